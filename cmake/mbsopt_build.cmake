@@ -1,0 +1,35 @@
+# mbsopt_sources(<variable> <folder>): every .cpp below a folder of the project; new files are seen at the next build.
+function(mbsopt_sources variable folder)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*.cpp)
+  set(${variable} ${sources} PARENT_SCOPE)
+endfunction()
+
+# mbsopt_compile_options(<target>): what every target of ours is compiled with. Imported targets are SYSTEM, so the
+# warnings are about our own code only.
+function(mbsopt_compile_options target)
+  target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+                                              $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/mbsopt>)
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wconversion -Wshadow)
+  if(MBSOPT_WERROR)
+    target_compile_options(${target} PRIVATE -Werror)
+  endif()
+  if(MBSOPT_NATIVE)  # PUBLIC: the alignment of Eigen's types depends on it
+    target_compile_options(${target} PUBLIC $<BUILD_INTERFACE:-march=native>)
+  endif()
+  if(MBSOPT_SANITIZE)
+    target_compile_options(${target} PRIVATE -fsanitize=address,undefined -fno-sanitize-recover=all
+                                             -fno-omit-frame-pointer)
+    target_link_options(${target} PUBLIC $<BUILD_INTERFACE:-fsanitize=address,undefined>)
+  endif()
+endfunction()
+
+# mbsopt_embed_text(<variable> <file> <name>): a source file that defines  extern const std::string_view mbsopt::<name>
+function(mbsopt_embed_text variable file name)
+  set(output ${CMAKE_CURRENT_BINARY_DIR}/embedded/${name}.cpp)
+  add_custom_command(OUTPUT ${output}
+    COMMAND ${CMAKE_COMMAND} -DINPUT=${file} -DOUTPUT=${output} -DNAME=${name}
+            -P ${PROJECT_SOURCE_DIR}/cmake/embed_text.cmake
+    DEPENDS ${file} ${PROJECT_SOURCE_DIR}/cmake/embed_text.cmake VERBATIM)
+  set(${variable} ${output} PARENT_SCOPE)
+endfunction()
