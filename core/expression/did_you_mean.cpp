@@ -1,0 +1,61 @@
+#include "core/expression/did_you_mean.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <limits>
+
+namespace mbsopt {
+
+namespace {
+
+constexpr std::size_t kLongestWord = 64;  // longer ones are not typing errors
+
+char lower(char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); }
+
+std::size_t distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const bool same = lower(a[i - 1]) == lower(b[j - 1]);
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (same ? 0 : 1)});
+      if (i > 1 && j > 1 && lower(a[i - 1]) == lower(b[j - 2]) && lower(a[i - 2]) == lower(b[j - 1]))
+        row[j] = std::min(row[j], before[j - 2] + 1);
+    }
+    before.swap(last);
+    last.swap(row);
+  }
+  return last[b.size()];
+}
+
+}  // namespace
+
+std::string did_you_mean(std::string_view word, const std::vector<std::string>& candidates) {
+  if (word.empty() || word.size() > kLongestWord) return "";
+  std::size_t best = std::numeric_limits<std::size_t>::max();
+  const std::string* nearest = nullptr;
+  for (const std::string& candidate : candidates) {
+    if (candidate.empty() || candidate.size() > kLongestWord) continue;
+    const std::size_t d = distance(word, candidate);
+    if (d < best) {
+      best = d;
+      nearest = &candidate;
+    }
+  }
+  const std::size_t allowed = std::max<std::size_t>(1, word.size() / 3);
+  // A wrong letter in a name of one letter is another name.
+  if (nearest == nullptr || best > allowed || best >= std::max(word.size(), nearest->size())) return "";
+  return " (did you mean '" + *nearest + "'?)";
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string all;
+  for (const std::string& word : words) {
+    if (!all.empty()) all += ", ";
+    all += word;
+  }
+  return all;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,44 @@
+// What a user writes in a numeric field: a number, or an expression over names ("rho*L1*w^2").
+// An Expression is an immutable syntax tree, cheap to copy; it is evaluated by compiling it (program.hpp).
+//
+//   Expression e = Expression::parse("m*g*l/2 + 3 [cm]");
+//   e.names();    // {"g", "l", "m"}
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace mbsopt {
+
+struct SyntaxTree;  // syntax_tree.hpp
+
+// A text that is not an expression: what is wrong and where (offset in bytes from the start of the text).
+class ExpressionError : public std::runtime_error {
+ public:
+  ExpressionError(const std::string& what, std::size_t at) : std::runtime_error(what), offset(at) {}
+  std::size_t offset;
+};
+
+class Expression {
+ public:
+  Expression() : Expression(0.0) {}
+  Expression(double value);  // NOLINT: a number is an expression
+  // Grammar: problem-format, "Numbers, expressions, names". Throws ExpressionError.
+  static Expression parse(std::string_view text);
+
+  bool is_number() const;                         // a plain constant: no names, already folded
+  double number() const;                          // its value; only where is_number()
+  const std::string& text() const;                // as written (a number: shortest form that reads back the same)
+  const std::vector<std::string>& names() const;  // free names, sorted, each once
+  bool depends_on(std::string_view name) const;
+  const SyntaxTree& tree() const { return *tree_; }
+
+ private:
+  std::shared_ptr<const SyntaxTree> tree_;
+};
+
+}  // namespace mbsopt

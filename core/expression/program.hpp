@@ -1,0 +1,87 @@
+// An Expression compiled against a table of symbols: a straight list of operations with value, exact gradient
+// (reverse sweep) and exact directional derivatives of both (forward over reverse, for second order).
+//
+//   Symbols symbols;
+//   int L = symbols.add_input("L");
+//   symbols.add_definition("half", Expression::parse("L/2"));
+//   Program program(Expression::parse("half^2"), symbols);
+//   Program::Scratch scratch = program.scratch();
+//   double x[] = {3.0}, g[] = {0.0};
+//   double value = program.add_gradient(x, 1.0, g, scratch);   // 2.25, g[0] = 1.5
+#pragma once
+
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "core/expression/expression.hpp"
+#include "core/expression/operation.hpp"
+
+namespace mbsopt {
+
+// Names an expression may use: inputs (numbered in the order added) and definitions (sub-expressions of them). A name
+// is one or the other, and is added once (std::invalid_argument otherwise).
+class Symbols {
+ public:
+  int add_input(const std::string& name);  // index of the input
+  void add_definition(const std::string& name, const Expression& expression);
+  int inputs() const { return static_cast<int>(input_names_.size()); }
+  const std::vector<std::string>& input_names() const { return input_names_; }
+  int input(std::string_view name) const;                     // its index, -1 when there is none
+  const Expression* definition(std::string_view name) const;  // nullptr when there is none
+  std::vector<std::string> names() const;                     // all of them, sorted
+
+ private:
+  std::vector<std::string> input_names_;
+  std::unordered_map<std::string, int> index_;
+  std::unordered_map<std::string, Expression> definitions_;
+};
+
+// A name that the table does not hold, or a definition that refers to itself (directly or through others).
+class UnknownName : public std::runtime_error {
+ public:
+  UnknownName(const std::string& what, std::string unknown) : std::runtime_error(what), name(std::move(unknown)) {}
+  std::string name;
+};
+
+class Program {
+ public:
+  // Sized once, reused by every evaluation; one per thread. A scratch serves any program not larger than its maker.
+  struct Scratch {
+    std::vector<double> value, adjoint, tangent, adjoint_tangent;
+  };
+
+  Program() = default;                                            // the constant 0
+  Program(const Expression& expression, const Symbols& symbols);  // throws UnknownName
+
+  Scratch scratch() const;
+  void grow(Scratch& scratch) const;  // makes a shared scratch large enough for this program, too
+
+  double value(std::span<const double> x, Scratch& scratch) const;
+  // Returns the value; gradient += scale * d value / d x   (gradient: size of x)
+  double add_gradient(std::span<const double> x, double scale, std::span<double> gradient, Scratch& scratch) const;
+  // Forward over reverse: gradient += scale * g, gradient_tangent += scale * (d g / d x) x_tangent, and the value's own
+  // tangent is returned.
+  double add_gradient_tangent(std::span<const double> x, std::span<const double> x_tangent, double scale,
+                              std::span<double> gradient, std::span<double> gradient_tangent, Scratch& scratch) const;
+
+  bool is_constant() const { return used_inputs_.empty(); }
+  const std::vector<int>& used_inputs() const { return used_inputs_; }  // sorted; structurally present
+  bool uses(int input) const;
+
+ private:
+  struct Instruction {
+    Operation operation = Operation::number;
+    int a = -1, b = -1;   // operands: earlier instructions; of a name: the index of the input
+    double constant = 0;  // of a number
+  };
+  friend class ProgramBuilder;
+  void sweep_values(std::span<const double> x, double* value) const;
+  std::vector<Instruction> code_;
+  std::vector<int> used_inputs_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,34 @@
+// What a parsed expression says: its operations in the order they are evaluated. Operands come before the operation
+// that uses them and may be used more than once, so that whoever reads a tree does it in one loop, however deep it is.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/expression/dimension.hpp"
+#include "core/expression/operation.hpp"
+
+namespace mbsopt {
+
+struct SyntaxNode {
+  Operation operation = Operation::number;
+  int a = -1, b = -1;             // operands: earlier nodes
+  double value = 0;               // of a number, in SI
+  std::optional<Dimension> unit;  // of a number written with a unit
+  std::string name;               // of a name
+  std::size_t offset = 0;         // where it stands in the text [bytes]
+};
+
+struct SyntaxTree {
+  std::vector<SyntaxNode> nodes;  // the last one is the whole expression
+  std::string text;
+  std::vector<std::string> names;  // free names, sorted, each once
+  std::optional<double> number;    // the value, where there are no names
+};
+
+SyntaxTree parse_expression(std::string_view text);  // throws ExpressionError
+
+}  // namespace mbsopt
