@@ -1,0 +1,14 @@
+// What the program says to the shell (docs/cli.md).
+#pragma once
+
+namespace mbsopt {
+
+enum ExitCode : int {
+  kDone = 0,
+  kNumericalFailure = 1,
+  kBadInput = 2,
+  kCheckFailed = 3,
+  kInterrupted = 130,  // 128 + SIGINT, as shells do
+};
+
+}  // namespace mbsopt

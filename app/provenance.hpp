@@ -1,0 +1,17 @@
+// Where a result comes from: enough to repeat it, and nothing that changes from run to run.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+namespace mbsopt {
+
+std::string program_version();
+std::string sha256_of_file(const std::string& path);  // lower-case hex; empty where it cannot be read
+
+// {"command_line", "input", "input_sha256", "data_sha256": {file: hash}, "libraries": {name: version}}
+nlohmann::ordered_json provenance(const std::vector<std::string>& arguments, const std::string& input_as_stored,
+                                  const std::string& problem_file, const std::vector<std::string>& data_files);
+
+}  // namespace mbsopt

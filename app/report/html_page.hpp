@@ -1,0 +1,30 @@
+// A static, self-contained HTML page: headings, sentences, tables and plots; light and dark. No scripts, nothing from
+// the network, no time stamp.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace mbsopt {
+
+struct LinePlot;
+
+std::string html_escaped(std::string_view text);
+
+class HtmlPage {
+ public:
+  explicit HtmlPage(std::string title) : title_(std::move(title)) {}
+
+  void heading(std::string_view text);
+  void paragraph(std::string_view text);
+  // The first column holds names; the others are numbers or short words.
+  void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
+  void plot(const LinePlot& plot);
+  std::string text() const;
+
+ private:
+  std::string title_, body_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,171 @@
+#include "app/report/line_plot.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+
+#include "app/report/html_page.hpp"
+
+namespace mbsopt {
+namespace {
+
+constexpr double kWidth = 760, kHeight = 320;                       // of the drawing [px]
+constexpr double kLeft = 78, kRight = 16, kTop = 30, kBottom = 44;  // margins
+constexpr double kInnerWidth = kWidth - kLeft - kRight, kInnerHeight = kHeight - kTop - kBottom;
+constexpr int kColours = 8;
+
+struct Range {
+  double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
+  void include(double value) { low = std::min(low, value), high = std::max(high, value); }
+  double span() const { return high - low; }
+  // Never empty and never of zero length; a little air at both ends.
+  void finish(double air) {
+    if (low > high) low = 0, high = 1;
+    const double smallest = 1e-12 * std::max(std::abs(low), std::abs(high));
+    if (span() <= smallest) {
+      const double half = low == 0 ? 1 : 0.1 * std::abs(low);
+      low -= half, high += half;
+    } else {
+      low -= air * span(), high += air * (high - low) / (1 + air);
+    }
+  }
+};
+
+// Data to pixels.
+struct Frame {
+  Range x, y;
+  double px(double value) const { return kLeft + (value - x.low) / x.span() * kInnerWidth; }
+  double py(double value) const { return kTop + (y.high - value) / y.span() * kInnerHeight; }
+};
+
+double y_of(const LinePlot& plot, double value) { return plot.logarithmic_y ? std::log10(value) : value; }
+
+Frame frame_of(const LinePlot& plot) {
+  Frame frame;
+  for (const PlotSeries& series : plot.series) {
+    for (std::size_t i = 0; i < series.x.size(); ++i) {
+      const double y = y_of(plot, series.y[i]);
+      if (!std::isfinite(series.x[i]) || !std::isfinite(y)) continue;
+      frame.x.include(series.x[i]);
+      frame.y.include(y);
+    }
+  }
+  frame.x.finish(plot.equal_axes ? 0.05 : 0);
+  frame.y.finish(0.05);
+  if (plot.equal_axes) {
+    const double scale = std::max(frame.x.span() / kInnerWidth, frame.y.span() / kInnerHeight);
+    const auto widen = [](Range& range, double span) {
+      const double middle = (range.low + range.high) / 2;
+      range.low = middle - span / 2, range.high = middle + span / 2;
+    };
+    widen(frame.x, scale * kInnerWidth);
+    widen(frame.y, scale * kInnerHeight);
+  }
+  return frame;
+}
+
+// Many samples to a pixel column become at most its first, lowest, highest and last: the drawing is the same.
+std::vector<std::size_t> visible_samples(const PlotSeries& series, const Frame& frame) {
+  std::vector<std::size_t> all(series.x.size());
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
+  if (series.x.size() <= 2 * static_cast<std::size_t>(kInnerWidth) ||
+      !std::is_sorted(series.x.begin(), series.x.end())) {
+    return all;
+  }
+  std::vector<std::size_t> kept;
+  for (std::size_t begin = 0; begin < all.size();) {
+    const double column = std::floor(frame.px(series.x[begin]));
+    std::size_t end = begin, low = begin, high = begin;
+    for (; end < all.size() && std::floor(frame.px(series.x[end])) == column; ++end) {
+      if (series.y[end] < series.y[low]) low = end;
+      if (series.y[end] > series.y[high]) high = end;
+    }
+    end = std::max(end, begin + 1);  // a value that is not finite has no column
+    for (const std::size_t i : {begin, std::min(low, high), std::max(low, high), end - 1}) {
+      if (kept.empty() || kept.back() < i) kept.push_back(i);
+    }
+    begin = end;
+  }
+  return kept;
+}
+
+void draw_series(const LinePlot& plot, const Frame& frame, std::size_t index, std::string& svg) {
+  const PlotSeries& series = plot.series[index];
+  std::string path;
+  bool pen_down = false;
+  for (const std::size_t i : visible_samples(series, frame)) {
+    const double y = y_of(plot, series.y[i]);
+    if (!std::isfinite(series.x[i]) || !std::isfinite(y)) {
+      pen_down = false;
+      continue;
+    }
+    const double px = frame.px(series.x[i]), py = frame.py(y);
+    if (series.mark == Mark::points) {
+      fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}h0", px, py);
+    } else {
+      fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}", pen_down ? 'L' : 'M', px, py);
+    }
+    pen_down = true;
+  }
+  const char* mark = series.mark == Mark::points ? "points" : series.mark == Mark::dashed ? "line dashed" : "line";
+  svg += fmt::format("<path class=\"{} c{}\" d=\"{}\"/>\n", mark, index % kColours, path);
+}
+
+void draw_axes(const LinePlot& plot, const Frame& frame, std::string& svg) {
+  const double bottom = kTop + kInnerHeight, right = kLeft + kInnerWidth;
+  const auto x_ticks = round_ticks(frame.x.low, frame.x.high, 8);
+  const auto y_ticks = round_ticks(frame.y.low, frame.y.high, plot.equal_axes ? 5 : 6);
+  for (const double tick : x_ticks) {
+    svg += fmt::format(
+        "<path class=\"grid\" d=\"M{0:.1f} {1:.1f}V{2:.1f}\"/><text x=\"{0:.1f}\" y=\"{3:.1f}\" "
+        "text-anchor=\"middle\">{4:.6g}</text>\n",
+        frame.px(tick), kTop, bottom, bottom + 16, tick);
+  }
+  for (const double tick : y_ticks) {
+    if (plot.logarithmic_y && tick != std::round(tick)) continue;  // whole decades only
+    const std::string label = plot.logarithmic_y ? fmt::format("1e{:.0f}", tick) : fmt::format("{:.6g}", tick);
+    svg += fmt::format(
+        "<path class=\"grid\" d=\"M{1:.1f} {0:.1f}H{2:.1f}\"/><text x=\"{3:.1f}\" y=\"{4:.1f}\" "
+        "text-anchor=\"end\">{5}</text>\n",
+        frame.py(tick), kLeft, right, kLeft - 6, frame.py(tick) + 4, label);
+  }
+  svg += fmt::format("<rect class=\"frame\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n", kLeft, kTop, kInnerWidth,
+                     kInnerHeight);
+  svg += fmt::format("<text class=\"label\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n",
+                     kLeft + kInnerWidth / 2, kHeight - 8, html_escaped(plot.x_label));
+  svg +=
+      fmt::format("<text class=\"label\" transform=\"translate(14 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
+                  kTop + kInnerHeight / 2, html_escaped(plot.y_label));
+  svg += fmt::format("<text class=\"title\" x=\"{}\" y=\"18\">{}</text>\n", kLeft, html_escaped(plot.title));
+}
+
+}  // namespace
+
+std::vector<double> round_ticks(double low, double high, int count) {
+  const double raw = (high - low) / count;
+  const double power = std::pow(10, std::floor(std::log10(raw)));
+  const double step = power * (raw <= power ? 1 : raw <= 2 * power ? 2 : raw <= 5 * power ? 5 : 10);
+  std::vector<double> ticks;
+  for (double k = std::ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k) ticks.push_back(k * step + 0.0);
+  return ticks;
+}
+
+std::string to_svg(const LinePlot& plot) {
+  const Frame frame = frame_of(plot);
+  std::string svg = fmt::format("<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">\n", kWidth, kHeight,
+                                html_escaped(plot.title));
+  draw_axes(plot, frame, svg);
+  for (std::size_t i = 0; i < plot.series.size(); ++i) draw_series(plot, frame, i, svg);
+  svg += "</svg>\n";
+  if (plot.series.size() < 2) return svg;
+  svg += "<div class=\"legend\">";
+  for (std::size_t i = 0; i < plot.series.size(); ++i) {
+    svg += fmt::format("<span><i class=\"b{}\"></i>{}</span>", i % kColours, html_escaped(plot.series[i].name));
+  }
+  return svg + "</div>\n";
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,34 @@
+// A line plot as SVG text: axes with round numbers, units in the labels, a legend; colours come from the page's style.
+//
+//   LinePlot plot{.title = "Angle", .x_label = "t [s]", .y_label = "angle [rad]"};
+//   plot.series.push_back({"model", t, angle});
+//   plot.series.push_back({"measured", t_k, z, Mark::points});
+//   page.add(plot);
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace mbsopt {
+
+enum class Mark { line, dashed, points };
+
+struct PlotSeries {
+  std::string name;
+  std::vector<double> x, y;  // values that are not finite are left out
+  Mark mark = Mark::line;
+};
+
+struct LinePlot {
+  std::string title, x_label, y_label;
+  std::vector<PlotSeries> series;
+  bool logarithmic_y = false;  // values <= 0 are left out
+  bool equal_axes = false;     // one metre is as long in x as in y: for paths
+};
+
+std::string to_svg(const LinePlot& plot);
+
+// About `count` round numbers (1, 2 or 5 times a power of ten) that cover [low, high].
+std::vector<double> round_ticks(double low, double high, int count);
+
+}  // namespace mbsopt
