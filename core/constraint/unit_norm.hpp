@@ -1,0 +1,21 @@
+// Unit norm of a body's Euler parameters, one equation per body.   [-]
+//   Phi = p'p - 1      Phi_p = 2 p'      Phidot = 2 p'pdot      Phiddot = 2 p'pddot + 2 pdot'pdot
+// The dynamics solves it by hand (frame.hpp: pddot has the component -(pdot'pdot) p along p); assembly and projection
+// impose it on positions and velocities.
+#pragma once
+
+#include "core/body/fixed_size.hpp"
+
+namespace mbsopt {
+
+struct UnitNorm {
+  static double phi(const Vector4d& p) { return p.squaredNorm() - 1; }
+  static double phi_dot(const Vector4d& p, const Vector4d& pdot) { return 2 * p.dot(pdot); }
+  static Vector4d phi_p(const Vector4d& p) { return 2 * p; }
+
+  // p -> p/|p| and pdot -> pdot - p (p'pdot) for unit p: the nearest numbers that satisfy both equations.
+  static Vector4d project(const Vector4d& p) { return p / p.norm(); }
+  static Vector4d project_rate(const Vector4d& p, const Vector4d& pdot) { return pdot - p * p.dot(pdot); }
+};
+
+}  // namespace mbsopt

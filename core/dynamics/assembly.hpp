@@ -1,0 +1,39 @@
+// Initial assembly: the nearest state to the guess that satisfies all constraints and initial.conditions.
+//
+//   positions:   min 1/2 |q - q_guess|^2   subject to  Phi(q, rho) = 0, c(q, rho) = 0      (q: r_g and p, unweighted)
+//   velocities:  min 1/2 |v - v_guess|^2   subject to  Phi_q v = -Phi_t, c_q v = rates
+//
+// Derivatives come from the optimality conditions of both problems.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+
+#include "core/mechanism/mechanism.hpp"
+
+namespace mbsopt {
+
+struct AssemblyResult {
+  bool ok = false;
+  std::string message;     // names violated constraints and amounts where it failed
+  Eigen::VectorXd y;       // (q, v)
+  Eigen::VectorXd angles;  // branch of each tracked joint angle
+  int iterations = 0;
+  double residual = 0;
+};
+
+class Assembly {
+ public:
+  Assembly(const Mechanism& mechanism, double start_time);
+  ~Assembly();
+  const AssemblyResult& result() const;
+  ModelSummary summary() const;
+  Eigen::MatrixXd tangent() const;                                                 // dy/drho, 14n x P
+  void add_adjoint(const Eigen::MatrixXd& y_bar, Eigen::MatrixXd& rho_bar) const;  // rho_bar += (dy/drho)' y_bar
+
+ private:
+  struct Solution;
+  std::unique_ptr<Solution> solution_;
+};
+
+}  // namespace mbsopt

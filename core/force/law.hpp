@@ -1,0 +1,83 @@
+// A force's law: a scalar function of two state variables (a length and its rate, an angle and its rate), of time and
+// of parameters, with its derivatives. Either the linear law  k (x - x0) + c xdot + f0  or a user's expression.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "core/body/fixed_size.hpp"
+#include "core/expression/program.hpp"
+
+namespace mbsopt {
+
+struct Law {
+  double k = 0, c = 0, x0 = 0, f0 = 0;  // [N/m, N s/m, m, N] or [N m/rad, N m s/rad, rad, N m]
+  int slot = -1;                        // first of the four rows k, c, x0, f0 among the differentiated fields
+  std::optional<Program> program;       // inputs: all parameters, then x, xdot, t
+
+  // Reusable numbers of one evaluation; gradient: all parameters, then x, xdot, t.
+  struct Scratch {
+    std::vector<double> inputs, gradient;
+    Program::Scratch program;
+  };
+
+  struct Value {
+    double f, f_x, f_xdot;
+  };
+
+  double value(double t, const Eigen::VectorXd& rho, double x, double xdot, Scratch& s) const {
+    if (!program) return k * (x - x0) + c * xdot + f0;
+    set_inputs(t, rho, x, xdot, s);
+    return program->value(s.inputs, s.program);
+  }
+
+  // With derivatives; those in the parameters of a program stay in s.gradient.
+  Value derivatives(double t, const Eigen::VectorXd& rho, double x, double xdot, Scratch& s) const {
+    if (!program) return {k * (x - x0) + c * xdot + f0, k, c};
+    set_inputs(t, rho, x, xdot, s);
+    std::fill(s.gradient.begin(), s.gradient.end(), 0.0);
+    const double f = program->add_gradient(s.inputs, 1.0, s.gradient, s.program);
+    const std::size_t P = static_cast<std::size_t>(rho.size());
+    return {f, s.gradient[P], s.gradient[P + 1]};
+  }
+
+  // theta_bar, rho_bar += f_bar df/d(fields, parameters), after derivatives() at the same point.
+  void add_field_gradient(double x, double xdot, double f_bar, const Scratch& s, Eigen::VectorXd& theta_bar,
+                          Eigen::VectorXd& rho_bar) const {
+    if (program) {
+      for (Eigen::Index i = 0; i < rho_bar.size(); ++i) rho_bar(i) += f_bar * s.gradient[static_cast<std::size_t>(i)];
+    } else if (slot >= 0) {
+      theta_bar(slot) += f_bar * (x - x0);
+      theta_bar(slot + 1) += f_bar * xdot;
+      theta_bar(slot + 2) -= f_bar * k;
+      theta_bar(slot + 3) += f_bar;
+    }
+  }
+
+  // Derivative of f through the law's own fields (directions of k, c, x0, f0; null: constant) and, for a program,
+  // through the parameters, whose directions are the rows of rho_dir(parameter).
+  template <class RhoDirection>
+  Lanes<1> field_tangent(double x, double xdot, const Lanes<4>* fields, RhoDirection&& rho_dir,
+                         const Scratch& s) const {
+    Lanes<1> df = Lanes<1>::Zero();
+    if (program) {
+      for (const int input : program->used_inputs()) {
+        const std::size_t i = static_cast<std::size_t>(input);
+        if (i + 3 < s.gradient.size()) df += s.gradient[i] * rho_dir(input);
+      }
+    } else if (fields) {
+      df = (x - x0) * fields->row(0) + xdot * fields->row(1) - k * fields->row(2) + fields->row(3);
+    }
+    return df;
+  }
+
+ private:
+  void set_inputs(double t, const Eigen::VectorXd& rho, double x, double xdot, Scratch& s) const {
+    std::copy(rho.data(), rho.data() + rho.size(), s.inputs.begin());
+    const std::size_t P = static_cast<std::size_t>(rho.size());
+    s.inputs[P] = x, s.inputs[P + 1] = xdot, s.inputs[P + 2] = t;
+  }
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,77 @@
+// Forward simulation, and its exact discrete derivatives by tangent-linear (TLM) and adjoint sweeps.
+//
+// All three take the same steps and compute the same numbers; the derivatives are those of the numbers computed, with
+// the accepted steps held fixed, through projection and initial assembly.
+//
+//   const Mechanism mechanism(scene, rho);
+//   SimulationResult run = simulate(mechanism, scene.simulation, {cost});        // run.psi(0)
+//   SimulationResult back = simulate_adjoint(mechanism, scene.simulation, {cost});  // back.psi_rho.row(0)
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/integrate/cost.hpp"
+#include "core/scene/settings.hpp"
+
+namespace mbsopt {
+
+class Mechanism;
+
+// Accepted steps: times.size() == sizes.size(); step i goes from times[i] by sizes[i].
+struct StepSequence {
+  std::vector<double> times, sizes;
+};
+
+struct SimulationStatistics {
+  long steps = 0, rejected = 0, rhs_evaluations = 0, factorisations = 0;
+  double wall_seconds = 0;
+  double max_position_violation = 0;                              // of |Phi| over accepted steps [m, -]
+  double max_velocity_violation = 0;                              // of |Phi_q v + Phi_t|
+  double energy_initial = 0, energy_final = 0, energy_drift = 0;  // drift: largest |E - E(0)| over accepted steps [J]
+  std::size_t adjoint_memory_bytes = 0;                           // what the backward sweep kept of the forward run
+};
+
+enum class SimulationStatus { ok, assembly_failed, step_too_small, too_many_steps, not_finite };
+
+struct SimulationResult {
+  SimulationStatus status = SimulationStatus::ok;
+  std::string message;        // in words, with t, h and what to try; empty where ok
+  double last_good_time = 0;  // [s]
+  Eigen::VectorXd psi;        // per cost
+  Eigen::MatrixXd psi_rho;    // cost x parameter; TLM and adjoint only
+  Eigen::VectorXd y_initial, y_end;
+  SimulationStatistics statistics;
+  StepSequence steps;
+  bool ok() const { return status == SimulationStatus::ok; }
+};
+
+// States wanted at given times (ascending, within the simulated span), through dense output; never forces a step.
+struct Sampling {
+  std::vector<double> times;
+  std::function<void(std::size_t index, const StatePoint& at)> observe;
+};
+// The same with derivatives: y_rho is dy/drho at that time, 14n x P.
+struct TangentSampling {
+  std::vector<double> times;
+  std::function<void(std::size_t index, const StatePoint& at, const Eigen::MatrixXd& y_rho)> observe;
+};
+
+struct RunOptions {
+  const StepSequence* frozen = nullptr;    // take exactly these steps
+  std::function<bool(double t)> progress;  // called after accepted steps; false stops the run (status not_finite never)
+};
+
+SimulationResult simulate(const Mechanism& mechanism, const SimulationSettings& settings,
+                          std::span<const Cost> costs = {}, const Sampling& sampling = {},
+                          const RunOptions& options = {});
+SimulationResult simulate_tlm(const Mechanism& mechanism, const SimulationSettings& settings,
+                              std::span<const Cost> costs = {}, const TangentSampling& sampling = {},
+                              const RunOptions& options = {});
+SimulationResult simulate_adjoint(const Mechanism& mechanism, const SimulationSettings& settings,
+                                  std::span<const Cost> costs, const RunOptions& options = {});
+
+}  // namespace mbsopt

@@ -1,0 +1,90 @@
+#include "core/mechanism/field_values.hpp"
+
+#include <cmath>
+
+#include "core/mechanism/mechanism.hpp"
+
+namespace mbsopt {
+
+FieldValues::FieldValues(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<int>& active)
+    : rho_(rho), active_index_(active), active_(static_cast<Eigen::Index>(active.size())) {
+  for (const Parameter& p : scene.parameters) symbols_.add_input(p.name);
+  for (const Definition& d : scene.definitions) symbols_.add_definition(d.name, d.value);
+}
+
+Dual FieldValues::value(const Field& field, const std::string& where) const {
+  if (field.is_number()) return constant(field.number());
+  try {
+    const Program program(field, symbols_);
+    Program::Scratch scratch = program.scratch();
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(rho_.size());
+    const std::span<const double> x(rho_.data(), static_cast<std::size_t>(rho_.size()));
+    const double v = program.add_gradient(
+        x, 1.0, std::span<double>(gradient.data(), static_cast<std::size_t>(rho_.size())), scratch);
+    Eigen::VectorXd d(active_);
+    for (Eigen::Index k = 0; k < active_; ++k) d(k) = gradient(active_index_[static_cast<std::size_t>(k)]);
+    if (!std::isfinite(v) || !d.allFinite()) {
+      throw SceneError(where + ": '" + field.text() + "' or its derivative is not finite at these parameters");
+    }
+    return Dual(v, d);
+  } catch (const UnknownName& e) {
+    throw SceneError(where + ": " + e.what());
+  }
+}
+
+Eigen::MatrixXd FieldValues::theta_rho() const {
+  Eigen::MatrixXd result(static_cast<Eigen::Index>(rows_.size()), active_);
+  for (std::size_t i = 0; i < rows_.size(); ++i) result.row(static_cast<Eigen::Index>(i)) = rows_[i].transpose();
+  return result;
+}
+
+DualVector3 operator+(const DualVector3& a, const DualVector3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+DualVector3 operator-(const DualVector3& a, const DualVector3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+DualVector3 operator*(const Dual& a, const DualVector3& b) { return {a * b[0], a * b[1], a * b[2]}; }
+Dual dot(const DualVector3& a, const DualVector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+DualVector3 cross(const DualVector3& a, const DualVector3& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+DualVector3 unit(const DualVector3& a) {
+  const Dual norm = sqrt(dot(a, a));
+  return {a[0] / norm, a[1] / norm, a[2] / norm};
+}
+
+DualVector3 perpendicular(const DualVector3& a) {
+  Eigen::Index k = 0;
+  numbers(a).cwiseAbs().minCoeff(&k);
+  const Dual zero = 0.0 * a[0], one = zero + 1.0;
+  DualVector3 e{zero, zero, zero};
+  e[static_cast<std::size_t>(k)] = one;
+  return unit(cross(a, e));
+}
+
+DualVector3 perpendicular_part(const DualVector3& n, const DualVector3& a) {
+  const Dual along = dot(n, a);
+  return unit(n - along * a);
+}
+
+DualVector4 unit(const DualVector4& p) {
+  const Dual norm = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
+  return {p[0] / norm, p[1] / norm, p[2] / norm, p[3] / norm};
+}
+
+DualVector4 quaternion_product(const DualVector4& a, const DualVector4& b) {
+  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
+}
+
+DualVector4 euler_parameters(const DualVector3& unit_axis, const Dual& angle) {
+  const Dual half = 0.5 * angle;
+  const Dual c = cos(half), s = sin(half);
+  return {c, s * unit_axis[0], s * unit_axis[1], s * unit_axis[2]};
+}
+
+DualVector3 rotated(const DualVector4& p, const DualVector3& s) {
+  const DualVector3 e{p[1], p[2], p[3]};
+  const Dual a = p[0] * p[0] - dot(e, e), b = 2.0 * dot(e, s), c = 2.0 * p[0];
+  return a * s + b * e + c * cross(e, s);
+}
+
+}  // namespace mbsopt

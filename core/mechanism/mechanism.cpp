@@ -1,0 +1,44 @@
+#include "core/mechanism/mechanism.hpp"
+
+#include <algorithm>
+
+#include "core/mechanism/compile.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/state_point.hpp"
+
+namespace mbsopt {
+
+Mechanism::Mechanism(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active,
+                     std::vector<std::shared_ptr<const UserForce>> user_forces)
+    : data_(std::make_shared<const MechanismData>(compile(scene, rho, active, std::move(user_forces)))) {}
+
+int Mechanism::bodies() const { return data_->n; }
+int Mechanism::states() const { return 14 * data_->n; }
+int Mechanism::parameters() const { return static_cast<int>(data_->rho.size()); }
+const Eigen::VectorXd& Mechanism::rho() const { return data_->rho; }
+int Mechanism::sensors() const { return static_cast<int>(data_->sensors.size()); }
+
+int Mechanism::sensor(const std::string& name) const {
+  const auto found = std::find(data_->sensor_names.begin(), data_->sensor_names.end(), name);
+  return found == data_->sensor_names.end() ? -1 : static_cast<int>(found - data_->sensor_names.begin());
+}
+
+double Mechanism::sensor_value(int sensor, const StatePoint& at) const {
+  return evaluate(*data_, data_->sensors[static_cast<std::size_t>(sensor)], at.t, at.y, at.angles);
+}
+
+double Mechanism::add_sensor_gradient(int sensor, const StatePoint& at, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
+                                      Eigen::Ref<Eigen::VectorXd> rho_bar) const {
+  return add_gradient(*data_, data_->sensors[static_cast<std::size_t>(sensor)], at.t, at.y, at.angles, scale, y_bar,
+                      rho_bar);
+}
+
+Eigen::Matrix<double, 13, 1> body_row(const Mechanism& mechanism, int body, const StatePoint& at) {
+  const BodyAt b = body_at(at.y, body + 1);
+  const Vector3d to_origin = -mechanism.data().bodies[static_cast<std::size_t>(body + 1)].com;
+  Eigen::Matrix<double, 13, 1> row;
+  row << b.frame.point(to_origin), b.state.p, b.frame.point_dot(to_origin), b.frame.A * b.state.omega();
+  return row;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,61 @@
+// The scene compiled at one value of its parameters: bodies numbered, joints turned into primitives, every numeric
+// field a number with its derivative in rho. Const after construction; a Workspace (workspace.hpp) owns what a step
+// touches.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+
+namespace mbsopt {
+
+struct MechanismData;  // mechanism_data.hpp
+struct UserForce;      // core/force/user_force.hpp
+struct StatePoint;
+
+// The scene cannot be compiled: what is wrong, with the place in the scene ("bodies[2].inertia").
+class SceneError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class Mechanism {
+ public:
+  // rho: one value per scene.parameters, in their order. active[k]: whether derivatives in rho_k are wanted (empty:
+  // all).
+  Mechanism(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active = {},
+            std::vector<std::shared_ptr<const UserForce>> user_forces = {});
+
+  int bodies() const;  // the ground not counted
+  int states() const;  // of y: 14 per body
+  int parameters() const;
+  const Eigen::VectorXd& rho() const;
+  int sensors() const;                        // in the order of scene.sensors
+  int sensor(const std::string& name) const;  // index, -1 when there is none
+
+  // Value of a sensor at a state, and with its gradient: y_bar += scale d/dy, rho_bar += scale d/drho.
+  double sensor_value(int sensor, const StatePoint& at) const;
+  double add_sensor_gradient(int sensor, const StatePoint& at, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
+                             Eigen::Ref<Eigen::VectorXd> rho_bar) const;
+
+  const MechanismData& data() const { return *data_; }
+
+ private:
+  std::shared_ptr<const MechanismData> data_;
+};
+
+// Body-frame quantities of one body at a state, for output: origin, Euler parameters, origin's velocity, angular
+// velocity (global components): x y z e0..e3 vx vy vz wx wy wz.
+Eigen::Matrix<double, 13, 1> body_row(const Mechanism& mechanism, int body, const StatePoint& at);
+
+// Counts of equations at the assembled initial state.
+struct ModelSummary {
+  int bodies = 0, equations = 0, rank = 0, degrees_of_freedom = 0;  // equations: joints' and unit-norm rows
+  std::vector<std::string> redundant;  // joints that hold redundant equations, "name (2 of 5)"
+};
+
+}  // namespace mbsopt

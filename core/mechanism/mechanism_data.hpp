@@ -1,0 +1,107 @@
+// The numbers of a compiled mechanism. Every field that depends on an active parameter owns rows ("slots") of
+// theta_rho, its derivative; a field without a slot (-1) is constant and costs nothing.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/constraint/constraint.hpp"
+#include "core/force/rsda.hpp"
+#include "core/force/tsda.hpp"
+#include "core/force/user_force.hpp"
+#include "core/sensor/joint_angle.hpp"
+#include "core/sensor/point_sensor.hpp"
+#include "core/sensor/rotation_sensor.hpp"
+
+namespace mbsopt {
+
+struct BodyData {
+  double mass = 0;                                 // [kg]
+  Matrix3d J = Matrix3d::Zero();                   // about the centre of mass, body axes [kg m^2]
+  Vector3d com = Vector3d::Zero();                 // in the body frame [m]
+  int slot_mass = -1, slot_J = -1, slot_com = -1;  // slot_J: xx yy zz xy xz yz
+  // Guess of the initial state.
+  Vec<7> q = Vec<7>::Zero();                                                  // (r_g, p)
+  Vector3d velocity = Vector3d::Zero(), angular_velocity = Vector3d::Zero();  // of the body-frame origin; global
+  int slot_q = -1, slot_velocity = -1, slot_angular_velocity = -1;
+};
+
+struct AngleSensor {
+  int angle = 0;  // index of the JointAngle
+  bool rate = false;
+};
+struct EnergySensor {
+  bool kinetic = true, potential = true;
+};
+struct ViolationSensor {};  // the largest |Phi| of joints and unit norms
+
+using SensorKind =
+    std::variant<PointSensor, AngularVelocitySensor, CoordinateSensor, AngleSensor, EnergySensor, ViolationSensor>;
+
+// Consecutive rows of Phi that tie the same two bodies.
+struct RowGroup {
+  int body1 = 0, body2 = 0, row = 0, rows = 0;
+};
+
+struct ConditionData {
+  int sensor = 0;
+  SensorKind rate_kind;  // the sensor's time derivative, where rate is set
+  bool has_value = false, has_rate = false, modulo_turn = false, velocity_level = false;
+  double value = 0, rate = 0;
+  int slot_value = -1, slot_rate = -1;
+};
+
+struct UserForceData {
+  std::shared_ptr<const UserForce> force;
+  std::vector<int> bodies;  // 1-based
+};
+
+struct MechanismData {
+  int n = 0;                  // bodies, the ground not counted
+  int m = 0;                  // rows of Phi, unit norms not counted
+  Eigen::VectorXd rho;        // all parameters
+  std::vector<int> active;    // parameters with respect to which derivatives are carried
+  Eigen::MatrixXd theta_rho;  // slots x active
+
+  std::vector<BodyData> bodies;  // [0] is the ground
+  Vector3d gravity = Vector3d::Zero();
+  int slot_gravity = -1;
+  std::vector<Constraint> constraints;
+  std::vector<RowGroup> groups;
+  std::vector<JointAngle> angles;
+  std::vector<TsdaForce> tsda;
+  std::vector<RsdaForce> rsda;
+  std::vector<UserForceData> user_forces;
+  std::vector<SensorKind> sensors;
+  std::vector<std::string> sensor_names;
+  std::vector<ConditionData> conditions;
+  std::vector<std::string> body_names, joint_names;  // body_names[0] = "ground"
+  int largest_law = 0;                               // inputs of the largest law, for scratch
+
+  Eigen::Index slots() const { return theta_rho.rows(); }
+  // rho_bar (all parameters) += (d theta/d rho)' theta_bar
+  void add_to_rho(const Eigen::VectorXd& theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) const {
+    for (std::size_t k = 0; k < active.size(); ++k) {
+      rho_bar(active[k]) += theta_rho.col(static_cast<Eigen::Index>(k)).dot(theta_bar);
+    }
+  }
+};
+
+// Value of a sensor at (y, branch of the angles), and its gradient: y_bar += scale d/dy, and in the fields and
+// parameters. rho_bar is with respect to all parameters.
+double evaluate(const MechanismData& data, const SensorKind& sensor, double t, const Eigen::VectorXd& y,
+                const Eigen::VectorXd& angles);
+double add_gradient(const MechanismData& data, const SensorKind& sensor, double t, const Eigen::VectorXd& y,
+                    const Eigen::VectorXd& angles, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
+                    Eigen::Ref<Eigen::VectorXd> rho_bar);
+
+struct Energy {
+  double kinetic = 0, potential = 0;
+};
+// Potential: gravity's, zero at the origin, and that of springs with constant coefficients.   [J]
+Energy energy(const MechanismData& data, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
+
+}  // namespace mbsopt

@@ -1,0 +1,228 @@
+// Sensors evaluated on a compiled mechanism: those of bodies and joints, and the whole model's energy and violation.
+#include <cmath>
+
+#include "core/constraint/unit_norm.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+
+namespace mbsopt {
+namespace {
+
+using VecOut = Eigen::Ref<Eigen::VectorXd>;
+
+// rho_bar (all parameters) += scale (d slot/d rho)' bar
+template <int N>
+void add_slot(const MechanismData& d, int slot, const Vec<N>& bar, double scale, VecOut rho_bar) {
+  if (slot < 0) return;
+  for (std::size_t k = 0; k < d.active.size(); ++k) {
+    rho_bar(d.active[k]) += scale * d.theta_rho.col(static_cast<Eigen::Index>(k)).segment<N>(slot).dot(bar);
+  }
+}
+
+double branch(const Eigen::VectorXd& angles, int i) { return i < angles.size() ? angles(i) : 0.0; }
+
+double angle_value(const MechanismData& d, const AngleSensor& s, const Eigen::VectorXd& y,
+                   const Eigen::VectorXd& angles) {
+  const JointAngle& joint = d.angles[static_cast<std::size_t>(s.angle)];
+  const JointAngle::Jet j = joint.jet(body_at(y, joint.body1).frame, body_at(y, joint.body2).frame);
+  return s.rate ? j.rate() : JointAngle::on_branch(j.angle(), branch(angles, s.angle));
+}
+
+double angle_gradient(const MechanismData& d, const AngleSensor& s, const Eigen::VectorXd& y,
+                      const Eigen::VectorXd& angles, double scale, VecOut y_bar, VecOut rho_bar) {
+  const JointAngle& joint = d.angles[static_cast<std::size_t>(s.angle)];
+  const BodyAt b1 = body_at(y, joint.body1), b2 = body_at(y, joint.body2);
+  const JointAngle::Jet j = joint.jet(b1.frame, b2.frame);
+  FrameBar bar1, bar2;
+  bar1.set_zero(), bar2.set_zero();
+  JointAngle::SlotBars s_bar;
+  joint.pull_back(b1.frame, b2.frame, j, s.rate ? 0 : 1, s.rate ? 1 : 0, 0, bar1, bar2, s_bar);
+  add_pull_back(b1, joint.body1, bar1, scale, y_bar);
+  add_pull_back(b2, joint.body2, bar2, scale, y_bar);
+  add_slot<3>(d, joint.slot_x1, s_bar.x1, scale, rho_bar);
+  add_slot<3>(d, joint.slot_y1, s_bar.y1, scale, rho_bar);
+  add_slot<3>(d, joint.slot_n2, s_bar.n2, scale, rho_bar);
+  return s.rate ? j.rate() : JointAngle::on_branch(j.angle(), branch(angles, s.angle));
+}
+
+Vec<6> inertia_entries(const Matrix3d& X) {  // gradient in xx yy zz xy xz yz of <X, J>
+  Vec<6> x;
+  x << X(0, 0), X(1, 1), X(2, 2), X(0, 1) + X(1, 0), X(0, 2) + X(2, 0), X(1, 2) + X(2, 1);
+  return x;
+}
+
+void add_kinetic_gradient(const MechanismData& d, const Eigen::VectorXd& y, double scale, VecOut y_bar,
+                          VecOut rho_bar) {
+  for (int i = 1; i <= d.n; ++i) {
+    const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
+    const BodyAt b = body_at(y, i);
+    const Vector3d w = b.state.omega(), w_bar = body.J * w;
+    const Eigen::Index q = 7 * (i - 1), v = y.size() / 2 + q;
+    y_bar.segment<3>(v) += scale * body.mass * b.frame.rdot;
+    // w = 2 G(p) pdot = -2 G(pdot) p
+    y_bar.segment<4>(v + 3) += 2 * scale * G_transposed_times(b.state.p, w_bar);
+    y_bar.segment<4>(q + 3) -= 2 * scale * G_transposed_times(b.state.pdot, w_bar);
+    add_slot<1>(d, body.slot_mass, Vec<1>(0.5 * b.frame.rdot.squaredNorm()), scale, rho_bar);
+    add_slot<6>(d, body.slot_J, inertia_entries(0.5 * w * w.transpose()), scale, rho_bar);
+  }
+}
+
+void add_potential_gradient(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                            double scale, VecOut y_bar, VecOut rho_bar) {
+  for (int i = 1; i <= d.n; ++i) {
+    const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
+    const Vector3d r = y.segment<3>(7 * (i - 1));
+    y_bar.segment<3>(7 * (i - 1)) -= scale * body.mass * d.gravity;
+    add_slot<1>(d, body.slot_mass, Vec<1>(-d.gravity.dot(r)), scale, rho_bar);
+    add_slot<3>(d, d.slot_gravity, Vec<3>(-body.mass * r), scale, rho_bar);
+  }
+  for (const TsdaForce& f : d.tsda) {
+    if (f.law.program) continue;
+    const BodyAt b1 = body_at(y, f.body1), b2 = body_at(y, f.body2);
+    const TsdaForce::Span x = f.span(b1.frame, b2.frame);
+    const double stretch = x.l - f.law.x0;
+    const Vector3d d_bar = f.law.k * stretch * x.u;
+    FrameBar bar1, bar2;
+    bar1.set_zero(), bar2.set_zero();
+    bar2.r = d_bar, bar2.A = d_bar * f.s2.transpose();
+    bar1.r = -d_bar, bar1.A = -d_bar * f.s1.transpose();
+    add_pull_back(b1, f.body1, bar1, scale, y_bar);
+    add_pull_back(b2, f.body2, bar2, scale, y_bar);
+    add_slot<3>(d, f.slot1, Vec<3>(-b1.frame.A.transpose() * d_bar), scale, rho_bar);
+    add_slot<3>(d, f.slot2, Vec<3>(b2.frame.A.transpose() * d_bar), scale, rho_bar);
+    add_slot<4>(d, f.law.slot, Vec<4>(0.5 * stretch * stretch, 0, -f.law.k * stretch, 0), scale, rho_bar);
+  }
+  for (const RsdaForce& f : d.rsda) {
+    if (f.law.program) continue;
+    const AngleSensor sensor{f.joint_angle, false};
+    const double stretch = angle_value(d, sensor, y, angles) - f.law.x0;
+    angle_gradient(d, sensor, y, angles, scale * f.law.k * stretch, y_bar, rho_bar);
+    add_slot<4>(d, f.law.slot, Vec<4>(0.5 * stretch * stretch, 0, -f.law.k * stretch, 0), scale, rho_bar);
+  }
+}
+
+// Which equation is violated most: a row of a constraint, or a body's unit norm.
+struct Worst {
+  double amount = 0;
+  const Constraint* constraint = nullptr;
+  int row = 0;   // within the constraint
+  int body = 0;  // of a unit norm, else 0
+};
+
+Worst worst_violation(const MechanismData& d, const Eigen::VectorXd& y) {
+  Worst worst;
+  auto offer = [&](double phi, const Constraint* c, int row, int body) {
+    if (std::abs(phi) > std::abs(worst.amount)) worst = {phi, c, row, body};
+  };
+  for (const Constraint& c : d.constraints) {
+    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+    std::visit(
+        [&](const auto& p) {
+          Vec<std::decay_t<decltype(p)>::kRows> phi;
+          p.phi(b1.frame, b2.frame, phi);
+          for (int i = 0; i < phi.size(); ++i) offer(phi(i), &c, i, 0);
+        },
+        c.primitive);
+  }
+  for (int i = 1; i <= d.n; ++i) offer(UnitNorm::phi(y.segment<4>(7 * (i - 1) + 3)), nullptr, 0, i);
+  return worst;
+}
+
+double add_violation_gradient(const MechanismData& d, const Eigen::VectorXd& y, double scale, VecOut y_bar,
+                              VecOut rho_bar) {
+  const Worst worst = worst_violation(d, y);
+  const double sign = worst.amount < 0 ? -1 : 1;
+  if (worst.body > 0) {
+    const Eigen::Index at = 7 * (worst.body - 1) + 3;
+    y_bar.segment<4>(at) += scale * sign * UnitNorm::phi_p(y.segment<4>(at));
+  } else if (worst.constraint) {
+    const Constraint& c = *worst.constraint;
+    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+    FrameBar bar1, bar2;
+    bar1.set_zero(), bar2.set_zero();
+    Vector3d s1_bar = Vector3d::Zero(), s2_bar = Vector3d::Zero();
+    std::visit(
+        [&](const auto& p) {
+          using P = std::decay_t<decltype(p)>;
+          Multipliers<P::kRows> z;
+          z.lambda.setZero(), z.mu0.setZero(), z.mu1.setZero(), z.mu2.setZero();
+          z.mu0(worst.row) = sign;
+          p.pull_back(b1.frame, b2.frame, z, bar1, bar2, s1_bar, s2_bar);
+        },
+        c.primitive);
+    add_pull_back(b1, c.body1, bar1, scale, y_bar);
+    add_pull_back(b2, c.body2, bar2, scale, y_bar);
+    add_slot<3>(d, c.slot1, s1_bar, scale, rho_bar);
+    add_slot<3>(d, c.slot2, s2_bar, scale, rho_bar);
+  }
+  return std::abs(worst.amount);
+}
+
+template <class... F>
+struct Overloaded : F... {
+  using F::operator()...;
+};
+
+}  // namespace
+
+Energy energy(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
+  Energy e;
+  for (int i = 1; i <= d.n; ++i) {
+    const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
+    const BodyAt b = body_at(y, i);
+    const Vector3d w = b.state.omega();
+    e.kinetic += 0.5 * (body.mass * b.frame.rdot.squaredNorm() + w.dot(body.J * w));
+    e.potential -= body.mass * d.gravity.dot(b.frame.r);
+  }
+  for (const TsdaForce& f : d.tsda) {
+    if (f.law.program) continue;
+    const double stretch = f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l - f.law.x0;
+    e.potential += 0.5 * f.law.k * stretch * stretch;
+  }
+  for (const RsdaForce& f : d.rsda) {
+    if (f.law.program) continue;
+    const double stretch = angle_value(d, {f.joint_angle, false}, y, angles) - f.law.x0;
+    e.potential += 0.5 * f.law.k * stretch * stretch;
+  }
+  return e;
+}
+
+double evaluate(const MechanismData& d, const SensorKind& sensor, double, const Eigen::VectorXd& y,
+                const Eigen::VectorXd& angles) {
+  return std::visit(Overloaded{[&](const PointSensor& s) { return s.value(y); },
+                               [&](const AngularVelocitySensor& s) { return s.value(y); },
+                               [&](const CoordinateSensor& s) { return y(s.index); },
+                               [&](const AngleSensor& s) { return angle_value(d, s, y, angles); },
+                               [&](const EnergySensor& s) {
+                                 const Energy e = energy(d, y, angles);
+                                 return (s.kinetic ? e.kinetic : 0) + (s.potential ? e.potential : 0);
+                               },
+                               [&](const ViolationSensor&) { return std::abs(worst_violation(d, y).amount); }},
+                    sensor);
+}
+
+double add_gradient(const MechanismData& d, const SensorKind& sensor, double t, const Eigen::VectorXd& y,
+                    const Eigen::VectorXd& angles, double scale, VecOut y_bar, VecOut rho_bar) {
+  return std::visit(
+      Overloaded{[&](const PointSensor& s) {
+                   Vector3d a_bar = Vector3d::Zero(), b_bar = Vector3d::Zero();
+                   const double value = s.add_gradient(y, scale, y_bar, a_bar, b_bar);
+                   add_slot<3>(d, s.a.slot, a_bar, 1, rho_bar);
+                   if (s.relative) add_slot<3>(d, s.b.slot, b_bar, 1, rho_bar);
+                   return value;
+                 },
+                 [&](const AngularVelocitySensor& s) { return s.add_gradient(y, scale, y_bar); },
+                 [&](const CoordinateSensor& s) {
+                   y_bar(s.index) += scale;
+                   return y(s.index);
+                 },
+                 [&](const AngleSensor& s) { return angle_gradient(d, s, y, angles, scale, y_bar, rho_bar); },
+                 [&](const EnergySensor& s) {
+                   if (s.kinetic) add_kinetic_gradient(d, y, scale, y_bar, rho_bar);
+                   if (s.potential) add_potential_gradient(d, y, angles, scale, y_bar, rho_bar);
+                   return evaluate(d, s, t, y, angles);
+                 },
+                 [&](const ViolationSensor&) { return add_violation_gradient(d, y, scale, y_bar, rho_bar); }},
+      sensor);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,140 @@
+// A scene: what a problem file says about a mechanism, as plain data. Nothing is numbered or checked here; scene_issues
+// (issues.hpp) checks it, Mechanism (core/mechanism) compiles it. SI units, radians, right-handed frames.
+#pragma once
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/expression/expression.hpp"
+#include "core/scene/settings.hpp"
+
+namespace mbsopt {
+
+using Field = Expression;  // a number, or an expression over parameters and definitions
+using VectorField = std::array<Field, 3>;
+using PointField = std::variant<std::string, VectorField>;  // a named point of the body ("O": its origin), or coordinates
+
+enum class ParameterScale { linear, log, log10 };
+
+struct Parameter {
+  std::string name;
+  double value = 0;
+  std::optional<double> lower, upper;
+  ParameterScale scale = ParameterScale::linear;
+  std::string unit;           // for display and for the dimension check
+  bool allow_unused = false;
+  struct Prior {
+    double mean = 0, sigma = 1;
+  };
+  std::optional<Prior> prior;  // normal; a residual of its own in identification
+};
+
+struct Definition {
+  std::string name;
+  Field value;
+};
+
+// Tensor entries about the centre of mass, body axes.  [kg m^2]
+struct InertiaField {
+  Field xx, yy, zz, xy, xz, yz;
+};
+
+struct EulerParametersField {
+  std::array<Field, 4> e{1.0, 0.0, 0.0, 0.0};
+};
+struct AxisAngleField {
+  VectorField axis;
+  Field angle;
+};
+struct RollPitchYawField {  // fixed axes x, y, z, as in URDF
+  VectorField rpy;
+};
+using OrientationField = std::variant<EulerParametersField, AxisAngleField, RollPitchYawField>;
+
+// Drawing only.
+struct Shape {
+  std::string type;  // rod, box, sphere, cylinder
+  PointField from = "O", to = "O";
+  double radius = 0.01;
+};
+
+struct Body {
+  std::string name;
+  Field mass;                            // [kg]
+  VectorField com{0.0, 0.0, 0.0};        // centre of mass in the body frame [m]
+  InertiaField inertia;
+  VectorField position{0.0, 0.0, 0.0};   // of the body-frame origin, global [m]
+  OrientationField orientation;
+  VectorField velocity{0.0, 0.0, 0.0};   // of the body-frame origin, global [m/s]
+  VectorField angular_velocity{0.0, 0.0, 0.0};  // global components [rad/s]
+  std::map<std::string, VectorField> points;    // named points and vectors in the body frame
+  std::vector<Shape> shapes;
+};
+
+// Types as in the problem format; core/constraint/joints.hpp says which primitives each one is made of.
+struct Joint {
+  std::string name, type;
+  std::string body1 = "ground", body2;
+  PointField point1 = "O", point2 = "O";
+  std::optional<PointField> axis1, axis2, normal1, normal2;
+};
+
+struct Tsda {
+  std::string body1 = "ground", body2;
+  PointField point1 = "O", point2 = "O";
+  Field stiffness, damping, free_length, actuator;
+  std::optional<Expression> law;  // of l, ldot, t and parameters; replaces the coefficients
+};
+struct Rsda {
+  std::string joint;
+  Field stiffness, damping, free_angle;
+  std::optional<Expression> law;  // of angle, rate, t and parameters
+};
+struct Force {
+  std::string name;
+  std::variant<Tsda, Rsda> kind;
+};
+
+struct PointOnBody {
+  std::string body;
+  PointField point = "O";
+};
+
+// What is measured on a state. Fields that a quantity does not use stay at their defaults.
+struct Sensor {
+  std::string name;
+  std::string quantity;       // position velocity angle rate energy constraint_violation distance ...
+  std::string body;           // of position, velocity, angular_velocity, orientation
+  PointField point = "O";
+  std::optional<PointOnBody> relative_to;
+  std::string component;      // x y z norm | kinetic potential total | e0..e3
+  bool in_body_frame = false; // "frame": "body"
+  std::string joint;          // of angle, rate, displacement
+  std::string body1, body2;   // of distance, distance_rate
+  PointField point1 = "O", point2 = "O";
+  std::string force;          // of force
+};
+
+struct Condition {
+  std::string sensor;
+  std::optional<Field> value, rate;
+};
+
+struct Scene {
+  std::string name = "unnamed";
+  VectorField gravity{0.0, 0.0, -9.81};
+  std::vector<Parameter> parameters;
+  std::vector<Definition> definitions;
+  std::vector<Body> bodies;
+  std::vector<Joint> joints;
+  std::vector<Force> forces;
+  std::vector<Condition> conditions;  // initial.conditions
+  std::vector<Sensor> sensors;
+  SimulationSettings simulation;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,42 @@
+// How a scene is to be simulated: formulation, projection, integrator, tolerances. Defaults are measured
+// (docs/formulations.md); a problem file needs none of them.
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace mbsopt {
+
+enum class FormulationType { penalty, augmented_lagrangian };
+enum class Projection { none, velocity, position_velocity };
+
+struct FormulationSettings {
+  FormulationType type = FormulationType::augmented_lagrangian;
+  double alpha = 1e6;     // augmented_lagrangian: relative to the inertia each constraint sees; penalty: absolute
+  double xi = 1;          // damping ratio of the stabilisation
+  double omega = 0;       // its frequency [1/s]; 0 with projection
+  int iterations = 6;     // at most, augmented Lagrangian
+  double tolerance = 1e-14;  // relative, on the constraints' accelerations
+  Projection projection = Projection::position_velocity;
+
+  static FormulationSettings penalty() {  // MBSVT's form
+    return {FormulationType::penalty, 1e9, 1, 10, 0, 0, Projection::none};
+  }
+};
+
+struct IntegratorSettings {
+  std::string type = "dopri5";  // a name of tableaus.hpp
+  double rtol = 1e-6, atol = 1e-8;
+  std::optional<double> initial_step, max_step;
+  std::optional<double> step;  // fixed step
+  long max_steps = 10'000'000;
+};
+
+struct SimulationSettings {
+  double start_time = 0, end_time = 1;     // [s]
+  std::optional<double> output_step;       // default: 200 rows
+  FormulationSettings formulation;
+  IntegratorSettings integrator;
+};
+
+}  // namespace mbsopt

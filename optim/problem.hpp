@@ -1,0 +1,70 @@
+// A whole problem: scene, objectives, and what is to be done with them, as plain data. The reader in app/ fills it from
+// a file; a C++ user may fill it by hand.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+
+namespace mbsopt {
+
+struct ObjectiveSample {
+  double time = 0;   // [s]
+  Expression value;  // of t, sensors and parameters
+};
+
+// psi = integral of running + terminal at the end time + sum of samples + parameters_only
+struct ObjectiveSpec {
+  std::string name;
+  std::optional<Expression> running, terminal, parameters_only;
+  std::vector<ObjectiveSample> samples;
+};
+
+struct ObjectiveBound {
+  std::string objective;
+  std::optional<double> lower, upper;
+};
+
+struct DesignSpec {
+  std::string minimize;
+  std::vector<ObjectiveBound> subject_to;
+  std::vector<std::string> variables;  // parameter names
+  std::string optimizer = "ipopt";
+  double tolerance = 1e-6;
+  int max_iterations = 100;
+};
+
+struct ChannelSpec {
+  std::string column, sensor;
+  Field sigma = 1.0, gain = 1.0, bias = 0.0;  // expressions over parameters
+};
+
+struct ExperimentSpec {
+  std::string name;
+  std::string data;                            // CSV file, resolved against the problem file's folder
+  std::string time = "t";                      // its time column
+  std::optional<double> start_time, end_time;  // instead of the simulation's; rows outside are left out
+  std::vector<ChannelSpec> channels;
+  std::vector<std::pair<std::string, double>> overrides;  // parameter values of this experiment
+  std::vector<std::string> free;                          // parameters with a value of their own here
+  bool validate = false;                                  // role: scored (only "free" refitted), not fitted
+};
+
+struct IdentificationSpec {
+  std::vector<ExperimentSpec> experiments;
+  std::vector<std::string> variables;
+  bool sigma_is_known = false;
+  double tolerance = 1e-10;
+  int max_iterations = 100;
+};
+
+struct Problem {
+  Scene scene;
+  std::vector<ObjectiveSpec> objectives;
+  std::optional<DesignSpec> design;
+  std::optional<IdentificationSpec> identification;
+};
+
+}  // namespace mbsopt
