@@ -29,7 +29,8 @@ struct Range {
       const double half = low == 0 ? 1 : 0.1 * std::abs(low);
       low -= half, high += half;
     } else {
-      low -= air * span(), high += air * (high - low) / (1 + air);
+      const double margin = air * span();
+      low -= margin, high += margin;
     }
   }
 };

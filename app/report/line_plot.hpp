@@ -21,7 +21,7 @@ struct PlotSeries {
 
 struct LinePlot {
   std::string title, x_label, y_label;
-  std::vector<PlotSeries> series;
+  std::vector<PlotSeries> series = {};
   bool logarithmic_y = false;  // values <= 0 are left out
   bool equal_axes = false;     // one metre is as long in x as in y: for paths
 };

@@ -1,0 +1,37 @@
+// What every command is given, and the commands. Each returns an exit code (exit_code.hpp); bad input leaves as an
+// exception (InputError, SceneError, OutputError), which command_line.cpp turns into words and exit code 2.
+#pragma once
+
+#include <ostream>
+#include <string>
+#include <vector>
+
+namespace mbsopt {
+
+struct CommandOptions {
+  std::string problem_file;
+  std::string out;                // --out; empty: out/<name>/
+  std::vector<std::string> sets;  // --set, each "path=value"
+  std::string method = "auto";    // --method of gradient
+  int threads = 0;                // --threads; 0: as many as the machine has
+  bool quiet = false;             // --quiet
+};
+
+struct CommandContext {
+  std::string command;
+  std::vector<std::string> arguments;  // as typed, for the provenance
+  CommandOptions options;
+  std::ostream& out;             // results
+  std::ostream& err;             // progress and errors
+  bool err_is_terminal = false;  // a bar may be drawn
+};
+
+int validate_command(const CommandContext& context);
+int simulate_command(const CommandContext& context);
+int gradient_command(const CommandContext& context);
+int check_command(const CommandContext& context);
+int design_command(const CommandContext& context);
+int identify_command(const CommandContext& context);
+int schema_command(const CommandContext& context);
+
+}  // namespace mbsopt

@@ -1,0 +1,107 @@
+#include "app/command_line.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <new>
+
+#include "app/atomic_file.hpp"
+#include "app/command.hpp"
+#include "app/exit_code.hpp"
+#include "app/interrupt.hpp"
+#include "app/json/input_error.hpp"
+#include "app/provenance.hpp"
+#include "core/mechanism/mechanism.hpp"
+
+namespace mbsopt {
+namespace {
+
+struct Command {
+  const char* name;
+  const char* does;
+  int (*run)(const CommandContext&);
+};
+constexpr std::array kCommands{
+    Command{"validate", "check a problem file; print bodies, equations, degrees of freedom", validate_command},
+    Command{"simulate", "forward dynamics", simulate_command},
+    Command{"gradient", "objectives and their gradients", gradient_command},
+    Command{"check", "all gradient methods against each other and against differences", check_command},
+    Command{"design", "optimal design", design_command},
+    Command{"identify", "fit parameters to measurements", identify_command},
+    Command{"schema", "print the JSON Schema of problem files", schema_command},
+};
+constexpr std::array kLaterCommands{"kinematics", "tradeoff", "resume"};
+
+std::string available_commands() {
+  std::string names;
+  for (const Command& command : kCommands) names += fmt::format("{}{}", names.empty() ? "" : ", ", command.name);
+  return names;
+}
+
+void add_options(CLI::App& sub, const std::string& name, CommandOptions& options) {
+  if (name == "schema") return;
+  sub.add_option("problem", options.problem_file, "problem file (*.json)")->required();
+  sub.add_option("--out", options.out, "folder for the results (default: out/<name>/)");
+  sub.add_option("--set", options.sets, "change a field: parameters.k1.value=120; may be repeated")
+      ->type_name("PATH=VALUE")
+      ->allow_extra_args(false);
+  sub.add_option("--threads", options.threads, "at most so many threads (results do not depend on it)")
+      ->check(CLI::PositiveNumber);
+  sub.add_flag("--quiet", options.quiet, "no progress on standard error");
+  if (name == "gradient") {
+    sub.add_option("--method", options.method, "how gradients are computed")
+        ->check(CLI::IsMember({"auto", "tlm", "adjoint", "fd"}))
+        ->capture_default_str();
+  }
+}
+
+// The command's exit code; what was wrong with the input goes to `err` in words.
+int run_guarded(const Command& command, const CommandContext& context) {
+  try {
+    const InterruptGuard guard;
+    return command.run(context);
+  } catch (const InputError& error) {
+    context.err << error.what() << '\n';
+  } catch (const SceneError& error) {
+    context.err << context.options.problem_file << ": " << error.what() << '\n';
+  } catch (const OutputError& error) {
+    context.err << error.what() << '\n';
+  } catch (const std::bad_alloc&) {
+    context.err << "mbsopt: out of memory\n";
+    return kNumericalFailure;
+  }
+  return kBadInput;
+}
+
+}  // namespace
+
+int run_command_line(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err,
+                     bool err_is_terminal) {
+  if (!arguments.empty() &&
+      std::find(kLaterCommands.begin(), kLaterCommands.end(), arguments[0]) != kLaterCommands.end()) {
+    err << fmt::format("mbsopt: '{}' is not available in this version; available: {}\n", arguments[0],
+                       available_commands());
+    return kBadInput;
+  }
+  CLI::App app("Optimal design and parameter identification of mechanisms.", "mbsopt");
+  app.set_version_flag("--version", "mbsopt " + program_version());
+  app.require_subcommand(1);
+  app.failure_message(CLI::FailureMessage::simple);
+  CommandContext context{"", arguments, {}, out, err, err_is_terminal};
+  for (const Command& command : kCommands) {
+    add_options(*app.add_subcommand(command.name, command.does), command.name, context.options);
+  }
+  try {
+    app.parse({arguments.rbegin(), arguments.rend()});  // CLI11 takes them last first
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error, out, err) == 0 ? kDone : kBadInput;
+  }
+  context.command = app.get_subcommands().front()->get_name();
+  return run_guarded(*std::find_if(kCommands.begin(), kCommands.end(),
+                                   [&](const Command& command) { return context.command == command.name; }),
+                     context);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,14 @@
+// mbsopt COMMAND problem.json [--out DIR] [--set path=value]... [--quiet] [--threads N]
+#pragma once
+
+#include <ostream>
+#include <string>
+#include <vector>
+
+namespace mbsopt {
+
+// Runs one command in this process and returns its exit code. arguments: without the program's name.
+int run_command_line(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err,
+                     bool err_is_terminal = false);
+
+}  // namespace mbsopt

@@ -1,0 +1,49 @@
+#include <fmt/format.h>
+
+#include "app/report/motion_plots.hpp"
+#include "app/report/report_parts.hpp"
+#include "app/report/run_report.hpp"
+
+namespace mbsopt {
+namespace {
+
+void add_parameters(HtmlPage& page, const Json& result) {
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& [name, p] : result.at("parameters").items()) {
+    rows.push_back({name, cell(p.at("initial")), cell(p.at("value")), cell(p.value("unit", Json())),
+                    cell(p.value("lower", Json())), cell(p.value("upper", Json())), cell(p.value("at_bound", Json()))});
+  }
+  page.table({"parameter", "initial", "optimum", "unit", "lower", "upper", "at bound"}, rows);
+}
+
+void add_outcome(HtmlPage& page, const Json& result) {
+  const Json& optimizer = result.at("optimizer");
+  page.paragraph(fmt::format("{}: {}; {} iterations, {} evaluations.", cell(optimizer.at("type")),
+                             cell(optimizer.at("status")), cell(optimizer.at("iterations")),
+                             cell(optimizer.at("evaluations"))));
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& [name, objective] : result.at("objectives").items()) {
+    rows.push_back({name, cell(objective.value("initial", Json())), cell(objective.at("value")),
+                    cell(objective.value("lower", Json())), cell(objective.value("upper", Json()))});
+  }
+  page.table({"objective", "before", "after", "at least", "at most"}, rows);
+}
+
+}  // namespace
+
+std::string design_report(const Scene& scene, const Json& result, const Trajectory& history, const Trajectory& before,
+                          const Trajectory& after) {
+  HtmlPage page(report_title(result));
+  add_status(page, result);
+  page.heading("Result");
+  add_outcome(page, result);
+  add_parameters(page, result);
+  add_convergence(page, history);
+  page.heading("Motion before and after");
+  for (const LinePlot& plot : motion_plots(scene, before, after)) page.plot(plot);
+  add_model(page, result);
+  add_provenance(page, result);
+  return page.text();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,115 @@
+#include "app/report/motion_plots.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+namespace mbsopt {
+namespace {
+
+constexpr std::size_t kMostSeries = 6;  // in one plot
+
+const std::map<std::string, std::string, std::less<>> kUnits{{"position", "m"},
+                                                             {"velocity", "m/s"},
+                                                             {"acceleration", "m/s^2"},
+                                                             {"angle", "rad"},
+                                                             {"rate", "rad/s"},
+                                                             {"distance", "m"},
+                                                             {"distance_rate", "m/s"},
+                                                             {"displacement", "m"},
+                                                             {"force", "N"},
+                                                             {"angular_velocity", "rad/s"},
+                                                             {"orientation", "-"},
+                                                             {"energy", "J"},
+                                                             {"constraint_violation", "m"}};
+
+std::vector<double> column(const Trajectory& trajectory, std::size_t index) {
+  std::vector<double> values;
+  values.reserve(trajectory.rows.size());
+  for (const auto& row : trajectory.rows) values.push_back(row[index]);
+  return values;
+}
+
+// What goes into one plot: its label, and the trajectory's columns.
+using Group = std::pair<std::string, std::vector<std::size_t>>;
+
+std::vector<Group> sensor_groups(const Scene& scene) {
+  const std::size_t first = 1 + 13 * scene.bodies.size();
+  std::vector<Group> groups;
+  for (std::size_t i = 0; i < scene.sensors.size(); ++i) {
+    const Sensor& sensor = scene.sensors[i];
+    const std::string label = fmt::format("{} [{}]", sensor.quantity, unit_of(sensor));
+    auto group = std::find_if(groups.rbegin(), groups.rend(), [&](const Group& g) { return g.first == label; });
+    if (group == groups.rend() || group->second.size() == kMostSeries) {
+      groups.push_back({label, {}});
+      group = groups.rbegin();
+    }
+    group->second.push_back(first + i);
+  }
+  return groups;
+}
+
+std::vector<Group> position_groups(const Scene& scene, const Trajectory& trajectory) {
+  std::vector<Group> groups;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Group group{fmt::format("{} [m]", "xyz"[axis]), {}};
+    for (std::size_t body = 0; body < std::min(scene.bodies.size(), kMostSeries); ++body) {
+      const std::vector<double> values = column(trajectory, 1 + 13 * body + axis);
+      const auto [low, high] = std::minmax_element(values.begin(), values.end());
+      if (*high - *low > 1e-9) group.second.push_back(1 + 13 * body + axis);  // [m]; what rests says nothing
+    }
+    if (!group.second.empty()) groups.push_back(std::move(group));
+  }
+  return groups;
+}
+
+void add_series(LinePlot& plot, const Group& group, const Trajectory& trajectory, const std::string& suffix,
+                Mark mark) {
+  for (const std::size_t index : group.second) {
+    plot.series.push_back({trajectory.columns[index] + suffix, column(trajectory, 0), column(trajectory, index), mark});
+  }
+}
+
+std::vector<Group> groups_of(const Scene& scene, const Trajectory& trajectory) {
+  if (trajectory.rows.empty()) return {};
+  return scene.sensors.empty() ? position_groups(scene, trajectory) : sensor_groups(scene);
+}
+
+std::string title_of(const Group& group, const Trajectory& trajectory) {
+  return group.second.size() == 1 ? trajectory.columns[group.second.front()] : group.first;
+}
+
+}  // namespace
+
+std::string unit_of(const Sensor& sensor) {
+  const auto unit = kUnits.find(sensor.quantity);
+  return unit == kUnits.end() ? "-" : unit->second;
+}
+
+std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& trajectory) {
+  std::vector<LinePlot> plots;
+  for (const Group& group : groups_of(scene, trajectory)) {
+    LinePlot plot{.title = title_of(group, trajectory), .x_label = "t [s]", .y_label = group.first};
+    add_series(plot, group, trajectory, "", Mark::line);
+    plots.push_back(std::move(plot));
+  }
+  return plots;
+}
+
+std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& before, const Trajectory& after) {
+  std::vector<LinePlot> plots;
+  for (const Group& group : groups_of(scene, before)) {
+    for (const std::size_t index : group.second) {
+      const Group alone{group.first, {index}};
+      LinePlot plot{.title = before.columns[index], .x_label = "t [s]", .y_label = group.first};
+      add_series(plot, alone, before, ", before", Mark::dashed);
+      add_series(plot, alone, after, ", after", Mark::line);
+      plots.push_back(std::move(plot));
+    }
+  }
+  return plots;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,17 @@
+// A trajectory as plots over time: sensors grouped by unit; where a scene has none, the bodies' positions.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/report/line_plot.hpp"
+#include "app/trajectory_csv.hpp"
+
+namespace mbsopt {
+
+std::string unit_of(const Sensor& sensor);  // "m", "rad/s", ...
+std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& trajectory);
+// The same plots with a second run dashed: before (dashed) and after.
+std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& before, const Trajectory& after);
+
+}  // namespace mbsopt

@@ -1,0 +1,111 @@
+#include "app/report/report_parts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "app/report/line_plot.hpp"
+#include "app/text_table.hpp"
+
+namespace mbsopt {
+namespace {
+
+// Rows "name, value" for the entries of an object that the list names.
+struct Entry {
+  const char* key;
+  const char* label;
+};
+
+void add_entries(HtmlPage& page, const Json& object, std::initializer_list<Entry> entries) {
+  std::vector<std::vector<std::string>> rows;
+  for (const Entry& entry : entries) {
+    if (object.contains(entry.key)) rows.push_back({entry.label, cell(object.at(entry.key))});
+  }
+  page.table({"", ""}, rows);
+}
+
+}  // namespace
+
+std::string cell(const Json& value) {
+  if (value.is_number_integer()) return std::to_string(value.get<long>());
+  if (value.is_number()) return significant(value.get<double>());
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
+  if (!value.is_array()) return "-";
+  std::string text;
+  for (const Json& element : value) text += (text.empty() ? "" : ", ") + cell(element);
+  return text.empty() ? "none" : text;
+}
+
+std::string report_title(const Json& result) {
+  return result.at("problem").get<std::string>() + ": " + result.at("command").get<std::string>();
+}
+
+void add_status(HtmlPage& page, const Json& result) {
+  if (result.contains("message")) page.paragraph("Failed: " + result.at("message").get<std::string>());
+  for (const Json& warning : result.at("warnings")) page.paragraph("Warning: " + warning.get<std::string>());
+}
+
+void add_model(HtmlPage& page, const Json& result) {
+  if (!result.contains("model")) return;
+  page.heading("Mechanism");
+  add_entries(page, result.at("model"),
+              {{"bodies", "bodies"},
+               {"equations", "constraint equations"},
+               {"rank", "of rank"},
+               {"degrees_of_freedom", "degrees of freedom"},
+               {"redundant", "redundant"}});
+}
+
+void add_simulation(HtmlPage& page, const Json& result) {
+  if (!result.contains("simulation")) return;
+  page.heading("Simulation");
+  add_entries(page, result.at("simulation"),
+              {{"steps", "steps"},
+               {"rejected", "rejected steps"},
+               {"rhs_evaluations", "right-hand sides"},
+               {"max_position_violation", "largest violation, positions"},
+               {"max_velocity_violation", "largest violation, velocities"},
+               {"energy_drift", "largest energy drift [J]"}});
+}
+
+void add_objectives(HtmlPage& page, const Json& result) {
+  if (!result.contains("objectives") || result.at("objectives").empty()) return;
+  page.heading("Objectives");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& [name, objective] : result.at("objectives").items())
+    rows.push_back({name, cell(objective.at("value"))});
+  page.table({"objective", "value"}, rows);
+}
+
+void add_convergence(HtmlPage& page, const Trajectory& history) {
+  if (history.rows.size() < 2) return;
+  page.heading("Convergence");
+  const auto column = [&](std::size_t index) {
+    std::vector<double> values;
+    for (const auto& row : history.rows) values.push_back(row[index]);
+    return values;
+  };
+  for (const char* name : {"objective", "cost", "infeasibility"}) {
+    const auto found = std::find(history.columns.begin(), history.columns.end(), name);
+    if (found == history.columns.end()) continue;
+    const std::vector<double> values = column(static_cast<std::size_t>(found - history.columns.begin()));
+    const bool positive = std::all_of(values.begin(), values.end(), [](double v) { return v > 0; });
+    if (std::all_of(values.begin(), values.end(), [](double v) { return v == 0; })) continue;
+    LinePlot plot{.title = name, .x_label = "iteration", .y_label = name, .logarithmic_y = positive};
+    plot.series.push_back({name, column(0), values, Mark::line});
+    page.plot(plot);
+  }
+}
+
+void add_provenance(HtmlPage& page, const Json& result) {
+  page.heading("Where this comes from");
+  const Json& origin = result.at("provenance");
+  std::vector<std::vector<std::string>> rows{{"command", cell(origin.at("command_line"))},
+                                             {"sha256 of the problem file", cell(origin.at("input_sha256"))},
+                                             {"mbsopt", cell(result.at("version"))}};
+  for (const auto& [name, version] : origin.at("libraries").items()) rows.push_back({name, cell(version)});
+  page.table({"", ""}, rows);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,27 @@
+// report.html, whole, per command: what was run, its numbers, its plots. No time of day and no seconds of computing, so
+// that the same inputs give the same bytes. The numbers are taken from the parts of result.json.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/result_json.hpp"
+#include "app/trajectory_csv.hpp"
+
+namespace mbsopt {
+
+std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory);
+
+// history: columns and rows of history.csv (iteration, objective, infeasibility, ...).
+std::string design_report(const Scene& scene, const Json& result, const Trajectory& history, const Trajectory& before,
+                          const Trajectory& after);
+
+// What one channel of one experiment measured, and what the fitted model says at the same times.
+struct ChannelFit {
+  std::string experiment, channel, unit;
+  std::vector<double> times, measured, model, residual;  // residual: weighted, (measured - model)/sigma
+};
+std::string identification_report(const Scene& scene, const Json& result, const Trajectory& history,
+                                  const std::vector<ChannelFit>& fits);
+
+}  // namespace mbsopt

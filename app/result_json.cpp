@@ -1,0 +1,43 @@
+#include "app/result_json.hpp"
+
+#include <array>
+
+namespace mbsopt {
+namespace {
+
+constexpr std::array kOrder{"program",   "version",         "command",    "problem",     "status",
+                            "message",   "last_good_time",  "model",      "simulation",  "objectives",
+                            "methods",   "verdict",         "parameters", "experiments", "correlation",
+                            "optimizer", "identifiability", "provenance", "warnings"};
+
+}  // namespace
+
+Json to_json(const ModelSummary& summary) {
+  return {{"bodies", summary.bodies},
+          {"equations", summary.equations},
+          {"rank", summary.rank},
+          {"degrees_of_freedom", summary.degrees_of_freedom},
+          {"redundant", summary.redundant}};
+}
+
+Json to_json(const SimulationStatistics& statistics) {
+  return {{"steps", statistics.steps},
+          {"rejected", statistics.rejected},
+          {"rhs_evaluations", statistics.rhs_evaluations},
+          {"factorisations", statistics.factorisations},
+          {"wall_seconds", statistics.wall_seconds},
+          {"max_position_violation", statistics.max_position_violation},
+          {"max_velocity_violation", statistics.max_velocity_violation},
+          {"energy_drift", statistics.energy_drift}};
+}
+
+std::string result_json_text(const Json& parts) {
+  Json ordered = Json::object();
+  for (const char* key : kOrder) {
+    if (const auto part = parts.find(key); part != parts.end()) ordered[key] = *part;
+  }
+  for (const auto& [key, part] : parts.items()) ordered[key] = part;  // assigns what is there already to itself
+  return ordered.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace mbsopt

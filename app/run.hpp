@@ -1,0 +1,49 @@
+// One run of a command on one problem: what all commands share. Reads the problem, claims the output folder, gathers
+// result.json, and ends with an exit code.
+//
+//   Run run(context);                               // throws on bad input
+//   run.result["simulation"] = to_json(statistics);
+//   run.write("trajectory.csv", text);
+//   return run.done();                              // or run.failed(message, last_good_time), run.stopped()
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "app/command.hpp"
+#include "app/output_folder.hpp"
+#include "app/progress.hpp"
+#include "app/result_json.hpp"
+#include "optim/problem.hpp"
+
+namespace mbsopt {
+
+class Run {
+ public:
+  explicit Run(const CommandContext& context);
+
+  const CommandContext& context;
+  const Problem problem;
+  const OutputFolder folder;
+  Json result;  // the parts of result.json
+  Progress progress;
+
+  void write(const std::string& file, std::string_view content);  // into the folder; named in the closing line
+  void warn(const std::string& warning);
+
+  int done();
+  int failed(const std::string& message, double last_good_time);  // exit 1
+  int disagreed();                                                // exit 3
+  int stopped();                                                  // exit 130
+
+ private:
+  int finish(const char* status, int exit_code);
+  std::vector<std::string> written_;
+};
+
+// Prints the counts of bodies, equations, degrees of freedom; redundant equations by joint.
+void print_model(std::ostream& out, const std::string& name, const ModelSummary& summary);
+void print_simulation(std::ostream& out, const SimulationSettings& settings, const SimulationStatistics& statistics);
+
+}  // namespace mbsopt
