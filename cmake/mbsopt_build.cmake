@@ -19,7 +19,8 @@ function(mbsopt_compile_options target)
   endif()
   if(MBSOPT_SANITIZE)
     target_compile_options(${target} PRIVATE -fsanitize=address,undefined -fno-sanitize-recover=all
-                                             -fno-omit-frame-pointer)
+                                             -fno-omit-frame-pointer
+                                             -Wno-maybe-uninitialized)  # false alarms: GCC's manual, -fsanitize
     target_link_options(${target} PUBLIC $<BUILD_INTERFACE:-fsanitize=address,undefined>)
   endif()
 endfunction()

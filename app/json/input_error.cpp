@@ -1,0 +1,32 @@
+#include "app/json/input_error.hpp"
+
+namespace mbsopt {
+
+namespace {
+
+std::string lines(const std::vector<Finding>& findings) {
+  std::string all;
+  for (const Finding& finding : findings) {
+    if (!all.empty()) all += '\n';
+    all += to_string(finding);
+  }
+  return all;
+}
+
+}  // namespace
+
+std::string to_string(const Finding& finding) {
+  std::string text;
+  if (finding.source.empty()) {
+    text = "--set " + finding.path;
+  } else {
+    text = finding.source;
+    if (finding.line > 0) text += ":" + std::to_string(finding.line) + ":" + std::to_string(finding.column);
+    if (!finding.path.empty()) text += ": " + finding.path;
+  }
+  return text + ": " + finding.message;
+}
+
+InputError::InputError(std::vector<Finding> all) : std::runtime_error(lines(all)), findings_(std::move(all)) {}
+
+}  // namespace mbsopt

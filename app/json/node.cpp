@@ -1,0 +1,94 @@
+#include "app/json/node.hpp"
+
+#include <charconv>
+#include <stdexcept>
+
+#include "core/expression/expression.hpp"
+#include "core/scene/type_table.hpp"
+
+namespace mbsopt {
+
+const Node* Node::find(std::string_view key) const {
+  for (std::size_t i = 0; i < keys.size(); ++i)
+    if (keys[i] == key) return &items[i];
+  return nullptr;
+}
+
+std::string what_is(const Node& node) {
+  constexpr std::size_t kShown = 40;
+  switch (node.kind) {
+    case Node::Kind::null:
+      return "null";
+    case Node::Kind::boolean:
+      return node.boolean ? "true" : "false";
+    case Node::Kind::number:
+      return "the number " + Expression(node.number).text();
+    case Node::Kind::string:
+      return node.string.size() > kShown ? "the string '" + node.string.substr(0, kShown) + "...'"
+                                         : "the string '" + node.string + "'";
+    case Node::Kind::array:
+      return "a list of " + std::to_string(node.items.size());
+    case Node::Kind::object:
+      return "an object";
+  }
+  return "";
+}
+
+std::string child_path(const std::string& parent, std::string_view key) {
+  const std::string name(key);
+  if (!is_identifier(key) && key != "$schema") return parent + "[\"" + name + "\"]";
+  return parent.empty() ? name : parent + "." + name;
+}
+
+std::string child_path(const std::string& parent, std::size_t index) {
+  return parent + "[" + std::to_string(index) + "]";
+}
+
+std::vector<PathStep> parse_path(std::string_view path) {
+  std::vector<PathStep> steps;
+  std::size_t at = 0;
+  while (at < path.size()) {
+    if (path[at] == '[') {
+      const bool quoted = path.substr(at + 1, 1) == "\"";
+      const std::size_t close = quoted ? path.find("\"]", at + 2) : path.find(']', at);
+      if (close == std::string_view::npos) throw std::invalid_argument("'[' is never closed");
+      PathStep step;
+      if (quoted) {
+        step.key = path.substr(at + 2, close - at - 2);
+        at = close + 2;
+      } else {
+        const char* const last = path.data() + close;
+        const auto [end, error] = std::from_chars(path.data() + at + 1, last, step.index);
+        if (error != std::errc() || end != last) throw std::invalid_argument("an index in [] must be a whole number");
+        step.is_index = true;
+        at = close + 1;
+      }
+      steps.push_back(std::move(step));
+    } else {
+      if (path[at] == '.') ++at;
+      const std::size_t end = std::min(path.find_first_of(".[", at), path.size());
+      if (end == at) throw std::invalid_argument("a key is missing");
+      steps.push_back({std::string(path.substr(at, end - at)), false, 0});
+      at = end;
+    }
+  }
+  if (steps.empty()) throw std::invalid_argument("is empty");
+  return steps;
+}
+
+const Node& nearest(const Node& root, std::string_view path) {
+  const Node* node = &root;
+  if (path.empty()) return root;
+  for (const PathStep& step : parse_path(path)) {
+    const Node* next = nullptr;
+    if (step.is_index && node->kind == Node::Kind::array && step.index < node->items.size())
+      next = &node->items[step.index];
+    else if (!step.is_index && node->kind == Node::Kind::object)
+      next = node->find(step.key);
+    if (!next) break;
+    node = next;
+  }
+  return *node;
+}
+
+}  // namespace mbsopt

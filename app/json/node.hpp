@@ -1,0 +1,45 @@
+// A JSON value that remembers where it stands in its text.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace mbsopt {
+
+struct Node {
+  enum class Kind { null, boolean, number, string, array, object };
+  Kind kind = Kind::null;
+  bool boolean = false;
+  double number = 0;
+  std::string string;             // of a string: its value, escapes resolved
+  std::vector<Node> items;        // of an array; of an object: the values of its keys
+  std::vector<std::string> keys;  // of an object
+  std::vector<std::size_t> key_offsets;
+  std::size_t begin = 0, end = 0;  // its first byte in the text, and one after its last
+  int source = 0;                  // 0: the problem file, k: the k-th --set
+
+  const Node* find(std::string_view key) const;  // of an object; nullptr when there is none
+};
+
+// "an object", "a list of 2", "the number 3", "the string 'x'", ...
+std::string what_is(const Node& node);
+
+// JSON paths: keys joined by dots, indices in brackets: bodies[2].points.tip. A key that is not a plain identifier is
+// written in quotes: objectives["tip error"].
+std::string child_path(const std::string& parent, std::string_view key);
+std::string child_path(const std::string& parent, std::size_t index);
+
+struct PathStep {
+  std::string key;  // of an object
+  bool is_index = false;
+  std::size_t index = 0;
+};
+// Throws std::invalid_argument where the text is not a path.
+std::vector<PathStep> parse_path(std::string_view path);
+
+// The value at a path, or the nearest one around it that exists.
+const Node& nearest(const Node& root, std::string_view path);
+
+}  // namespace mbsopt

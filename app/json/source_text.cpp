@@ -1,0 +1,112 @@
+#include "app/json/source_text.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <system_error>
+
+#include "app/json/input_error.hpp"
+
+namespace mbsopt {
+
+namespace {
+
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+constexpr std::size_t kLargestFile = std::size_t{256} << 20;
+
+bool is_continuation(char c) { return (static_cast<unsigned char>(c) & 0xC0) == 0x80; }
+
+// Bytes of the UTF-8 sequence at `at`, 0 where it is none (overlong forms, surrogates and beyond U+10FFFF are none).
+std::size_t sequence_length(std::string_view text, std::size_t at) {
+  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
+  const unsigned b0 = byte(at), b1 = byte(at + 1);
+  const auto continues = [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i)
+      if ((byte(at + i) & 0xC0u) != 0x80u) return false;
+    return true;
+  };
+  if (b0 < 0x80) return 1;
+  if (b0 >= 0xC2 && b0 <= 0xDF) return continues(1, 2) ? 2 : 0;
+  if (b0 >= 0xE0 && b0 <= 0xEF) {
+    const bool overlong = b0 == 0xE0 && b1 < 0xA0, surrogate = b0 == 0xED && b1 > 0x9F;
+    return continues(1, 3) && !overlong && !surrogate ? 3 : 0;
+  }
+  if (b0 >= 0xF0 && b0 <= 0xF4) {
+    const bool overlong = b0 == 0xF0 && b1 < 0x90, beyond = b0 == 0xF4 && b1 > 0x8F;
+    return continues(1, 4) && !overlong && !beyond ? 4 : 0;
+  }
+  return 0;
+}
+
+[[noreturn]] void fail(const std::filesystem::path& file, const std::string& message) {
+  constexpr std::size_t kShown = 200;
+  std::string name = file.string();
+  if (name.size() > kShown) name = name.substr(0, kShown) + "...";
+  throw InputError({{name.empty() ? "''" : name, 0, 0, "", message}});
+}
+
+}  // namespace
+
+SourceText::SourceText(std::string content) : content_(std::move(content)), line_starts_{0} {
+  for (std::size_t i = 0; i < content_.size(); ++i)
+    if (content_[i] == '\n') line_starts_.push_back(i + 1);
+}
+
+Position SourceText::position(std::size_t offset) const {
+  offset = std::min(offset, content_.size());
+  const auto line = std::upper_bound(line_starts_.begin(), line_starts_.end(), offset) - 1;
+  std::size_t start = *line;
+  if (start == 0 && content_.starts_with(kByteOrderMark)) start = std::min(kByteOrderMark.size(), offset);
+  Position position{static_cast<int>(line - line_starts_.begin()) + 1, 1};
+  for (std::size_t i = start; i < offset; ++i) position.column += is_continuation(content_[i]) ? 0 : 1;
+  return position;
+}
+
+std::size_t SourceText::first_invalid_byte() const {
+  for (std::size_t at = 0; at < content_.size();) {
+    const std::size_t length = sequence_length(content_, at);
+    if (length == 0) return at;
+    at += length;
+  }
+  return std::string::npos;
+}
+
+std::size_t SourceText::inside_string(std::size_t literal, std::size_t at) const {
+  std::size_t i = literal + 1;  // after the quote
+  for (std::size_t value = 0; i < content_.size() && content_[i] != '"' && value < at;) {
+    if (content_[i] != '\\') {
+      ++i, ++value;
+      continue;
+    }
+    if (content_.compare(i, 2, "\\u") != 0) {
+      i += 2, ++value;
+      continue;
+    }
+    const unsigned long unit = std::strtoul(content_.substr(i + 2, 4).c_str(), nullptr, 16);
+    const bool pair = unit >= 0xD800 && unit <= 0xDBFF;
+    i += pair ? 12 : 6;
+    value += pair ? 4 : (unit < 0x80 ? 1 : (unit < 0x800 ? 2 : 3));
+  }
+  return i;
+}
+
+std::string read_text_file(const std::filesystem::path& file) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(file, error);
+  if (status.type() == std::filesystem::file_type::directory) fail(file, "is a directory, a problem file is expected");
+  if (status.type() == std::filesystem::file_type::not_found) fail(file, "there is no such file");
+  if (error) fail(file, "cannot be read: " + error.message());
+  errno = 0;
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) fail(file, std::string("cannot be read: ") + std::strerror(errno));
+  std::string content;
+  char buffer[1 << 16];
+  while (stream.read(buffer, sizeof buffer) || stream.gcount() > 0) {
+    content.append(buffer, static_cast<std::size_t>(stream.gcount()));
+    if (content.size() > kLargestFile) fail(file, "is larger than 256 MiB, which no problem file is");
+  }
+  return content;
+}
+
+}  // namespace mbsopt

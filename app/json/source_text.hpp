@@ -1,0 +1,35 @@
+// A text and its lines: where an offset is for whoever looks at it in an editor.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace mbsopt {
+
+struct Position {
+  int line = 1, column = 1;  // columns in characters (code points)
+};
+
+class SourceText {
+ public:
+  explicit SourceText(std::string content);
+  const std::string& content() const { return content_; }
+  Position position(std::size_t offset) const;
+
+  // Offset of the first byte that is not UTF-8; npos where all is.
+  std::size_t first_invalid_byte() const;
+
+  // Offset in the text of byte `at` of the value of the string literal that begins at `literal`.
+  std::size_t inside_string(std::size_t literal, std::size_t at) const;
+
+ private:
+  std::string content_;
+  std::vector<std::size_t> line_starts_;
+};
+
+// The whole file; throws InputError where it cannot be read, naming it as given.
+std::string read_text_file(const std::filesystem::path& file);
+
+}  // namespace mbsopt
