@@ -1,0 +1,45 @@
+// A numeric CSV file: a header row, then numbers.
+//
+//   delimiter   comma, semicolon or tab: the one that separates the header's names
+//   comments    lines that start with '#'; blank lines are skipped
+//   quotes      "a name, with a comma", a quote inside is doubled; a cell ends on its line
+//   missing     an empty cell, NaN or NA: a NaN here
+//   line ends   LF, CRLF or CR LF mixed; a UTF-8 byte-order mark is skipped
+//
+//   const CsvTable table = read_csv("run1.csv");
+//   const std::vector<double>& t = ascending_times(table, "t");   // an error names the row that goes back
+//   const std::vector<double>& theta = table.column("theta");
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace mbsopt {
+
+// "run1.csv:17:5: ...": what is wrong, with line and column where there is one.
+class CsvError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+struct CsvTable {
+  std::string name;                          // of the file, for errors
+  std::vector<std::string> header;           // each once
+  std::vector<std::vector<double>> columns;  // NaN where a cell is missing
+  std::vector<std::size_t> lines;            // where in the file each row is, counted from 1
+
+  std::size_t rows() const { return lines.size(); }
+  bool has_column(std::string_view column_name) const;
+  const std::vector<double>& column(
+      std::string_view column_name) const;  // throws CsvError, listing the names there are
+};
+
+CsvTable parse_csv(std::string_view text, std::string name);
+CsvTable read_csv(const std::string& path);
+
+// A column of times: every cell present and finite, each later than the one before. Throws CsvError naming the row.
+const std::vector<double>& ascending_times(const CsvTable& table, std::string_view column_name);
+
+}  // namespace mbsopt

@@ -1,0 +1,242 @@
+#include "optim/ipopt_solver.hpp"
+
+#include <coin/IpIpoptApplication.hpp>
+#include <coin/IpTNLP.hpp>
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <exception>
+
+namespace mbsopt {
+namespace {
+
+using Ipopt::Index;
+using Ipopt::Number;
+using VectorIn = Eigen::Map<const Eigen::VectorXd>;
+using VectorView = Eigen::Map<Eigen::VectorXd>;
+
+constexpr double kNoBound = 1e20;  // Ipopt's: at least 1e19 means none
+
+class Adapter : public Ipopt::TNLP {
+ public:
+  Adapter(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const IpoptOptions& options, NlpResult& result)
+      : problem_(problem), x_start_(x_start), options_(options), result_(result) {
+    result_.x = x_start;
+  }
+
+  bool start_is_valid() { return evaluate(x_start_); }
+
+  bool get_nlp_info(Index& n, Index& m, Index& nnz_jac, Index& nnz_hess, IndexStyleEnum& style) override {
+    n = static_cast<Index>(problem_.variables());
+    m = static_cast<Index>(problem_.constraints());
+    nnz_jac = n * m, nnz_hess = 0;
+    style = C_STYLE;
+    return true;
+  }
+
+  bool get_bounds_info(Index n, Number* x_l, Number* x_u, Index m, Number* c_l, Number* c_u) override {
+    auto finite = [](double bound) { return std::isfinite(bound) ? bound : std::copysign(kNoBound, bound); };
+    VectorView(x_l, n) = problem_.x_lower.unaryExpr(finite), VectorView(x_u, n) = problem_.x_upper.unaryExpr(finite);
+    VectorView(c_l, m) = problem_.c_lower.unaryExpr(finite), VectorView(c_u, m) = problem_.c_upper.unaryExpr(finite);
+    return true;
+  }
+
+  bool get_scaling_parameters(Number& f_scaling, bool& use_x, Index, Number*, bool& use_c, Index m,
+                              Number* c_scaling) override {
+    f_scaling = problem_.f_scale;
+    use_x = false, use_c = m > 0;
+    if (use_c) VectorView(c_scaling, m) = problem_.c_scale;
+    return true;
+  }
+
+  bool get_starting_point(Index n, bool, Number* x, bool, Number*, Number*, Index, bool, Number*) override {
+    VectorView(x, n) = x_start_;
+    return true;
+  }
+
+  // Whichever of the four is asked for first computes all of them, so that a point fails where Ipopt can shorten the
+  // step (f, c) and never where it would give up (the gradients).
+  bool eval_f(Index n, const Number* x, bool, Number& f) override {
+    if (!evaluate(VectorIn(x, n))) return false;
+    f = point_.f;
+    return true;
+  }
+  bool eval_g(Index n, const Number* x, bool, Index m, Number* c) override {
+    if (!evaluate(VectorIn(x, n))) return false;
+    VectorView(c, m) = point_.c;
+    return true;
+  }
+  // Derivatives are asked for only where Ipopt has gone: at its iterates.
+  bool eval_grad_f(Index n, const Number* x, bool, Number* f_x) override {
+    if (!evaluate(VectorIn(x, n))) return false;
+    VectorView(f_x, n) = point_.f_x;
+    keep_iterate();
+    return true;
+  }
+  bool eval_jac_g(Index n, const Number* x, bool, Index m, Index, Index* row, Index* column, Number* values) override {
+    if (!values) {
+      for (Index k = 0; k < n * m; ++k) row[k] = k / n, column[k] = k % n;
+      return true;
+    }
+    if (!evaluate(VectorIn(x, n))) return false;
+    for (Index i = 0; i < m; ++i) VectorView(values + i * n, n) = point_.c_x.row(i);
+    keep_iterate();
+    return true;
+  }
+
+  bool intermediate_callback(Ipopt::AlgorithmMode, Index iteration, Number, Number, Number inf_du, Number, Number,
+                             Number, Number, Number, Index, const Ipopt::IpoptData*,
+                             Ipopt::IpoptCalculatedQuantities*) override {
+    result_.iterations = iteration;
+    if (!options_.progress || iterate_.size() == 0) return true;
+    return options_.progress({iteration, iterate_f_, iterate_violation_, inf_du, iterate_});
+  }
+
+  void finalize_solution(Ipopt::SolverReturn, Index n, const Number* x, const Number*, const Number*, Index,
+                         const Number*, const Number*, Number, const Ipopt::IpoptData*,
+                         Ipopt::IpoptCalculatedQuantities*) override {
+    final_ = VectorIn(x, n);
+  }
+
+  // The solution where Ipopt converged, else the best point seen.
+  void finish(bool converged) {
+    if (converged && final_.size() > 0 && evaluate(final_)) {
+      result_.x = x_, result_.point = point_;
+    } else if (have_best_) {
+      result_.x = best_x_, result_.point = best_;
+    }
+  }
+
+ private:
+  bool evaluate(const Eigen::VectorXd& x_asked) {
+    // Interior points may leave the bounds by a rounding error.
+    const Eigen::VectorXd x = x_asked.cwiseMax(problem_.x_lower).cwiseMin(problem_.x_upper);
+    if (x_.size() == x.size() && x_ == x) return point_.ok;
+    x_ = x;
+    point_ = NlpPoint();
+    point_.f_x.setZero(x.size());
+    point_.c.setZero(problem_.constraints());
+    point_.c_x.setZero(problem_.constraints(), x.size());
+    ++result_.evaluations;
+    try {
+      problem_.evaluate(x, point_);
+    } catch (const std::exception& error) {
+      point_.ok = false, point_.message = error.what();
+    }
+    if (point_.ok &&
+        !(std::isfinite(point_.f) && point_.f_x.allFinite() && point_.c.allFinite() && point_.c_x.allFinite()))
+      point_.ok = false, point_.message = "the objective, a constraint or a derivative is not finite";
+    if (!point_.ok) {
+      ++result_.failed_evaluations;
+      if (result_.first_error.empty()) result_.first_error = point_.message;
+      return false;
+    }
+    keep_best();
+    return true;
+  }
+
+  void keep_best() {
+    const double tolerance = options_.constraint_tolerance;
+    const double violation = problem_.violation(point_.c), best = have_best_ ? problem_.violation(best_.c) : 0;
+    const bool better =
+        !have_best_ || (best <= tolerance ? violation <= tolerance && point_.f < best_.f : violation < best);
+    if (better) best_x_ = x_, best_ = point_, have_best_ = true;
+  }
+
+  void keep_iterate() { iterate_ = x_, iterate_f_ = point_.f, iterate_violation_ = problem_.violation(point_.c); }
+
+  NonlinearProgram& problem_;
+  const Eigen::VectorXd x_start_;
+  const IpoptOptions& options_;
+  NlpResult& result_;
+  Eigen::VectorXd x_, best_x_, final_, iterate_;
+  NlpPoint point_, best_;
+  bool have_best_ = false;
+  double iterate_f_ = 0, iterate_violation_ = 0;
+};
+
+struct Outcome {
+  NlpStatus status;
+  std::string words;
+};
+
+Outcome in_words(Ipopt::ApplicationReturnStatus status, const NlpResult& result, const IpoptOptions& options) {
+  using namespace Ipopt;  // NOLINT: its enumerators
+  const std::string failures = result.failed_evaluations > 0
+                                   ? fmt::format("; {} of {} evaluations failed, first: {}", result.failed_evaluations,
+                                                 result.evaluations, result.first_error)
+                                   : "";
+  switch (status) {
+    case Solve_Succeeded:
+      return {NlpStatus::converged, "converged: the optimality conditions hold"};
+    case Solved_To_Acceptable_Level:
+    case Search_Direction_Becomes_Too_Small:
+    case Restoration_Failed:
+    case Error_In_Step_Computation:
+    case Feasible_Point_Found:
+      return {
+          NlpStatus::no_progress,
+          fmt::format("no further progress: no step lowers the objective any more, but the optimality conditions do "
+                      "not hold to {:g}; try tighter simulation tolerances, or a larger optimiser tolerance{}",
+                      options.tolerance, failures)};
+    case Infeasible_Problem_Detected:
+      return {
+          NlpStatus::infeasible,
+          "infeasible: no point near the last one satisfies the constraints; relax them or start elsewhere" + failures};
+    case Maximum_Iterations_Exceeded:
+    case Maximum_CpuTime_Exceeded:
+      return {NlpStatus::iteration_limit,
+              fmt::format("stopped at the limit of {} iterations{}", options.max_iterations, failures)};
+    case User_Requested_Stop:
+      return {NlpStatus::stopped, "stopped on request"};
+    case Diverging_Iterates:
+      return {NlpStatus::failed,
+              "the variables grow without limit: the objective seems to have no minimum; give bounds"};
+    case Not_Enough_Degrees_Of_Freedom:
+      return {NlpStatus::failed, "there are fewer variables than equality constraints"};
+    case Insufficient_Memory:
+      return {NlpStatus::failed, "not enough memory"};
+    default:
+      return {NlpStatus::failed, fmt::format("Ipopt failed (status {}){}", static_cast<int>(status), failures)};
+  }
+}
+
+void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& options) {
+  Ipopt::OptionsList& list = *application.Options();
+  list.SetIntegerValue("print_level", 0);
+  list.SetStringValue("sb", "yes");  // no banner
+  list.SetStringValue("hessian_approximation", "limited-memory");
+  list.SetIntegerValue("limited_memory_max_history", options.history);
+  list.SetStringValue("nlp_scaling_method", "user-scaling");
+  list.SetStringValue("mu_strategy", "adaptive");
+  list.SetNumericValue("bound_relax_factor", 0);  // a bound is a bound: masses and logarithms stay positive
+  list.SetNumericValue("tol", options.tolerance);
+  list.SetNumericValue("constr_viol_tol", options.constraint_tolerance);
+  list.SetIntegerValue("acceptable_iter", 0);  // only the tolerance asked for counts as converged
+  list.SetIntegerValue("max_iter", options.max_iterations);
+}
+
+}  // namespace
+
+NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const IpoptOptions& options) {
+  NlpResult result;
+  Adapter* const adapter = new Adapter(problem, x_start, options, result);
+  const Ipopt::SmartPtr<Ipopt::TNLP> owner(adapter);
+  if (!adapter->start_is_valid()) {
+    result.message = "the start point cannot be evaluated: " + result.first_error;
+    return result;
+  }
+  Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);  // no console
+  set_options(*application, options);
+  if (application->Initialize("") != Ipopt::Solve_Succeeded) {  // "": no options file is read
+    result.message = "Ipopt refused its options";
+    return result;
+  }
+  const Outcome outcome = in_words(application->OptimizeTNLP(owner), result, options);
+  result.status = outcome.status, result.message = outcome.words;
+  adapter->finish(outcome.status == NlpStatus::converged);
+  return result;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,137 @@
+#include "optim/ipopt_solver.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+using namespace mbsopt;
+
+namespace {
+
+struct Rosenbrock : NonlinearProgram {
+  Rosenbrock() : NonlinearProgram(2, 0) {}
+  void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
+    const double a = 1 - x(0), b = x(1) - x(0) * x(0);
+    p.f = a * a + 100 * b * b;
+    p.f_x << -2 * a - 400 * x(0) * b, 200 * b;
+  }
+};
+
+// Hock and Schittkowski, "Test Examples for Nonlinear Programming Codes" (1981), problem 71.
+struct Hs071 : NonlinearProgram {
+  Hs071() : NonlinearProgram(4, 2) {
+    x_lower.setConstant(1), x_upper.setConstant(5);
+    c_lower << 25, 40;
+    c_upper(1) = 40;
+  }
+  void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
+    p.f = x(0) * x(3) * (x(0) + x(1) + x(2)) + x(2);
+    p.f_x << x(3) * (2 * x(0) + x(1) + x(2)), x(0) * x(3), x(0) * x(3) + 1, x(0) * (x(0) + x(1) + x(2));
+    p.c << x.prod(), x.squaredNorm();
+    p.c_x.row(0) << x(1) * x(2) * x(3), x(0) * x(2) * x(3), x(0) * x(1) * x(3), x(0) * x(1) * x(2);
+    p.c_x.row(1) = 2 * x.transpose();
+  }
+};
+
+// f = x - log(x), minimum at 1, evaluable for 0.5 <= x only. The first steps from 4 go too far.
+struct Fragile : NonlinearProgram {
+  Fragile() : NonlinearProgram(1, 0) {}
+  void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
+    if (x(0) < 0.5 && throws) throw std::runtime_error("the crank locks");
+    if (x(0) < 0.5) {
+      p.ok = false, p.message = "the crank locks";
+      return;
+    }
+    p.f = 50 * (x(0) - std::log(x(0)));
+    p.f_x << 50 - 50 / x(0);
+  }
+  bool throws = false;
+};
+
+Eigen::VectorXd vector(std::initializer_list<double> values) {
+  return Eigen::Map<const Eigen::VectorXd>(values.begin(), static_cast<Eigen::Index>(values.size()));
+}
+
+}  // namespace
+
+TEST_CASE("ipopt finds Rosenbrock's minimum and counts what it did", "[ipopt]") {
+  Rosenbrock problem;
+  IpoptOptions options;
+  options.tolerance = 1e-8;
+  const NlpResult result = solve_with_ipopt(problem, vector({-1.2, 1}), options);
+  CHECK(result.status == NlpStatus::converged);
+  CHECK((result.x - vector({1, 1})).norm() < 1e-6);
+  CHECK(result.iterations > 5);
+  CHECK(result.evaluations >= result.iterations);
+  CHECK(result.evaluations < 4 * result.iterations);
+  CHECK(result.failed_evaluations == 0);
+}
+
+TEST_CASE("ipopt stops at a bound", "[ipopt]") {
+  Rosenbrock problem;
+  problem.x_upper << 0.5, 10;
+  const NlpResult result = solve_with_ipopt(problem, vector({-1.2, 1}), {1e-8, 1e-8, 200, 20, {}});
+  CHECK(result.status == NlpStatus::converged);
+  CHECK(result.x(0) == Approx(0.5).margin(1e-7));
+  CHECK(result.x(1) == Approx(0.25).margin(1e-6));
+  CHECK(result.x(0) <= 0.5);
+}
+
+TEST_CASE("ipopt solves HS071 with an inequality and an equality", "[ipopt]") {
+  Hs071 problem;
+  const NlpResult result = solve_with_ipopt(problem, vector({1, 5, 5, 1}), {1e-8, 1e-8, 100, 20, {}});
+  CHECK(result.status == NlpStatus::converged);
+  CHECK(result.point.f == Approx(17.0140172891563).epsilon(1e-7));
+  CHECK((result.x - vector({1, 4.74299963, 3.82114998, 1.37940829})).norm() < 1e-5);
+  CHECK(problem.violation(result.point.c) < 1e-7);
+}
+
+TEST_CASE("ipopt recovers from evaluations that fail and reports the first one", "[ipopt]") {
+  Fragile problem;
+  problem.throws = GENERATE(false, true);
+  const NlpResult result = solve_with_ipopt(problem, vector({4}), {1e-8, 1e-8, 100, 20, {}});
+  CHECK(result.status == NlpStatus::converged);
+  CHECK(result.x(0) == Approx(1).epsilon(1e-6));
+  CHECK(result.failed_evaluations > 0);
+  CHECK(result.first_error == "the crank locks");
+}
+
+TEST_CASE("a start point that cannot be evaluated is said in words", "[ipopt]") {
+  Fragile problem;
+  const NlpResult result = solve_with_ipopt(problem, vector({0.1}));
+  CHECK(result.status == NlpStatus::failed);
+  CHECK(result.message == "the start point cannot be evaluated: the crank locks");
+  CHECK(result.x == vector({0.1}));
+}
+
+TEST_CASE("ipopt stops on request and keeps the best point", "[ipopt]") {
+  Rosenbrock problem;
+  std::vector<double> seen;
+  IpoptOptions options;
+  options.progress = [&](const NlpProgress& p) {
+    seen.push_back(p.f);
+    CHECK(p.x.size() == 2);
+    return p.iteration < 5;
+  };
+  const NlpResult result = solve_with_ipopt(problem, vector({-1.2, 1}), options);
+  CHECK(result.status == NlpStatus::stopped);
+  REQUIRE(seen.size() == 6);
+  CHECK(seen.front() == Approx(24.2));
+  CHECK(result.point.f <= seen.back());
+  CHECK(result.point.f < 24.2);
+}
+
+TEST_CASE("ipopt says when it runs out of iterations", "[ipopt]") {
+  Rosenbrock problem;
+  const NlpResult result = solve_with_ipopt(problem, vector({-1.2, 1}), {1e-8, 1e-8, 3, 20, {}});
+  CHECK(result.status == NlpStatus::iteration_limit);
+  CHECK(result.message == "stopped at the limit of 3 iterations");
+}
+
+TEST_CASE("constraints that contradict each other are infeasible", "[ipopt]") {
+  Hs071 problem;
+  problem.c_lower(0) = 2000;  // the product of four numbers up to 5 is at most 625
+  const NlpResult result = solve_with_ipopt(problem, vector({1, 5, 5, 1}), {1e-6, 1e-8, 300, 20, {}});
+  CHECK(result.status == NlpStatus::infeasible);
+}
