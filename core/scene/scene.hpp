@@ -16,7 +16,8 @@ namespace mbsopt {
 
 using Field = Expression;  // a number, or an expression over parameters and definitions
 using VectorField = std::array<Field, 3>;
-using PointField = std::variant<std::string, VectorField>;  // a named point of the body ("O": its origin), or coordinates
+using PointField =
+    std::variant<std::string, VectorField>;  // a named point of the body ("O": its origin), or coordinates
 
 enum class ParameterScale { linear, log, log10 };
 
@@ -25,7 +26,7 @@ struct Parameter {
   double value = 0;
   std::optional<double> lower, upper;
   ParameterScale scale = ParameterScale::linear;
-  std::string unit;           // for display and for the dimension check
+  std::string unit;  // for display and for the dimension check
   bool allow_unused = false;
   struct Prior {
     double mean = 0, sigma = 1;
@@ -64,12 +65,12 @@ struct Shape {
 
 struct Body {
   std::string name;
-  Field mass;                            // [kg]
-  VectorField com{0.0, 0.0, 0.0};        // centre of mass in the body frame [m]
+  Field mass;                      // [kg]
+  VectorField com{0.0, 0.0, 0.0};  // centre of mass in the body frame [m]
   InertiaField inertia;
-  VectorField position{0.0, 0.0, 0.0};   // of the body-frame origin, global [m]
+  VectorField position{0.0, 0.0, 0.0};  // of the body-frame origin, global [m]
   OrientationField orientation;
-  VectorField velocity{0.0, 0.0, 0.0};   // of the body-frame origin, global [m/s]
+  VectorField velocity{0.0, 0.0, 0.0};          // of the body-frame origin, global [m/s]
   VectorField angular_velocity{0.0, 0.0, 0.0};  // global components [rad/s]
   std::map<std::string, VectorField> points;    // named points and vectors in the body frame
   std::vector<Shape> shapes;
@@ -107,16 +108,16 @@ struct PointOnBody {
 // What is measured on a state. Fields that a quantity does not use stay at their defaults.
 struct Sensor {
   std::string name;
-  std::string quantity;       // position velocity angle rate energy constraint_violation distance ...
-  std::string body;           // of position, velocity, angular_velocity, orientation
+  std::string quantity;  // position velocity angle rate energy constraint_violation distance ...
+  std::string body;      // of position, velocity, angular_velocity, orientation
   PointField point = "O";
   std::optional<PointOnBody> relative_to;
-  std::string component;      // x y z norm | kinetic potential total | e0..e3
-  bool in_body_frame = false; // "frame": "body"
-  std::string joint;          // of angle, rate, displacement
-  std::string body1, body2;   // of distance, distance_rate
+  std::string component;       // x y z norm | kinetic potential total | e0..e3
+  bool in_body_frame = false;  // "frame": "body"
+  std::string joint;           // of angle, rate, displacement
+  std::string body1, body2;    // of distance, distance_rate
   PointField point1 = "O", point2 = "O";
-  std::string force;          // of force
+  std::string force;  // of force
 };
 
 struct Condition {

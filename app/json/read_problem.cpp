@@ -1,0 +1,49 @@
+#include "app/json/read_problem.hpp"
+
+#include "app/json/findings.hpp"
+#include "app/json/overrides.hpp"
+#include "app/json/parse_json.hpp"
+#include "app/json/reader.hpp"
+#include "app/json/source_text.hpp"
+
+namespace mbsopt {
+
+namespace {
+
+void resolve_data_files(Problem& problem, const std::filesystem::path& folder, const Node& root, Findings& findings) {
+  if (!problem.identification) return;
+  std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
+  for (std::size_t i = 0; i < experiments.size(); ++i) {
+    std::string& data = experiments[i].data;
+    const std::string path = child_path("identification.experiments", i) + ".data";
+    if (findings.concerns(path)) continue;
+    const std::filesystem::path file = folder / data;
+    std::error_code error;
+    if (!std::filesystem::exists(file, error) || std::filesystem::is_directory(file, error))
+      findings.add(nearest(root, path), path, "there is no file '" + file.string() + "'; a CSV file is expected");
+    data = file.string();
+  }
+}
+
+}  // namespace
+
+Problem read_problem_text(const std::string& text, const std::filesystem::path& name,
+                          const std::vector<std::string>& set_overrides, std::vector<std::string>* warnings) {
+  Findings findings(name.string(), text);
+  Node root = parse_json(findings);
+  for (std::size_t i = 0; i < set_overrides.size(); ++i)
+    apply_override(root, set_overrides[i], static_cast<int>(i) + 1, findings);
+  Problem problem;
+  Reader::read(root, "", findings, problem);
+  resolve_data_files(problem, name.parent_path(), root, findings);
+  (void)warnings;
+  findings.throw_if_any();
+  return problem;
+}
+
+Problem read_problem(const std::filesystem::path& file, const std::vector<std::string>& set_overrides,
+                     std::vector<std::string>* warnings) {
+  return read_problem_text(read_text_file(file), file, set_overrides, warnings);
+}
+
+}  // namespace mbsopt

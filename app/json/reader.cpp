@@ -1,0 +1,292 @@
+#include "app/json/reader.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/expression/did_you_mean.hpp"
+#include "core/expression/dimension_inference.hpp"
+
+namespace mbsopt {
+
+namespace {
+
+const char* shape_of(Node::Kind kind) { return kind == Node::Kind::array ? "a list [...]" : "an object {...}"; }
+
+}  // namespace
+
+const Node* Reader::get(std::string_view key, const Says& says) {
+  if (says.need == Need::unknown) return nullptr;
+  known_.emplace_back(key);
+  const Node* const node = node_.find(key);
+  if (!node && says.need == Need::required)
+    findings_.add(node_, inside(key), "is missing; expected: " + std::string(says.description));
+  return node;
+}
+
+const Node* Reader::get_kind(std::string_view key, const Says& says, Node::Kind kind) {
+  const Node* const node = get(key, says);
+  if (!node || node->kind == kind) return node;
+  findings_.add(*node, inside(key), std::string("must be ") + shape_of(kind) + ", found " + what_is(*node));
+  return nullptr;
+}
+
+void Reader::report_unknown_keys() {
+  if (rest_unknown_) return;
+  for (std::size_t i = 0; i < node_.keys.size(); ++i) {
+    const std::string& key = node_.keys[i];
+    if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
+    const std::string message = "unknown key" + did_you_mean(key, known_) + "; known here: " + joined(known_);
+    if (node_.source == 0 && node_.items[i].source == 0)
+      findings_.add_at(node_.key_offsets[i], inside(key), message);
+    else
+      findings_.add_override(inside(key), message);
+  }
+}
+
+bool Reader::read_string(const Node& node, const std::string& path, std::string& value) {
+  if (node.kind != Node::Kind::string) {
+    findings_.add(node, path, "must be a string, found " + what_is(node));
+    return false;
+  }
+  value = node.string;
+  return true;
+}
+
+void Reader::text(std::string_view key, std::string& value, const Says& says) {
+  if (const Node* node = get(key, says)) read_string(*node, inside(key), value);
+}
+
+void Reader::references(std::string_view key, std::vector<std::string>& values, To, const Says& says) {
+  const Node* const node = get_kind(key, says, Node::Kind::array);
+  if (!node) return;
+  for (std::size_t i = 0; i < node->items.size(); ++i)
+    read_string(node->items[i], child_path(inside(key), i), values.emplace_back());
+}
+
+void Reader::word(std::string_view key, std::string& value, const Words& words_allowed, const Says& says) {
+  const Node* const node = get(key, says);
+  if (!node || !read_string(*node, inside(key), value)) return;
+  if (!has_word(words_allowed.available, value))
+    findings_.add(*node, inside(key), not_among(key, value, words(words_allowed.available), words_allowed.later));
+}
+
+const TypeRow* Reader::type(std::string_view key, std::string_view, std::span<const TypeRow> rows,
+                            std::string_view later, const Says& says) {
+  const Node* const node = get(key, {says.description, Need::optional, {}});
+  if (!node) {
+    findings_.add(node_, inside(key), "is missing; available: " + joined(names_of(rows)));
+    return nullptr;
+  }
+  std::string given;
+  if (!read_string(*node, inside(key), given)) return nullptr;
+  const TypeRow* const row = find_row(rows, given);
+  if (!row) findings_.add(*node, inside(key), not_among(key, given, names_of(rows), later));
+  return row;
+}
+
+bool Reader::read_expression(const Node& node, const std::string& path, Expression& value) {
+  if (node.kind == Node::Kind::number) {
+    value = Expression(node.number);
+    return true;
+  }
+  if (node.kind != Node::Kind::string) {
+    findings_.add(node, path, "must be a number or an expression in a string, found " + what_is(node));
+    return false;
+  }
+  try {
+    value = Expression::parse(node.string);
+    return true;
+  } catch (const ExpressionError& error) {
+    findings_.add_inside(node, error.offset, path, error.what());
+    return false;
+  }
+}
+
+void Reader::number(std::string_view key, Field& value, const Says& says) {
+  if (const Node* node = get(key, says)) read_expression(*node, inside(key), value);
+}
+
+void Reader::number(std::string_view key, std::optional<Field>& value, const Says& says) {
+  if (const Node* node = get(key, says)) read_expression(*node, inside(key), value.emplace());
+}
+
+template <std::size_t N>
+bool Reader::read_vector(const Node& node, const std::string& path, std::array<Field, N>& value) {
+  if (node.kind != Node::Kind::array || node.items.size() != N) {
+    findings_.add(node, path,
+                  "must be a list of " + std::to_string(N) + " numbers or expressions, found " + what_is(node));
+    return false;
+  }
+  bool good = true;
+  for (std::size_t i = 0; i < N; ++i) good = read_expression(node.items[i], child_path(path, i), value[i]) && good;
+  return good;
+}
+
+void Reader::vector(std::string_view key, VectorField& value, const Says& says) {
+  if (const Node* node = get(key, says)) read_vector(*node, inside(key), value);
+}
+
+bool Reader::read_point(const Node& node, const std::string& path, PointField& value) {
+  if (node.kind == Node::Kind::string) {
+    value = node.string;
+    return true;
+  }
+  if (node.kind != Node::Kind::array) {
+    findings_.add(node, path, "must be the name of a point or a list of 3 coordinates, found " + what_is(node));
+    return false;
+  }
+  return read_vector(node, path, value.emplace<VectorField>());
+}
+
+void Reader::point(std::string_view key, PointField& value, std::string_view, const Says& says) {
+  if (const Node* node = get(key, says)) read_point(*node, inside(key), value);
+}
+
+void Reader::point(std::string_view key, std::optional<PointField>& value, std::string_view, const Says& says) {
+  if (const Node* node = get(key, says)) read_point(*node, inside(key), value.emplace());
+}
+
+void Reader::inertia(std::string_view key, InertiaField& value, const Says& says) {
+  const Node* const node = get(key, says);
+  if (!node) return;
+  if (node->kind == Node::Kind::object) return read(*node, inside(key), findings_, value);
+  std::array<Field, 3> diagonal;
+  if (node->kind != Node::Kind::array || node->items.size() != 3) {
+    findings_.add(*node, inside(key),
+                  "must be {\"xx\":..,\"yy\":..,\"zz\":..,\"xy\":..,\"xz\":..,\"yz\":..} or [xx, yy, zz], found " +
+                      what_is(*node));
+  } else if (read_vector(*node, inside(key), diagonal)) {
+    value = {diagonal[0], diagonal[1], diagonal[2], 0.0, 0.0, 0.0};
+  }
+}
+
+void Reader::orientation(std::string_view key, OrientationField& value, const Says& says) {
+  const Node* const node = get(key, says);
+  if (!node) return;
+  const bool is_object = node->kind == Node::Kind::object;
+  if (node->kind == Node::Kind::array && node->items.size() == 4) {
+    read_vector(*node, inside(key), value.emplace<EulerParametersField>().e);
+  } else if (is_object && (node->find("axis") || node->find("angle"))) {
+    read(*node, inside(key), findings_, value.emplace<AxisAngleField>());
+  } else if (is_object && node->find("rpy")) {
+    read(*node, inside(key), findings_, value.emplace<RollPitchYawField>());
+  } else {
+    findings_.add(*node, inside(key),
+                  "must be [e0, e1, e2, e3], {\"axis\": [x, y, z], \"angle\": a} or {\"rpy\": [r, p, y]}, found " +
+                      what_is(*node));
+  }
+}
+
+void Reader::points(std::string_view key, std::map<std::string, VectorField>& value, const Says& says) {
+  const Node* const node = get_kind(key, says, Node::Kind::object);
+  if (!node) return;
+  for (std::size_t i = 0; i < node->keys.size(); ++i)
+    read_vector(node->items[i], child_path(inside(key), node->keys[i]), value[node->keys[i]]);
+}
+
+bool Reader::read_plain(const Node& node, const std::string& path, double& value,
+                        const std::optional<Dimension>& expected) {
+  Expression expression;
+  if (!read_expression(node, path, expression)) return false;
+  if (!expression.is_number()) {
+    findings_.add(node, path, "must be a number; '" + expression.names()[0] + "' is a name, which is not allowed here");
+    return false;
+  }
+  if (!std::isfinite(expression.number())) {
+    findings_.add(node, path, "is " + expression.text() + ", which is not finite");
+    return false;
+  }
+  try {
+    const auto found = infer_dimension(expression, [](const std::string&) { return std::nullopt; });
+    if (expected && !fits(found, *expected)) {
+      findings_.add(node, path, "has the dimension " + to_string(*found) + ", expected is " + to_string(*expected));
+      return false;
+    }
+  } catch (const DimensionError& error) {
+    findings_.add_inside(node, error.offset, path, error.what());
+    return false;
+  }
+  value = expression.number();
+  return true;
+}
+
+void Reader::plain(std::string_view key, double& value, const Range&, const Says& says) {
+  if (const Node* node = get(key, says)) read_plain(*node, inside(key), value, says.dimension);
+}
+
+template <class Integer>
+void Reader::read_integer(const Node& node, const std::string& path, Integer& value) {
+  double given = 0;
+  if (!read_plain(node, path, given, Dimension{})) return;
+  if (given != std::round(given) || std::abs(given) > static_cast<double>(std::numeric_limits<Integer>::max() / 2)) {
+    findings_.add(node, path, "must be a whole number, found " + Expression(given).text());
+    return;
+  }
+  value = static_cast<Integer>(given);
+}
+
+void Reader::plain(std::string_view key, int& value, const Range&, const Says& says) {
+  if (const Node* node = get(key, says)) read_integer(*node, inside(key), value);
+}
+
+void Reader::plain(std::string_view key, long& value, const Range&, const Says& says) {
+  if (const Node* node = get(key, says)) read_integer(*node, inside(key), value);
+}
+
+void Reader::plain(std::string_view key, bool& value, const Range&, const Says& says) {
+  const Node* const node = get(key, says);
+  if (!node) return;
+  if (node->kind == Node::Kind::boolean)
+    value = node->boolean;
+  else
+    findings_.add(*node, inside(key), "must be true or false, found " + what_is(*node));
+}
+
+void Reader::overrides(std::string_view key, std::vector<std::pair<std::string, double>>& values, const Says& says) {
+  const Node* const node = get_kind(key, says, Node::Kind::object);
+  if (!node) return;
+  for (std::size_t i = 0; i < node->keys.size(); ++i) {
+    auto& [name, value] = values.emplace_back(node->keys[i], 0.0);
+    read_plain(node->items[i], child_path(inside(key), name), value, std::nullopt);
+  }
+}
+
+// "k1": 100  is short for  "k1": {"value": 100}.
+void Reader::read_named(const Node& node, const std::string& path, Parameter& value) {
+  if (node.kind == Node::Kind::object)
+    read(node, path, findings_, value);
+  else
+    read_plain(node, path, value.value, std::nullopt);
+
+  // A value written with a unit says what "unit" would say.
+  const Node* const given = node.kind == Node::Kind::object ? node.find("value") : &node;
+  if (!given || given->kind != Node::Kind::string || findings_.concerns(path)) return;
+  const auto found = infer_dimension(Expression::parse(given->string), [](const std::string&) { return std::nullopt; });
+  if (!found || found->is_none()) return;
+  const std::optional<Unit> unit = value.unit.empty() ? Unit{1, *found} : parse_unit(value.unit);
+  if (unit && !compatible(unit->dimension, *found))
+    findings_.add(*given, path + ".value",
+                  "has the dimension " + to_string(*found) + ", its \"unit\" is " + to_string(unit->dimension));
+  if (value.unit.empty()) value.unit = to_string(*found);
+}
+
+void Reader::read_named(const Node& node, const std::string& path, Definition& value) {
+  read_expression(node, path, value.value);
+}
+
+void Reader::version(std::string_view key, int only, const Says& says) {
+  const Node* const node = get(key, says);
+  if (node && (node->kind != Node::Kind::number || node->number != only))
+    findings_.add(*node, inside(key), "must be " + std::to_string(only) + ", found " + what_is(*node));
+}
+
+void Reader::later(std::string_view key, std::string_view what) {
+  const Node* const node = node_.find(key);
+  if (!node) return;
+  known_.emplace_back(key);
+  findings_.add(*node, inside(key), std::string(what) + " is not available in this version");
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,156 @@
+// The visitor that fills a problem from nodes (core/scene/vocabulary.hpp says what there is to fill). It checks shapes
+// and syntax; meanings are checked on the finished problem.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "app/json/findings.hpp"
+#include "app/json/node.hpp"
+#include "optim/problem_vocabulary.hpp"
+
+namespace mbsopt {
+
+class Reader {
+ public:
+  Reader(const Node& node, std::string path, Findings& findings)
+      : node_(node), path_(std::move(path)), findings_(findings) {}
+
+  // Reads an object's fields into `value`, and reports the keys that it does not have.
+  template <class T>
+  static void read(const Node& node, const std::string& path, Findings& findings, T& value) {
+    if (node.kind != Node::Kind::object) {
+      findings.add(node, path, "must be an object {...}, found " + what_is(node));
+      return;
+    }
+    Reader reader(node, path, findings);
+    describe(reader, value);
+    reader.report_unknown_keys();
+  }
+
+  void name(std::string_view key, std::string& value, const Says& says) { text(key, value, says); }
+  void text(std::string_view key, std::string& value, const Says& says);
+  void reference(std::string_view key, std::string& value, To, const Says& says) { text(key, value, says); }
+  void references(std::string_view key, std::vector<std::string>& values, To, const Says& says);
+  void word(std::string_view key, std::string& value, const Words& words, const Says& says);
+  template <class T, std::size_t N>
+  void choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const Says& says);
+  const TypeRow* type(std::string_view key, std::string_view, std::span<const TypeRow> rows, std::string_view later,
+                      const Says& says);
+
+  void number(std::string_view key, Field& value, const Says& says);
+  void number(std::string_view key, std::optional<Field>& value, const Says& says);
+  void vector(std::string_view key, VectorField& value, const Says& says);
+  void point(std::string_view key, PointField& value, std::string_view, const Says& says);
+  void point(std::string_view key, std::optional<PointField>& value, std::string_view, const Says& says);
+  void inertia(std::string_view key, InertiaField& value, const Says& says);
+  void orientation(std::string_view key, OrientationField& value, const Says& says);
+  void points(std::string_view key, std::map<std::string, VectorField>& value, const Says& says);
+  void law(std::string_view key, std::optional<Expression>& value, Names, const Says& says) {
+    number(key, value, says);
+  }
+  void expression(std::string_view key, Expression& value, Names, const Says& says) { number(key, value, says); }
+
+  void plain(std::string_view key, double& value, const Range&, const Says& says);
+  void plain(std::string_view key, int& value, const Range&, const Says& says);
+  void plain(std::string_view key, long& value, const Range&, const Says& says);
+  void plain(std::string_view key, bool& value, const Range&, const Says& says);
+  template <class T>
+  void plain(std::string_view key, std::optional<T>& value, const Range& range, const Says& says) {
+    T given{};
+    if (!has(key)) return skip(key, says);
+    plain(key, given, range, says);
+    value = given;
+  }
+  void overrides(std::string_view key, std::vector<std::pair<std::string, double>>& values, const Says& says);
+
+  template <class T>
+  void object(std::string_view key, T& value, const Says& says) {
+    if (const Node* node = get(key, says)) read(*node, inside(key), findings_, value);
+  }
+  template <class T>
+  void object(std::string_view key, std::optional<T>& value, const Says& says) {
+    if (const Node* node = get(key, says)) read(*node, inside(key), findings_, value.emplace());
+  }
+  template <class F>
+  void group(std::string_view key, const Says& says, F&& fields) {
+    const Node* const node = get_kind(key, says, Node::Kind::object);
+    if (!node) return;
+    Reader reader(*node, inside(key), findings_);
+    fields(reader);
+    reader.report_unknown_keys();
+  }
+  template <class T>
+  void list(std::string_view key, std::vector<T>& values, const Says& says) {
+    const Node* const node = get_kind(key, says, Node::Kind::array);
+    if (!node) return;
+    for (std::size_t i = 0; i < node->items.size(); ++i)
+      read(node->items[i], child_path(inside(key), i), findings_, values.emplace_back());
+  }
+  template <class T>
+  void named(std::string_view key, std::vector<T>& values, const Says& says) {
+    const Node* const node = get_kind(key, says, Node::Kind::object);
+    if (!node) return;
+    for (std::size_t i = 0; i < node->keys.size(); ++i) {
+      T& value = values.emplace_back();
+      value.name = node->keys[i];
+      read_named(node->items[i], child_path(inside(key), node->keys[i]), value);
+    }
+  }
+
+  void version(std::string_view key, int only, const Says& says);
+  void later(std::string_view key, std::string_view what);
+  void rest_unknown() { rest_unknown_ = true; }
+  void report_unknown_keys();
+
+ private:
+  bool has(std::string_view key) const { return node_.find(key) != nullptr; }
+  std::string inside(std::string_view key) const { return child_path(path_, key); }
+  void skip(std::string_view key, const Says& says) { get(key, says); }
+
+  // The value of a key, which from now on is known; nullptr (and a finding where it is required) when it is absent.
+  const Node* get(std::string_view key, const Says& says);
+  const Node* get_kind(std::string_view key, const Says& says, Node::Kind kind);
+
+  template <class T>
+  void read_named(const Node& node, const std::string& path, T& value) {
+    read(node, path, findings_, value);
+  }
+  void read_named(const Node& node, const std::string& path, Parameter& value);
+  void read_named(const Node& node, const std::string& path, Definition& value);
+
+  bool read_expression(const Node& node, const std::string& path, Expression& value);
+  bool read_plain(const Node& node, const std::string& path, double& value, const std::optional<Dimension>& expected);
+  template <class Integer>
+  void read_integer(const Node& node, const std::string& path, Integer& value);
+  template <std::size_t N>
+  bool read_vector(const Node& node, const std::string& path, std::array<Field, N>& value);
+  bool read_point(const Node& node, const std::string& path, PointField& value);
+  bool read_string(const Node& node, const std::string& path, std::string& value);
+
+  const Node& node_;
+  std::string path_;
+  Findings& findings_;
+  std::vector<std::string> known_;
+  bool rest_unknown_ = false;
+};
+
+template <class T, std::size_t N>
+void Reader::choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const Says& says) {
+  const Node* const node = get(key, says);
+  std::string given;
+  if (!node || !read_string(*node, inside(key), given)) return;
+  std::vector<std::string> available;
+  for (const Choice<T>& choice : choices) {
+    if (choice.word == given) {
+      value = choice.value;
+      return;
+    }
+    available.emplace_back(choice.word);
+  }
+  findings_.add(*node, inside(key), not_among(key, given, available));
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,274 @@
+// Every field of a scene: its name in a problem file, what it is, its dimension, whether it must be there. Written
+// once, as functions that tell it to a visitor; the reader of problem files, the checks, the search for unused
+// parameters and the JSON Schema are visitors.
+//
+//   describe(visitor, body);      // visitor.name("name", body.name, ...), visitor.number("mass", body.mass, ...), ...
+//
+// What a visitor offers (Says holds description, need and dimension; X may be const):
+//   name(key, string&, says)                    a name that others refer to
+//   text(key, string&, says)                    any text
+//   reference(key, string&, To, says)           the name of a body, joint, force, sensor, parameter, objective
+//   references(key, vector<string>&, To, says)
+//   choice(key, T&, Choice<T>[], says)       one of a few words that stand for values
+//   word(key, string&, Words, says)             one of a few words
+//   type(key, word, rows, later, says)          the type of an object; returns its row, nullptr when there is none
+//   number(key, Field&, says)                   a number or an expression over parameters and definitions
+//   vector(key, VectorField&, says)             three of them
+//   point(key, PointField&, body, says)         a point or vector of that body, by name or by its coordinates
+//   inertia, orientation, points                the forms that the problem format gives them
+//   law(key, optional<Expression>&, Names, says)  an expression over further names, too
+//   expression(key, Expression&, Names, says)   the same, always there
+//   plain(key, double&, Range, says)            a number that no parameter enters; also long, int, bool, optional
+//   object(key, T&, says)                       describe(visitor, T) inside; also optional<T>
+//   group(key, says, f)                         f(visitor) inside: fields that are nested in the file only
+//   list(key, vector<T>&, says)                 describe(visitor, T) for each
+//   named(key, vector<T>&, says)                the same where the file has an object, its keys the names
+//   overrides(key, vector<pair<string, double>>&, says)  values by parameter
+//   version(key, number, says)                  that number and no other
+//   later(key, what)                            in the problem format, not in this version
+//   rest_unknown()                              the type is not known, hence neither are the other fields
+#pragma once
+
+#include <concepts>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <type_traits>
+#include <variant>
+
+#include "core/scene/scene.hpp"
+#include "core/scene/type_table.hpp"
+
+namespace mbsopt {
+
+struct Says {
+  std::string_view description;
+  Need need = Need::optional;
+  std::optional<Dimension> dimension = {};  // nullopt: any
+};
+
+enum class To { body, joint, force, sensor, parameter, objective };
+
+// Names that an expression may use besides parameters and definitions.
+enum class Names { none, tsda_law, rsda_law, objective };
+
+template <class T>
+struct Choice {
+  std::string_view word;
+  T value;
+};
+
+struct Words {
+  std::string_view available, later = "";
+};
+
+struct Range {
+  double least = -std::numeric_limits<double>::infinity();
+  bool open = false;  // least itself is not allowed
+};
+inline constexpr Range kAny{};
+inline constexpr Range kPositive{0, true};
+inline constexpr Range kNotNegative{0, false};
+
+template <class T, class Of>
+concept Like = std::same_as<std::remove_const_t<T>, Of>;
+
+inline constexpr Choice<ParameterScale> kParameterScales[] = {
+    {"linear", ParameterScale::linear}, {"log", ParameterScale::log}, {"log10", ParameterScale::log10}};
+inline constexpr Choice<FormulationType> kFormulations[] = {
+    {"augmented_lagrangian", FormulationType::augmented_lagrangian}, {"penalty", FormulationType::penalty}};
+inline constexpr Choice<Projection> kProjections[] = {{"none", Projection::none},
+                                                      {"velocity", Projection::velocity},
+                                                      {"position_velocity", Projection::position_velocity}};
+inline constexpr Choice<bool> kFrames[] = {{"global", false}, {"body", true}};
+
+void describe(auto& v, Like<Parameter> auto& p) {
+  v.plain("value", p.value, kAny, {"where a run starts, SI", Need::required});
+  v.plain("lower", p.lower, kAny, {"lower bound, SI"});
+  v.plain("upper", p.upper, kAny, {"upper bound, SI"});
+  v.choice("scale", p.scale, kParameterScales, {"how an optimiser sees it"});
+  v.text("unit", p.unit, {"SI unit of the value, such as N/m; expressions are checked against it"});
+  v.plain("allow_unused", p.allow_unused, kAny, {"true: not an error that nothing depends on it"});
+  v.later("prior", "a prior");
+}
+
+void describe(auto& v, Like<InertiaField> auto& i) {
+  using dimension::kInertia;
+  v.number("xx", i.xx, {"about x [kg m^2]", Need::required, kInertia});
+  v.number("yy", i.yy, {"about y [kg m^2]", Need::required, kInertia});
+  v.number("zz", i.zz, {"about z [kg m^2]", Need::required, kInertia});
+  v.number("xy", i.xy, {"tensor entry, minus the product of inertia [kg m^2]", Need::optional, kInertia});
+  v.number("xz", i.xz, {"tensor entry, minus the product of inertia [kg m^2]", Need::optional, kInertia});
+  v.number("yz", i.yz, {"tensor entry, minus the product of inertia [kg m^2]", Need::optional, kInertia});
+}
+
+void describe(auto& v, Like<AxisAngleField> auto& o) {
+  v.vector("axis", o.axis, {"direction, of any length", Need::required});
+  v.number("angle", o.angle, {"right-handed about the axis [rad]", Need::required, dimension::kAngle});
+}
+
+void describe(auto& v, Like<RollPitchYawField> auto& o) {
+  v.vector("rpy", o.rpy, {"about the fixed axes x, y, z, in this order [rad]", Need::required, dimension::kAngle});
+}
+
+void describe(auto& v, Like<Shape> auto& s) {
+  v.word("type", s.type, Words{"rod box sphere cylinder"}, {"what is drawn", Need::required});
+  v.point("from", s.from, "", {"one end, a point of the body"});
+  v.point("to", s.to, "", {"the other end"});
+  v.plain("radius", s.radius, kPositive, {"[m]"});
+}
+
+void describe(auto& v, Like<Body> auto& b) {
+  using namespace dimension;
+  v.name("name", b.name, {"name of the body; 'ground' is predefined", Need::required});
+  v.number("mass", b.mass, {"[kg]", Need::required, kMass});
+  v.vector("com", b.com, {"centre of mass in the body frame [m]", Need::optional, kLength});
+  v.inertia("inertia", b.inertia,
+            {"tensor entries about the centre of mass, body axes [kg m^2]", Need::required, kInertia});
+  v.vector("position", b.position, {"of the body-frame origin, global [m]; a guess", Need::optional, kLength});
+  v.orientation("orientation", b.orientation, {"of the body frame; a guess"});
+  v.vector("velocity", b.velocity, {"of the body-frame origin, global [m/s]; a guess", Need::optional, kVelocity});
+  v.vector("angular_velocity", b.angular_velocity, {"global components [rad/s]; a guess", Need::optional, kRate});
+  v.points("points", b.points, {"named points and vectors in the body frame [m]", Need::optional, kLength});
+  v.list("shape", b.shapes, {"drawing only"});
+}
+
+void describe(auto& v, Like<Joint> auto& j) {
+  using namespace dimension;
+  const TypeRow* const row =
+      v.type("type", j.type, std::span(kJointTypes), kLaterJointTypes, {"type of the joint", Need::required});
+  if constexpr (!std::is_const_v<std::remove_reference_t<decltype(j)>>)
+    if (row) j.type = row->name;
+  v.name("name", j.name, {"name of the joint", Need::required});
+  v.reference("body1", j.body1, To::body, {"first body"});
+  v.reference("body2", j.body2, To::body, {"second body", Need::required});
+  if (!row) return v.rest_unknown();
+  v.point("point1", j.point1, j.body1, {"point of body1 [m]", need_of(*row, "point1"), kLength});
+  v.point("point2", j.point2, j.body2, {"point of body2 [m]", need_of(*row, "point2"), kLength});
+  v.point("axis1", j.axis1, j.body1, {"direction in body1", need_of(*row, "axis1")});
+  v.point("axis2", j.axis2, j.body2, {"direction in body2", need_of(*row, "axis2")});
+  v.point("normal1", j.normal1, j.body1,
+          {"direction in body1 from which the angle is measured", need_of(*row, "normal1")});
+  v.point("normal2", j.normal2, j.body2,
+          {"direction in body2 to which the angle is measured", need_of(*row, "normal2")});
+}
+
+void describe(auto& v, Like<Tsda> auto& f, const TypeRow& row) {
+  using namespace dimension;
+  v.reference("body1", f.body1, To::body, {"first body", need_of(row, "body1")});
+  v.reference("body2", f.body2, To::body, {"second body", need_of(row, "body2")});
+  v.point("point1", f.point1, f.body1, {"point of body1 [m]", need_of(row, "point1"), kLength});
+  v.point("point2", f.point2, f.body2, {"point of body2 [m]", need_of(row, "point2"), kLength});
+  v.number("stiffness", f.stiffness, {"k [N/m]", need_of(row, "stiffness"), kStiffness});
+  v.number("damping", f.damping, {"c [N s/m]", need_of(row, "damping"), kDamping});
+  v.number("free_length", f.free_length, {"l0 [m]", need_of(row, "free_length"), kLength});
+  v.number("actuator", f.actuator, {"constant tension [N]", need_of(row, "actuator"), kForce});
+  v.law("law", f.law, Names::tsda_law,
+        {"tension [N] as an expression of l, ldot and t, instead of the coefficients", need_of(row, "law"), kForce});
+}
+
+void describe(auto& v, Like<Rsda> auto& f, const TypeRow& row) {
+  using namespace dimension;
+  v.reference("joint", f.joint, To::joint, {"revolute joint it acts on", need_of(row, "joint")});
+  v.number("stiffness", f.stiffness, {"k [N m/rad]", need_of(row, "stiffness"), kTorque});
+  v.number("damping", f.damping, {"c [N m s/rad]", need_of(row, "damping"), kTorsionalDamping});
+  v.number("free_angle", f.free_angle, {"angle without torque [rad]", need_of(row, "free_angle"), kAngle});
+  v.law("law", f.law, Names::rsda_law,
+        {"resisting torque [N m] as an expression of angle, rate and t, instead of the coefficients",
+         need_of(row, "law"), kTorque});
+}
+
+void describe(auto& v, Like<Force> auto& f) {
+  const TypeRow* const row =
+      v.type("type", type_of(f), std::span(kForceTypes), kLaterForceTypes, {"type of the force", Need::required});
+  v.name("name", f.name, {"name of the force", Need::required});
+  if (!row) return v.rest_unknown();
+  if constexpr (!std::is_const_v<std::remove_reference_t<decltype(f)>>) set_type(f, row->name);
+  std::visit([&](auto& kind) { describe(v, kind, *row); }, f.kind);
+}
+
+void describe(auto& v, Like<PointOnBody> auto& p) {
+  v.reference("body", p.body, To::body, {"a body", Need::required});
+  v.point("point", p.point, p.body, {"a point of it [m]", Need::optional, dimension::kLength});
+}
+
+void describe(auto& v, Like<Sensor> auto& s) {
+  using dimension::kLength;
+  const TypeRow* const row = v.type("quantity", s.quantity, std::span(kSensorQuantities), kLaterSensorQuantities,
+                                    {"what is measured", Need::required});
+  if (!row) return v.rest_unknown();
+  if constexpr (!std::is_const_v<std::remove_reference_t<decltype(s)>>) s.quantity = row->name;
+  v.reference("body", s.body, To::body, {"body it is on", need_of(*row, "body")});
+  v.point("point", s.point, s.body, {"point of the body [m]", need_of(*row, "point"), kLength});
+  if (need_of(*row, "relative_to") != Need::unknown)
+    v.object("relative_to", s.relative_to, {"point whose position or velocity is subtracted"});
+  v.word("component", s.component, Words{row->components}, {"which component", need_of(*row, "component")});
+  v.choice("frame", s.in_body_frame, kFrames, {"axes of the component", need_of(*row, "frame")});
+  v.reference("joint", s.joint, To::joint, {"revolute joint", need_of(*row, "joint")});
+  v.reference("body1", s.body1, To::body, {"body of the first point", need_of(*row, "body1")});
+  v.reference("body2", s.body2, To::body, {"body of the second point", need_of(*row, "body2")});
+  v.point("point1", s.point1, s.body1, {"first point [m]", need_of(*row, "point1"), kLength});
+  v.point("point2", s.point2, s.body2, {"second point [m]", need_of(*row, "point2"), kLength});
+}
+
+void describe(auto& v, Like<Condition> auto& c) {
+  v.reference("sensor", c.sensor, To::sensor, {"a sensor", Need::required});
+  v.number("value", c.value, {"its value at the start"});
+  v.number("rate", c.rate, {"time derivative of its value at the start"});
+}
+
+void describe(auto& v, Like<FormulationSettings> auto& f) {
+  v.choice("type", f.type, kFormulations, {"form of the equations of motion"});
+  if constexpr (!std::is_const_v<std::remove_reference_t<decltype(f)>>)
+    if (f.type == FormulationType::penalty) f = FormulationSettings::penalty();
+  v.plain("alpha", f.alpha, kPositive,
+          {"penalty factor: absolute (penalty), or relative to the inertia each constraint sees"});
+  v.plain("xi", f.xi, kNotNegative, {"damping ratio of the stabilisation"});
+  v.plain("omega", f.omega, kNotNegative, {"natural frequency of the stabilisation [1/s]"});
+  v.plain("iterations", f.iterations, kNotNegative, {"augmented Lagrangian: iterations at most"});
+  v.plain("tolerance", f.tolerance, kNotNegative,
+          {"augmented Lagrangian: relative, on the constraints' accelerations"});
+  v.choice("projection", f.projection, kProjections, {"of the state onto the constraints after each step"});
+  if (f.type == FormulationType::penalty) {
+    std::string solver = "cholesky";
+    v.word("linear_solver", solver, Words{"cholesky", "quasidefinite"}, {"of the penalty form"});
+  }
+}
+
+void describe(auto& v, Like<IntegratorSettings> auto& i) {
+  v.word("type", i.type, Words{kIntegrators, kLaterIntegrators}, {"explicit Runge-Kutta method"});
+  v.plain("rtol", i.rtol, kPositive, {"relative tolerance of a step"});
+  v.plain("atol", i.atol, kPositive, {"absolute tolerance of a step"});
+  v.plain("initial_step", i.initial_step, kPositive, {"[s]; chosen automatically when absent"});
+  v.plain("max_step", i.max_step, kPositive, {"[s]"});
+  v.plain("step", i.step, kPositive, {"fixed step [s]"});
+  v.plain("max_steps", i.max_steps, kPositive, {"a run that needs more fails"});
+}
+
+void describe(auto& v, Like<SimulationSettings> auto& s) {
+  v.plain("start_time", s.start_time, kAny, {"[s]", Need::optional, dimension::kTime});
+  v.plain("end_time", s.end_time, kAny, {"[s]", Need::optional, dimension::kTime});
+  v.plain("output_step", s.output_step, kPositive, {"of trajectory.csv [s]; 200 rows when absent"});
+  v.object("formulation", s.formulation, {"form of the equations of motion"});
+  v.object("integrator", s.integrator, {"time integration"});
+}
+
+void describe(auto& v, Like<Scene> auto& s) {
+  v.text("name", s.name, {"name of the problem; its results go to out/<name>/"});
+  v.vector("gravity", s.gravity, {"[m/s^2]", Need::optional, dimension::kAcceleration});
+  v.named("parameters", s.parameters, {"what may be designed or identified"});
+  v.named("definitions", s.definitions, {"named sub-expressions"});
+  v.list("bodies", s.bodies, {"rigid bodies", Need::required});
+  v.list("joints", s.joints, {"joints between bodies"});
+  v.later("drives", "a drive");
+  v.list("forces", s.forces, {"springs, dampers and actuators"});
+  v.group("initial", {"the state at the start time"}, [&](auto& inside) {
+    inside.list("conditions", s.conditions, {"values and rates of sensors that the assembled state must have"});
+    inside.later("equilibrium", "a start from static equilibrium");
+  });
+  v.named("sensors", s.sensors, {"what can be measured on a state"});
+  v.object("simulation", s.simulation, {"how the mechanism is simulated"});
+}
+
+}  // namespace mbsopt

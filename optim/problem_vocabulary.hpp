@@ -1,0 +1,93 @@
+// Every field of a problem beyond its scene, told to a visitor; see core/scene/vocabulary.hpp.
+#pragma once
+
+#include "core/scene/vocabulary.hpp"
+#include "optim/problem.hpp"
+
+namespace mbsopt {
+
+inline constexpr Choice<bool> kRoles[] = {{"fit", false}, {"validate", true}};
+
+void describe(auto& v, Like<ObjectiveSample> auto& s) {
+  v.plain("time", s.time, kAny, {"[s]", Need::required, dimension::kTime});
+  v.expression("value", s.value, Names::objective, {"added to the objective", Need::required});
+}
+
+void describe(auto& v, Like<ObjectiveSpec> auto& o) {
+  v.law("running", o.running, Names::objective, {"integrated over time; of sensors, t and parameters"});
+  v.law("terminal", o.terminal, Names::objective, {"added, at the end time; of sensors, t and parameters"});
+  v.list("samples", o.samples, {"added, each at its time"});
+  v.law("parameters_only", o.parameters_only, Names::none, {"added; of parameters only"});
+  v.later("maximum_of", "an objective maximum_of");
+  v.later("minimum_of", "an objective minimum_of");
+  v.later("rms_of", "an objective rms_of");
+}
+
+void describe(auto& v, Like<ObjectiveBound> auto& b) {
+  v.reference("objective", b.objective, To::objective, {"an objective", Need::required});
+  v.plain("lower", b.lower, kAny, {"it must not be less"});
+  v.plain("upper", b.upper, kAny, {"it must not be more"});
+}
+
+void describe(auto& v, Like<DesignSpec> auto& d) {
+  v.reference("minimize", d.minimize, To::objective, {"the objective to minimise", Need::required});
+  v.list("subject_to", d.subject_to, {"bounds on objectives"});
+  v.references("variables", d.variables, To::parameter, {"parameters that may change", Need::required});
+  v.group("optimizer", {"how it is minimised"}, [&](auto& inside) {
+    inside.word("type", d.optimizer, Words{"ipopt", "nlopt slsqp mma bobyqa"}, {"interior-point method Ipopt"});
+    inside.plain("tolerance", d.tolerance, kPositive, {"of the optimality conditions"});
+    inside.plain("max_iterations", d.max_iterations, kNotNegative, {"at most"});
+  });
+}
+
+void describe(auto& v, Like<ChannelSpec> auto& c) {
+  v.name("column", c.column, {"column of the data file", Need::required});
+  v.reference("sensor", c.sensor, To::sensor, {"what it measured", Need::required});
+  v.number("sigma", c.sigma, {"standard deviation of the noise, in the column's unit"});
+  v.number("gain", c.gain, {"measured = gain * sensor + bias + noise"});
+  v.number("bias", c.bias, {"in the column's unit"});
+  v.later("delay", "a delay");
+}
+
+void describe(auto& v, Like<ExperimentSpec> auto& e) {
+  v.name("name", e.name, {"name of the experiment", Need::required});
+  v.text("data", e.data, {"CSV file, relative to this file's folder", Need::required});
+  v.text("time", e.time, {"column of the time [s]"});
+  v.plain("start_time", e.start_time, kAny, {"[s]; the simulation's when absent", Need::optional, dimension::kTime});
+  v.plain("end_time", e.end_time, kAny,
+          {"[s]; the simulation's when absent; later rows are left out", Need::optional, dimension::kTime});
+  v.list("channels", e.channels, {"columns that are compared", Need::required});
+  v.overrides("overrides", e.overrides, {"parameter values of this experiment"});
+  v.references("free", e.free, To::parameter, {"parameters with a value of their own in this experiment"});
+  v.choice("role", e.validate, kRoles, {"validate: scored, not fitted"});
+}
+
+void describe(auto& v, Like<IdentificationSpec> auto& i) {
+  v.list("experiments", i.experiments, {"measured motions", Need::required});
+  v.references("variables", i.variables, To::parameter, {"parameters to fit", Need::required});
+  v.plain("sigma_is_known", i.sigma_is_known, kAny,
+          {"true: the covariance is not scaled by the variance of the residuals"});
+  v.group("loss", {"what is summed over the residuals"}, [](auto& inside) {
+    std::string type = "squared";
+    inside.word("type", type, Words{"squared", "huber cauchy tukey"}, {"loss function"});
+  });
+  v.group("optimizer", {"how the sum is minimised"}, [&](auto& inside) {
+    std::string type = "trust_region";
+    inside.word("type", type, Words{"trust_region"}, {"Levenberg-Marquardt with bounds"});
+    inside.plain("tolerance", i.tolerance, kPositive, {"relative change of the sum"});
+    inside.plain("max_iterations", i.max_iterations, kNotNegative, {"at most"});
+  });
+  v.later("multistart", "a multistart");
+}
+
+void describe(auto& v, Like<Problem> auto& p) {
+  std::string schema;
+  v.text("$schema", schema, {"for editors: where problem.schema.json is"});
+  v.version("format", 1, {"version of the problem format"});
+  describe(v, p.scene);
+  v.named("objectives", p.objectives, {"scalars of a motion, to minimise, to bound or to differentiate"});
+  v.object("design", p.design, {"optimal design"});
+  v.object("identification", p.identification, {"fit of parameters to measurements"});
+}
+
+}  // namespace mbsopt
