@@ -1,0 +1,246 @@
+#include "app/json/schema.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "optim/problem_vocabulary.hpp"
+
+namespace mbsopt {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json ref(const char* name) { return {{"$ref", std::string("#/$defs/") + name}}; }
+
+Json array_of(Json items, std::size_t count) {
+  return {{"type", "array"}, {"items", std::move(items)}, {"minItems", count}, {"maxItems", count}};
+}
+
+Json names_pattern() { return {{"pattern", "^[A-Za-z_][A-Za-z0-9_]*$"}}; }
+
+Json default_of(const Field& field) { return field.is_number() ? Json(field.number()) : Json(field.text()); }
+Json default_of(const VectorField& field) {
+  return Json::array({default_of(field[0]), default_of(field[1]), default_of(field[2])});
+}
+
+template <class T>
+Json object_schema();
+
+// Collects the properties of one object.
+class SchemaWriter {
+ public:
+  Json properties = Json::object();
+  Json required = Json::array();
+  std::span<const TypeRow> rows;  // of an object with a type
+  std::string type_key;
+
+  Json object() const {
+    Json schema{{"type", "object"}, {"properties", properties}};
+    if (!required.empty()) schema["required"] = required;
+    schema["additionalProperties"] = false;
+    return schema;
+  }
+
+  void name(std::string_view key, std::string&, const Says& says) {
+    put(key, says, {{"type", "string"}, {"minLength", 1}});
+  }
+  void text(std::string_view key, std::string& value, const Says& says) {
+    put(key, says, {{"type", "string"}}, value.empty() ? Json() : Json(value));
+  }
+  void reference(std::string_view key, std::string& value, To, const Says& says) { text(key, value, says); }
+  void references(std::string_view key, std::vector<std::string>&, To, const Says& says) {
+    put(key, says, {{"type", "array"}, {"items", {{"type", "string"}}}});
+  }
+  template <class T, std::size_t N>
+  void choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const Says& says) {
+    Json all = Json::array(), initial;
+    for (const Choice<T>& choice : choices) {
+      all.push_back(choice.word);
+      if (choice.value == value) initial = choice.word;
+    }
+    put(key, says, {{"enum", all}}, initial);
+  }
+  void word(std::string_view key, std::string& value, const Words& allowed, const Says& says) {
+    put(key, says, {{"enum", words(allowed.available)}}, value.empty() ? Json() : Json(value));
+  }
+  const TypeRow* type(std::string_view key, std::string_view current, std::span<const TypeRow> all, std::string_view,
+                      const Says& says) {
+    rows = all;
+    type_key = key;
+    const TypeRow* const row = find_row(all, current);
+    if (row) put(key, {row->description, says.need, {}}, {{"const", row->name}});
+    return row;
+  }
+
+  void number(std::string_view key, Field& value, const Says& says) {
+    put(key, says, ref("expression"), default_of(value));
+  }
+  void number(std::string_view key, std::optional<Field>&, const Says& says) { put(key, says, ref("expression")); }
+  void vector(std::string_view key, VectorField& value, const Says& says) {
+    put(key, says, ref("vector"), default_of(value));
+  }
+  void point(std::string_view key, PointField& value, std::string_view, const Says& says) {
+    const std::string* const initial = std::get_if<std::string>(&value);
+    put(key, says, ref("point"), initial ? Json(*initial) : Json());
+  }
+  void point(std::string_view key, std::optional<PointField>&, std::string_view, const Says& says) {
+    put(key, says, ref("point"));
+  }
+  void inertia(std::string_view key, InertiaField&, const Says& says) {
+    put(key, says, {{"anyOf", {array_of(ref("expression"), 3), object_schema<InertiaField>()}}});
+  }
+  void orientation(std::string_view key, OrientationField&, const Says& says) {
+    put(key, says,
+        {{"anyOf",
+          {array_of(ref("expression"), 4), object_schema<AxisAngleField>(), object_schema<RollPitchYawField>()}}},
+        Json::array({1, 0, 0, 0}));
+  }
+  void points(std::string_view key, std::map<std::string, VectorField>&, const Says& says) {
+    put(key, says, {{"type", "object"}, {"propertyNames", names_pattern()}, {"additionalProperties", ref("vector")}});
+  }
+  void law(std::string_view key, std::optional<Expression>&, Names, const Says& says) {
+    put(key, says, ref("expression"));
+  }
+  void expression(std::string_view key, Expression&, Names, const Says& says) { put(key, says, ref("expression")); }
+
+  void plain(std::string_view key, double& value, const Range& range, const Says& says) {
+    put(key, says, ranged(ref("number"), range), value);
+  }
+  void plain(std::string_view key, std::optional<double>&, const Range& range, const Says& says) {
+    put(key, says, ranged(ref("number"), range));
+  }
+  void plain(std::string_view key, int& value, const Range& range, const Says& says) {
+    put(key, says, ranged({{"type", "integer"}}, range), value);
+  }
+  void plain(std::string_view key, long& value, const Range& range, const Says& says) {
+    put(key, says, ranged({{"type", "integer"}}, range), value);
+  }
+  void plain(std::string_view key, bool& value, const Range&, const Says& says) {
+    put(key, says, {{"type", "boolean"}}, value);
+  }
+  void overrides(std::string_view key, std::vector<std::pair<std::string, double>>&, const Says& says) {
+    put(key, says, {{"type", "object"}, {"additionalProperties", ref("number")}});
+  }
+
+  template <class T>
+  void object(std::string_view key, T&, const Says& says) {
+    put(key, says, object_schema<T>());
+  }
+  template <class T>
+  void object(std::string_view key, std::optional<T>&, const Says& says) {
+    put(key, says, object_schema<T>());
+  }
+  template <class F>
+  void group(std::string_view key, const Says& says, F&& fields) {
+    SchemaWriter inside;
+    fields(inside);
+    put(key, says, inside.object());
+  }
+  template <class T>
+  void list(std::string_view key, std::vector<T>&, const Says& says) {
+    put(key, says, {{"type", "array"}, {"items", object_schema<T>()}});
+  }
+  template <class T>
+  void named(std::string_view key, std::vector<T>&, const Says& says) {
+    put(key, says,
+        {{"type", "object"}, {"propertyNames", names_pattern()}, {"additionalProperties", named_schema<T>()}});
+  }
+  void version(std::string_view key, int only, const Says& says) { put(key, says, {{"const", only}}); }
+  void later(std::string_view, std::string_view) {}
+  void rest_unknown() {}
+
+ private:
+  static Json ranged(Json schema, const Range& range) {
+    if (std::isfinite(range.least)) schema[range.open ? "exclusiveMinimum" : "minimum"] = range.least;
+    return schema;
+  }
+
+  template <class T>
+  static Json named_schema() {
+    if constexpr (std::is_same_v<T, Definition>)
+      return ref("expression");
+    else if constexpr (std::is_same_v<T, Parameter>)
+      return {{"anyOf", {ref("number"), object_schema<T>()}}};
+    else
+      return object_schema<T>();
+  }
+
+  void put(std::string_view key, const Says& says, Json schema, const Json& initial = {}) {
+    if (says.need == Need::unknown) return;
+    schema["description"] = says.description;
+    if (says.need == Need::required)
+      required.push_back(key);
+    else if (!initial.is_null())
+      schema["default"] = initial;
+    properties[std::string(key)] = std::move(schema);
+  }
+};
+
+void choose(Joint& joint, const TypeRow& row) { joint.type = row.name; }
+void choose(Force& force, const TypeRow& row) { set_type(force, row.name); }
+void choose(Sensor& sensor, const TypeRow& row) { sensor.quantity = row.name; }
+void choose(auto&, const TypeRow&) {}
+
+template <class T>
+Json object_schema_of(T value) {
+  SchemaWriter writer;
+  describe(writer, value);
+  return writer.object();
+}
+
+template <class T>
+Json object_schema() {
+  T value;
+  SchemaWriter writer;
+  describe(writer, value);
+  if (writer.rows.empty()) return writer.object();
+  Json variants = Json::array();
+  for (const TypeRow& row : writer.rows) {
+    T variant;
+    choose(variant, row);
+    Json schema = object_schema_of(variant);
+    schema["title"] = row.name;
+    variants.push_back(std::move(schema));
+  }
+  return {{"oneOf", std::move(variants)}};
+}
+
+// Its defaults depend on its type; without one it is the first.
+template <>
+Json object_schema<FormulationSettings>() {
+  Json variants = Json::array();
+  for (const auto& [word, type] : kFormulations) {
+    FormulationSettings settings;
+    if (type == FormulationType::penalty) settings = FormulationSettings::penalty();
+    Json schema = object_schema_of(settings);
+    schema["properties"]["type"] = {{"const", word}};
+    if (!variants.empty()) schema["required"] = {"type"};
+    variants.push_back(std::move(schema));
+  }
+  return {{"oneOf", std::move(variants)}};
+}
+
+}  // namespace
+
+std::string problem_schema_text() {
+  Json schema{
+      {"$schema", "https://json-schema.org/draft/2020-12/schema"},
+      {"title", "mbsopt problem"},
+      {"description",
+       "A mechanism, what may be changed of it, and what is wanted of it. SI units, radians, right-handed frames."}};
+  schema.update(object_schema<Problem>());
+  schema["$defs"] = {
+      {"expression",
+       {{"type", {"number", "string"}},
+        {"description", "A number, or an expression such as \"rho*L1*w^2\", \"L1 + 3 [cm]\" or \"90 [deg]\"."}}},
+      {"number",
+       {{"type", {"number", "string"}}, {"description", "A number, or one with its unit such as \"4.2 [N/mm]\"."}}},
+      {"vector", array_of(ref("expression"), 3)},
+      {"point",
+       {{"anyOf",
+         {{{"type", "string"}, {"description", "A named point of the body; \"O\" is its origin."}}, ref("vector")}}}},
+  };
+  return schema.dump(2) + "\n";
+}
+
+}  // namespace mbsopt
