@@ -1,0 +1,73 @@
+// Sparse Cholesky factorisation S = L L' of a symmetric positive definite matrix of 6x6 blocks on the graph of bodies.
+// Symbolic work once (elimination order by AMD, fill known), then factor and solve without allocation.
+//
+//   BlockCholesky S(bodies, edges);          // edges: pairs of bodies that share a block
+//   S.set_zero();  S.diagonal(0) += ...;  S.add_off_diagonal(handle, X);
+//   if (!S.factor()) ...                     // not positive definite
+//   S.solve(x);                              // in place, 6 numbers per body; or lanes of several right-hand sides
+#pragma once
+
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/body/fixed_size.hpp"
+
+namespace mbsopt {
+
+class BlockCholesky {
+ public:
+  using Block = Mat<6, 6>;
+
+  BlockCholesky() = default;
+  // Bodies 0..bodies-1. Handle k below belongs to edges[k]; repeated edges share a block.
+  BlockCholesky(int bodies, std::span<const std::pair<int, int>> edges);
+
+  void set_zero();
+  Block& diagonal(int body) { return diagonal_[index(position_[index(body)])]; }
+  // Adds X to the block (first, second) of edge `handle` and its transpose to (second, first).
+  void add_off_diagonal(std::size_t handle, const Block& X) {
+    const Handle& h = handles_[handle];
+    if (h.transposed) {
+      lower_[h.block] += X.transpose();
+    } else {
+      lower_[h.block] += X;
+    }
+  }
+
+  bool factor();
+
+  void solve(std::span<Vec<6>> x) { solve_any(x, permuted_); }
+  void solve(std::span<Lanes<6>> x) { solve_any(x, permuted_lanes_); }
+
+  std::size_t fill_blocks() const { return lower_.size(); }
+
+ private:
+  struct Handle {
+    std::size_t block = 0;
+    bool transposed = false;
+  };
+  struct Entry {  // a block of column k: its row (elimination position) and place
+    int row = 0;
+    std::size_t block = 0;
+  };
+  struct Update {  // target -= L_i L_j'
+    std::size_t target = 0, i = 0, j = 0;
+    bool diagonal = false;
+  };
+
+  static std::size_t index(int i) { return static_cast<std::size_t>(i); }
+  template <class X>
+  void solve_any(std::span<X> x, std::vector<X>& y);
+
+  int n_ = 0;
+  std::vector<int> position_, order_;  // body -> elimination position and back
+  std::vector<Handle> handles_;
+  std::vector<std::vector<Entry>> columns_;  // strictly below the diagonal
+  std::vector<std::vector<Update>> updates_;
+  std::vector<Block> diagonal_, lower_;  // S before factor(), inv(L_kk) and L_ik after
+  std::vector<Vec<6>> permuted_;
+  std::vector<Lanes<6>> permuted_lanes_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,279 @@
+#include "core/dynamics/dynamics.hpp"
+
+#include <algorithm>
+
+namespace mbsopt {
+
+Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settings)
+    : mechanism_(mechanism),
+      data_(mechanism_.data()),
+      settings_(settings),
+      solver_(data_, settings.alpha, settings.type == FormulationType::augmented_lagrangian) {
+  const std::size_t n = static_cast<std::size_t>(data_.n);
+  const Eigen::Index m = data_.m, P = data_.rho.size();
+  y_.setZero(14 * data_.n);
+  angles_.setZero(static_cast<Eigen::Index>(data_.angles.size()));
+  bodies_.resize(n + 1);
+  frames_.resize(n + 1);
+  loads_.resize(n), z_.resize(n), eta_.resize(n), body_loads_.resize(n + 1);
+  for (Eigen::VectorXd* x : {&gamma_, &phi_, &phi_dot_, &lambda_, &mu_, &g_}) x->setZero(m);
+  law_.inputs.resize(static_cast<std::size_t>(P) + 3);
+  law_.gradient.resize(static_cast<std::size_t>(P) + 3);
+  auto grow = [&](const Law& law) {
+    if (law.program) law.program->grow(law_.program);
+  };
+  for (const TsdaForce& f : data_.tsda) grow(f.law);
+  for (const RsdaForce& f : data_.rsda) grow(f.law);
+
+  frame_tangents_.resize(n + 1);
+  for (FrameTangent& t : frame_tangents_) {
+    t.r.setZero(), t.rdot.setZero();
+    t.A.setZero(), t.Adot.setZero(), t.Addot.setZero();
+  }
+  pddot_dir_.resize(n + 1), load_dirs_.resize(n + 1), rhs_lanes_.resize(n), z_dir_.resize(n);
+  for (LaneRows* x :
+       {&constraint_dirs_.phi, &constraint_dirs_.phi_dot, &constraint_dirs_.phi_ddot, &gamma_dir_, &lambda_dir_}) {
+    x->setZero(m, kLanes);
+  }
+  bars_.resize(n + 1);
+  Eigen::Index largest = 0;
+  for (const UserForceData& f : data_.user_forces) {
+    largest = std::max(largest, 7 * static_cast<Eigen::Index>(f.bodies.size()));
+  }
+  for (Eigen::VectorXd* x : {&user_q_, &user_v_, &user_Q_, &user_e_}) x->setZero(largest);
+  user_K_.setZero(largest, largest), user_C_.setZero(largest, largest), user_Q_rho_.setZero(largest, P);
+}
+
+SaddleSolver::Settings Dynamics::solver_settings(bool derivative) const {
+  if (settings_.type == FormulationType::penalty) return {0, 0};
+  return {settings_.iterations, derivative ? 0 : settings_.tolerance};
+}
+
+void Dynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
+  t_ = t;
+  y_ = y;
+  angles_ = angles;
+  for (int i = 1; i <= data_.n; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    set_position(y.segment<7>(7 * (i - 1)), bodies_[k], frames_[k]);
+    set_velocity(y.segment<7>(7 * (data_.n + i - 1)), bodies_[k], frames_[k]);
+  }
+}
+
+void Dynamics::set_loads() {
+  for (Vec<6>& load : body_loads_) load.setZero();
+  for (const TsdaForce& f : data_.tsda) {
+    const std::size_t i = static_cast<std::size_t>(f.body1), j = static_cast<std::size_t>(f.body2);
+    f.add_load(t_, data_.rho, frames_[i], frames_[j], law_, body_loads_[i], body_loads_[j]);
+  }
+  for (const RsdaForce& f : data_.rsda) {
+    const JointAngle& joint = data_.angles[static_cast<std::size_t>(f.joint_angle)];
+    const std::size_t i = static_cast<std::size_t>(joint.body1), j = static_cast<std::size_t>(joint.body2);
+    f.add_load(t_, data_.rho, joint, angles_(f.joint_angle), frames_[i], frames_[j], law_, body_loads_[i],
+               body_loads_[j]);
+  }
+  if (!data_.user_forces.empty()) add_user_loads();
+  for (std::size_t i = 0; i < loads_.size(); ++i) {
+    const BodyData& body = data_.bodies[i + 1];
+    const Vector3d omega = bodies_[i + 1].omega();
+    loads_[i] = body_loads_[i + 1];
+    loads_[i].head<3>() += body.mass * data_.gravity;
+    loads_[i].tail<3>() -= omega.cross(body.J * omega);
+  }
+}
+
+bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                        Eigen::Ref<Eigen::VectorXd> ydot) {
+  set_state(t, y, angles);
+  set_loads();
+  const Vec<6> none = Vec<6>::Zero();
+  for (std::size_t i = 1; i < frames_.size(); ++i) set_acceleration(none, bodies_[i], frames_[i]);
+  evaluate_phi_ddot(data_, frames_, gamma_);
+  if (settings_.omega != 0) {
+    evaluate_phi(data_, frames_, phi_);
+    evaluate_phi_dot(data_, frames_, phi_dot_);
+    gamma_ += 2 * settings_.xi * settings_.omega * phi_dot_ + settings_.omega * settings_.omega * phi_;
+  }
+  if (!solver_.factor(frames_)) return false;
+  g_ = -gamma_;
+  solver_.solve(loads_, g_, solver_settings(false), z_, lambda_);
+
+  const Eigen::Index half = 7 * data_.n;
+  ydot.head(half) = y.tail(half);
+  bool finite = true;
+  for (int i = 1; i <= data_.n; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    bodies_[k].omegadot = z_[k - 1].tail<3>();
+    ydot.segment<3>(half + 7 * (i - 1)) = z_[k - 1].head<3>();
+    ydot.segment<4>(half + 7 * (i - 1) + 3) = bodies_[k].pddot();
+    finite = finite && z_[k - 1].allFinite();
+  }
+  return finite;
+}
+
+bool Dynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                         const std::vector<Vec<6>>& z, const Eigen::VectorXd& lambda) {
+  set_state(t, y, angles);
+  z_ = z;
+  lambda_ = lambda;
+  linearise_here();
+  return solver_.factor(frames_);
+}
+
+void Dynamics::linearise_here() {
+  for (std::size_t i = 1; i < frames_.size(); ++i) set_acceleration(z_[i - 1], bodies_[i], frames_[i]);
+}
+
+void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir) {
+  const int n = data_.n;
+  for (int i = 1; i <= n; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    const Lanes<7> q_dir = y_dir.middleRows<7>(7 * (i - 1)), v_dir = y_dir.middleRows<7>(7 * (n + i - 1));
+    set_tangent(bodies_[k], q_dir, v_dir, frame_tangents_[k], pddot_dir_[k]);
+  }
+  for (Lanes<6>& load : load_dirs_) load.setZero();
+  evaluate_tangents(data_, frames_, frame_tangents_, block, lambda_, constraint_dirs_, load_dirs_);
+  for (Lanes<6>& load : load_dirs_) load = -load;  // from (J'lambda)' to its share of the right-hand side
+  for (const TsdaForce& f : data_.tsda) {
+    const std::size_t i = static_cast<std::size_t>(f.body1), j = static_cast<std::size_t>(f.body2);
+    const TsdaForce::Span x = f.span(frames_[i], frames_[j]);
+    const Law::Value value = f.law.derivatives(t_, data_.rho, x.l, x.ldot, law_);
+    Lanes<4> fields;
+    Lanes<3> s1, s2;
+    const Lanes<1> df = f.law.field_tangent(
+        x.l, x.ldot, block.field<4>(f.law.slot, fields), [&](int p) { return block.direction(p); }, law_);
+    f.tangent(x, value, df, frames_[i], frames_[j], frame_tangents_[i], frame_tangents_[j], block.field<3>(f.slot1, s1),
+              block.field<3>(f.slot2, s2), load_dirs_[i], load_dirs_[j]);
+  }
+  for (const RsdaForce& f : data_.rsda) {
+    const JointAngle& joint = data_.angles[static_cast<std::size_t>(f.joint_angle)];
+    const std::size_t i = static_cast<std::size_t>(joint.body1), j = static_cast<std::size_t>(joint.body2);
+    const JointAngle::Jet jet = joint.jet(frames_[i], frames_[j]);
+    const double angle = JointAngle::on_branch(jet.angle(), angles_(f.joint_angle)), rate = jet.rate();
+    const Law::Value value = f.law.derivatives(t_, data_.rho, angle, rate, law_);
+    Lanes<4> fields;
+    Lanes<3> x1, y1, n2;
+    const Lanes<1> df = f.law.field_tangent(
+        angle, rate, block.field<4>(f.law.slot, fields), [&](int p) { return block.direction(p); }, law_);
+    f.tangent(joint, jet, value, df, frames_[i], frames_[j], frame_tangents_[i], frame_tangents_[j],
+              block.field<3>(joint.slot_x1, x1), block.field<3>(joint.slot_y1, y1), block.field<3>(joint.slot_n2, n2),
+              load_dirs_[i], load_dirs_[j]);
+  }
+  if (!data_.user_forces.empty()) add_user_tangent(block, y_dir);
+
+  Lanes<3> gravity_dir;
+  const Lanes<3>* dg = block.field<3>(data_.slot_gravity, gravity_dir);
+  for (int i = 1; i <= n; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    const BodyData& body = data_.bodies[k];
+    const BodyState& state = bodies_[k];
+    const Vector3d omega = state.omega(), J_omega = body.J * omega;
+    // omega' = 2 (G(p) pdot' - G(pdot) p')
+    const Lanes<7> q_dir = y_dir.middleRows<7>(7 * (i - 1)), v_dir = y_dir.middleRows<7>(7 * (n + i - 1));
+    Lanes<3> omega_dir;
+    const Vector3d e = state.p.tail<3>(), f = state.pdot.tail<3>();
+    omega_dir = 2 * (state.p(0) * v_dir.bottomRows<3>() - e * v_dir.row(3) - cross(e, v_dir.bottomRows<3>()) -
+                     state.pdot(0) * q_dir.bottomRows<3>() + f * q_dir.row(3) + cross(f, q_dir.bottomRows<3>()));
+    Lanes<3> J_omega_dir = body.J * omega_dir;
+    Lanes<6>& b = rhs_lanes_[k - 1];
+    b = load_dirs_[k];
+    Lanes<1> mass_dir;
+    if (const Lanes<1>* dm = block.field<1>(body.slot_mass, mass_dir)) {
+      b.topRows<3>() += (data_.gravity - z_[k - 1].head<3>()) * *dm;
+    }
+    if (dg) b.topRows<3>() += body.mass * *dg;
+    Lanes<6> J_dir;
+    if (const Lanes<6>* dJ = block.field<6>(body.slot_J, J_dir)) {
+      auto times_J = [&](const Vector3d& x) {
+        Lanes<3> y;
+        y.row(0) = x(0) * dJ->row(0) + x(1) * dJ->row(3) + x(2) * dJ->row(4);
+        y.row(1) = x(0) * dJ->row(3) + x(1) * dJ->row(1) + x(2) * dJ->row(5);
+        y.row(2) = x(0) * dJ->row(4) + x(1) * dJ->row(5) + x(2) * dJ->row(2);
+        return y;
+      };
+      b.bottomRows<3>() -= times_J(z_[k - 1].tail<3>());
+      J_omega_dir += times_J(omega);
+    }
+    b.bottomRows<3>() -= cross(omega, J_omega_dir) - cross(J_omega, omega_dir);
+  }
+  gamma_dir_ = -constraint_dirs_.phi_ddot;
+  if (settings_.omega != 0) {
+    gamma_dir_ -= 2 * settings_.xi * settings_.omega * constraint_dirs_.phi_dot +
+                  settings_.omega * settings_.omega * constraint_dirs_.phi;
+  }
+  solver_.solve(rhs_lanes_, gamma_dir_, solver_settings(true), z_dir_, lambda_dir_);
+
+  const Eigen::Index half = 7 * n;
+  ydot_dir.topRows(half) = y_dir.bottomRows(half);
+  for (int i = 1; i <= n; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    const Vector4d& p = bodies_[k].p;
+    const Lanes<3> w = z_dir_[k - 1].bottomRows<3>();
+    ydot_dir.middleRows<3>(half + 7 * (i - 1)) = z_dir_[k - 1].topRows<3>();
+    // pddot' = (pddot' with omegadot fixed) + 1/2 G(p)' omegadot'
+    auto out = ydot_dir.middleRows<4>(half + 7 * (i - 1) + 3);
+    out = pddot_dir_[k];
+    out.row(0) -= 0.5 * dot(p.tail<3>(), w);
+    out.bottomRows<3>() += 0.5 * (p(0) * w + cross(p.tail<3>(), w));
+  }
+}
+
+void Dynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
+                           Eigen::VectorXd& rho_bar) {
+  const int n = data_.n;
+  const Eigen::Index half = 7 * n;
+  for (int i = 1; i <= n; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    loads_[k - 1] = to_virtual(bodies_[k], w.segment<7>(half + 7 * (i - 1)));
+  }
+  g_.setZero();
+  solver_.solve(loads_, g_, solver_settings(true), eta_, mu_);
+
+  for (FrameBar& bar : bars_) bar.set_zero();
+  for (std::size_t k = 1; k < frames_.size(); ++k) set_virtual(eta_[k - 1], frames_[k]);
+  // - eta'J'lambda - mu'(Phiddot + 2 xi omega Phidot + omega^2 Phi)
+  ConstraintWeights weights{&lambda_, nullptr, nullptr, &mu_};
+  if (settings_.omega != 0) {
+    phi_dot_ = 2 * settings_.xi * settings_.omega * mu_;
+    phi_ = settings_.omega * settings_.omega * mu_;
+    weights.mu0 = &phi_, weights.mu1 = &phi_dot_;
+  }
+  add_pull_back(data_, frames_, weights, -1, bars_, theta_bar);
+  for (const TsdaForce& f : data_.tsda) {
+    const std::size_t i = static_cast<std::size_t>(f.body1), j = static_cast<std::size_t>(f.body2);
+    f.pull_back(t_, data_.rho, frames_[i], frames_[j], law_, bars_[i], bars_[j], theta_bar, rho_bar);
+  }
+  for (const RsdaForce& f : data_.rsda) {
+    const JointAngle& joint = data_.angles[static_cast<std::size_t>(f.joint_angle)];
+    const std::size_t i = static_cast<std::size_t>(joint.body1), j = static_cast<std::size_t>(joint.body2);
+    f.pull_back(t_, data_.rho, joint, angles_(f.joint_angle), frames_[i], frames_[j], law_, bars_[i], bars_[j],
+                theta_bar, rho_bar);
+  }
+  if (!data_.user_forces.empty()) add_user_adjoint(y_bar, rho_bar);
+
+  y_bar.tail(half) += w.head(half);
+  for (int i = 1; i <= n; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    const BodyData& body = data_.bodies[k];
+    const BodyState& state = bodies_[k];
+    const Vector3d eta_r = eta_[k - 1].head<3>(), eta_w = eta_[k - 1].tail<3>();
+    const Eigen::Index q = 7 * (i - 1), v = half + q;
+    add_pull_back(state, bars_[k], w.segment<4>(v + 3), eta_w, y_bar.segment<7>(q), y_bar.segment<7>(v));
+    // - eta_w'(omega x J omega):  d/domega = -(J omega x eta_w + J (eta_w x omega))
+    const Vector3d omega = state.omega(), J_omega = body.J * omega;
+    const Vector3d omega_bar = -(J_omega.cross(eta_w) + body.J * eta_w.cross(omega));
+    y_bar.segment<4>(v + 3) += 2 * G_transposed_times(state.p, omega_bar);
+    y_bar.segment<4>(q + 3) -= 2 * G_transposed_times(state.pdot, omega_bar);
+    if (body.slot_mass >= 0) theta_bar(body.slot_mass) += eta_r.dot(data_.gravity - z_[k - 1].head<3>());
+    if (data_.slot_gravity >= 0) theta_bar.segment<3>(data_.slot_gravity) += body.mass * eta_r;
+    if (body.slot_J >= 0) {
+      // - eta_w'J omegadot - (eta_w x omega)'J omega
+      const Matrix3d X = -(eta_w * z_[k - 1].tail<3>().transpose() + eta_w.cross(omega) * omega.transpose());
+      Vec<6> x;
+      x << X(0, 0), X(1, 1), X(2, 2), X(0, 1) + X(1, 0), X(0, 2) + X(2, 0), X(1, 2) + X(2, 1);
+      theta_bar.segment<6>(body.slot_J) += x;
+    }
+  }
+}
+
+}  // namespace mbsopt

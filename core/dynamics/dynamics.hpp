@@ -1,0 +1,89 @@
+// The equations of motion, solved for the accelerations, with their tangent and adjoint.
+//
+// Unknowns per body: z = (rddot, omegadot), omegadot in body axes; a = qddot = (rddot, pddot) follows from it
+// (frame.hpp).
+//
+//   M z + J'lambda = f(t, q, v),          M = diag(m I, inertia),  f: gravity, springs, -omega x inertia omega
+//   J z + gamma(q, v) = 0,                gamma = Phiddot at z = 0  + 2 xi omega Phidot + omega^2 Phi      [augmented
+//   Lagrangian] lambda = alpha (J z + gamma) [penalty]
+//
+// Derivatives are those of the limit of the augmented-Lagrangian iteration, i.e. of the constrained equations:
+//   tangent:  [M J'; J -c] (z', lambda') = -( (M z + J'lambda - f)', (J z + gamma)' )  with z, lambda held fixed
+//   adjoint:  [M J'; J -c] (eta, mu) = (T'w, 0), then  y_bar += d/dy [ w'a - eta'(M z + J'lambda - f) - mu'(J z +
+//   gamma) ]
+// matrix-free: no n x n Jacobian is formed.
+//
+// One Dynamics per thread: it owns every array a right-hand side touches and allocates nothing after construction.
+#pragma once
+
+#include <vector>
+
+#include "core/dynamics/constraint_terms.hpp"
+#include "core/dynamics/saddle_solver.hpp"
+#include "core/mechanism/mechanism.hpp"
+#include "core/scene/settings.hpp"
+
+namespace mbsopt {
+
+class Dynamics {
+ public:
+  Dynamics(const Mechanism& mechanism, const FormulationSettings& settings);
+
+  const MechanismData& data() const { return data_; }
+  const FormulationSettings& settings() const { return settings_; }
+
+  // ydot = (v, a) at (t, y); angles: the branch of each joint angle. False where S is not positive definite or a number
+  // is not finite. The solution stays available as z() and lambda().
+  bool evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, Eigen::Ref<Eigen::VectorXd> ydot);
+  const std::vector<Vec<6>>& z() const { return z_; }
+  const Eigen::VectorXd& lambda() const { return lambda_; }
+
+  // Prepares derivatives at a state whose solution (z, lambda) is known: frames with accelerations, and the factor of
+  // S.
+  bool linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, const std::vector<Vec<6>>& z,
+                 const Eigen::VectorXd& lambda);
+  // The same right after evaluate() at this state, whose factor is still there.
+  void linearise_here();
+
+  // y_dir: tangent of y (14n x lanes); ydot_dir: of (v, a).
+  void tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir);
+  // w: cotangent of (v, a); adds to the cotangents of y, of the differentiated fields, and of the parameters in laws.
+  void add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
+                   Eigen::VectorXd& rho_bar);
+
+  SaddleSolver& solver() { return solver_; }
+
+ private:
+  void set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
+  void set_loads();  // f
+  void add_user_loads();
+  void add_user_tangent(const ParameterBlock& block, const LaneRows& y_dir);
+  void add_user_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& rho_bar);
+  SaddleSolver::Settings solver_settings(bool derivative) const;
+
+  const Mechanism mechanism_;  // keeps the data alive
+  const MechanismData& data_;
+  FormulationSettings settings_;
+  SaddleSolver solver_;
+
+  double t_ = 0;
+  Eigen::VectorXd y_, angles_;
+  std::vector<BodyState> bodies_;
+  std::vector<Frame> frames_;
+  std::vector<Vec<6>> loads_, z_, eta_;  // loads_: f, without the ground
+  std::vector<Vec<6>> body_loads_;       // with the ground, for forces to add to
+  Eigen::VectorXd gamma_, phi_, phi_dot_, lambda_, mu_, g_;
+  Law::Scratch law_;
+  // Derivatives.
+  std::vector<FrameTangent> frame_tangents_;
+  std::vector<Lanes<4>> pddot_dir_;
+  std::vector<Lanes<6>> load_dirs_, rhs_lanes_, z_dir_;
+  ConstraintTangents constraint_dirs_;
+  LaneRows gamma_dir_, lambda_dir_;
+  std::vector<FrameBar> bars_;
+  // User forces.
+  Eigen::VectorXd user_q_, user_v_, user_Q_, user_e_;
+  Eigen::MatrixXd user_K_, user_C_, user_Q_rho_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,81 @@
+#include "core/dynamics/saddle_solver.hpp"
+
+namespace mbsopt {
+
+SaddleSolver::SaddleSolver(const MechanismData& data, double alpha, bool alpha_is_relative)
+    : data_(&data), rows_(data), S_(rows_.matrix()) {
+  alpha_.setConstant(data.m, alpha);
+  if (alpha_is_relative) {
+    for (const Constraint& c : data.constraints) alpha_.segment(c.row, c.rows()) *= c.alpha;
+  }
+  const std::size_t n = static_cast<std::size_t>(data.n);
+  residual_.setZero(data.m);
+  residual_lanes_.setZero(data.m, kLanes);
+  correction_.resize(n);
+  correction_lanes_.resize(n);
+}
+
+bool SaddleSolver::factor(const std::vector<Frame>& frames) {
+  rows_.evaluate(frames);
+  S_.set_zero();
+  for (int i = 1; i <= data_->n; ++i) {
+    const BodyData& b = data_->bodies[static_cast<std::size_t>(i)];
+    Mat<6, 6>& D = S_.diagonal(i - 1);
+    D.diagonal().head<3>().setConstant(b.mass);
+    D.bottomRightCorner<3, 3>() = b.J;
+  }
+  rows_.add_weighted_square(alpha_, S_);
+  ++factorisations_;
+  return S_.factor();
+}
+
+template <class X, class Y>
+void SaddleSolver::solve_any(const std::vector<X>& b, const Y& g, const Settings& settings, std::vector<X>& x, Y& nu,
+                             Y& residual, std::vector<X>& correction) {
+  const std::size_t n = static_cast<std::size_t>(data_->n);
+  for (Eigen::Index r = 0; r < g.rows(); ++r) residual.row(r) = -alpha_(r) * g.row(r);
+  for (std::size_t i = 0; i < n; ++i) x[i] = b[i];
+  rows_.subtract_transposed_times(residual, x);
+  S_.solve(std::span<X>(x));
+
+  nu.setZero();
+  for (int k = 0;; ++k) {
+    residual = -g;
+    rows_.add_times(x, residual);
+    bool converged = k >= settings.refinements;
+    if (!converged && settings.tolerance > 0) {
+      // |J x - g| against |g|: J x is as large as g where the system is solved at all
+      converged = residual.cwiseAbs().maxCoeff() <= settings.tolerance * g.cwiseAbs().maxCoeff();
+    }
+    for (Eigen::Index r = 0; r < g.rows(); ++r) residual.row(r) *= alpha_(r);
+    nu += residual;
+    if (converged) return;
+    residual += nu;
+    for (std::size_t i = 0; i < n; ++i) correction[i] = b[i] - mass_times(static_cast<int>(i) + 1, x[i]);
+    rows_.subtract_transposed_times(residual, correction);
+    S_.solve(std::span<X>(correction));
+    for (std::size_t i = 0; i < n; ++i) x[i] += correction[i];
+  }
+}
+
+void SaddleSolver::solve(const std::vector<Vec<6>>& b, const Eigen::VectorXd& g, const Settings& settings,
+                         std::vector<Vec<6>>& x, Eigen::VectorXd& nu) {
+  if (g.size() == 0) {
+    x = b;
+    S_.solve(std::span<Vec<6>>(x));
+    return;
+  }
+  solve_any(b, g, settings, x, nu, residual_, correction_);
+}
+
+void SaddleSolver::solve(const std::vector<Lanes<6>>& b, const LaneRows& g, const Settings& settings,
+                         std::vector<Lanes<6>>& x, LaneRows& nu) {
+  if (g.rows() == 0) {
+    x = b;
+    S_.solve(std::span<Lanes<6>>(x));
+    return;
+  }
+  solve_any(b, g, settings, x, nu, residual_lanes_, correction_lanes_);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,71 @@
+// The linear system every formulation, tangent, adjoint and projection solves,
+//
+//   [ M  J' ] [ x  ]   [ b ]
+//   [ J  -c ] [ nu ] = [ g ]      c = 0: constrained (augmented Lagrangian);  c = 1/alpha: penalty
+//
+// with the one factor S = M + J' diag(alpha) J.  Starting from nu = 0,
+//
+//   x = S^-1 (b + J' alpha g),   then while refinements last:   nu += alpha (J x - g),   S dx = b - M x - J'(nu + alpha
+//   (J x - g))
+//
+// which is the augmented-Lagrangian iteration written as corrections, so that rounding errors of S (which is badly
+// conditioned for large alpha) are refined away, too; last, nu += alpha (J x - g) makes M x + J'nu = b. One solve
+// without refinement is the penalty system. The map (b, g) -> (x, nu) after a fixed number of refinements is symmetric,
+// so tangent and adjoint solves are exact transposes whatever their convergence.
+#pragma once
+
+#include <vector>
+
+#include "core/dynamics/constraint_rows.hpp"
+#include "core/mechanism/parameter_lanes.hpp"
+
+namespace mbsopt {
+
+class SaddleSolver {
+ public:
+  SaddleSolver(const MechanismData& data, double alpha, bool alpha_is_relative);
+
+  // S from J at the frames given; false where it is not positive definite.
+  bool factor(const std::vector<Frame>& frames);
+  const ConstraintRows& rows() const { return rows_; }
+  const Eigen::VectorXd& alpha() const { return alpha_; }
+
+  // Stops early once |J x - g| <= tolerance times the size of its terms (tolerance 0: never).
+  struct Settings {
+    int refinements = 0;
+    double tolerance = 0;
+  };
+  void solve(const std::vector<Vec<6>>& b, const Eigen::VectorXd& g, const Settings& settings, std::vector<Vec<6>>& x,
+             Eigen::VectorXd& nu);
+  void solve(const std::vector<Lanes<6>>& b, const LaneRows& g, const Settings& settings, std::vector<Lanes<6>>& x,
+             LaneRows& nu);
+
+  long factorisations() const { return factorisations_; }
+
+  // M x for body i (1-based).
+  template <class X>
+  X mass_times(int body, const X& x) const {
+    const BodyData& b = data_->bodies[static_cast<std::size_t>(body)];
+    X y;
+    y.template topRows<3>() = b.mass * x.template topRows<3>();
+    y.template bottomRows<3>().noalias() = b.J * x.template bottomRows<3>();
+    return y;
+  }
+
+ private:
+  template <class X, class Y>
+  void solve_any(const std::vector<X>& b, const Y& g, const Settings& settings, std::vector<X>& x, Y& nu, Y& residual,
+                 std::vector<X>& correction);
+
+  const MechanismData* data_;
+  ConstraintRows rows_;
+  BlockCholesky S_;
+  Eigen::VectorXd alpha_;
+  Eigen::VectorXd residual_;
+  LaneRows residual_lanes_;
+  std::vector<Vec<6>> correction_;
+  std::vector<Lanes<6>> correction_lanes_;
+  long factorisations_ = 0;
+};
+
+}  // namespace mbsopt
