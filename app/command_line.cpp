@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <new>
+#include <stdexcept>
 
 #include "app/atomic_file.hpp"
 #include "app/command.hpp"
@@ -66,6 +67,8 @@ int run_guarded(const Command& command, const CommandContext& context) {
     context.err << error.what() << '\n';
   } catch (const SceneError& error) {
     context.err << context.options.problem_file << ": " << error.what() << '\n';
+  } catch (const std::invalid_argument& error) {
+    context.err << context.options.problem_file << ": " << error.what() << '\n';
   } catch (const OutputError& error) {
     context.err << error.what() << '\n';
   } catch (const std::bad_alloc&) {
@@ -94,7 +97,7 @@ int run_command_line(const std::vector<std::string>& arguments, std::ostream& ou
     add_options(*app.add_subcommand(command.name, command.does), command.name, context.options);
   }
   try {
-    app.parse({arguments.rbegin(), arguments.rend()});  // CLI11 takes them last first
+    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them last first
   } catch (const CLI::ParseError& error) {
     return app.exit(error, out, err) == 0 ? kDone : kBadInput;
   }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "app/atomic_file.hpp"
 #include "app/exit_code.hpp"
 #include "app/json/read_problem.hpp"
 #include "app/provenance.hpp"
@@ -22,7 +23,7 @@ const char* plural(long count) { return count == 1 ? "" : "s"; }
 
 Run::Run(const CommandContext& given)
     : context(given),
-      problem(read_problem(given.options.problem_file, given.options.sets)),
+      problem(read_problem(given.options.problem_file, given.options.sets, &reader_warnings_)),
       folder(given.options.out, problem.scene.name, given.options.problem_file),
       progress(given.err, given.err_is_terminal, given.options.quiet) {
   result["program"] = "mbsopt";
@@ -32,7 +33,20 @@ Run::Run(const CommandContext& given)
   result["provenance"] =
       provenance(context.arguments, folder.owner(), context.options.problem_file, data_files(problem));
   result["warnings"] = Json::array();
-  // Claims the folder, and says what happened should the run be killed.
+  for (const std::string& warning : reader_warnings_) warn(warning);
+}
+
+Run::~Run() {
+  if (!running_) return;
+  try {
+    finish("failed", kNumericalFailure);
+  } catch (const OutputError&) {
+    return;  // "running" stays; the exception under way says more than this one
+  }
+}
+
+void Run::start() {
+  running_ = true;
   result["status"] = "running";
   folder.write("result.json", result_json_text(result));
 }
@@ -67,11 +81,18 @@ int Run::stopped() {
 }
 
 int Run::finish(const char* status, int exit_code) {
+  running_ = false;
   progress.finish();
   result["status"] = status;
   write("result.json", result_json_text(result));
   context.out << fmt::format("\n{}: {}\n", (folder.path() / "").string(), fmt::join(written_, " "));
   return exit_code;
+}
+
+Eigen::VectorXd parameter_values(const Scene& scene) {
+  Eigen::VectorXd rho(static_cast<Eigen::Index>(scene.parameters.size()));
+  for (Eigen::Index k = 0; k < rho.size(); ++k) rho(k) = scene.parameters[static_cast<std::size_t>(k)].value;
+  return rho;
 }
 
 void print_model(std::ostream& out, const std::string& name, const ModelSummary& summary) {

@@ -2,11 +2,13 @@
 // result.json, and ends with an exit code.
 //
 //   Run run(context);                               // throws on bad input
+//   run.start();                                    // from here on there is a result.json
 //   run.result["simulation"] = to_json(statistics);
 //   run.write("trajectory.csv", text);
 //   return run.done();                              // or run.failed(message, last_good_time), run.stopped()
 #pragma once
 
+#include <Eigen/Core>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,13 +24,19 @@ namespace mbsopt {
 class Run {
  public:
   explicit Run(const CommandContext& context);
+  ~Run();  // a run that an exception ends has failed, and its result.json says so
 
+ private:
+  std::vector<std::string> reader_warnings_;  // filled while `problem` is read, hence before it
+
+ public:
   const CommandContext& context;
   const Problem problem;
   const OutputFolder folder;
   Json result;  // the parts of result.json
   Progress progress;
 
+  void start();  // claims the folder: result.json with "status": "running"
   void write(const std::string& file, std::string_view content);  // into the folder; named in the closing line
   void warn(const std::string& warning);
 
@@ -40,7 +48,10 @@ class Run {
  private:
   int finish(const char* status, int exit_code);
   std::vector<std::string> written_;
+  bool running_ = false;
 };
+
+Eigen::VectorXd parameter_values(const Scene& scene);  // as the file gives them, in the scene's order
 
 // Prints the counts of bodies, equations, degrees of freedom; redundant equations by joint.
 void print_model(std::ostream& out, const std::string& name, const ModelSummary& summary);

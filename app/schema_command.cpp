@@ -1,14 +1,11 @@
-#include <string_view>
-
 #include "app/command.hpp"
 #include "app/exit_code.hpp"
+#include "app/json/schema.hpp"
 
 namespace mbsopt {
 
-extern const std::string_view problem_schema;  // problems/problem.schema.json, embedded by the build
-
 int schema_command(const CommandContext& context) {
-  context.out << problem_schema;
+  context.out << problem_schema_text();
   return kDone;
 }
 

@@ -8,6 +8,7 @@ namespace mbsopt {
 int validate_command(const CommandContext& context) {
   Run run(context);
   const Mechanism mechanism(run.problem.scene, parameter_values(run.problem.scene));
+  run.start();
   const Assembly assembly(mechanism, run.problem.scene.simulation.start_time);
   if (!assembly.result().ok) return run.failed(assembly.result().message, run.problem.scene.simulation.start_time);
   run.result["model"] = to_json(assembly.summary());

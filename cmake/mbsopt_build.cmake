@@ -27,13 +27,3 @@ function(mbsopt_compile_options target)
     target_link_options(${target} PUBLIC $<BUILD_INTERFACE:-fsanitize=address,undefined>)
   endif()
 endfunction()
-
-# mbsopt_embed_text(<variable> <file> <name>): a source file that defines  extern const std::string_view mbsopt::<name>
-function(mbsopt_embed_text variable file name)
-  set(output ${CMAKE_CURRENT_BINARY_DIR}/embedded/${name}.cpp)
-  add_custom_command(OUTPUT ${output}
-    COMMAND ${CMAKE_COMMAND} -DINPUT=${file} -DOUTPUT=${output} -DNAME=${name}
-            -P ${PROJECT_SOURCE_DIR}/cmake/embed_text.cmake
-    DEPENDS ${file} ${PROJECT_SOURCE_DIR}/cmake/embed_text.cmake VERBATIM)
-  set(${variable} ${output} PARENT_SCOPE)
-endfunction()

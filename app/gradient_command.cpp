@@ -1,0 +1,80 @@
+#include <fmt/format.h>
+
+#include <map>
+
+#include "app/command.hpp"
+#include "app/interrupt.hpp"
+#include "app/run.hpp"
+#include "app/text_table.hpp"
+#include "core/dynamics/assembly.hpp"
+#include "optim/evaluator.hpp"
+
+namespace mbsopt {
+namespace {
+
+const std::map<std::string, GradientMethod> kMethods{{"auto", GradientMethod::automatic},
+                                                     {"tlm", GradientMethod::tlm},
+                                                     {"adjoint", GradientMethod::adjoint},
+                                                     {"fd", GradientMethod::differences}};
+
+void add_objectives(Run& run, const Evaluation& evaluation) {
+  const Scene& scene = run.problem.scene;
+  std::vector<std::string> header{"parameter", "value"};
+  std::vector<std::string> values{"", ""};
+  for (std::size_t i = 0; i < run.problem.objectives.size(); ++i) {
+    const std::string& name = run.problem.objectives[i].name;
+    const auto row = static_cast<Eigen::Index>(i);
+    Json gradient = Json::object();
+    for (std::size_t k = 0; k < scene.parameters.size(); ++k) {
+      gradient[scene.parameters[k].name] = evaluation.psi_rho(row, static_cast<Eigen::Index>(k));
+    }
+    run.result["objectives"][name] = {{"value", evaluation.psi(row)}, {"gradient", gradient}};
+    run.context.out << fmt::format("{} = {}\n", name, significant(evaluation.psi(row), 12));
+    header.push_back("d " + name);
+  }
+  TextTable table(header);
+  for (std::size_t k = 0; k < scene.parameters.size(); ++k) {
+    std::vector<std::string> row{scene.parameters[k].name, significant(scene.parameters[k].value)};
+    for (Eigen::Index i = 0; i < evaluation.psi.size(); ++i) {
+      row.push_back(significant(evaluation.psi_rho(i, static_cast<Eigen::Index>(k)), 12));
+    }
+    table.add(std::move(row));
+  }
+  run.context.out << '\n' << table.text();
+}
+
+}  // namespace
+
+int gradient_command(const CommandContext& context) {
+  Run run(context);
+  const Scene& scene = run.problem.scene;
+  if (run.problem.objectives.empty()) throw std::invalid_argument("objectives: there are none to differentiate");
+
+  const Mechanism mechanism(scene, parameter_values(scene));
+  run.start();
+  const Assembly assembly(mechanism, scene.simulation.start_time);
+  if (!assembly.result().ok) return run.failed(assembly.result().message, scene.simulation.start_time);
+  run.result["model"] = to_json(assembly.summary());
+
+  double last_good_time = scene.simulation.start_time;
+  EvaluatorOptions options;
+  options.method = kMethods.at(context.options.method);
+  options.progress = [&](double t) {
+    last_good_time = t;
+    return !interrupted();
+  };
+  Evaluator evaluator(scene, objectives_of(run.problem), {}, options);
+  const Evaluation& evaluation = evaluator.gradients(evaluator.start());
+  run.result["simulation"] = to_json(evaluation.statistics);
+  if (interrupted()) return run.stopped();
+  if (!evaluation.ok) return run.failed(evaluation.message, last_good_time);
+  const std::string method(to_string(evaluation.method));
+  run.result["methods"][method] = {{"wall_seconds", evaluation.wall_seconds}, {"simulations", evaluation.simulations}};
+  print_simulation(context.out, scene.simulation, evaluation.statistics);
+  context.out << fmt::format("gradients by {}, {:.3g} s\n\n", evaluation.choice.empty() ? method : evaluation.choice,
+                             evaluation.wall_seconds);
+  add_objectives(run, evaluation);
+  return run.done();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,44 @@
+#include "app/command.hpp"
+#include "app/interrupt.hpp"
+#include "app/report/run_report.hpp"
+#include "app/run.hpp"
+#include "app/simulated_motion.hpp"
+#include "app/text_table.hpp"
+
+namespace mbsopt {
+namespace {
+
+void add_objectives(Run& run, const Eigen::VectorXd& psi) {
+  if (psi.size() == 0) return;
+  TextTable table({"objective", "value"});
+  for (Eigen::Index i = 0; i < psi.size(); ++i) {
+    const std::string& name = run.problem.objectives[static_cast<std::size_t>(i)].name;
+    run.result["objectives"][name] = {{"value", psi(i)}};
+    table.add({name, significant(psi(i), 10)});
+  }
+  run.context.out << '\n' << table.text();
+}
+
+}  // namespace
+
+int simulate_command(const CommandContext& context) {
+  Run run(context);
+  const Scene& scene = run.problem.scene;
+  run.start();
+  const SimulatedMotion motion = simulated_motion(run, parameter_values(scene));
+  const SimulationResult& simulation = motion.simulation;
+  if (simulation.status != SimulationStatus::assembly_failed) {
+    run.result["model"] = to_json(motion.model);
+    run.result["simulation"] = to_json(simulation.statistics);
+    print_model(context.out, scene.name, motion.model);
+    print_simulation(context.out, scene.simulation, simulation.statistics);
+    run.write("trajectory.csv", to_csv(motion.trajectory));
+  }
+  if (simulation.ok()) add_objectives(run, motion.psi);
+  run.write("report.html", simulation_report(scene, run.result, motion.trajectory));
+  if (interrupted()) return run.stopped();
+  if (!simulation.ok()) return run.failed(simulation.message, simulation.last_good_time);
+  return run.done();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,44 @@
+#include "app/simulated_motion.hpp"
+
+#include "app/interrupt.hpp"
+#include "core/dynamics/assembly.hpp"
+#include "optim/objective.hpp"
+
+namespace mbsopt {
+
+SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
+  const Scene& scene = run.problem.scene;
+  const SimulationSettings& settings = scene.simulation;
+  const std::vector<Objective> objectives = objectives_of(run.problem);
+  const std::vector<bool> no_derivatives(scene.parameters.size(), false);
+  const Mechanism mechanism(scene, rho, no_derivatives);
+
+  SimulatedMotion motion;
+  const Assembly assembly(mechanism, settings.start_time);
+  if (!assembly.result().ok) {
+    motion.simulation.status = SimulationStatus::assembly_failed;
+    motion.simulation.message = assembly.result().message;
+    motion.simulation.last_good_time = settings.start_time;
+    return motion;
+  }
+  motion.model = assembly.summary();
+
+  std::vector<Cost> costs;
+  for (const Objective& objective : objectives) costs.push_back(objective.cost(mechanism));
+  RunOptions options;
+  options.progress = [&](double t) {
+    run.progress.fraction("simulating", (t - settings.start_time) / (settings.end_time - settings.start_time));
+    return !interrupted();
+  };
+  const Sampling sampling = record_trajectory(mechanism, scene, motion.trajectory);
+  motion.simulation = simulate(mechanism, settings, costs, sampling, options);
+  run.progress.finish();
+  if (!motion.simulation.ok()) return motion;
+  motion.psi = motion.simulation.psi;
+  for (std::size_t i = 0; i < objectives.size(); ++i) {
+    motion.psi(static_cast<Eigen::Index>(i)) += objectives[i].parameters_only(rho);
+  }
+  return motion;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,19 @@
+// A scene simulated at given parameters, with its rows for trajectory.csv and the values of objectives.
+#pragma once
+
+#include "app/run.hpp"
+#include "app/trajectory_csv.hpp"
+
+namespace mbsopt {
+
+struct SimulatedMotion {
+  SimulationResult simulation;
+  Trajectory trajectory;  // up to the last good time where the simulation failed
+  Eigen::VectorXd psi;    // per objective of the problem, where the simulation is ok
+  ModelSummary model;     // where the assembly is ok
+};
+
+// Draws the progress of `run`, and stops where the user interrupts.
+SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho);
+
+}  // namespace mbsopt
