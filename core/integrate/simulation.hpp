@@ -35,7 +35,15 @@ struct SimulationStatistics {
   std::size_t adjoint_memory_bytes = 0;                           // what the backward sweep kept of the forward run
 };
 
-enum class SimulationStatus { ok, assembly_failed, step_too_small, too_many_steps, not_finite };
+enum class SimulationStatus {
+  ok,
+  assembly_failed,
+  step_too_small,
+  step_too_large,
+  too_many_steps,
+  not_finite,
+  stopped
+};
 
 struct SimulationResult {
   SimulationStatus status = SimulationStatus::ok;
@@ -62,7 +70,7 @@ struct TangentSampling {
 
 struct RunOptions {
   const StepSequence* frozen = nullptr;    // take exactly these steps
-  std::function<bool(double t)> progress;  // called after accepted steps; false stops the run (status not_finite never)
+  std::function<bool(double t)> progress;  // called after accepted steps; false stops the run (status: stopped)
 };
 
 SimulationResult simulate(const Mechanism& mechanism, const SimulationSettings& settings,

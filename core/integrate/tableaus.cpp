@@ -8,8 +8,8 @@ namespace {
 template <int S, int T>
 constexpr Method method(const Tableau<S, T>& rk) {
   constexpr auto nonzero = [](double x) { return x != 0; };
-  Method m{rk.name, rk.order, rk.dense_order, S, T, rk.c.data(), rk.A[0].data(), rk.b.data(), rk.error.data(), nullptr,
-           rk.dense[0].data()};
+  Method m{rk.name,         rk.order, rk.dense_order,    S, T, rk.c.data(), rk.A[0].data(), rk.b.data(),
+           rk.error.data(), nullptr,  rk.dense[0].data()};
   m.adaptive = std::any_of(rk.error.begin(), rk.error.end(), nonzero);
   if (std::any_of(rk.error_low.begin(), rk.error_low.end(), nonzero)) m.error_low = rk.error_low.data();
   return m;

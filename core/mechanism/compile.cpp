@@ -325,7 +325,7 @@ class Compiler {
     }
     if (quantity == "distance" || quantity == "distance_rate") {
       PointSensor out;
-      out.quantity = quantity == "distance" ? PointSensor::Quantity::position : PointSensor::Quantity::distance_rate;
+      out.quantity = quantity == "distance" ? PointSensor::Quantity::position : PointSensor::Quantity::position_rate;
       out.component = PointSensor::kNorm;
       out.relative = true;
       out.a = sensor_point(s.body2, s.point2, where);
@@ -395,10 +395,9 @@ class Compiler {
   // The time derivative of a position-level sensor as a sensor of its own, where it is one.
   bool rate_of(const SensorKind& kind, SensorKind& rate) const {
     if (const auto* p = std::get_if<PointSensor>(&kind)) {
-      if (p->quantity != PointSensor::Quantity::position || p->axes_body >= 1) return false;
+      if (p->quantity != PointSensor::Quantity::position) return false;
       PointSensor r = *p;
-      r.quantity =
-          p->component == PointSensor::kNorm ? PointSensor::Quantity::distance_rate : PointSensor::Quantity::velocity;
+      r.quantity = PointSensor::Quantity::position_rate;
       rate = r;
       return true;
     }

@@ -1,0 +1,49 @@
+#include "core/integrate/cost.hpp"
+
+namespace mbsopt {
+namespace {
+
+class UserRunning final : public PointCost {
+ public:
+  UserRunning(std::shared_ptr<const RunningCost> cost, Eigen::VectorXd rho)
+      : cost_(std::move(cost)), rho_(std::move(rho)) {}
+  double value(const StatePoint& at) const override { return cost_->g(at.t, at.y, rho_); }
+  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
+    cost_->add_g_y(at.t, at.y, rho_, scale, y_bar);
+    cost_->add_g_rho(at.t, at.y, rho_, scale, rho_bar);
+    return cost_->g(at.t, at.y, rho_);
+  }
+
+ private:
+  std::shared_ptr<const RunningCost> cost_;
+  Eigen::VectorXd rho_;
+};
+
+class UserTerminal final : public PointCost {
+ public:
+  UserTerminal(std::shared_ptr<const TerminalCost> cost, Eigen::VectorXd rho)
+      : cost_(std::move(cost)), rho_(std::move(rho)) {}
+  double value(const StatePoint& at) const override { return cost_->value(at.y, rho_); }
+  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
+    Eigen::VectorXd lambda = Eigen::VectorXd::Zero(at.y.size()), mu = Eigen::VectorXd::Zero(rho_.size());
+    cost_->adjoint_init(at.y, rho_, lambda, mu);
+    y_bar += scale * lambda;
+    rho_bar += scale * mu;
+    return cost_->value(at.y, rho_);
+  }
+
+ private:
+  std::shared_ptr<const TerminalCost> cost_;
+  Eigen::VectorXd rho_;
+};
+
+}  // namespace
+
+std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const RunningCost> running, const Eigen::VectorXd& rho) {
+  return std::make_shared<UserRunning>(std::move(running), rho);
+}
+std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const TerminalCost> terminal, const Eigen::VectorXd& rho) {
+  return std::make_shared<UserTerminal>(std::move(terminal), rho);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,159 @@
+#include "core/integrate/explicit_adjoint.hpp"
+
+#include "core/integrate/explicit_tlm.hpp"
+
+namespace mbsopt {
+
+StoredStep::StoredStep(const Step& step, const Method& rk, std::span<const SampleEvent> events)
+    : t(step.t),
+      h(step.h),
+      dense(step.dense),
+      y0(step.y0),
+      y_hat(step.y_hat),
+      y1(step.y1),
+      angles0(step.angles0),
+      a(step.K.bottomRows(step.K.rows() / 2).leftCols(step.stages(rk))),
+      lambda(step.lambda.leftCols(step.stages(rk))),
+      projection(step.projection) {
+  for (const SampleEvent& e : events) {
+    if (e.cost) samples.push_back(e);
+  }
+}
+
+std::size_t StoredStep::bytes() const {
+  const Eigen::Index numbers = y0.size() + y_hat.size() + y1.size() + angles0.size() + a.size() + lambda.size() +
+                               projection.nu.size() + projection.kappa.size() +
+                               12 * static_cast<Eigen::Index>(projection.delta.size());
+  return sizeof(*this) + sizeof(double) * static_cast<std::size_t>(numbers) + sizeof(SampleEvent) * samples.size();
+}
+
+AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
+                           std::span<const Cost> costs)
+    : mechanism_(mechanism),
+      rk_(method),
+      costs_(costs),
+      dynamics_(mechanism, settings.formulation),
+      projector_(mechanism, settings.formulation.projection) {
+  const MechanismData& d = mechanism.data();
+  const Eigen::Index states = mechanism.states(), objectives = static_cast<Eigen::Index>(costs.size());
+  lambda_.setZero(states, objectives);
+  lambda_hat_.setZero(states, objectives);
+  sample_bar_.setZero(states, objectives);
+  theta_bar_.setZero(d.slots(), objectives);
+  rho_bar_.setZero(d.rho.size(), objectives);
+  Y_.setZero(states, rk_.dense_stages);
+  K_.setZero(states, rk_.dense_stages);
+  K_bar_.assign(costs.size(), Eigen::MatrixXd::Zero(states, rk_.dense_stages));
+  z_.resize(static_cast<std::size_t>(d.n));
+  for (Eigen::VectorXd* x : {&y_, &w_, &y_bar_}) x->setZero(states);
+  theta_.setZero(d.slots());
+  rho_.setZero(d.rho.size());
+  multipliers_.setZero(d.m);
+}
+
+void AdjointSweep::begin(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
+  lambda_.setZero(), theta_bar_.setZero(), rho_bar_.setZero();
+  for (std::size_t o = 0; o < costs_.size(); ++o) {
+    const Eigen::Index column = static_cast<Eigen::Index>(o);
+    if (costs_[o].terminal) {
+      costs_[o].terminal->add_gradient({t, y, angles}, 1, lambda_.col(column), rho_bar_.col(column));
+    }
+  }
+}
+
+void AdjointSweep::rebuild(const StoredStep& step) {
+  const Eigen::Index half = mechanism_.states() / 2;
+  for (int i = 0; i < static_cast<int>(step.a.cols()); ++i) {
+    y_ = step.y0;
+    for (int j = 0; j < i; ++j) {
+      const double a = rk_.a(i, j);
+      if (a != 0) y_ += (step.h * a) * K_.col(j);
+    }
+    Y_.col(i) = y_;
+    K_.col(i).head(half) = y_.tail(half);
+    K_.col(i).tail(half) = step.a.col(i);
+  }
+}
+
+bool AdjointSweep::step_back(const StoredStep& step) {
+  const int stages = static_cast<int>(step.a.cols());
+  const Eigen::Index objectives = lambda_.cols();
+  rebuild(step);
+  for (Eigen::MatrixXd& K_bar : K_bar_) K_bar.setZero();
+  lambda_hat_.setZero();
+
+  // Samples: shares of y0, k_i, and of (y1 - y^) by the blend.
+  sample_bar_.setZero();
+  for (const SampleEvent& e : step.samples) {
+    const double theta = (e.time - step.t) / step.h, blend = projection_blend(theta);
+    y_ = step.y0 + blend * (step.y1 - step.y_hat);
+    for (int i = 0; i < stages; ++i) y_ += (step.h * rk_.dense_weight(i, theta)) * K_.col(i);
+    y_bar_.setZero();
+    e.cost->add_gradient({e.time, y_, step.angles0}, 1, y_bar_, rho_bar_.col(e.objective));
+    sample_bar_.col(e.objective) += y_bar_;
+    lambda_.col(e.objective) += blend * y_bar_;
+    lambda_hat_.col(e.objective) -= blend * y_bar_;
+    Eigen::MatrixXd& K_bar = K_bar_[static_cast<std::size_t>(e.objective)];
+    for (int i = 0; i < stages; ++i) K_bar.col(i) += (step.h * rk_.dense_weight(i, theta)) * y_bar_;
+  }
+
+  if (projector_.active()) {
+    if (!projector_.linearise(step.y_hat, step.y1, step.projection)) return false;
+    for (Eigen::Index o = 0; o < objectives; ++o) {
+      w_ = lambda_.col(o);
+      y_bar_ = lambda_hat_.col(o);
+      theta_ = theta_bar_.col(o);
+      projector_.add_adjoint(w_, y_bar_, theta_);
+      lambda_hat_.col(o) = y_bar_;
+      theta_bar_.col(o) = theta_;
+    }
+  } else {
+    lambda_hat_ += lambda_;
+  }
+
+  for (Eigen::Index o = 0; o < objectives; ++o) {
+    Eigen::MatrixXd& K_bar = K_bar_[static_cast<std::size_t>(o)];
+    for (int i = 0; i < rk_.stages; ++i) {
+      if (rk_.b[i] != 0) K_bar.col(i) += (step.h * rk_.b[i]) * lambda_hat_.col(o);
+    }
+  }
+  lambda_ = lambda_hat_ + sample_bar_;  // from here on of y0
+
+  for (int i = stages - 1; i >= 0; --i) {
+    const bool in_step = i < rk_.stages && rk_.b[i] != 0;
+    bool needed = in_step || step.dense;
+    for (int j = i + 1; j < stages && !needed; ++j) needed = rk_.a(j, i) != 0;
+    if (!needed) continue;
+    const double t = step.t + rk_.c[i] * step.h;
+    y_ = Y_.col(i);
+    set_z(y_, step.a.col(i), z_);
+    multipliers_ = step.lambda.col(i);
+    if (!dynamics_.linearise(t, y_, step.angles0, z_, multipliers_)) return false;
+    for (Eigen::Index o = 0; o < objectives; ++o) {
+      Eigen::MatrixXd& K_bar = K_bar_[static_cast<std::size_t>(o)];
+      w_ = K_bar.col(i);
+      y_bar_.setZero();
+      theta_ = theta_bar_.col(o);
+      rho_ = rho_bar_.col(o);
+      dynamics_.add_adjoint(w_, y_bar_, theta_, rho_);
+      const PointCost* running = costs_[static_cast<std::size_t>(o)].running.get();
+      if (running && in_step) running->add_gradient({t, y_, step.angles0}, step.h * rk_.b[i], y_bar_, rho_);
+      theta_bar_.col(o) = theta_;
+      rho_bar_.col(o) = rho_;
+      lambda_.col(o) += y_bar_;
+      for (int j = 0; j < i; ++j) {
+        const double a = rk_.a(i, j);
+        if (a != 0) K_bar.col(j) += (step.h * a) * y_bar_;
+      }
+    }
+  }
+  return true;
+}
+
+Eigen::MatrixXd AdjointSweep::mu() const {
+  Eigen::MatrixXd mu = rho_bar_;
+  for (Eigen::Index o = 0; o < mu.cols(); ++o) mechanism_.data().add_to_rho(theta_bar_.col(o), mu.col(o));
+  return mu;
+}
+
+}  // namespace mbsopt

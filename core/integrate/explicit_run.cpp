@@ -1,0 +1,234 @@
+#include "core/integrate/explicit_run.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace mbsopt {
+
+ExplicitRun::ExplicitRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method)
+    : mechanism_(mechanism),
+      settings_(settings),
+      rk_(method),
+      dynamics_(mechanism, settings.formulation),
+      projector_(mechanism, settings.formulation.projection),
+      step_(make_step()) {
+  const Eigen::Index states = mechanism.states();
+  angles_.setZero(static_cast<Eigen::Index>(mechanism.data().angles.size()));
+  for (Eigen::VectorXd* x : {&work_, &ydot_, &y_stage_}) x->setZero(states);
+}
+
+Step ExplicitRun::make_step() const {
+  Step s;
+  const MechanismData& d = mechanism_.data();
+  const Eigen::Index states = mechanism_.states(), angles = static_cast<Eigen::Index>(d.angles.size());
+  for (Eigen::VectorXd* x : {&s.y0, &s.y_hat, &s.y1}) x->setZero(states);
+  for (Eigen::VectorXd* x : {&s.angles0, &s.angles1}) x->setZero(angles);
+  s.Y.setZero(states, rk_.dense_stages);
+  s.K.setZero(states, rk_.dense_stages);
+  s.lambda.setZero(d.m, rk_.dense_stages);
+  s.projection = projector_.solution();
+  return s;
+}
+
+// Hairer, Norsett, Wanner I, section II.4, "Starting step size"; step_.y0 is the initial state.
+double ExplicitRun::first_step(const IntegratorSettings& s, double span) {
+  if (s.initial_step) return std::min(*s.initial_step, span);
+  const Eigen::VectorXd& y0 = step_.y0;
+  if (!dynamics_.evaluate(step_.t, y0, angles_, ydot_)) return 1e-6 * span;
+  ++evaluations_;
+  const double d0 = scaled_norm(y0, y0, y0, s.rtol, s.atol), d1 = scaled_norm(ydot_, y0, y0, s.rtol, s.atol);
+  const double h0 = std::min(d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1, span);
+  work_ = ydot_;
+  y_stage_ = y0 + h0 * ydot_;
+  if (!dynamics_.evaluate(step_.t + h0, y_stage_, angles_, ydot_)) return 1e-3 * h0;
+  ++evaluations_;
+  work_ -= ydot_;
+  const double d2 = scaled_norm(work_, y0, y0, s.rtol, s.atol) / h0;
+  const double largest = std::max(d1, d2);
+  const double h1 = largest <= 1e-15 ? std::max(1e-6, 1e-3 * h0) : std::pow(0.01 / largest, 1.0 / (rk_.order + 1));
+  return std::min({100 * h0, h1, span});
+}
+
+// Never beyond the end, and not leaving a tiny last step.
+double ExplicitRun::propose_step(double t, double h, double end) const {
+  const double left = end - t;
+  if (h >= left * (1 - 1e-12)) return left;
+  return 2 * h > left && h < left ? 0.5 * left : h;
+}
+
+bool ExplicitRun::evaluate_stage(int i) {
+  y_stage_ = step_.y0;
+  for (int j = 0; j < i; ++j) {
+    const double a = rk_.a(i, j);
+    if (a != 0) y_stage_ += (step_.h * a) * step_.K.col(j);
+  }
+  step_.Y.col(i) = y_stage_;
+  ++evaluations_;
+  if (!dynamics_.evaluate(step_.t + rk_.c[i] * step_.h, y_stage_, step_.angles0, step_.K.col(i))) return false;
+  step_.lambda.col(i) = dynamics_.lambda();
+  return true;
+}
+
+ExplicitRun::Outcome ExplicitRun::attempt(double h, bool adaptive, double& error) {
+  step_.h = h;
+  for (int i = first_stage_known_ ? 1 : 0; i < rk_.stages; ++i) {
+    if (!evaluate_stage(i)) return Outcome::failed;
+    first_stage_known_ = true;  // at this start, whatever h
+  }
+  step_.y_hat = step_.y0;
+  for (int i = 0; i < rk_.stages; ++i) {
+    if (rk_.b[i] != 0) step_.y_hat += (h * rk_.b[i]) * step_.K.col(i);
+  }
+  error = 0;
+  if (!adaptive) return step_.y_hat.allFinite() ? Outcome::accepted : Outcome::failed;
+  const IntegratorSettings& s = settings_.integrator;
+  error = step_error(rk_, h, step_.K, step_.y0, step_.y_hat, s.rtol, s.atol, work_);
+  if (!std::isfinite(error)) return Outcome::failed;
+  return error <= 1 ? Outcome::accepted : Outcome::rejected;
+}
+
+bool ExplicitRun::finish_step(bool dense) {
+  step_.dense = dense;
+  if (dense) {
+    for (int i = rk_.stages; i < rk_.dense_stages; ++i) {
+      if (!evaluate_stage(i)) return false;
+    }
+  }
+  if (projector_.active()) {
+    if (!projector_.project(step_.y_hat, step_.y1, step_.projection)) return false;
+  } else {
+    step_.y1 = step_.y_hat;
+  }
+  const MechanismData& d = mechanism_.data();
+  for (std::size_t k = 0; k < d.angles.size(); ++k) {
+    const JointAngle& a = d.angles[k];
+    const Eigen::Index i = static_cast<Eigen::Index>(k);
+    const double now = a.jet(body_at(step_.y1, a.body1).frame, body_at(step_.y1, a.body2).frame).angle();
+    step_.angles1(i) = JointAngle::on_branch(now, step_.angles0(i));
+  }
+  return true;
+}
+
+double ExplicitRun::fastest_tracked_rate(const Eigen::VectorXd& y) const {
+  double fastest = 0;
+  for (const JointAngle& a : mechanism_.data().angles) {
+    fastest = std::max(fastest, std::abs(a.jet(body_at(y, a.body1).frame, body_at(y, a.body2).frame).rate()));
+  }
+  return fastest;
+}
+
+void ExplicitRun::update_statistics(SimulationResult& result) {
+  SimulationStatistics& s = result.statistics;
+  s.max_position_violation = std::max(s.max_position_violation, projector_.position_violation(step_.y1));
+  s.max_velocity_violation = std::max(s.max_velocity_violation, projector_.velocity_violation(step_.y1));
+  const Energy e = energy(mechanism_.data(), step_.y1, step_.angles1);
+  s.energy_final = e.kinetic + e.potential;
+  s.energy_drift = std::max(s.energy_drift, std::abs(s.energy_final - s.energy_initial));
+}
+
+void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& angles,
+                      const std::function<bool(double)>& wants_dense, const Sink& accepted, const RunOptions& options,
+                      SimulationResult& result) {
+  const IntegratorSettings& s = settings_.integrator;
+  const double end = settings_.end_time, span = end - settings_.start_time;
+  const bool adaptive = !s.step && !options.frozen && rk_.adaptive;
+  angles_ = angles;
+  step_.t = settings_.start_time;
+  step_.y0 = y_initial;
+  step_.angles0 = angles;
+  const Energy e = energy(mechanism_.data(), y_initial, angles);
+  result.statistics.energy_initial = result.statistics.energy_final = e.kinetic + e.potential;
+  result.last_good_time = step_.t;
+  evaluations_ = 0;
+  first_stage_known_ = false;
+
+  auto stop = [&](SimulationStatus status, std::string message) {
+    result.status = status;
+    result.message = std::move(message);
+  };
+  PiController controller(rk_.order);
+  double h = adaptive ? first_step(s, span) : s.step.value_or(span);
+  if (s.max_step) h = std::min(h, *s.max_step);
+  std::size_t frozen_index = 0;
+  while (result.ok() && (options.frozen ? frozen_index < options.frozen->sizes.size() : step_.t < end)) {
+    if (result.statistics.steps + result.statistics.rejected >= s.max_steps) {
+      stop(
+          SimulationStatus::too_many_steps,
+          fmt::format("more than {} steps were needed; stopped at t = {:.6g} s with steps of {:.3g} s. Loosen rtol and "
+                      "atol, raise simulation.integrator.max_steps, or look for very stiff springs or dampers",
+                      s.max_steps, step_.t, h));
+      break;
+    }
+    const double rate = fastest_tracked_rate(step_.y0);
+    if (options.frozen) {
+      step_.t = options.frozen->times[frozen_index];
+      h = options.frozen->sizes[frozen_index];
+    } else {
+      if (adaptive && rate * h > 2)
+        h = 2 / rate;  // an angle is followed over turns only when steps are below half a turn
+      h = propose_step(step_.t, h, end);
+      if (!adaptive && rate * h > 3) {
+        stop(
+            SimulationStatus::step_too_large,
+            fmt::format("at t = {:.6g} s a joint whose angle is used turns by {:.3g} rad in one step of {:.3g} s; more "
+                        "than half a turn cannot be followed: use a smaller simulation.integrator.step",
+                        step_.t, rate * h, h));
+        break;
+      }
+    }
+    double error = 0;
+    Outcome outcome = attempt(h, adaptive, error);
+    const bool last = options.frozen ? frozen_index + 1 == options.frozen->sizes.size() : step_.t + h >= end;
+    step_.t1 = last ? end : step_.t + h;
+    if (outcome == Outcome::accepted && !finish_step(wants_dense(step_.t1))) outcome = Outcome::failed;
+    if (outcome != Outcome::accepted) {
+      if (!adaptive) {
+        stop(SimulationStatus::not_finite,
+             fmt::format(
+                 "the state stopped being finite in the step from t = {:.6g} s by {:.3g} s. The step is too large "
+                 "for this motion: use a smaller step, or an adaptive integrator (no \"step\")",
+                 step_.t, h));
+        break;
+      }
+      ++result.statistics.rejected;
+      h *= outcome == Outcome::rejected ? controller.after_rejection(error) : controller.after_rejection(INFINITY);
+      if (h < 1e-14 * std::max(span, std::abs(step_.t))) {
+        stop(SimulationStatus::step_too_small,
+             fmt::format(
+                 "the step fell to {:.3g} s at t = {:.6g} s and its error is still too large. Look for a singular "
+                 "position, a spring of zero length or a law that is not smooth near this time; looser tolerances "
+                 "or a fixed step may pass it",
+                 h, step_.t));
+      }
+      continue;
+    }
+
+    ++result.statistics.steps;
+    result.steps.times.push_back(step_.t);
+    result.steps.sizes.push_back(h);
+    update_statistics(result);
+    accepted(step_);
+    if (adaptive) {
+      const double proposed = h * controller.after_acceptance(error);
+      h = s.max_step ? std::min(proposed, *s.max_step) : proposed;
+    } else if (!options.frozen) {
+      h = s.step.value_or(span);
+    }
+    step_.t = step_.t1;
+    step_.y0 = step_.y1;
+    step_.angles0 = step_.angles1;
+    first_stage_known_ = false;
+    angles_ = step_.angles1;
+    result.last_good_time = step_.t;
+    ++frozen_index;
+    if (options.progress && !options.progress(step_.t)) {
+      stop(SimulationStatus::stopped, fmt::format("stopped at t = {:.6g} s", step_.t));
+    }
+  }
+  result.y_end = step_.y0;
+  result.statistics.rhs_evaluations += evaluations_;
+  result.statistics.factorisations += dynamics_.solver().factorisations() + projector_.factorisations();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,50 @@
+// Forward integration by an explicit method: adaptive (PI control) or fixed steps, or a frozen sequence of steps.
+// Each accepted step goes to a sink, which observes, accumulates objectives, keeps it for a backward sweep, or follows
+// it with tangents.
+#pragma once
+
+#include <functional>
+
+#include "core/dynamics/dynamics.hpp"
+#include "core/integrate/simulation.hpp"
+#include "core/integrate/step.hpp"
+#include "core/integrate/step_control.hpp"
+
+namespace mbsopt {
+
+class ExplicitRun {
+ public:
+  ExplicitRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method);
+
+  using Sink = std::function<void(const Step&)>;
+  // wants_dense(t1): whether a step that ends at t1 needs dense output. Fills status, statistics, steps, y_end.
+  void run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& angles,
+           const std::function<bool(double t1)>& wants_dense, const Sink& accepted, const RunOptions& options,
+           SimulationResult& result);
+
+  Step make_step() const;  // with all arrays of the right sizes
+  const Eigen::VectorXd& angles() const { return angles_; }
+
+ private:
+  enum class Outcome { accepted, rejected, failed };
+
+  double first_step(const IntegratorSettings& s, double span);
+  double propose_step(double t, double h, double end) const;
+  bool evaluate_stage(int i);
+  Outcome attempt(double h, bool adaptive, double& error);
+  bool finish_step(bool dense);  // dense stages, projection, branches of the angles
+  double fastest_tracked_rate(const Eigen::VectorXd& y) const;
+  void update_statistics(SimulationResult& result);
+
+  const Mechanism mechanism_;
+  SimulationSettings settings_;
+  const Method& rk_;
+  Dynamics dynamics_;
+  Projector projector_;
+  Step step_;
+  Eigen::VectorXd angles_, work_, ydot_, y_stage_;
+  bool first_stage_known_ = false;
+  long evaluations_ = 0;
+};
+
+}  // namespace mbsopt

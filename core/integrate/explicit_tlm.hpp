@@ -1,0 +1,53 @@
+// Tangent-linear sweep over accepted steps of an explicit method: for every direction,
+//   Y_i' = y0' + h sum_j A_ij k_j',   k_i' = f_y Y_i' + f_rho,   y^' = y0' + h sum_i b_i k_i',   y1' = projection'(y^')
+// with the steps held fixed. All directions go through the factor of a stage together, kLanes at a time.
+#pragma once
+
+#include "core/dynamics/dynamics.hpp"
+#include "core/integrate/cost.hpp"
+#include "core/integrate/sample_schedule.hpp"
+#include "core/integrate/simulation.hpp"
+#include "core/integrate/step.hpp"
+
+namespace mbsopt {
+
+class TangentSweep {
+ public:
+  TangentSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
+               const Eigen::MatrixXd& y_initial_rho);
+
+  // Advances over one step; adds the costs' derivatives to psi_rho. False where a factorisation failed.
+  bool follow(const Step& step, std::span<const Cost> costs, std::span<const SampleEvent> events,
+              const TangentSampling& sampling, Eigen::MatrixXd& psi_rho);
+  // Adds the terminal costs' derivatives; call once, after the last step.
+  void finish(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, std::span<const Cost> costs,
+              Eigen::MatrixXd& psi_rho);
+
+  long factorisations() { return dynamics_.solver().factorisations() + projector_.factorisations(); }
+
+ private:
+  struct Block {
+    ParameterBlock parameters;
+    LaneRows y0, y_hat, y1, Y;
+    std::vector<LaneRows> K;
+  };
+  void add_cost(const PointCost& cost, const StatePoint& at, double weight, LaneRows Block::*direction,
+                Eigen::Index objective, Eigen::MatrixXd& psi_rho);
+  void set_dense(const Step& step, double theta);  // into Block::Y
+  void take_samples(const Step& step, std::span<const SampleEvent> events, const TangentSampling& sampling,
+                    Eigen::MatrixXd& psi_rho);
+
+  const Mechanism mechanism_;
+  const Method& rk_;
+  Dynamics dynamics_;
+  Projector projector_;
+  std::vector<Block> blocks_;
+  std::vector<Vec<6>> z_;
+  Eigen::VectorXd y_, y_bar_, rho_bar_, lambda_;
+  Eigen::MatrixXd y_rho_;
+};
+
+// z = (rddot, omegadot) of each body from y and a = qddot:  omegadot = 2 G(p) pddot/(p'p).
+void set_z(const Eigen::VectorXd& y, const Eigen::Ref<const Eigen::VectorXd>& a, std::vector<Vec<6>>& z);
+
+}  // namespace mbsopt

@@ -1,0 +1,65 @@
+// Step-size control: error norm, PI controller, first step.
+//   Hairer, Norsett, Wanner, "Solving Ordinary Differential Equations I" (1993), section II.4; PI control: Gustafsson
+//   (1991), Hairer, Wanner, "Solving Ordinary Differential Equations II", section IV.2.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+
+#include "core/integrate/tableaus.hpp"
+
+namespace mbsopt {
+
+// h -> h * factor with factor = 0.9 err^-(1/k - 0.75 beta) err_old^beta, k the order of the step, beta = 0.2/k.
+class PiController {
+ public:
+  explicit PiController(int order) : beta_(0.2 / order), exponent_(1.0 / order - 0.75 * beta_) {}
+
+  double after_acceptance(double error) {
+    const double e = std::max(error, 1e-10);
+    double factor = 0.9 * std::pow(e, -exponent_) * std::pow(previous_, beta_);
+    factor = std::clamp(factor, 0.2, last_rejected_ ? 1.0 : 6.0);
+    previous_ = std::max(error, 1e-4);
+    last_rejected_ = false;
+    return factor;
+  }
+  double after_rejection(double error) {
+    last_rejected_ = true;
+    return std::isfinite(error) ? std::max(0.2, 0.9 * std::pow(error, -exponent_)) : 0.2;
+  }
+
+ private:
+  double beta_, exponent_;
+  double previous_ = 1e-4;
+  bool last_rejected_ = false;
+};
+
+// Root mean square of x_i / (atol + rtol max(|a_i|, |b_i|)).
+inline double scaled_norm(const Eigen::VectorXd& x, const Eigen::VectorXd& a, const Eigen::VectorXd& b, double rtol,
+                          double atol) {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    const double e = x(i) / (atol + rtol * std::max(std::abs(a(i)), std::abs(b(i))));
+    sum += e * e;
+  }
+  return std::sqrt(sum / static_cast<double>(x.size()));
+}
+
+// Error of a step: K's first columns hold the stages' derivatives. work: scratch of the state's size.
+inline double step_error(const Method& rk, double h, const Eigen::MatrixXd& K, const Eigen::VectorXd& y0,
+                         const Eigen::VectorXd& y1, double rtol, double atol, Eigen::VectorXd& work) {
+  auto norm = [&](const double* weights) {
+    work.setZero();
+    for (int i = 0; i < rk.stages; ++i) {
+      if (weights[i] != 0) work += (h * weights[i]) * K.col(i);
+    }
+    return scaled_norm(work, y0, y1, rtol, atol);
+  };
+  const double high = norm(rk.error);
+  if (!rk.error_low) return high;
+  const double low = norm(rk.error_low), both = std::sqrt(high * high + 0.01 * low * low);
+  return both > 0 ? high * high / both : 0.0;
+}
+
+}  // namespace mbsopt
