@@ -1,10 +1,10 @@
 #include "app/json/node.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <stdexcept>
 
 #include "core/expression/expression.hpp"
-#include "core/scene/type_table.hpp"
 
 namespace mbsopt {
 
@@ -32,16 +32,6 @@ std::string what_is(const Node& node) {
       return "an object";
   }
   return "";
-}
-
-std::string child_path(const std::string& parent, std::string_view key) {
-  const std::string name(key);
-  if (!is_identifier(key) && key != "$schema") return parent + "[\"" + name + "\"]";
-  return parent.empty() ? name : parent + "." + name;
-}
-
-std::string child_path(const std::string& parent, std::size_t index) {
-  return parent + "[" + std::to_string(index) + "]";
 }
 
 std::vector<PathStep> parse_path(std::string_view path) {

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/scene/scene_path.hpp"
+
 namespace mbsopt {
 
 struct Node {
@@ -26,11 +28,7 @@ struct Node {
 // "an object", "a list of 2", "the number 3", "the string 'x'", ...
 std::string what_is(const Node& node);
 
-// JSON paths: keys joined by dots, indices in brackets: bodies[2].points.tip. A key that is not a plain identifier is
-// written in quotes: objectives["tip error"].
-std::string child_path(const std::string& parent, std::string_view key);
-std::string child_path(const std::string& parent, std::size_t index);
-
+// A JSON path (core/scene/scene_path.hpp), step by step.
 struct PathStep {
   std::string key;  // of an object
   bool is_index = false;

@@ -5,6 +5,7 @@
 #include "app/json/parse_json.hpp"
 #include "app/json/reader.hpp"
 #include "app/json/source_text.hpp"
+#include "optim/problem_issues.hpp"
 
 namespace mbsopt {
 
@@ -25,6 +26,24 @@ void resolve_data_files(Problem& problem, const std::filesystem::path& folder, c
   }
 }
 
+// What is wrong with the meaning, at the place in the file that says it. An error that follows from one in the reading
+// is left out.
+void add_issues(const Problem& problem, const Node& root, Findings& findings, std::vector<std::string>* warnings) {
+  const std::vector<SceneIssue> issues = find_issues(problem);
+  std::vector<const SceneIssue*> errors;
+  for (const SceneIssue& issue : issues) {
+    if (!issue.is_warning && !findings.concerns(issue.path)) errors.push_back(&issue);
+    if (issue.is_warning && warnings) warnings->push_back(issue.path + ": " + issue.message);
+  }
+  for (const SceneIssue* issue : errors) {
+    const Node& node = nearest(root, issue->path);
+    if (issue->offset && node.kind == Node::Kind::string)
+      findings.add_inside(node, *issue->offset, issue->path, issue->message);
+    else
+      findings.add(node, issue->path, issue->message);
+  }
+}
+
 }  // namespace
 
 Problem read_problem_text(const std::string& text, const std::filesystem::path& name,
@@ -36,7 +55,7 @@ Problem read_problem_text(const std::string& text, const std::filesystem::path& 
   Problem problem;
   Reader::read(root, "", findings, problem);
   resolve_data_files(problem, name.parent_path(), root, findings);
-  (void)warnings;
+  add_issues(problem, root, findings, warnings);
   findings.throw_if_any();
   return problem;
 }

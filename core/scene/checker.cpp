@@ -1,0 +1,274 @@
+#include "core/scene/checker.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/expression/did_you_mean.hpp"
+#include "core/expression/dimension_inference.hpp"
+#include "core/expression/syntax_tree.hpp"
+
+namespace mbsopt {
+
+namespace {
+
+constexpr std::size_t kListed = 20;
+
+// "; bodies: ground, crank"
+std::string listed(std::string_view what, std::vector<std::string> names) {
+  const bool more = names.size() > kListed;
+  if (more) names.resize(kListed);
+  if (names.empty()) return "; there are no " + std::string(what);
+  return "; " + std::string(what) + ": " + joined(names) + (more ? ", ..." : "");
+}
+
+struct Kind {
+  const char* one;
+  const char* all;
+};
+Kind kind_of(To what) {
+  switch (what) {
+    case To::body:
+      return {"body", "bodies"};
+    case To::joint:
+      return {"joint", "joints"};
+    case To::force:
+      return {"force", "forces"};
+    case To::sensor:
+      return {"sensor", "sensors"};
+    case To::parameter:
+      return {"parameter", "parameters"};
+    case To::objective:
+      return {"objective", "objectives"};
+  }
+  return {"", ""};
+}
+
+std::string text_of(double value) { return Expression(value).text(); }
+
+}  // namespace
+
+void Checker::name(std::string_view key, const std::string& value, const Says&) {
+  if (value.empty()) return issue(path(key), "is empty, a name is expected");
+  const auto bad = std::find_if(value.begin(), value.end(), [](char c) {
+    return static_cast<unsigned char>(c) < 0x20 || std::string_view(".,;\"'[]/\\").find(c) != std::string_view::npos;
+  });
+  if (bad != value.end())
+    issue(path(key), "the name '" + value + "' must not contain . , ; \" ' [ ] / \\ or control characters");
+}
+
+void Checker::must_be_identifier(const std::string& where, const std::string& name) {
+  if (!is_identifier(name))
+    issue(where, "the name '" + name + "' must be an identifier: letters, digits and _, not beginning with a digit");
+  else if (has_word(kReservedNames, name))
+    issue(where, "the name '" + name + "' is reserved; reserved are " + joined(words(kReservedNames)));
+  else if (find_function(name))
+    issue(where, "the name '" + name + "' is that of a function");
+}
+
+void Checker::check_reference(const std::string& where, const std::string& value, To what) {
+  const std::vector<std::string> names = facts_.names(what);
+  if (std::find(names.begin(), names.end(), value) != names.end()) return;
+  const auto [one, all] = kind_of(what);
+  issue(where,
+        std::string("there is no ") + one + " '" + value + "'" + did_you_mean(value, names) + listed(all, names));
+}
+
+void Checker::reference(std::string_view key, const std::string& value, To what, const Says& says) {
+  if (says.need == Need::unknown || (value.empty() && says.need == Need::optional)) return;
+  if (value.empty()) return issue(path(key), "is missing; expected: " + std::string(says.description));
+  // Fast for the usual case: a list of all names is made for an error message only.
+  if (what == To::body && (value == "ground" || facts_.body(value))) return;
+  if (what == To::joint && facts_.joint(value)) return;
+  if (what == To::sensor && facts_.sensor(value)) return;
+  check_reference(path(key), value, what);
+}
+
+void Checker::references(std::string_view key, const std::vector<std::string>& values, To what, const Says& says) {
+  if (values.empty() && says.need == Need::required)
+    issue(path(key), "is empty; expected: " + std::string(says.description));
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::string where = child_path(path(key), i);
+    check_reference(where, values[i], what);
+    if (std::find(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(i), values[i]) !=
+        values.begin() + static_cast<std::ptrdiff_t>(i))
+      issue(where, "'" + values[i] + "' is listed twice");
+  }
+}
+
+void Checker::word(std::string_view key, const std::string& value, const Words& allowed, const Says& says) {
+  if (says.need == Need::unknown) return;
+  if (value.empty() && says.need == Need::required)
+    issue(path(key), "is missing; available: " + joined(words(allowed.available)));
+  else if (!value.empty() && !has_word(allowed.available, value))
+    issue(path(key), not_among(key, value, words(allowed.available), allowed.later));
+}
+
+const TypeRow* Checker::type(std::string_view key, std::string_view current, std::span<const TypeRow> rows,
+                             std::string_view later, const Says&) {
+  const TypeRow* const row = find_row(rows, current);
+  if (!row) issue(path(key), not_among(key, current, names_of(rows), later));
+  return row;
+}
+
+bool Checker::names_are_known(const std::string& where, const Expression& value, Names names) {
+  const Symbols& symbols = facts_.symbols(names);
+  bool known = true;
+  for (const std::string& name : value.names()) {
+    if (symbols.input(name) >= 0) continue;
+    if (symbols.definition(name)) {
+      known = known && !facts_.is_broken(name);
+      continue;
+    }
+    known = false;
+    const std::vector<SyntaxNode>& nodes = value.tree().nodes;
+    const auto node = std::find_if(nodes.begin(), nodes.end(), [&](const SyntaxNode& n) {
+      return n.operation == Operation::name && n.name == name;
+    });
+    issues_.push_back(
+        {where,
+         "unknown name '" + name + "'" + did_you_mean(name, symbols.names()) + listed("known names", symbols.names()),
+         false, node->offset});
+  }
+  return known;
+}
+
+void Checker::check_dimension(const std::string& where, const Expression& value,
+                              const std::optional<Dimension>& expected) {
+  try {
+    const auto found =
+        infer_dimension(value, [this](const std::string& name) { return facts_.dimension_of_name(name); });
+    if (expected && !fits(found, *expected))
+      issue(where,
+            "'" + value.text() + "' has the dimension " + to_string(*found) + ", expected is " + to_string(*expected) +
+                (value.names().empty() ? ""
+                                       : " (a factor without a unit counts as a pure number; write its unit, as in "
+                                         "7850 [kg/m^3])"));
+  } catch (const DimensionError& error) {
+    issues_.push_back({where, error.what(), false, error.offset});
+  }
+}
+
+void Checker::check_expression(const std::string& where, const Expression& value, Names names,
+                               const std::optional<Dimension>& expected) {
+  if (!names_are_known(where, value, names)) return;
+  if (names != Names::objective) check_dimension(where, value, expected);
+  if (value.is_number() || names == Names::none) {
+    const std::optional<double> result = facts_.value(value);
+    if (result && !std::isfinite(*result))
+      issue(where,
+            "'" + value.text() + "' is " + text_of(*result) + " at the values of the parameters; it must be finite");
+  }
+}
+
+void Checker::number(std::string_view key, const Field& value, const Says& says) {
+  if (says.need != Need::unknown) check_expression(path(key), value, Names::none, says.dimension);
+}
+
+void Checker::number(std::string_view key, const std::optional<Field>& value, const Says& says) {
+  if (value) number(key, *value, says);
+}
+
+void Checker::check_vector(const std::string& where, const VectorField& value,
+                           const std::optional<Dimension>& expected) {
+  for (std::size_t i = 0; i < value.size(); ++i)
+    check_expression(child_path(where, i), value[i], Names::none, expected);
+}
+
+void Checker::vector(std::string_view key, const VectorField& value, const Says& says) {
+  check_vector(path(key), value, says.dimension);
+}
+
+void Checker::point(std::string_view key, const PointField& value, const std::string& body, const Says& says) {
+  if (says.need == Need::unknown) return;
+  if (const auto* vector = std::get_if<VectorField>(&value)) return check_vector(path(key), *vector, says.dimension);
+  const std::string& name = std::get<std::string>(value);
+  if (name == "O") return;
+  const Body* const owner = facts_.body(body);
+  if (!owner && body != "ground") return;  // the body is what is wrong
+  std::vector<std::string> known{"O"};
+  if (owner) {
+    if (owner->points.contains(name)) return;
+    for (const auto& [point, coordinates] : owner->points) known.push_back(point);
+  }
+  issue(path(key),
+        "body '" + body + "' has no point '" + name + "'" + did_you_mean(name, known) + listed("points", known));
+}
+
+void Checker::point(std::string_view key, const std::optional<PointField>& value, const std::string& body,
+                    const Says& says) {
+  if (value && says.need == Need::unknown)
+    issue(path(key), "is given, and this type does not have it");
+  else if (value)
+    point(key, *value, body, says);
+  else if (says.need == Need::required)
+    issue(path(key), "is missing; expected: " + std::string(says.description));
+}
+
+void Checker::orientation(std::string_view key, const OrientationField& value, const Says&) {
+  Checker inside = at(key);
+  if (const auto* e = std::get_if<EulerParametersField>(&value)) {
+    for (std::size_t i = 0; i < e->e.size(); ++i)
+      inside.check_expression(child_path(inside.path(), i), e->e[i], Names::none, Dimension{});
+    check_meaning(inside, *e);
+  } else if (const auto* a = std::get_if<AxisAngleField>(&value)) {
+    inside.check(*a);
+  } else {
+    inside.check(std::get<RollPitchYawField>(value));
+  }
+}
+
+void Checker::points(std::string_view key, const std::map<std::string, VectorField>& value, const Says& says) {
+  for (const auto& [name, coordinates] : value) {
+    const std::string where = child_path(path(key), name);
+    if (!is_identifier(name) || name == "O")
+      issue(where, "the name '" + name + "' of a point must be an identifier other than 'O', which is the origin");
+    check_vector(where, coordinates, says.dimension);
+  }
+}
+
+void Checker::law(std::string_view key, const std::optional<Expression>& value, Names names, const Says& says) {
+  if (value) expression(key, *value, names, says);
+}
+
+void Checker::expression(std::string_view key, const Expression& value, Names names, const Says& says) {
+  // Names::none here means parameters_only, in which weights without units are as usual as in other objectives.
+  if (names == Names::none && !says.dimension) {
+    if (!names_are_known(path(key), value, names)) return;
+    const std::optional<double> result = facts_.value(value);
+    if (result && !std::isfinite(*result))
+      issue(path(key),
+            "'" + value.text() + "' is " + text_of(*result) + " at the values of the parameters; it must be finite");
+    return;
+  }
+  check_expression(path(key), value, names, says.dimension);
+}
+
+void Checker::check_range(std::string_view key, double value, const Range& range) {
+  if (!std::isfinite(value))
+    issue(path(key), "is " + text_of(value) + ", it must be finite");
+  else if (value < range.least || (range.open && value == range.least))
+    issue(path(key), "is " + text_of(value) + ", it must be " + (range.open ? "greater than " : "at least ") +
+                         text_of(range.least));
+}
+
+void Checker::plain(std::string_view key, double value, const Range& range, const Says&) {
+  check_range(key, value, range);
+}
+void Checker::plain(std::string_view key, int value, const Range& range, const Says&) {
+  check_range(key, value, range);
+}
+void Checker::plain(std::string_view key, long value, const Range& range, const Says&) {
+  check_range(key, static_cast<double>(value), range);
+}
+void Checker::plain(std::string_view key, const std::optional<double>& value, const Range& range, const Says&) {
+  if (value) check_range(key, *value, range);
+}
+
+void Checker::overrides(std::string_view key, const std::vector<std::pair<std::string, double>>& values, const Says&) {
+  for (const auto& [name, value] : values) {
+    check_reference(child_path(path(key), name), name, To::parameter);
+    at(key).check_range(name, value, kAny);
+  }
+}
+
+}  // namespace mbsopt

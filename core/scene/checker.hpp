@@ -1,0 +1,138 @@
+// The visitor (core/scene/vocabulary.hpp) that checks every field of a scene or problem: names that are referred to,
+// expressions, dimensions, ranges. What only a whole object can get wrong is checked by check_meaning().
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/scene/issues.hpp"
+#include "core/scene/scene_facts.hpp"
+#include "core/scene/scene_path.hpp"
+#include "core/scene/vocabulary.hpp"
+
+namespace mbsopt {
+
+class Checker {
+ public:
+  Checker(const SceneFacts& facts, std::vector<SceneIssue>& issues, std::string path = "")
+      : facts_(facts), issues_(issues), path_(std::move(path)) {}
+
+  const SceneFacts& facts() const { return facts_; }
+  const std::string& path() const { return path_; }
+  std::string path(std::string_view key) const { return child_path(path_, key); }
+  void issue(const std::string& path, const std::string& message) { issues_.push_back({path, message}); }
+  void warning(const std::string& path, const std::string& message) { issues_.push_back({path, message, true}); }
+
+  // Checks an object's fields, then what they mean together.
+  template <class T>
+  void check(const T& value) {
+    describe(*this, value);
+    check_meaning(*this, value);
+  }
+
+  void name(std::string_view key, const std::string& value, const Says& says);
+  void text(std::string_view, const std::string&, const Says&) {}
+  void reference(std::string_view key, const std::string& value, To what, const Says& says);
+  void references(std::string_view key, const std::vector<std::string>& values, To what, const Says& says);
+  void word(std::string_view key, const std::string& value, const Words& words, const Says& says);
+  template <class T, std::size_t N>
+  void choice(std::string_view, const T&, const Choice<T> (&)[N], const Says&) {}
+  const TypeRow* type(std::string_view key, std::string_view current, std::span<const TypeRow> rows,
+                      std::string_view later, const Says& says);
+
+  void number(std::string_view key, const Field& value, const Says& says);
+  void number(std::string_view key, const std::optional<Field>& value, const Says& says);
+  void vector(std::string_view key, const VectorField& value, const Says& says);
+  void point(std::string_view key, const PointField& value, const std::string& body, const Says& says);
+  void point(std::string_view key, const std::optional<PointField>& value, const std::string& body, const Says& says);
+  void inertia(std::string_view key, const InertiaField& value, const Says&) { at(key).check(value); }
+  void orientation(std::string_view key, const OrientationField& value, const Says&);
+  void points(std::string_view key, const std::map<std::string, VectorField>& value, const Says& says);
+  void law(std::string_view key, const std::optional<Expression>& value, Names names, const Says& says);
+  void expression(std::string_view key, const Expression& value, Names names, const Says& says);
+
+  void plain(std::string_view key, double value, const Range& range, const Says& says);
+  void plain(std::string_view key, int value, const Range& range, const Says& says);
+  void plain(std::string_view key, long value, const Range& range, const Says& says);
+  void plain(std::string_view, bool, const Range&, const Says&) {}
+  void plain(std::string_view key, const std::optional<double>& value, const Range& range, const Says& says);
+  void overrides(std::string_view key, const std::vector<std::pair<std::string, double>>& values, const Says& says);
+
+  template <class T>
+  void object(std::string_view key, const T& value, const Says&) {
+    at(key).check(value);
+  }
+  template <class T>
+  void object(std::string_view key, const std::optional<T>& value, const Says&) {
+    if (value) at(key).check(*value);
+  }
+  template <class F>
+  void group(std::string_view key, const Says&, F&& fields) {
+    Checker inside = at(key);
+    fields(inside);
+  }
+  template <class T>
+  void list(std::string_view key, const std::vector<T>& values, const Says&) {
+    for (std::size_t i = 0; i < values.size(); ++i) Checker(facts_, issues_, child_path(path(key), i)).check(values[i]);
+  }
+  template <class T>
+  void named(std::string_view key, const std::vector<T>& values, const Says&) {
+    for (const T& value : values) {
+      Checker inside(facts_, issues_, child_path(path(key), value.name));
+      if constexpr (std::is_same_v<T, Definition>)
+        inside.check_expression(inside.path(), value.value, Names::none, {});
+      else
+        inside.check(value);
+    }
+  }
+  void version(std::string_view, int, const Says&) {}
+  void later(std::string_view, std::string_view) {}
+  void rest_unknown() {}
+
+  // Of a field at any path.
+  void check_expression(const std::string& path, const Expression& value, Names names,
+                        const std::optional<Dimension>& expected);
+  void must_be_identifier(const std::string& path, const std::string& name);
+
+ private:
+  Checker at(std::string_view key) const { return {facts_, issues_, path(key)}; }
+  void check_reference(const std::string& path, const std::string& value, To what);
+  void check_range(std::string_view key, double value, const Range& range);
+  void check_vector(const std::string& path, const VectorField& value, const std::optional<Dimension>& expected);
+  bool names_are_known(const std::string& path, const Expression& value, Names names);
+  void check_dimension(const std::string& path, const Expression& value, const std::optional<Dimension>& expected);
+
+  const SceneFacts& facts_;
+  std::vector<SceneIssue>& issues_;
+  std::string path_;
+};
+
+template <class T>
+void check_meaning(Checker&, const T&) {}  // most objects are right when their fields are
+void check_meaning(Checker& checker, const Parameter& parameter);
+void check_meaning(Checker& checker, const Body& body);
+void check_meaning(Checker& checker, const InertiaField& inertia);
+void check_meaning(Checker& checker, const EulerParametersField& orientation);
+void check_meaning(Checker& checker, const AxisAngleField& orientation);
+void check_meaning(Checker& checker, const Joint& joint);
+void check_meaning(Checker& checker, const Force& force);
+void check_meaning(Checker& checker, const Sensor& sensor);
+void check_meaning(Checker& checker, const Condition& condition);
+void check_meaning(Checker& checker, const IntegratorSettings& settings);
+void check_meaning(Checker& checker, const SimulationSettings& settings);
+void check_meaning(Checker& checker, const Scene& scene);
+
+// Names that occur more than once in a list, at paths of(index).
+template <class T, class PathOf>
+void check_unique_names(Checker& checker, const std::vector<T>& all, std::string_view what, PathOf&& path_of) {
+  std::map<std::string, std::size_t> first;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const auto [it, is_new] = first.emplace(all[i].name, i);
+    if (!is_new)
+      checker.issue(path_of(i), "there is already " + std::string(what) + " '" + all[i].name + "', " +
+                                    path_of(it->second) + "; names must be unique");
+  }
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,250 @@
+#include "core/scene/issues.hpp"
+
+#include <cmath>
+#include <set>
+#include <tuple>
+
+#include "core/scene/checker.hpp"
+#include "core/scene/inertia_check.hpp"
+
+namespace mbsopt {
+
+namespace {
+
+using Vector = std::array<double, 3>;
+
+std::string text_of(double value) { return Expression(value).text(); }
+
+double norm(const Vector& v) { return std::hypot(v[0], v[1], v[2]); }
+double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+bool is_finite(const Vector& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
+Vector unit(const Vector& v) { return {v[0] / norm(v), v[1] / norm(v), v[2] / norm(v)}; }
+
+// A direction that can be used; an issue where it is a zero vector.
+std::optional<Vector> direction(Checker& checker, std::string_view key, const std::optional<PointField>& field,
+                                const std::string& body) {
+  if (!field) return std::nullopt;
+  const auto v = checker.facts().value(*field, body);
+  if (!v || !is_finite(*v)) return std::nullopt;
+  if (norm(*v) > 0) return unit(*v);
+  checker.issue(checker.path(key), "is a zero vector, a direction must not be");
+  return std::nullopt;
+}
+
+bool angle_is_used(const Scene& scene, const std::string& joint) {
+  for (const Force& force : scene.forces)
+    if (const auto* rsda = std::get_if<Rsda>(&force.kind); rsda && rsda->joint == joint) return true;
+  for (const Sensor& sensor : scene.sensors)
+    if (sensor.joint == joint) return true;
+  return false;
+}
+
+void check_normals(Checker& checker, const Joint& joint, const std::optional<Vector>& axis1,
+                   const std::optional<Vector>& axis2) {
+  const auto normal1 = direction(checker, "normal1", joint.normal1, joint.body1);
+  const auto normal2 = direction(checker, "normal2", joint.normal2, joint.body2);
+  constexpr double kParallel = 1e-9, kSame = 1e-12;
+  const auto check_angle = [&](std::string_view key, const std::optional<Vector>& n, const std::optional<Vector>& a) {
+    if (n && a && 1 - std::abs(dot(*n, *a)) < kParallel * kParallel)
+      checker.issue(checker.path(key), "is parallel to the axis; it must have a part perpendicular to it");
+  };
+  check_angle("normal1", normal1, axis1);
+  check_angle("normal2", normal2, axis2);
+  if (joint.normal1.has_value() != joint.normal2.has_value())
+    checker.issue(checker.path(joint.normal1 ? "normal2" : "normal1"), "is missing; give both normals, or neither");
+  if (!joint.normal1 && !joint.normal2 && axis1 && axis2 && angle_is_used(checker.facts().scene(), joint.name) &&
+      norm({(*axis1)[0] - (*axis2)[0], (*axis1)[1] - (*axis2)[1], (*axis1)[2] - (*axis2)[2]}) > kSame)
+    checker.issue(checker.path(), "its angle is used and axis1 differs from axis2: give normal1 and normal2");
+}
+
+void check_joint_has_angle(Checker& checker, const std::string& name) {
+  const Joint* const joint = checker.facts().joint(name);
+  if (joint && joint->type != "revolute" && find_row(kJointTypes, joint->type))
+    checker.issue(checker.path("joint"),
+                  "joint '" + name + "' is " + joint->type + " and has no angle; a revolute joint is needed");
+}
+
+void check_two_bodies(Checker& checker, const std::string& body1, const std::string& body2, std::string_view what) {
+  if (!body2.empty() && body1 == body2)
+    checker.issue(checker.path("body2"), "is '" + body2 + "' like body1; " + std::string(what) + " needs two bodies");
+}
+
+// Parameters, definitions and sensors share one name space.
+void check_shared_names(Checker& checker, const Scene& scene) {
+  std::map<std::string, std::string> first;
+  const auto check = [&](const char* list, const std::string& name) {
+    const std::string where = child_path(list, name);
+    checker.must_be_identifier(where, name);
+    const auto [it, is_new] = first.emplace(name, where);
+    if (!is_new)
+      checker.issue(where, "the name '" + name + "' is taken by " + it->second +
+                               "; parameters, definitions and sensors share one name space");
+  };
+  for (const Parameter& parameter : scene.parameters) check("parameters", parameter.name);
+  for (const Definition& definition : scene.definitions) check("definitions", definition.name);
+  for (const Sensor& sensor : scene.sensors) check("sensors", sensor.name);
+}
+
+}  // namespace
+
+void check_meaning(Checker& checker, const Parameter& parameter) {
+  const auto [value, lower, upper] = std::tuple(parameter.value, parameter.lower, parameter.upper);
+  if (lower && upper && *lower > *upper)
+    checker.issue(checker.path("lower"), "is " + text_of(*lower) + ", above the upper bound " + text_of(*upper));
+  else if (lower && value < *lower)
+    checker.issue(checker.path("value"), "is " + text_of(value) + ", below the lower bound " + text_of(*lower));
+  else if (upper && value > *upper)
+    checker.issue(checker.path("value"), "is " + text_of(value) + ", above the upper bound " + text_of(*upper));
+  if (parameter.scale != ParameterScale::linear) {
+    if (value <= 0)
+      checker.issue(checker.path("value"), "is " + text_of(value) + "; a logarithmic scale needs it positive");
+    if (lower && *lower <= 0)
+      checker.issue(checker.path("lower"), "is " + text_of(*lower) + "; a logarithmic scale needs it positive");
+  }
+  if (parameter.unit.empty()) return;
+  const std::optional<Unit> unit = parse_unit(parameter.unit);
+  if (!unit)
+    checker.issue(checker.path("unit"), "'" + parameter.unit +
+                                            "' is not a known unit; units are products, quotients and "
+                                            "whole powers of " +
+                                            known_units());
+  else if (unit->to_si != 1)
+    checker.issue(checker.path("unit"), "'" + parameter.unit + "' is not SI, and values are; give the unit as '" +
+                                            to_string(unit->dimension) + "', or the value as \"" + text_of(value) +
+                                            " [" + parameter.unit + "]\" without \"unit\"");
+}
+
+void check_meaning(Checker& checker, const Body& body) {
+  if (body.name == "ground") checker.issue(checker.path("name"), "is 'ground', which is predefined; take another name");
+  const std::optional<double> mass = checker.facts().value(body.mass);
+  if (mass && *mass < 0)
+    checker.issue(checker.path("mass"), "is " + text_of(*mass) + " kg, a mass must not be negative");
+}
+
+void check_meaning(Checker& checker, const InertiaField& inertia) {
+  std::array<double, 6> tensor{};
+  const std::array<const Field*, 6> fields{&inertia.xx, &inertia.yy, &inertia.zz,
+                                           &inertia.xy, &inertia.xz, &inertia.yz};
+  for (std::size_t i = 0; i < tensor.size(); ++i) {
+    const std::optional<double> entry = checker.facts().value(*fields[i]);
+    if (!entry || !std::isfinite(*entry)) return;
+    tensor[i] = *entry;
+  }
+  const std::string problem = inertia_problem(tensor);
+  if (!problem.empty()) checker.issue(checker.path(), problem);
+}
+
+void check_meaning(Checker& checker, const EulerParametersField& orientation) {
+  constexpr double kTolerance = 1e-6;
+  double squares = 0;
+  for (const Field& field : orientation.e) {
+    const std::optional<double> e = checker.facts().value(field);
+    if (!e || !std::isfinite(*e)) return;
+    squares += *e * *e;
+  }
+  if (std::abs(std::sqrt(squares) - 1) > kTolerance)
+    checker.issue(checker.path(),
+                  "Euler parameters of norm " + text_of(std::sqrt(squares)) + "; it must be 1 within 1e-6");
+}
+
+void check_meaning(Checker& checker, const AxisAngleField& orientation) {
+  direction(checker, "axis", PointField(orientation.axis), "");
+}
+
+void check_meaning(Checker& checker, const Joint& joint) {
+  check_two_bodies(checker, joint.body1, joint.body2, "a joint");
+  const TypeRow* const row = find_row(kJointTypes, joint.type);
+  if (!row) return;
+  const auto axis1 = direction(checker, "axis1", joint.axis1, joint.body1);
+  const auto axis2 = direction(checker, "axis2", joint.axis2, joint.body2);
+  if (need_of(*row, "normal1") != Need::unknown) check_normals(checker, joint, axis1, axis2);
+}
+
+void check_meaning(Checker& checker, const Force& force) {
+  const auto warn_of_law = [&](bool has_law, std::initializer_list<const Field*> coefficients) {
+    for (const Field* field : coefficients)
+      if (has_law && !(field->is_number() && field->number() == 0))
+        return checker.warning(checker.path("law"), "replaces the coefficients, which are given as well and not used");
+  };
+  if (const auto* tsda = std::get_if<Tsda>(&force.kind)) {
+    check_two_bodies(checker, tsda->body1, tsda->body2, "a tsda");
+    warn_of_law(tsda->law.has_value(), {&tsda->stiffness, &tsda->damping, &tsda->free_length, &tsda->actuator});
+  } else if (const auto* rsda = std::get_if<Rsda>(&force.kind)) {
+    check_joint_has_angle(checker, rsda->joint);
+    warn_of_law(rsda->law.has_value(), {&rsda->stiffness, &rsda->damping, &rsda->free_angle});
+  }
+}
+
+void check_meaning(Checker& checker, const Sensor& sensor) {
+  const TypeRow* const row = find_row(kSensorQuantities, sensor.quantity);
+  if (!row) return;
+  if (need_of(*row, "joint") != Need::unknown) check_joint_has_angle(checker, sensor.joint);
+  if (need_of(*row, "body2") != Need::unknown && sensor.body1 == sensor.body2 && !sensor.body2.empty())
+    checker.issue(checker.path("body2"), "is '" + sensor.body2 + "' like body1; their distance never changes");
+  if (sensor.quantity == "orientation" && sensor.body == "ground")
+    checker.issue(checker.path("body"), "is the ground, whose orientation never changes");
+}
+
+void check_meaning(Checker& checker, const Condition& condition) {
+  if (!condition.value && !condition.rate)
+    checker.issue(checker.path(), "has neither \"value\" nor \"rate\"; at least one is needed");
+  const Sensor* const sensor = checker.facts().sensor(condition.sensor);
+  const TypeRow* const row = sensor ? find_row(kSensorQuantities, sensor->quantity) : nullptr;
+  if (!row) return;
+  const std::string named = "sensor '" + sensor->name + "'";
+  if (sensor->quantity == "energy" || sensor->quantity == "constraint_violation")
+    return checker.issue(checker.path("sensor"), named + " measures " + sensor->quantity +
+                                                     ", which a condition cannot prescribe; use positions, angles, "
+                                                     "distances, Euler parameters or their rates");
+  if (condition.rate && row->velocity_level)
+    checker.issue(checker.path("rate"), named + " measures a " + sensor->quantity + ": give its \"value\"");
+  if (condition.rate && sensor->quantity == "position" && sensor->in_body_frame)
+    checker.issue(checker.path("rate"), named + " is in a body's axes, where its rate is not available");
+  const auto check_dimension = [&](std::string_view key, const std::optional<Field>& field, const Dimension& expected) {
+    if (field) checker.number(key, *field, {"", Need::optional, expected});
+  };
+  check_dimension("value", condition.value, row->dimension);
+  check_dimension("rate", condition.rate, row->dimension / dimension::kTime);
+}
+
+void check_meaning(Checker& checker, const IntegratorSettings& settings) {
+  if (settings.type == "rk4" && !settings.step)
+    checker.issue(checker.path("step"), "is missing; rk4 has no error estimate and needs a fixed step [s]");
+  if (settings.initial_step && settings.max_step && *settings.initial_step > *settings.max_step)
+    checker.issue(checker.path("initial_step"),
+                  "is " + text_of(*settings.initial_step) + ", above max_step " + text_of(*settings.max_step));
+}
+
+void check_meaning(Checker& checker, const SimulationSettings& settings) {
+  if (settings.end_time <= settings.start_time)
+    checker.issue(checker.path("end_time"), "is " + text_of(settings.end_time) + " s, it must be after start_time, " +
+                                                text_of(settings.start_time) + " s");
+}
+
+void check_meaning(Checker& checker, const Scene& scene) {
+  if (scene.bodies.empty()) checker.issue("bodies", "is empty; a mechanism has at least one body besides the ground");
+  check_shared_names(checker, scene);
+  const auto in_list = [](const char* list) { return [list](std::size_t i) { return child_path(list, i) + ".name"; }; };
+  check_unique_names(checker, scene.bodies, "a body", in_list("bodies"));
+  check_unique_names(checker, scene.joints, "a joint", in_list("joints"));
+  check_unique_names(checker, scene.forces, "a force", in_list("forces"));
+  for (const auto& [name, what] : checker.facts().endless_definitions())
+    checker.issue(child_path("definitions", name), what);
+}
+
+std::vector<SceneIssue> without_repetitions(std::vector<SceneIssue> issues) {
+  std::vector<SceneIssue> once;
+  std::set<std::pair<std::string, std::string>> seen;
+  for (SceneIssue& issue : issues)
+    if (seen.emplace(issue.path, issue.message).second) once.push_back(std::move(issue));
+  return once;
+}
+
+std::vector<SceneIssue> find_issues(const Scene& scene) {
+  const SceneFacts facts(scene);
+  std::vector<SceneIssue> issues;
+  Checker(facts, issues).check(scene);
+  return without_repetitions(std::move(issues));
+}
+
+}  // namespace mbsopt

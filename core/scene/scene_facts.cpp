@@ -1,0 +1,156 @@
+#include "core/scene/scene_facts.hpp"
+
+#include "core/expression/dimension_inference.hpp"
+
+namespace mbsopt {
+
+namespace {
+
+// The first of several equal names counts; duplicates are an issue of their own.
+void add_once(Symbols& symbols, const std::string& name) {
+  if (symbols.input(name) < 0 && !symbols.definition(name)) symbols.add_input(name);
+}
+
+template <class T>
+std::map<std::string, const T*> by_name(const std::vector<T>& all) {
+  std::map<std::string, const T*> table;
+  for (const T& one : all) table.emplace(one.name, &one);
+  return table;
+}
+
+template <class T>
+std::vector<std::string> names_of(const std::vector<T>& all) {
+  std::vector<std::string> names;
+  for (const T& one : all) names.push_back(one.name);
+  return names;
+}
+
+}  // namespace
+
+SceneFacts::SceneFacts(const Scene& scene)
+    : scene_(scene), bodies_(by_name(scene.bodies)), joints_(by_name(scene.joints)), sensors_(by_name(scene.sensors)) {
+  for (const Parameter& parameter : scene.parameters) {
+    if (none_.input(parameter.name) >= 0) continue;
+    none_.add_input(parameter.name);
+    parameter_values_.push_back(parameter.value);
+    const std::optional<Unit> unit = parse_unit(parameter.unit);
+    dimensions_[parameter.name] = unit ? std::optional(unit->dimension) : std::nullopt;
+  }
+  for (const Definition& definition : scene.definitions)
+    if (none_.input(definition.name) < 0 && !none_.definition(definition.name))
+      none_.add_definition(definition.name, definition.value);
+  find_broken_definitions();
+  tsda_law_ = rsda_law_ = objective_ = none_;
+  for (const char* name : {"l", "ldot", "t"}) add_once(tsda_law_, name);
+  for (const char* name : {"angle", "rate", "t"}) add_once(rsda_law_, name);
+  add_once(objective_, "t");
+  for (const Sensor& sensor : scene.sensors) add_once(objective_, sensor.name);
+}
+
+void SceneFacts::find_broken_definitions() {
+  bool too_deep = false;
+  for (const auto& [name, value] : scene_.definitions) {
+    if (!is_identifier(name) || !none_.definition(name)) continue;
+    try {
+      Program(Expression::parse(name), none_);
+    } catch (const UnknownName& error) {
+      broken_.insert(name);
+      const bool of_definition = none_.definition(error.name) != nullptr;  // else a name that nobody knows
+      const bool is_deep = of_definition && std::string_view(error.what()).find("deeper") != std::string_view::npos;
+      if (of_definition && (error.name == name || (is_deep && !too_deep))) endless_.emplace_back(name, error.what());
+      too_deep = too_deep || is_deep;
+    } catch (const ExpressionError&) {  // called like a function: an issue of its own
+    }
+  }
+}
+
+const Body* SceneFacts::body(const std::string& name) const {
+  const auto it = bodies_.find(name);
+  return it == bodies_.end() ? nullptr : it->second;
+}
+
+const Joint* SceneFacts::joint(const std::string& name) const {
+  const auto it = joints_.find(name);
+  return it == joints_.end() ? nullptr : it->second;
+}
+
+const Sensor* SceneFacts::sensor(const std::string& name) const {
+  const auto it = sensors_.find(name);
+  return it == sensors_.end() ? nullptr : it->second;
+}
+
+std::vector<std::string> SceneFacts::names(To what) const {
+  switch (what) {
+    case To::body: {
+      std::vector<std::string> all = names_of(scene_.bodies);
+      all.insert(all.begin(), "ground");
+      return all;
+    }
+    case To::joint:
+      return names_of(scene_.joints);
+    case To::force:
+      return names_of(scene_.forces);
+    case To::sensor:
+      return names_of(scene_.sensors);
+    case To::parameter:
+      return names_of(scene_.parameters);
+    case To::objective:
+      return objectives_;
+  }
+  return {};
+}
+
+const Symbols& SceneFacts::symbols(Names names) const {
+  switch (names) {
+    case Names::none:
+      return none_;
+    case Names::tsda_law:
+      return tsda_law_;
+    case Names::rsda_law:
+      return rsda_law_;
+    case Names::objective:
+      return objective_;
+  }
+  return none_;
+}
+
+std::optional<double> SceneFacts::value(const Field& field) const {
+  if (field.is_number()) return field.number();
+  try {
+    const Program program(field, none_);
+    program.grow(scratch_);
+    return program.value(parameter_values_, scratch_);
+  } catch (const UnknownName&) {
+    return std::nullopt;
+  }
+}
+
+std::optional<std::array<double, 3>> SceneFacts::value(const VectorField& field) const {
+  const auto x = value(field[0]), y = value(field[1]), z = value(field[2]);
+  if (!x || !y || !z) return std::nullopt;
+  return std::array{*x, *y, *z};
+}
+
+std::optional<std::array<double, 3>> SceneFacts::value(const PointField& field, const std::string& body_name) const {
+  if (const auto* vector = std::get_if<VectorField>(&field)) return value(*vector);
+  const std::string& point = std::get<std::string>(field);
+  if (point == "O") return std::array{0.0, 0.0, 0.0};
+  const Body* const owner = body(body_name);
+  if (!owner) return std::nullopt;
+  const auto it = owner->points.find(point);
+  return it == owner->points.end() ? std::nullopt : value(it->second);
+}
+
+std::optional<Dimension> SceneFacts::dimension_of_name(const std::string& name) const {
+  if (const auto it = dimensions_.find(name); it != dimensions_.end()) return it->second;
+  const Expression* const definition = none_.definition(name);
+  if (!definition || is_broken(name)) return std::nullopt;
+  std::optional<Dimension> found;
+  try {
+    found = infer_dimension(*definition, [this](const std::string& inner) { return dimension_of_name(inner); });
+  } catch (const DimensionError&) {  // reported at the definition
+  }
+  return dimensions_[name] = found;
+}
+
+}  // namespace mbsopt

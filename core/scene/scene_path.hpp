@@ -1,0 +1,14 @@
+// JSON paths, which name a place in a scene: keys joined by dots, indices in brackets: bodies[2].points.tip. A key that
+// is not a plain identifier is written in quotes: bodies[2].points["left tip"].
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace mbsopt {
+
+std::string child_path(const std::string& parent, std::string_view key);
+std::string child_path(const std::string& parent, std::size_t index);
+
+}  // namespace mbsopt

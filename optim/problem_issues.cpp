@@ -1,0 +1,91 @@
+#include "optim/problem_issues.hpp"
+
+#include <algorithm>
+
+#include "core/scene/checker.hpp"
+#include "optim/problem_vocabulary.hpp"
+#include "optim/unused_parameters.hpp"
+
+namespace mbsopt {
+
+namespace {
+
+std::string text_of(double value) { return Expression(value).text(); }
+
+}  // namespace
+
+// Found by Checker::check through the arguments' namespace.
+void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
+  checker.must_be_identifier(checker.path(), objective.name);
+  if (!objective.running && !objective.terminal && !objective.parameters_only && objective.samples.empty())
+    checker.issue(checker.path(),
+                  "has no part; at least one of running, terminal, samples and parameters_only is needed");
+  const SimulationSettings& simulation = checker.facts().scene().simulation;
+  for (std::size_t i = 0; i < objective.samples.size(); ++i) {
+    const double time = objective.samples[i].time;
+    if (time < simulation.start_time || time > simulation.end_time)
+      checker.issue(child_path(checker.path("samples"), i) + ".time",
+                    "is " + text_of(time) + " s, outside the simulated time, " + text_of(simulation.start_time) +
+                        " s to " + text_of(simulation.end_time) + " s");
+  }
+}
+
+void check_meaning(Checker& checker, const ObjectiveBound& bound) {
+  if (!bound.lower && !bound.upper)
+    checker.issue(checker.path(), "has neither \"lower\" nor \"upper\"; at least one is needed");
+  if (bound.lower && bound.upper && *bound.lower > *bound.upper)
+    checker.issue(checker.path("lower"),
+                  "is " + text_of(*bound.lower) + ", above the upper bound " + text_of(*bound.upper));
+}
+
+void check_meaning(Checker& checker, const ChannelSpec& channel) {
+  const std::optional<double> sigma = checker.facts().value(channel.sigma);
+  if (sigma && *sigma <= 0) checker.issue(checker.path("sigma"), "is " + text_of(*sigma) + ", it must be positive");
+}
+
+void check_meaning(Checker& checker, const ExperimentSpec& experiment) {
+  if (experiment.channels.empty()) checker.issue(checker.path("channels"), "is empty; at least one column is compared");
+  const SimulationSettings& simulation = checker.facts().scene().simulation;
+  const double start = experiment.start_time.value_or(simulation.start_time);
+  const double end = experiment.end_time.value_or(simulation.end_time);
+  if ((experiment.start_time || experiment.end_time) && end <= start)
+    checker.issue(
+        checker.path(experiment.end_time ? "end_time" : "start_time"),
+        "the experiment ends at " + text_of(end) + " s, which must be after its start at " + text_of(start) + " s");
+}
+
+void check_meaning(Checker& checker, const IdentificationSpec& identification) {
+  const std::vector<ExperimentSpec>& experiments = identification.experiments;
+  const std::string list = checker.path("experiments");
+  const bool any_fit =
+      std::any_of(experiments.begin(), experiments.end(), [](const ExperimentSpec& e) { return !e.validate; });
+  if (!any_fit) checker.issue(list, "has no experiment of role \"fit\"; at least one is needed");
+  check_unique_names(checker, experiments, "an experiment",
+                     [&](std::size_t i) { return child_path(list, i) + ".name"; });
+  for (std::size_t i = 0; i < experiments.size(); ++i) {
+    for (std::size_t k = 0; k < experiments[i].free.size(); ++k) {
+      const std::string& name = experiments[i].free[k];
+      if (std::find(identification.variables.begin(), identification.variables.end(), name) !=
+          identification.variables.end())
+        checker.issue(
+            child_path(child_path(list, i) + ".free", k),
+            "'" + name + "' is one of \"variables\", which have one value in all experiments; take it out of one");
+    }
+  }
+}
+
+std::vector<SceneIssue> find_issues(const Problem& problem) {
+  SceneFacts facts(problem.scene);
+  std::vector<std::string> objectives;
+  for (const ObjectiveSpec& objective : problem.objectives) objectives.push_back(objective.name);
+  facts.add_objectives(std::move(objectives));
+  std::vector<SceneIssue> issues;
+  Checker checker(facts, issues);
+  checker.check(problem);
+  check_meaning(checker, problem.scene);
+  if (std::none_of(issues.begin(), issues.end(), [](const SceneIssue& issue) { return !issue.is_warning; }))
+    for (SceneIssue& issue : find_unused_parameters(problem)) issues.push_back(std::move(issue));
+  return without_repetitions(std::move(issues));
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,215 @@
+#include "optim/unused_parameters.hpp"
+
+#include <map>
+#include <numeric>
+#include <set>
+
+#include "core/scene/field_visitor.hpp"
+#include "core/scene/scene_facts.hpp"
+#include "optim/problem_vocabulary.hpp"
+
+namespace mbsopt {
+
+namespace {
+
+// Sets of bodies that joints, forces and conditions connect. The ground is no body here.
+class ConnectedBodies {
+ public:
+  explicit ConnectedBodies(const Scene& scene) : parent_(scene.bodies.size()) {
+    std::iota(parent_.begin(), parent_.end(), std::size_t{0});
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i) index_.emplace(scene.bodies[i].name, i);
+  }
+
+  void connect(const std::vector<std::string>& bodies) {
+    std::optional<std::size_t> first;
+    for (const std::string& body : bodies) {
+      const auto it = index_.find(body);
+      if (it == index_.end()) continue;
+      const std::size_t root = root_of(it->second);
+      if (first) parent_[root] = *first;
+      first = root_of(root);
+    }
+  }
+  void look_at(const std::vector<std::string>& bodies) {
+    for (const std::string& body : bodies)
+      if (const auto it = index_.find(body); it != index_.end()) seen_.insert(it->second);
+  }
+  void look_at_all() {
+    for (std::size_t i = 0; i < parent_.size(); ++i) seen_.insert(i);
+  }
+  // After all connections: whether any of them moves with a body that is looked at.
+  bool matter(const std::vector<std::string>& bodies) {
+    std::set<std::size_t> roots;
+    for (const std::size_t body : seen_) roots.insert(root_of(body));
+    for (const std::string& body : bodies)
+      if (const auto it = index_.find(body); it != index_.end() && roots.contains(root_of(it->second))) return true;
+    return false;
+  }
+  bool any_seen() const { return !seen_.empty(); }
+
+ private:
+  std::size_t root_of(std::size_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+
+  std::vector<std::size_t> parent_;
+  std::map<std::string, std::size_t> index_;
+  std::set<std::size_t> seen_;
+};
+
+class Search {
+ public:
+  explicit Search(const Problem& problem) : problem_(problem), scene_(problem.scene), facts_(scene_), bodies_(scene_) {}
+
+  std::set<std::string> used_parameters() {
+    connect_bodies();
+    const bool judged_by_anything = !problem_.objectives.empty() || problem_.identification;
+    if (judged_by_anything) {
+      collect(problem_.objectives);
+      if (problem_.identification) collect(problem_.identification->experiments);
+    } else {
+      for (const Sensor& sensor : scene_.sensors) use_sensor(sensor.name);
+      bodies_.look_at_all();
+    }
+    collect_model();
+    return used_;
+  }
+
+ private:
+  std::vector<std::string> bodies_of_joint(const std::string& name) const {
+    const Joint* const joint = facts_.joint(name);
+    return joint ? std::vector{joint->body1, joint->body2} : std::vector<std::string>{};
+  }
+
+  std::vector<std::string> bodies_of(const Force& force) const {
+    if (const auto* tsda = std::get_if<Tsda>(&force.kind)) return {tsda->body1, tsda->body2};
+    return bodies_of_joint(std::get<Rsda>(force.kind).joint);
+  }
+
+  std::vector<std::string> bodies_of(const Sensor& sensor) const {
+    std::vector<std::string> all = bodies_of_joint(sensor.joint);
+    for (const std::string& body : {sensor.body, sensor.body1, sensor.body2}) all.push_back(body);
+    if (sensor.relative_to) all.push_back(sensor.relative_to->body);
+    return all;
+  }
+
+  void connect_bodies() {
+    for (const Joint& joint : scene_.joints) bodies_.connect({joint.body1, joint.body2});
+    for (const Force& force : scene_.forces) bodies_.connect(bodies_of(force));
+    for (const Condition& condition : scene_.conditions)
+      if (const Sensor* sensor = facts_.sensor(condition.sensor)) bodies_.connect(bodies_of(*sensor));
+  }
+
+  template <class T>
+  void collect(const T& object) {
+    FieldVisitor visitor([this](const Expression& e, Names names) { use(e, names); },
+                         [this](const std::string& body, const std::string& point) { use_point(body, point); });
+    describe(visitor, object);
+  }
+  void collect(const std::vector<ObjectiveSpec>& objectives) {
+    for (const ObjectiveSpec& objective : objectives) collect(objective);
+  }
+  void collect(const std::vector<ExperimentSpec>& experiments) {
+    for (const ExperimentSpec& experiment : experiments)
+      for (const ChannelSpec& channel : experiment.channels) {
+        collect(channel);
+        use_sensor(channel.sensor);
+      }
+  }
+
+  void use(const Expression& expression, Names names) {
+    if (expression.is_number()) return;
+    const Symbols& symbols = facts_.symbols(names);
+    const Program program(expression, symbols);
+    for (const int input : program.used_inputs()) {
+      const std::string& name = symbols.input_names()[static_cast<std::size_t>(input)];
+      if (input < facts_.symbols(Names::none).inputs())
+        used_.insert(name);
+      else if (names == Names::objective)
+        use_sensor(name);
+    }
+  }
+
+  void use_point(const std::string& body, const std::string& point) {
+    const Body* const owner = facts_.body(body);
+    if (!owner) return;
+    if (const auto it = owner->points.find(point); it != owner->points.end())
+      for (const Field& field : it->second) use(field, Names::none);
+  }
+
+  void use_sensor(const std::string& name) {
+    const Sensor* const sensor = facts_.sensor(name);  // "t" is none
+    if (!sensor || !used_sensors_.insert(name).second) return;
+    collect(*sensor);
+    if (sensor->quantity == "energy" || sensor->quantity == "constraint_violation")
+      bodies_.look_at_all();
+    else
+      bodies_.look_at(bodies_of(*sensor));
+    // A joint's angle also depends on the joint's own axes and normals.
+    if (const Joint* joint = facts_.joint(sensor->joint)) collect(*joint);
+  }
+
+  void collect_model() {
+    if (bodies_.any_seen())
+      for (const Field& field : scene_.gravity) use(field, Names::none);
+    for (const Body& body : scene_.bodies)
+      if (bodies_.matter({body.name})) collect(body);
+    for (const Joint& joint : scene_.joints)
+      if (bodies_.matter({joint.body1, joint.body2})) collect(joint);
+    for (const Force& force : scene_.forces)
+      if (bodies_.matter(bodies_of(force))) collect_force(force);
+    for (const Condition& condition : scene_.conditions) {
+      const Sensor* const sensor = facts_.sensor(condition.sensor);
+      if (!sensor || !bodies_.matter(bodies_of(*sensor))) continue;
+      collect(condition);
+      collect(*sensor);
+    }
+  }
+
+  // A law replaces the coefficients.
+  void collect_force(Force force) {
+    std::visit(
+        [](auto& kind) {
+          if (!kind.law) return;
+          kind.stiffness = kind.damping = 0.0;
+          if constexpr (requires { kind.free_length; })
+            kind.free_length = kind.actuator = 0.0;
+          else
+            kind.free_angle = 0.0;
+        },
+        force.kind);
+    collect(force);
+  }
+
+  const Problem& problem_;
+  const Scene& scene_;
+  SceneFacts facts_;
+  ConnectedBodies bodies_;
+  std::set<std::string> used_, used_sensors_;
+};
+
+bool occurs_anywhere(const Problem& problem, const std::string& parameter) {
+  // Judged without objectives and identification, everything that uses a parameter counts.
+  Problem model_only;
+  model_only.scene = problem.scene;
+  return Search(model_only).used_parameters().contains(parameter);
+}
+
+}  // namespace
+
+std::vector<SceneIssue> find_unused_parameters(const Problem& problem) {
+  std::vector<SceneIssue> issues;
+  const std::set<std::string> used = Search(problem).used_parameters();
+  for (const Parameter& parameter : problem.scene.parameters) {
+    if (parameter.allow_unused || used.contains(parameter.name)) continue;
+    const std::string what =
+        occurs_anywhere(problem, parameter.name)
+            ? "'" + parameter.name + "' cannot influence any objective or measurement: its derivatives are zero"
+            : "'" + parameter.name + "' is used by nothing";
+    issues.push_back({"parameters." + parameter.name, what + "; \"allow_unused\": true lifts this error"});
+  }
+  return issues;
+}
+
+}  // namespace mbsopt

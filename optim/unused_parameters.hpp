@@ -1,0 +1,23 @@
+// Parameters that cannot matter: nothing uses them, or what uses them cannot reach any objective or measurement, so
+// that their gradient entries would be zero by structure. An error rather than a silent zero; "allow_unused" lifts it.
+//
+// A parameter matters when it occurs
+//   in an objective, or in sigma, gain or bias of a channel;
+//   in a sensor that one of these uses;
+//   in the model of the bodies that such a sensor looks at, and of all bodies that joints, forces or initial conditions
+//   connect with those (not through the ground): their fields, joints, forces and conditions, and gravity.
+// energy and constraint_violation look at all bodies. A problem without objectives and identification is judged as if a
+// sensor looked at everything.
+#pragma once
+
+#include <vector>
+
+#include "core/scene/issues.hpp"
+#include "optim/problem.hpp"
+
+namespace mbsopt {
+
+// For a problem without other issues.
+std::vector<SceneIssue> find_unused_parameters(const Problem& problem);
+
+}  // namespace mbsopt
