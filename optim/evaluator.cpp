@@ -1,0 +1,212 @@
+#include "optim/evaluator.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "core/expression/did_you_mean.hpp"
+#include "optim/difference_ladder.hpp"
+
+namespace mbsopt {
+namespace {
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+std::string_view to_string(GradientMethod method) {
+  switch (method) {
+    case GradientMethod::tlm:
+      return "tlm";
+    case GradientMethod::adjoint:
+      return "adjoint";
+    case GradientMethod::differences:
+      return "fd";
+    case GradientMethod::automatic:
+      break;
+  }
+  return "auto";
+}
+
+GradientCost gradient_cost(std::size_t variables, std::size_t objectives) {
+  return {1 + 0.35 * static_cast<double>(variables), 2 + static_cast<double>(objectives)};
+}
+
+std::vector<int> parameter_indices(const Scene& scene, const std::vector<std::string>& names) {
+  std::vector<std::string> known;
+  for (const Parameter& p : scene.parameters) known.push_back(p.name);
+  std::vector<int> indices;
+  for (const std::string& name : names.empty() ? known : names) {
+    const auto found = std::find(known.begin(), known.end(), name);
+    if (found == known.end())
+      throw std::invalid_argument(
+          fmt::format("there is no parameter '{}'{}; known: {}", name, did_you_mean(name, known), joined(known)));
+    const int index = static_cast<int>(found - known.begin());
+    if (std::find(indices.begin(), indices.end(), index) != indices.end())
+      throw std::invalid_argument(fmt::format("the parameter '{}' is listed twice", name));
+    indices.push_back(index);
+  }
+  return indices;
+}
+
+double typical_size(const Parameter& parameter, double value) {
+  if (value != 0) return std::abs(value);
+  if (parameter.lower && parameter.upper && *parameter.upper > *parameter.lower)
+    return *parameter.upper - *parameter.lower;
+  return 1;
+}
+
+Evaluator::Evaluator(Scene scene, std::vector<Objective> objectives, const std::vector<std::string>& variables,
+                     EvaluatorOptions options)
+    : scene_(std::move(scene)),
+      objectives_(std::move(objectives)),
+      variables_(parameter_indices(scene_, variables)),
+      active_(scene_.parameters.size(), false),
+      options_(std::move(options)) {
+  for (const int k : variables_) active_[static_cast<std::size_t>(k)] = true;
+  for (std::size_t i = 0; i < objectives_.size(); ++i)
+    if (objectives_[i].needs_simulation()) simulated_.push_back(i);
+}
+
+Eigen::VectorXd Evaluator::start() const {
+  Eigen::VectorXd rho(static_cast<Eigen::Index>(scene_.parameters.size()));
+  for (Eigen::Index k = 0; k < rho.size(); ++k) rho(k) = scene_.parameters[static_cast<std::size_t>(k)].value;
+  return rho;
+}
+
+Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSequence* frozen) const {
+  const auto start = std::chrono::steady_clock::now();
+  Evaluation e;
+  e.rho = rho;
+  e.psi.setZero(static_cast<Eigen::Index>(objectives_.size()));
+  if (sweep != Sweep::none) e.psi_rho.setZero(e.psi.size(), static_cast<Eigen::Index>(variables_.size()));
+  e.ok = true;
+  if (!simulated_.empty()) {
+    // Derivatives are carried only where a sweep needs them.
+    const std::vector<bool> active = sweep == Sweep::none ? std::vector<bool>(active_.size(), false) : active_;
+    SimulationResult result;
+    try {
+      const Mechanism mechanism(scene_, rho, active, options_.user_forces);
+      std::vector<Cost> costs;
+      for (const std::size_t i : simulated_) costs.push_back(objectives_[i].cost(mechanism));
+      const RunOptions run_options{frozen, options_.progress};
+      result = sweep == Sweep::tlm       ? simulate_tlm(mechanism, scene_.simulation, costs, {}, run_options)
+               : sweep == Sweep::adjoint ? simulate_adjoint(mechanism, scene_.simulation, costs, run_options)
+                                         : simulate(mechanism, scene_.simulation, costs, {}, run_options);
+    } catch (const SceneError& error) {  // a field that this rho drives out of its range
+      e.ok = false, e.message = error.what();
+      return e;
+    }
+    e.simulations = 1;
+    e.statistics = result.statistics;
+    e.steps = std::move(result.steps);
+    if (!result.ok()) {
+      e.ok = false, e.message = result.message;
+      return e;
+    }
+    for (std::size_t j = 0; j < simulated_.size(); ++j) {
+      const Eigen::Index i = static_cast<Eigen::Index>(simulated_[j]), row = static_cast<Eigen::Index>(j);
+      e.psi(i) = result.psi(row);
+      if (sweep == Sweep::none) continue;
+      for (Eigen::Index k = 0; k < e.psi_rho.cols(); ++k)
+        e.psi_rho(i, k) = result.psi_rho(row, variables_[static_cast<std::size_t>(k)]);
+    }
+  }
+  add_parameters_only(e, sweep != Sweep::none);
+  for (Eigen::Index i = 0; i < e.psi.size(); ++i) {
+    if (std::isfinite(e.psi(i)) && (sweep == Sweep::none || e.psi_rho.row(i).allFinite())) continue;
+    e.ok = false;
+    e.message = fmt::format("the objective '{}' or its gradient is not finite here",
+                            objectives_[static_cast<std::size_t>(i)].name());
+    break;
+  }
+  e.wall_seconds = seconds_since(start);
+  return e;
+}
+
+void Evaluator::add_parameters_only(Evaluation& e, bool gradients) const {
+  Eigen::VectorXd gradient(e.rho.size());
+  for (Eigen::Index i = 0; i < e.psi.size(); ++i) {
+    const Objective& objective = objectives_[static_cast<std::size_t>(i)];
+    if (!gradients) {
+      e.psi(i) += objective.parameters_only(e.rho);
+      continue;
+    }
+    gradient.setZero();
+    e.psi(i) += objective.add_parameters_only_gradient(e.rho, gradient);
+    for (Eigen::Index k = 0; k < e.psi_rho.cols(); ++k)
+      e.psi_rho(i, k) += gradient(variables_[static_cast<std::size_t>(k)]);
+  }
+}
+
+void Evaluator::add_differences(Evaluation& e) const {
+  const auto start = std::chrono::steady_clock::now();
+  const StepSequence steps = e.steps;
+  Eigen::MatrixXd psi_rho(e.psi.size(), static_cast<Eigen::Index>(variables_.size()));
+  for (Eigen::Index k = 0; k < psi_rho.cols(); ++k) {
+    const int index = variables_[static_cast<std::size_t>(k)];
+    const auto psi_at = [&](double h) -> std::optional<Eigen::VectorXd> {
+      Eigen::VectorXd rho = e.rho;
+      rho(index) += h;
+      const bool frozen = options_.differences.frozen_steps && !simulated_.empty();
+      Evaluation shifted = run(rho, Sweep::none, frozen ? &steps : nullptr);
+      e.simulations += shifted.simulations;
+      if (!shifted.ok) return std::nullopt;
+      return shifted.psi;
+    };
+    const Parameter& parameter = scene_.parameters[static_cast<std::size_t>(index)];
+    const double h = options_.differences.relative_step * typical_size(parameter, e.rho(index));
+    const LadderDerivative d = difference_ladder(psi_at, e.psi.size(), {h, options_.differences.rungs, 0});
+    if (!(d.error.array() < std::numeric_limits<double>::infinity()).all()) {
+      e.ok = false;
+      e.message = fmt::format("no central difference in '{}' could be evaluated", parameter.name);
+      return;
+    }
+    psi_rho.col(k) = d.derivative;
+  }
+  e.psi_rho = std::move(psi_rho);
+  e.wall_seconds += seconds_since(start);
+}
+
+const Evaluation& Evaluator::values(const Eigen::VectorXd& rho) {
+  if (last_.rho.size() == rho.size() && last_.rho == rho) return last_;
+  last_ = run(rho, Sweep::none, nullptr);
+  simulations_ += last_.simulations;
+  return last_;
+}
+
+Evaluation Evaluator::values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const {
+  return run(rho, Sweep::none, simulated_.empty() ? nullptr : &steps);
+}
+
+const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
+  if (last_.rho.size() == rho.size() && last_.rho == rho && (last_.has_gradients() || !last_.ok)) return last_;
+  GradientMethod method = options_.method;
+  std::string choice;
+  if (simulated_.empty()) {
+    method = GradientMethod::tlm;  // nothing to simulate: the objectives' own derivatives
+  } else if (method == GradientMethod::automatic) {
+    const GradientCost cost = gradient_cost(variables_.size(), simulated_.size());
+    method = cost.tlm <= cost.adjoint ? GradientMethod::tlm : GradientMethod::adjoint;
+    choice = fmt::format("{}: {} variables, {} objectives; estimated cost in simulations: tlm {:.1f}, adjoint {:.1f}",
+                         to_string(method), variables_.size(), simulated_.size(), cost.tlm, cost.adjoint);
+  }
+  if (method == GradientMethod::differences) {
+    last_ = run(rho, Sweep::none, nullptr);
+    if (last_.ok) add_differences(last_);
+  } else {
+    last_ = run(rho, method == GradientMethod::adjoint ? Sweep::adjoint : Sweep::tlm, nullptr);
+  }
+  last_.method = simulated_.empty() ? GradientMethod::automatic : method;
+  last_.choice = std::move(choice);
+  simulations_ += last_.simulations;
+  return last_;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,104 @@
+// Objectives and their gradients at a point, by the method that is cheapest or the one asked for. The last point is
+// kept: a solver that asks for f and then for its gradient pays once.
+//
+//   Evaluator evaluator(problem.scene, objectives_of(problem), {"k1", "L01"});
+//   const Evaluation& e = evaluator.gradients(evaluator.start());
+//   if (!e.ok) std::cerr << e.message;
+//   e.psi(0), e.psi_rho(0, 1);   // the first objective, and its derivative in L01
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/integrate/simulation.hpp"
+#include "optim/objective.hpp"
+
+namespace mbsopt {
+
+enum class GradientMethod { automatic, tlm, adjoint, differences };
+std::string_view to_string(GradientMethod method);  // auto, tlm, adjoint, fd
+
+struct DifferenceSettings {
+  double relative_step = 4e-3;  // the largest: of the parameter's value, or of 1 where that is 0
+  int rungs = 4;                // steps, each half of the one before
+  bool frozen_steps = true;     // on the steps of the run at the point itself, else with step-size control
+};
+
+// Estimated cost in simulations, from which `automatic` chooses. Measured on chains and loops of 1 to 20 bodies
+// (docs/design-optimisation.md).
+//   tlm        1 + 0.35 per variable
+//   adjoint    2 + 1 per objective
+struct GradientCost {
+  double tlm = 0, adjoint = 0;
+};
+GradientCost gradient_cost(std::size_t variables, std::size_t objectives);
+
+struct Evaluation {
+  bool ok = false;
+  std::string message;                                // why not, in words
+  Eigen::VectorXd rho;                                // all parameters
+  Eigen::VectorXd psi;                                // per objective
+  Eigen::MatrixXd psi_rho;                            // objective x variable; 0 x 0 where only values were asked for
+  GradientMethod method = GradientMethod::automatic;  // the one used; automatic where no simulation was needed
+  std::string choice;                                 // why, in words, where it was chosen automatically
+  SimulationStatistics statistics;
+  StepSequence steps;
+  long simulations = 0;  // that this evaluation took
+  double wall_seconds = 0;
+  bool has_gradients() const { return psi_rho.size() > 0; }
+};
+
+struct EvaluatorOptions {
+  GradientMethod method = GradientMethod::automatic;
+  DifferenceSettings differences;
+  std::vector<std::shared_ptr<const UserForce>> user_forces;
+  std::function<bool(double t)> progress;  // after accepted steps; false abandons the evaluation
+};
+
+class Evaluator {
+ public:
+  // variables: names of parameters with respect to which derivatives are wanted; empty: all.
+  Evaluator(Scene scene, std::vector<Objective> objectives, const std::vector<std::string>& variables = {},
+            EvaluatorOptions options = {});
+
+  // The reference holds until the next call.
+  const Evaluation& values(const Eigen::VectorXd& rho);
+  const Evaluation& gradients(const Eigen::VectorXd& rho);
+
+  // Values on given steps, away from the point that is kept.
+  Evaluation values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const;
+
+  const Scene& scene() const { return scene_; }
+  const std::vector<Objective>& objectives() const { return objectives_; }
+  const std::vector<int>& variables() const { return variables_; }  // indices of parameters
+  Eigen::VectorXd start() const;                                    // the parameters' values in the scene
+  long simulations() const { return simulations_; }                 // since construction
+
+ private:
+  enum class Sweep { none, tlm, adjoint };
+  Evaluation run(const Eigen::VectorXd& rho, Sweep sweep, const StepSequence* frozen) const;
+  void add_parameters_only(Evaluation& e, bool gradients) const;
+  void add_differences(Evaluation& e) const;
+
+  Scene scene_;
+  std::vector<Objective> objectives_;
+  std::vector<int> variables_;
+  std::vector<bool> active_;
+  EvaluatorOptions options_;
+  std::vector<std::size_t> simulated_;  // objectives that need a simulation
+  Evaluation last_;
+  long simulations_ = 0;
+};
+
+// Indices of parameters by name; all where names is empty. Throws std::invalid_argument: what is unknown, what there
+// is.
+std::vector<int> parameter_indices(const Scene& scene, const std::vector<std::string>& names);
+
+// Size of a parameter for differences and Taylor steps: |value|, or the range of its bounds, or 1.
+double typical_size(const Parameter& parameter, double value);
+
+}  // namespace mbsopt
