@@ -4,7 +4,6 @@
 
 #include "core/scene/checker.hpp"
 #include "optim/problem_vocabulary.hpp"
-#include "optim/unused_parameters.hpp"
 
 namespace mbsopt {
 
@@ -83,8 +82,6 @@ std::vector<SceneIssue> find_issues(const Problem& problem) {
   Checker checker(facts, issues);
   checker.check(problem);
   check_meaning(checker, problem.scene);
-  if (std::none_of(issues.begin(), issues.end(), [](const SceneIssue& issue) { return !issue.is_warning; }))
-    for (SceneIssue& issue : find_unused_parameters(problem)) issues.push_back(std::move(issue));
   return without_repetitions(std::move(issues));
 }
 

@@ -8,7 +8,7 @@
 
 namespace mbsopt {
 
-// Scene issues come first. Unused parameters (unused_parameters.hpp) are looked for only where nothing else is wrong.
+// Without unused parameters, which are looked for where nothing else is wrong: unused_parameters.hpp.
 std::vector<SceneIssue> find_issues(const Problem& problem);
 
 }  // namespace mbsopt

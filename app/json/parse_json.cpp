@@ -13,7 +13,9 @@ constexpr std::size_t kDeepestNesting = 100;
 // The tokens of a JSON text in their order: brackets, strings, numbers and literals; commas and colons left out.
 class TokenScan {
  public:
-  explicit TokenScan(std::string_view text) : text_(text), at_(text.starts_with("\xEF\xBB\xBF") ? 3 : 0) {}
+  explicit TokenScan(std::string_view text, std::size_t begin = 0) : text_(text), at_(begin) {
+    if (begin == 0 && text.starts_with("\xEF\xBB\xBF")) at_ = 3;
+  }
 
   struct Token {
     std::size_t begin, end;
@@ -80,8 +82,11 @@ class NodeBuilder : public nlohmann::json_sax<nlohmann::json> {
     return true;
   }
 
-  bool parse_error(std::size_t position, const std::string& last, const nlohmann::json::exception& error) override {
-    if (findings_) findings_->add_at(place(position, last), "", message(position, last, error.what()));
+  bool parse_error(std::size_t position, const std::string&, const nlohmann::json::exception& error) override {
+    if (findings_) {
+      const std::size_t begin = place(position, error.what());
+      findings_->add_at(begin, "", message(begin, error.what()));
+    }
     return false;
   }
 
@@ -138,22 +143,25 @@ class NodeBuilder : public nlohmann::json_sax<nlohmann::json> {
                                                  : child_path(level.path, level.node.items.size());
   }
 
-  // nlohmann reports how many bytes it has read, which is one after the last byte of the token it read last.
-  std::size_t place(std::size_t position, const std::string& last) const {
-    const std::size_t end = std::min(position, text_.size());
-    if (end == text_.size() && last.empty()) return end;
-    const std::size_t length = std::min(std::max<std::size_t>(last.size(), 1), end);
-    return end - length;
+  // nlohmann reports how many bytes it has read, up to the last one of the token it stumbled over.
+  std::size_t place(std::size_t position, const std::string& what) const {
+    if (position == 0 || what.find("unexpected end of input") != std::string::npos) return text_.size();
+    const std::size_t last_byte = std::min(position, text_.size()) - 1;
+    if (text_[last_byte] == ',' || text_[last_byte] == ':') return last_byte;
+    TokenScan scan(text_);
+    std::size_t begin = 0;
+    for (TokenScan::Token token = scan.next(); token.begin <= last_byte && token.begin < token.end; token = scan.next())
+      begin = token.begin;
+    return begin;
   }
 
-  std::string message(std::size_t position, const std::string& last, std::string what) const {
-    const std::size_t begin = place(position, last);
-    for (const std::string_view word :
-         {"NaN", "nan", "Infinity", "-Infinity", "inf", "-inf", "+", "Inf", "-Inf", "-nan"})
-      if (word != "+" && text_.substr(begin).starts_with(word))
-        return std::string(word) + " is not a number; numbers must be finite";
+  std::string message(std::size_t begin, std::string what) const {
+    const std::string token(text_.substr(begin, TokenScan(text_, begin).next().end - begin));
+    for (const std::string_view word : {"NaN", "nan", "Infinity", "infinity", "Inf", "inf"})
+      if (token == word || (token.starts_with('-') && token.substr(1) == word))
+        return token + " is not a number; numbers must be finite";
     if (what.find("number overflow") != std::string::npos)
-      return "the number " + last + " is out of the range of double precision";
+      return "the number " + token + " is out of the range of double precision";
     const std::size_t colon = what.find(": ", what.find("column"));  // after "... at line 1, column 2"
     if (colon != std::string::npos) what = what.substr(colon + 2);
     return "is not JSON: " + what;
@@ -182,6 +190,10 @@ Node parse_json(Findings& findings) {
     constexpr std::array<char, 16> kHex{'0', '1', '2', '3', '4', '5', '6', '7', '8', '9', 'A', 'B', 'C', 'D', 'E', 'F'};
     const auto byte = static_cast<unsigned char>(text[invalid]);
     findings.add_at(invalid, "", std::string("is not UTF-8 text: byte 0x") + kHex[byte / 16] + kHex[byte % 16]);
+    findings.throw_if_any();
+  }
+  if (const std::size_t nul = text.find('\0'); nul != std::string::npos) {  // nlohmann would take it for the end
+    findings.add_at(nul, "", "is not JSON: byte 0x00");
     findings.throw_if_any();
   }
   if (is_blank(text)) {

@@ -6,6 +6,7 @@
 #include "app/json/reader.hpp"
 #include "app/json/source_text.hpp"
 #include "optim/problem_issues.hpp"
+#include "optim/unused_parameters.hpp"
 
 namespace mbsopt {
 
@@ -26,22 +27,28 @@ void resolve_data_files(Problem& problem, const std::filesystem::path& folder, c
   }
 }
 
+void add_issue(const SceneIssue& issue, const Node& root, Findings& findings) {
+  const Node& node = nearest(root, issue.path);
+  if (issue.offset && node.kind == Node::Kind::string)
+    findings.add_inside(node, *issue.offset, issue.path, issue.message);
+  else
+    findings.add(node, issue.path, issue.message);
+}
+
 // What is wrong with the meaning, at the place in the file that says it. An error that follows from one in the reading
 // is left out.
 void add_issues(const Problem& problem, const Node& root, Findings& findings, std::vector<std::string>* warnings) {
-  const std::vector<SceneIssue> issues = find_issues(problem);
-  std::vector<const SceneIssue*> errors;
-  for (const SceneIssue& issue : issues) {
-    if (!issue.is_warning && !findings.concerns(issue.path)) errors.push_back(&issue);
-    if (issue.is_warning && warnings) warnings->push_back(issue.path + ": " + issue.message);
+  std::vector<SceneIssue> errors;
+  for (SceneIssue& issue : find_issues(problem)) {
+    if (issue.is_warning) {
+      if (warnings) warnings->push_back(issue.path + ": " + issue.message);
+    } else if (!findings.concerns(issue.path)) {
+      errors.push_back(std::move(issue));
+    }
   }
-  for (const SceneIssue* issue : errors) {
-    const Node& node = nearest(root, issue->path);
-    if (issue->offset && node.kind == Node::Kind::string)
-      findings.add_inside(node, *issue->offset, issue->path, issue->message);
-    else
-      findings.add(node, issue->path, issue->message);
-  }
+  for (const SceneIssue& issue : errors) add_issue(issue, root, findings);
+  if (findings.any()) return;
+  for (const SceneIssue& issue : find_unused_parameters(problem)) add_issue(issue, root, findings);
 }
 
 }  // namespace

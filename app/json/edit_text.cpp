@@ -1,0 +1,77 @@
+#include "app/json/edit_text.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <vector>
+
+#include "app/json/findings.hpp"
+#include "app/json/parse_json.hpp"
+
+namespace mbsopt {
+
+namespace {
+
+std::string json_string(const std::string& key) { return nlohmann::json(key).dump(); }
+
+std::string replaced(const std::string& text, std::size_t begin, std::size_t end, const std::string& by) {
+  return text.substr(0, begin) + by + text.substr(end);
+}
+
+}  // namespace
+
+std::string with_value(const std::string& text, std::string_view path, const std::string& json) {
+  Findings findings("problem file", text);
+  const Node root = parse_json(findings);
+  std::vector<PathStep> steps;
+  try {
+    steps = parse_path(path);
+  } catch (const std::invalid_argument& error) {
+    findings.add_override(std::string(path), std::string("is not a path: ") + error.what());
+  }
+  findings.throw_if_any();
+
+  const Node* node = &root;
+  std::size_t depth = 0;
+  while (depth < steps.size()) {
+    const PathStep& step = steps[depth];
+    const bool inside_list = step.is_index && node->kind == Node::Kind::array && step.index < node->items.size();
+    const bool inside_object = !step.is_index && node->kind == Node::Kind::object;
+    const Node* const next = inside_list ? &node->items[step.index] : (inside_object ? node->find(step.key) : nullptr);
+    if (!next) break;
+    node = next;
+    ++depth;
+  }
+  if (depth == steps.size()) return replaced(text, node->begin, node->end, json);
+
+  // "k1": 100 is short for "k1": {"value": 100}
+  const bool is_short = depth == 2 && steps[0].key == "parameters" && node->kind != Node::Kind::object;
+  if (is_short && steps[depth].key == "value" && steps.size() == 3) return replaced(text, node->begin, node->end, json);
+
+  std::string member = json;
+  for (std::size_t i = steps.size(); i-- > depth;) {
+    const bool impossible = steps[i].is_index || (node->kind != Node::Kind::object && !is_short);
+    if (impossible) {
+      findings.add_override(std::string(path), "leads nowhere: there is " + what_is(*node) + " on the way");
+      findings.throw_if_any();
+    }
+    member = json_string(steps[i].key) + ": " + member;
+    if (i > depth) member = "{" + member + "}";
+  }
+  if (is_short) {
+    const std::string value = text.substr(node->begin, node->end - node->begin);
+    return replaced(text, node->begin, node->end, "{\"value\": " + value + ", " + member + "}");
+  }
+  if (!node->keys.empty()) member += ", ";
+  return replaced(text, node->begin + 1, node->begin + 1, member);
+}
+
+std::string with_parameter_values(const std::string& text, const std::map<std::string, double>& values) {
+  std::string result = text;
+  for (const auto& [name, value] : values)
+    result = with_value(result, "parameters." + name + ".value", fmt::format("{:.17g}", value));
+  return result;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,246 @@
+// One malformed file of each kind that the problem format lists. In every text the mark @ stands in front of the place
+// that the finding must point at; it is taken out before the text is read.
+#include <catch2/catch.hpp>
+#include <string>
+#include <vector>
+
+#include "app/json/input_error.hpp"
+#include "app/json/read_problem.hpp"
+
+using namespace mbsopt;
+
+namespace {
+
+// A problem that is right; cases replace one piece of it.
+const std::string kGood = R"({
+  "format": 1,
+  "gravity": [0, -9.81, 0],
+  "parameters": {
+    "k1": {"value": 100, "lower": 1, "upper": 1e4, "unit": "N/m"},
+    "theta0": 0.3
+  },
+  "definitions": {"half": "k1/2"},
+  "bodies": [
+    {"name": "crank", "mass": 1.0, "inertia": [1, 1, 1], "points": {"tip": [1, 0, 0]}},
+    {"name": "rod", "mass": 2, "inertia": {"xx": 1, "yy": 1, "zz": 1}, "position": [1, 0, 0]}
+  ],
+  "joints": [
+    {"name": "A", "type": "revolute", "body2": "crank", "axis1": [0, 0, 1], "axis2": [0, 0, 1]},
+    {"name": "B", "type": "spherical", "body1": "crank", "body2": "rod", "point1": "tip"}
+  ],
+  "forces": [{"name": "s1", "type": "tsda", "body2": "crank", "point2": "tip", "stiffness": "k1", "free_length": 0.5}],
+  "initial": {"conditions": [{"sensor": "crank_angle", "value": "theta0"}]},
+  "sensors": {
+    "crank_angle": {"quantity": "angle", "joint": "A"},
+    "tip_y": {"quantity": "position", "body": "crank", "point": "tip", "component": "y"}
+  },
+  "simulation": {"end_time": 5},
+  "objectives": {"track": {"running": "(tip_y - 0.5)^2 + 0*half"}},
+  "design": {"minimize": "track", "variables": ["k1"]}
+})";
+
+struct Case {
+  std::string kind;
+  std::string original, replacement;  // the replacement holds the mark
+  std::string path, message;          // message: a part of it
+};
+
+std::vector<Finding> findings_of(const std::string& text, const std::vector<std::string>& sets = {}) {
+  try {
+    read_problem_text(text, "suspension.json", sets);
+  } catch (const InputError& error) {
+    return error.findings();
+  }
+  return {};
+}
+
+std::string replaced(std::string text, const std::string& original, const std::string& replacement) {
+  const std::size_t at = text.find(original);
+  REQUIRE(at != std::string::npos);
+  return text.replace(at, original.size(), replacement);
+}
+
+Finding at_mark(std::string& text) {
+  Finding expected;
+  const std::size_t mark = text.find('@');
+  REQUIRE(mark != std::string::npos);
+  expected.line =
+      1 + static_cast<int>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(mark), '\n'));
+  expected.column = static_cast<int>(mark - text.rfind('\n', mark));
+  text.erase(mark, 1);
+  return expected;
+}
+
+const Case kCases[] = {
+    {"unknown key", R"("mass": 1.0)", R"("mass": 1.0, @"colour": 3)", "bodies[0].colour", "unknown key"},
+    {"misspelt key", R"("stiffness": "k1")", R"(@"stifness": "k1")", "forces[0].stifness", "did you mean 'stiffness'"},
+    {"unknown key at the top", R"("simulation":)", R"(@"simulatoin":)", "simulatoin", "did you mean 'simulation'"},
+    {"key of another type", R"("body2": "rod", )", R"("body2": "rod", @"axis1": [1, 0, 0], )", "joints[1].axis1",
+     "unknown key"},
+    {"unknown body", R"("body1": "crank")", R"("body1": @"crnak")", "joints[1].body1", "did you mean 'crank'"},
+    {"unknown point", R"("point1": "tip")", R"("point1": @"tpi")", "joints[1].point1", "did you mean 'tip'"},
+    {"unknown joint", R"("joint": "A")", R"("joint": @"Q")", "sensors.crank_angle.joint", "there is no joint 'Q'"},
+    {"unknown sensor", R"("sensor": "crank_angle")", R"("sensor": @"crankangle")", "initial.conditions[0].sensor",
+     "did you mean 'crank_angle'"},
+    {"unknown objective", R"("minimize": "track")", R"("minimize": @"trakc")", "design.minimize",
+     "did you mean 'track'"},
+    {"unknown variable", R"("variables": ["k1"])", R"("variables": ["k1", @"k2"])", "design.variables[1]",
+     "there is no parameter 'k2'"},
+    {"unknown name in an expression", R"("half": "k1/2")", R"("half": "k1/2 + @theta")", "definitions.half",
+     "unknown name 'theta'"},
+    {"unknown sensor in an objective", "tip_y - 0.5", "@tip_x - 0.5", "objectives.track.running",
+     "did you mean 'tip_y'"},
+    {"syntax of an expression", R"("k1/2")", R"("k1 / \u0032 + @)1")", "definitions.half", "found ')'"},
+    {"wrong shape: number for a list", R"([0, -9.81, 0])", R"(@9.81)", "gravity", "must be a list of 3"},
+    {"wrong shape: two numbers", R"([0, -9.81, 0])", R"(@[0, -9.81])", "gravity", "found a list of 2"},
+    {"wrong shape: string for an object", R"({"end_time": 5})", R"(@"5 s")", "simulation", "must be an object"},
+    {"wrong shape: true for a number", R"("mass": 1.0)", R"("mass": @true)", "bodies[0].mass", "found true"},
+    {"wrong shape: null", R"("mass": 1.0)", R"("mass": @null)", "bodies[0].mass", "found null"},
+    {"wrong shape: inertia", R"([1, 1, 1])", R"(@[1, 1])", "bodies[0].inertia", "[xx, yy, zz]"},
+    {"wrong shape: a fraction of an iteration", R"("variables": ["k1"])",
+     R"("variables": ["k1"], "optimizer": {"max_iterations": @2.5})", "design.optimizer.max_iterations",
+     "must be a whole number"},
+    {"missing key", R"("mass": 1.0, )", R"()", "bodies[0].mass", "is missing"},
+    {"NaN", R"("mass": 1.0)", R"("mass": @NaN)", "", "NaN is not a number"},
+    {"Infinity", R"("mass": 1.0)", R"("mass": @Infinity)", "", "Infinity is not a number"},
+    {"negative infinity", R"("mass": 1.0)", R"("mass": @-Infinity)", "", "-Infinity is not a number"},
+    {"NaN in an expression", R"("mass": 1.0)", R"("mass": "1 + @nan")", "bodies[0].mass", "not a finite number"},
+    {"too large a number", R"("mass": 1.0)", R"("mass": @1e400)", "", "out of the range"},
+    {"an expression that is not finite", R"("mass": 1.0)", R"~("mass": @"k1/(theta0 - 0.3)")~", "bodies[0].mass",
+     "is inf at the values"},
+    {"duplicate body", R"("name": "rod")", R"("name": @"crank")", "bodies[1].name", "already a body 'crank'"},
+    {"duplicate joint", R"("name": "B")", R"("name": @"A")", "joints[1].name", "already a joint 'A'"},
+    {"one name for two things", R"("half": "k1/2")", R"("theta0": @"k1/2", "half": 1)", "definitions.theta0",
+     "taken by parameters.theta0"},
+    {"a body called ground", R"("name": "rod")", R"("name": @"ground")", "bodies[1].name", "predefined"},
+    {"reserved name", R"("theta0": 0.3)", R"("theta0": 0.3, "ldot": @1)", "parameters.ldot", "is reserved"},
+    {"name of a function", R"("theta0": 0.3)", R"("theta0": 0.3, "sin": @1)", "parameters.sin", "function"},
+    {"name that is no identifier", R"("theta0": 0.3)", R"("theta0": 0.3, "k 2": @1)", R"(parameters["k 2"])",
+     "must be an identifier"},
+    {"duplicate key", R"("mass": 1.0)", R"("mass": 1.0, @"mass": 2.0)", "bodies[0].mass", "is there twice"},
+    {"negative mass", R"("mass": 1.0)", R"("mass": @-2)", "bodies[0].mass", "is -2 kg, a mass must not be negative"},
+    {"negative mass by its parameters", R"("mass": 1.0)", R"("mass": @"theta0 - 1")", "bodies[0].mass",
+     "must not be negative"},
+    {"inertia not positive semidefinite", R"({"xx": 1, "yy": 1, "zz": 1})", R"(@{"xx": 1, "yy": 1, "zz": 1, "xy": 2})",
+     "bodies[1].inertia", "positive semidefinite"},
+    {"triangle inequality", R"([1, 1, 1])", R"(@[1, 1, 2.1])", "bodies[0].inertia",
+     "the largest must not exceed the sum"},
+    {"zero axis", R"("axis2": [0, 0, 1])", R"("axis2": @[0, 0, 0])", "joints[0].axis2", "is a zero vector"},
+    {"zero axis of an orientation", R"("position": [1, 0, 0])",
+     R"("position": [1, 0, 0], "orientation": {"axis": @[0, 0, 0], "angle": 1})", "bodies[1].orientation.axis",
+     "is a zero vector"},
+    {"non-unit Euler parameters", R"("position": [1, 0, 0])", R"("orientation": @[1, 0.01, 0, 0])",
+     "bodies[1].orientation", "it must be 1 within 1e-6"},
+    {"lower above upper", R"("lower": 1, )", R"("lower": @2e4, )", "parameters.k1.lower", "above the upper bound"},
+    {"value outside its bounds", R"("value": 100, )", R"("value": @1e5, )", "parameters.k1.value",
+     "above the upper bound 10000"},
+    {"end before start", R"("end_time": 5)", R"("start_time": 5, "end_time": @5)", "simulation.end_time",
+     "must be after start_time"},
+    {"unused parameter", R"("theta0": 0.3)", R"("theta0": 0.3, "spare": @7)", "parameters.spare", "used by nothing"},
+    {"parameter that cannot matter", R"("theta0": 0.3)", R"("theta0": 0.3, "k9": @7)", "parameters.k9",
+     "used by nothing"},
+    {"dimension mismatch", R"("mass": 1.0)", R"("mass": @"k1")", "bodies[0].mass", "has the dimension kg/s^2"},
+    {"unit that does not fit", R"("position": [1, 0, 0])", R"("position": [1, 0, @"90 [deg]"])",
+     "bodies[1].position[2]", "has the dimension rad, expected is m"},
+    {"dimensions mixed in a sum", R"("free_length": 0.5)", R"("free_length": "1 [m] @+ k1")", "forces[0].free_length",
+     "combines m with kg/s^2"},
+    {"unknown unit", R"("free_length": 0.5)", R"("free_length": "1 [@furlong]")", "forces[0].free_length",
+     "not a known unit"},
+    {"unit that is not SI", R"("unit": "N/m")", R"("unit": @"N/mm")", "parameters.k1.unit", "is not SI"},
+    {"broken JSON: no comma", R"("mass": 1.0, )", R"("mass": 1.0 @"colour": )", "", "is not JSON"},
+    {"broken JSON: trailing comma", R"("variables": ["k1"])", R"("variables": ["k1", @])", "", "is not JSON"},
+    {"broken JSON: single quotes", R"("mass": 1.0)", R"(@'mass': 1.0)", "", "is not JSON"},
+    {"circular definitions", R"("half": "k1/2")", R"("half": @"other", "other": "half")", "definitions.half",
+     "refers to itself"},
+    {"joint of a later version", R"("spherical")", R"(@"gear")", "joints[1].type",
+     "'gear' is not available in this version; available: revolute, spherical"},
+    {"misspelt joint type", R"("spherical")", R"(@"sperical")", "joints[1].type", "did you mean 'spherical'"},
+    {"force of a later version", R"("tsda")", R"(@"bushing")", "forces[0].type", "not available in this version"},
+    {"sensor of a later version", R"("position", "body")", R"(@"acceleration", "body")", "sensors.tip_y.quantity",
+     "not available in this version"},
+    {"integrator of a later version", R"({"end_time": 5})", R"({"integrator": {"type": @"radau5"}})",
+     "simulation.integrator.type", "'radau5' is not available in this version; available: dopri5, dopri853, rk4"},
+    {"drives of a later version", R"("forces":)", R"("drives": @[], "forces":)", "drives",
+     "not available in this version"},
+    {"unknown integrator", R"({"end_time": 5})", R"({"integrator": {"type": @"dopri54"}})",
+     "simulation.integrator.type", "did you mean 'dopri5'"},
+    {"fixed-step method without a step", R"({"end_time": 5})", R"({"integrator": @{"type": "rk4"}})",
+     "simulation.integrator.step", "needs a fixed step"},
+    {"tolerance of zero", R"({"end_time": 5})", R"({"integrator": {"rtol": @0}})", "simulation.integrator.rtol",
+     "must be greater than 0"},
+    {"component missing", R"(, "component": "y")", R"()", "sensors.tip_y.component", "is missing"},
+    {"component unknown", R"("component": "y")", R"("component": @"w")", "sensors.tip_y.component",
+     "available: x, y, z, norm"},
+    {"rate of a rate", R"("value": "theta0")", R"("value": "theta0", "rate": @"1 [m]")", "initial.conditions[0].rate",
+     "expected is rad/s"},
+    {"joint of one body", R"("body1": "crank", "body2": "rod")", R"("body1": "crank", "body2": @"crank")",
+     "joints[1].body2", "needs two bodies"},
+    {"objective without parts", R"({"running": "(tip_y - 0.5)^2 + 0*half"})", R"(@{})", "objectives.track",
+     "has no part"},
+    {"optimiser of a later version", R"("variables": ["k1"])",
+     R"("variables": ["k1"], "optimizer": {"type": @"nlopt"})", "design.optimizer.type",
+     "not available in this version"},
+    {"format of a later version", R"("format": 1)", R"("format": @2)", "format", "must be 1"},
+};
+
+}  // namespace
+
+TEST_CASE("the problem that the cases start from is right", "[json]") {
+  for (const Finding& finding : findings_of(kGood)) FAIL(to_string(finding));
+}
+
+TEST_CASE("a malformed file of each kind is reported at its line, column and path", "[json]") {
+  for (const Case& c : kCases) {
+    CAPTURE(c.kind);
+    std::string text = replaced(kGood, c.original, c.replacement);
+    const bool marked = c.replacement.find('@') != std::string::npos;
+    const Finding expected = marked ? at_mark(text) : Finding{};
+    const std::vector<Finding> findings = findings_of(text);
+    REQUIRE(!findings.empty());
+    const auto found =
+        std::find_if(findings.begin(), findings.end(), [&](const Finding& f) { return f.path == c.path; });
+    std::string all;
+    for (const Finding& f : findings) all += to_string(f) + "\n";
+    CAPTURE(all);
+    REQUIRE(found != findings.end());
+    CHECK(found->source == "suspension.json");
+    CHECK_THAT(found->message, Catch::Contains(c.message));
+    if (!marked) continue;
+    CHECK(found->line == expected.line);
+    CHECK(found->column == expected.column);
+  }
+}
+
+TEST_CASE("a finding is one line: file, line, column, path, message", "[json]") {
+  const std::string text = replaced(kGood, R"("mass": 1.0)", R"("mass": -2)");
+  CHECK_THROWS_WITH(read_problem_text(text, "suspension.json"),
+                    "suspension.json:10:31: bodies[0].mass: is -2 kg, a mass must not be negative");
+}
+
+TEST_CASE("columns count characters, not bytes", "[json]") {
+  const std::string text =
+      replaced(kGood, R"("name": "crank", "mass": 1.0)", R"("name": "crank", /* \u00e4\u00f6 äö */ "mass": -2)");
+  const std::vector<Finding> findings = findings_of(text);
+  REQUIRE(findings.size() == 1);
+  CHECK(findings[0].column == 31 + 22);
+}
+
+TEST_CASE("all errors are reported at once, in the order of the file", "[json]") {
+  std::string text = replaced(kGood, R"("mass": 1.0)", R"("mass": -2)");
+  text = replaced(text, R"("axis2": [0, 0, 1])", R"("axis2": [0, 0, 0])");
+  text = replaced(text, R"("stiffness": "k1")", R"("stiffness": "k1 +")");
+  text = replaced(text, R"("minimize": "track")", R"("minimize": "truck", "colour": 1)");
+  const std::vector<Finding> findings = findings_of(text);
+  std::vector<std::string> paths;
+  for (const Finding& finding : findings) paths.push_back(finding.path);
+  CHECK(paths == std::vector<std::string>{"bodies[0].mass", "joints[0].axis2", "forces[0].stiffness", "design.minimize",
+                                          "design.colour"});
+}
+
+TEST_CASE("an error does not drag others behind it", "[json]") {
+  // Without its type, nothing can be said about the joint's other keys; k1 is used in the force that does not parse.
+  std::string text = replaced(kGood, R"("type": "revolute")", R"("type": "revolut")");
+  CHECK(findings_of(text).size() == 1);
+  text = replaced(kGood, R"("stiffness": "k1")", R"("stiffness": "k1 +")");
+  CHECK(findings_of(text).size() == 1);
+}
