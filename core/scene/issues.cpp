@@ -52,8 +52,9 @@ void check_normals(Checker& checker, const Joint& joint, const std::optional<Vec
   check_angle("normal2", normal2, axis2);
   if (joint.normal1.has_value() != joint.normal2.has_value())
     checker.issue(checker.path(joint.normal1 ? "normal2" : "normal1"), "is missing; give both normals, or neither");
-  if (!joint.normal1 && !joint.normal2 && axis1 && axis2 && angle_is_used(checker.facts().scene(), joint.name) &&
-      norm({(*axis1)[0] - (*axis2)[0], (*axis1)[1] - (*axis2)[1], (*axis1)[2] - (*axis2)[2]}) > kSame)
+  if (joint.normal1 || joint.normal2 || !axis1 || !axis2) return;
+  const Vector difference{(*axis1)[0] - (*axis2)[0], (*axis1)[1] - (*axis2)[1], (*axis1)[2] - (*axis2)[2]};
+  if (norm(difference) > kSame && angle_is_used(checker.facts().scene(), joint.name))
     checker.issue(checker.path(), "its angle is used and axis1 differs from axis2: give normal1 and normal2");
 }
 

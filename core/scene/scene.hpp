@@ -24,14 +24,14 @@ enum class ParameterScale { linear, log, log10 };
 struct Parameter {
   std::string name;
   double value = 0;
-  std::optional<double> lower, upper;
+  std::optional<double> lower = {}, upper = {};
   ParameterScale scale = ParameterScale::linear;
-  std::string unit;  // for display and for the dimension check
+  std::string unit = {};  // for display and for the dimension check
   bool allow_unused = false;
   struct Prior {
     double mean = 0, sigma = 1;
   };
-  std::optional<Prior> prior;  // normal; a residual of its own in identification
+  std::optional<Prior> prior = {};  // normal; a residual of its own in identification
 };
 
 struct Definition {
@@ -122,7 +122,7 @@ struct Sensor {
 
 struct Condition {
   std::string sensor;
-  std::optional<Field> value, rate;
+  std::optional<Field> value = {}, rate = {};
 };
 
 struct Scene {

@@ -1,0 +1,210 @@
+#include "core/scene/issues.hpp"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <limits>
+
+using namespace mbsopt;
+
+namespace {
+
+Scene pendulum() {
+  Scene scene;
+  scene.parameters.push_back({"m", 2.0});
+  scene.definitions.push_back({"half", Expression::parse("m/2")});
+  Body body;
+  body.name = "bob";
+  body.mass = Expression::parse("m");
+  body.inertia = {1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
+  body.points["tip"] = {1.0, 0.0, 0.0};
+  scene.bodies.push_back(body);
+  Joint joint;
+  joint.name = "pin";
+  joint.type = "revolute";
+  joint.body2 = "bob";
+  joint.axis1 = joint.axis2 = VectorField{0.0, 0.0, 1.0};
+  scene.joints.push_back(joint);
+  Sensor sensor;
+  sensor.name = "theta";
+  sensor.quantity = "angle";
+  sensor.joint = "pin";
+  scene.sensors.push_back(sensor);
+  return scene;
+}
+
+// The messages at a path.
+std::string at(const Scene& scene, const std::string& path) {
+  std::string all;
+  for (const SceneIssue& issue : find_issues(scene))
+    if (issue.path == path) all += issue.message + "\n";
+  return all;
+}
+
+Force spring() {
+  Tsda tsda;
+  tsda.body2 = "bob";
+  tsda.point2 = "tip";
+  tsda.stiffness = 100.0;
+  return {"spring", tsda};
+}
+
+}  // namespace
+
+TEST_CASE("a right scene has no issues", "[scene]") {
+  Scene scene = pendulum();
+  scene.forces.push_back(spring());
+  scene.conditions.push_back({"theta", Expression::parse("30 [deg]"), Expression(0.0)});
+  for (const SceneIssue& issue : find_issues(scene)) FAIL(issue.path << ": " << issue.message);
+}
+
+TEST_CASE("an empty scene needs a body", "[scene]") {
+  CHECK_THAT(at(Scene(), "bodies"), Catch::Contains("at least one body"));
+}
+
+TEST_CASE("a joint of a scene made in C++ lacks or has too many axes", "[scene]") {
+  Scene scene = pendulum();
+  scene.joints[0].axis2.reset();
+  CHECK_THAT(at(scene, "joints[0].axis2"), Catch::Contains("is missing"));
+  scene = pendulum();
+  scene.joints[0].type = "spherical";
+  scene.sensors.clear();
+  CHECK_THAT(at(scene, "joints[0].axis1"), Catch::Contains("this type does not have it"));
+}
+
+TEST_CASE("numbers of a scene made in C++ must be finite", "[scene]") {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  Scene scene = pendulum();
+  scene.bodies[0].position[1] = nan;
+  scene.parameters[0].value = std::numeric_limits<double>::infinity();
+  scene.simulation.end_time = nan;
+  CHECK_THAT(at(scene, "bodies[0].position[1]"), Catch::Contains("must be finite"));
+  CHECK_THAT(at(scene, "parameters.m.value"), Catch::Contains("must be finite"));
+  CHECK_THAT(at(scene, "bodies[0].mass"), Catch::Contains("must be finite"));
+  CHECK_THAT(at(scene, "simulation.end_time"), Catch::Contains("must be finite"));
+}
+
+TEST_CASE("inertia tensors at the edge of what a body can have", "[scene]") {
+  const auto problem = [](InertiaField inertia) {
+    Scene scene = pendulum();
+    scene.bodies[0].inertia = inertia;
+    return at(scene, "bodies[0].inertia");
+  };
+  CHECK(problem({0.0, 0.0, 0.0, 0.0, 0.0, 0.0}).empty());              // point mass
+  CHECK(problem({0.0, 1.0 / 12, 1.0 / 12, 0.0, 0.0, 0.0}).empty());    // thin rod
+  CHECK(problem({0.0, 0.0833333, 0.0833333, 0.0, 0.0, 0.0}).empty());  // written with six digits
+  CHECK(problem({1.0, 2.0, 3.0, 0.0, 0.0, 0.0}).empty());              // lamina
+  CHECK(problem({1e-30, 1e-30, 2e-30, 0.0, 0.0, 0.0}).empty());
+  CHECK(problem({2.0, 2.0, 2.0, 0.5, -0.5, 0.5}).empty());
+  CHECK_THAT(problem({1.0, 2.0, 3.01, 0.0, 0.0, 0.0}), Catch::Contains("must not exceed the sum of the other two"));
+  CHECK_THAT(problem({0.0, 0.0, 1.0, 0.0, 0.0, 0.0}), Catch::Contains("[J/2, J/2, J]"));
+  CHECK_THAT(problem({1.0, 1.0, 1.0, 1.1, 0.0, 0.0}), Catch::Contains("positive semidefinite"));
+  CHECK_THAT(problem({-1e-30, 1e-30, 1e-30, 0.0, 0.0, 0.0}), Catch::Contains("positive semidefinite"));
+}
+
+TEST_CASE("normals come in pairs and not along the axis", "[scene]") {
+  Scene scene = pendulum();
+  scene.joints[0].normal1 = VectorField{1.0, 0.0, 0.0};
+  CHECK_THAT(at(scene, "joints[0].normal2"), Catch::Contains("give both normals"));
+  scene.joints[0].normal2 = VectorField{0.0, 0.0, -2.0};
+  CHECK_THAT(at(scene, "joints[0].normal2"), Catch::Contains("parallel to the axis"));
+}
+
+TEST_CASE("an angle between different axes needs normals only where it is used", "[scene]") {
+  Scene scene = pendulum();
+  scene.joints[0].axis2 = VectorField{0.0, 1.0, 0.0};
+  CHECK_THAT(at(scene, "joints[0]"), Catch::Contains("give normal1 and normal2"));
+  scene.sensors.clear();
+  CHECK(at(scene, "joints[0]").empty());
+}
+
+TEST_CASE("conditions fit what their sensor measures", "[scene]") {
+  Scene scene = pendulum();
+  scene.sensors[0].quantity = "rate";
+  scene.conditions.push_back({"theta", Expression(1.0), Expression(1.0)});
+  CHECK_THAT(at(scene, "initial.conditions[0].rate"), Catch::Contains("give its \"value\""));
+  scene = pendulum();
+  scene.conditions.push_back({"theta", {}, {}});
+  CHECK_THAT(at(scene, "initial.conditions[0]"), Catch::Contains("neither"));
+  scene.conditions[0].value = Expression::parse("1 [m]");
+  CHECK_THAT(at(scene, "initial.conditions[0].value"), Catch::Contains("expected is rad"));
+  Sensor energy;
+  energy.name = "E";
+  energy.quantity = "energy";
+  energy.component = "total";
+  scene.sensors.push_back(energy);
+  scene.conditions[0] = {"E", Expression(1.0), {}};
+  CHECK_THAT(at(scene, "initial.conditions[0].sensor"), Catch::Contains("cannot prescribe"));
+}
+
+TEST_CASE("laws use their own names and the parameters", "[scene]") {
+  Scene scene = pendulum();
+  Force force = spring();
+  std::get<Tsda>(force.kind).stiffness = 0.0;
+  std::get<Tsda>(force.kind).law = Expression::parse("100*(l - half) + 5*ldot + sin(t)");
+  scene.forces.push_back(force);
+  CHECK(find_issues(scene).empty());
+  std::get<Tsda>(scene.forces[0].kind).law = Expression::parse("angle + theta");
+  CHECK_THAT(at(scene, "forces[0].law"),
+             Catch::Contains("unknown name 'angle'") && Catch::Contains("unknown name 'theta'"));
+  std::get<Tsda>(scene.forces[0].kind).law = Expression::parse("1 [kg]");
+  CHECK_THAT(at(scene, "forces[0].law"), Catch::Contains("expected is kg m/s^2"));
+}
+
+TEST_CASE("a law beside coefficients is a warning", "[scene]") {
+  Scene scene = pendulum();
+  Force force = spring();
+  std::get<Tsda>(force.kind).law = Expression::parse("l");
+  scene.forces.push_back(force);
+  const std::vector<SceneIssue> issues = find_issues(scene);
+  REQUIRE(issues.size() == 1);
+  CHECK(issues[0].is_warning);
+  CHECK(issues[0].path == "forces[0].law");
+}
+
+TEST_CASE("circular and endless definitions are reported once, at the definition", "[scene]") {
+  Scene scene = pendulum();
+  scene.definitions = {{"a", Expression::parse("b + 1")},
+                       {"b", Expression::parse("a + 1")},
+                       {"c", Expression::parse("a*2")},
+                       {"half", Expression::parse("1")}};
+  scene.bodies[0].mass = Expression::parse("c");
+  std::vector<std::string> paths;
+  for (const SceneIssue& issue : find_issues(scene)) paths.push_back(issue.path);
+  CHECK(paths == std::vector<std::string>{"definitions.a", "definitions.b"});
+
+  scene.definitions.assign(1, {"d0", Expression(1.0)});
+  for (int i = 1; i < 2000; ++i)
+    scene.definitions.push_back({"d" + std::to_string(i), Expression::parse("d" + std::to_string(i - 1))});
+  scene.bodies[0].mass = Expression::parse("d1999");
+  const std::vector<SceneIssue> issues = find_issues(scene);
+  REQUIRE(issues.size() == 1);
+  CHECK_THAT(issues[0].message, Catch::Contains("nest deeper"));
+}
+
+TEST_CASE("dimensions follow through parameters and definitions", "[scene]") {
+  Scene scene = pendulum();
+  scene.parameters.push_back({"L", 1.0, {}, {}, ParameterScale::linear, "m"});
+  scene.parameters.push_back({"w", 0.1, {}, {}, ParameterScale::linear, "m"});
+  scene.definitions.push_back({"volume", Expression::parse("L*w^2")});
+  scene.bodies[0].mass = Expression::parse("7850*volume");
+  CHECK_THAT(at(scene, "bodies[0].mass"), Catch::Contains("expected is kg") && Catch::Contains("7850 [kg/m^3]"));
+  scene.bodies[0].mass = Expression::parse("7850 [kg/m^3]*volume");
+  scene.bodies[0].points["tip"] = {Expression::parse("-L/2"), Expression::parse("w + 1 [mm]"), 0.0};
+  CHECK(find_issues(scene).empty());
+  scene.bodies[0].points["tip"][1] = Expression::parse("w*L");
+  CHECK_THAT(at(scene, "bodies[0].points.tip[1]"), Catch::Contains("has the dimension m^2"));
+}
+
+TEST_CASE("thousands of bodies are checked", "[scene]") {
+  Scene scene = pendulum();
+  const Body body = scene.bodies[0];
+  const Joint joint = scene.joints[0];
+  for (int i = 1; i < 3000; ++i) {
+    scene.bodies.push_back(body);
+    scene.bodies.back().name = "b" + std::to_string(i);
+    scene.joints.push_back(joint);
+    scene.joints.back().name = "j" + std::to_string(i);
+    scene.joints.back().body2 = scene.bodies.back().name;
+  }
+  CHECK(find_issues(scene).empty());
+}
