@@ -1,0 +1,80 @@
+// Optimal design: parameters within their bounds that minimise one objective, others held within bounds.
+//
+//   minimise psi_0(rho)   subject to   rho_lower <= rho <= rho_upper,   lower_i <= psi_i(rho) <= upper_i
+//
+//   DesignOptions options;
+//   options.progress = [](const DesignRow& row) { std::cerr << row.objective << '\n'; return true; };
+//   const DesignResult result = run_design(problem, options);
+//   if (result.ok()) std::cout << result.variables[0].name << " = " << result.variables[0].value;
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "optim/evaluator.hpp"
+#include "optim/nonlinear_program.hpp"
+#include "optim/problem.hpp"
+
+namespace mbsopt {
+
+struct DesignVariable {
+  std::string name, unit;
+  double initial = 0, value = 0;
+  std::optional<double> lower, upper;
+  bool at_lower = false, at_upper = false;  // the solution touches this bound
+};
+
+struct DesignConstraint {
+  std::string objective;
+  std::optional<double> lower, upper;
+  double initial = 0, value = 0;
+  double violation = 0;                     // amount by which the nearer bound is missed, 0 where it holds
+  bool at_lower = false, at_upper = false;  // the solution touches this bound
+};
+
+// One iteration of the optimiser.
+struct DesignRow {
+  int iteration = 0;
+  double objective = 0;
+  double violation = 0;        // largest of the constraints, each relative to its bounds
+  double optimality = 0;       // largest entry of the scaled Lagrangian gradient; 0 at the optimum
+  Eigen::VectorXd parameters;  // the variables, SI
+};
+
+struct DesignResult {
+  NlpStatus status = NlpStatus::failed;
+  std::string message;  // in words, always
+  std::string objective;
+  double objective_initial = 0, objective_final = 0;
+  std::vector<DesignVariable> variables;
+  std::vector<DesignConstraint> constraints;
+  std::vector<DesignRow> history;
+  Eigen::VectorXd rho;          // all parameters at the solution, or at the best point where there is none
+  Evaluation final_evaluation;  // there; its objectives: the one minimised, then the constraints
+  std::string optimizer;        // "ipopt"
+  std::string gradient_choice;  // method and why
+  int iterations = 0;
+  long evaluations = 0, failed_evaluations = 0;  // points at which objectives and gradients were computed
+  long simulations = 0;
+  double wall_seconds = 0;
+  bool ok() const { return status == NlpStatus::converged || status == NlpStatus::no_progress; }
+};
+
+struct DesignOptions {
+  GradientMethod method = GradientMethod::automatic;
+  std::vector<std::shared_ptr<const UserForce>> user_forces;
+  std::function<bool(const DesignRow&)> progress;     // after every iteration; false stops, the best so far is kept
+  std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
+};
+
+// problem.design must be there. Throws std::invalid_argument where it makes no sense (unknown names, no bounds to
+// hold).
+DesignResult run_design(const Problem& problem, const DesignOptions& options = {});
+
+// "converged", "no_progress", "iteration_limit", "infeasible", "stopped", "failed"
+std::string_view to_string(NlpStatus status);
+
+}  // namespace mbsopt

@@ -1,0 +1,106 @@
+// Identification: parameters that explain measured motions, by nonlinear least squares on exact derivatives.
+//
+//   measured_i = gain s(t_i, rho) + bias + noise        z_i = (measured_i - gain s(t_i, rho) - bias)/sigma
+//   min 1/2 sum z_i^2   within the bounds               Levenberg-Marquardt on the Jacobian of the tangent-linear model
+//
+// gain, bias and sigma are expressions over parameters; sigma must not depend on what is fitted. Each experiment has a
+// simulation of its own, from its start_time to its last sample, with its own values of the parameters that are `free`
+// there. Experiments with role "validate" take no part: with the shared parameters fixed, only their free ones are
+// refitted, and the residuals are scored.
+//
+//   const std::vector<CsvTable> data{read_csv("run1.csv")};      // one per experiment
+//   const IdentificationResult result = run_identification(problem, data);
+//   for (const FittedParameter& p : result.parameters) std::cout << p.name << ' ' << p.value << " +- " << p.std_error;
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "optim/csv_table.hpp"
+#include "optim/problem.hpp"
+#include "optim/statistics.hpp"
+
+namespace mbsopt {
+
+enum class FitStatus { converged, iteration_limit, stopped, failed };
+std::string_view to_string(FitStatus status);  // "converged", "iteration_limit", "stopped", "failed"
+
+struct FittedParameter {
+  std::string name;        // "k1", or "run1.theta0" where it is free in an experiment
+  std::string parameter;   // in the scene
+  std::string experiment;  // empty where shared
+  std::string unit;
+  double initial = 0, value = 0;
+  std::optional<double> lower, upper;
+  bool at_lower = false, at_upper = false;  // then its std_error, computed as if it were free, says little
+  double std_error = 0;                     // infinite where the data do not determine it
+  double ci95[2] = {0, 0};
+};
+
+struct ChannelFit {
+  std::string column, sensor;
+  std::size_t samples = 0, missing = 0;  // used, and empty cells among its rows
+  double rms = 0;                        // of measured - model, in the column's units
+  double rms_scaled = 0;                 // of z
+};
+
+struct ExperimentFit {
+  std::string name;
+  bool validate = false;
+  double start_time = 0, end_time = 0;  // of its simulation [s]
+  std::size_t samples = 0;
+  double rms = 0;  // of measured - model over all its channels, in the columns' units
+  std::vector<ChannelFit> channels;
+  std::vector<FittedParameter> refitted;  // validate: its free parameters
+  std::string message;                    // validate: how the refit ended
+};
+
+// A row of residuals.csv.
+struct ResidualRow {
+  std::size_t experiment = 0, channel = 0;
+  double t = 0, measured = 0, model = 0;
+  double scaled = 0;  // z
+};
+
+// One iteration of the solver.
+struct FitRow {
+  int iteration = 0;
+  double cost = 0;             // 1/2 sum z^2
+  double gradient_norm = 0;    // largest entry, of the scaled variables
+  double step_norm = 0;        // of the scaled variables
+  Eigen::VectorXd parameters;  // in the order of IdentificationResult::parameters
+};
+
+struct IdentificationResult {
+  FitStatus status = FitStatus::failed;
+  std::string message;  // in words, always
+  std::vector<FittedParameter> parameters;
+  FitStatistics statistics;  // in the order of parameters
+  std::vector<ExperimentFit> experiments;
+  std::vector<ResidualRow> residuals;  // by experiment, time, channel
+  std::vector<FitRow> history;
+  double cost_initial = 0, cost_final = 0;  // 1/2 sum z^2
+  std::size_t samples = 0;                  // fitted
+  int iterations = 0;
+  long evaluations = 0, failed_evaluations = 0;  // points at which all experiments were simulated, with derivatives
+  long simulations = 0;
+  double wall_seconds = 0;
+  bool ok() const { return status == FitStatus::converged; }
+};
+
+struct IdentificationOptions {
+  std::vector<std::shared_ptr<const UserForce>> user_forces;
+  std::function<bool(const FitRow&)> progress;        // after every iteration; false stops, the best so far is kept
+  std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
+};
+
+// problem.identification must be there; data: one table per experiment, in order. Throws std::invalid_argument where
+// the problem and the data do not fit, CsvError where the data are wrong.
+IdentificationResult run_identification(const Problem& problem, const std::vector<CsvTable>& data,
+                                        const IdentificationOptions& options = {});
+
+}  // namespace mbsopt
