@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>  // cross
+#include <Eigen/Geometry>  // cross
 
 namespace mbsopt {
 

@@ -1,0 +1,268 @@
+#include "core/dynamics/assembly.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include "core/dynamics/assembly_equations.hpp"
+#include "core/dynamics/assembly_report.hpp"
+#include "core/dynamics/nearest_point.hpp"
+
+namespace mbsopt {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+// Unknown q; v plays no part.
+class PositionProblem : public NearestPointEquations {
+ public:
+  explicit PositionProblem(AssemblyEquations& equations) : equations_(equations) {}
+
+  VectorXd values(const VectorXd& q) const override { return equations_.values(state(q)); }
+  MatrixXd jacobian(const VectorXd& q) const override { return equations_.gradients(state(q)).y.leftCols(q.size()); }
+  MatrixXd curvature(const VectorXd& q, const VectorXd& nu) const override {
+    return equations_.second(state(q), nu).y.leftCols(q.size());
+  }
+  // No Euler parameter changes by more than 0.3 at once (about 0.6 rad); r enters linearly.
+  double step_fraction(const VectorXd& step) const override {
+    double change = 0;
+    for (Index i = 3; i < step.size(); i += 7) change = std::max(change, step.segment<4>(i).lpNorm<Eigen::Infinity>());
+    return change > 0.3 ? 0.3 / change : 1.0;
+  }
+  VectorXd weights() const override { return equations_.weights(); }
+  void accept(const VectorXd& q) override { equations_.continue_branches(state(q)); }
+
+ private:
+  static VectorXd state(const VectorXd& q) {
+    VectorXd y = VectorXd::Zero(2 * q.size());
+    y.head(q.size()) = q;
+    return y;
+  }
+  AssemblyEquations& equations_;
+};
+
+// Unknown v at a fixed q.
+class VelocityProblem : public NearestPointEquations {
+ public:
+  VelocityProblem(const AssemblyEquations& equations, const VectorXd& q) : equations_(equations), q_(q) {}
+
+  VectorXd values(const VectorXd& v) const override { return equations_.values(state(v)); }
+  MatrixXd jacobian(const VectorXd& v) const override { return equations_.gradients(state(v)).y.rightCols(v.size()); }
+  MatrixXd curvature(const VectorXd& v, const VectorXd& nu) const override {
+    return equations_.second(state(v), nu).y.rightCols(v.size());
+  }
+  double step_fraction(const VectorXd&) const override { return 1; }
+  VectorXd weights() const override { return equations_.weights(); }
+
+ private:
+  VectorXd state(const VectorXd& v) const {
+    VectorXd y(2 * v.size());
+    y << q_, v;
+    return y;
+  }
+  const AssemblyEquations& equations_;
+  const VectorXd& q_;
+};
+
+VectorXd position_guess(const MechanismData& d) {
+  VectorXd q(7 * d.n);
+  for (int i = 0; i < d.n; ++i) q.segment<7>(7 * i) = d.bodies[static_cast<std::size_t>(i + 1)].q;
+  return q;
+}
+
+// pdot = 1/2 E(p)' omega_G as a matrix on p.
+Mat<4, 4> rate_matrix(const Vector3d& omega_G) {
+  Mat<4, 4> W;
+  W << 0, -omega_G.transpose(), omega_G, skew(omega_G);
+  return 0.5 * W;
+}
+
+// rdot = velocity + omega_G x A(p) com
+VectorXd velocity_guess(const MechanismData& d, const VectorXd& q) {
+  VectorXd v(7 * d.n);
+  for (int i = 0; i < d.n; ++i) {
+    const BodyData& body = d.bodies[static_cast<std::size_t>(i + 1)];
+    const Vector4d p = q.segment<4>(7 * i + 3);
+    v.segment<3>(7 * i) = body.velocity + body.angular_velocity.cross(A(p) * body.com);
+    v.segment<4>(7 * i + 3) = rate_matrix(body.angular_velocity) * p;
+  }
+  return v;
+}
+
+// Derivative of rows of a field: out += M (d field/d rho)
+template <int Rows, int N>
+void add_field(const MechanismData& d, int slot, const Mat<Rows, N>& M, Eigen::Ref<MatrixXd> out) {
+  if (slot < 0) return;
+  for (std::size_t k = 0; k < d.active.size(); ++k) {
+    out.col(d.active[k]) += M * d.theta_rho.col(static_cast<Index>(k)).segment<N>(slot);
+  }
+}
+
+MatrixXd position_guess_rho(const MechanismData& d) {
+  MatrixXd out = MatrixXd::Zero(7 * d.n, d.rho.size());
+  for (int i = 0; i < d.n; ++i) {
+    add_field<7, 7>(d, d.bodies[static_cast<std::size_t>(i + 1)].slot_q, Mat<7, 7>::Identity(),
+                    out.middleRows(7 * i, 7));
+  }
+  return out;
+}
+
+void velocity_guess_derivatives(const MechanismData& d, const VectorXd& q, MatrixXd& v_q, MatrixXd& v_rho) {
+  v_q = MatrixXd::Zero(q.size(), q.size());
+  v_rho = MatrixXd::Zero(q.size(), d.rho.size());
+  for (int i = 0; i < d.n; ++i) {
+    const BodyData& body = d.bodies[static_cast<std::size_t>(i + 1)];
+    const Vector4d p = q.segment<4>(7 * i + 3);
+    const Matrix3d W = skew(body.angular_velocity);
+    const Vector3d arm = A(p) * body.com, e = p.tail<3>();
+    v_q.block<3, 4>(7 * i, 7 * i + 3) = W * N(p, body.com);
+    v_q.block<4, 4>(7 * i + 3, 7 * i + 3) = rate_matrix(body.angular_velocity);
+    Mat<7, 3> from_omega;
+    from_omega.topRows<3>() = -skew(arm);
+    from_omega.row(3) = -0.5 * e.transpose();
+    from_omega.bottomRows<3>() = 0.5 * (p(0) * Matrix3d::Identity() - skew(e));
+    add_field<3, 3>(d, body.slot_velocity, Matrix3d::Identity(), v_rho.middleRows(7 * i, 3));
+    add_field<3, 3>(d, body.slot_com, W * A(p), v_rho.middleRows(7 * i, 3));
+    add_field<7, 3>(d, body.slot_angular_velocity, from_omega, v_rho.middleRows(7 * i, 7));
+  }
+}
+
+}  // namespace
+
+struct Assembly::Solution {
+  Solution(const MechanismData& d, double t)
+      : data(d), position(d, AssemblyLevel::position, t), velocity(d, AssemblyLevel::velocity, t) {
+    solve();
+    set_angles();
+  }
+
+  void solve() {
+    const Index N = 7 * data.n;
+    result.y = VectorXd::Zero(2 * N);
+    PositionProblem positions(position);
+    q.emplace(nearest_point(positions, position_guess(data)));
+    result.y.head(N) = q->x;
+    result.iterations = q->iterations;
+    result.residual = q->F.size() > 0 ? q->F.lpNorm<Eigen::Infinity>() : 0.0;
+    if (q->status != NearestPointStatus::found) {
+      result.message = assembly_failure(data, AssemblyLevel::position, position, *q);
+      return;
+    }
+    VelocityProblem velocities(velocity, q->x);
+    v.emplace(nearest_point(velocities, velocity_guess(data, q->x)));
+    result.y.tail(N) = v->x;
+    result.iterations += v->iterations;
+    result.residual = std::max(result.residual, v->F.lpNorm<Eigen::Infinity>());
+    if (v->status != NearestPointStatus::found) {
+      result.message = assembly_failure(data, AssemblyLevel::velocity, velocity, *v);
+      return;
+    }
+    result.ok = true;
+  }
+
+  // On the branch of an angle's condition where there is one, else atan2's own value.
+  void set_angles() {
+    result.angles.resize(static_cast<Index>(data.angles.size()));
+    for (std::size_t i = 0; i < data.angles.size(); ++i) {
+      const JointAngle& joint = data.angles[i];
+      result.angles(static_cast<Index>(i)) =
+          joint.jet(body_at(result.y, joint.body1).frame, body_at(result.y, joint.body2).frame).angle();
+    }
+    for (const AssemblyTarget& target : position.targets()) {
+      if (const auto* sensor = std::get_if<AngleSensor>(&target.sensor)) {
+        double& angle = result.angles(sensor->angle);
+        angle = JointAngle::on_branch(angle, target.branch);
+      }
+    }
+  }
+
+  // Right-hand sides of both linear systems (nearest_point.hpp); those of v need q' as well:
+  //   J_q q' = -q_F_rho,           H_q q' + .. = q_g_rho
+  //   J_v v' = -F_q q' - F_rho,    H_v v' + .. = g_q q' + g_rho
+  struct Derivatives {
+    MatrixXd q_b_rho, q_g_rho, v_b_q, v_b_rho, v_g_q, v_g_rho;
+  };
+  Derivatives derivatives() const {
+    const Index N = 7 * data.n;
+    Derivatives d;
+    d.q_b_rho = -position.gradients(result.y).rho;
+    d.q_g_rho = position_guess_rho(data) - position.second(result.y, q->nu).rho;
+    const AssemblyEquations::Gradients F = velocity.gradients(result.y), S = velocity.second(result.y, v->nu);
+    d.v_b_q = -F.y.leftCols(N);
+    d.v_b_rho = -F.rho;
+    velocity_guess_derivatives(data, q->x, d.v_g_q, d.v_g_rho);
+    d.v_g_q -= S.y.leftCols(N);
+    d.v_g_rho -= S.rho;
+    return d;
+  }
+
+  const MechanismData& data;
+  AssemblyEquations position, velocity;
+  std::optional<NearestPoint> q, v;
+  AssemblyResult result;
+};
+
+Assembly::Assembly(const Mechanism& mechanism, double start_time)
+    : solution_(std::make_unique<Solution>(mechanism.data(), start_time)) {}
+Assembly::~Assembly() = default;
+
+const AssemblyResult& Assembly::result() const { return solution_->result; }
+
+MatrixXd Assembly::tangent() const {
+  const Solution& s = *solution_;
+  const Solution::Derivatives d = s.derivatives();
+  MatrixXd y_rho(s.result.y.size(), s.data.rho.size());
+  const MatrixXd q_rho = s.q->linearisation.solve(d.q_b_rho, d.q_g_rho);
+  y_rho << q_rho, s.v->linearisation.solve(d.v_b_q * q_rho + d.v_b_rho, d.v_g_q * q_rho + d.v_g_rho);
+  return y_rho;
+}
+
+void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
+  const Solution& s = *solution_;
+  const Solution::Derivatives d = s.derivatives();
+  const Index N = 7 * s.data.n;
+  MatrixXd b_bar, g_bar;
+  s.v->linearisation.solve_transposed(y_bar.bottomRows(N), b_bar, g_bar);
+  rho_bar += d.v_b_rho.transpose() * b_bar + d.v_g_rho.transpose() * g_bar;
+  const MatrixXd q_bar = y_bar.topRows(N) + d.v_b_q.transpose() * b_bar + d.v_g_q.transpose() * g_bar;
+  s.q->linearisation.solve_transposed(q_bar, b_bar, g_bar);
+  rho_bar += d.q_b_rho.transpose() * b_bar + d.q_g_rho.transpose() * g_bar;
+}
+
+// Rows are taken in file order, unit norms first; one that lies in the span of those before it is redundant.
+ModelSummary Assembly::summary() const {
+  const MechanismData& d = solution_->data;
+  const MatrixXd J = solution_->position.gradients(solution_->result.y).y.leftCols(7 * d.n);
+  MatrixXd basis(7 * d.n, 7 * d.n);
+  Index rank = 0;
+  auto independent = [&](Index row) {
+    if (rank == basis.cols()) return false;
+    VectorXd x = J.row(row).transpose().normalized();
+    for (int twice = 0; twice < 2; ++twice) x -= basis.leftCols(rank) * (basis.leftCols(rank).transpose() * x);
+    if (!(x.norm() > NearestPointLinearisation::kRankThreshold)) return false;
+    basis.col(rank++) = x.normalized();
+    return true;
+  };
+  for (Index i = 0; i < d.n; ++i) independent(d.m + i);
+  std::vector<int> rows(d.joint_names.size(), 0), redundant(d.joint_names.size(), 0);
+  for (const Constraint& c : d.constraints) {
+    const std::size_t joint = static_cast<std::size_t>(c.joint);
+    rows[joint] += c.rows();
+    for (int i = 0; i < c.rows(); ++i) redundant[joint] += independent(c.row + i) ? 0 : 1;
+  }
+  ModelSummary summary;
+  summary.bodies = d.n;
+  summary.equations = d.m + d.n;
+  summary.rank = static_cast<int>(rank);
+  summary.degrees_of_freedom = 7 * d.n - summary.rank;
+  for (std::size_t j = 0; j < rows.size(); ++j) {
+    if (redundant[j] == 0) continue;
+    summary.redundant.push_back(d.joint_names[j] + " (" + std::to_string(redundant[j]) + " of " +
+                                std::to_string(rows[j]) + ")");
+  }
+  return summary;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,103 @@
+#include "core/dynamics/assembly_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+namespace mbsopt {
+namespace {
+
+std::string number(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", x);
+  return text;
+}
+
+struct Finding {
+  double amount;
+  std::string text;
+};
+
+std::string joint_name(const MechanismData& d, const Constraint& c) {
+  auto name = [&](int body) { return d.body_names[static_cast<std::size_t>(body)]; };
+  return "joint '" + d.joint_names[static_cast<std::size_t>(c.joint)] + "' (" + name(c.body1) + " - " + name(c.body2) +
+         ")";
+}
+
+const char* unit_of(const SensorKind& kind) {
+  if (const auto* p = std::get_if<PointSensor>(&kind)) {
+    return p->quantity == PointSensor::Quantity::position ? " m" : " m/s";
+  }
+  if (const auto* a = std::get_if<AngleSensor>(&kind)) return a->rate ? " rad/s" : " rad";
+  if (std::holds_alternative<AngularVelocitySensor>(kind)) return " rad/s";
+  return "";
+}
+
+// Points apart, directions out of square, of one joint.
+void add_joint(const MechanismData& d, AssemblyLevel level, std::size_t joint, const Eigen::VectorXd& F,
+               double tolerance, std::vector<Finding>& findings) {
+  double apart = 0, skew = 0;
+  const Constraint* any = nullptr;
+  for (const Constraint& c : d.constraints) {
+    if (static_cast<std::size_t>(c.joint) != joint) continue;
+    any = &c;
+    const double amount = F.segment(c.row, c.rows()).norm();
+    double& kind = std::holds_alternative<Coincidence>(c.primitive) ? apart : skew;
+    kind = std::hypot(kind, amount);
+  }
+  if (!any || std::max(apart, skew) <= tolerance) return;
+  const bool rates = level == AssemblyLevel::velocity;
+  std::string text = joint_name(d, *any) + ": ";
+  if (apart > tolerance) text += "points " + number(apart) + (rates ? " m/s apart" : " m apart");
+  if (skew > tolerance) {
+    if (apart > tolerance) text += ", ";
+    text += rates ? "axes turn apart at " + number(skew) + " rad/s"
+                  : "axes " + number(std::asin(std::min(1.0, skew))) + " rad out of line";
+  }
+  findings.push_back({std::max(apart, skew), text});
+}
+
+}  // namespace
+
+std::string assembly_failure(const MechanismData& d, AssemblyLevel level, const AssemblyEquations& equations,
+                             const NearestPoint& found) {
+  const bool positions = level == AssemblyLevel::position;
+  const std::string head = positions ? "initial assembly failed: " : "initial velocities failed: ";
+  if (!found.F.allFinite()) return head + "the equations are not finite at the guess";
+  if (found.status == NearestPointStatus::undetermined) {
+    return head +
+           "several initial states are equally near to the guess; move the guess (position, orientation of the "
+           "bodies) towards the one that is meant, or fix it by initial.conditions";
+  }
+  const Eigen::VectorXd& F = found.F;
+  const double tolerance = std::max(1e-9, 1e-3 * F.lpNorm<Eigen::Infinity>());
+  std::vector<Finding> findings;
+  for (std::size_t j = 0; j < d.joint_names.size(); ++j) add_joint(d, level, j, F, tolerance, findings);
+  Eigen::Index row = d.m + d.n;
+  for (const AssemblyTarget& target : equations.targets()) {
+    const double off = F(row++);
+    if (!(std::abs(off) > tolerance)) continue;
+    const ConditionData& c = d.conditions[static_cast<std::size_t>(target.condition)];
+    findings.push_back({std::abs(off), "condition on '" + d.sensor_names[static_cast<std::size_t>(c.sensor)] +
+                                           "': asks for " + (c.has_rate && !positions ? "rate " : "") +
+                                           number(target.value) + unit_of(target.sensor) + ", nearest possible " +
+                                           number(target.value + off) + unit_of(target.sensor)});
+  }
+  if (findings.empty()) {
+    return head + "no convergence after " + std::to_string(found.iterations) +
+           " iterations; give a guess (position, orientation of the bodies) nearer to the initial state";
+  }
+  std::stable_sort(findings.begin(), findings.end(),
+                   [](const Finding& a, const Finding& b) { return a.amount > b.amount; });
+  constexpr std::size_t kShown = 8;
+  std::string text = head;
+  for (std::size_t i = 0; i < std::min(kShown, findings.size()); ++i) text += (i ? "; " : "") + findings[i].text;
+  if (findings.size() > kShown) text += "; and " + std::to_string(findings.size() - kShown) + " more";
+  return text + (positions ? ". Check the lengths and conditions: the mechanism cannot be closed near its guess; if it "
+                             "can elsewhere, give a guess (position, orientation of the bodies) on that side"
+                           : ". The conditions on velocities contradict each other or the joints: leave one out, or "
+                             "change its value");
+}
+
+}  // namespace mbsopt

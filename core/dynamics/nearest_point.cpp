@@ -1,0 +1,256 @@
+#include "core/dynamics/nearest_point.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace mbsopt {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J) : scale_(J.rows()) {
+  for (Eigen::Index i = 0; i < J.rows(); ++i) {
+    const double norm = J.row(i).norm();
+    scale_(i) = norm > 0 ? 1 / norm : 1.0;
+  }
+  J_transposed_.setThreshold(kRankThreshold);
+  J_transposed_.compute((scale_.asDiagonal() * J).transpose());
+  const Eigen::Index N = J.cols(), free = N - rank();
+  Z_ = J_transposed_.householderQ() * MatrixXd::Identity(N, N).rightCols(free);
+}
+
+VectorXd NearestPointLinearisation::multipliers(const VectorXd& g) const {
+  return scale_.cwiseProduct(VectorXd(J_transposed_.solve(g)));
+}
+MatrixXd NearestPointLinearisation::pseudo_inverse_times(const Eigen::Ref<const MatrixXd>& b) const {
+  return J_transposed_.transpose().solve(MatrixXd(scale_.asDiagonal() * b));
+}
+MatrixXd NearestPointLinearisation::pseudo_inverse_transposed_times(const Eigen::Ref<const MatrixXd>& x) const {
+  return scale_.asDiagonal() * MatrixXd(J_transposed_.solve(MatrixXd(x)));
+}
+
+void NearestPointLinearisation::set_hessian(const MatrixXd& H) {
+  H_ = H;
+  if (Z_.cols() == 0) {
+    lambda_.resize(0);
+    V_.resize(0, 0);
+    return;
+  }
+  const MatrixXd M = Z_.transpose() * H * Z_;
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(0.5 * (M + M.transpose()));
+  lambda_ = eigen.eigenvalues();
+  V_ = eigen.eigenvectors();
+}
+
+MatrixXd NearestPointLinearisation::solve(const Eigen::Ref<const MatrixXd>& b,
+                                          const Eigen::Ref<const MatrixXd>& g) const {
+  const MatrixXd x = pseudo_inverse_times(b);
+  const MatrixXd w = V_.transpose() * (Z_.transpose() * (g - H_ * x));
+  return x + Z_ * (V_ * (lambda_.cwiseInverse().asDiagonal() * w));
+}
+
+void NearestPointLinearisation::solve_transposed(const Eigen::Ref<const MatrixXd>& x_bar, MatrixXd& b_bar,
+                                                 MatrixXd& g_bar) const {
+  const MatrixXd w = V_.transpose() * (Z_.transpose() * x_bar);
+  g_bar = Z_ * (V_ * (lambda_.cwiseInverse().asDiagonal() * w));
+  b_bar = pseudo_inverse_transposed_times(x_bar - H_.transpose() * g_bar);
+}
+
+VectorXd NearestPointLinearisation::descent(const VectorXd& b, const VectorXd& g) const {
+  constexpr double kPositive = 1e-6, kFloor = 0.1;
+  const VectorXd x = pseudo_inverse_times(b);
+  VectorXd lambda = lambda_;
+  if (lambda.size() > 0 && lambda(0) < kPositive) lambda = lambda.cwiseAbs().cwiseMax(kFloor);
+  const VectorXd w = V_.transpose() * (Z_.transpose() * (g - H_ * x));
+  return x + Z_ * (V_ * w.cwiseQuotient(lambda));
+}
+
+namespace {
+
+constexpr int kMaxIterations = 400;
+constexpr double kLocal = 1e-6;  // steps below it are taken whole: the merit function sees only rounding there
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+double largest(const VectorXd& x) { return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>(); }
+
+// Levenberg-Marquardt on 1/2 |weights F|^2: brings x to where the equations are violated least.
+void reduce_violation(NearestPointEquations& equations, VectorXd& x, int& iterations) {
+  double mu = 1e-3;
+  VectorXd F = equations.values(x);
+  MatrixXd J = equations.jacobian(x);
+  const VectorXd scale = equations.weights();
+  auto violation = [&](const VectorXd& f) { return scale.cwiseProduct(f).squaredNorm(); };
+  for (int k = 0; k < kMaxIterations && mu < 1e12; ++k, ++iterations) {
+    const MatrixXd A = scale.asDiagonal() * J;
+    const VectorXd gradient = A.transpose() * scale.cwiseProduct(F);
+    if (largest(gradient) < 1e-15) return;
+    MatrixXd normal = A.transpose() * A;
+    normal.diagonal().array() += mu;
+    VectorXd step = normal.llt().solve(-gradient);
+    step *= equations.step_fraction(step);
+    const VectorXd trial = x + step, F_trial = equations.values(trial);
+    if (violation(F_trial) < violation(F)) {
+      const bool negligible = violation(F) - violation(F_trial) < 1e-14 * violation(F);
+      x = trial, F = F_trial;
+      equations.accept(x);
+      if (negligible) return;
+      J = equations.jacobian(x);
+      mu = std::max(mu / 5, 1e-14);
+    } else {
+      mu *= 4;
+    }
+  }
+}
+
+class Search {
+ public:
+  Search(NearestPointEquations& equations, const VectorXd& x_guess)
+      : equations_(equations), x_guess_(x_guess), result_{NearestPointStatus::stalled,
+                                                          x_guess,
+                                                          {},
+                                                          {},
+                                                          0,
+                                                          NearestPointLinearisation(equations.jacobian(x_guess))} {}
+
+  NearestPoint run() {
+    constexpr int kRestorations = 3;
+    int restorations = 0;
+    for (; result_.iterations < kMaxIterations; ++result_.iterations) {
+      linearise();
+      if (!result_.F.allFinite()) break;
+      const VectorXd step = result_.linearisation.descent(-result_.F, x_guess_ - result_.x);
+      const bool satisfied = largest(result_.F) <= 1e-11 * size(), still = converged(step);
+      if (still && satisfied) {
+        result_.status = is_minimum() ? NearestPointStatus::found : NearestPointStatus::undetermined;
+        return result_;
+      }
+      if (!still && largest(step) < kLocal * size()) {
+        move(result_.x + step);
+      } else if (still || !gets_closer() || !advance(step)) {
+        if (restorations++ == kRestorations || !restore()) {
+          result_.status = NearestPointStatus::unsatisfiable;
+          result_.F = equations_.values(result_.x);
+          return result_;
+        }
+      }
+    }
+    result_.F = equations_.values(result_.x);
+    return result_;
+  }
+
+ private:
+  double size() const { return 1 + largest(result_.x); }
+  double scaled_violation(const VectorXd& F) const { return result_.linearisation.row_scale().cwiseProduct(F).norm(); }
+
+  void linearise() {
+    const VectorXd& x = result_.x;
+    result_.F = equations_.values(x);
+    result_.linearisation = NearestPointLinearisation(equations_.jacobian(x));
+    result_.nu = result_.linearisation.multipliers(x_guess_ - x);
+    MatrixXd H = equations_.curvature(x, result_.nu);
+    H.diagonal().array() += 1;
+    result_.linearisation.set_hessian(H);
+  }
+
+  // At rounding level, or no longer shrinking just above it.
+  bool converged(const VectorXd& step) {
+    const double length = largest(step);
+    if (length <= 2 * kEpsilon * size()) return true;
+    if (length < 0.5 * shortest_) {
+      shortest_ = length, waited_ = 0;
+      return false;
+    }
+    return shortest_ < 1e-11 * size() && ++waited_ >= 2;
+  }
+
+  // Whether the violation still shrinks from time to time.
+  bool gets_closer() {
+    const double violation = scaled_violation(result_.F);
+    if (violation < 0.7 * closest_ || violation < 1e-9) {
+      closest_ = violation, patience_ = 25;
+      return true;
+    }
+    return --patience_ > 0;
+  }
+
+  bool is_minimum() const {
+    const VectorXd& lambda = result_.linearisation.reduced_eigenvalues();
+    return lambda.size() == 0 || lambda(0) > 1e-9;
+  }
+
+  void move(const VectorXd& x) {
+    result_.x = x;
+    equations_.accept(x);
+  }
+
+  // One step along the merit function 1/2 |x - x_guess|^2 + sigma |scale F|; false where it cannot be reduced.
+  bool advance(VectorXd step) {
+    step *= equations_.step_fraction(step);
+    const VectorXd away = result_.x - x_guess_;
+    const VectorXd scale = result_.linearisation.row_scale();
+    const VectorXd F = scale.cwiseProduct(result_.F);
+    const double violation = F.norm();
+    double slope = away.dot(step);
+    if (violation > 0) {
+      const VectorXd change = scale.cwiseProduct(VectorXd(equations_.jacobian(result_.x) * step));
+      const double reduction = -F.dot(change) / violation;
+      if (violation > 1e-10 && reduction < 1e-8 * std::min(violation, step.norm())) return false;
+      const double rise = slope + 0.5 * step.squaredNorm();
+      if (rise > 0 && reduction > 0) sigma_ = std::max(sigma_, 2 * rise / reduction);
+      slope -= sigma_ * reduction;
+    }
+    if (!(slope < 0)) {
+      if (violation > 1e-8) return false;
+      move(result_.x + step);
+      return true;
+    }
+    auto merit = [&](const VectorXd& x, const VectorXd& f) {
+      return 0.5 * (x - x_guess_).squaredNorm() + sigma_ * scaled_violation(f);
+    };
+    const double now = merit(result_.x, result_.F);
+    for (double part = 1; part > 1e-7; part *= 0.5) {
+      VectorXd trial = result_.x + part * step;
+      VectorXd F_trial = equations_.values(trial);
+      const double enough = now + 1e-4 * part * slope;
+      if (merit(trial, F_trial) <= enough) {
+        move(trial);
+        return true;
+      }
+      if (part == 1) {  // second-order correction: full steps along curved equations
+        trial -= result_.linearisation.pseudo_inverse_times(F_trial);
+        if (merit(trial, equations_.values(trial)) <= enough) {
+          move(trial);
+          return true;
+        }
+      }
+    }
+    return false;
+  }
+
+  // False where even the violation alone does not go to zero.
+  bool restore() {
+    VectorXd x = result_.x;
+    reduce_violation(equations_, x, result_.iterations);
+    result_.x = x;
+    closest_ = shortest_ = std::numeric_limits<double>::infinity();
+    return largest(equations_.values(x)) < 1e-9 * size();
+  }
+
+  NearestPointEquations& equations_;
+  const VectorXd x_guess_;
+  NearestPoint result_;
+  double sigma_ = 1;
+  double shortest_ = std::numeric_limits<double>::infinity(), closest_ = shortest_;
+  int waited_ = 0, patience_ = 0;
+};
+
+}  // namespace
+
+NearestPoint nearest_point(NearestPointEquations& equations, const VectorXd& x_guess) {
+  return Search(equations, x_guess).run();
+}
+
+}  // namespace mbsopt

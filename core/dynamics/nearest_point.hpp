@@ -1,0 +1,83 @@
+// The point nearest to a guess among those that satisfy some equations, and how it moves when guess or equations do.
+//
+//   min 1/2 |x - x_guess|^2   subject to  F(x) = 0
+//
+// At the solution, with multipliers nu, J = F_x and H = I + sum_i nu_i F_i,xx:
+//
+//   x - x_guess + J'nu = 0,  F = 0
+//   H x' + J'nu' = g,  J x' = b          g = x_guess' - (J'nu)' at fixed x,   b = -F' at fixed x
+//   x' = J+ b + Z (Z'H Z)^-1 Z'(g - H J+ b)          Z: orthonormal basis of the null space of J
+//
+// J may be rank deficient (redundant equations). Nocedal and Wright, "Numerical Optimization" (2006), sections 16.2
+// (null-space method), 18.4 and 18.5 (SQP, merit functions, second-order correction).
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/QR>
+#include <Eigen/SVD>
+
+namespace mbsopt {
+
+// F of one nearest-point problem.
+struct NearestPointEquations {
+  virtual ~NearestPointEquations() = default;
+  virtual Eigen::VectorXd values(const Eigen::VectorXd& x) const = 0;
+  virtual Eigen::MatrixXd jacobian(const Eigen::VectorXd& x) const = 0;
+  virtual Eigen::MatrixXd curvature(const Eigen::VectorXd& x, const Eigen::VectorXd& nu) const = 0;  // sum nu_i F_i,xx
+  // The part of a step, at most 1, that keeps it small against the equations' nonlinearity.
+  virtual double step_fraction(const Eigen::VectorXd& step) const = 0;
+  // What a violation of each equation counts where they cannot all be satisfied.
+  virtual Eigen::VectorXd weights() const = 0;
+  virtual void accept(const Eigen::VectorXd&) {}  // x is the next iterate: continue what is continued (angles)
+};
+
+// J decomposed at one point, and the solution of the linear system above.
+class NearestPointLinearisation {
+ public:
+  static constexpr double kRankThreshold = 1e-8;  // relative, rows of J scaled to unit length
+
+  explicit NearestPointLinearisation(const Eigen::MatrixXd& J);
+
+  Eigen::Index rank() const { return J_transposed_.rank(); }
+  const Eigen::VectorXd& row_scale() const { return scale_; }
+  const Eigen::MatrixXd& null_space() const { return Z_; }                                 // Z
+  Eigen::VectorXd multipliers(const Eigen::VectorXd& g) const;                             // least nu with J'nu = g
+  Eigen::MatrixXd pseudo_inverse_times(const Eigen::Ref<const Eigen::MatrixXd>& b) const;  // J+ b
+  Eigen::MatrixXd pseudo_inverse_transposed_times(const Eigen::Ref<const Eigen::MatrixXd>& x) const;
+
+  // Must precede solve and solve_transposed.
+  void set_hessian(const Eigen::MatrixXd& H);
+  // Eigenvalues of Z'HZ, ascending: all positive at a strict minimum.
+  const Eigen::VectorXd& reduced_eigenvalues() const { return lambda_; }
+
+  Eigen::MatrixXd solve(const Eigen::Ref<const Eigen::MatrixXd>& b, const Eigen::Ref<const Eigen::MatrixXd>& g) const;
+  // The adjoint: b_bar and g_bar from x_bar, so that x_bar'x' = b_bar'b + g_bar'g.
+  void solve_transposed(const Eigen::Ref<const Eigen::MatrixXd>& x_bar, Eigen::MatrixXd& b_bar,
+                        Eigen::MatrixXd& g_bar) const;
+  // As solve, with eigenvalues of Z'HZ made positive: a descent direction of the merit function anywhere.
+  Eigen::VectorXd descent(const Eigen::VectorXd& b, const Eigen::VectorXd& g) const;
+
+ private:
+  Eigen::VectorXd scale_;                                                 // of the rows of J
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> J_transposed_;  // of (scale J)'
+  Eigen::MatrixXd Z_, H_, V_;                                             // Z'HZ = V diag(lambda) V'
+  Eigen::VectorXd lambda_;
+};
+
+enum class NearestPointStatus {
+  found,
+  unsatisfiable,  // x: a point of locally least violation
+  undetermined,   // a stationary point that is not a strict minimum: several points are equally near
+  stalled,        // no convergence within the allowed iterations
+};
+
+struct NearestPoint {
+  NearestPointStatus status = NearestPointStatus::stalled;
+  Eigen::VectorXd x, nu, F;
+  int iterations = 0;
+  NearestPointLinearisation linearisation;  // at x, with its Hessian where status is found
+};
+
+NearestPoint nearest_point(NearestPointEquations& equations, const Eigen::VectorXd& x_guess);
+
+}  // namespace mbsopt
