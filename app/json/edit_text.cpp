@@ -67,6 +67,13 @@ std::string with_value(const std::string& text, std::string_view path, const std
   return replaced(text, node->begin + 1, node->begin + 1, member);
 }
 
+std::string with_override(const std::string& text, const std::string& override_text) {
+  const std::size_t equals = override_text.find('=');
+  const std::string value = equals == std::string::npos ? "" : override_text.substr(equals + 1);
+  const bool is_json = nlohmann::json::accept(value, true);
+  return with_value(text, override_text.substr(0, equals), is_json ? value : json_string(value));
+}
+
 std::string with_parameter_values(const std::string& text, const std::map<std::string, double>& values) {
   std::string result = text;
   for (const auto& [name, value] : values)

@@ -11,6 +11,9 @@ namespace mbsopt {
 // added. Throws InputError where the text is not JSON or the path leads nowhere.
 std::string with_value(const std::string& text, std::string_view path, const std::string& json);
 
+// With one --set, "path=value", applied: the value is JSON where it is JSON, else a string.
+std::string with_override(const std::string& text, const std::string& override_text);
+
 // With the value of each named parameter replaced by a number in SI of 17 significant digits.
 std::string with_parameter_values(const std::string& text, const std::map<std::string, double>& values);
 

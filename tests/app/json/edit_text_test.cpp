@@ -56,3 +56,13 @@ TEST_CASE("a path that leads nowhere is refused", "[json]") {
   CHECK_THROWS_AS(with_value("{}", "", "1"), InputError);
   CHECK_THROWS_AS(with_value("{", "name", "1"), InputError);
 }
+
+TEST_CASE("an override is applied to the text as it is when it is read", "[json]") {
+  const std::string text = R"({"name": "x", "bodies": [{"mass": 1}], "parameters": {"k": 1}})";
+  CHECK(with_override(text, "bodies[0].mass=2.5") ==
+        R"({"name": "x", "bodies": [{"mass": 2.5}], "parameters": {"k": 1}})");
+  CHECK(with_override(text, "bodies[0].mass=2*k") ==
+        R"({"name": "x", "bodies": [{"mass": "2*k"}], "parameters": {"k": 1}})");
+  CHECK(with_override(text, "parameters.k.value=3") ==
+        R"({"name": "x", "bodies": [{"mass": 1}], "parameters": {"k": 3}})");
+}
