@@ -15,6 +15,7 @@
 #include "app/json/input_error.hpp"
 #include "app/provenance.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "optim/csv_table.hpp"
 
 namespace mbsopt {
 namespace {
@@ -67,6 +68,8 @@ int run_guarded(const Command& command, const CommandContext& context) {
     context.err << error.what() << '\n';
   } catch (const SceneError& error) {
     context.err << context.options.problem_file << ": " << error.what() << '\n';
+  } catch (const CsvError& error) {
+    context.err << error.what() << '\n';
   } catch (const std::invalid_argument& error) {
     context.err << context.options.problem_file << ": " << error.what() << '\n';
   } catch (const OutputError& error) {

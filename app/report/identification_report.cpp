@@ -44,7 +44,7 @@ void add_experiments(HtmlPage& page, const Json& result) {
   page.table({"experiment", "channel", "role", "samples", "rms of measured - model"}, rows);
 }
 
-void add_fit(HtmlPage& page, const ChannelFit& fit) {
+void add_fit(HtmlPage& page, const FitPlot& fit) {
   LinePlot plot{.title = fmt::format("{}: {}", fit.experiment, fit.channel),
                 .x_label = "t [s]",
                 .y_label = fmt::format("{} [{}]", fit.channel, fit.unit)};
@@ -61,7 +61,7 @@ void add_fit(HtmlPage& page, const ChannelFit& fit) {
 }  // namespace
 
 std::string identification_report(const Scene& scene, const Json& result, const Trajectory& history,
-                                  const std::vector<ChannelFit>& fits) {
+                                  const std::vector<FitPlot>& fits) {
   HtmlPage page(scene.name + ": identify");
   add_status(page, result);
   page.heading("Parameters");
@@ -69,7 +69,7 @@ std::string identification_report(const Scene& scene, const Json& result, const 
   add_correlation(page, result);
   page.heading("Measured and model");
   add_experiments(page, result);
-  for (const ChannelFit& fit : fits) add_fit(page, fit);
+  for (const FitPlot& fit : fits) add_fit(page, fit);
   add_convergence(page, history);
   add_provenance(page, result);
   return page.text();

@@ -17,11 +17,11 @@ std::string design_report(const Scene& scene, const Json& result, const Trajecto
                           const Trajectory& after);
 
 // What one channel of one experiment measured, and what the fitted model says at the same times.
-struct ChannelFit {
+struct FitPlot {
   std::string experiment, channel, unit;
   std::vector<double> times, measured, model, residual;  // residual: weighted, (measured - model)/sigma
 };
 std::string identification_report(const Scene& scene, const Json& result, const Trajectory& history,
-                                  const std::vector<ChannelFit>& fits);
+                                  const std::vector<FitPlot>& fits);
 
 }  // namespace mbsopt

@@ -1,0 +1,126 @@
+#include <fmt/format.h>
+
+#include "app/command.hpp"
+#include "app/interrupt.hpp"
+#include "app/optimized_problem.hpp"
+#include "app/report/run_report.hpp"
+#include "app/run.hpp"
+#include "app/simulated_motion.hpp"
+#include "app/text_table.hpp"
+#include "optim/design.hpp"
+
+namespace mbsopt {
+namespace {
+
+const char* bound_hit(bool lower, bool upper) { return lower ? "lower" : upper ? "upper" : ""; }
+
+Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+Json or_null(const char* word) { return *word ? Json(word) : Json(); }
+
+void print_design(std::ostream& out, const DesignResult& design) {
+  TextTable parameters({"parameter", "initial", "optimum", "unit", "at bound"});
+  for (const DesignVariable& v : design.variables) {
+    parameters.add({v.name, significant(v.initial, 10), significant(v.value, 10), v.unit.empty() ? "-" : v.unit,
+                    bound_hit(v.at_lower, v.at_upper)});
+  }
+  TextTable objectives({"objective", "before", "after", "at least", "at most"});
+  const auto bound = [](const std::optional<double>& value) { return value ? significant(*value) : std::string(); };
+  objectives.add(
+      {design.objective, significant(design.objective_initial), significant(design.objective_final), "", ""});
+  for (const DesignConstraint& c : design.constraints) {
+    objectives.add({c.objective, significant(c.initial), significant(c.value), bound(c.lower), bound(c.upper)});
+  }
+  out << '\n' << parameters.text() << '\n' << objectives.text();
+  out << fmt::format("\n{} {}: {} iterations, {} evaluations, {:.3g} s\n", design.optimizer, to_string(design.status),
+                     design.iterations, design.evaluations, design.wall_seconds);
+}
+
+void add_to_result(Json& result, const DesignResult& design) {
+  result["simulation"] = to_json(design.final_evaluation.statistics);
+  result["objectives"][design.objective] = {{"value", design.objective_final}, {"initial", design.objective_initial}};
+  for (const DesignConstraint& c : design.constraints) {
+    result["objectives"][c.objective] = {
+        {"value", c.value},          {"initial", c.initial},
+        {"lower", or_null(c.lower)}, {"upper", or_null(c.upper)},
+        {"violation", c.violation},  {"at_bound", or_null(bound_hit(c.at_lower, c.at_upper))}};
+  }
+  for (const DesignVariable& v : design.variables) {
+    result["parameters"][v.name] = {{"initial", v.initial},
+                                    {"value", v.value},
+                                    {"unit", v.unit},
+                                    {"lower", or_null(v.lower)},
+                                    {"upper", or_null(v.upper)},
+                                    {"at_bound", or_null(bound_hit(v.at_lower, v.at_upper))}};
+  }
+  result["optimizer"] = {{"type", design.optimizer},
+                         {"status", to_string(design.status)},
+                         {"message", design.message},
+                         {"gradients", design.gradient_choice},
+                         {"iterations", design.iterations},
+                         {"evaluations", design.evaluations},
+                         {"failed_evaluations", design.failed_evaluations},
+                         {"simulations", design.simulations},
+                         {"wall_seconds", design.wall_seconds},
+                         {"objective_initial", design.objective_initial},
+                         {"objective_final", design.objective_final}};
+}
+
+Trajectory history_of(const DesignResult& design) {
+  Trajectory history{{"iteration", "objective", "infeasibility", "optimality"}, {}};
+  for (const DesignVariable& v : design.variables) history.columns.push_back(v.name);
+  for (const DesignRow& row : design.history) {
+    history.rows.push_back({static_cast<double>(row.iteration), row.objective, row.violation, row.optimality});
+    history.rows.back().insert(history.rows.back().end(), row.parameters.begin(), row.parameters.end());
+  }
+  return history;
+}
+
+DesignResult minimised(Run& run) {
+  DesignOptions options;
+  options.simulation_progress = [](double) { return !interrupted(); };
+  options.progress = [&](const DesignRow& row) {
+    run.progress.iteration(fmt::format("iteration {:3d}   objective {:.6e}   infeasibility {:.1e}   optimality {:.1e}",
+                                       row.iteration, row.objective, row.violation, row.optimality));
+    return !interrupted();
+  };
+  DesignResult design = run_design(run.problem, options);
+  run.progress.finish();
+  return design;
+}
+
+std::string optimized_text(const Run& run, const DesignResult& design) {
+  std::vector<NewValue> values;
+  for (const DesignVariable& v : design.variables) values.push_back({"", v.name, v.value});
+  return optimized_problem_text(run.context.options.problem_file, run.context.options.sets, run.problem, values,
+                                run.folder.path());
+}
+
+}  // namespace
+
+int design_command(const CommandContext& context) {
+  Run run(context);
+  const Scene& scene = run.problem.scene;
+  if (!run.problem.design) throw std::invalid_argument("design: missing; it says what to minimise and what may change");
+  run.start();
+  const SimulatedMotion before = simulated_motion(run, parameter_values(scene));
+  if (interrupted()) return run.stopped();
+  if (!before.simulation.ok()) return run.failed(before.simulation.message, before.simulation.last_good_time);
+  run.result["model"] = to_json(before.model);
+  print_model(context.out, scene.name, before.model);
+
+  const DesignResult design = minimised(run);
+  add_to_result(run.result, design);
+  print_design(context.out, design);
+  const bool stopped = interrupted();
+  const SimulatedMotion after = simulated_motion(run, design.rho);
+  const Trajectory history = history_of(design);
+  run.write("optimized.json", optimized_text(run, design));
+  run.write("history.csv", to_csv(history));
+  run.write("trajectory.csv", to_csv(after.trajectory));
+  run.write("report.html", design_report(scene, run.result, history, before.trajectory, after.trajectory));
+  if (stopped) return run.stopped();
+  if (!design.ok()) return run.failed(design.message, scene.simulation.end_time);
+  return run.done();
+}
+
+}  // namespace mbsopt

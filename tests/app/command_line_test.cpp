@@ -1,0 +1,72 @@
+#include <catch2/catch.hpp>
+
+#include "app/exit_code.hpp"
+#include "tests/app/run_command.hpp"
+
+using namespace mbsopt;
+using Catch::Contains;
+namespace fs = std::filesystem;
+
+TEST_CASE("help and version are results, an unknown command is bad input", "[command]") {
+  CHECK(run_command({"--help"}).exit_code == kDone);
+  CHECK_THAT(run_command({"--help"}).out, Contains("simulate") && Contains("identify"));
+  CHECK_THAT(run_command({"--version"}).out, Contains("mbsopt 0."));
+  CHECK(run_command({}).exit_code == kBadInput);
+  CHECK(run_command({"simulat", "x.json"}).exit_code == kBadInput);
+  CHECK(run_command({"simulate"}).exit_code == kBadInput);
+  CHECK(run_command({"simulate", "x.json", "--thread", "2"}).exit_code == kBadInput);
+  CHECK(run_command({"simulate", "x.json", "--threads", "0"}).exit_code == kBadInput);
+}
+
+TEST_CASE("a command of the contract that this version lacks says so and lists what there is", "[command]") {
+  for (const char* command : {"kinematics", "tradeoff", "resume"}) {
+    const CommandOutcome outcome = run_command({command, "x.json"});
+    CHECK(outcome.exit_code == kBadInput);
+    CHECK_THAT(outcome.err, Contains(command) && Contains("not available") && Contains("simulate"));
+  }
+}
+
+TEST_CASE("bad input ends with exit 2 and its place, before anything is written", "[command]") {
+  const TemporaryFolder folder;
+  std::string text = kPendulum;
+  text.replace(text.find("\"mass\": 2"), 9, "\"mass\": -2");
+  const std::string file = folder.write("rod.json", text);
+  for (const char* command : {"validate", "simulate", "gradient", "check", "design"}) {
+    const CommandOutcome outcome = run_command({command, file, "--out", folder.file("out")});
+    CHECK(outcome.exit_code == kBadInput);
+    CHECK_THAT(outcome.err, Contains("rod.json:6:") && Contains("bodies[0].mass"));
+    CHECK_FALSE(fs::exists(folder.path / "out"));
+  }
+  CHECK(run_command({"validate", folder.file("absent.json")}).exit_code == kBadInput);
+}
+
+TEST_CASE("--set changes fields, creates missing objects, and is checked", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kPendulum), out = folder.file("out");
+  CHECK(run_command({"simulate", file, "--out", out, "--set", "simulation.end_time=0.5", "--set",
+                     "simulation.integrator.type=rk4", "--set", "simulation.integrator.step=0.01"})
+            .exit_code == kDone);
+  CHECK(json_of(folder.path / "out/result.json").at("simulation").at("steps") == 50);
+  const CommandOutcome wrong = run_command({"simulate", file, "--out", out, "--set", "bodies[0].mass=-1"});
+  CHECK(wrong.exit_code == kBadInput);
+  CHECK_THAT(wrong.err, Contains("--set") && Contains("bodies[0].mass"));
+}
+
+TEST_CASE("two problems of one name do not share a folder", "[command]") {
+  const TemporaryFolder folder;
+  const std::string out = folder.file("out");
+  REQUIRE(run_command({"validate", folder.write("a.json", kPendulum), "--out", out}).exit_code == kDone);
+  const std::string before = content_of(folder.path / "out/result.json");
+  const CommandOutcome second = run_command({"validate", folder.write("b.json", kPendulum), "--out", out});
+  CHECK(second.exit_code == kBadInput);
+  CHECK_THAT(second.err, Contains("another problem"));
+  CHECK(content_of(folder.path / "out/result.json") == before);
+  CHECK(run_command({"simulate", folder.file("a.json"), "--out", out}).exit_code == kDone);
+}
+
+TEST_CASE("schema prints JSON that describes a problem", "[command]") {
+  const CommandOutcome outcome = run_command({"schema"});
+  CHECK(outcome.exit_code == kDone);
+  const auto schema = nlohmann::json::parse(outcome.out);
+  CHECK(schema.at("properties").contains("bodies"));
+}
