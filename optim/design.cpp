@@ -1,0 +1,213 @@
+#include "optim/design.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "optim/ipopt_solver.hpp"
+#include "optim/variable_scaling.hpp"
+
+namespace mbsopt {
+namespace {
+
+constexpr double kTouches = 1e-6;  // relative to the bound's size: the barrier keeps solutions this near to a bound
+
+bool touches(double value, const std::optional<double>& bound, double size) {
+  return bound && std::abs(value - *bound) <= kTouches * size;
+}
+
+std::vector<Parameter> chosen(const Scene& scene, const std::vector<int>& indices) {
+  std::vector<Parameter> parameters;
+  for (const int k : indices) parameters.push_back(scene.parameters[static_cast<std::size_t>(k)]);
+  return parameters;
+}
+
+const DesignSpec& checked(const Problem& problem) {
+  if (!problem.design) throw std::invalid_argument("design: is missing; it says what to minimise and what to vary");
+  const DesignSpec& spec = *problem.design;
+  if (spec.variables.empty()) throw std::invalid_argument("design.variables: is empty; name at least one parameter");
+  if (spec.optimizer != "ipopt")
+    throw std::invalid_argument(fmt::format("design.optimizer.type: is '{}'; available: ipopt", spec.optimizer));
+  for (std::size_t i = 0; i < spec.subject_to.size(); ++i) {
+    const ObjectiveBound& bound = spec.subject_to[i];
+    if (!bound.lower && !bound.upper)
+      throw std::invalid_argument(fmt::format("design.subject_to[{}]: gives neither lower nor upper", i));
+    if (bound.lower && bound.upper && *bound.lower > *bound.upper)
+      throw std::invalid_argument(
+          fmt::format("design.subject_to[{}]: lower is {}, above upper {}", i, *bound.lower, *bound.upper));
+  }
+  return spec;
+}
+
+std::vector<std::string> objective_names(const DesignSpec& spec) {
+  std::vector<std::string> names{spec.minimize};
+  for (const ObjectiveBound& bound : spec.subject_to) names.push_back(bound.objective);
+  return names;
+}
+
+// The design as a nonlinear program in scaled variables; constraints relative to the size of their bounds.
+class DesignProgram : public NonlinearProgram {
+ public:
+  DesignProgram(const DesignSpec& spec, Evaluator& evaluator, const VariableScaling& scaling)
+      : NonlinearProgram(scaling.size(), static_cast<Eigen::Index>(spec.subject_to.size())),
+        evaluator_(evaluator),
+        scaling_(scaling),
+        rho_(evaluator.start()),
+        size_(constraints()) {
+    x_lower = scaling.x_lower(), x_upper = scaling.x_upper();
+    for (Eigen::Index i = 0; i < constraints(); ++i) {
+      const ObjectiveBound& bound = spec.subject_to[static_cast<std::size_t>(i)];
+      size_(i) = std::max(std::abs(bound.lower.value_or(0)), std::abs(bound.upper.value_or(0)));
+      if (size_(i) == 0) size_(i) = 1;
+      if (bound.lower) c_lower(i) = *bound.lower / size_(i);
+      if (bound.upper) c_upper(i) = *bound.upper / size_(i);
+    }
+  }
+
+  // Convergence is judged on an objective of size about 1 whose gradient at the start is about 1.
+  void scale_by(const NlpPoint& start) {
+    f_scale = inverse(std::max(std::abs(start.f), start.f_x.cwiseAbs().maxCoeff()));
+    for (Eigen::Index i = 0; i < constraints(); ++i)
+      c_scale(i) = std::min(1.0, inverse(start.c_x.row(i).cwiseAbs().maxCoeff()));
+  }
+
+  Eigen::VectorXd rho_at(const Eigen::VectorXd& x) const {
+    Eigen::VectorXd rho = rho_;
+    const Eigen::VectorXd values = scaling_.to_rho(x);
+    for (Eigen::Index k = 0; k < values.size(); ++k)
+      rho(evaluator_.variables()[static_cast<std::size_t>(k)]) = values(k);
+    return rho;
+  }
+
+  void evaluate(const Eigen::VectorXd& x, NlpPoint& point) override {
+    const Evaluation& e = evaluator_.gradients(rho_at(x));
+    if (!e.ok) {
+      point.ok = false, point.message = e.message;
+      return;
+    }
+    const Eigen::VectorXd rho_x = scaling_.rho_x(x);
+    point.f = e.psi(0);
+    point.f_x = e.psi_rho.row(0).transpose().cwiseProduct(rho_x);
+    for (Eigen::Index i = 0; i < constraints(); ++i) {
+      point.c(i) = e.psi(1 + i) / size_(i);
+      point.c_x.row(i) = e.psi_rho.row(1 + i).cwiseProduct(rho_x.transpose()) / size_(i);
+    }
+  }
+
+  double size(Eigen::Index constraint) const { return size_(constraint); }
+
+ private:
+  static double inverse(double x) { return x > 0 && std::isfinite(x) ? 1 / x : 1; }
+
+  Evaluator& evaluator_;
+  const VariableScaling& scaling_;
+  const Eigen::VectorXd rho_;  // the scene's values, which parameters that are not designed keep
+  Eigen::VectorXd size_;       // of each constraint's bounds
+};
+
+void describe_start(const Problem& problem, const Evaluator& evaluator, const Evaluation& start, DesignResult& result) {
+  const DesignSpec& spec = *problem.design;
+  result.objective = spec.minimize;
+  for (const Parameter& p : chosen(problem.scene, evaluator.variables()))
+    result.variables.push_back({p.name, p.unit, p.value, p.value, p.lower, p.upper, false, false});
+  if (start.ok) result.objective_initial = result.objective_final = start.psi(0);
+  for (std::size_t i = 0; i < spec.subject_to.size(); ++i) {
+    const ObjectiveBound& bound = spec.subject_to[i];
+    const double value = start.ok ? start.psi(static_cast<Eigen::Index>(i) + 1) : 0;
+    result.constraints.push_back({bound.objective, bound.lower, bound.upper, value, value, 0, false, false});
+  }
+}
+
+void describe_end(const Evaluator& evaluator, const DesignProgram& program, const Evaluation& end,
+                  DesignResult& result) {
+  for (std::size_t k = 0; k < result.variables.size(); ++k) {
+    DesignVariable& v = result.variables[k];
+    v.value = end.rho(evaluator.variables()[k]);
+    const double size = v.lower && v.upper ? *v.upper - *v.lower : std::max(std::abs(v.initial), std::abs(v.value));
+    v.at_lower = touches(v.value, v.lower, size), v.at_upper = touches(v.value, v.upper, size);
+  }
+  result.objective_final = end.psi(0);
+  for (std::size_t i = 0; i < result.constraints.size(); ++i) {
+    DesignConstraint& c = result.constraints[i];
+    const Eigen::Index row = static_cast<Eigen::Index>(i);
+    c.value = end.psi(row + 1);
+    c.violation = std::max({0.0, c.lower ? *c.lower - c.value : 0.0, c.upper ? c.value - *c.upper : 0.0});
+    c.at_lower = touches(c.value, c.lower, program.size(row)),
+    c.at_upper = touches(c.value, c.upper, program.size(row));
+  }
+}
+
+}  // namespace
+
+std::string_view to_string(NlpStatus status) {
+  switch (status) {
+    case NlpStatus::converged:
+      return "converged";
+    case NlpStatus::no_progress:
+      return "no_progress";
+    case NlpStatus::iteration_limit:
+      return "iteration_limit";
+    case NlpStatus::infeasible:
+      return "infeasible";
+    case NlpStatus::stopped:
+      return "stopped";
+    case NlpStatus::failed:
+      break;
+  }
+  return "failed";
+}
+
+DesignResult run_design(const Problem& problem, const DesignOptions& options) {
+  const auto clock_start = std::chrono::steady_clock::now();
+  const DesignSpec& spec = checked(problem);
+  EvaluatorOptions evaluator_options;
+  evaluator_options.method = options.method;
+  evaluator_options.user_forces = options.user_forces;
+  evaluator_options.progress = options.simulation_progress;
+  Evaluator evaluator(problem.scene, objectives_of(problem, objective_names(spec)), spec.variables, evaluator_options);
+  const VariableScaling scaling(chosen(problem.scene, evaluator.variables()));
+  DesignProgram program(spec, evaluator, scaling);
+
+  DesignResult result;
+  result.optimizer = spec.optimizer;
+  Eigen::VectorXd designed(scaling.size());
+  for (Eigen::Index k = 0; k < designed.size(); ++k)
+    designed(k) = evaluator.start()(evaluator.variables()[static_cast<std::size_t>(k)]);
+  const Eigen::VectorXd x_start = scaling.to_x(designed);
+  const Evaluation start = evaluator.gradients(program.rho_at(x_start));
+  result.gradient_choice = start.choice.empty() ? std::string(to_string(start.method)) : start.choice;
+  describe_start(problem, evaluator, start, result);
+  if (start.ok) {
+    NlpPoint point;
+    point.c.setZero(program.constraints());
+    point.c_x.setZero(program.constraints(), program.variables());
+    program.evaluate(x_start, point);  // from the evaluator's cache
+    program.scale_by(point);
+  }
+
+  IpoptOptions solver;
+  solver.tolerance = spec.tolerance;
+  solver.max_iterations = spec.max_iterations;
+  solver.progress = [&](const NlpProgress& p) {
+    result.history.push_back({p.iteration, p.f, p.violation, p.optimality, scaling.to_rho(p.x)});
+    return !options.progress || options.progress(result.history.back());
+  };
+  const NlpResult solution = solve_with_ipopt(program, x_start, solver);
+  result.status = solution.status, result.message = solution.message;
+  result.iterations = solution.iterations;
+  result.evaluations = solution.evaluations, result.failed_evaluations = solution.failed_evaluations;
+  result.rho = program.rho_at(solution.x);
+  if (start.ok) {
+    result.final_evaluation = evaluator.gradients(result.rho);
+    if (result.final_evaluation.ok) describe_end(evaluator, program, result.final_evaluation, result);
+  }
+  result.simulations = evaluator.simulations();
+  result.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock_start).count();
+  return result;
+}
+
+}  // namespace mbsopt
