@@ -140,9 +140,7 @@ void Checker::check_dimension(const std::string& where, const Expression& value,
     if (expected && !fits(found, *expected))
       issue(where,
             "'" + value.text() + "' has the dimension " + to_string(*found) + ", expected is " + to_string(*expected) +
-                (value.names().empty() ? ""
-                                       : " (a factor without a unit counts as a pure number; write its unit, as in "
-                                         "7850 [kg/m^3])"));
+                (value.names().empty() ? "" : " (a factor without a unit is a pure number; with one: 7850 [kg/m^3])"));
   } catch (const DimensionError& error) {
     issues_.push_back({where, error.what(), false, error.offset});
   }
