@@ -8,7 +8,7 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kRelativeAlpha = 1e6;
+constexpr double kRelativeAlpha = 1e8;
 constexpr SaddleSolver::Settings kSolve{2, 0};
 constexpr int kMostIterations = 30;
 
@@ -121,9 +121,7 @@ bool Projector::project(const Eigen::VectorXd& y_hat, Eigen::VectorXd& y, Projec
       evaluate_phi(data_, frames_, phi_);
       const double now = phi_.cwiseAbs().maxCoeff();
       if (!std::isfinite(now)) return false;
-      if (now < 1e-15 || (k > 1 && now < 1e-12 && now > 0.3 * before)) break;  // rounding reached
-      if (k > 4 && now > 0.9 * before)
-        break;  // a position that cannot be met, e.g. a singular one: the least violation
+      if (now < 1e-15 || (k > 1 && now > 0.95 * before)) break;  // rounding reached, or a singular position
       before = now;
       // [M J'; J 0] (d delta, d nu) = -(M delta + J'nu, Phi)
       for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, s.delta[at(i - 1)]);
@@ -153,7 +151,7 @@ bool Projector::project(const Eigen::VectorXd& y_hat, Eigen::VectorXd& y, Projec
     evaluate_phi_dot(data_, frames_, phi_);
     const double now = phi_.cwiseAbs().maxCoeff();
     if (!std::isfinite(now)) return false;
-    if (now < 1e-15 || (k > 1 && now > 0.3 * before)) break;
+    if (now < 1e-15 || (k > 1 && now > 0.95 * before)) break;
     before = now;
     for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, s.u[at(i - 1)]);
     rows_.subtract_transposed_times(s.kappa, b_);

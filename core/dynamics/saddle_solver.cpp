@@ -11,6 +11,8 @@ SaddleSolver::SaddleSolver(const MechanismData& data, double alpha, bool alpha_i
   const std::size_t n = static_cast<std::size_t>(data.n);
   residual_.setZero(data.m);
   residual_lanes_.setZero(data.m, kLanes);
+  step_.setZero(data.m);
+  step_lanes_.setZero(data.m, kLanes);
   correction_.resize(n);
   correction_lanes_.resize(n);
 }
@@ -31,30 +33,27 @@ bool SaddleSolver::factor(const std::vector<Frame>& frames) {
 
 template <class X, class Y>
 void SaddleSolver::solve_any(const std::vector<X>& b, const Y& g, const Settings& settings, std::vector<X>& x, Y& nu,
-                             Y& residual, std::vector<X>& correction) {
+                             Y& residual, Y& step, std::vector<X>& correction) {
   const std::size_t n = static_cast<std::size_t>(data_->n);
-  for (Eigen::Index r = 0; r < g.rows(); ++r) residual.row(r) = -alpha_(r) * g.row(r);
-  for (std::size_t i = 0; i < n; ++i) x[i] = b[i];
-  rows_.subtract_transposed_times(residual, x);
-  S_.solve(std::span<X>(x));
-
+  for (X& xi : x) xi.setZero();
   nu.setZero();
+  residual = g;
+  const double size = g.cwiseAbs().maxCoeff();
   for (int k = 0;; ++k) {
-    residual = -g;
-    rows_.add_times(x, residual);
-    bool converged = k >= settings.refinements;
-    if (!converged && settings.tolerance > 0) {
-      // |J x - g| against |g|: J x is as large as g where the system is solved at all
-      converged = residual.cwiseAbs().maxCoeff() <= settings.tolerance * g.cwiseAbs().maxCoeff();
+    // correction = b - M x - J'nu + J' alpha residual
+    for (Eigen::Index r = 0; r < g.rows(); ++r) step.row(r) = nu.row(r) - alpha_(r) * residual.row(r);
+    for (std::size_t i = 0; i < n; ++i) {
+      correction[i] = b[i];
+      if (k > 0) correction[i] -= mass_times(static_cast<int>(i) + 1, x[i]);
     }
-    for (Eigen::Index r = 0; r < g.rows(); ++r) residual.row(r) *= alpha_(r);
-    nu += residual;
-    if (converged) return;
-    residual += nu;
-    for (std::size_t i = 0; i < n; ++i) correction[i] = b[i] - mass_times(static_cast<int>(i) + 1, x[i]);
-    rows_.subtract_transposed_times(residual, correction);
+    rows_.subtract_transposed_times(step, correction);
     S_.solve(std::span<X>(correction));
     for (std::size_t i = 0; i < n; ++i) x[i] += correction[i];
+    step.setZero();
+    rows_.add_times(correction, step);
+    residual -= step;
+    for (Eigen::Index r = 0; r < g.rows(); ++r) nu.row(r) -= alpha_(r) * residual.row(r);
+    if (k >= settings.refinements || (k > 0 && residual.cwiseAbs().maxCoeff() <= settings.tolerance * size)) return;
   }
 }
 
@@ -65,7 +64,7 @@ void SaddleSolver::solve(const std::vector<Vec<6>>& b, const Eigen::VectorXd& g,
     S_.solve(std::span<Vec<6>>(x));
     return;
   }
-  solve_any(b, g, settings, x, nu, residual_, correction_);
+  solve_any(b, g, settings, x, nu, residual_, step_, correction_);
 }
 
 void SaddleSolver::solve(const std::vector<Lanes<6>>& b, const LaneRows& g, const Settings& settings,
@@ -75,7 +74,7 @@ void SaddleSolver::solve(const std::vector<Lanes<6>>& b, const LaneRows& g, cons
     S_.solve(std::span<Lanes<6>>(x));
     return;
   }
-  solve_any(b, g, settings, x, nu, residual_lanes_, correction_lanes_);
+  solve_any(b, g, settings, x, nu, residual_lanes_, step_lanes_, correction_lanes_);
 }
 
 }  // namespace mbsopt

@@ -3,15 +3,15 @@
 //   [ M  J' ] [ x  ]   [ b ]
 //   [ J  -c ] [ nu ] = [ g ]      c = 0: constrained (augmented Lagrangian);  c = 1/alpha: penalty
 //
-// with the one factor S = M + J' diag(alpha) J.  Starting from nu = 0,
+// with the one factor S = M + J' diag(alpha) J. From x = 0, nu = 0, 1 + refinements times
 //
-//   x = S^-1 (b + J' alpha g),   then while refinements last:   nu += alpha (J x - g),   S dx = b - M x - J'(nu + alpha
-//   (J x - g))
+//   S dx = (b - M x - J'nu) + J' alpha (g - J x),    dnu = alpha (J dx - (g - J x))
 //
-// which is the augmented-Lagrangian iteration written as corrections, so that rounding errors of S (which is badly
-// conditioned for large alpha) are refined away, too; last, nu += alpha (J x - g) makes M x + J'nu = b. One solve
-// without refinement is the penalty system. The map (b, g) -> (x, nu) after a fixed number of refinements is symmetric,
-// so tangent and adjoint solves are exact transposes whatever their convergence.
+// The first pass is the penalty system; further ones are the augmented-Lagrangian iteration, written as corrections of
+// both x and nu by their residuals: iterative refinement, which also removes the rounding errors of S (its condition
+// number grows with alpha). Updating nu by alpha times the whole J x - g instead would leave it with an error of alpha
+// times the rounding unit. The map (b, g) -> (x, nu) after a fixed number of passes is symmetric, so tangent and
+// adjoint solves are exact transposes whatever their convergence.
 #pragma once
 
 #include <vector>
@@ -30,7 +30,7 @@ class SaddleSolver {
   const ConstraintRows& rows() const { return rows_; }
   const Eigen::VectorXd& alpha() const { return alpha_; }
 
-  // Stops early once |J x - g| <= tolerance times the size of its terms (tolerance 0: never).
+  // Stops early, after one refinement at least, once |J x - g| <= tolerance |g|.
   struct Settings {
     int refinements = 0;
     double tolerance = 0;
@@ -55,14 +55,14 @@ class SaddleSolver {
  private:
   template <class X, class Y>
   void solve_any(const std::vector<X>& b, const Y& g, const Settings& settings, std::vector<X>& x, Y& nu, Y& residual,
-                 std::vector<X>& correction);
+                 Y& step, std::vector<X>& correction);
 
   const MechanismData* data_;
   ConstraintRows rows_;
   BlockCholesky S_;
   Eigen::VectorXd alpha_;
-  Eigen::VectorXd residual_;
-  LaneRows residual_lanes_;
+  Eigen::VectorXd residual_, step_;
+  LaneRows residual_lanes_, step_lanes_;
   std::vector<Vec<6>> correction_;
   std::vector<Lanes<6>> correction_lanes_;
   long factorisations_ = 0;

@@ -12,10 +12,10 @@ enum class Projection { none, velocity, position_velocity };
 
 struct FormulationSettings {
   FormulationType type = FormulationType::augmented_lagrangian;
-  double alpha = 1e6;        // augmented_lagrangian: relative to the inertia each constraint sees; penalty: absolute
+  double alpha = 1e8;        // augmented_lagrangian: relative to the inertia each constraint sees; penalty: absolute
   double xi = 1;             // damping ratio of the stabilisation
   double omega = 0;          // its frequency [1/s]; 0 with projection
-  int iterations = 6;        // at most, augmented Lagrangian
+  int iterations = 2;        // augmented Lagrangian: refinements after the first solve, at most
   double tolerance = 1e-14;  // relative, on the constraints' accelerations
   Projection projection = Projection::position_velocity;
 
