@@ -7,6 +7,8 @@
 //   sqrt at 0                   infinite
 #pragma once
 
+#include <cassert>
+#include <cmath>
 #include <string_view>
 
 namespace mbsopt {
@@ -42,7 +44,7 @@ enum class Operation : unsigned char {
 // 0 for number and name, else 1 or 2.
 int operands(Operation operation);
 
-double apply(Operation operation, double a, double b);
+inline double apply(Operation operation, double a, double b);
 
 // Partial derivatives of f(a, b), with value = apply(operation, a, b).
 struct FirstPartials {
@@ -51,8 +53,8 @@ struct FirstPartials {
 struct SecondPartials {
   double aa = 0, ab = 0, bb = 0;
 };
-FirstPartials first_partials(Operation operation, double a, double b, double value);
-SecondPartials second_partials(Operation operation, double a, double b, double value);
+inline FirstPartials first_partials(Operation operation, double a, double b, double value);
+inline SecondPartials second_partials(Operation operation, double a, double b, double value);
 
 // Functions as users call them.
 //   smooth_abs(x, eps)    = sqrt(x^2 + eps^2)                          eps: 1e-6 unless given
@@ -87,5 +89,203 @@ inline constexpr FunctionEntry kFunctions[] = {
     {"smooth_abs", Operation::smooth_abs, 1, 2},
     {"smooth_max", Operation::smooth_abs, 2, 3},
 };
+
+// Inline: a Program spends its time here.
+
+inline double apply(Operation operation, double a, double b) {
+  switch (operation) {
+    case Operation::number:
+    case Operation::name:
+      break;
+    case Operation::negate:
+      return -a;
+    case Operation::add:
+      return a + b;
+    case Operation::subtract:
+      return a - b;
+    case Operation::multiply:
+      return a * b;
+    case Operation::divide:
+      return a / b;
+    case Operation::power:
+      return std::pow(a, b);
+    case Operation::sin:
+      return std::sin(a);
+    case Operation::cos:
+      return std::cos(a);
+    case Operation::tan:
+      return std::tan(a);
+    case Operation::asin:
+      return std::asin(a);
+    case Operation::acos:
+      return std::acos(a);
+    case Operation::atan:
+      return std::atan(a);
+    case Operation::atan2:
+      return std::atan2(a, b);
+    case Operation::sinh:
+      return std::sinh(a);
+    case Operation::cosh:
+      return std::cosh(a);
+    case Operation::tanh:
+      return std::tanh(a);
+    case Operation::exp:
+      return std::exp(a);
+    case Operation::log:
+      return std::log(a);
+    case Operation::sqrt:
+      return std::sqrt(a);
+    case Operation::abs:
+      return std::abs(a);
+    case Operation::min:
+      return (a <= b || std::isnan(a)) ? a : b;  // NaN of either operand passes through
+    case Operation::max:
+      return (a >= b || std::isnan(a)) ? a : b;
+    case Operation::smooth_abs:
+      return std::hypot(a, b);
+  }
+  assert(false && "a leaf has no operands");
+  return 0;
+}
+
+namespace calculus {
+
+// a^b. Zero factors win over infinite ones: b a^(b-1) is 0 for b = 0 whatever a, and a^b log a is 0 at a = 0 < b.
+inline double power_a(double a, double b) { return b == 0 ? 0 : b * std::pow(a, b - 1); }
+inline double power_aa(double a, double b) { return b == 0 || b == 1 ? 0 : b * (b - 1) * std::pow(a, b - 2); }
+inline double power_b(double a, double b, double value) { return a == 0 && b > 0 ? 0 : value * std::log(a); }
+inline double power_bb(double a, double b, double value) {
+  return a == 0 && b > 0 ? 0 : value * std::log(a) * std::log(a);
+}
+inline double power_ab(double a, double b) {  // a^(b-1) (1 + b log a)
+  return a == 0 && b > 1 ? 0 : std::pow(a, b - 1) * (1 + b * std::log(a));
+}
+inline double cosine_of_asin(double a) { return std::sqrt((1 - a) * (1 + a)); }
+
+}  // namespace calculus
+
+inline FirstPartials first_partials(Operation operation, double a, double b, double value) {
+  switch (operation) {
+    case Operation::number:
+    case Operation::name:
+      break;
+    case Operation::negate:
+      return {-1, 0};
+    case Operation::add:
+      return {1, 1};
+    case Operation::subtract:
+      return {1, -1};
+    case Operation::multiply:
+      return {b, a};
+    case Operation::divide:
+      return {1 / b, -value / b};
+    case Operation::power:
+      return {calculus::power_a(a, b), calculus::power_b(a, b, value)};
+    case Operation::sin:
+      return {std::cos(a), 0};
+    case Operation::cos:
+      return {-std::sin(a), 0};
+    case Operation::tan:
+      return {1 + value * value, 0};
+    case Operation::asin:
+      return {1 / calculus::cosine_of_asin(a), 0};
+    case Operation::acos:
+      return {-1 / calculus::cosine_of_asin(a), 0};
+    case Operation::atan:
+      return {1 / (1 + a * a), 0};
+    case Operation::atan2: {
+      const double r = std::hypot(a, b);
+      return {b / r / r, -a / r / r};
+    }
+    case Operation::sinh:
+      return {std::cosh(a), 0};
+    case Operation::cosh:
+      return {std::sinh(a), 0};
+    case Operation::tanh: {
+      const double c = std::cosh(a);
+      return {1 / c / c, 0};
+    }
+    case Operation::exp:
+      return {value, 0};
+    case Operation::log:
+      return {1 / a, 0};
+    case Operation::sqrt:
+      return {0.5 / value, 0};
+    case Operation::abs:
+      return {a > 0 ? 1.0 : (a < 0 ? -1.0 : 0.0), 0};
+    case Operation::min:
+      return a <= b ? FirstPartials{1, 0} : FirstPartials{0, 1};
+    case Operation::max:
+      return a >= b ? FirstPartials{1, 0} : FirstPartials{0, 1};
+    case Operation::smooth_abs:
+      return value == 0 ? FirstPartials{0, 0} : FirstPartials{a / value, b / value};
+  }
+  assert(false && "a leaf has no operands");
+  return {};
+}
+
+inline SecondPartials second_partials(Operation operation, double a, double b, double value) {
+  switch (operation) {
+    case Operation::number:
+    case Operation::name:
+      break;
+    case Operation::negate:
+    case Operation::add:
+    case Operation::subtract:
+    case Operation::abs:
+    case Operation::min:
+    case Operation::max:
+      return {};
+    case Operation::multiply:
+      return {0, 1, 0};
+    case Operation::divide:
+      return {0, -1 / b / b, 2 * value / b / b};
+    case Operation::power:
+      return {calculus::power_aa(a, b), calculus::power_ab(a, b), calculus::power_bb(a, b, value)};
+    case Operation::sin:
+      return {-value, 0, 0};
+    case Operation::cos:
+      return {-value, 0, 0};
+    case Operation::tan:
+      return {2 * value * (1 + value * value), 0, 0};
+    case Operation::asin: {
+      const double c = calculus::cosine_of_asin(a);
+      return {a / c / c / c, 0, 0};
+    }
+    case Operation::acos: {
+      const double c = calculus::cosine_of_asin(a);
+      return {-a / c / c / c, 0, 0};
+    }
+    case Operation::atan: {
+      const double d = 1 + a * a;
+      return {-2 * a / d / d, 0, 0};
+    }
+    case Operation::atan2: {
+      const double r = std::hypot(a, b), s = a / r, c = b / r;
+      return {-2 * s * c / r / r, (s - c) * (s + c) / r / r, 2 * s * c / r / r};
+    }
+    case Operation::sinh:
+      return {value, 0, 0};
+    case Operation::cosh:
+      return {value, 0, 0};
+    case Operation::tanh: {
+      const double c = std::cosh(a);
+      return {-2 * value / c / c, 0, 0};
+    }
+    case Operation::exp:
+      return {value, 0, 0};
+    case Operation::log:
+      return {-1 / a / a, 0, 0};
+    case Operation::sqrt:
+      return {-0.25 / value / a, 0, 0};
+    case Operation::smooth_abs: {
+      if (value == 0) return {};
+      const double c = a / value, s = b / value;
+      return {s * s / value, -s * c / value, c * c / value};
+    }
+  }
+  assert(false && "a leaf has no operands");
+  return {};
+}
 
 }  // namespace mbsopt
