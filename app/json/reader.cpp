@@ -260,16 +260,23 @@ void Reader::read_named(const Node& node, const std::string& path, Parameter& va
   else
     read_plain(node, path, value.value, std::nullopt);
 
-  // A value written with a unit says what "unit" would say.
-  const Node* const given = node.kind == Node::Kind::object ? node.find("value") : &node;
-  if (!given || given->kind != Node::Kind::string || findings_.concerns(path)) return;
-  const auto found = infer_dimension(Expression::parse(given->string), [](const std::string&) { return std::nullopt; });
+  if (findings_.concerns(path)) return;
+  if (node.kind != Node::Kind::object) return take_unit(node, path, value);
+  for (const char* key : {"value", "lower", "upper"})
+    if (const Node* number = node.find(key)) take_unit(*number, child_path(path, key), value);
+}
+
+// A value written with a unit says what "unit" would say, and must not contradict it.
+void Reader::take_unit(const Node& node, const std::string& path, Parameter& parameter) {
+  if (node.kind != Node::Kind::string) return;
+  const auto found = infer_dimension(Expression::parse(node.string), [](const std::string&) { return std::nullopt; });
   if (!found || found->is_none()) return;
-  const std::optional<Unit> unit = value.unit.empty() ? Unit{1, *found} : parse_unit(value.unit);
+  if (parameter.unit.empty()) parameter.unit = to_string(*found);
+  const std::optional<Unit> unit = parse_unit(parameter.unit);
   if (unit && !compatible(unit->dimension, *found))
-    findings_.add(*given, path + ".value",
-                  "has the dimension " + to_string(*found) + ", its \"unit\" is " + to_string(unit->dimension));
-  if (value.unit.empty()) value.unit = to_string(*found);
+    findings_.add(
+        node, path,
+        "has the dimension " + to_string(*found) + ", that of the parameter is " + to_string(unit->dimension));
 }
 
 void Reader::read_named(const Node& node, const std::string& path, Definition& value) {

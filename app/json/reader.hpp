@@ -120,6 +120,7 @@ class Reader {
   }
   void read_named(const Node& node, const std::string& path, Parameter& value);
   void read_named(const Node& node, const std::string& path, Definition& value);
+  void take_unit(const Node& node, const std::string& path, Parameter& parameter);
 
   bool read_expression(const Node& node, const std::string& path, Expression& value);
   bool read_plain(const Node& node, const std::string& path, double& value, const std::optional<Dimension>& expected);

@@ -1,5 +1,6 @@
 #include "core/scene/issues.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <tuple>
@@ -223,6 +224,11 @@ void check_meaning(Checker& checker, const SimulationSettings& settings) {
 }
 
 void check_meaning(Checker& checker, const Scene& scene) {
+  const auto is_odd = [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < 0x20; };
+  if (scene.name.empty() || scene.name[0] == '.' || std::any_of(scene.name.begin(), scene.name.end(), is_odd))
+    checker.issue("name", "is '" + scene.name +
+                              "'; it names a folder, so it must not be empty, begin with '.' or "
+                              "contain / \\ or control characters");
   if (scene.bodies.empty()) checker.issue("bodies", "is empty; a mechanism has at least one body besides the ground");
   check_shared_names(checker, scene);
   const auto in_list = [](const char* list) { return [list](std::size_t i) { return child_path(list, i) + ".name"; }; };
