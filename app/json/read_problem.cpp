@@ -19,7 +19,7 @@ void resolve_data_files(Problem& problem, const std::filesystem::path& folder, c
     std::string& data = experiments[i].data;
     const std::string path = child_path("identification.experiments", i) + ".data";
     if (findings.concerns(path)) continue;
-    const std::filesystem::path file = folder / data;
+    const std::filesystem::path file = (folder / data).lexically_normal();
     std::error_code error;
     if (!std::filesystem::exists(file, error) || std::filesystem::is_directory(file, error))
       findings.add(nearest(root, path), path, "there is no file '" + file.string() + "'; a CSV file is expected");

@@ -15,7 +15,8 @@ constexpr double kLargestExponent = 100;
 
 struct Inferred {
   Known dimension;
-  std::optional<double> number;  // value of a constant, for exponents
+  std::optional<double> number = {};  // value of a constant, for exponents
+  bool is_plain = false;              // made of numbers without units only
 };
 
 bool is_pure(const Known& d) { return d && compatible(*d, Dimension{}); }
@@ -56,9 +57,9 @@ Known of_operation(const SyntaxNode& node, const Inferred& a, const Inferred& b)
     case Operation::smooth_abs:
       return agreed(a.dimension, b.dimension, node);
     case Operation::multiply:
-      return a.dimension && b.dimension ? Known(*a.dimension * *b.dimension) : std::nullopt;
     case Operation::divide:
-      return a.dimension && b.dimension ? Known(*a.dimension / *b.dimension) : std::nullopt;
+      if (!a.dimension || !b.dimension || a.is_plain != b.is_plain) return std::nullopt;
+      return node.operation == Operation::multiply ? *a.dimension * *b.dimension : *a.dimension / *b.dimension;
     case Operation::power:
       return power(a, b, node);
     case Operation::sqrt: {
@@ -93,7 +94,7 @@ std::optional<Dimension> infer_dimension(const Expression& expression, const Dim
   for (const SyntaxNode& node : nodes) {
     Inferred result;
     if (node.operation == Operation::number) {
-      result = {node.unit.value_or(Dimension{}), node.value};
+      result = {node.unit.value_or(Dimension{}), node.value, !node.unit};
     } else if (node.operation == Operation::name) {
       result.dimension = dimension_of_name(node.name);
     } else {
@@ -101,6 +102,7 @@ std::optional<Dimension> infer_dimension(const Expression& expression, const Dim
       const Inferred& b = node.b < 0 ? a : inferred[static_cast<std::size_t>(node.b)];
       result.dimension = of_operation(node, a, b);
       if (a.number && b.number) result.number = apply(node.operation, *a.number, *b.number);
+      result.is_plain = a.is_plain && b.is_plain;
     }
     inferred.push_back(result);
   }

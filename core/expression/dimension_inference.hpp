@@ -1,8 +1,8 @@
 // The physical dimension of an expression, from the units written in it and the dimensions of its names.
 //
-// A plain number is a pure number in a product ("L/2" is a length) and takes the dimension of its neighbours everywhere
-// else ("L + 3", or a field that is just "3"). So does any result without a dimension, such as sin(a) or L1/L2. A name
-// whose dimension is not known makes what is computed from it unknown, and unknown fits everything.
+// A plain number fits everything: "L + 3" is a length, and "m*0.5^2/12" may be an inertia, since 0.5 may be a length.
+// So does a name whose dimension is not known. What is computed from them by products is unknown, and unknown fits
+// everything; results such as sin(a) or L1/L2 have no dimension and may stand where a plain number may.
 #pragma once
 
 #include <functional>

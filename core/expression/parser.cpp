@@ -147,6 +147,7 @@ class Parser {
     node.offset = offset;
     if (name == "pi") {
       node.value = std::numbers::pi;
+      node.unit = Dimension{};
     } else {
       if (is_not_finite_literal(name)) fail("'" + name + "' is not a finite number", offset);
       node.operation = Operation::name;
@@ -189,6 +190,7 @@ class Parser {
       const int distance = push(Operation::smooth_abs, difference, eps, offset);
       const int total = push(Operation::add, sum, distance, offset);
       const int two = constant(2, offset);
+      nodes_.back().unit = Dimension{};
       return push(Operation::divide, total, two, offset);
     }
     if (function.name == "smooth_abs" && arguments.size() == 1) {

@@ -17,7 +17,7 @@ struct SyntaxNode {
   Operation operation = Operation::number;
   int a = -1, b = -1;             // operands: earlier nodes
   double value = 0;               // of a number, in SI
-  std::optional<Dimension> unit;  // of a number written with a unit
+  std::optional<Dimension> unit;  // of a number that has one; none: it may stand for anything
   std::string name;               // of a name
   std::size_t offset = 0;         // where it stands in the text [bytes]
 };

@@ -139,8 +139,7 @@ void Checker::check_dimension(const std::string& where, const Expression& value,
         infer_dimension(value, [this](const std::string& name) { return facts_.dimension_of_name(name); });
     if (expected && !fits(found, *expected))
       issue(where,
-            "'" + value.text() + "' has the dimension " + to_string(*found) + ", expected is " + to_string(*expected) +
-                (value.names().empty() ? "" : " (a factor without a unit is a pure number; with one: 7850 [kg/m^3])"));
+            "'" + value.text() + "' has the dimension " + to_string(*found) + ", expected is " + to_string(*expected));
   } catch (const DimensionError& error) {
     issues_.push_back({where, error.what(), false, error.offset});
   }

@@ -150,6 +150,7 @@ std::optional<Dimension> SceneFacts::dimension_of_name(const std::string& name) 
     found = infer_dimension(*definition, [this](const std::string& inner) { return dimension_of_name(inner); });
   } catch (const DimensionError&) {  // reported at the definition
   }
+  if (found && found->is_none()) found.reset();  // as a plain number: it may stand for anything
   return dimensions_[name] = found;
 }
 

@@ -83,15 +83,21 @@ TEST_CASE("dimensions are written in SI base units", "[expression]") {
 }
 
 TEST_CASE("the dimension of an expression follows from its names and units", "[expression]") {
-  CHECK(infer("L/2") == dimension::kLength);
-  CHECK(infer("m*L^2/12") == dimension::kInertia);
+  CHECK(infer("-L") == dimension::kLength);
+  CHECK(infer("m*L^2") == dimension::kInertia);
   CHECK(infer("sqrt(L^2 + (3 [cm])^2)") == dimension::kLength);
   CHECK(infer("m*g/k") == dimension::kLength);
   CHECK(infer("L + 3") == dimension::kLength);
   CHECK(infer("3 + L") == dimension::kLength);
   CHECK(infer("min(L, 2, 1 [mm])") == dimension::kLength);
   CHECK(infer("smooth_max(L, 1)") == dimension::kLength);
-  CHECK(infer("atan2(L, 2*L)") == dimension::kAngle);
+  CHECK(infer("atan2(L, L + 2)") == dimension::kAngle);
+  CHECK(infer("2*3 - pi") == Dimension{});
+  CHECK(infer("pi*L^2") == Dimension{{2, 0, 0, 0}});
+  CHECK(infer("smooth_max(L, 2 [cm])") == dimension::kLength);
+  CHECK(infer("12 [m]/2 [s]") == dimension::kVelocity);
+  CHECK(infer("L/2") == std::nullopt);  // 2 may be a time
+  CHECK(infer("m*0.5^2/12") == std::nullopt);
   CHECK(infer("sin(a)") == Dimension{});
   CHECK(infer("7850 [kg/m^3]*L^3") == dimension::kMass);
   CHECK(infer("L*unknown") == std::nullopt);
@@ -112,6 +118,8 @@ TEST_CASE("dimensions that do not fit each other are refused, pure numbers fit a
   CHECK_FALSE(mixes("sin(2*a + 1)"));
   CHECK_FALSE(mixes("exp(-L/2 [m])"));
   CHECK_FALSE(mixes("L + unknown*m"));
+  CHECK_FALSE(mixes("L + 2*m"));
+  CHECK(fits(infer("m*0.5^2/12"), dimension::kInertia));
   CHECK(fits(infer("3"), dimension::kMass));
   CHECK(fits(infer("L/L"), dimension::kMass));
   CHECK(fits(infer("unknown"), dimension::kMass));

@@ -186,8 +186,15 @@ TEST_CASE("dimensions follow through parameters and definitions", "[scene]") {
   scene.parameters.push_back({"L", 1.0, {}, {}, ParameterScale::linear, "m"});
   scene.parameters.push_back({"w", 0.1, {}, {}, ParameterScale::linear, "m"});
   scene.definitions.push_back({"volume", Expression::parse("L*w^2")});
-  scene.bodies[0].mass = Expression::parse("7850*volume");
-  CHECK_THAT(at(scene, "bodies[0].mass"), Catch::Contains("expected is kg") && Catch::Contains("7850 [kg/m^3]"));
+  scene.bodies[0].mass = Expression::parse("volume");
+  CHECK_THAT(at(scene, "bodies[0].mass"), Catch::Contains("has the dimension m^3, expected is kg"));
+  scene.bodies[0].mass = Expression::parse("7850*volume");  // a plain number may stand for anything
+  CHECK(at(scene, "bodies[0].mass").empty());
+  scene.bodies[0].mass = Expression::parse("7850 [kg/m^2]*volume");
+  CHECK_THAT(at(scene, "bodies[0].mass"), Catch::Contains("has the dimension kg m, expected is kg"));
+  scene.definitions.push_back({"length", Expression::parse("sqrt(0.5^2 + 1)")});
+  scene.bodies[0].mass = Expression::parse("7850 [kg/m^2]*L*length");
+  CHECK(at(scene, "bodies[0].mass").empty());
   scene.bodies[0].mass = Expression::parse("7850 [kg/m^3]*volume");
   scene.bodies[0].points["tip"] = {Expression::parse("-L/2"), Expression::parse("w + 1 [mm]"), 0.0};
   CHECK(find_issues(scene).empty());
