@@ -1,5 +1,7 @@
 #include "app/json/input_error.hpp"
 
+#include <algorithm>
+
 namespace mbsopt {
 
 namespace {
@@ -24,7 +26,11 @@ std::string to_string(const Finding& finding) {
     if (finding.line > 0) text += ":" + std::to_string(finding.line) + ":" + std::to_string(finding.column);
     if (!finding.path.empty()) text += ": " + finding.path;
   }
-  return text + ": " + finding.message;
+  text += ": " + finding.message;
+  // One line each, whatever names and texts it quotes.
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
+  return text;
 }
 
 InputError::InputError(std::vector<Finding> all) : std::runtime_error(lines(all)), findings_(std::move(all)) {}

@@ -34,25 +34,37 @@ std::string what_is(const Node& node) {
   return "";
 }
 
+namespace {
+
+// The key in ["..."] at `at`, which moves behind it.
+std::string quoted_key(std::string_view path, std::size_t& at) {
+  std::string key;
+  for (at += 2; at < path.size() && path[at] != '"'; ++at) {
+    if (path[at] == '\\' && at + 1 < path.size()) ++at;
+    key += path[at];
+  }
+  if (path.substr(at, 2) != "\"]") throw std::invalid_argument("'[\"' is never closed");
+  at += 2;
+  return key;
+}
+
+}  // namespace
+
 std::vector<PathStep> parse_path(std::string_view path) {
   std::vector<PathStep> steps;
   std::size_t at = 0;
   while (at < path.size()) {
-    if (path[at] == '[') {
-      const bool quoted = path.substr(at + 1, 1) == "\"";
-      const std::size_t close = quoted ? path.find("\"]", at + 2) : path.find(']', at);
+    if (path.substr(at, 2) == "[\"") {
+      steps.push_back({quoted_key(path, at), false, 0});
+    } else if (path[at] == '[') {
+      const std::size_t close = path.find(']', at);
       if (close == std::string_view::npos) throw std::invalid_argument("'[' is never closed");
       PathStep step;
-      if (quoted) {
-        step.key = path.substr(at + 2, close - at - 2);
-        at = close + 2;
-      } else {
-        const char* const last = path.data() + close;
-        const auto [end, error] = std::from_chars(path.data() + at + 1, last, step.index);
-        if (error != std::errc() || end != last) throw std::invalid_argument("an index in [] must be a whole number");
-        step.is_index = true;
-        at = close + 1;
-      }
+      step.is_index = true;
+      const char* const last = path.data() + close;
+      const auto [end, error] = std::from_chars(path.data() + at + 1, last, step.index);
+      if (error != std::errc() || end != last) throw std::invalid_argument("an index in [] must be a whole number");
+      at = close + 1;
       steps.push_back(std::move(step));
     } else {
       if (path[at] == '.') ++at;

@@ -5,9 +5,15 @@
 namespace mbsopt {
 
 std::string child_path(const std::string& parent, std::string_view key) {
-  const std::string name(key);
-  if (!is_identifier(key) && key != "$schema") return parent + "[\"" + name + "\"]";
-  return parent.empty() ? name : parent + "." + name;
+  if (!is_identifier(key) && key != "$schema") {
+    std::string quoted;
+    for (const char c : key) {
+      if (c == '"' || c == '\\') quoted += '\\';
+      quoted += c;
+    }
+    return parent + "[\"" + quoted + "\"]";
+  }
+  return parent.empty() ? std::string(key) : parent + "." + std::string(key);
 }
 
 std::string child_path(const std::string& parent, std::size_t index) {

@@ -1,6 +1,7 @@
 // Files that are hardly problem files.
 #include <unistd.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
@@ -96,4 +97,18 @@ TEST_CASE("a data file that is missing is reported where it is named", "[json]")
    {"name": "r", "data": "no_such.csv", "channels": [{"column": "x", "sensor": "x"}]}]}})";
   CHECK(error_of(text) ==
         "odd.json:4:26: identification.experiments[0].data: there is no file 'no_such.csv'; a CSV file is expected");
+}
+
+TEST_CASE("keys of any characters are pointed at, in one line each", "[json]") {
+  const std::string text = R"({
+ "parameters": {
+  "a\"]x[\\": {"value": 1, "lower": 2, "allow_unused": true},
+  "b\nc": 1, "": 2, "\"].": 3},
+ )" + kBody + "}";
+  const std::string all = error_of(text);
+  CHECK_THAT(all, Catch::Contains(R"(odd.json:3:25: parameters["a\"]x[\\"].value: is 1, below)"));
+  CHECK_THAT(all, Catch::Contains("odd.json:4:11: parameters[\"b c\"]: the name 'b c' must be"));
+  CHECK_THAT(all, Catch::Contains("odd.json:4:18: parameters[\"\"]: the name '' must be"));
+  CHECK_THAT(all, Catch::Contains(R"(odd.json:4:29: parameters["\"]."]: the name)"));
+  CHECK(std::count(all.begin(), all.end(), '\n') == 4);
 }
