@@ -1,0 +1,77 @@
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <optional>
+
+#include "app/exit_code.hpp"
+#include "tests/app/run_command.hpp"
+
+using namespace mbsopt;
+namespace fs = std::filesystem;
+
+namespace {
+
+// The example of the README: what is typed after "$ ./dev run ", and the indented lines that follow.
+struct Example {
+  std::vector<std::string> arguments;
+  std::string output;
+};
+
+Example readme_example() {
+  std::istringstream readme(content_of(fs::path(MBSOPT_SOURCE_DIR) / "README.md"));
+  const std::string prompt = "    $ ./dev run ";
+  Example example;
+  bool inside = false;
+  for (std::string line; std::getline(readme, line);) {
+    if (line.starts_with(prompt)) {
+      std::istringstream words(line.substr(prompt.size()));
+      for (std::string word; words >> word;) example.arguments.push_back(word);
+      inside = true;
+    } else if (inside && !line.empty() && !line.starts_with("    ")) {
+      break;
+    } else if (inside) {
+      example.output += line + "\n";
+    }
+  }
+  return example;
+}
+
+std::vector<std::string> words_of(const std::string& text) {
+  std::istringstream in(text);
+  std::vector<std::string> words;
+  for (std::string word; in >> word;) words.push_back(word);
+  return words;
+}
+
+std::optional<double> number_of(const std::string& word) {
+  char* end = nullptr;
+  const double value = std::strtod(word.c_str(), &end);
+  return end == word.c_str() + word.size() ? std::optional(value) : std::nullopt;
+}
+
+}  // namespace
+
+// Words must be the same, and numbers to 1e-6; seconds and how often an optimiser evaluated depend on the machine.
+TEST_CASE("the README's example prints what the README says", "[readme]") {
+  const Example example = readme_example();
+  REQUIRE(example.arguments.size() == 2);
+  const TemporaryFolder folder;
+  fs::create_directory_symlink(fs::path(MBSOPT_SOURCE_DIR) / "problems", folder.path / "problems");
+  const fs::path before = fs::current_path();
+  fs::current_path(folder.path);
+  const CommandOutcome outcome = run_command(example.arguments);
+  fs::current_path(before);
+  REQUIRE(outcome.exit_code == kDone);
+
+  const auto expected = words_of(example.output), printed = words_of(outcome.out);
+  REQUIRE(printed.size() == expected.size());
+  for (std::size_t i = 0; i + 1 < printed.size(); ++i) {
+    if (printed[i + 1] == "s" || printed[i + 1].starts_with("iterations") ||
+        printed[i + 1].starts_with("evaluations")) {
+      continue;
+    }
+    const std::optional<double> a = number_of(expected[i]), b = number_of(printed[i]);
+    INFO("word " << i << ": README '" << expected[i] << "', printed '" << printed[i] << "'");
+    CHECK((a && b ? std::abs(*a - *b) <= 1e-6 * (1 + std::abs(*a)) : expected[i] == printed[i]));
+  }
+}
