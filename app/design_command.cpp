@@ -23,10 +23,14 @@ void print_design(std::ostream& out, const DesignResult& design) {
     parameters.add({v.name, significant(v.initial, 10), significant(v.value, 10), v.unit.empty() ? "-" : v.unit,
                     bound_hit(v.at_lower, v.at_upper)});
   }
-  TextTable objectives({"objective", "before", "after", "at least", "at most"});
+  std::vector<std::string> header{"objective", "before", "after"};
+  if (!design.constraints.empty()) header.insert(header.end(), {"at least", "at most"});
+  TextTable objectives(header);
+  std::vector<std::string> minimised{design.objective, significant(design.objective_initial),
+                                     significant(design.objective_final)};
+  minimised.resize(header.size());
+  objectives.add(minimised);
   const auto bound = [](const std::optional<double>& value) { return value ? significant(*value) : std::string(); };
-  objectives.add(
-      {design.objective, significant(design.objective_initial), significant(design.objective_final), "", ""});
   for (const DesignConstraint& c : design.constraints) {
     objectives.add({c.objective, significant(c.initial), significant(c.value), bound(c.lower), bound(c.upper)});
   }

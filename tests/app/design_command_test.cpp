@@ -1,0 +1,88 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+
+#include "app/exit_code.hpp"
+#include "tests/app/run_command.hpp"
+
+using namespace mbsopt;
+using Catch::Contains;
+namespace fs = std::filesystem;
+
+namespace {
+
+const std::vector<std::string> kBounds{"--set", "parameters.k.lower=1", "--set", "parameters.k.upper=100"};
+
+CommandOutcome run_design_command(const std::string& file, const std::string& out,
+                                  const std::vector<std::string>& more = kBounds) {
+  std::vector<std::string> arguments{"design", file, "--out", out};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return run_command(arguments);
+}
+
+}  // namespace
+
+TEST_CASE("design: a minimum inside the bounds, told in a table, a history and a result", "[command]") {
+  const TemporaryFolder folder;
+  const CommandOutcome outcome = run_design_command(folder.write("rod.json", kPendulum), folder.file("out"));
+  REQUIRE(outcome.exit_code == kDone);
+  CHECK_THAT(outcome.out, Contains("optimum") && Contains("N/m") && Contains("track"));
+  CHECK_THAT(outcome.err, Contains("iteration   0"));  // a line per iteration: no terminal here
+
+  const auto result = json_of(folder.path / "out/result.json");
+  const auto& k = result.at("parameters").at("k");
+  CHECK(k.at("initial") == 20);
+  const double optimum = k.at("value");
+  CHECK((optimum > 1 && optimum < 100));
+  const auto& optimizer = result.at("optimizer");
+  CHECK(optimizer.at("status") == "converged");
+  CHECK(optimizer.at("objective_final") < optimizer.at("objective_initial"));
+  const std::string history = content_of(folder.path / "out/history.csv");
+  CHECK_THAT(history, Catch::StartsWith("iteration,objective,infeasibility,optimality,k\n0,"));
+  CHECK(std::count(history.begin(), history.end(), '\n') == optimizer.at("iterations").get<int>() + 2);
+}
+
+TEST_CASE("design: optimized.json is a problem whose objective is the optimum's", "[command]") {
+  const TemporaryFolder folder;
+  REQUIRE(run_design_command(folder.write("rod.json", kPendulum), folder.file("out")).exit_code == kDone);
+  const double found = json_of(folder.path / "out/result.json").at("optimizer").at("objective_final");
+  REQUIRE(run_command({"simulate", folder.file("out/optimized.json"), "--out", folder.file("again")}).exit_code ==
+          kDone);
+  const double again = json_of(folder.path / "again/result.json").at("objectives").at("track").at("value");
+  CHECK(again == Approx(found).epsilon(1e-12));
+}
+
+TEST_CASE("design: a bound that holds the optimum back is named", "[command]") {
+  const TemporaryFolder folder;
+  const CommandOutcome outcome =
+      run_design_command(folder.write("rod.json", kPendulum), folder.file("out"),
+                         {"--set", "parameters.k.lower=18", "--set", "parameters.k.upper=22"});
+  REQUIRE(outcome.exit_code == kDone);
+  const auto k = json_of(folder.path / "out/result.json").at("parameters").at("k");
+  REQUIRE(k.at("at_bound").is_string());
+  CHECK(k.at("value").get<double>() == Approx(k.at(k.at("at_bound").get<std::string>()).get<double>()).epsilon(1e-6));
+}
+
+TEST_CASE("design: too few iterations is a failure in words that keeps the best so far", "[command]") {
+  const TemporaryFolder folder;
+  std::vector<std::string> more = kBounds;
+  more.insert(more.end(), {"--set", "design.optimizer.max_iterations=1"});
+  const CommandOutcome outcome = run_design_command(folder.write("rod.json", kPendulum), folder.file("out"), more);
+  CHECK(outcome.exit_code == kNumericalFailure);
+  CHECK_THAT(outcome.err, Contains("design failed: "));
+  const auto result = json_of(folder.path / "out/result.json");
+  CHECK(result.at("status") == "failed");
+  CHECK(result.at("optimizer").at("objective_final") <= result.at("optimizer").at("objective_initial"));
+  CHECK(fs::exists(folder.path / "out/optimized.json"));
+}
+
+TEST_CASE("design and identify of a file that does not ask for them are bad input", "[command]") {
+  const TemporaryFolder folder;
+  std::string text = kPendulum;
+  text.erase(text.find(",\n  \"design\""));
+  const std::string file = folder.write("bare.json", text + "}");
+  for (const std::string command : {"design", "identify"}) {
+    const CommandOutcome outcome = run_command({command, file, "--out", folder.file("out")});
+    CHECK(outcome.exit_code == kBadInput);
+    CHECK_THAT(outcome.err, Contains(command == "design" ? "design: missing" : "identification: missing"));
+  }
+}

@@ -1,0 +1,83 @@
+#include <catch2/catch.hpp>
+#include <sstream>
+
+#include "app/exit_code.hpp"
+#include "tests/app/run_command.hpp"
+
+using namespace mbsopt;
+using Catch::Contains;
+
+namespace {
+
+// The rod's own motion at k = 20 as the measurement: t and the last column but one, the angle.
+std::string measured_swing(const TemporaryFolder& folder) {
+  const std::string file = folder.write("rod.json", kPendulum);
+  REQUIRE(run_command({"simulate", file, "--out", folder.file("motion"), "--set", "simulation.output_step=0.02",
+                       "--set", "simulation.integrator.rtol=1e-10"})
+              .exit_code == kDone);
+  std::istringstream rows(content_of(folder.path / "motion/trajectory.csv"));
+  std::string csv = "t,theta\n", row;
+  std::getline(rows, row);
+  while (std::getline(rows, row)) {
+    const std::size_t last = row.rfind(','), before = row.rfind(',', last - 1);
+    csv += row.substr(0, row.find(',')) + row.substr(before, last - before) + "\n";
+  }
+  return csv;
+}
+
+std::string identification_problem() {
+  std::string text = kPendulum;
+  text.replace(text.find("\"k\": {\"value\": 20"), 17, "\"k\": {\"value\": 15");
+  text.erase(text.rfind('}'));
+  return text + R"(,
+  "identification": {"experiments": [{"name": "swing", "data": "swing.csv", "time": "t",
+      "channels": [{"column": "theta", "sensor": "swing", "sigma": 0.01}]}], "variables": ["k"]}})";
+}
+
+}  // namespace
+
+TEST_CASE("identify: the parameter that made the motion is found, with its uncertainty", "[command]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", measured_swing(folder));
+  const std::string file = folder.write("fit.json", identification_problem());
+  const CommandOutcome outcome =
+      run_command({"identify", file, "--out", folder.file("out"), "--set", "simulation.integrator.rtol=1e-10"});
+  REQUIRE(outcome.exit_code == kDone);
+  CHECK_THAT(outcome.out, Contains("std error") && Contains("swing") && Contains("95 % interval"));
+
+  const auto result = json_of(folder.path / "out/result.json");
+  const auto& k = result.at("parameters").at("k");
+  CHECK(k.at("initial") == 15);
+  CHECK(k.at("value").get<double>() == Approx(20).epsilon(1e-7));
+  CHECK(k.at("ci95").at(0) <= k.at("value"));
+  CHECK(k.at("ci95").at(1) >= k.at("value"));
+  CHECK(result.at("identifiability").at("unidentifiable").empty());
+  CHECK(result.at("experiments").at("swing").at("channels").at("theta").at("samples") == 51);
+  CHECK(result.at("provenance").at("data_sha256").contains("swing.csv"));
+
+  const std::string residuals = content_of(folder.path / "out/residuals.csv");
+  CHECK_THAT(residuals, Catch::StartsWith("experiment,channel,t,measured,model,residual\nswing,theta,0,"));
+  CHECK_THAT(content_of(folder.path / "out/report.html"), Contains("residual of theta"));
+}
+
+TEST_CASE("identify: optimized.json fits at once, from its own folder", "[command]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", measured_swing(folder));
+  const std::string file = folder.write("fit.json", identification_problem());
+  REQUIRE(run_command({"identify", file, "--out", folder.file("deep/out")}).exit_code == kDone);
+  REQUIRE(run_command({"identify", folder.file("deep/out/optimized.json"), "--out", folder.file("again")}).exit_code ==
+          kDone);
+  const auto first = json_of(folder.path / "deep/out/result.json"), again = json_of(folder.path / "again/result.json");
+  CHECK(again.at("parameters").at("k").at("initial") == first.at("parameters").at("k").at("value"));
+  CHECK(again.at("optimizer").at("iterations") <= 1);
+}
+
+TEST_CASE("identify: a record with a bad cell is bad input, with its line", "[command]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", "t,theta\n0,0\n0.1,oops\n");
+  const CommandOutcome outcome =
+      run_command({"identify", folder.write("fit.json", identification_problem()), "--out", folder.file("out")});
+  CHECK(outcome.exit_code == kBadInput);
+  CHECK_THAT(outcome.err, Contains("swing.csv:3"));
+  CHECK_FALSE(std::filesystem::exists(folder.path / "out/result.json"));
+}
