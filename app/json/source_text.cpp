@@ -42,7 +42,7 @@ std::size_t sequence_length(std::string_view text, std::size_t at) {
 [[noreturn]] void fail(const std::filesystem::path& file, const std::string& message) {
   constexpr std::size_t kShown = 200;
   std::string name = file.string();
-  if (name.size() > kShown) name = name.substr(0, kShown) + "...";
+  if (name.size() > kShown) name.replace(kShown, std::string::npos, "...");
   throw InputError({{name.empty() ? "''" : name, 0, 0, "", message}});
 }
 
