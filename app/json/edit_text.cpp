@@ -13,7 +13,9 @@ namespace mbsopt {
 
 namespace {
 
-std::string json_string(const std::string& key) { return nlohmann::json(key).dump(); }
+std::string json_string(const std::string& key) {
+  return nlohmann::json(key).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
 
 std::string replaced(const std::string& text, std::size_t begin, std::size_t end, const std::string& by) {
   return text.substr(0, begin) + by + text.substr(end);
