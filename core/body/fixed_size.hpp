@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>  // cross
-#include <Eigen/Geometry>  // cross
 
 namespace mbsopt {
 

@@ -1,6 +1,7 @@
 #include "core/dynamics/dynamics.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace mbsopt {
 
@@ -44,9 +45,12 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
   user_K_.setZero(largest, largest), user_C_.setZero(largest, largest), user_Q_rho_.setZero(largest, P);
 }
 
+// Derivatives are those of the limit: as many refinements as bring alpha^-(passes) to rounding.
 SaddleSolver::Settings Dynamics::solver_settings(bool derivative) const {
   if (settings_.type == FormulationType::penalty) return {0, 0};
-  return {settings_.iterations, derivative ? 0 : settings_.tolerance};
+  if (!derivative) return {settings_.iterations, settings_.tolerance};
+  const double digits = std::max(1.0, std::log10(settings_.alpha));
+  return {std::clamp(static_cast<int>(std::ceil(15 / digits)) - 1, 1, 8), 0};
 }
 
 void Dynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {

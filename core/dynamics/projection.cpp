@@ -9,8 +9,8 @@ namespace mbsopt {
 namespace {
 
 constexpr double kRelativeAlpha = 1e8;
-constexpr SaddleSolver::Settings kSolve{2, 0};
-constexpr int kMostIterations = 30;
+constexpr SaddleSolver::Settings kOnePass{0, 0};  // every use is inside an iteration that refines
+constexpr int kMostIterations = 60;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -127,7 +127,7 @@ bool Projector::project(const Eigen::VectorXd& y_hat, Eigen::VectorXd& y, Projec
       for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, s.delta[at(i - 1)]);
       solver_.rows().subtract_transposed_times(s.nu, b_);
       g_ = -phi_;
-      solver_.solve(b_, g_, kSolve, dx_, dnu_);
+      solver_.solve(b_, g_, kOnePass, dx_, dnu_);
       for (std::size_t i = 0; i < dx_.size(); ++i) s.delta[i] += dx_[i];
       s.nu += dnu_;
       set_q(s.delta, y);
@@ -156,7 +156,7 @@ bool Projector::project(const Eigen::VectorXd& y_hat, Eigen::VectorXd& y, Projec
     for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, s.u[at(i - 1)]);
     rows_.subtract_transposed_times(s.kappa, b_);
     g_ = -phi_;
-    solver_.solve(b_, g_, kSolve, dx_, dnu_);
+    solver_.solve(b_, g_, kOnePass, dx_, dnu_);
     s.kappa += dnu_;
     for (int i = 1; i <= data_.n; ++i) {
       const Vec<6>& du = dx_[at(i - 1)];
@@ -240,7 +240,7 @@ void Projector::refine(Level level, bool transposed, const std::vector<X>& b, co
       return Ex_lanes_;
     }
   }();
-  solver_.solve(b, g, kSolve, x, nu);
+  solver_.solve(b, g, kOnePass, x, nu);
   if (data_.m == 0) return;
   const bool position = level == Level::position;
   for (int k = 0; k < refinements_; ++k) {
@@ -264,7 +264,7 @@ void Projector::refine(Level level, bool transposed, const std::vector<X>& b, co
       for (std::size_t i = 0; i < r.size(); ++i) r[i] += b[i];
     }
     rg *= -1;
-    solver_.solve(r, rg, kSolve, dx, dnu);
+    solver_.solve(r, rg, kOnePass, dx, dnu);
     for (std::size_t i = 0; i < x.size(); ++i) x[i] += dx[i];
     nu += dnu;
   }

@@ -71,7 +71,7 @@ class Projector {
   Projection what_;
   SaddleSolver solver_;  // factor of S(q~)
   ConstraintRows rows_;  // J at the projected q
-  int refinements_ = 3;  // of derivative systems, from the size of the correction
+  int refinements_ = 2;  // of derivative systems, from the size of the correction
   const ProjectionSolution* solution_ = nullptr;
 
   std::vector<Body> bodies_;

@@ -1,0 +1,95 @@
+// The hot loops allocate nothing after set-up: right-hand sides, steps, tangents and adjoints.
+#include <catch2/catch.hpp>
+
+#include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/projection.hpp"
+#include "core/integrate/explicit_run.hpp"
+#include "tests/allocation/allocation_count.hpp"
+#include "tests/core/mechanism/moving_scenes.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+using Eigen::VectorXd;
+
+namespace {
+
+struct Prepared {
+  Scene scene = loaded_four_bar();
+  Mechanism mechanism{scene,
+                      nominal(scene),
+                      {},
+                      {std::make_shared<CubicDrag>("coupler", static_cast<Eigen::Index>(scene.parameters.size()) - 1)}};
+  VectorXd y = VectorXd::Zero(mechanism.states()), angles = VectorXd::Zero(1), rate = y;
+
+  Prepared() {
+    for (int i = 1; i <= 3; ++i) y.segment<7>(7 * (i - 1)) = mechanism.data().bodies[static_cast<std::size_t>(i)].q;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a right-hand side, its tangent and its adjoint allocate nothing", "[allocation]") {
+  Prepared p;
+  Dynamics dynamics(p.mechanism, {});
+  const auto blocks = parameter_blocks(p.mechanism.data());
+  LaneRows direction = LaneRows::Random(p.y.size(), kLanes), out(p.y.size(), kLanes);
+  VectorXd w = VectorXd::Random(p.y.size()), y_bar = VectorXd::Zero(p.y.size());
+  VectorXd theta_bar = VectorXd::Zero(p.mechanism.data().slots()), rho_bar = VectorXd::Zero(p.mechanism.parameters());
+  const long before = allocation_count();
+  bool ok = true;
+  for (int k = 0; k < 3; ++k) {
+    ok = ok && dynamics.evaluate(0.1 * k, p.y, p.angles, p.rate);
+    dynamics.linearise_here();
+    for (const ParameterBlock& block : blocks) dynamics.tangent(block, direction, out);
+    dynamics.add_adjoint(w, y_bar, theta_bar, rho_bar);
+  }
+  const long after = allocation_count();
+  CHECK(ok);
+  CHECK(after == before);
+}
+
+TEST_CASE("a projection, its tangent and its adjoint allocate nothing", "[allocation]") {
+  Prepared p;
+  Projector projector(p.mechanism, Projection::position_velocity);
+  ProjectionSolution solution = projector.solution();
+  const auto blocks = parameter_blocks(p.mechanism.data());
+  LaneRows direction = LaneRows::Random(p.y.size(), kLanes), out(p.y.size(), kLanes);
+  VectorXd w = VectorXd::Random(p.y.size()), y_bar = VectorXd::Zero(p.y.size()), projected = p.y;
+  VectorXd theta_bar = VectorXd::Zero(p.mechanism.data().slots());
+  const long before = allocation_count();
+  const bool ok = projector.project(p.y, projected, solution) && projector.linearise(p.y, projected, solution);
+  for (const ParameterBlock& block : blocks) projector.tangent(block, direction, out);
+  projector.add_adjoint(w, y_bar, theta_bar);
+  const long after = allocation_count();
+  CHECK(ok);
+  CHECK(after == before);
+}
+
+TEST_CASE("steps allocate nothing after the first, whatever their number", "[allocation]") {
+  Prepared p;
+  const std::string method = GENERATE(as<std::string>{}, "dopri5", "dopri853");
+  // The same motion over two spans: all that may differ is the growth of the recorded list of steps.
+  auto allocations = [&](double end) {
+    SimulationSettings settings = p.scene.simulation;
+    settings.end_time = end;
+    settings.formulation.projection = Projection::position_velocity;
+    ExplicitRun run(p.mechanism, settings, *explicit_method(method));
+    SimulationResult result;
+    result.steps.times.reserve(100000);
+    result.steps.sizes.reserve(100000);
+    Projector projector(p.mechanism, Projection::position_velocity);
+    ProjectionSolution solution = projector.solution();
+    VectorXd y = p.y;
+    REQUIRE(projector.project(p.y, y, solution));
+    const long before = allocation_count();
+    run.run(
+        y, p.angles, [](double) { return true; }, [](const Step&) {}, {}, result);
+    const long count = allocation_count() - before;
+    REQUIRE(result.ok());
+    return std::pair(count, result.statistics.steps);
+  };
+  const auto [few, few_steps] = allocations(0.05);
+  const auto [many, many_steps] = allocations(0.5);
+  CHECK(many_steps > 2 * few_steps);
+  CHECK(many == few);
+}
