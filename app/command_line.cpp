@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <new>
 #include <stdexcept>
 
@@ -14,6 +15,7 @@
 #include "app/interrupt.hpp"
 #include "app/json/input_error.hpp"
 #include "app/provenance.hpp"
+#include "core/expression/did_you_mean.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "optim/csv_table.hpp"
 
@@ -36,10 +38,22 @@ constexpr std::array kCommands{
 };
 constexpr std::array kLaterCommands{"kinematics", "tradeoff", "resume"};
 
-std::string available_commands() {
-  std::string names;
-  for (const Command& command : kCommands) names += fmt::format("{}{}", names.empty() ? "" : ", ", command.name);
+std::vector<std::string> command_names() {
+  std::vector<std::string> names;
+  for (const Command& command : kCommands) names.emplace_back(command.name);
   return names;
+}
+
+bool is_known(const std::string& word) {
+  const std::vector<std::string> names = command_names();
+  return word.starts_with('-') || std::find(names.begin(), names.end(), word) != names.end();
+}
+
+std::string what_is_wrong_with(const std::string& word) {
+  if (std::find(kLaterCommands.begin(), kLaterCommands.end(), word) != kLaterCommands.end()) {
+    return fmt::format("'{}' is not available in this version", word);
+  }
+  return fmt::format("there is no command '{}'{}", word, did_you_mean(word, command_names()));
 }
 
 void add_options(CLI::App& sub, const std::string& name, CommandOptions& options) {
@@ -74,6 +88,8 @@ int run_guarded(const Command& command, const CommandContext& context) {
     context.err << context.options.problem_file << ": " << error.what() << '\n';
   } catch (const OutputError& error) {
     context.err << error.what() << '\n';
+  } catch (const std::filesystem::filesystem_error& error) {
+    context.err << error.what() << '\n';
   } catch (const std::bad_alloc&) {
     context.err << "mbsopt: out of memory\n";
     return kNumericalFailure;
@@ -85,10 +101,8 @@ int run_guarded(const Command& command, const CommandContext& context) {
 
 int run_command_line(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err,
                      bool err_is_terminal) {
-  if (!arguments.empty() &&
-      std::find(kLaterCommands.begin(), kLaterCommands.end(), arguments[0]) != kLaterCommands.end()) {
-    err << fmt::format("mbsopt: '{}' is not available in this version; available: {}\n", arguments[0],
-                       available_commands());
+  if (!arguments.empty() && !is_known(arguments[0])) {
+    err << fmt::format("mbsopt: {}; available: {}\n", what_is_wrong_with(arguments[0]), joined(command_names()));
     return kBadInput;
   }
   CLI::App app("Optimal design and parameter identification of mechanisms.", "mbsopt");

@@ -13,6 +13,7 @@ TEST_CASE("help and version are results, an unknown command is bad input", "[com
   CHECK_THAT(run_command({"--version"}).out, Contains("mbsopt 0."));
   CHECK(run_command({}).exit_code == kBadInput);
   CHECK(run_command({"simulat", "x.json"}).exit_code == kBadInput);
+  CHECK_THAT(run_command({"simulat", "x.json"}).err, Contains("did you mean 'simulate'"));
   CHECK(run_command({"simulate"}).exit_code == kBadInput);
   CHECK(run_command({"simulate", "x.json", "--thread", "2"}).exit_code == kBadInput);
   CHECK(run_command({"simulate", "x.json", "--threads", "0"}).exit_code == kBadInput);
