@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "core/constraint/unit_norm.hpp"
 #include "core/dynamics/assembly_equations.hpp"
 #include "core/dynamics/assembly_report.hpp"
 #include "core/dynamics/nearest_point.hpp"
@@ -31,6 +32,11 @@ class PositionProblem : public NearestPointEquations {
     for (Index i = 3; i < step.size(); i += 7) change = std::max(change, step.segment<4>(i).lpNorm<Eigen::Infinity>());
     return change > 0.3 ? 0.3 / change : 1.0;
   }
+  VectorXd retracted(const VectorXd& x) const override {
+    VectorXd q = x;
+    for (Index i = 3; i < q.size(); i += 7) q.segment<4>(i) = UnitNorm::project(q.segment<4>(i));
+    return q;
+  }
   VectorXd weights() const override { return equations_.weights(); }
   void accept(const VectorXd& q) override { equations_.continue_branches(state(q)); }
 
@@ -54,6 +60,7 @@ class VelocityProblem : public NearestPointEquations {
     return equations_.second(state(v), nu).y.rightCols(v.size());
   }
   double step_fraction(const VectorXd&) const override { return 1; }
+  VectorXd retracted(const VectorXd& v) const override { return v; }
   VectorXd weights() const override { return equations_.weights(); }
 
  private:

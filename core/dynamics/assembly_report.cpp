@@ -70,6 +70,11 @@ std::string assembly_failure(const MechanismData& d, AssemblyLevel level, const 
            "several initial states are equally near to the guess; move the guess (position, orientation of the "
            "bodies) towards the one that is meant, or fix it by initial.conditions";
   }
+  if (found.status == NearestPointStatus::singular) {
+    return head +
+           "the search ends at a singular position (as with all bars in line), where several motions branch off; move "
+           "the guess (position, orientation of the bodies) away from it, or fix the branch by initial.conditions";
+  }
   const Eigen::VectorXd& F = found.F;
   const double tolerance = std::max(1e-9, 1e-3 * F.lpNorm<Eigen::Infinity>());
   std::vector<Finding> findings;

@@ -91,7 +91,7 @@ void reduce_violation(NearestPointEquations& equations, VectorXd& x, int& iterat
     normal.diagonal().array() += mu;
     VectorXd step = normal.llt().solve(-gradient);
     step *= equations.step_fraction(step);
-    const VectorXd trial = x + step, F_trial = equations.values(trial);
+    const VectorXd trial = equations.retracted(x + step), F_trial = equations.values(trial);
     if (violation(F_trial) < violation(F)) {
       const bool negligible = violation(F) - violation(F_trial) < 1e-14 * violation(F);
       x = trial, F = F_trial;
@@ -116,48 +116,90 @@ class Search {
                                                           NearestPointLinearisation(equations.jacobian(x_guess))} {}
 
   NearestPoint run() {
+    if (!newton()) sqp();
+    result_.F = equations_.values(result_.x);
+    const bool unsettled =
+        result_.status == NearestPointStatus::stalled || result_.status == NearestPointStatus::unsatisfiable;
+    if (unsettled && largest(result_.F) < 1e-9 * size()) result_.status = NearestPointStatus::singular;
+    return result_;
+  }
+
+ private:
+  // Gauss-Newton, then Newton; false where neither converges.
+  bool newton() {
+    constexpr double kNear = 0.05;
+    constexpr int kPatience = 30;
+    double shortest = std::numeric_limits<double>::infinity();
+    for (int waited = 0; waited < kPatience && result_.iterations < kMaxIterations; ++result_.iterations) {
+      const VectorXd& x = result_.x;
+      linearise();
+      if (!result_.F.allFinite()) return true;
+      const NearestPointLinearisation& at = result_.linearisation;
+      const VectorXd away = x_guess_ - x;
+      VectorXd step = at.pseudo_inverse_times(-result_.F) + at.null_space() * (at.null_space().transpose() * away);
+      const double length = largest(step);
+      if (length < 0.9 * shortest) {
+        shortest = length, waited = 0;
+      } else {
+        ++waited;
+      }
+      if (length < kNear * size()) {
+        add_curvature();
+        const VectorXd& lambda = at.reduced_eigenvalues();
+        if (lambda.size() == 0 || lambda(0) > 1e-3) step = at.solve(-result_.F, away);
+        if (satisfied() && converged(largest(step))) {
+          result_.status = is_minimum() ? NearestPointStatus::found : NearestPointStatus::undetermined;
+          return true;
+        }
+      }
+      move(x + equations_.step_fraction(step) * step);
+    }
+    return false;
+  }
+
+  void sqp() {
     constexpr int kRestorations = 3;
     int restorations = 0;
-    for (; result_.iterations < kMaxIterations; ++result_.iterations) {
+    const int last = result_.iterations + kMaxIterations;
+    shortest_ = std::numeric_limits<double>::infinity(), waited_ = 0;
+    for (; result_.iterations < last; ++result_.iterations) {
       linearise();
-      if (!result_.F.allFinite()) break;
+      if (!result_.F.allFinite()) return;
+      add_curvature();
       const VectorXd step = result_.linearisation.descent(-result_.F, x_guess_ - result_.x);
-      const bool satisfied = largest(result_.F) <= 1e-11 * size(), still = converged(step);
-      if (still && satisfied) {
+      const bool still = converged(largest(step));
+      if (still && satisfied()) {
         result_.status = is_minimum() ? NearestPointStatus::found : NearestPointStatus::undetermined;
-        return result_;
+        return;
       }
       if (!still && largest(step) < kLocal * size()) {
         move(result_.x + step);
       } else if (still || !gets_closer() || !advance(step)) {
         if (restorations++ == kRestorations || !restore()) {
           result_.status = NearestPointStatus::unsatisfiable;
-          result_.F = equations_.values(result_.x);
-          return result_;
+          return;
         }
       }
     }
-    result_.F = equations_.values(result_.x);
-    return result_;
   }
 
- private:
+  bool satisfied() const { return largest(result_.F) <= 1e-11 * size(); }
   double size() const { return 1 + largest(result_.x); }
   double scaled_violation(const VectorXd& F) const { return result_.linearisation.row_scale().cwiseProduct(F).norm(); }
 
   void linearise() {
-    const VectorXd& x = result_.x;
-    result_.F = equations_.values(x);
-    result_.linearisation = NearestPointLinearisation(equations_.jacobian(x));
-    result_.nu = result_.linearisation.multipliers(x_guess_ - x);
-    MatrixXd H = equations_.curvature(x, result_.nu);
+    result_.F = equations_.values(result_.x);
+    result_.linearisation = NearestPointLinearisation(equations_.jacobian(result_.x));
+  }
+  void add_curvature() {
+    result_.nu = result_.linearisation.multipliers(x_guess_ - result_.x);
+    MatrixXd H = equations_.curvature(result_.x, result_.nu);
     H.diagonal().array() += 1;
     result_.linearisation.set_hessian(H);
   }
 
   // At rounding level, or no longer shrinking just above it.
-  bool converged(const VectorXd& step) {
-    const double length = largest(step);
+  bool converged(double length) {
     if (length <= 2 * kEpsilon * size()) return true;
     if (length < 0.5 * shortest_) {
       shortest_ = length, waited_ = 0;
@@ -182,8 +224,8 @@ class Search {
   }
 
   void move(const VectorXd& x) {
-    result_.x = x;
-    equations_.accept(x);
+    result_.x = equations_.retracted(x);
+    equations_.accept(result_.x);
   }
 
   // One step along the merit function 1/2 |x - x_guess|^2 + sigma |scale F|; false where it cannot be reduced.

@@ -10,6 +10,11 @@
 //
 // J may be rank deficient (redundant equations). Nocedal and Wright, "Numerical Optimization" (2006), sections 16.2
 // (null-space method), 18.4 and 18.5 (SQP, merit functions, second-order correction).
+//
+// Far from the solution Gauss-Newton steps (H = I) of limited length follow the guess onto the equations, without a
+// merit function: they keep to the guess's branch and pass redundant equations, whose rank changes on the way, where a
+// line search stalls. Near it Newton's steps converge to rounding. Where Gauss-Newton circles (equations curved more
+// than 2 seen from the guess), SQP with a merit function takes over.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,6 +31,8 @@ struct NearestPointEquations {
   virtual Eigen::MatrixXd curvature(const Eigen::VectorXd& x, const Eigen::VectorXd& nu) const = 0;  // sum nu_i F_i,xx
   // The part of a step, at most 1, that keeps it small against the equations' nonlinearity.
   virtual double step_fraction(const Eigen::VectorXd& step) const = 0;
+  // x made to satisfy the equations that can be satisfied one by one (unit norms).
+  virtual Eigen::VectorXd retracted(const Eigen::VectorXd& x) const = 0;
   // What a violation of each equation counts where they cannot all be satisfied.
   virtual Eigen::VectorXd weights() const = 0;
   virtual void accept(const Eigen::VectorXd&) {}  // x is the next iterate: continue what is continued (angles)
@@ -68,6 +75,7 @@ enum class NearestPointStatus {
   found,
   unsatisfiable,  // x: a point of locally least violation
   undetermined,   // a stationary point that is not a strict minimum: several points are equally near
+  singular,       // the equations are satisfied where their rank drops: branches meet, no nearest point is settled on
   stalled,        // no convergence within the allowed iterations
 };
 
