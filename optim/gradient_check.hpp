@@ -102,5 +102,8 @@ struct GradientCheckOptions {
 };
 
 GradientCheck check_gradients(const Problem& problem, const GradientCheckOptions& options = {});
+// The same for objectives that may be written in C++.
+GradientCheck check_gradients(const Scene& scene, const std::vector<Objective>& objectives,
+                              const GradientCheckOptions& options = {});
 
 }  // namespace mbsopt

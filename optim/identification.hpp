@@ -15,19 +15,23 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "optim/csv_table.hpp"
+#include "optim/least_squares.hpp"
 #include "optim/problem.hpp"
 #include "optim/statistics.hpp"
 
 namespace mbsopt {
 
-enum class FitStatus { converged, iteration_limit, stopped, failed };
+using FitStatus = LeastSquaresStatus;
 std::string_view to_string(FitStatus status);  // "converged", "iteration_limit", "stopped", "failed"
+
+struct UserForce;  // core/force/user_force.hpp
 
 struct FittedParameter {
   std::string name;        // "k1", or "run1.theta0" where it is free in an experiment

@@ -1,0 +1,194 @@
+#include "optim/ceres_solver.hpp"
+
+#include <ceres/ceres.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <vector>
+
+namespace mbsopt {
+namespace {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+constexpr int kInvalidSteps = 30;  // in a row; each shortens the step, the last ones to nothing
+
+// All residuals as one block of one vector of variables, with the last point kept: Ceres asks for the residuals of a
+// trial step first, and for the Jacobian of the same point once it has accepted the step.
+class Residuals : public ceres::CostFunction {
+ public:
+  Residuals(LeastSquaresProblem& problem, LeastSquaresResult& result) : problem_(problem), result_(result) {
+    set_num_residuals(static_cast<int>(problem.size));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(problem.variables()));
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const LeastSquaresPoint& point = at(Eigen::Map<const Eigen::VectorXd>(parameters[0], problem_.variables()));
+    if (!point.ok) return false;
+    Eigen::Map<Eigen::VectorXd>(residuals, problem_.size) = point.z;
+    if (jacobians && jacobians[0]) Eigen::Map<RowMajor>(jacobians[0], problem_.size, problem_.variables()) = point.z_x;
+    return true;
+  }
+
+  const LeastSquaresPoint& at(const Eigen::VectorXd& x) const {
+    if (x_.size() == x.size() && x_ == x) return point_;
+    x_ = x;
+    point_.ok = true, point_.message.clear();
+    point_.z.setZero(problem_.size), point_.z_x.setZero(problem_.size, problem_.variables());
+    ++result_.evaluations;
+    try {
+      problem_.evaluate(x, point_);
+    } catch (const std::exception& error) {
+      point_.ok = false, point_.message = error.what();
+    }
+    if (point_.ok && !(point_.z.allFinite() && point_.z_x.allFinite()))
+      point_.ok = false, point_.message = "a residual or its derivative is not finite";
+    if (!point_.ok) {
+      ++result_.failed_evaluations;
+      if (result_.first_error.empty()) result_.first_error = point_.message;
+    }
+    return point_;
+  }
+
+ private:
+  LeastSquaresProblem& problem_;
+  LeastSquaresResult& result_;
+  mutable Eigen::VectorXd x_;
+  mutable LeastSquaresPoint point_;
+};
+
+// Counts iterations over several calls of the solver, each of which reports its start as iteration 0.
+class Progress : public ceres::IterationCallback {
+ public:
+  Progress(const CeresOptions& options, const Eigen::VectorXd& x) : options_(options), x_(x) {}
+
+  int iterations() const { return std::max(0, count_); }
+  int left() const { return options_.max_iterations - iterations(); }
+
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& s) override {
+    if (s.iteration == 0 && count_ >= 0) return ceres::SOLVER_CONTINUE;  // the point just reported
+    ++count_;
+    if (!options_.progress) return ceres::SOLVER_CONTINUE;
+    const bool go_on = options_.progress({count_, s.cost, s.gradient_max_norm, s.step_norm, x_});
+    return go_on ? ceres::SOLVER_CONTINUE : ceres::SOLVER_ABORT;
+  }
+
+ private:
+  const CeresOptions& options_;
+  const Eigen::VectorXd& x_;  // Ceres keeps it at the last accepted point
+  int count_ = -1;
+};
+
+ceres::Solver::Options solver_options(const CeresOptions& options) {
+  ceres::Solver::Options o;
+  o.minimizer_type = ceres::TRUST_REGION;
+  o.trust_region_strategy_type = ceres::LEVENBERG_MARQUARDT;
+  o.linear_solver_type = ceres::DENSE_QR;
+  o.num_threads = 1;
+  o.max_num_iterations = options.max_iterations;
+  o.function_tolerance = options.tolerance;
+  o.parameter_tolerance = options.tolerance;
+  o.gradient_tolerance = 1e-14;
+  o.max_num_consecutive_invalid_steps = kInvalidSteps;
+  o.logging_type = ceres::SILENT;
+  o.minimizer_progress_to_stdout = false;
+  o.update_state_every_iteration = true;
+  return o;
+}
+
+// Variables at a bound that the cost would fall beyond.
+std::vector<int> pressed_bounds(const LeastSquaresProblem& problem, const Eigen::VectorXd& x,
+                                const Eigen::VectorXd& g) {
+  std::vector<int> pressed;
+  for (Eigen::Index k = 0; k < x.size(); ++k)
+    if ((x(k) <= problem.x_lower(k) && g(k) > 0) || (x(k) >= problem.x_upper(k) && g(k) < 0))
+      pressed.push_back(static_cast<int>(k));
+  return pressed;
+}
+
+void solve(const LeastSquaresProblem& problem, Residuals& residuals, const std::vector<int>& held,
+           const CeresOptions& options, Progress& progress, Eigen::VectorXd& x, ceres::Solver::Summary& summary) {
+  ceres::Problem::Options ownership;
+  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem ceres_problem(ownership);
+  ceres_problem.AddResidualBlock(&residuals, nullptr, x.data());
+  const int n = static_cast<int>(x.size());
+  for (int k = 0; k < n; ++k) {
+    if (std::isfinite(problem.x_lower(k))) ceres_problem.SetParameterLowerBound(x.data(), k, problem.x_lower(k));
+    if (std::isfinite(problem.x_upper(k))) ceres_problem.SetParameterUpperBound(x.data(), k, problem.x_upper(k));
+  }
+  if (!held.empty()) ceres_problem.SetManifold(x.data(), new ceres::SubsetManifold(n, held));  // the problem owns it
+  ceres::Solver::Options solver = solver_options(options);
+  solver.max_num_iterations = std::max(0, progress.left());
+  solver.callbacks.push_back(&progress);
+  ceres::Solve(solver, &ceres_problem, &summary);
+}
+
+void set_outcome(const ceres::Solver::Summary& summary, const CeresOptions& options, LeastSquaresResult& result) {
+  const std::string failures = result.failed_evaluations > 0
+                                   ? fmt::format("; {} of {} evaluations failed, first: {}", result.failed_evaluations,
+                                                 result.evaluations, result.first_error)
+                                   : "";
+  switch (summary.termination_type) {
+    case ceres::CONVERGENCE:
+    case ceres::USER_SUCCESS:
+      result.status = LeastSquaresStatus::converged;
+      result.message =
+          fmt::format("converged: cost and parameters change by less than {:g} of themselves", options.tolerance);
+      return;
+    case ceres::NO_CONVERGENCE:
+      result.status = LeastSquaresStatus::iteration_limit;
+      result.message = fmt::format("stopped at the limit of {} iterations{}", options.max_iterations, failures);
+      return;
+    case ceres::USER_FAILURE:
+      result.status = LeastSquaresStatus::stopped;
+      result.message = "stopped on request";
+      return;
+    case ceres::FAILURE:
+      break;
+  }
+  result.status = LeastSquaresStatus::failed;
+  result.message = fmt::format("failed: {}{}", summary.message, failures);
+}
+
+}  // namespace
+
+LeastSquaresResult solve_with_ceres(LeastSquaresProblem& problem, const Eigen::VectorXd& x_start,
+                                    const CeresOptions& options) {
+  LeastSquaresResult result;
+  result.x = x_start;
+  Residuals residuals(problem, result);
+  const LeastSquaresPoint start = residuals.at(x_start);
+  if (!start.ok) {
+    result.message = "the start point cannot be evaluated: " + start.message;
+    return result;
+  }
+  result.cost_initial = 0.5 * start.z.squaredNorm();
+
+  // Ceres projects steps onto the bounds, which is slow along an active one: variables that press against their bound
+  // are held there, until nothing changes.
+  Eigen::VectorXd x = x_start;
+  Progress progress(options, x);
+  ceres::Solver::Summary summary;
+  std::vector<int> held;
+  for (Eigen::Index round = 0; round <= 2 * x.size(); ++round) {
+    solve(problem, residuals, held, options, progress, x, summary);
+    result.iterations = progress.iterations();
+    if (summary.termination_type != ceres::CONVERGENCE) break;
+    const LeastSquaresPoint& at = residuals.at(x);
+    std::vector<int> pressed = at.ok ? pressed_bounds(problem, x, at.z_x.transpose() * at.z) : held;
+    if (pressed == held || static_cast<Eigen::Index>(pressed.size()) == x.size()) break;
+    held = std::move(pressed);
+  }
+
+  set_outcome(summary, options, result);
+  const LeastSquaresPoint& end = residuals.at(x);
+  result.x = end.ok ? x : x_start;
+  result.point = end.ok ? end : start;
+  result.cost_final = 0.5 * result.point.z.squaredNorm();
+  return result;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,292 @@
+#include "optim/gradient_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "optim/difference_ladder.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+// The ladder's estimate is of the right size, no bound: entries count as explained within some times of it.
+constexpr double kEstimateTrust = 10;
+// psi carries the rounding of all steps: some units in the last place of the largest numbers it is made of.
+constexpr double kPsiRounding = 100 * kEpsilon;
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+double median(std::vector<double> x) {
+  std::sort(x.begin(), x.end());
+  return x.empty() ? 0 : x[x.size() / 2];
+}
+
+class Check {
+ public:
+  Check(const Scene& scene, const std::vector<Objective>& objectives, const GradientCheckOptions& options)
+      : scene_(scene),
+        objectives_(objectives),
+        options_(options),
+        adjoint_(evaluator(GradientMethod::adjoint)),
+        tlm_(evaluator(GradientMethod::tlm)) {
+    for (const Objective& objective : objectives) result_.objectives.push_back(objective.name());
+    for (const Parameter& p : scene.parameters) result_.parameters.push_back(p.name);
+    rho_ = adjoint_.start();
+    size_.resize(rho_.size());
+    for (Index k = 0; k < rho_.size(); ++k)
+      size_(k) = typical_size(scene.parameters[static_cast<std::size_t>(k)], rho_(k));
+  }
+
+  GradientCheck run() {
+    if (!base_runs()) return std::move(result_);
+    result_.ran = true;
+    measure_times();
+    difference();
+    compare();
+    check_identity();
+    check_taylor();
+    result_.simulations += adjoint_.simulations() + tlm_.simulations();
+    return std::move(result_);
+  }
+
+ private:
+  Evaluator evaluator(GradientMethod method) const {
+    EvaluatorOptions options;
+    options.method = method;
+    options.user_forces = options_.user_forces;
+    options.progress = options_.simulation_progress;
+    return Evaluator(scene_, objectives_, {}, options);
+  }
+
+  bool base_runs() {
+    for (Evaluator* e : {&tlm_, &adjoint_}) {
+      const Evaluation& base = e->gradients(rho_);
+      result_.statistics = base.statistics;
+      if (!base.ok) {
+        result_.message = base.message;
+        return false;
+      }
+      (e == &tlm_ ? result_.tlm : result_.adjoint) = base.psi_rho;
+      result_.psi = base.psi;
+      steps_ = base.steps;
+    }
+    return true;
+  }
+
+  void measure_times() {
+    // A fresh evaluator's first call at a point always simulates.
+    auto timed = [&](const auto& work) {
+      std::vector<double> seconds;
+      for (int i = 0; i < std::max(1, options_.repetitions); ++i) seconds.push_back(work());
+      return median(std::move(seconds));
+    };
+    auto gradient_seconds = [&](GradientMethod method) {
+      return timed([&] {
+        Evaluator fresh = evaluator(method);
+        const double seconds = fresh.gradients(rho_).wall_seconds;
+        result_.simulations += fresh.simulations();
+        return seconds;
+      });
+    };
+    result_.simulation.wall_seconds = timed([&] {
+      Evaluator fresh = evaluator(GradientMethod::automatic);
+      const double seconds = fresh.values(rho_).wall_seconds;
+      result_.simulations += fresh.simulations();
+      return seconds;
+    });
+    result_.simulation.ratio = 1;
+    result_.tlm_cost.wall_seconds = gradient_seconds(GradientMethod::tlm);
+    result_.adjoint_cost.wall_seconds = gradient_seconds(GradientMethod::adjoint);
+    for (MethodCost* cost : {&result_.tlm_cost, &result_.adjoint_cost}) set_ratio(*cost);
+  }
+
+  void set_ratio(MethodCost& cost) const {
+    const double one = result_.simulation.wall_seconds;
+    cost.ratio = one > 0 ? cost.wall_seconds / one : 0;
+  }
+
+  std::optional<VectorXd> psi_at(const VectorXd& rho, bool frozen) {
+    Evaluation e;
+    if (frozen) {
+      e = tlm_.values_on(steps_, rho);
+    } else {
+      Evaluator fresh = evaluator(GradientMethod::automatic);
+      e = fresh.values(rho);
+    }
+    result_.simulations += e.simulations;
+    if (!e.ok) return std::nullopt;
+    return e.psi;
+  }
+
+  void difference() {
+    const Index m = result_.psi.size(), P = rho_.size();
+    for (MatrixXd* x : {&result_.frozen, &result_.free, &frozen_error_, &free_error_}) x->setZero(m, P);
+    for (Index k = 0; k < P; ++k) {
+      for (const bool frozen : {true, false}) {
+        if (!frozen && !options_.free_steps) continue;
+        const auto start = std::chrono::steady_clock::now();
+        const auto f = [&](double h) {
+          VectorXd rho = rho_;
+          rho(k) += h;
+          return psi_at(rho, frozen);
+        };
+        LadderOptions ladder{options_.relative_step * size_(k), options_.rungs, frozen ? kPsiRounding : 0};
+        const LadderDerivative d = difference_ladder(f, m, ladder);
+        (frozen ? result_.frozen : result_.free).col(k) = d.derivative;
+        (frozen ? frozen_error_ : free_error_).col(k) = d.error;
+        (frozen ? result_.frozen_cost : result_.free_cost).wall_seconds += seconds_since(start);
+      }
+      if (options_.progress) options_.progress(static_cast<int>(k) + 1, static_cast<int>(P));
+    }
+    set_ratio(result_.frozen_cost), set_ratio(result_.free_cost);
+  }
+
+  void compare() {
+    const CheckThresholds& limits = options_.thresholds;
+    for (Index i = 0; i < result_.psi.size(); ++i) {
+      const double largest = result_.tlm.row(i).cwiseAbs().cwiseProduct(size_.transpose()).maxCoeff();
+      for (Index k = 0; k < rho_.size(); ++k) {
+        CheckedEntry e;
+        e.objective = result_.objectives[static_cast<std::size_t>(i)];
+        e.parameter = result_.parameters[static_cast<std::size_t>(k)];
+        e.tlm = result_.tlm(i, k), e.adjoint = result_.adjoint(i, k);
+        e.frozen = result_.frozen(i, k), e.frozen_error = frozen_error_(i, k);
+        e.free = result_.free(i, k), e.free_error = free_error_(i, k);
+        const double entry = std::max(std::abs(e.tlm), std::abs(e.adjoint));
+        const double floor = limits.rounding_floor * largest / size_(k);
+        auto relative = [](double difference, double to) { return difference == 0 ? 0 : std::abs(difference) / to; };
+        e.tlm_adjoint = relative(e.tlm - e.adjoint, std::max(entry, floor));
+        e.frozen_difference = relative(e.frozen - e.tlm, entry);
+        e.free_difference = relative(e.free - e.tlm, entry);
+        e.exact = entry == 0                            ? Verdict::zero
+                  : e.tlm_adjoint <= limits.tlm_adjoint ? Verdict::agrees
+                                                        : Verdict::disagrees;
+        e.frozen_verdict = frozen_verdict(e, entry);
+        result_.entries.push_back(std::move(e));
+      }
+    }
+  }
+
+  Verdict frozen_verdict(const CheckedEntry& e, double entry) const {
+    const double difference = std::abs(e.frozen - e.tlm), threshold = options_.thresholds.frozen * entry;
+    if (entry == 0 && e.frozen == 0) return Verdict::zero;
+    if (difference <= threshold) return Verdict::agrees;
+    // The differences' own error counts only where it hides the entry at this threshold.
+    const double own = kEstimateTrust * e.frozen_error;
+    if (own > threshold && difference <= own && std::isfinite(own)) return Verdict::buried;
+    return Verdict::disagrees;
+  }
+
+  VectorXd random_direction(Index n) {
+    std::normal_distribution<double> normal;
+    VectorXd d(n);
+    for (Index k = 0; k < n; ++k) d(k) = normal(generator_);
+    return d;
+  }
+
+  void check_identity() {
+    constexpr int kDirections = 3;
+    for (int i = 0; i < kDirections; ++i) {
+      const VectorXd d = random_direction(rho_.size()).cwiseProduct(size_);
+      const VectorXd w = random_direction(result_.psi.size());
+      IdentityCheck check;
+      check.tlm = w.dot(result_.tlm * d);
+      check.adjoint = (result_.adjoint.transpose() * w).dot(d);
+      const double terms = w.cwiseAbs().dot(result_.tlm.cwiseAbs() * d.cwiseAbs());
+      check.relative_defect = terms > 0 ? std::abs(check.tlm - check.adjoint) / terms : 0;
+      check.passed = check.relative_defect <= options_.thresholds.identity;
+      result_.identities.push_back(check);
+    }
+  }
+
+  // R(h) = |psi(rho + h d) - psi - h psi_rho d|: where it stands clear of rounding, it falls by 4 when h is halved.
+  void check_taylor() {
+    constexpr int kRungs = 14;
+    constexpr double kLargest = 1e-2, kClear = 100;  // clear of rounding: that many times above it
+    const VectorXd d = random_direction(rho_.size()).cwiseProduct(size_) / std::sqrt(static_cast<double>(rho_.size()));
+    const VectorXd slope = result_.tlm * d;
+    std::vector<VectorXd> remainders, noise;
+    std::vector<double> steps;
+    double h = kLargest;
+    for (int j = 0; j < kRungs; ++j, h /= 2) {
+      const std::optional<VectorXd> psi = psi_at(rho_ + h * d, true);
+      if (!psi) continue;
+      steps.push_back(h);
+      remainders.push_back((*psi - result_.psi - h * slope).cwiseAbs());
+      noise.push_back(kPsiRounding * psi->cwiseAbs().cwiseMax(result_.psi.cwiseAbs()));
+    }
+    for (Index i = 0; i < result_.psi.size(); ++i) {
+      TaylorCheck check;
+      check.objective = result_.objectives[static_cast<std::size_t>(i)];
+      std::vector<double> slopes;
+      for (std::size_t j = 0; j < steps.size(); ++j) {
+        check.rows.push_back({steps[j], remainders[j](i)});
+        if (j == 0 || remainders[j](i) <= kClear * noise[j](i)) continue;
+        slopes.push_back(std::log(remainders[j - 1](i) / remainders[j](i)) / std::log(steps[j - 1] / steps[j]));
+      }
+      // Large h has terms of higher order: the later slopes tell.
+      if (slopes.size() > 4) slopes.erase(slopes.begin(), slopes.end() - 4);
+      check.slope = slopes.empty() ? kInfinity : median(slopes);
+      check.passed = !steps.empty() && check.slope >= options_.thresholds.taylor_slope;
+      result_.taylor.push_back(std::move(check));
+    }
+  }
+
+  const Scene& scene_;
+  const std::vector<Objective>& objectives_;
+  const GradientCheckOptions& options_;
+  Evaluator adjoint_, tlm_;
+  VectorXd rho_, size_;
+  StepSequence steps_;
+  MatrixXd frozen_error_, free_error_;
+  std::mt19937 generator_{options_.seed};
+  GradientCheck result_;
+};
+
+}  // namespace
+
+std::string_view to_string(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::agrees:
+      return "agrees";
+    case Verdict::buried:
+      return "agrees within rounding";
+    case Verdict::zero:
+      return "zero";
+    case Verdict::disagrees:
+      break;
+  }
+  return "DISAGREES";
+}
+
+bool GradientCheck::passed() const {
+  auto fine = [](const CheckedEntry& e) {
+    return e.exact != Verdict::disagrees && e.frozen_verdict != Verdict::disagrees;
+  };
+  auto passes = [](const auto& check) { return check.passed; };
+  return ran && std::all_of(entries.begin(), entries.end(), fine) &&
+         std::all_of(taylor.begin(), taylor.end(), passes) && std::all_of(identities.begin(), identities.end(), passes);
+}
+
+GradientCheck check_gradients(const Problem& problem, const GradientCheckOptions& options) {
+  return check_gradients(problem.scene, objectives_of(problem), options);
+}
+
+GradientCheck check_gradients(const Scene& scene, const std::vector<Objective>& objectives,
+                              const GradientCheckOptions& options) {
+  return Check(scene, objectives, options).run();
+}
+
+}  // namespace mbsopt

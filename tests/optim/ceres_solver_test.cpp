@@ -1,0 +1,83 @@
+#include "optim/ceres_solver.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <stdexcept>
+
+using namespace mbsopt;
+
+namespace {
+
+// Rosenbrock as residuals: z = (1 - x0, 10 (x1 - x0^2)).
+struct RosenbrockResiduals : LeastSquaresProblem {
+  RosenbrockResiduals() : LeastSquaresProblem(2, 2) {}
+  void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& p) override {
+    ++calls;
+    p.z << 1 - x(0), 10 * (x(1) - x(0) * x(0));
+    p.z_x << -1, 0, -20 * x(0), 10;
+  }
+  long calls = 0;
+};
+
+// One residual, exp(x) - 20, evaluable for x <= 3.5 only; Gauss-Newton from 0 jumps to 19.
+struct FragileResidual : LeastSquaresProblem {
+  FragileResidual() : LeastSquaresProblem(1, 1) {}
+  void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& p) override {
+    if (x(0) > 3.5) throw std::runtime_error("the loop cannot be closed");
+    p.z << std::exp(x(0)) - 20;
+    p.z_x << std::exp(x(0));
+  }
+};
+
+}  // namespace
+
+TEST_CASE("ceres finds Rosenbrock's minimum with one evaluation per point", "[ceres]") {
+  RosenbrockResiduals problem;
+  std::vector<LeastSquaresProgress> seen;
+  CeresOptions options;
+  options.progress = [&](const LeastSquaresProgress& p) {
+    seen.push_back(p);
+    return true;
+  };
+  const LeastSquaresResult result = solve_with_ceres(problem, Eigen::Vector2d(-1.2, 1), options);
+  CHECK(result.status == LeastSquaresStatus::converged);
+  CHECK((result.x - Eigen::Vector2d(1, 1)).norm() < 1e-8);
+  CHECK(result.cost_initial == Approx(12.1));
+  CHECK(result.evaluations == problem.calls);
+  CHECK(result.evaluations <= result.iterations + 4);
+  REQUIRE(seen.size() == static_cast<std::size_t>(result.iterations) + 1);
+  CHECK(seen.front().x == Eigen::Vector2d(-1.2, 1));
+  CHECK(seen.back().cost == Approx(result.cost_final).margin(1e-20));
+}
+
+TEST_CASE("ceres keeps within bounds", "[ceres]") {
+  RosenbrockResiduals problem;
+  problem.x_upper << 0.5, 10;
+  const LeastSquaresResult result = solve_with_ceres(problem, Eigen::Vector2d(-1.2, 1));
+  CHECK(result.status == LeastSquaresStatus::converged);
+  CHECK(result.x(0) == 0.5);
+  CHECK(result.x(1) == Approx(0.25).margin(1e-6));
+}
+
+TEST_CASE("a failed evaluation makes ceres shorten the step", "[ceres]") {
+  FragileResidual problem;
+  const LeastSquaresResult result = solve_with_ceres(problem, Eigen::VectorXd::Zero(1));
+  CHECK(result.status == LeastSquaresStatus::converged);
+  CHECK(result.x(0) == Approx(std::log(20)).epsilon(1e-8));
+  CHECK(result.failed_evaluations > 0);
+  CHECK(result.first_error == "the loop cannot be closed");
+  const LeastSquaresResult bad = solve_with_ceres(problem, Eigen::VectorXd::Constant(1, 5));
+  CHECK(bad.status == LeastSquaresStatus::failed);
+  CHECK(bad.message == "the start point cannot be evaluated: the loop cannot be closed");
+}
+
+TEST_CASE("ceres stops on request and at the limit", "[ceres]") {
+  RosenbrockResiduals problem;
+  CeresOptions options;
+  options.progress = [](const LeastSquaresProgress& p) { return p.cost > 10; };
+  const LeastSquaresResult stopped = solve_with_ceres(problem, Eigen::Vector2d(-1.2, 1), options);
+  CHECK(stopped.status == LeastSquaresStatus::stopped);
+  CHECK(stopped.cost_final < stopped.cost_initial);
+  const LeastSquaresResult limited = solve_with_ceres(problem, Eigen::Vector2d(-1.2, 1), {1e-10, 2, {}});
+  CHECK(limited.status == LeastSquaresStatus::iteration_limit);
+}

@@ -1,0 +1,101 @@
+#include "optim/gradient_check.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "five_bar.hpp"
+
+using namespace mbsopt;
+
+TEST_CASE("five-bar: every gradient method agrees with every other", "[check]") {
+  Problem problem = five_bar::problem(1e-8);
+  ObjectiveSpec terminal;
+  terminal.name = "drop";
+  terminal.terminal = Expression::parse("r2_y");
+  terminal.parameters_only = Expression::parse("0.01*k1*m1");
+  terminal.samples = {{0.5, Expression::parse("r2_x*m2")}, {2.25, Expression::parse("t*r2_y^2")}};
+  problem.objectives.push_back(terminal);
+  problem.scene.simulation.end_time = 3;
+  GradientCheckOptions options;
+  options.repetitions = 3;
+  const GradientCheck check = check_gradients(problem, options);
+  REQUIRE(check.ran);
+  REQUIRE(check.entries.size() == 20);
+  for (const CheckedEntry& e : check.entries) {
+    INFO(e.objective << " " << e.parameter << ": tlm " << e.tlm << " adjoint " << e.adjoint << " frozen " << e.frozen
+                     << " +- " << e.frozen_error << " free " << e.free);
+    CHECK(e.exact == Verdict::agrees);
+    CHECK(e.frozen_verdict == Verdict::agrees);
+    CHECK(e.frozen_difference < 1e-7);
+    CHECK(e.free_difference < 1e-3);
+  }
+  for (const TaylorCheck& t : check.taylor) {
+    INFO(t.objective << " slope " << t.slope);
+    CHECK(t.passed);
+    CHECK(t.slope < 2.2);
+  }
+  for (const IdentityCheck& i : check.identities) CHECK(i.relative_defect < 1e-11);
+  CHECK(check.passed());
+  CHECK(check.adjoint_cost.ratio > 1);
+  CHECK(check.tlm_cost.ratio > 1);
+  WARN("one simulation " << check.simulation.wall_seconds << " s; tlm " << check.tlm_cost.ratio << ", adjoint "
+                         << check.adjoint_cost.ratio << ", frozen differences " << check.frozen_cost.ratio);
+}
+
+TEST_CASE("entries that are zero, exactly or nearly, get a sane verdict", "[check]") {
+  Problem problem = five_bar::problem(1e-8);
+  problem.scene.simulation.end_time = 0.5;
+  ObjectiveSpec x;
+  x.name = "stiffness";  // of k1 alone: all other entries are exactly zero
+  x.parameters_only = Expression::parse("k1^2");
+  problem.objectives = {x};
+  GradientCheckOptions options;
+  options.repetitions = 1;
+  const GradientCheck check = check_gradients(problem, options);
+  REQUIRE(check.ran);
+  for (const CheckedEntry& e : check.entries) {
+    const bool zero = e.parameter != "k1";
+    CHECK(e.exact == (zero ? Verdict::zero : Verdict::agrees));
+    CHECK(e.frozen_verdict == (zero ? Verdict::zero : Verdict::agrees));
+  }
+  CHECK(check.passed());
+}
+
+TEST_CASE("a check whose base run fails says why and does not pass", "[check]") {
+  Problem problem = five_bar::problem(1e-8);
+  problem.scene.simulation.integrator.max_steps = 3;
+  const GradientCheck check = check_gradients(problem);
+  CHECK_FALSE(check.ran);
+  CHECK_FALSE(check.message.empty());
+  CHECK_FALSE(check.passed());
+}
+
+namespace {
+
+// A user's cost with a derivative that is wrong by a part in 1e5.
+struct WrongCost : RunningCost {
+  double g(double, VecIn y, VecIn) const override { return y(0) * y(0); }
+  void add_g_y(double, VecIn y, VecIn, double scale, VecOut out) const override {
+    out(0) += scale * 2 * y(0) * (1 + 1e-5);
+  }
+  void add_g_rho(double, VecIn, VecIn, double, VecOut) const override {}
+};
+
+}  // namespace
+
+TEST_CASE("a wrong derivative of a user's cost shows in frozen differences, not in TLM against adjoint", "[check]") {
+  Problem problem = five_bar::problem(1e-8);
+  problem.scene.simulation.end_time = 1;
+  const Objective wrong("wrong", std::make_shared<WrongCost>(), nullptr);
+  GradientCheckOptions options;
+  options.repetitions = 1, options.free_steps = false;
+  const GradientCheck check = check_gradients(problem.scene, {wrong}, options);
+  REQUIRE(check.ran);
+  CHECK_FALSE(check.passed());
+  int disagree = 0;
+  for (const CheckedEntry& e : check.entries) {
+    CHECK(e.exact == Verdict::agrees);
+    disagree += e.frozen_verdict == Verdict::disagrees;
+  }
+  CHECK(disagree > 5);
+}
