@@ -108,7 +108,8 @@ void print_simulation(std::ostream& out, const SimulationSettings& settings, con
                      plural(statistics.steps), statistics.rejected, statistics.rhs_evaluations,
                      statistics.wall_seconds);
   out << fmt::format(
-      "largest violation of the constraints {:.1e} (positions), {:.1e} (velocities); energy drift {:.1e} J\n",
+      "largest violation of the constraints {:.1e} (positions), {:.1e} (velocities); largest change of energy {:.1e} "
+      "J\n",
       statistics.max_position_violation, statistics.max_velocity_violation, statistics.energy_drift);
 }
 

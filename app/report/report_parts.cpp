@@ -66,7 +66,7 @@ void add_simulation(HtmlPage& page, const Json& result) {
                {"rhs_evaluations", "right-hand sides"},
                {"max_position_violation", "largest violation, positions"},
                {"max_velocity_violation", "largest violation, velocities"},
-               {"energy_drift", "largest energy drift [J]"}});
+               {"energy_drift", "largest change of energy [J]"}});
 }
 
 void add_objectives(HtmlPage& page, const Json& result) {
