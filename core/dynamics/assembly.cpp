@@ -238,6 +238,27 @@ void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
   rho_bar += d.q_b_rho.transpose() * b_bar + d.q_g_rho.transpose() * g_bar;
 }
 
+std::vector<int> Assembly::obstructed() const {
+  const Solution& s = *solution_;
+  const Solution::Derivatives d = s.derivatives();
+  // What is left of each right-hand side outside the range of J, rows scaled to unit length.
+  auto left = [](const NearestPointLinearisation& at, const MatrixXd& J, const MatrixXd& b) {
+    return MatrixXd(at.row_scale().asDiagonal() * (b - J * at.pseudo_inverse_times(b)));
+  };
+  const Index N = 7 * s.data.n;
+  const MatrixXd q_left = left(s.q->linearisation, s.position.gradients(s.result.y).y.leftCols(N), d.q_b_rho);
+  const MatrixXd q_rho = s.q->linearisation.solve(d.q_b_rho, d.q_g_rho), v_b = d.v_b_q * q_rho + d.v_b_rho;
+  const MatrixXd v_left = left(s.v->linearisation, s.velocity.gradients(s.result.y).y.rightCols(N), v_b);
+  std::vector<int> parameters;
+  for (Index k = 0; k < d.q_b_rho.cols(); ++k) {
+    const double q_size = 1 + d.q_b_rho.col(k).norm(), v_size = 1 + v_b.col(k).norm();
+    if (q_left.col(k).norm() > 1e-7 * q_size || v_left.col(k).norm() > 1e-7 * v_size) {
+      parameters.push_back(static_cast<int>(k));
+    }
+  }
+  return parameters;
+}
+
 // Rows are taken in file order, unit norms first; one that lies in the span of those before it is redundant.
 ModelSummary Assembly::summary() const {
   const MechanismData& d = solution_->data;

@@ -3,7 +3,7 @@
 //   positions:   min 1/2 |q - q_guess|^2   subject to  Phi(q, rho) = 0, c(q, rho) = 0      (q: r_g and p, unweighted)
 //   velocities:  min 1/2 |v - v_guess|^2   subject to  Phi_q v = -Phi_t, c_q v = rates
 //
-// Derivatives come from the optimality conditions of both problems.
+// Derivatives come from the optimality conditions of both problems (nearest_point.hpp). docs/assembly.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -30,6 +30,9 @@ class Assembly {
   ModelSummary summary() const;
   Eigen::MatrixXd tangent() const;                                                 // dy/drho, 14n x P
   void add_adjoint(const Eigen::MatrixXd& y_bar, Eigen::MatrixXd& rho_bar) const;  // rho_bar += (dy/drho)' y_bar
+  // Parameters that cannot change by themselves: where equations are redundant, they would contradict each other (one
+  // of two parallel cranks longer than the other). The state has no derivative with respect to them.
+  std::vector<int> obstructed() const;
 
  private:
   struct Solution;

@@ -107,13 +107,9 @@ void reduce_violation(NearestPointEquations& equations, VectorXd& x, int& iterat
 
 class Search {
  public:
-  Search(NearestPointEquations& equations, const VectorXd& x_guess)
-      : equations_(equations), x_guess_(x_guess), result_{NearestPointStatus::stalled,
-                                                          x_guess,
-                                                          {},
-                                                          {},
-                                                          0,
-                                                          NearestPointLinearisation(equations.jacobian(x_guess))} {}
+  Search(NearestPointEquations& equations, const VectorXd& x_guess) : equations_(equations), x_guess_(x_guess) {
+    result_.x = x_guess;
+  }
 
   NearestPoint run() {
     if (!newton()) sqp();

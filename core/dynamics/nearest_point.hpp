@@ -43,6 +43,7 @@ class NearestPointLinearisation {
  public:
   static constexpr double kRankThreshold = 1e-8;  // relative, rows of J scaled to unit length
 
+  NearestPointLinearisation() = default;
   explicit NearestPointLinearisation(const Eigen::MatrixXd& J);
 
   Eigen::Index rank() const { return J_transposed_.rank(); }

@@ -304,6 +304,18 @@ TEST_CASE("derivatives of the assembled state: spatial loop, every kind of field
   check_derivatives(scene);
 }
 
+TEST_CASE("a parameter that would break a redundant loop is known to have no derivative", "[assembly]") {
+  Scene scene = four_bar();
+  add_parameters(scene, {{"tilt", 0.0}});
+  scene.joints[3].axis1 = vec("tilt", "0", "1");  // out of the plane's normal: the loop opens
+  const Mechanism mechanism(scene, nominal(scene));
+  CHECK(Assembly(mechanism, 0).obstructed() == std::vector<int>{7});
+  scene.parameters[7].value = 1e-3;
+  const AssemblyResult opened = assemble(scene);
+  INFO(opened.message);
+  CHECK_FALSE(opened.ok);
+}
+
 TEST_CASE("only active parameters get derivatives", "[assembly]") {
   const Scene scene = spatial_four_bar();
   const VectorXd rho = nominal(scene);
