@@ -1,8 +1,34 @@
-#include "core/expression/expression.hpp"
-#include "optim/problem.hpp"
+// A project of its own: swings a rod, then minimises with Ipopt through the installed libraries.
+#include <cmath>
+#include <cstdio>
+
+#include "core/integrate/simulation.hpp"
+#include "core/mechanism/mechanism.hpp"
+#include "optim/ipopt_solver.hpp"
+
+namespace {
+
+struct Sphere : mbsopt::NonlinearProgram {
+  Sphere() : NonlinearProgram(2, 0) {}
+  void evaluate(const Eigen::VectorXd& x, mbsopt::NlpPoint& p) override { p.f = x.squaredNorm(), p.f_x = 2 * x; }
+};
+
+}  // namespace
 
 int main() {
-  mbsopt::Problem problem;
-  problem.scene.gravity[2] = mbsopt::Expression::parse("-2*3");
-  return problem.scene.gravity[2].number() == -6 ? 0 : 1;
+  mbsopt::Body rod;
+  rod.name = "rod", rod.mass = 1.0, rod.com = {0.5, 0.0, 0.0};
+  rod.inertia = {0.01, 0.1, 0.1, 0.0, 0.0, 0.0};
+  mbsopt::Joint pin;
+  pin.name = "pin", pin.type = "revolute", pin.body2 = "rod";
+  pin.axis1 = mbsopt::VectorField{0.0, 1.0, 0.0}, pin.axis2 = pin.axis1;
+  mbsopt::Scene scene;
+  scene.bodies = {rod}, scene.joints = {pin};
+  const mbsopt::Mechanism mechanism(scene, Eigen::VectorXd());
+  const mbsopt::SimulationResult run = mbsopt::simulate(mechanism, scene.simulation);
+
+  Sphere sphere;
+  const mbsopt::NlpResult minimum = mbsopt::solve_with_ipopt(sphere, Eigen::Vector2d(1, 2));
+  std::printf("energy drift %.1e J, minimum at %.1e\n", run.statistics.energy_drift, minimum.x.norm());
+  return run.ok() && run.statistics.energy_drift < 1e-3 && minimum.x.norm() < 1e-6 ? 0 : 1;
 }
