@@ -36,8 +36,8 @@ void Dynamics::add_user_tangent(const ParameterBlock& block, const LaneRows& y_d
     f.force->C(t_, q, v, data_.rho, user_C_.topLeftCorner(size, size));
     f.force->Q_rho(t_, q, v, data_.rho, user_Q_rho_.topRows(size));
     for (int lane = 0; lane < kLanes; ++lane) {
-      if (block.parameter[lane] < 0) continue;
-      user_e_.head(size) = user_Q_rho_.col(block.parameter[lane]).head(size);
+      user_e_.setZero();
+      if (block.parameter[lane] >= 0) user_e_.head(size) = user_Q_rho_.col(block.parameter[lane]).head(size);
       for (std::size_t k = 0; k < f.bodies.size(); ++k) {
         const Eigen::Index at = 7 * static_cast<Eigen::Index>(k), i = 7 * (f.bodies[k] - 1);
         user_e_.head(size).noalias() -= user_K_.block(0, at, size, 7).lazyProduct(y_dir.col(lane).segment<7>(i));

@@ -29,7 +29,7 @@ FormulationSettings formulation(const std::string& name) {
   FormulationSettings s;
   if (name == "penalty") {
     s = FormulationSettings::penalty();
-    s.alpha = 1e4;  // so that rounding leaves differences their digits
+    s.alpha = 1e2;  // rounding errors grow with alpha: so differences keep their digits
   } else if (name == "stabilised") {
     s.omega = 7, s.xi = 0.8;
   }
@@ -77,7 +77,7 @@ TEST_CASE("the augmented Lagrangian reaches the constrained equations whatever i
   const MechanismData& d = mechanism.data();
   const VectorXd y = state(mechanism, 5), angles = VectorXd::Zero(1);
   FormulationSettings settings;
-  settings.iterations = 8;
+  settings.iterations = 40;
   settings.alpha = GENERATE(1e3, 1e5, 1e7, 1e9, 1e11);
   Dynamics dynamics(mechanism, settings);
   VectorXd rate(y.size());
@@ -92,14 +92,14 @@ TEST_CASE("the augmented Lagrangian reaches the constrained equations whatever i
   const double size = expected.cwiseAbs().maxCoeff();
   INFO("alpha " << settings.alpha);
   CHECK((rate - expected).cwiseAbs().maxCoeff() < 1e-11 * size);
-  CHECK(Jz.cwiseAbs().maxCoeff() > 1);  // there is something to satisfy
+  CHECK(Jz.cwiseAbs().maxCoeff() > 0.1);  // there is something to satisfy
 }
 
 TEST_CASE("accelerations equal a dense solution of the constrained equations", "[dynamics]") {
-  const Scene scene = four_bar();
+  const Scene scene = spatial_four_bar();
   const Mechanism mechanism(scene, nominal(scene));
   const MechanismData& d = mechanism.data();
-  VectorXd y = state(mechanism, 7);
+  const VectorXd y = state(mechanism, 7);
   const VectorXd angles = VectorXd::Zero(1);
   Dynamics dynamics(mechanism, {});
   VectorXd rate(y.size());

@@ -22,12 +22,12 @@ SimulationResult run_with_step(Scene scene, const std::string& method, double st
 
 TEST_CASE("every method converges at its order on a closed loop, projection included", "[order]") {
   Scene scene = loaded_four_bar();
-  scene.simulation.end_time = 0.4;
+  scene.simulation.end_time = 0.96;
   for (const Method& rk : explicit_methods()) {
     const std::string name(rk.name);
     scene.simulation.integrator.type = name;
-    const double h = rk.order > 5 ? 0.1 : 0.02;
-    const VectorXd exact = run_with_step(scene, "dopri853", 0.4 / 128).y_end;
+    const double h = rk.order > 5 ? 0.12 : 0.01;
+    const VectorXd exact = run_with_step(scene, "dopri853", 0.96 / 192).y_end;
     const double coarse = (run_with_step(scene, name, h).y_end - exact).norm();
     const double fine = (run_with_step(scene, name, h / 2).y_end - exact).norm();
     INFO(name << ": errors " << coarse << ", " << fine);
