@@ -64,12 +64,14 @@ class Progress : public ceres::IterationCallback {
  public:
   Progress(const CeresOptions& options, const Eigen::VectorXd& x) : options_(options), x_(x) {}
 
+  const Eigen::VectorXd& last() const { return last_; }  // accepted; Ceres itself forgets it when it is stopped
   int iterations() const { return std::max(0, count_); }
   int left() const { return options_.max_iterations - iterations(); }
 
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& s) override {
     if (s.iteration == 0 && count_ >= 0) return ceres::SOLVER_CONTINUE;  // the point just reported
     ++count_;
+    last_ = x_;
     if (!options_.progress) return ceres::SOLVER_CONTINUE;
     const bool go_on = options_.progress({count_, s.cost, s.gradient_max_norm, s.step_norm, x_});
     return go_on ? ceres::SOLVER_CONTINUE : ceres::SOLVER_ABORT;
@@ -78,6 +80,7 @@ class Progress : public ceres::IterationCallback {
  private:
   const CeresOptions& options_;
   const Eigen::VectorXd& x_;  // Ceres keeps it at the last accepted point
+  Eigen::VectorXd last_;
   int count_ = -1;
 };
 
@@ -184,6 +187,7 @@ LeastSquaresResult solve_with_ceres(LeastSquaresProblem& problem, const Eigen::V
   }
 
   set_outcome(summary, options, result);
+  if (summary.termination_type != ceres::CONVERGENCE && progress.last().size() > 0) x = progress.last();
   const LeastSquaresPoint& end = residuals.at(x);
   result.x = end.ok ? x : x_start;
   result.point = end.ok ? end : start;

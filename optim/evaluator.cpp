@@ -35,7 +35,8 @@ std::string_view to_string(GradientMethod method) {
 }
 
 GradientCost gradient_cost(std::size_t variables, std::size_t objectives) {
-  return {1 + 0.35 * static_cast<double>(variables), 2 + static_cast<double>(objectives)};
+  const double blocks = std::ceil(static_cast<double>(variables) / 4);
+  return {3 + 2 * blocks, 2.5 + 0.6 * static_cast<double>(objectives)};
 }
 
 std::vector<int> parameter_indices(const Scene& scene, const std::vector<std::string>& names) {

@@ -28,10 +28,9 @@ struct DifferenceSettings {
   bool frozen_steps = true;     // on the steps of the run at the point itself, else with step-size control
 };
 
-// Estimated cost in simulations, from which `automatic` chooses. Measured on chains and loops of 1 to 20 bodies
-// (docs/design-optimisation.md).
-//   tlm        1 + 0.35 per variable
-//   adjoint    2 + 1 per objective
+// Estimated cost in simulations, from which `automatic` chooses; measured, see docs/design-optimisation.md.
+//   tlm        3 + 2 per block of four variables
+//   adjoint    2.5 + 0.6 per objective
 struct GradientCost {
   double tlm = 0, adjoint = 0;
 };
