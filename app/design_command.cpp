@@ -116,11 +116,11 @@ int design_command(const CommandContext& context) {
   add_to_result(run.result, design);
   print_design(context.out, design);
   const bool stopped = interrupted();
-  const SimulatedMotion after = simulated_motion(run, design.rho);
+  const SimulatedMotion after = stopped ? SimulatedMotion{} : simulated_motion(run, design.rho);
   const Trajectory history = history_of(design);
   run.write("optimized.json", optimized_text(run, design));
   run.write("history.csv", to_csv(history));
-  run.write("trajectory.csv", to_csv(after.trajectory));
+  if (!after.trajectory.rows.empty()) run.write("trajectory.csv", to_csv(after.trajectory));
   run.write("report.html", design_report(scene, run.result, history, before.trajectory, after.trajectory));
   if (stopped) return run.stopped();
   if (!design.ok()) return run.failed(design.message, scene.simulation.end_time);

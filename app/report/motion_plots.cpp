@@ -67,6 +67,7 @@ std::vector<Group> position_groups(const Scene& scene, const Trajectory& traject
 
 void add_series(LinePlot& plot, const Group& group, const Trajectory& trajectory, const std::string& suffix,
                 Mark mark) {
+  if (trajectory.rows.empty()) return;  // the run failed before its first row, or was interrupted
   for (const std::size_t index : group.second) {
     plot.series.push_back({trajectory.columns[index] + suffix, column(trajectory, 0), column(trajectory, index), mark});
   }

@@ -1,5 +1,10 @@
+#include <signal.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <chrono>
+#include <thread>
 
 #include "app/exit_code.hpp"
 #include "tests/app/run_command.hpp"
@@ -73,6 +78,21 @@ TEST_CASE("design: too few iterations is a failure in words that keeps the best 
   CHECK(result.at("status") == "failed");
   CHECK(result.at("optimizer").at("objective_final") <= result.at("optimizer").at("objective_initial"));
   CHECK(fs::exists(folder.path / "out/optimized.json"));
+}
+
+TEST_CASE("design: SIGTERM keeps the best so far", "[command]") {
+  const TemporaryFolder folder;
+  std::thread killer([] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    ::kill(::getpid(), SIGTERM);
+  });
+  std::vector<std::string> more = kBounds;  // simulations that take seconds, so that the signal comes within one
+  more.insert(more.end(), {"--set", "simulation.integrator.rtol=1e-13", "--set", "simulation.integrator.atol=1e-15",
+                           "--set", "simulation.integrator.max_step=1e-5", "--set", "simulation.output_step=0.1"});
+  const CommandOutcome outcome = run_design_command(folder.write("rod.json", kPendulum), folder.file("out"), more);
+  killer.join();
+  CHECK(outcome.exit_code == kInterrupted);
+  CHECK(json_of(folder.path / "out/result.json").at("status") == "interrupted");
 }
 
 TEST_CASE("design and identify of a file that does not ask for them are bad input", "[command]") {

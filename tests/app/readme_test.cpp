@@ -75,3 +75,15 @@ TEST_CASE("the README's example prints what the README says", "[readme]") {
     CHECK((a && b ? std::abs(*a - *b) <= 1e-6 * (1 + std::abs(*a)) : expected[i] == printed[i]));
   }
 }
+
+TEST_CASE("every page that the README links to is there", "[readme]") {
+  const std::string readme = content_of(fs::path(MBSOPT_SOURCE_DIR) / "README.md");
+  int links = 0;
+  for (std::size_t at = readme.find("]("); at != std::string::npos; at = readme.find("](", at + 1)) {
+    const std::string page = readme.substr(at + 2, readme.find(')', at) - at - 2);
+    INFO(page);
+    CHECK(fs::exists(fs::path(MBSOPT_SOURCE_DIR) / page));
+    ++links;
+  }
+  CHECK(links > 0);
+}
