@@ -167,7 +167,11 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
   EvaluatorOptions evaluator_options;
   evaluator_options.method = options.method;
   evaluator_options.user_forces = options.user_forces;
-  evaluator_options.progress = options.simulation_progress;
+  bool abandoned = false;
+  if (options.simulation_progress)
+    evaluator_options.progress = [&](double t) {
+      return abandoned = abandoned || !options.simulation_progress(t), !abandoned;
+    };
   Evaluator evaluator(problem.scene, objectives_of(problem, objective_names(spec)), spec.variables, evaluator_options);
   const VariableScaling scaling(chosen(problem.scene, evaluator.variables()));
   DesignProgram program(spec, evaluator, scaling);
@@ -197,11 +201,12 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
     return !options.progress || options.progress(result.history.back());
   };
   const NlpResult solution = solve_with_ipopt(program, x_start, solver);
-  result.status = solution.status, result.message = solution.message;
+  result.status = abandoned ? NlpStatus::stopped : solution.status;
+  result.message = abandoned ? "stopped on request" : solution.message;
   result.iterations = solution.iterations;
   result.evaluations = solution.evaluations, result.failed_evaluations = solution.failed_evaluations;
   result.rho = program.rho_at(solution.x);
-  if (start.ok) {
+  if (start.ok && !abandoned) {
     result.final_evaluation = evaluator.gradients(result.rho);
     if (result.final_evaluation.ok) describe_end(evaluator, program, result.final_evaluation, result);
   }

@@ -1,0 +1,80 @@
+// One experiment: what was measured, and the simulation that explains it. Turns values of the unknowns into residuals
+// and their exact Jacobian by one tangent-linear run from its start time to its last sample.
+//
+//   z = (measured - gain s(t) - bias)/sigma
+//   dz/du = -(gain (s_y y_u + s_rho rho_u) + s gain_u + bias_u)/sigma        sigma: constant in u
+//
+//   const Experiment run1(scene, spec, table, {{"k1", 0}, {"theta0", 1}});   // parameter and number of the unknown
+//   Experiment::Residuals r = run1.residuals(u);
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/expression/program.hpp"
+#include "core/integrate/simulation.hpp"
+#include "optim/csv_table.hpp"
+#include "optim/problem.hpp"
+
+namespace mbsopt {
+
+struct UserForce;
+
+class Experiment {
+ public:
+  struct Unknown {
+    int parameter;    // index in the scene
+    Eigen::Index at;  // place in the vector of unknowns
+  };
+  struct Sample {
+    std::size_t time;  // index in times()
+    std::size_t channel;
+    double measured;
+  };
+  struct Residuals {
+    bool ok = false;
+    std::string message;  // why not
+    Eigen::VectorXd z;    // per sample
+    Eigen::MatrixXd z_u;  // sample x all unknowns
+  };
+
+  // rho: values of parameters that are not unknown here (overrides are applied on top). Throws std::invalid_argument
+  // and CsvError with the place: "identification.experiments[0].channels[1].sigma: ...".
+  Experiment(const Scene& scene, const ExperimentSpec& spec, std::string place, const CsvTable& data,
+             const Eigen::VectorXd& rho, std::vector<Unknown> unknowns,
+             std::vector<std::shared_ptr<const UserForce>> user_forces = {});
+
+  Residuals residuals(const Eigen::VectorXd& u, const std::function<bool(double t)>& progress = {}) const;
+
+  const std::vector<double>& times() const { return times_; }
+  const std::vector<Sample>& samples() const { return samples_; }  // by time, then channel
+  double sigma(std::size_t channel) const { return channels_[channel].sigma; }
+  std::size_t missing(std::size_t channel) const { return channels_[channel].missing; }
+  double start_time() const { return settings_.start_time; }
+  double end_time() const { return settings_.end_time; }
+
+ private:
+  struct Channel {
+    int sensor = 0;
+    Program gain, bias;  // inputs: all parameters
+    double sigma = 1;
+    std::size_t missing = 0;
+  };
+  void compile_channels(const ExperimentSpec& spec, const std::string& place);
+  void take_samples(const ExperimentSpec& spec, const std::string& place, const CsvTable& data);
+
+  Scene scene_;
+  SimulationSettings settings_;
+  Eigen::VectorXd rho_;
+  std::vector<Unknown> unknowns_;
+  std::vector<bool> active_;
+  std::vector<std::shared_ptr<const UserForce>> user_forces_;
+  std::vector<Channel> channels_;
+  std::vector<double> times_;  // at which something was measured
+  std::vector<Sample> samples_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,66 @@
+// A nonlinear least-squares problem, as every solver here sees it:
+//
+//   minimise 1/2 |z(x)|^2   subject to   x_lower <= x <= x_upper
+//
+// Residuals and their Jacobian come together, since one simulation gives both; an evaluation that fails says so in
+// words, and the solver shortens its step.
+//
+//   struct Line : LeastSquaresProblem {
+//     Line() : LeastSquaresProblem(2, 3) {}
+//     void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& p) override { p.z = A * x - b, p.z_x = A; }
+//   };
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <string>
+
+namespace mbsopt {
+
+struct LeastSquaresPoint {
+  bool ok = true;
+  std::string message;  // why not
+  Eigen::VectorXd z;    // N
+  Eigen::MatrixXd z_x;  // N x n
+};
+
+struct LeastSquaresProblem {
+  LeastSquaresProblem(Eigen::Index variables, Eigen::Index residuals)
+      : x_lower(Eigen::VectorXd::Constant(variables, -std::numeric_limits<double>::infinity())),
+        x_upper(-x_lower),
+        size(residuals) {}
+  virtual ~LeastSquaresProblem() = default;
+  LeastSquaresProblem(const LeastSquaresProblem&) = delete;
+  LeastSquaresProblem& operator=(const LeastSquaresProblem&) = delete;
+
+  // point arrives sized, with zeros.
+  virtual void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) = 0;
+
+  Eigen::Index variables() const { return x_lower.size(); }
+
+  Eigen::VectorXd x_lower, x_upper;  // +-infinity where there is none
+  Eigen::Index size;                 // N
+};
+
+struct LeastSquaresProgress {
+  int iteration = 0;
+  double cost = 0;           // 1/2 |z|^2
+  double gradient_norm = 0;  // largest entry
+  double step_norm = 0;
+  Eigen::VectorXd x;
+};
+
+enum class LeastSquaresStatus { converged, iteration_limit, stopped, failed };
+
+struct LeastSquaresResult {
+  LeastSquaresStatus status = LeastSquaresStatus::failed;
+  std::string message;      // in words, always
+  Eigen::VectorXd x;        // the solution, or the best point seen
+  LeastSquaresPoint point;  // there
+  double cost_initial = 0, cost_final = 0;
+  int iterations = 0;
+  long evaluations = 0, failed_evaluations = 0;
+  std::string first_error;  // of the first evaluation that failed
+};
+
+}  // namespace mbsopt
