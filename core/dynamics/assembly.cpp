@@ -1,6 +1,7 @@
 #include "core/dynamics/assembly.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 
 #include "core/constraint/unit_norm.hpp"
@@ -15,6 +16,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // Unknown q; v plays no part.
 class PositionProblem : public NearestPointEquations {
@@ -219,6 +222,7 @@ const AssemblyResult& Assembly::result() const { return solution_->result; }
 
 MatrixXd Assembly::tangent() const {
   const Solution& s = *solution_;
+  if (!s.result.ok) return MatrixXd::Constant(s.result.y.size(), s.data.rho.size(), kNaN);
   const Solution::Derivatives d = s.derivatives();
   MatrixXd y_rho(s.result.y.size(), s.data.rho.size());
   const MatrixXd q_rho = s.q->linearisation.solve(d.q_b_rho, d.q_g_rho);
@@ -228,6 +232,10 @@ MatrixXd Assembly::tangent() const {
 
 void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
   const Solution& s = *solution_;
+  if (!s.result.ok) {
+    rho_bar.setConstant(kNaN);
+    return;
+  }
   const Solution::Derivatives d = s.derivatives();
   const Index N = 7 * s.data.n;
   MatrixXd b_bar, g_bar;
@@ -240,6 +248,7 @@ void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
 
 std::vector<int> Assembly::obstructed() const {
   const Solution& s = *solution_;
+  if (!s.result.ok) return {};
   const Solution::Derivatives d = s.derivatives();
   // What is left of each right-hand side outside the range of J, rows scaled to unit length.
   auto left = [](const NearestPointLinearisation& at, const MatrixXd& J, const MatrixXd& b) {

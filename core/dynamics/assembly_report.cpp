@@ -34,6 +34,15 @@ const char* unit_of(const SensorKind& kind) {
   return "";
 }
 
+// The norm of a velocity has no direction to grow into from rest.
+bool is_speed(const SensorKind& kind) {
+  if (const auto* p = std::get_if<PointSensor>(&kind)) {
+    return p->quantity == PointSensor::Quantity::velocity && p->component == PointSensor::kNorm;
+  }
+  const auto* w = std::get_if<AngularVelocitySensor>(&kind);
+  return w && w->component == AngularVelocitySensor::kNorm;
+}
+
 // Points apart, directions out of square, of one joint.
 void add_joint(const MechanismData& d, AssemblyLevel level, std::size_t joint, const Eigen::VectorXd& F,
                double tolerance, std::vector<Finding>& findings) {
@@ -83,11 +92,13 @@ std::string assembly_failure(const MechanismData& d, AssemblyLevel level, const 
   for (const AssemblyTarget& target : equations.targets()) {
     const double off = F(row++);
     if (!(std::abs(off) > tolerance)) continue;
+    const bool at_rest = is_speed(target.sensor) && std::abs(target.value + off) < 1e-12;
     const ConditionData& c = d.conditions[static_cast<std::size_t>(target.condition)];
     findings.push_back({std::abs(off), "condition on '" + d.sensor_names[static_cast<std::size_t>(c.sensor)] +
                                            "': asks for " + (c.has_rate && !positions ? "rate " : "") +
                                            number(target.value) + unit_of(target.sensor) + ", nearest possible " +
-                                           number(target.value + off) + unit_of(target.sensor)});
+                                           number(target.value + off) + unit_of(target.sensor) +
+                                           (at_rest ? " (from a guess at rest; give a velocity of the body)" : "")});
   }
   if (findings.empty()) {
     return head + "no convergence after " + std::to_string(found.iterations) +

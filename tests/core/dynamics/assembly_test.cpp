@@ -100,6 +100,40 @@ TEST_CASE("an angle is met modulo a full turn and then counted on the condition'
   CHECK(b.angles(0) == Approx(-20).margin(1e-14));
 }
 
+TEST_CASE("an angle is reached the short way round, across half a turn, and from exactly opposite", "[assembly]") {
+  Scene scene = pendulum();
+  scene.parameters[1].value = 3.0;  // the guess
+  scene.conditions.push_back(value_of("theta", "-3"));
+  const AssemblyResult across = assemble(scene);
+  REQUIRE(across.ok);
+  CHECK(across.iterations < 10);
+  CHECK(across.angles(0) == Approx(-3).margin(1e-14));
+
+  scene.parameters[1].value = -0.1;
+  scene.conditions[0] = value_of("theta", "pi-0.1");
+  const AssemblyResult opposite = assemble(scene);
+  REQUIRE(opposite.ok);
+  CHECK(opposite.angles(0) == Approx(kPi - 0.1).margin(1e-14));
+}
+
+TEST_CASE("a joint may name the ground second", "[assembly]") {
+  Scene scene = pendulum();
+  std::swap(scene.joints[0].body1, scene.joints[0].body2);
+  scene.conditions.push_back({"theta", f("theta0"), f("rate0")});
+  const AssemblyResult a = assemble(scene);
+  REQUIRE(a.ok);
+  CHECK(turn(a, 0) == Approx(-0.4).margin(1e-14));  // the angle runs from body1 to body2
+  check_derivatives(scene);
+}
+
+TEST_CASE("a free body starts at its guess, and follows it", "[assembly]") {
+  Scene scene = spatial_four_bar();
+  scene.joints.clear();
+  const AssemblyResult a = assemble(scene);
+  REQUIRE(a.ok);
+  check_derivatives(scene);
+}
+
 TEST_CASE("an angle without a condition is atan2's own value", "[assembly]") {
   Scene scene = pendulum();
   scene.parameters[1].value = 3.0;
@@ -333,8 +367,11 @@ TEST_CASE("only active parameters get derivatives", "[assembly]") {
 TEST_CASE("a loop that cannot close names the joints that stay apart and by how much", "[assembly]") {
   Scene scene = four_bar();
   scene.parameters[3].value = 3.0;  // d: 0.4 m more than the three bars together
-  const AssemblyResult a = assemble(scene);
+  const Mechanism mechanism(scene, nominal(scene));
+  const Assembly assembly(mechanism, 0);
+  const AssemblyResult& a = assembly.result();
   REQUIRE_FALSE(a.ok);
+  CHECK(assembly.tangent().array().isNaN().all());  // never a number that looks like a derivative
   INFO(a.message);
   CHECK(a.message.find("joint 'B' (crank - coupler): points 0.1 m apart") != std::string::npos);
   CHECK(a.message.find("joint 'D' (ground - rocker): points 0.1 m apart") != std::string::npos);
@@ -363,6 +400,20 @@ TEST_CASE("conditions on velocities that contradict each other are named", "[ass
   CHECK(a.message.find("initial velocities failed") == 0);
   CHECK(a.message.find("condition on 'tip_vx': asks for 5 m/s") != std::string::npos);
   CHECK(a.message.find("condition on 'theta': asks for rate 1 rad/s") != std::string::npos);
+}
+
+TEST_CASE("a speed asked of a guess at rest says what is missing", "[assembly]") {
+  Scene scene = pendulum();
+  scene.sensors.push_back(point_sensor("speed", "velocity", "bar", vec("1", "0", "0"), "norm"));
+  scene.conditions.push_back(value_of("speed", "2"));
+  const AssemblyResult at_rest = assemble(scene);
+  REQUIRE_FALSE(at_rest.ok);
+  INFO(at_rest.message);
+  CHECK(at_rest.message.find("from a guess at rest") != std::string::npos);
+  scene.bodies[0].angular_velocity = vec("0", "0", "-0.3");
+  const AssemblyResult moving = assemble(scene);
+  REQUIRE(moving.ok);
+  CHECK(omega_B(moving.y.segment<4>(3), moving.y.segment<4>(10))(2) == Approx(-2).margin(1e-14));
 }
 
 TEST_CASE("a planar loop closes from a guess out of its plane, through the redundant equations", "[assembly]") {
