@@ -122,19 +122,18 @@ void describe_start(const Problem& problem, const Evaluator& evaluator, const Ev
   }
 }
 
-void describe_end(const Evaluator& evaluator, const DesignProgram& program, const Evaluation& end,
-                  DesignResult& result) {
+void describe_end(const Evaluator& evaluator, const DesignProgram& program, const NlpPoint& end, DesignResult& result) {
   for (std::size_t k = 0; k < result.variables.size(); ++k) {
     DesignVariable& v = result.variables[k];
-    v.value = end.rho(evaluator.variables()[k]);
+    v.value = result.rho(evaluator.variables()[k]);
     const double size = v.lower && v.upper ? *v.upper - *v.lower : std::max(std::abs(v.initial), std::abs(v.value));
     v.at_lower = touches(v.value, v.lower, size), v.at_upper = touches(v.value, v.upper, size);
   }
-  result.objective_final = end.psi(0);
+  result.objective_final = end.f;
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     DesignConstraint& c = result.constraints[i];
     const Eigen::Index row = static_cast<Eigen::Index>(i);
-    c.value = end.psi(row + 1);
+    c.value = end.c(row) * program.size(row);
     c.violation = std::max({0.0, c.lower ? *c.lower - c.value : 0.0, c.upper ? c.value - *c.upper : 0.0});
     c.at_lower = touches(c.value, c.lower, program.size(row)),
     c.at_upper = touches(c.value, c.upper, program.size(row));
@@ -206,9 +205,9 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
   result.iterations = solution.iterations;
   result.evaluations = solution.evaluations, result.failed_evaluations = solution.failed_evaluations;
   result.rho = program.rho_at(solution.x);
-  if (start.ok && !abandoned) {
-    result.final_evaluation = evaluator.gradients(result.rho);
-    if (result.final_evaluation.ok) describe_end(evaluator, program, result.final_evaluation, result);
+  if (start.ok) {
+    describe_end(evaluator, program, solution.point, result);
+    if (!abandoned) result.final_evaluation = evaluator.gradients(result.rho);
   }
   result.simulations = evaluator.simulations();
   result.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock_start).count();

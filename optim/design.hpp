@@ -53,7 +53,7 @@ struct DesignResult {
   std::vector<DesignConstraint> constraints;
   std::vector<DesignRow> history;
   Eigen::VectorXd rho;          // all parameters at the solution, or at the best point where there is none
-  Evaluation final_evaluation;  // there; its objectives: the one minimised, then the constraints
+  Evaluation final_evaluation;  // there, unless stopped: the objective that is minimised, then the constraints
   std::string optimizer;        // "ipopt"
   std::string gradient_choice;  // method and why
   int iterations = 0;

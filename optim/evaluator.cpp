@@ -36,7 +36,7 @@ std::string_view to_string(GradientMethod method) {
 
 GradientCost gradient_cost(std::size_t variables, std::size_t objectives) {
   const double blocks = std::ceil(static_cast<double>(variables) / 4);
-  return {3 + 2 * blocks, 2.5 + 0.6 * static_cast<double>(objectives)};
+  return {1.5 + 2.2 * blocks, 1.7 + 0.9 * static_cast<double>(objectives)};
 }
 
 std::vector<int> parameter_indices(const Scene& scene, const std::vector<std::string>& names) {

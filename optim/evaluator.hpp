@@ -29,8 +29,8 @@ struct DifferenceSettings {
 };
 
 // Estimated cost in simulations, from which `automatic` chooses; measured, see docs/design-optimisation.md.
-//   tlm        3 + 2 per block of four variables
-//   adjoint    2.5 + 0.6 per objective
+//   tlm        1.5 + 2.2 per block of four variables, which go through a step together
+//   adjoint    1.7 + 0.9 per objective
 struct GradientCost {
   double tlm = 0, adjoint = 0;
 };

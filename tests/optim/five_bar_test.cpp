@@ -127,3 +127,28 @@ TEST_CASE("a design that makes no sense is refused with the place", "[five_bar]"
   problem.design->subject_to = {{"motion", {}, {}}};
   CHECK_THROWS_WITH(run_design(problem), Contains("design.subject_to[0]: gives neither"));
 }
+
+TEST_CASE("a design that is stopped keeps the best point it has seen", "[five_bar]") {
+  Problem problem = five_bar::problem(1e-6);
+  problem.design.emplace();
+  problem.design->minimize = "motion";
+  problem.design->variables = {"L01", "L02"};
+  DesignOptions options;
+  SECTION("between iterations") {
+    options.progress = [](const DesignRow& row) { return row.iteration < 2; };
+  }
+  SECTION("within a simulation") {
+    int simulations = 0;
+    double last = 1e9;
+    options.simulation_progress = [=](double t) mutable {
+      simulations += t < last;
+      last = t;
+      return simulations < 10;
+    };
+  }
+  const DesignResult result = run_design(problem, options);
+  CHECK(result.status == NlpStatus::stopped);
+  CHECK(result.objective_final < 0.9 * result.objective_initial);
+  CHECK(result.variables[0].value != result.variables[0].initial);
+  CHECK(result.rho(0) == result.variables[0].value);
+}
