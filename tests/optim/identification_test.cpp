@@ -147,6 +147,29 @@ TEST_CASE("what a motion cannot tell is named", "[identification]") {
   CHECK(result.statistics.condition_number > 1e8);
 }
 
+TEST_CASE("of mass, lever, inertia and friction a free swing tells two combinations", "[identification]") {
+  // theta'' = (m g a/J) sin theta - (k/J) theta'
+  Problem p = fit_problem(64, 0.055, 1.53, 1.55);
+  for (const auto& [name, value] : {std::pair("m", 0.5), std::pair("a", 0.1), std::pair("k", 4e-4)})
+    p.scene.parameters.push_back(pendulum::parameter(name, value));
+  p.scene.parameters.push_back(pendulum::parameter("J0", 0.5 * 9.81 * 0.1 / 64));
+  p.scene.bodies[0].mass = Expression::parse("m");
+  p.scene.bodies[0].com = {0.0, Expression::parse("a"), 0.0};
+  p.scene.bodies[0].inertia.zz = Expression::parse("J0 - m*a^2");
+  std::get<Rsda>(p.scene.forces[0].kind).damping = Expression::parse("k");
+  p.identification->variables = {"m", "a", "k", "J0"};
+  const IdentificationResult result = run_identification(p, {pendulum::exact_motion(64, 0.055, 1.53, 1.55, 2)});
+  INFO(result.message);
+  REQUIRE(result.ok());
+  CHECK(result.statistics.unidentifiable.size() == 2);
+  for (int k = 0; k < 4; ++k) CHECK(std::isinf(result.parameters[static_cast<std::size_t>(k)].std_error));
+  CHECK(std::isfinite(result.parameters[4].std_error));  // theta0
+  const auto value = [&](std::size_t i) { return result.parameters[i].value; };
+  CHECK(value(0) * 9.81 * value(1) / value(3) == Approx(64).epsilon(1e-6));
+  CHECK(value(2) / value(3) == Approx(0.055).epsilon(1e-4));
+  for (const std::string& words : result.statistics.unidentifiable) WARN(words);
+}
+
 TEST_CASE("gain and bias may be fitted, sigma may not", "[identification]") {
   Problem p = fit_problem(64.5, 0.05, 1.5, 1.5);
   p.scene.parameters.push_back(pendulum::parameter("offset", 0));
