@@ -120,8 +120,7 @@ void Experiment::take_samples(const ExperimentSpec& spec, const std::string& pla
   settings_.end_time = times_.back();
 }
 
-Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u,
-                                            const std::function<bool(double t)>& progress) const {
+Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limits& limits) const {
   Residuals r;
   const Eigen::Index N = static_cast<Eigen::Index>(samples_.size());
   r.z.setZero(N), r.z_u.setZero(N, u.size());
@@ -158,8 +157,11 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u,
       }
     };
     RunOptions options;
-    options.progress = progress;
-    const SimulationResult result = simulate_tlm(mechanism, settings_, {}, sampling, options);
+    options.progress = limits.progress;
+    SimulationSettings settings = settings_;
+    if (limits.max_steps) settings.integrator.max_steps = std::min(settings.integrator.max_steps, *limits.max_steps);
+    const SimulationResult result = simulate_tlm(mechanism, settings, {}, sampling, options);
+    r.steps = result.statistics.steps;
     r.ok = result.ok() && next == samples_.size();
     r.message = result.message;
   } catch (const SceneError& error) {  // a field that these values drive out of its range

@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,7 @@ class Experiment {
     std::string message;  // why not
     Eigen::VectorXd z;    // per sample
     Eigen::MatrixXd z_u;  // sample x all unknowns
+    long steps = 0;       // of the simulation
   };
 
   // rho: values of parameters that are not unknown here (overrides are applied on top). Throws std::invalid_argument
@@ -47,7 +49,11 @@ class Experiment {
              const Eigen::VectorXd& rho, std::vector<Unknown> unknowns,
              std::vector<std::shared_ptr<const UserForce>> user_forces = {});
 
-  Residuals residuals(const Eigen::VectorXd& u, const std::function<bool(double t)>& progress = {}) const;
+  struct Limits {
+    std::function<bool(double t)> progress;  // after accepted steps; false stops
+    std::optional<long> max_steps;           // instead of the simulation's
+  };
+  Residuals residuals(const Eigen::VectorXd& u, const Limits& limits = {}) const;
 
   const std::vector<double>& times() const { return times_; }
   const std::vector<Sample>& samples() const { return samples_; }  // by time, then channel

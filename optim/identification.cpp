@@ -18,6 +18,10 @@ namespace {
 
 constexpr double kTouches = 1e-9;  // of the bound's size: the trust region puts solutions exactly on bounds
 
+// A trial that needs so many times the steps of all before it has gone astray (negative damping, say): it counts as
+// failed before it takes forever.
+constexpr long kStepGrowth = 30;
+
 std::string place_of(std::size_t experiment) { return fmt::format("identification.experiments[{}]", experiment); }
 
 // A parameter to be fitted: shared by all experiments, or free in one of them.
@@ -135,6 +139,7 @@ class Identification {
   struct Fitted {
     std::size_t experiment;
     Experiment model;
+    long most_steps = 0;  // of a simulation that went well
   };
 
   // Experiments stacked, in scaled variables.
@@ -153,11 +158,14 @@ class Identification {
       Eigen::Index row = 0;
       for (Fitted& f : experiments) {
         ++simulations;
-        const Experiment::Residuals r = f.model.residuals(u, go_on);
+        Experiment::Limits limits{go_on, {}};
+        if (f.most_steps > 0) limits.max_steps = kStepGrowth * f.most_steps;
+        const Experiment::Residuals r = f.model.residuals(u, limits);
         if (!r.ok) {
           point.ok = false, point.message = r.message;
           return;
         }
+        f.most_steps = std::max(f.most_steps, r.steps);
         const Eigen::Index n = r.z.size();
         point.z.segment(row, n) = r.z;
         point.z_x.middleRows(row, n) = r.z_u * u_x.asDiagonal();
