@@ -71,7 +71,8 @@ VectorXd NearestPointLinearisation::descent(const VectorXd& b, const VectorXd& g
 namespace {
 
 constexpr int kMaxIterations = 400;
-constexpr double kLocal = 1e-6;  // steps below it are taken whole: the merit function sees only rounding there
+constexpr double kLocal = 1e-6;       // steps below it are taken whole: the merit function sees only rounding there
+constexpr double kSatisfied = 1e-11;  // of F, per unit of x
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 double largest(const VectorXd& x) { return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>(); }
@@ -123,8 +124,9 @@ class Search {
  private:
   // Gauss-Newton, then Newton; false where neither converges.
   bool newton() {
-    constexpr double kNear = 0.05;
-    constexpr int kPatience = 30;
+    constexpr double kNear = 0.05;    // Gauss-Newton steps below it, per unit of x, may be Newton's instead
+    constexpr double kConvex = 1e-3;  // least eigenvalue of Z'HZ at which they are
+    constexpr int kPatience = 30;     // steps without a shorter one: it circles
     double shortest = std::numeric_limits<double>::infinity();
     for (int waited = 0; waited < kPatience && result_.iterations < kMaxIterations; ++result_.iterations) {
       const VectorXd& x = result_.x;
@@ -142,7 +144,7 @@ class Search {
       if (length < kNear * size()) {
         add_curvature();
         const VectorXd& lambda = at.reduced_eigenvalues();
-        if (lambda.size() == 0 || lambda(0) > 1e-3) step = at.solve(-result_.F, away);
+        if (lambda.size() == 0 || lambda(0) > kConvex) step = at.solve(-result_.F, away);
         if (satisfied() && converged(largest(step))) {
           result_.status = is_minimum() ? NearestPointStatus::found : NearestPointStatus::undetermined;
           return true;
@@ -179,7 +181,7 @@ class Search {
     }
   }
 
-  bool satisfied() const { return largest(result_.F) <= 1e-11 * size(); }
+  bool satisfied() const { return largest(result_.F) <= kSatisfied * size(); }
   double size() const { return 1 + largest(result_.x); }
   double scaled_violation(const VectorXd& F) const { return result_.linearisation.row_scale().cwiseProduct(F).norm(); }
 
@@ -214,6 +216,7 @@ class Search {
     return --patience_ > 0;
   }
 
+  // A strict one: the nearest point moves at most 1e9 times as far as the guess.
   bool is_minimum() const {
     const VectorXd& lambda = result_.linearisation.reduced_eigenvalues();
     return lambda.size() == 0 || lambda(0) > 1e-9;
