@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 
 namespace mbsopt {
@@ -50,11 +51,24 @@ double ExplicitRun::first_step(const IntegratorSettings& s, double span) {
   return std::min({100 * h0, h1, span});
 }
 
-// Never beyond the end, and not leaving a tiny last step.
-double ExplicitRun::propose_step(double t, double h, double end) const {
+// Never beyond the end; an adaptive run does not leave a tiny last step.
+double ExplicitRun::propose_step(double t, double h, double end, bool adaptive) const {
   const double left = end - t;
-  if (h >= left * (1 - 1e-12)) return left;
-  return 2 * h > left && h < left ? 0.5 * left : h;
+  if (h >= left * (1 - 1e-9)) return left;
+  return adaptive && 2 * h > left ? 0.5 * left : h;
+}
+
+// Names the bodies whose mass or inertia vanishes in some direction, for the message of a singular start.
+std::string ExplicitRun::bodies_without_inertia() const {
+  const MechanismData& d = mechanism_.data();
+  std::string names;
+  for (int i = 1; i <= d.n; ++i) {
+    const BodyData& b = d.bodies[static_cast<std::size_t>(i)];
+    const double least = Eigen::SelfAdjointEigenSolver<Matrix3d>(b.J, Eigen::EigenvaluesOnly).eigenvalues()(0);
+    if (b.mass > 0 && least > 0) continue;
+    names += (names.empty() ? "'" : ", '") + d.body_names[static_cast<std::size_t>(i)] + "'";
+  }
+  return names;
 }
 
 bool ExplicitRun::evaluate_stage(int i) {
@@ -147,6 +161,15 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
     result.status = status;
     result.message = std::move(message);
   };
+  if (!dynamics_.evaluate(step_.t, y_initial, angles, ydot_)) {
+    const std::string bodies = bodies_without_inertia();
+    stop(SimulationStatus::not_finite,
+         fmt::format("the accelerations at the start, t = {:.6g} s, cannot be computed. {}", step_.t,
+                     bodies.empty() ? "A force or law is not finite there"
+                                    : "A body without mass or inertia in a direction that no joint holds has none: " +
+                                          bodies + ". Give it some, or hold it"));
+    return;
+  }
   PiController controller(rk_.order);
   double h = adaptive ? first_step(s, span) : s.step.value_or(span);
   if (s.max_step) h = std::min(h, *s.max_step);
@@ -167,7 +190,7 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
     } else {
       if (adaptive && rate * h > 2)
         h = 2 / rate;  // an angle is followed over turns only when steps are below half a turn
-      h = propose_step(step_.t, h, end);
+      h = propose_step(step_.t, h, end, adaptive);
       if (!adaptive && rate * h > 3) {
         stop(
             SimulationStatus::step_too_large,

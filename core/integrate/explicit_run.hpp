@@ -29,7 +29,8 @@ class ExplicitRun {
   enum class Outcome { accepted, rejected, failed };
 
   double first_step(const IntegratorSettings& s, double span);
-  double propose_step(double t, double h, double end) const;
+  double propose_step(double t, double h, double end, bool adaptive) const;
+  std::string bodies_without_inertia() const;
   bool evaluate_stage(int i);
   Outcome attempt(double h, bool adaptive, double& error);
   bool finish_step(bool dense);  // dense stages, projection, branches of the angles

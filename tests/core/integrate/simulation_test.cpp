@@ -109,3 +109,21 @@ TEST_CASE("what goes wrong is said with the time and what to try", "[simulation]
   CHECK(run.status == SimulationStatus::stopped);
   CHECK(run.last_good_time >= 0.1);
 }
+
+TEST_CASE("a fixed step divides the span evenly", "[simulation]") {
+  Scene scene = loaded_four_bar();
+  scene.simulation.end_time = 0.3;
+  scene.simulation.integrator.type = "rk4", scene.simulation.integrator.step = 0.001;
+  const SimulationResult run = simulate(Mechanism(scene, nominal(scene)), scene.simulation);
+  REQUIRE(run.ok());
+  CHECK(run.statistics.steps == 300);
+  CHECK(run.last_good_time == 0.3);
+}
+
+TEST_CASE("a body that nothing gives inertia is named", "[simulation]") {
+  Scene scene;
+  scene.bodies.push_back(plain_body("ghost", 0, {}, {0.0, 0.0, 0.0}));
+  const SimulationResult run = simulate(Mechanism(scene, VectorXd()), scene.simulation);
+  CHECK(run.status == SimulationStatus::not_finite);
+  CHECK(run.message.find("'ghost'") != std::string::npos);
+}
