@@ -68,11 +68,26 @@ class DesignProgram : public NonlinearProgram {
     }
   }
 
-  // Convergence is judged on an objective of size about 1 whose gradient at the start is about 1.
-  void scale_by(const NlpPoint& start) {
-    f_scale = inverse(std::max(std::abs(start.f), start.f_x.cwiseAbs().maxCoeff()));
-    for (Eigen::Index i = 0; i < constraints(); ++i)
-      c_scale(i) = std::min(1.0, inverse(start.c_x.row(i).cwiseAbs().maxCoeff()));
+  // Convergence is judged on an objective whose size and gradient are about 1: the larger of those at the start and a
+  // little way from it, so that a start at the optimum, where both may vanish, is seen for what it is.
+  void scale_by(const Eigen::VectorXd& x_start) {
+    constexpr double kLittleWay = 0.01;
+    const Eigen::VectorXd shift = kLittleWay * x_start.cwiseAbs().cwiseMax(1);
+    Eigen::VectorXd inward = x_start + shift;
+    for (Eigen::Index k = 0; k < inward.size(); ++k)
+      if (inward(k) > x_upper(k)) inward(k) = std::max(x_start(k) - shift(k), x_lower(k));
+    double f_size = 0;
+    Eigen::VectorXd c_size = Eigen::VectorXd::Zero(constraints());
+    for (const Eigen::VectorXd& x : {inward, x_start}) {  // the start last: the evaluator keeps it
+      NlpPoint point;
+      point.c.setZero(constraints()), point.c_x.setZero(constraints(), variables());
+      evaluate(x, point);
+      if (!point.ok) continue;
+      f_size = std::max({f_size, std::abs(point.f), point.f_x.cwiseAbs().maxCoeff()});
+      c_size = c_size.cwiseMax(point.c_x.cwiseAbs().rowwise().maxCoeff());
+    }
+    f_scale = inverse(f_size);
+    c_scale = c_size.unaryExpr([](double size) { return std::min(1.0, inverse(size)); });
   }
 
   Eigen::VectorXd rho_at(const Eigen::VectorXd& x) const {
@@ -184,13 +199,7 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
   const Evaluation start = evaluator.gradients(program.rho_at(x_start));
   result.gradient_choice = start.choice.empty() ? std::string(to_string(start.method)) : start.choice;
   describe_start(problem, evaluator, start, result);
-  if (start.ok) {
-    NlpPoint point;
-    point.c.setZero(program.constraints());
-    point.c_x.setZero(program.constraints(), program.variables());
-    program.evaluate(x_start, point);  // from the evaluator's cache
-    program.scale_by(point);
-  }
+  if (start.ok) program.scale_by(x_start);
 
   IpoptOptions solver;
   solver.tolerance = spec.tolerance;

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <exception>
 
@@ -16,6 +17,7 @@ using Ipopt::Number;
 using VectorIn = Eigen::Map<const Eigen::VectorXd>;
 using VectorView = Eigen::Map<Eigen::VectorXd>;
 
+constexpr int kFreshStarts = 2;
 constexpr double kNoBound = 1e20;  // Ipopt's: at least 1e19 means none
 
 class Adapter : public Ipopt::TNLP {
@@ -26,6 +28,18 @@ class Adapter : public Ipopt::TNLP {
   }
 
   bool start_is_valid() { return evaluate(x_start_); }
+
+  // Feasible, and the objective falls nowhere within the bounds: the barrier would only lead away from here.
+  bool start_is_optimal() {
+    if (problem_.violation(point_.c) > options_.constraint_tolerance) return false;
+    Eigen::VectorXd step = -problem_.f_scale * point_.f_x;
+    step = step.cwiseMin(problem_.x_upper - x_).cwiseMax(problem_.x_lower - x_);
+    if (step.cwiseAbs().maxCoeff() > options_.tolerance) return false;
+    result_.point = point_;
+    if (options_.progress)
+      options_.progress({0, point_.f, problem_.violation(point_.c), step.cwiseAbs().maxCoeff(), x_});
+    return true;
+  }
 
   bool get_nlp_info(Index& n, Index& m, Index& nnz_jac, Index& nnz_hess, IndexStyleEnum& style) override {
     n = static_cast<Index>(problem_.variables());
@@ -88,15 +102,28 @@ class Adapter : public Ipopt::TNLP {
   bool intermediate_callback(Ipopt::AlgorithmMode, Index iteration, Number, Number, Number inf_du, Number, Number,
                              Number, Number, Number, Index, const Ipopt::IpoptData*,
                              Ipopt::IpoptCalculatedQuantities*) override {
-    result_.iterations = iteration;
+    if (round_ > 0 && iteration == 0) return true;  // the point it goes on from
+    result_.iterations = iterations_before_ + iteration;
     if (!options_.progress || iterate_.size() == 0) return true;
-    return options_.progress({iteration, iterate_f_, iterate_violation_, inf_du, iterate_});
+    return options_.progress({result_.iterations, iterate_f_, iterate_violation_, inf_du, iterate_});
   }
 
   void finalize_solution(Ipopt::SolverReturn, Index n, const Number* x, const Number*, const Number*, Index,
                          const Number*, const Number*, Number, const Ipopt::IpoptData*,
                          Ipopt::IpoptCalculatedQuantities*) override {
     final_ = VectorIn(x, n);
+  }
+
+  // Whether a point seen on the way is feasible and better than the one Ipopt ended at by more than the tolerance.
+  bool passed_a_better_point() {
+    if (final_.size() == 0 || !have_best_ || !evaluate(final_)) return false;
+    const double gain = (point_.f - best_.f) * problem_.f_scale;
+    return problem_.violation(best_.c) <= options_.constraint_tolerance && gain > options_.tolerance;
+  }
+  void go_on_from_best() {
+    x_start_ = best_x_;
+    iterations_before_ = result_.iterations;
+    ++round_;
   }
 
   // The solution where Ipopt converged, else the best point seen.
@@ -147,12 +174,13 @@ class Adapter : public Ipopt::TNLP {
   void keep_iterate() { iterate_ = x_, iterate_f_ = point_.f, iterate_violation_ = problem_.violation(point_.c); }
 
   NonlinearProgram& problem_;
-  const Eigen::VectorXd x_start_;
+  Eigen::VectorXd x_start_;
   const IpoptOptions& options_;
   NlpResult& result_;
   Eigen::VectorXd x_, best_x_, final_, iterate_;
   NlpPoint point_, best_;
   bool have_best_ = false;
+  int round_ = 0, iterations_before_ = 0;
   double iterate_f_ = 0, iterate_violation_ = 0;
 };
 
@@ -206,14 +234,15 @@ Outcome in_words(Ipopt::ApplicationReturnStatus status, const NlpResult& result,
   }
 }
 
-void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& options) {
+void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& options, bool near_solution) {
   Ipopt::OptionsList& list = *application.Options();
   list.SetIntegerValue("print_level", 0);
   list.SetStringValue("sb", "yes");  // no banner
   list.SetStringValue("hessian_approximation", "limited-memory");
   list.SetIntegerValue("limited_memory_max_history", options.history);
   list.SetStringValue("nlp_scaling_method", "user-scaling");
-  list.SetStringValue("mu_strategy", "adaptive");
+  list.SetStringValue("mu_strategy",
+                      "monotone");                // "adaptive" leaps away from good points of problems with many minima
   list.SetNumericValue("bound_relax_factor", 0);  // a bound is a bound: masses and logarithms stay positive
   list.SetNumericValue("tol", options.tolerance);
   list.SetNumericValue("constr_viol_tol", options.constraint_tolerance);
@@ -223,7 +252,10 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
   list.SetNumericValue("acceptable_obj_change_tol", options.tolerance * options.tolerance);
   list.SetNumericValue("acceptable_constr_viol_tol", options.constraint_tolerance);
   list.SetIntegerValue("acceptable_iter", 3);
-  list.SetIntegerValue("max_iter", options.max_iterations);
+  if (near_solution) {
+    list.SetNumericValue("mu_init", 1e-4);
+    list.SetNumericValue("bound_push", 1e-6), list.SetNumericValue("bound_frac", 1e-6);
+  }
 }
 
 }  // namespace
@@ -236,13 +268,23 @@ NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_s
     result.message = "the start point cannot be evaluated: " + result.first_error;
     return result;
   }
-  Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);  // no console
-  set_options(*application, options);
-  if (application->Initialize("") != Ipopt::Solve_Succeeded) {  // "": no options file is read
-    result.message = "Ipopt refused its options";
+  if (adapter->start_is_optimal()) {
+    result.status = NlpStatus::converged, result.message = "converged: the start is optimal already";
     return result;
   }
-  const Outcome outcome = in_words(application->OptimizeTNLP(owner), result, options);
+  // From far away a barrier method may leave the valley of a good point for a worse one. Then it starts once more,
+  // there.
+  Outcome outcome{NlpStatus::failed, "Ipopt refused its options"};
+  for (int round = 0; round <= kFreshStarts; ++round) {
+    const Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);  // no console
+    set_options(*application, options, round > 0);
+    application->Options()->SetIntegerValue("max_iter", std::max(0, options.max_iterations - result.iterations));
+    if (application->Initialize("") != Ipopt::Solve_Succeeded) break;  // "": no options file is read
+    outcome = in_words(application->OptimizeTNLP(owner), result, options);
+    const bool ended = outcome.status == NlpStatus::converged || outcome.status == NlpStatus::no_progress;
+    if (!ended || !adapter->passed_a_better_point()) break;
+    adapter->go_on_from_best();
+  }
   result.status = outcome.status, result.message = outcome.words;
   adapter->finish(outcome.status == NlpStatus::converged);
   return result;

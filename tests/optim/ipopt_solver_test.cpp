@@ -135,3 +135,15 @@ TEST_CASE("constraints that contradict each other are infeasible", "[ipopt]") {
   const NlpResult result = solve_with_ipopt(problem, vector({1, 5, 5, 1}), {1e-6, 1e-8, 300, 20, {}});
   CHECK(result.status == NlpStatus::infeasible);
 }
+
+TEST_CASE("a start that is optimal already is left as it is", "[ipopt]") {
+  Rosenbrock problem;
+  const NlpResult result = solve_with_ipopt(problem, vector({1, 1}));
+  CHECK(result.status == NlpStatus::converged);
+  CHECK(result.x == vector({1, 1}));
+  CHECK(result.evaluations == 1);
+  problem.x_upper << 0.5, 0.25;  // at the bounds: the objective falls only beyond them
+  const NlpResult bounded = solve_with_ipopt(problem, vector({0.5, 0.25}));
+  CHECK(bounded.x == vector({0.5, 0.25}));
+  CHECK(bounded.evaluations == 1);
+}
