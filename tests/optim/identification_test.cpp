@@ -167,7 +167,8 @@ TEST_CASE("of mass, lever, inertia and friction a free swing tells two combinati
   const auto value = [&](std::size_t i) { return result.parameters[i].value; };
   CHECK(value(0) * 9.81 * value(1) / value(3) == Approx(64).epsilon(1e-6));
   CHECK(value(2) / value(3) == Approx(0.055).epsilon(1e-4));
-  for (const std::string& words : result.statistics.unidentifiable) WARN(words);
+  for (const std::string& words : result.statistics.unidentifiable)
+    CHECK_THAT(words, Contains("leave all that is measured as it is") || Contains("is determined"));
 }
 
 TEST_CASE("gain and bias may be fitted, sigma may not", "[identification]") {
