@@ -64,7 +64,7 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
       ->type_name("PATH=VALUE")
       ->allow_extra_args(false);
   sub.add_option("--threads", options.threads, "at most so many threads (results do not depend on it)")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1, 1024));
   sub.add_flag("--quiet", options.quiet, "no progress on standard error");
   if (name == "gradient") {
     sub.add_option("--method", options.method, "how gradients are computed")
@@ -92,6 +92,9 @@ int run_guarded(const Command& command, const CommandContext& context) {
     context.err << error.what() << '\n';
   } catch (const std::bad_alloc&) {
     context.err << "mbsopt: out of memory\n";
+    return kNumericalFailure;
+  } catch (const std::exception& e) {
+    context.err << "mbsopt: " << e.what() << '\n';
     return kNumericalFailure;
   }
   return kBadInput;

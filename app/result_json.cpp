@@ -26,6 +26,7 @@ Json to_json(const SimulationStatistics& statistics) {
           {"rhs_evaluations", statistics.rhs_evaluations},
           {"factorisations", statistics.factorisations},
           {"wall_seconds", statistics.wall_seconds},
+          {"max_acceleration_residual", statistics.max_acceleration_residual},
           {"max_position_violation", statistics.max_position_violation},
           {"max_velocity_violation", statistics.max_velocity_violation},
           {"energy_drift", statistics.energy_drift}};

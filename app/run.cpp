@@ -111,6 +111,13 @@ void print_simulation(std::ostream& out, const SimulationSettings& settings, con
       "largest violation of the constraints {:.1e} (positions), {:.1e} (velocities); largest change of energy {:.1e} "
       "J\n",
       statistics.max_position_violation, statistics.max_velocity_violation, statistics.energy_drift);
+  if (statistics.max_acceleration_residual > 1e-6) {
+    out << fmt::format(
+        "the constraints' accelerations were met to {:.1e} only: a singular position, or masses that differ too much "
+        "for "
+        "simulation.formulation (try a larger alpha or more iterations)\n",
+        statistics.max_acceleration_residual);
+  }
 }
 
 }  // namespace mbsopt

@@ -176,7 +176,7 @@ void Evaluator::add_differences(Evaluation& e) const {
 }
 
 const Evaluation& Evaluator::values(const Eigen::VectorXd& rho) {
-  if (last_.rho.size() == rho.size() && last_.rho == rho) return last_;
+  if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho) return last_;
   last_ = run(rho, Sweep::none, nullptr);
   simulations_ += last_.simulations;
   return last_;
@@ -187,7 +187,9 @@ Evaluation Evaluator::values_on(const StepSequence& steps, const Eigen::VectorXd
 }
 
 const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
-  if (last_.rho.size() == rho.size() && last_.rho == rho && (last_.has_gradients() || !last_.ok)) return last_;
+  if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho &&
+      (last_.has_gradients() || !last_.ok))
+    return last_;
   GradientMethod method = options_.method;
   std::string choice;
   if (simulated_.empty()) {

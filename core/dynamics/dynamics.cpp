@@ -45,12 +45,13 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
   user_K_.setZero(largest, largest), user_C_.setZero(largest, largest), user_Q_rho_.setZero(largest, P);
 }
 
-// Derivatives are those of the limit: as many refinements as bring alpha^-(passes) to rounding.
+// Derivatives are those of the limit: at least as many refinements as bring alpha^-(passes) to rounding.
 SaddleSolver::Settings Dynamics::solver_settings(bool derivative) const {
-  if (settings_.type == FormulationType::penalty) return {0, 0};
-  if (!derivative) return {settings_.iterations, settings_.tolerance};
+  if (settings_.type == FormulationType::penalty) return {};
+  if (!derivative) return {std::min(1, settings_.iterations), settings_.iterations, settings_.tolerance};
   const double digits = std::max(1.0, std::log10(settings_.alpha));
-  return {std::clamp(static_cast<int>(std::ceil(15 / digits)) - 1, 1, 8), 0};
+  const int least = std::clamp(static_cast<int>(std::ceil(15 / digits)) - 1, 1, 8);
+  return {least, std::max(least, settings_.iterations), 1e-14};
 }
 
 void Dynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
@@ -101,6 +102,9 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
   if (!solver_.factor(frames_)) return false;
   g_ = -gamma_;
   solver_.solve(loads_, g_, solver_settings(false), z_, lambda_);
+  if (settings_.type == FormulationType::augmented_lagrangian) {
+    worst_residual_ = std::max(worst_residual_, solver_.residual_ratio());
+  }
 
   const Eigen::Index half = 7 * data_.n;
   ydot.head(half) = y.tail(half);

@@ -52,6 +52,8 @@ class Dynamics {
                    Eigen::VectorXd& rho_bar);
 
   SaddleSolver& solver() { return solver_; }
+  // Largest relative residual of the constraints' accelerations over all evaluations (augmented Lagrangian).
+  double worst_residual() const { return worst_residual_; }
 
  private:
   void set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
@@ -66,7 +68,7 @@ class Dynamics {
   FormulationSettings settings_;
   SaddleSolver solver_;
 
-  double t_ = 0;
+  double t_ = 0, worst_residual_ = 0;
   Eigen::VectorXd y_, angles_;
   std::vector<BodyState> bodies_;
   std::vector<Frame> frames_;

@@ -9,7 +9,7 @@ namespace mbsopt {
 namespace {
 
 constexpr double kRelativeAlpha = 1e8;
-constexpr SaddleSolver::Settings kOnePass{0, 0};  // every use is inside an iteration that refines
+constexpr SaddleSolver::Settings kOnePass{};  // every use is inside an iteration that refines
 constexpr int kMostIterations = 60;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }

@@ -7,7 +7,7 @@
 namespace mbsopt {
 namespace {
 
-constexpr SaddleSolver::Settings kOnePass{0, 0};  // refine() refines
+constexpr SaddleSolver::Settings kOnePass{};  // refine() refines
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 

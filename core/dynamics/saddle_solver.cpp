@@ -1,6 +1,15 @@
 #include "core/dynamics/saddle_solver.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace mbsopt {
+namespace {
+
+// A pass that gains less ends the refinement: rounding is reached, or the position is singular.
+constexpr double kStagnation = 0.97;
+
+}  // namespace
 
 SaddleSolver::SaddleSolver(const MechanismData& data, double alpha, bool alpha_is_relative)
     : data_(&data), rows_(data), S_(rows_.matrix()) {
@@ -38,7 +47,8 @@ void SaddleSolver::solve_any(const std::vector<X>& b, const Y& g, const Settings
   for (X& xi : x) xi.setZero();
   nu.setZero();
   residual = g;
-  const double size = g.cwiseAbs().maxCoeff();
+  const double g_size = g.cwiseAbs().maxCoeff();
+  double before = INFINITY;
   for (int k = 0;; ++k) {
     // correction = b - M x - J'nu + J' alpha residual
     for (Eigen::Index r = 0; r < g.rows(); ++r) step.row(r) = nu.row(r) - alpha_(r) * residual.row(r);
@@ -48,12 +58,20 @@ void SaddleSolver::solve_any(const std::vector<X>& b, const Y& g, const Settings
     }
     rows_.subtract_transposed_times(step, correction);
     S_.solve(std::span<X>(correction));
-    for (std::size_t i = 0; i < n; ++i) x[i] += correction[i];
+    double size = g_size;
+    for (std::size_t i = 0; i < n; ++i) {
+      x[i] += correction[i];
+      size = std::max(size, x[i].cwiseAbs().maxCoeff());
+    }
     step.setZero();
     rows_.add_times(correction, step);
     residual -= step;
     for (Eigen::Index r = 0; r < g.rows(); ++r) nu.row(r) -= alpha_(r) * residual.row(r);
-    if (k >= settings.refinements || (k > 0 && residual.cwiseAbs().maxCoeff() <= settings.tolerance * size)) return;
+    const double now = residual.cwiseAbs().maxCoeff();
+    residual_ratio_ = size > 0 ? now / size : 0.0;
+    if (k >= settings.most) return;
+    if (k >= settings.least && (residual_ratio_ <= settings.tolerance || !(now < kStagnation * before))) return;
+    before = now;
   }
 }
 

@@ -30,9 +30,10 @@ class SaddleSolver {
   const ConstraintRows& rows() const { return rows_; }
   const Eigen::VectorXd& alpha() const { return alpha_; }
 
-  // Stops early, after one refinement at least, once |J x - g| <= tolerance |g|.
+  // Refinements after the first pass: at least `least`, at most `most`; between the two until |J x - g| is at most
+  // tolerance times the larger of |g| and |x|, or stops falling.
   struct Settings {
-    int refinements = 0;
+    int least = 0, most = 0;
     double tolerance = 0;
   };
   void solve(const std::vector<Vec<6>>& b, const Eigen::VectorXd& g, const Settings& settings, std::vector<Vec<6>>& x,
@@ -40,6 +41,8 @@ class SaddleSolver {
   void solve(const std::vector<Lanes<6>>& b, const LaneRows& g, const Settings& settings, std::vector<Lanes<6>>& x,
              LaneRows& nu);
 
+  // |J x - g| after the last solve, relative as above.
+  double residual_ratio() const { return residual_ratio_; }
   long factorisations() const { return factorisations_; }
 
   // M x for body i (1-based).
@@ -66,6 +69,7 @@ class SaddleSolver {
   std::vector<Vec<6>> correction_;
   std::vector<Lanes<6>> correction_lanes_;
   long factorisations_ = 0;
+  double residual_ratio_ = 0;
 };
 
 }  // namespace mbsopt

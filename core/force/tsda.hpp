@@ -1,8 +1,9 @@
 // Translational spring-damper-actuator between point 1 of body 1 and point 2 of body 2.
 //   d = P2 - P1,  l = |d|,  u = d/l,  ldot = u'ddot         tension f = k (l - l0) + c ldot + actuator, or a law [N]
 //   virtual work  -f u'(P2_eta - P1_eta): force -f u at P2, +f u at P1
-// A spring of zero length has no direction: u = 0 there, which is its right limit where l0 = 0.
-// Haug, "Computer Aided Kinematics and Dynamics of Mechanical Systems" (1989), section 11.3.
+// A spring of zero length has no direction: u = 0 there, so it has no force. That is the limit where l0 = 0; then,
+// without actuator and damper, the force is k d and its derivative k I is used. Haug, "Computer Aided Kinematics and
+// Dynamics of Mechanical Systems" (1989), section 11.3.
 #pragma once
 
 #include "core/body/frame.hpp"
@@ -46,7 +47,13 @@ struct TsdaForce {
   void pull_back(double t, const Eigen::VectorXd& rho, const Frame& f1, const Frame& f2, Law::Scratch& scratch,
                  FrameBar& bar1, FrameBar& bar2, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const {
     const Span x = span(f1, f2);
-    if (x.l == 0) return;
+    if (x.l == 0) {  // work = -k d'd_eta
+      if (!is_k_times_d()) return;
+      const Vector3d d_eta = f2.point_eta(s2) - f1.point_eta(s1), zero = Vector3d::Zero();
+      add_point(f2, s2, 1, slot2, -law.k * d_eta, zero, zero, bar2, theta_bar);
+      add_point(f1, s1, -1, slot1, -law.k * d_eta, zero, zero, bar1, theta_bar);
+      return;
+    }
     const Law::Value f = law.derivatives(t, rho, x.l, x.ldot, scratch);
     const Vector3d d_eta = f2.point_eta(s2) - f1.point_eta(s1);
     const double l_eta = x.u.dot(d_eta);
@@ -65,11 +72,19 @@ struct TsdaForce {
   void tangent(const Span& x, const Law::Value& f, Lanes<1> df, const Frame& f1, const Frame& f2,
                const FrameTangent& t1, const FrameTangent& t2, const Lanes<3>* ds1, const Lanes<3>* ds2,
                Lanes<6>& load1, Lanes<6>& load2) const {
-    if (x.l == 0) return;
+    if (x.l == 0 && !is_k_times_d()) return;
     Lanes<3> dd = t2.r + times(t2.A, s2) - t1.r - times(t1.A, s1);
     Lanes<3> dddot = t2.rdot + times(t2.Adot, s2) - t1.rdot - times(t1.Adot, s1);
     if (ds1) dd -= f1.A * *ds1, dddot -= f1.Adot * *ds1;
     if (ds2) dd += f2.A * *ds2, dddot += f2.Adot * *ds2;
+    if (x.l == 0) {
+      const Lanes<3> dF = law.k * dd;
+      load1.topRows<3>() += dF;
+      load2.topRows<3>() -= dF;
+      load1.bottomRows<3>() += cross(s1, f1.A.transpose() * dF);
+      load2.bottomRows<3>() -= cross(s2, f2.A.transpose() * dF);
+      return;
+    }
     const Lanes<1> dl = dot(x.u, dd);
     const Lanes<3> du = (dd - x.u * dl) / x.l;
     const Lanes<1> dldot = dot(x.ddot, du) + dot(x.u, dddot);
@@ -85,6 +100,9 @@ struct TsdaForce {
   }
 
  private:
+  // Without free length, actuator and damping the force is k d, smooth at zero length, too.
+  bool is_k_times_d() const { return !law.program && law.x0 == 0 && law.f0 == 0 && law.c == 0; }
+
   static void add_point(const Frame& f, const Vector3d& s, double sign, int slot, const Vector3d& d, const Vector3d& dd,
                         const Vector3d& eta, FrameBar& bar, Eigen::VectorXd& theta_bar) {
     bar.r += sign * d;

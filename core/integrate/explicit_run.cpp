@@ -218,11 +218,16 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
       h *= outcome == Outcome::rejected ? controller.after_rejection(error) : controller.after_rejection(INFINITY);
       if (h < 1e-14 * std::max(span, std::abs(step_.t))) {
         stop(SimulationStatus::step_too_small,
-             fmt::format(
-                 "the step fell to {:.3g} s at t = {:.6g} s and its error is still too large. Look for a singular "
-                 "position, a spring of zero length or a law that is not smooth near this time; looser tolerances "
-                 "or a fixed step may pass it",
-                 h, step_.t));
+             outcome == Outcome::failed
+                 ? fmt::format(
+                       "the accelerations cannot be computed beyond t = {:.6g} s, however small the step. A law or "
+                       "force that is not finite there (a root, logarithm or division outside its range), or a "
+                       "body without inertia in a direction that no joint holds?",
+                       step_.t)
+                 : fmt::format("the step fell to {:.3g} s at t = {:.6g} s and its error is still too large. Look for a "
+                               "singular position, a spring of zero length or a law that is not smooth near this time; "
+                               "looser tolerances or a fixed step may pass it",
+                               h, step_.t));
       }
       continue;
     }
@@ -250,6 +255,7 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
     }
   }
   result.y_end = step_.y0;
+  result.statistics.max_acceleration_residual = dynamics_.worst_residual();
   result.statistics.rhs_evaluations += evaluations_;
   result.statistics.factorisations += dynamics_.solver().factorisations() + projector_.factorisations();
 }

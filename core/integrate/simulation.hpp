@@ -32,7 +32,8 @@ struct SimulationStatistics {
   double max_position_violation = 0;                              // of |Phi| over accepted steps [m, -]
   double max_velocity_violation = 0;                              // of |Phi_q v + Phi_t|
   double energy_initial = 0, energy_final = 0, energy_drift = 0;  // drift: largest |E - E(0)| over accepted steps [J]
-  std::size_t adjoint_memory_bytes = 0;                           // what the backward sweep kept of the forward run
+  double max_acceleration_residual = 0;  // relative, of the constraints' accelerations (augmented Lagrangian)
+  std::size_t adjoint_memory_bytes = 0;  // what the backward sweep kept of the forward run
 };
 
 enum class SimulationStatus {

@@ -15,7 +15,7 @@ struct FormulationSettings {
   double alpha = 1e8;        // augmented_lagrangian: relative to the inertia each constraint sees; penalty: absolute
   double xi = 1;             // damping ratio of the stabilisation
   double omega = 0;          // its frequency [1/s]; 0 with projection
-  int iterations = 2;        // augmented Lagrangian: refinements after the first solve, at most
+  int iterations = 50;       // augmented Lagrangian: refinements after the first solve, at most (1 is usual)
   double tolerance = 1e-14;  // relative, on the constraints' accelerations
   Projection projection = Projection::position_velocity;
 
