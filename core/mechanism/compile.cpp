@@ -329,7 +329,7 @@ class Compiler {
       out.component = PointSensor::kNorm;
       out.relative = true;
       out.a = sensor_point(s.body2, s.point2, where);
-      out.b = sensor_point(s.body1, s.point1, where);
+      out.b = sensor_point(s.body1.empty() ? "ground" : s.body1, s.point1, where);
       return out;
     }
     if (quantity == "angle" || quantity == "rate") {
