@@ -1,0 +1,69 @@
+#include "core/mechanism/compilation.hpp"
+
+#include "core/mechanism/mechanism.hpp"
+
+namespace mbsopt {
+namespace {
+
+std::vector<int> active_list(const Eigen::VectorXd& rho, const std::vector<bool>& active) {
+  std::vector<int> list;
+  for (int k = 0; k < rho.size(); ++k) {
+    if (active.empty() || active.at(static_cast<std::size_t>(k))) list.push_back(k);
+  }
+  return list;
+}
+
+}  // namespace
+
+Compilation::Compilation(const Scene& s, const Eigen::VectorXd& rho, const std::vector<bool>& active)
+    : scene(s), fields(s, rho, active_list(rho, active)) {
+  data.rho = rho;
+  data.active = active_list(rho, active);
+  data.gravity = numbers(keep(data.slot_gravity, fields.values(scene.gravity, "gravity")));
+}
+
+int Compilation::body_index(const std::string& name, const std::string& where) const {
+  for (std::size_t i = 0; i < data.body_names.size(); ++i) {
+    if (data.body_names[i] == name) return static_cast<int>(i);
+  }
+  throw SceneError(where + ": there is no body '" + name + "'");
+}
+
+std::size_t Compilation::joint_index(const std::string& name, const std::string& where) const {
+  for (std::size_t i = 0; i < scene.joints.size(); ++i) {
+    if (scene.joints[i].name == name) return i;
+  }
+  throw SceneError(where + ": there is no joint '" + name + "'");
+}
+
+DualVector3 Compilation::vector(int body, const PointField& field, const std::string& where) const {
+  if (const auto* name = std::get_if<std::string>(&field)) {
+    if (*name == "O") return {fields.constant(0), fields.constant(0), fields.constant(0)};
+    if (body > 0) {
+      const auto& points = scene.bodies[static_cast<std::size_t>(body - 1)].points;
+      if (const auto found = points.find(*name); found != points.end()) {
+        return fields.values(found->second,
+                             child_path("bodies", static_cast<std::size_t>(body - 1)) + ".points." + *name);
+      }
+    }
+    throw SceneError(where + ": body '" + data.body_names[static_cast<std::size_t>(body)] + "' has no point '" + *name +
+                     "'");
+  }
+  return fields.values(std::get<VectorField>(field), where);
+}
+
+DualVector3 Compilation::point(int body, const PointField& field, const std::string& where) const {
+  return vector(body, field, where) - com[static_cast<std::size_t>(body)];
+}
+
+DualVector3 Compilation::direction(int body, const std::optional<PointField>& field, const std::string& where) const {
+  if (!field) throw SceneError(where + ": is missing; this joint needs it");
+  return unit_axis(vector(body, *field, where), where);
+}
+
+DualVector3 Compilation::unit_axis(const DualVector3& axis, const std::string& where) const {
+  if (numbers(axis).norm() == 0) throw SceneError(where + ": is a zero vector, a direction must not be");
+  return unit(axis);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,140 @@
+// Sensors, and the conditions on them that the initial state meets.
+#include <algorithm>
+
+#include "core/mechanism/compilation.hpp"
+#include "core/mechanism/mechanism.hpp"
+
+namespace mbsopt {
+namespace {
+
+PointSensor::Point sensor_point(Compilation& model, const std::string& body, const PointField& field,
+                                const std::string& where) {
+  PointSensor::Point result;
+  result.body = model.body_index(body, where);
+  result.s = numbers(model.keep(result.slot, model.point(result.body, field, where)));
+  return result;
+}
+
+int component(const std::string& name, const std::string& where) {
+  constexpr std::array<const char*, 4> names{"x", "y", "z", "norm"};
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) throw SceneError(where + ".component: is '" + name + "'; allowed: x, y, z, norm");
+  return static_cast<int>(found - names.begin());
+}
+
+SensorKind sensor(Compilation& model, const Sensor& s, const std::string& where) {
+  const std::string& quantity = s.quantity;
+  if (quantity == "position" || quantity == "velocity") {
+    PointSensor out;
+    out.quantity = quantity == "position" ? PointSensor::Quantity::position : PointSensor::Quantity::velocity;
+    out.a = sensor_point(model, s.body, s.point, where);
+    if (s.relative_to) {
+      out.relative = true;
+      out.b = sensor_point(model, s.relative_to->body, s.relative_to->point, where + ".relative_to");
+    }
+    out.component = component(s.component, where);
+    if (s.in_body_frame && out.a.body > 0) out.axes_body = out.a.body;
+    return out;
+  }
+  if (quantity == "distance" || quantity == "distance_rate") {
+    PointSensor out;
+    out.quantity = quantity == "distance" ? PointSensor::Quantity::position : PointSensor::Quantity::position_rate;
+    out.component = PointSensor::kNorm;
+    out.relative = true;
+    out.a = sensor_point(model, s.body2, s.point2, where);
+    out.b = sensor_point(model, s.body1.empty() ? "ground" : s.body1, s.point1, where);
+    return out;
+  }
+  if (quantity == "angle" || quantity == "rate") {
+    return AngleSensor{model.angle_of(s.joint, where + ".joint"), quantity == "rate"};
+  }
+  if (quantity == "angular_velocity") {
+    return AngularVelocitySensor{model.body_index(s.body, where), component(s.component, where), s.in_body_frame};
+  }
+  if (quantity == "orientation") {
+    const int body = model.body_index(s.body, where);
+    if (body == 0 || s.component.size() != 2 || s.component[0] != 'e' || s.component[1] < '0' || s.component[1] > '3') {
+      throw SceneError(where + ": orientation needs a moving body and a component e0, e1, e2 or e3");
+    }
+    return CoordinateSensor{7 * (body - 1) + 3 + (s.component[1] - '0')};
+  }
+  if (quantity == "energy") {
+    if (s.component != "kinetic" && s.component != "potential" && s.component != "total") {
+      throw SceneError(where + ".component: is '" + s.component + "'; allowed: kinetic, potential, total");
+    }
+    return EnergySensor{s.component != "potential", s.component != "kinetic"};
+  }
+  if (quantity == "constraint_violation") return ViolationSensor{};
+  throw SceneError(where + ".quantity: '" + quantity + "' is not a quantity known here");
+}
+
+// The time derivative of a position-level sensor as a sensor of its own, where it is one.
+bool rate_of(const Compilation& model, const SensorKind& kind, SensorKind& rate) {
+  if (const auto* p = std::get_if<PointSensor>(&kind)) {
+    if (p->quantity != PointSensor::Quantity::position) return false;
+    PointSensor r = *p;
+    r.quantity = PointSensor::Quantity::position_rate;
+    rate = r;
+    return true;
+  }
+  if (const auto* a = std::get_if<AngleSensor>(&kind); a && !a->rate) {
+    rate = AngleSensor{a->angle, true};
+    return true;
+  }
+  if (const auto* c = std::get_if<CoordinateSensor>(&kind)) {
+    rate = CoordinateSensor{c->index + 7 * model.data.n};
+    return true;
+  }
+  return false;
+}
+
+void add_condition(Compilation& model, std::size_t i) {
+  const Condition& c = model.scene.conditions[i];
+  const std::string where = std::string("initial.") + child_path("conditions", i);
+  ConditionData out;
+  const auto found = std::find(model.data.sensor_names.begin(), model.data.sensor_names.end(), c.sensor);
+  if (found == model.data.sensor_names.end())
+    throw SceneError(where + ".sensor: there is no sensor '" + c.sensor + "'");
+  out.sensor = static_cast<int>(found - model.data.sensor_names.begin());
+  const SensorKind& kind = model.data.sensors[static_cast<std::size_t>(out.sensor)];
+  const bool has_rate = rate_of(model, kind, out.rate_kind);
+  if (const auto* p = std::get_if<PointSensor>(&kind)) {
+    out.velocity_level = p->quantity != PointSensor::Quantity::position;
+  } else if (const auto* a = std::get_if<AngleSensor>(&kind)) {
+    out.velocity_level = a->rate;
+    out.modulo_turn = !a->rate;
+  } else {
+    out.velocity_level = !std::holds_alternative<CoordinateSensor>(kind);
+  }
+  if (std::holds_alternative<EnergySensor>(kind) || std::holds_alternative<ViolationSensor>(kind)) {
+    throw SceneError(where + ": a condition on sensor '" + c.sensor +
+                     "' is not possible; use positions, velocities, "
+                     "angles, distances, their rates, angular velocities or Euler parameters");
+  }
+  if (c.value) {
+    const Dual v = model.fields.value(*c.value, where + ".value");
+    out.has_value = true, out.value = v.value(), out.slot_value = model.fields.slot(v);
+  }
+  if (c.rate) {
+    if (out.velocity_level) throw SceneError(where + ".rate: sensor '" + c.sensor + "' is a velocity: give its value");
+    if (!has_rate) throw SceneError(where + ".rate: the rate of sensor '" + c.sensor + "' is not available");
+    const Dual v = model.fields.value(*c.rate, where + ".rate");
+    out.has_rate = true, out.rate = v.value(), out.slot_rate = model.fields.slot(v);
+  }
+  model.data.conditions.push_back(out);
+}
+
+}  // namespace
+
+void compile_sensors(Compilation& model) {
+  for (std::size_t i = 0; i < model.scene.sensors.size(); ++i) {
+    model.data.sensors.push_back(sensor(model, model.scene.sensors[i], child_path("sensors", i)));
+    model.data.sensor_names.push_back(model.scene.sensors[i].name);
+  }
+}
+
+void compile_conditions(Compilation& model) {
+  for (std::size_t i = 0; i < model.scene.conditions.size(); ++i) add_condition(model, i);
+}
+
+}  // namespace mbsopt
