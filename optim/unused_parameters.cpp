@@ -79,7 +79,21 @@ class Search {
  private:
   std::vector<std::string> bodies_of_joint(const std::string& name) const {
     const Joint* const joint = facts_.joint(name);
-    return joint ? std::vector{joint->body1, joint->body2} : std::vector<std::string>{};
+    return joint ? bodies_of(*joint) : std::vector<std::string>{};
+  }
+  std::vector<std::string> bodies_of(const Joint& joint) const {
+    if (!ties_joints(joint)) return {joint.body1, joint.body2};
+    std::vector<std::string> all;
+    for (const std::string& name : {joint.joint1, joint.joint2}) {
+      const Joint* const tied = facts_.joint(name);
+      if (tied && !ties_joints(*tied)) all.insert(all.end(), {tied->body1, tied->body2});
+    }
+    return all;
+  }
+  std::vector<std::string> bodies_of(const Drive& drive) const {
+    std::vector<std::string> all = bodies_of_joint(drive.joint);
+    all.insert(all.end(), {drive.body, drive.body1, drive.body2});
+    return all;
   }
 
   std::vector<std::string> bodies_of(const Force& force) const {
@@ -95,7 +109,8 @@ class Search {
   }
 
   void connect_bodies() {
-    for (const Joint& joint : scene_.joints) bodies_.connect({joint.body1, joint.body2});
+    for (const Joint& joint : scene_.joints) bodies_.connect(bodies_of(joint));
+    for (const Drive& drive : scene_.drives) bodies_.connect(bodies_of(drive));
     for (const Force& force : scene_.forces) bodies_.connect(bodies_of(force));
     for (const Condition& condition : scene_.conditions)
       if (const Sensor* sensor = facts_.sensor(condition.sensor)) bodies_.connect(bodies_of(*sensor));
@@ -156,7 +171,9 @@ class Search {
     for (const Body& body : scene_.bodies)
       if (bodies_.matter({body.name})) collect(body);
     for (const Joint& joint : scene_.joints)
-      if (bodies_.matter({joint.body1, joint.body2})) collect(joint);
+      if (bodies_.matter(bodies_of(joint))) collect(joint);
+    for (const Drive& drive : scene_.drives)
+      if (bodies_.matter(bodies_of(drive))) collect(drive);
     for (const Force& force : scene_.forces)
       if (bodies_.matter(bodies_of(force))) collect_force(force);
     for (const Condition& condition : scene_.conditions) {

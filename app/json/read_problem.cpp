@@ -1,10 +1,14 @@
 #include "app/json/read_problem.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "app/json/findings.hpp"
 #include "app/json/overrides.hpp"
 #include "app/json/parse_json.hpp"
 #include "app/json/reader.hpp"
 #include "app/json/source_text.hpp"
+#include "optim/csv_table.hpp"
 #include "optim/problem_issues.hpp"
 #include "optim/unused_parameters.hpp"
 
@@ -24,6 +28,29 @@ void resolve_data_files(Problem& problem, const std::filesystem::path& folder, c
     if (!std::filesystem::exists(file, error) || std::filesystem::is_directory(file, error))
       findings.add(nearest(root, path), path, "there is no file '" + file.string() + "'; a CSV file is expected");
     data = file.string();
+  }
+}
+
+// Laws from CSV files: the samples are read here, so that nothing below knows of files.
+void read_sampled_laws(Scene& scene, const std::filesystem::path& folder, const Node& root, Findings& findings) {
+  for (std::size_t i = 0; i < scene.drives.size(); ++i) {
+    if (!scene.drives[i].samples) continue;
+    SampledLaw& law = *scene.drives[i].samples;
+    const std::string path = child_path("drives", i) + ".law";
+    if (findings.concerns(path)) continue;
+    try {
+      const CsvTable table = read_csv((folder / law.csv).lexically_normal().string());
+      law.times = ascending_times(table, law.time);
+      law.values = table.column(law.column);
+      const auto bad = std::find_if(law.values.begin(), law.values.end(), [](double x) { return !std::isfinite(x); });
+      if (bad != law.values.end())
+        throw CsvError(table.name + ":" +
+                       std::to_string(table.lines[static_cast<std::size_t>(bad - law.values.begin())]) + ": column '" +
+                       law.column + "' has no number here; a law needs all of them");
+      if (law.times.size() < 2) throw CsvError(table.name + ": a law needs two rows or more");
+    } catch (const CsvError& error) {
+      findings.add(nearest(root, path + ".csv"), path + ".csv", error.what());
+    }
   }
 }
 
@@ -62,6 +89,7 @@ Problem read_problem_text(const std::string& text, const std::filesystem::path& 
   Problem problem;
   Reader::read(root, "", findings, problem);
   resolve_data_files(problem, name.parent_path(), root, findings);
+  read_sampled_laws(problem.scene, name.parent_path(), root, findings);
   add_issues(problem, root, findings, warnings);
   findings.throw_if_any();
   return problem;

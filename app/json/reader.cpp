@@ -112,6 +112,15 @@ void Reader::number(std::string_view key, std::optional<Field>& value, const Say
   if (const Node* node = get(key, says)) read_expression(*node, inside(key), value.emplace());
 }
 
+void Reader::time_law(std::string_view key, Expression& value, std::optional<SampledLaw>& samples, const Says& says) {
+  const Node* const node = get(key, says);
+  if (!node) return;
+  if (node->kind == Node::Kind::object)
+    read(*node, inside(key), findings_, samples.emplace());
+  else
+    read_expression(*node, inside(key), value);
+}
+
 template <std::size_t N>
 bool Reader::read_vector(const Node& node, const std::string& path, std::array<Field, N>& value) {
   if (node.kind != Node::Kind::array || node.items.size() != N) {

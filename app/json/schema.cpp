@@ -103,6 +103,10 @@ class SchemaWriter {
   }
   void expression(std::string_view key, Expression&, Names, const Says& says) { put(key, says, ref("expression")); }
 
+  void time_law(std::string_view key, Expression&, std::optional<SampledLaw>&, const Says& says) {
+    put(key, says, {{"anyOf", {ref("expression"), object_schema<SampledLaw>()}}});
+  }
+
   void plain(std::string_view key, double& value, const Range& range, const Says& says) {
     put(key, says, ranged(ref("number"), range), value);
   }
@@ -177,6 +181,7 @@ class SchemaWriter {
 };
 
 void choose(Joint& joint, const TypeRow& row) { joint.type = row.name; }
+void choose(Drive& drive, const TypeRow& row) { drive.type = row.name; }
 void choose(Force& force, const TypeRow& row) { set_type(force, row.name); }
 void choose(Sensor& sensor, const TypeRow& row) { sensor.quantity = row.name; }
 void choose(auto&, const TypeRow&) {}

@@ -20,8 +20,7 @@ void set_B(const Vector4d& p, const Lanes<4>& w, double scale, Lanes<9>& out) {
 
 }  // namespace
 
-void set_tangent(const BodyState& body, const Lanes<7>& q_dir, const Lanes<7>& v_dir, FrameTangent& out,
-                 Lanes<4>& pddot_dir) {
+void set_tangent(const BodyState& body, const Lanes<7>& q_dir, const Lanes<7>& v_dir, FrameTangent& out) {
   const Lanes<4> p_dir = q_dir.bottomRows<4>(), pdot_dir = v_dir.bottomRows<4>();
   out.r = q_dir.topRows<3>();
   out.rdot = v_dir.topRows<3>();
@@ -32,6 +31,7 @@ void set_tangent(const BodyState& body, const Lanes<7>& q_dir, const Lanes<7>& v
   out.Adot += other;
   // pddot' = 1/2 G(p')' omegadot - 2 (pdot'pdot') p - (pdot'pdot) p'
   const Vector3d& w = body.omegadot;
+  Lanes<4>& pddot_dir = out.pddot;
   pddot_dir.row(0) = -0.5 * (w(0) * p_dir.row(1) + w(1) * p_dir.row(2) + w(2) * p_dir.row(3));
   pddot_dir.row(1) = 0.5 * (w(0) * p_dir.row(0) + w(2) * p_dir.row(2) - w(1) * p_dir.row(3));
   pddot_dir.row(2) = 0.5 * (w(1) * p_dir.row(0) + w(0) * p_dir.row(3) - w(2) * p_dir.row(1));
@@ -45,6 +45,7 @@ void set_tangent(const BodyState& body, const Lanes<7>& q_dir, const Lanes<7>& v
   out.Addot += other;
   set_B(body.pdot, pdot_dir, 2, other);
   out.Addot += other;
+  out.p = p_dir, out.pdot = pdot_dir;
 }
 
 }  // namespace mbsopt

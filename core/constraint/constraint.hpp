@@ -1,23 +1,36 @@
-// A primitive placed in a mechanism: which bodies it ties, which rows of Phi it owns, where its geometry's derivatives
-// are.
+// A primitive placed in a mechanism: which bodies it ties, to which rows of Phi it contributes, where its geometry's
+// derivatives are.
+//
+//   Phi(row) = sum of factor * primitive over the constraints of that row  -  the row's law f(t)     (time_law.hpp)
+//
+// Most rows have one constraint with factor 1 and no law. A gear's row has two: the angles of two joints.
 #pragma once
 
 #include <variant>
 
+#include "core/constraint/angle.hpp"
 #include "core/constraint/coincidence.hpp"
+#include "core/constraint/coordinate.hpp"
+#include "core/constraint/distance.hpp"
 #include "core/constraint/dot1.hpp"
+#include "core/constraint/dot2.hpp"
 
 namespace mbsopt {
 
-using Primitive = std::variant<Coincidence, Dot1>;
+using Primitive = std::variant<Coincidence, Dot1, Dot2, Distance, Angle, Coordinate>;
 
 struct Constraint {
   Primitive primitive;
-  int joint = 0;               // index in the scene
-  int body1 = 0, body2 = 0;    // 0 is the ground
-  int row = 0;                 // first row in Phi
-  int slot1 = -1, slot2 = -1;  // first row of s1, s2 among the differentiated fields; -1: constant
-  double alpha = 1;            // alpha of the augmented Lagrangian per unit of its relative alpha: the inertia seen
+  int joint = -1, drive = -1;              // index in the scene of the one that it belongs to
+  int body1 = 0, body2 = 0;                // 0 is the ground
+  int row = 0;                             // first row in Phi
+  int block = 0;                           // first row among the Jacobian blocks of all constraints
+  int slot1 = -1, slot2 = -1, slot3 = -1;  // first row of s1, s2, s3 among the differentiated fields; -1: constant
+  double factor = 1;
+  int slot_factor = -1;
+  // Of an Angle: the followed joint angle whose branch it takes, or kNearestLaw.
+  static constexpr int kNearestLaw = -1;
+  int angle = kNearestLaw;
 
   int rows() const {
     return std::visit([](const auto& p) { return std::decay_t<decltype(p)>::kRows; }, primitive);

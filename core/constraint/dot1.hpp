@@ -21,6 +21,9 @@ struct Dot1 {
   void phi_ddot(const Frame& f1, const Frame& f2, Vec<1>& out) const {
     out(0) = (f1.Addot * s1).dot(f2.A * s2) + 2 * (f1.Adot * s1).dot(f2.Adot * s2) + (f1.A * s1).dot(f2.Addot * s2);
   }
+  double change(const Frame& f1, const Frame& f2) const {  // under the frames' virtual displacement
+    return (f1.A_eta * s1).dot(f2.A * s2) + (f1.A * s1).dot(f2.A_eta * s2);
+  }
 
   void jacobian(const Frame& f1, const Frame& f2, Mat<1, 6>& J1, Mat<1, 6>& J2) const {
     const Vector3d x = f1.A * s1, y = f2.A * s2;
@@ -30,48 +33,33 @@ struct Dot1 {
   }
 
   void pull_back(const Frame& f1, const Frame& f2, const Multipliers<1>& z, FrameBar& bar1, FrameBar& bar2,
-                 Vector3d& s1_bar, Vector3d& s2_bar) const {
-    add_vector(f1, s1, f2, s2, z, bar1, s1_bar);
-    add_vector(f2, s2, f1, s1, z, bar2, s2_bar);
+                 GeometryBar& s) const {
+    const VectorJet x(f1, s1), y(f2, s2);
+    add_vector_bar(f1, s1, product_bar(y, z), 1, bar1, s.s1);
+    add_vector_bar(f2, s2, product_bar(x, z), 1, bar2, s.s2);
+  }
+  // Cotangent of x in  lambda (x'y)_eta + mu0 x'y + mu1 (x'y)dot + mu2 (x'y)ddot.
+  static VectorJet product_bar(const VectorJet& y, const Multipliers<1>& z) {
+    const double lambda = z.lambda(0), mu0 = z.mu0(0), mu1 = z.mu1(0), mu2 = z.mu2(0);
+    return {lambda * y.x_eta + mu0 * y.x + mu1 * y.xd + mu2 * y.xdd, mu1 * y.x + 2 * mu2 * y.xd, mu2 * y.x,
+            lambda * y.x};
   }
 
   void tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
                const GeometryTangent& s, const Vec<1>& lambda, PrimitiveTangent<1>& out) const {
-    const Vector3d x = f1.A * s1, xd = f1.Adot * s1, xdd = f1.Addot * s1;
-    const Vector3d y = f2.A * s2, yd = f2.Adot * s2, ydd = f2.Addot * s2;
-    Lanes<3> dx = times(t1.A, s1), dxd = times(t1.Adot, s1), dxdd = times(t1.Addot, s1);
-    Lanes<3> dy = times(t2.A, s2), dyd = times(t2.Adot, s2), dydd = times(t2.Addot, s2);
-    if (s.s1) dx += f1.A * *s.s1, dxd += f1.Adot * *s.s1, dxdd += f1.Addot * *s.s1;
-    if (s.s2) dy += f2.A * *s.s2, dyd += f2.Adot * *s.s2, dydd += f2.Addot * *s.s2;
-    out.phi = dot(y, dx) + dot(x, dy);
-    out.phi_dot = dot(y, dxd) + dot(xd, dy) + dot(yd, dx) + dot(x, dyd);
-    out.phi_ddot = dot(y, dxdd) + dot(xdd, dy) + 2 * (dot(yd, dxd) + dot(xd, dyd)) + dot(ydd, dx) + dot(x, dydd);
-    // (s1 x A1'y)' = s1' x A1'y + s1 x (A1''y + A1'y'), with '' the direction's part of A1'
-    const Vector3d m1 = f1.A.transpose() * y, m2 = f2.A.transpose() * x;
-    Lanes<3> moment1 = cross(s1, transposed_times(t1.A, y) + f1.A.transpose() * dy);
-    Lanes<3> moment2 = cross(s2, transposed_times(t2.A, x) + f2.A.transpose() * dx);
-    if (s.s1) moment1 -= cross(m1, *s.s1);
-    if (s.s2) moment2 -= cross(m2, *s.s2);
+    const VectorJet x(f1, s1), y(f2, s2);
+    const VectorTangent dx(f1, t1, s1, s.s1), dy(f2, t2, s2, s.s2);
+    product_tangent(x, y, dx, dy, out);
     out.load1.setZero(), out.load2.setZero();
-    out.load1.bottomRows<3>() = lambda(0) * moment1;
-    out.load2.bottomRows<3>() = lambda(0) * moment2;
+    out.load1.bottomRows<3>() = lambda(0) * moment_tangent(f1, t1, s1, s.s1, y.x, dy.x);
+    out.load2.bottomRows<3>() = lambda(0) * moment_tangent(f2, t2, s2, s.s2, x.x, dx.x);
   }
-
- private:
-  // Gradient with respect to the vector x = A s of one body, y the other's.
-  static void add_vector(const Frame& f, const Vector3d& s, const Frame& other, const Vector3d& s_other,
-                         const Multipliers<1>& z, FrameBar& bar, Vector3d& s_bar) {
-    const Vector3d y = other.A * s_other, yd = other.Adot * s_other, ydd = other.Addot * s_other,
-                   y_eta = other.A_eta * s_other;
-    const double mu0 = z.mu0(0), mu1 = z.mu1(0), mu2 = z.mu2(0), lambda = z.lambda(0);
-    const Vector3d x_bar = lambda * y_eta + mu0 * y + mu1 * yd + mu2 * ydd;
-    const Vector3d xd_bar = mu1 * y + 2 * mu2 * yd, xdd_bar = mu2 * y, x_eta_bar = lambda * y;
-    bar.A += x_bar * s.transpose();
-    bar.Adot += xd_bar * s.transpose();
-    bar.Addot += xdd_bar * s.transpose();
-    bar.A_eta += x_eta_bar * s.transpose();
-    s_bar += f.A.transpose() * x_bar + f.Adot.transpose() * xd_bar + f.Addot.transpose() * xdd_bar +
-             f.A_eta.transpose() * x_eta_bar;
+  static void product_tangent(const VectorJet& x, const VectorJet& y, const VectorTangent& dx, const VectorTangent& dy,
+                              PrimitiveTangent<1>& out) {
+    out.phi = dot(y.x, dx.x) + dot(x.x, dy.x);
+    out.phi_dot = dot(y.x, dx.xd) + dot(x.xd, dy.x) + dot(y.xd, dx.x) + dot(x.x, dy.xd);
+    out.phi_ddot = dot(y.x, dx.xdd) + dot(x.xdd, dy.x) + 2 * (dot(y.xd, dx.xd) + dot(x.xd, dy.xd)) + dot(y.xdd, dx.x) +
+                   dot(x.x, dy.xdd);
   }
 };
 static_assert(IsPrimitive<Dot1>);

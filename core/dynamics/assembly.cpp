@@ -152,7 +152,10 @@ struct Assembly::Solution {
     const Index N = 7 * data.n;
     result.y = VectorXd::Zero(2 * N);
     PositionProblem positions(position);
-    q.emplace(nearest_point(positions, position_guess(data)));
+    const VectorXd guess = position_guess(data);
+    result.y.head(N) = guess;
+    position.start_branches(result.y);
+    q.emplace(nearest_point(positions, guess));
     result.y.head(N) = q->x;
     result.iterations = q->iterations;
     result.residual = q->F.size() > 0 ? q->F.lpNorm<Eigen::Infinity>() : 0.0;
@@ -172,20 +175,18 @@ struct Assembly::Solution {
     result.ok = true;
   }
 
-  // On the branch of an angle's condition where there is one, else atan2's own value.
+  // On the turn that an angle's condition names, where there is one (so that a measured angle starts where it was
+  // measured), else within half a turn of zero; the last angle of a gear on the branch that the gear asks for.
   void set_angles() {
-    result.angles.resize(static_cast<Index>(data.angles.size()));
-    for (std::size_t i = 0; i < data.angles.size(); ++i) {
-      const JointAngle& joint = data.angles[i];
-      result.angles(static_cast<Index>(i)) =
-          joint.jet(body_at(result.y, joint.body1).frame, body_at(result.y, joint.body2).frame).angle();
-    }
+    position.start_branches(result.y);
+    result.angles = position.angles();
     for (const AssemblyTarget& target : position.targets()) {
       if (const auto* sensor = std::get_if<AngleSensor>(&target.sensor)) {
         double& angle = result.angles(sensor->angle);
-        angle = JointAngle::on_branch(angle, target.branch);
+        angle = JointAngle::on_branch(angle, target.value);
       }
     }
+    position.settle_shared_rows(result.y, result.angles);
   }
 
   // Right-hand sides of both linear systems (nearest_point.hpp); those of v need q' as well:
@@ -283,11 +284,16 @@ ModelSummary Assembly::summary() const {
     return true;
   };
   for (Index i = 0; i < d.n; ++i) independent(d.m + i);
-  std::vector<int> rows(d.joint_names.size(), 0), redundant(d.joint_names.size(), 0);
+  const std::size_t joints = d.joint_names.size();
+  std::vector<int> rows(joints + d.drive_names.size(), 0), redundant(rows.size(), 0);
+  int next_row = 0;
   for (const Constraint& c : d.constraints) {
-    const std::size_t joint = static_cast<std::size_t>(c.joint);
-    rows[joint] += c.rows();
-    for (int i = 0; i < c.rows(); ++i) redundant[joint] += independent(c.row + i) ? 0 : 1;
+    if (c.row < next_row) continue;  // a further term of a row already seen
+    next_row = c.row + c.rows();
+    const std::size_t owner =
+        c.drive >= 0 ? joints + static_cast<std::size_t>(c.drive) : static_cast<std::size_t>(c.joint);
+    rows[owner] += c.rows();
+    for (int i = 0; i < c.rows(); ++i) redundant[owner] += independent(c.row + i) ? 0 : 1;
   }
   ModelSummary summary;
   summary.bodies = d.n;
@@ -296,8 +302,8 @@ ModelSummary Assembly::summary() const {
   summary.degrees_of_freedom = 7 * d.n - summary.rank;
   for (std::size_t j = 0; j < rows.size(); ++j) {
     if (redundant[j] == 0) continue;
-    summary.redundant.push_back(d.joint_names[j] + " (" + std::to_string(redundant[j]) + " of " +
-                                std::to_string(rows[j]) + ")");
+    summary.redundant.push_back((j < joints ? d.joint_names[j] : d.drive_names[j - joints]) + " (" +
+                                std::to_string(redundant[j]) + " of " + std::to_string(rows[j]) + ")");
   }
   return summary;
 }

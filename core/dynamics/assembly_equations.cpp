@@ -1,6 +1,7 @@
 #include "core/dynamics/assembly_equations.hpp"
 
 #include <cmath>
+#include <numbers>
 
 #include "core/constraint/unit_norm.hpp"
 #include "core/sensor/body_at.hpp"
@@ -12,6 +13,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
+
+// A half turn is +pi: rounding does not decide its sign.
+constexpr double kHalfTurn = -std::numbers::pi + 1e-6;
 
 // y = (q, e_j)
 VectorXd with_unit_velocity(const VectorXd& y, Index j) {
@@ -37,24 +41,28 @@ std::vector<SensorKind> components_of_norm(const SensorKind& kind) {
 
 template <class P>
 Multipliers<P::kRows> only_mu0(const Vec<P::kRows>& mu0) {
-  Multipliers<P::kRows> z;
-  z.lambda.setZero(), z.mu1.setZero(), z.mu2.setZero();
+  Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
   z.mu0 = mu0;
   return z;
 }
 template <class P>
 Multipliers<P::kRows> only_mu1(const Vec<P::kRows>& mu1) {
-  Multipliers<P::kRows> z;
-  z.lambda.setZero(), z.mu0.setZero(), z.mu2.setZero();
+  Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
   z.mu1 = mu1;
   return z;
 }
 
 struct PrimitiveBars {
   FrameBar bar1, bar2;
-  Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero();
+  GeometryBar s;
   PrimitiveBars() { bar1.set_zero(), bar2.set_zero(); }
 };
+
+std::vector<double> law_inputs(const MechanismData& d, double t) {
+  std::vector<double> inputs(d.rho.begin(), d.rho.end());
+  inputs.push_back(t);
+  return inputs;
+}
 
 BodyAt at_rest(const VectorXd& y, int body) {
   BodyAt b;
@@ -73,7 +81,15 @@ void add_to_row(const BodyAt& b, int body, const FrameBar& bar, AssemblyEquation
 }  // namespace
 
 AssemblyEquations::AssemblyEquations(const MechanismData& data, AssemblyLevel level, double t)
-    : data_(data), level_(level), t_(t) {
+    : data_(data), level_(level), t_(t), angles_(Eigen::VectorXd::Zero(static_cast<Index>(data.angles.size()))) {
+  const std::vector<double> inputs = law_inputs(data, t);
+  for (const RowLaw& row : data.laws) {
+    Program::Scratch scratch;
+    if (row.law.programs) {
+      for (const Program& p : *row.law.programs) p.grow(scratch);
+    }
+    laws_.push_back(row.law.at(inputs, scratch));
+  }
   for (std::size_t i = 0; i < data.conditions.size(); ++i) {
     const ConditionData& c = data.conditions[i];
     const SensorKind& sensor = data.sensors[static_cast<std::size_t>(c.sensor)];
@@ -102,7 +118,63 @@ VectorXd AssemblyEquations::branches(const AssemblyTarget& target) const {
   return VectorXd::Constant(static_cast<Index>(data_.angles.size()), target.branch);
 }
 
+// factor * primitive of a constraint of one row, at position level.
+double AssemblyEquations::term_value(const Constraint& c, const VectorXd& y, const VectorXd& angles) const {
+  const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+  return std::visit(
+      [&]<class P>(const P& p) {
+        Vec<P::kRows> phi;
+        p.phi(b1.frame, b2.frame, phi);
+        if constexpr (std::is_same_v<P, Angle>) {
+          double reference = c.angle == Constraint::kNearestLaw ? 0 : angles(c.angle);
+          if (c.angle == Constraint::kNearestLaw) {
+            for (std::size_t k = 0; k < laws_.size(); ++k) {
+              if (data_.laws[k].row == c.row) reference = laws_[k].f;
+            }
+          }
+          return c.factor * Angle::on_branch(phi(0), reference);
+        }
+        return c.factor * phi(0);
+      },
+      c.primitive);
+}
+
+void AssemblyEquations::settle_shared_rows(const VectorXd& y, VectorXd& angles) const {
+  for (const RowGroup& g : data_.groups) {
+    if (!g.shared) continue;
+    double sum = 0;
+    const Constraint* last = nullptr;
+    for (const Constraint& c : data_.constraints) {
+      if (c.row != g.row) continue;
+      sum += term_value(c, y, angles);
+      if (std::holds_alternative<Angle>(c.primitive)) last = &c;
+    }
+    for (std::size_t k = 0; k < laws_.size(); ++k) {
+      if (data_.laws[k].row == g.row) sum -= laws_[k].f;
+    }
+    if (!last || last->factor == 0) continue;
+    double& angle = angles(last->angle);
+    angle = Angle::on_branch(angle, angle - sum / last->factor);
+  }
+}
+
+void AssemblyEquations::start_branches(const VectorXd& y) {
+  angles_.setZero();
+  for (std::size_t i = 0; i < data_.angles.size(); ++i) {
+    const JointAngle& a = data_.angles[i];
+    double& angle = angles_(static_cast<Index>(i));
+    angle = a.jet(body_at(y, a.body1).frame, body_at(y, a.body2).frame).angle();
+    if (angle < kHalfTurn) angle += 2 * std::numbers::pi;
+  }
+  settle_shared_rows(y, angles_);
+}
+
 void AssemblyEquations::continue_branches(const VectorXd& y) {
+  for (std::size_t i = 0; i < data_.angles.size(); ++i) {
+    const JointAngle& a = data_.angles[i];
+    double& angle = angles_(static_cast<Index>(i));
+    angle = JointAngle::on_branch(a.jet(body_at(y, a.body1).frame, body_at(y, a.body2).frame).angle(), angle);
+  }
   for (AssemblyTarget& target : targets_) {
     if (std::holds_alternative<AngleSensor>(target.sensor)) {
       target.branch = evaluate(data_, target.sensor, t_, y, branches(target));
@@ -118,21 +190,27 @@ void AssemblyEquations::add_slot(int slot, const Eigen::Ref<const VectorXd>& bar
 }
 
 VectorXd AssemblyEquations::values(const VectorXd& y) const {
-  VectorXd F(rows());
+  VectorXd F = VectorXd::Zero(rows());
+  const bool positions = level_ == AssemblyLevel::position;
   for (const Constraint& c : data_.constraints) {
+    if (positions && c.rows() == 1) {
+      F(c.row) += term_value(c, y, angles_);
+      continue;
+    }
     const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
     std::visit(
-        [&](const auto& p) {
-          Vec<std::decay_t<decltype(p)>::kRows> phi;
-          if (level_ == AssemblyLevel::position) {
+        [&]<class P>(const P& p) {
+          Vec<P::kRows> phi;
+          if (positions) {
             p.phi(b1.frame, b2.frame, phi);
           } else {
             p.phi_dot(b1.frame, b2.frame, phi);
           }
-          F.segment(c.row, phi.size()) = phi;
+          F.segment<P::kRows>(c.row) += c.factor * phi;
         },
         c.primitive);
   }
+  for (std::size_t k = 0; k < laws_.size(); ++k) F(data_.laws[k].row) -= positions ? laws_[k].f : laws_[k].f_t;
   for (int i = 0; i < data_.n; ++i) {
     const Vector4d p = y.segment<4>(7 * i + 3), pdot = y.segment<4>(y.size() / 2 + 7 * i + 3);
     F(data_.m + i) = level_ == AssemblyLevel::position ? UnitNorm::phi(p) : UnitNorm::phi_dot(p, pdot);
@@ -152,21 +230,30 @@ AssemblyEquations::Gradients AssemblyEquations::gradients(const VectorXd& y) con
     std::visit(
         [&](const auto& p) {
           using P = std::decay_t<decltype(p)>;
+          const bool positions = level_ == AssemblyLevel::position;
           for (int i = 0; i < P::kRows; ++i) {
-            const Vec<P::kRows> unit = Vec<P::kRows>::Unit(i);
+            const Vec<P::kRows> unit = c.factor * Vec<P::kRows>::Unit(i);
             PrimitiveBars bars;
-            p.pull_back(b1.frame, b2.frame, level_ == AssemblyLevel::position ? only_mu0<P>(unit) : only_mu1<P>(unit),
-                        bars.bar1, bars.bar2, bars.s1, bars.s2);
+            p.pull_back(b1.frame, b2.frame, positions ? only_mu0<P>(unit) : only_mu1<P>(unit), bars.bar1, bars.bar2,
+                        bars.s);
             y_bar.setZero();
             add_pull_back(b1, c.body1, bars.bar1, 1, y_bar);
             add_pull_back(b2, c.body2, bars.bar2, 1, y_bar);
-            out.y.row(c.row + i) = y_bar.transpose();
-            add_slot(c.slot1, bars.s1, out.rho.row(c.row + i));
-            add_slot(c.slot2, bars.s2, out.rho.row(c.row + i));
+            out.y.row(c.row + i) += y_bar.transpose();
+            add_slot(c.slot1, bars.s.s1, out.rho.row(c.row + i));
+            add_slot(c.slot2, bars.s.s2, out.rho.row(c.row + i));
+            add_slot(c.slot3, bars.s.s3, out.rho.row(c.row + i));
+          }
+          if (c.slot_factor >= 0) {
+            Vec<P::kRows> phi_dot;
+            p.phi_dot(b1.frame, b2.frame, phi_dot);
+            const double value = positions ? term_value(c, y, angles_) / c.factor : phi_dot(0);
+            add_slot(c.slot_factor, Vec<1>(value), out.rho.row(c.row));
           }
         },
         c.primitive);
   }
+  add_law_gradients(out);
   for (int i = 0; i < data_.n; ++i) {
     const Index p = 7 * i + 3, pdot = y.size() / 2 + p;
     if (level_ == AssemblyLevel::position) {
@@ -186,6 +273,20 @@ AssemblyEquations::Gradients AssemblyEquations::gradients(const VectorXd& y) con
     ++row;
   }
   return out;
+}
+
+void AssemblyEquations::add_law_gradients(Gradients& out) const {
+  const bool positions = level_ == AssemblyLevel::position;
+  const std::vector<double> inputs = law_inputs(data_, t_);
+  for (const RowLaw& row : data_.laws) {
+    if (positions) add_slot(row.law.slot, Vec<1>(-1), out.rho.row(row.row));
+    if (!row.law.programs) continue;
+    const Program& program = (*row.law.programs)[positions ? 0 : 1];
+    Program::Scratch scratch = program.scratch();
+    std::vector<double> gradient(inputs.size(), 0.0);
+    program.add_gradient(inputs, -1, gradient, scratch);
+    for (const int k : data_.active) out.rho(row.row, k) += gradient[static_cast<std::size_t>(k)];
+  }
 }
 
 AssemblyEquations::Gradients AssemblyEquations::second(const VectorXd& y, const VectorXd& nu) const {
@@ -214,14 +315,19 @@ void AssemblyEquations::add_joint_curvature(const VectorXd& y, const VectorXd& n
         std::visit(
             [&](const auto& p) {
               using P = std::decay_t<decltype(p)>;
-              p.pull_back(b1.frame, b2.frame, only_mu1<P>(nu.segment<P::kRows>(c.row)), bars.bar1, bars.bar2, bars.s1,
-                          bars.s2);
+              p.pull_back(b1.frame, b2.frame, only_mu1<P>(c.factor * nu.segment<P::kRows>(c.row)), bars.bar1, bars.bar2,
+                          bars.s);
+              if (c.slot_factor < 0) return;
+              Vec<P::kRows> rate;
+              p.phi_dot(b1.frame, b2.frame, rate);
+              add_slot(c.slot_factor, Vec<1>(nu(c.row) * rate(0)), out.rho.row(j));
             },
             c.primitive);
         add_to_row(b1, c.body1, bars.bar1, out.y.row(j));
         add_to_row(b2, c.body2, bars.bar2, out.y.row(j));
-        add_slot(c.slot1, bars.s1, out.rho.row(j));
-        add_slot(c.slot2, bars.s2, out.rho.row(j));
+        add_slot(c.slot1, bars.s.s1, out.rho.row(j));
+        add_slot(c.slot2, bars.s.s2, out.rho.row(j));
+        add_slot(c.slot3, bars.s.s3, out.rho.row(j));
       }
     }
   }

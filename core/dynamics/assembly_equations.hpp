@@ -30,6 +30,12 @@ class AssemblyEquations {
  public:
   AssemblyEquations(const MechanismData& data, AssemblyLevel level, double t);
 
+  // Branches of followed joint angles: within half a turn of zero at the guess, except that the last angle in a row of
+  // several (a gear) is on the branch that satisfies the row best; from there on they are continued.
+  void start_branches(const Eigen::VectorXd& y);
+  const Eigen::VectorXd& angles() const { return angles_; }
+  void settle_shared_rows(const Eigen::VectorXd& y, Eigen::VectorXd& angles) const;
+
   Eigen::Index rows() const;  // joints first, then unit norms, then targets
   const std::vector<AssemblyTarget>& targets() const { return targets_; }
 
@@ -53,12 +59,16 @@ class AssemblyEquations {
   Eigen::VectorXd branches(const AssemblyTarget& target) const;
   void add_joint_curvature(const Eigen::VectorXd& q, const Eigen::VectorXd& nu, Gradients& out) const;
   void add_target_curvature(const AssemblyTarget& target, const Eigen::VectorXd& y, double nu, Gradients& out) const;
+  void add_law_gradients(Gradients& out) const;
+  double term_value(const Constraint& c, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) const;
   void add_slot(int slot, const Eigen::Ref<const Eigen::VectorXd>& bar, Row rho_bar) const;
 
   const MechanismData& data_;
   AssemblyLevel level_;
   double t_;
   std::vector<AssemblyTarget> targets_;
+  Eigen::VectorXd angles_;
+  std::vector<CubicSpline::Jet> laws_;  // at t
 };
 
 }  // namespace mbsopt

@@ -43,28 +43,42 @@ bool is_speed(const SensorKind& kind) {
   return w && w->component == AngularVelocitySensor::kNorm;
 }
 
-// Points apart, directions out of square, of one joint.
-void add_joint(const MechanismData& d, AssemblyLevel level, std::size_t joint, const Eigen::VectorXd& F,
-               double tolerance, std::vector<Finding>& findings) {
-  double apart = 0, skew = 0;
+// What is wrong with one joint: points apart, directions out of square.
+void add_joint(const MechanismData& d, AssemblyLevel level, int joint, const Eigen::VectorXd& F, double tolerance,
+               std::vector<Finding>& findings) {
+  double apart = 0, skew = 0, turned = 0;
   const Constraint* any = nullptr;
   for (const Constraint& c : d.constraints) {
-    if (static_cast<std::size_t>(c.joint) != joint) continue;
+    if (c.joint != joint) continue;
     any = &c;
     const double amount = F.segment(c.row, c.rows()).norm();
-    double& kind = std::holds_alternative<Coincidence>(c.primitive) ? apart : skew;
-    kind = std::hypot(kind, amount);
+    double& kind = std::holds_alternative<Dot1>(c.primitive)    ? skew
+                   : std::holds_alternative<Angle>(c.primitive) ? turned
+                                                                : apart;
+    kind = std::holds_alternative<Angle>(c.primitive) ? amount : std::hypot(kind, amount);
   }
-  if (!any || std::max(apart, skew) <= tolerance) return;
+  if (!any || std::max({apart, skew, turned}) <= tolerance) return;
   const bool rates = level == AssemblyLevel::velocity;
-  std::string text = joint_name(d, *any) + ": ";
-  if (apart > tolerance) text += "points " + number(apart) + (rates ? " m/s apart" : " m apart");
+  std::vector<std::string> parts;
+  if (apart > tolerance) parts.push_back("points " + number(apart) + (rates ? " m/s apart" : " m apart"));
   if (skew > tolerance) {
-    if (apart > tolerance) text += ", ";
-    text += rates ? "axes turn apart at " + number(skew) + " rad/s"
-                  : "axes " + number(std::asin(std::min(1.0, skew))) + " rad out of line";
+    parts.push_back(rates ? "axes turn apart at " + number(skew) + " rad/s"
+                          : "axes " + number(std::asin(std::min(1.0, skew))) + " rad out of line");
   }
-  findings.push_back({std::max(apart, skew), text});
+  if (turned > tolerance) parts.push_back("angles off by " + number(turned) + (rates ? " rad/s" : " rad"));
+  std::string text = joint_name(d, *any) + ": " + parts[0];
+  for (std::size_t i = 1; i < parts.size(); ++i) text += ", " + parts[i];
+  findings.push_back({std::max({apart, skew, turned}), text});
+}
+
+void add_drive(const MechanismData& d, AssemblyLevel level, const Constraint& c, const Eigen::VectorXd& F,
+               double tolerance, std::vector<Finding>& findings) {
+  const double amount = std::abs(F(c.row));
+  if (amount <= tolerance) return;
+  const bool lengths = std::holds_alternative<Dot2>(c.primitive) || std::holds_alternative<Distance>(c.primitive);
+  const std::string unit = std::holds_alternative<Angle>(c.primitive) ? " rad" : lengths ? " m" : "";
+  findings.push_back({amount, "drive '" + d.drive_names[static_cast<std::size_t>(c.drive)] + "': missed by " +
+                                  number(amount) + unit + (level == AssemblyLevel::velocity ? " per second" : "")});
 }
 
 }  // namespace
@@ -87,7 +101,12 @@ std::string assembly_failure(const MechanismData& d, AssemblyLevel level, const 
   const Eigen::VectorXd& F = found.F;
   const double tolerance = std::max(1e-9, 1e-3 * F.lpNorm<Eigen::Infinity>());
   std::vector<Finding> findings;
-  for (std::size_t j = 0; j < d.joint_names.size(); ++j) add_joint(d, level, j, F, tolerance, findings);
+  for (std::size_t j = 0; j < d.joint_names.size(); ++j) {
+    add_joint(d, level, static_cast<int>(j), F, tolerance, findings);
+  }
+  for (const Constraint& c : d.constraints) {
+    if (c.drive >= 0) add_drive(d, level, c, F, tolerance, findings);
+  }
   Eigen::Index row = d.m + d.n;
   for (const AssemblyTarget& target : equations.targets()) {
     const double off = F(row++);

@@ -1,14 +1,44 @@
 #include "core/dynamics/constraint_rows.hpp"
 
+#include <algorithm>
+
 namespace mbsopt {
+namespace {
+
+// S += x' alpha x: the lower triangle only, which is all that a Cholesky factorisation reads.
+void add_lower_square(double alpha, const double* x, Mat<6, 6>& S) {
+  for (int j = 0; j < 6; ++j) {
+    const double ax = alpha * x[j];
+    for (int i = j; i < 6; ++i) S(i, j) += ax * x[i];
+  }
+}
+
+}  // namespace
 
 ConstraintRows::ConstraintRows(const MechanismData& data) : data_(&data) {
-  J1.setZero(data.m, 6);
-  J2.setZero(data.m, 6);
-  std::size_t edges = 0;
+  J1.setZero(data.blocks, 6);
+  J2.setZero(data.blocks, 6);
   for (const RowGroup& g : data.groups) {
-    handle_.push_back(edges);
-    if (g.body1 > 0 && g.body2 > 0) ++edges;
+    handle_.push_back(edges_.size());
+    if (g.shared) {
+      auto row = std::find_if(shared_.begin(), shared_.end(), [&](const SharedRow& s) { return s.row == g.row; });
+      if (row == shared_.end()) row = shared_.insert(row, SharedRow{g.row, {}, {}, {}});
+      for (const int body : {g.body1, g.body2}) {
+        if (body > 0 && std::find(row->bodies.begin(), row->bodies.end(), body) == row->bodies.end())
+          row->bodies.push_back(body);
+      }
+    } else if (g.body1 > 0 && g.body2 > 0) {
+      edges_.emplace_back(g.body1 - 1, g.body2 - 1);
+    }
+  }
+  for (SharedRow& row : shared_) {
+    row.J.resize(row.bodies.size());
+    for (std::size_t j = 1; j < row.bodies.size(); ++j) {
+      for (std::size_t i = 0; i < j; ++i) {
+        row.handles.push_back(edges_.size());
+        edges_.emplace_back(row.bodies[i] - 1, row.bodies[j] - 1);
+      }
+    }
   }
 }
 
@@ -20,36 +50,58 @@ void ConstraintRows::evaluate(const std::vector<Frame>& frames) {
           constexpr int m = std::decay_t<decltype(p)>::kRows;
           Mat<m, 6> A, B;
           p.jacobian(f1, f2, A, B);
-          J1.middleRows<m>(c.row) = A;
-          J2.middleRows<m>(c.row) = B;
+          J1.middleRows<m>(c.block) = c.factor * A;
+          J2.middleRows<m>(c.block) = c.factor * B;
         },
         c.primitive);
   }
 }
 
-void ConstraintRows::add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky& S) const {
-  using Row = Mat<1, 6>;
+void ConstraintRows::add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky& S) {
   for (std::size_t k = 0; k < data_->groups.size(); ++k) {
     const RowGroup& g = data_->groups[k];
-    Mat<6, 6> S11 = Mat<6, 6>::Zero(), S12 = Mat<6, 6>::Zero(), S22 = Mat<6, 6>::Zero();
-    for (int r = g.row; r < g.row + g.rows; ++r) {
-      const Row a = J1.row(r), b = J2.row(r), weighted_a = alpha(r) * a, weighted_b = alpha(r) * b;
-      S11.noalias() += weighted_a.transpose() * a;
-      S12.noalias() += weighted_a.transpose() * b;
-      S22.noalias() += weighted_b.transpose() * b;
+    if (g.shared) continue;
+    for (int r = 0; r < g.rows; ++r) {
+      if (g.body1 > 0) add_lower_square(alpha(g.row + r), J1.row(g.block + r).data(), S.diagonal(g.body1 - 1));
+      if (g.body2 > 0) add_lower_square(alpha(g.row + r), J2.row(g.block + r).data(), S.diagonal(g.body2 - 1));
     }
-    if (g.body1 > 0) S.diagonal(g.body1 - 1) += S11;
-    if (g.body2 > 0) S.diagonal(g.body2 - 1) += S22;
-    if (g.body1 > 0 && g.body2 > 0) S.add_off_diagonal(handle_[k], S12);
+    if (g.body1 == 0 || g.body2 == 0) continue;
+    Mat<6, 6> S12 = Mat<6, 6>::Zero();
+    for (int r = 0; r < g.rows; ++r) {
+      const double *a = J1.row(g.block + r).data(), *b = J2.row(g.block + r).data();
+      for (int j = 0; j < 6; ++j) {
+        const double ab = alpha(g.row + r) * b[j];
+        for (int i = 0; i < 6; ++i) S12(i, j) += a[i] * ab;
+      }
+    }
+    S.add_off_diagonal(handle_[k], S12);
+  }
+  if (!shared_.empty()) add_shared_square(alpha, S);
+}
+
+void ConstraintRows::add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky& S) {
+  for (SharedRow& row : shared_) {
+    for (Mat<1, 6>& J : row.J) J.setZero();
+    auto of = [&](int body) -> Mat<1, 6>& {
+      return row
+          .J[static_cast<std::size_t>(std::find(row.bodies.begin(), row.bodies.end(), body) - row.bodies.begin())];
+    };
+    for (const RowGroup& g : data_->groups) {
+      if (!g.shared || g.row != row.row) continue;
+      if (g.body1 > 0) of(g.body1) += J1.row(g.block);
+      if (g.body2 > 0) of(g.body2) += J2.row(g.block);
+    }
+    std::size_t pair = 0;
+    for (std::size_t j = 0; j < row.bodies.size(); ++j) {
+      add_lower_square(alpha(row.row), row.J[j].data(), S.diagonal(row.bodies[j] - 1));
+      for (std::size_t i = 0; i < j; ++i) {
+        const Mat<6, 6> S12 = alpha(row.row) * row.J[i].transpose() * row.J[j];
+        S.add_off_diagonal(row.handles[pair++], S12);
+      }
+    }
   }
 }
 
-BlockCholesky ConstraintRows::matrix() const {
-  std::vector<std::pair<int, int>> edges;
-  for (const RowGroup& g : data_->groups) {
-    if (g.body1 > 0 && g.body2 > 0) edges.emplace_back(g.body1 - 1, g.body2 - 1);
-  }
-  return BlockCholesky(data_->n, edges);
-}
+BlockCholesky ConstraintRows::matrix() const { return BlockCholesky(data_->n, edges_); }
 
 }  // namespace mbsopt

@@ -7,13 +7,14 @@ const Frame& of(const std::vector<Frame>& frames, int body) { return frames[stat
 
 template <class Evaluate>
 void for_each(const MechanismData& data, const std::vector<Frame>& frames, Eigen::VectorXd& out, Evaluate&& evaluate) {
+  out.setZero();
   for (const Constraint& c : data.constraints) {
     std::visit(
         [&](const auto& p) {
           constexpr int m = std::decay_t<decltype(p)>::kRows;
           Vec<m> value;
-          evaluate(p, of(frames, c.body1), of(frames, c.body2), value);
-          out.segment<m>(c.row) = value;
+          evaluate(c, p, of(frames, c.body1), of(frames, c.body2), value);
+          out.segment<m>(c.row) += c.factor * value;
         },
         c.primitive);
   }
@@ -25,58 +26,108 @@ Vec<M> rows(const Eigen::VectorXd* z, int row, double scale) {
   return scale * z->segment<M>(row);
 }
 
+// The angle's branch: that of the followed joint angle, or the one nearest to the row's law.
+template <class P>
+void put_on_branch(const Constraint& c, const RowLaws& laws, const Eigen::VectorXd& angles, Vec<P::kRows>& value) {
+  if constexpr (std::is_same_v<P, Angle>) {
+    value(0) = Angle::on_branch(value(0), c.angle == Constraint::kNearestLaw ? laws.f(c.row) : angles(c.angle));
+  }
+}
+
 }  // namespace
 
-void evaluate_phi(const MechanismData& data, const std::vector<Frame>& frames, Eigen::VectorXd& phi) {
-  for_each(data, frames, phi, [](const auto& p, const Frame& a, const Frame& b, auto& out) { p.phi(a, b, out); });
+void evaluate_phi(const MechanismData& data, const std::vector<Frame>& frames, const RowLaws& laws,
+                  const Eigen::VectorXd& angles, Eigen::VectorXd& phi) {
+  for_each(data, frames, phi,
+           [&]<class P>(const Constraint& c, const P& p, const Frame& a, const Frame& b, Vec<P::kRows>& out) {
+             p.phi(a, b, out);
+             put_on_branch<P>(c, laws, angles, out);
+           });
+  laws.subtract_f(phi);
 }
-void evaluate_phi_dot(const MechanismData& data, const std::vector<Frame>& frames, Eigen::VectorXd& phi_dot) {
+void evaluate_phi_dot(const MechanismData& data, const std::vector<Frame>& frames, const RowLaws& laws,
+                      Eigen::VectorXd& phi_dot) {
   for_each(data, frames, phi_dot,
-           [](const auto& p, const Frame& a, const Frame& b, auto& out) { p.phi_dot(a, b, out); });
+           [](const Constraint&, const auto& p, const Frame& a, const Frame& b, auto& out) { p.phi_dot(a, b, out); });
+  laws.subtract_f_t(phi_dot);
 }
-void evaluate_phi_ddot(const MechanismData& data, const std::vector<Frame>& frames, Eigen::VectorXd& phi_ddot) {
+void evaluate_phi_ddot(const MechanismData& data, const std::vector<Frame>& frames, const RowLaws& laws,
+                       Eigen::VectorXd& phi_ddot) {
   for_each(data, frames, phi_ddot,
-           [](const auto& p, const Frame& a, const Frame& b, auto& out) { p.phi_ddot(a, b, out); });
+           [](const Constraint&, const auto& p, const Frame& a, const Frame& b, auto& out) { p.phi_ddot(a, b, out); });
+  laws.subtract_f_tt(phi_ddot);
 }
 
-void add_pull_back(const MechanismData& data, const std::vector<Frame>& frames, const ConstraintWeights& weights,
-                   double scale, std::vector<FrameBar>& bars, Eigen::VectorXd& theta_bar) {
+void add_pull_back(const MechanismData& data, const std::vector<Frame>& frames, RowLaws& laws,
+                   const Eigen::VectorXd& angles, const ConstraintWeights& weights, double scale,
+                   std::vector<FrameBar>& bars, Eigen::Ref<Eigen::VectorXd> theta_bar,
+                   Eigen::Ref<Eigen::VectorXd> rho_bar) {
   for (const Constraint& c : data.constraints) {
     std::visit(
-        [&](const auto& p) {
-          constexpr int m = std::decay_t<decltype(p)>::kRows;
-          const Multipliers<m> z{rows<m>(weights.lambda, c.row, scale), rows<m>(weights.mu0, c.row, scale),
-                                 rows<m>(weights.mu1, c.row, scale), rows<m>(weights.mu2, c.row, scale)};
-          Vector3d s1_bar = Vector3d::Zero(), s2_bar = Vector3d::Zero();
-          p.pull_back(of(frames, c.body1), of(frames, c.body2), z, bars[static_cast<std::size_t>(c.body1)],
-                      bars[static_cast<std::size_t>(c.body2)], s1_bar, s2_bar);
-          if (c.slot1 >= 0) theta_bar.segment<3>(c.slot1) += s1_bar;
-          if (c.slot2 >= 0) theta_bar.segment<3>(c.slot2) += s2_bar;
+        [&]<class P>(const P& p) {
+          constexpr int m = P::kRows;
+          const double s = scale * c.factor;
+          const Multipliers<m> z{rows<m>(weights.lambda, c.row, s), rows<m>(weights.mu0, c.row, s),
+                                 rows<m>(weights.mu1, c.row, s), rows<m>(weights.mu2, c.row, s)};
+          const Frame &f1 = of(frames, c.body1), &f2 = of(frames, c.body2);
+          GeometryBar bar;
+          p.pull_back(f1, f2, z, bars[static_cast<std::size_t>(c.body1)], bars[static_cast<std::size_t>(c.body2)], bar);
+          if (c.slot1 >= 0) theta_bar.segment<3>(c.slot1) += bar.s1;
+          if (c.slot2 >= 0) theta_bar.segment<3>(c.slot2) += bar.s2;
+          if (c.slot3 >= 0) theta_bar.segment<3>(c.slot3) += bar.s3;
+          if (c.slot_factor >= 0) {
+            const Multipliers<m> unscaled{rows<m>(weights.lambda, c.row, scale), rows<m>(weights.mu0, c.row, scale),
+                                          rows<m>(weights.mu1, c.row, scale), rows<m>(weights.mu2, c.row, scale)};
+            Vec<m> phi, phi_dot, phi_ddot;
+            p.phi(f1, f2, phi), p.phi_dot(f1, f2, phi_dot), p.phi_ddot(f1, f2, phi_ddot);
+            put_on_branch<P>(c, laws, angles, phi);
+            theta_bar(c.slot_factor) += unscaled.lambda.dot(virtual_change(p, f1, f2)) + unscaled.mu0.dot(phi) +
+                                        unscaled.mu1.dot(phi_dot) + unscaled.mu2.dot(phi_ddot);
+          }
         },
         c.primitive);
   }
+  laws.add_pull_back(weights.mu0, weights.mu1, weights.mu2, scale, theta_bar, rho_bar);
 }
 
-void evaluate_tangents(const MechanismData& data, const std::vector<Frame>& frames,
-                       const std::vector<FrameTangent>& directions, const ParameterBlock& block,
-                       const Eigen::VectorXd& lambda, ConstraintTangents& out, std::vector<Lanes<6>>& loads) {
+void evaluate_tangents(const MechanismData& data, const std::vector<Frame>& frames, RowLaws& laws,
+                       const Eigen::VectorXd& angles, const std::vector<FrameTangent>& directions,
+                       const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,
+                       std::vector<Lanes<6>>& loads) {
+  for (LaneRows* x : {&out.phi, &out.phi_dot, &out.phi_ddot}) x->setZero();
   for (const Constraint& c : data.constraints) {
     std::visit(
-        [&](const auto& p) {
-          constexpr int m = std::decay_t<decltype(p)>::kRows;
+        [&]<class P>(const P& p) {
+          constexpr int m = P::kRows;
           const std::size_t i = static_cast<std::size_t>(c.body1), j = static_cast<std::size_t>(c.body2);
-          Lanes<3> s1, s2;
-          const GeometryTangent s{block.field<3>(c.slot1, s1), block.field<3>(c.slot2, s2)};
+          Lanes<3> s1, s2, s3;
+          const GeometryTangent s{block.field<3>(c.slot1, s1), block.field<3>(c.slot2, s2),
+                                  block.field<3>(c.slot3, s3)};
           PrimitiveTangent<m> t;
           p.tangent(frames[i], frames[j], directions[i], directions[j], s, lambda.segment<m>(c.row), t);
-          out.phi.middleRows<m>(c.row) = t.phi;
-          out.phi_dot.middleRows<m>(c.row) = t.phi_dot;
-          out.phi_ddot.middleRows<m>(c.row) = t.phi_ddot;
-          loads[i] += t.load1;
-          loads[j] += t.load2;
+          out.phi.middleRows<m>(c.row) += c.factor * t.phi;
+          out.phi_dot.middleRows<m>(c.row) += c.factor * t.phi_dot;
+          out.phi_ddot.middleRows<m>(c.row) += c.factor * t.phi_ddot;
+          loads[i] += c.factor * t.load1;
+          loads[j] += c.factor * t.load2;
+          Lanes<1> storage;
+          if (const Lanes<1>* factor_dir = block.field<1>(c.slot_factor, storage)) {
+            Vec<m> phi, phi_dot, phi_ddot;
+            p.phi(frames[i], frames[j], phi), p.phi_dot(frames[i], frames[j], phi_dot);
+            p.phi_ddot(frames[i], frames[j], phi_ddot);
+            put_on_branch<P>(c, laws, angles, phi);
+            out.phi.middleRows<m>(c.row) += phi * *factor_dir;
+            out.phi_dot.middleRows<m>(c.row) += phi_dot * *factor_dir;
+            out.phi_ddot.middleRows<m>(c.row) += phi_ddot * *factor_dir;
+            Mat<m, 6> J1, J2;
+            p.jacobian(frames[i], frames[j], J1, J2);
+            loads[i] += J1.transpose() * lambda.segment<m>(c.row) * *factor_dir;
+            loads[j] += J2.transpose() * lambda.segment<m>(c.row) * *factor_dir;
+          }
         },
         c.primitive);
   }
+  laws.subtract_tangents(block, out.phi, out.phi_dot, out.phi_ddot);
 }
 
 }  // namespace mbsopt

@@ -1,16 +1,21 @@
-// Values and derivatives of all constraints of a mechanism at given frames (frames[0]: the ground).
+// Values and derivatives of all constraints of a mechanism at given frames (frames[0]: the ground), at one time (laws,
+// set_time called) and on the branches of followed joint angles.
 #pragma once
 
 #include <vector>
 
+#include "core/dynamics/row_laws.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
 
 namespace mbsopt {
 
-void evaluate_phi(const MechanismData& data, const std::vector<Frame>& frames, Eigen::VectorXd& phi);
-void evaluate_phi_dot(const MechanismData& data, const std::vector<Frame>& frames, Eigen::VectorXd& phi_dot);
-void evaluate_phi_ddot(const MechanismData& data, const std::vector<Frame>& frames, Eigen::VectorXd& phi_ddot);
+void evaluate_phi(const MechanismData& data, const std::vector<Frame>& frames, const RowLaws& laws,
+                  const Eigen::VectorXd& angles, Eigen::VectorXd& phi);
+void evaluate_phi_dot(const MechanismData& data, const std::vector<Frame>& frames, const RowLaws& laws,
+                      Eigen::VectorXd& phi_dot);
+void evaluate_phi_ddot(const MechanismData& data, const std::vector<Frame>& frames, const RowLaws& laws,
+                       Eigen::VectorXd& phi_ddot);
 
 // Weights of the scalar  lambda'J eta + mu0'Phi + mu1'Phidot + mu2'Phiddot  (null: zero); eta is in the frames.
 struct ConstraintWeights {
@@ -19,16 +24,19 @@ struct ConstraintWeights {
   const Eigen::VectorXd* mu1 = nullptr;
   const Eigen::VectorXd* mu2 = nullptr;
 };
-// Adds its gradient in the frames to bars and in the geometry to theta_bar, times scale.
-void add_pull_back(const MechanismData& data, const std::vector<Frame>& frames, const ConstraintWeights& weights,
-                   double scale, std::vector<FrameBar>& bars, Eigen::VectorXd& theta_bar);
+// Adds its gradient, times scale, in the frames to bars, in the geometry to theta_bar, through laws to rho_bar.
+void add_pull_back(const MechanismData& data, const std::vector<Frame>& frames, RowLaws& laws,
+                   const Eigen::VectorXd& angles, const ConstraintWeights& weights, double scale,
+                   std::vector<FrameBar>& bars, Eigen::Ref<Eigen::VectorXd> theta_bar,
+                   Eigen::Ref<Eigen::VectorXd> rho_bar);
 
 // Tangents of Phi, Phidot, Phiddot, and of J'lambda (added to loads, one per body, the ground's first).
 struct ConstraintTangents {
   LaneRows phi, phi_dot, phi_ddot;
 };
-void evaluate_tangents(const MechanismData& data, const std::vector<Frame>& frames,
-                       const std::vector<FrameTangent>& directions, const ParameterBlock& block,
-                       const Eigen::VectorXd& lambda, ConstraintTangents& out, std::vector<Lanes<6>>& loads);
+void evaluate_tangents(const MechanismData& data, const std::vector<Frame>& frames, RowLaws& laws,
+                       const Eigen::VectorXd& angles, const std::vector<FrameTangent>& directions,
+                       const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,
+                       std::vector<Lanes<6>>& loads);
 
 }  // namespace mbsopt

@@ -9,6 +9,7 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
     : mechanism_(mechanism),
       data_(mechanism_.data()),
       settings_(settings),
+      laws_(data_),
       solver_(data_, settings.alpha, settings.type == FormulationType::augmented_lagrangian) {
   const std::size_t n = static_cast<std::size_t>(data_.n);
   const Eigen::Index m = data_.m, P = data_.rho.size();
@@ -27,11 +28,8 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
   for (const RsdaForce& f : data_.rsda) grow(f.law);
 
   frame_tangents_.resize(n + 1);
-  for (FrameTangent& t : frame_tangents_) {
-    t.r.setZero(), t.rdot.setZero();
-    t.A.setZero(), t.Adot.setZero(), t.Addot.setZero();
-  }
-  pddot_dir_.resize(n + 1), load_dirs_.resize(n + 1), rhs_lanes_.resize(n), z_dir_.resize(n);
+  for (FrameTangent& t : frame_tangents_) t.set_zero();
+  load_dirs_.resize(n + 1), rhs_lanes_.resize(n), z_dir_.resize(n);
   for (LaneRows* x :
        {&constraint_dirs_.phi, &constraint_dirs_.phi_dot, &constraint_dirs_.phi_ddot, &gamma_dir_, &lambda_dir_}) {
     x->setZero(m, kLanes);
@@ -58,6 +56,7 @@ void Dynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::Vector
   t_ = t;
   y_ = y;
   angles_ = angles;
+  laws_.set_time(t);
   for (int i = 1; i <= data_.n; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
     set_position(y.segment<7>(7 * (i - 1)), bodies_[k], frames_[k]);
@@ -93,10 +92,10 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
   set_loads();
   const Vec<6> none = Vec<6>::Zero();
   for (std::size_t i = 1; i < frames_.size(); ++i) set_acceleration(none, bodies_[i], frames_[i]);
-  evaluate_phi_ddot(data_, frames_, gamma_);
+  evaluate_phi_ddot(data_, frames_, laws_, gamma_);
   if (settings_.omega != 0) {
-    evaluate_phi(data_, frames_, phi_);
-    evaluate_phi_dot(data_, frames_, phi_dot_);
+    evaluate_phi(data_, frames_, laws_, angles_, phi_);
+    evaluate_phi_dot(data_, frames_, laws_, phi_dot_);
     gamma_ += 2 * settings_.xi * settings_.omega * phi_dot_ + settings_.omega * settings_.omega * phi_;
   }
   if (!solver_.factor(frames_)) return false;
@@ -137,10 +136,10 @@ void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneR
   for (int i = 1; i <= n; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
     const Lanes<7> q_dir = y_dir.middleRows<7>(7 * (i - 1)), v_dir = y_dir.middleRows<7>(7 * (n + i - 1));
-    set_tangent(bodies_[k], q_dir, v_dir, frame_tangents_[k], pddot_dir_[k]);
+    set_tangent(bodies_[k], q_dir, v_dir, frame_tangents_[k]);
   }
   for (Lanes<6>& load : load_dirs_) load.setZero();
-  evaluate_tangents(data_, frames_, frame_tangents_, block, lambda_, constraint_dirs_, load_dirs_);
+  evaluate_tangents(data_, frames_, laws_, angles_, frame_tangents_, block, lambda_, constraint_dirs_, load_dirs_);
   for (Lanes<6>& load : load_dirs_) load = -load;  // from (J'lambda)' to its share of the right-hand side
   for (const TsdaForce& f : data_.tsda) {
     const std::size_t i = static_cast<std::size_t>(f.body1), j = static_cast<std::size_t>(f.body2);
@@ -220,7 +219,7 @@ void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneR
     ydot_dir.middleRows<3>(half + 7 * (i - 1)) = z_dir_[k - 1].topRows<3>();
     // pddot' = (pddot' with omegadot fixed) + 1/2 G(p)' omegadot'
     auto out = ydot_dir.middleRows<4>(half + 7 * (i - 1) + 3);
-    out = pddot_dir_[k];
+    out = frame_tangents_[k].pddot;
     out.row(0) -= 0.5 * dot(p.tail<3>(), w);
     out.bottomRows<3>() += 0.5 * (p(0) * w + cross(p.tail<3>(), w));
   }
@@ -246,7 +245,7 @@ void Dynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd>
     phi_ = settings_.omega * settings_.omega * mu_;
     weights.mu0 = &phi_, weights.mu1 = &phi_dot_;
   }
-  add_pull_back(data_, frames_, weights, -1, bars_, theta_bar);
+  add_pull_back(data_, frames_, laws_, angles_, weights, -1, bars_, theta_bar, rho_bar);
   for (const TsdaForce& f : data_.tsda) {
     const std::size_t i = static_cast<std::size_t>(f.body1), j = static_cast<std::size_t>(f.body2);
     f.pull_back(t_, data_.rho, frames_[i], frames_[j], law_, bars_[i], bars_[j], theta_bar, rho_bar);

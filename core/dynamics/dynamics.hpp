@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "core/dynamics/constraint_terms.hpp"
+#include "core/dynamics/row_laws.hpp"
 #include "core/dynamics/saddle_solver.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/settings.hpp"
@@ -66,6 +67,7 @@ class Dynamics {
   const Mechanism mechanism_;  // keeps the data alive
   const MechanismData& data_;
   FormulationSettings settings_;
+  RowLaws laws_;
   SaddleSolver solver_;
 
   double t_ = 0, worst_residual_ = 0;
@@ -78,7 +80,6 @@ class Dynamics {
   Law::Scratch law_;
   // Derivatives.
   std::vector<FrameTangent> frame_tangents_;
-  std::vector<Lanes<4>> pddot_dir_;
   std::vector<Lanes<6>> load_dirs_, rhs_lanes_, z_dir_;
   ConstraintTangents constraint_dirs_;
   LaneRows gamma_dir_, lambda_dir_;

@@ -17,23 +17,25 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 }  // namespace
 
 Projector::Projector(const Mechanism& mechanism, Projection what)
-    : mechanism_(mechanism), data_(mechanism_.data()), what_(what), solver_(data_, kRelativeAlpha, true), rows_(data_) {
+    : mechanism_(mechanism),
+      data_(mechanism_.data()),
+      what_(what),
+      solver_(data_, kRelativeAlpha, true),
+      rows_(data_),
+      laws_(data_) {
   const std::size_t n = at(data_.n);
   const Eigen::Index m = data_.m;
   bodies_.resize(n + 1);
   states_.resize(n + 1), states_tilde_.resize(n + 1), frames_.resize(n + 1), frames_tilde_.resize(n + 1);
   for (Eigen::VectorXd* x : {&phi_, &g_, &dnu_, &mu_}) x->setZero(m);
+  angles_.setZero(static_cast<Eigen::Index>(data_.angles.size()));
   scratch_y_.setZero(14 * data_.n);
   q_bar_.setZero(7 * data_.n), v_bar_.setZero(7 * data_.n);
   for (auto* x : {&b_, &x_, &dx_, &r_, &Ex_}) x->resize(n);
   bars_.resize(n + 1);
   frame_dirs_.resize(n + 1);
-  for (FrameTangent& t : frame_dirs_) {
-    t.r.setZero(), t.rdot.setZero();
-    t.A.setZero(), t.Adot.setZero(), t.Addot.setZero();
-  }
+  for (FrameTangent& t : frame_dirs_) t.set_zero();
   loads_.resize(n + 1);
-  pddot_unused_.resize(n + 1);
   for (auto* x : {&b_lanes_, &x_lanes_, &dx_lanes_, &r_lanes_, &Ex_lanes_}) x->resize(n);
   for (LaneRows* x : {&dirs_.phi, &dirs_.phi_dot, &dirs_.phi_ddot, &g_lanes_, &nu_lanes_, &rg_lanes_, &dnu_lanes_}) {
     x->setZero(m, kLanes);
@@ -83,7 +85,9 @@ void Projector::set_q(const std::vector<Vec<6>>& delta, Eigen::VectorXd& y) {
   }
 }
 
-bool Projector::project(const Eigen::VectorXd& y_hat, Eigen::VectorXd& y, ProjectionSolution& s) {
+bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y,
+                        ProjectionSolution& s) {
+  laws_.set_time(t);
   prepare_bodies(y_hat);
   set_frames(scratch_y_, nullptr, states_tilde_, frames_tilde_);
   if (!solver_.factor(frames_tilde_)) return false;
@@ -95,7 +99,7 @@ bool Projector::project(const Eigen::VectorXd& y_hat, Eigen::VectorXd& y, Projec
   if (positions() && data_.m > 0) {
     double before = INFINITY;
     for (int k = 0; k < kMostIterations; ++k) {
-      evaluate_phi(data_, frames_, phi_);
+      evaluate_phi(data_, frames_, laws_, angles, phi_);
       const double now = phi_.cwiseAbs().maxCoeff();
       if (!std::isfinite(now)) return false;
       if (now < 1e-15 || (k > 1 && now > 0.95 * before)) break;  // rounding reached, or a singular position
@@ -125,7 +129,7 @@ bool Projector::project(const Eigen::VectorXd& y_hat, Eigen::VectorXd& y, Projec
   double before = INFINITY;
   for (int k = 0; k < kMostIterations; ++k) {
     set_frames(y, &y, states_, frames_);
-    evaluate_phi_dot(data_, frames_, phi_);
+    evaluate_phi_dot(data_, frames_, laws_, phi_);
     const double now = phi_.cwiseAbs().maxCoeff();
     if (!std::isfinite(now)) return false;
     if (now < 1e-15 || (k > 1 && now > 0.95 * before)) break;
@@ -145,17 +149,19 @@ bool Projector::project(const Eigen::VectorXd& y_hat, Eigen::VectorXd& y, Projec
   return y.allFinite();
 }
 
-double Projector::position_violation(const Eigen::VectorXd& y) {
+double Projector::position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y) {
+  laws_.set_time(t);
   set_frames(y, nullptr, states_, frames_);
-  evaluate_phi(data_, frames_, phi_);
+  evaluate_phi(data_, frames_, laws_, angles, phi_);
   double worst = data_.m > 0 ? phi_.cwiseAbs().maxCoeff() : 0.0;
   for (int i = 1; i <= data_.n; ++i) worst = std::max(worst, std::abs(UnitNorm::phi(states_[at(i)].p)));
   return worst;
 }
 
-double Projector::velocity_violation(const Eigen::VectorXd& y) {
+double Projector::velocity_violation(double t, const Eigen::VectorXd& y) {
+  laws_.set_time(t);
   set_frames(y, &y, states_, frames_);
-  evaluate_phi_dot(data_, frames_, phi_);
+  evaluate_phi_dot(data_, frames_, laws_, phi_);
   double worst = data_.m > 0 ? phi_.cwiseAbs().maxCoeff() : 0.0;
   for (int i = 1; i <= data_.n; ++i) {
     worst = std::max(worst, std::abs(UnitNorm::phi_dot(states_[at(i)].p, states_[at(i)].pdot)));

@@ -34,18 +34,21 @@ class Projector {
   bool active() const { return what_ != Projection::none; }
   ProjectionSolution solution() const;  // of the right sizes
 
-  // y = projected y_hat. False where it does not converge.
-  bool project(const Eigen::VectorXd& y_hat, Eigen::VectorXd& y, ProjectionSolution& solution);
+  // y = projected y_hat, at time t; angles: branches of the followed joint angles. False where it does not converge.
+  bool project(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y,
+               ProjectionSolution& solution);
 
   // Prepares derivatives at a projection made before (also of another Projector of the same mechanism).
-  bool linearise(const Eigen::VectorXd& y_hat, const Eigen::VectorXd& y, const ProjectionSolution& solution);
+  bool linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, const Eigen::VectorXd& y,
+                 const ProjectionSolution& solution);
   void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir);
-  // y_hat_bar += (dy/dy_hat)' y_bar, theta_bar += (dy/dtheta)' y_bar
-  void add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar);
+  // y_hat_bar += (dy/dy_hat)' y_bar, and the same for the differentiated fields and the parameters in laws
+  void add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,
+                   Eigen::VectorXd& rho_bar);
 
   // Largest violations at y: of Phi and the unit norms, and of their rates.
-  double position_violation(const Eigen::VectorXd& y);
-  double velocity_violation(const Eigen::VectorXd& y);
+  double position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y);
+  double velocity_violation(double t, const Eigen::VectorXd& y);
   long factorisations() const { return solver_.factorisations(); }
 
  private:
@@ -71,6 +74,8 @@ class Projector {
   Projection what_;
   SaddleSolver solver_;  // factor of S(q~)
   ConstraintRows rows_;  // J at the projected q
+  RowLaws laws_;
+  Eigen::VectorXd angles_;
   int refinements_ = 2;  // of derivative systems, from the size of the correction
   const ProjectionSolution* solution_ = nullptr;
 
@@ -84,7 +89,6 @@ class Projector {
   // Lanes.
   std::vector<FrameTangent> frame_dirs_;
   std::vector<Lanes<6>> loads_, b_lanes_, x_lanes_, dx_lanes_, r_lanes_, Ex_lanes_;
-  std::vector<Lanes<4>> pddot_unused_;
   ConstraintTangents dirs_;
   LaneRows g_lanes_, nu_lanes_, rg_lanes_, dnu_lanes_;
 };

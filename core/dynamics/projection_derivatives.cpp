@@ -36,7 +36,10 @@ Lanes<4> G_transposed_direction(const Lanes<4>& p_dir, const Vector3d& w) {
 
 }  // namespace
 
-bool Projector::linearise(const Eigen::VectorXd& y_hat, const Eigen::VectorXd& y, const ProjectionSolution& solution) {
+bool Projector::linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat,
+                          const Eigen::VectorXd& y, const ProjectionSolution& solution) {
+  laws_.set_time(t);
+  angles_ = angles;
   solution_ = &solution;
   prepare_bodies(y_hat);
   set_frames(scratch_y_, nullptr, states_tilde_, frames_tilde_);
@@ -153,11 +156,11 @@ void Projector::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, 
     y_dir.middleRows<7>(7 * (i - 1)) = q_tilde;
     BodyState still = states_tilde_[at(i)];
     still.pdot.setZero(), still.omegadot.setZero();
-    set_tangent(still, q_tilde, none, frame_dirs_[at(i)], pddot_unused_[at(i)]);
+    set_tangent(still, q_tilde, none, frame_dirs_[at(i)]);
   }
   if (positions()) {
     for (Lanes<6>& load : loads_) load.setZero();
-    evaluate_tangents(data_, frames_tilde_, frame_dirs_, block, s.nu, dirs_, loads_);
+    evaluate_tangents(data_, frames_tilde_, laws_, angles_, frame_dirs_, block, s.nu, dirs_, loads_);
     mass_directions(s.delta);
     // Direction of q with delta fixed, and Phi' along it.
     for (int i = 1; i <= n; ++i) {
@@ -169,10 +172,10 @@ void Projector::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, 
       BodyState still = states_[at(i)];
       still.pdot.setZero(), still.omegadot.setZero();
       const Lanes<7> q_fixed = q_dir;
-      set_tangent(still, q_fixed, none, frame_dirs_[at(i)], pddot_unused_[at(i)]);
+      set_tangent(still, q_fixed, none, frame_dirs_[at(i)]);
     }
     mu_.setZero();
-    evaluate_tangents(data_, frames_, frame_dirs_, block, mu_, dirs_, loads_);
+    evaluate_tangents(data_, frames_, laws_, angles_, frame_dirs_, block, mu_, dirs_, loads_);
     g_lanes_ = -dirs_.phi;
     refine(Level::position, false, b_lanes_, g_lanes_, x_lanes_, nu_lanes_, r_lanes_, dx_lanes_, rg_lanes_, dnu_lanes_);
     for (int i = 1; i <= n; ++i) {
@@ -202,11 +205,11 @@ void Projector::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, 
     BodyState still = states_[at(i)];
     still.omegadot.setZero();
     const Lanes<7> q_dir = y_dir.middleRows<7>(7 * (i - 1)), v_fixed = v_dir;
-    set_tangent(still, q_dir, v_fixed, frame_dirs_[at(i)], pddot_unused_[at(i)]);
+    set_tangent(still, q_dir, v_fixed, frame_dirs_[at(i)]);
   }
   if (data_.m == 0) return;
   for (Lanes<6>& load : loads_) load.setZero();
-  evaluate_tangents(data_, frames_, frame_dirs_, block, s.kappa, dirs_, loads_);
+  evaluate_tangents(data_, frames_, laws_, angles_, frame_dirs_, block, s.kappa, dirs_, loads_);
   mass_directions(s.u);
   g_lanes_ = -dirs_.phi_dot;
   refine(Level::velocity, false, b_lanes_, g_lanes_, x_lanes_, nu_lanes_, r_lanes_, dx_lanes_, rg_lanes_, dnu_lanes_);
@@ -217,7 +220,8 @@ void Projector::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, 
   }
 }
 
-void Projector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar) {
+void Projector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,
+                            Eigen::VectorXd& rho_bar) {
   const int n = data_.n;
   const Eigen::Index half = 7 * n;
   const ProjectionSolution& s = *solution_;
@@ -247,11 +251,11 @@ void Projector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat
     refine(Level::velocity, true, b_, g_, x_, mu_, r_, dx_, phi_, dnu_);
     for (FrameBar& bar : bars_) bar.set_zero();
     for (int i = 1; i <= n; ++i) set_virtual(x_[at(i - 1)], frames_[at(i)]);
-    add_pull_back(data_, frames_, {&s.kappa, nullptr, &mu_, nullptr}, -1, bars_, theta_bar);
+    add_pull_back(data_, frames_, laws_, angles_, {&s.kappa, nullptr, &mu_, nullptr}, -1, bars_, theta_bar, rho_bar);
     add_mass(x_, s.u);
     for (int i = 1; i <= n; ++i) {
       FrameBar& bar = bars_[at(i)];
-      bar.A.noalias() -= bar.A_eta * skew(x_[at(i - 1)].tail<3>());
+      fold_virtual(x_[at(i - 1)].tail<3>(), bar);
       add_pull_back_velocity(states_[at(i)], bar, 1, q_bar_.segment<7>(7 * (i - 1)), v_bar_.segment<7>(7 * (i - 1)));
     }
   }
@@ -285,13 +289,14 @@ void Projector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat
     }
     g_.setZero();
     refine(Level::position, true, b_, g_, x_, mu_, r_, dx_, phi_, dnu_);
-    add_pull_back(data_, frames_, {nullptr, &mu_, nullptr, nullptr}, -1, bars_, theta_bar);
+    add_pull_back(data_, frames_, laws_, angles_, {nullptr, &mu_, nullptr, nullptr}, -1, bars_, theta_bar, rho_bar);
     for (int i = 1; i <= n; ++i) {
       q_bar_.segment<7>(7 * (i - 1)) += pull_back_position(states_[at(i)], bars_[at(i)]);
       bars_[at(i)].set_zero();
       set_virtual(x_[at(i - 1)], frames_tilde_[at(i)]);
     }
-    add_pull_back(data_, frames_tilde_, {&s.nu, nullptr, nullptr, nullptr}, -1, bars_, theta_bar);
+    add_pull_back(data_, frames_tilde_, laws_, angles_, {&s.nu, nullptr, nullptr, nullptr}, -1, bars_, theta_bar,
+                  rho_bar);
     add_mass(x_, s.delta);
   }
   for (int i = 1; i <= n; ++i) {
@@ -300,7 +305,7 @@ void Projector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat
     FrameBar& bar = bars_[at(i)];
     Vector4d p_tilde_bar = pi_bar + 0.5 * G_transposed_times_adjoint(s.delta[at(i - 1)].tail<3>(), pi_bar);
     if (data_.m > 0) {
-      bar.A.noalias() -= bar.A_eta * skew(x_[at(i - 1)].tail<3>());
+      fold_virtual(x_[at(i - 1)].tail<3>(), bar);
       p_tilde_bar += pull_back_position(states_tilde_[at(i)], bar).tail<4>();
     }
     y_hat_bar.segment<3>(7 * (i - 1)) += q_bar_.segment<3>(7 * (i - 1));

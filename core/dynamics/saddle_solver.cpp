@@ -14,9 +14,7 @@ constexpr double kStagnation = 0.97;
 SaddleSolver::SaddleSolver(const MechanismData& data, double alpha, bool alpha_is_relative)
     : data_(&data), rows_(data), S_(rows_.matrix()) {
   alpha_.setConstant(data.m, alpha);
-  if (alpha_is_relative) {
-    for (const Constraint& c : data.constraints) alpha_.segment(c.row, c.rows()) *= c.alpha;
-  }
+  if (alpha_is_relative) alpha_ = alpha * data.row_alpha;
   const std::size_t n = static_cast<std::size_t>(data.n);
   residual_.setZero(data.m);
   residual_lanes_.setZero(data.m, kLanes);

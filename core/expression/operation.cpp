@@ -16,6 +16,7 @@ int operands(Operation operation) {
     case Operation::min:
     case Operation::max:
     case Operation::smooth_abs:
+    case Operation::not_above:
       return 2;
     default:
       return 1;

@@ -39,6 +39,8 @@ enum class Operation : unsigned char {
   min,
   max,
   smooth_abs,  // sqrt(a^2 + b^2)
+  sign,        // -1, 0 or 1: the derivative of abs; only derivative programs use it
+  not_above,   // 1 where a <= b, else 0: the choice of min and max; only derivative programs use it
 };
 
 // 0 for number and name, else 1 or 2.
@@ -143,6 +145,10 @@ inline double apply(Operation operation, double a, double b) {
       return (a >= b || std::isnan(a)) ? a : b;
     case Operation::smooth_abs:
       return std::hypot(a, b);
+    case Operation::sign:
+      return a > 0 ? 1 : (a < 0 ? -1 : 0);
+    case Operation::not_above:
+      return a <= b ? 1 : 0;
   }
   assert(false && "a leaf has no operands");
   return 0;
@@ -219,6 +225,9 @@ inline FirstPartials first_partials(Operation operation, double a, double b, dou
       return a >= b ? FirstPartials{1, 0} : FirstPartials{0, 1};
     case Operation::smooth_abs:
       return value == 0 ? FirstPartials{0, 0} : FirstPartials{a / value, b / value};
+    case Operation::sign:
+    case Operation::not_above:
+      return {};
   }
   assert(false && "a leaf has no operands");
   return {};
@@ -235,6 +244,8 @@ inline SecondPartials second_partials(Operation operation, double a, double b, d
     case Operation::abs:
     case Operation::min:
     case Operation::max:
+    case Operation::sign:
+    case Operation::not_above:
       return {};
     case Operation::multiply:
       return {0, 1, 0};

@@ -68,6 +68,9 @@ class Program {
   double add_gradient_tangent(std::span<const double> x, std::span<const double> x_tangent, double scale,
                               std::span<double> gradient, std::span<double> gradient_tangent, Scratch& scratch) const;
 
+  // The program that computes d value / d x[input], itself differentiable; operation.hpp says what holds at kinks.
+  Program derivative(int input) const;
+
   bool is_constant() const { return used_inputs_.empty(); }
   const std::vector<int>& used_inputs() const { return used_inputs_; }  // sorted; structurally present
   bool uses(int input) const;

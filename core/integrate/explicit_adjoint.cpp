@@ -7,6 +7,7 @@ namespace mbsopt {
 StoredStep::StoredStep(const Step& step, const Method& rk, std::span<const SampleEvent> events)
     : t(step.t),
       h(step.h),
+      t1(step.t1),
       dense(step.dense),
       y0(step.y0),
       y_hat(step.y_hat),
@@ -98,14 +99,16 @@ bool AdjointSweep::step_back(const StoredStep& step) {
   }
 
   if (projector_.active()) {
-    if (!projector_.linearise(step.y_hat, step.y1, step.projection)) return false;
+    if (!projector_.linearise(step.t1, step.angles0, step.y_hat, step.y1, step.projection)) return false;
     for (Eigen::Index o = 0; o < objectives; ++o) {
       w_ = lambda_.col(o);
       y_bar_ = lambda_hat_.col(o);
       theta_ = theta_bar_.col(o);
-      projector_.add_adjoint(w_, y_bar_, theta_);
+      rho_ = rho_bar_.col(o);
+      projector_.add_adjoint(w_, y_bar_, theta_, rho_);
       lambda_hat_.col(o) = y_bar_;
       theta_bar_.col(o) = theta_;
+      rho_bar_.col(o) = rho_;
     }
   } else {
     lambda_hat_ += lambda_;

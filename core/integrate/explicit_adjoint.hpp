@@ -16,7 +16,7 @@ namespace mbsopt {
 
 // What a backward sweep keeps of a step; stages are rebuilt from their accelerations.
 struct StoredStep {
-  double t = 0, h = 0;
+  double t = 0, h = 0, t1 = 0;
   bool dense = false;
   Eigen::VectorXd y0, y_hat, y1, angles0;
   Eigen::MatrixXd a;  // qddot of each stage, 7n x stages

@@ -110,7 +110,7 @@ bool ExplicitRun::finish_step(bool dense) {
     }
   }
   if (projector_.active()) {
-    if (!projector_.project(step_.y_hat, step_.y1, step_.projection)) return false;
+    if (!projector_.project(step_.t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return false;
   } else {
     step_.y1 = step_.y_hat;
   }
@@ -134,8 +134,9 @@ double ExplicitRun::fastest_tracked_rate(const Eigen::VectorXd& y) const {
 
 void ExplicitRun::update_statistics(SimulationResult& result) {
   SimulationStatistics& s = result.statistics;
-  s.max_position_violation = std::max(s.max_position_violation, projector_.position_violation(step_.y1));
-  s.max_velocity_violation = std::max(s.max_velocity_violation, projector_.velocity_violation(step_.y1));
+  s.max_position_violation =
+      std::max(s.max_position_violation, projector_.position_violation(step_.t1, step_.angles1, step_.y1));
+  s.max_velocity_violation = std::max(s.max_velocity_violation, projector_.velocity_violation(step_.t1, step_.y1));
   const Energy e = energy(mechanism_.data(), step_.y1, step_.angles1);
   s.energy_final = e.kinetic + e.potential;
   s.energy_drift = std::max(s.energy_drift, std::abs(s.energy_final - s.energy_initial));

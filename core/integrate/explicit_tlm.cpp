@@ -116,7 +116,7 @@ bool TangentSweep::follow(const Step& step, std::span<const Cost> costs, std::sp
     }
   }
   if (projector_.active()) {
-    if (!projector_.linearise(step.y_hat, step.y1, step.projection)) return false;
+    if (!projector_.linearise(step.t1, step.angles0, step.y_hat, step.y1, step.projection)) return false;
     for (Block& b : blocks_) projector_.tangent(b.parameters, b.y_hat, b.y1);
   } else {
     for (Block& b : blocks_) b.y1 = b.y_hat;

@@ -20,7 +20,9 @@ struct Compilation {
   const Scene& scene;
   FieldValues fields;
   MechanismData data;
-  std::vector<DualVector3> com;  // of each body, the ground first; in the body frame [m]
+  std::vector<DualVector3> com;          // of each body, the ground first; in the body frame [m]
+  std::vector<DualVector4> orientation;  // of each body in the file, the ground first
+  std::vector<DualVector3> position;     // of its centre of mass, the same [m]
 
   // Gives the numbers their rows of theta_rho, and returns them.
   template <std::size_t N>
@@ -40,15 +42,31 @@ struct Compilation {
   DualVector3 direction(int body, const std::optional<PointField>& field, const std::string& where) const;
   DualVector3 unit_axis(const DualVector3& axis, const std::string& where) const;
 
+  enum class Zero { normals, start };
   // Index of a joint's angle among data.angles; made when it is first asked for.
-  int angle_of(const std::string& joint, const std::string& where);
+  int angle_of(const std::string& joint, const std::string& where, Zero zero = Zero::normals);
+
+  // A vector of body 1 as body 2 sees it at the orientations in the file, made perpendicular to axis2 (not finite where
+  // it is along axis2).
+  DualVector3 normal_in_file(int body1, const DualVector3& normal1, int body2, const DualVector3& axis2) const;
+
+  // A further constraint: on rows of its own, or as a further term of the row last made.
+  Constraint& add_constraint(Constraint constraint);
+  Constraint& add_term(Constraint constraint);
+  // The angle or displacement of a joint as a constraint not placed yet. Throws SceneError where it has none.
+  // Zero::start: an angle without normals is zero at the orientations in the file, else both normals are the same
+  // vector.
+  Constraint joint_angle_term(const std::string& joint, Zero zero, const std::string& where);
+  Constraint joint_displacement_term(const std::string& joint, const std::string& where);
+  Dual joint_displacement_in_file(const std::string& joint, const std::string& where) const;
 
  private:
-  std::map<std::size_t, int> angle_of_joint_;
+  std::map<std::pair<std::size_t, Zero>, int> angle_of_joint_;
 };
 
 void compile_bodies(Compilation& model);
 void compile_joints(Compilation& model);
+void compile_drives(Compilation& model);
 void compile_forces(Compilation& model);
 void compile_user_forces(Compilation& model, std::vector<std::shared_ptr<const UserForce>> forces);
 void compile_sensors(Compilation& model);

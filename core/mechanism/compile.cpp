@@ -10,28 +10,39 @@ namespace mbsopt {
 namespace {
 
 void group_rows(MechanismData& data) {
-  for (const Constraint& c : data.constraints) {
-    if (data.groups.empty() || data.groups.back().body1 != c.body1 || data.groups.back().body2 != c.body2) {
-      data.groups.push_back({c.body1, c.body2, c.row, 0});
+  std::vector<int> terms(static_cast<std::size_t>(data.m), 0);
+  for (const Constraint& c : data.constraints) ++terms[static_cast<std::size_t>(c.row)];
+  for (Constraint& c : data.constraints) {
+    c.block = data.blocks;
+    data.blocks += c.rows();
+    const bool shared = terms[static_cast<std::size_t>(c.row)] > 1;
+    const RowGroup* last = data.groups.empty() ? nullptr : &data.groups.back();
+    if (!last || shared || last->shared || last->body1 != c.body1 || last->body2 != c.body2) {
+      data.groups.push_back({c.body1, c.body2, c.row, c.block, 0, shared});
     }
     data.groups.back().rows += c.rows();
   }
 }
 
-// The inertia a constraint sees, independent of the configuration: reduced mass of the two bodies for a point,
-// reduced inertia about the body's farthest joint point for a direction. Bodies without mass count with a small share
-// of the largest mass, so that alpha stays finite and S = M + alpha J'J stays well scaled.
+// The inertia a row sees, independent of the configuration: reduced mass of the two bodies for a point or distance,
+// reduced inertia about the body's farthest joint point for a direction or angle, four times that for an Euler
+// parameter (p' = 1/2 G'omega); of several terms, the inverses add up with their factors squared. Bodies without mass
+// count with a small share of the largest mass, so that alpha stays finite and S = M + alpha J'J stays well scaled.
 void scale_alpha(MechanismData& data) {
   const std::size_t bodies = data.bodies.size();
   std::vector<double> mass(bodies), inertia(bodies), reach2(bodies, 0.0);
   double largest_mass = 0, largest_inertia = 0;
   for (const Constraint& c : data.constraints) {
-    if (const auto* p = std::get_if<Coincidence>(&c.primitive)) {
-      double& r1 = reach2[static_cast<std::size_t>(c.body1)];
-      double& r2 = reach2[static_cast<std::size_t>(c.body2)];
-      r1 = std::max(r1, p->s1.squaredNorm());
-      r2 = std::max(r2, p->s2.squaredNorm());
-    }
+    std::visit(
+        [&]<class P>(const P& p) {
+          if constexpr (std::is_same_v<P, Coincidence> || std::is_same_v<P, Dot2> || std::is_same_v<P, Distance>) {
+            double& r1 = reach2[static_cast<std::size_t>(c.body1)];
+            double& r2 = reach2[static_cast<std::size_t>(c.body2)];
+            r1 = std::max(r1, p.s1.squaredNorm());
+            r2 = std::max(r2, p.s2.squaredNorm());
+          }
+        },
+        c.primitive);
   }
   for (std::size_t i = 1; i < bodies; ++i) {
     const BodyData& b = data.bodies[i];
@@ -47,11 +58,17 @@ void scale_alpha(MechanismData& data) {
   auto inverse = [&](const std::vector<double>& x, double largest, int body) {
     return body == 0 ? 0.0 : 1 / std::max(x[static_cast<std::size_t>(body)], kLeast * largest);
   };
-  for (Constraint& c : data.constraints) {
-    c.alpha = std::holds_alternative<Coincidence>(c.primitive)
-                  ? 1 / (inverse(mass, largest_mass, c.body1) + inverse(mass, largest_mass, c.body2))
-                  : 1 / (inverse(inertia, largest_inertia, c.body1) + inverse(inertia, largest_inertia, c.body2));
+  data.row_alpha.setZero(data.m);
+  for (const Constraint& c : data.constraints) {
+    const auto* coordinate = std::get_if<Coordinate>(&c.primitive);
+    const bool turns = std::holds_alternative<Dot1>(c.primitive) || std::holds_alternative<Angle>(c.primitive) ||
+                       (coordinate && coordinate->index >= 3);
+    const double seen = turns ? inverse(inertia, largest_inertia, c.body1) + inverse(inertia, largest_inertia, c.body2)
+                              : inverse(mass, largest_mass, c.body1) + inverse(mass, largest_mass, c.body2);
+    data.row_alpha.segment(c.row, c.rows()).array() += c.factor * c.factor * seen * (turns && coordinate ? 0.25 : 1.0);
   }
+  // A factor of zero leaves a row without inertia: any alpha does.
+  data.row_alpha = (data.row_alpha.array() > 0).select(data.row_alpha.array().inverse(), 1.0);
 }
 
 }  // namespace
@@ -65,6 +82,7 @@ MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std:
   Compilation model(scene, rho, active);
   compile_bodies(model);
   compile_joints(model);
+  compile_drives(model);
   compile_forces(model);
   compile_user_forces(model, std::move(user_forces));
   compile_sensors(model);

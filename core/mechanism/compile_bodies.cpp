@@ -27,7 +27,8 @@ DualVector4 orientation(const Compilation& model, const OrientationField& field,
   return quaternion_product(p, euler_parameters(unit_vector(model, 0), rpy[0]));
 }
 
-void add_body(Compilation& model, const Body& body, BodyData& out, DualVector3& com, const std::string& where) {
+void add_body(Compilation& model, const Body& body, BodyData& out, DualVector3& com, DualVector4& p, DualVector3& r,
+              const std::string& where) {
   const Dual mass = model.fields.value(body.mass, where + ".mass");
   if (mass.value() < 0) throw SceneError(where + ".mass: is negative, a mass must not be");
   out.mass = mass.value();
@@ -40,8 +41,8 @@ void add_body(Compilation& model, const Body& body, BodyData& out, DualVector3& 
   com = model.fields.values(body.com, where + ".com");
   out.com = numbers(model.keep(out.slot_com, com));
 
-  const DualVector4 p = orientation(model, body.orientation, where + ".orientation");
-  const DualVector3 r = model.fields.values(body.position, where + ".position") + rotated(p, com);
+  p = orientation(model, body.orientation, where + ".orientation");
+  r = model.fields.values(body.position, where + ".position") + rotated(p, com);
   const DualVector<7> q{r[0], r[1], r[2], p[0], p[1], p[2], p[3]};
   out.q = numbers(model.keep(out.slot_q, q));
   out.velocity = numbers(model.keep(out.slot_velocity, model.fields.values(body.velocity, where + ".velocity")));
@@ -59,8 +60,13 @@ void compile_bodies(Compilation& model) {
   model.data.body_names = {"ground"};
   model.com.resize(model.data.bodies.size());
   for (Dual& c : model.com[0]) c = model.fields.constant(0);
+  model.orientation.resize(model.data.bodies.size());
+  model.position.resize(model.data.bodies.size());
+  for (Dual& c : model.position[0]) c = model.fields.constant(0);
+  for (std::size_t k = 0; k < 4; ++k) model.orientation[0][k] = model.fields.constant(k == 0 ? 1 : 0);
   for (std::size_t i = 0; i < model.scene.bodies.size(); ++i) {
-    add_body(model, model.scene.bodies[i], model.data.bodies[i + 1], model.com[i + 1], child_path("bodies", i));
+    add_body(model, model.scene.bodies[i], model.data.bodies[i + 1], model.com[i + 1], model.orientation[i + 1],
+             model.position[i + 1], child_path("bodies", i));
     model.data.body_names.push_back(model.scene.bodies[i].name);
   }
 }

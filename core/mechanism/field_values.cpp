@@ -70,6 +70,8 @@ DualVector4 unit(const DualVector4& p) {
   return {p[0] / norm, p[1] / norm, p[2] / norm, p[3] / norm};
 }
 
+DualVector4 inverse(const DualVector4& p) { return {p[0], -p[1], -p[2], -p[3]}; }
+
 DualVector4 quaternion_product(const DualVector4& a, const DualVector4& b) {
   return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
           a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};

@@ -79,6 +79,7 @@ DualVector3 perpendicular(const DualVector3& a);
 DualVector3 perpendicular_part(const DualVector3& n, const DualVector3& a);
 
 DualVector4 unit(const DualVector4& p);
+DualVector4 inverse(const DualVector4& p);  // of a unit p: the opposite rotation
 DualVector4 quaternion_product(const DualVector4& a, const DualVector4& b);
 DualVector4 euler_parameters(const DualVector3& unit_axis, const Dual& angle);
 DualVector3 rotated(const DualVector4& p, const DualVector3& s);  // A(p) s, p unit

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/constraint/constraint.hpp"
+#include "core/constraint/time_law.hpp"
 #include "core/force/rsda.hpp"
 #include "core/force/tsda.hpp"
 #include "core/force/user_force.hpp"
@@ -41,9 +42,15 @@ struct ViolationSensor {};  // the largest |Phi| of joints and unit norms
 using SensorKind =
     std::variant<PointSensor, AngularVelocitySensor, CoordinateSensor, AngleSensor, EnergySensor, ViolationSensor>;
 
-// Consecutive rows of Phi that tie the same two bodies.
+// Consecutive rows of Phi that tie the same two bodies, and their Jacobian blocks.
 struct RowGroup {
-  int body1 = 0, body2 = 0, row = 0, rows = 0;
+  int body1 = 0, body2 = 0, row = 0, block = 0, rows = 0;
+  bool shared = false;  // one row that other groups contribute to as well
+};
+
+struct RowLaw {
+  int row = 0;
+  TimeLaw law;
 };
 
 struct ConditionData {
@@ -62,6 +69,7 @@ struct UserForceData {
 struct MechanismData {
   int n = 0;                  // bodies, the ground not counted
   int m = 0;                  // rows of Phi, unit norms not counted
+  int blocks = 0;             // Jacobian block rows of all constraints: m, and more where rows are shared
   Eigen::VectorXd rho;        // all parameters
   std::vector<int> active;    // parameters with respect to which derivatives are carried
   Eigen::MatrixXd theta_rho;  // slots x active
@@ -70,6 +78,8 @@ struct MechanismData {
   Vector3d gravity = Vector3d::Zero();
   int slot_gravity = -1;
   std::vector<Constraint> constraints;
+  std::vector<RowLaw> laws;
+  Eigen::VectorXd row_alpha;  // per row: alpha of the augmented Lagrangian per unit of its relative alpha
   std::vector<RowGroup> groups;
   std::vector<JointAngle> angles;
   std::vector<TsdaForce> tsda;
@@ -78,8 +88,8 @@ struct MechanismData {
   std::vector<SensorKind> sensors;
   std::vector<std::string> sensor_names;
   std::vector<ConditionData> conditions;
-  std::vector<std::string> body_names, joint_names;  // body_names[0] = "ground"
-  int largest_law = 0;                               // inputs of the largest law, for scratch
+  std::vector<std::string> body_names, joint_names, drive_names;  // body_names[0] = "ground"
+  int largest_law = 0;                                            // inputs of the largest law, for scratch
 
   Eigen::Index slots() const { return theta_rho.rows(); }
   // rho_bar (all parameters) += (d theta/d rho)' theta_bar

@@ -1,8 +1,8 @@
 // Sensors evaluated on a compiled mechanism: those of bodies and joints, and the whole model's energy and violation.
 #include <cmath>
 
-#include "core/constraint/unit_norm.hpp"
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/violation.hpp"
 
 namespace mbsopt {
 namespace {
@@ -100,63 +100,6 @@ void add_potential_gradient(const MechanismData& d, const Eigen::VectorXd& y, co
   }
 }
 
-// Which equation is violated most: a row of a constraint, or a body's unit norm.
-struct Worst {
-  double amount = 0;
-  const Constraint* constraint = nullptr;
-  int row = 0;   // within the constraint
-  int body = 0;  // of a unit norm, else 0
-};
-
-Worst worst_violation(const MechanismData& d, const Eigen::VectorXd& y) {
-  Worst worst;
-  auto offer = [&](double phi, const Constraint* c, int row, int body) {
-    if (std::abs(phi) > std::abs(worst.amount)) worst = {phi, c, row, body};
-  };
-  for (const Constraint& c : d.constraints) {
-    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
-    std::visit(
-        [&](const auto& p) {
-          Vec<std::decay_t<decltype(p)>::kRows> phi;
-          p.phi(b1.frame, b2.frame, phi);
-          for (int i = 0; i < phi.size(); ++i) offer(phi(i), &c, i, 0);
-        },
-        c.primitive);
-  }
-  for (int i = 1; i <= d.n; ++i) offer(UnitNorm::phi(y.segment<4>(7 * (i - 1) + 3)), nullptr, 0, i);
-  return worst;
-}
-
-double add_violation_gradient(const MechanismData& d, const Eigen::VectorXd& y, double scale, VecOut y_bar,
-                              VecOut rho_bar) {
-  const Worst worst = worst_violation(d, y);
-  const double sign = worst.amount < 0 ? -1 : 1;
-  if (worst.body > 0) {
-    const Eigen::Index at = 7 * (worst.body - 1) + 3;
-    y_bar.segment<4>(at) += scale * sign * UnitNorm::phi_p(y.segment<4>(at));
-  } else if (worst.constraint) {
-    const Constraint& c = *worst.constraint;
-    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
-    FrameBar bar1, bar2;
-    bar1.set_zero(), bar2.set_zero();
-    Vector3d s1_bar = Vector3d::Zero(), s2_bar = Vector3d::Zero();
-    std::visit(
-        [&](const auto& p) {
-          using P = std::decay_t<decltype(p)>;
-          Multipliers<P::kRows> z;
-          z.lambda.setZero(), z.mu0.setZero(), z.mu1.setZero(), z.mu2.setZero();
-          z.mu0(worst.row) = sign;
-          p.pull_back(b1.frame, b2.frame, z, bar1, bar2, s1_bar, s2_bar);
-        },
-        c.primitive);
-    add_pull_back(b1, c.body1, bar1, scale, y_bar);
-    add_pull_back(b2, c.body2, bar2, scale, y_bar);
-    add_slot<3>(d, c.slot1, s1_bar, scale, rho_bar);
-    add_slot<3>(d, c.slot2, s2_bar, scale, rho_bar);
-  }
-  return std::abs(worst.amount);
-}
-
 template <class... F>
 struct Overloaded : F... {
   using F::operator()...;
@@ -186,42 +129,44 @@ Energy energy(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::Vec
   return e;
 }
 
-double evaluate(const MechanismData& d, const SensorKind& sensor, double, const Eigen::VectorXd& y,
+double evaluate(const MechanismData& d, const SensorKind& sensor, double t, const Eigen::VectorXd& y,
                 const Eigen::VectorXd& angles) {
-  return std::visit(Overloaded{[&](const PointSensor& s) { return s.value(y); },
-                               [&](const AngularVelocitySensor& s) { return s.value(y); },
-                               [&](const CoordinateSensor& s) { return y(s.index); },
-                               [&](const AngleSensor& s) { return angle_value(d, s, y, angles); },
-                               [&](const EnergySensor& s) {
-                                 const Energy e = energy(d, y, angles);
-                                 return (s.kinetic ? e.kinetic : 0) + (s.potential ? e.potential : 0);
-                               },
-                               [&](const ViolationSensor&) { return std::abs(worst_violation(d, y).amount); }},
-                    sensor);
+  return std::visit(
+      Overloaded{[&](const PointSensor& s) { return s.value(y); },
+                 [&](const AngularVelocitySensor& s) { return s.value(y); },
+                 [&](const CoordinateSensor& s) { return y(s.index); },
+                 [&](const AngleSensor& s) { return angle_value(d, s, y, angles); },
+                 [&](const EnergySensor& s) {
+                   const Energy e = energy(d, y, angles);
+                   return (s.kinetic ? e.kinetic : 0) + (s.potential ? e.potential : 0);
+                 },
+                 [&](const ViolationSensor&) { return std::abs(worst_violation(d, t, y, angles).amount); }},
+      sensor);
 }
 
 double add_gradient(const MechanismData& d, const SensorKind& sensor, double t, const Eigen::VectorXd& y,
                     const Eigen::VectorXd& angles, double scale, VecOut y_bar, VecOut rho_bar) {
   return std::visit(
-      Overloaded{[&](const PointSensor& s) {
-                   Vector3d a_bar = Vector3d::Zero(), b_bar = Vector3d::Zero();
-                   const double value = s.add_gradient(y, scale, y_bar, a_bar, b_bar);
-                   add_slot<3>(d, s.a.slot, a_bar, 1, rho_bar);
-                   if (s.relative) add_slot<3>(d, s.b.slot, b_bar, 1, rho_bar);
-                   return value;
-                 },
-                 [&](const AngularVelocitySensor& s) { return s.add_gradient(y, scale, y_bar); },
-                 [&](const CoordinateSensor& s) {
-                   y_bar(s.index) += scale;
-                   return y(s.index);
-                 },
-                 [&](const AngleSensor& s) { return angle_gradient(d, s, y, angles, scale, y_bar, rho_bar); },
-                 [&](const EnergySensor& s) {
-                   if (s.kinetic) add_kinetic_gradient(d, y, scale, y_bar, rho_bar);
-                   if (s.potential) add_potential_gradient(d, y, angles, scale, y_bar, rho_bar);
-                   return evaluate(d, s, t, y, angles);
-                 },
-                 [&](const ViolationSensor&) { return add_violation_gradient(d, y, scale, y_bar, rho_bar); }},
+      Overloaded{
+          [&](const PointSensor& s) {
+            Vector3d a_bar = Vector3d::Zero(), b_bar = Vector3d::Zero();
+            const double value = s.add_gradient(y, scale, y_bar, a_bar, b_bar);
+            add_slot<3>(d, s.a.slot, a_bar, 1, rho_bar);
+            if (s.relative) add_slot<3>(d, s.b.slot, b_bar, 1, rho_bar);
+            return value;
+          },
+          [&](const AngularVelocitySensor& s) { return s.add_gradient(y, scale, y_bar); },
+          [&](const CoordinateSensor& s) {
+            y_bar(s.index) += scale;
+            return y(s.index);
+          },
+          [&](const AngleSensor& s) { return angle_gradient(d, s, y, angles, scale, y_bar, rho_bar); },
+          [&](const EnergySensor& s) {
+            if (s.kinetic) add_kinetic_gradient(d, y, scale, y_bar, rho_bar);
+            if (s.potential) add_potential_gradient(d, y, angles, scale, y_bar, rho_bar);
+            return evaluate(d, s, t, y, angles);
+          },
+          [&](const ViolationSensor&) { return add_violation_gradient(d, t, y, angles, scale, y_bar, rho_bar); }},
       sensor);
 }
 

@@ -240,6 +240,14 @@ void Checker::expression(std::string_view key, const Expression& value, Names na
   check_expression(path(key), value, names, says.dimension);
 }
 
+void Checker::time_law(std::string_view key, const Expression& value, const std::optional<SampledLaw>& samples,
+                       const Says& says) {
+  if (samples)
+    at(key).check(*samples);
+  else
+    check_expression(path(key), value, Names::time_law, says.dimension);
+}
+
 void Checker::check_range(std::string_view key, double value, const Range& range) {
   if (!std::isfinite(value))
     issue(path(key), "is " + text_of(value) + ", it must be finite");

@@ -51,6 +51,8 @@ class Checker {
   void points(std::string_view key, const std::map<std::string, VectorField>& value, const Says& says);
   void law(std::string_view key, const std::optional<Expression>& value, Names names, const Says& says);
   void expression(std::string_view key, const Expression& value, Names names, const Says& says);
+  void time_law(std::string_view key, const Expression& value, const std::optional<SampledLaw>& samples,
+                const Says& says);
 
   void plain(std::string_view key, double value, const Range& range, const Says& says);
   void plain(std::string_view key, int value, const Range& range, const Says& says);
@@ -116,6 +118,7 @@ void check_meaning(Checker& checker, const InertiaField& inertia);
 void check_meaning(Checker& checker, const EulerParametersField& orientation);
 void check_meaning(Checker& checker, const AxisAngleField& orientation);
 void check_meaning(Checker& checker, const Joint& joint);
+void check_meaning(Checker& checker, const Drive& drive);
 void check_meaning(Checker& checker, const Force& force);
 void check_meaning(Checker& checker, const Sensor& sensor);
 void check_meaning(Checker& checker, const Condition& condition);

@@ -61,6 +61,9 @@ class FieldVisitor {
     if (value) on_expression_(*value, names);
   }
   void expression(std::string_view, const Expression& value, Names names, const Says&) { on_expression_(value, names); }
+  void time_law(std::string_view, const Expression& value, const std::optional<SampledLaw>& samples, const Says&) {
+    if (!samples) on_expression_(value, Names::time_law);
+  }
   void plain(std::string_view, const auto&, const Range&, const Says&) {}
   void overrides(std::string_view, const std::vector<std::pair<std::string, double>>&, const Says&) {}
   template <class T>

@@ -5,6 +5,7 @@
 #include <set>
 #include <tuple>
 
+#include "core/expression/did_you_mean.hpp"
 #include "core/scene/checker.hpp"
 #include "core/scene/inertia_check.hpp"
 
@@ -36,7 +37,9 @@ bool angle_is_used(const Scene& scene, const std::string& joint) {
   for (const Force& force : scene.forces)
     if (const auto* rsda = std::get_if<Rsda>(&force.kind); rsda && rsda->joint == joint) return true;
   for (const Sensor& sensor : scene.sensors)
-    if (sensor.joint == joint) return true;
+    if (sensor.joint == joint && (sensor.quantity == "angle" || sensor.quantity == "rate")) return true;
+  for (const Drive& drive : scene.drives)
+    if (drive.type == "angle" && drive.joint == joint) return true;
   return false;
 }
 
@@ -59,11 +62,16 @@ void check_normals(Checker& checker, const Joint& joint, const std::optional<Vec
     checker.issue(checker.path(), "its angle is used and axis1 differs from axis2: give normal1 and normal2");
 }
 
-void check_joint_has_angle(Checker& checker, const std::string& name) {
+void check_joint_has(Checker& checker, std::string_view key, const std::string& name, std::string_view what) {
   const Joint* const joint = checker.facts().joint(name);
-  if (joint && joint->type != "revolute" && find_row(kJointTypes, joint->type))
-    checker.issue(checker.path("joint"),
-                  "joint '" + name + "' is " + joint->type + " and has no angle; a revolute joint is needed");
+  if (!joint || !find_row(kJointTypes, joint->type)) return;
+  if (has_word(what == "angle" ? kJointsWithAngle : kJointsWithDisplacement, joint->type)) return;
+  checker.issue(checker.path(key), "joint '" + name + "' is " + joint->type + " and has no " + std::string(what) +
+                                       "; joints that have one: " +
+                                       joined(words(what == "angle" ? kJointsWithAngle : kJointsWithDisplacement)));
+}
+void check_joint_has_angle(Checker& checker, const std::string& name) {
+  check_joint_has(checker, "joint", name, "angle");
 }
 
 void check_two_bodies(Checker& checker, const std::string& body1, const std::string& body2, std::string_view what) {
@@ -154,12 +162,28 @@ void check_meaning(Checker& checker, const AxisAngleField& orientation) {
 }
 
 void check_meaning(Checker& checker, const Joint& joint) {
-  check_two_bodies(checker, joint.body1, joint.body2, "a joint");
   const TypeRow* const row = find_row(kJointTypes, joint.type);
   if (!row) return;
+  if (ties_joints(joint)) {
+    check_joint_has(checker, "joint1", joint.joint1, "angle");
+    check_joint_has(checker, "joint2", joint.joint2, joint.type == "gear" ? "angle" : "displacement");
+    if (!joint.joint2.empty() && joint.joint1 == joint.joint2)
+      checker.issue(checker.path("joint2"), "is '" + joint.joint2 + "' like joint1; two joints are needed");
+    return;
+  }
+  check_two_bodies(checker, joint.body1, joint.body2, "a joint");
+  if (const auto length = checker.facts().value(joint.length); joint.type == "distance" && length && *length <= 0)
+    checker.issue(checker.path("length"), "is " + text_of(*length) + " m, the length of a rod must be greater than 0");
   const auto axis1 = direction(checker, "axis1", joint.axis1, joint.body1);
   const auto axis2 = direction(checker, "axis2", joint.axis2, joint.body2);
   if (need_of(*row, "normal1") != Need::unknown) check_normals(checker, joint, axis1, axis2);
+}
+
+void check_meaning(Checker& checker, const Drive& drive) {
+  if (drive.type == "angle" || drive.type == "displacement") check_joint_has(checker, "joint", drive.joint, drive.type);
+  if (drive.type == "distance") check_two_bodies(checker, drive.body1, drive.body2, "a distance");
+  if (drive.type == "coordinate" && drive.body == "ground")
+    checker.issue(checker.path("body"), "is the ground, which never moves");
 }
 
 void check_meaning(Checker& checker, const Force& force) {
@@ -234,7 +258,12 @@ void check_meaning(Checker& checker, const Scene& scene) {
   const auto in_list = [](const char* list) { return [list](std::size_t i) { return child_path(list, i) + ".name"; }; };
   check_unique_names(checker, scene.bodies, "a body", in_list("bodies"));
   check_unique_names(checker, scene.joints, "a joint", in_list("joints"));
+  check_unique_names(checker, scene.drives, "a drive", in_list("drives"));
   check_unique_names(checker, scene.forces, "a force", in_list("forces"));
+  if (scene.equilibrium && !scene.conditions.empty())
+    checker.issue("initial.conditions",
+                  "stand beside \"equilibrium\": true, which settles the whole initial state; "
+                  "give one or the other");
   for (const auto& [name, what] : checker.facts().endless_definitions())
     checker.issue(child_path("definitions", name), what);
 }

@@ -82,6 +82,29 @@ struct Joint {
   std::string body1 = "ground", body2;
   PointField point1 = "O", point2 = "O";
   std::optional<PointField> axis1, axis2, normal1, normal2;
+  Field length;                // of distance [m]
+  std::string joint1, joint2;  // of gear and rack_pinion, which tie two joints
+  // Angles from normal1 to normal2, or where these are left out from the start; displacements from the start.
+  Field ratio = 1.0;  // of gear: angle(joint2) = ratio angle(joint1)
+  Field radius;       // of rack_pinion: displacement(joint2) = radius angle(joint1) [m]
+  Field pitch;        // of screw: displacement = pitch angle/(2 pi) [m per turn]
+};
+
+// A column of a CSV file over another, interpolated by a C2 cubic spline. The reader of the file fills in the samples.
+struct SampledLaw {
+  std::string csv, time, column;
+  std::vector<double> times = {}, values = {};
+};
+
+// A rheonomic constraint: a coordinate, distance, angle or displacement that follows a law of time.
+struct Drive {
+  std::string name, type;
+  std::string body, coordinate;  // of coordinate: x y z (centre of mass), e0 e1 e2 e3
+  std::string joint;             // of angle, displacement
+  std::string body1 = "ground", body2;
+  PointField point1 = "O", point2 = "O";  // of distance
+  Expression law;                         // of t and parameters
+  std::optional<SampledLaw> samples;      // instead of the law
 };
 
 struct Tsda {
@@ -132,8 +155,10 @@ struct Scene {
   std::vector<Definition> definitions;
   std::vector<Body> bodies;
   std::vector<Joint> joints;
+  std::vector<Drive> drives;
   std::vector<Force> forces;
   std::vector<Condition> conditions;  // initial.conditions
+  bool equilibrium = false;           // initial.equilibrium: start at rest from the static equilibrium near the guess
   std::vector<Sensor> sensors;
   SimulationSettings simulation;
 };

@@ -40,9 +40,10 @@ SceneFacts::SceneFacts(const Scene& scene)
     if (none_.input(definition.name) < 0 && !none_.definition(definition.name))
       none_.add_definition(definition.name, definition.value);
   find_broken_definitions();
-  tsda_law_ = rsda_law_ = objective_ = none_;
+  tsda_law_ = rsda_law_ = time_law_ = objective_ = none_;
   for (const char* name : {"l", "ldot", "t"}) add_once(tsda_law_, name);
   for (const char* name : {"angle", "rate", "t"}) add_once(rsda_law_, name);
+  add_once(time_law_, "t");
   add_once(objective_, "t");
   for (const Sensor& sensor : scene.sensors) add_once(objective_, sensor.name);
 }
@@ -108,6 +109,8 @@ const Symbols& SceneFacts::symbols(Names names) const {
       return tsda_law_;
     case Names::rsda_law:
       return rsda_law_;
+    case Names::time_law:
+      return time_law_;
     case Names::objective:
       return objective_;
   }

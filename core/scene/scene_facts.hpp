@@ -52,7 +52,7 @@ class SceneFacts {
   std::map<std::string, const Joint*> joints_;
   std::map<std::string, const Sensor*> sensors_;
   std::vector<std::string> objectives_;
-  Symbols none_, tsda_law_, rsda_law_, objective_;
+  Symbols none_, tsda_law_, rsda_law_, time_law_, objective_;
   std::vector<double> parameter_values_;
   std::set<std::string> broken_;
   std::vector<std::pair<std::string, std::string>> endless_;

@@ -65,6 +65,8 @@ std::string not_among(std::string_view what, std::string_view found, const std::
   return quoted + " is not a known " + std::string(what) + did_you_mean(found, all) + list;
 }
 
+bool ties_joints(const Joint& joint) { return joint.type == "gear" || joint.type == "rack_pinion"; }
+
 std::string_view type_of(const Force& force) { return std::holds_alternative<Tsda>(force.kind) ? "tsda" : "rsda"; }
 
 void set_type(Force& force, std::string_view type) {
@@ -73,6 +75,11 @@ void set_type(Force& force, std::string_view type) {
     force.kind = Tsda{};
   else
     force.kind = Rsda{};
+}
+
+Dimension dimension_of_drive(std::string_view type, std::string_view coordinate) {
+  if (type == "angle") return dimension::kAngle;
+  return type == "coordinate" && coordinate.starts_with('e') ? Dimension{} : dimension::kLength;
 }
 
 bool is_identifier(std::string_view text) {

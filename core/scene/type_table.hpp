@@ -12,6 +12,10 @@
 namespace mbsopt {
 
 struct Force;
+struct Joint;
+
+// Whether a joint ties two other joints (gear, rack_pinion) and has no bodies of its own.
+bool ties_joints(const Joint& joint);
 
 struct TypeRow {
   std::string_view name;
@@ -25,6 +29,31 @@ struct TypeRow {
 inline constexpr TypeRow kJointTypes[] = {
     {"revolute", "a common point and a common axis: 5 equations", "point1 point2 axis1! axis2! normal1 normal2"},
     {"spherical", "a common point: 3 equations", "point1 point2"},
+    {"translational", "slides along a common axis without turning: 5 equations",
+     "point1 point2 axis1! axis2! normal1 normal2"},
+    {"cylindrical", "slides along a common axis and turns about it: 4 equations",
+     "point1 point2 axis1! axis2! normal1 normal2"},
+    {"screw", "a cylindrical joint whose displacement from the start is pitch/(2 pi) times its angle: 5 equations",
+     "point1 point2 axis1! axis2! normal1 normal2 pitch!"},
+    {"universal", "a common point and two axes that stay perpendicular: 4 equations", "point1 point2 axis1! axis2!"},
+    {"planar", "a plane of each body stays in the other's, axis1 and axis2 the normals: 3 equations",
+     "point1 point2 axis1! axis2!"},
+    {"fixed", "no motion from the relative pose of point and orientation in the file: 6 equations", "point1 point2"},
+    {"distance", "a massless rod of given length between two points: 1 equation", "point1 point2 length!"},
+    {"point_on_line", "point2 stays on the line through point1 along axis1: 2 equations", "point1 point2 axis1!"},
+    {"point_on_plane", "point2 stays in the plane through point1 with the normal axis1: 1 equation",
+     "point1 point2 axis1!"},
+    {"perpendicular", "axis1 and axis2 stay perpendicular: 1 equation", "axis1! axis2!"},
+    {"gear", "angle(joint2) = ratio angle(joint1) from the start: 1 equation", "joint1! joint2! ratio!"},
+    {"rack_pinion", "displacement(joint2) = radius angle(joint1) from the start: 1 equation",
+     "joint1! joint2! radius!"},
+};
+
+inline constexpr TypeRow kDriveTypes[] = {
+    {"coordinate", "a coordinate of a body: of its centre of mass, or an Euler parameter", "body! coordinate!"},
+    {"distance", "the distance of two points", "body1 body2! point1 point2"},
+    {"angle", "the angle of a revolute, cylindrical or screw joint", "joint!"},
+    {"displacement", "the displacement along a translational, cylindrical or screw joint", "joint!"},
 };
 
 inline constexpr TypeRow kForceTypes[] = {
@@ -48,10 +77,11 @@ inline constexpr TypeRow kSensorQuantities[] = {
     {"constraint_violation", "norm of the constraint equations", ""},
 };
 
+inline constexpr std::string_view kJointsWithAngle = "revolute cylindrical screw";
+inline constexpr std::string_view kJointsWithDisplacement = "translational cylindrical screw";
+
 // In the problem format, not in this version.
-inline constexpr std::string_view kLaterJointTypes =
-    "translational universal cylindrical planar fixed distance point_on_line point_on_plane perpendicular gear "
-    "rack_pinion screw";
+inline constexpr std::string_view kLaterJointTypes = "";
 inline constexpr std::string_view kLaterForceTypes = "force torque bushing friction";
 inline constexpr std::string_view kLaterSensorQuantities = "acceleration displacement force reaction";
 
@@ -80,5 +110,7 @@ std::string_view type_of(const Force& force);
 void set_type(Force& force, std::string_view type);
 
 bool is_identifier(std::string_view text);
+
+Dimension dimension_of_drive(std::string_view type, std::string_view coordinate);
 
 }  // namespace mbsopt

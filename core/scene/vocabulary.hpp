@@ -18,6 +18,7 @@
 //   inertia, orientation, points                the forms that the problem format gives them
 //   law(key, optional<Expression>&, Names, says)  an expression over further names, too
 //   expression(key, Expression&, Names, says)   the same, always there
+//   time_law(key, Expression&, optional<SampledLaw>&, says)  an expression of t, or samples from a file
 //   plain(key, double&, Range, says)            a number that no parameter enters; also long, int, bool, optional
 //   object(key, T&, says)                       describe(visitor, T) inside; also optional<T>
 //   group(key, says, f)                         f(visitor) inside: fields that are nested in the file only
@@ -51,7 +52,7 @@ struct Says {
 enum class To { body, joint, force, sensor, parameter, objective };
 
 // Names that an expression may use besides parameters and definitions.
-enum class Names { none, tsda_law, rsda_law, objective };
+enum class Names { none, tsda_law, rsda_law, time_law, objective };
 
 template <class T>
 struct Choice {
@@ -141,9 +142,10 @@ void describe(auto& v, Like<Joint> auto& j) {
   if constexpr (!std::is_const_v<std::remove_reference_t<decltype(j)>>)
     if (row) j.type = row->name;
   v.name("name", j.name, {"name of the joint", Need::required});
-  v.reference("body1", j.body1, To::body, {"first body"});
-  v.reference("body2", j.body2, To::body, {"second body", Need::required});
   if (!row) return v.rest_unknown();
+  const bool has_bodies = need_of(*row, "joint1") == Need::unknown;
+  v.reference("body1", j.body1, To::body, {"first body", has_bodies ? Need::optional : Need::unknown});
+  v.reference("body2", j.body2, To::body, {"second body", has_bodies ? Need::required : Need::unknown});
   v.point("point1", j.point1, j.body1, {"point of body1 [m]", need_of(*row, "point1"), kLength});
   v.point("point2", j.point2, j.body2, {"point of body2 [m]", need_of(*row, "point2"), kLength});
   v.point("axis1", j.axis1, j.body1, {"direction in body1", need_of(*row, "axis1")});
@@ -152,6 +154,38 @@ void describe(auto& v, Like<Joint> auto& j) {
           {"direction in body1 from which the angle is measured", need_of(*row, "normal1")});
   v.point("normal2", j.normal2, j.body2,
           {"direction in body2 to which the angle is measured", need_of(*row, "normal2")});
+  v.number("length", j.length, {"of the rod [m]", need_of(*row, "length"), kLength});
+  v.reference("joint1", j.joint1, To::joint, {"joint that turns", need_of(*row, "joint1")});
+  v.reference("joint2", j.joint2, To::joint, {"joint that follows", need_of(*row, "joint2")});
+  v.number("ratio", j.ratio, {"angle of joint2 per angle of joint1", need_of(*row, "ratio"), Dimension{}});
+  v.number("radius", j.radius, {"displacement of joint2 per radian of joint1 [m]", need_of(*row, "radius"), kLength});
+  v.number("pitch", j.pitch, {"displacement per turn, right-handed [m]", need_of(*row, "pitch"), kLength});
+}
+
+void describe(auto& v, Like<SampledLaw> auto& l) {
+  v.text("csv", l.csv, {"file with a header row, relative to the problem file", Need::required});
+  v.text("time", l.time, {"name of the column of times [s]", Need::required});
+  v.text("column", l.column, {"name of the column of values, SI", Need::required});
+}
+
+void describe(auto& v, Like<Drive> auto& d) {
+  using namespace dimension;
+  const TypeRow* const row = v.type("type", d.type, std::span(kDriveTypes), "", {"type of the drive", Need::required});
+  if constexpr (!std::is_const_v<std::remove_reference_t<decltype(d)>>)
+    if (row) d.type = row->name;
+  v.name("name", d.name, {"name of the drive", Need::required});
+  if (!row) return v.rest_unknown();
+  v.reference("body", d.body, To::body, {"body whose coordinate is driven", need_of(*row, "body")});
+  v.word("coordinate", d.coordinate, Words{"x y z e0 e1 e2 e3"},
+         {"of the centre of mass [m], or an Euler parameter", need_of(*row, "coordinate")});
+  v.reference("joint", d.joint, To::joint, {"joint that is driven", need_of(*row, "joint")});
+  v.reference("body1", d.body1, To::body, {"body of the first point", need_of(*row, "body1")});
+  v.reference("body2", d.body2, To::body, {"body of the second point", need_of(*row, "body2")});
+  v.point("point1", d.point1, d.body1, {"first point [m]", need_of(*row, "point1"), kLength});
+  v.point("point2", d.point2, d.body2, {"second point [m]", need_of(*row, "point2"), kLength});
+  v.time_law("law", d.law, d.samples,
+             {"expression of t and parameters, or {\"csv\": file, \"time\": column, \"column\": column}",
+              Need::required, dimension_of_drive(d.type, d.coordinate)});
 }
 
 void describe(auto& v, Like<Tsda> auto& f, const TypeRow& row) {
@@ -261,11 +295,12 @@ void describe(auto& v, Like<Scene> auto& s) {
   v.named("definitions", s.definitions, {"named sub-expressions"});
   v.list("bodies", s.bodies, {"rigid bodies", Need::required});
   v.list("joints", s.joints, {"joints between bodies"});
-  v.later("drives", "a drive");
+  v.list("drives", s.drives, {"rheonomic constraints: what follows a law of time"});
   v.list("forces", s.forces, {"springs, dampers and actuators"});
   v.group("initial", {"the state at the start time"}, [&](auto& inside) {
     inside.list("conditions", s.conditions, {"values and rates of sensors that the assembled state must have"});
-    inside.later("equilibrium", "a start from static equilibrium");
+    inside.plain("equilibrium", s.equilibrium, kAny,
+                 {"true: start at rest from the static equilibrium near the guess"});
   });
   v.named("sensors", s.sensors, {"what can be measured on a state"});
   v.object("simulation", s.simulation, {"how the mechanism is simulated"});

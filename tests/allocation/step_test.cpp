@@ -56,10 +56,12 @@ TEST_CASE("a projection, its tangent and its adjoint allocate nothing", "[alloca
   LaneRows direction = LaneRows::Random(p.y.size(), kLanes), out(p.y.size(), kLanes);
   VectorXd w = VectorXd::Random(p.y.size()), y_bar = VectorXd::Zero(p.y.size()), projected = p.y;
   VectorXd theta_bar = VectorXd::Zero(p.mechanism.data().slots());
+  VectorXd rho_bar = VectorXd::Zero(p.mechanism.parameters());
   const long before = allocation_count();
-  const bool ok = projector.project(p.y, projected, solution) && projector.linearise(p.y, projected, solution);
+  const bool ok = projector.project(0, p.angles, p.y, projected, solution) &&
+                  projector.linearise(0, p.angles, p.y, projected, solution);
   for (const ParameterBlock& block : blocks) projector.tangent(block, direction, out);
-  projector.add_adjoint(w, y_bar, theta_bar);
+  projector.add_adjoint(w, y_bar, theta_bar, rho_bar);
   const long after = allocation_count();
   CHECK(ok);
   CHECK(after == before);
@@ -80,7 +82,7 @@ TEST_CASE("steps allocate nothing after the first, whatever their number", "[all
     Projector projector(p.mechanism, Projection::position_velocity);
     ProjectionSolution solution = projector.solution();
     VectorXd y = p.y;
-    REQUIRE(projector.project(p.y, y, solution));
+    REQUIRE(projector.project(0, p.angles, p.y, y, solution));
     const long before = allocation_count();
     run.run(
         y, p.angles, [](double) { return true; }, [](const Step&) {}, {}, result);

@@ -5,6 +5,8 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "core/scene/type_table.hpp"
+
 TEST_CASE("problems/problem.schema.json is the schema of this version", "[json]") {
   std::ifstream file(MBSOPT_SOURCE_DIR "/problems/problem.schema.json");
   const std::string stored{std::istreambuf_iterator<char>(file), {}};
@@ -18,10 +20,10 @@ TEST_CASE("the schema knows names, defaults and what is required", "[json]") {
   CHECK(schema.at("additionalProperties") == false);
   CHECK(properties.at("gravity").at("default") == nlohmann::json::parse("[0.0, 0.0, -9.81]"));
   CHECK(properties.at("bodies").at("items").at("required") == nlohmann::json::parse(R"(["name", "mass", "inertia"])"));
-  CHECK(properties.at("joints").at("items").at("oneOf").size() == 2);
+  CHECK(properties.at("joints").at("items").at("oneOf").size() == std::size(mbsopt::kJointTypes));
   CHECK(properties.at("joints").at("items").at("oneOf").at(0).at("properties").at("type").at("const") == "revolute");
   CHECK(properties.at("joints").at("items").at("oneOf").at(1).at("properties").contains("axis1") == false);
   CHECK(properties.at("simulation").at("properties").at("integrator").at("properties").at("type").at("enum") ==
         nlohmann::json::parse(R"(["dopri5", "dopri853", "rk4"])"));
-  CHECK_FALSE(properties.contains("drives"));
+  CHECK(properties.at("drives").at("items").at("oneOf").size() == std::size(mbsopt::kDriveTypes));
 }

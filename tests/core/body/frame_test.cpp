@@ -31,6 +31,7 @@ FrameBar random_bar(Random& random) {
   FrameBar bar;
   bar.r = random.vector(3), bar.rdot = random.vector(3);
   for (Matrix3d* M : {&bar.A, &bar.Adot, &bar.Addot, &bar.A_eta}) *M = random.vector(9).reshaped(3, 3);
+  for (Vector4d* x : {&bar.p, &bar.pdot, &bar.pddot, &bar.p_eta}) *x = random.vector(4);
   return bar;
 }
 
@@ -58,6 +59,11 @@ T weighted_frame(const std::vector<T>& x, const Moving& b, const FrameBar& bar, 
   sum += inner(bar.A_eta, displaced.A, 1);
   for (std::size_t i = 0; i < 3; ++i) {
     sum += bar.r(static_cast<Eigen::Index>(i)) * f.r[i].c[0] + bar.rdot(static_cast<Eigen::Index>(i)) * f.r[i].c[1];
+  }
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Eigen::Index k = static_cast<Eigen::Index>(i);
+    sum += bar.p(k) * f.p[i].c[0] + bar.pdot(k) * f.p[i].c[1] + T(2) * bar.pddot(k) * f.p[i].c[2] +
+           bar.p_eta(k) * displaced.p[i].c[1];
   }
   const V4<T> p = body.p(), w = body.pdot();
   const V3<T> e{p[1], p[2], p[3]}, o{T(b.z(3)), T(b.z(4)), T(b.z(5))}, cross_part = cross(e, o);
@@ -97,6 +103,13 @@ TEST_CASE("a frame follows the motion of (r, p), off the unit sphere as well", "
       CHECK(b.frame.A_eta(row, col) == Approx(d.A[i][j].c[1]).margin(1e-13));
     }
   }
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Eigen::Index row = static_cast<Eigen::Index>(i);
+    CHECK(b.frame.p(row) == f.p[i].c[0]);
+    CHECK(b.frame.pdot(row) == f.p[i].c[1]);
+    CHECK(b.frame.pddot(row) == Approx(2 * f.p[i].c[2]).margin(1e-13));
+    CHECK(b.frame.p_eta(row) == Approx(d.p[i].c[1]).margin(1e-13));
+  }
 }
 
 TEST_CASE("pull-backs of a frame equal complex-step gradients", "[body]") {
@@ -115,7 +128,7 @@ TEST_CASE("pull-backs of a frame equal complex-step gradients", "[body]") {
   }
   SECTION("positions and velocities") {
     FrameBar some = bar;
-    some.Addot.setZero(), some.A_eta.setZero();
+    some.Addot.setZero(), some.A_eta.setZero(), some.pddot.setZero(), some.p_eta.setZero();
     Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
     add_pull_back_velocity(b.state, some, 0.7, q_bar, v_bar);
     VectorXd found(14);
@@ -123,7 +136,7 @@ TEST_CASE("pull-backs of a frame equal complex-step gradients", "[body]") {
     const VectorXd expected = complex_gradient(
         [&](const std::vector<Complex>& x) { return weighted_frame(x, b, some, Vector4d::Zero()); }, packed(b));
     CHECK((found - 0.7 * expected).lpNorm<Eigen::Infinity>() < 1e-13);
-    some.rdot.setZero(), some.Adot.setZero();
+    some.rdot.setZero(), some.Adot.setZero(), some.pdot.setZero();
     const VectorXd position = complex_gradient(
         [&](const std::vector<Complex>& x) { return weighted_frame(x, b, some, Vector4d::Zero()); }, packed(b));
     CHECK((pull_back_position(b.state, some) - position.head<7>()).lpNorm<Eigen::Infinity>() < 1e-13);
@@ -134,17 +147,17 @@ TEST_CASE("the tangent of a frame is the transpose of its pull-back", "[body]") 
   Random random(GENERATE(range(0u, 8u)));
   const Moving b = moving(random);
   FrameBar bar = random_bar(random);
-  bar.A_eta.setZero();
+  bar.A_eta.setZero(), bar.p_eta.setZero();
   const Vector4d w_p = random.vector(4);
   Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
   add_pull_back(b.state, bar, w_p, b.eta.tail<3>(), q_bar, v_bar);
   const Lanes<7> q_dir = random.vector(7 * kLanes).reshaped(7, kLanes);
   const Lanes<7> v_dir = random.vector(7 * kLanes).reshaped(7, kLanes);
   FrameTangent t;
-  Lanes<4> pddot_dir;
-  set_tangent(b.state, q_dir, v_dir, t, pddot_dir);
+  set_tangent(b.state, q_dir, v_dir, t);
   for (int lane = 0; lane < kLanes; ++lane) {
-    double forward = bar.r.dot(t.r.col(lane)) + bar.rdot.dot(t.rdot.col(lane)) + w_p.dot(pddot_dir.col(lane));
+    double forward = bar.r.dot(t.r.col(lane)) + bar.rdot.dot(t.rdot.col(lane)) + w_p.dot(t.pddot.col(lane)) +
+                     bar.p.dot(t.p.col(lane)) + bar.pdot.dot(t.pdot.col(lane)) + bar.pddot.dot(t.pddot.col(lane));
     for (int i = 0; i < 9; ++i) {
       forward += bar.A(i / 3, i % 3) * t.A(i, lane) + bar.Adot(i / 3, i % 3) * t.Adot(i, lane) +
                  bar.Addot(i / 3, i % 3) * t.Addot(i, lane);

@@ -32,6 +32,27 @@ struct Series {
 };
 
 template <class T>
+Series<T> sqrt(const Series<T>& a) {
+  using std::sqrt;
+  const T r = sqrt(a.c[0]), r1 = a.c[1] / (T(2) * r);
+  return {r, r1, (a.c[2] - r1 * r1) / (T(2) * r)};
+}
+// Exact to first order in the imaginary parts, which is all that the complex step uses.
+inline Complex atan2(const Complex& S, const Complex& C) {
+  const double s = S.real(), c = C.real();
+  return {std::atan2(s, c), (c * S.imag() - s * C.imag()) / (c * c + s * s)};
+}
+// The angle's rate is N/D with N = C Sdot - S Cdot, D = C^2 + S^2.
+template <class T>
+Series<T> atan2(const Series<T>& S, const Series<T>& C) {
+  using mbsopt::testing::atan2;
+  using std::atan2;  // beside the one above, which argument-dependent lookup does not find
+  const T N0 = C.c[0] * S.c[1] - S.c[0] * C.c[1], N1 = T(2) * (C.c[0] * S.c[2] - S.c[0] * C.c[2]);
+  const T D0 = C.c[0] * C.c[0] + S.c[0] * S.c[0], D1 = T(2) * (C.c[0] * C.c[1] + S.c[0] * S.c[1]);
+  return {atan2(S.c[0], C.c[0]), N0 / D0, T(0.5) * (N1 - N0 * D1 / D0) / D0};
+}
+
+template <class T>
 using V3 = std::array<T, 3>;
 template <class T>
 using V4 = std::array<T, 4>;
@@ -86,6 +107,7 @@ template <class T>
 struct TextbookFrame {
   V3<T> r;
   M3<T> A;
+  V4<T> p;
   V3<T> point(const V3<T>& s) const { return r + times(A, s); }
 };
 
@@ -97,7 +119,7 @@ struct TextbookBody {
 
   V4<T> p() const { return {q[3], q[4], q[5], q[6]}; }
   V4<T> pdot() const { return {v[3], v[4], v[5], v[6]}; }
-  TextbookFrame<T> frame() const { return {{q[0], q[1], q[2]}, rotation<T>(p())}; }
+  TextbookFrame<T> frame() const { return {{q[0], q[1], q[2]}, rotation<T>(p()), p()}; }
 
   // Along its motion: coefficients of t are velocities, those of t^2 half the accelerations.
   // 2 pddot = p * (0, omegadot) - 2 (pdot'pdot) p, a quaternion product
@@ -112,10 +134,11 @@ struct TextbookBody {
     V4<Series<T>> series;
     for (std::size_t i = 0; i < 4; ++i) series[i] = Series<T>(x[i], w[i], T(0.5) * (T(0.5) * product[i] - spin * x[i]));
     f.A = rotation(series);
+    f.p = series;
     return f;
   }
 
-  // Along its virtual displacement: A (I + t skew(eta_theta)).
+  // Along its virtual displacement: A (I + t skew(eta_theta)), p + t/2 p * (0, eta_theta).
   TextbookFrame<Series<T>> displaced() const {
     const TextbookFrame<T> now = frame();
     const M3<T> turn{V3<T>{T(0), T(-eta[5]), T(eta[4])}, V3<T>{T(eta[5]), T(0), T(-eta[3])},
@@ -126,6 +149,10 @@ struct TextbookBody {
       const V3<T> row = transposed_times(turn, now.A[i]);
       for (std::size_t j = 0; j < 3; ++j) f.A[i][j] = Series<T>(now.A[i][j], row[j]);
     }
+    const V4<T> x = p();
+    const V3<T> e{x[1], x[2], x[3]}, o{T(eta[3]), T(eta[4]), T(eta[5])}, turned = scaled(x[0], o) + cross(e, o);
+    f.p = {Series<T>(x[0], T(-0.5) * dot(e, o)), Series<T>(x[1], T(0.5) * turned[0]),
+           Series<T>(x[2], T(0.5) * turned[1]), Series<T>(x[3], T(0.5) * turned[2])};
     return f;
   }
 };

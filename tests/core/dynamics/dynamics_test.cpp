@@ -116,7 +116,8 @@ TEST_CASE("accelerations equal a dense solution of the constrained equations", "
     set_acceleration(none, states[k], frames[k]);
   }
   VectorXd gamma(d.m);
-  evaluate_phi_ddot(d, frames, gamma);
+  RowLaws laws(d);
+  evaluate_phi_ddot(d, frames, laws, gamma);
   MatrixXd M = MatrixXd::Zero(18, 18), J = MatrixXd::Zero(d.m, 18);
   VectorXd f = VectorXd::Zero(18);
   for (int i = 1; i <= 3; ++i) {
@@ -129,8 +130,8 @@ TEST_CASE("accelerations equal a dense solution of the constrained equations", "
   }
   const ConstraintRows& rows = dynamics.solver().rows();
   for (const RowGroup& g : d.groups) {
-    if (g.body1 > 0) J.block(g.row, 6 * (g.body1 - 1), g.rows, 6) += rows.J1.middleRows(g.row, g.rows);
-    if (g.body2 > 0) J.block(g.row, 6 * (g.body2 - 1), g.rows, 6) += rows.J2.middleRows(g.row, g.rows);
+    if (g.body1 > 0) J.block(g.row, 6 * (g.body1 - 1), g.rows, 6) += rows.J1.middleRows(g.block, g.rows);
+    if (g.body2 > 0) J.block(g.row, 6 * (g.body2 - 1), g.rows, 6) += rows.J2.middleRows(g.block, g.rows);
   }
   MatrixXd KKT = MatrixXd::Zero(18 + d.m, 18 + d.m);
   KKT.topLeftCorner(18, 18) = M;

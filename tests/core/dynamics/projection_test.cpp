@@ -23,7 +23,7 @@ VectorXd projected(const Mechanism& mechanism, const VectorXd& y_hat) {
   Projector projector(mechanism, Projection::position_velocity);
   ProjectionSolution solution = projector.solution();
   VectorXd y(y_hat.size());
-  REQUIRE(projector.project(y_hat, y, solution));
+  REQUIRE(projector.project(0, {}, y_hat, y, solution));
   return y;
 }
 
@@ -35,8 +35,8 @@ TEST_CASE("projection meets positions and velocities to rounding and leaves what
   const double drift = GENERATE(1e-2, 1e-5, 1e-9);
   const VectorXd y = projected(mechanism, drifted(mechanism, drift));
   Projector projector(mechanism, Projection::position_velocity);
-  CHECK(projector.position_violation(y) < 1e-14);
-  CHECK(projector.velocity_violation(y) < 1e-13);
+  CHECK(projector.position_violation(0, {}, y) < 1e-14);
+  CHECK(projector.velocity_violation(0, y) < 1e-13);
   CHECK((projected(mechanism, y) - y).cwiseAbs().maxCoeff() < 1e-13);
 }
 
@@ -62,8 +62,8 @@ TEST_CASE("tangent of the projection equals central differences", "[projection]"
   Projector projector(mechanism, Projection::position_velocity);
   ProjectionSolution solution = projector.solution();
   VectorXd y(y_hat.size());
-  REQUIRE(projector.project(y_hat, y, solution));
-  REQUIRE(projector.linearise(y_hat, y, solution));
+  REQUIRE(projector.project(0, {}, y_hat, y, solution));
+  REQUIRE(projector.linearise(0, {}, y_hat, y, solution));
   const double h = 1e-6;
   for (const ParameterBlock& block : parameter_blocks(mechanism.data())) {
     const LaneRows direction = LaneRows::Random(y.size(), kLanes);
@@ -90,12 +90,12 @@ TEST_CASE("the adjoint of the projection is the transpose of its tangent", "[pro
   Projector projector(mechanism, what);
   ProjectionSolution solution = projector.solution();
   VectorXd y(y_hat.size());
-  REQUIRE(projector.project(y_hat, y, solution));
-  REQUIRE(projector.linearise(y_hat, y, solution));
+  REQUIRE(projector.project(0, {}, y_hat, y, solution));
+  REQUIRE(projector.linearise(0, {}, y_hat, y, solution));
   const VectorXd w = VectorXd::Random(y.size());
   VectorXd y_hat_bar = VectorXd::Zero(y.size()), theta_bar = VectorXd::Zero(d.slots()),
            rho_bar = VectorXd::Zero(d.rho.size());
-  projector.add_adjoint(w, y_hat_bar, theta_bar);
+  projector.add_adjoint(w, y_hat_bar, theta_bar, rho_bar);
   d.add_to_rho(theta_bar, rho_bar);
   for (const ParameterBlock& block : parameter_blocks(d)) {
     const LaneRows direction = LaneRows::Random(y.size(), kLanes);

@@ -98,6 +98,9 @@ Complex evaluate(const Expression& expression, const std::vector<std::string>& n
       case Operation::smooth_abs:
         v.push_back(std::sqrt(a * a + b * b));
         break;
+      case Operation::sign:
+      case Operation::not_above:
+        FAIL("only derivative programs have these");
     }
   }
   return v.back();
@@ -314,4 +317,35 @@ TEST_CASE("one scratch serves several programs once it has grown", "[expression]
   const double x[] = {1, 2, 3};
   CHECK(large.value(x, scratch) == std::sin(2.0) + std::cos(6.0));
   CHECK(small.value(x, scratch) == 1);
+}
+
+TEST_CASE("a derivative program computes the derivative, and its own derivatives the higher ones", "[program]") {
+  const char* text = GENERATE("x^3*y + sin(x*z)/y", "exp(-x/z)*cos(y*x)^2", "atan2(x*y, z + x^2) + log(x + 2*z)",
+                              "sqrt(x*y + z)*tanh(x - y)", "abs(x - 3)*max(x, y, 0.1)*min(z, x*y)",
+                              "asin(x/9)*acos(x/8) + atan(x*z)", "x^y + z^x + smooth_abs(x - y, 0.1)",
+                              "sinh(x/2)*cosh(y*x/4) - tan(x/3)", "y + z", "7", "smooth_max(x, y, 0.2)*x");
+  const Symbols symbols = xyz();
+  const Expression expression = Expression::parse(text);
+  const Program f(expression, symbols), f_x = f.derivative(0), f_xx = f_x.derivative(0);
+  const std::vector<double> at{1.3, 0.8, 2.1};
+  auto derivative = [&](std::size_t k, double h) {  // by the complex step, and of that by central differences
+    std::vector<Complex> x{at[0] + h, at[1], at[2]};
+    x[k] += Complex(0, 1e-40);
+    return evaluate(expression, kNames, x).imag() / 1e-40;
+  };
+  Program::Scratch scratch;
+  for (const Program* p : {&f, &f_x, &f_xx}) p->grow(scratch);
+  INFO(text);
+  CHECK(f_x.value(at, scratch) == Approx(derivative(0, 0)).epsilon(1e-12).margin(1e-13));
+  const double h = 1e-3;
+  auto slope = [&](std::size_t k, double d) { return (derivative(k, d) - derivative(k, -d)) / (2 * d); };
+  const double second = (4 * slope(0, h / 2) - slope(0, h)) / 3;
+  CHECK(f_xx.value(at, scratch) == Approx(second).epsilon(1e-9).margin(1e-9));
+  // Its gradient: mixed derivatives, here by differences in x of those in y and z.
+  std::vector<double> gradient(3, 0.0);
+  f_x.add_gradient(at, 1, gradient, scratch);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double mixed = (4 * slope(k, h / 2) - slope(k, h)) / 3;
+    CHECK(gradient[k] == Approx(mixed).epsilon(1e-9).margin(1e-9));
+  }
 }

@@ -273,9 +273,8 @@ TEMPLATE_TEST_CASE("a force's tangent is the derivative of its loads along any d
   Random random(seed + 100);
   const Eigen::MatrixXd directions = random.vector(TestType::kInputs * kLanes).reshaped(TestType::kInputs, kLanes);
   FrameTangent t1, t2;
-  Lanes<4> unused;
-  set_tangent(c.b1, directions.middleRows<7>(0), directions.middleRows<7>(7), t1, unused);
-  set_tangent(c.b2, directions.middleRows<7>(14), directions.middleRows<7>(21), t2, unused);
+  set_tangent(c.b1, directions.middleRows<7>(0), directions.middleRows<7>(7), t1);
+  set_tangent(c.b2, directions.middleRows<7>(14), directions.middleRows<7>(21), t2);
   const LoadTangents found = c.tangent(t1, t2, directions);
   for (int lane = 0; lane < kLanes; ++lane) {
     for (int i = 0; i < 12; ++i) {

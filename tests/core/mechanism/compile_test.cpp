@@ -43,7 +43,13 @@ Numbers numbers_of(const MechanismData& d) {
     x.add(b.slot_angular_velocity, b.angular_velocity);
   }
   for (const Constraint& c : d.constraints) {
-    std::visit([&](const auto& p) { x.add(c.slot1, p.s1), x.add(c.slot2, p.s2); }, c.primitive);
+    std::visit(
+        [&](const auto& p) {
+          if constexpr (requires { p.s1; }) x.add(c.slot1, p.s1), x.add(c.slot2, p.s2);
+          if constexpr (requires { p.s3; }) x.add(c.slot3, p.s3);
+        },
+        c.primitive);
+    x.add(c.slot_factor, Vec<1>(c.factor));
   }
   for (const JointAngle& a : d.angles) x.add(a.slot_x1, a.x1), x.add(a.slot_y1, a.y1), x.add(a.slot_n2, a.n2);
   auto add_law = [&](const Law& law) {

@@ -12,11 +12,11 @@ TEST_CASE("rows say what a type needs, may have and does not know", "[scene]") {
   CHECK(need_of(*revolute, "axis1") == Need::required);
   CHECK(need_of(*revolute, "normal1") == Need::optional);
   CHECK(need_of(*revolute, "axis") == Need::unknown);
-  CHECK(find_row(kJointTypes, "gear") == nullptr);
+  CHECK(find_row(kJointTypes, "gearbox") == nullptr);
 }
 
 TEST_CASE("a wrong choice is answered with what is available", "[scene]") {
-  CHECK(not_among("type", "gear", {"revolute", "spherical"}, kLaterJointTypes) ==
+  CHECK(not_among("type", "gear", {"revolute", "spherical"}, "gear screw") ==
         "type 'gear' is not available in this version; available: revolute, spherical");
   CHECK(not_among("type", "revolut", {"revolute", "spherical"}, kLaterJointTypes) ==
         "'revolut' is not a known type (did you mean 'revolute'?); available: revolute, spherical");

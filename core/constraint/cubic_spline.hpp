@@ -1,0 +1,28 @@
+// C2 interpolating cubic spline through samples, not-a-knot at both ends: the third derivative is continuous at the
+// second and the last but one sample. Two samples give a line, three a parabola.
+// de Boor, "A Practical Guide to Splines" (2001), chapter IV.
+#pragma once
+
+#include <vector>
+
+namespace mbsopt {
+
+class CubicSpline {
+ public:
+  struct Jet {
+    double f, f_t, f_tt;
+  };
+
+  // At least two samples, times strictly increasing (std::invalid_argument otherwise).
+  CubicSpline(std::vector<double> times, std::vector<double> values);
+
+  // Outside the samples the end polynomials go on.
+  Jet operator()(double t) const;
+  double first_time() const { return times_.front(); }
+  double last_time() const { return times_.back(); }
+
+ private:
+  std::vector<double> times_, values_, slopes_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,30 @@
+// What the sum of a row's primitives shall be as time goes on: f(t, rho), with f_t and f_tt and the derivatives of all
+// three in the parameters. A constant (the length of a rod), an expression in t and parameters, or samples.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <optional>
+
+#include "core/constraint/cubic_spline.hpp"
+#include "core/expression/program.hpp"
+
+namespace mbsopt {
+
+struct TimeLaw {
+  double constant = 0;
+  int slot = -1;                                   // row of the constant among the differentiated fields
+  std::optional<std::array<Program, 3>> programs;  // f, f_t, f_tt; inputs: all parameters, then t
+  std::shared_ptr<const CubicSpline> spline;
+
+  // inputs: all parameters, then t
+  CubicSpline::Jet at(const std::vector<double>& inputs, Program::Scratch& scratch) const {
+    if (spline) return (*spline)(inputs.back());
+    if (!programs) return {constant, 0, 0};
+    return {(*programs)[0].value(inputs, scratch), (*programs)[1].value(inputs, scratch),
+            (*programs)[2].value(inputs, scratch)};
+  }
+};
+
+}  // namespace mbsopt

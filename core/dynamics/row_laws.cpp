@@ -1,0 +1,72 @@
+#include "core/dynamics/row_laws.hpp"
+
+#include <algorithm>
+
+namespace mbsopt {
+
+RowLaws::RowLaws(const MechanismData& data) : data_(&data), jets_(data.laws.size()) {
+  if (data.laws.empty()) return;
+  law_of_row_.assign(static_cast<std::size_t>(data.m), -1);
+  inputs_.assign(data.rho.begin(), data.rho.end());
+  inputs_.push_back(0);
+  gradient_.resize(inputs_.size());
+  for (std::size_t k = 0; k < data.laws.size(); ++k) {
+    law_of_row_[static_cast<std::size_t>(data.laws[k].row)] = static_cast<int>(k);
+    if (!data.laws[k].law.programs) continue;
+    for (const Program& p : *data.laws[k].law.programs) p.grow(scratch_);
+  }
+}
+
+void RowLaws::set_time(double t) {
+  if (jets_.empty()) return;
+  inputs_.back() = t;
+  for (std::size_t k = 0; k < jets_.size(); ++k) jets_[k] = data_->laws[k].law.at(inputs_, scratch_);
+}
+
+void RowLaws::subtract_f(Eigen::VectorXd& phi) const {
+  for (std::size_t k = 0; k < jets_.size(); ++k) phi(data_->laws[k].row) -= jets_[k].f;
+}
+void RowLaws::subtract_f_t(Eigen::VectorXd& phi_dot) const {
+  for (std::size_t k = 0; k < jets_.size(); ++k) phi_dot(data_->laws[k].row) -= jets_[k].f_t;
+}
+void RowLaws::subtract_f_tt(Eigen::VectorXd& phi_ddot) const {
+  for (std::size_t k = 0; k < jets_.size(); ++k) phi_ddot(data_->laws[k].row) -= jets_[k].f_tt;
+}
+
+void RowLaws::add_pull_back(const Eigen::VectorXd* mu0, const Eigen::VectorXd* mu1, const Eigen::VectorXd* mu2,
+                            double scale, Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) {
+  const Eigen::VectorXd* const mu[] = {mu0, mu1, mu2};
+  for (const RowLaw& row : data_->laws) {
+    if (row.law.slot >= 0 && mu0) theta_bar(row.law.slot) -= scale * (*mu0)(row.row);
+    if (!row.law.programs) continue;
+    for (std::size_t order = 0; order < 3; ++order) {
+      if (!mu[order]) continue;
+      std::fill(gradient_.begin(), gradient_.end(), 0.0);
+      const Program& program = (*row.law.programs)[order];
+      program.add_gradient(inputs_, -scale * (*mu[order])(row.row), gradient_, scratch_);
+      for (const int input : program.used_inputs()) {
+        if (input < rho_bar.size()) rho_bar(input) += gradient_[static_cast<std::size_t>(input)];
+      }
+    }
+  }
+}
+
+void RowLaws::subtract_tangents(const ParameterBlock& block, LaneRows& phi, LaneRows& phi_dot, LaneRows& phi_ddot) {
+  LaneRows* const out[] = {&phi, &phi_dot, &phi_ddot};
+  const int P = static_cast<int>(data_->rho.size());
+  for (const RowLaw& row : data_->laws) {
+    Lanes<1> storage;
+    if (const Lanes<1>* constant = block.field<1>(row.law.slot, storage)) phi.row(row.row) -= *constant;
+    if (!row.law.programs) continue;
+    for (std::size_t order = 0; order < 3; ++order) {
+      std::fill(gradient_.begin(), gradient_.end(), 0.0);
+      const Program& program = (*row.law.programs)[order];
+      program.add_gradient(inputs_, 1, gradient_, scratch_);
+      for (const int input : program.used_inputs()) {
+        if (input < P) out[order]->row(row.row) -= gradient_[static_cast<std::size_t>(input)] * block.direction(input);
+      }
+    }
+  }
+}
+
+}  // namespace mbsopt

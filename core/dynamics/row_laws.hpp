@@ -1,0 +1,37 @@
+// The laws of time on the rows of Phi, evaluated at one time: Phi - f, Phidot - f_t, Phiddot - f_tt, and the
+// derivatives of these terms. A mechanism without drives and rods has none and pays nothing.
+#pragma once
+
+#include <vector>
+
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/parameter_lanes.hpp"
+
+namespace mbsopt {
+
+class RowLaws {
+ public:
+  explicit RowLaws(const MechanismData& data);
+
+  void set_time(double t);
+  double f(int row) const { return jets_[static_cast<std::size_t>(law_of_row_[static_cast<std::size_t>(row)])].f; }
+
+  void subtract_f(Eigen::VectorXd& phi) const;
+  void subtract_f_t(Eigen::VectorXd& phi_dot) const;
+  void subtract_f_tt(Eigen::VectorXd& phi_ddot) const;
+
+  // Adds scale times the gradient of -(mu0'f + mu1'f_t + mu2'f_tt); null: zero.
+  void add_pull_back(const Eigen::VectorXd* mu0, const Eigen::VectorXd* mu1, const Eigen::VectorXd* mu2, double scale,
+                     Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar);
+  // Subtracts the tangents of f, f_t, f_tt.
+  void subtract_tangents(const ParameterBlock& block, LaneRows& phi, LaneRows& phi_dot, LaneRows& phi_ddot);
+
+ private:
+  const MechanismData* data_;
+  std::vector<int> law_of_row_;
+  std::vector<CubicSpline::Jet> jets_;
+  std::vector<double> inputs_, gradient_;
+  Program::Scratch scratch_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,166 @@
+// Compiles expressions and derivatives of programs into instructions; what program.cpp and program_derivative.cpp
+// share.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <tuple>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "core/expression/did_you_mean.hpp"
+#include "core/expression/program.hpp"
+#include "core/expression/syntax_tree.hpp"
+
+namespace mbsopt {
+
+// Turns a tree and the definitions it uses into instructions: equal sub-expressions become one (value numbering),
+// constants are folded, and factors that cannot matter (x^0, 0 x) drop out, so that used_inputs() is structural.
+class ProgramBuilder {
+ public:
+  ProgramBuilder(const Symbols& symbols, Program& program) : symbols_(symbols), program_(program) {}
+
+  void build(const Expression& expression) {
+    const int result = emit(expression);
+    keep_only_what_reaches(result);
+  }
+
+  // The derivative of another program in one of its inputs, by the chain rule applied to each instruction.
+  void build_derivative(const Program& of, int input);
+
+ private:
+  using Instruction = Program::Instruction;
+  static constexpr int kDeepestDefinitions = 500;
+
+  int emit(const Expression& expression) {
+    const std::vector<SyntaxNode>& nodes = expression.tree().nodes;
+    std::vector<int> at(nodes.size());
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const SyntaxNode& node = nodes[i];
+      const int a = node.a < 0 ? -1 : at[static_cast<std::size_t>(node.a)];
+      const int b = node.b < 0 ? -1 : at[static_cast<std::size_t>(node.b)];
+      if (node.operation == Operation::number)
+        at[i] = number(node.value);
+      else if (node.operation == Operation::name)
+        at[i] = name(node.name);
+      else
+        at[i] = operation(node.operation, a, b);
+    }
+    return at.back();
+  }
+
+  int name(const std::string& name) {
+    if (const int input = symbols_.input(name); input >= 0) return add({Operation::name, input, -1, 0});
+    const Expression* const definition = symbols_.definition(name);
+    if (!definition)
+      throw UnknownName("unknown name '" + name + "'" + did_you_mean(name, symbols_.names()) + known_names(), name);
+    if (const auto it = done_.find(name); it != done_.end()) return it->second;
+    if (!open_.insert(name).second) throw UnknownName("the definition '" + name + "' refers to itself", name);
+    if (open_.size() > kDeepestDefinitions)
+      throw UnknownName("definitions nest deeper than " + std::to_string(kDeepestDefinitions) + " levels", name);
+    const int result = emit(*definition);
+    open_.erase(name);
+    done_.emplace(name, result);
+    return result;
+  }
+
+  std::string known_names() const {
+    constexpr std::size_t kListed = 12;
+    std::vector<std::string> names = symbols_.names();
+    if (names.empty()) return "; no names are defined here";
+    const bool more = names.size() > kListed;
+    if (more) names.resize(kListed);
+    return "; known here: " + joined(names) + (more ? ", ..." : "");
+  }
+
+  int operation(Operation operation, int a, int b) {
+    const bool binary = operands(operation) == 2;
+    if (is_number(a) && (!binary || is_number(b)))
+      return number(apply(operation, constant(a), binary ? constant(b) : 0));
+    switch (operation) {
+      case Operation::add:
+        if (is(a, 0)) return b;
+        if (is(b, 0)) return a;
+        break;
+      case Operation::subtract:
+        if (is(b, 0)) return a;
+        break;
+      case Operation::multiply:
+        if (is(a, 0) || is(b, 1)) return a;
+        if (is(b, 0) || is(a, 1)) return b;
+        break;
+      case Operation::divide:
+        if (is(b, 1) || is(a, 0)) return a;
+        break;
+      case Operation::power:
+        if (is(b, 0)) return number(1);
+        if (is(b, 1)) return a;
+        if (is(b, 2)) return this->operation(Operation::multiply, a, a);
+        break;
+      default:
+        break;
+    }
+    if ((operation == Operation::add || operation == Operation::multiply) && a > b) std::swap(a, b);
+    return add({operation, a, b, 0});
+  }
+
+  int number(double value) { return add({Operation::number, -1, -1, value}); }
+  int partial(const Instruction& in, int a, int b, int value, bool first);
+
+  int add(const Instruction& instruction) {
+    const auto key = std::make_tuple(static_cast<int>(instruction.operation), instruction.a, instruction.b,
+                                     std::bit_cast<std::uint64_t>(instruction.constant));
+    const auto [it, is_new] = known_.emplace(key, static_cast<int>(code().size()));
+    if (is_new) code().push_back(instruction);
+    return it->second;
+  }
+
+  void keep_only_what_reaches(int result) {
+    std::vector<int> moved(code().size(), -1);
+    std::vector<char> needed(code().size(), 0);
+    needed[static_cast<std::size_t>(result)] = 1;
+    for (int i = result; i >= 0; --i) {
+      const Instruction& instruction = code()[static_cast<std::size_t>(i)];
+      if (!needed[static_cast<std::size_t>(i)] || operands(instruction.operation) == 0) continue;
+      needed[static_cast<std::size_t>(instruction.a)] = 1;
+      if (instruction.b >= 0) needed[static_cast<std::size_t>(instruction.b)] = 1;
+    }
+    std::vector<Instruction> kept;
+    for (std::size_t i = 0; i <= static_cast<std::size_t>(result); ++i) {
+      if (!needed[i]) continue;
+      Instruction instruction = code()[i];
+      if (operands(instruction.operation) > 0) {
+        instruction.a = moved[static_cast<std::size_t>(instruction.a)];
+        if (instruction.b >= 0) instruction.b = moved[static_cast<std::size_t>(instruction.b)];
+      }
+      if (instruction.operation == Operation::name) program_.used_inputs_.push_back(instruction.a);
+      moved[i] = static_cast<int>(kept.size());
+      kept.push_back(instruction);
+    }
+    code() = std::move(kept);
+    std::sort(program_.used_inputs_.begin(), program_.used_inputs_.end());
+  }
+
+  std::vector<Instruction>& code() { return program_.code_; }
+  bool is_number(int i) { return code()[static_cast<std::size_t>(i)].operation == Operation::number; }
+  double constant(int i) { return code()[static_cast<std::size_t>(i)].constant; }
+  bool is(int i, double value) { return is_number(i) && constant(i) == value; }
+
+  struct KeyHash {
+    std::size_t operator()(const std::tuple<int, int, int, std::uint64_t>& key) const {
+      std::uint64_t h = std::get<3>(key);
+      for (const int part : {std::get<0>(key), std::get<1>(key), std::get<2>(key)})
+        h = (h ^ static_cast<std::uint64_t>(part + 2)) * 0x9E3779B97F4A7C15ull + (h >> 29);
+      return static_cast<std::size_t>(h);
+    }
+  };
+
+  const Symbols& symbols_;
+  Program& program_;
+  std::unordered_map<std::tuple<int, int, int, std::uint64_t>, int, KeyHash> known_;
+  std::unordered_map<std::string, int> done_;  // definitions, by name
+  std::unordered_set<std::string> open_;       // definitions being emitted
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,83 @@
+// Drives: a coordinate, distance, angle or displacement that follows a law of time, one row of Phi each.
+#include <stdexcept>
+
+#include "core/mechanism/compilation.hpp"
+#include "core/mechanism/mechanism.hpp"
+
+namespace mbsopt {
+namespace {
+
+constexpr std::string_view kCoordinates[] = {"x", "y", "z", "e0", "e1", "e2", "e3"};
+
+Constraint measured(Compilation& model, const Drive& drive, const std::string& where) {
+  if (drive.type == "angle") {
+    Constraint c = model.joint_angle_term(drive.joint, Compilation::Zero::normals, where + ".joint");
+    c.angle = Constraint::kNearestLaw;
+    return c;
+  }
+  if (drive.type == "displacement") return model.joint_displacement_term(drive.joint, where + ".joint");
+  Constraint c;
+  if (drive.type == "coordinate") {
+    c.body2 = model.body_index(drive.body, where + ".body");
+    if (c.body2 == 0) throw SceneError(where + ".body: is the ground, which never moves");
+    Coordinate coordinate;
+    const auto found = std::find(std::begin(kCoordinates), std::end(kCoordinates), drive.coordinate);
+    if (found == std::end(kCoordinates)) {
+      throw SceneError(where + ".coordinate: is '" + drive.coordinate + "'; allowed: x, y, z, e0, e1, e2, e3");
+    }
+    coordinate.index = static_cast<int>(found - std::begin(kCoordinates));
+    c.primitive = coordinate;
+    return c;
+  }
+  if (drive.type != "distance") throw SceneError(where + ".type: '" + drive.type + "' is not a drive known here");
+  c.body1 = model.body_index(drive.body1, where + ".body1"), c.body2 = model.body_index(drive.body2, where + ".body2");
+  Distance distance;
+  distance.s1 = numbers(model.keep(c.slot1, model.point(c.body1, drive.point1, where + ".point1")));
+  distance.s2 = numbers(model.keep(c.slot2, model.point(c.body2, drive.point2, where + ".point2")));
+  c.primitive = distance;
+  return c;
+}
+
+TimeLaw law_of(Compilation& model, const Drive& drive, const std::string& where) {
+  TimeLaw law;
+  if (drive.samples) {
+    try {
+      law.spline = std::make_shared<CubicSpline>(drive.samples->times, drive.samples->values);
+    } catch (const std::invalid_argument& e) {
+      throw SceneError(where + ".law: " + e.what());
+    }
+    const SimulationSettings& s = model.scene.simulation;
+    const double slack = 1e-9 * (s.end_time - s.start_time);
+    if (s.start_time < law.spline->first_time() - slack || s.end_time > law.spline->last_time() + slack) {
+      throw SceneError(where + ".law: its samples cover " + Expression(law.spline->first_time()).text() + " s to " +
+                       Expression(law.spline->last_time()).text() + " s, the simulation " +
+                       Expression(s.start_time).text() + " s to " + Expression(s.end_time).text() + " s");
+    }
+    return law;
+  }
+  Symbols symbols = model.fields.symbols();
+  const int t = symbols.add_input("t");
+  try {
+    const Program f(drive.law, symbols), f_t = f.derivative(t), f_tt = f_t.derivative(t);
+    law.programs = {f, f_t, f_tt};
+  } catch (const UnknownName& e) {
+    throw SceneError(where + ".law: " + e.what());
+  }
+  return law;
+}
+
+}  // namespace
+
+void compile_drives(Compilation& model) {
+  for (std::size_t i = 0; i < model.scene.drives.size(); ++i) {
+    const Drive& drive = model.scene.drives[i];
+    const std::string where = child_path("drives", i);
+    Constraint c = measured(model, drive, where);
+    c.drive = static_cast<int>(i);
+    model.data.drive_names.push_back(drive.name);
+    const int row = model.add_constraint(std::move(c)).row;
+    model.data.laws.push_back({row, law_of(model, drive, where)});
+  }
+}
+
+}  // namespace mbsopt

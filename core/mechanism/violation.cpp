@@ -1,0 +1,133 @@
+#include "core/mechanism/violation.hpp"
+
+#include <cmath>
+
+#include "core/constraint/unit_norm.hpp"
+#include "core/sensor/body_at.hpp"
+
+namespace mbsopt {
+namespace {
+
+using VecOut = Eigen::Ref<Eigen::VectorXd>;
+
+const RowLaw* law_of(const MechanismData& d, int row) {
+  for (const RowLaw& law : d.laws) {
+    if (law.row == row) return &law;
+  }
+  return nullptr;
+}
+
+// f of a row at t; with a gradient, weight times its derivatives are added to rho_bar.
+double law_value(const MechanismData& d, const RowLaw* row, double t, double weight, VecOut* rho_bar) {
+  if (!row) return 0;
+  if (!row->law.programs) {
+    if (row->law.spline) return (*row->law.spline)(t).f;
+    if (rho_bar && row->law.slot >= 0) {
+      for (std::size_t k = 0; k < d.active.size(); ++k) {
+        (*rho_bar)(d.active[k]) += weight * d.theta_rho(row->law.slot, static_cast<Eigen::Index>(k));
+      }
+    }
+    return row->law.constant;
+  }
+  const Program& f = (*row->law.programs)[0];
+  Program::Scratch scratch = f.scratch();
+  std::vector<double> inputs(d.rho.begin(), d.rho.end());
+  inputs.push_back(t);
+  std::vector<double> gradient(inputs.size(), 0.0);
+  const double value = f.add_gradient(inputs, weight, gradient, scratch);
+  if (rho_bar) {
+    for (const int k : d.active) (*rho_bar)(k) += gradient[static_cast<std::size_t>(k)];
+  }
+  return value;
+}
+
+template <class P>
+Vec<P::kRows> phi_of(const MechanismData& d, const Constraint& c, const P& p, double t, const BodyAt& b1,
+                     const BodyAt& b2, const Eigen::VectorXd& angles) {
+  Vec<P::kRows> phi;
+  p.phi(b1.frame, b2.frame, phi);
+  if constexpr (std::is_same_v<P, Angle>) {
+    double reference = 0;
+    if (c.angle == Constraint::kNearestLaw) {
+      reference = law_value(d, law_of(d, c.row), t, 0, nullptr);
+    } else if (c.angle < angles.size()) {
+      reference = angles(c.angle);
+    }
+    phi(0) = Angle::on_branch(phi(0), reference);
+  }
+  return phi;
+}
+
+void add_slot(const MechanismData& d, int slot, const Vector3d& bar, double scale, VecOut rho_bar) {
+  if (slot < 0) return;
+  for (std::size_t k = 0; k < d.active.size(); ++k) {
+    rho_bar(d.active[k]) += scale * d.theta_rho.col(static_cast<Eigen::Index>(k)).segment<3>(slot).dot(bar);
+  }
+}
+
+}  // namespace
+
+Violation worst_violation(const MechanismData& d, double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
+  Violation worst;
+  auto offer = [&](double phi, int row, int body) {
+    if (std::abs(phi) > std::abs(worst.amount)) worst = {phi, row, body};
+  };
+  double sum = 0;
+  for (std::size_t i = 0; i < d.constraints.size(); ++i) {
+    const Constraint& c = d.constraints[i];
+    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+    const bool last_term = i + 1 == d.constraints.size() || d.constraints[i + 1].row != c.row;
+    std::visit(
+        [&](const auto& p) {
+          const auto phi = phi_of(d, c, p, t, b1, b2, angles);
+          sum += c.factor * phi(0);
+          if (!last_term) return;
+          offer(sum - law_value(d, law_of(d, c.row), t, 0, nullptr), c.row, 0);
+          for (int k = 1; k < phi.size(); ++k) offer(c.factor * phi(k), c.row + k, 0);
+          sum = 0;
+        },
+        c.primitive);
+  }
+  for (int i = 1; i <= d.n; ++i) offer(UnitNorm::phi(y.segment<4>(7 * (i - 1) + 3)), -1, i);
+  return worst;
+}
+
+double add_violation_gradient(const MechanismData& d, double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                              double scale, VecOut y_bar, VecOut rho_bar) {
+  const Violation worst = worst_violation(d, t, y, angles);
+  const double s = worst.amount < 0 ? -scale : scale;
+  if (worst.body > 0) {
+    const Eigen::Index at = 7 * (worst.body - 1) + 3;
+    y_bar.segment<4>(at) += s * UnitNorm::phi_p(y.segment<4>(at));
+    return std::abs(worst.amount);
+  }
+  if (worst.row < 0) return 0;
+  law_value(d, law_of(d, worst.row), t, -s, &rho_bar);
+  for (const Constraint& c : d.constraints) {
+    if (worst.row < c.row || worst.row >= c.row + c.rows()) continue;
+    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+    FrameBar bar1, bar2;
+    bar1.set_zero(), bar2.set_zero();
+    GeometryBar s_bar;
+    std::visit(
+        [&]<class P>(const P& p) {
+          Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
+          z.mu0(worst.row - c.row) = c.factor;
+          p.pull_back(b1.frame, b2.frame, z, bar1, bar2, s_bar);
+          if (c.slot_factor < 0) return;
+          const double value = phi_of(d, c, p, t, b1, b2, angles)(worst.row - c.row);
+          for (std::size_t k = 0; k < d.active.size(); ++k) {
+            rho_bar(d.active[k]) += s * value * d.theta_rho(c.slot_factor, static_cast<Eigen::Index>(k));
+          }
+        },
+        c.primitive);
+    add_pull_back(b1, c.body1, bar1, s, y_bar);
+    add_pull_back(b2, c.body2, bar2, s, y_bar);
+    add_slot(d, c.slot1, s_bar.s1, s, rho_bar);
+    add_slot(d, c.slot2, s_bar.s2, s, rho_bar);
+    add_slot(d, c.slot3, s_bar.s3, s, rho_bar);
+  }
+  return std::abs(worst.amount);
+}
+
+}  // namespace mbsopt
