@@ -3,14 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <stdexcept>
 
 #include "optim/ceres_solver.hpp"
-#include "optim/evaluator.hpp"
 #include "optim/experiment.hpp"
+#include "optim/parameter_values.hpp"
+#include "optim/stopwatch.hpp"
 #include "optim/variable_scaling.hpp"
 
 namespace mbsopt {
@@ -53,13 +53,13 @@ class Identification {
   }
 
   IdentificationResult run() {
-    const auto clock_start = std::chrono::steady_clock::now();
+    const Stopwatch stopwatch;
     fit();
     for (std::size_t e = 0; e < spec_.experiments.size(); ++e) {
-      if (spec_.experiments[e].validate && result_.status != FitStatus::failed && !abandoned_) validate(e);
+      if (spec_.experiments[e].validate && result_.status != SolverStatus::failed && !abandoned_) validate(e);
     }
     order_residuals();
-    result_.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock_start).count();
+    result_.wall_seconds = stopwatch.seconds();
     return std::move(result_);
   }
 
@@ -79,12 +79,6 @@ class Identification {
     if (std::all_of(spec.experiments.begin(), spec.experiments.end(), [](const auto& e) { return e.validate; }))
       throw std::invalid_argument("identification.experiments: all of them validate, none is fitted");
     return spec;
-  }
-
-  Eigen::VectorXd scene_values() const {
-    Eigen::VectorXd rho(static_cast<Eigen::Index>(scene_.parameters.size()));
-    for (Eigen::Index k = 0; k < rho.size(); ++k) rho(k) = scene_.parameters[static_cast<std::size_t>(k)].value;
-    return rho;
   }
 
   std::vector<UnknownParameter> free_in(std::size_t e) const {
@@ -240,8 +234,8 @@ class Identification {
     std::vector<Fitted> experiments;
     for (std::size_t e = 0; e < spec_.experiments.size(); ++e) {
       if (spec_.experiments[e].validate) continue;
-      experiments.push_back({e, Experiment(scene_, spec_.experiments[e], place_of(e), data_[e], scene_values(),
-                                           unknowns_in(e, unknowns), options_.user_forces)});
+      experiments.push_back({e, Experiment(scene_, spec_.experiments[e], place_of(e), data_[e],
+                                           parameter_values(scene_), unknowns_in(e, unknowns), options_.user_forces)});
     }
     Stack problem(experiments, scaling, go_on_, result_.simulations);
     if (problem.size < problem.variables())
@@ -253,7 +247,7 @@ class Identification {
       return !options_.progress || options_.progress(result_.history.back());
     };
     const LeastSquaresResult solution = solve_with_ceres(problem, scaling.to_x(start_of(unknowns)), solver);
-    result_.status = abandoned_ ? FitStatus::stopped : solution.status;
+    result_.status = abandoned_ ? SolverStatus::stopped : solution.status;
     result_.message = abandoned_ ? "stopped on request" : solution.message;
     result_.cost_initial = solution.cost_initial, result_.cost_final = solution.cost_final;
     result_.samples = static_cast<std::size_t>(problem.size);
@@ -263,7 +257,7 @@ class Identification {
     const Eigen::VectorXd values = scaling.to_rho(solution.x);
     if (solution.point.z.size() > 0) result_.statistics = statistics_at(solution, scaling, unknowns);
     result_.parameters = described(unknowns, values, result_.statistics);
-    shared_ = scene_values();
+    shared_ = parameter_values(scene_);
     for (std::size_t i = 0; i < unknowns.size(); ++i)
       if (unknowns[i].shared) shared_(unknowns[i].parameter) = values(static_cast<Eigen::Index>(i));
     Eigen::Index row = 0;
@@ -351,20 +345,6 @@ class Identification {
 };
 
 }  // namespace
-
-std::string_view to_string(FitStatus status) {
-  switch (status) {
-    case FitStatus::converged:
-      return "converged";
-    case FitStatus::iteration_limit:
-      return "iteration_limit";
-    case FitStatus::stopped:
-      return "stopped";
-    case FitStatus::failed:
-      break;
-  }
-  return "failed";
-}
 
 IdentificationResult run_identification(const Problem& problem, const std::vector<CsvTable>& data,
                                         const IdentificationOptions& options) {
