@@ -102,6 +102,7 @@ int design_command(const CommandContext& context) {
   if (!before.simulation.ok()) {
     interrupted() ? run.stopped("nothing was designed yet")
                   : run.failed(before.simulation.message, before.simulation.last_good_time);
+    run.write("report.html", simulation_report(scene, run.result, before.trajectory));
     return run.finish();
   }
   run.result["model"] = to_json(before.model);

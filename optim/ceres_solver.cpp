@@ -8,6 +8,8 @@
 #include <exception>
 #include <vector>
 
+#include "core/expression/counted.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -140,7 +142,8 @@ void set_outcome(const ceres::Solver::Summary& summary, const CeresOptions& opti
       return;
     case ceres::NO_CONVERGENCE:
       result.status = SolverStatus::iteration_limit;
-      result.message = fmt::format("stopped at the limit of {} iterations{}", options.max_iterations, failures);
+      result.message =
+          fmt::format("stopped at the limit of {}{}", counted(options.max_iterations, "iteration"), failures);
       return;
     case ceres::USER_FAILURE:
       result.status = SolverStatus::stopped;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "core/expression/counted.hpp"
 #include "optim/ceres_solver.hpp"
 #include "optim/experiment.hpp"
 #include "optim/parameter_values.hpp"
@@ -69,8 +70,9 @@ class Identification {
     const IdentificationSpec& spec = *problem.identification;
     if (spec.experiments.empty()) throw std::invalid_argument("identification.experiments: is empty");
     if (data.size() != spec.experiments.size())
-      throw std::invalid_argument(fmt::format("identification.experiments: {} experiments, but {} tables of data",
-                                              spec.experiments.size(), data.size()));
+      throw std::invalid_argument(fmt::format("identification.experiments: {}, but {} of data",
+                                              counted(spec.experiments.size(), "experiment"),
+                                              counted(data.size(), "table")));
     for (std::size_t e = 0; e < spec.experiments.size(); ++e)
       for (std::size_t d = 0; d < e; ++d)
         if (spec.experiments[d].name == spec.experiments[e].name)
@@ -239,8 +241,8 @@ class Identification {
     }
     Stack problem(experiments, scaling, go_on_, result_.simulations);
     if (problem.size < problem.variables())
-      throw std::invalid_argument(
-          fmt::format("identification: {} samples cannot determine {} parameters", problem.size, problem.variables()));
+      throw std::invalid_argument(fmt::format("identification: {} cannot determine {}", counted(problem.size, "sample"),
+                                              counted(problem.variables(), "parameter")));
     CeresOptions solver = solver_options();
     solver.progress = [&](const LeastSquaresProgress& p) {
       result_.history.push_back({p.iteration, p.cost, p.gradient_norm, p.step_norm, scaling.to_rho(p.x)});

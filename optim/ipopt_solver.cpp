@@ -9,6 +9,8 @@
 #include <cmath>
 #include <exception>
 
+#include "core/expression/counted.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -216,7 +218,7 @@ Outcome in_words(Ipopt::ApplicationReturnStatus status, const NlpResult& result,
     case Maximum_Iterations_Exceeded:
     case Maximum_CpuTime_Exceeded:
       return {SolverStatus::iteration_limit,
-              fmt::format("stopped at the limit of {} iterations{}", options.max_iterations, failures)};
+              fmt::format("stopped at the limit of {}{}", counted(options.max_iterations, "iteration"), failures)};
     case User_Requested_Stop:
       return {SolverStatus::stopped, "stopped on request"};
     case Diverging_Iterates:

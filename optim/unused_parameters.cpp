@@ -260,9 +260,15 @@ std::vector<SceneIssue> find_idle_variables(const Problem& problem) {
   if (problem.design)
     add_idle(problem.design->variables, as_designed(problem), "design.variables",
              "any objective that the design minimises or bounds", issues);
-  if (problem.identification)
-    add_idle(problem.identification->variables, as_identified(problem), "identification.variables",
-             "anything that is measured", issues);
+  if (problem.identification) {
+    const IdentificationSpec& identification = *problem.identification;
+    const Problem identified = as_identified(problem);
+    constexpr const char* kMeasured = "anything that is measured";
+    add_idle(identification.variables, identified, "identification.variables", kMeasured, issues);
+    for (std::size_t e = 0; e < identification.experiments.size(); ++e)
+      add_idle(identification.experiments[e].free, identified, child_path("identification.experiments", e) + ".free",
+               kMeasured, issues);
+  }
   return issues;
 }
 

@@ -11,7 +11,8 @@ namespace {
 void add_rows(std::vector<std::vector<std::string>>& rows, const Json& parameters) {
   for (const auto& [name, p] : parameters.items()) {
     rows.push_back({name, cell(p.at("initial")), cell(p.at("value"), 9), cell(p.value("std_error", Json()), 3),
-                    cell(p.value("ci95", Json())), cell(p.value("unit", Json())), cell(p.value("at_bound", Json()))});
+                    "[" + cell(p.value("ci95", Json())) + "]", cell(p.value("unit", Json())),
+                    cell(p.value("at_bound", Json()))});
   }
 }
 

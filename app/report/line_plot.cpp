@@ -116,10 +116,14 @@ void draw_series(const LinePlot& plot, const Frame& frame, std::size_t index, st
   svg += fmt::format("<path class=\"{} c{}\" d=\"{}\"/>\n", mark, index % kColours, path);
 }
 
-// 0.02, 5, 10000 as they are; powers of ten far from 1 as 10 with a raised exponent, which reads better than 1e-12.
-std::string logarithmic_label(double value) {
+// Whether all of an axis can be written as 0.02, 5, 1000.
+bool near_one(const std::vector<double>& ticks) {
+  return std::all_of(ticks.begin(), ticks.end(), [](double tick) { return tick > 0.9e-3 && tick < 1.1e4; });
+}
+
+// 10 with a raised exponent, which reads better than 1e-12.
+std::string power_of_ten(double value) {
   const double exponent = std::floor(std::log10(value) + 1e-9), digits = value / std::pow(10, exponent);
-  if (exponent >= -3 && exponent <= 4) return fmt::format("{:.6g}", value);
   const std::string power = fmt::format("10<tspan dy=\"-4\" font-size=\"9\">{:.0f}</tspan>", exponent);
   return std::abs(digits - 1) < 1e-6 ? power : fmt::format("{:.4g}\u00b7{}", digits, power);
 }
@@ -128,8 +132,9 @@ std::string logarithmic_label(double value) {
 std::vector<std::pair<double, std::string>> y_ticks_of(const LinePlot& plot, const Frame& frame) {
   std::vector<std::pair<double, std::string>> ticks;
   if (plot.logarithmic_y) {
-    for (const double y : logarithmic_ticks(std::pow(10, frame.y.low), std::pow(10, frame.y.high), 6))
-      ticks.emplace_back(std::log10(y), logarithmic_label(y));
+    const std::vector<double> values = logarithmic_ticks(std::pow(10, frame.y.low), std::pow(10, frame.y.high), 6);
+    for (const double y : values)
+      ticks.emplace_back(std::log10(y), near_one(values) ? fmt::format("{:.6g}", y) : power_of_ten(y));
   } else {
     for (const double y : round_ticks(frame.y.low, frame.y.high, plot.equal_axes ? 5 : 6))
       ticks.emplace_back(y, fmt::format("{:.6g}", y));

@@ -82,7 +82,7 @@ TEST_CASE("design: too few iterations is a failure in words that keeps the best 
   CHECK(result.at("optimizer").at("objective_final") <= result.at("optimizer").at("objective_initial"));
   CHECK(fs::exists(folder.path / "out/optimized.json"));
   CHECK_THAT(content_of(folder.path / "out/report.html"),
-             Contains("class=\"banner\"") && Contains("This run failed: stopped at the limit of 1 iterations"));
+             Contains("class=\"banner\"") && Contains("This run failed: stopped at the limit of 1 iteration"));
 }
 
 TEST_CASE("design: SIGTERM keeps the best so far", "[command]") {

@@ -186,6 +186,10 @@ TEST_CASE("a variable must matter to what the design uses, or to what is measure
   problem.identification->variables = {"mb"};
   REQUIRE(find_idle_variables(problem).size() == 1);
   CHECK(find_idle_variables(problem)[0].path == "identification.variables[0]");
+  problem.identification->variables = {"ma"};
+  problem.identification->experiments[0].free = {"mb"};
+  REQUIRE(find_idle_variables(problem).size() == 1);
+  CHECK(find_idle_variables(problem)[0].path == "identification.experiments[0].free[0]");
 }
 
 TEST_CASE("gravity and initial conditions count", "[unused]") {

@@ -38,6 +38,8 @@ TEST_CASE("a convergence plot has readable labels and whole iterations", "[repor
   CHECK(svg.find(">1e-") == std::string::npos);
   CHECK(svg.find(">0.5<") == std::string::npos);
   CHECK(svg.find(">2<") != std::string::npos);
+  plot.series[0].y = {1, 0.1, 0.02, 0.01};
+  CHECK(to_svg(plot).find(">0.01<") != std::string::npos);
 }
 
 TEST_CASE("a legend shows lines as they are drawn", "[report]") {
