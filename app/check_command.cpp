@@ -6,46 +6,71 @@
 #include "app/interrupt.hpp"
 #include "app/run.hpp"
 #include "app/text_table.hpp"
-#include "core/dynamics/assembly.hpp"
+#include "core/expression/counted.hpp"
 #include "optim/gradient_check.hpp"
 
 namespace mbsopt {
 namespace {
 
-std::string relative(double difference) { return std::isfinite(difference) ? fmt::format("{:.1e}", difference) : "-"; }
+// "agrees 3.1e-14": the verdict, and the relative difference it is about.
+std::string compared(Verdict verdict, double difference) {
+  const std::string words(to_string(verdict));
+  return std::isfinite(difference) && verdict != Verdict::zero ? fmt::format("{} {:.1e}", words, difference) : words;
+}
+
+std::string derivative(double value) { return std::isfinite(value) ? significant(value, 11) : "failed"; }
 
 void print_entries(std::ostream& out, const GradientCheck& check) {
+  out << "\nfrozen: differences on the steps of the base run; free: with step-size control at work. Relative to tlm:\n";
   for (std::size_t i = 0; i < check.objectives.size(); ++i) {
     out << fmt::format("\n{} = {}\n", check.objectives[i], significant(check.psi(static_cast<Eigen::Index>(i)), 12));
-    TextTable table({"parameter", "adjoint", "tlm", "fd frozen", "fd free", "tlm-adjoint", "frozen-tlm", "free-tlm",
-                     "exact", "frozen"});
+    TextTable table(
+        {"parameter", "adjoint", "tlm", "fd frozen", "fd free", "adjoint = tlm", "fd frozen = tlm", "fd free = tlm"});
     for (const CheckedEntry& e : check.entries) {
       if (e.objective != check.objectives[i]) continue;
-      table.add({e.parameter, significant(e.adjoint, 11), significant(e.tlm, 11), significant(e.frozen, 11),
-                 significant(e.free, 11), relative(e.tlm_adjoint), relative(e.frozen_difference),
-                 relative(e.free_difference), std::string(to_string(e.exact)),
-                 std::string(to_string(e.frozen_verdict))});
+      table.add({e.parameter, derivative(e.adjoint), derivative(e.tlm), derivative(e.frozen), derivative(e.free),
+                 compared(e.exact, e.tlm_adjoint), compared(e.frozen_verdict, e.frozen_difference),
+                 e.free_verdict ? compared(*e.free_verdict, e.free_difference) : "-"});
     }
     out << table.text();
   }
 }
 
-void print_other_checks(std::ostream& out, const GradientCheck& check) {
-  out << '\n';
+void print_taylor(std::ostream& out, const GradientCheck& check) {
+  out << "\nTaylor remainder |psi(rho + h d) - psi - h psi_rho d|, frozen steps, d random in all parameters:\n";
   for (const TaylorCheck& taylor : check.taylor) {
-    out << fmt::format("Taylor remainder of {} falls as h^{:.2f}: {}\n", taylor.objective, taylor.slope,
-                       taylor.passed ? "agrees" : "DISAGREES");
+    const std::string found = taylor.slope          ? fmt::format("falls as h^{:.2f}", *taylor.slope)
+                              : taylor.rows.empty() ? "could not be evaluated at any h"
+                                                    : "has no slope to measure, it is rounding: linear along d";
+    const char* verdict = taylor.passed ? "agrees" : taylor.rows.empty() ? "FAILED" : "DISAGREES";
+    out << fmt::format("  {}: {}: {}\n", taylor.objective, found, verdict);
   }
+}
+
+std::string weighted_sum(const GradientCheck& check, const Eigen::VectorXd& w) {
+  std::string text;
+  for (std::size_t i = 0; i < check.objectives.size(); ++i) {
+    const double weight = w(static_cast<Eigen::Index>(i));
+    const char* sign = weight < 0 ? "-" : "+";
+    if (!text.empty()) text += fmt::format(" {} {:.3g} {}", sign, std::abs(weight), check.objectives[i]);
+    if (text.empty()) text = fmt::format("{:.3g} {}", weight, check.objectives[i]);
+  }
+  return text;
+}
+
+void print_identities(std::ostream& out, const GradientCheck& check) {
+  out << "\nadjoint identity w'(psi_rho d) by tlm = (psi_rho'w)'d by adjoint, d random in all parameters, w random:\n";
   for (const IdentityCheck& identity : check.identities) {
-    out << fmt::format("adjoint identity: defect {:.1e}: {}\n", identity.relative_defect,
-                       identity.passed ? "agrees" : "DISAGREES");
+    out << fmt::format("  of {}: {:.6g}, defect {:.1e} of its terms: {}\n", weighted_sum(check, identity.w),
+                       identity.adjoint, identity.relative_defect, identity.passed ? "agrees" : "DISAGREES");
   }
 }
 
 void print_costs(std::ostream& out, const GradientCheck& check) {
   TextTable table({"cost", "seconds", "simulations"});
   const auto add = [&](const char* name, const MethodCost& cost) {
-    table.add({name, fmt::format("{:.3g}", cost.wall_seconds), fmt::format("{:.2f}", cost.ratio)});
+    table.add(
+        {name, fmt::format("{:.2g}", cost.wall_seconds), fmt::format("{:.{}f}", cost.ratio, cost.ratio < 10 ? 1 : 0)});
   };
   add("one simulation", check.simulation);
   add("adjoint", check.adjoint_cost);
@@ -53,6 +78,10 @@ void print_costs(std::ostream& out, const GradientCheck& check) {
   add("differences, frozen steps", check.frozen_cost);
   add("differences, free steps", check.free_cost);
   out << '\n' << table.text();
+  out << fmt::format(
+      "one simulation: a run with the same objectives and tolerances, without derivatives; medians of {} in turn with "
+      "adjoint and tlm\n",
+      counted(check.timing_rounds, "round"));
 }
 
 Json gradient_json(const GradientCheck& check, const Eigen::MatrixXd& psi_rho) {
@@ -86,15 +115,26 @@ void add_to_result(Json& result, const GradientCheck& check) {
   Json& verdict = result["verdict"];
   verdict["passed"] = check.passed();
   for (const CheckedEntry& e : check.entries) {
-    verdict["entries"][e.objective][e.parameter] = {{"tlm_adjoint", e.tlm_adjoint},
-                                                    {"frozen_difference", e.frozen_difference},
-                                                    {"free_difference", e.free_difference},
-                                                    {"exact", to_string(e.exact)},
-                                                    {"frozen", to_string(e.frozen_verdict)}};
+    verdict["entries"][e.objective][e.parameter] = {
+        {"tlm_adjoint", e.tlm_adjoint},
+        {"frozen_difference", e.frozen_difference},
+        {"free_difference", e.free_difference},
+        {"frozen_error", e.frozen_error},
+        {"free_error", e.free_error},
+        {"exact", to_string(e.exact)},
+        {"frozen", to_string(e.frozen_verdict)},
+        {"free", e.free_verdict ? Json(to_string(*e.free_verdict)) : Json()}};
   }
-  for (const TaylorCheck& t : check.taylor) verdict["taylor"][t.objective] = {{"slope", t.slope}, {"passed", t.passed}};
+  for (const TaylorCheck& t : check.taylor)
+    verdict["taylor"][t.objective] = {{"slope", or_null(t.slope)}, {"passed", t.passed}};
   for (const IdentityCheck& i : check.identities) {
-    verdict["identities"].push_back({{"relative_defect", i.relative_defect}, {"passed", i.passed}});
+    Json weights, direction;
+    for (std::size_t k = 0; k < check.objectives.size(); ++k)
+      weights[check.objectives[k]] = i.w(static_cast<Eigen::Index>(k));
+    for (std::size_t k = 0; k < check.parameters.size(); ++k)
+      direction[check.parameters[k]] = i.d(static_cast<Eigen::Index>(k));
+    verdict["identities"].push_back(
+        {{"weights", weights}, {"direction", direction}, {"relative_defect", i.relative_defect}, {"passed", i.passed}});
   }
 }
 
@@ -107,11 +147,7 @@ int check_command(const CommandContext& context) {
   if (scene.parameters.empty()) throw std::invalid_argument("parameters: there are none to differentiate with");
   const Mechanism mechanism(scene, parameter_values(scene));
   run.start();
-  const Assembly assembly(mechanism, scene.simulation.start_time);
-  if (!assembly.result().ok) return run.failed(assembly.result().message, scene.simulation.start_time);
-  const ModelSummary model = assembly.summary();
-  run.result["model"] = to_json(model);
-  print_model(context.out, scene.name, model);
+  if (!assembled(run, mechanism)) return run.finish();
 
   double last_good_time = scene.simulation.start_time;
   GradientCheckOptions options;
@@ -122,17 +158,21 @@ int check_command(const CommandContext& context) {
   options.progress = [&](int done, int of) { run.progress.fraction("checking", static_cast<double>(done) / of); };
   const GradientCheck check = check_gradients(run.problem, options);
   run.progress.finish();
-  if (interrupted()) return run.stopped();
-  if (!check.ran) return run.failed(check.message, last_good_time);
+  if (interrupted() || !check.ran) {
+    interrupted() ? run.stopped("nothing was compared") : run.failed(check.message, last_good_time);
+    return run.finish();
+  }
 
   run.result["simulation"] = to_json(check.statistics);
   add_to_result(run.result, check);
-  print_simulation(context.out, scene.simulation, check.statistics);
+  print_simulation(context.out, scene, check.statistics);
   print_entries(context.out, check);
-  print_other_checks(context.out, check);
+  print_taylor(context.out, check);
+  print_identities(context.out, check);
   print_costs(context.out, check);
   context.out << fmt::format("\n{}\n", check.passed() ? "all gradients agree" : "THE GRADIENTS DISAGREE");
-  return check.passed() ? run.done() : run.disagreed();
+  if (!check.passed()) run.disagrees();
+  return run.finish();
 }
 
 }  // namespace mbsopt

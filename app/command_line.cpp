@@ -56,6 +56,14 @@ std::string what_is_wrong_with(const std::string& word) {
   return fmt::format("there is no command '{}'{}", word, did_you_mean(word, command_names()));
 }
 
+// "help" is --help, "help design" is design --help.
+std::vector<std::string> without_help_command(std::vector<std::string> arguments) {
+  if (arguments.empty() || arguments[0] != "help") return arguments;
+  arguments.erase(arguments.begin());
+  arguments.push_back("--help");
+  return arguments;
+}
+
 void add_options(CLI::App& sub, const std::string& name, CommandOptions& options) {
   if (name == "schema") return;
   sub.add_option("problem", options.problem_file, "problem file (*.json)")->required();
@@ -102,8 +110,9 @@ int run_guarded(const Command& command, const CommandContext& context) {
 
 }  // namespace
 
-int run_command_line(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err,
+int run_command_line(const std::vector<std::string>& given, std::ostream& out, std::ostream& err,
                      bool err_is_terminal) {
+  const std::vector<std::string> arguments = without_help_command(given);
   if (!arguments.empty() && !is_known(arguments[0])) {
     err << fmt::format("mbsopt: {}; available: {}\n", what_is_wrong_with(arguments[0]), joined(command_names()));
     return kBadInput;
@@ -111,6 +120,7 @@ int run_command_line(const std::vector<std::string>& arguments, std::ostream& ou
   CLI::App app("Optimal design and parameter identification of mechanisms.", "mbsopt");
   app.set_version_flag("--version", "mbsopt " + program_version());
   app.require_subcommand(1);
+  app.footer("mbsopt help COMMAND, or mbsopt COMMAND --help, lists a command's options.");
   app.failure_message(CLI::FailureMessage::simple);
   CommandContext context{"", arguments, {}, out, err, err_is_terminal};
   for (const Command& command : kCommands) {

@@ -7,15 +7,11 @@
 #include "app/run.hpp"
 #include "app/simulated_motion.hpp"
 #include "app/text_table.hpp"
+#include "core/expression/counted.hpp"
 #include "optim/design.hpp"
 
 namespace mbsopt {
 namespace {
-
-const char* bound_hit(bool lower, bool upper) { return lower ? "lower" : upper ? "upper" : ""; }
-
-Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
-Json or_null(const char* word) { return *word ? Json(word) : Json(); }
 
 void print_design(std::ostream& out, const DesignResult& design) {
   TextTable parameters({"parameter", "initial", "optimum", "unit", "at bound"});
@@ -35,26 +31,23 @@ void print_design(std::ostream& out, const DesignResult& design) {
     objectives.add({c.objective, significant(c.initial), significant(c.value), bound(c.lower), bound(c.upper)});
   }
   out << '\n' << parameters.text() << '\n' << objectives.text();
-  out << fmt::format("\n{} {}: {} iterations, {} evaluations, {:.3g} s\n", design.optimizer, to_string(design.status),
-                     design.iterations, design.evaluations, design.wall_seconds);
+  out << fmt::format("\n{} {}: {}, {}, {:.3g} s\n", design.optimizer, to_string(design.status),
+                     counted(design.iterations, "iteration"), counted(design.evaluations, "evaluation"),
+                     design.wall_seconds);
 }
 
 void add_to_result(Json& result, const DesignResult& design) {
   result["simulation"] = to_json(design.final_evaluation.statistics);
   result["objectives"][design.objective] = {{"value", design.objective_final}, {"initial", design.objective_initial}};
   for (const DesignConstraint& c : design.constraints) {
-    result["objectives"][c.objective] = {
-        {"value", c.value},          {"initial", c.initial},
-        {"lower", or_null(c.lower)}, {"upper", or_null(c.upper)},
-        {"violation", c.violation},  {"at_bound", or_null(bound_hit(c.at_lower, c.at_upper))}};
+    result["objectives"][c.objective] = {{"value", c.value},          {"initial", c.initial},
+                                         {"lower", or_null(c.lower)}, {"upper", or_null(c.upper)},
+                                         {"violation", c.violation},  {"at_bound", bound_json(c.at_lower, c.at_upper)}};
   }
   for (const DesignVariable& v : design.variables) {
-    result["parameters"][v.name] = {{"initial", v.initial},
-                                    {"value", v.value},
-                                    {"unit", v.unit},
-                                    {"lower", or_null(v.lower)},
-                                    {"upper", or_null(v.upper)},
-                                    {"at_bound", or_null(bound_hit(v.at_lower, v.at_upper))}};
+    result["parameters"][v.name] = {
+        {"initial", v.initial},      {"value", v.value},          {"unit", v.unit},
+        {"lower", or_null(v.lower)}, {"upper", or_null(v.upper)}, {"at_bound", bound_json(v.at_lower, v.at_upper)}};
   }
   result["optimizer"] = {{"type", design.optimizer},
                          {"status", to_string(design.status)},
@@ -92,11 +85,10 @@ DesignResult minimised(Run& run) {
   return design;
 }
 
-std::string optimized_text(const Run& run, const DesignResult& design) {
+std::vector<NewValue> new_values(const DesignResult& design) {
   std::vector<NewValue> values;
   for (const DesignVariable& v : design.variables) values.push_back({"", v.name, v.value});
-  return optimized_problem_text(run.context.options.problem_file, run.context.options.sets, run.problem, values,
-                                run.folder.path());
+  return values;
 }
 
 }  // namespace
@@ -107,24 +99,31 @@ int design_command(const CommandContext& context) {
   if (!run.problem.design) throw std::invalid_argument("design: missing; it says what to minimise and what may change");
   run.start();
   const SimulatedMotion before = simulated_motion(run, parameter_values(scene));
-  if (interrupted()) return run.stopped();
-  if (!before.simulation.ok()) return run.failed(before.simulation.message, before.simulation.last_good_time);
+  if (!before.simulation.ok()) {
+    interrupted() ? run.stopped("nothing was designed yet")
+                  : run.failed(before.simulation.message, before.simulation.last_good_time);
+    run.write("report.html", simulation_report(scene, run.result, before.trajectory));
+    return run.finish();
+  }
   run.result["model"] = to_json(before.model);
   print_model(context.out, scene.name, before.model);
 
   const DesignResult design = minimised(run);
   add_to_result(run.result, design);
   print_design(context.out, design);
-  const bool stopped = interrupted();
-  const SimulatedMotion after = stopped ? SimulatedMotion{} : simulated_motion(run, design.rho);
+  for (const std::string& warning : design.warnings) run.warn(warning);
+  const SimulatedMotion after = interrupted() ? SimulatedMotion{} : simulated_motion(run, design.rho);
+  if (design.status == SolverStatus::stopped) {
+    run.stopped("optimized.json holds the best design so far");
+  } else if (!design.ok()) {
+    run.failed(design.message, scene.simulation.end_time);
+  }
   const Trajectory history = history_of(design);
-  run.write("optimized.json", optimized_text(run, design));
+  run.write("optimized.json", optimized_problem_text(run, new_values(design)));
   run.write("history.csv", to_csv(history));
   if (!after.trajectory.rows.empty()) run.write("trajectory.csv", to_csv(after.trajectory));
-  run.write("report.html", design_report(scene, run.result, history, before.trajectory, after.trajectory));
-  if (stopped) return run.stopped();
-  if (!design.ok()) return run.failed(design.message, scene.simulation.end_time);
-  return run.done();
+  run.write("report.html", design_report(scene, design.rho, run.result, history, before.trajectory, after.trajectory));
+  return run.finish();
 }
 
 }  // namespace mbsopt

@@ -6,7 +6,6 @@
 #include "app/interrupt.hpp"
 #include "app/run.hpp"
 #include "app/text_table.hpp"
-#include "core/dynamics/assembly.hpp"
 #include "optim/evaluator.hpp"
 
 namespace mbsopt {
@@ -52,9 +51,7 @@ int gradient_command(const CommandContext& context) {
 
   const Mechanism mechanism(scene, parameter_values(scene));
   run.start();
-  const Assembly assembly(mechanism, scene.simulation.start_time);
-  if (!assembly.result().ok) return run.failed(assembly.result().message, scene.simulation.start_time);
-  run.result["model"] = to_json(assembly.summary());
+  if (!assembled(run, mechanism)) return run.finish();
 
   double last_good_time = scene.simulation.start_time;
   EvaluatorOptions options;
@@ -66,15 +63,17 @@ int gradient_command(const CommandContext& context) {
   Evaluator evaluator(scene, objectives_of(run.problem), {}, options);
   const Evaluation& evaluation = evaluator.gradients(evaluator.start());
   run.result["simulation"] = to_json(evaluation.statistics);
-  if (interrupted()) return run.stopped();
-  if (!evaluation.ok) return run.failed(evaluation.message, last_good_time);
+  if (!evaluation.ok) {
+    interrupted() ? run.stopped("no gradient was finished") : run.failed(evaluation.message, last_good_time);
+    return run.finish();
+  }
   const std::string method(to_string(evaluation.method));
   run.result["methods"][method] = {{"wall_seconds", evaluation.wall_seconds}, {"simulations", evaluation.simulations}};
-  print_simulation(context.out, scene.simulation, evaluation.statistics);
+  print_simulation(context.out, scene, evaluation.statistics);
   context.out << fmt::format("gradients by {}, {:.3g} s\n\n", evaluation.choice.empty() ? method : evaluation.choice,
                              evaluation.wall_seconds);
   add_objectives(run, evaluation);
-  return run.done();
+  return run.finish();
 }
 
 }  // namespace mbsopt

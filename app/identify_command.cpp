@@ -8,18 +8,17 @@
 #include "app/run.hpp"
 #include "app/text_table.hpp"
 #include "core/dynamics/assembly.hpp"
+#include "core/expression/counted.hpp"
 #include "optim/identification.hpp"
 
 namespace mbsopt {
 namespace {
 
-const char* bound_hit(const FittedParameter& p) { return p.at_lower ? "lower" : p.at_upper ? "upper" : ""; }
-
 void add_rows(TextTable& table, const std::vector<FittedParameter>& parameters) {
   for (const FittedParameter& p : parameters) {
     table.add({p.name, significant(p.initial), significant(p.value, 9), significant(p.std_error, 3),
                fmt::format("[{}, {}]", significant(p.ci95[0]), significant(p.ci95[1])), p.unit.empty() ? "-" : p.unit,
-               bound_hit(p)});
+               bound_hit(p.at_lower, p.at_upper)});
   }
 }
 
@@ -36,21 +35,22 @@ void print_fit(std::ostream& out, const IdentificationResult& fit) {
   }
   out << '\n' << parameters.text() << '\n' << channels.text();
   for (const std::string& words : fit.statistics.unidentifiable) out << "not determined by the data: " << words << '\n';
-  out << fmt::format("\n{}: {} iterations, {} evaluations, {} simulations, {:.3g} s; condition number {:.3g}\n",
-                     to_string(fit.status), fit.iterations, fit.evaluations, fit.simulations, fit.wall_seconds,
+  out << fmt::format("\n{}, {}; condition number {:.3g}\n", counted(fit.samples, "sample"),
+                     counted(fit.statistics.degrees_of_freedom, "degree of freedom", "degrees of freedom"),
                      fit.statistics.condition_number);
+  out << fmt::format("{}: {}, {}, {}, {:.3g} s\n", to_string(fit.status), counted(fit.iterations, "iteration"),
+                     counted(fit.evaluations, "evaluation"), counted(fit.simulations, "simulation"), fit.wall_seconds);
 }
 
 Json to_json(const FittedParameter& p) {
-  const char* bound = bound_hit(p);
   return {{"initial", p.initial},
           {"value", p.value},
           {"std_error", p.std_error},
           {"ci95", {p.ci95[0], p.ci95[1]}},
           {"unit", p.unit},
-          {"lower", p.lower ? Json(*p.lower) : Json()},
-          {"upper", p.upper ? Json(*p.upper) : Json()},
-          {"at_bound", *bound ? Json(bound) : Json()}};
+          {"lower", or_null(p.lower)},
+          {"upper", or_null(p.upper)},
+          {"at_bound", bound_json(p.at_lower, p.at_upper)}};
 }
 
 Json to_json(const ExperimentFit& e) {
@@ -94,6 +94,9 @@ void add_to_result(Json& result, const IdentificationResult& fit) {
                          {"wall_seconds", fit.wall_seconds},
                          {"objective_initial", fit.cost_initial},
                          {"objective_final", fit.cost_final}};
+  result["statistics"] = {{"samples", fit.samples},
+                          {"degrees_of_freedom", fit.statistics.degrees_of_freedom},
+                          {"residual_variance", fit.statistics.residual_variance}};
   result["identifiability"] = {{"condition_number", fit.statistics.condition_number},
                                {"unidentifiable", fit.statistics.unidentifiable}};
 }
@@ -158,14 +161,13 @@ IdentificationResult fitted(Run& run, const std::vector<CsvTable>& data) {
   return fit;
 }
 
-std::string optimized_text(const Run& run, const IdentificationResult& fit) {
+std::vector<NewValue> new_values(const IdentificationResult& fit) {
   std::vector<NewValue> values;
   for (const FittedParameter& p : fit.parameters) values.push_back({p.experiment, p.parameter, p.value});
   for (const ExperimentFit& e : fit.experiments) {
     for (const FittedParameter& p : e.refitted) values.push_back({p.experiment, p.parameter, p.value});
   }
-  return optimized_problem_text(run.context.options.problem_file, run.context.options.sets, run.problem, values,
-                                run.folder.path());
+  return values;
 }
 
 }  // namespace
@@ -182,8 +184,8 @@ int identify_command(const CommandContext& context) {
   }
   const Mechanism mechanism(scene, parameter_values(scene));
   run.start();
-  const Assembly assembly(mechanism, scene.simulation.start_time);
-  if (assembly.result().ok) {
+  // Experiments have their own overrides: where the scene itself does not assemble, they still may.
+  if (const Assembly assembly(mechanism, scene.simulation.start_time); assembly.result().ok) {
     run.result["model"] = to_json(assembly.summary());
     print_model(context.out, scene.name, assembly.summary());
   }
@@ -191,13 +193,16 @@ int identify_command(const CommandContext& context) {
   add_to_result(run.result, fit);
   print_fit(context.out, fit);
   const Trajectory history = history_of(fit);
-  run.write("optimized.json", optimized_text(run, fit));
+  if (fit.status == SolverStatus::stopped) {
+    run.stopped("optimized.json holds the best fit so far");
+  } else if (!fit.ok()) {
+    run.failed(fit.message, scene.simulation.start_time);
+  }
+  run.write("optimized.json", optimized_problem_text(run, new_values(fit)));
   run.write("history.csv", to_csv(history));
   run.write("residuals.csv", residuals_csv(fit));
   run.write("report.html", identification_report(scene, run.result, history, fit_plots(run.problem, fit)));
-  if (interrupted()) return run.stopped();
-  if (!fit.ok()) return run.failed(fit.message, scene.simulation.start_time);
-  return run.done();
+  return run.finish();
 }
 
 }  // namespace mbsopt

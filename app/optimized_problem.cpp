@@ -7,6 +7,7 @@
 
 #include "app/json/edit_text.hpp"
 #include "app/json/source_text.hpp"
+#include "app/run.hpp"
 #include "core/scene/scene_path.hpp"
 
 namespace mbsopt {
@@ -26,6 +27,11 @@ std::string with_experiment_values(std::string text, const Problem& problem, con
 }
 
 }  // namespace
+
+std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& values) {
+  const CommandOptions& options = run.context.options;
+  return optimized_problem_text(options.problem_file, options.sets, run.problem, values, run.folder.path());
+}
 
 std::string optimized_problem_text(const std::string& problem_file, const std::vector<std::string>& sets,
                                    const Problem& problem, const std::vector<NewValue>& values,

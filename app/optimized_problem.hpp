@@ -16,6 +16,10 @@ struct NewValue {
   double value = 0;  // SI
 };
 
+class Run;
+
+std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& values);
+
 // problem: as read from that file with those --set; folder: where the text will lie.
 std::string optimized_problem_text(const std::string& problem_file, const std::vector<std::string>& sets,
                                    const Problem& problem, const std::vector<NewValue>& values,

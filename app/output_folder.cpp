@@ -24,21 +24,27 @@ std::string folder_name(std::string name) {
   return name;
 }
 
-// The problem a result.json belongs to; empty where it is not one of ours.
-std::string stored_owner(const fs::path& file) {
+// The problem and the command that a result.json belongs to; empty where it is not one of ours.
+struct StoredRun {
+  std::string owner, command;
+};
+
+std::string text_at(const nlohmann::json& object, const char* key) {
+  const auto found = object.is_object() ? object.find(key) : object.end();
+  return found != object.end() && found->is_string() ? found->get<std::string>() : std::string{};
+}
+
+StoredRun stored_run(const fs::path& file) {
   std::ifstream in(file);
   const nlohmann::json result = nlohmann::json::parse(in, nullptr, false);
-  if (!result.is_object() || result.value("program", nlohmann::json()) != "mbsopt") return {};
-  const auto provenance = result.find("provenance");
-  if (provenance == result.end() || !provenance->is_object()) return {};
-  const auto input = provenance->find("input");
-  return input != provenance->end() && input->is_string() ? input->get<std::string>() : std::string{};
+  if (text_at(result, "program") != "mbsopt" || !result.contains("provenance")) return {};
+  return {text_at(result.at("provenance"), "input"), text_at(result, "command")};
 }
 
 }  // namespace
 
 OutputFolder::OutputFolder(const std::string& requested, const std::string& problem_name,
-                           const std::string& problem_file)
+                           const std::string& problem_file, const std::string& command)
     : path_(requested.empty() ? fs::path("out") / folder_name(problem_name) : fs::path(requested)) {
   std::error_code error;
   fs::create_directories(path_, error);
@@ -47,13 +53,21 @@ OutputFolder::OutputFolder(const std::string& requested, const std::string& prob
                                   error ? error.message() : "a file has this name"));
   }
   owner_ = fs::relative(fs::canonical(problem_file), fs::canonical(path_)).generic_string();
-  refuse_if_foreign();
+  refuse_if_taken(command);
 }
 
-void OutputFolder::refuse_if_foreign() const {
+void OutputFolder::refuse_if_taken(const std::string& command) const {
   const fs::path marker = path_ / "result.json";
-  const std::string owner = stored_owner(marker);
-  if (owner == owner_) return;
+  const auto [owner, stored_command] = stored_run(marker);
+  if (owner == owner_) {
+    const bool costly = stored_command == "design" || stored_command == "identify";
+    if (!costly || stored_command == command || !fs::exists(path_ / "optimized.json")) return;
+    throw OutputError(fmt::format(
+        "{0}: holds the outcome of '{1}', which '{2}' would overwrite; name another folder with --out, such as --out "
+        "{3}, or remove this one",
+        path_.string(), stored_command, command,
+        (path_.parent_path() / (path_.filename().string() + "_" + command)).string()));
+  }
   if (!owner.empty()) {
     throw OutputError(fmt::format(
         "{}: holds the results of another problem ({}); they are never overwritten: name another folder with --out, or "
@@ -70,11 +84,6 @@ void OutputFolder::refuse_if_foreign() const {
 
 void OutputFolder::write(const std::string& file, std::string_view content) const {
   write_file_atomically(path_ / file, content);
-}
-
-void OutputFolder::remove(const std::string& file) const {
-  std::error_code ignored;
-  fs::remove(path_ / file, ignored);
 }
 
 }  // namespace mbsopt

@@ -5,10 +5,10 @@
 namespace mbsopt {
 namespace {
 
-constexpr std::array kOrder{"program",   "version",         "command",    "problem",     "status",
-                            "message",   "last_good_time",  "model",      "simulation",  "objectives",
-                            "methods",   "verdict",         "parameters", "experiments", "correlation",
-                            "optimizer", "identifiability", "provenance", "warnings"};
+constexpr std::array kOrder{"program",    "version",        "command",         "problem",     "status",
+                            "message",    "last_good_time", "model",           "simulation",  "objectives",
+                            "methods",    "verdict",        "parameters",      "experiments", "correlation",
+                            "statistics", "optimizer",      "identifiability", "provenance",  "warnings"};
 
 }  // namespace
 
@@ -31,6 +31,12 @@ Json to_json(const SimulationStatistics& statistics) {
           {"max_velocity_violation", statistics.max_velocity_violation},
           {"energy_drift", statistics.energy_drift}};
 }
+
+Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+const char* bound_hit(bool lower, bool upper) { return lower ? "lower" : upper ? "upper" : ""; }
+
+Json bound_json(bool lower, bool upper) { return lower || upper ? Json(bound_hit(lower, upper)) : Json(); }
 
 std::string result_json_text(const Json& parts) {
   Json ordered = Json::object();

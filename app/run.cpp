@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include "app/atomic_file.hpp"
+#include "app/energy_balance.hpp"
 #include "app/exit_code.hpp"
 #include "app/json/read_problem.hpp"
 #include "app/provenance.hpp"
+#include "core/dynamics/assembly.hpp"
+#include "core/expression/counted.hpp"
 
 namespace mbsopt {
 namespace {
@@ -17,14 +20,18 @@ std::vector<std::string> data_files(const Problem& problem) {
   return files;
 }
 
-const char* plural(long count) { return count == 1 ? "" : "s"; }
+int exit_code_of(const std::string& status) {
+  if (status == "failed") return kNumericalFailure;
+  if (status == "disagrees") return kCheckFailed;
+  return status == "interrupted" ? kInterrupted : kDone;
+}
 
 }  // namespace
 
 Run::Run(const CommandContext& given)
     : context(given),
       problem(read_problem(given.options.problem_file, given.options.sets, &reader_warnings_)),
-      folder(given.options.out, problem.scene.name, given.options.problem_file),
+      folder(given.options.out, problem.scene.name, given.options.problem_file, given.command),
       progress(given.err, given.err_is_terminal, given.options.quiet) {
   result["program"] = "mbsopt";
   result["version"] = program_version();
@@ -39,7 +46,8 @@ Run::Run(const CommandContext& given)
 Run::~Run() {
   if (!running_) return;
   try {
-    finish("failed", kNumericalFailure);
+    result["status"] = "failed";
+    finish();
   } catch (const OutputError&) {
     return;  // "running" stays; the exception under way says more than this one
   }
@@ -62,60 +70,66 @@ void Run::warn(const std::string& warning) {
   result["warnings"].push_back(warning);
 }
 
-int Run::done() { return finish("ok", kDone); }
-
-int Run::failed(const std::string& message, double last_good_time) {
+void Run::failed(const std::string& message, double last_good_time) {
+  result["status"] = "failed";
   result["message"] = message;
   result["last_good_time"] = last_good_time;
-  progress.finish();
-  context.err << fmt::format("{} failed: {}\n", context.command, message);
-  return finish("failed", kNumericalFailure);
 }
 
-int Run::disagreed() { return finish("disagrees", kCheckFailed); }
+void Run::disagrees() { result["status"] = "disagrees"; }
 
-int Run::stopped() {
-  progress.finish();
-  context.err << "interrupted; what was found so far is kept\n";
-  return finish("interrupted", kInterrupted);
+void Run::stopped(const std::string& kept) {
+  result["status"] = "interrupted";
+  result["message"] = "interrupted; " + kept;
 }
 
-int Run::finish(const char* status, int exit_code) {
+int Run::finish() {
   running_ = false;
   progress.finish();
-  result["status"] = status;
+  if (result["status"] == "running") result["status"] = "ok";
+  const std::string status = result["status"], message = result.value("message", "");
+  if (status == "interrupted") context.err << message << '\n';
+  if (status == "failed" && !message.empty()) context.err << fmt::format("{} failed: {}\n", context.command, message);
   write("result.json", result_json_text(result));
   context.out << fmt::format("\n{}: {}\n", (folder.path() / "").string(), fmt::join(written_, " "));
-  return exit_code;
+  return exit_code_of(status);
 }
 
-Eigen::VectorXd parameter_values(const Scene& scene) {
-  Eigen::VectorXd rho(static_cast<Eigen::Index>(scene.parameters.size()));
-  for (Eigen::Index k = 0; k < rho.size(); ++k) rho(k) = scene.parameters[static_cast<std::size_t>(k)].value;
-  return rho;
+bool assembled(Run& run, const Mechanism& mechanism) {
+  const Scene& scene = run.problem.scene;
+  const Assembly assembly(mechanism, scene.simulation.start_time);
+  if (!assembly.result().ok) {
+    run.failed(assembly.result().message, scene.simulation.start_time);
+    return false;
+  }
+  const ModelSummary model = assembly.summary();
+  run.result["model"] = to_json(model);
+  print_model(run.context.out, scene.name, model);
+  return true;
 }
 
 void print_model(std::ostream& out, const std::string& name, const ModelSummary& summary) {
-  out << fmt::format("{}: {} bod{}, {} equation{} of rank {}, {} degree{} of freedom\n", name, summary.bodies,
-                     summary.bodies == 1 ? "y" : "ies", summary.equations, plural(summary.equations), summary.rank,
-                     summary.degrees_of_freedom, plural(summary.degrees_of_freedom));
+  out << fmt::format("{}: {}, {} of rank {}, {}\n", name, counted(summary.bodies, "body", "bodies"),
+                     counted(summary.equations, "equation"), summary.rank,
+                     counted(summary.degrees_of_freedom, "degree of freedom", "degrees of freedom"));
   if (!summary.redundant.empty()) out << fmt::format("redundant: {}\n", fmt::join(summary.redundant, ", "));
 }
 
-void print_simulation(std::ostream& out, const SimulationSettings& settings, const SimulationStatistics& statistics) {
-  out << fmt::format("{:g} s to {:g} s with {}: {} step{}, {} rejected, {} right-hand sides, {:.3g} s\n",
-                     settings.start_time, settings.end_time, settings.integrator.type, statistics.steps,
-                     plural(statistics.steps), statistics.rejected, statistics.rhs_evaluations,
+void print_simulation(std::ostream& out, const Scene& scene, const SimulationStatistics& statistics) {
+  const SimulationSettings& settings = scene.simulation;
+  out << fmt::format("{:g} s to {:g} s with {}: {}, {} rejected, {}, {:.3g} s\n", settings.start_time,
+                     settings.end_time, settings.integrator.type, counted(statistics.steps, "step"),
+                     statistics.rejected, counted(statistics.rhs_evaluations, "right-hand side"),
                      statistics.wall_seconds);
   out << fmt::format(
       "largest violation of the constraints {:.1e} (positions), {:.1e} (velocities); largest change of energy {:.1e} "
-      "J\n",
-      statistics.max_position_violation, statistics.max_velocity_violation, statistics.energy_drift);
+      "J{}\n",
+      statistics.max_position_violation, statistics.max_velocity_violation, statistics.energy_drift,
+      conserves_energy(scene) ? "" : fmt::format(" ({})", kWorkIsDone));
   if (statistics.max_acceleration_residual > 1e-6) {
     out << fmt::format(
         "the constraints' accelerations were met to {:.1e} only: a singular position, or masses that differ too much "
-        "for "
-        "simulation.formulation (try a larger alpha or more iterations)\n",
+        "for simulation.formulation (try a larger alpha or more iterations)\n",
         statistics.max_acceleration_residual);
   }
 }

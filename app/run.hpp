@@ -4,8 +4,9 @@
 //   Run run(context);                               // throws on bad input
 //   run.start();                                    // from here on there is a result.json
 //   run.result["simulation"] = to_json(statistics);
-//   run.write("trajectory.csv", text);
-//   return run.done();                              // or run.failed(message, last_good_time), run.stopped()
+//   if (!simulation.ok()) run.failed(simulation.message, simulation.last_good_time);   // how it ended: in the report,
+//   too run.write("report.html", report(run.result)); return run.finish();                            // says how it
+//   ended, and where the results are
 #pragma once
 
 #include <Eigen/Core>
@@ -17,6 +18,7 @@
 #include "app/output_folder.hpp"
 #include "app/progress.hpp"
 #include "app/result_json.hpp"
+#include "optim/parameter_values.hpp"
 #include "optim/problem.hpp"
 
 namespace mbsopt {
@@ -40,21 +42,24 @@ class Run {
   void write(const std::string& file, std::string_view content);  // into the folder; named in the closing line
   void warn(const std::string& warning);
 
-  int done();
-  int failed(const std::string& message, double last_good_time);  // exit 1
-  int disagreed();                                                // exit 3
-  int stopped();                                                  // exit 130
+  // How it ended, unless all went well.
+  void failed(const std::string& message, double last_good_time);  // exit 1
+  void disagrees();                                                // exit 3
+  void stopped(const std::string& kept);                           // exit 130; kept: a sentence, what the folder holds
+
+  int finish();  // the exit code
 
  private:
-  int finish(const char* status, int exit_code);
   std::vector<std::string> written_;
   bool running_ = false;
 };
 
-Eigen::VectorXd parameter_values(const Scene& scene);  // as the file gives them, in the scene's order
+// Assembles at the start time; the model into the result and onto standard output. False where that failed, which then
+// is how the run ended.
+bool assembled(Run& run, const Mechanism& mechanism);
 
 // Prints the counts of bodies, equations, degrees of freedom; redundant equations by joint.
 void print_model(std::ostream& out, const std::string& name, const ModelSummary& summary);
-void print_simulation(std::ostream& out, const SimulationSettings& settings, const SimulationStatistics& statistics);
+void print_simulation(std::ostream& out, const Scene& scene, const SimulationStatistics& statistics);
 
 }  // namespace mbsopt

@@ -1,5 +1,6 @@
+#include <fmt/format.h>
+
 #include "app/command.hpp"
-#include "app/interrupt.hpp"
 #include "app/report/run_report.hpp"
 #include "app/run.hpp"
 #include "app/simulated_motion.hpp"
@@ -31,14 +32,18 @@ int simulate_command(const CommandContext& context) {
     run.result["model"] = to_json(motion.model);
     run.result["simulation"] = to_json(simulation.statistics);
     print_model(context.out, scene.name, motion.model);
-    print_simulation(context.out, scene.simulation, simulation.statistics);
+    print_simulation(context.out, scene, simulation.statistics);
     run.write("trajectory.csv", to_csv(motion.trajectory));
   }
-  if (simulation.ok()) add_objectives(run, motion.psi);
+  if (simulation.ok()) {
+    add_objectives(run, motion.psi);
+  } else if (simulation.status == SimulationStatus::stopped) {
+    run.stopped(fmt::format("trajectory.csv holds the motion up to {:.6g} s", simulation.last_good_time));
+  } else {
+    run.failed(simulation.message, simulation.last_good_time);
+  }
   run.write("report.html", simulation_report(scene, run.result, motion.trajectory));
-  if (interrupted()) return run.stopped();
-  if (!simulation.ok()) return run.failed(simulation.message, simulation.last_good_time);
-  return run.done();
+  return run.finish();
 }
 
 }  // namespace mbsopt

@@ -8,6 +8,8 @@
 #include <exception>
 #include <vector>
 
+#include "core/expression/counted.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -130,29 +132,27 @@ void solve(const LeastSquaresProblem& problem, Residuals& residuals, const std::
 }
 
 void set_outcome(const ceres::Solver::Summary& summary, const CeresOptions& options, LeastSquaresResult& result) {
-  const std::string failures = result.failed_evaluations > 0
-                                   ? fmt::format("; {} of {} evaluations failed, first: {}", result.failed_evaluations,
-                                                 result.evaluations, result.first_error)
-                                   : "";
+  const std::string failures = result.failures();
   switch (summary.termination_type) {
     case ceres::CONVERGENCE:
     case ceres::USER_SUCCESS:
-      result.status = LeastSquaresStatus::converged;
+      result.status = SolverStatus::converged;
       result.message =
           fmt::format("converged: cost and parameters change by less than {:g} of themselves", options.tolerance);
       return;
     case ceres::NO_CONVERGENCE:
-      result.status = LeastSquaresStatus::iteration_limit;
-      result.message = fmt::format("stopped at the limit of {} iterations{}", options.max_iterations, failures);
+      result.status = SolverStatus::iteration_limit;
+      result.message =
+          fmt::format("stopped at the limit of {}{}", counted(options.max_iterations, "iteration"), failures);
       return;
     case ceres::USER_FAILURE:
-      result.status = LeastSquaresStatus::stopped;
+      result.status = SolverStatus::stopped;
       result.message = "stopped on request";
       return;
     case ceres::FAILURE:
       break;
   }
-  result.status = LeastSquaresStatus::failed;
+  result.status = SolverStatus::failed;
   result.message = fmt::format("failed: {}{}", summary.message, failures);
 }
 

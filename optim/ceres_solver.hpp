@@ -4,7 +4,7 @@
 //   CeresOptions options;
 //   options.max_iterations = 50;
 //   LeastSquaresResult result = solve_with_ceres(problem, x_start, options);
-//   if (result.status != LeastSquaresStatus::converged) std::cerr << result.message;
+//   if (result.status != SolverStatus::converged) std::cerr << result.message;
 #pragma once
 
 #include <functional>

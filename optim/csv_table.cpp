@@ -10,6 +10,7 @@
 #include <limits>
 #include <unordered_set>
 
+#include "core/expression/counted.hpp"
 #include "core/expression/did_you_mean.hpp"
 
 namespace mbsopt {
@@ -130,7 +131,7 @@ class Reader {
   void read_row() {
     split();
     if (cells_.size() != table_.header.size())
-      fail(1, fmt::format("the row has {} cells, the header {}", cells_.size(), table_.header.size()));
+      fail(1, fmt::format("the row has {}, the header {}", counted(cells_.size(), "cell"), table_.header.size()));
     for (std::size_t k = 0; k < cells_.size(); ++k) table_.columns[k].push_back(number(cells_[k], table_.header[k]));
     table_.lines.push_back(line_);
   }

@@ -3,12 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
+#include "core/expression/did_you_mean.hpp"
 #include "optim/ipopt_solver.hpp"
+#include "optim/stopwatch.hpp"
 #include "optim/variable_scaling.hpp"
 
 namespace mbsopt {
@@ -137,6 +138,21 @@ void describe_start(const Problem& problem, const Evaluator& evaluator, const Ev
   }
 }
 
+// Where a derivative is exactly zero in all that takes part, a variable goes nowhere, by symmetry or because its force
+// does not act (yet).
+std::vector<std::string> idle_variables(const Evaluation& start, const DesignSpec& spec, const Evaluator& evaluator) {
+  std::vector<std::string> warnings;
+  for (std::size_t k = 0; k < evaluator.variables().size(); ++k) {
+    if (start.psi_rho.col(static_cast<Eigen::Index>(k)).any()) continue;
+    warnings.push_back(fmt::format(
+        "design.variables: '{}' has a derivative of exactly 0 at the start in all that the design uses ({}); it stays "
+        "as it is unless others change that",
+        evaluator.scene().parameters[static_cast<std::size_t>(evaluator.variables()[k])].name,
+        joined(objective_names(spec))));
+  }
+  return warnings;
+}
+
 void describe_end(const Evaluator& evaluator, const DesignProgram& program, const NlpPoint& end, DesignResult& result) {
   for (std::size_t k = 0; k < result.variables.size(); ++k) {
     DesignVariable& v = result.variables[k];
@@ -157,26 +173,8 @@ void describe_end(const Evaluator& evaluator, const DesignProgram& program, cons
 
 }  // namespace
 
-std::string_view to_string(NlpStatus status) {
-  switch (status) {
-    case NlpStatus::converged:
-      return "converged";
-    case NlpStatus::no_progress:
-      return "no_progress";
-    case NlpStatus::iteration_limit:
-      return "iteration_limit";
-    case NlpStatus::infeasible:
-      return "infeasible";
-    case NlpStatus::stopped:
-      return "stopped";
-    case NlpStatus::failed:
-      break;
-  }
-  return "failed";
-}
-
 DesignResult run_design(const Problem& problem, const DesignOptions& options) {
-  const auto clock_start = std::chrono::steady_clock::now();
+  const Stopwatch stopwatch;
   const DesignSpec& spec = checked(problem);
   EvaluatorOptions evaluator_options;
   evaluator_options.method = options.method;
@@ -199,6 +197,7 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
   const Evaluation start = evaluator.gradients(program.rho_at(x_start));
   result.gradient_choice = start.choice.empty() ? std::string(to_string(start.method)) : start.choice;
   describe_start(problem, evaluator, start, result);
+  if (start.ok) result.warnings = idle_variables(start, spec, evaluator);
   if (start.ok) program.scale_by(x_start);
 
   IpoptOptions solver;
@@ -209,7 +208,7 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
     return !options.progress || options.progress(result.history.back());
   };
   const NlpResult solution = solve_with_ipopt(program, x_start, solver);
-  result.status = abandoned ? NlpStatus::stopped : solution.status;
+  result.status = abandoned ? SolverStatus::stopped : solution.status;
   result.message = abandoned ? "stopped on request" : solution.message;
   result.iterations = solution.iterations;
   result.evaluations = solution.evaluations, result.failed_evaluations = solution.failed_evaluations;
@@ -219,7 +218,7 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
     if (!abandoned) result.final_evaluation = evaluator.gradients(result.rho);
   }
   result.simulations = evaluator.simulations();
-  result.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock_start).count();
+  result.wall_seconds = stopwatch.seconds();
   return result;
 }
 

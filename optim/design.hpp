@@ -45,7 +45,7 @@ struct DesignRow {
 };
 
 struct DesignResult {
-  NlpStatus status = NlpStatus::failed;
+  SolverStatus status = SolverStatus::failed;
   std::string message;  // in words, always
   std::string objective;
   double objective_initial = 0, objective_final = 0;
@@ -60,7 +60,8 @@ struct DesignResult {
   long evaluations = 0, failed_evaluations = 0;  // points at which objectives and gradients were computed
   long simulations = 0;
   double wall_seconds = 0;
-  bool ok() const { return status == NlpStatus::converged || status == NlpStatus::no_progress; }
+  std::vector<std::string> warnings;  // sentences
+  bool ok() const { return status == SolverStatus::converged || status == SolverStatus::no_progress; }
 };
 
 struct DesignOptions {
@@ -73,8 +74,5 @@ struct DesignOptions {
 // problem.design must be there. Throws std::invalid_argument where it makes no sense (unknown names, no bounds to
 // hold).
 DesignResult run_design(const Problem& problem, const DesignOptions& options = {});
-
-// "converged", "no_progress", "iteration_limit", "infeasible", "stopped", "failed"
-std::string_view to_string(NlpStatus status);
 
 }  // namespace mbsopt

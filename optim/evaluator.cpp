@@ -3,23 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
-#include "core/expression/did_you_mean.hpp"
+#include "core/expression/counted.hpp"
 #include "optim/difference_ladder.hpp"
+#include "optim/parameter_values.hpp"
+#include "optim/stopwatch.hpp"
 
 namespace mbsopt {
-namespace {
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-}  // namespace
-
 std::string_view to_string(GradientMethod method) {
   switch (method) {
     case GradientMethod::tlm:
@@ -39,30 +31,6 @@ GradientCost gradient_cost(std::size_t variables, std::size_t objectives) {
   return {1.5 + 2.2 * blocks, 1.7 + 0.9 * static_cast<double>(objectives)};
 }
 
-std::vector<int> parameter_indices(const Scene& scene, const std::vector<std::string>& names) {
-  std::vector<std::string> known;
-  for (const Parameter& p : scene.parameters) known.push_back(p.name);
-  std::vector<int> indices;
-  for (const std::string& name : names.empty() ? known : names) {
-    const auto found = std::find(known.begin(), known.end(), name);
-    if (found == known.end())
-      throw std::invalid_argument(
-          fmt::format("there is no parameter '{}'{}; known: {}", name, did_you_mean(name, known), joined(known)));
-    const int index = static_cast<int>(found - known.begin());
-    if (std::find(indices.begin(), indices.end(), index) != indices.end())
-      throw std::invalid_argument(fmt::format("the parameter '{}' is listed twice", name));
-    indices.push_back(index);
-  }
-  return indices;
-}
-
-double typical_size(const Parameter& parameter, double value) {
-  if (value != 0) return std::abs(value);
-  if (parameter.lower && parameter.upper && *parameter.upper > *parameter.lower)
-    return *parameter.upper - *parameter.lower;
-  return 1;
-}
-
 Evaluator::Evaluator(Scene scene, std::vector<Objective> objectives, const std::vector<std::string>& variables,
                      EvaluatorOptions options)
     : scene_(std::move(scene)),
@@ -75,14 +43,10 @@ Evaluator::Evaluator(Scene scene, std::vector<Objective> objectives, const std::
     if (objectives_[i].needs_simulation()) simulated_.push_back(i);
 }
 
-Eigen::VectorXd Evaluator::start() const {
-  Eigen::VectorXd rho(static_cast<Eigen::Index>(scene_.parameters.size()));
-  for (Eigen::Index k = 0; k < rho.size(); ++k) rho(k) = scene_.parameters[static_cast<std::size_t>(k)].value;
-  return rho;
-}
+Eigen::VectorXd Evaluator::start() const { return parameter_values(scene_); }
 
 Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSequence* frozen) const {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch stopwatch;
   Evaluation e;
   e.rho = rho;
   e.psi.setZero(static_cast<Eigen::Index>(objectives_.size()));
@@ -127,7 +91,7 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
                             objectives_[static_cast<std::size_t>(i)].name());
     break;
   }
-  e.wall_seconds = seconds_since(start);
+  e.wall_seconds = stopwatch.seconds();
   return e;
 }
 
@@ -147,7 +111,7 @@ void Evaluator::add_parameters_only(Evaluation& e, bool gradients) const {
 }
 
 void Evaluator::add_differences(Evaluation& e) const {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch stopwatch;
   const StepSequence steps = e.steps;
   Eigen::MatrixXd psi_rho(e.psi.size(), static_cast<Eigen::Index>(variables_.size()));
   for (Eigen::Index k = 0; k < psi_rho.cols(); ++k) {
@@ -172,7 +136,7 @@ void Evaluator::add_differences(Evaluation& e) const {
     psi_rho.col(k) = d.derivative;
   }
   e.psi_rho = std::move(psi_rho);
-  e.wall_seconds += seconds_since(start);
+  e.wall_seconds += stopwatch.seconds();
 }
 
 const Evaluation& Evaluator::values(const Eigen::VectorXd& rho) {
@@ -197,8 +161,9 @@ const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
   } else if (method == GradientMethod::automatic) {
     const GradientCost cost = gradient_cost(variables_.size(), simulated_.size());
     method = cost.tlm <= cost.adjoint ? GradientMethod::tlm : GradientMethod::adjoint;
-    choice = fmt::format("{}: {} variables, {} objectives; estimated cost in simulations: tlm {:.1f}, adjoint {:.1f}",
-                         to_string(method), variables_.size(), simulated_.size(), cost.tlm, cost.adjoint);
+    choice = fmt::format("{}: {}, {}; estimated cost in simulations: tlm {:.1f}, adjoint {:.1f}", to_string(method),
+                         counted(variables_.size(), "variable"), counted(simulated_.size(), "objective"), cost.tlm,
+                         cost.adjoint);
   }
   if (method == GradientMethod::differences) {
     last_ = run(rho, Sweep::none, nullptr);

@@ -16,6 +16,7 @@
 
 #include "core/integrate/simulation.hpp"
 #include "optim/objective.hpp"
+#include "optim/parameter_values.hpp"
 
 namespace mbsopt {
 
@@ -92,12 +93,5 @@ class Evaluator {
   Evaluation last_;
   long simulations_ = 0;
 };
-
-// Indices of parameters by name; all where names is empty. Throws std::invalid_argument: what is unknown, what there
-// is.
-std::vector<int> parameter_indices(const Scene& scene, const std::vector<std::string>& names);
-
-// Size of a parameter for differences and Taylor steps: |value|, or the range of its bounds, or 1.
-double typical_size(const Parameter& parameter, double value);
 
 }  // namespace mbsopt

@@ -10,8 +10,8 @@
 
 #include "core/expression/did_you_mean.hpp"
 #include "core/mechanism/mechanism.hpp"
-#include "optim/evaluator.hpp"
 #include "optim/expression_cost.hpp"
+#include "optim/parameter_values.hpp"
 
 namespace mbsopt {
 namespace {

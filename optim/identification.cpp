@@ -3,14 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <stdexcept>
 
+#include "core/expression/counted.hpp"
 #include "optim/ceres_solver.hpp"
-#include "optim/evaluator.hpp"
 #include "optim/experiment.hpp"
+#include "optim/parameter_values.hpp"
+#include "optim/stopwatch.hpp"
 #include "optim/variable_scaling.hpp"
 
 namespace mbsopt {
@@ -53,13 +54,13 @@ class Identification {
   }
 
   IdentificationResult run() {
-    const auto clock_start = std::chrono::steady_clock::now();
+    const Stopwatch stopwatch;
     fit();
     for (std::size_t e = 0; e < spec_.experiments.size(); ++e) {
-      if (spec_.experiments[e].validate && result_.status != FitStatus::failed && !abandoned_) validate(e);
+      if (spec_.experiments[e].validate && result_.status != SolverStatus::failed && !abandoned_) validate(e);
     }
     order_residuals();
-    result_.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock_start).count();
+    result_.wall_seconds = stopwatch.seconds();
     return std::move(result_);
   }
 
@@ -69,8 +70,9 @@ class Identification {
     const IdentificationSpec& spec = *problem.identification;
     if (spec.experiments.empty()) throw std::invalid_argument("identification.experiments: is empty");
     if (data.size() != spec.experiments.size())
-      throw std::invalid_argument(fmt::format("identification.experiments: {} experiments, but {} tables of data",
-                                              spec.experiments.size(), data.size()));
+      throw std::invalid_argument(fmt::format("identification.experiments: {}, but {} of data",
+                                              counted(spec.experiments.size(), "experiment"),
+                                              counted(data.size(), "table")));
     for (std::size_t e = 0; e < spec.experiments.size(); ++e)
       for (std::size_t d = 0; d < e; ++d)
         if (spec.experiments[d].name == spec.experiments[e].name)
@@ -79,12 +81,6 @@ class Identification {
     if (std::all_of(spec.experiments.begin(), spec.experiments.end(), [](const auto& e) { return e.validate; }))
       throw std::invalid_argument("identification.experiments: all of them validate, none is fitted");
     return spec;
-  }
-
-  Eigen::VectorXd scene_values() const {
-    Eigen::VectorXd rho(static_cast<Eigen::Index>(scene_.parameters.size()));
-    for (Eigen::Index k = 0; k < rho.size(); ++k) rho(k) = scene_.parameters[static_cast<std::size_t>(k)].value;
-    return rho;
   }
 
   std::vector<UnknownParameter> free_in(std::size_t e) const {
@@ -240,20 +236,20 @@ class Identification {
     std::vector<Fitted> experiments;
     for (std::size_t e = 0; e < spec_.experiments.size(); ++e) {
       if (spec_.experiments[e].validate) continue;
-      experiments.push_back({e, Experiment(scene_, spec_.experiments[e], place_of(e), data_[e], scene_values(),
-                                           unknowns_in(e, unknowns), options_.user_forces)});
+      experiments.push_back({e, Experiment(scene_, spec_.experiments[e], place_of(e), data_[e],
+                                           parameter_values(scene_), unknowns_in(e, unknowns), options_.user_forces)});
     }
     Stack problem(experiments, scaling, go_on_, result_.simulations);
     if (problem.size < problem.variables())
-      throw std::invalid_argument(
-          fmt::format("identification: {} samples cannot determine {} parameters", problem.size, problem.variables()));
+      throw std::invalid_argument(fmt::format("identification: {} cannot determine {}", counted(problem.size, "sample"),
+                                              counted(problem.variables(), "parameter")));
     CeresOptions solver = solver_options();
     solver.progress = [&](const LeastSquaresProgress& p) {
       result_.history.push_back({p.iteration, p.cost, p.gradient_norm, p.step_norm, scaling.to_rho(p.x)});
       return !options_.progress || options_.progress(result_.history.back());
     };
     const LeastSquaresResult solution = solve_with_ceres(problem, scaling.to_x(start_of(unknowns)), solver);
-    result_.status = abandoned_ ? FitStatus::stopped : solution.status;
+    result_.status = abandoned_ ? SolverStatus::stopped : solution.status;
     result_.message = abandoned_ ? "stopped on request" : solution.message;
     result_.cost_initial = solution.cost_initial, result_.cost_final = solution.cost_final;
     result_.samples = static_cast<std::size_t>(problem.size);
@@ -263,7 +259,7 @@ class Identification {
     const Eigen::VectorXd values = scaling.to_rho(solution.x);
     if (solution.point.z.size() > 0) result_.statistics = statistics_at(solution, scaling, unknowns);
     result_.parameters = described(unknowns, values, result_.statistics);
-    shared_ = scene_values();
+    shared_ = parameter_values(scene_);
     for (std::size_t i = 0; i < unknowns.size(); ++i)
       if (unknowns[i].shared) shared_(unknowns[i].parameter) = values(static_cast<Eigen::Index>(i));
     Eigen::Index row = 0;
@@ -351,20 +347,6 @@ class Identification {
 };
 
 }  // namespace
-
-std::string_view to_string(FitStatus status) {
-  switch (status) {
-    case FitStatus::converged:
-      return "converged";
-    case FitStatus::iteration_limit:
-      return "iteration_limit";
-    case FitStatus::stopped:
-      return "stopped";
-    case FitStatus::failed:
-      break;
-  }
-  return "failed";
-}
 
 IdentificationResult run_identification(const Problem& problem, const std::vector<CsvTable>& data,
                                         const IdentificationOptions& options) {

@@ -18,7 +18,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "optim/csv_table.hpp"
@@ -27,9 +26,6 @@
 #include "optim/statistics.hpp"
 
 namespace mbsopt {
-
-using FitStatus = LeastSquaresStatus;
-std::string_view to_string(FitStatus status);  // "converged", "iteration_limit", "stopped", "failed"
 
 struct UserForce;  // core/force/user_force.hpp
 
@@ -80,7 +76,7 @@ struct FitRow {
 };
 
 struct IdentificationResult {
-  FitStatus status = FitStatus::failed;
+  SolverStatus status = SolverStatus::failed;
   std::string message;  // in words, always
   std::vector<FittedParameter> parameters;
   FitStatistics statistics;  // in the order of parameters
@@ -93,7 +89,7 @@ struct IdentificationResult {
   long evaluations = 0, failed_evaluations = 0;  // points at which all experiments were simulated, with derivatives
   long simulations = 0;
   double wall_seconds = 0;
-  bool ok() const { return status == FitStatus::converged; }
+  bool ok() const { return status == SolverStatus::converged; }
 };
 
 struct IdentificationOptions {

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <exception>
 
+#include "core/expression/counted.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -185,22 +187,19 @@ class Adapter : public Ipopt::TNLP {
 };
 
 struct Outcome {
-  NlpStatus status;
+  SolverStatus status;
   std::string words;
 };
 
 Outcome in_words(Ipopt::ApplicationReturnStatus status, const NlpResult& result, const IpoptOptions& options) {
   using namespace Ipopt;  // NOLINT: its enumerators
-  const std::string failures = result.failed_evaluations > 0
-                                   ? fmt::format("; {} of {} evaluations failed, first: {}", result.failed_evaluations,
-                                                 result.evaluations, result.first_error)
-                                   : "";
+  const std::string failures = result.failures();
   switch (status) {
     case Solve_Succeeded:
-      return {NlpStatus::converged, "converged: the optimality conditions hold"};
+      return {SolverStatus::converged, "converged: the optimality conditions hold"};
     case Solved_To_Acceptable_Level:
       return {
-          NlpStatus::converged,
+          SolverStatus::converged,
           "converged: the objective does not change any more, and the optimality conditions hold to the accuracy of "
           "its derivatives"};
     case Search_Direction_Becomes_Too_Small:
@@ -208,29 +207,29 @@ Outcome in_words(Ipopt::ApplicationReturnStatus status, const NlpResult& result,
     case Error_In_Step_Computation:
     case Feasible_Point_Found:
       return {
-          NlpStatus::no_progress,
+          SolverStatus::no_progress,
           fmt::format("no further progress: no step lowers the objective any more, but the optimality conditions do "
                       "not hold to {:g}; try tighter simulation tolerances, or a larger optimiser tolerance{}",
                       options.tolerance, failures)};
     case Infeasible_Problem_Detected:
       return {
-          NlpStatus::infeasible,
+          SolverStatus::infeasible,
           "infeasible: no point near the last one satisfies the constraints; relax them or start elsewhere" + failures};
     case Maximum_Iterations_Exceeded:
     case Maximum_CpuTime_Exceeded:
-      return {NlpStatus::iteration_limit,
-              fmt::format("stopped at the limit of {} iterations{}", options.max_iterations, failures)};
+      return {SolverStatus::iteration_limit,
+              fmt::format("stopped at the limit of {}{}", counted(options.max_iterations, "iteration"), failures)};
     case User_Requested_Stop:
-      return {NlpStatus::stopped, "stopped on request"};
+      return {SolverStatus::stopped, "stopped on request"};
     case Diverging_Iterates:
-      return {NlpStatus::failed,
+      return {SolverStatus::failed,
               "the variables grow without limit: the objective seems to have no minimum; give bounds"};
     case Not_Enough_Degrees_Of_Freedom:
-      return {NlpStatus::failed, "there are fewer variables than equality constraints"};
+      return {SolverStatus::failed, "there are fewer variables than equality constraints"};
     case Insufficient_Memory:
-      return {NlpStatus::failed, "not enough memory"};
+      return {SolverStatus::failed, "not enough memory"};
     default:
-      return {NlpStatus::failed, fmt::format("Ipopt failed (status {}){}", static_cast<int>(status), failures)};
+      return {SolverStatus::failed, fmt::format("Ipopt failed (status {}){}", static_cast<int>(status), failures)};
   }
 }
 
@@ -269,24 +268,24 @@ NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_s
     return result;
   }
   if (adapter->start_is_optimal()) {
-    result.status = NlpStatus::converged, result.message = "converged: the start is optimal already";
+    result.status = SolverStatus::converged, result.message = "converged: the start is optimal already";
     return result;
   }
   // From far away a barrier method may leave the valley of a good point for a worse one. Then it starts once more,
   // there.
-  Outcome outcome{NlpStatus::failed, "Ipopt refused its options"};
+  Outcome outcome{SolverStatus::failed, "Ipopt refused its options"};
   for (int round = 0; round <= kFreshStarts; ++round) {
     const Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);  // no console
     set_options(*application, options, round > 0);
     application->Options()->SetIntegerValue("max_iter", std::max(0, options.max_iterations - result.iterations));
     if (application->Initialize("") != Ipopt::Solve_Succeeded) break;  // "": no options file is read
     outcome = in_words(application->OptimizeTNLP(owner), result, options);
-    const bool ended = outcome.status == NlpStatus::converged || outcome.status == NlpStatus::no_progress;
+    const bool ended = outcome.status == SolverStatus::converged || outcome.status == SolverStatus::no_progress;
     if (!ended || !adapter->passed_a_better_point()) break;
     adapter->go_on_from_best();
   }
   result.status = outcome.status, result.message = outcome.words;
-  adapter->finish(outcome.status == NlpStatus::converged);
+  adapter->finish(outcome.status == SolverStatus::converged);
   return result;
 }
 

@@ -15,6 +15,8 @@
 #include <limits>
 #include <string>
 
+#include "optim/solver_outcome.hpp"
+
 namespace mbsopt {
 
 struct LeastSquaresPoint {
@@ -50,17 +52,9 @@ struct LeastSquaresProgress {
   Eigen::VectorXd x;
 };
 
-enum class LeastSquaresStatus { converged, iteration_limit, stopped, failed };
-
-struct LeastSquaresResult {
-  LeastSquaresStatus status = LeastSquaresStatus::failed;
-  std::string message;      // in words, always
-  Eigen::VectorXd x;        // the solution, or the best point seen
-  LeastSquaresPoint point;  // there
+struct LeastSquaresResult : SolverOutcome {
+  LeastSquaresPoint point;  // at x
   double cost_initial = 0, cost_final = 0;
-  int iterations = 0;
-  long evaluations = 0, failed_evaluations = 0;
-  std::string first_error;  // of the first evaluation that failed
 };
 
 }  // namespace mbsopt

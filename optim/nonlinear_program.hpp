@@ -16,6 +16,8 @@
 #include <limits>
 #include <string>
 
+#include "optim/solver_outcome.hpp"
+
 namespace mbsopt {
 
 struct NlpPoint {
@@ -63,16 +65,9 @@ struct NlpProgress {
   const Eigen::VectorXd& x;
 };
 
-enum class NlpStatus { converged, no_progress, iteration_limit, infeasible, stopped, failed };
-
-struct NlpResult {
-  NlpStatus status = NlpStatus::failed;
-  std::string message;  // in words, always
-  Eigen::VectorXd x;    // the solution, or the best point seen: feasible before lower f
-  NlpPoint point;       // there
-  int iterations = 0;
-  long evaluations = 0, failed_evaluations = 0;
-  std::string first_error;  // of the first evaluation that failed
+// x: the solution, or the best point seen: feasible before lower f.
+struct NlpResult : SolverOutcome {
+  NlpPoint point;  // at x
 };
 
 }  // namespace mbsopt

@@ -46,11 +46,9 @@ void check_meaning(Checker& checker, const ExperimentSpec& experiment) {
   if (experiment.channels.empty()) checker.issue(checker.path("channels"), "is empty; at least one column is compared");
   const SimulationSettings& simulation = checker.facts().scene().simulation;
   const double start = experiment.start_time.value_or(simulation.start_time);
-  const double end = experiment.end_time.value_or(simulation.end_time);
-  if ((experiment.start_time || experiment.end_time) && end <= start)
-    checker.issue(
-        checker.path(experiment.end_time ? "end_time" : "start_time"),
-        "the experiment ends at " + text_of(end) + " s, which must be after its start at " + text_of(start) + " s");
+  if (experiment.end_time && *experiment.end_time <= start)
+    checker.issue(checker.path("end_time"), "the experiment ends at " + text_of(*experiment.end_time) +
+                                                " s, which must be after its start at " + text_of(start) + " s");
 }
 
 void check_meaning(Checker& checker, const IdentificationSpec& identification) {

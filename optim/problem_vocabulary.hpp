@@ -55,7 +55,7 @@ void describe(auto& v, Like<ExperimentSpec> auto& e) {
   v.text("time", e.time, {"column of the time [s]"});
   v.plain("start_time", e.start_time, kAny, {"[s]; the simulation's when absent", Need::optional, dimension::kTime});
   v.plain("end_time", e.end_time, kAny,
-          {"[s]; the simulation's when absent; later rows are left out", Need::optional, dimension::kTime});
+          {"[s]; later rows are left out; all are used when absent", Need::optional, dimension::kTime});
   v.list("channels", e.channels, {"columns that are compared", Need::required});
   v.overrides("overrides", e.overrides, {"parameter values of this experiment"});
   v.references("free", e.free, To::parameter, {"parameters with a value of their own in this experiment"});

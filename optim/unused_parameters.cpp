@@ -1,11 +1,13 @@
 #include "optim/unused_parameters.hpp"
 
+#include <algorithm>
 #include <map>
 #include <numeric>
 #include <set>
 
 #include "core/scene/field_visitor.hpp"
 #include "core/scene/scene_facts.hpp"
+#include "core/scene/scene_path.hpp"
 #include "optim/problem_vocabulary.hpp"
 
 namespace mbsopt {
@@ -206,11 +208,50 @@ class Search {
   std::set<std::string> used_, used_sensors_;
 };
 
+// The problem with nothing but the objectives that its design uses.
+Problem as_designed(const Problem& problem) {
+  Problem designed;
+  designed.scene = problem.scene;
+  for (const ObjectiveSpec& objective : problem.objectives) {
+    const std::vector<ObjectiveBound>& bounds = problem.design->subject_to;
+    const auto bounds_it = [&](const ObjectiveBound& bound) { return bound.objective == objective.name; };
+    if (objective.name == problem.design->minimize || std::any_of(bounds.begin(), bounds.end(), bounds_it))
+      designed.objectives.push_back(objective);
+  }
+  return designed;
+}
+
+Problem as_identified(const Problem& problem) {
+  Problem identified;
+  identified.scene = problem.scene;
+  identified.identification = problem.identification;
+  return identified;
+}
+
+void add_idle(const std::vector<std::string>& variables, const Problem& judged_by, const std::string& list,
+              const std::string& what, std::vector<SceneIssue>& issues) {
+  const std::set<std::string> used = Search(judged_by).used_parameters();
+  const std::vector<Parameter>& all = judged_by.scene.parameters;
+  for (std::size_t i = 0; i < variables.size(); ++i) {
+    const auto is_it = [&](const Parameter& p) { return p.name == variables[i]; };
+    const auto parameter = std::find_if(all.begin(), all.end(), is_it);
+    if (parameter == all.end() || parameter->allow_unused || used.contains(variables[i])) continue;
+    issues.push_back({child_path(list, i), "'" + variables[i] + "' cannot influence " + what +
+                                               ": its derivatives are zero, and it would stay as it is; take it out"});
+  }
+}
+
 bool occurs_anywhere(const Problem& problem, const std::string& parameter) {
   // Judged without objectives and identification, everything that uses a parameter counts.
   Problem model_only;
   model_only.scene = problem.scene;
   return Search(model_only).used_parameters().contains(parameter);
+}
+
+// Only where a law replaces it.
+bool occurs_beside_a_law(Problem problem, const std::string& parameter) {
+  for (Force& force : problem.scene.forces) std::visit([](auto& kind) { kind.law.reset(); }, force.kind);
+  return occurs_anywhere(problem, parameter);
 }
 
 }  // namespace
@@ -223,8 +264,27 @@ std::vector<SceneIssue> find_unused_parameters(const Problem& problem) {
     const std::string what =
         occurs_anywhere(problem, parameter.name)
             ? "'" + parameter.name + "' cannot influence any objective or measurement: its derivatives are zero"
+        : occurs_beside_a_law(problem, parameter.name)
+            ? "'" + parameter.name + "' is used only by coefficients that a law replaces"
             : "'" + parameter.name + "' is used by nothing";
     issues.push_back({"parameters." + parameter.name, what + "; \"allow_unused\": true lifts this error"});
+  }
+  return issues;
+}
+
+std::vector<SceneIssue> find_idle_variables(const Problem& problem) {
+  std::vector<SceneIssue> issues;
+  if (problem.design)
+    add_idle(problem.design->variables, as_designed(problem), "design.variables",
+             "any objective that the design minimises or bounds", issues);
+  if (problem.identification) {
+    const IdentificationSpec& identification = *problem.identification;
+    const Problem identified = as_identified(problem);
+    constexpr const char* kMeasured = "anything that is measured";
+    add_idle(identification.variables, identified, "identification.variables", kMeasured, issues);
+    for (std::size_t e = 0; e < identification.experiments.size(); ++e)
+      add_idle(identification.experiments[e].free, identified, child_path("identification.experiments", e) + ".free",
+               kMeasured, issues);
   }
   return issues;
 }

@@ -20,4 +20,8 @@ namespace mbsopt {
 // For a problem without other issues.
 std::vector<SceneIssue> find_unused_parameters(const Problem& problem);
 
+// Variables of a design that matter to none of the objectives it minimises or bounds, and variables and free parameters
+// of an identification that matter to none of its channels, though they may matter to other objectives of the problem.
+std::vector<SceneIssue> find_idle_variables(const Problem& problem);
+
 }  // namespace mbsopt

@@ -33,9 +33,15 @@ bool Findings::concerns(std::string_view path) const {
     return inner.starts_with(outer) &&
            (inner.size() == outer.size() || outer.empty() || inner[outer.size()] == '.' || inner[outer.size()] == '[');
   };
-  return std::any_of(found_.begin(), found_.end(), [&](const Found& found) {
-    return within(path, found.finding.path) || within(found.finding.path, path);
-  });
+  const auto related = [&](std::string_view other) { return within(path, other) || within(other, path); };
+  return std::any_of(found_.begin(), found_.end(), [&](const Found& found) { return related(found.finding.path); }) ||
+         std::any_of(elsewhere_.begin(), elsewhere_.end(), related);
+}
+
+Finding Findings::finding(const Node& node, const std::string& path, const std::string& message) const {
+  if (node.source != 0) return {"", 0, 0, path, message};
+  const Position position = text_.position(node.begin);
+  return {file_, position.line, position.column, path, message};
 }
 
 void Findings::throw_if_any() const {

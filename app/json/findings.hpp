@@ -24,9 +24,14 @@ class Findings {
   void add_at(std::size_t offset, const std::string& path, const std::string& message);
   void add_override(const std::string& path, const std::string& message);
 
+  // The path counts as having a finding, which is told at another place.
+  void add_elsewhere(const std::string& path) { elsewhere_.push_back(path); }
+
   // Whether a path, one it lies in, or one that lies in it has a finding already.
   bool concerns(std::string_view path) const;
   bool any() const { return !found_.empty(); }
+  // A finding about a value, not collected: for what is no error.
+  Finding finding(const Node& node, const std::string& path, const std::string& message) const;
   void throw_if_any() const;  // InputError, in the order of the file, each once
 
  private:
@@ -37,6 +42,7 @@ class Findings {
   std::string file_;
   SourceText text_;
   std::vector<Found> found_;
+  std::vector<std::string> elsewhere_;
 };
 
 }  // namespace mbsopt

@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "app/json/parse_json.hpp"
+#include "core/expression/counted.hpp"
 
 namespace mbsopt {
 
@@ -62,7 +63,15 @@ void apply_override(Node& root, const std::string& override_text, int number, Fi
       return;
     }
     if (step.is_index && step.index >= node->items.size()) {
-      findings.add_override(path, here + " has " + std::to_string(node->items.size()) + " entries, numbered from 0");
+      findings.add_override(path,
+                            here + " has " + counted(node->items.size(), "entry", "entries") + ", numbered from 0");
+      return;
+    }
+    const bool list_next = depth + 1 < steps.size() && steps[depth + 1].is_index;
+    if (!step.is_index && list_next && !node->find(step.key)) {
+      const std::string list = child_path(here, step.key);
+      findings.add_override(
+          path, "there is no " + list + ", and an entry alone cannot be made; set the list whole: " + list + "=[...]");
       return;
     }
     here = step.is_index ? child_path(here, step.index) : child_path(here, step.key);

@@ -164,7 +164,20 @@ class NodeBuilder : public nlohmann::json_sax<nlohmann::json> {
       return "the number " + token + " is out of the range of double precision";
     const std::size_t colon = what.find(": ", what.find("column"));  // after "... at line 1, column 2"
     if (colon != std::string::npos) what = what.substr(colon + 2);
-    return "is not JSON: " + what;
+    return "is not JSON: " + what + comma_hint(begin, what);
+  }
+
+  // nlohmann says what it expected; what a writer forgot is most often a comma, and what is left over is one, too.
+  std::string comma_hint(std::size_t begin, const std::string& what) const {
+    const bool in_object = what.find("expected '}'") != std::string::npos;
+    const bool in_list = what.find("expected ']'") != std::string::npos;
+    const char found = begin < text_.size() ? text_[begin] : ' ';
+    const bool closes = found == '}' || found == ']';
+    if ((in_object || in_list) && !closes && found != ':' && found != ' ') return " (is a comma missing before it?)";
+    const std::size_t before = text_.find_last_not_of(" \t\r\n", begin == 0 ? 0 : begin - 1);
+    if (closes && before != std::string_view::npos && before < begin && text_[before] == ',')
+      return " (is there a comma too many before it?)";
+    return "";
   }
 
   TokenScan scan_;

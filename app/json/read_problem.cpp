@@ -9,6 +9,7 @@
 #include "app/json/reader.hpp"
 #include "app/json/source_text.hpp"
 #include "optim/csv_table.hpp"
+#include "optim/data_issues.hpp"
 #include "optim/problem_issues.hpp"
 #include "optim/unused_parameters.hpp"
 
@@ -25,7 +26,8 @@ void resolve_data_files(Problem& problem, const std::filesystem::path& folder, c
     if (findings.concerns(path)) continue;
     const std::filesystem::path file = (folder / data).lexically_normal();
     std::error_code error;
-    if (!std::filesystem::exists(file, error) || std::filesystem::is_directory(file, error))
+    const bool found = std::filesystem::exists(file, error) && !std::filesystem::is_directory(file, error);
+    if (!found)
       findings.add(nearest(root, path), path, "there is no file '" + file.string() + "'; a CSV file is expected");
     data = file.string();
   }
@@ -54,6 +56,24 @@ void read_sampled_laws(Scene& scene, const std::filesystem::path& folder, const 
   }
 }
 
+// Data that an experiment cannot use are found now, before anything runs, whatever the command.
+void check_data(const Problem& problem, const Node& root, Findings& findings) {
+  if (!problem.identification) return;
+  const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
+  for (std::size_t i = 0; i < experiments.size(); ++i) {
+    const std::string place = child_path("identification.experiments", i);
+    if (findings.concerns(place)) continue;
+    try {
+      const CsvTable table = read_csv(experiments[i].data);
+      for (const SceneIssue& issue :
+           find_data_issues(experiments[i], place, table, problem.scene.simulation.start_time))
+        findings.add(nearest(root, issue.path), issue.path, issue.message);
+    } catch (const CsvError& error) {
+      findings.add(nearest(root, place + ".data"), place + ".data", error.what());
+    }
+  }
+}
+
 void add_issue(const SceneIssue& issue, const Node& root, Findings& findings) {
   const Node& node = nearest(root, issue.path);
   if (issue.offset && node.kind == Node::Kind::string)
@@ -68,14 +88,18 @@ void add_issues(const Problem& problem, const Node& root, Findings& findings, st
   std::vector<SceneIssue> errors;
   for (SceneIssue& issue : find_issues(problem)) {
     if (issue.is_warning) {
-      if (warnings) warnings->push_back(issue.path + ": " + issue.message);
+      if (warnings)
+        warnings->push_back(to_string(findings.finding(nearest(root, issue.path), issue.path, issue.message)));
     } else if (!findings.concerns(issue.path)) {
       errors.push_back(std::move(issue));
     }
   }
   for (const SceneIssue& issue : errors) add_issue(issue, root, findings);
+  check_data(problem, root, findings);
   if (findings.any()) return;
   for (const SceneIssue& issue : find_unused_parameters(problem)) add_issue(issue, root, findings);
+  for (const SceneIssue& issue : find_idle_variables(problem))
+    if (!findings.concerns(issue.path)) add_issue(issue, root, findings);
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ const Node* Reader::get(std::string_view key, const Says& says) {
   known_.emplace_back(key);
   const Node* const node = node_.find(key);
   if (!node && says.need == Need::required)
-    findings_.add(node_, inside(key), "is missing; expected: " + std::string(says.description));
+    missing_.push_back({std::string(key), "is missing; expected: " + std::string(says.description)});
   return node;
 }
 
@@ -32,17 +32,32 @@ const Node* Reader::get_kind(std::string_view key, const Says& says, Node::Kind 
   return nullptr;
 }
 
-void Reader::report_unknown_keys() {
-  if (rest_unknown_) return;
+const Reader::Missing* Reader::missing_like(const std::string& unknown) const {
+  const auto found = std::find_if(missing_.begin(), missing_.end(),
+                                  [&](const Missing& m) { return !did_you_mean(unknown, {m.key}).empty(); });
+  return found == missing_.end() ? nullptr : &*found;
+}
+
+void Reader::report_keys() {
+  std::vector<std::string> told;
   for (std::size_t i = 0; i < node_.keys.size(); ++i) {
     const std::string& key = node_.keys[i];
     if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
-    const std::string message = "unknown key" + did_you_mean(key, known_) + "; known here: " + joined(known_);
+    const Missing* const missing = missing_like(key);
+    if (rest_unknown_ && !missing) continue;
+    std::string message = "unknown key" + did_you_mean(key, known_) + "; known here: " + joined(known_);
+    if (missing) {
+      message = "unknown key" + did_you_mean(key, {missing->key}) + "; " + missing->key + " " + missing->message;
+      told.push_back(missing->key);
+      findings_.add_elsewhere(inside(missing->key));
+    }
     if (node_.source == 0 && node_.items[i].source == 0)
       findings_.add_at(node_.key_offsets[i], inside(key), message);
     else
       findings_.add_override(inside(key), message);
   }
+  for (const auto& [key, message] : missing_)
+    if (std::find(told.begin(), told.end(), key) == told.end()) findings_.add(node_, inside(key), message);
 }
 
 bool Reader::read_string(const Node& node, const std::string& path, std::string& value) {
@@ -76,7 +91,7 @@ const TypeRow* Reader::type(std::string_view key, std::string_view, std::span<co
                             std::string_view later, const Says& says) {
   const Node* const node = get(key, {says.description, Need::optional, {}});
   if (!node) {
-    findings_.add(node_, inside(key), "is missing; available: " + joined(names_of(rows)));
+    missing_.push_back({std::string(key), "is missing; available: " + joined(names_of(rows))});
     return nullptr;
   }
   std::string given;

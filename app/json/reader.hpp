@@ -27,7 +27,7 @@ class Reader {
     }
     Reader reader(node, path, findings);
     describe(reader, value);
-    reader.report_unknown_keys();
+    reader.report_keys();
   }
 
   void name(std::string_view key, std::string& value, const Says& says) { text(key, value, says); }
@@ -81,7 +81,7 @@ class Reader {
     if (!node) return;
     Reader reader(*node, inside(key), findings_);
     fields(reader);
-    reader.report_unknown_keys();
+    reader.report_keys();
   }
   template <class T>
   void list(std::string_view key, std::vector<T>& values, const Says& says) {
@@ -104,11 +104,17 @@ class Reader {
   void version(std::string_view key, int only, const Says& says);
   void later(std::string_view key, std::string_view what);
   void rest_unknown() { rest_unknown_ = true; }
-  void report_unknown_keys();
+  // At the end of an object: keys that it does not have, and required ones that are missing. A key that is both unknown
+  // and like a missing one is one finding.
+  void report_keys();
 
  private:
   bool has(std::string_view key) const { return node_.find(key) != nullptr; }
   std::string inside(std::string_view key) const { return child_path(path_, key); }
+  struct Missing {
+    std::string key, message;
+  };
+  const Missing* missing_like(const std::string& unknown) const;
   void skip(std::string_view key, const Says& says) { get(key, says); }
 
   // The value of a key, which from now on is known; nullptr (and a finding where it is required) when it is absent.
@@ -136,6 +142,7 @@ class Reader {
   std::string path_;
   Findings& findings_;
   std::vector<std::string> known_;
+  std::vector<Missing> missing_;
   bool rest_unknown_ = false;
 };
 

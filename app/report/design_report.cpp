@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
+#include "app/report/mechanism_drawing.hpp"
 #include "app/report/motion_plots.hpp"
 #include "app/report/report_parts.hpp"
 #include "app/report/run_report.hpp"
+#include "core/expression/counted.hpp"
 
 namespace mbsopt {
 namespace {
@@ -18,9 +20,9 @@ void add_parameters(HtmlPage& page, const Json& result) {
 
 void add_outcome(HtmlPage& page, const Json& result) {
   const Json& optimizer = result.at("optimizer");
-  page.paragraph(fmt::format("{}: {}; {} iterations, {} evaluations.", cell(optimizer.at("type")),
-                             cell(optimizer.at("status")), cell(optimizer.at("iterations")),
-                             cell(optimizer.at("evaluations"))));
+  page.paragraph(fmt::format("{}: {}; {}, {}.", cell(optimizer.at("type")), cell(optimizer.at("message")),
+                             counted(optimizer.at("iterations").get<long>(), "iteration"),
+                             counted(optimizer.at("evaluations").get<long>(), "evaluation")));
   std::vector<std::vector<std::string>> rows;
   for (const auto& [name, objective] : result.at("objectives").items()) {
     rows.push_back({name, cell(objective.value("initial", Json())), cell(objective.at("value")),
@@ -29,10 +31,26 @@ void add_outcome(HtmlPage& page, const Json& result) {
   page.table({"objective", "before", "after", "at least", "at most"}, rows);
 }
 
+void add_drawings(HtmlPage& page, const Scene& scene, const Eigen::VectorXd& rho, const Trajectory& before,
+                  const Trajectory& after) {
+  if (before.rows.empty()) return;
+  const std::array<int, 2> plane = plane_of_motion(scene, before);
+  if (after.rows.empty()) {
+    page.drawing(mechanism_drawing("Before, at start and end", plane,
+                                   {{"start", scene, before.rows.front()}, {"end", scene, before.rows.back()}}));
+    return;
+  }
+  const Scene designed = with_values(scene, rho);
+  page.drawing(mechanism_drawing("At the start", plane,
+                                 {{"before", scene, before.rows.front()}, {"after", designed, after.rows.front()}}));
+  page.drawing(mechanism_drawing("At the end", plane,
+                                 {{"before", scene, before.rows.back()}, {"after", designed, after.rows.back()}}));
+}
+
 }  // namespace
 
-std::string design_report(const Scene& scene, const Json& result, const Trajectory& history, const Trajectory& before,
-                          const Trajectory& after) {
+std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const Json& result, const Trajectory& history,
+                          const Trajectory& before, const Trajectory& after) {
   HtmlPage page(report_title(result));
   add_status(page, result);
   page.heading("Result");
@@ -40,6 +58,7 @@ std::string design_report(const Scene& scene, const Json& result, const Trajecto
   add_parameters(page, result);
   add_convergence(page, history);
   page.heading("Motion before and after");
+  add_drawings(page, scene, rho, before, after);
   for (const LinePlot& plot : motion_plots(scene, before, after)) page.plot(plot);
   add_model(page, result);
   add_provenance(page, result);

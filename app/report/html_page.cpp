@@ -25,11 +25,15 @@ svg .title { fill:var(--ink); font-size:14px; font-weight:600 }
 .line { fill:none; stroke-width:1.6; stroke-linejoin:round } .dashed { stroke-dasharray:6 4 }
 .points { fill:none; stroke-width:3; stroke-linecap:round }
 .legend { display:flex; flex-wrap:wrap; gap:.2em 1.2em; font-size:.85em; color:var(--soft); padding-left:5em }
-.legend i { display:inline-block; width:1.4em; height:.25em; margin-right:.4em; vertical-align:middle }
+svg.key { display:inline-block; width:2.1em; height:.7em; margin:0 .4em 0 0; vertical-align:middle }
+.banner { border-left:.4em solid var(--c1); padding:.5em 1em; font-weight:600 }
+.body { fill-opacity:.12; stroke-width:2.4; stroke-linejoin:round; stroke-linecap:round } .earlier { opacity:.55 }
+.earlier .body { stroke-dasharray:6 4; fill-opacity:.05 } .spring { fill:none; stroke:var(--soft); stroke-width:1.2 }
+.joint { fill:var(--paper); stroke:var(--ink); stroke-width:1.2 } .ground { fill:var(--soft); stroke:none }
 .c0{stroke:var(--c0)} .c1{stroke:var(--c1)} .c2{stroke:var(--c2)} .c3{stroke:var(--c3)} .c4{stroke:var(--c4)}
 .c5{stroke:var(--c5)} .c6{stroke:var(--c6)} .c7{stroke:var(--c7)}
-.b0{background:var(--c0)} .b1{background:var(--c1)} .b2{background:var(--c2)} .b3{background:var(--c3)}
-.b4{background:var(--c4)} .b5{background:var(--c5)} .b6{background:var(--c6)} .b7{background:var(--c7)}
+.f0{fill:var(--c0)} .f1{fill:var(--c1)} .f2{fill:var(--c2)} .f3{fill:var(--c3)} .f4{fill:var(--c4)}
+.f5{fill:var(--c5)} .f6{fill:var(--c6)} .f7{fill:var(--c7)}
 )";
 
 }  // namespace
@@ -60,6 +64,10 @@ std::string html_escaped(std::string_view text) {
 void HtmlPage::heading(std::string_view text) { body_ += fmt::format("<h2>{}</h2>\n", html_escaped(text)); }
 
 void HtmlPage::paragraph(std::string_view text) { body_ += fmt::format("<p>{}</p>\n", html_escaped(text)); }
+
+void HtmlPage::banner(std::string_view text) {
+  body_ += fmt::format("<p class=\"banner\" role=\"alert\">{}</p>\n", html_escaped(text));
+}
 
 void HtmlPage::table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows) {
   const auto row_of = [](const std::vector<std::string>& cells, const char* tag) {

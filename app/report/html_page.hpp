@@ -18,9 +18,11 @@ class HtmlPage {
 
   void heading(std::string_view text);
   void paragraph(std::string_view text);
+  void banner(std::string_view text);  // what a reader must see first
   // The first column holds names; the others are numbers or short words.
   void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
   void plot(const LinePlot& plot);
+  void drawing(std::string_view svg) { body_ += svg; }
   std::string text() const;
 
  private:

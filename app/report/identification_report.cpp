@@ -3,17 +3,44 @@
 #include "app/report/line_plot.hpp"
 #include "app/report/report_parts.hpp"
 #include "app/report/run_report.hpp"
+#include "core/expression/counted.hpp"
 
 namespace mbsopt {
 namespace {
 
+void add_rows(std::vector<std::vector<std::string>>& rows, const Json& parameters) {
+  for (const auto& [name, p] : parameters.items()) {
+    rows.push_back({name, cell(p.at("initial")), cell(p.at("value"), 9), cell(p.value("std_error", Json()), 3),
+                    "[" + cell(p.value("ci95", Json())) + "]", cell(p.value("unit", Json())),
+                    cell(p.value("at_bound", Json()))});
+  }
+}
+
+// Those fitted, then what was refitted to score the experiments that validate.
 void add_parameters(HtmlPage& page, const Json& result) {
   std::vector<std::vector<std::string>> rows;
-  for (const auto& [name, p] : result.at("parameters").items()) {
-    rows.push_back({name, cell(p.at("initial")), cell(p.at("value")), cell(p.value("std_error", Json())),
-                    cell(p.value("ci95", Json())), cell(p.value("unit", Json())), cell(p.value("at_bound", Json()))});
-  }
+  add_rows(rows, result.at("parameters"));
+  for (const Json& experiment : result.value("experiments", Json::object()))
+    add_rows(rows, experiment.value("refitted", Json::object()));
   page.table({"parameter", "initial", "value", "standard error", "95 % interval", "unit", "at bound"}, rows);
+}
+
+// How the fit ended, and how much there was to fit.
+void add_outcome(HtmlPage& page, const Json& result) {
+  const Json& optimizer = result.at("optimizer");
+  page.paragraph(fmt::format("{}: {}; {}, {}.", cell(optimizer.at("type")), cell(optimizer.at("message")),
+                             counted(optimizer.at("iterations").get<long>(), "iteration"),
+                             counted(optimizer.at("evaluations").get<long>(), "evaluation")));
+  const Json& statistics = result.at("statistics");
+  const Json& identifiability = result.at("identifiability");
+  page.table({"", ""}, {{"samples", cell(statistics.at("samples"))},
+                        {"degrees of freedom", cell(statistics.at("degrees_of_freedom"))},
+                        {"variance of the residuals, in sigma^2", cell(statistics.at("residual_variance"), 4)},
+                        {"half the sum of their squares, before", cell(optimizer.at("objective_initial"))},
+                        {"after", cell(optimizer.at("objective_final"))},
+                        {"condition number", cell(identifiability.at("condition_number"), 3)}});
+  for (const Json& words : identifiability.at("unidentifiable"))
+    page.paragraph("Not determined by the data: " + cell(words));
 }
 
 // result["correlation"]: {"names": [...], "matrix": [[...], ...]}
@@ -38,10 +65,11 @@ void add_experiments(HtmlPage& page, const Json& result) {
   std::vector<std::vector<std::string>> rows;
   for (const auto& [name, experiment] : result.at("experiments").items()) {
     for (const auto& [channel, fit] : experiment.at("channels").items()) {
-      rows.push_back({name, channel, cell(experiment.at("role")), cell(fit.at("samples")), cell(fit.at("rms"))});
+      rows.push_back({name, channel, cell(experiment.at("role")), cell(fit.at("samples")), cell(fit.at("rms"), 4),
+                      cell(fit.at("rms_scaled"), 4)});
     }
   }
-  page.table({"experiment", "channel", "role", "samples", "rms of measured - model"}, rows);
+  page.table({"experiment", "channel", "role", "samples", "rms of measured - model", "rms/sigma"}, rows);
 }
 
 void add_fit(HtmlPage& page, const FitPlot& fit) {
@@ -64,6 +92,8 @@ std::string identification_report(const Scene& scene, const Json& result, const 
                                   const std::vector<FitPlot>& fits) {
   HtmlPage page(scene.name + ": identify");
   add_status(page, result);
+  page.heading("Fit");
+  add_outcome(page, result);
   page.heading("Parameters");
   add_parameters(page, result);
   add_correlation(page, result);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <utility>
 
 #include "app/report/html_page.hpp"
 
@@ -115,19 +116,51 @@ void draw_series(const LinePlot& plot, const Frame& frame, std::size_t index, st
   svg += fmt::format("<path class=\"{} c{}\" d=\"{}\"/>\n", mark, index % kColours, path);
 }
 
+// Whether all of an axis can be written as 0.02, 5, 1000.
+bool near_one(const std::vector<double>& ticks) {
+  return std::all_of(ticks.begin(), ticks.end(), [](double tick) { return tick > 0.9e-3 && tick < 1.1e4; });
+}
+
+// 10 with a raised exponent, which reads better than 1e-12.
+std::string power_of_ten(double value) {
+  const double exponent = std::floor(std::log10(value) + 1e-9), digits = value / std::pow(10, exponent);
+  const std::string power = fmt::format("10<tspan dy=\"-4\" font-size=\"9\">{:.0f}</tspan>", exponent);
+  return std::abs(digits - 1) < 1e-6 ? power : fmt::format("{:.4g}\u00b7{}", digits, power);
+}
+
+// Places on the axis (logarithms where it is logarithmic) and their labels.
+std::vector<std::pair<double, std::string>> y_ticks_of(const LinePlot& plot, const Frame& frame) {
+  std::vector<std::pair<double, std::string>> ticks;
+  if (plot.logarithmic_y) {
+    const std::vector<double> values = logarithmic_ticks(std::pow(10, frame.y.low), std::pow(10, frame.y.high), 6);
+    for (const double y : values)
+      ticks.emplace_back(std::log10(y), near_one(values) ? fmt::format("{:.6g}", y) : power_of_ten(y));
+  } else {
+    for (const double y : round_ticks(frame.y.low, frame.y.high, plot.equal_axes ? 5 : 6))
+      ticks.emplace_back(y, fmt::format("{:.6g}", y));
+  }
+  return ticks;
+}
+
+// Drawn like the series itself.
+std::string legend_key(const PlotSeries& series, std::size_t index) {
+  const char* mark = series.mark == Mark::points ? "points" : series.mark == Mark::dashed ? "line dashed" : "line";
+  const char* path = series.mark == Mark::points ? "M5 5h0M15 5h0M25 5h0" : "M0 5H30";
+  return fmt::format("<svg class=\"key\" viewBox=\"0 0 30 10\"><path class=\"{} c{}\" d=\"{}\"/></svg>", mark,
+                     index % kColours, path);
+}
+
 void draw_axes(const LinePlot& plot, const Frame& frame, std::string& svg) {
   const double bottom = kTop + kInnerHeight, right = kLeft + kInnerWidth;
-  const auto x_ticks = round_ticks(frame.x.low, frame.x.high, 8);
-  const auto y_ticks = round_ticks(frame.y.low, frame.y.high, plot.equal_axes ? 5 : 6);
+  auto x_ticks = round_ticks(frame.x.low, frame.x.high, 8);
+  if (plot.whole_x) std::erase_if(x_ticks, [](double x) { return x != std::round(x); });
   for (const double tick : x_ticks) {
     svg += fmt::format(
         "<path class=\"grid\" d=\"M{0:.1f} {1:.1f}V{2:.1f}\"/><text x=\"{0:.1f}\" y=\"{3:.1f}\" "
         "text-anchor=\"middle\">{4:.6g}</text>\n",
         frame.px(tick), kTop, bottom, bottom + 16, tick);
   }
-  for (const double tick : y_ticks) {
-    if (plot.logarithmic_y && tick != std::round(tick)) continue;  // whole decades only
-    const std::string label = plot.logarithmic_y ? fmt::format("1e{:.0f}", tick) : fmt::format("{:.6g}", tick);
+  for (const auto& [tick, label] : y_ticks_of(plot, frame)) {
     svg += fmt::format(
         "<path class=\"grid\" d=\"M{1:.1f} {0:.1f}H{2:.1f}\"/><text x=\"{3:.1f}\" y=\"{4:.1f}\" "
         "text-anchor=\"end\">{5}</text>\n",
@@ -154,6 +187,28 @@ std::vector<double> round_ticks(double low, double high, int count) {
   return ticks;
 }
 
+std::vector<double> logarithmic_ticks(double low, double high, int count) {
+  const double first = std::ceil(std::log10(low) - 1e-9), last = std::floor(std::log10(high) + 1e-9);
+  if (last - first >= 2) {
+    const double stride = std::max(1.0, std::ceil((last - first) / count));
+    std::vector<double> ticks;
+    // Multiples of the stride, so that 1 is among them wherever it is in the range.
+    for (double k = std::ceil(first / stride) * stride; k <= last; k += stride) ticks.push_back(std::pow(10, k));
+    return ticks;
+  }
+  std::vector<double> ticks;
+  for (double k = first - 1; k <= last; ++k) {
+    for (const double digit : {1, 2, 5}) {
+      const double tick = digit * std::pow(10, k);
+      if (tick >= low * (1 - 1e-9) && tick <= high * (1 + 1e-9)) ticks.push_back(tick);
+    }
+  }
+  if (ticks.size() >= 3) return ticks;
+  ticks = round_ticks(low, high, count);
+  std::erase_if(ticks, [](double tick) { return tick <= 0; });
+  return ticks;
+}
+
 std::string to_svg(const LinePlot& plot) {
   const Frame frame = frame_of(plot);
   std::string svg = fmt::format("<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">\n", kWidth, kHeight,
@@ -164,7 +219,7 @@ std::string to_svg(const LinePlot& plot) {
   if (plot.series.size() < 2) return svg;
   svg += "<div class=\"legend\">";
   for (std::size_t i = 0; i < plot.series.size(); ++i) {
-    svg += fmt::format("<span><i class=\"b{}\"></i>{}</span>", i % kColours, html_escaped(plot.series[i].name));
+    svg += fmt::format("<span>{}{}</span>", legend_key(plot.series[i], i), html_escaped(plot.series[i].name));
   }
   return svg + "</div>\n";
 }

@@ -23,6 +23,7 @@ struct LinePlot {
   std::string title, x_label, y_label;
   std::vector<PlotSeries> series = {};
   bool logarithmic_y = false;  // values <= 0 are left out
+  bool whole_x = false;        // x counts: ticks at whole numbers only
   bool equal_axes = false;     // one metre is as long in x as in y: for paths
 };
 
@@ -30,5 +31,9 @@ std::string to_svg(const LinePlot& plot);
 
 // About `count` round numbers (1, 2 or 5 times a power of ten) that cover [low, high].
 std::vector<double> round_ticks(double low, double high, int count);
+
+// The same on a logarithmic axis, low > 0: powers of ten, every so many where there are too many of them; 1, 2, 5 times
+// powers of ten where there are few, round numbers where there are none.
+std::vector<double> logarithmic_ticks(double low, double high, int count);
 
 }  // namespace mbsopt

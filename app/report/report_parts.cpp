@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "app/energy_balance.hpp"
 #include "app/report/line_plot.hpp"
 #include "app/text_table.hpp"
 
@@ -13,27 +14,28 @@ namespace {
 // Rows "name, value" for the entries of an object that the list names.
 struct Entry {
   const char* key;
-  const char* label;
+  std::string label;
+  int digits = 7;
 };
 
 void add_entries(HtmlPage& page, const Json& object, std::initializer_list<Entry> entries) {
   std::vector<std::vector<std::string>> rows;
   for (const Entry& entry : entries) {
-    if (object.contains(entry.key)) rows.push_back({entry.label, cell(object.at(entry.key))});
+    if (object.contains(entry.key)) rows.push_back({entry.label, cell(object.at(entry.key), entry.digits)});
   }
   page.table({"", ""}, rows);
 }
 
 }  // namespace
 
-std::string cell(const Json& value) {
+std::string cell(const Json& value, int digits) {
   if (value.is_number_integer()) return std::to_string(value.get<long>());
-  if (value.is_number()) return significant(value.get<double>());
+  if (value.is_number()) return significant(value.get<double>(), digits);
   if (value.is_string()) return value.get<std::string>();
   if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
   if (!value.is_array()) return "-";
   std::string text;
-  for (const Json& element : value) text += (text.empty() ? "" : ", ") + cell(element);
+  for (const Json& element : value) text += (text.empty() ? "" : ", ") + cell(element, digits);
   return text.empty() ? "none" : text;
 }
 
@@ -42,7 +44,14 @@ std::string report_title(const Json& result) {
 }
 
 void add_status(HtmlPage& page, const Json& result) {
-  if (result.contains("message")) page.paragraph("Failed: " + result.at("message").get<std::string>());
+  const std::string status = result.value("status", ""), message = result.value("message", "");
+  if (status == "failed") {
+    page.banner("This run failed: " + message);
+    if (result.contains("last_good_time"))
+      page.paragraph(fmt::format("The motion is good up to {:.6g} s.", result.at("last_good_time").get<double>()));
+  } else if (status == "interrupted") {
+    page.banner("This run was " + message + ".");
+  }
   for (const Json& warning : result.at("warnings")) page.paragraph("Warning: " + warning.get<std::string>());
 }
 
@@ -57,16 +66,19 @@ void add_model(HtmlPage& page, const Json& result) {
                {"redundant", "redundant"}});
 }
 
-void add_simulation(HtmlPage& page, const Json& result) {
+void add_simulation(HtmlPage& page, const Scene& scene, const Json& result) {
   if (!result.contains("simulation")) return;
   page.heading("Simulation");
   add_entries(page, result.at("simulation"),
               {{"steps", "steps"},
                {"rejected", "rejected steps"},
                {"rhs_evaluations", "right-hand sides"},
-               {"max_position_violation", "largest violation, positions"},
-               {"max_velocity_violation", "largest violation, velocities"},
-               {"energy_drift", "largest change of energy [J]"}});
+               {"max_position_violation", "largest violation, positions", 2},
+               {"max_velocity_violation", "largest violation, velocities", 2},
+               {"energy_drift",
+                conserves_energy(scene) ? "largest change of energy [J]"
+                                        : fmt::format("largest change of energy [J], {}", kWorkIsDone),
+                2}});
 }
 
 void add_objectives(HtmlPage& page, const Json& result) {
@@ -92,7 +104,7 @@ void add_convergence(HtmlPage& page, const Trajectory& history) {
     const std::vector<double> values = column(static_cast<std::size_t>(found - history.columns.begin()));
     const bool positive = std::all_of(values.begin(), values.end(), [](double v) { return v > 0; });
     if (std::all_of(values.begin(), values.end(), [](double v) { return v == 0; })) continue;
-    LinePlot plot{.title = name, .x_label = "iteration", .y_label = name, .logarithmic_y = positive};
+    LinePlot plot{.title = name, .x_label = "iteration", .y_label = name, .logarithmic_y = positive, .whole_x = true};
     plot.series.push_back({name, column(0), values, Mark::line});
     page.plot(plot);
   }

@@ -7,13 +7,14 @@
 
 namespace mbsopt {
 
-std::string report_title(const Json& result);                     // "five_bar: design"
-void add_status(HtmlPage& page, const Json& result);              // failure in words, warnings
-void add_model(HtmlPage& page, const Json& result);               // bodies, equations, degrees of freedom
-void add_simulation(HtmlPage& page, const Json& result);          // steps, violations, energy
-void add_objectives(HtmlPage& page, const Json& result);          // name and value
-void add_convergence(HtmlPage& page, const Trajectory& history);  // objective over iterations
+std::string report_title(const Json& result);         // "five_bar: design"
+void add_status(HtmlPage& page, const Json& result);  // a banner where it did not end well; warnings
+void add_model(HtmlPage& page, const Json& result);   // bodies, equations, degrees of freedom
+void add_simulation(HtmlPage& page, const Scene& scene, const Json& result);  // steps, violations, energy
+void add_objectives(HtmlPage& page, const Json& result);                      // name and value
+void add_convergence(HtmlPage& page, const Trajectory& history);              // objective over iterations
 void add_provenance(HtmlPage& page, const Json& result);
-std::string cell(const Json& value);  // a number, a word, an interval, "-" where there is none
+// A number, a word, an interval, "-" where there is none.
+std::string cell(const Json& value, int digits = 7);
 
 }  // namespace mbsopt

@@ -12,9 +12,9 @@ namespace mbsopt {
 
 std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory);
 
-// history: columns and rows of history.csv (iteration, objective, infeasibility, ...).
-std::string design_report(const Scene& scene, const Json& result, const Trajectory& history, const Trajectory& before,
-                          const Trajectory& after);
+// rho: the designed parameters; history: columns and rows of history.csv (iteration, objective, infeasibility, ...).
+std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const Json& result, const Trajectory& history,
+                          const Trajectory& before, const Trajectory& after);
 
 // What one channel of one experiment measured, and what the fitted model says at the same times.
 struct FitPlot {

@@ -187,17 +187,25 @@ void check_meaning(Checker& checker, const Drive& drive) {
 }
 
 void check_meaning(Checker& checker, const Force& force) {
-  const auto warn_of_law = [&](bool has_law, std::initializer_list<const Field*> coefficients) {
-    for (const Field* field : coefficients)
-      if (has_law && !(field->is_number() && field->number() == 0))
-        return checker.warning(checker.path("law"), "replaces the coefficients, which are given as well and not used");
+  // A coefficient of 0 beside a law says nothing, any other may be thought to act.
+  const auto warn_of_law = [&](bool has_law, std::initializer_list<std::pair<const char*, const Field*>> coefficients) {
+    std::vector<std::string> idle;
+    for (const auto& [key, field] : coefficients)
+      if (has_law && !(field->is_number() && field->number() == 0)) idle.emplace_back(key);
+    if (!idle.empty())
+      checker.warning(checker.path("law"),
+                      "replaces the coefficients of this force: " + joined(idle) + ", given beside it, will not act");
   };
   if (const auto* tsda = std::get_if<Tsda>(&force.kind)) {
     check_two_bodies(checker, tsda->body1, tsda->body2, "a tsda");
-    warn_of_law(tsda->law.has_value(), {&tsda->stiffness, &tsda->damping, &tsda->free_length, &tsda->actuator});
+    warn_of_law(tsda->law.has_value(), {{"stiffness", &tsda->stiffness},
+                                        {"damping", &tsda->damping},
+                                        {"free_length", &tsda->free_length},
+                                        {"actuator", &tsda->actuator}});
   } else if (const auto* rsda = std::get_if<Rsda>(&force.kind)) {
     check_joint_has_angle(checker, rsda->joint);
-    warn_of_law(rsda->law.has_value(), {&rsda->stiffness, &rsda->damping, &rsda->free_angle});
+    warn_of_law(rsda->law.has_value(),
+                {{"stiffness", &rsda->stiffness}, {"damping", &rsda->damping}, {"free_angle", &rsda->free_angle}});
   }
 }
 

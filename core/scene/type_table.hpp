@@ -74,7 +74,7 @@ inline constexpr TypeRow kSensorQuantities[] = {
     {"angular_velocity", "of a body", "body! component! frame", "x y z norm", dimension::kRate, true},
     {"orientation", "Euler parameters of a body", "body! component!", "e0 e1 e2 e3"},
     {"energy", "of the whole mechanism", "component!", "kinetic potential total", dimension::kTorque, true},
-    {"constraint_violation", "norm of the constraint equations", ""},
+    {"constraint_violation", "largest absolute entry of the constraint equations", ""},
 };
 
 inline constexpr std::string_view kJointsWithAngle = "revolute cylindrical screw";

@@ -11,7 +11,9 @@ TEST_CASE("check: all methods agree on a smooth problem, and each one's cost is 
   const CommandOutcome outcome =
       run_command({"check", folder.write("rod.json", kPendulum), "--out", folder.file("out")});
   CHECK(outcome.exit_code == kDone);
-  CHECK_THAT(outcome.out, Contains("all gradients agree") && Contains("fd frozen") && Contains("simulations"));
+  CHECK_THAT(outcome.out, Contains("all gradients agree") && Contains("fd frozen") && Contains("simulations") &&
+                              Contains("one simulation: a run with the same objectives") &&
+                              Contains("Taylor remainder"));
   const auto result = json_of(folder.path / "out/result.json");
   CHECK(result.at("status") == "ok");
   for (const char* method : {"adjoint", "tlm", "fd_frozen", "fd_free"}) {
@@ -19,6 +21,11 @@ TEST_CASE("check: all methods agree on a smooth problem, and each one's cost is 
     CHECK(result.at("methods").at(method).at("gradient").at("track").at("k").is_number());
   }
   CHECK(result.at("verdict").at("entries").at("end").at("L").at("tlm_adjoint") < 1e-10);
+  CHECK(result.at("verdict").at("entries").at("end").at("L").at("free").is_string());
+  for (const auto& identity : result.at("verdict").at("identities")) {
+    CHECK(identity.at("weights").contains("track"));
+    CHECK(identity.at("direction").contains("k"));
+  }
 }
 
 TEST_CASE("check: an objective with a kink at this very point ends with exit 3", "[command]") {

@@ -19,6 +19,30 @@ TEST_CASE("help and version are results, an unknown command is bad input", "[com
   CHECK(run_command({"simulate", "x.json", "--threads", "0"}).exit_code == kBadInput);
 }
 
+TEST_CASE("help is a command, too", "[command]") {
+  const CommandOutcome all = run_command({"help"}), design = run_command({"help", "design"});
+  CHECK(all.exit_code == kDone);
+  CHECK(all.out == run_command({"--help"}).out);
+  CHECK(design.exit_code == kDone);
+  CHECK_THAT(design.out, Contains("--set"));
+  CHECK(design.out == run_command({"design", "--help"}).out);
+}
+
+TEST_CASE("the outcome of a design survives other commands, but not another design", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kPendulum), out = folder.file("out");
+  REQUIRE(run_command({"simulate", file, "--out", out}).exit_code == kDone);
+  REQUIRE(run_command({"design", file, "--out", out, "--set", "parameters.k.upper=30"}).exit_code == kDone);
+  const std::string before = content_of(folder.path / "out/result.json");
+  for (const char* command : {"validate", "simulate", "gradient", "check"}) {
+    const CommandOutcome outcome = run_command({command, file, "--out", out});
+    CHECK(outcome.exit_code == kBadInput);
+    CHECK_THAT(outcome.err, Contains("holds the outcome of 'design'") && Contains(std::string("out_") + command));
+    CHECK(content_of(folder.path / "out/result.json") == before);
+  }
+  CHECK(run_command({"design", file, "--out", out, "--set", "parameters.k.upper=31"}).exit_code == kDone);
+}
+
 TEST_CASE("a command of the contract that this version lacks says so and lists what there is", "[command]") {
   for (const char* command : {"kinematics", "tradeoff", "resume"}) {
     const CommandOutcome outcome = run_command({command, "x.json"});

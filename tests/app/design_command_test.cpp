@@ -41,6 +41,9 @@ TEST_CASE("design: a minimum inside the bounds, told in a table, a history and a
   const auto& optimizer = result.at("optimizer");
   CHECK(optimizer.at("status") == "converged");
   CHECK(optimizer.at("objective_final") < optimizer.at("objective_initial"));
+  const std::string report = content_of(folder.path / "out/report.html");
+  CHECK_THAT(report, Contains("At the start, seen in the x-y plane") && Contains("converged: the optimality"));
+  CHECK(report.find("class=\"banner\"") == std::string::npos);
   const std::string history = content_of(folder.path / "out/history.csv");
   CHECK_THAT(history, Catch::StartsWith("iteration,objective,infeasibility,optimality,k\n0,"));
   CHECK(std::count(history.begin(), history.end(), '\n') == optimizer.at("iterations").get<int>() + 2);
@@ -78,6 +81,8 @@ TEST_CASE("design: too few iterations is a failure in words that keeps the best 
   CHECK(result.at("status") == "failed");
   CHECK(result.at("optimizer").at("objective_final") <= result.at("optimizer").at("objective_initial"));
   CHECK(fs::exists(folder.path / "out/optimized.json"));
+  CHECK_THAT(content_of(folder.path / "out/report.html"),
+             Contains("class=\"banner\"") && Contains("This run failed: stopped at the limit of 1 iteration"));
 }
 
 TEST_CASE("design: SIGTERM keeps the best so far", "[command]") {
@@ -92,7 +97,12 @@ TEST_CASE("design: SIGTERM keeps the best so far", "[command]") {
   const CommandOutcome outcome = run_design_command(folder.write("rod.json", kPendulum), folder.file("out"), more);
   killer.join();
   CHECK(outcome.exit_code == kInterrupted);
-  CHECK(json_of(folder.path / "out/result.json").at("status") == "interrupted");
+  const auto result = json_of(folder.path / "out/result.json");
+  CHECK(result.at("status") == "interrupted");
+  const std::string kept = result.at("message");
+  // Only what is there: the design, unless the signal came before it began.
+  CHECK_THAT(kept, Contains("optimized.json") || Contains("nothing was designed yet"));
+  CHECK(fs::exists(folder.path / "out/optimized.json") == (kept.find("optimized.json") != std::string::npos));
 }
 
 TEST_CASE("design and identify of a file that does not ask for them are bad input", "[command]") {

@@ -57,7 +57,9 @@ TEST_CASE("identify: the parameter that made the motion is found, with its uncer
 
   const std::string residuals = content_of(folder.path / "out/residuals.csv");
   CHECK_THAT(residuals, Catch::StartsWith("experiment,channel,t,measured,model,residual\nswing,theta,0,"));
-  CHECK_THAT(content_of(folder.path / "out/report.html"), Contains("residual of theta"));
+  CHECK_THAT(content_of(folder.path / "out/report.html"), Contains("residual of theta") &&
+                                                              Contains("degrees of freedom") && Contains("rms/sigma") &&
+                                                              Contains("condition number"));
 }
 
 TEST_CASE("identify: optimized.json starts where the fit ended, from its own folder", "[command]") {
@@ -80,5 +82,23 @@ TEST_CASE("identify: a record with a bad cell is bad input, with its line", "[co
       run_command({"identify", folder.write("fit.json", identification_problem()), "--out", folder.file("out")});
   CHECK(outcome.exit_code == kBadInput);
   CHECK_THAT(outcome.err, Contains("swing.csv:3"));
-  CHECK_FALSE(std::filesystem::exists(folder.path / "out/result.json"));
+  CHECK_THAT(outcome.err, Contains("fit.json:") && Contains("identification.experiments[0].data: "));
+  CHECK_FALSE(std::filesystem::exists(folder.path / "out"));
+}
+
+TEST_CASE("a column or a file that is missing is bad input of every command, at its place in the problem",
+          "[command]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", "time,tehta\n0,0\n0.1,0.2\n");
+  const std::string file = folder.write("fit.json", identification_problem());
+  for (const char* command : {"validate", "identify"}) {
+    const CommandOutcome outcome = run_command({command, file, "--out", folder.file("out")});
+    CHECK(outcome.exit_code == kBadInput);
+    CHECK_THAT(outcome.err, Contains("identification.experiments[0].time: ") && Contains("no column 't'") &&
+                                Contains("identification.experiments[0].channels[0].column: ") &&
+                                Contains("did you mean 'tehta'?"));
+    CHECK_THAT(run_command({command, file, "--set", "identification.experiments[0].data=absent.csv"}).err,
+               Contains("identification.experiments[0].data: there is no file") && Contains("absent.csv"));
+  }
+  CHECK_FALSE(std::filesystem::exists(folder.path / "out"));
 }

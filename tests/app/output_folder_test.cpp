@@ -19,17 +19,17 @@ std::string marker(const OutputFolder& folder) {
 TEST_CASE("a folder is created, and taken again by the same problem", "[output]") {
   const TemporaryFolder temporary;
   const std::string problem = temporary.write("a.json", "{}");
-  const OutputFolder first(temporary.file("deep/out"), "a", problem);
+  const OutputFolder first(temporary.file("deep/out"), "a", problem, "simulate");
   first.write("result.json", marker(first));
   CHECK(first.owner() == "../../a.json");
-  CHECK_NOTHROW(OutputFolder(temporary.file("deep/out"), "a", problem));
+  CHECK_NOTHROW(OutputFolder(temporary.file("deep/out"), "a", problem, "simulate"));
 }
 
 TEST_CASE("a folder with another problem's results is refused and stays as it is", "[output]") {
   const TemporaryFolder temporary;
-  const OutputFolder first(temporary.file("out"), "same name", temporary.write("a.json", "{}"));
+  const OutputFolder first(temporary.file("out"), "same name", temporary.write("a.json", "{}"), "simulate");
   first.write("result.json", marker(first));
-  CHECK_THROWS_WITH(OutputFolder(temporary.file("out"), "same name", temporary.write("b.json", "{}")),
+  CHECK_THROWS_WITH(OutputFolder(temporary.file("out"), "same name", temporary.write("b.json", "{}"), "simulate"),
                     Catch::Contains("another problem") && Catch::Contains("a.json"));
   CHECK(content_of(temporary.path / "out/result.json") == marker(first));
 }
@@ -38,9 +38,9 @@ TEST_CASE("a file that no run wrote is never overwritten", "[output]") {
   const TemporaryFolder temporary;
   const std::string problem = temporary.write("a.json", "{}");
   temporary.write("trajectory.csv", "mine");
-  CHECK_THROWS_WITH(OutputFolder(temporary.path.string(), "a", problem), Catch::Contains("trajectory.csv"));
+  CHECK_THROWS_WITH(OutputFolder(temporary.path.string(), "a", problem, "simulate"), Catch::Contains("trajectory.csv"));
   temporary.write("result.json", R"({"program": "another"})");
-  CHECK_THROWS_AS(OutputFolder(temporary.path.string(), "a", problem), OutputError);
+  CHECK_THROWS_AS(OutputFolder(temporary.path.string(), "a", problem, "simulate"), OutputError);
 }
 
 TEST_CASE("a problem's name cannot lead out of the output folder", "[output]") {
@@ -48,7 +48,7 @@ TEST_CASE("a problem's name cannot lead out of the output folder", "[output]") {
   const std::string problem = temporary.write("a.json", "{}");
   const fs::path before = fs::current_path();
   fs::current_path(temporary.path);
-  const OutputFolder folder("", "../escape", problem);
+  const OutputFolder folder("", "../escape", problem, "simulate");
   fs::current_path(before);
   CHECK(folder.path() == fs::path("out") / "_.._escape");
 }
@@ -56,5 +56,5 @@ TEST_CASE("a problem's name cannot lead out of the output folder", "[output]") {
 TEST_CASE("an output folder where a file lies is an error", "[output]") {
   const TemporaryFolder temporary;
   const std::string problem = temporary.write("a.json", "{}");
-  CHECK_THROWS_AS(OutputFolder(problem, "a", problem), OutputError);
+  CHECK_THROWS_AS(OutputFolder(problem, "a", problem, "simulate"), OutputError);
 }

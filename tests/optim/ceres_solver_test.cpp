@@ -40,7 +40,7 @@ TEST_CASE("ceres finds Rosenbrock's minimum with one evaluation per point", "[ce
     return true;
   };
   const LeastSquaresResult result = solve_with_ceres(problem, Eigen::Vector2d(-1.2, 1), options);
-  CHECK(result.status == LeastSquaresStatus::converged);
+  CHECK(result.status == SolverStatus::converged);
   CHECK((result.x - Eigen::Vector2d(1, 1)).norm() < 1e-8);
   CHECK(result.cost_initial == Approx(12.1));
   CHECK(result.evaluations == problem.calls);
@@ -54,7 +54,7 @@ TEST_CASE("ceres keeps within bounds", "[ceres]") {
   RosenbrockResiduals problem;
   problem.x_upper << 0.5, 10;
   const LeastSquaresResult result = solve_with_ceres(problem, Eigen::Vector2d(-1.2, 1));
-  CHECK(result.status == LeastSquaresStatus::converged);
+  CHECK(result.status == SolverStatus::converged);
   CHECK(result.x(0) == 0.5);
   CHECK(result.x(1) == Approx(0.25).margin(1e-6));
 }
@@ -62,12 +62,12 @@ TEST_CASE("ceres keeps within bounds", "[ceres]") {
 TEST_CASE("a failed evaluation makes ceres shorten the step", "[ceres]") {
   FragileResidual problem;
   const LeastSquaresResult result = solve_with_ceres(problem, Eigen::VectorXd::Zero(1));
-  CHECK(result.status == LeastSquaresStatus::converged);
+  CHECK(result.status == SolverStatus::converged);
   CHECK(result.x(0) == Approx(std::log(20)).epsilon(1e-8));
   CHECK(result.failed_evaluations > 0);
   CHECK(result.first_error == "the loop cannot be closed");
   const LeastSquaresResult bad = solve_with_ceres(problem, Eigen::VectorXd::Constant(1, 5));
-  CHECK(bad.status == LeastSquaresStatus::failed);
+  CHECK(bad.status == SolverStatus::failed);
   CHECK(bad.message == "the start point cannot be evaluated: the loop cannot be closed");
 }
 
@@ -76,8 +76,8 @@ TEST_CASE("ceres stops on request and at the limit", "[ceres]") {
   CeresOptions options;
   options.progress = [](const LeastSquaresProgress& p) { return p.cost > 10; };
   const LeastSquaresResult stopped = solve_with_ceres(problem, Eigen::Vector2d(-1.2, 1), options);
-  CHECK(stopped.status == LeastSquaresStatus::stopped);
+  CHECK(stopped.status == SolverStatus::stopped);
   CHECK(stopped.cost_final < stopped.cost_initial);
   const LeastSquaresResult limited = solve_with_ceres(problem, Eigen::Vector2d(-1.2, 1), {1e-10, 2, {}});
-  CHECK(limited.status == LeastSquaresStatus::iteration_limit);
+  CHECK(limited.status == SolverStatus::iteration_limit);
 }

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "optim/problem.hpp"
+#include "tests/core/mechanism/small_scenes.hpp"
 
 namespace five_bar {
 
@@ -25,12 +26,6 @@ inline const std::array<std::pair<const char*, double>, 10> kGradient{{{"L01", 0
                                                                        {"m3", 0.116610652344094},
                                                                        {"m4", 0.046704924396818}}};
 inline constexpr double kL01 = 2.1469536808839935, kL02 = 1.9183006617287768;  // the optimum, psi = 0
-
-inline mbsopt::Parameter parameter(const std::string& name, double value) {
-  mbsopt::Parameter p;
-  p.name = name, p.value = value;
-  return p;
-}
 
 // A uniform rod from (x1, y1) to (x2, y2), its frame in the middle, x along the rod; its mass is a parameter.
 inline mbsopt::Body rod(const std::string& name, const std::string& mass, double x1, double y1, double x2, double y2) {
@@ -49,14 +44,6 @@ inline mbsopt::Body rod(const std::string& name, const std::string& mass, double
   return b;
 }
 
-inline mbsopt::Joint revolute(const std::string& name, const std::string& body1, const mbsopt::PointField& point1,
-                              const std::string& body2, const mbsopt::PointField& point2) {
-  mbsopt::Joint j;
-  j.name = name, j.type = "revolute", j.body1 = body1, j.body2 = body2, j.point1 = point1, j.point2 = point2;
-  j.axis1 = mbsopt::VectorField{0.0, 0.0, 1.0}, j.axis2 = mbsopt::VectorField{0.0, 0.0, 1.0};
-  return j;
-}
-
 inline mbsopt::Force spring(const std::string& name, const mbsopt::VectorField& ground, const std::string& number) {
   mbsopt::Tsda s;
   s.body1 = "ground", s.point1 = ground, s.body2 = "bar2", s.point2 = "to";
@@ -66,33 +53,30 @@ inline mbsopt::Force spring(const std::string& name, const mbsopt::VectorField& 
 }
 
 inline mbsopt::Problem problem(double rtol = 1e-10) {
+  using namespace mbsopt::testing;
   mbsopt::Problem p;
   mbsopt::Scene& s = p.scene;
   s.name = "five-bar";
   s.gravity = {0.0, -9.81, 0.0};
-  s.parameters = {parameter("L01", std::sqrt(5)),
-                  parameter("L02", std::sqrt(4.25)),
-                  parameter("k1", 100),
-                  parameter("k2", 100),
-                  parameter("c1", 0),
-                  parameter("c2", 0),
-                  parameter("m1", 1),
-                  parameter("m2", 1.5),
-                  parameter("m3", 1.5),
-                  parameter("m4", 1)};
+  add_parameters(s, {{"L01", std::sqrt(5)},
+                     {"L02", std::sqrt(4.25)},
+                     {"k1", 100},
+                     {"k2", 100},
+                     {"c1", 0},
+                     {"c2", 0},
+                     {"m1", 1},
+                     {"m2", 1.5},
+                     {"m3", 1.5},
+                     {"m4", 1}});
   s.bodies = {rod("bar1", "m1", -1, 0, -1.5, -1), rod("bar2", "m2", -1.5, -1, 0, -2), rod("bar3", "m3", 0, -2, 1, -1),
               rod("bar4", "m4", 1, -1, 0.5, 0)};
-  s.joints = {revolute("A", "ground", mbsopt::VectorField{-1.0, 0.0, 0.0}, "bar1", "from"),
-              revolute("P1", "bar1", "to", "bar2", "from"), revolute("P2", "bar2", "to", "bar3", "from"),
-              revolute("P3", "bar3", "to", "bar4", "from"),
-              revolute("B", "bar4", "to", "ground", mbsopt::VectorField{0.5, 0.0, 0.0})};
+  s.joints = {hinge("A", "ground", mbsopt::VectorField{-1.0, 0.0, 0.0}, "bar1", "from"),
+              hinge("P1", "bar1", "to", "bar2", "from"), hinge("P2", "bar2", "to", "bar3", "from"),
+              hinge("P3", "bar3", "to", "bar4", "from"),
+              hinge("B", "bar4", "to", "ground", mbsopt::VectorField{0.5, 0.0, 0.0})};
   s.forces = {spring("spring_A", {-1.0, 0.0, 0.0}, "1"), spring("spring_B", {0.5, 0.0, 0.0}, "2")};
-  for (const char* axis : {"x", "y"}) {
-    mbsopt::Sensor sensor;
-    sensor.name = std::string("r2_") + axis, sensor.quantity = "position", sensor.body = "bar2", sensor.point = "to";
-    sensor.component = axis;
-    s.sensors.push_back(sensor);
-  }
+  for (const char* axis : {"x", "y"})
+    s.sensors.push_back(point_sensor(std::string("r2_") + axis, "position", "bar2", "to", axis));
   s.simulation.end_time = 5;
   s.simulation.integrator.rtol = rtol, s.simulation.integrator.atol = rtol * 1e-2;
   mbsopt::ObjectiveSpec motion;

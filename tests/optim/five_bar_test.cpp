@@ -36,7 +36,7 @@ TEST_CASE("five-bar: the evaluator computes a point once, and only the derivativ
   CHECK(first.psi_rho(0, 0) == Approx(five_bar::kGradient[8].second).epsilon(1e-5));
   CHECK(first.psi_rho(0, 1) == Approx(five_bar::kGradient[1].second).epsilon(1e-5));
   CHECK(first.method == GradientMethod::adjoint);  // one objective
-  CHECK(first.choice.find("2 variables, 1 objectives") != std::string::npos);
+  CHECK(first.choice.find("2 variables, 1 objective;") != std::string::npos);
   evaluator.values(evaluator.start());
   evaluator.gradients(evaluator.start());
   CHECK(evaluator.simulations() == 1);
@@ -75,7 +75,7 @@ TEST_CASE("five-bar: the design holds the mechanism still, from the given length
   }
   const DesignResult result = run_design(problem);
   INFO(result.message);
-  CHECK(result.status == NlpStatus::converged);
+  CHECK(result.status == SolverStatus::converged);
   CHECK(result.variables[0].value == Approx(five_bar::kL01).margin(1e-6));
   CHECK(result.variables[1].value == Approx(five_bar::kL02).margin(1e-6));
   CHECK(result.objective_final < 1e-10);
@@ -100,7 +100,7 @@ TEST_CASE("five-bar: a bound on another objective is held, and said to be touche
   problem.design->subject_to = {{"total_length", 4.1, {}}};  // the free optimum has 4.065
   const DesignResult result = run_design(problem);
   INFO(result.message);
-  CHECK(result.status == NlpStatus::converged);
+  CHECK(result.status == SolverStatus::converged);
   REQUIRE(result.constraints.size() == 1);
   CHECK(result.constraints[0].value == Approx(4.1).margin(1e-6));
   CHECK(result.constraints[0].violation < 1e-7);
@@ -147,7 +147,7 @@ TEST_CASE("a design that is stopped keeps the best point it has seen", "[five_ba
     };
   }
   const DesignResult result = run_design(problem, options);
-  CHECK(result.status == NlpStatus::stopped);
+  CHECK(result.status == SolverStatus::stopped);
   CHECK(result.objective_final < 0.9 * result.objective_initial);
   CHECK(result.variables[0].value != result.variables[0].initial);
   CHECK(result.rho(0) == result.variables[0].value);

@@ -1,11 +1,29 @@
 #include "optim/gradient_check.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
 #include "five_bar.hpp"
 
 using namespace mbsopt;
+
+namespace {
+
+// A user's cost with a derivative that is wrong by some part of itself.
+struct WrongCost : RunningCost {
+  explicit WrongCost(double part) : wrong_(part) {}
+  double g(double, VecIn y, VecIn) const override { return y(0) * y(0); }
+  void add_g_y(double, VecIn y, VecIn, double scale, VecOut out) const override {
+    out(0) += scale * 2 * y(0) * (1 + wrong_);
+  }
+  void add_g_rho(double, VecIn, VecIn, double, VecOut) const override {}
+
+ private:
+  double wrong_;
+};
+
+}  // namespace
 
 TEST_CASE("five-bar: every gradient method agrees with every other", "[check]") {
   Problem problem = five_bar::problem(1e-8);
@@ -17,7 +35,7 @@ TEST_CASE("five-bar: every gradient method agrees with every other", "[check]") 
   problem.objectives.push_back(terminal);
   problem.scene.simulation.end_time = 3;
   GradientCheckOptions options;
-  options.repetitions = 3;
+  options.timing.least_rounds = 3, options.timing.least_seconds = 0;
   const GradientCheck check = check_gradients(problem, options);
   REQUIRE(check.ran);
   REQUIRE(check.entries.size() == 20);
@@ -27,14 +45,21 @@ TEST_CASE("five-bar: every gradient method agrees with every other", "[check]") 
     CHECK(e.exact == Verdict::agrees);
     CHECK(e.frozen_verdict == Verdict::agrees);
     CHECK(e.frozen_difference < 1e-7);
+    REQUIRE(e.free_verdict);
+    CHECK(passes(*e.free_verdict));
     CHECK(e.free_difference < 1e-3);
+    CHECK(std::abs(e.free - e.tlm) <= std::max(1e-7 * std::abs(e.tlm), 10 * e.free_error));
   }
   for (const TaylorCheck& t : check.taylor) {
-    INFO(t.objective << " slope " << t.slope);
+    INFO(t.objective << " slope " << t.slope.value_or(0));
     CHECK(t.passed);
-    CHECK(t.slope < 2.2);
+    REQUIRE(t.slope);
+    CHECK(*t.slope < 2.2);
   }
-  for (const IdentityCheck& i : check.identities) CHECK(i.relative_defect < 1e-11);
+  for (const IdentityCheck& i : check.identities) {
+    CHECK(i.relative_defect < 1e-11);
+    CHECK(i.tlm == Approx(i.w.dot(check.tlm * i.d)).epsilon(1e-14));
+  }
   CHECK(check.passed());
   CHECK(check.adjoint_cost.ratio > 1);
   CHECK(check.tlm_cost.ratio > 1);
@@ -50,7 +75,7 @@ TEST_CASE("entries that are zero, exactly or nearly, get a sane verdict", "[chec
   x.parameters_only = Expression::parse("k1^2");
   problem.objectives = {x};
   GradientCheckOptions options;
-  options.repetitions = 1;
+  options.timing = {1, 1, 0};
   const GradientCheck check = check_gradients(problem, options);
   REQUIRE(check.ran);
   for (const CheckedEntry& e : check.entries) {
@@ -70,25 +95,62 @@ TEST_CASE("a check whose base run fails says why and does not pass", "[check]") 
   CHECK_FALSE(check.passed());
 }
 
-namespace {
+TEST_CASE("free differences that their integration error excuses still judge: wrong by a hundredth is seen",
+          "[check]") {
+  Problem problem = five_bar::problem(1e-6);
+  problem.scene.simulation.end_time = 1;
+  const Objective wrong("wrong", std::make_shared<WrongCost>(1e-2), nullptr);
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0};
+  const GradientCheck check = check_gradients(problem.scene, {wrong}, options);
+  REQUIRE(check.ran);
+  const auto disagrees = [](const CheckedEntry& e) { return e.free_verdict == Verdict::disagrees; };
+  CHECK(std::count_if(check.entries.begin(), check.entries.end(), disagrees) > 5);
+}
 
-// A user's cost with a derivative that is wrong by a part in 1e5.
-struct WrongCost : RunningCost {
-  double g(double, VecIn y, VecIn) const override { return y(0) * y(0); }
-  void add_g_y(double, VecIn y, VecIn, double scale, VecOut out) const override {
-    out(0) += scale * 2 * y(0) * (1 + 1e-5);
+TEST_CASE("differences that cannot be evaluated have failed, they are not zero", "[check]") {
+  Problem problem = five_bar::problem(1e-6);
+  problem.scene.simulation.end_time = 0.2;
+  ObjectiveSpec root;
+  root.name = "root";  // of a number that is 0 here, and negative on one side
+  root.parameters_only = Expression::parse("sqrt(m1 - m4 + 1e-300) + k1");
+  problem.objectives = {root};
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0};
+  const GradientCheck check = check_gradients(problem, options);
+  REQUIRE(check.ran);
+  CHECK_FALSE(check.passed());
+  for (const CheckedEntry& e : check.entries) {
+    if (e.parameter != "m1" && e.parameter != "m4") continue;
+    CHECK(e.frozen_verdict == Verdict::failed);
+    CHECK(e.free_verdict == Verdict::failed);
+    CHECK(std::isnan(e.frozen));
+    CHECK(to_string(e.frozen_verdict) == "FAILED");
   }
-  void add_g_rho(double, VecIn, VecIn, double, VecOut) const override {}
-};
+}
 
-}  // namespace
+TEST_CASE("the Taylor remainder of a linear objective has no slope, and that is right", "[check]") {
+  Problem problem = five_bar::problem(1e-6);
+  problem.scene.simulation.end_time = 0.2;
+  ObjectiveSpec sum;
+  sum.name = "sum";
+  sum.parameters_only = Expression::parse("L01 + 2*k1 + m1 + m2 - c1");
+  problem.objectives = {sum};
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0};
+  const GradientCheck check = check_gradients(problem, options);
+  REQUIRE(check.taylor.size() == 1);
+  CHECK_FALSE(check.taylor[0].slope);
+  CHECK(check.taylor[0].passed);
+  CHECK(check.passed());
+}
 
 TEST_CASE("a wrong derivative of a user's cost shows in frozen differences, not in TLM against adjoint", "[check]") {
   Problem problem = five_bar::problem(1e-8);
   problem.scene.simulation.end_time = 1;
-  const Objective wrong("wrong", std::make_shared<WrongCost>(), nullptr);
+  const Objective wrong("wrong", std::make_shared<WrongCost>(1e-5), nullptr);
   GradientCheckOptions options;
-  options.repetitions = 1, options.free_steps = false;
+  options.timing = {1, 1, 0}, options.free_steps = false;
   const GradientCheck check = check_gradients(problem.scene, {wrong}, options);
   REQUIRE(check.ran);
   CHECK_FALSE(check.passed());

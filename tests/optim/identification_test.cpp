@@ -27,8 +27,8 @@ Problem fit_problem(double w2, double c, double theta0, double omega0) {
 
 TEST_CASE("an experiment's Jacobian is that of its residuals", "[identification]") {
   Problem p = pendulum::problem(64, 0.05, 1.5, 1.8);
-  p.scene.parameters.push_back(pendulum::parameter("g0", 1.1));
-  p.scene.parameters.push_back(pendulum::parameter("b0", 0.02));
+  testing::add_parameters(p.scene, {{"g0", 1.1}});
+  testing::add_parameters(p.scene, {{"b0", 0.02}});
   ExperimentSpec spec = pendulum::experiment("run1", {});
   spec.channels[0].gain = Expression::parse("g0^2"), spec.channels[0].bias = Expression::parse("b0*w2");
   const CsvTable data = pendulum::exact_motion(60, 0.1, 1.4, 1, 2, 50);
@@ -53,7 +53,7 @@ TEST_CASE("the parameters of an exact motion are found again", "[identification]
   const CsvTable data = pendulum::exact_motion(64, 0.055, 1.53, 1.55, 5);
   const IdentificationResult result = run_identification(fit_problem(66, 0.1, 1.5, 1.4), {data});
   INFO(result.message);
-  REQUIRE(result.status == FitStatus::converged);
+  REQUIRE(result.status == SolverStatus::converged);
   REQUIRE(result.parameters.size() == 4);
   CHECK(result.parameters[0].value == Approx(64).epsilon(1e-6));
   CHECK(result.parameters[1].value == Approx(0.055).epsilon(1e-4));
@@ -134,8 +134,8 @@ TEST_CASE("several experiments share parameters, own others, and override", "[id
 
 TEST_CASE("what a motion cannot tell is named", "[identification]") {
   Problem p = fit_problem(64, 0.055, 1.53, 1.55);
-  p.scene.parameters.push_back(pendulum::parameter("m_arm", 0.5));
-  p.scene.parameters.push_back(pendulum::parameter("m_load", 0.5));
+  testing::add_parameters(p.scene, {{"m_arm", 0.5}});
+  testing::add_parameters(p.scene, {{"m_load", 0.5}});
   p.scene.bodies[0].mass = Expression::parse("m_arm + m_load");  // the inertia about the centre of mass is not theirs
   p.identification->variables = {"m_arm", "m_load", "c"};
   const CsvTable data = pendulum::exact_motion(64, 0.055, 1.53, 1.55, 2);
@@ -151,8 +151,8 @@ TEST_CASE("of mass, lever, inertia and friction a free swing tells two combinati
   // theta'' = (m g a/J) sin theta - (k/J) theta'
   Problem p = fit_problem(64, 0.055, 1.53, 1.55);
   for (const auto& [name, value] : {std::pair("m", 0.5), std::pair("a", 0.1), std::pair("k", 4e-4)})
-    p.scene.parameters.push_back(pendulum::parameter(name, value));
-  p.scene.parameters.push_back(pendulum::parameter("J0", 0.5 * 9.81 * 0.1 / 64));
+    testing::add_parameters(p.scene, {{name, value}});
+  testing::add_parameters(p.scene, {{"J0", 0.5 * 9.81 * 0.1 / 64}});
   p.scene.bodies[0].mass = Expression::parse("m");
   p.scene.bodies[0].com = {0.0, Expression::parse("a"), 0.0};
   p.scene.bodies[0].inertia.zz = Expression::parse("J0 - m*a^2");
@@ -173,7 +173,7 @@ TEST_CASE("of mass, lever, inertia and friction a free swing tells two combinati
 
 TEST_CASE("gain and bias may be fitted, sigma may not", "[identification]") {
   Problem p = fit_problem(64.5, 0.05, 1.5, 1.5);
-  p.scene.parameters.push_back(pendulum::parameter("offset", 0));
+  testing::add_parameters(p.scene, {{"offset", 0}});
   p.identification->variables.push_back("offset");
   p.identification->experiments[0].channels[0].bias = Expression::parse("offset");
   CsvTable data = pendulum::exact_motion(64, 0.055, 1.53, 1.55, 4);

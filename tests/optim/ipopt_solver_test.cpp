@@ -60,7 +60,7 @@ TEST_CASE("ipopt finds Rosenbrock's minimum and counts what it did", "[ipopt]") 
   IpoptOptions options;
   options.tolerance = 1e-8;
   const NlpResult result = solve_with_ipopt(problem, vector({-1.2, 1}), options);
-  CHECK(result.status == NlpStatus::converged);
+  CHECK(result.status == SolverStatus::converged);
   CHECK((result.x - vector({1, 1})).norm() < 1e-6);
   CHECK(result.iterations > 5);
   CHECK(result.evaluations >= result.iterations);
@@ -72,7 +72,7 @@ TEST_CASE("ipopt stops at a bound", "[ipopt]") {
   Rosenbrock problem;
   problem.x_upper << 0.5, 10;
   const NlpResult result = solve_with_ipopt(problem, vector({-1.2, 1}), {1e-8, 1e-8, 200, 20, {}});
-  CHECK(result.status == NlpStatus::converged);
+  CHECK(result.status == SolverStatus::converged);
   CHECK(result.x(0) == Approx(0.5).margin(1e-7));
   CHECK(result.x(1) == Approx(0.25).margin(1e-6));
   CHECK(result.x(0) <= 0.5);
@@ -81,7 +81,7 @@ TEST_CASE("ipopt stops at a bound", "[ipopt]") {
 TEST_CASE("ipopt solves HS071 with an inequality and an equality", "[ipopt]") {
   Hs071 problem;
   const NlpResult result = solve_with_ipopt(problem, vector({1, 5, 5, 1}), {1e-8, 1e-8, 100, 20, {}});
-  CHECK(result.status == NlpStatus::converged);
+  CHECK(result.status == SolverStatus::converged);
   CHECK(result.point.f == Approx(17.0140172891563).epsilon(1e-7));
   CHECK((result.x - vector({1, 4.74299963, 3.82114998, 1.37940829})).norm() < 1e-5);
   CHECK(problem.violation(result.point.c) < 1e-7);
@@ -91,7 +91,7 @@ TEST_CASE("ipopt recovers from evaluations that fail and reports the first one",
   Fragile problem;
   problem.throws = GENERATE(false, true);
   const NlpResult result = solve_with_ipopt(problem, vector({4}), {1e-8, 1e-8, 100, 20, {}});
-  CHECK(result.status == NlpStatus::converged);
+  CHECK(result.status == SolverStatus::converged);
   CHECK(result.x(0) == Approx(1).epsilon(1e-6));
   CHECK(result.failed_evaluations > 0);
   CHECK(result.first_error == "the crank locks");
@@ -100,7 +100,7 @@ TEST_CASE("ipopt recovers from evaluations that fail and reports the first one",
 TEST_CASE("a start point that cannot be evaluated is said in words", "[ipopt]") {
   Fragile problem;
   const NlpResult result = solve_with_ipopt(problem, vector({0.1}));
-  CHECK(result.status == NlpStatus::failed);
+  CHECK(result.status == SolverStatus::failed);
   CHECK(result.message == "the start point cannot be evaluated: the crank locks");
   CHECK(result.x == vector({0.1}));
 }
@@ -115,7 +115,7 @@ TEST_CASE("ipopt stops on request and keeps the best point", "[ipopt]") {
     return p.iteration < 5;
   };
   const NlpResult result = solve_with_ipopt(problem, vector({-1.2, 1}), options);
-  CHECK(result.status == NlpStatus::stopped);
+  CHECK(result.status == SolverStatus::stopped);
   REQUIRE(seen.size() == 6);
   CHECK(seen.front() == Approx(24.2));
   CHECK(result.point.f <= seen.back());
@@ -125,7 +125,7 @@ TEST_CASE("ipopt stops on request and keeps the best point", "[ipopt]") {
 TEST_CASE("ipopt says when it runs out of iterations", "[ipopt]") {
   Rosenbrock problem;
   const NlpResult result = solve_with_ipopt(problem, vector({-1.2, 1}), {1e-8, 1e-8, 3, 20, {}});
-  CHECK(result.status == NlpStatus::iteration_limit);
+  CHECK(result.status == SolverStatus::iteration_limit);
   CHECK(result.message == "stopped at the limit of 3 iterations");
 }
 
@@ -133,13 +133,13 @@ TEST_CASE("constraints that contradict each other are infeasible", "[ipopt]") {
   Hs071 problem;
   problem.c_lower(0) = 2000;  // the product of four numbers up to 5 is at most 625
   const NlpResult result = solve_with_ipopt(problem, vector({1, 5, 5, 1}), {1e-6, 1e-8, 300, 20, {}});
-  CHECK(result.status == NlpStatus::infeasible);
+  CHECK(result.status == SolverStatus::infeasible);
 }
 
 TEST_CASE("a start that is optimal already is left as it is", "[ipopt]") {
   Rosenbrock problem;
   const NlpResult result = solve_with_ipopt(problem, vector({1, 1}));
-  CHECK(result.status == NlpStatus::converged);
+  CHECK(result.status == SolverStatus::converged);
   CHECK(result.x == vector({1, 1}));
   CHECK(result.evaluations == 1);
   problem.x_upper << 0.5, 0.25;  // at the bounds: the objective falls only beyond them

@@ -8,14 +8,9 @@
 
 #include "optim/csv_table.hpp"
 #include "optim/problem.hpp"
+#include "tests/core/mechanism/small_scenes.hpp"
 
 namespace pendulum {
-
-inline mbsopt::Parameter parameter(const std::string& name, double value) {
-  mbsopt::Parameter p;
-  p.name = name, p.value = value;
-  return p;
-}
 
 // m = 1 kg, a = 1 mm: the inertia about the pin is m g a/w2.
 inline mbsopt::Problem problem(double w2, double c, double theta0, double omega0) {
@@ -24,7 +19,7 @@ inline mbsopt::Problem problem(double w2, double c, double theta0, double omega0
   mbsopt::Scene& s = p.scene;
   s.name = "pendulum";
   s.gravity = {0.0, -9.81, 0.0};
-  s.parameters = {parameter("w2", w2), parameter("c", c), parameter("theta0", theta0), parameter("omega0", omega0)};
+  mbsopt::testing::add_parameters(s, {{"w2", w2}, {"c", c}, {"theta0", theta0}, {"omega0", omega0}});
   s.parameters[0].lower = 1, s.parameters[0].upper = 1000;
   s.parameters[1].lower = 0;
   s.definitions = {{"J", Expression::parse("9.81*0.001/w2")}};
@@ -33,16 +28,11 @@ inline mbsopt::Problem problem(double w2, double c, double theta0, double omega0
   arm.inertia = {1e-4, 1e-4, Expression::parse("J - 0.001^2"), 0.0, 0.0, 0.0};
   arm.orientation = mbsopt::AxisAngleField{{0.0, 0.0, 1.0}, Expression::parse("theta0")};
   s.bodies = {arm};
-  mbsopt::Joint pin;
-  pin.name = "pin", pin.type = "revolute", pin.body2 = "arm";
-  pin.axis1 = mbsopt::VectorField{0.0, 0.0, 1.0}, pin.axis2 = mbsopt::VectorField{0.0, 0.0, 1.0};
-  s.joints = {pin};
+  s.joints = {mbsopt::testing::hinge("pin", "ground", "O", "arm", "O")};
   mbsopt::Rsda friction;
   friction.joint = "pin", friction.damping = Expression::parse("c*J");
   s.forces = {{"friction", friction}};
-  mbsopt::Sensor theta;
-  theta.name = "theta", theta.quantity = "angle", theta.joint = "pin";
-  s.sensors = {theta};
+  s.sensors = {mbsopt::testing::angle_sensor("theta", "pin")};
   s.conditions = {{"theta", Expression::parse("theta0"), Expression::parse("omega0")}};
   s.simulation.integrator.rtol = 1e-8, s.simulation.integrator.atol = 1e-10;
   return p;

@@ -157,6 +157,39 @@ TEST_CASE("coefficients that a law replaces do not matter, the law's parameters 
   tsda.law = Expression::parse("c*l + twice*ldot");
   problem.scene.forces.push_back({"s", tsda});
   CHECK(unused(problem) == Paths{"parameters.k"});
+  std::get<Tsda>(problem.scene.forces[0].kind).stiffness = Expression::parse("k");
+  const auto issues = find_unused_parameters(problem);
+  REQUIRE(issues.size() == 1);
+  CHECK_THAT(issues[0].message, Catch::Contains("only by coefficients that a law replaces"));
+}
+
+TEST_CASE("a variable must matter to what the design uses, or to what is measured", "[unused]") {
+  Problem problem = two_pendulums();
+  add_objective(problem, "ya^2");
+  add_objective(problem, "yb^2");
+  problem.design.emplace();
+  problem.design->minimize = "psi0", problem.design->variables = {"ma", "mb"};
+  CHECK(unused(problem) == Paths{});
+  const auto issues = find_idle_variables(problem);
+  REQUIRE(issues.size() == 1);
+  CHECK(issues[0].path == "design.variables[1]");
+  problem.scene.parameters[1].allow_unused = true;
+  CHECK(find_idle_variables(problem).empty());
+  problem.scene.parameters[1].allow_unused = false;
+  problem.design->subject_to = {{"psi1", {}, 1.0}};
+  CHECK(find_idle_variables(problem).empty());
+
+  ExperimentSpec experiment;
+  experiment.channels.push_back({"theta", "ya", 1.0, 1.0, 0.0});
+  problem.identification.emplace();
+  problem.identification->experiments = {experiment};
+  problem.identification->variables = {"mb"};
+  REQUIRE(find_idle_variables(problem).size() == 1);
+  CHECK(find_idle_variables(problem)[0].path == "identification.variables[0]");
+  problem.identification->variables = {"ma"};
+  problem.identification->experiments[0].free = {"mb"};
+  REQUIRE(find_idle_variables(problem).size() == 1);
+  CHECK(find_idle_variables(problem)[0].path == "identification.experiments[0].free[0]");
 }
 
 TEST_CASE("gravity and initial conditions count", "[unused]") {

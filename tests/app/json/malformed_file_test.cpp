@@ -74,6 +74,10 @@ Finding at_mark(std::string& text) {
 const Case kCases[] = {
     {"unknown key", R"("mass": 1.0)", R"("mass": 1.0, @"colour": 3)", "bodies[0].colour", "unknown key"},
     {"misspelt key", R"("stiffness": "k1")", R"(@"stifness": "k1")", "forces[0].stifness", "did you mean 'stiffness'"},
+    {"misspelt required key", R"("mass": 1.0)", R"(@"mas": 1.0)", "bodies[0].mas",
+     "unknown key (did you mean 'mass'?); mass is missing; expected: [kg]"},
+    {"misspelt key of the type", R"("type": "revolute")", R"(@"tpye": "revolute")", "joints[0].tpye",
+     "did you mean 'type'?); type is missing; available: revolute, spherical"},
     {"unknown key at the top", R"("simulation":)", R"(@"simulatoin":)", "simulatoin", "did you mean 'simulation'"},
     {"key of another type", R"("body2": "rod", )", R"("body2": "rod", @"axis1": [1, 0, 0], )", "joints[1].axis1",
      "unknown key"},
@@ -150,8 +154,11 @@ const Case kCases[] = {
      "that of the parameter is kg/s^2"},
     {"name that is no folder", R"("format": 1)", R"("name": @"../out", "format": 1)", "name", "names a folder"},
     {"unit that is not SI", R"("unit": "N/m")", R"("unit": @"N/mm")", "parameters.k1.unit", "is not SI"},
-    {"broken JSON: no comma", R"("mass": 1.0, )", R"("mass": 1.0 @"colour": )", "", "is not JSON"},
-    {"broken JSON: trailing comma", R"("variables": ["k1"])", R"("variables": ["k1", @])", "", "is not JSON"},
+    {"broken JSON: no comma", R"("mass": 1.0, )", R"("mass": 1.0 @"colour": )", "", "is a comma missing before it?"},
+    {"broken JSON: no comma in a list", R"([0, -9.81, 0])", R"([0, -9.81 @0])", "", "is a comma missing before it?"},
+    {"broken JSON: no colon", R"("mass": 1.0)", R"("mass" @1.0)", "", "expected ':'"},
+    {"broken JSON: trailing comma", R"("variables": ["k1"])", R"("variables": ["k1", @])", "",
+     "is there a comma too many before it?"},
     {"broken JSON: single quotes", R"("mass": 1.0)", R"(@'mass': 1.0)", "", "is not JSON"},
     {"circular definitions", R"("half": "k1/2")", R"("half": @"other", "other": "half")", "definitions.half",
      "refers to itself"},
@@ -249,7 +256,26 @@ TEST_CASE("all errors are reported at once, in the order of the file", "[json]")
                                           "design.colour"});
 }
 
+TEST_CASE("a design variable that only objectives it does not use depend on is refused", "[json]") {
+  std::string text = replaced(kGood, R"("theta0": 0.3)", R"("theta0": 0.3, "price": 2)");
+  text = replaced(text, R"("objectives": {)", R"("objectives": {"cost": {"parameters_only": "price^2"}, )");
+  CHECK(findings_of(text).empty());
+  text = replaced(text, R"("variables": ["k1"])", R"("variables": ["k1", @"price"])");
+  const Finding expected = at_mark(text);
+  const std::vector<Finding> findings = findings_of(text);
+  REQUIRE(findings.size() == 1);
+  CHECK(findings[0].path == "design.variables[1]");
+  CHECK(findings[0].line == expected.line);
+  CHECK(findings[0].column == expected.column);
+  CHECK_THAT(findings[0].message, Catch::Contains("'price' cannot influence any objective that the design"));
+  CHECK(findings_of(replaced(text, R"("minimize": "track",)", R"("minimize": "cost", "subject_to": [{"objective":
+        "track", "upper": 1}],)"))
+            .empty());
+}
+
 TEST_CASE("an error does not drag others behind it", "[json]") {
+  CHECK(findings_of(replaced(kGood, R"("mass": 1.0)", R"("mas": 1.0)")).size() == 1);
+  CHECK(findings_of(replaced(kGood, R"("type": "revolute")", R"("tpye": "revolute")")).size() == 1);
   // Without its type, nothing can be said about the joint's other keys; k1 is used in the force that does not parse.
   std::string text = replaced(kGood, R"("type": "revolute")", R"("type": "revolut")");
   CHECK(findings_of(text).size() == 1);

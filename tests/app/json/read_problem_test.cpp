@@ -3,6 +3,8 @@
 #include <catch2/catch.hpp>
 #include <numbers>
 
+#include "tests/app/temporary_folder.hpp"
+
 using namespace mbsopt;
 
 namespace {
@@ -114,23 +116,25 @@ TEST_CASE("a problem is read field by field", "[json]") {
 }
 
 TEST_CASE("an identification is read, its data found beside the problem file", "[json]") {
+  const TemporaryFolder folder;
+  folder.write("run.csv", "t,time,x\n0,1,0.1\n0.5,1.5,0.2\n1,2,0.3\n");
   const std::string text =
       R"({"parameters": {"m": 1, "g0": 1, "th": 0}, "bodies": [{"name": "a", "mass": "m", "inertia": [1, 1, 1], "position": ["th", 0, 0]}],
  "sensors": {"x": {"quantity": "position", "body": "a", "component": "x"}},
  "identification": {"variables": ["m"], "loss": {"type": "squared"}, "sigma_is_known": true,
    "optimizer": {"tolerance": 1e-8},
    "experiments": [
-   {"name": "r", "data": "problem.schema.json", "time": "time", "start_time": 1, "end_time": 2, "overrides": {"th": 0.3}, "free": ["th"],
+   {"name": "r", "data": "run.csv", "time": "time", "start_time": 1, "end_time": 2, "overrides": {"th": 0.3}, "free": ["th"],
     "channels": [{"column": "x", "sensor": "x", "sigma": 0.01, "gain": "g0", "bias": "2 [mm]"}]},
-   {"name": "v", "data": "problem.schema.json", "role": "validate", "channels": [{"column": "x", "sensor": "x"}]}]}})";
-  const Problem problem = read_problem_text(text, MBSOPT_SOURCE_DIR "/problems/p.json");
+   {"name": "v", "data": "run.csv", "role": "validate", "channels": [{"column": "x", "sensor": "x"}]}]}})";
+  const Problem problem = read_problem_text(text, folder.path / "p.json");
   REQUIRE(problem.identification);
   const IdentificationSpec& identification = *problem.identification;
   CHECK(identification.sigma_is_known);
   CHECK(identification.tolerance == 1e-8);
   REQUIRE(identification.experiments.size() == 2);
   const ExperimentSpec& run = identification.experiments[0];
-  CHECK(run.data == MBSOPT_SOURCE_DIR "/problems/problem.schema.json");
+  CHECK(run.data == folder.file("run.csv"));
   CHECK(run.time == "time");
   CHECK(run.start_time == 1.0);
   CHECK(run.overrides == std::vector<std::pair<std::string, double>>{{"th", 0.3}});
@@ -181,6 +185,10 @@ TEST_CASE("errors of a --set are reported under its path", "[json]") {
   CHECK_THAT(error_of({"bodies[0].mas=2"}),
              Catch::StartsWith("--set bodies[0].mas: unknown key (did you mean 'mass'?)"));
   CHECK_THAT(error_of({"bodies[7].mass=2"}), Catch::Contains("--set bodies[7].mass: bodies has 2 entries"));
+  CHECK_THAT(error_of({"objectives.track.samples[1].time=2"}),
+             Catch::Contains("objectives.track.samples has 1 entry, numbered from 0"));
+  CHECK_THAT(error_of({"design.subject_too[0].upper=2"}),
+             Catch::Contains("there is no design.subject_too") && Catch::Contains("design.subject_too=[...]"));
   CHECK_THAT(error_of({"name.first=2"}), Catch::Contains("name is the string 'double-pendulum', not an object"));
   CHECK_THAT(error_of({"bodies.mass=2"}), Catch::Contains("bodies is a list of 2, not an object"));
   CHECK_THAT(error_of({"bodies[x].mass=2"}), Catch::Contains("an index in [] must be a whole number"));
@@ -194,5 +202,6 @@ TEST_CASE("what deserves a word but is no error is a warning", "[json]") {
   std::vector<std::string> warnings;
   read_problem_text(kFile, "p.json", {"forces[1].stiffness=3"}, &warnings);
   REQUIRE(warnings.size() == 1);
-  CHECK_THAT(warnings[0], Catch::StartsWith("forces[1].law: replaces the coefficients"));
+  CHECK_THAT(warnings[0], Catch::StartsWith("p.json:") &&
+                              Catch::Contains(": forces[1].law: replaces the coefficients of this force: stiffness,"));
 }

@@ -16,6 +16,42 @@ TEST_CASE("ticks are round numbers within the range", "[report]") {
   CHECK(tiny[1] - tiny[0] == Approx(2e-9).epsilon(1e-6));
 }
 
+TEST_CASE("logarithmic ticks are powers of ten, or 1, 2, 5 where those are few", "[report]") {
+  const auto near = [](const std::vector<double>& a, const std::vector<double>& b) {
+    return a.size() == b.size() &&
+           std::equal(a.begin(), a.end(), b.begin(), [](double x, double y) { return x == Approx(y); });
+  };
+  CHECK(near(logarithmic_ticks(1e-3, 2e2, 6), {1e-3, 1e-2, 0.1, 1, 10, 100}));
+  CHECK(near(logarithmic_ticks(1e-14, 1, 6), {1e-12, 1e-9, 1e-6, 1e-3, 1}));
+  CHECK(near(logarithmic_ticks(0.9, 12, 6), {1, 2, 5, 10}));
+  const auto narrow = logarithmic_ticks(0.1288, 0.1312, 6);
+  REQUIRE(narrow.size() >= 3);
+  CHECK(narrow.front() >= 0.1288);
+  CHECK(narrow.back() <= 0.1312);
+}
+
+TEST_CASE("a convergence plot has readable labels and whole iterations", "[report]") {
+  LinePlot plot{.title = "f", .x_label = "iteration", .y_label = "f", .logarithmic_y = true, .whole_x = true};
+  plot.series.push_back({"f", {0, 1, 2, 3}, {1, 1e-4, 1e-9, 1e-13}, Mark::line});
+  const std::string svg = to_svg(plot);
+  CHECK(svg.find(">10<tspan dy=\"-4\" font-size=\"9\">-6</tspan>") != std::string::npos);
+  CHECK(svg.find(">1e-") == std::string::npos);
+  CHECK(svg.find(">0.5<") == std::string::npos);
+  CHECK(svg.find(">2<") != std::string::npos);
+  plot.series[0].y = {1, 0.1, 0.02, 0.01};
+  CHECK(to_svg(plot).find(">0.01<") != std::string::npos);
+}
+
+TEST_CASE("a legend shows lines as they are drawn", "[report]") {
+  LinePlot plot{.title = "", .x_label = "", .y_label = ""};
+  plot.series.push_back({"before", {0, 1}, {0, 1}, Mark::dashed});
+  plot.series.push_back({"measured", {0, 1}, {1, 0}, Mark::points});
+  const std::string svg = to_svg(plot);
+  const std::string legend = svg.substr(svg.find("legend"));
+  CHECK(legend.find("class=\"line dashed c0\"") < legend.find("before"));
+  CHECK(legend.find("class=\"points c1\"") < legend.find("measured"));
+}
+
 TEST_CASE("values that are not finite interrupt the line and never reach the drawing", "[report]") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   LinePlot plot{.title = "a < b", .x_label = "t [s]", .y_label = "y"};

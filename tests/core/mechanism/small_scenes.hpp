@@ -40,13 +40,17 @@ inline Body body(const std::string& name, VectorField com, VectorField position,
 inline OrientationField turned(const std::string& angle) { return AxisAngleField{vec("0", "0", "1"), f(angle)}; }
 
 // A revolute about z of both bodies.
-inline Joint hinge(const std::string& name, const std::string& body1, VectorField point1, const std::string& body2,
-                   VectorField point2) {
+inline Joint hinge(const std::string& name, const std::string& body1, PointField point1, const std::string& body2,
+                   PointField point2) {
   Joint j;
   j.name = name, j.type = "revolute", j.body1 = body1, j.body2 = body2;
   j.point1 = std::move(point1), j.point2 = std::move(point2);
   j.axis1 = vec("0", "0", "1"), j.axis2 = vec("0", "0", "1");
   return j;
+}
+inline Joint hinge(const std::string& name, const std::string& body1, VectorField point1, const std::string& body2,
+                   VectorField point2) {
+  return hinge(name, body1, PointField(std::move(point1)), body2, PointField(std::move(point2)));
 }
 
 inline Joint ball(const std::string& name, const std::string& body1, VectorField point1, const std::string& body2,
@@ -63,10 +67,14 @@ inline Sensor angle_sensor(const std::string& name, const std::string& joint) {
   return s;
 }
 inline Sensor point_sensor(const std::string& name, const std::string& quantity, const std::string& on,
-                           VectorField point, const std::string& component) {
+                           PointField point, const std::string& component) {
   Sensor s;
   s.name = name, s.quantity = quantity, s.body = on, s.point = std::move(point), s.component = component;
   return s;
+}
+inline Sensor point_sensor(const std::string& name, const std::string& quantity, const std::string& on,
+                           VectorField point, const std::string& component) {
+  return point_sensor(name, quantity, on, PointField(std::move(point)), component);
 }
 
 inline Condition value_of(const std::string& sensor, const std::string& value) { return {sensor, f(value), {}}; }

@@ -159,6 +159,7 @@ TEST_CASE("a law beside coefficients is a warning", "[scene]") {
   REQUIRE(issues.size() == 1);
   CHECK(issues[0].is_warning);
   CHECK(issues[0].path == "forces[0].law");
+  CHECK_THAT(issues[0].message, Catch::Contains("stiffness"));
 }
 
 TEST_CASE("circular and endless definitions are reported once, at the definition", "[scene]") {

@@ -1,0 +1,22 @@
+#include "app/energy_balance.hpp"
+
+#include <algorithm>
+#include <variant>
+
+#include "core/scene/scene_facts.hpp"
+
+namespace mbsopt {
+
+bool conserves_energy(const Scene& scene) {
+  const SceneFacts facts(scene);
+  const auto zero = [&](const Field& field) { return facts.value(field) == 0.0; };
+  return std::all_of(scene.forces.begin(), scene.forces.end(), [&](const Force& force) {
+    // A constant tension has no part in the potential energy either.
+    if (const auto* tsda = std::get_if<Tsda>(&force.kind))
+      return !tsda->law && zero(tsda->damping) && zero(tsda->actuator);
+    if (const auto* rsda = std::get_if<Rsda>(&force.kind)) return !rsda->law && zero(rsda->damping);
+    return false;
+  });
+}
+
+}  // namespace mbsopt

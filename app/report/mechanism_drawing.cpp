@@ -1,0 +1,298 @@
+#include "app/report/mechanism_drawing.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <set>
+
+#include "app/report/html_page.hpp"
+#include "app/report/line_plot.hpp"
+#include "core/body/euler_parameters.hpp"
+#include "core/scene/scene_facts.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Point3 = Eigen::Vector3d;
+using Point2 = Eigen::Vector2d;
+
+constexpr double kWidth = 760, kLargestHeight = 460, kSmallestHeight = 160, kMargin = 40;  // [px]
+constexpr double kTitle = 24;                                                              // room above [px]
+constexpr std::size_t kColours = 8, kMostNames = 10;
+
+// A point of a body, which may be the ground, in that body's frame.
+struct BodyPoint {
+  std::string body;
+  Point3 s;
+};
+
+// What of a scene is drawn.
+struct Sketch {
+  std::vector<std::vector<Point3>> bodies;  // points of each
+  std::vector<BodyPoint> joints;
+  std::vector<std::pair<BodyPoint, BodyPoint>> springs;
+};
+
+class SketchMaker {
+ public:
+  explicit SketchMaker(const Scene& scene) : scene_(scene), facts_(scene) {}
+
+  Sketch sketch() {
+    result_.bodies.resize(scene_.bodies.size());
+    for (const Joint& joint : scene_.joints) {
+      const BodyPoint p1 = point(joint.body1, joint.point1), p2 = point(joint.body2, joint.point2);
+      add(p1), add(p2);
+      result_.joints.push_back(joint.body1 == "ground" ? p1 : p2);
+    }
+    for (const Force& force : scene_.forces) {
+      const auto* tsda = std::get_if<Tsda>(&force.kind);
+      if (!tsda) continue;
+      const BodyPoint p1 = point(tsda->body1, tsda->point1), p2 = point(tsda->body2, tsda->point2);
+      add(p1), add(p2);
+      result_.springs.emplace_back(p1, p2);
+    }
+    for (const Sensor& sensor : scene_.sensors) {
+      if (!sensor.body.empty()) add(point(sensor.body, sensor.point));
+      if (!sensor.body1.empty() && !sensor.body2.empty())
+        add(point(sensor.body1, sensor.point1)), add(point(sensor.body2, sensor.point2));
+    }
+    for (std::size_t i = 0; i < scene_.bodies.size(); ++i) add_own_points(i);
+    return std::move(result_);
+  }
+
+ private:
+  BodyPoint point(const std::string& body, const PointField& field) const {
+    const auto s = facts_.value(field, body);
+    return {body, s ? Point3((*s)[0], (*s)[1], (*s)[2]) : Point3::Zero()};
+  }
+
+  // Its named points, but for those that are directions of joints; a body without any gets its centre of mass.
+  void add_own_points(std::size_t index) {
+    const Body& body = scene_.bodies[index];
+    std::set<std::string> directions;
+    for (const Joint& joint : scene_.joints) {
+      for (const auto* field : {&joint.axis1, &joint.axis2, &joint.normal1, &joint.normal2}) {
+        const std::string* name = *field ? std::get_if<std::string>(&**field) : nullptr;
+        if (name) directions.insert(*name);
+      }
+    }
+    for (const auto& [name, coordinates] : body.points)
+      if (!directions.contains(name)) add(point(body.name, coordinates));
+    for (const Shape& shape : body.shapes) add(point(body.name, shape.from)), add(point(body.name, shape.to));
+    if (result_.bodies[index].size() < 2) add(point(body.name, body.com));
+  }
+
+  void add(const BodyPoint& p) {
+    for (std::size_t i = 0; i < scene_.bodies.size(); ++i)
+      if (scene_.bodies[i].name == p.body) result_.bodies[i].push_back(p.s);
+  }
+
+  const Scene& scene_;
+  const SceneFacts facts_;
+  Sketch result_;
+};
+
+// Global position of a point of the body of that number, from a trajectory's row: t, then 13 numbers per body.
+Point3 placed(const std::vector<double>& row, std::size_t body, const Point3& s) {
+  const double* const b = row.data() + 1 + 13 * body;
+  const Eigen::Vector4d e(b[3], b[4], b[5], b[6]);
+  return Point3(b[0], b[1], b[2]) + A(e) * s;
+}
+
+Point3 placed(const Scene& scene, const std::vector<double>& row, const BodyPoint& p) {
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i)
+    if (scene.bodies[i].name == p.body) return placed(row, i, p.s);
+  return p.s;  // of the ground
+}
+
+double cross(const Point2& a, const Point2& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+// Andrew's monotone chain, Information Processing Letters 9 (1979) 216-219.
+std::vector<Point2> convex_hull(std::vector<Point2> points) {
+  const auto before = [](const Point2& a, const Point2& b) {
+    return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y());
+  };
+  std::sort(points.begin(), points.end(), before);
+  points.erase(std::unique(points.begin(), points.end(), [](const auto& a, const auto& b) { return a == b; }),
+               points.end());
+  if (points.size() < 3) return points;
+  std::vector<Point2> hull;
+  for (int side = 0; side < 2; ++side, std::reverse(points.begin(), points.end())) {
+    const std::size_t first = hull.size();
+    for (const Point2& p : points) {
+      while (hull.size() >= first + 2 && cross(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0)
+        hull.pop_back();
+      hull.push_back(p);
+    }
+    hull.pop_back();  // the other side begins with it
+  }
+  return hull;
+}
+
+// A hull thinner than a pixel is a line: between its two points that are farthest apart.
+std::vector<Point2> outline(std::vector<Point2> points) {
+  const std::vector<Point2> hull = convex_hull(std::move(points));
+  if (hull.size() < 3) return hull;
+  Point2 a = hull[0], b = hull[1];
+  for (const Point2& p : hull)
+    for (const Point2& q : hull)
+      if ((p - q).norm() > (a - b).norm()) a = p, b = q;
+  const auto off = [&](const Point2& p) { return std::abs(cross(b - a, p - a)) / (b - a).norm(); };
+  const bool thin = std::all_of(hull.begin(), hull.end(), [&](const Point2& p) { return off(p) < 1; });
+  return thin ? std::vector<Point2>{a, b} : hull;
+}
+
+// Metres to pixels, the same scale in both directions.
+struct View {
+  std::array<int, 2> plane;
+  double x0 = 0, y0 = 0, scale = 1, height = 0;  // x0, y0: at the left and lower margin [m]; scale [px/m]
+
+  Point2 flat(const Point3& p) const { return {p(plane[0]), p(plane[1])}; }
+  Point2 operator()(const Point3& p) const {
+    return {kMargin + (p(plane[0]) - x0) * scale, height - kMargin - (p(plane[1]) - y0) * scale};
+  }
+};
+
+struct DrawnSketch {
+  const DrawnState& state;
+  Sketch sketch;
+};
+
+View view_of(std::array<int, 2> plane, const std::vector<DrawnSketch>& drawn) {
+  Eigen::AlignedBox2d box;
+  View view{plane};
+  for (const auto& [state, sketch] : drawn) {
+    for (std::size_t i = 0; i < sketch.bodies.size(); ++i)
+      for (const Point3& s : sketch.bodies[i]) box.extend(view.flat(placed(state.row, i, s)));
+    for (const BodyPoint& joint : sketch.joints) box.extend(view.flat(placed(state.scene, state.row, joint)));
+    for (const auto& [from, to] : sketch.springs)
+      for (const BodyPoint& end : {from, to}) box.extend(view.flat(placed(state.scene, state.row, end)));
+  }
+  const double width = std::max(box.sizes().x(), 1e-12), height = std::max(box.sizes().y(), 1e-12);
+  view.scale = std::min((kWidth - 2 * kMargin) / width, (kLargestHeight - 2 * kMargin - kTitle) / height);
+  view.height = std::max(kSmallestHeight, height * view.scale + 2 * kMargin + kTitle);
+  view.x0 = box.center().x() - (kWidth / 2 - kMargin) / view.scale;
+  view.y0 = box.center().y() - ((view.height - kTitle) / 2 - kMargin) / view.scale;
+  return view;
+}
+
+std::string path_through(const std::vector<Point2>& pixels, bool closed) {
+  std::string d;
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+    fmt::format_to(std::back_inserter(d), "{}{:.1f} {:.1f}", i == 0 ? 'M' : 'L', pixels[i].x(), pixels[i].y());
+  return closed ? d + "Z" : d;
+}
+
+std::string zigzag(const Point2& from, const Point2& to) {
+  constexpr int kTurns = 12;
+  constexpr double kWide = 5;  // [px]
+  const Point2 along = to - from;
+  const double length = along.norm();
+  const Point2 across = length > 0 ? Point2(Point2(-along.y(), along.x()) / length * kWide) : Point2(0, 0);
+  std::vector<Point2> pixels{from, from + 0.15 * along};
+  for (int i = 1; i < kTurns; ++i)
+    pixels.push_back(from + (0.15 + 0.7 * i / kTurns) * along + (i % 2 == 0 ? -1.0 : 1.0) * across);
+  pixels.push_back(from + 0.85 * along);
+  pixels.push_back(to);
+  return path_through(pixels, false);
+}
+
+void draw_state(const DrawnSketch& drawn, const View& view, bool last, std::string& svg) {
+  const auto& [state, sketch] = drawn;
+  svg += last ? "<g>\n" : "<g class=\"earlier\">\n";
+  for (const auto& [from, to] : sketch.springs) {
+    svg += fmt::format("<path class=\"spring\" d=\"{}\"/>\n",
+                       zigzag(view(placed(state.scene, state.row, from)), view(placed(state.scene, state.row, to))));
+  }
+  for (std::size_t i = 0; i < sketch.bodies.size(); ++i) {
+    std::vector<Point2> pixels;
+    Point2 middle(0, 0);
+    for (const Point3& s : sketch.bodies[i]) pixels.push_back(view(placed(state.row, i, s)));
+    const std::vector<Point2> hull = outline(std::move(pixels));
+    for (const Point2& p : hull) middle += p / static_cast<double>(hull.size());
+    svg += fmt::format("<path class=\"body c{0} f{0}\" d=\"{1}\"/>\n", i % kColours,
+                       hull.size() == 1 ? path_through(hull, false) + "h0" : path_through(hull, hull.size() > 2));
+    if (last && sketch.bodies.size() <= kMostNames)
+      svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", middle.x() + 6, middle.y() - 6,
+                         html_escaped(state.scene.bodies[i].name));
+  }
+  for (const BodyPoint& joint : sketch.joints) {
+    const Point2 p = view(placed(state.scene, state.row, joint));
+    if (joint.body == "ground")
+      svg += fmt::format("<path class=\"ground\" d=\"M{0:.1f} {1:.1f}l-7 12h14Z\"/>\n", p.x(), p.y());
+    svg += fmt::format("<circle class=\"joint\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\"/>\n", p.x(), p.y());
+  }
+  svg += "</g>\n";
+}
+
+// A length of about an eighth of the width, round.
+void draw_scale(const View& view, std::string& svg) {
+  const double wanted = kWidth / 8 / view.scale, length = round_ticks(0, 2 * wanted, 2).at(1);
+  svg += fmt::format(
+      "<path class=\"frame\" d=\"M{0:.1f} {1:.1f}v6h{2:.1f}v-6\"/><text x=\"{3:.1f}\" y=\"{4:.1f}\">{5:g} m</text>\n",
+      kMargin / 2, view.height - 14, length * view.scale, kMargin / 2 + length * view.scale + 6, view.height - 8,
+      length);
+}
+
+}  // namespace
+
+std::array<int, 2> plane_of_motion(const Scene& scene, const Trajectory& trajectory) {
+  constexpr std::size_t kInstants = 50;
+  constexpr double kStandstill = 1e-6;  // of the spread: motion below is none
+  const Sketch sketch = SketchMaker(scene).sketch();
+  Eigen::AlignedBox3d all;
+  Point3 motion = Point3::Zero();  // largest way of a point along each axis
+  const std::size_t stride = std::max<std::size_t>(1, trajectory.rows.size() / kInstants);
+  for (std::size_t i = 0; i < sketch.bodies.size(); ++i) {
+    for (const Point3& s : sketch.bodies[i]) {
+      Eigen::AlignedBox3d way;
+      for (std::size_t row = 0; row < trajectory.rows.size(); row += stride)
+        way.extend(placed(trajectory.rows[row], i, s));
+      if (way.isEmpty()) continue;
+      motion = motion.cwiseMax(way.sizes());
+      all.extend(way);
+    }
+  }
+  const Point3 spread = all.isEmpty() ? Point3::Zero() : Point3(all.sizes());
+  std::array<int, 3> axes{0, 1, 2};
+  std::stable_sort(axes.begin(), axes.end(), [&](int a, int b) {
+    const double least = kStandstill * spread.maxCoeff();
+    const bool still = motion(a) <= least && motion(b) <= least;
+    return still ? spread(a) > spread(b) : motion(a) > motion(b);
+  });
+  return {std::min(axes[0], axes[1]), std::max(axes[0], axes[1])};
+}
+
+std::string mechanism_drawing(const std::string& title, std::array<int, 2> plane,
+                              const std::vector<DrawnState>& states) {
+  if (states.empty()) return {};
+  std::vector<DrawnSketch> drawn;
+  for (const DrawnState& state : states) drawn.push_back({state, SketchMaker(state.scene).sketch()});
+  const View view = view_of(plane, drawn);
+  const std::string full_title = fmt::format("{}, seen in the {}-{} plane", title, "xyz"[plane[0]], "xyz"[plane[1]]);
+  std::string svg = fmt::format("<svg viewBox=\"0 0 {} {:.0f}\" role=\"img\" aria-label=\"{}\">\n", kWidth, view.height,
+                                html_escaped(full_title));
+  svg += fmt::format("<text class=\"title\" x=\"{}\" y=\"18\">{}</text>\n", kMargin / 2, html_escaped(full_title));
+  for (const DrawnSketch& one : drawn) draw_state(one, view, &one == &drawn.back(), svg);
+  draw_scale(view, svg);
+  svg += "</svg>\n";
+  if (states.size() < 2) return svg;
+  svg += "<div class=\"legend\">";
+  for (const DrawnState& state : states) {
+    const bool last = &state == &states.back();
+    svg += fmt::format(
+        "<span><svg class=\"key\" viewBox=\"0 0 30 10\"><path class=\"line{} c0\" d=\"M0 5H30\"/></svg>{}</span>",
+        last ? "" : " dashed", html_escaped(state.name));
+  }
+  return svg + "</div>\n";
+}
+
+Scene with_values(Scene scene, const Eigen::VectorXd& rho) {
+  for (std::size_t k = 0; k < scene.parameters.size(); ++k)
+    scene.parameters[k].value = rho(static_cast<Eigen::Index>(k));
+  return scene;
+}
+
+}  // namespace mbsopt

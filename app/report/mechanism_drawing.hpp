@@ -1,0 +1,32 @@
+// A sketch of a mechanism: bodies as the hulls of their points, joints as circles, springs as zigzags, projected on the
+// coordinate plane in which it moves most. One state or several on top of each other, all but the last one dashed.
+//
+//   const std::array<int, 2> plane = plane_of_motion(scene, trajectory);
+//   page.drawing(mechanism_drawing("start and end", plane, {{"start", scene, first_row}, {"end", scene, last_row}}));
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "app/trajectory_csv.hpp"
+
+namespace mbsopt {
+
+struct DrawnState {
+  std::string name;
+  const Scene& scene;              // its points, at the values that its parameters have
+  const std::vector<double>& row;  // of a trajectory
+};
+
+// The two axes (0, 1, 2) along which the bodies' points move most; where they move along fewer, are spread most.
+std::array<int, 2> plane_of_motion(const Scene& scene, const Trajectory& trajectory);
+
+// SVG text; empty where there is no state.
+std::string mechanism_drawing(const std::string& title, std::array<int, 2> plane,
+                              const std::vector<DrawnState>& states);
+
+// A scene with other values of its parameters.
+Scene with_values(Scene scene, const Eigen::VectorXd& rho);
+
+}  // namespace mbsopt

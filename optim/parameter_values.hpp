@@ -1,0 +1,20 @@
+// The parameters of a scene as a vector rho, in the scene's order.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+
+namespace mbsopt {
+
+Eigen::VectorXd parameter_values(const Scene& scene);  // as the scene gives them
+
+// Indices by name; all where names is empty. Throws std::invalid_argument: what is unknown, what there is.
+std::vector<int> parameter_indices(const Scene& scene, const std::vector<std::string>& names);
+
+// Size of a parameter for differences and Taylor steps: |value|, or the range of its bounds, or 1.
+double typical_size(const Parameter& parameter, double value);
+
+}  // namespace mbsopt

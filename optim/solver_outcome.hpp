@@ -1,0 +1,24 @@
+// How a solver ended, whichever it is and whatever it solved.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <string_view>
+
+namespace mbsopt {
+
+enum class SolverStatus { converged, no_progress, iteration_limit, infeasible, stopped, failed };
+std::string_view to_string(SolverStatus status);  // "converged", "no_progress", "iteration_limit", ...
+
+struct SolverOutcome {
+  SolverStatus status = SolverStatus::failed;
+  std::string message;  // in words, always
+  Eigen::VectorXd x;    // the solution, or the best point seen
+  int iterations = 0;
+  long evaluations = 0, failed_evaluations = 0;
+  std::string first_error;  // of the first evaluation that failed
+
+  std::string failures() const;  // "; 2 of 17 evaluations failed, first: ...", or ""
+};
+
+}  // namespace mbsopt
