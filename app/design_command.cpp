@@ -116,7 +116,7 @@ int design_command(const CommandContext& context) {
   if (design.status == SolverStatus::stopped) {
     run.stopped("optimized.json holds the best design so far");
   } else if (!design.ok()) {
-    run.failed(design.message, scene.simulation.end_time);
+    run.failed(design.message);
   }
   const Trajectory history = history_of(design);
   run.write("optimized.json", optimized_problem_text(run, new_values(design)));

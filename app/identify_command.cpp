@@ -196,7 +196,7 @@ int identify_command(const CommandContext& context) {
   if (fit.status == SolverStatus::stopped) {
     run.stopped("optimized.json holds the best fit so far");
   } else if (!fit.ok()) {
-    run.failed(fit.message, scene.simulation.start_time);
+    run.failed(fit.message);
   }
   run.write("optimized.json", optimized_problem_text(run, new_values(fit)));
   run.write("history.csv", to_csv(history));

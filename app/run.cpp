@@ -70,10 +70,10 @@ void Run::warn(const std::string& warning) {
   result["warnings"].push_back(warning);
 }
 
-void Run::failed(const std::string& message, double last_good_time) {
+void Run::failed(const std::string& message, std::optional<double> last_good_time) {
   result["status"] = "failed";
   result["message"] = message;
-  result["last_good_time"] = last_good_time;
+  if (last_good_time) result["last_good_time"] = *last_good_time;
 }
 
 void Run::disagrees() { result["status"] = "disagrees"; }

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -43,9 +44,10 @@ class Run {
   void warn(const std::string& warning);
 
   // How it ended, unless all went well.
-  void failed(const std::string& message, double last_good_time);  // exit 1
-  void disagrees();                                                // exit 3
-  void stopped(const std::string& kept);                           // exit 130; kept: a sentence, what the folder holds
+  // exit 1; last_good_time: of the motion, where it is the simulation that failed
+  void failed(const std::string& message, std::optional<double> last_good_time = {});
+  void disagrees();                       // exit 3
+  void stopped(const std::string& kept);  // exit 130; kept: a sentence, what the folder holds
 
   int finish();  // the exit code
 

@@ -284,6 +284,7 @@ void Reader::read_named(const Node& node, const std::string& path, Parameter& va
   else
     read_plain(node, path, value.value, std::nullopt);
 
+  if (findings_.concerns(child_path(path, "value"))) value.value = std::numeric_limits<double>::quiet_NaN();
   if (findings_.concerns(path)) return;
   if (node.kind != Node::Kind::object) return take_unit(node, path, value);
   for (const char* key : {"value", "lower", "upper"})
@@ -304,7 +305,7 @@ void Reader::take_unit(const Node& node, const std::string& path, Parameter& par
 }
 
 void Reader::read_named(const Node& node, const std::string& path, Definition& value) {
-  read_expression(node, path, value.value);
+  if (!read_expression(node, path, value.value)) value.value = std::numeric_limits<double>::quiet_NaN();
 }
 
 void Reader::version(std::string_view key, int only, const Says& says) {

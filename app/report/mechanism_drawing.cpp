@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <set>
 
 #include "app/report/html_page.hpp"
@@ -22,9 +23,11 @@ constexpr double kWidth = 760, kLargestHeight = 460, kSmallestHeight = 160, kMar
 constexpr double kTitle = 24;                                                              // room above [px]
 constexpr std::size_t kColours = 8, kMostNames = 10;
 
-// A point of a body, which may be the ground, in that body's frame.
+constexpr std::size_t kGround = static_cast<std::size_t>(-1);
+
+// A point of a body, in that body's frame.
 struct BodyPoint {
-  std::string body;
+  std::size_t body;  // its number, or kGround
   Point3 s;
 };
 
@@ -37,14 +40,16 @@ struct Sketch {
 
 class SketchMaker {
  public:
-  explicit SketchMaker(const Scene& scene) : scene_(scene), facts_(scene) {}
+  explicit SketchMaker(const Scene& scene) : scene_(scene), facts_(scene) {
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i) numbers_.emplace(scene.bodies[i].name, i);
+  }
 
   Sketch sketch() {
     result_.bodies.resize(scene_.bodies.size());
     for (const Joint& joint : scene_.joints) {
       const BodyPoint p1 = point(joint.body1, joint.point1), p2 = point(joint.body2, joint.point2);
       add(p1), add(p2);
-      result_.joints.push_back(joint.body1 == "ground" ? p1 : p2);
+      result_.joints.push_back(p1.body == kGround ? p1 : p2);
     }
     for (const Force& force : scene_.forces) {
       const auto* tsda = std::get_if<Tsda>(&force.kind);
@@ -65,7 +70,9 @@ class SketchMaker {
  private:
   BodyPoint point(const std::string& body, const PointField& field) const {
     const auto s = facts_.value(field, body);
-    return {body, s ? Point3((*s)[0], (*s)[1], (*s)[2]) : Point3::Zero()};
+    const auto number = numbers_.find(body);
+    return {number == numbers_.end() ? kGround : number->second,
+            s ? Point3((*s)[0], (*s)[1], (*s)[2]) : Point3(Point3::Zero())};
   }
 
   // Its named points, but for those that are directions of joints; a body without any gets its centre of mass.
@@ -85,26 +92,21 @@ class SketchMaker {
   }
 
   void add(const BodyPoint& p) {
-    for (std::size_t i = 0; i < scene_.bodies.size(); ++i)
-      if (scene_.bodies[i].name == p.body) result_.bodies[i].push_back(p.s);
+    if (p.body != kGround) result_.bodies[p.body].push_back(p.s);
   }
 
   const Scene& scene_;
   const SceneFacts facts_;
+  std::map<std::string, std::size_t> numbers_;
   Sketch result_;
 };
 
-// Global position of a point of the body of that number, from a trajectory's row: t, then 13 numbers per body.
-Point3 placed(const std::vector<double>& row, std::size_t body, const Point3& s) {
-  const double* const b = row.data() + 1 + 13 * body;
+// Global position of a point, from a trajectory's row: t, then 13 numbers per body.
+Point3 placed(const std::vector<double>& row, const BodyPoint& p) {
+  if (p.body == kGround) return p.s;
+  const double* const b = row.data() + 1 + 13 * p.body;
   const Eigen::Vector4d e(b[3], b[4], b[5], b[6]);
-  return Point3(b[0], b[1], b[2]) + A(e) * s;
-}
-
-Point3 placed(const Scene& scene, const std::vector<double>& row, const BodyPoint& p) {
-  for (std::size_t i = 0; i < scene.bodies.size(); ++i)
-    if (scene.bodies[i].name == p.body) return placed(row, i, p.s);
-  return p.s;  // of the ground
+  return Point3(b[0], b[1], b[2]) + A(e) * p.s;
 }
 
 double cross(const Point2& a, const Point2& b) { return a.x() * b.y() - a.y() * b.x(); }
@@ -165,10 +167,10 @@ View view_of(std::array<int, 2> plane, const std::vector<DrawnSketch>& drawn) {
   View view{plane};
   for (const auto& [state, sketch] : drawn) {
     for (std::size_t i = 0; i < sketch.bodies.size(); ++i)
-      for (const Point3& s : sketch.bodies[i]) box.extend(view.flat(placed(state.row, i, s)));
-    for (const BodyPoint& joint : sketch.joints) box.extend(view.flat(placed(state.scene, state.row, joint)));
+      for (const Point3& s : sketch.bodies[i]) box.extend(view.flat(placed(state.row, {i, s})));
+    for (const BodyPoint& joint : sketch.joints) box.extend(view.flat(placed(state.row, joint)));
     for (const auto& [from, to] : sketch.springs)
-      for (const BodyPoint& end : {from, to}) box.extend(view.flat(placed(state.scene, state.row, end)));
+      for (const BodyPoint& end : {from, to}) box.extend(view.flat(placed(state.row, end)));
   }
   const double width = std::max(box.sizes().x(), 1e-12), height = std::max(box.sizes().y(), 1e-12);
   view.scale = std::min((kWidth - 2 * kMargin) / width, (kLargestHeight - 2 * kMargin - kTitle) / height);
@@ -204,12 +206,12 @@ void draw_state(const DrawnSketch& drawn, const View& view, bool last, std::stri
   svg += last ? "<g>\n" : "<g class=\"earlier\">\n";
   for (const auto& [from, to] : sketch.springs) {
     svg += fmt::format("<path class=\"spring\" d=\"{}\"/>\n",
-                       zigzag(view(placed(state.scene, state.row, from)), view(placed(state.scene, state.row, to))));
+                       zigzag(view(placed(state.row, from)), view(placed(state.row, to))));
   }
   for (std::size_t i = 0; i < sketch.bodies.size(); ++i) {
     std::vector<Point2> pixels;
     Point2 middle(0, 0);
-    for (const Point3& s : sketch.bodies[i]) pixels.push_back(view(placed(state.row, i, s)));
+    for (const Point3& s : sketch.bodies[i]) pixels.push_back(view(placed(state.row, {i, s})));
     const std::vector<Point2> hull = outline(std::move(pixels));
     for (const Point2& p : hull) middle += p / static_cast<double>(hull.size());
     svg += fmt::format("<path class=\"body c{0} f{0}\" d=\"{1}\"/>\n", i % kColours,
@@ -219,8 +221,8 @@ void draw_state(const DrawnSketch& drawn, const View& view, bool last, std::stri
                          html_escaped(state.scene.bodies[i].name));
   }
   for (const BodyPoint& joint : sketch.joints) {
-    const Point2 p = view(placed(state.scene, state.row, joint));
-    if (joint.body == "ground")
+    const Point2 p = view(placed(state.row, joint));
+    if (joint.body == kGround)
       svg += fmt::format("<path class=\"ground\" d=\"M{0:.1f} {1:.1f}l-7 12h14Z\"/>\n", p.x(), p.y());
     svg += fmt::format("<circle class=\"joint\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\"/>\n", p.x(), p.y());
   }
@@ -249,7 +251,7 @@ std::array<int, 2> plane_of_motion(const Scene& scene, const Trajectory& traject
     for (const Point3& s : sketch.bodies[i]) {
       Eigen::AlignedBox3d way;
       for (std::size_t row = 0; row < trajectory.rows.size(); row += stride)
-        way.extend(placed(trajectory.rows[row], i, s));
+        way.extend(placed(trajectory.rows[row], {i, s}));
       if (way.isEmpty()) continue;
       motion = motion.cwiseMax(way.sizes());
       all.extend(way);

@@ -99,6 +99,8 @@ void check_shared_names(Checker& checker, const Scene& scene) {
 
 void check_meaning(Checker& checker, const Parameter& parameter) {
   const auto [value, lower, upper] = std::tuple(parameter.value, parameter.lower, parameter.upper);
+  if (!std::isfinite(value))
+    return checker.issue(checker.path("value"), "is " + text_of(value) + "; it must be finite");
   if (lower && upper && *lower > *upper)
     checker.issue(checker.path("lower"), "is " + text_of(*lower) + ", above the upper bound " + text_of(*upper));
   else if (lower && value < *lower)

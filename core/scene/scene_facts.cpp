@@ -1,5 +1,7 @@
 #include "core/scene/scene_facts.hpp"
 
+#include <cmath>
+
 #include "core/expression/dimension_inference.hpp"
 
 namespace mbsopt {
@@ -33,12 +35,15 @@ SceneFacts::SceneFacts(const Scene& scene)
     if (none_.input(parameter.name) >= 0) continue;
     none_.add_input(parameter.name);
     parameter_values_.push_back(parameter.value);
+    any_unread_ = any_unread_ || std::isnan(parameter.value);
     const std::optional<Unit> unit = parse_unit(parameter.unit);
     dimensions_[parameter.name] = unit ? std::optional(unit->dimension) : std::nullopt;
   }
-  for (const Definition& definition : scene.definitions)
+  for (const Definition& definition : scene.definitions) {
     if (none_.input(definition.name) < 0 && !none_.definition(definition.name))
       none_.add_definition(definition.name, definition.value);
+    any_unread_ = any_unread_ || (definition.value.is_number() && std::isnan(definition.value.number()));
+  }
   find_broken_definitions();
   tsda_law_ = rsda_law_ = time_law_ = objective_ = none_;
   for (const char* name : {"l", "ldot", "t"}) add_once(tsda_law_, name);
@@ -122,7 +127,8 @@ std::optional<double> SceneFacts::value(const Field& field) const {
   try {
     const Program program(field, none_);
     program.grow(scratch_);
-    return program.value(parameter_values_, scratch_);
+    const double result = program.value(parameter_values_, scratch_);
+    return std::isnan(result) && any_unread_ ? std::nullopt : std::optional(result);
   } catch (const UnknownName&) {
     return std::nullopt;
   }

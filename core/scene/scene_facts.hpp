@@ -37,7 +37,8 @@ class SceneFacts {
   // Of those, the ones that are circular or nested too deep: name and what is wrong.
   const std::vector<std::pair<std::string, std::string>>& endless_definitions() const { return endless_; }
 
-  // At the parameters' values; nullopt where it cannot be evaluated.
+  // At the parameters' values; nullopt where it cannot be evaluated. A parameter or definition of NaN has no value that
+  // could be read, which is an issue of its own: what depends on it cannot be evaluated either.
   std::optional<double> value(const Field& field) const;
   std::optional<std::array<double, 3>> value(const VectorField& field) const;
   std::optional<std::array<double, 3>> value(const PointField& field, const std::string& body) const;
@@ -54,6 +55,7 @@ class SceneFacts {
   std::vector<std::string> objectives_;
   Symbols none_, tsda_law_, rsda_law_, time_law_, objective_;
   std::vector<double> parameter_values_;
+  bool any_unread_ = false;
   std::set<std::string> broken_;
   std::vector<std::pair<std::string, std::string>> endless_;
   mutable Program::Scratch scratch_;

@@ -105,9 +105,25 @@ TEST_CASE("a simulation that fails ends with exit 1, in words, and keeps what wa
   CHECK_FALSE(result.at("message").get<std::string>().empty());
   const double last = result.at("last_good_time");
   CHECK((last > 0 && last < 1));
+  CHECK_THAT(content_of(folder.path / "out/report.html"),
+             Contains("class=\"banner\"") && Contains("This run failed: " + result.at("message").get<std::string>()) &&
+                 Contains("The motion is good up to"));
   const auto lines = lines_of(content_of(folder.path / "out/trajectory.csv"));
   REQUIRE(lines.size() > 2);
   CHECK(std::stod(lines.back()) == Approx(last).margin(0.001));
+}
+
+TEST_CASE("a change of energy is explained where dampers take it", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kPendulum);
+  const CommandOutcome free = run_command({"simulate", file, "--out", folder.file("free")});
+  const CommandOutcome damped =
+      run_command({"simulate", file, "--out", folder.file("damped"), "--set", "forces[0].damping=3"});
+  const auto words = Contains("with the work of dampers");
+  CHECK_THAT(free.out, !words);
+  CHECK_THAT(damped.out, words);
+  CHECK_THAT(content_of(folder.path / "free/report.html"), !words);
+  CHECK_THAT(content_of(folder.path / "damped/report.html"), words);
 }
 
 TEST_CASE("an assembly that cannot be closed ends with exit 1", "[command]") {
@@ -131,6 +147,10 @@ TEST_CASE("SIGTERM stops a simulation at the next step and keeps the rows so far
                                               "simulation.end_time=1e6", "--set", "simulation.output_step=1000"});
   killer.join();
   CHECK(outcome.exit_code == kInterrupted);
-  CHECK(json_of(folder.path / "out/result.json").at("status") == "interrupted");
+  const auto result = json_of(folder.path / "out/result.json");
+  CHECK(result.at("status") == "interrupted");
+  const std::string message = result.at("message");
+  CHECK_THAT(message, Contains("trajectory.csv holds the motion up to "));
+  CHECK_THAT(content_of(folder.path / "out/report.html"), Contains("This run was " + message));
   CHECK(lines_of(content_of(folder.path / "out/trajectory.csv")).size() >= 2);
 }

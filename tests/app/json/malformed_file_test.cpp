@@ -275,6 +275,12 @@ TEST_CASE("a design variable that only objectives it does not use depend on is r
 
 TEST_CASE("an error does not drag others behind it", "[json]") {
   CHECK(findings_of(replaced(kGood, R"("mass": 1.0)", R"("mas": 1.0)")).size() == 1);
+  // A mass and an inertia of a parameter or a definition that could not be read are not judged.
+  const std::string massive = replaced(kGood, R"("mass": 1.0, "inertia": [1, 1, 1])", R"("mass": "k1*1 [s^2]",
+      "inertia": ["half*1 [m^2*s^2]", "half*1 [m^2*s^2]", "half*1 [m^2*s^2]"])");
+  CHECK(findings_of(massive).empty());
+  CHECK(findings_of(replaced(massive, R"({"value": 100, )", R"({"value": "100 +", )")).size() == 1);
+  CHECK(findings_of(replaced(massive, R"("half": "k1/2")", R"("half": "k1/")")).size() == 1);
   CHECK(findings_of(replaced(kGood, R"("type": "revolute")", R"("tpye": "revolute")")).size() == 1);
   // Without its type, nothing can be said about the joint's other keys; k1 is used in the force that does not parse.
   std::string text = replaced(kGood, R"("type": "revolute")", R"("type": "revolut")");
