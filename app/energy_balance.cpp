@@ -10,6 +10,7 @@ namespace mbsopt {
 bool conserves_energy(const Scene& scene) {
   const SceneFacts facts(scene);
   const auto zero = [&](const Field& field) { return facts.value(field) == 0.0; };
+  if (!scene.drives.empty()) return false;  // drives do work
   return std::all_of(scene.forces.begin(), scene.forces.end(), [&](const Force& force) {
     // A constant tension has no part in the potential energy either.
     if (const auto* tsda = std::get_if<Tsda>(&force.kind))

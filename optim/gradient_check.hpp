@@ -36,7 +36,7 @@ struct CheckThresholds {
   double taylor_slope = 1.9;   // at least, 2 in theory
   // Entries below this part of the largest (each times its parameter's size) are compared to that part: they are
   // differences of numbers so much larger, and carry their rounding.
-  double rounding_floor = 1e-6;
+  double rounding_floor = 1e-3;
 };
 
 enum class Verdict {
