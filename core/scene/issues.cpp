@@ -34,8 +34,11 @@ std::optional<Vector> direction(Checker& checker, std::string_view key, const st
 }
 
 bool angle_is_used(const Scene& scene, const std::string& joint) {
-  for (const Force& force : scene.forces)
-    if (const auto* rsda = std::get_if<Rsda>(&force.kind); rsda && rsda->joint == joint) return true;
+  for (const Force& force : scene.forces) {
+    const auto* rsda = std::get_if<Rsda>(&force.kind);
+    const auto* friction = std::get_if<FrictionSpec>(&force.kind);
+    if ((rsda && rsda->joint == joint) || (friction && friction->joint == joint)) return true;
+  }
   for (const Sensor& sensor : scene.sensors)
     if (sensor.joint == joint && (sensor.quantity == "angle" || sensor.quantity == "rate")) return true;
   for (const Drive& drive : scene.drives)
@@ -77,6 +80,10 @@ void check_joint_has_angle(Checker& checker, const std::string& name) {
 void check_two_bodies(Checker& checker, const std::string& body1, const std::string& body2, std::string_view what) {
   if (!body2.empty() && body1 == body2)
     checker.issue(checker.path("body2"), "is '" + body2 + "' like body1; " + std::string(what) + " needs two bodies");
+}
+
+void check_moving(Checker& checker, const std::string& body) {
+  if (body == "ground") checker.issue(checker.path("body"), "is the ground, which never moves");
 }
 
 // Parameters, definitions and sensors share one name space.
@@ -198,6 +205,17 @@ void check_meaning(Checker& checker, const Force& force) {
   } else if (const auto* rsda = std::get_if<Rsda>(&force.kind)) {
     check_joint_has_angle(checker, rsda->joint);
     warn_of_law(rsda->law.has_value(), {&rsda->stiffness, &rsda->damping, &rsda->free_angle});
+  } else if (const auto* applied = std::get_if<PointForce>(&force.kind)) {
+    check_moving(checker, applied->body);
+  } else if (const auto* torque = std::get_if<Torque>(&force.kind)) {
+    check_moving(checker, torque->body);
+  } else if (const auto* bushing = std::get_if<BushingSpec>(&force.kind)) {
+    check_two_bodies(checker, bushing->body1, bushing->body2, "a bushing");
+  } else if (const auto* friction = std::get_if<FrictionSpec>(&force.kind)) {
+    check_joint_has_angle(checker, friction->joint);
+    const std::optional<double> smooth = checker.facts().value(friction->smooth_velocity);
+    if (smooth && *smooth <= 0)
+      checker.issue(checker.path("smooth_velocity"), "is " + text_of(*smooth) + ", it must be greater than 0");
   }
 }
 
@@ -209,6 +227,12 @@ void check_meaning(Checker& checker, const Sensor& sensor) {
     checker.issue(checker.path("body2"), "is '" + sensor.body2 + "' like body1; their distance never changes");
   if (sensor.quantity == "orientation" && sensor.body == "ground")
     checker.issue(checker.path("body"), "is the ground, whose orientation never changes");
+  if (sensor.quantity == "force") {
+    const Force* const force = checker.facts().force(sensor.force);
+    if (force && type_of(*force) != Tsda::kType && type_of(*force) != Rsda::kType)
+      checker.issue(checker.path("force"), "'" + sensor.force + "' is a " + std::string(type_of(*force)) +
+                                               "; only a tsda or an rsda has one number to measure");
+  }
 }
 
 void check_meaning(Checker& checker, const Condition& condition) {
@@ -218,7 +242,7 @@ void check_meaning(Checker& checker, const Condition& condition) {
   const TypeRow* const row = sensor ? find_row(kSensorQuantities, sensor->quantity) : nullptr;
   if (!row) return;
   const std::string named = "sensor '" + sensor->name + "'";
-  if (sensor->quantity == "energy" || sensor->quantity == "constraint_violation")
+  if (sensor->quantity == "energy" || sensor->quantity == "constraint_violation" || sensor->quantity == "force")
     return checker.issue(checker.path("sensor"), named + " measures " + sensor->quantity +
                                                      ", which a condition cannot prescribe; use positions, angles, "
                                                      "distances, Euler parameters or their rates");

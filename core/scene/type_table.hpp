@@ -24,6 +24,7 @@ struct TypeRow {
   std::string_view components = "";  // of a sensor: what "component" may be
   Dimension dimension = {};          // of a sensor: what it measures
   bool velocity_level = false;       // of a sensor: a condition on it has a value only
+  bool of_accelerations = false;     // of a sensor: not a function of (t, q, v) alone, so that no force may use it
 };
 
 inline constexpr TypeRow kJointTypes[] = {
@@ -61,6 +62,14 @@ inline constexpr TypeRow kForceTypes[] = {
      "body1 body2! point1 point2 stiffness damping free_length actuator law"},
     {"rsda", "torsional spring and damper on the angle of a revolute joint: k (angle - angle0) + c rate, or a law",
      "joint! stiffness damping free_angle law"},
+    {"force", "force on a point of a body: three expressions of t, parameters and sensors of the state",
+     "body! point components! frame"},
+    {"torque", "torque on a body: three expressions of t, parameters and sensors of the state",
+     "body! components! frame"},
+    {"bushing", "springs and dampers along and about the three axes of body1, undeformed as the file places the bodies",
+     "body1 body2! point1 point2 stiffness damping torsional_stiffness torsional_damping"},
+    {"friction", "smoothed Coulomb and viscous friction about the axis of a joint",
+     "joint! coulomb smooth_velocity! viscous"},
 };
 
 inline constexpr TypeRow kSensorQuantities[] = {
@@ -75,6 +84,7 @@ inline constexpr TypeRow kSensorQuantities[] = {
     {"orientation", "Euler parameters of a body", "body! component!", "e0 e1 e2 e3"},
     {"energy", "of the whole mechanism", "component!", "kinetic potential total", dimension::kTorque, true},
     {"constraint_violation", "norm of the constraint equations", ""},
+    {"force", "tension of a tsda, torque of an rsda", "force!", "", dimension::kForce, true},
 };
 
 inline constexpr std::string_view kJointsWithAngle = "revolute cylindrical screw";
@@ -82,8 +92,8 @@ inline constexpr std::string_view kJointsWithDisplacement = "translational cylin
 
 // In the problem format, not in this version.
 inline constexpr std::string_view kLaterJointTypes = "";
-inline constexpr std::string_view kLaterForceTypes = "force torque bushing friction";
-inline constexpr std::string_view kLaterSensorQuantities = "acceleration displacement force reaction";
+inline constexpr std::string_view kLaterForceTypes = "";
+inline constexpr std::string_view kLaterSensorQuantities = "acceleration displacement reaction";
 
 inline constexpr std::string_view kIntegrators = "dopri5 dopri853 rk4";
 inline constexpr std::string_view kLaterIntegrators =

@@ -19,6 +19,7 @@
 //   law(key, optional<Expression>&, Names, says)  an expression over further names, too
 //   expression(key, Expression&, Names, says)   the same, always there
 //   time_law(key, Expression&, optional<SampledLaw>&, says)  an expression of t, or samples from a file
+//   laws(key, LawVector&, Names, says)          three of them
 //   plain(key, double&, Range, says)            a number that no parameter enters; also long, int, bool, optional
 //   object(key, T&, says)                       describe(visitor, T) inside; also optional<T>
 //   group(key, says, f)                         f(visitor) inside: fields that are nested in the file only
@@ -52,7 +53,7 @@ struct Says {
 enum class To { body, joint, force, sensor, parameter, objective };
 
 // Names that an expression may use besides parameters and definitions.
-enum class Names { none, tsda_law, rsda_law, time_law, objective };
+enum class Names { none, tsda_law, rsda_law, time_law, state, objective };  // state: t and sensors of (t, q, v)
 
 template <class T>
 struct Choice {
@@ -213,6 +214,44 @@ void describe(auto& v, Like<Rsda> auto& f, const TypeRow& row) {
          need_of(row, "law"), kTorque});
 }
 
+void describe(auto& v, Like<PointForce> auto& f, const TypeRow& row) {
+  v.reference("body", f.body, To::body, {"body it acts on", need_of(row, "body")});
+  v.point("point", f.point, f.body, {"point of the body [m]", need_of(row, "point"), dimension::kLength});
+  v.laws("components", f.components, Names::state,
+         {"x, y, z [N], expressions of t, parameters and sensors", need_of(row, "components"), dimension::kForce});
+  v.choice("frame", f.in_body_frame, kFrames, {"axes of the components", need_of(row, "frame")});
+}
+
+void describe(auto& v, Like<Torque> auto& f, const TypeRow& row) {
+  v.reference("body", f.body, To::body, {"body it acts on", need_of(row, "body")});
+  v.laws("components", f.components, Names::state,
+         {"x, y, z [N m], expressions of t, parameters and sensors", need_of(row, "components"), dimension::kTorque});
+  v.choice("frame", f.in_body_frame, kFrames, {"axes of the components", need_of(row, "frame")});
+}
+
+void describe(auto& v, Like<BushingSpec> auto& f, const TypeRow& row) {
+  using namespace dimension;
+  v.reference("body1", f.body1, To::body, {"first body, whose axes count", need_of(row, "body1")});
+  v.reference("body2", f.body2, To::body, {"second body", need_of(row, "body2")});
+  v.point("point1", f.point1, f.body1, {"point of body1 [m]", need_of(row, "point1"), kLength});
+  v.point("point2", f.point2, f.body2, {"point of body2 [m]", need_of(row, "point2"), kLength});
+  v.vector("stiffness", f.stiffness, {"along x, y, z of body1 [N/m]", need_of(row, "stiffness"), kStiffness});
+  v.vector("damping", f.damping, {"along x, y, z of body1 [N s/m]", need_of(row, "damping"), kDamping});
+  v.vector("torsional_stiffness", f.torsional_stiffness,
+           {"about x, y, z of body1 [N m/rad]", need_of(row, "torsional_stiffness"), kTorque});
+  v.vector("torsional_damping", f.torsional_damping,
+           {"about x, y, z of body1 [N m s/rad]", need_of(row, "torsional_damping"), kTorsionalDamping});
+}
+
+void describe(auto& v, Like<FrictionSpec> auto& f, const TypeRow& row) {
+  using namespace dimension;
+  v.reference("joint", f.joint, To::joint, {"joint it acts in", need_of(row, "joint")});
+  v.number("coulomb", f.coulomb, {"torque at high rates [N m]", need_of(row, "coulomb"), kTorque});
+  v.number("smooth_velocity", f.smooth_velocity,
+           {"rate at which the Coulomb part is 0.71 of its level [rad/s]", need_of(row, "smooth_velocity"), kRate});
+  v.number("viscous", f.viscous, {"torque per rate [N m s/rad]", need_of(row, "viscous"), kTorsionalDamping});
+}
+
 void describe(auto& v, Like<Force> auto& f) {
   const TypeRow* const row =
       v.type("type", type_of(f), std::span(kForceTypes), kLaterForceTypes, {"type of the force", Need::required});
@@ -244,6 +283,7 @@ void describe(auto& v, Like<Sensor> auto& s) {
   v.reference("body2", s.body2, To::body, {"body of the second point", need_of(*row, "body2")});
   v.point("point1", s.point1, s.body1, {"first point [m]", need_of(*row, "point1"), kLength});
   v.point("point2", s.point2, s.body2, {"second point [m]", need_of(*row, "point2"), kLength});
+  v.reference("force", s.force, To::force, {"a tsda or rsda", need_of(*row, "force")});
 }
 
 void describe(auto& v, Like<Condition> auto& c) {

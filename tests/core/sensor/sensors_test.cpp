@@ -41,11 +41,17 @@ Scene two_bodies() {
   s.joints.push_back(hinged);
   Tsda spring;
   spring.body1 = "one", spring.body2 = "two", spring.point1 = vec("0", "a", "0"), spring.point2 = vec("b", "0", "0.2");
-  spring.stiffness = f("k"), spring.free_length = f("l0");
+  spring.stiffness = f("k"), spring.free_length = f("l0"), spring.damping = f("a");
   s.forces.push_back({"spring", spring});
   Rsda torsion;
-  torsion.joint = "H", torsion.stiffness = f("kt"), torsion.free_angle = f("theta0");
+  torsion.joint = "H", torsion.stiffness = f("kt"), torsion.free_angle = f("theta0"), torsion.damping = f("b");
   s.forces.push_back({"torsion", torsion});
+  Tsda cubic = spring;
+  cubic.law = f("k*l^3 - a*ldot*l + 0.5*cos(t)");
+  s.forces.push_back({"cubic", cubic});
+  Rsda stop = torsion;
+  stop.law = f("kt*angle^2 + n*rate*angle + t");
+  s.forces.push_back({"stop", stop});
   return s;
 }
 
@@ -120,6 +126,20 @@ struct TextbookScene {
     const T stretch = norm(values(d)) - rho[l0], twist = angle() - rho[theta0];
     return sum + T(0.5) * (rho[k] * stretch * stretch + rho[kt] * twist * twist);
   }
+  // The spring's length and its rate.
+  std::pair<T, T> span() const {
+    const auto d = point(1, {rho[b], T(0), T(0.2)}) - point(0, {T(0), rho[a], T(0)});
+    const V3<T> x = values(d);
+    return {norm(x), dot(x, rates(d)) / norm(x)};
+  }
+  T spring_tension() const {
+    const auto [l, ldot] = span();
+    return rho[k] * (l - rho[l0]) + rho[a] * ldot;
+  }
+  T cubic_tension() const {
+    const auto [l, ldot] = span();
+    return rho[k] * l * l * l - rho[a] * ldot * l + T(0.5);
+  }
   // The largest |Phi| of the hinge and the unit norms.
   T violation() const {
     std::vector<T> phi;
@@ -175,6 +195,11 @@ Sensor plain(const std::string& quantity, const std::string& component = "") {
   s.body1 = "one", s.body2 = "two", s.point1 = vec("a", "b", "0.3"), s.point2 = vec("b", "0.5", "a");
   return s;
 }
+Sensor force_of(const std::string& force) {
+  Sensor s = plain("force");
+  s.force = force;
+  return s;
+}
 Sensor spin(const std::string& component, bool in_axes) {
   Sensor s = plain("angular_velocity", component);
   s.in_body_frame = in_axes;
@@ -222,6 +247,12 @@ const std::vector<Row>& all_sensors() {
       row("energy, kinetic", plain("energy", "kinetic"), [](const auto& s) { return s.kinetic(); }),
       row("energy, potential", plain("energy", "potential"), [](const auto& s) { return s.potential(); }),
       row("energy, total", plain("energy", "total"), [](const auto& s) { return s.kinetic() + s.potential(); }),
+      row("force of a spring", force_of("spring"), [](const auto& s) { return s.spring_tension(); }),
+      row("force of a law", force_of("cubic"), [](const auto& s) { return s.cubic_tension(); }),
+      row("torque of a torsional spring", force_of("torsion"),
+          [](const auto& s) { return s.rho[kt] * (s.angle() - s.rho[theta0]) + s.rho[b] * s.rate(); }),
+      row("torque of a law", force_of("stop"),
+          [](const auto& s) { return s.rho[kt] * s.angle() * s.angle() + s.rho[n] * s.rate() * s.angle(); }),
       row("constraint_violation", plain("constraint_violation"), [](const auto& s) { return s.violation(); }),
   };
   return rows;
