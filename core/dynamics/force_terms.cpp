@@ -71,6 +71,10 @@ void ForceTerms::add_loads(const At& at, std::vector<Vec<6>>& loads) {
     const std::size_t i = index(f.body1), j = index(f.body2);
     f.add_load(at.frames[i], at.frames[j], loads[i], loads[j]);
   }
+  for (const SlidingFriction& f : data_.sliding_frictions) {
+    const std::size_t i = index(f.body1), j = index(f.body2);
+    f.add_load(at.frames[i], at.frames[j], loads[i], loads[j]);
+  }
   for (const AppliedForce& f : data_.applied) {
     f.add_load(components(f, at), at.frames[index(f.body)], loads[index(f.body)]);
   }
@@ -118,6 +122,13 @@ void ForceTerms::add_tangent(const At& at, const std::vector<FrameTangent>& tang
                                      block.field<9>(f.slot_R0, R0), block.field<12>(f.slot_law, law)};
     f.tangent(at.frames[i], at.frames[j], tangents[i], tangents[j], fields, load_dirs[i], load_dirs[j]);
   }
+  for (const SlidingFriction& f : data_.sliding_frictions) {
+    const std::size_t i = index(f.body1), j = index(f.body2);
+    Lanes<3> s1, s2, s3, law;
+    const GeometryTangent ds{block.field<3>(f.slot1, s1), block.field<3>(f.slot2, s2), block.field<3>(f.slot3, s3)};
+    f.tangent(at.frames[i], at.frames[j], tangents[i], tangents[j], ds, block.field<3>(f.law.slot, law), load_dirs[i],
+              load_dirs[j]);
+  }
   const int t = static_cast<int>(data_.rho.size());
   for (const AppliedForce& f : data_.applied) {
     const Vector3d c = components_with_gradients(f, at);
@@ -159,6 +170,10 @@ void ForceTerms::add_pull_back(const At& at, std::vector<FrameBar>& bars, Eigen:
   for (const RsdaForce& f : data_.rsda) add_torque(f);
   for (const FrictionForce& f : data_.frictions) add_torque(f);
   for (const Bushing& f : data_.bushings) {
+    const std::size_t i = index(f.body1), j = index(f.body2);
+    f.pull_back(at.frames[i], at.frames[j], bars[i], bars[j], theta_bar);
+  }
+  for (const SlidingFriction& f : data_.sliding_frictions) {
     const std::size_t i = index(f.body1), j = index(f.body2);
     f.pull_back(at.frames[i], at.frames[j], bars[i], bars[j], theta_bar);
   }

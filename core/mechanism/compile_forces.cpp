@@ -4,6 +4,7 @@
 
 #include "core/mechanism/compilation.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/scene/type_table.hpp"
 
 namespace mbsopt {
 namespace {
@@ -130,16 +131,21 @@ void add(Compilation& model, const BushingSpec& f, int force, const std::string&
 }
 
 void add(Compilation& model, const FrictionSpec& f, int force, const std::string& where) {
-  FrictionForce out;
-  out.force = force;
-  out.joint_angle = model.angle_of(f.joint, where + ".joint");
+  const Joint& joint = model.scene.joints[model.joint_index(f.joint, where + ".joint")];
+  FrictionLaw law;
   const DualVector3 x{model.fields.value(f.coulomb, where + ".coulomb"),
                       model.fields.value(f.smooth_velocity, where + ".smooth_velocity"),
                       model.fields.value(f.viscous, where + ".viscous")};
-  const Vec<3> v = numbers(model.keep(out.law.slot, x));
-  out.law.coulomb = v(0), out.law.smooth = v(1), out.law.viscous = v(2);
-  if (!(out.law.smooth > 0)) throw SceneError(where + ".smooth_velocity: must be greater than 0");
-  model.data.frictions.push_back(std::move(out));
+  const Vec<3> v = numbers(model.keep(law.slot, x));
+  law.coulomb = v(0), law.smooth = v(1), law.viscous = v(2);
+  if (!(law.smooth > 0)) throw SceneError(where + ".smooth_velocity: must be greater than 0");
+  if (is_sliding(f.motion, joint.type)) {
+    const Constraint c = model.joint_displacement_term(f.joint, where + ".joint");
+    model.data.sliding_frictions.push_back(
+        {force, c.body1, c.body2, std::get<Dot2>(c.primitive), c.slot1, c.slot2, c.slot3, law});
+  } else {
+    model.data.frictions.push_back({force, model.angle_of(f.joint, where + ".joint"), law});
+  }
 }
 
 void add_user_force(Compilation& model, std::shared_ptr<const UserForce> force) {

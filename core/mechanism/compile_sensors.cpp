@@ -81,6 +81,10 @@ SensorKind sensor(Compilation& model, const Sensor& s, const std::string& where)
     return EnergySensor{s.component != "potential", s.component != "kinetic"};
   }
   if (quantity == "constraint_violation") return ViolationSensor{};
+  if (quantity == "displacement") {
+    const Constraint c = model.joint_displacement_term(s.joint, where + ".joint");
+    return DisplacementSensor{c.body1, c.body2, std::get<Dot2>(c.primitive), c.slot1, c.slot2, c.slot3};
+  }
   if (quantity == "force") return tension_sensor(model.data, s.force, model.scene.forces, where + ".force");
   throw SceneError(where + ".quantity: '" + quantity + "' is not a quantity known here");
 }
@@ -96,6 +100,12 @@ bool rate_of(const Compilation& model, const SensorKind& kind, SensorKind& rate)
   }
   if (const auto* a = std::get_if<AngleSensor>(&kind); a && !a->rate) {
     rate = AngleSensor{a->angle, true};
+    return true;
+  }
+  if (const auto* x = std::get_if<DisplacementSensor>(&kind); x && !x->rate) {
+    DisplacementSensor r = *x;
+    r.rate = true;
+    rate = r;
     return true;
   }
   if (const auto* c = std::get_if<CoordinateSensor>(&kind)) {
@@ -121,7 +131,8 @@ void add_condition(Compilation& model, std::size_t i) {
     out.velocity_level = a->rate;
     out.modulo_turn = !a->rate;
   } else {
-    out.velocity_level = !std::holds_alternative<CoordinateSensor>(kind);
+    out.velocity_level =
+        !std::holds_alternative<CoordinateSensor>(kind) && !std::holds_alternative<DisplacementSensor>(kind);
   }
   if (std::holds_alternative<EnergySensor>(kind) || std::holds_alternative<ViolationSensor>(kind) ||
       std::holds_alternative<TensionSensor>(kind)) {

@@ -40,14 +40,20 @@ struct AngleSensor {
 struct EnergySensor {
   bool kinetic = true, potential = true;
 };
-struct ViolationSensor {};  // the largest |Phi| of joints and unit norms
-struct TensionSensor {      // what a tsda pulls [N], what an rsda resists [N m]
+struct ViolationSensor {};   // the largest |Phi| of joints and unit norms
+struct DisplacementSensor {  // along a joint's axis, or its rate
+  int body1 = 0, body2 = 0;
+  Dot2 displacement;
+  int slot1 = -1, slot2 = -1, slot3 = -1;
+  bool rate = false;
+};
+struct TensionSensor {  // what a tsda pulls [N], what an rsda resists [N m]
   bool is_torque = false;
   int index = 0;  // among the tsda or the rsda
 };
 
 using SensorKind = std::variant<PointSensor, AngularVelocitySensor, CoordinateSensor, AngleSensor, EnergySensor,
-                                ViolationSensor, TensionSensor>;
+                                ViolationSensor, TensionSensor, DisplacementSensor>;
 
 // Consecutive rows of Phi that tie the same two bodies, and their Jacobian blocks.
 struct RowGroup {
@@ -94,6 +100,7 @@ struct MechanismData {
   std::vector<AppliedForce> applied;
   std::vector<Bushing> bushings;
   std::vector<FrictionForce> frictions;
+  std::vector<SlidingFriction> sliding_frictions;
   std::vector<UserForceData> user_forces;
   std::vector<SensorKind> sensors;
   std::vector<std::string> sensor_names;

@@ -36,6 +36,34 @@ double angle_gradient(const MechanismData& d, const AngleSensor& s, const Eigen:
   return s.rate ? j.rate() : JointAngle::on_branch(j.angle(), branch(angles, s.angle));
 }
 
+double displacement_value(const DisplacementSensor& s, const Eigen::VectorXd& y) {
+  const BodyAt b1 = body_at(y, s.body1), b2 = body_at(y, s.body2);
+  Vec<1> x;
+  if (s.rate) {
+    s.displacement.phi_dot(b1.frame, b2.frame, x);
+  } else {
+    s.displacement.phi(b1.frame, b2.frame, x);
+  }
+  return x(0);
+}
+
+double displacement_gradient(const MechanismData& d, const DisplacementSensor& s, const Eigen::VectorXd& y,
+                             double scale, VecOut y_bar, VecOut rho_bar) {
+  const BodyAt b1 = body_at(y, s.body1), b2 = body_at(y, s.body2);
+  Multipliers<1> z = Multipliers<1>::zero();
+  (s.rate ? z.mu1 : z.mu0)(0) = 1;
+  FrameBar bar1, bar2;
+  bar1.set_zero(), bar2.set_zero();
+  GeometryBar s_bar;
+  s.displacement.pull_back(b1.frame, b2.frame, z, bar1, bar2, s_bar);
+  add_pull_back(b1, s.body1, bar1, scale, y_bar);
+  add_pull_back(b2, s.body2, bar2, scale, y_bar);
+  add_slot<3>(d, s.slot1, s_bar.s1, scale, rho_bar);
+  add_slot<3>(d, s.slot2, s_bar.s2, scale, rho_bar);
+  add_slot<3>(d, s.slot3, s_bar.s3, scale, rho_bar);
+  return displacement_value(s, y);
+}
+
 Vec<6> inertia_entries(const Matrix3d& X) {  // gradient in xx yy zz xy xz yz of <X, J>
   Vec<6> x;
   x << X(0, 0), X(1, 1), X(2, 2), X(0, 1) + X(1, 0), X(0, 2) + X(2, 0), X(1, 2) + X(2, 1);
@@ -149,7 +177,8 @@ double evaluate(const MechanismData& d, const SensorKind& sensor, double t, cons
                    return (s.kinetic ? e.kinetic : 0) + (s.potential ? e.potential : 0);
                  },
                  [&](const ViolationSensor&) { return std::abs(worst_violation(d, t, y, angles).amount); },
-                 [&](const TensionSensor& s) { return tension(d, s, t, y, angles); }},
+                 [&](const TensionSensor& s) { return tension(d, s, t, y, angles); },
+                 [&](const DisplacementSensor& s) { return displacement_value(s, y); }},
       sensor);
 }
 
@@ -176,7 +205,8 @@ double add_gradient(const MechanismData& d, const SensorKind& sensor, double t, 
             return evaluate(d, s, t, y, angles);
           },
           [&](const ViolationSensor&) { return add_violation_gradient(d, t, y, angles, scale, y_bar, rho_bar); },
-          [&](const TensionSensor& s) { return add_tension_gradient(d, s, t, y, angles, scale, y_bar, rho_bar); }},
+          [&](const TensionSensor& s) { return add_tension_gradient(d, s, t, y, angles, scale, y_bar, rho_bar); },
+          [&](const DisplacementSensor& s) { return displacement_gradient(d, s, y, scale, y_bar, rho_bar); }},
       sensor);
 }
 

@@ -33,11 +33,12 @@ std::optional<Vector> direction(Checker& checker, std::string_view key, const st
   return std::nullopt;
 }
 
-bool angle_is_used(const Scene& scene, const std::string& joint) {
+bool angle_is_used(const Scene& scene, const std::string& joint, const std::string& joint_type) {
   for (const Force& force : scene.forces) {
     const auto* rsda = std::get_if<Rsda>(&force.kind);
     const auto* friction = std::get_if<FrictionSpec>(&force.kind);
-    if ((rsda && rsda->joint == joint) || (friction && friction->joint == joint)) return true;
+    if (rsda && rsda->joint == joint) return true;
+    if (friction && friction->joint == joint && !is_sliding(friction->motion, joint_type)) return true;
   }
   for (const Sensor& sensor : scene.sensors)
     if (sensor.joint == joint && (sensor.quantity == "angle" || sensor.quantity == "rate")) return true;
@@ -61,7 +62,7 @@ void check_normals(Checker& checker, const Joint& joint, const std::optional<Vec
     checker.issue(checker.path(joint.normal1 ? "normal2" : "normal1"), "is missing; give both normals, or neither");
   if (joint.normal1 || joint.normal2 || !axis1 || !axis2) return;
   const Vector difference{(*axis1)[0] - (*axis2)[0], (*axis1)[1] - (*axis2)[1], (*axis1)[2] - (*axis2)[2]};
-  if (norm(difference) > kSame && angle_is_used(checker.facts().scene(), joint.name))
+  if (norm(difference) > kSame && angle_is_used(checker.facts().scene(), joint.name, joint.type))
     checker.issue(checker.path(), "its angle is used and axis1 differs from axis2: give normal1 and normal2");
 }
 
@@ -80,6 +81,22 @@ void check_joint_has_angle(Checker& checker, const std::string& name) {
 void check_two_bodies(Checker& checker, const std::string& body1, const std::string& body2, std::string_view what) {
   if (!body2.empty() && body1 == body2)
     checker.issue(checker.path("body2"), "is '" + body2 + "' like body1; " + std::string(what) + " needs two bodies");
+}
+
+void check_friction(Checker& checker, const FrictionSpec& friction) {
+  using namespace dimension;
+  const Joint* const joint = checker.facts().joint(friction.joint);
+  const bool slides = joint && is_sliding(friction.motion, joint->type);
+  check_joint_has(checker, "joint", friction.joint, slides ? "displacement" : "angle");
+  const auto check = [&](std::string_view key, const Field& field, const Dimension& turning, const Dimension& sliding) {
+    if (joint) checker.number(key, field, {"", Need::optional, slides ? sliding : turning});
+  };
+  check("coulomb", friction.coulomb, kTorque, kForce);
+  check("smooth_velocity", friction.smooth_velocity, kRate, kVelocity);
+  check("viscous", friction.viscous, kTorsionalDamping, kDamping);
+  const std::optional<double> smooth = checker.facts().value(friction.smooth_velocity);
+  if (smooth && *smooth <= 0)
+    checker.issue(checker.path("smooth_velocity"), "is " + text_of(*smooth) + ", it must be greater than 0");
 }
 
 void check_moving(Checker& checker, const std::string& body) {
@@ -212,17 +229,15 @@ void check_meaning(Checker& checker, const Force& force) {
   } else if (const auto* bushing = std::get_if<BushingSpec>(&force.kind)) {
     check_two_bodies(checker, bushing->body1, bushing->body2, "a bushing");
   } else if (const auto* friction = std::get_if<FrictionSpec>(&force.kind)) {
-    check_joint_has_angle(checker, friction->joint);
-    const std::optional<double> smooth = checker.facts().value(friction->smooth_velocity);
-    if (smooth && *smooth <= 0)
-      checker.issue(checker.path("smooth_velocity"), "is " + text_of(*smooth) + ", it must be greater than 0");
+    check_friction(checker, *friction);
   }
 }
 
 void check_meaning(Checker& checker, const Sensor& sensor) {
   const TypeRow* const row = find_row(kSensorQuantities, sensor.quantity);
   if (!row) return;
-  if (need_of(*row, "joint") != Need::unknown) check_joint_has_angle(checker, sensor.joint);
+  if (need_of(*row, "joint") != Need::unknown)
+    check_joint_has(checker, "joint", sensor.joint, sensor.quantity == "displacement" ? "displacement" : "angle");
   if (need_of(*row, "body2") != Need::unknown && sensor.body1 == sensor.body2 && !sensor.body2.empty())
     checker.issue(checker.path("body2"), "is '" + sensor.body2 + "' like body1; their distance never changes");
   if (sensor.quantity == "orientation" && sensor.body == "ground")

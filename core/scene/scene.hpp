@@ -147,7 +147,8 @@ struct BushingSpec {  // along and about the axes of body1
 struct FrictionSpec {
   static constexpr std::string_view kType = "friction";
   std::string joint;
-  Field coulomb, smooth_velocity, viscous;
+  std::string motion;                       // rotation or translation; empty: whichever the joint has, rotation first
+  Field coulomb, smooth_velocity, viscous;  // [N m], [rad/s], [N m s/rad], or [N], [m/s], [N s/m]
 };
 struct Force {
   std::string name;

@@ -205,7 +205,7 @@ void describe(auto& v, Like<Tsda> auto& f, const TypeRow& row) {
 
 void describe(auto& v, Like<Rsda> auto& f, const TypeRow& row) {
   using namespace dimension;
-  v.reference("joint", f.joint, To::joint, {"revolute joint it acts on", need_of(row, "joint")});
+  v.reference("joint", f.joint, To::joint, {"joint on whose angle it acts", need_of(row, "joint")});
   v.number("stiffness", f.stiffness, {"k [N m/rad]", need_of(row, "stiffness"), kTorque});
   v.number("damping", f.damping, {"c [N m s/rad]", need_of(row, "damping"), kTorsionalDamping});
   v.number("free_angle", f.free_angle, {"angle without torque [rad]", need_of(row, "free_angle"), kAngle});
@@ -244,12 +244,13 @@ void describe(auto& v, Like<BushingSpec> auto& f, const TypeRow& row) {
 }
 
 void describe(auto& v, Like<FrictionSpec> auto& f, const TypeRow& row) {
-  using namespace dimension;
   v.reference("joint", f.joint, To::joint, {"joint it acts in", need_of(row, "joint")});
-  v.number("coulomb", f.coulomb, {"torque at high rates [N m]", need_of(row, "coulomb"), kTorque});
+  v.word("motion", f.motion, Words{"rotation translation"},
+         {"about or along the axis; when absent, about it where the joint has an angle", need_of(row, "motion")});
+  v.number("coulomb", f.coulomb, {"torque [N m] or force [N] at high rates", need_of(row, "coulomb")});
   v.number("smooth_velocity", f.smooth_velocity,
-           {"rate at which the Coulomb part is 0.71 of its level [rad/s]", need_of(row, "smooth_velocity"), kRate});
-  v.number("viscous", f.viscous, {"torque per rate [N m s/rad]", need_of(row, "viscous"), kTorsionalDamping});
+           {"rate at which the Coulomb part is 0.71 of its level [rad/s], [m/s]", need_of(row, "smooth_velocity")});
+  v.number("viscous", f.viscous, {"torque [N m s/rad] or force [N s/m] per rate", need_of(row, "viscous")});
 }
 
 void describe(auto& v, Like<Force> auto& f) {
@@ -278,7 +279,7 @@ void describe(auto& v, Like<Sensor> auto& s) {
     v.object("relative_to", s.relative_to, {"point whose position or velocity is subtracted"});
   v.word("component", s.component, Words{row->components}, {"which component", need_of(*row, "component")});
   v.choice("frame", s.in_body_frame, kFrames, {"axes of the component", need_of(*row, "frame")});
-  v.reference("joint", s.joint, To::joint, {"revolute joint", need_of(*row, "joint")});
+  v.reference("joint", s.joint, To::joint, {"joint that has it", need_of(*row, "joint")});
   v.reference("body1", s.body1, To::body, {"body of the first point", need_of(*row, "body1")});
   v.reference("body2", s.body2, To::body, {"body of the second point", need_of(*row, "body2")});
   v.point("point1", s.point1, s.body1, {"first point [m]", need_of(*row, "point1"), kLength});

@@ -153,6 +153,48 @@ TEST_CASE("dry friction brakes a wheel as its closed form says", "[force]") {
   CHECK(F(6) - F(omega) == Approx(1.5 * s.simulation.end_time / 0.4).epsilon(1e-7));
 }
 
+TEST_CASE("friction along a slide brakes a block as it brakes a wheel", "[force]") {
+  Scene s = free_body();
+  Joint slide = hinge("slide", "ground", vec("0", "0", "0"), "block", vec("0", "0", "0"));
+  slide.type = GENERATE(as<std::string>{}, "translational", "cylindrical");
+  s.joints.push_back(slide);
+  FrictionSpec brake;
+  brake.joint = "slide", brake.coulomb = 1.5, brake.smooth_velocity = 0.4;
+  if (slide.type == "cylindrical") brake.motion = "translation";
+  s.forces.push_back({"brake", brake});
+  Sensor along;
+  along.name = "x", along.quantity = "displacement", along.joint = "slide";
+  s.sensors.push_back(along);
+  s.conditions = {{"x", f("0.25"), f("3")}};
+  s.simulation.end_time = 1.2;
+  const Mechanism mechanism(s, nominal(s));
+  const VectorXd y = end_state(s);
+  auto F = [](double v) {
+    const double u = std::hypot(v, 0.4);
+    return u - 0.4 * std::atanh(0.4 / u);
+  };
+  CHECK(F(3) - F(y(9)) == Approx(1.5 * 1.2).epsilon(1e-7));
+  CHECK(end_value(s, along) == Approx(y(2)).epsilon(1e-12));
+  s.simulation.end_time = 1e-6;
+  CHECK(end_value(s, along) == Approx(0.25 + 3e-6).epsilon(1e-9));
+}
+
+TEST_CASE("a torsional spring turns a body on a cylindrical joint, which slides as it likes", "[force]") {
+  Scene s = free_body();
+  Joint joint = hinge("pin", "ground", vec("0", "0", "0"), "block", vec("0", "0", "0"));
+  joint.type = "cylindrical";
+  s.joints.push_back(joint);
+  s.sensors.push_back(angle_sensor("theta", "pin"));
+  s.conditions = {value_of("theta", "0.5"), rate_of("theta", "0")};
+  s.bodies[0].velocity = {0.0, 0.0, 0.7};
+  Rsda spring;
+  spring.joint = "pin", spring.stiffness = 1.6;
+  s.forces.push_back({"spring", spring});
+  const VectorXd y = end_state(s);
+  CHECK(2 * std::atan2(y(6), y(3)) == Approx(0.5 * std::cos(2 * 2.0)).epsilon(1e-8));  // sqrt(1.6/0.4) = 2
+  CHECK(y(2) == Approx(1.4).epsilon(1e-9));
+}
+
 TEST_CASE("a force on the ground, or with a name that nobody knows, is refused with its place", "[force]") {
   auto message = [](const Scene& scene) {
     try {

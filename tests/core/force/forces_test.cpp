@@ -12,7 +12,7 @@
 
 #define BETWEEN_BODIES                                                                                         \
   TsdaCase<LinearLaw>, TsdaCase<ProgramLaw>, RsdaCase<LinearLaw>, RsdaCase<ProgramLaw>, RsdaCase<DryFriction>, \
-      BushingCase
+      BushingCase, SlidingCase
 #define ALL_FORCES                                                                                     \
   BETWEEN_BODIES, (AppliedCase<false, false>), (AppliedCase<false, true>), (AppliedCase<true, false>), \
       (AppliedCase<true, true>)
@@ -335,6 +335,46 @@ struct BushingCase : Bodies {
   }
 };
 
+// Friction along an axis of body 1; geometry: the two points and the axis.
+struct SlidingCase : Bodies {
+  static constexpr int kGeometry = 9, kLaw = 28 + kGeometry, kFields = 3, kParameters = 0, kInputs = kLaw + kFields;
+  SlidingFriction force;
+
+  explicit SlidingCase(unsigned seed) : Bodies(seed, kInputs) { place(); }
+  void place() {
+    Bodies::place();
+    force.displacement.s1 = x.segment<3>(28), force.displacement.s2 = x.segment<3>(31);
+    force.displacement.s3 = x.segment<3>(34);
+    force.slot1 = 0, force.slot2 = 3, force.slot3 = 6;
+    DryFriction::fill(force.law, x, kLaw, kGeometry);
+  }
+  template <class T>
+  T work(const std::vector<T>& at) const {
+    const TextbookBody<T> body1 = textbook(at, 0), body2 = textbook(at, 14);
+    auto displacement = [&](const auto& g1, const auto& g2) {
+      const auto d = g2.point(constant(part<3>(at, 31))) - g1.point(constant(part<3>(at, 28)));
+      return dot(times(g1.A, constant(part<3>(at, 34))), d);
+    };
+    const T rate = displacement(body1.moving(), body2.moving()).c[1];
+    return -DryFriction::value(at, kLaw, rate, rate) * displacement(body1.displaced(), body2.displaced()).c[1];
+  }
+  Loads loads() const {
+    Loads out;
+    force.add_load(f1, f2, out.load1, out.load2);
+    return out;
+  }
+  void pull_back(FrameBar& bar1, FrameBar& bar2, VectorXd& theta_bar, VectorXd&) const {
+    force.pull_back(f1, f2, bar1, bar2, theta_bar);
+  }
+  LoadTangents tangent(const FrameTangent& t1, const FrameTangent& t2, const Eigen::MatrixXd& directions) const {
+    const Lanes<3> s1 = directions.middleRows<3>(28), s2 = directions.middleRows<3>(31),
+                   s3 = directions.middleRows<3>(34), law = directions.middleRows<3>(kLaw);
+    LoadTangents out;
+    force.tangent(f1, f2, t1, t2, {&s1, &s2, &s3}, &law, out.load1, out.load2);
+    return out;
+  }
+};
+
 // On body 1: geometry: the point; parameters: the components.
 template <bool kTorque, bool kBodyAxes>
 struct AppliedCase : Bodies {
@@ -456,7 +496,7 @@ TEMPLATE_TEST_CASE("forces between two bodies balance: no resultant, no moment",
   TestType c(GENERATE(range(0u, 4u)));
   c.x.template segment<4>(3).normalize();
   c.x.template segment<4>(17).normalize();
-  if constexpr (TestType::kGeometry == 9) {  // a joint angle: a common axis
+  if constexpr (requires { c.joint; }) {  // a joint angle: a common axis
     const Vector3d axis = Vector3d(c.x.template segment<3>(28)).normalized();
     const Vector3d x1 = axis.unitOrthogonal(), y1 = axis.cross(x1);
     c.x.template segment<3>(28) = x1, c.x.template segment<3>(31) = y1;

@@ -140,6 +140,13 @@ struct TextbookScene {
     const auto [l, ldot] = span();
     return rho[k] * l * l * l - rho[a] * ldot * l + T(0.5);
   }
+  // Along an axis of body one, between the points of a slider.
+  Series<T> displacement() const {
+    using std::sqrt;
+    const T length = sqrt(rho[n] * rho[n] + T(1.04));
+    const V3<T> axis{rho[n] / length, T(0.2) / length, T(1) / length};
+    return dot(times(body(0).moving().A, constant(axis)), point(1, foot()) - point(0, tip()));
+  }
   // The largest |Phi| of the hinge and the unit norms.
   T violation() const {
     std::vector<T> phi;
@@ -234,6 +241,9 @@ const std::vector<Row>& all_sensors() {
             const auto v = s.rates(s.point(0, s.tip()) - s.point(1, s.foot()));
             return transposed_times(s.body(0).frame().A, v)[2];
           }),
+      row("displacement", plain("displacement"), [](const auto& s) { return s.displacement().c[0]; }),
+      row(
+          "rate of displacement", plain("displacement"), [](const auto& s) { return s.displacement().c[1]; }, true),
       row("distance", plain("distance"),
           [](const auto& s) { return norm(s.values(s.point(1, s.foot()) - s.point(0, s.tip()))); }),
       row("distance_rate", plain("distance_rate"),
@@ -265,6 +275,11 @@ struct Compiled {
 };
 std::vector<SensorKind> kind_of(const Row& row, const MechanismData& data) {
   if (!row.time_derivative) return {data.sensors.at(0)};
+  if (const auto* along = std::get_if<DisplacementSensor>(&data.sensors.at(0))) {
+    DisplacementSensor rate = *along;
+    rate.rate = true;
+    return {rate};
+  }
   PointSensor rate = std::get<PointSensor>(data.sensors.at(0));
   rate.quantity = PointSensor::Quantity::position_rate;
   return {rate};
@@ -272,6 +287,12 @@ std::vector<SensorKind> kind_of(const Row& row, const MechanismData& data) {
 Compiled compiled(const Row& row, const VectorXd& rho) {
   Scene scene = two_bodies();
   scene.sensors.push_back(row.sensor);
+  if (row.sensor.quantity == "displacement") {  // a joint that has one, and that the other rows do not see
+    Joint slider = hinge("S", "one", vec("a", "b", "0.3"), "two", vec("b", "0.5", "a"));
+    slider.type = "cylindrical", slider.axis1 = vec("n", "0.2", "1");
+    scene.joints.push_back(slider);
+    scene.sensors.back().joint = "S";
+  }
   const Mechanism mechanism(scene, rho);
   const VectorXd angles = VectorXd::Constant(static_cast<Eigen::Index>(mechanism.data().angles.size()),
                                              TextbookScene<double>::kTurns * 2 * std::acos(-1.0));
