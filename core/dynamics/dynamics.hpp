@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "core/dynamics/constraint_terms.hpp"
+#include "core/dynamics/force_terms.hpp"
 #include "core/dynamics/row_laws.hpp"
 #include "core/dynamics/saddle_solver.hpp"
 #include "core/mechanism/mechanism.hpp"
@@ -59,6 +60,7 @@ class Dynamics {
  private:
   void set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
   void set_loads();  // f
+  ForceTerms::At here() const { return {t_, y_, angles_, frames_}; }
   void add_user_loads();
   void add_user_tangent(const ParameterBlock& block, const LaneRows& y_dir);
   void add_user_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& rho_bar);
@@ -68,6 +70,7 @@ class Dynamics {
   const MechanismData& data_;
   FormulationSettings settings_;
   RowLaws laws_;
+  ForceTerms forces_;
   SaddleSolver solver_;
 
   double t_ = 0, worst_residual_ = 0;
@@ -77,7 +80,6 @@ class Dynamics {
   std::vector<Vec<6>> loads_, z_, eta_;  // loads_: f, without the ground
   std::vector<Vec<6>> body_loads_;       // with the ground, for forces to add to
   Eigen::VectorXd gamma_, phi_, phi_dot_, lambda_, mu_, g_;
-  Law::Scratch law_;
   // Derivatives.
   std::vector<FrameTangent> frame_tangents_;
   std::vector<Lanes<6>> load_dirs_, rhs_lanes_, z_dir_;

@@ -10,6 +10,9 @@
 
 #include "core/constraint/constraint.hpp"
 #include "core/constraint/time_law.hpp"
+#include "core/force/applied.hpp"
+#include "core/force/bushing.hpp"
+#include "core/force/friction.hpp"
 #include "core/force/rsda.hpp"
 #include "core/force/tsda.hpp"
 #include "core/force/user_force.hpp"
@@ -37,10 +40,20 @@ struct AngleSensor {
 struct EnergySensor {
   bool kinetic = true, potential = true;
 };
-struct ViolationSensor {};  // the largest |Phi| of joints and unit norms
+struct ViolationSensor {};   // the largest |Phi| of joints and unit norms
+struct DisplacementSensor {  // along a joint's axis, or its rate
+  int body1 = 0, body2 = 0;
+  Dot2 displacement;
+  int slot1 = -1, slot2 = -1, slot3 = -1;
+  bool rate = false;
+};
+struct TensionSensor {  // what a tsda pulls [N], what an rsda resists [N m]
+  bool is_torque = false;
+  int index = 0;  // among the tsda or the rsda
+};
 
-using SensorKind =
-    std::variant<PointSensor, AngularVelocitySensor, CoordinateSensor, AngleSensor, EnergySensor, ViolationSensor>;
+using SensorKind = std::variant<PointSensor, AngularVelocitySensor, CoordinateSensor, AngleSensor, EnergySensor,
+                                ViolationSensor, TensionSensor, DisplacementSensor>;
 
 // Consecutive rows of Phi that tie the same two bodies, and their Jacobian blocks.
 struct RowGroup {
@@ -84,6 +97,10 @@ struct MechanismData {
   std::vector<JointAngle> angles;
   std::vector<TsdaForce> tsda;
   std::vector<RsdaForce> rsda;
+  std::vector<AppliedForce> applied;
+  std::vector<Bushing> bushings;
+  std::vector<FrictionForce> frictions;
+  std::vector<SlidingFriction> sliding_frictions;
   std::vector<UserForceData> user_forces;
   std::vector<SensorKind> sensors;
   std::vector<std::string> sensor_names;
@@ -99,6 +116,17 @@ struct MechanismData {
     }
   }
 };
+
+// rho_bar (all parameters) += scale (d slot/d rho)' bar, for one field
+template <int N>
+void add_slot(const MechanismData& data, int slot, const Vec<N>& bar, double scale,
+              Eigen::Ref<Eigen::VectorXd> rho_bar) {
+  if (slot < 0) return;
+  for (std::size_t k = 0; k < data.active.size(); ++k) {
+    rho_bar(data.active[k]) +=
+        scale * data.theta_rho.col(static_cast<Eigen::Index>(k)).template segment<N>(slot).dot(bar);
+  }
+}
 
 // Value of a sensor at (y, branch of the angles), and its gradient: y_bar += scale d/dy, and in the fields and
 // parameters. rho_bar is with respect to all parameters.
