@@ -186,14 +186,16 @@ void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneR
 }
 
 void Dynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
-                           Eigen::VectorXd& rho_bar) {
+                           Eigen::VectorXd& rho_bar, const Motion* motion) {
   const int n = data_.n;
   const Eigen::Index half = 7 * n;
   for (int i = 1; i <= n; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
     loads_[k - 1] = to_virtual(bodies_[k], w.segment<7>(half + 7 * (i - 1)));
+    if (motion) loads_[k - 1] += motion->z[k - 1];
   }
   g_.setZero();
+  if (motion) g_ = motion->lambda;
   solver_.solve(loads_, g_, solver_settings(true), eta_, mu_);
 
   for (FrameBar& bar : bars_) bar.set_zero();

@@ -23,6 +23,7 @@
 #include "core/dynamics/row_laws.hpp"
 #include "core/dynamics/saddle_solver.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/state_point.hpp"
 #include "core/scene/settings.hpp"
 
 namespace mbsopt {
@@ -50,8 +51,13 @@ class Dynamics {
   // y_dir: tangent of y (14n x lanes); ydot_dir: of (v, a).
   void tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir);
   // w: cotangent of (v, a); adds to the cotangents of y, of the differentiated fields, and of the parameters in laws.
+  // motion: a cotangent of z and lambda themselves beside it.
   void add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
-                   Eigen::VectorXd& rho_bar);
+                   Eigen::VectorXd& rho_bar, const Motion* motion = nullptr);
+  const std::vector<Lanes<6>>& z_tangent() const { return z_dir_; }  // after tangent()
+
+  // Statics: from now on laws of time stand still at their values.
+  void hold_laws() { laws_.hold(); }
 
   SaddleSolver& solver() { return solver_; }
   // Largest relative residual of the constraints' accelerations over all evaluations (augmented Lagrangian).

@@ -46,8 +46,7 @@ void add_pull_back_of_loads(const MechanismData& d, const ReactionSensor& s, con
   auto add_slot = [&](int slot, const auto& bar) {
     if (slot < 0) return;
     for (std::size_t k = 0; k < d.active.size(); ++k) {
-      rho_bar(d.active[k]) +=
-          scale * d.theta_rho.col(static_cast<Eigen::Index>(k)).segment(slot, bar.size()).dot(bar);
+      rho_bar(d.active[k]) += scale * d.theta_rho.col(static_cast<Eigen::Index>(k)).segment(slot, bar.size()).dot(bar);
     }
   };
   for (const Constraint& c : d.constraints) {
@@ -120,8 +119,7 @@ double add_gradient(const MechanismData& d, const ReactionSensor& s, const Eigen
   if (s.slot_s2 >= 0) {
     const Vector3d s2_bar = A2.transpose() * arm_bar;
     for (std::size_t k = 0; k < d.active.size(); ++k) {
-      rho_bar(d.active[k]) +=
-          scale * d.theta_rho.col(static_cast<Eigen::Index>(k)).segment<3>(s.slot_s2).dot(s2_bar);
+      rho_bar(d.active[k]) += scale * d.theta_rho.col(static_cast<Eigen::Index>(k)).segment<3>(s.slot_s2).dot(s2_bar);
     }
   }
   return result;

@@ -1,7 +1,11 @@
 // Sensors evaluated on a compiled mechanism: those of bodies and joints, and the whole model's energy and violation.
+#include <cassert>
 #include <cmath>
+#include <limits>
 
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/reaction_sensor.hpp"
+#include "core/mechanism/state_point.hpp"
 #include "core/mechanism/tension_sensor.hpp"
 #include "core/mechanism/violation.hpp"
 
@@ -133,6 +137,12 @@ void add_potential_gradient(const MechanismData& d, const Eigen::VectorXd& y, co
   }
 }
 
+// Sensors that need accelerations are evaluated by the functions below, with a motion.
+double without_motion() {
+  assert(false && "this sensor needs accelerations");
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
 template <class... F>
 struct Overloaded : F... {
   using F::operator()...;
@@ -178,7 +188,9 @@ double evaluate(const MechanismData& d, const SensorKind& sensor, double t, cons
                  },
                  [&](const ViolationSensor&) { return std::abs(worst_violation(d, t, y, angles).amount); },
                  [&](const TensionSensor& s) { return tension(d, s, t, y, angles); },
-                 [&](const DisplacementSensor& s) { return displacement_value(s, y); }},
+                 [&](const DisplacementSensor& s) { return displacement_value(s, y); },
+                 [&](const AccelerationSensor&) { return without_motion(); },
+                 [&](const ReactionSensor&) { return without_motion(); }},
       sensor);
 }
 
@@ -206,8 +218,36 @@ double add_gradient(const MechanismData& d, const SensorKind& sensor, double t, 
           },
           [&](const ViolationSensor&) { return add_violation_gradient(d, t, y, angles, scale, y_bar, rho_bar); },
           [&](const TensionSensor& s) { return add_tension_gradient(d, s, t, y, angles, scale, y_bar, rho_bar); },
-          [&](const DisplacementSensor& s) { return displacement_gradient(d, s, y, scale, y_bar, rho_bar); }},
+          [&](const DisplacementSensor& s) { return displacement_gradient(d, s, y, scale, y_bar, rho_bar); },
+          [&](const AccelerationSensor&) { return without_motion(); },
+          [&](const ReactionSensor&) { return without_motion(); }},
       sensor);
+}
+
+double evaluate(const MechanismData& d, const SensorKind& sensor, const StatePoint& at) {
+  if (const auto* s = std::get_if<AccelerationSensor>(&sensor)) return s->value(at.y, at.motion->motion(at).z);
+  if (const auto* s = std::get_if<ReactionSensor>(&sensor)) {
+    return evaluate(d, *s, at.y, at.motion->motion(at).lambda);
+  }
+  return evaluate(d, sensor, at.t, at.y, at.angles);
+}
+
+double add_gradient(const MechanismData& d, const SensorKind& sensor, const StatePoint& at, double scale, VecOut y_bar,
+                    VecOut rho_bar) {
+  double value = 0;
+  if (const auto* s = std::get_if<AccelerationSensor>(&sensor)) {
+    Vector3d a_bar = Vector3d::Zero(), b_bar = Vector3d::Zero();
+    value = s->add_gradient(at.y, at.motion->motion(at).z, scale, y_bar, at.motion->bar().z, a_bar, b_bar);
+    add_slot<3>(d, s->a.slot, a_bar, 1, rho_bar);
+    if (s->relative) add_slot<3>(d, s->b.slot, b_bar, 1, rho_bar);
+  } else if (const auto* r = std::get_if<ReactionSensor>(&sensor)) {
+    const Motion& motion = at.motion->motion(at);
+    value = add_gradient(d, *r, at.y, motion.lambda, scale, y_bar, at.motion->bar().lambda, rho_bar);
+  } else {
+    return add_gradient(d, sensor, at.t, at.y, at.angles, scale, y_bar, rho_bar);
+  }
+  at.motion->fold_bar(at, y_bar, rho_bar);
+  return value;
 }
 
 }  // namespace mbsopt

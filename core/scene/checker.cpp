@@ -31,6 +31,8 @@ Kind kind_of(To what) {
       return {"body", "bodies"};
     case To::joint:
       return {"joint", "joints"};
+    case To::drive:
+      return {"drive", "drives"};
     case To::force:
       return {"force", "forces"};
     case To::sensor:

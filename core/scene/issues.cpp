@@ -267,7 +267,8 @@ void check_meaning(Checker& checker, const Condition& condition) {
   const TypeRow* const row = sensor ? find_row(kSensorQuantities, sensor->quantity) : nullptr;
   if (!row) return;
   const std::string named = "sensor '" + sensor->name + "'";
-  if (sensor->quantity == "energy" || sensor->quantity == "constraint_violation" || sensor->quantity == "force")
+  if (row->of_accelerations || sensor->quantity == "energy" || sensor->quantity == "constraint_violation" ||
+      sensor->quantity == "force")
     return checker.issue(checker.path("sensor"), named + " measures " + sensor->quantity +
                                                      ", which a condition cannot prescribe; use positions, angles, "
                                                      "distances, Euler parameters or their rates");

@@ -173,6 +173,8 @@ struct Sensor {
   std::string body1, body2;    // of distance, distance_rate
   PointField point1 = "O", point2 = "O";
   std::string force;  // of force
+  std::string kind;   // of reaction: force or torque
+  std::string drive;  // of drive_force
 };
 
 struct Condition {

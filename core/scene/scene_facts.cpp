@@ -103,6 +103,8 @@ std::vector<std::string> SceneFacts::names(To what) const {
     }
     case To::joint:
       return names_of(scene_.joints);
+    case To::drive:
+      return names_of(scene_.drives);
     case To::force:
       return names_of(scene_.forces);
     case To::sensor:

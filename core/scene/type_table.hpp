@@ -86,6 +86,12 @@ inline constexpr TypeRow kSensorQuantities[] = {
     {"energy", "of the whole mechanism", "component!", "kinetic potential total", dimension::kTorque, true},
     {"constraint_violation", "largest absolute entry of the constraint equations", ""},
     {"force", "tension of a tsda, torque of an rsda", "force!", "", dimension::kForce, true},
+    {"acceleration", "of a body point, kinematic: without gravity", "body! point relative_to component! frame",
+     "x y z norm", dimension::kAcceleration, true, true},
+    {"reaction", "force or torque of a joint on body2 at its point2, global axes", "joint! kind! component!",
+     "x y z norm", dimension::kForce, true, true},
+    {"drive_force", "force or torque of a drive along its coordinate, positive where it pushes it up", "drive!", "",
+     dimension::kForce, true, true},
 };
 
 inline constexpr std::string_view kJointsWithAngle = "revolute cylindrical screw";
@@ -94,7 +100,7 @@ inline constexpr std::string_view kJointsWithDisplacement = "translational cylin
 // In the problem format, not in this version.
 inline constexpr std::string_view kLaterJointTypes = "";
 inline constexpr std::string_view kLaterForceTypes = "";
-inline constexpr std::string_view kLaterSensorQuantities = "acceleration reaction";
+inline constexpr std::string_view kLaterSensorQuantities = "";
 
 inline constexpr std::string_view kIntegrators = "dopri5 dopri853 rk4";
 inline constexpr std::string_view kLaterIntegrators =

@@ -50,7 +50,7 @@ struct Says {
   std::optional<Dimension> dimension = {};  // nullopt: any
 };
 
-enum class To { body, joint, force, sensor, parameter, objective };
+enum class To { body, joint, drive, force, sensor, parameter, objective };
 
 // Names that an expression may use besides parameters and definitions.
 enum class Names { none, tsda_law, rsda_law, time_law, state, objective };  // state: t and sensors of (t, q, v)
@@ -285,6 +285,8 @@ void describe(auto& v, Like<Sensor> auto& s) {
   v.point("point1", s.point1, s.body1, {"first point [m]", need_of(*row, "point1"), kLength});
   v.point("point2", s.point2, s.body2, {"second point [m]", need_of(*row, "point2"), kLength});
   v.reference("force", s.force, To::force, {"a tsda or rsda", need_of(*row, "force")});
+  v.word("kind", s.kind, Words{"force torque"}, {"which reaction", need_of(*row, "kind")});
+  v.reference("drive", s.drive, To::drive, {"a drive", need_of(*row, "drive")});
 }
 
 void describe(auto& v, Like<Condition> auto& c) {
