@@ -274,7 +274,12 @@ bool occurs_anywhere(const Problem& problem, const std::string& parameter) {
 
 // Only where a law replaces it.
 bool occurs_beside_a_law(Problem problem, const std::string& parameter) {
-  for (Force& force : problem.scene.forces) std::visit([](auto& kind) { kind.law.reset(); }, force.kind);
+  for (Force& force : problem.scene.forces)
+    std::visit(
+        [](auto& kind) {
+          if constexpr (requires { kind.law; }) kind.law.reset();
+        },
+        force.kind);
   return occurs_anywhere(problem, parameter);
 }
 

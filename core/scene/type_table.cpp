@@ -68,7 +68,8 @@ std::string not_among(std::string_view what, std::string_view found, const std::
 bool ties_joints(const Joint& joint) { return joint.type == "gear" || joint.type == "rack_pinion"; }
 
 bool is_sliding(std::string_view motion, std::string_view joint_type) {
-  return motion.empty() ? !has_word(kJointsWithAngle, joint_type) : motion == "translation";
+  if (!motion.empty()) return motion == "translation";
+  return has_word(kJointsWithDisplacement, joint_type) && !has_word(kJointsWithAngle, joint_type);
 }
 
 std::string_view type_of(const Force& force) {

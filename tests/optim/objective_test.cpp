@@ -138,7 +138,6 @@ TEST_CASE("the gradients of all kinds agree with each other and with differences
   rms.rms_of = f("vz");
   problem.objectives = {peak, low, rms, tension};
   GradientCheckOptions options;
-  options.repetitions = 1;
   options.free_steps = false;
   const GradientCheck check = check_gradients(problem, options);
   REQUIRE(check.ran);

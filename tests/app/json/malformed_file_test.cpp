@@ -163,7 +163,7 @@ const Case kCases[] = {
     {"circular definitions", R"("half": "k1/2")", R"("half": @"other", "other": "half")", "definitions.half",
      "refers to itself"},
     {"gear between bodies", R"("spherical")", R"("gear", @"body1": "crank")", "joints[1].body1", "unknown key"},
-    {"gear without its joints", R"("spherical")", R"("gear")", "joints[1].joint1", "is missing"},
+    {"gear without its joints", R"("spherical")", R"("gear")", "joints[1].joint2", "is missing"},
     {"misspelt joint type", R"("spherical")", R"(@"sperical")", "joints[1].type", "did you mean 'spherical'"},
     {"misspelt force type", R"("tsda")", R"(@"bushng")", "forces[0].type", "did you mean 'bushing'"},
     {"torque without components", R"("forces": [)", R"("forces": [@{"name": "T", "type": "torque", "body": "rod"}, )",
