@@ -4,6 +4,7 @@
 
 #include "app/command.hpp"
 #include "app/interrupt.hpp"
+#include "app/objective_values.hpp"
 #include "app/run.hpp"
 #include "app/text_table.hpp"
 #include "core/expression/counted.hpp"
@@ -20,10 +21,12 @@ std::string compared(Verdict verdict, double difference) {
 
 std::string derivative(double value) { return std::isfinite(value) ? significant(value, 11) : "failed"; }
 
-void print_entries(std::ostream& out, const GradientCheck& check) {
+void print_entries(std::ostream& out, const GradientCheck& check,
+                   const std::vector<std::optional<double>>& true_values) {
   out << "\nfrozen: differences on the steps of the base run; free: with step-size control at work. Relative to tlm:\n";
   for (std::size_t i = 0; i < check.objectives.size(); ++i) {
-    out << fmt::format("\n{} = {}\n", check.objectives[i], significant(check.psi(static_cast<Eigen::Index>(i)), 12));
+    out << fmt::format("\n{} = {}{}\n", check.objectives[i], significant(check.psi(static_cast<Eigen::Index>(i)), 12),
+                       true_extreme_text(true_values[i]));
     TextTable table(
         {"parameter", "adjoint", "tlm", "fd frozen", "fd free", "adjoint = tlm", "fd frozen = tlm", "fd free = tlm"});
     for (const CheckedEntry& e : check.entries) {
@@ -95,12 +98,12 @@ Json gradient_json(const GradientCheck& check, const Eigen::MatrixXd& psi_rho) {
   return gradient;
 }
 
-void add_to_result(Json& result, const GradientCheck& check) {
+void add_to_result(Json& result, const GradientCheck& check, const std::vector<std::optional<double>>& true_values) {
   const Json adjoint = gradient_json(check, check.adjoint);
   for (std::size_t i = 0; i < check.objectives.size(); ++i) {
     const std::string& name = check.objectives[i];
-    result["objectives"][name] = {{"value", check.psi(static_cast<Eigen::Index>(i))},
-                                  {"gradient", adjoint.value(name, Json::object())}};
+    result["objectives"][name] = objective_json(check.psi(static_cast<Eigen::Index>(i)), true_values[i]);
+    result["objectives"][name]["gradient"] = adjoint.value(name, Json::object());
   }
   const auto add = [&](const char* name, const MethodCost& cost, const Eigen::MatrixXd& psi_rho) {
     result["methods"][name] = {{"wall_seconds", cost.wall_seconds},
@@ -164,9 +167,11 @@ int check_command(const CommandContext& context) {
   }
 
   run.result["simulation"] = to_json(check.statistics);
-  add_to_result(run.result, check);
+  const Evaluator evaluator(scene, objectives_of(run.problem));
+  const std::vector<std::optional<double>> true_values = evaluator.true_values(evaluator.start());
+  add_to_result(run.result, check, true_values);
   print_simulation(context.out, scene, check.statistics);
-  print_entries(context.out, check);
+  print_entries(context.out, check, true_values);
   print_taylor(context.out, check);
   print_identities(context.out, check);
   print_costs(context.out, check);

@@ -28,6 +28,7 @@ struct CommandContext {
 
 int validate_command(const CommandContext& context);
 int simulate_command(const CommandContext& context);
+int kinematics_command(const CommandContext& context);
 int gradient_command(const CommandContext& context);
 int check_command(const CommandContext& context);
 int design_command(const CommandContext& context);

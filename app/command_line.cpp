@@ -30,6 +30,8 @@ struct Command {
 constexpr std::array kCommands{
     Command{"validate", "check a problem file; print bodies, equations, degrees of freedom", validate_command},
     Command{"simulate", "forward dynamics", simulate_command},
+    Command{"kinematics", "positions, velocities, accelerations of a fully driven mechanism, and driving forces",
+            kinematics_command},
     Command{"gradient", "objectives and their gradients", gradient_command},
     Command{"check", "all gradient methods against each other and against differences", check_command},
     Command{"design", "optimal design", design_command},

@@ -2,6 +2,7 @@
 
 #include "app/command.hpp"
 #include "app/interrupt.hpp"
+#include "app/objective_values.hpp"
 #include "app/optimized_problem.hpp"
 #include "app/report/run_report.hpp"
 #include "app/run.hpp"
@@ -23,12 +24,13 @@ void print_design(std::ostream& out, const DesignResult& design) {
   if (!design.constraints.empty()) header.insert(header.end(), {"at least", "at most"});
   TextTable objectives(header);
   std::vector<std::string> minimised{design.objective, significant(design.objective_initial),
-                                     significant(design.objective_final)};
+                                     significant(design.objective_final) + true_extreme_text(design.objective_true)};
   minimised.resize(header.size());
   objectives.add(minimised);
   const auto bound = [](const std::optional<double>& value) { return value ? significant(*value) : std::string(); };
   for (const DesignConstraint& c : design.constraints) {
-    objectives.add({c.objective, significant(c.initial), significant(c.value), bound(c.lower), bound(c.upper)});
+    objectives.add({c.objective, significant(c.initial), significant(c.value) + true_extreme_text(c.true_value),
+                    bound(c.lower), bound(c.upper)});
   }
   out << '\n' << parameters.text() << '\n' << objectives.text();
   out << fmt::format("\n{} {}: {}, {}, {:.3g} s\n", design.optimizer, to_string(design.status),
@@ -38,11 +40,13 @@ void print_design(std::ostream& out, const DesignResult& design) {
 
 void add_to_result(Json& result, const DesignResult& design) {
   result["simulation"] = to_json(design.final_evaluation.statistics);
-  result["objectives"][design.objective] = {{"value", design.objective_final}, {"initial", design.objective_initial}};
+  result["objectives"][design.objective] = objective_json(design.objective_final, design.objective_true);
+  result["objectives"][design.objective]["initial"] = design.objective_initial;
   for (const DesignConstraint& c : design.constraints) {
     result["objectives"][c.objective] = {{"value", c.value},          {"initial", c.initial},
                                          {"lower", or_null(c.lower)}, {"upper", or_null(c.upper)},
                                          {"violation", c.violation},  {"at_bound", bound_json(c.at_lower, c.at_upper)}};
+    if (c.true_value) result["objectives"][c.objective]["true_value"] = *c.true_value;
   }
   for (const DesignVariable& v : design.variables) {
     result["parameters"][v.name] = {

@@ -4,6 +4,7 @@
 
 #include "app/command.hpp"
 #include "app/interrupt.hpp"
+#include "app/objective_values.hpp"
 #include "app/run.hpp"
 #include "app/text_table.hpp"
 #include "optim/evaluator.hpp"
@@ -16,7 +17,7 @@ const std::map<std::string, GradientMethod> kMethods{{"auto", GradientMethod::au
                                                      {"adjoint", GradientMethod::adjoint},
                                                      {"fd", GradientMethod::differences}};
 
-void add_objectives(Run& run, const Evaluation& evaluation) {
+void add_objectives(Run& run, const Evaluation& evaluation, const std::vector<std::optional<double>>& true_values) {
   const Scene& scene = run.problem.scene;
   std::vector<std::string> header{"parameter", "value"};
   std::vector<std::string> values{"", ""};
@@ -27,8 +28,10 @@ void add_objectives(Run& run, const Evaluation& evaluation) {
     for (std::size_t k = 0; k < scene.parameters.size(); ++k) {
       gradient[scene.parameters[k].name] = evaluation.psi_rho(row, static_cast<Eigen::Index>(k));
     }
-    run.result["objectives"][name] = {{"value", evaluation.psi(row)}, {"gradient", gradient}};
-    run.context.out << fmt::format("{} = {}\n", name, significant(evaluation.psi(row), 12));
+    run.result["objectives"][name] = objective_json(evaluation.psi(row), true_values[i]);
+    run.result["objectives"][name]["gradient"] = gradient;
+    run.context.out << fmt::format("{} = {}{}\n", name, significant(evaluation.psi(row), 12),
+                                   true_extreme_text(true_values[i]));
     header.push_back("d " + name);
   }
   TextTable table(header);
@@ -72,7 +75,7 @@ int gradient_command(const CommandContext& context) {
   print_simulation(context.out, scene, evaluation.statistics);
   context.out << fmt::format("gradients by {}, {:.3g} s\n\n", evaluation.choice.empty() ? method : evaluation.choice,
                              evaluation.wall_seconds);
-  add_objectives(run, evaluation);
+  add_objectives(run, evaluation, evaluator.true_values(evaluator.start()));
   return run.finish();
 }
 

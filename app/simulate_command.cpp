@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "app/command.hpp"
+#include "app/objective_values.hpp"
 #include "app/report/run_report.hpp"
 #include "app/run.hpp"
 #include "app/simulated_motion.hpp"
@@ -9,13 +10,15 @@
 namespace mbsopt {
 namespace {
 
-void add_objectives(Run& run, const Eigen::VectorXd& psi) {
+void add_objectives(Run& run, const SimulatedMotion& motion) {
+  const Eigen::VectorXd& psi = motion.psi;
   if (psi.size() == 0) return;
   TextTable table({"objective", "value"});
   for (Eigen::Index i = 0; i < psi.size(); ++i) {
     const std::string& name = run.problem.objectives[static_cast<std::size_t>(i)].name;
-    run.result["objectives"][name] = {{"value", psi(i)}};
-    table.add({name, significant(psi(i), 10)});
+    const std::optional<double>& true_value = motion.true_values[static_cast<std::size_t>(i)];
+    run.result["objectives"][name] = objective_json(psi(i), true_value);
+    table.add({name, significant(psi(i), 10) + true_extreme_text(true_value)});
   }
   run.context.out << '\n' << table.text();
 }
@@ -36,7 +39,7 @@ int simulate_command(const CommandContext& context) {
     run.write("trajectory.csv", to_csv(motion.trajectory));
   }
   if (simulation.ok()) {
-    add_objectives(run, motion.psi);
+    add_objectives(run, motion);
   } else if (simulation.status == SimulationStatus::stopped) {
     run.stopped(fmt::format("trajectory.csv holds the motion up to {:.6g} s", simulation.last_good_time));
   } else {

@@ -2,7 +2,7 @@
 
 #include "app/interrupt.hpp"
 #include "core/dynamics/assembly.hpp"
-#include "optim/objective.hpp"
+#include "optim/objective_run.hpp"
 
 namespace mbsopt {
 
@@ -23,18 +23,22 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
   }
   motion.model = assembly.summary();
 
-  std::vector<Cost> costs;
-  for (const Objective& objective : objectives) costs.push_back(objective.cost(mechanism));
+  std::vector<const Objective*> all;
+  for (const Objective& objective : objectives) all.push_back(&objective);
   RunOptions options;
   options.progress = [&](double t) {
     run.progress.fraction("simulating", (t - settings.start_time) / (settings.end_time - settings.start_time));
     return !interrupted();
   };
-  const Sampling sampling = record_trajectory(mechanism, scene, motion.trajectory);
-  motion.simulation = simulate(mechanism, settings, costs, sampling, options);
+  motion.simulation = ObjectiveRun(all, mechanism, settings).run([&](std::span<const Cost> costs) {
+    motion.trajectory = {};
+    const Sampling sampling = record_trajectory(mechanism, scene, motion.trajectory);
+    return simulate(mechanism, settings, costs, sampling, options);
+  });
   run.progress.finish();
   if (!motion.simulation.ok()) return motion;
   motion.psi = motion.simulation.psi;
+  motion.true_values = true_extremes(all, mechanism, settings, motion.simulation.steps);
   for (std::size_t i = 0; i < objectives.size(); ++i) {
     motion.psi(static_cast<Eigen::Index>(i)) += objectives[i].parameters_only(rho);
   }

@@ -8,9 +8,10 @@ namespace mbsopt {
 
 struct SimulatedMotion {
   SimulationResult simulation;
-  Trajectory trajectory;  // up to the last good time where the simulation failed
-  Eigen::VectorXd psi;    // per objective of the problem, where the simulation is ok
-  ModelSummary model;     // where the assembly is ok
+  Trajectory trajectory;                           // up to the last good time where the simulation failed
+  Eigen::VectorXd psi;                             // per objective of the problem, where the simulation is ok
+  std::vector<std::optional<double>> true_values;  // of smooth maxima and minima among them
+  ModelSummary model;                              // where the assembly is ok
 };
 
 // Draws the progress of `run`, and stops where the user interrupts.

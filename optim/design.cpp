@@ -134,7 +134,7 @@ void describe_start(const Problem& problem, const Evaluator& evaluator, const Ev
   for (std::size_t i = 0; i < spec.subject_to.size(); ++i) {
     const ObjectiveBound& bound = spec.subject_to[i];
     const double value = start.ok ? start.psi(static_cast<Eigen::Index>(i) + 1) : 0;
-    result.constraints.push_back({bound.objective, bound.lower, bound.upper, value, value, 0, false, false});
+    result.constraints.push_back({bound.objective, bound.lower, bound.upper, value, value, {}, 0, false, false});
   }
 }
 
@@ -215,7 +215,12 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
   result.rho = program.rho_at(solution.x);
   if (start.ok) {
     describe_end(evaluator, program, solution.point, result);
-    if (!abandoned) result.final_evaluation = evaluator.gradients(result.rho);
+    if (!abandoned) {
+      result.final_evaluation = evaluator.gradients(result.rho);
+      const std::vector<std::optional<double>> true_values = evaluator.true_values(result.rho);
+      result.objective_true = true_values[0];
+      for (std::size_t i = 0; i < result.constraints.size(); ++i) result.constraints[i].true_value = true_values[i + 1];
+    }
   }
   result.simulations = evaluator.simulations();
   result.wall_seconds = stopwatch.seconds();

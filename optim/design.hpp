@@ -31,6 +31,7 @@ struct DesignConstraint {
   std::string objective;
   std::optional<double> lower, upper;
   double initial = 0, value = 0;
+  std::optional<double> true_value = {};    // at the solution, where the objective is a smooth maximum or minimum
   double violation = 0;                     // amount by which the nearer bound is missed, 0 where it holds
   bool at_lower = false, at_upper = false;  // the solution touches this bound
 };
@@ -49,6 +50,7 @@ struct DesignResult {
   std::string message;  // in words, always
   std::string objective;
   double objective_initial = 0, objective_final = 0;
+  std::optional<double> objective_true;  // at the solution, where the objective is a smooth maximum or minimum
   std::vector<DesignVariable> variables;
   std::vector<DesignConstraint> constraints;
   std::vector<DesignRow> history;

@@ -8,6 +8,7 @@
 
 #include "core/expression/counted.hpp"
 #include "optim/difference_ladder.hpp"
+#include "optim/objective_run.hpp"
 #include "optim/parameter_values.hpp"
 #include "optim/stopwatch.hpp"
 
@@ -58,17 +59,18 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
     SimulationResult result;
     try {
       const Mechanism mechanism(scene_, rho, active, options_.user_forces);
-      std::vector<Cost> costs;
-      for (const std::size_t i : simulated_) costs.push_back(objectives_[i].cost(mechanism));
-      const RunOptions run_options{frozen, options_.progress};
-      result = sweep == Sweep::tlm       ? simulate_tlm(mechanism, scene_.simulation, costs, {}, run_options)
+      ObjectiveRun objective_run(simulated(), mechanism, scene_.simulation);
+      result = objective_run.run([&](std::span<const Cost> costs) {
+        const RunOptions run_options{frozen, options_.progress};
+        ++e.simulations;
+        return sweep == Sweep::tlm       ? simulate_tlm(mechanism, scene_.simulation, costs, {}, run_options)
                : sweep == Sweep::adjoint ? simulate_adjoint(mechanism, scene_.simulation, costs, run_options)
                                          : simulate(mechanism, scene_.simulation, costs, {}, run_options);
+      });
     } catch (const SceneError& error) {  // a field that this rho drives out of its range
       e.ok = false, e.message = error.what();
       return e;
     }
-    e.simulations = 1;
     e.statistics = result.statistics;
     e.steps = std::move(result.steps);
     if (!result.ok()) {
@@ -93,6 +95,24 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
   }
   e.wall_seconds = stopwatch.seconds();
   return e;
+}
+
+std::vector<const Objective*> Evaluator::simulated() const {
+  std::vector<const Objective*> list;
+  for (const std::size_t i : simulated_) list.push_back(&objectives_[i]);
+  return list;
+}
+
+std::vector<std::optional<double>> Evaluator::true_values(const Eigen::VectorXd& rho) const {
+  std::vector<std::optional<double>> values(objectives_.size());
+  if (std::none_of(objectives_.begin(), objectives_.end(), [](const Objective& o) { return o.is_extreme(); }))
+    return values;
+  const Mechanism mechanism(scene_, rho, std::vector<bool>(active_.size(), false), options_.user_forces);
+  const SimulationResult run = simulate(mechanism, scene_.simulation, {}, {}, {nullptr, options_.progress});
+  if (!run.ok()) return values;
+  const std::vector<std::optional<double>> found = true_extremes(simulated(), mechanism, scene_.simulation, run.steps);
+  for (std::size_t j = 0; j < found.size(); ++j) values[simulated_[j]] = found[j];
+  return values;
 }
 
 void Evaluator::add_parameters_only(Evaluation& e, bool gradients) const {

@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -69,6 +70,10 @@ class Evaluator {
   const Evaluation& values(const Eigen::VectorXd& rho);
   const Evaluation& gradients(const Eigen::VectorXd& rho);
 
+  // Of each objective that is a smooth maximum or minimum: the largest, smallest value that it stands for, on a run of
+  // its own. The others have none; none has one where the run fails.
+  std::vector<std::optional<double>> true_values(const Eigen::VectorXd& rho) const;
+
   // Values on given steps, away from the point that is kept.
   Evaluation values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const;
 
@@ -83,6 +88,7 @@ class Evaluator {
   Evaluation run(const Eigen::VectorXd& rho, Sweep sweep, const StepSequence* frozen) const;
   void add_parameters_only(Evaluation& e, bool gradients) const;
   void add_differences(Evaluation& e) const;
+  std::vector<const Objective*> simulated() const;
 
   Scene scene_;
   std::vector<Objective> objectives_;

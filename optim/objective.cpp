@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <stdexcept>
 
@@ -20,6 +21,39 @@ auto at_place(const std::string& place, const Make& make) {
   }
 }
 
+// exp(k (x - x0)), of which the integral makes a smooth maximum (k > 0) or minimum (k < 0) of x.
+class Exponential final : public PointCost {
+ public:
+  Exponential(std::shared_ptr<const PointCost> x, double k, double x0) : x_(std::move(x)), k_(k), x0_(x0) {}
+  double value(const StatePoint& at) const override { return std::exp(k_ * (x_->value(at) - x0_)); }
+  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
+    const double e = value(at);
+    x_->add_gradient(at, scale * k_ * e, y_bar, rho_bar);
+    return e;
+  }
+
+ private:
+  std::shared_ptr<const PointCost> x_;
+  double k_, x0_;
+};
+
+class Square final : public PointCost {
+ public:
+  explicit Square(std::shared_ptr<const PointCost> x) : x_(std::move(x)) {}
+  double value(const StatePoint& at) const override {
+    const double x = x_->value(at);
+    return x * x;
+  }
+  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
+    const double x = x_->value(at);
+    x_->add_gradient(at, 2 * scale * x, y_bar, rho_bar);
+    return x * x;
+  }
+
+ private:
+  std::shared_ptr<const PointCost> x_;
+};
+
 std::span<const double> view(const Eigen::VectorXd& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
 
 }  // namespace
@@ -33,16 +67,25 @@ Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec
     if (result->is_zero()) result.reset();
     return result;
   };
-  running_ = compile(spec.running, "running");
+  const std::optional<Expression>* expression = &spec.running;
+  const char* part = "running";
+  if (spec.maximum_of) kind_ = ObjectiveKind::maximum, expression = &spec.maximum_of, part = "maximum_of";
+  if (spec.minimum_of) kind_ = ObjectiveKind::minimum, expression = &spec.minimum_of, part = "minimum_of";
+  if (spec.rms_of) kind_ = ObjectiveKind::rms, expression = &spec.rms_of, part = "rms_of";
+  if (kind_ != ObjectiveKind::sum && (spec.running || spec.terminal || spec.parameters_only || !spec.samples.empty()))
+    throw std::invalid_argument(fmt::format("{}.{}: stands alone; other parts are given beside it", place, part));
+  sharpness_ = spec.sharpness.value_or(ObjectiveSpec::kSharpness);
+  duration_ = scene.simulation.end_time - scene.simulation.start_time;
+  running_ = compile(*expression, part);
   terminal_ = compile(spec.terminal, "terminal");
   const double t0 = scene.simulation.start_time, t1 = scene.simulation.end_time;
   for (std::size_t i = 0; i < spec.samples.size(); ++i) {
     const ObjectiveSample& sample = spec.samples[i];
-    const std::string part = fmt::format("samples[{}]", i);
+    const std::string sample_part = fmt::format("samples[{}]", i);
     if (!(sample.time >= t0 && sample.time <= t1))
-      throw std::invalid_argument(
-          fmt::format("{}.{}.time: is {} s, outside the simulated time {} to {} s", place, part, sample.time, t0, t1));
-    if (std::optional<CostExpression> value = compile(sample.value, part + ".value"))
+      throw std::invalid_argument(fmt::format("{}.{}.time: is {} s, outside the simulated time {} to {} s", place,
+                                              sample_part, sample.time, t0, t1));
+    if (std::optional<CostExpression> value = compile(sample.value, sample_part + ".value"))
       samples_.push_back({sample.time, *std::move(value)});
   }
   std::stable_sort(samples_.begin(), samples_.end(), [](const Sample& a, const Sample& b) { return a.time < b.time; });
@@ -59,14 +102,32 @@ bool Objective::needs_simulation() const {
   return running_ || terminal_ || !samples_.empty() || user_running_ || user_terminal_;
 }
 
-Cost Objective::cost(const Mechanism& mechanism) const {
+std::shared_ptr<const PointCost> Objective::expression(const Mechanism& mechanism) const {
+  return running_ ? running_->bind(mechanism) : nullptr;
+}
+
+Cost Objective::cost(const Mechanism& mechanism, double x0) const {
   Cost cost;
   if (running_) cost.running = running_->bind(mechanism);
+  if (running_ && is_extreme())
+    cost.running =
+        std::make_shared<Exponential>(cost.running, kind_ == ObjectiveKind::maximum ? sharpness_ : -sharpness_, x0);
+  if (running_ && kind_ == ObjectiveKind::rms) cost.running = std::make_shared<Square>(cost.running);
   if (terminal_) cost.terminal = terminal_->bind(mechanism);
   for (const Sample& sample : samples_) cost.samples.push_back({sample.time, sample.value.bind(mechanism)});
   if (user_running_) cost.running = point_cost(user_running_, mechanism.rho());
   if (user_terminal_) cost.terminal = point_cost(user_terminal_, mechanism.rho());
   return cost;
+}
+
+Objective::OfIntegral Objective::of_integral(double I, double x0) const {
+  if (!running_ || kind_ == ObjectiveKind::sum) return {I, 1};
+  if (kind_ == ObjectiveKind::rms) {
+    const double psi = std::sqrt(I / duration_);
+    return {psi, I == 0 ? 0 : 0.5 * psi / I};
+  }
+  const double k = kind_ == ObjectiveKind::maximum ? sharpness_ : -sharpness_;
+  return {x0 + std::log(I / duration_) / k, 1 / (k * I)};
 }
 
 double Objective::parameters_only(const Eigen::VectorXd& rho) const {

@@ -1,11 +1,18 @@
 // An objective, ready to be evaluated at any rho:
 //
-//   psi(rho) = integral of running dt + terminal at the end time + sum of samples + parameters_only
+//   sum        psi(rho) = integral of running dt + terminal at the end time + sum of samples + parameters_only
+//   maximum    psi(rho) = x0 + log(I/T)/k,   I = integral of exp(k (x - x0)) dt over the simulated time T
+//   minimum    psi(rho) = x0 - log(I/T)/k,   I = integral of exp(-k (x - x0)) dt
+//   rms        psi(rho) = sqrt(I/T),         I = integral of x^2 dt
+// Whatever x0, the maximum is the same and below the true one; x0 only keeps exp within the range of numbers.
+// A simulation computes what `cost` describes, I (in a sum psi without parameters_only); `of_integral` makes psi of it:
 //
 //   const Objective track(scene, spec);
 //   const Mechanism mechanism(scene, rho);
 //   const SimulationResult run = simulate(mechanism, scene.simulation, std::vector{track.cost(mechanism)});
-//   const double psi = run.psi(0) + track.parameters_only(rho);
+//   const double psi = track.of_integral(run.psi(0)).psi + track.parameters_only(rho);
+//
+// ObjectiveRun (objective_run.hpp) does this for several of them and finds x0.
 #pragma once
 
 #include <memory>
@@ -20,6 +27,8 @@
 
 namespace mbsopt {
 
+enum class ObjectiveKind { sum, maximum, minimum, rms };
+
 class Objective {
  public:
   // Throws std::invalid_argument: "objectives.track.running: unknown name ...".
@@ -29,7 +38,15 @@ class Objective {
 
   const std::string& name() const { return name_; }
   bool needs_simulation() const;
-  Cost cost(const Mechanism& mechanism) const;  // all but parameters_only; an absent part stays absent
+  ObjectiveKind kind() const { return kind_; }
+  bool is_extreme() const { return kind_ == ObjectiveKind::maximum || kind_ == ObjectiveKind::minimum; }
+  Cost cost(const Mechanism& mechanism, double x0 = 0) const;  // an absent part stays absent
+  struct OfIntegral {
+    double psi, psi_I;  // and its derivative in I; that of an rms at 0, where it has none, is 0
+  };
+  OfIntegral of_integral(double I, double x0 = 0) const;
+  // The expression x of a kind that is no sum; null where it is the constant 0.
+  std::shared_ptr<const PointCost> expression(const Mechanism& mechanism) const;
   double parameters_only(const Eigen::VectorXd& rho) const;
   double add_parameters_only_gradient(const Eigen::VectorXd& rho,
                                       Eigen::Ref<Eigen::VectorXd> rho_bar) const;  // += d/drho
@@ -40,6 +57,8 @@ class Objective {
     CostExpression value;
   };
   std::string name_;
+  ObjectiveKind kind_ = ObjectiveKind::sum;
+  double sharpness_ = 1, duration_ = 1;
   std::optional<CostExpression> running_, terminal_;
   std::vector<Sample> samples_;
   std::optional<Program> parameters_only_;

@@ -15,11 +15,16 @@ struct ObjectiveSample {
   Expression value;  // of t, sensors and parameters
 };
 
-// psi = integral of running + terminal at the end time + sum of samples + parameters_only
+// psi = integral of running + terminal at the end time + sum of samples + parameters_only; or, alone, one of
+//   maximum_of   (1/k) log(mean of exp(k x)), k = sharpness          minimum_of   -(1/k) log(mean of exp(-k x))
+//   rms_of       sqrt(mean of x^2)                                   means over the simulated time
 struct ObjectiveSpec {
   std::string name;
   std::optional<Expression> running, terminal, parameters_only;
   std::vector<ObjectiveSample> samples;
+  std::optional<Expression> maximum_of, minimum_of, rms_of;
+  std::optional<double> sharpness;  // of maximum_of, minimum_of [1/unit of the expression]
+  static constexpr double kSharpness = 100;
 };
 
 struct ObjectiveBound {

@@ -16,9 +16,18 @@ std::string text_of(double value) { return Expression(value).text(); }
 // Found by Checker::check through the arguments' namespace.
 void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
   checker.must_be_identifier(checker.path(), objective.name);
-  if (!objective.running && !objective.terminal && !objective.parameters_only && objective.samples.empty())
+  const bool sums = objective.running || objective.terminal || objective.parameters_only || !objective.samples.empty();
+  const int alone = objective.maximum_of.has_value() + objective.minimum_of.has_value() + objective.rms_of.has_value();
+  if (!sums && alone == 0)
     checker.issue(checker.path(),
-                  "has no part; at least one of running, terminal, samples and parameters_only is needed");
+                  "has no part; running, terminal, samples and parameters_only (added), or one of maximum_of, "
+                  "minimum_of and rms_of is needed");
+  if (alone > 1 || (alone == 1 && sums))
+    checker.issue(checker.path(),
+                  "has maximum_of, minimum_of or rms_of beside another part; each of them stands alone, so make it an "
+                  "objective of its own");
+  if (objective.sharpness && !objective.maximum_of && !objective.minimum_of)
+    checker.issue(checker.path("sharpness"), "is given without maximum_of or minimum_of, which it belongs to");
   const SimulationSettings& simulation = checker.facts().scene().simulation;
   for (std::size_t i = 0; i < objective.samples.size(); ++i) {
     const double time = objective.samples[i].time;

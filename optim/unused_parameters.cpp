@@ -99,15 +99,36 @@ class Search {
   }
 
   std::vector<std::string> bodies_of(const Force& force) const {
-    if (const auto* tsda = std::get_if<Tsda>(&force.kind)) return {tsda->body1, tsda->body2};
-    return bodies_of_joint(std::get<Rsda>(force.kind).joint);
+    return std::visit([this](const auto& kind) { return bodies_of(kind); }, force.kind);
+  }
+  template <class Kind>
+  std::vector<std::string> bodies_of(const Kind& kind) const {
+    if constexpr (requires { kind.joint; }) {
+      return bodies_of_joint(kind.joint);
+    } else if constexpr (requires { kind.body1; }) {
+      return {kind.body1, kind.body2};
+    } else {  // on one body, of which its sensors may make it depend on others
+      std::vector<std::string> all{kind.body};
+      for (const Expression& component : kind.components)
+        for (const std::string& name : component.names())
+          if (const Sensor* sensor = facts_.sensor(name))
+            for (const std::string& body : bodies_of(*sensor)) all.push_back(body);
+      return all;
+    }
   }
 
   std::vector<std::string> bodies_of(const Sensor& sensor) const {
     std::vector<std::string> all = bodies_of_joint(sensor.joint);
+    if (measures_everything(sensor))
+      for (const Body& body : scene_.bodies) all.push_back(body.name);
+    if (const Force* force = facts_.force(sensor.force))
+      for (const std::string& body : bodies_of(*force)) all.push_back(body);
     for (const std::string& body : {sensor.body, sensor.body1, sensor.body2}) all.push_back(body);
     if (sensor.relative_to) all.push_back(sensor.relative_to->body);
     return all;
+  }
+  static bool measures_everything(const Sensor& sensor) {
+    return sensor.quantity == "energy" || sensor.quantity == "constraint_violation";
   }
 
   void connect_bodies() {
@@ -143,7 +164,7 @@ class Search {
       const std::string& name = symbols.input_names()[static_cast<std::size_t>(input)];
       if (input < facts_.symbols(Names::none).inputs())
         used_.insert(name);
-      else if (names == Names::objective)
+      else if (names == Names::objective || names == Names::state)
         use_sensor(name);
     }
   }
@@ -159,10 +180,11 @@ class Search {
     const Sensor* const sensor = facts_.sensor(name);  // "t" is none
     if (!sensor || !used_sensors_.insert(name).second) return;
     collect(*sensor);
-    if (sensor->quantity == "energy" || sensor->quantity == "constraint_violation")
+    if (measures_everything(*sensor))
       bodies_.look_at_all();
     else
       bodies_.look_at(bodies_of(*sensor));
+    if (const Force* force = facts_.force(sensor->force)) collect_force(*force);
     // A joint's angle also depends on the joint's own axes and normals.
     if (const Joint* joint = facts_.joint(sensor->joint)) collect(*joint);
   }
@@ -190,12 +212,14 @@ class Search {
   void collect_force(Force force) {
     std::visit(
         [](auto& kind) {
-          if (!kind.law) return;
-          kind.stiffness = kind.damping = 0.0;
-          if constexpr (requires { kind.free_length; })
-            kind.free_length = kind.actuator = 0.0;
-          else
-            kind.free_angle = 0.0;
+          if constexpr (requires { kind.law; }) {
+            if (!kind.law) return;
+            kind.stiffness = kind.damping = 0.0;
+            if constexpr (requires { kind.free_length; })
+              kind.free_length = kind.actuator = 0.0;
+            else
+              kind.free_angle = 0.0;
+          }
         },
         force.kind);
     collect(force);
@@ -250,7 +274,12 @@ bool occurs_anywhere(const Problem& problem, const std::string& parameter) {
 
 // Only where a law replaces it.
 bool occurs_beside_a_law(Problem problem, const std::string& parameter) {
-  for (Force& force : problem.scene.forces) std::visit([](auto& kind) { kind.law.reset(); }, force.kind);
+  for (Force& force : problem.scene.forces)
+    std::visit(
+        [](auto& kind) {
+          if constexpr (requires { kind.law; }) kind.law.reset();
+        },
+        force.kind);
   return occurs_anywhere(problem, parameter);
 }
 

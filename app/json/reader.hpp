@@ -53,6 +53,7 @@ class Reader {
   }
   void expression(std::string_view key, Expression& value, Names, const Says& says) { number(key, value, says); }
   void time_law(std::string_view key, Expression& value, std::optional<SampledLaw>& samples, const Says& says);
+  void laws(std::string_view key, LawVector& value, Names, const Says& says) { vector(key, value, says); }
 
   void plain(std::string_view key, double& value, const Range&, const Says& says);
   void plain(std::string_view key, int& value, const Range&, const Says& says);

@@ -106,6 +106,7 @@ class SchemaWriter {
   void time_law(std::string_view key, Expression&, std::optional<SampledLaw>&, const Says& says) {
     put(key, says, {{"anyOf", {ref("expression"), object_schema<SampledLaw>()}}});
   }
+  void laws(std::string_view key, LawVector& value, Names, const Says& says) { vector(key, value, says); }
 
   void plain(std::string_view key, double& value, const Range& range, const Says& says) {
     put(key, says, ranged(ref("number"), range), value);

@@ -28,7 +28,14 @@ void add_outcome(HtmlPage& page, const Json& result) {
     rows.push_back({name, cell(objective.value("initial", Json())), cell(objective.at("value")),
                     cell(objective.value("lower", Json())), cell(objective.value("upper", Json()))});
   }
-  page.table({"objective", "before", "after", "at least", "at most"}, rows);
+  std::vector<std::string> header{"objective", "before", "after", "at least", "at most"};
+  if (has_true_values(result)) {
+    header.push_back("true extreme after");
+    std::size_t i = 0;
+    for (const auto& [name, objective] : result.at("objectives").items())
+      rows[i++].push_back(cell(objective.value("true_value", Json())));
+  }
+  page.table(header, rows);
 }
 
 void add_drawings(HtmlPage& page, const Scene& scene, const Eigen::VectorXd& rho, const Trajectory& before,

@@ -231,8 +231,7 @@ void draw_state(const DrawnSketch& drawn, const View& view, bool last, std::stri
 
 // A length of about an eighth of the width, round.
 void draw_scale(const View& view, std::string& svg) {
-  // A round step is at most 2.5 times as long as asked for.
-  const double wanted = kWidth / 8 / view.scale, length = round_ticks(0, 3 * wanted, 3).at(1);
+  const double wanted = kWidth / 8 / view.scale, length = round_ticks(0, 4 * wanted, 4).at(1);
   svg += fmt::format(
       "<path class=\"frame\" d=\"M{0:.1f} {1:.1f}v6h{2:.1f}v-6\"/><text x=\"{3:.1f}\" y=\"{4:.1f}\">{5:g} m</text>\n",
       kMargin / 2, view.height - 14, length * view.scale, kMargin / 2 + length * view.scale + 6, view.height - 8,

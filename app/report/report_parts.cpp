@@ -81,13 +81,23 @@ void add_simulation(HtmlPage& page, const Scene& scene, const Json& result) {
                 2}});
 }
 
+bool has_true_values(const Json& result) {
+  const Json& objectives = result.at("objectives");
+  return std::any_of(objectives.begin(), objectives.end(), [](const Json& o) { return o.contains("true_value"); });
+}
+
 void add_objectives(HtmlPage& page, const Json& result) {
   if (!result.contains("objectives") || result.at("objectives").empty()) return;
   page.heading("Objectives");
   std::vector<std::vector<std::string>> rows;
-  for (const auto& [name, objective] : result.at("objectives").items())
+  std::vector<std::string> header{"objective", "value"};
+  const bool any_smooth = has_true_values(result);
+  if (any_smooth) header.push_back("true extreme");
+  for (const auto& [name, objective] : result.at("objectives").items()) {
     rows.push_back({name, cell(objective.at("value"))});
-  page.table({"objective", "value"}, rows);
+    if (any_smooth) rows.back().push_back(cell(objective.value("true_value", Json())));
+  }
+  page.table(header, rows);
 }
 
 void add_convergence(HtmlPage& page, const Trajectory& history) {

@@ -12,7 +12,9 @@ void add_status(HtmlPage& page, const Json& result);  // a banner where it did n
 void add_model(HtmlPage& page, const Json& result);   // bodies, equations, degrees of freedom
 void add_simulation(HtmlPage& page, const Scene& scene, const Json& result);  // steps, violations, energy
 void add_objectives(HtmlPage& page, const Json& result);                      // name and value
-void add_convergence(HtmlPage& page, const Trajectory& history);              // objective over iterations
+// Whether any objective is a smooth maximum or minimum, with the true one beside it.
+bool has_true_values(const Json& result);
+void add_convergence(HtmlPage& page, const Trajectory& history);  // objective over iterations
 void add_provenance(HtmlPage& page, const Json& result);
 // A number, a word, an interval, "-" where there is none.
 std::string cell(const Json& value, int digits = 7);

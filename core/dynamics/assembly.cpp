@@ -7,6 +7,7 @@
 #include "core/constraint/unit_norm.hpp"
 #include "core/dynamics/assembly_equations.hpp"
 #include "core/dynamics/assembly_report.hpp"
+#include "core/dynamics/equilibrium.hpp"
 #include "core/dynamics/nearest_point.hpp"
 
 namespace mbsopt {
@@ -142,8 +143,12 @@ void velocity_guess_derivatives(const MechanismData& d, const VectorXd& q, Matri
 }  // namespace
 
 struct Assembly::Solution {
-  Solution(const MechanismData& d, double t)
-      : data(d), position(d, AssemblyLevel::position, t), velocity(d, AssemblyLevel::velocity, t) {
+  Solution(const Mechanism& m, double t)
+      : mechanism(m),
+        start(t),
+        data(m.data()),
+        position(data, AssemblyLevel::position, t),
+        velocity(data, AssemblyLevel::velocity, t) {
     solve();
     set_angles();
   }
@@ -163,6 +168,7 @@ struct Assembly::Solution {
       result.message = assembly_failure(data, AssemblyLevel::position, position, *q);
       return;
     }
+    if (data.equilibrium) return rest_in_equilibrium();
     VelocityProblem velocities(velocity, q->x);
     v.emplace(nearest_point(velocities, velocity_guess(data, q->x)));
     result.y.tail(N) = v->x;
@@ -173,6 +179,16 @@ struct Assembly::Solution {
       return;
     }
     result.ok = true;
+  }
+
+  // From the nearest position that closes the joints to the equilibrium nearest to that.
+  void rest_in_equilibrium() {
+    position.start_branches(result.y);
+    equilibrium = static_equilibrium(mechanism, start, q->x, position.angles());
+    result.iterations += equilibrium.iterations;
+    result.y.head(7 * data.n) = equilibrium.q;
+    result.ok = equilibrium.ok;
+    result.message = equilibrium.message;
   }
 
   // On the turn that an angle's condition names, where there is one (so that a measured angle starts where it was
@@ -209,14 +225,17 @@ struct Assembly::Solution {
     return d;
   }
 
+  const Mechanism mechanism;
+  double start;
   const MechanismData& data;
+  Equilibrium equilibrium;  // where the scene starts from one
   AssemblyEquations position, velocity;
   std::optional<NearestPoint> q, v;
   AssemblyResult result;
 };
 
 Assembly::Assembly(const Mechanism& mechanism, double start_time)
-    : solution_(std::make_unique<Solution>(mechanism.data(), start_time)) {}
+    : solution_(std::make_unique<Solution>(mechanism, start_time)) {}
 Assembly::~Assembly() = default;
 
 const AssemblyResult& Assembly::result() const { return solution_->result; }
@@ -224,8 +243,12 @@ const AssemblyResult& Assembly::result() const { return solution_->result; }
 MatrixXd Assembly::tangent() const {
   const Solution& s = *solution_;
   if (!s.result.ok) return MatrixXd::Constant(s.result.y.size(), s.data.rho.size(), kNaN);
+  MatrixXd y_rho = MatrixXd::Zero(s.result.y.size(), s.data.rho.size());
+  if (s.data.equilibrium) {
+    y_rho.topRows(7 * s.data.n) = s.equilibrium.q_rho;
+    return y_rho;
+  }
   const Solution::Derivatives d = s.derivatives();
-  MatrixXd y_rho(s.result.y.size(), s.data.rho.size());
   const MatrixXd q_rho = s.q->linearisation.solve(d.q_b_rho, d.q_g_rho);
   y_rho << q_rho, s.v->linearisation.solve(d.v_b_q * q_rho + d.v_b_rho, d.v_g_q * q_rho + d.v_g_rho);
   return y_rho;
@@ -237,8 +260,12 @@ void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
     rho_bar.setConstant(kNaN);
     return;
   }
-  const Solution::Derivatives d = s.derivatives();
   const Index N = 7 * s.data.n;
+  if (s.data.equilibrium) {
+    rho_bar += s.equilibrium.q_rho.transpose() * y_bar.topRows(N);
+    return;
+  }
+  const Solution::Derivatives d = s.derivatives();
   MatrixXd b_bar, g_bar;
   s.v->linearisation.solve_transposed(y_bar.bottomRows(N), b_bar, g_bar);
   rho_bar += d.v_b_rho.transpose() * b_bar + d.v_g_rho.transpose() * g_bar;
@@ -249,7 +276,7 @@ void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
 
 std::vector<int> Assembly::obstructed() const {
   const Solution& s = *solution_;
-  if (!s.result.ok) return {};
+  if (!s.result.ok || s.data.equilibrium) return {};
   const Solution::Derivatives d = s.derivatives();
   // What is left of each right-hand side outside the range of J, rows scaled to unit length.
   auto left = [](const NearestPointLinearisation& at, const MatrixXd& J, const MatrixXd& b) {

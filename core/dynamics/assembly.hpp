@@ -3,6 +3,8 @@
 //   positions:   min 1/2 |q - q_guess|^2   subject to  Phi(q, rho) = 0, c(q, rho) = 0      (q: r_g and p, unweighted)
 //   velocities:  min 1/2 |v - v_guess|^2   subject to  Phi_q v = -Phi_t, c_q v = rates
 //
+// or, where the scene starts from static equilibrium, that of equilibrium.hpp, at rest.
+//
 // Derivatives come from the optimality conditions of both problems (nearest_point.hpp). docs/assembly.md.
 #pragma once
 

@@ -31,6 +31,7 @@ const char* unit_of(const SensorKind& kind) {
   }
   if (const auto* a = std::get_if<AngleSensor>(&kind)) return a->rate ? " rad/s" : " rad";
   if (std::holds_alternative<AngularVelocitySensor>(kind)) return " rad/s";
+  if (const auto* x = std::get_if<DisplacementSensor>(&kind)) return x->rate ? " m/s" : " m";
   return "";
 }
 

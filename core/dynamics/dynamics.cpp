@@ -10,6 +10,7 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
       data_(mechanism_.data()),
       settings_(settings),
       laws_(data_),
+      forces_(data_),
       solver_(data_, settings.alpha, settings.type == FormulationType::augmented_lagrangian) {
   const std::size_t n = static_cast<std::size_t>(data_.n);
   const Eigen::Index m = data_.m, P = data_.rho.size();
@@ -19,14 +20,6 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
   frames_.resize(n + 1);
   loads_.resize(n), z_.resize(n), eta_.resize(n), body_loads_.resize(n + 1);
   for (Eigen::VectorXd* x : {&gamma_, &phi_, &phi_dot_, &lambda_, &mu_, &g_}) x->setZero(m);
-  law_.inputs.resize(static_cast<std::size_t>(P) + 3);
-  law_.gradient.resize(static_cast<std::size_t>(P) + 3);
-  auto grow = [&](const Law& law) {
-    if (law.program) law.program->grow(law_.program);
-  };
-  for (const TsdaForce& f : data_.tsda) grow(f.law);
-  for (const RsdaForce& f : data_.rsda) grow(f.law);
-
   frame_tangents_.resize(n + 1);
   for (FrameTangent& t : frame_tangents_) t.set_zero();
   load_dirs_.resize(n + 1), rhs_lanes_.resize(n), z_dir_.resize(n);
@@ -66,16 +59,7 @@ void Dynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::Vector
 
 void Dynamics::set_loads() {
   for (Vec<6>& load : body_loads_) load.setZero();
-  for (const TsdaForce& f : data_.tsda) {
-    const std::size_t i = static_cast<std::size_t>(f.body1), j = static_cast<std::size_t>(f.body2);
-    f.add_load(t_, data_.rho, frames_[i], frames_[j], law_, body_loads_[i], body_loads_[j]);
-  }
-  for (const RsdaForce& f : data_.rsda) {
-    const JointAngle& joint = data_.angles[static_cast<std::size_t>(f.joint_angle)];
-    const std::size_t i = static_cast<std::size_t>(joint.body1), j = static_cast<std::size_t>(joint.body2);
-    f.add_load(t_, data_.rho, joint, angles_(f.joint_angle), frames_[i], frames_[j], law_, body_loads_[i],
-               body_loads_[j]);
-  }
+  forces_.add_loads(here(), body_loads_);
   if (!data_.user_forces.empty()) add_user_loads();
   for (std::size_t i = 0; i < loads_.size(); ++i) {
     const BodyData& body = data_.bodies[i + 1];
@@ -141,31 +125,7 @@ void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneR
   for (Lanes<6>& load : load_dirs_) load.setZero();
   evaluate_tangents(data_, frames_, laws_, angles_, frame_tangents_, block, lambda_, constraint_dirs_, load_dirs_);
   for (Lanes<6>& load : load_dirs_) load = -load;  // from (J'lambda)' to its share of the right-hand side
-  for (const TsdaForce& f : data_.tsda) {
-    const std::size_t i = static_cast<std::size_t>(f.body1), j = static_cast<std::size_t>(f.body2);
-    const TsdaForce::Span x = f.span(frames_[i], frames_[j]);
-    const Law::Value value = f.law.derivatives(t_, data_.rho, x.l, x.ldot, law_);
-    Lanes<4> fields;
-    Lanes<3> s1, s2;
-    const Lanes<1> df = f.law.field_tangent(
-        x.l, x.ldot, block.field<4>(f.law.slot, fields), [&](int p) { return block.direction(p); }, law_);
-    f.tangent(x, value, df, frames_[i], frames_[j], frame_tangents_[i], frame_tangents_[j], block.field<3>(f.slot1, s1),
-              block.field<3>(f.slot2, s2), load_dirs_[i], load_dirs_[j]);
-  }
-  for (const RsdaForce& f : data_.rsda) {
-    const JointAngle& joint = data_.angles[static_cast<std::size_t>(f.joint_angle)];
-    const std::size_t i = static_cast<std::size_t>(joint.body1), j = static_cast<std::size_t>(joint.body2);
-    const JointAngle::Jet jet = joint.jet(frames_[i], frames_[j]);
-    const double angle = JointAngle::on_branch(jet.angle(), angles_(f.joint_angle)), rate = jet.rate();
-    const Law::Value value = f.law.derivatives(t_, data_.rho, angle, rate, law_);
-    Lanes<4> fields;
-    Lanes<3> x1, y1, n2;
-    const Lanes<1> df = f.law.field_tangent(
-        angle, rate, block.field<4>(f.law.slot, fields), [&](int p) { return block.direction(p); }, law_);
-    f.tangent(joint, jet, value, df, frames_[i], frames_[j], frame_tangents_[i], frame_tangents_[j],
-              block.field<3>(joint.slot_x1, x1), block.field<3>(joint.slot_y1, y1), block.field<3>(joint.slot_n2, n2),
-              load_dirs_[i], load_dirs_[j]);
-  }
+  forces_.add_tangent(here(), frame_tangents_, block, y_dir, load_dirs_);
   if (!data_.user_forces.empty()) add_user_tangent(block, y_dir);
 
   Lanes<3> gravity_dir;
@@ -226,14 +186,16 @@ void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneR
 }
 
 void Dynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
-                           Eigen::VectorXd& rho_bar) {
+                           Eigen::VectorXd& rho_bar, const Motion* motion) {
   const int n = data_.n;
   const Eigen::Index half = 7 * n;
   for (int i = 1; i <= n; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
     loads_[k - 1] = to_virtual(bodies_[k], w.segment<7>(half + 7 * (i - 1)));
+    if (motion) loads_[k - 1] += motion->z[k - 1];
   }
   g_.setZero();
+  if (motion) g_ = motion->lambda;
   solver_.solve(loads_, g_, solver_settings(true), eta_, mu_);
 
   for (FrameBar& bar : bars_) bar.set_zero();
@@ -246,16 +208,7 @@ void Dynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd>
     weights.mu0 = &phi_, weights.mu1 = &phi_dot_;
   }
   add_pull_back(data_, frames_, laws_, angles_, weights, -1, bars_, theta_bar, rho_bar);
-  for (const TsdaForce& f : data_.tsda) {
-    const std::size_t i = static_cast<std::size_t>(f.body1), j = static_cast<std::size_t>(f.body2);
-    f.pull_back(t_, data_.rho, frames_[i], frames_[j], law_, bars_[i], bars_[j], theta_bar, rho_bar);
-  }
-  for (const RsdaForce& f : data_.rsda) {
-    const JointAngle& joint = data_.angles[static_cast<std::size_t>(f.joint_angle)];
-    const std::size_t i = static_cast<std::size_t>(joint.body1), j = static_cast<std::size_t>(joint.body2);
-    f.pull_back(t_, data_.rho, joint, angles_(f.joint_angle), frames_[i], frames_[j], law_, bars_[i], bars_[j],
-                theta_bar, rho_bar);
-  }
+  forces_.add_pull_back(here(), bars_, y_bar, theta_bar, rho_bar);
   if (!data_.user_forces.empty()) add_user_adjoint(y_bar, rho_bar);
 
   y_bar.tail(half) += w.head(half);

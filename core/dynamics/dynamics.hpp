@@ -19,9 +19,11 @@
 #include <vector>
 
 #include "core/dynamics/constraint_terms.hpp"
+#include "core/dynamics/force_terms.hpp"
 #include "core/dynamics/row_laws.hpp"
 #include "core/dynamics/saddle_solver.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/state_point.hpp"
 #include "core/scene/settings.hpp"
 
 namespace mbsopt {
@@ -49,8 +51,13 @@ class Dynamics {
   // y_dir: tangent of y (14n x lanes); ydot_dir: of (v, a).
   void tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir);
   // w: cotangent of (v, a); adds to the cotangents of y, of the differentiated fields, and of the parameters in laws.
+  // motion: a cotangent of z and lambda themselves beside it.
   void add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
-                   Eigen::VectorXd& rho_bar);
+                   Eigen::VectorXd& rho_bar, const Motion* motion = nullptr);
+  const std::vector<Lanes<6>>& z_tangent() const { return z_dir_; }  // after tangent()
+
+  // Statics: from now on laws of time stand still at their values.
+  void hold_laws() { laws_.hold(); }
 
   SaddleSolver& solver() { return solver_; }
   // Largest relative residual of the constraints' accelerations over all evaluations (augmented Lagrangian).
@@ -59,6 +66,7 @@ class Dynamics {
  private:
   void set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
   void set_loads();  // f
+  ForceTerms::At here() const { return {t_, y_, angles_, frames_}; }
   void add_user_loads();
   void add_user_tangent(const ParameterBlock& block, const LaneRows& y_dir);
   void add_user_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& rho_bar);
@@ -68,6 +76,7 @@ class Dynamics {
   const MechanismData& data_;
   FormulationSettings settings_;
   RowLaws laws_;
+  ForceTerms forces_;
   SaddleSolver solver_;
 
   double t_ = 0, worst_residual_ = 0;
@@ -77,7 +86,6 @@ class Dynamics {
   std::vector<Vec<6>> loads_, z_, eta_;  // loads_: f, without the ground
   std::vector<Vec<6>> body_loads_;       // with the ground, for forces to add to
   Eigen::VectorXd gamma_, phi_, phi_dot_, lambda_, mu_, g_;
-  Law::Scratch law_;
   // Derivatives.
   std::vector<FrameTangent> frame_tangents_;
   std::vector<Lanes<6>> load_dirs_, rhs_lanes_, z_dir_;

@@ -20,7 +20,10 @@ RowLaws::RowLaws(const MechanismData& data) : data_(&data), jets_(data.laws.size
 void RowLaws::set_time(double t) {
   if (jets_.empty()) return;
   inputs_.back() = t;
-  for (std::size_t k = 0; k < jets_.size(); ++k) jets_[k] = data_->laws[k].law.at(inputs_, scratch_);
+  for (std::size_t k = 0; k < jets_.size(); ++k) {
+    jets_[k] = data_->laws[k].law.at(inputs_, scratch_);
+    if (held_) jets_[k].f_t = jets_[k].f_tt = 0;
+  }
 }
 
 void RowLaws::subtract_f(Eigen::VectorXd& phi) const {
@@ -39,7 +42,7 @@ void RowLaws::add_pull_back(const Eigen::VectorXd* mu0, const Eigen::VectorXd* m
   for (const RowLaw& row : data_->laws) {
     if (row.law.slot >= 0 && mu0) theta_bar(row.law.slot) -= scale * (*mu0)(row.row);
     if (!row.law.programs) continue;
-    for (std::size_t order = 0; order < 3; ++order) {
+    for (std::size_t order = 0; order < (held_ ? 1u : 3u); ++order) {
       if (!mu[order]) continue;
       std::fill(gradient_.begin(), gradient_.end(), 0.0);
       const Program& program = (*row.law.programs)[order];
@@ -58,7 +61,7 @@ void RowLaws::subtract_tangents(const ParameterBlock& block, LaneRows& phi, Lane
     Lanes<1> storage;
     if (const Lanes<1>* constant = block.field<1>(row.law.slot, storage)) phi.row(row.row) -= *constant;
     if (!row.law.programs) continue;
-    for (std::size_t order = 0; order < 3; ++order) {
+    for (std::size_t order = 0; order < (held_ ? 1u : 3u); ++order) {
       std::fill(gradient_.begin(), gradient_.end(), 0.0);
       const Program& program = (*row.law.programs)[order];
       program.add_gradient(inputs_, 1, gradient_, scratch_);

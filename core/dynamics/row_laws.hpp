@@ -14,6 +14,7 @@ class RowLaws {
   explicit RowLaws(const MechanismData& data);
 
   void set_time(double t);
+  void hold() { held_ = true; }  // from now on f_t = f_tt = 0
   double f(int row) const { return jets_[static_cast<std::size_t>(law_of_row_[static_cast<std::size_t>(row)])].f; }
 
   void subtract_f(Eigen::VectorXd& phi) const;
@@ -32,6 +33,7 @@ class RowLaws {
   std::vector<CubicSpline::Jet> jets_;
   std::vector<double> inputs_, gradient_;
   Program::Scratch scratch_;
+  bool held_ = false;
 };
 
 }  // namespace mbsopt

@@ -12,6 +12,7 @@
 namespace mbsopt {
 
 struct Law {
+  static constexpr int kFields = 4;
   double k = 0, c = 0, x0 = 0, f0 = 0;  // [N/m, N s/m, m, N] or [N m/rad, N m s/rad, rad, N m]
   int slot = -1;                        // first of the four rows k, c, x0, f0 among the differentiated fields
   std::optional<Program> program;       // inputs: all parameters, then x, xdot, t
@@ -42,16 +43,16 @@ struct Law {
     return {f, s.gradient[P], s.gradient[P + 1]};
   }
 
+  // df/d(k, c, x0, f0) of the linear law.
+  Vec<4> field_gradient(double x, double xdot) const { return {x - x0, xdot, -k, 1}; }
+
   // theta_bar, rho_bar += f_bar df/d(fields, parameters), after derivatives() at the same point.
   void add_field_gradient(double x, double xdot, double f_bar, const Scratch& s, Eigen::VectorXd& theta_bar,
                           Eigen::VectorXd& rho_bar) const {
     if (program) {
       for (Eigen::Index i = 0; i < rho_bar.size(); ++i) rho_bar(i) += f_bar * s.gradient[static_cast<std::size_t>(i)];
     } else if (slot >= 0) {
-      theta_bar(slot) += f_bar * (x - x0);
-      theta_bar(slot + 1) += f_bar * xdot;
-      theta_bar(slot + 2) -= f_bar * k;
-      theta_bar(slot + 3) += f_bar;
+      theta_bar.segment<4>(slot) += f_bar * field_gradient(x, xdot);
     }
   }
 
@@ -67,7 +68,7 @@ struct Law {
         if (i + 3 < s.gradient.size()) df += s.gradient[i] * rho_dir(input);
       }
     } else if (fields) {
-      df = (x - x0) * fields->row(0) + xdot * fields->row(1) - k * fields->row(2) + fields->row(3);
+      df = field_gradient(x, xdot).transpose() * *fields;
     }
     return df;
   }

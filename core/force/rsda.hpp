@@ -1,6 +1,6 @@
-// Torsional spring-damper on a joint angle (rsda).
-//   torque f = k (angle - free_angle) + c rate, or a law; positive when it resists a positive angle.   [N m]
+// A torque about a joint's axis: a law f(angle, rate, t), positive when it resists a positive angle.   [N m]
 //   virtual work  -f angle_eta,   angle_eta = theta_C C_eta + theta_S S_eta   (joint_angle.hpp)
+// With the law  k (angle - free_angle) + c rate  or an expression it is the torsional spring-damper, rsda.
 #pragma once
 
 #include "core/force/law.hpp"
@@ -8,10 +8,11 @@
 
 namespace mbsopt {
 
-struct RsdaForce {
+template <class L>  // Law, or what has the same members (friction.hpp)
+struct JointTorque {
   int force = 0;        // index in the scene
   int joint_angle = 0;  // index of its JointAngle
-  Law law;
+  L law;
 
   // Moments per unit torque on each body, in body axes: angle_eta = a1'eta_theta1 + a2'eta_theta2.
   static void directions(const JointAngle& joint, const JointAngle::Jet& j, const Frame& f1, const Frame& f2,
@@ -77,5 +78,7 @@ struct RsdaForce {
     load2.bottomRows<3>() -= joint.n2.cross(m2) * df + f.f * da2;
   }
 };
+
+using RsdaForce = JointTorque<Law>;
 
 }  // namespace mbsopt

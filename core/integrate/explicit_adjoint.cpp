@@ -36,6 +36,7 @@ AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings&
       dynamics_(mechanism, settings.formulation),
       projector_(mechanism, settings.formulation.projection) {
   const MechanismData& d = mechanism.data();
+  if (d.needs_motion) motion_.emplace(mechanism, settings.formulation);
   const Eigen::Index states = mechanism.states(), objectives = static_cast<Eigen::Index>(costs.size());
   lambda_.setZero(states, objectives);
   lambda_hat_.setZero(states, objectives);
@@ -57,7 +58,7 @@ void AdjointSweep::begin(double t, const Eigen::VectorXd& y, const Eigen::Vector
   for (std::size_t o = 0; o < costs_.size(); ++o) {
     const Eigen::Index column = static_cast<Eigen::Index>(o);
     if (costs_[o].terminal) {
-      costs_[o].terminal->add_gradient({t, y, angles}, 1, lambda_.col(column), rho_bar_.col(column));
+      costs_[o].terminal->add_gradient({t, y, angles, motion()}, 1, lambda_.col(column), rho_bar_.col(column));
     }
   }
 }
@@ -90,7 +91,7 @@ bool AdjointSweep::step_back(const StoredStep& step) {
     y_ = step.y0 + blend * (step.y1 - step.y_hat);
     for (int i = 0; i < stages; ++i) y_ += (step.h * rk_.dense_weight(i, theta)) * K_.col(i);
     y_bar_.setZero();
-    e.cost->add_gradient({e.time, y_, step.angles0}, 1, y_bar_, rho_bar_.col(e.objective));
+    e.cost->add_gradient({e.time, y_, step.angles0, motion()}, 1, y_bar_, rho_bar_.col(e.objective));
     sample_bar_.col(e.objective) += y_bar_;
     lambda_.col(e.objective) += blend * y_bar_;
     lambda_hat_.col(e.objective) -= blend * y_bar_;
@@ -140,7 +141,7 @@ bool AdjointSweep::step_back(const StoredStep& step) {
       rho_ = rho_bar_.col(o);
       dynamics_.add_adjoint(w_, y_bar_, theta_, rho_);
       const PointCost* running = costs_[static_cast<std::size_t>(o)].running.get();
-      if (running && in_step) running->add_gradient({t, y_, step.angles0}, step.h * rk_.b[i], y_bar_, rho_);
+      if (running && in_step) running->add_gradient({t, y_, step.angles0, motion()}, step.h * rk_.b[i], y_bar_, rho_);
       theta_bar_.col(o) = theta_;
       rho_bar_.col(o) = rho_;
       lambda_.col(o) += y_bar_;

@@ -7,7 +7,9 @@
 // share the factor of each stage.
 #pragma once
 
+#include <optional>
 #include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/motion_solver.hpp"
 #include "core/integrate/cost.hpp"
 #include "core/integrate/sample_schedule.hpp"
 #include "core/integrate/step.hpp"
@@ -49,6 +51,8 @@ class AdjointSweep {
   const Mechanism mechanism_;
   const Method& rk_;
   std::span<const Cost> costs_;
+  MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
+  std::optional<MotionSolver> motion_;  // where some sensor needs it
   Dynamics dynamics_;
   Projector projector_;
   Eigen::MatrixXd lambda_, theta_bar_, rho_bar_;  // a column per objective

@@ -18,6 +18,7 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
       dynamics_(mechanism, settings.formulation),
       projector_(mechanism, settings.formulation.projection) {
   const MechanismData& d = mechanism.data();
+  if (d.needs_motion) motion_.emplace(mechanism, settings.formulation);
   const Eigen::Index states = mechanism.states();
   for (ParameterBlock& p : parameter_blocks(d)) {
     Block b;
@@ -67,7 +68,7 @@ void TangentSweep::take_samples(const Step& step, std::span<const SampleEvent> e
     const double theta = (e.time - step.t) / step.h;
     dense_output(rk_, step, theta, y_);
     set_dense(step, theta);
-    const StatePoint at{e.time, y_, step.angles0};
+    const StatePoint at{e.time, y_, step.angles0, motion()};
     if (e.cost) {
       add_cost(*e.cost, at, 1, &Block::Y, e.objective, psi_rho);
     } else {
@@ -105,8 +106,8 @@ bool TangentSweep::follow(const Step& step, std::span<const Cost> costs, std::sp
     if (!in_step) continue;
     for (std::size_t o = 0; o < costs.size(); ++o) {
       if (!costs[o].running) continue;
-      add_cost(*costs[o].running, {t, y_, step.angles0}, step.h * rk_.b[i], &Block::Y, static_cast<Eigen::Index>(o),
-               psi_rho);
+      add_cost(*costs[o].running, {t, y_, step.angles0, motion()}, step.h * rk_.b[i], &Block::Y,
+               static_cast<Eigen::Index>(o), psi_rho);
     }
   }
   for (Block& b : blocks_) {
@@ -130,7 +131,7 @@ void TangentSweep::finish(double t, const Eigen::VectorXd& y, const Eigen::Vecto
                           std::span<const Cost> costs, Eigen::MatrixXd& psi_rho) {
   for (std::size_t o = 0; o < costs.size(); ++o) {
     if (!costs[o].terminal) continue;
-    add_cost(*costs[o].terminal, {t, y, angles}, 1, &Block::y0, static_cast<Eigen::Index>(o), psi_rho);
+    add_cost(*costs[o].terminal, {t, y, angles, motion()}, 1, &Block::y0, static_cast<Eigen::Index>(o), psi_rho);
   }
 }
 

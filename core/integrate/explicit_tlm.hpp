@@ -3,7 +3,9 @@
 // with the steps held fixed. All directions go through the factor of a stage together, kLanes at a time.
 #pragma once
 
+#include <optional>
 #include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/motion_solver.hpp"
 #include "core/integrate/cost.hpp"
 #include "core/integrate/sample_schedule.hpp"
 #include "core/integrate/simulation.hpp"
@@ -39,6 +41,8 @@ class TangentSweep {
 
   const Mechanism mechanism_;
   const Method& rk_;
+  MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
+  std::optional<MotionSolver> motion_;  // where some sensor needs it
   Dynamics dynamics_;
   Projector projector_;
   std::vector<Block> blocks_;

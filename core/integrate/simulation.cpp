@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "core/dynamics/assembly.hpp"
+#include "core/dynamics/motion_solver.hpp"
 #include "core/integrate/explicit_adjoint.hpp"
 #include "core/integrate/explicit_run.hpp"
 #include "core/integrate/explicit_tlm.hpp"
@@ -39,6 +40,7 @@ class Run {
         costs_(costs),
         method_(method_of(settings)),
         assembly_(mechanism, settings.start_time) {
+    if (mechanism.data().needs_motion) motion_.emplace(mechanism, settings.formulation);
     result_.psi.setZero(static_cast<Eigen::Index>(costs.size()));
     result_.last_good_time = settings.start_time;
     result_.y_initial = assembly_.result().y;
@@ -66,7 +68,7 @@ class Run {
       for (const SampleEvent& e : events) {
         if (!e.cost && !observe) continue;
         dense_output(method_, step, (e.time - step.t) / step.h, y);
-        const StatePoint at{e.time, y, step.angles0};
+        const StatePoint at{e.time, y, step.angles0, motion()};
         if (e.cost) {
           result_.psi(e.objective) += e.cost->value(at);
         } else {
@@ -88,7 +90,7 @@ class Run {
     for (std::size_t o = 0; o < costs_.size(); ++o) {
       if (costs_[o].terminal) {
         result_.psi(static_cast<Eigen::Index>(o)) +=
-            costs_[o].terminal->value({settings_.end_time, result_.y_end, angles_end_});
+            costs_[o].terminal->value({settings_.end_time, result_.y_end, angles_end_, motion()});
       }
     }
     if (!result_.psi.allFinite()) {
@@ -112,10 +114,13 @@ class Run {
         if (!copied) y = step.Y.col(i);
         copied = true;
         result_.psi(static_cast<Eigen::Index>(o)) +=
-            step.h * method_.b[i] * costs_[o].running->value({step.t + method_.c[i] * step.h, y, step.angles0});
+            step.h * method_.b[i] *
+            costs_[o].running->value({step.t + method_.c[i] * step.h, y, step.angles0, motion()});
       }
     }
   }
+
+  MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
 
   std::chrono::steady_clock::time_point start_;
   const Mechanism mechanism_;
@@ -123,6 +128,7 @@ class Run {
   std::span<const Cost> costs_;
   const Method& method_;
   Assembly assembly_;
+  std::optional<MotionSolver> motion_;  // where some sensor needs it
   SimulationResult result_;
   Eigen::VectorXd angles_end_;
 };

@@ -87,6 +87,7 @@ MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std:
   compile_user_forces(model, std::move(user_forces));
   compile_sensors(model);
   compile_conditions(model);
+  model.data.equilibrium = scene.equilibrium;
   group_rows(model.data);
   scale_alpha(model.data);
   model.data.theta_rho = model.fields.theta_rho();

@@ -9,6 +9,17 @@ namespace {
 
 constexpr std::string_view kCoordinates[] = {"x", "y", "z", "e0", "e1", "e2", "e3"};
 
+// A global coordinate of any body point: a dot-2 with the ground (kinematic_scene.hpp makes such drives).
+Constraint point_coordinate(Compilation& model, const Drive& drive, const std::string& where) {
+  Constraint c;
+  c.body2 = model.body_index(drive.body, where + ".body");
+  Dot2 dot2;
+  dot2.s2 = numbers(model.keep(c.slot2, model.point(c.body2, drive.point2, where + ".point2")));
+  dot2.s3 = Vector3d::Unit(drive.coordinate == "x" ? 0 : drive.coordinate == "y" ? 1 : 2);
+  c.primitive = dot2;
+  return c;
+}
+
 Constraint measured(Compilation& model, const Drive& drive, const std::string& where) {
   if (drive.type == "angle") {
     Constraint c = model.joint_angle_term(drive.joint, Compilation::Zero::normals, where + ".joint");
@@ -29,6 +40,7 @@ Constraint measured(Compilation& model, const Drive& drive, const std::string& w
     c.primitive = coordinate;
     return c;
   }
+  if (drive.type == "point") return point_coordinate(model, drive, where);
   if (drive.type != "distance") throw SceneError(where + ".type: '" + drive.type + "' is not a drive known here");
   c.body1 = model.body_index(drive.body1, where + ".body1"), c.body2 = model.body_index(drive.body2, where + ".body2");
   Distance distance;

@@ -1,8 +1,10 @@
 // Forces of the scene, and those written in C++.
 #include <algorithm>
+#include <set>
 
 #include "core/mechanism/compilation.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/scene/type_table.hpp"
 
 namespace mbsopt {
 namespace {
@@ -28,24 +30,121 @@ Law law(Compilation& model, const std::optional<Expression>& expression, const s
   return result;
 }
 
-void add_force(Compilation& model, std::size_t i) {
-  const Force& force = model.scene.forces[i];
-  const std::string where = child_path("forces", i);
-  if (const auto* f = std::get_if<Tsda>(&force.kind)) {
-    TsdaForce out;
-    out.force = static_cast<int>(i);
-    out.body1 = model.body_index(f->body1, where + ".body1"), out.body2 = model.body_index(f->body2, where + ".body2");
-    out.s1 = numbers(model.keep(out.slot1, model.point(out.body1, f->point1, where + ".point1")));
-    out.s2 = numbers(model.keep(out.slot2, model.point(out.body2, f->point2, where + ".point2")));
-    out.law = law(model, f->law, {"l", "ldot"}, {f->stiffness, f->damping, f->free_length, f->actuator}, where);
-    model.data.tsda.push_back(std::move(out));
+void add(Compilation& model, const Tsda& f, int force, const std::string& where) {
+  TsdaForce out;
+  out.force = force;
+  out.body1 = model.body_index(f.body1, where + ".body1"), out.body2 = model.body_index(f.body2, where + ".body2");
+  out.s1 = numbers(model.keep(out.slot1, model.point(out.body1, f.point1, where + ".point1")));
+  out.s2 = numbers(model.keep(out.slot2, model.point(out.body2, f.point2, where + ".point2")));
+  out.law = law(model, f.law, {"l", "ldot"}, {f.stiffness, f.damping, f.free_length, f.actuator}, where);
+  model.data.tsda.push_back(std::move(out));
+}
+
+void add(Compilation& model, const Rsda& f, int force, const std::string& where) {
+  RsdaForce out;
+  out.force = force;
+  out.joint_angle = model.angle_of(f.joint, where + ".joint");
+  out.law = law(model, f.law, {"angle", "rate"}, {f.stiffness, f.damping, f.free_angle, 0.0}, where);
+  model.data.rsda.push_back(std::move(out));
+}
+
+// The components' inputs: all parameters, t, all sensors; what is used of them is listed.
+void set_components(const Compilation& model, const LawVector& components, AppliedForce& out,
+                    const std::string& where) {
+  Symbols symbols = model.fields.symbols();
+  const int t = symbols.add_input("t");
+  for (const Sensor& s : model.scene.sensors) symbols.add_input(s.name);
+  std::set<int> used;
+  for (std::size_t i = 0; i < components.size(); ++i) {
+    try {
+      out.components[i] = Program(components[i], symbols);
+    } catch (const UnknownName& e) {
+      throw SceneError(child_path(where + ".components", i) + ": " + e.what());
+    }
+    const std::vector<int>& inputs = out.components[i].used_inputs();
+    used.insert(inputs.begin(), inputs.end());
+  }
+  for (const int input : used) {
+    if (input < t) out.parameters.push_back(input);
+    if (input > t) out.sensors.push_back(input - t - 1);
+  }
+}
+
+int moving_body(const Compilation& model, const std::string& name, const std::string& where) {
+  const int body = model.body_index(name, where);
+  if (body == 0) throw SceneError(where + ": is the ground, which never moves");
+  return body;
+}
+
+void add(Compilation& model, const PointForce& f, int force, const std::string& where) {
+  AppliedForce out;
+  out.force = force;
+  out.body = moving_body(model, f.body, where + ".body");
+  out.s = numbers(model.keep(out.slot, model.point(out.body, f.point, where + ".point")));
+  out.in_body_axes = f.in_body_frame;
+  set_components(model, f.components, out, where);
+  model.data.applied.push_back(std::move(out));
+}
+
+void add(Compilation& model, const Torque& f, int force, const std::string& where) {
+  AppliedForce out;
+  out.force = force;
+  out.body = moving_body(model, f.body, where + ".body");
+  out.is_torque = true;
+  out.in_body_axes = f.in_body_frame;
+  set_components(model, f.components, out, where);
+  model.data.applied.push_back(std::move(out));
+}
+
+void add(Compilation& model, const BushingSpec& f, int force, const std::string& where) {
+  Bushing out;
+  out.force = force;
+  out.body1 = model.body_index(f.body1, where + ".body1"), out.body2 = model.body_index(f.body2, where + ".body2");
+  out.s1 = numbers(model.keep(out.slot1, model.point(out.body1, f.point1, where + ".point1")));
+  out.s2 = numbers(model.keep(out.slot2, model.point(out.body2, f.point2, where + ".point2")));
+  // R0 = A(p1)'A(p2), row by row
+  const DualVector4 &p1 = model.orientation[static_cast<std::size_t>(out.body1)],
+                    &p2 = model.orientation[static_cast<std::size_t>(out.body2)];
+  const DualVector4 relative = quaternion_product({p1[0], -p1[1], -p1[2], -p1[3]}, p2);
+  DualVector<9> R0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    DualVector3 axis{model.fields.constant(0), model.fields.constant(0), model.fields.constant(0)};
+    axis[k] = model.fields.constant(1);
+    const DualVector3 column = rotated(relative, axis);
+    for (std::size_t i = 0; i < 3; ++i) R0[3 * i + k] = column[i];
+  }
+  const Vec<9> entries = numbers(model.keep(out.slot_R0, R0));
+  for (int i = 0; i < 3; ++i) out.R0.row(i) = entries.segment<3>(3 * i).transpose();
+  DualVector<12> law;
+  const std::array<std::pair<const VectorField*, const char*>, 4> parts{
+      {{&f.stiffness, ".stiffness"},
+       {&f.damping, ".damping"},
+       {&f.torsional_stiffness, ".torsional_stiffness"},
+       {&f.torsional_damping, ".torsional_damping"}}};
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const DualVector3 x = model.fields.values(*parts[k].first, where + parts[k].second);
+    std::copy(x.begin(), x.end(), law.begin() + static_cast<std::ptrdiff_t>(3 * k));
+  }
+  const Vec<12> x = numbers(model.keep(out.slot_law, law));
+  out.K = x.segment<3>(0), out.C = x.segment<3>(3), out.Kt = x.segment<3>(6), out.Ct = x.segment<3>(9);
+  model.data.bushings.push_back(std::move(out));
+}
+
+void add(Compilation& model, const FrictionSpec& f, int force, const std::string& where) {
+  const Joint& joint = model.scene.joints[model.joint_index(f.joint, where + ".joint")];
+  FrictionLaw law;
+  const DualVector3 x{model.fields.value(f.coulomb, where + ".coulomb"),
+                      model.fields.value(f.smooth_velocity, where + ".smooth_velocity"),
+                      model.fields.value(f.viscous, where + ".viscous")};
+  const Vec<3> v = numbers(model.keep(law.slot, x));
+  law.coulomb = v(0), law.smooth = v(1), law.viscous = v(2);
+  if (!(law.smooth > 0)) throw SceneError(where + ".smooth_velocity: must be greater than 0");
+  if (is_sliding(f.motion, joint.type)) {
+    const Constraint c = model.joint_displacement_term(f.joint, where + ".joint");
+    model.data.sliding_frictions.push_back(
+        {force, c.body1, c.body2, std::get<Dot2>(c.primitive), c.slot1, c.slot2, c.slot3, law});
   } else {
-    const Rsda& r = std::get<Rsda>(force.kind);
-    RsdaForce out;
-    out.force = static_cast<int>(i);
-    out.joint_angle = model.angle_of(r.joint, where + ".joint");
-    out.law = law(model, r.law, {"angle", "rate"}, {r.stiffness, r.damping, r.free_angle, 0.0}, where);
-    model.data.rsda.push_back(std::move(out));
+    model.data.frictions.push_back({force, model.angle_of(f.joint, where + ".joint"), law});
   }
 }
 
@@ -63,7 +162,10 @@ void add_user_force(Compilation& model, std::shared_ptr<const UserForce> force) 
 }  // namespace
 
 void compile_forces(Compilation& model) {
-  for (std::size_t i = 0; i < model.scene.forces.size(); ++i) add_force(model, i);
+  for (std::size_t i = 0; i < model.scene.forces.size(); ++i) {
+    const std::string where = child_path("forces", i);
+    std::visit([&](const auto& kind) { add(model, kind, static_cast<int>(i), where); }, model.scene.forces[i].kind);
+  }
 }
 
 void compile_user_forces(Compilation& model, std::vector<std::shared_ptr<const UserForce>> forces) {

@@ -3,6 +3,7 @@
 
 #include "core/mechanism/compilation.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/scene/type_table.hpp"
 
 namespace mbsopt {
 namespace {
@@ -20,6 +21,40 @@ int component(const std::string& name, const std::string& where) {
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end()) throw SceneError(where + ".component: is '" + name + "'; allowed: x, y, z, norm");
   return static_cast<int>(found - names.begin());
+}
+
+SensorKind tension_sensor(const MechanismData& data, const std::string& name, const std::vector<Force>& forces,
+                          const std::string& where) {
+  const auto found = std::find_if(forces.begin(), forces.end(), [&](const Force& f) { return f.name == name; });
+  if (found == forces.end()) throw SceneError(where + ": there is no force '" + name + "'");
+  const int force = static_cast<int>(found - forces.begin());
+  for (std::size_t i = 0; i < data.tsda.size(); ++i) {
+    if (data.tsda[i].force == force) return TensionSensor{false, static_cast<int>(i)};
+  }
+  for (std::size_t i = 0; i < data.rsda.size(); ++i) {
+    if (data.rsda[i].force == force) return TensionSensor{true, static_cast<int>(i)};
+  }
+  throw SceneError(where + ": '" + name + "' is a " + std::string(type_of(*found)) +
+                   "; only a tsda or an rsda has one number to measure");
+}
+
+ReactionSensor reaction_sensor(Compilation& model, const Sensor& s, const std::string& where) {
+  ReactionSensor out;
+  const std::size_t i = model.joint_index(s.joint, where + ".joint");
+  const Joint& joint = model.scene.joints[i];
+  if (ties_joints(joint)) {
+    throw SceneError(where + ".joint: joint '" + s.joint + "' is " + joint.type + ", which has no bodies of its own");
+  }
+  out.joint = static_cast<int>(i);
+  out.torque = s.kind == "torque";
+  if (!out.torque && s.kind != "force") {
+    throw SceneError(where + ".kind: is '" + s.kind + "'; allowed: force, torque");
+  }
+  out.component = component(s.component, where);
+  const std::string path = child_path("joints", i);
+  out.body2 = model.body_index(joint.body2, path + ".body2");
+  out.s2 = numbers(model.keep(out.slot_s2, model.point(out.body2, joint.point2, path + ".point2")));
+  return out;
 }
 
 SensorKind sensor(Compilation& model, const Sensor& s, const std::string& where) {
@@ -65,6 +100,31 @@ SensorKind sensor(Compilation& model, const Sensor& s, const std::string& where)
     return EnergySensor{s.component != "potential", s.component != "kinetic"};
   }
   if (quantity == "constraint_violation") return ViolationSensor{};
+  if (quantity == "displacement") {
+    const Constraint c = model.joint_displacement_term(s.joint, where + ".joint");
+    return DisplacementSensor{c.body1, c.body2, std::get<Dot2>(c.primitive), c.slot1, c.slot2, c.slot3};
+  }
+  if (quantity == "acceleration") {
+    AccelerationSensor out;
+    out.a = sensor_point(model, s.body, s.point, where);
+    if (s.relative_to) {
+      out.relative = true;
+      out.b = sensor_point(model, s.relative_to->body, s.relative_to->point, where + ".relative_to");
+    }
+    out.component = component(s.component, where);
+    if (s.in_body_frame && out.a.body > 0) out.axes_body = out.a.body;
+    return out;
+  }
+  if (quantity == "reaction") return reaction_sensor(model, s, where);
+  if (quantity == "drive_force") {
+    ReactionSensor out;
+    for (const Constraint& c : model.data.constraints) {
+      if (c.drive >= 0 && model.scene.drives[static_cast<std::size_t>(c.drive)].name == s.drive) out.drive_row = c.row;
+    }
+    if (out.drive_row < 0) throw SceneError(where + ".drive: there is no drive '" + s.drive + "'");
+    return out;
+  }
+  if (quantity == "force") return tension_sensor(model.data, s.force, model.scene.forces, where + ".force");
   throw SceneError(where + ".quantity: '" + quantity + "' is not a quantity known here");
 }
 
@@ -79,6 +139,12 @@ bool rate_of(const Compilation& model, const SensorKind& kind, SensorKind& rate)
   }
   if (const auto* a = std::get_if<AngleSensor>(&kind); a && !a->rate) {
     rate = AngleSensor{a->angle, true};
+    return true;
+  }
+  if (const auto* x = std::get_if<DisplacementSensor>(&kind); x && !x->rate) {
+    DisplacementSensor r = *x;
+    r.rate = true;
+    rate = r;
     return true;
   }
   if (const auto* c = std::get_if<CoordinateSensor>(&kind)) {
@@ -104,9 +170,11 @@ void add_condition(Compilation& model, std::size_t i) {
     out.velocity_level = a->rate;
     out.modulo_turn = !a->rate;
   } else {
-    out.velocity_level = !std::holds_alternative<CoordinateSensor>(kind);
+    out.velocity_level =
+        !std::holds_alternative<CoordinateSensor>(kind) && !std::holds_alternative<DisplacementSensor>(kind);
   }
-  if (std::holds_alternative<EnergySensor>(kind) || std::holds_alternative<ViolationSensor>(kind)) {
+  if (needs_motion(kind) || std::holds_alternative<EnergySensor>(kind) ||
+      std::holds_alternative<ViolationSensor>(kind) || std::holds_alternative<TensionSensor>(kind)) {
     throw SceneError(where + ": a condition on sensor '" + c.sensor +
                      "' is not possible; use positions, velocities, "
                      "angles, distances, their rates, angular velocities or Euler parameters");
@@ -130,6 +198,7 @@ void compile_sensors(Compilation& model) {
   for (std::size_t i = 0; i < model.scene.sensors.size(); ++i) {
     model.data.sensors.push_back(sensor(model, model.scene.sensors[i], child_path("sensors", i)));
     model.data.sensor_names.push_back(model.scene.sensors[i].name);
+    model.data.needs_motion = model.data.needs_motion || needs_motion(model.data.sensors.back());
   }
 }
 

@@ -24,13 +24,12 @@ int Mechanism::sensor(const std::string& name) const {
 }
 
 double Mechanism::sensor_value(int sensor, const StatePoint& at) const {
-  return evaluate(*data_, data_->sensors[static_cast<std::size_t>(sensor)], at.t, at.y, at.angles);
+  return evaluate(*data_, data_->sensors[static_cast<std::size_t>(sensor)], at);
 }
 
 double Mechanism::add_sensor_gradient(int sensor, const StatePoint& at, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
                                       Eigen::Ref<Eigen::VectorXd> rho_bar) const {
-  return add_gradient(*data_, data_->sensors[static_cast<std::size_t>(sensor)], at.t, at.y, at.angles, scale, y_bar,
-                      rho_bar);
+  return add_gradient(*data_, data_->sensors[static_cast<std::size_t>(sensor)], at, scale, y_bar, rho_bar);
 }
 
 Eigen::Matrix<double, 13, 1> body_row(const Mechanism& mechanism, int body, const StatePoint& at) {

@@ -10,9 +10,13 @@
 
 #include "core/constraint/constraint.hpp"
 #include "core/constraint/time_law.hpp"
+#include "core/force/applied.hpp"
+#include "core/force/bushing.hpp"
+#include "core/force/friction.hpp"
 #include "core/force/rsda.hpp"
 #include "core/force/tsda.hpp"
 #include "core/force/user_force.hpp"
+#include "core/sensor/acceleration_sensor.hpp"
 #include "core/sensor/joint_angle.hpp"
 #include "core/sensor/point_sensor.hpp"
 #include "core/sensor/rotation_sensor.hpp"
@@ -37,10 +41,29 @@ struct AngleSensor {
 struct EnergySensor {
   bool kinetic = true, potential = true;
 };
-struct ViolationSensor {};  // the largest |Phi| of joints and unit norms
+struct ReactionSensor {  // reaction_sensor.hpp
+  int joint = -1;        // index in the scene
+  bool torque = false;
+  int component = 0;  // 0..2, or PointSensor::kNorm
+  int body2 = 0;
+  Vector3d s2 = Vector3d::Zero();  // the joint's point on body 2, from its centre of mass
+  int slot_s2 = -1;
+  int drive_row = -1;  // of a drive's effort: its row of Phi
+};
+struct ViolationSensor {};   // the largest |Phi| of joints and unit norms
+struct DisplacementSensor {  // along a joint's axis, or its rate
+  int body1 = 0, body2 = 0;
+  Dot2 displacement;
+  int slot1 = -1, slot2 = -1, slot3 = -1;
+  bool rate = false;
+};
+struct TensionSensor {  // what a tsda pulls [N], what an rsda resists [N m]
+  bool is_torque = false;
+  int index = 0;  // among the tsda or the rsda
+};
 
-using SensorKind =
-    std::variant<PointSensor, AngularVelocitySensor, CoordinateSensor, AngleSensor, EnergySensor, ViolationSensor>;
+using SensorKind = std::variant<PointSensor, AngularVelocitySensor, CoordinateSensor, AngleSensor, EnergySensor,
+                                ViolationSensor, TensionSensor, DisplacementSensor, AccelerationSensor, ReactionSensor>;
 
 // Consecutive rows of Phi that tie the same two bodies, and their Jacobian blocks.
 struct RowGroup {
@@ -84,12 +107,19 @@ struct MechanismData {
   std::vector<JointAngle> angles;
   std::vector<TsdaForce> tsda;
   std::vector<RsdaForce> rsda;
+  std::vector<AppliedForce> applied;
+  std::vector<Bushing> bushings;
+  std::vector<FrictionForce> frictions;
+  std::vector<SlidingFriction> sliding_frictions;
   std::vector<UserForceData> user_forces;
   std::vector<SensorKind> sensors;
   std::vector<std::string> sensor_names;
   std::vector<ConditionData> conditions;
   std::vector<std::string> body_names, joint_names, drive_names;  // body_names[0] = "ground"
   int largest_law = 0;                                            // inputs of the largest law, for scratch
+
+  bool needs_motion = false;  // some sensor does
+  bool equilibrium = false;   // start from static equilibrium
 
   Eigen::Index slots() const { return theta_rho.rows(); }
   // rho_bar (all parameters) += (d theta/d rho)' theta_bar
@@ -100,6 +130,17 @@ struct MechanismData {
   }
 };
 
+// rho_bar (all parameters) += scale (d slot/d rho)' bar, for one field
+template <int N>
+void add_slot(const MechanismData& data, int slot, const Vec<N>& bar, double scale,
+              Eigen::Ref<Eigen::VectorXd> rho_bar) {
+  if (slot < 0) return;
+  for (std::size_t k = 0; k < data.active.size(); ++k) {
+    rho_bar(data.active[k]) +=
+        scale * data.theta_rho.col(static_cast<Eigen::Index>(k)).template segment<N>(slot).dot(bar);
+  }
+}
+
 // Value of a sensor at (y, branch of the angles), and its gradient: y_bar += scale d/dy, and in the fields and
 // parameters. rho_bar is with respect to all parameters.
 double evaluate(const MechanismData& data, const SensorKind& sensor, double t, const Eigen::VectorXd& y,
@@ -107,6 +148,18 @@ double evaluate(const MechanismData& data, const SensorKind& sensor, double t, c
 double add_gradient(const MechanismData& data, const SensorKind& sensor, double t, const Eigen::VectorXd& y,
                     const Eigen::VectorXd& angles, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
                     Eigen::Ref<Eigen::VectorXd> rho_bar);
+
+struct StatePoint;  // state_point.hpp
+// The same for any sensor; one that needs the motion takes it from the point.
+double evaluate(const MechanismData& data, const SensorKind& sensor, const StatePoint& at);
+double add_gradient(const MechanismData& data, const SensorKind& sensor, const StatePoint& at, double scale,
+                    Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::Ref<Eigen::VectorXd> rho_bar);
+
+// Whether a sensor needs the solution of the equations of motion; such a one is evaluated with a StatePoint that has
+// it.
+inline bool needs_motion(const SensorKind& sensor) {
+  return std::holds_alternative<AccelerationSensor>(sensor) || std::holds_alternative<ReactionSensor>(sensor);
+}
 
 struct Energy {
   double kinetic = 0, potential = 0;

@@ -1,22 +1,18 @@
 // Sensors evaluated on a compiled mechanism: those of bodies and joints, and the whole model's energy and violation.
+#include <cassert>
 #include <cmath>
+#include <limits>
 
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/reaction_sensor.hpp"
+#include "core/mechanism/state_point.hpp"
+#include "core/mechanism/tension_sensor.hpp"
 #include "core/mechanism/violation.hpp"
 
 namespace mbsopt {
 namespace {
 
 using VecOut = Eigen::Ref<Eigen::VectorXd>;
-
-// rho_bar (all parameters) += scale (d slot/d rho)' bar
-template <int N>
-void add_slot(const MechanismData& d, int slot, const Vec<N>& bar, double scale, VecOut rho_bar) {
-  if (slot < 0) return;
-  for (std::size_t k = 0; k < d.active.size(); ++k) {
-    rho_bar(d.active[k]) += scale * d.theta_rho.col(static_cast<Eigen::Index>(k)).segment<N>(slot).dot(bar);
-  }
-}
 
 double branch(const Eigen::VectorXd& angles, int i) { return i < angles.size() ? angles(i) : 0.0; }
 
@@ -42,6 +38,34 @@ double angle_gradient(const MechanismData& d, const AngleSensor& s, const Eigen:
   add_slot<3>(d, joint.slot_y1, s_bar.y1, scale, rho_bar);
   add_slot<3>(d, joint.slot_n2, s_bar.n2, scale, rho_bar);
   return s.rate ? j.rate() : JointAngle::on_branch(j.angle(), branch(angles, s.angle));
+}
+
+double displacement_value(const DisplacementSensor& s, const Eigen::VectorXd& y) {
+  const BodyAt b1 = body_at(y, s.body1), b2 = body_at(y, s.body2);
+  Vec<1> x;
+  if (s.rate) {
+    s.displacement.phi_dot(b1.frame, b2.frame, x);
+  } else {
+    s.displacement.phi(b1.frame, b2.frame, x);
+  }
+  return x(0);
+}
+
+double displacement_gradient(const MechanismData& d, const DisplacementSensor& s, const Eigen::VectorXd& y,
+                             double scale, VecOut y_bar, VecOut rho_bar) {
+  const BodyAt b1 = body_at(y, s.body1), b2 = body_at(y, s.body2);
+  Multipliers<1> z = Multipliers<1>::zero();
+  (s.rate ? z.mu1 : z.mu0)(0) = 1;
+  FrameBar bar1, bar2;
+  bar1.set_zero(), bar2.set_zero();
+  GeometryBar s_bar;
+  s.displacement.pull_back(b1.frame, b2.frame, z, bar1, bar2, s_bar);
+  add_pull_back(b1, s.body1, bar1, scale, y_bar);
+  add_pull_back(b2, s.body2, bar2, scale, y_bar);
+  add_slot<3>(d, s.slot1, s_bar.s1, scale, rho_bar);
+  add_slot<3>(d, s.slot2, s_bar.s2, scale, rho_bar);
+  add_slot<3>(d, s.slot3, s_bar.s3, scale, rho_bar);
+  return displacement_value(s, y);
 }
 
 Vec<6> inertia_entries(const Matrix3d& X) {  // gradient in xx yy zz xy xz yz of <X, J>
@@ -98,6 +122,25 @@ void add_potential_gradient(const MechanismData& d, const Eigen::VectorXd& y, co
     angle_gradient(d, sensor, y, angles, scale * f.law.k * stretch, y_bar, rho_bar);
     add_slot<4>(d, f.law.slot, Vec<4>(0.5 * stretch * stretch, 0, -f.law.k * stretch, 0), scale, rho_bar);
   }
+  for (const Bushing& f : d.bushings) {
+    const BodyAt b1 = body_at(y, f.body1), b2 = body_at(y, f.body2);
+    FrameBar bar1, bar2;
+    bar1.set_zero(), bar2.set_zero();
+    Bushing::SlotBars slots;
+    f.pull_back_potential(b1.frame, b2.frame, bar1, bar2, slots);
+    add_pull_back(b1, f.body1, bar1, scale, y_bar);
+    add_pull_back(b2, f.body2, bar2, scale, y_bar);
+    add_slot<3>(d, f.slot1, slots.s1, scale, rho_bar);
+    add_slot<3>(d, f.slot2, slots.s2, scale, rho_bar);
+    add_slot<9>(d, f.slot_R0, slots.R0, scale, rho_bar);
+    add_slot<12>(d, f.slot_law, slots.law, scale, rho_bar);
+  }
+}
+
+// Sensors that need accelerations are evaluated by the functions below, with a motion.
+double without_motion() {
+  assert(false && "this sensor needs accelerations");
+  return std::numeric_limits<double>::quiet_NaN();
 }
 
 template <class... F>
@@ -126,6 +169,9 @@ Energy energy(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::Vec
     const double stretch = angle_value(d, {f.joint_angle, false}, y, angles) - f.law.x0;
     e.potential += 0.5 * f.law.k * stretch * stretch;
   }
+  for (const Bushing& f : d.bushings) {
+    e.potential += f.potential(body_at(y, f.body1).frame, body_at(y, f.body2).frame);
+  }
   return e;
 }
 
@@ -140,7 +186,11 @@ double evaluate(const MechanismData& d, const SensorKind& sensor, double t, cons
                    const Energy e = energy(d, y, angles);
                    return (s.kinetic ? e.kinetic : 0) + (s.potential ? e.potential : 0);
                  },
-                 [&](const ViolationSensor&) { return std::abs(worst_violation(d, t, y, angles).amount); }},
+                 [&](const ViolationSensor&) { return std::abs(worst_violation(d, t, y, angles).amount); },
+                 [&](const TensionSensor& s) { return tension(d, s, t, y, angles); },
+                 [&](const DisplacementSensor& s) { return displacement_value(s, y); },
+                 [&](const AccelerationSensor&) { return without_motion(); },
+                 [&](const ReactionSensor&) { return without_motion(); }},
       sensor);
 }
 
@@ -166,8 +216,38 @@ double add_gradient(const MechanismData& d, const SensorKind& sensor, double t, 
             if (s.potential) add_potential_gradient(d, y, angles, scale, y_bar, rho_bar);
             return evaluate(d, s, t, y, angles);
           },
-          [&](const ViolationSensor&) { return add_violation_gradient(d, t, y, angles, scale, y_bar, rho_bar); }},
+          [&](const ViolationSensor&) { return add_violation_gradient(d, t, y, angles, scale, y_bar, rho_bar); },
+          [&](const TensionSensor& s) { return add_tension_gradient(d, s, t, y, angles, scale, y_bar, rho_bar); },
+          [&](const DisplacementSensor& s) { return displacement_gradient(d, s, y, scale, y_bar, rho_bar); },
+          [&](const AccelerationSensor&) { return without_motion(); },
+          [&](const ReactionSensor&) { return without_motion(); }},
       sensor);
+}
+
+double evaluate(const MechanismData& d, const SensorKind& sensor, const StatePoint& at) {
+  if (const auto* s = std::get_if<AccelerationSensor>(&sensor)) return s->value(at.y, at.motion->motion(at).z);
+  if (const auto* s = std::get_if<ReactionSensor>(&sensor)) {
+    return evaluate(d, *s, at.y, at.motion->motion(at).lambda);
+  }
+  return evaluate(d, sensor, at.t, at.y, at.angles);
+}
+
+double add_gradient(const MechanismData& d, const SensorKind& sensor, const StatePoint& at, double scale, VecOut y_bar,
+                    VecOut rho_bar) {
+  double value = 0;
+  if (const auto* s = std::get_if<AccelerationSensor>(&sensor)) {
+    Vector3d a_bar = Vector3d::Zero(), b_bar = Vector3d::Zero();
+    value = s->add_gradient(at.y, at.motion->motion(at).z, scale, y_bar, at.motion->bar().z, a_bar, b_bar);
+    add_slot<3>(d, s->a.slot, a_bar, 1, rho_bar);
+    if (s->relative) add_slot<3>(d, s->b.slot, b_bar, 1, rho_bar);
+  } else if (const auto* r = std::get_if<ReactionSensor>(&sensor)) {
+    const Motion& motion = at.motion->motion(at);
+    value = add_gradient(d, *r, at.y, motion.lambda, scale, y_bar, at.motion->bar().lambda, rho_bar);
+  } else {
+    return add_gradient(d, sensor, at.t, at.y, at.angles, scale, y_bar, rho_bar);
+  }
+  at.motion->fold_bar(at, y_bar, rho_bar);
+  return value;
 }
 
 }  // namespace mbsopt

@@ -2,14 +2,37 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
+
+#include "core/body/fixed_size.hpp"
 
 namespace mbsopt {
+
+// The solution of the equations of motion at a state, or a gradient in it.
+struct Motion {
+  std::vector<Vec<6>> z;   // per body (rddot, omegadot), omegadot in body axes
+  Eigen::VectorXd lambda;  // per row of Phi
+};
+
+struct StatePoint;
+
+// Where sensors of accelerations and reactions get them from (core/dynamics/motion_solver.hpp).
+struct MotionSource {
+  virtual ~MotionSource() = default;
+  virtual const Motion& motion(const StatePoint& at) = 0;
+  // A gradient in the motion: zero, until a sensor adds to it.
+  virtual Motion& bar() = 0;
+  // Turns it into one in the state and the parameters, which it adds, and sets it to zero again.
+  virtual void fold_bar(const StatePoint& at, Eigen::Ref<Eigen::VectorXd> y_bar,
+                        Eigen::Ref<Eigen::VectorXd> rho_bar) = 0;
+};
 
 struct StatePoint {
   double t;                  // [s]
   const Eigen::VectorXd& y;  // (q, v): q has 7 numbers per body (r_g, p), v = qdot
   const Eigen::VectorXd&
       angles;  // per tracked joint: an angle on the branch in use; size 0 where none is tracked [rad]
+  MotionSource* motion = nullptr;  // needed by sensors of accelerations and reactions only
 };
 
 }  // namespace mbsopt

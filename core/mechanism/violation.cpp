@@ -58,13 +58,6 @@ Vec<P::kRows> phi_of(const MechanismData& d, const Constraint& c, const P& p, do
   return phi;
 }
 
-void add_slot(const MechanismData& d, int slot, const Vector3d& bar, double scale, VecOut rho_bar) {
-  if (slot < 0) return;
-  for (std::size_t k = 0; k < d.active.size(); ++k) {
-    rho_bar(d.active[k]) += scale * d.theta_rho.col(static_cast<Eigen::Index>(k)).segment<3>(slot).dot(bar);
-  }
-}
-
 }  // namespace
 
 Violation worst_violation(const MechanismData& d, double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
@@ -123,9 +116,9 @@ double add_violation_gradient(const MechanismData& d, double t, const Eigen::Vec
         c.primitive);
     add_pull_back(b1, c.body1, bar1, s, y_bar);
     add_pull_back(b2, c.body2, bar2, s, y_bar);
-    add_slot(d, c.slot1, s_bar.s1, s, rho_bar);
-    add_slot(d, c.slot2, s_bar.s2, s, rho_bar);
-    add_slot(d, c.slot3, s_bar.s3, s, rho_bar);
+    add_slot<3>(d, c.slot1, s_bar.s1, s, rho_bar);
+    add_slot<3>(d, c.slot2, s_bar.s2, s, rho_bar);
+    add_slot<3>(d, c.slot3, s_bar.s3, s, rho_bar);
   }
   return std::abs(worst.amount);
 }

@@ -31,6 +31,8 @@ Kind kind_of(To what) {
       return {"body", "bodies"};
     case To::joint:
       return {"joint", "joints"};
+    case To::drive:
+      return {"drive", "drives"};
     case To::force:
       return {"force", "forces"};
     case To::sensor:
@@ -148,6 +150,7 @@ void Checker::check_dimension(const std::string& where, const Expression& value,
 void Checker::check_expression(const std::string& where, const Expression& value, Names names,
                                const std::optional<Dimension>& expected) {
   if (!names_are_known(where, value, names)) return;
+  if (names == Names::state) check_sensors_of_state(where, value);
   if (names != Names::objective) check_dimension(where, value, expected);
   if (value.is_number() || names == Names::none) {
     const std::optional<double> result = facts_.value(value);
@@ -155,6 +158,23 @@ void Checker::check_expression(const std::string& where, const Expression& value
       issue(where,
             "'" + value.text() + "' is " + text_of(*result) + " at the values of the parameters; it must be finite");
   }
+}
+
+// Accelerations and reactions follow from the forces, so no force may depend on them.
+void Checker::check_sensors_of_state(const std::string& where, const Expression& value) {
+  for (const std::string& name : value.names()) {
+    const Sensor* const sensor = facts_.sensor(name);
+    const TypeRow* const row = sensor ? find_row(kSensorQuantities, sensor->quantity) : nullptr;
+    if (row && row->of_accelerations)
+      issue(where, "uses the sensor '" + name + "', whose quantity is " + sensor->quantity +
+                       ": it follows from the forces, so a force cannot depend on it; sensors of positions, "
+                       "velocities, angles, energies and spring forces can be used");
+  }
+}
+
+void Checker::laws(std::string_view key, const LawVector& values, Names names, const Says& says) {
+  for (std::size_t i = 0; i < values.size(); ++i)
+    check_expression(child_path(path(key), i), values[i], names, says.dimension);
 }
 
 void Checker::number(std::string_view key, const Field& value, const Says& says) {

@@ -53,6 +53,7 @@ class Checker {
   void expression(std::string_view key, const Expression& value, Names names, const Says& says);
   void time_law(std::string_view key, const Expression& value, const std::optional<SampledLaw>& samples,
                 const Says& says);
+  void laws(std::string_view key, const LawVector& values, Names names, const Says& says);
 
   void plain(std::string_view key, double value, const Range& range, const Says& says);
   void plain(std::string_view key, int value, const Range& range, const Says& says);
@@ -103,6 +104,7 @@ class Checker {
   void check_range(std::string_view key, double value, const Range& range);
   void check_vector(const std::string& path, const VectorField& value, const std::optional<Dimension>& expected);
   bool names_are_known(const std::string& path, const Expression& value, Names names);
+  void check_sensors_of_state(const std::string& path, const Expression& value);
   void check_dimension(const std::string& path, const Expression& value, const std::optional<Dimension>& expected);
 
   const SceneFacts& facts_;

@@ -64,6 +64,9 @@ class FieldVisitor {
   void time_law(std::string_view, const Expression& value, const std::optional<SampledLaw>& samples, const Says&) {
     if (!samples) on_expression_(value, Names::time_law);
   }
+  void laws(std::string_view, const LawVector& values, Names names, const Says&) {
+    for (const Expression& value : values) on_expression_(value, names);
+  }
   void plain(std::string_view, const auto&, const Range&, const Says&) {}
   void overrides(std::string_view, const std::vector<std::pair<std::string, double>>&, const Says&) {}
   template <class T>

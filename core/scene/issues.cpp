@@ -33,9 +33,13 @@ std::optional<Vector> direction(Checker& checker, std::string_view key, const st
   return std::nullopt;
 }
 
-bool angle_is_used(const Scene& scene, const std::string& joint) {
-  for (const Force& force : scene.forces)
-    if (const auto* rsda = std::get_if<Rsda>(&force.kind); rsda && rsda->joint == joint) return true;
+bool angle_is_used(const Scene& scene, const std::string& joint, const std::string& joint_type) {
+  for (const Force& force : scene.forces) {
+    const auto* rsda = std::get_if<Rsda>(&force.kind);
+    const auto* friction = std::get_if<FrictionSpec>(&force.kind);
+    if (rsda && rsda->joint == joint) return true;
+    if (friction && friction->joint == joint && !is_sliding(friction->motion, joint_type)) return true;
+  }
   for (const Sensor& sensor : scene.sensors)
     if (sensor.joint == joint && (sensor.quantity == "angle" || sensor.quantity == "rate")) return true;
   for (const Drive& drive : scene.drives)
@@ -58,7 +62,7 @@ void check_normals(Checker& checker, const Joint& joint, const std::optional<Vec
     checker.issue(checker.path(joint.normal1 ? "normal2" : "normal1"), "is missing; give both normals, or neither");
   if (joint.normal1 || joint.normal2 || !axis1 || !axis2) return;
   const Vector difference{(*axis1)[0] - (*axis2)[0], (*axis1)[1] - (*axis2)[1], (*axis1)[2] - (*axis2)[2]};
-  if (norm(difference) > kSame && angle_is_used(checker.facts().scene(), joint.name))
+  if (norm(difference) > kSame && angle_is_used(checker.facts().scene(), joint.name, joint.type))
     checker.issue(checker.path(), "its angle is used and axis1 differs from axis2: give normal1 and normal2");
 }
 
@@ -77,6 +81,26 @@ void check_joint_has_angle(Checker& checker, const std::string& name) {
 void check_two_bodies(Checker& checker, const std::string& body1, const std::string& body2, std::string_view what) {
   if (!body2.empty() && body1 == body2)
     checker.issue(checker.path("body2"), "is '" + body2 + "' like body1; " + std::string(what) + " needs two bodies");
+}
+
+void check_friction(Checker& checker, const FrictionSpec& friction) {
+  using namespace dimension;
+  const Joint* const joint = checker.facts().joint(friction.joint);
+  const bool slides = joint && is_sliding(friction.motion, joint->type);
+  check_joint_has(checker, "joint", friction.joint, slides ? "displacement" : "angle");
+  const auto check = [&](std::string_view key, const Field& field, const Dimension& turning, const Dimension& sliding) {
+    if (joint) checker.number(key, field, {"", Need::optional, slides ? sliding : turning});
+  };
+  check("coulomb", friction.coulomb, kTorque, kForce);
+  check("smooth_velocity", friction.smooth_velocity, kRate, kVelocity);
+  check("viscous", friction.viscous, kTorsionalDamping, kDamping);
+  const std::optional<double> smooth = checker.facts().value(friction.smooth_velocity);
+  if (smooth && *smooth <= 0)
+    checker.issue(checker.path("smooth_velocity"), "is " + text_of(*smooth) + ", it must be greater than 0");
+}
+
+void check_moving(Checker& checker, const std::string& body) {
+  if (body == "ground") checker.issue(checker.path("body"), "is the ground, which never moves");
 }
 
 // Parameters, definitions and sensors share one name space.
@@ -208,17 +232,32 @@ void check_meaning(Checker& checker, const Force& force) {
     check_joint_has_angle(checker, rsda->joint);
     warn_of_law(rsda->law.has_value(),
                 {{"stiffness", &rsda->stiffness}, {"damping", &rsda->damping}, {"free_angle", &rsda->free_angle}});
+  } else if (const auto* applied = std::get_if<PointForce>(&force.kind)) {
+    check_moving(checker, applied->body);
+  } else if (const auto* torque = std::get_if<Torque>(&force.kind)) {
+    check_moving(checker, torque->body);
+  } else if (const auto* bushing = std::get_if<BushingSpec>(&force.kind)) {
+    check_two_bodies(checker, bushing->body1, bushing->body2, "a bushing");
+  } else if (const auto* friction = std::get_if<FrictionSpec>(&force.kind)) {
+    check_friction(checker, *friction);
   }
 }
 
 void check_meaning(Checker& checker, const Sensor& sensor) {
   const TypeRow* const row = find_row(kSensorQuantities, sensor.quantity);
   if (!row) return;
-  if (need_of(*row, "joint") != Need::unknown) check_joint_has_angle(checker, sensor.joint);
+  if (need_of(*row, "joint") != Need::unknown)
+    check_joint_has(checker, "joint", sensor.joint, sensor.quantity == "displacement" ? "displacement" : "angle");
   if (need_of(*row, "body2") != Need::unknown && sensor.body1 == sensor.body2 && !sensor.body2.empty())
     checker.issue(checker.path("body2"), "is '" + sensor.body2 + "' like body1; their distance never changes");
   if (sensor.quantity == "orientation" && sensor.body == "ground")
     checker.issue(checker.path("body"), "is the ground, whose orientation never changes");
+  if (sensor.quantity == "force") {
+    const Force* const force = checker.facts().force(sensor.force);
+    if (force && type_of(*force) != Tsda::kType && type_of(*force) != Rsda::kType)
+      checker.issue(checker.path("force"), "'" + sensor.force + "' is a " + std::string(type_of(*force)) +
+                                               "; only a tsda or an rsda has one number to measure");
+  }
 }
 
 void check_meaning(Checker& checker, const Condition& condition) {
@@ -228,7 +267,8 @@ void check_meaning(Checker& checker, const Condition& condition) {
   const TypeRow* const row = sensor ? find_row(kSensorQuantities, sensor->quantity) : nullptr;
   if (!row) return;
   const std::string named = "sensor '" + sensor->name + "'";
-  if (sensor->quantity == "energy" || sensor->quantity == "constraint_violation")
+  if (row->of_accelerations || sensor->quantity == "energy" || sensor->quantity == "constraint_violation" ||
+      sensor->quantity == "force")
     return checker.issue(checker.path("sensor"), named + " measures " + sensor->quantity +
                                                      ", which a condition cannot prescribe; use positions, angles, "
                                                      "distances, Euler parameters or their rates");

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -107,20 +108,51 @@ struct Drive {
   std::optional<SampledLaw> samples;      // instead of the law
 };
 
+// Each kind of force has the name that a problem file calls it by.
 struct Tsda {
+  static constexpr std::string_view kType = "tsda";
   std::string body1 = "ground", body2;
   PointField point1 = "O", point2 = "O";
   Field stiffness, damping, free_length, actuator;
   std::optional<Expression> law;  // of l, ldot, t and parameters; replaces the coefficients
 };
 struct Rsda {
+  static constexpr std::string_view kType = "rsda";
   std::string joint;
   Field stiffness, damping, free_angle;
   std::optional<Expression> law;  // of angle, rate, t and parameters
 };
+// Components are expressions of t, parameters and sensors of the state (t, q, v).
+using LawVector = std::array<Expression, 3>;
+struct PointForce {
+  static constexpr std::string_view kType = "force";
+  std::string body;
+  PointField point = "O";
+  LawVector components;
+  bool in_body_frame = false;  // "frame": "body"
+};
+struct Torque {
+  static constexpr std::string_view kType = "torque";
+  std::string body;
+  LawVector components;
+  bool in_body_frame = false;
+};
+struct BushingSpec {  // along and about the axes of body1
+  static constexpr std::string_view kType = "bushing";
+  std::string body1 = "ground", body2;
+  PointField point1 = "O", point2 = "O";
+  VectorField stiffness{0.0, 0.0, 0.0}, damping{0.0, 0.0, 0.0};                      // [N/m], [N s/m]
+  VectorField torsional_stiffness{0.0, 0.0, 0.0}, torsional_damping{0.0, 0.0, 0.0};  // [N m/rad], [N m s/rad]
+};
+struct FrictionSpec {
+  static constexpr std::string_view kType = "friction";
+  std::string joint;
+  std::string motion;                       // rotation or translation; empty: whichever the joint has, rotation first
+  Field coulomb, smooth_velocity, viscous;  // [N m], [rad/s], [N m s/rad], or [N], [m/s], [N s/m]
+};
 struct Force {
   std::string name;
-  std::variant<Tsda, Rsda> kind;
+  std::variant<Tsda, Rsda, PointForce, Torque, BushingSpec, FrictionSpec> kind;
 };
 
 struct PointOnBody {
@@ -141,6 +173,8 @@ struct Sensor {
   std::string body1, body2;    // of distance, distance_rate
   PointField point1 = "O", point2 = "O";
   std::string force;  // of force
+  std::string kind;   // of reaction: force or torque
+  std::string drive;  // of drive_force
 };
 
 struct Condition {

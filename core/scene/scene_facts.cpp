@@ -30,7 +30,11 @@ std::vector<std::string> names_of(const std::vector<T>& all) {
 }  // namespace
 
 SceneFacts::SceneFacts(const Scene& scene)
-    : scene_(scene), bodies_(by_name(scene.bodies)), joints_(by_name(scene.joints)), sensors_(by_name(scene.sensors)) {
+    : scene_(scene),
+      bodies_(by_name(scene.bodies)),
+      joints_(by_name(scene.joints)),
+      forces_(by_name(scene.forces)),
+      sensors_(by_name(scene.sensors)) {
   for (const Parameter& parameter : scene.parameters) {
     if (none_.input(parameter.name) >= 0) continue;
     none_.add_input(parameter.name);
@@ -80,6 +84,11 @@ const Joint* SceneFacts::joint(const std::string& name) const {
   return it == joints_.end() ? nullptr : it->second;
 }
 
+const Force* SceneFacts::force(const std::string& name) const {
+  const auto it = forces_.find(name);
+  return it == forces_.end() ? nullptr : it->second;
+}
+
 const Sensor* SceneFacts::sensor(const std::string& name) const {
   const auto it = sensors_.find(name);
   return it == sensors_.end() ? nullptr : it->second;
@@ -94,6 +103,8 @@ std::vector<std::string> SceneFacts::names(To what) const {
     }
     case To::joint:
       return names_of(scene_.joints);
+    case To::drive:
+      return names_of(scene_.drives);
     case To::force:
       return names_of(scene_.forces);
     case To::sensor:
@@ -116,6 +127,7 @@ const Symbols& SceneFacts::symbols(Names names) const {
       return rsda_law_;
     case Names::time_law:
       return time_law_;
+    case Names::state:
     case Names::objective:
       return objective_;
   }

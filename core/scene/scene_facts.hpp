@@ -25,6 +25,7 @@ class SceneFacts {
   // nullptr when there is none of that name (or when it is the ground, of bodies).
   const Body* body(const std::string& name) const;
   const Joint* joint(const std::string& name) const;
+  const Force* force(const std::string& name) const;
   const Sensor* sensor(const std::string& name) const;
   std::vector<std::string> names(To what) const;  // objectives: those added with add_objectives
   void add_objectives(std::vector<std::string> names) { objectives_ = std::move(names); }
@@ -51,6 +52,7 @@ class SceneFacts {
   const Scene& scene_;
   std::map<std::string, const Body*> bodies_;
   std::map<std::string, const Joint*> joints_;
+  std::map<std::string, const Force*> forces_;
   std::map<std::string, const Sensor*> sensors_;
   std::vector<std::string> objectives_;
   Symbols none_, tsda_law_, rsda_law_, time_law_, objective_;

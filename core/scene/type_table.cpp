@@ -67,14 +67,27 @@ std::string not_among(std::string_view what, std::string_view found, const std::
 
 bool ties_joints(const Joint& joint) { return joint.type == "gear" || joint.type == "rack_pinion"; }
 
-std::string_view type_of(const Force& force) { return std::holds_alternative<Tsda>(force.kind) ? "tsda" : "rsda"; }
+bool is_sliding(std::string_view motion, std::string_view joint_type) {
+  if (!motion.empty()) return motion == "translation";
+  return has_word(kJointsWithDisplacement, joint_type) && !has_word(kJointsWithAngle, joint_type);
+}
+
+std::string_view type_of(const Force& force) {
+  return std::visit([](const auto& kind) { return std::decay_t<decltype(kind)>::kType; }, force.kind);
+}
+
+namespace {
+
+// Makes the kind that is called so the one in hand; nothing where there is none.
+template <class... Kinds>
+void emplace_kind(std::variant<Kinds...>& kind, std::string_view type) {
+  ((Kinds::kType == type ? void(kind.template emplace<Kinds>()) : void()), ...);
+}
+
+}  // namespace
 
 void set_type(Force& force, std::string_view type) {
-  if (type == type_of(force)) return;
-  if (type == "tsda")
-    force.kind = Tsda{};
-  else
-    force.kind = Rsda{};
+  if (type != type_of(force)) emplace_kind(force.kind, type);
 }
 
 Dimension dimension_of_drive(std::string_view type, std::string_view coordinate) {

@@ -24,6 +24,7 @@ struct TypeRow {
   std::string_view components = "";  // of a sensor: what "component" may be
   Dimension dimension = {};          // of a sensor: what it measures
   bool velocity_level = false;       // of a sensor: a condition on it has a value only
+  bool of_accelerations = false;     // of a sensor: not a function of (t, q, v) alone, so that no force may use it
 };
 
 inline constexpr TypeRow kJointTypes[] = {
@@ -59,22 +60,38 @@ inline constexpr TypeRow kDriveTypes[] = {
 inline constexpr TypeRow kForceTypes[] = {
     {"tsda", "spring, damper and actuator between two points: k (l - l0) + c ldot + actuator, or a law",
      "body1 body2! point1 point2 stiffness damping free_length actuator law"},
-    {"rsda", "torsional spring and damper on the angle of a revolute joint: k (angle - angle0) + c rate, or a law",
+    {"rsda", "torsional spring and damper on a joint's angle: k (angle - angle0) + c rate, or a law",
      "joint! stiffness damping free_angle law"},
+    {"force", "force on a point of a body: three expressions of t, parameters and sensors of the state",
+     "body! point components! frame"},
+    {"torque", "torque on a body: three expressions of t, parameters and sensors of the state",
+     "body! components! frame"},
+    {"bushing", "springs and dampers along and about the three axes of body1, undeformed as the file places the bodies",
+     "body1 body2! point1 point2 stiffness damping torsional_stiffness torsional_damping"},
+    {"friction", "smoothed Coulomb and viscous friction about or along the axis of a joint",
+     "joint! motion coulomb smooth_velocity! viscous"},
 };
 
 inline constexpr TypeRow kSensorQuantities[] = {
     {"position", "of a body point", "body! point relative_to component! frame", "x y z norm", dimension::kLength},
     {"velocity", "of a body point", "body! point relative_to component! frame", "x y z norm", dimension::kVelocity,
      true},
-    {"angle", "of a revolute joint, continuous over many turns", "joint!", "", dimension::kAngle},
+    {"angle", "of a revolute, cylindrical or screw joint, continuous over many turns", "joint!", "", dimension::kAngle},
     {"rate", "time derivative of a joint's angle", "joint!", "", dimension::kRate, true},
+    {"displacement", "along the axis of a translational, cylindrical or screw joint", "joint!", "", dimension::kLength},
     {"distance", "of two body points", "body1 body2! point1 point2", "", dimension::kLength},
     {"distance_rate", "time derivative of a distance", "body1 body2! point1 point2", "", dimension::kVelocity, true},
     {"angular_velocity", "of a body", "body! component! frame", "x y z norm", dimension::kRate, true},
     {"orientation", "Euler parameters of a body", "body! component!", "e0 e1 e2 e3"},
     {"energy", "of the whole mechanism", "component!", "kinetic potential total", dimension::kTorque, true},
     {"constraint_violation", "largest absolute entry of the constraint equations", ""},
+    {"force", "tension of a tsda, torque of an rsda", "force!", "", dimension::kForce, true},
+    {"acceleration", "of a body point, kinematic: without gravity", "body! point relative_to component! frame",
+     "x y z norm", dimension::kAcceleration, true, true},
+    {"reaction", "force or torque of a joint on body2 at its point2, global axes", "joint! kind! component!",
+     "x y z norm", dimension::kForce, true, true},
+    {"drive_force", "force or torque of a drive along its coordinate, positive where it pushes it up", "drive!", "",
+     dimension::kForce, true, true},
 };
 
 inline constexpr std::string_view kJointsWithAngle = "revolute cylindrical screw";
@@ -82,8 +99,8 @@ inline constexpr std::string_view kJointsWithDisplacement = "translational cylin
 
 // In the problem format, not in this version.
 inline constexpr std::string_view kLaterJointTypes = "";
-inline constexpr std::string_view kLaterForceTypes = "force torque bushing friction";
-inline constexpr std::string_view kLaterSensorQuantities = "acceleration displacement force reaction";
+inline constexpr std::string_view kLaterForceTypes = "";
+inline constexpr std::string_view kLaterSensorQuantities = "";
 
 inline constexpr std::string_view kIntegrators = "dopri5 dopri853 rk4";
 inline constexpr std::string_view kLaterIntegrators =
@@ -105,6 +122,9 @@ bool has_word(std::string_view list, std::string_view word);
 // "'gear' is not available in this version; available: revolute, spherical", or what else is wrong with the choice.
 std::string not_among(std::string_view what, std::string_view found, const std::vector<std::string>& available,
                       std::string_view later = "");
+
+// What friction in a joint resists: as said, else rotation where the joint has an angle.
+bool is_sliding(std::string_view motion, std::string_view joint_type);
 
 std::string_view type_of(const Force& force);
 void set_type(Force& force, std::string_view type);

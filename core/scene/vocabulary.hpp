@@ -19,6 +19,7 @@
 //   law(key, optional<Expression>&, Names, says)  an expression over further names, too
 //   expression(key, Expression&, Names, says)   the same, always there
 //   time_law(key, Expression&, optional<SampledLaw>&, says)  an expression of t, or samples from a file
+//   laws(key, LawVector&, Names, says)          three of them
 //   plain(key, double&, Range, says)            a number that no parameter enters; also long, int, bool, optional
 //   object(key, T&, says)                       describe(visitor, T) inside; also optional<T>
 //   group(key, says, f)                         f(visitor) inside: fields that are nested in the file only
@@ -49,10 +50,10 @@ struct Says {
   std::optional<Dimension> dimension = {};  // nullopt: any
 };
 
-enum class To { body, joint, force, sensor, parameter, objective };
+enum class To { body, joint, drive, force, sensor, parameter, objective };
 
 // Names that an expression may use besides parameters and definitions.
-enum class Names { none, tsda_law, rsda_law, time_law, objective };
+enum class Names { none, tsda_law, rsda_law, time_law, state, objective };  // state: t and sensors of (t, q, v)
 
 template <class T>
 struct Choice {
@@ -204,13 +205,52 @@ void describe(auto& v, Like<Tsda> auto& f, const TypeRow& row) {
 
 void describe(auto& v, Like<Rsda> auto& f, const TypeRow& row) {
   using namespace dimension;
-  v.reference("joint", f.joint, To::joint, {"revolute joint it acts on", need_of(row, "joint")});
+  v.reference("joint", f.joint, To::joint, {"joint on whose angle it acts", need_of(row, "joint")});
   v.number("stiffness", f.stiffness, {"k [N m/rad]", need_of(row, "stiffness"), kTorque});
   v.number("damping", f.damping, {"c [N m s/rad]", need_of(row, "damping"), kTorsionalDamping});
   v.number("free_angle", f.free_angle, {"angle without torque [rad]", need_of(row, "free_angle"), kAngle});
   v.law("law", f.law, Names::rsda_law,
         {"resisting torque [N m] as an expression of angle, rate and t, instead of the coefficients",
          need_of(row, "law"), kTorque});
+}
+
+void describe(auto& v, Like<PointForce> auto& f, const TypeRow& row) {
+  v.reference("body", f.body, To::body, {"body it acts on", need_of(row, "body")});
+  v.point("point", f.point, f.body, {"point of the body [m]", need_of(row, "point"), dimension::kLength});
+  v.laws("components", f.components, Names::state,
+         {"x, y, z [N], expressions of t, parameters and sensors", need_of(row, "components"), dimension::kForce});
+  v.choice("frame", f.in_body_frame, kFrames, {"axes of the components", need_of(row, "frame")});
+}
+
+void describe(auto& v, Like<Torque> auto& f, const TypeRow& row) {
+  v.reference("body", f.body, To::body, {"body it acts on", need_of(row, "body")});
+  v.laws("components", f.components, Names::state,
+         {"x, y, z [N m], expressions of t, parameters and sensors", need_of(row, "components"), dimension::kTorque});
+  v.choice("frame", f.in_body_frame, kFrames, {"axes of the components", need_of(row, "frame")});
+}
+
+void describe(auto& v, Like<BushingSpec> auto& f, const TypeRow& row) {
+  using namespace dimension;
+  v.reference("body1", f.body1, To::body, {"first body, whose axes count", need_of(row, "body1")});
+  v.reference("body2", f.body2, To::body, {"second body", need_of(row, "body2")});
+  v.point("point1", f.point1, f.body1, {"point of body1 [m]", need_of(row, "point1"), kLength});
+  v.point("point2", f.point2, f.body2, {"point of body2 [m]", need_of(row, "point2"), kLength});
+  v.vector("stiffness", f.stiffness, {"along x, y, z of body1 [N/m]", need_of(row, "stiffness"), kStiffness});
+  v.vector("damping", f.damping, {"along x, y, z of body1 [N s/m]", need_of(row, "damping"), kDamping});
+  v.vector("torsional_stiffness", f.torsional_stiffness,
+           {"about x, y, z of body1 [N m/rad]", need_of(row, "torsional_stiffness"), kTorque});
+  v.vector("torsional_damping", f.torsional_damping,
+           {"about x, y, z of body1 [N m s/rad]", need_of(row, "torsional_damping"), kTorsionalDamping});
+}
+
+void describe(auto& v, Like<FrictionSpec> auto& f, const TypeRow& row) {
+  v.reference("joint", f.joint, To::joint, {"joint it acts in", need_of(row, "joint")});
+  v.word("motion", f.motion, Words{"rotation translation"},
+         {"about or along the axis; when absent, about it where the joint has an angle", need_of(row, "motion")});
+  v.number("coulomb", f.coulomb, {"torque [N m] or force [N] at high rates", need_of(row, "coulomb")});
+  v.number("smooth_velocity", f.smooth_velocity,
+           {"rate at which the Coulomb part is 0.71 of its level [rad/s], [m/s]", need_of(row, "smooth_velocity")});
+  v.number("viscous", f.viscous, {"torque [N m s/rad] or force [N s/m] per rate", need_of(row, "viscous")});
 }
 
 void describe(auto& v, Like<Force> auto& f) {
@@ -239,11 +279,14 @@ void describe(auto& v, Like<Sensor> auto& s) {
     v.object("relative_to", s.relative_to, {"point whose position or velocity is subtracted"});
   v.word("component", s.component, Words{row->components}, {"which component", need_of(*row, "component")});
   v.choice("frame", s.in_body_frame, kFrames, {"axes of the component", need_of(*row, "frame")});
-  v.reference("joint", s.joint, To::joint, {"revolute joint", need_of(*row, "joint")});
+  v.reference("joint", s.joint, To::joint, {"joint that has it", need_of(*row, "joint")});
   v.reference("body1", s.body1, To::body, {"body of the first point", need_of(*row, "body1")});
   v.reference("body2", s.body2, To::body, {"body of the second point", need_of(*row, "body2")});
   v.point("point1", s.point1, s.body1, {"first point [m]", need_of(*row, "point1"), kLength});
   v.point("point2", s.point2, s.body2, {"second point [m]", need_of(*row, "point2"), kLength});
+  v.reference("force", s.force, To::force, {"a tsda or rsda", need_of(*row, "force")});
+  v.word("kind", s.kind, Words{"force torque"}, {"which reaction", need_of(*row, "kind")});
+  v.reference("drive", s.drive, To::drive, {"a drive", need_of(*row, "drive")});
 }
 
 void describe(auto& v, Like<Condition> auto& c) {

@@ -14,7 +14,7 @@ using Eigen::VectorXd;
 namespace {
 
 struct Prepared {
-  Scene scene = loaded_four_bar();
+  Scene scene = every_force_four_bar();
   Mechanism mechanism{scene,
                       nominal(scene),
                       {},

@@ -23,6 +23,17 @@ TEST_CASE("springs and gravity keep the energy, dampers, actuators and laws do n
   bearing.joint = "A", bearing.stiffness = 2.0;
   scene.forces[0].kind = bearing;
   CHECK(conserves_energy(scene));
+  BushingSpec mount;
+  mount.body2 = "bar", mount.stiffness = vec("1", "2", "3");
+  scene.forces[0].kind = mount;
+  CHECK(conserves_energy(scene));
+  mount.torsional_damping[1] = 0.1;
+  scene.forces[0].kind = mount;
+  CHECK_FALSE(conserves_energy(scene));
+  FrictionSpec friction;
+  friction.joint = "A", friction.coulomb = 1.0, friction.smooth_velocity = 0.1;
+  scene.forces[0].kind = friction;
+  CHECK_FALSE(conserves_energy(scene));
   bearing.law = f("angle^3");
   scene.forces[0].kind = bearing;
   CHECK_FALSE(conserves_energy(scene));

@@ -72,7 +72,7 @@ TEST_CASE("accelerations of a free body follow Euler's equations", "[dynamics]")
 }
 
 TEST_CASE("the augmented Lagrangian reaches the constrained equations whatever its alpha", "[dynamics]") {
-  const Scene scene = loaded_four_bar();
+  const Scene scene = every_force_four_bar();
   const Mechanism mechanism(scene, nominal(scene));
   const MechanismData& d = mechanism.data();
   const VectorXd y = state(mechanism, 5), angles = VectorXd::Zero(1);
@@ -147,7 +147,7 @@ TEST_CASE("accelerations equal a dense solution of the constrained equations", "
 
 TEST_CASE("tangent of the accelerations equals central differences, in the state and in every parameter",
           "[dynamics]") {
-  const Scene scene = loaded_four_bar();
+  const Scene scene = every_force_four_bar();
   const std::string form = GENERATE(as<std::string>{}, "augmented_lagrangian", "stabilised", "penalty");
   const FormulationSettings settings = formulation(form);
   const VectorXd rho = nominal(scene);
@@ -190,7 +190,7 @@ TEST_CASE("tangent of the accelerations equals central differences, in the state
 }
 
 TEST_CASE("the adjoint of the accelerations is the transpose of their tangent", "[dynamics]") {
-  const Scene scene = loaded_four_bar();
+  const Scene scene = every_force_four_bar();
   const FormulationSettings settings =
       formulation(GENERATE(as<std::string>{}, "augmented_lagrangian", "stabilised", "penalty"));
   const Mechanism mechanism(scene, nominal(scene), {}, user_forces(scene));

@@ -3,11 +3,19 @@
 // of its own in the list of types below.
 #include <catch2/catch.hpp>
 
+#include "core/force/applied.hpp"
+#include "core/force/bushing.hpp"
+#include "core/force/friction.hpp"
 #include "core/force/rsda.hpp"
 #include "core/force/tsda.hpp"
 #include "tests/core/body/textbook_body.hpp"
 
-#define ALL_FORCES TsdaCase<LinearLaw>, TsdaCase<ProgramLaw>, RsdaCase<LinearLaw>, RsdaCase<ProgramLaw>
+#define BETWEEN_BODIES                                                                                         \
+  TsdaCase<LinearLaw>, TsdaCase<ProgramLaw>, RsdaCase<LinearLaw>, RsdaCase<ProgramLaw>, RsdaCase<DryFriction>, \
+      BushingCase, SlidingCase
+#define ALL_FORCES                                                                                     \
+  BETWEEN_BODIES, (AppliedCase<false, false>), (AppliedCase<false, true>), (AppliedCase<true, false>), \
+      (AppliedCase<true, true>)
 
 using namespace mbsopt;
 using namespace mbsopt::testing;
@@ -20,6 +28,7 @@ constexpr double kTime = 0.7;
 // k (x - x0) + c xdot + f0: four fields.
 struct LinearLaw {
   static constexpr int kFields = 4, kParameters = 0;
+  using ForceLaw = Law;
   template <class T>
   static T value(const std::vector<T>& at, std::size_t k, const T& x, const T& xdot) {
     return at[k] * (x - at[k + 2]) + at[k + 1] * xdot + at[k + 3];
@@ -33,6 +42,7 @@ struct LinearLaw {
 // A user's expression of x, xdot, t and two parameters.
 struct ProgramLaw {
   static constexpr int kFields = 0, kParameters = 2;
+  using ForceLaw = Law;
   template <class T>
   static T value(const std::vector<T>& at, std::size_t k, const T& x, const T& xdot) {
     return at[k] * x * x * x + at[k + 1] * xdot * x - at[k] * at[k + 1] * T(kTime);
@@ -41,6 +51,21 @@ struct ProgramLaw {
     Symbols symbols;
     for (const char* name : {"a", "b", "x", "xdot", "t"}) symbols.add_input(name);
     law.program.emplace(Expression::parse("a*x^3 + b*xdot*x - a*b*t"), symbols);
+  }
+};
+
+// Smoothed Coulomb friction and a viscous part: three fields.
+struct DryFriction {
+  static constexpr int kFields = 3, kParameters = 0;
+  using ForceLaw = FrictionLaw;
+  template <class T>
+  static T value(const std::vector<T>& at, std::size_t k, const T&, const T& rate) {
+    using std::sqrt;
+    return at[k] * rate / sqrt(rate * rate + at[k + 1] * at[k + 1]) + at[k + 2] * rate;
+  }
+  static void fill(FrictionLaw& law, const VectorXd& at, int first, int slot) {
+    law.coulomb = at(first), law.smooth = at(first + 1), law.viscous = at(first + 2);
+    law.slot = slot;
   }
 };
 
@@ -88,16 +113,19 @@ template <class L>
 struct LawScratch {
   Law::Scratch scratch;
   VectorXd rho;
-  LawScratch(const Law& law, const VectorXd& at, int first) : rho(at.segment(first, L::kParameters)) {
+  LawScratch(const typename L::ForceLaw& law, const VectorXd& at, int first) : rho(at.segment(first, L::kParameters)) {
     scratch.inputs.resize(static_cast<std::size_t>(L::kParameters + 3));
     scratch.gradient.resize(scratch.inputs.size());
-    if (law.program) scratch.program = law.program->scratch();
+    if constexpr (requires { law.program; }) {
+      if (law.program) scratch.program = law.program->scratch();
+    }
   }
 };
 
 template <class L>
 struct TsdaCase : Bodies {
-  static constexpr int kGeometry = 6, kLaw = 28 + kGeometry, kInputs = kLaw + L::kFields + L::kParameters;
+  static constexpr int kGeometry = 6, kLaw = 28 + kGeometry, kFields = L::kFields, kParameters = L::kParameters,
+                       kInputs = kLaw + kFields + kParameters;
   TsdaForce force;
 
   explicit TsdaCase(unsigned seed) : Bodies(seed, kInputs) { place(); }
@@ -146,9 +174,10 @@ struct TsdaCase : Bodies {
 
 template <class L>
 struct RsdaCase : Bodies {
-  static constexpr int kGeometry = 9, kLaw = 28 + kGeometry, kInputs = kLaw + L::kFields + L::kParameters;
+  static constexpr int kGeometry = 9, kLaw = 28 + kGeometry, kFields = L::kFields, kParameters = L::kParameters,
+                       kInputs = kLaw + kFields + kParameters;
   static constexpr double kReference = 13;  // two turns on: the branch that counts
-  RsdaForce force;
+  JointTorque<typename L::ForceLaw> force;
   JointAngle joint;
 
   explicit RsdaCase(unsigned seed) : Bodies(seed, kInputs) { place(); }
@@ -198,14 +227,193 @@ struct RsdaCase : Bodies {
     const JointAngle::Jet j = joint.jet(f1, f2);
     const double angle = JointAngle::on_branch(j.angle(), kReference);
     const Law::Value f = force.law.derivatives(kTime, s.rho, angle, j.rate(), s.scratch);
-    Lanes<4> fields = Lanes<4>::Zero();
-    if (L::kFields > 0) fields = directions.middleRows(kLaw, 4);
+    Lanes<L::ForceLaw::kFields> fields = Lanes<L::ForceLaw::kFields>::Zero();
+    if (L::kFields > 0) fields = directions.middleRows(kLaw, L::ForceLaw::kFields);
     const Lanes<1> df = force.law.field_tangent(
         angle, j.rate(), &fields, [&](int k) { return Lanes<1>(directions.row(kLaw + k)); }, s.scratch);
     const Lanes<3> dx = directions.middleRows<3>(28), dy = directions.middleRows<3>(31),
                    dn = directions.middleRows<3>(34);
     LoadTangents out;
     force.tangent(joint, j, f, df, f1, f2, t1, t2, &dx, &dy, &dn, out.load1, out.load2);
+    return out;
+  }
+};
+
+// acos near its real value, as atan2 above.
+double acos_of(double c) { return std::acos(c); }
+Complex acos_of(const Complex& c) { return {std::acos(c.real()), -c.imag() / std::sqrt(1 - c.real() * c.real())}; }
+
+// Geometry: the points and R0, row by row; fields: K, C, Kt, Ct.
+struct BushingCase : Bodies {
+  static constexpr int kGeometry = 15, kLaw = 28 + kGeometry, kFields = 12, kParameters = 0, kInputs = kLaw + kFields;
+  Bushing force;
+
+  // Some tens of degrees from rest, the Euler parameters and R0 a little off their manifolds.
+  explicit BushingCase(unsigned seed) : Bodies(seed, kInputs) {
+    Random random(seed + 50);
+    for (const int first : {3, 17}) x.segment<4>(first) *= (1 + 0.01 * random()) / x.segment<4>(first).norm();
+    const Eigen::AngleAxisd turn(0.4 + 0.2 * seed, Vector3d(random.vector(3)).normalized());
+    const Matrix3d R0 = turn.matrix() * A(x.segment<4>(3)).transpose() * A(x.segment<4>(17));
+    for (int i = 0; i < 3; ++i) x.segment<3>(34 + 3 * i) = R0.row(i).transpose() + 0.01 * random.vector(3);
+    place();
+  }
+  void place() {
+    Bodies::place();
+    force.s1 = x.segment<3>(28), force.s2 = x.segment<3>(31);
+    for (int i = 0; i < 3; ++i) force.R0.row(i) = x.segment<3>(34 + 3 * i).transpose();
+    force.K = x.segment<3>(kLaw), force.C = x.segment<3>(kLaw + 3);
+    force.Kt = x.segment<3>(kLaw + 6), force.Ct = x.segment<3>(kLaw + 9);
+    force.slot1 = 0, force.slot2 = 3, force.slot_R0 = 6, force.slot_law = 15;
+  }
+
+  // Deflection and rotation vector along a motion or a virtual displacement, with their first derivatives.
+  template <class T>
+  struct Deflection {
+    V3<T> d, d_dot, theta, theta_dot;
+  };
+  template <class T, class F>
+  static Deflection<T> deflection(const std::vector<T>& at, const F& f1, const F& f2) {
+    const auto D = f2.point(constant(part<3>(at, 31))) - f1.point(constant(part<3>(at, 28)));
+    const auto d = transposed_times(f1.A, D);
+    M3<Series<T>> R;  // A1'A2 R0'
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto turned = times(f2.A, constant(part<3>(at, 34 + 3 * i)));
+      const auto column = transposed_times(f1.A, turned);
+      for (std::size_t k = 0; k < 3; ++k) R[k][i] = column[k];
+    }
+    const Series<T> half(T(0.5));
+    const Series<T> c = half * (R[0][0] + R[1][1] + R[2][2] - Series<T>(T(1)));
+    const V3<Series<T>> a{half * (R[2][1] - R[1][2]), half * (R[0][2] - R[2][0]), half * (R[1][0] - R[0][1])};
+    using std::sqrt;
+    const T sine2 = T(1) - c.c[0] * c.c[0], g = acos_of(c.c[0]) / sqrt(sine2), g_c = (c.c[0] * g - T(1)) / sine2;
+    const Series<T> factor(g, g_c * c.c[1]);
+    Deflection<T> out;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Series<T> theta = factor * a[i];
+      out.d[i] = d[i].c[0], out.d_dot[i] = d[i].c[1], out.theta[i] = theta.c[0], out.theta_dot[i] = theta.c[1];
+    }
+    return out;
+  }
+  template <class T>
+  T work(const std::vector<T>& at) const {
+    const TextbookBody<T> body1 = textbook(at, 0), body2 = textbook(at, 14);
+    const Deflection<T> now = deflection(at, body1.moving(), body2.moving());
+    const Deflection<T> change = deflection(at, body1.displaced(), body2.displaced());
+    T sum(0);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t k = static_cast<std::size_t>(kLaw) + i;
+      sum -= (at[k] * now.d[i] + at[k + 3] * now.d_dot[i]) * change.d_dot[i];
+      sum -= (at[k + 6] * now.theta[i] + at[k + 9] * now.theta_dot[i]) * change.theta_dot[i];
+    }
+    return sum;
+  }
+  template <class T>
+  T potential(const std::vector<T>& at) const {
+    const Deflection<T> now = deflection(at, textbook(at, 0).moving(), textbook(at, 14).moving());
+    T sum(0);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t k = static_cast<std::size_t>(kLaw) + i;
+      sum += T(0.5) * (at[k] * now.d[i] * now.d[i] + at[k + 6] * now.theta[i] * now.theta[i]);
+    }
+    return sum;
+  }
+  Loads loads() const {
+    Loads out;
+    force.add_load(f1, f2, out.load1, out.load2);
+    return out;
+  }
+  void pull_back(FrameBar& bar1, FrameBar& bar2, VectorXd& theta_bar, VectorXd&) const {
+    force.pull_back(f1, f2, bar1, bar2, theta_bar);
+  }
+  LoadTangents tangent(const FrameTangent& t1, const FrameTangent& t2, const Eigen::MatrixXd& directions) const {
+    const Lanes<3> s1 = directions.middleRows<3>(28), s2 = directions.middleRows<3>(31);
+    const Lanes<9> R0 = directions.middleRows<9>(34);
+    const Lanes<12> law = directions.middleRows<12>(kLaw);
+    LoadTangents out;
+    force.tangent(f1, f2, t1, t2, {&s1, &s2, &R0, &law}, out.load1, out.load2);
+    return out;
+  }
+};
+
+// Friction along an axis of body 1; geometry: the two points and the axis.
+struct SlidingCase : Bodies {
+  static constexpr int kGeometry = 9, kLaw = 28 + kGeometry, kFields = 3, kParameters = 0, kInputs = kLaw + kFields;
+  SlidingFriction force;
+
+  explicit SlidingCase(unsigned seed) : Bodies(seed, kInputs) { place(); }
+  void place() {
+    Bodies::place();
+    force.displacement.s1 = x.segment<3>(28), force.displacement.s2 = x.segment<3>(31);
+    force.displacement.s3 = x.segment<3>(34);
+    force.slot1 = 0, force.slot2 = 3, force.slot3 = 6;
+    DryFriction::fill(force.law, x, kLaw, kGeometry);
+  }
+  template <class T>
+  T work(const std::vector<T>& at) const {
+    const TextbookBody<T> body1 = textbook(at, 0), body2 = textbook(at, 14);
+    auto displacement = [&](const auto& g1, const auto& g2) {
+      const auto d = g2.point(constant(part<3>(at, 31))) - g1.point(constant(part<3>(at, 28)));
+      return dot(times(g1.A, constant(part<3>(at, 34))), d);
+    };
+    const T rate = displacement(body1.moving(), body2.moving()).c[1];
+    return -DryFriction::value(at, kLaw, rate, rate) * displacement(body1.displaced(), body2.displaced()).c[1];
+  }
+  Loads loads() const {
+    Loads out;
+    force.add_load(f1, f2, out.load1, out.load2);
+    return out;
+  }
+  void pull_back(FrameBar& bar1, FrameBar& bar2, VectorXd& theta_bar, VectorXd&) const {
+    force.pull_back(f1, f2, bar1, bar2, theta_bar);
+  }
+  LoadTangents tangent(const FrameTangent& t1, const FrameTangent& t2, const Eigen::MatrixXd& directions) const {
+    const Lanes<3> s1 = directions.middleRows<3>(28), s2 = directions.middleRows<3>(31),
+                   s3 = directions.middleRows<3>(34), law = directions.middleRows<3>(kLaw);
+    LoadTangents out;
+    force.tangent(f1, f2, t1, t2, {&s1, &s2, &s3}, &law, out.load1, out.load2);
+    return out;
+  }
+};
+
+// On body 1: geometry: the point; parameters: the components.
+template <bool kTorque, bool kBodyAxes>
+struct AppliedCase : Bodies {
+  static constexpr int kGeometry = 3, kLaw = 28 + kGeometry, kFields = 0, kParameters = 3, kInputs = kLaw + 3;
+  AppliedForce force;
+
+  explicit AppliedCase(unsigned seed) : Bodies(seed, kInputs) { place(); }
+  void place() {
+    Bodies::place();
+    force.is_torque = kTorque, force.in_body_axes = kBodyAxes;
+    force.s = x.segment<3>(28), force.slot = 0;
+  }
+  Vector3d c() const { return x.segment<3>(kLaw); }
+
+  template <class T>
+  T work(const std::vector<T>& at) const {
+    const TextbookBody<T> body = textbook(at, 0);
+    const M3<T> rotation = body.frame().A;
+    V3<T> load = part<3>(at, kLaw);
+    if (kTorque) {
+      if (!kBodyAxes) load = transposed_times(rotation, load);
+      return dot(load, V3<T>{T(eta1(3)), T(eta1(4)), T(eta1(5))});
+    }
+    if (kBodyAxes) load = times(rotation, load);
+    const auto change = body.displaced().point(constant(part<3>(at, 28)));
+    return dot(load, V3<T>{change[0].c[1], change[1].c[1], change[2].c[1]});
+  }
+  Loads loads() const {
+    Loads out;
+    force.add_load(c(), f1, out.load1);
+    return out;
+  }
+  void pull_back(FrameBar& bar1, FrameBar&, VectorXd& theta_bar, VectorXd& rho_bar) const {
+    rho_bar += force.pull_back(c(), f1, bar1, theta_bar);
+  }
+  LoadTangents tangent(const FrameTangent& t1, const FrameTangent&, const Eigen::MatrixXd& directions) const {
+    const Lanes<3> ds = directions.middleRows<3>(28), dc = directions.middleRows<3>(kLaw);
+    LoadTangents out;
+    force.tangent(c(), dc, f1, t1, &ds, out.load1);
     return out;
   }
 };
@@ -243,18 +451,14 @@ TEMPLATE_TEST_CASE("a force's pull-back is the gradient of its virtual work", "[
   const TestType c(GENERATE(range(0u, 8u)));
   FrameBar bar1, bar2;
   bar1.set_zero(), bar2.set_zero();
-  constexpr int fields = TestType::kLaw - 28 + 4;
-  VectorXd theta_bar = VectorXd::Zero(fields), rho_bar = VectorXd::Zero(TestType::kInputs - TestType::kLaw);
+  constexpr int fields = TestType::kGeometry + TestType::kFields;
+  VectorXd theta_bar = VectorXd::Zero(fields), rho_bar = VectorXd::Zero(TestType::kParameters);
   c.pull_back(bar1, bar2, theta_bar, rho_bar);
   VectorXd found = VectorXd::Zero(TestType::kInputs);
   add_pull_back(c.b1, bar1, Vector4d::Zero(), c.eta1.template tail<3>(), found.segment<7>(0), found.segment<7>(7));
   add_pull_back(c.b2, bar2, Vector4d::Zero(), c.eta2.template tail<3>(), found.segment<7>(14), found.segment<7>(21));
-  found.segment(28, TestType::kGeometry) = theta_bar.head(TestType::kGeometry);
-  if (c.force.law.program) {
-    found.tail(rho_bar.size()) = rho_bar;
-  } else {
-    found.tail(4) = theta_bar.tail(4);
-  }
+  found.segment(28, fields) = theta_bar;
+  found.tail(rho_bar.size()) = rho_bar;
   const VectorXd complex_step = complex_gradient([&](const std::vector<Complex>& at) { return c.work(at); }, c.x);
   const VectorXd differences = difference_gradient(
       [&](const VectorXd& at) {
@@ -288,11 +492,11 @@ TEMPLATE_TEST_CASE("a force's tangent is the derivative of its loads along any d
   }
 }
 
-TEMPLATE_TEST_CASE("forces between two bodies balance: no resultant, no moment", "[force]", ALL_FORCES) {
+TEMPLATE_TEST_CASE("forces between two bodies balance: no resultant, no moment", "[force]", BETWEEN_BODIES) {
   TestType c(GENERATE(range(0u, 4u)));
   c.x.template segment<4>(3).normalize();
   c.x.template segment<4>(17).normalize();
-  if constexpr (TestType::kGeometry == 9) {  // a joint angle: a common axis
+  if constexpr (requires { c.joint; }) {  // a joint angle: a common axis
     const Vector3d axis = Vector3d(c.x.template segment<3>(28)).normalized();
     const Vector3d x1 = axis.unitOrthogonal(), y1 = axis.cross(x1);
     c.x.template segment<3>(28) = x1, c.x.template segment<3>(31) = y1;
@@ -361,6 +565,82 @@ TEST_CASE("power of a spring-damper is minus its force times its rate", "[force]
     const double angle = JointAngle::on_branch(j.angle(), c.kReference);
     return -(law.k * (angle - law.x0) + law.c * j.rate() + law.f0) * j.rate();
   });
+}
+
+TEST_CASE("a bushing without damping is the gradient of its potential, and that has its own gradient", "[force]") {
+  BushingCase c(GENERATE(range(0u, 6u)));
+  c.x.segment<3>(c.kLaw + 3).setZero(), c.x.segment<3>(c.kLaw + 9).setZero();
+  c.place();
+  const std::vector<double> at(c.x.data(), c.x.data() + c.x.size());
+  CHECK(c.force.potential(c.f1, c.f2) == Approx(c.potential(at)).epsilon(1e-12));
+
+  FrameBar bar1, bar2;
+  bar1.set_zero(), bar2.set_zero();
+  Bushing::SlotBars slots;
+  c.force.pull_back_potential(c.f1, c.f2, bar1, bar2, slots);
+  VectorXd found = VectorXd::Zero(c.kInputs);
+  found.segment<7>(0) = pull_back_position(c.b1, bar1), found.segment<7>(14) = pull_back_position(c.b2, bar2);
+  found.segment<3>(28) = slots.s1, found.segment<3>(31) = slots.s2;
+  found.segment<9>(34) = slots.R0, found.segment<12>(c.kLaw) = slots.law;
+  const VectorXd expected = complex_gradient([&](const std::vector<Complex>& x) { return c.potential(x); }, c.x);
+  CHECK(distance(found, expected) < 1e-12 * (1 + expected.lpNorm<Eigen::Infinity>()));
+
+  const Loads l = c.loads();  // along q' = (eta_r, 1/2 G'eta_theta)
+  VectorXd direction = VectorXd::Zero(c.kInputs);
+  direction.segment<3>(0) = c.eta1.head<3>(), direction.segment<3>(14) = c.eta2.head<3>();
+  direction.segment<4>(3) = 0.5 * G_transposed_times(c.b1.p, c.eta1.tail<3>());
+  direction.segment<4>(17) = 0.5 * G_transposed_times(c.b2.p, c.eta2.tail<3>());
+  CHECK(l.load1.dot(c.eta1) + l.load2.dot(c.eta2) == Approx(-expected.dot(direction)).epsilon(1e-12));
+}
+
+TEST_CASE("a bushing measures the rotation vector at any angle below half a turn, smoothly at rest", "[force]") {
+  const double angle = GENERATE(0.0, 1e-12, 1e-8, 1e-4, 0.1, 0.7, 0.7227, 0.7228, 1.5, 2.8, 3.1);
+  const Vector3d axis = Vector3d(1, -2, 0.5).normalized();
+  Bushing bushing;
+  bushing.Kt = Vector3d(3, 5, 7);
+  Frame f1, f2;
+  f1.A = Eigen::AngleAxisd(1.1, Vector3d(0.3, 1, -1).normalized()).matrix();
+  f2.A = f1.A * Eigen::AngleAxisd(angle, axis).matrix();
+  const Vector3d theta = angle * axis;
+  CHECK(bushing.potential(f1, f2) ==
+        Approx(0.5 * theta.dot(bushing.Kt.cwiseProduct(theta))).epsilon(1e-9).margin(1e-26));
+  Vec<6> load1 = Vec<6>::Zero(), load2 = Vec<6>::Zero();
+  bushing.add_load(f1, f2, load1, load2);
+  // Of equal stiffnesses the torque is that of the axis; of these it is so to first order in the angle.
+  Bushing uniform;
+  uniform.Kt.setConstant(4);
+  Vec<6> one = Vec<6>::Zero(), two = Vec<6>::Zero();
+  uniform.add_load(f1, f2, one, two);
+  CHECK((two.tail<3>() + 4 * theta).norm() <= 1e-11 * (1 + angle / (3.1416 - angle)));
+  CHECK((one.tail<3>() - 4 * theta).norm() <= 1e-11 * (1 + angle / (3.1416 - angle)));
+  if (angle < 1e-3) CHECK((load2.tail<3>() + bushing.Kt.cwiseProduct(theta)).norm() <= 10 * angle * angle + 1e-15);
+}
+
+TEST_CASE("friction resists the motion at its level, smoothly through rest", "[force]") {
+  FrictionLaw law;
+  law.coulomb = 2, law.smooth = 0.01, law.viscous = 0.5;
+  Law::Scratch scratch;
+  auto torque = [&](double rate) { return law.value(0, VectorXd(), 0, rate, scratch); };
+  CHECK(torque(0) == 0);
+  CHECK(torque(0.01) == Approx(2 / std::sqrt(2.0) + 0.005));
+  CHECK(torque(5) == Approx(2 + 2.5).epsilon(1e-5));
+  CHECK(torque(-5) == -torque(5));
+  CHECK(law.derivatives(0, VectorXd(), 0, 0, scratch).f_xdot == Approx(2 / 0.01 + 0.5));
+}
+
+TEST_CASE("a force at a point gives its moment about the centre of mass", "[force]") {
+  AppliedForce force;
+  force.s = Vector3d(0.5, 0, 0);
+  Frame frame;
+  frame.A = Eigen::AngleAxisd(std::acos(-1.0) / 2, Vector3d::UnitZ()).matrix();  // the point is at (0, 0.5, 0)
+  Vec<6> global = Vec<6>::Zero(), in_body = Vec<6>::Zero(), expected;
+  force.add_load({3, 0, 0}, frame, global);
+  expected << 3, 0, 0, 0, 0, -1.5;
+  CHECK((global - expected).norm() < 1e-15);
+  force.in_body_axes = true;
+  force.add_load({0, 2, 0}, frame, in_body);
+  expected << -2, 0, 0, 0, 0, 1;
+  CHECK((in_body - expected).norm() < 1e-15);
 }
 
 TEST_CASE("tension is positive when it pulls the points together", "[force]") {

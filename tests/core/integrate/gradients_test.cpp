@@ -50,7 +50,7 @@ struct UserTerminalCost final : TerminalCost {
 };
 
 struct Case {
-  Scene scene = loaded_four_bar();
+  Scene scene = every_force_four_bar();
   std::vector<std::shared_ptr<const UserForce>> forces;
 
   Case() {

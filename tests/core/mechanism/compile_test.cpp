@@ -59,6 +59,17 @@ Numbers numbers_of(const MechanismData& d) {
   };
   for (const TsdaForce& f : d.tsda) x.add(f.slot1, f.s1), x.add(f.slot2, f.s2), add_law(f.law);
   for (const RsdaForce& f : d.rsda) add_law(f.law);
+  for (const AppliedForce& f : d.applied) x.add(f.slot, f.s);
+  for (const Bushing& f : d.bushings) {
+    x.add(f.slot1, f.s1), x.add(f.slot2, f.s2);
+    VectorXd R0(9), law(12);
+    R0 << f.R0.row(0).transpose(), f.R0.row(1).transpose(), f.R0.row(2).transpose();
+    law << f.K, f.C, f.Kt, f.Ct;
+    x.add(f.slot_R0, R0), x.add(f.slot_law, law);
+  }
+  for (const FrictionForce& f : d.frictions) {
+    x.add(f.law.slot, Vector3d(f.law.coulomb, f.law.smooth, f.law.viscous));
+  }
   for (const SensorKind& s : d.sensors) {
     if (const auto* p = std::get_if<PointSensor>(&s)) x.add(p->a.slot, p->a.s), x.add(p->b.slot, p->b.s);
   }
@@ -80,6 +91,18 @@ Scene every_field() {
   Rsda torsion;
   torsion.joint = "A", torsion.stiffness = f("n^2"), torsion.damping = f("0.1*spin"), torsion.free_angle = f("x0");
   s.forces.push_back({"torsion", torsion});
+  BushingSpec mount;
+  mount.body1 = "coupler", mount.body2 = "rocker", mount.point1 = vec("c2", "0", "off"),
+  mount.point2 = vec("0", "n", "0");
+  mount.stiffness = vec("n", "2", "L3"), mount.damping = vec("u", "0", "c2");
+  mount.torsional_stiffness = vec("1", "v0", "x0"), mount.torsional_damping = vec("c1", "c3", "off");
+  s.forces.push_back({"mount", mount});
+  FrictionSpec brake;
+  brake.joint = "A", brake.coulomb = f("n*L2"), brake.smooth_velocity = f("u^2"), brake.viscous = f("spin");
+  s.forces.push_back({"brake", brake});
+  PointForce push;
+  push.body = "crank", push.point = vec("c1", "off", "u"), push.components = {f("1"), f("theta"), f("t")};
+  s.forces.push_back({"push", push});
   s.sensors.push_back(angle_sensor("theta", "A"));
   Sensor gap = point_sensor("gap", "position", "coupler", vec("c2", "off", "0.1"), "norm");
   gap.relative_to = PointOnBody{"crank", vec("0", "n", "0")};

@@ -94,6 +94,35 @@ inline Scene loaded_four_bar() {
   return s;
 }
 
+// The same with every type of force, those written with sensors too. The last parameter is still drag.
+inline Scene every_force_four_bar() {
+  Scene s = loaded_four_bar();
+  const Parameter drag = s.parameters.back();
+  s.parameters.pop_back();
+  add_parameters(s, {{"kb", 6.0}, {"cb", 0.3}, {"mu", 0.4}, {"slip", 1.5}, {"push", 0.7}});
+  s.parameters.push_back(drag);
+  BushingSpec mount;
+  mount.body2 = "rocker", mount.point1 = vec("dx", "0.1", "dz"), mount.point2 = vec("off", "0.1", "0");
+  mount.stiffness = vec("kb", "4", "kb/2"), mount.damping = vec("cb", "0.2", "0.1");
+  mount.torsional_stiffness = vec("0.5", "kb/5", "0.7"), mount.torsional_damping = vec("0.1", "cb/4", "0.05");
+  s.forces.push_back({"mount", mount});
+  FrictionSpec brake;
+  brake.joint = "A", brake.coulomb = f("mu"), brake.smooth_velocity = f("slip"), brake.viscous = f("cb/3");
+  s.forces.push_back({"brake", brake});
+  PointForce follower;
+  follower.body = "coupler", follower.point = vec("c2", "0.1", "off"), follower.in_body_frame = true;
+  follower.components = {f("push*sin(2*t)"), f("-push*vz"), f("0.1*pull_of_spring")};
+  s.forces.push_back({"follower", follower});
+  Torque servo;
+  servo.body = "crank", servo.components = {f("0.2*push*z"), f("0"), f("-kt*(angle - rest) - 0.2*v^2")};
+  s.forces.push_back({"servo", servo});
+  Sensor vz = point_sensor("vz", "velocity", "rocker", vec("L3", "off", "0"), "z"), tension;
+  tension.name = "pull_of_spring", tension.quantity = "force", tension.force = "spring";
+  s.sensors.push_back(vz);
+  s.sensors.push_back(tension);
+  return s;
+}
+
 // A force written by a user: -drag |r'|^2 r' - stiffness p on one body, drag the last parameter. Q on q = (r, p).
 struct CubicDrag final : UserForce {
   std::string body;

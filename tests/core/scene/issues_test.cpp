@@ -57,6 +57,20 @@ TEST_CASE("a right scene has no issues", "[scene]") {
   for (const SceneIssue& issue : find_issues(scene)) FAIL(issue.path << ": " << issue.message);
 }
 
+TEST_CASE("forces written with sensors and a force sensor are right; of other forces it is refused", "[scene]") {
+  Scene scene = pendulum();
+  scene.forces.push_back(spring());
+  Torque servo;
+  servo.body = "bob", servo.components[2] = Expression::parse("-m*theta + sin(t)");
+  scene.forces.push_back({"servo", servo});
+  Sensor pull;
+  pull.name = "pull", pull.quantity = "force", pull.force = "spring";
+  scene.sensors.push_back(pull);
+  for (const SceneIssue& issue : find_issues(scene)) FAIL(issue.path << ": " << issue.message);
+  scene.sensors.back().force = "servo";
+  CHECK_THAT(at(scene, "sensors.pull.force"), Catch::Contains("'servo' is a torque"));
+}
+
 TEST_CASE("an empty scene needs a body", "[scene]") {
   CHECK_THAT(at(Scene(), "bodies"), Catch::Contains("at least one body"));
 }

@@ -41,11 +41,17 @@ Scene two_bodies() {
   s.joints.push_back(hinged);
   Tsda spring;
   spring.body1 = "one", spring.body2 = "two", spring.point1 = vec("0", "a", "0"), spring.point2 = vec("b", "0", "0.2");
-  spring.stiffness = f("k"), spring.free_length = f("l0");
+  spring.stiffness = f("k"), spring.free_length = f("l0"), spring.damping = f("a");
   s.forces.push_back({"spring", spring});
   Rsda torsion;
-  torsion.joint = "H", torsion.stiffness = f("kt"), torsion.free_angle = f("theta0");
+  torsion.joint = "H", torsion.stiffness = f("kt"), torsion.free_angle = f("theta0"), torsion.damping = f("b");
   s.forces.push_back({"torsion", torsion});
+  Tsda cubic = spring;
+  cubic.law = f("k*l^3 - a*ldot*l + 0.5*cos(t)");
+  s.forces.push_back({"cubic", cubic});
+  Rsda stop = torsion;
+  stop.law = f("kt*angle^2 + n*rate*angle + t");
+  s.forces.push_back({"stop", stop});
   return s;
 }
 
@@ -120,6 +126,27 @@ struct TextbookScene {
     const T stretch = norm(values(d)) - rho[l0], twist = angle() - rho[theta0];
     return sum + T(0.5) * (rho[k] * stretch * stretch + rho[kt] * twist * twist);
   }
+  // The spring's length and its rate.
+  std::pair<T, T> span() const {
+    const auto d = point(1, {rho[b], T(0), T(0.2)}) - point(0, {T(0), rho[a], T(0)});
+    const V3<T> x = values(d);
+    return {norm(x), dot(x, rates(d)) / norm(x)};
+  }
+  T spring_tension() const {
+    const auto [l, ldot] = span();
+    return rho[k] * (l - rho[l0]) + rho[a] * ldot;
+  }
+  T cubic_tension() const {
+    const auto [l, ldot] = span();
+    return rho[k] * l * l * l - rho[a] * ldot * l + T(0.5);
+  }
+  // Along an axis of body one, between the points of a slider.
+  Series<T> displacement() const {
+    using std::sqrt;
+    const T length = sqrt(rho[n] * rho[n] + T(1.04));
+    const V3<T> axis{rho[n] / length, T(0.2) / length, T(1) / length};
+    return dot(times(body(0).moving().A, constant(axis)), point(1, foot()) - point(0, tip()));
+  }
   // The largest |Phi| of the hinge and the unit norms.
   T violation() const {
     std::vector<T> phi;
@@ -175,6 +202,11 @@ Sensor plain(const std::string& quantity, const std::string& component = "") {
   s.body1 = "one", s.body2 = "two", s.point1 = vec("a", "b", "0.3"), s.point2 = vec("b", "0.5", "a");
   return s;
 }
+Sensor force_of(const std::string& force) {
+  Sensor s = plain("force");
+  s.force = force;
+  return s;
+}
 Sensor spin(const std::string& component, bool in_axes) {
   Sensor s = plain("angular_velocity", component);
   s.in_body_frame = in_axes;
@@ -209,6 +241,9 @@ const std::vector<Row>& all_sensors() {
             const auto v = s.rates(s.point(0, s.tip()) - s.point(1, s.foot()));
             return transposed_times(s.body(0).frame().A, v)[2];
           }),
+      row("displacement", plain("displacement"), [](const auto& s) { return s.displacement().c[0]; }),
+      row(
+          "rate of displacement", plain("displacement"), [](const auto& s) { return s.displacement().c[1]; }, true),
       row("distance", plain("distance"),
           [](const auto& s) { return norm(s.values(s.point(1, s.foot()) - s.point(0, s.tip()))); }),
       row("distance_rate", plain("distance_rate"),
@@ -222,6 +257,12 @@ const std::vector<Row>& all_sensors() {
       row("energy, kinetic", plain("energy", "kinetic"), [](const auto& s) { return s.kinetic(); }),
       row("energy, potential", plain("energy", "potential"), [](const auto& s) { return s.potential(); }),
       row("energy, total", plain("energy", "total"), [](const auto& s) { return s.kinetic() + s.potential(); }),
+      row("force of a spring", force_of("spring"), [](const auto& s) { return s.spring_tension(); }),
+      row("force of a law", force_of("cubic"), [](const auto& s) { return s.cubic_tension(); }),
+      row("torque of a torsional spring", force_of("torsion"),
+          [](const auto& s) { return s.rho[kt] * (s.angle() - s.rho[theta0]) + s.rho[b] * s.rate(); }),
+      row("torque of a law", force_of("stop"),
+          [](const auto& s) { return s.rho[kt] * s.angle() * s.angle() + s.rho[n] * s.rate() * s.angle(); }),
       row("constraint_violation", plain("constraint_violation"), [](const auto& s) { return s.violation(); }),
   };
   return rows;
@@ -234,6 +275,11 @@ struct Compiled {
 };
 std::vector<SensorKind> kind_of(const Row& row, const MechanismData& data) {
   if (!row.time_derivative) return {data.sensors.at(0)};
+  if (const auto* along = std::get_if<DisplacementSensor>(&data.sensors.at(0))) {
+    DisplacementSensor rate = *along;
+    rate.rate = true;
+    return {rate};
+  }
   PointSensor rate = std::get<PointSensor>(data.sensors.at(0));
   rate.quantity = PointSensor::Quantity::position_rate;
   return {rate};
@@ -241,6 +287,12 @@ std::vector<SensorKind> kind_of(const Row& row, const MechanismData& data) {
 Compiled compiled(const Row& row, const VectorXd& rho) {
   Scene scene = two_bodies();
   scene.sensors.push_back(row.sensor);
+  if (row.sensor.quantity == "displacement") {  // a joint that has one, and that the other rows do not see
+    Joint slider = hinge("S", "one", vec("a", "b", "0.3"), "two", vec("b", "0.5", "a"));
+    slider.type = "cylindrical", slider.axis1 = vec("n", "0.2", "1");
+    scene.joints.push_back(slider);
+    scene.sensors.back().joint = "S";
+  }
   const Mechanism mechanism(scene, rho);
   const VectorXd angles = VectorXd::Constant(static_cast<Eigen::Index>(mechanism.data().angles.size()),
                                              TextbookScene<double>::kTurns * 2 * std::acos(-1.0));

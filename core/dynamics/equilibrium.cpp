@@ -1,0 +1,226 @@
+#include "core/dynamics/equilibrium.hpp"
+
+#include <Eigen/QR>
+#include <cmath>
+#include <limits>
+
+#include "core/dynamics/assembly_equations.hpp"
+#include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/projection.hpp"
+#include "core/sensor/body_at.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kMostIterations = 500;
+constexpr double kLargestStep = 0.2;     // of a coordinate at once [m, rad]
+constexpr double kRankThreshold = 1e-8;  // rows of J scaled to unit length
+constexpr double kTolerance = 1e-11;     // of the last Newton step [m, rad]
+
+class Statics {
+ public:
+  Statics(const Mechanism& mechanism, double t, const VectorXd& angles)
+      : d_(mechanism.data()),
+        t_(t),
+        n_(d_.n),
+        dynamics_(mechanism, FormulationSettings{}),
+        projector_(mechanism, Projection::position_velocity),
+        equations_(d_, AssemblyLevel::position, t),
+        angles_(angles),
+        ydot_(14 * n_) {
+    dynamics_.hold_laws();
+  }
+
+  // q_dir = T(p) xi, columns
+  MatrixXd to_q(const VectorXd& q, const MatrixXd& xi) const {
+    MatrixXd out(7 * n_, xi.cols());
+    for (Index i = 0; i < n_; ++i) {
+      const Vector4d p = q.segment<4>(7 * i + 3);
+      for (Index k = 0; k < xi.cols(); ++k) {
+        out.col(k).segment<3>(7 * i) = xi.col(k).segment<3>(6 * i);
+        out.col(k).segment<4>(7 * i + 3) = 0.5 * G_transposed_times(p, xi.col(k).segment<3>(6 * i + 3));
+      }
+    }
+    return out;
+  }
+
+  bool evaluate(const VectorXd& q) {
+    y_ = VectorXd::Zero(14 * n_);
+    y_.head(7 * n_) = q;
+    if (!dynamics_.evaluate(t_, y_, angles_, ydot_)) return false;
+    dynamics_.linearise_here();
+    z_.resize(6 * n_);
+    for (Index i = 0; i < n_; ++i) z_.segment<6>(6 * i) = dynamics_.z()[static_cast<std::size_t>(i)];
+    return z_.allFinite();
+  }
+
+  // Tangents of z: in the directions xi (6n x 6n identity), and in the parameters.
+  MatrixXd z_of_positions() {
+    const MatrixXd directions = to_q(y_.head(7 * n_), MatrixXd::Identity(6 * n_, 6 * n_));
+    MatrixXd out(6 * n_, 6 * n_);
+    ParameterBlock none;
+    none.theta.setZero(d_.slots(), kLanes);
+    std::fill(none.parameter, none.parameter + kLanes, -1);
+    LaneRows y_dir(14 * n_, kLanes), ydot_dir(14 * n_, kLanes);
+    for (Index first = 0; first < 6 * n_; first += kLanes) {
+      y_dir.setZero();
+      const Index lanes = std::min<Index>(kLanes, 6 * n_ - first);
+      y_dir.topLeftCorner(7 * n_, lanes) = directions.middleCols(first, lanes);
+      dynamics_.tangent(none, y_dir, ydot_dir);
+      for (Index i = 0; i < n_; ++i) {
+        out.block(6 * i, first, 6, lanes) = dynamics_.z_tangent()[static_cast<std::size_t>(i)].leftCols(lanes);
+      }
+    }
+    return out;
+  }
+  MatrixXd z_of_parameters() {
+    MatrixXd out = MatrixXd::Zero(6 * n_, d_.rho.size());
+    const LaneRows y_dir = LaneRows::Zero(14 * n_, kLanes);
+    LaneRows ydot_dir(14 * n_, kLanes);
+    for (const ParameterBlock& block : parameter_blocks(d_)) {
+      dynamics_.tangent(block, y_dir, ydot_dir);
+      for (int lane = 0; lane < kLanes; ++lane) {
+        if (block.parameter[lane] < 0) continue;
+        for (Index i = 0; i < n_; ++i) {
+          out.col(block.parameter[lane]).segment<6>(6 * i) =
+              dynamics_.z_tangent()[static_cast<std::size_t>(i)].col(lane);
+        }
+      }
+    }
+    return out;
+  }
+
+  // J, its null space and Phi_rho at y.
+  struct Rows {
+    MatrixXd J, N, phi_rho;
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> J_scaled;
+    VectorXd scale;
+    MatrixXd particular(const MatrixXd& b) const { return J_scaled.solve(scale.asDiagonal() * b); }  // J xi = b
+  };
+  Rows rows() {
+    Rows r;
+    equations_.start_branches(y_);
+    const AssemblyEquations::Gradients g = equations_.gradients(y_);
+    r.J = g.y.topLeftCorner(d_.m, 7 * n_) * to_q(y_.head(7 * n_), MatrixXd::Identity(6 * n_, 6 * n_));
+    r.phi_rho = g.rho.topRows(d_.m);
+    r.scale = r.J.rowwise().norm().cwiseMax(std::numeric_limits<double>::min()).cwiseInverse();
+    r.J_scaled.setThreshold(kRankThreshold);
+    r.J_scaled.compute(r.scale.asDiagonal() * r.J);
+    Eigen::ColPivHouseholderQR<MatrixXd> qr;
+    qr.setThreshold(kRankThreshold);
+    qr.compute((r.scale.asDiagonal() * r.J).transpose());
+    const MatrixXd Q = qr.householderQ() * MatrixXd::Identity(6 * n_, 6 * n_);
+    r.N = Q.rightCols(6 * n_ - qr.rank());
+    return r;
+  }
+
+  MatrixXd mass_times(const MatrixXd& x) const {
+    MatrixXd out(x.rows(), x.cols());
+    for (Index i = 0; i < n_; ++i) {
+      const BodyData& b = d_.bodies[static_cast<std::size_t>(i + 1)];
+      out.middleRows(6 * i, 3) = b.mass * x.middleRows(6 * i, 3);
+      out.middleRows(6 * i + 3, 3) = b.J * x.middleRows(6 * i + 3, 3);
+    }
+    return out;
+  }
+
+  // Back onto the constraints.
+  bool settle(VectorXd& q) {
+    VectorXd y_hat = VectorXd::Zero(14 * n_), y(14 * n_);
+    y_hat.head(7 * n_) = q;
+    ProjectionSolution solution = projector_.solution();
+    if (!projector_.project(t_, angles_, y_hat, y, solution)) return false;
+    q = y.head(7 * n_);
+    for (std::size_t k = 0; k < d_.angles.size(); ++k) {
+      const JointAngle& a = d_.angles[k];
+      double& angle = angles_(static_cast<Index>(k));
+      angle = JointAngle::on_branch(a.jet(body_at(y, a.body1).frame, body_at(y, a.body2).frame).angle(), angle);
+    }
+    return true;
+  }
+
+  const VectorXd& z() const { return z_; }
+
+  // The body that is accelerated most, for the message.
+  std::string fastest() const {
+    Index i = 0;
+    z_.cwiseAbs().maxCoeff(&i);
+    return d_.body_names[static_cast<std::size_t>(i / 6 + 1)];
+  }
+
+ private:
+  const MechanismData& d_;
+  double t_;
+  Index n_;
+  Dynamics dynamics_;
+  Projector projector_;
+  AssemblyEquations equations_;
+  VectorXd angles_, y_, ydot_, z_;
+};
+
+std::string number(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", x);
+  return text;
+}
+
+}  // namespace
+
+Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const VectorXd& q_guess, const VectorXd& angles) {
+  Equilibrium e;
+  e.q = q_guess;
+  Statics statics(mechanism, t, angles);
+  auto fail = [&](std::string message) {
+    e.message = "static equilibrium not found: " + std::move(message);
+    return e;
+  };
+  double sigma = 0, before = 0;
+  bool converged = false;
+  for (; e.iterations < kMostIterations && !converged; ++e.iterations) {
+    if (!statics.evaluate(e.q)) return fail("the accelerations cannot be computed on the way");
+    const double now = statics.z().cwiseAbs().maxCoeff();
+    sigma = e.iterations == 0 ? now / kLargestStep : sigma * std::min(now / before, 4.0);
+    if (sigma < 1e-9 * (1 + now)) sigma = 0;
+    before = now;
+    const Statics::Rows rows = statics.rows();
+    if (rows.N.cols() == 0 || now == 0) {
+      converged = true;
+      break;
+    }
+    const MatrixXd Z = statics.z_of_positions();
+    MatrixXd S = -Z;
+    S.diagonal().array() += sigma;
+    const MatrixXd reduced = rows.N.transpose() * statics.mass_times(S * rows.N);
+    const VectorXd xi = rows.N * reduced.completeOrthogonalDecomposition().solve(
+                                     VectorXd(rows.N.transpose() * statics.mass_times(statics.z())));
+    const double size = xi.cwiseAbs().maxCoeff();
+    if (!std::isfinite(size)) return fail("a step towards it is not finite");
+    e.q += statics.to_q(e.q, (size > kLargestStep ? kLargestStep / size : 1.0) * xi);
+    if (!statics.settle(e.q)) return fail("the joints cannot be kept closed on the way to it");
+    converged = size < kTolerance && sigma < 1e-3 * (1 + now);
+  }
+  if (!converged) {
+    return fail("after " + std::to_string(e.iterations) + " iterations body '" + statics.fastest() +
+                "' would still be accelerated by " + number(before) +
+                " (m/s^2 or rad/s^2); is there a spring or stop that holds every free motion?");
+  }
+  if (!statics.evaluate(e.q)) return fail("the accelerations cannot be computed there");
+  const Statics::Rows rows = statics.rows();
+  const MatrixXd particular = rows.particular(-rows.phi_rho);
+  MatrixXd xi_rho = particular;
+  if (rows.N.cols() > 0) {
+    const MatrixXd Z = statics.z_of_positions(), NM = rows.N.transpose();
+    const MatrixXd reduced = NM * statics.mass_times(-(Z * rows.N));
+    const MatrixXd right = NM * statics.mass_times(statics.z_of_parameters() + Z * particular);
+    xi_rho += rows.N * reduced.completeOrthogonalDecomposition().solve(right);
+  }
+  e.q_rho = statics.to_q(e.q, xi_rho);
+  e.ok = true;
+  return e;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,197 @@
+#include "core/dynamics/force_terms.hpp"
+
+#include <algorithm>
+
+namespace mbsopt {
+namespace {
+
+std::size_t index(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+ForceTerms::ForceTerms(const MechanismData& data) : data_(data) {
+  const std::size_t P = static_cast<std::size_t>(data.rho.size());
+  law_.inputs.resize(P + 3);
+  law_.gradient.resize(P + 3);
+  auto grow = [&](const Law& law) {
+    if (law.program) law.program->grow(law_.program);
+  };
+  for (const TsdaForce& f : data.tsda) grow(f.law);
+  for (const RsdaForce& f : data.rsda) grow(f.law);
+  if (data.applied.empty()) return;
+  inputs_.resize(P + 1 + data.sensors.size());
+  for (std::vector<double>& gradient : gradients_) gradient.resize(inputs_.size());
+  for (const AppliedForce& f : data.applied) {
+    for (const Program& component : f.components) component.grow(program_);
+  }
+  y_bar_.setZero(14 * data.n);
+  rho_bar_.setZero(data.rho.size());
+}
+
+void ForceTerms::set_inputs(const AppliedForce& f, const At& at) {
+  const int t = static_cast<int>(data_.rho.size());
+  for (const int k : f.parameters) inputs_[index(k)] = data_.rho(k);
+  inputs_[index(t)] = at.t;
+  for (const int s : f.sensors) {
+    inputs_[index(t + 1 + s)] = evaluate(data_, data_.sensors[index(s)], at.t, at.y, at.angles);
+  }
+}
+
+Vector3d ForceTerms::components(const AppliedForce& f, const At& at) {
+  set_inputs(f, at);
+  Vector3d c;
+  for (int i = 0; i < 3; ++i) c(i) = f.components[index(i)].value(inputs_, program_);
+  return c;
+}
+
+Vector3d ForceTerms::components_with_gradients(const AppliedForce& f, const At& at) {
+  set_inputs(f, at);
+  Vector3d c;
+  for (int i = 0; i < 3; ++i) {
+    std::vector<double>& gradient = gradients_[index(i)];
+    std::fill(gradient.begin(), gradient.end(), 0.0);
+    c(i) = f.components[index(i)].add_gradient(inputs_, 1.0, gradient, program_);
+  }
+  return c;
+}
+
+void ForceTerms::add_loads(const At& at, std::vector<Vec<6>>& loads) {
+  for (const TsdaForce& f : data_.tsda) {
+    const std::size_t i = index(f.body1), j = index(f.body2);
+    f.add_load(at.t, data_.rho, at.frames[i], at.frames[j], law_, loads[i], loads[j]);
+  }
+  auto add_torque = [&](const auto& f) {
+    const JointAngle& joint = data_.angles[index(f.joint_angle)];
+    const std::size_t i = index(joint.body1), j = index(joint.body2);
+    f.add_load(at.t, data_.rho, joint, at.angles(f.joint_angle), at.frames[i], at.frames[j], law_, loads[i], loads[j]);
+  };
+  for (const RsdaForce& f : data_.rsda) add_torque(f);
+  for (const FrictionForce& f : data_.frictions) add_torque(f);
+  for (const Bushing& f : data_.bushings) {
+    const std::size_t i = index(f.body1), j = index(f.body2);
+    f.add_load(at.frames[i], at.frames[j], loads[i], loads[j]);
+  }
+  for (const SlidingFriction& f : data_.sliding_frictions) {
+    const std::size_t i = index(f.body1), j = index(f.body2);
+    f.add_load(at.frames[i], at.frames[j], loads[i], loads[j]);
+  }
+  for (const AppliedForce& f : data_.applied) {
+    f.add_load(components(f, at), at.frames[index(f.body)], loads[index(f.body)]);
+  }
+}
+
+template <class Force>
+void ForceTerms::add_torque_tangent(const Force& f, const At& at, const std::vector<FrameTangent>& tangents,
+                                    const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs) {
+  constexpr int kFields = decltype(f.law)::kFields;
+  const JointAngle& joint = data_.angles[index(f.joint_angle)];
+  const std::size_t i = index(joint.body1), j = index(joint.body2);
+  const JointAngle::Jet jet = joint.jet(at.frames[i], at.frames[j]);
+  const double angle = JointAngle::on_branch(jet.angle(), at.angles(f.joint_angle)), rate = jet.rate();
+  const Law::Value value = f.law.derivatives(at.t, data_.rho, angle, rate, law_);
+  Lanes<kFields> fields;
+  Lanes<3> x1, y1, n2;
+  const Lanes<1> df = f.law.field_tangent(
+      angle, rate, block.field<kFields>(f.law.slot, fields), [&](int p) { return block.direction(p); }, law_);
+  f.tangent(joint, jet, value, df, at.frames[i], at.frames[j], tangents[i], tangents[j],
+            block.field<3>(joint.slot_x1, x1), block.field<3>(joint.slot_y1, y1), block.field<3>(joint.slot_n2, n2),
+            load_dirs[i], load_dirs[j]);
+}
+
+void ForceTerms::add_tangent(const At& at, const std::vector<FrameTangent>& tangents, const ParameterBlock& block,
+                             const LaneRows& y_dir, std::vector<Lanes<6>>& load_dirs) {
+  for (const TsdaForce& f : data_.tsda) {
+    const std::size_t i = index(f.body1), j = index(f.body2);
+    const TsdaForce::Span x = f.span(at.frames[i], at.frames[j]);
+    const Law::Value value = f.law.derivatives(at.t, data_.rho, x.l, x.ldot, law_);
+    Lanes<4> fields;
+    Lanes<3> s1, s2;
+    const Lanes<1> df = f.law.field_tangent(
+        x.l, x.ldot, block.field<4>(f.law.slot, fields), [&](int p) { return block.direction(p); }, law_);
+    f.tangent(x, value, df, at.frames[i], at.frames[j], tangents[i], tangents[j], block.field<3>(f.slot1, s1),
+              block.field<3>(f.slot2, s2), load_dirs[i], load_dirs[j]);
+  }
+  for (const RsdaForce& f : data_.rsda) add_torque_tangent(f, at, tangents, block, load_dirs);
+  for (const FrictionForce& f : data_.frictions) add_torque_tangent(f, at, tangents, block, load_dirs);
+  for (const Bushing& f : data_.bushings) {
+    const std::size_t i = index(f.body1), j = index(f.body2);
+    Lanes<3> s1, s2;
+    Lanes<9> R0;
+    Lanes<12> law;
+    const Bushing::FieldLanes fields{block.field<3>(f.slot1, s1), block.field<3>(f.slot2, s2),
+                                     block.field<9>(f.slot_R0, R0), block.field<12>(f.slot_law, law)};
+    f.tangent(at.frames[i], at.frames[j], tangents[i], tangents[j], fields, load_dirs[i], load_dirs[j]);
+  }
+  for (const SlidingFriction& f : data_.sliding_frictions) {
+    const std::size_t i = index(f.body1), j = index(f.body2);
+    Lanes<3> s1, s2, s3, law;
+    const GeometryTangent ds{block.field<3>(f.slot1, s1), block.field<3>(f.slot2, s2), block.field<3>(f.slot3, s3)};
+    f.tangent(at.frames[i], at.frames[j], tangents[i], tangents[j], ds, block.field<3>(f.law.slot, law), load_dirs[i],
+              load_dirs[j]);
+  }
+  const int t = static_cast<int>(data_.rho.size());
+  for (const AppliedForce& f : data_.applied) {
+    const Vector3d c = components_with_gradients(f, at);
+    Lanes<3> dc = Lanes<3>::Zero();
+    auto add_input = [&](int input, const Lanes<1>& direction) {
+      for (int i = 0; i < 3; ++i) dc.row(i) += gradients_[index(i)][index(input)] * direction;
+    };
+    for (const int k : f.parameters) add_input(k, block.direction(k));
+    for (const int s : f.sensors) {
+      y_bar_.setZero(), rho_bar_.setZero();
+      add_gradient(data_, data_.sensors[index(s)], at.t, at.y, at.angles, 1, y_bar_, rho_bar_);
+      Lanes<1> direction = Lanes<1>::Zero();
+      for (Eigen::Index i = 0; i < y_bar_.size(); ++i) {
+        if (y_bar_(i) != 0) direction += y_bar_(i) * y_dir.row(i);
+      }
+      for (int lane = 0; lane < kLanes; ++lane) {
+        if (block.parameter[lane] >= 0) direction(lane) += rho_bar_(block.parameter[lane]);
+      }
+      add_input(t + 1 + s, direction);
+    }
+    Lanes<3> ds;
+    f.tangent(c, dc, at.frames[index(f.body)], tangents[index(f.body)], block.field<3>(f.slot, ds),
+              load_dirs[index(f.body)]);
+  }
+}
+
+void ForceTerms::add_pull_back(const At& at, std::vector<FrameBar>& bars, Eigen::Ref<Eigen::VectorXd> y_bar,
+                               Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) {
+  for (const TsdaForce& f : data_.tsda) {
+    const std::size_t i = index(f.body1), j = index(f.body2);
+    f.pull_back(at.t, data_.rho, at.frames[i], at.frames[j], law_, bars[i], bars[j], theta_bar, rho_bar);
+  }
+  auto add_torque = [&](const auto& f) {
+    const JointAngle& joint = data_.angles[index(f.joint_angle)];
+    const std::size_t i = index(joint.body1), j = index(joint.body2);
+    f.pull_back(at.t, data_.rho, joint, at.angles(f.joint_angle), at.frames[i], at.frames[j], law_, bars[i], bars[j],
+                theta_bar, rho_bar);
+  };
+  for (const RsdaForce& f : data_.rsda) add_torque(f);
+  for (const FrictionForce& f : data_.frictions) add_torque(f);
+  for (const Bushing& f : data_.bushings) {
+    const std::size_t i = index(f.body1), j = index(f.body2);
+    f.pull_back(at.frames[i], at.frames[j], bars[i], bars[j], theta_bar);
+  }
+  for (const SlidingFriction& f : data_.sliding_frictions) {
+    const std::size_t i = index(f.body1), j = index(f.body2);
+    f.pull_back(at.frames[i], at.frames[j], bars[i], bars[j], theta_bar);
+  }
+  const int t = static_cast<int>(data_.rho.size());
+  for (const AppliedForce& f : data_.applied) {
+    const Vector3d c = components_with_gradients(f, at);
+    const Vector3d c_bar = f.pull_back(c, at.frames[index(f.body)], bars[index(f.body)], theta_bar);
+    auto weight = [&](int input) {
+      double sum = 0;
+      for (int i = 0; i < 3; ++i) sum += c_bar(i) * gradients_[index(i)][index(input)];
+      return sum;
+    };
+    for (const int k : f.parameters) rho_bar(k) += weight(k);
+    for (const int s : f.sensors) {
+      const double scale = weight(t + 1 + s);
+      if (scale != 0) add_gradient(data_, data_.sensors[index(s)], at.t, at.y, at.angles, scale, y_bar, rho_bar);
+    }
+  }
+}
+
+}  // namespace mbsopt

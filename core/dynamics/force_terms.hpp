@@ -1,0 +1,52 @@
+// The scene's forces inside the equations of motion (gravity and users' own apart): their loads on each body, force in
+// global axes and moment in body axes, with tangent and pull-back.
+//
+// A force written with sensors, F(t, rho, s(t, y, rho)), is differentiated through them:
+//   tangent    F' = F_rho rho' + F_s (s_y y' + s_rho rho')
+//   pull-back  y_bar += s_y' F_s' F_bar,    rho_bar += (F_rho + F_s s_rho)' F_bar
+//
+// Owns the numbers of one evaluation: one per thread, nothing is allocated after construction.
+#pragma once
+
+#include <vector>
+
+#include "core/mechanism/parameter_lanes.hpp"
+
+namespace mbsopt {
+
+class ForceTerms {
+ public:
+  explicit ForceTerms(const MechanismData& data);
+
+  // Where they are evaluated; angles: the branch of each joint angle; frames: of all bodies, the ground first.
+  struct At {
+    double t;
+    const Eigen::VectorXd& y;
+    const Eigen::VectorXd& angles;
+    const std::vector<Frame>& frames;
+  };
+  void add_loads(const At& at, std::vector<Vec<6>>& loads);
+  void add_tangent(const At& at, const std::vector<FrameTangent>& tangents, const ParameterBlock& block,
+                   const LaneRows& y_dir, std::vector<Lanes<6>>& load_dirs);
+  // Gradient of the virtual work sum load'eta, eta in the frames and held fixed.
+  void add_pull_back(const At& at, std::vector<FrameBar>& bars, Eigen::Ref<Eigen::VectorXd> y_bar,
+                     Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
+
+ private:
+  template <class Force>
+  void add_torque_tangent(const Force& force, const At& at, const std::vector<FrameTangent>& tangents,
+                          const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs);
+  void set_inputs(const AppliedForce& force, const At& at);
+  Vector3d components(const AppliedForce& force, const At& at);
+  Vector3d components_with_gradients(const AppliedForce& force, const At& at);
+
+  const MechanismData& data_;
+  Law::Scratch law_;
+  // Of applied forces: inputs of their programs, the gradient of each component; a sensor's gradient.
+  Program::Scratch program_;
+  std::vector<double> inputs_;
+  std::array<std::vector<double>, 3> gradients_;
+  Eigen::VectorXd y_bar_, rho_bar_;
+};
+
+}  // namespace mbsopt

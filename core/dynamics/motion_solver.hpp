@@ -1,0 +1,25 @@
+// Accelerations and multipliers at any state, for sensors that need them, and what a gradient in them means for the
+// state and the parameters: the equations of motion solved once more, and their adjoint.
+#pragma once
+
+#include "core/dynamics/dynamics.hpp"
+#include "core/mechanism/state_point.hpp"
+
+namespace mbsopt {
+
+class MotionSolver final : public MotionSource {
+ public:
+  MotionSolver(const Mechanism& mechanism, const FormulationSettings& settings);
+
+  const Motion& motion(const StatePoint& at) override;
+  Motion& bar() override { return bar_; }
+  void fold_bar(const StatePoint& at, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) override;
+
+ private:
+  Dynamics dynamics_;
+  Motion motion_, bar_;
+  double t_ = 0;
+  Eigen::VectorXd y_, ydot_, w_, y_bar_, theta_bar_, rho_bar_;
+};
+
+}  // namespace mbsopt
