@@ -304,11 +304,14 @@ void Projector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat
     const Vector4d pi_bar = pi_bar_of(i);
     FrameBar& bar = bars_[at(i)];
     Vector4d p_tilde_bar = pi_bar + 0.5 * G_transposed_times_adjoint(s.delta[at(i - 1)].tail<3>(), pi_bar);
+    auto r_hat_bar = y_hat_bar.segment<3>(7 * (i - 1));
+    r_hat_bar += q_bar_.segment<3>(7 * (i - 1));
     if (data_.m > 0) {
       fold_virtual(x_[at(i - 1)].tail<3>(), bar);
-      p_tilde_bar += pull_back_position(states_tilde_[at(i)], bar).tail<4>();
+      const Vec<7> q_tilde_bar = pull_back_position(states_tilde_[at(i)], bar);  // J~ of a distance or dot-2: of r too
+      r_hat_bar += q_tilde_bar.head<3>();
+      p_tilde_bar += q_tilde_bar.tail<4>();
     }
-    y_hat_bar.segment<3>(7 * (i - 1)) += q_bar_.segment<3>(7 * (i - 1));
     y_hat_bar.segment<4>(7 * (i - 1) + 3) += (p_tilde_bar - b.p_tilde * b.p_tilde.dot(p_tilde_bar)) / b.norm_hat;
   }
 }

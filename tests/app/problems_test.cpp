@@ -25,7 +25,7 @@ TEST_CASE("every problem file is right, without a warning", "[problems]") {
     CHECK(warnings.empty());
     ++files;
   }
-  CHECK(files >= 8);
+  CHECK(files >= 24);
 }
 
 // Reference values: complex step through an 8th-order method with exact constraints, as in tests/optim/five_bar.hpp.

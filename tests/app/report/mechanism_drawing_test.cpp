@@ -94,3 +94,20 @@ TEST_CASE("a drawing follows the values of the parameters", "[report]") {
   const std::vector<double> before = numbers_of_body(svg, 0), after = numbers_of_body(svg, 1);
   CHECK(std::abs(after[2] - after[0]) == Approx(2 * std::abs(before[2] - before[0])).margin(0.2));
 }
+
+TEST_CASE("a drawing of any size has a scale of a round length", "[report]") {
+  for (double length = 1e-3; length < 1e4; length *= 1.07) {
+    Scene scene = pendulum();
+    scene.bodies[0].points["tip"] = {length, 0.0, 0.0};
+    const std::vector<double> level = bar_at(0);
+    std::string svg;
+    INFO(length);
+    REQUIRE_NOTHROW(svg = mechanism_drawing("bar", {0, 1}, {{"start", scene, level}}));
+    const std::regex scale(">([0-9.e+-]+) m</text>");
+    std::smatch found;
+    REQUIRE(std::regex_search(svg, found, scale));
+    const double shown = std::stod(found[1]), digit = shown / std::pow(10, std::floor(std::log10(shown) + 1e-9));
+    CHECK((std::abs(digit - 1) < 1e-9 || std::abs(digit - 2) < 1e-9 || std::abs(digit - 5) < 1e-9));
+    CHECK(shown < length);
+  }
+}
