@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/dynamics/assembly.hpp"
 #include "core/dynamics/motion_solver.hpp"
 #include "core/dynamics/projection.hpp"
