@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/dynamics/assembly_equations.hpp"
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/projection.hpp"

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/dynamics/assembly.hpp"
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/projection.hpp"
