@@ -1,14 +1,46 @@
-// Reading a problem is its whole check; what is left to say is what the mechanism is.
+// Reading a problem is its whole check; what is left to say is what the mechanism is, and what is odd about it.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include "app/command.hpp"
 #include "app/run.hpp"
+#include "app/text_table.hpp"
+#include "core/dynamics/assembly.hpp"
+#include "core/dynamics/model_warnings.hpp"
+#include "optim/parameter_uses.hpp"
 
 namespace mbsopt {
+namespace {
+
+void add_parameters(Run& run) {
+  const std::vector<ParameterUse> uses = parameter_uses(run.problem);
+  if (uses.empty()) return;
+  TextTable table({"parameter", "value", "enters"});
+  for (std::size_t k = 0; k < uses.size(); ++k) {
+    const double value = run.problem.scene.parameters[k].value;
+    run.result["parameters"][uses[k].parameter] = {{"value", value}, {"fields", uses[k].fields}};
+    constexpr std::size_t kShown = 4;
+    std::vector<std::string> shown = uses[k].fields;
+    const std::size_t more = shown.size() > kShown ? shown.size() - kShown : 0;
+    if (more > 0) shown.resize(kShown);
+    table.add({uses[k].parameter, significant(value, 6),
+               fmt::format("{}{}", fmt::join(shown, ", "), more > 0 ? fmt::format(" and {} more", more) : "")});
+  }
+  run.context.out << '\n' << table.text();
+}
+
+}  // namespace
 
 int validate_command(const CommandContext& context) {
   Run run(context);
   const Mechanism mechanism(run.problem.scene, parameter_values(run.problem.scene));
   run.start();
-  assembled(run, mechanism);
+  const bool closed = assembled(run, mechanism);
+  for (const std::string& warning :
+       model_warnings(mechanism, Assembly(mechanism, run.problem.scene.simulation.start_time))) {
+    run.warn(warning);
+  }
+  if (closed) add_parameters(run);
   return run.finish();
 }
 

@@ -1,0 +1,143 @@
+#include "core/dynamics/model_warnings.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <map>
+
+#include "core/dynamics/constraint_rows.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/sensor/body_at.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kMassless = 1e-12;      // relative to the largest mass or inertia
+constexpr double kZeroLength = 1e-9;     // [m]
+constexpr double kMuchViolated = 0.1;    // of the mechanism's size for points, rad for axes
+constexpr double kRankThreshold = 1e-8;  // rows of J scaled to unit length
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+std::vector<Frame> frames_at(const MechanismData& d, const VectorXd& q) {
+  std::vector<Frame> frames(at(d.n) + 1);
+  BodyState state;
+  for (int i = 1; i <= d.n; ++i) set_position(q.segment<7>(7 * (i - 1)), state, frames[at(i)]);
+  return frames;
+}
+
+void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::string>& warnings) {
+  bool any = false;
+  double mass = 0, inertia = 0;
+  for (int i = 1; i <= d.n; ++i) {
+    mass = std::max(mass, d.bodies[at(i)].mass), inertia = std::max(inertia, d.bodies[at(i)].J.trace());
+  }
+  for (int i = 1; i <= d.n; ++i) {
+    const BodyData& b = d.bodies[at(i)];
+    const double least = Eigen::SelfAdjointEigenSolver<Matrix3d>(b.J, Eigen::EigenvaluesOnly).eigenvalues()(0);
+    any = any || b.mass <= kMassless * mass || least <= kMassless * inertia;
+  }
+  if (!any) return;  // the usual case costs nothing
+  ConstraintRows rows(d);
+  rows.evaluate(frames_at(d, q));
+  MatrixXd J = MatrixXd::Zero(std::max(d.m, 1), 6 * d.n);
+  for (const RowGroup& g : d.groups) {
+    for (int r = 0; r < g.rows; ++r) {
+      if (g.body1 > 0) J.block<1, 6>(g.row + r, 6 * (g.body1 - 1)) += rows.J1.row(g.block + r);
+      if (g.body2 > 0) J.block<1, 6>(g.row + r, 6 * (g.body2 - 1)) += rows.J2.row(g.block + r);
+    }
+  }
+  for (Index r = 0; r < J.rows(); ++r) J.row(r) /= std::max(J.row(r).norm(), 1e-300);
+  Eigen::ColPivHouseholderQR<MatrixXd> qr;
+  qr.setThreshold(kRankThreshold);
+  qr.compute(J.transpose());
+  const MatrixXd Q = qr.householderQ() * MatrixXd::Identity(6 * d.n, 6 * d.n);
+  const MatrixXd N = Q.rightCols(6 * d.n - qr.rank());
+  if (N.cols() == 0) return;
+  MatrixXd MN = N;
+  for (int i = 1; i <= d.n; ++i) {
+    MN.middleRows(6 * (i - 1), 3) *= d.bodies[at(i)].mass / (mass > 0 ? mass : 1);
+    MN.middleRows(6 * (i - 1) + 3, 3) =
+        (d.bodies[at(i)].J / (inertia > 0 ? inertia : 1) * N.middleRows(6 * (i - 1) + 3, 3)).eval();
+  }
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(N.transpose() * MN);
+  std::map<int, bool> bodies;
+  for (Index k = 0; k < N.cols() && eigen.eigenvalues()(k) <= kMassless; ++k) {
+    Index row = 0;
+    (N * eigen.eigenvectors().col(k)).cwiseAbs().maxCoeff(&row);
+    bodies[static_cast<int>(row / 6) + 1] = row % 6 >= 3;
+  }
+  for (const auto& [body, turns] : bodies) {
+    warnings.push_back(fmt::format(
+        "body '{}' has no {} in a direction in which no joint holds it: forces there give no finite acceleration; give it "
+        "some, or hold it by a joint",
+        d.body_names[at(body)], turns ? "inertia" : "mass"));
+  }
+}
+
+void add_springs(const MechanismData& d, const VectorXd& y, std::vector<std::string>& warnings) {
+  for (const TsdaForce& f : d.tsda) {
+    const double l = f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l;
+    if (l > kZeroLength) continue;
+    warnings.push_back(
+        fmt::format("a tsda between '{}' and '{}' has zero length at the start, where it has no direction; its force acts "
+                    "once its points have moved apart",
+                    d.body_names[at(f.body1)], d.body_names[at(f.body2)]));
+  }
+}
+
+void add_violations(const MechanismData& d, std::vector<std::string>& warnings) {
+  double size = 0;
+  for (const Constraint& c : d.constraints) {
+    if (const auto* p = std::get_if<Coincidence>(&c.primitive)) size = std::max({size, p->s1.norm(), p->s2.norm()});
+  }
+  VectorXd q(7 * d.n);
+  for (int i = 1; i <= d.n; ++i) q.segment<7>(7 * (i - 1)) = d.bodies[at(i)].q;
+  const std::vector<Frame> frames = frames_at(d, q);
+  std::map<int, double> worst_point, worst_axis;
+  for (const Constraint& c : d.constraints) {
+    if (c.joint < 0) continue;
+    if (const auto* p = std::get_if<Coincidence>(&c.primitive)) {
+      Vec<3> phi;
+      p->phi(frames[at(c.body1)], frames[at(c.body2)], phi);
+      worst_point[c.joint] = std::max(worst_point[c.joint], phi.norm());
+    } else if (const auto* x = std::get_if<Dot1>(&c.primitive)) {
+      Vec<1> phi;
+      x->phi(frames[at(c.body1)], frames[at(c.body2)], phi);
+      worst_axis[c.joint] = std::max(worst_axis[c.joint], std::abs(phi(0)));
+    }
+  }
+  for (const auto& [joint, amount] : worst_point) {
+    if (amount <= kMuchViolated * size || size == 0) continue;
+    warnings.push_back(
+        fmt::format("the guess (position, orientation of the bodies) leaves the points of joint '{}' {:.3g} m apart; "
+                    "check in the report that the assembled position is the one that is meant",
+                    d.joint_names[at(joint)], amount));
+  }
+  for (const auto& [joint, amount] : worst_axis) {
+    if (amount <= kMuchViolated) continue;
+    warnings.push_back(
+        fmt::format("the guess (orientation of the bodies) leaves the axes of joint '{}' {:.3g} rad out of line; check in "
+                    "the report that the assembled position is the one that is meant",
+                    d.joint_names[at(joint)], std::asin(std::min(1.0, amount))));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> model_warnings(const Mechanism& mechanism, const Assembly& assembly) {
+  const MechanismData& d = mechanism.data();
+  std::vector<std::string> warnings;
+  add_violations(d, warnings);
+  if (!assembly.result().ok) return warnings;
+  add_massless(d, assembly.result().y.head(7 * d.n), warnings);
+  add_springs(d, assembly.result().y, warnings);
+  return warnings;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,17 @@
+// What is odd about a mechanism at its assembled start, in words: things that run but seldom mean what they say.
+//
+//   massless directions that no joint holds        (M is singular on the null space of J: no acceleration there)
+//   springs of zero length                         (they have no direction)
+//   a guess that violates joints by much           (the assembled state may be another than the one that was meant)
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/dynamics/assembly.hpp"
+
+namespace mbsopt {
+
+std::vector<std::string> model_warnings(const Mechanism& mechanism, const Assembly& assembly);
+
+}  // namespace mbsopt
