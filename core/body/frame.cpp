@@ -1,5 +1,7 @@
 #include "core/body/frame.hpp"
 
+#include "core/body/euler_parameters.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -46,6 +48,97 @@ void set_tangent(const BodyState& body, const Lanes<7>& q_dir, const Lanes<7>& v
   set_B(body.pdot, pdot_dir, 2, other);
   out.Addot += other;
   out.p = p_dir, out.pdot = pdot_dir;
+}
+
+void FrameBar::set_zero() {
+  r.setZero(), rdot.setZero();
+  A.setZero(), Adot.setZero(), Addot.setZero(), A_eta.setZero();
+  p.setZero(), pdot.setZero(), pddot.setZero(), p_eta.setZero();
+}
+
+void FrameTangent::set_zero() {
+  r.setZero(), rdot.setZero();
+  A.setZero(), Adot.setZero(), Addot.setZero();
+  p.setZero(), pdot.setZero(), pddot.setZero();
+}
+
+Vector3d BodyState::omega() const { return omega_B(p, pdot); }
+
+Vector4d BodyState::pddot() const { return 0.5 * G_transposed_times(p, omegadot) - pdot.squaredNorm() * p; }
+
+void set_position(const Vec<7>& q, BodyState& body, Frame& frame) {
+  body.p = q.tail<4>();
+  frame.r = q.head<3>();
+  frame.A = A(body.p);
+  frame.p = body.p;
+}
+
+void set_velocity(const Vec<7>& v, BodyState& body, Frame& frame) {
+  body.pdot = v.tail<4>();
+  frame.rdot = v.head<3>();
+  frame.Adot = B(body.p, body.pdot);
+  frame.pdot = body.pdot;
+}
+
+void set_acceleration(const Vec<6>& z, BodyState& body, Frame& frame) {
+  body.omegadot = z.tail<3>();
+  frame.rddot = z.head<3>();
+  frame.Addot = frame.A * skew(body.omegadot) + 2 * A(body.pdot) - 2 * body.pdot.squaredNorm() * frame.A;
+  frame.pddot = body.pddot();
+}
+
+void set_virtual(const Vec<6>& eta, Frame& frame) {
+  frame.r_eta = eta.head<3>();
+  frame.theta_eta = eta.tail<3>();
+  frame.A_eta = frame.A * skew(frame.theta_eta);
+  frame.p_eta = 0.5 * G_transposed_times(frame.p, frame.theta_eta);
+}
+
+Vec<7> acceleration(const BodyState& body, const Frame& frame) {
+  Vec<7> a;
+  a << frame.rddot, body.pddot();
+  return a;
+}
+
+Vec<6> to_virtual(const BodyState& body, const Vec<7>& w) {
+  Vec<6> x;
+  x.head<3>() = w.head<3>();
+  x.tail<3>() = 0.5 * G_times(body.p, w.tail<4>());
+  return x;
+}
+
+void fold_virtual(const Vector3d& eta_theta, FrameBar& bar) {
+  bar.A.noalias() -= bar.A_eta * skew(eta_theta);
+  bar.p += 0.5 * G_transposed_times_adjoint(eta_theta, bar.p_eta);
+}
+
+Vec<7> pull_back_position(const BodyState& body, const FrameBar& bar) {
+  Vec<7> q_bar;
+  q_bar.head<3>() = bar.r;
+  q_bar.tail<4>() = bar.p;
+  q_bar.tail<4>().noalias() += K(bar.A) * body.p;
+  return q_bar;
+}
+
+void add_pull_back_velocity(const BodyState& body, const FrameBar& bar, double scale, Eigen::Ref<Vec<7>> q_bar,
+                            Eigen::Ref<Vec<7>> v_bar) {
+  const Mat<4, 4> K_dot = K(bar.Adot);
+  q_bar.head<3>() += scale * bar.r;
+  q_bar.tail<4>() += scale * (bar.p + K(bar.A) * body.p + K_dot * body.pdot);
+  v_bar.head<3>() += scale * bar.rdot;
+  v_bar.tail<4>() += scale * (bar.pdot + K_dot * body.p);
+}
+
+void add_pull_back(const BodyState& body, FrameBar bar, const Vector4d& w_p, const Vector3d& eta_theta,
+                   Eigen::Ref<Vec<7>> q_bar, Eigen::Ref<Vec<7>> v_bar) {
+  fold_virtual(eta_theta, bar);
+  const Mat<4, 4> K_dot = K(bar.Adot), K_ddot = K(bar.Addot);
+  const Vector4d pddot_bar = K_ddot * body.p + w_p + bar.pddot;
+  q_bar.head<3>() += bar.r;
+  q_bar.tail<4>() += bar.p + K(bar.A) * body.p + K_dot * body.pdot + K_ddot * body.pddot() +
+                     0.5 * G_transposed_times_adjoint(body.omegadot, pddot_bar) - body.pdot.squaredNorm() * pddot_bar;
+  v_bar.head<3>() += bar.rdot;
+  v_bar.tail<4>() += bar.pdot + K_dot * body.p + 2 * (K_ddot * body.pdot) - 2 * body.p.dot(pddot_bar) * body.pdot;
 }
 
 }  // namespace mbsopt

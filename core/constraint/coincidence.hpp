@@ -12,31 +12,17 @@ struct Coincidence {
   static constexpr int kRows = 3;
   Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero();  // P seen from each centre of mass, in that body's axes [m]
 
-  void phi(const Frame& f1, const Frame& f2, Vec<3>& out) const { out = f2.point(s2) - f1.point(s1); }
-  void phi_dot(const Frame& f1, const Frame& f2, Vec<3>& out) const { out = f2.point_dot(s2) - f1.point_dot(s1); }
-  void phi_ddot(const Frame& f1, const Frame& f2, Vec<3>& out) const { out = f2.point_ddot(s2) - f1.point_ddot(s1); }
+  void phi(const Frame& f1, const Frame& f2, Vec<3>& out) const;
+  void phi_dot(const Frame& f1, const Frame& f2, Vec<3>& out) const;
+  void phi_ddot(const Frame& f1, const Frame& f2, Vec<3>& out) const;
 
-  void jacobian(const Frame& f1, const Frame& f2, Mat<3, 6>& J1, Mat<3, 6>& J2) const {
-    J1 << -Matrix3d::Identity(), f1.A * skew(s1);
-    J2 << Matrix3d::Identity(), -f2.A * skew(s2);
-  }
+  void jacobian(const Frame& f1, const Frame& f2, Mat<3, 6>& J1, Mat<3, 6>& J2) const;
 
   void pull_back(const Frame& f1, const Frame& f2, const Multipliers<3>& z, FrameBar& bar1, FrameBar& bar2,
-                 GeometryBar& s) const {
-    const VectorJet d_bar(z.mu0, z.mu1, z.mu2, z.lambda);
-    add_point_bar(f2, s2, d_bar, 1, bar2, s.s2);
-    add_point_bar(f1, s1, d_bar, -1, bar1, s.s1);
-  }
+                 GeometryBar& s) const;
 
   void tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
-               const GeometryTangent& s, const Vec<3>& lambda, PrimitiveTangent<3>& out) const {
-    const VectorTangent d = separation_tangent(f1, f2, t1, t2, s1, s2, s);
-    out.phi = d.x, out.phi_dot = d.xd, out.phi_ddot = d.xdd;
-    out.load1.setZero(), out.load2.setZero();
-    const Lanes<3> none = Lanes<3>::Zero();
-    out.load1.bottomRows<3>() = -moment_tangent(f1, t1, s1, s.s1, lambda, none);
-    out.load2.bottomRows<3>() = moment_tangent(f2, t2, s2, s.s2, lambda, none);
-  }
+               const GeometryTangent& s, const Vec<3>& lambda, PrimitiveTangent<3>& out) const;
 };
 static_assert(IsPrimitive<Coincidence>);
 

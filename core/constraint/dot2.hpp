@@ -6,7 +6,7 @@
 // joint's displacement. Haug (1989), section 9.4 (dot-2).
 #pragma once
 
-#include "core/constraint/dot1.hpp"
+#include "core/constraint/primitive.hpp"
 
 namespace mbsopt {
 
@@ -15,44 +15,17 @@ struct Dot2 {
   Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero();  // the points from each centre of mass, body axes [m]
   Vector3d s3 = Vector3d::Zero();                         // the direction, axes of body 1 [-]
 
-  void phi(const Frame& f1, const Frame& f2, Vec<1>& out) const {
-    out(0) = (f1.A * s3).dot(f2.point(s2) - f1.point(s1));
-  }
-  void phi_dot(const Frame& f1, const Frame& f2, Vec<1>& out) const {
-    out(0) = (f1.Adot * s3).dot(f2.point(s2) - f1.point(s1)) + (f1.A * s3).dot(f2.point_dot(s2) - f1.point_dot(s1));
-  }
-  void phi_ddot(const Frame& f1, const Frame& f2, Vec<1>& out) const {
-    const VectorJet x(f1, s3), d = separation(f1, f2, s1, s2);
-    out(0) = x.xdd.dot(d.x) + 2 * x.xd.dot(d.xd) + x.x.dot(d.xdd);
-  }
+  void phi(const Frame& f1, const Frame& f2, Vec<1>& out) const;
+  void phi_dot(const Frame& f1, const Frame& f2, Vec<1>& out) const;
+  void phi_ddot(const Frame& f1, const Frame& f2, Vec<1>& out) const;
 
-  void jacobian(const Frame& f1, const Frame& f2, Mat<1, 6>& J1, Mat<1, 6>& J2) const {
-    const Vector3d x = f1.A * s3, d = f2.point(s2) - f1.point(s1);
-    J1.leftCols<3>() = -x.transpose();
-    J1.rightCols<3>() = (s3.cross(f1.A.transpose() * d) - s1.cross(f1.A.transpose() * x)).transpose();
-    J2.leftCols<3>() = x.transpose();
-    J2.rightCols<3>() = s2.cross(f2.A.transpose() * x).transpose();
-  }
+  void jacobian(const Frame& f1, const Frame& f2, Mat<1, 6>& J1, Mat<1, 6>& J2) const;
 
   void pull_back(const Frame& f1, const Frame& f2, const Multipliers<1>& z, FrameBar& bar1, FrameBar& bar2,
-                 GeometryBar& s) const {
-    const VectorJet x(f1, s3), d = separation(f1, f2, s1, s2), d_bar = Dot1::product_bar(x, z);
-    add_vector_bar(f1, s3, Dot1::product_bar(d, z), 1, bar1, s.s3);
-    add_point_bar(f2, s2, d_bar, 1, bar2, s.s2);
-    add_point_bar(f1, s1, d_bar, -1, bar1, s.s1);
-  }
+                 GeometryBar& s) const;
 
   void tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
-               const GeometryTangent& s, const Vec<1>& lambda, PrimitiveTangent<1>& out) const {
-    const VectorJet x(f1, s3), d = separation(f1, f2, s1, s2);
-    const VectorTangent dx(f1, t1, s3, s.s3), dd = separation_tangent(f1, f2, t1, t2, s1, s2, s);
-    Dot1::product_tangent(x, d, dx, dd, out);
-    out.load1.topRows<3>() = -lambda(0) * dx.x;
-    out.load2.topRows<3>() = lambda(0) * dx.x;
-    out.load1.bottomRows<3>() =
-        lambda(0) * (moment_tangent(f1, t1, s3, s.s3, d.x, dd.x) - moment_tangent(f1, t1, s1, s.s1, x.x, dx.x));
-    out.load2.bottomRows<3>() = lambda(0) * moment_tangent(f2, t2, s2, s.s2, x.x, dx.x);
-  }
+               const GeometryTangent& s, const Vec<1>& lambda, PrimitiveTangent<1>& out) const;
 };
 static_assert(IsPrimitive<Dot2>);
 

@@ -4,6 +4,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/constraint/unit_norm.hpp"
 #include "core/dynamics/assembly_equations.hpp"
 #include "core/dynamics/assembly_report.hpp"

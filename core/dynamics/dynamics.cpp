@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/body/euler_parameters.hpp"
+#include "core/body/lanes.hpp"
+
 namespace mbsopt {
 
 Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settings)

@@ -40,6 +40,9 @@ class Dynamics {
   bool evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, Eigen::Ref<Eigen::VectorXd> ydot);
   const std::vector<Vec<6>>& z() const { return z_; }
   const Eigen::VectorXd& lambda() const { return lambda_; }
+  // Of the same evaluation: f, and gamma.
+  const std::vector<Vec<6>>& loads() const { return loads_; }
+  const Eigen::VectorXd& gamma() const { return gamma_; }
 
   // Prepares derivatives at a state whose solution (z, lambda) is known: frames with accelerations, and the factor of
   // S.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/dynamics/assembly_equations.hpp"
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/projection.hpp"
@@ -99,10 +100,18 @@ class Statics {
     MatrixXd J, N, phi_rho;
     Eigen::CompleteOrthogonalDecomposition<MatrixXd> J_scaled;
     VectorXd scale;
-    MatrixXd particular(const MatrixXd& b) const { return J_scaled.solve(scale.asDiagonal() * b); }  // J xi = b
+    MatrixXd particular(const MatrixXd& b) const {  // J xi = b
+      if (J.rows() == 0) return MatrixXd::Zero(N.rows(), b.cols());
+      return J_scaled.solve(scale.asDiagonal() * b);
+    }
   };
   Rows rows() {
     Rows r;
+    if (d_.m == 0) {
+      r.J.resize(0, 6 * n_), r.phi_rho.resize(0, d_.rho.size());
+      r.N.setIdentity(6 * n_, 6 * n_);
+      return r;
+    }
     equations_.start_branches(y_);
     const AssemblyEquations::Gradients g = equations_.gradients(y_);
     r.J = g.y.topLeftCorner(d_.m, 7 * n_) * to_q(y_.head(7 * n_), MatrixXd::Identity(6 * n_, 6 * n_));

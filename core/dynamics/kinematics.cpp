@@ -3,11 +3,13 @@
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <set>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/dynamics/assembly.hpp"
-#include "core/dynamics/motion_solver.hpp"
+#include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/projection.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -29,6 +31,104 @@ std::string number(double x) {
   std::snprintf(text, sizeof text, "%.6g", x);
   return text;
 }
+
+// J at a state, rows scaled to unit length: linear solves that no mass enters.
+class DrivenRows {
+ public:
+  explicit DrivenRows(const MechanismData& d) : d_(d), rows_(d), laws_(d), states_(static_cast<std::size_t>(d.n) + 1) {
+    frames_.resize(states_.size());
+    phi_.setZero(d.m);
+  }
+
+  void set(double t, const VectorXd& y) {
+    laws_.set_time(t);
+    for (int i = 1; i <= d_.n; ++i) {
+      const std::size_t k = static_cast<std::size_t>(i);
+      set_position(y.segment<7>(7 * (i - 1)), states_[k], frames_[k]);
+      set_velocity(y.segment<7>(7 * (d_.n + i - 1)), states_[k], frames_[k]);
+    }
+  }
+  void factor() {
+    rows_.evaluate(frames_);
+    J_ = MatrixXd::Zero(d_.m, 6 * d_.n);
+    for (const RowGroup& g : d_.groups) {
+      for (int r = 0; r < g.rows; ++r) {
+        if (g.body1 > 0) J_.block<1, 6>(g.row + r, 6 * (g.body1 - 1)) += rows_.J1.row(g.block + r);
+        if (g.body2 > 0) J_.block<1, 6>(g.row + r, 6 * (g.body2 - 1)) += rows_.J2.row(g.block + r);
+      }
+    }
+    scale_ = J_.rowwise().norm().cwiseMax(1e-300).cwiseInverse();
+    scaled_.setThreshold(kRankThreshold);
+    scaled_.compute(scale_.asDiagonal() * J_);
+  }
+  const VectorXd& phi(const VectorXd& angles) {
+    evaluate_phi(d_, frames_, laws_, angles, phi_);
+    return phi_;
+  }
+  const VectorXd& phi_dot() {
+    evaluate_phi_dot(d_, frames_, laws_, phi_);
+    return phi_;
+  }
+  Index rank() const { return scaled_.rank(); }
+  MatrixXd unit_rows() const { return scale_.asDiagonal() * J_; }
+  VectorXd solve(const VectorXd& b) const { return scaled_.solve(scale_.cwiseProduct(b)); }  // J x = b
+  VectorXd solve_transposed(const VectorXd& f) const {                                       // J'x = f
+    return scale_.cwiseProduct(scaled_.transpose().solve(f));
+  }
+  VectorXd transposed_times(const VectorXd& x) const { return J_.transpose() * x; }
+
+ private:
+  const MechanismData& d_;
+  ConstraintRows rows_;
+  RowLaws laws_;
+  std::vector<BodyState> states_;
+  std::vector<Frame> frames_;
+  VectorXd phi_, scale_;
+  MatrixXd J_;
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> scaled_;
+};
+
+// Accelerations from the equations of the drives alone, and the multipliers that belong to them: right whatever the
+// masses, where the equations of motion lose digits.
+class DrivenMotion final : public MotionSource {
+ public:
+  DrivenMotion(const Mechanism& mechanism, const FormulationSettings& formulation)
+      : d_(mechanism.data()), dynamics_(mechanism, formulation), rows_(d_), ydot_(mechanism.states()) {
+    motion_.z.assign(static_cast<std::size_t>(d_.n), Vec<6>::Zero());
+    bar_ = motion_;
+    bar_.lambda.setZero(d_.m);
+  }
+
+  const Motion& motion(const StatePoint& at) override {
+    if (at.t == t_ && at.y.size() == y_.size() && at.y == y_) return motion_;
+    t_ = at.t, y_ = at.y;
+    const bool solved = dynamics_.evaluate(at.t, at.y, at.angles, ydot_);
+    rows_.set(at.t, at.y);
+    rows_.factor();
+    const VectorXd z = rows_.solve(-dynamics_.gamma());
+    VectorXd left(6 * d_.n);  // f - M z - J'lambda
+    motion_.lambda = solved && dynamics_.lambda().allFinite() ? dynamics_.lambda() : VectorXd::Zero(d_.m);
+    for (int i = 1; i <= d_.n; ++i) {
+      const std::size_t k = static_cast<std::size_t>(i - 1);
+      motion_.z[k] = z.segment<6>(6 * (i - 1));
+      left.segment<6>(6 * (i - 1)) = dynamics_.loads()[k] - dynamics_.solver().mass_times(i, motion_.z[k]);
+    }
+    motion_.lambda += rows_.solve_transposed(left - rows_.transposed_times(motion_.lambda));
+    return motion_;
+  }
+  Motion& bar() override { return bar_; }
+  void fold_bar(const StatePoint&, Eigen::Ref<VectorXd>, Eigen::Ref<VectorXd>) override {
+    assert(false && "kinematics carries no derivatives");
+  }
+
+ private:
+  const MechanismData& d_;
+  Dynamics dynamics_;
+  DrivenRows rows_;
+  Motion motion_, bar_;
+  double t_ = 0;
+  VectorXd y_, ydot_;
+};
 
 class Kinematics {
  public:
@@ -74,6 +174,7 @@ class Kinematics {
       y_hat_.segment<7>(half + q) = y_.segment<7>(half + q) + h * a;
     }
     if (!projector_.project(t1, angles_, y_hat_, y_next_, solution_)) return false;
+    polish(t1);
     const double step = (y_hat_.head(half) - y_.head(half)).lpNorm<Eigen::Infinity>();
     const double correction = (y_next_.head(half) - y_hat_.head(half)).lpNorm<Eigen::Infinity>();
     if (correction > std::max(kSmallCorrection, kRelativeCorrection * step)) return false;
@@ -88,33 +189,51 @@ class Kinematics {
     return true;
   }
 
+  // Newton's last steps, and the velocities, without masses.
+  void polish(double t1) {
+    double before = INFINITY;
+    for (int k = 0; k < 10; ++k) {
+      rows_.set(t1, y_next_);
+      const VectorXd phi = rows_.phi(angles_);
+      const double now = phi.cwiseAbs().maxCoeff();
+      rows_.factor();
+      if (now < 1e-15 || !(now < 0.9 * before)) break;
+      before = now;
+      move(rows_.solve(-phi));
+    }
+    const VectorXd u = rows_.solve(-rows_.phi_dot());
+    const Index half = 7 * d_.n;
+    for (int i = 0; i < d_.n; ++i) {
+      y_next_.segment<3>(half + 7 * i) += u.segment<3>(6 * i);
+      y_next_.segment<4>(half + 7 * i + 3) +=
+          0.5 * G_transposed_times(Vector4d(y_next_.segment<4>(7 * i + 3)), u.segment<3>(6 * i + 3));
+    }
+  }
+  void move(const VectorXd& delta) {
+    const Index half = 7 * d_.n;
+    for (int i = 0; i < d_.n; ++i) {
+      y_next_.segment<3>(7 * i) += delta.segment<3>(6 * i);
+      Vector4d p = y_next_.segment<4>(7 * i + 3);
+      p += 0.5 * G_transposed_times(p, delta.segment<3>(6 * i + 3));
+      p.normalize();
+      Vector4d pdot = y_next_.segment<4>(half + 7 * i + 3);
+      pdot -= p * p.dot(pdot);
+      y_next_.segment<4>(7 * i + 3) = p;
+      y_next_.segment<4>(half + 7 * i + 3) = pdot;
+    }
+  }
+
   double position_violation() { return projector_.position_violation(t_, angles_, y_); }
   double velocity_violation() { return projector_.velocity_violation(t_, y_); }
 
   // Degrees of freedom that J leaves at the present position, and who owns the equations that depend on each other.
   SingularPosition rank_here() {
-    std::vector<BodyState> states(static_cast<std::size_t>(d_.n) + 1);
-    std::vector<Frame> frames(states.size());
-    for (int i = 1; i <= d_.n; ++i) {
-      set_position(y_.segment<7>(7 * (i - 1)), states[static_cast<std::size_t>(i)],
-                   frames[static_cast<std::size_t>(i)]);
-    }
-    rows_.evaluate(frames);
-    MatrixXd J = MatrixXd::Zero(d_.m, 6 * d_.n);
-    for (const RowGroup& g : d_.groups) {
-      for (int r = 0; r < g.rows; ++r) {
-        if (g.body1 > 0) J.block<1, 6>(g.row + r, 6 * (g.body1 - 1)) += rows_.J1.row(g.block + r);
-        if (g.body2 > 0) J.block<1, 6>(g.row + r, 6 * (g.body2 - 1)) += rows_.J2.row(g.block + r);
-      }
-    }
-    for (Index r = 0; r < J.rows(); ++r) J.row(r) /= std::max(J.row(r).norm(), 1e-300);
+    rows_.set(t_, y_);
+    rows_.factor();
     SingularPosition s;
     s.t = t_;
-    Eigen::ColPivHouseholderQR<MatrixXd> qr;
-    qr.setThreshold(kRankThreshold);
-    qr.compute(J.transpose());
-    s.rank_lost = static_cast<int>(6 * d_.n - qr.rank());
-    if (s.rank_lost > 0) name_owners(J, s);
+    s.rank_lost = static_cast<int>(6 * d_.n - rows_.rank());
+    if (s.rank_lost > 0) name_owners(rows_.unit_rows(), s);
     return s;
   }
 
@@ -135,9 +254,9 @@ class Kinematics {
   }
 
   const MechanismData& d_;
-  MotionSolver motion_;
+  DrivenMotion motion_;
   Projector projector_;
-  ConstraintRows rows_;
+  DrivenRows rows_;
   ProjectionSolution solution_;
   double t_ = 0;
   VectorXd y_, angles_, y_hat_, y_next_;

@@ -73,10 +73,11 @@ void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::st
     bodies[static_cast<int>(row / 6) + 1] = row % 6 >= 3;
   }
   for (const auto& [body, turns] : bodies) {
-    warnings.push_back(fmt::format(
-        "body '{}' has no {} in a direction in which no joint holds it: forces there give no finite acceleration; give it "
-        "some, or hold it by a joint",
-        d.body_names[at(body)], turns ? "inertia" : "mass"));
+    warnings.push_back(
+        fmt::format("body '{}' has no {} in a direction in which no joint holds it: forces there give no finite "
+                    "acceleration; give it "
+                    "some, or hold it by a joint",
+                    d.body_names[at(body)], turns ? "inertia" : "mass"));
   }
 }
 
@@ -84,10 +85,10 @@ void add_springs(const MechanismData& d, const VectorXd& y, std::vector<std::str
   for (const TsdaForce& f : d.tsda) {
     const double l = f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l;
     if (l > kZeroLength) continue;
-    warnings.push_back(
-        fmt::format("a tsda between '{}' and '{}' has zero length at the start, where it has no direction; its force acts "
-                    "once its points have moved apart",
-                    d.body_names[at(f.body1)], d.body_names[at(f.body2)]));
+    warnings.push_back(fmt::format(
+        "a tsda between '{}' and '{}' has zero length at the start, where it has no direction; its force acts "
+        "once its points have moved apart",
+        d.body_names[at(f.body1)], d.body_names[at(f.body2)]));
   }
 }
 
@@ -121,10 +122,10 @@ void add_violations(const MechanismData& d, std::vector<std::string>& warnings) 
   }
   for (const auto& [joint, amount] : worst_axis) {
     if (amount <= kMuchViolated) continue;
-    warnings.push_back(
-        fmt::format("the guess (orientation of the bodies) leaves the axes of joint '{}' {:.3g} rad out of line; check in "
-                    "the report that the assembled position is the one that is meant",
-                    d.joint_names[at(joint)], std::asin(std::min(1.0, amount))));
+    warnings.push_back(fmt::format(
+        "the guess (orientation of the bodies) leaves the axes of joint '{}' {:.3g} rad out of line; check in "
+        "the report that the assembled position is the one that is meant",
+        d.joint_names[at(joint)], std::asin(std::min(1.0, amount))));
   }
 }
 

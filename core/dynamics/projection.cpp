@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/constraint/unit_norm.hpp"
 
 namespace mbsopt {

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/body/euler_parameters.hpp"
+#include "core/body/lanes.hpp"
 #include "core/dynamics/projection.hpp"
 
 namespace mbsopt {

@@ -2,6 +2,8 @@
 //   virtual work e'Q with e = T(p) eta = (eta_r, 1/2 G(p)' eta_theta)
 #include "core/dynamics/dynamics.hpp"
 
+#include "core/body/euler_parameters.hpp"
+
 namespace mbsopt {
 
 void Dynamics::add_user_loads() {

@@ -27,34 +27,17 @@ struct Law {
     double f, f_x, f_xdot;
   };
 
-  double value(double t, const Eigen::VectorXd& rho, double x, double xdot, Scratch& s) const {
-    if (!program) return k * (x - x0) + c * xdot + f0;
-    set_inputs(t, rho, x, xdot, s);
-    return program->value(s.inputs, s.program);
-  }
+  double value(double t, const Eigen::VectorXd& rho, double x, double xdot, Scratch& s) const;
 
   // With derivatives; those in the parameters of a program stay in s.gradient.
-  Value derivatives(double t, const Eigen::VectorXd& rho, double x, double xdot, Scratch& s) const {
-    if (!program) return {k * (x - x0) + c * xdot + f0, k, c};
-    set_inputs(t, rho, x, xdot, s);
-    std::fill(s.gradient.begin(), s.gradient.end(), 0.0);
-    const double f = program->add_gradient(s.inputs, 1.0, s.gradient, s.program);
-    const std::size_t P = static_cast<std::size_t>(rho.size());
-    return {f, s.gradient[P], s.gradient[P + 1]};
-  }
+  Value derivatives(double t, const Eigen::VectorXd& rho, double x, double xdot, Scratch& s) const;
 
   // df/d(k, c, x0, f0) of the linear law.
-  Vec<4> field_gradient(double x, double xdot) const { return {x - x0, xdot, -k, 1}; }
+  Vec<4> field_gradient(double x, double xdot) const;
 
   // theta_bar, rho_bar += f_bar df/d(fields, parameters), after derivatives() at the same point.
   void add_field_gradient(double x, double xdot, double f_bar, const Scratch& s, Eigen::VectorXd& theta_bar,
-                          Eigen::VectorXd& rho_bar) const {
-    if (program) {
-      for (Eigen::Index i = 0; i < rho_bar.size(); ++i) rho_bar(i) += f_bar * s.gradient[static_cast<std::size_t>(i)];
-    } else if (slot >= 0) {
-      theta_bar.segment<4>(slot) += f_bar * field_gradient(x, xdot);
-    }
-  }
+                          Eigen::VectorXd& rho_bar) const;
 
   // Derivative of f through the law's own fields (directions of k, c, x0, f0; null: constant) and, for a program,
   // through the parameters, whose directions are the rows of rho_dir(parameter).
@@ -74,11 +57,7 @@ struct Law {
   }
 
  private:
-  void set_inputs(double t, const Eigen::VectorXd& rho, double x, double xdot, Scratch& s) const {
-    std::copy(rho.data(), rho.data() + rho.size(), s.inputs.begin());
-    const std::size_t P = static_cast<std::size_t>(rho.size());
-    s.inputs[P] = x, s.inputs[P + 1] = xdot, s.inputs[P + 2] = t;
-  }
+  void set_inputs(double t, const Eigen::VectorXd& rho, double x, double xdot, Scratch& s) const;
 };
 
 }  // namespace mbsopt

@@ -1,5 +1,7 @@
 #include "core/integrate/explicit_tlm.hpp"
 
+#include "core/body/euler_parameters.hpp"
+
 namespace mbsopt {
 
 void set_z(const Eigen::VectorXd& y, const Eigen::Ref<const Eigen::VectorXd>& a, std::vector<Vec<6>>& z) {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/reaction_sensor.hpp"
 #include "core/mechanism/state_point.hpp"

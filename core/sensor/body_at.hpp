@@ -11,19 +11,8 @@ struct BodyAt {
 };
 
 // body: 0 is the ground; y = (q, v) of n bodies.
-inline BodyAt body_at(const Eigen::VectorXd& y, int body) {
-  BodyAt b;
-  if (body == 0) return b;
-  set_position(y.segment<7>(7 * (body - 1)), b.state, b.frame);
-  set_velocity(y.segment<7>(y.size() / 2 + 7 * (body - 1)), b.state, b.frame);
-  return b;
-}
+BodyAt body_at(const Eigen::VectorXd& y, int body);
 
-inline void add_pull_back(const BodyAt& b, int body, const FrameBar& bar, double scale,
-                          Eigen::Ref<Eigen::VectorXd> y_bar) {
-  if (body == 0) return;
-  add_pull_back_velocity(b.state, bar, scale, y_bar.segment<7>(7 * (body - 1)),
-                         y_bar.segment<7>(y_bar.size() / 2 + 7 * (body - 1)));
-}
+void add_pull_back(const BodyAt& b, int body, const FrameBar& bar, double scale, Eigen::Ref<Eigen::VectorXd> y_bar);
 
 }  // namespace mbsopt

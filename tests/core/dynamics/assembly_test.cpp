@@ -5,6 +5,7 @@
 #include <numbers>
 #include <random>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "tests/core/mechanism/small_scenes.hpp"
 

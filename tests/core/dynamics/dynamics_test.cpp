@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <catch2/catch.hpp>
 
+#include "core/body/euler_parameters.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;

@@ -119,17 +119,17 @@ TEST_CASE("derivatives of accelerations, reactions and efforts equal differences
   drive.name = "motor", drive.type = "angle", drive.joint = "D", drive.law = f("kt*sin(t) + 0.1*t^2*mu");
   scene.joints[3].normal1 = vec("1", "0.2", "0.1"), scene.joints[3].normal2 = vec("0.4", "1", "u");
   scene.drives.push_back(drive);
-  scene.sensors.push_back(point_sensor("a1", "acceleration", "coupler", vec("c2", "0.1", "off"), "y"));
-  scene.sensors.push_back(point_sensor("a2", "acceleration", "rocker", vec("L3", "0", "0.1"), "norm"));
+  scene.sensors.push_back(point_sensor("acc_a1", "acceleration", "coupler", vec("c2", "0.1", "off"), "y"));
+  scene.sensors.push_back(point_sensor("acc_a2", "acceleration", "rocker", vec("L3", "0", "0.1"), "norm"));
   scene.sensors.back().relative_to = PointOnBody{"crank", vec("L1", "0", "0")};
-  scene.sensors.push_back(point_sensor("a3", "acceleration", "coupler", vec("c2", "0", "0"), "z"));
+  scene.sensors.push_back(point_sensor("acc_a3", "acceleration", "coupler", vec("c2", "0", "0"), "z"));
   scene.sensors.back().in_body_frame = true;
-  scene.sensors.push_back(reaction("r1", "A", "force", "x"));
-  scene.sensors.push_back(reaction("r2", "B", "force", "norm"));
-  scene.sensors.push_back(reaction("r3", "D", "torque", "y"));
-  scene.sensors.push_back(reaction("r4", "A", "torque", "norm"));
+  scene.sensors.push_back(reaction("reaction_r1", "A", "force", "x"));
+  scene.sensors.push_back(reaction("reaction_r2", "B", "force", "norm"));
+  scene.sensors.push_back(reaction("reaction_r3", "D", "torque", "y"));
+  scene.sensors.push_back(reaction("reaction_r4", "A", "torque", "norm"));
   Sensor effort;
-  effort.name = "e1", effort.quantity = "drive_force", effort.drive = "motor";
+  effort.name = "effort", effort.quantity = "drive_force", effort.drive = "motor";
   scene.sensors.push_back(effort);
 
   const VectorXd rho = nominal(scene);

@@ -3,6 +3,7 @@
 // of its own in the list of types below.
 #include <catch2/catch.hpp>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/force/applied.hpp"
 #include "core/force/bushing.hpp"
 #include "core/force/friction.hpp"

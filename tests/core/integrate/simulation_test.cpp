@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/integrate/tableaus.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/mechanism/state_point.hpp"
 #include "tests/core/mechanism/small_scenes.hpp"

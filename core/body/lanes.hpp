@@ -1,0 +1,31 @@
+// Vector algebra of tangent directions, kLanes at a time. For the files that evaluate tangents: inline, so kept out of
+// the headers that declare them.
+#pragma once
+
+#include "core/body/fixed_size.hpp"
+
+namespace mbsopt {
+
+// Lanes of a matrix-vector product M' s, M' given entry by entry.
+inline Lanes<3> times(const Lanes<9>& M, const Vector3d& s) {
+  Lanes<3> x;
+  for (int i = 0; i < 3; ++i) x.row(i) = M.row(3 * i) * s(0) + M.row(3 * i + 1) * s(1) + M.row(3 * i + 2) * s(2);
+  return x;
+}
+inline Lanes<3> transposed_times(const Lanes<9>& M, const Vector3d& z) {
+  Lanes<3> x;
+  for (int j = 0; j < 3; ++j) x.row(j) = M.row(j) * z(0) + M.row(3 + j) * z(1) + M.row(6 + j) * z(2);
+  return x;
+}
+inline Lanes<1> dot(const Vector3d& a, const Lanes<3>& b) {
+  return a(0) * b.row(0) + a(1) * b.row(1) + a(2) * b.row(2);
+}
+inline Lanes<3> cross(const Vector3d& a, const Lanes<3>& b) {
+  Lanes<3> x;
+  x.row(0) = a(1) * b.row(2) - a(2) * b.row(1);
+  x.row(1) = a(2) * b.row(0) - a(0) * b.row(2);
+  x.row(2) = a(0) * b.row(1) - a(1) * b.row(0);
+  return x;
+}
+
+}  // namespace mbsopt

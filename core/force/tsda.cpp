@@ -1,0 +1,92 @@
+#include "core/force/tsda.hpp"
+
+#include "core/body/lanes.hpp"
+
+namespace mbsopt {
+
+TsdaForce::Span TsdaForce::span(const Frame& f1, const Frame& f2) const {
+  Span x;
+  x.d = f2.point(s2) - f1.point(s1);
+  x.ddot = f2.point_dot(s2) - f1.point_dot(s1);
+  x.l = x.d.norm();
+  x.u = x.l > 0 ? Vector3d(x.d / x.l) : Vector3d(Vector3d::Zero());
+  x.ldot = x.u.dot(x.ddot);
+  return x;
+}
+
+void TsdaForce::add_load(double t, const Eigen::VectorXd& rho, const Frame& f1, const Frame& f2, Law::Scratch& scratch,
+                         Vec<6>& load1, Vec<6>& load2) const {
+  const Span x = span(f1, f2);
+  const Vector3d F = law.value(t, rho, x.l, x.ldot, scratch) * x.u;
+  load1.head<3>() += F;
+  load1.tail<3>() += s1.cross(f1.A.transpose() * F);
+  load2.head<3>() -= F;
+  load2.tail<3>() -= s2.cross(f2.A.transpose() * F);
+}
+
+void TsdaForce::pull_back(double t, const Eigen::VectorXd& rho, const Frame& f1, const Frame& f2, Law::Scratch& scratch,
+                          FrameBar& bar1, FrameBar& bar2, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const {
+  const Span x = span(f1, f2);
+  if (x.l == 0) {  // work = -k d'd_eta
+    if (!is_k_times_d()) return;
+    const Vector3d d_eta = f2.point_eta(s2) - f1.point_eta(s1), zero = Vector3d::Zero();
+    add_point(f2, s2, 1, slot2, -law.k * d_eta, zero, zero, bar2, theta_bar);
+    add_point(f1, s1, -1, slot1, -law.k * d_eta, zero, zero, bar1, theta_bar);
+    return;
+  }
+  const Law::Value f = law.derivatives(t, rho, x.l, x.ldot, scratch);
+  const Vector3d d_eta = f2.point_eta(s2) - f1.point_eta(s1);
+  const double l_eta = x.u.dot(d_eta);
+  // work = -f l_eta;   l_d = u,  (ldot)_d = (ddot - ldot u)/l,  (ldot)_ddot = u,  (l_eta)_d = (d_eta - l_eta u)/l
+  const Vector3d d_bar =
+      -l_eta * (f.f_x * x.u + f.f_xdot * (x.ddot - x.ldot * x.u) / x.l) - f.f * (d_eta - l_eta * x.u) / x.l;
+  const Vector3d ddot_bar = -l_eta * f.f_xdot * x.u;
+  const Vector3d eta_bar = -f.f * x.u;
+  law.add_field_gradient(x.l, x.ldot, -l_eta, scratch, theta_bar, rho_bar);
+  add_point(f2, s2, 1, slot2, d_bar, ddot_bar, eta_bar, bar2, theta_bar);
+  add_point(f1, s1, -1, slot1, d_bar, ddot_bar, eta_bar, bar1, theta_bar);
+}
+
+void TsdaForce::tangent(const Span& x, const Law::Value& f, Lanes<1> df, const Frame& f1, const Frame& f2,
+                        const FrameTangent& t1, const FrameTangent& t2, const Lanes<3>* ds1, const Lanes<3>* ds2,
+                        Lanes<6>& load1, Lanes<6>& load2) const {
+  if (x.l == 0 && !is_k_times_d()) return;
+  Lanes<3> dd = t2.r + times(t2.A, s2) - t1.r - times(t1.A, s1);
+  Lanes<3> dddot = t2.rdot + times(t2.Adot, s2) - t1.rdot - times(t1.Adot, s1);
+  if (ds1) dd -= f1.A * *ds1, dddot -= f1.Adot * *ds1;
+  if (ds2) dd += f2.A * *ds2, dddot += f2.Adot * *ds2;
+  if (x.l == 0) {
+    const Lanes<3> dF = law.k * dd;
+    load1.topRows<3>() += dF;
+    load2.topRows<3>() -= dF;
+    load1.bottomRows<3>() += cross(s1, f1.A.transpose() * dF);
+    load2.bottomRows<3>() -= cross(s2, f2.A.transpose() * dF);
+    return;
+  }
+  const Lanes<1> dl = dot(x.u, dd);
+  const Lanes<3> du = (dd - x.u * dl) / x.l;
+  const Lanes<1> dldot = dot(x.ddot, du) + dot(x.u, dddot);
+  df += f.f_x * dl + f.f_xdot * dldot;
+  const Vector3d F = f.f * x.u;
+  const Lanes<3> dF = x.u * df + f.f * du;
+  load1.topRows<3>() += dF;
+  load2.topRows<3>() -= dF;
+  load1.bottomRows<3>() += cross(s1, transposed_times(t1.A, F) + f1.A.transpose() * dF);
+  load2.bottomRows<3>() -= cross(s2, transposed_times(t2.A, F) + f2.A.transpose() * dF);
+  if (ds1) load1.bottomRows<3>() -= cross(f1.A.transpose() * F, *ds1);
+  if (ds2) load2.bottomRows<3>() += cross(f2.A.transpose() * F, *ds2);
+}
+
+void TsdaForce::add_point(const Frame& f, const Vector3d& s, double sign, int slot, const Vector3d& d,
+                          const Vector3d& dd, const Vector3d& eta, FrameBar& bar, Eigen::VectorXd& theta_bar) {
+  bar.r += sign * d;
+  bar.rdot += sign * dd;
+  bar.A += sign * d * s.transpose();
+  bar.Adot += sign * dd * s.transpose();
+  bar.A_eta += sign * eta * s.transpose();
+  if (slot >= 0) {
+    theta_bar.segment<3>(slot) += sign * (f.A.transpose() * d + f.Adot.transpose() * dd + f.A_eta.transpose() * eta);
+  }
+}
+
+}  // namespace mbsopt
