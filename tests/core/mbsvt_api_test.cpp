@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/dynamics/assembly.hpp"
 #include "core/dynamics/constraint_rows.hpp"
 #include "core/dynamics/kinematics.hpp"
