@@ -73,7 +73,8 @@ class DrivenRows {
   MatrixXd unit_rows() const { return scale_.asDiagonal() * J_; }
   VectorXd solve(const VectorXd& b) const { return scaled_.solve(scale_.cwiseProduct(b)); }  // J x = b
   VectorXd solve_transposed(const VectorXd& f) const {                                       // J'x = f
-    return scale_.cwiseProduct(scaled_.transpose().solve(f));
+    const VectorXd x = scaled_.transpose().solve(f);
+    return scale_.cwiseProduct(x);
   }
   VectorXd transposed_times(const VectorXd& x) const { return J_.transpose() * x; }
 
