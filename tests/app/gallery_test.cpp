@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <span>
 
 #include "app/exit_code.hpp"
 #include "app/json/read_problem.hpp"
@@ -43,15 +44,26 @@ Problem accurately(const std::string& name, double rtol) {
 
 }  // namespace
 
-TEST_CASE("the gallery shows every joint and every drive", "[gallery]") {
-  std::set<std::string> joints, drives;
+TEST_CASE("the gallery shows every joint, drive, force and sensor", "[gallery]") {
+  auto type_in = [](std::string_view kind, std::string_view type) { return std::string(kind) + std::string(type); };
+  std::set<std::string> shown;
   for (const std::string& name : gallery()) {
     const Scene scene = read_problem(file_of(name)).scene;
-    for (const Joint& j : scene.joints) joints.insert(j.type);
-    for (const Drive& d : scene.drives) drives.insert(d.type);
+    for (const Joint& j : scene.joints) shown.insert(type_in("joint ", j.type));
+    for (const Drive& d : scene.drives) shown.insert(type_in("drive ", d.type));
+    for (const Force& force : scene.forces) shown.insert(type_in("force ", type_of(force)));
+    for (const Sensor& s : scene.sensors) shown.insert(type_in("sensor ", s.quantity));
   }
-  for (const TypeRow& row : kJointTypes) CHECK(joints.contains(std::string(row.name)));
-  for (const TypeRow& row : kDriveTypes) CHECK(drives.contains(std::string(row.name)));
+  auto all_of = [&](std::string_view kind, std::span<const TypeRow> rows) {
+    for (const TypeRow& row : rows) {
+      INFO(kind << row.name);
+      CHECK(shown.contains(type_in(kind, row.name)));
+    }
+  };
+  all_of("joint ", kJointTypes);
+  all_of("drive ", kDriveTypes);
+  all_of("force ", kForceTypes);
+  all_of("sensor ", kSensorQuantities);
 }
 
 TEST_CASE("values and gradients of the gallery are those of independent solutions to 1e-8", "[gallery]") {
@@ -99,7 +111,7 @@ TEST_CASE("check holds on every problem file", "[gallery]") {
     INFO(name << "\n" << outcome.out << outcome.err);
     CHECK(outcome.exit_code == kDone);
   }
-  CHECK(files >= 24);
+  CHECK(files >= 30);
 }
 
 // ../shared/cases.md: two models, halved steps agree to 1e-12 (angles) and 1e-10 (rates). The published end point (IVP
