@@ -125,6 +125,11 @@ class Search {
       for (const std::string& body : bodies_of(*force)) all.push_back(body);
     for (const std::string& body : {sensor.body, sensor.body1, sensor.body2}) all.push_back(body);
     if (sensor.relative_to) all.push_back(sensor.relative_to->body);
+    for (const Drive& drive : scene_.drives) {
+      if (drive.name != sensor.drive) continue;
+      const std::vector<std::string> driven = bodies_of(drive);
+      all.insert(all.end(), driven.begin(), driven.end());
+    }
     return all;
   }
   static bool measures_everything(const Sensor& sensor) {

@@ -246,7 +246,11 @@ void check_meaning(Checker& checker, const Force& force) {
 void check_meaning(Checker& checker, const Sensor& sensor) {
   const TypeRow* const row = find_row(kSensorQuantities, sensor.quantity);
   if (!row) return;
-  if (need_of(*row, "joint") != Need::unknown)
+  if (sensor.quantity == "reaction") {
+    if (const Joint* const joint = checker.facts().joint(sensor.joint); joint && ties_joints(*joint))
+      checker.issue(checker.path("joint"), "joint '" + sensor.joint + "' is " + joint->type +
+                                               ", which has no bodies of its own; name one of the joints that it ties");
+  } else if (need_of(*row, "joint") != Need::unknown)
     check_joint_has(checker, "joint", sensor.joint, sensor.quantity == "displacement" ? "displacement" : "angle");
   if (need_of(*row, "body2") != Need::unknown && sensor.body1 == sensor.body2 && !sensor.body2.empty())
     checker.issue(checker.path("body2"), "is '" + sensor.body2 + "' like body1; their distance never changes");

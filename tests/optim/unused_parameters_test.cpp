@@ -215,3 +215,15 @@ TEST_CASE("channels of an identification look at their sensors", "[unused]") {
   problem.identification->variables = {"ma"};
   CHECK(unused(problem) == Paths{"parameters.mb"});
 }
+
+TEST_CASE("the effort of a drive looks at what the drive moves", "[unused]") {
+  Problem problem = two_pendulums();
+  Drive drive;
+  drive.name = "motor", drive.type = "angle", drive.joint = "A", drive.law = Expression::parse("t");
+  problem.scene.drives.push_back(drive);
+  Sensor effort;
+  effort.name = "torque", effort.quantity = "drive_force", effort.drive = "motor";
+  problem.scene.sensors.push_back(effort);
+  add_objective(problem, "torque^2");
+  CHECK(unused(problem) == Paths{"parameters.mb"});
+}

@@ -4,6 +4,8 @@
 #include <catch2/catch.hpp>
 #include <limits>
 
+#include "core/scene/type_table.hpp"
+
 using namespace mbsopt;
 
 namespace {
@@ -174,6 +176,17 @@ TEST_CASE("a law beside coefficients is a warning", "[scene]") {
   CHECK(issues[0].is_warning);
   CHECK(issues[0].path == "forces[0].law");
   CHECK_THAT(issues[0].message, Catch::Contains("stiffness"));
+}
+
+TEST_CASE("a reaction is that of any joint with bodies, whether it has an angle or not", "[scene]") {
+  Scene scene = pendulum();
+  scene.sensors[0].quantity = "reaction", scene.sensors[0].kind = "force", scene.sensors[0].component = "x";
+  for (const TypeRow& row : kJointTypes) {
+    scene.joints[0].type = row.name;
+    const std::string found = at(scene, "sensors.theta.joint");
+    INFO(row.name << ": " << found);
+    CHECK(found.empty() != ties_joints(scene.joints[0]));
+  }
 }
 
 TEST_CASE("circular and endless definitions are reported once, at the definition", "[scene]") {
