@@ -103,6 +103,9 @@ TEST_CASE("check holds on every problem file", "[gallery]") {
   const TemporaryFolder folder;
   int files = 0;
   for (const std::string& name : gallery()) {
+#ifdef __SANITIZE_ADDRESS__
+    if (files % 5 != 0 && ++files) continue;  // twenty times slower: every fifth file is enough for the sanitizers
+#endif
     std::vector<std::string> arguments{"check", file_of(name).string(), "--out",
                                        folder.file("out" + std::to_string(files++)), "--quiet"};
     if (const auto found = end_times.find(name); found != end_times.end())
