@@ -251,6 +251,7 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
     angles_ = step_.angles1;
     result.last_good_time = step_.t;
     ++frozen_index;
+    if (options.after_step) options.after_step({step_.t, step_.y0, step_.angles0});
     if (options.progress && !options.progress(step_.t)) {
       stop(SimulationStatus::stopped, fmt::format("stopped at t = {:.6g} s", step_.t));
     }

@@ -72,6 +72,8 @@ struct TangentSampling {
 struct RunOptions {
   const StepSequence* frozen = nullptr;    // take exactly these steps
   std::function<bool(double t)> progress;  // called after accepted steps; false stops the run (status: stopped)
+  // The state after each accepted step, the start not counted; for states at times of one's own choice: Sampling.
+  std::function<void(const StatePoint& at)> after_step = {};
 };
 
 SimulationResult simulate(const Mechanism& mechanism, const SimulationSettings& settings,

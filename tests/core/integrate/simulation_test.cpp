@@ -128,3 +128,20 @@ TEST_CASE("a body that nothing gives inertia is named", "[simulation]") {
   CHECK(run.status == SimulationStatus::not_finite);
   CHECK(run.message.find("'ghost'") != std::string::npos);
 }
+
+TEST_CASE("after each accepted step the state is shown, the last one that of the end", "[integrate]") {
+  const Scene scene = point_pendulum();
+  SimulationSettings settings = scene.simulation;
+  settings.end_time = 0.5;
+  const Mechanism mechanism(scene, Eigen::VectorXd());
+  std::vector<double> times;
+  Eigen::VectorXd last;
+  RunOptions options;
+  options.after_step = [&](const StatePoint& at) { times.push_back(at.t), last = at.y; };
+  const SimulationResult run = simulate(mechanism, settings, {}, {}, options);
+  REQUIRE(run.ok());
+  CHECK(static_cast<long>(times.size()) == run.statistics.steps);
+  CHECK(std::is_sorted(times.begin(), times.end()));
+  CHECK(times.back() == 0.5);
+  CHECK(last == run.y_end);
+}
