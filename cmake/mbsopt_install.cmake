@@ -20,4 +20,5 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/mbsopt-config.cmake.in
   ${PROJECT_BINARY_DIR}/mbsopt-config.cmake INSTALL_DESTINATION ${package_dir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/mbsopt-config-version.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/mbsopt-config.cmake ${PROJECT_BINARY_DIR}/mbsopt-config-version.cmake
+              ${PROJECT_SOURCE_DIR}/cmake/FindKLU.cmake
         DESTINATION ${package_dir} COMPONENT development)

@@ -31,6 +31,8 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
     x->setZero(m, kLanes);
   }
   bars_.resize(n + 1);
+  pddot_bar_.resize(n + 1);
+  a_.setZero(7 * data_.n);
   Eigen::Index largest = 0;
   for (const UserForceData& f : data_.user_forces) {
     largest = std::max(largest, 7 * static_cast<Eigen::Index>(f.bodies.size()));
@@ -107,18 +109,23 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
 
 bool Dynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                          const std::vector<Vec<6>>& z, const Eigen::VectorXd& lambda) {
+  place(t, y, angles, z, lambda);
+  return solver_.factor(frames_);
+}
+
+void Dynamics::place(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, const std::vector<Vec<6>>& z,
+                     const Eigen::VectorXd& lambda) {
   set_state(t, y, angles);
   z_ = z;
   lambda_ = lambda;
   linearise_here();
-  return solver_.factor(frames_);
 }
 
 void Dynamics::linearise_here() {
   for (std::size_t i = 1; i < frames_.size(); ++i) set_acceleration(z_[i - 1], bodies_[i], frames_[i]);
 }
 
-void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir) {
+void Dynamics::right_hand_side_tangent(const ParameterBlock& block, const LaneRows& y_dir) {
   const int n = data_.n;
   for (int i = 1; i <= n; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
@@ -171,6 +178,11 @@ void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneR
     gamma_dir_ -= 2 * settings_.xi * settings_.omega * constraint_dirs_.phi_dot +
                   settings_.omega * settings_.omega * constraint_dirs_.phi;
   }
+}
+
+void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir) {
+  const int n = data_.n;
+  right_hand_side_tangent(block, y_dir);
   solver_.solve(rhs_lanes_, gamma_dir_, solver_settings(true), z_dir_, lambda_dir_);
 
   const Eigen::Index half = 7 * n;
@@ -190,9 +202,8 @@ void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneR
 
 void Dynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
                            Eigen::VectorXd& rho_bar, const Motion* motion) {
-  const int n = data_.n;
-  const Eigen::Index half = 7 * n;
-  for (int i = 1; i <= n; ++i) {
+  const Eigen::Index half = 7 * data_.n;
+  for (int i = 1; i <= data_.n; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
     loads_[k - 1] = to_virtual(bodies_[k], w.segment<7>(half + 7 * (i - 1)));
     if (motion) loads_[k - 1] += motion->z[k - 1];
@@ -200,7 +211,16 @@ void Dynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd>
   g_.setZero();
   if (motion) g_ = motion->lambda;
   solver_.solve(loads_, g_, solver_settings(true), eta_, mu_);
+  y_bar.tail(half) += w.head(half);
+  for (int i = 1; i <= data_.n; ++i) {
+    pddot_bar_[static_cast<std::size_t>(i)] = w.segment<4>(half + 7 * (i - 1) + 3);
+  }
+  pull_back(y_bar, theta_bar, rho_bar);
+}
 
+void Dynamics::pull_back(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) {
+  const int n = data_.n;
+  const Eigen::Index half = 7 * n;
   for (FrameBar& bar : bars_) bar.set_zero();
   for (std::size_t k = 1; k < frames_.size(); ++k) set_virtual(eta_[k - 1], frames_[k]);
   // - eta'J'lambda - mu'(Phiddot + 2 xi omega Phidot + omega^2 Phi)
@@ -214,14 +234,13 @@ void Dynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd>
   forces_.add_pull_back(here(), bars_, y_bar, theta_bar, rho_bar);
   if (!data_.user_forces.empty()) add_user_adjoint(y_bar, rho_bar);
 
-  y_bar.tail(half) += w.head(half);
   for (int i = 1; i <= n; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
     const BodyData& body = data_.bodies[k];
     const BodyState& state = bodies_[k];
     const Vector3d eta_r = eta_[k - 1].head<3>(), eta_w = eta_[k - 1].tail<3>();
     const Eigen::Index q = 7 * (i - 1), v = half + q;
-    add_pull_back(state, bars_[k], w.segment<4>(v + 3), eta_w, y_bar.segment<7>(q), y_bar.segment<7>(v));
+    add_pull_back(state, bars_[k], pddot_bar_[k], eta_w, y_bar.segment<7>(q), y_bar.segment<7>(v));
     // - eta_w'(omega x J omega):  d/domega = -(J omega x eta_w + J (eta_w x omega))
     const Vector3d omega = state.omega(), J_omega = body.J * omega;
     const Vector3d omega_bar = -(J_omega.cross(eta_w) + body.J * eta_w.cross(omega));

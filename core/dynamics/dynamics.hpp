@@ -50,6 +50,28 @@ class Dynamics {
                  const Eigen::VectorXd& lambda);
   // The same right after evaluate() at this state, whose factor is still there.
   void linearise_here();
+  // Without the factor: for the equations below.
+  void place(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, const std::vector<Vec<6>>& z,
+             const Eigen::VectorXd& lambda);
+
+  // The same equations as an implicit method solves them, together with its stages: 7 n + m rows r = 0 for the unknowns
+  // (a = qddot, lambda), body by body and then the constraints (equations.cpp):
+  //   f - M z - J'lambda,   p'(pddot(z) - a_p)      z = (rddot, omegadot) of a,  pddot(z) as above   [7 per body]
+  //   lambda/alpha [penalty] - (J z + gamma)                                                         [m]
+  Eigen::Index equations() const { return 7 * data_.n + data_.m; }
+  void place_at(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
+  void residual(Eigen::Ref<Eigen::VectorXd> r);  // at the place
+  // Their derivatives at the place in y and in the parameters, with (a, lambda) fixed:  r_y y' + r_rho, and its transpose.
+  void residual_tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& r_dir);
+  void add_residual_adjoint(const Eigen::VectorXd& r_bar, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
+                            Eigen::VectorXd& rho_bar);
+  // Pieces of -r_(a, lambda) = [M T, J'; J T, -1/alpha] at the place, T = dz/da: a body's own block with its row of p, a
+  // row of J times T, and 1/alpha (0: constrained).
+  Mat<7, 7> mass_block(int body) const;
+  Mat<1, 7> times_T(int body, const Mat<1, 6>& J_row) const;
+  const ConstraintRows& place_rows() const { return solver_.rows(); }
+  double compliance(Eigen::Index row) const;
 
   // y_dir: tangent of y (14n x lanes); ydot_dir: of (v, a).
   void tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir);
@@ -68,6 +90,10 @@ class Dynamics {
 
  private:
   void set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
+  // What the state's and the parameters' directions do to f - M z - J'lambda (rhs_lanes_) and -(J z + gamma) (gamma_dir_).
+  void right_hand_side_tangent(const ParameterBlock& block, const LaneRows& y_dir);
+  // y_bar, ... += gradient of  pddot_bar'pddot - eta'(M z + J'lambda - f) - mu'(J z + gamma)  with z and lambda fixed.
+  void pull_back(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
   void set_loads();  // f
   ForceTerms::At here() const { return {t_, y_, angles_, frames_}; }
   void add_user_loads();
@@ -89,12 +115,14 @@ class Dynamics {
   std::vector<Vec<6>> loads_, z_, eta_;  // loads_: f, without the ground
   std::vector<Vec<6>> body_loads_;       // with the ground, for forces to add to
   Eigen::VectorXd gamma_, phi_, phi_dot_, lambda_, mu_, g_;
+  Eigen::VectorXd a_;  // of a place: qddot as given
   // Derivatives.
   std::vector<FrameTangent> frame_tangents_;
   std::vector<Lanes<6>> load_dirs_, rhs_lanes_, z_dir_;
   ConstraintTangents constraint_dirs_;
   LaneRows gamma_dir_, lambda_dir_;
   std::vector<FrameBar> bars_;
+  std::vector<Vector4d> pddot_bar_;
   // User forces.
   Eigen::VectorXd user_q_, user_v_, user_Q_, user_e_;
   Eigen::MatrixXd user_K_, user_C_, user_Q_rho_;

@@ -27,6 +27,8 @@ class SaddleSolver {
 
   // S from J at the frames given; false where it is not positive definite.
   bool factor(const std::vector<Frame>& frames);
+  // J alone.
+  void place(const std::vector<Frame>& frames) { rows_.evaluate(frames); }
   const ConstraintRows& rows() const { return rows_; }
   const Eigen::VectorXd& alpha() const { return alpha_; }
 

@@ -46,11 +46,17 @@ AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings&
   Y_.setZero(states, rk_.dense_stages);
   K_.setZero(states, rk_.dense_stages);
   K_bar_.assign(costs.size(), Eigen::MatrixXd::Zero(states, rk_.dense_stages));
+  if (const int coupled = largest_implicit_group(rk_); coupled > 0) {
+    implicit_.emplace(d, rk_);
+    Y_bar_.assign(costs.size(), Eigen::MatrixXd::Zero(states, coupled));
+    x_bar_.setZero(coupled * dynamics_.equations(), objectives);
+  }
   z_.resize(static_cast<std::size_t>(d.n));
   for (Eigen::VectorXd* x : {&y_, &w_, &y_bar_}) x->setZero(states);
   theta_.setZero(d.slots());
   rho_.setZero(d.rho.size());
   multipliers_.setZero(d.m);
+  r_bar_.setZero(dynamics_.equations());
 }
 
 void AdjointSweep::begin(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
@@ -64,16 +70,10 @@ void AdjointSweep::begin(double t, const Eigen::VectorXd& y, const Eigen::Vector
 }
 
 void AdjointSweep::rebuild(const StoredStep& step) {
-  const Eigen::Index half = mechanism_.states() / 2;
-  for (int i = 0; i < static_cast<int>(step.a.cols()); ++i) {
-    y_ = step.y0;
-    for (int j = 0; j < i; ++j) {
-      const double a = rk_.a(i, j);
-      if (a != 0) y_ += (step.h * a) * K_.col(j);
-    }
-    Y_.col(i) = y_;
-    K_.col(i).head(half) = y_.tail(half);
-    K_.col(i).tail(half) = step.a.col(i);
+  const int stages = static_cast<int>(step.a.cols());
+  K_.bottomRows(mechanism_.states() / 2).leftCols(stages) = step.a;
+  for (const StageGroup& g : rk_.stage_groups()) {
+    if (g.first < stages) set_group_stages(rk_, g, step.h, step.y0, Y_, K_);
   }
 }
 
@@ -123,31 +123,110 @@ bool AdjointSweep::step_back(const StoredStep& step) {
   }
   lambda_ = lambda_hat_ + sample_bar_;  // from here on of y0
 
-  for (int i = stages - 1; i >= 0; --i) {
-    const bool in_step = i < rk_.stages && rk_.b[i] != 0;
-    bool needed = in_step || step.dense;
-    for (int j = i + 1; j < stages && !needed; ++j) needed = rk_.a(j, i) != 0;
-    if (!needed) continue;
-    const double t = step.t + rk_.c[i] * step.h;
+  const std::span<const StageGroup> groups = rk_.stage_groups();
+  for (auto g = groups.rbegin(); g != groups.rend(); ++g) {
+    if (g->first >= stages || !is_used(rk_, *g, step.dense)) continue;
+    if (!(is_implicit(rk_, *g) ? implicit_back(step, *g) : explicit_back(step, g->first))) return false;
+  }
+  return true;
+}
+
+bool AdjointSweep::explicit_back(const StoredStep& step, int i) {
+  const double t = step.t + rk_.c[i] * step.h;
+  const bool in_step = i < rk_.stages && rk_.b[i] != 0;
+  y_ = Y_.col(i);
+  set_z(y_, step.a.col(i), z_);
+  multipliers_ = step.lambda.col(i);
+  if (!dynamics_.linearise(t, y_, step.angles0, z_, multipliers_)) return false;
+  for (Eigen::Index o = 0; o < lambda_.cols(); ++o) {
+    Eigen::MatrixXd& K_bar = K_bar_[static_cast<std::size_t>(o)];
+    w_ = K_bar.col(i);
+    y_bar_.setZero();
+    theta_ = theta_bar_.col(o);
+    rho_ = rho_bar_.col(o);
+    dynamics_.add_adjoint(w_, y_bar_, theta_, rho_);
+    const PointCost* running = costs_[static_cast<std::size_t>(o)].running.get();
+    if (running && in_step) running->add_gradient({t, y_, step.angles0, motion()}, step.h * rk_.b[i], y_bar_, rho_);
+    theta_bar_.col(o) = theta_;
+    rho_bar_.col(o) = rho_;
+    lambda_.col(o) += y_bar_;
+    for (int j = 0; j < i; ++j) {
+      const double a = rk_.a(i, j);
+      if (a != 0) K_bar.col(j) += (step.h * a) * y_bar_;
+    }
+  }
+  return true;
+}
+
+// The transpose of TangentSweep::follow_implicit. With bars for cotangents, sums over the group's own stages:
+//   Vbar_i = kbar_q,i + Ybar_v,i + h sum_j A_ji Qbar_j,   abar_i = kbar_v,i + h sum_j A_ji Vbar_j,   N'rbar = (abar, 0)
+//   Q*bar_i = Qbar_i + r_q'rbar_i,   V*bar_i = Vbar_i + r_v'rbar_i + h sum_j A_ji (r_q'rbar_j)
+// Qbar, Ybar: of running costs, whose value is taken at the stage itself.
+bool AdjointSweep::implicit_back(const StoredStep& step, const StageGroup& g) {
+  const Eigen::Index n = mechanism_.states() / 2, rows = dynamics_.equations(), objectives = lambda_.cols();
+  auto time_of = [&](int i) { return step.t + rk_.c[i] * step.h; };
+  auto place = [&](int i) {
     y_ = Y_.col(i);
-    set_z(y_, step.a.col(i), z_);
-    multipliers_ = step.lambda.col(i);
-    if (!dynamics_.linearise(t, y_, step.angles0, z_, multipliers_)) return false;
+    dynamics_.place_at(time_of(i), y_, step.angles0, step.a.col(i), step.lambda.col(i));
+  };
+  for (int i = g.first; i <= g.last; ++i) {
+    place(i);
+    implicit_->linearise(dynamics_, i - g.first);
+  }
+  if (!implicit_->factor(step.h, g)) return false;
+
+  for (Eigen::Index o = 0; o < objectives; ++o) {
+    const Eigen::MatrixXd& K_bar = K_bar_[static_cast<std::size_t>(o)];
+    Eigen::MatrixXd& Y_bar = Y_bar_[static_cast<std::size_t>(o)];
+    const PointCost* running = costs_[static_cast<std::size_t>(o)].running.get();
+    x_bar_.col(o).setZero();
+    for (int i = g.first; i <= g.last; ++i) {
+      y_bar_.setZero();
+      if (running && i < rk_.stages && rk_.b[i] != 0) {
+        y_ = Y_.col(i);
+        rho_ = rho_bar_.col(o);
+        running->add_gradient({time_of(i), y_, step.angles0, motion()}, step.h * rk_.b[i], y_bar_, rho_);
+        rho_bar_.col(o) = rho_;
+      }
+      Y_bar.col(i - g.first) = y_bar_;
+    }
+    for (int i = g.first; i <= g.last; ++i) {
+      auto V_bar = Y_bar.col(i - g.first).tail(n);
+      V_bar += K_bar.col(i).head(n);
+      for (int j = g.first; j <= g.last; ++j) V_bar += (step.h * rk_.a(j, i)) * Y_bar.col(j - g.first).head(n);
+    }
+    for (int i = g.first; i <= g.last; ++i) {
+      auto a_bar = x_bar_.col(o).segment((i - g.first) * rows, n);
+      a_bar = K_bar.col(i).tail(n);
+      for (int j = g.first; j <= g.last; ++j) a_bar += (step.h * rk_.a(j, i)) * Y_bar.col(j - g.first).tail(n);
+    }
+  }
+  implicit_->solve_transposed(g, x_bar_);
+
+  for (int i = g.first; i <= g.last; ++i) {
+    if (g.size() > 1) place(i);
     for (Eigen::Index o = 0; o < objectives; ++o) {
-      Eigen::MatrixXd& K_bar = K_bar_[static_cast<std::size_t>(o)];
-      w_ = K_bar.col(i);
+      Eigen::MatrixXd& Y_bar = Y_bar_[static_cast<std::size_t>(o)];
+      r_bar_ = x_bar_.col(o).segment((i - g.first) * rows, rows);
       y_bar_.setZero();
       theta_ = theta_bar_.col(o);
       rho_ = rho_bar_.col(o);
-      dynamics_.add_adjoint(w_, y_bar_, theta_, rho_);
-      const PointCost* running = costs_[static_cast<std::size_t>(o)].running.get();
-      if (running && in_step) running->add_gradient({t, y_, step.angles0, motion()}, step.h * rk_.b[i], y_bar_, rho_);
+      dynamics_.add_residual_adjoint(r_bar_, y_bar_, theta_, rho_);
       theta_bar_.col(o) = theta_;
       rho_bar_.col(o) = rho_;
-      lambda_.col(o) += y_bar_;
-      for (int j = 0; j < i; ++j) {
+      Y_bar.col(i - g.first) += y_bar_;
+      for (int j = g.first; j <= g.last; ++j) {
+        Y_bar.col(j - g.first).tail(n) += (step.h * rk_.a(i, j)) * y_bar_.head(n);
+      }
+    }
+  }
+  for (Eigen::Index o = 0; o < objectives; ++o) {
+    const Eigen::MatrixXd& Y_bar = Y_bar_[static_cast<std::size_t>(o)];
+    for (int i = g.first; i <= g.last; ++i) {
+      lambda_.col(o) += Y_bar.col(i - g.first);
+      for (int j = 0; j < g.first; ++j) {
         const double a = rk_.a(i, j);
-        if (a != 0) K_bar.col(j) += (step.h * a) * y_bar_;
+        if (a != 0) K_bar_[static_cast<std::size_t>(o)].col(j) += (step.h * a) * Y_bar.col(i - g.first);
       }
     }
   }

@@ -11,6 +11,7 @@
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/motion_solver.hpp"
 #include "core/integrate/cost.hpp"
+#include "core/integrate/linearised_stages.hpp"
 #include "core/integrate/sample_schedule.hpp"
 #include "core/integrate/step.hpp"
 
@@ -43,10 +44,15 @@ class AdjointSweep {
   const Eigen::MatrixXd& lambda() const { return lambda_; }
   Eigen::MatrixXd mu() const;
 
-  long factorisations() { return dynamics_.solver().factorisations() + projector_.factorisations(); }
+  long factorisations() {
+    return dynamics_.solver().factorisations() + projector_.factorisations() +
+           (implicit_ ? implicit_->factorisations() : 0);
+  }
 
  private:
   void rebuild(const StoredStep& step);
+  bool explicit_back(const StoredStep& step, int i);
+  bool implicit_back(const StoredStep& step, const StageGroup& group);
 
   const Mechanism mechanism_;
   const Method& rk_;
@@ -55,12 +61,14 @@ class AdjointSweep {
   std::optional<MotionSolver> motion_;  // where some sensor needs it
   Dynamics dynamics_;
   Projector projector_;
+  std::optional<LinearisedStages> implicit_;
   Eigen::MatrixXd lambda_, theta_bar_, rho_bar_;  // a column per objective
   Eigen::MatrixXd Y_, K_;                         // stages of the step in hand
   std::vector<Eigen::MatrixXd> K_bar_;            // per objective
-  Eigen::MatrixXd lambda_hat_, sample_bar_;
+  std::vector<Eigen::MatrixXd> Y_bar_;            // the same, of coupled stages
+  Eigen::MatrixXd lambda_hat_, sample_bar_, x_bar_;
   std::vector<Vec<6>> z_;
-  Eigen::VectorXd y_, w_, y_bar_, theta_, rho_, multipliers_;
+  Eigen::VectorXd y_, w_, y_bar_, theta_, rho_, multipliers_, r_bar_;
 };
 
 }  // namespace mbsopt

@@ -17,6 +17,7 @@ ExplicitRun::ExplicitRun(const Mechanism& mechanism, const SimulationSettings& s
   const Eigen::Index states = mechanism.states();
   angles_.setZero(static_cast<Eigen::Index>(mechanism.data().angles.size()));
   for (Eigen::VectorXd* x : {&work_, &ydot_, &y_stage_}) x->setZero(states);
+  if (rk_.implicit()) implicit_.emplace(mechanism_, rk_, settings_.integrator, dynamics_);
 }
 
 Step ExplicitRun::make_step() const {
@@ -84,20 +85,49 @@ bool ExplicitRun::evaluate_stage(int i) {
   return true;
 }
 
+// All stages but those of dense output.
+bool ExplicitRun::solve_stages(bool exact) {
+  if (implicit_) implicit_->new_attempt();
+  for (const StageGroup& g : rk_.stage_groups_of_step()) {
+    if (is_implicit(rk_, g)) {
+      if (!implicit_->solve(step_, g, exact)) return false;
+    } else if (g.first > 0 || !first_stage_known_) {
+      if (!evaluate_stage(g.first)) return false;
+      first_stage_known_ = true;  // at this start, whatever h
+    }
+  }
+  return true;
+}
+
+double ExplicitRun::error_of_step() {
+  const IntegratorSettings& s = settings_.integrator;
+  auto norm = [&](const double* weights) {
+    work_.setZero();
+    for (int i = 0; i < rk_.stages; ++i) {
+      if (weights[i] != 0) work_ += (step_.h * weights[i]) * step_.K.col(i);
+    }
+    if (rk_.error_filter != 0 && !implicit_->filter(step_, work_)) return double(INFINITY);
+    return scaled_norm(work_, step_.y0, step_.y_hat, s.rtol, s.atol);
+  };
+  const double high = norm(rk_.error);
+  return rk_.error_low ? combined_error(high, norm(rk_.error_low)) : high;
+}
+
 ExplicitRun::Outcome ExplicitRun::attempt(double h, bool adaptive, double& error) {
   step_.h = h;
-  for (int i = first_stage_known_ ? 1 : 0; i < rk_.stages; ++i) {
-    if (!evaluate_stage(i)) return Outcome::failed;
-    first_stage_known_ = true;  // at this start, whatever h
+  bool solved = solve_stages(!adaptive);
+  if (!solved && implicit_ && implicit_->stale()) {
+    implicit_->renew();
+    solved = solve_stages(!adaptive);
   }
+  if (!solved) return Outcome::failed;
   step_.y_hat = step_.y0;
   for (int i = 0; i < rk_.stages; ++i) {
     if (rk_.b[i] != 0) step_.y_hat += (h * rk_.b[i]) * step_.K.col(i);
   }
   error = 0;
   if (!adaptive) return step_.y_hat.allFinite() ? Outcome::accepted : Outcome::failed;
-  const IntegratorSettings& s = settings_.integrator;
-  error = step_error(rk_, h, step_.K, step_.y0, step_.y_hat, s.rtol, s.atol, work_);
+  error = error_of_step();
   if (!std::isfinite(error)) return Outcome::failed;
   return error <= 1 ? Outcome::accepted : Outcome::rejected;
 }
@@ -171,6 +201,7 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
                                           bodies + ". Give it some, or hold it"));
     return;
   }
+  if (implicit_) implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
   PiController controller(rk_.order);
   double h = adaptive ? first_step(s, span) : s.step.value_or(span);
   if (s.max_step) h = std::min(h, *s.max_step);
@@ -238,8 +269,11 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
     result.steps.sizes.push_back(h);
     update_statistics(result);
     accepted(step_);
+    if (implicit_) implicit_->accept(step_);
     if (adaptive) {
-      const double proposed = h * controller.after_acceptance(error);
+      double proposed = h * controller.after_acceptance(error);
+      // The factor of an implicit method serves as long as the step stays.
+      if (implicit_ && proposed >= h && proposed < ImplicitStages::kKeepStep * h) proposed = h;
       h = s.max_step ? std::min(proposed, *s.max_step) : proposed;
     } else if (!options.frozen) {
       h = s.step.value_or(span);
@@ -258,6 +292,11 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
   }
   result.y_end = step_.y0;
   result.statistics.max_acceleration_residual = dynamics_.worst_residual();
+  if (implicit_) {
+    evaluations_ += implicit_->evaluations();
+    result.statistics.jacobians += implicit_->jacobians();
+    result.statistics.factorisations += implicit_->factorisations();
+  }
   result.statistics.rhs_evaluations += evaluations_;
   result.statistics.factorisations += dynamics_.solver().factorisations() + projector_.factorisations();
 }

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "core/dynamics/dynamics.hpp"
+#include "core/integrate/implicit_stages.hpp"
 #include "core/integrate/simulation.hpp"
 #include "core/integrate/step.hpp"
 #include "core/integrate/step_control.hpp"
@@ -32,6 +33,8 @@ class ExplicitRun {
   double propose_step(double t, double h, double end, bool adaptive) const;
   std::string bodies_without_inertia() const;
   bool evaluate_stage(int i);
+  bool solve_stages(bool exact);
+  double error_of_step();
   Outcome attempt(double h, bool adaptive, double& error);
   bool finish_step(bool dense);  // dense stages, projection, branches of the angles
   double fastest_tracked_rate(const Eigen::VectorXd& y) const;
@@ -41,6 +44,7 @@ class ExplicitRun {
   SimulationSettings settings_;
   const Method& rk_;
   Dynamics dynamics_;
+  std::optional<ImplicitStages> implicit_;
   Projector projector_;
   Step step_;
   Eigen::VectorXd angles_, work_, ydot_, y_stage_;

@@ -22,11 +22,15 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
   const MechanismData& d = mechanism.data();
   if (d.needs_motion) motion_.emplace(mechanism, settings.formulation);
   const Eigen::Index states = mechanism.states();
+  const int coupled = largest_implicit_group(rk_);
+  if (coupled > 0) implicit_.emplace(d, rk_);
   for (ParameterBlock& p : parameter_blocks(d)) {
     Block b;
     b.parameters = std::move(p);
     for (LaneRows* x : {&b.y0, &b.y_hat, &b.y1, &b.Y}) x->setZero(states, kLanes);
     b.K.assign(static_cast<std::size_t>(rk_.dense_stages), LaneRows::Zero(states, kLanes));
+    b.Y_stage.assign(static_cast<std::size_t>(coupled), LaneRows::Zero(states, kLanes));
+    b.x.setZero(coupled * dynamics_.equations(), kLanes);
     for (int k = 0; k < kLanes; ++k) {
       if (b.parameters.parameter[k] >= 0) b.y0.col(k) = y_initial_rho.col(b.parameters.parameter[k]);
     }
@@ -36,6 +40,7 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
   y_.setZero(states), y_bar_.setZero(states);
   rho_bar_.setZero(d.rho.size());
   lambda_.setZero(d.m);
+  r_.setZero(dynamics_.equations(), kLanes);
   y_rho_.setZero(states, d.rho.size());
 }
 
@@ -84,32 +89,102 @@ void TangentSweep::take_samples(const Step& step, std::span<const SampleEvent> e
   }
 }
 
+bool TangentSweep::follow_explicit(const Step& step, int i) {
+  y_ = step.Y.col(i);
+  set_z(y_, step.K.col(i).tail(mechanism_.states() / 2), z_);
+  lambda_ = step.lambda.col(i);
+  if (!dynamics_.linearise(step.t + rk_.c[i] * step.h, y_, step.angles0, z_, lambda_)) return false;
+  for (Block& b : blocks_) {
+    b.Y = b.y0;
+    for (int j = 0; j < i; ++j) {
+      const double a = rk_.a(i, j);
+      if (a != 0) b.Y += (step.h * a) * b.K[static_cast<std::size_t>(j)];
+    }
+    dynamics_.tangent(b.parameters, b.Y, b.K[static_cast<std::size_t>(i)]);
+  }
+  return true;
+}
+
+// Y_i' = Y*_i' + h sum_j A_ij k_j' over the group's own stages j; their accelerations and multipliers solve
+//   N x' = r_y (Q*_i' + h sum_j A_ij V*_j', V*_i') + r_rho
+bool TangentSweep::follow_implicit(const Step& step, const StageGroup& g) {
+  const Eigen::Index n = mechanism_.states() / 2, rows = dynamics_.equations();
+  for (Block& b : blocks_) {
+    for (int i = g.first; i <= g.last; ++i) {
+      LaneRows& Y = b.Y_stage[static_cast<std::size_t>(i - g.first)];
+      Y = b.y0;
+      for (int j = 0; j < g.first; ++j) {
+        const double a = rk_.a(i, j);
+        if (a != 0) Y += (step.h * a) * b.K[static_cast<std::size_t>(j)];
+      }
+    }
+    for (int i = g.first; i <= g.last; ++i) {
+      for (int j = g.first; j <= g.last; ++j) {
+        b.Y_stage[static_cast<std::size_t>(i - g.first)].topRows(n) +=
+            (step.h * rk_.a(i, j)) * b.Y_stage[static_cast<std::size_t>(j - g.first)].bottomRows(n);
+      }
+    }
+  }
+  for (int i = g.first; i <= g.last; ++i) {
+    y_ = step.Y.col(i);
+    dynamics_.place_at(step.t + rk_.c[i] * step.h, y_, step.angles0, step.K.col(i).tail(n), step.lambda.col(i));
+    implicit_->linearise(dynamics_, i - g.first);
+    for (Block& b : blocks_) {
+      dynamics_.residual_tangent(b.parameters, b.Y_stage[static_cast<std::size_t>(i - g.first)], r_);
+      b.x.middleRows((i - g.first) * rows, rows) = r_;
+    }
+  }
+  if (!implicit_->factor(step.h, g)) return false;
+  for (Block& b : blocks_) {
+    implicit_->solve(g, b.x);
+    for (int i = g.first; i <= g.last; ++i) {
+      LaneRows& K = b.K[static_cast<std::size_t>(i)];
+      K.bottomRows(n) = b.x.middleRows((i - g.first) * rows, n);
+      K.topRows(n) = b.Y_stage[static_cast<std::size_t>(i - g.first)].bottomRows(n);
+    }
+    for (int i = g.first; i <= g.last; ++i) {  // V_i'
+      LaneRows& Y = b.Y_stage[static_cast<std::size_t>(i - g.first)];
+      for (int j = g.first; j <= g.last; ++j) {
+        Y.bottomRows(n) += (step.h * rk_.a(i, j)) * b.K[static_cast<std::size_t>(j)].bottomRows(n);
+      }
+    }
+    // Q_i' has h sum A_ij V*_j' already; what the group's accelerations add to V_j' comes to it.
+    for (int i = g.first; i <= g.last; ++i) {
+      LaneRows& Y = b.Y_stage[static_cast<std::size_t>(i - g.first)];
+      for (int j = g.first; j <= g.last; ++j) {
+        const LaneRows& K = b.K[static_cast<std::size_t>(j)];
+        Y.topRows(n) += (step.h * rk_.a(i, j)) *
+                        (b.Y_stage[static_cast<std::size_t>(j - g.first)].bottomRows(n) - K.topRows(n));
+      }
+    }
+    for (int i = g.first; i <= g.last; ++i) {
+      b.K[static_cast<std::size_t>(i)].topRows(n) = b.Y_stage[static_cast<std::size_t>(i - g.first)].bottomRows(n);
+    }
+  }
+  return true;
+}
+
+void TangentSweep::add_running_costs(const Step& step, int i, std::span<const Cost> costs, Eigen::MatrixXd& psi_rho) {
+  y_ = step.Y.col(i);
+  for (std::size_t o = 0; o < costs.size(); ++o) {
+    if (!costs[o].running) continue;
+    add_cost(*costs[o].running, {step.t + rk_.c[i] * step.h, y_, step.angles0, motion()}, step.h * rk_.b[i], &Block::Y,
+             static_cast<Eigen::Index>(o), psi_rho);
+  }
+}
+
 bool TangentSweep::follow(const Step& step, std::span<const Cost> costs, std::span<const SampleEvent> events,
                           const TangentSampling& sampling, Eigen::MatrixXd& psi_rho) {
-  const Eigen::Index half = mechanism_.states() / 2;
-  for (int i = 0; i < step.stages(rk_); ++i) {
-    const bool in_step = i < rk_.stages && rk_.b[i] != 0;
-    bool needed = in_step || step.dense;
-    for (int j = i + 1; j < step.stages(rk_) && !needed; ++j) needed = rk_.a(j, i) != 0;
-    if (!needed) continue;
-    y_ = step.Y.col(i);
-    set_z(y_, step.K.col(i).tail(half), z_);
-    lambda_ = step.lambda.col(i);
-    const double t = step.t + rk_.c[i] * step.h;
-    if (!dynamics_.linearise(t, y_, step.angles0, z_, lambda_)) return false;
-    for (Block& b : blocks_) {
-      b.Y = b.y0;
-      for (int j = 0; j < i; ++j) {
-        const double a = rk_.a(i, j);
-        if (a != 0) b.Y += (step.h * a) * b.K[static_cast<std::size_t>(j)];
+  for (const StageGroup& g : step.dense ? rk_.stage_groups() : rk_.stage_groups_of_step()) {
+    if (!is_used(rk_, g, step.dense)) continue;
+    const bool implicit = is_implicit(rk_, g);
+    if (!(implicit ? follow_implicit(step, g) : follow_explicit(step, g.first))) return false;
+    for (int i = g.first; i <= g.last; ++i) {
+      if (i >= rk_.stages || rk_.b[i] == 0) continue;
+      if (implicit) {
+        for (Block& b : blocks_) b.Y = b.Y_stage[static_cast<std::size_t>(i - g.first)];
       }
-      dynamics_.tangent(b.parameters, b.Y, b.K[static_cast<std::size_t>(i)]);
-    }
-    if (!in_step) continue;
-    for (std::size_t o = 0; o < costs.size(); ++o) {
-      if (!costs[o].running) continue;
-      add_cost(*costs[o].running, {t, y_, step.angles0, motion()}, step.h * rk_.b[i], &Block::Y,
-               static_cast<Eigen::Index>(o), psi_rho);
+      add_running_costs(step, i, costs, psi_rho);
     }
   }
   for (Block& b : blocks_) {

@@ -7,6 +7,7 @@
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/motion_solver.hpp"
 #include "core/integrate/cost.hpp"
+#include "core/integrate/linearised_stages.hpp"
 #include "core/integrate/sample_schedule.hpp"
 #include "core/integrate/simulation.hpp"
 #include "core/integrate/step.hpp"
@@ -25,14 +26,22 @@ class TangentSweep {
   void finish(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, std::span<const Cost> costs,
               Eigen::MatrixXd& psi_rho);
 
-  long factorisations() { return dynamics_.solver().factorisations() + projector_.factorisations(); }
+  long factorisations() {
+    return dynamics_.solver().factorisations() + projector_.factorisations() +
+           (implicit_ ? implicit_->factorisations() : 0);
+  }
 
  private:
   struct Block {
     ParameterBlock parameters;
     LaneRows y0, y_hat, y1, Y;
     std::vector<LaneRows> K;
+    std::vector<LaneRows> Y_stage;  // of coupled stages
+    Eigen::MatrixXd x;              // their accelerations and multipliers
   };
+  bool follow_explicit(const Step& step, int i);
+  bool follow_implicit(const Step& step, const StageGroup& group);
+  void add_running_costs(const Step& step, int i, std::span<const Cost> costs, Eigen::MatrixXd& psi_rho);
   void add_cost(const PointCost& cost, const StatePoint& at, double weight, LaneRows Block::*direction,
                 Eigen::Index objective, Eigen::MatrixXd& psi_rho);
   void set_dense(const Step& step, double theta);  // into Block::Y
@@ -45,10 +54,12 @@ class TangentSweep {
   std::optional<MotionSolver> motion_;  // where some sensor needs it
   Dynamics dynamics_;
   Projector projector_;
+  std::optional<LinearisedStages> implicit_;
   std::vector<Block> blocks_;
   std::vector<Vec<6>> z_;
   Eigen::VectorXd y_, y_bar_, rho_bar_, lambda_;
   Eigen::MatrixXd y_rho_;
+  LaneRows r_;
 };
 
 // z = (rddot, omegadot) of each body from y and a = qddot:  omegadot = 2 G(p) pddot/(p'p).

@@ -20,7 +20,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 }
 
 const Method& method_of(const SimulationSettings& settings) {
-  const Method* method = explicit_method(settings.integrator.type);
+  const Method* method = runge_kutta_method(settings.integrator.type);
   if (!method) throw std::invalid_argument("integrator '" + settings.integrator.type + "' is not known");
   if (!method->adaptive && !settings.integrator.step) {
     throw std::invalid_argument("integrator '" + settings.integrator.type + "' has no error estimate: give a step");

@@ -27,7 +27,8 @@ struct StepSequence {
 };
 
 struct SimulationStatistics {
-  long steps = 0, rejected = 0, rhs_evaluations = 0, factorisations = 0;
+  // rhs_evaluations: of the equations of motion, each stage of a Newton iteration included; jacobians: of these.
+  long steps = 0, rejected = 0, rhs_evaluations = 0, factorisations = 0, jacobians = 0;
   double wall_seconds = 0;
   double max_position_violation = 0;                              // of |Phi| over accepted steps [m, -]
   double max_velocity_violation = 0;                              // of |Phi_q v + Phi_t|

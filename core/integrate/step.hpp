@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/dynamics/projection.hpp"
+#include "core/integrate/stage_groups.hpp"
 #include "core/integrate/tableaus.hpp"
 
 namespace mbsopt {
@@ -22,6 +23,25 @@ struct Step {
 
   int stages(const Method& rk) const { return dense ? rk.dense_stages : rk.stages; }
 };
+
+// Stage states Y and the upper half (v) of their derivatives K, from the lower half (qdd) of K, for a group whose earlier
+// stages are known:  V_i = v0 + h sum_j A_ij a_j,   Q_i = q0 + h sum_j A_ij V_j.
+inline void set_group_stages(const Method& rk, const StageGroup& g, double h, const Eigen::VectorXd& y0,
+                             Eigen::MatrixXd& Y, Eigen::MatrixXd& K) {
+  const Eigen::Index n = y0.size() / 2;
+  auto add_stages = [&](int i, Eigen::Index first) {
+    auto part = Y.col(i).segment(first, n);
+    part = y0.segment(first, n);
+    for (int j = 0; j <= g.last; ++j) {
+      if (rk.a(i, j) != 0) part += (h * rk.a(i, j)) * K.col(j).segment(first, n);
+    }
+  };
+  for (int i = g.first; i <= g.last; ++i) {
+    add_stages(i, n);
+    K.col(i).head(n) = Y.col(i).tail(n);
+  }
+  for (int i = g.first; i <= g.last; ++i) add_stages(i, 0);
+}
 
 // y(t + theta h) = y0 + h sum_i b_i(theta) k_i + blend(theta) (y1 - y_hat): the last term spreads the projection over
 // the step, so that the output is continuous and ends at the projected state.

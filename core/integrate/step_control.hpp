@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/integrate/tableaus.hpp"
-
 namespace mbsopt {
 
 // h -> h * factor with factor = 0.9 err^-(1/k - 0.75 beta) err_old^beta, k the order of the step, beta = 0.2/k.
@@ -46,19 +44,9 @@ inline double scaled_norm(const Eigen::VectorXd& x, const Eigen::VectorXd& a, co
   return std::sqrt(sum / static_cast<double>(x.size()));
 }
 
-// Error of a step: K's first columns hold the stages' derivatives. work: scratch of the state's size.
-inline double step_error(const Method& rk, double h, const Eigen::MatrixXd& K, const Eigen::VectorXd& y0,
-                         const Eigen::VectorXd& y1, double rtol, double atol, Eigen::VectorXd& work) {
-  auto norm = [&](const double* weights) {
-    work.setZero();
-    for (int i = 0; i < rk.stages; ++i) {
-      if (weights[i] != 0) work += (h * weights[i]) * K.col(i);
-    }
-    return scaled_norm(work, y0, y1, rtol, atol);
-  };
-  const double high = norm(rk.error);
-  if (!rk.error_low) return high;
-  const double low = norm(rk.error_low), both = std::sqrt(high * high + 0.01 * low * low);
+// Two estimates of different order as in DOP853: high^2/sqrt(high^2 + 0.01 low^2).
+inline double combined_error(double high, double low) {
+  const double both = std::sqrt(high * high + 0.01 * low * low);
   return both > 0 ? high * high / both : 0.0;
 }
 

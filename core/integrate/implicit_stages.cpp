@@ -1,0 +1,225 @@
+#include "core/integrate/implicit_stages.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mbsopt {
+namespace {
+
+constexpr int kMostIterations = 10;        // at a tolerance
+constexpr int kMostExactIterations = 60;   // to rounding, with a new Jacobian wherever convergence is slow
+constexpr double kSlow = 0.1;              // contraction per iteration from which a new Jacobian pays
+constexpr double kRounding = 1e-11;        // relative; iterations that stop falling below it are at rounding
+
+}  // namespace
+
+ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method, const IntegratorSettings& settings,
+                               Dynamics& dynamics)
+    : data_(mechanism.data()),
+      rk_(method),
+      settings_(settings),
+      dynamics_(dynamics),
+      jacobian_(data_),
+      values_(jacobian_.values()) {
+  int largest = 0;
+  for (const StageGroup& g : rk_.stage_groups()) {
+    int found = -1;
+    if (is_implicit(rk_, g)) {
+      Eigen::MatrixXd A(g.size(), g.size());
+      for (int i = 0; i < g.size(); ++i) {
+        for (int j = 0; j < g.size(); ++j) A(i, j) = rk_.a(g.first + i, g.first + j);
+      }
+      for (std::size_t k = 0; k < matrices_.size(); ++k) {
+        if (matrices_[k].A == A) found = static_cast<int>(k);
+      }
+      if (found < 0) {
+        found = static_cast<int>(matrices_.size());
+        matrices_.push_back({A, StageMatrix(data_, jacobian_, g.size())});
+      }
+      largest = std::max(largest, g.size());
+    }
+    for (int i = g.first; i <= g.last; ++i) matrix_of_.push_back(found);
+  }
+  if (rk_.error_filter != 0) filter_.emplace(data_, jacobian_);
+  const Eigen::Index rows = 7 * data_.n + data_.m;
+  x_.setZero(rows, largest), r_.setZero(rows * largest, 1), change_.setZero(14 * data_.n, largest);
+  a_start_.setZero(7 * data_.n), lambda_start_.setZero(data_.m);
+  y_.setZero(14 * data_.n), work_.setZero(7 * data_.n);
+}
+
+long ImplicitStages::factorisations() const {
+  long sum = filter_ ? filter_->factorisations() : 0;
+  for (const Matrix& m : matrices_) sum += m.matrix.factorisations();
+  return sum;
+}
+
+void ImplicitStages::begin(const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::VectorXd& lambda) {
+  a_start_ = a;
+  lambda_start_ = lambda;
+  past_.clear();
+  present_.clear();
+  renew_ = true;
+}
+
+void ImplicitStages::new_attempt() { present_.clear(); }
+
+void ImplicitStages::accept(const Step& step) {
+  const Eigen::Index n = 7 * data_.n;
+  past_ = std::move(present_);
+  present_.clear();
+  // Where the next Jacobian is taken: the latest stage.
+  int latest = 0;
+  for (int i = 1; i < rk_.stages; ++i) {
+    if (rk_.c[i] >= rk_.c[latest]) latest = i;
+  }
+  a_start_ = step.K.col(latest).tail(n);
+  lambda_start_ = step.lambda.col(latest);
+  ++age_;
+  if (rate_ > kSlow) renew_ = true;
+}
+
+void ImplicitStages::evaluate_jacobian(const Step& step) {
+  dynamics_.place_at(step.t, step.y0, step.angles0, a_start_, lambda_start_);
+  jacobian_.evaluate(dynamics_, values_);
+  ++jacobians_;
+  age_ = 0;
+  renew_ = false;
+}
+
+bool ImplicitStages::ready(const Step& step, Matrix& m) {
+  if (renew_) evaluate_jacobian(step);
+  if (m.jacobian == jacobians_ && m.h == step.h) return true;
+  m.h = step.h;
+  m.jacobian = jacobians_;
+  const std::vector<const MotionJacobian::Values*> values(static_cast<std::size_t>(m.A.rows()), &values_);
+  return m.matrix.factor(step.h * m.A, values);
+}
+
+// The polynomial through the three nearest points of the past, at most.
+void ImplicitStages::predict(const Step& step, int stage, Eigen::Ref<Eigen::VectorXd> x) const {
+  const double t = step.t + rk_.c[stage] * step.h;
+  std::vector<const Point*> points;
+  for (const auto* list : {&present_, &past_}) {
+    for (const Point& p : *list) points.push_back(&p);
+  }
+  std::stable_sort(points.begin(), points.end(),
+                   [&](const Point* a, const Point* b) { return std::abs(a->t - t) < std::abs(b->t - t); });
+  std::vector<const Point*> nodes;
+  for (const Point* p : points) {
+    const bool distinct =
+        std::all_of(nodes.begin(), nodes.end(), [&](const Point* q) { return std::abs(q->t - p->t) > 0.05 * step.h; });
+    if (distinct && nodes.size() < 3) nodes.push_back(p);
+  }
+  if (nodes.empty()) {
+    x << a_start_, lambda_start_;
+    return;
+  }
+  x.setZero();
+  for (const Point* p : nodes) {
+    double weight = 1;
+    for (const Point* q : nodes) {
+      if (q != p) weight *= (t - q->t) / (p->t - q->t);
+    }
+    x.head(a_start_.size()) += weight * p->a;
+    x.tail(lambda_start_.size()) += weight * p->lambda;
+  }
+}
+
+// Y and K of the group's stages from the accelerations in x_.
+void ImplicitStages::set_stages(Step& step, const StageGroup& g) {
+  const Eigen::Index n = 7 * data_.n;
+  for (int i = g.first; i <= g.last; ++i) {
+    step.K.col(i).tail(n) = x_.col(i - g.first).head(n);
+    step.lambda.col(i) = x_.col(i - g.first).tail(data_.m);
+  }
+  set_group_stages(rk_, g, step.h, step.y0, step.Y, step.K);
+}
+
+bool ImplicitStages::solve(Step& step, const StageGroup& g, bool exact) {
+  const Eigen::Index n = 7 * data_.n, rows = n + data_.m;
+  const int s = g.size();
+  Matrix& m = matrices_[static_cast<std::size_t>(matrix_of_[static_cast<std::size_t>(g.first)])];
+  if (!ready(step, m)) return false;
+  for (int i = 0; i < s; ++i) predict(step, g.first + i, x_.col(i));
+  const double tolerance = std::min(1e-2, std::sqrt(settings_.rtol));
+  double before = INFINITY, eta = 1;
+  int renewals = 0;
+  const int most = exact ? kMostExactIterations : kMostIterations;
+  for (int k = 0; k < most; ++k) {
+    set_stages(step, g);
+    for (int i = 0; i < s; ++i) {
+      const int stage = g.first + i;
+      y_ = step.Y.col(stage);
+      dynamics_.place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, x_.col(i).head(n), x_.col(i).tail(data_.m));
+      dynamics_.residual(r_.col(0).segment(i * rows, rows));
+      ++evaluations_;
+    }
+    if (!r_.topRows(s * rows).allFinite()) return false;
+    m.matrix.solve(r_.topRows(s * rows), 0);
+    // What the change does to the stages, in units of the tolerance (exact: of the state's size).
+    double sum = 0;
+    for (int i = 0; i < s; ++i) {
+      auto dV = change_.col(i).tail(n);
+      dV.setZero();
+      for (int j = 0; j < s; ++j) dV += (step.h * m.A(i, j)) * r_.col(0).segment(j * rows, n);
+    }
+    for (int i = 0; i < s; ++i) {
+      auto dQ = change_.col(i).head(n);
+      dQ.setZero();
+      for (int j = 0; j < s; ++j) dQ += (step.h * m.A(i, j)) * change_.col(j).tail(n);
+      for (Eigen::Index e = 0; e < 2 * n; ++e) {
+        const double size = std::abs(step.y0(e));
+        const double unit = exact ? 1 + size : settings_.atol + settings_.rtol * size;
+        const double x = change_(e, i) / unit;
+        sum += x * x;
+      }
+      x_.col(i) += r_.col(0).segment(i * rows, rows);
+    }
+    const double now = std::sqrt(sum / static_cast<double>(2 * n * s));
+    if (!std::isfinite(now)) return false;
+    if (k > 0) rate_ = before > 0 ? now / before : 0;
+    const bool slow = k > 0 && rate_ > 0.5;
+    if (exact) {
+      if (now < 1e-15 || (slow && now < kRounding)) break;
+      if (slow && renewals < 5) {  // far from where the Jacobian was taken: take it here
+        ++renewals;
+        dynamics_.place_at(step.t + rk_.c[g.last] * step.h, y_, step.angles0, x_.col(s - 1).head(n),
+                           x_.col(s - 1).tail(data_.m));
+        jacobian_.evaluate(dynamics_, values_);
+        ++jacobians_;
+        if (!ready(step, m)) return false;
+        before = INFINITY;
+        continue;
+      }
+      if (k + 1 == most || (k > 5 && now > 1e10)) return false;
+    } else {
+      if (k > 0) {
+        if (rate_ >= 1) return false;
+        eta = rate_ / (1 - rate_);
+        const double left = std::pow(rate_, most - 1 - k) / (1 - rate_) * now;
+        if (left > tolerance && !(eta * now <= tolerance)) return false;
+      }
+      if (now <= 1e-10 || (k > 0 && eta * now <= tolerance)) break;
+      if (k + 1 == most) return false;
+    }
+    before = now;
+  }
+  set_stages(step, g);
+  for (int i = g.first; i <= g.last; ++i) {
+    present_.push_back({step.t + rk_.c[i] * step.h, step.K.col(i).tail(n), step.lambda.col(i)});
+  }
+  return true;
+}
+
+bool ImplicitStages::filter(const Step& step, Eigen::VectorXd& error) {
+  const double gamma = step.h * rk_.error_filter;
+  if (filter_h_ != step.h || filter_jacobian_ != jacobians_) {
+    filter_h_ = step.h;
+    filter_jacobian_ = jacobians_;
+    if (!filter_->factor(gamma, values_)) return false;
+  }
+  filter_->solve(error);
+  return true;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,87 @@
+// The coupled stages of an implicit Runge-Kutta step, solved in their accelerations a_i and multipliers lambda_i by
+// simplified Newton iterations: one Jacobian, taken where the step starts and kept over steps while it serves, one
+// factor per step size and distinct block of the tableau.
+//
+//   V_i = v0 + h sum_j A_ij a_j,   Q_i = q0 + h sum_j A_ij V_j,   r(t_i, Q_i, V_i, a_i, lambda_i) = 0
+//
+// Convergence test: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.8. An adaptive
+// run stops at a fraction of its tolerance; otherwise (fixed or given steps) the equations are solved to rounding, so
+// that differences of runs over the same steps mean something.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/integrate/shifted_system.hpp"
+#include "core/integrate/stage_groups.hpp"
+#include "core/integrate/step.hpp"
+#include "core/scene/settings.hpp"
+
+namespace mbsopt {
+
+class ImplicitStages {
+ public:
+  ImplicitStages(const Mechanism& mechanism, const Method& method, const IntegratorSettings& settings,
+                 Dynamics& dynamics);
+
+  // The motion at the start of the run: a, lambda at step.y0.
+  void begin(const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::VectorXd& lambda);
+  // Before each attempt at a step.
+  void new_attempt();
+  // Solves the stages of a group; earlier groups are solved. exact: to rounding. False: no convergence.
+  bool solve(Step& step, const StageGroup& group, bool exact);
+  // error = (I - h error_filter f_y)^-1 error
+  bool filter(const Step& step, Eigen::VectorXd& error);
+  // After an accepted step.
+  void accept(const Step& step);
+
+  // Whether a failure may be cured at the same step size, by a new Jacobian.
+  bool stale() const { return age_ > 0; }
+  void renew() { renew_ = true; }
+  // Fastest contraction is left alone while the step changes by less than this.
+  static constexpr double kKeepStep = 1.2;
+
+  long evaluations() const { return evaluations_; }
+  long jacobians() const { return jacobians_; }
+  long factorisations() const;
+
+ private:
+  struct Matrix {  // of one distinct block of A
+    Eigen::MatrixXd A;
+    StageMatrix matrix;
+    double h = 0;
+    long jacobian = -1;
+  };
+  struct Point {  // of the past, for the first guess
+    double t;
+    Eigen::VectorXd a, lambda;
+  };
+
+  bool ready(const Step& step, Matrix& m);
+  void evaluate_jacobian(const Step& step);
+  void predict(const Step& step, int stage, Eigen::Ref<Eigen::VectorXd> x) const;
+  void set_stages(Step& step, const StageGroup& group);
+
+  const MechanismData& data_;
+  const Method& rk_;
+  IntegratorSettings settings_;
+  Dynamics& dynamics_;
+  MotionJacobian jacobian_;
+  MotionJacobian::Values values_;
+  std::vector<Matrix> matrices_;
+  std::vector<int> matrix_of_;  // per group, in order
+  std::optional<ShiftedSystem> filter_;
+  double filter_h_ = 0;
+  long filter_jacobian_ = -1;
+
+  Eigen::VectorXd a_start_, lambda_start_;
+  std::vector<Point> past_, present_;  // of accepted steps; of the attempt in hand
+  Eigen::MatrixXd x_, r_, change_;
+  Eigen::VectorXd y_, work_;
+  double rate_ = 1;  // of the last iteration
+  bool renew_ = true;
+  long age_ = 0;  // steps since the Jacobian was taken
+  long evaluations_ = 0, jacobians_ = 0;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,87 @@
+#include "core/mechanism/coupling.hpp"
+
+#include <algorithm>
+#include <type_traits>
+
+namespace mbsopt {
+namespace {
+
+using Bodies = std::vector<int>;
+
+// The bodies that a sensor of the state reads; those of accelerations and reactions are not inputs of forces.
+Bodies read_by(const MechanismData& data, const SensorKind& sensor) {
+  Bodies all;
+  for (int i = 1; i <= data.n; ++i) all.push_back(i);
+  return std::visit(
+      [&](const auto& s) -> Bodies {
+        using Kind = std::decay_t<decltype(s)>;
+        if constexpr (std::is_same_v<Kind, PointSensor>) {
+          return {s.a.body, s.relative ? s.b.body : 0, std::max(s.axes_body, 0)};
+        } else if constexpr (std::is_same_v<Kind, AngularVelocitySensor>) {
+          return {s.body};
+        } else if constexpr (std::is_same_v<Kind, CoordinateSensor>) {
+          return {static_cast<int>(s.index % (7 * data.n)) / 7 + 1};
+        } else if constexpr (std::is_same_v<Kind, AngleSensor>) {
+          const JointAngle& angle = data.angles[static_cast<std::size_t>(s.angle)];
+          return {angle.body1, angle.body2};
+        } else if constexpr (std::is_same_v<Kind, DisplacementSensor>) {
+          return {s.body1, s.body2};
+        } else {
+          return all;
+        }
+      },
+      sensor);
+}
+
+void add(const Bodies& from, Bodies& to) {
+  for (const int body : from) {
+    if (body > 0) to.push_back(body);
+  }
+}
+
+void sort_unique(Bodies& bodies) {
+  std::sort(bodies.begin(), bodies.end());
+  bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
+}
+
+}  // namespace
+
+Coupling coupling(const MechanismData& data) {
+  Coupling c;
+  c.bodies.resize(static_cast<std::size_t>(data.n));
+  c.rows.resize(static_cast<std::size_t>(data.m));
+  auto couple = [&](const Bodies& loaded, const Bodies& read) {
+    for (const int body : loaded) {
+      if (body > 0) add(read, c.bodies[static_cast<std::size_t>(body) - 1]);
+    }
+  };
+  auto couple_pair = [&](const auto& forces) {
+    for (const auto& f : forces) couple({f.body1, f.body2}, {f.body1, f.body2});
+  };
+  for (int i = 1; i <= data.n; ++i) couple({i}, {i});
+  for (const Constraint& k : data.constraints) {
+    for (int r = 0; r < k.rows(); ++r) add({k.body1, k.body2}, c.rows[static_cast<std::size_t>(k.row + r)]);
+    couple({k.body1, k.body2}, {k.body1, k.body2});  // J'lambda
+  }
+  couple_pair(data.tsda);
+  couple_pair(data.bushings);
+  couple_pair(data.sliding_frictions);
+  auto couple_torques = [&](const auto& torques) {
+    for (const auto& f : torques) {
+      const JointAngle& angle = data.angles[static_cast<std::size_t>(f.joint_angle)];
+      couple({angle.body1, angle.body2}, {angle.body1, angle.body2});
+    }
+  };
+  couple_torques(data.rsda);
+  couple_torques(data.frictions);
+  for (const AppliedForce& f : data.applied) {
+    couple({f.body}, {f.body});
+    for (const int s : f.sensors) couple({f.body}, read_by(data, data.sensors[static_cast<std::size_t>(s)]));
+  }
+  for (const UserForceData& f : data.user_forces) couple(f.bodies, f.bodies);
+  for (Bodies& b : c.bodies) sort_unique(b);
+  for (Bodies& b : c.rows) sort_unique(b);
+  return c;
+}
+
+}  // namespace mbsopt
