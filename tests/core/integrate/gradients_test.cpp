@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/integrate/simulation.hpp"
+#include "core/scene/type_table.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;
@@ -95,12 +96,12 @@ FormulationSettings formulation(const std::string& name) {
 
 TEST_CASE("TLM equals adjoint to 1e-10 for every method, formulation and projection", "[gradient]") {
   Case c;
-  const std::string method = GENERATE(as<std::string>{}, "rk4", "dopri5", "dopri853");
+  const std::string method = GENERATE(from_range(words(kIntegrators)));
   const std::string form =
       GENERATE(as<std::string>{}, "augmented_lagrangian", "velocity", "stabilised", "penalty", "penalty, projected");
   c.scene.simulation.formulation = formulation(form);
   c.scene.simulation.integrator.type = method;
-  if (method == "rk4") c.scene.simulation.integrator.step = 0.01;
+  if (has_word(kFixedStepIntegrators, method)) c.scene.simulation.integrator.step = 0.01;
   const Mechanism m = c.mechanism(nominal(c.scene));
   const std::vector<Cost> costs = c.costs(m);
   const SimulationResult forward = simulate(m, c.scene.simulation, costs);
@@ -122,9 +123,9 @@ TEST_CASE("TLM equals adjoint to 1e-10 for every method, formulation and project
 
 TEST_CASE("the gradient equals differences on frozen steps to 1e-7 for every parameter", "[gradient]") {
   Case c;
-  const std::string method = GENERATE(as<std::string>{}, "rk4", "dopri5", "dopri853");
+  const std::string method = GENERATE(from_range(words(kIntegrators)));
   c.scene.simulation.integrator.type = method;
-  if (method == "rk4") c.scene.simulation.integrator.step = 0.01;
+  if (has_word(kFixedStepIntegrators, method)) c.scene.simulation.integrator.step = 0.01;
   const VectorXd rho = nominal(c.scene);
   const Mechanism m = c.mechanism(rho);
   const std::vector<Cost> costs = c.costs(m);

@@ -3,38 +3,12 @@
 #include <catch2/catch.hpp>
 
 #include "core/body/euler_parameters.hpp"
-#include "core/integrate/tableaus.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;
 using namespace mbsopt::testing;
 using Eigen::VectorXd;
-
-namespace {
-
-SimulationResult run_with_step(Scene scene, const std::string& method, double step) {
-  scene.simulation.integrator.type = method;
-  scene.simulation.integrator.step = step;
-  return simulate(Mechanism(scene, nominal(scene)), scene.simulation);
-}
-
-}  // namespace
-
-TEST_CASE("every method converges at its order on a closed loop, projection included", "[order]") {
-  Scene scene = loaded_four_bar();
-  scene.simulation.end_time = 0.96;
-  for (const Method& rk : explicit_methods()) {
-    const std::string name(rk.name);
-    scene.simulation.integrator.type = name;
-    const double h = rk.order > 5 ? 0.12 : 0.01;
-    const VectorXd exact = run_with_step(scene, "dopri853", 0.96 / 192).y_end;
-    const double coarse = (run_with_step(scene, name, h).y_end - exact).norm();
-    const double fine = (run_with_step(scene, name, h / 2).y_end - exact).norm();
-    INFO(name << ": errors " << coarse << ", " << fine);
-    CHECK(std::log2(coarse / fine) == Approx(rk.order).margin(0.5));
-  }
-}
 
 TEST_CASE("a torque-free body keeps its energy and its angular momentum", "[simulation]") {
   Scene scene;
