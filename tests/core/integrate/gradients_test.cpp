@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/integrate/simulation.hpp"
+#include "core/integrate/tableaus.hpp"
 #include "core/scene/type_table.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
@@ -138,7 +139,9 @@ TEST_CASE("the gradient equals differences on frozen steps to 1e-7 for every par
     REQUIRE(run.ok());
     return run.psi;
   };
-  CHECK((psi(rho) - adjoint.psi).cwiseAbs().maxCoeff() < 1e-13 * adjoint.psi.cwiseAbs().maxCoeff());
+  // An adaptive run solves implicit stages to a fraction of its tolerance, a run over given steps to rounding.
+  const double same = runge_kutta_method(method)->implicit() ? 1e-2 * c.scene.simulation.integrator.rtol : 1e-13;
+  CHECK((psi(rho) - adjoint.psi).cwiseAbs().maxCoeff() < same * adjoint.psi.cwiseAbs().maxCoeff());
   const double size = adjoint.psi_rho.cwiseAbs().maxCoeff();
   for (Eigen::Index k = 0; k < rho.size(); ++k) {
     const double h = 2e-4 * std::max(1.0, std::abs(rho(k)));
