@@ -102,9 +102,8 @@ inline constexpr std::string_view kLaterJointTypes = "";
 inline constexpr std::string_view kLaterForceTypes = "";
 inline constexpr std::string_view kLaterSensorQuantities = "";
 
-inline constexpr std::string_view kIntegrators = "dopri5 dopri853 rk4";
-inline constexpr std::string_view kLaterIntegrators =
-    "euler rk2 bs3 verner6 sdirk2 sdirk3 sdirk4 radau5 gauss4 cvodes_bdf cvodes_adams";
+inline constexpr std::string_view kIntegrators = "dopri5 dopri853 rk4 cvodes_adams cvodes_bdf";
+inline constexpr std::string_view kLaterIntegrators = "euler rk2 bs3 verner6 sdirk2 sdirk3 sdirk4 radau5 gauss4";
 
 // Names that mean something in laws and objectives, so that nothing else may be called so.
 inline constexpr std::string_view kReservedNames = "t l ldot angle rate pi ground O";
