@@ -4,6 +4,7 @@
 #include <ceres/version.h>
 #include <fmt/format.h>
 #include <openssl/evp.h>
+#include <sundials/sundials_config.h>
 #include <CLI/Version.hpp>
 
 #include <Eigen/Core>
@@ -29,6 +30,7 @@ nlohmann::ordered_json library_versions() {
   return {{"Eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
           {"Ipopt", IPOPT_VERSION},
           {"Ceres", CERES_VERSION_STRING},
+          {"SUNDIALS", SUNDIALS_VERSION},
           {"fmt", fmt::format("{}.{}.{}", FMT_VERSION / 10000, FMT_VERSION / 100 % 100, FMT_VERSION % 100)},
           {"nlohmann_json", fmt::format("{}.{}.{}", NLOHMANN_JSON_VERSION_MAJOR, NLOHMANN_JSON_VERSION_MINOR,
                                         NLOHMANN_JSON_VERSION_PATCH)},

@@ -8,6 +8,7 @@
 
 #include "core/dynamics/assembly.hpp"
 #include "core/dynamics/motion_solver.hpp"
+#include "core/integrate/cvodes.hpp"
 #include "core/integrate/explicit_adjoint.hpp"
 #include "core/integrate/explicit_run.hpp"
 #include "core/integrate/explicit_tlm.hpp"
@@ -137,6 +138,7 @@ class Run {
 
 SimulationResult simulate(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
                           const Sampling& sampling, const RunOptions& options) {
+  if (is_cvodes(settings.integrator.type)) return cvodes_simulate(mechanism, settings, costs, sampling, options);
   Run run(mechanism, settings, costs);
   run.go(sampling.times, sampling.observe, options, {});
   return run.finish();
@@ -144,6 +146,7 @@ SimulationResult simulate(const Mechanism& mechanism, const SimulationSettings& 
 
 SimulationResult simulate_tlm(const Mechanism& mechanism, const SimulationSettings& settings,
                               std::span<const Cost> costs, const TangentSampling& sampling, const RunOptions& options) {
+  if (is_cvodes(settings.integrator.type)) return cvodes_forward(mechanism, settings, costs, sampling, options);
   Run run(mechanism, settings, costs);
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
@@ -159,6 +162,7 @@ SimulationResult simulate_tlm(const Mechanism& mechanism, const SimulationSettin
 
 SimulationResult simulate_adjoint(const Mechanism& mechanism, const SimulationSettings& settings,
                                   std::span<const Cost> costs, const RunOptions& options) {
+  if (is_cvodes(settings.integrator.type)) return cvodes_adjoint(mechanism, settings, costs, options);
   Run run(mechanism, settings, costs);
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());

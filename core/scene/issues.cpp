@@ -291,6 +291,9 @@ void check_meaning(Checker& checker, const IntegratorSettings& settings) {
   if (has_word(kFixedStepIntegrators, settings.type) && !settings.step)
     checker.issue(checker.path("step"),
                   "is missing; " + settings.type + " has no error estimate and needs a fixed step [s]");
+  if (has_word(kMultistepMethods, settings.type) && settings.step)
+    checker.issue(checker.path("step"), "is " + text_of(*settings.step) + "; " + settings.type +
+                                            " chooses its own steps: leave it out and give rtol, atol or max_step");
   if (settings.initial_step && settings.max_step && *settings.initial_step > *settings.max_step)
     checker.issue(checker.path("initial_step"),
                   "is " + text_of(*settings.initial_step) + ", above max_step " + text_of(*settings.max_step));

@@ -102,10 +102,10 @@ inline constexpr std::string_view kLaterJointTypes = "";
 inline constexpr std::string_view kLaterForceTypes = "";
 inline constexpr std::string_view kLaterSensorQuantities = "";
 
-inline constexpr std::string_view kIntegrators = "dopri5 dopri853 verner6 bs3 rk2 rk4 euler";
+inline constexpr std::string_view kIntegrators =
+    "dopri5 dopri853 verner6 bs3 rk2 rk4 euler sdirk2 sdirk3 sdirk4 radau5 gauss4 gauss6 cvodes_adams cvodes_bdf";
 inline constexpr std::string_view kFixedStepIntegrators = "rk4 euler";  // without an error estimate
-inline constexpr std::string_view kLaterIntegrators =
-    "sdirk2 sdirk3 sdirk4 radau5 gauss4 gauss6 cvodes_bdf cvodes_adams";
+inline constexpr std::string_view kMultistepMethods = "cvodes_adams cvodes_bdf";
 
 // Names that mean something in laws and objectives, so that nothing else may be called so.
 inline constexpr std::string_view kReservedNames = "t l ldot angle rate pi ground O";

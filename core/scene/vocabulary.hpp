@@ -314,7 +314,7 @@ void describe(auto& v, Like<FormulationSettings> auto& f) {
 }
 
 void describe(auto& v, Like<IntegratorSettings> auto& i) {
-  v.word("type", i.type, Words{kIntegrators, kLaterIntegrators}, {"explicit Runge-Kutta method"});
+  v.word("type", i.type, Words{kIntegrators}, {"integration method"});
   v.plain("rtol", i.rtol, kPositive, {"relative tolerance of a step"});
   v.plain("atol", i.atol, kPositive, {"absolute tolerance of a step"});
   v.plain("initial_step", i.initial_step, kPositive, {"[s]; chosen automatically when absent"});

@@ -1,0 +1,79 @@
+// Owners of SUNDIALS' objects. For the cvodes_*.cpp files only: no header that others include includes this one.
+// Every object belongs to a context, which must outlive it.
+#pragma once
+
+#include <cvodes/cvodes.h>
+#include <nvector/nvector_serial.h>
+#include <sundials/sundials_context.h>
+
+#include <Eigen/Core>
+#include <memory>
+#include <new>
+#include <type_traits>
+#include <utility>
+
+namespace mbsopt::cvodes {
+
+class Context {
+ public:
+  Context() {
+    if (SUNContext_Create(nullptr, &context_) != 0) throw std::bad_alloc();
+  }
+  ~Context() { SUNContext_Free(&context_); }
+  Context(const Context&) = delete;
+  Context& operator=(const Context&) = delete;
+  operator SUNContext() const { return context_; }
+
+ private:
+  SUNContext context_ = nullptr;
+};
+
+// The numbers of a vector of SUNDIALS.
+inline Eigen::Map<Eigen::VectorXd> values(N_Vector v) { return {N_VGetArrayPointer(v), N_VGetLength(v)}; }
+
+class Vector {
+ public:
+  Vector(Eigen::Index size, const Context& context) : vector_(N_VNew_Serial(size, context)) {
+    if (!vector_) throw std::bad_alloc();
+    values(vector_).setZero();
+  }
+  Vector(Vector&& other) noexcept : vector_(std::exchange(other.vector_, nullptr)) {}
+  Vector& operator=(Vector&&) = delete;
+  ~Vector() { N_VDestroy(vector_); }
+  operator N_Vector() const { return vector_; }
+  Eigen::Map<Eigen::VectorXd> operator*() const { return values(vector_); }
+
+ private:
+  N_Vector vector_;
+};
+
+// count vectors of the same size, as functions of sensitivities want them.
+class VectorArray {
+ public:
+  VectorArray(int count, Eigen::Index size, const Context& context)
+      : count_(count), vectors_(N_VCloneVectorArray(count, Vector(size, context))) {
+    if (!vectors_) throw std::bad_alloc();
+    for (int i = 0; i < count; ++i) values(vectors_[i]).setZero();
+  }
+  VectorArray(const VectorArray&) = delete;
+  VectorArray& operator=(const VectorArray&) = delete;
+  ~VectorArray() { N_VDestroyVectorArray(vectors_, count_); }
+  operator N_Vector*() const { return vectors_; }
+  Eigen::Map<Eigen::VectorXd> at(int i) const { return values(vectors_[i]); }
+
+ private:
+  int count_;
+  N_Vector* vectors_;
+};
+
+struct FreeMemory {
+  void operator()(void* memory) const { CVodeFree(&memory); }
+};
+using Memory = std::unique_ptr<void, FreeMemory>;  // of one integrator
+
+struct FreeNonlinearSolver {
+  void operator()(SUNNonlinearSolver solver) const { SUNNonlinSolFree(solver); }
+};
+using NonlinearSolver = std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, FreeNonlinearSolver>;
+
+}  // namespace mbsopt::cvodes
