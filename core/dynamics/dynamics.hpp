@@ -62,12 +62,13 @@ class Dynamics {
   void place_at(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                 const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
   void residual(Eigen::Ref<Eigen::VectorXd> r);  // at the place
-  // Their derivatives at the place in y and in the parameters, with (a, lambda) fixed:  r_y y' + r_rho, and its transpose.
+  // Their derivatives at the place in y and in the parameters, with (a, lambda) fixed:  r_y y' + r_rho, and its
+  // transpose.
   void residual_tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& r_dir);
   void add_residual_adjoint(const Eigen::VectorXd& r_bar, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
                             Eigen::VectorXd& rho_bar);
-  // Pieces of -r_(a, lambda) = [M T, J'; J T, -1/alpha] at the place, T = dz/da: a body's own block with its row of p, a
-  // row of J times T, and 1/alpha (0: constrained).
+  // Pieces of -r_(a, lambda) = [M T, J'; J T, -1/alpha] at the place, T = dz/da: a body's own block with its row of p,
+  // a row of J times T, and 1/alpha (0: constrained).
   Mat<7, 7> mass_block(int body) const;
   Mat<1, 7> times_T(int body, const Mat<1, 6>& J_row) const;
   const ConstraintRows& place_rows() const { return solver_.rows(); }
@@ -90,7 +91,8 @@ class Dynamics {
 
  private:
   void set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
-  // What the state's and the parameters' directions do to f - M z - J'lambda (rhs_lanes_) and -(J z + gamma) (gamma_dir_).
+  // What the state's and the parameters' directions do to f - M z - J'lambda (rhs_lanes_) and -(J z + gamma)
+  // (gamma_dir_).
   void right_hand_side_tangent(const ParameterBlock& block, const LaneRows& y_dir);
   // y_bar, ... += gradient of  pddot_bar'pddot - eta'(M z + J'lambda - f) - mu'(J z + gamma)  with z and lambda fixed.
   void pull_back(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);

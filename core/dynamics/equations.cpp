@@ -37,7 +37,8 @@ double Dynamics::compliance(Eigen::Index row) const {
 
 void Dynamics::residual(Eigen::Ref<Eigen::VectorXd> r) {
   set_loads();
-  for (int i = 1; i <= data_.n; ++i) loads_[static_cast<std::size_t>(i) - 1] -= solver_.mass_times(i, z_[static_cast<std::size_t>(i) - 1]);
+  for (int i = 1; i <= data_.n; ++i)
+    loads_[static_cast<std::size_t>(i) - 1] -= solver_.mass_times(i, z_[static_cast<std::size_t>(i) - 1]);
   solver_.rows().subtract_transposed_times(lambda_, loads_);
   evaluate_phi_ddot(data_, frames_, laws_, gamma_);
   if (settings_.omega != 0) {

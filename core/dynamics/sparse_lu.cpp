@@ -27,7 +27,8 @@ struct SparseLu::Klu {
   int size() const { return static_cast<int>(starts.size()) - 1; }
 };
 
-SparseLu::SparseLu(int size, const std::vector<Entry>& entries) : klu_(std::make_unique<Klu>()), slots_(entries.size()) {
+SparseLu::SparseLu(int size, const std::vector<Entry>& entries)
+    : klu_(std::make_unique<Klu>()), slots_(entries.size()) {
   std::vector<std::size_t> order(entries.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
@@ -63,7 +64,8 @@ bool SparseLu::factor() {
   if (k.size() == 0) return true;
   if (!std::all_of(values_.begin(), values_.end(), [](double x) { return x - x == 0; })) return false;
   if (k.numeric) {
-    const bool refactored = klu_refactor(k.starts.data(), k.rows.data(), values_.data(), k.symbolic, k.numeric, &k.common) == 1;
+    const bool refactored =
+        klu_refactor(k.starts.data(), k.rows.data(), values_.data(), k.symbolic, k.numeric, &k.common) == 1;
     if (refactored &&
         klu_rgrowth(k.starts.data(), k.rows.data(), values_.data(), k.symbolic, k.numeric, &k.common) == 1 &&
         k.common.rgrowth > kLeastGrowth) {

@@ -153,8 +153,8 @@ bool TangentSweep::follow_implicit(const Step& step, const StageGroup& g) {
       LaneRows& Y = b.Y_stage[static_cast<std::size_t>(i - g.first)];
       for (int j = g.first; j <= g.last; ++j) {
         const LaneRows& K = b.K[static_cast<std::size_t>(j)];
-        Y.topRows(n) += (step.h * rk_.a(i, j)) *
-                        (b.Y_stage[static_cast<std::size_t>(j - g.first)].bottomRows(n) - K.topRows(n));
+        Y.topRows(n) +=
+            (step.h * rk_.a(i, j)) * (b.Y_stage[static_cast<std::size_t>(j - g.first)].bottomRows(n) - K.topRows(n));
       }
     }
     for (int i = g.first; i <= g.last; ++i) {

@@ -6,10 +6,10 @@
 namespace mbsopt {
 namespace {
 
-constexpr int kMostIterations = 10;        // at a tolerance
-constexpr int kMostExactIterations = 60;   // to rounding, with a new Jacobian wherever convergence is slow
-constexpr double kSlow = 0.1;              // contraction per iteration from which a new Jacobian pays
-constexpr double kRounding = 1e-11;        // relative; iterations that stop falling below it are at rounding
+constexpr int kMostIterations = 10;       // at a tolerance
+constexpr int kMostExactIterations = 60;  // to rounding, with a new Jacobian wherever convergence is slow
+constexpr double kSlow = 0.1;             // contraction per iteration from which a new Jacobian pays
+constexpr double kRounding = 1e-11;       // relative; iterations that stop falling below it are at rounding
 
 }  // namespace
 

@@ -1,5 +1,5 @@
 // Implicit methods. Stage 0 of each is the explicit one at the start of the step, f(y0): the estimate and dense output
-// use it. Numbers and the weights of dense output are made by implicit_tableaus.py, beside this file.
+// use it. Numbers and the weights of dense output are made by tableaus.py, beside this file.
 //   Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996): [HW].
 //
 // error_filter is A_ii where it is the same in all implicit stages and the real eigenvalue of A where there is one, so

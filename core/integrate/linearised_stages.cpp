@@ -4,8 +4,7 @@
 
 namespace mbsopt {
 
-LinearisedStages::LinearisedStages(const MechanismData& data, const Method& method)
-    : rk_(method), jacobian_(data) {
+LinearisedStages::LinearisedStages(const MechanismData& data, const Method& method) : rk_(method), jacobian_(data) {
   values_.assign(static_cast<std::size_t>(largest_implicit_group(method)), jacobian_.values());
   std::vector<int> sizes;
   for (const StageGroup& g : method.stage_groups()) {

@@ -12,8 +12,9 @@ class ShiftedSystem {
  public:
   ShiftedSystem(const MechanismData& data, const MotionJacobian& jacobian);
 
-  bool factor(double gamma, const MotionJacobian::Values& values);  // values are kept by reference until the next factor
-  void solve(Eigen::Ref<Eigen::VectorXd> x, int refinements = 0);   // in place, 14 n
+  bool factor(double gamma,
+              const MotionJacobian::Values& values);               // values are kept by reference until the next factor
+  void solve(Eigen::Ref<Eigen::VectorXd> x, int refinements = 0);  // in place, 14 n
   void solve_transposed(Eigen::Ref<Eigen::VectorXd> x, int refinements = 0);
   long factorisations() const { return matrix_.factorisations(); }
 

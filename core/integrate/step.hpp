@@ -24,8 +24,8 @@ struct Step {
   int stages(const Method& rk) const { return dense ? rk.dense_stages : rk.stages; }
 };
 
-// Stage states Y and the upper half (v) of their derivatives K, from the lower half (qdd) of K, for a group whose earlier
-// stages are known:  V_i = v0 + h sum_j A_ij a_j,   Q_i = q0 + h sum_j A_ij V_j.
+// Stage states Y and the upper half (v) of their derivatives K, from the lower half (qdd) of K, for a group whose
+// earlier stages are known:  V_i = v0 + h sum_j A_ij a_j,   Q_i = q0 + h sum_j A_ij V_j.
 inline void set_group_stages(const Method& rk, const StageGroup& g, double h, const Eigen::VectorXd& y0,
                              Eigen::MatrixXd& Y, Eigen::MatrixXd& K) {
   const Eigen::Index n = y0.size() / 2;

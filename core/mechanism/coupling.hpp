@@ -8,7 +8,8 @@
 namespace mbsopt {
 
 struct Coupling {
-  // [i - 1]: the moving bodies (1-based, ascending) whose q and v occur in the six equations of body i, itself included.
+  // [i - 1]: the moving bodies (1-based, ascending) whose q and v occur in the six equations of body i, itself
+  // included.
   std::vector<std::vector<int>> bodies;
   // Per row of Phi: the moving bodies that it ties.
   std::vector<std::vector<int>> rows;

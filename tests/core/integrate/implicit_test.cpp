@@ -21,9 +21,9 @@ TEST_CASE("scratch", "[implicit]") {
       scene.simulation.integrator.type = std::string(rk.name);
       scene.simulation.integrator.step = h;
       const SimulationResult run = simulate(Mechanism(scene, nominal(scene)), scene.simulation);
-      UNSCOPED_INFO(rk.name << " h " << h << " ok " << run.ok() << " " << run.message << " error " << (run.y_end - exact).norm() << " rhs "
-                   << run.statistics.rhs_evaluations << " jac " << run.statistics.jacobians << " fact "
-                   << run.statistics.factorisations);
+      UNSCOPED_INFO(rk.name << " h " << h << " ok " << run.ok() << " " << run.message << " error "
+                            << (run.y_end - exact).norm() << " rhs " << run.statistics.rhs_evaluations << " jac "
+                            << run.statistics.jacobians << " fact " << run.statistics.factorisations);
     }
     scene.simulation.integrator.step.reset();
     if (!rk.adaptive) continue;
@@ -31,10 +31,10 @@ TEST_CASE("scratch", "[implicit]") {
       scene.simulation.integrator.rtol = tol;
       scene.simulation.integrator.atol = tol;
       const SimulationResult run = simulate(Mechanism(scene, nominal(scene)), scene.simulation);
-      UNSCOPED_INFO(rk.name << " tol " << tol << " ok " << run.ok() << " " << run.message << " error " << (run.y_end - exact).norm() << " steps "
-                   << run.statistics.steps << "+" << run.statistics.rejected << " rhs "
-                   << run.statistics.rhs_evaluations << " jac " << run.statistics.jacobians << " fact "
-                   << run.statistics.factorisations);
+      UNSCOPED_INFO(rk.name << " tol " << tol << " ok " << run.ok() << " " << run.message << " error "
+                            << (run.y_end - exact).norm() << " steps " << run.statistics.steps << "+"
+                            << run.statistics.rejected << " rhs " << run.statistics.rhs_evaluations << " jac "
+                            << run.statistics.jacobians << " fact " << run.statistics.factorisations);
     }
   }
   CHECK(false);

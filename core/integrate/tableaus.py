@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Coefficients of the implicit tableaus, for implicit_tableaus.hpp.
+"""Coefficients of the implicit tableaus and of verner6, for implicit_tableaus.hpp and verner6_tableau.hpp.
 
 Works in decimals of 60 digits and prints each number with the 17 that a double holds. A tableau has its A, b, c from
 their defining equations; the weights of dense output,
@@ -229,6 +229,23 @@ def gauss6():
     return gauss(c, real_eigenvalue(collocation(c)[0]))
 
 
+def verner6():
+    """Verner's "most robust" pair of orders 6 and 5; its ninth stage is f(y1)."""
+    def row(*x):
+        return [D(y[0]) / D(y[1]) if isinstance(y, tuple) else D(y) for y in x]
+
+    c = row(0, (9, 50), (1, 6), (1, 4), (53, 100), (3, 5), (4, 5), 1, 1)
+    rows = [[], row((9, 50)), row((29, 324), (25, 324)), row((1, 16), 0, (3, 16)),
+            row((79129, 250000), 0, (-261237, 250000), (19663, 15625)),
+            row((1336883, 4909125), 0, (-25476, 30875), (194159, 185250), (8225, 78546)),
+            row((-2459386, 14727375), 0, (19504, 30875), (2377474, 13615875), (-6157250, 5773131), (902, 735)),
+            row((2699, 7410), 0, (-252, 1235), (-1393253, 3993990), (236875, 72618), (-135, 49), (15, 22)),
+            row((11, 144), 0, 0, (256, 693), 0, (125, 504), (125, 528), (5, 72))]
+    A = [r + [D(0)] * (9 - len(r)) for r in rows]
+    low = row((28, 477), 0, 0, (212, 441), (-312500, 366177), (2125, 1764), 0, (-2105, 35532), (2995, 17766))
+    return c, A, A[8], [x - y for x, y in zip(A[8], low)], D(0)
+
+
 def order_of(A, b, up_to=8):
     b = b + [D(0)] * (len(A) - len(b))
     for n in range(1, up_to + 1):
@@ -257,12 +274,13 @@ def main():
     show("sdirk4", *kennedy_carpenter4(), 4, 4)
     show("radau5", *radau5(), 4, 4)
     show("gauss4", *gauss4(), 3, 3)
-    c, A, b, error, g = gauss6()
-    # A state of order 4 in the middle gives one more stage, and with it order 5; weights are smallest for it there.
-    theta = D(1) / 2
-    row = [sum(x * theta**(j + 1) for j, x in enumerate(w)) for w in dense_weights(A, b, 4, 5)]
-    c, A = with_explicit_stage(c, A, theta, row)
-    show("gauss6", c, A, b, error, g, 5, 5)
+    for name, (c, A, b, error, g) in (("gauss6", gauss6()), ("verner6", verner6())):
+        # A state of order 4 in the middle gives one more stage, and with it order 5; weights are smallest for it there.
+        theta = D(1) / 2
+        row = [sum(x * theta**(j + 1) for j, x in enumerate(w)) for w in dense_weights(A, b, 4, 5)]
+        stages = len(b)
+        c, A = with_explicit_stage(c, A, theta, row)
+        show(name, c, A, b, error, g, 5, 5, stages)
 
 
 main()
