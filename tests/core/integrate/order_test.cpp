@@ -1,0 +1,123 @@
+// The order of each method, measured in the final state, in its tangent-linear derivative and in the adjoint gradient.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "core/integrate/simulation.hpp"
+#include "core/integrate/tableaus.hpp"
+#include "core/scene/type_table.hpp"
+#include "tests/core/mechanism/moving_scenes.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+struct StateNorm final : RunningCost {  // g = |y|^2 + cos(t) y_1
+  double g(double t, VecIn y, VecIn) const override { return y.squaredNorm() + std::cos(t) * y(1); }
+  void add_g_y(double t, VecIn y, VecIn, double scale, VecOut out) const override {
+    out += 2 * scale * y;
+    out(1) += scale * std::cos(t);
+  }
+  void add_g_rho(double, VecIn, VecIn, double, VecOut) const override {}
+};
+struct EndNorm final : TerminalCost {  // |y|^2
+  double value(VecIn y, VecIn) const override { return y.squaredNorm(); }
+  void adjoint_init(VecIn y, VecIn, VecOut lambda, VecOut mu) const override {
+    lambda = 2 * y;
+    mu.setZero();
+  }
+};
+
+struct Derivatives {
+  VectorXd y_end;
+  MatrixXd y_rho;     // by TLM, at the end
+  VectorXd gradient;  // of the objective, by the adjoint
+};
+
+Derivatives solve(Scene scene, const std::string& method, int steps) {
+  scene.simulation.integrator.type = method;
+  scene.simulation.integrator.step = scene.simulation.end_time / steps;
+  const Mechanism m(scene, nominal(scene));
+  std::vector<Cost> costs(1);
+  costs[0].running = point_cost(std::make_shared<StateNorm>(), m.rho());
+  costs[0].terminal = point_cost(std::make_shared<EndNorm>(), m.rho());
+  Derivatives d;
+  TangentSampling end;
+  end.times = {scene.simulation.end_time};
+  end.observe = [&](std::size_t, const StatePoint&, const MatrixXd& y_rho) { d.y_rho = y_rho; };
+  const SimulationResult tlm = simulate_tlm(m, scene.simulation, {}, end);
+  const SimulationResult adjoint = simulate_adjoint(m, scene.simulation, costs);
+  INFO(tlm.message << adjoint.message);
+  REQUIRE((tlm.ok() && adjoint.ok()));
+  d.y_end = tlm.y_end;
+  d.gradient = adjoint.psi_rho.row(0);
+  return d;
+}
+
+// Steps small enough that the leading term of the error rules, and large enough to stay above rounding.
+struct Steps {
+  int pendulum, four_bar;
+};
+Steps steps_for(int order) {
+  switch (order) {
+    case 1:
+      return {800, 800};
+    case 2:
+      return {400, 400};
+    case 3:
+      return {96, 192};
+    case 4:
+      return {96, 192};
+    case 5:
+      return {192, 20};
+    case 6:
+      return {6, 8};
+    default:
+      return {2, 20};
+  }
+}
+
+void check_order(const Scene& scene, const Method& rk, int steps) {
+  const std::string name(rk.name);
+  const Derivatives exact = solve(scene, "dopri853", 120), coarse = solve(scene, name, steps),
+                    fine = solve(scene, name, 2 * steps);
+  const auto order = [&](const auto& part) {
+    return std::log2((part(coarse) - part(exact)).norm() / (part(fine) - part(exact)).norm());
+  };
+  // verner6 is made such that its error terms of h^6 are smaller than those of h^7 at any step that rounding allows: it
+  // converges faster than its order here.
+  const double above = name == "verner6" ? 1.2 : 0.1;
+  const auto check = [&](const char* what, double measured) {
+    INFO(name << ", " << what << ": order " << measured);
+    CHECK(measured > rk.order - 0.1);
+    CHECK(measured < rk.order + above);
+  };
+  check("state", order([](const Derivatives& d) -> const VectorXd& { return d.y_end; }));
+  check("TLM", order([](const Derivatives& d) -> const MatrixXd& { return d.y_rho; }));
+  check("adjoint", order([](const Derivatives& d) -> const VectorXd& { return d.gradient; }));
+}
+
+}  // namespace
+
+TEST_CASE("on the double pendulum state, TLM and adjoint gradient converge at the order of each method", "[order]") {
+  for (const Method& rk : runge_kutta_methods()) {
+    if (!has_word(kIntegrators, rk.name)) continue;
+    Scene scene = double_pendulum();
+    scene.simulation.end_time = 2.4;
+    if (rk.order == 5) {  // falling, since without weight the terms of h^6 of dopri5 exceed those of h^5
+      scene.gravity = {0.0, -9.81, 0.0};
+      scene.simulation.end_time = 2;
+    }
+    check_order(scene, rk, steps_for(rk.order).pendulum);
+  }
+}
+
+TEST_CASE("on a closed loop they do, too, projection included", "[order]") {
+  Scene scene = loaded_four_bar();
+  scene.simulation.end_time = 0.53;
+  for (const Method& rk : runge_kutta_methods()) {
+    if (has_word(kIntegrators, rk.name)) check_order(scene, rk, steps_for(rk.order).four_bar);
+  }
+}
