@@ -215,6 +215,8 @@ const Case kCases[] = {
      "simulation.integrator.type", "did you mean 'dopri5'"},
     {"fixed-step method without a step", R"({"end_time": 5})", R"({"integrator": @{"type": "rk4"}})",
      "simulation.integrator.step", "needs a fixed step"},
+    {"a fixed step for CVODES", R"({"end_time": 5})", R"({"integrator": {"type": "cvodes_bdf", "step": @0.01}})",
+     "simulation.integrator.step", "chooses its own steps"},
     {"tolerance of zero", R"({"end_time": 5})", R"({"integrator": {"rtol": @0}})", "simulation.integrator.rtol",
      "must be greater than 0"},
     {"component missing", R"(, "component": "y")", R"()", "sensors.tip_y.component", "is missing"},
