@@ -23,7 +23,10 @@ std::string derivative(double value) { return std::isfinite(value) ? significant
 
 void print_entries(std::ostream& out, const GradientCheck& check,
                    const std::vector<std::optional<double>>& true_values) {
-  out << "\nfrozen: differences on the steps of the base run; free: with step-size control at work. Relative to tlm:\n";
+  out << (check.discrete ? "\nfrozen: differences on the steps of the base run; free: with step-size control at work. "
+                           "Relative to tlm:\n"
+                         : "\nadjoint, tlm: the sensitivities by CVODES, backward and forward; its steps cannot be "
+                           "frozen. Relative to tlm:\n");
   for (std::size_t i = 0; i < check.objectives.size(); ++i) {
     out << fmt::format("\n{} = {}{}\n", check.objectives[i], significant(check.psi(static_cast<Eigen::Index>(i)), 12),
                        true_extreme_text(true_values[i]));
@@ -31,8 +34,9 @@ void print_entries(std::ostream& out, const GradientCheck& check,
         {"parameter", "adjoint", "tlm", "fd frozen", "fd free", "adjoint = tlm", "fd frozen = tlm", "fd free = tlm"});
     for (const CheckedEntry& e : check.entries) {
       if (e.objective != check.objectives[i]) continue;
-      table.add({e.parameter, derivative(e.adjoint), derivative(e.tlm), derivative(e.frozen), derivative(e.free),
-                 compared(e.exact, e.tlm_adjoint), compared(e.frozen_verdict, e.frozen_difference),
+      table.add({e.parameter, derivative(e.adjoint), derivative(e.tlm), e.frozen_verdict ? derivative(e.frozen) : "-",
+                 derivative(e.free), compared(e.exact, e.tlm_adjoint),
+                 e.frozen_verdict ? compared(*e.frozen_verdict, e.frozen_difference) : "-",
                  e.free_verdict ? compared(*e.free_verdict, e.free_difference) : "-"});
     }
     out << table.text();
@@ -40,6 +44,7 @@ void print_entries(std::ostream& out, const GradientCheck& check,
 }
 
 void print_taylor(std::ostream& out, const GradientCheck& check) {
+  if (check.taylor.empty()) return;
   out << "\nTaylor remainder |psi(rho + h d) - psi - h psi_rho d|, frozen steps, d random in all parameters:\n";
   for (const TaylorCheck& taylor : check.taylor) {
     const std::string found = taylor.slope          ? fmt::format("falls as h^{:.2f}", *taylor.slope)
@@ -62,10 +67,26 @@ std::string weighted_sum(const GradientCheck& check, const Eigen::VectorXd& w) {
 }
 
 void print_identities(std::ostream& out, const GradientCheck& check) {
+  if (check.identities.empty()) return;
   out << "\nadjoint identity w'(psi_rho d) by tlm = (psi_rho'w)'d by adjoint, d random in all parameters, w random:\n";
   for (const IdentityCheck& identity : check.identities) {
     out << fmt::format("  of {}: {:.6g}, defect {:.1e} of its terms: {}\n", weighted_sum(check, identity.w),
                        identity.adjoint, identity.relative_defect, identity.passed ? "agrees" : "DISAGREES");
+  }
+}
+
+// The worst entry of each objective; all of them are in result.json.
+void print_continuous(std::ostream& out, const GradientCheck& check) {
+  if (!check.continuous) return;
+  const ContinuousCheck& c = *check.continuous;
+  if (!c.ran) {
+    out << fmt::format("\nindependent sensitivities by CVODES: not available, {}\n", c.message);
+    return;
+  }
+  out << fmt::format("\n{} by {}, of the differential equation, against the derivatives of {}, both at rtol {:g}:\n",
+                     c.method, c.integrator, c.discrete, c.rtol);
+  for (const std::string& objective : check.objectives) {
+    out << fmt::format("  {}: {}\n", objective, compared(c.worst_verdict(objective), c.worst_difference(objective)));
   }
 }
 
@@ -78,7 +99,7 @@ void print_costs(std::ostream& out, const GradientCheck& check) {
   add("one simulation", check.simulation);
   add("adjoint", check.adjoint_cost);
   add("tlm", check.tlm_cost);
-  add("differences, frozen steps", check.frozen_cost);
+  if (check.discrete) add("differences, frozen steps", check.frozen_cost);
   add("differences, free steps", check.free_cost);
   out << '\n' << table.text();
   out << fmt::format(
@@ -98,6 +119,23 @@ Json gradient_json(const GradientCheck& check, const Eigen::MatrixXd& psi_rho) {
   return gradient;
 }
 
+void add_continuous(Json& result, const GradientCheck& check) {
+  const ContinuousCheck& c = *check.continuous;
+  Json& verdict = result["verdict"]["continuous"];
+  verdict = {{"ran", c.ran}, {"passed", c.passed()}};
+  if (!c.ran) {
+    verdict["message"] = c.message;
+    return;
+  }
+  result["methods"][c.method] = {{"wall_seconds", c.wall_seconds},
+                                 {"integrator", c.integrator},
+                                 {"rtol", c.rtol},
+                                 {"gradient", gradient_json(check, c.psi_rho)}};
+  verdict["method"] = c.method, verdict["against"] = c.discrete, verdict["rtol"] = c.rtol;
+  for (const ContinuousEntry& e : c.entries)
+    verdict["entries"][e.objective][e.parameter] = {{"difference", e.difference}, {"verdict", to_string(e.verdict)}};
+}
+
 void add_to_result(Json& result, const GradientCheck& check, const std::vector<std::optional<double>>& true_values) {
   const Json adjoint = gradient_json(check, check.adjoint);
   for (std::size_t i = 0; i < check.objectives.size(); ++i) {
@@ -112,7 +150,7 @@ void add_to_result(Json& result, const GradientCheck& check, const std::vector<s
   };
   add("adjoint", check.adjoint_cost, check.adjoint);
   add("tlm", check.tlm_cost, check.tlm);
-  add("fd_frozen", check.frozen_cost, check.frozen);
+  if (check.discrete) add("fd_frozen", check.frozen_cost, check.frozen);
   add("fd_free", check.free_cost, check.free);
 
   Json& verdict = result["verdict"];
@@ -125,9 +163,10 @@ void add_to_result(Json& result, const GradientCheck& check, const std::vector<s
         {"frozen_error", e.frozen_error},
         {"free_error", e.free_error},
         {"exact", to_string(e.exact)},
-        {"frozen", to_string(e.frozen_verdict)},
+        {"frozen", e.frozen_verdict ? Json(to_string(*e.frozen_verdict)) : Json()},
         {"free", e.free_verdict ? Json(to_string(*e.free_verdict)) : Json()}};
   }
+  if (check.continuous) add_continuous(result, check);
   for (const TaylorCheck& t : check.taylor)
     verdict["taylor"][t.objective] = {{"slope", or_null(t.slope)}, {"passed", t.passed}};
   for (const IdentityCheck& i : check.identities) {
@@ -174,6 +213,7 @@ int check_command(const CommandContext& context) {
   print_entries(context.out, check, true_values);
   print_taylor(context.out, check);
   print_identities(context.out, check);
+  print_continuous(context.out, check);
   print_costs(context.out, check);
   context.out << fmt::format("\n{}\n", check.passed() ? "all gradients agree" : "THE GRADIENTS DISAGREE");
   if (!check.passed()) run.disagrees();

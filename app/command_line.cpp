@@ -78,7 +78,7 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
   sub.add_flag("--quiet", options.quiet, "no progress on standard error");
   if (name == "gradient") {
     sub.add_option("--method", options.method, "how gradients are computed")
-        ->check(CLI::IsMember({"auto", "tlm", "adjoint", "fd"}))
+        ->check(CLI::IsMember({"auto", "tlm", "adjoint", "cvodes_forward", "cvodes_adjoint", "fd"}))
         ->capture_default_str();
   }
 }

@@ -7,6 +7,7 @@
 #include "app/objective_values.hpp"
 #include "app/run.hpp"
 #include "app/text_table.hpp"
+#include "core/integrate/cvodes.hpp"
 #include "optim/evaluator.hpp"
 
 namespace mbsopt {
@@ -15,6 +16,8 @@ namespace {
 const std::map<std::string, GradientMethod> kMethods{{"auto", GradientMethod::automatic},
                                                      {"tlm", GradientMethod::tlm},
                                                      {"adjoint", GradientMethod::adjoint},
+                                                     {"cvodes_forward", GradientMethod::cvodes_forward},
+                                                     {"cvodes_adjoint", GradientMethod::cvodes_adjoint},
                                                      {"fd", GradientMethod::differences}};
 
 void add_objectives(Run& run, const Evaluation& evaluation, const std::vector<std::optional<double>>& true_values) {
@@ -72,7 +75,11 @@ int gradient_command(const CommandContext& context) {
   }
   const std::string method(to_string(evaluation.method));
   run.result["methods"][method] = {{"wall_seconds", evaluation.wall_seconds}, {"simulations", evaluation.simulations}};
-  print_simulation(context.out, scene, evaluation.statistics);
+  Scene simulated = scene;
+  if (evaluation.method == GradientMethod::cvodes_forward || evaluation.method == GradientMethod::cvodes_adjoint)
+    simulated.simulation = with_cvodes(scene.simulation);
+  run.result["methods"][method]["integrator"] = simulated.simulation.integrator.type;
+  print_simulation(context.out, simulated, evaluation.statistics);
   context.out << fmt::format("gradients by {}, {:.3g} s\n\n", evaluation.choice.empty() ? method : evaluation.choice,
                              evaluation.wall_seconds);
   add_objectives(run, evaluation, evaluator.true_values(evaluator.start()));

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/expression/counted.hpp"
+#include "core/integrate/cvodes.hpp"
 #include "optim/difference_ladder.hpp"
 #include "optim/objective_run.hpp"
 #include "optim/parameter_values.hpp"
@@ -19,6 +20,10 @@ std::string_view to_string(GradientMethod method) {
       return "tlm";
     case GradientMethod::adjoint:
       return "adjoint";
+    case GradientMethod::cvodes_forward:
+      return "cvodes_forward";
+    case GradientMethod::cvodes_adjoint:
+      return "cvodes_adjoint";
     case GradientMethod::differences:
       return "fd";
     case GradientMethod::automatic:
@@ -46,8 +51,9 @@ Evaluator::Evaluator(Scene scene, std::vector<Objective> objectives, const std::
 
 Eigen::VectorXd Evaluator::start() const { return parameter_values(scene_); }
 
-Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSequence* frozen) const {
+Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSequence* frozen, bool by_cvodes) const {
   const Stopwatch stopwatch;
+  const SimulationSettings settings = by_cvodes ? with_cvodes(scene_.simulation) : scene_.simulation;
   Evaluation e;
   e.rho = rho;
   e.psi.setZero(static_cast<Eigen::Index>(objectives_.size()));
@@ -59,13 +65,13 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
     SimulationResult result;
     try {
       const Mechanism mechanism(scene_, rho, active, options_.user_forces);
-      ObjectiveRun objective_run(simulated(), mechanism, scene_.simulation);
+      ObjectiveRun objective_run(simulated(), mechanism, settings);
       result = objective_run.run([&](std::span<const Cost> costs) {
         const RunOptions run_options{frozen, options_.progress};
         ++e.simulations;
-        return sweep == Sweep::tlm       ? simulate_tlm(mechanism, scene_.simulation, costs, {}, run_options)
-               : sweep == Sweep::adjoint ? simulate_adjoint(mechanism, scene_.simulation, costs, run_options)
-                                         : simulate(mechanism, scene_.simulation, costs, {}, run_options);
+        return sweep == Sweep::forward    ? simulate_tlm(mechanism, settings, costs, {}, run_options)
+               : sweep == Sweep::backward ? simulate_adjoint(mechanism, settings, costs, run_options)
+                                          : simulate(mechanism, settings, costs, {}, run_options);
       });
     } catch (const SceneError& error) {  // a field that this rho drives out of its range
       e.ok = false, e.message = error.what();
@@ -139,7 +145,8 @@ void Evaluator::add_differences(Evaluation& e) const {
     const auto psi_at = [&](double h) -> std::optional<Eigen::VectorXd> {
       Eigen::VectorXd rho = e.rho;
       rho(index) += h;
-      const bool frozen = options_.differences.frozen_steps && !simulated_.empty();
+      const bool frozen =
+          options_.differences.frozen_steps && !simulated_.empty() && !is_cvodes(scene_.simulation.integrator.type);
       Evaluation shifted = run(rho, Sweep::none, frozen ? &steps : nullptr);
       e.simulations += shifted.simulations;
       if (!shifted.ok) return std::nullopt;
@@ -170,6 +177,24 @@ Evaluation Evaluator::values_on(const StepSequence& steps, const Eigen::VectorXd
   return run(rho, Sweep::none, simulated_.empty() ? nullptr : &steps);
 }
 
+// The method that is asked for, or what stands for it; `choice` says what that means, where it is not plain.
+GradientMethod Evaluator::available(GradientMethod method, std::string& choice) const {
+  const IntegratorSettings& given = scene_.simulation.integrator;
+  const bool by_cvodes = is_cvodes(given.type);
+  if (by_cvodes && (method == GradientMethod::tlm || method == GradientMethod::adjoint)) {
+    const GradientMethod instead =
+        method == GradientMethod::tlm ? GradientMethod::cvodes_forward : GradientMethod::cvodes_adjoint;
+    choice = fmt::format("{}, where {} was asked for: {} has no discrete derivatives", to_string(instead),
+                         to_string(method), given.type);
+    return instead;
+  }
+  if (!by_cvodes && (method == GradientMethod::cvodes_forward || method == GradientMethod::cvodes_adjoint)) {
+    choice = fmt::format("{}: motion and sensitivities by {} with rtol {:g}, atol {:g}, not by {}", to_string(method),
+                         with_cvodes(scene_.simulation).integrator.type, given.rtol, given.atol, given.type);
+  }
+  return method;
+}
+
 const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
   if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho &&
       (last_.has_gradients() || !last_.ok))
@@ -180,16 +205,23 @@ const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
     method = GradientMethod::tlm;  // nothing to simulate: the objectives' own derivatives
   } else if (method == GradientMethod::automatic) {
     const GradientCost cost = gradient_cost(variables_.size(), simulated_.size());
-    method = cost.tlm <= cost.adjoint ? GradientMethod::tlm : GradientMethod::adjoint;
-    choice = fmt::format("{}: {}, {}; estimated cost in simulations: tlm {:.1f}, adjoint {:.1f}", to_string(method),
-                         counted(variables_.size(), "variable"), counted(simulated_.size(), "objective"), cost.tlm,
-                         cost.adjoint);
+    const bool by_cvodes = is_cvodes(scene_.simulation.integrator.type);
+    const GradientMethod forward = by_cvodes ? GradientMethod::cvodes_forward : GradientMethod::tlm,
+                         backward = by_cvodes ? GradientMethod::cvodes_adjoint : GradientMethod::adjoint;
+    method = cost.tlm <= cost.adjoint ? forward : backward;
+    choice = fmt::format("{}: {}, {}; estimated cost in simulations: {} {:.1f}, {} {:.1f}", to_string(method),
+                         counted(variables_.size(), "variable"), counted(simulated_.size(), "objective"),
+                         to_string(forward), cost.tlm, to_string(backward), cost.adjoint);
+  } else {
+    method = available(method, choice);
   }
   if (method == GradientMethod::differences) {
     last_ = run(rho, Sweep::none, nullptr);
     if (last_.ok) add_differences(last_);
   } else {
-    last_ = run(rho, method == GradientMethod::adjoint ? Sweep::adjoint : Sweep::tlm, nullptr);
+    const bool backward = method == GradientMethod::adjoint || method == GradientMethod::cvodes_adjoint,
+               by_cvodes = method == GradientMethod::cvodes_forward || method == GradientMethod::cvodes_adjoint;
+    last_ = run(rho, backward ? Sweep::backward : Sweep::forward, nullptr, by_cvodes);
   }
   last_.method = simulated_.empty() ? GradientMethod::automatic : method;
   last_.choice = std::move(choice);

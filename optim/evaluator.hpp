@@ -21,13 +21,16 @@
 
 namespace mbsopt {
 
-enum class GradientMethod { automatic, tlm, adjoint, differences };
-std::string_view to_string(GradientMethod method);  // auto, tlm, adjoint, fd
+// tlm and adjoint are the derivatives of the numbers computed; CVODES, which has none of these, answers with its own.
+// cvodes_*: the motion and its continuous sensitivities by CVODES, whatever the scene's integrator (cvodes.hpp).
+enum class GradientMethod { automatic, tlm, adjoint, cvodes_forward, cvodes_adjoint, differences };
+std::string_view to_string(GradientMethod method);  // auto, tlm, adjoint, cvodes_forward, cvodes_adjoint, fd
 
 struct DifferenceSettings {
   double relative_step = 4e-3;  // the largest: of the parameter's value, or of 1 where that is 0
   int rungs = 4;                // steps, each half of the one before
-  bool frozen_steps = true;     // on the steps of the run at the point itself, else with step-size control
+  // On the steps of the run at the point itself, else with step-size control; CVODES always with step-size control.
+  bool frozen_steps = true;
 };
 
 // Estimated cost in simulations, from which `automatic` chooses; measured, see docs/design-optimisation.md.
@@ -45,7 +48,7 @@ struct Evaluation {
   Eigen::VectorXd psi;                                // per objective
   Eigen::MatrixXd psi_rho;                            // objective x variable; 0 x 0 where only values were asked for
   GradientMethod method = GradientMethod::automatic;  // the one used; automatic where no simulation was needed
-  std::string choice;                                 // why, in words, where it was chosen automatically
+  std::string choice;                                 // why, in words, where there is something to say
   SimulationStatistics statistics;
   StepSequence steps;
   long simulations = 0;  // that this evaluation took
@@ -84,8 +87,9 @@ class Evaluator {
   long simulations() const { return simulations_; }                 // since construction
 
  private:
-  enum class Sweep { none, tlm, adjoint };
-  Evaluation run(const Eigen::VectorXd& rho, Sweep sweep, const StepSequence* frozen) const;
+  enum class Sweep { none, forward, backward };
+  Evaluation run(const Eigen::VectorXd& rho, Sweep sweep, const StepSequence* frozen, bool by_cvodes = false) const;
+  GradientMethod available(GradientMethod method, std::string& choice) const;
   void add_parameters_only(Evaluation& e, bool gradients) const;
   void add_differences(Evaluation& e) const;
   std::vector<const Objective*> simulated() const;

@@ -7,6 +7,11 @@
 //                the integrator's error lets them say
 //   identity     for random directions d and weights w: w'(psi_rho d) by TLM = (psi_rho' w)'d by adjoint
 //   Taylor       |psi(rho + h d) - psi(rho) - h psi_rho d| falls as h^2 along a random d, on frozen steps
+//   continuous   sensitivities of the differential equation by CVODES, at tolerances of its own (continuous_check.hpp)
+//
+// A scene whose integrator is CVODES has no discrete derivatives, and its steps cannot be frozen: its forward and
+// adjoint sensitivities stand in the places of TLM and adjoint and agree to `continuous`; frozen, identity and Taylor
+// are left out.
 //
 //   const GradientCheck check = check_gradients(problem);
 //   for (const CheckedEntry& e : check.entries) std::cout << e.parameter << ' ' << e.adjoint << ' ' << e.frozen;
@@ -21,9 +26,11 @@
 #include <utility>
 #include <vector>
 
+#include "optim/continuous_check.hpp"
 #include "optim/evaluator.hpp"
 #include "optim/gradient_timing.hpp"
 #include "optim/problem.hpp"
+#include "optim/verdict.hpp"
 
 namespace mbsopt {
 
@@ -37,29 +44,21 @@ struct CheckThresholds {
   // Entries below this part of the largest (each times its parameter's size) are compared to that part: they are
   // differences of numbers so much larger, and carry their rounding.
   double rounding_floor = 1e-3;
+  // Of CVODES: relative to the entry or to rounding_floor's part, or within the integration errors.
+  double continuous = 1e-6;
 };
-
-enum class Verdict {
-  agrees,  // to the threshold
-  buried,  // to the error of the differences themselves, which is larger than the threshold
-  zero,    // exactly zero by every method
-  failed,  // the differences could not be evaluated
-  disagrees,
-};
-std::string_view to_string(Verdict verdict);  // "agrees", "within its error", "zero", "FAILED", "DISAGREES"
-inline bool passes(Verdict verdict) { return verdict != Verdict::failed && verdict != Verdict::disagrees; }
 
 struct CheckedEntry {
   std::string objective, parameter;
   double tlm = 0, adjoint = 0;
-  double frozen = 0, frozen_error = 0;  // derivative and its estimated error; NaN, infinite where it failed
-  double free = 0, free_error = 0;      // the error with that of the integration
-  double tlm_adjoint = 0;               // relative difference
-  double frozen_difference = 0;         // |frozen - tlm| relative to the entry
-  double free_difference = 0;           // |free - tlm| relative to the entry
-  Verdict exact = Verdict::disagrees;   // TLM against adjoint
-  Verdict frozen_verdict = Verdict::disagrees;
-  std::optional<Verdict> free_verdict;  // where free differences were asked for
+  double frozen = 0, frozen_error = 0;    // derivative and its estimated error; NaN, infinite where it failed
+  double free = 0, free_error = 0;        // the error with that of the integration
+  double tlm_adjoint = 0;                 // relative difference
+  double frozen_difference = 0;           // |frozen - tlm| relative to the entry
+  double free_difference = 0;             // |free - tlm| relative to the entry
+  Verdict exact = Verdict::disagrees;     // TLM against adjoint
+  std::optional<Verdict> frozen_verdict;  // where steps can be frozen
+  std::optional<Verdict> free_verdict;    // where free differences were asked for
 };
 
 struct TaylorRow {
@@ -88,6 +87,8 @@ struct GradientCheck {
   std::vector<CheckedEntry> entries;           // objective by objective
   std::vector<TaylorCheck> taylor;
   std::vector<IdentityCheck> identities;
+  bool discrete = true;                       // false: tlm and adjoint are sensitivities by CVODES
+  std::optional<ContinuousCheck> continuous;  // where it was asked for
   MethodCost simulation, tlm_cost, adjoint_cost, frozen_cost, free_cost;  // differences: of all of them
   int timing_rounds = 0;
   SimulationStatistics statistics;  // of the base run
@@ -100,6 +101,7 @@ struct GradientCheckOptions {
   double relative_step = 1e-2;  // the ladder's largest, of the parameter's size
   int rungs = 8;
   bool free_steps = true;
+  bool continuous = true;        // compare with CVODES, too
   unsigned seed = 1;             // of the random directions
   GradientTimingOptions timing;  // rounds and seconds
   std::vector<std::shared_ptr<const UserForce>> user_forces;

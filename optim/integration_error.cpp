@@ -1,7 +1,5 @@
 #include "optim/integration_error.hpp"
 
-#include "optim/evaluator.hpp"
-
 namespace mbsopt {
 
 IntegrationError integration_error(const Scene& scene, const std::vector<Objective>& objectives,
@@ -17,8 +15,7 @@ IntegrationError integration_error(const Scene& scene, const std::vector<Objecti
   const double factor = given.rtol > 10 * kTightest ? 0.1 : 10;
   Scene other = scene;
   other.simulation.integrator.rtol *= factor, other.simulation.integrator.atol *= factor;
-  Evaluator evaluator(std::move(other), objectives, {},
-                      {GradientMethod::automatic, {}, options.user_forces, options.progress});
+  Evaluator evaluator(std::move(other), objectives, {}, {options.method, {}, options.user_forces, options.progress});
   const Evaluation& e = evaluator.gradients(evaluator.start());
   error.simulations = e.simulations;
   if (!e.ok) return error;

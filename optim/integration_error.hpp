@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/scene/scene.hpp"
+#include "optim/evaluator.hpp"
 
 namespace mbsopt {
 
@@ -24,6 +25,7 @@ struct IntegrationError {
 struct IntegrationErrorOptions {
   std::vector<std::shared_ptr<const UserForce>> user_forces = {};
   std::function<bool(double t)> progress = {};  // within a simulation; false abandons it
+  GradientMethod method = GradientMethod::automatic;
 };
 
 // psi, psi_rho: at the parameters and tolerances of the scene.

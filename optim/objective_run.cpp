@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/integrate/cvodes.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -113,7 +115,9 @@ std::vector<std::optional<double>> true_extremes(const std::vector<const Objecti
   sampling.observe = [&](std::size_t, const StatePoint& at) {
     for (Tracked& t : tracked) t.peak.add(at.t, t.sign * t.x->value(at));
   };
-  if (!simulate(mechanism, settings, {}, sampling, {&steps, {}}).ok()) return values;
+  // CVODES takes its own steps again.
+  const RunOptions options{is_cvodes(settings.integrator.type) ? nullptr : &steps, {}};
+  if (!simulate(mechanism, settings, {}, sampling, options).ok()) return values;
   for (const Tracked& t : tracked) values[t.objective] = t.sign * t.peak.largest();
   return values;
 }

@@ -141,7 +141,7 @@ int ForwardRun::g(realtype t, N_Vector y, N_Vector gdot, void* self) {
 
 void ForwardRun::stop_for(int flag, double t, const char* of_what) {
   double h = 0;
-  CVodeGetLastStep(memory(), &h);
+  CVodeGetCurrentStep(memory(), &h);
   switch (flag) {
     case CV_RHSFUNC_FAIL:
     case CV_FIRST_RHSFUNC_ERR:
@@ -173,7 +173,7 @@ void ForwardRun::stop_for(int flag, double t, const char* of_what) {
     case CV_TOO_CLOSE:
     case CV_LSETUP_FAIL:
       stop(SimulationStatus::step_too_small,
-           fmt::format("no step beyond t = {:.6g} s is small enough for the tolerances (the last good one was {:.3g} "
+           fmt::format("no step beyond t = {:.6g} s is small enough for the tolerances (the last one tried was {:.3g} "
                        "s). Look for a singular position, a spring of zero length or a law that is not smooth near "
                        "this time; CVODES does not project onto the constraints, a Runge-Kutta method may pass it",
                        t, h));

@@ -102,3 +102,16 @@ TEST_CASE("a column or a file that is missing is bad input of every command, at 
   }
   CHECK_FALSE(std::filesystem::exists(folder.path / "out"));
 }
+
+TEST_CASE("identify: the same parameter by the forward sensitivities of CVODES", "[command][cvodes]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", measured_swing(folder));
+  const std::string file = folder.write("fit.json", identification_problem());
+  const CommandOutcome outcome =
+      run_command({"identify", file, "--out", folder.file("out"), "--set", "simulation.integrator.rtol=1e-10", "--set",
+                   "simulation.integrator.type=cvodes_adams"});
+  INFO(outcome.out << outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  const auto result = json_of(folder.path / "out/result.json");
+  CHECK(result.at("parameters").at("k").at("value").get<double>() == Approx(20).epsilon(1e-6));
+}

@@ -251,7 +251,7 @@ TEST_CASE("cvodes_bdf takes long steps where a stiff mode has died out, and its 
   CHECK(20 * bdf.statistics.rhs_evaluations < rk.statistics.rhs_evaluations);
   CHECK(bdf.psi(0) == Approx(rk.psi(0)).epsilon(1e-6));
   // An explicit method's derivatives, too, are stable only below its limit: 6 over the fast mode's 5e4 1/s.
-  SimulationSettings settings = by("cvodes_bdf", 1e-10, scene.simulation), small_steps;
+  SimulationSettings settings = by("cvodes_bdf", 1e-11, scene.simulation), small_steps;
   settings.end_time = 0.2;
   small_steps = by("dopri853", 1e-10, settings);
   small_steps.integrator.max_step = 5e-5;

@@ -1,0 +1,22 @@
+// What a comparison of two derivatives found.
+#pragma once
+
+#include <string_view>
+
+namespace mbsopt {
+
+enum class Verdict {
+  agrees,  // to the threshold
+  buried,  // to the error of the differences themselves, which is larger than the threshold
+  zero,    // exactly zero by every method
+  failed,  // the differences could not be evaluated
+  disagrees,
+};
+std::string_view to_string(Verdict verdict);  // "agrees", "within its error", "zero", "FAILED", "DISAGREES"
+inline bool passes(Verdict verdict) { return verdict != Verdict::failed && verdict != Verdict::disagrees; }
+
+// A derivative that is known to `error` against one that it should equal: within threshold * entry it agrees. Its own
+// error, trusted to some times its estimate, counts only where it hides the entry at this threshold.
+Verdict verdict_of(double found, double error, double expected, double entry, double threshold);
+
+}  // namespace mbsopt
