@@ -21,15 +21,20 @@ Json to_json(const ModelSummary& summary) {
 }
 
 Json to_json(const SimulationStatistics& statistics) {
-  return {{"steps", statistics.steps},
-          {"rejected", statistics.rejected},
-          {"rhs_evaluations", statistics.rhs_evaluations},
-          {"factorisations", statistics.factorisations},
-          {"wall_seconds", statistics.wall_seconds},
-          {"max_acceleration_residual", statistics.max_acceleration_residual},
-          {"max_position_violation", statistics.max_position_violation},
-          {"max_velocity_violation", statistics.max_velocity_violation},
-          {"energy_drift", statistics.energy_drift}};
+  Json json{{"steps", statistics.steps},
+            {"rejected", statistics.rejected},
+            {"rhs_evaluations", statistics.rhs_evaluations},
+            {"factorisations", statistics.factorisations},
+            {"wall_seconds", statistics.wall_seconds},
+            {"max_acceleration_residual", statistics.max_acceleration_residual},
+            {"max_position_violation", statistics.max_position_violation},
+            {"max_velocity_violation", statistics.max_velocity_violation},
+            {"energy_drift", statistics.energy_drift}};
+  if (statistics.adjoint_memory_bytes > 0) {
+    json["adjoint_memory_bytes"] = statistics.adjoint_memory_bytes;
+    json["recomputed_steps"] = statistics.recomputed_steps;
+  }
+  return json;
 }
 
 Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }

@@ -126,6 +126,11 @@ void print_simulation(std::ostream& out, const Scene& scene, const SimulationSta
       "J{}\n",
       statistics.max_position_violation, statistics.max_velocity_violation, statistics.energy_drift,
       conserves_energy(scene) ? "" : fmt::format(" ({})", kWorkIsDone));
+  if (statistics.recomputed_steps > 0) {
+    out << fmt::format("the adjoint kept {:.3g} MiB of the motion and computed {} again\n",
+                       static_cast<double>(statistics.adjoint_memory_bytes) / (1024 * 1024),
+                       counted(statistics.recomputed_steps, "step"));
+  }
   if (statistics.max_acceleration_residual > 1e-6) {
     out << fmt::format(
         "the constraints' accelerations were met to {:.1e} only: a singular position, or masses that differ too much "

@@ -73,6 +73,8 @@ void add_simulation(HtmlPage& page, const Scene& scene, const Json& result) {
               {{"steps", "steps"},
                {"rejected", "rejected steps"},
                {"rhs_evaluations", "right-hand sides"},
+               {"adjoint_memory_bytes", "kept for the adjoint [bytes]"},
+               {"recomputed_steps", "steps computed again for it"},
                {"max_position_violation", "largest violation, positions", 2},
                {"max_velocity_violation", "largest violation, velocities", 2},
                {"energy_drift",

@@ -176,10 +176,11 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
                       const std::function<bool(double)>& wants_dense, const Sink& accepted, const RunOptions& options,
                       SimulationResult& result) {
   const IntegratorSettings& s = settings_.integrator;
-  const double end = settings_.end_time, span = end - settings_.start_time;
+  const double end = options.frozen ? options.frozen->end.value_or(settings_.end_time) : settings_.end_time;
+  const double span = end - settings_.start_time;
   const bool adaptive = !s.step && !options.frozen && rk_.adaptive;
   angles_ = angles;
-  step_.t = settings_.start_time;
+  step_.t = options.frozen && !options.frozen->times.empty() ? options.frozen->times[0] : settings_.start_time;
   step_.y0 = y_initial;
   step_.angles0 = angles;
   const Energy e = energy(mechanism_.data(), y_initial, angles);

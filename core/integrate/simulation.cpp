@@ -8,6 +8,7 @@
 
 #include "core/dynamics/assembly.hpp"
 #include "core/dynamics/motion_solver.hpp"
+#include "core/integrate/checkpoints.hpp"
 #include "core/integrate/cvodes.hpp"
 #include "core/integrate/explicit_adjoint.hpp"
 #include "core/integrate/explicit_run.hpp"
@@ -134,6 +135,48 @@ class Run {
   Eigen::VectorXd angles_end_;
 };
 
+// Computes steps of a run again, bit for bit.
+class Replayer {
+ public:
+  Replayer(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
+           const StepSequence& steps)
+      : mechanism_(mechanism), settings_(settings), method_(method), steps_(steps) {}
+
+  bool replay(const Snapshot& from, long last, const std::function<bool()>& dense,
+              const std::function<void(const Step&)>& sink) {
+    if (!run_) run_.emplace(mechanism_, settings_, method_);
+    Snapshot at = from;
+    while (at.step < last) {
+      const long next = std::min(last, at.step + kStretch);
+      StepSequence part;
+      part.times.assign(steps_.times.begin() + at.step, steps_.times.begin() + next);
+      part.sizes.assign(steps_.sizes.begin() + at.step, steps_.sizes.begin() + next);
+      if (static_cast<std::size_t>(next) < steps_.times.size()) {
+        part.end = steps_.times[static_cast<std::size_t>(next)];
+      }
+      SimulationResult result;
+      RunOptions options;
+      options.frozen = &part;
+      run_->run(
+          at.y0, at.angles, [&](double) { return dense(); }, sink, options, result);
+      factorisations_ = result.statistics.factorisations;  // of all calls so far
+      if (!result.ok()) return false;
+      at = {next, result.y_end, run_->angles()};
+    }
+    return true;
+  }
+  long factorisations() const { return factorisations_; }
+
+ private:
+  static constexpr long kStretch = 256;  // steps at once: their list is copied
+  const Mechanism& mechanism_;
+  const SimulationSettings& settings_;
+  const Method& method_;
+  const StepSequence& steps_;
+  std::optional<ExplicitRun> run_;  // made where it is needed
+  long factorisations_ = 0;
+};
+
 }  // namespace
 
 SimulationResult simulate(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
@@ -166,23 +209,30 @@ SimulationResult simulate_adjoint(const Mechanism& mechanism, const SimulationSe
   Run run(mechanism, settings, costs);
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
-  std::vector<StoredStep> kept;
+  Checkpoints checkpoints(run.method(), settings.adjoint_memory_mib);
   run.go({}, {}, options, [&](const Step& step, std::span<const SampleEvent> events) {
-    kept.emplace_back(step, run.method(), events);
-    result.statistics.adjoint_memory_bytes += kept.back().bytes();
+    checkpoints.keep(step, events);
     return true;
   });
   if (!result.ok()) return run.finish();
   AdjointSweep sweep(mechanism, settings, run.method(), costs);
   sweep.begin(settings.end_time, result.y_end, run.angles_end());
-  while (!kept.empty()) {
-    if (!sweep.step_back(kept.back())) {
-      result.status = SimulationStatus::not_finite;
-      result.message =
-          fmt::format("the adjoint met a matrix that cannot be factored in the step at t = {:.6g} s", kept.back().t);
-      return run.finish();
-    }
-    kept.pop_back();
+  Replayer replayer(mechanism, settings, run.method(), result.steps);
+  double t_back = settings.end_time;
+  const bool swept = checkpoints.go_back([&](const Snapshot& from, long last, const auto& dense,
+                                             const auto& sink) { return replayer.replay(from, last, dense, sink); },
+                                         [&](const StoredStep& step) {
+                                           t_back = step.t;
+                                           return sweep.step_back(step);
+                                         });
+  result.statistics.adjoint_memory_bytes = checkpoints.peak_bytes();
+  result.statistics.recomputed_steps = checkpoints.recomputed_steps();
+  result.statistics.factorisations += replayer.factorisations();
+  if (!swept) {
+    result.status = SimulationStatus::not_finite;
+    result.message =
+        fmt::format("the adjoint met a matrix that cannot be factored in the step at t = {:.6g} s", t_back);
+    return run.finish();
   }
   Eigen::MatrixXd mu = sweep.mu();
   run.assembly().add_adjoint(sweep.lambda(), mu);

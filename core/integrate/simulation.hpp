@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -24,6 +25,7 @@ class Mechanism;
 // Accepted steps: times.size() == sizes.size(); step i goes from times[i] by sizes[i].
 struct StepSequence {
   std::vector<double> times, sizes;
+  std::optional<double> end = {};  // of the last step; the end time when absent
 };
 
 struct SimulationStatistics {
@@ -34,7 +36,8 @@ struct SimulationStatistics {
   double max_velocity_violation = 0;                              // of |Phi_q v + Phi_t|
   double energy_initial = 0, energy_final = 0, energy_drift = 0;  // drift: largest |E - E(0)| over accepted steps [J]
   double max_acceleration_residual = 0;  // relative, of the constraints' accelerations (augmented Lagrangian)
-  std::size_t adjoint_memory_bytes = 0;  // what the backward sweep kept of the forward run
+  std::size_t adjoint_memory_bytes = 0;  // the most that the backward sweep kept of the forward run
+  long recomputed_steps = 0;             // for want of memory, of the backward sweep
 };
 
 enum class SimulationStatus {

@@ -37,6 +37,7 @@ struct SimulationSettings {
   std::optional<double> output_step;    // default: 200 rows
   FormulationSettings formulation;
   IntegratorSettings integrator;
+  double adjoint_memory_mib = 256;  // what an adjoint run keeps of the forward motion, at most [MiB]
 };
 
 }  // namespace mbsopt

@@ -7,3 +7,9 @@
 #pragma once
 
 long allocation_count();
+
+// What is allocated and not freed [bytes], with the heap's own overhead as far as it is per block; its largest value
+// since the last call of restart_most_allocated().
+long allocated_bytes();
+long most_allocated_bytes();
+void restart_most_allocated();

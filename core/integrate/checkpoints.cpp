@@ -1,0 +1,208 @@
+#include "core/integrate/checkpoints.hpp"
+
+#include <algorithm>
+
+namespace mbsopt {
+namespace {
+
+constexpr std::size_t kBlock = 24;       // what an allocation costs beside its contents, at most [bytes]
+constexpr std::size_t kStepListed = 32;  // times and sizes in the list of steps, with room to grow
+constexpr std::size_t kStepBlocks = 12;  // allocations of a StoredStep
+constexpr std::size_t kSnapshotBlocks = 3;
+constexpr std::size_t kLeastSteps = 2, kLeastSnapshots = 8;  // below these no budget can push
+
+std::size_t bytes_of(const StoredStep& step) { return step.bytes() + kStepBlocks * kBlock; }
+
+// (s + r)!/(s! r!), no more than `most`; 0 for r < 0.
+long beta(long s, long r, long most) {
+  if (r < 0) return 0;
+  double value = 1;  // exact as long as it counts
+  for (long i = 1; i <= std::min(s, r); ++i) {
+    value = value * static_cast<double>(std::max(s, r) + i) / static_cast<double>(i);
+    if (value >= static_cast<double>(most)) return most;
+  }
+  return static_cast<long>(value + 0.5);
+}
+
+long repetitions(long blocks, long snapshots) {
+  long r = 0;
+  while (beta(snapshots, r, blocks) < blocks) ++r;
+  return r;
+}
+
+}  // namespace
+
+// Optimal where  beta(s, r-2) <= m <= beta(s, r-1)  and  beta(s-1, r-1) <= N - m <= beta(s-1, r).
+long binomial_split(long blocks, long snapshots) {
+  const long r = repetitions(blocks, snapshots);
+  return std::min(beta(snapshots, r - 1, blocks), blocks - beta(snapshots - 1, r - 1, blocks));
+}
+
+long binomial_cost(long blocks, long snapshots) {
+  const long r = repetitions(blocks, snapshots), most = r * blocks;
+  return r * blocks - beta(snapshots + 1, r - 1, most);
+}
+
+Checkpoints::Checkpoints(const Method& method, double budget_mib)
+    : rk_(method), budget_(static_cast<std::size_t>(std::min(budget_mib, 1e9) * 1024 * 1024)) {}
+
+std::size_t Checkpoints::limit() const {
+  const std::size_t listed =
+      static_cast<std::size_t>(steps_) * kStepListed + events_.size() * sizeof(std::pair<long, SampleEvent>);
+  const std::size_t least = kLeastSteps * step_bytes_ + kLeastSnapshots * snapshot_bytes_;
+  return budget_ > listed + least ? budget_ - listed : least;
+}
+
+std::size_t Checkpoints::room() const { return limit() > bytes_ ? limit() - bytes_ : 0; }
+
+void Checkpoints::count(std::size_t more) {
+  bytes_ += more;
+  peak_ = std::max(peak_, bytes_ + static_cast<std::size_t>(steps_) * kStepListed +
+                              events_.size() * sizeof(std::pair<long, SampleEvent>));
+}
+
+std::size_t Checkpoints::bytes_of(const Snapshot& s) const {
+  return sizeof(s) + sizeof(double) * static_cast<std::size_t>(s.y0.size() + s.angles.size()) +
+         kSnapshotBlocks * kBlock;
+}
+
+void Checkpoints::add(Snapshot s) {
+  count(bytes_of(s));
+  snapshots_.push_back(std::move(s));
+}
+
+void Checkpoints::drop_newest() {
+  bytes_ -= bytes_of(snapshots_.back());
+  snapshots_.pop_back();
+}
+
+void Checkpoints::keep(const Step& step, std::span<const SampleEvent> events) {
+  if (steps_ == 0) {
+    Step with_dense_output = step;
+    with_dense_output.dense = true;
+    step_bytes_ = mbsopt::bytes_of(StoredStep(with_dense_output, rk_, {}));
+    snapshot_bytes_ = bytes_of(Snapshot{0, step.y0, step.angles0});
+  }
+  const long index = steps_++;
+  if (every_ == 0 && bytes_ + step_bytes_ > limit()) turn_steps_into_snapshots();
+  if (every_ == 0) {
+    kept_.emplace_back(step, rk_, events);
+    count(mbsopt::bytes_of(kept_.back()));
+    return;
+  }
+  for (const SampleEvent& e : events) {
+    if (e.cost) events_.emplace_back(index, e);
+  }
+  if (index % every_ != 0) return;
+  add({index, step.y0, step.angles0});
+  thin_out();
+}
+
+void Checkpoints::turn_steps_into_snapshots() {
+  every_ = 1;
+  for (long index = 0; !kept_.empty(); ++index) {
+    StoredStep& step = kept_.front();
+    bytes_ -= mbsopt::bytes_of(step);
+    for (const SampleEvent& e : step.samples) events_.emplace_back(index, e);
+    add({index, std::move(step.y0), std::move(step.angles0)});
+    kept_.pop_front();
+  }
+  thin_out();
+}
+
+void Checkpoints::thin_out() {
+  while (bytes_ > limit() / 2 && snapshots_.size() > kLeastSnapshots / 2) {
+    every_ *= 2;
+    std::erase_if(snapshots_, [&](const Snapshot& s) { return s.step % every_ != 0; });
+    bytes_ = 0;
+    for (const Snapshot& s : snapshots_) bytes_ += bytes_of(s);
+  }
+}
+
+bool Checkpoints::go_back(const Replay& replay, const StepBack& back) {
+  replay_ = replay;
+  back_ = back;
+  if (!back_over_kept()) return false;
+  for (long last = steps_; !snapshots_.empty();) {
+    if (!reverse(snapshots_.back(), last)) return false;
+    last = snapshots_.back().step;
+    drop_newest();
+  }
+  return true;
+}
+
+bool Checkpoints::back_over_kept() {
+  while (!kept_.empty()) {
+    if (!back_(kept_.back())) return false;
+    bytes_ -= mbsopt::bytes_of(kept_.back());
+    kept_.pop_back();
+  }
+  return true;
+}
+
+bool Checkpoints::reverse(const Snapshot& from, long last) {
+  const std::size_t length = static_cast<std::size_t>(last - from.step), free = std::max(room(), step_bytes_);
+  if (length * step_bytes_ <= free) return keep_and_go_back(from, from.step, last);
+  const std::size_t block = std::max<std::size_t>(free / 2 / step_bytes_, 1);
+  const std::size_t left = free - block * step_bytes_;
+  return reverse_blocks(from, last, static_cast<long>(block), 1 + static_cast<long>(left / snapshot_bytes_));
+}
+
+bool Checkpoints::reverse_blocks(const Snapshot& from, long last, long block, long snapshots) {
+  const long blocks = (last - from.step + block - 1) / block;
+  if (snapshots <= 1 || blocks == 1) {
+    for (long k = blocks; k-- > 0; last = from.step + k * block) {
+      if (!keep_and_go_back(from, from.step + k * block, last)) return false;
+    }
+    return true;
+  }
+  Snapshot middle;
+  middle.step = from.step + block * binomial_split(blocks, snapshots);
+  if (!advance(from, middle)) return false;
+  count(bytes_of(middle));
+  if (!reverse_blocks(middle, last, block, snapshots - 1)) return false;
+  bytes_ -= bytes_of(middle);
+  return reverse_blocks(from, middle.step, block, snapshots);
+}
+
+bool Checkpoints::advance(const Snapshot& from, Snapshot& to) {
+  long index = from.step;
+  return run_again(
+      from, to.step, [] { return false; },
+      [&](const Step& step) {
+        if (++index != to.step) return;
+        to.y0 = step.y1;
+        to.angles = step.angles1;
+      });
+}
+
+bool Checkpoints::run_again(const Snapshot& from, long last, const std::function<bool()>& dense,
+                            const std::function<void(const Step&)>& sink) {
+  recomputed_ += last - from.step;
+  return replay_(from, last, dense, sink);
+}
+
+// Computes from..last again, keeps the steps from `first` on, and goes back over these.
+bool Checkpoints::keep_and_go_back(const Snapshot& from, long first, long last) {
+  long index = from.step;
+  const auto events_in = [&](long step) {
+    const auto [begin, end] = std::equal_range(events_.begin(), events_.end(), std::pair(step, SampleEvent{}),
+                                               [](const auto& a, const auto& b) { return a.first < b.first; });
+    return std::span(begin, end);
+  };
+  std::vector<SampleEvent> events;
+  const bool ok = run_again(
+      from, last, [&] { return index >= first && !events_in(index).empty(); },
+      [&](const Step& step) {
+        if (index >= first) {
+          events.clear();
+          for (const auto& [of, event] : events_in(index)) events.push_back(event);
+          kept_.emplace_back(step, rk_, events);
+          count(mbsopt::bytes_of(kept_.back()));
+        }
+        ++index;
+      });
+  return ok && back_over_kept();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,78 @@
+// What an adjoint run keeps of the forward motion, within a budget of memory.
+//
+// While all steps fit they are kept, and nothing is computed twice. Beyond that the forward run keeps the state at the
+// start of every k-th step, k doubled whenever these snapshots fill half of the budget. Going back, the steps from one
+// snapshot to the next are computed again and kept; where they do not fit either, more snapshots are placed in between
+// by the binomial rule. The steps are those of the forward run, bit for bit, so that derivatives do not depend on the
+// budget.
+//
+//   N blocks of steps are reversed from s snapshots (the one at their start included) with the least number of block
+//   evaluations beside those that keep steps, t(N, s) = r N - beta(s + 1, r - 1), beta(s, r) = (s + r)!/(s! r!), r the
+//   least with beta(s, r) >= N:  Griewank, Walther, "Algorithm 799: revolve", ACM TOMS 26 (2000).
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <utility>
+
+#include "core/integrate/explicit_adjoint.hpp"
+
+namespace mbsopt {
+
+// The state before a step, from where the run may go on.
+struct Snapshot {
+  long step = 0;
+  Eigen::VectorXd y0, angles;
+};
+
+// Where to place the next snapshot: after how many of N >= 2 blocks, with s snapshots in all. And t(N, s).
+long binomial_split(long blocks, long snapshots);
+long binomial_cost(long blocks, long snapshots);
+
+class Checkpoints {
+ public:
+  Checkpoints(const Method& method, double budget_mib);
+
+  // Forward: each accepted step in turn, with the samples in it.
+  void keep(const Step& step, std::span<const SampleEvent> events);
+
+  // Computes the steps from a snapshot up to, not including, `last` again, and hands each to a sink; dense(): whether
+  // the step at hand needs dense output. False where that fails.
+  using Replay = std::function<bool(const Snapshot& from, long last, const std::function<bool()>& dense,
+                                    const std::function<void(const Step&)>& sink)>;
+  using StepBack = std::function<bool(const StoredStep&)>;
+  // Backward: every step, the last one first. False as soon as either function says so.
+  bool go_back(const Replay& replay, const StepBack& back);
+
+  std::size_t peak_bytes() const { return peak_; }
+  long recomputed_steps() const { return recomputed_; }
+
+ private:
+  std::size_t limit() const;  // of what is kept beside the list of steps
+  std::size_t room() const;
+  void count(std::size_t more);
+  std::size_t bytes_of(const Snapshot& s) const;
+  void add(Snapshot s);
+  void drop_newest();
+  void thin_out();
+  void turn_steps_into_snapshots();
+  bool reverse(const Snapshot& from, long last);
+  bool reverse_blocks(const Snapshot& from, long last, long block, long snapshots);
+  bool keep_and_go_back(const Snapshot& from, long first, long last);
+  bool advance(const Snapshot& from, Snapshot& to);
+  bool run_again(const Snapshot& from, long last, const std::function<bool()>& dense,
+                 const std::function<void(const Step&)>& sink);
+  bool back_over_kept();
+
+  const Method& rk_;
+  std::size_t budget_, bytes_ = 0, peak_ = 0;
+  std::size_t step_bytes_ = 0, snapshot_bytes_ = 0;  // of one step with dense output, of one snapshot
+  long steps_ = 0, every_ = 0, recomputed_ = 0;      // every_: distance of snapshots; 0 while all steps are kept
+  std::deque<StoredStep> kept_;
+  std::deque<Snapshot> snapshots_;
+  std::vector<std::pair<long, SampleEvent>> events_;  // by step, where steps are not kept
+  Replay replay_;
+  StepBack back_;
+};
+
+}  // namespace mbsopt

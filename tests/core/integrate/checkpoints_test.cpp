@@ -1,0 +1,159 @@
+#include "core/integrate/checkpoints.hpp"
+
+#include <catch2/catch.hpp>
+#include <map>
+
+#include "core/integrate/simulation.hpp"
+#include "tests/core/mechanism/moving_scenes.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+using Eigen::VectorXd;
+
+namespace {
+
+// t(N, s) by trying every split: the definition.
+long least_cost(long blocks, long snapshots, std::map<std::pair<long, long>, long>& known) {
+  if (blocks == 1) return 0;
+  if (snapshots == 1) return blocks * (blocks - 1) / 2;
+  const auto [at, is_new] = known.try_emplace({blocks, snapshots}, 0);
+  if (!is_new) return at->second;
+  long best = blocks * blocks;
+  for (long m = 1; m < blocks; ++m) {
+    best = std::min(best, m + least_cost(blocks - m, snapshots - 1, known) + least_cost(m, snapshots, known));
+  }
+  return known[{blocks, snapshots}] = best;
+}
+
+// A run whose step i holds the number i in its state: what is replayed and what comes back can be told apart.
+struct CountedRun {
+  const Method& rk = *explicit_method("dopri5");
+  static constexpr Eigen::Index kStates = 6;
+
+  Step step(long i) const {
+    Step s;
+    s.t = static_cast<double>(i), s.h = 1, s.t1 = s.t + 1;
+    s.y0 = s.y_hat = VectorXd::Constant(kStates, static_cast<double>(i));
+    s.y1 = VectorXd::Constant(kStates, static_cast<double>(i + 1));
+    s.angles0 = s.angles1 = VectorXd::Zero(0);
+    s.Y = s.K = Eigen::MatrixXd::Zero(kStates, rk.dense_stages);
+    s.lambda.setZero(2, rk.dense_stages);
+    return s;
+  }
+
+  struct Outcome {
+    long recomputed = 0;
+    std::size_t peak = 0;
+    bool right = true;
+  };
+  Outcome go(long steps, double budget_mib) const {
+    Checkpoints checkpoints(rk, budget_mib);
+    for (long i = 0; i < steps; ++i) checkpoints.keep(step(i), {});
+    Outcome outcome;
+    long next = steps - 1;
+    const bool done = checkpoints.go_back(
+        [&](const Snapshot& from, long last, const auto&, const auto& sink) {
+          outcome.right = outcome.right && from.y0(0) == static_cast<double>(from.step) && last > from.step;
+          for (long i = from.step; i < last; ++i) sink(step(i));
+          return true;
+        },
+        [&](const StoredStep& s) {
+          outcome.right = outcome.right && s.y0(0) == static_cast<double>(next) && s.t == static_cast<double>(next);
+          --next;
+          return true;
+        });
+    outcome.right = outcome.right && done && next == -1;
+    outcome.recomputed = checkpoints.recomputed_steps();
+    outcome.peak = checkpoints.peak_bytes();
+    return outcome;
+  }
+};
+
+struct StateNorm final : PointCost {
+  double value(const StatePoint& at) const override { return at.y.squaredNorm(); }
+  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut) const override {
+    y_bar += 2 * scale * at.y;
+    return at.y.squaredNorm();
+  }
+};
+
+Cost sampled_cost() {
+  Cost cost;
+  cost.running = cost.terminal = std::make_shared<StateNorm>();
+  for (const double t : {0.0, 0.01, 0.2, 0.2001, 0.33, 0.48}) {
+    cost.samples.push_back({t, std::make_shared<StateNorm>()});
+  }
+  return cost;
+}
+
+}  // namespace
+
+TEST_CASE("the binomial rule places snapshots with the least recomputation", "[checkpoints]") {
+  std::map<std::pair<long, long>, long> known;
+  for (long snapshots = 2; snapshots <= 6; ++snapshots) {
+    for (long blocks = 2; blocks <= 60; ++blocks) {
+      const long m = binomial_split(blocks, snapshots);
+      INFO(blocks << " blocks, " << snapshots << " snapshots, split after " << m);
+      REQUIRE(m >= 1);
+      REQUIRE(m < blocks);
+      const long best = least_cost(blocks, snapshots, known);
+      CHECK(m + least_cost(blocks - m, snapshots - 1, known) + least_cost(m, snapshots, known) == best);
+      CHECK(binomial_cost(blocks, snapshots) == best);
+    }
+  }
+}
+
+TEST_CASE("every step comes back once, in order, whatever the budget", "[checkpoints]") {
+  const CountedRun run;
+  for (const long steps : {1L, 2L, 7L, 100L, 1000L, 4096L}) {
+    for (const double mib : {1e-9, 0.02, 0.1, 0.5, 64.0}) {
+      const CountedRun::Outcome outcome = run.go(steps, mib);
+      INFO(steps << " steps, " << mib << " MiB: peak " << outcome.peak << ", recomputed " << outcome.recomputed);
+      CHECK(outcome.right);
+      // At 32 bytes per step the list of the steps alone passes the smallest budgets.
+      if (mib * 1024 * 1024 > 3e4 + 40.0 * static_cast<double>(steps)) {
+        CHECK(static_cast<double>(outcome.peak) <= mib * 1024 * 1024);
+      }
+      if (mib == 64.0) CHECK(outcome.recomputed == 0);
+    }
+  }
+}
+
+TEST_CASE("recomputation grows as the binomial rule promises", "[checkpoints]") {
+  const CountedRun run;
+  // Where snapshots of the forward run lie so near that the steps between two of them fit: each step once.
+  CHECK(run.go(4096, 1.0).recomputed <= 4096);
+  // With next to nothing: the least allowance holds 2 steps and 8 snapshots, at most 4 of these from the forward run.
+  // So no interval is longer than half of the run, and single steps are reversed from 4 snapshots or more.
+  for (const long steps : {100L, 1000L, 4096L}) {
+    const CountedRun::Outcome outcome = run.go(steps, 1e-9);
+    const long longest = steps / 2 + 1;
+    INFO(steps << " steps: " << outcome.recomputed);
+    CHECK(outcome.recomputed > steps);
+    CHECK(outcome.recomputed <= 2 * (binomial_cost(longest, 4) + longest));
+  }
+}
+
+TEST_CASE("a gradient is the same to the last bit whatever the memory", "[checkpoints]") {
+  Scene scene = loaded_four_bar();
+  scene.simulation.end_time = 0.48;
+  scene.simulation.integrator.type = GENERATE(as<std::string>{}, "dopri5", "dopri853", "rk4");
+  if (scene.simulation.integrator.type == "rk4") scene.simulation.integrator.step = 0.001;
+  scene.simulation.integrator.max_step = 0.002;
+  const Mechanism mechanism(scene, nominal(scene));
+  const std::vector<Cost> costs{sampled_cost()};
+  const SimulationResult free = simulate_adjoint(mechanism, scene.simulation, costs);
+  REQUIRE(free.ok());
+  CHECK(free.statistics.recomputed_steps == 0);
+  for (const double mib : {0.15, 1e-6}) {
+    scene.simulation.adjoint_memory_mib = mib;
+    const SimulationResult bound = simulate_adjoint(mechanism, scene.simulation, costs);
+    INFO(scene.simulation.integrator.type << ", " << mib << " MiB: " << free.statistics.steps << " steps, "
+                                          << bound.statistics.recomputed_steps << " recomputed");
+    REQUIRE(bound.ok());
+    CHECK(bound.psi == free.psi);
+    CHECK(bound.psi_rho == free.psi_rho);
+    CHECK(bound.statistics.adjoint_memory_bytes < free.statistics.adjoint_memory_bytes);
+    if (mib < 0.1) CHECK(bound.statistics.recomputed_steps > bound.statistics.steps);
+  }
+}
