@@ -94,6 +94,7 @@ class FieldPaths {
   }
   void version(std::string_view, int, const Says&) {}
   void later(std::string_view, std::string_view) {}
+  void misplaced(std::string_view, std::string_view) {}
   void rest_unknown() {}
 
  private:

@@ -315,10 +315,16 @@ void Reader::version(std::string_view key, int only, const Says& says) {
 }
 
 void Reader::later(std::string_view key, std::string_view what) {
+  refuse(key, std::string(what) + " is not available in this version");
+}
+
+void Reader::misplaced(std::string_view key, std::string_view where) { refuse(key, "is " + std::string(where)); }
+
+void Reader::refuse(std::string_view key, const std::string& message) {
   const Node* const node = node_.find(key);
   if (!node) return;
   known_.emplace_back(key);
-  findings_.add(*node, inside(key), std::string(what) + " is not available in this version");
+  findings_.add(*node, inside(key), message);
 }
 
 }  // namespace mbsopt

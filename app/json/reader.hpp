@@ -104,6 +104,7 @@ class Reader {
 
   void version(std::string_view key, int only, const Says& says);
   void later(std::string_view key, std::string_view what);
+  void misplaced(std::string_view key, std::string_view where);
   void rest_unknown() { rest_unknown_ = true; }
   // At the end of an object: keys that it does not have, and required ones that are missing. A key that is both unknown
   // and like a missing one is one finding.
@@ -117,6 +118,7 @@ class Reader {
   };
   const Missing* missing_like(const std::string& unknown) const;
   void skip(std::string_view key, const Says& says) { get(key, says); }
+  void refuse(std::string_view key, const std::string& message);  // where it is given
 
   // The value of a key, which from now on is known; nullptr (and a finding where it is required) when it is absent.
   const Node* get(std::string_view key, const Says& says);

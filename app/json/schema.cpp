@@ -152,6 +152,7 @@ class SchemaWriter {
   }
   void version(std::string_view key, int only, const Says& says) { put(key, says, {{"const", only}}); }
   void later(std::string_view, std::string_view) {}
+  void misplaced(std::string_view, std::string_view) {}
   void rest_unknown() {}
 
  private:

@@ -91,6 +91,7 @@ class Checker {
   }
   void version(std::string_view, int, const Says&) {}
   void later(std::string_view, std::string_view) {}
+  void misplaced(std::string_view, std::string_view) {}
   void rest_unknown() {}
 
   // Of a field at any path.

@@ -89,6 +89,7 @@ class FieldVisitor {
   }
   void version(std::string_view, int, const Says&) {}
   void later(std::string_view, std::string_view) {}
+  void misplaced(std::string_view, std::string_view) {}
   void rest_unknown() {}
 
  private:

@@ -28,6 +28,7 @@
 //   overrides(key, vector<pair<string, double>>&, says)  values by parameter
 //   version(key, number, says)                  that number and no other
 //   later(key, what)                            in the problem format, not in this version
+//   misplaced(key, where)                       a field of other objects of this kind, which `where` says
 //   rest_unknown()                              the type is not known, hence neither are the other fields
 #pragma once
 
@@ -80,6 +81,8 @@ inline constexpr Choice<ParameterScale> kParameterScales[] = {
     {"linear", ParameterScale::linear}, {"log", ParameterScale::log}, {"log10", ParameterScale::log10}};
 inline constexpr Choice<FormulationType> kFormulations[] = {
     {"augmented_lagrangian", FormulationType::augmented_lagrangian}, {"penalty", FormulationType::penalty}};
+inline constexpr Choice<LinearSolver> kLinearSolvers[] = {{"cholesky", LinearSolver::cholesky},
+                                                          {"quasidefinite", LinearSolver::quasidefinite}};
 inline constexpr Choice<Projection> kProjections[] = {{"none", Projection::none},
                                                       {"velocity", Projection::velocity},
                                                       {"position_velocity", Projection::position_velocity}};
@@ -308,8 +311,10 @@ void describe(auto& v, Like<FormulationSettings> auto& f) {
           {"augmented Lagrangian: relative, on the constraints' accelerations"});
   v.choice("projection", f.projection, kProjections, {"of the state onto the constraints after each step"});
   if (f.type == FormulationType::penalty) {
-    std::string solver = "cholesky";
-    v.word("linear_solver", solver, Words{"cholesky", "quasidefinite"}, {"of the penalty form"});
+    v.choice("linear_solver", f.linear_solver, kLinearSolvers,
+             {"of the penalty form: cholesky loses digits as alpha grows, quasidefinite does not"});
+  } else {
+    v.misplaced("linear_solver", "of the type 'penalty' only");
   }
 }
 
