@@ -163,7 +163,7 @@ void AssemblyEquations::start_branches(const VectorXd& y) {
   for (std::size_t i = 0; i < data_.angles.size(); ++i) {
     const JointAngle& a = data_.angles[i];
     double& angle = angles_(static_cast<Index>(i));
-    angle = a.jet(body_at(y, a.body1).frame, body_at(y, a.body2).frame).angle();
+    angle = a.value(body_at(y, a.body1).frame, body_at(y, a.body2).frame);
     if (angle < kHalfTurn) angle += 2 * std::numbers::pi;
   }
   settle_shared_rows(y, angles_);
@@ -173,7 +173,7 @@ void AssemblyEquations::continue_branches(const VectorXd& y) {
   for (std::size_t i = 0; i < data_.angles.size(); ++i) {
     const JointAngle& a = data_.angles[i];
     double& angle = angles_(static_cast<Index>(i));
-    angle = JointAngle::on_branch(a.jet(body_at(y, a.body1).frame, body_at(y, a.body2).frame).angle(), angle);
+    angle = a.value_near(angle, body_at(y, a.body1).frame, body_at(y, a.body2).frame);
   }
   for (AssemblyTarget& target : targets_) {
     if (std::holds_alternative<AngleSensor>(target.sensor)) {

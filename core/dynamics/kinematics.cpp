@@ -185,7 +185,7 @@ class Kinematics {
     for (std::size_t k = 0; k < d_.angles.size(); ++k) {
       const JointAngle& a = d_.angles[k];
       double& angle = angles_(static_cast<Index>(k));
-      angle = JointAngle::on_branch(a.jet(body_at(y_, a.body1).frame, body_at(y_, a.body2).frame).angle(), angle);
+      angle = a.value_near(angle, body_at(y_, a.body1).frame, body_at(y_, a.body2).frame);
     }
     return true;
   }

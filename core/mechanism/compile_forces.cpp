@@ -43,7 +43,8 @@ void add(Compilation& model, const Tsda& f, int force, const std::string& where)
 void add(Compilation& model, const Rsda& f, int force, const std::string& where) {
   RsdaForce out;
   out.force = force;
-  out.joint_angle = model.angle_of(f.joint, where + ".joint");
+  out.angle = model.angle_of(f.joint, where + ".joint");
+  out.joint = model.data.angles[static_cast<std::size_t>(out.angle)];
   out.law = law(model, f.law, {"angle", "rate"}, {f.stiffness, f.damping, f.free_angle, 0.0}, where);
   model.data.rsda.push_back(std::move(out));
 }
@@ -140,11 +141,10 @@ void add(Compilation& model, const FrictionSpec& f, int force, const std::string
   law.coulomb = v(0), law.smooth = v(1), law.viscous = v(2);
   if (!(law.smooth > 0)) throw SceneError(where + ".smooth_velocity: must be greater than 0");
   if (is_sliding(f.motion, joint.type)) {
-    const Constraint c = model.joint_displacement_term(f.joint, where + ".joint");
-    model.data.sliding_frictions.push_back(
-        {force, c.body1, c.body2, std::get<Dot2>(c.primitive), c.slot1, c.slot2, c.slot3, law});
+    model.data.sliding_frictions.push_back({force, model.joint_displacement(f.joint, where + ".joint"), -1, law});
   } else {
-    model.data.frictions.push_back({force, model.angle_of(f.joint, where + ".joint"), law});
+    const int angle = model.angle_of(f.joint, where + ".joint");
+    model.data.turning_frictions.push_back({force, model.data.angles[static_cast<std::size_t>(angle)], angle, law});
   }
 }
 

@@ -101,8 +101,7 @@ SensorKind sensor(Compilation& model, const Sensor& s, const std::string& where)
   }
   if (quantity == "constraint_violation") return ViolationSensor{};
   if (quantity == "displacement") {
-    const Constraint c = model.joint_displacement_term(s.joint, where + ".joint");
-    return DisplacementSensor{c.body1, c.body2, std::get<Dot2>(c.primitive), c.slot1, c.slot2, c.slot3};
+    return DisplacementSensor{model.joint_displacement(s.joint, where + ".joint")};
   }
   if (quantity == "acceleration") {
     AccelerationSensor out;

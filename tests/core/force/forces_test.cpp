@@ -7,7 +7,7 @@
 #include "core/force/applied.hpp"
 #include "core/force/bushing.hpp"
 #include "core/force/friction.hpp"
-#include "core/force/rsda.hpp"
+#include "core/force/joint_effort.hpp"
 #include "core/force/tsda.hpp"
 #include "tests/core/body/textbook_body.hpp"
 
@@ -178,14 +178,14 @@ struct RsdaCase : Bodies {
   static constexpr int kGeometry = 9, kLaw = 28 + kGeometry, kFields = L::kFields, kParameters = L::kParameters,
                        kInputs = kLaw + kFields + kParameters;
   static constexpr double kReference = 13;  // two turns on: the branch that counts
-  JointTorque<typename L::ForceLaw> force;
-  JointAngle joint;
+  JointEffort<Angle, typename L::ForceLaw> force;
 
   explicit RsdaCase(unsigned seed) : Bodies(seed, kInputs) { place(); }
   void place() {
     Bodies::place();
-    joint.x1 = x.segment<3>(28), joint.y1 = x.segment<3>(31), joint.n2 = x.segment<3>(34);
-    joint.slot_x1 = 0, joint.slot_y1 = 3, joint.slot_n2 = 6;
+    JointAngle& joint = force.joint;  // in x: n1, axis x n1, n2
+    joint.measure.s1 = x.segment<3>(28), joint.measure.s3 = x.segment<3>(31), joint.measure.s2 = x.segment<3>(34);
+    joint.slot1 = 0, joint.slot3 = 3, joint.slot2 = 6;
     L::fill(force.law, x, kLaw, kGeometry);
   }
 
@@ -216,26 +216,25 @@ struct RsdaCase : Bodies {
   Loads loads() const {
     LawScratch<L> s(force.law, x, kLaw);
     Loads out;
-    force.add_load(kTime, s.rho, joint, kReference, f1, f2, s.scratch, out.load1, out.load2);
+    force.add_load(kTime, s.rho, kReference, f1, f2, s.scratch, out.load1, out.load2);
     return out;
   }
   void pull_back(FrameBar& bar1, FrameBar& bar2, VectorXd& theta_bar, VectorXd& rho_bar) const {
     LawScratch<L> s(force.law, x, kLaw);
-    force.pull_back(kTime, s.rho, joint, kReference, f1, f2, s.scratch, bar1, bar2, theta_bar, rho_bar);
+    force.pull_back(kTime, s.rho, kReference, f1, f2, s.scratch, bar1, bar2, theta_bar, rho_bar);
   }
   LoadTangents tangent(const FrameTangent& t1, const FrameTangent& t2, const Eigen::MatrixXd& directions) const {
     LawScratch<L> s(force.law, x, kLaw);
-    const JointAngle::Jet j = joint.jet(f1, f2);
-    const double angle = JointAngle::on_branch(j.angle(), kReference);
-    const Law::Value f = force.law.derivatives(kTime, s.rho, angle, j.rate(), s.scratch);
+    const double angle = force.joint.value_near(kReference, f1, f2), rate = force.joint.rate(f1, f2);
+    const Law::Value f = force.law.derivatives(kTime, s.rho, angle, rate, s.scratch);
     Lanes<L::ForceLaw::kFields> fields = Lanes<L::ForceLaw::kFields>::Zero();
     if (L::kFields > 0) fields = directions.middleRows(kLaw, L::ForceLaw::kFields);
     const Lanes<1> df = force.law.field_tangent(
-        angle, j.rate(), &fields, [&](int k) { return Lanes<1>(directions.row(kLaw + k)); }, s.scratch);
+        angle, rate, &fields, [&](int k) { return Lanes<1>(directions.row(kLaw + k)); }, s.scratch);
     const Lanes<3> dx = directions.middleRows<3>(28), dy = directions.middleRows<3>(31),
                    dn = directions.middleRows<3>(34);
     LoadTangents out;
-    force.tangent(joint, j, f, df, f1, f2, t1, t2, &dx, &dy, &dn, out.load1, out.load2);
+    force.tangent(f, df, f1, f2, t1, t2, {&dx, &dn, &dy}, out.load1, out.load2);
     return out;
   }
 };
@@ -344,9 +343,9 @@ struct SlidingCase : Bodies {
   explicit SlidingCase(unsigned seed) : Bodies(seed, kInputs) { place(); }
   void place() {
     Bodies::place();
-    force.displacement.s1 = x.segment<3>(28), force.displacement.s2 = x.segment<3>(31);
-    force.displacement.s3 = x.segment<3>(34);
-    force.slot1 = 0, force.slot2 = 3, force.slot3 = 6;
+    JointDisplacement& joint = force.joint;
+    joint.measure.s1 = x.segment<3>(28), joint.measure.s2 = x.segment<3>(31), joint.measure.s3 = x.segment<3>(34);
+    joint.slot1 = 0, joint.slot2 = 3, joint.slot3 = 6;
     DryFriction::fill(force.law, x, kLaw, kGeometry);
   }
   template <class T>
@@ -360,18 +359,25 @@ struct SlidingCase : Bodies {
     return -DryFriction::value(at, kLaw, rate, rate) * displacement(body1.displaced(), body2.displaced()).c[1];
   }
   Loads loads() const {
+    LawScratch<DryFriction> s(force.law, x, kLaw);
     Loads out;
-    force.add_load(f1, f2, out.load1, out.load2);
+    force.add_load(kTime, s.rho, 0, f1, f2, s.scratch, out.load1, out.load2);
     return out;
   }
-  void pull_back(FrameBar& bar1, FrameBar& bar2, VectorXd& theta_bar, VectorXd&) const {
-    force.pull_back(f1, f2, bar1, bar2, theta_bar);
+  void pull_back(FrameBar& bar1, FrameBar& bar2, VectorXd& theta_bar, VectorXd& rho_bar) const {
+    LawScratch<DryFriction> s(force.law, x, kLaw);
+    force.pull_back(kTime, s.rho, 0, f1, f2, s.scratch, bar1, bar2, theta_bar, rho_bar);
   }
   LoadTangents tangent(const FrameTangent& t1, const FrameTangent& t2, const Eigen::MatrixXd& directions) const {
+    LawScratch<DryFriction> s(force.law, x, kLaw);
+    const double displacement = force.joint.value(f1, f2), rate = force.joint.rate(f1, f2);
+    const Law::Value f = force.law.derivatives(kTime, s.rho, displacement, rate, s.scratch);
     const Lanes<3> s1 = directions.middleRows<3>(28), s2 = directions.middleRows<3>(31),
                    s3 = directions.middleRows<3>(34), law = directions.middleRows<3>(kLaw);
+    const Lanes<1> df =
+        force.law.field_tangent(displacement, rate, &law, [](int) { return Lanes<1>(Lanes<1>::Zero()); }, s.scratch);
     LoadTangents out;
-    force.tangent(f1, f2, t1, t2, {&s1, &s2, &s3}, &law, out.load1, out.load2);
+    force.tangent(f, df, f1, f2, t1, t2, {&s1, &s2, &s3}, out.load1, out.load2);
     return out;
   }
 };
@@ -497,7 +503,7 @@ TEMPLATE_TEST_CASE("forces between two bodies balance: no resultant, no moment",
   TestType c(GENERATE(range(0u, 4u)));
   c.x.template segment<4>(3).normalize();
   c.x.template segment<4>(17).normalize();
-  if constexpr (requires { c.joint; }) {  // a joint angle: a common axis
+  if constexpr (requires { c.kReference; }) {  // a joint angle: a common axis
     const Vector3d axis = Vector3d(c.x.template segment<3>(28)).normalized();
     const Vector3d x1 = axis.unitOrthogonal(), y1 = axis.cross(x1);
     c.x.template segment<3>(28) = x1, c.x.template segment<3>(31) = y1;
@@ -537,7 +543,7 @@ TEST_CASE("a spring without damping is the gradient of its potential", "[force]"
     return s * s;
   });
   check(RsdaCase<LinearLaw>(seed), [](const RsdaCase<LinearLaw>& c) {
-    const double s = JointAngle::on_branch(c.joint.jet(c.f1, c.f2).angle(), c.kReference) - c.force.law.x0;
+    const double s = c.force.joint.value_near(c.kReference, c.f1, c.f2) - c.force.law.x0;
     return s * s;
   });
 }
@@ -561,10 +567,9 @@ TEST_CASE("power of a spring-damper is minus its force times its rate", "[force]
     return -(law.k * (s.l - law.x0) + law.c * s.ldot + law.f0) * s.ldot;
   });
   check(RsdaCase<LinearLaw>(seed), [](const RsdaCase<LinearLaw>& c) {
-    const auto j = c.joint.jet(c.f1, c.f2);
     const Law& law = c.force.law;
-    const double angle = JointAngle::on_branch(j.angle(), c.kReference);
-    return -(law.k * (angle - law.x0) + law.c * j.rate() + law.f0) * j.rate();
+    const double angle = c.force.joint.value_near(c.kReference, c.f1, c.f2), rate = c.force.joint.rate(c.f1, c.f2);
+    return -(law.k * (angle - law.x0) + law.c * rate + law.f0) * rate;
   });
 }
 
@@ -658,15 +663,15 @@ TEST_CASE("tension is positive when it pulls the points together", "[force]") {
 }
 
 TEST_CASE("a positive torsional torque resists a positive angle", "[force]") {
-  JointAngle joint;
-  joint.x1 = Vector3d::UnitX(), joint.y1 = Vector3d::UnitY(), joint.n2 = Vector3d::UnitX();
   RsdaForce spring;
+  Angle& angle = spring.joint.measure;
+  angle.s1 = Vector3d::UnitX(), angle.s3 = Vector3d::UnitY(), angle.s2 = Vector3d::UnitX();
   spring.law.k = 4, spring.law.x0 = 0.1;
   Frame ground, other;
   other.A = A(Vector4d(std::cos(0.3), 0, 0, std::sin(0.3)));  // 0.6 rad about z
   Law::Scratch scratch;
   Vec<6> load1 = Vec<6>::Zero(), load2 = Vec<6>::Zero();
-  spring.add_load(0, VectorXd(), joint, 0, ground, other, scratch, load1, load2);
+  spring.add_load(0, VectorXd(), 0, ground, other, scratch, load1, load2);
   CHECK(load2(5) == Approx(-2));
   CHECK(load1(5) == Approx(2));
 }
