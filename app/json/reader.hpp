@@ -37,8 +37,7 @@ class Reader {
   void word(std::string_view key, std::string& value, const Words& words, const Says& says);
   template <class T, std::size_t N>
   void choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const Says& says);
-  const TypeRow* type(std::string_view key, std::string_view, std::span<const TypeRow> rows, std::string_view later,
-                      const Says& says);
+  const TypeRow* type(std::string_view key, std::string_view, std::span<const TypeRow> rows, const Says& says);
 
   void number(std::string_view key, Field& value, const Says& says);
   void number(std::string_view key, std::optional<Field>& value, const Says& says);

@@ -63,8 +63,7 @@ class SchemaWriter {
   void word(std::string_view key, std::string& value, const Words& allowed, const Says& says) {
     put(key, says, {{"enum", words(allowed.available)}}, value.empty() ? Json() : Json(value));
   }
-  const TypeRow* type(std::string_view key, std::string_view current, std::span<const TypeRow> all, std::string_view,
-                      const Says& says) {
+  const TypeRow* type(std::string_view key, std::string_view current, std::span<const TypeRow> all, const Says& says) {
     rows = all;
     type_key = key;
     const TypeRow* const row = find_row(all, current);

@@ -31,8 +31,7 @@ class FieldVisitor {
   void word(std::string_view, const std::string&, const Words&, const Says&) {}
   template <class T, std::size_t N>
   void choice(std::string_view, const T&, const Choice<T> (&)[N], const Says&) {}
-  const TypeRow* type(std::string_view, std::string_view current, std::span<const TypeRow> rows, std::string_view,
-                      const Says&) {
+  const TypeRow* type(std::string_view, std::string_view current, std::span<const TypeRow> rows, const Says&) {
     return find_row(rows, current);
   }
   void number(std::string_view key, const Field& value, const Says& says) {

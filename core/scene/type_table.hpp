@@ -97,12 +97,8 @@ inline constexpr TypeRow kSensorQuantities[] = {
 inline constexpr std::string_view kJointsWithAngle = "revolute cylindrical screw";
 inline constexpr std::string_view kJointsWithDisplacement = "translational cylindrical screw";
 
-// In the problem format, not in this version.
-inline constexpr std::string_view kLaterJointTypes = "";
-inline constexpr std::string_view kLaterForceTypes = "";
-inline constexpr std::string_view kLaterSensorQuantities = "";
-
 inline constexpr std::string_view kIntegrators = "dopri5 dopri853 rk4";
+// In the problem format, not in this version.
 inline constexpr std::string_view kLaterIntegrators =
     "euler rk2 bs3 verner6 sdirk2 sdirk3 sdirk4 radau5 gauss4 cvodes_bdf cvodes_adams";
 

@@ -11,7 +11,7 @@
 //   references(key, vector<string>&, To, says)
 //   choice(key, T&, Choice<T>[], says)       one of a few words that stand for values
 //   word(key, string&, Words, says)             one of a few words
-//   type(key, word, rows, later, says)          the type of an object; returns its row, nullptr when there is none
+//   type(key, word, rows, says)                 the type of an object; returns its row, nullptr when there is none
 //   number(key, Field&, says)                   a number or an expression over parameters and definitions
 //   vector(key, VectorField&, says)             three of them
 //   point(key, PointField&, body, says)         a point or vector of that body, by name or by its coordinates
@@ -141,8 +141,7 @@ void describe(auto& v, Like<Body> auto& b) {
 
 void describe(auto& v, Like<Joint> auto& j) {
   using namespace dimension;
-  const TypeRow* const row =
-      v.type("type", j.type, std::span(kJointTypes), kLaterJointTypes, {"type of the joint", Need::required});
+  const TypeRow* const row = v.type("type", j.type, std::span(kJointTypes), {"type of the joint", Need::required});
   if constexpr (!std::is_const_v<std::remove_reference_t<decltype(j)>>)
     if (row) j.type = row->name;
   v.name("name", j.name, {"name of the joint", Need::required});
@@ -174,7 +173,7 @@ void describe(auto& v, Like<SampledLaw> auto& l) {
 
 void describe(auto& v, Like<Drive> auto& d) {
   using namespace dimension;
-  const TypeRow* const row = v.type("type", d.type, std::span(kDriveTypes), "", {"type of the drive", Need::required});
+  const TypeRow* const row = v.type("type", d.type, std::span(kDriveTypes), {"type of the drive", Need::required});
   if constexpr (!std::is_const_v<std::remove_reference_t<decltype(d)>>)
     if (row) d.type = row->name;
   v.name("name", d.name, {"name of the drive", Need::required});
@@ -257,8 +256,7 @@ void describe(auto& v, Like<FrictionSpec> auto& f, const TypeRow& row) {
 }
 
 void describe(auto& v, Like<Force> auto& f) {
-  const TypeRow* const row =
-      v.type("type", type_of(f), std::span(kForceTypes), kLaterForceTypes, {"type of the force", Need::required});
+  const TypeRow* const row = v.type("type", type_of(f), std::span(kForceTypes), {"type of the force", Need::required});
   v.name("name", f.name, {"name of the force", Need::required});
   if (!row) return v.rest_unknown();
   if constexpr (!std::is_const_v<std::remove_reference_t<decltype(f)>>) set_type(f, row->name);
@@ -272,8 +270,8 @@ void describe(auto& v, Like<PointOnBody> auto& p) {
 
 void describe(auto& v, Like<Sensor> auto& s) {
   using dimension::kLength;
-  const TypeRow* const row = v.type("quantity", s.quantity, std::span(kSensorQuantities), kLaterSensorQuantities,
-                                    {"what is measured", Need::required});
+  const TypeRow* const row =
+      v.type("quantity", s.quantity, std::span(kSensorQuantities), {"what is measured", Need::required});
   if (!row) return v.rest_unknown();
   if constexpr (!std::is_const_v<std::remove_reference_t<decltype(s)>>) s.quantity = row->name;
   v.reference("body", s.body, To::body, {"body it is on", need_of(*row, "body")});
