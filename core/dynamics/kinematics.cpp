@@ -8,7 +8,6 @@
 #include <set>
 
 #include "core/body/euler_parameters.hpp"
-#include "core/dynamics/assembly.hpp"
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/projection.hpp"
 #include "core/sensor/body_at.hpp"
@@ -271,19 +270,18 @@ std::string joined_names(const std::vector<std::string>& names) {
 
 }  // namespace
 
-KinematicsResult solve_kinematics(const Mechanism& mechanism, const FormulationSettings& formulation,
-                                  const std::vector<double>& times,
+KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& start,
+                                  const FormulationSettings& formulation, const std::vector<double>& times,
                                   const std::function<bool(std::size_t, const StatePoint&)>& observe) {
   KinematicsResult result;
   result.last_good_time = times.front();
-  const Assembly assembly(mechanism, times.front());
-  if (!assembly.result().ok) {
-    result.message = assembly.result().message;
+  if (!start.result().ok) {
+    result.message = start.result().message;
     return result;
   }
-  const int freedoms = assembly.summary().degrees_of_freedom;
+  const int freedoms = start.summary().degrees_of_freedom;
   Kinematics k(mechanism, formulation);
-  k.start(times.front(), assembly.result().y, assembly.result().angles);
+  k.start(times.front(), start.result().y, start.result().angles);
   if (freedoms > 0 && k.rank_here().rank_lost > 0) {
     result.message = "the drives leave " + std::to_string(freedoms) + (freedoms == 1 ? " degree" : " degrees") +
                      " of freedom at the start; kinematics needs all of them driven, by drives or by a condition on a "
