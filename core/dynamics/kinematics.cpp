@@ -49,13 +49,7 @@ class DrivenRows {
   }
   void factor() {
     rows_.evaluate(frames_);
-    J_ = MatrixXd::Zero(d_.m, 6 * d_.n);
-    for (const RowGroup& g : d_.groups) {
-      for (int r = 0; r < g.rows; ++r) {
-        if (g.body1 > 0) J_.block<1, 6>(g.row + r, 6 * (g.body1 - 1)) += rows_.J1.row(g.block + r);
-        if (g.body2 > 0) J_.block<1, 6>(g.row + r, 6 * (g.body2 - 1)) += rows_.J2.row(g.block + r);
-      }
-    }
+    J_ = rows_.dense();
     scale_ = J_.rowwise().norm().cwiseMax(1e-300).cwiseInverse();
     scaled_.setThreshold(kRankThreshold);
     scaled_.compute(scale_.asDiagonal() * J_);
