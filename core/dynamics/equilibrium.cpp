@@ -1,5 +1,7 @@
 #include "core/dynamics/equilibrium.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/QR>
 #include <cmath>
 #include <limits>
@@ -171,12 +173,6 @@ class Statics {
   VectorXd angles_, y_, ydot_, z_;
 };
 
-std::string number(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", x);
-  return text;
-}
-
 }  // namespace
 
 Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const VectorXd& q_guess, const VectorXd& angles) {
@@ -213,9 +209,10 @@ Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const Vecto
     converged = size < kTolerance && sigma < 1e-3 * (1 + now);
   }
   if (!converged) {
-    return fail("after " + std::to_string(e.iterations) + " iterations body '" + statics.fastest() +
-                "' would still be accelerated by " + number(before) +
-                " (m/s^2 or rad/s^2); is there a spring or stop that holds every free motion?");
+    return fail(
+        fmt::format("after {} iterations body '{}' would still be accelerated by {:.3g} (m/s^2 or rad/s^2); is there a "
+                    "spring or stop that holds every free motion?",
+                    e.iterations, statics.fastest(), before));
   }
   if (!statics.evaluate(e.q)) return fail("the accelerations cannot be computed there");
   const Statics::Rows rows = statics.rows();

@@ -1,5 +1,7 @@
 #include "core/dynamics/kinematics.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -24,12 +26,6 @@ constexpr double kRelativeCorrection = 0.2;  // of the predictor, against the st
 constexpr double kSmallCorrection = 1e-6;    // always accepted
 constexpr double kViolation = 1e-9;
 constexpr double kRankThreshold = 1e-7;  // rows of J scaled to unit length
-
-std::string number(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", x);
-  return text;
-}
 
 // J at a state, rows scaled to unit length: linear solves that no mass enters.
 class DrivenRows {
@@ -256,12 +252,6 @@ class Kinematics {
   VectorXd y_, angles_, y_hat_, y_next_;
 };
 
-std::string joined_names(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 }  // namespace
 
 KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& start,
@@ -296,12 +286,14 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
       h /= 2;
       if (h < 1e-9 * std::max(1e-3, times.back() - times.front())) {
         const SingularPosition here = k.rank_here();
-        result.message = "the positions cannot be continued beyond t = " + number(k.t()) + " s" +
-                         (here.rank_lost > 0 ? ": a singular position, where the equations of " +
-                                                   joined_names(here.owners) + " depend on each other"
-                                             : "") +
-                         ". A dead point that the drives cannot pass, or a position out of reach? Change the law, the "
-                         "lengths, or drive another joint there";
+        const std::string why =
+            here.rank_lost > 0 ? fmt::format(": a singular position, where the equations of {} depend on each other",
+                                             fmt::join(here.owners, ", "))
+                               : "";
+        result.message = fmt::format(
+            "the positions cannot be continued beyond t = {:.6g} s{}. A dead point that the drives cannot "
+            "pass, or a position out of reach? Change the law, the lengths, or drive another joint there",
+            k.t(), why);
         return result;
       }
     }
@@ -311,7 +303,7 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
     SingularPosition here = k.rank_here();
     if (here.rank_lost > 0) result.singular.push_back(std::move(here));
     if (!observe(i, k.point())) {
-      result.message = "stopped at t = " + number(k.t()) + " s";
+      result.message = fmt::format("stopped at t = {:.6g} s", k.t());
       return result;
     }
   }
