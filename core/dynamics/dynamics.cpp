@@ -9,12 +9,15 @@
 namespace mbsopt {
 namespace {
 
-// alpha of S for the quasi-definite solution, which is the same whatever it is: large against the inertia that any row
-// sees, so that few refinements do, and not so large that S loses the smallest. Either that of the penalty itself, or
-// far from it: in between refinements would crawl where rows are redundant.
+// alpha of S for the quasi-definite solution, which is the same whatever it is: large against any inertia, so that few
+// refinements do (a row between light bodies may have to move heavy ones behind them), and not so large that S loses
+// the smallest. Either that of the penalty itself, or far from it: in between refinements would crawl where rows are
+// redundant.
 double moderate_alpha(const MechanismData& data, double penalty) {
   if (data.m == 0) return penalty;
-  const double least = data.row_alpha.minCoeff(), most = data.row_alpha.maxCoeff();
+  const double least = data.row_alpha.minCoeff();
+  double most = data.row_alpha.maxCoeff();
+  for (const BodyData& b : data.bodies) most = std::max({most, b.mass, b.J.trace()});
   const double moderate = std::clamp(1e11 * least, 1e3 * most, 1e7 * most);
   return penalty <= moderate ? penalty : std::min(moderate, penalty / 100);
 }

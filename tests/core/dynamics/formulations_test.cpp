@@ -75,8 +75,8 @@ struct Errors {
   double model, cholesky, quasidefinite, augmented_lagrangian;
 };
 
-Errors errors(int links, double alpha) {
-  const Mechanism mechanism(chain(links), VectorXd());
+Errors errors(const Scene& scene, double alpha) {
+  const Mechanism mechanism(scene, VectorXd());
   std::srand(3);
   const MechanismData& d = mechanism.data();
   VectorXd y = 0.3 * VectorXd::Random(14 * d.n), ydot(y.size());
@@ -96,6 +96,8 @@ Errors errors(int links, double alpha) {
   return {relative_error(with_penalty, constrained), relative_error(of(cholesky), with_penalty),
           relative_error(of(quasidefinite), with_penalty), relative_error(of(augmented), constrained)};
 }
+
+Errors errors(int links, double alpha) { return errors(chain(links), alpha); }
 
 }  // namespace
 
@@ -117,6 +119,21 @@ TEST_CASE("by Cholesky the digits that penalty loses grow with alpha", "[formula
 TEST_CASE("the quasi-definite solution keeps all digits at any alpha", "[formulation]") {
   const double alpha = GENERATE(1.0, 1e3, 1e5, 1e6, 1e7, 1e8, 1e9, 1e11, 1e13, 1e15);
   CHECK(errors(GENERATE(2, 5), alpha).quasidefinite < 2e-15);
+}
+
+TEST_CASE("mass ratios up to 1e8 cost the quasi-definite solution no digits", "[formulation]") {
+  const double ratio = GENERATE(1e2, 1e4, 1e6, 1e8), alpha = GENERATE(1e3, 1e6, 1e9, 1e12);
+  const int order = GENERATE(0, 1, 2);  // heavy between light, growing outwards, growing inwards
+  Scene scene = chain(5);
+  for (std::size_t i = 0; i < 5; ++i) {
+    const double grown = static_cast<double>(order == 1 ? i : 4 - i) / 4;
+    const double factor = order == 0 ? (i % 2 == 1 ? ratio : 1) : std::pow(ratio, grown);
+    Body& b = scene.bodies[i];
+    for (Field* x : {&b.mass, &b.inertia.xx, &b.inertia.yy, &b.inertia.zz, &b.inertia.xy, &b.inertia.xz, &b.inertia.yz})
+      *x = factor * x->number();
+  }
+  INFO("ratio " << ratio << ", order " << order << ", alpha " << alpha);
+  CHECK(errors(scene, alpha).quasidefinite < 2e-14);
 }
 
 // alpha is relative here: 0.17 to 1 of it is its absolute value in the rows of these chains.
