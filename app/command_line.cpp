@@ -38,7 +38,7 @@ constexpr std::array kCommands{
     Command{"identify", "fit parameters to measurements", identify_command},
     Command{"schema", "print the JSON Schema of problem files", schema_command},
 };
-constexpr std::array kLaterCommands{"kinematics", "tradeoff", "resume"};
+constexpr std::array kLaterCommands{"tradeoff", "resume"};
 
 std::vector<std::string> command_names() {
   std::vector<std::string> names;

@@ -82,15 +82,16 @@ int kinematics_command(const CommandContext& context) {
   run.start();
   const auto start = std::chrono::steady_clock::now();
   const Mechanism mechanism(scene, parameter_values(scene), std::vector<bool>(scene.parameters.size(), false));
-  if (!assembled(run, mechanism)) return run.finish();
+  const Assembly assembly(mechanism, scene.simulation.start_time);
+  if (!assembled(run, assembly)) return run.finish();
 
   Trajectory trajectory;
   const Sampling sampling = record_trajectory(mechanism, scene, trajectory);
   DriveEfforts efforts(mechanism.data());
   SimulationStatistics statistics;
   const SimulationSettings& settings = scene.simulation;
-  const KinematicsResult kinematics =
-      solve_kinematics(mechanism, settings.formulation, sampling.times, [&](std::size_t i, const StatePoint& at) {
+  const KinematicsResult kinematics = solve_kinematics(
+      mechanism, assembly, settings.formulation, sampling.times, [&](std::size_t i, const StatePoint& at) {
         sampling.observe(i, at);
         efforts.record(at);
         const Energy e = energy(mechanism.data(), at.y, at.angles);

@@ -7,7 +7,6 @@
 #include "app/exit_code.hpp"
 #include "app/json/read_problem.hpp"
 #include "app/provenance.hpp"
-#include "core/dynamics/assembly.hpp"
 #include "core/expression/counted.hpp"
 
 namespace mbsopt {
@@ -95,9 +94,8 @@ int Run::finish() {
   return exit_code_of(status);
 }
 
-bool assembled(Run& run, const Mechanism& mechanism) {
+bool assembled(Run& run, const Assembly& assembly) {
   const Scene& scene = run.problem.scene;
-  const Assembly assembly(mechanism, scene.simulation.start_time);
   if (!assembly.result().ok) {
     run.failed(assembly.result().message, scene.simulation.start_time);
     return false;

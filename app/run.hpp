@@ -19,6 +19,7 @@
 #include "app/output_folder.hpp"
 #include "app/progress.hpp"
 #include "app/result_json.hpp"
+#include "core/dynamics/assembly.hpp"
 #include "optim/parameter_values.hpp"
 #include "optim/problem.hpp"
 
@@ -56,9 +57,9 @@ class Run {
   bool running_ = false;
 };
 
-// Assembles at the start time; the model into the result and onto standard output. False where that failed, which then
-// is how the run ended.
-bool assembled(Run& run, const Mechanism& mechanism);
+// The model at its assembled start into the result and onto standard output. False where the assembly failed, which
+// then is how the run ended.
+bool assembled(Run& run, const Assembly& assembly);
 
 // Prints the counts of bodies, equations, degrees of freedom; redundant equations by joint.
 void print_model(std::ostream& out, const std::string& name, const ModelSummary& summary);

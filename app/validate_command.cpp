@@ -5,7 +5,6 @@
 #include "app/command.hpp"
 #include "app/run.hpp"
 #include "app/text_table.hpp"
-#include "core/dynamics/assembly.hpp"
 #include "core/dynamics/model_warnings.hpp"
 #include "optim/parameter_uses.hpp"
 
@@ -35,11 +34,9 @@ int validate_command(const CommandContext& context) {
   Run run(context);
   const Mechanism mechanism(run.problem.scene, parameter_values(run.problem.scene));
   run.start();
-  const bool closed = assembled(run, mechanism);
-  for (const std::string& warning :
-       model_warnings(mechanism, Assembly(mechanism, run.problem.scene.simulation.start_time))) {
-    run.warn(warning);
-  }
+  const Assembly assembly(mechanism, run.problem.scene.simulation.start_time);
+  const bool closed = assembled(run, assembly);
+  for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
   if (closed) add_parameters(run);
   return run.finish();
 }

@@ -146,8 +146,11 @@ class Search {
 
   template <class T>
   void collect(const T& object) {
-    FieldVisitor visitor([this](const Expression& e, Names names) { use(e, names); },
-                         [this](const std::string& body, const std::string& point) { use_point(body, point); });
+    FieldVisitor visitor(
+        [this](const FieldPlace& at, const Expression& e, Names names) {
+          if (!at.in_named_point && !at.in_drawing) use(e, names);
+        },
+        [this](const std::string& body, const std::string& point) { use_point(body, point); });
     describe(visitor, object);
   }
   void collect(const std::vector<ObjectiveSpec>& objectives) {

@@ -87,8 +87,7 @@ void Reader::word(std::string_view key, std::string& value, const Words& words_a
     findings_.add(*node, inside(key), not_among(key, value, words(words_allowed.available), words_allowed.later));
 }
 
-const TypeRow* Reader::type(std::string_view key, std::string_view, std::span<const TypeRow> rows,
-                            std::string_view later, const Says& says) {
+const TypeRow* Reader::type(std::string_view key, std::string_view, std::span<const TypeRow> rows, const Says& says) {
   const Node* const node = get(key, {says.description, Need::optional, {}});
   if (!node) {
     missing_.push_back({std::string(key), "is missing; available: " + joined(names_of(rows))});
@@ -97,7 +96,7 @@ const TypeRow* Reader::type(std::string_view key, std::string_view, std::span<co
   std::string given;
   if (!read_string(*node, inside(key), given)) return nullptr;
   const TypeRow* const row = find_row(rows, given);
-  if (!row) findings_.add(*node, inside(key), not_among(key, given, names_of(rows), later));
+  if (!row) findings_.add(*node, inside(key), not_among(key, given, names_of(rows)));
   return row;
 }
 
@@ -315,10 +314,16 @@ void Reader::version(std::string_view key, int only, const Says& says) {
 }
 
 void Reader::later(std::string_view key, std::string_view what) {
+  refuse(key, std::string(what) + " is not available in this version");
+}
+
+void Reader::misplaced(std::string_view key, std::string_view where) { refuse(key, "is " + std::string(where)); }
+
+void Reader::refuse(std::string_view key, const std::string& message) {
   const Node* const node = node_.find(key);
   if (!node) return;
   known_.emplace_back(key);
-  findings_.add(*node, inside(key), std::string(what) + " is not available in this version");
+  findings_.add(*node, inside(key), message);
 }
 
 }  // namespace mbsopt

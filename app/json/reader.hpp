@@ -37,8 +37,7 @@ class Reader {
   void word(std::string_view key, std::string& value, const Words& words, const Says& says);
   template <class T, std::size_t N>
   void choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const Says& says);
-  const TypeRow* type(std::string_view key, std::string_view, std::span<const TypeRow> rows, std::string_view later,
-                      const Says& says);
+  const TypeRow* type(std::string_view key, std::string_view, std::span<const TypeRow> rows, const Says& says);
 
   void number(std::string_view key, Field& value, const Says& says);
   void number(std::string_view key, std::optional<Field>& value, const Says& says);
@@ -104,6 +103,7 @@ class Reader {
 
   void version(std::string_view key, int only, const Says& says);
   void later(std::string_view key, std::string_view what);
+  void misplaced(std::string_view key, std::string_view where);
   void rest_unknown() { rest_unknown_ = true; }
   // At the end of an object: keys that it does not have, and required ones that are missing. A key that is both unknown
   // and like a missing one is one finding.
@@ -117,6 +117,7 @@ class Reader {
   };
   const Missing* missing_like(const std::string& unknown) const;
   void skip(std::string_view key, const Says& says) { get(key, says); }
+  void refuse(std::string_view key, const std::string& message);  // where it is given
 
   // The value of a key, which from now on is known; nullptr (and a finding where it is required) when it is absent.
   const Node* get(std::string_view key, const Says& says);

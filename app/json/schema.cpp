@@ -63,8 +63,7 @@ class SchemaWriter {
   void word(std::string_view key, std::string& value, const Words& allowed, const Says& says) {
     put(key, says, {{"enum", words(allowed.available)}}, value.empty() ? Json() : Json(value));
   }
-  const TypeRow* type(std::string_view key, std::string_view current, std::span<const TypeRow> all, std::string_view,
-                      const Says& says) {
+  const TypeRow* type(std::string_view key, std::string_view current, std::span<const TypeRow> all, const Says& says) {
     rows = all;
     type_key = key;
     const TypeRow* const row = find_row(all, current);
@@ -152,6 +151,7 @@ class SchemaWriter {
   }
   void version(std::string_view key, int only, const Says& says) { put(key, says, {{"const", only}}); }
   void later(std::string_view, std::string_view) {}
+  void misplaced(std::string_view, std::string_view) {}
   void rest_unknown() {}
 
  private:

@@ -200,7 +200,7 @@ struct Assembly::Solution {
     for (const AssemblyTarget& target : position.targets()) {
       if (const auto* sensor = std::get_if<AngleSensor>(&target.sensor)) {
         double& angle = result.angles(sensor->angle);
-        angle = JointAngle::on_branch(angle, target.value);
+        angle = Angle::on_branch(angle, target.value);
       }
     }
     position.settle_shared_rows(result.y, result.angles);

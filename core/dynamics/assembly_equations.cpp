@@ -58,12 +58,6 @@ struct PrimitiveBars {
   PrimitiveBars() { bar1.set_zero(), bar2.set_zero(); }
 };
 
-std::vector<double> law_inputs(const MechanismData& d, double t) {
-  std::vector<double> inputs(d.rho.begin(), d.rho.end());
-  inputs.push_back(t);
-  return inputs;
-}
-
 BodyAt at_rest(const VectorXd& y, int body) {
   BodyAt b;
   if (body > 0) set_position(y.segment<7>(7 * (body - 1)), b.state, b.frame);
@@ -81,15 +75,12 @@ void add_to_row(const BodyAt& b, int body, const FrameBar& bar, AssemblyEquation
 }  // namespace
 
 AssemblyEquations::AssemblyEquations(const MechanismData& data, AssemblyLevel level, double t)
-    : data_(data), level_(level), t_(t), angles_(Eigen::VectorXd::Zero(static_cast<Index>(data.angles.size()))) {
-  const std::vector<double> inputs = law_inputs(data, t);
-  for (const RowLaw& row : data.laws) {
-    Program::Scratch scratch;
-    if (row.law.programs) {
-      for (const Program& p : *row.law.programs) p.grow(scratch);
-    }
-    laws_.push_back(row.law.at(inputs, scratch));
-  }
+    : data_(data),
+      level_(level),
+      t_(t),
+      angles_(Eigen::VectorXd::Zero(static_cast<Index>(data.angles.size()))),
+      laws_(data) {
+  laws_.set_time(t);
   for (std::size_t i = 0; i < data.conditions.size(); ++i) {
     const ConditionData& c = data.conditions[i];
     const SensorKind& sensor = data.sensors[static_cast<std::size_t>(c.sensor)];
@@ -126,12 +117,7 @@ double AssemblyEquations::term_value(const Constraint& c, const VectorXd& y, con
         Vec<P::kRows> phi;
         p.phi(b1.frame, b2.frame, phi);
         if constexpr (std::is_same_v<P, Angle>) {
-          double reference = c.angle == Constraint::kNearestLaw ? 0 : angles(c.angle);
-          if (c.angle == Constraint::kNearestLaw) {
-            for (std::size_t k = 0; k < laws_.size(); ++k) {
-              if (data_.laws[k].row == c.row) reference = laws_[k].f;
-            }
-          }
+          const double reference = c.angle == Constraint::kNearestLaw ? laws_.f_or_zero(c.row) : angles(c.angle);
           return c.factor * Angle::on_branch(phi(0), reference);
         }
         return c.factor * phi(0);
@@ -149,9 +135,7 @@ void AssemblyEquations::settle_shared_rows(const VectorXd& y, VectorXd& angles) 
       sum += term_value(c, y, angles);
       if (std::holds_alternative<Angle>(c.primitive)) last = &c;
     }
-    for (std::size_t k = 0; k < laws_.size(); ++k) {
-      if (data_.laws[k].row == g.row) sum -= laws_[k].f;
-    }
+    sum -= laws_.f_or_zero(g.row);
     if (!last || last->factor == 0) continue;
     double& angle = angles(last->angle);
     angle = Angle::on_branch(angle, angle - sum / last->factor);
@@ -163,7 +147,7 @@ void AssemblyEquations::start_branches(const VectorXd& y) {
   for (std::size_t i = 0; i < data_.angles.size(); ++i) {
     const JointAngle& a = data_.angles[i];
     double& angle = angles_(static_cast<Index>(i));
-    angle = a.jet(body_at(y, a.body1).frame, body_at(y, a.body2).frame).angle();
+    angle = a.value(body_at(y, a.body1).frame, body_at(y, a.body2).frame);
     if (angle < kHalfTurn) angle += 2 * std::numbers::pi;
   }
   settle_shared_rows(y, angles_);
@@ -173,7 +157,7 @@ void AssemblyEquations::continue_branches(const VectorXd& y) {
   for (std::size_t i = 0; i < data_.angles.size(); ++i) {
     const JointAngle& a = data_.angles[i];
     double& angle = angles_(static_cast<Index>(i));
-    angle = JointAngle::on_branch(a.jet(body_at(y, a.body1).frame, body_at(y, a.body2).frame).angle(), angle);
+    angle = a.value_near(angle, body_at(y, a.body1).frame, body_at(y, a.body2).frame);
   }
   for (AssemblyTarget& target : targets_) {
     if (std::holds_alternative<AngleSensor>(target.sensor)) {
@@ -210,7 +194,11 @@ VectorXd AssemblyEquations::values(const VectorXd& y) const {
         },
         c.primitive);
   }
-  for (std::size_t k = 0; k < laws_.size(); ++k) F(data_.laws[k].row) -= positions ? laws_[k].f : laws_[k].f_t;
+  if (positions) {
+    laws_.subtract_f(F);
+  } else {
+    laws_.subtract_f_t(F);
+  }
   for (int i = 0; i < data_.n; ++i) {
     const Vector4d p = y.segment<4>(7 * i + 3), pdot = y.segment<4>(y.size() / 2 + 7 * i + 3);
     F(data_.m + i) = level_ == AssemblyLevel::position ? UnitNorm::phi(p) : UnitNorm::phi_dot(p, pdot);
@@ -276,16 +264,12 @@ AssemblyEquations::Gradients AssemblyEquations::gradients(const VectorXd& y) con
 }
 
 void AssemblyEquations::add_law_gradients(Gradients& out) const {
-  const bool positions = level_ == AssemblyLevel::position;
-  const std::vector<double> inputs = law_inputs(data_, t_);
-  for (const RowLaw& row : data_.laws) {
-    if (positions) add_slot(row.law.slot, Vec<1>(-1), out.rho.row(row.row));
-    if (!row.law.programs) continue;
-    const Program& program = (*row.law.programs)[positions ? 0 : 1];
-    Program::Scratch scratch = program.scratch();
-    std::vector<double> gradient(inputs.size(), 0.0);
-    program.add_gradient(inputs, -1, gradient, scratch);
-    for (const int k : data_.active) out.rho(row.row, k) += gradient[static_cast<std::size_t>(k)];
+  const RowLaws::Of what = level_ == AssemblyLevel::position ? RowLaws::Of::f : RowLaws::Of::f_t;
+  VectorXd rho_bar(data_.rho.size());
+  for (const RowLaw& law : data_.laws) {
+    rho_bar.setZero();
+    laws_.add_gradient(what, law.row, -1, rho_bar);
+    out.rho.row(law.row) += rho_bar.transpose();
   }
 }
 

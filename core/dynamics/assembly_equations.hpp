@@ -10,7 +10,7 @@
 
 #include <vector>
 
-#include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/row_laws.hpp"
 
 namespace mbsopt {
 
@@ -68,7 +68,7 @@ class AssemblyEquations {
   double t_;
   std::vector<AssemblyTarget> targets_;
   Eigen::VectorXd angles_;
-  std::vector<CubicSpline::Jet> laws_;  // at t
+  RowLaws laws_;  // at t
 };
 
 }  // namespace mbsopt

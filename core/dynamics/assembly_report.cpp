@@ -1,18 +1,13 @@
 #include "core/dynamics/assembly_report.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <vector>
 
 namespace mbsopt {
 namespace {
-
-std::string number(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", x);
-  return text;
-}
 
 struct Finding {
   double amount;
@@ -61,12 +56,12 @@ void add_joint(const MechanismData& d, AssemblyLevel level, int joint, const Eig
   if (!any || std::max({apart, skew, turned}) <= tolerance) return;
   const bool rates = level == AssemblyLevel::velocity;
   std::vector<std::string> parts;
-  if (apart > tolerance) parts.push_back("points " + number(apart) + (rates ? " m/s apart" : " m apart"));
+  if (apart > tolerance) parts.push_back(fmt::format("points {:.3g} {} apart", apart, rates ? "m/s" : "m"));
   if (skew > tolerance) {
-    parts.push_back(rates ? "axes turn apart at " + number(skew) + " rad/s"
-                          : "axes " + number(std::asin(std::min(1.0, skew))) + " rad out of line");
+    parts.push_back(rates ? fmt::format("axes turn apart at {:.3g} rad/s", skew)
+                          : fmt::format("axes {:.3g} rad out of line", std::asin(std::min(1.0, skew))));
   }
-  if (turned > tolerance) parts.push_back("angles off by " + number(turned) + (rates ? " rad/s" : " rad"));
+  if (turned > tolerance) parts.push_back(fmt::format("angles off by {:.3g} {}", turned, rates ? "rad/s" : "rad"));
   std::string text = joint_name(d, *any) + ": " + parts[0];
   for (std::size_t i = 1; i < parts.size(); ++i) text += ", " + parts[i];
   findings.push_back({std::max({apart, skew, turned}), text});
@@ -78,8 +73,9 @@ void add_drive(const MechanismData& d, AssemblyLevel level, const Constraint& c,
   if (amount <= tolerance) return;
   const bool lengths = std::holds_alternative<Dot2>(c.primitive) || std::holds_alternative<Distance>(c.primitive);
   const std::string unit = std::holds_alternative<Angle>(c.primitive) ? " rad" : lengths ? " m" : "";
-  findings.push_back({amount, "drive '" + d.drive_names[static_cast<std::size_t>(c.drive)] + "': missed by " +
-                                  number(amount) + unit + (level == AssemblyLevel::velocity ? " per second" : "")});
+  findings.push_back(
+      {amount, fmt::format("drive '{}': missed by {:.3g}{}{}", d.drive_names[static_cast<std::size_t>(c.drive)], amount,
+                           unit, level == AssemblyLevel::velocity ? " per second" : "")});
 }
 
 }  // namespace
@@ -114,11 +110,12 @@ std::string assembly_failure(const MechanismData& d, AssemblyLevel level, const 
     if (!(std::abs(off) > tolerance)) continue;
     const bool at_rest = is_speed(target.sensor) && std::abs(target.value + off) < 1e-12;
     const ConditionData& c = d.conditions[static_cast<std::size_t>(target.condition)];
-    findings.push_back({std::abs(off), "condition on '" + d.sensor_names[static_cast<std::size_t>(c.sensor)] +
-                                           "': asks for " + (c.has_rate && !positions ? "rate " : "") +
-                                           number(target.value) + unit_of(target.sensor) + ", nearest possible " +
-                                           number(target.value + off) + unit_of(target.sensor) +
-                                           (at_rest ? " (from a guess at rest; give a velocity of the body)" : "")});
+    const char* const unit = unit_of(target.sensor);
+    findings.push_back(
+        {std::abs(off), fmt::format("condition on '{}': asks for {}{:.3g}{}, nearest possible {:.3g}{}{}",
+                                    d.sensor_names[static_cast<std::size_t>(c.sensor)],
+                                    c.has_rate && !positions ? "rate " : "", target.value, unit, target.value + off,
+                                    unit, at_rest ? " (from a guess at rest; give a velocity of the body)" : "")});
   }
   if (findings.empty()) {
     return head + "no convergence after " + std::to_string(found.iterations) +

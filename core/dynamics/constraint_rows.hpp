@@ -40,6 +40,8 @@ class ConstraintRows {
   // S += J' diag(alpha) J
   void add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky& S);
 
+  Eigen::MatrixXd dense() const;  // J, 6 columns per moving body
+
   BlockCholesky matrix() const;  // a matrix with the pattern of J'J
 
   Rows J1, J2;  // one row per block row

@@ -30,7 +30,7 @@ Vec<M> rows(const Eigen::VectorXd* z, int row, double scale) {
 template <class P>
 void put_on_branch(const Constraint& c, const RowLaws& laws, const Eigen::VectorXd& angles, Vec<P::kRows>& value) {
   if constexpr (std::is_same_v<P, Angle>) {
-    value(0) = Angle::on_branch(value(0), c.angle == Constraint::kNearestLaw ? laws.f(c.row) : angles(c.angle));
+    value(0) = Angle::on_branch(value(0), c.angle == Constraint::kNearestLaw ? laws.f_or_zero(c.row) : angles(c.angle));
   }
 }
 

@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "core/dynamics/row_laws.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
+#include "core/mechanism/row_laws.hpp"
 
 namespace mbsopt {
 

@@ -7,6 +7,32 @@
 #include "core/body/lanes.hpp"
 
 namespace mbsopt {
+namespace {
+
+// alpha of S for the quasi-definite solution, which is the same whatever it is: large against any inertia, so that few
+// refinements do (a row between light bodies may have to move heavy ones behind them), and not so large that S loses
+// the smallest. Either that of the penalty itself, or far from it: in between refinements would crawl where rows are
+// redundant.
+double moderate_alpha(const MechanismData& data, double penalty) {
+  if (data.m == 0) return penalty;
+  const double least = data.row_alpha.minCoeff();
+  double most = data.row_alpha.maxCoeff();
+  for (const BodyData& b : data.bodies) most = std::max({most, b.mass, b.J.trace()});
+  const double moderate = std::clamp(1e11 * least, 1e3 * most, 1e7 * most);
+  return penalty <= moderate ? penalty : std::min(moderate, penalty / 100);
+}
+
+Eigen::VectorXd alpha_of_factor(const MechanismData& data, const FormulationSettings& settings) {
+  if (settings.type == FormulationType::augmented_lagrangian) return settings.alpha * data.row_alpha;
+  const bool moderate = settings.linear_solver == LinearSolver::quasidefinite;
+  return Eigen::VectorXd::Constant(data.m, moderate ? moderate_alpha(data, settings.alpha) : settings.alpha);
+}
+
+double compliance(const FormulationSettings& settings) {
+  return settings.type == FormulationType::penalty ? 1 / settings.alpha : 0.0;
+}
+
+}  // namespace
 
 Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settings)
     : mechanism_(mechanism),
@@ -14,7 +40,7 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
       settings_(settings),
       laws_(data_),
       forces_(data_),
-      solver_(data_, settings.alpha, settings.type == FormulationType::augmented_lagrangian) {
+      solver_(data_, alpha_of_factor(data_, settings), compliance(settings)) {
   const std::size_t n = static_cast<std::size_t>(data_.n);
   const Eigen::Index m = data_.m, P = data_.rho.size();
   y_.setZero(14 * data_.n);
@@ -43,7 +69,10 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
 
 // Derivatives are those of the limit: at least as many refinements as bring alpha^-(passes) to rounding.
 SaddleSolver::Settings Dynamics::solver_settings(bool derivative) const {
-  if (settings_.type == FormulationType::penalty) return {};
+  if (settings_.type == FormulationType::penalty) {
+    if (settings_.linear_solver == LinearSolver::cholesky) return {};
+    return {2, 50, 1e-15};
+  }
   if (!derivative) return {std::min(1, settings_.iterations), settings_.iterations, settings_.tolerance};
   const double digits = std::max(1.0, std::log10(settings_.alpha));
   const int least = std::clamp(static_cast<int>(std::ceil(15 / digits)) - 1, 1, 8);

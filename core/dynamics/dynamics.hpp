@@ -20,9 +20,9 @@
 
 #include "core/dynamics/constraint_terms.hpp"
 #include "core/dynamics/force_terms.hpp"
-#include "core/dynamics/row_laws.hpp"
 #include "core/dynamics/saddle_solver.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/row_laws.hpp"
 #include "core/mechanism/state_point.hpp"
 #include "core/scene/settings.hpp"
 

@@ -1,5 +1,7 @@
 #include "core/dynamics/equilibrium.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/QR>
 #include <cmath>
 #include <limits>
@@ -147,7 +149,7 @@ class Statics {
     for (std::size_t k = 0; k < d_.angles.size(); ++k) {
       const JointAngle& a = d_.angles[k];
       double& angle = angles_(static_cast<Index>(k));
-      angle = JointAngle::on_branch(a.jet(body_at(y, a.body1).frame, body_at(y, a.body2).frame).angle(), angle);
+      angle = a.value_near(angle, body_at(y, a.body1).frame, body_at(y, a.body2).frame);
     }
     return true;
   }
@@ -170,12 +172,6 @@ class Statics {
   AssemblyEquations equations_;
   VectorXd angles_, y_, ydot_, z_;
 };
-
-std::string number(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", x);
-  return text;
-}
 
 }  // namespace
 
@@ -213,9 +209,10 @@ Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const Vecto
     converged = size < kTolerance && sigma < 1e-3 * (1 + now);
   }
   if (!converged) {
-    return fail("after " + std::to_string(e.iterations) + " iterations body '" + statics.fastest() +
-                "' would still be accelerated by " + number(before) +
-                " (m/s^2 or rad/s^2); is there a spring or stop that holds every free motion?");
+    return fail(
+        fmt::format("after {} iterations body '{}' would still be accelerated by {:.3g} (m/s^2 or rad/s^2); is there a "
+                    "spring or stop that holds every free motion?",
+                    e.iterations, statics.fastest(), before));
   }
   if (!statics.evaluate(e.q)) return fail("the accelerations cannot be computed there");
   const Statics::Rows rows = statics.rows();

@@ -7,6 +7,9 @@ namespace {
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
+// The value on whose turn a joint's angle is.
+double reference(int angle, const Eigen::VectorXd& angles) { return angle < 0 ? 0.0 : angles(angle); }
+
 }  // namespace
 
 ForceTerms::ForceTerms(const MechanismData& data) : data_(data) {
@@ -60,42 +63,17 @@ void ForceTerms::add_loads(const At& at, std::vector<Vec<6>>& loads) {
     const std::size_t i = index(f.body1), j = index(f.body2);
     f.add_load(at.t, data_.rho, at.frames[i], at.frames[j], law_, loads[i], loads[j]);
   }
-  auto add_torque = [&](const auto& f) {
-    const JointAngle& joint = data_.angles[index(f.joint_angle)];
-    const std::size_t i = index(joint.body1), j = index(joint.body2);
-    f.add_load(at.t, data_.rho, joint, at.angles(f.joint_angle), at.frames[i], at.frames[j], law_, loads[i], loads[j]);
-  };
-  for (const RsdaForce& f : data_.rsda) add_torque(f);
-  for (const FrictionForce& f : data_.frictions) add_torque(f);
+  for_each_joint_effort([&](const auto& f) {
+    const std::size_t i = index(f.joint.body1), j = index(f.joint.body2);
+    f.add_load(at.t, data_.rho, reference(f.angle, at.angles), at.frames[i], at.frames[j], law_, loads[i], loads[j]);
+  });
   for (const Bushing& f : data_.bushings) {
-    const std::size_t i = index(f.body1), j = index(f.body2);
-    f.add_load(at.frames[i], at.frames[j], loads[i], loads[j]);
-  }
-  for (const SlidingFriction& f : data_.sliding_frictions) {
     const std::size_t i = index(f.body1), j = index(f.body2);
     f.add_load(at.frames[i], at.frames[j], loads[i], loads[j]);
   }
   for (const AppliedForce& f : data_.applied) {
     f.add_load(components(f, at), at.frames[index(f.body)], loads[index(f.body)]);
   }
-}
-
-template <class Force>
-void ForceTerms::add_torque_tangent(const Force& f, const At& at, const std::vector<FrameTangent>& tangents,
-                                    const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs) {
-  constexpr int kFields = decltype(f.law)::kFields;
-  const JointAngle& joint = data_.angles[index(f.joint_angle)];
-  const std::size_t i = index(joint.body1), j = index(joint.body2);
-  const JointAngle::Jet jet = joint.jet(at.frames[i], at.frames[j]);
-  const double angle = JointAngle::on_branch(jet.angle(), at.angles(f.joint_angle)), rate = jet.rate();
-  const Law::Value value = f.law.derivatives(at.t, data_.rho, angle, rate, law_);
-  Lanes<kFields> fields;
-  Lanes<3> x1, y1, n2;
-  const Lanes<1> df = f.law.field_tangent(
-      angle, rate, block.field<kFields>(f.law.slot, fields), [&](int p) { return block.direction(p); }, law_);
-  f.tangent(joint, jet, value, df, at.frames[i], at.frames[j], tangents[i], tangents[j],
-            block.field<3>(joint.slot_x1, x1), block.field<3>(joint.slot_y1, y1), block.field<3>(joint.slot_n2, n2),
-            load_dirs[i], load_dirs[j]);
 }
 
 void ForceTerms::add_tangent(const At& at, const std::vector<FrameTangent>& tangents, const ParameterBlock& block,
@@ -111,8 +89,20 @@ void ForceTerms::add_tangent(const At& at, const std::vector<FrameTangent>& tang
     f.tangent(x, value, df, at.frames[i], at.frames[j], tangents[i], tangents[j], block.field<3>(f.slot1, s1),
               block.field<3>(f.slot2, s2), load_dirs[i], load_dirs[j]);
   }
-  for (const RsdaForce& f : data_.rsda) add_torque_tangent(f, at, tangents, block, load_dirs);
-  for (const FrictionForce& f : data_.frictions) add_torque_tangent(f, at, tangents, block, load_dirs);
+  for_each_joint_effort([&](const auto& f) {
+    constexpr int kFields = decltype(f.law)::kFields;
+    const std::size_t i = index(f.joint.body1), j = index(f.joint.body2);
+    const Frame &f1 = at.frames[i], &f2 = at.frames[j];
+    const double x = f.joint.value_near(reference(f.angle, at.angles), f1, f2), xdot = f.joint.rate(f1, f2);
+    const Law::Value value = f.law.derivatives(at.t, data_.rho, x, xdot, law_);
+    Lanes<kFields> fields;
+    Lanes<3> s1, s2, s3;
+    const Lanes<1> df = f.law.field_tangent(
+        x, xdot, block.field<kFields>(f.law.slot, fields), [&](int p) { return block.direction(p); }, law_);
+    const GeometryTangent ds{block.field<3>(f.joint.slot1, s1), block.field<3>(f.joint.slot2, s2),
+                             block.field<3>(f.joint.slot3, s3)};
+    f.tangent(value, df, f1, f2, tangents[i], tangents[j], ds, load_dirs[i], load_dirs[j]);
+  });
   for (const Bushing& f : data_.bushings) {
     const std::size_t i = index(f.body1), j = index(f.body2);
     Lanes<3> s1, s2;
@@ -121,13 +111,6 @@ void ForceTerms::add_tangent(const At& at, const std::vector<FrameTangent>& tang
     const Bushing::FieldLanes fields{block.field<3>(f.slot1, s1), block.field<3>(f.slot2, s2),
                                      block.field<9>(f.slot_R0, R0), block.field<12>(f.slot_law, law)};
     f.tangent(at.frames[i], at.frames[j], tangents[i], tangents[j], fields, load_dirs[i], load_dirs[j]);
-  }
-  for (const SlidingFriction& f : data_.sliding_frictions) {
-    const std::size_t i = index(f.body1), j = index(f.body2);
-    Lanes<3> s1, s2, s3, law;
-    const GeometryTangent ds{block.field<3>(f.slot1, s1), block.field<3>(f.slot2, s2), block.field<3>(f.slot3, s3)};
-    f.tangent(at.frames[i], at.frames[j], tangents[i], tangents[j], ds, block.field<3>(f.law.slot, law), load_dirs[i],
-              load_dirs[j]);
   }
   const int t = static_cast<int>(data_.rho.size());
   for (const AppliedForce& f : data_.applied) {
@@ -161,19 +144,12 @@ void ForceTerms::add_pull_back(const At& at, std::vector<FrameBar>& bars, Eigen:
     const std::size_t i = index(f.body1), j = index(f.body2);
     f.pull_back(at.t, data_.rho, at.frames[i], at.frames[j], law_, bars[i], bars[j], theta_bar, rho_bar);
   }
-  auto add_torque = [&](const auto& f) {
-    const JointAngle& joint = data_.angles[index(f.joint_angle)];
-    const std::size_t i = index(joint.body1), j = index(joint.body2);
-    f.pull_back(at.t, data_.rho, joint, at.angles(f.joint_angle), at.frames[i], at.frames[j], law_, bars[i], bars[j],
+  for_each_joint_effort([&](const auto& f) {
+    const std::size_t i = index(f.joint.body1), j = index(f.joint.body2);
+    f.pull_back(at.t, data_.rho, reference(f.angle, at.angles), at.frames[i], at.frames[j], law_, bars[i], bars[j],
                 theta_bar, rho_bar);
-  };
-  for (const RsdaForce& f : data_.rsda) add_torque(f);
-  for (const FrictionForce& f : data_.frictions) add_torque(f);
+  });
   for (const Bushing& f : data_.bushings) {
-    const std::size_t i = index(f.body1), j = index(f.body2);
-    f.pull_back(at.frames[i], at.frames[j], bars[i], bars[j], theta_bar);
-  }
-  for (const SlidingFriction& f : data_.sliding_frictions) {
     const std::size_t i = index(f.body1), j = index(f.body2);
     f.pull_back(at.frames[i], at.frames[j], bars[i], bars[j], theta_bar);
   }

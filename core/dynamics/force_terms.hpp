@@ -33,9 +33,12 @@ class ForceTerms {
                      Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
 
  private:
-  template <class Force>
-  void add_torque_tangent(const Force& force, const At& at, const std::vector<FrameTangent>& tangents,
-                          const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs);
+  template <class Visitor>
+  void for_each_joint_effort(Visitor&& visitor) const {
+    for (const RsdaForce& f : data_.rsda) visitor(f);
+    for (const TurningFriction& f : data_.turning_frictions) visitor(f);
+    for (const SlidingFriction& f : data_.sliding_frictions) visitor(f);
+  }
   void set_inputs(const AppliedForce& force, const At& at);
   Vector3d components(const AppliedForce& force, const At& at);
   Vector3d components_with_gradients(const AppliedForce& force, const At& at);

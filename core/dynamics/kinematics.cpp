@@ -1,5 +1,7 @@
 #include "core/dynamics/kinematics.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -8,7 +10,6 @@
 #include <set>
 
 #include "core/body/euler_parameters.hpp"
-#include "core/dynamics/assembly.hpp"
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/projection.hpp"
 #include "core/sensor/body_at.hpp"
@@ -25,12 +26,6 @@ constexpr double kRelativeCorrection = 0.2;  // of the predictor, against the st
 constexpr double kSmallCorrection = 1e-6;    // always accepted
 constexpr double kViolation = 1e-9;
 constexpr double kRankThreshold = 1e-7;  // rows of J scaled to unit length
-
-std::string number(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", x);
-  return text;
-}
 
 // J at a state, rows scaled to unit length: linear solves that no mass enters.
 class DrivenRows {
@@ -50,13 +45,7 @@ class DrivenRows {
   }
   void factor() {
     rows_.evaluate(frames_);
-    J_ = MatrixXd::Zero(d_.m, 6 * d_.n);
-    for (const RowGroup& g : d_.groups) {
-      for (int r = 0; r < g.rows; ++r) {
-        if (g.body1 > 0) J_.block<1, 6>(g.row + r, 6 * (g.body1 - 1)) += rows_.J1.row(g.block + r);
-        if (g.body2 > 0) J_.block<1, 6>(g.row + r, 6 * (g.body2 - 1)) += rows_.J2.row(g.block + r);
-      }
-    }
+    J_ = rows_.dense();
     scale_ = J_.rowwise().norm().cwiseMax(1e-300).cwiseInverse();
     scaled_.setThreshold(kRankThreshold);
     scaled_.compute(scale_.asDiagonal() * J_);
@@ -185,7 +174,7 @@ class Kinematics {
     for (std::size_t k = 0; k < d_.angles.size(); ++k) {
       const JointAngle& a = d_.angles[k];
       double& angle = angles_(static_cast<Index>(k));
-      angle = JointAngle::on_branch(a.jet(body_at(y_, a.body1).frame, body_at(y_, a.body2).frame).angle(), angle);
+      angle = a.value_near(angle, body_at(y_, a.body1).frame, body_at(y_, a.body2).frame);
     }
     return true;
   }
@@ -263,27 +252,20 @@ class Kinematics {
   VectorXd y_, angles_, y_hat_, y_next_;
 };
 
-std::string joined_names(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 }  // namespace
 
-KinematicsResult solve_kinematics(const Mechanism& mechanism, const FormulationSettings& formulation,
-                                  const std::vector<double>& times,
+KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& start,
+                                  const FormulationSettings& formulation, const std::vector<double>& times,
                                   const std::function<bool(std::size_t, const StatePoint&)>& observe) {
   KinematicsResult result;
   result.last_good_time = times.front();
-  const Assembly assembly(mechanism, times.front());
-  if (!assembly.result().ok) {
-    result.message = assembly.result().message;
+  if (!start.result().ok) {
+    result.message = start.result().message;
     return result;
   }
-  const int freedoms = assembly.summary().degrees_of_freedom;
+  const int freedoms = start.summary().degrees_of_freedom;
   Kinematics k(mechanism, formulation);
-  k.start(times.front(), assembly.result().y, assembly.result().angles);
+  k.start(times.front(), start.result().y, start.result().angles);
   if (freedoms > 0 && k.rank_here().rank_lost > 0) {
     result.message = "the drives leave " + std::to_string(freedoms) + (freedoms == 1 ? " degree" : " degrees") +
                      " of freedom at the start; kinematics needs all of them driven, by drives or by a condition on a "
@@ -304,12 +286,14 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const FormulationS
       h /= 2;
       if (h < 1e-9 * std::max(1e-3, times.back() - times.front())) {
         const SingularPosition here = k.rank_here();
-        result.message = "the positions cannot be continued beyond t = " + number(k.t()) + " s" +
-                         (here.rank_lost > 0 ? ": a singular position, where the equations of " +
-                                                   joined_names(here.owners) + " depend on each other"
-                                             : "") +
-                         ". A dead point that the drives cannot pass, or a position out of reach? Change the law, the "
-                         "lengths, or drive another joint there";
+        const std::string why =
+            here.rank_lost > 0 ? fmt::format(": a singular position, where the equations of {} depend on each other",
+                                             fmt::join(here.owners, ", "))
+                               : "";
+        result.message = fmt::format(
+            "the positions cannot be continued beyond t = {:.6g} s{}. A dead point that the drives cannot "
+            "pass, or a position out of reach? Change the law, the lengths, or drive another joint there",
+            k.t(), why);
         return result;
       }
     }
@@ -319,7 +303,7 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const FormulationS
     SingularPosition here = k.rank_here();
     if (here.rank_lost > 0) result.singular.push_back(std::move(here));
     if (!observe(i, k.point())) {
-      result.message = "stopped at t = " + number(k.t()) + " s";
+      result.message = fmt::format("stopped at t = {:.6g} s", k.t());
       return result;
     }
   }

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "core/dynamics/assembly.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/mechanism/state_point.hpp"
 #include "core/scene/settings.hpp"
@@ -35,9 +36,10 @@ struct KinematicsResult {
   std::vector<SingularPosition> singular;  // among the times wanted
 };
 
-// times: ascending, the first is the start. observe: with the motion (accelerations, multipliers) in the point.
-KinematicsResult solve_kinematics(const Mechanism& mechanism, const FormulationSettings& formulation,
-                                  const std::vector<double>& times,
+// start: the mechanism assembled at the first of the times, which ascend. observe: with the motion (accelerations,
+// multipliers) in the point.
+KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& start,
+                                  const FormulationSettings& formulation, const std::vector<double>& times,
                                   const std::function<bool(std::size_t, const StatePoint&)>& observe);
 
 }  // namespace mbsopt

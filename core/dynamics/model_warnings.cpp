@@ -45,13 +45,8 @@ void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::st
   if (!any) return;  // the usual case costs nothing
   ConstraintRows rows(d);
   rows.evaluate(frames_at(d, q));
-  MatrixXd J = MatrixXd::Zero(std::max(d.m, 1), 6 * d.n);
-  for (const RowGroup& g : d.groups) {
-    for (int r = 0; r < g.rows; ++r) {
-      if (g.body1 > 0) J.block<1, 6>(g.row + r, 6 * (g.body1 - 1)) += rows.J1.row(g.block + r);
-      if (g.body2 > 0) J.block<1, 6>(g.row + r, 6 * (g.body2 - 1)) += rows.J2.row(g.block + r);
-    }
-  }
+  MatrixXd J = rows.dense();
+  if (d.m == 0) J = MatrixXd::Zero(1, 6 * d.n);
   for (Index r = 0; r < J.rows(); ++r) J.row(r) /= std::max(J.row(r).norm(), 1e-300);
   Eigen::ColPivHouseholderQR<MatrixXd> qr;
   qr.setThreshold(kRankThreshold);

@@ -21,7 +21,7 @@ Projector::Projector(const Mechanism& mechanism, Projection what)
     : mechanism_(mechanism),
       data_(mechanism_.data()),
       what_(what),
-      solver_(data_, kRelativeAlpha, true),
+      solver_(data_, kRelativeAlpha * data_.row_alpha),
       rows_(data_),
       laws_(data_) {
   const std::size_t n = at(data_.n);

@@ -9,12 +9,13 @@ namespace {
 // A pass that gains less ends the refinement: rounding is reached, or the position is singular.
 constexpr double kStagnation = 0.97;
 
+// A residual above it, relative as in Settings, is more than rounding.
+constexpr double kDisagreement = 1e-14;
+
 }  // namespace
 
-SaddleSolver::SaddleSolver(const MechanismData& data, double alpha, bool alpha_is_relative)
-    : data_(&data), rows_(data), S_(rows_.matrix()) {
-  alpha_.setConstant(data.m, alpha);
-  if (alpha_is_relative) alpha_ = alpha * data.row_alpha;
+SaddleSolver::SaddleSolver(const MechanismData& data, const Eigen::VectorXd& alpha, double c)
+    : data_(&data), rows_(data), S_(rows_.matrix()), alpha_(alpha), c_(c) {
   const std::size_t n = static_cast<std::size_t>(data.n);
   residual_.setZero(data.m);
   residual_lanes_.setZero(data.m, kLanes);
@@ -64,13 +65,34 @@ void SaddleSolver::solve_any(const std::vector<X>& b, const Y& g, const Settings
     step.setZero();
     rows_.add_times(correction, step);
     residual -= step;
-    for (Eigen::Index r = 0; r < g.rows(); ++r) nu.row(r) -= alpha_(r) * residual.row(r);
+    for (Eigen::Index r = 0; r < g.rows(); ++r) {
+      nu.row(r) -= alpha_(r) * residual.row(r);
+      residual.row(r) *= 1 - c_ * alpha_(r);
+    }
     const double now = residual.cwiseAbs().maxCoeff();
     residual_ratio_ = size > 0 ? now / size : 0.0;
-    if (k >= settings.most) return;
-    if (k >= settings.least && (residual_ratio_ <= settings.tolerance || !(now < kStagnation * before))) return;
+    if (k >= settings.most) break;
+    if (k >= settings.least && (residual_ratio_ <= settings.tolerance || !(now < kStagnation * before))) break;
     before = now;
   }
+  if (c_ > 0 && residual_ratio_ > kDisagreement) add_redundant_part(nu, residual, step, correction);
+}
+
+// nu += d,  d = -s/c with J'd = 0: the rounding of s that lies in the range of J is 1/c times too large there, and goes
+// again as in solve_any, by dx and alpha J dx from the residual -J'd. Twice: each gains a factor of 1/(1 + alpha j).
+template <class X, class Y>
+void SaddleSolver::add_redundant_part(Y& nu, Y& residual, Y& step, std::vector<X>& correction) {
+  Y& d = residual;
+  d *= -1 / c_;
+  for (int k = 0; k < 2; ++k) {
+    for (X& x : correction) x.setZero();
+    rows_.subtract_transposed_times(d, correction);
+    S_.solve(std::span<X>(correction));
+    step.setZero();
+    rows_.add_times(correction, step);
+    for (Eigen::Index r = 0; r < d.rows(); ++r) d.row(r) += alpha_(r) * step.row(r);
+  }
+  nu += d;
 }
 
 void SaddleSolver::solve(const std::vector<Vec<6>>& b, const Eigen::VectorXd& g, const Settings& settings,

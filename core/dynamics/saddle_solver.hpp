@@ -1,17 +1,22 @@
 // The linear system every formulation, tangent, adjoint and projection solves,
 //
 //   [ M  J' ] [ x  ]   [ b ]
-//   [ J  -c ] [ nu ] = [ g ]      c = 0: constrained (augmented Lagrangian);  c = 1/alpha: penalty
+//   [ J  -c ] [ nu ] = [ g ]      c = 0: constrained (augmented Lagrangian);  c > 0: penalty, its alpha 1/c
 //
 // with the one factor S = M + J' diag(alpha) J. From x = 0, nu = 0, 1 + refinements times
 //
-//   S dx = (b - M x - J'nu) + J' alpha (g - J x),    dnu = alpha (J dx - (g - J x))
+//   S dx = (b - M x - J'nu) + J' alpha s,    dnu = alpha (J dx - s),      s = g - J x + c nu
 //
-// The first pass is the penalty system; further ones are the augmented-Lagrangian iteration, written as corrections of
-// both x and nu by their residuals: iterative refinement, which also removes the rounding errors of S (its condition
-// number grows with alpha). Updating nu by alpha times the whole J x - g instead would leave it with an error of alpha
+// The first pass solves the system with 1/alpha in place of c: penalty, when c is just that. Further ones are the
+// augmented-Lagrangian iteration (c = 0) or its quasi-definite counterpart, written as corrections of both x and nu by
+// their residuals: iterative refinement, which also removes the rounding errors of S (its condition number grows with
+// alpha). Each gains a factor of about (1 - c alpha)/(1 + alpha j), j the eigenvalues of J inv(M) J', so alpha need not
+// be that of the penalty. Updating nu by alpha times the whole J x - g instead would leave it with an error of alpha
 // times the rounding unit. The map (b, g) -> (x, nu) after a fixed number of passes is symmetric, so tangent and
 // adjoint solves are exact transposes whatever their convergence.
+//
+// Redundant rows that disagree leave a residual s with J's = 0 that no x removes. Where c > 0, and alpha is the same in
+// all rows, x is right nevertheless, and nu lacks -s/c, which is added at the end.
 #pragma once
 
 #include <vector>
@@ -23,7 +28,8 @@ namespace mbsopt {
 
 class SaddleSolver {
  public:
-  SaddleSolver(const MechanismData& data, double alpha, bool alpha_is_relative);
+  // alpha: that of S, per row.
+  SaddleSolver(const MechanismData& data, const Eigen::VectorXd& alpha, double c = 0);
 
   // S from J at the frames given; false where it is not positive definite.
   bool factor(const std::vector<Frame>& frames);
@@ -32,8 +38,8 @@ class SaddleSolver {
   const ConstraintRows& rows() const { return rows_; }
   const Eigen::VectorXd& alpha() const { return alpha_; }
 
-  // Refinements after the first pass: at least `least`, at most `most`; between the two until |J x - g| is at most
-  // tolerance times the larger of |g| and |x|, or stops falling.
+  // Refinements after the first pass: at least `least`, at most `most`; between the two until |s| is at most tolerance
+  // times the larger of |g| and |x|, or stops falling.
   struct Settings {
     int least = 0, most = 0;
     double tolerance = 0;
@@ -43,7 +49,7 @@ class SaddleSolver {
   void solve(const std::vector<Lanes<6>>& b, const LaneRows& g, const Settings& settings, std::vector<Lanes<6>>& x,
              LaneRows& nu);
 
-  // |J x - g| after the last solve, relative as above.
+  // |s| after the last solve, relative as above.
   double residual_ratio() const { return residual_ratio_; }
   long factorisations() const { return factorisations_; }
 
@@ -61,11 +67,14 @@ class SaddleSolver {
   template <class X, class Y>
   void solve_any(const std::vector<X>& b, const Y& g, const Settings& settings, std::vector<X>& x, Y& nu, Y& residual,
                  Y& step, std::vector<X>& correction);
+  template <class X, class Y>
+  void add_redundant_part(Y& nu, Y& residual, Y& step, std::vector<X>& correction);
 
   const MechanismData* data_;
   ConstraintRows rows_;
   BlockCholesky S_;
   Eigen::VectorXd alpha_;
+  double c_;
   Eigen::VectorXd residual_, step_;
   LaneRows residual_lanes_, step_lanes_;
   std::vector<Vec<6>> correction_;

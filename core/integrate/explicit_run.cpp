@@ -148,8 +148,8 @@ bool ExplicitRun::finish_step(bool dense) {
   for (std::size_t k = 0; k < d.angles.size(); ++k) {
     const JointAngle& a = d.angles[k];
     const Eigen::Index i = static_cast<Eigen::Index>(k);
-    const double now = a.jet(body_at(step_.y1, a.body1).frame, body_at(step_.y1, a.body2).frame).angle();
-    step_.angles1(i) = JointAngle::on_branch(now, step_.angles0(i));
+    step_.angles1(i) =
+        a.value_near(step_.angles0(i), body_at(step_.y1, a.body1).frame, body_at(step_.y1, a.body2).frame);
   }
   return true;
 }
@@ -157,7 +157,7 @@ bool ExplicitRun::finish_step(bool dense) {
 double ExplicitRun::fastest_tracked_rate(const Eigen::VectorXd& y) const {
   double fastest = 0;
   for (const JointAngle& a : mechanism_.data().angles) {
-    fastest = std::max(fastest, std::abs(a.jet(body_at(y, a.body1).frame, body_at(y, a.body2).frame).rate()));
+    fastest = std::max(fastest, std::abs(a.rate(body_at(y, a.body1).frame, body_at(y, a.body2).frame)));
   }
   return fastest;
 }

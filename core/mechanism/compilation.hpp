@@ -57,6 +57,7 @@ struct Compilation {
   // Zero::start: an angle without normals is zero at the orientations in the file, else both normals are the same
   // vector.
   Constraint joint_angle_term(const std::string& joint, Zero zero, const std::string& where);
+  JointDisplacement joint_displacement(const std::string& joint, const std::string& where);
   Constraint joint_displacement_term(const std::string& joint, const std::string& where);
   Dual joint_displacement_in_file(const std::string& joint, const std::string& where) const;
 

@@ -43,7 +43,8 @@ void add(Compilation& model, const Tsda& f, int force, const std::string& where)
 void add(Compilation& model, const Rsda& f, int force, const std::string& where) {
   RsdaForce out;
   out.force = force;
-  out.joint_angle = model.angle_of(f.joint, where + ".joint");
+  out.angle = model.angle_of(f.joint, where + ".joint");
+  out.joint = model.data.angles[static_cast<std::size_t>(out.angle)];
   out.law = law(model, f.law, {"angle", "rate"}, {f.stiffness, f.damping, f.free_angle, 0.0}, where);
   model.data.rsda.push_back(std::move(out));
 }
@@ -76,21 +77,17 @@ int moving_body(const Compilation& model, const std::string& name, const std::st
   return body;
 }
 
-void add(Compilation& model, const PointForce& f, int force, const std::string& where) {
+template <class Applied>  // PointForce, Torque
+requires requires(const Applied& f) { f.components; }
+void add(Compilation& model, const Applied& f, int force, const std::string& where) {
   AppliedForce out;
   out.force = force;
   out.body = moving_body(model, f.body, where + ".body");
-  out.s = numbers(model.keep(out.slot, model.point(out.body, f.point, where + ".point")));
-  out.in_body_axes = f.in_body_frame;
-  set_components(model, f.components, out, where);
-  model.data.applied.push_back(std::move(out));
-}
-
-void add(Compilation& model, const Torque& f, int force, const std::string& where) {
-  AppliedForce out;
-  out.force = force;
-  out.body = moving_body(model, f.body, where + ".body");
-  out.is_torque = true;
+  if constexpr (requires { f.point; }) {
+    out.s = numbers(model.keep(out.slot, model.point(out.body, f.point, where + ".point")));
+  } else {
+    out.is_torque = true;
+  }
   out.in_body_axes = f.in_body_frame;
   set_components(model, f.components, out, where);
   model.data.applied.push_back(std::move(out));
@@ -105,7 +102,7 @@ void add(Compilation& model, const BushingSpec& f, int force, const std::string&
   // R0 = A(p1)'A(p2), row by row
   const DualVector4 &p1 = model.orientation[static_cast<std::size_t>(out.body1)],
                     &p2 = model.orientation[static_cast<std::size_t>(out.body2)];
-  const DualVector4 relative = quaternion_product({p1[0], -p1[1], -p1[2], -p1[3]}, p2);
+  const DualVector4 relative = quaternion_product(inverse(p1), p2);
   DualVector<9> R0;
   for (std::size_t k = 0; k < 3; ++k) {
     DualVector3 axis{model.fields.constant(0), model.fields.constant(0), model.fields.constant(0)};
@@ -140,11 +137,10 @@ void add(Compilation& model, const FrictionSpec& f, int force, const std::string
   law.coulomb = v(0), law.smooth = v(1), law.viscous = v(2);
   if (!(law.smooth > 0)) throw SceneError(where + ".smooth_velocity: must be greater than 0");
   if (is_sliding(f.motion, joint.type)) {
-    const Constraint c = model.joint_displacement_term(f.joint, where + ".joint");
-    model.data.sliding_frictions.push_back(
-        {force, c.body1, c.body2, std::get<Dot2>(c.primitive), c.slot1, c.slot2, c.slot3, law});
+    model.data.sliding_frictions.push_back({force, model.joint_displacement(f.joint, where + ".joint"), -1, law});
   } else {
-    model.data.frictions.push_back({force, model.angle_of(f.joint, where + ".joint"), law});
+    const int angle = model.angle_of(f.joint, where + ".joint");
+    model.data.turning_frictions.push_back({force, model.data.angles[static_cast<std::size_t>(angle)], angle, law});
   }
 }
 

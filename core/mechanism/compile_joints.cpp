@@ -106,6 +106,13 @@ void add_constant(Compilation& model, int row, const Dual& value) {
   model.data.laws.push_back(std::move(law));
 }
 
+template <class P>
+void place(const JointMeasure<P>& joint, Constraint& c) {
+  c.primitive = joint.measure;
+  c.body1 = joint.body1, c.body2 = joint.body2;
+  c.slot1 = joint.slot1, c.slot2 = joint.slot2, c.slot3 = joint.slot3;
+}
+
 void set_factor(Compilation& model, Constraint& c, const Dual& factor) {
   c.factor = factor.value();
   c.slot_factor = model.fields.slot(factor);
@@ -195,28 +202,30 @@ Constraint& Compilation::add_term(Constraint c) {
 Constraint Compilation::joint_angle_term(const std::string& name, Zero zero, const std::string& where) {
   Constraint c;
   c.angle = angle_of(name, where, zero);
-  const JointAngle& a = data.angles[static_cast<std::size_t>(c.angle)];
-  c.body1 = a.body1, c.body2 = a.body2;
-  Angle angle;
-  angle.s1 = a.x1, angle.s2 = a.n2, angle.s3 = a.y1;
-  c.slot1 = a.slot_x1, c.slot2 = a.slot_n2, c.slot3 = a.slot_y1;
-  c.primitive = angle;
+  place(data.angles[at(c.angle)], c);
   return c;
 }
 
 Constraint Compilation::joint_displacement_term(const std::string& name, const std::string& where) {
+  Constraint c;
+  place(joint_displacement(name, where), c);
+  return c;
+}
+
+JointDisplacement Compilation::joint_displacement(const std::string& name, const std::string& where) {
   const Joint& joint = scene.joints[joint_index(name, where)];
   const JointRecipe* recipe = joint_recipe(joint.type);
   if (!recipe || !recipe->has_displacement) {
     throw SceneError(where + ": joint '" + name + "' is " + joint.type + " and has no displacement");
   }
   const std::string path = child_path("joints", joint_index(name, where));
-  Constraint c;
-  c.body1 = body_index(joint.body1, path), c.body2 = body_index(joint.body2, path);
-  c.primitive = Dot2{};
-  JointVectors vectors(*this, joint, c.body1, c.body2, path);
-  set_vectors(*this, c, vectors, JointVector::point1, JointVector::point2, JointVector::axis1);
-  return c;
+  JointDisplacement x;
+  x.body1 = body_index(joint.body1, path), x.body2 = body_index(joint.body2, path);
+  JointVectors vectors(*this, joint, x.body1, x.body2, path);
+  x.measure.s1 = numbers(keep(x.slot1, vectors(JointVector::point1)));
+  x.measure.s2 = numbers(keep(x.slot2, vectors(JointVector::point2)));
+  x.measure.s3 = numbers(keep(x.slot3, vectors(JointVector::axis1)));
+  return x;
 }
 
 Dual Compilation::joint_displacement_in_file(const std::string& name, const std::string& where) const {
@@ -241,7 +250,6 @@ int Compilation::angle_of(const std::string& name, const std::string& where, Zer
     throw SceneError(where + ": joint '" + name + "' is " + joint.type + " and has no angle");
   }
   JointAngle angle;
-  angle.joint = static_cast<int>(i);
   angle.body1 = body_index(joint.body1, joint_path), angle.body2 = body_index(joint.body2, joint_path);
   const DualVector3 a1 = direction(angle.body1, joint.axis1, joint_path + ".axis1");
   const DualVector3 a2 = direction(angle.body2, joint.axis2, joint_path + ".axis2");
@@ -265,9 +273,9 @@ int Compilation::angle_of(const std::string& name, const std::string& where, Zer
                        "not settled: give normal1 and normal2");
     }
   }
-  angle.x1 = numbers(keep(angle.slot_x1, n1));
-  angle.y1 = numbers(keep(angle.slot_y1, cross(a1, n1)));
-  angle.n2 = numbers(keep(angle.slot_n2, n2));
+  angle.measure.s1 = numbers(keep(angle.slot1, n1));
+  angle.measure.s3 = numbers(keep(angle.slot3, cross(a1, n1)));
+  angle.measure.s2 = numbers(keep(angle.slot2, n2));
   data.angles.push_back(angle);
   return angle_of_joint_[{i, zero}] = static_cast<int>(data.angles.size()) - 1;
 }

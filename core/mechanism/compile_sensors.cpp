@@ -23,6 +23,20 @@ int component(const std::string& name, const std::string& where) {
   return static_cast<int>(found - names.begin());
 }
 
+// What the sensors of points share (PointSensor, AccelerationSensor): a point, perhaps relative to another, a component
+// in some axes.
+template <class Kind>
+Kind with_points(Compilation& model, const Sensor& s, Kind out, const std::string& where) {
+  out.a = sensor_point(model, s.body, s.point, where);
+  if (s.relative_to) {
+    out.relative = true;
+    out.b = sensor_point(model, s.relative_to->body, s.relative_to->point, where + ".relative_to");
+  }
+  out.component = component(s.component, where);
+  if (s.in_body_frame && out.a.body > 0) out.axes_body = out.a.body;
+  return out;
+}
+
 SensorKind tension_sensor(const MechanismData& data, const std::string& name, const std::vector<Force>& forces,
                           const std::string& where) {
   const auto found = std::find_if(forces.begin(), forces.end(), [&](const Force& f) { return f.name == name; });
@@ -62,14 +76,7 @@ SensorKind sensor(Compilation& model, const Sensor& s, const std::string& where)
   if (quantity == "position" || quantity == "velocity") {
     PointSensor out;
     out.quantity = quantity == "position" ? PointSensor::Quantity::position : PointSensor::Quantity::velocity;
-    out.a = sensor_point(model, s.body, s.point, where);
-    if (s.relative_to) {
-      out.relative = true;
-      out.b = sensor_point(model, s.relative_to->body, s.relative_to->point, where + ".relative_to");
-    }
-    out.component = component(s.component, where);
-    if (s.in_body_frame && out.a.body > 0) out.axes_body = out.a.body;
-    return out;
+    return with_points(model, s, out, where);
   }
   if (quantity == "distance" || quantity == "distance_rate") {
     PointSensor out;
@@ -101,20 +108,9 @@ SensorKind sensor(Compilation& model, const Sensor& s, const std::string& where)
   }
   if (quantity == "constraint_violation") return ViolationSensor{};
   if (quantity == "displacement") {
-    const Constraint c = model.joint_displacement_term(s.joint, where + ".joint");
-    return DisplacementSensor{c.body1, c.body2, std::get<Dot2>(c.primitive), c.slot1, c.slot2, c.slot3};
+    return DisplacementSensor{model.joint_displacement(s.joint, where + ".joint")};
   }
-  if (quantity == "acceleration") {
-    AccelerationSensor out;
-    out.a = sensor_point(model, s.body, s.point, where);
-    if (s.relative_to) {
-      out.relative = true;
-      out.b = sensor_point(model, s.relative_to->body, s.relative_to->point, where + ".relative_to");
-    }
-    out.component = component(s.component, where);
-    if (s.in_body_frame && out.a.body > 0) out.axes_body = out.a.body;
-    return out;
-  }
+  if (quantity == "acceleration") return with_points(model, s, AccelerationSensor{}, where);
   if (quantity == "reaction") return reaction_sensor(model, s, where);
   if (quantity == "drive_force") {
     ReactionSensor out;

@@ -65,15 +65,12 @@ Coupling coupling(const MechanismData& data) {
   }
   couple_pair(data.tsda);
   couple_pair(data.bushings);
-  couple_pair(data.sliding_frictions);
-  auto couple_torques = [&](const auto& torques) {
-    for (const auto& f : torques) {
-      const JointAngle& angle = data.angles[static_cast<std::size_t>(f.joint_angle)];
-      couple({angle.body1, angle.body2}, {angle.body1, angle.body2});
-    }
+  auto couple_efforts = [&](const auto& efforts) {
+    for (const auto& f : efforts) couple({f.joint.body1, f.joint.body2}, {f.joint.body1, f.joint.body2});
   };
-  couple_torques(data.rsda);
-  couple_torques(data.frictions);
+  couple_efforts(data.rsda);
+  couple_efforts(data.turning_frictions);
+  couple_efforts(data.sliding_frictions);
   for (const AppliedForce& f : data.applied) {
     couple({f.body}, {f.body});
     for (const int s : f.sensors) couple({f.body}, read_by(data, data.sensors[static_cast<std::size_t>(s)]));

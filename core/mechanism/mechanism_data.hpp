@@ -13,11 +13,10 @@
 #include "core/force/applied.hpp"
 #include "core/force/bushing.hpp"
 #include "core/force/friction.hpp"
-#include "core/force/rsda.hpp"
 #include "core/force/tsda.hpp"
 #include "core/force/user_force.hpp"
 #include "core/sensor/acceleration_sensor.hpp"
-#include "core/sensor/joint_angle.hpp"
+#include "core/sensor/joint_measure.hpp"
 #include "core/sensor/point_sensor.hpp"
 #include "core/sensor/rotation_sensor.hpp"
 
@@ -52,9 +51,7 @@ struct ReactionSensor {  // reaction_sensor.hpp
 };
 struct ViolationSensor {};   // the largest |Phi| of joints and unit norms
 struct DisplacementSensor {  // along a joint's axis, or its rate
-  int body1 = 0, body2 = 0;
-  Dot2 displacement;
-  int slot1 = -1, slot2 = -1, slot3 = -1;
+  JointDisplacement joint;
   bool rate = false;
 };
 struct TensionSensor {  // what a tsda pulls [N], what an rsda resists [N m]
@@ -109,7 +106,7 @@ struct MechanismData {
   std::vector<RsdaForce> rsda;
   std::vector<AppliedForce> applied;
   std::vector<Bushing> bushings;
-  std::vector<FrictionForce> frictions;
+  std::vector<TurningFriction> turning_frictions;
   std::vector<SlidingFriction> sliding_frictions;
   std::vector<UserForceData> user_forces;
   std::vector<SensorKind> sensors;

@@ -43,12 +43,6 @@ void add_pull_back_of_loads(const MechanismData& d, const ReactionSensor& s, con
                             const Eigen::VectorXd& lambda, const Vec<6>& eta, double scale,
                             Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& lambda_bar,
                             Eigen::Ref<Eigen::VectorXd> rho_bar) {
-  auto add_slot = [&](int slot, const auto& bar) {
-    if (slot < 0) return;
-    for (std::size_t k = 0; k < d.active.size(); ++k) {
-      rho_bar(d.active[k]) += scale * d.theta_rho.col(static_cast<Eigen::Index>(k)).segment(slot, bar.size()).dot(bar);
-    }
-  };
   for (const Constraint& c : d.constraints) {
     if (c.joint != s.joint) continue;
     BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
@@ -64,16 +58,16 @@ void add_pull_back_of_loads(const MechanismData& d, const ReactionSensor& s, con
           p.pull_back(b1.frame, b2.frame, z, bar1, bar2, geometry);
           const Vec<P::kRows> change = virtual_change(p, b1.frame, b2.frame);
           lambda_bar.segment<P::kRows>(c.row) -= scale * c.factor * change;
-          add_slot(c.slot_factor, Vec<1>(-lambda.segment<P::kRows>(c.row).dot(change)));
+          add_slot<1>(d, c.slot_factor, Vec<1>(-lambda.segment<P::kRows>(c.row).dot(change)), scale, rho_bar);
         },
         c.primitive);
     fold_virtual(Vector3d::Zero(), bar1);
     fold_virtual(eta.tail<3>(), bar2);
     add_pull_back(b1, c.body1, bar1, scale, y_bar);
     add_pull_back(b2, c.body2, bar2, scale, y_bar);
-    add_slot(c.slot1, geometry.s1);
-    add_slot(c.slot2, geometry.s2);
-    add_slot(c.slot3, geometry.s3);
+    add_slot<3>(d, c.slot1, geometry.s1, scale, rho_bar);
+    add_slot<3>(d, c.slot2, geometry.s2, scale, rho_bar);
+    add_slot<3>(d, c.slot3, geometry.s3, scale, rho_bar);
   }
 }
 
@@ -116,12 +110,7 @@ double add_gradient(const MechanismData& d, const ReactionSensor& s, const Eigen
   bar.set_zero();
   bar.A = c * loads.T.transpose() + arm_bar * s.s2.transpose();
   add_pull_back(b2, s.body2, bar, scale, y_bar);
-  if (s.slot_s2 >= 0) {
-    const Vector3d s2_bar = A2.transpose() * arm_bar;
-    for (std::size_t k = 0; k < d.active.size(); ++k) {
-      rho_bar(d.active[k]) += scale * d.theta_rho.col(static_cast<Eigen::Index>(k)).segment<3>(s.slot_s2).dot(s2_bar);
-    }
-  }
+  add_slot<3>(d, s.slot_s2, Vec<3>(A2.transpose() * arm_bar), scale, rho_bar);
   return result;
 }
 

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "core/body/euler_parameters.hpp"
+#include "core/mechanism/measure_gradient.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/reaction_sensor.hpp"
 #include "core/mechanism/state_point.hpp"
@@ -17,57 +18,22 @@ using VecOut = Eigen::Ref<Eigen::VectorXd>;
 
 double branch(const Eigen::VectorXd& angles, int i) { return i < angles.size() ? angles(i) : 0.0; }
 
-double angle_value(const MechanismData& d, const AngleSensor& s, const Eigen::VectorXd& y,
-                   const Eigen::VectorXd& angles) {
-  const JointAngle& joint = d.angles[static_cast<std::size_t>(s.angle)];
-  const JointAngle::Jet j = joint.jet(body_at(y, joint.body1).frame, body_at(y, joint.body2).frame);
-  return s.rate ? j.rate() : JointAngle::on_branch(j.angle(), branch(angles, s.angle));
-}
-
-double angle_gradient(const MechanismData& d, const AngleSensor& s, const Eigen::VectorXd& y,
-                      const Eigen::VectorXd& angles, double scale, VecOut y_bar, VecOut rho_bar) {
-  const JointAngle& joint = d.angles[static_cast<std::size_t>(s.angle)];
+// reference: the value on whose turn an angle is.
+template <class P>
+double measure_value(const JointMeasure<P>& joint, bool rate, double reference, const Eigen::VectorXd& y) {
   const BodyAt b1 = body_at(y, joint.body1), b2 = body_at(y, joint.body2);
-  const JointAngle::Jet j = joint.jet(b1.frame, b2.frame);
-  FrameBar bar1, bar2;
-  bar1.set_zero(), bar2.set_zero();
-  JointAngle::SlotBars s_bar;
-  joint.pull_back(b1.frame, b2.frame, j, s.rate ? 0 : 1, s.rate ? 1 : 0, 0, bar1, bar2, s_bar);
-  add_pull_back(b1, joint.body1, bar1, scale, y_bar);
-  add_pull_back(b2, joint.body2, bar2, scale, y_bar);
-  add_slot<3>(d, joint.slot_x1, s_bar.x1, scale, rho_bar);
-  add_slot<3>(d, joint.slot_y1, s_bar.y1, scale, rho_bar);
-  add_slot<3>(d, joint.slot_n2, s_bar.n2, scale, rho_bar);
-  return s.rate ? j.rate() : JointAngle::on_branch(j.angle(), branch(angles, s.angle));
+  return rate ? joint.rate(b1.frame, b2.frame) : joint.value_near(reference, b1.frame, b2.frame);
 }
 
-double displacement_value(const DisplacementSensor& s, const Eigen::VectorXd& y) {
-  const BodyAt b1 = body_at(y, s.body1), b2 = body_at(y, s.body2);
-  Vec<1> x;
-  if (s.rate) {
-    s.displacement.phi_dot(b1.frame, b2.frame, x);
-  } else {
-    s.displacement.phi(b1.frame, b2.frame, x);
-  }
-  return x(0);
+template <class P>
+double measure_gradient(const MechanismData& d, const JointMeasure<P>& joint, bool rate, double reference,
+                        const Eigen::VectorXd& y, double scale, VecOut y_bar, VecOut rho_bar) {
+  const BodyAt b1 = body_at(y, joint.body1), b2 = body_at(y, joint.body2);
+  add_measure_gradient(d, joint, b1, b2, rate ? 0 : scale, rate ? scale : 0, y_bar, rho_bar);
+  return rate ? joint.rate(b1.frame, b2.frame) : joint.value_near(reference, b1.frame, b2.frame);
 }
 
-double displacement_gradient(const MechanismData& d, const DisplacementSensor& s, const Eigen::VectorXd& y,
-                             double scale, VecOut y_bar, VecOut rho_bar) {
-  const BodyAt b1 = body_at(y, s.body1), b2 = body_at(y, s.body2);
-  Multipliers<1> z = Multipliers<1>::zero();
-  (s.rate ? z.mu1 : z.mu0)(0) = 1;
-  FrameBar bar1, bar2;
-  bar1.set_zero(), bar2.set_zero();
-  GeometryBar s_bar;
-  s.displacement.pull_back(b1.frame, b2.frame, z, bar1, bar2, s_bar);
-  add_pull_back(b1, s.body1, bar1, scale, y_bar);
-  add_pull_back(b2, s.body2, bar2, scale, y_bar);
-  add_slot<3>(d, s.slot1, s_bar.s1, scale, rho_bar);
-  add_slot<3>(d, s.slot2, s_bar.s2, scale, rho_bar);
-  add_slot<3>(d, s.slot3, s_bar.s3, scale, rho_bar);
-  return displacement_value(s, y);
-}
+const JointAngle& followed(const MechanismData& d, int angle) { return d.angles[static_cast<std::size_t>(angle)]; }
 
 Vec<6> inertia_entries(const Matrix3d& X) {  // gradient in xx yy zz xy xz yz of <X, J>
   Vec<6> x;
@@ -118,9 +84,8 @@ void add_potential_gradient(const MechanismData& d, const Eigen::VectorXd& y, co
   }
   for (const RsdaForce& f : d.rsda) {
     if (f.law.program) continue;
-    const AngleSensor sensor{f.joint_angle, false};
-    const double stretch = angle_value(d, sensor, y, angles) - f.law.x0;
-    angle_gradient(d, sensor, y, angles, scale * f.law.k * stretch, y_bar, rho_bar);
+    const double stretch = measure_value(f.joint, false, branch(angles, f.angle), y) - f.law.x0;
+    measure_gradient(d, f.joint, false, 0, y, scale * f.law.k * stretch, y_bar, rho_bar);
     add_slot<4>(d, f.law.slot, Vec<4>(0.5 * stretch * stretch, 0, -f.law.k * stretch, 0), scale, rho_bar);
   }
   for (const Bushing& f : d.bushings) {
@@ -167,7 +132,7 @@ Energy energy(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::Vec
   }
   for (const RsdaForce& f : d.rsda) {
     if (f.law.program) continue;
-    const double stretch = angle_value(d, {f.joint_angle, false}, y, angles) - f.law.x0;
+    const double stretch = measure_value(f.joint, false, branch(angles, f.angle), y) - f.law.x0;
     e.potential += 0.5 * f.law.k * stretch * stretch;
   }
   for (const Bushing& f : d.bushings) {
@@ -179,19 +144,19 @@ Energy energy(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::Vec
 double evaluate(const MechanismData& d, const SensorKind& sensor, double t, const Eigen::VectorXd& y,
                 const Eigen::VectorXd& angles) {
   return std::visit(
-      Overloaded{[&](const PointSensor& s) { return s.value(y); },
-                 [&](const AngularVelocitySensor& s) { return s.value(y); },
-                 [&](const CoordinateSensor& s) { return y(s.index); },
-                 [&](const AngleSensor& s) { return angle_value(d, s, y, angles); },
-                 [&](const EnergySensor& s) {
-                   const Energy e = energy(d, y, angles);
-                   return (s.kinetic ? e.kinetic : 0) + (s.potential ? e.potential : 0);
-                 },
-                 [&](const ViolationSensor&) { return std::abs(worst_violation(d, t, y, angles).amount); },
-                 [&](const TensionSensor& s) { return tension(d, s, t, y, angles); },
-                 [&](const DisplacementSensor& s) { return displacement_value(s, y); },
-                 [&](const AccelerationSensor&) { return without_motion(); },
-                 [&](const ReactionSensor&) { return without_motion(); }},
+      Overloaded{
+          [&](const PointSensor& s) { return s.value(y); }, [&](const AngularVelocitySensor& s) { return s.value(y); },
+          [&](const CoordinateSensor& s) { return y(s.index); },
+          [&](const AngleSensor& s) { return measure_value(followed(d, s.angle), s.rate, branch(angles, s.angle), y); },
+          [&](const EnergySensor& s) {
+            const Energy e = energy(d, y, angles);
+            return (s.kinetic ? e.kinetic : 0) + (s.potential ? e.potential : 0);
+          },
+          [&](const ViolationSensor&) { return std::abs(worst_violation(d, t, y, angles).amount); },
+          [&](const TensionSensor& s) { return tension(d, s, t, y, angles); },
+          [&](const DisplacementSensor& s) { return measure_value(s.joint, s.rate, 0, y); },
+          [&](const AccelerationSensor&) { return without_motion(); },
+          [&](const ReactionSensor&) { return without_motion(); }},
       sensor);
 }
 
@@ -211,7 +176,9 @@ double add_gradient(const MechanismData& d, const SensorKind& sensor, double t, 
             y_bar(s.index) += scale;
             return y(s.index);
           },
-          [&](const AngleSensor& s) { return angle_gradient(d, s, y, angles, scale, y_bar, rho_bar); },
+          [&](const AngleSensor& s) {
+            return measure_gradient(d, followed(d, s.angle), s.rate, branch(angles, s.angle), y, scale, y_bar, rho_bar);
+          },
           [&](const EnergySensor& s) {
             if (s.kinetic) add_kinetic_gradient(d, y, scale, y_bar, rho_bar);
             if (s.potential) add_potential_gradient(d, y, angles, scale, y_bar, rho_bar);
@@ -219,7 +186,9 @@ double add_gradient(const MechanismData& d, const SensorKind& sensor, double t, 
           },
           [&](const ViolationSensor&) { return add_violation_gradient(d, t, y, angles, scale, y_bar, rho_bar); },
           [&](const TensionSensor& s) { return add_tension_gradient(d, s, t, y, angles, scale, y_bar, rho_bar); },
-          [&](const DisplacementSensor& s) { return displacement_gradient(d, s, y, scale, y_bar, rho_bar); },
+          [&](const DisplacementSensor& s) {
+            return measure_gradient(d, s.joint, s.rate, 0, y, scale, y_bar, rho_bar);
+          },
           [&](const AccelerationSensor&) { return without_motion(); },
           [&](const ReactionSensor&) { return without_motion(); }},
       sensor);

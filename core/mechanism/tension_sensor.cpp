@@ -1,5 +1,7 @@
 #include "core/mechanism/tension_sensor.hpp"
 
+#include "core/mechanism/measure_gradient.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -38,19 +40,18 @@ double tension(const MechanismData& d, const TensionSensor& s, double t, const E
     return f.law.value(t, d.rho, x.l, x.ldot, scratch_for(d, f.law, none));
   }
   const RsdaForce& f = d.rsda[static_cast<std::size_t>(s.index)];
-  const JointAngle& joint = d.angles[static_cast<std::size_t>(f.joint_angle)];
-  const JointAngle::Jet j = joint.jet(body_at(y, joint.body1).frame, body_at(y, joint.body2).frame);
-  const double angle = JointAngle::on_branch(j.angle(), branch(angles, f.joint_angle));
-  return f.law.value(t, d.rho, angle, j.rate(), scratch_for(d, f.law, none));
+  const BodyAt b1 = body_at(y, f.joint.body1), b2 = body_at(y, f.joint.body2);
+  return f.law.value(t, d.rho, f.joint.value_near(branch(angles, f.angle), b1.frame, b2.frame),
+                     f.joint.rate(b1.frame, b2.frame), scratch_for(d, f.law, none));
 }
 
 double add_tension_gradient(const MechanismData& d, const TensionSensor& s, double t, const Eigen::VectorXd& y,
                             const Eigen::VectorXd& angles, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
                             Eigen::Ref<Eigen::VectorXd> rho_bar) {
-  FrameBar bar1, bar2;
-  bar1.set_zero(), bar2.set_zero();
   Law::Scratch none;
   if (!s.is_torque) {
+    FrameBar bar1, bar2;
+    bar1.set_zero(), bar2.set_zero();
     const TsdaForce& f = d.tsda[static_cast<std::size_t>(s.index)];
     const BodyAt b1 = body_at(y, f.body1), b2 = body_at(y, f.body2);
     const TsdaForce::Span x = f.span(b1.frame, b2.frame);
@@ -75,20 +76,13 @@ double add_tension_gradient(const MechanismData& d, const TensionSensor& s, doub
     return law.f;
   }
   const RsdaForce& f = d.rsda[static_cast<std::size_t>(s.index)];
-  const JointAngle& joint = d.angles[static_cast<std::size_t>(f.joint_angle)];
-  const BodyAt b1 = body_at(y, joint.body1), b2 = body_at(y, joint.body2);
-  const JointAngle::Jet j = joint.jet(b1.frame, b2.frame);
-  const double angle = JointAngle::on_branch(j.angle(), branch(angles, f.joint_angle));
+  const BodyAt b1 = body_at(y, f.joint.body1), b2 = body_at(y, f.joint.body2);
+  const double angle = f.joint.value_near(branch(angles, f.angle), b1.frame, b2.frame),
+               rate = f.joint.rate(b1.frame, b2.frame);
   Law::Scratch& scratch = scratch_for(d, f.law, none);
-  const Law::Value law = f.law.derivatives(t, d.rho, angle, j.rate(), scratch);
-  add_law_gradient(d, f.law, angle, j.rate(), scale, scratch, rho_bar);
-  JointAngle::SlotBars slots;
-  joint.pull_back(b1.frame, b2.frame, j, law.f_x, law.f_xdot, 0, bar1, bar2, slots);
-  add_pull_back(b1, joint.body1, bar1, scale, y_bar);
-  add_pull_back(b2, joint.body2, bar2, scale, y_bar);
-  add_slot<3>(d, joint.slot_x1, slots.x1, scale, rho_bar);
-  add_slot<3>(d, joint.slot_y1, slots.y1, scale, rho_bar);
-  add_slot<3>(d, joint.slot_n2, slots.n2, scale, rho_bar);
+  const Law::Value law = f.law.derivatives(t, d.rho, angle, rate, scratch);
+  add_law_gradient(d, f.law, angle, rate, scale, scratch, rho_bar);
+  add_measure_gradient(d, f.joint, b1, b2, scale * law.f_x, scale * law.f_xdot, y_bar, rho_bar);
   return law.f;
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/constraint/unit_norm.hpp"
+#include "core/mechanism/row_laws.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
@@ -10,46 +11,21 @@ namespace {
 
 using VecOut = Eigen::Ref<Eigen::VectorXd>;
 
-const RowLaw* law_of(const MechanismData& d, int row) {
-  for (const RowLaw& law : d.laws) {
-    if (law.row == row) return &law;
-  }
-  return nullptr;
-}
-
-// f of a row at t; with a gradient, weight times its derivatives are added to rho_bar.
-double law_value(const MechanismData& d, const RowLaw* row, double t, double weight, VecOut* rho_bar) {
-  if (!row) return 0;
-  if (!row->law.programs) {
-    if (row->law.spline) return (*row->law.spline)(t).f;
-    if (rho_bar && row->law.slot >= 0) {
-      for (std::size_t k = 0; k < d.active.size(); ++k) {
-        (*rho_bar)(d.active[k]) += weight * d.theta_rho(row->law.slot, static_cast<Eigen::Index>(k));
-      }
-    }
-    return row->law.constant;
-  }
-  const Program& f = (*row->law.programs)[0];
-  Program::Scratch scratch = f.scratch();
-  std::vector<double> inputs(d.rho.begin(), d.rho.end());
-  inputs.push_back(t);
-  std::vector<double> gradient(inputs.size(), 0.0);
-  const double value = f.add_gradient(inputs, weight, gradient, scratch);
-  if (rho_bar) {
-    for (const int k : d.active) (*rho_bar)(k) += gradient[static_cast<std::size_t>(k)];
-  }
-  return value;
+RowLaws laws_at(const MechanismData& d, double t) {
+  RowLaws laws(d);
+  laws.set_time(t);
+  return laws;
 }
 
 template <class P>
-Vec<P::kRows> phi_of(const MechanismData& d, const Constraint& c, const P& p, double t, const BodyAt& b1,
-                     const BodyAt& b2, const Eigen::VectorXd& angles) {
+Vec<P::kRows> phi_of(const RowLaws& laws, const Constraint& c, const P& p, const BodyAt& b1, const BodyAt& b2,
+                     const Eigen::VectorXd& angles) {
   Vec<P::kRows> phi;
   p.phi(b1.frame, b2.frame, phi);
   if constexpr (std::is_same_v<P, Angle>) {
     double reference = 0;
     if (c.angle == Constraint::kNearestLaw) {
-      reference = law_value(d, law_of(d, c.row), t, 0, nullptr);
+      reference = laws.f_or_zero(c.row);
     } else if (c.angle < angles.size()) {
       reference = angles(c.angle);
     }
@@ -61,6 +37,7 @@ Vec<P::kRows> phi_of(const MechanismData& d, const Constraint& c, const P& p, do
 }  // namespace
 
 Violation worst_violation(const MechanismData& d, double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
+  const RowLaws laws = laws_at(d, t);
   Violation worst;
   auto offer = [&](double phi, int row, int body) {
     if (std::abs(phi) > std::abs(worst.amount)) worst = {phi, row, body};
@@ -72,10 +49,10 @@ Violation worst_violation(const MechanismData& d, double t, const Eigen::VectorX
     const bool last_term = i + 1 == d.constraints.size() || d.constraints[i + 1].row != c.row;
     std::visit(
         [&](const auto& p) {
-          const auto phi = phi_of(d, c, p, t, b1, b2, angles);
+          const auto phi = phi_of(laws, c, p, b1, b2, angles);
           sum += c.factor * phi(0);
           if (!last_term) return;
-          offer(sum - law_value(d, law_of(d, c.row), t, 0, nullptr), c.row, 0);
+          offer(sum - laws.f_or_zero(c.row), c.row, 0);
           for (int k = 1; k < phi.size(); ++k) offer(c.factor * phi(k), c.row + k, 0);
           sum = 0;
         },
@@ -95,7 +72,8 @@ double add_violation_gradient(const MechanismData& d, double t, const Eigen::Vec
     return std::abs(worst.amount);
   }
   if (worst.row < 0) return 0;
-  law_value(d, law_of(d, worst.row), t, -s, &rho_bar);
+  const RowLaws laws = laws_at(d, t);
+  laws.add_gradient(RowLaws::Of::f, worst.row, -s, rho_bar);
   for (const Constraint& c : d.constraints) {
     if (worst.row < c.row || worst.row >= c.row + c.rows()) continue;
     const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
@@ -108,10 +86,8 @@ double add_violation_gradient(const MechanismData& d, double t, const Eigen::Vec
           z.mu0(worst.row - c.row) = c.factor;
           p.pull_back(b1.frame, b2.frame, z, bar1, bar2, s_bar);
           if (c.slot_factor < 0) return;
-          const double value = phi_of(d, c, p, t, b1, b2, angles)(worst.row - c.row);
-          for (std::size_t k = 0; k < d.active.size(); ++k) {
-            rho_bar(d.active[k]) += s * value * d.theta_rho(c.slot_factor, static_cast<Eigen::Index>(k));
-          }
+          const double value = phi_of(laws, c, p, b1, b2, angles)(worst.row - c.row);
+          add_slot<1>(d, c.slot_factor, Vec<1>(value), s, rho_bar);
         },
         c.primitive);
     add_pull_back(b1, c.body1, bar1, s, y_bar);

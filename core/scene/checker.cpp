@@ -106,9 +106,9 @@ void Checker::word(std::string_view key, const std::string& value, const Words& 
 }
 
 const TypeRow* Checker::type(std::string_view key, std::string_view current, std::span<const TypeRow> rows,
-                             std::string_view later, const Says&) {
+                             const Says&) {
   const TypeRow* const row = find_row(rows, current);
-  if (!row) issue(path(key), not_among(key, current, names_of(rows), later));
+  if (!row) issue(path(key), not_among(key, current, names_of(rows)));
   return row;
 }
 

@@ -38,8 +38,7 @@ class Checker {
   void word(std::string_view key, const std::string& value, const Words& words, const Says& says);
   template <class T, std::size_t N>
   void choice(std::string_view, const T&, const Choice<T> (&)[N], const Says&) {}
-  const TypeRow* type(std::string_view key, std::string_view current, std::span<const TypeRow> rows,
-                      std::string_view later, const Says& says);
+  const TypeRow* type(std::string_view key, std::string_view current, std::span<const TypeRow> rows, const Says& says);
 
   void number(std::string_view key, const Field& value, const Says& says);
   void number(std::string_view key, const std::optional<Field>& value, const Says& says);
@@ -91,6 +90,7 @@ class Checker {
   }
   void version(std::string_view, int, const Says&) {}
   void later(std::string_view, std::string_view) {}
+  void misplaced(std::string_view, std::string_view) {}
   void rest_unknown() {}
 
   // Of a field at any path.

@@ -1,15 +1,23 @@
-// The visitor (core/scene/vocabulary.hpp) that finds the expressions and the points of an object, for whoever asks on
-// what it depends.
+// The visitor (core/scene/vocabulary.hpp) that finds the expressions and the points of an object, each with its place,
+// for whoever asks on what it depends.
 #pragma once
 
+#include <string>
 #include <utility>
 
+#include "core/scene/scene_path.hpp"
 #include "core/scene/vocabulary.hpp"
 
 namespace mbsopt {
 
-// on_expression(const Expression&, Names);  on_point(const std::string& body, const std::string& name) for points that
-// are referred to by name. Of a body, its named points and its drawing are left out: they matter where they are used.
+struct FieldPlace {
+  const std::string& path;  // "bodies[2].mass", below the path that the visit began at
+  // A body's named points matter where they are used, its drawing to nothing that is computed.
+  bool in_named_point = false, in_drawing = false;
+};
+
+// on_expression(const FieldPlace&, const Expression&, Names);  on_point(const std::string& body, const std::string&
+// name) for points that are referred to by name. Definitions are left out: they count where they are used.
 template <class OnExpression, class OnPoint>
 class FieldVisitor {
  public:
@@ -23,77 +31,103 @@ class FieldVisitor {
   void word(std::string_view, const std::string&, const Words&, const Says&) {}
   template <class T, std::size_t N>
   void choice(std::string_view, const T&, const Choice<T> (&)[N], const Says&) {}
-  const TypeRow* type(std::string_view, std::string_view current, std::span<const TypeRow> rows, std::string_view,
-                      const Says&) {
+  const TypeRow* type(std::string_view, std::string_view current, std::span<const TypeRow> rows, const Says&) {
     return find_row(rows, current);
   }
-  void number(std::string_view, const Field& value, const Says& says) {
-    if (says.need != Need::unknown) on_expression_(value, Names::none);
+  void number(std::string_view key, const Field& value, const Says& says) {
+    if (says.need != Need::unknown) tell(at(key), value, Names::none);
   }
-  void number(std::string_view, const std::optional<Field>& value, const Says&) {
-    if (value) on_expression_(*value, Names::none);
+  void number(std::string_view key, const std::optional<Field>& value, const Says&) {
+    if (value) tell(at(key), *value, Names::none);
   }
-  void vector(std::string_view, const VectorField& value, const Says&) {
-    for (const Field& field : value) on_expression_(field, Names::none);
-  }
+  void vector(std::string_view key, const VectorField& value, const Says&) { tell_all(at(key), value, Names::none); }
   void point(std::string_view key, const PointField& value, const std::string& body, const Says& says) {
     if (says.need == Need::unknown) return;
     if (const auto* given = std::get_if<VectorField>(&value))
-      vector(key, *given, says);
-    else
+      tell_all(at(key), *given, Names::none);
+    else if (!in_drawing_)
       on_point_(body, std::get<std::string>(value));
   }
   void point(std::string_view key, const std::optional<PointField>& value, const std::string& body, const Says& says) {
     if (value) point(key, *value, body, says);
   }
-  void inertia(std::string_view, const InertiaField& value, const Says&) { describe(*this, value); }
-  void orientation(std::string_view, const OrientationField& value, const Says&) {
-    if (const auto* e = std::get_if<EulerParametersField>(&value)) {
-      for (const Field& field : e->e) on_expression_(field, Names::none);
-    } else if (const auto* a = std::get_if<AxisAngleField>(&value)) {
-      describe(*this, *a);
-    } else {
-      describe(*this, std::get<RollPitchYawField>(value));
-    }
+  void inertia(std::string_view key, const InertiaField& value, const Says&) { visit(at(key), value); }
+  void orientation(std::string_view key, const OrientationField& value, const Says&) {
+    if (const auto* e = std::get_if<EulerParametersField>(&value))
+      tell_all(at(key), e->e, Names::none);
+    else if (const auto* a = std::get_if<AxisAngleField>(&value))
+      visit(at(key), *a);
+    else
+      visit(at(key), std::get<RollPitchYawField>(value));
   }
-  void points(std::string_view, const std::map<std::string, VectorField>&, const Says&) {}
-  void law(std::string_view, const std::optional<Expression>& value, Names names, const Says&) {
-    if (value) on_expression_(*value, names);
+  void points(std::string_view key, const std::map<std::string, VectorField>& value, const Says&) {
+    in_named_point_ = true;
+    for (const auto& [name, coordinates] : value) tell_all(child_path(at(key), name), coordinates, Names::none);
+    in_named_point_ = false;
   }
-  void expression(std::string_view, const Expression& value, Names names, const Says&) { on_expression_(value, names); }
-  void time_law(std::string_view, const Expression& value, const std::optional<SampledLaw>& samples, const Says&) {
-    if (!samples) on_expression_(value, Names::time_law);
+  void law(std::string_view key, const std::optional<Expression>& value, Names names, const Says&) {
+    if (value) tell(at(key), *value, names);
   }
-  void laws(std::string_view, const LawVector& values, Names names, const Says&) {
-    for (const Expression& value : values) on_expression_(value, names);
+  void expression(std::string_view key, const Expression& value, Names names, const Says&) {
+    tell(at(key), value, names);
+  }
+  void time_law(std::string_view key, const Expression& value, const std::optional<SampledLaw>& samples, const Says&) {
+    if (!samples) tell(at(key), value, Names::time_law);
+  }
+  void laws(std::string_view key, const LawVector& values, Names names, const Says&) {
+    tell_all(at(key), values, names);
   }
   void plain(std::string_view, const auto&, const Range&, const Says&) {}
   void overrides(std::string_view, const std::vector<std::pair<std::string, double>>&, const Says&) {}
   template <class T>
-  void object(std::string_view, const T& value, const Says&) {
-    describe(*this, value);
+  void object(std::string_view key, const T& value, const Says&) {
+    visit(at(key), value);
   }
   template <class T>
-  void object(std::string_view, const std::optional<T>& value, const Says&) {
-    if (value) describe(*this, *value);
+  void object(std::string_view key, const std::optional<T>& value, const Says&) {
+    if (value) visit(at(key), *value);
   }
-  void group(std::string_view, const Says&, auto&& fields) { fields(*this); }
-  template <class T>
-  void list(std::string_view, const std::vector<T>& values, const Says&) {
-    if constexpr (!std::is_same_v<T, Shape>)
-      for (const T& value : values) describe(*this, value);
+  void group(std::string_view key, const Says&, auto&& fields) {
+    below(at(key), [&] { fields(*this); });
   }
   template <class T>
-  void named(std::string_view, const std::vector<T>& values, const Says&) {
-    for (const T& value : values) describe(*this, value);
+  void list(std::string_view key, const std::vector<T>& values, const Says&) {
+    in_drawing_ = std::is_same_v<T, Shape>;
+    for (std::size_t i = 0; i < values.size(); ++i) visit(child_path(at(key), i), values[i]);
+    in_drawing_ = false;
+  }
+  template <class T>
+  void named(std::string_view key, const std::vector<T>& values, const Says&) {
+    if constexpr (!std::is_same_v<T, Definition>)
+      for (const T& value : values) visit(child_path(at(key), value.name), value);
   }
   void version(std::string_view, int, const Says&) {}
   void later(std::string_view, std::string_view) {}
+  void misplaced(std::string_view, std::string_view) {}
   void rest_unknown() {}
 
  private:
+  std::string at(std::string_view key) const { return child_path(path_, key); }
+  void tell(const std::string& path, const Expression& value, Names names) {
+    on_expression_(FieldPlace{path, in_named_point_, in_drawing_}, value, names);
+  }
+  void tell_all(const std::string& path, const auto& values, Names names) {
+    for (std::size_t i = 0; i < values.size(); ++i) tell(child_path(path, i), values[i], names);
+  }
+  void below(std::string path, auto&& tell_fields) {
+    std::swap(path_, path);
+    tell_fields();
+    std::swap(path_, path);
+  }
+  template <class T>
+  void visit(std::string path, const T& value) {
+    below(std::move(path), [&] { describe(*this, value); });
+  }
+
   OnExpression on_expression_;
   OnPoint on_point_;
+  std::string path_;
+  bool in_named_point_ = false, in_drawing_ = false;
 };
 
 }  // namespace mbsopt

@@ -1,9 +1,10 @@
 #include "core/scene/inertia_check.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 #include <cmath>
-#include <cstdio>
 
 namespace mbsopt {
 
@@ -16,13 +17,8 @@ std::string inertia_problem(const std::array<double, 6>& tensor) {
   if (scale == 0) return "";
   const Eigen::Vector3d moments =
       scale * Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(J / scale, Eigen::EigenvaluesOnly).eigenvalues();
-  const auto rounded = [](double x) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.4g", x);
-    return std::string(text);
-  };
-  const std::string found = "has the principal moments " + rounded(moments(0)) + ", " + rounded(moments(1)) + ", " +
-                            rounded(moments(2)) + " kg m^2; ";
+  const std::string found =
+      fmt::format("has the principal moments {:.4g}, {:.4g}, {:.4g} kg m^2; ", moments(0), moments(1), moments(2));
   const double slack = kTolerance * std::abs(moments.sum()) + 1e-15 * scale;
   if (moments(0) < -slack) return found + "an inertia tensor must be positive semidefinite, so none may be negative";
   if (moments(2) > moments(0) + moments(1) + slack)

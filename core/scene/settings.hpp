@@ -8,6 +8,9 @@
 namespace mbsopt {
 
 enum class FormulationType { penalty, augmented_lagrangian };
+// Of the penalty equations: S = M + J' alpha J at once, which loses digits as alpha grows, or the quasi-definite system
+// [M J'; J -1/alpha], which does not.
+enum class LinearSolver { cholesky, quasidefinite };
 enum class Projection { none, velocity, position_velocity };
 
 struct FormulationSettings {
@@ -18,6 +21,7 @@ struct FormulationSettings {
   int iterations = 50;       // augmented Lagrangian: refinements after the first solve, at most (1 is usual)
   double tolerance = 1e-14;  // relative, on the constraints' accelerations
   Projection projection = Projection::position_velocity;
+  LinearSolver linear_solver = LinearSolver::cholesky;  // penalty only
 
   static FormulationSettings penalty() {  // MBSVT's form
     return {FormulationType::penalty, 1e9, 1, 10, 0, 0, Projection::none};

@@ -97,11 +97,6 @@ inline constexpr TypeRow kSensorQuantities[] = {
 inline constexpr std::string_view kJointsWithAngle = "revolute cylindrical screw";
 inline constexpr std::string_view kJointsWithDisplacement = "translational cylindrical screw";
 
-// In the problem format, not in this version.
-inline constexpr std::string_view kLaterJointTypes = "";
-inline constexpr std::string_view kLaterForceTypes = "";
-inline constexpr std::string_view kLaterSensorQuantities = "";
-
 inline constexpr std::string_view kIntegrators =
     "dopri5 dopri853 verner6 bs3 rk2 rk4 euler sdirk2 sdirk3 sdirk4 radau5 gauss4 gauss6 cvodes_adams cvodes_bdf";
 inline constexpr std::string_view kFixedStepIntegrators = "rk4 euler";  // without an error estimate

@@ -11,7 +11,7 @@
 //   references(key, vector<string>&, To, says)
 //   choice(key, T&, Choice<T>[], says)       one of a few words that stand for values
 //   word(key, string&, Words, says)             one of a few words
-//   type(key, word, rows, later, says)          the type of an object; returns its row, nullptr when there is none
+//   type(key, word, rows, says)                 the type of an object; returns its row, nullptr when there is none
 //   number(key, Field&, says)                   a number or an expression over parameters and definitions
 //   vector(key, VectorField&, says)             three of them
 //   point(key, PointField&, body, says)         a point or vector of that body, by name or by its coordinates
@@ -28,6 +28,7 @@
 //   overrides(key, vector<pair<string, double>>&, says)  values by parameter
 //   version(key, number, says)                  that number and no other
 //   later(key, what)                            in the problem format, not in this version
+//   misplaced(key, where)                       a field of other objects of this kind, which `where` says
 //   rest_unknown()                              the type is not known, hence neither are the other fields
 #pragma once
 
@@ -80,6 +81,8 @@ inline constexpr Choice<ParameterScale> kParameterScales[] = {
     {"linear", ParameterScale::linear}, {"log", ParameterScale::log}, {"log10", ParameterScale::log10}};
 inline constexpr Choice<FormulationType> kFormulations[] = {
     {"augmented_lagrangian", FormulationType::augmented_lagrangian}, {"penalty", FormulationType::penalty}};
+inline constexpr Choice<LinearSolver> kLinearSolvers[] = {{"cholesky", LinearSolver::cholesky},
+                                                          {"quasidefinite", LinearSolver::quasidefinite}};
 inline constexpr Choice<Projection> kProjections[] = {{"none", Projection::none},
                                                       {"velocity", Projection::velocity},
                                                       {"position_velocity", Projection::position_velocity}};
@@ -138,8 +141,7 @@ void describe(auto& v, Like<Body> auto& b) {
 
 void describe(auto& v, Like<Joint> auto& j) {
   using namespace dimension;
-  const TypeRow* const row =
-      v.type("type", j.type, std::span(kJointTypes), kLaterJointTypes, {"type of the joint", Need::required});
+  const TypeRow* const row = v.type("type", j.type, std::span(kJointTypes), {"type of the joint", Need::required});
   if constexpr (!std::is_const_v<std::remove_reference_t<decltype(j)>>)
     if (row) j.type = row->name;
   v.name("name", j.name, {"name of the joint", Need::required});
@@ -171,7 +173,7 @@ void describe(auto& v, Like<SampledLaw> auto& l) {
 
 void describe(auto& v, Like<Drive> auto& d) {
   using namespace dimension;
-  const TypeRow* const row = v.type("type", d.type, std::span(kDriveTypes), "", {"type of the drive", Need::required});
+  const TypeRow* const row = v.type("type", d.type, std::span(kDriveTypes), {"type of the drive", Need::required});
   if constexpr (!std::is_const_v<std::remove_reference_t<decltype(d)>>)
     if (row) d.type = row->name;
   v.name("name", d.name, {"name of the drive", Need::required});
@@ -254,8 +256,7 @@ void describe(auto& v, Like<FrictionSpec> auto& f, const TypeRow& row) {
 }
 
 void describe(auto& v, Like<Force> auto& f) {
-  const TypeRow* const row =
-      v.type("type", type_of(f), std::span(kForceTypes), kLaterForceTypes, {"type of the force", Need::required});
+  const TypeRow* const row = v.type("type", type_of(f), std::span(kForceTypes), {"type of the force", Need::required});
   v.name("name", f.name, {"name of the force", Need::required});
   if (!row) return v.rest_unknown();
   if constexpr (!std::is_const_v<std::remove_reference_t<decltype(f)>>) set_type(f, row->name);
@@ -269,8 +270,8 @@ void describe(auto& v, Like<PointOnBody> auto& p) {
 
 void describe(auto& v, Like<Sensor> auto& s) {
   using dimension::kLength;
-  const TypeRow* const row = v.type("quantity", s.quantity, std::span(kSensorQuantities), kLaterSensorQuantities,
-                                    {"what is measured", Need::required});
+  const TypeRow* const row =
+      v.type("quantity", s.quantity, std::span(kSensorQuantities), {"what is measured", Need::required});
   if (!row) return v.rest_unknown();
   if constexpr (!std::is_const_v<std::remove_reference_t<decltype(s)>>) s.quantity = row->name;
   v.reference("body", s.body, To::body, {"body it is on", need_of(*row, "body")});
@@ -308,8 +309,10 @@ void describe(auto& v, Like<FormulationSettings> auto& f) {
           {"augmented Lagrangian: relative, on the constraints' accelerations"});
   v.choice("projection", f.projection, kProjections, {"of the state onto the constraints after each step"});
   if (f.type == FormulationType::penalty) {
-    std::string solver = "cholesky";
-    v.word("linear_solver", solver, Words{"cholesky", "quasidefinite"}, {"of the penalty form"});
+    v.choice("linear_solver", f.linear_solver, kLinearSolvers,
+             {"of the penalty form: cholesky loses digits as alpha grows, quasidefinite does not"});
+  } else {
+    v.misplaced("linear_solver", "of the type 'penalty' only");
   }
 }
 

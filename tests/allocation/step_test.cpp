@@ -30,7 +30,12 @@ struct Prepared {
 
 TEST_CASE("a right-hand side, its tangent and its adjoint allocate nothing", "[allocation]") {
   Prepared p;
-  Dynamics dynamics(p.mechanism, {});
+  FormulationSettings formulation;
+  if (GENERATE(false, true)) {
+    formulation = FormulationSettings::penalty();
+    formulation.linear_solver = LinearSolver::quasidefinite;
+  }
+  Dynamics dynamics(p.mechanism, formulation);
   const auto blocks = parameter_blocks(p.mechanism.data());
   LaneRows direction = LaneRows::Random(p.y.size(), kLanes), out(p.y.size(), kLanes);
   VectorXd w = VectorXd::Random(p.y.size()), y_bar = VectorXd::Zero(p.y.size());

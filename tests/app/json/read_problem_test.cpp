@@ -40,7 +40,7 @@ const std::string kFile = R"({
                         "relative_to": {"body": "rod"}, "frame": "body"},
               "crank_angle": {"quantity": "angle", "joint": "A"}},
   "simulation": {"start_time": 0, "end_time": "500 [ms]", "output_step": 0.01,
-                 "formulation": {"type": "penalty", "alpha": 1e7, "linear_solver": "cholesky"},
+                 "formulation": {"type": "penalty", "alpha": 1e7, "linear_solver": "quasidefinite"},
                  "integrator": {"type": "dopri853", "rtol": 1e-7, "atol": 1e-9, "max_steps": 1e6}},
   "objectives": {"track": {"running": "(tip_y - 0.5)^2", "terminal": "0", "parameters_only": "0",
                            "samples": [{"time": 0.25, "value": "crank_angle^2"}]}},
@@ -103,6 +103,7 @@ TEST_CASE("a problem is read field by field", "[json]") {
   CHECK(scene.simulation.output_step == 0.01);
   CHECK(scene.simulation.formulation.type == FormulationType::penalty);
   CHECK(scene.simulation.formulation.alpha == 1e7);
+  CHECK(scene.simulation.formulation.linear_solver == LinearSolver::quasidefinite);
   CHECK(scene.simulation.formulation.omega == 10);  // penalty's own default
   CHECK(scene.simulation.formulation.projection == Projection::none);
   CHECK(scene.simulation.integrator.type == "dopri853");

@@ -58,8 +58,9 @@ TEST_CASE("a driven slider-crank follows its closed form over two turns, torque 
   scene.sensors.push_back(effort);
   const Mechanism mechanism(scene, VectorXd());
   double worst_x = 0, worst_v = 0, worst_a = 0, worst_T = 0;
-  const KinematicsResult result =
-      solve_kinematics(mechanism, {}, times(4 * std::numbers::pi / kSpeed, 97), [&](std::size_t, const StatePoint& at) {
+  const KinematicsResult result = solve_kinematics(
+      mechanism, Assembly(mechanism, 0), {}, times(4 * std::numbers::pi / kSpeed, 97),
+      [&](std::size_t, const StatePoint& at) {
         const double th = kSpeed * at.t, s = kCrank * std::sin(th), c = kCrank * std::cos(th);
         const double root = std::sqrt(kRod * kRod - s * s);
         // x = c + root,  root' = -s s'/root
@@ -91,10 +92,11 @@ TEST_CASE("a condition holds the degree of freedom that no drive holds", "[kinem
   CHECK(issues.empty());
   const Mechanism mechanism(prescribed, VectorXd());
   double last = 0;
-  const KinematicsResult result = solve_kinematics(mechanism, {}, times(1, 4), [&](std::size_t, const StatePoint& at) {
-    last = mechanism.sensor_value(mechanism.sensor("theta"), at);
-    return true;
-  });
+  const KinematicsResult result =
+      solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 4), [&](std::size_t, const StatePoint& at) {
+        last = mechanism.sensor_value(mechanism.sensor("theta"), at);
+        return true;
+      });
   INFO(result.message);
   REQUIRE(result.ok);
   CHECK(last == Approx(2.3).epsilon(1e-13));
@@ -102,7 +104,8 @@ TEST_CASE("a condition holds the degree of freedom that no drive holds", "[kinem
 
 TEST_CASE("what is not driven is said", "[kinematics]") {
   const Scene scene = slider_crank();
-  const KinematicsResult result = solve_kinematics(Mechanism(scene, VectorXd()), {}, times(1, 2),
+  const Mechanism mechanism(scene, VectorXd());
+  const KinematicsResult result = solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 2),
                                                    [](std::size_t, const StatePoint&) { return true; });
   CHECK_FALSE(result.ok);
   CHECK_THAT(result.message, Catch::Contains("1 degree of freedom"));
@@ -114,7 +117,8 @@ TEST_CASE("a drive that cannot pass a dead point fails with the time and the joi
   push.name = "piston", push.type = "displacement", push.joint = "guide",
   push.law = f("0.8 + 0.2*t");  // 0.9: stretched
   scene.drives.push_back(push);
-  const KinematicsResult result = solve_kinematics(Mechanism(scene, VectorXd()), {}, times(1, 10),
+  const Mechanism mechanism(scene, VectorXd());
+  const KinematicsResult result = solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 10),
                                                    [](std::size_t, const StatePoint&) { return true; });
   CHECK_FALSE(result.ok);
   CHECK(result.last_good_time == Approx(0.5).margin(0.11));
@@ -139,10 +143,11 @@ TEST_CASE("a parallelogram passes its flat positions on its branch, and they are
   scene.sensors.push_back(point_sensor("y0", "position", "bar", vec("0", "0", "0"), "y"));
   const Mechanism mechanism(scene, VectorXd());
   double tilt = 0;
-  const KinematicsResult result = solve_kinematics(mechanism, {}, times(6, 25), [&](std::size_t, const StatePoint& at) {
-    tilt = std::max(tilt, std::abs(mechanism.sensor_value(0, at) - mechanism.sensor_value(1, at)));
-    return true;
-  });
+  const KinematicsResult result =
+      solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(6, 25), [&](std::size_t, const StatePoint& at) {
+        tilt = std::max(tilt, std::abs(mechanism.sensor_value(0, at) - mechanism.sensor_value(1, at)));
+        return true;
+      });
   INFO(result.message);
   REQUIRE(result.ok);
   CHECK(tilt < 1e-9);  // the other branch would tilt the bar

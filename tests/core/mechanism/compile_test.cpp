@@ -52,7 +52,9 @@ Numbers numbers_of(const MechanismData& d) {
         c.primitive);
     x.add(c.slot_factor, Vec<1>(c.factor));
   }
-  for (const JointAngle& a : d.angles) x.add(a.slot_x1, a.x1), x.add(a.slot_y1, a.y1), x.add(a.slot_n2, a.n2);
+  for (const JointAngle& a : d.angles) {
+    x.add(a.slot1, a.measure.s1), x.add(a.slot3, a.measure.s3), x.add(a.slot2, a.measure.s2);
+  }
   auto add_law = [&](const Law& law) {
     VectorXd v(4);
     v << law.k, law.c, law.x0, law.f0;
@@ -68,7 +70,7 @@ Numbers numbers_of(const MechanismData& d) {
     law << f.K, f.C, f.Kt, f.Ct;
     x.add(f.slot_R0, R0), x.add(f.slot_law, law);
   }
-  for (const FrictionForce& f : d.frictions) {
+  for (const TurningFriction& f : d.turning_frictions) {
     x.add(f.law.slot, Vector3d(f.law.coulomb, f.law.smooth, f.law.viscous));
   }
   for (const SensorKind& s : d.sensors) {

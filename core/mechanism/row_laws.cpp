@@ -1,4 +1,4 @@
-#include "core/dynamics/row_laws.hpp"
+#include "core/mechanism/row_laws.hpp"
 
 #include <algorithm>
 
@@ -52,6 +52,18 @@ void RowLaws::add_pull_back(const Eigen::VectorXd* mu0, const Eigen::VectorXd* m
       }
     }
   }
+}
+
+void RowLaws::add_gradient(Of what, int row, double weight, Eigen::Ref<Eigen::VectorXd> rho_bar) const {
+  if (!has_law(row)) return;
+  const TimeLaw& law = data_->laws[index_of(row)].law;
+  if (what == Of::f) add_slot<1>(*data_, law.slot, Vec<1>(1), weight, rho_bar);
+  if (!law.programs) return;
+  const Program& program = (*law.programs)[what == Of::f ? 0 : 1];
+  Program::Scratch scratch = program.scratch();
+  std::vector<double> gradient(inputs_.size(), 0.0);
+  program.add_gradient(inputs_, weight, gradient, scratch);
+  for (const int k : data_->active) rho_bar(k) += gradient[static_cast<std::size_t>(k)];
 }
 
 void RowLaws::subtract_tangents(const ParameterBlock& block, LaneRows& phi, LaneRows& phi_dot, LaneRows& phi_ddot) {

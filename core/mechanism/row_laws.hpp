@@ -15,7 +15,7 @@ class RowLaws {
 
   void set_time(double t);
   void hold() { held_ = true; }  // from now on f_t = f_tt = 0
-  double f(int row) const { return jets_[static_cast<std::size_t>(law_of_row_[static_cast<std::size_t>(row)])].f; }
+  double f_or_zero(int row) const { return has_law(row) ? jets_[index_of(row)].f : 0.0; }
 
   void subtract_f(Eigen::VectorXd& phi) const;
   void subtract_f_t(Eigen::VectorXd& phi_dot) const;
@@ -24,10 +24,16 @@ class RowLaws {
   // Adds scale times the gradient of -(mu0'f + mu1'f_t + mu2'f_tt); null: zero.
   void add_pull_back(const Eigen::VectorXd* mu0, const Eigen::VectorXd* mu1, const Eigen::VectorXd* mu2, double scale,
                      Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar);
+  // Adds weight times the gradient of f, or of f_t, of one row (that of none is zero) in the active parameters.
+  enum class Of { f, f_t };
+  void add_gradient(Of what, int row, double weight, Eigen::Ref<Eigen::VectorXd> rho_bar) const;
   // Subtracts the tangents of f, f_t, f_tt.
   void subtract_tangents(const ParameterBlock& block, LaneRows& phi, LaneRows& phi_dot, LaneRows& phi_ddot);
 
  private:
+  bool has_law(int row) const { return !jets_.empty() && law_of_row_[static_cast<std::size_t>(row)] >= 0; }
+  std::size_t index_of(int row) const { return static_cast<std::size_t>(law_of_row_[static_cast<std::size_t>(row)]); }
+
   const MechanismData* data_;
   std::vector<int> law_of_row_;
   std::vector<CubicSpline::Jet> jets_;

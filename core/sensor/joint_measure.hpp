@@ -1,0 +1,39 @@
+// What a joint leaves to its bodies, as one number x: the angle about its axis or the displacement along it; what
+// sensors, drives and forces in joints share. The mathematics is that of the primitive.
+#pragma once
+
+#include <type_traits>
+
+#include "core/constraint/angle.hpp"
+#include "core/constraint/dot2.hpp"
+
+namespace mbsopt {
+
+template <class P>  // Angle or Dot2
+struct JointMeasure {
+  int body1 = 0, body2 = 0;
+  P measure;
+  int slot1 = -1, slot2 = -1, slot3 = -1;  // first row of the measure's s1, s2, s3 among the differentiated fields
+
+  // An angle lies within half a turn of zero.
+  double value(const Frame& f1, const Frame& f2) const {
+    Vec<1> x;
+    measure.phi(f1, f2, x);
+    return x(0);
+  }
+  double rate(const Frame& f1, const Frame& f2) const {
+    Vec<1> xdot;
+    measure.phi_dot(f1, f2, xdot);
+    return xdot(0);
+  }
+  // An angle on the turn nearest to the reference; a displacement has no turns.
+  double value_near(double reference, const Frame& f1, const Frame& f2) const {
+    if constexpr (std::is_same_v<P, Angle>) return Angle::on_branch(value(f1, f2), reference);
+    return value(f1, f2);
+  }
+};
+
+using JointAngle = JointMeasure<Angle>;        // [rad]
+using JointDisplacement = JointMeasure<Dot2>;  // [m]
+
+}  // namespace mbsopt
