@@ -125,7 +125,8 @@ TEST_CASE("differences that cannot be evaluated have failed, they are not zero",
     CHECK(e.frozen_verdict == Verdict::failed);
     CHECK(e.free_verdict == Verdict::failed);
     CHECK(std::isnan(e.frozen));
-    CHECK(to_string(e.frozen_verdict) == "FAILED");
+    REQUIRE(e.frozen_verdict);
+    CHECK(to_string(*e.frozen_verdict) == "FAILED");
   }
 }
 
