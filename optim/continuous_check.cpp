@@ -32,8 +32,10 @@ class Check {
     }
     const GradientCost cost = gradient_cost(scene_.parameters.size(), count);
     forward_ = cost.tlm <= cost.adjoint;
-    const std::optional<MatrixXd> continuous = by_cvodes(), discrete = by_steps(result_.rtol);
-    if (!continuous || !discrete) return std::move(result_);
+    const std::optional<MatrixXd> continuous = by_cvodes();
+    if (!continuous) return std::move(result_);
+    const std::optional<MatrixXd> discrete = by_steps(result_.rtol);
+    if (!discrete) return std::move(result_);
     result_.ran = true;
     result_.psi_rho = *continuous;
     compare(*continuous, *discrete);
@@ -49,7 +51,10 @@ class Check {
     for (const std::string& type : types) {
       result_.integrator = type;
       const std::optional<MatrixXd> psi_rho = gradients(type, result_.rtol, method(), &message);
-      if (psi_rho) return psi_rho;
+      if (psi_rho) {
+        result_.message.clear();
+        return psi_rho;
+      }
       result_.message += fmt::format("{}{}: {}", result_.message.empty() ? "" : "; ", type, message);
     }
     return std::nullopt;

@@ -115,9 +115,13 @@ bool Adjoint::evaluate(double t, N_Vector y, N_Vector lambda) {
       mu_rate_(o * active_ + k) = -rho_bar_(d.active[static_cast<std::size_t>(k)]);
     }
   }
+  if (!lambda_rate_.allFinite() || !mu_rate_.allFinite()) {
+    t_ = std::numeric_limits<double>::quiet_NaN();
+    return false;
+  }
   t_ = t;
   lambda_at_ = values(lambda);
-  return lambda_rate_.allFinite() && mu_rate_.allFinite();
+  return true;
 }
 
 int Adjoint::lambda_rate(realtype t, N_Vector y, N_Vector lambda, N_Vector rate, void* self) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include "core/sensor/body_at.hpp"
@@ -164,9 +165,11 @@ void ForwardRun::stop_for(int flag, double t, const char* of_what) {
       return;
     case CV_TOO_MUCH_WORK:
       stop(SimulationStatus::too_many_steps,
-           fmt::format("more than {} steps were needed; stopped at t = {:.6g} s. Loosen rtol and atol, raise "
-                       "simulation.integrator.max_steps, or take cvodes_bdf where springs or dampers are very stiff",
-                       settings_.integrator.max_steps, t));
+           fmt::format(
+               "more than {} steps were needed; stopped at t = {:.6g} s. Loosen rtol and atol, raise "
+               "simulation.integrator.max_steps{}",
+               settings_.integrator.max_steps, t,
+               is_stiff_method(settings_) ? "" : ", or take cvodes_bdf where springs or dampers are very stiff"));
       return;
     case CV_ERR_FAILURE:
     case CV_CONV_FAILURE:

@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -60,7 +59,6 @@ class ForwardRun {
   // The value of a running cost within the range that a quadrature can carry; a cost that leaves it makes psi not
   // finite, as an infinite sum would.
   double bounded(double g, std::size_t quadrature);
-  bool left_range(std::size_t quadrature) const { return left_range_[quadrature]; }
 
   void require(int flag) const;  // throws std::runtime_error where CVODES refused what is always right
   void stop(SimulationStatus status, std::string message);

@@ -3,6 +3,7 @@
 
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/projection.hpp"
+#include "core/integrate/cvodes_newton.hpp"
 #include "core/integrate/explicit_run.hpp"
 #include "tests/allocation/allocation_count.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
@@ -50,6 +51,25 @@ TEST_CASE("a right-hand side, its tangent and its adjoint allocate nothing", "[a
   }
   const long after = allocation_count();
   CHECK(ok);
+  CHECK(after == before);
+}
+
+TEST_CASE("what CVODES calls, and BDF's Newton matrix, allocate nothing", "[allocation]") {
+  Prepared p;
+  cvodes::Flow flow(p.mechanism, {});
+  flow.start(0, p.angles);
+  cvodes::NewtonMatrix newton(flow);
+  VectorXd x = VectorXd::Random(p.y.size());
+  const cvodes::Flow::Numbers y(p.y.data(), p.y.size());
+  const long before = allocation_count();
+  bool ok = true;
+  for (int k = 0; k < 3; ++k) {
+    ok = ok && flow.evaluate(0.1 * k, y) && newton.linearise(0.1 * k, y) && newton.factor(0.01 * (k + 1));
+    newton.solve(x);
+  }
+  const long after = allocation_count();
+  CHECK(ok);
+  CHECK(x.allFinite());
   CHECK(after == before);
 }
 
