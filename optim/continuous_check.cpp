@@ -23,7 +23,9 @@ class Check {
   ContinuousCheck run() {
     const IntegratorSettings& given = scene_.simulation.integrator;
     result_.rtol = std::min(options_.rtol, given.rtol);
-    result_.discrete = is_cvodes(given.type) || given.step ? "dopri853" : given.type;
+    result_.discrete = given.type == "cvodes_bdf"            ? "radau5"
+                       : is_cvodes(given.type) || given.step ? "dopri853"
+                                                             : given.type;
     const auto simulated = [](const Objective& o) { return o.needs_simulation(); };
     const auto count = static_cast<std::size_t>(std::count_if(objectives_.begin(), objectives_.end(), simulated));
     if (count == 0) {

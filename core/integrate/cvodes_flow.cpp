@@ -24,9 +24,8 @@ void Flow::accept(double t, const Eigen::VectorXd& y) {
   Eigen::VectorXd next = angles_.back();
   for (std::size_t k = 0; k < followed.size(); ++k) {
     const JointAngle& a = followed[k];
-    const double now = a.jet(body_at(y, a.body1).frame, body_at(y, a.body2).frame).angle();
     double& angle = next(static_cast<Eigen::Index>(k));
-    angle = JointAngle::on_branch(now, angle);
+    angle = a.value_near(angle, body_at(y, a.body1).frame, body_at(y, a.body2).frame);
   }
   times_.push_back(t);
   angles_.push_back(std::move(next));

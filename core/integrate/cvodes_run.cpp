@@ -189,7 +189,7 @@ void ForwardRun::stop_for(int flag, double t, const char* of_what) {
 // A branch is chosen by nearness: a joint that turns by half a turn in one step is lost.
 bool ForwardRun::step_is_followed(double h, const Eigen::VectorXd& y) {
   for (const JointAngle& a : mechanism_.data().angles) {
-    const double rate = std::abs(a.jet(body_at(y, a.body1).frame, body_at(y, a.body2).frame).rate());
+    const double rate = std::abs(a.rate(body_at(y, a.body1).frame, body_at(y, a.body2).frame));
     if (rate * h <= 3) continue;
     stop(SimulationStatus::step_too_large,
          fmt::format("at t = {:.6g} s a joint whose angle is used turns by {:.3g} rad in one step of {:.3g} s; more "

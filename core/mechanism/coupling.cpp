@@ -25,7 +25,7 @@ Bodies read_by(const MechanismData& data, const SensorKind& sensor) {
           const JointAngle& angle = data.angles[static_cast<std::size_t>(s.angle)];
           return {angle.body1, angle.body2};
         } else if constexpr (std::is_same_v<Kind, DisplacementSensor>) {
-          return {s.body1, s.body2};
+          return {s.joint.body1, s.joint.body2};
         } else {
           return all;
         }
