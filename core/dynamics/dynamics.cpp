@@ -28,7 +28,7 @@ Eigen::VectorXd alpha_of_factor(const MechanismData& data, const FormulationSett
   return Eigen::VectorXd::Constant(data.m, moderate ? moderate_alpha(data, settings.alpha) : settings.alpha);
 }
 
-double compliance(const FormulationSettings& settings) {
+double compliance_of(const FormulationSettings& settings) {
   return settings.type == FormulationType::penalty ? 1 / settings.alpha : 0.0;
 }
 
@@ -40,7 +40,7 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
       settings_(settings),
       laws_(data_),
       forces_(data_),
-      solver_(data_, alpha_of_factor(data_, settings), compliance(settings)) {
+      solver_(data_, alpha_of_factor(data_, settings), compliance_of(settings)) {
   const std::size_t n = static_cast<std::size_t>(data_.n);
   const Eigen::Index m = data_.m, P = data_.rho.size();
   y_.setZero(14 * data_.n);
@@ -78,6 +78,8 @@ SaddleSolver::Settings Dynamics::solver_settings(bool derivative) const {
   const int least = std::clamp(static_cast<int>(std::ceil(15 / digits)) - 1, 1, 8);
   return {least, std::max(least, settings_.iterations), 1e-14};
 }
+
+double Dynamics::compliance() const { return compliance_of(settings_); }
 
 void Dynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
   t_ = t;

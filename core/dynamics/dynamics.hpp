@@ -72,7 +72,7 @@ class Dynamics {
   Mat<7, 7> mass_block(int body) const;
   Mat<1, 7> times_T(int body, const Mat<1, 6>& J_row) const;
   const ConstraintRows& place_rows() const { return solver_.rows(); }
-  double compliance(Eigen::Index row) const;
+  double compliance() const;  // 1/alpha of the penalty form, 0: constrained
 
   // y_dir: tangent of y (14n x lanes); ydot_dir: of (v, a).
   void tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir);

@@ -31,10 +31,6 @@ void Dynamics::place_at(double t, const Eigen::VectorXd& y, const Eigen::VectorX
   solver_.place(frames_);
 }
 
-double Dynamics::compliance(Eigen::Index row) const {
-  return settings_.type == FormulationType::penalty ? 1 / solver_.alpha()(row) : 0.0;
-}
-
 void Dynamics::residual(Eigen::Ref<Eigen::VectorXd> r) {
   set_loads();
   for (int i = 1; i <= data_.n; ++i)
@@ -53,7 +49,7 @@ void Dynamics::residual(Eigen::Ref<Eigen::VectorXd> r) {
     r.segment<6>(row) = loads_[k - 1];
     r(row + 6) = -p.dot(a_.segment<4>(row + 3)) - pdot.squaredNorm() * p.squaredNorm();
   }
-  for (Eigen::Index j = 0; j < data_.m; ++j) r(7 * data_.n + j) = compliance(j) * lambda_(j) - gamma_(j);
+  r.tail(data_.m) = compliance() * lambda_ - gamma_;
 }
 
 void Dynamics::residual_tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& r_dir) {

@@ -68,7 +68,6 @@ MotionJacobian::Values MotionJacobian::values() const {
   x.row_q.assign(rows_.size(), Row::Zero()), x.row_v = x.row_q, x.J_T = x.row_q;
   x.J.assign(rows_.size(), Mat<1, 6>::Zero());
   x.mass.assign(at(n_), Block::Zero());
-  x.compliance.setZero(m_);
   return x;
 }
 
@@ -102,7 +101,7 @@ void MotionJacobian::evaluate(Dynamics& dynamics, Values& out) {
     for (const int block : blocks_of_[k]) out.J[k] += block >= 0 ? J.J1.row(block) : J.J2.row(-1 - block);
     out.J_T[k] = dynamics.times_T(rows_[k].body + 1, out.J[k]);
   }
-  for (int r = 0; r < m_; ++r) out.compliance(r) = dynamics.compliance(r);
+  out.compliance = dynamics.compliance();
 }
 
 }  // namespace mbsopt

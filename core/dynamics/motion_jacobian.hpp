@@ -26,7 +26,7 @@ class MotionJacobian {
     std::vector<Block> mass;        // per body
     std::vector<Row> J_T;           // per row and body
     std::vector<Mat<1, 6>> J;       // the same
-    Eigen::VectorXd compliance;     // per row
+    double compliance = 0;          // of every row
   };
   struct Place {
     int row, body;  // the equation's body (0-based) or row of Phi; the body whose coordinates (0-based)

@@ -69,7 +69,7 @@ bool StageMatrix::factor(const Eigen::Ref<const Eigen::MatrixXd>& P,
     for (const Mat<1, 6>& J : at.J) {
       for (Eigen::Index e = 0; e < 6; ++e) add(J(e));
     }
-    for (Eigen::Index r = 0; r < epsilon_.size(); ++r) add(-at.compliance(r) - epsilon_(r));
+    for (Eigen::Index r = 0; r < epsilon_.size(); ++r) add(-at.compliance - epsilon_(r));
   }
   ++factorisations_;
   return lu_.factor();

@@ -13,27 +13,14 @@
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/type_table.hpp"
 #include "optim/evaluator.hpp"
+#include "tests/app/gallery_files.hpp"
 #include "tests/app/run_command.hpp"
 
 using namespace mbsopt;
+using namespace mbsopt::testing;
 namespace fs = std::filesystem;
 
 namespace {
-
-const fs::path kProblems = fs::path(MBSOPT_SOURCE_DIR) / "problems";
-
-// "joints/gear_train", ...
-std::vector<std::string> gallery() {
-  std::vector<std::string> names;
-  for (const auto& entry : fs::recursive_directory_iterator(kProblems)) {
-    if (entry.path().extension() == ".json" && entry.path().parent_path() != kProblems)
-      names.push_back(fs::relative(entry.path(), kProblems).replace_extension().generic_string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-fs::path file_of(const std::string& name) { return kProblems / (name + ".json"); }
 
 Problem accurately(const std::string& name, double rtol) {
   Problem problem = read_problem(file_of(name));

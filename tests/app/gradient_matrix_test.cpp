@@ -1,0 +1,87 @@
+// TLM against adjoint on the problem files themselves: every method, formulation and projection, in a few fixed steps.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "app/json/read_problem.hpp"
+#include "core/integrate/tableaus.hpp"
+#include "optim/evaluator.hpp"
+#include "tests/app/gallery_files.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+using Eigen::Index;
+
+namespace {
+
+constexpr int kSteps = 4;
+
+struct Form {
+  std::string name;
+  FormulationSettings settings;
+};
+
+std::vector<Form> forms() {
+  FormulationSettings projected, velocity, free, penalty = FormulationSettings::penalty();
+  velocity.projection = Projection::velocity;
+  free.projection = Projection::none, free.omega = 10;
+  penalty.alpha = 1e6;
+  FormulationSettings accurate = penalty;
+  accurate.linear_solver = LinearSolver::quasidefinite;
+  accurate.projection = Projection::position_velocity;
+  return {{"augmented Lagrangian", projected},
+          {"augmented Lagrangian, velocity", velocity},
+          {"augmented Lagrangian, stabilised", free},
+          {"penalty", penalty},
+          {"penalty, quasi-definite, projected", accurate}};
+}
+
+}  // namespace
+
+TEST_CASE("TLM equals adjoint to 1e-10 on the small problem files, whatever the method and formulation",
+          "[gallery][gradient]") {
+  int files = 0;
+  for (const std::string& name : gallery()) {
+    Problem problem = read_problem(file_of(name));
+    Scene& scene = problem.scene;
+    if (scene.bodies.size() > 8 || problem.objectives.empty() || scene.parameters.size() > 12) continue;
+#ifdef __SANITIZE_ADDRESS__
+    if (++files % 8 != 0) continue;  // twenty times slower
+#else
+    ++files;
+#endif
+    const double span = scene.simulation.end_time - scene.simulation.start_time;
+    scene.simulation.end_time = scene.simulation.start_time + 2e-3 * span;
+    scene.simulation.integrator.step = 2e-3 * span / kSteps;
+    const std::vector<Objective> objectives = objectives_of(problem);
+    for (const Method& rk : runge_kutta_methods()) {
+      scene.simulation.integrator.type = std::string(rk.name);
+      for (const Form& form : forms()) {
+        scene.simulation.formulation = form.settings;
+        auto gradients = [&](GradientMethod method) {
+          EvaluatorOptions options;
+          options.method = method;
+          Evaluator evaluator(scene, objectives, {}, options);
+          return evaluator.gradients(evaluator.start());
+        };
+        const Evaluation tlm = gradients(GradientMethod::tlm), adjoint = gradients(GradientMethod::adjoint);
+        INFO(name << ", " << rk.name << ", " << form.name << ": " << tlm.message << adjoint.message);
+        REQUIRE((tlm.ok && adjoint.ok));
+        const Eigen::VectorXd size = tlm.rho.cwiseAbs().cwiseMax(1e-6);
+        for (Index o = 0; o < tlm.psi_rho.rows(); ++o) {
+          const Eigen::VectorXd a = tlm.psi_rho.row(o).transpose().cwiseProduct(size),
+                                b = adjoint.psi_rho.row(o).transpose().cwiseProduct(size);
+          const double largest = a.cwiseAbs().maxCoeff();
+          for (Index k = 0; k < a.size(); ++k) {
+            INFO(objectives[static_cast<std::size_t>(o)].name()
+                 << " in " << scene.parameters[static_cast<std::size_t>(k)].name);
+            CHECK(std::abs(a(k) - b(k)) <= 1e-10 * std::max(std::abs(a(k)), 1e-3 * largest));
+          }
+        }
+      }
+    }
+  }
+#ifndef __SANITIZE_ADDRESS__
+  CHECK(files >= 20);
+#endif
+}

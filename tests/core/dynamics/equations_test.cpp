@@ -1,0 +1,189 @@
+// The equations of motion as residuals in (a, lambda): zero at the solution; tangent, adjoint and Jacobian against
+// differences and against each other.
+#include <catch2/catch.hpp>
+
+#include "core/dynamics/assembly.hpp"
+#include "core/dynamics/motion_jacobian.hpp"
+#include "tests/core/mechanism/moving_scenes.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+// A scene at its start, moved off the solution: nothing below may rely on r = 0.
+struct Place {
+  Scene scene;
+  std::vector<std::shared_ptr<const UserForce>> forces;
+  Mechanism mechanism;
+  Dynamics dynamics;
+  double t = 0.1;
+  VectorXd y, angles, a, lambda;
+
+  explicit Place(Scene s, std::vector<std::shared_ptr<const UserForce>> user = {},
+                 const FormulationSettings& formulation = {})
+      : scene(std::move(s)),
+        forces(std::move(user)),
+        mechanism(scene, nominal(scene), {}, forces),
+        dynamics(mechanism, formulation) {
+    const Assembly assembly(mechanism, t);
+    REQUIRE(assembly.result().ok);
+    y = assembly.result().y, angles = assembly.result().angles;
+    VectorXd ydot(y.size());
+    REQUIRE(dynamics.evaluate(t, y, angles, ydot));
+    a = ydot.tail(y.size() / 2), lambda = dynamics.lambda();
+  }
+  void move() {
+    std::srand(7);
+    y += 0.02 * VectorXd::Random(y.size());
+    a += 0.3 * VectorXd::Random(a.size());
+    lambda += 0.3 * VectorXd::Random(lambda.size());
+  }
+  VectorXd residual(Dynamics& d, const VectorXd& at_y, const VectorXd& at_a, const VectorXd& at_lambda) const {
+    VectorXd r(d.equations());
+    d.place_at(t, at_y, angles, at_a, at_lambda);
+    d.residual(r);
+    return r;
+  }
+};
+
+Place moving_four_bar(const FormulationSettings& formulation = {}) {
+  Scene scene = every_force_four_bar();
+  const auto drag = std::make_shared<CubicDrag>("coupler", static_cast<Index>(scene.parameters.size()) - 1);
+  return Place(std::move(scene), {drag}, formulation);
+}
+
+ParameterBlock no_parameters(const MechanismData& data) {
+  ParameterBlock none;
+  none.theta.setZero(data.slots(), kLanes);
+  std::fill(std::begin(none.parameter), std::end(none.parameter), -1);
+  return none;
+}
+
+FormulationSettings stabilised_penalty() {
+  FormulationSettings s = FormulationSettings::penalty();
+  s.alpha = 1e4;
+  return s;
+}
+
+}  // namespace
+
+TEST_CASE("the residual vanishes at the solved accelerations and multipliers", "[equations]") {
+  const FormulationSettings formulation = GENERATE(FormulationSettings{}, stabilised_penalty());
+  Place p = moving_four_bar(formulation);
+  const VectorXd r = p.residual(p.dynamics, p.y, p.a, p.lambda);
+  CHECK(r.cwiseAbs().maxCoeff() < 1e-9 * (1 + p.lambda.cwiseAbs().maxCoeff()));
+}
+
+TEST_CASE("the residual's tangent in state and parameters is its difference", "[equations]") {
+  const FormulationSettings formulation = GENERATE(FormulationSettings{}, stabilised_penalty());
+  Place p = moving_four_bar(formulation);
+  p.move();
+  const Index states = p.y.size(), P = p.mechanism.parameters();
+  p.residual(p.dynamics, p.y, p.a, p.lambda);
+  LaneRows direction = LaneRows::Random(states, kLanes), change = LaneRows::Zero(p.dynamics.equations(), kLanes);
+  for (const ParameterBlock& block : parameter_blocks(p.mechanism.data())) {
+    p.residual(p.dynamics, p.y, p.a, p.lambda);
+    p.dynamics.residual_tangent(block, direction, change);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      auto at = [&](double h) {
+        VectorXd rho = nominal(p.scene);
+        if (block.parameter[lane] >= 0) rho(block.parameter[lane]) += h;
+        const Mechanism moved(p.scene, rho, {}, p.forces);
+        Dynamics dynamics(moved, formulation);
+        return p.residual(dynamics, p.y + h * direction.col(lane), p.a, p.lambda);
+      };
+      const double h = 1e-3;
+      const VectorXd d1 = (at(h) - at(-h)) / (2 * h), d2 = (at(h / 2) - at(-h / 2)) / h,
+                     d4 = (at(h / 4) - at(-h / 4)) / (h / 2);
+      const VectorXd difference = (64 * d4 - 20 * d2 + d1) / 45;
+      INFO("parameter " << block.parameter[lane] << " of " << P);
+      CHECK((difference - change.col(lane)).norm() < 1e-8 * (1 + change.col(lane).norm()));
+    }
+  }
+}
+
+TEST_CASE("the residual's adjoint is the transpose of its tangent", "[equations]") {
+  const FormulationSettings formulation = GENERATE(FormulationSettings{}, stabilised_penalty());
+  Place p = moving_four_bar(formulation);
+  p.move();
+  const MechanismData& data = p.mechanism.data();
+  p.residual(p.dynamics, p.y, p.a, p.lambda);
+  const VectorXd r_bar = VectorXd::Random(p.dynamics.equations());
+  VectorXd y_bar = VectorXd::Zero(p.y.size()), theta_bar = VectorXd::Zero(data.slots()),
+           rho_bar = VectorXd::Zero(data.rho.size());
+  p.dynamics.add_residual_adjoint(r_bar, y_bar, theta_bar, rho_bar);
+  data.add_to_rho(theta_bar, rho_bar);
+  LaneRows direction = LaneRows::Random(p.y.size(), kLanes), change = LaneRows::Zero(p.dynamics.equations(), kLanes);
+  for (const ParameterBlock& block : parameter_blocks(data)) {
+    p.dynamics.residual_tangent(block, direction, change);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      double expected = y_bar.dot(direction.col(lane));
+      if (block.parameter[lane] >= 0) expected += rho_bar(block.parameter[lane]);
+      CHECK(r_bar.dot(change.col(lane)) == Approx(expected).epsilon(1e-11).margin(1e-9));
+    }
+  }
+}
+
+TEST_CASE("the sparse Jacobian has the residual's derivatives in q, v, a and lambda", "[equations]") {
+  Place p = GENERATE(0, 1) == 0 ? moving_four_bar() : Place(n_four_bar(3));
+  p.move();
+  const int n = 7 * p.mechanism.data().n, m = p.mechanism.data().m;
+  p.residual(p.dynamics, p.y, p.a, p.lambda);
+  MotionJacobian jacobian(p.mechanism.data());
+  MotionJacobian::Values values = jacobian.values();
+  jacobian.evaluate(p.dynamics, values);
+  MatrixXd found = MatrixXd::Zero(n + m, 3 * n + m);  // minus the derivative in (q, v, a, lambda)
+  for (std::size_t k = 0; k < jacobian.pairs().size(); ++k) {
+    const auto& [row, body] = jacobian.pairs()[k];
+    found.block<7, 7>(7 * row, 7 * body) = values.q[k];
+    found.block<7, 7>(7 * row, n + 7 * body) = values.v[k];
+  }
+  for (std::size_t k = 0; k < jacobian.rows().size(); ++k) {
+    const auto& [row, body] = jacobian.rows()[k];
+    found.block<1, 7>(n + row, 7 * body) = values.row_q[k];
+    found.block<1, 7>(n + row, n + 7 * body) = values.row_v[k];
+    found.block<1, 7>(n + row, 2 * n + 7 * body) = values.J_T[k];
+    found.block<6, 1>(7 * body, 3 * n + row) = values.J[k].transpose();
+  }
+  for (int i = 0; i < n / 7; ++i) found.block<7, 7>(7 * i, 2 * n + 7 * i) = values.mass[static_cast<std::size_t>(i)];
+  for (int r = 0; r < m; ++r) found(n + r, 3 * n + r) = -values.compliance;
+
+  // All directions, bodies one by one.
+  const ParameterBlock none = no_parameters(p.mechanism.data());
+  LaneRows direction(2 * n, kLanes), change(n + m, kLanes);
+  for (int c = 0; c < 2 * n; ++c) {
+    direction.setZero();
+    direction(c, 0) = 1;
+    p.dynamics.residual_tangent(none, direction, change);
+    INFO("column " << c);
+    CHECK((found.col(c) + change.col(0)).cwiseAbs().maxCoeff() < 1e-12 * (1 + change.col(0).cwiseAbs().maxCoeff()));
+  }
+  // The residual is linear in (a, lambda).
+  const VectorXd r = p.residual(p.dynamics, p.y, p.a, p.lambda);
+  for (int c = 0; c < n + m; ++c) {
+    VectorXd a = p.a, lambda = p.lambda;
+    (c < n ? a(c) : lambda(c - n)) += 1;
+    const VectorXd column = p.residual(p.dynamics, p.y, a, lambda) - r;
+    INFO("column " << 2 * n + c);
+    CHECK((found.col(2 * n + c) + column).cwiseAbs().maxCoeff() < 1e-9 * (1 + r.cwiseAbs().maxCoeff()));
+  }
+}
+
+TEST_CASE("a chain needs three colours however long it is", "[equations]") {
+  for (const int bodies : {3, 30}) {
+    Scene scene;
+    for (int i = 0; i < bodies; ++i) {
+      scene.bodies.push_back(
+          plain_body(fmt::format("b{}", i), 1, {0.1, 0.1, 0.1, 0.0, 0.0, 0.0}, {static_cast<double>(i), 0.0, 0.0}));
+      scene.joints.push_back(hinge(fmt::format("j{}", i), i == 0 ? "ground" : fmt::format("b{}", i - 1),
+                                   i == 0 ? vec("-0.5", "0", "0") : vec("0.5", "0", "0"), fmt::format("b{}", i),
+                                   vec("-0.5", "0", "0")));
+    }
+    const Mechanism mechanism(scene, VectorXd());
+    CHECK(MotionJacobian(mechanism.data()).colours() == 3);
+  }
+}
