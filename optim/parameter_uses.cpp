@@ -65,6 +65,7 @@ class FieldPaths {
     if (!samples) on_field_(at(key), value, Names::time_law);
   }
   void plain(std::string_view, const auto&, const Range&, const Says&) {}
+  void numbers(std::string_view, const std::vector<double>&, const Range&, const Says&) {}
   void overrides(std::string_view, const std::vector<std::pair<std::string, double>>&, const Says&) {}
   template <class T>
   void object(std::string_view key, const T& value, const Says&) {

@@ -68,6 +68,7 @@ class FieldVisitor {
     for (const Expression& value : values) on_expression_(value, names);
   }
   void plain(std::string_view, const auto&, const Range&, const Says&) {}
+  void numbers(std::string_view, const std::vector<double>&, const Range&, const Says&) {}
   void overrides(std::string_view, const std::vector<std::pair<std::string, double>>&, const Says&) {}
   template <class T>
   void object(std::string_view, const T& value, const Says&) {
