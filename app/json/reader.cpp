@@ -267,6 +267,13 @@ void Reader::plain(std::string_view key, bool& value, const Range&, const Says& 
     findings_.add(*node, inside(key), "must be true or false, found " + what_is(*node));
 }
 
+void Reader::numbers(std::string_view key, std::vector<double>& values, const Range&, const Says& says) {
+  const Node* const node = get_kind(key, says, Node::Kind::array);
+  if (!node) return;
+  for (std::size_t i = 0; i < node->items.size(); ++i)
+    read_plain(node->items[i], child_path(inside(key), i), values.emplace_back(0.0), says.dimension);
+}
+
 void Reader::overrides(std::string_view key, std::vector<std::pair<std::string, double>>& values, const Says& says) {
   const Node* const node = get_kind(key, says, Node::Kind::object);
   if (!node) return;

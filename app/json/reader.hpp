@@ -65,6 +65,7 @@ class Reader {
     plain(key, given, range, says);
     value = given;
   }
+  void numbers(std::string_view key, std::vector<double>& values, const Range&, const Says& says);
   void overrides(std::string_view key, std::vector<std::pair<std::string, double>>& values, const Says& says);
 
   template <class T>

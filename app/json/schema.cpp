@@ -122,6 +122,9 @@ class SchemaWriter {
   void plain(std::string_view key, bool& value, const Range&, const Says& says) {
     put(key, says, {{"type", "boolean"}}, value);
   }
+  void numbers(std::string_view key, std::vector<double>&, const Range& range, const Says& says) {
+    put(key, says, {{"type", "array"}, {"items", ranged(ref("number"), range)}});
+  }
   void overrides(std::string_view key, std::vector<std::pair<std::string, double>>&, const Says& says) {
     put(key, says, {{"type", "object"}, {"additionalProperties", ref("number")}});
   }

@@ -176,8 +176,7 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
                       const std::function<bool(double)>& wants_dense, const Sink& accepted, const RunOptions& options,
                       SimulationResult& result) {
   const IntegratorSettings& s = settings_.integrator;
-  const double end = options.frozen ? options.frozen->end.value_or(settings_.end_time) : settings_.end_time;
-  const double span = end - settings_.start_time;
+  const double end = settings_.end_time, span = end - settings_.start_time;
   const bool adaptive = !s.step && !options.frozen && rk_.adaptive;
   angles_ = angles;
   step_.t = options.frozen && !options.frozen->times.empty() ? options.frozen->times[0] : settings_.start_time;
@@ -207,6 +206,7 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
   double h = adaptive ? first_step(s, span) : s.step.value_or(span);
   if (s.max_step) h = std::min(h, *s.max_step);
   std::size_t frozen_index = 0;
+  EventTimes events(settings_.events, settings_.start_time, settings_.end_time);
   while (result.ok() && (options.frozen ? frozen_index < options.frozen->sizes.size() : step_.t < end)) {
     if (result.statistics.steps + result.statistics.rejected >= s.max_steps) {
       stop(
@@ -223,7 +223,7 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
     } else {
       if (adaptive && rate * h > 2)
         h = 2 / rate;  // an angle is followed over turns only when steps are below half a turn
-      h = propose_step(step_.t, h, end, adaptive);
+      h = propose_step(step_.t, h, events.stop_after(step_.t), adaptive);
       if (!adaptive && rate * h > 3) {
         stop(
             SimulationStatus::step_too_large,
@@ -235,7 +235,8 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
     }
     double error = 0;
     Outcome outcome = attempt(h, adaptive, error);
-    const bool last = options.frozen ? frozen_index + 1 == options.frozen->sizes.size() : step_.t + h >= end;
+    const bool last = options.frozen ? frozen_index + 1 == options.frozen->sizes.size() && options.frozen->to_the_end
+                                     : step_.t + h >= end;
     step_.t1 = last ? end : step_.t + h;
     if (outcome == Outcome::accepted && !finish_step(wants_dense(step_.t1))) outcome = Outcome::failed;
     if (outcome != Outcome::accepted) {
@@ -279,11 +280,16 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
     } else if (!options.frozen) {
       h = s.step.value_or(span);
     }
-    step_.t = step_.t1;
+    const bool event = !options.frozen && events.reached(step_.t1);
+    step_.t = event ? events.resume_time() : step_.t1;
     step_.y0 = step_.y1;
     step_.angles0 = step_.angles1;
     first_stage_known_ = false;
     angles_ = step_.angles1;
+    if (event && adaptive) {  // what the steps before an event were fit for says nothing about those after it
+      controller = PiController(rk_.order);
+      h = std::min(first_step(s, end - step_.t), s.max_step.value_or(end - step_.t));
+    }
     result.last_good_time = step_.t;
     ++frozen_index;
     if (options.after_step) options.after_step({step_.t, step_.y0, step_.angles0});

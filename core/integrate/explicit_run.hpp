@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "core/dynamics/dynamics.hpp"
+#include "core/integrate/event_times.hpp"
 #include "core/integrate/implicit_stages.hpp"
 #include "core/integrate/simulation.hpp"
 #include "core/integrate/step.hpp"

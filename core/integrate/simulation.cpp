@@ -151,9 +151,7 @@ class Replayer {
       StepSequence part;
       part.times.assign(steps_.times.begin() + at.step, steps_.times.begin() + next);
       part.sizes.assign(steps_.sizes.begin() + at.step, steps_.sizes.begin() + next);
-      if (static_cast<std::size_t>(next) < steps_.times.size()) {
-        part.end = steps_.times[static_cast<std::size_t>(next)];
-      }
+      part.to_the_end = static_cast<std::size_t>(next) == steps_.times.size();
       SimulationResult result;
       RunOptions options;
       options.frozen = &part;

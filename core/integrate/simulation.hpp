@@ -10,7 +10,6 @@
 
 #include <Eigen/Core>
 #include <functional>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -25,7 +24,7 @@ class Mechanism;
 // Accepted steps: times.size() == sizes.size(); step i goes from times[i] by sizes[i].
 struct StepSequence {
   std::vector<double> times, sizes;
-  std::optional<double> end = {};  // of the last step; the end time when absent
+  bool to_the_end = true;  // the last step is the run's last, not one before it
 };
 
 struct SimulationStatistics {

@@ -269,11 +269,19 @@ void Checker::time_law(std::string_view key, const Expression& value, const std:
 }
 
 void Checker::check_range(std::string_view key, double value, const Range& range) {
+  check_number(path(key), value, range);
+}
+
+void Checker::check_number(const std::string& at, double value, const Range& range) {
   if (!std::isfinite(value))
-    issue(path(key), "is " + text_of(value) + ", it must be finite");
+    issue(at, "is " + text_of(value) + ", it must be finite");
   else if (value < range.least || (range.open && value == range.least))
-    issue(path(key), "is " + text_of(value) + ", it must be " + (range.open ? "greater than " : "at least ") +
-                         text_of(range.least));
+    issue(at, "is " + text_of(value) + ", it must be " + (range.open ? "greater than " : "at least ") +
+                  text_of(range.least));
+}
+
+void Checker::numbers(std::string_view key, const std::vector<double>& values, const Range& range, const Says&) {
+  for (std::size_t i = 0; i < values.size(); ++i) check_number(child_path(path(key), i), values[i], range);
 }
 
 void Checker::plain(std::string_view key, double value, const Range& range, const Says&) {

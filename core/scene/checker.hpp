@@ -59,6 +59,7 @@ class Checker {
   void plain(std::string_view key, long value, const Range& range, const Says& says);
   void plain(std::string_view, bool, const Range&, const Says&) {}
   void plain(std::string_view key, const std::optional<double>& value, const Range& range, const Says& says);
+  void numbers(std::string_view key, const std::vector<double>& values, const Range& range, const Says& says);
   void overrides(std::string_view key, const std::vector<std::pair<std::string, double>>& values, const Says& says);
 
   template <class T>
@@ -102,6 +103,7 @@ class Checker {
   Checker at(std::string_view key) const { return {facts_, issues_, path(key)}; }
   void check_reference(const std::string& path, const std::string& value, To what);
   void check_range(std::string_view key, double value, const Range& range);
+  void check_number(const std::string& at, double value, const Range& range);
   void check_vector(const std::string& path, const VectorField& value, const std::optional<Dimension>& expected);
   bool names_are_known(const std::string& path, const Expression& value, Names names);
   void check_sensors_of_state(const std::string& path, const Expression& value);

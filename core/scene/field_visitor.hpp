@@ -78,6 +78,7 @@ class FieldVisitor {
     tell_all(at(key), values, names);
   }
   void plain(std::string_view, const auto&, const Range&, const Says&) {}
+  void numbers(std::string_view, const std::vector<double>&, const Range&, const Says&) {}
   void overrides(std::string_view, const std::vector<std::pair<std::string, double>>&, const Says&) {}
   template <class T>
   void object(std::string_view key, const T& value, const Says&) {

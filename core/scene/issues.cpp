@@ -303,6 +303,13 @@ void check_meaning(Checker& checker, const SimulationSettings& settings) {
   if (settings.end_time <= settings.start_time)
     checker.issue(checker.path("end_time"), "is " + text_of(settings.end_time) + " s, it must be after start_time, " +
                                                 text_of(settings.start_time) + " s");
+  for (std::size_t i = 0; i < settings.events.size(); ++i) {
+    const double event = settings.events[i];
+    if (!(event > settings.start_time && event < settings.end_time))
+      checker.issue(child_path(checker.path("events"), i),
+                    "is " + text_of(event) + " s, it must lie between start_time, " + text_of(settings.start_time) +
+                        " s, and end_time, " + text_of(settings.end_time) + " s");
+  }
 }
 
 void check_meaning(Checker& checker, const Scene& scene) {

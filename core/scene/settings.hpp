@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace mbsopt {
 
@@ -41,6 +42,7 @@ struct SimulationSettings {
   std::optional<double> output_step;    // default: 200 rows
   FormulationSettings formulation;
   IntegratorSettings integrator;
+  std::vector<double> events;       // times at which a step ends and the next begins [s]
   double adjoint_memory_mib = 256;  // what an adjoint run keeps of the forward motion, at most [MiB]
 };
 

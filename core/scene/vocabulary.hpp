@@ -332,6 +332,8 @@ void describe(auto& v, Like<SimulationSettings> auto& s) {
   v.plain("output_step", s.output_step, kPositive, {"of trajectory.csv [s]; 200 rows when absent"});
   v.object("formulation", s.formulation, {"form of the equations of motion"});
   v.object("integrator", s.integrator, {"time integration"});
+  v.numbers("events", s.events, kAny,
+            {"times at which a law may jump or have a kink: a step ends there [s]", Need::optional, dimension::kTime});
   v.plain("adjoint_memory_mib", s.adjoint_memory_mib, kPositive,
           {"what an adjoint run may keep of the forward motion [MiB]; beyond it, steps are computed again"});
 }
