@@ -15,7 +15,7 @@
 #include <functional>
 #include <utility>
 
-#include "core/integrate/explicit_adjoint.hpp"
+#include "core/integrate/adjoint_sweep.hpp"
 
 namespace mbsopt {
 

@@ -10,6 +10,8 @@ constexpr int kMostIterations = 10;       // at a tolerance
 constexpr int kMostExactIterations = 60;  // to rounding, with a new Jacobian wherever convergence is slow
 constexpr double kSlow = 0.1;             // contraction per iteration from which a new Jacobian pays
 constexpr double kRounding = 1e-11;       // relative; iterations that stop falling below it are at rounding
+constexpr int kMostOwnJacobians = 4;      // of each stage, in one step
+constexpr int kOwnSteps = 20;             // steps for which they are used once the Jacobian of the start did not serve
 
 }  // namespace
 
@@ -42,6 +44,7 @@ ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method,
   }
   if (rk_.error_filter != 0) filter_.emplace(data_, jacobian_);
   const Eigen::Index rows = 7 * data_.n + data_.m;
+  own_values_.assign(static_cast<std::size_t>(largest), values_);
   x_.setZero(rows, largest), r_.setZero(rows * largest, 1), change_.setZero(14 * data_.n, largest);
   a_start_.setZero(7 * data_.n), lambda_start_.setZero(data_.m);
   y_.setZero(14 * data_.n), work_.setZero(7 * data_.n);
@@ -76,6 +79,10 @@ void ImplicitStages::accept(const Step& step) {
   lambda_start_ = step.lambda.col(latest);
   ++age_;
   if (rate_ > kSlow) renew_ = true;
+  if (own_steps_ > 0) {
+    --own_steps_;
+    renew_ = true;
+  }
 }
 
 void ImplicitStages::evaluate_jacobian(const Step& step) {
@@ -135,83 +142,122 @@ void ImplicitStages::set_stages(Step& step, const StageGroup& g) {
   set_group_stages(rk_, g, step.h, step.y0, step.Y, step.K);
 }
 
-bool ImplicitStages::solve(Step& step, const StageGroup& g, bool exact) {
+// A Jacobian of each stage's own, where its iterate is.
+bool ImplicitStages::linearise_stages(const Step& step, const StageGroup& g, Matrix& m) {
+  std::vector<const MotionJacobian::Values*> values;
+  for (int i = 0; i < g.size(); ++i) {
+    const int stage = g.first + i;
+    y_ = step.Y.col(stage);
+    dynamics_.place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, step.K.col(stage).tail(7 * data_.n),
+                       step.lambda.col(stage));
+    MotionJacobian::Values& own = own_values_[static_cast<std::size_t>(i)];
+    jacobian_.evaluate(dynamics_, own);
+    values.push_back(&own);
+    ++own_jacobians_;
+  }
+  m.jacobian = -1;  // not that of the start
+  return m.matrix.factor(step.h * m.A, values);
+}
+
+// Residuals of the group's stages at x_ into r_.
+bool ImplicitStages::evaluate_residuals(Step& step, const StageGroup& g) {
+  const Eigen::Index n = 7 * data_.n, rows = n + data_.m;
+  set_stages(step, g);
+  for (int i = 0; i < g.size(); ++i) {
+    const int stage = g.first + i;
+    y_ = step.Y.col(stage);
+    dynamics_.place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, x_.col(i).head(n), x_.col(i).tail(data_.m));
+    dynamics_.residual(r_.col(0).segment(i * rows, rows));
+    ++evaluations_;
+  }
+  return r_.topRows(g.size() * rows).allFinite();
+}
+
+// Adds the change in r_ to x_; returns what it does to the stages, root mean square in units of the tolerance (exact:
+// of the state's size).
+double ImplicitStages::add_change(const Step& step, const StageGroup& g, const Matrix& m, bool exact) {
   const Eigen::Index n = 7 * data_.n, rows = n + data_.m;
   const int s = g.size();
-  Matrix& m = matrices_[static_cast<std::size_t>(matrix_of_[static_cast<std::size_t>(g.first)])];
-  if (!ready(step, m)) return false;
-  for (int i = 0; i < s; ++i) predict(step, g.first + i, x_.col(i));
-  const double tolerance = std::min(1e-2, std::sqrt(settings_.rtol));
-  double before = INFINITY, eta = 1;
-  int renewals = 0;
-  const int most = exact ? kMostExactIterations : kMostIterations;
-  for (int k = 0; k < most; ++k) {
-    set_stages(step, g);
-    for (int i = 0; i < s; ++i) {
-      const int stage = g.first + i;
-      y_ = step.Y.col(stage);
-      dynamics_.place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, x_.col(i).head(n), x_.col(i).tail(data_.m));
-      dynamics_.residual(r_.col(0).segment(i * rows, rows));
-      ++evaluations_;
-    }
-    if (!r_.topRows(s * rows).allFinite()) return false;
-    m.matrix.solve(r_.topRows(s * rows), 0);
-    // What the change does to the stages, in units of the tolerance (exact: of the state's size).
-    double sum = 0;
-    for (int i = 0; i < s; ++i) {
-      auto dV = change_.col(i).tail(n);
-      dV.setZero();
-      for (int j = 0; j < s; ++j) dV += (step.h * m.A(i, j)) * r_.col(0).segment(j * rows, n);
-    }
-    for (int i = 0; i < s; ++i) {
-      auto dQ = change_.col(i).head(n);
-      dQ.setZero();
-      for (int j = 0; j < s; ++j) dQ += (step.h * m.A(i, j)) * change_.col(j).tail(n);
-      for (Eigen::Index e = 0; e < 2 * n; ++e) {
-        const double size = std::abs(step.y0(e));
-        const double unit = exact ? 1 + size : settings_.atol + settings_.rtol * size;
-        const double x = change_(e, i) / unit;
-        sum += x * x;
-      }
-      x_.col(i) += r_.col(0).segment(i * rows, rows);
-    }
-    const double now = std::sqrt(sum / static_cast<double>(2 * n * s));
-    if (!std::isfinite(now)) return false;
-    if (k > 0) rate_ = before > 0 ? now / before : 0;
-    const bool slow = k > 0 && rate_ > 0.5;
-    if (exact) {
-      if (now < 1e-15 || (slow && now < kRounding)) break;
-      if (slow && renewals < 5) {  // far from where the Jacobian was taken: take it here
-        ++renewals;
-        dynamics_.place_at(step.t + rk_.c[g.last] * step.h, y_, step.angles0, x_.col(s - 1).head(n),
-                           x_.col(s - 1).tail(data_.m));
-        jacobian_.evaluate(dynamics_, values_);
-        ++jacobians_;
-        if (!ready(step, m)) return false;
-        before = INFINITY;
-        continue;
-      }
-      if (k + 1 == most || (k > 5 && now > 1e10)) return false;
-    } else {
-      if (k > 0) {
-        if (rate_ >= 1) return false;
-        eta = rate_ / (1 - rate_);
-        const double left = std::pow(rate_, most - 1 - k) / (1 - rate_) * now;
-        if (left > tolerance && !(eta * now <= tolerance)) return false;
-      }
-      if (now <= 1e-10 || (k > 0 && eta * now <= tolerance)) break;
-      if (k + 1 == most) return false;
-    }
-    before = now;
+  double sum = 0;
+  for (int i = 0; i < s; ++i) {
+    auto dV = change_.col(i).tail(n);
+    dV.setZero();
+    for (int j = 0; j < s; ++j) dV += (step.h * m.A(i, j)) * r_.col(0).segment(j * rows, n);
   }
+  for (int i = 0; i < s; ++i) {
+    auto dQ = change_.col(i).head(n);
+    dQ.setZero();
+    for (int j = 0; j < s; ++j) dQ += (step.h * m.A(i, j)) * change_.col(j).tail(n);
+    for (Eigen::Index e = 0; e < 2 * n; ++e) {
+      const double size = std::abs(step.y0(e));
+      const double unit = exact ? 1 + size : settings_.atol + settings_.rtol * size;
+      const double x = change_(e, i) / unit;
+      sum += x * x;
+    }
+    x_.col(i) += r_.col(0).segment(i * rows, rows);
+  }
+  return std::sqrt(sum / static_cast<double>(2 * n * s));
+}
+
+bool ImplicitStages::iterate(Step& step, const StageGroup& g, Matrix& m, bool exact, bool own) {
+  const Eigen::Index rows = 7 * data_.n + data_.m;
+  for (int i = 0; i < g.size(); ++i) predict(step, g.first + i, x_.col(i));
+  if (own) {
+    set_stages(step, g);
+    if (!linearise_stages(step, g, m)) return false;
+  } else if (!ready(step, m)) {
+    return false;
+  }
+  const double tolerance = std::min(1e-2, std::sqrt(settings_.rtol));
+  const int most = exact ? kMostExactIterations : kMostIterations;
+  double before = INFINITY;
+  int own_left = kMostOwnJacobians;
+  for (int k = 0, since = 0; k < most; ++k, ++since) {
+    if (!evaluate_residuals(step, g)) return false;
+    m.matrix.solve(r_.topRows(g.size() * rows), 0);
+    const double now = add_change(step, g, m, exact);
+    if (!std::isfinite(now)) return false;
+    bool converges = true;
+    if (since > 0) {
+      rate_ = before > 0 ? now / before : 0;
+      if (exact) {
+        converges = rate_ <= 0.5;
+        if (!converges && now < kRounding) return true;
+      } else {
+        converges = rate_ < 1;
+        if (converges && rate_ / (1 - rate_) * now <= tolerance) return true;
+        if (converges) converges = std::pow(rate_, most - 1 - k) / (1 - rate_) * now <= tolerance;
+      }
+    }
+    if (now <= (exact ? 1e-15 : 1e-10)) return true;
+    before = now;
+    if (converges) continue;
+    if ((!own && !exact) || own_left-- == 0) return false;
+    set_stages(step, g);
+    if (!linearise_stages(step, g, m)) return false;
+    since = -1;
+  }
+  return false;
+}
+
+bool ImplicitStages::solve(Step& step, const StageGroup& g, bool exact) {
+  Matrix& m = matrices_[static_cast<std::size_t>(matrix_of_[static_cast<std::size_t>(g.first)])];
+  bool solved = own_steps_ == 0 && iterate(step, g, m, exact, false);
+  if (!solved) {
+    if (own_steps_ == 0 && stale()) return false;  // a new Jacobian at the start is tried first
+    own_steps_ = kOwnSteps;
+    solved = iterate(step, g, m, exact, true);
+  }
+  if (!solved) return false;
   set_stages(step, g);
   for (int i = g.first; i <= g.last; ++i) {
-    present_.push_back({step.t + rk_.c[i] * step.h, step.K.col(i).tail(n), step.lambda.col(i)});
+    present_.push_back({step.t + rk_.c[i] * step.h, step.K.col(i).tail(7 * data_.n), step.lambda.col(i)});
   }
   return true;
 }
 
 bool ImplicitStages::filter(const Step& step, Eigen::VectorXd& error) {
+  if (renew_) evaluate_jacobian(step);
   const double gamma = step.h * rk_.error_filter;
   if (filter_h_ != step.h || filter_jacobian_ != jacobians_) {
     filter_h_ = step.h;

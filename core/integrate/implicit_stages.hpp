@@ -1,6 +1,7 @@
 // The coupled stages of an implicit Runge-Kutta step, solved in their accelerations a_i and multipliers lambda_i by
 // simplified Newton iterations: one Jacobian, taken where the step starts and kept over steps while it serves, one
-// factor per step size and distinct block of the tableau.
+// factor per step size and distinct block of the tableau. Where it does not serve (a stiff direction turns within the
+// step), each stage gets a Jacobian of its own for some steps.
 //
 //   V_i = v0 + h sum_j A_ij a_j,   Q_i = q0 + h sum_j A_ij V_j,   r(t_i, Q_i, V_i, a_i, lambda_i) = 0
 //
@@ -42,7 +43,7 @@ class ImplicitStages {
   static constexpr double kKeepStep = 1.2;
 
   long evaluations() const { return evaluations_; }
-  long jacobians() const { return jacobians_; }
+  long jacobians() const { return jacobians_ + own_jacobians_; }
   long factorisations() const;
 
  private:
@@ -61,6 +62,10 @@ class ImplicitStages {
   void evaluate_jacobian(const Step& step);
   void predict(const Step& step, int stage, Eigen::Ref<Eigen::VectorXd> x) const;
   void set_stages(Step& step, const StageGroup& group);
+  bool linearise_stages(const Step& step, const StageGroup& group, Matrix& m);
+  bool evaluate_residuals(Step& step, const StageGroup& group);
+  double add_change(const Step& step, const StageGroup& group, const Matrix& m, bool exact);
+  bool iterate(Step& step, const StageGroup& group, Matrix& m, bool exact, bool own);
 
   const MechanismData& data_;
   const Method& rk_;
@@ -68,6 +73,7 @@ class ImplicitStages {
   Dynamics& dynamics_;
   MotionJacobian jacobian_;
   MotionJacobian::Values values_;
+  std::vector<MotionJacobian::Values> own_values_;  // per stage of a group
   std::vector<Matrix> matrices_;
   std::vector<int> matrix_of_;  // per group, in order
   std::optional<ShiftedSystem> filter_;
@@ -80,8 +86,9 @@ class ImplicitStages {
   Eigen::VectorXd y_, work_;
   double rate_ = 1;  // of the last iteration
   bool renew_ = true;
-  long age_ = 0;  // steps since the Jacobian was taken
-  long evaluations_ = 0, jacobians_ = 0;
+  long age_ = 0;       // steps since the Jacobian was taken
+  int own_steps_ = 0;  // for which each stage still gets a Jacobian of its own
+  long evaluations_ = 0, jacobians_ = 0, own_jacobians_ = 0;
 };
 
 }  // namespace mbsopt

@@ -10,9 +10,9 @@
 #include "core/dynamics/motion_solver.hpp"
 #include "core/integrate/checkpoints.hpp"
 #include "core/integrate/cvodes.hpp"
-#include "core/integrate/explicit_adjoint.hpp"
-#include "core/integrate/explicit_run.hpp"
-#include "core/integrate/explicit_tlm.hpp"
+#include "core/integrate/adjoint_sweep.hpp"
+#include "core/integrate/runge_kutta_run.hpp"
+#include "core/integrate/tangent_sweep.hpp"
 
 namespace mbsopt {
 namespace {
@@ -61,7 +61,7 @@ class Run {
           const RunOptions& options, const Follow& follow) {
     if (!result_.ok()) return;
     SampleSchedule schedule(costs_, observed, settings_.end_time);
-    ExplicitRun run(mechanism_, settings_, method_);
+    RungeKuttaRun run(mechanism_, settings_, method_);
     Eigen::VectorXd y(mechanism_.states());
     bool followed = true;
     auto accepted = [&](const Step& step) {
@@ -171,7 +171,7 @@ class Replayer {
   const SimulationSettings& settings_;
   const Method& method_;
   const StepSequence& steps_;
-  std::optional<ExplicitRun> run_;  // made where it is needed
+  std::optional<RungeKuttaRun> run_;  // made where it is needed
   long factorisations_ = 0;
 };
 

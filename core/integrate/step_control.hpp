@@ -9,10 +9,11 @@
 
 namespace mbsopt {
 
-// h -> h * factor with factor = 0.9 err^-(1/k - 0.75 beta) err_old^beta, k the order of the step, beta = 0.2/k.
+// h -> h * factor with factor = 0.9 err^-(1/k - 0.75 beta) err_old^beta, k the power of h in the estimate (p for an
+// estimate of order p - 1), beta = 0.2/k.
 class PiController {
  public:
-  explicit PiController(int order) : beta_(0.2 / order), exponent_(1.0 / order - 0.75 * beta_) {}
+  explicit PiController(int error_order) : beta_(0.2 / error_order), exponent_(1.0 / error_order - 0.75 * beta_) {}
 
   double after_acceptance(double error) {
     const double e = std::max(error, 1e-10);

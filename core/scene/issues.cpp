@@ -303,6 +303,10 @@ void check_meaning(Checker& checker, const SimulationSettings& settings) {
   if (settings.end_time <= settings.start_time)
     checker.issue(checker.path("end_time"), "is " + text_of(settings.end_time) + " s, it must be after start_time, " +
                                                 text_of(settings.start_time) + " s");
+  if (!settings.events.empty() && has_word(kMultistepMethods, settings.integrator.type))
+    checker.issue(checker.path("events"),
+                  "are times at which a step ends; " + settings.integrator.type +
+                      " does not end steps there: leave them out, or take a Runge-Kutta method");
   for (std::size_t i = 0; i < settings.events.size(); ++i) {
     const double event = settings.events[i];
     if (!(event > settings.start_time && event < settings.end_time))

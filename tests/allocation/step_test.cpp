@@ -4,7 +4,7 @@
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/projection.hpp"
 #include "core/integrate/cvodes_newton.hpp"
-#include "core/integrate/explicit_run.hpp"
+#include "core/integrate/runge_kutta_run.hpp"
 #include "tests/allocation/allocation_count.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
@@ -100,7 +100,7 @@ TEST_CASE("steps allocate nothing after the first, whatever their number", "[all
     SimulationSettings settings = p.scene.simulation;
     settings.end_time = end;
     settings.formulation.projection = Projection::position_velocity;
-    ExplicitRun run(p.mechanism, settings, *explicit_method(method));
+    RungeKuttaRun run(p.mechanism, settings, *explicit_method(method));
     SimulationResult result;
     result.steps.times.reserve(100000);
     result.steps.sizes.reserve(100000);

@@ -1,4 +1,4 @@
-// Discrete adjoint of an explicit method: the transpose of the tangent-linear sweep, steps and stages in reverse.
+// Discrete adjoint: the transpose of the tangent-linear sweep, steps and stages in reverse. For explicit stages
 //
 //   lambda at y1 -> projection' -> lambda^ at y^
 //   kbar_i = h b_i lambda^ + h sum_{j>i} A_ji ybar_j,      ybar_i = f_y(Y_i)' kbar_i + h b_i g_y(Y_i)
@@ -8,6 +8,7 @@
 #pragma once
 
 #include <optional>
+
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/motion_solver.hpp"
 #include "core/integrate/cost.hpp"

@@ -1,4 +1,4 @@
-#include "core/integrate/explicit_run.hpp"
+#include "core/integrate/runge_kutta_run.hpp"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 
 namespace mbsopt {
 
-ExplicitRun::ExplicitRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method)
+RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method)
     : mechanism_(mechanism),
       settings_(settings),
       rk_(method),
@@ -20,7 +20,7 @@ ExplicitRun::ExplicitRun(const Mechanism& mechanism, const SimulationSettings& s
   if (rk_.implicit()) implicit_.emplace(mechanism_, rk_, settings_.integrator, dynamics_);
 }
 
-Step ExplicitRun::make_step() const {
+Step RungeKuttaRun::make_step() const {
   Step s;
   const MechanismData& d = mechanism_.data();
   const Eigen::Index states = mechanism_.states(), angles = static_cast<Eigen::Index>(d.angles.size());
@@ -34,7 +34,7 @@ Step ExplicitRun::make_step() const {
 }
 
 // Hairer, Norsett, Wanner I, section II.4, "Starting step size"; step_.y0 is the initial state.
-double ExplicitRun::first_step(const IntegratorSettings& s, double span) {
+double RungeKuttaRun::first_step(const IntegratorSettings& s, double span) {
   if (s.initial_step) return std::min(*s.initial_step, span);
   const Eigen::VectorXd& y0 = step_.y0;
   if (!dynamics_.evaluate(step_.t, y0, angles_, ydot_)) return 1e-6 * span;
@@ -53,14 +53,14 @@ double ExplicitRun::first_step(const IntegratorSettings& s, double span) {
 }
 
 // Never beyond the end; an adaptive run does not leave a tiny last step.
-double ExplicitRun::propose_step(double t, double h, double end, bool adaptive) const {
+double RungeKuttaRun::propose_step(double t, double h, double end, bool adaptive) const {
   const double left = end - t;
   if (h >= left * (1 - 1e-9)) return left;
   return adaptive && 2 * h > left ? 0.5 * left : h;
 }
 
 // Names the bodies whose mass or inertia vanishes in some direction, for the message of a singular start.
-std::string ExplicitRun::bodies_without_inertia() const {
+std::string RungeKuttaRun::bodies_without_inertia() const {
   const MechanismData& d = mechanism_.data();
   std::string names;
   for (int i = 1; i <= d.n; ++i) {
@@ -72,7 +72,7 @@ std::string ExplicitRun::bodies_without_inertia() const {
   return names;
 }
 
-bool ExplicitRun::evaluate_stage(int i) {
+bool RungeKuttaRun::evaluate_stage(int i) {
   y_stage_ = step_.y0;
   for (int j = 0; j < i; ++j) {
     const double a = rk_.a(i, j);
@@ -86,7 +86,7 @@ bool ExplicitRun::evaluate_stage(int i) {
 }
 
 // All stages but those of dense output.
-bool ExplicitRun::solve_stages(bool exact) {
+bool RungeKuttaRun::solve_stages(bool exact) {
   if (implicit_) implicit_->new_attempt();
   for (const StageGroup& g : rk_.stage_groups_of_step()) {
     if (is_implicit(rk_, g)) {
@@ -99,7 +99,7 @@ bool ExplicitRun::solve_stages(bool exact) {
   return true;
 }
 
-double ExplicitRun::error_of_step() {
+double RungeKuttaRun::error_of_step() {
   const IntegratorSettings& s = settings_.integrator;
   auto norm = [&](const double* weights) {
     work_.setZero();
@@ -113,7 +113,7 @@ double ExplicitRun::error_of_step() {
   return rk_.error_low ? combined_error(high, norm(rk_.error_low)) : high;
 }
 
-ExplicitRun::Outcome ExplicitRun::attempt(double h, bool adaptive, double& error) {
+RungeKuttaRun::Outcome RungeKuttaRun::attempt(double h, bool adaptive, double& error) {
   step_.h = h;
   bool solved = solve_stages(!adaptive);
   if (!solved && implicit_ && implicit_->stale()) {
@@ -132,7 +132,7 @@ ExplicitRun::Outcome ExplicitRun::attempt(double h, bool adaptive, double& error
   return error <= 1 ? Outcome::accepted : Outcome::rejected;
 }
 
-bool ExplicitRun::finish_step(bool dense) {
+bool RungeKuttaRun::finish_step(bool dense) {
   step_.dense = dense;
   if (dense) {
     for (int i = rk_.stages; i < rk_.dense_stages; ++i) {
@@ -154,7 +154,7 @@ bool ExplicitRun::finish_step(bool dense) {
   return true;
 }
 
-double ExplicitRun::fastest_tracked_rate(const Eigen::VectorXd& y) const {
+double RungeKuttaRun::fastest_tracked_rate(const Eigen::VectorXd& y) const {
   double fastest = 0;
   for (const JointAngle& a : mechanism_.data().angles) {
     fastest = std::max(fastest, std::abs(a.rate(body_at(y, a.body1).frame, body_at(y, a.body2).frame)));
@@ -162,7 +162,7 @@ double ExplicitRun::fastest_tracked_rate(const Eigen::VectorXd& y) const {
   return fastest;
 }
 
-void ExplicitRun::update_statistics(SimulationResult& result) {
+void RungeKuttaRun::update_statistics(SimulationResult& result) {
   SimulationStatistics& s = result.statistics;
   s.max_position_violation =
       std::max(s.max_position_violation, projector_.position_violation(step_.t1, step_.angles1, step_.y1));
@@ -172,9 +172,9 @@ void ExplicitRun::update_statistics(SimulationResult& result) {
   s.energy_drift = std::max(s.energy_drift, std::abs(s.energy_final - s.energy_initial));
 }
 
-void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& angles,
-                      const std::function<bool(double)>& wants_dense, const Sink& accepted, const RunOptions& options,
-                      SimulationResult& result) {
+void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& angles,
+                        const std::function<bool(double)>& wants_dense, const Sink& accepted, const RunOptions& options,
+                        SimulationResult& result) {
   const IntegratorSettings& s = settings_.integrator;
   const double end = settings_.end_time, span = end - settings_.start_time;
   const bool adaptive = !s.step && !options.frozen && rk_.adaptive;
@@ -202,7 +202,7 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
     return;
   }
   if (implicit_) implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
-  PiController controller(rk_.order);
+  PiController controller(rk_.error_order);
   double h = adaptive ? first_step(s, span) : s.step.value_or(span);
   if (s.max_step) h = std::min(h, *s.max_step);
   std::size_t frozen_index = 0;
@@ -287,8 +287,12 @@ void ExplicitRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& a
     first_stage_known_ = false;
     angles_ = step_.angles1;
     if (event && adaptive) {  // what the steps before an event were fit for says nothing about those after it
-      controller = PiController(rk_.order);
+      controller = PiController(rk_.error_order);
       h = std::min(first_step(s, end - step_.t), s.max_step.value_or(end - step_.t));
+    }
+    if (event && implicit_ && dynamics_.evaluate(step_.t, step_.y0, angles_, ydot_)) {
+      ++evaluations_;
+      implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
     }
     result.last_good_time = step_.t;
     ++frozen_index;

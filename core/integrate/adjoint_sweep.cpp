@@ -1,6 +1,6 @@
-#include "core/integrate/explicit_adjoint.hpp"
+#include "core/integrate/adjoint_sweep.hpp"
 
-#include "core/integrate/explicit_tlm.hpp"
+#include "core/integrate/tangent_sweep.hpp"
 
 namespace mbsopt {
 

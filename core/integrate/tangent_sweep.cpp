@@ -1,4 +1,4 @@
-#include "core/integrate/explicit_tlm.hpp"
+#include "core/integrate/tangent_sweep.hpp"
 
 #include "core/body/euler_parameters.hpp"
 

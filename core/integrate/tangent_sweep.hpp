@@ -1,9 +1,11 @@
-// Tangent-linear sweep over accepted steps of an explicit method: for every direction,
+// Tangent-linear sweep over accepted steps: for every direction,
 //   Y_i' = y0' + h sum_j A_ij k_j',   k_i' = f_y Y_i' + f_rho,   y^' = y0' + h sum_i b_i k_i',   y1' = projection'(y^')
-// with the steps held fixed. All directions go through the factor of a stage together, kLanes at a time.
+// with the steps held fixed; stages that need each other solve their linear equations together (linearised_stages.hpp).
+// All directions go through the factor of a stage together, kLanes at a time.
 #pragma once
 
 #include <optional>
+
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/motion_solver.hpp"
 #include "core/integrate/cost.hpp"

@@ -1,4 +1,4 @@
-// Forward integration by an explicit method: adaptive (PI control) or fixed steps, or a frozen sequence of steps.
+// Forward integration by a Runge-Kutta method: adaptive (PI control) or fixed steps, or a frozen sequence of steps.
 // Each accepted step goes to a sink, which observes, accumulates objectives, keeps it for a backward sweep, or follows
 // it with tangents.
 #pragma once
@@ -14,9 +14,9 @@
 
 namespace mbsopt {
 
-class ExplicitRun {
+class RungeKuttaRun {
  public:
-  ExplicitRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method);
+  RungeKuttaRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method);
 
   using Sink = std::function<void(const Step&)>;
   // wants_dense(t1): whether a step that ends at t1 needs dense output. Fills status, statistics, steps, y_end.
