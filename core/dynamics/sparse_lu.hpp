@@ -24,7 +24,7 @@ class SparseLu {
   std::size_t slot(std::size_t entry) const { return slots_[entry]; }
   std::vector<double>& values() { return values_; }
 
-  bool factor();                                               // false where singular to working precision
+  bool factor();                                               // false where a pivot is zero or a number is not finite
   void solve(Eigen::Ref<Eigen::MatrixXd> b) const;             // in place, size x columns
   void solve_transposed(Eigen::Ref<Eigen::MatrixXd> b) const;  // the same with A'
 

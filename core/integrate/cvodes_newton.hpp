@@ -10,6 +10,8 @@ namespace mbsopt::cvodes {
 class NewtonMatrix {
  public:
   explicit NewtonMatrix(Flow& flow);
+  NewtonMatrix(const NewtonMatrix&) = delete;  // its system refers to its Jacobian
+  NewtonMatrix& operator=(const NewtonMatrix&) = delete;
 
   bool linearise(double t, const Flow::Numbers& y);                // f_y at this state
   bool factor(double gamma);                                       // false where it is not finite or singular

@@ -4,13 +4,16 @@
 
 #include "core/integrate/cvodes.hpp"
 #include "core/integrate/cvodes_run.hpp"
+#include "core/integrate/tableaus.hpp"
 
 namespace mbsopt {
 
 bool is_cvodes(std::string_view integrator) { return integrator == "cvodes_adams" || integrator == "cvodes_bdf"; }
 
 SimulationSettings with_cvodes(SimulationSettings settings) {
-  if (!is_cvodes(settings.integrator.type)) settings.integrator.type = "cvodes_adams";
+  std::string& type = settings.integrator.type;
+  const Method* method = runge_kutta_method(type);
+  if (!is_cvodes(type)) type = method && method->implicit() ? "cvodes_bdf" : "cvodes_adams";
   settings.integrator.step.reset();
   return settings;
 }

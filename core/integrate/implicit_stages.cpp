@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace mbsopt {
 namespace {
@@ -62,6 +63,9 @@ void ImplicitStages::begin(const Eigen::Ref<const Eigen::VectorXd>& a, const Eig
   past_.clear();
   present_.clear();
   renew_ = true;
+  own_steps_ = 0;
+  age_ = 0;
+  rate_ = 1;
 }
 
 void ImplicitStages::new_attempt() { present_.clear(); }
@@ -96,10 +100,12 @@ void ImplicitStages::evaluate_jacobian(const Step& step) {
 bool ImplicitStages::ready(const Step& step, Matrix& m) {
   if (renew_) evaluate_jacobian(step);
   if (m.jacobian == jacobians_ && m.h == step.h) return true;
+  const std::vector<const MotionJacobian::Values*> values(static_cast<std::size_t>(m.A.rows()), &values_);
+  m.jacobian = -1;
+  if (!m.matrix.factor(step.h * m.A, values)) return false;
   m.h = step.h;
   m.jacobian = jacobians_;
-  const std::vector<const MotionJacobian::Values*> values(static_cast<std::size_t>(m.A.rows()), &values_);
-  return m.matrix.factor(step.h * m.A, values);
+  return true;
 }
 
 // The polynomial through the three nearest points of the past, at most.
@@ -199,16 +205,24 @@ double ImplicitStages::add_change(const Step& step, const StageGroup& g, const M
   return std::sqrt(sum / static_cast<double>(2 * n * s));
 }
 
-bool ImplicitStages::iterate(Step& step, const StageGroup& g, Matrix& m, bool exact, bool own) {
+bool ImplicitStages::iterate(Step& step, const StageGroup& g, Matrix& m, Goal goal, bool own) {
   const Eigen::Index rows = 7 * data_.n + data_.m;
-  for (int i = 0; i < g.size(); ++i) predict(step, g.first + i, x_.col(i));
+  const bool exact = goal != Goal::tolerance;
+  for (int i = 0; i < g.size(); ++i) {
+    if (goal == Goal::polish) {
+      x_.col(i) << step.K.col(g.first + i).tail(7 * data_.n), step.lambda.col(g.first + i);
+    } else {
+      predict(step, g.first + i, x_.col(i));
+    }
+  }
   if (own) {
     set_stages(step, g);
     if (!linearise_stages(step, g, m)) return false;
   } else if (!ready(step, m)) {
     return false;
   }
-  const double tolerance = std::min(1e-2, std::sqrt(settings_.rtol));
+  const double tolerance =
+      std::max(std::min(1e-2, std::sqrt(settings_.rtol)), 10 * std::numeric_limits<double>::epsilon() / settings_.rtol);
   const int most = exact ? kMostExactIterations : kMostIterations;
   double before = INFINITY;
   int own_left = kMostOwnJacobians;
@@ -240,13 +254,13 @@ bool ImplicitStages::iterate(Step& step, const StageGroup& g, Matrix& m, bool ex
   return false;
 }
 
-bool ImplicitStages::solve(Step& step, const StageGroup& g, bool exact) {
+bool ImplicitStages::solve(Step& step, const StageGroup& g, Goal goal) {
   Matrix& m = matrices_[static_cast<std::size_t>(matrix_of_[static_cast<std::size_t>(g.first)])];
-  bool solved = own_steps_ == 0 && iterate(step, g, m, exact, false);
+  bool solved = own_steps_ == 0 && iterate(step, g, m, goal, false);
   if (!solved) {
-    if (own_steps_ == 0 && stale()) return false;  // a new Jacobian at the start is tried first
+    if (stale()) return false;  // a new Jacobian at the start is tried first
     own_steps_ = kOwnSteps;
-    solved = iterate(step, g, m, exact, true);
+    solved = iterate(step, g, m, goal, true);
   }
   if (!solved) return false;
   set_stages(step, g);
@@ -260,9 +274,10 @@ bool ImplicitStages::filter(const Step& step, Eigen::VectorXd& error) {
   if (renew_) evaluate_jacobian(step);
   const double gamma = step.h * rk_.error_filter;
   if (filter_h_ != step.h || filter_jacobian_ != jacobians_) {
+    filter_jacobian_ = -1;
+    if (!filter_->factor(gamma, values_)) return false;
     filter_h_ = step.h;
     filter_jacobian_ = jacobians_;
-    if (!filter_->factor(gamma, values_)) return false;
   }
   filter_->solve(error);
   return true;

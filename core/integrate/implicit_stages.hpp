@@ -6,8 +6,8 @@
 //   V_i = v0 + h sum_j A_ij a_j,   Q_i = q0 + h sum_j A_ij V_j,   r(t_i, Q_i, V_i, a_i, lambda_i) = 0
 //
 // Convergence test: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.8. An adaptive
-// run stops at a fraction of its tolerance; otherwise (fixed or given steps) the equations are solved to rounding, so
-// that differences of runs over the same steps mean something.
+// run stops at a fraction of its tolerance; where derivatives are taken, or steps are fixed or given, the stages of
+// accepted steps are solved to rounding, so that differences of runs over the same steps mean something.
 #pragma once
 
 #include <optional>
@@ -24,20 +24,27 @@ class ImplicitStages {
  public:
   ImplicitStages(const Mechanism& mechanism, const Method& method, const IntegratorSettings& settings,
                  Dynamics& dynamics);
+  ImplicitStages(const ImplicitStages&) = delete;  // its matrices refer to its Jacobian
+  ImplicitStages& operator=(const ImplicitStages&) = delete;
 
   // The motion at the start of the run: a, lambda at step.y0.
   void begin(const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::VectorXd& lambda);
   // Before each attempt at a step.
   void new_attempt();
-  // Solves the stages of a group; earlier groups are solved. exact: to rounding. False: no convergence.
-  bool solve(Step& step, const StageGroup& group, bool exact);
+  // Solves the stages of a group; earlier groups are solved. False: no convergence.
+  enum class Goal {
+    tolerance,  // a fraction of it, from a guess
+    rounding,   // from a guess
+    polish      // to rounding, from stages that are solved to a tolerance
+  };
+  bool solve(Step& step, const StageGroup& group, Goal goal);
   // error = (I - h error_filter f_y)^-1 error
   bool filter(const Step& step, Eigen::VectorXd& error);
   // After an accepted step.
   void accept(const Step& step);
 
   // Whether a failure may be cured at the same step size, by a new Jacobian.
-  bool stale() const { return age_ > 0; }
+  bool stale() const { return age_ > 0 && own_steps_ == 0; }
   void renew() { renew_ = true; }
   // Fastest contraction is left alone while the step changes by less than this.
   static constexpr double kKeepStep = 1.2;
@@ -65,7 +72,7 @@ class ImplicitStages {
   bool linearise_stages(const Step& step, const StageGroup& group, Matrix& m);
   bool evaluate_residuals(Step& step, const StageGroup& group);
   double add_change(const Step& step, const StageGroup& group, const Matrix& m, bool exact);
-  bool iterate(Step& step, const StageGroup& group, Matrix& m, bool exact, bool own);
+  bool iterate(Step& step, const StageGroup& group, Matrix& m, Goal goal, bool own);
 
   const MechanismData& data_;
   const Method& rk_;

@@ -2,8 +2,7 @@
 // use it. Numbers and the weights of dense output are made by tableaus.py, beside this file.
 //   Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996): [HW].
 //
-// error_filter is A_ii where it is the same in all implicit stages and the real eigenvalue of A where there is one, so
-// that the matrix I - h error_filter f_y is one that the stages have factored.
+// error_filter is A_ii where it is the same in all implicit stages and the real eigenvalue of A where there is one.
 //
 // Dense output of the order before last, or better, needs f(y0) (and f(y1), in the Gauss methods): in a stiff direction
 // with rate s it carries h s times what y0 is off the slow motion there. Outputs within a fast transient are rough.

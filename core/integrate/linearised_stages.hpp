@@ -11,6 +11,8 @@ namespace mbsopt {
 
 class LinearisedStages {
  public:
+  LinearisedStages(const LinearisedStages&) = delete;  // its matrices refer to its Jacobian
+  LinearisedStages& operator=(const LinearisedStages&) = delete;
   LinearisedStages(const MechanismData& data, const Method& method);
 
   // The Jacobian of stage k of a group (from 0), at the place where `dynamics` is.

@@ -86,11 +86,11 @@ bool RungeKuttaRun::evaluate_stage(int i) {
 }
 
 // All stages but those of dense output.
-bool RungeKuttaRun::solve_stages(bool exact) {
+bool RungeKuttaRun::solve_stages(ImplicitStages::Goal goal) {
   if (implicit_) implicit_->new_attempt();
   for (const StageGroup& g : rk_.stage_groups_of_step()) {
     if (is_implicit(rk_, g)) {
-      if (!implicit_->solve(step_, g, exact)) return false;
+      if (!implicit_->solve(step_, g, goal)) return false;
     } else if (g.first > 0 || !first_stage_known_) {
       if (!evaluate_stage(g.first)) return false;
       first_stage_known_ = true;  // at this start, whatever h
@@ -113,23 +113,40 @@ double RungeKuttaRun::error_of_step() {
   return rk_.error_low ? combined_error(high, norm(rk_.error_low)) : high;
 }
 
-RungeKuttaRun::Outcome RungeKuttaRun::attempt(double h, bool adaptive, double& error) {
+RungeKuttaRun::Outcome RungeKuttaRun::attempt(double h, bool adaptive, bool exact, double& error) {
+  using Goal = ImplicitStages::Goal;
   step_.h = h;
-  bool solved = solve_stages(!adaptive);
+  const Goal goal = adaptive ? Goal::tolerance : Goal::rounding;
+  bool solved = solve_stages(goal);
   if (!solved && implicit_ && implicit_->stale()) {
     implicit_->renew();
-    solved = solve_stages(!adaptive);
+    solved = solve_stages(goal);
   }
-  if (!solved) return Outcome::failed;
-  step_.y_hat = step_.y0;
-  for (int i = 0; i < rk_.stages; ++i) {
-    if (rk_.b[i] != 0) step_.y_hat += (h * rk_.b[i]) * step_.K.col(i);
-  }
+  if (!solved) return implicit_ ? Outcome::unsolved : Outcome::failed;
+  set_y_hat();
   error = 0;
   if (!adaptive) return step_.y_hat.allFinite() ? Outcome::accepted : Outcome::failed;
   error = error_of_step();
   if (!std::isfinite(error)) return Outcome::failed;
-  return error <= 1 ? Outcome::accepted : Outcome::rejected;
+  if (error > 1) return Outcome::rejected;
+  if (implicit_ && exact) {
+    if (!solve_stages(Goal::polish)) return Outcome::unsolved;
+    set_y_hat();
+  }
+  return Outcome::accepted;
+}
+
+std::string RungeKuttaRun::unsolved(double h) const {
+  return fmt::format("the stages of the implicit step from t = {:.6g} s by {:.3g} s were not found: Newton's method did "
+                     "not converge. Use a smaller step, or look for a law that is not smooth or not finite, or a "
+                     "singular position, near this time", step_.t, h);
+}
+
+void RungeKuttaRun::set_y_hat() {
+  step_.y_hat = step_.y0;
+  for (int i = 0; i < rk_.stages; ++i) {
+    if (rk_.b[i] != 0) step_.y_hat += (step_.h * rk_.b[i]) * step_.K.col(i);
+  }
 }
 
 bool RungeKuttaRun::finish_step(bool dense) {
@@ -234,15 +251,15 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
       }
     }
     double error = 0;
-    Outcome outcome = attempt(h, adaptive, error);
+    Outcome outcome = attempt(h, adaptive, options.exact_stages, error);
     const bool last = options.frozen ? frozen_index + 1 == options.frozen->sizes.size() && options.frozen->to_the_end
                                      : step_.t + h >= end;
     step_.t1 = last ? end : step_.t + h;
     if (outcome == Outcome::accepted && !finish_step(wants_dense(step_.t1))) outcome = Outcome::failed;
     if (outcome != Outcome::accepted) {
       if (!adaptive) {
-        stop(SimulationStatus::not_finite,
-             fmt::format(
+        stop(outcome == Outcome::unsolved ? SimulationStatus::not_solved : SimulationStatus::not_finite,
+             outcome == Outcome::unsolved ? unsolved(h) : fmt::format(
                  "the state stopped being finite in the step from t = {:.6g} s by {:.3g} s. The step is too large "
                  "for this motion: use a smaller step, or an adaptive integrator (no \"step\")",
                  step_.t, h));
@@ -258,6 +275,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
                        "force that is not finite there (a root, logarithm or division outside its range), or a "
                        "body without inertia in a direction that no joint holds?",
                        step_.t)
+             : outcome == Outcome::unsolved ? unsolved(h)
                  : fmt::format("the step fell to {:.3g} s at t = {:.6g} s and its error is still too large. Look for a "
                                "singular position, a spring of zero length or a law that is not smooth near this time; "
                                "looser tolerances or a fixed step may pass it",

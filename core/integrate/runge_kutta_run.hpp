@@ -28,15 +28,18 @@ class RungeKuttaRun {
   const Eigen::VectorXd& angles() const { return angles_; }
 
  private:
-  enum class Outcome { accepted, rejected, failed };
+  // unsolved: Newton's method did not converge; failed: a number is not finite, a matrix is singular.
+  enum class Outcome { accepted, rejected, unsolved, failed };
 
   double first_step(const IntegratorSettings& s, double span);
   double propose_step(double t, double h, double end, bool adaptive) const;
   std::string bodies_without_inertia() const;
   bool evaluate_stage(int i);
-  bool solve_stages(bool exact);
+  bool solve_stages(ImplicitStages::Goal goal);
   double error_of_step();
-  Outcome attempt(double h, bool adaptive, double& error);
+  void set_y_hat();
+  std::string unsolved(double h) const;  // in words
+  Outcome attempt(double h, bool adaptive, bool exact, double& error);
   bool finish_step(bool dense);  // dense stages, projection, branches of the angles
   double fastest_tracked_rate(const Eigen::VectorXd& y) const;
   void update_statistics(SimulationResult& result);

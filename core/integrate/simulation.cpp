@@ -30,6 +30,11 @@ const Method& method_of(const SimulationSettings& settings) {
   return *method;
 }
 
+RunOptions with_exact_stages(RunOptions options) {
+  options.exact_stages = true;
+  return options;
+}
+
 // One forward integration from assembly to the end, with costs; what derivatives need hangs in by `follow`.
 class Run {
  public:
@@ -193,7 +198,7 @@ SimulationResult simulate_tlm(const Mechanism& mechanism, const SimulationSettin
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   if (!result.ok()) return run.finish();
   TangentSweep sweep(mechanism, settings, run.method(), run.assembly().tangent());
-  run.go(sampling.times, {}, options, [&](const Step& step, std::span<const SampleEvent> events) {
+  run.go(sampling.times, {}, with_exact_stages(options), [&](const Step& step, std::span<const SampleEvent> events) {
     return sweep.follow(step, costs, events, sampling, result.psi_rho);
   });
   if (result.ok()) sweep.finish(settings.end_time, result.y_end, run.angles_end(), costs, result.psi_rho);
@@ -208,7 +213,7 @@ SimulationResult simulate_adjoint(const Mechanism& mechanism, const SimulationSe
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   Checkpoints checkpoints(run.method(), settings.adjoint_memory_mib);
-  run.go({}, {}, options, [&](const Step& step, std::span<const SampleEvent> events) {
+  run.go({}, {}, with_exact_stages(options), [&](const Step& step, std::span<const SampleEvent> events) {
     checkpoints.keep(step, events);
     return true;
   });

@@ -46,6 +46,7 @@ enum class SimulationStatus {
   step_too_large,
   too_many_steps,
   not_finite,
+  not_solved,  // the stages of an implicit step
   stopped
 };
 
@@ -77,6 +78,9 @@ struct RunOptions {
   std::function<bool(double t)> progress;  // called after accepted steps; false stops the run (status: stopped)
   // The state after each accepted step, the start not counted; for states at times of one's own choice: Sampling.
   std::function<void(const StatePoint& at)> after_step = {};
+  // Stages of implicit methods to rounding, not to a fraction of the tolerance; always so in runs with derivatives, and
+  // with fixed or given steps. For values that are to be compared with those.
+  bool exact_stages = false;
 };
 
 SimulationResult simulate(const Mechanism& mechanism, const SimulationSettings& settings,

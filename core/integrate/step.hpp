@@ -1,4 +1,4 @@
-// One accepted step of an explicit method, with everything that dense output and the derivative sweeps read.
+// One accepted step, with everything that dense output and the derivative sweeps read.
 #pragma once
 
 #include <Eigen/Core>

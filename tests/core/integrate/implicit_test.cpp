@@ -103,6 +103,6 @@ TEST_CASE("an implicit method converges at fixed steps that explicit ones cannot
   scene.simulation.integrator.type = "radau5";
   CHECK(simulate(Mechanism(scene, nominal(scene)), scene.simulation).ok());
   scene.simulation.integrator.type = "rk4";
-  const SimulationResult runge_kutta_run = simulate(Mechanism(scene, nominal(scene)), scene.simulation);
-  CHECK_FALSE(runge_kutta_run.ok());
+  const SimulationResult with_rk4 = simulate(Mechanism(scene, nominal(scene)), scene.simulation);
+  CHECK_FALSE(with_rk4.ok());
 }
