@@ -55,21 +55,18 @@ class GradientAlong {
   LadderDerivative derivative(const VectorXd& d) {
     double h = options_.relative_step;
     Reach reach = reach_along(d, h);
-    LadderDerivative best = ladder(d, reach);
+    LadderDerivative best = without_constants(ladder(d, reach));
     for (int i = 0; i < kWiderLadders && best.has_estimate(0) && rounding_hides(best); ++i) {
       if (reach.step < h) break;  // the bounds are all the room there is
       h *= kGrowth;
       reach = reach_along(d, h);
-      const LadderDerivative wider = ladder(d, reach);
+      const LadderDerivative wider = without_constants(ladder(d, reach));
       for (Index c = 0; c < best.error.size(); ++c) {
         if (!(wider.error(c) < best.error(c))) continue;
         best.derivative(c) = wider.derivative(c), best.error(c) = wider.error(c);
         best.rounding(c) = wider.rounding(c), best.step(c) = wider.step(c);
       }
     }
-    // An entry that no step changed by a bit is constant.
-    for (Index c = 0; c < best.error.size(); ++c)
-      if (best.derivative(c) == 0 && best.has_estimate(c) && best.error(c) == best.rounding(c)) best.error(c) = 0;
     return best;
   }
 
@@ -139,6 +136,13 @@ class GradientAlong {
       if (best.has_estimate(0)) break;
     }
     return best;
+  }
+
+  // An entry that no step changed by a bit is constant.
+  static LadderDerivative without_constants(LadderDerivative found) {
+    for (Index c = 0; c < found.error.size(); ++c)
+      if (found.derivative(c) == 0 && found.has_estimate(c) && found.error(c) == found.rounding(c)) found.error(c) = 0;
+    return found;
   }
 
   double largest_gradient(Index objective) const {

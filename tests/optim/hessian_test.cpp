@@ -231,9 +231,12 @@ TEST_CASE("the error of a Hessian tells of kinks, of constants, and of values th
           "[hessian]") {
   CHECK(hessian_in_p(of_p(0, "abs(p)")).relative() > 0.1);
 
-  const ObjectiveHessian linear = hessian_in_p(of_p(3, "7*p"));
-  CHECK(linear.value(0, 0) == 0);
-  CHECK(linear.relative() == 0);
+  Evaluator linear = evaluator_of(of_p(3, "7*p"), GradientMethod::adjoint);
+  const Hessians zero = hessians(linear, linear.start());
+  REQUIRE(zero.ok);
+  CHECK(zero.of[0].value(0, 0) == 0);
+  CHECK(zero.of[0].relative() == 0);
+  CHECK(zero.gradients == 4);  // two rungs say so, none is spent on wider steps
 
   // A small offset in something of size 1: steps of its own size see nothing but rounding.
   const double offset = 1e-9;
