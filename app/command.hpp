@@ -13,6 +13,7 @@ struct CommandOptions {
   std::string out;                // --out; empty: out/<name>/
   std::vector<std::string> sets;  // --set, each "path=value"
   std::string method = "auto";    // --method of gradient
+  bool hessian = false;           // --hessian of gradient
   int threads = 0;                // --threads; 0: as many as the machine has
   bool quiet = false;             // --quiet
 };

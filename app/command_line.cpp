@@ -80,6 +80,9 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
     sub.add_option("--method", options.method, "how gradients are computed")
         ->check(CLI::IsMember({"auto", "tlm", "adjoint", "cvodes_forward", "cvodes_adjoint", "fd"}))
         ->capture_default_str();
+    sub.add_flag("--hessian", options.hessian,
+                 "second derivatives, too: extrapolated differences of the adjoint gradient (of the tlm gradient with "
+                 "--method tlm) on frozen steps, not forward over adjoint; not for integrators of CVODES");
   }
 }
 

@@ -3,12 +3,14 @@
 #include <map>
 
 #include "app/command.hpp"
+#include "app/hessian_results.hpp"
 #include "app/interrupt.hpp"
 #include "app/objective_values.hpp"
 #include "app/run.hpp"
 #include "app/text_table.hpp"
 #include "core/integrate/cvodes.hpp"
 #include "optim/evaluator.hpp"
+#include "optim/hessian.hpp"
 
 namespace mbsopt {
 namespace {
@@ -48,6 +50,28 @@ void add_objectives(Run& run, const Evaluation& evaluation, const std::vector<st
   run.context.out << '\n' << table.text();
 }
 
+// The gradients are done and stay whatever comes of this.
+void add_second_derivatives(Run& run, Evaluator& evaluator) {
+  std::vector<std::string> objectives, parameters;
+  for (const ObjectiveSpec& objective : run.problem.objectives) objectives.push_back(objective.name);
+  for (const Parameter& parameter : run.problem.scene.parameters) parameters.push_back(parameter.name);
+  HessianOptions options;
+  options.progress = [&](int done, int of) {
+    run.progress.fraction("second derivatives", static_cast<double>(done) / of);
+    return !interrupted();
+  };
+  const Hessians found = hessians(evaluator, evaluator.start(), options);
+  run.progress.finish();
+  if (interrupted() || !found.ok) {
+    interrupted() ? run.stopped("the gradients are kept, there are no second derivatives")
+                  : run.failed("no second derivatives: " + found.message);
+    return;
+  }
+  add_hessians(run.result, found, objectives, parameters);
+  print_hessians(run.context.out, found, objectives, parameters);
+  for (const std::string& warning : hessian_warnings(found, objectives)) run.warn(warning);
+}
+
 }  // namespace
 
 int gradient_command(const CommandContext& context) {
@@ -55,13 +79,19 @@ int gradient_command(const CommandContext& context) {
   const Scene& scene = run.problem.scene;
   if (run.problem.objectives.empty()) throw std::invalid_argument("objectives: there are none to differentiate");
 
+  GradientMethod wanted = kMethods.at(context.options.method);
+  if (context.options.hessian) {
+    require_second_order(scene, wanted);
+    if (wanted == GradientMethod::automatic) wanted = GradientMethod::adjoint;
+  }
+
   const Mechanism mechanism(scene, parameter_values(scene));
   run.start();
   if (!assembled(run, Assembly(mechanism, scene.simulation.start_time))) return run.finish();
 
   double last_good_time = scene.simulation.start_time;
   EvaluatorOptions options;
-  options.method = kMethods.at(context.options.method);
+  options.method = wanted;
   options.progress = [&](double t) {
     last_good_time = t;
     return !interrupted();
@@ -83,6 +113,7 @@ int gradient_command(const CommandContext& context) {
   context.out << fmt::format("gradients by {}, {:.3g} s\n\n", evaluation.choice.empty() ? method : evaluation.choice,
                              evaluation.wall_seconds);
   add_objectives(run, evaluation, evaluator.true_values(evaluator.start()));
+  if (context.options.hessian) add_second_derivatives(run, evaluator);
   return run.finish();
 }
 

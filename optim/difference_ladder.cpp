@@ -2,15 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 namespace mbsopt {
+namespace {
 
-LadderDerivative difference_ladder(const std::function<std::optional<Eigen::VectorXd>(double h)>& f, Eigen::Index size,
-                                   const LadderOptions& options) {
+// One rung: the quotient of differences, and the largest values it is made of.
+struct Rung {
+  Eigen::VectorXd quotient, largest;
+};
+
+// base: b of the extrapolation. evaluations: of f in a rung.
+template <class RungAt>
+LadderDerivative climb(const RungAt& rung_at, Eigen::Index size, double base, double amplification, int evaluations,
+                       const LadderOptions& options) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  const double noise = std::max(options.noise, std::numeric_limits<double>::epsilon());
+  const double noise = amplification * std::max(options.noise, std::numeric_limits<double>::epsilon());
   LadderDerivative best;
   best.derivative.setZero(size);
   best.error.setConstant(size, kInfinity);
@@ -18,17 +25,17 @@ LadderDerivative difference_ladder(const std::function<std::optional<Eigen::Vect
   std::vector<Eigen::VectorXd> above, row;  // rows j - 1 and j of T
   double h = options.step;
   for (int j = 0; j < options.rungs; ++j, h /= 2) {
-    const std::optional<Eigen::VectorXd> plus = f(h), minus = f(-h);
-    best.evaluations += 2;
-    if (!plus || !minus) {
+    const std::optional<Rung> rung = rung_at(h);
+    best.evaluations += evaluations;
+    if (!rung) {
       above.clear();
       continue;
     }
-    row.assign(1, (*plus - *minus) / (2 * h));
-    double power = 4;
-    for (std::size_t k = 1; k <= above.size(); ++k, power *= 4)
+    row.assign(1, rung->quotient);
+    double power = base;
+    for (std::size_t k = 1; k <= above.size(); ++k, power *= base)
       row.push_back(row[k - 1] + (row[k - 1] - above[k - 1]) / (power - 1));
-    const Eigen::ArrayXd rounding = noise * plus->cwiseAbs().cwiseMax(minus->cwiseAbs()).array() / h;
+    const Eigen::ArrayXd rounding = noise * rung->largest.array() / std::abs(h);
     for (std::size_t k = 0; k < row.size(); ++k) {
       for (Eigen::Index i = 0; i < size; ++i) {
         // A first difference has nothing to be compared with: its error is unknown, but it is better than nothing.
@@ -38,12 +45,34 @@ LadderDerivative difference_ladder(const std::function<std::optional<Eigen::Vect
         const double error = std::max(spread, rounding(i));
         if (!(error < best.error(i))) continue;
         best.error(i) = error, best.derivative(i) = row[k](i);
-        best.rounding(i) = rounding(i), best.step(i) = h;
+        best.rounding(i) = rounding(i), best.step(i) = std::abs(h);
       }
     }
     above = row;
+    if (options.enough && row.size() > 1 && options.enough(best)) break;
   }
   return best;
+}
+
+}  // namespace
+
+LadderDerivative difference_ladder(const LadderFunction& f, Eigen::Index size, const LadderOptions& options) {
+  const auto rung_at = [&](double h) -> std::optional<Rung> {
+    const std::optional<Eigen::VectorXd> plus = f(h), minus = f(-h);
+    if (!plus || !minus) return std::nullopt;
+    return Rung{(*plus - *minus) / (2 * h), plus->cwiseAbs().cwiseMax(minus->cwiseAbs())};
+  };
+  return climb(rung_at, size, 4, 1, 2, options);
+}
+
+LadderDerivative one_sided_ladder(const LadderFunction& f, const Eigen::VectorXd& f0, const LadderOptions& options) {
+  constexpr double kAmplification = 8.3;
+  const auto rung_at = [&](double h) -> std::optional<Rung> {
+    const std::optional<Eigen::VectorXd> there = f(h);
+    if (!there) return std::nullopt;
+    return Rung{(*there - f0) / h, there->cwiseAbs().cwiseMax(f0.cwiseAbs())};
+  };
+  return climb(rung_at, f0.size(), 2, kAmplification, 1, options);
 }
 
 }  // namespace mbsopt

@@ -1,38 +1,52 @@
-// Derivatives of functions that can only be evaluated: central differences over a ladder of steps h0, h0/2, h0/4, ...
-// and Richardson extrapolation of their errors h^2, h^4, ... to zero:
+// Derivatives of functions that can only be evaluated: differences over a ladder of steps h0, h0/2, h0/4, ... and
+// Richardson extrapolation of their errors to zero:
 //
-//   T_j0 = (f(h_j) - f(-h_j)) / (2 h_j)          T_jk = T_j,k-1 + (T_j,k-1 - T_j-1,k-1) / (4^k - 1)
+//   central     T_j0 = (f(h_j) - f(-h_j)) / (2 h_j)     errors h^2, h^4, ...     b = 4
+//   one-sided   T_j0 = (f(h_j) - f(0)) / h_j            errors h, h^2, ...       b = 2
+//   T_jk = T_j,k-1 + (T_j,k-1 - T_j-1,k-1) / (b^k - 1)
 //
 // Of each component the entry with the least estimated error is taken, estimated by its distance from the two it is
 // made of and by the rounding of f (Ridders, Advances in Engineering Software 4 (1982) 75-76).
 //
 //   const auto f = [&](double h) { return std::optional(value_at(x + h)); };
-//   const LadderDerivative d = difference_ladder(f, f0, {1e-2 * x});
+//   const LadderDerivative d = difference_ladder(f, f0.size(), {1e-2 * x});
 //   d.derivative(0), d.error(0);
 #pragma once
 
 #include <Eigen/Core>
 #include <functional>
+#include <limits>
 #include <optional>
 
 namespace mbsopt {
 
-struct LadderOptions {
-  double step = 1e-2;  // the largest, h0 > 0
-  int rungs = 8;       // >= 1
-  double noise = 0;    // of f, relative to its largest value: 0 takes the rounding of a double
-};
-
 struct LadderDerivative {
   Eigen::VectorXd derivative;
-  Eigen::VectorXd error;     // estimated; infinite where no step could be evaluated
+  // Estimated; infinite where no step could be evaluated, the largest double where only one could.
+  Eigen::VectorXd error;
   Eigen::VectorXd rounding;  // the part of it that comes from the noise of f
   Eigen::VectorXd step;      // of the rung taken
   int evaluations = 0;
+  bool has_estimate(Eigen::Index i) const { return error(i) < std::numeric_limits<double>::max(); }
 };
 
-// f(h): the function at an offset, nullopt where it cannot be evaluated (that rung is skipped). size: of f.
-LadderDerivative difference_ladder(const std::function<std::optional<Eigen::VectorXd>(double h)>& f, Eigen::Index size,
-                                   const LadderOptions& options = {});
+struct LadderOptions {
+  double step = 1e-2;  // the largest, h0 > 0; one-sided also < 0
+  int rungs = 8;       // >= 1
+  double noise = 0;    // of f, relative to its largest value: 0 takes the rounding of a double
+  // Asked after each rung: true where the derivative is good enough. Absent: all rungs.
+  std::function<bool(const LadderDerivative& best)> enough = {};
+};
+
+// f at an offset, nullopt where it cannot be evaluated (that rung is skipped).
+using LadderFunction = std::function<std::optional<Eigen::VectorXd>(double h)>;
+
+// size: of f.
+LadderDerivative difference_ladder(const LadderFunction& f, Eigen::Index size, const LadderOptions& options = {});
+
+// On the side of the step's sign, where the other is out of reach. f0 = f(0). Less exact: the extrapolation amplifies
+// the noise of f up to 8.3 times, prod (2^k + 1)/(2^k - 1), which is counted in.
+LadderDerivative one_sided_ladder(const LadderFunction& f, const Eigen::VectorXd& f0,
+                                  const LadderOptions& options = {});
 
 }  // namespace mbsopt

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include "core/expression/counted.hpp"
 #include "core/integrate/cvodes.hpp"
@@ -175,6 +176,16 @@ const Evaluation& Evaluator::values(const Eigen::VectorXd& rho) {
 
 Evaluation Evaluator::values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const {
   return run(rho, Sweep::none, simulated_.empty() ? nullptr : &steps);
+}
+
+Evaluation Evaluator::gradients_on(const StepSequence& steps, const Eigen::VectorXd& rho, GradientMethod method) const {
+  const bool backward = method == GradientMethod::adjoint;
+  if (!backward && method != GradientMethod::tlm && !simulated_.empty())
+    throw std::invalid_argument(
+        fmt::format("gradients on given steps are by tlm or adjoint, not by {}", to_string(method)));
+  Evaluation e = run(rho, backward ? Sweep::backward : Sweep::forward, simulated_.empty() ? nullptr : &steps);
+  e.method = method;
+  return e;
 }
 
 // The method that is asked for, or what stands for it; `choice` says what that means, where it is not plain.

@@ -77,10 +77,13 @@ class Evaluator {
   // its own. The others have none; none has one where the run fails.
   std::vector<std::optional<double>> true_values(const Eigen::VectorXd& rho) const;
 
-  // Values on given steps, away from the point that is kept.
+  // On given steps, away from the point that is kept: values, and discrete gradients by tlm or adjoint. CVODES, which
+  // cannot take given steps, throws std::invalid_argument.
   Evaluation values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const;
+  Evaluation gradients_on(const StepSequence& steps, const Eigen::VectorXd& rho, GradientMethod method) const;
 
   const Scene& scene() const { return scene_; }
+  const EvaluatorOptions& options() const { return options_; }
   const std::vector<Objective>& objectives() const { return objectives_; }
   const std::vector<int>& variables() const { return variables_; }  // indices of parameters
   Eigen::VectorXd start() const;                                    // the parameters' values in the scene

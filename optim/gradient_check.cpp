@@ -125,7 +125,7 @@ class Check {
         };
         LadderDerivative d = difference_ladder(f, m, {options_.relative_step * size_(k), options_.rungs, kPsiRounding});
         for (Index i = 0; i < m; ++i)
-          if (!has_estimate(d.error(i))) d.derivative(i) = kNaN, d.error(i) = kInfinity;
+          if (!d.has_estimate(i)) d.derivative(i) = kNaN, d.error(i) = kInfinity;
         (frozen ? result_.frozen : result_.free).col(k) = d.derivative;
         (frozen ? frozen_error_ : free_error_).col(k) = d.error;
         if (!frozen) free_step_.col(k) = d.step;
@@ -156,9 +156,6 @@ class Check {
       for (Index i = 0; i < result_.psi.size(); ++i)
         if (std::isfinite(free_error_(i, k))) free_error_(i, k) += e.psi_rho(i, k) + e.psi(i) / free_step_(i, k);
   }
-
-  // One difference alone has nothing to be compared with.
-  static bool has_estimate(double error) { return error < std::numeric_limits<double>::max(); }
 
   void compare() {
     const CheckThresholds& limits = options_.thresholds;
