@@ -25,6 +25,7 @@ Json to_json(const SimulationStatistics& statistics) {
             {"rejected", statistics.rejected},
             {"rhs_evaluations", statistics.rhs_evaluations},
             {"factorisations", statistics.factorisations},
+            {"jacobians", statistics.jacobians},
             {"wall_seconds", statistics.wall_seconds},
             {"max_acceleration_residual", statistics.max_acceleration_residual},
             {"max_position_violation", statistics.max_position_violation},

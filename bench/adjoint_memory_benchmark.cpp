@@ -1,12 +1,7 @@
 // What a budget of memory costs an adjoint run: 1e5 fixed steps of a pendulum within simulation.adjoint_memory_mib.
-//   time_ratio = wall time within the budget / wall time with everything kept     recomputed = steps computed
-//   again/steps kept_mib: the most that was kept
-#include <benchmark/benchmark.h>
-
-#include <algorithm>
-#include <memory>
-
-#include "core/integrate/simulation.hpp"
+//   time_ratio   wall time within the budget / wall time with everything kept
+//   recomputed   steps computed again / steps
+//   kept_mib     the most that was kept
 #include "core/mechanism/mechanism.hpp"
 
 using namespace mbsopt;

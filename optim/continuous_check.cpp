@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/integrate/cvodes.hpp"
+#include "core/integrate/tableaus.hpp"
 #include "optim/evaluator.hpp"
 #include "optim/parameter_values.hpp"
 
@@ -23,9 +24,13 @@ class Check {
   ContinuousCheck run() {
     const IntegratorSettings& given = scene_.simulation.integrator;
     result_.rtol = std::min(options_.rtol, given.rtol);
-    result_.discrete = given.type == "cvodes_bdf"            ? "radau5"
-                       : is_cvodes(given.type) || given.step ? "dopri853"
-                                                             : given.type;
+    const Method* method_of_file = runge_kutta_method(given.type);
+    stiff_ = given.type == "cvodes_bdf" || (method_of_file && method_of_file->implicit());
+    result_.discrete = method_of_file && method_of_file->adaptive ? given.type : stiff_ ? "radau5" : "dopri853";
+    if (!scene_.simulation.events.empty()) {
+      result_.message = "CVODES does not end steps at simulation.events";
+      return std::move(result_);
+    }
     const auto simulated = [](const Objective& o) { return o.needs_simulation(); };
     const auto count = static_cast<std::size_t>(std::count_if(objectives_.begin(), objectives_.end(), simulated));
     if (count == 0) {
@@ -48,7 +53,7 @@ class Check {
   // The type that gets through: Adams' method, and BDF where stiffness is in its way.
   std::optional<MatrixXd> by_cvodes() {
     std::vector<std::string> types{"cvodes_adams", "cvodes_bdf"};
-    if (scene_.simulation.integrator.type == "cvodes_bdf") types.erase(types.begin());
+    if (stiff_) types.erase(types.begin());
     std::string message;
     for (const std::string& type : types) {
       result_.integrator = type;
@@ -144,6 +149,7 @@ class Check {
   const Scene& scene_;
   const std::vector<Objective>& objectives_;
   const ContinuousCheckOptions& options_;
+  bool stiff_ = false;  // CVODES: by BDF
   bool forward_ = true;
   ContinuousCheck result_;
 };

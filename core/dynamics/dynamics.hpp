@@ -4,13 +4,13 @@
 // (frame.hpp).
 //
 //   M z + J'lambda = f(t, q, v),          M = diag(m I, inertia),  f: gravity, springs, -omega x inertia omega
-//   J z + gamma(q, v) = 0,                gamma = Phiddot at z = 0  + 2 xi omega Phidot + omega^2 Phi      [augmented
-//   Lagrangian] lambda = alpha (J z + gamma) [penalty]
+//   gamma(q, v) = Phiddot at z = 0  + 2 xi omega Phidot + omega^2 Phi
+//   augmented Lagrangian:  J z + gamma = 0        penalty:  lambda = alpha (J z + gamma)
 //
 // Derivatives are those of the limit of the augmented-Lagrangian iteration, i.e. of the constrained equations:
 //   tangent:  [M J'; J -c] (z', lambda') = -( (M z + J'lambda - f)', (J z + gamma)' )  with z, lambda held fixed
-//   adjoint:  [M J'; J -c] (eta, mu) = (T'w, 0), then  y_bar += d/dy [ w'a - eta'(M z + J'lambda - f) - mu'(J z +
-//   gamma) ]
+//   adjoint:  [M J'; J -c] (eta, mu) = (T'w, 0), then
+//             y_bar += d/dy [ w'a - eta'(M z + J'lambda - f) - mu'(J z + gamma) ]
 // matrix-free: no n x n Jacobian is formed.
 //
 // One Dynamics per thread: it owns every array a right-hand side touches and allocates nothing after construction.

@@ -2,8 +2,8 @@
 // positive when it resists a positive x.   [N m] or [N]
 //   load       -J'f,  J = x_eta                                   virtual work  -f x_eta
 //   tangent    -(J'f)' at f held fixed - J'f',                    f' = f_x x' + f_xdot xdot' + through the law
-//   pull-back  of lambda'x_eta + mu0 x + mu1 xdot (primitive.hpp) with lambda = -f, mu0 = -x_eta f_x, mu1 = -x_eta
-//   f_xdot
+//   pull-back  of lambda'x_eta + mu0 x + mu1 xdot (primitive.hpp)
+//              with lambda = -f, mu0 = -x_eta f_x, mu1 = -x_eta f_xdot
 // With Angle and the law  k (angle - free_angle) + c rate  or an expression it is the torsional spring-damper, rsda.
 #pragma once
 

@@ -27,6 +27,9 @@ void refuse_what_cannot_be(const SimulationSettings& settings, const RunOptions&
     throw std::invalid_argument(
         fmt::format("integrator '{}' chooses its own steps: give rtol and atol, no step", type));
   }
+  if (!settings.events.empty()) {
+    throw std::invalid_argument(fmt::format("integrator '{}' does not end steps at simulation.events", type));
+  }
   if (options.frozen) {
     throw std::invalid_argument(
         fmt::format("integrator '{}' cannot repeat the steps of another run: its steps and orders are its own", type));

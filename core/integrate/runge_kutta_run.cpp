@@ -137,9 +137,11 @@ RungeKuttaRun::Outcome RungeKuttaRun::attempt(double h, bool adaptive, bool exac
 }
 
 std::string RungeKuttaRun::unsolved(double h) const {
-  return fmt::format("the stages of the implicit step from t = {:.6g} s by {:.3g} s were not found: Newton's method did "
-                     "not converge. Use a smaller step, or look for a law that is not smooth or not finite, or a "
-                     "singular position, near this time", step_.t, h);
+  return fmt::format(
+      "the stages of the implicit step from t = {:.6g} s by {:.3g} s were not found: Newton's method did "
+      "not converge. Use a smaller step, or look for a law that is not smooth or not finite, or a "
+      "singular position, near this time",
+      step_.t, h);
 }
 
 void RungeKuttaRun::set_y_hat() {
@@ -258,11 +260,14 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     if (outcome == Outcome::accepted && !finish_step(wants_dense(step_.t1))) outcome = Outcome::failed;
     if (outcome != Outcome::accepted) {
       if (!adaptive) {
-        stop(outcome == Outcome::unsolved ? SimulationStatus::not_solved : SimulationStatus::not_finite,
-             outcome == Outcome::unsolved ? unsolved(h) : fmt::format(
-                 "the state stopped being finite in the step from t = {:.6g} s by {:.3g} s. The step is too large "
-                 "for this motion: use a smaller step, or an adaptive integrator (no \"step\")",
-                 step_.t, h));
+        stop(
+            outcome == Outcome::unsolved ? SimulationStatus::not_solved : SimulationStatus::not_finite,
+            outcome == Outcome::unsolved
+                ? unsolved(h)
+                : fmt::format(
+                      "the state stopped being finite in the step from t = {:.6g} s by {:.3g} s. The step is too large "
+                      "for this motion: use a smaller step, or an adaptive integrator (no \"step\")",
+                      step_.t, h));
         break;
       }
       ++result.statistics.rejected;
@@ -275,7 +280,8 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
                        "force that is not finite there (a root, logarithm or division outside its range), or a "
                        "body without inertia in a direction that no joint holds?",
                        step_.t)
-             : outcome == Outcome::unsolved ? unsolved(h)
+             : outcome == Outcome::unsolved
+                 ? unsolved(h)
                  : fmt::format("the step fell to {:.3g} s at t = {:.6g} s and its error is still too large. Look for a "
                                "singular position, a spring of zero length or a law that is not smooth near this time; "
                                "looser tolerances or a fixed step may pass it",

@@ -8,9 +8,9 @@
 
 #include "core/dynamics/assembly.hpp"
 #include "core/dynamics/motion_solver.hpp"
+#include "core/integrate/adjoint_sweep.hpp"
 #include "core/integrate/checkpoints.hpp"
 #include "core/integrate/cvodes.hpp"
-#include "core/integrate/adjoint_sweep.hpp"
 #include "core/integrate/runge_kutta_run.hpp"
 #include "core/integrate/tangent_sweep.hpp"
 
