@@ -126,16 +126,20 @@ bool Adjoint::evaluate(double t, N_Vector y, N_Vector lambda) {
 
 int Adjoint::lambda_rate(realtype t, N_Vector y, N_Vector lambda, N_Vector rate, void* self) {
   Adjoint& adjoint = *static_cast<Adjoint*>(self);
-  if (!adjoint.evaluate(t, y, lambda)) return kTryASmallerStep;
-  values(rate) = adjoint.lambda_rate_;
-  return kOk;
+  return adjoint.run_.flow().thrown().keep([&] {
+    if (!adjoint.evaluate(t, y, lambda)) return kTryASmallerStep;
+    values(rate) = adjoint.lambda_rate_;
+    return kOk;
+  });
 }
 
 int Adjoint::mu_rate(realtype t, N_Vector y, N_Vector lambda, N_Vector rate, void* self) {
   Adjoint& adjoint = *static_cast<Adjoint*>(self);
-  if (!adjoint.evaluate(t, y, lambda)) return kTryASmallerStep;
-  values(rate) = adjoint.mu_rate_;
-  return kOk;
+  return adjoint.run_.flow().thrown().keep([&] {
+    if (!adjoint.evaluate(t, y, lambda)) return kTryASmallerStep;
+    values(rate) = adjoint.mu_rate_;
+    return kOk;
+  });
 }
 
 void Adjoint::create_backward() {
@@ -184,6 +188,7 @@ bool Adjoint::go_back_to(double t, double from, const RunOptions& options) {
   for (double next = from; next > t;) {
     next = next - pause > t + tie_ ? next - pause : t;
     const int flag = CVodeB(run_.memory(), next, CV_NORMAL);
+    run_.flow().thrown().throw_on();
     if (flag < 0) {
       failed(flag);
       return false;

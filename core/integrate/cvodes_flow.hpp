@@ -8,6 +8,7 @@
 
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/motion_solver.hpp"
+#include "core/integrate/cvodes_thrown.hpp"
 
 namespace mbsopt::cvodes {
 
@@ -35,6 +36,7 @@ class Flow {
   Dynamics& dynamics() { return dynamics_; }
   const MechanismData& data() const { return mechanism_.data(); }
   long evaluations() const { return evaluations_; }
+  Thrown& thrown() { return thrown_; }  // in any callback of a run on this flow
 
  private:
   const Mechanism mechanism_;
@@ -46,6 +48,7 @@ class Flow {
   Eigen::VectorXd y_, ydot_, y_point_;
   bool solved_ = false, linearised_ = false;
   long evaluations_ = 0;
+  Thrown thrown_;
 };
 
 }  // namespace mbsopt::cvodes

@@ -54,32 +54,36 @@ Sensitivities::Sensitivities(ForwardRun& run, const SimulationSettings& settings
 int Sensitivities::f(int count, realtype t, N_Vector y, N_Vector, N_Vector* s, N_Vector* sdot, void* run, N_Vector,
                      N_Vector) {
   Sensitivities& self = *static_cast<ForwardRun*>(run)->sensitivities();
-  Flow& flow = self.run_.flow();
-  if (!flow.linearise(t, values(y))) return kTryASmallerStep;
-  for (std::size_t c = 0; c < self.blocks_.size(); ++c) {
-    const int first = kLanes * static_cast<int>(c), lanes = std::min(kLanes, count - first);
-    for (int k = 0; k < lanes; ++k) self.direction_.col(k) = values(s[first + k]);
-    flow.dynamics().tangent(self.blocks_[c], self.direction_, self.change_);
-    for (int k = 0; k < lanes; ++k) values(sdot[first + k]) = self.change_.col(k);
-    if (!self.change_.leftCols(lanes).allFinite()) return kTryASmallerStep;
-  }
-  return kOk;
+  return self.run_.flow().thrown().keep([&] {
+    Flow& flow = self.run_.flow();
+    if (!flow.linearise(t, values(y))) return kTryASmallerStep;
+    for (std::size_t c = 0; c < self.blocks_.size(); ++c) {
+      const int first = kLanes * static_cast<int>(c), lanes = std::min(kLanes, count - first);
+      for (int k = 0; k < lanes; ++k) self.direction_.col(k) = values(s[first + k]);
+      flow.dynamics().tangent(self.blocks_[c], self.direction_, self.change_);
+      for (int k = 0; k < lanes; ++k) values(sdot[first + k]) = self.change_.col(k);
+      if (!self.change_.leftCols(lanes).allFinite()) return kTryASmallerStep;
+    }
+    return kOk;
+  });
 }
 
 int Sensitivities::g(int count, realtype t, N_Vector y, N_Vector* s, N_Vector, N_Vector* gsdot, void* run, N_Vector,
                      N_Vector) {
   Sensitivities& self = *static_cast<ForwardRun*>(run)->sensitivities();
-  const StatePoint at = self.run_.flow().point(t, values(y));
-  for (std::size_t q = 0; q < self.run_.running().size(); ++q) {
-    const PointCost& cost = *self.costs_[static_cast<std::size_t>(self.run_.running()[q])].running;
-    self.y_bar_.setZero(), self.rho_bar_.setZero();
-    cost.add_gradient(at, 1, self.y_bar_, self.rho_bar_);
-    for (int k = 0; k < count; ++k) {
-      const double rate = self.y_bar_.dot(values(s[k])) + self.rho_bar_(self.active_[static_cast<std::size_t>(k)]);
-      values(gsdot[k])(static_cast<Eigen::Index>(q)) = self.run_.bounded(rate, q);
+  return self.run_.flow().thrown().keep([&] {
+    const StatePoint at = self.run_.flow().point(t, values(y));
+    for (std::size_t q = 0; q < self.run_.running().size(); ++q) {
+      const PointCost& cost = *self.costs_[static_cast<std::size_t>(self.run_.running()[q])].running;
+      self.y_bar_.setZero(), self.rho_bar_.setZero();
+      cost.add_gradient(at, 1, self.y_bar_, self.rho_bar_);
+      for (int k = 0; k < count; ++k) {
+        const double rate = self.y_bar_.dot(values(s[k])) + self.rho_bar_(self.active_[static_cast<std::size_t>(k)]);
+        values(gsdot[k])(static_cast<Eigen::Index>(q)) = self.run_.bounded(rate, q);
+      }
     }
-  }
-  return kOk;
+    return kOk;
+  });
 }
 
 void Sensitivities::add_cost(const PointCost& cost, const StatePoint& at, Eigen::Index objective) {

@@ -5,7 +5,8 @@
 namespace mbsopt::cvodes {
 
 LinearSolver::LinearSolver(Flow& flow, const Context& context)
-    : matrix_(flow),
+    : flow_(flow),
+      matrix_(flow),
       solver_(SUNLinSolNewEmpty(context)),
       handle_(SUNMatNewEmpty(context)),
       states_(14 * flow.data().n) {
@@ -24,8 +25,10 @@ int LinearSolver::set_up(double t, const Flow::Numbers& y, bool keep_jacobian, b
                          double gamma) {
   constexpr int kRetry = 1;  // CVODES tries a smaller step
   *jacobian_is_new = keep_jacobian ? SUNFALSE : SUNTRUE;
-  if (!keep_jacobian && !matrix_.linearise(t, y)) return kRetry;
-  return matrix_.factor(gamma) ? 0 : kRetry;
+  return flow_.thrown().keep([&] {
+    if (!keep_jacobian && !matrix_.linearise(t, y)) return kRetry;
+    return matrix_.factor(gamma) ? 0 : kRetry;
+  });
 }
 
 int LinearSolver::solve(N_Vector x, N_Vector b) {

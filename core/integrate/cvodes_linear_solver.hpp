@@ -35,6 +35,7 @@ class LinearSolver {
   int set_up(double t, const Flow::Numbers& y, bool keep_jacobian, booleantype* jacobian_is_new, double gamma);
   int solve(N_Vector x, N_Vector b);
 
+  Flow& flow_;
   NewtonMatrix matrix_;
   std::unique_ptr<std::remove_pointer_t<SUNLinearSolver>, FreeSolver> solver_;
   std::unique_ptr<std::remove_pointer_t<SUNMatrix>, FreeMatrix> handle_;

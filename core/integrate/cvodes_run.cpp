@@ -125,19 +125,23 @@ double ForwardRun::bounded(double value, std::size_t quadrature) {
 
 int ForwardRun::f(realtype t, N_Vector y, N_Vector ydot, void* self) {
   Flow& flow = static_cast<ForwardRun*>(self)->flow_;
-  if (!flow.evaluate(t, values(y))) return kTryASmallerStep;
-  values(ydot) = flow.ydot();
-  return kOk;
+  return flow.thrown().keep([&] {
+    if (!flow.evaluate(t, values(y))) return kTryASmallerStep;
+    values(ydot) = flow.ydot();
+    return kOk;
+  });
 }
 
 int ForwardRun::g(realtype t, N_Vector y, N_Vector gdot, void* self) {
   ForwardRun& run = *static_cast<ForwardRun*>(self);
-  const StatePoint at = run.flow_.point(t, values(y));
-  for (std::size_t k = 0; k < run.running_.size(); ++k) {
-    const PointCost& cost = *run.costs_[static_cast<std::size_t>(run.running_[k])].running;
-    values(gdot)(static_cast<Eigen::Index>(k)) = run.bounded(cost.value(at), k);
-  }
-  return kOk;
+  return run.flow_.thrown().keep([&] {
+    const StatePoint at = run.flow_.point(t, values(y));
+    for (std::size_t k = 0; k < run.running_.size(); ++k) {
+      const PointCost& cost = *run.costs_[static_cast<std::size_t>(run.running_[k])].running;
+      values(gdot)(static_cast<Eigen::Index>(k)) = run.bounded(cost.value(at), k);
+    }
+    return kOk;
+  });
 }
 
 void ForwardRun::stop_for(int flag, double t, const char* of_what) {
@@ -243,6 +247,7 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
     }
     double t1 = t;
     const int flag = hooks.advance ? hooks.advance(end, y_, &t1) : CVode(memory(), end, y_, &t1, CV_ONE_STEP);
+    flow_.thrown().throw_on();
     if (flag < 0) {
       stop_for(flag, t, "the accelerations or their derivatives");
       break;

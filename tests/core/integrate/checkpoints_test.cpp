@@ -157,3 +157,19 @@ TEST_CASE("a gradient is the same to the last bit whatever the memory", "[checkp
     if (mib < 0.1) CHECK(bound.statistics.recomputed_steps > bound.statistics.steps);
   }
 }
+
+TEST_CASE("with implicit stages it is the same to the rounding that their equations are solved to", "[checkpoints]") {
+  Scene scene = loaded_four_bar();
+  scene.simulation.end_time = 0.48;
+  scene.simulation.integrator.type = GENERATE(as<std::string>{}, "radau5", "sdirk4");
+  scene.simulation.integrator.rtol = 1e-4;
+  const Mechanism mechanism(scene, nominal(scene));
+  const std::vector<Cost> costs{sampled_cost()};
+  const SimulationResult free = simulate_adjoint(mechanism, scene.simulation, costs);
+  scene.simulation.adjoint_memory_mib = 1e-6;
+  const SimulationResult bound = simulate_adjoint(mechanism, scene.simulation, costs);
+  INFO(scene.simulation.integrator.type << ": " << free.message << bound.message);
+  REQUIRE((free.ok() && bound.ok()));
+  CHECK(bound.statistics.recomputed_steps > 0);
+  CHECK((bound.psi_rho - free.psi_rho).cwiseAbs().maxCoeff() < 1e-10 * free.psi_rho.cwiseAbs().maxCoeff());
+}

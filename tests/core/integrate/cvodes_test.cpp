@@ -418,3 +418,22 @@ TEST_CASE("with_cvodes keeps what a file asks for", "[cvodes]") {
   s.integrator.type = "cvodes_bdf";
   CHECK(with_cvodes(s).integrator.type == "cvodes_bdf");
 }
+
+TEST_CASE("what a user's cost throws comes through CVODES as it was thrown", "[cvodes]") {
+  struct Broken final : PointCost {
+    double value(const StatePoint& at) const override {
+      if (at.t > 0.05) throw std::out_of_range("beyond the table");
+      return 0;
+    }
+    double add_gradient(const StatePoint& at, double, VecOut, VecOut) const override { return value(at); }
+  };
+  Scene scene = loaded_four_bar();
+  scene.simulation.end_time = 0.2;
+  scene.simulation.integrator.type = GENERATE(as<std::string>{}, "cvodes_adams", "cvodes_bdf");
+  const Mechanism mechanism(scene, nominal(scene));
+  std::vector<Cost> costs(1);
+  costs[0].running = std::make_shared<Broken>();
+  CHECK_THROWS_AS(simulate(mechanism, scene.simulation, costs), std::out_of_range);
+  CHECK_THROWS_AS(simulate_tlm(mechanism, scene.simulation, costs), std::out_of_range);
+  CHECK_THROWS_AS(simulate_adjoint(mechanism, scene.simulation, costs), std::out_of_range);
+}
