@@ -105,12 +105,13 @@ Case acceleration_case() {
   return c;
 }
 
+// Entries below 1 % of the largest are compared to the largest: CVODES controls the error of the whole.
 void check_close(const Case& c, const MatrixXd& found, const MatrixXd& expected, double tolerance) {
   for (Eigen::Index o = 0; o < expected.rows(); ++o) {
     const double size = expected.row(o).cwiseAbs().maxCoeff();
     for (Eigen::Index k = 0; k < expected.cols(); ++k) {
       INFO("objective " << o << ", " << c.scene.parameters[static_cast<std::size_t>(k)].name);
-      CHECK(std::abs(found(o, k) - expected(o, k)) <= tolerance * std::max(std::abs(expected(o, k)), 1e-3 * size));
+      CHECK(std::abs(found(o, k) - expected(o, k)) <= tolerance * std::max(std::abs(expected(o, k)), 1e-2 * size));
     }
   }
 }
