@@ -139,17 +139,9 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
 }
 
 bool Dynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
-                         const std::vector<Vec<6>>& z, const Eigen::VectorXd& lambda) {
-  place(t, y, angles, z, lambda);
+                         const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda) {
+  set_motion(t, y, angles, a, lambda);
   return solver_.factor(frames_);
-}
-
-void Dynamics::place(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, const std::vector<Vec<6>>& z,
-                     const Eigen::VectorXd& lambda) {
-  set_state(t, y, angles);
-  z_ = z;
-  lambda_ = lambda;
-  linearise_here();
 }
 
 void Dynamics::linearise_here() {

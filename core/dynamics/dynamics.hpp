@@ -44,15 +44,12 @@ class Dynamics {
   const std::vector<Vec<6>>& loads() const { return loads_; }
   const Eigen::VectorXd& gamma() const { return gamma_; }
 
-  // Prepares derivatives at a state whose solution (z, lambda) is known: frames with accelerations, and the factor of
-  // S.
-  bool linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, const std::vector<Vec<6>>& z,
-                 const Eigen::VectorXd& lambda);
+  // Prepares derivatives at a state whose solution (a = qddot, lambda) is known: frames with accelerations, and the
+  // factor of S.
+  bool linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                 const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
   // The same right after evaluate() at this state, whose factor is still there.
   void linearise_here();
-  // Without the factor: for the equations below.
-  void place(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, const std::vector<Vec<6>>& z,
-             const Eigen::VectorXd& lambda);
 
   // The same equations as an implicit method solves them, together with its stages: 7 n + m rows r = 0 for the unknowns
   // (a = qddot, lambda), body by body and then the constraints (equations.cpp):
@@ -91,6 +88,8 @@ class Dynamics {
 
  private:
   void set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
+  void set_motion(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                  const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
   // What the state's and the parameters' directions do to f - M z - J'lambda (rhs_lanes_) and -(J z + gamma)
   // (gamma_dir_).
   void right_hand_side_tangent(const ParameterBlock& block, const LaneRows& y_dir);

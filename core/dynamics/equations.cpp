@@ -15,8 +15,8 @@ Lanes<1> dot(const Vector4d& a, const Lanes<4>& b) {
 
 }  // namespace
 
-void Dynamics::place_at(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
-                        const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda) {
+void Dynamics::set_motion(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                          const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda) {
   set_state(t, y, angles);
   a_ = a;
   lambda_ = lambda;
@@ -28,6 +28,11 @@ void Dynamics::place_at(double t, const Eigen::VectorXd& y, const Eigen::VectorX
     z_[k - 1].tail<3>() = (2 / p.squaredNorm()) * G_times(p, a.segment<4>(q + 3));
   }
   linearise_here();
+}
+
+void Dynamics::place_at(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                        const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda) {
+  set_motion(t, y, angles, a, lambda);
   solver_.place(frames_);
 }
 

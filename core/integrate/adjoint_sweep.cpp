@@ -1,7 +1,5 @@
 #include "core/integrate/adjoint_sweep.hpp"
 
-#include "core/integrate/tangent_sweep.hpp"
-
 namespace mbsopt {
 
 StoredStep::StoredStep(const Step& step, const Method& rk, std::span<const SampleEvent> events)
@@ -51,11 +49,9 @@ AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings&
     Y_bar_.assign(costs.size(), Eigen::MatrixXd::Zero(states, coupled));
     x_bar_.setZero(coupled * dynamics_.equations(), objectives);
   }
-  z_.resize(static_cast<std::size_t>(d.n));
   for (Eigen::VectorXd* x : {&y_, &w_, &y_bar_}) x->setZero(states);
   theta_.setZero(d.slots());
   rho_.setZero(d.rho.size());
-  multipliers_.setZero(d.m);
   r_bar_.setZero(dynamics_.equations());
 }
 
@@ -135,9 +131,7 @@ bool AdjointSweep::explicit_back(const StoredStep& step, int i) {
   const double t = step.t + rk_.c[i] * step.h;
   const bool in_step = i < rk_.stages && rk_.b[i] != 0;
   y_ = Y_.col(i);
-  set_z(y_, step.a.col(i), z_);
-  multipliers_ = step.lambda.col(i);
-  if (!dynamics_.linearise(t, y_, step.angles0, z_, multipliers_)) return false;
+  if (!dynamics_.linearise(t, y_, step.angles0, step.a.col(i), step.lambda.col(i))) return false;
   for (Eigen::Index o = 0; o < lambda_.cols(); ++o) {
     Eigen::MatrixXd& K_bar = K_bar_[static_cast<std::size_t>(o)];
     w_ = K_bar.col(i);

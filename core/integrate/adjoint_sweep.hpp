@@ -68,8 +68,7 @@ class AdjointSweep {
   std::vector<Eigen::MatrixXd> K_bar_;            // per objective
   std::vector<Eigen::MatrixXd> Y_bar_;            // the same, of coupled stages
   Eigen::MatrixXd lambda_hat_, sample_bar_, x_bar_;
-  std::vector<Vec<6>> z_;
-  Eigen::VectorXd y_, w_, y_bar_, theta_, rho_, multipliers_, r_bar_;
+  Eigen::VectorXd y_, w_, y_bar_, theta_, rho_, r_bar_;
 };
 
 }  // namespace mbsopt

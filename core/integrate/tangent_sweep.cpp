@@ -1,17 +1,6 @@
 #include "core/integrate/tangent_sweep.hpp"
 
-#include "core/body/euler_parameters.hpp"
-
 namespace mbsopt {
-
-void set_z(const Eigen::VectorXd& y, const Eigen::Ref<const Eigen::VectorXd>& a, std::vector<Vec<6>>& z) {
-  for (std::size_t i = 0; i < z.size(); ++i) {
-    const Eigen::Index q = 7 * static_cast<Eigen::Index>(i);
-    const Vector4d p = y.segment<4>(q + 3);
-    z[i].head<3>() = a.segment<3>(q);
-    z[i].tail<3>() = (2 / p.squaredNorm()) * G_times(p, a.segment<4>(q + 3));
-  }
-}
 
 TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
                            const Eigen::MatrixXd& y_initial_rho)
@@ -36,10 +25,8 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
     }
     blocks_.push_back(std::move(b));
   }
-  z_.resize(static_cast<std::size_t>(d.n));
   y_.setZero(states), y_bar_.setZero(states);
   rho_bar_.setZero(d.rho.size());
-  lambda_.setZero(d.m);
   r_.setZero(dynamics_.equations(), kLanes);
   y_rho_.setZero(states, d.rho.size());
 }
@@ -91,9 +78,8 @@ void TangentSweep::take_samples(const Step& step, std::span<const SampleEvent> e
 
 bool TangentSweep::follow_explicit(const Step& step, int i) {
   y_ = step.Y.col(i);
-  set_z(y_, step.K.col(i).tail(mechanism_.states() / 2), z_);
-  lambda_ = step.lambda.col(i);
-  if (!dynamics_.linearise(step.t + rk_.c[i] * step.h, y_, step.angles0, z_, lambda_)) return false;
+  const auto a_i = step.K.col(i).tail(mechanism_.states() / 2);
+  if (!dynamics_.linearise(step.t + rk_.c[i] * step.h, y_, step.angles0, a_i, step.lambda.col(i))) return false;
   for (Block& b : blocks_) {
     b.Y = b.y0;
     for (int j = 0; j < i; ++j) {

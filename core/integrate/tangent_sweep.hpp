@@ -58,13 +58,9 @@ class TangentSweep {
   Projector projector_;
   std::optional<LinearisedStages> implicit_;
   std::vector<Block> blocks_;
-  std::vector<Vec<6>> z_;
-  Eigen::VectorXd y_, y_bar_, rho_bar_, lambda_;
+  Eigen::VectorXd y_, y_bar_, rho_bar_;
   Eigen::MatrixXd y_rho_;
   LaneRows r_;
 };
-
-// z = (rddot, omegadot) of each body from y and a = qddot:  omegadot = 2 G(p) pddot/(p'p).
-void set_z(const Eigen::VectorXd& y, const Eigen::Ref<const Eigen::VectorXd>& a, std::vector<Vec<6>>& z);
 
 }  // namespace mbsopt
