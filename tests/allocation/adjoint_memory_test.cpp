@@ -3,22 +3,11 @@
 
 #include "core/integrate/simulation.hpp"
 #include "tests/allocation/allocation_count.hpp"
+#include "tests/core/integrate/state_costs.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;
 using namespace mbsopt::testing;
-
-namespace {
-
-struct StateNorm final : PointCost {
-  double value(const StatePoint& at) const override { return at.y.squaredNorm(); }
-  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut) const override {
-    y_bar += 2 * scale * at.y;
-    return at.y.squaredNorm();
-  }
-};
-
-}  // namespace
 
 TEST_CASE("1e5 steps go back within 16 MiB, with the gradient of unlimited memory", "[allocation]") {
   Scene scene = pendulum();

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "core/integrate/simulation.hpp"
+#include "tests/core/integrate/state_costs.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;
@@ -66,14 +67,6 @@ struct CountedRun {
     outcome.recomputed = checkpoints.recomputed_steps();
     outcome.peak = checkpoints.peak_bytes();
     return outcome;
-  }
-};
-
-struct StateNorm final : PointCost {
-  double value(const StatePoint& at) const override { return at.y.squaredNorm(); }
-  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut) const override {
-    y_bar += 2 * scale * at.y;
-    return at.y.squaredNorm();
   }
 };
 

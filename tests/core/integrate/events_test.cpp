@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/integrate/simulation.hpp"
+#include "tests/core/integrate/state_costs.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;
@@ -12,14 +13,6 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kEvent = 0.2341;
-
-struct StateNorm final : PointCost {
-  double value(const StatePoint& at) const override { return at.y.squaredNorm(); }
-  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut) const override {
-    y_bar += 2 * scale * at.y;
-    return at.y.squaredNorm();
-  }
-};
 
 // A torque that changes its sign at kEvent, where it has no value, and a sample just there.
 Scene with_jump() {

@@ -5,6 +5,7 @@
 #include "core/integrate/simulation.hpp"
 #include "core/integrate/tableaus.hpp"
 #include "core/scene/type_table.hpp"
+#include "tests/core/integrate/state_costs.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;
@@ -13,22 +14,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-
-// weight * product of two sensors, or the square of one.
-struct SensorProduct final : PointCost {
-  const Mechanism& mechanism;
-  int a, b;
-  SensorProduct(const Mechanism& m, int first, int second) : mechanism(m), a(first), b(second) {}
-  double value(const StatePoint& at) const override {
-    return mechanism.sensor_value(a, at) * mechanism.sensor_value(b, at);
-  }
-  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
-    const double x = mechanism.sensor_value(a, at), y = mechanism.sensor_value(b, at);
-    mechanism.add_sensor_gradient(a, at, scale * y, y_bar, rho_bar);
-    mechanism.add_sensor_gradient(b, at, scale * x, y_bar, rho_bar);
-    return x * y;
-  }
-};
 
 // A cost as a user writes it: g = rho_0 |v|^2 + cos(t) q_1, terminal: rho_1 q'q.
 struct UserRunningCost final : RunningCost {
