@@ -39,6 +39,7 @@ void set_tangent(const BodyState& body, const Lanes<7>& q_dir, const Lanes<7>& v
   set_B(body.pdot, pdot_dir, 2, other);
   out.Addot += other;
   out.p = p_dir, out.pdot = pdot_dir, out.pddot = pddot_dir;
+  out.still = false;
 }
 
 // pddot' = 1/2 G(p')' omegadot - 2 (pdot'pdot') p - (pdot'pdot) p'

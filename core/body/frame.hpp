@@ -40,10 +40,12 @@ struct FrameTangent {
   Lanes<3> r, rdot;
   Lanes<9> A, Adot, Addot;
   Lanes<4> p, pdot, pddot;
+  bool still = false;  // all of it is zero: products with it may be left out
   void set_zero();
   static FrameTangent zero() {
     FrameTangent t;
     t.set_zero();
+    t.still = true;
     return t;
   }
 };

@@ -19,8 +19,12 @@ struct VectorJet {
 };
 struct VectorTangent {
   Lanes<3> x, xd, xdd;
-  VectorTangent(const Frame& f, const FrameTangent& t, const Vector3d& s, const Lanes<3>* ds)
-      : x(times(t.A, s)), xd(times(t.Adot, s)), xdd(times(t.Addot, s)) {
+  VectorTangent(const Frame& f, const FrameTangent& t, const Vector3d& s, const Lanes<3>* ds) {
+    if (t.still) {
+      x.setZero(), xd.setZero(), xdd.setZero();
+    } else {
+      x = times(t.A, s), xd = times(t.Adot, s), xdd = times(t.Addot, s);
+    }
     if (ds) x += f.A * *ds, xd += f.Adot * *ds, xdd += f.Addot * *ds;
   }
 };
@@ -74,7 +78,7 @@ inline void add_point_bar(const Frame& f, const Vector3d& s, const VectorJet& ba
 // Tangent of the moment s x A'F (body axes) of a force F at s.
 inline Lanes<3> moment_tangent(const Frame& f, const FrameTangent& t, const Vector3d& s, const Lanes<3>* ds,
                                const Vector3d& F, const Lanes<3>& dF) {
-  Lanes<3> m = cross(s, transposed_times(t.A, F) + f.A.transpose() * dF);
+  Lanes<3> m = t.still ? cross(s, f.A.transpose() * dF) : cross(s, transposed_times(t.A, F) + f.A.transpose() * dF);
   if (ds) m -= cross(f.A.transpose() * F, *ds);
   return m;
 }

@@ -157,17 +157,18 @@ void ForceTerms::add_blocks(const At& at, const std::vector<UnitTangents>& units
 }
 
 template <class L>
-bool ForceTerms::has_fields(const L& law, std::initializer_list<int> slots) {
+bool ForceTerms::moves(const ParameterBlock& block, const L& law, std::initializer_list<int> slots) {
   if constexpr (requires { law.program; }) {
     if (law.program) return true;
   }
-  return law.slot >= 0 || std::max(slots) >= 0;
+  return block.moves(law.slot, L::kFields) ||
+         std::any_of(slots.begin(), slots.end(), [&](int slot) { return block.moves(slot, 3); });
 }
 
 void ForceTerms::add_field_tangent(const At& at, const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs) {
   static const FrameTangent still = FrameTangent::zero();
   for (const TsdaForce& f : data_.tsda) {
-    if (!has_fields(f.law, {f.slot1, f.slot2})) continue;
+    if (!moves(block, f.law, {f.slot1, f.slot2})) continue;
     const std::size_t i = index(f.body1), j = index(f.body2);
     const TsdaForce::Span x = f.span(at.frames[i], at.frames[j]);
     const Law::Value value = f.law.derivatives(at.t, data_.rho, x.l, x.ldot, law_);
@@ -179,7 +180,7 @@ void ForceTerms::add_field_tangent(const At& at, const ParameterBlock& block, st
               block.field<3>(f.slot2, s2), load_dirs[i], load_dirs[j]);
   }
   for_each_joint_effort([&](const auto& f) {
-    if (!has_fields(f.law, {f.joint.slot1, f.joint.slot2, f.joint.slot3})) return;
+    if (!moves(block, f.law, {f.joint.slot1, f.joint.slot2, f.joint.slot3})) return;
     constexpr int kFields = decltype(f.law)::kFields;
     const std::size_t i = index(f.joint.body1), j = index(f.joint.body2);
     const Frame &f1 = at.frames[i], &f2 = at.frames[j];

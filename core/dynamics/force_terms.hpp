@@ -47,9 +47,9 @@ class ForceTerms {
   template <class Tangent>
   static void add_pair(int body1, int body2, const std::vector<UnitTangents>& units, MotionBlocks& out,
                        Tangent&& tangent);
-  // Whether its law or, by `slots`, its geometry has derivatives.
+  // Whether its law or, by `slots`, a vector of its geometry changes in the block.
   template <class Law>
-  static bool has_fields(const Law& law, std::initializer_list<int> slots);
+  static bool moves(const ParameterBlock& block, const Law& law, std::initializer_list<int> slots);
 
   void set_inputs(const AppliedForce& force, const At& at);
   Vector3d components(const AppliedForce& force, const At& at);
