@@ -25,6 +25,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 // psi carries the rounding of all steps: some units in the last place of the largest numbers it is made of.
 constexpr double kPsiRounding = 100 * kEpsilon;
+constexpr int kJumpRungs = 3;  // the smallest: further off, frozen steps have errors of their own
 
 class Check {
  public:
@@ -117,7 +118,7 @@ class Check {
     jump_.setZero(m, P);
     for (Index k = 0; k < P; ++k) {
       std::vector<std::pair<double, VectorXd>> on_frozen_steps;
-      const double smallest = options_.relative_step * size_(k) * std::pow(0.5, options_.rungs - 1);
+      const double near = options_.relative_step * size_(k) * std::pow(0.5, options_.rungs - kJumpRungs);
       for (const bool frozen : {true, false}) {
         if (frozen ? !result_.discrete : !options_.free_steps) continue;
         const Stopwatch stopwatch;
@@ -125,10 +126,7 @@ class Check {
           VectorXd rho = rho_;
           rho(k) += h;
           const std::optional<VectorXd> psi = psi_at(rho, frozen);
-          if (!psi || std::abs(h) > 4.5 * smallest) return psi;  // further off, frozen steps have errors of their own
-          if (frozen) on_frozen_steps.emplace_back(h, *psi);
-          for (const auto& [at, values] : on_frozen_steps)
-            if (at == h) jump_.col(k) = jump_.col(k).cwiseMax((*psi - values).cwiseAbs());
+          if (psi && std::abs(h) < 1.5 * near) note_jump(k, h, frozen, *psi, on_frozen_steps);
           return psi;
         };
         LadderDerivative d = difference_ladder(f, m, {options_.relative_step * size_(k), options_.rungs, kPsiRounding});
@@ -142,6 +140,18 @@ class Check {
       if (options_.progress) options_.progress(static_cast<int>(k) + 1, static_cast<int>(P));
     }
     set_ratio(result_.frozen_cost), set_ratio(result_.free_cost);
+  }
+
+  // Both ladders take the same steps h, halved exactly.
+  void note_jump(Index k, double h, bool frozen, const VectorXd& psi,
+                 std::vector<std::pair<double, VectorXd>>& on_frozen_steps) {
+    if (frozen) {
+      on_frozen_steps.emplace_back(h, psi);
+      return;
+    }
+    for (const auto& [at, values] : on_frozen_steps)
+      if (at == h && psi.allFinite() && values.allFinite())
+        jump_.col(k) = jump_.col(k).cwiseMax((psi - values).cwiseAbs());
   }
 
   // Free differences differ from the derivatives of the numbers on frozen steps by the derivative of the integration

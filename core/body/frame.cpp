@@ -78,6 +78,7 @@ void FrameTangent::set_zero() {
   r.setZero(), rdot.setZero();
   A.setZero(), Adot.setZero(), Addot.setZero();
   p.setZero(), pdot.setZero(), pddot.setZero();
+  still = true;
 }
 
 Vector3d BodyState::omega() const { return omega_B(p, pdot); }

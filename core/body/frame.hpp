@@ -40,15 +40,15 @@ struct FrameTangent {
   Lanes<3> r, rdot;
   Lanes<9> A, Adot, Addot;
   Lanes<4> p, pdot, pddot;
-  bool still = false;  // all of it is zero: products with it may be left out
+  bool still = false;  // all of it is zero (set_zero): products with it may be left out
   void set_zero();
   static FrameTangent zero() {
     FrameTangent t;
     t.set_zero();
-    t.still = true;
     return t;
   }
 };
+inline const FrameTangent kStill = FrameTangent::zero();
 
 // A body's own numbers at a state: q = (r, p), v = (rdot, pdot), z = (rddot, omegadot in body axes).
 struct BodyState {

@@ -29,9 +29,8 @@ struct VectorTangent {
   }
 };
 
-// Derivatives of x, xd, xdd in p and pdot with omegadot held fixed. Since  Addot = A(p) (skew(omegadot) - 2
-// (pdot'pdot))
-// + 2 A(pdot), all of them are values of N:  xd_pdot = x_p.
+// Derivatives of x, xd, xdd in p and pdot with omegadot held fixed; xd_pdot = x_p. All are values of N, since
+//   Addot = A(p) (skew(omegadot) - 2 (pdot'pdot)) + 2 A(pdot)
 struct VectorBlocks {
   Mat<3, 4> x_p, xd_p, xdd_p, xdd_pdot;
   VectorBlocks(const BodyState& b, const Frame& f, const Vector3d& s)

@@ -9,6 +9,7 @@ namespace mbsopt {
 
 struct Coordinate {
   static constexpr int kRows = 1;
+  static constexpr Displacements kDisplacements = Displacements::any;
   int index = 0;  // 0..2: x y z, 3..6: e0..e3
 
   void phi(const Frame&, const Frame& f, Vec<1>& out) const;

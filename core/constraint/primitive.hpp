@@ -17,6 +17,9 @@
 
 namespace mbsopt {
 
+// How the rows of J1 and J2 see displacements of their bodies: not at all, row r only along axis r, or anyhow.
+enum class Displacements { none, own_axis, any };
+
 template <int Rows>
 struct Multipliers {
   Vec<Rows> lambda, mu0, mu1, mu2;
@@ -53,6 +56,7 @@ template <class P>
 concept IsPrimitive = requires(const P& primitive, const Frame& f, Vec<P::kRows>& phi, Mat<P::kRows, 6>& J,
                                const Multipliers<P::kRows>& z, FrameBar& bar, GeometryBar& s_bar, const FrameTangent& t,
                                const GeometryTangent& s, PrimitiveTangent<P::kRows>& out) {
+  { P::kDisplacements } -> std::convertible_to<Displacements>;
   primitive.phi(f, f, phi);
   primitive.phi_dot(f, f, phi);
   primitive.phi_ddot(f, f, phi);

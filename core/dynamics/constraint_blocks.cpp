@@ -15,8 +15,9 @@ void add_moment(int pair, double factor, const Mat<3, 4>& moment_p, MotionBlocks
 
 }  // namespace
 
-ConstraintBlocks::ConstraintBlocks(const MechanismData& data, const MotionBlocks& blocks, double phi_dot, double phi)
-    : data_(&data), phi_dot_(phi_dot), phi_(phi) {
+ConstraintBlocks::ConstraintBlocks(const MechanismData& data, const MotionBlocks& blocks, double two_xi_omega,
+                                   double omega2)
+    : data_(&data), two_xi_omega_(two_xi_omega), omega2_(omega2), stabilised_(two_xi_omega != 0 || omega2 != 0) {
   for (const Constraint& c : data.constraints) {
     Places p;
     const int body[2] = {c.body1, c.body2};
@@ -28,13 +29,18 @@ ConstraintBlocks::ConstraintBlocks(const MechanismData& data, const MotionBlocks
       for (int r = 0; r < c.rows(); ++r) p.row[i][at(r)] = blocks.row(c.row + r, body[i] - 1);
     }
     places_.push_back(p);
-    if (!short_cut(c)) needs_units_ = true;
   }
 }
 
 bool ConstraintBlocks::short_cut(const Constraint& c) const {
-  return phi_ == 0 && phi_dot_ == 0 &&
+  return !stabilised_ &&
          std::visit([](const auto& p) { return HasTurningBlocks<std::decay_t<decltype(p)>>; }, c.primitive);
+}
+
+void ConstraintBlocks::mark_units(std::vector<bool>& bodies) const {
+  for (const Constraint& c : data_->constraints) {
+    if (!short_cut(c)) bodies[at(c.body1)] = bodies[at(c.body2)] = true;
+  }
 }
 
 template <class P>
@@ -43,18 +49,17 @@ void ConstraintBlocks::add_by_units(const Constraint& c, const P& p, const Place
                                     const Eigen::VectorXd& lambda, MotionBlocks& out) const {
   constexpr int m = P::kRows;
   const int body[2] = {c.body1, c.body2};
-  static const FrameTangent still = FrameTangent::zero();
   const Vec<m> nu = lambda.segment<m>(c.row);
   for (int j = 0; j < 2; ++j) {
     if (body[j] == 0) continue;
     const UnitTangents& unit = units[at(body[j])];
     auto add = [&](MotionBlocks::Part part, const FrameTangent& t) {
       PrimitiveTangent<m> x;
-      p.tangent(frames[at(c.body1)], frames[at(c.body2)], j == 0 ? t : still, j == 1 ? t : still, {}, nu, x);
+      p.tangent(frames[at(c.body1)], frames[at(c.body2)], j == 0 ? t : kStill, j == 1 ? t : kStill, {}, nu, x);
       if (place.pair[0][j] >= 0) out.b[at(place.pair[0][j])].add(part, -c.factor * x.load1);
       if (place.pair[1][j] >= 0) out.b[at(place.pair[1][j])].add(part, -c.factor * x.load2);
       for (int r = 0; r < m; ++r) {
-        const Lanes<1> change = x.phi_ddot.row(r) + phi_dot_ * x.phi_dot.row(r) + phi_ * x.phi.row(r);
+        const Lanes<1> change = x.phi_ddot.row(r) + two_xi_omega_ * x.phi_dot.row(r) + omega2_ * x.phi.row(r);
         out.c[at(place.row[j][at(r)])].add(part, -c.factor * change);
       }
     };
@@ -68,7 +73,6 @@ void ConstraintBlocks::add_by_units(const Constraint& c, const P& p, const Place
 void ConstraintBlocks::add(const std::vector<BodyState>& bodies, const std::vector<Frame>& frames,
                            const std::vector<UnitTangents>& units, const Eigen::VectorXd& lambda,
                            MotionBlocks& out) const {
-  const bool stabilised = phi_ != 0 || phi_dot_ != 0;
   for (std::size_t k = 0; k < places_.size(); ++k) {
     const Constraint& c = data_->constraints[k];
     const Places& place = places_[k];
@@ -76,7 +80,7 @@ void ConstraintBlocks::add(const std::vector<BodyState>& bodies, const std::vect
         [&]<class P>(const P& p) {
           constexpr int m = P::kRows;
           if constexpr (HasTurningBlocks<P>) {
-            if (!stabilised) {
+            if (!stabilised_) {
               const std::size_t i = at(c.body1), j = at(c.body2);
               TurningBlocks<m> x;
               p.turning_blocks(bodies[i], frames[i], bodies[j], frames[j], lambda.segment<m>(c.row), x);

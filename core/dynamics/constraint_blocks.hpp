@@ -10,11 +10,10 @@ namespace mbsopt {
 
 class ConstraintBlocks {
  public:
-  // phi_dot, phi: 2 xi omega and omega^2.
-  ConstraintBlocks(const MechanismData& data, const MotionBlocks& blocks, double phi_dot, double phi);
+  ConstraintBlocks(const MechanismData& data, const MotionBlocks& blocks, double two_xi_omega, double omega2);
 
-  // Whether add() reads the tangents of unit directions; some primitives know short cuts.
-  bool needs_units() const { return needs_units_; }
+  // Marks the bodies whose unit tangents add() reads; some primitives know short cuts.
+  void mark_units(std::vector<bool>& bodies) const;
   // bodies, frames, units: the ground first.
   void add(const std::vector<BodyState>& bodies, const std::vector<Frame>& frames,
            const std::vector<UnitTangents>& units, const Eigen::VectorXd& lambda, MotionBlocks& out) const;
@@ -26,14 +25,14 @@ class ConstraintBlocks {
     std::array<int, 3> row[2] = {{-1, -1, -1}, {-1, -1, -1}};
   };
   template <class P>
-  void add_by_units(const Constraint& c, const P& p, const Places& at, const std::vector<Frame>& frames,
+  void add_by_units(const Constraint& c, const P& p, const Places& place, const std::vector<Frame>& frames,
                     const std::vector<UnitTangents>& units, const Eigen::VectorXd& lambda, MotionBlocks& out) const;
   bool short_cut(const Constraint& c) const;
 
   const MechanismData* data_;
-  double phi_dot_, phi_;
+  double two_xi_omega_, omega2_;
+  bool stabilised_;
   std::vector<Places> places_;  // per constraint
-  bool needs_units_ = false;
 };
 
 }  // namespace mbsopt

@@ -50,20 +50,18 @@ class ConstraintRows {
   template <class X>
   using RowOf = Eigen::Matrix<double, 1, X::ColsAtCompileTime>;
 
-  // Which of a row's first three entries, those of a body's displacement, are not zero: one, none or all.
-  enum class Displaces : char { x, y, z, none, all };
+  // Which of a row's three entries for displacements may not be zero; those for turning follow.
+  struct Columns {
+    int first = 0, last = 3;
+  };
+  const Columns& columns(int block) const { return columns_[static_cast<std::size_t>(block)]; }
 
   // Written out, on copies: the compiler unrolls these and keeps them in registers, and does neither with Eigen's
   // products with a row of a dynamic matrix.
   template <class X>
   void add_row_times(const Rows& J, int block, const X& x, RowOf<X>& sum) const {
     const double* row = J.row(block).data();
-    const Displaces d = displaces_[static_cast<std::size_t>(block)];
-    if (d < Displaces::none) {
-      sum += row[static_cast<int>(d)] * x.row(static_cast<int>(d));
-    } else if (d == Displaces::all) {
-      sum += row[0] * x.row(0) + row[1] * x.row(1) + row[2] * x.row(2);
-    }
+    for (int i = columns(block).first; i < columns(block).last; ++i) sum += row[i] * x.row(i);
     sum += row[3] * x.row(3) + row[4] * x.row(4) + row[5] * x.row(5);
   }
   template <class X, class Y>
@@ -72,17 +70,11 @@ class ConstraintRows {
     for (int r = 0; r < g.rows; ++r) {
       const double* row = J.row(g.block + r).data();
       const RowOf<X> l = lambda.row(g.row + r);
-      const Displaces d = displaces_[static_cast<std::size_t>(g.block + r)];
-      if (d < Displaces::none) {
-        sum.row(static_cast<int>(d)) -= row[static_cast<int>(d)] * l;
-      } else if (d == Displaces::all) {
-        for (int i = 0; i < 3; ++i) sum.row(i) -= row[i] * l;
-      }
+      for (int i = columns(g.block + r).first; i < columns(g.block + r).last; ++i) sum.row(i) -= row[i] * l;
       for (int i = 3; i < 6; ++i) sum.row(i) -= row[i] * l;
     }
     x = sum;
   }
-  void add_lower_square(double alpha, const Rows& J, int block, Mat<6, 6>& S) const;
   void add_cross(double alpha, int block, Mat<6, 6>& S12) const;
   static std::size_t at(int body) { return static_cast<std::size_t>(body - 1); }
   void add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky& S);
@@ -96,8 +88,8 @@ class ConstraintRows {
   };
 
   const MechanismData* data_;
-  std::vector<Displaces> displaces_;  // per block row
-  std::vector<std::size_t> handle_;   // per group: its off-diagonal block
+  std::vector<Columns> columns_;     // per block row
+  std::vector<std::size_t> handle_;  // per group: its off-diagonal block
   std::vector<SharedRow> shared_;
   std::vector<std::pair<int, int>> edges_;
 };

@@ -143,14 +143,13 @@ void evaluate_field_tangents(const MechanismData& data, const std::vector<Frame>
                              const Eigen::VectorXd& angles, const ParameterBlock& block, const Eigen::VectorXd& lambda,
                              ConstraintTangents& out, std::vector<Lanes<6>>& loads) {
   for (LaneRows* x : {&out.phi, &out.phi_dot, &out.phi_ddot}) x->setZero();
-  static const FrameTangent still = FrameTangent::zero();
   for (const Constraint& c : data.constraints) {
     if (std::max({c.slot1, c.slot2, c.slot3, c.slot_factor}) < 0) continue;
     if (!(block.moves(c.slot1, 3) || block.moves(c.slot2, 3) || block.moves(c.slot3, 3) ||
           block.moves(c.slot_factor, 1))) {
       continue;
     }
-    add_tangent(c, frames, laws, angles, still, still, block, lambda, out, loads);
+    add_tangent(c, frames, laws, angles, kStill, kStill, block, lambda, out, loads);
   }
   laws.subtract_tangents(block, out.phi, out.phi_dot, out.phi_ddot);
 }

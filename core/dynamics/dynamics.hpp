@@ -11,9 +11,10 @@
 //   tangent:  [M J'; J -c] (z', lambda') = -( (M z + J'lambda - f)', (J z + gamma)' )  with z, lambda held fixed
 //   adjoint:  [M J'; J -c] (eta, mu) = (T'w, 0), then
 //             y_bar += d/dy [ w'a - eta'(M z + J'lambda - f) - mu'(J z + gamma) ]
-// matrix-free: no n x n Jacobian is formed.
+// The adjoint is matrix-free; tangents multiply with blocks that are evaluated once per state (motion_blocks.hpp).
 //
-// One Dynamics per thread: it owns every array a right-hand side touches and allocates nothing after construction.
+// One Dynamics per thread: it owns every array a right-hand side touches. It allocates nothing after construction, but
+// in the first call of blocks() or tangent().
 #pragma once
 
 #include <optional>
@@ -132,7 +133,8 @@ class Dynamics {
   struct Linearisation {
     MotionBlocks blocks;
     ConstraintBlocks constraints;
-    std::vector<UnitTangents> units;  // where something reads them
+    std::vector<UnitTangents> units;
+    std::vector<std::size_t> bodies_of_units;  // where something reads them
     bool current = false;
   };
   std::optional<Linearisation> linear_;

@@ -110,9 +110,7 @@ Mat<7, 7> Dynamics::mass_block(int body) const {
   const Vector4d& p = bodies_[static_cast<std::size_t>(body)].p;
   Mat<7, 7> X = Mat<7, 7>::Zero();
   X.diagonal().head<3>().setConstant(b.mass);
-  Mat<3, 4> T;  // 2 G(p)/(p'p)
-  for (int c = 0; c < 4; ++c) T.col(c) = (2 / p.squaredNorm()) * G_times(p, Vector4d::Unit(c));
-  X.block<3, 4>(3, 3) = b.J * T;
+  X.block<3, 4>(3, 3) = (2 / p.squaredNorm()) * (b.J * G(p));
   X.block<1, 4>(6, 3) = p.transpose();
   return X;
 }

@@ -76,20 +76,23 @@ void ForceTerms::add_loads(const At& at, std::vector<Vec<6>>& loads) {
   }
 }
 
-bool ForceTerms::any() const {
-  return !(data_.tsda.empty() && data_.rsda.empty() && data_.turning_frictions.empty() &&
-           data_.sliding_frictions.empty() && data_.bushings.empty() && data_.applied.empty());
+void ForceTerms::mark_units(std::vector<bool>& bodies) const {
+  const auto mark = [&](int body1, int body2) { bodies[index(body1)] = bodies[index(body2)] = true; };
+  for (const TsdaForce& f : data_.tsda) mark(f.body1, f.body2);
+  for_each_joint_effort([&](const auto& f) { mark(f.joint.body1, f.joint.body2); });
+  for (const Bushing& f : data_.bushings) mark(f.body1, f.body2);
+  for (const AppliedForce& f : data_.applied) mark(f.body, f.body);
 }
 
 template <class Tangent>
 void ForceTerms::add_pair(int body1, int body2, const std::vector<UnitTangents>& units, MotionBlocks& out,
                           Tangent&& tangent) {
-  static const FrameTangent still = FrameTangent::zero();
-  for (const int read : {body1, body2}) {
+  for (const bool first : {true, false}) {
+    const int read = first ? body1 : body2;
     if (read == 0) continue;
     auto add = [&](MotionBlocks::Part part, const FrameTangent& t) {
       Lanes<6> load1 = Lanes<6>::Zero(), load2 = Lanes<6>::Zero();
-      tangent(read == body1 ? t : still, read == body2 ? t : still, load1, load2);
+      tangent(first ? t : kStill, first ? kStill : t, load1, load2);
       if (body1 > 0) out.b[index(out.pair(body1 - 1, read - 1))].add(part, load1);
       if (body2 > 0) out.b[index(out.pair(body2 - 1, read - 1))].add(part, load2);
     };
@@ -129,7 +132,6 @@ void ForceTerms::add_blocks(const At& at, const std::vector<UnitTangents>& units
              });
   }
   const int t = static_cast<int>(data_.rho.size());
-  static const FrameTangent still = FrameTangent::zero();
   for (const AppliedForce& f : data_.applied) {
     const Vector3d c = components_with_gradients(f, at);
     const Frame& frame = at.frames[index(f.body)];
@@ -143,7 +145,7 @@ void ForceTerms::add_blocks(const At& at, const std::vector<UnitTangents>& units
       Lanes<3> dc = Lanes<3>::Zero();
       for (int i = 0; i < 3; ++i) dc(i, 0) = gradients_[index(i)][index(t + 1 + s)];
       load.setZero();
-      f.tangent(c, dc, frame, still, nullptr, load);
+      f.tangent(c, dc, frame, kStill, nullptr, load);
       for (int j = 0; j < data_.n; ++j) {
         const Vec<7> q = y_bar_.segment<7>(7 * j), v = y_bar_.segment<7>(7 * (data_.n + j));
         if (q.isZero(0) && v.isZero(0)) continue;
@@ -166,7 +168,6 @@ bool ForceTerms::moves(const ParameterBlock& block, const L& law, std::initializ
 }
 
 void ForceTerms::add_field_tangent(const At& at, const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs) {
-  static const FrameTangent still = FrameTangent::zero();
   for (const TsdaForce& f : data_.tsda) {
     if (!moves(block, f.law, {f.slot1, f.slot2})) continue;
     const std::size_t i = index(f.body1), j = index(f.body2);
@@ -176,7 +177,7 @@ void ForceTerms::add_field_tangent(const At& at, const ParameterBlock& block, st
     Lanes<3> s1, s2;
     const Lanes<1> df = f.law.field_tangent(
         x.l, x.ldot, block.field<4>(f.law.slot, fields), [&](int p) { return block.direction(p); }, law_);
-    f.tangent(x, value, df, at.frames[i], at.frames[j], still, still, block.field<3>(f.slot1, s1),
+    f.tangent(x, value, df, at.frames[i], at.frames[j], kStill, kStill, block.field<3>(f.slot1, s1),
               block.field<3>(f.slot2, s2), load_dirs[i], load_dirs[j]);
   }
   for_each_joint_effort([&](const auto& f) {
@@ -192,20 +193,24 @@ void ForceTerms::add_field_tangent(const At& at, const ParameterBlock& block, st
         x, xdot, block.field<kFields>(f.law.slot, fields), [&](int p) { return block.direction(p); }, law_);
     const GeometryTangent ds{block.field<3>(f.joint.slot1, s1), block.field<3>(f.joint.slot2, s2),
                              block.field<3>(f.joint.slot3, s3)};
-    f.tangent(value, df, f1, f2, still, still, ds, load_dirs[i], load_dirs[j]);
+    f.tangent(value, df, f1, f2, kStill, kStill, ds, load_dirs[i], load_dirs[j]);
   });
   for (const Bushing& f : data_.bushings) {
-    if (std::max({f.slot1, f.slot2, f.slot_R0, f.slot_law}) < 0) continue;
+    if (!(block.moves(f.slot1, 3) || block.moves(f.slot2, 3) || block.moves(f.slot_R0, 9) ||
+          block.moves(f.slot_law, 12))) {
+      continue;
+    }
     const std::size_t i = index(f.body1), j = index(f.body2);
     Lanes<3> s1, s2;
     Lanes<9> R0;
     Lanes<12> law;
     const Bushing::FieldLanes fields{block.field<3>(f.slot1, s1), block.field<3>(f.slot2, s2),
                                      block.field<9>(f.slot_R0, R0), block.field<12>(f.slot_law, law)};
-    f.tangent(at.frames[i], at.frames[j], still, still, fields, load_dirs[i], load_dirs[j]);
+    f.tangent(at.frames[i], at.frames[j], kStill, kStill, fields, load_dirs[i], load_dirs[j]);
   }
   const int t = static_cast<int>(data_.rho.size());
   for (const AppliedForce& f : data_.applied) {
+    if (f.parameters.empty() && f.sensors.empty() && !block.moves(f.slot, 3)) continue;
     const Vector3d c = components_with_gradients(f, at);
     Lanes<3> dc = Lanes<3>::Zero();
     auto add_input = [&](int input, const Lanes<1>& direction) {
@@ -222,7 +227,7 @@ void ForceTerms::add_field_tangent(const At& at, const ParameterBlock& block, st
       add_input(t + 1 + s, direction);
     }
     Lanes<3> ds;
-    f.tangent(c, dc, at.frames[index(f.body)], still, block.field<3>(f.slot, ds), load_dirs[index(f.body)]);
+    f.tangent(c, dc, at.frames[index(f.body)], kStill, block.field<3>(f.slot, ds), load_dirs[index(f.body)]);
   }
 }
 

@@ -29,7 +29,7 @@ class ForceTerms {
   void add_loads(const At& at, std::vector<Vec<6>>& loads);
   // Their derivatives in the state as blocks, units: unit tangents of all bodies, the ground first; and in the
   // directions of fields and parameters, bodies at rest.
-  bool any() const;
+  void mark_units(std::vector<bool>& bodies) const;  // that add_blocks() reads
   void add_blocks(const At& at, const std::vector<UnitTangents>& units, MotionBlocks& out);
   void add_field_tangent(const At& at, const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs);
   // Gradient of the virtual work sum load'eta, eta in the frames and held fixed.
@@ -48,8 +48,8 @@ class ForceTerms {
   static void add_pair(int body1, int body2, const std::vector<UnitTangents>& units, MotionBlocks& out,
                        Tangent&& tangent);
   // Whether its law or, by `slots`, a vector of its geometry changes in the block.
-  template <class Law>
-  static bool moves(const ParameterBlock& block, const Law& law, std::initializer_list<int> slots);
+  template <class L>
+  static bool moves(const ParameterBlock& block, const L& law, std::initializer_list<int> slots);
 
   void set_inputs(const AppliedForce& force, const At& at);
   Vector3d components(const AppliedForce& force, const At& at);

@@ -23,17 +23,24 @@ const MotionBlocks& Dynamics::blocks() {
   if (!linear_) {
     MotionBlocks empty(data_);
     ConstraintBlocks constraints(data_, empty, two_xi_omega, omega2);
-    const bool units = constraints.needs_units() || forces_.any();
-    linear_.emplace(Linearisation{std::move(empty), std::move(constraints),
-                                  std::vector<UnitTangents>(units ? frames_.size() : 0), false});
+    std::vector<bool> reads_units(frames_.size(), false);
+    constraints.mark_units(reads_units);
+    forces_.mark_units(reads_units);
+    std::vector<std::size_t> bodies;
+    for (std::size_t i = 1; i < reads_units.size(); ++i) {
+      if (reads_units[i]) bodies.push_back(i);
+    }
+    std::vector<UnitTangents> units(bodies.empty() ? 0 : bodies.back() + 1);
+    linear_.emplace(
+        Linearisation{std::move(empty), std::move(constraints), std::move(units), std::move(bodies), false});
   }
   Linearisation& x = *linear_;
   if (x.current) return x.blocks;
   x.current = true;
   x.blocks.set_zero();
-  for (std::size_t i = 1; i < x.units.size(); ++i) set_unit_tangents(bodies_[i], x.units[i]);
+  for (const std::size_t i : x.bodies_of_units) set_unit_tangents(bodies_[i], x.units[i]);
   x.constraints.add(bodies_, frames_, x.units, lambda_, x.blocks);
-  if (forces_.any()) forces_.add_blocks(here(), x.units, x.blocks);
+  forces_.add_blocks(here(), x.units, x.blocks);
   if (!data_.user_forces.empty()) add_user_blocks(x.blocks);
   for (int i = 0; i < data_.n; ++i) {
     // -(omega x J omega)' = (skew(J omega) - skew(omega) J) omega',   omega' = 2 (G(p) pdot' - G(pdot) p')

@@ -1,5 +1,7 @@
 #include "core/dynamics/motion_blocks.hpp"
 
+#include <cassert>
+
 #include "core/mechanism/coupling.hpp"
 
 namespace mbsopt {
@@ -54,6 +56,7 @@ int MotionBlocks::find(const std::vector<Place>& places, const std::vector<int>&
       high = middle;
     }
   }
+  assert(low < begin[at(row) + 1] && places[at(low)].body == body);  // what is not coupled (coupling.hpp) has no block
   return low;
 }
 

@@ -76,7 +76,6 @@ class Projector {
   ConstraintRows rows_;  // J at the projected q
   RowLaws laws_;
   Eigen::VectorXd angles_;
-  int refinements_ = 2;  // of derivative systems, from the size of the correction
   const ProjectionSolution* solution_ = nullptr;
 
   std::vector<Body> bodies_;

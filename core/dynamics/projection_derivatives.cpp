@@ -11,7 +11,21 @@ namespace {
 
 constexpr SaddleSolver::Settings kOnePass{};  // refine() refines
 
+// Each pass of refine() gains a factor of about the correction's size, or of 1/alpha times the ratio of masses that
+// meet.
+constexpr int kMostRefinements = 12;
+constexpr double kNegligible = 1e-17;
+
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// Largest entry of each direction.
+template <class X>
+Eigen::Array<double, 1, X::ColsAtCompileTime> largest(const std::vector<X>& x) {
+  Eigen::Array<double, 1, X::ColsAtCompileTime> most;
+  most.setZero();
+  for (const X& xi : x) most = most.max(xi.cwiseAbs().colwise().maxCoeff().array());
+  return most;
+}
 
 // p' of p = pi/|pi|, for one direction or lanes of pi'.
 template <class X>
@@ -46,11 +60,9 @@ bool Projector::linearise(double t, const Eigen::VectorXd& angles, const Eigen::
   prepare_bodies(y_hat);
   set_frames(scratch_y_, nullptr, states_tilde_, frames_tilde_);
   if (!solver_.factor(frames_tilde_)) return false;
-  double correction = 0;
   for (int i = 1; i <= data_.n; ++i) {
     Body& b = bodies_[at(i)];
     const Vec<6>& d = solution.delta[at(i - 1)];
-    correction = std::max(correction, d.cwiseAbs().maxCoeff());
     b.pi = b.p_tilde + 0.5 * G_transposed_times(b.p_tilde, d.tail<3>());
     b.norm_pi = positions() ? b.pi.norm() : 1.0;
     b.p = b.pi / b.norm_pi;
@@ -62,10 +74,6 @@ bool Projector::linearise(double t, const Eigen::VectorXd& angles, const Eigen::
   }
   set_frames(y, &y, states_, frames_);
   rows_.evaluate(frames_);
-  // Each iteration gains a factor of about the correction's size, or of 1/alpha; twelve digits are wanted, two
-  // iterations at least.
-  refinements_ =
-      std::clamp(static_cast<int>(std::ceil(16 / -std::log10(std::clamp(10 * correction, 1e-8, 0.05)))), 2, 12);
   return true;
 }
 
@@ -99,7 +107,9 @@ void Projector::refine(Level level, bool transposed, const std::vector<X>& b, co
   solver_.solve(b, g, kOnePass, x, nu);
   if (data_.m == 0) return;
   const bool position = level == Level::position;
-  for (int k = 0; k < refinements_; ++k) {
+  const auto size = largest(x);
+  auto before = size;
+  for (int k = 0; k < kMostRefinements; ++k) {
     for (int i = 1; i <= data_.n; ++i) r[at(i - 1)] = -solver_.mass_times(i, x[at(i - 1)]);
     rg = g;
     rg *= -1;
@@ -123,6 +133,9 @@ void Projector::refine(Level level, bool transposed, const std::vector<X>& b, co
     solver_.solve(r, rg, kOnePass, dx, dnu);
     for (std::size_t i = 0; i < x.size(); ++i) x[i] += dx[i];
     nu += dnu;
+    const auto now = largest(dx);
+    if ((now * now <= kNegligible * size * before).all()) return;  // what the next pass would change
+    before = now;
   }
 }
 

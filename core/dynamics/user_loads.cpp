@@ -1,5 +1,7 @@
 // User forces inside the equations of motion: from the 7 coordinates of a body, Q, to its 6 loads T'Q, and derivatives.
 //   virtual work e'Q with e = T(p) eta = (eta_r, 1/2 G(p)' eta_theta)
+#include <algorithm>
+
 #include "core/dynamics/dynamics.hpp"
 
 #include "core/body/euler_parameters.hpp"
@@ -50,15 +52,14 @@ void Dynamics::add_user_blocks(MotionBlocks& out) {
         }
         block.parts |= all;
         if (k != l) continue;
-        for (int c = 0; c < 4; ++c) {
-          block.q.col(3 + c).tail<3>() += 0.5 * G_times(Vector4d::Unit(c), user_Q_.segment<4>(row + 3));
-        }
+        block.q.block<3, 4>(3, 3) -= 0.5 * G(user_Q_.segment<4>(row + 3));  // G(p') Q_p = -G(Q_p) p'
       }
     }
   }
 }
 
 void Dynamics::add_user_field_tangent(const ParameterBlock& block) {
+  if (std::all_of(std::begin(block.parameter), std::end(block.parameter), [](int k) { return k < 0; })) return;
   for (const UserForceData& f : data_.user_forces) {
     const Eigen::Index size = 7 * static_cast<Eigen::Index>(f.bodies.size());
     set_user_state(f);

@@ -6,8 +6,7 @@ namespace {
 // epsilon of a row of Phi in units of the inertia that it sees: far above rounding, far below what matters.
 constexpr double kEpsilon = 1e-9;
 
-// A refinement of less than this, relative, is not followed by another.
-constexpr double kLastStep = 1e-9;
+constexpr double kNegligible = 1e-17;  // relative, of a refinement
 
 using Entries = std::vector<SparseLu::Entry>;
 
@@ -78,16 +77,18 @@ bool StageMatrix::factor(const Eigen::Ref<const Eigen::MatrixXd>& P,
   return lu_.factor();
 }
 
-// N = N_epsilon + E:  x += N_epsilon^-1 (b - N x),  and the residual after each pass is -E times its step. A pass whose
-// step is so small that the next one's would be below rounding is the last: steps shrink by as much each time.
+// N = N_epsilon + E:  x += N_epsilon^-1 (b - N x),  and the residual after each pass is -E times its step. Goes on
+// until the next step, foreseen from the last two, would be below rounding in each column, of accelerations and
+// multipliers.
 template <class Solve>
 void StageMatrix::refine(Eigen::Ref<Eigen::MatrixXd> b, int refinements, const Solve& solve) {
   solve(b);
-  if (epsilon_.size() == 0) return;
+  if (epsilon_.size() == 0 || refinements == 0) return;
   auto step = step_.leftCols(b.cols());
   auto correction = correction_.leftCols(b.cols());
   step = b;
-  const double size = b.cwiseAbs().maxCoeff();
+  const Sizes size = sizes(b);
+  Sizes before = size;
   for (int pass = 0; pass < refinements; ++pass) {
     correction.setZero();
     for (int i = 0; i < stages_; ++i) {
@@ -96,9 +97,24 @@ void StageMatrix::refine(Eigen::Ref<Eigen::MatrixXd> b, int refinements, const S
     }
     solve(correction);
     b += correction;
-    if (correction.cwiseAbs().maxCoeff() < kLastStep * size) return;
+    const Sizes now = sizes(correction);
+    if ((now * now <= kNegligible * size * before).all()) return;
+    before = now;
     step = correction;
   }
+}
+
+StageMatrix::Sizes StageMatrix::sizes(const Eigen::Ref<const Eigen::MatrixXd>& x) const {
+  Sizes most = Sizes::Zero();
+  const Eigen::Index m = epsilon_.size();
+  for (int i = 0; i < stages_; ++i) {
+    const auto of_stage = x.middleRows(i * per_stage_, per_stage_);
+    for (Eigen::Index c = 0; c < x.cols(); ++c) {
+      most(0, c) = std::max(most(0, c), of_stage.col(c).head(per_stage_ - m).cwiseAbs().maxCoeff());
+      most(1, c) = std::max(most(1, c), of_stage.col(c).tail(m).cwiseAbs().maxCoeff());
+    }
+  }
+  return most;
 }
 
 void StageMatrix::solve(Eigen::Ref<Eigen::MatrixXd> b, int refinements) {

@@ -25,12 +25,15 @@ class StageMatrix {
 
   // values: of each stage; may be one and the same.
   bool factor(const Eigen::Ref<const Eigen::MatrixXd>& P, std::span<const MotionJacobian::Values* const> values);
-  static constexpr int kExact = 3;  // refinements at most for derivatives; Newton's method needs none
+  static constexpr int kExact = 4;  // refinements at most for derivatives; Newton's method needs none
   void solve(Eigen::Ref<Eigen::MatrixXd> b, int refinements);  // in place; at most kLanes columns
   void solve_transposed(Eigen::Ref<Eigen::MatrixXd> b, int refinements);
   long factorisations() const { return factorisations_; }
 
  private:
+  // Largest acceleration (row 0) and multiplier (row 1) of each column.
+  using Sizes = Eigen::Array<double, 2, kLanes>;
+  Sizes sizes(const Eigen::Ref<const Eigen::MatrixXd>& x) const;
   template <class Solve>
   void refine(Eigen::Ref<Eigen::MatrixXd> b, int refinements, const Solve& solve);
 

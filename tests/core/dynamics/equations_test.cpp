@@ -14,6 +14,12 @@ using Eigen::VectorXd;
 
 namespace {
 
+FormulationSettings stabilised_penalty() {
+  FormulationSettings s = FormulationSettings::penalty();
+  s.alpha = 1e4;
+  return s;
+}
+
 // A scene at its start, moved off the solution: nothing below may rely on r = 0.
 struct Place {
   Scene scene;
@@ -50,16 +56,36 @@ struct Place {
   }
 };
 
+// Q = -K q - C v of two bodies at once, both matrices full.
+struct FullPair final : UserForce {
+  MatrixXd stiffness = MatrixXd::Random(14, 14), damping = MatrixXd::Random(14, 14);
+  std::vector<std::string> bodies() const override { return {"rocker", "crank"}; }
+  void Q(double, VecIn q, VecIn v, VecIn, VecOut out) const override { out = -stiffness * q - damping * v; }
+  void K(double, VecIn, VecIn, VecIn, MatOut out) const override { out = stiffness; }
+  void C(double, VecIn, VecIn, VecIn, MatOut out) const override { out = damping; }
+  void Q_rho(double, VecIn, VecIn, VecIn, MatOut) const override {}
+};
+
+// The ground second in its joints, a gear whose row both of two hinges share, and a force on two bodies.
+Place geared_four_bar(const FormulationSettings& formulation = {}) {
+  Scene scene = spatial_four_bar();
+  scene.joints.back() = hinge("D", "rocker", vec("0", "0", "0"), "ground", vec("dx", "0", "dz"));
+  scene.joints.back().axis1 = vec("w", "0", "1"), scene.joints.back().axis2 = vec("0.1", "w", "1");
+  scene.joints.back().normal1 = vec("1", "0", "n"), scene.joints.back().normal2 = vec("1", "n", "0");
+  scene.bodies.push_back(body("wheel", vec("0.05", "0.02", "0"), vec("0.1", "0.2", "0.1"), turned("0.4")));
+  Joint axle = hinge("E", "crank", vec("c1", "0", "0.1"), "wheel", vec("0", "0", "0"));
+  axle.normal1 = vec("1", "0", "0"), axle.normal2 = vec("1", "0", "0");
+  scene.joints.push_back(axle);
+  Joint gear;
+  gear.name = "gear", gear.type = "gear", gear.joint1 = "A", gear.joint2 = "E", gear.ratio = f("-1.7*n");
+  scene.joints.push_back(gear);
+  return Place(std::move(scene), {std::make_shared<FullPair>()}, formulation);
+}
+
 Place moving_four_bar(const FormulationSettings& formulation = {}) {
   Scene scene = every_force_four_bar();
   const auto drag = std::make_shared<CubicDrag>("coupler", static_cast<Index>(scene.parameters.size()) - 1);
   return Place(std::move(scene), {drag}, formulation);
-}
-
-FormulationSettings stabilised_penalty() {
-  FormulationSettings s = FormulationSettings::penalty();
-  s.alpha = 1e4;
-  return s;
 }
 
 }  // namespace
@@ -123,11 +149,15 @@ TEST_CASE("the residual's adjoint is the transpose of its tangent", "[equations]
 
 TEST_CASE("the sparse Jacobian has the residual's derivatives in q, v, a and lambda", "[equations]") {
   Place p = [] {
-    switch (GENERATE(0, 1, 2)) {
+    switch (GENERATE(0, 1, 2, 3, 4)) {
       case 0:
         return moving_four_bar();
       case 1:
         return moving_four_bar(stabilised_penalty());
+      case 2:
+        return geared_four_bar();
+      case 3:
+        return geared_four_bar(stabilised_penalty());
       default:
         return Place(n_four_bar(3));
     }

@@ -125,7 +125,10 @@ TEST_CASE("on a closed loop they do, too, projection included", "[order]") {
   scene.simulation.end_time = 0.53;
   for (const Method& rk : measured_methods()) {
     const int steps = steps_for(rk.order).four_bar;
-    if (rk.order == 8) {  // between terms of h^9 and rounding there is little room, at another end for the state
+    // Between terms of h^9 and rounding there is little room. Measured over 14 to 22 steps: to 0.53 s the state's order
+    // rises from 7.80 to 7.84 and falls into rounding, those of TLM and adjoint are 7.95 to 8.04; to 0.55 s the state's
+    // is 7.97 to 8.00.
+    if (rk.order == 8) {
       check_order(scene, rk, steps, Of::derivatives);
       Scene longer = scene;
       longer.simulation.end_time = 0.55;
