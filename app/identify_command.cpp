@@ -49,6 +49,10 @@ IdentificationResult fitted(Run& run, const std::vector<CsvTable>& data) {
                                        row.cost, row.gradient_norm, row.step_norm));
     return !interrupted();
   };
+  options.profile_progress = [&](const std::string& name, double value, double tau) {
+    run.progress.iteration(fmt::format("profile of {}   {:.6g}   tau {:+.3f}", name, value, tau));
+    return !interrupted();
+  };
   IdentificationResult fit = run_identification(run.problem, data, options);
   run.progress.finish();
   return fit;

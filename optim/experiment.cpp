@@ -229,7 +229,7 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
       y_bar.setZero(), rho_bar.setZero();
       const double s = mechanism.add_sensor_gradient(channels_[sample.channel].sensor, at, 1, y_bar, rho_bar);
       const bool held = times_[sample.time] - c.delay.value < settings.start_time;
-      const double sdot = delayed_ && !held ? y_bar.dot(*at.ydot) : 0.0;
+      const double sdot = delayed_ && !held && !unknowns_.empty() ? y_bar.dot(*at.ydot) : 0.0;
       const double sigma = channels_[sample.channel].sigma;
       const Eigen::Index row = static_cast<Eigen::Index>(i);
       r.z(row) = (sample.measured - c.gain.value * s - c.bias.value) / sigma;

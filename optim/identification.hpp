@@ -116,6 +116,8 @@ struct IdentificationOptions {
   std::vector<std::shared_ptr<const UserForce>> user_forces;
   std::function<bool(const FitRow&)> progress;        // after every iteration; false stops, the best so far is kept
   std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
+  // After every point of a profile; false ends it there.
+  std::function<bool(const std::string& name, double value, double tau)> profile_progress;
 };
 
 // problem.identification must be there; data: one table per experiment, in order. Throws std::invalid_argument where

@@ -156,7 +156,10 @@ Profile profile_likelihood(LeastSquaresProblem& problem, const Eigen::VectorXd& 
   }
   const ProfilePoint estimate{x(options.variable), problem.cost(at.z), 0, x};
   Side down(problem, held, options, estimate, -1), up(problem, held, options, estimate, 1);
-  down.walk(), up.walk();
+  for (Side* side : {&down, &up}) {
+    side->walk();
+    if (!side->crossing && side->why_none.empty()) side->why_none = "stopped on request";
+  }
   profile.points = down.points;
   profile.points.push_back(estimate);
   profile.points.insert(profile.points.end(), up.points.begin(), up.points.end());

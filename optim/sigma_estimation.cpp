@@ -12,12 +12,6 @@ namespace {
 constexpr double kNormalMedian = 1.4826;  // 1 over the median of |x|, x normal
 constexpr double kLeast = 1e-12;          // of the largest measured value: an exact record has no noise
 
-struct NewSigma {
-  ExperimentStack::Member* member;
-  std::size_t channel;
-  double sigma;
-};
-
 double estimated(const Experiment& model, std::size_t channel, const Eigen::VectorXd& z, const Loss& loss,
                  double freedom) {
   std::vector<double> sizes;
@@ -44,26 +38,28 @@ bool estimates_sigma(const IdentificationSpec& spec) {
   });
 }
 
-double update_sigmas(ExperimentStack& stack, const IdentificationSpec& spec, const Eigen::VectorXd& z) {
+SigmaEstimates estimated_sigmas(ExperimentStack& stack, const IdentificationSpec& spec, const Eigen::VectorXd& z) {
   const double N = static_cast<double>(stack.samples()), P = static_cast<double>(stack.variables());
   const double freedom = N > P ? (N - P) / N : 1;
-  std::vector<NewSigma> all;
-  double change = 0;
+  SigmaEstimates found;
   Eigen::Index row = 0;
-  for (ExperimentStack::Member& m : stack.members()) {
+  for (std::size_t i = 0; i < stack.members().size(); ++i) {
+    const ExperimentStack::Member& m = stack.members()[i];
     const Eigen::Index n = static_cast<Eigen::Index>(m.model.samples().size());
     const std::vector<ChannelSpec>& channels = spec.experiments[m.experiment].channels;
     for (std::size_t c = 0; c < channels.size(); ++c) {
       if (!channels[c].estimate_sigma) continue;
       const double before = m.model.sigma(c), sigma = estimated(m.model, c, z.segment(row, n), stack.loss, freedom);
-      change = std::max(change, std::abs(sigma - before) / before);
-      all.push_back({&m, c, sigma});
+      found.change = std::max(found.change, std::abs(sigma - before) / before);
+      found.all.push_back({i, c, sigma});
     }
     row += n;
   }
-  if (change >= kSigmaChange)
-    for (const NewSigma& s : all) s.member->model.set_sigma(s.channel, s.sigma);
-  return change;
+  return found;
+}
+
+void use_sigmas(ExperimentStack& stack, const SigmaEstimates& sigmas) {
+  for (const SigmaEstimates::One& s : sigmas.all) stack.members()[s.member].model.set_sigma(s.channel, s.sigma);
 }
 
 }  // namespace mbsopt

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "optim/experiment_stack.hpp"
 
@@ -18,8 +19,17 @@ inline constexpr double kSigmaChange = 1e-6;  // relative
 
 bool estimates_sigma(const IdentificationSpec& spec);  // in a fitted experiment
 
-// z: the residuals with the sigmas so far. Returns the largest relative change of a sigma; where that is below
-// kSigmaChange, all stay as they were.
-double update_sigmas(ExperimentStack& stack, const IdentificationSpec& spec, const Eigen::VectorXd& z);
+struct SigmaEstimates {
+  struct One {
+    std::size_t member, channel;  // of the stack, of its experiment
+    double sigma;
+  };
+  std::vector<One> all;
+  double change = 0;  // the largest, relative
+};
+
+// z: the residuals with the sigmas so far.
+SigmaEstimates estimated_sigmas(ExperimentStack& stack, const IdentificationSpec& spec, const Eigen::VectorXd& z);
+void use_sigmas(ExperimentStack& stack, const SigmaEstimates& sigmas);
 
 }  // namespace mbsopt

@@ -97,7 +97,7 @@ FitStatistics fit_statistics(const FitData& data) {
     const Eigen::JacobiSVD<MatrixXd> svd(triangle, Eigen::ComputeFullV);
     VectorXd sigma = VectorXd::Zero(U);
     sigma.head(svd.singularValues().size()) = svd.singularValues();
-    const Index rank = (sigma.array() > kRankTolerance * sigma(0)).count();
+    const Index rank = (sigma.array() > std::max(kRankTolerance, data.accuracy) * sigma(0)).count();
     if (s.condition_number == 0) s.condition_number = sigma(U - 1) > 0 ? sigma(0) / sigma(U - 1) : kInfinity;
 
     const MatrixXd V = svd.matrixV().leftCols(rank) * sigma.head(rank).cwiseInverse().asDiagonal();

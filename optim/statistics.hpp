@@ -36,6 +36,7 @@ struct FitData {
   std::vector<std::string> names;
   Loss loss;
   bool sigma_is_known = false;  // v = 1, and quantiles are normal; not with a loss other than the square
+  double accuracy = 0;          // of J, relative: what differs by less is the same
 };
 
 struct FitStatistics {

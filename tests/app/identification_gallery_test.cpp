@@ -4,6 +4,8 @@
 #include <map>
 
 #include "app/exit_code.hpp"
+#include "core/scene/inertia_check.hpp"
+#include "optim/csv_table.hpp"
 #include "tests/app/gallery_files.hpp"
 #include "tests/app/run_command.hpp"
 
@@ -75,6 +77,26 @@ TEST_CASE("ten inertial numbers of a body come from the motion of two markers", 
                          {"sxy", 0.01},
                          {"sxz", -0.02},
                          {"syz", 0.015}});
+
+  // All that the fit went through were possible bodies, also from a poor start.
+  const TemporaryFolder poor;
+  run_command({"identify", file_of("double_pendulum/identify_inertia").string(), "--out", poor.file("out"), "--quiet",
+               "--set", "parameters.ex.value=0.3", "--set", "parameters.ez.value=0.02", "--set",
+               "parameters.sxz.value=0.1", "--set", "identification.optimizer.max_iterations=8"});
+  for (const TemporaryFolder* each : {&folder, &poor}) {
+    const CsvTable history = read_csv(each->file("out/history.csv"));
+    REQUIRE(history.rows() > 5);
+    for (std::size_t row = 0; row < history.rows(); ++row) {
+      const auto value = [&](const char* name) { return history.column(name)[row]; };
+      const double m = value("m"), x = value("ex"), y = value("ey"), z = value("ez");
+      const double xy = value("sxy"), xz = value("sxz"), yz = value("syz");
+      const double Sxx = x * x + xy * xy + xz * xz, Syy = y * y + yz * yz, Szz = z * z;
+      CHECK(m > 0);
+      CHECK(inertia_problem(
+                {m * (Syy + Szz), m * (Sxx + Szz), m * (Sxx + Syy), -m * (xy * y + xz * yz), -m * xz * z, -m * yz * z})
+                .empty());
+    }
+  }
 }
 
 TEST_CASE("a damper's law, and how late its sensor is, come from two rides on roads of their own",
