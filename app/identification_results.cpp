@@ -125,15 +125,15 @@ Json to_json(const ParameterProfile& p) {
 void print_fit(std::ostream& out, const IdentificationResult& fit) {
   TextTable parameters({"parameter", "initial", "value", "std error", "95 % interval", "unit", "at bound"});
   add_rows(parameters, fit.parameters);
-  TextTable channels(
-      {"experiment", "role", "channel", "samples", "rms", "sigma", "rms/sigma", "lag-1", "runs p", "residuals"});
+  TextTable channels({"experiment", "role", "channel", "samples", "rms", "sigma", "rms/sigma", "lag-1", "Ljung-Box p",
+                      "runs p", "residuals"});
   for (const ExperimentFit& e : fit.experiments) {
     add_rows(parameters, e.refitted);
     for (const ChannelFit& c : e.channels) {
       channels.add({e.name, e.validate ? "validate" : "fit", c.column, std::to_string(c.samples), significant(c.rms, 4),
                     significant(c.sigma, 4) + (c.sigma_is_estimated ? " (estimated)" : ""),
                     significant(c.rms_scaled, 4), fmt::format("{:.2f}", c.analysis.autocorrelation),
-                    significant(c.analysis.runs_p, 2), c.analysis.in_words()});
+                    significant(c.analysis.ljung_box_p, 2), significant(c.analysis.runs_p, 2), c.analysis.in_words()});
     }
   }
   out << '\n' << parameters.text() << '\n' << channels.text();

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <set>
 
 #include "core/expression/did_you_mean.hpp"
 
@@ -48,7 +49,7 @@ MatrixXd reduced_rows(MatrixXd rows, std::vector<Index>& pivots) {
 class Group {
  public:
   Group(std::vector<Index> members, const MatrixXd& P, const VectorXd& rho, const VectorXd& size,
-        const std::vector<std::string>& names)
+        const std::vector<std::string>& names, const std::vector<std::string>& units)
       : members_(std::move(members)) {
     const Index c = static_cast<Index>(members_.size());
     MatrixXd inside(c, c);
@@ -58,6 +59,7 @@ class Group {
       for (Index j = 0; j < c; ++j) inside(i, j) = P(k, members_[static_cast<std::size_t>(j)]);
       rho_(i) = rho(k), size_(i) = size(k);
       names_.push_back(names[static_cast<std::size_t>(k)]);
+      units_.push_back(units.empty() ? "" : units[static_cast<std::size_t>(k)]);
     }
     // A projector's singular values are 1 and 0.
     const Eigen::JacobiSVD<MatrixXd> svd(inside, Eigen::ComputeFullU);
@@ -92,6 +94,13 @@ class Group {
     const MatrixXd rows = absolute_rows();
     for (const double x : rows.reshaped())
       if (x != 0 && !is_near(std::abs(x), 1)) return std::nullopt;
+    for (Index r = 0; r < rows.rows(); ++r) {
+      std::set<std::string> units;
+      for (Index k = 0; k < rows.cols(); ++k)
+        if (rows(r, k) != 0) units.insert(units_[static_cast<std::size_t>(k)]);
+      units.erase("");
+      if (units.size() > 1) return std::nullopt;
+    }
     return linear_terms();
   }
 
@@ -150,7 +159,7 @@ class Group {
   }
 
   std::vector<Index> members_;
-  std::vector<std::string> names_;
+  std::vector<std::string> names_, units_;
   VectorXd rho_, size_;
   MatrixXd rows_;  // determined combinations, in changes over sizes
   std::vector<Index> pivots_;
@@ -167,7 +176,8 @@ std::vector<bool> changed_parameters(const MatrixXd& null_space) {
 }
 
 std::vector<std::string> determined_combinations(const MatrixXd& null_space, const VectorXd& rho, const VectorXd& size,
-                                                 const std::vector<std::string>& names) {
+                                                 const std::vector<std::string>& names,
+                                                 const std::vector<std::string>& units) {
   std::vector<std::string> words;
   if (null_space.cols() == 0) return words;
   const MatrixXd P = projector(null_space);
@@ -185,7 +195,7 @@ std::vector<std::string> determined_combinations(const MatrixXd& null_space, con
     std::vector<Index> members;
     for (std::size_t i = k; i < group.size(); ++i)
       if (changed[i] && group[i] == group[k]) members.push_back(static_cast<Index>(i));
-    words.push_back(Group(members, P, rho, size, names).in_words());
+    words.push_back(Group(members, P, rho, size, names, units).in_words());
   }
   return words;
 }

@@ -5,7 +5,7 @@
 // along every direction. To first order they are known from the directions alone, and are told in the simplest form
 // that fits:
 //
-//   sums         "m1, m2: only m1 + m2 is determined"
+//   sums         "m1, m2: only m1 + m2 is determined"                    of parameters of one unit
 //   products     "m, g, J: only m*g/J is determined"                     whole or half exponents
 //   otherwise    "a, b: only a + 0.25*b is determined (near this solution)"
 // A group without any: "c: does not influence what is measured".
@@ -18,9 +18,10 @@
 namespace mbsopt {
 
 // null_space: independent columns, changes of the parameters over their sizes; rho and size: the parameters' values and
-// the positive numbers that the changes are relative to.
+// the positive numbers that the changes are relative to. units: of the parameters, "" where not known; empty: none is.
 std::vector<std::string> determined_combinations(const Eigen::MatrixXd& null_space, const Eigen::VectorXd& rho,
-                                                 const Eigen::VectorXd& size, const std::vector<std::string>& names);
+                                                 const Eigen::VectorXd& size, const std::vector<std::string>& names,
+                                                 const std::vector<std::string>& units = {});
 
 // Parameters that the directions change.
 std::vector<bool> changed_parameters(const Eigen::MatrixXd& null_space);

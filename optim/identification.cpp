@@ -75,6 +75,7 @@ class Identification {
     data.z = solution.point.z.head(stack.samples());
     data.rho = stack.scaling().to_rho(solution.x);
     data.names = names_of(unknowns, spec_);
+    for (const UnknownParameter& u : unknowns) data.units.push_back(u.description.unit);
     data.loss = spec_.loss, data.sigma_is_known = spec_.sigma_is_known;
     const IntegratorSettings& integrator = scene_.simulation.integrator;
     if (!integrator.step) data.accuracy = std::min(kTolerances * integrator.rtol, kLeastAccuracy);

@@ -120,7 +120,7 @@ FitStatistics fit_statistics(const FitData& data) {
   }
   MatrixXd null_space(P, static_cast<Index>(unseen.size()));
   for (std::size_t c = 0; c < unseen.size(); ++c) null_space.col(static_cast<Index>(c)) = unseen[c];
-  s.unidentifiable = determined_combinations(null_space, rho, size, data.names);
+  s.unidentifiable = determined_combinations(null_space, rho, size, data.names, data.units);
   const std::vector<bool> changed = changed_parameters(null_space);
   for (Index k = 0; k < P; ++k) {
     s.std_error(k) = changed[static_cast<std::size_t>(k)] ? kInfinity : std::sqrt(s.covariance(k, k));

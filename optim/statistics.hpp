@@ -34,6 +34,7 @@ struct FitData {
   Eigen::MatrixXd J_prior;  // R x P, or empty
   Eigen::VectorXd rho;      // P
   std::vector<std::string> names;
+  std::vector<std::string> units;  // "" where not known; or none at all
   Loss loss;
   bool sigma_is_known = false;  // v = 1, and quantiles are normal; not with a loss other than the square
   double accuracy = 0;          // of J, relative: what differs by less is the same

@@ -59,6 +59,20 @@ TEST_CASE("sums, differences and other combinations are named", "[identifiabilit
   CHECK(words_for(row(1, 0.5, 0.4), with_zero, names) == Words{"m1, m2, m3: only m1 + 0.5*m2 + 0.4*m3 is determined"});
 }
 
+TEST_CASE("parameters of different units are not added up", "[identifiability]") {
+  // m a is measured, and both are 1: to first order m + a is as good, but for its units.
+  const VectorXd ones = VectorXd::Ones(2);
+  MatrixXd direction(2, 1);
+  direction << 1, -1;
+  CHECK(determined_combinations(direction, ones, ones, {"m", "a"}) == Words{"m, a: only m + a is determined"});
+  CHECK(determined_combinations(direction, ones, ones, {"m", "a"}, {"kg", "kg"}) ==
+        Words{"m, a: only m + a is determined"});
+  CHECK(determined_combinations(direction, ones, ones, {"m", "a"}, {"kg", ""}) ==
+        Words{"m, a: only m + a is determined"});
+  CHECK(determined_combinations(direction, ones, ones, {"m", "a"}, {"kg", "m"}) ==
+        Words{"m, a: only m*a is determined"});
+}
+
 TEST_CASE("several combinations of one group, and several groups", "[identifiability]") {
   VectorXd rho(4);
   rho << 0.5, 0.1, 4e-4, 7e-3;
