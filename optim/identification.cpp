@@ -119,13 +119,10 @@ class Identification {
                           unknowns_in(scene_, spec_, e, unknowns), options_.user_forces)};
   }
 
-  void count(const LeastSquaresResult& solution) {
-    result_.iterations += solution.iterations;
-    result_.evaluations += solution.evaluations, result_.failed_evaluations += solution.failed_evaluations;
-  }
-
-  LeastSquaresResult solve(ExperimentStack& stack, const Eigen::VectorXd& x) {
+  // of_fit: its iterations are those of the result.
+  LeastSquaresResult minimised(ExperimentStack& stack, const Eigen::VectorXd& x, bool of_fit) {
     CeresOptions solver = solver_options();
+    if (!of_fit) return solve_with_ceres(stack, x, solver);
     const int before = result_.iterations;
     solver.progress = [&](const LeastSquaresProgress& p) {
       result_.history.push_back(
@@ -133,22 +130,16 @@ class Identification {
       return !options_.progress || options_.progress(result_.history.back());
     };
     LeastSquaresResult solution = solve_with_ceres(stack, x, solver);
-    count(solution);
+    result_.iterations += solution.iterations;
+    result_.evaluations += solution.evaluations, result_.failed_evaluations += solution.failed_evaluations;
     return solution;
   }
 
-  // Tukey's loss has no pull far out, so that a start there would find nothing: Huber's estimate comes first.
-  LeastSquaresResult solved(ExperimentStack& stack, const Eigen::VectorXd& start) {
-    Eigen::VectorXd x = start;
-    if (spec_.loss.type == LossType::tukey) {
-      stack.loss = {LossType::huber, {}};
-      const LeastSquaresResult first = solve(stack, x);
-      stack.loss = spec_.loss;
-      if (first.status == SolverStatus::failed || first.status == SolverStatus::stopped) return first;
-      x = first.x;
-    }
-    LeastSquaresResult solution = solve(stack, x);
-    if (!estimates_sigma(spec_)) return solution;
+  // The estimate under a loss, with the sigmas that it estimates.
+  LeastSquaresResult estimate(ExperimentStack& stack, const Loss& loss, const Eigen::VectorXd& x, bool of_fit) {
+    stack.loss = loss;
+    LeastSquaresResult solution = minimised(stack, x, of_fit);
+    if (!of_fit || !estimates_sigma(spec_)) return solution;
     const double cost_initial = solution.cost_initial;
     for (int round = 0; solution.status == SolverStatus::converged; ++round) {
       const SigmaEstimates sigmas = estimated_sigmas(stack, spec_, solution.point.z);
@@ -158,10 +149,18 @@ class Identification {
         break;
       }
       use_sigmas(stack, sigmas);
-      solution = solve(stack, solution.x);
+      solution = minimised(stack, solution.x, of_fit);
     }
     solution.cost_initial = cost_initial;
     return solution;
+  }
+
+  // Tukey's loss has no pull far out, so that a start there would find nothing: Huber's estimate comes first.
+  LeastSquaresResult solved(ExperimentStack& stack, const Eigen::VectorXd& start, bool of_fit = true) {
+    if (spec_.loss.type != LossType::tukey) return estimate(stack, spec_.loss, start, of_fit);
+    LeastSquaresResult first = estimate(stack, {LossType::huber}, start, of_fit);
+    if (first.status == SolverStatus::failed || first.status == SolverStatus::stopped) return first;
+    return estimate(stack, spec_.loss, first.x, of_fit);
   }
 
   void fit() {
@@ -263,7 +262,7 @@ class Identification {
       scored.message = point.ok ? "simulated" : "could not be simulated: " + point.message;
       if (point.ok) z = point.z;
     } else {
-      const LeastSquaresResult solution = solve_with_ceres(stack, scaling.to_x(start_of(unknowns)), solver_options());
+      const LeastSquaresResult solution = solved(stack, scaling.to_x(start_of(unknowns)), false);
       scored.message = "refitted, " + solution.message;
       scored.refitted =
           described(unknowns, scaling.to_rho(solution.x),

@@ -251,6 +251,24 @@ TEST_CASE("under a robust loss sigma is that of the bulk, whatever the outliers"
   CHECK(run_identification(p, {with_outliers(noisy(7), 11)}).experiments[0].channels[0].sigma > 5 * kSigma);
 }
 
+TEST_CASE("Tukey's loss finds its way from a sigma that is far too small, in the fit and where it validates",
+          "[identification][loss][sigma]") {
+  Problem p = fit_problem(64.5, 0.1);
+  p.identification->loss = {LossType::tukey};
+  p.identification->experiments[0].channels[0].estimate_sigma = true;
+  p.identification->experiments[0].channels[0].sigma = 1e-4;
+  p.identification->experiments.push_back(pendulum::experiment("check", {"theta0", "omega0"}));
+  p.identification->experiments[1].validate = true;
+  p.identification->experiments[1].overrides = {{"theta0", 1.8}, {"omega0", 1.2}};  // 0.3 rad off: 27 sigma
+  const IdentificationResult result = run_identification(p, {with_outliers(noisy(7), 11), with_outliers(noisy(8), 12)});
+  INFO(result.message << "; " << result.experiments[1].message);
+  REQUIRE(result.ok());
+  CHECK(std::abs(result.parameters[0].value - 64) < 4 * result.parameters[0].std_error);
+  CHECK(result.experiments[0].channels[0].sigma == Approx(1.13 * kSigma).epsilon(0.18));
+  // Found, with the shared parameters as the other record has them, whose errors are not in its standard error.
+  CHECK(result.experiments[1].refitted.at(0).value == Approx(1.53).margin(0.005));
+}
+
 TEST_CASE("an exact record has no sigma to estimate, and does not divide by it", "[identification][sigma]") {
   Problem p = fit_problem();
   p.identification->experiments[0].channels[0].estimate_sigma = true;
