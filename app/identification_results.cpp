@@ -101,6 +101,7 @@ Json to_json(const ExperimentFit& e) {
                                   {"rms_scaled", c.rms_scaled},
                                   {"sigma", c.sigma},
                                   {"sigma_is_estimated", c.sigma_is_estimated},
+                                  {"beyond_scale", c.beyond_scale},
                                   {"residuals", to_json(c.analysis)}};
   }
   for (const FittedParameter& p : e.refitted) json["refitted"][p.name] = to_json(p);

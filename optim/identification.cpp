@@ -277,7 +277,7 @@ class Identification {
     Eigen::Index row = 0;
     for (const ExperimentStack::Member& m : stack.members()) {
       const Eigen::Index n = static_cast<Eigen::Index>(m.model.samples().size());
-      score_experiment(spec_.experiments[m.experiment], m.model, z.segment(row, n), m.experiment,
+      score_experiment(spec_.experiments[m.experiment], m.model, spec_.loss, z.segment(row, n), m.experiment,
                        result_.experiments[m.experiment], result_.residuals);
       row += n;
     }

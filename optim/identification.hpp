@@ -52,7 +52,8 @@ struct ChannelFit {
   double rms_scaled = 0;                 // of z
   double sigma = 1;
   bool sigma_is_estimated = false;
-  ResidualAnalysis analysis;  // of z
+  ResidualAnalysis analysis;     // of z
+  std::size_t beyond_scale = 0;  // samples with |z| above the scale of the loss, which count for less than their square
 };
 
 struct ExperimentFit {

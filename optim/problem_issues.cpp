@@ -73,6 +73,11 @@ void check_meaning(Checker& checker, const IdentificationSpec& identification) {
   if (!any_fit) checker.issue(list, "has no experiment of role \"fit\"; at least one is needed");
   if (identification.loss.type == LossType::squared && identification.loss.scale)
     checker.issue(checker.path("loss") + ".scale", "is given with the loss 'squared', which has none");
+  for (std::size_t i = 0; identification.sigma_is_known && i < experiments.size(); ++i)
+    for (std::size_t k = 0; k < experiments[i].channels.size(); ++k)
+      if (experiments[i].channels[k].estimate_sigma)
+        checker.issue(child_path(child_path(list, i) + ".channels", k) + ".estimate_sigma",
+                      "is true, and so is identification.sigma_is_known; one of them must be false");
   check_unique_names(checker, experiments, "an experiment",
                      [&](std::size_t i) { return child_path(list, i) + ".name"; });
   for (std::size_t i = 0; i < experiments.size(); ++i) {

@@ -5,7 +5,7 @@
 
 namespace mbsopt {
 
-void score_experiment(const ExperimentSpec& spec, const Experiment& model, const Eigen::VectorXd& z,
+void score_experiment(const ExperimentSpec& spec, const Experiment& model, const Loss& loss, const Eigen::VectorXd& z,
                       std::size_t experiment, ExperimentFit& fit, std::vector<ResidualRow>& residuals) {
   fit.name = spec.name, fit.validate = spec.validate;
   fit.start_time = model.start_time(), fit.end_time = model.end_time();
@@ -24,6 +24,7 @@ void score_experiment(const ExperimentSpec& spec, const Experiment& model, const
     const double z_i = z(static_cast<Eigen::Index>(i)), residual = z_i * model.sigma(sample.channel);
     ChannelFit& channel = fit.channels[sample.channel];
     ++channel.samples;
+    channel.beyond_scale += std::abs(z_i) > loss.s();
     channel.rms += residual * residual, channel.rms_scaled += z_i * z_i;
     sum += residual * residual;
     scaled[sample.channel].push_back(z_i);

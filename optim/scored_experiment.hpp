@@ -10,7 +10,7 @@
 namespace mbsopt {
 
 // Fills the fit of one experiment from its residuals z, and appends them to the rows of residuals.csv.
-void score_experiment(const ExperimentSpec& spec, const Experiment& model, const Eigen::VectorXd& z,
+void score_experiment(const ExperimentSpec& spec, const Experiment& model, const Loss& loss, const Eigen::VectorXd& z,
                       std::size_t experiment, ExperimentFit& fit, std::vector<ResidualRow>& residuals);
 
 }  // namespace mbsopt

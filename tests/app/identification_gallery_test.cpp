@@ -127,6 +127,9 @@ TEST_CASE("friction comes from a run-down with gross errors, in a CSV file with 
   check_against(result, {{"coulomb", 1.2}, {"viscous", 0.05}, {"slip", 0.4}, {"run_down.omega0", 20}});
   CHECK(result.at("parameters").at("slip").at("prior").at("mean") == 0.5);
   CHECK(result.at("statistics").at("degrees_of_freedom") == 301 + 1 - 4);
+  // 15 gross errors, and of the others the 18 % that are beyond 1.345 sigma.
+  const double beyond = result.at("experiments").at("run_down").at("channels").at("omega").at("beyond_scale");
+  CHECK(beyond == Approx(15 + 0.18 * 286).margin(20));
 
   // Profiles: their ends, their points, their plot.
   const auto& profile = result.at("profiles").at("slip");
@@ -175,6 +178,9 @@ TEST_CASE("fields of losses, priors, drives and inertia that make no sense are f
              Contains("parameters.slip.prior.sigma: is 0, it must be greater than 0"));
   CHECK_THAT(refusal("friction/identify", R"(parameters.slip.prior={"mean": 1})"),
              Contains("parameters.slip.prior.sigma: is missing"));
+  CHECK_THAT(refusal("friction/identify", "identification.sigma_is_known=true"),
+             Contains("identification.experiments[0].channels[0].estimate_sigma: is true, and so is "
+                      "identification.sigma_is_known"));
   CHECK_THAT(refusal("damper/identify_law", "identification.experiments[0].drives[0].drive=rode"),
              Contains("identification.experiments[0].drives[0].drive") && Contains("did you mean 'ride'?"));
   CHECK_THAT(refusal("damper/identify_law", "identification.experiments[1].drives[0].law.column=raod"),
