@@ -2,7 +2,11 @@
 //   time_ratio   wall time within the budget / wall time with everything kept
 //   recomputed   steps computed again / steps
 //   kept_mib     the most that was kept
+#include <benchmark/benchmark.h>
+
+#include "core/integrate/simulation.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/state_point.hpp"
 
 using namespace mbsopt;
 

@@ -41,5 +41,11 @@ void gradient_cost(benchmark::State& state, const char* file, const char* method
 
 MBSOPT_GRADIENT_COST(five_bar_dopri5, "five_bar/sensitivities.json", "dopri5");
 MBSOPT_GRADIENT_COST(five_bar_dopri853, "five_bar/sensitivities.json", "dopri853");
+MBSOPT_GRADIENT_COST(five_bar_radau5, "five_bar/sensitivities.json", "radau5");
+MBSOPT_GRADIENT_COST(five_bar_sdirk4, "five_bar/sensitivities.json", "sdirk4");
 MBSOPT_GRADIENT_COST(chain_20_dopri5, "chain/gradient.json", "dopri5");
 MBSOPT_GRADIENT_COST(chain_20_dopri853, "chain/gradient.json", "dopri853");
+MBSOPT_GRADIENT_COST(chain_20_radau5, "chain/gradient.json", "radau5");
+MBSOPT_GRADIENT_COST(chain_20_sdirk4, "chain/gradient.json", "sdirk4");
+MBSOPT_GRADIENT_COST(stiff_governor_radau5, "governor/stiff_flyball.json", "radau5");
+MBSOPT_GRADIENT_COST(stiff_governor_sdirk4, "governor/stiff_flyball.json", "sdirk4");

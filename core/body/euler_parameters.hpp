@@ -3,6 +3,7 @@
 //   A(p)    = (e0^2 - e'e) I + 2 e e' + 2 e0 skew(e)         a rotation where p'p = 1, |p|^2 times one elsewhere
 //   B(p, w) = dA(p)[w]: bilinear and symmetric, B(p, p) = 2 A(p)
 //   N(p, s) = d(A(p) s)/dp  (3x4):  N(p, s) w = B(p, w) s = N(w, s) p
+//   N_transposed(p, s) = d(A(p)'s)/dp
 //   K(X)    = the symmetric 4x4 with <X, A(p)> = 1/2 p'K(X)p, so that <X, B(p, w)> = p'K(X)w
 //   omega_B = 2 G(p) pdot,  pdot = 1/2 G(p)' omega_B;  A(p) skew(omega_B) = B(p, 1/2 G(p)' omega_B) for every p
 //
@@ -40,6 +41,13 @@ inline Mat<3, 4> N(const Vector4d& p, const Vector3d& s) {
   return R;
 }
 
+// d(A(p)'s)/dp: A(p)' = A of the conjugate (e0, -e).
+inline Mat<3, 4> N_transposed(const Vector4d& p, const Vector3d& s) {
+  Mat<3, 4> R = N(Vector4d(p(0), -p(1), -p(2), -p(3)), s);
+  R.rightCols<3>() *= -1;
+  return R;
+}
+
 inline Mat<4, 4> K(const Matrix3d& X) {
   const double trace = X.trace();
   const Vector3d a(X(2, 1) - X(1, 2), X(0, 2) - X(2, 0), X(1, 0) - X(0, 1));
@@ -53,6 +61,13 @@ inline Mat<4, 4> K(const Matrix3d& X) {
   return R;
 }
 
+inline Mat<3, 4> G(const Vector4d& p) {
+  Mat<3, 4> R;
+  R.col(0) = -p.tail<3>();
+  R.rightCols<3>() = -skew(p.tail<3>());
+  R.rightCols<3>().diagonal().array() += p(0);
+  return R;
+}
 // G(p) x for x in R^4 (3 numbers), and G(p)' w for w in R^3 (4 numbers).
 inline Vector3d G_times(const Vector4d& p, const Vector4d& x) {
   const Vector3d e = p.tail<3>(), f = x.tail<3>();

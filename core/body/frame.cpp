@@ -31,23 +31,41 @@ void set_tangent(const BodyState& body, const Lanes<7>& q_dir, const Lanes<7>& v
   set_B(body.p, pdot_dir, 1, out.Adot);
   set_B(body.pdot, p_dir, 1, other);
   out.Adot += other;
-  // pddot' = 1/2 G(p')' omegadot - 2 (pdot'pdot') p - (pdot'pdot) p'
-  const Vector3d& w = body.omegadot;
-  Lanes<4>& pddot_dir = out.pddot;
-  pddot_dir.row(0) = -0.5 * (w(0) * p_dir.row(1) + w(1) * p_dir.row(2) + w(2) * p_dir.row(3));
-  pddot_dir.row(1) = 0.5 * (w(0) * p_dir.row(0) + w(2) * p_dir.row(2) - w(1) * p_dir.row(3));
-  pddot_dir.row(2) = 0.5 * (w(1) * p_dir.row(0) + w(0) * p_dir.row(3) - w(2) * p_dir.row(1));
-  pddot_dir.row(3) = 0.5 * (w(2) * p_dir.row(0) + w(1) * p_dir.row(1) - w(0) * p_dir.row(2));
-  const Lanes<1> spin = 2 * (body.pdot(0) * pdot_dir.row(0) + body.pdot(1) * pdot_dir.row(1) +
-                             body.pdot(2) * pdot_dir.row(2) + body.pdot(3) * pdot_dir.row(3));
-  for (int i = 0; i < 4; ++i) pddot_dir.row(i) -= body.p(i) * spin + body.pdot.squaredNorm() * p_dir.row(i);
+  const Lanes<4> pddot_dir = pddot_tangent(body, p_dir, pdot_dir);
   // Addot' = B(p, pddot') + B(p', pddot) + 2 B(pdot, pdot')
   set_B(body.p, pddot_dir, 1, out.Addot);
   set_B(body.pddot(), p_dir, 1, other);
   out.Addot += other;
   set_B(body.pdot, pdot_dir, 2, other);
   out.Addot += other;
-  out.p = p_dir, out.pdot = pdot_dir;
+  out.p = p_dir, out.pdot = pdot_dir, out.pddot = pddot_dir;
+  out.still = false;
+}
+
+// pddot' = 1/2 G(p')' omegadot - 2 (pdot'pdot') p - (pdot'pdot) p'
+Lanes<4> pddot_tangent(const BodyState& body, const Lanes<4>& p_dir, const Lanes<4>& pdot_dir) {
+  const Vector3d& w = body.omegadot;
+  Lanes<4> x;
+  x.row(0) = -0.5 * (w(0) * p_dir.row(1) + w(1) * p_dir.row(2) + w(2) * p_dir.row(3));
+  x.row(1) = 0.5 * (w(0) * p_dir.row(0) + w(2) * p_dir.row(2) - w(1) * p_dir.row(3));
+  x.row(2) = 0.5 * (w(1) * p_dir.row(0) + w(0) * p_dir.row(3) - w(2) * p_dir.row(1));
+  x.row(3) = 0.5 * (w(2) * p_dir.row(0) + w(1) * p_dir.row(1) - w(0) * p_dir.row(2));
+  const Lanes<1> spin = 2 * (body.pdot(0) * pdot_dir.row(0) + body.pdot(1) * pdot_dir.row(1) +
+                             body.pdot(2) * pdot_dir.row(2) + body.pdot(3) * pdot_dir.row(3));
+  for (int i = 0; i < 4; ++i) x.row(i) -= body.p(i) * spin + body.pdot.squaredNorm() * p_dir.row(i);
+  return x;
+}
+
+void set_unit_tangents(const BodyState& body, UnitTangents& out) {
+  Lanes<7> e = Lanes<7>::Zero();
+  const Lanes<7> none = Lanes<7>::Zero();
+  e.topLeftCorner<3, 3>().setIdentity();
+  set_tangent(body, e, none, out.r);
+  set_tangent(body, none, e, out.rdot);
+  e.setZero();
+  e.bottomRows<4>().setIdentity();
+  set_tangent(body, e, none, out.p);
+  set_tangent(body, none, e, out.pdot);
 }
 
 void FrameBar::set_zero() {

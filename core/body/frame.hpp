@@ -40,7 +40,14 @@ struct FrameTangent {
   Lanes<3> r, rdot;
   Lanes<9> A, Adot, Addot;
   Lanes<4> p, pdot, pddot;
+  bool still = false;  // all of it is zero: products with it may be left out
   void set_zero();
+  static FrameTangent zero() {
+    FrameTangent t;
+    t.set_zero();
+    t.still = true;
+    return t;
+  }
 };
 
 // A body's own numbers at a state: q = (r, p), v = (rdot, pdot), z = (rddot, omegadot in body axes).
@@ -78,7 +85,14 @@ void add_pull_back_velocity(const BodyState& body, const FrameBar& bar, double s
 void add_pull_back(const BodyState& body, FrameBar bar, const Vector4d& w_p, const Vector3d& eta_theta,
                    Eigen::Ref<Vec<7>> q_bar, Eigen::Ref<Vec<7>> v_bar);
 
-// Tangent of the frame for directions (q', v') with z held fixed.
+// Tangent of the frame for directions (q', v') with z held fixed; and of pddot alone.
 void set_tangent(const BodyState& body, const Lanes<7>& q_dir, const Lanes<7>& v_dir, FrameTangent& out);
+Lanes<4> pddot_tangent(const BodyState& body, const Lanes<4>& p_dir, const Lanes<4>& pdot_dir);
+
+// Tangents of the frame in each coordinate of r, p, rdot, pdot in turn (three lanes of those of r and rdot).
+struct UnitTangents {
+  FrameTangent r, p, rdot, pdot;
+};
+void set_unit_tangents(const BodyState& body, UnitTangents& out);
 
 }  // namespace mbsopt

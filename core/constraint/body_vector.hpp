@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "core/body/euler_parameters.hpp"
 #include "core/body/lanes.hpp"
 #include "core/constraint/primitive.hpp"
 
@@ -18,10 +19,26 @@ struct VectorJet {
 };
 struct VectorTangent {
   Lanes<3> x, xd, xdd;
-  VectorTangent(const Frame& f, const FrameTangent& t, const Vector3d& s, const Lanes<3>* ds)
-      : x(times(t.A, s)), xd(times(t.Adot, s)), xdd(times(t.Addot, s)) {
+  VectorTangent(const Frame& f, const FrameTangent& t, const Vector3d& s, const Lanes<3>* ds) {
+    if (t.still) {
+      x.setZero(), xd.setZero(), xdd.setZero();
+    } else {
+      x = times(t.A, s), xd = times(t.Adot, s), xdd = times(t.Addot, s);
+    }
     if (ds) x += f.A * *ds, xd += f.Adot * *ds, xdd += f.Addot * *ds;
   }
+};
+
+// Derivatives of x, xd, xdd in p and pdot with omegadot held fixed. Since  Addot = A(p) (skew(omegadot) - 2
+// (pdot'pdot))
+// + 2 A(pdot), all of them are values of N:  xd_pdot = x_p.
+struct VectorBlocks {
+  Mat<3, 4> x_p, xd_p, xdd_p, xdd_pdot;
+  VectorBlocks(const BodyState& b, const Frame& f, const Vector3d& s)
+      : x_p(N(b.p, s)),
+        xd_p(N(b.pdot, s)),
+        xdd_p(N(b.p, b.omegadot.cross(s) - 2 * b.pdot.squaredNorm() * s)),
+        xdd_pdot(2 * xd_p - 4 * (f.A * s) * b.pdot.transpose()) {}
 };
 
 // d = P2 - P1 of two body points; its second derivative without the part of rddot', which tangents hold fixed.
@@ -61,7 +78,7 @@ inline void add_point_bar(const Frame& f, const Vector3d& s, const VectorJet& ba
 // Tangent of the moment s x A'F (body axes) of a force F at s.
 inline Lanes<3> moment_tangent(const Frame& f, const FrameTangent& t, const Vector3d& s, const Lanes<3>* ds,
                                const Vector3d& F, const Lanes<3>& dF) {
-  Lanes<3> m = cross(s, transposed_times(t.A, F) + f.A.transpose() * dF);
+  Lanes<3> m = t.still ? cross(s, f.A.transpose() * dF) : cross(s, transposed_times(t.A, F) + f.A.transpose() * dF);
   if (ds) m -= cross(f.A.transpose() * F, *ds);
   return m;
 }

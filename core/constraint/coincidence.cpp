@@ -36,4 +36,14 @@ void Coincidence::tangent(const Frame& f1, const Frame& f2, const FrameTangent& 
   out.load2.bottomRows<3>() = moment_tangent(f2, t2, s2, s.s2, lambda, none);
 }
 
+void Coincidence::turning_blocks(const BodyState& b1, const Frame& f1, const BodyState& b2, const Frame& f2,
+                                 const Vec<3>& lambda, TurningBlocks<3>& out) const {
+  const VectorBlocks x(b1, f1, s1), y(b2, f2, s2);
+  out.p1 = -x.xdd_p, out.pdot1 = -x.xdd_pdot;
+  out.p2 = y.xdd_p, out.pdot2 = y.xdd_pdot;
+  out.moment1_p1 = -skew(s1) * N_transposed(b1.p, lambda);
+  out.moment2_p2 = skew(s2) * N_transposed(b2.p, lambda);
+  out.moment1_p2.setZero(), out.moment2_p1.setZero();
+}
+
 }  // namespace mbsopt

@@ -42,4 +42,19 @@ void Dot1::tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, con
   out.load2.bottomRows<3>() = lambda(0) * moment_tangent(f2, t2, s2, s.s2, x.x, dx.x);
 }
 
+void Dot1::turning_blocks(const BodyState& b1, const Frame& f1, const BodyState& b2, const Frame& f2,
+                          const Vec<1>& lambda, TurningBlocks<1>& out) const {
+  const VectorBlocks dx(b1, f1, s1), dy(b2, f2, s2);
+  const VectorJet x(f1, s1), y(f2, s2);
+  out.p1 = y.x.transpose() * dx.xdd_p + 2 * y.xd.transpose() * dx.xd_p + y.xdd.transpose() * dx.x_p;
+  out.p2 = x.x.transpose() * dy.xdd_p + 2 * x.xd.transpose() * dy.xd_p + x.xdd.transpose() * dy.x_p;
+  out.pdot1 = y.x.transpose() * dx.xdd_pdot + 2 * y.xd.transpose() * dx.x_p;
+  out.pdot2 = x.x.transpose() * dy.xdd_pdot + 2 * x.xd.transpose() * dy.x_p;
+  const Matrix3d S1 = lambda(0) * skew(s1), S2 = lambda(0) * skew(s2);
+  out.moment1_p1 = S1 * N_transposed(b1.p, y.x);
+  out.moment1_p2 = S1 * (f1.A.transpose() * dy.x_p);
+  out.moment2_p2 = S2 * N_transposed(b2.p, x.x);
+  out.moment2_p1 = S2 * (f2.A.transpose() * dx.x_p);
+}
+
 }  // namespace mbsopt

@@ -26,7 +26,10 @@ struct Dot1 {
 
   void tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
                const GeometryTangent& s, const Vec<1>& lambda, PrimitiveTangent<1>& out) const;
+
+  void turning_blocks(const BodyState& b1, const Frame& f1, const BodyState& b2, const Frame& f2, const Vec<1>& lambda,
+                      TurningBlocks<1>& out) const;
 };
-static_assert(IsPrimitive<Dot1>);
+static_assert(IsPrimitive<Dot1> && HasTurningBlocks<Dot1>);
 
 }  // namespace mbsopt

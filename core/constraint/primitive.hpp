@@ -35,6 +35,14 @@ struct GeometryTangent {
   const Lanes<3>* s3 = nullptr;
 };
 
+// Of a primitive whose Phiddot and J'lambda see nothing of the bodies' r and rdot: their derivatives in each body's p
+// and pdot (4 columns) with omegadot held fixed. Forces in J'lambda do not change, moments are in body axes.
+template <int Rows>
+struct TurningBlocks {
+  Mat<Rows, 4> p1, pdot1, p2, pdot2;                         // of Phiddot
+  Mat<3, 4> moment1_p1, moment1_p2, moment2_p1, moment2_p2;  // of J'lambda
+};
+
 template <int Rows>
 struct PrimitiveTangent {
   Lanes<Rows> phi, phi_dot, phi_ddot;
@@ -63,5 +71,12 @@ Vec<P::kRows> virtual_change(const P& p, const Frame& f1, const Frame& f2) {
   eta2 << f2.r_eta, f2.theta_eta;
   return J1 * eta1 + J2 * eta2;
 }
+
+// Has turning_blocks(): a short cut to what its tangents in all directions say.
+template <class P>
+concept HasTurningBlocks = requires(const P p, const Frame f, const BodyState b, const Vec<P::kRows> lambda,
+                                    TurningBlocks<P::kRows> out) {
+  p.turning_blocks(b, f, b, f, lambda, out);
+};
 
 }  // namespace mbsopt

@@ -2,7 +2,7 @@
 
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCore>
-#include <cmath>
+#include <algorithm>
 #include <map>
 #include <set>
 
@@ -24,31 +24,80 @@ std::vector<int> elimination_order(int n, std::span<const std::pair<int, int>> e
   return {order.data(), order.data() + order.size()};
 }
 
-// D -> inv(L) with D = L L', lower triangle of D used; false where D is not positive definite.
-bool invert_factor(Mat<6, 6>& D) {
-  Mat<6, 6> L;
+// Lower triangle of A -> W = inv(L), unit lower, and the inverse of D, with A = L D L'; false where D is not positive.
+bool factor_diagonal(Mat<6, 6>& A, Vec<6>& inverse) {
   for (int j = 0; j < 6; ++j) {
-    double d = D(j, j);
-    for (int k = 0; k < j; ++k) d -= L(j, k) * L(j, k);
-    if (!(d > 0)) return false;
-    const double root = std::sqrt(d), inverse = 1 / root;
-    L(j, j) = inverse;  // the inverse of the diagonal is all that is needed
-    for (int i = j + 1; i < 6; ++i) {
-      double x = D(i, j);
-      for (int k = 0; k < j; ++k) x -= L(i, k) * L(j, k);
-      L(i, j) = x * inverse;
+    if (!(A(j, j) > 0)) return false;
+    inverse(j) = 1 / A(j, j);
+    double l[6];
+    for (int i = j + 1; i < 6; ++i) l[i] = A(i, j) * inverse(j);
+    for (int k = j + 1; k < 6; ++k) {
+      for (int i = k; i < 6; ++i) A(i, k) -= l[i] * A(k, j);
     }
+    for (int i = j + 1; i < 6; ++i) A(i, j) = l[i];
   }
-  D.setZero();
-  for (int j = 0; j < 6; ++j) {
-    D(j, j) = L(j, j);
+  // W L = I, column by column from the last: W(i, j) = -L(i, j) - sum_{j<k<i} W(i, k) L(k, j)
+  for (int j = 4; j >= 0; --j) {
+    double w[6];
     for (int i = j + 1; i < 6; ++i) {
-      double x = 0;
-      for (int k = j; k < i; ++k) x -= L(i, k) * D(k, j);
-      D(i, j) = x * L(i, i);
+      w[i] = -A(i, j);
+      for (int k = j + 1; k < i; ++k) w[i] -= A(i, k) * A(k, j);
     }
+    for (int i = j + 1; i < 6; ++i) A(i, j) = w[i];
   }
   return true;
+}
+
+// M = B W', column by column.
+void times_transposed(const Mat<6, 6>& B, const Mat<6, 6>& W, Mat<6, 6>& M) {
+  for (int j = 0; j < 6; ++j) {
+    Vec<6> column = B.col(j);
+    for (int k = 0; k < j; ++k) column += W(j, k) * B.col(k);
+    M.col(j) = column;
+  }
+}
+
+// C -= A B'
+void subtract_product(const Mat<6, 6>& A, const Mat<6, 6>& B, Mat<6, 6>& C) {
+  for (int j = 0; j < 6; ++j) {
+    Vec<6> column = C.col(j);
+    for (int k = 0; k < 6; ++k) column -= B(j, k) * A.col(k);
+    C.col(j) = column;
+  }
+}
+
+// y = W b and y = W'b, W unit lower.
+template <class X>
+X times(const Mat<6, 6>& W, const X& b) {
+  X y = b;
+  for (int j = 0; j < 5; ++j) {
+    for (int i = j + 1; i < 6; ++i) y.row(i) += W(i, j) * b.row(j);
+  }
+  return y;
+}
+template <class X>
+X transposed_times(const Mat<6, 6>& W, const X& b) {
+  X y = b;
+  for (int j = 0; j < 5; ++j) {
+    for (int i = j + 1; i < 6; ++i) y.row(j) += W(i, j) * b.row(i);
+  }
+  return y;
+}
+// y -= L x and y -= L'x
+template <class X>
+void subtract_times(const Mat<6, 6>& L, const X& x, X& y) {
+  X sum = y;
+  for (int j = 0; j < 6; ++j) {
+    for (int i = 0; i < 6; ++i) sum.row(i) -= L(i, j) * x.row(j);
+  }
+  y = sum;
+}
+template <class X>
+void subtract_transposed_times(const Mat<6, 6>& L, const X& x, X& y) {
+  for (int j = 0; j < 6; ++j) {
+    y.row(j) -= L(0, j) * x.row(0) + L(1, j) * x.row(1) + L(2, j) * x.row(2) + L(3, j) * x.row(3) + L(4, j) * x.row(4) +
+                L(5, j) * x.row(5);
+  }
 }
 
 }  // namespace
@@ -88,14 +137,17 @@ BlockCholesky::BlockCholesky(int bodies, std::span<const std::pair<int, int>> ed
   for (int k = 0; k < n_; ++k) {
     const std::vector<Entry>& column = columns_[index(k)];
     for (std::size_t a = 0; a < column.size(); ++a) {
-      updates_[index(k)].push_back({index(column[a].row), column[a].block, column[a].block, true});
+      updates_[index(k)].push_back({index(column[a].row), a, column[a].block, true});
       for (std::size_t b = 0; b < a; ++b) {
-        updates_[index(k)].push_back(
-            {place[index(column[b].row)].at(column[a].row), column[a].block, column[b].block, false});
+        updates_[index(k)].push_back({place[index(column[b].row)].at(column[a].row), a, column[b].block, false});
       }
     }
   }
   diagonal_.resize(index(n_));
+  inverse_.resize(index(n_));
+  std::size_t longest = 0;
+  for (const std::vector<Entry>& column : columns_) longest = std::max(longest, column.size());
+  scaled_.resize(longest);
   permuted_.resize(index(n_));
   permuted_lanes_.resize(index(n_));
   set_zero();
@@ -106,14 +158,20 @@ void BlockCholesky::set_zero() {
   for (Block& b : lower_) b.setZero();
 }
 
+// L_ik = A_ik W_k' inv(D_k); A_ij -= L_ik D_k L_jk'
 bool BlockCholesky::factor() {
   for (std::size_t k = 0; k < index(n_); ++k) {
     Block& W = diagonal_[k];
-    if (!invert_factor(W)) return false;
-    for (const Entry& e : columns_[k]) lower_[e.block] = (lower_[e.block] * W.transpose()).eval();
+    Vec<6>& inverse = inverse_[k];
+    if (!factor_diagonal(W, inverse)) return false;
+    const std::vector<Entry>& column = columns_[k];
+    for (std::size_t e = 0; e < column.size(); ++e) {
+      Block &L = lower_[column[e].block], &LD = scaled_[e];
+      times_transposed(L, W, LD);
+      for (int j = 0; j < 6; ++j) L.col(j) = inverse(j) * LD.col(j);
+    }
     for (const Update& u : updates_[k]) {
-      Block& target = u.diagonal ? diagonal_[u.target] : lower_[u.target];
-      target.noalias() -= lower_[u.i] * lower_[u.j].transpose();
+      subtract_product(scaled_[u.i], lower_[u.j], u.diagonal ? diagonal_[u.target] : lower_[u.target]);
     }
   }
   return true;
@@ -123,14 +181,14 @@ template <class X>
 void BlockCholesky::solve_any(std::span<X> x, std::vector<X>& y) {
   for (std::size_t k = 0; k < index(n_); ++k) y[k] = x[index(order_[k])];
   for (std::size_t k = 0; k < index(n_); ++k) {
-    const X b = y[k];
-    y[k].noalias() = diagonal_[k] * b;
-    for (const Entry& e : columns_[k]) y[index(e.row)].noalias() -= lower_[e.block] * y[k];
+    y[k] = times(diagonal_[k], y[k]);
+    for (const Entry& e : columns_[k]) subtract_times(lower_[e.block], y[k], y[index(e.row)]);
   }
   for (std::size_t k = index(n_); k-- > 0;) {
-    for (const Entry& e : columns_[k]) y[k].noalias() -= lower_[e.block].transpose() * y[index(e.row)];
-    const X b = y[k];
-    y[k].noalias() = diagonal_[k].transpose() * b;
+    X z;
+    for (int i = 0; i < 6; ++i) z.row(i) = inverse_[k](i) * y[k].row(i);
+    for (const Entry& e : columns_[k]) subtract_transposed_times(lower_[e.block], y[index(e.row)], z);
+    y[k] = transposed_times(diagonal_[k], z);
     x[index(order_[k])] = y[k];
   }
 }

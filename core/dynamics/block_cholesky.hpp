@@ -1,5 +1,5 @@
-// Sparse Cholesky factorisation S = L L' of a symmetric positive definite matrix of 6x6 blocks on the graph of bodies.
-// Symbolic work once (elimination order by AMD, fill known), then factor and solve without allocation.
+// Sparse Cholesky factorisation S = L D L' (D diagonal) of a symmetric positive definite matrix of 6x6 blocks on the
+// graph of bodies. Symbolic work once (elimination order by AMD, fill known), then factor and solve without allocation.
 //
 //   BlockCholesky S(bodies, edges);          // edges: pairs of bodies that share a block
 //   S.set_zero();  S.diagonal(0) += ...;  S.add_off_diagonal(handle, X);
@@ -51,7 +51,7 @@ class BlockCholesky {
     int row = 0;
     std::size_t block = 0;
   };
-  struct Update {  // target -= L_i L_j'
+  struct Update {  // target -= L_i D L_j'; i: the entry's number in its column, j: its place
     std::size_t target = 0, i = 0, j = 0;
     bool diagonal = false;
   };
@@ -65,7 +65,9 @@ class BlockCholesky {
   std::vector<Handle> handles_;
   std::vector<std::vector<Entry>> columns_;  // strictly below the diagonal
   std::vector<std::vector<Update>> updates_;
-  std::vector<Block> diagonal_, lower_;  // S before factor(), inv(L_kk) and L_ik after
+  std::vector<Block> diagonal_, lower_;  // S before factor(), inv(L_kk) below the diagonal and L_ik after
+  std::vector<Vec<6>> inverse_;          // of D
+  std::vector<Block> scaled_;            // L_ik D_k of the column in hand
   std::vector<Vec<6>> permuted_;
   std::vector<Lanes<6>> permuted_lanes_;
 };

@@ -22,8 +22,10 @@ class ConstraintRows {
   void add_times(const std::vector<X>& x, Y& y) const {
     for (const RowGroup& g : data_->groups) {
       for (int r = 0; r < g.rows; ++r) {
-        if (g.body1 > 0) add_row_times(J1, g.block + r, x[at(g.body1)], y, g.row + r);
-        if (g.body2 > 0) add_row_times(J2, g.block + r, x[at(g.body2)], y, g.row + r);
+        RowOf<X> sum = y.row(g.row + r);
+        if (g.body1 > 0) add_row_times(J1, g.block + r, x[at(g.body1)], sum);
+        if (g.body2 > 0) add_row_times(J2, g.block + r, x[at(g.body2)], sum);
+        y.row(g.row + r) = sum;
       }
     }
   }
@@ -31,10 +33,8 @@ class ConstraintRows {
   template <class X, class Y>
   void subtract_transposed_times(const Y& lambda, std::vector<X>& x) const {
     for (const RowGroup& g : data_->groups) {
-      for (int r = 0; r < g.rows; ++r) {
-        if (g.body1 > 0) subtract_row_times(J1, g.block + r, lambda, g.row + r, x[at(g.body1)]);
-        if (g.body2 > 0) subtract_row_times(J2, g.block + r, lambda, g.row + r, x[at(g.body2)]);
-      }
+      if (g.body1 > 0) subtract_group_times(J1, g, lambda, x[at(g.body1)]);
+      if (g.body2 > 0) subtract_group_times(J2, g, lambda, x[at(g.body2)]);
     }
   }
   // S += J' diag(alpha) J
@@ -47,16 +47,43 @@ class ConstraintRows {
   Rows J1, J2;  // one row per block row
 
  private:
-  // Written out by rows: the compiler unrolls these, and does not unroll Eigen's products with a row of a dynamic
-  // matrix.
-  template <class X, class Y>
-  static void add_row_times(const Rows& J, int block, const X& x, Y& y, int row) {
-    for (int i = 0; i < 6; ++i) y.row(row) += J(block, i) * x.row(i);
+  template <class X>
+  using RowOf = Eigen::Matrix<double, 1, X::ColsAtCompileTime>;
+
+  // Which of a row's first three entries, those of a body's displacement, are not zero: one, none or all.
+  enum class Displaces : char { x, y, z, none, all };
+
+  // Written out, on copies: the compiler unrolls these and keeps them in registers, and does neither with Eigen's
+  // products with a row of a dynamic matrix.
+  template <class X>
+  void add_row_times(const Rows& J, int block, const X& x, RowOf<X>& sum) const {
+    const double* row = J.row(block).data();
+    const Displaces d = displaces_[static_cast<std::size_t>(block)];
+    if (d < Displaces::none) {
+      sum += row[static_cast<int>(d)] * x.row(static_cast<int>(d));
+    } else if (d == Displaces::all) {
+      sum += row[0] * x.row(0) + row[1] * x.row(1) + row[2] * x.row(2);
+    }
+    sum += row[3] * x.row(3) + row[4] * x.row(4) + row[5] * x.row(5);
   }
   template <class X, class Y>
-  static void subtract_row_times(const Rows& J, int block, const Y& lambda, int row, X& x) {
-    for (int i = 0; i < 6; ++i) x.row(i) -= J(block, i) * lambda.row(row);
+  void subtract_group_times(const Rows& J, const RowGroup& g, const Y& lambda, X& x) const {
+    X sum = x;
+    for (int r = 0; r < g.rows; ++r) {
+      const double* row = J.row(g.block + r).data();
+      const RowOf<X> l = lambda.row(g.row + r);
+      const Displaces d = displaces_[static_cast<std::size_t>(g.block + r)];
+      if (d < Displaces::none) {
+        sum.row(static_cast<int>(d)) -= row[static_cast<int>(d)] * l;
+      } else if (d == Displaces::all) {
+        for (int i = 0; i < 3; ++i) sum.row(i) -= row[i] * l;
+      }
+      for (int i = 3; i < 6; ++i) sum.row(i) -= row[i] * l;
+    }
+    x = sum;
   }
+  void add_lower_square(double alpha, const Rows& J, int block, Mat<6, 6>& S) const;
+  void add_cross(double alpha, int block, Mat<6, 6>& S12) const;
   static std::size_t at(int body) { return static_cast<std::size_t>(body - 1); }
   void add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky& S);
 
@@ -69,7 +96,8 @@ class ConstraintRows {
   };
 
   const MechanismData* data_;
-  std::vector<std::size_t> handle_;  // per group: its off-diagonal block
+  std::vector<Displaces> displaces_;  // per block row
+  std::vector<std::size_t> handle_;   // per group: its off-diagonal block
   std::vector<SharedRow> shared_;
   std::vector<std::pair<int, int>> edges_;
 };

@@ -1,5 +1,7 @@
 #include "core/dynamics/constraint_terms.hpp"
 
+#include <algorithm>
+
 namespace mbsopt {
 namespace {
 
@@ -32,6 +34,41 @@ void put_on_branch(const Constraint& c, const RowLaws& laws, const Eigen::Vector
   if constexpr (std::is_same_v<P, Angle>) {
     value(0) = Angle::on_branch(value(0), c.angle == Constraint::kNearestLaw ? laws.f_or_zero(c.row) : angles(c.angle));
   }
+}
+
+void add_tangent(const Constraint& c, const std::vector<Frame>& frames, const RowLaws& laws,
+                 const Eigen::VectorXd& angles, const FrameTangent& t1, const FrameTangent& t2,
+                 const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,
+                 std::vector<Lanes<6>>& loads) {
+  std::visit(
+      [&]<class P>(const P& p) {
+        constexpr int m = P::kRows;
+        const std::size_t i = static_cast<std::size_t>(c.body1), j = static_cast<std::size_t>(c.body2);
+        Lanes<3> s1, s2, s3;
+        const GeometryTangent s{block.field<3>(c.slot1, s1), block.field<3>(c.slot2, s2), block.field<3>(c.slot3, s3)};
+        PrimitiveTangent<m> t;
+        p.tangent(frames[i], frames[j], t1, t2, s, lambda.segment<m>(c.row), t);
+        out.phi.middleRows<m>(c.row) += c.factor * t.phi;
+        out.phi_dot.middleRows<m>(c.row) += c.factor * t.phi_dot;
+        out.phi_ddot.middleRows<m>(c.row) += c.factor * t.phi_ddot;
+        loads[i] += c.factor * t.load1;
+        loads[j] += c.factor * t.load2;
+        Lanes<1> storage;
+        if (const Lanes<1>* factor_dir = block.field<1>(c.slot_factor, storage)) {
+          Vec<m> phi, phi_dot, phi_ddot;
+          p.phi(frames[i], frames[j], phi), p.phi_dot(frames[i], frames[j], phi_dot);
+          p.phi_ddot(frames[i], frames[j], phi_ddot);
+          put_on_branch<P>(c, laws, angles, phi);
+          out.phi.middleRows<m>(c.row) += phi * *factor_dir;
+          out.phi_dot.middleRows<m>(c.row) += phi_dot * *factor_dir;
+          out.phi_ddot.middleRows<m>(c.row) += phi_ddot * *factor_dir;
+          Mat<m, 6> J1, J2;
+          p.jacobian(frames[i], frames[j], J1, J2);
+          loads[i] += J1.transpose() * lambda.segment<m>(c.row) * *factor_dir;
+          loads[j] += J2.transpose() * lambda.segment<m>(c.row) * *factor_dir;
+        }
+      },
+      c.primitive);
 }
 
 }  // namespace
@@ -96,36 +133,24 @@ void evaluate_tangents(const MechanismData& data, const std::vector<Frame>& fram
                        std::vector<Lanes<6>>& loads) {
   for (LaneRows* x : {&out.phi, &out.phi_dot, &out.phi_ddot}) x->setZero();
   for (const Constraint& c : data.constraints) {
-    std::visit(
-        [&]<class P>(const P& p) {
-          constexpr int m = P::kRows;
-          const std::size_t i = static_cast<std::size_t>(c.body1), j = static_cast<std::size_t>(c.body2);
-          Lanes<3> s1, s2, s3;
-          const GeometryTangent s{block.field<3>(c.slot1, s1), block.field<3>(c.slot2, s2),
-                                  block.field<3>(c.slot3, s3)};
-          PrimitiveTangent<m> t;
-          p.tangent(frames[i], frames[j], directions[i], directions[j], s, lambda.segment<m>(c.row), t);
-          out.phi.middleRows<m>(c.row) += c.factor * t.phi;
-          out.phi_dot.middleRows<m>(c.row) += c.factor * t.phi_dot;
-          out.phi_ddot.middleRows<m>(c.row) += c.factor * t.phi_ddot;
-          loads[i] += c.factor * t.load1;
-          loads[j] += c.factor * t.load2;
-          Lanes<1> storage;
-          if (const Lanes<1>* factor_dir = block.field<1>(c.slot_factor, storage)) {
-            Vec<m> phi, phi_dot, phi_ddot;
-            p.phi(frames[i], frames[j], phi), p.phi_dot(frames[i], frames[j], phi_dot);
-            p.phi_ddot(frames[i], frames[j], phi_ddot);
-            put_on_branch<P>(c, laws, angles, phi);
-            out.phi.middleRows<m>(c.row) += phi * *factor_dir;
-            out.phi_dot.middleRows<m>(c.row) += phi_dot * *factor_dir;
-            out.phi_ddot.middleRows<m>(c.row) += phi_ddot * *factor_dir;
-            Mat<m, 6> J1, J2;
-            p.jacobian(frames[i], frames[j], J1, J2);
-            loads[i] += J1.transpose() * lambda.segment<m>(c.row) * *factor_dir;
-            loads[j] += J2.transpose() * lambda.segment<m>(c.row) * *factor_dir;
-          }
-        },
-        c.primitive);
+    add_tangent(c, frames, laws, angles, directions[static_cast<std::size_t>(c.body1)],
+                directions[static_cast<std::size_t>(c.body2)], block, lambda, out, loads);
+  }
+  laws.subtract_tangents(block, out.phi, out.phi_dot, out.phi_ddot);
+}
+
+void evaluate_field_tangents(const MechanismData& data, const std::vector<Frame>& frames, RowLaws& laws,
+                             const Eigen::VectorXd& angles, const ParameterBlock& block, const Eigen::VectorXd& lambda,
+                             ConstraintTangents& out, std::vector<Lanes<6>>& loads) {
+  for (LaneRows* x : {&out.phi, &out.phi_dot, &out.phi_ddot}) x->setZero();
+  static const FrameTangent still = FrameTangent::zero();
+  for (const Constraint& c : data.constraints) {
+    if (std::max({c.slot1, c.slot2, c.slot3, c.slot_factor}) < 0) continue;
+    if (!(block.moves(c.slot1, 3) || block.moves(c.slot2, 3) || block.moves(c.slot3, 3) ||
+          block.moves(c.slot_factor, 1))) {
+      continue;
+    }
+    add_tangent(c, frames, laws, angles, still, still, block, lambda, out, loads);
   }
   laws.subtract_tangents(block, out.phi, out.phi_dot, out.phi_ddot);
 }

@@ -34,9 +34,14 @@ void add_pull_back(const MechanismData& data, const std::vector<Frame>& frames, 
 struct ConstraintTangents {
   LaneRows phi, phi_dot, phi_ddot;
 };
+// In the bodies' directions and those of the fields.
 void evaluate_tangents(const MechanismData& data, const std::vector<Frame>& frames, RowLaws& laws,
                        const Eigen::VectorXd& angles, const std::vector<FrameTangent>& directions,
                        const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,
                        std::vector<Lanes<6>>& loads);
+// In the directions of the fields alone, bodies at rest: only constraints and laws that have some.
+void evaluate_field_tangents(const MechanismData& data, const std::vector<Frame>& frames, RowLaws& laws,
+                             const Eigen::VectorXd& angles, const ParameterBlock& block, const Eigen::VectorXd& lambda,
+                             ConstraintTangents& out, std::vector<Lanes<6>>& loads);
 
 }  // namespace mbsopt

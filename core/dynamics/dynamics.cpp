@@ -49,8 +49,6 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
   frames_.resize(n + 1);
   loads_.resize(n), z_.resize(n), eta_.resize(n), body_loads_.resize(n + 1);
   for (Eigen::VectorXd* x : {&gamma_, &phi_, &phi_dot_, &lambda_, &mu_, &g_}) x->setZero(m);
-  frame_tangents_.resize(n + 1);
-  for (FrameTangent& t : frame_tangents_) t.set_zero();
   load_dirs_.resize(n + 1), rhs_lanes_.resize(n), z_dir_.resize(n);
   for (LaneRows* x :
        {&constraint_dirs_.phi, &constraint_dirs_.phi_dot, &constraint_dirs_.phi_ddot, &gamma_dir_, &lambda_dir_}) {
@@ -86,6 +84,7 @@ void Dynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::Vector
   y_ = y;
   angles_ = angles;
   laws_.set_time(t);
+  if (linear_) linear_->current = false;
   for (int i = 1; i <= data_.n; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
     set_position(y.segment<7>(7 * (i - 1)), bodies_[k], frames_[k]);
@@ -146,61 +145,7 @@ bool Dynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen::Vector
 
 void Dynamics::linearise_here() {
   for (std::size_t i = 1; i < frames_.size(); ++i) set_acceleration(z_[i - 1], bodies_[i], frames_[i]);
-}
-
-void Dynamics::right_hand_side_tangent(const ParameterBlock& block, const LaneRows& y_dir) {
-  const int n = data_.n;
-  for (int i = 1; i <= n; ++i) {
-    const std::size_t k = static_cast<std::size_t>(i);
-    const Lanes<7> q_dir = y_dir.middleRows<7>(7 * (i - 1)), v_dir = y_dir.middleRows<7>(7 * (n + i - 1));
-    set_tangent(bodies_[k], q_dir, v_dir, frame_tangents_[k]);
-  }
-  for (Lanes<6>& load : load_dirs_) load.setZero();
-  evaluate_tangents(data_, frames_, laws_, angles_, frame_tangents_, block, lambda_, constraint_dirs_, load_dirs_);
-  for (Lanes<6>& load : load_dirs_) load = -load;  // from (J'lambda)' to its share of the right-hand side
-  forces_.add_tangent(here(), frame_tangents_, block, y_dir, load_dirs_);
-  if (!data_.user_forces.empty()) add_user_tangent(block, y_dir);
-
-  Lanes<3> gravity_dir;
-  const Lanes<3>* dg = block.field<3>(data_.slot_gravity, gravity_dir);
-  for (int i = 1; i <= n; ++i) {
-    const std::size_t k = static_cast<std::size_t>(i);
-    const BodyData& body = data_.bodies[k];
-    const BodyState& state = bodies_[k];
-    const Vector3d omega = state.omega(), J_omega = body.J * omega;
-    // omega' = 2 (G(p) pdot' - G(pdot) p')
-    const Lanes<7> q_dir = y_dir.middleRows<7>(7 * (i - 1)), v_dir = y_dir.middleRows<7>(7 * (n + i - 1));
-    Lanes<3> omega_dir;
-    const Vector3d e = state.p.tail<3>(), f = state.pdot.tail<3>();
-    omega_dir = 2 * (state.p(0) * v_dir.bottomRows<3>() - e * v_dir.row(3) - cross(e, v_dir.bottomRows<3>()) -
-                     state.pdot(0) * q_dir.bottomRows<3>() + f * q_dir.row(3) + cross(f, q_dir.bottomRows<3>()));
-    Lanes<3> J_omega_dir = body.J * omega_dir;
-    Lanes<6>& b = rhs_lanes_[k - 1];
-    b = load_dirs_[k];
-    Lanes<1> mass_dir;
-    if (const Lanes<1>* dm = block.field<1>(body.slot_mass, mass_dir)) {
-      b.topRows<3>() += (data_.gravity - z_[k - 1].head<3>()) * *dm;
-    }
-    if (dg) b.topRows<3>() += body.mass * *dg;
-    Lanes<6> J_dir;
-    if (const Lanes<6>* dJ = block.field<6>(body.slot_J, J_dir)) {
-      auto times_J = [&](const Vector3d& x) {
-        Lanes<3> y;
-        y.row(0) = x(0) * dJ->row(0) + x(1) * dJ->row(3) + x(2) * dJ->row(4);
-        y.row(1) = x(0) * dJ->row(3) + x(1) * dJ->row(1) + x(2) * dJ->row(5);
-        y.row(2) = x(0) * dJ->row(4) + x(1) * dJ->row(5) + x(2) * dJ->row(2);
-        return y;
-      };
-      b.bottomRows<3>() -= times_J(z_[k - 1].tail<3>());
-      J_omega_dir += times_J(omega);
-    }
-    b.bottomRows<3>() -= cross(omega, J_omega_dir) - cross(J_omega, omega_dir);
-  }
-  gamma_dir_ = -constraint_dirs_.phi_ddot;
-  if (settings_.omega != 0) {
-    gamma_dir_ -= 2 * settings_.xi * settings_.omega * constraint_dirs_.phi_dot +
-                  settings_.omega * settings_.omega * constraint_dirs_.phi;
-  }
+  if (linear_) linear_->current = false;
 }
 
 void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir) {
@@ -217,7 +162,7 @@ void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneR
     ydot_dir.middleRows<3>(half + 7 * (i - 1)) = z_dir_[k - 1].topRows<3>();
     // pddot' = (pddot' with omegadot fixed) + 1/2 G(p)' omegadot'
     auto out = ydot_dir.middleRows<4>(half + 7 * (i - 1) + 3);
-    out = frame_tangents_[k].pddot;
+    out = pddot_tangent(bodies_[k], y_dir.middleRows<4>(7 * (i - 1) + 3), y_dir.middleRows<4>(half + 7 * (i - 1) + 3));
     out.row(0) -= 0.5 * dot(p.tail<3>(), w);
     out.bottomRows<3>() += 0.5 * (p(0) * w + cross(p.tail<3>(), w));
   }

@@ -16,8 +16,10 @@
 // One Dynamics per thread: it owns every array a right-hand side touches and allocates nothing after construction.
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include "core/dynamics/constraint_blocks.hpp"
 #include "core/dynamics/constraint_terms.hpp"
 #include "core/dynamics/force_terms.hpp"
 #include "core/dynamics/saddle_solver.hpp"
@@ -68,9 +70,16 @@ class Dynamics {
   // a row of J times T, and 1/alpha (0: constrained).
   Mat<7, 7> mass_block(int body) const;
   Mat<1, 7> times_T(int body, const Mat<1, 6>& J_row) const;
+  // What a fixed a adds to the derivatives with z fixed: omegadot in p; and to a body's own block of -r_q, -r_v, its
+  // row of p included.
+  Mat<3, 4> omegadot_by_p(int body) const;
+  void add_fixed_a(int body, Mat<7, 7>& q, Mat<7, 7>& v) const;
   const ConstraintRows& place_rows() const { return solver_.rows(); }
   double compliance() const;  // 1/alpha of the penalty form, 0: constrained
 
+  // The derivatives of the equations in the state where they were linearised or placed, z and lambda held fixed.
+  // Evaluated once there; the first call of all allocates.
+  const MotionBlocks& blocks();
   // y_dir: tangent of y (14n x lanes); ydot_dir: of (v, a).
   void tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir);
   // w: cotangent of (v, a); adds to the cotangents of y, of the differentiated fields, and of the parameters in laws.
@@ -90,15 +99,17 @@ class Dynamics {
   void set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
   void set_motion(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                   const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
-  // What the state's and the parameters' directions do to f - M z - J'lambda (rhs_lanes_) and -(J z + gamma)
+  // What the state's and the parameters' directions do to b = f - M z - J'lambda (rhs_lanes_) and c = -(J z + gamma)
   // (gamma_dir_).
   void right_hand_side_tangent(const ParameterBlock& block, const LaneRows& y_dir);
   // y_bar, ... += gradient of  pddot_bar'pddot - eta'(M z + J'lambda - f) - mu'(J z + gamma)  with z and lambda fixed.
   void pull_back(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
   void set_loads();  // f
   ForceTerms::At here() const { return {t_, y_, angles_, frames_}; }
+  void set_user_state(const UserForceData& force);
   void add_user_loads();
-  void add_user_tangent(const ParameterBlock& block, const LaneRows& y_dir);
+  void add_user_blocks(MotionBlocks& out);
+  void add_user_field_tangent(const ParameterBlock& block);
   void add_user_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& rho_bar);
   SaddleSolver::Settings solver_settings(bool derivative) const;
 
@@ -118,7 +129,13 @@ class Dynamics {
   Eigen::VectorXd gamma_, phi_, phi_dot_, lambda_, mu_, g_;
   Eigen::VectorXd a_;  // of a place: qddot as given
   // Derivatives.
-  std::vector<FrameTangent> frame_tangents_;
+  struct Linearisation {
+    MotionBlocks blocks;
+    ConstraintBlocks constraints;
+    std::vector<UnitTangents> units;  // where something reads them
+    bool current = false;
+  };
+  std::optional<Linearisation> linear_;
   std::vector<Lanes<6>> load_dirs_, rhs_lanes_, z_dir_;
   ConstraintTangents constraint_dirs_;
   LaneRows gamma_dir_, lambda_dir_;

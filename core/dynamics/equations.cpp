@@ -117,6 +117,20 @@ Mat<7, 7> Dynamics::mass_block(int body) const {
   return X;
 }
 
+Mat<3, 4> Dynamics::omegadot_by_p(int body) const {
+  const std::size_t k = static_cast<std::size_t>(body);
+  const Vector4d& p = bodies_[k].p;
+  return (-2 / p.squaredNorm()) * (G(a_.segment<4>(7 * (body - 1) + 3)) + z_[k - 1].tail<3>() * p.transpose());
+}
+
+void Dynamics::add_fixed_a(int body, Mat<7, 7>& q, Mat<7, 7>& v) const {
+  const std::size_t k = static_cast<std::size_t>(body);
+  const Vector4d &p = bodies_[k].p, &pdot = bodies_[k].pdot;
+  q.block<3, 4>(3, 3) += data_.bodies[k].J * omegadot_by_p(body);
+  q.block<1, 4>(6, 3) = (a_.segment<4>(7 * (body - 1) + 3) + 2 * pdot.squaredNorm() * p).transpose();
+  v.block<1, 4>(6, 3) = 2 * p.squaredNorm() * pdot.transpose();
+}
+
 Mat<1, 7> Dynamics::times_T(int body, const Mat<1, 6>& J_row) const {
   const Vector4d& p = bodies_[static_cast<std::size_t>(body)].p;
   Mat<1, 7> x;

@@ -76,9 +76,99 @@ void ForceTerms::add_loads(const At& at, std::vector<Vec<6>>& loads) {
   }
 }
 
-void ForceTerms::add_tangent(const At& at, const std::vector<FrameTangent>& tangents, const ParameterBlock& block,
-                             const LaneRows& y_dir, std::vector<Lanes<6>>& load_dirs) {
+bool ForceTerms::any() const {
+  return !(data_.tsda.empty() && data_.rsda.empty() && data_.turning_frictions.empty() &&
+           data_.sliding_frictions.empty() && data_.bushings.empty() && data_.applied.empty());
+}
+
+template <class Tangent>
+void ForceTerms::add_pair(int body1, int body2, const std::vector<UnitTangents>& units, MotionBlocks& out,
+                          Tangent&& tangent) {
+  static const FrameTangent still = FrameTangent::zero();
+  for (const int read : {body1, body2}) {
+    if (read == 0) continue;
+    auto add = [&](MotionBlocks::Part part, const FrameTangent& t) {
+      Lanes<6> load1 = Lanes<6>::Zero(), load2 = Lanes<6>::Zero();
+      tangent(read == body1 ? t : still, read == body2 ? t : still, load1, load2);
+      if (body1 > 0) out.b[index(out.pair(body1 - 1, read - 1))].add(part, load1);
+      if (body2 > 0) out.b[index(out.pair(body2 - 1, read - 1))].add(part, load2);
+    };
+    const UnitTangents& unit = units[index(read)];
+    add(MotionBlocks::r, unit.r);
+    add(MotionBlocks::p, unit.p);
+    add(MotionBlocks::rdot, unit.rdot);
+    add(MotionBlocks::pdot, unit.pdot);
+  }
+}
+
+void ForceTerms::add_blocks(const At& at, const std::vector<UnitTangents>& units, MotionBlocks& out) {
+  const Lanes<1> none = Lanes<1>::Zero();
   for (const TsdaForce& f : data_.tsda) {
+    const Frame &f1 = at.frames[index(f.body1)], &f2 = at.frames[index(f.body2)];
+    const TsdaForce::Span x = f.span(f1, f2);
+    const Law::Value value = f.law.derivatives(at.t, data_.rho, x.l, x.ldot, law_);
+    add_pair(f.body1, f.body2, units, out,
+             [&](const FrameTangent& t1, const FrameTangent& t2, Lanes<6>& load1, Lanes<6>& load2) {
+               f.tangent(x, value, none, f1, f2, t1, t2, nullptr, nullptr, load1, load2);
+             });
+  }
+  for_each_joint_effort([&](const auto& f) {
+    const Frame &f1 = at.frames[index(f.joint.body1)], &f2 = at.frames[index(f.joint.body2)];
+    const double x = f.joint.value_near(reference(f.angle, at.angles), f1, f2), xdot = f.joint.rate(f1, f2);
+    const Law::Value value = f.law.derivatives(at.t, data_.rho, x, xdot, law_);
+    add_pair(f.joint.body1, f.joint.body2, units, out,
+             [&](const FrameTangent& t1, const FrameTangent& t2, Lanes<6>& load1, Lanes<6>& load2) {
+               f.tangent(value, none, f1, f2, t1, t2, {}, load1, load2);
+             });
+  });
+  for (const Bushing& f : data_.bushings) {
+    const Frame &f1 = at.frames[index(f.body1)], &f2 = at.frames[index(f.body2)];
+    add_pair(f.body1, f.body2, units, out,
+             [&](const FrameTangent& t1, const FrameTangent& t2, Lanes<6>& load1, Lanes<6>& load2) {
+               f.tangent(f1, f2, t1, t2, {}, load1, load2);
+             });
+  }
+  const int t = static_cast<int>(data_.rho.size());
+  static const FrameTangent still = FrameTangent::zero();
+  for (const AppliedForce& f : data_.applied) {
+    const Vector3d c = components_with_gradients(f, at);
+    const Frame& frame = at.frames[index(f.body)];
+    const int row = f.body - 1;
+    Lanes<6> load = Lanes<6>::Zero();
+    f.tangent(c, Lanes<3>::Zero(), frame, units[index(f.body)].p, nullptr, load);
+    out.b[index(out.pair(row, row))].add(MotionBlocks::p, load);
+    for (const int s : f.sensors) {
+      y_bar_.setZero(), rho_bar_.setZero();
+      add_gradient(data_, data_.sensors[index(s)], at.t, at.y, at.angles, 1, y_bar_, rho_bar_);
+      Lanes<3> dc = Lanes<3>::Zero();
+      for (int i = 0; i < 3; ++i) dc(i, 0) = gradients_[index(i)][index(t + 1 + s)];
+      load.setZero();
+      f.tangent(c, dc, frame, still, nullptr, load);
+      for (int j = 0; j < data_.n; ++j) {
+        const Vec<7> q = y_bar_.segment<7>(7 * j), v = y_bar_.segment<7>(7 * (data_.n + j));
+        if (q.isZero(0) && v.isZero(0)) continue;
+        MotionBlocks::Block<6>& block = out.b[index(out.pair(row, j))];
+        block.q += load.col(0) * q.transpose();
+        block.v += load.col(0) * v.transpose();
+        block.parts |= MotionBlocks::r | MotionBlocks::p | MotionBlocks::rdot | MotionBlocks::pdot;
+      }
+    }
+  }
+}
+
+template <class L>
+bool ForceTerms::moves(const ParameterBlock& block, const L& law, std::initializer_list<int> slots) {
+  if constexpr (requires { law.program; }) {
+    if (law.program) return true;
+  }
+  return block.moves(law.slot, L::kFields) ||
+         std::any_of(slots.begin(), slots.end(), [&](int slot) { return block.moves(slot, 3); });
+}
+
+void ForceTerms::add_field_tangent(const At& at, const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs) {
+  static const FrameTangent still = FrameTangent::zero();
+  for (const TsdaForce& f : data_.tsda) {
+    if (!moves(block, f.law, {f.slot1, f.slot2})) continue;
     const std::size_t i = index(f.body1), j = index(f.body2);
     const TsdaForce::Span x = f.span(at.frames[i], at.frames[j]);
     const Law::Value value = f.law.derivatives(at.t, data_.rho, x.l, x.ldot, law_);
@@ -86,10 +176,11 @@ void ForceTerms::add_tangent(const At& at, const std::vector<FrameTangent>& tang
     Lanes<3> s1, s2;
     const Lanes<1> df = f.law.field_tangent(
         x.l, x.ldot, block.field<4>(f.law.slot, fields), [&](int p) { return block.direction(p); }, law_);
-    f.tangent(x, value, df, at.frames[i], at.frames[j], tangents[i], tangents[j], block.field<3>(f.slot1, s1),
+    f.tangent(x, value, df, at.frames[i], at.frames[j], still, still, block.field<3>(f.slot1, s1),
               block.field<3>(f.slot2, s2), load_dirs[i], load_dirs[j]);
   }
   for_each_joint_effort([&](const auto& f) {
+    if (!moves(block, f.law, {f.joint.slot1, f.joint.slot2, f.joint.slot3})) return;
     constexpr int kFields = decltype(f.law)::kFields;
     const std::size_t i = index(f.joint.body1), j = index(f.joint.body2);
     const Frame &f1 = at.frames[i], &f2 = at.frames[j];
@@ -101,16 +192,17 @@ void ForceTerms::add_tangent(const At& at, const std::vector<FrameTangent>& tang
         x, xdot, block.field<kFields>(f.law.slot, fields), [&](int p) { return block.direction(p); }, law_);
     const GeometryTangent ds{block.field<3>(f.joint.slot1, s1), block.field<3>(f.joint.slot2, s2),
                              block.field<3>(f.joint.slot3, s3)};
-    f.tangent(value, df, f1, f2, tangents[i], tangents[j], ds, load_dirs[i], load_dirs[j]);
+    f.tangent(value, df, f1, f2, still, still, ds, load_dirs[i], load_dirs[j]);
   });
   for (const Bushing& f : data_.bushings) {
+    if (std::max({f.slot1, f.slot2, f.slot_R0, f.slot_law}) < 0) continue;
     const std::size_t i = index(f.body1), j = index(f.body2);
     Lanes<3> s1, s2;
     Lanes<9> R0;
     Lanes<12> law;
     const Bushing::FieldLanes fields{block.field<3>(f.slot1, s1), block.field<3>(f.slot2, s2),
                                      block.field<9>(f.slot_R0, R0), block.field<12>(f.slot_law, law)};
-    f.tangent(at.frames[i], at.frames[j], tangents[i], tangents[j], fields, load_dirs[i], load_dirs[j]);
+    f.tangent(at.frames[i], at.frames[j], still, still, fields, load_dirs[i], load_dirs[j]);
   }
   const int t = static_cast<int>(data_.rho.size());
   for (const AppliedForce& f : data_.applied) {
@@ -124,17 +216,13 @@ void ForceTerms::add_tangent(const At& at, const std::vector<FrameTangent>& tang
       y_bar_.setZero(), rho_bar_.setZero();
       add_gradient(data_, data_.sensors[index(s)], at.t, at.y, at.angles, 1, y_bar_, rho_bar_);
       Lanes<1> direction = Lanes<1>::Zero();
-      for (Eigen::Index i = 0; i < y_bar_.size(); ++i) {
-        if (y_bar_(i) != 0) direction += y_bar_(i) * y_dir.row(i);
-      }
       for (int lane = 0; lane < kLanes; ++lane) {
-        if (block.parameter[lane] >= 0) direction(lane) += rho_bar_(block.parameter[lane]);
+        if (block.parameter[lane] >= 0) direction(lane) = rho_bar_(block.parameter[lane]);
       }
       add_input(t + 1 + s, direction);
     }
     Lanes<3> ds;
-    f.tangent(c, dc, at.frames[index(f.body)], tangents[index(f.body)], block.field<3>(f.slot, ds),
-              load_dirs[index(f.body)]);
+    f.tangent(c, dc, at.frames[index(f.body)], still, block.field<3>(f.slot, ds), load_dirs[index(f.body)]);
   }
 }
 

@@ -2,15 +2,16 @@
 // global axes and moment in body axes, with tangent and pull-back.
 //
 // A force written with sensors, F(t, rho, s(t, y, rho)), is differentiated through them:
-//   tangent    F' = F_rho rho' + F_s (s_y y' + s_rho rho')
+//   blocks     F_y = F_s s_y        fields     F' = (F_rho + F_s s_rho) rho'
 //   pull-back  y_bar += s_y' F_s' F_bar,    rho_bar += (F_rho + F_s s_rho)' F_bar
 //
 // Owns the numbers of one evaluation: one per thread, nothing is allocated after construction.
 #pragma once
 
+#include <initializer_list>
 #include <vector>
 
-#include "core/mechanism/parameter_lanes.hpp"
+#include "core/dynamics/motion_blocks.hpp"
 
 namespace mbsopt {
 
@@ -26,8 +27,11 @@ class ForceTerms {
     const std::vector<Frame>& frames;
   };
   void add_loads(const At& at, std::vector<Vec<6>>& loads);
-  void add_tangent(const At& at, const std::vector<FrameTangent>& tangents, const ParameterBlock& block,
-                   const LaneRows& y_dir, std::vector<Lanes<6>>& load_dirs);
+  // Their derivatives in the state as blocks, units: unit tangents of all bodies, the ground first; and in the
+  // directions of fields and parameters, bodies at rest.
+  bool any() const;
+  void add_blocks(const At& at, const std::vector<UnitTangents>& units, MotionBlocks& out);
+  void add_field_tangent(const At& at, const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs);
   // Gradient of the virtual work sum load'eta, eta in the frames and held fixed.
   void add_pull_back(const At& at, std::vector<FrameBar>& bars, Eigen::Ref<Eigen::VectorXd> y_bar,
                      Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
@@ -39,6 +43,14 @@ class ForceTerms {
     for (const TurningFriction& f : data_.turning_frictions) visitor(f);
     for (const SlidingFriction& f : data_.sliding_frictions) visitor(f);
   }
+  // tangent(t1, t2, load_dir1, load_dir2) of a force between two bodies, in each of their coordinates, to its blocks.
+  template <class Tangent>
+  static void add_pair(int body1, int body2, const std::vector<UnitTangents>& units, MotionBlocks& out,
+                       Tangent&& tangent);
+  // Whether its law or, by `slots`, a vector of its geometry changes in the block.
+  template <class Law>
+  static bool moves(const ParameterBlock& block, const Law& law, std::initializer_list<int> slots);
+
   void set_inputs(const AppliedForce& force, const At& at);
   Vector3d components(const AppliedForce& force, const At& at);
   Vector3d components_with_gradients(const AppliedForce& force, const At& at);

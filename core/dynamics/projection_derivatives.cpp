@@ -62,9 +62,10 @@ bool Projector::linearise(double t, const Eigen::VectorXd& angles, const Eigen::
   }
   set_frames(y, &y, states_, frames_);
   rows_.evaluate(frames_);
-  // Each iteration gains a factor of about the correction's size; twelve digits are wanted, three iterations at least.
+  // Each iteration gains a factor of about the correction's size, or of 1/alpha; twelve digits are wanted, two
+  // iterations at least.
   refinements_ =
-      std::clamp(static_cast<int>(std::ceil(16 / -std::log10(std::clamp(10 * correction, 1e-8, 0.05)))), 3, 12);
+      std::clamp(static_cast<int>(std::ceil(16 / -std::log10(std::clamp(10 * correction, 1e-8, 0.05)))), 2, 12);
   return true;
 }
 
@@ -164,20 +165,21 @@ void Projector::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, 
     for (Lanes<6>& load : loads_) load.setZero();
     evaluate_tangents(data_, frames_tilde_, laws_, angles_, frame_dirs_, block, s.nu, dirs_, loads_);
     mass_directions(s.delta);
-    // Direction of q with delta fixed, and Phi' along it.
+    // Direction of q with delta fixed, and Phi' along it: J times the displacement, since p' turns a unit p.
     for (int i = 1; i <= n; ++i) {
       const Body& b = bodies_[at(i)];
       auto q_dir = y_dir.middleRows<7>(7 * (i - 1));
       const Lanes<4> p_tilde_dir = q_dir.bottomRows<4>();
       const Lanes<4> pi_dir = p_tilde_dir + 0.5 * G_transposed_direction(p_tilde_dir, s.delta[at(i - 1)].tail<3>());
-      q_dir.bottomRows<4>() = normalised_direction(b.p, b.norm_pi, pi_dir);
-      BodyState still = states_[at(i)];
-      still.pdot.setZero(), still.omegadot.setZero();
-      const Lanes<7> q_fixed = q_dir;
-      set_tangent(still, q_fixed, none, frame_dirs_[at(i)]);
+      const Lanes<4> p_dir = normalised_direction(b.p, b.norm_pi, pi_dir);
+      q_dir.bottomRows<4>() = p_dir;
+      x_lanes_[at(i - 1)].topRows<3>() = q_dir.topRows<3>();
+      x_lanes_[at(i - 1)].bottomRows<3>().noalias() = (2 * G(b.p)) * p_dir;
     }
+    for (Lanes<6>& load : loads_) load.setZero();
     mu_.setZero();
-    evaluate_tangents(data_, frames_, laws_, angles_, frame_dirs_, block, mu_, dirs_, loads_);
+    evaluate_field_tangents(data_, frames_, laws_, angles_, block, mu_, dirs_, loads_);
+    rows_.add_times(x_lanes_, dirs_.phi);
     g_lanes_ = -dirs_.phi;
     refine(Level::position, false, b_lanes_, g_lanes_, x_lanes_, nu_lanes_, r_lanes_, dx_lanes_, rg_lanes_, dnu_lanes_);
     for (int i = 1; i <= n; ++i) {

@@ -14,9 +14,13 @@ struct ParameterBlock {
   LaneRows theta;         // slots x kLanes
   int parameter[kLanes];  // index of each lane's parameter, -1: lane not used
 
+  // Whether a field of so many rows changes in any of the lanes.
+  bool moves(int slot, Eigen::Index rows) const {
+    return slot >= 0 && (theta.middleRows(slot, rows).array() != 0).any();
+  }
   template <int N>
-  const Lanes<N>* field(int slot, Lanes<N>& storage) const {  // null where the field is constant
-    if (slot < 0) return nullptr;
+  const Lanes<N>* field(int slot, Lanes<N>& storage) const {  // null where the field does not change
+    if (!moves(slot, N)) return nullptr;
     storage = theta.middleRows<N>(slot);
     return &storage;
   }

@@ -283,3 +283,35 @@ TEMPLATE_TEST_CASE("a primitive's tangent is its derivative along any direction"
     }
   }
 }
+
+TEMPLATE_TEST_CASE("the blocks of a primitive that sees only turning are its tangents in p and pdot", "[constraint]",
+                   Coincidence, Dot1) {
+  const unsigned seed = GENERATE(range(0u, 4u));
+  const Case<TestType> c(seed);
+  constexpr int m = TestType::kRows;
+  TurningBlocks<m> found;
+  c.primitive.turning_blocks(c.b1, c.f1, c.b2, c.f2, c.weights.lambda, found);
+  UnitTangents u1, u2;
+  set_unit_tangents(c.b1, u1), set_unit_tangents(c.b2, u2);
+  const FrameTangent still = FrameTangent::zero();
+  auto tangent = [&](const FrameTangent& t1, const FrameTangent& t2) {
+    PrimitiveTangent<m> x;
+    c.primitive.tangent(c.f1, c.f2, t1, t2, {}, c.weights.lambda, x);
+    return x;
+  };
+  const PrimitiveTangent<m> p1 = tangent(u1.p, still), p2 = tangent(still, u2.p);
+  CHECK(found.p1.isApprox(p1.phi_ddot, 1e-12));
+  CHECK(found.p2.isApprox(p2.phi_ddot, 1e-12));
+  CHECK(found.pdot1.isApprox(tangent(u1.pdot, still).phi_ddot, 1e-12));
+  CHECK(found.pdot2.isApprox(tangent(still, u2.pdot).phi_ddot, 1e-12));
+  CHECK((found.moment1_p1 - p1.load1.bottomRows(3)).norm() < 1e-12 * (1 + p1.load1.norm()));
+  CHECK((found.moment1_p2 - p2.load1.bottomRows(3)).norm() < 1e-12 * (1 + p2.load1.norm()));
+  CHECK((found.moment2_p1 - p1.load2.bottomRows(3)).norm() < 1e-12 * (1 + p1.load2.norm()));
+  CHECK((found.moment2_p2 - p2.load2.bottomRows(3)).norm() < 1e-12 * (1 + p2.load2.norm()));
+  // Nothing else moves them: r, rdot, and the forces.
+  for (const FrameTangent* t : {&u1.r, &u1.rdot}) {
+    const PrimitiveTangent<m> x = tangent(*t, still);
+    CHECK(x.phi_ddot.norm() + x.load1.norm() + x.load2.norm() == 0);
+  }
+  CHECK(p1.load1.topRows(3).norm() + p1.load2.topRows(3).norm() + p2.load1.topRows(3).norm() == 0);
+}
