@@ -114,14 +114,22 @@ class Check {
   void difference() {
     const Index m = result_.psi.size(), P = rho_.size();
     for (MatrixXd* x : {&result_.frozen, &result_.free, &frozen_error_, &free_error_, &free_step_}) x->setZero(m, P);
+    jump_.setZero(m, P);
     for (Index k = 0; k < P; ++k) {
+      std::vector<std::pair<double, VectorXd>> on_frozen_steps;
+      const double smallest = options_.relative_step * size_(k) * std::pow(0.5, options_.rungs - 1);
       for (const bool frozen : {true, false}) {
         if (frozen ? !result_.discrete : !options_.free_steps) continue;
         const Stopwatch stopwatch;
         const auto f = [&](double h) {
           VectorXd rho = rho_;
           rho(k) += h;
-          return psi_at(rho, frozen);
+          const std::optional<VectorXd> psi = psi_at(rho, frozen);
+          if (!psi || std::abs(h) > 4.5 * smallest) return psi;  // further off, frozen steps have errors of their own
+          if (frozen) on_frozen_steps.emplace_back(h, *psi);
+          for (const auto& [at, values] : on_frozen_steps)
+            if (at == h) jump_.col(k) = jump_.col(k).cwiseMax((*psi - values).cwiseAbs());
+          return psi;
         };
         LadderDerivative d = difference_ladder(f, m, {options_.relative_step * size_(k), options_.rungs, kPsiRounding});
         for (Index i = 0; i < m; ++i)
@@ -137,7 +145,8 @@ class Check {
   }
 
   // Free differences differ from the derivatives of the numbers on frozen steps by the derivative of the integration
-  // error, and carry its jumps from step sequence to step sequence, divided by the step.
+  // error, and carry its jumps from step sequence to step sequence, divided by the step. How large these are the
+  // smallest steps show, too, where both differences were taken.
   void estimate_integration_error() {
     if (!options_.free_steps && result_.discrete) return;
     const auto error_of = [&](GradientMethod method, const MatrixXd& psi_rho) {
@@ -154,7 +163,8 @@ class Check {
     if (!options_.free_steps) return;
     for (Index k = 0; k < rho_.size(); ++k)
       for (Index i = 0; i < result_.psi.size(); ++i)
-        if (std::isfinite(free_error_(i, k))) free_error_(i, k) += e.psi_rho(i, k) + e.psi(i) / free_step_(i, k);
+        if (std::isfinite(free_error_(i, k)))
+          free_error_(i, k) += e.psi_rho(i, k) + std::max(e.psi(i), jump_(i, k)) / free_step_(i, k);
   }
 
   void compare() {
@@ -262,6 +272,7 @@ class Check {
   VectorXd rho_, size_;
   StepSequence steps_;
   MatrixXd frozen_error_, free_error_, free_step_, integration_error_;
+  MatrixXd jump_;  // of psi, between the steps of the base run and those chosen anew
   std::mt19937 generator_{options_.seed};
   GradientCheck result_;
 };

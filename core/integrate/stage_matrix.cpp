@@ -6,6 +6,9 @@ namespace {
 // epsilon of a row of Phi in units of the inertia that it sees: far above rounding, far below what matters.
 constexpr double kEpsilon = 1e-9;
 
+// A refinement of less than this, relative, is not followed by another.
+constexpr double kLastStep = 1e-9;
+
 using Entries = std::vector<SparseLu::Entry>;
 
 void add_block(int row, int column, int rows, int columns, Entries& entries) {
@@ -75,7 +78,8 @@ bool StageMatrix::factor(const Eigen::Ref<const Eigen::MatrixXd>& P,
   return lu_.factor();
 }
 
-// N = N_epsilon + E:  x += N_epsilon^-1 (b - N x),  and the residual after each pass is -E times its step.
+// N = N_epsilon + E:  x += N_epsilon^-1 (b - N x),  and the residual after each pass is -E times its step. A pass whose
+// step is so small that the next one's would be below rounding is the last: steps shrink by as much each time.
 template <class Solve>
 void StageMatrix::refine(Eigen::Ref<Eigen::MatrixXd> b, int refinements, const Solve& solve) {
   solve(b);
@@ -83,6 +87,7 @@ void StageMatrix::refine(Eigen::Ref<Eigen::MatrixXd> b, int refinements, const S
   auto step = step_.leftCols(b.cols());
   auto correction = correction_.leftCols(b.cols());
   step = b;
+  const double size = b.cwiseAbs().maxCoeff();
   for (int pass = 0; pass < refinements; ++pass) {
     correction.setZero();
     for (int i = 0; i < stages_; ++i) {
@@ -91,6 +96,7 @@ void StageMatrix::refine(Eigen::Ref<Eigen::MatrixXd> b, int refinements, const S
     }
     solve(correction);
     b += correction;
+    if (correction.cwiseAbs().maxCoeff() < kLastStep * size) return;
     step = correction;
   }
 }

@@ -6,7 +6,7 @@
 // factor serves Newton's method, the tangents, and transposed the adjoint.
 //
 // Redundant constraints make N singular, so it is factored with -epsilon added for each multiplier; solve() takes that
-// back by refinement, a fixed number of times, so that solve and solve_transposed are transposes of each other.
+// back by refinement, to rounding, so that solve and solve_transposed are transposes of each other.
 #pragma once
 
 #include <span>
@@ -25,7 +25,7 @@ class StageMatrix {
 
   // values: of each stage; may be one and the same.
   bool factor(const Eigen::Ref<const Eigen::MatrixXd>& P, std::span<const MotionJacobian::Values* const> values);
-  static constexpr int kExact = 2;  // refinements for derivatives; Newton's method needs none
+  static constexpr int kExact = 3;  // refinements at most for derivatives; Newton's method needs none
   void solve(Eigen::Ref<Eigen::MatrixXd> b, int refinements);  // in place; at most kLanes columns
   void solve_transposed(Eigen::Ref<Eigen::MatrixXd> b, int refinements);
   long factorisations() const { return factorisations_; }

@@ -41,6 +41,7 @@ TEST_CASE("a right-hand side, its tangent and its adjoint allocate nothing", "[a
   LaneRows direction = LaneRows::Random(p.y.size(), kLanes), out(p.y.size(), kLanes);
   VectorXd w = VectorXd::Random(p.y.size()), y_bar = VectorXd::Zero(p.y.size());
   VectorXd theta_bar = VectorXd::Zero(p.mechanism.data().slots()), rho_bar = VectorXd::Zero(p.mechanism.parameters());
+  dynamics.blocks();  // sets up what derivatives need
   const long before = allocation_count();
   bool ok = true;
   for (int k = 0; k < 3; ++k) {

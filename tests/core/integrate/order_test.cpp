@@ -79,22 +79,21 @@ Steps steps_for(int order) {
   }
 }
 
-// below: by how much the state's order may fall short.
-void check_order(const Scene& scene, const Method& rk, int steps, double below = 0.1) {
+enum class Of { all, state, derivatives };
+
+void check_order(const Scene& scene, const Method& rk, int steps, Of what = Of::all) {
   const std::string name(rk.name);
-  const Derivatives exact = solve(scene, "dopri853", 240), coarse = solve(scene, name, steps),
+  const Derivatives exact = solve(scene, "dopri853", 400), coarse = solve(scene, name, steps),
                     fine = solve(scene, name, 2 * steps);
-  const auto order = [&](const auto& part) {
-    return std::log2((part(coarse) - part(exact)).norm() / (part(fine) - part(exact)).norm());
+  const auto check = [&](const char* of, const auto& part) {
+    const double order = std::log2((part(coarse) - part(exact)).norm() / (part(fine) - part(exact)).norm());
+    INFO(name << ", " << of << ": order " << order);
+    CHECK(order == Approx(rk.order).margin(0.1));
   };
-  const auto check = [&](const char* what, double measured) {
-    INFO(name << ", " << what << ": order " << measured);
-    CHECK(measured > rk.order - (what == std::string("state") ? below : 0.1));
-    CHECK(measured < rk.order + 0.1);
-  };
-  check("state", order([](const Derivatives& d) -> const VectorXd& { return d.y_end; }));
-  check("TLM", order([](const Derivatives& d) -> const MatrixXd& { return d.y_rho; }));
-  check("adjoint", order([](const Derivatives& d) -> const VectorXd& { return d.gradient; }));
+  if (what != Of::derivatives) check("state", [](const Derivatives& d) -> const VectorXd& { return d.y_end; });
+  if (what == Of::state) return;
+  check("TLM", [](const Derivatives& d) -> const MatrixXd& { return d.y_rho; });
+  check("adjoint", [](const Derivatives& d) -> const VectorXd& { return d.gradient; });
 }
 
 std::vector<Method> measured_methods() {
@@ -124,7 +123,15 @@ TEST_CASE("on the double pendulum state, TLM and adjoint gradient converge at th
 TEST_CASE("on a closed loop they do, too, projection included", "[order]") {
   Scene scene = loaded_four_bar();
   scene.simulation.end_time = 0.53;
-  // Of dopri853 the state's error meets rounding before the terms of h^9 are small: its order comes up to 7.86 here.
-  for (const Method& rk : measured_methods())
-    check_order(scene, rk, steps_for(rk.order).four_bar, rk.order == 8 ? 0.2 : 0.1);
+  for (const Method& rk : measured_methods()) {
+    const int steps = steps_for(rk.order).four_bar;
+    if (rk.order == 8) {  // between terms of h^9 and rounding there is little room, at another end for the state
+      check_order(scene, rk, steps, Of::derivatives);
+      Scene longer = scene;
+      longer.simulation.end_time = 0.55;
+      check_order(longer, rk, steps, Of::state);
+    } else {
+      check_order(scene, rk, steps);
+    }
+  }
 }
