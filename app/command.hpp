@@ -10,12 +10,13 @@ namespace mbsopt {
 
 struct CommandOptions {
   std::string problem_file;
-  std::string out;                // --out; empty: out/<name>/
-  std::vector<std::string> sets;  // --set, each "path=value"
-  std::string method = "auto";    // --method of gradient
-  bool hessian = false;           // --hessian of gradient
-  int threads = 0;                // --threads; 0: as many as the machine has
-  bool quiet = false;             // --quiet
+  std::string out;                    // --out; empty: out/<name>/
+  std::vector<std::string> sets;      // --set, each "path=value"
+  std::string method = "auto";        // --method of gradient
+  bool hessian = false;               // --hessian of gradient
+  std::vector<std::string> profiles;  // --profile of identify: fitted parameters
+  int threads = 0;                    // --threads; 0: as many as the machine has
+  bool quiet = false;                 // --quiet
 };
 
 struct CommandContext {

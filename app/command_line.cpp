@@ -76,6 +76,11 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
   sub.add_option("--threads", options.threads, "at most so many threads (results do not depend on it)")
       ->check(CLI::Range(1, 1024));
   sub.add_flag("--quiet", options.quiet, "no progress on standard error");
+  if (name == "identify") {
+    sub.add_option("--profile", options.profiles, "profile likelihood of fitted parameters: k1,run1.theta0")
+        ->delimiter(',')
+        ->type_name("NAME,...");
+  }
   if (name == "gradient") {
     sub.add_option("--method", options.method, "how gradients are computed")
         ->check(CLI::IsMember({"auto", "tlm", "adjoint", "cvodes_forward", "cvodes_adjoint", "fd"}))

@@ -1,125 +1,17 @@
 #include <fmt/format.h>
 
 #include "app/command.hpp"
+#include "app/identification_results.hpp"
 #include "app/interrupt.hpp"
 #include "app/optimized_problem.hpp"
 #include "app/report/motion_plots.hpp"
 #include "app/report/run_report.hpp"
 #include "app/run.hpp"
-#include "app/text_table.hpp"
 #include "core/dynamics/assembly.hpp"
-#include "core/expression/counted.hpp"
 #include "optim/identification.hpp"
 
 namespace mbsopt {
 namespace {
-
-void add_rows(TextTable& table, const std::vector<FittedParameter>& parameters) {
-  for (const FittedParameter& p : parameters) {
-    table.add({p.name, significant(p.initial), significant(p.value, 9), significant(p.std_error, 3),
-               fmt::format("[{}, {}]", significant(p.ci95[0]), significant(p.ci95[1])), p.unit.empty() ? "-" : p.unit,
-               bound_hit(p.at_lower, p.at_upper)});
-  }
-}
-
-void print_fit(std::ostream& out, const IdentificationResult& fit) {
-  TextTable parameters({"parameter", "initial", "value", "std error", "95 % interval", "unit", "at bound"});
-  add_rows(parameters, fit.parameters);
-  TextTable channels({"experiment", "role", "channel", "samples", "rms", "rms/sigma"});
-  for (const ExperimentFit& e : fit.experiments) {
-    add_rows(parameters, e.refitted);
-    for (const ChannelFit& c : e.channels) {
-      channels.add({e.name, e.validate ? "validate" : "fit", c.column, std::to_string(c.samples), significant(c.rms, 4),
-                    significant(c.rms_scaled, 4)});
-    }
-  }
-  out << '\n' << parameters.text() << '\n' << channels.text();
-  for (const std::string& words : fit.statistics.unidentifiable) out << "not determined by the data: " << words << '\n';
-  out << fmt::format("\n{}, {}; condition number {:.3g}\n", counted(fit.samples, "sample"),
-                     counted(fit.statistics.degrees_of_freedom, "degree of freedom", "degrees of freedom"),
-                     fit.statistics.condition_number);
-  out << fmt::format("{}: {}, {}, {}, {:.3g} s\n", to_string(fit.status), counted(fit.iterations, "iteration"),
-                     counted(fit.evaluations, "evaluation"), counted(fit.simulations, "simulation"), fit.wall_seconds);
-}
-
-Json to_json(const FittedParameter& p) {
-  return {{"initial", p.initial},
-          {"value", p.value},
-          {"std_error", p.std_error},
-          {"ci95", {p.ci95[0], p.ci95[1]}},
-          {"unit", p.unit},
-          {"lower", or_null(p.lower)},
-          {"upper", or_null(p.upper)},
-          {"at_bound", bound_json(p.at_lower, p.at_upper)}};
-}
-
-Json to_json(const ExperimentFit& e) {
-  Json json{{"role", e.validate ? "validate" : "fit"},
-            {"start_time", e.start_time},
-            {"end_time", e.end_time},
-            {"samples", e.samples},
-            {"rms", e.rms},
-            {"channels", Json::object()}};
-  for (const ChannelFit& c : e.channels) {
-    json["channels"][c.column] = {{"sensor", c.sensor},
-                                  {"samples", c.samples},
-                                  {"missing", c.missing},
-                                  {"rms", c.rms},
-                                  {"rms_scaled", c.rms_scaled}};
-  }
-  for (const FittedParameter& p : e.refitted) json["refitted"][p.name] = to_json(p);
-  if (!e.message.empty()) json["message"] = e.message;
-  return json;
-}
-
-void add_to_result(Json& result, const IdentificationResult& fit) {
-  result["parameters"] = Json::object();
-  for (const FittedParameter& p : fit.parameters) {
-    result["parameters"][p.name] = to_json(p);
-    result["correlation"]["names"].push_back(p.name);
-  }
-  for (Eigen::Index i = 0; i < fit.statistics.correlation.rows(); ++i) {
-    const Eigen::VectorXd row = fit.statistics.correlation.row(i);
-    result["correlation"]["matrix"].push_back(std::vector<double>(row.begin(), row.end()));
-  }
-  for (const ExperimentFit& e : fit.experiments) result["experiments"][e.name] = to_json(e);
-  result["optimizer"] = {{"type", "ceres"},
-                         {"status", to_string(fit.status)},
-                         {"message", fit.message},
-                         {"iterations", fit.iterations},
-                         {"evaluations", fit.evaluations},
-                         {"failed_evaluations", fit.failed_evaluations},
-                         {"simulations", fit.simulations},
-                         {"samples", fit.samples},
-                         {"wall_seconds", fit.wall_seconds},
-                         {"objective_initial", fit.cost_initial},
-                         {"objective_final", fit.cost_final}};
-  result["statistics"] = {{"samples", fit.samples},
-                          {"degrees_of_freedom", fit.statistics.degrees_of_freedom},
-                          {"residual_variance", fit.statistics.residual_variance}};
-  result["identifiability"] = {{"condition_number", fit.statistics.condition_number},
-                               {"unidentifiable", fit.statistics.unidentifiable}};
-}
-
-Trajectory history_of(const IdentificationResult& fit) {
-  Trajectory history{{"iteration", "cost", "gradient_norm", "step_norm"}, {}};
-  for (const FittedParameter& p : fit.parameters) history.columns.push_back(p.name);
-  for (const FitRow& row : fit.history) {
-    history.rows.push_back({static_cast<double>(row.iteration), row.cost, row.gradient_norm, row.step_norm});
-    history.rows.back().insert(history.rows.back().end(), row.parameters.begin(), row.parameters.end());
-  }
-  return history;
-}
-
-std::string residuals_csv(const IdentificationResult& fit) {
-  std::string text = "experiment,channel,t,measured,model,residual\n";
-  for (const ResidualRow& row : fit.residuals) {
-    const ExperimentFit& experiment = fit.experiments[row.experiment];
-    fmt::format_to(std::back_inserter(text), "{},{},{:.17g},{:.17g},{:.17g},{:.17g}\n", experiment.name,
-                   experiment.channels[row.channel].column, row.t, row.measured, row.model, row.scaled);
-  }
-  return text;
-}
 
 // One plot per channel of each experiment.
 std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResult& fit) {
@@ -150,10 +42,15 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
 
 IdentificationResult fitted(Run& run, const std::vector<CsvTable>& data) {
   IdentificationOptions options;
+  options.profiles = run.context.options.profiles;
   options.simulation_progress = [](double) { return !interrupted(); };
   options.progress = [&](const FitRow& row) {
     run.progress.iteration(fmt::format("iteration {:3d}   cost {:.9e}   gradient {:.1e}   step {:.1e}", row.iteration,
                                        row.cost, row.gradient_norm, row.step_norm));
+    return !interrupted();
+  };
+  options.profile_progress = [&](const std::string& name, double value, double tau) {
+    run.progress.iteration(fmt::format("profile of {}   {:.6g}   tau {:+.3f}", name, value, tau));
     return !interrupted();
   };
   IdentificationResult fit = run_identification(run.problem, data, options);
@@ -201,6 +98,7 @@ int identify_command(const CommandContext& context) {
   run.write("optimized.json", optimized_problem_text(run, new_values(fit)));
   run.write("history.csv", to_csv(history));
   run.write("residuals.csv", residuals_csv(fit));
+  if (!fit.profiles.empty()) run.write("profile.csv", profile_csv(fit));
   run.write("report.html", identification_report(scene, run.result, history, fit_plots(run.problem, fit)));
   return run.finish();
 }

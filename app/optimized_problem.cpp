@@ -43,12 +43,22 @@ std::string optimized_problem_text(const std::string& problem_file, const std::v
     if (v.experiment.empty()) of_parameters[v.parameter] = v.value;
   }
   text = with_parameter_values(text, of_parameters);
+  // Files are named relative to the folder that the text will be in.
+  const auto moved = [&](const std::string& path, const std::string& file) {
+    const std::string relative = std::filesystem::relative(file, std::filesystem::canonical(folder)).generic_string();
+    text = with_value(text, path, nlohmann::json(relative).dump());
+  };
+  const std::vector<Drive>& drives = problem.scene.drives;
+  for (std::size_t i = 0; i < drives.size(); ++i)
+    if (drives[i].samples) moved(child_path("drives", i) + ".law.csv", drives[i].samples->csv);
   if (!problem.identification) return text;
   text = with_experiment_values(std::move(text), problem, values);
   for (std::size_t i = 0; i < problem.identification->experiments.size(); ++i) {
-    const std::filesystem::path data = problem.identification->experiments[i].data;
-    const std::string relative = std::filesystem::relative(data, std::filesystem::canonical(folder)).generic_string();
-    text = with_value(text, experiment_path(i) + ".data", nlohmann::json(relative).dump());
+    const ExperimentSpec& experiment = problem.identification->experiments[i];
+    moved(experiment_path(i) + ".data", experiment.data);
+    for (std::size_t k = 0; k < experiment.drives.size(); ++k)
+      if (experiment.drives[k].samples)
+        moved(child_path(experiment_path(i) + ".drives", k) + ".law.csv", experiment.drives[k].samples->csv);
   }
   return text;
 }

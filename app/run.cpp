@@ -14,8 +14,15 @@ namespace {
 
 std::vector<std::string> data_files(const Problem& problem) {
   std::vector<std::string> files;
+  const auto add = [&](const std::optional<SampledLaw>& law) {
+    if (law) files.push_back(law->csv);
+  };
+  for (const Drive& drive : problem.scene.drives) add(drive.samples);
   if (!problem.identification) return files;
-  for (const ExperimentSpec& experiment : problem.identification->experiments) files.push_back(experiment.data);
+  for (const ExperimentSpec& e : problem.identification->experiments) {
+    files.push_back(e.data);
+    for (const DriveLaw& law : e.drives) add(law.samples);
+  }
   return files;
 }
 

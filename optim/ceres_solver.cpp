@@ -17,24 +17,15 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 
 constexpr int kInvalidSteps = 30;  // in a row; each shortens the step, the last ones to nothing
 
-// All residuals as one block of one vector of variables, with the last point kept: Ceres asks for the residuals of a
-// trial step first, and for the Jacobian of the same point once it has accepted the step.
-class Residuals : public ceres::CostFunction {
+// The problem's last point is kept: Ceres asks for the residuals of a trial step first, and for the Jacobian of the
+// same point once it has accepted the step.
+class Evaluations {
  public:
-  Residuals(LeastSquaresProblem& problem, LeastSquaresResult& result) : problem_(problem), result_(result) {
-    set_num_residuals(static_cast<int>(problem.size));
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(problem.variables()));
-  }
+  Evaluations(LeastSquaresProblem& problem, LeastSquaresResult& result) : problem_(problem), result_(result) {}
 
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    const LeastSquaresPoint& point = at(Eigen::Map<const Eigen::VectorXd>(parameters[0], problem_.variables()));
-    if (!point.ok) return false;
-    Eigen::Map<Eigen::VectorXd>(residuals, problem_.size) = point.z;
-    if (jacobians && jacobians[0]) Eigen::Map<RowMajor>(jacobians[0], problem_.size, problem_.variables()) = point.z_x;
-    return true;
-  }
+  const LeastSquaresProblem& problem() const { return problem_; }
 
-  const LeastSquaresPoint& at(const Eigen::VectorXd& x) const {
+  const LeastSquaresPoint& at(const Eigen::VectorXd& x) {
     if (x_.size() == x.size() && x_ == x) return point_;
     x_ = x;
     point_.ok = true, point_.message.clear();
@@ -57,8 +48,43 @@ class Residuals : public ceres::CostFunction {
  private:
   LeastSquaresProblem& problem_;
   LeastSquaresResult& result_;
-  mutable Eigen::VectorXd x_;
-  mutable LeastSquaresPoint point_;
+  Eigen::VectorXd x_;
+  LeastSquaresPoint point_;
+};
+
+// Some rows of the residuals as a block of one vector of variables.
+class Rows : public ceres::CostFunction {
+ public:
+  Rows(Evaluations& evaluations, Eigen::Index first, Eigen::Index count)
+      : evaluations_(evaluations), first_(first), count_(count) {
+    set_num_residuals(static_cast<int>(count));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(evaluations.problem().variables()));
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const Eigen::Index n = evaluations_.problem().variables();
+    const LeastSquaresPoint& point = evaluations_.at(Eigen::Map<const Eigen::VectorXd>(parameters[0], n));
+    if (!point.ok) return false;
+    Eigen::Map<Eigen::VectorXd>(residuals, count_) = point.z.segment(first_, count_);
+    if (jacobians && jacobians[0]) Eigen::Map<RowMajor>(jacobians[0], count_, n) = point.z_x.middleRows(first_, count_);
+    return true;
+  }
+
+ private:
+  Evaluations& evaluations_;
+  Eigen::Index first_, count_;
+};
+
+class CeresLoss : public ceres::LossFunction {
+ public:
+  explicit CeresLoss(const Loss& loss) : loss_(loss) {}
+  void Evaluate(double z_squared, double out[3]) const override {
+    const LossValue v = loss_.at(z_squared);
+    out[0] = v.rho, out[1] = v.rho1, out[2] = v.rho2;
+  }
+
+ private:
+  const Loss loss_;
 };
 
 // Counts iterations over several calls of the solver, each of which reports its start as iteration 0.
@@ -113,12 +139,23 @@ std::vector<int> pressed_bounds(const LeastSquaresProblem& problem, const Eigen:
   return pressed;
 }
 
-void solve(const LeastSquaresProblem& problem, Residuals& residuals, const std::vector<int>& held,
-           const CeresOptions& options, Progress& progress, Eigen::VectorXd& x, ceres::Solver::Summary& summary) {
+// A loss sees each residual by itself; without one all are a single block. The problem owns the blocks.
+void add_residuals(ceres::Problem& ceres_problem, Evaluations& evaluations, ceres::LossFunction* loss, double* x) {
+  const LeastSquaresProblem& problem = evaluations.problem();
+  const Eigen::Index robust = loss ? problem.size - problem.plain : 0;
+  for (Eigen::Index i = 0; i < robust; ++i) ceres_problem.AddResidualBlock(new Rows(evaluations, i, 1), loss, x);
+  if (robust < problem.size)
+    ceres_problem.AddResidualBlock(new Rows(evaluations, robust, problem.size - robust), nullptr, x);
+}
+
+void solve(Evaluations& evaluations, const std::vector<int>& held, const CeresOptions& options, Progress& progress,
+           Eigen::VectorXd& x, ceres::Solver::Summary& summary) {
+  const LeastSquaresProblem& problem = evaluations.problem();
+  CeresLoss loss(problem.loss);
   ceres::Problem::Options ownership;
-  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem ceres_problem(ownership);
-  ceres_problem.AddResidualBlock(&residuals, nullptr, x.data());
+  add_residuals(ceres_problem, evaluations, problem.loss.type == LossType::squared ? nullptr : &loss, x.data());
   const int n = static_cast<int>(x.size());
   for (int k = 0; k < n; ++k) {
     if (std::isfinite(problem.x_lower(k))) ceres_problem.SetParameterLowerBound(x.data(), k, problem.x_lower(k));
@@ -162,13 +199,13 @@ LeastSquaresResult solve_with_ceres(LeastSquaresProblem& problem, const Eigen::V
                                     const CeresOptions& options) {
   LeastSquaresResult result;
   result.x = x_start;
-  Residuals residuals(problem, result);
-  const LeastSquaresPoint start = residuals.at(x_start);
+  Evaluations evaluations(problem, result);
+  const LeastSquaresPoint start = evaluations.at(x_start);
   if (!start.ok) {
     result.message = "the start point cannot be evaluated: " + start.message;
     return result;
   }
-  result.cost_initial = 0.5 * start.z.squaredNorm();
+  result.cost_initial = problem.cost(start.z);
 
   // Ceres projects steps onto the bounds, which is slow along an active one: variables that press against their bound
   // are held there, until nothing changes.
@@ -177,21 +214,21 @@ LeastSquaresResult solve_with_ceres(LeastSquaresProblem& problem, const Eigen::V
   ceres::Solver::Summary summary;
   std::vector<int> held;
   for (Eigen::Index round = 0; round <= 2 * x.size(); ++round) {
-    solve(problem, residuals, held, options, progress, x, summary);
+    solve(evaluations, held, options, progress, x, summary);
     result.iterations = progress.iterations();
     if (summary.termination_type != ceres::CONVERGENCE) break;
-    const LeastSquaresPoint& at = residuals.at(x);
-    std::vector<int> pressed = at.ok ? pressed_bounds(problem, x, at.z_x.transpose() * at.z) : held;
+    const LeastSquaresPoint& at = evaluations.at(x);
+    std::vector<int> pressed = at.ok ? pressed_bounds(problem, x, at.z_x.transpose() * problem.pull(at.z)) : held;
     if (pressed == held || static_cast<Eigen::Index>(pressed.size()) == x.size()) break;
     held = std::move(pressed);
   }
 
   set_outcome(summary, options, result);
   if (summary.termination_type != ceres::CONVERGENCE && progress.last().size() > 0) x = progress.last();
-  const LeastSquaresPoint& end = residuals.at(x);
+  const LeastSquaresPoint& end = evaluations.at(x);
   result.x = end.ok ? x : x_start;
   result.point = end.ok ? end : start;
-  result.cost_final = 0.5 * result.point.z.squaredNorm();
+  result.cost_final = problem.cost(result.point.z);
   return result;
 }
 

@@ -123,7 +123,8 @@ class Reader {
       table_.header.push_back(cell.text);
     }
     double number = 0;
-    if (std::all_of(cells_.begin(), cells_.end(), [&](const Cell& c) { return is_number(c.text, number); }))
+    if (std::all_of(cells_.begin(), cells_.end(),
+                    [&](const Cell& c) { return is_number(c.text, number) || is_decimal_comma(c.text); }))
       fail(1, "the first row must hold the columns' names, found numbers");
     table_.columns.resize(table_.header.size());
   }
@@ -131,7 +132,10 @@ class Reader {
   void read_row() {
     split();
     if (cells_.size() != table_.header.size())
-      fail(1, fmt::format("the row has {}, the header {}", counted(cells_.size(), "cell"), table_.header.size()));
+      fail(1, fmt::format("the row has {}, the header {}{}", counted(cells_.size(), "cell"), table_.header.size(),
+                          delimiter_ == ',' && cells_.size() > table_.header.size()
+                              ? " (where decimals have a comma, cells need a semicolon or a tab between them)"
+                              : ""));
     for (std::size_t k = 0; k < cells_.size(); ++k) table_.columns[k].push_back(number(cells_[k], table_.header[k]));
     table_.lines.push_back(line_);
   }
@@ -142,15 +146,43 @@ class Reader {
     return error == std::errc() && end == text.data() + text.size() && !text.empty();
   }
 
-  double number(const Cell& cell, const std::string& column) const {
+  // "1,5": a number where decimals have a comma.
+  static bool is_decimal_comma(std::string text) {
+    std::replace(text.begin(), text.end(), ',', '.');
+    double number = 0;
+    return is_number(text, number);
+  }
+
+  double number(const Cell& cell, const std::string& column) {
     const std::string word = lower_case(cell.text);
     if (word.empty() || word == "nan" || word == "na") return std::numeric_limits<double>::quiet_NaN();
     double value = 0;
-    if (is_number(cell.text, value) && std::isfinite(value)) return value;
-    const bool decimal_comma = delimiter_ != ',' && cell.text.find(',') != std::string::npos;
-    fail(cell.column, fmt::format("column '{}': '{}' is not a finite number{}", column, cell.text,
-                                  decimal_comma ? " (decimals are written with a point)" : ""));
+    if (is_number(with_point(cell, column), value) && std::isfinite(value)) return value;
+    fail(cell.column, fmt::format("column '{}': '{}' is not a finite number", column, cell.text));
   }
+
+  // The cell's text with a decimal point. The first point or comma of the file says which one all others are.
+  std::string with_point(const Cell& cell, const std::string& column) {
+    const std::size_t mark = cell.text.find_first_of(".,");
+    if (mark == std::string::npos) return cell.text;
+    const char found = cell.text[mark];
+    const auto refuse = [&](const std::string& why) {
+      fail(cell.column, fmt::format("column '{}': '{}' {}", column, cell.text, why));
+    };
+    if (cell.text.find_first_of(".,", mark + 1) != std::string::npos)
+      refuse("has more than one point or comma; thousands are not separated");
+    if (found == ',' && delimiter_ == ',')
+      refuse("has a decimal comma, which needs a semicolon or a tab between cells");
+    if (decimal_ == 0) decimal_ = found, decimal_line_ = line_;
+    if (decimal_ != found)
+      refuse(fmt::format("has a decimal {}, line {} a decimal {}; a file has one of them", name_of(found),
+                         decimal_line_, name_of(decimal_)));
+    std::string text = cell.text;
+    text[mark] = '.';
+    return text;
+  }
+
+  static const char* name_of(char decimal) { return decimal == ',' ? "comma" : "point"; }
 
   [[noreturn]] void fail(std::size_t column, const std::string& what) const {
     throw CsvError(fmt::format("{}:{}:{}: {}", table_.name, line_, column, what));
@@ -159,6 +191,8 @@ class Reader {
   std::string_view rest_, current_;
   std::size_t line_ = 0;
   char delimiter_ = ',';
+  char decimal_ = 0;  // not seen yet
+  std::size_t decimal_line_ = 0;
   std::vector<Cell> cells_;
   CsvTable& table_;
 };

@@ -1,6 +1,7 @@
 // A numeric CSV file: a header row, then numbers.
 //
 //   delimiter   comma, semicolon or tab: the one that separates the header's names
+//   decimals    a point; between semicolons or tabs a comma, too, but one of the two in the whole file
 //   comments    lines that start with '#'; blank lines are skipped
 //   quotes      "a name, with a comma", a quote inside is doubled; a cell ends on its line
 //   missing     an empty cell, NaN or NA: a NaN here

@@ -1,8 +1,11 @@
 // One experiment: what was measured, and the simulation that explains it. Turns values of the unknowns into residuals
 // and their exact Jacobian by one tangent-linear run from its start time to its last sample.
 //
-//   z = (measured - gain s(t) - bias)/sigma
-//   dz/du = -(gain (s_y y_u + s_rho rho_u) + s gain_u + bias_u)/sigma        sigma: constant in u
+//   z = (measured - gain s(t - delay) - bias)/sigma
+//   dz/du = -(gain (s_y (y_u - ydot delay_u) + s_rho rho_u) + s gain_u + bias_u)/sigma        sigma: constant in u
+//
+// y, y_u and ydot are the dense output, its derivative in u and in time. Before the start the mechanism stays as it is
+// there; rows that a delay within its bounds could take there are left out.
 //
 //   const Experiment run1(scene, spec, table, {{"k1", 0}, {"theta0", 1}});   // parameter and number of the unknown
 //   Experiment::Residuals r = run1.residuals(u);
@@ -58,6 +61,7 @@ class Experiment {
   const std::vector<double>& times() const { return times_; }
   const std::vector<Sample>& samples() const { return samples_; }  // by time, then channel
   double sigma(std::size_t channel) const { return channels_[channel].sigma; }
+  void set_sigma(std::size_t channel, double sigma) { channels_[channel].sigma = sigma; }
   std::size_t missing(std::size_t channel) const { return channels_[channel].missing; }
   double start_time() const { return settings_.start_time; }
   double end_time() const { return settings_.end_time; }
@@ -65,11 +69,16 @@ class Experiment {
  private:
   struct Channel {
     int sensor = 0;
-    Program gain, bias;  // inputs: all parameters
+    Program gain, bias, delay;  // inputs: all parameters
     double sigma = 1;
+    double first = 0;  // samples before are left out [s]
     std::size_t missing = 0;
   };
+  void replace_laws(const ExperimentSpec& spec, const std::string& place);
   void compile_channels(const ExperimentSpec& spec, const std::string& place);
+  // The largest delay that the bounds of the unknowns allow, where they say; else at their start values, rho.
+  double largest_delay(const Program& delay) const;
+  void refuse_time_dependence(const Sensor& sensor, const Program& delay, const std::string& place) const;
   void take_samples(const ExperimentSpec& spec, const std::string& place, const CsvTable& data);
 
   Scene scene_;
@@ -81,6 +90,8 @@ class Experiment {
   std::vector<Channel> channels_;
   std::vector<double> times_;  // at which something was measured
   std::vector<Sample> samples_;
+  std::vector<std::size_t> first_;  // sample of each time, and the end
+  bool delayed_ = false;            // some channel has a delay
 };
 
 }  // namespace mbsopt

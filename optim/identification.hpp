@@ -1,9 +1,11 @@
 // Identification: parameters that explain measured motions, by nonlinear least squares on exact derivatives.
 //
-//   measured_i = gain s(t_i, rho) + bias + noise        z_i = (measured_i - gain s(t_i, rho) - bias)/sigma
-//   min 1/2 sum z_i^2   within the bounds               Levenberg-Marquardt on the Jacobian of the tangent-linear model
+//   measured_i = gain s(t_i - delay, rho) + bias + noise        z_i = (measured_i - gain s(t_i - delay, rho) -
+//   bias)/sigma min 1/2 sum loss(z_i^2) + 1/2 sum_k ((rho_k - mean_k)/sigma_k)^2   within the bounds, the last sum over
+//   priors, by Levenberg-Marquardt on the Jacobian of the tangent-linear model
 //
-// gain, bias and sigma are expressions over parameters; sigma must not depend on what is fitted. Each experiment has a
+// gain, bias, delay and sigma are expressions over parameters; sigma must not depend on what is fitted, but may be
+// estimated from the residuals (sigma_estimation.hpp). Each experiment has a
 // simulation of its own, from its start_time to its last sample, with its own values of the parameters that are `free`
 // there. Experiments with role "validate" take no part: with the shared parameters fixed, only their free ones are
 // refitted, and the residuals are scored.
@@ -23,6 +25,7 @@
 #include "optim/csv_table.hpp"
 #include "optim/least_squares.hpp"
 #include "optim/problem.hpp"
+#include "optim/residual_analysis.hpp"
 #include "optim/statistics.hpp"
 
 namespace mbsopt {
@@ -36,6 +39,7 @@ struct FittedParameter {
   std::string unit;
   double initial = 0, value = 0;
   std::optional<double> lower, upper;
+  std::optional<Parameter::Prior> prior;
   bool at_lower = false, at_upper = false;  // then its std_error, computed as if it were free, says little
   double std_error = 0;                     // infinite where the data do not determine it
   double ci95[2] = {0, 0};
@@ -46,6 +50,10 @@ struct ChannelFit {
   std::size_t samples = 0, missing = 0;  // used, and empty cells among its rows
   double rms = 0;                        // of measured - model, in the column's units
   double rms_scaled = 0;                 // of z
+  double sigma = 1;
+  bool sigma_is_estimated = false;
+  ResidualAnalysis analysis;     // of z
+  std::size_t beyond_scale = 0;  // samples with |z| above the scale of the loss, which count for less than their square
 };
 
 struct ExperimentFit {
@@ -69,10 +77,21 @@ struct ResidualRow {
 // One iteration of the solver.
 struct FitRow {
   int iteration = 0;
-  double cost = 0;             // 1/2 sum z^2
+  double cost = 0;             // what is minimised
   double gradient_norm = 0;    // largest entry, of the scaled variables
   double step_norm = 0;        // of the scaled variables
   Eigen::VectorXd parameters;  // in the order of IdentificationResult::parameters
+};
+
+struct ParameterProfile {
+  struct Point {
+    double value = 0, cost = 0, tau = 0;
+    Eigen::VectorXd parameters;  // all, in the order of IdentificationResult::parameters
+  };
+  std::string name;                    // "k1", "run1.theta0"
+  std::vector<Point> points;           // by rising value
+  std::optional<double> lower, upper;  // of the 95 % interval
+  std::string below, above;            // why there is none
 };
 
 struct IdentificationResult {
@@ -83,7 +102,8 @@ struct IdentificationResult {
   std::vector<ExperimentFit> experiments;
   std::vector<ResidualRow> residuals;  // by experiment, time, channel
   std::vector<FitRow> history;
-  double cost_initial = 0, cost_final = 0;  // 1/2 sum z^2
+  std::vector<ParameterProfile> profiles;
+  double cost_initial = 0, cost_final = 0;  // what is minimised
   std::size_t samples = 0;                  // fitted
   int iterations = 0;
   long evaluations = 0, failed_evaluations = 0;  // points at which all experiments were simulated, with derivatives
@@ -93,9 +113,12 @@ struct IdentificationResult {
 };
 
 struct IdentificationOptions {
+  std::vector<std::string> profiles;  // names of fitted parameters whose profile likelihood is wanted
   std::vector<std::shared_ptr<const UserForce>> user_forces;
   std::function<bool(const FitRow&)> progress;        // after every iteration; false stops, the best so far is kept
   std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
+  // After every point of a profile; false ends it there.
+  std::function<bool(const std::string& name, double value, double tau)> profile_progress;
 };
 
 // problem.identification must be there; data: one table per experiment, in order. Throws std::invalid_argument where

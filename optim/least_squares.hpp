@@ -1,6 +1,8 @@
 // A nonlinear least-squares problem, as every solver here sees it:
 //
-//   minimise 1/2 |z(x)|^2   subject to   x_lower <= x <= x_upper
+//   minimise 1/2 sum rho(z_i(x)^2) + 1/2 sum z_j(x)^2   subject to   x_lower <= x <= x_upper
+//
+// rho is the loss (robust_loss.hpp); the last `plain` residuals, j, are squared whatever it is.
 //
 // Residuals and their Jacobian come together, since one simulation gives both; an evaluation that fails says so in
 // words, and the solver shortens its step.
@@ -15,6 +17,7 @@
 #include <limits>
 #include <string>
 
+#include "optim/robust_loss.hpp"
 #include "optim/solver_outcome.hpp"
 
 namespace mbsopt {
@@ -39,14 +42,19 @@ struct LeastSquaresProblem {
   virtual void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) = 0;
 
   Eigen::Index variables() const { return x_lower.size(); }
+  double cost(const Eigen::VectorXd& z) const;
+  // d cost/d z_i, residual by residual.
+  Eigen::VectorXd pull(const Eigen::VectorXd& z) const;
 
   Eigen::VectorXd x_lower, x_upper;  // +-infinity where there is none
   Eigen::Index size;                 // N
+  Eigen::Index plain = 0;            // of them, the last: not seen by the loss
+  Loss loss;
 };
 
 struct LeastSquaresProgress {
   int iteration = 0;
-  double cost = 0;           // 1/2 |z|^2
+  double cost = 0;           // as in LeastSquaresProblem::cost
   double gradient_norm = 0;  // largest entry
   double step_norm = 0;
   Eigen::VectorXd x;

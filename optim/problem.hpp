@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/scene/scene.hpp"
+#include "optim/robust_loss.hpp"
 
 namespace mbsopt {
 
@@ -44,6 +45,15 @@ struct DesignSpec {
 struct ChannelSpec {
   std::string column, sensor;
   Field sigma = 1.0, gain = 1.0, bias = 0.0;  // expressions over parameters
+  Field delay = 0.0;                          // [s]
+  bool estimate_sigma = false;                // sigma is where its estimate starts
+};
+
+// A drive that follows another law in one experiment.
+struct DriveLaw {
+  std::string drive;
+  Expression law;
+  std::optional<SampledLaw> samples;
 };
 
 struct ExperimentSpec {
@@ -53,6 +63,7 @@ struct ExperimentSpec {
   std::optional<double> start_time, end_time;  // instead of the simulation's; rows outside are left out
   std::vector<ChannelSpec> channels;
   std::vector<std::pair<std::string, double>> overrides;  // parameter values of this experiment
+  std::vector<DriveLaw> drives;                           // of this experiment, instead of the scene's laws
   std::vector<std::string> free;                          // parameters with a value of their own here
   bool validate = false;                                  // role: scored (only "free" refitted), not fitted
 };
@@ -61,6 +72,7 @@ struct IdentificationSpec {
   std::vector<ExperimentSpec> experiments;
   std::vector<std::string> variables;
   bool sigma_is_known = false;
+  Loss loss;
   double tolerance = 1e-10;
   int max_iterations = 100;
 };

@@ -55,6 +55,11 @@ void check_meaning(Checker& checker, const ExperimentSpec& experiment) {
   if (experiment.channels.empty()) checker.issue(checker.path("channels"), "is empty; at least one column is compared");
   const SimulationSettings& simulation = checker.facts().scene().simulation;
   const double start = experiment.start_time.value_or(simulation.start_time);
+  for (std::size_t i = 0; i < experiment.drives.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      if (experiment.drives[k].drive == experiment.drives[i].drive)
+        checker.issue(child_path(checker.path("drives"), i) + ".drive",
+                      "'" + experiment.drives[i].drive + "' has a law in this experiment already");
   if (experiment.end_time && *experiment.end_time <= start)
     checker.issue(checker.path("end_time"), "the experiment ends at " + text_of(*experiment.end_time) +
                                                 " s, which must be after its start at " + text_of(start) + " s");
@@ -66,6 +71,13 @@ void check_meaning(Checker& checker, const IdentificationSpec& identification) {
   const bool any_fit =
       std::any_of(experiments.begin(), experiments.end(), [](const ExperimentSpec& e) { return !e.validate; });
   if (!any_fit) checker.issue(list, "has no experiment of role \"fit\"; at least one is needed");
+  if (identification.loss.type == LossType::squared && identification.loss.scale)
+    checker.issue(checker.path("loss") + ".scale", "is given with the loss 'squared', which has none");
+  for (std::size_t i = 0; identification.sigma_is_known && i < experiments.size(); ++i)
+    for (std::size_t k = 0; k < experiments[i].channels.size(); ++k)
+      if (experiments[i].channels[k].estimate_sigma)
+        checker.issue(child_path(child_path(list, i) + ".channels", k) + ".estimate_sigma",
+                      "is true, and so is identification.sigma_is_known; one of them must be false");
   check_unique_names(checker, experiments, "an experiment",
                      [&](std::size_t i) { return child_path(list, i) + ".name"; });
   for (std::size_t i = 0; i < experiments.size(); ++i) {

@@ -8,6 +8,11 @@ namespace mbsopt {
 
 inline constexpr Choice<bool> kRoles[] = {{"fit", false}, {"validate", true}};
 
+inline constexpr Choice<LossType> kLosses[] = {{"squared", LossType::squared},
+                                               {"huber", LossType::huber},
+                                               {"cauchy", LossType::cauchy},
+                                               {"tukey", LossType::tukey}};
+
 void describe(auto& v, Like<ObjectiveSample> auto& s) {
   v.plain("time", s.time, kAny, {"[s]", Need::required, dimension::kTime});
   v.expression("value", s.value, Names::objective, {"added to the objective", Need::required});
@@ -48,7 +53,16 @@ void describe(auto& v, Like<ChannelSpec> auto& c) {
   v.number("sigma", c.sigma, {"standard deviation of the noise, in the column's unit"});
   v.number("gain", c.gain, {"measured = gain * sensor + bias + noise"});
   v.number("bias", c.bias, {"in the column's unit"});
-  v.later("delay", "a delay");
+  v.number("delay", c.delay,
+           {"measured(t) = gain * sensor(t - delay) + bias + noise [s]", Need::optional, dimension::kTime});
+  v.plain("estimate_sigma", c.estimate_sigma, kAny,
+          {"true: sigma is estimated from the residuals of this channel, from the given one on"});
+}
+
+void describe(auto& v, Like<DriveLaw> auto& d) {
+  v.reference("drive", d.drive, To::drive, {"the drive", Need::required});
+  v.time_law("law", d.law, d.samples,
+             {"its law in this experiment: of t and parameters, or a CSV file", Need::required});
 }
 
 void describe(auto& v, Like<ExperimentSpec> auto& e) {
@@ -60,6 +74,7 @@ void describe(auto& v, Like<ExperimentSpec> auto& e) {
           {"[s]; later rows are left out; all are used when absent", Need::optional, dimension::kTime});
   v.list("channels", e.channels, {"columns that are compared", Need::required});
   v.overrides("overrides", e.overrides, {"parameter values of this experiment"});
+  v.list("drives", e.drives, {"laws of drives in this experiment"});
   v.references("free", e.free, To::parameter, {"parameters with a value of their own in this experiment"});
   v.choice("role", e.validate, kRoles, {"validate: scored, not fitted"});
 }
@@ -69,9 +84,11 @@ void describe(auto& v, Like<IdentificationSpec> auto& i) {
   v.references("variables", i.variables, To::parameter, {"parameters to fit", Need::required});
   v.plain("sigma_is_known", i.sigma_is_known, kAny,
           {"true: the covariance is not scaled by the variance of the residuals"});
-  v.group("loss", {"what is summed over the residuals"}, [](auto& inside) {
-    std::string type = "squared";
-    inside.word("type", type, Words{"squared", "huber cauchy tukey"}, {"loss function"});
+  v.group("loss", {"what is summed over the residuals"}, [&](auto& inside) {
+    inside.choice("type", i.loss.type, kLosses, {"loss function"});
+    inside.plain("scale", i.loss.scale, kPositive,
+                 {"residual, in units of sigma, beyond which it counts less than its square; 1.345 (huber), 2.385 "
+                  "(cauchy), 4.685 (tukey) when absent"});
   });
   v.group("optimizer", {"how the sum is minimised"}, [&](auto& inside) {
     std::string type = "trust_region";

@@ -1,15 +1,21 @@
 // What a least-squares fit says about its parameters.
 //
 //   residuals z(rho) in units of their sigma, Jacobian J = dz/drho, N rows, P columns, at the solution
-//   s^2         = z'z / (N - P)                            residual variance; 1 where sigma is known
-//   covariance  = s^2 (J'J)^-1
-//   std_error_k = sqrt(covariance_kk)                      ci95 = rho_k -+ t(0.975, N - P) std_error_k
-// Seber and Wild, "Nonlinear Regression" (1989), sections 2.1 and 5.1.
+//   s^2         = z'z / (N + R - P)                        residual variance, R: number of priors
+//   covariance  = (J'J/v + J_prior'J_prior)^-1             v = s^2; 1 where sigma is known
+//   std_error_k = sqrt(covariance_kk)                      ci95 = rho_k -+ t(0.975, N + R - P) std_error_k
+// Seber and Wild, "Nonlinear Regression" (1989), sections 2.1 and 5.1. Priors are taken at their word.
+//
+// With a loss other than the square the estimate is Huber's M-estimate, and with psi(z) = rho'(z^2) z
+//   v = K^2 [sum psi^2/(N + R - P)] / mean(psi_z)^2,   K = 1 + (P/N) var(psi_z)/mean(psi_z)^2
+// Huber, "Robust Statistics" (1981), section 7.6, equation 6.5: errors independent, of one symmetric distribution.
 //
 // Combinations that the data do not determine come from the singular values of J with columns scaled to unit length,
 // whose ratio is the condition number (Belsley, Kuh and Welsch, "Regression Diagnostics" (1980), section 3.2).
 //
-//   const FitStatistics s = fit_statistics(J, z, rho, {"m1", "m2"});
+//   FitData data;
+//   data.J = J, data.z = z, data.rho = rho, data.names = {"m1", "m2"};
+//   const FitStatistics s = fit_statistics(data);
 //   s.std_error(0), s.ci95(0, 1), s.correlation(0, 1);
 //   for (const std::string& words : s.unidentifiable) std::cout << words;   // "m1, m2: only m1 + m2 is determined"
 #pragma once
@@ -18,21 +24,36 @@
 #include <string>
 #include <vector>
 
+#include "optim/robust_loss.hpp"
+
 namespace mbsopt {
+
+struct FitData {
+  Eigen::MatrixXd J;        // N x P
+  Eigen::VectorXd z;        // N
+  Eigen::MatrixXd J_prior;  // R x P, or empty
+  Eigen::VectorXd rho;      // P
+  std::vector<std::string> names;
+  std::vector<std::string> units;  // "" where not known; or none at all
+  Loss loss;
+  bool sigma_is_known = false;  // v = 1, and quantiles are normal; not with a loss other than the square
+  double accuracy = 0;          // of J, relative: what differs by less is the same
+};
 
 struct FitStatistics {
   Eigen::VectorXd std_error;                // infinite where the data do not determine the parameter
   Eigen::MatrixXd ci95;                     // P x 2
   Eigen::MatrixXd covariance;               // of the determined combinations
   Eigen::MatrixXd correlation;              // ones on the diagonal
-  double residual_variance = 0;             // z'z / (N - P), also where sigma is known; NaN where N <= P
-  long degrees_of_freedom = 0;              // N - P
+  double residual_variance = 0;             // s^2, also where it is not used; NaN without degrees of freedom
+  double variance = 0;                      // v
+  double likelihood_scale = 0;              // of 2 (cost - least cost), in which it is about chi^2 of a parameter
+  double quantile = 0;                      // of the intervals
+  long degrees_of_freedom = 0;              // N + R - P
   double condition_number = 0;              // infinite where a column of J is zero
   std::vector<std::string> unidentifiable;  // in words
 };
 
-// sigma_is_known: the covariance is not scaled by the residual variance, and quantiles are normal.
-FitStatistics fit_statistics(const Eigen::MatrixXd& J, const Eigen::VectorXd& z, const Eigen::VectorXd& rho,
-                             const std::vector<std::string>& names, bool sigma_is_known = false);
+FitStatistics fit_statistics(const FitData& data);
 
 }  // namespace mbsopt

@@ -157,11 +157,13 @@ class Search {
     for (const ObjectiveSpec& objective : objectives) collect(objective);
   }
   void collect(const std::vector<ExperimentSpec>& experiments) {
-    for (const ExperimentSpec& experiment : experiments)
+    for (const ExperimentSpec& experiment : experiments) {
       for (const ChannelSpec& channel : experiment.channels) {
         collect(channel);
         use_sensor(channel.sensor);
       }
+      for (const DriveLaw& law : experiment.drives) collect(law);
+    }
   }
 
   void use(const Expression& expression, Names names) {

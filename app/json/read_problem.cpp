@@ -33,26 +33,37 @@ void resolve_data_files(Problem& problem, const std::filesystem::path& folder, c
   }
 }
 
+void read_samples(SampledLaw& law, const std::string& path, const std::filesystem::path& folder, const Node& root,
+                  Findings& findings) {
+  if (findings.concerns(path)) return;
+  try {
+    law.csv = (folder / law.csv).lexically_normal().string();
+    const CsvTable table = read_csv(law.csv);
+    law.times = ascending_times(table, law.time);
+    law.values = table.column(law.column);
+    const auto bad = std::find_if(law.values.begin(), law.values.end(), [](double x) { return !std::isfinite(x); });
+    if (bad != law.values.end())
+      throw CsvError(table.name + ":" +
+                     std::to_string(table.lines[static_cast<std::size_t>(bad - law.values.begin())]) + ": column '" +
+                     law.column + "' has no number here; a law needs all of them");
+    if (law.times.size() < 2) throw CsvError(table.name + ": a law needs two rows or more");
+  } catch (const CsvError& error) {
+    findings.add(nearest(root, path + ".csv"), path + ".csv", error.what());
+  }
+}
+
 // Laws from CSV files: the samples are read here, so that nothing below knows of files.
-void read_sampled_laws(Scene& scene, const std::filesystem::path& folder, const Node& root, Findings& findings) {
-  for (std::size_t i = 0; i < scene.drives.size(); ++i) {
-    if (!scene.drives[i].samples) continue;
-    SampledLaw& law = *scene.drives[i].samples;
-    const std::string path = child_path("drives", i) + ".law";
-    if (findings.concerns(path)) continue;
-    try {
-      const CsvTable table = read_csv((folder / law.csv).lexically_normal().string());
-      law.times = ascending_times(table, law.time);
-      law.values = table.column(law.column);
-      const auto bad = std::find_if(law.values.begin(), law.values.end(), [](double x) { return !std::isfinite(x); });
-      if (bad != law.values.end())
-        throw CsvError(table.name + ":" +
-                       std::to_string(table.lines[static_cast<std::size_t>(bad - law.values.begin())]) + ": column '" +
-                       law.column + "' has no number here; a law needs all of them");
-      if (law.times.size() < 2) throw CsvError(table.name + ": a law needs two rows or more");
-    } catch (const CsvError& error) {
-      findings.add(nearest(root, path + ".csv"), path + ".csv", error.what());
-    }
+void read_sampled_laws(Problem& problem, const std::filesystem::path& folder, const Node& root, Findings& findings) {
+  std::vector<Drive>& drives = problem.scene.drives;
+  for (std::size_t i = 0; i < drives.size(); ++i)
+    if (drives[i].samples) read_samples(*drives[i].samples, child_path("drives", i) + ".law", folder, root, findings);
+  if (!problem.identification) return;
+  std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
+  for (std::size_t e = 0; e < experiments.size(); ++e) {
+    const std::string list = child_path("identification.experiments", e) + ".drives";
+    for (std::size_t i = 0; i < experiments[e].drives.size(); ++i)
+      if (std::optional<SampledLaw>& law = experiments[e].drives[i].samples)
+        read_samples(*law, child_path(list, i) + ".law", folder, root, findings);
   }
 }
 
@@ -113,7 +124,7 @@ Problem read_problem_text(const std::string& text, const std::filesystem::path& 
   Problem problem;
   Reader::read(root, "", findings, problem);
   resolve_data_files(problem, name.parent_path(), root, findings);
-  read_sampled_laws(problem.scene, name.parent_path(), root, findings);
+  read_sampled_laws(problem, name.parent_path(), root, findings);
   add_issues(problem, root, findings, warnings);
   findings.throw_if_any();
   return problem;

@@ -171,17 +171,25 @@ void Reader::point(std::string_view key, std::optional<PointField>& value, std::
   if (const Node* node = get(key, says)) read_point(*node, inside(key), value.emplace());
 }
 
-void Reader::inertia(std::string_view key, InertiaField& value, const Says& says) {
+void Reader::inertia(std::string_view key, InertiaField& tensor, std::optional<ConsistentInertiaField>& consistent,
+                     const Says& says) {
   const Node* const node = get(key, says);
   if (!node) return;
-  if (node->kind == Node::Kind::object) return read(*node, inside(key), findings_, value);
+  if (node->kind == Node::Kind::object) {
+    const Node* const inside_it = node->find("consistent");
+    if (!inside_it) return read(*node, inside(key), findings_, tensor);
+    if (node->keys.size() > 1)
+      findings_.add(*node, inside(key), "has \"consistent\" beside other keys; it stands alone");
+    return read(*inside_it, child_path(inside(key), "consistent"), findings_, consistent.emplace());
+  }
   std::array<Field, 3> diagonal;
   if (node->kind != Node::Kind::array || node->items.size() != 3) {
     findings_.add(*node, inside(key),
-                  "must be {\"xx\":..,\"yy\":..,\"zz\":..,\"xy\":..,\"xz\":..,\"yz\":..} or [xx, yy, zz], found " +
+                  "must be {\"xx\":..,\"yy\":..,\"zz\":..,\"xy\":..,\"xz\":..,\"yz\":..}, [xx, yy, zz] or "
+                  "{\"consistent\": {\"x\":..,\"y\":..,\"z\":..}}, found " +
                       what_is(*node));
   } else if (read_vector(*node, inside(key), diagonal)) {
-    value = {diagonal[0], diagonal[1], diagonal[2], 0.0, 0.0, 0.0};
+    tensor = {diagonal[0], diagonal[1], diagonal[2], 0.0, 0.0, 0.0};
   }
 }
 

@@ -44,7 +44,8 @@ class Reader {
   void vector(std::string_view key, VectorField& value, const Says& says);
   void point(std::string_view key, PointField& value, std::string_view, const Says& says);
   void point(std::string_view key, std::optional<PointField>& value, std::string_view, const Says& says);
-  void inertia(std::string_view key, InertiaField& value, const Says& says);
+  void inertia(std::string_view key, InertiaField& tensor, std::optional<ConsistentInertiaField>& consistent,
+               const Says& says);
   void orientation(std::string_view key, OrientationField& value, const Says& says);
   void points(std::string_view key, std::map<std::string, VectorField>& value, const Says& says);
   void law(std::string_view key, std::optional<Expression>& value, Names, const Says& says) {

@@ -85,8 +85,11 @@ class SchemaWriter {
   void point(std::string_view key, std::optional<PointField>&, std::string_view, const Says& says) {
     put(key, says, ref("point"));
   }
-  void inertia(std::string_view key, InertiaField&, const Says& says) {
-    put(key, says, {{"anyOf", {array_of(ref("expression"), 3), object_schema<InertiaField>()}}});
+  void inertia(std::string_view key, InertiaField&, std::optional<ConsistentInertiaField>&, const Says& says) {
+    SchemaWriter form;
+    form.put("consistent", {"lengths that give a possible tensor whatever they are", Need::required, {}},
+             object_schema<ConsistentInertiaField>());
+    put(key, says, {{"anyOf", {array_of(ref("expression"), 3), object_schema<InertiaField>(), form.object()}}});
   }
   void orientation(std::string_view key, OrientationField&, const Says& says) {
     put(key, says,

@@ -36,7 +36,7 @@ void add_outcome(HtmlPage& page, const Json& result) {
   page.table({"", ""}, {{"samples", cell(statistics.at("samples"))},
                         {"degrees of freedom", cell(statistics.at("degrees_of_freedom"))},
                         {"variance of the residuals, in sigma^2", cell(statistics.at("residual_variance"), 4)},
-                        {"half the sum of their squares, before", cell(optimizer.at("objective_initial"))},
+                        {"what is minimised, before", cell(optimizer.at("objective_initial"))},
                         {"after", cell(optimizer.at("objective_final"))},
                         {"condition number", cell(identifiability.at("condition_number"), 3)}});
   for (const Json& words : identifiability.at("unidentifiable"))
@@ -62,14 +62,46 @@ void add_correlation(HtmlPage& page, const Json& result) {
 
 void add_experiments(HtmlPage& page, const Json& result) {
   if (!result.contains("experiments")) return;
-  std::vector<std::vector<std::string>> rows;
+  std::vector<std::vector<std::string>> rows, tests;
   for (const auto& [name, experiment] : result.at("experiments").items()) {
     for (const auto& [channel, fit] : experiment.at("channels").items()) {
       rows.push_back({name, channel, cell(experiment.at("role")), cell(fit.at("samples")), cell(fit.at("rms"), 4),
+                      cell(fit.at("sigma"), 4) + (fit.at("sigma_is_estimated").get<bool>() ? " (estimated)" : ""),
                       cell(fit.at("rms_scaled"), 4)});
+      const Json& residuals = fit.at("residuals");
+      tests.push_back({name, channel, cell(residuals.at("mean"), 3), cell(residuals.at("autocorrelation"), 3),
+                       cell(residuals.at("ljung_box"), 3), cell(residuals.at("lags")),
+                       cell(residuals.at("ljung_box_p"), 2), cell(residuals.at("runs")),
+                       cell(residuals.at("runs_p"), 2), cell(residuals.at("in_words"))});
     }
   }
-  page.table({"experiment", "channel", "role", "samples", "rms of measured - model", "rms/sigma"}, rows);
+  page.table({"experiment", "channel", "role", "samples", "rms of measured - model", "sigma", "rms/sigma"}, rows);
+  page.heading("Are the residuals noise?");
+  page.paragraph(
+      "Of white noise p is rarely below 0.01. Where it is, the model misses something, and the standard errors are too "
+      "small.");
+  page.table({"experiment", "channel", "mean", "lag-1 autocorrelation", "Ljung-Box", "lags", "its p", "runs of signs",
+              "their p", "in words"},
+             tests);
+}
+
+void add_profiles(HtmlPage& page, const Json& result) {
+  if (!result.contains("profiles")) return;
+  page.heading("Profile likelihood");
+  page.paragraph(
+      "The parameter is held, all others are fitted again. Where the model is linear in it, tau is a straight line.");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& [name, profile] : result.at("profiles").items())
+    rows.push_back({name, "[" + cell(profile.at("ci95")) + "]", cell(profile.value("no_lower_end", Json())),
+                    cell(profile.value("no_upper_end", Json()))});
+  page.table({"parameter", "95 % interval", "no lower end", "no upper end"}, rows);
+  for (const auto& [name, profile] : result.at("profiles").items()) {
+    if (!profile.contains("value")) continue;
+    LinePlot plot{.title = "Profile of " + name, .x_label = name, .y_label = "tau [-]"};
+    plot.series.push_back({"tau", profile.at("value").get<std::vector<double>>(),
+                           profile.at("tau").get<std::vector<double>>(), Mark::line});
+    page.plot(plot);
+  }
 }
 
 void add_fit(HtmlPage& page, const FitPlot& fit) {
@@ -97,6 +129,7 @@ std::string identification_report(const Scene& scene, const Json& result, const 
   page.heading("Parameters");
   add_parameters(page, result);
   add_correlation(page, result);
+  add_profiles(page, result);
   page.heading("Measured and model");
   add_experiments(page, result);
   for (const FitPlot& fit : fits) add_fit(page, fit);

@@ -15,7 +15,8 @@ Sensitivities::Sensitivities(ForwardRun& run, const SimulationSettings& settings
       sampling_(sampling),
       active_(run.flow().data().active),
       blocks_(parameter_blocks(run.flow().data())),
-      s_(static_cast<int>(active_.size()), 14 * run.flow().data().n, run.context()) {
+      s_(static_cast<int>(active_.size()), 14 * run.flow().data().n, run.context()),
+      rate_(14 * run.flow().data().n, run.context()) {
   const MechanismData& d = run.flow().data();
   const Eigen::Index states = 14 * d.n;
   const int count = static_cast<int>(active_.size());
@@ -98,7 +99,11 @@ void Sensitivities::take_sample(const SampleEvent& event, const StatePoint& at) 
   if (event.cost) {
     add_cost(*event.cost, at, event.objective);
   } else if (sampling_.observe) {
-    sampling_.observe(event.index, at, y_rho_);
+    run_.require(CVodeGetDky(run_.memory(), event.time, 1, rate_));
+    const Eigen::VectorXd ydot = *rate_;
+    StatePoint with_rate = at;
+    with_rate.ydot = &ydot;
+    sampling_.observe(event.index, with_rate, y_rho_);
   }
 }
 

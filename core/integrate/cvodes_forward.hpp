@@ -41,6 +41,7 @@ class Sensitivities {
   Eigen::VectorXd y_bar_, rho_bar_;
   Eigen::MatrixXd y_rho_, psi_rho_;
   VectorArray s_;
+  Vector rate_;  // dy/dt at a sample
   NonlinearSolver fixed_point_;
 };
 

@@ -67,7 +67,7 @@ struct Sampling {
   std::vector<double> times;
   std::function<void(std::size_t index, const StatePoint& at)> observe;
 };
-// The same with derivatives: y_rho is dy/drho at that time, 14n x P.
+// The same with derivatives: y_rho is dy/drho at that time, 14n x P; at.ydot is there.
 struct TangentSampling {
   std::vector<double> times;
   std::function<void(std::size_t index, const StatePoint& at, const Eigen::MatrixXd& y_rho)> observe;

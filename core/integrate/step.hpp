@@ -52,4 +52,10 @@ inline void dense_output(const Method& rk, const Step& step, double theta, Eigen
   for (int i = 0; i < rk.dense_stages; ++i) y += (step.h * rk.dense_weight(i, theta)) * step.K.col(i);
 }
 
+// Its derivative in t.
+inline void dense_output_rate(const Method& rk, const Step& step, double theta, Eigen::VectorXd& ydot) {
+  ydot = (6 * theta * (1 - theta) / step.h) * (step.y1 - step.y_hat);
+  for (int i = 0; i < rk.dense_stages; ++i) ydot += rk.dense_weight_rate(i, theta) * step.K.col(i);
+}
+
 }  // namespace mbsopt

@@ -96,6 +96,12 @@ struct Method {
     for (int j = 6; j >= 0; --j) x = (x + dense[7 * i + j]) * theta;
     return x;
   }
+  // d b_i/d theta
+  double dense_weight_rate(int i, double theta) const {
+    double x = 0;
+    for (int j = 6; j >= 0; --j) x = x * theta + (j + 1) * dense[7 * i + j];
+    return x;
+  }
 
   // The groups of coupled stages, in the order of their computation; those of the step come first.
   std::span<const StageGroup> stage_groups() const { return {group.data(), static_cast<std::size_t>(groups)}; }

@@ -25,7 +25,7 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
     }
     blocks_.push_back(std::move(b));
   }
-  y_.setZero(states), y_bar_.setZero(states);
+  y_.setZero(states), ydot_.setZero(states), y_bar_.setZero(states);
   rho_bar_.setZero(d.rho.size());
   r_.setZero(dynamics_.equations(), kLanes);
   y_rho_.setZero(states, d.rho.size());
@@ -62,10 +62,12 @@ void TangentSweep::take_samples(const Step& step, std::span<const SampleEvent> e
     const double theta = (e.time - step.t) / step.h;
     dense_output(rk_, step, theta, y_);
     set_dense(step, theta);
-    const StatePoint at{e.time, y_, step.angles0, motion()};
+    StatePoint at{e.time, y_, step.angles0, motion()};
     if (e.cost) {
       add_cost(*e.cost, at, 1, &Block::Y, e.objective, psi_rho);
     } else {
+      dense_output_rate(rk_, step, theta, ydot_);
+      at.ydot = &ydot_;
       for (const Block& b : blocks_) {
         for (int k = 0; k < kLanes; ++k) {
           if (b.parameters.parameter[k] >= 0) y_rho_.col(b.parameters.parameter[k]) = b.Y.col(k);

@@ -58,7 +58,7 @@ class TangentSweep {
   Projector projector_;
   std::optional<LinearisedStages> implicit_;
   std::vector<Block> blocks_;
-  Eigen::VectorXd y_, y_bar_, rho_bar_;
+  Eigen::VectorXd y_, ydot_, y_bar_, rho_bar_;
   Eigen::MatrixXd y_rho_;
   LaneRows r_;
 };

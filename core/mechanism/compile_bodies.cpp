@@ -27,16 +27,30 @@ DualVector4 orientation(const Compilation& model, const OrientationField& field,
   return quaternion_product(p, euler_parameters(unit_vector(model, 0), rpy[0]));
 }
 
+// J = tr(S) I - S with S = m U U': xx yy zz xy xz yz.
+DualVector<6> tensor_of(const Compilation& model, const ConsistentInertiaField& I, const Dual& m,
+                        const std::string& where) {
+  const Dual x = model.fields.value(I.x, where + ".x"), y = model.fields.value(I.y, where + ".y"),
+             z = model.fields.value(I.z, where + ".z"), xy = model.fields.value(I.xy, where + ".xy"),
+             xz = model.fields.value(I.xz, where + ".xz"), yz = model.fields.value(I.yz, where + ".yz");
+  const Dual Sxx = x * x + xy * xy + xz * xz, Syy = y * y + yz * yz, Szz = z * z;
+  const Dual Sxy = xy * y + xz * yz, Sxz = xz * z, Syz = yz * z;
+  return {m * (Syy + Szz), m * (Sxx + Szz), m * (Sxx + Syy), -m * Sxy, -m * Sxz, -m * Syz};
+}
+
+DualVector<6> inertia(const Compilation& model, const Body& body, const Dual& mass, const std::string& where) {
+  if (body.consistent_inertia) return tensor_of(model, *body.consistent_inertia, mass, where + ".consistent");
+  const InertiaField& I = body.inertia;
+  return model.fields.values(std::array<Field, 6>{I.xx, I.yy, I.zz, I.xy, I.xz, I.yz}, where);
+}
+
 void add_body(Compilation& model, const Body& body, BodyData& out, DualVector3& com, DualVector4& p, DualVector3& r,
               const std::string& where) {
   const Dual mass = model.fields.value(body.mass, where + ".mass");
   if (mass.value() < 0) throw SceneError(where + ".mass: is negative, a mass must not be");
   out.mass = mass.value();
   out.slot_mass = model.fields.slot(mass);
-  const InertiaField& I = body.inertia;
-  const DualVector<6> J =
-      model.fields.values(std::array<Field, 6>{I.xx, I.yy, I.zz, I.xy, I.xz, I.yz}, where + ".inertia");
-  const Vec<6> x = numbers(model.keep(out.slot_J, J));
+  const Vec<6> x = numbers(model.keep(out.slot_J, inertia(model, body, mass, where + ".inertia")));
   out.J << x(0), x(3), x(4), x(3), x(1), x(5), x(4), x(5), x(2);
   com = model.fields.values(body.com, where + ".com");
   out.com = numbers(model.keep(out.slot_com, com));

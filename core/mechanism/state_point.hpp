@@ -32,7 +32,8 @@ struct StatePoint {
   const Eigen::VectorXd& y;  // (q, v): q has 7 numbers per body (r_g, p), v = qdot
   const Eigen::VectorXd&
       angles;  // per tracked joint: an angle on the branch in use; size 0 where none is tracked [rad]
-  MotionSource* motion = nullptr;  // needed by sensors of accelerations and reactions only
+  MotionSource* motion = nullptr;         // needed by sensors of accelerations and reactions only
+  const Eigen::VectorXd* ydot = nullptr;  // dy/dt of the dense output; for observers of runs with tangents only
 };
 
 }  // namespace mbsopt

@@ -45,7 +45,13 @@ class Checker {
   void vector(std::string_view key, const VectorField& value, const Says& says);
   void point(std::string_view key, const PointField& value, const std::string& body, const Says& says);
   void point(std::string_view key, const std::optional<PointField>& value, const std::string& body, const Says& says);
-  void inertia(std::string_view key, const InertiaField& value, const Says&) { at(key).check(value); }
+  void inertia(std::string_view key, const InertiaField& tensor,
+               const std::optional<ConsistentInertiaField>& consistent, const Says&) {
+    if (consistent)
+      at(key).at("consistent").check(*consistent);
+    else
+      at(key).check(tensor);
+  }
   void orientation(std::string_view key, const OrientationField& value, const Says&);
   void points(std::string_view key, const std::map<std::string, VectorField>& value, const Says& says);
   void law(std::string_view key, const std::optional<Expression>& value, Names names, const Says& says);

@@ -51,7 +51,13 @@ class FieldVisitor {
   void point(std::string_view key, const std::optional<PointField>& value, const std::string& body, const Says& says) {
     if (value) point(key, *value, body, says);
   }
-  void inertia(std::string_view key, const InertiaField& value, const Says&) { visit(at(key), value); }
+  void inertia(std::string_view key, const InertiaField& tensor,
+               const std::optional<ConsistentInertiaField>& consistent, const Says&) {
+    if (consistent)
+      visit(child_path(at(key), "consistent"), *consistent);
+    else
+      visit(at(key), tensor);
+  }
   void orientation(std::string_view key, const OrientationField& value, const Says&) {
     if (const auto* e = std::get_if<EulerParametersField>(&value))
       tell_all(at(key), e->e, Names::none);

@@ -45,6 +45,17 @@ struct InertiaField {
   Field xx, yy, zz, xy, xz, yz;
 };
 
+// A tensor that a body of that mass can have, whatever the six lengths are: with the second moments of the mass about
+// its centre S = m U U', U upper triangular, the tensor is J = tr(S) I - S.  [m]
+//   U = [ x xy xz ]    x, y, z: what is left of the mass's root-mean-square extent along an axis when the shears
+//       [ 0  y yz ]    xy, xz, yz are taken off; with those zero,  J = m diag(y^2 + z^2, x^2 + z^2, x^2 + y^2)
+//       [ 0  0  z ]
+// With the mass and the centre of mass it is the log-Cholesky parametrisation of the pseudo-inertia: Rucker and
+// Wensing, "Smooth Parameterization of Rigid-Body Inertia", IEEE RA-L 7 (2022).
+struct ConsistentInertiaField {
+  Field x, y, z, xy, xz, yz;
+};
+
 struct EulerParametersField {
   std::array<Field, 4> e{1.0, 0.0, 0.0, 0.0};
 };
@@ -69,7 +80,8 @@ struct Body {
   Field mass;                      // [kg]
   VectorField com{0.0, 0.0, 0.0};  // centre of mass in the body frame [m]
   InertiaField inertia;
-  VectorField position{0.0, 0.0, 0.0};  // of the body-frame origin, global [m]
+  std::optional<ConsistentInertiaField> consistent_inertia = {};  // instead
+  VectorField position{0.0, 0.0, 0.0};                            // of the body-frame origin, global [m]
   OrientationField orientation;
   VectorField velocity{0.0, 0.0, 0.0};          // of the body-frame origin, global [m/s]
   VectorField angular_velocity{0.0, 0.0, 0.0};  // global components [rad/s]

@@ -95,7 +95,14 @@ void describe(auto& v, Like<Parameter> auto& p) {
   v.choice("scale", p.scale, kParameterScales, {"how an optimiser sees it"});
   v.text("unit", p.unit, {"SI unit of the value, such as N/m; expressions are checked against it"});
   v.plain("allow_unused", p.allow_unused, kAny, {"true: not an error that nothing depends on it"});
-  v.later("prior", "a prior");
+  v.object("prior", p.prior, {"what is known of it beforehand; a residual of its own in identify"});
+}
+
+void describe(auto& v, Like<Parameter::Prior> auto& p) {
+  std::string type = "normal";
+  v.word("type", type, Words{"normal"}, {"distribution"});
+  v.plain("mean", p.mean, kAny, {"in the parameter's unit", Need::required});
+  v.plain("sigma", p.sigma, kPositive, {"standard deviation, in the parameter's unit", Need::required});
 }
 
 void describe(auto& v, Like<InertiaField> auto& i) {
@@ -106,6 +113,16 @@ void describe(auto& v, Like<InertiaField> auto& i) {
   v.number("xy", i.xy, {"tensor entry, minus the product of inertia [kg m^2]", Need::optional, kInertia});
   v.number("xz", i.xz, {"tensor entry, minus the product of inertia [kg m^2]", Need::optional, kInertia});
   v.number("yz", i.yz, {"tensor entry, minus the product of inertia [kg m^2]", Need::optional, kInertia});
+}
+
+void describe(auto& v, Like<ConsistentInertiaField> auto& i) {
+  using dimension::kLength;
+  v.number("x", i.x, {"extent of the mass along x, root mean square about its centre [m]", Need::required, kLength});
+  v.number("y", i.y, {"along y [m]", Need::required, kLength});
+  v.number("z", i.z, {"along z [m]", Need::required, kLength});
+  v.number("xy", i.xy, {"shear: S = m U U' with U = [x xy xz; 0 y yz; 0 0 z] [m]", Need::optional, kLength});
+  v.number("xz", i.xz, {"shear [m]", Need::optional, kLength});
+  v.number("yz", i.yz, {"shear [m]", Need::optional, kLength});
 }
 
 void describe(auto& v, Like<AxisAngleField> auto& o) {
@@ -129,7 +146,7 @@ void describe(auto& v, Like<Body> auto& b) {
   v.name("name", b.name, {"name of the body; 'ground' is predefined", Need::required});
   v.number("mass", b.mass, {"[kg]", Need::required, kMass});
   v.vector("com", b.com, {"centre of mass in the body frame [m]", Need::optional, kLength});
-  v.inertia("inertia", b.inertia,
+  v.inertia("inertia", b.inertia, b.consistent_inertia,
             {"tensor entries about the centre of mass, body axes [kg m^2]", Need::required, kInertia});
   v.vector("position", b.position, {"of the body-frame origin, global [m]; a guess", Need::optional, kLength});
   v.orientation("orientation", b.orientation, {"of the body frame; a guess"});

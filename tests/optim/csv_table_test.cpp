@@ -54,17 +54,38 @@ TEST_CASE("a tab-separated row may end in missing cells", "[csv]") {
   CHECK(std::isnan(table.column("y")[0]));
 }
 
+TEST_CASE("decimals may have a comma between semicolons and tabs", "[csv]") {
+  for (const char* text : {"t;x;y\n0;-1,5;2\n0,25;+3,5e-2;\n", "t\tx\ty\n0\t-1,5\t2\n0,25\t+3,5e-2\t\n"}) {
+    const CsvTable table = parse_csv(text, "run1.csv");
+    REQUIRE(table.rows() == 2);
+    CHECK(table.column("t") == std::vector<double>{0, 0.25});
+    CHECK(table.column("x") == std::vector<double>{-1.5, 0.035});
+    CHECK(table.column("y")[0] == 2);
+    CHECK(std::isnan(table.column("y")[1]));
+  }
+}
+
 TEST_CASE("errors in a table name the file, the line and the column", "[csv]") {
   CHECK(error_of("") == "run1.csv: is empty; a header row with the columns' names is needed");
   CHECK(error_of("# only a comment\n") == error_of(""));
   CHECK(error_of("t,x\n0,1\n1,1.5e\n") == "run1.csv:3:3: column 'x': '1.5e' is not a finite number");
   CHECK(error_of("t,x\n0,inf\n") == "run1.csv:2:3: column 'x': 'inf' is not a finite number");
-  CHECK(error_of("t,x\n0,1,2\n") == "run1.csv:2:1: the row has 3 cells, the header 2");
+  CHECK(error_of("t,x\n0\n") == "run1.csv:2:1: the row has 1 cell, the header 2");
+  CHECK(error_of("t,x\n0,1,2\n") ==
+        "run1.csv:2:1: the row has 3 cells, the header 2 (where decimals have a comma, cells need a semicolon or a tab "
+        "between them)");
   CHECK(error_of("t,x,t\n") == "run1.csv:1:5: the column 't' appears twice");
   CHECK(error_of("t,,x\n") == "run1.csv:1:3: a column without a name in the header");
   CHECK(error_of("0,1\n1,2\n") == "run1.csv:1:1: the first row must hold the columns' names, found numbers");
-  CHECK(error_of("t;x\n0;1,5\n") ==
-        "run1.csv:2:3: column 'x': '1,5' is not a finite number (decimals are written with a point)");
+  CHECK(error_of("0,5;1\n1;2\n") == "run1.csv:1:1: the first row must hold the columns' names, found numbers");
+  CHECK(error_of("t,x\n0,\"1,5\"\n") ==
+        "run1.csv:2:3: column 'x': '1,5' has a decimal comma, which needs a semicolon or a tab between cells");
+  CHECK(error_of("t;x\n0;1,5\n\n1;2.5\n") ==
+        "run1.csv:4:3: column 'x': '2.5' has a decimal point, line 2 a decimal comma; a file has one of them");
+  CHECK(error_of("t\tx\n0.0\t1,5\n") ==
+        "run1.csv:2:5: column 'x': '1,5' has a decimal comma, line 2 a decimal point; a file has one of them");
+  CHECK(error_of("t;x\n0;1.234,5\n") ==
+        "run1.csv:2:3: column 'x': '1.234,5' has more than one point or comma; thousands are not separated");
   CHECK(error_of("t,\"x\n0,1\n") == "run1.csv:1:3: the quote is not closed on its line");
   CHECK(error_of("t,\"x\"y\n0,1\n") == "run1.csv:1:6: found 'y' after a closing quote, where the cell must end");
 }

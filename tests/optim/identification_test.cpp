@@ -161,14 +161,13 @@ TEST_CASE("of mass, lever, inertia and friction a free swing tells two combinati
   const IdentificationResult result = run_identification(p, {pendulum::exact_motion(64, 0.055, 1.53, 1.55, 2)});
   INFO(result.message);
   REQUIRE(result.ok());
-  CHECK(result.statistics.unidentifiable.size() == 2);
+  CHECK(result.statistics.unidentifiable ==
+        std::vector<std::string>{"m, a, k, J0: only m*a/J0 and k/J0 are determined"});
   for (int k = 0; k < 4; ++k) CHECK(std::isinf(result.parameters[static_cast<std::size_t>(k)].std_error));
   CHECK(std::isfinite(result.parameters[4].std_error));  // theta0
   const auto value = [&](std::size_t i) { return result.parameters[i].value; };
   CHECK(value(0) * 9.81 * value(1) / value(3) == Approx(64).epsilon(1e-6));
   CHECK(value(2) / value(3) == Approx(0.055).epsilon(1e-4));
-  for (const std::string& words : result.statistics.unidentifiable)
-    CHECK_THAT(words, Contains("leave all that is measured as it is") || Contains("is determined"));
 }
 
 TEST_CASE("gain and bias may be fitted, sigma may not", "[identification]") {

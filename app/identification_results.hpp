@@ -1,0 +1,21 @@
+// What an identification found, for people on standard output and for scripts in result.json and CSV files.
+#pragma once
+
+#include <ostream>
+#include <string>
+
+#include "app/result_json.hpp"
+#include "app/trajectory_csv.hpp"
+#include "optim/identification.hpp"
+
+namespace mbsopt {
+
+void print_fit(std::ostream& out, const IdentificationResult& fit);
+// parameters, correlation, experiments, optimizer, statistics, identifiability, profiles
+void add_to_result(Json& result, const IdentificationResult& fit);
+
+Trajectory history_of(const IdentificationResult& fit);      // history.csv
+std::string residuals_csv(const IdentificationResult& fit);  // a row per sample
+std::string profile_csv(const IdentificationResult& fit);    // a row per point of a profile
+
+}  // namespace mbsopt

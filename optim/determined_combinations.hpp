@@ -1,0 +1,29 @@
+// What data determine where they do not determine every parameter, in words.
+//
+// Given are directions in which nothing that is measured changes. Parameters that such directions tie together form a
+// group; of a group of c parameters with d directions, c - d combinations are determined, those that stay as they are
+// along every direction. To first order they are known from the directions alone, and are told in the simplest form
+// that fits:
+//
+//   sums         "m1, m2: only m1 + m2 is determined"                    of parameters of one unit
+//   products     "m, g, J: only m*g/J is determined"                     whole or half exponents
+//   otherwise    "a, b: only a + 0.25*b is determined (near this solution)"
+// A group without any: "c: does not influence what is measured".
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+namespace mbsopt {
+
+// null_space: independent columns, changes of the parameters over their sizes; rho and size: the parameters' values and
+// the positive numbers that the changes are relative to. units: of the parameters, "" where not known; empty: none is.
+std::vector<std::string> determined_combinations(const Eigen::MatrixXd& null_space, const Eigen::VectorXd& rho,
+                                                 const Eigen::VectorXd& size, const std::vector<std::string>& names,
+                                                 const std::vector<std::string>& units = {});
+
+// Parameters that the directions change.
+std::vector<bool> changed_parameters(const Eigen::MatrixXd& null_space);
+
+}  // namespace mbsopt

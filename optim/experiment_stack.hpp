@@ -1,0 +1,51 @@
+// The least-squares problem of an identification: the residuals of its experiments one below the other, then one
+// residual per prior, in the scaled variables of variable_scaling.hpp.
+//
+//   z = [ z_1; z_2; ...; (u_k - mean_k)/sigma_k for each unknown with a prior ]
+//
+// The loss does not see priors. A value free in several experiments has its prior in each.
+//
+//   ExperimentStack stack(std::move(experiments), unknowns, scaling, spec.loss);
+//   LeastSquaresResult fit = solve_with_ceres(stack, scaling.to_x(start_of(unknowns)));
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "optim/least_squares.hpp"
+#include "optim/unknown_parameters.hpp"
+
+namespace mbsopt {
+
+class ExperimentStack : public LeastSquaresProblem {
+ public:
+  struct Member {
+    std::size_t experiment;  // in the identification
+    Experiment model;
+    long most_steps = 0;  // of a simulation that went well
+  };
+
+  // scaling must outlive it.
+  ExperimentStack(std::vector<Member> members, const std::vector<UnknownParameter>& unknowns,
+                  const VariableScaling& scaling, const Loss& fit_loss);
+
+  void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) override;
+
+  std::vector<Member>& members() { return members_; }
+  const VariableScaling& scaling() const { return scaling_; }
+  Eigen::Index samples() const { return size - plain; }
+  long simulations() const { return simulations_; }
+  std::function<bool(double t)> go_on;  // within a simulation; false abandons it
+
+ private:
+  struct Prior {
+    Eigen::Index at;
+    double mean, sigma;
+  };
+  std::vector<Member> members_;
+  const VariableScaling& scaling_;
+  std::vector<Prior> priors_;
+  long simulations_ = 0;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,16 @@
+// The residuals of an experiment, and what they say channel by channel.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "optim/experiment.hpp"
+#include "optim/identification.hpp"
+
+namespace mbsopt {
+
+// Fills the fit of one experiment from its residuals z, and appends them to the rows of residuals.csv.
+void score_experiment(const ExperimentSpec& spec, const Experiment& model, const Loss& loss, const Eigen::VectorXd& z,
+                      std::size_t experiment, ExperimentFit& fit, std::vector<ResidualRow>& residuals);
+
+}  // namespace mbsopt
