@@ -36,9 +36,10 @@ constexpr std::array kCommands{
     Command{"check", "all gradient methods against each other and against differences", check_command},
     Command{"design", "optimal design", design_command},
     Command{"identify", "fit parameters to measurements", identify_command},
+    Command{"resume", "go on with a design or an identification that was interrupted or killed", resume_command},
     Command{"schema", "print the JSON Schema of problem files", schema_command},
 };
-constexpr std::array kLaterCommands{"tradeoff", "resume"};
+constexpr std::array kLaterCommands{"tradeoff"};
 
 std::vector<std::string> command_names() {
   std::vector<std::string> names;
@@ -68,14 +69,18 @@ std::vector<std::string> without_help_command(std::vector<std::string> arguments
 
 void add_options(CLI::App& sub, const std::string& name, CommandOptions& options) {
   if (name == "schema") return;
+  sub.add_option("--threads", options.threads, "at most so many threads or processes (results do not depend on it)")
+      ->check(CLI::Range(1, 1024));
+  sub.add_flag("--quiet", options.quiet, "no progress on standard error");
+  if (name == "resume") {
+    sub.add_option("folder", options.problem_file, "output folder of the run, with its journal.jsonl")->required();
+    return;
+  }
   sub.add_option("problem", options.problem_file, "problem file (*.json)")->required();
   sub.add_option("--out", options.out, "folder for the results (default: out/<name>/)");
   sub.add_option("--set", options.sets, "change a field: parameters.k1.value=120; may be repeated")
       ->type_name("PATH=VALUE")
       ->allow_extra_args(false);
-  sub.add_option("--threads", options.threads, "at most so many threads (results do not depend on it)")
-      ->check(CLI::Range(1, 1024));
-  sub.add_flag("--quiet", options.quiet, "no progress on standard error");
   if (name == "gradient") {
     sub.add_option("--method", options.method, "how gradients are computed")
         ->check(CLI::IsMember({"auto", "tlm", "adjoint", "cvodes_forward", "cvodes_adjoint", "fd"}))

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "app/command.hpp"
+#include "app/identify_starts.hpp"
 #include "app/interrupt.hpp"
 #include "app/optimized_problem.hpp"
 #include "app/report/motion_plots.hpp"
@@ -148,7 +149,7 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
   return plots;
 }
 
-IdentificationResult fitted(Run& run, const std::vector<CsvTable>& data) {
+IdentificationResult fitted(Run& run, const Problem& problem, const std::vector<CsvTable>& data) {
   IdentificationOptions options;
   options.simulation_progress = [](double) { return !interrupted(); };
   options.progress = [&](const FitRow& row) {
@@ -156,7 +157,7 @@ IdentificationResult fitted(Run& run, const std::vector<CsvTable>& data) {
                                        row.cost, row.gradient_norm, row.step_norm));
     return !interrupted();
   };
-  IdentificationResult fit = run_identification(run.problem, data, options);
+  IdentificationResult fit = run_identification(problem, data, options);
   run.progress.finish();
   return fit;
 }
@@ -189,7 +190,11 @@ int identify_command(const CommandContext& context) {
     run.result["model"] = to_json(assembly.summary());
     print_model(context.out, scene.name, assembly.summary());
   }
-  const IdentificationResult fit = fitted(run, data);
+  LongRun long_run(run);
+  const Problem problem = from_best_start(run, long_run, data);
+  long_run.begin();
+  const IdentificationResult fit = fitted(run, problem, data);
+  long_run.end(fit.status == SolverStatus::stopped ? "interrupted" : fit.ok() ? "ok" : "failed");
   add_to_result(run.result, fit);
   print_fit(context.out, fit);
   const Trajectory history = history_of(fit);

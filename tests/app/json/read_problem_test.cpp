@@ -112,7 +112,7 @@ TEST_CASE("a problem is read field by field", "[json]") {
   REQUIRE(problem.design);
   CHECK(problem.design->subject_to.at(0).upper == 0.2);
   CHECK(problem.design->variables == std::vector<std::string>{"k1"});
-  CHECK(problem.design->max_iterations == 50);
+  CHECK(problem.design->optimizer.max_iterations == 50);
   CHECK_FALSE(problem.identification);
 }
 

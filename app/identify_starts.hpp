@@ -1,0 +1,17 @@
+// A multistart of an identification: the problem with the values of the best start's fit, from which the fit proper
+// begins.
+#pragma once
+
+#include <vector>
+
+#include "app/long_run.hpp"
+#include "optim/csv_table.hpp"
+#include "optim/identification.hpp"
+
+namespace mbsopt {
+
+// The given problem where no multistart is asked for. Shared variables are spread over their bounds; parameters that
+// are free in an experiment begin at their given values.
+Problem from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data);
+
+}  // namespace mbsopt
