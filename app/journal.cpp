@@ -32,7 +32,7 @@ std::string whole_lines_of(const std::filesystem::path& file) {
 
 JournalContent read_journal(const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / kJournalFile;
-  const auto refuse = [&](const std::string& why) { throw std::invalid_argument(file.string() + ": " + why); };
+  const auto refuse = [&](const std::string& why) { throw OutputError(file.string() + ": " + why); };
   if (!std::filesystem::exists(file))
     refuse("there is none; 'resume' goes on with a folder that 'design' or 'identify' of this version has begun");
   const std::string text = whole_lines_of(file);

@@ -13,7 +13,6 @@
 #pragma once
 
 #include <filesystem>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -31,7 +30,7 @@ struct JournalContent {
   std::string ended;  // empty: it did not end by itself
 };
 
-// Throws std::invalid_argument where there is none, or where it is none.
+// Throws OutputError where there is none, or where it is none.
 JournalContent read_journal(const std::filesystem::path& folder);
 
 class Journal {

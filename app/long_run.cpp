@@ -2,8 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <stdexcept>
-
+#include "app/atomic_file.hpp"
 #include "optim/seed.hpp"
 
 namespace mbsopt {
@@ -43,12 +42,12 @@ void LongRun::refuse_what_has_changed() const {
   for (const char* key : {"version", "input_sha256", "data_sha256"}) {
     const Json before = earlier_.header.value(key, Json()), after = now.value(key, Json());
     if (before == after) continue;
-    throw std::invalid_argument(fmt::format("{}: was begun with another {}; it cannot go on: start '{}' anew",
-                                            (run_.folder.path() / kJournalFile).string(),
-                                            std::string(key) == "version"        ? "version of mbsopt"
-                                            : std::string(key) == "input_sha256" ? "content of the problem file"
-                                                                                 : "content of a data file",
-                                            run_.context.command));
+    throw OutputError(fmt::format("{}: was begun with another {}; it cannot go on: start '{}' anew",
+                                  (run_.folder.path() / kJournalFile).string(),
+                                  std::string(key) == "version"        ? "version of mbsopt"
+                                  : std::string(key) == "input_sha256" ? "content of the problem file"
+                                                                       : "content of a data file",
+                                  run_.context.command));
   }
 }
 

@@ -2,7 +2,7 @@
 //
 //   LongRun long_run(run);
 //   spec.seed = long_run.seed("multistart", spec.seed);   // given, of the run that this one goes on with, or drawn
-//   long_run.begin();                                     // throws std::invalid_argument when the input has changed
+//   long_run.begin();                                     // throws OutputError when the input has changed
 //   long_run.earlier().starts ...                         // what was done before
 //   long_run.journal().add("start", record);
 //   long_run.end("ok");

@@ -259,6 +259,8 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
   list.SetStringValue("sb", "yes");  // no banner
   list.SetStringValue("hessian_approximation", options.exact_hessian ? "exact" : "limited-memory");
   list.SetIntegerValue("limited_memory_max_history", options.history);
+  // Newton's steps converge faster than the barrier falls from its usual 0.1; BFGS needs that time to learn.
+  if (options.exact_hessian) list.SetNumericValue("mu_init", 1e-3);
   list.SetStringValue("nlp_scaling_method", "user-scaling");
   list.SetStringValue("mu_strategy",
                       "monotone");                // "adaptive" leaps away from good points of problems with many minima
