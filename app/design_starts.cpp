@@ -67,7 +67,7 @@ Problem at_start(Problem problem, int start, const Eigen::VectorXd& values) {
 }
 
 // In a worker process: the run from one start, with the points it computed, from which the best run is told again.
-Json record_of_start(const Problem& problem, int start) {
+Json record_of_start(const Problem& problem, const NlpScale& scale, int start) {
   Json points = Json::array(), hessians = Json::array();
   JsonPointRecords records({}, {}, [&](const char* kind, const Json& content) {
     (std::string_view(kind) == "point" ? points : hessians).push_back(content);
@@ -76,6 +76,7 @@ Json record_of_start(const Problem& problem, int start) {
   options.records = &records;
   options.simulation_progress = [](double) { return !interrupted(); };
   options.progress = [](const DesignRow&) { return !interrupted(); };
+  options.scale = scale;
   const DesignResult design = run_design(problem, options);
   const bool evaluated = !design.history.empty();
   Json record{{"start", start},
@@ -93,7 +94,7 @@ Json record_of_start(const Problem& problem, int start) {
 }
 
 // The run of a record, from the points that it knows.
-DesignResult told_again(const Problem& problem, const Json& record) {
+DesignResult told_again(const Problem& problem, const NlpScale& scale, const Json& record) {
   JsonPointRecords records(record.at("points").get<std::vector<Json>>(), record.at("hessians").get<std::vector<Json>>(),
                            [](const char*, const Json&) {});
   const auto go_on = [&] { return !interrupted() || !records.all_recalled(); };
@@ -101,6 +102,7 @@ DesignResult told_again(const Problem& problem, const Json& record) {
   options.records = &records;
   options.simulation_progress = [&](double) { return go_on(); };
   options.progress = [&](const DesignRow&) { return go_on(); };
+  options.scale = scale;
   return run_design(problem, options);
 }
 
@@ -121,12 +123,15 @@ DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& problem
   const MultistartSpec& spec = *problem.design->multistart;
   const std::vector<Eigen::VectorXd> starts = start_values(designed(problem), spec, *spec.seed);
   const auto from = [&](int start) { return at_start(problem, start, starts[static_cast<std::size_t>(start)]); };
+  DesignOptions for_scale;
+  for_scale.simulation_progress = [](double) { return !interrupted(); };
+  const NlpScale scale = design_scale(from(0), for_scale);
   const MultistartOutcome outcome =
-      run_multistart(run, long_run, spec, [&](int start) { return record_of_start(from(start), start); });
+      run_multistart(run, long_run, spec, [&](int start) { return record_of_start(from(start), scale, start); });
   const Json* const best = outcome.best();
   DesignOutcome result;
   result.interrupted = outcome.interrupted;
-  result.design = best ? told_again(from((*best)["start"].get<int>()), *best) : run_design(from(0));
+  result.design = best ? told_again(from((*best)["start"].get<int>()), scale, *best) : run_design(from(0));
   if (best) describe_given(problem, before, result.design);
   return result;
 }

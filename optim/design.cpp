@@ -58,6 +58,13 @@ std::vector<std::string> objective_names(const DesignSpec& spec) {
   return names;
 }
 
+Eigen::VectorXd start_of(const Evaluator& evaluator, const VariableScaling& scaling) {
+  Eigen::VectorXd designed(scaling.size());
+  for (Eigen::Index k = 0; k < designed.size(); ++k)
+    designed(k) = evaluator.start()(evaluator.variables()[static_cast<std::size_t>(k)]);
+  return scaling.to_x(designed);
+}
+
 void describe_start(const Problem& problem, const Evaluator& evaluator, const Evaluation& start, DesignResult& result) {
   const DesignSpec& spec = *problem.design;
   result.objective = spec.minimize;
@@ -148,6 +155,19 @@ NlpResult solved(DesignProgram& program, const Eigen::VectorXd& x_start, const O
 
 }  // namespace
 
+NlpScale design_scale(const Problem& problem, const DesignOptions& options) {
+  const DesignSpec& spec = checked(problem);
+  EvaluatorOptions evaluator_options;
+  evaluator_options.method = options.method;
+  evaluator_options.user_forces = options.user_forces;
+  evaluator_options.progress = options.simulation_progress;
+  Evaluator evaluator(problem.scene, objectives_of(problem, objective_names(spec)), spec.variables, evaluator_options);
+  const VariableScaling scaling(chosen(problem.scene, evaluator.variables()));
+  DesignProgram program(spec, evaluator, scaling);
+  program.start_from(start_of(evaluator, scaling));
+  return {program.f_scale, program.c_scale};
+}
+
 DesignResult run_design(const Problem& problem, const DesignOptions& options) {
   const Stopwatch stopwatch;
   const DesignSpec& spec = checked(problem);
@@ -165,11 +185,9 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
 
   DesignResult result;
   result.optimizer = spec.optimizer.type;
-  Eigen::VectorXd designed(scaling.size());
-  for (Eigen::Index k = 0; k < designed.size(); ++k)
-    designed(k) = evaluator.start()(evaluator.variables()[static_cast<std::size_t>(k)]);
-  const Eigen::VectorXd x_start = scaling.to_x(designed);
-  const Evaluation start = program.start_from(x_start);
+  const Eigen::VectorXd x_start = start_of(evaluator, scaling);
+  const Evaluation start = program.start_from(x_start, options.scale);
+  result.scale = {program.f_scale, program.c_scale};
   result.gradient_choice = start.choice.empty() ? std::string(to_string(start.method)) : start.choice;
   describe_start(problem, evaluator, start, result);
   if (start.ok) result.warnings = idle_variables(start, spec, evaluator);

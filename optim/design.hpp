@@ -63,6 +63,7 @@ struct DesignResult {
                                                                  // optimality.hpp; NaN where stopped
   double violation = 0;         // at the solution: largest of the constraints, each relative to its bounds
   std::optional<long> seed;     // where the method is random
+  NlpScale scale;               // by which convergence was judged
   std::string gradient_choice;  // method and why
   int iterations = 0;
   long evaluations = 0, failed_evaluations = 0;  // points at which objectives and gradients were computed
@@ -80,10 +81,16 @@ struct DesignOptions {
   std::function<bool(const DesignRow&)> progress;     // after every iteration; false stops, the best so far is kept
   std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
   PointRecords* records = nullptr;                    // of an earlier run that this one goes on with
+  // By which convergence is judged. Where there is none: about 1 over the objective and its gradient at the start. Runs
+  // from several starts share one, so that "converged" means the same of all.
+  std::optional<NlpScale> scale = {};
 };
 
 // problem.design must be there. Throws std::invalid_argument where it makes no sense (unknown names, no bounds to
 // hold).
 DesignResult run_design(const Problem& problem, const DesignOptions& options = {});
+
+// The scale that a run from the problem's own values would take.
+NlpScale design_scale(const Problem& problem, const DesignOptions& options = {});
 
 }  // namespace mbsopt

@@ -42,7 +42,7 @@ DesignProgram::DesignProgram(const DesignSpec& spec, Evaluator& evaluator, const
   }
 }
 
-Evaluation DesignProgram::start_from(const VectorXd& x_start) {
+NlpScale DesignProgram::scale_at(const VectorXd& x_start) {
   constexpr double kLittleWay = 0.01;
   const VectorXd shift = kLittleWay * x_start.cwiseAbs().cwiseMax(1);
   VectorXd inward = x_start + shift;
@@ -58,9 +58,13 @@ Evaluation DesignProgram::start_from(const VectorXd& x_start) {
     f_size = std::max({f_size, std::abs(point.f), point.f_x.cwiseAbs().maxCoeff()});
     c_size = c_size.cwiseMax(point.c_x.cwiseAbs().rowwise().maxCoeff());
   }
-  f_scale = inverse(f_size);
-  c_scale = c_size.unaryExpr([](double size) { return std::min(1.0, inverse(size)); });
-  const Evaluation start = evaluator_.gradients(rho_at(x_start));  // in memory
+  return {inverse(f_size), c_size.unaryExpr([](double size) { return std::min(1.0, inverse(size)); })};
+}
+
+Evaluation DesignProgram::start_from(const VectorXd& x_start, const std::optional<NlpScale>& given) {
+  const NlpScale scale = given ? *given : scale_at(x_start);
+  f_scale = scale.f, c_scale = scale.c;
+  const Evaluation start = evaluator_.gradients(rho_at(x_start));  // in memory, unless the scale is given
   if (start.ok) best_ = start, best_f_ = start.psi(0), best_violation_ = violation_of(start);
   return start;
 }

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "optim/evaluator.hpp"
@@ -26,8 +27,8 @@ class DesignProgram : public NonlinearProgram {
 
   // Evaluates the start and scales by it. Convergence is judged on an objective whose size and gradient are about 1:
   // the larger of those at the start and a little way from it, so that a start at the optimum, where both may vanish,
-  // is seen for what it is. Constraints likewise.
-  Evaluation start_from(const Eigen::VectorXd& x_start);
+  // is seen for what it is. Constraints likewise. Or by a given scale.
+  Evaluation start_from(const Eigen::VectorXd& x_start, const std::optional<NlpScale>& scale = {});
 
   Eigen::VectorXd rho_at(const Eigen::VectorXd& x) const;  // all parameters
 
@@ -43,6 +44,7 @@ class DesignProgram : public NonlinearProgram {
   const std::string& hessian_failure() const { return hessian_failure_; }  // the first, in words
 
  private:
+  NlpScale scale_at(const Eigen::VectorXd& x_start);
   void fill(const Evaluation& e, const Eigen::VectorXd& x, NlpPoint& point) const;
   void keep(const Evaluation& e);
   double violation_of(const Evaluation& e) const;

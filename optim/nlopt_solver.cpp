@@ -50,6 +50,7 @@ const Row* find_row(std::string_view name) {
 constexpr int kFailuresInARow = 40;  // of local methods: they are lost
 constexpr double kFirstStep = 0.1;   // of x, without derivatives
 constexpr double kAcceptable = 100;  // times the tolerance: as Ipopt's second way to converge
+constexpr int kFreshStarts = 2;      // of local methods with gradients, from their best point
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr long kRequestsPerPoint = 20;  // of points in memory; then a method goes round in circles
 
@@ -116,8 +117,15 @@ class Adapter {
       return;
     }
     VectorXd x = x_start;
-    double f = 0;
-    const nlopt_result code = nlopt_optimize(opt_, x.data(), &f);
+    nlopt_result code = NLOPT_SUCCESS;
+    for (int round = 0; round <= kFreshStarts; ++round) {
+      const double f_before = points_.best().f;
+      double f = 0;
+      code = nlopt_optimize(opt_, x.data(), &f);
+      // A line search that got lost in what it had learnt may get on without it.
+      if (ended() || !stalled() || !(points_.best().f < f_before)) break;
+      x = points_.best_x();
+    }
     if (const char* const words = nlopt_get_errmsg(opt_)) library_message_ = words;
     opt_ = nullptr;
     if (exception_) std::rethrow_exception(exception_);
@@ -232,6 +240,13 @@ class Adapter {
     const NlpProgress progress{result_.iterations, point.f, problem_.violation(point.c), distance, points_.x()};
     if (options_.progress && !options_.progress(progress)) end(Ended::stopped);
     if (options_.max_iterations && result_.iterations >= *options_.max_iterations) end(Ended::iterations);
+  }
+
+  bool stalled() {
+    if (!method_.gradients || method_.global) return false;
+    keep_solution();
+    return points_.feasible(result_.point) &&
+           optimality(problem_, result_.x, result_.point) > kAcceptable * options_.tolerance;
   }
 
   // A constraint that is missed by its tolerance buys a lower objective: of points whose objectives differ by no more

@@ -21,6 +21,12 @@
 
 namespace mbsopt {
 
+// What a solver multiplies f and c by where it tests convergence.
+struct NlpScale {
+  double f = 1;
+  Eigen::VectorXd c;
+};
+
 enum class Wanted { values, derivatives };
 
 struct NlpPoint {
@@ -67,8 +73,8 @@ struct NonlinearProgram {
   Eigen::VectorXd c_scale;                             // the same for c; ones
 };
 
-// Points that were computed in an earlier run, and a place where new ones are written down: a run that was killed goes on
-// from there.
+// Points that were computed in an earlier run, and a place where new ones are written down: a run that was killed goes
+// on from there.
 struct PointRecords {
   virtual ~PointRecords() = default;
   virtual bool recall(const Eigen::VectorXd& x, Wanted wanted, NlpPoint& point) = 0;
