@@ -159,6 +159,7 @@ IdentificationResult fitted(Run& run, const Problem& problem, const std::vector<
   };
   IdentificationResult fit = run_identification(problem, data, options);
   run.progress.finish();
+  if (run.problem.identification->multistart) describe_given(run.problem, fit);
   return fit;
 }
 

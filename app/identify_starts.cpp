@@ -75,4 +75,16 @@ Problem from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>
   return outcome.best() ? at_fit(problem, *outcome.best()) : with_values(problem, Json::object());
 }
 
+void describe_given(const Problem& given, IdentificationResult& fit) {
+  for (FittedParameter& fitted : fit.parameters) {
+    for (const Parameter& p : given.scene.parameters)
+      if (p.name == fitted.parameter) fitted.initial = p.value;
+    for (const ExperimentSpec& experiment : given.identification->experiments) {
+      if (experiment.name != fitted.experiment) continue;
+      for (const auto& [name, value] : experiment.overrides)
+        if (name == fitted.parameter) fitted.initial = value;
+    }
+  }
+}
+
 }  // namespace mbsopt

@@ -14,4 +14,7 @@ namespace mbsopt {
 // are free in an experiment begin at their given values.
 Problem from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data);
 
+// "initial" of each parameter: as it was given, not where the best start had brought it.
+void describe_given(const Problem& given, IdentificationResult& fit);
+
 }  // namespace mbsopt
