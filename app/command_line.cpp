@@ -118,7 +118,29 @@ int run_guarded(const Command& command, const CommandContext& context) {
   return kBadInput;
 }
 
+void add_commands(CLI::App& app, CommandOptions& options) {
+  app.require_subcommand(1);
+  for (const Command& command : kCommands)
+    add_options(*app.add_subcommand(command.name, command.does), command.name, options);
+}
+
+void parse(CLI::App& app, const std::vector<std::string>& arguments) {
+  app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them last first
+}
+
 }  // namespace
+
+CommandOptions options_of(const std::vector<std::string>& arguments) {
+  CLI::App app("", "mbsopt");
+  CommandOptions options;
+  add_commands(app, options);
+  try {
+    parse(app, arguments);
+  } catch (const CLI::ParseError& error) {
+    throw std::invalid_argument(fmt::format("'{}' is no command line: {}", fmt::join(arguments, " "), error.what()));
+  }
+  return options;
+}
 
 int run_command_line(const std::vector<std::string>& given, std::ostream& out, std::ostream& err,
                      bool err_is_terminal) {
@@ -129,15 +151,12 @@ int run_command_line(const std::vector<std::string>& given, std::ostream& out, s
   }
   CLI::App app("Optimal design and parameter identification of mechanisms.", "mbsopt");
   app.set_version_flag("--version", "mbsopt " + program_version());
-  app.require_subcommand(1);
   app.footer("mbsopt help COMMAND, or mbsopt COMMAND --help, lists a command's options.");
   app.failure_message(CLI::FailureMessage::simple);
   CommandContext context{"", arguments, {}, out, err, err_is_terminal};
-  for (const Command& command : kCommands) {
-    add_options(*app.add_subcommand(command.name, command.does), command.name, context.options);
-  }
+  add_commands(app, context.options);
   try {
-    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them last first
+    parse(app, arguments);
   } catch (const CLI::ParseError& error) {
     return app.exit(error, out, err) == 0 ? kDone : kBadInput;
   }

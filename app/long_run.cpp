@@ -11,10 +11,13 @@ namespace {
 Json header_of(const Run& run, const Json& seeds) {
   const CommandContext& context = run.context;
   const Json& provenance = run.result["provenance"];
-  Json header{{"program", "mbsopt"},          {"version", run.result["version"]},
-              {"command", context.command},   {"arguments", context.arguments},
-              {"input", provenance["input"]}, {"input_sha256", provenance["input_sha256"]},
-              {"sets", context.options.sets}, {"seeds", seeds}};
+  Json header{{"program", "mbsopt"},
+              {"version", run.result["version"]},
+              {"command", context.command},
+              {"arguments", context.arguments},
+              {"input", provenance["input"]},
+              {"input_sha256", provenance["input_sha256"]},
+              {"seeds", seeds}};
   if (provenance.contains("data_sha256")) header["data_sha256"] = provenance["data_sha256"];
   return header;
 }

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "app/command.hpp"
+#include "app/command_line.hpp"
 #include "app/exit_code.hpp"
 #include "app/journal.hpp"
 
@@ -18,14 +19,13 @@ int resume_command(const CommandContext& context) {
                                command, journal.ended);
     return kDone;
   }
-  CommandOptions options = context.options;
+  const auto arguments = journal.header.at("arguments").get<std::vector<std::string>>();
+  CommandOptions options = options_of(arguments);  // as it was begun, but for where we are now
+  options.threads = context.options.threads, options.quiet = context.options.quiet;
   options.problem_file = (folder / journal.header.at("input").get<std::string>()).lexically_normal().string();
   options.out = folder.string();
-  options.sets = journal.header.at("sets").get<std::vector<std::string>>();
   options.resume = true;
-  const CommandContext again{command,     journal.header.at("arguments").get<std::vector<std::string>>(),
-                             options,     context.out,
-                             context.err, context.err_is_terminal};
+  const CommandContext again{command, arguments, options, context.out, context.err, context.err_is_terminal};
   if (command == "design") return design_command(again);
   if (command == "identify") return identify_command(again);
   throw std::invalid_argument(

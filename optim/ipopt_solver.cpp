@@ -22,6 +22,10 @@ using VectorIn = Eigen::Map<const Eigen::VectorXd>;
 using VectorView = Eigen::Map<Eigen::VectorXd>;
 
 constexpr int kFreshStarts = 2;
+constexpr double kAcceptable = 100;  // times the tolerance: where noise hides the rest
+constexpr const char* kConvergedInNoise =
+    "converged: the objective does not change any more, and the optimality conditions hold to the accuracy of its "
+    "derivatives";
 constexpr double kNoBound = 1e20;  // Ipopt's: at least 1e19 means none
 
 class Adapter : public Ipopt::TNLP {
@@ -156,6 +160,14 @@ class Adapter : public Ipopt::TNLP {
     ++round_;
   }
 
+  // Ipopt gives up where a constraint's noise is larger than what it may be missed by, or no step lowers the objective
+  // by more than noise. The best point may be optimal all the same.
+  bool best_is_optimal() const {
+    return points_.have_best() && points_.feasible(points_.best()) &&
+           optimality(problem_, points_.best_x(), points_.best()) <= kAcceptable * options_.tolerance;
+  }
+  bool best_is_feasible() const { return points_.have_best() && points_.feasible(points_.best()); }
+
   // The solution where Ipopt converged, else the best point seen.
   void finish(bool converged) {
     if (converged && final_.size() > 0 && evaluate(final_)) {
@@ -218,10 +230,7 @@ Outcome in_words(Ipopt::ApplicationReturnStatus status, const NlpResult& result,
     case Solve_Succeeded:
       return {SolverStatus::converged, "converged: the optimality conditions hold"};
     case Solved_To_Acceptable_Level:
-      return {
-          SolverStatus::converged,
-          "converged: the objective does not change any more, and the optimality conditions hold to the accuracy of "
-          "its derivatives"};
+      return {SolverStatus::converged, kConvergedInNoise};
     case Search_Direction_Becomes_Too_Small:
     case Restoration_Failed:
     case Error_In_Step_Computation:
@@ -269,7 +278,7 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
   list.SetNumericValue("constr_viol_tol", options.constraint_tolerance);
   // Simulations have noise. Where optimality hangs just above the tolerance and f, about 1 in size, has stopped to
   // change by what that tolerance amounts to (f - f* = f_x^2/(2 f_xx)), no more is to be had.
-  list.SetNumericValue("acceptable_tol", 100 * options.tolerance);
+  list.SetNumericValue("acceptable_tol", kAcceptable * options.tolerance);
   list.SetNumericValue("acceptable_obj_change_tol", options.tolerance * options.tolerance);
   list.SetNumericValue("acceptable_constr_viol_tol", options.constraint_tolerance);
   list.SetIntegerValue("acceptable_iter", 3);
@@ -314,6 +323,16 @@ NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_s
   }
   result.status = outcome.status, result.message = outcome.words;
   adapter->finish(outcome.status == SolverStatus::converged);
+  const bool gave_up = outcome.status == SolverStatus::no_progress || outcome.status == SolverStatus::infeasible;
+  if (gave_up && adapter->best_is_optimal()) {
+    result.status = SolverStatus::converged, result.message = kConvergedInNoise;
+  } else if (outcome.status == SolverStatus::infeasible && adapter->best_is_feasible()) {
+    result.status = SolverStatus::no_progress;
+    result.message =
+        "no further progress: the constraints can be held, but not while the objective is lowered; try "
+        "tighter simulation tolerances, or another start" +
+        result.failures();
+  }
   return result;
 }
 

@@ -159,7 +159,6 @@ TEST_CASE("what identification of a later version asks for is refused", "[json]"
     for (const Finding& finding : error.findings())
       if (finding.message.find("not available in this version") != std::string::npos) paths.push_back(finding.path);
     CHECK(paths == std::vector<std::string>{"parameters.m.prior", "identification.loss.type",
-                                            "identification.multistart",
                                             "identification.experiments[0].channels[0].delay"});
   }
 }
