@@ -123,15 +123,16 @@ DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& problem
   const MultistartSpec& spec = *problem.design->multistart;
   const std::vector<Eigen::VectorXd> starts = start_values(designed(problem), spec, *spec.seed);
   const auto from = [&](int start) { return at_start(problem, start, starts[static_cast<std::size_t>(start)]); };
-  DesignOptions for_scale;
-  for_scale.simulation_progress = [](double) { return !interrupted(); };
-  const NlpScale scale = design_scale(from(0), for_scale);
+  DesignOptions until_interrupted;
+  until_interrupted.simulation_progress = [](double) { return !interrupted(); };
+  const NlpScale scale = design_scale(from(0), until_interrupted);
   const MultistartOutcome outcome =
       run_multistart(run, long_run, spec, [&](int start) { return record_of_start(from(start), scale, start); });
   const Json* const best = outcome.best();
   DesignOutcome result;
   result.interrupted = outcome.interrupted;
-  result.design = best ? told_again(from((*best)["start"].get<int>()), scale, *best) : run_design(from(0));
+  result.design =
+      best ? told_again(from((*best)["start"].get<int>()), scale, *best) : run_design(from(0), until_interrupted);
   if (best) describe_given(problem, before, result.design);
   return result;
 }

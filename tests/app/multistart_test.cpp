@@ -109,6 +109,8 @@ TEST_CASE("multistart: the same result from 1, 2 and 4 workers, with a waterfall
     CHECK(result == first);
     CHECK(content_of(folder.path / workers / "history.csv") == history);
   }
+  const std::string report = content_of(folder.path / "4/report.html");
+  CHECK_THAT(report, Contains("Waterfall") && Contains("8 starts, seed 11"));
   const auto& multistart = first.at("multistart");
   CHECK(multistart.at("starts") == 8);
   CHECK(multistart.at("seed") == 11);
