@@ -193,6 +193,7 @@ int identify_command(const CommandContext& context) {
   }
   LongRun long_run(run);
   const Problem problem = from_best_start(run, long_run, data);
+  if (interrupted() && run.problem.identification->multistart) return stopped_within_starts(run, long_run, problem);
   long_run.begin();
   const IdentificationResult fit = fitted(run, problem, data);
   long_run.end(fit.status == SolverStatus::stopped ? "interrupted" : fit.ok() ? "ok" : "failed");

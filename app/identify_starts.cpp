@@ -1,10 +1,13 @@
 #include "app/identify_starts.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "app/interrupt.hpp"
 #include "app/multistart.hpp"
+#include "app/optimized_problem.hpp"
 #include "optim/start_points.hpp"
 
 namespace mbsopt {
@@ -73,6 +76,19 @@ Problem from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>
     return record_of_start(with_values(problem, named_values(names, {values.begin(), values.end()})), data, start);
   });
   return outcome.best() ? at_fit(problem, *outcome.best()) : with_values(problem, Json::object());
+}
+
+int stopped_within_starts(Run& run, LongRun& long_run, const Problem& best) {
+  std::vector<NewValue> values;
+  for (const Parameter& p : shared_parameters(best)) values.push_back({"", p.name, p.value});
+  for (const ExperimentSpec& experiment : best.identification->experiments) {
+    for (const auto& [name, value] : experiment.overrides) values.push_back({experiment.name, name, value});
+  }
+  run.write("optimized.json", optimized_problem_text(run, values));
+  run.stopped(fmt::format("optimized.json holds the best of the starts so far; 'mbsopt resume {}' goes on",
+                          run.folder.path().string()));
+  long_run.end("interrupted");
+  return run.finish();
 }
 
 void describe_given(const Problem& given, IdentificationResult& fit) {

@@ -14,6 +14,9 @@ namespace mbsopt {
 // are free in an experiment begin at their given values.
 Problem from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data);
 
+// Ends a run that was interrupted before the fit proper began; best: from_best_start(). Returns the exit code.
+int stopped_within_starts(Run& run, LongRun& long_run, const Problem& best);
+
 // "initial" of each parameter: as it was given, not where the best start had brought it.
 void describe_given(const Problem& given, IdentificationResult& fit);
 

@@ -347,3 +347,30 @@ TEST_CASE("multistart: identify fits from several starts, the same with any numb
   CHECK(lines_with(killed, "start") == 5);
   if (!was_done) CHECK(content_of(killed / "residuals.csv") == content_of(folder.path / "one/residuals.csv"));
 }
+
+TEST_CASE("resume: an identification that was interrupted between its starts goes on", "[resume]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", swing_csv(folder));
+  const std::string file = folder.write("fit.json", fit_problem());
+  const Arguments slow{"--threads", "2", "--set", "simulation.integrator.max_step=1e-3"};
+  const auto identify = [&](const fs::path& out) {
+    Arguments arguments{"identify", file, "--out", out.string()};
+    arguments.insert(arguments.end(), slow.begin(), slow.end());
+    return run_command(arguments);
+  };
+  REQUIRE(identify(folder.path / "whole").exit_code == kDone);
+  const fs::path out = folder.path / "out";
+  std::thread killer([&] {
+    for (int i = 0; i < 6000 && !(fs::exists(out / kJournalFile) && lines_with(out, "start") >= 1); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    ::kill(::getpid(), SIGTERM);
+  });
+  const CommandOutcome outcome = identify(out);
+  killer.join();
+  INFO(outcome.err);
+  REQUIRE(outcome.exit_code == kInterrupted);
+  CHECK(json_of(out / "result.json").at("status") == "interrupted");
+  CHECK(fs::exists(out / "optimized.json"));
+  REQUIRE(run_command({"resume", out.string()}).exit_code == kDone);
+  CHECK(outcome_of(out) == outcome_of(folder.path / "whole"));
+}
