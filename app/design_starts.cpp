@@ -8,7 +8,7 @@
 #include "app/interrupt.hpp"
 #include "app/multistart.hpp"
 #include "app/point_records.hpp"
-#include "optim/nlopt_solver.hpp"
+#include "optim/nlopt_methods.hpp"
 #include "optim/start_points.hpp"
 
 namespace mbsopt {

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/scene/scene_path.hpp"
-#include "optim/nlopt_solver.hpp"
+#include "optim/nlopt_methods.hpp"
 
 namespace mbsopt {
 

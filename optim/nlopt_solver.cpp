@@ -24,27 +24,20 @@ using Eigen::VectorXd;
 using VectorIn = Eigen::Map<const VectorXd>;
 using VectorView = Eigen::Map<VectorXd>;
 
-struct Row {
-  NloptMethod method;
+struct Algorithm {
+  std::string_view name;
   nlopt_algorithm algorithm;
 };
-constexpr std::array kMethods{
-    Row{{"slsqp", true, false, false, ConstraintSupport::all}, NLOPT_LD_SLSQP},
-    Row{{"mma", true, false, false, ConstraintSupport::inequalities}, NLOPT_LD_MMA},
-    Row{{"ccsaq", true, false, false, ConstraintSupport::inequalities}, NLOPT_LD_CCSAQ},
-    Row{{"lbfgs", true, false, false, ConstraintSupport::augmented_lagrangian}, NLOPT_LD_LBFGS},
-    Row{{"bobyqa", false, false, false, ConstraintSupport::augmented_lagrangian}, NLOPT_LN_BOBYQA},
-    Row{{"cobyla", false, false, false, ConstraintSupport::all}, NLOPT_LN_COBYLA},
-    Row{{"sbplx", false, false, false, ConstraintSupport::augmented_lagrangian}, NLOPT_LN_SBPLX},
-    Row{{"mlsl", true, true, true, ConstraintSupport::none}, NLOPT_G_MLSL},
-    Row{{"direct", false, true, false, ConstraintSupport::none}, NLOPT_GN_DIRECT},
-    Row{{"crs", false, true, true, ConstraintSupport::none}, NLOPT_GN_CRS2_LM},
-    Row{{"isres", false, true, true, ConstraintSupport::all}, NLOPT_GN_ISRES},
-    Row{{"esch", false, true, true, ConstraintSupport::none}, NLOPT_GN_ESCH}};
+constexpr std::array kAlgorithms{
+    Algorithm{"slsqp", NLOPT_LD_SLSQP}, Algorithm{"mma", NLOPT_LD_MMA},       Algorithm{"ccsaq", NLOPT_LD_CCSAQ},
+    Algorithm{"lbfgs", NLOPT_LD_LBFGS}, Algorithm{"bobyqa", NLOPT_LN_BOBYQA}, Algorithm{"cobyla", NLOPT_LN_COBYLA},
+    Algorithm{"sbplx", NLOPT_LN_SBPLX}, Algorithm{"mlsl", NLOPT_G_MLSL},      Algorithm{"direct", NLOPT_GN_DIRECT},
+    Algorithm{"crs", NLOPT_GN_CRS2_LM}, Algorithm{"isres", NLOPT_GN_ISRES},   Algorithm{"esch", NLOPT_GN_ESCH}};
 
-const Row* find_row(std::string_view name) {
-  const auto row = std::find_if(kMethods.begin(), kMethods.end(), [&](const Row& r) { return r.method.name == name; });
-  return row == kMethods.end() ? nullptr : &*row;
+nlopt_algorithm algorithm_of(const NloptMethod& method) {
+  return std::find_if(kAlgorithms.begin(), kAlgorithms.end(),
+                      [&](const Algorithm& row) { return row.name == method.name; })
+      ->algorithm;
 }
 
 constexpr int kFailuresInARow = 40;  // of local methods: they are lost
@@ -60,14 +53,15 @@ enum class Ended { by_itself, converged, stopped, evaluations, iterations, failu
 
 class Adapter {
  public:
-  Adapter(NonlinearProgram& problem, const Row& row, const NloptOptions& options, NlpResult& result)
+  Adapter(NonlinearProgram& problem, const NloptMethod& method, const NloptOptions& options, NlpResult& result)
       : problem_(problem),
-        method_(row.method),
+        method_(method),
+        algorithm_(algorithm_of(method)),
         options_(options),
         result_(result),
         points_(problem, result, options.constraint_tolerance, options.records),
-        wanted_(row.method.gradients ? Wanted::derivatives : Wanted::values),
-        max_evaluations_(options.max_evaluations.value_or(default_max_evaluations(row.method, problem.variables()))) {
+        wanted_(method.gradients ? Wanted::derivatives : Wanted::values),
+        max_evaluations_(options.max_evaluations.value_or(default_max_evaluations(method, problem.variables()))) {
     for (Index i = 0; i < problem.constraints(); ++i) {
       const double lower = problem.c_lower(i), upper = problem.c_upper(i);
       if (lower == upper) {
@@ -87,18 +81,18 @@ class Adapter {
   }
   bool ended() const { return ended_ != Ended::by_itself; }
 
-  void run(const Row& row, const VectorXd& x_start) {
+  void run(const VectorXd& x_start) {
     const unsigned n = static_cast<unsigned>(problem_.variables());
     const bool constrained = problem_.constraints() > 0;
     const bool augmented = constrained && method_.constraints == ConstraintSupport::augmented_lagrangian;
-    const Optimizer outer(nlopt_create(augmented ? NLOPT_AUGLAG : row.algorithm, n), nlopt_destroy);
+    const Optimizer outer(nlopt_create(augmented ? NLOPT_AUGLAG : algorithm_, n), nlopt_destroy);
     opt_ = outer.get();
     limit(opt_, x_start);
     nlopt_set_maxeval(opt_, static_cast<int>(std::min(kRequestsPerPoint * max_evaluations_, 2'000'000'000L)));
-    if (augmented || row.algorithm == NLOPT_G_MLSL) {
-      const Optimizer inner(nlopt_create(augmented ? row.algorithm : NLOPT_LD_LBFGS, n), nlopt_destroy);
+    if (augmented || algorithm_ == NLOPT_G_MLSL) {
+      const Optimizer inner(nlopt_create(augmented ? algorithm_ : NLOPT_LD_LBFGS, n), nlopt_destroy);
       limit(inner.get(), x_start);
-      if (row.algorithm == NLOPT_G_MLSL) {  // whose search ends when a local one cannot get anywhere
+      if (algorithm_ == NLOPT_G_MLSL) {  // whose search ends when a local one cannot get anywhere
         nlopt_set_xtol_abs(inner.get(), VectorXd(options_.tolerance * x_start.cwiseAbs().cwiseMax(1)).data());
         nlopt_set_ftol_abs(inner.get(), 1e-3 * options_.tolerance);
       }
@@ -108,7 +102,7 @@ class Adapter {
     add(inequalities_, nlopt_add_inequality_mconstraint, inequality_values);
     add(equalities_, nlopt_add_equality_mconstraint, equality_values);
     if (method_.random) nlopt_srand(options_.seed);
-    result_.algorithm = nlopt_algorithm_name(row.algorithm);
+    result_.algorithm = nlopt_algorithm_name(algorithm_);
     if (augmented) result_.algorithm = std::string(nlopt_algorithm_name(NLOPT_AUGLAG)) + ": " + result_.algorithm;
     if (ended()) {  // at the start already
       opt_ = nullptr;
@@ -374,6 +368,7 @@ class Adapter {
 
   NonlinearProgram& problem_;
   const NloptMethod& method_;
+  const nlopt_algorithm algorithm_;
   const NloptOptions& options_;
   NlpResult& result_;
   EvaluatedPoints points_;
@@ -397,50 +392,23 @@ bool has_equality(const NonlinearProgram& problem) {
 
 }  // namespace
 
-const NloptMethod* find_nlopt_method(std::string_view name) {
-  const Row* const row = find_row(name);
-  return row ? &row->method : nullptr;
-}
-
-long default_max_evaluations(const NloptMethod& method, Index variables) {
-  if (method.global) return 1000 * (variables + 1);
-  return method.gradients ? 500 : 500 * (variables + 1);
-}
-
-std::string nlopt_refusal(const NloptMethod& method, const NloptNeeds& needs) {
-  if (needs.constraints && method.constraints == ConstraintSupport::none)
-    return fmt::format(
-        "'{}' takes no constraints; isres does among the global methods, and ipopt, slsqp or cobyla from "
-        "several starts (multistart)",
-        method.name);
-  if (needs.equalities && method.constraints == ConstraintSupport::inequalities)
-    return fmt::format(
-        "'{}' takes no equality constraints (lower = upper); ipopt, slsqp, cobyla and isres do, and "
-        "lbfgs, bobyqa and sbplx by an augmented Lagrangian",
-        method.name);
-  if (method.name == "bobyqa" && needs.variables < 2)
-    return "'bobyqa' needs two variables or more; cobyla and sbplx take one";
-  return {};
-}
-
 NlpResult solve_with_nlopt(NonlinearProgram& problem, const VectorXd& x_start, const NloptOptions& options) {
-  const Row* const row = find_row(options.method);
-  if (!row)
+  const NloptMethod* const method = find_nlopt_method(options.method);
+  if (!method)
     throw std::invalid_argument(
         fmt::format("there is no NLopt method '{}'; available: {}", options.method, kNloptMethods));
   const NloptNeeds needs{static_cast<std::size_t>(problem.variables()), problem.constraints() > 0,
                          has_equality(problem)};
-  if (const std::string refusal = nlopt_refusal(row->method, needs); !refusal.empty())
-    throw std::invalid_argument(refusal);
-  if (row->method.global && !(problem.x_lower.allFinite() && problem.x_upper.allFinite()))
+  if (const std::string refusal = nlopt_refusal(*method, needs); !refusal.empty()) throw std::invalid_argument(refusal);
+  if (method->global && !(problem.x_lower.allFinite() && problem.x_upper.allFinite()))
     throw std::invalid_argument(fmt::format("'{}' searches between bounds; every variable needs both", options.method));
   NlpResult result;
-  Adapter adapter(problem, *row, options, result);
+  Adapter adapter(problem, *method, options, result);
   if (!adapter.start_is_valid(x_start)) {
     result.message = "the start point cannot be evaluated: " + result.first_error;
     return result;
   }
-  adapter.run(*row, x_start);
+  adapter.run(x_start);
   return result;
 }
 

@@ -1,46 +1,21 @@
 // NLopt: a dozen local and global methods behind one call. S. G. Johnson, "The NLopt nonlinear-optimization package".
 //
-//   slsqp    sequential quadratic programming (Kraft 1994)               gradients   all constraints
-//   mma      moving asymptotes, globally convergent (Svanberg 2002)      gradients   inequalities
-//   ccsaq    the same with quadratic approximations (Svanberg 2002)      gradients   inequalities
-//   lbfgs    limited-memory BFGS (Luksan)                                gradients   by augmented Lagrangian
-//   bobyqa   quadratic interpolation (Powell 2009)                       values      by augmented Lagrangian
-//   cobyla   linear interpolation (Powell 1994)                          values      all constraints
-//   sbplx    Nelder-Mead in subspaces (Rowan 1990)                       values      by augmented Lagrangian
-//   mlsl     multi-level single-linkage with lbfgs (Rinnooy Kan 1987)    gradients   none      global, random
-//   direct   dividing rectangles (Jones 1993)                            values      none      global
-//   crs      controlled random search (Kaelo and Ali 2006)               values      none      global, random
-//   isres    evolution with stochastic ranking (Runarsson and Yao 2005)  values      all       global, random
-//   esch     evolutionary (da Silva Santos 2010)                         values      none      global, random
-//
-// The augmented Lagrangian is NLopt's (Birgin and Martinez 2008). Global methods need all bounds.
+// Which ones there are, and what they can do: nlopt_methods.hpp.
 //
 //   NloptOptions options;
 //   options.method = "slsqp";
 //   NlpResult result = solve_with_nlopt(problem, x_start, options);
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
-#include <string_view>
 
+#include "optim/nlopt_methods.hpp"
 #include "optim/nonlinear_program.hpp"
 
 namespace mbsopt {
-
-enum class ConstraintSupport { none, inequalities, all, augmented_lagrangian };
-
-struct NloptMethod {
-  std::string_view name;
-  bool gradients, global, random;
-  ConstraintSupport constraints;
-};
-const NloptMethod* find_nlopt_method(std::string_view name);  // nullptr: no such method
-inline constexpr std::string_view kNloptMethods =
-    "slsqp mma ccsaq lbfgs bobyqa cobyla sbplx mlsl direct crs isres esch";
 
 struct NloptOptions {
   std::string method = "slsqp";
@@ -53,16 +28,6 @@ struct NloptOptions {
   std::function<bool(const NlpProgress&)> progress;  // after every iteration; false stops
   PointRecords* records = nullptr;
 };
-// Where none is given: 500 for local methods with gradients, 500 (n + 1) for those without, 1000 (n + 1) for global
-// ones.
-long default_max_evaluations(const NloptMethod& method, Eigen::Index variables);
-
-struct NloptNeeds {
-  std::size_t variables = 0;
-  bool constraints = false, equalities = false;
-};
-// Why the method cannot solve such a problem, with what can; empty where it can.
-std::string nlopt_refusal(const NloptMethod& method, const NloptNeeds& needs);
 
 // Throws std::invalid_argument with nlopt_refusal(), or where a global method lacks bounds; never for what an
 // evaluation does.
