@@ -15,8 +15,9 @@ struct CommandOptions {
   std::string method = "auto";        // --method of gradient
   bool hessian = false;               // --hessian of gradient
   std::vector<std::string> profiles;  // --profile of identify: fitted parameters
-  int threads = 0;                    // --threads; 0: as many as the machine has
+  int threads = 0;                    // --threads, also worker processes; 0: as many as the machine has
   bool quiet = false;                 // --quiet
+  bool resume = false;                // go on with the journal in `out`
 };
 
 struct CommandContext {
@@ -35,6 +36,7 @@ int gradient_command(const CommandContext& context);
 int check_command(const CommandContext& context);
 int design_command(const CommandContext& context);
 int identify_command(const CommandContext& context);
+int resume_command(const CommandContext& context);  // options.problem_file: the folder
 int schema_command(const CommandContext& context);
 
 }  // namespace mbsopt

@@ -36,9 +36,10 @@ constexpr std::array kCommands{
     Command{"check", "all gradient methods against each other and against differences", check_command},
     Command{"design", "optimal design", design_command},
     Command{"identify", "fit parameters to measurements", identify_command},
+    Command{"resume", "go on with a design or an identification that was interrupted or killed", resume_command},
     Command{"schema", "print the JSON Schema of problem files", schema_command},
 };
-constexpr std::array kLaterCommands{"tradeoff", "resume"};
+constexpr std::array kLaterCommands{"tradeoff"};
 
 std::vector<std::string> command_names() {
   std::vector<std::string> names;
@@ -68,14 +69,18 @@ std::vector<std::string> without_help_command(std::vector<std::string> arguments
 
 void add_options(CLI::App& sub, const std::string& name, CommandOptions& options) {
   if (name == "schema") return;
+  sub.add_option("--threads", options.threads, "at most so many threads or processes (results do not depend on it)")
+      ->check(CLI::Range(1, 1024));
+  sub.add_flag("--quiet", options.quiet, "no progress on standard error");
+  if (name == "resume") {
+    sub.add_option("folder", options.problem_file, "output folder of the run, with its journal.jsonl")->required();
+    return;
+  }
   sub.add_option("problem", options.problem_file, "problem file (*.json)")->required();
   sub.add_option("--out", options.out, "folder for the results (default: out/<name>/)");
   sub.add_option("--set", options.sets, "change a field: parameters.k1.value=120; may be repeated")
       ->type_name("PATH=VALUE")
       ->allow_extra_args(false);
-  sub.add_option("--threads", options.threads, "at most so many threads (results do not depend on it)")
-      ->check(CLI::Range(1, 1024));
-  sub.add_flag("--quiet", options.quiet, "no progress on standard error");
   if (name == "identify") {
     sub.add_option("--profile", options.profiles, "profile likelihood of fitted parameters: k1,run1.theta0")
         ->delimiter(',')
@@ -118,7 +123,29 @@ int run_guarded(const Command& command, const CommandContext& context) {
   return kBadInput;
 }
 
+void add_commands(CLI::App& app, CommandOptions& options) {
+  app.require_subcommand(1);
+  for (const Command& command : kCommands)
+    add_options(*app.add_subcommand(command.name, command.does), command.name, options);
+}
+
+void parse(CLI::App& app, const std::vector<std::string>& arguments) {
+  app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them last first
+}
+
 }  // namespace
+
+CommandOptions options_of(const std::vector<std::string>& arguments) {
+  CLI::App app("", "mbsopt");
+  CommandOptions options;
+  add_commands(app, options);
+  try {
+    parse(app, arguments);
+  } catch (const CLI::ParseError& error) {
+    throw std::invalid_argument(fmt::format("'{}' is no command line: {}", fmt::join(arguments, " "), error.what()));
+  }
+  return options;
+}
 
 int run_command_line(const std::vector<std::string>& given, std::ostream& out, std::ostream& err,
                      bool err_is_terminal) {
@@ -129,15 +156,12 @@ int run_command_line(const std::vector<std::string>& given, std::ostream& out, s
   }
   CLI::App app("Optimal design and parameter identification of mechanisms.", "mbsopt");
   app.set_version_flag("--version", "mbsopt " + program_version());
-  app.require_subcommand(1);
   app.footer("mbsopt help COMMAND, or mbsopt COMMAND --help, lists a command's options.");
   app.failure_message(CLI::FailureMessage::simple);
   CommandContext context{"", arguments, {}, out, err, err_is_terminal};
-  for (const Command& command : kCommands) {
-    add_options(*app.add_subcommand(command.name, command.does), command.name, context.options);
-  }
+  add_commands(app, context.options);
   try {
-    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them last first
+    parse(app, arguments);
   } catch (const CLI::ParseError& error) {
     return app.exit(error, out, err) == 0 ? kDone : kBadInput;
   }

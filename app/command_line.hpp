@@ -7,6 +7,11 @@
 
 namespace mbsopt {
 
+struct CommandOptions;
+
+// What was typed, without the program's name, as options; throws std::invalid_argument where it makes no sense.
+CommandOptions options_of(const std::vector<std::string>& arguments);
+
 // Runs one command in this process and returns its exit code. arguments: without the program's name.
 int run_command_line(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err,
                      bool err_is_terminal = false);

@@ -1,6 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "app/command.hpp"
+#include "app/design_starts.hpp"
 #include "app/interrupt.hpp"
 #include "app/objective_values.hpp"
 #include "app/optimized_problem.hpp"
@@ -9,10 +13,11 @@
 #include "app/simulated_motion.hpp"
 #include "app/text_table.hpp"
 #include "core/expression/counted.hpp"
-#include "optim/design.hpp"
 
 namespace mbsopt {
 namespace {
+
+Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 void print_design(std::ostream& out, const DesignResult& design) {
   TextTable parameters({"parameter", "initial", "optimum", "unit", "at bound"});
@@ -33,9 +38,12 @@ void print_design(std::ostream& out, const DesignResult& design) {
                     bound(c.lower), bound(c.upper)});
   }
   out << '\n' << parameters.text() << '\n' << objectives.text();
-  out << fmt::format("\n{} {}: {}, {}, {:.3g} s\n", design.optimizer, to_string(design.status),
+  out << fmt::format("\n{} {}: {}, {}, {:.3g} s{}\n", design.optimizer, to_string(design.status),
                      counted(design.iterations, "iteration"), counted(design.evaluations, "evaluation"),
-                     design.wall_seconds);
+                     design.wall_seconds, design.seed ? fmt::format(", seed {}", *design.seed) : "");
+  if (std::isfinite(design.optimality))
+    out << fmt::format("optimality {:.1e}, infeasibility {:.1e} at the solution\n", design.optimality,
+                       design.violation);
 }
 
 void add_to_result(Json& result, const DesignResult& design) {
@@ -54,6 +62,7 @@ void add_to_result(Json& result, const DesignResult& design) {
         {"lower", or_null(v.lower)}, {"upper", or_null(v.upper)}, {"at_bound", bound_json(v.at_lower, v.at_upper)}};
   }
   result["optimizer"] = {{"type", design.optimizer},
+                         {"algorithm", design.algorithm},
                          {"status", to_string(design.status)},
                          {"message", design.message},
                          {"gradients", design.gradient_choice},
@@ -63,30 +72,26 @@ void add_to_result(Json& result, const DesignResult& design) {
                          {"simulations", design.simulations},
                          {"wall_seconds", design.wall_seconds},
                          {"objective_initial", design.objective_initial},
-                         {"objective_final", design.objective_final}};
+                         {"objective_final", design.objective_final},
+                         {"optimality", number_or_null(design.optimality)},
+                         {"infeasibility", design.violation}};
+  if (design.seed) result["optimizer"]["seed"] = *design.seed;
 }
 
+// Without a column of what the method does not know.
 Trajectory history_of(const DesignResult& design) {
-  Trajectory history{{"iteration", "objective", "infeasibility", "optimality"}, {}};
+  const bool optimality = std::all_of(design.history.begin(), design.history.end(),
+                                      [](const DesignRow& row) { return std::isfinite(row.optimality); });
+  Trajectory history{{"iteration", "objective", "infeasibility"}, {}};
+  if (optimality) history.columns.push_back("optimality");
   for (const DesignVariable& v : design.variables) history.columns.push_back(v.name);
   for (const DesignRow& row : design.history) {
-    history.rows.push_back({static_cast<double>(row.iteration), row.objective, row.violation, row.optimality});
-    history.rows.back().insert(history.rows.back().end(), row.parameters.begin(), row.parameters.end());
+    std::vector<double>& line = history.rows.emplace_back(
+        std::vector<double>{static_cast<double>(row.iteration), row.objective, row.violation});
+    if (optimality) line.push_back(row.optimality);
+    line.insert(line.end(), row.parameters.begin(), row.parameters.end());
   }
   return history;
-}
-
-DesignResult minimised(Run& run) {
-  DesignOptions options;
-  options.simulation_progress = [](double) { return !interrupted(); };
-  options.progress = [&](const DesignRow& row) {
-    run.progress.iteration(fmt::format("iteration {:3d}   objective {:.6e}   infeasibility {:.1e}   optimality {:.1e}",
-                                       row.iteration, row.objective, row.violation, row.optimality));
-    return !interrupted();
-  };
-  DesignResult design = run_design(run.problem, options);
-  run.progress.finish();
-  return design;
 }
 
 std::vector<NewValue> new_values(const DesignResult& design) {
@@ -112,13 +117,14 @@ int design_command(const CommandContext& context) {
   run.result["model"] = to_json(before.model);
   print_model(context.out, scene.name, before.model);
 
-  const DesignResult design = minimised(run);
+  const auto [design, cut_off] = minimised(run, before.psi);
   add_to_result(run.result, design);
   print_design(context.out, design);
   for (const std::string& warning : design.warnings) run.warn(warning);
   const SimulatedMotion after = interrupted() ? SimulatedMotion{} : simulated_motion(run, design.rho);
-  if (design.status == SolverStatus::stopped) {
-    run.stopped("optimized.json holds the best design so far");
+  if (cut_off || design.status == SolverStatus::stopped) {
+    run.stopped(fmt::format("optimized.json holds the best design so far; 'mbsopt resume {}' goes on",
+                            run.folder.path().string()));
   } else if (!design.ok()) {
     run.failed(design.message);
   }

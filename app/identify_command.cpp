@@ -2,6 +2,7 @@
 
 #include "app/command.hpp"
 #include "app/identification_results.hpp"
+#include "app/identify_starts.hpp"
 #include "app/interrupt.hpp"
 #include "app/optimized_problem.hpp"
 #include "app/report/motion_plots.hpp"
@@ -40,7 +41,7 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
   return plots;
 }
 
-IdentificationResult fitted(Run& run, const std::vector<CsvTable>& data) {
+IdentificationResult fitted(Run& run, const Problem& problem, const std::vector<CsvTable>& data) {
   IdentificationOptions options;
   options.profiles = run.context.options.profiles;
   options.simulation_progress = [](double) { return !interrupted(); };
@@ -53,8 +54,9 @@ IdentificationResult fitted(Run& run, const std::vector<CsvTable>& data) {
     run.progress.iteration(fmt::format("profile of {}   {:.6g}   tau {:+.3f}", name, value, tau));
     return !interrupted();
   };
-  IdentificationResult fit = run_identification(run.problem, data, options);
+  IdentificationResult fit = run_identification(problem, data, options);
   run.progress.finish();
+  if (run.problem.identification->multistart) describe_given(run.problem, fit);
   return fit;
 }
 
@@ -86,7 +88,12 @@ int identify_command(const CommandContext& context) {
     run.result["model"] = to_json(assembly.summary());
     print_model(context.out, scene.name, assembly.summary());
   }
-  const IdentificationResult fit = fitted(run, data);
+  LongRun long_run(run);
+  const Problem problem = from_best_start(run, long_run, data);
+  if (interrupted() && run.problem.identification->multistart) return stopped_within_starts(run, long_run, problem);
+  long_run.begin();
+  const IdentificationResult fit = fitted(run, problem, data);
+  long_run.end(fit.status == SolverStatus::stopped ? "interrupted" : fit.ok() ? "ok" : "failed");
   add_to_result(run.result, fit);
   print_fit(context.out, fit);
   const Trajectory history = history_of(fit);

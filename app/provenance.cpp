@@ -3,6 +3,7 @@
 #include <IpoptConfig.h>
 #include <ceres/version.h>
 #include <fmt/format.h>
+#include <nlopt.h>
 #include <openssl/evp.h>
 #include <sundials/sundials_config.h>
 #include <CLI/Version.hpp>
@@ -26,9 +27,16 @@ std::string shell_word(const std::string& word) {
   return quoted + "'";
 }
 
+std::string nlopt_version_text() {
+  int major = 0, minor = 0, fix = 0;
+  nlopt_version(&major, &minor, &fix);
+  return fmt::format("{}.{}.{}", major, minor, fix);
+}
+
 nlohmann::ordered_json library_versions() {
   return {{"Eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
           {"Ipopt", IPOPT_VERSION},
+          {"NLopt", nlopt_version_text()},
           {"Ceres", CERES_VERSION_STRING},
           {"SUNDIALS", SUNDIALS_VERSION},
           {"fmt", fmt::format("{}.{}.{}", FMT_VERSION / 10000, FMT_VERSION / 100 % 100, FMT_VERSION % 100)},

@@ -5,11 +5,11 @@
 namespace mbsopt {
 namespace {
 
-constexpr std::array kOrder{"program",     "version",        "command",    "problem",    "status",
-                            "message",     "last_good_time", "model",      "simulation", "objectives",
-                            "methods",     "hessian_method", "verdict",    "parameters", "experiments",
-                            "correlation", "profiles",       "statistics", "optimizer",  "identifiability",
-                            "provenance",  "warnings"};
+constexpr std::array kOrder{"program",         "version",        "command",    "problem",    "status",
+                            "message",         "last_good_time", "model",      "simulation", "objectives",
+                            "methods",         "hessian_method", "verdict",    "parameters", "experiments",
+                            "correlation",     "profiles",       "statistics", "multistart", "optimizer",
+                            "identifiability", "provenance",     "warnings"};
 
 }  // namespace
 

@@ -8,7 +8,12 @@
 #include <stdexcept>
 
 #include "core/expression/did_you_mean.hpp"
+#include "optim/design_issues.hpp"
+#include "optim/design_program.hpp"
 #include "optim/ipopt_solver.hpp"
+#include "optim/nlopt_solver.hpp"
+#include "optim/optimality.hpp"
+#include "optim/seed.hpp"
 #include "optim/stopwatch.hpp"
 #include "optim/variable_scaling.hpp"
 
@@ -31,8 +36,9 @@ const DesignSpec& checked(const Problem& problem) {
   if (!problem.design) throw std::invalid_argument("design: is missing; it says what to minimise and what to vary");
   const DesignSpec& spec = *problem.design;
   if (spec.variables.empty()) throw std::invalid_argument("design.variables: is empty; name at least one parameter");
-  if (spec.optimizer != "ipopt")
-    throw std::invalid_argument(fmt::format("design.optimizer.type: is '{}'; available: ipopt", spec.optimizer));
+  if (spec.optimizer.type != "ipopt" && !find_nlopt_method(spec.optimizer.type))
+    throw std::invalid_argument(
+        fmt::format("design.optimizer.type: is '{}'; available: ipopt {}", spec.optimizer.type, kNloptMethods));
   for (std::size_t i = 0; i < spec.subject_to.size(); ++i) {
     const ObjectiveBound& bound = spec.subject_to[i];
     if (!bound.lower && !bound.upper)
@@ -41,6 +47,8 @@ const DesignSpec& checked(const Problem& problem) {
       throw std::invalid_argument(
           fmt::format("design.subject_to[{}]: lower is {}, above upper {}", i, *bound.lower, *bound.upper));
   }
+  if (const std::vector<DesignIssue> issues = optimizer_issues(spec, problem.scene); !issues.empty())
+    throw std::invalid_argument(issues[0].path + ": " + issues[0].message);
   return spec;
 }
 
@@ -50,80 +58,12 @@ std::vector<std::string> objective_names(const DesignSpec& spec) {
   return names;
 }
 
-// The design as a nonlinear program in scaled variables; constraints relative to the size of their bounds.
-class DesignProgram : public NonlinearProgram {
- public:
-  DesignProgram(const DesignSpec& spec, Evaluator& evaluator, const VariableScaling& scaling)
-      : NonlinearProgram(scaling.size(), static_cast<Eigen::Index>(spec.subject_to.size())),
-        evaluator_(evaluator),
-        scaling_(scaling),
-        rho_(evaluator.start()),
-        size_(constraints()) {
-    x_lower = scaling.x_lower(), x_upper = scaling.x_upper();
-    for (Eigen::Index i = 0; i < constraints(); ++i) {
-      const ObjectiveBound& bound = spec.subject_to[static_cast<std::size_t>(i)];
-      size_(i) = std::max(std::abs(bound.lower.value_or(0)), std::abs(bound.upper.value_or(0)));
-      if (size_(i) == 0) size_(i) = 1;
-      if (bound.lower) c_lower(i) = *bound.lower / size_(i);
-      if (bound.upper) c_upper(i) = *bound.upper / size_(i);
-    }
-  }
-
-  // Convergence is judged on an objective whose size and gradient are about 1: the larger of those at the start and a
-  // little way from it, so that a start at the optimum, where both may vanish, is seen for what it is.
-  void scale_by(const Eigen::VectorXd& x_start) {
-    constexpr double kLittleWay = 0.01;
-    const Eigen::VectorXd shift = kLittleWay * x_start.cwiseAbs().cwiseMax(1);
-    Eigen::VectorXd inward = x_start + shift;
-    for (Eigen::Index k = 0; k < inward.size(); ++k)
-      if (inward(k) > x_upper(k)) inward(k) = std::max(x_start(k) - shift(k), x_lower(k));
-    double f_size = 0;
-    Eigen::VectorXd c_size = Eigen::VectorXd::Zero(constraints());
-    for (const Eigen::VectorXd& x : {inward, x_start}) {  // the start last: the evaluator keeps it
-      NlpPoint point;
-      point.c.setZero(constraints()), point.c_x.setZero(constraints(), variables());
-      evaluate(x, point);
-      if (!point.ok) continue;
-      f_size = std::max({f_size, std::abs(point.f), point.f_x.cwiseAbs().maxCoeff()});
-      c_size = c_size.cwiseMax(point.c_x.cwiseAbs().rowwise().maxCoeff());
-    }
-    f_scale = inverse(f_size);
-    c_scale = c_size.unaryExpr([](double size) { return std::min(1.0, inverse(size)); });
-  }
-
-  Eigen::VectorXd rho_at(const Eigen::VectorXd& x) const {
-    Eigen::VectorXd rho = rho_;
-    const Eigen::VectorXd values = scaling_.to_rho(x);
-    for (Eigen::Index k = 0; k < values.size(); ++k)
-      rho(evaluator_.variables()[static_cast<std::size_t>(k)]) = values(k);
-    return rho;
-  }
-
-  void evaluate(const Eigen::VectorXd& x, NlpPoint& point) override {
-    const Evaluation& e = evaluator_.gradients(rho_at(x));
-    if (!e.ok) {
-      point.ok = false, point.message = e.message;
-      return;
-    }
-    const Eigen::VectorXd rho_x = scaling_.rho_x(x);
-    point.f = e.psi(0);
-    point.f_x = e.psi_rho.row(0).transpose().cwiseProduct(rho_x);
-    for (Eigen::Index i = 0; i < constraints(); ++i) {
-      point.c(i) = e.psi(1 + i) / size_(i);
-      point.c_x.row(i) = e.psi_rho.row(1 + i).cwiseProduct(rho_x.transpose()) / size_(i);
-    }
-  }
-
-  double size(Eigen::Index constraint) const { return size_(constraint); }
-
- private:
-  static double inverse(double x) { return x > 0 && std::isfinite(x) ? 1 / x : 1; }
-
-  Evaluator& evaluator_;
-  const VariableScaling& scaling_;
-  const Eigen::VectorXd rho_;  // the scene's values, which parameters that are not designed keep
-  Eigen::VectorXd size_;       // of each constraint's bounds
-};
+Eigen::VectorXd start_of(const Evaluator& evaluator, const VariableScaling& scaling) {
+  Eigen::VectorXd designed(scaling.size());
+  for (Eigen::Index k = 0; k < designed.size(); ++k)
+    designed(k) = evaluator.start()(evaluator.variables()[static_cast<std::size_t>(k)]);
+  return scaling.to_x(designed);
+}
 
 void describe_start(const Problem& problem, const Evaluator& evaluator, const Evaluation& start, DesignResult& result) {
   const DesignSpec& spec = *problem.design;
@@ -161,6 +101,7 @@ void describe_end(const Evaluator& evaluator, const DesignProgram& program, cons
     v.at_lower = touches(v.value, v.lower, size), v.at_upper = touches(v.value, v.upper, size);
   }
   result.objective_final = end.f;
+  result.violation = program.violation(end.c);
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     DesignConstraint& c = result.constraints[i];
     const Eigen::Index row = static_cast<Eigen::Index>(i);
@@ -171,7 +112,61 @@ void describe_end(const Evaluator& evaluator, const DesignProgram& program, cons
   }
 }
 
+// What takes one more look at the solution: the final evaluation, true extremes, and how stationary it is.
+void describe_solution(Evaluator& evaluator, DesignProgram& program, const Eigen::VectorXd& x, DesignResult& result) {
+  result.final_evaluation = program.evaluation(result.rho);
+  NlpPoint end;
+  end.f_x.setZero(program.variables()), end.c.setZero(program.constraints());
+  end.c_x.setZero(program.constraints(), program.variables());
+  program.evaluate(x, end);
+  if (end.ok) result.optimality = optimality(program, x, end);
+  const std::vector<std::optional<double>> true_values = evaluator.true_values(result.rho);
+  result.objective_true = true_values[0];
+  for (std::size_t i = 0; i < result.constraints.size(); ++i) result.constraints[i].true_value = true_values[i + 1];
+}
+
+NlpResult solved(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
+                 const std::function<bool(const NlpProgress&)>& progress, PointRecords* records, DesignResult& result) {
+  if (spec.type == "ipopt") {
+    IpoptOptions solver;
+    solver.tolerance = spec.tolerance;
+    solver.constraint_tolerance = kConstraintTolerance;
+    solver.max_iterations = static_cast<int>(spec.max_iterations.value_or(OptimizerSpec::kIpoptIterations));
+    solver.max_evaluations = spec.max_evaluations;
+    solver.exact_hessian = spec.hessian == "exact";
+    solver.progress = progress;
+    solver.records = records;
+    return solve_with_ipopt(program, x_start, solver);
+  }
+  NloptOptions solver;
+  solver.method = spec.type;
+  solver.tolerance = spec.tolerance;
+  solver.constraint_tolerance = kConstraintTolerance;
+  solver.max_evaluations = spec.max_evaluations;
+  solver.max_iterations = spec.max_iterations;
+  if (find_nlopt_method(spec.type)->random) {
+    result.seed = spec.seed.value_or(drawn_seed());
+    solver.seed = static_cast<std::uint32_t>(*result.seed);
+  }
+  solver.progress = progress;
+  solver.records = records;
+  return solve_with_nlopt(program, x_start, solver);
+}
+
 }  // namespace
+
+NlpScale design_scale(const Problem& problem, const DesignOptions& options) {
+  const DesignSpec& spec = checked(problem);
+  EvaluatorOptions evaluator_options;
+  evaluator_options.method = options.method;
+  evaluator_options.user_forces = options.user_forces;
+  evaluator_options.progress = options.simulation_progress;
+  Evaluator evaluator(problem.scene, objectives_of(problem, objective_names(spec)), spec.variables, evaluator_options);
+  const VariableScaling scaling(chosen(problem.scene, evaluator.variables()));
+  DesignProgram program(spec, evaluator, scaling);
+  program.start_from(start_of(evaluator, scaling));
+  return {program.f_scale, program.c_scale};
+}
 
 DesignResult run_design(const Problem& problem, const DesignOptions& options) {
   const Stopwatch stopwatch;
@@ -186,43 +181,38 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
     };
   Evaluator evaluator(problem.scene, objectives_of(problem, objective_names(spec)), spec.variables, evaluator_options);
   const VariableScaling scaling(chosen(problem.scene, evaluator.variables()));
-  DesignProgram program(spec, evaluator, scaling);
+  DesignProgram program(spec, evaluator, scaling, [&] { return abandoned; });
 
   DesignResult result;
-  result.optimizer = spec.optimizer;
-  Eigen::VectorXd designed(scaling.size());
-  for (Eigen::Index k = 0; k < designed.size(); ++k)
-    designed(k) = evaluator.start()(evaluator.variables()[static_cast<std::size_t>(k)]);
-  const Eigen::VectorXd x_start = scaling.to_x(designed);
-  const Evaluation start = evaluator.gradients(program.rho_at(x_start));
+  result.optimizer = spec.optimizer.type;
+  const Eigen::VectorXd x_start = start_of(evaluator, scaling);
+  const Evaluation start = program.start_from(x_start, options.scale);
+  result.scale = {program.f_scale, program.c_scale};
   result.gradient_choice = start.choice.empty() ? std::string(to_string(start.method)) : start.choice;
   describe_start(problem, evaluator, start, result);
   if (start.ok) result.warnings = idle_variables(start, spec, evaluator);
-  if (start.ok) program.scale_by(x_start);
 
-  IpoptOptions solver;
-  solver.tolerance = spec.tolerance;
-  solver.max_iterations = spec.max_iterations;
-  solver.progress = [&](const NlpProgress& p) {
+  const auto progress = [&](const NlpProgress& p) {
     result.history.push_back({p.iteration, p.f, p.violation, p.optimality, scaling.to_rho(p.x)});
     return !options.progress || options.progress(result.history.back());
   };
-  const NlpResult solution = solve_with_ipopt(program, x_start, solver);
+  const NlpResult solution = solved(program, x_start, spec.optimizer, progress, options.records, result);
   result.status = abandoned ? SolverStatus::stopped : solution.status;
   result.message = abandoned ? "stopped on request" : solution.message;
+  result.algorithm = solution.algorithm;
   result.iterations = solution.iterations;
   result.evaluations = solution.evaluations, result.failed_evaluations = solution.failed_evaluations;
   result.rho = program.rho_at(solution.x);
   if (start.ok) {
     describe_end(evaluator, program, solution.point, result);
-    if (!abandoned) {
-      result.final_evaluation = evaluator.gradients(result.rho);
-      const std::vector<std::optional<double>> true_values = evaluator.true_values(result.rho);
-      result.objective_true = true_values[0];
-      for (std::size_t i = 0; i < result.constraints.size(); ++i) result.constraints[i].true_value = true_values[i + 1];
-    }
+    if (!abandoned) describe_solution(evaluator, program, solution.x, result);
   }
-  result.simulations = evaluator.simulations();
+  if (!program.hessian_failure().empty())
+    result.warnings.push_back(
+        "design.optimizer.hessian: could not be computed everywhere, where it was not the one "
+        "before served again; first: " +
+        program.hessian_failure());
+  result.simulations = evaluator.simulations() + program.hessian_gradients();
   result.wall_seconds = stopwatch.seconds();
   return result;
 }

@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,7 +42,7 @@ struct DesignRow {
   int iteration = 0;
   double objective = 0;
   double violation = 0;        // largest of the constraints, each relative to its bounds
-  double optimality = 0;       // largest entry of the scaled Lagrangian gradient; 0 at the optimum
+  double optimality = 0;       // largest entry of the scaled Lagrangian gradient; 0 at the optimum; NaN: not known
   Eigen::VectorXd parameters;  // the variables, SI
 };
 
@@ -56,14 +57,22 @@ struct DesignResult {
   std::vector<DesignRow> history;
   Eigen::VectorXd rho;          // all parameters at the solution, or at the best point where there is none
   Evaluation final_evaluation;  // there, unless stopped: the objective that is minimised, then the constraints
-  std::string optimizer;        // "ipopt"
+  std::string optimizer;        // as in the problem: "ipopt"
+  std::string algorithm;        // in the words of its library
+  double optimality = std::numeric_limits<double>::quiet_NaN();  // at the solution, by the yardstick of all:
+                                                                 // optimality.hpp; NaN where stopped
+  double violation = 0;         // at the solution: largest of the constraints, each relative to its bounds
+  std::optional<long> seed;     // where the method is random
+  NlpScale scale;               // by which convergence was judged
   std::string gradient_choice;  // method and why
   int iterations = 0;
   long evaluations = 0, failed_evaluations = 0;  // points at which objectives and gradients were computed
-  long simulations = 0;
+  long simulations = 0;                          // also those of second derivatives
   double wall_seconds = 0;
   std::vector<std::string> warnings;  // sentences
-  bool ok() const { return status == SolverStatus::converged || status == SolverStatus::no_progress; }
+  bool ok() const {
+    return status == SolverStatus::converged || status == SolverStatus::no_progress || status == SolverStatus::searched;
+  }
 };
 
 struct DesignOptions {
@@ -71,10 +80,17 @@ struct DesignOptions {
   std::vector<std::shared_ptr<const UserForce>> user_forces;
   std::function<bool(const DesignRow&)> progress;     // after every iteration; false stops, the best so far is kept
   std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
+  PointRecords* records = nullptr;                    // of an earlier run that this one goes on with
+  // By which convergence is judged. Where there is none: about 1 over the objective and its gradient at the start. Runs
+  // from several starts share one, so that "converged" means the same of all.
+  std::optional<NlpScale> scale = {};
 };
 
 // problem.design must be there. Throws std::invalid_argument where it makes no sense (unknown names, no bounds to
 // hold).
 DesignResult run_design(const Problem& problem, const DesignOptions& options = {});
+
+// The scale that a run from the problem's own values would take.
+NlpScale design_scale(const Problem& problem, const DesignOptions& options = {});
 
 }  // namespace mbsopt

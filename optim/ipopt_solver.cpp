@@ -7,9 +7,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
+#include <vector>
 
 #include "core/expression/counted.hpp"
+#include "optim/evaluated_points.hpp"
+#include "optim/optimality.hpp"
 
 namespace mbsopt {
 namespace {
@@ -20,33 +22,39 @@ using VectorIn = Eigen::Map<const Eigen::VectorXd>;
 using VectorView = Eigen::Map<Eigen::VectorXd>;
 
 constexpr int kFreshStarts = 2;
+constexpr double kAcceptable = 100;  // times the tolerance: where noise hides the rest
+constexpr const char* kConvergedInNoise =
+    "converged: the objective does not change any more, and the optimality conditions hold to the accuracy of its "
+    "derivatives";
 constexpr double kNoBound = 1e20;  // Ipopt's: at least 1e19 means none
 
 class Adapter : public Ipopt::TNLP {
  public:
   Adapter(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const IpoptOptions& options, NlpResult& result)
-      : problem_(problem), x_start_(x_start), options_(options), result_(result) {
+      : problem_(problem),
+        x_start_(x_start),
+        options_(options),
+        result_(result),
+        points_(problem, result, options.constraint_tolerance, options.records) {
     result_.x = x_start;
   }
 
   bool start_is_valid() { return evaluate(x_start_); }
+  bool out_of_evaluations() const { return out_of_evaluations_; }
 
   // Feasible, and the objective falls nowhere within the bounds: the barrier would only lead away from here.
   bool start_is_optimal() {
-    if (problem_.violation(point_.c) > options_.constraint_tolerance) return false;
-    Eigen::VectorXd step = -problem_.f_scale * point_.f_x;
-    step = step.cwiseMin(problem_.x_upper - x_).cwiseMax(problem_.x_lower - x_);
-    if (step.cwiseAbs().maxCoeff() > options_.tolerance) return false;
-    result_.point = point_;
-    if (options_.progress)
-      options_.progress({0, point_.f, problem_.violation(point_.c), step.cwiseAbs().maxCoeff(), x_});
+    const double distance = optimality(problem_, points_.x(), *point_);
+    if (!points_.feasible(*point_) || distance > options_.tolerance) return false;
+    result_.point = *point_;
+    if (options_.progress) options_.progress({0, point_->f, problem_.violation(point_->c), distance, points_.x()});
     return true;
   }
 
   bool get_nlp_info(Index& n, Index& m, Index& nnz_jac, Index& nnz_hess, IndexStyleEnum& style) override {
     n = static_cast<Index>(problem_.variables());
     m = static_cast<Index>(problem_.constraints());
-    nnz_jac = n * m, nnz_hess = 0;
+    nnz_jac = n * m, nnz_hess = options_.exact_hessian ? n * (n + 1) / 2 : 0;
     style = C_STYLE;
     return true;
   }
@@ -75,18 +83,18 @@ class Adapter : public Ipopt::TNLP {
   // step (f, c) and never where it would give up (the gradients).
   bool eval_f(Index n, const Number* x, bool, Number& f) override {
     if (!evaluate(VectorIn(x, n))) return false;
-    f = point_.f;
+    f = point_->f;
     return true;
   }
   bool eval_g(Index n, const Number* x, bool, Index m, Number* c) override {
     if (!evaluate(VectorIn(x, n))) return false;
-    VectorView(c, m) = point_.c;
+    VectorView(c, m) = point_->c;
     return true;
   }
   // Derivatives are asked for only where Ipopt has gone: at its iterates.
   bool eval_grad_f(Index n, const Number* x, bool, Number* f_x) override {
     if (!evaluate(VectorIn(x, n))) return false;
-    VectorView(f_x, n) = point_.f_x;
+    VectorView(f_x, n) = point_->f_x;
     keep_iterate();
     return true;
   }
@@ -96,8 +104,27 @@ class Adapter : public Ipopt::TNLP {
       return true;
     }
     if (!evaluate(VectorIn(x, n))) return false;
-    for (Index i = 0; i < m; ++i) VectorView(values + i * n, n) = point_.c_x.row(i);
+    for (Index i = 0; i < m; ++i) VectorView(values + i * n, n) = point_->c_x.row(i);
     keep_iterate();
+    return true;
+  }
+
+  // Of the Lagrangian: the lower triangle, row by row. Where it cannot be computed, the one before serves again.
+  bool eval_h(Index n, const Number* x, bool, Number f_factor, Index m, const Number* multipliers, bool, Index,
+              Index* row, Index* column, Number* values) override {
+    Index k = 0;
+    if (!values) {
+      for (Index i = 0; i < n; ++i)
+        for (Index j = 0; j <= i; ++j, ++k) row[k] = i, column[k] = j;
+      return true;
+    }
+    update_hessians(VectorIn(x, n));
+    for (Index i = 0; i < n; ++i) {
+      for (Index j = 0; j <= i; ++j, ++k) {
+        values[k] = f_factor * hessians_[0](i, j);
+        for (Index c = 0; c < m; ++c) values[k] += multipliers[c] * hessians_[static_cast<std::size_t>(c) + 1](i, j);
+      }
+    }
     return true;
   }
 
@@ -106,7 +133,12 @@ class Adapter : public Ipopt::TNLP {
                              Ipopt::IpoptCalculatedQuantities*) override {
     if (round_ > 0 && iteration == 0) return true;  // the point it goes on from
     result_.iterations = iterations_before_ + iteration;
-    if (!options_.progress || iterate_.size() == 0) return true;
+    out_of_evaluations_ = options_.max_evaluations && result_.evaluations >= *options_.max_evaluations;
+    if (options_.progress && iterate_.size() > 0 && !told_progress(inf_du)) return false;
+    return !out_of_evaluations_;
+  }
+
+  bool told_progress(double inf_du) const {
     return options_.progress({result_.iterations, iterate_f_, iterate_violation_, inf_du, iterate_});
   }
 
@@ -118,70 +150,70 @@ class Adapter : public Ipopt::TNLP {
 
   // Whether a point seen on the way is feasible and better than the one Ipopt ended at by more than the tolerance.
   bool passed_a_better_point() {
-    if (final_.size() == 0 || !have_best_ || !evaluate(final_)) return false;
-    const double gain = (point_.f - best_.f) * problem_.f_scale;
-    return problem_.violation(best_.c) <= options_.constraint_tolerance && gain > options_.tolerance;
+    if (final_.size() == 0 || !points_.have_best() || !evaluate(final_)) return false;
+    const double gain = (point_->f - points_.best().f) * problem_.f_scale;
+    return points_.feasible(points_.best()) && gain > options_.tolerance;
   }
   void go_on_from_best() {
-    x_start_ = best_x_;
+    x_start_ = points_.best_x();
     iterations_before_ = result_.iterations;
     ++round_;
   }
 
+  // Ipopt gives up where a constraint's noise is larger than what it may be missed by, or no step lowers the objective
+  // by more than noise. The best point may be optimal all the same.
+  bool best_is_optimal() const {
+    return points_.have_best() && points_.feasible(points_.best()) &&
+           optimality(problem_, points_.best_x(), points_.best()) <= kAcceptable * options_.tolerance;
+  }
+  bool best_is_feasible() const { return points_.have_best() && points_.feasible(points_.best()); }
+
   // The solution where Ipopt converged, else the best point seen.
   void finish(bool converged) {
     if (converged && final_.size() > 0 && evaluate(final_)) {
-      result_.x = x_, result_.point = point_;
-    } else if (have_best_) {
-      result_.x = best_x_, result_.point = best_;
+      result_.x = points_.x(), result_.point = *point_;
+    } else if (points_.have_best()) {
+      result_.x = points_.best_x(), result_.point = points_.best();
     }
   }
 
  private:
-  bool evaluate(const Eigen::VectorXd& x_asked) {
-    // Interior points may leave the bounds by a rounding error.
-    const Eigen::VectorXd x = x_asked.cwiseMax(problem_.x_lower).cwiseMin(problem_.x_upper);
-    if (x_.size() == x.size() && x_ == x) return point_.ok;
-    x_ = x;
-    point_ = NlpPoint();
-    point_.f_x.setZero(x.size());
-    point_.c.setZero(problem_.constraints());
-    point_.c_x.setZero(problem_.constraints(), x.size());
-    ++result_.evaluations;
-    try {
-      problem_.evaluate(x, point_);
-    } catch (const std::exception& error) {
-      point_.ok = false, point_.message = error.what();
-    }
-    if (point_.ok &&
-        !(std::isfinite(point_.f) && point_.f_x.allFinite() && point_.c.allFinite() && point_.c_x.allFinite()))
-      point_.ok = false, point_.message = "the objective, a constraint or a derivative is not finite";
-    if (!point_.ok) {
-      ++result_.failed_evaluations;
-      if (result_.first_error.empty()) result_.first_error = point_.message;
-      return false;
-    }
-    keep_best();
-    return true;
+  // Interior points may leave the bounds by a rounding error; EvaluatedPoints takes them back.
+  bool evaluate(const Eigen::VectorXd& x) {
+    point_ = &points_.at(x, Wanted::derivatives);
+    return point_->ok;
   }
 
-  void keep_best() {
-    const double tolerance = options_.constraint_tolerance;
-    const double violation = problem_.violation(point_.c), best = have_best_ ? problem_.violation(best_.c) : 0;
-    const bool better =
-        !have_best_ || (best <= tolerance ? violation <= tolerance && point_.f < best_.f : violation < best);
-    if (better) best_x_ = x_, best_ = point_, have_best_ = true;
+  void update_hessians(const Eigen::VectorXd& x) {
+    if (hessians_x_.size() > 0 && hessians_x_ == x) return;
+    std::vector<Eigen::MatrixXd> found;
+    bool ok = options_.records && options_.records->recall(x, found);
+    if (!ok) {
+      ok = problem_.hessians(x, found);
+      if (ok && options_.records) options_.records->record(x, found);
+    }
+    if (ok) hessians_ = std::move(found);
+    if (hessians_.empty()) {
+      const Eigen::Index n = problem_.variables();
+      hessians_.assign(static_cast<std::size_t>(problem_.constraints()) + 1, Eigen::MatrixXd::Zero(n, n));
+      hessians_[0] = Eigen::MatrixXd::Identity(n, n) / problem_.f_scale;
+    }
+    hessians_x_ = x;
   }
 
-  void keep_iterate() { iterate_ = x_, iterate_f_ = point_.f, iterate_violation_ = problem_.violation(point_.c); }
+  void keep_iterate() {
+    iterate_ = points_.x(), iterate_f_ = point_->f, iterate_violation_ = problem_.violation(point_->c);
+  }
 
   NonlinearProgram& problem_;
   Eigen::VectorXd x_start_;
   const IpoptOptions& options_;
   NlpResult& result_;
-  Eigen::VectorXd x_, best_x_, final_, iterate_;
-  NlpPoint point_, best_;
-  bool have_best_ = false;
+  EvaluatedPoints points_;
+  const NlpPoint* point_ = nullptr;  // the last one
+  Eigen::VectorXd final_, iterate_, hessians_x_;
+  std::vector<Eigen::MatrixXd> hessians_;
+  bool out_of_evaluations_ = false;
   int round_ = 0, iterations_before_ = 0;
   double iterate_f_ = 0, iterate_violation_ = 0;
 };
@@ -198,10 +230,7 @@ Outcome in_words(Ipopt::ApplicationReturnStatus status, const NlpResult& result,
     case Solve_Succeeded:
       return {SolverStatus::converged, "converged: the optimality conditions hold"};
     case Solved_To_Acceptable_Level:
-      return {
-          SolverStatus::converged,
-          "converged: the objective does not change any more, and the optimality conditions hold to the accuracy of "
-          "its derivatives"};
+      return {SolverStatus::converged, kConvergedInNoise};
     case Search_Direction_Becomes_Too_Small:
     case Restoration_Failed:
     case Error_In_Step_Computation:
@@ -237,8 +266,10 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
   Ipopt::OptionsList& list = *application.Options();
   list.SetIntegerValue("print_level", 0);
   list.SetStringValue("sb", "yes");  // no banner
-  list.SetStringValue("hessian_approximation", "limited-memory");
+  list.SetStringValue("hessian_approximation", options.exact_hessian ? "exact" : "limited-memory");
   list.SetIntegerValue("limited_memory_max_history", options.history);
+  // Newton's steps converge faster than the barrier falls from its usual 0.1; BFGS needs that time to learn.
+  if (options.exact_hessian) list.SetNumericValue("mu_init", 1e-3);
   list.SetStringValue("nlp_scaling_method", "user-scaling");
   list.SetStringValue("mu_strategy",
                       "monotone");                // "adaptive" leaps away from good points of problems with many minima
@@ -247,7 +278,7 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
   list.SetNumericValue("constr_viol_tol", options.constraint_tolerance);
   // Simulations have noise. Where optimality hangs just above the tolerance and f, about 1 in size, has stopped to
   // change by what that tolerance amounts to (f - f* = f_x^2/(2 f_xx)), no more is to be had.
-  list.SetNumericValue("acceptable_tol", 100 * options.tolerance);
+  list.SetNumericValue("acceptable_tol", kAcceptable * options.tolerance);
   list.SetNumericValue("acceptable_obj_change_tol", options.tolerance * options.tolerance);
   list.SetNumericValue("acceptable_constr_viol_tol", options.constraint_tolerance);
   list.SetIntegerValue("acceptable_iter", 3);
@@ -261,6 +292,9 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
 
 NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const IpoptOptions& options) {
   NlpResult result;
+  result.algorithm = options.exact_hessian
+                         ? "Ipopt: interior point, exact Hessian"
+                         : fmt::format("Ipopt: interior point, limited-memory BFGS of {} pairs", options.history);
   Adapter* const adapter = new Adapter(problem, x_start, options, result);
   const Ipopt::SmartPtr<Ipopt::TNLP> owner(adapter);
   if (!adapter->start_is_valid()) {
@@ -280,12 +314,25 @@ NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_s
     application->Options()->SetIntegerValue("max_iter", std::max(0, options.max_iterations - result.iterations));
     if (application->Initialize("") != Ipopt::Solve_Succeeded) break;  // "": no options file is read
     outcome = in_words(application->OptimizeTNLP(owner), result, options);
+    if (adapter->out_of_evaluations() && outcome.status == SolverStatus::stopped)
+      outcome = {SolverStatus::iteration_limit,
+                 "stopped at the limit of " + counted(*options.max_evaluations, "evaluation") + result.failures()};
     const bool ended = outcome.status == SolverStatus::converged || outcome.status == SolverStatus::no_progress;
     if (!ended || !adapter->passed_a_better_point()) break;
     adapter->go_on_from_best();
   }
   result.status = outcome.status, result.message = outcome.words;
   adapter->finish(outcome.status == SolverStatus::converged);
+  const bool gave_up = outcome.status == SolverStatus::no_progress || outcome.status == SolverStatus::infeasible;
+  if (gave_up && adapter->best_is_optimal()) {
+    result.status = SolverStatus::converged, result.message = kConvergedInNoise;
+  } else if (outcome.status == SolverStatus::infeasible && adapter->best_is_feasible()) {
+    result.status = SolverStatus::no_progress;
+    result.message =
+        "no further progress: the constraints can be held, but not while the objective is lowered; try "
+        "tighter simulation tolerances, or another start" +
+        result.failures();
+  }
   return result;
 }
 

@@ -2,8 +2,8 @@
 //
 //   minimise f(x)   subject to   x_lower <= x <= x_upper,   c_lower <= c(x) <= c_upper
 //
-// Value and derivatives come together, since one simulation gives them all; an evaluation that fails says so in words,
-// and the solver shortens its step.
+// Value and derivatives come together, since one simulation gives them all; methods without derivatives ask for values
+// alone. An evaluation that fails says so in words, and the solver shortens its step.
 //
 //   struct Sphere : NonlinearProgram {
 //     Sphere() : NonlinearProgram(2, 0) {}
@@ -15,14 +15,24 @@
 #include <algorithm>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "optim/solver_outcome.hpp"
 
 namespace mbsopt {
 
+// What a solver multiplies f and c by where it tests convergence.
+struct NlpScale {
+  double f = 1;
+  Eigen::VectorXd c;
+};
+
+enum class Wanted { values, derivatives };
+
 struct NlpPoint {
   bool ok = true;
-  std::string message;  // why not
+  bool abandoned = false;  // not ok because the user stopped it: that says nothing about x
+  std::string message;     // why not
   double f = 0;
   Eigen::VectorXd f_x;  // n
   Eigen::VectorXd c;    // m
@@ -42,6 +52,13 @@ struct NonlinearProgram {
 
   // point arrives sized, with zeros. x is within the bounds.
   virtual void evaluate(const Eigen::VectorXd& x, NlpPoint& point) = 0;
+  // f and c alone, where they are cheaper than with derivatives.
+  virtual void evaluate_values(const Eigen::VectorXd& x, NlpPoint& point) {
+    point.f_x.setZero(x.size()), point.c_x.setZero(constraints(), x.size());
+    evaluate(x, point);
+  }
+  // Second derivatives of f, then of each c: n x n each. False where there are none.
+  virtual bool hessians(const Eigen::VectorXd&, std::vector<Eigen::MatrixXd>&) { return false; }
 
   Eigen::Index variables() const { return x_lower.size(); }
   Eigen::Index constraints() const { return c_lower.size(); }
@@ -56,18 +73,29 @@ struct NonlinearProgram {
   Eigen::VectorXd c_scale;                             // the same for c; ones
 };
 
+// Points that were computed in an earlier run, and a place where new ones are written down: a run that was killed goes
+// on from there.
+struct PointRecords {
+  virtual ~PointRecords() = default;
+  virtual bool recall(const Eigen::VectorXd& x, Wanted wanted, NlpPoint& point) = 0;
+  virtual void record(const Eigen::VectorXd& x, Wanted wanted, const NlpPoint& point) = 0;
+  virtual bool recall(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& hessians) = 0;
+  virtual void record(const Eigen::VectorXd& x, const std::vector<Eigen::MatrixXd>& hessians) = 0;
+};
+
 // What every solver takes and gives.
 struct NlpProgress {
   int iteration = 0;
   double f = 0;
   double violation = 0;   // of the constraints
-  double optimality = 0;  // largest entry of the Lagrangian's gradient, as the solver scales it
+  double optimality = 0;  // largest entry of the Lagrangian's gradient, as the solver scales it; NaN: not known
   const Eigen::VectorXd& x;
 };
 
 // x: the solution, or the best point seen: feasible before lower f.
 struct NlpResult : SolverOutcome {
-  NlpPoint point;  // at x
+  NlpPoint point;         // at x
+  std::string algorithm;  // in the words of the library that it comes from
 };
 
 }  // namespace mbsopt

@@ -33,13 +33,31 @@ struct ObjectiveBound {
   std::optional<double> lower, upper;
 };
 
+struct OptimizerSpec {
+  std::string type = "ipopt";  // or a method of NLopt: nlopt_solver.hpp
+  double tolerance = 1e-6;
+  std::optional<long> max_iterations;   // ipopt: 100 when absent
+  std::optional<long> max_evaluations;  // NLopt: depends on the method, nlopt_solver.hpp
+  std::string hessian = "lbfgs";        // of ipopt; or "exact"
+  std::optional<long> seed;             // of methods that are random; drawn when absent
+  static constexpr int kIpoptIterations = 100;
+};
+
+enum class StartSampling { latin_hypercube, sobol };
+
+// Runs from several starts: first from the given values, then from points between the bounds.
+struct MultistartSpec {
+  int starts = 20;
+  std::optional<long> seed;  // drawn when absent
+  StartSampling sampling = StartSampling::latin_hypercube;
+};
+
 struct DesignSpec {
   std::string minimize;
   std::vector<ObjectiveBound> subject_to;
   std::vector<std::string> variables;  // parameter names
-  std::string optimizer = "ipopt";
-  double tolerance = 1e-6;
-  int max_iterations = 100;
+  OptimizerSpec optimizer;
+  std::optional<MultistartSpec> multistart;
 };
 
 struct ChannelSpec {
@@ -73,6 +91,7 @@ struct IdentificationSpec {
   std::vector<std::string> variables;
   bool sigma_is_known = false;
   Loss loss;
+  std::optional<MultistartSpec> multistart;
   double tolerance = 1e-10;
   int max_iterations = 100;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/scene/checker.hpp"
+#include "optim/design_issues.hpp"
 #include "optim/problem_vocabulary.hpp"
 
 namespace mbsopt {
@@ -46,6 +47,11 @@ void check_meaning(Checker& checker, const ObjectiveBound& bound) {
                   "is " + text_of(*bound.lower) + ", above the upper bound " + text_of(*bound.upper));
 }
 
+void check_meaning(Checker& checker, const DesignSpec& design) {
+  for (const DesignIssue& found : optimizer_issues(design, checker.facts().scene()))
+    checker.issue(found.path, found.message);
+}
+
 void check_meaning(Checker& checker, const ChannelSpec& channel) {
   const std::optional<double> sigma = checker.facts().value(channel.sigma);
   if (sigma && *sigma <= 0) checker.issue(checker.path("sigma"), "is " + text_of(*sigma) + ", it must be positive");
@@ -68,6 +74,11 @@ void check_meaning(Checker& checker, const ExperimentSpec& experiment) {
 void check_meaning(Checker& checker, const IdentificationSpec& identification) {
   const std::vector<ExperimentSpec>& experiments = identification.experiments;
   const std::string list = checker.path("experiments");
+  if (identification.multistart) {
+    for (const DesignIssue& found : missing_bounds(identification.variables, checker.facts().scene(),
+                                                   "identification.multistart draws starts between them"))
+      checker.issue(found.path, found.message);
+  }
   const bool any_fit =
       std::any_of(experiments.begin(), experiments.end(), [](const ExperimentSpec& e) { return !e.validate; });
   if (!any_fit) checker.issue(list, "has no experiment of role \"fit\"; at least one is needed");

@@ -6,6 +6,10 @@
 
 namespace mbsopt {
 
+inline constexpr std::string_view kOptimizers =
+    "ipopt slsqp mma ccsaq lbfgs bobyqa cobyla sbplx mlsl direct crs isres esch";
+inline constexpr Choice<StartSampling> kSamplings[] = {{"latin_hypercube", StartSampling::latin_hypercube},
+                                                       {"sobol", StartSampling::sobol}};
 inline constexpr Choice<bool> kRoles[] = {{"fit", false}, {"validate", true}};
 
 inline constexpr Choice<LossType> kLosses[] = {{"squared", LossType::squared},
@@ -36,15 +40,30 @@ void describe(auto& v, Like<ObjectiveBound> auto& b) {
   v.plain("upper", b.upper, kAny, {"it must not be more"});
 }
 
+void describe(auto& v, Like<OptimizerSpec> auto& o) {
+  v.word("type", o.type, Words{kOptimizers},
+         {"interior points (ipopt); NLopt's local methods with gradients (slsqp, mma, ccsaq, lbfgs) and without "
+          "(bobyqa, cobyla, sbplx), and global ones (mlsl, direct, crs, isres, esch)"});
+  v.plain("tolerance", o.tolerance, kPositive, {"of the optimality conditions; of the last steps without gradients"});
+  v.plain("max_iterations", o.max_iterations, kNotNegative, {"at most; ipopt: 100 when absent"});
+  v.plain("max_evaluations", o.max_evaluations, kPositive,
+          {"at most; NLopt: 500, without gradients 500 (n + 1), global 1000 (n + 1) when absent, of n variables"});
+  v.word("hessian", o.hessian, Words{"lbfgs exact"}, {"of ipopt: limited-memory BFGS, or second derivatives"});
+  v.plain("seed", o.seed, kNotNegative, {"of methods that are random; drawn when absent"});
+}
+
+void describe(auto& v, Like<MultistartSpec> auto& m) {
+  v.plain("starts", m.starts, kPositive, {"how many; the first is from the given values"});
+  v.plain("seed", m.seed, kNotNegative, {"of the starts; drawn when absent"});
+  v.choice("sampling", m.sampling, kSamplings, {"how the starts fill the bounds"});
+}
+
 void describe(auto& v, Like<DesignSpec> auto& d) {
   v.reference("minimize", d.minimize, To::objective, {"the objective to minimise", Need::required});
   v.list("subject_to", d.subject_to, {"bounds on objectives"});
   v.references("variables", d.variables, To::parameter, {"parameters that may change", Need::required});
-  v.group("optimizer", {"how it is minimised"}, [&](auto& inside) {
-    inside.word("type", d.optimizer, Words{"ipopt", "nlopt slsqp mma bobyqa"}, {"interior-point method Ipopt"});
-    inside.plain("tolerance", d.tolerance, kPositive, {"of the optimality conditions"});
-    inside.plain("max_iterations", d.max_iterations, kNotNegative, {"at most"});
-  });
+  v.object("optimizer", d.optimizer, {"how it is minimised"});
+  v.object("multistart", d.multistart, {"from several starts, in parallel"});
 }
 
 void describe(auto& v, Like<ChannelSpec> auto& c) {
@@ -96,7 +115,7 @@ void describe(auto& v, Like<IdentificationSpec> auto& i) {
     inside.plain("tolerance", i.tolerance, kPositive, {"relative change of the sum"});
     inside.plain("max_iterations", i.max_iterations, kNotNegative, {"at most"});
   });
-  v.later("multistart", "a multistart");
+  v.object("multistart", i.multistart, {"from several starts, in parallel"});
 }
 
 void describe(auto& v, Like<Problem> auto& p) {

@@ -7,7 +7,8 @@
 
 namespace mbsopt {
 
-enum class SolverStatus { converged, no_progress, iteration_limit, infeasible, stopped, failed };
+// searched: a global method that has no other end than its budget has used it up.
+enum class SolverStatus { converged, searched, no_progress, iteration_limit, infeasible, stopped, failed };
 std::string_view to_string(SolverStatus status);  // "converged", "no_progress", "iteration_limit", ...
 
 struct SolverOutcome {

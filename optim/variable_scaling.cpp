@@ -72,6 +72,18 @@ double VariableScaling::Variable::rho_x(double x) const {
   return s;
 }
 
+double VariableScaling::Variable::rho_xx(double x) const {
+  switch (scale) {
+    case ParameterScale::log:
+      return std::exp(x);
+    case ParameterScale::log10:
+      return std::numbers::ln10 * std::numbers::ln10 * std::pow(10, x);
+    case ParameterScale::linear:
+      break;
+  }
+  return 0;
+}
+
 VariableScaling::VariableScaling(const std::vector<Parameter>& parameters) {
   const Eigen::Index n = static_cast<Eigen::Index>(parameters.size());
   x_lower_.setConstant(n, -kInfinity), x_upper_.setConstant(n, kInfinity);
@@ -101,6 +113,12 @@ Eigen::VectorXd VariableScaling::to_rho(const Eigen::VectorXd& x) const {
 Eigen::VectorXd VariableScaling::rho_x(const Eigen::VectorXd& x) const {
   Eigen::VectorXd d(size());
   for (Eigen::Index k = 0; k < size(); ++k) d(k) = variables_[static_cast<std::size_t>(k)].rho_x(x(k));
+  return d;
+}
+
+Eigen::VectorXd VariableScaling::rho_xx(const Eigen::VectorXd& x) const {
+  Eigen::VectorXd d(size());
+  for (Eigen::Index k = 0; k < size(); ++k) d(k) = variables_[static_cast<std::size_t>(k)].rho_xx(x(k));
   return d;
 }
 

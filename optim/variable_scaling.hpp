@@ -26,6 +26,7 @@ class VariableScaling {
   Eigen::VectorXd to_x(const Eigen::VectorXd& rho) const;
   Eigen::VectorXd to_rho(const Eigen::VectorXd& x) const;      // within the bounds, whatever the rounding
   Eigen::VectorXd rho_x(const Eigen::VectorXd& x) const;       // d rho_k / d x_k
+  Eigen::VectorXd rho_xx(const Eigen::VectorXd& x) const;      // d2 rho_k / d x_k^2
   const Eigen::VectorXd& x_lower() const { return x_lower_; }  // -infinity where there is none
   const Eigen::VectorXd& x_upper() const { return x_upper_; }
   const Eigen::VectorXd& rho_lower() const { return rho_lower_; }
@@ -38,6 +39,7 @@ class VariableScaling {
     double to_x(double rho) const;
     double to_rho(double x) const;
     double rho_x(double x) const;
+    double rho_xx(double x) const;
   };
   std::vector<Variable> variables_;
   Eigen::VectorXd x_lower_, x_upper_, rho_lower_, rho_upper_;

@@ -116,6 +116,9 @@ class SchemaWriter {
   void plain(std::string_view key, std::optional<double>&, const Range& range, const Says& says) {
     put(key, says, ranged(ref("number"), range));
   }
+  void plain(std::string_view key, std::optional<long>&, const Range& range, const Says& says) {
+    put(key, says, ranged({{"type", "integer"}}, range));
+  }
   void plain(std::string_view key, int& value, const Range& range, const Says& says) {
     put(key, says, ranged({{"type", "integer"}}, range), value);
   }

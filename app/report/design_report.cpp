@@ -64,6 +64,7 @@ std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const 
   add_outcome(page, result);
   add_parameters(page, result);
   add_convergence(page, history);
+  add_multistart(page, result);
   page.heading("Motion before and after");
   add_drawings(page, scene, rho, before, after);
   for (const LinePlot& plot : motion_plots(scene, before, after)) page.plot(plot);

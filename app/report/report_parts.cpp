@@ -7,6 +7,7 @@
 #include "app/energy_balance.hpp"
 #include "app/report/line_plot.hpp"
 #include "app/text_table.hpp"
+#include "core/expression/counted.hpp"
 
 namespace mbsopt {
 namespace {
@@ -120,6 +121,31 @@ void add_convergence(HtmlPage& page, const Trajectory& history) {
     plot.series.push_back({name, column(0), values, Mark::line});
     page.plot(plot);
   }
+}
+
+void add_multistart(HtmlPage& page, const Json& result) {
+  if (!result.contains("multistart") || !result.at("multistart").contains("waterfall")) return;
+  const Json& multistart = result.at("multistart");
+  page.heading("Starts");
+  page.paragraph(fmt::format("{}, seed {}; {} at the best optimum.",
+                             counted(multistart.at("starts").get<long>(), "start"), multistart.at("seed").get<long>(),
+                             multistart.at("at_the_best_optimum").get<long>()));
+  LinePlot plot{.title = "Waterfall", .x_label = "rank", .y_label = "objective", .whole_x = true};
+  PlotSeries& series = plot.series.emplace_back(PlotSeries{"objective", {}, {}, Mark::points});
+  std::vector<std::vector<std::string>> rows;
+  for (const Json& record : multistart.at("waterfall")) {
+    const Json objective = record.value("objective", Json());
+    if (objective.is_number()) {
+      series.x.push_back(static_cast<double>(series.x.size() + 1));
+      series.y.push_back(objective.get<double>());
+    }
+    rows.push_back({cell(record.at("start")), cell(objective), cell(record.value("infeasibility", Json())),
+                    cell(record.value("optimality", Json())), cell(record.at("message"))});
+  }
+  plot.logarithmic_y =
+      !series.y.empty() && std::all_of(series.y.begin(), series.y.end(), [](double y) { return y > 0; });
+  if (!series.y.empty()) page.plot(plot);
+  page.table({"start", "objective", "infeasibility", "optimality", "outcome"}, rows);
 }
 
 void add_provenance(HtmlPage& page, const Json& result) {

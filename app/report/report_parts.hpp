@@ -15,6 +15,7 @@ void add_objectives(HtmlPage& page, const Json& result);                      //
 // Whether any objective is a smooth maximum or minimum, with the true one beside it.
 bool has_true_values(const Json& result);
 void add_convergence(HtmlPage& page, const Trajectory& history);  // objective over iterations
+void add_multistart(HtmlPage& page, const Json& result);          // the waterfall, where there is one
 void add_provenance(HtmlPage& page, const Json& result);
 // A number, a word, an interval, "-" where there is none.
 std::string cell(const Json& value, int digits = 7);

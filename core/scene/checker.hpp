@@ -65,6 +65,9 @@ class Checker {
   void plain(std::string_view key, long value, const Range& range, const Says& says);
   void plain(std::string_view, bool, const Range&, const Says&) {}
   void plain(std::string_view key, const std::optional<double>& value, const Range& range, const Says& says);
+  void plain(std::string_view key, const std::optional<long>& value, const Range& range, const Says& says) {
+    if (value) plain(key, *value, range, says);
+  }
   void numbers(std::string_view key, const std::vector<double>& values, const Range& range, const Says& says);
   void overrides(std::string_view key, const std::vector<std::pair<std::string, double>>& values, const Says& says);
 

@@ -44,7 +44,7 @@ TEST_CASE("the outcome of a design survives other commands, but not another desi
 }
 
 TEST_CASE("a command of the contract that this version lacks says so and lists what there is", "[command]") {
-  for (const char* command : {"tradeoff", "resume"}) {
+  for (const char* command : {"tradeoff"}) {
     const CommandOutcome outcome = run_command({command, "x.json"});
     CHECK(outcome.exit_code == kBadInput);
     CHECK_THAT(outcome.err, Contains(command) && Contains("not available") && Contains("simulate"));

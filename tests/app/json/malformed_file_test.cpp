@@ -240,9 +240,9 @@ const Case kCases[] = {
      "joints[1].body2", "needs two bodies"},
     {"objective without parts", R"({"running": "(tip_y - 0.5)^2 + 0*half"})", R"(@{})", "objectives.track",
      "has no part"},
-    {"optimiser of a later version", R"("variables": ["k1"])",
-     R"("variables": ["k1"], "optimizer": {"type": @"nlopt"})", "design.optimizer.type",
-     "not available in this version"},
+    {"optimiser that is not there", R"("variables": ["k1"])", R"("variables": ["k1"], "optimizer": {"type": @"nlopt"})",
+     "design.optimizer.type",
+     "available: ipopt, slsqp, mma, ccsaq, lbfgs, bobyqa, cobyla, sbplx, mlsl, direct, crs, isres, esch"},
     {"format of a later version", R"("format": 1)", R"("format": @2)", "format", "must be 1"},
 };
 

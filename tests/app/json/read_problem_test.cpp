@@ -112,7 +112,7 @@ TEST_CASE("a problem is read field by field", "[json]") {
   REQUIRE(problem.design);
   CHECK(problem.design->subject_to.at(0).upper == 0.2);
   CHECK(problem.design->variables == std::vector<std::string>{"k1"});
-  CHECK(problem.design->max_iterations == 50);
+  CHECK(problem.design->optimizer.max_iterations == 50);
   CHECK_FALSE(problem.identification);
 }
 
@@ -187,18 +187,6 @@ TEST_CASE("losses, priors, delays, laws of an experiment and consistent inertia 
                                              std::string("identification.loss={\"type\": \"") + word + "\"}"});
     CHECK(other.identification->loss.type == type);
     CHECK_FALSE(other.identification->loss.scale);
-  }
-}
-
-TEST_CASE("what identification of a later version asks for is refused", "[json]") {
-  try {
-    read_problem_text(kRobust, MBSOPT_SOURCE_DIR "/problems/p.json", {"identification.multistart={\"starts\": 3}"});
-    FAIL("must throw");
-  } catch (const InputError& error) {
-    std::vector<std::string> paths;
-    for (const Finding& finding : error.findings())
-      if (finding.message.find("not available in this version") != std::string::npos) paths.push_back(finding.path);
-    CHECK(paths == std::vector<std::string>{"identification.multistart"});
   }
 }
 

@@ -1,0 +1,106 @@
+#include "app/identify_starts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "app/interrupt.hpp"
+#include "app/multistart.hpp"
+#include "app/optimized_problem.hpp"
+#include "optim/start_points.hpp"
+
+namespace mbsopt {
+namespace {
+
+std::vector<Parameter> shared_parameters(const Problem& problem) {
+  std::vector<Parameter> parameters;
+  for (const std::string& name : problem.identification->variables) {
+    for (const Parameter& p : problem.scene.parameters)
+      if (p.name == name) parameters.push_back(p);
+  }
+  return parameters;
+}
+
+Json record_of_start(const Problem& problem, const std::vector<CsvTable>& data, int start) {
+  IdentificationOptions options;
+  options.simulation_progress = [](double) { return !interrupted(); };
+  options.progress = [](const FitRow&) { return !interrupted(); };
+  const IdentificationResult fit = run_identification(problem, data, options);
+  Json record{{"start", start},
+              {"status", to_string(fit.status)},
+              {"message", fit.message},
+              {"objective", std::isfinite(fit.cost_final) && !fit.history.empty() ? Json(fit.cost_final) : Json()},
+              {"iterations", fit.iterations},
+              {"evaluations", fit.evaluations}};
+  for (const FittedParameter& p : fit.parameters) {
+    record[p.experiment.empty() ? "parameters" : "free"][p.name] = p.value;
+    if (p.experiment.empty()) record["from"][p.name] = p.initial;
+    if (!p.experiment.empty()) record["overrides"][p.experiment][p.parameter] = p.value;
+  }
+  return record;
+}
+
+void override_value(ExperimentSpec& experiment, const std::string& parameter, double value) {
+  const auto found = std::find_if(experiment.overrides.begin(), experiment.overrides.end(),
+                                  [&](const auto& entry) { return entry.first == parameter; });
+  if (found != experiment.overrides.end())
+    found->second = value;
+  else
+    experiment.overrides.emplace_back(parameter, value);
+}
+
+Problem at_fit(const Problem& problem, const Json& record) {
+  Problem fitted = with_values(problem, record.value("parameters", Json::object()));
+  const Json overrides = record.value("overrides", Json::object());
+  for (ExperimentSpec& experiment : fitted.identification->experiments) {
+    if (!overrides.contains(experiment.name)) continue;
+    for (const auto& [name, value] : overrides[experiment.name].items())
+      override_value(experiment, name, value.get<double>());
+  }
+  return fitted;
+}
+
+}  // namespace
+
+Problem from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data) {
+  const Problem& problem = run.problem;
+  if (!problem.identification->multistart) return problem;
+  MultistartSpec spec = *problem.identification->multistart;
+  spec.seed = long_run.seed("multistart", spec.seed);
+  const std::vector<std::string>& names = problem.identification->variables;
+  const std::vector<Eigen::VectorXd> starts = start_values(shared_parameters(problem), spec, *spec.seed);
+  long_run.begin();
+  const MultistartOutcome outcome = run_multistart(run, long_run, spec, [&](int start) {
+    const Eigen::VectorXd& values = starts[static_cast<std::size_t>(start)];
+    return record_of_start(with_values(problem, named_values(names, {values.begin(), values.end()})), data, start);
+  });
+  return outcome.best() ? at_fit(problem, *outcome.best()) : with_values(problem, Json::object());
+}
+
+int stopped_within_starts(Run& run, LongRun& long_run, const Problem& best) {
+  std::vector<NewValue> values;
+  for (const Parameter& p : shared_parameters(best)) values.push_back({"", p.name, p.value});
+  for (const ExperimentSpec& experiment : best.identification->experiments) {
+    for (const auto& [name, value] : experiment.overrides) values.push_back({experiment.name, name, value});
+  }
+  run.write("optimized.json", optimized_problem_text(run, values));
+  run.stopped(fmt::format("optimized.json holds the best of the starts so far; 'mbsopt resume {}' goes on",
+                          run.folder.path().string()));
+  long_run.end("interrupted");
+  return run.finish();
+}
+
+void describe_given(const Problem& given, IdentificationResult& fit) {
+  for (FittedParameter& fitted : fit.parameters) {
+    for (const Parameter& p : given.scene.parameters)
+      if (p.name == fitted.parameter) fitted.initial = p.value;
+    for (const ExperimentSpec& experiment : given.identification->experiments) {
+      if (experiment.name != fitted.experiment) continue;
+      for (const auto& [name, value] : experiment.overrides)
+        if (name == fitted.parameter) fitted.initial = value;
+    }
+  }
+}
+
+}  // namespace mbsopt

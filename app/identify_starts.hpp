@@ -1,0 +1,23 @@
+// A multistart of an identification: the problem with the values of the best start's fit, from which the fit proper
+// begins.
+#pragma once
+
+#include <vector>
+
+#include "app/long_run.hpp"
+#include "optim/csv_table.hpp"
+#include "optim/identification.hpp"
+
+namespace mbsopt {
+
+// The given problem where no multistart is asked for. Shared variables are spread over their bounds; parameters that
+// are free in an experiment begin at their given values.
+Problem from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data);
+
+// Ends a run that was interrupted before the fit proper began; best: from_best_start(). Returns the exit code.
+int stopped_within_starts(Run& run, LongRun& long_run, const Problem& best);
+
+// "initial" of each parameter: as it was given, not where the best start had brought it.
+void describe_given(const Problem& given, IdentificationResult& fit);
+
+}  // namespace mbsopt

@@ -1,0 +1,69 @@
+#include "app/long_run.hpp"
+
+#include <fmt/format.h>
+
+#include "app/atomic_file.hpp"
+#include "optim/seed.hpp"
+
+namespace mbsopt {
+namespace {
+
+Json header_of(const Run& run, const Json& seeds) {
+  const CommandContext& context = run.context;
+  const Json& provenance = run.result["provenance"];
+  Json header{{"program", "mbsopt"},
+              {"version", run.result["version"]},
+              {"command", context.command},
+              {"arguments", context.arguments},
+              {"input", provenance["input"]},
+              {"input_sha256", provenance["input_sha256"]},
+              {"seeds", seeds}};
+  if (provenance.contains("data_sha256")) header["data_sha256"] = provenance["data_sha256"];
+  return header;
+}
+
+}  // namespace
+
+LongRun::LongRun(Run& run) : run_(run) {
+  if (run.context.options.resume) earlier_ = read_journal(run.folder.path());
+}
+
+long LongRun::seed(const std::string& of, const std::optional<long>& given) {
+  long value = 0;
+  if (given)
+    value = *given;
+  else if (earlier_.header.contains("seeds") && earlier_.header["seeds"].contains(of))
+    value = earlier_.header["seeds"][of].get<long>();
+  else
+    value = drawn_seed();
+  seeds_[of] = value;
+  return value;
+}
+
+void LongRun::refuse_what_has_changed() const {
+  const Json now = header_of(run_, seeds_);
+  for (const char* key : {"version", "input_sha256", "data_sha256"}) {
+    const Json before = earlier_.header.value(key, Json()), after = now.value(key, Json());
+    if (before == after) continue;
+    throw OutputError(fmt::format("{}: was begun with another {}; it cannot go on: start '{}' anew",
+                                  (run_.folder.path() / kJournalFile).string(),
+                                  std::string(key) == "version"        ? "version of mbsopt"
+                                  : std::string(key) == "input_sha256" ? "content of the problem file"
+                                                                       : "content of a data file",
+                                  run_.context.command));
+  }
+}
+
+void LongRun::begin() {
+  if (journal_) return;
+  if (!run_.context.options.resume) {
+    journal_ = std::make_unique<Journal>(run_.folder.path(), header_of(run_, seeds_));
+    return;
+  }
+  refuse_what_has_changed();
+  journal_ = std::make_unique<Journal>(run_.folder.path());
+}
+
+void LongRun::end(const std::string& status) { journal_->add("ended", status); }
+
+}  // namespace mbsopt

@@ -1,0 +1,36 @@
+// A multistart: one record per start, computed in worker processes, ranked. What a start is, the caller says; a record
+// holds at least
+//
+//   {"start": 7, "status": "converged", "message": "...", "objective": 0.12, "infeasibility": 0, "iterations": 9,
+//    "evaluations": 12, "from": {"k1": 100}, "parameters": {"k1": 87}}
+//
+// and may hold more, which is kept in the journal but not in result.json. Results do not depend on the number of
+// workers: the records are ranked by what they hold, ties by the number of the start.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "app/long_run.hpp"
+#include "app/result_json.hpp"
+#include "optim/problem.hpp"
+
+namespace mbsopt {
+
+struct MultistartOutcome {
+  std::vector<Json> ranked;  // best first; what failed last
+  bool interrupted = false;
+  const Json* best() const;  // nullptr: no start has an objective
+};
+
+// spec.seed must be there. Puts "multistart" into the result and prints the waterfall.
+MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSpec& spec,
+                                 const std::function<Json(int start)>& work);
+
+// Parameter values by name.
+Json named_values(const std::vector<std::string>& names, const std::vector<double>& values);
+
+// The problem with other values of some parameters, and without the multistart.
+Problem with_values(Problem problem, const Json& values);
+
+}  // namespace mbsopt

@@ -1,0 +1,141 @@
+#include "optim/process_pool.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <exception>
+#include <stdexcept>
+
+namespace mbsopt {
+namespace {
+
+constexpr int kPollMilliseconds = 50;
+// The first byte of a reply; one that was cut off has no last byte.
+constexpr char kReturned = 'R', kThrew = 'E', kEnd = '.';
+
+[[noreturn]] void fail(const char* what) {
+  throw std::runtime_error(fmt::format("{}: {}", what, std::strerror(errno)));
+}
+
+void write_all(int descriptor, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return;  // nobody listens any more
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+[[noreturn]] void be_worker(int pipe_end, pid_t parent, const std::function<std::string(int)>& work, int job) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // a worker does not outlive the run it belongs to
+  if (::getppid() != parent) ::_exit(1);
+  ::signal(SIGPIPE, SIG_IGN);
+  std::string reply;
+  try {
+    reply = kReturned + work(job);
+  } catch (const std::exception& error) {
+    reply = std::string(1, kThrew) + error.what();
+  } catch (...) {
+    reply = std::string(1, kThrew) + "an exception that says nothing";
+  }
+  write_all(pipe_end, reply + kEnd);
+  ::_exit(0);  // without the destructors and buffers of the process this is a copy of
+}
+
+struct Worker {
+  int job;
+  pid_t process;
+  int descriptor;
+  std::string received;
+};
+
+Worker started(int job, const std::function<std::string(int)>& work) {
+  std::array<int, 2> ends;
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0) fail("no pipe to a worker process");
+  const pid_t parent = ::getpid(), process = ::fork();
+  if (process < 0) {
+    ::close(ends[0]), ::close(ends[1]);
+    fail("no worker process");
+  }
+  if (process == 0) {
+    ::close(ends[0]);
+    be_worker(ends[1], parent, work, job);
+  }
+  ::close(ends[1]);
+  return {job, process, ends[0], {}};
+}
+
+// True when all has come.
+bool receive(Worker& worker) {
+  std::array<char, 1 << 14> buffer;
+  const ssize_t count = ::read(worker.descriptor, buffer.data(), buffer.size());
+  if (count > 0) worker.received.append(buffer.data(), static_cast<std::size_t>(count));
+  return count == 0 || (count < 0 && errno != EINTR);
+}
+
+JobReply reply_of(Worker& worker) {
+  ::close(worker.descriptor);
+  int status = 0;
+  while (::waitpid(worker.process, &status, 0) < 0 && errno == EINTR) {
+  }
+  std::string& text = worker.received;
+  const bool whole = text.size() >= 2 && text.back() == kEnd;
+  if (whole) {
+    text.pop_back();
+    const bool ok = text.front() == kReturned;
+    text.erase(0, 1);
+    return {worker.job, ok, std::move(text)};
+  }
+  if (WIFSIGNALED(status))
+    return {worker.job, false,
+            fmt::format("its process was ended by signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status)))};
+  return {worker.job, false, fmt::format("its process ended with code {}", WEXITSTATUS(status))};
+}
+
+// Ends what is still running when `done` throws.
+struct Pool {
+  std::vector<Worker> workers;
+  ~Pool() {
+    for (Worker& worker : workers) {
+      ::kill(worker.process, SIGKILL);
+      reply_of(worker);
+    }
+  }
+};
+
+}  // namespace
+
+void run_in_processes(const std::vector<int>& jobs, int workers, const std::function<std::string(int)>& work,
+                      const std::function<void(const JobReply&)>& done, const std::function<bool()>& go_on) {
+  Pool pool;
+  auto next = jobs.begin();
+  bool stopping = false;
+  while (!pool.workers.empty() || (next != jobs.end() && !stopping)) {
+    while (!stopping && next != jobs.end() && pool.workers.size() < static_cast<std::size_t>(std::max(1, workers)))
+      pool.workers.push_back(started(*next++, work));
+    std::vector<pollfd> waiting;
+    for (const Worker& worker : pool.workers) waiting.push_back({worker.descriptor, POLLIN, 0});
+    ::poll(waiting.data(), waiting.size(), kPollMilliseconds);
+    for (std::size_t i = waiting.size(); i-- > 0;) {
+      if (waiting[i].revents == 0 || !receive(pool.workers[i])) continue;
+      Worker ended = std::move(pool.workers[i]);
+      pool.workers.erase(pool.workers.begin() + static_cast<std::ptrdiff_t>(i));
+      done(reply_of(ended));
+    }
+    if (!stopping && go_on && !go_on()) {
+      stopping = true;
+      for (const Worker& worker : pool.workers) ::kill(worker.process, SIGTERM);
+    }
+  }
+}
+
+}  // namespace mbsopt

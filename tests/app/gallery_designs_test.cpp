@@ -1,0 +1,88 @@
+// Designs of the gallery whose answers are known.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "app/exit_code.hpp"
+#include "tests/app/gallery_files.hpp"
+#include "tests/app/run_command.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+
+namespace {
+
+nlohmann::json designed(const std::string& name, const std::vector<std::string>& sets = {}) {
+  const TemporaryFolder folder;
+  std::vector<std::string> arguments{"design", file_of(name).string(), "--out", folder.file("out")};
+  for (const std::string& set : sets) arguments.insert(arguments.end(), {"--set", set});
+  const CommandOutcome outcome = run_command(arguments);
+  INFO(outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  return json_of(folder.path / "out/result.json");
+}
+
+double value(const nlohmann::json& result, const char* parameter) {
+  return result.at("parameters").at(parameter).at("value").get<double>();
+}
+
+// Watt's governor of governor/spring.json at rest in the frame that turns at Omega; theta: of the arms. Potential:
+//   V = 2 m g z_b + M g z_s + (1/2) k (l - free)^2 - Omega^2 (m r_b^2 + I_x sin^2 + I_z cos^2),   l = top - z_s
+struct TurningGovernor {
+  double g = 9.81, eye = 0.03, top = 0.5, arm = 0.3, pin = 0.18, rod = 0.2, m = 1.5, M = 2, I_x = 0.002, I_z = 0.001;
+
+  double height(double theta) const {
+    return top - pin * std::cos(theta) - std::sqrt(rod * rod - std::pow(pin * std::sin(theta), 2));
+  }
+  double theta(double wanted_height) const {
+    double low = 0, high = 1.5;
+    for (int i = 0; i < 100; ++i) {
+      const double middle = (low + high) / 2;
+      (height(middle) < wanted_height ? low : high) = middle;
+    }
+    return low;
+  }
+  // k (l - free) from dV/dtheta = 0.
+  double spring_force(double wanted_height, double Omega) const {
+    const double t = theta(wanted_height), s = std::sin(t), c = std::cos(t);
+    const double z_t = pin * s + pin * pin * s * c / std::sqrt(rod * rod - pin * pin * s * s);
+    return (2 * m * g * arm * s + M * g * z_t - 2 * m * (eye + arm * s) * arm * c * Omega * Omega -
+            2 * (I_x - I_z) * s * c * Omega * Omega) /
+           z_t;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("governor/spring: the spring is that of the statics in the turning frame", "[gallery]") {
+  const TurningGovernor governor;
+  const double slow = governor.spring_force(0.20, 9), fast = governor.spring_force(0.26, 12);
+  const double k = (slow - fast) / 0.06, free = governor.top - 0.20 - slow / k;
+  CHECK(k == Approx(339.4776777870).epsilon(1e-11));
+  const auto result = designed("governor/spring", {"simulation.integrator.rtol=1e-7"});
+  CHECK(value(result, "k") == Approx(k).epsilon(1e-5));  // what is left of the motion at the sampling times
+  CHECK(value(result, "free") == Approx(free).epsilon(1e-6));
+}
+
+TEST_CASE("double_wishbone/hard_points: the given suspension is found again", "[gallery]") {
+  const std::string type = GENERATE("ipopt", "slsqp", "lbfgs");
+  const auto result = designed("double_wishbone/hard_points", {"design.optimizer.type=" + type});
+  CHECK(result.at("optimizer").at("type") == type);
+  CHECK(value(result, "upper_y") == Approx(0.42).epsilon(1e-6));
+  CHECK(value(result, "upper_z") == Approx(0.47).epsilon(1e-6));
+  CHECK(value(result, "tie_z") == Approx(0.28).epsilon(1e-6));
+}
+
+// Reference: the linear system's matrix exponential, Gauss-Legendre quadrature on 3000 cells, SciPy's SLSQP from three
+// starts, which agree to 1e-6.
+TEST_CASE("quarter_car/ride: the optimum is that of the linear system, with the travel at its limit", "[gallery]") {
+  const std::string type = GENERATE("ipopt", "slsqp", "mma", "cobyla");
+  INFO(type);
+  const auto result = designed("quarter_car/ride", {"design.optimizer.type=" + type});
+  CHECK(result.at("objectives").at("comfort").at("initial").get<double>() == Approx(8.916666667).epsilon(1e-8));
+  // The smooth maximum is an integral of a sharp peak: its quadrature decides how near.
+  CHECK(result.at("objectives").at("comfort").at("value").get<double>() == Approx(9.231468409).epsilon(1e-5));
+  CHECK(value(result, "c") == Approx(3403.8505).epsilon(1e-4));
+  CHECK(value(result, "k") == Approx(22810.41).epsilon(type == "cobyla" ? 1e-3 : 1e-4));
+  CHECK(result.at("objectives").at("travel").at("at_bound") == "upper");
+  CHECK(result.at("objectives").at("grip").at("at_bound").is_null());
+}

@@ -1,0 +1,376 @@
+// Multistart, journal and resume, as commands.
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <fstream>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "app/exit_code.hpp"
+#include "app/journal.hpp"
+#include "tests/app/run_command.hpp"
+
+using namespace mbsopt;
+using Catch::Contains;
+namespace fs = std::filesystem;
+
+namespace {
+
+// A rod on a spring that is to be still at the end: two parameters, and more than one minimum.
+const char* const kTwoVariables = R"({
+  "format": 1,
+  "name": "rod",
+  "gravity": [0, -9.81, 0],
+  "parameters": {"k": {"value": 20, "lower": 5, "upper": 200, "scale": "log"},
+                 "free": {"value": 0.5, "lower": 0.2, "upper": 1.2}},
+  "bodies": [{"name": "rod", "mass": 2, "com": [0.5, 0, 0], "inertia": [1e-3, 0.1666, 0.1666],
+              "points": {"tip": [1, 0, 0]}}],
+  "joints": [{"name": "pin", "type": "revolute", "body1": "ground", "body2": "rod",
+              "point1": [0, 0, 0], "point2": "O", "axis1": [0, 0, 1], "axis2": [0, 0, 1]}],
+  "forces": [{"name": "spring", "type": "tsda", "body1": "ground", "body2": "rod",
+              "point1": [0, 1, 0], "point2": "tip", "stiffness": "k", "damping": 0.5, "free_length": "free"}],
+  "sensors": {"tip_y": {"quantity": "position", "body": "rod", "point": "tip", "component": "y"},
+              "swing": {"quantity": "angle", "joint": "pin"},
+              "speed": {"quantity": "rate", "joint": "pin"}},
+  "simulation": {"end_time": 1, "output_step": 0.25},
+  "objectives": {"track": {"running": "(tip_y + 0.2*sin(5*t))^2", "parameters_only": "1e-4*k"}},
+  "design": {"minimize": "track", "variables": ["k", "free"],
+             "multistart": {"starts": 8, "seed": 11}}
+})";
+
+using Arguments = std::vector<std::string>;
+
+CommandOutcome design(const std::string& file, const std::string& out, const Arguments& more = {}) {
+  Arguments arguments{"design", file, "--out", out};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return run_command(arguments);
+}
+
+// result.json without what says how it was run.
+nlohmann::json outcome_of(const fs::path& folder) {
+  nlohmann::json result = repeatable(json_of(folder / "result.json"));
+  result.erase("provenance");
+  if (result.contains("optimizer")) result["optimizer"].erase("simulations");  // of the last process
+  return result;
+}
+
+std::vector<std::string> lines_of(const fs::path& file) {
+  std::istringstream text(content_of(file));
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(text, line);) lines.push_back(line);
+  return lines;
+}
+
+long lines_with(const fs::path& folder, const std::string& key) {
+  const auto lines = lines_of(folder / kJournalFile);
+  return std::count_if(lines.begin(), lines.end(),
+                       [&](const std::string& line) { return line.starts_with("{\"" + key + "\":"); });
+}
+
+void write_text(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
+
+// A run in a process of its own that is killed as soon as its journal has so many lines of a kind.
+void kill_at(const Arguments& arguments, const fs::path& folder, const std::string& key, long count) {
+  const pid_t process = ::fork();
+  if (process == 0) {
+    std::ostringstream out, err;
+    run_command_line(arguments, out, err);
+    ::_exit(0);
+  }
+  for (int i = 0; i < 6000; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    if (fs::exists(folder / kJournalFile) && lines_with(folder, key) >= count) break;
+  }
+  ::kill(process, SIGKILL);
+  int status = 0;
+  ::waitpid(process, &status, 0);
+}
+
+}  // namespace
+
+TEST_CASE("multistart: the same result from 1, 2 and 4 workers, with a waterfall", "[multistart]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kTwoVariables);
+  nlohmann::json first;
+  std::string history;
+  for (const std::string workers : {"1", "2", "4"}) {
+    const CommandOutcome outcome = design(file, folder.file(workers), {"--threads", workers});
+    INFO(outcome.err);
+    REQUIRE(outcome.exit_code == kDone);
+    CHECK_THAT(outcome.out, Contains("rank") && Contains("8 starts, seed 11"));
+    CHECK_THAT(outcome.err, Contains("8 of 8 finished"));
+    const nlohmann::json result = outcome_of(folder.path / workers);
+    if (first.is_null()) first = result, history = content_of(folder.path / workers / "history.csv");
+    CHECK(result == first);
+    CHECK(content_of(folder.path / workers / "history.csv") == history);
+  }
+  const std::string report = content_of(folder.path / "4/report.html");
+  CHECK_THAT(report, Contains("Waterfall") && Contains("8 starts, seed 11"));
+  const auto& multistart = first.at("multistart");
+  CHECK(multistart.at("starts") == 8);
+  CHECK(multistart.at("seed") == 11);
+  REQUIRE(multistart.at("waterfall").size() == 8);
+  std::set<int> starts;
+  double before = -1;
+  for (const auto& record : multistart.at("waterfall")) {
+    starts.insert(record.at("start").get<int>());
+    CHECK(record.at("objective").get<double>() >= before);
+    before = record.at("objective");
+    CHECK_FALSE(record.contains("points"));
+    if (record.at("start") == 0) CHECK(record.at("from").at("k") == 20);
+  }
+  CHECK(starts.size() == 8);
+  const auto& best = multistart.at("waterfall").at(0);
+  CHECK(best.at("start") == multistart.at("best"));
+  CHECK(first.at("optimizer").at("objective_final") == best.at("objective"));
+  CHECK(first.at("parameters").at("k").at("value") == best.at("parameters").at("k"));
+  CHECK(first.at("parameters").at("k").at("initial") == 20);
+  CHECK(first.at("optimizer").at("evaluations") == best.at("evaluations"));
+}
+
+TEST_CASE("multistart: a single run from the best start ends where the multistart says", "[multistart]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kTwoVariables);
+  REQUIRE(design(file, folder.file("many")).exit_code == kDone);
+  const auto result = outcome_of(folder.path / "many");
+  REQUIRE(run_command({"simulate", folder.file("many/optimized.json"), "--out", folder.file("again")}).exit_code ==
+          kDone);
+  const double again = json_of(folder.path / "again/result.json").at("objectives").at("track").at("value");
+  CHECK(again == Approx(result.at("optimizer").at("objective_final").get<double>()).epsilon(1e-10));
+}
+
+TEST_CASE("multistart: Sobol points are other points, and a seed that is not given is drawn and told", "[multistart]") {
+  const TemporaryFolder folder;
+  std::string text = kTwoVariables;
+  text.replace(text.find(", \"seed\": 11"), 12, "");
+  const std::string file = folder.write("rod.json", text);
+  const Arguments few{"--set", "design.multistart.starts=3", "--set", "design.optimizer.max_iterations=0"};
+  design(file, folder.file("a"), few);
+  design(file, folder.file("b"), few);
+  const auto a = outcome_of(folder.path / "a").at("multistart"), b = outcome_of(folder.path / "b").at("multistart");
+  CHECK(a.at("seed") != b.at("seed"));
+  Arguments repeated = few;
+  repeated.insert(repeated.end(), {"--set", "design.multistart.seed=" + a.at("seed").dump()});
+  design(file, folder.file("c"), repeated);
+  CHECK(outcome_of(folder.path / "c").at("multistart") == a);
+  repeated.insert(repeated.end(), {"--set", "design.multistart.sampling=sobol"});
+  design(file, folder.file("d"), repeated);
+  CHECK(outcome_of(folder.path / "d").at("multistart").at("waterfall") != a.at("waterfall"));
+}
+
+TEST_CASE("multistart needs bounds, and says of which parameter", "[multistart]") {
+  const TemporaryFolder folder;
+  std::string text = kTwoVariables;
+  text.replace(text.find(", \"upper\": 1.2"), 14, "");
+  const CommandOutcome outcome = design(folder.write("rod.json", text), folder.file("out"));
+  CHECK(outcome.exit_code == kBadInput);
+  CHECK_THAT(outcome.err, Contains("parameters.free: has no upper bound") && Contains("multistart"));
+}
+
+TEST_CASE("resume: a multistart that is killed ends as if it had not been", "[resume]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kTwoVariables);
+  REQUIRE(design(file, folder.file("whole")).exit_code == kDone);
+  const fs::path killed = folder.path / "killed";
+  const long at = GENERATE(0, 1, 4, 7);
+  kill_at({"design", file, "--out", killed.string(), "--threads", "2"}, killed, at == 0 ? "journal" : "start",
+          std::max(at, 1L));
+  const long finished = lines_with(killed, "start");
+  INFO("killed after " << finished << " starts");
+  REQUIRE(finished >= at);
+  const bool was_done = lines_with(killed, "ended") > 0;
+  const CommandOutcome outcome = run_command({"resume", killed.string(), "--threads", "3"});
+  INFO(outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  CHECK(lines_with(killed, "start") == 8);  // those that had finished are not run again
+  if (!was_done) CHECK(outcome_of(killed) == outcome_of(folder.path / "whole"));
+  for (const char* name : {"history.csv", "trajectory.csv"})
+    CHECK(content_of(killed / name) == content_of(folder.path / "whole" / name));
+}
+
+TEST_CASE("resume: a single run goes on from its journal, wherever that was cut off", "[resume]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kTwoVariables);
+  const std::string optimizer = GENERATE("ipopt", "slsqp", "bobyqa", "crs");
+  INFO(optimizer);
+  Arguments single{"--set", "design.multistart.starts=1", "--set", "design.optimizer.type=" + optimizer};
+  std::string text = kTwoVariables;
+  text.replace(text.find("\"multistart\": {\"starts\": 8, \"seed\": 11}"), 39,
+               "\"optimizer\": {\"type\": \"" + optimizer + "\"}");
+  const std::string alone = folder.write("alone.json", text);
+  const fs::path out = folder.path / "out";
+  REQUIRE(design(alone, out.string()).exit_code == kDone);
+  const auto whole = outcome_of(out);
+  const std::string history = content_of(out / "history.csv"), journal = content_of(out / kJournalFile);
+  const long points = lines_with(out, "point");
+  CHECK(points == whole.at("optimizer").at("evaluations"));
+  CHECK(lines_with(out, "iterate") == whole.at("optimizer").at("iterations").get<long>() + 1);
+  for (const double part : {0.15, 0.5, 0.93}) {
+    INFO(part);
+    fs::remove(out / "optimized.json");
+    write_text(out / kJournalFile,
+               journal.substr(0, std::max(journal.find('\n') + 1,
+                                          static_cast<std::size_t>(part * static_cast<double>(journal.size())))));
+    const long known = lines_with(out, "point");
+    CHECK(known < points);
+    const CommandOutcome outcome = run_command({"resume", out.string()});
+    INFO(outcome.err);
+    REQUIRE(outcome.exit_code == kDone);
+    CHECK(outcome_of(out) == whole);
+    CHECK(content_of(out / "history.csv") == history);
+    CHECK(lines_with(out, "point") == points);  // only what was missing has been computed
+    CHECK(fs::exists(out / "optimized.json"));
+  }
+}
+
+TEST_CASE("resume: exact Hessians are in the journal, too", "[resume]") {
+  const TemporaryFolder folder;
+  std::string text = kTwoVariables;
+  text.replace(text.find("\"multistart\": {\"starts\": 8, \"seed\": 11}"), 39,
+               "\"optimizer\": {\"hessian\": \"exact\"}");
+  const std::string file = folder.write("rod.json", text);
+  const fs::path out = folder.path / "out";
+  REQUIRE(design(file, out.string()).exit_code == kDone);
+  const auto whole = outcome_of(out);
+  const long hessians = lines_with(out, "hessians");
+  CHECK(hessians > 0);
+  const std::string journal = content_of(out / kJournalFile);
+  write_text(out / kJournalFile, journal.substr(0, journal.size() / 2));
+  REQUIRE(run_command({"resume", out.string()}).exit_code == kDone);
+  CHECK(outcome_of(out) == whole);
+  CHECK(lines_with(out, "hessians") == hessians);
+}
+
+TEST_CASE("resume: a run that was interrupted keeps its best and goes on", "[resume]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kTwoVariables);
+  // Simulations that take a while, so that the signal comes within one.
+  const Arguments slow{
+      "--threads", "2", "--set", "simulation.integrator.max_step=2e-3", "--set", "design.multistart.starts=4"};
+  REQUIRE(design(file, folder.file("whole"), slow).exit_code == kDone);
+  const fs::path out = folder.path / "out";
+  std::thread killer([&] {
+    for (int i = 0; i < 3000 && !(fs::exists(out / kJournalFile) && lines_with(out, "start") >= 1); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    ::kill(::getpid(), SIGTERM);
+  });
+  const CommandOutcome outcome = design(file, out.string(), slow);
+  killer.join();
+  INFO(outcome.err);
+  REQUIRE(outcome.exit_code == kInterrupted);
+  CHECK_THAT(outcome.err, Contains("mbsopt resume"));
+  const auto part = json_of(out / "result.json");
+  CHECK(part.at("status") == "interrupted");
+  CHECK(fs::exists(out / "optimized.json"));
+  CHECK(part.at("optimizer").at("objective_final") <= part.at("optimizer").at("objective_initial"));
+  REQUIRE(run_command({"resume", out.string()}).exit_code == kDone);
+  CHECK(outcome_of(out) == outcome_of(folder.path / "whole"));
+}
+
+TEST_CASE("resume refuses what it cannot go on with", "[resume]") {
+  const TemporaryFolder folder;
+  CommandOutcome outcome = run_command({"resume", folder.path.string()});
+  CHECK(outcome.exit_code == kBadInput);
+  CHECK_THAT(outcome.err, Contains("journal.jsonl: there is none"));
+
+  const std::string file = folder.write("rod.json", kTwoVariables);
+  const fs::path out = folder.path / "out";
+  REQUIRE(design(file, out.string(), {"--set", "design.multistart.starts=2"}).exit_code == kDone);
+  outcome = run_command({"resume", out.string()});
+  CHECK(outcome.exit_code == kDone);
+  CHECK_THAT(outcome.out, Contains("came to its end (ok)"));
+
+  std::vector<std::string> lines = lines_of(out / kJournalFile);
+  write_text(out / kJournalFile, lines[0] + "\n" + lines[1] + "\n");
+  folder.write("rod.json", std::string(kTwoVariables) + "\n");
+  outcome = run_command({"resume", out.string()});
+  CHECK(outcome.exit_code == kBadInput);
+  CHECK_THAT(outcome.err, Contains("another content of the problem file") && Contains("anew"));
+  write_text(out / kJournalFile, "{\"a\": 1}\n");
+  CHECK_THAT(run_command({"resume", out.string()}).err, Contains("no journal of this version"));
+}
+
+namespace {
+
+// Half a second of the rod's motion at k = 20 and free = 0.5, told with little noise; from far away the fit has other
+// minima.
+std::string swing_csv(const TemporaryFolder& folder) {
+  REQUIRE(run_command({"simulate", folder.write("truth.json", kTwoVariables), "--out", folder.file("truth"), "--set",
+                       "simulation.output_step=0.05"})
+              .exit_code == kDone);
+  const std::vector<std::string> rows = lines_of(folder.path / "truth/trajectory.csv");
+  std::string csv = "t,theta\n";
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    const std::size_t last = rows[i].rfind(','), before = rows[i].rfind(',', last - 1);
+    csv += rows[i].substr(0, rows[i].find(',')) + rows[i].substr(before, last - before) + "\n";
+  }
+  return csv;
+}
+
+std::string fit_problem() {
+  std::string text = kTwoVariables;
+  text.replace(text.find("\"k\": {\"value\": 20"), 17, "\"k\": {\"value\": 60");
+  text.erase(text.find(",\n  \"design\""));
+  return text + R"(,
+  "identification": {"experiments": [{"name": "swing", "data": "swing.csv",
+      "channels": [{"column": "theta", "sensor": "swing", "sigma": 0.01}]}], "variables": ["k", "free"],
+      "multistart": {"starts": 5, "seed": 2}}})";
+}
+
+}  // namespace
+
+TEST_CASE("multistart: identify fits from several starts, the same with any number of workers, killed or not",
+          "[multistart]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", swing_csv(folder));
+  const std::string file = folder.write("fit.json", fit_problem());
+  REQUIRE(run_command({"identify", file, "--out", folder.file("one"), "--threads", "1"}).exit_code == kDone);
+  const auto one = outcome_of(folder.path / "one");
+  CHECK(one.at("parameters").at("k").at("value").get<double>() == Approx(20).epsilon(1e-4));
+  CHECK(one.at("parameters").at("k").at("initial") == 60);
+  CHECK(one.at("multistart").at("waterfall").size() == 5);
+  const double best = one.at("multistart").at("waterfall").at(0).at("objective");
+  CHECK(one.at("optimizer").at("objective_final").get<double>() <= best * (1 + 1e-9) + 1e-12);
+
+  REQUIRE(run_command({"identify", file, "--out", folder.file("three"), "--threads", "3"}).exit_code == kDone);
+  CHECK(outcome_of(folder.path / "three") == one);
+
+  const fs::path killed = folder.path / "killed";
+  kill_at({"identify", file, "--out", killed.string(), "--threads", "2"}, killed, "start", 2);
+  const bool was_done = lines_with(killed, "ended") > 0;
+  REQUIRE(run_command({"resume", killed.string()}).exit_code == kDone);
+  CHECK(lines_with(killed, "start") == 5);
+  if (!was_done) CHECK(content_of(killed / "residuals.csv") == content_of(folder.path / "one/residuals.csv"));
+}
+
+TEST_CASE("resume: an identification that was interrupted between its starts goes on", "[resume]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", swing_csv(folder));
+  const std::string file = folder.write("fit.json", fit_problem());
+  const Arguments slow{"--threads", "2", "--set", "simulation.integrator.max_step=1e-3"};
+  const auto identify = [&](const fs::path& out) {
+    Arguments arguments{"identify", file, "--out", out.string()};
+    arguments.insert(arguments.end(), slow.begin(), slow.end());
+    return run_command(arguments);
+  };
+  REQUIRE(identify(folder.path / "whole").exit_code == kDone);
+  const fs::path out = folder.path / "out";
+  std::thread killer([&] {
+    for (int i = 0; i < 6000 && !(fs::exists(out / kJournalFile) && lines_with(out, "start") >= 1); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    ::kill(::getpid(), SIGTERM);
+  });
+  const CommandOutcome outcome = identify(out);
+  killer.join();
+  INFO(outcome.err);
+  REQUIRE(outcome.exit_code == kInterrupted);
+  CHECK(json_of(out / "result.json").at("status") == "interrupted");
+  CHECK(fs::exists(out / "optimized.json"));
+  REQUIRE(run_command({"resume", out.string()}).exit_code == kDone);
+  CHECK(outcome_of(out) == outcome_of(folder.path / "whole"));
+}

@@ -1,0 +1,187 @@
+// Designs by every optimiser that a problem file can name.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <map>
+
+#include "five_bar.hpp"
+#include "optim/design.hpp"
+#include "optim/design_issues.hpp"
+#include "optim/design_program.hpp"
+
+using namespace mbsopt;
+using Catch::Contains;
+
+namespace {
+
+// Springs' free lengths between bounds; default tolerances of the simulation.
+Problem still(double rtol = 1e-8) {
+  Problem problem = five_bar::problem(rtol);
+  problem.design.emplace();
+  problem.design->minimize = "motion";
+  problem.design->variables = {"L01", "L02"};
+  for (std::size_t k = 0; k < 2; ++k) problem.scene.parameters[k].lower = 1.9, problem.scene.parameters[k].upper = 2.3;
+  problem.scene.parameters[1].lower = 1.7;
+  return problem;
+}
+
+void add_total_length(Problem& problem, std::optional<double> lower, std::optional<double> upper) {
+  ObjectiveSpec total;
+  total.name = "total_length";
+  total.parameters_only = Expression::parse("L01 + L02");
+  problem.objectives.push_back(total);
+  problem.design->subject_to = {{"total_length", lower, upper}};
+}
+
+}  // namespace
+
+TEST_CASE("five-bar: every local optimiser holds the mechanism still", "[design_optimizers]") {
+  const std::string type = GENERATE("ipopt", "slsqp", "mma", "ccsaq", "lbfgs", "bobyqa", "cobyla", "sbplx");
+  INFO(type);
+  Problem problem = still();
+  problem.design->optimizer.type = type;
+  const DesignResult result = run_design(problem);
+  INFO(result.message << " " << result.evaluations << " evaluations");
+  CHECK(result.status == SolverStatus::converged);
+  CHECK(result.optimizer == type);
+  const double margin = type == "cobyla" ? 1e-5 : 2e-6;
+  CHECK(result.variables[0].value == Approx(five_bar::kL01).margin(margin));
+  CHECK(result.variables[1].value == Approx(five_bar::kL02).margin(margin));
+  CHECK(result.optimality < 1e-4);  // also of methods that know no derivatives
+}
+
+TEST_CASE("five-bar: nothing is simulated twice", "[design_optimizers]") {
+  const std::string type = GENERATE("ipopt", "slsqp", "mma", "lbfgs");
+  INFO(type);
+  Problem problem = still();
+  problem.design->optimizer.type = type;
+  const DesignResult result = run_design(problem);
+  // One adjoint per point; one more near the start, for the scale.
+  CHECK(result.simulations == result.evaluations + 1);
+  problem.design->optimizer.type = "bobyqa";
+  const DesignResult by_values = run_design(problem);
+  CHECK(by_values.simulations <= by_values.evaluations + 2);  // and the gradient at the solution
+}
+
+TEST_CASE("five-bar: a bound on another objective is held by every optimiser that takes one", "[design_optimizers]") {
+  Problem problem = still();
+  add_total_length(problem, 4.1, {});  // the free optimum has 4.065
+  std::map<std::string, double> psi;
+  for (const std::string type : {"ipopt", "slsqp", "mma", "ccsaq", "cobyla", "lbfgs", "bobyqa", "sbplx"}) {
+    INFO(type);
+    problem.design->optimizer.type = type;
+    const DesignResult result = run_design(problem);
+    INFO(result.message);
+    CHECK(result.ok());
+    CHECK(result.violation <= kConstraintTolerance);
+    CHECK(result.constraints[0].value == Approx(4.1).margin(1e-4));
+    psi[type] = result.objective_final;
+  }
+  for (const auto& [type, value] : psi) {
+    INFO(type);
+    CHECK(value == Approx(psi.at("ipopt")).epsilon(1e-3));
+  }
+}
+
+TEST_CASE("five-bar: an equality is met by those that take one, and refused with the alternatives by others",
+          "[design_optimizers]") {
+  Problem problem = still();
+  add_total_length(problem, 4.1, 4.1);
+  for (const std::string type : {"ipopt", "slsqp", "cobyla", "lbfgs"}) {
+    INFO(type);
+    problem.design->optimizer.type = type;
+    const DesignResult result = run_design(problem);
+    INFO(result.message);
+    CHECK(result.constraints[0].value == Approx(4.1).margin(1e-6));
+  }
+  for (const std::string type : {"mma", "ccsaq"}) {
+    problem.design->optimizer.type = type;
+    CHECK_THROWS_WITH(run_design(problem), Contains("design.optimizer.type: '" + type) && Contains("slsqp"));
+  }
+}
+
+TEST_CASE("five-bar: a global method finds the valley without a hint", "[design_optimizers]") {
+  Problem problem = still(1e-6);
+  problem.design->optimizer.type = GENERATE("direct", "crs", "mlsl");
+  problem.design->optimizer.max_evaluations = 400;
+  if (problem.design->optimizer.type != "direct") problem.design->optimizer.seed = 4;
+  const DesignResult result = run_design(problem);
+  INFO(result.optimizer << ": " << result.message);
+  CHECK(result.ok());
+  CHECK(result.objective_final < 1e-5);
+  CHECK(result.seed.has_value() == (result.optimizer != "direct"));
+}
+
+TEST_CASE("what an optimiser cannot do is said where it is asked for", "[design_optimizers]") {
+  Problem problem = still();
+  const auto issue = [&] {
+    const std::vector<DesignIssue> issues = optimizer_issues(*problem.design, problem.scene);
+    return issues.empty() ? std::string() : issues[0].path + ": " + issues[0].message;
+  };
+  CHECK(issue().empty());
+  problem.design->optimizer.type = "direct";
+  problem.scene.parameters[1].upper.reset();
+  CHECK_THAT(issue(), Contains("parameters.L02: has no upper bound"));
+  problem.design->optimizer.type = "slsqp";
+  CHECK(issue().empty());
+  problem.design->optimizer.seed = 1;
+  CHECK_THAT(issue(), Contains("design.optimizer.seed: ") && Contains("draws no random numbers"));
+  problem.design->optimizer.seed.reset();
+  problem.design->optimizer.hessian = "exact";
+  CHECK_THAT(issue(), Contains("design.optimizer.hessian: is of ipopt only"));
+  problem.design->optimizer = {};
+  problem.design->multistart.emplace();
+  CHECK_THAT(issue(), Contains("parameters.L02: has no upper bound") && Contains("design.multistart"));
+  problem.design->multistart.reset();
+  problem.design->optimizer.type = "bobyqa";
+  problem.design->variables = {"L01"};
+  CHECK_THAT(issue(), Contains("design.optimizer.type: 'bobyqa' needs two variables"));
+  add_total_length(problem, 4.1, {});
+  problem.design->optimizer.type = "esch";
+  CHECK_THAT(issue(), Contains("'esch' takes no constraints") && Contains("isres"));
+}
+
+TEST_CASE("Hessians of a design are those of its scaled program", "[design_optimizers]") {
+  Problem problem = still(1e-10);
+  problem.scene.parameters[0].scale = ParameterScale::log;
+  ObjectiveSpec product;
+  product.name = "product";
+  product.parameters_only = Expression::parse("L01^2*L02");
+  problem.objectives.push_back(product);
+  problem.design->subject_to = {{"product", {}, 10.0}};
+  Evaluator evaluator(problem.scene, objectives_of(problem, {"motion", "product"}), {"L01", "L02"});
+  const VariableScaling scaling({problem.scene.parameters[0], problem.scene.parameters[1]});
+  DesignProgram program(*problem.design, evaluator, scaling);
+  const Eigen::VectorXd x = scaling.to_x(evaluator.start().head<2>());
+  std::vector<Eigen::MatrixXd> H;
+  REQUIRE(program.hessians(x, H));
+  REQUIRE(H.size() == 2);
+  CHECK(program.hessian_gradients() > 0);
+  // Against central differences of the program's own gradient, on free steps.
+  const auto derivatives = [&](const Eigen::VectorXd& at) {
+    NlpPoint p;
+    p.f_x.setZero(2), p.c.setZero(1), p.c_x.setZero(1, 2);
+    program.evaluate(at, p);
+    return p;
+  };
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    const Eigen::VectorXd h = 1e-3 * Eigen::VectorXd::Unit(2, k);
+    const NlpPoint plus = derivatives(x + h), minus = derivatives(x - h);
+    CHECK((H[0].col(k) - (plus.f_x - minus.f_x) / 2e-3).norm() < 1e-4 * H[0].norm());
+    CHECK((H[1].col(k) - (plus.c_x - minus.c_x).transpose() / 2e-3).norm() < 1e-4 * H[1].norm());
+  }
+}
+
+TEST_CASE("five-bar: exact Hessians save iterations", "[design_optimizers]") {
+  Problem problem = still(1e-9);
+  problem.design->optimizer.tolerance = 1e-8;
+  const DesignResult by_bfgs = run_design(problem);
+  problem.design->optimizer.hessian = "exact";
+  const DesignResult exact = run_design(problem);
+  INFO(by_bfgs.iterations << " iterations by L-BFGS, " << exact.iterations << " with exact Hessians");
+  CHECK(exact.status == SolverStatus::converged);
+  CHECK_THAT(exact.algorithm, Contains("exact Hessian"));
+  CHECK_THAT(by_bfgs.algorithm, Contains("limited-memory"));
+  CHECK(exact.iterations < by_bfgs.iterations);
+  CHECK(exact.variables[0].value == Approx(five_bar::kL01).margin(1e-7));
+  CHECK(exact.simulations > exact.evaluations + 1);
+}

@@ -1,0 +1,95 @@
+#include "optim/process_pool.hpp"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <csignal>
+#include <map>
+#include <numeric>
+#include <stdexcept>
+#include <thread>
+
+using namespace mbsopt;
+using Catch::Contains;
+
+namespace {
+
+std::map<int, JobReply> replies_of(int count, int workers, const std::function<std::string(int)>& work) {
+  std::vector<int> jobs(static_cast<std::size_t>(count));
+  std::iota(jobs.begin(), jobs.end(), 0);
+  std::map<int, JobReply> replies;
+  run_in_processes(jobs, workers, work, [&](const JobReply& reply) { replies[reply.job] = reply; });
+  return replies;
+}
+
+}  // namespace
+
+TEST_CASE("every job replies, however many workers there are", "[process_pool]") {
+  const int workers = GENERATE(1, 2, 5, 50);
+  const auto replies = replies_of(20, workers, [](int job) { return std::to_string(job * job); });
+  REQUIRE(replies.size() == 20);
+  for (const auto& [job, reply] : replies) {
+    CHECK(reply.ok);
+    CHECK(reply.text == std::to_string(job * job));
+  }
+}
+
+TEST_CASE("jobs run in processes of their own, and leave nothing in this one", "[process_pool]") {
+  static int changed = 0;
+  const auto replies =
+      replies_of(3, 2, [](int) { return std::to_string(++changed) + " " + std::to_string(::getpid()); });
+  CHECK(changed == 0);
+  CHECK(replies.at(0).text.substr(0, 2) == "1 ");
+  CHECK(replies.at(1).text.substr(0, 2) == "1 ");
+  CHECK(replies.at(0).text != replies.at(1).text);
+}
+
+TEST_CASE("a long reply arrives whole", "[process_pool]") {
+  const std::string text(3'000'000, 'x');
+  CHECK(replies_of(2, 2, [&](int job) { return text + std::to_string(job); }).at(1).text == text + "1");
+}
+
+TEST_CASE("a job that throws, crashes or leaves is one reply in words; the others are not disturbed",
+          "[process_pool]") {
+  const auto replies = replies_of(4, 2, [](int job) -> std::string {
+    if (job == 0) throw std::runtime_error("the crank locks");
+    if (job == 1) ::raise(SIGKILL);
+    if (job == 2) ::_exit(7);
+    return "fine";
+  });
+  CHECK((!replies.at(0).ok && replies.at(0).text == "the crank locks"));
+  CHECK_FALSE(replies.at(1).ok);
+  CHECK_THAT(replies.at(1).text, Contains("signal 9"));
+  CHECK_FALSE(replies.at(2).ok);
+  CHECK_THAT(replies.at(2).text, Contains("code 7"));
+  CHECK((replies.at(3).ok && replies.at(3).text == "fine"));
+}
+
+TEST_CASE("workers work at the same time", "[process_pool]") {
+  const auto begin = std::chrono::steady_clock::now();
+  replies_of(4, 4, [](int) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(400));
+    return std::string();
+  });
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::milliseconds(1200));
+}
+
+TEST_CASE("when it is to stop, no job begins and those under way are told", "[process_pool]") {
+  std::vector<JobReply> replies;
+  static volatile std::sig_atomic_t told = 0;
+  run_in_processes(
+      {0, 1, 2, 3}, 2,
+      [](int) {
+        ::signal(SIGTERM, [](int) { told = 1; });
+        for (int i = 0; i < 1000 && !told; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        return std::string(told ? "stopped early" : "ran on");
+      },
+      [&](const JobReply& reply) { replies.push_back(reply); },
+      [begin = std::chrono::steady_clock::now()] {
+        return std::chrono::steady_clock::now() - begin < std::chrono::milliseconds(300);
+      });
+  REQUIRE(replies.size() == 2);
+  for (const JobReply& reply : replies) CHECK(reply.text == "stopped early");
+}
