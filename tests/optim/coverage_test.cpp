@@ -8,7 +8,11 @@ using namespace mbsopt;
 
 TEST_CASE("95 % intervals cover the truth about as often as they say, on three problems",
           "[identification][coverage]") {
+#ifdef __SANITIZE_ADDRESS__
+  constexpr unsigned kRuns = 2;  // twenty times slower: only that they run
+#else
   constexpr unsigned kRuns = 40;
+#endif
   for (const repetitions::Study& study : repetitions::studies()) {
     std::vector<unsigned> covered(study.truth.size(), 0);
     for (unsigned run = 0; run < kRuns; ++run) {
@@ -21,7 +25,7 @@ TEST_CASE("95 % intervals cover the truth about as often as they say, on three p
     }
     for (std::size_t k = 0; k < covered.size(); ++k) {
       INFO(study.name << ", parameter " << k);
-      CHECK(covered[k] >= 33);  // 38 expected, 3.6 standard deviations of the binomial below
+      if (kRuns == 40) CHECK(covered[k] >= 33);  // 38 expected, 3.6 standard deviations of the binomial below
     }
   }
 }
