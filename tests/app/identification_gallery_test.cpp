@@ -65,6 +65,9 @@ TEST_CASE("without the load only ratios to the mass are determined, and that is 
 }
 
 TEST_CASE("ten inertial numbers of a body come from the motion of two markers", "[gallery][identification]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
   const TemporaryFolder folder;
   const auto result = identified(folder, "double_pendulum/identify_inertia");
   check_against(result, {{"m", 1.8},
@@ -101,6 +104,9 @@ TEST_CASE("ten inertial numbers of a body come from the motion of two markers", 
 
 TEST_CASE("a damper's law, and how late its sensor is, come from two rides on roads of their own",
           "[gallery][identification]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
   const TemporaryFolder folder;
   const auto result = identified(folder, "damper/identify_law");
   check_against(result, {{"k", 18000}, {"c", 1500}, {"r", 600}, {"vs", 0.4}, {"tau", 0.012}});

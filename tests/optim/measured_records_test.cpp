@@ -109,6 +109,9 @@ TEST_CASE("the swinging gate: one stiffness for three runs, a damping for each",
 TEST_CASE("the measured pendulum with drag and dry friction: better where it was not fitted",
           "[identification][measured]") {
   const std::string file = "multiarm_single_pendulum/single_pendulum_1kHz.csv";
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
   if (!is_here(file)) return;
   const CsvTable data = read_csv(kMeasured + file);
   // Every tenth sample: the residuals are correlated over far longer than 10 ms.
