@@ -1,28 +1,9 @@
 #include "core/dynamics/block_cholesky.hpp"
 
-#include <Eigen/OrderingMethods>
-#include <Eigen/SparseCore>
 #include <algorithm>
-#include <map>
-#include <set>
 
 namespace mbsopt {
 namespace {
-
-std::vector<int> elimination_order(int n, std::span<const std::pair<int, int>> edges) {
-  std::vector<Eigen::Triplet<double>> entries;
-  for (int i = 0; i < n; ++i) entries.emplace_back(i, i, 1.0);
-  for (const auto& [i, j] : edges) {
-    entries.emplace_back(i, j, 1.0);
-    entries.emplace_back(j, i, 1.0);
-  }
-  Eigen::SparseMatrix<double> pattern(n, n);
-  pattern.setFromTriplets(entries.begin(), entries.end());
-  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> permutation;
-  Eigen::AMDOrdering<int>()(pattern, permutation);
-  const auto& order = permutation.indices();
-  return {order.data(), order.data() + order.size()};
-}
 
 // Lower triangle of A -> W = inv(L), unit lower, and the inverse of D, with A = L D L'; false where D is not positive.
 bool factor_diagonal(Mat<6, 6>& A, Vec<6>& inverse) {
@@ -102,54 +83,16 @@ void subtract_transposed_times(const Mat<6, 6>& L, const X& x, X& y) {
 
 }  // namespace
 
-BlockCholesky::BlockCholesky(int bodies, std::span<const std::pair<int, int>> edges) : n_(bodies) {
-  order_ = elimination_order(n_, edges);
-  position_.resize(index(n_));
-  for (int k = 0; k < n_; ++k) position_[index(order_[index(k)])] = k;
-
-  // Symbolic elimination: the rows of column k are its own edges and what eliminating its children leaves.
-  std::vector<std::set<int>> rows(index(n_));
-  for (const auto& [a, b] : edges) {
-    const int i = position_[index(a)], j = position_[index(b)];
-    rows[index(std::min(i, j))].insert(std::max(i, j));
-  }
-  std::vector<std::map<int, std::size_t>> place(index(n_));
-  columns_.resize(index(n_));
-  for (int k = 0; k < n_; ++k) {
-    const std::set<int>& below = rows[index(k)];
-    for (const int i : below) {
-      place[index(k)][i] = lower_.size();
-      columns_[index(k)].push_back({i, lower_.size()});
-      lower_.emplace_back();
-    }
-    if (!below.empty()) {
-      const int parent = *below.begin();
-      for (const int i : below) {
-        if (i != parent) rows[index(parent)].insert(i);
-      }
-    }
-  }
-  for (const auto& [a, b] : edges) {
-    const int i = position_[index(a)], j = position_[index(b)];
-    handles_.push_back({place[index(std::min(i, j))].at(std::max(i, j)), i < j});
-  }
-  updates_.resize(index(n_));
-  for (int k = 0; k < n_; ++k) {
-    const std::vector<Entry>& column = columns_[index(k)];
-    for (std::size_t a = 0; a < column.size(); ++a) {
-      updates_[index(k)].push_back({index(column[a].row), a, column[a].block, true});
-      for (std::size_t b = 0; b < a; ++b) {
-        updates_[index(k)].push_back({place[index(column[b].row)].at(column[a].row), a, column[b].block, false});
-      }
-    }
-  }
-  diagonal_.resize(index(n_));
-  inverse_.resize(index(n_));
+BlockCholesky::BlockCholesky(int bodies, std::span<const std::pair<int, int>> edges) : elimination_(bodies, edges) {
+  for (const auto& [a, b] : edges) handles_.push_back(elimination_.place(a, b));
+  diagonal_.resize(index(bodies));
+  inverse_.resize(index(bodies));
+  lower_.resize(elimination_.blocks);
   std::size_t longest = 0;
-  for (const std::vector<Entry>& column : columns_) longest = std::max(longest, column.size());
+  for (const auto& column : elimination_.columns) longest = std::max(longest, column.size());
   scaled_.resize(longest);
-  permuted_.resize(index(n_));
-  permuted_lanes_.resize(index(n_));
+  permuted_.resize(index(bodies));
+  permuted_lanes_.resize(index(bodies));
   set_zero();
 }
 
@@ -160,18 +103,18 @@ void BlockCholesky::set_zero() {
 
 // L_ik = A_ik W_k' inv(D_k); A_ij -= L_ik D_k L_jk'
 bool BlockCholesky::factor() {
-  for (std::size_t k = 0; k < index(n_); ++k) {
+  for (std::size_t k = 0; k < diagonal_.size(); ++k) {
     Block& W = diagonal_[k];
     Vec<6>& inverse = inverse_[k];
     if (!factor_diagonal(W, inverse)) return false;
-    const std::vector<Entry>& column = columns_[k];
+    const std::vector<Elimination::Entry>& column = elimination_.columns[k];
     for (std::size_t e = 0; e < column.size(); ++e) {
       Block &L = lower_[column[e].block], &LD = scaled_[e];
       times_transposed(L, W, LD);
       for (int j = 0; j < 6; ++j) L.col(j) = inverse(j) * LD.col(j);
     }
-    for (const Update& u : updates_[k]) {
-      subtract_product(scaled_[u.i], lower_[u.j], u.diagonal ? diagonal_[u.target] : lower_[u.target]);
+    for (const Elimination::Update& u : elimination_.updates[k]) {
+      subtract_product(scaled_[u.i], lower_[column[u.j].block], u.diagonal ? diagonal_[u.target] : lower_[u.target]);
     }
   }
   return true;
@@ -179,17 +122,18 @@ bool BlockCholesky::factor() {
 
 template <class X>
 void BlockCholesky::solve_any(std::span<X> x, std::vector<X>& y) {
-  for (std::size_t k = 0; k < index(n_); ++k) y[k] = x[index(order_[k])];
-  for (std::size_t k = 0; k < index(n_); ++k) {
+  const std::vector<int>& order = elimination_.order;
+  for (std::size_t k = 0; k < order.size(); ++k) y[k] = x[index(order[k])];
+  for (std::size_t k = 0; k < order.size(); ++k) {
     y[k] = times(diagonal_[k], y[k]);
-    for (const Entry& e : columns_[k]) subtract_times(lower_[e.block], y[k], y[index(e.row)]);
+    for (const auto& e : elimination_.columns[k]) subtract_times(lower_[e.block], y[k], y[index(e.row)]);
   }
-  for (std::size_t k = index(n_); k-- > 0;) {
+  for (std::size_t k = order.size(); k-- > 0;) {
     X z;
     for (int i = 0; i < 6; ++i) z.row(i) = inverse_[k](i) * y[k].row(i);
-    for (const Entry& e : columns_[k]) subtract_transposed_times(lower_[e.block], y[index(e.row)], z);
+    for (const auto& e : elimination_.columns[k]) subtract_transposed_times(lower_[e.block], y[index(e.row)], z);
     y[k] = transposed_times(diagonal_[k], z);
-    x[index(order_[k])] = y[k];
+    x[index(order[k])] = y[k];
   }
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/body/fixed_size.hpp"
+#include "core/dynamics/elimination.hpp"
 
 namespace mbsopt {
 
@@ -24,10 +25,10 @@ class BlockCholesky {
   BlockCholesky(int bodies, std::span<const std::pair<int, int>> edges);
 
   void set_zero();
-  Block& diagonal(int body) { return diagonal_[index(position_[index(body)])]; }
+  Block& diagonal(int body) { return diagonal_[index(elimination_.position[index(body)])]; }
   // Adds X to the block (first, second) of edge `handle` and its transpose to (second, first).
   void add_off_diagonal(std::size_t handle, const Block& X) {
-    const Handle& h = handles_[handle];
+    const Elimination::Place& h = handles_[handle];
     if (h.transposed) {
       lower_[h.block] += X.transpose();
     } else {
@@ -43,28 +44,12 @@ class BlockCholesky {
   std::size_t fill_blocks() const { return lower_.size(); }
 
  private:
-  struct Handle {
-    std::size_t block = 0;
-    bool transposed = false;
-  };
-  struct Entry {  // a block of column k: its row (elimination position) and place
-    int row = 0;
-    std::size_t block = 0;
-  };
-  struct Update {  // target -= L_i D L_j'; i: the entry's number in its column, j: its place
-    std::size_t target = 0, i = 0, j = 0;
-    bool diagonal = false;
-  };
-
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
   template <class X>
   void solve_any(std::span<X> x, std::vector<X>& y);
 
-  int n_ = 0;
-  std::vector<int> position_, order_;  // body -> elimination position and back
-  std::vector<Handle> handles_;
-  std::vector<std::vector<Entry>> columns_;  // strictly below the diagonal
-  std::vector<std::vector<Update>> updates_;
+  Elimination elimination_;
+  std::vector<Elimination::Place> handles_;
   std::vector<Block> diagonal_, lower_;  // S before factor(), inv(L_kk) below the diagonal and L_ik after
   std::vector<Vec<6>> inverse_;          // of D
   std::vector<Block> scaled_;            // L_ik D_k of the column in hand

@@ -13,10 +13,11 @@ class NewtonMatrix {
   NewtonMatrix(const NewtonMatrix&) = delete;  // its system refers to its Jacobian
   NewtonMatrix& operator=(const NewtonMatrix&) = delete;
 
-  bool linearise(double t, const Flow::Numbers& y);                // f_y at this state
-  bool factor(double gamma);                                       // false where it is not finite or singular
-  void solve(Eigen::Ref<Eigen::VectorXd> x) { system_.solve(x); }  // x: right-hand side in, solution out
-  void solve_transposed(Eigen::Ref<Eigen::VectorXd> x) { system_.solve_transposed(x); }
+  bool linearise(double t, const Flow::Numbers& y);  // f_y at this state
+  bool factor(double gamma);                         // false where it is not finite or singular
+  // x: right-hand side in, solution out; once refined: CVODES takes the solution for that of the equation.
+  void solve(Eigen::Ref<Eigen::VectorXd> x) { system_.solve(x, 1); }
+  void solve_transposed(Eigen::Ref<Eigen::VectorXd> x) { system_.solve_transposed(x, 1); }
   long factorisations() const { return system_.factorisations(); }
 
  private:

@@ -1,6 +1,7 @@
 #include "core/integrate/implicit_stages.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -46,6 +47,11 @@ ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method,
   if (rk_.error_filter != 0) filter_.emplace(data_, jacobian_);
   const Eigen::Index rows = 7 * data_.n + data_.m;
   own_values_.assign(static_cast<std::size_t>(largest), values_);
+  same_.assign(own_values_.size(), &values_);
+  for (const MotionJacobian::Values& v : own_values_) own_.push_back(&v);
+  for (Points* points : {&past_, &present_}) {
+    points->places.assign(static_cast<std::size_t>(rk_.stages), {0, Eigen::VectorXd::Zero(rows)});
+  }
   x_.setZero(rows, largest), r_.setZero(rows * largest, 1), change_.setZero(14 * data_.n, largest);
   a_start_.setZero(7 * data_.n), lambda_start_.setZero(data_.m);
   y_.setZero(14 * data_.n), work_.setZero(7 * data_.n);
@@ -60,20 +66,19 @@ long ImplicitStages::factorisations() const {
 void ImplicitStages::begin(const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::VectorXd& lambda) {
   a_start_ = a;
   lambda_start_ = lambda;
-  past_.clear();
-  present_.clear();
+  past_.count = present_.count = 0;
   renew_ = true;
   own_steps_ = 0;
   age_ = 0;
   rate_ = 1;
 }
 
-void ImplicitStages::new_attempt() { present_.clear(); }
+void ImplicitStages::new_attempt() { present_.count = 0; }
 
 void ImplicitStages::accept(const Step& step) {
   const Eigen::Index n = 7 * data_.n;
-  past_ = std::move(present_);
-  present_.clear();
+  std::swap(past_, present_);
+  present_.count = 0;
   // Where the next Jacobian is taken: the latest stage.
   int latest = 0;
   for (int i = 1; i < rk_.stages; ++i) {
@@ -100,9 +105,8 @@ void ImplicitStages::evaluate_jacobian(const Step& step) {
 bool ImplicitStages::ready(const Step& step, Matrix& m) {
   if (renew_) evaluate_jacobian(step);
   if (m.jacobian == jacobians_ && m.h == step.h) return true;
-  const std::vector<const MotionJacobian::Values*> values(static_cast<std::size_t>(m.A.rows()), &values_);
   m.jacobian = -1;
-  if (!m.matrix.factor(step.h * m.A, values)) return false;
+  if (!m.matrix.factor(step.h, m.A, std::span(same_).first(static_cast<std::size_t>(m.A.rows())))) return false;
   m.h = step.h;
   m.jacobian = jacobians_;
   return true;
@@ -111,30 +115,33 @@ bool ImplicitStages::ready(const Step& step, Matrix& m) {
 // The polynomial through the three nearest points of the past, at most.
 void ImplicitStages::predict(const Step& step, int stage, Eigen::Ref<Eigen::VectorXd> x) const {
   const double t = step.t + rk_.c[stage] * step.h;
-  std::vector<const Point*> points;
-  for (const auto* list : {&present_, &past_}) {
-    for (const Point& p : *list) points.push_back(&p);
+  std::array<const Point*, 3> nodes;
+  std::size_t count = 0;
+  auto is_new = [&](const Point& p) {
+    return std::all_of(nodes.begin(), nodes.begin() + count,
+                       [&](const Point* q) { return std::abs(q->t - p.t) > 0.05 * step.h; });
+  };
+  while (count < nodes.size()) {
+    const Point* nearest = nullptr;
+    for (const Points* points : {&present_, &past_}) {
+      for (const Point& p : std::span(points->places).first(points->count)) {
+        if (is_new(p) && (!nearest || std::abs(p.t - t) < std::abs(nearest->t - t))) nearest = &p;
+      }
+    }
+    if (!nearest) break;
+    nodes[count++] = nearest;
   }
-  std::stable_sort(points.begin(), points.end(),
-                   [&](const Point* a, const Point* b) { return std::abs(a->t - t) < std::abs(b->t - t); });
-  std::vector<const Point*> nodes;
-  for (const Point* p : points) {
-    const bool distinct =
-        std::all_of(nodes.begin(), nodes.end(), [&](const Point* q) { return std::abs(q->t - p->t) > 0.05 * step.h; });
-    if (distinct && nodes.size() < 3) nodes.push_back(p);
-  }
-  if (nodes.empty()) {
+  if (count == 0) {
     x << a_start_, lambda_start_;
     return;
   }
   x.setZero();
-  for (const Point* p : nodes) {
+  for (std::size_t i = 0; i < count; ++i) {
     double weight = 1;
-    for (const Point* q : nodes) {
-      if (q != p) weight *= (t - q->t) / (p->t - q->t);
+    for (std::size_t j = 0; j < count; ++j) {
+      if (j != i) weight *= (t - nodes[j]->t) / (nodes[i]->t - nodes[j]->t);
     }
-    x.head(a_start_.size()) += weight * p->a;
-    x.tail(lambda_start_.size()) += weight * p->lambda;
+    x += weight * nodes[i]->x;
   }
 }
 
@@ -150,7 +157,6 @@ void ImplicitStages::set_stages(Step& step, const StageGroup& g) {
 
 // A Jacobian of each stage's own, where its iterate is.
 bool ImplicitStages::linearise_stages(const Step& step, const StageGroup& g, Matrix& m) {
-  std::vector<const MotionJacobian::Values*> values;
   for (int i = 0; i < g.size(); ++i) {
     const int stage = g.first + i;
     y_ = step.Y.col(stage);
@@ -158,11 +164,10 @@ bool ImplicitStages::linearise_stages(const Step& step, const StageGroup& g, Mat
                        step.lambda.col(stage));
     MotionJacobian::Values& own = own_values_[static_cast<std::size_t>(i)];
     jacobian_.evaluate(dynamics_, own);
-    values.push_back(&own);
     ++own_jacobians_;
   }
   m.jacobian = -1;  // not that of the start
-  return m.matrix.factor(step.h * m.A, values);
+  return m.matrix.factor(step.h, m.A, std::span(own_).first(static_cast<std::size_t>(g.size())));
 }
 
 // Residuals of the group's stages at x_ into r_.
@@ -265,7 +270,9 @@ bool ImplicitStages::solve(Step& step, const StageGroup& g, Goal goal) {
   if (!solved) return false;
   set_stages(step, g);
   for (int i = g.first; i <= g.last; ++i) {
-    present_.push_back({step.t + rk_.c[i] * step.h, step.K.col(i).tail(7 * data_.n), step.lambda.col(i)});
+    Point& p = present_.places[present_.count++];
+    p.t = step.t + rk_.c[i] * step.h;
+    p.x << step.K.col(i).tail(7 * data_.n), step.lambda.col(i);
   }
   return true;
 }

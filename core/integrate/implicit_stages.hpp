@@ -61,8 +61,12 @@ class ImplicitStages {
     long jacobian = -1;
   };
   struct Point {  // of the past, for the first guess
-    double t;
-    Eigen::VectorXd a, lambda;
+    double t = 0;
+    Eigen::VectorXd x;  // (a, lambda)
+  };
+  struct Points {
+    std::vector<Point> places;  // room for all stages
+    std::size_t count = 0;
   };
 
   bool ready(const Step& step, Matrix& m);
@@ -81,6 +85,7 @@ class ImplicitStages {
   MotionJacobian jacobian_;
   MotionJacobian::Values values_;
   std::vector<MotionJacobian::Values> own_values_;  // per stage of a group
+  std::vector<const MotionJacobian::Values*> same_, own_;
   std::vector<Matrix> matrices_;
   std::vector<int> matrix_of_;  // per group, in order
   std::optional<ShiftedSystem> filter_;
@@ -88,7 +93,7 @@ class ImplicitStages {
   long filter_jacobian_ = -1;
 
   Eigen::VectorXd a_start_, lambda_start_;
-  std::vector<Point> past_, present_;  // of accepted steps; of the attempt in hand
+  Points past_, present_;  // of the last accepted step; of the attempt in hand
   Eigen::MatrixXd x_, r_, change_;
   Eigen::VectorXd y_, work_;
   double rate_ = 1;  // of the last iteration

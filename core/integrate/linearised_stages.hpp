@@ -24,12 +24,14 @@ class LinearisedStages {
   long factorisations() const;
 
  private:
-  StageMatrix& of(const StageGroup& group);
+  std::size_t of(const StageGroup& group) const;  // which matrix
 
   const Method& rk_;
   MotionJacobian jacobian_;
   std::vector<MotionJacobian::Values> values_;  // per stage of the group in hand
-  std::vector<StageMatrix> matrices_;           // per size of a group
+  std::vector<const MotionJacobian::Values*> pointers_;
+  std::vector<StageMatrix> matrices_;  // per size of a group
+  std::vector<Eigen::MatrixXd> A_;     // the same: of the group in hand
 };
 
 }  // namespace mbsopt

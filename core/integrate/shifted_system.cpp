@@ -11,7 +11,7 @@ ShiftedSystem::ShiftedSystem(const MechanismData& data, const MotionJacobian& ja
 bool ShiftedSystem::factor(double gamma, const MotionJacobian::Values& values) {
   values_ = &values;
   gamma_ = gamma;
-  return matrix_.factor(Mat<1, 1>(gamma), std::span(&values_, 1));
+  return matrix_.factor(gamma, one_, std::span(&values_, 1));
 }
 
 void ShiftedSystem::solve(Eigen::Ref<Eigen::VectorXd> x, int refinements) {

@@ -24,7 +24,7 @@ class ShiftedSystem {
   StageMatrix matrix_;
   double gamma_ = 0;
   Eigen::Index half_;
-  Eigen::MatrixXd r_;
+  Eigen::MatrixXd one_ = Eigen::MatrixXd::Ones(1, 1), r_;
   Eigen::VectorXd y_;
 };
 
