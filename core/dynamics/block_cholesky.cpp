@@ -2,10 +2,18 @@
 
 #include <algorithm>
 
+#include "core/dynamics/pairs.hpp"
+
 namespace mbsopt {
 namespace {
 
-// Lower triangle of A -> W = inv(L), unit lower, and the inverse of D, with A = L D L'; false where D is not positive.
+using Six = Column<3>;
+
+const double* column(const Mat<6, 6>& A, int j) { return A.data() + 6 * j; }
+double* column(Mat<6, 6>& A, int j) { return A.data() + 6 * j; }
+
+// Lower triangle of A -> below the diagonal of W = inv(L), unit lower, else zeros, and the inverse of D, with
+// A = L D L'; false where D is not positive.
 bool factor_diagonal(Mat<6, 6>& A, Vec<6>& inverse) {
   for (int j = 0; j < 6; ++j) {
     if (!(A(j, j) > 0)) return false;
@@ -26,24 +34,32 @@ bool factor_diagonal(Mat<6, 6>& A, Vec<6>& inverse) {
     }
     for (int i = j + 1; i < 6; ++i) A(i, j) = w[i];
   }
+  for (int j = 0; j < 6; ++j) {
+    for (int i = 0; i <= j; ++i) A(i, j) = 0;
+  }
   return true;
 }
 
-// M = B W', column by column.
-void times_transposed(const Mat<6, 6>& B, const Mat<6, 6>& W, Mat<6, 6>& M) {
-  for (int j = 0; j < 6; ++j) {
-    Vec<6> column = B.col(j);
-    for (int k = 0; k < j; ++k) column += W(j, k) * B.col(k);
-    M.col(j) = column;
+// LD = A W',  A = LD inv(D), column by column from the last.
+void divide(const Mat<6, 6>& W, const Vec<6>& inverse, Mat<6, 6>& A, Mat<6, 6>& LD) {
+#pragma GCC unroll 6
+  for (int j = 5; j >= 0; --j) {
+    Six sum(column(A, j));
+#pragma GCC unroll 6
+    for (int k = 0; k < j; ++k) sum.add(W(j, k), column(A, k));
+    sum.store(column(LD, j));
+    sum.scale(inverse(j));
+    sum.store(column(A, j));
   }
 }
 
 // C -= A B'
 void subtract_product(const Mat<6, 6>& A, const Mat<6, 6>& B, Mat<6, 6>& C) {
   for (int j = 0; j < 6; ++j) {
-    Vec<6> column = C.col(j);
-    for (int k = 0; k < 6; ++k) column -= B(j, k) * A.col(k);
-    C.col(j) = column;
+    Six sum(column(C, j));
+#pragma GCC unroll 6
+    for (int k = 0; k < 6; ++k) sum.subtract(B(j, k), column(A, k));
+    sum.store(column(C, j));
   }
 }
 
@@ -81,6 +97,40 @@ void subtract_transposed_times(const Mat<6, 6>& L, const X& x, X& y) {
   }
 }
 
+// The same of one vector, in pairs.
+Vec<6> times(const Mat<6, 6>& W, const Vec<6>& b) {
+  Six sum(b.data());
+  sum.add<0>(b(0), column(W, 0));
+  sum.add<1>(b(1), column(W, 1));
+  sum.add<1>(b(2), column(W, 2));
+  sum.add<2>(b(3), column(W, 3));
+  sum.add<2>(b(4), column(W, 4));
+  Vec<6> y;
+  sum.store(y.data());
+  return y;
+}
+Vec<6> transposed_times(const Mat<6, 6>& W, const Vec<6>& b) {
+  const Six x(b.data());
+  Six sum = x;
+  sum.x[0] += sums(x.times<0>(column(W, 0)), x.times<1>(column(W, 1)));
+  sum.x[1] += sums(x.times<1>(column(W, 2)), x.times<2>(column(W, 3)));
+  sum.x[2] += sums(x.times<2>(column(W, 4)), Pair{0, 0});
+  Vec<6> y;
+  sum.store(y.data());
+  return y;
+}
+void subtract_times(const Mat<6, 6>& L, const Vec<6>& x, Vec<6>& y) {
+  Six sum(y.data());
+  for (int j = 0; j < 6; ++j) sum.subtract(x(j), column(L, j));
+  sum.store(y.data());
+}
+void subtract_transposed_times(const Mat<6, 6>& L, const Vec<6>& b, Vec<6>& y) {
+  const Six x(b.data());
+  Six sum(y.data());
+  for (int j = 0; j < 3; ++j) sum.x[j] -= sums(x.times(column(L, 2 * j)), x.times(column(L, 2 * j + 1)));
+  sum.store(y.data());
+}
+
 }  // namespace
 
 BlockCholesky::BlockCholesky(int bodies, std::span<const std::pair<int, int>> edges) : elimination_(bodies, edges) {
@@ -108,11 +158,7 @@ bool BlockCholesky::factor() {
     Vec<6>& inverse = inverse_[k];
     if (!factor_diagonal(W, inverse)) return false;
     const std::vector<Elimination::Entry>& column = elimination_.columns[k];
-    for (std::size_t e = 0; e < column.size(); ++e) {
-      Block &L = lower_[column[e].block], &LD = scaled_[e];
-      times_transposed(L, W, LD);
-      for (int j = 0; j < 6; ++j) L.col(j) = inverse(j) * LD.col(j);
-    }
+    for (std::size_t e = 0; e < column.size(); ++e) divide(W, inverse, lower_[column[e].block], scaled_[e]);
     for (const Elimination::Update& u : elimination_.updates[k]) {
       subtract_product(scaled_[u.i], lower_[column[u.j].block], u.diagonal ? diagonal_[u.target] : lower_[u.target]);
     }

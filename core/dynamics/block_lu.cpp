@@ -4,56 +4,26 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "core/dynamics/pairs.hpp"
+
 namespace mbsopt {
 namespace {
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
-// Columns are padded to an even length, with zeros, and treated as pairs: GCC's and Clang's vector types, which need
-// no particular processor.
-using Pair = double __attribute__((vector_size(16), aligned(8), may_alias));
+// Columns are padded to an even length, with zeros.
 template <int N>
 constexpr int kPairs = (N + 1) / 2;
 template <int N>
 constexpr int kStride = 2 * kPairs<N>;
 
-template <int N>
-Pair* pairs(double* x) {
-  return reinterpret_cast<Pair*>(x);
-}
-template <int N>
-const Pair* pairs(const double* x) {
-  return reinterpret_cast<const Pair*>(x);
-}
-
-// A column held in registers.
-template <int N>
-struct Column {
-  Pair x[kPairs<N>];
-  explicit Column(const double* from) {
-#pragma GCC unroll 16
-    for (int i = 0; i < kPairs<N>; ++i) x[i] = pairs<N>(from)[i];
-  }
-  void subtract(double s, const double* y) {
-    const Pair ss = {s, s};
-#pragma GCC unroll 16
-    for (int i = 0; i < kPairs<N>; ++i) x[i] -= ss * pairs<N>(y)[i];
-  }
-  void scale(double s) {
-    const Pair ss = {s, s};
-#pragma GCC unroll 16
-    for (int i = 0; i < kPairs<N>; ++i) x[i] *= ss;
-  }
-  void store(double* to) const {
-#pragma GCC unroll 16
-    for (int i = 0; i < kPairs<N>; ++i) pairs<N>(to)[i] = x[i];
-  }
-};
+Pair* pairs(double* x) { return reinterpret_cast<Pair*>(x); }
+const Pair* pairs(const double* x) { return reinterpret_cast<const Pair*>(x); }
 
 template <int N>
 double dot(const double* x, const double* y) {
   Pair sum = {0, 0};
-  for (int i = 0; i < kPairs<N>; ++i) sum += pairs<N>(x)[i] * pairs<N>(y)[i];
+  for (int i = 0; i < kPairs<N>; ++i) sum += pairs(x)[i] * pairs(y)[i];
   return sum[0] + sum[1];
 }
 
@@ -61,7 +31,7 @@ double dot(const double* x, const double* y) {
 template <int N>
 void subtract_product(const double* A, const double* B, double* C) {
   for (int c = 0; c < N; ++c) {
-    Column<N> column(C + c * kStride<N>);
+    Column<kPairs<N>> column(C + c * kStride<N>);
     for (int k = 0; k < N; ++k) column.subtract(B[c + k * kStride<N>], A + k * kStride<N>);
     column.store(C + c * kStride<N>);
   }
@@ -87,7 +57,7 @@ bool factor_diagonal(double* D, int* exchanged, double* inverse) {
     for (int c = j + 1; c < N; ++c) {
       double* other = D + c * kStride<N>;
       const Pair s = {other[j], other[j]};
-      for (int i = (j + 1) / 2; i < kPairs<N>; ++i) pairs<N>(other)[i] -= s * pairs<N>(l)[i];
+      for (int i = (j + 1) / 2; i < kPairs<N>; ++i) pairs(other)[i] -= s * pairs(l)[i];
     }
   }
   return true;
@@ -97,7 +67,7 @@ bool factor_diagonal(double* D, int* exchanged, double* inverse) {
 template <int N>
 void divide_by_upper(const double* D, const double* inverse, double* X) {
   for (int j = 0; j < N; ++j) {
-    Column<N> column(X + j * kStride<N>);
+    Column<kPairs<N>> column(X + j * kStride<N>);
     for (int k = 0; k < j; ++k) column.subtract(D[k + j * kStride<N>], X + k * kStride<N>);
     column.scale(inverse[j]);
     column.store(X + j * kStride<N>);
@@ -113,7 +83,7 @@ void divide_by_lower_transposed(const double* D, const int* exchanged, double* X
     }
   }
   for (int j = 0; j < N; ++j) {
-    Column<N> column(X + j * kStride<N>);
+    Column<kPairs<N>> column(X + j * kStride<N>);
     for (int k = 0; k < j; ++k) column.subtract(D[j + k * kStride<N>], X + k * kStride<N>);
     column.store(X + j * kStride<N>);
   }
@@ -122,7 +92,7 @@ void divide_by_lower_transposed(const double* D, const int* exchanged, double* X
 // y -= A x,  y -= A'x
 template <int N>
 void subtract_times(const double* A, const double* x, double* y) {
-  Column<N> sum(y);
+  Column<kPairs<N>> sum(y);
   for (int k = 0; k < N; ++k) sum.subtract(x[k], A + k * kStride<N>);
   sum.store(y);
 }

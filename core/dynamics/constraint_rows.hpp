@@ -2,9 +2,11 @@
 // that several constraints share (a gear) has several blocks.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "core/dynamics/block_cholesky.hpp"
+#include "core/dynamics/pairs.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 
 namespace mbsopt {
@@ -18,6 +20,24 @@ class ConstraintRows {
   void evaluate(const std::vector<Frame>& frames);  // J at the frames' positions
 
   // y += J x; x: 6 numbers (or lanes of them) per moving body, body i at x[i - 1].
+  void add_times(const std::vector<Vec<6>>& x, Eigen::VectorXd& y) const {
+    for (const RowGroup& g : data_->groups) {
+      if (g.body1 > 0 && g.body2 > 0) {
+        const Column<3> x1(x[at(g.body1)].data()), x2(x[at(g.body2)].data());
+        for (int r = 0; r < g.rows; ++r) {
+          const Pair sum = x1.times(row(J1, g.block + r)) + x2.times(row(J2, g.block + r));
+          y(g.row + r) += sum[0] + sum[1];
+        }
+      } else if (g.body1 > 0 || g.body2 > 0) {
+        const Rows& J = g.body1 > 0 ? J1 : J2;
+        const Column<3> moving(x[at(std::max(g.body1, g.body2))].data());
+        for (int r = 0; r < g.rows; ++r) {
+          const Pair sum = moving.times(row(J, g.block + r));
+          y(g.row + r) += sum[0] + sum[1];
+        }
+      }
+    }
+  }
   template <class X, class Y>
   void add_times(const std::vector<X>& x, Y& y) const {
     for (const RowGroup& g : data_->groups) {
@@ -30,6 +50,16 @@ class ConstraintRows {
     }
   }
   // x -= J'lambda
+  void subtract_transposed_times(const Eigen::VectorXd& lambda, std::vector<Vec<6>>& x) const {
+    const auto subtract = [&](int body, const Rows& J, const RowGroup& g) {
+      if (body == 0) return;
+      double* to = x[at(body)].data();
+      Column<3> sum(to);
+      for (int r = 0; r < g.rows; ++r) sum.subtract(lambda(g.row + r), row(J, g.block + r));
+      sum.store(to);
+    };
+    for (const RowGroup& g : data_->groups) subtract(g.body1, J1, g), subtract(g.body2, J2, g);
+  }
   template <class X, class Y>
   void subtract_transposed_times(const Y& lambda, std::vector<X>& x) const {
     for (const RowGroup& g : data_->groups) {
@@ -55,6 +85,8 @@ class ConstraintRows {
     int first = 0, last = 3;
   };
   const Columns& columns(int block) const { return columns_[static_cast<std::size_t>(block)]; }
+
+  static const double* row(const Rows& J, int block) { return J.data() + 6 * block; }
 
   // Written out, on copies: the compiler unrolls these and keeps them in registers, and does neither with Eigen's
   // products with a row of a dynamic matrix.
