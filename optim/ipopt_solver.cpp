@@ -54,7 +54,7 @@ class Adapter : public Ipopt::TNLP {
   bool get_nlp_info(Index& n, Index& m, Index& nnz_jac, Index& nnz_hess, IndexStyleEnum& style) override {
     n = static_cast<Index>(problem_.variables());
     m = static_cast<Index>(problem_.constraints());
-    nnz_jac = n * m, nnz_hess = options_.exact_hessian ? n * (n + 1) / 2 : 0;
+    nnz_jac = n * m, nnz_hess = options_.second_order ? n * (n + 1) / 2 : 0;
     style = C_STYLE;
     return true;
   }
@@ -266,10 +266,10 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
   Ipopt::OptionsList& list = *application.Options();
   list.SetIntegerValue("print_level", 0);
   list.SetStringValue("sb", "yes");  // no banner
-  list.SetStringValue("hessian_approximation", options.exact_hessian ? "exact" : "limited-memory");
+  list.SetStringValue("hessian_approximation", options.second_order ? "exact" : "limited-memory");
   list.SetIntegerValue("limited_memory_max_history", options.history);
   // Newton's steps converge faster than the barrier falls from its usual 0.1; BFGS needs that time to learn.
-  if (options.exact_hessian) list.SetNumericValue("mu_init", 1e-3);
+  if (options.second_order) list.SetNumericValue("mu_init", 1e-3);
   list.SetStringValue("nlp_scaling_method", "user-scaling");
   list.SetStringValue("mu_strategy",
                       "monotone");                // "adaptive" leaps away from good points of problems with many minima
@@ -292,8 +292,8 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
 
 NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const IpoptOptions& options) {
   NlpResult result;
-  result.algorithm = options.exact_hessian
-                         ? "Ipopt: interior point, exact Hessian"
+  result.algorithm = options.second_order
+                         ? "Ipopt: interior point, Hessians of the problem"
                          : fmt::format("Ipopt: interior point, limited-memory BFGS of {} pairs", options.history);
   Adapter* const adapter = new Adapter(problem, x_start, options, result);
   const Ipopt::SmartPtr<Ipopt::TNLP> owner(adapter);
