@@ -326,6 +326,7 @@ TEST_CASE("resume: a single identification goes on from its journal, its profile
   std::vector<std::string> contents;
   for (const std::string& name : files) contents.push_back(content_of(out / name));
   const std::string journal = content_of(out / kJournalFile);
+  const long simulations = json_of(out / "result.json").at("optimizer").at("simulations");
   const long residuals = journal_lines(out, "residuals"), iterates = journal_lines(out, "iterate");
   CHECK(iterates == whole.at("optimizer").at("iterations").get<long>() + 1);
   CHECK(residuals > whole.at("optimizer").at("evaluations").get<long>());  // and those of the profile
@@ -341,7 +342,7 @@ TEST_CASE("resume: a single identification goes on from its journal, its profile
     INFO(outcome.err);
     REQUIRE(outcome.exit_code == kDone);
     CHECK(outcome_of(out) == whole);
-    CHECK(json_of(out / "result.json").at("optimizer").at("simulations") == residuals - known);
+    CHECK(json_of(out / "result.json").at("optimizer").at("simulations") == simulations - known);
     for (std::size_t i = 0; i < files.size(); ++i) CHECK(content_of(out / files[i]) == contents[i]);
     CHECK(journal_lines(out, "residuals") == residuals);  // only what was missing has been computed
     CHECK(journal_lines(out, "iterate") == iterates);
