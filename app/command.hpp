@@ -8,6 +8,8 @@
 
 namespace mbsopt {
 
+struct Ranks;
+
 struct CommandOptions {
   std::string problem_file;
   std::string out;                    // --out; empty: out/<name>/
@@ -27,6 +29,7 @@ struct CommandContext {
   std::ostream& out;             // results
   std::ostream& err;             // progress and errors
   bool err_is_terminal = false;  // a bar may be drawn
+  Ranks* ranks = nullptr;        // other processes that compute for this one, under mpirun
 };
 
 int validate_command(const CommandContext& context);

@@ -147,8 +147,8 @@ CommandOptions options_of(const std::vector<std::string>& arguments) {
   return options;
 }
 
-int run_command_line(const std::vector<std::string>& given, std::ostream& out, std::ostream& err,
-                     bool err_is_terminal) {
+int run_command_line(const std::vector<std::string>& given, std::ostream& out, std::ostream& err, bool err_is_terminal,
+                     Ranks* ranks) {
   const std::vector<std::string> arguments = without_help_command(given);
   if (!arguments.empty() && !is_known(arguments[0])) {
     err << fmt::format("mbsopt: {}; available: {}\n", what_is_wrong_with(arguments[0]), joined(command_names()));
@@ -158,7 +158,7 @@ int run_command_line(const std::vector<std::string>& given, std::ostream& out, s
   app.set_version_flag("--version", "mbsopt " + program_version());
   app.footer("mbsopt help COMMAND, or mbsopt COMMAND --help, lists a command's options.");
   app.failure_message(CLI::FailureMessage::simple);
-  CommandContext context{"", arguments, {}, out, err, err_is_terminal};
+  CommandContext context{"", arguments, {}, out, err, err_is_terminal, ranks};
   add_commands(app, context.options);
   try {
     parse(app, arguments);

@@ -8,12 +8,14 @@
 namespace mbsopt {
 
 struct CommandOptions;
+struct Ranks;
 
 // What was typed, without the program's name, as options; throws std::invalid_argument where it makes no sense.
 CommandOptions options_of(const std::vector<std::string>& arguments);
 
-// Runs one command in this process and returns its exit code. arguments: without the program's name.
+// Runs one command in this process and returns its exit code. arguments: without the program's name; ranks: those that
+// may help (not owned).
 int run_command_line(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err,
-                     bool err_is_terminal = false);
+                     bool err_is_terminal = false, Ranks* ranks = nullptr);
 
 }  // namespace mbsopt

@@ -66,6 +66,14 @@ Problem at_start(Problem problem, int start, const Eigen::VectorXd& values) {
   return problem;
 }
 
+// The problem of each start.
+std::function<Problem(int)> starts_of(const Problem& problem) {
+  const MultistartSpec& spec = *problem.design->multistart;
+  return [problem, values = start_values(designed(problem), spec, *spec.seed)](int start) {
+    return at_start(problem, start, values[static_cast<std::size_t>(start)]);
+  };
+}
+
 // In a worker process: the run from one start, with the points it computed, from which the best run is told again.
 Json record_of_start(const Problem& problem, const NlpScale& scale, int start) {
   Json points = Json::array(), hessians = Json::array();
@@ -119,15 +127,21 @@ void describe_given(const Problem& problem, const Eigen::VectorXd& before, Desig
   for (DesignConstraint& c : design.constraints) c.initial = value_before(c.objective);
 }
 
+// problem: with its seeds.
+Json task_of(const Problem& problem, const NlpScale& scale) {
+  Json task{{"seed", *problem.design->multistart->seed}, {"scale", {{"f", scale.f}, {"c", numbers(scale.c)}}}};
+  if (problem.design->optimizer.seed) task["optimizer_seed"] = *problem.design->optimizer.seed;
+  return task;
+}
+
 DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& problem, const Eigen::VectorXd& before) {
   const MultistartSpec& spec = *problem.design->multistart;
-  const std::vector<Eigen::VectorXd> starts = start_values(designed(problem), spec, *spec.seed);
-  const auto from = [&](int start) { return at_start(problem, start, starts[static_cast<std::size_t>(start)]); };
+  const auto from = starts_of(problem);
   DesignOptions until_interrupted;
   until_interrupted.simulation_progress = [](double) { return !interrupted(); };
   const NlpScale scale = design_scale(from(0), until_interrupted);
   const MultistartOutcome outcome =
-      run_multistart(run, long_run, spec, [&](int start) { return record_of_start(from(start), scale, start); });
+      run_multistart(run, long_run, spec, design_start_work(problem, task_of(problem, scale)));
   const Json* const best = outcome.best();
   DesignOutcome result;
   result.interrupted = outcome.interrupted;
@@ -138,6 +152,15 @@ DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& problem
 }
 
 }  // namespace
+
+StartWork design_start_work(Problem problem, const Json& task) {
+  problem.design->multistart->seed = task.at("seed").get<long>();
+  if (task.contains("optimizer_seed")) problem.design->optimizer.seed = task["optimizer_seed"].get<long>();
+  const std::vector<double> c = task.at("scale").at("c").get<std::vector<double>>();
+  const NlpScale scale{task["scale"].at("f").get<double>(),
+                       Eigen::Map<const Eigen::VectorXd>(c.data(), static_cast<Eigen::Index>(c.size()))};
+  return {task, [from = starts_of(problem), scale](int start) { return record_of_start(from(start), scale, start); }};
+}
 
 DesignOutcome minimised(Run& run, const Eigen::VectorXd& before) {
   LongRun long_run(run);

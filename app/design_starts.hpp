@@ -2,6 +2,7 @@
 #pragma once
 
 #include "app/long_run.hpp"
+#include "app/start_workers.hpp"
 #include "optim/design.hpp"
 
 namespace mbsopt {
@@ -13,5 +14,8 @@ struct DesignOutcome {
 
 // before: the objectives at the given values, in the problem's order.
 DesignOutcome minimised(Run& run, const Eigen::VectorXd& before);
+
+// The starts of its multistart, from the task that this process or another one has made.
+StartWork design_start_work(Problem problem, const Json& task);
 
 }  // namespace mbsopt

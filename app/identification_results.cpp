@@ -152,7 +152,7 @@ void add_to_result(Json& result, const IdentificationResult& fit) {
   result["parameters"] = Json::object();
   for (const FittedParameter& p : fit.parameters) {
     result["parameters"][p.name] = to_json(p);
-    result["correlation"]["names"].push_back(p.name);
+    if (fit.statistics.correlation.size() > 0) result["correlation"]["names"].push_back(p.name);
   }
   for (Eigen::Index i = 0; i < fit.statistics.correlation.rows(); ++i) {
     const Eigen::VectorXd row = fit.statistics.correlation.row(i);

@@ -7,6 +7,7 @@
 #include "app/optimized_problem.hpp"
 #include "app/report/motion_plots.hpp"
 #include "app/report/run_report.hpp"
+#include "app/residual_records.hpp"
 #include "app/run.hpp"
 #include "core/dynamics/assembly.hpp"
 #include "optim/identification.hpp"
@@ -41,13 +42,21 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
   return plots;
 }
 
-IdentificationResult fitted(Run& run, const Problem& problem, const std::vector<CsvTable>& data) {
+IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem, const std::vector<CsvTable>& data) {
+  JsonResidualRecords records(long_run.earlier().residuals,
+                              [&](const Json& content) { long_run.journal().add("residuals", content); });
   IdentificationOptions options;
+  options.records = &records;
   options.profiles = run.context.options.profiles;
   options.simulation_progress = [](double) { return !interrupted(); };
   options.progress = [&](const FitRow& row) {
     run.progress.iteration(fmt::format("iteration {:3d}   cost {:.9e}   gradient {:.1e}   step {:.1e}", row.iteration,
                                        row.cost, row.gradient_norm, row.step_norm));
+    if (row.iteration > long_run.earlier().last_iteration)
+      long_run.journal().add("iterate",
+                             {{"iteration", row.iteration},
+                              {"cost", row.cost},
+                              {"parameters", std::vector<double>(row.parameters.begin(), row.parameters.end())}});
     return !interrupted();
   };
   options.profile_progress = [&](const std::string& name, double value, double tau) {
@@ -77,10 +86,7 @@ int identify_command(const CommandContext& context) {
   if (!run.problem.identification) {
     throw std::invalid_argument("identification: missing; it says which measurements to explain and what may change");
   }
-  std::vector<CsvTable> data;
-  for (const ExperimentSpec& experiment : run.problem.identification->experiments) {
-    data.push_back(read_csv(experiment.data));
-  }
+  const std::vector<CsvTable> data = data_of(run.problem);
   const Mechanism mechanism(scene, parameter_values(scene));
   run.start();
   // Experiments have their own overrides: where the scene itself does not assemble, they still may.
@@ -92,13 +98,14 @@ int identify_command(const CommandContext& context) {
   const Problem problem = from_best_start(run, long_run, data);
   if (interrupted() && run.problem.identification->multistart) return stopped_within_starts(run, long_run, problem);
   long_run.begin();
-  const IdentificationResult fit = fitted(run, problem, data);
+  const IdentificationResult fit = fitted(run, long_run, problem, data);
   long_run.end(fit.status == SolverStatus::stopped ? "interrupted" : fit.ok() ? "ok" : "failed");
   add_to_result(run.result, fit);
   print_fit(context.out, fit);
   const Trajectory history = history_of(fit);
   if (fit.status == SolverStatus::stopped) {
-    run.stopped("optimized.json holds the best fit so far");
+    run.stopped(fmt::format("optimized.json holds the best fit so far; 'mbsopt resume {}' goes on",
+                            run.folder.path().string()));
   } else if (!fit.ok()) {
     run.failed(fit.message);
   }

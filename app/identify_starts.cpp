@@ -61,20 +61,35 @@ Problem at_fit(const Problem& problem, const Json& record) {
   return fitted;
 }
 
+StartWork start_work(const Problem& problem, const std::vector<CsvTable>& data, long seed) {
+  const MultistartSpec& spec = *problem.identification->multistart;
+  return {{{"seed", seed}}, [problem, data, starts = start_values(shared_parameters(problem), spec, seed)](int start) {
+            const Eigen::VectorXd& values = starts[static_cast<std::size_t>(start)];
+            const Json named = named_values(problem.identification->variables, {values.begin(), values.end()});
+            return record_of_start(with_values(problem, named), data, start);
+          }};
+}
+
 }  // namespace
+
+std::vector<CsvTable> data_of(const Problem& problem) {
+  std::vector<CsvTable> data;
+  for (const ExperimentSpec& experiment : problem.identification->experiments)
+    data.push_back(read_csv(experiment.data));
+  return data;
+}
+
+StartWork identify_start_work(const Problem& problem, const Json& task) {
+  return start_work(problem, data_of(problem), task.at("seed").get<long>());
+}
 
 Problem from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data) {
   const Problem& problem = run.problem;
   if (!problem.identification->multistart) return problem;
   MultistartSpec spec = *problem.identification->multistart;
   spec.seed = long_run.seed("multistart", spec.seed);
-  const std::vector<std::string>& names = problem.identification->variables;
-  const std::vector<Eigen::VectorXd> starts = start_values(shared_parameters(problem), spec, *spec.seed);
   long_run.begin();
-  const MultistartOutcome outcome = run_multistart(run, long_run, spec, [&](int start) {
-    const Eigen::VectorXd& values = starts[static_cast<std::size_t>(start)];
-    return record_of_start(with_values(problem, named_values(names, {values.begin(), values.end()})), data, start);
-  });
+  const MultistartOutcome outcome = run_multistart(run, long_run, spec, start_work(problem, data, *spec.seed));
   return outcome.best() ? at_fit(problem, *outcome.best()) : with_values(problem, Json::object());
 }
 

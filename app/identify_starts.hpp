@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "app/long_run.hpp"
+#include "app/start_workers.hpp"
 #include "optim/csv_table.hpp"
 #include "optim/identification.hpp"
 
@@ -13,6 +14,12 @@ namespace mbsopt {
 // The given problem where no multistart is asked for. Shared variables are spread over their bounds; parameters that
 // are free in an experiment begin at their given values.
 Problem from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data);
+
+// The starts, from the task that this process or another one has made.
+StartWork identify_start_work(const Problem& problem, const Json& task);
+
+// The records of the experiments, in their order.
+std::vector<CsvTable> data_of(const Problem& problem);
 
 // Ends a run that was interrupted before the fit proper began; best: from_best_start(). Returns the exit code.
 int stopped_within_starts(Run& run, LongRun& long_run, const Problem& best);

@@ -27,4 +27,6 @@ InterruptGuard::~InterruptGuard() {
 
 bool interrupted() { return flag != 0; }
 
+void interrupt() { flag = 1; }
+
 }  // namespace mbsopt

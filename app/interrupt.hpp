@@ -14,5 +14,6 @@ class InterruptGuard {
 };
 
 bool interrupted();
+void interrupt();  // as if a signal had come
 
 }  // namespace mbsopt

@@ -51,6 +51,8 @@ JournalContent read_journal(const std::filesystem::path& folder) {
       content.points.push_back(line["point"]);
     } else if (line.contains("hessians")) {
       content.hessians.push_back(line["hessians"]);
+    } else if (line.contains("residuals")) {
+      content.residuals.push_back(line["residuals"]);
     } else if (line.contains("start")) {
       content.starts.push_back(line["start"]);
     } else if (line.contains("iterate")) {

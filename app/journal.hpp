@@ -4,6 +4,7 @@
 //   {"journal": 1, "command": "design", "input": "../five_bar.json", ...}    the first line: what is run, and on what
 //   {"point": {"x": [...], "f": 0.12, "f_x": [...], ...}}                    an evaluation   (point_records.hpp)
 //   {"hessians": {...}}                                                      second derivatives
+//   {"residuals": {...}}                                                     an experiment   (residual_records.hpp)
 //   {"iterate": {"iteration": 3, "objective": ..., "parameters": {...}}}     accepted by the optimiser
 //   {"start": {"start": 7, "status": "converged", ...}}                      a finished start of a multistart
 //   {"ended": "ok"}                                                          the status of result.json
@@ -25,7 +26,7 @@ inline constexpr const char* kJournalFile = "journal.jsonl";
 // Lines after the first. A last line that was cut off is none.
 struct JournalContent {
   Json header;
-  std::vector<Json> points, hessians, starts;
+  std::vector<Json> points, hessians, residuals, starts;
   int last_iteration = -1;
   std::string ended;  // empty: it did not end by itself
 };

@@ -1,9 +1,25 @@
 #include <unistd.h>
 
+#include <exception>
 #include <iostream>
 
 #include "app/command_line.hpp"
+#include "app/exit_code.hpp"
+#include "app/mpi_ranks.hpp"
+#include "app/start_workers.hpp"
 
 int main(int argc, char** argv) {
-  return mbsopt::run_command_line({argv + 1, argv + argc}, std::cout, std::cerr, isatty(STDERR_FILENO) == 1);
+  using namespace mbsopt;
+  std::unique_ptr<Ranks> ranks;
+  try {
+    ranks = mpi_ranks();
+  } catch (const std::exception& error) {
+    std::cerr << "mbsopt: " << error.what() << '\n';
+    return kBadInput;
+  }
+  if (ranks && ranks->rank() > 0) return serve(*ranks);
+  const int exit_code =
+      run_command_line({argv + 1, argv + argc}, std::cout, std::cerr, isatty(STDERR_FILENO) == 1, ranks.get());
+  if (ranks) dismiss(*ranks);
+  return exit_code;
 }

@@ -5,13 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
-#include <thread>
 #include <tuple>
 
 #include "app/interrupt.hpp"
 #include "app/text_table.hpp"
 #include "core/expression/counted.hpp"
-#include "optim/process_pool.hpp"
 
 namespace mbsopt {
 namespace {
@@ -30,11 +28,6 @@ std::tuple<int, double, double, int> rank(const Json& record) {
   const double violation = record.value("infeasibility", 0.0), objective = record["objective"].get<double>();
   if (violation <= kFeasible) return {0, objective, 0, number_of(record)};
   return {1, violation, objective, number_of(record)};
-}
-
-int workers_of(const Run& run) {
-  const int asked = run.context.options.threads;
-  return asked > 0 ? asked : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 }
 
 Json record_of(const JobReply& reply) {
@@ -106,8 +99,7 @@ Problem with_values(Problem problem, const Json& values) {
   return problem;
 }
 
-MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSpec& spec,
-                                 const std::function<Json(int)>& work) {
+MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSpec& spec, const StartWork& work) {
   MultistartOutcome outcome;
   std::set<int> finished;
   for (const Json& record : long_run.earlier().starts) {
@@ -128,8 +120,7 @@ MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSp
     run.progress.iteration(fmt::format("start {:3d}   {}   objective {}   {} of {} finished", reply.job, status,
                                        text_of(record, "objective"), outcome.ranked.size(), spec.starts));
   };
-  run_in_processes(
-      jobs, workers_of(run), [&](int start) { return work(start).dump(); }, done, [] { return !interrupted(); });
+  compute_starts(run, jobs, work, done);
   run.progress.finish();
   outcome.interrupted = outcome.interrupted || outcome.ranked.size() < static_cast<std::size_t>(spec.starts);
   std::sort(outcome.ranked.begin(), outcome.ranked.end(),

@@ -1,5 +1,5 @@
-// A multistart: one record per start, computed in worker processes, ranked. What a start is, the caller says; a record
-// holds at least
+// A multistart: one record per start, computed in worker processes (start_workers.hpp), ranked. What a start is, the
+// caller says; a record holds at least
 //
 //   {"start": 7, "status": "converged", "message": "...", "objective": 0.12, "infeasibility": 0, "iterations": 9,
 //    "evaluations": 12, "from": {"k1": 100}, "parameters": {"k1": 87}}
@@ -8,11 +8,11 @@
 // workers: the records are ranked by what they hold, ties by the number of the start.
 #pragma once
 
-#include <functional>
 #include <vector>
 
 #include "app/long_run.hpp"
 #include "app/result_json.hpp"
+#include "app/start_workers.hpp"
 #include "optim/problem.hpp"
 
 namespace mbsopt {
@@ -24,8 +24,7 @@ struct MultistartOutcome {
 };
 
 // spec.seed must be there. Puts "multistart" into the result and prints the waterfall.
-MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSpec& spec,
-                                 const std::function<Json(int start)>& work);
+MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSpec& spec, const StartWork& work);
 
 // Parameter values by name.
 Json named_values(const std::vector<std::string>& names, const std::vector<double>& values);

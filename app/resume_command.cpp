@@ -25,7 +25,8 @@ int resume_command(const CommandContext& context) {
   options.problem_file = (folder / journal.header.at("input").get<std::string>()).lexically_normal().string();
   options.out = folder.string();
   options.resume = true;
-  const CommandContext again{command, arguments, options, context.out, context.err, context.err_is_terminal};
+  const CommandContext again{command,      arguments, options, context.out, context.err, context.err_is_terminal,
+                             context.ranks};
   if (command == "design") return design_command(again);
   if (command == "identify") return identify_command(again);
   throw std::invalid_argument(

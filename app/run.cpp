@@ -12,6 +12,14 @@
 namespace mbsopt {
 namespace {
 
+int exit_code_of(const std::string& status) {
+  if (status == "failed") return kNumericalFailure;
+  if (status == "disagrees") return kCheckFailed;
+  return status == "interrupted" ? kInterrupted : kDone;
+}
+
+}  // namespace
+
 std::vector<std::string> data_files(const Problem& problem) {
   std::vector<std::string> files;
   const auto add = [&](const std::optional<SampledLaw>& law) {
@@ -25,14 +33,6 @@ std::vector<std::string> data_files(const Problem& problem) {
   }
   return files;
 }
-
-int exit_code_of(const std::string& status) {
-  if (status == "failed") return kNumericalFailure;
-  if (status == "disagrees") return kCheckFailed;
-  return status == "interrupted" ? kInterrupted : kDone;
-}
-
-}  // namespace
 
 Run::Run(const CommandContext& given)
     : context(given),

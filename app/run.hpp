@@ -57,6 +57,9 @@ class Run {
   bool running_ = false;
 };
 
+// The data files that a problem names.
+std::vector<std::string> data_files(const Problem& problem);
+
 // The model at its assembled start into the result and onto standard output. False where the assembly failed, which
 // then is how the run ended.
 bool assembled(Run& run, const Assembly& assembly);

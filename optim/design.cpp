@@ -49,6 +49,8 @@ const DesignSpec& checked(const Problem& problem) {
   }
   if (const std::vector<DesignIssue> issues = optimizer_issues(spec, problem.scene); !issues.empty())
     throw std::invalid_argument(issues[0].path + ": " + issues[0].message);
+  if (const std::optional<DesignIssue> issue = curvature_issue(problem))
+    throw std::invalid_argument(issue->path + ": " + issue->message);
   return spec;
 }
 
@@ -133,10 +135,14 @@ NlpResult solved(DesignProgram& program, const Eigen::VectorXd& x_start, const O
     solver.constraint_tolerance = kConstraintTolerance;
     solver.max_iterations = static_cast<int>(spec.max_iterations.value_or(OptimizerSpec::kIpoptIterations));
     solver.max_evaluations = spec.max_evaluations;
-    solver.exact_hessian = spec.hessian == "exact";
+    solver.second_order = spec.hessian != "lbfgs";
     solver.progress = progress;
     solver.records = records;
-    return solve_with_ipopt(program, x_start, solver);
+    NlpResult solution = solve_with_ipopt(program, x_start, solver);
+    if (solver.second_order)
+      solution.algorithm = fmt::format("Ipopt: interior point, {} Hessian",
+                                       spec.hessian == "exact" ? "exact" : "generalised Gauss-Newton");
+    return solution;
   }
   NloptOptions solver;
   solver.method = spec.type;

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 
+#include "core/integrate/cvodes.hpp"
 #include "core/scene/scene_path.hpp"
 #include "optim/nlopt_methods.hpp"
+#include "optim/objective.hpp"
 
 namespace mbsopt {
 
@@ -25,6 +27,10 @@ std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& s
   const NloptMethod* const method = find_nlopt_method(optimizer.type);
   if (method && optimizer.hessian != "lbfgs")
     issues.push_back({path + ".hessian", "is of ipopt only; '" + optimizer.type + "' builds its own, if any"});
+  if (!method && optimizer.hessian != "lbfgs" && is_cvodes(scene.simulation.integrator.type))
+    issues.push_back({path + ".hessian", "is '" + optimizer.hessian +
+                                             "', which needs a run on given steps; simulation.integrator.type is '" +
+                                             scene.simulation.integrator.type + "', which cannot take them: 'lbfgs'"});
   if (optimizer.seed && !(method && method->random))
     issues.push_back({path + ".seed", "is given, but '" + optimizer.type + "' draws no random numbers"});
   if (method) {
@@ -44,6 +50,16 @@ std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& s
       issues.push_back(std::move(issue));
   }
   return issues;
+}
+
+std::optional<DesignIssue> curvature_issue(const Problem& problem) {
+  if (!problem.design || problem.design->optimizer.hessian != "gauss_newton") return std::nullopt;
+  const std::string& name = problem.design->minimize;
+  if (!objectives_of(problem, {name}).front().is_linear()) return std::nullopt;
+  return DesignIssue{"design.optimizer.hessian",
+                     "is 'gauss_newton', but '" + name +
+                         "' is linear in its sensors and parameters, which leaves nothing of its second derivatives; "
+                         "it is meant for squares (running, samples, rms_of) and extremes: take 'lbfgs' or 'exact'"};
 }
 
 }  // namespace mbsopt

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "optim/evaluated_points.hpp"
+#include "optim/gauss_newton.hpp"
 #include "optim/hessian.hpp"
 
 namespace mbsopt {
@@ -31,7 +32,8 @@ DesignProgram::DesignProgram(const DesignSpec& spec, Evaluator& evaluator, const
       scaling_(scaling),
       abandoned_(std::move(abandoned)),
       rho_(evaluator.start()),
-      size_(constraints()) {
+      size_(constraints()),
+      gauss_newton_(spec.optimizer.hessian == "gauss_newton") {
   x_lower = scaling.x_lower(), x_upper = scaling.x_upper();
   for (Index i = 0; i < constraints(); ++i) {
     const ObjectiveBound& bound = spec.subject_to[static_cast<std::size_t>(i)];
@@ -122,19 +124,34 @@ const Evaluation& DesignProgram::evaluation(const VectorXd& rho) {
   return best_.ok && best_.has_gradients() && best_.rho == rho ? best_ : evaluator_.gradients(rho);
 }
 
+// Of the evaluator's objectives, exact or by Gauss-Newton.
+bool DesignProgram::second_derivatives(const VectorXd& rho, std::vector<MatrixXd>& psi_rhorho) {
+  std::string failure;
+  bool ok = false;
+  if (gauss_newton_) {
+    const Evaluation at = evaluation(rho);
+    GaussNewton found = at.ok ? gauss_newton(evaluator_, at) : GaussNewton{false, at.message, {}};
+    ok = found.ok, failure = found.message, psi_rhorho = std::move(found.of);
+    ++hessian_gradients_;
+  } else {
+    const Hessians found = mbsopt::hessians(evaluator_, rho, for_steps());
+    ok = found.ok, failure = found.message;
+    for (const ObjectiveHessian& H : found.of) psi_rhorho.push_back(H.value);
+    hessian_gradients_ += found.gradients;
+  }
+  if (!ok && hessian_failure_.empty()) hessian_failure_ = failure;
+  return ok;
+}
+
 bool DesignProgram::hessians(const VectorXd& x, std::vector<MatrixXd>& H) {
   const VectorXd rho_x = scaling_.rho_x(x), rho_xx = scaling_.rho_xx(x), rho = rho_at(x);
-  const Hessians found = mbsopt::hessians(evaluator_, rho, for_steps());
-  hessian_gradients_ += found.gradients;
-  if (!found.ok) {
-    if (hessian_failure_.empty()) hessian_failure_ = found.message;
-    return false;
-  }
-  const MatrixXd psi_rho = evaluation(rho).psi_rho;
+  std::vector<MatrixXd> psi_rhorho;
+  if (!second_derivatives(rho, psi_rhorho)) return false;
+  const MatrixXd psi_rho = evaluation(rho).psi_rho;  // of Gauss-Newton rho(x) is a part of the motion
   H.clear();
   for (Index i = 0; i <= constraints(); ++i) {
-    MatrixXd of_x = rho_x.asDiagonal() * found.of[static_cast<std::size_t>(i)].value * rho_x.asDiagonal();
-    of_x.diagonal() += psi_rho.row(i).transpose().cwiseProduct(rho_xx);
+    MatrixXd of_x = rho_x.asDiagonal() * psi_rhorho[static_cast<std::size_t>(i)] * rho_x.asDiagonal();
+    if (!gauss_newton_) of_x.diagonal() += psi_rho.row(i).transpose().cwiseProduct(rho_xx);
     H.push_back(i == 0 ? of_x : MatrixXd(of_x / size_(i - 1)));
   }
   return true;

@@ -45,6 +45,7 @@ class DesignProgram : public NonlinearProgram {
 
  private:
   NlpScale scale_at(const Eigen::VectorXd& x_start);
+  bool second_derivatives(const Eigen::VectorXd& rho, std::vector<Eigen::MatrixXd>& psi_rhorho);
   void fill(const Evaluation& e, const Eigen::VectorXd& x, NlpPoint& point) const;
   void keep(const Evaluation& e);
   double violation_of(const Evaluation& e) const;
@@ -58,6 +59,7 @@ class DesignProgram : public NonlinearProgram {
   double best_f_ = 0, best_violation_ = 0;
   long hessian_gradients_ = 0;
   std::string hessian_failure_;
+  const bool gauss_newton_;
 };
 
 inline constexpr double kConstraintTolerance = 1e-8;  // relative to the size of the bounds: what counts as held

@@ -35,14 +35,26 @@ ExperimentStack::ExperimentStack(std::vector<Member> members, const std::vector<
   plain = static_cast<Eigen::Index>(priors_.size());
 }
 
+Experiment::Residuals ExperimentStack::residuals(const Member& member, const Eigen::VectorXd& u) {
+  ResidualRecords::Asked asked{member.experiment, u, {}};
+  Experiment::Residuals r;
+  if (records) {
+    for (std::size_t c = 0; c < member.model.channels(); ++c) asked.sigma.push_back(member.model.sigma(c));
+    if (records->recall(asked, r)) return r;
+  }
+  ++simulations_;
+  Experiment::Limits limits{go_on, {}};
+  if (member.most_steps > 0) limits.max_steps = kStepGrowth * member.most_steps;
+  r = member.model.residuals(u, limits);
+  if (records && r.ok) records->record(asked, r);
+  return r;
+}
+
 void ExperimentStack::evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) {
   const Eigen::VectorXd u = scaling_.to_rho(x), u_x = scaling_.rho_x(x);
   Eigen::Index row = 0;
   for (Member& m : members_) {
-    ++simulations_;
-    Experiment::Limits limits{go_on, {}};
-    if (m.most_steps > 0) limits.max_steps = kStepGrowth * m.most_steps;
-    const Experiment::Residuals r = m.model.residuals(u, limits);
+    const Experiment::Residuals r = residuals(m, u);
     if (!r.ok) {
       point.ok = false, point.message = r.message;
       return;

@@ -17,6 +17,19 @@
 
 namespace mbsopt {
 
+// Residuals that were computed in an earlier run, and a place where new ones are written down: a fit that was killed
+// goes on from there.
+struct ResidualRecords {
+  struct Asked {
+    std::size_t experiment;  // in the identification
+    const Eigen::VectorXd& u;
+    std::vector<double> sigma;  // per channel
+  };
+  virtual ~ResidualRecords() = default;
+  virtual bool recall(const Asked& asked, Experiment::Residuals& found) = 0;
+  virtual void record(const Asked& asked, const Experiment::Residuals& found) = 0;  // that are ok
+};
+
 class ExperimentStack : public LeastSquaresProblem {
  public:
   struct Member {
@@ -36,12 +49,15 @@ class ExperimentStack : public LeastSquaresProblem {
   Eigen::Index samples() const { return size - plain; }
   long simulations() const { return simulations_; }
   std::function<bool(double t)> go_on;  // within a simulation; false abandons it
+  ResidualRecords* records = nullptr;
 
  private:
   struct Prior {
     Eigen::Index at;
     double mean, sigma;
   };
+  Experiment::Residuals residuals(const Member& member, const Eigen::VectorXd& u);
+
   std::vector<Member> members_;
   const VariableScaling& scaling_;
   std::vector<Prior> priors_;

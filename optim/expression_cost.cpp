@@ -118,6 +118,55 @@ CostExpression::CostExpression(const Expression& expression, const Scene& scene)
   compiled_ = std::move(compiled);
 }
 
+bool CostExpression::is_linear() const {
+  const auto varies = [&](int input) { return input != compiled_->time; };
+  for (const int i : compiled_->program.used_inputs()) {
+    if (!varies(i)) continue;
+    const Program slope = compiled_->program.derivative(i);
+    if (std::any_of(slope.used_inputs().begin(), slope.used_inputs().end(), varies)) return false;
+  }
+  return true;
+}
+
+SecondOrder CostExpression::second_order(const Mechanism& mechanism, const StatePoint& at, const Eigen::MatrixXd& y_rho,
+                                         const std::vector<int>& variables) const {
+  const Program& program = compiled_->program;
+  const Eigen::Index n = static_cast<Eigen::Index>(variables.size());
+  Eigen::VectorXd u = Eigen::VectorXd::Zero(compiled_->inputs);
+  Eigen::MatrixXd U = Eigen::MatrixXd::Zero(compiled_->inputs, n);
+  u(compiled_->time) = at.t;
+  for (const int k : compiled_->parameters) {
+    u(k) = mechanism.rho()(k);
+    for (Eigen::Index j = 0; j < n; ++j) U(k, j) = variables[static_cast<std::size_t>(j)] == k ? 1 : 0;
+  }
+  Eigen::VectorXd y_bar(y_rho.rows()), rho_bar(mechanism.rho().size());
+  for (const auto& [input, sensor] : compiled_->sensors) {
+    y_bar.setZero(), rho_bar.setZero();
+    u(input) = mechanism.add_sensor_gradient(sensor, at, 1, y_bar, rho_bar);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const int k = variables[static_cast<std::size_t>(j)];
+      U(input, j) = y_bar.dot(y_rho.col(k)) + rho_bar(k);
+    }
+  }
+  const auto span_of = [](Eigen::VectorXd& x) {
+    return std::span<double>(x.data(), static_cast<std::size_t>(x.size()));
+  };
+  Program::Scratch scratch = program.scratch();
+  Eigen::VectorXd e_u, e_uj, direction(u.size());
+  Eigen::MatrixXd e_uu = Eigen::MatrixXd::Zero(u.size(), u.size());
+  SecondOrder result{program.value(span_of(u), scratch), Eigen::VectorXd::Zero(n), {}};
+  for (const int i : program.used_inputs()) {
+    if (i == compiled_->time) continue;
+    direction.setZero(), direction(i) = 1;
+    e_u.setZero(u.size()), e_uj.setZero(u.size());
+    program.add_gradient_tangent(span_of(u), span_of(direction), 1, span_of(e_u), span_of(e_uj), scratch);
+    e_uu.col(i) = e_uj;
+    result.first += e_u(i) * U.row(i).transpose();
+  }
+  result.second = U.transpose() * e_uu * U;
+  return result;
+}
+
 std::shared_ptr<const PointCost> CostExpression::bind(const Mechanism& mechanism) const {
   return std::make_shared<ExpressionCost<Compiled>>(compiled_, mechanism);
 }

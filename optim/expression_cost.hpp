@@ -25,11 +25,23 @@ Symbols cost_symbols(const Scene& scene);
 // The same without t and sensors: what depends on parameters alone.
 Symbols parameter_symbols(const Scene& scene);
 
+// A scalar e of u = (parameters, sensors) along the tangents U = du/drho of a motion.
+struct SecondOrder {
+  double value = 0;
+  Eigen::VectorXd first;   // U' e_u, its derivative
+  Eigen::MatrixXd second;  // U' e_uu U, its second derivative but for that of u
+};
+
 class CostExpression {
  public:
   CostExpression(const Expression& expression, const Scene& scene);  // throws UnknownName
   bool is_zero() const { return is_zero_; }                          // the constant 0: costs nothing
+  // Of parameters and sensors, at any fixed time: its second derivatives are 0.
+  bool is_linear() const;
   std::shared_ptr<const PointCost> bind(const Mechanism& mechanism) const;
+  // y_rho: dy/drho, all parameters; variables: those of rho that are wanted.
+  SecondOrder second_order(const Mechanism& mechanism, const StatePoint& at, const Eigen::MatrixXd& y_rho,
+                           const std::vector<int>& variables) const;
 
  private:
   struct Compiled;

@@ -170,7 +170,7 @@ class Identification {
     for (std::size_t e = 0; e < spec_.experiments.size(); ++e)
       if (!spec_.experiments[e].validate) members.push_back(member(e, parameter_values(scene_), unknowns));
     ExperimentStack stack(std::move(members), unknowns, scaling, spec_.loss);
-    stack.go_on = go_on_;
+    stack.go_on = go_on_, stack.records = options_.records;
     if (stack.size < stack.variables())
       throw std::invalid_argument(fmt::format("identification: {} cannot determine {}",
                                               counted(stack.samples(), "sample"),

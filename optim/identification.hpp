@@ -30,7 +30,8 @@
 
 namespace mbsopt {
 
-struct UserForce;  // core/force/user_force.hpp
+struct UserForce;        // core/force/user_force.hpp
+struct ResidualRecords;  // optim/experiment_stack.hpp
 
 struct FittedParameter {
   std::string name;        // "k1", or "run1.theta0" where it is free in an experiment
@@ -117,6 +118,7 @@ struct IdentificationOptions {
   std::vector<std::shared_ptr<const UserForce>> user_forces;
   std::function<bool(const FitRow&)> progress;        // after every iteration; false stops, the best so far is kept
   std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
+  ResidualRecords* records = nullptr;  // of an earlier run that this one goes on with; of the fit and its profiles
   // After every point of a profile; false ends it there.
   std::function<bool(const std::string& name, double value, double tau)> profile_progress;
 };

@@ -1,5 +1,6 @@
 #include "optim/ipopt_solver.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <coin/IpIpoptApplication.hpp>
 #include <coin/IpTNLP.hpp>
 
@@ -28,6 +29,15 @@ constexpr const char* kConvergedInNoise =
     "derivatives";
 constexpr double kNoBound = 1e20;  // Ipopt's: at least 1e19 means none
 
+// Its curvatures by their size: where f curves down, Newton's step would lead up. A step along the negative curvature
+// is then as long as one along a positive of the same size, where Ipopt's own remedy, a multiple of the unit matrix,
+// shortens all. Only without constraints, which may need the negative ones for what they leave free.
+Eigen::MatrixXd with_positive_curvature(const Eigen::MatrixXd& H) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of(H);
+  if (of.info() != Eigen::Success || of.eigenvalues()(0) >= 0) return H;
+  return of.eigenvectors() * of.eigenvalues().cwiseAbs().asDiagonal() * of.eigenvectors().transpose();
+}
+
 class Adapter : public Ipopt::TNLP {
  public:
   Adapter(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const IpoptOptions& options, NlpResult& result)
@@ -54,7 +64,7 @@ class Adapter : public Ipopt::TNLP {
   bool get_nlp_info(Index& n, Index& m, Index& nnz_jac, Index& nnz_hess, IndexStyleEnum& style) override {
     n = static_cast<Index>(problem_.variables());
     m = static_cast<Index>(problem_.constraints());
-    nnz_jac = n * m, nnz_hess = options_.exact_hessian ? n * (n + 1) / 2 : 0;
+    nnz_jac = n * m, nnz_hess = options_.second_order ? n * (n + 1) / 2 : 0;
     style = C_STYLE;
     return true;
   }
@@ -192,7 +202,10 @@ class Adapter : public Ipopt::TNLP {
       ok = problem_.hessians(x, found);
       if (ok && options_.records) options_.records->record(x, found);
     }
-    if (ok) hessians_ = std::move(found);
+    if (ok) {
+      hessians_ = std::move(found);
+      if (problem_.constraints() == 0) hessians_[0] = with_positive_curvature(hessians_[0]);
+    }
     if (hessians_.empty()) {
       const Eigen::Index n = problem_.variables();
       hessians_.assign(static_cast<std::size_t>(problem_.constraints()) + 1, Eigen::MatrixXd::Zero(n, n));
@@ -266,10 +279,10 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
   Ipopt::OptionsList& list = *application.Options();
   list.SetIntegerValue("print_level", 0);
   list.SetStringValue("sb", "yes");  // no banner
-  list.SetStringValue("hessian_approximation", options.exact_hessian ? "exact" : "limited-memory");
+  list.SetStringValue("hessian_approximation", options.second_order ? "exact" : "limited-memory");
   list.SetIntegerValue("limited_memory_max_history", options.history);
   // Newton's steps converge faster than the barrier falls from its usual 0.1; BFGS needs that time to learn.
-  if (options.exact_hessian) list.SetNumericValue("mu_init", 1e-3);
+  if (options.second_order) list.SetNumericValue("mu_init", 1e-3);
   list.SetStringValue("nlp_scaling_method", "user-scaling");
   list.SetStringValue("mu_strategy",
                       "monotone");                // "adaptive" leaps away from good points of problems with many minima
@@ -292,8 +305,8 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
 
 NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const IpoptOptions& options) {
   NlpResult result;
-  result.algorithm = options.exact_hessian
-                         ? "Ipopt: interior point, exact Hessian"
+  result.algorithm = options.second_order
+                         ? "Ipopt: interior point, Hessians of the problem"
                          : fmt::format("Ipopt: interior point, limited-memory BFGS of {} pairs", options.history);
   Adapter* const adapter = new Adapter(problem, x_start, options, result);
   const Ipopt::SmartPtr<Ipopt::TNLP> owner(adapter);

@@ -1,6 +1,6 @@
 // Ipopt: a primal-dual interior point method with a filter line search, here with a limited-memory BFGS Hessian or with
-// the program's own. Waechter and Biegler, Mathematical Programming 106 (2006) 25-57. For smooth problems with bounds
-// and constraints. With MUMPS it is not thread-safe: one run at a time per process.
+// the program's own, exact or approximate. Waechter and Biegler, Mathematical Programming 106 (2006) 25-57. For smooth
+// problems with bounds and constraints. With MUMPS it is not thread-safe: one run at a time per process.
 //
 //   IpoptOptions options;
 //   options.tolerance = 1e-8;
@@ -21,7 +21,7 @@ struct IpoptOptions {
   int max_iterations = 100;            // >= 0
   int history = 20;                    // pairs kept by the limited-memory Hessian
   std::function<bool(const NlpProgress&)> progress;  // after every iteration; false stops
-  bool exact_hessian = false;                        // the program must have hessians()
+  bool second_order = false;                         // Hessians of the program, which must have hessians()
   std::optional<long> max_evaluations = {};          // looked at after every iteration
   PointRecords* records = nullptr;
 };

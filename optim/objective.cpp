@@ -109,9 +109,7 @@ std::shared_ptr<const PointCost> Objective::expression(const Mechanism& mechanis
 Cost Objective::cost(const Mechanism& mechanism, double x0) const {
   Cost cost;
   if (running_) cost.running = running_->bind(mechanism);
-  if (running_ && is_extreme())
-    cost.running =
-        std::make_shared<Exponential>(cost.running, kind_ == ObjectiveKind::maximum ? sharpness_ : -sharpness_, x0);
+  if (running_ && is_extreme()) cost.running = std::make_shared<Exponential>(cost.running, exponent(), x0);
   if (running_ && kind_ == ObjectiveKind::rms) cost.running = std::make_shared<Square>(cost.running);
   if (terminal_) cost.terminal = terminal_->bind(mechanism);
   for (const Sample& sample : samples_) cost.samples.push_back({sample.time, sample.value.bind(mechanism)});
@@ -126,7 +124,7 @@ Objective::OfIntegral Objective::of_integral(double I, double x0) const {
     const double psi = std::sqrt(I / duration_);
     return {psi, I == 0 ? 0 : 0.5 * psi / I};
   }
-  const double k = kind_ == ObjectiveKind::maximum ? sharpness_ : -sharpness_;
+  const double k = exponent();
   return {x0 + std::log(I / duration_) / k, 1 / (k * I)};
 }
 
@@ -141,6 +139,30 @@ double Objective::add_parameters_only_gradient(const Eigen::VectorXd& rho, Eigen
   Program::Scratch scratch = parameters_only_->scratch();
   const std::span<double> gradient(rho_bar.data(), static_cast<std::size_t>(rho_bar.size()));
   return parameters_only_->add_gradient(view(rho), 1, gradient, scratch);
+}
+
+void Objective::add_parameters_only_hessian(const Eigen::VectorXd& rho, const std::vector<int>& variables,
+                                            Eigen::MatrixXd& H) const {
+  if (!parameters_only_) return;
+  Program::Scratch scratch = parameters_only_->scratch();
+  Eigen::VectorXd direction(rho.size()), gradient(rho.size()), slope(rho.size());
+  const auto all = [](Eigen::VectorXd& x) { return std::span<double>(x.data(), static_cast<std::size_t>(x.size())); };
+  for (std::size_t j = 0; j < variables.size(); ++j) {
+    direction.setZero(), gradient.setZero(), slope.setZero();
+    direction(variables[j]) = 1;
+    parameters_only_->add_gradient_tangent(view(rho), all(direction), 1, all(gradient), all(slope), scratch);
+    for (std::size_t i = 0; i < variables.size(); ++i)
+      H(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) += slope(variables[i]);
+  }
+}
+
+bool Objective::is_linear() const {
+  if (kind_ != ObjectiveKind::sum) return false;
+  if ((running_ && !running_->is_linear()) || (terminal_ && !terminal_->is_linear())) return false;
+  if (std::any_of(samples_.begin(), samples_.end(), [](const Sample& s) { return !s.value.is_linear(); })) return false;
+  if (!parameters_only_) return true;
+  const std::vector<int>& used = parameters_only_->used_inputs();
+  return std::all_of(used.begin(), used.end(), [&](int i) { return parameters_only_->derivative(i).is_constant(); });
 }
 
 std::vector<Objective> objectives_of(const Problem& problem, const std::vector<std::string>& names) {

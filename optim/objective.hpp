@@ -47,15 +47,26 @@ class Objective {
   OfIntegral of_integral(double I, double x0 = 0) const;
   // The expression x of a kind that is no sum; null where it is the constant 0.
   std::shared_ptr<const PointCost> expression(const Mechanism& mechanism) const;
-  double parameters_only(const Eigen::VectorXd& rho) const;
-  double add_parameters_only_gradient(const Eigen::VectorXd& rho,
-                                      Eigen::Ref<Eigen::VectorXd> rho_bar) const;  // += d/drho
-
- private:
+  // Its parts, for second derivatives: `running` is the integrand, or the expression x of a kind that is no sum.
   struct Sample {
     double time;
     CostExpression value;
   };
+  const std::optional<CostExpression>& running() const { return running_; }
+  const std::optional<CostExpression>& terminal() const { return terminal_; }
+  const std::vector<Sample>& samples() const { return samples_; }
+  double exponent() const { return kind_ == ObjectiveKind::maximum ? sharpness_ : -sharpness_; }  // k of an extreme
+  bool is_written_in_cpp() const { return user_running_ || user_terminal_; }
+  // A sum of parts whose second derivatives in parameters and sensors are 0.
+  bool is_linear() const;
+
+  double parameters_only(const Eigen::VectorXd& rho) const;
+  double add_parameters_only_gradient(const Eigen::VectorXd& rho,
+                                      Eigen::Ref<Eigen::VectorXd> rho_bar) const;  // += d/drho
+  void add_parameters_only_hessian(const Eigen::VectorXd& rho, const std::vector<int>& variables,
+                                   Eigen::MatrixXd& H) const;
+
+ private:
   std::string name_;
   ObjectiveKind kind_ = ObjectiveKind::sum;
   double sharpness_ = 1, duration_ = 1;

@@ -38,7 +38,7 @@ struct OptimizerSpec {
   double tolerance = 1e-6;
   std::optional<long> max_iterations;   // ipopt: 100 when absent
   std::optional<long> max_evaluations;  // NLopt: depends on the method, nlopt_solver.hpp
-  std::string hessian = "lbfgs";        // of ipopt; or "exact"
+  std::string hessian = "lbfgs";        // of ipopt; or "exact", "gauss_newton"
   std::optional<long> seed;             // of methods that are random; drawn when absent
   static constexpr int kIpoptIterations = 100;
 };

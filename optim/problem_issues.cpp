@@ -112,6 +112,8 @@ std::vector<SceneIssue> find_issues(const Problem& problem) {
   Checker checker(facts, issues);
   checker.check(problem);
   check_meaning(checker, problem.scene);
+  if (issues.empty())
+    if (const std::optional<DesignIssue> found = curvature_issue(problem)) checker.issue(found->path, found->message);
   return without_repetitions(std::move(issues));
 }
 

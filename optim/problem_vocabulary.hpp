@@ -48,7 +48,8 @@ void describe(auto& v, Like<OptimizerSpec> auto& o) {
   v.plain("max_iterations", o.max_iterations, kNotNegative, {"at most; ipopt: 100 when absent"});
   v.plain("max_evaluations", o.max_evaluations, kPositive,
           {"at most; NLopt: 500, without gradients 500 (n + 1), global 1000 (n + 1) when absent, of n variables"});
-  v.word("hessian", o.hessian, Words{"lbfgs exact"}, {"of ipopt: limited-memory BFGS, or second derivatives"});
+  v.word("hessian", o.hessian, Words{"lbfgs exact gauss_newton"},
+         {"of ipopt: limited-memory BFGS, second derivatives, or these without those of the motion"});
   v.plain("seed", o.seed, kNotNegative, {"of methods that are random; drawn when absent"});
 }
 

@@ -19,6 +19,7 @@ namespace mbsopt {
 namespace {
 
 constexpr int kPollMilliseconds = 50;
+using Worker = ProcessPool::Worker;
 // The first byte of a reply; one that was cut off has no last byte.
 constexpr char kReturned = 'R', kThrew = 'E', kEnd = '.';
 
@@ -50,13 +51,6 @@ void write_all(int descriptor, std::string_view text) {
   write_all(pipe_end, reply + kEnd);
   ::_exit(0);  // without the destructors and buffers of the process this is a copy of
 }
-
-struct Worker {
-  int job;
-  pid_t process;
-  int descriptor;
-  std::string received;
-};
 
 Worker started(int job, const std::function<std::string(int)>& work) {
   std::array<int, 2> ends;
@@ -101,39 +95,49 @@ JobReply reply_of(Worker& worker) {
   return {worker.job, false, fmt::format("its process ended with code {}", WEXITSTATUS(status))};
 }
 
-// Ends what is still running when `done` throws.
-struct Pool {
-  std::vector<Worker> workers;
-  ~Pool() {
-    for (Worker& worker : workers) {
-      ::kill(worker.process, SIGKILL);
-      reply_of(worker);
-    }
-  }
-};
-
 }  // namespace
+
+ProcessPool::ProcessPool(int workers, std::function<std::string(int)> work)
+    : room_(static_cast<std::size_t>(std::max(1, workers))), work_(std::move(work)) {}
+
+ProcessPool::~ProcessPool() {
+  for (Worker& worker : workers_) {
+    ::kill(worker.process, SIGKILL);
+    reply_of(worker);
+  }
+}
+
+void ProcessPool::start(int job) { workers_.push_back(started(job, work_)); }
+
+std::vector<JobReply> ProcessPool::ended(int milliseconds) {
+  std::vector<pollfd> waiting;
+  for (const Worker& worker : workers_) waiting.push_back({worker.descriptor, POLLIN, 0});
+  ::poll(waiting.data(), waiting.size(), milliseconds);
+  std::vector<JobReply> replies;
+  for (std::size_t i = waiting.size(); i-- > 0;) {
+    if (waiting[i].revents == 0 || !receive(workers_[i])) continue;
+    Worker worker = std::move(workers_[i]);
+    workers_.erase(workers_.begin() + static_cast<std::ptrdiff_t>(i));
+    replies.push_back(reply_of(worker));
+  }
+  return replies;
+}
+
+void ProcessPool::stop() {
+  for (const Worker& worker : workers_) ::kill(worker.process, SIGTERM);
+}
 
 void run_in_processes(const std::vector<int>& jobs, int workers, const std::function<std::string(int)>& work,
                       const std::function<void(const JobReply&)>& done, const std::function<bool()>& go_on) {
-  Pool pool;
+  ProcessPool pool(workers, work);
   auto next = jobs.begin();
   bool stopping = false;
-  while (!pool.workers.empty() || (next != jobs.end() && !stopping)) {
-    while (!stopping && next != jobs.end() && pool.workers.size() < static_cast<std::size_t>(std::max(1, workers)))
-      pool.workers.push_back(started(*next++, work));
-    std::vector<pollfd> waiting;
-    for (const Worker& worker : pool.workers) waiting.push_back({worker.descriptor, POLLIN, 0});
-    ::poll(waiting.data(), waiting.size(), kPollMilliseconds);
-    for (std::size_t i = waiting.size(); i-- > 0;) {
-      if (waiting[i].revents == 0 || !receive(pool.workers[i])) continue;
-      Worker ended = std::move(pool.workers[i]);
-      pool.workers.erase(pool.workers.begin() + static_cast<std::ptrdiff_t>(i));
-      done(reply_of(ended));
-    }
+  while (!pool.idle() || (next != jobs.end() && !stopping)) {
+    while (!stopping && next != jobs.end() && pool.has_room()) pool.start(*next++);
+    for (const JobReply& reply : pool.ended(kPollMilliseconds)) done(reply);
     if (!stopping && go_on && !go_on()) {
       stopping = true;
-      for (const Worker& worker : pool.workers) ::kill(worker.process, SIGTERM);
+      pool.stop();
     }
   }
 }

@@ -14,6 +14,15 @@ namespace mbsopt {
 
 namespace {
 
+template <class Kind>
+concept ForceOfJoint = requires(const Kind& kind) {
+  kind.joint;
+};
+template <class Kind>
+concept ForceBetweenBodies = requires(const Kind& kind) {
+  kind.body1;
+};
+
 // Sets of bodies that joints, forces and conditions connect. The ground is no body here.
 class ConnectedBodies {
  public:
@@ -103,9 +112,9 @@ class Search {
   }
   template <class Kind>
   std::vector<std::string> bodies_of(const Kind& kind) const {
-    if constexpr (requires { kind.joint; }) {
+    if constexpr (ForceOfJoint<Kind>) {
       return bodies_of_joint(kind.joint);
-    } else if constexpr (requires { kind.body1; }) {
+    } else if constexpr (ForceBetweenBodies<Kind>) {
       return {kind.body1, kind.body2};
     } else {  // on one body, of which its sensors may make it depend on others
       std::vector<std::string> all{kind.body};

@@ -14,6 +14,7 @@
 #include "app/exit_code.hpp"
 #include "app/journal.hpp"
 #include "tests/app/run_command.hpp"
+#include "tests/app/swinging_rod.hpp"
 
 using namespace mbsopt;
 using Catch::Contains;
@@ -21,55 +22,12 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// A rod on a spring that is to be still at the end: two parameters, and more than one minimum.
-const char* const kTwoVariables = R"({
-  "format": 1,
-  "name": "rod",
-  "gravity": [0, -9.81, 0],
-  "parameters": {"k": {"value": 20, "lower": 5, "upper": 200, "scale": "log"},
-                 "free": {"value": 0.5, "lower": 0.2, "upper": 1.2}},
-  "bodies": [{"name": "rod", "mass": 2, "com": [0.5, 0, 0], "inertia": [1e-3, 0.1666, 0.1666],
-              "points": {"tip": [1, 0, 0]}}],
-  "joints": [{"name": "pin", "type": "revolute", "body1": "ground", "body2": "rod",
-              "point1": [0, 0, 0], "point2": "O", "axis1": [0, 0, 1], "axis2": [0, 0, 1]}],
-  "forces": [{"name": "spring", "type": "tsda", "body1": "ground", "body2": "rod",
-              "point1": [0, 1, 0], "point2": "tip", "stiffness": "k", "damping": 0.5, "free_length": "free"}],
-  "sensors": {"tip_y": {"quantity": "position", "body": "rod", "point": "tip", "component": "y"},
-              "swing": {"quantity": "angle", "joint": "pin"},
-              "speed": {"quantity": "rate", "joint": "pin"}},
-  "simulation": {"end_time": 1, "output_step": 0.25},
-  "objectives": {"track": {"running": "(tip_y + 0.2*sin(5*t))^2", "parameters_only": "1e-4*k"}},
-  "design": {"minimize": "track", "variables": ["k", "free"],
-             "multistart": {"starts": 8, "seed": 11}}
-})";
-
 using Arguments = std::vector<std::string>;
 
 CommandOutcome design(const std::string& file, const std::string& out, const Arguments& more = {}) {
   Arguments arguments{"design", file, "--out", out};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return run_command(arguments);
-}
-
-// result.json without what says how it was run.
-nlohmann::json outcome_of(const fs::path& folder) {
-  nlohmann::json result = repeatable(json_of(folder / "result.json"));
-  result.erase("provenance");
-  if (result.contains("optimizer")) result["optimizer"].erase("simulations");  // of the last process
-  return result;
-}
-
-std::vector<std::string> lines_of(const fs::path& file) {
-  std::istringstream text(content_of(file));
-  std::vector<std::string> lines;
-  for (std::string line; std::getline(text, line);) lines.push_back(line);
-  return lines;
-}
-
-long lines_with(const fs::path& folder, const std::string& key) {
-  const auto lines = lines_of(folder / kJournalFile);
-  return std::count_if(lines.begin(), lines.end(),
-                       [&](const std::string& line) { return line.starts_with("{\"" + key + "\":"); });
 }
 
 void write_text(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
@@ -84,7 +42,7 @@ void kill_at(const Arguments& arguments, const fs::path& folder, const std::stri
   }
   for (int i = 0; i < 6000; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    if (fs::exists(folder / kJournalFile) && lines_with(folder, key) >= count) break;
+    if (fs::exists(folder / kJournalFile) && journal_lines(folder, key) >= count) break;
   }
   ::kill(process, SIGKILL);
   int status = 0;
@@ -95,7 +53,7 @@ void kill_at(const Arguments& arguments, const fs::path& folder, const std::stri
 
 TEST_CASE("multistart: the same result from 1, 2 and 4 workers, with a waterfall", "[multistart]") {
   const TemporaryFolder folder;
-  const std::string file = folder.write("rod.json", kTwoVariables);
+  const std::string file = folder.write("rod.json", kSwingingRod);
   nlohmann::json first;
   std::string history;
   for (const std::string workers : {"1", "2", "4"}) {
@@ -135,7 +93,7 @@ TEST_CASE("multistart: the same result from 1, 2 and 4 workers, with a waterfall
 
 TEST_CASE("multistart: a single run from the best start ends where the multistart says", "[multistart]") {
   const TemporaryFolder folder;
-  const std::string file = folder.write("rod.json", kTwoVariables);
+  const std::string file = folder.write("rod.json", kSwingingRod);
   REQUIRE(design(file, folder.file("many")).exit_code == kDone);
   const auto result = outcome_of(folder.path / "many");
   REQUIRE(run_command({"simulate", folder.file("many/optimized.json"), "--out", folder.file("again")}).exit_code ==
@@ -146,7 +104,7 @@ TEST_CASE("multistart: a single run from the best start ends where the multistar
 
 TEST_CASE("multistart: Sobol points are other points, and a seed that is not given is drawn and told", "[multistart]") {
   const TemporaryFolder folder;
-  std::string text = kTwoVariables;
+  std::string text = kSwingingRod;
   text.replace(text.find(", \"seed\": 11"), 12, "");
   const std::string file = folder.write("rod.json", text);
   const Arguments few{"--set", "design.multistart.starts=3", "--set", "design.optimizer.max_iterations=0"};
@@ -165,7 +123,7 @@ TEST_CASE("multistart: Sobol points are other points, and a seed that is not giv
 
 TEST_CASE("multistart needs bounds, and says of which parameter", "[multistart]") {
   const TemporaryFolder folder;
-  std::string text = kTwoVariables;
+  std::string text = kSwingingRod;
   text.replace(text.find(", \"upper\": 1.2"), 14, "");
   const CommandOutcome outcome = design(folder.write("rod.json", text), folder.file("out"));
   CHECK(outcome.exit_code == kBadInput);
@@ -174,20 +132,20 @@ TEST_CASE("multistart needs bounds, and says of which parameter", "[multistart]"
 
 TEST_CASE("resume: a multistart that is killed ends as if it had not been", "[resume]") {
   const TemporaryFolder folder;
-  const std::string file = folder.write("rod.json", kTwoVariables);
+  const std::string file = folder.write("rod.json", kSwingingRod);
   REQUIRE(design(file, folder.file("whole")).exit_code == kDone);
   const fs::path killed = folder.path / "killed";
   const long at = GENERATE(0, 1, 4, 7);
   kill_at({"design", file, "--out", killed.string(), "--threads", "2"}, killed, at == 0 ? "journal" : "start",
           std::max(at, 1L));
-  const long finished = lines_with(killed, "start");
+  const long finished = journal_lines(killed, "start");
   INFO("killed after " << finished << " starts");
   REQUIRE(finished >= at);
-  const bool was_done = lines_with(killed, "ended") > 0;
+  const bool was_done = journal_lines(killed, "ended") > 0;
   const CommandOutcome outcome = run_command({"resume", killed.string(), "--threads", "3"});
   INFO(outcome.err);
   REQUIRE(outcome.exit_code == kDone);
-  CHECK(lines_with(killed, "start") == 8);  // those that had finished are not run again
+  CHECK(journal_lines(killed, "start") == 8);  // those that had finished are not run again
   if (!was_done) CHECK(outcome_of(killed) == outcome_of(folder.path / "whole"));
   for (const char* name : {"history.csv", "trajectory.csv"})
     CHECK(content_of(killed / name) == content_of(folder.path / "whole" / name));
@@ -195,11 +153,11 @@ TEST_CASE("resume: a multistart that is killed ends as if it had not been", "[re
 
 TEST_CASE("resume: a single run goes on from its journal, wherever that was cut off", "[resume]") {
   const TemporaryFolder folder;
-  const std::string file = folder.write("rod.json", kTwoVariables);
+  const std::string file = folder.write("rod.json", kSwingingRod);
   const std::string optimizer = GENERATE("ipopt", "slsqp", "bobyqa", "crs");
   INFO(optimizer);
   Arguments single{"--set", "design.multistart.starts=1", "--set", "design.optimizer.type=" + optimizer};
-  std::string text = kTwoVariables;
+  std::string text = kSwingingRod;
   text.replace(text.find("\"multistart\": {\"starts\": 8, \"seed\": 11}"), 39,
                "\"optimizer\": {\"type\": \"" + optimizer + "\"}");
   const std::string alone = folder.write("alone.json", text);
@@ -207,55 +165,55 @@ TEST_CASE("resume: a single run goes on from its journal, wherever that was cut 
   REQUIRE(design(alone, out.string()).exit_code == kDone);
   const auto whole = outcome_of(out);
   const std::string history = content_of(out / "history.csv"), journal = content_of(out / kJournalFile);
-  const long points = lines_with(out, "point");
+  const long points = journal_lines(out, "point");
   CHECK(points == whole.at("optimizer").at("evaluations"));
-  CHECK(lines_with(out, "iterate") == whole.at("optimizer").at("iterations").get<long>() + 1);
+  CHECK(journal_lines(out, "iterate") == whole.at("optimizer").at("iterations").get<long>() + 1);
   for (const double part : {0.15, 0.5, 0.93}) {
     INFO(part);
     fs::remove(out / "optimized.json");
     write_text(out / kJournalFile,
                journal.substr(0, std::max(journal.find('\n') + 1,
                                           static_cast<std::size_t>(part * static_cast<double>(journal.size())))));
-    const long known = lines_with(out, "point");
+    const long known = journal_lines(out, "point");
     CHECK(known < points);
     const CommandOutcome outcome = run_command({"resume", out.string()});
     INFO(outcome.err);
     REQUIRE(outcome.exit_code == kDone);
     CHECK(outcome_of(out) == whole);
     CHECK(content_of(out / "history.csv") == history);
-    CHECK(lines_with(out, "point") == points);  // only what was missing has been computed
+    CHECK(journal_lines(out, "point") == points);  // only what was missing has been computed
     CHECK(fs::exists(out / "optimized.json"));
   }
 }
 
 TEST_CASE("resume: exact Hessians are in the journal, too", "[resume]") {
   const TemporaryFolder folder;
-  std::string text = kTwoVariables;
+  std::string text = kSwingingRod;
   text.replace(text.find("\"multistart\": {\"starts\": 8, \"seed\": 11}"), 39,
                "\"optimizer\": {\"hessian\": \"exact\"}");
   const std::string file = folder.write("rod.json", text);
   const fs::path out = folder.path / "out";
   REQUIRE(design(file, out.string()).exit_code == kDone);
   const auto whole = outcome_of(out);
-  const long hessians = lines_with(out, "hessians");
+  const long hessians = journal_lines(out, "hessians");
   CHECK(hessians > 0);
   const std::string journal = content_of(out / kJournalFile);
   write_text(out / kJournalFile, journal.substr(0, journal.size() / 2));
   REQUIRE(run_command({"resume", out.string()}).exit_code == kDone);
   CHECK(outcome_of(out) == whole);
-  CHECK(lines_with(out, "hessians") == hessians);
+  CHECK(journal_lines(out, "hessians") == hessians);
 }
 
 TEST_CASE("resume: a run that was interrupted keeps its best and goes on", "[resume]") {
   const TemporaryFolder folder;
-  const std::string file = folder.write("rod.json", kTwoVariables);
+  const std::string file = folder.write("rod.json", kSwingingRod);
   // Simulations that take a while, so that the signal comes within one.
   const Arguments slow{
       "--threads", "2", "--set", "simulation.integrator.max_step=2e-3", "--set", "design.multistart.starts=4"};
   REQUIRE(design(file, folder.file("whole"), slow).exit_code == kDone);
   const fs::path out = folder.path / "out";
   std::thread killer([&] {
-    for (int i = 0; i < 3000 && !(fs::exists(out / kJournalFile) && lines_with(out, "start") >= 1); ++i)
+    for (int i = 0; i < 3000 && !(fs::exists(out / kJournalFile) && journal_lines(out, "start") >= 1); ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     ::kill(::getpid(), SIGTERM);
   });
@@ -278,7 +236,7 @@ TEST_CASE("resume refuses what it cannot go on with", "[resume]") {
   CHECK(outcome.exit_code == kBadInput);
   CHECK_THAT(outcome.err, Contains("journal.jsonl: there is none"));
 
-  const std::string file = folder.write("rod.json", kTwoVariables);
+  const std::string file = folder.write("rod.json", kSwingingRod);
   const fs::path out = folder.path / "out";
   REQUIRE(design(file, out.string(), {"--set", "design.multistart.starts=2"}).exit_code == kDone);
   outcome = run_command({"resume", out.string()});
@@ -287,7 +245,7 @@ TEST_CASE("resume refuses what it cannot go on with", "[resume]") {
 
   std::vector<std::string> lines = lines_of(out / kJournalFile);
   write_text(out / kJournalFile, lines[0] + "\n" + lines[1] + "\n");
-  folder.write("rod.json", std::string(kTwoVariables) + "\n");
+  folder.write("rod.json", std::string(kSwingingRod) + "\n");
   outcome = run_command({"resume", out.string()});
   CHECK(outcome.exit_code == kBadInput);
   CHECK_THAT(outcome.err, Contains("another content of the problem file") && Contains("anew"));
@@ -295,40 +253,10 @@ TEST_CASE("resume refuses what it cannot go on with", "[resume]") {
   CHECK_THAT(run_command({"resume", out.string()}).err, Contains("no journal of this version"));
 }
 
-namespace {
-
-// Half a second of the rod's motion at k = 20 and free = 0.5, told with little noise; from far away the fit has other
-// minima.
-std::string swing_csv(const TemporaryFolder& folder) {
-  REQUIRE(run_command({"simulate", folder.write("truth.json", kTwoVariables), "--out", folder.file("truth"), "--set",
-                       "simulation.output_step=0.05"})
-              .exit_code == kDone);
-  const std::vector<std::string> rows = lines_of(folder.path / "truth/trajectory.csv");
-  std::string csv = "t,theta\n";
-  for (std::size_t i = 1; i < rows.size(); ++i) {
-    const std::size_t last = rows[i].rfind(','), before = rows[i].rfind(',', last - 1);
-    csv += rows[i].substr(0, rows[i].find(',')) + rows[i].substr(before, last - before) + "\n";
-  }
-  return csv;
-}
-
-std::string fit_problem() {
-  std::string text = kTwoVariables;
-  text.replace(text.find("\"k\": {\"value\": 20"), 17, "\"k\": {\"value\": 60");
-  text.erase(text.find(",\n  \"design\""));
-  return text + R"(,
-  "identification": {"experiments": [{"name": "swing", "data": "swing.csv",
-      "channels": [{"column": "theta", "sensor": "swing", "sigma": 0.01}]}], "variables": ["k", "free"],
-      "multistart": {"starts": 5, "seed": 2}}})";
-}
-
-}  // namespace
-
 TEST_CASE("multistart: identify fits from several starts, the same with any number of workers, killed or not",
           "[multistart]") {
   const TemporaryFolder folder;
-  folder.write("swing.csv", swing_csv(folder));
-  const std::string file = folder.write("fit.json", fit_problem());
+  const std::string file = write_swing_fit(folder);
   REQUIRE(run_command({"identify", file, "--out", folder.file("one"), "--threads", "1"}).exit_code == kDone);
   const auto one = outcome_of(folder.path / "one");
   CHECK(one.at("parameters").at("k").at("value").get<double>() == Approx(20).epsilon(1e-4));
@@ -342,16 +270,15 @@ TEST_CASE("multistart: identify fits from several starts, the same with any numb
 
   const fs::path killed = folder.path / "killed";
   kill_at({"identify", file, "--out", killed.string(), "--threads", "2"}, killed, "start", 2);
-  const bool was_done = lines_with(killed, "ended") > 0;
+  const bool was_done = journal_lines(killed, "ended") > 0;
   REQUIRE(run_command({"resume", killed.string()}).exit_code == kDone);
-  CHECK(lines_with(killed, "start") == 5);
+  CHECK(journal_lines(killed, "start") == 5);
   if (!was_done) CHECK(content_of(killed / "residuals.csv") == content_of(folder.path / "one/residuals.csv"));
 }
 
 TEST_CASE("resume: an identification that was interrupted between its starts goes on", "[resume]") {
   const TemporaryFolder folder;
-  folder.write("swing.csv", swing_csv(folder));
-  const std::string file = folder.write("fit.json", fit_problem());
+  const std::string file = write_swing_fit(folder);
   const Arguments slow{"--threads", "2", "--set", "simulation.integrator.max_step=1e-3"};
   const auto identify = [&](const fs::path& out) {
     Arguments arguments{"identify", file, "--out", out.string()};
@@ -361,7 +288,7 @@ TEST_CASE("resume: an identification that was interrupted between its starts goe
   REQUIRE(identify(folder.path / "whole").exit_code == kDone);
   const fs::path out = folder.path / "out";
   std::thread killer([&] {
-    for (int i = 0; i < 6000 && !(fs::exists(out / kJournalFile) && lines_with(out, "start") >= 1); ++i)
+    for (int i = 0; i < 6000 && !(fs::exists(out / kJournalFile) && journal_lines(out, "start") >= 1); ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     ::kill(::getpid(), SIGTERM);
   });
@@ -373,4 +300,71 @@ TEST_CASE("resume: an identification that was interrupted between its starts goe
   CHECK(fs::exists(out / "optimized.json"));
   REQUIRE(run_command({"resume", out.string()}).exit_code == kDone);
   CHECK(outcome_of(out) == outcome_of(folder.path / "whole"));
+}
+
+namespace {
+
+std::string single_fit(const TemporaryFolder& folder) {
+  std::string text = fit_problem();
+  const std::string multistart = ",\n      \"multistart\": {\"starts\": 5, \"seed\": 2}";
+  text.erase(text.find(multistart), multistart.size());
+  text.replace(text.find("\"k\": {\"value\": 60"), 17, "\"k\": {\"value\": 25");
+  folder.write("swing.csv", swing_csv(folder));
+  return folder.write("fit.json", text);
+}
+
+}  // namespace
+
+TEST_CASE("resume: a single identification goes on from its journal, its profiles too, wherever that was cut off",
+          "[resume]") {
+  const TemporaryFolder folder;
+  const std::string file = single_fit(folder);
+  const fs::path out = folder.path / "out";
+  REQUIRE(run_command({"identify", file, "--out", out.string(), "--profile", "k"}).exit_code == kDone);
+  const auto whole = outcome_of(out);
+  const std::vector<std::string> files{"history.csv", "residuals.csv", "profile.csv", "optimized.json"};
+  std::vector<std::string> contents;
+  for (const std::string& name : files) contents.push_back(content_of(out / name));
+  const std::string journal = content_of(out / kJournalFile);
+  const long simulations = json_of(out / "result.json").at("optimizer").at("simulations");
+  const long residuals = journal_lines(out, "residuals"), iterates = journal_lines(out, "iterate");
+  CHECK(iterates == whole.at("optimizer").at("iterations").get<long>() + 1);
+  CHECK(residuals > whole.at("optimizer").at("evaluations").get<long>());  // and those of the profile
+  for (const double part : {0.02, 0.3, 0.9}) {
+    INFO(part);
+    for (const std::string& name : files) fs::remove(out / name);
+    write_text(out / kJournalFile,
+               journal.substr(0, std::max(journal.find('\n') + 1,
+                                          static_cast<std::size_t>(part * static_cast<double>(journal.size())))));
+    const long known = journal_lines(out, "residuals");
+    REQUIRE(known < residuals);
+    const CommandOutcome outcome = run_command({"resume", out.string()});
+    INFO(outcome.err);
+    REQUIRE(outcome.exit_code == kDone);
+    CHECK(outcome_of(out) == whole);
+    CHECK(json_of(out / "result.json").at("optimizer").at("simulations") == simulations - known);
+    for (std::size_t i = 0; i < files.size(); ++i) CHECK(content_of(out / files[i]) == contents[i]);
+    CHECK(journal_lines(out, "residuals") == residuals);  // only what was missing has been computed
+    CHECK(journal_lines(out, "iterate") == iterates);
+  }
+}
+
+TEST_CASE("resume: an identification that is interrupted within its first simulation has nothing yet, and says so",
+          "[resume]") {
+  const TemporaryFolder folder;
+  const std::string file = single_fit(folder);
+  const fs::path out = folder.path / "out";
+  std::thread killer([&] {
+    for (int i = 0; i < 3000 && !fs::exists(out / kJournalFile); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    ::kill(::getpid(), SIGINT);
+  });
+  const CommandOutcome outcome = run_command(
+      {"identify", file, "--out", out.string(), "--set", "simulation.integrator.max_step=1e-5"});  // takes seconds
+  killer.join();
+  INFO(outcome.err);
+  CHECK(outcome.exit_code == kInterrupted);
+  CHECK_THAT(outcome.err, Contains("mbsopt resume"));
+  CHECK(json_of(out / "result.json").at("status") == "interrupted");
+  CHECK(journal_lines(out, "residuals") == 0);
 }

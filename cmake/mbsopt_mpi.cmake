@@ -1,0 +1,16 @@
+# Open MPI's C header, and the program that starts ranks: MBSOPT_HAVE_MPI, OPEN_MPI_INCLUDE_DIRS, MBSOPT_MPIRUN. Nothing
+# is linked: ranks load the library themselves (app/mpi_ranks.cpp).
+set(MBSOPT_HAVE_MPI OFF)
+if(MBSOPT_MPI AND MBSOPT_SANITIZE)
+  message(STATUS "No MPI: the sanitizers cannot load it as the program has to (RTLD_DEEPBIND)")
+elseif(MBSOPT_MPI)
+  find_package(PkgConfig REQUIRED)
+  pkg_check_modules(OPEN_MPI QUIET ompi-c)
+  find_program(MBSOPT_MPIRUN mpirun)
+  if(OPEN_MPI_FOUND AND MBSOPT_MPIRUN)
+    set(MBSOPT_HAVE_MPI ON)
+  elseif(NOT MBSOPT_MPI STREQUAL AUTO)
+    message(FATAL_ERROR "MBSOPT_MPI is ${MBSOPT_MPI}, but Open MPI is not there: ./dev setup --mpi")
+  endif()
+endif()
+message(STATUS "MPI: ${MBSOPT_HAVE_MPI}")
