@@ -65,7 +65,7 @@ class Sweep {
   void find_reference() {
     say("reference", 0);
     ReferenceOptions options;
-    options.seconds_per_run = std::max(3.0, options_.budget_seconds / 12);
+    options.seconds_per_run = std::max(10.0, options_.budget_seconds / 6);
     options.interrupted = options_.interrupted;
     result_.reference = converged_reference(runs_, options);
     result_.message = result_.reference.message;

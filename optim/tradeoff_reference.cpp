@@ -31,10 +31,9 @@ class Search {
     const Stopwatch stopwatch;
     TradeoffReference reference;
     std::vector<Candidate> found;
-    constexpr double kTightEnough = 1.01e-11;
-    for (const char* integrator : {"dopri853", "gauss6", "radau5"}) {
+    for (const char* integrator : {"dopri853", "gauss6", "verner6", "radau5"}) {
       const bool settled =
-          found.size() == 2 && found[0].method.rtol < kTightEnough && found[1].method.rtol < kTightEnough;
+          std::count_if(found.begin(), found.end(), [](const Candidate& c) { return c.change < 1e-9; }) >= 2;
       if (settled || interrupted()) break;
       if (std::optional<Candidate> candidate = converged(integrator)) found.push_back(std::move(*candidate));
     }
@@ -61,9 +60,10 @@ class Search {
   // Tightens until the answer no longer settles.
   std::optional<Candidate> converged(const std::string& integrator) {
     std::optional<Candidate> best;
-    for (const double rtol : {1e-9, 1e-10, 1e-11, 1e-12, 1e-13}) {
-      constexpr double kGrowth = 2;  // of the cost, a decade
-      if (best && kGrowth * best->method.wall_seconds > options_.seconds_per_run) break;
+    for (const double rtol : {1e-7, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13}) {
+      constexpr double kGrowth = 1.5;     // of the cost, a decade
+      constexpr double kSettled = 1e-11;  // what is left is a tenth of it
+      if (best && (kGrowth * best->method.wall_seconds > options_.seconds_per_run || best->change < kSettled)) break;
       Candidate next;
       next.settings = with_tolerance(runs_.scene().simulation, integrator, rtol);
       next.settings.formulation = constrained(next.settings.formulation);

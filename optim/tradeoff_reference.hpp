@@ -1,8 +1,9 @@
 // The right answer of a problem, found by two methods that share no table: each goes on to tighter tolerances until its
 // answer no longer settles (rounding) or costs too much. What the two are apart is the reference's certificate.
 //
-// Methods: dopri853 (explicit) and gauss6 (implicit); radau5 where one of them does not get there. Equations: the
-// constrained ones (augmented Lagrangian, projected), whatever the scene asks for.
+// Methods: dopri853 (explicit) and gauss6 (implicit); where one of them does not get there (stiff motion, singular
+// positions) verner6 and radau5. Equations: the constrained ones (augmented Lagrangian, projected), whatever the scene
+// asks for.
 //
 //   const TradeoffReference reference = converged_reference(runs);
 //   if (reference.ok()) reference.errors->of(answer);
@@ -32,7 +33,7 @@ struct TradeoffReference {
 };
 
 struct ReferenceOptions {
-  double seconds_per_run = 5;  // a run that would take longer is left out
+  double seconds_per_run = 10;  // a run that would take longer is left out
   bool gradients = true;
   std::function<bool()> interrupted = {};
 };

@@ -26,7 +26,7 @@ TEST_CASE("alpha: the model's error falls as 1/alpha, Cholesky's rounding grows 
   Problem p = five_bar::problem();
   p.scene.simulation.end_time = 0.3;
   PenaltyStudyOptions options;
-  options.alphas = {1e4, 1e6, 1e8, 1e14};
+  options.alphas = {1e3, 1e5, 1e7, 1e14};
   options.budget_seconds = 4;
   const PenaltyStudy study = study_penalty(p.scene, objectives_of(p), options);
   INFO(study.message);
@@ -40,7 +40,8 @@ TEST_CASE("alpha: the model's error falls as 1/alpha, Cholesky's rounding grows 
     REQUIRE(row.quasidefinite.ok);
     for (Eigen::Index q : {0, 2}) {  // motion, psi
       CHECK(row.quasidefinite.errors(q) < 0.1 * before.quasidefinite.errors(q));
-      CHECK(row.rounding(q) < 0.1 * before.quasidefinite.errors(q));
+      CHECK(before.rounding(q) < 1e-3 * before.quasidefinite.errors(q));
+      CHECK(row.rounding(q) > before.rounding(q));
     }
     CHECK(row.quasidefinite.statistics.max_position_violation <
           0.1 * before.quasidefinite.statistics.max_position_violation);
@@ -48,6 +49,6 @@ TEST_CASE("alpha: the model's error falls as 1/alpha, Cholesky's rounding grows 
   const PenaltyStudyRow& extreme = study.rows.back();
   CHECK(extreme.rounding_error > 1e-4);
   CHECK(extreme.model_error < 1e-10);
-  CHECK(study.rows[2].augmented_error < 1e-12);
+  CHECK(study.rows[2].augmented_error < 1e-11);
   CHECK(study.constrained.ok);
 }
