@@ -106,6 +106,7 @@ def keep(runs):
                 "file": f"{kind}_{name}.csv", "problem": name.replace("__", "/"), "kind": kind,
                 "command": "mbsopt " + result["provenance"]["command_line"].removeprefix("mbsopt ").split(" --out")[0],
                 "machine": f"{result['machine']['cpu']}, {result['machine']['cores']} cores",
+                "load": f"{result['machine']['load'] or 0:.1f}",
                 "first": f"{reference['first']['integrator']} at rtol {reference['first']['rtol']:.0e}",
                 "second": f"{reference['second']['integrator']} at rtol {reference['second']['rtol']:.0e}",
                 "apart": json.dumps({q: float(f"{v['apart']:.2g}") for q, v in reference["quantities"].items()}),
@@ -268,6 +269,11 @@ def write():
     PLOTS.mkdir(parents=True, exist_ok=True)
     runs = rows_of(DATA / "runs.csv")
     lines = [f"Measured on: {', '.join(sorted({r['machine'] for r in runs}))}. Times are medians of up to five rounds.", ""]
+    loads = [float(r["load"]) for r in runs]
+    cores = min(int(r["machine"].rsplit(", ", 1)[1].split()[0]) for r in runs)
+    if max(loads) > 0.7 * cores:
+        lines += [f"**The machine was busy**: a load of {min(loads):.0f} to {max(loads):.0f} on {cores} cores, so that times are longer than they would be",
+                  "alone and their order is uncertain where they are close; errors and counts do not depend on it.", ""]
     lines += gallery_section()
     for run in runs:
         lines += sweep_section(run) if run["kind"] == "sweep" else alpha_section(run)

@@ -43,6 +43,7 @@ class Sweep {
     find_reference();
     if (!result_.ok()) return finish();
     measure_given_settings();
+    budget_.emplace();
     if (options_.budget_seconds > 0) {
       constexpr double kSimulations = 0.25, kGradients = 0.2, kFormulations = 0.1;  // of the budget; the rest: again
       stage("integrators", simulation_curves(), kSimulations);
@@ -69,7 +70,6 @@ class Sweep {
     options.interrupted = options_.interrupted;
     result_.reference = converged_reference(runs_, options);
     result_.message = result_.reference.message;
-    budget_.emplace();
   }
 
   Tradeoff finish() {
@@ -313,7 +313,7 @@ class Sweep {
   TradeoffRuns runs_;
   const TradeoffOptions& options_;
   Stopwatch stopwatch_;
-  std::optional<Stopwatch> budget_;  // begins after the reference
+  std::optional<Stopwatch> budget_;  // begins after the reference and the given settings
   Tradeoff result_;
   std::vector<std::vector<double>> seconds_;  // per row
 };

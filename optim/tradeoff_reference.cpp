@@ -32,9 +32,7 @@ class Search {
     TradeoffReference reference;
     std::vector<Candidate> found;
     for (const char* integrator : {"dopri853", "gauss6", "verner6", "radau5"}) {
-      const bool settled =
-          std::count_if(found.begin(), found.end(), [](const Candidate& c) { return c.change < 1e-9; }) >= 2;
-      if (settled || interrupted()) break;
+      if (agree(found) || interrupted()) break;
       if (std::optional<Candidate> candidate = converged(integrator)) found.push_back(std::move(*candidate));
     }
     reference.interrupted = interrupted();
@@ -56,6 +54,16 @@ class Search {
  private:
   bool interrupted() const { return options_.interrupted && options_.interrupted(); }
   RunLimit limit() const { return {options_.seconds_per_run, options_.interrupted}; }
+
+  // Two that each have settled, on the same answer.
+  bool agree(const std::vector<Candidate>& found) const {
+    constexpr double kSettled = 1e-9, kSame = 1e-7;
+    const auto settled =
+        std::count_if(found.begin(), found.end(), [](const Candidate& c) { return c.change < kSettled; });
+    if (settled < 2) return false;
+    const auto [first, second] = closest(found);
+    return apart(found[first].answer, found[second].answer) < kSame;
+  }
 
   // Tightens until the answer no longer settles.
   std::optional<Candidate> converged(const std::string& integrator) {
