@@ -2,6 +2,7 @@
 // exception (InputError, SceneError, OutputError), which command_line.cpp turns into words and exit code 2.
 #pragma once
 
+#include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -17,6 +18,9 @@ struct CommandOptions {
   std::string method = "auto";        // --method of gradient
   bool hessian = false;               // --hessian of gradient
   std::vector<std::string> profiles;  // --profile of identify: fitted parameters
+  double budget = 60;                 // --budget of tradeoff [s]
+  std::string alpha;                  // --alpha of tradeoff: the penalty study
+  std::optional<double> apply;        // --apply of tradeoff: the accuracy wanted
   int threads = 0;                    // --threads, also worker processes; 0: as many as the machine has
   bool quiet = false;                 // --quiet
   bool resume = false;                // go on with the journal in `out`
@@ -39,6 +43,7 @@ int gradient_command(const CommandContext& context);
 int check_command(const CommandContext& context);
 int design_command(const CommandContext& context);
 int identify_command(const CommandContext& context);
+int tradeoff_command(const CommandContext& context);
 int resume_command(const CommandContext& context);  // options.problem_file: the folder
 int schema_command(const CommandContext& context);
 

@@ -36,10 +36,11 @@ constexpr std::array kCommands{
     Command{"check", "all gradient methods against each other and against differences", check_command},
     Command{"design", "optimal design", design_command},
     Command{"identify", "fit parameters to measurements", identify_command},
+    Command{"tradeoff", "error against cost for integrators, tolerances, formulations and gradient methods",
+            tradeoff_command},
     Command{"resume", "go on with a design or an identification that was interrupted or killed", resume_command},
     Command{"schema", "print the JSON Schema of problem files", schema_command},
 };
-constexpr std::array kLaterCommands{"tradeoff"};
 
 std::vector<std::string> command_names() {
   std::vector<std::string> names;
@@ -53,9 +54,6 @@ bool is_known(const std::string& word) {
 }
 
 std::string what_is_wrong_with(const std::string& word) {
-  if (std::find(kLaterCommands.begin(), kLaterCommands.end(), word) != kLaterCommands.end()) {
-    return fmt::format("'{}' is not available in this version", word);
-  }
   return fmt::format("there is no command '{}'{}", word, did_you_mean(word, command_names()));
 }
 
@@ -85,6 +83,18 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
     sub.add_option("--profile", options.profiles, "profile likelihood of fitted parameters: k1,run1.theta0")
         ->delimiter(',')
         ->type_name("NAME,...");
+  }
+  if (name == "tradeoff") {
+    sub.add_option("--budget", options.budget,
+                   "seconds for the sweep, roughly; 0: only the file's own settings and the defaults")
+        ->check(CLI::Range(0.0, 1e6))
+        ->capture_default_str();
+    sub.add_option("--alpha", options.alpha, "instead of the sweep, what alpha does to the penalty form: 1e2:1e16")
+        ->type_name("LOW:HIGH");
+    sub.add_option("--apply", options.apply,
+                   "also write recommended.json, the problem with the fastest settings of this accuracy: 1e-6")
+        ->check(CLI::Range(1e-15, 1.0))
+        ->type_name("ACCURACY");
   }
   if (name == "gradient") {
     sub.add_option("--method", options.method, "how gradients are computed")

@@ -12,8 +12,8 @@ namespace mbsopt {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::array kOutputs{"result.json", "trajectory.csv", "report.html", "optimized.json",
-                              "history.csv", "residuals.csv",  "profile.csv"};
+constexpr std::array kOutputs{"result.json",   "trajectory.csv", "report.html",  "optimized.json",  "history.csv",
+                              "residuals.csv", "profile.csv",    "tradeoff.csv", "recommended.json"};
 
 // A folder's name from a problem's: no separators, no leading dot, no control characters.
 std::string folder_name(std::string name) {

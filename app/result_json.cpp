@@ -5,11 +5,12 @@
 namespace mbsopt {
 namespace {
 
-constexpr std::array kOrder{"program",         "version",        "command",    "problem",    "status",
-                            "message",         "last_good_time", "model",      "simulation", "objectives",
-                            "methods",         "hessian_method", "verdict",    "parameters", "experiments",
-                            "correlation",     "profiles",       "statistics", "multistart", "optimizer",
-                            "identifiability", "provenance",     "warnings"};
+constexpr std::array kOrder{"program",    "version",         "command",         "problem",    "status",
+                            "message",    "last_good_time",  "machine",         "model",      "simulation",
+                            "objectives", "methods",         "hessian_method",  "verdict",    "reference",
+                            "settings",   "recommendations", "applied",         "skipped",    "penalty",
+                            "parameters", "experiments",     "correlation",     "profiles",   "statistics",
+                            "multistart", "optimizer",       "identifiability", "provenance", "warnings"};
 
 }  // namespace
 

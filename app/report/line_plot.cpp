@@ -43,19 +43,20 @@ struct Frame {
   double py(double value) const { return kTop + (y.high - value) / y.span() * kInnerHeight; }
 };
 
+double x_of(const LinePlot& plot, double value) { return plot.logarithmic_x ? std::log10(value) : value; }
 double y_of(const LinePlot& plot, double value) { return plot.logarithmic_y ? std::log10(value) : value; }
 
 Frame frame_of(const LinePlot& plot) {
   Frame frame;
   for (const PlotSeries& series : plot.series) {
     for (std::size_t i = 0; i < series.x.size(); ++i) {
-      const double y = y_of(plot, series.y[i]);
-      if (!std::isfinite(series.x[i]) || !std::isfinite(y)) continue;
-      frame.x.include(series.x[i]);
+      const double x = x_of(plot, series.x[i]), y = y_of(plot, series.y[i]);
+      if (!std::isfinite(x) || !std::isfinite(y)) continue;
+      frame.x.include(x);
       frame.y.include(y);
     }
   }
-  frame.x.finish(plot.equal_axes ? 0.05 : 0);
+  frame.x.finish(plot.equal_axes || plot.logarithmic_x ? 0.05 : 0);
   frame.y.finish(0.05);
   if (plot.equal_axes) {
     const double scale = std::max(frame.x.span() / kInnerWidth, frame.y.span() / kInnerHeight);
@@ -70,7 +71,7 @@ Frame frame_of(const LinePlot& plot) {
 }
 
 // Many samples to a pixel column become at most its first, lowest, highest and last: the drawing is the same.
-std::vector<std::size_t> visible_samples(const PlotSeries& series, const Frame& frame) {
+std::vector<std::size_t> visible_samples(const LinePlot& plot, const PlotSeries& series, const Frame& frame) {
   std::vector<std::size_t> all(series.x.size());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
   if (series.x.size() <= 2 * static_cast<std::size_t>(kInnerWidth) ||
@@ -79,9 +80,10 @@ std::vector<std::size_t> visible_samples(const PlotSeries& series, const Frame& 
   }
   std::vector<std::size_t> kept;
   for (std::size_t begin = 0; begin < all.size();) {
-    const double column = std::floor(frame.px(series.x[begin]));
+    const auto column_of = [&](std::size_t i) { return std::floor(frame.px(x_of(plot, series.x[i]))); };
+    const double column = column_of(begin);
     std::size_t end = begin, low = begin, high = begin;
-    for (; end < all.size() && std::floor(frame.px(series.x[end])) == column; ++end) {
+    for (; end < all.size() && column_of(end) == column; ++end) {
       if (series.y[end] < series.y[low]) low = end;
       if (series.y[end] > series.y[high]) high = end;
     }
@@ -98,13 +100,13 @@ void draw_series(const LinePlot& plot, const Frame& frame, std::size_t index, st
   const PlotSeries& series = plot.series[index];
   std::string path;
   bool pen_down = false;
-  for (const std::size_t i : visible_samples(series, frame)) {
-    const double y = y_of(plot, series.y[i]);
-    if (!std::isfinite(series.x[i]) || !std::isfinite(y)) {
+  for (const std::size_t i : visible_samples(plot, series, frame)) {
+    const double x = x_of(plot, series.x[i]), y = y_of(plot, series.y[i]);
+    if (!std::isfinite(x) || !std::isfinite(y)) {
       pen_down = false;
       continue;
     }
-    const double px = frame.px(series.x[i]), py = frame.py(y);
+    const double px = frame.px(x), py = frame.py(y);
     if (series.mark == Mark::points) {
       fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}h0", px, py);
     } else {
@@ -128,18 +130,33 @@ std::string power_of_ten(double value) {
   return std::abs(digits - 1) < 1e-6 ? power : fmt::format("{:.4g}\u00b7{}", digits, power);
 }
 
-// Places on the axis (logarithms where it is logarithmic) and their labels.
-std::vector<std::pair<double, std::string>> y_ticks_of(const LinePlot& plot, const Frame& frame) {
-  std::vector<std::pair<double, std::string>> ticks;
-  if (plot.logarithmic_y) {
-    const std::vector<double> values = logarithmic_ticks(std::pow(10, frame.y.low), std::pow(10, frame.y.high), 6);
-    for (const double y : values)
-      ticks.emplace_back(std::log10(y), near_one(values) ? fmt::format("{:.6g}", y) : power_of_ten(y));
-  } else {
-    for (const double y : round_ticks(frame.y.low, frame.y.high, plot.equal_axes ? 5 : 6))
-      ticks.emplace_back(y, fmt::format("{:.6g}", y));
-  }
+// Places on an axis (logarithms where it is logarithmic) and their labels.
+using Ticks = std::vector<std::pair<double, std::string>>;
+
+Ticks ticks_of(const std::vector<double>& values) {
+  Ticks ticks;
+  for (const double value : values) ticks.emplace_back(value, fmt::format("{:.6g}", value));
   return ticks;
+}
+
+Ticks logarithmic_ticks_of(const Range& range, int count) {
+  Ticks ticks;
+  const std::vector<double> values = logarithmic_ticks(std::pow(10, range.low), std::pow(10, range.high), count);
+  for (const double value : values)
+    ticks.emplace_back(std::log10(value), near_one(values) ? fmt::format("{:.6g}", value) : power_of_ten(value));
+  return ticks;
+}
+
+Ticks y_ticks_of(const LinePlot& plot, const Frame& frame) {
+  if (plot.logarithmic_y) return logarithmic_ticks_of(frame.y, 6);
+  return ticks_of(round_ticks(frame.y.low, frame.y.high, plot.equal_axes ? 5 : 6));
+}
+
+Ticks x_ticks_of(const LinePlot& plot, const Frame& frame) {
+  if (plot.logarithmic_x) return logarithmic_ticks_of(frame.x, 8);
+  std::vector<double> values = round_ticks(frame.x.low, frame.x.high, 8);
+  if (plot.whole_x) std::erase_if(values, [](double x) { return x != std::round(x); });
+  return ticks_of(values);
 }
 
 // Drawn like the series itself.
@@ -152,13 +169,11 @@ std::string legend_key(const PlotSeries& series, std::size_t index) {
 
 void draw_axes(const LinePlot& plot, const Frame& frame, std::string& svg) {
   const double bottom = kTop + kInnerHeight, right = kLeft + kInnerWidth;
-  auto x_ticks = round_ticks(frame.x.low, frame.x.high, 8);
-  if (plot.whole_x) std::erase_if(x_ticks, [](double x) { return x != std::round(x); });
-  for (const double tick : x_ticks) {
+  for (const auto& [tick, label] : x_ticks_of(plot, frame)) {
     svg += fmt::format(
         "<path class=\"grid\" d=\"M{0:.1f} {1:.1f}V{2:.1f}\"/><text x=\"{0:.1f}\" y=\"{3:.1f}\" "
-        "text-anchor=\"middle\">{4:.6g}</text>\n",
-        frame.px(tick), kTop, bottom, bottom + 16, tick);
+        "text-anchor=\"middle\">{4}</text>\n",
+        frame.px(tick), kTop, bottom, bottom + 16, label);
   }
   for (const auto& [tick, label] : y_ticks_of(plot, frame)) {
     svg += fmt::format(

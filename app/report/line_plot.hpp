@@ -23,6 +23,7 @@ struct LinePlot {
   std::string title, x_label, y_label;
   std::vector<PlotSeries> series = {};
   bool logarithmic_y = false;  // values <= 0 are left out
+  bool logarithmic_x = false;  // likewise
   bool whole_x = false;        // x counts: ticks at whole numbers only
   bool equal_axes = false;     // one metre is as long in x as in y: for paths
 };

@@ -43,14 +43,6 @@ TEST_CASE("the outcome of a design survives other commands, but not another desi
   CHECK(run_command({"design", file, "--out", out, "--set", "parameters.k.upper=31"}).exit_code == kDone);
 }
 
-TEST_CASE("a command of the contract that this version lacks says so and lists what there is", "[command]") {
-  for (const char* command : {"tradeoff"}) {
-    const CommandOutcome outcome = run_command({command, "x.json"});
-    CHECK(outcome.exit_code == kBadInput);
-    CHECK_THAT(outcome.err, Contains(command) && Contains("not available") && Contains("simulate"));
-  }
-}
-
 TEST_CASE("bad input ends with exit 2 and its place, before anything is written", "[command]") {
   const TemporaryFolder folder;
   std::string text = kPendulum;

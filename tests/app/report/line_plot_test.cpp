@@ -86,3 +86,15 @@ TEST_CASE("a constant, an empty and a logarithmic series are drawn", "[report]")
   plot.series[0].y = {1e-3, 0};
   CHECK(to_svg(plot).find("inf") == std::string::npos);
 }
+
+TEST_CASE("on a logarithmic x axis decades are equally wide and values <= 0 are left out", "[report]") {
+  LinePlot plot{.title = "", .x_label = "time [s]", .y_label = "error", .logarithmic_y = true, .logarithmic_x = true};
+  plot.series.push_back({"dopri5", {1e-3, 1e-2, 0, 1e-1}, {1e-2, 1e-4, 1e-5, 1e-6}, Mark::line});
+  const std::string svg = to_svg(plot);
+  CHECK(svg.find("inf") == std::string::npos);
+  CHECK(svg.find(">0.01<") != std::string::npos);
+  std::smatch line;
+  REQUIRE(std::regex_search(svg, line, std::regex("d=\"M([0-9.]+) [0-9.]+L([0-9.]+) [0-9.]+M([0-9.]+) ")));
+  const double first = std::stod(line[1]), second = std::stod(line[2]), third = std::stod(line[3]);
+  CHECK(second - first == Approx(third - second).epsilon(1e-3));
+}

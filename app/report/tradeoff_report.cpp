@@ -1,0 +1,206 @@
+#include "app/report/tradeoff_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "app/machine.hpp"
+#include "app/report/line_plot.hpp"
+#include "app/report/report_parts.hpp"
+#include "core/integrate/tableaus.hpp"
+
+namespace mbsopt {
+namespace {
+
+std::string error_cell(double error) { return std::isfinite(error) ? fmt::format("{:.1e}", error) : "-"; }
+
+void add_reference(HtmlPage& page, const TradeoffReference& reference) {
+  page.heading("Reference");
+  page.paragraph(fmt::format(
+      "{} at rtol {:.0e}, certified by {} at rtol {:.0e}: what the two are apart is how far errors can be told.",
+      reference.first.integrator, reference.first.rtol, reference.second.integrator, reference.second.rtol));
+  std::vector<std::vector<std::string>> rows;
+  for (const Quantity& q : reference.errors->quantities())
+    rows.push_back({q.name, q.relative ? "relative" : "absolute", error_cell(q.certificate)});
+  page.table({"quantity", "errors are", "two methods apart"}, rows);
+}
+
+// Which plot a curve belongs to.
+enum class Group { explicit_methods, implicit_methods, formulations, gradients };
+
+Group group_of(const TradeoffSetting& setting) {
+  if (setting.gradient) return Group::gradients;
+  const Method* method = runge_kutta_method(setting.simulation.integrator.type);
+  if (setting.curve != setting.simulation.integrator.type) return Group::formulations;
+  return method && !method->implicit() ? Group::explicit_methods : Group::implicit_methods;
+}
+
+bool is_one_point(const TradeoffSetting& setting) {
+  return setting.curve == "as in the file" || setting.curve == "defaults";
+}
+
+LinePlot work_precision(const Tradeoff& tradeoff, std::size_t quantity, Group group, const std::string& title) {
+  const Quantity& q = tradeoff.reference.errors->quantities()[quantity];
+  const auto column = static_cast<Eigen::Index>(quantity);
+  LinePlot plot{.title = title,
+                .x_label = "time [s]",
+                .y_label = (q.relative ? "relative error of " : "absolute error of ") + q.name,
+                .logarithmic_y = true,
+                .logarithmic_x = true};
+  PlotSeries front{"Pareto front", {}, {}, Mark::points};
+  for (const TradeoffRow& row : tradeoff.rows) {
+    if (row.status != RowStatus::ok || !(row.errors(column) > 0)) continue;
+    if (group_of(row.setting) != group && !(is_one_point(row.setting) && group == Group::formulations)) continue;
+    if (row.pareto.size() > quantity && row.pareto[quantity]) {
+      front.x.push_back(row.wall_seconds);
+      front.y.push_back(row.errors(column));
+    }
+    if (is_one_point(row.setting)) continue;
+    auto series = std::find_if(plot.series.begin(), plot.series.end(),
+                               [&](const PlotSeries& s) { return s.name == row.setting.curve; });
+    if (series == plot.series.end())
+      series = plot.series.insert(series, PlotSeries{row.setting.curve, {}, {}, Mark::line});
+    series->x.push_back(row.wall_seconds);
+    series->y.push_back(row.errors(column));
+  }
+  if (!front.x.empty() && !plot.series.empty()) plot.series.push_back(std::move(front));
+  return plot;
+}
+
+void add_plots(HtmlPage& page, const Tradeoff& tradeoff) {
+  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
+  struct Titled {
+    Group group;
+    const char* title;
+  };
+  constexpr std::array kPlots{Titled{Group::explicit_methods, "explicit methods"},
+                              Titled{Group::implicit_methods, "implicit and multistep methods"},
+                              Titled{Group::formulations, "formulations"},
+                              Titled{Group::gradients, "gradient methods"}};
+  for (std::size_t q = 0; q < quantities.size(); ++q) {
+    page.heading("Error of " + quantities[q].name + " over time");
+    for (const Titled& p : kPlots) {
+      const LinePlot plot = work_precision(tradeoff, q, p.group, quantities[q].name + ": " + p.title);
+      if (!plot.series.empty()) page.plot(plot);
+    }
+  }
+}
+
+void add_recommendations(HtmlPage& page, const Json& result) {
+  if (!result.contains("recommendations")) return;
+  page.heading("What to use");
+  std::vector<std::vector<std::string>> rows;
+  for (const Json& r : result.at("recommendations")) {
+    const std::string words = r.at("in_words");
+    rows.push_back(
+        {r.at("quantity"), fmt::format("{:.0e}", r.at("accuracy").get<double>()), words.substr(words.find(": ") + 2)});
+  }
+  page.table({"quantity", "accuracy", "fastest setting"}, rows);
+  if (result.contains("applied"))
+    page.paragraph("Applied in recommended.json, " + result.at("applied").at("in_words").get<std::string>() + ".");
+}
+
+void add_rows(HtmlPage& page, const Tradeoff& tradeoff) {
+  page.heading("All settings");
+  std::vector<std::string> header{"setting", "time [s]", "repetitions", "steps", "right-hand sides", "factorisations"};
+  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
+  for (const Quantity& q : quantities) header.push_back(q.name);
+  header.push_back("outcome");
+  std::vector<std::vector<std::string>> rows;
+  for (const TradeoffRow& r : tradeoff.rows) {
+    const bool ok = r.status == RowStatus::ok;
+    std::vector<std::string> row{in_words(r.setting),
+                                 ok ? fmt::format("{:.3g}", r.wall_seconds) : "-",
+                                 std::to_string(r.repetitions),
+                                 std::to_string(r.statistics.steps),
+                                 std::to_string(r.statistics.rhs_evaluations),
+                                 std::to_string(r.statistics.factorisations)};
+    for (std::size_t q = 0; q < quantities.size(); ++q) {
+      const bool front = q < r.pareto.size() && r.pareto[q];
+      row.push_back(error_cell(r.errors(static_cast<Eigen::Index>(q))) + (front ? " *" : ""));
+    }
+    row.push_back(ok ? "ok" : fmt::format("{}: {}", to_string(r.status), r.message));
+    rows.push_back(std::move(row));
+  }
+  page.table(header, rows);
+  page.paragraph("* on the Pareto front: nothing measured is both faster and more exact.");
+}
+
+void add_machine(HtmlPage& page, const Json& result) {
+  page.paragraph("Times are medians, measured on " + machine_name(result.at("machine")) + ".");
+}
+
+LinePlot alpha_plot(const std::string& title, const std::string& label) {
+  return {.title = title, .x_label = "alpha", .y_label = label, .logarithmic_y = true, .logarithmic_x = true};
+}
+
+}  // namespace
+
+std::string tradeoff_report(const Json& result, const Tradeoff& tradeoff) {
+  HtmlPage page(report_title(result));
+  add_status(page, result);
+  add_machine(page, result);
+  add_recommendations(page, result);
+  add_plots(page, tradeoff);
+  add_reference(page, tradeoff.reference);
+  add_rows(page, tradeoff);
+  add_model(page, result);
+  add_provenance(page, result);
+  return page.text();
+}
+
+std::string penalty_report(const Json& result, const PenaltyStudy& study) {
+  HtmlPage page(report_title(result));
+  add_status(page, result);
+  add_machine(page, result);
+  page.heading("Accelerations");
+  LinePlot accelerations = alpha_plot("Relative error of accelerations", "relative error");
+  PlotSeries model{"penalty against the constrained equations", {}, {}, Mark::line},
+      rounding{"rounding by Cholesky", {}, {}, Mark::line}, augmented{"augmented Lagrangian", {}, {}, Mark::dashed};
+  std::vector<std::vector<std::string>> rows;
+  for (const PenaltyStudyRow& row : study.rows) {
+    for (PlotSeries* s : {&model, &rounding, &augmented}) s->x.push_back(row.alpha);
+    model.y.push_back(row.model_error), rounding.y.push_back(row.rounding_error);
+    augmented.y.push_back(row.augmented_error);
+    rows.push_back({fmt::format("{:.0e}", row.alpha), error_cell(row.model_error), error_cell(row.rounding_error),
+                    error_cell(row.augmented_error)});
+  }
+  accelerations.series = {model, rounding, augmented};
+  page.plot(accelerations);
+  page.table({"alpha", "model error", "rounding by Cholesky", "augmented Lagrangian"}, rows);
+  page.heading("Runs");
+  page.paragraph(fmt::format("{} at rtol {:g}; xi {:g}, omega {:g}.", study.integrator, study.rtol,
+                             study.formulation.xi, study.formulation.omega));
+  const std::vector<Quantity>& quantities = study.reference.errors->quantities();
+  for (std::size_t q = 0; q < quantities.size(); ++q) {
+    const auto column = static_cast<Eigen::Index>(q);
+    LinePlot plot = alpha_plot("Error of " + quantities[q].name, "error of " + quantities[q].name);
+    PlotSeries quasi{"quasi-definite", {}, {}, Mark::line}, cholesky{"cholesky", {}, {}, Mark::line},
+        rounded{"rounding by Cholesky on equal steps", {}, {}, Mark::dashed};
+    for (const PenaltyStudyRow& row : study.rows) {
+      for (PlotSeries* s : {&quasi, &cholesky, &rounded}) s->x.push_back(row.alpha);
+      quasi.y.push_back(row.quasidefinite.errors(column)), cholesky.y.push_back(row.cholesky.errors(column));
+      rounded.y.push_back(row.rounding(column));
+    }
+    plot.series = {quasi, cholesky, rounded};
+    page.plot(plot);
+  }
+  rows.clear();
+  for (const PenaltyStudyRow& row : study.rows) {
+    for (const auto& [name, r] : {std::pair<const char*, const PenaltyRun&>{"quasi-definite", row.quasidefinite},
+                                  std::pair<const char*, const PenaltyRun&>{"cholesky", row.cholesky}}) {
+      rows.push_back({fmt::format("{:.0e}", row.alpha), name, std::to_string(r.statistics.rhs_evaluations),
+                      r.ok ? fmt::format("{:.3g}", r.wall_seconds) : "-",
+                      r.ok ? error_cell(r.statistics.max_position_violation) : "-", r.ok ? "ok" : r.message});
+    }
+  }
+  page.table({"alpha", "solver", "right-hand sides", "time [s]", "drift", "outcome"}, rows);
+  add_reference(page, study.reference);
+  add_model(page, result);
+  add_provenance(page, result);
+  return page.text();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,16 @@
+// report.html of `tradeoff`: work-precision plots, what is recommended, how far the reference can be trusted. Unlike
+// other reports it shows seconds: they are what was measured.
+#pragma once
+
+#include <string>
+
+#include "app/result_json.hpp"
+#include "optim/penalty_study.hpp"
+#include "optim/tradeoff.hpp"
+
+namespace mbsopt {
+
+std::string tradeoff_report(const Json& result, const Tradeoff& tradeoff);
+std::string penalty_report(const Json& result, const PenaltyStudy& study);
+
+}  // namespace mbsopt

@@ -1,0 +1,91 @@
+#include <fmt/format.h>
+
+#include "app/command.hpp"
+#include "app/interrupt.hpp"
+#include "app/machine.hpp"
+#include "app/recommended_problem.hpp"
+#include "app/report/tradeoff_report.hpp"
+#include "app/run.hpp"
+#include "app/tradeoff_csv.hpp"
+#include "app/tradeoff_results.hpp"
+
+namespace mbsopt {
+namespace {
+
+void apply_accuracy(Run& run, const Tradeoff& tradeoff, double accuracy) {
+  const Recommendation r = recommend(tradeoff, main_quantities(tradeoff.reference.errors->quantities()), accuracy);
+  add_applied(run, tradeoff, r);
+  if (r.row) run.write("recommended.json", recommended_problem_text(run, tradeoff.rows[*r.row].setting.simulation));
+}
+
+void sweep(Run& run) {
+  TradeoffOptions options;
+  options.budget_seconds = run.context.options.budget;
+  options.interrupted = [] { return interrupted(); };
+  options.progress = [&](const std::string& doing, double done) { run.progress.fraction(doing, done); };
+  const Tradeoff tradeoff = measure_tradeoff(run.problem.scene, objectives_of(run.problem), options);
+  run.progress.finish();
+  if (!tradeoff.ok()) {
+    tradeoff.interrupted ? run.stopped("there was no reference yet, nothing is kept") : run.failed(tradeoff.message);
+    return;
+  }
+  add_reference(run, tradeoff.reference);
+  if (!tradeoff.rows.empty()) run.write("tradeoff.csv", to_csv(tradeoff));
+  add_given_settings(run, tradeoff);
+  if (options.budget_seconds > 0) {
+    add_recommendations(run, tradeoff);
+    add_outcomes(run, tradeoff);
+  }
+  if (tradeoff.interrupted) {
+    run.stopped("tradeoff.csv holds what was measured");
+  } else if (run.context.options.apply) {
+    apply_accuracy(run, tradeoff, *run.context.options.apply);
+  }
+  run.write("report.html", tradeoff_report(run.result, tradeoff));
+}
+
+void penalty_study(Run& run) {
+  PenaltyStudyOptions options;
+  options.alphas = alphas_of(run.context.options.alpha);
+  options.budget_seconds = run.context.options.budget;
+  options.interrupted = [] { return interrupted(); };
+  options.progress = [&](const std::string& doing, double done) { run.progress.fraction(doing, done); };
+  const PenaltyStudy study = study_penalty(run.problem.scene, objectives_of(run.problem), options);
+  run.progress.finish();
+  if (!study.ok()) {
+    study.interrupted ? run.stopped("there was no reference yet, nothing is kept") : run.failed(study.message);
+    return;
+  }
+  add_reference(run, study.reference);
+  if (!study.rows.empty()) run.write("tradeoff.csv", to_csv(study));
+  add_penalty_study(run, study);
+  if (study.interrupted) run.stopped("tradeoff.csv holds what was measured");
+  run.write("report.html", penalty_report(run.result, study));
+}
+
+}  // namespace
+
+int tradeoff_command(const CommandContext& context) {
+  const CommandOptions& options = context.options;
+  if (!options.alpha.empty()) {
+    if (options.apply) throw std::invalid_argument("--apply: the study that --alpha makes recommends nothing");
+    alphas_of(options.alpha);  // throws
+  } else if (options.apply && options.budget == 0) {
+    throw std::invalid_argument("--apply: with --budget 0 nothing is measured that could be recommended");
+  }
+  Run run(context);
+  const Scene& scene = run.problem.scene;
+  const Mechanism mechanism(scene, parameter_values(scene));
+  run.start();
+  const Json machine = machine_json();
+  run.result["machine"] = machine;
+  if (!assembled(run, Assembly(mechanism, scene.simulation.start_time))) return run.finish();
+  context.out << machine_name(machine) << '\n';
+  const Json& load = machine.at("load");
+  if (load.is_number() && load.get<double>() > 0.7 * machine.at("cores").get<double>())
+    run.warn(fmt::format("the machine is busy (load {:.1f}): times come out longer than they are", load.get<double>()));
+  options.alpha.empty() ? sweep(run) : penalty_study(run);
+  return run.finish();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,166 @@
+#include "app/tradeoff_results.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "app/text_table.hpp"
+#include "core/expression/counted.hpp"
+
+namespace mbsopt {
+namespace {
+
+Json row_json(const Tradeoff& tradeoff, std::size_t index) {
+  const TradeoffRow& row = tradeoff.rows[index];
+  Json json{{"setting", in_words(row.setting)}, {"status", to_string(row.status)}};
+  if (row.status != RowStatus::ok) json["message"] = row.message;
+  if (row.status == RowStatus::ok) json["wall_seconds"] = row.wall_seconds;
+  json["errors"] = errors_json(tradeoff.reference.errors->quantities(), row.errors);
+  return json;
+}
+
+std::string names_of(const std::vector<Quantity>& quantities, const std::vector<std::size_t>& indices) {
+  std::string names;
+  for (const std::size_t q : indices) names += (names.empty() ? "" : " and ") + quantities[q].name;
+  return names;
+}
+
+double worst_error(const TradeoffRow& row, const std::vector<std::size_t>& quantities) {
+  double worst = 0;
+  for (const std::size_t q : quantities) worst = std::max(worst, row.errors(static_cast<Eigen::Index>(q)));
+  return worst;
+}
+
+// "for 1e-04 in track: dopri5 at rtol 1e-05, 12 ms (error 3.1e-05)"
+std::string recommendation_text(const Tradeoff& tradeoff, const Recommendation& r) {
+  const std::string aim =
+      fmt::format("for {:.0e} in {}: ", r.accuracy, names_of(tradeoff.reference.errors->quantities(), r.quantities));
+  if (!r.row) return aim + r.why_not;
+  const TradeoffRow& row = tradeoff.rows[*r.row];
+  return aim + fmt::format("{}, {} (error {:.1e})", in_words(row.setting), duration_text(row.wall_seconds),
+                           worst_error(row, r.quantities));
+}
+
+}  // namespace
+
+std::string duration_text(double seconds) {
+  return seconds < 1 ? fmt::format("{:.3g} ms", 1e3 * seconds) : fmt::format("{:.3g} s", seconds);
+}
+
+Json errors_json(const std::vector<Quantity>& quantities, const Eigen::VectorXd& errors) {
+  Json json = Json::object();
+  for (std::size_t q = 0; q < quantities.size(); ++q) {
+    const double error = errors(static_cast<Eigen::Index>(q));
+    if (std::isfinite(error)) json[quantities[q].name] = error;
+  }
+  return json;
+}
+
+void add_reference(Run& run, const TradeoffReference& reference) {
+  const TradeoffErrors& errors = *reference.errors;
+  const auto method = [](const ReferenceMethod& m) {
+    return Json{{"integrator", m.integrator}, {"rtol", m.rtol}, {"wall_seconds", m.wall_seconds}};
+  };
+  Json& json = run.result["reference"];
+  json = {{"first", method(reference.first)}, {"second", method(reference.second)}};
+  if (!reference.gradients_by.empty()) json["gradients_by"] = reference.gradients_by;
+  TextTable table({"quantity", "reference", "two methods apart"});
+  for (const Quantity& q : errors.quantities()) {
+    json["quantities"][q.name] = {{"apart", q.certificate}, {"relative", q.relative}, {"scale", q.scale}};
+    const bool objective = q.kind == QuantityKind::objective;
+    const std::string words = objective ? significant(errors.exact().psi(q.objective), 14)
+                              : q.kind == QuantityKind::motion && q.relative
+                                  ? fmt::format("{:.3g} m from its start", q.scale)
+                                  : "";
+    table.add({q.name, words, fmt::format("{:.1e}{}", q.certificate, q.relative ? "" : " (absolute)")});
+  }
+  const std::vector<Parameter>& parameters = run.problem.scene.parameters;
+  for (std::size_t i = 0; i < run.problem.objectives.size(); ++i) {
+    const Eigen::Index row = static_cast<Eigen::Index>(i);
+    Json& objective = run.result["objectives"][run.problem.objectives[i].name];
+    objective["value"] = errors.exact().psi(row);
+    for (std::size_t k = 0; k < parameters.size() && errors.exact().psi_rho.size() > 0; ++k)
+      objective["gradient"][parameters[k].name] = errors.exact().psi_rho(row, static_cast<Eigen::Index>(k));
+  }
+  run.context.out << fmt::format("reference: {} at rtol {:.0e}, certified by {} at rtol {:.0e}; {}\n",
+                                 reference.first.integrator, reference.first.rtol, reference.second.integrator,
+                                 reference.second.rtol, duration_text(reference.wall_seconds))
+                  << '\n'
+                  << table.text();
+  for (const Quantity& q : errors.quantities()) {
+    if (q.certificate < 1e-6) continue;
+    run.warn(fmt::format(
+        "the reference of {} is known to {:.1e} only: errors below that cannot be told (a chaotic motion, or a law "
+        "that is not smooth?)",
+        q.name, q.certificate));
+  }
+}
+
+void add_given_settings(Run& run, const Tradeoff& tradeoff) {
+  std::vector<std::string> header{"setting", "time"};
+  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
+  for (const Quantity& q : quantities) header.push_back(q.name);
+  TextTable table(header);
+  const auto add = [&](const char* name, const std::optional<std::size_t>& simulation,
+                       const std::optional<std::size_t>& gradient) {
+    for (const std::optional<std::size_t>& i : {simulation, gradient}) {
+      if (!i) continue;
+      const TradeoffRow& row = tradeoff.rows[*i];
+      std::vector<std::string> cells{in_words(row.setting),
+                                     row.status == RowStatus::ok ? duration_text(row.wall_seconds) : "-"};
+      for (Eigen::Index q = 0; q < row.errors.size(); ++q)
+        cells.push_back(std::isfinite(row.errors(q)) ? fmt::format("{:.1e}", row.errors(q)) : "-");
+      table.add(cells);
+      if (row.status != RowStatus::ok) run.warn(fmt::format("{}: {}", cells[0], row.message));
+    }
+    if (simulation) run.result["settings"][name] = row_json(tradeoff, *simulation);
+    if (gradient) run.result["settings"][name]["gradient"] = row_json(tradeoff, *gradient);
+  };
+  add("own", tradeoff.own, tradeoff.own_gradient);
+  add("defaults", tradeoff.defaults, tradeoff.default_gradient);
+  run.context.out << "\nerrors\n" << table.text();
+}
+
+void add_recommendations(Run& run, const Tradeoff& tradeoff) {
+  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
+  for (std::size_t q = 0; q < quantities.size(); ++q) {
+    run.context.out << '\n';
+    for (const double accuracy : {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8}) {
+      const Recommendation r = recommend(tradeoff, {q}, accuracy);
+      const std::string words = recommendation_text(tradeoff, r);
+      Json json{{"quantity", quantities[q].name}, {"accuracy", accuracy}, {"in_words", words}};
+      if (r.row) json.update(row_json(tradeoff, *r.row));
+      run.result["recommendations"].push_back(json);
+      run.context.out << words << '\n';
+    }
+  }
+}
+
+void add_outcomes(Run& run, const Tradeoff& tradeoff) {
+  const auto count = [&](RowStatus status) {
+    return std::count_if(tradeoff.rows.begin(), tradeoff.rows.end(),
+                         [&](const TradeoffRow& row) { return row.status == status; });
+  };
+  for (const TradeoffRow& row : tradeoff.rows)
+    if (row.status != RowStatus::ok)
+      run.result["skipped"].push_back(
+          {{"setting", in_words(row.setting)}, {"status", to_string(row.status)}, {"message", row.message}});
+  run.context.out << fmt::format("\n{} measured, {} failed, {} abandoned, {} skipped ({}); {}\n",
+                                 counted(count(RowStatus::ok), "setting"), count(RowStatus::failed),
+                                 count(RowStatus::abandoned), count(RowStatus::skipped), "tradeoff.csv says why",
+                                 duration_text(tradeoff.wall_seconds));
+}
+
+void add_applied(Run& run, const Tradeoff& tradeoff, const Recommendation& r) {
+  const std::string words = recommendation_text(tradeoff, r);
+  run.context.out << "\napplied " << words << '\n';
+  run.result["applied"] = {{"accuracy", r.accuracy}, {"in_words", words}};
+  if (r.row) {
+    run.result["applied"].update(row_json(tradeoff, *r.row));
+  } else {
+    run.failed("no recommended.json: " + words);
+  }
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,292 @@
+#!/usr/bin/env python3
+"""Keeps the measured figures of `mbsopt tradeoff` in data/tradeoffs/ and writes them into docs/tradeoffs.md.
+
+    docs/tradeoffs.py keep RUNS     from the output folders RUNS/{gallery,sweep,alpha}/NAME to data/tradeoffs/
+    docs/tradeoffs.py write         from data/tradeoffs/ to docs/tradeoffs.md (between its two markers) and docs/tradeoffs/*.svg
+
+./dev tradeoffs does both after measuring. Needs nothing but Python 3.
+"""
+
+import csv
+import json
+import math
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+DATA, PAGE, PLOTS = ROOT / "data/tradeoffs", ROOT / "docs/tradeoffs.md", ROOT / "docs/tradeoffs"
+BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+KEPT = ("curve", "method", "integrator", "rtol", "step", "status", "wall_seconds", "repetitions", "steps",
+        "rhs_evaluations", "factorisations", "pareto")
+WANTED = {"objective": 1e-5, "gradient": 1e-4}  # of the gallery at default settings
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7a5195", "#666666")
+
+
+def rows_of(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def write_rows(path, rows):
+    with open(path, "w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def number(text):
+    return float(text) if text not in ("", None) else math.nan
+
+
+def short(text):
+    """Three digits are enough for what varies from run to run."""
+    try:
+        return f"{float(text):.3g}"
+    except ValueError:
+        return text
+
+
+# ---- keep
+
+
+def is_objective(result, name):
+    return name.removeprefix("objective ") in result.get("objectives", {})
+
+
+def worst(errors, chosen):
+    values = [error for name, error in errors.items() if chosen(name)]
+    return f"{max(values):.2g}" if values else ""
+
+
+def gallery_row(name, result):
+    row = {"problem": name, "status": result["status"], "reference": "", "apart_objective": "", "apart_gradient": "",
+           "absolute": "", "defaults_objective": "", "defaults_gradient": "", "defaults_seconds": "", "own_setting": "",
+           "own_objective": "", "own_gradient": "", "own_seconds": "", "message": result.get("message", "")}
+    if "reference" not in result:
+        return row
+    reference = result["reference"]
+    row["reference"] = " and ".join(f"{reference[k]['integrator']} at {reference[k]['rtol']:.0e}" for k in ("first", "second"))
+    objective, gradient = (lambda q: is_objective(result, q)), (lambda q: q.startswith("gradient of "))
+    apart = {q: v["apart"] for q, v in reference["quantities"].items()}
+    row["apart_objective"], row["apart_gradient"] = worst(apart, objective), worst(apart, gradient)
+    row["absolute"] = "; ".join(q for q, v in reference["quantities"].items() if not v["relative"] and q != "motion")
+    for which in ("defaults", "own"):
+        setting = result.get("settings", {}).get(which, {})
+        row[f"{which}_objective"] = worst(setting.get("errors", {}), objective)
+        row[f"{which}_gradient"] = worst(setting.get("gradient", {}).get("errors", {}), gradient)
+        row[f"{which}_seconds"] = short(setting.get("wall_seconds", ""))
+        for s in (setting, setting.get("gradient", {})):
+            if s.get("status", "ok") != "ok":
+                row["message"] = s["message"]
+    row["own_setting"] = result.get("settings", {}).get("own", {}).get("setting", "").replace(" (as in the file)", "")
+    return row
+
+
+def keep(runs):
+    DATA.mkdir(parents=True, exist_ok=True)
+    about, gallery = [], []
+    for folder in sorted((runs / "gallery").glob("*")):
+        result = json.loads((folder / "result.json").read_text())
+        gallery.append(gallery_row(folder.name.replace("__", "/"), result))
+    write_rows(DATA / "gallery.csv", gallery)
+    for kind in ("sweep", "alpha"):
+        for folder in sorted((runs / kind).glob("*")):
+            result = json.loads((folder / "result.json").read_text())
+            name = folder.name
+            rows = rows_of(folder / "tradeoff.csv")
+            if kind == "sweep":
+                names = [c for c in rows[0] if c in KEPT or c.startswith("error ")]
+                rows = [{c: short(r[c]) if c not in ("curve", "rtol", "step") else r[c] for c in names} for r in rows]
+            else:
+                names = [c for c in rows[0] if not c.endswith("message")]
+                rows = [{c: short(r[c]) for c in names} for r in rows]
+            write_rows(DATA / f"{kind}_{name}.csv", rows)
+            reference = result["reference"]
+            about.append({
+                "file": f"{kind}_{name}.csv", "problem": name.replace("__", "/"), "kind": kind,
+                "command": "mbsopt " + result["provenance"]["command_line"].removeprefix("mbsopt ").split(" --out")[0],
+                "machine": f"{result['machine']['cpu']}, {result['machine']['cores']} cores",
+                "load": f"{result['machine']['load'] or 0:.1f}",
+                "first": f"{reference['first']['integrator']} at rtol {reference['first']['rtol']:.0e}",
+                "second": f"{reference['second']['integrator']} at rtol {reference['second']['rtol']:.0e}",
+                "apart": json.dumps({q: float(f"{v['apart']:.2g}") for q, v in reference["quantities"].items()}),
+                "advice": json.dumps([r["in_words"] for r in result.get("recommendations", [])]),
+            })
+    write_rows(DATA / "runs.csv", about)
+
+
+# ---- plots
+
+
+def log_plot(path, title, x_label, y_label, series, front=()):
+    """Lines on two logarithmic axes; series: name -> [(x, y)]; front: points to mark."""
+    width, height, left, right, top, bottom = 760, 400, 70, 190, 34, 48
+    points = [p for line in series.values() for p in line]
+    if not points:
+        return False
+
+    def ends(values):
+        return math.floor(math.log10(min(values)) - 0.05), math.ceil(math.log10(max(values)) + 0.05)
+
+    (x0, x1), (y0, y1) = ends([p[0] for p in points]), ends([p[1] for p in points])
+    px = lambda x: left + (math.log10(x) - x0) / (x1 - x0) * (width - left - right)
+    py = lambda y: top + (y1 - math.log10(y)) / (y1 - y0) * (height - top - bottom)
+    svg = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="system-ui,sans-serif" '
+           f'font-size="12"><rect width="{width}" height="{height}" fill="#fff"/>',
+           f'<text x="{left}" y="20" font-size="14" font-weight="600" fill="#1b1f24">{title}</text>']
+    power = lambda k: f'10<tspan dy="-4" font-size="9">{k}</tspan>'
+    for k in range(x0, x1 + 1):
+        x = px(10.0**k)
+        svg.append(f'<path d="M{x:.1f} {top}V{height - bottom}" stroke="#dfe3e8"/>'
+                   f'<text x="{x:.1f}" y="{height - bottom + 18}" text-anchor="middle" fill="#5d6670">{power(k)}</text>')
+    stride = max(1, math.ceil((y1 - y0) / 8))
+    for k in range(math.ceil(y0 / stride) * stride, y1 + 1, stride):
+        y = py(10.0**k)
+        svg.append(f'<path d="M{left} {y:.1f}H{width - right}" stroke="#dfe3e8"/>'
+                   f'<text x="{left - 8}" y="{y + 4:.1f}" text-anchor="end" fill="#5d6670">{power(k)}</text>')
+    svg.append(f'<rect x="{left}" y="{top}" width="{width - left - right}" height="{height - top - bottom}" fill="none" stroke="#5d6670"/>')
+    svg.append(f'<text x="{(left + width - right) / 2}" y="{height - 10}" text-anchor="middle" fill="#5d6670">{x_label}</text>')
+    svg.append(f'<text transform="translate(16 {(top + height - bottom) / 2}) rotate(-90)" text-anchor="middle" fill="#5d6670">{y_label}</text>')
+    for x, y in front:
+        svg.append(f'<circle cx="{px(x):.1f}" cy="{py(y):.1f}" r="5.5" fill="none" stroke="#1b1f24"/>')
+    for i, (name, line) in enumerate(series.items()):
+        colour, dash = COLOURS[i % 8], ' stroke-dasharray="6 4"' if i >= 8 else ""
+        path_text = "L".join(f"{px(x):.1f} {py(y):.1f}" for x, y in line)
+        svg.append(f'<path d="M{path_text}" fill="none" stroke="{colour}" stroke-width="1.6"{dash}/>')
+        svg += [f'<circle cx="{px(x):.1f}" cy="{py(y):.1f}" r="2.2" fill="{colour}"/>' for x, y in line]
+        y = top + 10 + 18 * i
+        svg.append(f'<path d="M{width - right + 14} {y}h24" stroke="{colour}" stroke-width="1.6"{dash}/>'
+                   f'<text x="{width - right + 44}" y="{y + 4}" fill="#1b1f24">{name}</text>')
+    if front:
+        y = top + 10 + 18 * len(series)
+        svg.append(f'<circle cx="{width - right + 26}" cy="{y}" r="5.5" fill="none" stroke="#1b1f24"/>'
+                   f'<text x="{width - right + 44}" y="{y + 4}" fill="#1b1f24">Pareto front</text>')
+    path.write_text("\n".join(svg) + "\n</svg>\n")
+    return True
+
+
+def work_precision(rows, quantity, of_gradient):
+    column = "error " + quantity
+    series, front = {}, []
+    for r in rows:
+        error, seconds = number(r[column]), number(r["wall_seconds"])
+        if r["status"] != "ok" or not error > 0 or (r["method"] != "simulate") != of_gradient:
+            continue
+        if r["curve"] in ("as in the file", "defaults") or (not of_gradient and r["curve"] != r["integrator"]):
+            continue
+        series.setdefault(r["curve"], []).append((seconds, error))
+        if quantity in r["pareto"].split("; "):
+            front.append((seconds, error))
+    return series, front
+
+
+# ---- the page
+
+
+def table(header, rows):
+    lines = ["| " + " | ".join(header) + " |", "| " + " | ".join("---" for _ in header) + " |"]
+    return lines + ["| " + " | ".join(row) + " |" for row in rows] + [""]
+
+
+def with_verdict(text, wanted):
+    if text == "":
+        return "-"
+    return text if float(text) <= wanted else f"**{text}**"
+
+
+def gallery_section():
+    rows = rows_of(DATA / "gallery.csv")
+    lines = ["### The gallery at default settings", "",
+             "Augmented Lagrangian, `dopri5`, rtol 1e-6, atol 1e-8, whatever the file asks for; the largest error of its objectives and of their",
+             "gradients, relative unless said. Wanted: 1e-5 and 1e-4; **bold** where it is missed. Apart: how much the two methods of the",
+             "reference differ. Own: the settings of the file.", ""]
+    cells, missed = [], []
+    for r in rows:
+        absolute = " (absolute)" if r["absolute"] else ""
+        cells.append([f"`{r['problem']}`", with_verdict(r["defaults_objective"], WANTED["objective"]) + absolute,
+                      with_verdict(r["defaults_gradient"], WANTED["gradient"]), r["own_setting"] or "-",
+                      r["own_objective"] or "-", r["own_gradient"] or "-",
+                      f"{r['apart_objective'] or '-'}, {r['apart_gradient'] or '-'}"])
+        if any(r["defaults_" + k] and float(r["defaults_" + k]) > w for k, w in WANTED.items()) or r["message"]:
+            missed.append(r)
+    lines += table(["problem", "objective", "gradient", "own setting", "objective", "gradient", "apart"], cells)
+    known = [r for r in rows if r["defaults_objective"]]
+    good = {k: sum(1 for r in known if r["defaults_" + k] and float(r["defaults_" + k]) <= w) for k, w in WANTED.items()}
+    of = {k: sum(1 for r in known if r["defaults_" + k]) for k in WANTED}
+    lines += [f"{good['objective']} of {of['objective']} objectives and {good['gradient']} of {of['gradient']} gradients are as exact as wanted.", ""]
+    return lines
+
+
+def sweep_section(run):
+    rows, problem = rows_of(DATA / run["file"]), run["problem"]
+    stem = run["file"].removesuffix(".csv").removeprefix("sweep_")
+    apart, advice = json.loads(run["apart"]), json.loads(run["advice"])
+    lines = [f"### `{problem}`", "", f"    {run['command']}", "",
+             f"Reference: {run['first']}, certified by {run['second']}; apart by " +
+             ", ".join(f"{v:.0e} ({q})" for q, v in apart.items()) + ".", ""]
+    objective = next((q for q in apart if q not in ("motion", "sensors") and not q.startswith("gradient of ")), "motion")
+    gradient = "gradient of " + objective
+    for quantity in (objective, gradient):
+        found = [a for a in advice if f" in {quantity}: " in a]
+        cells = []
+        for words in found:
+            aim, setting = words.split(": ", 1)
+            cells.append([aim.split()[1], setting])
+        if cells:
+            lines += table([f"error of {quantity}", "fastest setting"], cells)
+    for quantity, of_gradient in ((objective, False), (gradient, True)):
+        series, front = work_precision(rows, quantity, of_gradient)
+        file = PLOTS / f"{stem}_{'gradient' if of_gradient else 'objective'}.svg"
+        if log_plot(file, f"{problem}: {quantity}", "time [s]", "relative error", series, front):
+            lines += [f"![error of {quantity} over time](tradeoffs/{file.name})", ""]
+    return lines
+
+
+def alpha_section(run):
+    rows = rows_of(DATA / run["file"])
+    stem = run["file"].removesuffix(".csv")
+    objective = next(q for q in json.loads(run["apart"]) if q not in ("motion", "sensors"))
+    lines = [f"### Penalty: `{run['problem']}`", "", f"    {run['command']}", "",
+             "Relative errors of the accelerations at 100 states of the motion; then runs, quasi-definite and by Cholesky: error of",
+             f"`{objective}`, right-hand sides, drift of the constraints [m].", ""]
+    cells = []
+    for r in rows:
+        pair = lambda c: f"{r['quasidefinite ' + c] or '-'}, {r['cholesky ' + c] or '-'}"
+        ok = lambda s: r[f"{s} status"] == "ok"
+        rhs = ", ".join(r[f"{s} rhs_evaluations"] + ("" if ok(s) else " (gave up)") for s in ("quasidefinite", "cholesky"))
+        cells.append([f"{float(r['alpha']):.0e}", r["acceleration model_error"], r["acceleration rounding"],
+                      r["acceleration augmented_lagrangian"], pair("error " + objective), rhs, pair("drift")])
+    lines += table(["alpha", "model", "rounding by Cholesky", "augmented Lagrangian", f"error of {objective}", "right-hand sides", "drift"], cells)
+    names = {"acceleration model_error": "model", "acceleration rounding": "rounding", "acceleration augmented_lagrangian": "augmented"}
+    series = {label: [(float(r["alpha"]), number(r[c])) for r in rows if number(r[c]) > 0] for c, label in names.items()}
+    file = PLOTS / f"{stem}.svg"
+    if log_plot(file, f"{run['problem']}: accelerations", "alpha", "relative error", {k: v for k, v in series.items() if v}):
+        lines += [f"![errors of accelerations over alpha](tradeoffs/{file.name})", ""]
+    return lines
+
+
+def write():
+    PLOTS.mkdir(parents=True, exist_ok=True)
+    runs = rows_of(DATA / "runs.csv")
+    lines = [f"Measured on: {', '.join(sorted({r['machine'] for r in runs}))}. Times are medians of up to five rounds.", ""]
+    loads = [float(r["load"]) for r in runs]
+    cores = min(int(r["machine"].rsplit(", ", 1)[1].split()[0]) for r in runs)
+    if max(loads) > 0.7 * cores:
+        lines += [f"**The machine was busy**: a load of {min(loads):.0f} to {max(loads):.0f} on {cores} cores, so that times are longer than they would be",
+                  "alone and their order is uncertain where they are close; errors and counts do not depend on it.", ""]
+    lines += gallery_section()
+    for run in runs:
+        lines += sweep_section(run) if run["kind"] == "sweep" else alpha_section(run)
+    page = PAGE.read_text()
+    before, rest = page.split(BEGIN)
+    after = rest.split(END)[1]
+    PAGE.write_text(before + BEGIN + "\n\n" + "\n".join(lines).rstrip() + "\n\n" + END + after)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) == 3 and sys.argv[1] == "keep":
+        keep(Path(sys.argv[2]))
+    elif sys.argv[1:] == ["write"]:
+        write()
+    else:
+        sys.exit(__doc__)

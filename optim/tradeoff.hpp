@@ -1,0 +1,88 @@
+// The trade between speed and accuracy of one problem, measured: integrators x tolerances (or steps) x formulations for
+// the motion, the sensors and the objectives, and every gradient method for their gradients; errors against a reference
+// that two methods certify (tradeoff_reference.hpp).
+//
+//   const Tradeoff tradeoff = measure_tradeoff(problem.scene, objectives_of(problem), {.budget_seconds = 20});
+//   for (const TradeoffRow& row : tradeoff.rows) std::cout << in_words(row.setting) << ' ' << row.wall_seconds << '\n';
+//
+// Settings that differ in tolerance or step only are a curve. Curves are followed from loose to tight, all together;
+// one ends where its next point would cost more than its share of the budget, or where the reference is no more exact
+// than it. Afterwards all points are timed again, in turn, so that a busy minute does not fall on one of them: times
+// are medians.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "optim/tradeoff_reference.hpp"
+
+namespace mbsopt {
+
+struct TradeoffSetting {
+  std::string curve;  // what it has in common with its neighbours: "dopri5", "penalty 1e+07, cholesky: dopri5"
+  SimulationSettings simulation;
+  std::optional<GradientMethod> gradient;  // absent: a simulation
+};
+// "dopri5 at rtol 1e-06", "adjoint, rk4 with steps of 0.005 s"
+std::string in_words(const TradeoffSetting& setting);
+
+enum class RowStatus {
+  ok,
+  failed,     // of its own: a step too large, a method that cannot do it
+  abandoned,  // took longer than its share, or the user ended it
+  skipped,    // would have taken longer
+};
+std::string_view to_string(RowStatus status);
+
+struct TradeoffRow {
+  TradeoffSetting setting;
+  RowStatus status = RowStatus::ok;
+  std::string message;  // why it is not ok
+  double wall_seconds = 0;
+  int repetitions = 0;  // that this is the median of
+  SimulationStatistics statistics;
+  Eigen::VectorXd errors;     // per quantity of the reference; NaN: not of this row
+  std::vector<bool> pareto;   // per quantity: nothing is faster and more exact
+  bool within_floor = false;  // no error is larger than what the reference is certain of
+};
+
+// The cheapest setting for an accuracy; see recommend().
+struct Recommendation {
+  std::vector<std::size_t> quantities;  // indices; all of them within the accuracy
+  double accuracy = 0;
+  std::optional<std::size_t> row;  // absent: none
+  std::string why_not;
+};
+
+struct Tradeoff {
+  std::string message;  // why there is nothing
+  TradeoffReference reference;
+  std::vector<TradeoffRow> rows;
+  std::optional<std::size_t> own, defaults, own_gradient, default_gradient;  // rows of the scene's own settings, and
+                                                                             // of the program's defaults
+  bool interrupted = false;
+  double wall_seconds = 0;
+  bool ok() const { return reference.ok(); }
+};
+
+struct TradeoffOptions {
+  double budget_seconds = 60;  // 0: the reference, the scene's own settings and the defaults only
+  std::function<bool()> interrupted = {};
+  std::function<void(const std::string& doing, double done)> progress = {};  // done: 0..1
+};
+
+Tradeoff measure_tradeoff(const Scene& scene, const std::vector<Objective>& objectives,
+                          const TradeoffOptions& options = {});
+
+// The fastest row whose errors in these quantities are within the accuracy, as are those of all tighter rows of its
+// curve, so that none is taken for an error that happens to pass through zero. Of rows that are equally fast to a tenth
+// the most exact one. None where the reference is not three times as exact as what is asked for.
+Recommendation recommend(const Tradeoff& tradeoff, std::vector<std::size_t> quantities, double accuracy);
+
+// What the scene is run for: the objectives, or the sensors where there are none, or the motion.
+std::vector<std::size_t> main_quantities(const std::vector<Quantity>& quantities);
+
+}  // namespace mbsopt

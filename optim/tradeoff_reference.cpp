@@ -1,0 +1,154 @@
+#include "optim/tradeoff_reference.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "optim/stopwatch.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+
+struct Candidate {
+  ReferenceMethod method;
+  SimulationSettings settings;
+  Answer answer;
+  double change = std::numeric_limits<double>::infinity();  // made by the last tightening
+};
+
+class Search {
+ public:
+  Search(const TradeoffRuns& runs, const ReferenceOptions& options)
+      : runs_(runs), options_(options), distance_(runs.mechanism()) {}
+
+  TradeoffReference run() {
+    const Stopwatch stopwatch;
+    TradeoffReference reference;
+    std::vector<Candidate> found;
+    for (const char* integrator : {"dopri853", "gauss6", "verner6", "radau5"}) {
+      if (agree(found) || interrupted()) break;
+      if (std::optional<Candidate> candidate = converged(integrator)) found.push_back(std::move(*candidate));
+    }
+    reference.interrupted = interrupted();
+    if (found.size() < 2) {
+      reference.message = fmt::format("no reference was found by two methods: {}", problem_);
+      reference.wall_seconds = stopwatch.seconds();
+      return reference;
+    }
+    auto [first, second] = closest(found);
+    if (found[second].change < found[first].change) std::swap(first, second);
+    Candidate &a = found[first], &b = found[second];
+    add_gradients(a, b, reference);
+    reference.first = a.method, reference.second = b.method;
+    reference.errors.emplace(runs_, std::move(a.answer), b.answer);
+    reference.wall_seconds = stopwatch.seconds();
+    return reference;
+  }
+
+ private:
+  bool interrupted() const { return options_.interrupted && options_.interrupted(); }
+  RunLimit limit() const { return {options_.seconds_per_run, options_.interrupted}; }
+
+  // Two that each have settled, on the same answer.
+  bool agree(const std::vector<Candidate>& found) const {
+    constexpr double kSettled = 1e-9, kSame = 1e-7;
+    const auto settled =
+        std::count_if(found.begin(), found.end(), [](const Candidate& c) { return c.change < kSettled; });
+    if (settled < 2) return false;
+    const auto [first, second] = closest(found);
+    return apart(found[first].answer, found[second].answer) < kSame;
+  }
+
+  // Tightens until the answer no longer settles.
+  std::optional<Candidate> converged(const std::string& integrator) {
+    std::optional<Candidate> best;
+    for (const double rtol : {1e-7, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13}) {
+      constexpr double kGrowth = 1.5;     // of the cost, a decade
+      constexpr double kSettled = 1e-11;  // what is left is a tenth of it
+      if (best && (kGrowth * best->method.wall_seconds > options_.seconds_per_run || best->change < kSettled)) break;
+      Candidate next;
+      next.settings = with_tolerance(runs_.scene().simulation, integrator, rtol);
+      next.settings.formulation = constrained(next.settings.formulation);
+      next.answer = runs_.motion(next.settings, limit());
+      if (!next.answer.ok) {
+        if (!best) problem_ += fmt::format("{}{}: {}", problem_.empty() ? "" : "; ", integrator, next.answer.message);
+        break;
+      }
+      next.method = {integrator, rtol, next.answer.wall_seconds};
+      if (best) next.change = apart(next.answer, best->answer);
+      if (best && next.change >= best->change) break;
+      best = std::move(next);
+    }
+    return best;
+  }
+
+  // Of the motion and of the objectives, the largest relative difference.
+  double apart(const Answer& a, const Answer& b) const {
+    const double extent = distance_.extent(a.motion, a.y_initial);
+    double largest = distance_.between(a.motion, b.motion);
+    if (extent > 1e3 * largest) largest /= extent;
+    for (Index i = 0; i < a.psi.size(); ++i) {
+      const double change = std::abs(a.psi(i) - b.psi(i)), size = std::abs(a.psi(i));
+      if (size > 1e3 * change) largest = std::max(largest, change / size);
+    }
+    return largest;
+  }
+
+  std::pair<std::size_t, std::size_t> closest(const std::vector<Candidate>& found) const {
+    std::pair<std::size_t, std::size_t> pair{0, 1};
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      for (std::size_t j = i + 1; j < found.size(); ++j) {
+        const double here = apart(found[i].answer, found[j].answer);
+        if (here < least) least = here, pair = {i, j};
+      }
+    }
+    return pair;
+  }
+
+  void add_gradients(Candidate& a, Candidate& b, TradeoffReference& reference) const {
+    if (!runs_.has_gradients() || !options_.gradients) return;
+    const GradientCost cost = gradient_cost(runs_.scene().parameters.size(), runs_.objectives().size());
+    const GradientMethod method = cost.tlm <= cost.adjoint ? GradientMethod::tlm : GradientMethod::adjoint;
+    RunLimit longer = limit();
+    longer.seconds *= 4;
+    Answer of_a = runs_.gradients(a.settings, method, longer), of_b = runs_.gradients(b.settings, method, longer);
+    if (!of_a.ok || !of_b.ok) return;
+    a.answer.psi_rho = std::move(of_a.psi_rho), b.answer.psi_rho = std::move(of_b.psi_rho);
+    reference.gradients_by = to_string(method);
+  }
+
+  const TradeoffRuns& runs_;
+  const ReferenceOptions& options_;
+  MotionDistance distance_;
+  std::string problem_;
+};
+
+}  // namespace
+
+TradeoffReference converged_reference(const TradeoffRuns& runs, const ReferenceOptions& options) {
+  return Search(runs, options).run();
+}
+
+SimulationSettings with_tolerance(SimulationSettings settings, const std::string& integrator, double rtol) {
+  IntegratorSettings& s = settings.integrator;
+  const double atol = rtol * (s.step || s.rtol <= 0 ? 1e-2 : s.atol / s.rtol);
+  s.atol = std::stod(fmt::format("{:.6e}", atol));  // 1e-07, not 1.0000000000000001e-07
+  s.type = integrator, s.rtol = rtol;
+  s.step.reset();
+  return settings;
+}
+
+FormulationSettings constrained(const FormulationSettings& formulation) {
+  const bool as_it_is = formulation.type == FormulationType::augmented_lagrangian &&
+                        formulation.projection == Projection::position_velocity;
+  return as_it_is ? formulation : FormulationSettings{};
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,189 @@
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <sstream>
+#include <thread>
+
+#include "app/exit_code.hpp"
+#include "tests/app/run_command.hpp"
+
+using namespace mbsopt;
+using Catch::Contains;
+namespace fs = std::filesystem;
+
+namespace {
+
+#ifdef __SANITIZE_ADDRESS__
+const std::string kBudget = "6";  // as many settings take longer
+#else
+const std::string kBudget = "1";
+#endif
+
+// The columns of the header that are not quoted, and the number of lines.
+struct Csv {
+  std::vector<std::string> columns;
+  std::vector<std::string> lines;
+};
+
+Csv csv_of(const fs::path& file) {
+  std::istringstream text(content_of(file));
+  Csv csv;
+  std::string line;
+  std::getline(text, line);
+  std::istringstream header(line);
+  for (std::string column; std::getline(header, column, ',');) csv.columns.push_back(column);
+  while (std::getline(text, line)) csv.lines.push_back(line);
+  return csv;
+}
+
+}  // namespace
+
+TEST_CASE("tradeoff: a table of all settings, plots, and advice in words for each quantity", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kPendulum);
+  const CommandOutcome outcome =
+      run_command({"tradeoff", file, "--budget", kBudget, "--out", folder.file("out"), "--quiet"});
+  INFO(outcome.out << outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  CHECK_THAT(outcome.out, Contains("certified by") && Contains("for 1e-04 in track: ") &&
+                              Contains("for 1e-06 in gradient of end: ") && Contains("rtol"));
+  const Csv csv = csv_of(folder.path / "out/tradeoff.csv");
+  CHECK(csv.lines.size() > 100);
+  for (const char* column : {"integrator", "rtol", "step", "formulation", "alpha", "status", "wall_seconds",
+                             "rhs_evaluations", "factorisations", "memory_bytes", "error motion", "error sensors",
+                             "error track", "error end", "error gradient of track", "pareto", "message"}) {
+    INFO(column);
+    CHECK(std::count(csv.columns.begin(), csv.columns.end(), column) == 1);
+  }
+  for (const char* method : {"adjoint", "tlm", "cvodes_forward", "cvodes_adjoint", "fd", "penalty", "quasidefinite"})
+    CHECK(std::any_of(csv.lines.begin(), csv.lines.end(),
+                      [&](const std::string& line) { return line.find(method) != std::string::npos; }));
+  const auto result = json_of(folder.path / "out/result.json");
+  CHECK(result.at("status") == "ok");
+  CHECK_FALSE(result.at("machine").at("cpu").get<std::string>().empty());
+  CHECK(result.at("reference").at("quantities").at("track").at("apart").get<double>() < 1e-9);
+  CHECK(result.at("objectives").at("track").at("gradient").contains("k"));
+  CHECK(result.at("recommendations").size() == 6 * 6);  // motion, sensors, two objectives, two gradients
+  CHECK(result.at("settings").at("defaults").at("errors").at("track").get<double>() < 1e-4);
+  const std::string report = content_of(folder.path / "out/report.html");
+  CHECK_THAT(report, Contains("<svg") && Contains("Pareto front") && Contains("What to use") &&
+                         Contains(result.at("machine").at("cpu").get<std::string>()));
+  CHECK(report.find("nan") == std::string::npos);
+}
+
+TEST_CASE("tradeoff --apply writes a problem that runs and has the accuracy, its comments kept", "[command]") {
+  const TemporaryFolder folder;
+  std::string text = kPendulum;
+  text.insert(text.find("\"gravity\""), "// downwards\n  ");
+  text.insert(text.find("\"end_time\""), "\"integrator\": {\"type\": \"rk4\", \"step\": 0.01}, ");
+  const std::string file = folder.write("rod.json", text);
+  const CommandOutcome outcome = run_command({"tradeoff", file, "--budget", kBudget, "--apply", "1e-6", "--out",
+                                              folder.file("out"), "--set", "parameters.k.value=25", "--quiet"});
+  INFO(outcome.out << outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  const fs::path applied = folder.path / "out/recommended.json";
+  CHECK_THAT(content_of(applied), Contains("// downwards") && Contains("\"value\": 25"));
+  const auto result = json_of(folder.path / "out/result.json");
+  CHECK(result.at("applied").at("status") == "ok");
+  REQUIRE(run_command({"simulate", applied.string(), "--out", folder.file("again"), "--quiet"}).exit_code == kDone);
+  const auto again = json_of(folder.path / "again/result.json").at("objectives");
+  for (const char* name : {"track", "end"}) {
+    INFO(name);
+    const double exact = result.at("objectives").at(name).at("value");
+    CHECK(std::abs(again.at(name).at("value").get<double>() - exact) <= 1e-6 * std::abs(exact));
+  }
+}
+
+TEST_CASE("tradeoff --apply of an accuracy that nothing has fails in words and keeps the table", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kPendulum);
+  const CommandOutcome outcome =
+      run_command({"tradeoff", file, "--budget", kBudget, "--apply", "1e-15", "--out", folder.file("out"), "--quiet"});
+  CHECK(outcome.exit_code == kNumericalFailure);
+  CHECK_THAT(outcome.err, Contains("no recommended.json") && Contains("the reference itself is certain to"));
+  CHECK(fs::exists(folder.path / "out/tradeoff.csv"));
+  CHECK_FALSE(fs::exists(folder.path / "out/recommended.json"));
+}
+
+TEST_CASE("tradeoff --alpha: model error, rounding and drift of the penalty form", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kPendulum);
+  const CommandOutcome outcome = run_command(
+      {"tradeoff", file, "--alpha", "1e4:1e7", "--budget", kBudget, "--out", folder.file("out"), "--quiet"});
+  INFO(outcome.out << outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  const Csv csv = csv_of(folder.path / "out/tradeoff.csv");
+  CHECK(csv.lines.size() == 4);
+  const auto rows = json_of(folder.path / "out/result.json").at("penalty").at("rows");
+  REQUIRE(rows.size() == 4);
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    const auto model = [&](std::size_t k) { return rows[k].at("acceleration").at("model_error").get<double>(); };
+    CHECK(model(i - 1) / model(i) == Approx(10).epsilon(0.2));
+    CHECK(rows[i].at("quasidefinite").at("drift").get<double>() <
+          rows[i - 1].at("quasidefinite").at("drift").get<double>());
+  }
+  CHECK_THAT(content_of(folder.path / "out/report.html"), Contains("rounding by Cholesky"));
+}
+
+TEST_CASE("tradeoff: a file without objectives is measured by its sensors and its motion", "[command]") {
+  const TemporaryFolder folder;
+  std::string text = kPendulum;
+  const auto begin = text.find(",\n  \"objectives\"");
+  text.erase(begin, text.rfind('}') - begin);
+  const std::string file = folder.write("bare.json", text);
+  const CommandOutcome outcome =
+      run_command({"tradeoff", file, "--budget", kBudget, "--apply", "1e-4", "--out", folder.file("out"), "--quiet",
+                   "--set", "parameters.k.allow_unused=true", "--set", "parameters.L.allow_unused=true"});
+  INFO(outcome.out << outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  CHECK_THAT(outcome.out, Contains("applied for 1e-04 in sensors: "));
+}
+
+TEST_CASE("tradeoff: options that make no sense are bad input", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kPendulum);
+  const std::vector<std::vector<std::string>> wrong{{"--alpha", "much"},
+                                                    {"--alpha", "1e9:1e2"},
+                                                    {"--alpha", "1e2:1e9", "--apply", "1e-4"},
+                                                    {"--budget", "0", "--apply", "1e-4"},
+                                                    {"--budget", "-1"},
+                                                    {"--apply", "0"}};
+  for (const std::vector<std::string>& options : wrong) {
+    std::vector<std::string> arguments{"tradeoff", file, "--out", folder.file("out")};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const CommandOutcome outcome = run_command(arguments);
+    INFO(options[0] << ' ' << options[1]);
+    CHECK(outcome.exit_code == kBadInput);
+    CHECK_THAT(outcome.err, Contains(options[0]) || Contains(options.back()) || Contains(options[1]));
+    CHECK_FALSE(fs::exists(folder.path / "out"));
+  }
+}
+
+TEST_CASE("tradeoff: SIGTERM leaves what was measured", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kPendulum);
+  std::thread killer([] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    ::kill(::getpid(), SIGTERM);
+  });
+  const CommandOutcome outcome = run_command({"tradeoff", file, "--budget", "600", "--out", folder.file("out")});
+  killer.join();
+  CHECK(outcome.exit_code == kInterrupted);
+  const auto result = json_of(folder.path / "out/result.json");
+  CHECK(result.at("status") == "interrupted");
+  const std::string message = result.at("message");
+  CHECK_THAT(message, Contains("tradeoff.csv holds what was measured") || Contains("nothing is kept"));
+  CHECK(fs::exists(folder.path / "out/tradeoff.csv") == (message.find("tradeoff.csv") != std::string::npos));
+}
+
+TEST_CASE("tradeoff does not overwrite the outcome of a design", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kPendulum), out = folder.file("out");
+  REQUIRE(run_command({"design", file, "--out", out, "--set", "parameters.k.upper=30", "--quiet"}).exit_code == kDone);
+  const CommandOutcome outcome = run_command({"tradeoff", file, "--out", out, "--budget", "0"});
+  CHECK(outcome.exit_code == kBadInput);
+  CHECK_THAT(outcome.err, Contains("holds the outcome of 'design'"));
+}

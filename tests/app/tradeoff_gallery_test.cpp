@@ -1,0 +1,91 @@
+// References that `tradeoff` computes itself, against figures found elsewhere.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <map>
+#include <string>
+
+#include "app/json/read_problem.hpp"
+#include "optim/tradeoff.hpp"
+#include "tests/app/gallery_files.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+
+namespace {
+
+struct Found {
+  Problem problem;
+  TradeoffReference reference;
+  double sensor(const std::string& name) const {  // at the end
+    const std::vector<Sensor>& sensors = problem.scene.sensors;
+    for (std::size_t s = 0; s < sensors.size(); ++s) {
+      if (sensors[s].name == name)
+        return reference.errors->exact().motion.sensors.rightCols<1>()(static_cast<Eigen::Index>(s));
+    }
+    FAIL("no sensor " << name);
+    return 0;
+  }
+};
+
+Found reference_of(const std::string& name, const std::vector<std::string>& sets = {}) {
+  Found found{read_problem(file_of(name), sets), {}};
+  found.reference =
+      converged_reference(TradeoffRuns(found.problem.scene, objectives_of(found.problem)), {.seconds_per_run = 3});
+  INFO(name << ": " << found.reference.message);
+  REQUIRE(found.reference.ok());
+  return found;
+}
+
+double largest_certificate(const TradeoffReference& reference) {
+  double largest = 0;
+  for (const Quantity& q : reference.errors->quantities()) largest = std::max(largest, q.certificate);
+  return largest;
+}
+
+}  // namespace
+
+// Two models, halved steps agree to 1e-12 (angles) and 1e-10 (rates).
+TEST_CASE("the reference of Andrews' mechanism is right to 1e-10", "[tradeoff]") {
+  const Found found = reference_of("andrews/simulate", {"simulation.end_time=0.03"});
+  const std::map<std::string, double> expected{{"beta", 15.8107711951538},    {"theta", -15.756371058412},
+                                               {"gamma", 0.0408222401196468}, {"phi", -0.534730116342077},
+                                               {"delta", 0.524409965879955},  {"Omega", 0.534730116342077},
+                                               {"eps", 1.04808074104194},     {"beta_rate", 1139.9203022591}};
+  for (const auto& [sensor, value] : expected) {
+    INFO(sensor);
+    CHECK(std::abs(found.sensor(sensor) / value - 1) < 1e-10);
+  }
+}
+
+#ifndef __SANITIZE_ADDRESS__  // twenty times slower: the others would find no reference in their time
+
+// The exact solution, by quadrature: 16 digits. What both methods share, the equations where they are singular, is in
+// no certificate.
+TEST_CASE("the reference of two windows is right to 5e-9 m after ten passages of their singular positions",
+          "[tradeoff]") {
+  const Found found = reference_of("four_bar/windows");
+  const double error = std::hypot(found.sensor("x") - 0.3284581115408154, found.sensor("y") - 0.944518538178601);
+  INFO("error " << error);
+  CHECK(error < 5e-9);
+}
+
+TEST_CASE("the reference of a stiff governor is found, though its link decays at 8000 1/s", "[tradeoff]") {
+  const Found found = reference_of("governor/stiff_flyball", {"simulation.end_time=1"});
+  CHECK(largest_certificate(found.reference) < 1e-8);
+  const TradeoffRuns runs(found.problem.scene, objectives_of(found.problem));
+  double last = 1;
+  for (const double rtol : {1e-3, 1e-5, 1e-7}) {
+    SimulationSettings settings = with_tolerance(found.problem.scene.simulation, "radau5", rtol);
+    const Eigen::VectorXd errors = found.reference.errors->of(runs.motion(settings));
+    CHECK(errors(0) < 0.3 * last);
+    last = errors(0);
+  }
+}
+
+TEST_CASE("a chaotic motion's reference says how little it is certain of", "[tradeoff]") {
+  const Found found = reference_of("double_pendulum/gradient",
+                                   {"simulation.end_time=20", "forces[0].damping=0", "parameters.theta1.value=3"});
+  CHECK(largest_certificate(found.reference) > 1e-9);
+}
+
+#endif
