@@ -211,11 +211,13 @@ def radau5():
 
 
 def gauss(c, g):
-    """With f(y0) and f(y1); the estimate: gamma0 times the divided difference of f over all nodes, its weight 1 at 0."""
+    """With f(y0) and f(y1); the estimate: gamma0 times the divided difference of f over 0 and the nodes, its weight 1 at
+    0. (Over 1 as well it would vanish wherever f is linear: f(u) has the degree of the collocation polynomial u then.)"""
     A, b = collocation(c)
     c, A, b = with_start(c, A, b)
+    error = [g * x for x in difference_weights(c)] + [D(0)]
     c, A = with_explicit_stage(c, A, D(1), b)
-    return c, A, b + [D(0)], [g * x for x in difference_weights(c)], g
+    return c, A, b + [D(0)], error, g
 
 
 def gauss4():

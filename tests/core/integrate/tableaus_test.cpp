@@ -95,6 +95,23 @@ TEST_CASE("the error estimate vanishes up to one order below its own, and not at
   }
 }
 
+// y' = lambda y, z = h lambda: K = inv(I - z A) lambda y0.
+TEST_CASE("the error estimate does not vanish on linear motion", "[tableau]") {
+  for (const Method& rk : runge_kutta_methods()) {
+    if (!rk.adaptive) continue;
+    const Complex z(0, 0.5);
+    Eigen::MatrixXcd matrix = Eigen::MatrixXcd::Identity(rk.stages, rk.stages);
+    Eigen::RowVectorXcd error(rk.stages);
+    for (int i = 0; i < rk.stages; ++i) {
+      error(i) = rk.error[i];
+      for (int j = 0; j < rk.stages; ++j) matrix(i, j) -= z * rk.a(i, j);
+    }
+    const Eigen::VectorXcd K = matrix.lu().solve(Eigen::VectorXcd::Ones(rk.stages));
+    INFO(std::string(rk.name));
+    CHECK(std::abs(z * (error * K)(0)) > 1e-6 * std::pow(std::abs(z), rk.error_order));
+  }
+}
+
 TEST_CASE("dense output meets all order conditions for each power of theta", "[tableau]") {
   const std::vector<RootedTree> trees = rooted_trees(7);
   for (const Method& rk : runge_kutta_methods()) {
