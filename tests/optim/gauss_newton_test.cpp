@@ -120,7 +120,7 @@ TEST_CASE("five-bar: where it is held still Gauss-Newton is the exact Hessian, e
   if (at_optimum) {
     problem.scene.parameters[0].value = five_bar::kL01, problem.scene.parameters[1].value = five_bar::kL02;
   }
-  problem.scene.simulation.integrator.max_step = 0.05;  // at rest steps would grow too long for what is beside it
+  problem.scene.simulation.integrator.max_step = 0.02;  // at rest steps would grow too long for what is beside it
   Evaluator evaluator(problem.scene, objectives_of(problem), {"L01", "L02"});
   const Evaluation at = evaluator.gradients(evaluator.start());
   const GaussNewton H = gauss_newton(evaluator, at);
