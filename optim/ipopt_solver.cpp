@@ -1,6 +1,5 @@
 #include "optim/ipopt_solver.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <coin/IpIpoptApplication.hpp>
 #include <coin/IpTNLP.hpp>
 
@@ -28,15 +27,6 @@ constexpr const char* kConvergedInNoise =
     "converged: the objective does not change any more, and the optimality conditions hold to the accuracy of its "
     "derivatives";
 constexpr double kNoBound = 1e20;  // Ipopt's: at least 1e19 means none
-
-// Its curvatures by their size: where f curves down, Newton's step would lead up. A step along the negative curvature
-// is then as long as one along a positive of the same size, where Ipopt's own remedy, a multiple of the unit matrix,
-// shortens all. Only without constraints, which may need the negative ones for what they leave free.
-Eigen::MatrixXd with_positive_curvature(const Eigen::MatrixXd& H) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of(H);
-  if (of.info() != Eigen::Success || of.eigenvalues()(0) >= 0) return H;
-  return of.eigenvectors() * of.eigenvalues().cwiseAbs().asDiagonal() * of.eigenvectors().transpose();
-}
 
 class Adapter : public Ipopt::TNLP {
  public:
@@ -202,10 +192,7 @@ class Adapter : public Ipopt::TNLP {
       ok = problem_.hessians(x, found);
       if (ok && options_.records) options_.records->record(x, found);
     }
-    if (ok) {
-      hessians_ = std::move(found);
-      if (problem_.constraints() == 0) hessians_[0] = with_positive_curvature(hessians_[0]);
-    }
+    if (ok) hessians_ = std::move(found);
     if (hessians_.empty()) {
       const Eigen::Index n = problem_.variables();
       hessians_.assign(static_cast<std::size_t>(problem_.constraints()) + 1, Eigen::MatrixXd::Zero(n, n));

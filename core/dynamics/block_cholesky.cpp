@@ -21,6 +21,7 @@ bool factor_diagonal(Mat<6, 6>& A, Vec<6>& inverse) {
     double l[6];
     for (int i = j + 1; i < 6; ++i) l[i] = A(i, j) * inverse(j);
     for (int k = j + 1; k < 6; ++k) {
+      // cppcheck-suppress uninitvar  // of j = 5 no entry is read
       for (int i = k; i < 6; ++i) A(i, k) -= l[i] * A(k, j);
     }
     for (int i = j + 1; i < 6; ++i) A(i, j) = l[i];
@@ -32,6 +33,7 @@ bool factor_diagonal(Mat<6, 6>& A, Vec<6>& inverse) {
       w[i] = -A(i, j);
       for (int k = j + 1; k < i; ++k) w[i] -= A(i, k) * A(k, j);
     }
+    // cppcheck-suppress uninitvar  // j < 5: one entry is set at least
     for (int i = j + 1; i < 6; ++i) A(i, j) = w[i];
   }
   for (int j = 0; j < 6; ++j) {

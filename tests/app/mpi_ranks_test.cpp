@@ -118,7 +118,7 @@ TEST_CASE("mpirun: Ctrl-C, and the loss of a rank, leave what resume goes on wit
   const TemporaryFolder folder;
   const std::string file = folder.write("rod.json", kSwingingRod);
   const auto design = [&](const fs::path& out) {
-    return std::vector<std::string>{"design", file, "--out", out.string(), "--set", "design.multistart.starts=24"};
+    return std::vector<std::string>{"design", file, "--out", out.string(), "--set", "design.multistart.starts=12"};
   };
   REQUIRE(run_command(design(folder.path / "whole")).exit_code == kDone);
   for (const bool lose_a_rank : {false, true}) {
@@ -136,7 +136,7 @@ TEST_CASE("mpirun: Ctrl-C, and the loss of a rank, leave what resume goes on wit
     const Finished ended = finished(process, folder);
     INFO(ended.err);
     CHECK(ended.exit_code != kDone);
-    CHECK(journal_lines(out, "start") < 24);
+    CHECK(journal_lines(out, "start") < 12);
     if (!lose_a_rank) {
       CHECK(json_of(out / "result.json").at("status") == "interrupted");
       CHECK(fs::exists(out / "optimized.json"));
@@ -144,7 +144,7 @@ TEST_CASE("mpirun: Ctrl-C, and the loss of a rank, leave what resume goes on wit
     const Finished resumed = mpirun(2, {"resume", out.string()}, folder);
     INFO(resumed.err);
     REQUIRE(resumed.exit_code == kDone);
-    CHECK(journal_lines(out, "start") == 24);
+    CHECK(journal_lines(out, "start") == 12);
     CHECK(outcome_of(out) == outcome_of(folder.path / "whole"));
   }
 }

@@ -336,7 +336,9 @@ TEST_CASE("resume: a single identification goes on from its journal, its profile
     write_text(out / kJournalFile,
                journal.substr(0, std::max(journal.find('\n') + 1,
                                           static_cast<std::size_t>(part * static_cast<double>(journal.size())))));
-    const long known = journal_lines(out, "residuals");
+    const bool cut_off = !content_of(out / kJournalFile).ends_with('\n');
+    const bool of_residuals = lines_of(out / kJournalFile).back().starts_with("{\"residuals\":");
+    const long known = journal_lines(out, "residuals") - (cut_off && of_residuals ? 1 : 0);
     REQUIRE(known < residuals);
     const CommandOutcome outcome = run_command({"resume", out.string()});
     INFO(outcome.err);
