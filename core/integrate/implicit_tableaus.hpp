@@ -82,8 +82,8 @@ static_assert(rows_sum_to_c(kSdirk4) && dense_ends_at_step(kSdirk4));
 // gauss4, gauss6: collocation at the zeros of Legendre's polynomials: [HW], section IV.5. A-stable and symplectic, not
 // L-stable: for long motion without fast damping. The last stage of the step is f(y1). The estimate is the divided
 // difference of f over 0 and the nodes, that is, against a formula of order 2 (3 with three nodes), scaled as the one
-// of radau5: error_filter times f(y0). Over 1 as well it would be an order better and vanish wherever f is linear, since
-// f is a polynomial of the collocation polynomial's degree there. With two nodes A has no real eigenvalue and
+// of radau5: error_filter times f(y0). Over 1 as well it would be an order better and vanish wherever f is linear,
+// since f is a polynomial of the collocation polynomial's degree there. With two nodes A has no real eigenvalue and
 // error_filter is their modulus.
 inline constexpr Tableau<4> kGauss4{
     .name = "gauss4",
