@@ -1,5 +1,6 @@
 #include "optim/ipopt_solver.hpp"
 
+#include <Eigen/Cholesky>
 #include <coin/IpIpoptApplication.hpp>
 #include <coin/IpTNLP.hpp>
 
@@ -49,6 +50,13 @@ class Adapter : public Ipopt::TNLP {
     result_.point = *point_;
     if (options_.progress) options_.progress({0, point_->f, problem_.violation(point_->c), distance, points_.x()});
     return true;
+  }
+
+  // Without constraints, and the Hessian there is positive definite: Newton's step leads down and needs no barrier.
+  bool start_curves_up() {
+    if (!options_.second_order || problem_.constraints() > 0) return false;
+    update_hessians(points_.x());
+    return Eigen::LLT<Eigen::MatrixXd>(hessians_[0]).info() == Eigen::Success;
   }
 
   bool get_nlp_info(Index& n, Index& m, Index& nnz_jac, Index& nnz_hess, IndexStyleEnum& style) override {
@@ -262,7 +270,8 @@ Outcome in_words(Ipopt::ApplicationReturnStatus status, const NlpResult& result,
   }
 }
 
-void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& options, bool near_solution) {
+void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& options, bool near_solution,
+                 bool start_curves_up) {
   Ipopt::OptionsList& list = *application.Options();
   list.SetIntegerValue("print_level", 0);
   list.SetStringValue("sb", "yes");  // no banner
@@ -270,6 +279,10 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
   list.SetIntegerValue("limited_memory_max_history", options.history);
   // Newton's steps converge faster than the barrier falls from its usual 0.1; BFGS needs that time to learn.
   if (options.second_order) list.SetNumericValue("mu_init", 1e-3);
+  if (start_curves_up) {
+    list.SetNumericValue("mu_init", 1e-7);
+    list.SetStringValue("bound_mult_init_method", "mu-based");  // multipliers of 1 would count as curvature
+  }
   list.SetStringValue("nlp_scaling_method", "user-scaling");
   list.SetStringValue("mu_strategy",
                       "monotone");                // "adaptive" leaps away from good points of problems with many minima
@@ -308,9 +321,10 @@ NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_s
   // From far away a barrier method may leave the valley of a good point for a worse one. Then it starts once more,
   // there.
   Outcome outcome{SolverStatus::failed, "Ipopt refused its options"};
+  const bool start_curves_up = adapter->start_curves_up();
   for (int round = 0; round <= kFreshStarts; ++round) {
     const Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);  // no console
-    set_options(*application, options, round > 0);
+    set_options(*application, options, round > 0, start_curves_up && round == 0);
     application->Options()->SetIntegerValue("max_iter", std::max(0, options.max_iterations - result.iterations));
     if (application->Initialize("") != Ipopt::Solve_Succeeded) break;  // "": no options file is read
     outcome = in_words(application->OptimizeTNLP(owner), result, options);
