@@ -187,6 +187,9 @@ TEST_CASE("resume: a single run goes on from its journal, wherever that was cut 
 }
 
 TEST_CASE("resume: exact Hessians are in the journal, too", "[resume]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
   const TemporaryFolder folder;
   std::string text = kSwingingRod;
   text.replace(text.find("\"multistart\": {\"starts\": 8, \"seed\": 11}"), 39,
@@ -255,6 +258,9 @@ TEST_CASE("resume refuses what it cannot go on with", "[resume]") {
 
 TEST_CASE("multistart: identify fits from several starts, the same with any number of workers, killed or not",
           "[multistart]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
   const TemporaryFolder folder;
   const std::string file = write_swing_fit(folder);
   REQUIRE(run_command({"identify", file, "--out", folder.file("one"), "--threads", "1"}).exit_code == kDone);
@@ -277,6 +283,9 @@ TEST_CASE("multistart: identify fits from several starts, the same with any numb
 }
 
 TEST_CASE("resume: an identification that was interrupted between its starts goes on", "[resume]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
   const TemporaryFolder folder;
   const std::string file = write_swing_fit(folder);
   const Arguments slow{"--threads", "2", "--set", "simulation.integrator.max_step=1e-3"};
@@ -317,6 +326,9 @@ std::string single_fit(const TemporaryFolder& folder) {
 
 TEST_CASE("resume: a single identification goes on from its journal, its profiles too, wherever that was cut off",
           "[resume]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
   const TemporaryFolder folder;
   const std::string file = single_fit(folder);
   const fs::path out = folder.path / "out";

@@ -190,6 +190,9 @@ TEST_CASE("Hessians of a design are those of its scaled program", "[design_optim
 }
 
 TEST_CASE("five-bar: exact Hessians halve the iterations", "[design_optimizers]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
   const auto iterations = [](const std::string& hessian) {
     Problem problem = still();
     problem.design->optimizer.hessian = hessian;
@@ -203,6 +206,9 @@ TEST_CASE("five-bar: exact Hessians halve the iterations", "[design_optimizers]"
 }
 
 TEST_CASE("five-bar: exact Hessians come to a tight tolerance", "[design_optimizers]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
   Problem problem = still(1e-9);
   problem.design->optimizer.tolerance = 1e-8;
   const DesignResult by_bfgs = run_design(problem);
