@@ -54,7 +54,7 @@ ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method,
   }
   x_.setZero(rows, largest), r_.setZero(rows * largest, 1), change_.setZero(14 * data_.n, largest);
   a_start_.setZero(7 * data_.n), lambda_start_.setZero(data_.m);
-  y_.setZero(14 * data_.n), work_.setZero(7 * data_.n);
+  y_.setZero(14 * data_.n);
 }
 
 long ImplicitStages::factorisations() const {

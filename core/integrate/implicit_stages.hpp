@@ -95,7 +95,7 @@ class ImplicitStages {
   Eigen::VectorXd a_start_, lambda_start_;
   Points past_, present_;  // of the last accepted step; of the attempt in hand
   Eigen::MatrixXd x_, r_, change_;
-  Eigen::VectorXd y_, work_;
+  Eigen::VectorXd y_;
   double rate_ = 1;  // of the last iteration
   bool renew_ = true;
   long age_ = 0;       // steps since the Jacobian was taken
