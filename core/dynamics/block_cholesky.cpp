@@ -14,35 +14,45 @@ double* column(Mat<6, 6>& A, int j) { return A.data() + 6 * j; }
 
 // Lower triangle of A -> below the diagonal of W = inv(L), unit lower, else zeros, and the inverse of D, with
 // A = L D L'; false where D is not positive.
-bool factor_diagonal(Mat<6, 6>& A, Vec<6>& inverse) {
-  for (int j = 0; j < 6; ++j) {
+template <int N>
+bool factor_diagonal(Mat<N, N>& A, Vec<N>& inverse) {
+  for (int j = 0; j < N; ++j) {
     if (!(A(j, j) > 0)) return false;
     inverse(j) = 1 / A(j, j);
-    double l[6];
-    for (int i = j + 1; i < 6; ++i) l[i] = A(i, j) * inverse(j);
-    for (int k = j + 1; k < 6; ++k) {
-      // cppcheck-suppress uninitvar  // of j = 5 no entry is read
-      for (int i = k; i < 6; ++i) A(i, k) -= l[i] * A(k, j);
+    double l[N];
+    for (int i = j + 1; i < N; ++i) l[i] = A(i, j) * inverse(j);
+    for (int k = j + 1; k < N; ++k) {
+      // cppcheck-suppress uninitvar  // of the last j no entry is read
+      for (int i = k; i < N; ++i) A(i, k) -= l[i] * A(k, j);
     }
-    for (int i = j + 1; i < 6; ++i) A(i, j) = l[i];
+    for (int i = j + 1; i < N; ++i) A(i, j) = l[i];
   }
   // W L = I, column by column from the last: W(i, j) = -L(i, j) - sum_{j<k<i} W(i, k) L(k, j)
-  for (int j = 4; j >= 0; --j) {
-    double w[6];
-    for (int i = j + 1; i < 6; ++i) {
+  for (int j = N - 2; j >= 0; --j) {
+    double w[N];
+    for (int i = j + 1; i < N; ++i) {
       w[i] = -A(i, j);
       for (int k = j + 1; k < i; ++k) w[i] -= A(i, k) * A(k, j);
     }
-    // cppcheck-suppress uninitvar  // j < 5: one entry is set at least
-    for (int i = j + 1; i < 6; ++i) A(i, j) = w[i];
+    // cppcheck-suppress uninitvar  // j < N - 1: one entry is set at least
+    for (int i = j + 1; i < N; ++i) A(i, j) = w[i];
   }
-  for (int j = 0; j < 6; ++j) {
+  for (int j = 0; j < N; ++j) {
     for (int i = 0; i <= j; ++i) A(i, j) = 0;
   }
   return true;
 }
 
 // LD = A W',  A = LD inv(D), column by column from the last.
+template <int N>
+void divide(const Mat<N, N>& W, const Vec<N>& inverse, Mat<N, N>& A, Mat<N, N>& LD) {
+  for (int j = N - 1; j >= 0; --j) {
+    Vec<N> sum = A.col(j);
+    for (int k = 0; k < j; ++k) sum += W(j, k) * A.col(k);
+    LD.col(j) = sum;
+    A.col(j) = inverse(j) * sum;
+  }
+}
 void divide(const Mat<6, 6>& W, const Vec<6>& inverse, Mat<6, 6>& A, Mat<6, 6>& LD) {
 #pragma GCC unroll 6
   for (int j = 5; j >= 0; --j) {
@@ -56,6 +66,10 @@ void divide(const Mat<6, 6>& W, const Vec<6>& inverse, Mat<6, 6>& A, Mat<6, 6>& 
 }
 
 // C -= A B'
+template <int N>
+void subtract_product(const Mat<N, N>& A, const Mat<N, N>& B, Mat<N, N>& C) {
+  C.noalias() -= A.lazyProduct(B.transpose());
+}
 void subtract_product(const Mat<6, 6>& A, const Mat<6, 6>& B, Mat<6, 6>& C) {
   for (int j = 0; j < 6; ++j) {
     Six sum(column(C, j));
@@ -66,36 +80,37 @@ void subtract_product(const Mat<6, 6>& A, const Mat<6, 6>& B, Mat<6, 6>& C) {
 }
 
 // y = W b and y = W'b, W unit lower.
-template <class X>
-X times(const Mat<6, 6>& W, const X& b) {
+template <int N, class X>
+X times(const Mat<N, N>& W, const X& b) {
   X y = b;
-  for (int j = 0; j < 5; ++j) {
-    for (int i = j + 1; i < 6; ++i) y.row(i) += W(i, j) * b.row(j);
+  for (int j = 0; j < N - 1; ++j) {
+    for (int i = j + 1; i < N; ++i) y.row(i) += W(i, j) * b.row(j);
   }
   return y;
 }
-template <class X>
-X transposed_times(const Mat<6, 6>& W, const X& b) {
+template <int N, class X>
+X transposed_times(const Mat<N, N>& W, const X& b) {
   X y = b;
-  for (int j = 0; j < 5; ++j) {
-    for (int i = j + 1; i < 6; ++i) y.row(j) += W(i, j) * b.row(i);
+  for (int j = 0; j < N - 1; ++j) {
+    for (int i = j + 1; i < N; ++i) y.row(j) += W(i, j) * b.row(i);
   }
   return y;
 }
 // y -= L x and y -= L'x
-template <class X>
-void subtract_times(const Mat<6, 6>& L, const X& x, X& y) {
+template <int N, class X>
+void subtract_times(const Mat<N, N>& L, const X& x, X& y) {
   X sum = y;
-  for (int j = 0; j < 6; ++j) {
-    for (int i = 0; i < 6; ++i) sum.row(i) -= L(i, j) * x.row(j);
+  for (int j = 0; j < N; ++j) {
+    for (int i = 0; i < N; ++i) sum.row(i) -= L(i, j) * x.row(j);
   }
   y = sum;
 }
-template <class X>
-void subtract_transposed_times(const Mat<6, 6>& L, const X& x, X& y) {
-  for (int j = 0; j < 6; ++j) {
-    y.row(j) -= L(0, j) * x.row(0) + L(1, j) * x.row(1) + L(2, j) * x.row(2) + L(3, j) * x.row(3) + L(4, j) * x.row(4) +
-                L(5, j) * x.row(5);
+template <int N, class X>
+void subtract_transposed_times(const Mat<N, N>& L, const X& x, X& y) {
+  for (int j = 0; j < N; ++j) {
+    Eigen::Matrix<double, 1, X::ColsAtCompileTime> sum = L(0, j) * x.row(0);
+    for (int i = 1; i < N; ++i) sum += L(i, j) * x.row(i);
+    y.row(j) -= sum;
   }
 }
 
@@ -135,7 +150,8 @@ void subtract_transposed_times(const Mat<6, 6>& L, const Vec<6>& b, Vec<6>& y) {
 
 }  // namespace
 
-BlockCholesky::BlockCholesky(int bodies, std::span<const std::pair<int, int>> edges) : elimination_(bodies, edges) {
+template <int N>
+BlockCholesky<N>::BlockCholesky(int bodies, std::span<const std::pair<int, int>> edges) : elimination_(bodies, edges) {
   for (const auto& [a, b] : edges) handles_.push_back(elimination_.place(a, b));
   diagonal_.resize(index(bodies));
   inverse_.resize(index(bodies));
@@ -148,16 +164,18 @@ BlockCholesky::BlockCholesky(int bodies, std::span<const std::pair<int, int>> ed
   set_zero();
 }
 
-void BlockCholesky::set_zero() {
+template <int N>
+void BlockCholesky<N>::set_zero() {
   for (Block& b : diagonal_) b.setZero();
   for (Block& b : lower_) b.setZero();
 }
 
 // L_ik = A_ik W_k' inv(D_k); A_ij -= L_ik D_k L_jk'
-bool BlockCholesky::factor() {
+template <int N>
+bool BlockCholesky<N>::factor() {
   for (std::size_t k = 0; k < diagonal_.size(); ++k) {
     Block& W = diagonal_[k];
-    Vec<6>& inverse = inverse_[k];
+    Vec<N>& inverse = inverse_[k];
     if (!factor_diagonal(W, inverse)) return false;
     const std::vector<Elimination::Entry>& column = elimination_.columns[k];
     for (std::size_t e = 0; e < column.size(); ++e) divide(W, inverse, lower_[column[e].block], scaled_[e]);
@@ -168,8 +186,9 @@ bool BlockCholesky::factor() {
   return true;
 }
 
+template <int N>
 template <class X>
-void BlockCholesky::solve_any(std::span<X> x, std::vector<X>& y) {
+void BlockCholesky<N>::solve_any(std::span<X> x, std::vector<X>& y) {
   const std::vector<int>& order = elimination_.order;
   for (std::size_t k = 0; k < order.size(); ++k) y[k] = x[index(order[k])];
   for (std::size_t k = 0; k < order.size(); ++k) {
@@ -178,14 +197,23 @@ void BlockCholesky::solve_any(std::span<X> x, std::vector<X>& y) {
   }
   for (std::size_t k = order.size(); k-- > 0;) {
     X z;
-    for (int i = 0; i < 6; ++i) z.row(i) = inverse_[k](i) * y[k].row(i);
+    for (int i = 0; i < N; ++i) z.row(i) = inverse_[k](i) * y[k].row(i);
     for (const auto& e : elimination_.columns[k]) subtract_transposed_times(lower_[e.block], y[index(e.row)], z);
     y[k] = transposed_times(diagonal_[k], z);
     x[index(order[k])] = y[k];
   }
 }
 
-template void BlockCholesky::solve_any(std::span<Vec<6>>, std::vector<Vec<6>>&);
-template void BlockCholesky::solve_any(std::span<Lanes<6>>, std::vector<Lanes<6>>&);
+template <int N>
+void BlockCholesky<N>::solve(std::span<Vec<N>> x) {
+  solve_any(x, permuted_);
+}
+template <int N>
+void BlockCholesky<N>::solve(std::span<Lanes<N>> x) {
+  solve_any(x, permuted_lanes_);
+}
+
+template class BlockCholesky<6>;
+template class BlockCholesky<3>;
 
 }  // namespace mbsopt

@@ -1,10 +1,11 @@
-// Sparse Cholesky factorisation S = L D L' (D diagonal) of a symmetric positive definite matrix of 6x6 blocks on the
-// graph of bodies. Symbolic work once (elimination order by AMD, fill known), then factor and solve without allocation.
+// Sparse Cholesky factorisation S = L D L' (D diagonal) of a symmetric positive definite matrix of N x N blocks on the
+// graph of bodies, N = 6 in space, 3 in the plane. Symbolic work once (elimination order by AMD, fill known), then
+// factor and solve without allocation.
 //
-//   BlockCholesky S(bodies, edges);          // edges: pairs of bodies that share a block
+//   BlockCholesky<6> S(bodies, edges);       // edges: pairs of bodies that share a block
 //   S.set_zero();  S.diagonal(0) += ...;  S.add_off_diagonal(handle, X);
 //   if (!S.factor()) ...                     // not positive definite
-//   S.solve(x);                              // in place, 6 numbers per body; or lanes of several right-hand sides
+//   S.solve(x);                              // in place, N numbers per body; or lanes of several right-hand sides
 #pragma once
 
 #include <span>
@@ -16,9 +17,10 @@
 
 namespace mbsopt {
 
+template <int N>
 class BlockCholesky {
  public:
-  using Block = Mat<6, 6>;
+  using Block = Mat<N, N>;
 
   BlockCholesky() = default;
   // Bodies 0..bodies-1. Handle k below belongs to edges[k]; repeated edges share a block.
@@ -38,8 +40,8 @@ class BlockCholesky {
 
   bool factor();
 
-  void solve(std::span<Vec<6>> x) { solve_any(x, permuted_); }
-  void solve(std::span<Lanes<6>> x) { solve_any(x, permuted_lanes_); }
+  void solve(std::span<Vec<N>> x);
+  void solve(std::span<Lanes<N>> x);
 
   std::size_t fill_blocks() const { return lower_.size(); }
 
@@ -51,10 +53,12 @@ class BlockCholesky {
   Elimination elimination_;
   std::vector<Elimination::Place> handles_;
   std::vector<Block> diagonal_, lower_;  // S before factor(), inv(L_kk) below the diagonal and L_ik after
-  std::vector<Vec<6>> inverse_;          // of D
+  std::vector<Vec<N>> inverse_;          // of D
   std::vector<Block> scaled_;            // L_ik D_k of the column in hand
-  std::vector<Vec<6>> permuted_;
-  std::vector<Lanes<6>> permuted_lanes_;
+  std::vector<Vec<N>> permuted_;
+  std::vector<Lanes<N>> permuted_lanes_;
 };
+extern template class BlockCholesky<6>;
+extern template class BlockCholesky<3>;
 
 }  // namespace mbsopt

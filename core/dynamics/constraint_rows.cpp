@@ -72,6 +72,15 @@ void ConstraintRows::evaluate(const std::vector<Frame>& frames) {
   }
 }
 
+void ConstraintRows::add_mass(BlockCholesky<6>& S) const {
+  for (int i = 1; i <= data_->n; ++i) {
+    const BodyData& b = data_->bodies[static_cast<std::size_t>(i)];
+    Mat<6, 6>& D = S.diagonal(i - 1);
+    D.diagonal().head<3>().array() += b.mass;
+    D.bottomRightCorner<3, 3>() += b.J;
+  }
+}
+
 // S12 += alpha J1'J2 of one row.
 void ConstraintRows::add_cross(double alpha, int block, Mat<6, 6>& S12) const {
   const double *a = J1.row(block).data(), *b = J2.row(block).data();
@@ -85,7 +94,7 @@ void ConstraintRows::add_cross(double alpha, int block, Mat<6, 6>& S12) const {
   for (int j = 3; j < 6; ++j) add_column(j);
 }
 
-void ConstraintRows::add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky& S) {
+void ConstraintRows::add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S) {
   for (std::size_t k = 0; k < data_->groups.size(); ++k) {
     const RowGroup& g = data_->groups[k];
     if (g.shared) continue;
@@ -106,7 +115,7 @@ void ConstraintRows::add_weighted_square(const Eigen::VectorXd& alpha, BlockChol
   if (!shared_.empty()) add_shared_square(alpha, S);
 }
 
-void ConstraintRows::add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky& S) {
+void ConstraintRows::add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S) {
   for (SharedRow& row : shared_) {
     for (Mat<1, 6>& J : row.J) J.setZero();
     auto of = [&](int body) -> Mat<1, 6>& {
@@ -138,6 +147,6 @@ Eigen::MatrixXd ConstraintRows::dense() const {
   return J;
 }
 
-BlockCholesky ConstraintRows::matrix() const { return BlockCholesky(data_->n, edges_); }
+BlockCholesky<6> ConstraintRows::matrix() const { return BlockCholesky<6>(data_->n, edges_); }
 
 }  // namespace mbsopt

@@ -13,7 +13,9 @@ namespace mbsopt {
 
 class ConstraintRows {
  public:
+  static constexpr int kUnknowns = 6;  // per body
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor>;
+  using Frames = std::vector<Frame>;
 
   explicit ConstraintRows(const MechanismData& data);
 
@@ -67,12 +69,22 @@ class ConstraintRows {
       if (g.body2 > 0) subtract_group_times(J2, g, lambda, x[at(g.body2)]);
     }
   }
+  // M x for body i (1-based), and S += M.
+  template <class X>
+  X mass_times(int body, const X& x) const {
+    const BodyData& b = data_->bodies[static_cast<std::size_t>(body)];
+    X y;
+    y.template topRows<3>() = b.mass * x.template topRows<3>();
+    y.template bottomRows<3>().noalias() = b.J * x.template bottomRows<3>();
+    return y;
+  }
+  void add_mass(BlockCholesky<6>& S) const;
   // S += J' diag(alpha) J
-  void add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky& S);
+  void add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S);
 
   Eigen::MatrixXd dense() const;  // J, 6 columns per moving body
 
-  BlockCholesky matrix() const;  // a matrix with the pattern of J'J
+  BlockCholesky<6> matrix() const;  // a matrix with the pattern of J'J
 
   Rows J1, J2;  // one row per block row
 
@@ -109,7 +121,7 @@ class ConstraintRows {
   }
   void add_cross(double alpha, int block, Mat<6, 6>& S12) const;
   static std::size_t at(int body) { return static_cast<std::size_t>(body - 1); }
-  void add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky& S);
+  void add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S);
 
   // A row with several constraints: its distinct moving bodies, and the off-diagonal blocks of their pairs.
   struct SharedRow {

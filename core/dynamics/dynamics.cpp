@@ -34,7 +34,7 @@ double compliance_of(const FormulationSettings& settings) {
 
 }  // namespace
 
-Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settings)
+Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settings, Model model)
     : mechanism_(mechanism),
       data_(mechanism_.data()),
       settings_(settings),
@@ -43,6 +43,11 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
       solver_(data_, alpha_of_factor(data_, settings), compliance_of(settings)) {
   const std::size_t n = static_cast<std::size_t>(data_.n);
   const Eigen::Index m = data_.m, P = data_.rho.size();
+  if (model == Model::planar) {
+    planar_ = std::make_unique<PlanarDynamics>(data_, settings, solver_.alpha(), compliance_of(settings),
+                                               solver_settings(false), solver_settings(true));
+    return;
+  }
   y_.setZero(14 * data_.n);
   angles_.setZero(static_cast<Eigen::Index>(data_.angles.size()));
   bodies_.resize(n + 1);
@@ -107,6 +112,11 @@ void Dynamics::set_loads() {
 
 bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                         Eigen::Ref<Eigen::VectorXd> ydot) {
+  if (planar_) {
+    const bool finite = planar_->evaluate(t, y, angles, ydot);
+    note_residual(planar_->residual_ratio());
+    return finite;
+  }
   set_state(t, y, angles);
   set_loads();
   const Vec<6> none = Vec<6>::Zero();
@@ -120,9 +130,7 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
   if (!solver_.factor(frames_)) return false;
   g_ = -gamma_;
   solver_.solve(loads_, g_, solver_settings(false), z_, lambda_);
-  if (settings_.type == FormulationType::augmented_lagrangian) {
-    worst_residual_ = std::max(worst_residual_, solver_.residual_ratio());
-  }
+  note_residual(solver_.residual_ratio());
 
   const Eigen::Index half = 7 * data_.n;
   ydot.head(half) = y.tail(half);
@@ -137,8 +145,13 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
   return finite;
 }
 
+void Dynamics::note_residual(double ratio) {
+  if (settings_.type == FormulationType::augmented_lagrangian) worst_residual_ = std::max(worst_residual_, ratio);
+}
+
 bool Dynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                          const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda) {
+  if (planar_) return planar_->linearise(t, y, angles, a, lambda);
   set_motion(t, y, angles, a, lambda);
   return solver_.factor(frames_);
 }
@@ -149,6 +162,7 @@ void Dynamics::linearise_here() {
 }
 
 void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir) {
+  if (planar_) return planar_->tangent(block, y_dir, ydot_dir);
   const int n = data_.n;
   right_hand_side_tangent(block, y_dir);
   solver_.solve(rhs_lanes_, gamma_dir_, solver_settings(true), z_dir_, lambda_dir_);
@@ -170,6 +184,7 @@ void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneR
 
 void Dynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
                            Eigen::VectorXd& rho_bar, const Motion* motion) {
+  if (planar_) return planar_->add_adjoint(w, y_bar, theta_bar, rho_bar);
   const Eigen::Index half = 7 * data_.n;
   for (int i = 1; i <= data_.n; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);

@@ -17,12 +17,14 @@
 // in the first call of blocks() or tangent().
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "core/dynamics/constraint_blocks.hpp"
 #include "core/dynamics/constraint_terms.hpp"
 #include "core/dynamics/force_terms.hpp"
+#include "core/dynamics/planar_dynamics.hpp"
 #include "core/dynamics/saddle_solver.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/mechanism/row_laws.hpp"
@@ -33,7 +35,9 @@ namespace mbsopt {
 
 class Dynamics {
  public:
-  Dynamics(const Mechanism& mechanism, const FormulationSettings& settings);
+  // planar: for explicit methods only, that is, for evaluate(), linearise(), tangent(), add_adjoint() and lambda()
+  // alone, without a motion's cotangent; the mechanism has a planar model.
+  Dynamics(const Mechanism& mechanism, const FormulationSettings& settings, Model model = Model::spatial);
 
   const MechanismData& data() const { return data_; }
   const FormulationSettings& settings() const { return settings_; }
@@ -42,7 +46,7 @@ class Dynamics {
   // is not finite. The solution stays available as z() and lambda().
   bool evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, Eigen::Ref<Eigen::VectorXd> ydot);
   const std::vector<Vec<6>>& z() const { return z_; }
-  const Eigen::VectorXd& lambda() const { return lambda_; }
+  const Eigen::VectorXd& lambda() const { return planar_ ? planar_->lambda() : lambda_; }
   // Of the same evaluation: f, and gamma.
   const std::vector<Vec<6>>& loads() const { return loads_; }
   const Eigen::VectorXd& gamma() const { return gamma_; }
@@ -93,6 +97,7 @@ class Dynamics {
   void hold_laws() { laws_.hold(); }
 
   SaddleSolver& solver() { return solver_; }
+  long factorisations() const { return planar_ ? planar_->factorisations() : solver_.factorisations(); }
   // Largest relative residual of the constraints' accelerations over all evaluations (augmented Lagrangian).
   double worst_residual() const { return worst_residual_; }
 
@@ -106,6 +111,7 @@ class Dynamics {
   // y_bar, ... += gradient of  pddot_bar'pddot - eta'(M z + J'lambda - f) - mu'(J z + gamma)  with z and lambda fixed.
   void pull_back(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
   void set_loads();  // f
+  void note_residual(double ratio);
   ForceTerms::At here() const { return {t_, y_, angles_, frames_}; }
   void set_user_state(const UserForceData& force);
   void add_user_loads();
@@ -120,6 +126,7 @@ class Dynamics {
   RowLaws laws_;
   ForceTerms forces_;
   SaddleSolver solver_;
+  std::unique_ptr<PlanarDynamics> planar_;  // where it is there, it does all the work
 
   double t_ = 0, worst_residual_ = 0;
   Eigen::VectorXd y_, angles_;

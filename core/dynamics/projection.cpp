@@ -17,10 +17,11 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
-Projector::Projector(const Mechanism& mechanism, Projection what)
+Projector::Projector(const Mechanism& mechanism, Projection what, Model model)
     : mechanism_(mechanism),
       data_(mechanism_.data()),
       what_(what),
+      planar_(model == Model::planar ? std::make_unique<PlanarProjector>(data_) : nullptr),
       solver_(data_, kRelativeAlpha * data_.row_alpha),
       rows_(data_),
       laws_(data_) {
@@ -88,6 +89,7 @@ void Projector::set_q(const std::vector<Vec<6>>& delta, Eigen::VectorXd& y) {
 
 bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y,
                         ProjectionSolution& s) {
+  if (planar_) return planar_->project(t, angles, y_hat, y, s);
   laws_.set_time(t);
   prepare_bodies(y_hat);
   set_frames(scratch_y_, nullptr, states_tilde_, frames_tilde_);
@@ -151,6 +153,7 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
 }
 
 double Projector::position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y) {
+  if (planar_) return planar_->position_violation(t, angles, y);
   laws_.set_time(t);
   set_frames(y, nullptr, states_, frames_);
   evaluate_phi(data_, frames_, laws_, angles, phi_);
@@ -160,6 +163,7 @@ double Projector::position_violation(double t, const Eigen::VectorXd& angles, co
 }
 
 double Projector::velocity_violation(double t, const Eigen::VectorXd& y) {
+  if (planar_) return planar_->velocity_violation(t, y);
   laws_.set_time(t);
   set_frames(y, &y, states_, frames_);
   evaluate_phi_dot(data_, frames_, laws_, phi_);

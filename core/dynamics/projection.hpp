@@ -11,24 +11,22 @@
 // Numer. Anal. 30 (1993).
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "core/dynamics/constraint_terms.hpp"
+#include "core/dynamics/planar_projection.hpp"
+#include "core/dynamics/projection_solution.hpp"
 #include "core/dynamics/saddle_solver.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/settings.hpp"
 
 namespace mbsopt {
 
-// What a projection found; enough to differentiate it later.
-struct ProjectionSolution {
-  std::vector<Vec<6>> delta, u;
-  Eigen::VectorXd nu, kappa;
-};
-
 class Projector {
  public:
-  Projector(const Mechanism& mechanism, Projection what);
+  // planar: what is none or position_velocity, and the mechanism has a planar model.
+  Projector(const Mechanism& mechanism, Projection what, Model model = Model::spatial);
 
   bool positions() const { return what_ == Projection::position_velocity; }
   bool active() const { return what_ != Projection::none; }
@@ -49,7 +47,7 @@ class Projector {
   // Largest violations at y: of Phi and the unit norms, and of their rates.
   double position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y);
   double velocity_violation(double t, const Eigen::VectorXd& y);
-  long factorisations() const { return solver_.factorisations(); }
+  long factorisations() const { return planar_ ? planar_->factorisations() : solver_.factorisations(); }
 
  private:
   struct Body {
@@ -72,7 +70,8 @@ class Projector {
   const Mechanism mechanism_;
   const MechanismData& data_;
   Projection what_;
-  SaddleSolver solver_;  // factor of S(q~)
+  std::unique_ptr<PlanarProjector> planar_;  // where it is there, it does all the work
+  SaddleSolver solver_;                      // factor of S(q~)
   ConstraintRows rows_;  // J at the projected q
   RowLaws laws_;
   Eigen::VectorXd angles_;

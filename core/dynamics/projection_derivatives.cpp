@@ -54,6 +54,7 @@ Lanes<4> G_transposed_direction(const Lanes<4>& p_dir, const Vector3d& w) {
 
 bool Projector::linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat,
                           const Eigen::VectorXd& y, const ProjectionSolution& solution) {
+  if (planar_) return planar_->linearise(t, angles, y_hat, y, solution);
   laws_.set_time(t);
   angles_ = angles;
   solution_ = &solution;
@@ -140,6 +141,7 @@ void Projector::refine(Level level, bool transposed, const std::vector<X>& b, co
 }
 
 void Projector::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) {
+  if (planar_) return planar_->tangent(block, y_hat_dir, y_dir);
   const int n = data_.n;
   const Eigen::Index half = 7 * n;
   const ProjectionSolution& s = *solution_;
@@ -239,6 +241,7 @@ void Projector::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, 
 
 void Projector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,
                             Eigen::VectorXd& rho_bar) {
+  if (planar_) return planar_->add_adjoint(y_bar, y_hat_bar, theta_bar, rho_bar);
   const int n = data_.n;
   const Eigen::Index half = 7 * n;
   const ProjectionSolution& s = *solution_;

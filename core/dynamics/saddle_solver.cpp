@@ -14,8 +14,9 @@ constexpr double kDisagreement = 1e-14;
 
 }  // namespace
 
-SaddleSolver::SaddleSolver(const MechanismData& data, const Eigen::VectorXd& alpha, double c)
-    : data_(&data), rows_(data), S_(rows_.matrix()), alpha_(alpha), c_(c) {
+template <class Rows>
+BlockSaddleSolver<Rows>::BlockSaddleSolver(const MechanismData& data, const Eigen::VectorXd& alpha, double c)
+    : rows_(data), S_(rows_.matrix()), alpha_(alpha), c_(c) {
   const std::size_t n = static_cast<std::size_t>(data.n);
   residual_.setZero(data.m);
   residual_lanes_.setZero(data.m, kLanes);
@@ -25,24 +26,21 @@ SaddleSolver::SaddleSolver(const MechanismData& data, const Eigen::VectorXd& alp
   correction_lanes_.resize(n);
 }
 
-bool SaddleSolver::factor(const std::vector<Frame>& frames) {
+template <class Rows>
+bool BlockSaddleSolver<Rows>::factor(const Frames& frames) {
   rows_.evaluate(frames);
   S_.set_zero();
-  for (int i = 1; i <= data_->n; ++i) {
-    const BodyData& b = data_->bodies[static_cast<std::size_t>(i)];
-    Mat<6, 6>& D = S_.diagonal(i - 1);
-    D.diagonal().head<3>().setConstant(b.mass);
-    D.bottomRightCorner<3, 3>() = b.J;
-  }
+  rows_.add_mass(S_);
   rows_.add_weighted_square(alpha_, S_);
   ++factorisations_;
   return S_.factor();
 }
 
+template <class Rows>
 template <class X, class Y>
-void SaddleSolver::solve_any(const std::vector<X>& b, const Y& g, const Settings& settings, std::vector<X>& x, Y& nu,
+void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, const Settings& settings, std::vector<X>& x, Y& nu,
                              Y& residual, Y& step, std::vector<X>& correction) {
-  const std::size_t n = static_cast<std::size_t>(data_->n);
+  const std::size_t n = b.size();
   for (X& xi : x) xi.setZero();
   nu.setZero();
   residual = g;
@@ -80,8 +78,9 @@ void SaddleSolver::solve_any(const std::vector<X>& b, const Y& g, const Settings
 
 // nu += d,  d = -s/c with J'd = 0: the rounding of s that lies in the range of J is 1/c times too large there, and goes
 // again as in solve_any, by dx and alpha J dx from the residual -J'd. Twice: each gains a factor of 1/(1 + alpha j).
+template <class Rows>
 template <class X, class Y>
-void SaddleSolver::add_redundant_part(Y& nu, Y& residual, Y& step, std::vector<X>& correction) {
+void BlockSaddleSolver<Rows>::add_redundant_part(Y& nu, Y& residual, Y& step, std::vector<X>& correction) {
   Y& d = residual;
   d *= -1 / c_;
   for (int k = 0; k < 2; ++k) {
@@ -95,24 +94,29 @@ void SaddleSolver::add_redundant_part(Y& nu, Y& residual, Y& step, std::vector<X
   nu += d;
 }
 
-void SaddleSolver::solve(const std::vector<Vec<6>>& b, const Eigen::VectorXd& g, const Settings& settings,
-                         std::vector<Vec<6>>& x, Eigen::VectorXd& nu) {
+template <class Rows>
+void BlockSaddleSolver<Rows>::solve(const Vector& b, const Eigen::VectorXd& g, const Settings& settings, Vector& x,
+                                    Eigen::VectorXd& nu) {
   if (g.size() == 0) {
     x = b;
-    S_.solve(std::span<Vec<6>>(x));
+    S_.solve(std::span(x));
     return;
   }
   solve_any(b, g, settings, x, nu, residual_, step_, correction_);
 }
 
-void SaddleSolver::solve(const std::vector<Lanes<6>>& b, const LaneRows& g, const Settings& settings,
-                         std::vector<Lanes<6>>& x, LaneRows& nu) {
+template <class Rows>
+void BlockSaddleSolver<Rows>::solve(const LaneVector& b, const LaneRows& g, const Settings& settings, LaneVector& x,
+                                    LaneRows& nu) {
   if (g.rows() == 0) {
     x = b;
-    S_.solve(std::span<Lanes<6>>(x));
+    S_.solve(std::span(x));
     return;
   }
   solve_any(b, g, settings, x, nu, residual_lanes_, step_lanes_, correction_lanes_);
 }
+
+template class BlockSaddleSolver<ConstraintRows>;
+template class BlockSaddleSolver<PlanarRows>;
 
 }  // namespace mbsopt

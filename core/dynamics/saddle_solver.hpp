@@ -22,32 +22,40 @@
 #include <vector>
 
 #include "core/dynamics/constraint_rows.hpp"
+#include "core/dynamics/planar_rows.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
 
 namespace mbsopt {
 
-class SaddleSolver {
+// Refinements after the first pass: at least `least`, at most `most`; between the two until |s| is at most tolerance
+// times the larger of |g| and |x|, or stops falling.
+struct Refinements {
+  int least = 0, most = 0;
+  double tolerance = 0;
+};
+
+// Rows: J and M in space (ConstraintRows) or in the plane (PlanarRows).
+template <class Rows>
+class BlockSaddleSolver {
  public:
+  static constexpr int kUnknowns = Rows::kUnknowns;  // per body
+  using Settings = Refinements;
+  using Frames = typename Rows::Frames;
+  using Vector = std::vector<Vec<kUnknowns>>;
+  using LaneVector = std::vector<Lanes<kUnknowns>>;
+
   // alpha: that of S, per row.
-  SaddleSolver(const MechanismData& data, const Eigen::VectorXd& alpha, double c = 0);
+  BlockSaddleSolver(const MechanismData& data, const Eigen::VectorXd& alpha, double c = 0);
 
   // S from J at the frames given; false where it is not positive definite.
-  bool factor(const std::vector<Frame>& frames);
+  bool factor(const Frames& frames);
   // J alone.
-  void place(const std::vector<Frame>& frames) { rows_.evaluate(frames); }
-  const ConstraintRows& rows() const { return rows_; }
+  void place(const Frames& frames) { rows_.evaluate(frames); }
+  const Rows& rows() const { return rows_; }
   const Eigen::VectorXd& alpha() const { return alpha_; }
 
-  // Refinements after the first pass: at least `least`, at most `most`; between the two until |s| is at most tolerance
-  // times the larger of |g| and |x|, or stops falling.
-  struct Settings {
-    int least = 0, most = 0;
-    double tolerance = 0;
-  };
-  void solve(const std::vector<Vec<6>>& b, const Eigen::VectorXd& g, const Settings& settings, std::vector<Vec<6>>& x,
-             Eigen::VectorXd& nu);
-  void solve(const std::vector<Lanes<6>>& b, const LaneRows& g, const Settings& settings, std::vector<Lanes<6>>& x,
-             LaneRows& nu);
+  void solve(const Vector& b, const Eigen::VectorXd& g, const Settings& settings, Vector& x, Eigen::VectorXd& nu);
+  void solve(const LaneVector& b, const LaneRows& g, const Settings& settings, LaneVector& x, LaneRows& nu);
 
   // |s| after the last solve, relative as above.
   double residual_ratio() const { return residual_ratio_; }
@@ -56,11 +64,7 @@ class SaddleSolver {
   // M x for body i (1-based).
   template <class X>
   X mass_times(int body, const X& x) const {
-    const BodyData& b = data_->bodies[static_cast<std::size_t>(body)];
-    X y;
-    y.template topRows<3>() = b.mass * x.template topRows<3>();
-    y.template bottomRows<3>().noalias() = b.J * x.template bottomRows<3>();
-    return y;
+    return rows_.mass_times(body, x);
   }
 
  private:
@@ -70,17 +74,21 @@ class SaddleSolver {
   template <class X, class Y>
   void add_redundant_part(Y& nu, Y& residual, Y& step, std::vector<X>& correction);
 
-  const MechanismData* data_;
-  ConstraintRows rows_;
-  BlockCholesky S_;
+  Rows rows_;
+  BlockCholesky<kUnknowns> S_;
   Eigen::VectorXd alpha_;
   double c_;
   Eigen::VectorXd residual_, step_;
   LaneRows residual_lanes_, step_lanes_;
-  std::vector<Vec<6>> correction_;
-  std::vector<Lanes<6>> correction_lanes_;
+  Vector correction_;
+  LaneVector correction_lanes_;
   long factorisations_ = 0;
   double residual_ratio_ = 0;
 };
+extern template class BlockSaddleSolver<ConstraintRows>;
+extern template class BlockSaddleSolver<PlanarRows>;
+
+using SaddleSolver = BlockSaddleSolver<ConstraintRows>;
+using PlanarSaddleSolver = BlockSaddleSolver<PlanarRows>;
 
 }  // namespace mbsopt

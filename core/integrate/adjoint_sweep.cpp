@@ -1,5 +1,7 @@
 #include "core/integrate/adjoint_sweep.hpp"
 
+#include "core/integrate/model_choice.hpp"
+
 namespace mbsopt {
 
 StoredStep::StoredStep(const Step& step, const Method& rk, std::span<const SampleEvent> events)
@@ -31,8 +33,8 @@ AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings&
     : mechanism_(mechanism),
       rk_(method),
       costs_(costs),
-      dynamics_(mechanism, settings.formulation),
-      projector_(mechanism, settings.formulation.projection) {
+      dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
+      projector_(mechanism, settings.formulation.projection, model_of(mechanism, settings, method)) {
   const MechanismData& d = mechanism.data();
   if (d.needs_motion) motion_.emplace(mechanism, settings.formulation);
   const Eigen::Index states = mechanism.states(), objectives = static_cast<Eigen::Index>(costs.size());

@@ -46,7 +46,7 @@ class AdjointSweep {
   Eigen::MatrixXd mu() const;
 
   long factorisations() {
-    return dynamics_.solver().factorisations() + projector_.factorisations() +
+    return dynamics_.factorisations() + projector_.factorisations() +
            (implicit_ ? implicit_->factorisations() : 0);
   }
 

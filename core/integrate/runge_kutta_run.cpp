@@ -5,14 +5,16 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "core/integrate/model_choice.hpp"
+
 namespace mbsopt {
 
 RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method)
     : mechanism_(mechanism),
       settings_(settings),
       rk_(method),
-      dynamics_(mechanism, settings.formulation),
-      projector_(mechanism, settings.formulation.projection),
+      dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
+      projector_(mechanism, settings.formulation.projection, model_of(mechanism, settings, method)),
       step_(make_step()) {
   const Eigen::Index states = mechanism.states();
   angles_.setZero(static_cast<Eigen::Index>(mechanism.data().angles.size()));
@@ -333,7 +335,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     result.statistics.factorisations += implicit_->factorisations();
   }
   result.statistics.rhs_evaluations += evaluations_;
-  result.statistics.factorisations += dynamics_.solver().factorisations() + projector_.factorisations();
+  result.statistics.factorisations += dynamics_.factorisations() + projector_.factorisations();
 }
 
 }  // namespace mbsopt

@@ -1,13 +1,15 @@
 #include "core/integrate/tangent_sweep.hpp"
 
+#include "core/integrate/model_choice.hpp"
+
 namespace mbsopt {
 
 TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
                            const Eigen::MatrixXd& y_initial_rho)
     : mechanism_(mechanism),
       rk_(method),
-      dynamics_(mechanism, settings.formulation),
-      projector_(mechanism, settings.formulation.projection) {
+      dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
+      projector_(mechanism, settings.formulation.projection, model_of(mechanism, settings, method)) {
   const MechanismData& d = mechanism.data();
   if (d.needs_motion) motion_.emplace(mechanism, settings.formulation);
   const Eigen::Index states = mechanism.states();

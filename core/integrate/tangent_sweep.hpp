@@ -29,7 +29,7 @@ class TangentSweep {
               Eigen::MatrixXd& psi_rho);
 
   long factorisations() {
-    return dynamics_.solver().factorisations() + projector_.factorisations() +
+    return dynamics_.factorisations() + projector_.factorisations() +
            (implicit_ ? implicit_->factorisations() : 0);
   }
 

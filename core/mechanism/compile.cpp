@@ -5,6 +5,7 @@
 
 #include "core/mechanism/compilation.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/planar_model.hpp"
 
 namespace mbsopt {
 namespace {
@@ -91,6 +92,9 @@ MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std:
   group_rows(model.data);
   scale_alpha(model.data);
   model.data.theta_rho = model.fields.theta_rho();
+  PlanarSearch plane = find_planar_model(scene, model.data);
+  model.data.planar = std::move(plane.model);
+  model.data.not_planar = std::move(plane.reason);
   return std::move(model.data);
 }
 

@@ -86,6 +86,8 @@ struct UserForceData {
   std::vector<int> bodies;  // 1-based
 };
 
+struct PlanarModel;  // planar_model.hpp
+
 struct MechanismData {
   int n = 0;                  // bodies, the ground not counted
   int m = 0;                  // rows of Phi, unit norms not counted
@@ -114,6 +116,9 @@ struct MechanismData {
   std::vector<ConditionData> conditions;
   std::vector<std::string> body_names, joint_names, drive_names;  // body_names[0] = "ground"
   int largest_law = 0;                                            // inputs of the largest law, for scratch
+
+  std::shared_ptr<const PlanarModel> planar;  // where joints hold all bodies in a plane
+  std::string not_planar;                     // else why not
 
   bool needs_motion = false;  // some sensor does
   bool equilibrium = false;   // start from static equilibrium

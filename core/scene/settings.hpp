@@ -13,6 +13,10 @@ enum class FormulationType { penalty, augmented_lagrangian };
 // [M J'; J -1/alpha], which does not.
 enum class LinearSolver { cholesky, quasidefinite };
 enum class Projection { none, velocity, position_velocity };
+// Six unknowns per body, or three where joints hold all bodies in a plane (planar_model.hpp); automatic: planar where
+// it can be.
+enum class ModelChoice { automatic, planar, spatial };
+enum class Model { spatial, planar };
 
 struct FormulationSettings {
   FormulationType type = FormulationType::augmented_lagrangian;
@@ -40,6 +44,7 @@ struct IntegratorSettings {
 struct SimulationSettings {
   double start_time = 0, end_time = 1;  // [s]
   std::optional<double> output_step;    // default: 200 rows
+  ModelChoice model = ModelChoice::automatic;
   FormulationSettings formulation;
   IntegratorSettings integrator;
   std::vector<double> events;       // times at which a step ends and the next begins [s]

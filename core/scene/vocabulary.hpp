@@ -83,6 +83,9 @@ inline constexpr Choice<FormulationType> kFormulations[] = {
     {"augmented_lagrangian", FormulationType::augmented_lagrangian}, {"penalty", FormulationType::penalty}};
 inline constexpr Choice<LinearSolver> kLinearSolvers[] = {{"cholesky", LinearSolver::cholesky},
                                                           {"quasidefinite", LinearSolver::quasidefinite}};
+inline constexpr Choice<ModelChoice> kModels[] = {{"auto", ModelChoice::automatic},
+                                                  {"planar", ModelChoice::planar},
+                                                  {"spatial", ModelChoice::spatial}};
 inline constexpr Choice<Projection> kProjections[] = {{"none", Projection::none},
                                                       {"velocity", Projection::velocity},
                                                       {"position_velocity", Projection::position_velocity}};
@@ -347,6 +350,8 @@ void describe(auto& v, Like<SimulationSettings> auto& s) {
   v.plain("start_time", s.start_time, kAny, {"[s]", Need::optional, dimension::kTime});
   v.plain("end_time", s.end_time, kAny, {"[s]", Need::optional, dimension::kTime});
   v.plain("output_step", s.output_step, kPositive, {"of trajectory.csv [s]; 200 rows when absent"});
+  v.choice("model", s.model, kModels,
+           {"three unknowns per body (planar) or six (spatial); auto: planar where joints hold all bodies in a plane"});
   v.object("formulation", s.formulation, {"form of the equations of motion"});
   v.object("integrator", s.integrator, {"time integration"});
   v.numbers("events", s.events, kAny,

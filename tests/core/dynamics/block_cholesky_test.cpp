@@ -11,7 +11,7 @@ namespace {
 // A connected random graph with a few cycles, its matrix S = I + sum over edges of a random positive part, dense as
 // well.
 struct Case {
-  BlockCholesky S;
+  BlockCholesky<6> S;
   Eigen::MatrixXd dense;
 
   Case(int bodies, int extra_edges, unsigned seed) {
@@ -23,7 +23,7 @@ struct Case {
       const int j = static_cast<int>(random() % static_cast<unsigned>(bodies));
       if (i != j) edges.emplace_back(i, j);
     }
-    S = BlockCholesky(bodies, edges);
+    S = BlockCholesky<6>(bodies, edges);
     S.set_zero();
     dense = Eigen::MatrixXd::Identity(6 * bodies, 6 * bodies);
     for (int i = 0; i < bodies; ++i) S.diagonal(i).setIdentity();
@@ -69,11 +69,11 @@ TEST_CASE("block Cholesky solves like a dense Cholesky on chains, trees and grap
 TEST_CASE("a chain is factored without fill", "[dynamics]") {
   std::vector<std::pair<int, int>> edges;
   for (int i = 1; i < 50; ++i) edges.emplace_back(i - 1, i);
-  CHECK(BlockCholesky(50, edges).fill_blocks() == 49);
+  CHECK(BlockCholesky<6>(50, edges).fill_blocks() == 49);
 }
 
 TEST_CASE("a matrix that is not positive definite is refused", "[dynamics]") {
-  BlockCholesky S(2, std::vector<std::pair<int, int>>{{0, 1}});
+  BlockCholesky<6> S(2, std::vector<std::pair<int, int>>{{0, 1}});
   S.set_zero();
   S.diagonal(0).setIdentity();
   S.diagonal(1).setIdentity();

@@ -1,0 +1,383 @@
+#include "core/dynamics/planar_constraints.hpp"
+
+#include <algorithm>
+
+namespace mbsopt {
+namespace {
+
+using Kind = PlanarConstraint::Kind;
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// The primitive's vectors, constant or with directions of their own.
+template <class S>
+struct Vectors {
+  Complex<S> s1, s2, s3;
+};
+
+// Along the motion: a body-fixed vector x = A s, or the separation of two points.
+template <class T>
+struct Jet {
+  Complex<T> x, xd, xdd;
+};
+template <class T, class S>
+Jet<T> vector_of(const PlanarFrame<T>& f, const Complex<S>& s) {
+  return {f.A * s, f.Adot * s, f.Addot * s};
+}
+template <class T, class S>
+Jet<T> separation(const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, const Vectors<S>& s) {
+  return {f2.r - f1.r + f2.A * s.s2 - f1.A * s.s1, f2.rdot - f1.rdot + f2.Adot * s.s2 - f1.Adot * s.s1,
+          f2.Addot * s.s2 - f1.Addot * s.s1 + (f2.rddot - f1.rddot)};
+}
+
+// What each kind of a single row says.
+template <class T, class S>
+T phi_of(const PlanarConstraint& c, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, const Vectors<S>& s) {
+  using std::atan2, std::sqrt;
+  switch (c.kind) {
+    case Kind::dot1:
+      return dot(f1.A * s.s1, f2.A * s.s2);
+    case Kind::dot2:
+      return dot(f1.A * s.s3, separation(f1, f2, s).x);
+    case Kind::distance:
+      return sqrt(squared_norm(separation(f1, f2, s).x));
+    case Kind::angle: {
+      const Complex<T> x1 = f1.A * s.s1, x2 = f2.A * s.s2;
+      return c.sign * T(atan2(cross(x1, x2), dot(x1, x2)));
+    }
+    case Kind::point:
+      break;
+  }
+  return T(0);
+}
+
+template <class T, class S>
+T phi_dot_of(const PlanarConstraint& c, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, const Vectors<S>& s) {
+  using std::sqrt;
+  switch (c.kind) {
+    case Kind::dot1:
+      return dot(f1.Adot * s.s1, f2.A * s.s2) + dot(f1.A * s.s1, f2.Adot * s.s2);
+    case Kind::dot2: {
+      const Jet<T> d = separation(f1, f2, s);
+      return dot(f1.Adot * s.s3, d.x) + dot(f1.A * s.s3, d.xd);
+    }
+    case Kind::distance: {
+      const Jet<T> d = separation(f1, f2, s);
+      return dot(d.x, d.xd) / T(sqrt(squared_norm(d.x)));
+    }
+    case Kind::angle:
+      return c.sign * T((f2.Adot * inverse(f2.A)).im - (f1.Adot * inverse(f1.A)).im);
+    case Kind::point:
+      break;
+  }
+  return T(0);
+}
+
+template <class T, class S>
+T phi_ddot_of(const PlanarConstraint& c, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, const Vectors<S>& s) {
+  using std::sqrt;
+  const auto product = [](const Jet<T>& x, const Jet<T>& y) {
+    return T(dot(x.xdd, y.x) + 2 * dot(x.xd, y.xd) + dot(x.x, y.xdd));
+  };
+  switch (c.kind) {
+    case Kind::dot1:
+      return product(vector_of(f1, s.s1), vector_of(f2, s.s2));
+    case Kind::dot2:
+      return product(vector_of(f1, s.s3), separation(f1, f2, s));
+    case Kind::distance: {
+      const Jet<T> d = separation(f1, f2, s);
+      const T l = sqrt(squared_norm(d.x)), ldot = dot(d.x, d.xd) / l;
+      return T(dot(d.x, d.xdd) + squared_norm(d.xd) - ldot * ldot) / l;
+    }
+    case Kind::angle: {
+      const auto second = [](const PlanarFrame<T>& f) {
+        const Complex<T> over = inverse(f.A), rate = f.Adot * over;
+        return T((f.Addot * over - rate * rate).im);
+      };
+      return c.sign * T(second(f2) - second(f1));
+    }
+    case Kind::point:
+      break;
+  }
+  return T(0);
+}
+
+// J' of a single row.
+template <class T>
+struct RowColumn {
+  Complex<T> force1, force2;
+  T moment1 = 0, moment2 = 0;
+};
+template <class T, class S>
+RowColumn<T> column_of(const PlanarConstraint& c, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2,
+                    const Vectors<S>& s) {
+  using std::sqrt;
+  const auto along = [&](const Complex<T>& u) {  // u'd
+    return RowColumn<T>{-u, u, -cross(f1.A * s.s1, u), cross(f2.A * s.s2, u)};
+  };
+  switch (c.kind) {
+    case Kind::dot1: {
+      const T m = cross(f1.A * s.s1, f2.A * s.s2);
+      return {{}, {}, m, -m};
+    }
+    case Kind::dot2: {
+      const Complex<T> u = f1.A * s.s3;
+      RowColumn<T> column = along(u);
+      column.moment1 = column.moment1 + cross(u, separation(f1, f2, s).x);
+      return column;
+    }
+    case Kind::distance: {
+      const Complex<T> d = separation(f1, f2, s).x;
+      const T l = sqrt(squared_norm(d));
+      return along({d.re / l, d.im / l});
+    }
+    case Kind::angle:
+      return {{}, {}, T(-c.sign), T(c.sign)};
+    case Kind::point:
+      break;
+  }
+  return {};
+}
+
+double on_branch(const PlanarConstraint& c, const RowLaws& laws, const Eigen::VectorXd& angles, double value) {
+  if (c.kind != Kind::angle) return value;
+  return Angle::on_branch(value, c.angle == Constraint::kNearestLaw ? laws.f_or_zero(c.row) : angles(c.angle));
+}
+
+Vectors<double> vectors(const PlanarConstraint& c) { return {c.s1, c.s2, c.s3}; }
+
+// A vector with its directions, of the slot's three numbers those in the plane.
+PlaneDual moving(const PlanarBody& body, const Plane& s, const Lanes<3>* ds) {
+  if (!ds) return {s.re, s.im};
+  return {{s.re, LaneDual::Lane(body.b1.transpose() * *ds)}, {s.im, LaneDual::Lane(body.b2.transpose() * *ds)}};
+}
+
+// Cotangents of x, xd, xdd of a vector or separation, and of its virtual change.
+struct JetBar {
+  Plane x, xd, xdd, eta;
+};
+void add_vector_bar(const PlanarFrame<double>& f, double turn, const Plane& s, const JetBar& bar, double sign,
+                    PlanarFrameBar& frame_bar, Plane& s_bar) {
+  const Plane st = conj(sign * s);
+  frame_bar.A += bar.x * st, frame_bar.Adot += bar.xd * st, frame_bar.Addot += bar.xdd * st;
+  frame_bar.A_eta += bar.eta * st;
+  s_bar += sign * (conj(f.A) * bar.x + conj(f.Adot) * bar.xd + conj(f.Addot) * bar.xdd +
+                   conj(times_i(turn * f.A)) * bar.eta);
+}
+void add_point_bar(const PlanarFrame<double>& f, double turn, const Plane& s, const JetBar& bar, double sign,
+                   PlanarFrameBar& frame_bar, Plane& s_bar) {
+  frame_bar.r += sign * bar.x;
+  frame_bar.rdot += sign * bar.xd;
+  add_vector_bar(f, turn, s, bar, sign, frame_bar, s_bar);
+}
+
+struct Multipliers1 {
+  double lambda = 0, mu0 = 0, mu1 = 0, mu2 = 0;
+};
+
+// Cotangent of x in  lambda (x'y)_eta + mu0 x'y + mu1 (x'y)dot + mu2 (x'y)ddot.
+JetBar product_bar(const Jet<double>& y, const Plane& y_eta, const Multipliers1& z) {
+  return {z.lambda * y_eta + z.mu0 * y.x + z.mu1 * y.xd + z.mu2 * y.xdd, z.mu1 * y.x + (2 * z.mu2) * y.xd, z.mu2 * y.x,
+          z.lambda * y.x};
+}
+
+// Of |d|; with u = d/|d| and across(x) = (x - u u'x)/l as in distance.cpp.
+JetBar distance_bar(const Jet<double>& d, const Plane& d_eta, const Multipliers1& z) {
+  const double l = std::sqrt(squared_norm(d.x));
+  const Plane u = (1 / l) * d.x;
+  const auto across = [&](const Plane& x) { return (1 / l) * (x - dot(u, x) * u); };
+  const double ldot = dot(u, d.xd), c = (squared_norm(d.xd) - ldot * ldot) / l;
+  return {z.lambda * across(d_eta) + z.mu0 * u + z.mu1 * across(d.xd) +
+              z.mu2 * (across(d.xdd) - (2 * ldot / l) * across(d.xd) - (c / l) * u),
+          z.mu1 * u + (2 * z.mu2) * across(d.xd), z.mu2 * u, z.lambda * u};
+}
+
+// Of Im w,  w = mu0 log A + mu1 Adot/A + mu2 (Addot/A - (Adot/A)^2) + lambda A_eta/A:  the cotangent of z in Im w is
+// i conj(dw/dz).
+void add_angle_bar(const PlanarFrame<double>& f, double turn, const Multipliers1& z, PlanarFrameBar& bar) {
+  const Plane over = inverse(f.A), rate = f.Adot * over, second = f.Addot * over;
+  const Plane change{0, turn};  // A_eta/A
+  const auto add = [](Plane& to, const Plane& w_z) { to += times_i(conj(w_z)); };
+  add(bar.A, over * (Plane{z.mu0, 0} - z.mu1 * rate - z.mu2 * (second - 2 * (rate * rate)) - z.lambda * change));
+  add(bar.Adot, over * (Plane{z.mu1, 0} - (2 * z.mu2) * rate));
+  add(bar.Addot, z.mu2 * over);
+  add(bar.A_eta, z.lambda * over);
+}
+
+Multipliers1 times(double s, const Multipliers1& z) { return {s * z.lambda, s * z.mu0, s * z.mu1, s * z.mu2}; }
+
+}  // namespace
+
+PlanarColumn jacobian_of_row(const PlanarConstraint& c, const PlanarFrame<double>& f1, const PlanarFrame<double>& f2) {
+  const RowColumn<double> J = column_of(c, f1, f2, vectors(c));
+  return {J.force1, J.force2, J.moment1, J.moment2};
+}
+
+void PlanarConstraints::phi(const Frames& frames, const RowLaws& laws, const Eigen::VectorXd& angles,
+                            Eigen::VectorXd& out) const {
+  out.setZero();
+  for (const PlanarConstraint& c : model_->constraints) {
+    const PlanarFrame<double>&f1 = frames[at(c.body1)], &f2 = frames[at(c.body2)];
+    if (c.kind == Kind::point) {
+      const Plane d = f2.r - f1.r + f2.A * c.s2 - f1.A * c.s1;
+      out(c.row) = d.re, out(c.row2) = d.im;
+    } else {
+      out(c.row) += c.factor * on_branch(c, laws, angles, phi_of(c, f1, f2, vectors(c)));
+    }
+  }
+  laws.subtract_f(out);
+}
+
+void PlanarConstraints::phi_dot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const {
+  out.setZero();
+  for (const PlanarConstraint& c : model_->constraints) {
+    const PlanarFrame<double>&f1 = frames[at(c.body1)], &f2 = frames[at(c.body2)];
+    if (c.kind == Kind::point) {
+      const Plane d = f2.rdot - f1.rdot + f2.Adot * c.s2 - f1.Adot * c.s1;
+      out(c.row) = d.re, out(c.row2) = d.im;
+    } else {
+      out(c.row) += c.factor * phi_dot_of(c, f1, f2, vectors(c));
+    }
+  }
+  laws.subtract_f_t(out);
+}
+
+void PlanarConstraints::phi_ddot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const {
+  out.setZero();
+  for (const PlanarConstraint& c : model_->constraints) {
+    const PlanarFrame<double>&f1 = frames[at(c.body1)], &f2 = frames[at(c.body2)];
+    if (c.kind == Kind::point) {
+      const Plane d = f2.Addot * c.s2 - f1.Addot * c.s1 + (f2.rddot - f1.rddot);
+      out(c.row) = d.re, out(c.row2) = d.im;
+    } else {
+      out(c.row) += c.factor * phi_ddot_of(c, f1, f2, vectors(c));
+    }
+  }
+  laws.subtract_f_tt(out);
+}
+
+void PlanarConstraints::add_pull_back(const Frames& frames, std::span<const PlanarShift> eta, RowLaws& laws,
+                                      const Eigen::VectorXd& angles, const Weights& weights, double scale,
+                                      std::vector<PlanarFrameBar>& bars, Eigen::Ref<Eigen::VectorXd> theta_bar,
+                                      Eigen::Ref<Eigen::VectorXd> rho_bar) const {
+  const auto of = [&](const Eigen::VectorXd* z, int row) { return z ? scale * (*z)(row) : 0.0; };
+  const auto point = [&](const Eigen::VectorXd* z, const PlanarConstraint& c) {
+    return Plane{of(z, c.row), of(z, c.row2)};
+  };
+  for (const PlanarConstraint& c : model_->constraints) {
+    const std::size_t i = at(c.body1), j = at(c.body2);
+    const PlanarFrame<double>&f1 = frames[i], &f2 = frames[j];
+    const double turn1 = eta[i].turn, turn2 = eta[j].turn;
+    Plane s1_bar, s2_bar, s3_bar;
+    if (c.kind == Kind::point) {
+      const JetBar bar{point(weights.mu0, c), point(weights.mu1, c), point(weights.mu2, c), point(weights.lambda, c)};
+      add_point_bar(f2, turn2, c.s2, bar, 1, bars[j], s2_bar);
+      add_point_bar(f1, turn1, c.s1, bar, -1, bars[i], s1_bar);
+    } else {
+      const Multipliers1 unscaled{of(weights.lambda, c.row), of(weights.mu0, c.row), of(weights.mu1, c.row),
+                                  of(weights.mu2, c.row)};
+      const Multipliers1 z = times(c.factor, unscaled);
+      const auto changed = [](const PlanarFrame<double>& f, double turn, const Plane& s) {
+        return times_i(turn * (f.A * s));
+      };
+      const Plane d_eta = eta[j].r - eta[i].r + changed(f2, turn2, c.s2) - changed(f1, turn1, c.s1);
+      switch (c.kind) {
+        case Kind::dot1:
+          add_vector_bar(f1, turn1, c.s1, product_bar(vector_of(f2, c.s2), changed(f2, turn2, c.s2), z), 1, bars[i],
+                         s1_bar);
+          add_vector_bar(f2, turn2, c.s2, product_bar(vector_of(f1, c.s1), changed(f1, turn1, c.s1), z), 1, bars[j],
+                         s2_bar);
+          break;
+        case Kind::dot2: {
+          const Jet<double> d = separation(f1, f2, vectors(c));
+          add_vector_bar(f1, turn1, c.s3, product_bar(d, d_eta, z), 1, bars[i], s3_bar);
+          const JetBar bar = product_bar(vector_of(f1, c.s3), changed(f1, turn1, c.s3), z);
+          add_point_bar(f2, turn2, c.s2, bar, 1, bars[j], s2_bar);
+          add_point_bar(f1, turn1, c.s1, bar, -1, bars[i], s1_bar);
+          break;
+        }
+        case Kind::distance: {
+          const JetBar bar = distance_bar(separation(f1, f2, vectors(c)), d_eta, z);
+          add_point_bar(f2, turn2, c.s2, bar, 1, bars[j], s2_bar);
+          add_point_bar(f1, turn1, c.s1, bar, -1, bars[i], s1_bar);
+          break;
+        }
+        case Kind::angle:
+          add_angle_bar(f2, turn2, times(c.sign, z), bars[j]);
+          add_angle_bar(f1, turn1, times(-c.sign, z), bars[i]);
+          s2_bar = times_i(conj((c.sign * z.mu0) * inverse(c.s2)));
+          s1_bar = times_i(conj((-c.sign * z.mu0) * inverse(c.s1)));
+          break;
+        case Kind::point:
+          break;
+      }
+      if (c.slot_factor >= 0) {
+        const RowColumn<double> J = column_of(c, f1, f2, vectors(c));
+        const double change =
+            dot(J.force1, eta[i].r) + dot(J.force2, eta[j].r) + J.moment1 * turn1 + J.moment2 * turn2;
+        theta_bar(c.slot_factor) += unscaled.lambda * change +
+                                    unscaled.mu0 * on_branch(c, laws, angles, phi_of(c, f1, f2, vectors(c))) +
+                                    unscaled.mu1 * phi_dot_of(c, f1, f2, vectors(c)) +
+                                    unscaled.mu2 * phi_ddot_of(c, f1, f2, vectors(c));
+      }
+    }
+    const auto keep = [&](int slot, std::size_t body, const Plane& s_bar) {
+      if (slot >= 0) theta_bar.segment<3>(slot) += model_->bodies[body].in_body(s_bar);
+    };
+    keep(c.slot1, i, s1_bar), keep(c.slot2, j, s2_bar), keep(c.slot3, i, s3_bar);
+  }
+  laws.add_pull_back(weights.mu0, weights.mu1, weights.mu2, scale, theta_bar, rho_bar);
+}
+
+void PlanarConstraints::tangents(Order order, const DualFrames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
+                                 const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,
+                                 std::vector<Lanes<3>>& loads) const {
+  for (LaneRows* x : {&out.phi, &out.phi_dot, &out.phi_ddot}) x->setZero();
+  LaneRows& rows = order == Order::phi ? out.phi : order == Order::phi_dot ? out.phi_dot : out.phi_ddot;
+  for (const PlanarConstraint& c : model_->constraints) {
+    const std::size_t i = at(c.body1), j = at(c.body2);
+    const PlanarFrame<LaneDual>&f1 = frames[i], &f2 = frames[j];
+    const auto add_load = [&](std::size_t body, const PlaneDual& force, const LaneDual& moment) {
+      loads[body].row(0) += force.re.d.matrix();
+      loads[body].row(1) += force.im.d.matrix();
+      loads[body].row(2) += moment.d.matrix();
+    };
+    const auto add = [&](const auto& s) {
+      if (c.kind == Kind::point) {
+        const PlaneDual d = order == Order::phi       ? f2.r - f1.r + f2.A * s.s2 - f1.A * s.s1
+                            : order == Order::phi_dot ? f2.rdot - f1.rdot + f2.Adot * s.s2 - f1.Adot * s.s1
+                                                      : f2.Addot * s.s2 - f1.Addot * s.s1;
+        rows.row(c.row) += d.re.d.matrix();
+        rows.row(c.row2) += d.im.d.matrix();
+        const Plane l{lambda(c.row), lambda(c.row2)};
+        loads[i].row(2) -= cross(f1.A * s.s1, l).d.matrix();
+        loads[j].row(2) += cross(f2.A * s.s2, l).d.matrix();
+        return;
+      }
+      LaneDual factor = c.factor;
+      Lanes<1> storage;
+      if (const Lanes<1>* change = block.field<1>(c.slot_factor, storage)) factor.d = change->array();
+      LaneDual phi = order == Order::phi       ? phi_of(c, f1, f2, s)
+                     : order == Order::phi_dot ? phi_dot_of(c, f1, f2, s)
+                                               : phi_ddot_of(c, f1, f2, s);
+      if (order == Order::phi) phi.v = on_branch(c, laws, angles, phi.v);
+      rows.row(c.row) += (factor * phi).d.matrix();
+      const LaneDual l = lambda(c.row) * factor;
+      const auto J = column_of(c, f1, f2, s);
+      add_load(i, l * J.force1, l * J.moment1);
+      add_load(j, l * J.force2, l * J.moment2);
+    };
+    Lanes<3> d1, d2, d3;
+    const Lanes<3>*s1 = block.field<3>(c.slot1, d1), *s2 = block.field<3>(c.slot2, d2),
+          *s3 = block.field<3>(c.slot3, d3);
+    if (s1 || s2 || s3) {
+      const PlanarBody &b1 = model_->bodies[i], &b2 = model_->bodies[j];
+      add(Vectors<LaneDual>{moving(b1, c.s1, s1), moving(b2, c.s2, s2), moving(b1, c.s3, s3)});
+    } else {
+      add(vectors(c));
+    }
+  }
+  laws.subtract_tangents(block, out.phi, out.phi_dot, out.phi_ddot);
+}
+
+}  // namespace mbsopt

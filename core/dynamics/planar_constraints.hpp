@@ -1,0 +1,94 @@
+// The constraints of a planar model (planar_model.hpp): Phi, its time derivatives, J'lambda and all their derivatives,
+// in the three displacements (eta_r, eta_theta) per body.
+//
+//   point      Phi = r2 + A2 s2 - r1 - A1 s1                  d: the same separation below
+//   dot1       Phi = (A1 s1)'(A2 s2)
+//   dot2       Phi = (A1 s3)'d
+//   distance   Phi = |d|
+//   angle      Phi = +-(arg(A2 s2) - arg(A1 s1))
+//
+// As in space (primitive.hpp), each is a function of the bodies' frames, whose derivatives are taken per body.
+// A = P^2 is a rotation times |P|^2, as A(p) is in space: both models compute the same numbers.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/dynamics/constraint_terms.hpp"
+#include "core/mechanism/parameter_lanes.hpp"
+#include "core/mechanism/planar_model.hpp"
+#include "core/mechanism/row_laws.hpp"
+
+namespace mbsopt {
+
+// A body's motion as primitives see it; T = LaneDual: with its tangent.
+template <class T>
+struct PlanarFrame {
+  Complex<T> r, rdot, A{1, 0}, Adot, Addot;
+  Plane rddot;  // given, like the angular acceleration: tangents hold it fixed
+
+  //   Adot = 2 P Pdot,   Addot = 2 Pdot^2 + (i omegadot - 2 |Pdot|^2) A
+  void set_turn(const Complex<T>& P, const Complex<T>& Pdot, double omegadot) {
+    A = P * P;
+    Adot = 2 * (P * Pdot);
+    Addot = 2 * (Pdot * Pdot) + times_i(omegadot * A) - (2 * squared_norm(Pdot)) * A;
+  }
+};
+
+// Gradient of a scalar in a frame and in the image A_eta = i A eta_theta of a virtual turn.
+struct PlanarFrameBar {
+  Plane r, rdot, A, Adot, Addot, A_eta;
+};
+
+// A virtual displacement.
+struct PlanarShift {
+  Plane r;
+  double turn = 0;
+  PlanarShift() = default;
+  explicit PlanarShift(const Vec<3>& x) : r{x(0), x(1)}, turn(x(2)) {}
+};
+
+// J' of a row: the force and moment of a unit multiplier on each body (factor left out).
+struct PlanarColumn {
+  Plane force1, force2;
+  double moment1 = 0, moment2 = 0;
+};
+PlanarColumn jacobian_of_row(const PlanarConstraint& c, const PlanarFrame<double>& f1, const PlanarFrame<double>& f2);
+
+class PlanarConstraints {
+ public:
+  explicit PlanarConstraints(const MechanismData& data) : model_(data.planar.get()) {}
+
+  using Frames = std::vector<PlanarFrame<double>>;
+  using DualFrames = std::vector<PlanarFrame<LaneDual>>;
+
+  // Rows that hold by themselves in the plane stay zero.
+  void phi(const Frames& frames, const RowLaws& laws, const Eigen::VectorXd& angles, Eigen::VectorXd& out) const;
+  void phi_dot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const;
+  void phi_ddot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const;
+
+  // Adds the gradient of  scale (lambda'J eta + mu0'Phi + mu1'Phidot + mu2'Phiddot)  in the frames, the vectors of the
+  // primitives, and the laws. Null: zero.
+  struct Weights {
+    const Eigen::VectorXd* lambda = nullptr;
+    const Eigen::VectorXd* mu0 = nullptr;
+    const Eigen::VectorXd* mu1 = nullptr;
+    const Eigen::VectorXd* mu2 = nullptr;
+  };
+  void add_pull_back(const Frames& frames, std::span<const PlanarShift> eta, RowLaws& laws,
+                     const Eigen::VectorXd& angles, const Weights& weights, double scale,
+                     std::vector<PlanarFrameBar>& bars, Eigen::Ref<Eigen::VectorXd> theta_bar,
+                     Eigen::Ref<Eigen::VectorXd> rho_bar) const;
+
+  // Tangents in the frames' directions and those of the vectors: of Phi, of Phidot, or of Phiddot (the others are left
+  // zero), and of J'lambda, added to loads (the ground's first).
+  enum class Order { phi, phi_dot, phi_ddot };
+  void tangents(Order order, const DualFrames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
+                const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,
+                std::vector<Lanes<3>>& loads) const;
+
+ private:
+  const PlanarModel* model_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,302 @@
+#include "core/dynamics/planar_dynamics.hpp"
+
+#include "core/body/euler_parameters.hpp"
+#include "core/body/lanes.hpp"
+
+namespace mbsopt {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+bool any_force(const MechanismData& d) {
+  return !(d.tsda.empty() && d.rsda.empty() && d.applied.empty() && d.bushings.empty() &&
+           d.turning_frictions.empty() && d.sliding_frictions.empty());
+}
+
+// The blocks of forces alone.
+MotionBlocks force_blocks(MechanismData data) {
+  data.constraints.clear();
+  data.m = 0;
+  return MotionBlocks(data);
+}
+
+}  // namespace
+
+PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSettings& settings,
+                               const Eigen::VectorXd& alpha, double compliance, const Refinements& values,
+                               const Refinements& derivatives)
+    : data_(data),
+      model_(*data.planar),
+      bodies_in_y_(model_),
+      settings_(settings),
+      value_refinements_(values),
+      derivative_refinements_(derivatives),
+      laws_(data),
+      constraints_(data),
+      solver_(data, alpha, compliance),
+      has_forces_(any_force(data)),
+      forces_(data) {
+  const std::size_t n = at(data.n);
+  y_.setZero(14 * data.n);
+  angles_.setZero(static_cast<Eigen::Index>(data.angles.size()));
+  bodies_.resize(n + 1), frames_.resize(n + 1), dual_frames_.resize(n + 1);
+  loads_.resize(n), z_.resize(n), eta_.resize(n);
+  for (Eigen::VectorXd* x : {&gamma_, &phi_, &phi_dot_, &lambda_, &mu_, &g_}) x->setZero(data.m);
+  for (LaneRows* x :
+       {&constraint_dirs_.phi, &constraint_dirs_.phi_dot, &constraint_dirs_.phi_ddot, &gamma_dir_, &lambda_dir_}) {
+    x->setZero(data.m, kLanes);
+  }
+  load_dirs_.resize(n + 1), other_load_dirs_.resize(n + 1), rhs_lanes_.resize(n), z_dir_.resize(n);
+  shifts_.resize(n + 1), bars_.resize(n + 1);
+  if (!has_forces_) return;
+  std::vector<bool> loaded(n + 1, false);
+  forces_.mark_units(loaded);
+  for (std::size_t i = 1; i <= n; ++i) {
+    if (loaded[i]) loaded_.push_back(i);
+  }
+  states_in_space_.resize(n + 1), frames_in_space_.resize(n + 1), body_loads_.resize(n + 1);
+  body_load_dirs_.resize(n + 1), force_rhs_.resize(n), bars_in_space_.resize(n + 1);
+}
+
+void PlanarDynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
+  t_ = t;
+  laws_.set_time(t);
+  const Eigen::Index half = 7 * data_.n;
+  for (int i = 1; i <= data_.n; ++i) {
+    const Eigen::Index q = 7 * (i - 1), v = half + q;
+    Body& b = bodies_[at(i)];
+    PlanarFrame<double>& f = frames_[at(i)];
+    f.r = bodies_in_y_.vector(y, q), f.rdot = bodies_in_y_.vector(y, v), f.rddot = {};
+    b.P = bodies_in_y_.turn(at(i), y, q + 3), b.Pdot = bodies_in_y_.turn(at(i), y, v + 3);
+    f.set_turn(b.P, b.Pdot, 0);
+  }
+  angles_ = angles;
+  if (!has_forces_) return;
+  y_ = y;
+  if (force_blocks_) force_blocks_->current = false;
+  for (const std::size_t k : loaded_) {
+    const Eigen::Index q = 7 * (static_cast<Eigen::Index>(k) - 1);
+    set_position(y.segment<7>(q), states_in_space_[k], frames_in_space_[k]);
+    set_velocity(y.segment<7>(half + q), states_in_space_[k], frames_in_space_[k]);
+  }
+}
+
+void PlanarDynamics::set_acceleration(std::size_t body, const Vec<3>& z) {
+  bodies_[body].omegadot = z(2);
+  frames_[body].rddot = {z(0), z(1)};
+  frames_[body].Addot += times_i(z(2) * frames_[body].A);  // from zero
+}
+
+void PlanarDynamics::set_loads() {
+  for (std::size_t k = 1; k < bodies_.size(); ++k) {
+    const PlanarBody& b = model_.bodies[k];
+    loads_[k - 1] << b.mass * model_.gravity.re, b.mass * model_.gravity.im, 0;
+  }
+  if (!has_forces_) return;
+  body_loads_[0].setZero();
+  for (const std::size_t k : loaded_) body_loads_[k].setZero();
+  forces_.add_loads(here(), body_loads_);
+  for (const std::size_t k : loaded_) loads_[k - 1] += bodies_in_y_.reduced(k, body_loads_[k]);
+}
+
+bool PlanarDynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                              Eigen::Ref<Eigen::VectorXd> ydot) {
+  set_state(t, y, angles);
+  set_loads();
+  constraints_.phi_ddot(frames_, laws_, gamma_);
+  if (settings_.omega != 0) {
+    constraints_.phi(frames_, laws_, angles_, phi_);
+    constraints_.phi_dot(frames_, laws_, phi_dot_);
+    gamma_ += 2 * settings_.xi * settings_.omega * phi_dot_ + settings_.omega * settings_.omega * phi_;
+  }
+  if (!solver_.factor(frames_)) return false;
+  g_ = -gamma_;
+  solver_.solve(loads_, g_, value_refinements_, z_, lambda_);
+
+  const Eigen::Index half = 7 * data_.n;
+  ydot.head(half) = y.tail(half);
+  ydot.tail(half).setZero();
+  bool finite = true;
+  for (int i = 1; i <= data_.n; ++i) {
+    const Vec<3>& z = z_[at(i - 1)];
+    Body& b = bodies_[at(i)];
+    const Eigen::Index a = half + 7 * (i - 1);
+    b.omegadot = z(2);
+    bodies_in_y_.add_vector({z(0), z(1)}, a, ydot);
+    bodies_in_y_.add_turn(at(i), Plane{-squared_norm(b.Pdot), 0.5 * z(2)} * b.P, a + 3, ydot);
+    finite = finite && z.allFinite();
+  }
+  return finite;
+}
+
+bool PlanarDynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                               const Eigen::Ref<const Eigen::VectorXd>& a,
+                               const Eigen::Ref<const Eigen::VectorXd>& lambda) {
+  set_state(t, y, angles);
+  lambda_ = lambda;
+  for (int i = 1; i <= data_.n; ++i) {
+    const Eigen::Index q = 7 * (i - 1);
+    const Plane& P = bodies_[at(i)].P;
+    const Plane rddot = bodies_in_y_.vector(a, q), Pddot = bodies_in_y_.turn(at(i), a, q + 3);
+    z_[at(i - 1)] << rddot.re, rddot.im, 2 * cross(P, Pddot) / squared_norm(P);
+    set_acceleration(at(i), z_[at(i - 1)]);
+  }
+  return solver_.factor(frames_);
+}
+
+// What forces add to b: in the state by blocks, evaluated once per state, and in the fields.
+void PlanarDynamics::add_force_tangent(const ParameterBlock& block, const LaneRows& y_dir) {
+  if (!force_blocks_) {
+    force_blocks_.emplace(ForceLinearisation{force_blocks(data_), std::vector<UnitTangents>(bodies_.size()), false});
+    no_rows_.setZero(0, kLanes);
+  }
+  ForceLinearisation& x = *force_blocks_;
+  if (!x.current) {
+    x.current = true;
+    x.blocks.set_zero();
+    for (const std::size_t k : loaded_) set_unit_tangents(states_in_space_[k], x.units[k]);
+    forces_.add_blocks(here(), x.units, x.blocks);
+  }
+  for (Lanes<6>& load : body_load_dirs_) load.setZero();
+  for (Lanes<6>& load : force_rhs_) load.setZero();
+  forces_.add_field_tangent(here(), block, body_load_dirs_);
+  x.blocks.add_times(y_dir, force_rhs_, no_rows_);
+  for (const std::size_t k : loaded_) {
+    const Lanes<6> load = body_load_dirs_[k] + force_rhs_[k - 1];
+    rhs_lanes_[k - 1] += bodies_in_y_.reduced(k, load);
+  }
+}
+
+void PlanarDynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir) {
+  using Order = PlanarConstraints::Order;
+  const Eigen::Index half = 7 * data_.n;
+  std::vector<PlanarFrame<LaneDual>>& frames = dual_frames_;
+  for (int i = 1; i <= data_.n; ++i) {
+    const Eigen::Index q = 7 * (i - 1), v = half + q;
+    const Body& b = bodies_[at(i)];
+    PlanarFrame<LaneDual>& f = frames[at(i)];
+    f.r = bodies_in_y_.vector(frames_[at(i)].r, y_dir, q);
+    f.rdot = bodies_in_y_.vector(frames_[at(i)].rdot, y_dir, v);
+    f.rddot = frames_[at(i)].rddot;
+    f.set_turn(bodies_in_y_.turn(at(i), b.P, y_dir, q + 3), bodies_in_y_.turn(at(i), b.Pdot, y_dir, v + 3),
+               b.omegadot);
+  }
+  if (settings_.omega != 0) {
+    for (Lanes<3>& load : other_load_dirs_) load.setZero();
+    constraints_.tangents(Order::phi, frames, laws_, angles_, block, lambda_, constraint_dirs_, other_load_dirs_);
+    gamma_dir_ = -settings_.omega * settings_.omega * constraint_dirs_.phi;
+    constraints_.tangents(Order::phi_dot, frames, laws_, angles_, block, lambda_, constraint_dirs_, other_load_dirs_);
+    gamma_dir_ -= 2 * settings_.xi * settings_.omega * constraint_dirs_.phi_dot;
+  } else {
+    gamma_dir_.setZero();
+  }
+  for (Lanes<3>& load : load_dirs_) load.setZero();
+  constraints_.tangents(Order::phi_ddot, frames, laws_, angles_, block, lambda_, constraint_dirs_, load_dirs_);
+  gamma_dir_ -= constraint_dirs_.phi_ddot;
+
+  Lanes<3> gravity_dir;
+  const Lanes<3>* dg = block.field<3>(data_.slot_gravity, gravity_dir);
+  for (std::size_t k = 1; k < bodies_.size(); ++k) {
+    const BodyData& body = data_.bodies[k];
+    const Vec<3>& z = z_[k - 1];
+    Lanes<3>& b = rhs_lanes_[k - 1];
+    b = -load_dirs_[k];
+    Lanes<1> mass_dir;
+    if (const Lanes<1>* dm = block.field<1>(body.slot_mass, mass_dir)) {
+      b.row(0) += (model_.gravity.re - z(0)) * *dm, b.row(1) += (model_.gravity.im - z(1)) * *dm;
+    }
+    if (dg) b.row(0) += body.mass * dg->row(model_.t1), b.row(1) += body.mass * dg->row(model_.t2);
+    Lanes<6> J_dir;
+    if (const Lanes<6>* dJ = block.field<6>(body.slot_J, J_dir)) {
+      b.row(2) -= z(2) * (bodies_in_y_.inertia_weights(k).transpose() * *dJ);
+    }
+  }
+  if (has_forces_) add_force_tangent(block, y_dir);
+  solver_.solve(rhs_lanes_, gamma_dir_, derivative_refinements_, z_dir_, lambda_dir_);
+
+  ydot_dir.topRows(half) = y_dir.bottomRows(half);
+  ydot_dir.bottomRows(half).setZero();
+  for (int i = 1; i <= data_.n; ++i) {
+    const Eigen::Index q = 7 * (i - 1), a = half + q;
+    const Body& b = bodies_[at(i)];
+    const Lanes<3>& dz = z_dir_[at(i - 1)];
+    bodies_in_y_.add_vector_direction({{0, dz.row(0).array()}, {0, dz.row(1).array()}}, a, ydot_dir);
+    const PlaneDual P = bodies_in_y_.turn(at(i), b.P, y_dir, q + 3),
+                    Pdot = bodies_in_y_.turn(at(i), b.Pdot, y_dir, half + q + 3);
+    const PlaneDual factor{-squared_norm(Pdot), LaneDual{0.5 * b.omegadot, 0.5 * dz.row(2).array()}};
+    bodies_in_y_.add_turn_direction(at(i), factor * P, a + 3, ydot_dir);
+  }
+}
+
+void PlanarDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar,
+                                 Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) {
+  const Eigen::Index half = 7 * data_.n;
+  for (int i = 1; i <= data_.n; ++i) {
+    const Eigen::Index a = half + 7 * (i - 1);
+    const Plane rddot_bar = bodies_in_y_.vector(w, a), Pddot_bar = bodies_in_y_.turn(at(i), w, a + 3);
+    loads_[at(i - 1)] << rddot_bar.re, rddot_bar.im, 0.5 * cross(bodies_[at(i)].P, Pddot_bar);
+  }
+  g_.setZero();
+  solver_.solve(loads_, g_, derivative_refinements_, eta_, mu_);
+  y_bar.tail(half) += w.head(half);
+
+  for (PlanarFrameBar& bar : bars_) bar = {};
+  for (std::size_t k = 1; k < bodies_.size(); ++k) shifts_[k] = PlanarShift(eta_[k - 1]);
+  // - eta'J'lambda - mu'(Phiddot + 2 xi omega Phidot + omega^2 Phi)
+  PlanarConstraints::Weights weights{&lambda_, nullptr, nullptr, &mu_};
+  if (settings_.omega != 0) {
+    phi_dot_ = 2 * settings_.xi * settings_.omega * mu_;
+    phi_ = settings_.omega * settings_.omega * mu_;
+    weights.mu0 = &phi_, weights.mu1 = &phi_dot_;
+  }
+  constraints_.add_pull_back(frames_, shifts_, laws_, angles_, weights, -1, bars_, theta_bar, rho_bar);
+  if (has_forces_) add_force_adjoint(y_bar, theta_bar, rho_bar);
+
+  for (int i = 1; i <= data_.n; ++i) {
+    const std::size_t k = at(i);
+    const Body& b = bodies_[k];
+    const PlanarFrame<double>& f = frames_[k];
+    const BodyData& body = data_.bodies[k];
+    const Vec<3>&eta = eta_[k - 1], &z = z_[k - 1];
+    const PlanarFrameBar& bar = bars_[k];
+    const Eigen::Index q = 7 * (i - 1), v = half + q;
+    const Plane Pddot_bar = bodies_in_y_.turn(k, w, v + 3);
+    // A_eta = i eta_theta A and the frame's turn (PlanarFrame::set_turn), then Pddot.
+    const Plane A_bar =
+        bar.A - eta(2) * times_i(bar.A_eta) + conj(Plane{-2 * squared_norm(b.Pdot), b.omegadot}) * bar.Addot;
+    const Plane P_bar = 2 * (conj(b.P) * A_bar + conj(b.Pdot) * bar.Adot) +
+                        conj(Plane{-squared_norm(b.Pdot), 0.5 * b.omegadot}) * Pddot_bar;
+    const Plane Pdot_bar = 2 * (conj(b.P) * bar.Adot) + 4 * (conj(b.Pdot) * bar.Addot) -
+                           (4 * dot(f.A, bar.Addot) + 2 * dot(b.P, Pddot_bar)) * b.Pdot;
+    bodies_in_y_.add_vector(bar.r, q, y_bar);
+    bodies_in_y_.add_vector(bar.rdot, v, y_bar);
+    bodies_in_y_.add_turn(k, P_bar, q + 3, y_bar);
+    bodies_in_y_.add_turn(k, Pdot_bar, v + 3, y_bar);
+    if (body.slot_mass >= 0) {
+      theta_bar(body.slot_mass) +=
+          eta(0) * (model_.gravity.re - z(0)) + eta(1) * (model_.gravity.im - z(1));
+    }
+    if (data_.slot_gravity >= 0) {
+      theta_bar.segment<3>(data_.slot_gravity) += body.mass * model_.in_space({eta(0), eta(1)});
+    }
+    if (body.slot_J >= 0) theta_bar.segment<6>(body.slot_J) -= eta(2) * z(2) * bodies_in_y_.inertia_weights(k);
+  }
+}
+
+void PlanarDynamics::add_force_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
+                                       Eigen::VectorXd& rho_bar) {
+  bars_in_space_[0].set_zero();
+  for (const std::size_t k : loaded_) {
+    bars_in_space_[k].set_zero();
+    set_virtual(bodies_in_y_.in_space(k, eta_[k - 1]), frames_in_space_[k]);
+  }
+  forces_.add_pull_back(here(), bars_in_space_, y_bar, theta_bar, rho_bar);
+  const Eigen::Index half = 7 * data_.n;
+  for (const std::size_t k : loaded_) {
+    const Eigen::Index q = 7 * (static_cast<Eigen::Index>(k) - 1);
+    add_pull_back(states_in_space_[k], bars_in_space_[k], Vector4d::Zero(), eta_[k - 1](2) * model_.bodies[k].n,
+                  y_bar.segment<7>(q), y_bar.segment<7>(half + q));
+  }
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,91 @@
+// The equations of motion of a planar model (planar_model.hpp), their tangent and adjoint: the same equations and
+// derivatives as in dynamics.hpp, in z = (rddot along t1 and t2, omegadot about n) per body,
+//
+//   pddot:  Pddot = (i omegadot/2 - |Pdot|^2) P
+//
+// and with the gyroscopic term gone. Forces are evaluated in space, where they act, and reduced to the plane.
+// Allocates nothing after construction, but in the first tangent.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/dynamics/force_terms.hpp"
+#include "core/dynamics/planar_bodies.hpp"
+#include "core/dynamics/saddle_solver.hpp"
+#include "core/scene/settings.hpp"
+
+namespace mbsopt {
+
+class PlanarDynamics {
+ public:
+  // Settings of a solve: for values, and for derivatives.
+  PlanarDynamics(const MechanismData& data, const FormulationSettings& settings, const Eigen::VectorXd& alpha,
+                 double compliance, const Refinements& values, const Refinements& derivatives);
+
+  // As those of Dynamics.
+  bool evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, Eigen::Ref<Eigen::VectorXd> ydot);
+  bool linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                 const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
+  void tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir);
+  void add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
+                   Eigen::VectorXd& rho_bar);
+
+  const Eigen::VectorXd& lambda() const { return lambda_; }
+  double residual_ratio() const { return solver_.residual_ratio(); }
+  long factorisations() const { return solver_.factorisations(); }
+
+ private:
+  struct Body {
+    Plane P, Pdot;
+    double omegadot = 0;
+  };
+  void set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
+  void set_loads();
+  void set_acceleration(std::size_t body, const Vec<3>& z);
+  void add_force_tangent(const ParameterBlock& block, const LaneRows& y_dir);
+  void add_force_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
+  ForceTerms::At here() const { return {t_, y_, angles_, frames_in_space_}; }
+
+  const MechanismData& data_;
+  const PlanarModel& model_;
+  const PlanarBodies bodies_in_y_;
+  FormulationSettings settings_;
+  Refinements value_refinements_, derivative_refinements_;
+  RowLaws laws_;
+  PlanarConstraints constraints_;
+  PlanarSaddleSolver solver_;
+
+  double t_ = 0;
+  Eigen::VectorXd y_, angles_;
+  std::vector<Body> bodies_;
+  PlanarConstraints::Frames frames_;
+  std::vector<Vec<3>> loads_, z_, eta_;
+  Eigen::VectorXd gamma_, phi_, phi_dot_, lambda_, mu_, g_;
+
+  // Forces, and the bodies that they read and load, in space.
+  bool has_forces_ = false;
+  ForceTerms forces_;
+  std::vector<std::size_t> loaded_;
+  std::vector<BodyState> states_in_space_;
+  std::vector<Frame> frames_in_space_;
+  std::vector<Vec<6>> body_loads_;
+
+  // Derivatives.
+  struct ForceLinearisation {
+    MotionBlocks blocks;
+    std::vector<UnitTangents> units;
+    bool current = false;
+  };
+  std::optional<ForceLinearisation> force_blocks_;
+  PlanarConstraints::DualFrames dual_frames_;
+  ConstraintTangents constraint_dirs_;
+  LaneRows gamma_dir_, lambda_dir_, no_rows_;
+  std::vector<Lanes<3>> load_dirs_, other_load_dirs_, rhs_lanes_, z_dir_;
+  std::vector<Lanes<6>> body_load_dirs_, force_rhs_;
+  std::vector<PlanarShift> shifts_;
+  std::vector<PlanarFrameBar> bars_;
+  std::vector<FrameBar> bars_in_space_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,115 @@
+#include "core/dynamics/planar_rows.hpp"
+
+#include <map>
+
+namespace mbsopt {
+namespace {
+
+std::size_t index(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+PlanarRows::PlanarRows(const MechanismData& data) : model_(data.planar.get()) {
+  using Kind = PlanarConstraint::Kind;
+  std::map<int, std::vector<int>> bodies_of_row;  // that move
+  for (const PlanarConstraint& c : model_->constraints) {
+    if (c.kind == Kind::point) continue;
+    std::vector<int>& bodies = bodies_of_row[c.row];
+    for (const int body : {c.body1, c.body2}) {
+      if (body > 0 && std::find(bodies.begin(), bodies.end(), body) == bodies.end()) bodies.push_back(body);
+    }
+  }
+  std::map<int, int> first_entry;
+  for (const auto& [row, bodies] : bodies_of_row) {
+    const int first = static_cast<int>(entries_.size());
+    first_entry[row] = first;
+    for (std::size_t j = 0; j < bodies.size(); ++j) {
+      entries_.push_back({bodies[j], row, {}});
+      for (std::size_t i = 0; i < j; ++i) {
+        pairs_.push_back({first + static_cast<int>(i), first + static_cast<int>(j), edges_.size()});
+        edges_.emplace_back(bodies[i] - 1, bodies[j] - 1);
+      }
+    }
+  }
+  for (std::size_t k = 0; k < model_->constraints.size(); ++k) {
+    const PlanarConstraint& c = model_->constraints[k];
+    const int constraint = static_cast<int>(k);
+    if (c.kind == Kind::point) {
+      points_.push_back({constraint, c.body1, c.body2, c.row, c.row2, edges_.size(), {}, {}});
+      if (c.body1 > 0 && c.body2 > 0) edges_.emplace_back(c.body1 - 1, c.body2 - 1);
+      continue;
+    }
+    const std::vector<int>& bodies = bodies_of_row[c.row];
+    const auto entry = [&](int body) {
+      if (body == 0) return -1;
+      return first_entry[c.row] + static_cast<int>(std::find(bodies.begin(), bodies.end(), body) - bodies.begin());
+    };
+    singles_.push_back({constraint, entry(c.body1), entry(c.body2)});
+  }
+}
+
+void PlanarRows::evaluate(const Frames& frames) {
+  for (Point& p : points_) {
+    const PlanarConstraint& c = model_->constraints[index(p.constraint)];
+    p.x1 = frames[index(p.body1)].A * c.s1;
+    p.x2 = frames[index(p.body2)].A * c.s2;
+  }
+  for (Entry& e : entries_) e.J[0] = e.J[1] = e.J[2] = 0;
+  for (const Single& s : singles_) {
+    const PlanarConstraint& c = model_->constraints[index(s.constraint)];
+    const PlanarColumn column = jacobian_of_row(c, frames[index(c.body1)], frames[index(c.body2)]);
+    const auto add = [&](int entry, const Plane& force, double moment) {
+      if (entry < 0) return;
+      double* J = entries_[index(entry)].J;
+      J[0] += c.factor * force.re, J[1] += c.factor * force.im, J[2] += c.factor * moment;
+    };
+    add(s.entry1, column.force1, column.moment1);
+    add(s.entry2, column.force2, column.moment2);
+  }
+}
+
+void PlanarRows::add_mass(BlockCholesky<3>& S) const {
+  for (std::size_t i = 1; i < model_->bodies.size(); ++i) {
+    const PlanarBody& b = model_->bodies[i];
+    Mat<3, 3>& D = S.diagonal(static_cast<int>(i) - 1);
+    D(0, 0) += b.mass, D(1, 1) += b.mass, D(2, 2) += b.inertia;
+  }
+}
+
+void PlanarRows::add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky<3>& S) const {
+  for (const Point& p : points_) {
+    const double a = alpha(p.row), b = alpha(p.row2);
+    const auto add_square = [&](int body, const Plane& x) {
+      if (body == 0) return;
+      Mat<3, 3>& D = S.diagonal(body - 1);  // its lower triangle is what is read
+      D(0, 0) += a, D(1, 1) += b;
+      D(2, 0) -= a * x.im, D(2, 1) += b * x.re;
+      D(2, 2) += a * x.im * x.im + b * x.re * x.re;
+    };
+    add_square(p.body1, p.x1);
+    add_square(p.body2, p.x2);
+    if (p.body1 == 0 || p.body2 == 0) continue;
+    Mat<3, 3> X;
+    X << -a, 0, a * p.x2.im,  //
+        0, -b, -b * p.x2.re,  //
+        a * p.x1.im, -b * p.x1.re, -(a * p.x1.im * p.x2.im + b * p.x1.re * p.x2.re);
+    S.add_off_diagonal(p.handle, X);
+  }
+  for (const Entry& e : entries_) {
+    const double a = alpha(e.row);
+    Mat<3, 3>& D = S.diagonal(e.body - 1);
+    for (int j = 0; j < 3; ++j) {
+      for (int i = j; i < 3; ++i) D(i, j) += a * e.J[i] * e.J[j];
+    }
+  }
+  for (const Pair& p : pairs_) {
+    const Entry &e = entries_[index(p.entry1)], &f = entries_[index(p.entry2)];
+    Mat<3, 3> X;
+    for (int j = 0; j < 3; ++j) {
+      for (int i = 0; i < 3; ++i) X(i, j) = alpha(e.row) * e.J[i] * f.J[j];
+    }
+    S.add_off_diagonal(p.handle, X);
+  }
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,25 @@
+#include "core/integrate/model_choice.hpp"
+
+#include "core/mechanism/mechanism_data.hpp"
+
+namespace mbsopt {
+
+std::string why_not_planar(const Mechanism& mechanism, const SimulationSettings& settings, const Method* method) {
+  if (!mechanism.data().planar) return mechanism.data().not_planar;
+  if (!method || method->implicit()) return "the planar model serves explicit Runge-Kutta methods only";
+  if (settings.formulation.projection == Projection::velocity) return "velocities alone are projected in space only";
+  return "";
+}
+
+Model model_of(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method) {
+  if (settings.model == ModelChoice::spatial) return Model::spatial;
+  const std::string reason = why_not_planar(mechanism, settings, &method);
+  const bool exact = settings.formulation.type == FormulationType::augmented_lagrangian;
+  if (reason.empty() && (exact || settings.model == ModelChoice::planar)) return Model::planar;
+  if (settings.model == ModelChoice::planar) {
+    throw SceneError("simulation.model: cannot be planar: " + reason + ". Use \"auto\" or \"spatial\"");
+  }
+  return Model::spatial;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,17 @@
+// Which model a run of a Runge-Kutta method takes: three unknowns per body or six.
+#pragma once
+
+#include "core/integrate/tableaus.hpp"
+#include "core/mechanism/mechanism.hpp"
+#include "core/scene/settings.hpp"
+
+namespace mbsopt {
+
+// By itself never planar with the penalty form, whose joints give way to loads across the plane, too.
+// Throws SceneError where the settings ask for the planar model and there is none.
+Model model_of(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method);
+
+// Why a run with these settings is not planar; empty where it is. method: null for CVODES.
+std::string why_not_planar(const Mechanism& mechanism, const SimulationSettings& settings, const Method* method);
+
+}  // namespace mbsopt

@@ -1,0 +1,216 @@
+#include "core/mechanism/planar_model.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+
+#include "core/body/euler_parameters.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/scene/scene.hpp"
+
+namespace mbsopt {
+namespace {
+
+constexpr double kParallel = 1e-12;  // sine of the angle up to which a direction counts as another
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// How a body-fixed vector lies to the plane, at every value of the parameters.
+enum class Lies { in_plane, along_normal, across };
+
+class Search {
+ public:
+  Search(const Scene& scene, const MechanismData& data, int normal) : scene_(scene), data_(data) {
+    model_.n = normal, model_.t1 = (normal + 1) % 3, model_.t2 = (normal + 2) % 3;
+  }
+
+  // Why there is no model; empty when there is.
+  std::string run() {
+    if (data_.n == 0) return "there is no moving body";
+    if (!data_.user_forces.empty()) return "forces written in C++ act in space";
+    place_bodies();
+    terms_.assign(at(data_.m), 0);
+    for (const Constraint& c : data_.constraints) ++terms_[at(c.row)];
+    for (const RowLaw& law : data_.laws) ++terms_[at(law.row)];
+    has_levels_ = has_levels();
+    for (const Constraint& c : data_.constraints) {
+      if (std::string reason = add(c); !reason.empty()) return reason;
+    }
+    model_.gravity = model_.in_plane(data_.gravity);
+    return body_not_held();
+  }
+  PlanarModel take() { return std::move(model_); }
+
+ private:
+  void place_bodies() {
+    const Vector3d n = Vector3d::Unit(model_.n);
+    for (const BodyData& b : data_.bodies) {
+      PlanarBody body;
+      const Matrix3d A0 = A(b.q.tail<4>().isZero() ? Vector4d(1, 0, 0, 0) : Vector4d(b.q.tail<4>().normalized()));
+      const Vector3d own = A0.transpose() * n;
+      if ((own - n).norm() > kParallel) {
+        const Eigen::Quaterniond q = Eigen::Quaterniond::FromTwoVectors(own, n);
+        body.p_a << q.w(), q.vec();
+      }
+      // (0, n) times p_a
+      body.p_b << -n.dot(body.p_a.tail<3>()), body.p_a(0) * n + n.cross(body.p_a.tail<3>());
+      const Matrix3d turned = A(body.p_a);
+      body.b1 = turned.row(model_.t1), body.b2 = turned.row(model_.t2), body.n = turned.row(model_.n);
+      body.mass = b.mass;
+      body.inertia = body.n.dot(b.J * body.n);
+      model_.bodies.push_back(body);
+    }
+  }
+
+  Lies lies(int body, const Vector3d& s, int slot) const {
+    const PlanarBody& b = model_.bodies[at(body)];
+    const double along = b.n.dot(s), size = s.norm();
+    double turns_in = 0, turns_out = 0;  // by parameters
+    if (slot >= 0) {
+      const auto change = data_.theta_rho.middleRows<3>(slot);
+      turns_in = std::max((b.b1.transpose() * change).cwiseAbs().maxCoeff(),
+                          (b.b2.transpose() * change).cwiseAbs().maxCoeff());
+      turns_out = (b.n.transpose() * change).cwiseAbs().maxCoeff();
+    }
+    if (std::abs(along) <= kParallel * size && turns_out == 0) return Lies::in_plane;
+    const Plane rest = b.in_plane(s);
+    if (std::hypot(rest.re, rest.im) <= kParallel * size && turns_in == 0) return Lies::along_normal;
+    return Lies::across;
+  }
+
+  std::string name(const Constraint& c) const {
+    if (c.drive >= 0) return "drive '" + data_.drive_names[at(c.drive)] + "'";
+    return "joint '" + data_.joint_names[at(c.joint)] + "'";
+  }
+
+  // A row that motion in the plane satisfies by itself.
+  std::string drop(const Constraint& c) const {
+    return terms_[at(c.row)] > 1 ? name(c) + " moves bodies out of the plane" : "";
+  }
+
+  std::string add(const Constraint& c) {
+    PlanarConstraint out;
+    out.body1 = c.body1, out.body2 = c.body2, out.row = c.row;
+    out.slot1 = c.slot1, out.slot2 = c.slot2, out.slot3 = c.slot3;
+    out.factor = c.factor, out.slot_factor = c.slot_factor, out.angle = c.angle;
+    const PlanarBody &b1 = model_.bodies[at(c.body1)], &b2 = model_.bodies[at(c.body2)];
+    const std::string tilted = name(c) + " has a direction that is neither in the plane nor across it";
+    auto keep = [&](PlanarConstraint::Kind kind) {
+      out.kind = kind;
+      model_.constraints.push_back(out);
+      return std::string();
+    };
+    return std::visit(
+        [&]<class P>(const P& p) -> std::string {
+          using Kind = PlanarConstraint::Kind;
+          if constexpr (!std::is_same_v<P, Coordinate>) out.s1 = b1.in_plane(p.s1), out.s2 = b2.in_plane(p.s2);
+          if constexpr (std::is_same_v<P, Coincidence>) {
+            out.row = c.row + model_.t1, out.row2 = c.row + model_.t2;
+            return keep(Kind::point);
+          } else if constexpr (std::is_same_v<P, Dot1>) {
+            const Lies first = lies(c.body1, p.s1, c.slot1), second = lies(c.body2, p.s2, c.slot2);
+            if (first == Lies::across || second == Lies::across) return tilted;
+            if (first == Lies::in_plane && second == Lies::in_plane) return keep(Kind::dot1);
+            if (first == second) return name(c) + " holds two normals of the plane at right angles";
+            return drop(c);
+          } else if constexpr (std::is_same_v<P, Dot2>) {
+            const Lies direction = lies(c.body1, p.s3, c.slot3);
+            if (direction == Lies::across) return tilted;
+            if (direction == Lies::along_normal) return drop(c);
+            out.s3 = b1.in_plane(p.s3);
+            return keep(Kind::dot2);
+          } else if constexpr (std::is_same_v<P, Distance>) {
+            const double out1 = b1.n.dot(p.s1), out2 = b2.n.dot(p.s2);
+            if (c.slot1 >= 0 && lies(c.body1, p.s1, c.slot1) != Lies::in_plane) return tilted;
+            if (c.slot2 >= 0 && lies(c.body2, p.s2, c.slot2) != Lies::in_plane) return tilted;
+            if (out1 != 0 || out2 != 0 || has_levels_) return name(c) + " joins points at different heights";
+            return keep(Kind::distance);
+          } else if constexpr (std::is_same_v<P, Angle>) {
+            for (const auto& [body, s, slot] :
+                 {std::tuple(c.body1, p.s1, c.slot1), std::tuple(c.body2, p.s2, c.slot2), std::tuple(c.body1, p.s3, c.slot3)}) {
+              if (lies(body, s, slot) != Lies::in_plane) return tilted;
+            }
+            out.sign = cross(b1.in_plane(p.s1), b1.in_plane(p.s3)) > 0 ? 1 : -1;
+            return keep(Kind::angle);
+          } else {
+            return name(c) + " prescribes a single coordinate";
+          }
+        },
+        c.primitive);
+  }
+
+  // Whether bodies may lie at heights other than the ground's, where the length of a rod is not that in the plane.
+  bool has_levels() const {
+    for (const Constraint& c : data_.constraints) {
+      const auto* point = std::get_if<Coincidence>(&c.primitive);
+      if (!point) continue;
+      if (model_.bodies[at(c.body1)].n.dot(point->s1) != model_.bodies[at(c.body2)].n.dot(point->s2)) return true;
+      for (const auto& [body, slot] : {std::pair(c.body1, c.slot1), std::pair(c.body2, c.slot2)}) {
+        if (slot >= 0 && !(model_.bodies[at(body)].n.transpose() * data_.theta_rho.middleRows<3>(slot)).isZero(0)) return true;
+      }
+    }
+    return false;
+  }
+
+  // Joints that hold one body of theirs in the plane when the other one is, followed from the ground.
+  std::string body_not_held() const {
+    std::vector<std::vector<int>> neighbours(data_.bodies.size());
+    for (const Constraint& c : data_.constraints) {
+      if (!holds(c)) continue;
+      neighbours[at(c.body1)].push_back(c.body2);
+      neighbours[at(c.body2)].push_back(c.body1);
+    }
+    std::vector<bool> held(data_.bodies.size(), false);
+    std::vector<int> reached{0};
+    held[0] = true;
+    while (!reached.empty()) {
+      const int body = reached.back();
+      reached.pop_back();
+      for (const int next : neighbours[at(body)]) {
+        if (!held[at(next)]) reached.push_back(next);
+        held[at(next)] = true;
+      }
+    }
+    for (int i = 1; i <= data_.n; ++i) {
+      if (!held[at(i)]) {
+        return fmt::format("no joint holds body '{}' in the plane (revolute, planar, translational or fixed joints do)",
+                           data_.body_names[at(i)]);
+      }
+    }
+    return "";
+  }
+
+  // Whether this row is of a joint that holds bodies in the plane; of each such joint one row is enough, a dot-1 with
+  // axis 2.
+  bool holds(const Constraint& c) const {
+    const auto* parallel = std::get_if<Dot1>(&c.primitive);
+    if (!parallel || c.joint < 0) return false;
+    const std::string& type = scene_.joints[at(c.joint)].type;
+    const Lies axis = lies(c.body2, parallel->s2, c.slot2);
+    if (type == "revolute" || type == "planar") return axis == Lies::along_normal;
+    return type == "fixed" || (type == "translational" && axis == Lies::in_plane);
+  }
+
+  const Scene& scene_;
+  const MechanismData& data_;
+  PlanarModel model_;
+  std::vector<int> terms_;  // constraints and laws per row
+  bool has_levels_ = false;
+};
+
+}  // namespace
+
+PlanarSearch find_planar_model(const Scene& scene, const MechanismData& data) {
+  // The first joint with axes says about which normal it can be; z is as good as any without one.
+  std::string reason;
+  for (const int normal : {2, 0, 1}) {
+    Search search(scene, data, normal);
+    std::string why = search.run();
+    if (why.empty()) return {std::make_shared<const PlanarModel>(search.take()), ""};
+    if (reason.empty()) reason = std::move(why);
+  }
+  return {nullptr, reason};
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,70 @@
+// A mechanism that its joints hold in a plane: three unknowns per body instead of six.
+//
+// The plane's normal n is a coordinate axis, (t1, t2, n) a cyclic permutation of (x, y, z). Every body is held in the
+// plane by joints (revolute and planar ones about n, translational ones along the plane, fixed ones) that lead to the
+// ground, and every row of Phi either says something about motion in the plane or holds by itself. Then the feasible
+// accelerations are those with rddot'n = 0 and omegadot along n, whatever the forces: what leaves the plane is reacted.
+// No parameter turns a joint's axis out of the plane, so derivatives stay in it, too.
+//
+// Vectors of the plane are complex numbers, t1 + i t2. A body's Euler parameters move in the span of p_a and p_b,
+//   p = Re(P) p_a + Im(P) p_b,   P = e0 + i e_n seen from the pose p_a,   A(p) s = P^2 s   for s in the plane,
+// with p_a any pose that has the body's own normal along n, and p_b = p_a turned by pi about n.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/body/complex.hpp"
+
+namespace mbsopt {
+
+struct MechanismData;
+struct Scene;
+
+struct PlanarBody {
+  double mass = 0, inertia = 0;                            // [kg], about n through the centre of mass [kg m^2]
+  Vector3d b1 = Vector3d::UnitX(), b2 = Vector3d::UnitY(), n = Vector3d::UnitZ();  // t1, t2, n in body axes at p_a
+  Vector4d p_a{1, 0, 0, 0}, p_b{0, 0, 0, 1};
+
+  Plane in_plane(const Vector3d& s) const { return {b1.dot(s), b2.dot(s)}; }
+  Vector3d in_body(const Plane& s) const { return s.re * b1 + s.im * b2; }
+};
+
+// A primitive (constraint.hpp) seen in the plane.
+struct PlanarConstraint {
+  enum class Kind { point, dot1, dot2, distance, angle };
+  Kind kind = Kind::point;
+  int body1 = 0, body2 = 0;
+  int row = 0, row2 = 0;                   // of Phi; row2: of a point's second coordinate
+  Plane s1, s2, s3;                        // parts in the plane of the primitive's vectors
+  double offset = 0;                       // distance: of the two points along n [m]
+  double sign = 1;                         // angle: about +n or -n
+  int slot1 = -1, slot2 = -1, slot3 = -1;  // of the primitive's vectors, three rows each
+  double factor = 1;
+  int slot_factor = -1, angle = -1;
+};
+
+struct PlanarModel {
+  int t1 = 0, t2 = 1, n = 2;  // coordinate axes
+  std::vector<PlanarBody> bodies;  // the ground first
+  std::vector<PlanarConstraint> constraints;
+  Plane gravity;
+
+  Plane in_plane(const Vector3d& x) const { return {x(t1), x(t2)}; }
+  Vector3d in_space(const Plane& x) const {
+    Vector3d out = Vector3d::Zero();
+    out(t1) = x.re, out(t2) = x.im;
+    return out;
+  }
+};
+
+// The planar model of compiled data whose theta_rho is set; or why there is none, in words that end a sentence
+// "is not planar: ...".
+struct PlanarSearch {
+  std::shared_ptr<const PlanarModel> model;
+  std::string reason;
+};
+PlanarSearch find_planar_model(const Scene& scene, const MechanismData& data);
+
+}  // namespace mbsopt

@@ -1,0 +1,232 @@
+// The planar model against the spatial one: the same numbers, at single states off the constraints and along motions,
+// with their tangents and adjoints; and which scenes have one.
+#include <catch2/catch.hpp>
+
+#include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/projection.hpp"
+#include "core/integrate/simulation.hpp"
+#include "core/mechanism/planar_model.hpp"
+#include "tests/core/dynamics/planar_scenes.hpp"
+#include "tests/core/integrate/state_costs.hpp"
+#include "tests/core/mechanism/moving_scenes.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kTime = 0.37;
+
+// The directions of y that stay in the plane, one per column: r, and P along p_a and p_b; their rates.
+MatrixXd plane_of(const MechanismData& d) {
+  const PlanarModel& m = *d.planar;
+  MatrixXd basis = MatrixXd::Zero(14 * d.n, 8 * d.n);
+  Eigen::Index column = 0;
+  for (const int half : {0, 7 * d.n}) {
+    for (int i = 1; i <= d.n; ++i) {
+      const PlanarBody& b = m.bodies[static_cast<std::size_t>(i)];
+      const Eigen::Index q = half + 7 * (i - 1);
+      basis(q + m.t1, column++) = 1, basis(q + m.t2, column++) = 1;
+      basis.block<4, 1>(q + 3, column++) = b.p_a, basis.block<4, 1>(q + 3, column++) = b.p_b;
+    }
+  }
+  return basis;
+}
+
+// In the plane, off the constraints and off the unit sphere.
+VectorXd state(const MechanismData& d, unsigned seed) {
+  std::srand(seed);
+  VectorXd guess = VectorXd::Zero(14 * d.n);
+  for (int i = 1; i <= d.n; ++i) guess.segment<7>(7 * (i - 1)) = d.bodies[static_cast<std::size_t>(i)].q;
+  const MatrixXd plane = plane_of(d);
+  return guess + plane * (0.2 * VectorXd::Random(plane.cols()));
+}
+
+LaneRows directions(const MechanismData& d, unsigned seed) {
+  std::srand(seed);
+  const MatrixXd plane = plane_of(d);
+  return plane * LaneRows::Random(plane.cols(), kLanes);
+}
+
+FormulationSettings formulation(const std::string& name) {
+  FormulationSettings s;
+  if (name == "stabilised") s.omega = 7, s.xi = 0.8;
+  if (name == "penalty") s = FormulationSettings::penalty(), s.alpha = 1e4;
+  return s;
+}
+
+double size_of(const MatrixXd& x) { return x.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(); }
+// Largest difference, relative to the largest entry.
+double apart(const MatrixXd& x, const MatrixXd& y) { return size_of(x - y) / std::max(size_of(y), 1e-300); }
+
+}  // namespace
+
+TEST_CASE("planar accelerations, their tangent and their adjoint are the spatial ones", "[planar]") {
+  const std::string form = GENERATE(as<std::string>{}, "augmented_lagrangian", "stabilised", "penalty");
+  const Scene scene = planar_machine(GENERATE(2, 0, 1), form != "penalty");  // which gives way to loads across the plane
+  const FormulationSettings settings = formulation(form);
+  const Mechanism mechanism(scene, nominal(scene));
+  const MechanismData& d = mechanism.data();
+  INFO(d.not_planar);
+  REQUIRE(d.planar);
+  const VectorXd y = state(d, 3), angles = VectorXd::Constant(static_cast<Eigen::Index>(d.angles.size()), 0.2);
+  Dynamics spatial(mechanism, settings), planar(mechanism, settings, Model::planar);
+  VectorXd expected(y.size()), rate(y.size());
+  REQUIRE(spatial.evaluate(kTime, y, angles, expected));
+  REQUIRE(planar.evaluate(kTime, y, angles, rate));
+  CHECK(apart(rate, expected) < 1e-11);
+
+  const VectorXd a = expected.tail(7 * d.n), lambda = spatial.lambda();
+  REQUIRE(spatial.linearise(kTime, y, angles, a, lambda));
+  REQUIRE(planar.linearise(kTime, y, angles, a, lambda));
+  const MatrixXd plane = plane_of(d);
+  for (const ParameterBlock& block : parameter_blocks(d)) {
+    const LaneRows y_dir = directions(d, 4);
+    LaneRows out(y.size(), kLanes), reference(y.size(), kLanes);
+    spatial.tangent(block, y_dir, reference);
+    planar.tangent(block, y_dir, out);
+    CHECK(apart(out, reference) < 1e-9);
+  }
+  // The transpose, on directions in the plane.
+  std::srand(5);
+  const VectorXd w = plane * VectorXd::Random(plane.cols());
+  VectorXd y_bar = VectorXd::Zero(y.size()), theta_bar = VectorXd::Zero(d.slots()), rho_bar = VectorXd::Zero(d.rho.size());
+  planar.add_adjoint(w, y_bar, theta_bar, rho_bar);
+  VectorXd total = rho_bar;
+  d.add_to_rho(theta_bar, total);
+  const LaneRows y_dir = directions(d, 6);
+  for (const ParameterBlock& block : parameter_blocks(d)) {
+    LaneRows out(y.size(), kLanes);
+    planar.tangent(block, y_dir, out);
+    for (int k = 0; k < kLanes; ++k) {
+      const double by_parameter = block.parameter[k] < 0 ? 0 : total(block.parameter[k]);
+      const double forward = w.dot(out.col(k)), backward = y_bar.dot(y_dir.col(k)) + by_parameter;
+      CHECK(std::abs(forward - backward) < 1e-10 * (std::abs(forward) + y_bar.norm() * y_dir.col(k).norm()));
+    }
+  }
+}
+
+TEST_CASE("the planar projection, its tangent and its adjoint are the spatial ones", "[planar]") {
+  const Scene scene = planar_machine(GENERATE(2, 1));
+  const Mechanism mechanism(scene, nominal(scene));
+  const MechanismData& d = mechanism.data();
+  REQUIRE(d.planar);
+  const VectorXd angles = VectorXd::Constant(static_cast<Eigen::Index>(d.angles.size()), 0.2);
+  Projector spatial(mechanism, Projection::position_velocity),
+      planar(mechanism, Projection::position_velocity, Model::planar);
+  ProjectionSolution s = spatial.solution(), p = planar.solution();
+  VectorXd start(14 * d.n), y_hat = state(d, 7), expected(14 * d.n), y(14 * d.n);
+  REQUIRE(spatial.project(kTime, angles, y_hat, start, s));  // onto the constraints, and off them by a step's error
+  y_hat = start + 0.02 * (plane_of(d) * VectorXd::Random(8 * d.n));
+  REQUIRE(spatial.project(kTime, angles, y_hat, expected, s));
+  REQUIRE(planar.project(kTime, angles, y_hat, y, p));
+  CHECK(apart(y, expected) < 1e-12);
+  CHECK(planar.position_violation(kTime, angles, y) < 1e-13);
+  CHECK(planar.velocity_violation(kTime, y) < 1e-13);
+  CHECK(planar.velocity_violation(kTime, y_hat) == Approx(spatial.velocity_violation(kTime, y_hat)));
+
+  REQUIRE(spatial.linearise(kTime, angles, y_hat, expected, s));
+  REQUIRE(planar.linearise(kTime, angles, y_hat, expected, p));
+  std::srand(8);
+  const MatrixXd plane = plane_of(d);
+  const VectorXd w = plane * VectorXd::Random(plane.cols());
+  VectorXd y_bar = VectorXd::Zero(y.size()), theta_bar = VectorXd::Zero(d.slots()), total = VectorXd::Zero(d.rho.size());
+  planar.add_adjoint(w, y_bar, theta_bar, total);
+  d.add_to_rho(theta_bar, total);
+  for (const ParameterBlock& block : parameter_blocks(d)) {
+    const LaneRows dir = directions(d, 9);
+    LaneRows out(y.size(), kLanes), reference(y.size(), kLanes);
+    spatial.tangent(block, dir, reference);
+    planar.tangent(block, dir, out);
+    CHECK(apart(out, reference) < 1e-10);
+    for (int k = 0; k < kLanes; ++k) {
+      const double by_parameter = block.parameter[k] < 0 ? 0 : total(block.parameter[k]);
+      const double forward = w.dot(out.col(k)), backward = y_bar.dot(dir.col(k)) + by_parameter;
+      CHECK(std::abs(forward - backward) < 1e-11 * (std::abs(forward) + y_bar.norm() * dir.col(k).norm()));
+    }
+  }
+}
+
+TEST_CASE("a planar run takes the spatial run's steps to the same motion and gradient", "[planar]") {
+  const std::string form = GENERATE(as<std::string>{}, "augmented_lagrangian", "penalty");
+  Scene scene = planar_machine(GENERATE(2, 0), form != "penalty");
+  scene.simulation.formulation = formulation(form);
+  const VectorXd rho = nominal(scene);
+  const Mechanism mechanism(scene, rho);
+  const auto run = [&](ModelChoice model, auto simulate_by) {
+    SimulationSettings settings = scene.simulation;
+    settings.model = model;
+    std::vector<Cost> costs(1);
+    costs[0].running = std::make_shared<StateNorm>();
+    costs[0].terminal = std::make_shared<SensorProduct>(mechanism, 0, 1);
+    SimulationResult result = simulate_by(settings, costs);
+    INFO(result.message);
+    REQUIRE(result.ok());
+    return result;
+  };
+  const auto tlm = [&](const SimulationSettings& s, const std::vector<Cost>& c) { return simulate_tlm(mechanism, s, c); };
+  const auto adjoint = [&](const SimulationSettings& s, const std::vector<Cost>& c) {
+    return simulate_adjoint(mechanism, s, c);
+  };
+  const SimulationResult spatial = run(ModelChoice::spatial, adjoint), planar = run(ModelChoice::planar, adjoint),
+                         planar_tlm = run(ModelChoice::planar, tlm);
+  CHECK(planar.statistics.steps == spatial.statistics.steps);
+  CHECK(apart(planar.y_end, spatial.y_end) < 1e-10);
+  CHECK(apart(planar.psi, spatial.psi) < 1e-10);
+  CHECK(apart(planar.psi_rho, spatial.psi_rho) < 1e-10);
+  CHECK(apart(planar_tlm.psi_rho, planar.psi_rho) < 1e-10);
+}
+
+TEST_CASE("the N-four-bar through its flat position: the planar model meets the spatial one", "[planar]") {
+  Scene scene = n_four_bar(3);
+  scene.simulation.end_time = 1;
+  scene.simulation.integrator.rtol = 1e-9, scene.simulation.integrator.atol = 1e-11;
+  const Mechanism mechanism(scene, nominal(scene));
+  REQUIRE(mechanism.data().planar);
+  SimulationSettings spatial = scene.simulation;
+  spatial.model = ModelChoice::spatial;
+  const SimulationResult a = simulate(mechanism, scene.simulation), b = simulate(mechanism, spatial);
+  REQUIRE((a.ok() && b.ok()));
+  CHECK(apart(a.y_end, b.y_end) < 1e-7);  // rounding, as the singular position magnifies it
+  CHECK(a.statistics.max_position_violation < 1e-12);
+}
+
+TEST_CASE("only what joints hold in a plane, at every value of the parameters, is planar", "[planar]") {
+  const auto reason = [](const Scene& s) { return Mechanism(s, nominal(s)).data().not_planar; };
+  CHECK(reason(double_pendulum()).empty());
+  CHECK(reason(four_bar()).empty());
+  CHECK_THAT(reason(spatial_four_bar()), Catch::Contains("neither in the plane nor across it"));
+
+  Scene free = double_pendulum();
+  free.joints.pop_back();
+  free.sensors.pop_back();
+  CHECK_THAT(reason(free), Catch::Contains("no joint holds body 'lower'"));
+
+  Scene tilting = double_pendulum();  // parallel now, but a parameter tilts it
+  add_parameters(tilting, {{"tilt", 0.0}});
+  tilting.joints[1].axis1 = vec("0", "sin(tilt)", "cos(tilt)");
+  CHECK_FALSE(reason(tilting).empty());
+
+  Scene hung = double_pendulum();  // by a ball
+  hung.joints[1].type = "spherical", hung.joints[1].axis1.reset(), hung.joints[1].axis2.reset();
+  hung.sensors.pop_back();
+  CHECK_THAT(reason(hung), Catch::Contains("no joint holds body 'lower'"));
+
+  Scene lifted = four_bar();
+  Drive lift;
+  lift.name = "lift", lift.type = "coordinate", lift.body = "crank", lift.coordinate = "x", lift.law = f("0.1*t");
+  lifted.drives.push_back(lift);
+  CHECK_THAT(reason(lifted), Catch::Contains("drive 'lift'"));
+}
+
+TEST_CASE("a planar model that is asked for and is none is refused with the reason", "[planar]") {
+  Scene scene = spatial_four_bar();
+  scene.simulation.model = ModelChoice::planar;
+  const Mechanism mechanism(scene, nominal(scene));
+  CHECK_THROWS_WITH(simulate(mechanism, scene.simulation), Catch::Contains("simulation.model") && Catch::Contains("neither"));
+  Scene implicit = four_bar();
+  implicit.simulation.model = ModelChoice::planar, implicit.simulation.integrator.type = "radau5";
+  CHECK_THROWS_WITH(simulate(Mechanism(implicit, nominal(implicit)), implicit.simulation), Catch::Contains("explicit"));
+}
