@@ -189,7 +189,7 @@ int check_command(const CommandContext& context) {
   if (scene.parameters.empty()) throw std::invalid_argument("parameters: there are none to differentiate with");
   const Mechanism mechanism(scene, parameter_values(scene));
   run.start();
-  if (!assembled(run, Assembly(mechanism, scene.simulation.start_time))) return run.finish();
+  if (!assembled(run, &mechanism, Assembly(mechanism, scene.simulation.start_time))) return run.finish();
 
   double last_good_time = scene.simulation.start_time;
   GradientCheckOptions options;

@@ -87,7 +87,7 @@ int gradient_command(const CommandContext& context) {
 
   const Mechanism mechanism(scene, parameter_values(scene));
   run.start();
-  if (!assembled(run, Assembly(mechanism, scene.simulation.start_time))) return run.finish();
+  if (!assembled(run, &mechanism, Assembly(mechanism, scene.simulation.start_time))) return run.finish();
 
   double last_good_time = scene.simulation.start_time;
   EvaluatorOptions options;

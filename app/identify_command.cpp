@@ -10,6 +10,7 @@
 #include "app/residual_records.hpp"
 #include "app/run.hpp"
 #include "core/dynamics/assembly.hpp"
+#include "core/integrate/model_choice.hpp"
 #include "optim/identification.hpp"
 
 namespace mbsopt {
@@ -91,8 +92,10 @@ int identify_command(const CommandContext& context) {
   run.start();
   // Experiments have their own overrides: where the scene itself does not assemble, they still may.
   if (const Assembly assembly(mechanism, scene.simulation.start_time); assembly.result().ok) {
-    run.result["model"] = to_json(assembly.summary());
-    print_model(context.out, scene.name, assembly.summary());
+    ModelSummary model = assembly.summary();
+    add_model(mechanism, scene.simulation, model);
+    run.result["model"] = to_json(model);
+    print_model(context.out, scene.name, model);
   }
   LongRun long_run(run);
   const Problem problem = from_best_start(run, long_run, data);

@@ -19,7 +19,10 @@ Json to_json(const ModelSummary& summary) {
           {"equations", summary.equations},
           {"rank", summary.rank},
           {"degrees_of_freedom", summary.degrees_of_freedom},
-          {"redundant", summary.redundant}};
+          {"redundant", summary.redundant},
+          {"type", summary.unknowns_per_body == 3 ? "planar" : "spatial"},
+          {"unknowns_per_body", summary.unknowns_per_body},
+          {"not_planar", summary.not_planar.empty() ? Json() : Json(summary.not_planar)}};
 }
 
 Json to_json(const SimulationStatistics& statistics) {
@@ -28,6 +31,8 @@ Json to_json(const SimulationStatistics& statistics) {
             {"rhs_evaluations", statistics.rhs_evaluations},
             {"factorisations", statistics.factorisations},
             {"jacobians", statistics.jacobians},
+            {"factor_blocks", statistics.factor_blocks},
+            {"linearised_states", statistics.linearised_states},
             {"wall_seconds", statistics.wall_seconds},
             {"max_acceleration_residual", statistics.max_acceleration_residual},
             {"max_position_violation", statistics.max_position_violation},

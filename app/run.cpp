@@ -8,6 +8,7 @@
 #include "app/json/read_problem.hpp"
 #include "app/provenance.hpp"
 #include "core/expression/counted.hpp"
+#include "core/integrate/model_choice.hpp"
 
 namespace mbsopt {
 namespace {
@@ -101,22 +102,23 @@ int Run::finish() {
   return exit_code_of(status);
 }
 
-bool assembled(Run& run, const Assembly& assembly) {
+bool assembled(Run& run, const Mechanism* mechanism, const Assembly& assembly) {
   const Scene& scene = run.problem.scene;
   if (!assembly.result().ok) {
     run.failed(assembly.result().message, scene.simulation.start_time);
     return false;
   }
-  const ModelSummary model = assembly.summary();
+  ModelSummary model = assembly.summary();
+  if (mechanism) add_model(*mechanism, scene.simulation, model);
   run.result["model"] = to_json(model);
   print_model(run.context.out, scene.name, model);
   return true;
 }
 
 void print_model(std::ostream& out, const std::string& name, const ModelSummary& summary) {
-  out << fmt::format("{}: {}, {} of rank {}, {}\n", name, counted(summary.bodies, "body", "bodies"),
-                     counted(summary.equations, "equation"), summary.rank,
-                     counted(summary.degrees_of_freedom, "degree of freedom", "degrees of freedom"));
+  out << fmt::format("{}: {}{}, {} of rank {}, {}\n", name, counted(summary.bodies, "body", "bodies"),
+                     summary.unknowns_per_body == 3 ? " in a plane" : "", counted(summary.equations, "equation"),
+                     summary.rank, counted(summary.degrees_of_freedom, "degree of freedom", "degrees of freedom"));
   if (!summary.redundant.empty()) out << fmt::format("redundant: {}\n", fmt::join(summary.redundant, ", "));
 }
 

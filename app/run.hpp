@@ -62,7 +62,8 @@ std::vector<std::string> data_files(const Problem& problem);
 
 // The model at its assembled start into the result and onto standard output. False where the assembly failed, which
 // then is how the run ended.
-bool assembled(Run& run, const Assembly& assembly);
+// mechanism: null where its motion is not simulated.
+bool assembled(Run& run, const Mechanism* mechanism, const Assembly& assembly);
 
 // Prints the counts of bodies, equations, degrees of freedom; redundant equations by joint.
 void print_model(std::ostream& out, const std::string& name, const ModelSummary& summary);

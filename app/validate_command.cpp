@@ -35,7 +35,7 @@ int validate_command(const CommandContext& context) {
   const Mechanism mechanism(run.problem.scene, parameter_values(run.problem.scene));
   run.start();
   const Assembly assembly(mechanism, run.problem.scene.simulation.start_time);
-  const bool closed = assembled(run, assembly);
+  const bool closed = assembled(run, &mechanism, assembly);
   for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
   if (closed) add_parameters(run);
   return run.finish();

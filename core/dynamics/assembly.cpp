@@ -192,6 +192,14 @@ struct Assembly::Solution {
     result.message = equilibrium.message;
   }
 
+  // Before the linearisations of q and v are used.
+  void linearise_both() {
+    PositionProblem positions(position);
+    linearise(positions, *q);
+    VelocityProblem velocities(velocity, q->x);
+    linearise(velocities, *v);
+  }
+
   // On the turn that an angle's condition names, where there is one (so that a measured angle starts where it was
   // measured), else within half a turn of zero; the last angle of a gear on the branch that the gear asks for.
   void set_angles() {
@@ -242,13 +250,14 @@ Assembly::~Assembly() = default;
 const AssemblyResult& Assembly::result() const { return solution_->result; }
 
 MatrixXd Assembly::tangent() const {
-  const Solution& s = *solution_;
+  Solution& s = *solution_;
   if (!s.result.ok) return MatrixXd::Constant(s.result.y.size(), s.data.rho.size(), kNaN);
   MatrixXd y_rho = MatrixXd::Zero(s.result.y.size(), s.data.rho.size());
   if (s.data.equilibrium) {
     y_rho.topRows(7 * s.data.n) = s.equilibrium.q_rho;
     return y_rho;
   }
+  s.linearise_both();
   const Solution::Derivatives d = s.derivatives();
   const MatrixXd q_rho = s.q->linearisation.solve(d.q_b_rho, d.q_g_rho);
   y_rho << q_rho, s.v->linearisation.solve(d.v_b_q * q_rho + d.v_b_rho, d.v_g_q * q_rho + d.v_g_rho);
@@ -256,7 +265,7 @@ MatrixXd Assembly::tangent() const {
 }
 
 void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
-  const Solution& s = *solution_;
+  Solution& s = *solution_;
   if (!s.result.ok) {
     rho_bar.setConstant(kNaN);
     return;
@@ -266,6 +275,7 @@ void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
     rho_bar += s.equilibrium.q_rho.transpose() * y_bar.topRows(N);
     return;
   }
+  s.linearise_both();
   const Solution::Derivatives d = s.derivatives();
   MatrixXd b_bar, g_bar;
   s.v->linearisation.solve_transposed(y_bar.bottomRows(N), b_bar, g_bar);
@@ -276,8 +286,9 @@ void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
 }
 
 std::vector<int> Assembly::obstructed() const {
-  const Solution& s = *solution_;
+  Solution& s = *solution_;
   if (!s.result.ok || s.data.equilibrium) return {};
+  s.linearise_both();
   const Solution::Derivatives d = s.derivatives();
   // What is left of each right-hand side outside the range of J, rows scaled to unit length.
   auto left = [](const NearestPointLinearisation& at, const MatrixXd& J, const MatrixXd& b) {

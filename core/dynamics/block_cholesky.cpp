@@ -114,7 +114,23 @@ void subtract_transposed_times(const Mat<N, N>& L, const X& x, X& y) {
   }
 }
 
-// The same of one vector, in pairs.
+// The same of one vector of three numbers, written out: pairs would wait for the single numbers just stored.
+Vec<3> times(const Mat<3, 3>& W, const Vec<3>& b) {
+  return {b(0), b(1) + W(1, 0) * b(0), b(2) + W(2, 0) * b(0) + W(2, 1) * b(1)};
+}
+Vec<3> transposed_times(const Mat<3, 3>& W, const Vec<3>& b) {
+  return {b(0) + W(1, 0) * b(1) + W(2, 0) * b(2), b(1) + W(2, 1) * b(2), b(2)};
+}
+void subtract_times(const Mat<3, 3>& L, const Vec<3>& x, Vec<3>& y) {
+  const double a = x(0), b = x(1), c = x(2);
+  for (int i = 0; i < 3; ++i) y(i) -= L(i, 0) * a + L(i, 1) * b + L(i, 2) * c;
+}
+void subtract_transposed_times(const Mat<3, 3>& L, const Vec<3>& x, Vec<3>& y) {
+  const double a = x(0), b = x(1), c = x(2);
+  for (int j = 0; j < 3; ++j) y(j) -= L(0, j) * a + L(1, j) * b + L(2, j) * c;
+}
+
+// And of one of six, in pairs.
 Vec<6> times(const Mat<6, 6>& W, const Vec<6>& b) {
   Six sum(b.data());
   sum.add<0>(b(0), column(W, 0));

@@ -44,6 +44,7 @@ class BlockCholesky {
   void solve(std::span<Lanes<N>> x);
 
   std::size_t fill_blocks() const { return lower_.size(); }
+  std::size_t blocks() const { return diagonal_.size() + lower_.size(); }
 
  private:
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }

@@ -151,6 +151,7 @@ void Dynamics::note_residual(double ratio) {
 
 bool Dynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                          const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda) {
+  ++linearised_states_;
   if (planar_) return planar_->linearise(t, y, angles, a, lambda);
   set_motion(t, y, angles, a, lambda);
   return solver_.factor(frames_);

@@ -97,6 +97,8 @@ class Dynamics {
   void hold_laws() { laws_.hold(); }
 
   SaddleSolver& solver() { return solver_; }
+  long factor_blocks() const { return planar_ ? planar_->factor_blocks() : solver_.factor_blocks(); }
+  long linearised_states() const { return linearised_states_; }
   long factorisations() const { return planar_ ? planar_->factorisations() : solver_.factorisations(); }
   // Largest relative residual of the constraints' accelerations over all evaluations (augmented Lagrangian).
   double worst_residual() const { return worst_residual_; }
@@ -129,6 +131,7 @@ class Dynamics {
   std::unique_ptr<PlanarDynamics> planar_;  // where it is there, it does all the work
 
   double t_ = 0, worst_residual_ = 0;
+  long linearised_states_ = 0;
   Eigen::VectorXd y_, angles_;
   std::vector<BodyState> bodies_;
   std::vector<Frame> frames_;

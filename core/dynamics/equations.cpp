@@ -32,6 +32,7 @@ void Dynamics::set_motion(double t, const Eigen::VectorXd& y, const Eigen::Vecto
 
 void Dynamics::place_at(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                         const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda) {
+  ++linearised_states_;
   set_motion(t, y, angles, a, lambda);
   solver_.place(frames_);
 }

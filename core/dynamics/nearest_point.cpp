@@ -113,6 +113,7 @@ class Search {
   }
 
   NearestPoint run() {
+    if (guess_is_it()) return result_;
     if (!newton()) sqp();
     result_.F = equations_.values(result_.x);
     const bool unsettled =
@@ -122,6 +123,17 @@ class Search {
   }
 
  private:
+  // The guess satisfies the equations to rounding: nothing is nearer, nu = 0 and H = I.
+  bool guess_is_it() {
+    const VectorXd x = equations_.retracted(x_guess_), F = equations_.values(x);
+    if (!(largest(F) <= 4 * kEpsilon * size()) || !(largest(x - x_guess_) <= 4 * kEpsilon * size())) return false;
+    result_.x = x, result_.F = F, result_.nu = VectorXd::Zero(F.size());
+    result_.status = NearestPointStatus::found;
+    result_.linearised = false;
+    equations_.accept(x);
+    return true;
+  }
+
   // Gauss-Newton, then Newton; false where neither converges.
   bool newton() {
     constexpr double kNear = 0.05;    // Gauss-Newton steps below it, per unit of x, may be Newton's instead
@@ -292,6 +304,15 @@ class Search {
 
 NearestPoint nearest_point(NearestPointEquations& equations, const VectorXd& x_guess) {
   return Search(equations, x_guess).run();
+}
+
+void linearise(NearestPointEquations& equations, NearestPoint& found) {
+  if (found.linearised) return;
+  found.linearised = true;
+  found.linearisation = NearestPointLinearisation(equations.jacobian(found.x));
+  MatrixXd H = equations.curvature(found.x, found.nu);
+  H.diagonal().array() += 1;
+  found.linearisation.set_hessian(H);
 }
 
 }  // namespace mbsopt

@@ -84,9 +84,13 @@ struct NearestPoint {
   NearestPointStatus status = NearestPointStatus::stalled;
   Eigen::VectorXd x, nu, F;
   int iterations = 0;
-  NearestPointLinearisation linearisation;  // at x, with its Hessian where status is found
+  // At x, with its Hessian where status is found; not there yet (linearise below) where the guess itself was found.
+  bool linearised = true;
+  NearestPointLinearisation linearisation;
 };
 
 NearestPoint nearest_point(NearestPointEquations& equations, const Eigen::VectorXd& x_guess);
+// What a guess that satisfies its equations to rounding does without: a dense decomposition.
+void linearise(NearestPointEquations& equations, NearestPoint& found);
 
 }  // namespace mbsopt

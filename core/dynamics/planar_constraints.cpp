@@ -110,7 +110,7 @@ struct RowColumn {
 };
 template <class T, class S>
 RowColumn<T> column_of(const PlanarConstraint& c, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2,
-                    const Vectors<S>& s) {
+                       const Vectors<S>& s) {
   using std::sqrt;
   const auto along = [&](const Complex<T>& u) {  // u'd
     return RowColumn<T>{-u, u, -cross(f1.A * s.s1, u), cross(f2.A * s.s2, u)};
@@ -161,8 +161,8 @@ void add_vector_bar(const PlanarFrame<double>& f, double turn, const Plane& s, c
   const Plane st = conj(sign * s);
   frame_bar.A += bar.x * st, frame_bar.Adot += bar.xd * st, frame_bar.Addot += bar.xdd * st;
   frame_bar.A_eta += bar.eta * st;
-  s_bar += sign * (conj(f.A) * bar.x + conj(f.Adot) * bar.xd + conj(f.Addot) * bar.xdd +
-                   conj(times_i(turn * f.A)) * bar.eta);
+  s_bar += sign *
+           (conj(f.A) * bar.x + conj(f.Adot) * bar.xd + conj(f.Addot) * bar.xdd + conj(times_i(turn * f.A)) * bar.eta);
 }
 void add_point_bar(const PlanarFrame<double>& f, double turn, const Plane& s, const JetBar& bar, double sign,
                    PlanarFrameBar& frame_bar, Plane& s_bar) {
@@ -313,12 +313,10 @@ void PlanarConstraints::add_pull_back(const Frames& frames, std::span<const Plan
       }
       if (c.slot_factor >= 0) {
         const RowColumn<double> J = column_of(c, f1, f2, vectors(c));
-        const double change =
-            dot(J.force1, eta[i].r) + dot(J.force2, eta[j].r) + J.moment1 * turn1 + J.moment2 * turn2;
-        theta_bar(c.slot_factor) += unscaled.lambda * change +
-                                    unscaled.mu0 * on_branch(c, laws, angles, phi_of(c, f1, f2, vectors(c))) +
-                                    unscaled.mu1 * phi_dot_of(c, f1, f2, vectors(c)) +
-                                    unscaled.mu2 * phi_ddot_of(c, f1, f2, vectors(c));
+        const double change = dot(J.force1, eta[i].r) + dot(J.force2, eta[j].r) + J.moment1 * turn1 + J.moment2 * turn2;
+        theta_bar(c.slot_factor) +=
+            unscaled.lambda * change + unscaled.mu0 * on_branch(c, laws, angles, phi_of(c, f1, f2, vectors(c))) +
+            unscaled.mu1 * phi_dot_of(c, f1, f2, vectors(c)) + unscaled.mu2 * phi_ddot_of(c, f1, f2, vectors(c));
       }
     }
     const auto keep = [&](int slot, std::size_t body, const Plane& s_bar) {

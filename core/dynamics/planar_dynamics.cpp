@@ -9,8 +9,8 @@ namespace {
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 bool any_force(const MechanismData& d) {
-  return !(d.tsda.empty() && d.rsda.empty() && d.applied.empty() && d.bushings.empty() &&
-           d.turning_frictions.empty() && d.sliding_frictions.empty());
+  return !(d.tsda.empty() && d.rsda.empty() && d.applied.empty() && d.bushings.empty() && d.turning_frictions.empty() &&
+           d.sliding_frictions.empty());
 }
 
 // The blocks of forces alone.
@@ -178,8 +178,7 @@ void PlanarDynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir,
     f.r = bodies_in_y_.vector(frames_[at(i)].r, y_dir, q);
     f.rdot = bodies_in_y_.vector(frames_[at(i)].rdot, y_dir, v);
     f.rddot = frames_[at(i)].rddot;
-    f.set_turn(bodies_in_y_.turn(at(i), b.P, y_dir, q + 3), bodies_in_y_.turn(at(i), b.Pdot, y_dir, v + 3),
-               b.omegadot);
+    f.set_turn(bodies_in_y_.turn(at(i), b.P, y_dir, q + 3), bodies_in_y_.turn(at(i), b.Pdot, y_dir, v + 3), b.omegadot);
   }
   if (settings_.omega != 0) {
     for (Lanes<3>& load : other_load_dirs_) load.setZero();
@@ -273,8 +272,7 @@ void PlanarDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::Vec
     bodies_in_y_.add_turn(k, P_bar, q + 3, y_bar);
     bodies_in_y_.add_turn(k, Pdot_bar, v + 3, y_bar);
     if (body.slot_mass >= 0) {
-      theta_bar(body.slot_mass) +=
-          eta(0) * (model_.gravity.re - z(0)) + eta(1) * (model_.gravity.im - z(1));
+      theta_bar(body.slot_mass) += eta(0) * (model_.gravity.re - z(0)) + eta(1) * (model_.gravity.im - z(1));
     }
     if (data_.slot_gravity >= 0) {
       theta_bar.segment<3>(data_.slot_gravity) += body.mass * model_.in_space({eta(0), eta(1)});

@@ -34,6 +34,7 @@ class PlanarDynamics {
   const Eigen::VectorXd& lambda() const { return lambda_; }
   double residual_ratio() const { return solver_.residual_ratio(); }
   long factorisations() const { return solver_.factorisations(); }
+  long factor_blocks() const { return solver_.factor_blocks(); }
 
  private:
   struct Body {

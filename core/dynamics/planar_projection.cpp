@@ -271,8 +271,7 @@ void PlanarProjector::tangent(const ParameterBlock& block, const LaneRows& y_hat
     const std::size_t k = at(i);
     const Body& b = bodies_[k];
     const Eigen::Index q = 7 * (i - 1);
-    const PlaneDual r = bodies_in_y_.vector(b.r_hat, y_hat_dir, q),
-                    P = bodies_in_y_.turn(k, b.P_hat, y_hat_dir, q + 3);
+    const PlaneDual r = bodies_in_y_.vector(b.r_hat, y_hat_dir, q), P = bodies_in_y_.turn(k, b.P_hat, y_hat_dir, q + 3);
     Lanes<3>& dir = q_dir_[k - 1];
     dir.row(0) = r.re.d.matrix(), dir.row(1) = r.im.d.matrix();
     dir.row(2) = ((2 / squared_norm(b.P_hat)) * (b.P_hat.re * P.im.d - b.P_hat.im * P.re.d)).matrix();

@@ -72,7 +72,7 @@ class Projector {
   Projection what_;
   std::unique_ptr<PlanarProjector> planar_;  // where it is there, it does all the work
   SaddleSolver solver_;                      // factor of S(q~)
-  ConstraintRows rows_;  // J at the projected q
+  ConstraintRows rows_;                      // J at the projected q
   RowLaws laws_;
   Eigen::VectorXd angles_;
   const ProjectionSolution* solution_ = nullptr;

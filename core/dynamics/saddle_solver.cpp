@@ -9,6 +9,21 @@ namespace {
 // A pass that gains less ends the refinement: rounding is reached, or the position is singular.
 constexpr double kStagnation = 0.97;
 
+// y = x - alpha z, row by row, and z *= 1 - c alpha.
+void subtract_scaled(const Eigen::VectorXd& x, const Eigen::VectorXd& alpha, const Eigen::VectorXd& z,
+                     Eigen::VectorXd& y) {
+  y = x - alpha.cwiseProduct(z);
+}
+void subtract_scaled(const LaneRows& x, const Eigen::VectorXd& alpha, const LaneRows& z, LaneRows& y) {
+  for (Eigen::Index r = 0; r < x.rows(); ++r) y.row(r) = x.row(r) - alpha(r) * z.row(r);
+}
+void reduce(double c, const Eigen::VectorXd& alpha, Eigen::VectorXd& z) {
+  z -= c * alpha.cwiseProduct(z);
+}
+void reduce(double c, const Eigen::VectorXd& alpha, LaneRows& z) {
+  for (Eigen::Index r = 0; r < z.rows(); ++r) z.row(r) *= 1 - c * alpha(r);
+}
+
 // A residual above it, relative as in Settings, is more than rounding.
 constexpr double kDisagreement = 1e-14;
 
@@ -38,8 +53,8 @@ bool BlockSaddleSolver<Rows>::factor(const Frames& frames) {
 
 template <class Rows>
 template <class X, class Y>
-void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, const Settings& settings, std::vector<X>& x, Y& nu,
-                             Y& residual, Y& step, std::vector<X>& correction) {
+void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, const Settings& settings,
+                                        std::vector<X>& x, Y& nu, Y& residual, Y& step, std::vector<X>& correction) {
   const std::size_t n = b.size();
   for (X& xi : x) xi.setZero();
   nu.setZero();
@@ -48,7 +63,7 @@ void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, con
   double before = INFINITY;
   for (int k = 0;; ++k) {
     // correction = b - M x - J'nu + J' alpha residual
-    for (Eigen::Index r = 0; r < g.rows(); ++r) step.row(r) = nu.row(r) - alpha_(r) * residual.row(r);
+    subtract_scaled(nu, alpha_, residual, step);
     for (std::size_t i = 0; i < n; ++i) {
       correction[i] = b[i];
       if (k > 0) correction[i] -= mass_times(static_cast<int>(i) + 1, x[i]);
@@ -63,10 +78,8 @@ void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, con
     step.setZero();
     rows_.add_times(correction, step);
     residual -= step;
-    for (Eigen::Index r = 0; r < g.rows(); ++r) {
-      nu.row(r) -= alpha_(r) * residual.row(r);
-      residual.row(r) *= 1 - c_ * alpha_(r);
-    }
+    subtract_scaled(nu, alpha_, residual, nu);
+    if (c_ > 0) reduce(c_, alpha_, residual);
     const double now = residual.cwiseAbs().maxCoeff();
     residual_ratio_ = size > 0 ? now / size : 0.0;
     if (k >= settings.most) break;

@@ -60,6 +60,7 @@ class BlockSaddleSolver {
   // |s| after the last solve, relative as above.
   double residual_ratio() const { return residual_ratio_; }
   long factorisations() const { return factorisations_; }
+  long factor_blocks() const { return static_cast<long>(S_.blocks()); }
 
   // M x for body i (1-based).
   template <class X>

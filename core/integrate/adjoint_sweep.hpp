@@ -45,9 +45,9 @@ class AdjointSweep {
   const Eigen::MatrixXd& lambda() const { return lambda_; }
   Eigen::MatrixXd mu() const;
 
+  long linearised_states() const { return dynamics_.linearised_states(); }
   long factorisations() {
-    return dynamics_.factorisations() + projector_.factorisations() +
-           (implicit_ ? implicit_->factorisations() : 0);
+    return dynamics_.factorisations() + projector_.factorisations() + (implicit_ ? implicit_->factorisations() : 0);
   }
 
  private:

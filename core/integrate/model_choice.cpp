@@ -11,6 +11,17 @@ std::string why_not_planar(const Mechanism& mechanism, const SimulationSettings&
   return "";
 }
 
+void add_model(const Mechanism& mechanism, const SimulationSettings& settings, ModelSummary& summary) {
+  const Method* method = runge_kutta_method(settings.integrator.type);
+  if (method && model_of(mechanism, settings, *method) == Model::planar) {
+    summary.unknowns_per_body = 3;
+    return;
+  }
+  summary.not_planar = settings.model == ModelChoice::spatial ? "simulation.model is \"spatial\""
+                                                              : why_not_planar(mechanism, settings, method);
+  if (summary.not_planar.empty()) summary.not_planar = "the penalty form is planar only where simulation.model says so";
+}
+
 Model model_of(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method) {
   if (settings.model == ModelChoice::spatial) return Model::spatial;
   const std::string reason = why_not_planar(mechanism, settings, &method);

@@ -14,4 +14,7 @@ Model model_of(const Mechanism& mechanism, const SimulationSettings& settings, c
 // Why a run with these settings is not planar; empty where it is. method: null for CVODES.
 std::string why_not_planar(const Mechanism& mechanism, const SimulationSettings& settings, const Method* method);
 
+// Adds to a summary what the settings make of the mechanism.
+void add_model(const Mechanism& mechanism, const SimulationSettings& settings, ModelSummary& summary);
+
 }  // namespace mbsopt

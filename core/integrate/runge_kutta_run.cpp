@@ -331,10 +331,12 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   result.statistics.max_acceleration_residual = dynamics_.worst_residual();
   if (implicit_) {
     evaluations_ += implicit_->evaluations();
+    result.statistics.linearised_states += dynamics_.linearised_states();
     result.statistics.jacobians += implicit_->jacobians();
     result.statistics.factorisations += implicit_->factorisations();
   }
   result.statistics.rhs_evaluations += evaluations_;
+  result.statistics.factor_blocks = dynamics_.factor_blocks();
   result.statistics.factorisations += dynamics_.factorisations() + projector_.factorisations();
 }
 

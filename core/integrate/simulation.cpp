@@ -202,6 +202,7 @@ SimulationResult simulate_tlm(const Mechanism& mechanism, const SimulationSettin
     return sweep.follow(step, costs, events, sampling, result.psi_rho);
   });
   if (result.ok()) sweep.finish(settings.end_time, result.y_end, run.angles_end(), costs, result.psi_rho);
+  result.statistics.linearised_states += sweep.linearised_states();
   result.statistics.factorisations += sweep.factorisations();
   return run.finish();
 }
@@ -240,6 +241,7 @@ SimulationResult simulate_adjoint(const Mechanism& mechanism, const SimulationSe
   Eigen::MatrixXd mu = sweep.mu();
   run.assembly().add_adjoint(sweep.lambda(), mu);
   result.psi_rho = mu.transpose();
+  result.statistics.linearised_states += sweep.linearised_states();
   result.statistics.factorisations += sweep.factorisations();
   return run.finish();
 }

@@ -30,6 +30,9 @@ struct StepSequence {
 struct SimulationStatistics {
   // rhs_evaluations: of the equations of motion, each stage of a Newton iteration included; jacobians: of these.
   long steps = 0, rejected = 0, rhs_evaluations = 0, factorisations = 0, jacobians = 0;
+  // Of the factor of the explicit equations of motion: its blocks (6 x 6, or 3 x 3 in the plane), diagonal ones
+  // included; and at how many states derivatives of these equations were evaluated.
+  long factor_blocks = 0, linearised_states = 0;
   double wall_seconds = 0;
   double max_position_violation = 0;                              // of |Phi| over accepted steps [m, -]
   double max_velocity_violation = 0;                              // of |Phi_q v + Phi_t|

@@ -28,9 +28,9 @@ class TangentSweep {
   void finish(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, std::span<const Cost> costs,
               Eigen::MatrixXd& psi_rho);
 
+  long linearised_states() const { return dynamics_.linearised_states(); }
   long factorisations() {
-    return dynamics_.factorisations() + projector_.factorisations() +
-           (implicit_ ? implicit_->factorisations() : 0);
+    return dynamics_.factorisations() + projector_.factorisations() + (implicit_ ? implicit_->factorisations() : 0);
   }
 
  private:

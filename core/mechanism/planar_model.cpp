@@ -127,8 +127,8 @@ class Search {
             if (out1 != 0 || out2 != 0 || has_levels_) return name(c) + " joins points at different heights";
             return keep(Kind::distance);
           } else if constexpr (std::is_same_v<P, Angle>) {
-            for (const auto& [body, s, slot] :
-                 {std::tuple(c.body1, p.s1, c.slot1), std::tuple(c.body2, p.s2, c.slot2), std::tuple(c.body1, p.s3, c.slot3)}) {
+            for (const auto& [body, s, slot] : {std::tuple(c.body1, p.s1, c.slot1), std::tuple(c.body2, p.s2, c.slot2),
+                                                std::tuple(c.body1, p.s3, c.slot3)}) {
               if (lies(body, s, slot) != Lies::in_plane) return tilted;
             }
             out.sign = cross(b1.in_plane(p.s1), b1.in_plane(p.s3)) > 0 ? 1 : -1;
@@ -147,7 +147,8 @@ class Search {
       if (!point) continue;
       if (model_.bodies[at(c.body1)].n.dot(point->s1) != model_.bodies[at(c.body2)].n.dot(point->s2)) return true;
       for (const auto& [body, slot] : {std::pair(c.body1, c.slot1), std::pair(c.body2, c.slot2)}) {
-        if (slot >= 0 && !(model_.bodies[at(body)].n.transpose() * data_.theta_rho.middleRows<3>(slot)).isZero(0)) return true;
+        if (slot >= 0 && !(model_.bodies[at(body)].n.transpose() * data_.theta_rho.middleRows<3>(slot)).isZero(0))
+          return true;
       }
     }
     return false;

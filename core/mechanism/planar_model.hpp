@@ -23,7 +23,7 @@ struct MechanismData;
 struct Scene;
 
 struct PlanarBody {
-  double mass = 0, inertia = 0;                            // [kg], about n through the centre of mass [kg m^2]
+  double mass = 0, inertia = 0;  // [kg], about n through the centre of mass [kg m^2]
   Vector3d b1 = Vector3d::UnitX(), b2 = Vector3d::UnitY(), n = Vector3d::UnitZ();  // t1, t2, n in body axes at p_a
   Vector4d p_a{1, 0, 0, 0}, p_b{0, 0, 0, 1};
 
@@ -46,7 +46,7 @@ struct PlanarConstraint {
 };
 
 struct PlanarModel {
-  int t1 = 0, t2 = 1, n = 2;  // coordinate axes
+  int t1 = 0, t2 = 1, n = 2;       // coordinate axes
   std::vector<PlanarBody> bodies;  // the ground first
   std::vector<PlanarConstraint> constraints;
   Plane gravity;

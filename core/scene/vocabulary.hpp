@@ -83,9 +83,8 @@ inline constexpr Choice<FormulationType> kFormulations[] = {
     {"augmented_lagrangian", FormulationType::augmented_lagrangian}, {"penalty", FormulationType::penalty}};
 inline constexpr Choice<LinearSolver> kLinearSolvers[] = {{"cholesky", LinearSolver::cholesky},
                                                           {"quasidefinite", LinearSolver::quasidefinite}};
-inline constexpr Choice<ModelChoice> kModels[] = {{"auto", ModelChoice::automatic},
-                                                  {"planar", ModelChoice::planar},
-                                                  {"spatial", ModelChoice::spatial}};
+inline constexpr Choice<ModelChoice> kModels[] = {
+    {"auto", ModelChoice::automatic}, {"planar", ModelChoice::planar}, {"spatial", ModelChoice::spatial}};
 inline constexpr Choice<Projection> kProjections[] = {{"none", Projection::none},
                                                       {"velocity", Projection::velocity},
                                                       {"position_velocity", Projection::position_velocity}};

@@ -25,9 +25,25 @@ inline Scene planar_machine(int normal = 2, bool out_of_plane = true) {
   };
   const VectorField n = v("0", "0", "1"), down = v("0", "0", "-1");
   Scene s;
-  add_parameters(s, {{"L1", 0.4},  {"L2", 1.1}, {"c1", 0.2},  {"c2", 0.5},   {"a1", 0.7},   {"h", 0.05},  {"m2", 1.4},
-                     {"J2", 0.3},  {"g", 9.0},  {"k", 30.0},  {"px", -0.6},  {"rest", 0.5}, {"ratio", -1.6},
-                     {"rod", 0.8}, {"q", 0.6},  {"spin", 2.5}, {"tilt", 0.1}, {"mu", 0.3},  {"edge", 0.2}});
+  add_parameters(s, {{"L1", 0.4},
+                     {"L2", 1.1},
+                     {"c1", 0.2},
+                     {"c2", 0.5},
+                     {"a1", 0.7},
+                     {"h", 0.05},
+                     {"m2", 1.4},
+                     {"J2", 0.3},
+                     {"g", 9.0},
+                     {"k", 30.0},
+                     {"px", -0.6},
+                     {"rest", 0.5},
+                     {"ratio", -1.6},
+                     {"rod", 0.8},
+                     {"q", 0.6},
+                     {"spin", 2.5},
+                     {"tilt", 0.1},
+                     {"mu", 0.3},
+                     {"edge", 0.2}});
   s.gravity = v("1", "-g", out_of_plane ? "0.4" : "0");
   const auto turned_by = [&](const std::string& angle) { return AxisAngleField{n, f(angle)}; };
   s.bodies.push_back(body("crank", v("c1", "0.03"), v("0", "0"), turned_by("a1")));
@@ -96,7 +112,8 @@ inline Scene planar_machine(int normal = 2, bool out_of_plane = true) {
   s.forces.push_back({"brake", brake});
   PointForce push;
   push.body = "plate", push.point = v("0.1", "edge");
-  push.components[at((normal + 1) % 3)] = f("2*sin(spin*t)"), push.components[at((normal + 2) % 3)] = f("-k*0.01*reach");
+  push.components[at((normal + 1) % 3)] = f("2*sin(spin*t)"),
+                                    push.components[at((normal + 2) % 3)] = f("-k*0.01*reach");
   push.components[at(normal)] = f(out_of_plane ? "1" : "0");
   s.forces.push_back({"push", push});
   s.sensors.push_back(point_sensor("reach", "position", "coupler", v("L2", "0"), "x"));

@@ -65,7 +65,8 @@ double apart(const MatrixXd& x, const MatrixXd& y) { return size_of(x - y) / std
 
 TEST_CASE("planar accelerations, their tangent and their adjoint are the spatial ones", "[planar]") {
   const std::string form = GENERATE(as<std::string>{}, "augmented_lagrangian", "stabilised", "penalty");
-  const Scene scene = planar_machine(GENERATE(2, 0, 1), form != "penalty");  // which gives way to loads across the plane
+  const Scene scene =
+      planar_machine(GENERATE(2, 0, 1), form != "penalty");  // which gives way to loads across the plane
   const FormulationSettings settings = formulation(form);
   const Mechanism mechanism(scene, nominal(scene));
   const MechanismData& d = mechanism.data();
@@ -92,7 +93,8 @@ TEST_CASE("planar accelerations, their tangent and their adjoint are the spatial
   // The transpose, on directions in the plane.
   std::srand(5);
   const VectorXd w = plane * VectorXd::Random(plane.cols());
-  VectorXd y_bar = VectorXd::Zero(y.size()), theta_bar = VectorXd::Zero(d.slots()), rho_bar = VectorXd::Zero(d.rho.size());
+  VectorXd y_bar = VectorXd::Zero(y.size()), theta_bar = VectorXd::Zero(d.slots()),
+           rho_bar = VectorXd::Zero(d.rho.size());
   planar.add_adjoint(w, y_bar, theta_bar, rho_bar);
   VectorXd total = rho_bar;
   d.add_to_rho(theta_bar, total);
@@ -132,7 +134,8 @@ TEST_CASE("the planar projection, its tangent and its adjoint are the spatial on
   std::srand(8);
   const MatrixXd plane = plane_of(d);
   const VectorXd w = plane * VectorXd::Random(plane.cols());
-  VectorXd y_bar = VectorXd::Zero(y.size()), theta_bar = VectorXd::Zero(d.slots()), total = VectorXd::Zero(d.rho.size());
+  VectorXd y_bar = VectorXd::Zero(y.size()), theta_bar = VectorXd::Zero(d.slots()),
+           total = VectorXd::Zero(d.rho.size());
   planar.add_adjoint(w, y_bar, theta_bar, total);
   d.add_to_rho(theta_bar, total);
   for (const ParameterBlock& block : parameter_blocks(d)) {
@@ -166,7 +169,9 @@ TEST_CASE("a planar run takes the spatial run's steps to the same motion and gra
     REQUIRE(result.ok());
     return result;
   };
-  const auto tlm = [&](const SimulationSettings& s, const std::vector<Cost>& c) { return simulate_tlm(mechanism, s, c); };
+  const auto tlm = [&](const SimulationSettings& s, const std::vector<Cost>& c) {
+    return simulate_tlm(mechanism, s, c);
+  };
   const auto adjoint = [&](const SimulationSettings& s, const std::vector<Cost>& c) {
     return simulate_adjoint(mechanism, s, c);
   };
@@ -225,7 +230,8 @@ TEST_CASE("a planar model that is asked for and is none is refused with the reas
   Scene scene = spatial_four_bar();
   scene.simulation.model = ModelChoice::planar;
   const Mechanism mechanism(scene, nominal(scene));
-  CHECK_THROWS_WITH(simulate(mechanism, scene.simulation), Catch::Contains("simulation.model") && Catch::Contains("neither"));
+  CHECK_THROWS_WITH(simulate(mechanism, scene.simulation),
+                    Catch::Contains("simulation.model") && Catch::Contains("neither"));
   Scene implicit = four_bar();
   implicit.simulation.model = ModelChoice::planar, implicit.simulation.integrator.type = "radau5";
   CHECK_THROWS_WITH(simulate(Mechanism(implicit, nominal(implicit)), implicit.simulation), Catch::Contains("explicit"));
