@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "core/scene/scene.hpp"
+
 namespace mbsopt::bench {
 namespace {
 

@@ -9,7 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "core/scene/scene.hpp"
+namespace mbsopt {
+struct Scene;
+}
 
 namespace mbsopt::bench {
 

@@ -3,6 +3,7 @@
 
 #include "bench/models.hpp"
 #include "core/dynamics/dynamics.hpp"
+#include "core/scene/scene.hpp"
 
 namespace mbsopt::bench {
 
