@@ -1,11 +1,11 @@
 // What a right-hand side costs per body, as the mechanism grows.
-//   us             one evaluation of the equations of motion, median [microseconds]
-//   us_per_body    the same per body
-//   run_us_per_body  per right-hand side and body of a whole run with the default method at steps of 1 ms: stages,
-//   error
-//                  norms and projections included
-//   start_ms       compiling the scene and assembly, before a run
-//   ratio          of the time per body at 10 000 bodies to that at 100, measured in turn
+//   us                one evaluation of the equations of motion, median [microseconds]
+//   us_per_body       the same per body
+//   run_us_per_body   per right-hand side and body of a run with the default method at steps of 1 ms: stages, error
+//   norms
+//                     and projections included
+//   start_ms          compiling the scene and assembly, before a run
+//   ratio             of the time per body at 10 000 bodies to that at 100, measured in turn
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
