@@ -2,8 +2,16 @@
 //   time_ratio   wall time within the budget / wall time with everything kept
 //   recomputed   steps computed again / steps
 //   kept_mib     the most that was kept
+// And of N-four-bars over 10 s, within 4 MiB:
+//   grown_mib    by how much the process was largest during the run, beyond its size before (Linux)
 #include <benchmark/benchmark.h>
 
+#include <malloc.h>
+
+#include <fstream>
+#include <string>
+
+#include "bench/linkage.hpp"
 #include "core/integrate/simulation.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/mechanism/state_point.hpp"
@@ -63,6 +71,50 @@ void adjoint_memory(benchmark::State& state, double mib) {
     state.counters["kept_mib"] = static_cast<double>(last.adjoint_memory_bytes) / (1024.0 * 1024.0);
   }
 }
+
+// "VmRSS" or "VmHWM" of this process [MiB]; 0 where the system does not tell.
+double process_mib(const std::string& key) {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind(key + ":", 0) == 0) return std::stod(line.substr(key.size() + 1)) / 1024;
+  }
+  return 0;
+}
+
+void memory_of_four_bars(benchmark::State& state) {
+  const bench::Linkage linkage = bench::four_bars(static_cast<int>(state.range(0)));
+  Scene scene = bench::scene_of(linkage);
+  Parameter mass;
+  mass.name = "mass", mass.value = 1;
+  scene.parameters.push_back(mass);
+  scene.bodies[0].mass = Expression::parse("mass");
+  scene.simulation.end_time = 10;
+  scene.simulation.adjoint_memory_mib = 4;
+  const Mechanism mechanism(scene, Eigen::VectorXd::Constant(1, 1));
+  std::vector<Cost> costs(1);
+  costs[0].running = costs[0].terminal = std::make_shared<StateNorm>();
+  for (auto _ : state) {
+    simulate(mechanism, scene.simulation, costs);  // what a run takes without its adjoint is there before
+    malloc_trim(0);                                // what is free goes back to the system
+    std::ofstream("/proc/self/clear_refs") << 5;   // the largest size so far: that of now
+    const double before = process_mib("VmRSS");
+    const SimulationStatistics statistics = simulate_adjoint(mechanism, scene.simulation, costs).statistics;
+    const double mib = 1024.0 * 1024.0;
+    state.counters["bodies"] = linkage.size();
+    state.counters["budget_mib"] = scene.simulation.adjoint_memory_mib;
+    state.counters["kept_mib"] = static_cast<double>(statistics.adjoint_memory_bytes) / mib;
+    state.counters["grown_mib"] = process_mib("VmHWM") - before;
+    state.counters["recomputed"] =
+        static_cast<double>(statistics.recomputed_steps) / static_cast<double>(statistics.steps);
+  }
+}
+BENCHMARK(memory_of_four_bars)
+    ->Name("adjoint_memory/four_bars")
+    ->Arg(2)
+    ->Arg(10)
+    ->Arg(40)
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

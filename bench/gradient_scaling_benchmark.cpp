@@ -1,17 +1,23 @@
-// Cost of gradients in simulations as the mechanism grows: chains of 1, 5, 20 and 100 rods in space with 20 parameters
-// (masses and lengths, spread over the rods), by an explicit and by implicit methods.
-//   adjoint_ratio, tlm_per_parameter: as in gradient_cost_benchmark.cpp
+// Cost of gradients in simulations as the mechanism grows, with 50 parameters, by an explicit and by implicit methods:
+// chains of rods in space (masses and lengths, spread over the rods) and N-four-bars (masses, centres of mass,
+// inertias) in gravity turned upwards, so that they swing about the upright and never come to their singular position.
+//   adjoint_ratio          adjoint / simulation, both with compilation and assembly
+//   tlm_per_parameter      (TLM / simulation - 1)/(parameters - 1)
+//   start_share            of one simulation, what its compilation and assembly take
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
+#include "bench/linkage.hpp"
+#include "core/dynamics/assembly.hpp"
 #include "optim/gradient_timing.hpp"
 #include "optim/objective.hpp"
+#include "optim/stopwatch.hpp"
 
 using namespace mbsopt;
 
 namespace {
 
-constexpr int kParameters = 20;
+constexpr int kParameters = 50;
 
 // "0.3" for a rod without parameters, else the mean of its own.
 Expression mean_of(char name, int rod, int rods, double otherwise) {
@@ -50,44 +56,75 @@ Scene chain(int rods) {
   height.name = "height", height.quantity = "position", height.component = "z";
   height.body = fmt::format("rod{}", rods - 1);
   scene.sensors.push_back(height);
-  scene.simulation.end_time = rods < 100 ? 0.3 : 1.5;  // the start of many rods costs more than some steps
+  scene.simulation.end_time = rods < 50 ? 1 : 3;  // the start of many rods costs more than some steps
   scene.simulation.integrator.rtol = 1e-6, scene.simulation.integrator.atol = 1e-8;
   return scene;
 }
 
-void gradient_scaling(benchmark::State& state, const char* method) {
-  const int rods = static_cast<int>(state.range(0));
-  Scene scene = chain(rods);
+// Every parameter is a field of one body: of each the first, then of each the second, ...
+Scene windows(int count) {
+  const bench::Linkage linkage = bench::four_bars(count);
+  Scene scene = bench::scene_of(linkage);
+  const int bodies = linkage.size();
+  for (int k = 0; k < kParameters; ++k) {
+    Body& body = scene.bodies[static_cast<std::size_t>(bodies < kParameters ? k % bodies : k * bodies / kParameters)];
+    InertiaField& J = body.inertia;
+    Expression* const fields[] = {&body.mass, &body.com[0], &body.com[1], &J.zz, &J.xx,
+                                  &J.yy,      &body.com[2], &J.xy,        &J.xz, &J.yz};
+    Expression& field = *fields[bodies < kParameters ? k / bodies : k % 4];
+    Parameter p;
+    p.name = fmt::format("p{}", k);
+    p.value = field.number();
+    field = Expression::parse(p.name);
+    scene.parameters.push_back(p);
+  }
+  Sensor height;
+  height.name = "height", height.quantity = "position", height.component = "y", height.body = "rod0";
+  scene.sensors.push_back(height);
+  scene.gravity = {0.0, 9.81, 0.0};
+  scene.simulation.end_time = 5;
+  scene.simulation.integrator.rtol = 1e-6, scene.simulation.integrator.atol = 1e-8;
+  return scene;
+}
+
+void gradient_scaling(benchmark::State& state, const char* method, Scene (*make)(int)) {
+  Scene scene = make(static_cast<int>(state.range(0)));
+  const auto bodies = static_cast<double>(scene.bodies.size());
   scene.simulation.integrator.type = method;
   ObjectiveSpec spec;
   spec.name = "sag", spec.running = Expression::parse("height^2");
   const std::vector<Objective> objectives{Objective(scene, spec)};
   for (auto _ : state) {
-    const GradientTiming timing = time_gradients(scene, objectives);
+    GradientTimingOptions options;
+    options.most_seconds = 6;
+    const GradientTiming timing = time_gradients(scene, objectives, options);
     if (!timing.ok) {
       state.SkipWithError(timing.message.c_str());
       return;
     }
+    Eigen::VectorXd rho(kParameters);
+    for (int k = 0; k < kParameters; ++k) rho(k) = scene.parameters[static_cast<std::size_t>(k)].value;
+    const Stopwatch clock;
+    Assembly(Mechanism(scene, rho), 0);
+    state.counters["start_share"] = clock.seconds() / timing.simulation.wall_seconds;
+    state.counters["bodies"] = bodies;
     state.counters["steps"] = static_cast<double>(timing.steps);
-    state.counters["rhs_us_per_body"] =
-        1e6 * timing.simulation.wall_seconds / static_cast<double>(timing.rhs_evaluations) / rods;
+    state.counters["rounds"] = timing.rounds;
     state.counters["adjoint_ratio"] = timing.adjoint.ratio;
-    state.counters["tlm_per_parameter"] = (timing.tlm.ratio - 1) / kParameters;
+    state.counters["tlm_per_parameter"] = (timing.tlm.ratio - 1) / (kParameters - 1);
   }
 }
 
 }  // namespace
 
-#define MBSOPT_GRADIENT_SCALING(method)                \
-  BENCHMARK_CAPTURE(gradient_scaling, method, #method) \
-      ->Arg(1)                                         \
-      ->Arg(5)                                         \
-      ->Arg(20)                                        \
-      ->Arg(100)                                       \
-      ->Iterations(1)                                  \
+#define MBSOPT_GRADIENT_SCALING(mechanism, method, ...)                         \
+  BENCHMARK_CAPTURE(gradient_scaling, mechanism##_##method, #method, mechanism) \
+      ->ArgsProduct({{__VA_ARGS__}})                                            \
+      ->Iterations(1)                                                           \
       ->Unit(benchmark::kMillisecond)
 
-MBSOPT_GRADIENT_SCALING(dopri5);
-MBSOPT_GRADIENT_SCALING(dopri853);
-MBSOPT_GRADIENT_SCALING(radau5);
-MBSOPT_GRADIENT_SCALING(sdirk4);
+MBSOPT_GRADIENT_SCALING(chain, dopri5, 5, 21, 81, 500);
+MBSOPT_GRADIENT_SCALING(windows, dopri5, 2, 10, 40, 250);
+MBSOPT_GRADIENT_SCALING(chain, dopri853, 5, 21, 81);
+MBSOPT_GRADIENT_SCALING(chain, radau5, 5, 21, 81);
+MBSOPT_GRADIENT_SCALING(chain, sdirk4, 5, 21, 81);

@@ -1,0 +1,305 @@
+#!/usr/bin/env python3
+"""Keeps what the benchmarks measured in data/performance/ and writes docs/performance.md whole.
+
+    docs/performance.py keep RUNS     from RUNS/*.json (Google Benchmark's --benchmark_out) to data/performance/*.csv
+    docs/performance.py write         from data/performance/ to docs/performance.md
+
+./dev bench does both after measuring. Needs nothing but Python 3.
+"""
+
+import csv
+import json
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+DATA, PAGE = ROOT / "data/performance", ROOT / "docs/performance.md"
+# What Google Benchmark writes of every benchmark; the rest are counters.
+OF_GOOGLE = {"name", "family_index", "per_family_instance_index", "run_name", "run_type", "repetitions",
+             "repetition_index", "threads", "iterations", "real_time", "cpu_time", "time_unit", "label",
+             "error_occurred", "error_message"}
+
+
+def rows_of(name):
+    path = DATA / f"{name}.csv"
+    if not path.exists():
+        return []
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def write_rows(name, rows):
+    header = list(dict.fromkeys(key for row in rows for key in row))
+    with open(DATA / f"{name}.csv", "w", newline="") as file:
+        writer = csv.DictWriter(file, header, lineterminator="\n", restval="")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+# ---- keep
+
+
+def kept(entry):
+    row = {"name": re.sub(r"/iterations:\d+$", "", entry["name"])}
+    if entry["name"].startswith("primitive/"):
+        row["ns"] = f"{entry['cpu_time']:.3g}"
+    row |= {key: f"{value:.6g}" for key, value in entry.items() if key not in OF_GOOGLE}
+    row["label"] = entry.get("label", "") or entry.get("error_message", "")
+    return row
+
+
+def keep(runs):
+    DATA.mkdir(parents=True, exist_ok=True)
+    about = {row["file"]: row for row in rows_of("runs")}
+    for path in sorted(runs.glob("*.json")):
+        measured = json.loads(path.read_text())
+        tables = {}
+        for entry in measured["benchmarks"]:
+            tables.setdefault(entry["name"].split("/")[0], []).append(kept(entry))
+        machine = json.loads((runs / "machine.txt").read_text())
+        for table, rows in tables.items():
+            write_rows(table, rows)
+            load = measured["context"].get("load_avg", [0])[0]
+            about[table] = {"file": table, "program": path.stem, "command": command_of(path.stem, table),
+                            "cpu": machine["cpu"], "cores": machine["cores"], "compiler": machine["compiler"],
+                            "flags": machine["flags"], "load": f"{load:.1f}", "date": measured["context"]["date"][:10]}
+    write_rows("runs", [about[table] for table in sorted(about)])
+
+
+def command_of(program, table):
+    peers = " --peers" if program == "mbsopt_peers" else ""
+    return f"./dev bench{peers} --benchmark_filter='^{table}/'"
+
+
+# ---- the page
+
+
+def number(text):
+    return float(text) if text not in ("", None) else None
+
+
+def figure(value, digits=3):
+    if value is None:
+        return "-"
+    if value != 0 and (abs(value) >= 1e5 or abs(value) < 1e-3):
+        return f"{value:.1e}"
+    if abs(value) >= 10 ** (digits - 1):
+        return f"{value:.0f}"
+    return f"{value:.{digits}g}"
+
+
+def of(table, name, column):
+    for row in rows_of(table):
+        if row["name"] == name:
+            return number(row.get(column))
+    return None
+
+
+def table_of(header, rows):
+    lines = ["| " + " | ".join(header) + " |", "| " + " | ".join("---" for _ in header) + " |"]
+    return lines + ["| " + " | ".join(row) + " |" for row in rows] + [""]
+
+
+def command(table):
+    return ["    " + next((r["command"] for r in rows_of("runs") if r["file"] == table), f"(not measured: {table})"), ""]
+
+
+def models():
+    found = {row["name"].split("/")[-1] for row in rows_of("right_hand_side") if row["name"].count("/") == 3}
+    return [m for m in ("spatial", "planar") if m in found]
+
+
+def largest(table, pattern, column):
+    values = [number(r[column]) for r in rows_of(table) if re.search(pattern, r["name"]) and number(r.get(column)) is not None]
+    return max(values) if values else None
+
+
+def targets():
+    """What issue, aim and measured figure are: (what, aim as text, aim, measured, unit)."""
+    sizes = r"^right_hand_side/(planar_chain|spatial_chain|four_bars)/(10|40|50|200|333|1000)/"
+    mega = lambda table, name, column: of(table, name, column)
+    rows = [("right-hand side per body, spatial, chains and N-four-bars of 10 to 1000: the slowest", "0.7 us", 0.7,
+             largest("right_hand_side", sizes + "spatial", "us_per_body"), "us"),
+            ("the same, planar", "0.25 us", 0.25, largest("right_hand_side", sizes + "planar", "us_per_body"), "us")]
+    for kind in ("planar_chain", "spatial_chain", "four_bars"):
+        for model in models():
+            rows.append((f"per body at 10 000 bodies over that at 100, {kind}, {model}", "1.3", 1.3,
+                         mega("right_hand_side_growth", f"right_hand_side_growth/{kind}/{model}", "ratio"), ""))
+    best = models()[-1] if models() else "spatial"
+    for windows, aim in ((10, 40), (40, 160)):
+        ms = mega("time_to_error", f"time_to_error/four_bars/{windows}/{best}", "ms")
+        rows.append((f"A02, N = {windows}, 10 s to 1e-5 m, default model ({best})", f"{aim} ms", aim, ms, "ms"))
+        spatial = mega("time_to_error", f"time_to_error/four_bars/{windows}/spatial", "ms")
+        rows.append((f"the same forced spatial, over the default", "4", 4, spatial / ms if ms and spatial and best != "spatial" else None, ""))
+        name = f"peers_time_to_error/four_bars/{windows}"
+        theirs, ours = of("peers_time_to_error", name, "mujoco_ms"), of("peers_time_to_error", name, "mbsopt_ms_for_mujoco")
+        rows.append((f"A02, N = {windows}: MuJoCo's time over mbsopt's, at no larger error", "at least 10", -10,
+                     theirs / ours if theirs and ours else None, ""))
+    rows.append(("Bricard, 10 s to 1e-6 m", "30 ms", 30, mega("time_to_error", "time_to_error/bricard", "ms"), "ms"))
+    for row in rows_of("gradient_scaling"):
+        bodies, kind = row.get("bodies", ""), row["name"].split("/")[1].split("_")[0]
+        if row["name"].split("/")[1].endswith("_dopri5") and bodies:
+            rows.append((f"adjoint of 50 parameters over one simulation, {kind} of {bodies} bodies", "3.0", 3.0, number(row["adjoint_ratio"]), ""))
+            rows.append((f"TLM per further parameter, {kind} of {bodies} bodies", "0.35", 0.35, number(row["tlm_per_parameter"]), ""))
+    for row in rows_of("adjoint_memory"):
+        if row["name"].startswith("adjoint_memory/four_bars"):
+            budget = number(row["budget_mib"])
+            rows.append((f"kept by an adjoint within {budget:g} MiB, N-four-bar of {row['bodies']} bodies", f"{budget:g} MiB", budget, number(row["kept_mib"]), "MiB"))
+    rows.append(("FB-1 to its optimum", "50 ms", 50, mega("design", "design/five_bar", "ms"), "ms"))
+    return rows
+
+
+def targets_section():
+    cells = []
+    for what, aim_text, aim, measured, unit in targets():
+        verdict = "-" if measured is None else ("met" if (measured >= -aim if aim < 0 else measured <= aim) else "**missed**")
+        cells.append([what, aim_text, figure(measured) + (f" {unit}" if unit and measured is not None else ""), verdict])
+    return table_of(["what", "aim", "measured", ""], cells)
+
+
+def right_hand_side_section():
+    lines = ["## Right-hand sides", "",
+             "One evaluation of the equations of motion [microseconds], and per body; *in a run*: per body and right-hand side of a run with the default",
+             "method, its error norms and projections included. N-four-bars have 2N + 1 bodies.", ""] + command("right_hand_side")
+    cells = []
+    for row in rows_of("right_hand_side"):
+        _, kind, size, model = row["name"].split("/")
+        cells.append([kind, size, row["bodies"], model, figure(number(row["us"])), figure(number(row["us_per_body"])),
+                      figure(number(row["run_us_per_body"]))])
+    lines += table_of(["mechanism", "size", "bodies", "model", "one", "per body", "per body in a run"], cells)
+    cells = [[f"`{r['name'].split('/', 1)[1]}`", r["bodies"], figure(number(r["us"])), figure(number(r["us_per_body"]))]
+             for r in rows_of("right_hand_side_of_problem")]
+    if cells:
+        lines += command("right_hand_side_of_problem") + table_of(["problem", "bodies", "one", "per body"], cells)
+    return lines
+
+
+def parts_section():
+    lines = ["## Where a right-hand side goes", "",
+             "Nanoseconds per body, each part by itself (so that the sum differs from the whole); *linear share*: assembly of S, its factorisation and",
+             "the solution with one refinement, of the whole.", ""] + command("right_hand_side_parts")
+    columns = ("frames", "phi_ddot", "jacobian", "assembly", "factor", "solve", "whole")
+    cells = [[r["name"].split("/", 1)[1]] + [figure(number(r[c])) for c in columns] + [figure(number(r["linear_share"]), 2)]
+             for r in rows_of("right_hand_side_parts")]
+    lines += table_of(["mechanism"] + list(columns) + ["linear share"], cells)
+    cells = {}
+    for r in rows_of("primitive"):
+        _, primitive, part = r["name"].split("/")
+        cells.setdefault(primitive, {})[part] = r["ns"]
+    lines += ["Primitives between two bodies [ns]; `pull_back` is what an adjoint needs of them:", ""] + command("primitive")
+    return lines + table_of(["primitive", "residual", "jacobian", "pull_back"],
+                            [[p, c["residual"], c["jacobian"], c["pull_back"]] for p, c in cells.items()])
+
+
+def growth_section():
+    lines = ["## As mechanisms grow", "", "Time per body at 10 000 bodies over that at 100, in turn in one run:", ""] + command("right_hand_side_growth")
+    lines += table_of(["mechanism", "model", "ratio"], [[*r["name"].split("/")[1:], figure(number(r["ratio"]))] for r in rows_of("right_hand_side_growth")])
+    lines += ["Before a run: compiling the scene and assembling the initial state [ms].", ""] + command("start")
+    return lines + table_of(["N-four-bar", "bodies", "start"], [[r["name"].split("/")[-1], r["bodies"], figure(number(r["start_ms"]))] for r in rows_of("start")])
+
+
+def time_to_error_section():
+    lines = ["## Time to an error", "",
+             "10 s of motion; the error is the largest distance of any rod's centre of mass from where it should be, at 201 times: from the exact motion",
+             "(A02 passes its singular position about ten times), of Bricard's mechanism from `dopri853` at rtol 1e-12. The fastest of `dopri5`, `verner6`,",
+             "`dopri853` at two tolerances per decade that meets the error and meets it at a third of the tolerance, too; the whole of `simulate`,",
+             "initial assembly included.", ""] + command("time_to_error")
+    cells = []
+    for r in rows_of("time_to_error"):
+        f = lambda c, d=3: figure(number(r.get(c)), d)
+        cells.append([r["name"].split("/", 1)[1], f("wanted"), f("ms"), f("assembly_ms"), f("error", 2), f"{r['label']} at {f('rtol', 2)}",
+                      f("steps"), f("rhs", 4), f("default_ms"), f("default_error", 2)])
+    return lines + table_of(["mechanism", "wanted [m]", "ms", "of it assembly", "error", "method", "steps", "right-hand sides", "defaults: ms", "error"], cells)
+
+
+def gradients_section():
+    lines = ["## Gradients", "",
+             "50 parameters; ratios of wall times to one simulation with its compilation and assembly, medians of rounds in turn. *Start*: the share of",
+             "compilation and assembly in one simulation.", ""] + command("gradient_scaling")
+    cells = []
+    for r in rows_of("gradient_scaling"):
+        kind, method = r["name"].split("/")[1].split("_")
+        cells.append([kind, r["bodies"], method, r["steps"], figure(number(r["start_share"]), 2), figure(number(r["adjoint_ratio"])), figure(number(r["tlm_per_parameter"]))])
+    lines += table_of(["mechanism", "bodies", "method", "steps", "start", "adjoint", "TLM per further parameter"], cells)
+    lines += ["A full Hessian in ten parameters (FB-1): " + figure(of("hessian", "hessian/five_bar", "hessian_ratio")) + " simulations, by " +
+              figure(of("hessian", "hessian/five_bar", "gradients")) + " gradients.", ""] + command("hessian")
+    lines += ["Memory of an adjoint over 10 s [MiB]; *grown*: the largest size of the process during the run beyond that before it, assembly and its",
+              "derivatives included.", ""] + command("adjoint_memory")
+    cells = [[r["bodies"], r["budget_mib"], figure(number(r["kept_mib"])), figure(number(r["grown_mib"])), figure(number(r["recomputed"]), 2)]
+             for r in rows_of("adjoint_memory") if r["name"].startswith("adjoint_memory/four_bars")]
+    lines += table_of(["bodies", "budget", "kept", "grown", "steps computed again, of all"], cells)
+    design = rows_of("design")
+    if design:
+        d = design[0]
+        lines += [f"FB-1 from its start to its optimum: {figure(number(d['ms']))} ms, {d['iterations']} iterations, {d['evaluations']} evaluations with gradients;",
+                  f"the lengths end within {figure(number(d['optimum_error']), 2)} of the known optimum.", ""] + command("design")
+    return lines
+
+
+PEERS = {"simbody": "Simbody", "mujoco": "MuJoCo", "dart": "DART"}
+
+
+def peers_section():
+    rows = rows_of("peers_right_hand_side")
+    lines = ["## Other programs", ""]
+    if not rows:
+        return lines + ["Not measured: `./dev bench --peers` installs Simbody, MuJoCo and DART (Debian packages, for nothing but this) and measures them.", ""]
+    lines += ["Debian's Simbody 3.7, MuJoCo 2.2 and DART 6.12, the same mechanisms at the same state, in turn in one run, one thread: microseconds per",
+              "right-hand side, and in brackets the ratio to mbsopt (above 1: mbsopt is faster). mbsopt solves for 6 unknowns per body and all reactions;",
+              "Simbody, MuJoCo and DART work in joint coordinates. Accelerations agree to the figure in *apart* (MuJoCo closes loops by regularised",
+              "constraints). DART closes loops only in its time stepping, so that it is on open mechanisms alone; MuJoCo's reader does not take chains of",
+              "100 bodies and more.", ""] + command("peers_right_hand_side")
+    cells = []
+    for r in rows:
+        line = [r["name"].split("/", 1)[1], r["bodies"], figure(number(r["mbsopt_us"]))]
+        for p in PEERS:
+            us, ratio, apart = (number(r.get(f"{p}_{c}")) for c in ("us", "ratio", "apart"))
+            line.append("-" if us is None else f"{figure(us)} ({figure(ratio, 2)})")
+        worst = [f"{p} {figure(number(r[f'{k}_apart']), 1)}" for k, p in PEERS.items() if number(r.get(f"{k}_apart")) is not None]
+        cells.append(line + [", ".join(worst)])
+    lines += table_of(["mechanism", "bodies", "mbsopt"] + list(PEERS.values()) + ["apart"], cells)
+    lines += ["10 s of motion, the error as above. Of each program the coarsest of its settings that meets the wanted error, else its most exact; mbsopt at",
+              "an error no larger than that.", ""] + command("peers_time_to_error")
+    cells, words = [], []
+    for r in rows_of("peers_time_to_error"):
+        name = r["name"].split("/", 1)[1]
+        for p, title in PEERS.items():
+            theirs = number(r.get(f"{p}_ms"))
+            said = next((s.split(": ", 1)[1] for s in r["label"].split("; ") if s.startswith(p + ":")), "")
+            if theirs is None:
+                if said:
+                    words.append(f"{title} on `{name}`: {said}.")
+                continue
+            ours = number(r[f"mbsopt_ms_for_{p}"])
+            setting, ours_setting = said.split(", mbsopt: ")
+            cells.append([name, title, setting, figure(theirs), figure(number(r[f"{p}_error"]), 2), ours_setting, figure(ours),
+                          figure(number(r[f"mbsopt_error_for_{p}"]), 2), figure(theirs / ours, 2)])
+    lines += table_of(["mechanism", "program", "setting", "ms", "error [m]", "mbsopt", "ms", "error [m]", "ratio"], cells)
+    return lines + words + [""] * bool(words)
+
+
+def write():
+    runs = rows_of("runs")
+    machines = sorted({f"{r['cpu']}, {r['cores']} cores, {r['compiler']}, {r['flags']}" for r in runs})
+    loads = [float(r["load"]) for r in runs]
+    lines = ["# Performance", "",
+             "Written by `./dev bench` (`docs/performance.py`); do not edit. The figures are in `data/performance/`, the programs in `bench/`. Each table stands",
+             "below the command that measures it alone; `./dev bench --peers` measures all, the other programs included.", "",
+             f"Measured on: {'; '.join(machines)}. One thread; processor time of that thread, medians; ratios are taken in one run, in turn.", ""]
+    if loads and max(loads) > 0.7 * min(int(r["cores"]) for r in runs):
+        lines += [f"**The machine was busy**: a load of {min(loads):.0f} to {max(loads):.0f}. Processor times are then longer than they would be alone (a core's",
+                  "caches and arithmetic are shared); ratios within a run hardly depend on it.", ""]
+    lines += ["## Aims", ""] + targets_section()
+    for section in (right_hand_side_section, parts_section, growth_section, time_to_error_section, gradients_section, peers_section):
+        lines += section()
+    PAGE.write_text("\n".join(lines).rstrip() + "\n")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) == 3 and sys.argv[1] == "keep":
+        keep(Path(sys.argv[2]))
+    elif sys.argv[1:] == ["write"]:
+        write()
+    else:
+        sys.exit(__doc__)
