@@ -106,6 +106,7 @@ class Dynamics {
   // y_bar, ... += gradient of  pddot_bar'pddot - eta'(M z + J'lambda - f) - mu'(J z + gamma)  with z and lambda fixed.
   void pull_back(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
   void set_loads();  // f
+  double usual_acceleration() const;
   ForceTerms::At here() const { return {t_, y_, angles_, frames_}; }
   void set_user_state(const UserForceData& force);
   void add_user_loads();

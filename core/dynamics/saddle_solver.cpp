@@ -71,6 +71,7 @@ void SaddleSolver::solve_any(const std::vector<X>& b, const Y& g, const Settings
     }
     const double now = residual.cwiseAbs().maxCoeff();
     residual_ratio_ = size > 0 ? now / size : 0.0;
+    residual_size_ = now;
     if (k >= settings.most) break;
     if (k >= settings.least && (residual_ratio_ <= settings.tolerance || !(now < kStagnation * before))) break;
     before = now;

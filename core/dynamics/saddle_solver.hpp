@@ -49,8 +49,9 @@ class SaddleSolver {
   void solve(const std::vector<Lanes<6>>& b, const LaneRows& g, const Settings& settings, std::vector<Lanes<6>>& x,
              LaneRows& nu);
 
-  // |s| after the last solve, relative as above.
+  // |s| after the last solve, relative as above, and itself.
   double residual_ratio() const { return residual_ratio_; }
+  double residual_size() const { return residual_size_; }
   long factorisations() const { return factorisations_; }
 
   // M x for body i (1-based).
@@ -80,7 +81,7 @@ class SaddleSolver {
   std::vector<Vec<6>> correction_;
   std::vector<Lanes<6>> correction_lanes_;
   long factorisations_ = 0;
-  double residual_ratio_ = 0;
+  double residual_ratio_ = 0, residual_size_ = 0;
 };
 
 }  // namespace mbsopt
