@@ -2,6 +2,7 @@
 
 #include "app/interrupt.hpp"
 #include "core/dynamics/assembly.hpp"
+#include "core/dynamics/model_warnings.hpp"
 #include "optim/objective_run.hpp"
 
 namespace mbsopt {
@@ -22,6 +23,7 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
     return motion;
   }
   motion.model = assembly.summary();
+  motion.warnings = start_warnings(mechanism, assembly);
 
   std::vector<const Objective*> all;
   for (const Objective& objective : objectives) all.push_back(&objective);
