@@ -7,7 +7,9 @@
 #include "app/interrupt.hpp"
 #include "app/objective_values.hpp"
 #include "app/run.hpp"
+#include "app/simulation_warnings.hpp"
 #include "app/text_table.hpp"
+#include "core/dynamics/model_warnings.hpp"
 #include "core/integrate/cvodes.hpp"
 #include "optim/evaluator.hpp"
 #include "optim/hessian.hpp"
@@ -87,7 +89,9 @@ int gradient_command(const CommandContext& context) {
 
   const Mechanism mechanism(scene, parameter_values(scene));
   run.start();
-  if (!assembled(run, &mechanism, Assembly(mechanism, scene.simulation.start_time))) return run.finish();
+  const Assembly assembly(mechanism, scene.simulation.start_time);
+  if (!assembled(run, &mechanism, assembly)) return run.finish();
+  for (const std::string& warning : start_warnings(mechanism, assembly)) run.warn(warning);
 
   double last_good_time = scene.simulation.start_time;
   EvaluatorOptions options;
@@ -99,6 +103,7 @@ int gradient_command(const CommandContext& context) {
   Evaluator evaluator(scene, objectives_of(run.problem), {}, options);
   const Evaluation& evaluation = evaluator.gradients(evaluator.start());
   run.result["simulation"] = to_json(evaluation.statistics);
+  for (const std::string& warning : simulation_warnings(scene.simulation, evaluation.statistics)) run.warn(warning);
   if (!evaluation.ok) {
     interrupted() ? run.stopped("no gradient was finished") : run.failed(evaluation.message, last_good_time);
     return run.finish();

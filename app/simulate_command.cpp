@@ -5,6 +5,7 @@
 #include "app/report/run_report.hpp"
 #include "app/run.hpp"
 #include "app/simulated_motion.hpp"
+#include "app/simulation_warnings.hpp"
 #include "app/text_table.hpp"
 
 namespace mbsopt {
@@ -31,12 +32,14 @@ int simulate_command(const CommandContext& context) {
   run.start();
   const SimulatedMotion motion = simulated_motion(run, parameter_values(scene));
   const SimulationResult& simulation = motion.simulation;
+  for (const std::string& warning : motion.warnings) run.warn(warning);
   if (simulation.status != SimulationStatus::assembly_failed) {
     run.result["model"] = to_json(motion.model);
     run.result["simulation"] = to_json(simulation.statistics);
     print_model(context.out, scene.name, motion.model);
     print_simulation(context.out, scene, simulation.statistics);
     run.write("trajectory.csv", to_csv(motion.trajectory));
+    for (const std::string& warning : simulation_warnings(scene.simulation, simulation.statistics)) run.warn(warning);
   }
   if (simulation.ok()) {
     add_objectives(run, motion);

@@ -2,6 +2,7 @@
 
 #include "app/interrupt.hpp"
 #include "core/dynamics/assembly.hpp"
+#include "core/dynamics/model_warnings.hpp"
 #include "core/integrate/model_choice.hpp"
 #include "optim/objective_run.hpp"
 
@@ -24,6 +25,7 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
   }
   motion.model = assembly.summary();
   add_model(mechanism, settings, motion.model);
+  motion.warnings = start_warnings(mechanism, assembly);
 
   std::vector<const Objective*> all;
   for (const Objective& objective : objectives) all.push_back(&objective);

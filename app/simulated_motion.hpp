@@ -12,6 +12,7 @@ struct SimulatedMotion {
   Eigen::VectorXd psi;                             // per objective of the problem, where the simulation is ok
   std::vector<std::optional<double>> true_values;  // of smooth maxima and minima among them
   ModelSummary model;                              // where the assembly is ok
+  std::vector<std::string> warnings;               // of the start
 };
 
 // Draws the progress of `run`, and stops where the user interrupts.

@@ -70,15 +70,17 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
   user_K_.setZero(largest, largest), user_C_.setZero(largest, largest), user_Q_rho_.setZero(largest, P);
 }
 
-// Derivatives are those of the limit: at least as many refinements as bring alpha^-(passes) to rounding.
+// Derivatives are those of the limit: at least as many refinements as bring alpha^-(passes) to rounding. All: as many
+// as bring what S loses of M to alpha to rounding.
 SaddleSolver::Settings Dynamics::solver_settings(bool derivative) const {
   if (settings_.type == FormulationType::penalty) {
     if (settings_.linear_solver == LinearSolver::cholesky) return {};
     return {2, 50, 1e-15};
   }
-  if (!derivative) return {std::min(1, settings_.iterations), settings_.iterations, settings_.tolerance};
   const double digits = std::max(1.0, std::log10(settings_.alpha));
-  const int least = std::clamp(static_cast<int>(std::ceil(15 / digits)) - 1, 1, 8);
+  const int rounding = std::clamp(static_cast<int>(std::ceil(14 / std::max(1.0, 16 - digits))) - 1, 1, 14);
+  if (!derivative) return {std::min(rounding, settings_.iterations), settings_.iterations, settings_.tolerance};
+  const int least = std::max(rounding, std::clamp(static_cast<int>(std::ceil(15 / digits)) - 1, 1, 8));
   return {least, std::max(least, settings_.iterations), 1e-14};
 }
 
@@ -110,11 +112,32 @@ void Dynamics::set_loads() {
   }
 }
 
+// What accelerations are of: loads on each body alone, and turning.
+double Dynamics::usual_acceleration() const {
+  double largest = 1e-9;
+  for (std::size_t i = 0; i < loads_.size(); ++i) {
+    const BodyData& b = data_.bodies[i + 1];
+    const double omega = bodies_[i + 1].omega().norm();
+    largest = std::max(largest, omega * (omega + frames_[i + 1].rdot.norm()));
+    if (b.mass > 0) largest = std::max(largest, loads_[i].head<3>().norm() / b.mass);
+    if (b.J.trace() > 0) largest = std::max(largest, loads_[i].tail<3>().norm() / b.J.trace());
+  }
+  return largest;
+}
+
+// Where nothing accelerates (a wheel driven at constant speed) what is left is rounding.
+template <class Usual>
+void Dynamics::note_residual(double ratio, double size, Usual&& usual_acceleration) {
+  if (settings_.type != FormulationType::augmented_lagrangian) return;
+  if (ratio > worst_residual_) ratio = std::min(ratio, size / usual_acceleration());
+  worst_residual_ = std::max(worst_residual_, ratio);
+}
+
 bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                         Eigen::Ref<Eigen::VectorXd> ydot) {
   if (planar_) {
     const bool finite = planar_->evaluate(t, y, angles, ydot);
-    note_residual(planar_->residual_ratio());
+    note_residual(planar_->residual_ratio(), planar_->residual_size(), [&] { return planar_->usual_acceleration(); });
     return finite;
   }
   set_state(t, y, angles);
@@ -130,7 +153,7 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
   if (!solver_.factor(frames_)) return false;
   g_ = -gamma_;
   solver_.solve(loads_, g_, solver_settings(false), z_, lambda_);
-  note_residual(solver_.residual_ratio());
+  note_residual(solver_.residual_ratio(), solver_.residual_size(), [&] { return usual_acceleration(); });
 
   const Eigen::Index half = 7 * data_.n;
   ydot.head(half) = y.tail(half);
@@ -143,10 +166,6 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
     finite = finite && z_[k - 1].allFinite();
   }
   return finite;
-}
-
-void Dynamics::note_residual(double ratio) {
-  if (settings_.type == FormulationType::augmented_lagrangian) worst_residual_ = std::max(worst_residual_, ratio);
 }
 
 bool Dynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,

@@ -113,7 +113,9 @@ class Dynamics {
   // y_bar, ... += gradient of  pddot_bar'pddot - eta'(M z + J'lambda - f) - mu'(J z + gamma)  with z and lambda fixed.
   void pull_back(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
   void set_loads();  // f
-  void note_residual(double ratio);
+  template <class Usual>
+  void note_residual(double ratio, double size, Usual&& usual_acceleration);
+  double usual_acceleration() const;
   ForceTerms::At here() const { return {t_, y_, angles_, frames_}; }
   void set_user_state(const UserForceData& force);
   void add_user_loads();

@@ -130,6 +130,13 @@ std::vector<std::string> model_warnings(const Mechanism& mechanism, const Assemb
   const MechanismData& d = mechanism.data();
   std::vector<std::string> warnings;
   add_violations(d, warnings);
+  for (std::string& warning : start_warnings(mechanism, assembly)) warnings.push_back(std::move(warning));
+  return warnings;
+}
+
+std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assembly& assembly) {
+  const MechanismData& d = mechanism.data();
+  std::vector<std::string> warnings;
   if (!assembly.result().ok) return warnings;
   add_massless(d, assembly.result().y.head(7 * d.n), warnings);
   add_springs(d, assembly.result().y, warnings);

@@ -13,5 +13,7 @@
 namespace mbsopt {
 
 std::vector<std::string> model_warnings(const Mechanism& mechanism, const Assembly& assembly);
+// The first two of them, which a simulation may end with.
+std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assembly& assembly);
 
 }  // namespace mbsopt

@@ -1,5 +1,8 @@
 #include "core/dynamics/planar_dynamics.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/body/euler_parameters.hpp"
 #include "core/body/lanes.hpp"
 
@@ -127,6 +130,19 @@ bool PlanarDynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::V
     finite = finite && z.allFinite();
   }
   return finite;
+}
+
+double PlanarDynamics::usual_acceleration() const {
+  double largest = 1e-9;
+  for (std::size_t k = 1; k < bodies_.size(); ++k) {
+    const PlanarBody& b = model_.bodies[k];
+    const Vec<3>& load = loads_[k - 1];
+    const double omega = 2 * std::sqrt(squared_norm(bodies_[k].Pdot));
+    largest = std::max(largest, omega * (omega + std::sqrt(squared_norm(frames_[k].rdot))));
+    if (b.mass > 0) largest = std::max(largest, load.head<2>().norm() / b.mass);
+    if (b.inertia > 0) largest = std::max(largest, std::abs(load(2)) / b.inertia);
+  }
+  return largest;
 }
 
 bool PlanarDynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,

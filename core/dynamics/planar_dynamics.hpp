@@ -33,6 +33,8 @@ class PlanarDynamics {
 
   const Eigen::VectorXd& lambda() const { return lambda_; }
   double residual_ratio() const { return solver_.residual_ratio(); }
+  double residual_size() const { return solver_.residual_size(); }
+  double usual_acceleration() const;  // what accelerations are of: loads on each body alone, and turning
   long factorisations() const { return solver_.factorisations(); }
   long factor_blocks() const { return solver_.factor_blocks(); }
 

@@ -10,6 +10,7 @@ constexpr double kRelativeAlpha = 1e8;
 constexpr Refinements kOnePass{};  // every use is inside an iteration that refines
 constexpr int kMostIterations = 60, kMostRefinements = 12;
 constexpr double kNegligible = 1e-17;
+constexpr double kUnmetPosition = 1e-8, kUnmetVelocity = 1e-6;  // of the largest coordinate, velocity; at least of 1
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -96,10 +97,10 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
   for (Vec<3>& d : delta_) d.setZero();
   nu_.setZero();
   set_positions(delta_);
-  double before = INFINITY;
+  double before = INFINITY, now = 0;
   for (int k = 0; k < kMostIterations && data_.m > 0; ++k) {
     constraints_.phi(frames_, laws_, angles, phi_);
-    const double now = phi_.cwiseAbs().maxCoeff();
+    now = phi_.cwiseAbs().maxCoeff();
     if (!std::isfinite(now)) return false;
     if (now < 1e-15 || (k > 1 && now > 0.95 * before)) break;  // rounding reached, or a singular position
     before = now;
@@ -111,15 +112,17 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
     nu_ += dnu_;
     set_positions(delta_);
   }
+  const Eigen::Index half = 7 * data_.n;
+  if (now > kUnmetPosition * std::max(1.0, y_hat.head(half).cwiseAbs().maxCoeff())) return false;
 
   for (Vec<3>& u : u_) u.setZero();
   kappa_.setZero();
   set_velocities(u_);
   rows_.evaluate(frames_);
-  before = INFINITY;
+  before = INFINITY, now = 0;
   for (int k = 0; k < kMostIterations && data_.m > 0; ++k) {
     constraints_.phi_dot(frames_, laws_, phi_);
-    const double now = phi_.cwiseAbs().maxCoeff();
+    now = phi_.cwiseAbs().maxCoeff();
     if (!std::isfinite(now)) return false;
     if (now < 1e-15 || (k > 1 && now > 0.95 * before)) break;
     before = now;
@@ -131,6 +134,7 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
     for (std::size_t i = 0; i < dx_.size(); ++i) u_[i] += dx_[i];
     set_velocities(u_);
   }
+  if (now > kUnmetVelocity * std::max(1.0, y_hat.tail(half).cwiseAbs().maxCoeff())) return false;
 
   y = y_hat;
   bool finite = true;

@@ -12,6 +12,7 @@ namespace {
 constexpr double kRelativeAlpha = 1e8;
 constexpr SaddleSolver::Settings kOnePass{};  // every use is inside an iteration that refines
 constexpr int kMostIterations = 60;
+constexpr double kUnmetPosition = 1e-8, kUnmetVelocity = 1e-6;  // of the largest coordinate, velocity; at least of 1
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -99,11 +100,12 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
   s.nu.setZero();
   set_q(s.delta, y);
   set_frames(y, nullptr, states_, frames_);
+  const Eigen::Index half = 7 * data_.n;
   if (positions() && data_.m > 0) {
-    double before = INFINITY;
+    double before = INFINITY, now = 0;
     for (int k = 0; k < kMostIterations; ++k) {
       evaluate_phi(data_, frames_, laws_, angles, phi_);
-      const double now = phi_.cwiseAbs().maxCoeff();
+      now = phi_.cwiseAbs().maxCoeff();
       if (!std::isfinite(now)) return false;
       if (now < 1e-15 || (k > 1 && now > 0.95 * before)) break;  // rounding reached, or a singular position
       before = now;
@@ -117,9 +119,9 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
       set_q(s.delta, y);
       set_frames(y, nullptr, states_, frames_);
     }
+    if (now > kUnmetPosition * std::max(1.0, y.head(half).cwiseAbs().maxCoeff())) return false;
   }
 
-  const Eigen::Index half = 7 * data_.n;
   for (int i = 1; i <= data_.n; ++i) {
     const Body& b = bodies_[at(i)];
     y.segment<3>(half + 7 * (i - 1)) = y_hat.segment<3>(half + 7 * (i - 1));
@@ -129,11 +131,11 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
   s.kappa.setZero();
   if (data_.m == 0) return y.allFinite();
   rows_.evaluate(frames_);
-  double before = INFINITY;
+  double before = INFINITY, now = 0;
   for (int k = 0; k < kMostIterations; ++k) {
     set_frames(y, &y, states_, frames_);
     evaluate_phi_dot(data_, frames_, laws_, phi_);
-    const double now = phi_.cwiseAbs().maxCoeff();
+    now = phi_.cwiseAbs().maxCoeff();
     if (!std::isfinite(now)) return false;
     if (now < 1e-15 || (k > 1 && now > 0.95 * before)) break;
     before = now;
@@ -149,6 +151,7 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
       y.segment<4>(half + 7 * (i - 1) + 3) += 0.5 * G_transposed_times(bodies_[at(i)].p, du.tail<3>());
     }
   }
+  if (now > kUnmetVelocity * std::max(1.0, y.tail(half).cwiseAbs().maxCoeff())) return false;
   return y.allFinite();
 }
 

@@ -17,9 +17,7 @@ void subtract_scaled(const Eigen::VectorXd& x, const Eigen::VectorXd& alpha, con
 void subtract_scaled(const LaneRows& x, const Eigen::VectorXd& alpha, const LaneRows& z, LaneRows& y) {
   for (Eigen::Index r = 0; r < x.rows(); ++r) y.row(r) = x.row(r) - alpha(r) * z.row(r);
 }
-void reduce(double c, const Eigen::VectorXd& alpha, Eigen::VectorXd& z) {
-  z -= c * alpha.cwiseProduct(z);
-}
+void reduce(double c, const Eigen::VectorXd& alpha, Eigen::VectorXd& z) { z -= c * alpha.cwiseProduct(z); }
 void reduce(double c, const Eigen::VectorXd& alpha, LaneRows& z) {
   for (Eigen::Index r = 0; r < z.rows(); ++r) z.row(r) *= 1 - c * alpha(r);
 }
@@ -82,6 +80,7 @@ void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, con
     if (c_ > 0) reduce(c_, alpha_, residual);
     const double now = residual.cwiseAbs().maxCoeff();
     residual_ratio_ = size > 0 ? now / size : 0.0;
+    residual_size_ = now;
     if (k >= settings.most) break;
     if (k >= settings.least && (residual_ratio_ <= settings.tolerance || !(now < kStagnation * before))) break;
     before = now;

@@ -57,8 +57,9 @@ class BlockSaddleSolver {
   void solve(const Vector& b, const Eigen::VectorXd& g, const Settings& settings, Vector& x, Eigen::VectorXd& nu);
   void solve(const LaneVector& b, const LaneRows& g, const Settings& settings, LaneVector& x, LaneRows& nu);
 
-  // |s| after the last solve, relative as above.
+  // |s| after the last solve, relative as above, and itself.
   double residual_ratio() const { return residual_ratio_; }
+  double residual_size() const { return residual_size_; }
   long factorisations() const { return factorisations_; }
   long factor_blocks() const { return static_cast<long>(S_.blocks()); }
 
@@ -84,7 +85,7 @@ class BlockSaddleSolver {
   Vector correction_;
   LaneVector correction_lanes_;
   long factorisations_ = 0;
-  double residual_ratio_ = 0;
+  double residual_ratio_ = 0, residual_size_ = 0;
 };
 extern template class BlockSaddleSolver<ConstraintRows>;
 extern template class BlockSaddleSolver<PlanarRows>;

@@ -10,6 +10,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "core/integrate/run_guard.hpp"
+#include "core/integrate/zero_length.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt::cvodes {
@@ -204,7 +206,7 @@ bool ForwardRun::step_is_followed(double h, const Eigen::VectorXd& y) {
   return true;
 }
 
-void ForwardRun::update_statistics(double t, const Eigen::VectorXd& y) {
+Energy ForwardRun::update_statistics(double t, const Eigen::VectorXd& y) {
   SimulationStatistics& s = result_.statistics;
   const Eigen::VectorXd& angles = flow_.angles_at(t);
   s.max_position_violation = std::max(s.max_position_violation, violations_.position_violation(t, angles, y));
@@ -212,6 +214,7 @@ void ForwardRun::update_statistics(double t, const Eigen::VectorXd& y) {
   const Energy e = energy(mechanism_.data(), y, angles);
   s.energy_final = e.kinetic + e.potential;
   s.energy_drift = std::max(s.energy_drift, std::abs(s.energy_final - s.energy_initial));
+  return e;
 }
 
 void ForwardRun::take_samples(SampleSchedule& schedule, double t, const Hooks& hooks) {
@@ -239,6 +242,10 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
   result_.statistics.energy_initial = result_.statistics.energy_final = e.kinetic + e.potential;
   require(CVodeSetStopTime(memory(), end));
   double t = settings_.start_time;
+  RunGuard guard(mechanism_.data());
+  guard.begin(t, y_now_, e);
+  const bool derivatives = hooks.advance || sensitivities_;
+  Eigen::VectorXd y_before;
   while (result_.ok() && t < end) {
     result_.statistics.rejected = rejected();
     if (result_.statistics.steps + result_.statistics.rejected >= settings_.integrator.max_steps) {
@@ -256,15 +263,24 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
       stop_for(CV_ERR_FAILURE, t, "");
       break;
     }
+    y_before = y_now_;
     y_now_ = *y_;
     if (!step_is_followed(t1 - t, y_now_)) break;
     ++result_.statistics.steps;
     result_.steps.times.push_back(t);
     result_.steps.sizes.push_back(t1 - t);
     flow_.accept(t1, y_now_);
+    const Energy energy_now = update_statistics(t1, y_now_);
+    std::string objection = guard.objection(t1, energy_now, flow_.dynamics().worst_residual());
+    if (objection.empty() && derivatives) {
+      objection = through_zero_length(mechanism_.data(), t, y_before, t1, y_now_);
+    }
+    if (!objection.empty()) {
+      stop(SimulationStatus::not_credible, objection);
+      break;
+    }
     t = t1;
     result_.last_good_time = t;
-    update_statistics(t, y_now_);
     take_samples(schedule, t, hooks);
     if (hooks.accepted) hooks.accepted({t, y_now_, flow_.angles_at(t), flow_.motion()});
     if (options.after_step) options.after_step({t, y_now_, flow_.angles_at(t), flow_.motion()});

@@ -69,7 +69,7 @@ class ForwardRun {
  private:
   void set_up();
   bool step_is_followed(double h, const Eigen::VectorXd& y);
-  void update_statistics(double t, const Eigen::VectorXd& y);
+  Energy update_statistics(double t, const Eigen::VectorXd& y);
   void take_samples(SampleSchedule& schedule, double t, const Hooks& hooks);
   void finish_costs();
   long rejected() const;  // steps that failed a test of error or did not converge

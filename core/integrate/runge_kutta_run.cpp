@@ -8,6 +8,17 @@
 #include "core/integrate/model_choice.hpp"
 
 namespace mbsopt {
+namespace {
+
+// Where S = M + alpha J'J may have lost M to rounding: what to change, as the end of a message.
+std::string about_alpha(const FormulationSettings& f) {
+  constexpr double kLarge = 1e13;
+  const bool keeps_digits = f.type == FormulationType::penalty && f.linear_solver == LinearSolver::quasidefinite;
+  if (keeps_digits || f.alpha < kLarge) return {};
+  return fmt::format(". Or simulation.formulation.alpha is too large: {:.3g}, where 1e8 is usual", f.alpha);
+}
+
+}  // namespace
 
 RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method)
     : mechanism_(mechanism),
@@ -15,6 +26,7 @@ RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSetting
       rk_(method),
       dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
       projector_(mechanism, settings.formulation.projection, model_of(mechanism, settings, method)),
+      guard_(mechanism_.data()),
       step_(make_step()) {
   const Eigen::Index states = mechanism.states();
   angles_.setZero(static_cast<Eigen::Index>(mechanism.data().angles.size()));
@@ -138,12 +150,46 @@ RungeKuttaRun::Outcome RungeKuttaRun::attempt(double h, bool adaptive, bool exac
   return Outcome::accepted;
 }
 
-std::string RungeKuttaRun::unsolved(double h) const {
-  return fmt::format(
-      "the stages of the implicit step from t = {:.6g} s by {:.3g} s were not found: Newton's method did "
-      "not converge. Use a smaller step, or look for a law that is not smooth or not finite, or a "
-      "singular position, near this time",
-      step_.t, h);
+std::string RungeKuttaRun::failed(Outcome outcome, double h, bool adaptive) const {
+  switch (outcome) {
+    case Outcome::unsolved:
+      return fmt::format(
+          "the stages of the implicit step from t = {:.6g} s by {:.3g} s were not found: Newton's method did "
+          "not converge. Use a smaller step, or look for a law that is not smooth or not finite, or a "
+          "singular position, near this time",
+          step_.t, h);
+    case Outcome::off_constraints:
+      return adaptive
+                 ? fmt::format(
+                       "no position and velocity beyond t = {:.6g} s meet the constraints, however small the step. "
+                       "Does a drive ask for more than the mechanism reaches, or is the position singular? Look at the "
+                       "laws of drives and the lengths",
+                       step_.t)
+                 : fmt::format(
+                       "after the step from t = {:.6g} s by {:.3g} s no position and velocity nearby meet the "
+                       "constraints. The step is too large for this motion, or a drive asks for more than the "
+                       "mechanism "
+                       "reaches: use a smaller step, or an adaptive integrator (no \"step\")",
+                       step_.t, h);
+    case Outcome::failed:
+      return (adaptive
+                  ? fmt::format(
+                        "the accelerations cannot be computed beyond t = {:.6g} s, however small the step. A law or "
+                        "force that is not finite there (a root, logarithm or division outside its range), or a "
+                        "body without inertia in a direction that no joint holds?",
+                        step_.t)
+                  : fmt::format("the state stopped being finite in the step from t = {:.6g} s by {:.3g} s. The step is "
+                                "too large "
+                                "for this motion: use a smaller step, or an adaptive integrator (no \"step\")",
+                                step_.t, h)) +
+             about_alpha(settings_.formulation);
+    default:
+      return fmt::format(
+          "the step fell to {:.3g} s at t = {:.6g} s and its error is still too large. Look for a "
+          "singular position, a spring of zero length or a law that is not smooth near this time; "
+          "looser tolerances or a fixed step may pass it",
+          h, step_.t);
+  }
 }
 
 void RungeKuttaRun::set_y_hat() {
@@ -153,15 +199,17 @@ void RungeKuttaRun::set_y_hat() {
   }
 }
 
-bool RungeKuttaRun::finish_step(bool dense) {
+RungeKuttaRun::Outcome RungeKuttaRun::finish_step(bool dense) {
   step_.dense = dense;
   if (dense) {
     for (int i = rk_.stages; i < rk_.dense_stages; ++i) {
-      if (!evaluate_stage(i)) return false;
+      if (!evaluate_stage(i)) return Outcome::failed;
     }
   }
   if (projector_.active()) {
-    if (!projector_.project(step_.t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return false;
+    if (!projector_.project(step_.t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) {
+      return Outcome::off_constraints;
+    }
   } else {
     step_.y1 = step_.y_hat;
   }
@@ -172,7 +220,7 @@ bool RungeKuttaRun::finish_step(bool dense) {
     step_.angles1(i) =
         a.value_near(step_.angles0(i), body_at(step_.y1, a.body1).frame, body_at(step_.y1, a.body2).frame);
   }
-  return true;
+  return Outcome::accepted;
 }
 
 double RungeKuttaRun::fastest_tracked_rate(const Eigen::VectorXd& y) const {
@@ -183,7 +231,7 @@ double RungeKuttaRun::fastest_tracked_rate(const Eigen::VectorXd& y) const {
   return fastest;
 }
 
-void RungeKuttaRun::update_statistics(SimulationResult& result) {
+Energy RungeKuttaRun::update_statistics(SimulationResult& result) {
   SimulationStatistics& s = result.statistics;
   s.max_position_violation =
       std::max(s.max_position_violation, projector_.position_violation(step_.t1, step_.angles1, step_.y1));
@@ -191,6 +239,7 @@ void RungeKuttaRun::update_statistics(SimulationResult& result) {
   const Energy e = energy(mechanism_.data(), step_.y1, step_.angles1);
   s.energy_final = e.kinetic + e.potential;
   s.energy_drift = std::max(s.energy_drift, std::abs(s.energy_final - s.energy_initial));
+  return e;
 }
 
 void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& angles,
@@ -206,6 +255,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   const Energy e = energy(mechanism_.data(), y_initial, angles);
   result.statistics.energy_initial = result.statistics.energy_final = e.kinetic + e.potential;
   result.last_good_time = step_.t;
+  guard_.begin(step_.t, y_initial, e);
   evaluations_ = 0;
   first_stage_known_ = false;
 
@@ -219,7 +269,8 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
          fmt::format("the accelerations at the start, t = {:.6g} s, cannot be computed. {}", step_.t,
                      bodies.empty() ? "A force or law is not finite there"
                                     : "A body without mass or inertia in a direction that no joint holds has none: " +
-                                          bodies + ". Give it some, or hold it"));
+                                          bodies + ". Give it some, or hold it") +
+             about_alpha(settings_.formulation));
     return;
   }
   if (implicit_) implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
@@ -259,35 +310,19 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     const bool last = options.frozen ? frozen_index + 1 == options.frozen->sizes.size() && options.frozen->to_the_end
                                      : step_.t + h >= end;
     step_.t1 = last ? end : step_.t + h;
-    if (outcome == Outcome::accepted && !finish_step(wants_dense(step_.t1))) outcome = Outcome::failed;
+    if (outcome == Outcome::accepted) outcome = finish_step(wants_dense(step_.t1));
     if (outcome != Outcome::accepted) {
       if (!adaptive) {
-        stop(
-            outcome == Outcome::unsolved ? SimulationStatus::not_solved : SimulationStatus::not_finite,
-            outcome == Outcome::unsolved
-                ? unsolved(h)
-                : fmt::format(
-                      "the state stopped being finite in the step from t = {:.6g} s by {:.3g} s. The step is too large "
-                      "for this motion: use a smaller step, or an adaptive integrator (no \"step\")",
-                      step_.t, h));
+        stop(outcome == Outcome::unsolved          ? SimulationStatus::not_solved
+             : outcome == Outcome::off_constraints ? SimulationStatus::step_too_large
+                                                   : SimulationStatus::not_finite,
+             failed(outcome, h, adaptive));
         break;
       }
       ++result.statistics.rejected;
       h *= outcome == Outcome::rejected ? controller.after_rejection(error) : controller.after_rejection(INFINITY);
       if (h < 1e-14 * std::max(span, std::abs(step_.t))) {
-        stop(SimulationStatus::step_too_small,
-             outcome == Outcome::failed
-                 ? fmt::format(
-                       "the accelerations cannot be computed beyond t = {:.6g} s, however small the step. A law or "
-                       "force that is not finite there (a root, logarithm or division outside its range), or a "
-                       "body without inertia in a direction that no joint holds?",
-                       step_.t)
-             : outcome == Outcome::unsolved
-                 ? unsolved(h)
-                 : fmt::format("the step fell to {:.3g} s at t = {:.6g} s and its error is still too large. Look for a "
-                               "singular position, a spring of zero length or a law that is not smooth near this time; "
-                               "looser tolerances or a fixed step may pass it",
-                               h, step_.t));
+        stop(SimulationStatus::step_too_small, failed(outcome, h, adaptive));
       }
       continue;
     }
@@ -295,7 +330,14 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     ++result.statistics.steps;
     result.steps.times.push_back(step_.t);
     result.steps.sizes.push_back(h);
-    update_statistics(result);
+    const Energy energy_now = update_statistics(result);
+    if (!options.frozen) {  // given steps have been looked at where they were found
+      const std::string objection = guard_.objection(step_.t1, energy_now, dynamics_.worst_residual());
+      if (!objection.empty()) {
+        stop(SimulationStatus::not_credible, objection);
+        break;
+      }
+    }
     accepted(step_);
     if (implicit_) implicit_->accept(step_);
     if (adaptive) {

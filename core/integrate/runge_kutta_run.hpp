@@ -8,6 +8,7 @@
 #include "core/dynamics/dynamics.hpp"
 #include "core/integrate/event_times.hpp"
 #include "core/integrate/implicit_stages.hpp"
+#include "core/integrate/run_guard.hpp"
 #include "core/integrate/simulation.hpp"
 #include "core/integrate/step.hpp"
 #include "core/integrate/step_control.hpp"
@@ -28,8 +29,9 @@ class RungeKuttaRun {
   const Eigen::VectorXd& angles() const { return angles_; }
 
  private:
-  // unsolved: Newton's method did not converge; failed: a number is not finite, a matrix is singular.
-  enum class Outcome { accepted, rejected, unsolved, failed };
+  // unsolved: Newton's method did not converge; failed: a number is not finite, a matrix is singular; off_constraints:
+  // projection found no state that meets them.
+  enum class Outcome { accepted, rejected, unsolved, failed, off_constraints };
 
   double first_step(const IntegratorSettings& s, double span);
   double propose_step(double t, double h, double end, bool adaptive) const;
@@ -38,11 +40,11 @@ class RungeKuttaRun {
   bool solve_stages(ImplicitStages::Goal goal);
   double error_of_step();
   void set_y_hat();
-  std::string unsolved(double h) const;  // in words
   Outcome attempt(double h, bool adaptive, bool exact, double& error);
-  bool finish_step(bool dense);  // dense stages, projection, branches of the angles
+  Outcome finish_step(bool dense);  // dense stages, projection, branches of the angles
   double fastest_tracked_rate(const Eigen::VectorXd& y) const;
-  void update_statistics(SimulationResult& result);
+  std::string failed(Outcome outcome, double h, bool adaptive) const;  // in words
+  Energy update_statistics(SimulationResult& result);
 
   const Mechanism mechanism_;
   SimulationSettings settings_;
@@ -50,6 +52,7 @@ class RungeKuttaRun {
   Dynamics dynamics_;
   std::optional<ImplicitStages> implicit_;
   Projector projector_;
+  RunGuard guard_;
   Step step_;
   Eigen::VectorXd angles_, work_, ydot_, y_stage_;
   bool first_stage_known_ = false;

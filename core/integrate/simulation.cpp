@@ -13,6 +13,7 @@
 #include "core/integrate/cvodes.hpp"
 #include "core/integrate/runge_kutta_run.hpp"
 #include "core/integrate/tangent_sweep.hpp"
+#include "core/integrate/zero_length.hpp"
 
 namespace mbsopt {
 namespace {
@@ -69,6 +70,7 @@ class Run {
     RungeKuttaRun run(mechanism_, settings_, method_);
     Eigen::VectorXd y(mechanism_.states());
     bool followed = true;
+    std::string objection;  // to derivatives
     auto accepted = [&](const Step& step) {
       const std::span<const SampleEvent> events = schedule.take(step.t1);
       add_running_costs(step, y);
@@ -82,11 +84,23 @@ class Run {
           observe(e.index, at);
         }
       }
-      if (follow && !follow(step, events)) followed = false;
+      if (!follow) return;
+      if (!follow(step, events)) followed = false;
+      objection = through_zero_length(mechanism_.data(), step.t, step.y0, step.t1, step.y1);
     };
+    RunOptions until_objection = options;
+    if (follow) {
+      until_objection.progress = [&](double t) {
+        return objection.empty() && (!options.progress || options.progress(t));
+      };
+    }
     run.run(
-        assembly_.result().y, assembly_.result().angles, [&](double t1) { return schedule.due(t1); }, accepted, options,
-        result_);
+        assembly_.result().y, assembly_.result().angles, [&](double t1) { return schedule.due(t1); }, accepted,
+        until_objection, result_);
+    if (!objection.empty()) {
+      result_.status = SimulationStatus::not_credible;
+      result_.message = objection;
+    }
     angles_end_ = run.angles();
     if (result_.ok() && !followed) {
       result_.status = SimulationStatus::not_finite;

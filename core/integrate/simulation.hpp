@@ -49,7 +49,8 @@ enum class SimulationStatus {
   step_too_large,
   too_many_steps,
   not_finite,
-  not_solved,  // the stages of an implicit step
+  not_solved,    // the stages of an implicit step
+  not_credible,  // run_guard.hpp
   stopped
 };
 

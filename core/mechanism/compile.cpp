@@ -55,7 +55,7 @@ void scale_alpha(MechanismData& data) {
   }
   if (largest_mass == 0) largest_mass = 1;
   if (largest_inertia == 0) largest_inertia = 1;
-  constexpr double kLeast = 1e-10;
+  constexpr double kLeast = 1e-6;
   auto inverse = [&](const std::vector<double>& x, double largest, int body) {
     return body == 0 ? 0.0 : 1 / std::max(x[static_cast<std::size_t>(body)], kLeast * largest);
   };

@@ -1,0 +1,36 @@
+// Jumps of the laws that drives prescribe, or of their rates: no motion of finite force follows them.
+//
+// Over an interval of length h a smooth f keeps  f1 - f0 - h (f0' + f1')/2  within h^3 f'''/12, and so does f' with its
+// own derivative; a jump keeps its size however short the interval. So an interval is halved, towards the larger
+// difference, until that vanishes or the interval does.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/mechanism/mechanism_data.hpp"
+
+namespace mbsopt {
+
+class LawJumps {
+ public:
+  explicit LawJumps(const MechanismData& data);
+
+  // The law that jumps between t0 and t1, when and by how much, in words; empty: none does.
+  std::string between(double t0, double t1);
+
+ private:
+  enum class Of { f, f_t };
+  struct Jump {
+    double t = 0, size = 0;
+  };
+  CubicSpline::Jet at(const TimeLaw& law, double t);
+  Jump find(const TimeLaw& law, Of what, double t0, double t1);
+
+  const MechanismData& data_;
+  std::vector<const RowLaw*> laws_;  // those of an expression: constants and splines are smooth
+  std::vector<double> inputs_;       // all parameters, then t
+  Program::Scratch scratch_;
+};
+
+}  // namespace mbsopt

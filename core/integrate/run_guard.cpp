@@ -1,0 +1,83 @@
+#include "core/integrate/run_guard.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/sensor/body_at.hpp"
+
+namespace mbsopt {
+namespace {
+
+constexpr double kUnmet = 1e-3;       // relative, of accelerations
+constexpr double kGrown = 0.5;        // of the energy there is
+constexpr double kNoticeable = 1e-3;  // of the natural energy: below it a change is none
+
+// Nothing does work but gravity and springs, whose potential is known.
+bool conserves_energy(const MechanismData& d) {
+  const auto is_spring = [](const auto& f) { return !f.law.program && f.law.c == 0 && f.law.f0 == 0; };
+  const auto is_elastic = [](const Bushing& b) { return b.C.isZero(0) && b.Ct.isZero(0); };
+  const auto is_constant = [](const RowLaw& l) { return !l.law.programs && !l.law.spline; };
+  return d.applied.empty() && d.user_forces.empty() && d.turning_frictions.empty() && d.sliding_frictions.empty() &&
+         std::all_of(d.tsda.begin(), d.tsda.end(), is_spring) && std::all_of(d.rsda.begin(), d.rsda.end(), is_spring) &&
+         std::all_of(d.bushings.begin(), d.bushings.end(), is_elastic) &&
+         std::all_of(d.laws.begin(), d.laws.end(), is_constant);
+}
+
+// What moving by its own size would take: a scale, for runs that begin at rest where the potential is zero.
+double natural_energy(const MechanismData& d, const Eigen::VectorXd& y) {
+  double sum = 0;
+  for (int i = 1; i <= d.n; ++i) {
+    sum += d.bodies[static_cast<std::size_t>(i)].mass * d.gravity.norm() * y.segment<3>(7 * (i - 1)).norm();
+  }
+  for (const TsdaForce& f : d.tsda) {
+    const double l = f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l;
+    sum += f.law.k * std::max(l * l, f.law.x0 * f.law.x0);
+  }
+  for (const RsdaForce& f : d.rsda) sum += f.law.k;
+  for (const Bushing& b : d.bushings) {
+    sum += b.Kt.maxCoeff() + b.K.maxCoeff() * std::max(b.s1.squaredNorm(), b.s2.squaredNorm());
+  }
+  return sum;
+}
+
+double size_of(const Energy& e) { return e.kinetic + std::abs(e.potential); }
+
+}  // namespace
+
+RunGuard::RunGuard(const MechanismData& data)
+    : data_(data), conserves_energy_(conserves_energy(data)), law_jumps_(data) {}
+
+void RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& energy) {
+  last_t_ = t;
+  energy_initial_ = energy.kinetic + energy.potential;
+  energy_largest_ = size_of(energy);
+  energy_natural_ = conserves_energy_ ? natural_energy(data_, y) : 0.0;
+}
+
+std::string RunGuard::about_energy(double t, const Energy& energy) {
+  energy_largest_ = std::max(energy_largest_, size_of(energy));
+  const double now = energy.kinetic + energy.potential, grown = now - energy_initial_;
+  if (!(grown > kGrown * energy_largest_ && grown > kNoticeable * energy_natural_)) return {};
+  return fmt::format(
+      "the energy has grown from {:.3g} J to {:.3g} J at t = {:.6g} s, although nothing does work: the steps are too "
+      "large for this motion. Use a smaller simulation.integrator.step, or an adaptive integrator with smaller rtol "
+      "and atol",
+      energy_initial_, now, t);
+}
+
+std::string RunGuard::objection(double t, const Energy& energy, double acceleration_residual) {
+  std::string words = law_jumps_.between(last_t_, t);
+  last_t_ = t;
+  if (words.empty() && acceleration_residual > kUnmet) {
+    words = fmt::format(
+        "the accelerations of the constraints are met to {:.1e} only at t = {:.6g} s: use a larger "
+        "simulation.formulation.alpha (relative; 1e8 is the default) or more iterations; or the position is singular",
+        acceleration_residual, t);
+  }
+  if (words.empty() && conserves_energy_) words = about_energy(t, energy);
+  return words;
+}
+
+}  // namespace mbsopt
