@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "app/accuracy_results.hpp"
 #include "app/command.hpp"
 #include "app/interrupt.hpp"
 #include "app/objective_values.hpp"
@@ -190,6 +191,7 @@ int check_command(const CommandContext& context) {
   const Mechanism mechanism(scene, parameter_values(scene));
   run.start();
   if (!assembled(run, Assembly(mechanism, scene.simulation.start_time))) return run.finish();
+  if (!settle_accuracy(run)) return run.finish();
 
   double last_good_time = scene.simulation.start_time;
   GradientCheckOptions options;
@@ -210,6 +212,7 @@ int check_command(const CommandContext& context) {
   const std::vector<std::optional<double>> true_values = evaluator.true_values(evaluator.start());
   add_to_result(run.result, check, true_values);
   print_simulation(context.out, scene, check.statistics);
+  warn_of_stiffness(run, check.statistics, true);
   print_entries(context.out, check, true_values);
   print_taylor(context.out, check);
   print_identities(context.out, check);

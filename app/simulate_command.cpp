@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "app/accuracy_results.hpp"
 #include "app/command.hpp"
 #include "app/objective_values.hpp"
 #include "app/report/run_report.hpp"
@@ -29,6 +30,7 @@ int simulate_command(const CommandContext& context) {
   Run run(context);
   const Scene& scene = run.problem.scene;
   run.start();
+  if (!settle_accuracy(run)) return run.finish();
   const SimulatedMotion motion = simulated_motion(run, parameter_values(scene));
   const SimulationResult& simulation = motion.simulation;
   if (simulation.status != SimulationStatus::assembly_failed) {
@@ -37,6 +39,7 @@ int simulate_command(const CommandContext& context) {
     print_model(context.out, scene.name, motion.model);
     print_simulation(context.out, scene, simulation.statistics);
     run.write("trajectory.csv", to_csv(motion.trajectory));
+    warn_of_stiffness(run, simulation.statistics, false);
   }
   if (simulation.ok()) {
     add_objectives(run, motion);

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "app/accuracy_results.hpp"
 #include "app/command.hpp"
 #include "app/interrupt.hpp"
 #include "app/machine.hpp"
@@ -80,6 +81,7 @@ int tradeoff_command(const CommandContext& context) {
   const Json machine = machine_json();
   run.result["machine"] = machine;
   if (!assembled(run, Assembly(mechanism, scene.simulation.start_time))) return run.finish();
+  if (!settle_accuracy(run)) return run.finish();
   context.out << machine_name(machine) << '\n';
   const Json& load = machine.at("load");
   if (load.is_number() && load.get<double>() > 0.7 * machine.at("cores").get<double>())

@@ -5,6 +5,8 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "core/integrate/stiffness.hpp"
+
 namespace mbsopt {
 
 RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method)
@@ -222,6 +224,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   }
   if (implicit_) implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
   PiController controller(rk_.error_order);
+  StiffnessWatch stiffness(rk_);
   double h = adaptive ? first_step(s, span) : s.step.value_or(span);
   if (s.max_step) h = std::min(h, *s.max_step);
   std::size_t frozen_index = 0;
@@ -294,6 +297,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     result.steps.times.push_back(step_.t);
     result.steps.sizes.push_back(h);
     update_statistics(result);
+    stiffness.look_at(step_);
     accepted(step_);
     if (implicit_) implicit_->accept(step_);
     if (adaptive) {
@@ -326,6 +330,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     }
   }
   result.y_end = step_.y0;
+  stiffness.add_to(result.statistics);
   result.statistics.max_acceleration_residual = dynamics_.worst_residual();
   if (implicit_) {
     evaluations_ += implicit_->evaluations();
