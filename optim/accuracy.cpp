@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 
@@ -74,8 +75,8 @@ class Chooser {
  private:
   // Of the pilot run: where that does not suffice the scene is either stiff, or long and worth as many steps as it may.
   static constexpr long kPilotSteps = 2'000;
-  static constexpr double kTightest = 1e-12, kLoosest = 1e-3;  // of rtol; rounding starves step-size control beyond
-  static constexpr double kTighter = 100;                      // the verifying run's tolerance
+  static constexpr double kTightest = 1e-11, kLoosest = 1e-3;  // of rtol
+  static constexpr double kTighter = 100;  // the verifying run's tolerance; rounding starves step-size control beyond
   static constexpr int kMostRuns = 8;
 
   struct Point {
@@ -109,6 +110,19 @@ class Chooser {
     ++result_.simulations;
     if (options_.progress) options_.progress(static_cast<int>(result_.simulations));
     return runs_.motion(settings, options_.limit);
+  }
+
+  // A run much more exact than one at rtol; better than one at the tolerance that there is.
+  Answer verifying(double rtol, double there_is) {
+    Answer verified;
+    for (const double tighter : {kTighter, 0.1 * kTighter}) {
+      const SimulationSettings tight = with_tolerance(base_, verifier_, rounded(rtol / tighter));
+      if (tight.integrator.rtol >= there_is) break;
+      verified = answer(tight);
+      if (verified.ok) result_.verified_by = tight.integrator;
+      if (verified.ok || interrupted()) break;
+    }
+    return verified;
   }
 
   SimulationSettings settings_at(const char* method, double rtol, long max_steps) const {
@@ -150,7 +164,7 @@ class Chooser {
   std::optional<Point> settled(long pilot_steps) {
     std::optional<Point> best, last;
     std::optional<Answer> right;  // of the verifying run, and its tolerance
-    double right_rtol = 0, rtol = 0.1 * result_.wanted;
+    double right_rtol = std::numeric_limits<double>::infinity(), rtol = 0.1 * result_.wanted;
     long max_steps = pilot_steps;
     for (int runs = 0; runs < kMostRuns; ++runs) {
       Point point;
@@ -174,13 +188,9 @@ class Chooser {
       }
       max_steps = base_.integrator.max_steps;
       if (!right || right_rtol > 1.01 * point.rtol() / kTighter) {
-        const SimulationSettings tight = settings_at(verifier_, point.rtol() / kTighter, max_steps);
-        if (!right || tight.integrator.rtol < right_rtol) {
-          Answer verified = answer(tight);
-          if (!verified.ok && !right) return failed(verified, std::move(best));
-          if (verified.ok)
-            right = std::move(verified), right_rtol = tight.integrator.rtol, result_.verified_by = tight.integrator;
-        }
+        Answer verified = verifying(point.rtol(), right_rtol);
+        if (!verified.ok && !right) return failed(verified, std::move(best));
+        if (verified.ok) right = std::move(verified), right_rtol = result_.verified_by.rtol;
       }
       judge(point, *right);
       const double error = std::max(point.largest(), AccuracyChoice::kRounding), aim = result_.wanted / 3;

@@ -224,7 +224,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   }
   if (implicit_) implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
   PiController controller(rk_.error_order);
-  StiffnessWatch stiffness(rk_);
+  StiffnessWatch stiffness(rk_, mechanism_.states());
   double h = adaptive ? first_step(s, span) : s.step.value_or(span);
   if (s.max_step) h = std::min(h, *s.max_step);
   std::size_t frozen_index = 0;

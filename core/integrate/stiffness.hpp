@@ -29,7 +29,7 @@ class StiffnessWatch {
   // Of the boundary: what h |lambda| is in limited steps. Step-size control lets it vary about and below the boundary.
   static constexpr double kNear = 0.6, kBeyond = 1.3;
 
-  explicit StiffnessWatch(const Method& rk);
+  StiffnessWatch(const Method& rk, Eigen::Index states);
 
   void look_at(const Step& accepted);
   void add_to(SimulationStatistics& statistics) const;
@@ -50,8 +50,11 @@ class StiffnessWatch {
 
 // Whether most steps were limited by stability, of as many as stiff motion takes.
 bool is_stability_limited(const SimulationStatistics& statistics);
+// Whether as many were, a tenth of a long run, as can make the derivatives of these steps wrong: a stretch of them
+// does.
+bool may_spoil_derivatives(const SimulationStatistics& statistics);
 
-// "the step is limited by stability in 93 % of the steps ..." with what to do; empty where it is not in most of them.
+// "the step is limited by stability in 93 % of the steps ..." with what to do; empty where it is in too few of them.
 // differentiated: whether derivatives of these very steps are taken. They are exact, and may be wrong by orders as
 // derivatives of the motion: a mode that has decayed to rounding grows by |R| > 1 until its error reaches the
 // tolerance, and derivatives, which no step-size control looks at, grow with it from wherever they are.
