@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "app/accuracy_results.hpp"
 #include "app/command.hpp"
 #include "app/interrupt.hpp"
 #include "app/objective_values.hpp"
@@ -189,6 +190,7 @@ int check_command(const CommandContext& context) {
   if (scene.parameters.empty()) throw std::invalid_argument("parameters: there are none to differentiate with");
   const Mechanism mechanism(scene, parameter_values(scene));
   run.start();
+  if (!settle_accuracy(run)) return run.finish();
   if (!assembled(run, &mechanism, Assembly(mechanism, scene.simulation.start_time))) return run.finish();
 
   double last_good_time = scene.simulation.start_time;
@@ -210,6 +212,7 @@ int check_command(const CommandContext& context) {
   const std::vector<std::optional<double>> true_values = evaluator.true_values(evaluator.start());
   add_to_result(run.result, check, true_values);
   print_simulation(context.out, scene, check.statistics);
+  warn_of_stiffness(run, check.statistics, true);
   print_entries(context.out, check, true_values);
   print_taylor(context.out, check);
   print_identities(context.out, check);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/accuracy_results.hpp"
 #include "app/command.hpp"
 #include "app/design_starts.hpp"
 #include "app/interrupt.hpp"
@@ -107,6 +108,7 @@ int design_command(const CommandContext& context) {
   const Scene& scene = run.problem.scene;
   if (!run.problem.design) throw std::invalid_argument("design: missing; it says what to minimise and what may change");
   run.start();
+  if (!settle_accuracy(run)) return run.finish();
   const SimulatedMotion before = simulated_motion(run, parameter_values(scene));
   if (!before.simulation.ok()) {
     interrupted() ? run.stopped("nothing was designed yet")
@@ -121,6 +123,7 @@ int design_command(const CommandContext& context) {
   add_to_result(run.result, design);
   print_design(context.out, design);
   for (const std::string& warning : design.warnings) run.warn(warning);
+  warn_of_stiffness(run, design.final_evaluation.statistics, true);
   const SimulatedMotion after = interrupted() ? SimulatedMotion{} : simulated_motion(run, design.rho);
   if (cut_off || design.status == SolverStatus::stopped) {
     run.stopped(fmt::format("optimized.json holds the best design so far; 'mbsopt resume {}' goes on",

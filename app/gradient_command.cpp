@@ -2,6 +2,7 @@
 
 #include <map>
 
+#include "app/accuracy_results.hpp"
 #include "app/command.hpp"
 #include "app/hessian_results.hpp"
 #include "app/interrupt.hpp"
@@ -89,6 +90,7 @@ int gradient_command(const CommandContext& context) {
 
   const Mechanism mechanism(scene, parameter_values(scene));
   run.start();
+  if (!settle_accuracy(run)) return run.finish();
   const Assembly assembly(mechanism, scene.simulation.start_time);
   if (!assembled(run, &mechanism, assembly)) return run.finish();
   for (const std::string& warning : start_warnings(mechanism, assembly)) run.warn(warning);
@@ -115,6 +117,7 @@ int gradient_command(const CommandContext& context) {
     simulated.simulation = with_cvodes(scene.simulation);
   run.result["methods"][method]["integrator"] = simulated.simulation.integrator.type;
   print_simulation(context.out, simulated, evaluation.statistics);
+  warn_of_stiffness(run, evaluation.statistics, true);
   context.out << fmt::format("gradients by {}, {:.3g} s\n\n", evaluation.choice.empty() ? method : evaluation.choice,
                              evaluation.wall_seconds);
   add_objectives(run, evaluation, evaluator.true_values(evaluator.start()));

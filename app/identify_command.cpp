@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "app/accuracy_results.hpp"
 #include "app/command.hpp"
 #include "app/identification_results.hpp"
 #include "app/identify_starts.hpp"
@@ -11,6 +12,7 @@
 #include "app/run.hpp"
 #include "core/dynamics/assembly.hpp"
 #include "core/integrate/model_choice.hpp"
+#include "optim/experiment.hpp"
 #include "optim/identification.hpp"
 
 namespace mbsopt {
@@ -70,6 +72,25 @@ IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem,
   return fit;
 }
 
+// Of the first experiment that is fitted: it stands for all of them where an integrator is chosen or judged.
+Scene simulated_scene(const Problem& problem, const std::vector<CsvTable>& data) {
+  const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
+  std::size_t e = 0;
+  while (e + 1 < experiments.size() && experiments[e].validate) ++e;
+  return Experiment(problem.scene, experiments[e], fmt::format("identification.experiments[{}]", e), data[e],
+                    parameter_values(problem.scene), {})
+      .simulated();
+}
+
+// Residuals are derived along with the motion, by runs that say nothing of their steps: hence one that does.
+void warn_of_stiff_experiment(Run& run, const std::vector<CsvTable>& data) {
+  const Scene scene = simulated_scene(run.problem, data);
+  const Mechanism mechanism(scene, parameter_values(scene), std::vector<bool>(scene.parameters.size(), false));
+  RunOptions options;
+  options.progress = [](double) { return !interrupted(); };
+  warn_of_stiffness(run, simulate(mechanism, scene.simulation, {}, {}, options).statistics, true);
+}
+
 std::vector<NewValue> new_values(const IdentificationResult& fit) {
   std::vector<NewValue> values;
   for (const FittedParameter& p : fit.parameters) values.push_back({p.experiment, p.parameter, p.value});
@@ -97,6 +118,8 @@ int identify_command(const CommandContext& context) {
     run.result["model"] = to_json(model);
     print_model(context.out, scene.name, model);
   }
+  if (!settle_accuracy(run, simulated_scene(run.problem, data), {})) return run.finish();
+  warn_of_stiff_experiment(run, data);
   LongRun long_run(run);
   const Problem problem = from_best_start(run, long_run, data);
   if (interrupted() && run.problem.identification->multistart) return stopped_within_starts(run, long_run, problem);

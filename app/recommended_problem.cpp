@@ -52,6 +52,7 @@ Json formulation_json(const FormulationSettings& f) {
 
 std::string recommended_problem_text(const Run& run, const SimulationSettings& settings) {
   std::string text = optimized_problem_text(run, {});
+  text = without_member(text, "simulation.accuracy");  // it was a choice, too
   text = with_value(text, "simulation.integrator", text_of(integrator_json(settings.integrator)));
   const Json formulation = formulation_json(settings.formulation);
   if (formulation != formulation_json(run.problem.scene.simulation.formulation))

@@ -5,12 +5,12 @@
 namespace mbsopt {
 namespace {
 
-constexpr std::array kOrder{"program",    "version",         "command",         "problem",    "status",
-                            "message",    "last_good_time",  "machine",         "model",      "simulation",
-                            "objectives", "methods",         "hessian_method",  "verdict",    "reference",
-                            "settings",   "recommendations", "applied",         "skipped",    "penalty",
-                            "parameters", "experiments",     "correlation",     "profiles",   "statistics",
-                            "multistart", "optimizer",       "identifiability", "provenance", "warnings"};
+constexpr std::array kOrder{
+    "program",         "version",     "command",     "problem",         "status",     "message",    "last_good_time",
+    "machine",         "model",       "accuracy",    "simulation",      "objectives", "methods",    "hessian_method",
+    "verdict",         "reference",   "settings",    "recommendations", "applied",    "skipped",    "penalty",
+    "parameters",      "experiments", "correlation", "profiles",        "statistics", "multistart", "optimizer",
+    "identifiability", "provenance",  "warnings"};
 
 }  // namespace
 
@@ -38,6 +38,11 @@ Json to_json(const SimulationStatistics& statistics) {
             {"max_position_violation", statistics.max_position_violation},
             {"max_velocity_violation", statistics.max_velocity_violation},
             {"energy_drift", statistics.energy_drift}};
+  if (statistics.watched_steps > 0) {
+    json["watched_steps"] = statistics.watched_steps;
+    json["stability_limited_steps"] = statistics.stability_limited_steps;
+    if (statistics.stability_limited_steps > 0) json["fastest_rate"] = statistics.stiffest_rate;
+  }
   if (statistics.adjoint_memory_bytes > 0) {
     json["adjoint_memory_bytes"] = statistics.adjoint_memory_bytes;
     json["recomputed_steps"] = statistics.recomputed_steps;

@@ -36,8 +36,8 @@ std::vector<std::string> data_files(const Problem& problem) {
 }
 
 Run::Run(const CommandContext& given)
-    : context(given),
-      problem(read_problem(given.options.problem_file, given.options.sets, &reader_warnings_)),
+    : problem_(read_problem(given.options.problem_file, given.options.sets, &reader_warnings_)),
+      context(given),
       folder(given.options.out, problem.scene.name, given.options.problem_file, given.command),
       progress(given.err, given.err_is_terminal, given.options.quiet) {
   result["program"] = "mbsopt";

@@ -31,11 +31,12 @@ class Run {
   ~Run();  // a run that an exception ends has failed, and its result.json says so
 
  private:
-  std::vector<std::string> reader_warnings_;  // filled while `problem` is read, hence before it
+  std::vector<std::string> reader_warnings_;  // filled while the problem is read, hence before it
+  Problem problem_;
 
  public:
   const CommandContext& context;
-  const Problem problem;
+  const Problem& problem = problem_;
   const OutputFolder folder;
   Json result;  // the parts of result.json
   Progress progress;
@@ -43,6 +44,8 @@ class Run {
   void start();  // claims the folder: result.json with "status": "running"
   void write(const std::string& file, std::string_view content);  // into the folder; named in the closing line
   void warn(const std::string& warning);
+  // In place of what the file says (accuracy_results.hpp).
+  void simulate_with(const SimulationSettings& settings) { problem_.scene.simulation = settings; }
 
   // How it ended, unless all went well.
   // exit 1; last_good_time: of the motion, where it is the simulation that failed

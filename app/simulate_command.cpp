@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "app/accuracy_results.hpp"
 #include "app/command.hpp"
 #include "app/objective_values.hpp"
 #include "app/report/run_report.hpp"
@@ -30,6 +31,7 @@ int simulate_command(const CommandContext& context) {
   Run run(context);
   const Scene& scene = run.problem.scene;
   run.start();
+  if (!settle_accuracy(run)) return run.finish();
   const SimulatedMotion motion = simulated_motion(run, parameter_values(scene));
   const SimulationResult& simulation = motion.simulation;
   for (const std::string& warning : motion.warnings) run.warn(warning);
@@ -40,6 +42,7 @@ int simulate_command(const CommandContext& context) {
     print_simulation(context.out, scene, simulation.statistics);
     run.write("trajectory.csv", to_csv(motion.trajectory));
     for (const std::string& warning : simulation_warnings(scene.simulation, simulation.statistics)) run.warn(warning);
+    warn_of_stiffness(run, simulation.statistics, false);
   }
   if (simulation.ok()) {
     add_objectives(run, motion);

@@ -29,6 +29,20 @@ constexpr std::chrono::milliseconds kPatience{300};
 //   to a rank   {"work": {...}} {"start": 7} {"stop": true} {"dismissed": true}
 //   to rank 0   {"reply": 7, "ok": true, "text": "..."} {"interrupted": true} {"failed": "why"}
 
+// As rank 0 may have chosen it (accuracy_results.hpp).
+Json integrator_of(const Problem& problem) {
+  const IntegratorSettings& s = problem.scene.simulation.integrator;
+  return {{"type", s.type}, {"rtol", s.rtol}, {"atol", s.atol}};
+}
+
+void set_integrator(Problem& problem, const Json& integrator) {
+  SimulationSettings& settings = problem.scene.simulation;
+  settings.accuracy.reset();
+  settings.integrator.type = integrator.at("type").get<std::string>();
+  settings.integrator.rtol = integrator.at("rtol").get<double>(),
+  settings.integrator.atol = integrator.at("atol").get<double>();
+}
+
 Json work_message(const Run& run, const Json& task, int workers) {
   const CommandContext& context = run.context;
   return {{"work",
@@ -38,6 +52,7 @@ Json work_message(const Run& run, const Json& task, int workers) {
             {"input_sha256", run.result["provenance"]["input_sha256"]},
             {"data_sha256", run.result["provenance"].value("data_sha256", Json())},
             {"workers", workers},
+            {"integrator", integrator_of(run.problem)},
             {"task", task}}}};
 }
 
@@ -104,7 +119,8 @@ void compute_on_ranks(Run& run, Ranks& ranks, int workers, const std::vector<int
 
 std::function<Json(int)> work_of(const Json& work) {
   const std::string file = work.at("problem_file"), command = work.at("command");
-  const Problem problem = read_problem(file, work.at("sets").get<std::vector<std::string>>());
+  Problem problem = read_problem(file, work.at("sets").get<std::vector<std::string>>());
+  set_integrator(problem, work.at("integrator"));
   const Json here = provenance({}, "", file, data_files(problem));
   for (const char* key : {"input_sha256", "data_sha256"})
     if (here.value(key, Json()) != work.at(key))

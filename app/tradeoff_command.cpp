@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "app/accuracy_results.hpp"
 #include "app/command.hpp"
 #include "app/interrupt.hpp"
 #include "app/machine.hpp"
@@ -79,6 +80,7 @@ int tradeoff_command(const CommandContext& context) {
   run.start();
   const Json machine = machine_json();
   run.result["machine"] = machine;
+  if (!settle_accuracy(run)) return run.finish();
   if (!assembled(run, &mechanism, Assembly(mechanism, scene.simulation.start_time))) return run.finish();
   context.out << machine_name(machine) << '\n';
   const Json& load = machine.at("load");

@@ -153,6 +153,14 @@ void Experiment::compile_channels(const ExperimentSpec& spec, const std::string&
   }
 }
 
+Scene Experiment::simulated() const {
+  Scene scene = scene_;
+  scene.simulation = settings_;
+  for (std::size_t k = 0; k < scene.parameters.size(); ++k)
+    scene.parameters[k].value = rho_(static_cast<Eigen::Index>(k));
+  return scene;
+}
+
 void Experiment::take_samples(const ExperimentSpec& spec, const std::string& place, const CsvTable& data) {
   if (spec.start_time) settings_.start_time = *spec.start_time;
   const double start = settings_.start_time, end = spec.end_time.value_or(std::numeric_limits<double>::infinity());

@@ -58,6 +58,10 @@ class Experiment {
   };
   Residuals residuals(const Eigen::VectorXd& u, const Limits& limits = {}) const;
 
+  // What is simulated, as a scene: with its laws and its span, at the values that are not unknown and those at which
+  // the unknown ones start.
+  Scene simulated() const;
+
   const std::vector<double>& times() const { return times_; }
   const std::vector<Sample>& samples() const { return samples_; }  // by time, then channel
   std::size_t channels() const { return channels_.size(); }

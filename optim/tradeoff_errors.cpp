@@ -12,13 +12,10 @@ namespace {
 using Eigen::Index;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-// A size that two methods agree on to three digits, so that errors may be relative to it.
-bool is_known(double size, double apart) { return size > 1e3 * apart; }
-
 }  // namespace
 
-TradeoffErrors::TradeoffErrors(const TradeoffRuns& runs, Answer exact, const Answer& second)
-    : distance_(runs.mechanism()), exact_(std::move(exact)) {
+TradeoffErrors::TradeoffErrors(const TradeoffRuns& runs, Answer exact, const Answer& second, double clearly)
+    : distance_(runs.mechanism()), exact_(std::move(exact)), clearly_(clearly) {
   const Scene& scene = runs.scene();
   parameter_size_.resize(static_cast<Index>(scene.parameters.size()));
   for (Index k = 0; k < parameter_size_.size(); ++k) {

@@ -5,8 +5,8 @@
 //   objective  |psi - psi*| / |psi*|
 //   gradient   of an objective: |D (g - g*)| / |D g*|, D: sizes of the parameters, on the diagonal
 //
-// Where the right answer is zero, or so small that two methods do not agree on its first three digits, the error of the
-// motion, an objective or a gradient is absolute, and a sensor is left out.
+// Where the right answer is zero, or so small that two methods do not agree on its first three digits (`clearly` says
+// otherwise), the error of the motion, an objective or a gradient is absolute, and a sensor is left out.
 #pragma once
 
 #include <Eigen/Core>
@@ -32,7 +32,8 @@ class TradeoffErrors {
  public:
   // Two answers that should be the same, by different methods; the first is the more exact one. Each has the motion and
   // the gradients, where there are any.
-  TradeoffErrors(const TradeoffRuns& runs, Answer exact, const Answer& second);
+  // Errors are relative to what is `clearly` times as large as what the two are apart.
+  TradeoffErrors(const TradeoffRuns& runs, Answer exact, const Answer& second, double clearly = 1e3);
 
   // The same measures against another answer, by the same scales.
   TradeoffErrors(TradeoffErrors measures, Answer exact) : TradeoffErrors(std::move(measures)) {
@@ -46,11 +47,13 @@ class TradeoffErrors {
 
  private:
   double error(const Quantity& quantity, const Answer& answer) const;
+  bool is_known(double size, double apart) const { return size > clearly_ * apart; }
   double sensor_error(const Answer& answer) const;
   double gradient_size(const Eigen::Ref<const Eigen::RowVectorXd>& gradient) const;
 
   MotionDistance distance_;
   Answer exact_;
+  double clearly_;
   Eigen::VectorXd sensor_scale_;  // 0: left out
   Eigen::VectorXd parameter_size_;
   std::vector<Quantity> quantities_;

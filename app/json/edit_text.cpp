@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <vector>
@@ -67,6 +68,24 @@ std::string with_value(const std::string& text, std::string_view path, const std
   }
   if (!node->keys.empty()) member += ", ";
   return replaced(text, node->begin + 1, node->begin + 1, member);
+}
+
+std::string without_member(const std::string& text, std::string_view path) {
+  Findings findings("problem file", text);
+  const Node root = parse_json(findings);
+  findings.throw_if_any();
+  const Node *parent = nullptr, *node = &root;
+  std::size_t at = 0;
+  for (const PathStep& step : parse_path(path)) {
+    if (node->kind != Node::Kind::object) return text;
+    const auto key = std::find(node->keys.begin(), node->keys.end(), step.key);
+    if (key == node->keys.end()) return text;
+    parent = node, at = static_cast<std::size_t>(key - node->keys.begin());
+    node = &node->items[at];
+  }
+  if (!parent) return text;
+  if (at + 1 < parent->keys.size()) return replaced(text, parent->key_offsets[at], parent->key_offsets[at + 1], "");
+  return replaced(text, at > 0 ? parent->items[at - 1].end : parent->key_offsets[at], node->end, "");
 }
 
 std::string with_override(const std::string& text, const std::string& override_text) {

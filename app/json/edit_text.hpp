@@ -11,6 +11,9 @@ namespace mbsopt {
 // added. Throws InputError where the text is not JSON or the path leads nowhere.
 std::string with_value(const std::string& text, std::string_view path, const std::string& json);
 
+// Without the member at a path of keys; as it is where there is none.
+std::string without_member(const std::string& text, std::string_view path);
+
 // With one --set, "path=value", applied: the value is JSON where it is JSON, else a string.
 std::string with_override(const std::string& text, const std::string& override_text);
 

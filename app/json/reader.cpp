@@ -1,7 +1,10 @@
 #include "app/json/reader.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <limits>
 
@@ -273,6 +276,37 @@ void Reader::plain(std::string_view key, bool& value, const Range&, const Says& 
     value = node->boolean;
   else
     findings_.add(*node, inside(key), "must be true or false, found " + what_is(*node));
+}
+
+void Reader::level(std::string_view key, std::optional<double>& value, std::span<const Choice<double>> choices,
+                   const Range& range, const Says& says) {
+  const Node* const node = get(key, says);
+  if (!node) return;
+  std::vector<std::string> available;
+  for (const Choice<double>& choice : choices) {
+    if (node->kind == Node::Kind::string && node->string == choice.word) {
+      value = choice.value;
+      return;
+    }
+    available.emplace_back(choice.word);
+  }
+  const bool is_word = node->kind == Node::Kind::string && !node->string.empty() &&
+                       std::isalpha(static_cast<unsigned char>(node->string[0]));
+  if (is_word)
+    findings_.add(*node, inside(key), not_among(key, node->string, available) + ", or a number");
+  else
+    plain(key, value, range, says);
+}
+
+void Reader::instead_of(std::string_view key, std::string_view object, const Words& fields) {
+  const Node* const node = node_.find(object);
+  if (!has(key) || !node || node->kind != Node::Kind::object) return;
+  for (const std::string& field : words(fields.available))
+    if (const Node* const value = node->find(field))
+      findings_.add(*value, child_path(inside(object), field),
+                    fmt::format("is chosen by {0}, and must not stand beside it: leave out one of the two ({1} is left "
+                                "out with --set {1}={{}})",
+                                inside(key), inside(object)));
 }
 
 void Reader::numbers(std::string_view key, std::vector<double>& values, const Range&, const Says& says) {

@@ -66,6 +66,14 @@ class Reader {
     plain(key, given, range, says);
     value = given;
   }
+  template <std::size_t N>
+  void level(std::string_view key, std::optional<double>& value, const Choice<double> (&choices)[N], const Range& range,
+             const Says& says) {
+    level(key, value, std::span<const Choice<double>>(choices), range, says);
+  }
+  void level(std::string_view key, std::optional<double>& value, std::span<const Choice<double>> choices, const Range&,
+             const Says& says);
+  void instead_of(std::string_view key, std::string_view object, const Words& fields);
   void numbers(std::string_view key, std::vector<double>& values, const Range&, const Says& says);
   void overrides(std::string_view key, std::vector<std::pair<std::string, double>>& values, const Says& says);
 

@@ -31,12 +31,14 @@ class SchemaWriter {
  public:
   Json properties = Json::object();
   Json required = Json::array();
-  std::span<const TypeRow> rows;  // of an object with a type
+  Json dependent = Json::object();  // what the presence of a key asks of others
+  std::span<const TypeRow> rows;    // of an object with a type
   std::string type_key;
 
   Json object() const {
     Json schema{{"type", "object"}, {"properties", properties}};
     if (!required.empty()) schema["required"] = required;
+    if (!dependent.empty()) schema["dependentSchemas"] = dependent;
     schema["additionalProperties"] = false;
     return schema;
   }
@@ -127,6 +129,18 @@ class SchemaWriter {
   }
   void plain(std::string_view key, bool& value, const Range&, const Says& says) {
     put(key, says, {{"type", "boolean"}}, value);
+  }
+  template <std::size_t N>
+  void level(std::string_view key, std::optional<double>&, const Choice<double> (&choices)[N], const Range& range,
+             const Says& says) {
+    Json words = Json::array();
+    for (const Choice<double>& choice : choices) words.push_back(choice.word);
+    put(key, says, {{"anyOf", {{{"enum", words}}, ranged(ref("number"), range)}}});
+  }
+  void instead_of(std::string_view key, std::string_view object, const Words& fields) {
+    Json none = Json::object();
+    for (const std::string& field : words(fields.available)) none[field] = false;
+    dependent[std::string(key)] = {{"properties", {{std::string(object), {{"properties", none}}}}}};
   }
   void numbers(std::string_view key, std::vector<double>&, const Range& range, const Says& says) {
     put(key, says, {{"type", "array"}, {"items", ranged(ref("number"), range)}});

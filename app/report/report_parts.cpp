@@ -53,6 +53,8 @@ void add_status(HtmlPage& page, const Json& result) {
   } else if (status == "interrupted") {
     page.banner("This run was " + message + ".");
   }
+  if (result.contains("accuracy"))
+    page.paragraph("Accuracy: " + result.at("accuracy").at("in_words").get<std::string>());
   for (const Json& warning : result.at("warnings")) page.paragraph("Warning: " + warning.get<std::string>());
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/integrate/model_choice.hpp"
+#include "core/integrate/stiffness.hpp"
 
 namespace mbsopt {
 namespace {
@@ -275,6 +276,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   }
   if (implicit_) implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
   PiController controller(rk_.error_order);
+  StiffnessWatch stiffness(rk_, mechanism_.states());
   double h = adaptive ? first_step(s, span) : s.step.value_or(span);
   if (s.max_step) h = std::min(h, *s.max_step);
   std::size_t frozen_index = 0;
@@ -338,6 +340,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
         break;
       }
     }
+    stiffness.look_at(step_);
     accepted(step_);
     if (implicit_) implicit_->accept(step_);
     if (adaptive) {
@@ -370,6 +373,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     }
   }
   result.y_end = step_.y0;
+  stiffness.add_to(result.statistics);
   result.statistics.max_acceleration_residual = dynamics_.worst_residual();
   if (implicit_) {
     evaluations_ += implicit_->evaluations();

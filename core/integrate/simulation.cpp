@@ -31,6 +31,13 @@ const Method& method_of(const SimulationSettings& settings) {
   return *method;
 }
 
+void require_settled(const SimulationSettings& settings) {
+  if (settings.accuracy)
+    throw std::invalid_argument(
+        "simulation.accuracy: stands for an integrator that is still to be chosen; choose_accuracy() of "
+        "optim/accuracy.hpp does");
+}
+
 RunOptions with_exact_stages(RunOptions options) {
   options.exact_stages = true;
   return options;
@@ -198,6 +205,7 @@ class Replayer {
 
 SimulationResult simulate(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
                           const Sampling& sampling, const RunOptions& options) {
+  require_settled(settings);
   if (is_cvodes(settings.integrator.type)) return cvodes_simulate(mechanism, settings, costs, sampling, options);
   Run run(mechanism, settings, costs);
   run.go(sampling.times, sampling.observe, options, {});
@@ -206,6 +214,7 @@ SimulationResult simulate(const Mechanism& mechanism, const SimulationSettings& 
 
 SimulationResult simulate_tlm(const Mechanism& mechanism, const SimulationSettings& settings,
                               std::span<const Cost> costs, const TangentSampling& sampling, const RunOptions& options) {
+  require_settled(settings);
   if (is_cvodes(settings.integrator.type)) return cvodes_forward(mechanism, settings, costs, sampling, options);
   Run run(mechanism, settings, costs);
   SimulationResult& result = run.result();
@@ -223,6 +232,7 @@ SimulationResult simulate_tlm(const Mechanism& mechanism, const SimulationSettin
 
 SimulationResult simulate_adjoint(const Mechanism& mechanism, const SimulationSettings& settings,
                                   std::span<const Cost> costs, const RunOptions& options) {
+  require_settled(settings);
   if (is_cvodes(settings.integrator.type)) return cvodes_adjoint(mechanism, settings, costs, options);
   Run run(mechanism, settings, costs);
   SimulationResult& result = run.result();

@@ -40,6 +40,10 @@ struct SimulationStatistics {
   double max_acceleration_residual = 0;  // relative, of the constraints' accelerations (augmented Lagrangian)
   std::size_t adjoint_memory_bytes = 0;  // the most that the backward sweep kept of the forward run
   long recomputed_steps = 0;             // for want of memory, of the backward sweep
+  // Of explicit methods that can tell (stiffness.hpp): steps that were looked at, those at the edge of stability among
+  // them, and the fastest rate |lambda| there [1/s].
+  long watched_steps = 0, stability_limited_steps = 0;
+  double stiffest_rate = 0;
 };
 
 enum class SimulationStatus {

@@ -68,6 +68,12 @@ class Checker {
   void plain(std::string_view key, const std::optional<long>& value, const Range& range, const Says& says) {
     if (value) plain(key, *value, range, says);
   }
+  template <std::size_t N>
+  void level(std::string_view key, const std::optional<double>& value, const Choice<double> (&)[N], const Range& range,
+             const Says& says) {
+    plain(key, value, range, says);
+  }
+  void instead_of(std::string_view, std::string_view, const Words&) {}
   void numbers(std::string_view key, const std::vector<double>& values, const Range& range, const Says& says);
   void overrides(std::string_view key, const std::vector<std::pair<std::string, double>>& values, const Says& says);
 

@@ -84,6 +84,9 @@ class FieldVisitor {
     tell_all(at(key), values, names);
   }
   void plain(std::string_view, const auto&, const Range&, const Says&) {}
+  template <std::size_t N>
+  void level(std::string_view, const std::optional<double>&, const Choice<double> (&)[N], const Range&, const Says&) {}
+  void instead_of(std::string_view, std::string_view, const Words&) {}
   void numbers(std::string_view, const std::vector<double>&, const Range&, const Says&) {}
   void overrides(std::string_view, const std::vector<std::pair<std::string, double>>&, const Says&) {}
   template <class T>

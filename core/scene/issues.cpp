@@ -303,6 +303,8 @@ void check_meaning(Checker& checker, const SimulationSettings& settings) {
   if (settings.end_time <= settings.start_time)
     checker.issue(checker.path("end_time"), "is " + text_of(settings.end_time) + " s, it must be after start_time, " +
                                                 text_of(settings.start_time) + " s");
+  if (settings.accuracy && *settings.accuracy >= 1)
+    checker.issue(checker.path("accuracy"), "is " + text_of(*settings.accuracy) + ", a relative error must be below 1");
   if (!settings.events.empty() && has_word(kMultistepMethods, settings.integrator.type))
     checker.issue(checker.path("events"),
                   "are times at which a step ends; " + settings.integrator.type +

@@ -21,6 +21,8 @@
 //   time_law(key, Expression&, optional<SampledLaw>&, says)  an expression of t, or samples from a file
 //   laws(key, LawVector&, Names, says)          three of them
 //   plain(key, double&, Range, says)            a number that no parameter enters; also long, int, bool, optional
+//   level(key, optional<double>&, Choice<double>[], Range, says)  a number, or one of a few words that stand for
+//   numbers instead_of(key, object, Words)              where the key is given, that object must not have these fields
 //   object(key, T&, says)                       describe(visitor, T) inside; also optional<T>
 //   group(key, says, f)                         f(visitor) inside: fields that are nested in the file only
 //   list(key, vector<T>&, says)                 describe(visitor, T) for each
@@ -88,6 +90,7 @@ inline constexpr Choice<ModelChoice> kModels[] = {
 inline constexpr Choice<Projection> kProjections[] = {{"none", Projection::none},
                                                       {"velocity", Projection::velocity},
                                                       {"position_velocity", Projection::position_velocity}};
+inline constexpr Choice<double> kAccuracies[] = {{"draft", 1e-3}, {"engineering", 1e-5}, {"reference", 1e-9}};
 inline constexpr Choice<bool> kFrames[] = {{"global", false}, {"body", true}};
 
 void describe(auto& v, Like<Parameter> auto& p) {
@@ -352,7 +355,11 @@ void describe(auto& v, Like<SimulationSettings> auto& s) {
   v.choice("model", s.model, kModels,
            {"three unknowns per body (planar) or six (spatial); auto: planar where joints hold all bodies in a plane"});
   v.object("formulation", s.formulation, {"form of the equations of motion"});
+  v.level("accuracy", s.accuracy, kAccuracies, kPositive,
+          {"wanted relative error of the objectives (of the motion where there is none), from which integrator and "
+           "tolerances are chosen: draft 1e-3, engineering 1e-5, reference 1e-9, or a number"});
   v.object("integrator", s.integrator, {"time integration"});
+  v.instead_of("accuracy", "integrator", Words{"type rtol atol step"});
   v.numbers("events", s.events, kAny,
             {"times at which a law may jump or have a kink: a step ends there [s]", Need::optional, dimension::kTime});
   v.plain("adjoint_memory_mib", s.adjoint_memory_mib, kPositive,

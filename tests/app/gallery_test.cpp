@@ -24,6 +24,7 @@ namespace {
 
 Problem accurately(const std::string& name, double rtol) {
   Problem problem = read_problem(file_of(name));
+  problem.scene.simulation.accuracy.reset();
   problem.scene.simulation.integrator.type = "dopri853";
   problem.scene.simulation.integrator.rtol = rtol, problem.scene.simulation.integrator.atol = 1e-2 * rtol;
   return problem;

@@ -57,6 +57,16 @@ TEST_CASE("a path that leads nowhere is refused", "[json]") {
   CHECK_THROWS_AS(with_value("{", "name", "1"), InputError);
 }
 
+TEST_CASE("a member is taken out with its comma, and nothing else", "[json]") {
+  const std::string text = R"({"a": 1, "b": {"c": 2, "d": [3]}, "e": 4})";
+  CHECK(without_member(text, "a") == R"({"b": {"c": 2, "d": [3]}, "e": 4})");
+  CHECK(without_member(text, "b.d") == R"({"a": 1, "b": {"c": 2}, "e": 4})");
+  CHECK(without_member(text, "b.c") == R"({"a": 1, "b": {"d": [3]}, "e": 4})");
+  CHECK(without_member(R"({"b": {"c": 2}})", "b.c") == R"({"b": {}})");
+  CHECK(without_member(text, "b.none") == text);
+  CHECK(without_member(text, "a.c") == text);
+}
+
 TEST_CASE("an override is applied to the text as it is when it is read", "[json]") {
   const std::string text = R"({"name": "x", "bodies": [{"mass": 1}], "parameters": {"k": 1}})";
   CHECK(with_override(text, "bodies[0].mass=2.5") ==
