@@ -245,15 +245,15 @@ REASONS = """## What is missed, and why
 
 Profiles by `perf record -e cpu-clock` of right-hand sides in the spatial model, chain of 200 rods (N-four-bar, N = 40, in brackets), per cent:
 assembly of S 26 (27), its factorisation 21 (21), both solves with their products with J 21 (21), frames with pddot 16 (11), J 7 (10), Phiddot
-4 (7), the rest 5 (3). In a run with `dopri5` the right-hand sides are about three quarters; the rest is the projection, about two
+4 (7), the rest 5 (3). In a run with `dopri5` the right-hand sides are about three quarters; the rest is the projection, one to two
 right-hand sides per step, and the sums of the stages.
 
 * **Assembly of S costs more than its factorisation.** Rows are multiplied one by one into blocks that were set to zero before.
-* **Refinements grow with long chains in space.** At the relative alpha of 1e8 a chain of 10 000 rods needs 27 passes to 1e-14, against 2 for one
+* **Refinements grow with long chains in space.** At the relative alpha of 1e8 a chain of 10 000 rods needs about 20 passes to 1e-14, against 2 for one
   of 100 in the plane: that is its ratio above 1.3. Tried: alpha of 1e10 takes 5 passes, 1e11 three; Bricard's mechanism at 1e9 takes one
   refinement where 1e8 takes two. What that does to rounding in whole runs is not known yet.
 * **Initial assembly is dense**, of the third order in the number of bodies, even where the guess is exact: a third of the time of A02 at N = 40 and
-  more at default tolerances. Mechanisms of 1 000 bodies do not get through it in minutes, so that the figures *in a run* leave it out.
+  more at default tolerances. By its growth 1 000 bodies would take minutes, so that the figures *in a run* leave it out.
 * **The projection does not stop where rounding is.** Its bound of 1e-15 m lies below the rounding of positions of some metres, so that each of its two
   iterations takes a pass or more for nothing; far from the origin, where it also converges slowly, dozens.
 * **FB-1** takes eight evaluations with gradients at the tolerance of its file, 1e-9 with `dopri853`.
