@@ -1,7 +1,7 @@
 // Five bars on two springs (FB-1), whose optimum is known: what the whole optimisation takes, and a Hessian.
 //   ms                        processor time from the problem to its optimum, median; reading the file is not in it
-//   evaluations, simulations  of it;  optimum_error: the larger error of the two lengths, relative
-//   hessian_ratio             a full Hessian in ten parameters over one simulation
+//   optimizer_iterations, evaluations, simulations  of it;  optimum_error: the larger error of the two lengths,
+//   relative hessian_ratio             a full Hessian in ten parameters over one simulation
 #include <benchmark/benchmark.h>
 
 #include "app/json/read_problem.hpp"
@@ -23,7 +23,7 @@ void design(benchmark::State& state) {
     DesignResult result;
     state.counters["ms"] = 1e3 * median_seconds([&] { result = run_design(problem); }, 9);
     if (!result.ok()) return state.SkipWithError(result.message.c_str());
-    state.counters["iterations"] = result.iterations;
+    state.counters["optimizer_iterations"] = result.iterations;
     state.counters["evaluations"] = static_cast<double>(result.evaluations);
     state.counters["simulations"] = static_cast<double>(result.simulations);
     double error = 0;
