@@ -15,9 +15,12 @@ namespace {
 // redundant.
 double moderate_alpha(const MechanismData& data, double penalty) {
   if (data.m == 0) return penalty;
-  const double least = data.row_alpha.minCoeff();
-  double most = data.row_alpha.maxCoeff();
-  for (const BodyData& b : data.bodies) most = std::max({most, b.mass, b.J.trace()});
+  double least = data.row_alpha.minCoeff(), most = data.row_alpha.maxCoeff();
+  for (const BodyData& b : data.bodies) {
+    most = std::max({most, b.mass, b.J.trace()});
+    if (b.mass > 0) least = std::min(least, b.mass);
+    if (b.J.trace() > 0) least = std::min(least, b.J.trace());
+  }
   const double moderate = std::clamp(1e11 * least, 1e3 * most, 1e7 * most);
   return penalty <= moderate ? penalty : std::min(moderate, penalty / 100);
 }
