@@ -9,8 +9,13 @@
 
 namespace mbsopt::bench {
 
-// "spatial": six unknowns per body.
-inline std::vector<std::string> models_of(const Linkage&) { return {"spatial"}; }
-inline void choose_model(SimulationSettings&, const std::string&) {}
+// "planar": three unknowns per body, "spatial": six. The first is the one that runs take by themselves.
+inline std::vector<std::string> models_of(const Linkage& linkage) {
+  if (linkage.planar()) return {"planar", "spatial"};
+  return {"spatial"};
+}
+inline void choose_model(SimulationSettings& settings, const std::string& model) {
+  settings.model = model == "planar" ? ModelChoice::planar : ModelChoice::spatial;
+}
 
 }  // namespace mbsopt::bench

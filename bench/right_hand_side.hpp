@@ -3,6 +3,7 @@
 
 #include "bench/models.hpp"
 #include "core/dynamics/dynamics.hpp"
+#include "core/integrate/model_choice.hpp"
 #include "core/scene/scene.hpp"
 
 namespace mbsopt::bench {
@@ -10,7 +11,10 @@ namespace mbsopt::bench {
 class RightHandSide {
  public:
   RightHandSide(const Scene& scene, const SimulationSettings& settings, Eigen::VectorXd y)
-      : mechanism_(scene, Eigen::VectorXd(0)), dynamics_(mechanism_, settings.formulation), y_(std::move(y)) {
+      : mechanism_(scene, Eigen::VectorXd(0)),
+        dynamics_(mechanism_, settings.formulation,
+                  model_of(mechanism_, settings, *runge_kutta_method(settings.integrator.type))),
+        y_(std::move(y)) {
     ydot_.setZero(y_.size());
     angles_.setZero(static_cast<Eigen::Index>(mechanism_.data().angles.size()));
   }

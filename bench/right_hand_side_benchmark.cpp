@@ -77,7 +77,9 @@ void of_problem(benchmark::State& state, const char* file) {
   for (Eigen::Index k = 0; k < rho.size(); ++k) rho(k) = problem.scene.parameters[static_cast<std::size_t>(k)].value;
   const Mechanism mechanism(problem.scene, rho);
   const Assembly assembly(mechanism, problem.scene.simulation.start_time);
-  Dynamics dynamics(mechanism, problem.scene.simulation.formulation);
+  const SimulationSettings& settings = problem.scene.simulation;
+  Dynamics dynamics(mechanism, settings.formulation,
+                    model_of(mechanism, settings, *runge_kutta_method(settings.integrator.type)));
   Eigen::VectorXd ydot(mechanism.states());
   for (auto _ : state) {
     const auto& start = assembly.result();

@@ -157,7 +157,10 @@ class Search {
   // Joints that hold one body of theirs in the plane when the other one is, followed from the ground.
   std::string body_not_held() const {
     std::vector<std::vector<int>> neighbours(data_.bodies.size());
+    int seen = -1;  // the joint whose first dot-1, one with axis 2, has been looked at
     for (const Constraint& c : data_.constraints) {
+      if (c.joint < 0 || c.joint == seen || !std::holds_alternative<Dot1>(c.primitive)) continue;
+      seen = c.joint;
       if (!holds(c)) continue;
       neighbours[at(c.body1)].push_back(c.body2);
       neighbours[at(c.body2)].push_back(c.body1);
@@ -182,13 +185,10 @@ class Search {
     return "";
   }
 
-  // Whether this row is of a joint that holds bodies in the plane; of each such joint one row is enough, a dot-1 with
-  // axis 2.
+  // Whether a joint holds bodies in the plane, from its first dot-1, which has axis 2 where the joint has axes.
   bool holds(const Constraint& c) const {
-    const auto* parallel = std::get_if<Dot1>(&c.primitive);
-    if (!parallel || c.joint < 0) return false;
     const std::string& type = scene_.joints[at(c.joint)].type;
-    const Lies axis = lies(c.body2, parallel->s2, c.slot2);
+    const Lies axis = lies(c.body2, std::get<Dot1>(c.primitive).s2, c.slot2);
     if (type == "revolute" || type == "planar") return axis == Lies::along_normal;
     return type == "fixed" || (type == "translational" && axis == Lies::in_plane);
   }

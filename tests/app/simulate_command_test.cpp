@@ -35,7 +35,10 @@ TEST_CASE("validate counts bodies, equations and degrees of freedom", "[command]
                                              {"equations", 6},
                                              {"rank", 6},
                                              {"degrees_of_freedom", 1},
-                                             {"redundant", nlohmann::json::array()}});
+                                             {"redundant", nlohmann::json::array()},
+                                             {"type", "planar"},
+                                             {"unknowns_per_body", 3},
+                                             {"not_planar", nullptr}});
 }
 
 TEST_CASE("simulate writes the columns of the contract, a row each output step", "[command]") {
