@@ -175,9 +175,10 @@ std::string RungeKuttaRun::failed(Outcome outcome, double h, bool adaptive) cons
     case Outcome::failed:
       return (adaptive
                   ? fmt::format(
-                        "the accelerations cannot be computed beyond t = {:.6g} s, however small the step. A law or "
+                        "the accelerations cannot be computed beyond t = {:.6g} s, however small the step. Look for a "
+                        "law or "
                         "force that is not finite there (a root, logarithm or division outside its range), or a "
-                        "body without inertia in a direction that no joint holds?",
+                        "body without inertia in a direction that no joint holds",
                         step_.t)
                   : fmt::format("the state stopped being finite in the step from t = {:.6g} s by {:.3g} s. The step is "
                                 "too large "

@@ -42,6 +42,18 @@ class Search {
   }
   PlanarModel take() { return std::move(model_); }
 
+  // Rows that keep an axis along the normal: where there is no model, the normal with most is the one meant.
+  int axes_along_normal() const {
+    int count = 0;
+    for (const Constraint& c : data_.constraints) {
+      const auto* parallel = std::get_if<Dot1>(&c.primitive);
+      if (parallel && !model_.bodies.empty()) {
+        count += lies(c.body2, parallel->s2, c.slot2) == Lies::along_normal ? 1 : 0;
+      }
+    }
+    return count;
+  }
+
  private:
   void place_bodies() {
     const Vector3d n = Vector3d::Unit(model_.n);
@@ -203,13 +215,14 @@ class Search {
 }  // namespace
 
 PlanarSearch find_planar_model(const Scene& scene, const MechanismData& data) {
-  // The first joint with axes says about which normal it can be; z is as good as any without one.
   std::string reason;
+  int most = -1;
   for (const int normal : {2, 0, 1}) {
     Search search(scene, data, normal);
     std::string why = search.run();
     if (why.empty()) return {std::make_shared<const PlanarModel>(search.take()), ""};
-    if (reason.empty()) reason = std::move(why);
+    const int axes = search.axes_along_normal();
+    if (axes > most) most = axes, reason = std::move(why);
   }
   return {nullptr, reason};
 }
