@@ -111,6 +111,7 @@ int identify_command(const CommandContext& context) {
   const std::vector<CsvTable> data = data_of(run.problem);
   const Mechanism mechanism(scene, parameter_values(scene));
   run.start();
+  if (!settle_accuracy(run, simulated_scene(run.problem, data), {})) return run.finish();
   // Experiments have their own overrides: where the scene itself does not assemble, they still may.
   if (const Assembly assembly(mechanism, scene.simulation.start_time); assembly.result().ok) {
     ModelSummary model = assembly.summary();
@@ -118,7 +119,6 @@ int identify_command(const CommandContext& context) {
     run.result["model"] = to_json(model);
     print_model(context.out, scene.name, model);
   }
-  if (!settle_accuracy(run, simulated_scene(run.problem, data), {})) return run.finish();
   warn_of_stiff_experiment(run, data);
   LongRun long_run(run);
   const Problem problem = from_best_start(run, long_run, data);

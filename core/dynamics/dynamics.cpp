@@ -1,6 +1,7 @@
 #include "core/dynamics/dynamics.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "core/body/euler_parameters.hpp"
@@ -180,6 +181,7 @@ bool Dynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen::Vector
 }
 
 void Dynamics::linearise_here() {
+  assert(!planar_);
   for (std::size_t i = 1; i < frames_.size(); ++i) set_acceleration(z_[i - 1], bodies_[i], frames_[i]);
   if (linear_) linear_->current = false;
 }
@@ -207,6 +209,7 @@ void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneR
 
 void Dynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
                            Eigen::VectorXd& rho_bar, const Motion* motion) {
+  assert(!(planar_ && motion));
   if (planar_) return planar_->add_adjoint(w, y_bar, theta_bar, rho_bar);
   const Eigen::Index half = 7 * data_.n;
   for (int i = 1; i <= data_.n; ++i) {

@@ -97,6 +97,7 @@ class Dynamics {
   void hold_laws() { laws_.hold(); }
 
   SaddleSolver& solver() { return solver_; }
+  bool is_planar() const { return planar_ != nullptr; }
   long factor_blocks() const { return planar_ ? planar_->factor_blocks() : solver_.factor_blocks(); }
   long linearised_states() const { return linearised_states_; }
   long factorisations() const { return planar_ ? planar_->factorisations() : solver_.factorisations(); }

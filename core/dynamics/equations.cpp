@@ -2,6 +2,8 @@
 //
 //   omegadot = 2 G(p) a_p/(p'p) keeps the part of a_p = pddot that turns the body; the other part has its own equation,
 //   p'a_p + (pdot'pdot)(p'p) = 0. With a fixed,  omegadot' = -2/(p'p) (G(a_p) p' + omegadot (p'p')).
+#include <cassert>
+
 #include "core/body/euler_parameters.hpp"
 #include "core/body/lanes.hpp"
 #include "core/dynamics/dynamics.hpp"
@@ -32,6 +34,7 @@ void Dynamics::set_motion(double t, const Eigen::VectorXd& y, const Eigen::Vecto
 
 void Dynamics::place_at(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                         const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda) {
+  assert(!planar_);
   ++linearised_states_;
   set_motion(t, y, angles, a, lambda);
   solver_.place(frames_);

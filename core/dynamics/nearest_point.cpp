@@ -302,8 +302,10 @@ class Search {
 
 }  // namespace
 
-NearestPoint nearest_point(NearestPointEquations& equations, const VectorXd& x_guess) {
-  return Search(equations, x_guess).run();
+NearestPoint nearest_point(NearestPointEquations& equations, const VectorXd& x_guess, Decomposition decomposition) {
+  NearestPoint found = Search(equations, x_guess).run();
+  if (decomposition == Decomposition::now) linearise(equations, found);
+  return found;
 }
 
 void linearise(NearestPointEquations& equations, NearestPoint& found) {

@@ -84,13 +84,15 @@ struct NearestPoint {
   NearestPointStatus status = NearestPointStatus::stalled;
   Eigen::VectorXd x, nu, F;
   int iterations = 0;
-  // At x, with its Hessian where status is found; not there yet (linearise below) where the guess itself was found.
+  // At x, with its Hessian where status is found; on demand (linearise below) where the guess itself was found.
   bool linearised = true;
   NearestPointLinearisation linearisation;
 };
 
-NearestPoint nearest_point(NearestPointEquations& equations, const Eigen::VectorXd& x_guess);
-// What a guess that satisfies its equations to rounding does without: a dense decomposition.
+enum class Decomposition { now, on_demand };
+NearestPoint nearest_point(NearestPointEquations& equations, const Eigen::VectorXd& x_guess,
+                           Decomposition decomposition = Decomposition::now);
+// The dense decomposition, which a guess that satisfies its equations to rounding can do without until it is asked for.
 void linearise(NearestPointEquations& equations, NearestPoint& found);
 
 }  // namespace mbsopt

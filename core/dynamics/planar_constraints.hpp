@@ -80,8 +80,8 @@ class PlanarConstraints {
                      std::vector<PlanarFrameBar>& bars, Eigen::Ref<Eigen::VectorXd> theta_bar,
                      Eigen::Ref<Eigen::VectorXd> rho_bar) const;
 
-  // Tangents in the frames' directions and those of the vectors: of Phi, of Phidot, or of Phiddot (the others are left
-  // zero), and of J'lambda, added to loads (the ground's first).
+  // Tangents in the frames' directions and those of the vectors: of Phi, of Phidot, or of Phiddot (the others
+  // hold nothing of use), and of J'lambda, added to loads (the ground's first).
   enum class Order { phi, phi_dot, phi_ddot };
   void tangents(Order order, const DualFrames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
                 const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,

@@ -3,6 +3,13 @@
 #include "core/mechanism/mechanism_data.hpp"
 
 namespace mbsopt {
+namespace {
+
+SceneError not_planar(const std::string& reason) {
+  return SceneError("simulation.model: cannot be planar: " + reason + ". Use \"auto\" or \"spatial\"");
+}
+
+}  // namespace
 
 std::string why_not_planar(const Mechanism& mechanism, const SimulationSettings& settings, const Method* method) {
   if (!mechanism.data().planar) return mechanism.data().not_planar;
@@ -17,6 +24,7 @@ void add_model(const Mechanism& mechanism, const SimulationSettings& settings, M
     summary.unknowns_per_body = 3;
     return;
   }
+  if (settings.model == ModelChoice::planar) throw not_planar(why_not_planar(mechanism, settings, method));
   summary.not_planar = settings.model == ModelChoice::spatial ? "simulation.model is \"spatial\""
                                                               : why_not_planar(mechanism, settings, method);
   if (summary.not_planar.empty()) summary.not_planar = "the penalty form is planar only where simulation.model says so";
@@ -28,7 +36,7 @@ Model model_of(const Mechanism& mechanism, const SimulationSettings& settings, c
   const bool exact = settings.formulation.type == FormulationType::augmented_lagrangian;
   if (reason.empty() && (exact || settings.model == ModelChoice::planar)) return Model::planar;
   if (settings.model == ModelChoice::planar) {
-    throw SceneError("simulation.model: cannot be planar: " + reason + ". Use \"auto\" or \"spatial\"");
+    throw not_planar(reason);
   }
   return Model::spatial;
 }

@@ -275,6 +275,19 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
              about_alpha(settings_.formulation));
     return;
   }
+  // A guard on which scenes are taken to be planar: what was assembled in space satisfies the planar equations.
+  if (dynamics_.is_planar() && !options.frozen) {
+    const double unmet = std::max(projector_.position_violation(step_.t, angles, y_initial),
+                                  projector_.velocity_violation(step_.t, y_initial));
+    if (unmet > 1e-6 * (1 + y_initial.cwiseAbs().maxCoeff())) {
+      stop(SimulationStatus::not_credible,
+           fmt::format(
+               "the start does not satisfy the equations of the planar model, by {:.3g}: set simulation.model to "
+               "\"spatial\"",
+               unmet));
+      return;
+    }
+  }
   if (implicit_) implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
   PiController controller(rk_.error_order);
   StiffnessWatch stiffness(rk_, mechanism_.states());

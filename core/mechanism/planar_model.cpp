@@ -81,9 +81,12 @@ class Search {
     double turns_in = 0, turns_out = 0;  // by parameters
     if (slot >= 0) {
       const auto change = data_.theta_rho.middleRows<3>(slot);
+      const double rounding = kParallel * change.cwiseAbs().maxCoeff();
       turns_in = std::max((b.b1.transpose() * change).cwiseAbs().maxCoeff(),
                           (b.b2.transpose() * change).cwiseAbs().maxCoeff());
       turns_out = (b.n.transpose() * change).cwiseAbs().maxCoeff();
+      if (turns_in <= rounding) turns_in = 0;
+      if (turns_out <= rounding) turns_out = 0;
     }
     if (std::abs(along) <= kParallel * size && turns_out == 0) return Lies::in_plane;
     const Plane rest = b.in_plane(s);
@@ -136,7 +139,10 @@ class Search {
             const double out1 = b1.n.dot(p.s1), out2 = b2.n.dot(p.s2);
             if (c.slot1 >= 0 && lies(c.body1, p.s1, c.slot1) != Lies::in_plane) return tilted;
             if (c.slot2 >= 0 && lies(c.body2, p.s2, c.slot2) != Lies::in_plane) return tilted;
-            if (out1 != 0 || out2 != 0 || has_levels_) return name(c) + " joins points at different heights";
+            const double level = kParallel * (p.s1.norm() + p.s2.norm());
+            if (std::abs(out1) > level || std::abs(out2) > level || has_levels_) {
+              return name(c) + " may join points at different heights";
+            }
             return keep(Kind::distance);
           } else if constexpr (std::is_same_v<P, Angle>) {
             for (const auto& [body, s, slot] : {std::tuple(c.body1, p.s1, c.slot1), std::tuple(c.body2, p.s2, c.slot2),
@@ -152,18 +158,24 @@ class Search {
         c.primitive);
   }
 
-  // Whether bodies may lie at heights other than the ground's, where the length of a rod is not that in the plane.
+  // Whether bodies may lie at heights other than the ground's, where the length of a rod is not that in the plane: a
+  // point, or a row along the normal, that joins two heights.
   bool has_levels() const {
     for (const Constraint& c : data_.constraints) {
       const auto* point = std::get_if<Coincidence>(&c.primitive);
-      if (!point) continue;
-      if (model_.bodies[at(c.body1)].n.dot(point->s1) != model_.bodies[at(c.body2)].n.dot(point->s2)) return true;
-      for (const auto& [body, slot] : {std::pair(c.body1, c.slot1), std::pair(c.body2, c.slot2)}) {
-        if (slot >= 0 && !(model_.bodies[at(body)].n.transpose() * data_.theta_rho.middleRows<3>(slot)).isZero(0))
-          return true;
-      }
+      const auto* plane = std::get_if<Dot2>(&c.primitive);
+      if (!point && !(plane && lies(c.body1, plane->s3, c.slot3) != Lies::in_plane)) continue;
+      const Vector3d &s1 = point ? point->s1 : plane->s1, &s2 = point ? point->s2 : plane->s2;
+      const Vector3d &n1 = model_.bodies[at(c.body1)].n, &n2 = model_.bodies[at(c.body2)].n;
+      if (std::abs(n1.dot(s1) - n2.dot(s2)) > kParallel * (s1.norm() + s2.norm())) return true;
+      if (rises(n1, c.slot1) || rises(n2, c.slot2)) return true;
     }
     return false;
+  }
+  bool rises(const Vector3d& n, int slot) const {  // with a parameter
+    if (slot < 0) return false;
+    const auto change = data_.theta_rho.middleRows<3>(slot);
+    return (n.transpose() * change).cwiseAbs().maxCoeff() > kParallel * change.cwiseAbs().maxCoeff();
   }
 
   // Joints that hold one body of theirs in the plane when the other one is, followed from the ground.

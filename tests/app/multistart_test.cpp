@@ -77,8 +77,10 @@ TEST_CASE("multistart: the same result from 1, 2 and 4 workers, with a waterfall
   double before = -1;
   for (const auto& record : multistart.at("waterfall")) {
     starts.insert(record.at("start").get<int>());
-    CHECK(record.at("objective").get<double>() >= before);
-    before = record.at("objective");
+    // Starts whose design failed come last: there the spring's ends meet, where there is no gradient.
+    const auto& objective = record.at("objective");
+    CHECK((objective.is_null() || objective.get<double>() >= before));
+    before = objective.is_null() ? INFINITY : objective.get<double>();
     CHECK_FALSE(record.contains("points"));
     if (record.at("start") == 0) CHECK(record.at("from").at("k") == 20);
   }
