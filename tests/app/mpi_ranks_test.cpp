@@ -73,6 +73,15 @@ std::vector<pid_t> children_of(pid_t parent) {
   return children;
 }
 
+// State T in /proc/PID/stat, after the name in brackets.
+bool is_stopped(pid_t process) {
+  std::ifstream in("/proc/" + std::to_string(process) + "/stat");
+  std::string stat;
+  std::getline(in, stat);
+  const std::size_t name = stat.rfind(')');
+  return name != std::string::npos && name + 2 < stat.size() && stat[name + 2] == 'T';
+}
+
 }  // namespace
 
 TEST_CASE("mpirun: two ranks design what one worker does, bit by bit, and only one of them speaks", "[mpi]") {
@@ -130,10 +139,12 @@ TEST_CASE("mpirun: Ctrl-C, and the loss of a rank, leave what resume goes on wit
     const pid_t process = started(3, design(out), folder);
     wait_for_starts(out, 1);
     const std::vector<pid_t> ranks = children_of(process);
-    for (const pid_t rank : ranks) ::kill(rank, SIGSTOP);  // or they could be done before mpirun passes a signal on
+    // They could be done before mpirun passes a signal on; it wakes them when it does.
+    for (const pid_t rank : ranks) ::kill(rank, SIGSTOP);
     CHECK(ranks.size() == 3);
     ::kill(lose_a_rank ? ranks.back() : process, lose_a_rank ? SIGKILL : SIGINT);
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    for (int i = 0; i < 1000 && std::any_of(ranks.begin(), ranks.end(), is_stopped); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
     for (const pid_t rank : ranks) ::kill(rank, SIGCONT);
     const Finished ended = finished(process, folder);
     INFO(ended.err);
