@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <optional>
+#include <vector>
 
 #include "core/body/euler_parameters.hpp"
 #include "core/constraint/unit_norm.hpp"
@@ -10,6 +11,7 @@
 #include "core/dynamics/assembly_report.hpp"
 #include "core/dynamics/equilibrium.hpp"
 #include "core/dynamics/nearest_point.hpp"
+#include "core/dynamics/sparse_projection.hpp"
 
 namespace mbsopt {
 
@@ -121,16 +123,17 @@ MatrixXd position_guess_rho(const MechanismData& d) {
   return out;
 }
 
-void velocity_guess_derivatives(const MechanismData& d, const VectorXd& q, MatrixXd& v_q, MatrixXd& v_rho) {
-  v_q = MatrixXd::Zero(q.size(), q.size());
+// v_q: per body, in its own p.
+void velocity_guess_derivatives(const MechanismData& d, const VectorXd& q, std::vector<Mat<7, 4>>& v_q,
+                                MatrixXd& v_rho) {
+  v_q.resize(static_cast<std::size_t>(d.n));
   v_rho = MatrixXd::Zero(q.size(), d.rho.size());
   for (int i = 0; i < d.n; ++i) {
     const BodyData& body = d.bodies[static_cast<std::size_t>(i + 1)];
     const Vector4d p = q.segment<4>(7 * i + 3);
     const Matrix3d W = skew(body.angular_velocity);
     const Vector3d arm = A(p) * body.com, e = p.tail<3>();
-    v_q.block<3, 4>(7 * i, 7 * i + 3) = W * N(p, body.com);
-    v_q.block<4, 4>(7 * i + 3, 7 * i + 3) = rate_matrix(body.angular_velocity);
+    v_q[static_cast<std::size_t>(i)] << W * N(p, body.com), rate_matrix(body.angular_velocity);
     Mat<7, 3> from_omega;
     from_omega.topRows<3>() = -skew(arm);
     from_omega.row(3) = -0.5 * e.transpose();
@@ -192,6 +195,66 @@ struct Assembly::Solution {
     result.message = equilibrium.message;
   }
 
+  // A large mechanism whose guess satisfies everything is differentiated by sparse factors, in about the time of some
+  // steps; the dense decomposition below takes as long as a run.
+  struct Sparse {
+    SparseProjection q, v;
+    std::vector<SparseEntry> v_b_q;  // -F_q at velocity level
+    MatrixXd q_b_rho, q_g_rho, v_b_rho, v_g_rho;
+    std::vector<Mat<7, 4>> v_g_q;  // per body, in its own p
+  };
+  bool is_sparse() const {
+    constexpr int kManyBodies = 12;
+    return data.n >= kManyBodies && !q->linearised && !v->linearised;
+  }
+  Sparse sparse_derivatives() const {
+    const Index N = 7 * data.n;
+    AssemblyEquations::SparseGradients F = position.sparse_gradients(result.y), G = velocity.sparse_gradients(result.y);
+    std::vector<SparseEntry> G_q, G_v;
+    for (const SparseEntry& e : G.y) {
+      if (e.column < N) {
+        G_q.push_back({e.row, e.column, -e.value});
+      } else {
+        G_v.push_back({e.row, static_cast<int>(e.column - N), e.value});
+      }
+    }
+    Sparse s{SparseProjection(position.rows(), N, F.y),
+             SparseProjection(velocity.rows(), N, G_v),
+             std::move(G_q),
+             -F.rho,
+             position_guess_rho(data),
+             -G.rho,
+             {},
+             {}};
+    velocity_guess_derivatives(data, q->x, s.v_g_q, s.v_g_rho);
+    return s;
+  }
+  MatrixXd sparse_tangent() const {
+    const Sparse s = sparse_derivatives();
+    const MatrixXd q_rho = s.q.solve(s.q_b_rho, s.q_g_rho);
+    MatrixXd b = s.v_b_rho, g = s.v_g_rho;
+    for (const SparseEntry& e : s.v_b_q) b.row(e.row) += e.value * q_rho.row(e.column);
+    for (Index i = 0; i < data.n; ++i) {
+      g.middleRows<7>(7 * i) += s.v_g_q[static_cast<std::size_t>(i)] * q_rho.middleRows<4>(7 * i + 3);
+    }
+    MatrixXd y_rho(result.y.size(), data.rho.size());
+    y_rho << q_rho, s.v.solve(b, g);
+    return y_rho;
+  }
+  void add_sparse_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
+    const Sparse s = sparse_derivatives();
+    const Index N = 7 * data.n;
+    MatrixXd b_bar, g_bar, q_bar = y_bar.topRows(N);
+    s.v.solve_transposed(y_bar.bottomRows(N), b_bar, g_bar);
+    rho_bar += s.v_b_rho.transpose() * b_bar + s.v_g_rho.transpose() * g_bar;
+    for (const SparseEntry& e : s.v_b_q) q_bar.row(e.column) += e.value * b_bar.row(e.row);
+    for (Index i = 0; i < data.n; ++i) {
+      q_bar.middleRows<4>(7 * i + 3) += s.v_g_q[static_cast<std::size_t>(i)].transpose() * g_bar.middleRows<7>(7 * i);
+    }
+    s.q.solve_transposed(q_bar, b_bar, g_bar);
+    rho_bar += s.q_b_rho.transpose() * b_bar + s.q_g_rho.transpose() * g_bar;
+  }
+
   // Before the linearisations of q and v are used.
   void linearise_both() {
     PositionProblem positions(position);
@@ -228,8 +291,10 @@ struct Assembly::Solution {
     const AssemblyEquations::Gradients F = velocity.gradients(result.y), S = velocity.second(result.y, v->nu);
     d.v_b_q = -F.y.leftCols(N);
     d.v_b_rho = -F.rho;
-    velocity_guess_derivatives(data, q->x, d.v_g_q, d.v_g_rho);
-    d.v_g_q -= S.y.leftCols(N);
+    std::vector<Mat<7, 4>> v_guess_q;
+    velocity_guess_derivatives(data, q->x, v_guess_q, d.v_g_rho);
+    d.v_g_q = -S.y.leftCols(N);
+    for (Index i = 0; i < data.n; ++i) d.v_g_q.block<7, 4>(7 * i, 7 * i + 3) += v_guess_q[static_cast<std::size_t>(i)];
     d.v_g_rho -= S.rho;
     return d;
   }
@@ -257,6 +322,7 @@ MatrixXd Assembly::tangent() const {
     y_rho.topRows(7 * s.data.n) = s.equilibrium.q_rho;
     return y_rho;
   }
+  if (s.is_sparse()) return s.sparse_tangent();
   s.linearise_both();
   const Solution::Derivatives d = s.derivatives();
   const MatrixXd q_rho = s.q->linearisation.solve(d.q_b_rho, d.q_g_rho);
@@ -275,6 +341,7 @@ void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
     rho_bar += s.equilibrium.q_rho.transpose() * y_bar.topRows(N);
     return;
   }
+  if (s.is_sparse()) return s.add_sparse_adjoint(y_bar, rho_bar);
   s.linearise_both();
   const Solution::Derivatives d = s.derivatives();
   MatrixXd b_bar, g_bar;

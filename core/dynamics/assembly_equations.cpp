@@ -211,65 +211,90 @@ VectorXd AssemblyEquations::values(const VectorXd& y) const {
 }
 
 AssemblyEquations::Gradients AssemblyEquations::gradients(const VectorXd& y) const {
-  Gradients out{MatrixXd::Zero(rows(), y.size()), MatrixXd::Zero(rows(), data_.rho.size())};
-  VectorXd y_bar(y.size()), rho_bar(data_.rho.size());
+  Gradients out{MatrixXd::Zero(rows(), y.size()), {}};
+  collect_gradients(
+      y, [&](Index row, Index column, double value) { out.y(row, column) += value; }, out.rho);
+  return out;
+}
+
+AssemblyEquations::SparseGradients AssemblyEquations::sparse_gradients(const VectorXd& y) const {
+  SparseGradients out;
+  collect_gradients(
+      y,
+      [&](Index row, Index column, double value) {
+        if (value != 0) out.y.push_back({static_cast<int>(row), static_cast<int>(column), value});
+      },
+      out.rho);
+  return out;
+}
+
+template <class AddEntry>
+void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, MatrixXd& rho) const {
+  const bool positions = level_ == AssemblyLevel::position;
+  const Index half = y.size() / 2;
+  rho = MatrixXd::Zero(rows(), data_.rho.size());
+  const auto add_body = [&](Index row, const BodyAt& b, int body, const FrameBar& bar) {
+    if (body == 0) return;
+    Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
+    add_pull_back_velocity(b.state, bar, 1, q_bar, v_bar);
+    for (Index k = 0; k < 7; ++k) {
+      add(row, 7 * (body - 1) + k, q_bar(k));
+      add(row, half + 7 * (body - 1) + k, v_bar(k));
+    }
+  };
   for (const Constraint& c : data_.constraints) {
     const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
     std::visit(
         [&](const auto& p) {
           using P = std::decay_t<decltype(p)>;
-          const bool positions = level_ == AssemblyLevel::position;
           for (int i = 0; i < P::kRows; ++i) {
             const Vec<P::kRows> unit = c.factor * Vec<P::kRows>::Unit(i);
             PrimitiveBars bars;
             p.pull_back(b1.frame, b2.frame, positions ? only_mu0<P>(unit) : only_mu1<P>(unit), bars.bar1, bars.bar2,
                         bars.s);
-            y_bar.setZero();
-            add_pull_back(b1, c.body1, bars.bar1, 1, y_bar);
-            add_pull_back(b2, c.body2, bars.bar2, 1, y_bar);
-            out.y.row(c.row + i) += y_bar.transpose();
-            add_slot(c.slot1, bars.s.s1, out.rho.row(c.row + i));
-            add_slot(c.slot2, bars.s.s2, out.rho.row(c.row + i));
-            add_slot(c.slot3, bars.s.s3, out.rho.row(c.row + i));
+            const Index row = c.row + i;
+            add_body(row, b1, c.body1, bars.bar1);
+            add_body(row, b2, c.body2, bars.bar2);
+            add_slot(c.slot1, bars.s.s1, rho.row(row));
+            add_slot(c.slot2, bars.s.s2, rho.row(row));
+            add_slot(c.slot3, bars.s.s3, rho.row(row));
           }
           if (c.slot_factor >= 0) {
             Vec<P::kRows> phi_dot;
             p.phi_dot(b1.frame, b2.frame, phi_dot);
             const double value = positions ? term_value(c, y, angles_) / c.factor : phi_dot(0);
-            add_slot(c.slot_factor, Vec<1>(value), out.rho.row(c.row));
+            add_slot(c.slot_factor, Vec<1>(value), rho.row(c.row));
           }
         },
         c.primitive);
   }
-  add_law_gradients(out);
+  add_law_gradients(rho);
   for (int i = 0; i < data_.n; ++i) {
-    const Index p = 7 * i + 3, pdot = y.size() / 2 + p;
-    if (level_ == AssemblyLevel::position) {
-      out.y.row(data_.m + i).segment<4>(p) = 2 * y.segment<4>(p).transpose();
-    } else {
-      out.y.row(data_.m + i).segment<4>(p) = 2 * y.segment<4>(pdot).transpose();
-      out.y.row(data_.m + i).segment<4>(pdot) = 2 * y.segment<4>(p).transpose();
+    const Index p = 7 * i + 3, pdot = half + p;
+    for (Index k = 0; k < 4; ++k) {
+      add(data_.m + i, p + k, 2 * y(positions ? p + k : pdot + k));
+      if (!positions) add(data_.m + i, pdot + k, 2 * y(p + k));
     }
   }
+  VectorXd y_bar(y.size()), rho_bar(data_.rho.size());
   Index row = data_.m + data_.n;
   for (const AssemblyTarget& target : targets_) {
     y_bar.setZero(), rho_bar.setZero();
     add_gradient(data_, target.sensor, t_, y, branches(target), 1, y_bar, rho_bar);
-    out.y.row(row) = y_bar.transpose();
-    out.rho.row(row) = rho_bar.transpose();
-    add_slot(target.slot, Vec<1>(-1), out.rho.row(row));
+    for (Index k = 0; k < y.size(); ++k) add(row, k, y_bar(k));
+    rho.row(row) = rho_bar.transpose();
+    add_slot(target.slot, Vec<1>(-1), rho.row(row));
     ++row;
   }
-  return out;
 }
 
-void AssemblyEquations::add_law_gradients(Gradients& out) const {
+void AssemblyEquations::add_law_gradients(MatrixXd& rho) const {
   const RowLaws::Of what = level_ == AssemblyLevel::position ? RowLaws::Of::f : RowLaws::Of::f_t;
   VectorXd rho_bar(data_.rho.size());
   for (const RowLaw& law : data_.laws) {
     rho_bar.setZero();
     laws_.add_gradient(what, law.row, -1, rho_bar);
-    out.rho.row(law.row) += rho_bar.transpose();
+    rho.row(law.row) += rho_bar.transpose();
   }
 }
 

@@ -10,6 +10,7 @@
 
 #include <vector>
 
+#include "core/dynamics/sparse_projection.hpp"
 #include "core/mechanism/row_laws.hpp"
 
 namespace mbsopt {
@@ -45,6 +46,12 @@ class AssemblyEquations {
     Eigen::MatrixXd y, rho;  // rows x 14n, rows x P (all parameters)
   };
   Gradients gradients(const Eigen::VectorXd& y) const;
+  // The same with the state's gradient by its entries; those of the same place add up.
+  struct SparseGradients {
+    std::vector<SparseEntry> y;
+    Eigen::MatrixXd rho;
+  };
+  SparseGradients sparse_gradients(const Eigen::VectorXd& y) const;
   // (F_x'nu) differentiated, x: q at position, v at velocity level.   7n x 14n, 7n x P
   Gradients second(const Eigen::VectorXd& y, const Eigen::VectorXd& nu) const;
 
@@ -59,7 +66,9 @@ class AssemblyEquations {
   Eigen::VectorXd branches(const AssemblyTarget& target) const;
   void add_joint_curvature(const Eigen::VectorXd& q, const Eigen::VectorXd& nu, Gradients& out) const;
   void add_target_curvature(const AssemblyTarget& target, const Eigen::VectorXd& y, double nu, Gradients& out) const;
-  void add_law_gradients(Gradients& out) const;
+  template <class AddEntry>
+  void collect_gradients(const Eigen::VectorXd& y, AddEntry&& add, Eigen::MatrixXd& rho) const;
+  void add_law_gradients(Eigen::MatrixXd& rho) const;
   double term_value(const Constraint& c, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) const;
   void add_slot(int slot, const Eigen::Ref<const Eigen::VectorXd>& bar, Row rho_bar) const;
 

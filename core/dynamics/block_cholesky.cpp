@@ -79,47 +79,54 @@ void subtract_product(const Mat<6, 6>& A, const Mat<6, 6>& B, Mat<6, 6>& C) {
   }
 }
 
-// y = W b and y = W'b, W unit lower.
-template <int N, class X>
-X times(const Mat<N, N>& W, const X& b) {
-  X y = b;
+// Of lanes: x = W x and x = W'x, W unit lower; y -= L x and y -= L'x.
+template <int N>
+void multiply(const Mat<N, N>& W, LaneRow* x) {
+#pragma GCC unroll 6
+  for (int i = N - 1; i > 0; --i) {
+    LaneRow sum = x[i];
+#pragma GCC unroll 6
+    for (int j = 0; j < i; ++j) sum += W(i, j) * x[j];
+    x[i] = sum;
+  }
+}
+template <int N>
+void multiply_transposed(const Mat<N, N>& W, LaneRow* x) {
+#pragma GCC unroll 6
   for (int j = 0; j < N - 1; ++j) {
-    for (int i = j + 1; i < N; ++i) y.row(i) += W(i, j) * b.row(j);
+    LaneRow sum = x[j];
+#pragma GCC unroll 6
+    for (int i = j + 1; i < N; ++i) sum += W(i, j) * x[i];
+    x[j] = sum;
   }
-  return y;
 }
-template <int N, class X>
-X transposed_times(const Mat<N, N>& W, const X& b) {
-  X y = b;
-  for (int j = 0; j < N - 1; ++j) {
-    for (int i = j + 1; i < N; ++i) y.row(j) += W(i, j) * b.row(i);
+template <int N>
+void subtract_times(const Mat<N, N>& L, const LaneRow* x, LaneRow* y) {
+#pragma GCC unroll 6
+  for (int i = 0; i < N; ++i) {
+    LaneRow sum = y[i];
+#pragma GCC unroll 6
+    for (int j = 0; j < N; ++j) sum -= L(i, j) * x[j];
+    y[i] = sum;
   }
-  return y;
 }
-// y -= L x and y -= L'x
-template <int N, class X>
-void subtract_times(const Mat<N, N>& L, const X& x, X& y) {
-  X sum = y;
+template <int N>
+void subtract_transposed_times(const Mat<N, N>& L, const LaneRow* x, LaneRow* y) {
+#pragma GCC unroll 6
   for (int j = 0; j < N; ++j) {
-    for (int i = 0; i < N; ++i) sum.row(i) -= L(i, j) * x.row(j);
-  }
-  y = sum;
-}
-template <int N, class X>
-void subtract_transposed_times(const Mat<N, N>& L, const X& x, X& y) {
-  for (int j = 0; j < N; ++j) {
-    Eigen::Matrix<double, 1, X::ColsAtCompileTime> sum = L(0, j) * x.row(0);
-    for (int i = 1; i < N; ++i) sum += L(i, j) * x.row(i);
-    y.row(j) -= sum;
+    LaneRow sum = y[j];
+#pragma GCC unroll 6
+    for (int i = 0; i < N; ++i) sum -= L(i, j) * x[i];
+    y[j] = sum;
   }
 }
 
-// The same of one vector of three numbers, written out: pairs would wait for the single numbers just stored.
-Vec<3> times(const Mat<3, 3>& W, const Vec<3>& b) {
-  return {b(0), b(1) + W(1, 0) * b(0), b(2) + W(2, 0) * b(0) + W(2, 1) * b(1)};
+// Of one vector of three numbers, written out: pairs would wait for the single numbers just stored.
+void multiply(const Mat<3, 3>& W, Vec<3>& x) {
+  x = Vec<3>(x(0), x(1) + W(1, 0) * x(0), x(2) + W(2, 0) * x(0) + W(2, 1) * x(1));
 }
-Vec<3> transposed_times(const Mat<3, 3>& W, const Vec<3>& b) {
-  return {b(0) + W(1, 0) * b(1) + W(2, 0) * b(2), b(1) + W(2, 1) * b(2), b(2)};
+void multiply_transposed(const Mat<3, 3>& W, Vec<3>& x) {
+  x = Vec<3>(x(0) + W(1, 0) * x(1) + W(2, 0) * x(2), x(1) + W(2, 1) * x(2), x(2));
 }
 void subtract_times(const Mat<3, 3>& L, const Vec<3>& x, Vec<3>& y) {
   const double a = x(0), b = x(1), c = x(2);
@@ -131,26 +138,23 @@ void subtract_transposed_times(const Mat<3, 3>& L, const Vec<3>& x, Vec<3>& y) {
 }
 
 // And of one of six, in pairs.
-Vec<6> times(const Mat<6, 6>& W, const Vec<6>& b) {
+void multiply(const Mat<6, 6>& W, Vec<6>& x) {
+  const Vec<6> b = x;
   Six sum(b.data());
   sum.add<0>(b(0), column(W, 0));
   sum.add<1>(b(1), column(W, 1));
   sum.add<1>(b(2), column(W, 2));
   sum.add<2>(b(3), column(W, 3));
   sum.add<2>(b(4), column(W, 4));
-  Vec<6> y;
-  sum.store(y.data());
-  return y;
+  sum.store(x.data());
 }
-Vec<6> transposed_times(const Mat<6, 6>& W, const Vec<6>& b) {
+void multiply_transposed(const Mat<6, 6>& W, Vec<6>& b) {
   const Six x(b.data());
   Six sum = x;
   sum.x[0] += sums(x.times<0>(column(W, 0)), x.times<1>(column(W, 1)));
   sum.x[1] += sums(x.times<1>(column(W, 2)), x.times<2>(column(W, 3)));
   sum.x[2] += sums(x.times<2>(column(W, 4)), Pair{0, 0});
-  Vec<6> y;
-  sum.store(y.data());
-  return y;
+  sum.store(b.data());
 }
 void subtract_times(const Mat<6, 6>& L, const Vec<6>& x, Vec<6>& y) {
   Six sum(y.data());
@@ -175,8 +179,6 @@ BlockCholesky<N>::BlockCholesky(int bodies, std::span<const std::pair<int, int>>
   std::size_t longest = 0;
   for (const auto& column : elimination_.columns) longest = std::max(longest, column.size());
   scaled_.resize(longest);
-  permuted_.resize(index(bodies));
-  permuted_lanes_.resize(index(bodies));
   set_zero();
 }
 
@@ -202,31 +204,38 @@ bool BlockCholesky<N>::factor() {
   return true;
 }
 
+// In the order of elimination, in place.
 template <int N>
-template <class X>
-void BlockCholesky<N>::solve_any(std::span<X> x, std::vector<X>& y) {
+void BlockCholesky<N>::solve(std::span<Vec<N>> x) {
   const std::vector<int>& order = elimination_.order;
-  for (std::size_t k = 0; k < order.size(); ++k) y[k] = x[index(order[k])];
   for (std::size_t k = 0; k < order.size(); ++k) {
-    y[k] = times(diagonal_[k], y[k]);
-    for (const auto& e : elimination_.columns[k]) subtract_times(lower_[e.block], y[k], y[index(e.row)]);
+    Vec<N>& y = x[index(order[k])];
+    multiply(diagonal_[k], y);
+    for (const auto& e : elimination_.columns[k]) subtract_times(lower_[e.block], y, x[index(e.body)]);
   }
   for (std::size_t k = order.size(); k-- > 0;) {
-    X z;
-    for (int i = 0; i < N; ++i) z.row(i) = inverse_[k](i) * y[k].row(i);
-    for (const auto& e : elimination_.columns[k]) subtract_transposed_times(lower_[e.block], y[index(e.row)], z);
-    y[k] = transposed_times(diagonal_[k], z);
-    x[index(order[k])] = y[k];
+    Vec<N>& y = x[index(order[k])];
+    y.array() *= inverse_[k].array();
+    for (const auto& e : elimination_.columns[k]) subtract_transposed_times(lower_[e.block], x[index(e.body)], y);
+    multiply_transposed(diagonal_[k], y);
   }
 }
 
 template <int N>
-void BlockCholesky<N>::solve(std::span<Vec<N>> x) {
-  solve_any(x, permuted_);
-}
-template <int N>
-void BlockCholesky<N>::solve(std::span<Lanes<N>> x) {
-  solve_any(x, permuted_lanes_);
+void BlockCholesky<N>::solve(std::span<Lanes<N>> lanes) {
+  const std::vector<int>& order = elimination_.order;
+  const auto rows = [&](int body) { return entries(lanes[index(body)]); };
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    LaneRow* y = rows(order[k]);
+    multiply(diagonal_[k], y);
+    for (const auto& e : elimination_.columns[k]) subtract_times(lower_[e.block], y, rows(e.body));
+  }
+  for (std::size_t k = order.size(); k-- > 0;) {
+    LaneRow* y = rows(order[k]);
+    for (int i = 0; i < N; ++i) y[i] *= inverse_[k](i);
+    for (const auto& e : elimination_.columns[k]) subtract_transposed_times(lower_[e.block], rows(e.body), y);
+    multiply_transposed(diagonal_[k], y);
+  }
 }
 
 template class BlockCholesky<6>;

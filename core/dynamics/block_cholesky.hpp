@@ -48,16 +48,12 @@ class BlockCholesky {
 
  private:
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
-  template <class X>
-  void solve_any(std::span<X> x, std::vector<X>& y);
 
   Elimination elimination_;
   std::vector<Elimination::Place> handles_;
   std::vector<Block> diagonal_, lower_;  // S before factor(), inv(L_kk) below the diagonal and L_ik after
   std::vector<Vec<N>> inverse_;          // of D
   std::vector<Block> scaled_;            // L_ik D_k of the column in hand
-  std::vector<Vec<N>> permuted_;
-  std::vector<Lanes<N>> permuted_lanes_;
 };
 extern template class BlockCholesky<6>;
 extern template class BlockCholesky<3>;

@@ -8,6 +8,7 @@
 #include "core/dynamics/block_cholesky.hpp"
 #include "core/dynamics/pairs.hpp"
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/parameter_lanes.hpp"
 
 namespace mbsopt {
 
@@ -19,35 +20,47 @@ class ConstraintRows {
 
   explicit ConstraintRows(const MechanismData& data);
 
+  Eigen::Index count() const { return data_->m; }
   void evaluate(const std::vector<Frame>& frames);  // J at the frames' positions
 
-  // y += J x; x: 6 numbers (or lanes of them) per moving body, body i at x[i - 1].
-  void add_times(const std::vector<Vec<6>>& x, Eigen::VectorXd& y) const {
+  // y -= J x; x: 6 numbers (or lanes of them) per moving body, body i at x[i - 1].
+  void subtract_times(const std::vector<Vec<6>>& x, Eigen::VectorXd& y) const {
     for (const RowGroup& g : data_->groups) {
       if (g.body1 > 0 && g.body2 > 0) {
         const Column<3> x1(x[at(g.body1)].data()), x2(x[at(g.body2)].data());
         for (int r = 0; r < g.rows; ++r) {
           const Pair sum = x1.times(row(J1, g.block + r)) + x2.times(row(J2, g.block + r));
-          y(g.row + r) += sum[0] + sum[1];
+          y(g.row + r) -= sum[0] + sum[1];
         }
       } else if (g.body1 > 0 || g.body2 > 0) {
         const Rows& J = g.body1 > 0 ? J1 : J2;
         const Column<3> moving(x[at(std::max(g.body1, g.body2))].data());
         for (int r = 0; r < g.rows; ++r) {
           const Pair sum = moving.times(row(J, g.block + r));
-          y(g.row + r) += sum[0] + sum[1];
+          y(g.row + r) -= sum[0] + sum[1];
         }
       }
     }
   }
-  template <class X, class Y>
-  void add_times(const std::vector<X>& x, Y& y) const {
+  void subtract_times(const std::vector<Lanes<6>>& x, LaneRows& y) const {
     for (const RowGroup& g : data_->groups) {
-      for (int r = 0; r < g.rows; ++r) {
-        RowOf<X> sum = y.row(g.row + r);
-        if (g.body1 > 0) add_row_times(J1, g.block + r, x[at(g.body1)], sum);
-        if (g.body2 > 0) add_row_times(J2, g.block + r, x[at(g.body2)], sum);
-        y.row(g.row + r) = sum;
+      LaneRow* to = entries(y) + g.row;
+      for (const auto& [body, J] : {std::pair(g.body1, &J1), std::pair(g.body2, &J2)}) {
+        if (body == 0) continue;
+        const LaneRow* from = entries(x[at(body)]);
+        const LaneRow x3 = from[3], x4 = from[4], x5 = from[5];
+        const double* a = row(*J, g.block);
+        const Columns* nonzero = &columns(g.block);
+        for (int r = 0; r < g.rows; ++r, a += 6, ++nonzero) {
+          LaneRow sum = to[r];
+          if (nonzero->single()) {
+            sum -= a[nonzero->first] * from[nonzero->first];
+          } else if (nonzero->any()) {
+            sum -= a[0] * from[0], sum -= a[1] * from[1], sum -= a[2] * from[2];
+          }
+          sum -= a[3] * x3, sum -= a[4] * x4, sum -= a[5] * x5;
+          to[r] = sum;
+        }
       }
     }
   }
@@ -62,21 +75,38 @@ class ConstraintRows {
     };
     for (const RowGroup& g : data_->groups) subtract(g.body1, J1, g), subtract(g.body2, J2, g);
   }
-  template <class X, class Y>
-  void subtract_transposed_times(const Y& lambda, std::vector<X>& x) const {
+  void subtract_transposed_times(const LaneRows& lambda, std::vector<Lanes<6>>& x) const {
     for (const RowGroup& g : data_->groups) {
-      if (g.body1 > 0) subtract_group_times(J1, g, lambda, x[at(g.body1)]);
-      if (g.body2 > 0) subtract_group_times(J2, g, lambda, x[at(g.body2)]);
+      const LaneRow* from = entries(lambda) + g.row;
+      for (const auto& [body, J] : {std::pair(g.body1, &J1), std::pair(g.body2, &J2)}) {
+        if (body == 0) continue;
+        LaneRow* to = entries(x[at(body)]);
+        LaneRow x3 = to[3], x4 = to[4], x5 = to[5];
+        const double* a = row(*J, g.block);
+        const Columns* nonzero = &columns(g.block);
+        for (int r = 0; r < g.rows; ++r, a += 6, ++nonzero) {
+          const LaneRow l = from[r];
+          if (nonzero->single()) {
+            to[nonzero->first] -= a[nonzero->first] * l;
+          } else if (nonzero->any()) {
+            to[0] -= a[0] * l, to[1] -= a[1] * l, to[2] -= a[2] * l;
+          }
+          x3 -= a[3] * l, x4 -= a[4] * l, x5 -= a[5] * l;
+        }
+        to[3] = x3, to[4] = x4, to[5] = x5;
+      }
     }
   }
   // M x for body i (1-based), and S += M.
   template <class X>
   X mass_times(int body, const X& x) const {
     const BodyData& b = data_->bodies[static_cast<std::size_t>(body)];
-    X y;
-    y.template topRows<3>() = b.mass * x.template topRows<3>();
-    y.template bottomRows<3>().noalias() = b.J * x.template bottomRows<3>();
-    return y;
+    X out;
+    const auto* from = entries(x);
+    auto* to = entries(out);
+    for (int i = 0; i < 3; ++i) to[i] = b.mass * from[i];
+    for (int i = 0; i < 3; ++i) to[3 + i] = b.J(i, 0) * from[3] + b.J(i, 1) * from[4] + b.J(i, 2) * from[5];
+    return out;
   }
   void add_mass(BlockCholesky<6>& S) const;
   // S += J' diag(alpha) J
@@ -89,36 +119,16 @@ class ConstraintRows {
   Rows J1, J2;  // one row per block row
 
  private:
-  template <class X>
-  using RowOf = Eigen::Matrix<double, 1, X::ColsAtCompileTime>;
-
   // Which of a row's three entries for displacements may not be zero; those for turning follow.
   struct Columns {
     int first = 0, last = 3;
+    bool single() const { return last - first == 1; }
+    bool any() const { return last != first; }
   };
   const Columns& columns(int block) const { return columns_[static_cast<std::size_t>(block)]; }
 
   static const double* row(const Rows& J, int block) { return J.data() + 6 * block; }
 
-  // Written out, on copies: the compiler unrolls these and keeps them in registers, and does neither with Eigen's
-  // products with a row of a dynamic matrix.
-  template <class X>
-  void add_row_times(const Rows& J, int block, const X& x, RowOf<X>& sum) const {
-    const double* row = J.row(block).data();
-    for (int i = columns(block).first; i < columns(block).last; ++i) sum += row[i] * x.row(i);
-    sum += row[3] * x.row(3) + row[4] * x.row(4) + row[5] * x.row(5);
-  }
-  template <class X, class Y>
-  void subtract_group_times(const Rows& J, const RowGroup& g, const Y& lambda, X& x) const {
-    X sum = x;
-    for (int r = 0; r < g.rows; ++r) {
-      const double* row = J.row(g.block + r).data();
-      const RowOf<X> l = lambda.row(g.row + r);
-      for (int i = columns(g.block + r).first; i < columns(g.block + r).last; ++i) sum.row(i) -= row[i] * l;
-      for (int i = 3; i < 6; ++i) sum.row(i) -= row[i] * l;
-    }
-    x = sum;
-  }
   void add_cross(double alpha, int block, Mat<6, 6>& S12) const;
   static std::size_t at(int body) { return static_cast<std::size_t>(body - 1); }
   void add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S);

@@ -43,7 +43,7 @@ Elimination::Elimination(int bodies, std::span<const std::pair<int, int>> edges)
   for (std::size_t k = 0; k < index(bodies); ++k) {
     for (const int i : rows[k]) {
       places[k][i] = blocks;
-      columns[k].push_back({i, blocks++});
+      columns[k].push_back({i, order[index(i)], blocks++});
     }
     if (rows[k].empty()) continue;
     const int parent = *rows[k].begin();

@@ -10,8 +10,8 @@
 namespace mbsopt {
 
 struct Elimination {
-  struct Entry {  // a block of column k below the diagonal: its row (elimination position) and place
-    int row = 0;
+  struct Entry {  // a block of column k below the diagonal: its row (elimination position), its body, its place
+    int row = 0, body = 0;
     std::size_t block = 0;
   };
   // Eliminating column k changes `target` by the product of its entries i and j (numbers in the column), i at or below

@@ -79,9 +79,8 @@ void Dynamics::residual_tangent(const ParameterBlock& block, const LaneRows& y_d
     r_dir.middleRows<6>(row) = rhs_lanes_[k - 1] - solver_.mass_times(i, z_dir_[k - 1]);
     r_dir.row(row + 6) = -dot(a, p_dir) - (2 * pp) * dot(pdot, pdot_dir) - (2 * vv) * p_p_dir;
   }
-  lambda_dir_.setZero();
-  solver_.rows().add_times(z_dir_, lambda_dir_);
-  r_dir.bottomRows(data_.m) = gamma_dir_ - lambda_dir_;
+  solver_.rows().subtract_times(z_dir_, gamma_dir_);
+  r_dir.bottomRows(data_.m) = gamma_dir_;
 }
 
 void Dynamics::add_residual_adjoint(const Eigen::VectorXd& r_bar, Eigen::Ref<Eigen::VectorXd> y_bar,

@@ -65,9 +65,7 @@ class Statics {
   MatrixXd z_of_positions() {
     const MatrixXd directions = to_q(y_.head(7 * n_), MatrixXd::Identity(6 * n_, 6 * n_));
     MatrixXd out(6 * n_, 6 * n_);
-    ParameterBlock none;
-    none.theta.setZero(d_.slots(), kLanes);
-    std::fill(none.parameter, none.parameter + kLanes, -1);
+    const ParameterBlock none = block_without_parameters(d_);
     LaneRows y_dir(14 * n_, kLanes), ydot_dir(14 * n_, kLanes);
     for (Index first = 0; first < 6 * n_; first += kLanes) {
       y_dir.setZero();

@@ -1,10 +1,46 @@
-// Pairs of doubles, and columns of them held in registers: vector types of GCC and Clang, which need no particular
-// processor. For the innermost loops of the block solvers, where Eigen's fixed-size expressions go through memory.
+// Pairs of doubles, columns of them held in registers, and rows of lanes: vector types of GCC and Clang, which need no
+// particular processor. For the innermost loops of the block solvers, where Eigen's fixed-size expressions go through
+// memory.
 #pragma once
+
+#include "core/body/fixed_size.hpp"
 
 namespace mbsopt {
 
 using Pair = double __attribute__((vector_size(16), aligned(8), may_alias));
+
+// One row of lanes (fixed_size.hpp) in registers. A single vector of four would live in memory where the processor's
+// registers hold two.
+struct __attribute__((may_alias)) LaneRow {
+  using AlignedPair = double __attribute__((vector_size(16), may_alias));
+  AlignedPair low, high;
+
+  LaneRow& operator+=(const LaneRow& x) { return low += x.low, high += x.high, *this; }
+  LaneRow& operator-=(const LaneRow& x) { return low -= x.low, high -= x.high, *this; }
+  LaneRow& operator*=(double s) { return low *= s, high *= s, *this; }
+  friend LaneRow operator+(const LaneRow& x, const LaneRow& y) { return {x.low + y.low, x.high + y.high}; }
+  friend LaneRow operator-(const LaneRow& x, const LaneRow& y) { return {x.low - y.low, x.high - y.high}; }
+  friend LaneRow operator*(double s, const LaneRow& x) { return {s * x.low, s * x.high}; }
+};
+static_assert(sizeof(LaneRow) == kLanes * sizeof(double));
+
+// The numbers of a vector, or the rows of an array of lanes: formulas written for entries hold for both.
+template <int N>
+double* entries(Vec<N>& x) {
+  return x.data();
+}
+template <int N>
+const double* entries(const Vec<N>& x) {
+  return x.data();
+}
+template <int N>
+LaneRow* entries(Lanes<N>& x) {
+  return reinterpret_cast<LaneRow*>(x.data());
+}
+template <int N>
+const LaneRow* entries(const Lanes<N>& x) {
+  return reinterpret_cast<const LaneRow*>(x.data());
+}
 
 // (a0 + a1, b0 + b1)
 inline Pair sums(Pair a, Pair b) { return __builtin_shufflevector(a, b, 0, 2) + __builtin_shufflevector(a, b, 1, 3); }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/dynamics/pairs.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -333,6 +335,7 @@ void PlanarConstraints::tangents(Order order, const DualFrames& frames, RowLaws&
   for (LaneRows* x : {&out.phi, &out.phi_dot, &out.phi_ddot}) x->setZero();
   LaneRows& rows = order == Order::phi ? out.phi : order == Order::phi_dot ? out.phi_dot : out.phi_ddot;
   for (const PlanarConstraint& c : model_->constraints) {
+    if (c.kind == Kind::point && order == Order::phi_ddot) continue;
     const std::size_t i = at(c.body1), j = at(c.body2);
     const PlanarFrame<LaneDual>&f1 = frames[i], &f2 = frames[j];
     const auto add_load = [&](std::size_t body, const PlaneDual& force, const LaneDual& moment) {
@@ -342,9 +345,8 @@ void PlanarConstraints::tangents(Order order, const DualFrames& frames, RowLaws&
     };
     const auto add = [&](const auto& s) {
       if (c.kind == Kind::point) {
-        const PlaneDual d = order == Order::phi       ? f2.r - f1.r + f2.A * s.s2 - f1.A * s.s1
-                            : order == Order::phi_dot ? f2.rdot - f1.rdot + f2.Adot * s.s2 - f1.Adot * s.s1
-                                                      : f2.Addot * s.s2 - f1.Addot * s.s1;
+        const PlaneDual d = order == Order::phi ? f2.r - f1.r + f2.A * s.s2 - f1.A * s.s1
+                                                : f2.rdot - f1.rdot + f2.Adot * s.s2 - f1.Adot * s.s1;
         rows.row(c.row) += d.re.d.matrix();
         rows.row(c.row2) += d.im.d.matrix();
         const Plane l{lambda(c.row), lambda(c.row2)};
@@ -376,6 +378,54 @@ void PlanarConstraints::tangents(Order order, const DualFrames& frames, RowLaws&
     }
   }
   laws.subtract_tangents(block, out.phi, out.phi_dot, out.phi_ddot);
+}
+
+void PlanarConstraints::set_point_moments(const Eigen::VectorXd& lambda, std::vector<Plane>& W) const {
+  for (Plane& w : W) w = {};
+  for (const PlanarConstraint& c : model_->constraints) {
+    if (c.kind != Kind::point) continue;
+    const Plane l{lambda(c.row), lambda(c.row2)};
+    W[at(c.body1)] -= conj(c.s1) * l;
+    W[at(c.body2)] += conj(c.s2) * l;
+  }
+}
+
+void PlanarConstraints::subtract_point_tangents(const Frames& frames, const std::vector<Lanes<2>>& Addot_dirs,
+                                                const ParameterBlock& block, const Eigen::VectorXd& lambda, LaneRows& c,
+                                                std::vector<Lanes<3>>& b) const {
+  LaneRow* rows = entries(c);
+  for (const PlanarConstraint& p : model_->constraints) {
+    if (p.kind != Kind::point) continue;
+    LaneRow &first = rows[p.row], &second = rows[p.row2];
+    if (p.body2 > 0) {
+      const LaneRow* x = entries(Addot_dirs[at(p.body2)]);
+      first -= p.s2.re * x[0] - p.s2.im * x[1], second -= p.s2.re * x[1] + p.s2.im * x[0];
+    }
+    if (p.body1 > 0) {
+      const LaneRow* x = entries(Addot_dirs[at(p.body1)]);
+      first += p.s1.re * x[0] - p.s1.im * x[1], second += p.s1.re * x[1] + p.s1.im * x[0];
+    }
+    const auto vector_moves = [&](int slot, int body, double sign) {
+      if (!block.moves(slot, 3)) return;
+      const PlanarBody& own = model_->bodies[at(body)];
+      const PlanarFrame<double>& f = frames[at(body)];
+      const Lanes<3> ds = block.theta.middleRows<3>(slot);
+      const Lanes<1> re = own.b1.transpose() * ds, im = own.b2.transpose() * ds;
+      c.row(p.row) -= sign * (f.Addot.re * re - f.Addot.im * im);
+      c.row(p.row2) -= sign * (f.Addot.re * im + f.Addot.im * re);
+      if (body == 0) return;
+      const Plane w = conj(f.A) * Plane{lambda(p.row), lambda(p.row2)};  // cross(A s', l) = cross(s', conj(A) l)
+      b[at(body - 1)].row(2) -= sign * (w.im * re - w.re * im);
+    };
+    vector_moves(p.slot2, p.body2, 1);
+    vector_moves(p.slot1, p.body1, -1);
+  }
+}
+
+void PlanarConstraints::mark_others(std::vector<bool>& bodies) const {
+  for (const PlanarConstraint& c : model_->constraints) {
+    if (c.kind != Kind::point) bodies[at(c.body1)] = bodies[at(c.body2)] = true;
+  }
 }
 
 }  // namespace mbsopt

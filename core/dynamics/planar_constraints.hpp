@@ -81,11 +81,23 @@ class PlanarConstraints {
                      Eigen::Ref<Eigen::VectorXd> rho_bar) const;
 
   // Tangents in the frames' directions and those of the vectors: of Phi, of Phidot, or of Phiddot (the others
-  // hold nothing of use), and of J'lambda, added to loads (the ground's first).
+  // hold nothing of use), and of J'lambda, added to loads (the ground's first). Of Phiddot without the points, whose
+  // tangents are below.
   enum class Order { phi, phi_dot, phi_ddot };
   void tangents(Order order, const DualFrames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
                 const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,
                 std::vector<Lanes<3>>& loads) const;
+
+  // Points, which most joints of a plane are. In the frames, lambda and the vectors held fixed:
+  //   d(J'lambda)_theta of a body = cross(A', W),  W: sum of +-conj(s) lambda over its points      [the ground's first]
+  void set_point_moments(const Eigen::VectorXd& lambda, std::vector<Plane>& W) const;
+  // c -= Phiddot' in the directions Addot' (the ground's first; rows re, im) and those of the vectors, and
+  // b -= (J'lambda)' in those of the vectors (b without the ground).
+  void subtract_point_tangents(const Frames& frames, const std::vector<Lanes<2>>& Addot_dirs,
+                               const ParameterBlock& block, const Eigen::VectorXd& lambda, LaneRows& c,
+                               std::vector<Lanes<3>>& b) const;
+  // Bodies (the ground first) of constraints that are no points.
+  void mark_others(std::vector<bool>& bodies) const;
 
  private:
   const PlanarModel* model_;

@@ -5,6 +5,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/body/lanes.hpp"
+#include "core/dynamics/pairs.hpp"
 
 namespace mbsopt {
 namespace {
@@ -14,6 +15,12 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 bool any_force(const MechanismData& d) {
   return !(d.tsda.empty() && d.rsda.empty() && d.applied.empty() && d.bushings.empty() && d.turning_frictions.empty() &&
            d.sliding_frictions.empty());
+}
+
+Eigen::VectorXd in_plane(const PlanarModel& model, const Eigen::VectorXd& of_rows) {
+  Eigen::VectorXd out(static_cast<Eigen::Index>(model.rows.size()));
+  model.gather(of_rows, out);
+  return out;
 }
 
 // The blocks of forces alone.
@@ -34,9 +41,9 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
       settings_(settings),
       value_refinements_(values),
       derivative_refinements_(derivatives),
-      laws_(data),
+      laws_(data, model_.rows),
       constraints_(data),
-      solver_(data, alpha, compliance),
+      solver_(data, in_plane(model_, alpha), compliance),
       has_forces_(any_force(data)),
       forces_(data) {
   const std::size_t n = at(data.n);
@@ -44,13 +51,21 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
   angles_.setZero(static_cast<Eigen::Index>(data.angles.size()));
   bodies_.resize(n + 1), frames_.resize(n + 1), dual_frames_.resize(n + 1);
   loads_.resize(n), z_.resize(n), eta_.resize(n);
-  for (Eigen::VectorXd* x : {&gamma_, &phi_, &phi_dot_, &lambda_, &mu_, &g_}) x->setZero(data.m);
+  const Eigen::Index m = static_cast<Eigen::Index>(model_.rows.size());
+  for (Eigen::VectorXd* x : {&gamma_, &phi_, &phi_dot_, &lambda_, &mu_, &g_}) x->setZero(m);
+  lambda_of_phi_.setZero(data.m);
   for (LaneRows* x :
        {&constraint_dirs_.phi, &constraint_dirs_.phi_dot, &constraint_dirs_.phi_ddot, &gamma_dir_, &lambda_dir_}) {
-    x->setZero(data.m, kLanes);
+    x->setZero(m, kLanes);
   }
-  load_dirs_.resize(n + 1), other_load_dirs_.resize(n + 1), rhs_lanes_.resize(n), z_dir_.resize(n);
+  load_dirs_.resize(n + 1), rhs_lanes_.resize(n), z_dir_.resize(n);
+  turns_.resize(n + 1), turn_dirs_.resize(n + 1), Addot_dirs_.resize(n + 1), moments_.resize(n + 1);
   shifts_.resize(n + 1), bars_.resize(n + 1);
+  std::vector<bool> dual(n + 1, settings.omega != 0);
+  constraints_.mark_others(dual);
+  for (std::size_t i = 1; i <= n; ++i) {
+    if (dual[i]) dual_bodies_.push_back(i);
+  }
   if (!has_forces_) return;
   std::vector<bool> loaded(n + 1, false);
   forces_.mark_units(loaded);
@@ -58,11 +73,12 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
     if (loaded[i]) loaded_.push_back(i);
   }
   states_in_space_.resize(n + 1), frames_in_space_.resize(n + 1), body_loads_.resize(n + 1);
-  body_load_dirs_.resize(n + 1), force_rhs_.resize(n), bars_in_space_.resize(n + 1);
+  body_load_dirs_.resize(n + 1), bars_in_space_.resize(n + 1);
 }
 
 void PlanarDynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
   t_ = t;
+  tangents_ready_ = false;
   laws_.set_time(t);
   const Eigen::Index half = 7 * data_.n;
   for (int i = 1; i <= data_.n; ++i) {
@@ -76,7 +92,6 @@ void PlanarDynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::
   angles_ = angles;
   if (!has_forces_) return;
   y_ = y;
-  if (force_blocks_) force_blocks_->current = false;
   for (const std::size_t k : loaded_) {
     const Eigen::Index q = 7 * (static_cast<Eigen::Index>(k) - 1);
     set_position(y.segment<7>(q), states_in_space_[k], frames_in_space_[k]);
@@ -115,6 +130,7 @@ bool PlanarDynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::V
   if (!solver_.factor(frames_)) return false;
   g_ = -gamma_;
   solver_.solve(loads_, g_, value_refinements_, z_, lambda_);
+  model_.spread(lambda_, lambda_of_phi_);
 
   const Eigen::Index half = 7 * data_.n;
   ydot.head(half) = y.tail(half);
@@ -149,7 +165,7 @@ bool PlanarDynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen::
                                const Eigen::Ref<const Eigen::VectorXd>& a,
                                const Eigen::Ref<const Eigen::VectorXd>& lambda) {
   set_state(t, y, angles);
-  lambda_ = lambda;
+  model_.gather(lambda, lambda_);
   for (int i = 1; i <= data_.n; ++i) {
     const Eigen::Index q = 7 * (i - 1);
     const Plane& P = bodies_[at(i)].P;
@@ -160,54 +176,131 @@ bool PlanarDynamics::linearise(double t, const Eigen::VectorXd& y, const Eigen::
   return solver_.factor(frames_);
 }
 
-// What forces add to b: in the state by blocks, evaluated once per state, and in the fields.
-void PlanarDynamics::add_force_tangent(const ParameterBlock& block, const LaneRows& y_dir) {
-  if (!force_blocks_) {
-    force_blocks_.emplace(ForceLinearisation{force_blocks(data_), std::vector<UnitTangents>(bodies_.size()), false});
-    no_rows_.setZero(0, kLanes);
+// With P' and Pdot' for directions, products of complex numbers and real dot products:
+//   Addot' = 4 Pdot Pdot' + (i omegadot - 2 |Pdot|^2) 2 P P' - 4 (Pdot'Pdot') A
+//   Pddot' = (i omegadot/2 - |Pdot|^2) P' - 2 (Pdot'Pdot') P        and with omegadot':  + i omegadot'/2 P
+void PlanarDynamics::prepare_tangents() {
+  tangents_ready_ = true;
+  constraints_.set_point_moments(lambda_, moments_);
+  const auto product = [](const Plane& g, auto&& block) { block << g.re, -g.im, g.im, g.re; };
+  for (std::size_t k = 1; k < bodies_.size(); ++k) {
+    const Body& b = bodies_[k];
+    const Plane &A = frames_[k].A, &P = b.P, &Pdot = b.Pdot;
+    const double size = squared_norm(Pdot);
+    TurnTangent& x = turns_[k];
+    x.moment = conj(2 * P) * moments_[k];
+    product(2 * (Plane{-2 * size, b.omegadot} * P), x.Addot.leftCols<2>());
+    product(4 * Pdot, x.Addot.rightCols<2>());
+    product(Plane{-size, 0.5 * b.omegadot}, x.Pddot.leftCols<2>());
+    const Eigen::RowVector2d along(Pdot.re, Pdot.im);
+    x.Addot.row(0).tail<2>() -= 4 * A.re * along, x.Addot.row(1).tail<2>() -= 4 * A.im * along;
+    x.Pddot.row(0).tail<2>() = -2 * P.re * along, x.Pddot.row(1).tail<2>() = -2 * P.im * along;
   }
-  ForceLinearisation& x = *force_blocks_;
-  if (!x.current) {
-    x.current = true;
-    x.blocks.set_zero();
-    for (const std::size_t k : loaded_) set_unit_tangents(states_in_space_[k], x.units[k]);
-    forces_.add_blocks(here(), x.units, x.blocks);
+  if (has_forces_) prepare_force_tangents();
+}
+
+// The blocks of forces, as the plane sees them.
+void PlanarDynamics::prepare_force_tangents() {
+  if (!force_linearisation_) {
+    force_linearisation_.emplace(
+        ForceLinearisation{force_blocks(data_), std::vector<UnitTangents>(bodies_.size()), {}});
+    force_linearisation_->in_plane.resize(force_linearisation_->blocks.b.size());
   }
-  for (Lanes<6>& load : body_load_dirs_) load.setZero();
-  for (Lanes<6>& load : force_rhs_) load.setZero();
-  forces_.add_field_tangent(here(), block, body_load_dirs_);
-  x.blocks.add_times(y_dir, force_rhs_, no_rows_);
-  for (const std::size_t k : loaded_) {
-    const Lanes<6> load = body_load_dirs_[k] + force_rhs_[k - 1];
-    rhs_lanes_[k - 1] += bodies_in_y_.reduced(k, load);
+  ForceLinearisation& x = *force_linearisation_;
+  x.blocks.set_zero();
+  for (const std::size_t k : loaded_) set_unit_tangents(states_in_space_[k], x.units[k]);
+  forces_.add_blocks(here(), x.units, x.blocks);
+  for (std::size_t k = 0; k < x.in_plane.size(); ++k) {
+    const MotionBlocks::Block<6>& block = x.blocks.b[k];
+    if (block.parts == 0) continue;
+    const MotionBlocks::Place& place = x.blocks.pairs()[k];
+    const PlanarBody &loaded = model_.bodies[at(place.row + 1)], &read = model_.bodies[at(place.body + 1)];
+    const auto reduce = [&](const Mat<6, 7>& of, Mat<3, 4>& to) {
+      Mat<3, 7> rows;
+      rows << of.row(model_.t1), of.row(model_.t2), loaded.n.transpose() * of.bottomRows<3>();
+      to << rows.col(model_.t1), rows.col(model_.t2), rows.rightCols<4>() * read.p_a, rows.rightCols<4>() * read.p_b;
+    };
+    reduce(block.q, x.in_plane[k].q);
+    reduce(block.v, x.in_plane[k].v);
   }
 }
 
-void PlanarDynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir) {
+// What forces add to b: in the state by their blocks, and in the fields.
+void PlanarDynamics::add_force_tangent(const ParameterBlock& block, const LaneRows& y_dir) {
+  const ForceLinearisation& x = *force_linearisation_;
+  const LaneRow* y = entries(y_dir);
+  for (std::size_t k = 0; k < x.in_plane.size(); ++k) {
+    if (x.blocks.b[k].parts == 0) continue;
+    const MotionBlocks::Place& place = x.blocks.pairs()[k];
+    const LaneRow* r = y + 7 * place.body;
+    const LaneRow* rdot = r + 7 * data_.n;
+    const LaneRow* P = entries(turn_dirs_[at(place.body + 1)]);
+    LaneRow* b = entries(rhs_lanes_[at(place.row)]);
+    const Mat<3, 4>&q = x.in_plane[k].q, &v = x.in_plane[k].v;
+    for (int i = 0; i < 3; ++i) {
+      b[i] += q(i, 0) * r[model_.t1] + q(i, 1) * r[model_.t2] + q(i, 2) * P[0] + q(i, 3) * P[1] +
+              v(i, 0) * rdot[model_.t1] + v(i, 1) * rdot[model_.t2] + v(i, 2) * P[2] + v(i, 3) * P[3];
+    }
+  }
+  for (const std::size_t k : loaded_) body_load_dirs_[k].setZero();
+  body_load_dirs_[0].setZero();
+  forces_.add_field_tangent(here(), block, body_load_dirs_);
+  for (const std::size_t k : loaded_) rhs_lanes_[k - 1] += bodies_in_y_.reduced(k, body_load_dirs_[k]);
+}
+
+// Of constraints that are no points, and of laws: duals.
+void PlanarDynamics::add_other_tangents(const ParameterBlock& block, const LaneRows& y_dir) {
   using Order = PlanarConstraints::Order;
   const Eigen::Index half = 7 * data_.n;
-  std::vector<PlanarFrame<LaneDual>>& frames = dual_frames_;
-  for (int i = 1; i <= data_.n; ++i) {
-    const Eigen::Index q = 7 * (i - 1), v = half + q;
-    const Body& b = bodies_[at(i)];
-    PlanarFrame<LaneDual>& f = frames[at(i)];
-    f.r = bodies_in_y_.vector(frames_[at(i)].r, y_dir, q);
-    f.rdot = bodies_in_y_.vector(frames_[at(i)].rdot, y_dir, v);
-    f.rddot = frames_[at(i)].rddot;
-    f.set_turn(bodies_in_y_.turn(at(i), b.P, y_dir, q + 3), bodies_in_y_.turn(at(i), b.Pdot, y_dir, v + 3), b.omegadot);
+  for (const std::size_t k : dual_bodies_) {
+    const Eigen::Index q = 7 * (static_cast<Eigen::Index>(k) - 1), v = half + q;
+    const Body& b = bodies_[k];
+    PlanarFrame<LaneDual>& f = dual_frames_[k];
+    f.r = bodies_in_y_.vector(frames_[k].r, y_dir, q);
+    f.rdot = bodies_in_y_.vector(frames_[k].rdot, y_dir, v);
+    f.rddot = frames_[k].rddot;
+    const auto turn = [&](const Plane& value, Eigen::Index row) {
+      return PlaneDual{{value.re, turn_dirs_[k].row(row).array()}, {value.im, turn_dirs_[k].row(row + 1).array()}};
+    };
+    f.set_turn(turn(b.P, 0), turn(b.Pdot, 2), b.omegadot);
   }
+  const auto add = [&](Order order, double factor, const LaneRows& rows, std::vector<Lanes<3>>& loads) {
+    for (Lanes<3>& load : loads) load.setZero();
+    constraints_.tangents(order, dual_frames_, laws_, angles_, block, lambda_, constraint_dirs_, loads);
+    gamma_dir_ -= factor * rows;
+  };
   if (settings_.omega != 0) {
-    for (Lanes<3>& load : other_load_dirs_) load.setZero();
-    constraints_.tangents(Order::phi, frames, laws_, angles_, block, lambda_, constraint_dirs_, other_load_dirs_);
-    gamma_dir_ = -settings_.omega * settings_.omega * constraint_dirs_.phi;
-    constraints_.tangents(Order::phi_dot, frames, laws_, angles_, block, lambda_, constraint_dirs_, other_load_dirs_);
-    gamma_dir_ -= 2 * settings_.xi * settings_.omega * constraint_dirs_.phi_dot;
-  } else {
-    gamma_dir_.setZero();
+    add(Order::phi, settings_.omega * settings_.omega, constraint_dirs_.phi, load_dirs_);
+    add(Order::phi_dot, 2 * settings_.xi * settings_.omega, constraint_dirs_.phi_dot, load_dirs_);
   }
-  for (Lanes<3>& load : load_dirs_) load.setZero();
-  constraints_.tangents(Order::phi_ddot, frames, laws_, angles_, block, lambda_, constraint_dirs_, load_dirs_);
-  gamma_dir_ -= constraint_dirs_.phi_ddot;
+  add(Order::phi_ddot, 1, constraint_dirs_.phi_ddot, load_dirs_);
+  for (std::size_t i = 0; i < rhs_lanes_.size(); ++i) rhs_lanes_[i] -= load_dirs_[i + 1];
+}
+
+void PlanarDynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir) {
+  if (!tangents_ready_) prepare_tangents();
+  const Eigen::Index half = 7 * data_.n;
+  const LaneRow* y = entries(y_dir);
+  for (std::size_t k = 1; k < bodies_.size(); ++k) {
+    const PlanarBody& body = model_.bodies[k];
+    const LaneRow* p = y + 7 * (k - 1) + 3;
+    LaneRow* P = entries(turn_dirs_[k]);
+    for (int i = 0; i < 4; i += 2, p += half) {
+      P[i] = body.p_a(0) * p[0] + body.p_a(1) * p[1] + body.p_a(2) * p[2] + body.p_a(3) * p[3];
+      P[i + 1] = body.p_b(0) * p[0] + body.p_b(1) * p[1] + body.p_b(2) * p[2] + body.p_b(3) * p[3];
+    }
+    const TurnTangent& x = turns_[k];
+    LaneRow* Addot = entries(Addot_dirs_[k]);
+    for (int i = 0; i < 2; ++i) {
+      Addot[i] = x.Addot(i, 0) * P[0] + x.Addot(i, 1) * P[1] + x.Addot(i, 2) * P[2] + x.Addot(i, 3) * P[3];
+    }
+    LaneRow* b = entries(rhs_lanes_[k - 1]);
+    b[0] = LaneRow{}, b[1] = LaneRow{};
+    b[2] = x.moment.re * P[1] - x.moment.im * P[0];
+  }
+  gamma_dir_.setZero();
+  if (!dual_bodies_.empty() || !data_.laws.empty()) add_other_tangents(block, y_dir);
+  constraints_.subtract_point_tangents(frames_, Addot_dirs_, block, lambda_, gamma_dir_, rhs_lanes_);
 
   Lanes<3> gravity_dir;
   const Lanes<3>* dg = block.field<3>(data_.slot_gravity, gravity_dir);
@@ -215,7 +308,6 @@ void PlanarDynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir,
     const BodyData& body = data_.bodies[k];
     const Vec<3>& z = z_[k - 1];
     Lanes<3>& b = rhs_lanes_[k - 1];
-    b = -load_dirs_[k];
     Lanes<1> mass_dir;
     if (const Lanes<1>* dm = block.field<1>(body.slot_mass, mass_dir)) {
       b.row(0) += (model_.gravity.re - z(0)) * *dm, b.row(1) += (model_.gravity.im - z(1)) * *dm;
@@ -230,16 +322,20 @@ void PlanarDynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir,
   solver_.solve(rhs_lanes_, gamma_dir_, derivative_refinements_, z_dir_, lambda_dir_);
 
   ydot_dir.topRows(half) = y_dir.bottomRows(half);
-  ydot_dir.bottomRows(half).setZero();
-  for (int i = 1; i <= data_.n; ++i) {
-    const Eigen::Index q = 7 * (i - 1), a = half + q;
-    const Body& b = bodies_[at(i)];
-    const Lanes<3>& dz = z_dir_[at(i - 1)];
-    bodies_in_y_.add_vector_direction({{0, dz.row(0).array()}, {0, dz.row(1).array()}}, a, ydot_dir);
-    const PlaneDual P = bodies_in_y_.turn(at(i), b.P, y_dir, q + 3),
-                    Pdot = bodies_in_y_.turn(at(i), b.Pdot, y_dir, half + q + 3);
-    const PlaneDual factor{-squared_norm(Pdot), LaneDual{0.5 * b.omegadot, 0.5 * dz.row(2).array()}};
-    bodies_in_y_.add_turn_direction(at(i), factor * P, a + 3, ydot_dir);
+  LaneRow* out = entries(ydot_dir) + half;
+  for (std::size_t k = 1; k < bodies_.size(); ++k, out += 7) {
+    const PlanarBody& body = model_.bodies[k];
+    const TurnTangent& x = turns_[k];
+    const Plane& turn = bodies_[k].P;
+    const LaneRow *P = entries(turn_dirs_[k]), *z = entries(z_dir_[k - 1]);
+    for (int i = 0; i < 3; ++i) out[i] = LaneRow{};
+    out[model_.t1] = z[0], out[model_.t2] = z[1];
+    LaneRow Pddot[2];
+    for (int i = 0; i < 2; ++i) {
+      Pddot[i] = x.Pddot(i, 0) * P[0] + x.Pddot(i, 1) * P[1] + x.Pddot(i, 2) * P[2] + x.Pddot(i, 3) * P[3];
+    }
+    Pddot[0] -= (0.5 * turn.im) * z[2], Pddot[1] += (0.5 * turn.re) * z[2];
+    for (int i = 0; i < 4; ++i) out[3 + i] = body.p_a(i) * Pddot[0] + body.p_b(i) * Pddot[1];
   }
 }
 

@@ -31,7 +31,7 @@ class PlanarDynamics {
   void add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
                    Eigen::VectorXd& rho_bar);
 
-  const Eigen::VectorXd& lambda() const { return lambda_; }
+  const Eigen::VectorXd& lambda() const { return lambda_of_phi_; }
   double residual_ratio() const { return solver_.residual_ratio(); }
   double residual_size() const { return solver_.residual_size(); }
   double usual_acceleration() const;  // what accelerations are of: loads on each body alone, and turning
@@ -46,7 +46,10 @@ class PlanarDynamics {
   void set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
   void set_loads();
   void set_acceleration(std::size_t body, const Vec<3>& z);
+  void prepare_tangents();  // what all directions share, after linearise()
+  void prepare_force_tangents();
   void add_force_tangent(const ParameterBlock& block, const LaneRows& y_dir);
+  void add_other_tangents(const ParameterBlock& block, const LaneRows& y_dir);
   void add_force_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
   ForceTerms::At here() const { return {t_, y_, angles_, frames_in_space_}; }
 
@@ -64,7 +67,8 @@ class PlanarDynamics {
   std::vector<Body> bodies_;
   PlanarConstraints::Frames frames_;
   std::vector<Vec<3>> loads_, z_, eta_;
-  Eigen::VectorXd gamma_, phi_, phi_dot_, lambda_, mu_, g_;
+  Eigen::VectorXd gamma_, phi_, phi_dot_, lambda_, mu_, g_;  // of the rows in the plane
+  Eigen::VectorXd lambda_of_phi_;                            // of all; those that hold by themselves have none
 
   // Forces, and the bodies that they read and load, in space.
   bool has_forces_ = false;
@@ -75,17 +79,30 @@ class PlanarDynamics {
   std::vector<Vec<6>> body_loads_;
 
   // Derivatives.
+  struct TurnTangent {
+    Mat<2, 4> Addot, Pddot;  // in the directions (Re P, Im P, Re Pdot, Im Pdot)
+    Plane moment;            // b_theta' = moment x P', of J'lambda
+  };
   struct ForceLinearisation {
     MotionBlocks blocks;
     std::vector<UnitTangents> units;
-    bool current = false;
+    struct Block {
+      Mat<3, 4> q, v;  // by (r, P) and (rdot, Pdot)
+    };
+    std::vector<Block> in_plane;
   };
-  std::optional<ForceLinearisation> force_blocks_;
+  bool tangents_ready_ = false;
+  std::vector<TurnTangent> turns_;
+  std::vector<Plane> moments_;
+  std::vector<Lanes<4>> turn_dirs_;  // (P', Pdot')
+  std::vector<Lanes<2>> Addot_dirs_;
+  std::vector<std::size_t> dual_bodies_;  // of constraints that are no points
+  std::optional<ForceLinearisation> force_linearisation_;
   PlanarConstraints::DualFrames dual_frames_;
   ConstraintTangents constraint_dirs_;
-  LaneRows gamma_dir_, lambda_dir_, no_rows_;
-  std::vector<Lanes<3>> load_dirs_, other_load_dirs_, rhs_lanes_, z_dir_;
-  std::vector<Lanes<6>> body_load_dirs_, force_rhs_;
+  LaneRows gamma_dir_, lambda_dir_;
+  std::vector<Lanes<3>> load_dirs_, rhs_lanes_, z_dir_;
+  std::vector<Lanes<6>> body_load_dirs_;
   std::vector<PlanarShift> shifts_;
   std::vector<PlanarFrameBar> bars_;
   std::vector<FrameBar> bars_in_space_;

@@ -9,10 +9,17 @@ namespace {
 constexpr double kRelativeAlpha = 1e8;
 constexpr Refinements kOnePass{};  // every use is inside an iteration that refines
 constexpr int kMostIterations = 60, kMostRefinements = 12;
-constexpr double kNegligible = 1e-17;
-constexpr double kUnmetPosition = 1e-8, kUnmetVelocity = 1e-6;  // of the largest coordinate, velocity; at least of 1
+constexpr double kNegligible = 2e-15;  // as in projection_derivatives.cpp
+// Of the largest coordinate and velocity, at least of 1.
+constexpr double kRounding = 1e-15, kUnmetPosition = 1e-8, kUnmetVelocity = 1e-6;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+Eigen::VectorXd alpha_in_plane(const MechanismData& data) {
+  Eigen::VectorXd alpha(static_cast<Eigen::Index>(data.planar->rows.size()));
+  data.planar->gather(data.row_alpha, alpha);
+  return alpha;
+}
 
 // Frames at (r, P) moving at (rdot, w), where |P| = 1.
 template <class T>
@@ -35,20 +42,21 @@ PlanarProjector::PlanarProjector(const MechanismData& data)
     : data_(data),
       model_(*data.planar),
       bodies_in_y_(model_),
-      solver_(data, kRelativeAlpha * data.row_alpha),
+      solver_(data, kRelativeAlpha * alpha_in_plane(data)),
       rows_(data),
       constraints_(data),
-      laws_(data) {
+      laws_(data, model_.rows) {
   const std::size_t n = at(data.n);
+  const Eigen::Index m = rows_.count();
   bodies_.resize(n + 1), frames_.resize(n + 1), frames_tilde_.resize(n + 1), dual_frames_.resize(n + 1);
   for (auto* x : {&delta_, &u_, &b_, &x_, &dx_, &r_, &Ex_}) x->resize(n);
-  for (Eigen::VectorXd* x : {&nu_, &kappa_, &phi_, &g_, &dnu_, &mu_}) x->setZero(data.m);
+  for (Eigen::VectorXd* x : {&nu_, &kappa_, &phi_, &g_, &dnu_, &mu_}) x->setZero(m);
   angles_.setZero(static_cast<Eigen::Index>(data.angles.size()));
   shifts_.resize(n + 1), still_.resize(n + 1), bars_.resize(n + 1), q_bar_.resize(n + 1), v_bar_.resize(n + 1);
   load_dirs_.resize(n + 1);
   for (auto* x : {&q_dir_, &v_dir_, &b_lanes_, &x_lanes_, &dx_lanes_, &r_lanes_, &Ex_lanes_}) x->resize(n);
   for (LaneRows* x : {&dirs_.phi, &dirs_.phi_dot, &dirs_.phi_ddot, &g_lanes_, &nu_lanes_, &rg_lanes_, &dnu_lanes_}) {
-    x->setZero(data.m, kLanes);
+    x->setZero(m, kLanes);
   }
 }
 
@@ -94,15 +102,18 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
   laws_.set_time(t);
   set_hat(y_hat);
   if (!solver_.factor(frames_tilde_)) return false;
+  const Eigen::Index half = 7 * data_.n;
+  const double q_size = std::max(1.0, y_hat.head(half).cwiseAbs().maxCoeff()),
+               v_size = std::max(1.0, y_hat.tail(half).cwiseAbs().maxCoeff());
   for (Vec<3>& d : delta_) d.setZero();
   nu_.setZero();
   set_positions(delta_);
   double before = INFINITY, now = 0;
-  for (int k = 0; k < kMostIterations && data_.m > 0; ++k) {
+  for (int k = 0; k < kMostIterations && rows_.count() > 0; ++k) {
     constraints_.phi(frames_, laws_, angles, phi_);
     now = phi_.cwiseAbs().maxCoeff();
     if (!std::isfinite(now)) return false;
-    if (now < 1e-15 || (k > 1 && now > 0.95 * before)) break;  // rounding reached, or a singular position
+    if (now < kRounding * q_size || (k > 1 && now > 0.95 * before)) break;  // rounding reached, or a singular position
     before = now;
     for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, delta_[at(i - 1)]);
     solver_.rows().subtract_transposed_times(nu_, b_);
@@ -112,19 +123,18 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
     nu_ += dnu_;
     set_positions(delta_);
   }
-  const Eigen::Index half = 7 * data_.n;
-  if (now > kUnmetPosition * std::max(1.0, y_hat.head(half).cwiseAbs().maxCoeff())) return false;
+  if (now > kUnmetPosition * q_size) return false;
 
   for (Vec<3>& u : u_) u.setZero();
   kappa_.setZero();
   set_velocities(u_);
   rows_.evaluate(frames_);
   before = INFINITY, now = 0;
-  for (int k = 0; k < kMostIterations && data_.m > 0; ++k) {
+  for (int k = 0; k < kMostIterations && rows_.count() > 0; ++k) {
     constraints_.phi_dot(frames_, laws_, phi_);
     now = phi_.cwiseAbs().maxCoeff();
     if (!std::isfinite(now)) return false;
-    if (now < 1e-15 || (k > 1 && now > 0.95 * before)) break;
+    if (now < kRounding * v_size || (k > 1 && now > 0.95 * before)) break;
     before = now;
     for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, u_[at(i - 1)]);
     rows_.subtract_transposed_times(kappa_, b_);
@@ -134,7 +144,7 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
     for (std::size_t i = 0; i < dx_.size(); ++i) u_[i] += dx_[i];
     set_velocities(u_);
   }
-  if (now > kUnmetVelocity * std::max(1.0, y_hat.tail(half).cwiseAbs().maxCoeff())) return false;
+  if (now > kUnmetVelocity * v_size) return false;
 
   y = y_hat;
   bool finite = true;
@@ -151,7 +161,7 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
     s.u[k - 1] << u_[k - 1], 0, 0, 0;
     finite = finite && delta_[k - 1].allFinite() && u_[k - 1].allFinite();
   }
-  s.nu = nu_, s.kappa = kappa_;
+  model_.spread(nu_, s.nu), model_.spread(kappa_, s.kappa);
   return finite && y.allFinite();
 }
 
@@ -173,7 +183,7 @@ double PlanarProjector::position_violation(double t, const Eigen::VectorXd& angl
   laws_.set_time(t);
   read(y);
   constraints_.phi(frames_, laws_, angles, phi_);
-  double worst = data_.m > 0 ? phi_.cwiseAbs().maxCoeff() : 0.0;
+  double worst = rows_.count() > 0 ? phi_.cwiseAbs().maxCoeff() : 0.0;
   for (std::size_t k = 1; k < bodies_.size(); ++k) worst = std::max(worst, std::abs(squared_norm(bodies_[k].P) - 1));
   return worst;
 }
@@ -182,7 +192,7 @@ double PlanarProjector::velocity_violation(double t, const Eigen::VectorXd& y) {
   laws_.set_time(t);
   read(y);
   constraints_.phi_dot(frames_, laws_, phi_);
-  double worst = data_.m > 0 ? phi_.cwiseAbs().maxCoeff() : 0.0;
+  double worst = rows_.count() > 0 ? phi_.cwiseAbs().maxCoeff() : 0.0;
   for (int i = 1; i <= data_.n; ++i) {
     const Plane Pdot = bodies_in_y_.turn(at(i), y, 7 * (data_.n + i - 1) + 3);
     worst = std::max(worst, 2 * std::abs(dot(bodies_[at(i)].P, Pdot)));
@@ -197,7 +207,7 @@ bool PlanarProjector::linearise(double t, const Eigen::VectorXd& angles, const E
   set_hat(y_hat);
   if (!solver_.factor(frames_tilde_)) return false;
   for (std::size_t i = 0; i < delta_.size(); ++i) delta_[i] = s.delta[i].head<3>(), u_[i] = s.u[i].head<3>();
-  nu_ = s.nu, kappa_ = s.kappa;
+  model_.gather(s.nu, nu_), model_.gather(s.kappa, kappa_);
   set_positions(delta_);
   set_velocities(u_);
   rows_.evaluate(frames_);
@@ -212,7 +222,7 @@ template <class X, class Y>
 void PlanarProjector::refine(Level level, bool transposed, const std::vector<X>& b, const Y& g, std::vector<X>& x,
                              Y& nu, std::vector<X>& r, std::vector<X>& dx, std::vector<X>& Ex, Y& rg, Y& dnu) const {
   solver_.solve(b, g, kOnePass, x, nu);
-  if (data_.m == 0) return;
+  if (rows_.count() == 0) return;
   const bool position = level == Level::position;
   const auto turn_by_E = [&](std::vector<X>& of) {
     for (std::size_t i = 0; i < of.size(); ++i) of[i].row(2) *= bodies_[i + 1].turn_by_delta;
@@ -221,28 +231,27 @@ void PlanarProjector::refine(Level level, bool transposed, const std::vector<X>&
   auto before = size;
   for (int k = 0; k < kMostRefinements; ++k) {
     for (int i = 1; i <= data_.n; ++i) r[at(i - 1)] = b[at(i - 1)] - solver_.mass_times(i, x[at(i - 1)]);
-    rg.setZero();
+    rg = g;
     if (position && !transposed) {
       solver_.rows().subtract_transposed_times(nu, r);
       Ex = x;
       turn_by_E(Ex);
-      rows_.add_times(Ex, rg);
+      rows_.subtract_times(Ex, rg);
     } else if (position) {
       for (X& e : Ex) e.setZero();
       rows_.subtract_transposed_times(nu, Ex);
       turn_by_E(Ex);
       for (std::size_t i = 0; i < r.size(); ++i) r[i] += Ex[i];
-      solver_.rows().add_times(x, rg);
+      solver_.rows().subtract_times(x, rg);
     } else {
       rows_.subtract_transposed_times(nu, r);
-      rows_.add_times(x, rg);
+      rows_.subtract_times(x, rg);
     }
-    rg = g - rg;
     solver_.solve(r, rg, kOnePass, dx, dnu);
     for (std::size_t i = 0; i < x.size(); ++i) x[i] += dx[i];
     nu += dnu;
     const auto now = largest(dx);
-    if ((now * now <= kNegligible * size * before).all()) return;  // what the next pass would change
+    if ((now * now <= kNegligible * size * before).all()) return;
     before = now;
   }
 }
@@ -310,7 +319,7 @@ void PlanarProjector::tangent(const ParameterBlock& block, const LaneRows& y_hat
     f.rdot = {{frames_[k].rdot.re, rdot.re.d}, {frames_[k].rdot.im, rdot.im.d}};
     f.Adot = times_i(LaneDual{b.w, dir.row(2).array()} * f.A);
   }
-  if (data_.m > 0) {
+  if (rows_.count() > 0) {
     for (Lanes<3>& load : load_dirs_) load.setZero();
     constraints_.tangents(Order::phi_dot, dual_frames_, laws_, angles_, block, kappa_, dirs_, load_dirs_);
     set_b(block, u_);
@@ -374,7 +383,7 @@ void PlanarProjector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd&
     v_bar_[k] = {bodies_in_y_.vector(y_bar, v), 0.5 * dot(Pdot_bar, iP)};
   }
   // Velocities: (eta, chi) from v_bar; then the gradient of v_bar'v - eta'(M u + J'kappa) - chi'Phidot.
-  if (data_.m > 0) {
+  if (rows_.count() > 0) {
     for (std::size_t k = 1; k < bodies_.size(); ++k) b_[k - 1] << v_bar_[k].r.re, v_bar_[k].r.im, v_bar_[k].theta;
     g_.setZero();
     refine(Level::velocity, true, b_, g_, x_, mu_, r_, dx_, Ex_, phi_, dnu_);
@@ -397,7 +406,7 @@ void PlanarProjector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd&
   }
 
   // Positions: (eta, chi) from delta's cotangent; then the gradient of q_bar'q - eta'(M delta + J~'nu) - chi'Phi(q).
-  if (data_.m > 0) {
+  if (rows_.count() > 0) {
     for (std::size_t k = 1; k < bodies_.size(); ++k) {
       b_[k - 1] << q_bar_[k].r.re, q_bar_[k].r.im, bodies_[k].turn_by_delta * q_bar_[k].theta;
     }

@@ -1,10 +1,11 @@
-// J and M of a planar model: three unknowns per body, (rddot along t1 and t2, omegadot about n). Rows of Phi keep their
-// numbers; those that hold by themselves in the plane are empty.
+// J and M of a planar model: three unknowns per body, (rddot along t1 and t2, omegadot about n), and the rows of
+// PlanarModel::rows.
 #pragma once
 
 #include <vector>
 
 #include "core/dynamics/block_cholesky.hpp"
+#include "core/dynamics/pairs.hpp"
 #include "core/dynamics/planar_constraints.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 
@@ -17,48 +18,48 @@ class PlanarRows {
 
   explicit PlanarRows(const MechanismData& data);  // data.planar is set
 
+  Eigen::Index count() const { return static_cast<Eigen::Index>(model_->rows.size()); }
   void evaluate(const Frames& frames);  // J
 
-  // y += J x; x: body i at x[i - 1]
+  // y -= J x; x: body i at x[i - 1]
   template <class X, class Y>
-  void add_times(const std::vector<X>& x, Y& y) const {
-    using R = Row<X>;
+  void subtract_times(const std::vector<X>& x, Y& y) const {
+    auto* to = entries(y);
     for (const Point& p : points_) {
-      R first = R::Zero(), second = R::Zero();
+      auto first = to[p.row], second = to[p.row2];
       if (p.body2 > 0) {
-        const X& b = x[at(p.body2)];
-        first = b.row(0) - p.x2.im * b.row(2), second = b.row(1) + p.x2.re * b.row(2);
+        const auto* b = entries(x[at(p.body2)]);
+        first -= b[0] - p.x2.im * b[2], second -= b[1] + p.x2.re * b[2];
       }
       if (p.body1 > 0) {
-        const X& b = x[at(p.body1)];
-        first -= b.row(0) - p.x1.im * b.row(2), second -= b.row(1) + p.x1.re * b.row(2);
+        const auto* b = entries(x[at(p.body1)]);
+        first += b[0] - p.x1.im * b[2], second += b[1] + p.x1.re * b[2];
       }
-      y.row(p.row) += first, y.row(p.row2) += second;
+      to[p.row] = first, to[p.row2] = second;
     }
     for (const Entry& e : entries_) {
-      const X& b = x[at(e.body)];
-      y.row(e.row) += e.J[0] * b.row(0) + e.J[1] * b.row(1) + e.J[2] * b.row(2);
+      const auto* b = entries(x[at(e.body)]);
+      to[e.row] -= e.J[0] * b[0] + e.J[1] * b[1] + e.J[2] * b[2];
     }
   }
   // x -= J'lambda
   template <class X, class Y>
   void subtract_transposed_times(const Y& lambda, std::vector<X>& x) const {
-    using R = Row<X>;
+    const auto* l = entries(lambda);
     for (const Point& p : points_) {
-      const R first = lambda.row(p.row), second = lambda.row(p.row2);
+      const auto first = l[p.row], second = l[p.row2];
       if (p.body2 > 0) {
-        X& b = x[at(p.body2)];
-        b.row(0) -= first, b.row(1) -= second, b.row(2) -= p.x2.re * second - p.x2.im * first;
+        auto* b = entries(x[at(p.body2)]);
+        b[0] -= first, b[1] -= second, b[2] -= p.x2.re * second - p.x2.im * first;
       }
       if (p.body1 > 0) {
-        X& b = x[at(p.body1)];
-        b.row(0) += first, b.row(1) += second, b.row(2) += p.x1.re * second - p.x1.im * first;
+        auto* b = entries(x[at(p.body1)]);
+        b[0] += first, b[1] += second, b[2] += p.x1.re * second - p.x1.im * first;
       }
     }
     for (const Entry& e : entries_) {
-      X& b = x[at(e.body)];
-      const R l = lambda.row(e.row);
-      for (int k = 0; k < 3; ++k) b.row(k) -= e.J[k] * l;
+      auto* b = entries(x[at(e.body)]);
+      for (int k = 0; k < 3; ++k) b[k] -= e.J[k] * l[e.row];
     }
   }
 
@@ -66,9 +67,11 @@ class PlanarRows {
   template <class X>
   X mass_times(int body, const X& x) const {
     const PlanarBody& b = model_->bodies[static_cast<std::size_t>(body)];
-    X y;
-    y.row(0) = b.mass * x.row(0), y.row(1) = b.mass * x.row(1), y.row(2) = b.inertia * x.row(2);
-    return y;
+    X out;
+    const auto* from = entries(x);
+    auto* to = entries(out);
+    to[0] = b.mass * from[0], to[1] = b.mass * from[1], to[2] = b.inertia * from[2];
+    return out;
   }
   void add_mass(BlockCholesky<3>& S) const;
   // S += J' diag(alpha) J
@@ -77,9 +80,6 @@ class PlanarRows {
   BlockCholesky<3> matrix() const { return BlockCholesky<3>(static_cast<int>(model_->bodies.size()) - 1, edges_); }
 
  private:
-  template <class X>
-  using Row = Eigen::Matrix<double, 1, X::ColsAtCompileTime>;
-
   // A coincidence: [-I, -i x1] of body 1 and [I, i x2] of body 2, the ground's part left out.
   struct Point {
     int constraint, body1, body2, row, row2;

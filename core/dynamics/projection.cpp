@@ -12,7 +12,8 @@ namespace {
 constexpr double kRelativeAlpha = 1e8;
 constexpr SaddleSolver::Settings kOnePass{};  // every use is inside an iteration that refines
 constexpr int kMostIterations = 60;
-constexpr double kUnmetPosition = 1e-8, kUnmetVelocity = 1e-6;  // of the largest coordinate, velocity; at least of 1
+// Of the largest coordinate and velocity, at least of 1.
+constexpr double kRounding = 1e-15, kUnmetPosition = 1e-8, kUnmetVelocity = 1e-6;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -101,13 +102,16 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
   set_q(s.delta, y);
   set_frames(y, nullptr, states_, frames_);
   const Eigen::Index half = 7 * data_.n;
+  const double q_size = std::max(1.0, y_hat.head(half).cwiseAbs().maxCoeff()),
+               v_size = std::max(1.0, y_hat.tail(half).cwiseAbs().maxCoeff());
   if (positions() && data_.m > 0) {
     double before = INFINITY, now = 0;
     for (int k = 0; k < kMostIterations; ++k) {
       evaluate_phi(data_, frames_, laws_, angles, phi_);
       now = phi_.cwiseAbs().maxCoeff();
       if (!std::isfinite(now)) return false;
-      if (now < 1e-15 || (k > 1 && now > 0.95 * before)) break;  // rounding reached, or a singular position
+      if (now < kRounding * q_size || (k > 1 && now > 0.95 * before))
+        break;  // rounding reached, or a singular position
       before = now;
       // [M J'; J 0] (d delta, d nu) = -(M delta + J'nu, Phi)
       for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, s.delta[at(i - 1)]);
@@ -119,7 +123,7 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
       set_q(s.delta, y);
       set_frames(y, nullptr, states_, frames_);
     }
-    if (now > kUnmetPosition * std::max(1.0, y.head(half).cwiseAbs().maxCoeff())) return false;
+    if (now > kUnmetPosition * q_size) return false;
   }
 
   for (int i = 1; i <= data_.n; ++i) {
@@ -137,7 +141,7 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
     evaluate_phi_dot(data_, frames_, laws_, phi_);
     now = phi_.cwiseAbs().maxCoeff();
     if (!std::isfinite(now)) return false;
-    if (now < 1e-15 || (k > 1 && now > 0.95 * before)) break;
+    if (now < kRounding * v_size || (k > 1 && now > 0.95 * before)) break;
     before = now;
     for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, s.u[at(i - 1)]);
     rows_.subtract_transposed_times(s.kappa, b_);
@@ -151,7 +155,7 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
       y.segment<4>(half + 7 * (i - 1) + 3) += 0.5 * G_transposed_times(bodies_[at(i)].p, du.tail<3>());
     }
   }
-  if (now > kUnmetVelocity * std::max(1.0, y.tail(half).cwiseAbs().maxCoeff())) return false;
+  if (now > kUnmetVelocity * v_size) return false;
   return y.allFinite();
 }
 

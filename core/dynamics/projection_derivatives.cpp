@@ -14,7 +14,7 @@ constexpr SaddleSolver::Settings kOnePass{};  // refine() refines
 // Each pass of refine() gains a factor of about the correction's size, or of 1/alpha times the ratio of masses that
 // meet.
 constexpr int kMostRefinements = 12;
-constexpr double kNegligible = 1e-17;
+constexpr double kNegligible = 2e-15;  // relative, of what the next pass would change: several units of rounding
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -113,29 +113,27 @@ void Projector::refine(Level level, bool transposed, const std::vector<X>& b, co
   for (int k = 0; k < kMostRefinements; ++k) {
     for (int i = 1; i <= data_.n; ++i) r[at(i - 1)] = -solver_.mass_times(i, x[at(i - 1)]);
     rg = g;
-    rg *= -1;
     if (position && !transposed) {
       solver_.rows().subtract_transposed_times(nu, r);
       rotate_by_E(x, Ex, false);
-      rows_.add_times(Ex, rg);
+      rows_.subtract_times(Ex, rg);
       for (std::size_t i = 0; i < r.size(); ++i) r[i] += b[i];
     } else if (position) {
       for (X& e : Ex) e.setZero();
       rows_.subtract_transposed_times(nu, Ex);
       rotate_by_E(Ex, dx, true);
       for (std::size_t i = 0; i < r.size(); ++i) r[i] += dx[i] + b[i];
-      solver_.rows().add_times(x, rg);
+      solver_.rows().subtract_times(x, rg);
     } else {
       rows_.subtract_transposed_times(nu, r);
-      rows_.add_times(x, rg);
+      rows_.subtract_times(x, rg);
       for (std::size_t i = 0; i < r.size(); ++i) r[i] += b[i];
     }
-    rg *= -1;
     solver_.solve(r, rg, kOnePass, dx, dnu);
     for (std::size_t i = 0; i < x.size(); ++i) x[i] += dx[i];
     nu += dnu;
     const auto now = largest(dx);
-    if ((now * now <= kNegligible * size * before).all()) return;  // what the next pass would change
+    if ((now * now <= kNegligible * size * before).all()) return;
     before = now;
   }
 }
@@ -194,8 +192,8 @@ void Projector::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, 
     for (Lanes<6>& load : loads_) load.setZero();
     mu_.setZero();
     evaluate_field_tangents(data_, frames_, laws_, angles_, block, mu_, dirs_, loads_);
-    rows_.add_times(x_lanes_, dirs_.phi);
     g_lanes_ = -dirs_.phi;
+    rows_.subtract_times(x_lanes_, g_lanes_);
     refine(Level::position, false, b_lanes_, g_lanes_, x_lanes_, nu_lanes_, r_lanes_, dx_lanes_, rg_lanes_, dnu_lanes_);
     for (int i = 1; i <= n; ++i) {
       const Body& b = bodies_[at(i)];

@@ -9,17 +9,14 @@ namespace {
 // A pass that gains less ends the refinement: rounding is reached, or the position is singular.
 constexpr double kStagnation = 0.97;
 
-// y = x - alpha z, row by row, and z *= 1 - c alpha.
-void subtract_scaled(const Eigen::VectorXd& x, const Eigen::VectorXd& alpha, const Eigen::VectorXd& z,
-                     Eigen::VectorXd& y) {
-  y = x - alpha.cwiseProduct(z);
+// Row by row: y = x - alpha z, and z *= 1 - c alpha.
+template <class Y>
+void subtract_scaled(const Y& x, const Eigen::VectorXd& alpha, const Y& z, Y& y) {
+  for (Eigen::Index r = 0; r < alpha.size(); ++r) entries(y)[r] = entries(x)[r] - alpha(r) * entries(z)[r];
 }
-void subtract_scaled(const LaneRows& x, const Eigen::VectorXd& alpha, const LaneRows& z, LaneRows& y) {
-  for (Eigen::Index r = 0; r < x.rows(); ++r) y.row(r) = x.row(r) - alpha(r) * z.row(r);
-}
-void reduce(double c, const Eigen::VectorXd& alpha, Eigen::VectorXd& z) { z -= c * alpha.cwiseProduct(z); }
-void reduce(double c, const Eigen::VectorXd& alpha, LaneRows& z) {
-  for (Eigen::Index r = 0; r < z.rows(); ++r) z.row(r) *= 1 - c * alpha(r);
+template <class Y>
+void reduce(double c, const Eigen::VectorXd& alpha, Y& z) {
+  for (Eigen::Index r = 0; r < alpha.size(); ++r) entries(z)[r] *= 1 - c * alpha(r);
 }
 
 // A residual above it, relative as in Settings, is more than rounding.
@@ -31,10 +28,10 @@ template <class Rows>
 BlockSaddleSolver<Rows>::BlockSaddleSolver(const MechanismData& data, const Eigen::VectorXd& alpha, double c)
     : rows_(data), S_(rows_.matrix()), alpha_(alpha), c_(c) {
   const std::size_t n = static_cast<std::size_t>(data.n);
-  residual_.setZero(data.m);
-  residual_lanes_.setZero(data.m, kLanes);
-  step_.setZero(data.m);
-  step_lanes_.setZero(data.m, kLanes);
+  residual_.setZero(rows_.count());
+  residual_lanes_.setZero(rows_.count(), kLanes);
+  step_.setZero(rows_.count());
+  step_lanes_.setZero(rows_.count(), kLanes);
   correction_.resize(n);
   correction_lanes_.resize(n);
 }
@@ -54,10 +51,8 @@ template <class X, class Y>
 void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, const Settings& settings,
                                         std::vector<X>& x, Y& nu, Y& residual, Y& step, std::vector<X>& correction) {
   const std::size_t n = b.size();
-  for (X& xi : x) xi.setZero();
   nu.setZero();
   residual = g;
-  const double g_size = g.cwiseAbs().maxCoeff();
   double before = INFINITY;
   for (int k = 0;; ++k) {
     // correction = b - M x - J'nu + J' alpha residual
@@ -68,21 +63,26 @@ void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, con
     }
     rows_.subtract_transposed_times(step, correction);
     S_.solve(std::span<X>(correction));
-    double size = g_size;
     for (std::size_t i = 0; i < n; ++i) {
-      x[i] += correction[i];
-      size = std::max(size, x[i].cwiseAbs().maxCoeff());
+      if (k > 0) {
+        x[i] += correction[i];
+      } else {
+        x[i] = correction[i];
+      }
     }
-    step.setZero();
-    rows_.add_times(correction, step);
-    residual -= step;
+    rows_.subtract_times(correction, residual);
     subtract_scaled(nu, alpha_, residual, nu);
     if (c_ > 0) reduce(c_, alpha_, residual);
+    const bool last = k >= settings.most;
+    if (!last && k + 1 < settings.least) continue;  // nothing is decided here
     const double now = residual.cwiseAbs().maxCoeff();
-    residual_ratio_ = size > 0 ? now / size : 0.0;
-    residual_size_ = now;
-    if (k >= settings.most) break;
-    if (k >= settings.least && (residual_ratio_ <= settings.tolerance || !(now < kStagnation * before))) break;
+    if (last || k >= settings.least) {
+      double size = g.cwiseAbs().maxCoeff();
+      for (const X& xi : x) size = std::max(size, xi.cwiseAbs().maxCoeff());
+      residual_ratio_ = size > 0 ? now / size : 0.0;
+      residual_size_ = now;
+      if (last || residual_ratio_ <= settings.tolerance || !(now < kStagnation * before)) break;
+    }
     before = now;
   }
   if (c_ > 0 && residual_ratio_ > kDisagreement) add_redundant_part(nu, residual, step, correction);
@@ -100,8 +100,8 @@ void BlockSaddleSolver<Rows>::add_redundant_part(Y& nu, Y& residual, Y& step, st
     rows_.subtract_transposed_times(d, correction);
     S_.solve(std::span<X>(correction));
     step.setZero();
-    rows_.add_times(correction, step);
-    for (Eigen::Index r = 0; r < d.rows(); ++r) d.row(r) += alpha_(r) * step.row(r);
+    rows_.subtract_times(correction, step);
+    subtract_scaled(d, alpha_, step, d);
   }
   nu += d;
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 
@@ -38,6 +39,7 @@ class Search {
       if (std::string reason = add(c); !reason.empty()) return reason;
     }
     model_.gravity = model_.in_plane(data_.gravity);
+    number_rows();
     return body_not_held();
   }
   PlanarModel take() { return std::move(model_); }
@@ -156,6 +158,23 @@ class Search {
           }
         },
         c.primitive);
+  }
+
+  void number_rows() {
+    std::vector<int>& rows = model_.rows;
+    for (const PlanarConstraint& c : model_.constraints) {
+      rows.push_back(c.row);
+      if (c.kind == PlanarConstraint::Kind::point) rows.push_back(c.row2);
+    }
+    std::sort(rows.begin(), rows.end());
+    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+    const auto number = [&](int row) {
+      return static_cast<int>(std::lower_bound(rows.begin(), rows.end(), row) - rows.begin());
+    };
+    for (PlanarConstraint& c : model_.constraints) {
+      c.row = number(c.row);
+      if (c.kind == PlanarConstraint::Kind::point) c.row2 = number(c.row2);
+    }
   }
 
   // Whether bodies may lie at heights other than the ground's, where the length of a rod is not that in the plane: a

@@ -36,10 +36,10 @@ struct PlanarConstraint {
   enum class Kind { point, dot1, dot2, distance, angle };
   Kind kind = Kind::point;
   int body1 = 0, body2 = 0;
-  int row = 0, row2 = 0;                   // of Phi; row2: of a point's second coordinate
-  Plane s1, s2, s3;                        // parts in the plane of the primitive's vectors
-  double offset = 0;                       // distance: of the two points along n [m]
-  double sign = 1;                         // angle: about +n or -n
+  int row = 0, row2 = 0;  // number of its row (PlanarModel::rows); row2: of a point's second coordinate
+  Plane s1, s2, s3;       // parts in the plane of the primitive's vectors
+  double offset = 0;      // distance: of the two points along n [m]
+  double sign = 1;        // angle: about +n or -n
   int slot1 = -1, slot2 = -1, slot3 = -1;  // of the primitive's vectors, three rows each
   double factor = 1;
   int slot_factor = -1, angle = -1;
@@ -49,7 +49,17 @@ struct PlanarModel {
   int t1 = 0, t2 = 1, n = 2;       // coordinate axes
   std::vector<PlanarBody> bodies;  // the ground first
   std::vector<PlanarConstraint> constraints;
+  std::vector<int> rows;  // of Phi: those that say something in the plane, counted 0, 1, ... by the constraints above
   Plane gravity;
+
+  // Vectors over rows of Phi, of which the others stay as they are.
+  void spread(const Eigen::VectorXd& x, Eigen::VectorXd& phi_rows) const {
+    for (std::size_t k = 0; k < rows.size(); ++k) phi_rows(rows[k]) = x(static_cast<Eigen::Index>(k));
+  }
+  template <class PhiRows>
+  void gather(const PhiRows& phi_rows, Eigen::VectorXd& x) const {
+    for (std::size_t k = 0; k < rows.size(); ++k) x(static_cast<Eigen::Index>(k)) = phi_rows(rows[k]);
+  }
 
   Plane in_plane(const Vector3d& x) const { return {x(t1), x(t2)}; }
   Vector3d in_space(const Plane& x) const {

@@ -11,10 +11,20 @@ RowLaws::RowLaws(const MechanismData& data) : data_(&data), jets_(data.laws.size
   inputs_.push_back(0);
   gradient_.resize(inputs_.size());
   for (std::size_t k = 0; k < data.laws.size(); ++k) {
+    row_of_law_.push_back(data.laws[k].row);
     law_of_row_[static_cast<std::size_t>(data.laws[k].row)] = static_cast<int>(k);
     if (!data.laws[k].law.programs) continue;
     for (const Program& p : *data.laws[k].law.programs) p.grow(scratch_);
   }
+}
+
+RowLaws::RowLaws(const MechanismData& data, const std::vector<int>& rows) : RowLaws(data) {
+  std::vector<int> laws(law_of_row_.empty() ? 0 : rows.size(), -1);
+  for (std::size_t k = 0; k < laws.size(); ++k) {
+    laws[k] = law_of_row_[static_cast<std::size_t>(rows[k])];
+    if (laws[k] >= 0) row_of_law_[static_cast<std::size_t>(laws[k])] = static_cast<int>(k);
+  }
+  law_of_row_ = std::move(laws);
 }
 
 void RowLaws::set_time(double t) {
@@ -27,26 +37,28 @@ void RowLaws::set_time(double t) {
 }
 
 void RowLaws::subtract_f(Eigen::VectorXd& phi) const {
-  for (std::size_t k = 0; k < jets_.size(); ++k) phi(data_->laws[k].row) -= jets_[k].f;
+  for (std::size_t k = 0; k < jets_.size(); ++k) phi(row_of_law_[k]) -= jets_[k].f;
 }
 void RowLaws::subtract_f_t(Eigen::VectorXd& phi_dot) const {
-  for (std::size_t k = 0; k < jets_.size(); ++k) phi_dot(data_->laws[k].row) -= jets_[k].f_t;
+  for (std::size_t k = 0; k < jets_.size(); ++k) phi_dot(row_of_law_[k]) -= jets_[k].f_t;
 }
 void RowLaws::subtract_f_tt(Eigen::VectorXd& phi_ddot) const {
-  for (std::size_t k = 0; k < jets_.size(); ++k) phi_ddot(data_->laws[k].row) -= jets_[k].f_tt;
+  for (std::size_t k = 0; k < jets_.size(); ++k) phi_ddot(row_of_law_[k]) -= jets_[k].f_tt;
 }
 
 void RowLaws::add_pull_back(const Eigen::VectorXd* mu0, const Eigen::VectorXd* mu1, const Eigen::VectorXd* mu2,
                             double scale, Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) {
   const Eigen::VectorXd* const mu[] = {mu0, mu1, mu2};
-  for (const RowLaw& row : data_->laws) {
-    if (row.law.slot >= 0 && mu0) theta_bar(row.law.slot) -= scale * (*mu0)(row.row);
-    if (!row.law.programs) continue;
+  for (std::size_t k = 0; k < jets_.size(); ++k) {
+    const TimeLaw& law = data_->laws[k].law;
+    const int row = row_of_law_[k];
+    if (law.slot >= 0 && mu0) theta_bar(law.slot) -= scale * (*mu0)(row);
+    if (!law.programs) continue;
     for (std::size_t order = 0; order < (held_ ? 1u : 3u); ++order) {
       if (!mu[order]) continue;
       std::fill(gradient_.begin(), gradient_.end(), 0.0);
-      const Program& program = (*row.law.programs)[order];
-      program.add_gradient(inputs_, -scale * (*mu[order])(row.row), gradient_, scratch_);
+      const Program& program = (*law.programs)[order];
+      program.add_gradient(inputs_, -scale * (*mu[order])(row), gradient_, scratch_);
       for (const int input : program.used_inputs()) {
         if (input < rho_bar.size()) rho_bar(input) += gradient_[static_cast<std::size_t>(input)];
       }
@@ -69,16 +81,18 @@ void RowLaws::add_gradient(Of what, int row, double weight, Eigen::Ref<Eigen::Ve
 void RowLaws::subtract_tangents(const ParameterBlock& block, LaneRows& phi, LaneRows& phi_dot, LaneRows& phi_ddot) {
   LaneRows* const out[] = {&phi, &phi_dot, &phi_ddot};
   const int P = static_cast<int>(data_->rho.size());
-  for (const RowLaw& row : data_->laws) {
+  for (std::size_t k = 0; k < jets_.size(); ++k) {
+    const TimeLaw& law = data_->laws[k].law;
+    const int row = row_of_law_[k];
     Lanes<1> storage;
-    if (const Lanes<1>* constant = block.field<1>(row.law.slot, storage)) phi.row(row.row) -= *constant;
-    if (!row.law.programs) continue;
+    if (const Lanes<1>* constant = block.field<1>(law.slot, storage)) phi.row(row) -= *constant;
+    if (!law.programs) continue;
     for (std::size_t order = 0; order < (held_ ? 1u : 3u); ++order) {
       std::fill(gradient_.begin(), gradient_.end(), 0.0);
-      const Program& program = (*row.law.programs)[order];
+      const Program& program = (*law.programs)[order];
       program.add_gradient(inputs_, 1, gradient_, scratch_);
       for (const int input : program.used_inputs()) {
-        if (input < P) out[order]->row(row.row) -= gradient_[static_cast<std::size_t>(input)] * block.direction(input);
+        if (input < P) out[order]->row(row) -= gradient_[static_cast<std::size_t>(input)] * block.direction(input);
       }
     }
   }

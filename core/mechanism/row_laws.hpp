@@ -12,6 +12,8 @@ namespace mbsopt {
 class RowLaws {
  public:
   explicit RowLaws(const MechanismData& data);
+  // Rows here are those listed, each by its place in the list.
+  RowLaws(const MechanismData& data, const std::vector<int>& rows);
 
   void set_time(double t);
   void hold() { held_ = true; }  // from now on f_t = f_tt = 0
@@ -35,7 +37,7 @@ class RowLaws {
   std::size_t index_of(int row) const { return static_cast<std::size_t>(law_of_row_[static_cast<std::size_t>(row)]); }
 
   const MechanismData* data_;
-  std::vector<int> law_of_row_;
+  std::vector<int> row_of_law_, law_of_row_;
   std::vector<CubicSpline::Jet> jets_;
   std::vector<double> inputs_, gradient_;
   Program::Scratch scratch_;

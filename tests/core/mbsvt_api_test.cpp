@@ -304,7 +304,7 @@ TEST_CASE("MBSVT: Jacob and its products, at a state", "[mbsvt]") {
   ConstraintRows J(data);
   J.evaluate(frames);
   VectorXd Phidot = VectorXd::Zero(data.m);
-  J.add_times(velocity, Phidot);  // J v: no joint moves apart
+  J.subtract_times(velocity, Phidot);  // J v: no joint moves apart
   CHECK(Phidot.cwiseAbs().maxCoeff() < 1e-12);
   // Jacob' lambda, and its product with the velocities, is lambda' J v
   std::vector<Vec<6>> load(3, Vec<6>::Zero());

@@ -89,7 +89,7 @@ TEST_CASE("the augmented Lagrangian reaches the constrained equations whatever i
   // J z + gamma = 0 and M z + J'lambda = f, residuals against the size of their terms
   const ConstraintRows& rows = dynamics.solver().rows();
   VectorXd Jz = VectorXd::Zero(d.m);
-  rows.add_times(dynamics.z(), Jz);
+  rows.subtract_times(dynamics.z(), Jz);
   FormulationSettings reference = settings;
   reference.alpha = 1e6;
   const VectorXd expected = ydot(mechanism, reference, y, angles);
@@ -163,9 +163,7 @@ TEST_CASE("tangent of the accelerations equals central differences, in the state
 
   std::srand(2);
   LaneRows direction = LaneRows::Random(y.size(), kLanes), out(y.size(), kLanes);
-  ParameterBlock none = parameter_blocks(mechanism.data()).front();
-  none.theta.setZero();
-  for (int& p : none.parameter) p = -1;
+  const ParameterBlock none = block_without_parameters(mechanism.data());
   dynamics.tangent(none, direction, out);
   for (int k = 0; k < kLanes; ++k) {
     const VectorXd e = direction.col(k);

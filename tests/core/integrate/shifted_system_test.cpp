@@ -24,9 +24,7 @@ void check_scene(const Scene& scene, double tolerance) {
   REQUIRE(dynamics.evaluate(0, y, angles, ydot));
   dynamics.linearise_here();
 
-  ParameterBlock none;
-  none.theta.setZero(data.slots(), kLanes);
-  std::fill(std::begin(none.parameter), std::end(none.parameter), -1);
+  const ParameterBlock none = block_without_parameters(data);
   MatrixXd f_y(y.size(), y.size());
   LaneRows direction(y.size(), kLanes), change(y.size(), kLanes);
   for (Eigen::Index c = 0; c < y.size(); ++c) {

@@ -1,0 +1,40 @@
+// How the point nearest to a guess moves (nearest_point.hpp) where the guess itself satisfies the equations, so that
+// nu = 0 and H = I, for large sparse J:
+//
+//   x' = J+ b + (I - J+ J) g          that is   x' + J'nu' = g,  J x' = b
+//
+// by the augmented-Lagrangian iteration of saddle_solver.hpp on one sparse factor of S = I + alpha J'J, rows of J
+// scaled to unit length: redundant rows do no harm, and those that disagree are met in the least-squares sense.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <span>
+
+namespace mbsopt {
+
+struct SparseEntry {
+  int row = 0, column = 0;
+  double value = 0;
+};
+
+class SparseProjection {
+ public:
+  // Entries of the same place add up.
+  SparseProjection(Eigen::Index rows, Eigen::Index columns, std::span<const SparseEntry> J);
+  ~SparseProjection();
+  SparseProjection(SparseProjection&&) noexcept;
+
+  Eigen::MatrixXd solve(const Eigen::Ref<const Eigen::MatrixXd>& b, const Eigen::Ref<const Eigen::MatrixXd>& g) const;
+  // The adjoint: b_bar and g_bar from x_bar, so that x_bar'x' = b_bar'b + g_bar'g.
+  void solve_transposed(const Eigen::Ref<const Eigen::MatrixXd>& x_bar, Eigen::MatrixXd& b_bar,
+                        Eigen::MatrixXd& g_bar) const;
+
+ private:
+  struct Factor;
+  void solve_system(const Eigen::MatrixXd& b, const Eigen::Ref<const Eigen::MatrixXd>& g, Eigen::MatrixXd& x,
+                    Eigen::MatrixXd& nu) const;
+  std::unique_ptr<Factor> factor_;
+};
+
+}  // namespace mbsopt
