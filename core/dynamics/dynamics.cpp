@@ -32,6 +32,8 @@ Eigen::VectorXd alpha_of_factor(const MechanismData& data, const FormulationSett
   return Eigen::VectorXd::Constant(data.m, moderate ? moderate_alpha(data, settings.alpha) : settings.alpha);
 }
 
+constexpr double kDerivativeTolerance = 1e-12;
+
 double compliance_of(const FormulationSettings& settings) {
   return settings.type == FormulationType::penalty ? 1 / settings.alpha : 0.0;
 }
@@ -74,8 +76,9 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
   user_K_.setZero(largest, largest), user_C_.setZero(largest, largest), user_Q_rho_.setZero(largest, P);
 }
 
-// Derivatives are those of the limit: at least as many refinements as bring alpha^-(passes) to rounding. All: as many
-// as bring what S loses of M to alpha to rounding.
+// Derivatives are those of the limit: at least as many refinements as bring alpha^-(passes) to rounding, and until J x'
+// is right to 1e-12: what is missing, M^-1 J' times an error of nu', is what the projection's derivative takes out.
+// All: as many as bring what S loses of M to alpha to rounding.
 SaddleSolver::Settings Dynamics::solver_settings(bool derivative) const {
   if (settings_.type == FormulationType::penalty) {
     if (settings_.linear_solver == LinearSolver::cholesky) return {};
@@ -85,7 +88,7 @@ SaddleSolver::Settings Dynamics::solver_settings(bool derivative) const {
   const int rounding = std::clamp(static_cast<int>(std::ceil(14 / std::max(1.0, 16 - digits))) - 1, 1, 14);
   if (!derivative) return {std::min(rounding, settings_.iterations), settings_.iterations, settings_.tolerance};
   const int least = std::max(rounding, std::clamp(static_cast<int>(std::ceil(15 / digits)) - 1, 1, 8));
-  return {least, std::max(least, settings_.iterations), 1e-14};
+  return {least, std::max(least, settings_.iterations), kDerivativeTolerance};
 }
 
 double Dynamics::compliance() const { return compliance_of(settings_); }

@@ -199,8 +199,8 @@ bool AdjointSweep::implicit_back(const StoredStep& step, const StageGroup& g) {
   }
   implicit_->solve_transposed(g, x_bar_);
 
-  for (int i = g.first; i <= g.last; ++i) {
-    if (g.size() > 1) place(i);
+  for (int i = g.last; i >= g.first; --i) {
+    if (i != g.last) place(i);  // where the last still is
     for (Eigen::Index o = 0; o < objectives; ++o) {
       Eigen::MatrixXd& Y_bar = Y_bar_[static_cast<std::size_t>(o)];
       r_bar_ = x_bar_.col(o).segment((i - g.first) * rows, rows);

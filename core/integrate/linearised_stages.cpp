@@ -30,7 +30,8 @@ bool LinearisedStages::factor(double h, const StageGroup& g) {
   for (int i = 0; i < g.size(); ++i) {
     for (int j = 0; j < g.size(); ++j) A(i, j) = rk_.a(g.first + i, g.first + j);
   }
-  return matrices_[of(g)].factor(h, A, std::span(pointers_).first(static_cast<std::size_t>(g.size())));
+  return matrices_[of(g)].factor(h, A, std::span(pointers_).first(static_cast<std::size_t>(g.size())),
+                                 StageMatrix::Trial::by_solutions);
 }
 
 void LinearisedStages::solve(const StageGroup& g, Eigen::MatrixXd& x) {

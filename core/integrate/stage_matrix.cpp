@@ -93,7 +93,8 @@ StageMatrix::StageMatrix(const MechanismData& data, const MotionJacobian& jacobi
   probe_.setZero(size()), answer_.setZero(size());
 }
 
-bool StageMatrix::factor(double h, const Eigen::MatrixXd& A, std::span<const MotionJacobian::Values* const> values) {
+bool StageMatrix::factor(double h, const Eigen::MatrixXd& A, std::span<const MotionJacobian::Values* const> values,
+                         Trial trial) {
   P_ = h * A;
   P2_.noalias() = P_.lazyProduct(P_);
   std::copy(values.begin(), values.end(), values_.begin());
@@ -101,11 +102,16 @@ bool StageMatrix::factor(double h, const Eigen::MatrixXd& A, std::span<const Mot
   ++factorisations_;
   use_sparse_ = false;
   if (blocks_ && sparse_left_ == 0) {
-    if (factor_blocks() && is_right()) return true;
+    tried_ = trial == Trial::now;
+    if (factor_blocks() && (!tried_ || is_right())) return true;
     sparse_left_ = kSparseRun;
   }
+  return turn_to_sparse();
+}
+
+bool StageMatrix::turn_to_sparse() {
   sparse_left_ = std::max(0, sparse_left_ - 1);
-  use_sparse_ = true;
+  use_sparse_ = tried_ = true;
   ++pivoted_;
   return factor_sparse();
 }
@@ -230,9 +236,17 @@ void StageMatrix::refine(Eigen::Ref<Eigen::MatrixXd> b, int refinements) {
     solve_factored<Transposed>(step);
     b += step;
     const Sizes now = sizes(step);
-    if ((now * now <= kNegligible * size * before).all()) return;
+    if ((now * now <= kNegligible * size * before).all()) {
+      tried_ = true;
+      return;
+    }
     before = now;
   }
+  if (tried_ || refinements < kExact) return;
+  b = right;
+  sparse_left_ = kSparseRun;
+  if (turn_to_sparse()) return refine<Transposed>(b, refinements);
+  b.setConstant(NAN);
 }
 
 StageMatrix::Sizes StageMatrix::sizes(const Eigen::Ref<const Eigen::MatrixXd>& x) const {

@@ -11,8 +11,9 @@
 // blocks of 7s rows per body, eliminated without exchanging rows between bodies: S is near the positive definite matrix
 // of the equations of motion (saddle_solver.hpp). epsilon also makes it regular where constraints are redundant. What
 // it leaves out, and the rounding of a large W, is taken back by refinement with the residual of N itself, so that
-// solve and solve_transposed are transposes of each other. Each factor is tried on one right-hand side; where the
-// answer is wrong, N is factored by a sparse LU with pivoting instead.
+// solve and solve_transposed are transposes of each other. Each factor is tried, on one right-hand side or by whether
+// the refinement of the first solution converges; where the answer is wrong, N is factored by a sparse LU with pivoting
+// instead.
 #pragma once
 
 #include <optional>
@@ -32,7 +33,10 @@ class StageMatrix {
   Eigen::Index size() const { return per_stage_ * stages_; }
 
   // A: of these stages alone. values: of each stage; may be one and the same; kept by reference until the next factor.
-  bool factor(double h, const Eigen::MatrixXd& A, std::span<const MotionJacobian::Values* const> values);
+  // Trial: a factor that only serves refined solutions is tried by them.
+  enum class Trial { now, by_solutions };
+  bool factor(double h, const Eigen::MatrixXd& A, std::span<const MotionJacobian::Values* const> values,
+              Trial trial = Trial::now);
   static constexpr int kExact = 4;  // refinements at most for derivatives; Newton's method needs none
   // In place; at most kLanes columns.
   void solve(Eigen::Ref<Eigen::MatrixXd> b, int refinements) { refine<false>(b, refinements); }
@@ -50,6 +54,7 @@ class StageMatrix {
 
   bool factor_blocks();
   bool factor_sparse();
+  bool turn_to_sparse();
   bool is_right();
   template <bool Transposed>
   void refine(Eigen::Ref<Eigen::MatrixXd> b, int refinements);
@@ -82,7 +87,7 @@ class StageMatrix {
   std::vector<BlockLu::Handle> pairs_, diagonal_;  // per pair of the Jacobian; per body
   std::optional<BlockLu> blocks_;                  // none for more stages than it takes
   std::optional<SparseLu> sparse_;                 // made when first needed
-  bool use_sparse_ = false;
+  bool use_sparse_ = false, tried_ = true;
   int sparse_left_ = 0;  // factorisations by it before blocks_ is tried again
 
   Eigen::MatrixXd P_, P2_;

@@ -1,8 +1,32 @@
 #include "core/integrate/tangent_sweep.hpp"
 
+#include "core/dynamics/pairs.hpp"
 #include "core/integrate/model_choice.hpp"
 
 namespace mbsopt {
+namespace {
+
+// Y = y0 + h sum_j w_j K_j, over j < count.
+template <class Weight>
+void combine(const LaneRows& y0, double h, int count, Weight&& w, const std::vector<LaneRows>& K, LaneRows& Y) {
+  const LaneRow* k[Method::kMaxStages];
+  double c[Method::kMaxStages];
+  int terms = 0;
+  for (int j = 0; j < count; ++j) {
+    if (w(j) == 0) continue;
+    k[terms] = entries(K[static_cast<std::size_t>(j)]);
+    c[terms++] = h * w(j);
+  }
+  const LaneRow* from = entries(y0);
+  LaneRow* to = entries(Y);
+  for (Eigen::Index r = 0; r < y0.rows(); ++r) {
+    LaneRow sum = from[r];
+    for (int j = 0; j < terms; ++j) sum += c[j] * k[j][r];
+    to[r] = sum;
+  }
+}
+
+}  // namespace
 
 TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
                            const Eigen::MatrixXd& y_initial_rho)
@@ -85,11 +109,8 @@ bool TangentSweep::follow_explicit(const Step& step, int i) {
   const auto a_i = step.K.col(i).tail(mechanism_.states() / 2);
   if (!dynamics_.linearise(step.t + rk_.c[i] * step.h, y_, step.angles0, a_i, step.lambda.col(i))) return false;
   for (Block& b : blocks_) {
-    b.Y = b.y0;
-    for (int j = 0; j < i; ++j) {
-      const double a = rk_.a(i, j);
-      if (a != 0) b.Y += (step.h * a) * b.K[static_cast<std::size_t>(j)];
-    }
+    combine(
+        b.y0, step.h, i, [&](int j) { return rk_.a(i, j); }, b.K, b.Y);
     dynamics_.tangent(b.parameters, b.Y, b.K[static_cast<std::size_t>(i)]);
   }
   return true;
@@ -178,10 +199,8 @@ bool TangentSweep::follow(const Step& step, std::span<const Cost> costs, std::sp
     }
   }
   for (Block& b : blocks_) {
-    b.y_hat = b.y0;
-    for (int i = 0; i < rk_.stages; ++i) {
-      if (rk_.b[i] != 0) b.y_hat += (step.h * rk_.b[i]) * b.K[static_cast<std::size_t>(i)];
-    }
+    combine(
+        b.y0, step.h, rk_.stages, [&](int j) { return rk_.b[j]; }, b.K, b.y_hat);
   }
   if (projector_.active()) {
     if (!projector_.linearise(step.t1, step.angles0, step.y_hat, step.y1, step.projection)) return false;
