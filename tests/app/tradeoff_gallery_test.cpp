@@ -30,7 +30,7 @@ struct Found {
 Found reference_of(const std::string& name, const std::vector<std::string>& sets = {}) {
   Found found{read_problem(file_of(name), sets), {}};
   found.reference =
-      converged_reference(TradeoffRuns(found.problem.scene, objectives_of(found.problem)), {.seconds_per_run = 3});
+      converged_reference(TradeoffRuns(found.problem.scene, objectives_of(found.problem)), {.seconds_per_run = 30});
   INFO(name << ": " << found.reference.message);
   REQUIRE(found.reference.ok());
   return found;
