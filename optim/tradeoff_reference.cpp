@@ -131,20 +131,21 @@ class Search {
   void shorten_steps(std::pair<SimulationSettings, SimulationSettings> settings, GradientMethod method,
                      const RunLimit& limit, Answer& best_a, Answer& best_b) const {
     constexpr double kSame = 1e-8, kShorter = 3;
-    constexpr int kRounds = 4;
+    constexpr int kRounds = 4, kInVain = 2;
     const auto shorten = [&](SimulationSettings& s, const Answer& by) {
       s.integrator.max_step = *std::max_element(by.steps.sizes.begin(), by.steps.sizes.end()) / kShorter;
     };
     if (best_a.steps.sizes.empty() || best_b.steps.sizes.empty()) return;
     double least = gradients_apart(best_a, best_b);
     Answer a = best_a, b = best_b;
-    for (int round = 0; round < kRounds && least > kSame; ++round) {
+    for (int round = 0, in_vain = 0; round < kRounds && in_vain < kInVain && least > kSame; ++round) {
       if (kShorter * std::max(a.wall_seconds, b.wall_seconds) > options_.seconds_per_run) return;
       shorten(settings.first, a), shorten(settings.second, b);
       a = runs_.gradients(settings.first, method, limit), b = runs_.gradients(settings.second, method, limit);
       if (!a.ok || !b.ok) return;
       const double apart = gradients_apart(a, b);
-      if (apart < least) best_a = a, best_b = b, least = apart;
+      ++in_vain;
+      if (apart < least) best_a = a, best_b = b, least = apart, in_vain = 0;
     }
   }
 
