@@ -1,11 +1,13 @@
 // What a file without an integrator is run with, and how exact that is.
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
 
 #include "app/json/read_problem.hpp"
 #include "core/scene/default_integrator.hpp"
 #include "optim/fit_errors.hpp"
-#include "optim/tradeoff.hpp"
+#include "optim/tradeoff_reference.hpp"
 #include "tests/app/gallery_files.hpp"
 #include "tests/app/run_command.hpp"
 
@@ -18,16 +20,16 @@ IntegratorSettings read(const std::vector<std::string>& sets) {
   return read_problem_text(kPendulum, "rod.json", sets).scene.simulation.integrator;
 }
 
-// Largest errors of a kind.
-double largest(const Tradeoff& tradeoff, const std::optional<std::size_t>& row, QuantityKind kind) {
-  REQUIRE(row);
+// Largest error of a kind.
+double largest(const TradeoffErrors& measures, const Answer& answer, QuantityKind kind) {
   double worst = 0;
-  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
-  for (std::size_t q = 0; q < quantities.size(); ++q) {
-    if (quantities[q].kind != kind) continue;
-    const double error = tradeoff.rows[*row].errors(static_cast<Eigen::Index>(q));
+  const Eigen::VectorXd errors = measures.of(answer);
+  for (std::size_t q = 0; q < measures.quantities().size(); ++q) {
+    const Quantity& quantity = measures.quantities()[q];
+    if (quantity.kind != kind) continue;
+    const double error = errors(static_cast<Eigen::Index>(q));
     CHECK(std::isfinite(error));
-    CHECK(quantities[q].certificate < 1e-6);
+    CHECK(quantity.certificate < 1e-6);
     worst = std::max(worst, error);
   }
   return worst;
@@ -68,11 +70,18 @@ TEST_CASE("what a file says of the integrator is kept, and the rest fits it", "[
 TEST_CASE("default settings give objectives to 1e-5 and gradients to 1e-4", "[defaults][gallery]") {
   for (const char* name : {"joints/screw_press", "damper/identify_law", "joints/gear_train"}) {
     const Problem problem = read_problem(file_of(name));
-    const Tradeoff tradeoff = measure_tradeoff(problem.scene, objectives_of(problem), {.budget_seconds = 0});
-    INFO(name << ": " << tradeoff.message);
-    REQUIRE(tradeoff.ok());
-    CHECK(largest(tradeoff, tradeoff.defaults, QuantityKind::objective) < 1e-5);
-    CHECK(largest(tradeoff, tradeoff.default_gradient, QuantityKind::gradient) < 1e-4);
+    const TradeoffRuns runs(problem.scene, objectives_of(problem));
+    const TradeoffReference reference =
+        converged_reference(runs, {.seconds_per_run = std::numeric_limits<double>::infinity()});
+    INFO(name << ": " << reference.message);
+    REQUIRE(reference.ok());
+    SimulationSettings defaults = problem.scene.simulation;
+    defaults.formulation = {};
+    defaults.integrator = default_integrator(defaults.start_time, defaults.end_time);
+    const Answer answer = runs.gradients(defaults, GradientMethod::adjoint);
+    REQUIRE(answer.ok);
+    CHECK(largest(*reference.errors, answer, QuantityKind::objective) < 1e-5);
+    CHECK(largest(*reference.errors, answer, QuantityKind::gradient) < 1e-4);
   }
 }
 
