@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <map>
 
@@ -14,6 +15,7 @@
 #include "core/integrate/cvodes.hpp"
 #include "optim/evaluator.hpp"
 #include "optim/hessian.hpp"
+#include "optim/unused_parameters.hpp"
 
 namespace mbsopt {
 namespace {
@@ -102,7 +104,13 @@ int gradient_command(const CommandContext& context) {
     last_good_time = t;
     return !interrupted();
   };
-  Evaluator evaluator(scene, objectives_of(run.problem), {}, options);
+  std::vector<std::string> left_out;
+  const Problem needed = what_objectives_need(run.problem, &left_out);
+  if (!left_out.empty()) {
+    run.result["model"]["left_out"] = left_out;
+    context.out << fmt::format("not simulated, since no objective depends on them: {}\n", fmt::join(left_out, ", "));
+  }
+  Evaluator evaluator(needed.scene, objectives_of(needed), {}, options);
   const Evaluation& evaluation = evaluator.gradients(evaluator.start());
   run.result["simulation"] = to_json(evaluation.statistics);
   for (const std::string& warning : simulation_warnings(scene.simulation, evaluation.statistics)) run.warn(warning);

@@ -109,11 +109,12 @@ int identify_command(const CommandContext& context) {
     throw std::invalid_argument("identification: missing; it says which measurements to explain and what may change");
   }
   const std::vector<CsvTable> data = data_of(run.problem);
-  const Mechanism mechanism(scene, parameter_values(scene));
+  // With its drives and overrides, which the scene itself may not even assemble without.
+  const Scene first = simulated_scene(run.problem, data);
+  const Mechanism mechanism(first, parameter_values(first));
   run.start();
-  if (!settle_accuracy(run, simulated_scene(run.problem, data), {})) return run.finish();
-  // Experiments have their own overrides: where the scene itself does not assemble, they still may.
-  if (const Assembly assembly(mechanism, scene.simulation.start_time); assembly.result().ok) {
+  if (!settle_accuracy(run, first, {})) return run.finish();
+  if (const Assembly assembly(mechanism, first.simulation.start_time); assembly.result().ok) {
     ModelSummary model = assembly.summary();
     add_model(mechanism, scene.simulation, model);
     run.result["model"] = to_json(model);

@@ -6,23 +6,24 @@ namespace mbsopt {
 namespace {
 
 constexpr std::array kOrder{
-    "program",         "version",     "command",     "problem",         "status",     "message",    "last_good_time",
-    "machine",         "model",       "accuracy",    "simulation",      "objectives", "methods",    "hessian_method",
-    "verdict",         "reference",   "settings",    "recommendations", "applied",    "skipped",    "penalty",
-    "parameters",      "experiments", "correlation", "profiles",        "statistics", "multistart", "optimizer",
-    "identifiability", "provenance",  "warnings"};
+    "program",   "version",         "command",     "problem",     "status",          "message",    "last_good_time",
+    "machine",   "model",           "accuracy",    "simulation",  "objectives",      "methods",    "hessian_method",
+    "verdict",   "reference",       "settings",    "fit",         "recommendations", "applied",    "skipped",
+    "penalty",   "parameters",      "experiments", "correlation", "profiles",        "statistics", "multistart",
+    "optimizer", "identifiability", "provenance",  "warnings"};
 
 }  // namespace
 
 Json to_json(const ModelSummary& summary) {
-  return {{"bodies", summary.bodies},
-          {"equations", summary.equations},
-          {"rank", summary.rank},
-          {"degrees_of_freedom", summary.degrees_of_freedom},
-          {"redundant", summary.redundant},
-          {"type", summary.unknowns_per_body == 3 ? "planar" : "spatial"},
-          {"unknowns_per_body", summary.unknowns_per_body},
-          {"not_planar", summary.not_planar.empty() ? Json() : Json(summary.not_planar)}};
+  Json json{{"bodies", summary.bodies},
+            {"equations", summary.equations},
+            {"rank", summary.rank},
+            {"degrees_of_freedom", summary.degrees_of_freedom},
+            {"redundant", summary.redundant},
+            {"type", summary.unknowns_per_body == 3 ? "planar" : "spatial"},
+            {"unknowns_per_body", summary.unknowns_per_body}};
+  if (!summary.not_planar.empty()) json["not_planar"] = summary.not_planar;
+  return json;
 }
 
 Json to_json(const SimulationStatistics& statistics) {

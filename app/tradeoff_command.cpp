@@ -2,6 +2,7 @@
 
 #include "app/accuracy_results.hpp"
 #include "app/command.hpp"
+#include "app/identify_starts.hpp"
 #include "app/interrupt.hpp"
 #include "app/machine.hpp"
 #include "app/recommended_problem.hpp"
@@ -9,6 +10,8 @@
 #include "app/run.hpp"
 #include "app/tradeoff_csv.hpp"
 #include "app/tradeoff_results.hpp"
+#include "core/scene/default_integrator.hpp"
+#include "optim/fit_errors.hpp"
 
 namespace mbsopt {
 namespace {
@@ -17,6 +20,16 @@ void apply_accuracy(Run& run, const Tradeoff& tradeoff, double accuracy) {
   const Recommendation r = recommend(tradeoff, main_quantities(tradeoff.reference.errors->quantities()), accuracy);
   add_applied(run, tradeoff, r);
   if (r.row) run.write("recommended.json", recommended_problem_text(run, tradeoff.rows[*r.row].setting.simulation));
+}
+
+// What `identify` minimises is no objective of the file, and as exact as the integrator leaves it.
+void add_fit(Run& run) {
+  if (!run.problem.identification) return;
+  const SimulationSettings& own = run.problem.scene.simulation;
+  SimulationSettings defaults = own;
+  defaults.formulation = {}, defaults.integrator = default_integrator(own.start_time, own.end_time);
+  add_fit_errors(run, measure_fit_errors(run.problem, data_of(run.problem), {{"own", own}, {"defaults", defaults}},
+                                         [] { return interrupted(); }));
 }
 
 void sweep(Run& run) {
@@ -33,6 +46,7 @@ void sweep(Run& run) {
   add_reference(run, tradeoff.reference);
   if (!tradeoff.rows.empty()) run.write("tradeoff.csv", to_csv(tradeoff));
   add_given_settings(run, tradeoff);
+  if (!tradeoff.interrupted) add_fit(run);
   if (options.budget_seconds > 0) {
     add_recommendations(run, tradeoff);
     add_outcomes(run, tradeoff);

@@ -122,6 +122,31 @@ void add_given_settings(Run& run, const Tradeoff& tradeoff) {
   run.context.out << "\nerrors\n" << table.text();
 }
 
+void add_fit_errors(Run& run, const FitErrors& errors) {
+  Json& json = run.result["fit"];
+  if (!errors.ok()) {
+    json = {{"message", errors.message}};
+    return run.warn("the error of what identify minimises is not known: " + errors.message);
+  }
+  json = {{"cost", errors.cost},
+          {"apart", errors.certificate.cost},
+          {"gradient", {{"apart", errors.certificate.gradient}}},
+          {"relative", true}};
+  TextTable table({"sum of squares of identify", "its error", "of its gradient"});
+  table.add({"two methods apart", fmt::format("{:.1e}", errors.certificate.cost),
+             fmt::format("{:.1e}", errors.certificate.gradient)});
+  for (const FitErrors::Setting& s : errors.settings) {
+    if (!s.message.empty()) {
+      json["settings"][s.name] = {{"message", s.message}};
+      run.warn(fmt::format("identify, {}: {}", s.name, s.message));
+      continue;
+    }
+    json["settings"][s.name] = {{"error", s.error.cost}, {"gradient_error", s.error.gradient}};
+    table.add({s.name, fmt::format("{:.1e}", s.error.cost), fmt::format("{:.1e}", s.error.gradient)});
+  }
+  run.context.out << '\n' << table.text();
+}
+
 void add_recommendations(Run& run, const Tradeoff& tradeoff) {
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
   for (std::size_t q = 0; q < quantities.size(); ++q) {

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "app/run.hpp"
+#include "optim/fit_errors.hpp"
 #include "optim/penalty_study.hpp"
 #include "optim/tradeoff.hpp"
 
@@ -17,6 +18,7 @@ Json errors_json(const std::vector<Quantity>& quantities, const Eigen::VectorXd&
 void add_reference(Run& run, const TradeoffReference& reference);
 // The scene's own settings and the defaults.
 void add_given_settings(Run& run, const Tradeoff& tradeoff);
+void add_fit_errors(Run& run, const FitErrors& errors);
 void add_recommendations(Run& run, const Tradeoff& tradeoff);
 void add_outcomes(Run& run, const Tradeoff& tradeoff);  // how many were measured; what was not, and why
 // What --apply chose; the run has failed where there is nothing to choose.

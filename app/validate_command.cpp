@@ -36,6 +36,9 @@ int validate_command(const CommandContext& context) {
   run.start();
   const Assembly assembly(mechanism, run.problem.scene.simulation.start_time);
   const bool closed = assembled(run, &mechanism, assembly);
+  if (closed && run.problem.scene.simulation.accuracy)
+    context.out
+        << "simulation.accuracy chooses the integrator when it is run; with an implicit one the model is spatial\n";
   for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
   if (closed) add_parameters(run);
   return run.finish();

@@ -15,6 +15,7 @@
 #include "optim/optimality.hpp"
 #include "optim/seed.hpp"
 #include "optim/stopwatch.hpp"
+#include "optim/unused_parameters.hpp"
 #include "optim/variable_scaling.hpp"
 
 namespace mbsopt {
@@ -159,6 +160,11 @@ NlpResult solved(DesignProgram& program, const Eigen::VectorXd& x_start, const O
   return solve_with_nlopt(program, x_start, solver);
 }
 
+// Forces written in C++ name bodies by their number.
+Problem simulated(const Problem& problem, const DesignOptions& options) {
+  return options.user_forces.empty() ? what_objectives_need(problem) : problem;
+}
+
 }  // namespace
 
 NlpScale design_scale(const Problem& problem, const DesignOptions& options) {
@@ -167,7 +173,8 @@ NlpScale design_scale(const Problem& problem, const DesignOptions& options) {
   evaluator_options.method = options.method;
   evaluator_options.user_forces = options.user_forces;
   evaluator_options.progress = options.simulation_progress;
-  Evaluator evaluator(problem.scene, objectives_of(problem, objective_names(spec)), spec.variables, evaluator_options);
+  const Problem needed = simulated(problem, options);
+  Evaluator evaluator(needed.scene, objectives_of(needed, objective_names(spec)), spec.variables, evaluator_options);
   const VariableScaling scaling(chosen(problem.scene, evaluator.variables()));
   DesignProgram program(spec, evaluator, scaling);
   program.start_from(start_of(evaluator, scaling));
@@ -185,7 +192,8 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
     evaluator_options.progress = [&](double t) {
       return abandoned = abandoned || !options.simulation_progress(t), !abandoned;
     };
-  Evaluator evaluator(problem.scene, objectives_of(problem, objective_names(spec)), spec.variables, evaluator_options);
+  const Problem needed = simulated(problem, options);
+  Evaluator evaluator(needed.scene, objectives_of(needed, objective_names(spec)), spec.variables, evaluator_options);
   const VariableScaling scaling(chosen(problem.scene, evaluator.variables()));
   DesignProgram program(spec, evaluator, scaling, [&] { return abandoned; });
 

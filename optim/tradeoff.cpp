@@ -10,6 +10,7 @@
 
 #include "core/integrate/cvodes.hpp"
 #include "core/integrate/tableaus.hpp"
+#include "core/scene/default_integrator.hpp"
 #include "optim/median.hpp"
 #include "optim/pareto.hpp"
 #include "optim/stopwatch.hpp"
@@ -82,7 +83,7 @@ class Sweep {
   // What the file says, and what it would be without a word; with a gradient where there is one.
   void measure_given_settings() {
     SimulationSettings defaults = own();
-    defaults.formulation = {}, defaults.integrator = {};
+    defaults.formulation = {}, defaults.integrator = default_integrator(own().start_time, own().end_time);
     RunLimit limit{std::max(10.0, options_.budget_seconds / 3), options_.interrupted};
     const auto add = [&](const char* curve, const SimulationSettings& settings,
                          std::optional<GradientMethod> method) -> std::optional<std::size_t> {
@@ -102,8 +103,16 @@ class Sweep {
 
   bool has_gradients() const { return !result_.reference.gradients_by.empty(); }
 
-  SimulationSettings constrained_settings() const {
+  // The scene's settings; a limit of steps that it does not ask for itself would hide what loose tolerances do.
+  SimulationSettings swept() const {
     SimulationSettings settings = own();
+    IntegratorSettings& s = settings.integrator;
+    if (s.max_step == default_integrator(settings.start_time, settings.end_time).max_step) s.max_step.reset();
+    return settings;
+  }
+
+  SimulationSettings constrained_settings() const {
+    SimulationSettings settings = swept();
     settings.formulation = constrained(settings.formulation);
     return settings;
   }
@@ -181,7 +190,7 @@ class Sweep {
     std::vector<Curve> curves;
     for (const LinearSolver solver : {LinearSolver::quasidefinite, LinearSolver::cholesky}) {
       for (const double alpha : {1e5, 1e7, 1e9}) {
-        SimulationSettings settings = own();
+        SimulationSettings settings = swept();
         settings.formulation = FormulationSettings::penalty();
         settings.formulation.alpha = alpha, settings.formulation.linear_solver = solver;
         curves.push_back(

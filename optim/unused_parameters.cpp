@@ -87,7 +87,36 @@ class Search {
     return used_;
   }
 
+  // The scene without the bodies that no objective depends on, and without what acts on these alone.
+  Scene needed(std::vector<std::string>& left_out) {
+    used_parameters();
+    Scene needed = scene_;
+    const auto idle = [this](const auto& part) { return !bodies_.matter(bodies_of(part)); };
+    for (const Body& body : scene_.bodies)
+      if (!bodies_.matter({body.name})) left_out.push_back(body.name);
+    if (left_out.empty() || left_out.size() == scene_.bodies.size()) return left_out.clear(), needed;
+    std::erase_if(needed.bodies, [this](const Body& body) { return !bodies_.matter({body.name}); });
+    std::erase_if(needed.joints, idle);
+    std::erase_if(needed.drives, idle);
+    std::erase_if(needed.forces, idle);
+    std::erase_if(needed.conditions, [&](const Condition& condition) {
+      const Sensor* const sensor = facts_.sensor(condition.sensor);
+      return sensor && idle(*sensor);
+    });
+    std::erase_if(needed.sensors, [&](const Sensor& sensor) { return reads(sensor, left_out); });
+    return needed;
+  }
+
  private:
+  // Also one that looks at several bodies, some of which are there.
+  bool reads(const Sensor& sensor, const std::vector<std::string>& bodies) const {
+    if (measures_everything(sensor)) return false;
+    const std::vector<std::string> read = bodies_of(sensor);
+    return std::any_of(read.begin(), read.end(), [&](const std::string& body) {
+      return std::find(bodies.begin(), bodies.end(), body) != bodies.end();
+    });
+  }
+
   std::vector<std::string> bodies_of_joint(const std::string& name) const {
     const Joint* const joint = facts_.joint(name);
     return joint ? bodies_of(*joint) : std::vector<std::string>{};
@@ -318,6 +347,18 @@ std::vector<SceneIssue> find_unused_parameters(const Problem& problem) {
     issues.push_back({"parameters." + parameter.name, what + "; \"allow_unused\": true lifts this error"});
   }
   return issues;
+}
+
+Problem what_objectives_need(const Problem& problem, std::vector<std::string>* left_out) {
+  Problem needed = problem;
+  std::vector<std::string> names;
+  if (!problem.objectives.empty()) {
+    Problem judged = problem;
+    judged.identification.reset();
+    needed.scene = Search(judged).needed(names);
+  }
+  if (left_out) *left_out = std::move(names);
+  return needed;
 }
 
 std::vector<SceneIssue> find_idle_variables(const Problem& problem) {

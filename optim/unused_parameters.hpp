@@ -20,6 +20,11 @@ namespace mbsopt {
 // For a problem without other issues.
 std::vector<SceneIssue> find_unused_parameters(const Problem& problem);
 
+// The problem as far as its objectives depend on it: without the bodies that none of them looks at and that nothing
+// connects with one that is looked at (not through the ground), and without what acts on or measures these. Such bodies
+// then cost nothing in values and gradients. Parameters stay as they are. For a problem without other issues.
+Problem what_objectives_need(const Problem& problem, std::vector<std::string>* left_out = nullptr);
+
 // Variables of a design that matter to none of the objectives it minimises or bounds, and variables and free parameters
 // of an identification that matter to none of its channels, though they may matter to other objectives of the problem.
 std::vector<SceneIssue> find_idle_variables(const Problem& problem);

@@ -8,6 +8,7 @@
 #include "app/json/parse_json.hpp"
 #include "app/json/reader.hpp"
 #include "app/json/source_text.hpp"
+#include "core/scene/default_integrator.hpp"
 #include "optim/csv_table.hpp"
 #include "optim/data_issues.hpp"
 #include "optim/problem_issues.hpp"
@@ -16,6 +17,19 @@
 namespace mbsopt {
 
 namespace {
+
+// simulation.accuracy chooses all of it, later.
+void complete_integrator(SimulationSettings& settings, const Node& root) {
+  if (settings.accuracy) return;
+  const Node* const simulation = root.find("simulation");
+  const Node* const integrator = simulation ? simulation->find("integrator") : nullptr;
+  const auto has = [&](const char* key) { return integrator && integrator->find(key); };
+  choose_what_is_left_out(settings, {.type = has("type"),
+                                     .rtol = has("rtol"),
+                                     .atol = has("atol"),
+                                     .step = has("step"),
+                                     .max_step = has("max_step")});
+}
 
 void resolve_data_files(Problem& problem, const std::filesystem::path& folder, const Node& root, Findings& findings) {
   if (!problem.identification) return;
@@ -123,6 +137,7 @@ Problem read_problem_text(const std::string& text, const std::filesystem::path& 
     apply_override(root, set_overrides[i], static_cast<int>(i) + 1, findings);
   Problem problem;
   Reader::read(root, "", findings, problem);
+  complete_integrator(problem.scene.simulation, root);
   resolve_data_files(problem, name.parent_path(), root, findings);
   read_sampled_laws(problem, name.parent_path(), root, findings);
   add_issues(problem, root, findings, warnings);

@@ -1,7 +1,10 @@
 #include "app/json/schema.hpp"
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
+#include "core/scene/default_integrator.hpp"
 #include "optim/problem_vocabulary.hpp"
 
 namespace mbsopt {
@@ -232,6 +235,22 @@ Json object_schema() {
     variants.push_back(std::move(schema));
   }
   return {{"oneOf", std::move(variants)}};
+}
+
+// Its default is a choice as a whole (core/scene/default_integrator.hpp).
+template <>
+Json object_schema<IntegratorSettings>() {
+  const IntegratorSettings of_other_types;
+  IntegratorSettings settings = default_integrator(0, 1);
+  Json schema = object_schema_of(settings);
+  const auto also = [&](const char* key, const std::string& words) {
+    Json& description = schema["properties"][key]["description"];
+    description = description.get<std::string>() + words;
+  };
+  also("rtol", fmt::format("; with another type than {}: {:g}", settings.type, of_other_types.rtol));
+  also("atol", fmt::format("; with another type than {}: {:g}", settings.type, of_other_types.atol));
+  also("max_step", "; where type is left out: a hundredth of the run, else none");
+  return schema;
 }
 
 // Its defaults depend on its type; without one it is the first.

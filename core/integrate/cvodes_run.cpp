@@ -159,10 +159,11 @@ void ForwardRun::stop_for(int flag, double t, const char* of_what) {
     case CV_REPTD_SRHSFUNC_ERR:
     case CV_UNREC_SRHSFUNC_ERR:
       stop(SimulationStatus::not_finite,
-           fmt::format("{} cannot be computed beyond t = {:.6g} s, however small the step. A law or force that is not "
-                       "finite there (a root, logarithm or division outside its range), or a body without inertia in "
-                       "a direction that no joint holds?",
-                       of_what, t));
+           fmt::format(
+               "{} cannot be computed beyond t = {:.6g} s, however small the step. Look for a law or force that is "
+               "not finite there (a root, logarithm or division outside its range), or for a body without "
+               "inertia in a direction that no joint holds",
+               of_what, t));
       return;
     case CV_TOO_MUCH_ACC:
       stop(SimulationStatus::step_too_small,

@@ -104,7 +104,7 @@ TEST_CASE("the estimated error is the true one within a factor of 10", "[accurac
 TEST_CASE("a stiff scene gets an implicit method, one that is not an explicit one", "[accuracy]") {
   const auto chosen = [](const std::string& text, double accuracy) {
     Problem problem = read_problem_text(text, "honey.json");
-    problem.scene.simulation.accuracy = accuracy;
+    problem.scene.simulation.accuracy = accuracy, problem.scene.simulation.integrator = {};
     return choose_accuracy(problem.scene, objectives_of(problem));
   };
   const AccuracyChoice stiff = chosen(honey(R"({"end_time": 20, "accuracy": "draft"})"), 1e-5);

@@ -34,7 +34,7 @@ TEST_CASE("gradient: CVODES gives the discrete derivatives to 1e-6, and says wha
     const CommandOutcome outcome = run_with({"gradient", file, "--out", out, "--method", method}, kAccurate);
     INFO(outcome.out << outcome.err);
     REQUIRE(outcome.exit_code == kDone);
-    CHECK_THAT(outcome.out, Contains("with cvodes_adams") && Contains(method) && Contains("not by dopri5"));
+    CHECK_THAT(outcome.out, Contains("with cvodes_adams") && Contains(method) && Contains("not by dopri853"));
     const auto result = json_of(folder.path / "out/result.json");
     CHECK(result.at("methods").at(method).at("integrator") == "cvodes_adams");
     for (const char* objective : {"track", "end"}) {
@@ -87,7 +87,7 @@ TEST_CASE("check: CVODES stands beside the discrete methods", "[command][cvodes]
   const CommandOutcome outcome =
       run_command({"check", folder.write("rod.json", kPendulum), "--out", folder.file("out")});
   CHECK(outcome.exit_code == kDone);
-  CHECK_THAT(outcome.out, Contains("of the differential equation, against the derivatives of dopri5") &&
+  CHECK_THAT(outcome.out, Contains("of the differential equation, against the derivatives of dopri853") &&
                               Contains("track: agrees") && Contains("end: agrees"));
   const auto result = json_of(folder.path / "out/result.json");
   const auto& verdict = result.at("verdict").at("continuous");

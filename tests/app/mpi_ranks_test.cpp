@@ -130,7 +130,7 @@ TEST_CASE("mpirun: Ctrl-C, and the loss of a rank, leave what resume goes on wit
     return std::vector<std::string>{"design", file,
                                     "--out",  out.string(),
                                     "--set",  "design.multistart.starts=12",
-                                    "--set",  "simulation.integrator.max_step=0.0006"};
+                                    "--set",  "simulation.integrator.max_step=0.001"};
   };
   REQUIRE(run_command(design(folder.path / "whole")).exit_code == kDone);
   for (const bool lose_a_rank : {false, true}) {

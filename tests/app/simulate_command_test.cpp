@@ -37,8 +37,7 @@ TEST_CASE("validate counts bodies, equations and degrees of freedom", "[command]
                                              {"degrees_of_freedom", 1},
                                              {"redundant", nlohmann::json::array()},
                                              {"type", "planar"},
-                                             {"unknowns_per_body", 3},
-                                             {"not_planar", nullptr}});
+                                             {"unknowns_per_body", 3}});
 }
 
 TEST_CASE("simulate writes the columns of the contract, a row each output step", "[command]") {

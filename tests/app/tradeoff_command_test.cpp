@@ -54,7 +54,7 @@ TEST_CASE("tradeoff: a table of all settings, plots, and advice in words for eac
   CHECK_THAT(outcome.out, Contains("certified by") && Contains("for 1e-04 in track: ") &&
                               Contains("for 1e-06 in gradient of end: ") && Contains("rtol"));
   const Csv csv = csv_of(folder.path / "out/tradeoff.csv");
-  CHECK(csv.lines.size() > 100);
+  CHECK(csv.lines.size() > 30);  // a row per curve, however little time there is
   for (const char* column : {"integrator", "rtol", "step", "formulation", "alpha", "status", "wall_seconds",
                              "rhs_evaluations", "factorisations", "memory_bytes", "error motion", "error sensors",
                              "error track", "error end", "error gradient of track", "pareto", "message"}) {

@@ -1,0 +1,20 @@
+// What integrates a problem that does not choose: dopri853 at rtol 1e-8, atol 1e-10, with steps of at most a hundredth
+// of the run. It costs about as many right-hand sides as dopri5 at 1e-6 and is a thousand times more exact
+// (docs/tradeoffs.md). The limit is for what step-size control cannot see: a pulse between two steps, the quadrature of
+// an objective, a kink of a law in which only a derivative has it.
+#pragma once
+
+#include "core/scene/settings.hpp"
+
+namespace mbsopt {
+
+IntegratorSettings default_integrator(double start_time, double end_time);
+
+// What of an integrator was said; the rest is filled in. A type of its own keeps its own tolerances (settings.hpp), and
+// no limit.
+struct IntegratorGiven {
+  bool type = false, rtol = false, atol = false, step = false, max_step = false;
+};
+void choose_what_is_left_out(SimulationSettings& settings, const IntegratorGiven& given);
+
+}  // namespace mbsopt

@@ -1,0 +1,46 @@
+// How exact the integrator leaves what an identification minimises, 1/2 sum z^2 over the samples of its fitted
+// experiments, and the gradient of it in their unknowns, at the values from which it starts: against dopri853 and
+// gauss6 at tight tolerances, with steps shortened until both agree. Priors and losses are no matter of integration and
+// left out.
+//
+//   const FitErrors errors = measure_fit_errors(problem, data, {{"own", problem.scene.simulation}});
+//   errors.settings.at(0).cost;   // |cost - cost*| / |cost*|
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/scene/settings.hpp"
+#include "optim/csv_table.hpp"
+#include "optim/problem.hpp"
+
+namespace mbsopt {
+
+struct FitErrors {
+  // Relative; of the gradient |D (g - g*)|/|D g*|, D the sizes of the unknowns on the diagonal.
+  struct Apart {
+    double cost = 0, gradient = 0;
+  };
+  struct Setting {
+    std::string name;
+    std::string message;  // why there is no error
+    Apart error;
+  };
+  std::string message;  // why there is nothing
+  double cost = 0;      // the right one
+  Apart certificate;    // what the two methods are apart
+  std::vector<Setting> settings;
+  bool ok() const { return message.empty(); }
+};
+
+struct NamedSettings {
+  std::string name;
+  SimulationSettings simulation;
+};
+
+// data: one table per experiment.
+FitErrors measure_fit_errors(const Problem& problem, const std::vector<CsvTable>& data,
+                             const std::vector<NamedSettings>& settings, const std::function<bool()>& interrupted = {});
+
+}  // namespace mbsopt
