@@ -8,11 +8,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <vector>
 
 #include "core/expression/counted.hpp"
 #include "optim/evaluated_points.hpp"
 #include "optim/optimality.hpp"
+#include "optim/secant_curvature.hpp"
 
 namespace mbsopt {
 namespace {
@@ -23,10 +25,13 @@ using VectorIn = Eigen::Map<const Eigen::VectorXd>;
 using VectorView = Eigen::Map<Eigen::VectorXd>;
 
 constexpr int kFreshStarts = 2;
+constexpr int kStalled = 10;         // iterations between whose objectives there is but noise
 constexpr double kAcceptable = 100;  // times the tolerance: where noise hides the rest
 constexpr const char* kConvergedInNoise =
     "converged: the objective does not change any more, and the optimality conditions hold to the accuracy of its "
     "derivatives";
+constexpr const char* kConverged = "converged: the optimality conditions hold";
+constexpr double kNoise = 1e-2;    // times the tolerance, relative to f
 constexpr double kNoBound = 1e20;  // Ipopt's: at least 1e19 means none
 
 class Adapter : public Ipopt::TNLP {
@@ -36,12 +41,15 @@ class Adapter : public Ipopt::TNLP {
         x_start_(x_start),
         options_(options),
         result_(result),
-        points_(problem, result, options.constraint_tolerance, options.records) {
+        points_(problem, result, options.constraint_tolerance, options.records),
+        secants_(1 / problem.f_scale) {
     result_.x = x_start;
   }
 
   bool start_is_valid() { return evaluate(x_start_); }
   bool out_of_evaluations() const { return out_of_evaluations_; }
+  bool optimal() const { return optimal_; }
+  bool stalled() const { return stalled_; }
 
   // Feasible, and the objective falls nowhere within the bounds: the barrier would only lead away from here.
   bool start_is_optimal() {
@@ -50,13 +58,6 @@ class Adapter : public Ipopt::TNLP {
     result_.point = *point_;
     if (options_.progress) options_.progress({0, point_->f, problem_.violation(point_->c), distance, points_.x()});
     return true;
-  }
-
-  // Without constraints, and the Hessian there is positive definite: Newton's step leads down and needs no barrier.
-  bool start_curves_up() {
-    if (!options_.second_order || problem_.constraints() > 0) return false;
-    update_hessians(points_.x());
-    return Eigen::LLT<Eigen::MatrixXd>(hessians_[0]).info() == Eigen::Success;
   }
 
   bool get_nlp_info(Index& n, Index& m, Index& nnz_jac, Index& nnz_hess, IndexStyleEnum& style) override {
@@ -127,9 +128,10 @@ class Adapter : public Ipopt::TNLP {
       return true;
     }
     update_hessians(VectorIn(x, n));
+    const Eigen::MatrixXd of_f = convex_where_free();
     for (Index i = 0; i < n; ++i) {
       for (Index j = 0; j <= i; ++j, ++k) {
-        values[k] = f_factor * hessians_[0](i, j);
+        values[k] = f_factor * of_f(i, j);
         for (Index c = 0; c < m; ++c) values[k] += multipliers[c] * hessians_[static_cast<std::size_t>(c) + 1](i, j);
       }
     }
@@ -143,7 +145,8 @@ class Adapter : public Ipopt::TNLP {
     result_.iterations = iterations_before_ + iteration;
     out_of_evaluations_ = options_.max_evaluations && result_.evaluations >= *options_.max_evaluations;
     if (options_.progress && iterate_.size() > 0 && !told_progress(inf_du)) return false;
-    return !out_of_evaluations_;
+    look_at_iterate();
+    return !out_of_evaluations_ && !optimal_ && !stalled_;
   }
 
   bool told_progress(double inf_du) const {
@@ -156,6 +159,9 @@ class Adapter : public Ipopt::TNLP {
     final_ = VectorIn(x, n);
   }
 
+  // Of a stalled search, the end point's optimality.
+  double distance() const { return most_stationary().distance; }
+
   // Whether a point seen on the way is feasible and better than the one Ipopt ended at by more than the tolerance.
   bool passed_a_better_point() {
     if (final_.size() == 0 || !points_.have_best() || !evaluate(final_)) return false;
@@ -165,6 +171,7 @@ class Adapter : public Ipopt::TNLP {
   void go_on_from_best() {
     x_start_ = points_.best_x();
     iterations_before_ = result_.iterations;
+    recent_.clear(), stalled_ = false;
     ++round_;
   }
 
@@ -186,10 +193,49 @@ class Adapter : public Ipopt::TNLP {
   }
 
  private:
+  struct Recent {
+    Eigen::VectorXd x;
+    double f, distance;  // f: scaled
+  };
+
   // Interior points may leave the bounds by a rounding error; EvaluatedPoints takes them back.
   bool evaluate(const Eigen::VectorXd& x) {
     point_ = &points_.at(x, Wanted::derivatives);
     return point_->ok;
+  }
+
+  // Ends that do not depend on the Hessian, nor on what is left of the barrier: an iterate is optimal by the yardstick
+  // of all methods, or the last ones differ in nothing but noise, which a line search would go on trying to lower.
+  void look_at_iterate() {
+    if (iterate_.size() == 0 || !evaluate(iterate_) || !points_.feasible(*point_)) return;
+    const double distance = optimality(problem_, iterate_, *point_);
+    if (distance <= options_.tolerance) {
+      optimal_ = true, final_ = iterate_;
+      return;
+    }
+    recent_.push_back({iterate_, point_->f * problem_.f_scale, distance});
+    if (recent_.size() <= kStalled) return;
+    if (recent_.size() > kStalled + 1) recent_.pop_front();
+    const auto by_f = [](const Recent& a, const Recent& b) { return a.f < b.f; };
+    const auto [least, most] = std::minmax_element(recent_.begin(), recent_.end(), by_f);
+    const double noise =
+        std::max(options_.tolerance * options_.tolerance, kNoise * options_.tolerance * std::abs(most->f));
+    stalled_ = most->f - least->f <= noise;
+    if (stalled_) final_ = most_stationary().x;
+  }
+
+  const Recent& most_stationary() const {
+    return *std::min_element(recent_.begin(), recent_.end(),
+                             [](const Recent& a, const Recent& b) { return a.distance < b.distance; });
+  }
+
+  // The Hessian of f; but without constraints, where it is not positive definite, BFGS. Negative curvature holds for a
+  // short way only, and Ipopt would add what makes all steps as short; the gradients of the iterates tell of a longer
+  // one.
+  Eigen::MatrixXd convex_where_free() const {
+    if (problem_.constraints() > 0 || Eigen::LLT<Eigen::MatrixXd>(hessians_[0]).info() == Eigen::Success)
+      return hessians_[0];
+    return secants_.matrix();
   }
 
   void update_hessians(const Eigen::VectorXd& x) {
@@ -211,6 +257,7 @@ class Adapter : public Ipopt::TNLP {
 
   void keep_iterate() {
     iterate_ = points_.x(), iterate_f_ = point_->f, iterate_violation_ = problem_.violation(point_->c);
+    secants_.add(iterate_, point_->f_x);
   }
 
   NonlinearProgram& problem_;
@@ -218,10 +265,12 @@ class Adapter : public Ipopt::TNLP {
   const IpoptOptions& options_;
   NlpResult& result_;
   EvaluatedPoints points_;
+  SecantCurvature secants_;
   const NlpPoint* point_ = nullptr;  // the last one
   Eigen::VectorXd final_, iterate_, hessians_x_;
   std::vector<Eigen::MatrixXd> hessians_;
-  bool out_of_evaluations_ = false;
+  bool out_of_evaluations_ = false, optimal_ = false, stalled_ = false;
+  std::deque<Recent> recent_;  // oldest first
   int round_ = 0, iterations_before_ = 0;
   double iterate_f_ = 0, iterate_violation_ = 0;
 };
@@ -231,12 +280,21 @@ struct Outcome {
   std::string words;
 };
 
+Outcome stalled_in_words(double distance, const NlpResult& result, const IpoptOptions& options) {
+  if (distance <= kAcceptable * options.tolerance) return {SolverStatus::converged, kConvergedInNoise};
+  return {SolverStatus::no_progress,
+          fmt::format("no further progress: in {} the objective has changed by no more than noise, but the optimality "
+                      "conditions hold to {:.1e} only, not to {:g}; try tighter simulation tolerances, or a larger "
+                      "optimiser tolerance{}",
+                      counted(kStalled, "iteration"), distance, options.tolerance, result.failures())};
+}
+
 Outcome in_words(Ipopt::ApplicationReturnStatus status, const NlpResult& result, const IpoptOptions& options) {
   using namespace Ipopt;  // NOLINT: its enumerators
   const std::string failures = result.failures();
   switch (status) {
     case Solve_Succeeded:
-      return {SolverStatus::converged, "converged: the optimality conditions hold"};
+      return {SolverStatus::converged, kConverged};
     case Solved_To_Acceptable_Level:
       return {SolverStatus::converged, kConvergedInNoise};
     case Search_Direction_Becomes_Too_Small:
@@ -271,7 +329,7 @@ Outcome in_words(Ipopt::ApplicationReturnStatus status, const NlpResult& result,
 }
 
 void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& options, bool near_solution,
-                 bool start_curves_up) {
+                 bool constrained) {
   Ipopt::OptionsList& list = *application.Options();
   list.SetIntegerValue("print_level", 0);
   list.SetStringValue("sb", "yes");  // no banner
@@ -279,8 +337,8 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
   list.SetIntegerValue("limited_memory_max_history", options.history);
   // Newton's steps converge faster than the barrier falls from its usual 0.1; BFGS needs that time to learn.
   if (options.second_order) list.SetNumericValue("mu_init", 1e-3);
-  if (start_curves_up) {
-    list.SetNumericValue("mu_init", 1e-7);
+  if (options.second_order && !constrained) {  // all matrices are positive definite: Newton's steps need no barrier
+    list.SetNumericValue("mu_init", 0.1 * options.tolerance);
     list.SetStringValue("bound_mult_init_method", "mu-based");  // multipliers of 1 would count as curvature
   }
   list.SetStringValue("nlp_scaling_method", "user-scaling");
@@ -321,22 +379,23 @@ NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_s
   // From far away a barrier method may leave the valley of a good point for a worse one. Then it starts once more,
   // there.
   Outcome outcome{SolverStatus::failed, "Ipopt refused its options"};
-  const bool start_curves_up = adapter->start_curves_up();
   for (int round = 0; round <= kFreshStarts; ++round) {
     const Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);  // no console
-    set_options(*application, options, round > 0, start_curves_up && round == 0);
+    set_options(*application, options, round > 0, problem.constraints() > 0);
     application->Options()->SetIntegerValue("max_iter", std::max(0, options.max_iterations - result.iterations));
     if (application->Initialize("") != Ipopt::Solve_Succeeded) break;  // "": no options file is read
     outcome = in_words(application->OptimizeTNLP(owner), result, options);
     if (adapter->out_of_evaluations() && outcome.status == SolverStatus::stopped)
       outcome = {SolverStatus::iteration_limit,
                  "stopped at the limit of " + counted(*options.max_evaluations, "evaluation") + result.failures()};
+    if (adapter->optimal()) outcome = {SolverStatus::converged, kConverged};
+    if (adapter->stalled()) outcome = stalled_in_words(adapter->distance(), result, options);
     const bool ended = outcome.status == SolverStatus::converged || outcome.status == SolverStatus::no_progress;
     if (!ended || !adapter->passed_a_better_point()) break;
     adapter->go_on_from_best();
   }
   result.status = outcome.status, result.message = outcome.words;
-  adapter->finish(outcome.status == SolverStatus::converged);
+  adapter->finish(outcome.status == SolverStatus::converged || adapter->stalled());
   const bool gave_up = outcome.status == SolverStatus::no_progress || outcome.status == SolverStatus::infeasible;
   if (gave_up && adapter->best_is_optimal()) {
     result.status = SolverStatus::converged, result.message = kConvergedInNoise;

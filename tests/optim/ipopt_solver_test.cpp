@@ -147,3 +147,57 @@ TEST_CASE("a start that is optimal already is left as it is", "[ipopt]") {
   CHECK(bounded.x == vector({0.5, 0.25}));
   CHECK(bounded.evaluations == 1);
 }
+
+TEST_CASE("ipopt leaves negative curvature by what the gradients tell", "[ipopt]") {
+  // Curves down within 0.2 of 0 along x, 1000 times as strong as it curves up elsewhere.
+  struct Ridge : NonlinearProgram {
+    Ridge() : NonlinearProgram(2, 0) {}
+    static double bump(double x) { return std::exp(-50 * x * x); }
+    void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
+      p.f = x.squaredNorm() / 2 + 20 * bump(x(0));
+      p.f_x = x;
+      p.f_x(0) -= 2000 * x(0) * bump(x(0));
+    }
+    bool hessians(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& H) override {
+      H.assign(1, Eigen::MatrixXd::Identity(2, 2));
+      H[0](0, 0) += (200000 * x(0) * x(0) - 2000) * bump(x(0));
+      return true;
+    }
+  } ridge;
+  ridge.x_lower = Eigen::Vector2d(-3, -3), ridge.x_upper = Eigen::Vector2d(3, 3);
+  IpoptOptions options;
+  options.second_order = true;
+  const NlpResult result = solve_with_ipopt(ridge, Eigen::Vector2d(0.001, 1), options);
+  INFO(result.message << " " << result.iterations);
+  CHECK(result.status == SolverStatus::converged);
+  CHECK(result.iterations <= 20);
+  CHECK(std::abs(result.x(0)) == Approx(std::sqrt(std::log(2000.0) / 50)).epsilon(1e-6));
+  CHECK(result.x(1) == Approx(0).margin(1e-6));
+}
+
+TEST_CASE("ipopt says where noise is all that is left", "[ipopt]") {
+  // Values and gradients carry noise, as those of simulations do.
+  struct Noisy : NonlinearProgram {
+    explicit Noisy(double size) : NonlinearProgram(1, 0), noise(size) {}
+    double noise;
+    void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
+      p.f = 1 + x(0) * x(0) / 2 + 1e-4 * noise * std::sin(1e9 * x(0));
+      p.f_x = x;
+      p.f_x(0) += noise * (2 + std::sin(1e9 * x(0)));
+    }
+    bool hessians(const Eigen::VectorXd&, std::vector<Eigen::MatrixXd>& H) override {
+      H.assign(1, Eigen::MatrixXd::Identity(1, 1));
+      return true;
+    }
+  };
+  IpoptOptions options;
+  options.second_order = GENERATE(false, true);
+  Noisy little(1e-5), much(1e-3);
+  const NlpResult in_noise = solve_with_ipopt(little, Eigen::VectorXd::Constant(1, 1.0), options);
+  INFO(in_noise.message << " " << in_noise.iterations);
+  CHECK(in_noise.status == SolverStatus::converged);
+  CHECK(in_noise.iterations < 40);
+  const NlpResult lost = solve_with_ipopt(much, Eigen::VectorXd::Constant(1, 1.0), options);
+  INFO(lost.message << " " << lost.iterations);
+  CHECK(lost.iterations < 60);
+}

@@ -1,0 +1,34 @@
+// Curvature learnt from gradients: BFGS (Nocedal and Wright, "Numerical Optimization", 2nd ed., equation 6.19) over the
+// last iterates. Positive definite always, so that it stands in where a Hessian is not.
+//
+//   s = x_k - x_k-1,  y = f_x,k - f_x,k-1:     B <- B - (B s)(B s)'/(s' B s) + y y'/(y' s),   left out where y's <= 0
+//
+//   SecantCurvature curvature(1);           // of the first matrix, a multiple of the identity
+//   curvature.add(x, f_x);                  // each iterate
+//   curvature.matrix();
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <deque>
+
+namespace mbsopt {
+
+class SecantCurvature {
+ public:
+  explicit SecantCurvature(double first, std::size_t pairs = 20) : first_(first), pairs_(pairs) {}
+
+  // The last one again changes nothing.
+  void add(const Eigen::VectorXd& x, const Eigen::VectorXd& f_x);
+  Eigen::MatrixXd matrix() const;  // there must have been an iterate
+
+ private:
+  struct Iterate {
+    Eigen::VectorXd x, f_x;
+  };
+  double first_;
+  std::size_t pairs_;
+  std::deque<Iterate> iterates_;  // oldest first
+};
+
+}  // namespace mbsopt
