@@ -7,7 +7,7 @@
 //   stationary      other stationary ones;  not_stationary: the rest
 //   iterations, lbfgs_iterations, ratio   of runs that end at the exact optimum by this method and by Ipopt's L-BFGS
 // MBSOPT_STARTS_TABLE=1 writes each run as a row of a Markdown table on standard error:
-//   MBSOPT_STARTS_TABLE=1 build/release/bench/mbsopt_bench --benchmark_filter=starts
+//   MBSOPT_STARTS_TABLE=1 ./dev bench --benchmark_filter=starts
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
