@@ -16,6 +16,9 @@
 namespace mbsopt {
 namespace {
 
+constexpr const char* kNothingMeasured = "nothing was measured yet";
+constexpr const char* kMeasuredIsKept = "tradeoff.csv holds what was measured";
+
 void apply_accuracy(Run& run, const Tradeoff& tradeoff, double accuracy) {
   const Recommendation r = recommend(tradeoff, main_quantities(tradeoff.reference.errors->quantities()), accuracy);
   add_applied(run, tradeoff, r);
@@ -52,7 +55,7 @@ void sweep(Run& run) {
     add_outcomes(run, tradeoff);
   }
   if (tradeoff.interrupted) {
-    run.stopped("tradeoff.csv holds what was measured");
+    run.stopped(tradeoff.rows.empty() ? kNothingMeasured : kMeasuredIsKept);
   } else if (run.context.options.apply) {
     apply_accuracy(run, tradeoff, *run.context.options.apply);
   }
@@ -74,7 +77,7 @@ void penalty_study(Run& run) {
   add_reference(run, study.reference);
   if (!study.rows.empty()) run.write("tradeoff.csv", to_csv(study));
   add_penalty_study(run, study);
-  if (study.interrupted) run.stopped("tradeoff.csv holds what was measured");
+  if (study.interrupted) run.stopped(study.rows.empty() ? kNothingMeasured : kMeasuredIsKept);
   run.write("report.html", penalty_report(run.result, study));
 }
 

@@ -21,7 +21,7 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kTouches = 1e-6;  // relative to the bound's size: the barrier keeps solutions this near to a bound
+constexpr double kTouches = 1e-5;  // relative to the bound's size: the barrier keeps solutions this near to a bound
 
 bool touches(double value, const std::optional<double>& bound, double size) {
   return bound && std::abs(value - *bound) <= kTouches * size;

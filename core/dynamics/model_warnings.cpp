@@ -110,10 +110,10 @@ void add_violations(const MechanismData& d, std::vector<std::string>& warnings) 
   }
   for (const auto& [joint, amount] : worst_point) {
     if (amount <= kMuchViolated * size || size == 0) continue;
-    warnings.push_back(
-        fmt::format("the guess (position, orientation of the bodies) leaves the points of joint '{}' {:.3g} m apart; "
-                    "check in the report that the assembled position is the one that is meant",
-                    d.joint_names[at(joint)], amount));
+    warnings.push_back(fmt::format(
+        "the guess (position, orientation of the bodies) leaves the points of joint '{}' {:.3g} m apart; "
+        "check that the assembled position is the one that is meant (`simulate` writes a report with a drawing)",
+        d.joint_names[at(joint)], amount));
   }
   for (const auto& [joint, amount] : worst_axis) {
     if (amount <= kMuchViolated) continue;
