@@ -2,9 +2,42 @@
 
 #include <algorithm>
 
+#include "core/body/euler_parameters.hpp"
+
 namespace mbsopt {
 
+namespace {
+
+// A position in the ground's axes, which most objectives look at, needs neither velocities nor frames.
+bool is_place(const PointSensor& sensor) {
+  return sensor.quantity == PointSensor::Quantity::position && sensor.axes_body < 1;
+}
+
+// The body's Euler parameters in y, in which q comes first.
+Vector4d turn_of(const Eigen::VectorXd& y, int body) { return y.segment<4>(7 * (body - 1) + 3); }
+
+Vector3d place(const PointSensor::Point& point, const Eigen::VectorXd& y) {
+  if (point.body == 0) return point.s;
+  return y.segment<3>(7 * (point.body - 1)) + A(turn_of(y, point.body)) * point.s;
+}
+
+void add_place_bar(const PointSensor::Point& point, const Eigen::VectorXd& y, const Vector3d& X_bar,
+                   Eigen::Ref<Eigen::VectorXd> y_bar, Vector3d& s_bar) {
+  if (point.body == 0) {
+    s_bar += X_bar;
+    return;
+  }
+  const Eigen::Index q = 7 * (point.body - 1);
+  const Vector4d p = turn_of(y, point.body);
+  y_bar.segment<3>(q) += X_bar;
+  y_bar.segment<4>(q + 3) += N(p, point.s).transpose() * X_bar;
+  s_bar += A(p).transpose() * X_bar;
+}
+
+}  // namespace
+
 double PointSensor::value(const Eigen::VectorXd& y) const {
+  if (is_place(*this)) return pick(relative ? Vector3d(place(a, y) - place(b, y)) : place(a, y));
   const Seen x = seen(y);
   const Vector3d L = x.R.frame.A.transpose() * x.X;
   const Vector3d Ldot = x.R.frame.Adot.transpose() * x.X + x.R.frame.A.transpose() * x.V;
@@ -21,6 +54,12 @@ double PointSensor::value(const Eigen::VectorXd& y) const {
 
 double PointSensor::add_gradient(const Eigen::VectorXd& y, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
                                  Vector3d& a_bar, Vector3d& b_bar) const {
+  if (is_place(*this)) {
+    const Vector3d L = relative ? Vector3d(place(a, y) - place(b, y)) : place(a, y), X_bar = scale * along(L);
+    add_place_bar(a, y, X_bar, y_bar, a_bar);
+    if (relative) add_place_bar(b, y, -X_bar, y_bar, b_bar);
+    return pick(L);
+  }
   const Seen x = seen(y);
   const Matrix3d &R = x.R.frame.A, &Rdot = x.R.frame.Adot;
   const Vector3d L = R.transpose() * x.X;
