@@ -126,5 +126,5 @@ void gradient_scaling(benchmark::State& state, const char* method, Scene (*make)
 MBSOPT_GRADIENT_SCALING(chain, dopri5, 1, 5, 21, 81, 100, 500);
 MBSOPT_GRADIENT_SCALING(windows, dopri5, 2, 10, 40, 250);
 MBSOPT_GRADIENT_SCALING(chain, dopri853, 1, 5, 21, 81, 100);
-MBSOPT_GRADIENT_SCALING(chain, radau5, 1, 5, 21);
-MBSOPT_GRADIENT_SCALING(chain, sdirk4, 1, 5, 21);
+MBSOPT_GRADIENT_SCALING(chain, radau5, 1, 5, 21, 100);
+MBSOPT_GRADIENT_SCALING(chain, sdirk4, 1, 5, 21, 100);

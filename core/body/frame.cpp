@@ -85,14 +85,14 @@ Vector3d BodyState::omega() const { return omega_B(p, pdot); }
 
 Vector4d BodyState::pddot() const { return 0.5 * G_transposed_times(p, omegadot) - pdot.squaredNorm() * p; }
 
-void set_position(const Vec<7>& q, BodyState& body, Frame& frame) {
+void set_position(const Eigen::Ref<const Vec<7>>& q, BodyState& body, Frame& frame) {
   body.p = q.tail<4>();
   frame.r = q.head<3>();
   frame.A = A(body.p);
   frame.p = body.p;
 }
 
-void set_velocity(const Vec<7>& v, BodyState& body, Frame& frame) {
+void set_velocity(const Eigen::Ref<const Vec<7>>& v, BodyState& body, Frame& frame) {
   body.pdot = v.tail<4>();
   frame.rdot = v.head<3>();
   frame.Adot = B(body.p, body.pdot);

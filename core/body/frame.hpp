@@ -59,8 +59,8 @@ struct BodyState {
   Vector4d pddot() const;
 };
 
-void set_position(const Vec<7>& q, BodyState& body, Frame& frame);
-void set_velocity(const Vec<7>& v, BodyState& body, Frame& frame);
+void set_position(const Eigen::Ref<const Vec<7>>& q, BodyState& body, Frame& frame);
+void set_velocity(const Eigen::Ref<const Vec<7>>& v, BodyState& body, Frame& frame);
 void set_acceleration(const Vec<6>& z, BodyState& body, Frame& frame);
 void set_virtual(const Vec<6>& eta, Frame& frame);
 

@@ -63,6 +63,10 @@ void ForceTerms::add_loads(const At& at, std::vector<Vec<6>>& loads) {
     const std::size_t i = index(f.body1), j = index(f.body2);
     f.add_load(at.t, data_.rho, at.frames[i], at.frames[j], law_, loads[i], loads[j]);
   }
+  add_loads_but_springs(at, loads);
+}
+
+void ForceTerms::add_loads_but_springs(const At& at, std::vector<Vec<6>>& loads) {
   for_each_joint_effort([&](const auto& f) {
     const std::size_t i = index(f.joint.body1), j = index(f.joint.body2);
     f.add_load(at.t, data_.rho, reference(f.angle, at.angles), at.frames[i], at.frames[j], law_, loads[i], loads[j]);
@@ -237,6 +241,11 @@ void ForceTerms::add_pull_back(const At& at, std::vector<FrameBar>& bars, Eigen:
     const std::size_t i = index(f.body1), j = index(f.body2);
     f.pull_back(at.t, data_.rho, at.frames[i], at.frames[j], law_, bars[i], bars[j], theta_bar, rho_bar);
   }
+  add_pull_back_but_springs(at, bars, y_bar, theta_bar, rho_bar);
+}
+
+void ForceTerms::add_pull_back_but_springs(const At& at, std::vector<FrameBar>& bars, Eigen::Ref<Eigen::VectorXd> y_bar,
+                                           Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) {
   for_each_joint_effort([&](const auto& f) {
     const std::size_t i = index(f.joint.body1), j = index(f.joint.body2);
     f.pull_back(at.t, data_.rho, reference(f.angle, at.angles), at.frames[i], at.frames[j], law_, bars[i], bars[j],

@@ -27,6 +27,7 @@ class ForceTerms {
     const std::vector<Frame>& frames;
   };
   void add_loads(const At& at, std::vector<Vec<6>>& loads);
+  void add_loads_but_springs(const At& at, std::vector<Vec<6>>& loads);
   // Their derivatives in the state as blocks, units: unit tangents of all bodies, the ground first; and in the
   // directions of fields and parameters, bodies at rest.
   void mark_units(std::vector<bool>& bodies) const;  // that add_blocks() reads
@@ -35,6 +36,9 @@ class ForceTerms {
   // Gradient of the virtual work sum load'eta, eta in the frames and held fixed.
   void add_pull_back(const At& at, std::vector<FrameBar>& bars, Eigen::Ref<Eigen::VectorXd> y_bar,
                      Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
+  void add_pull_back_but_springs(const At& at, std::vector<FrameBar>& bars, Eigen::Ref<Eigen::VectorXd> y_bar,
+                                 Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
+  Law::Scratch& law_scratch() { return law_; }
 
  private:
   template <class Visitor>

@@ -154,37 +154,18 @@ PlaneDual moving(const PlanarBody& body, const Plane& s, const Lanes<3>* ds) {
   return {{s.re, LaneDual::Lane(body.b1.transpose() * *ds)}, {s.im, LaneDual::Lane(body.b2.transpose() * *ds)}};
 }
 
-// Cotangents of x, xd, xdd of a vector or separation, and of its virtual change.
-struct JetBar {
-  Plane x, xd, xdd, eta;
-};
-void add_vector_bar(const PlanarFrame<double>& f, double turn, const Plane& s, const JetBar& bar, double sign,
-                    PlanarFrameBar& frame_bar, Plane& s_bar) {
-  const Plane st = conj(sign * s);
-  frame_bar.A += bar.x * st, frame_bar.Adot += bar.xd * st, frame_bar.Addot += bar.xdd * st;
-  frame_bar.A_eta += bar.eta * st;
-  s_bar += sign *
-           (conj(f.A) * bar.x + conj(f.Adot) * bar.xd + conj(f.Addot) * bar.xdd + conj(times_i(turn * f.A)) * bar.eta);
-}
-void add_point_bar(const PlanarFrame<double>& f, double turn, const Plane& s, const JetBar& bar, double sign,
-                   PlanarFrameBar& frame_bar, Plane& s_bar) {
-  frame_bar.r += sign * bar.x;
-  frame_bar.rdot += sign * bar.xd;
-  add_vector_bar(f, turn, s, bar, sign, frame_bar, s_bar);
-}
-
 struct Multipliers1 {
   double lambda = 0, mu0 = 0, mu1 = 0, mu2 = 0;
 };
 
 // Cotangent of x in  lambda (x'y)_eta + mu0 x'y + mu1 (x'y)dot + mu2 (x'y)ddot.
-JetBar product_bar(const Jet<double>& y, const Plane& y_eta, const Multipliers1& z) {
+PlanarJetBar product_bar(const Jet<double>& y, const Plane& y_eta, const Multipliers1& z) {
   return {z.lambda * y_eta + z.mu0 * y.x + z.mu1 * y.xd + z.mu2 * y.xdd, z.mu1 * y.x + (2 * z.mu2) * y.xd, z.mu2 * y.x,
           z.lambda * y.x};
 }
 
 // Of |d|; with u = d/|d| and across(x) = (x - u u'x)/l as in distance.cpp.
-JetBar distance_bar(const Jet<double>& d, const Plane& d_eta, const Multipliers1& z) {
+PlanarJetBar distance_bar(const Jet<double>& d, const Plane& d_eta, const Multipliers1& z) {
   const double l = std::sqrt(squared_norm(d.x));
   const Plane u = (1 / l) * d.x;
   const auto across = [&](const Plane& x) { return (1 / l) * (x - dot(u, x) * u); };
@@ -272,7 +253,8 @@ void PlanarConstraints::add_pull_back(const Frames& frames, std::span<const Plan
     const double turn1 = eta[i].turn, turn2 = eta[j].turn;
     Plane s1_bar, s2_bar, s3_bar;
     if (c.kind == Kind::point) {
-      const JetBar bar{point(weights.mu0, c), point(weights.mu1, c), point(weights.mu2, c), point(weights.lambda, c)};
+      const PlanarJetBar bar{point(weights.mu0, c), point(weights.mu1, c), point(weights.mu2, c),
+                             point(weights.lambda, c)};
       add_point_bar(f2, turn2, c.s2, bar, 1, bars[j], s2_bar);
       add_point_bar(f1, turn1, c.s1, bar, -1, bars[i], s1_bar);
     } else {
@@ -293,13 +275,13 @@ void PlanarConstraints::add_pull_back(const Frames& frames, std::span<const Plan
         case Kind::dot2: {
           const Jet<double> d = separation(f1, f2, vectors(c));
           add_vector_bar(f1, turn1, c.s3, product_bar(d, d_eta, z), 1, bars[i], s3_bar);
-          const JetBar bar = product_bar(vector_of(f1, c.s3), changed(f1, turn1, c.s3), z);
+          const PlanarJetBar bar = product_bar(vector_of(f1, c.s3), changed(f1, turn1, c.s3), z);
           add_point_bar(f2, turn2, c.s2, bar, 1, bars[j], s2_bar);
           add_point_bar(f1, turn1, c.s1, bar, -1, bars[i], s1_bar);
           break;
         }
         case Kind::distance: {
-          const JetBar bar = distance_bar(separation(f1, f2, vectors(c)), d_eta, z);
+          const PlanarJetBar bar = distance_bar(separation(f1, f2, vectors(c)), d_eta, z);
           add_point_bar(f2, turn2, c.s2, bar, 1, bars[j], s2_bar);
           add_point_bar(f1, turn1, c.s1, bar, -1, bars[i], s1_bar);
           break;

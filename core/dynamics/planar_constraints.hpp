@@ -8,45 +8,18 @@
 //   angle      Phi = +-(arg(A2 s2) - arg(A1 s1))
 //
 // As in space (primitive.hpp), each is a function of the bodies' frames, whose derivatives are taken per body.
-// A = P^2 is a rotation times |P|^2, as A(p) is in space: both models compute the same numbers.
 #pragma once
 
 #include <span>
 #include <vector>
 
 #include "core/dynamics/constraint_terms.hpp"
+#include "core/dynamics/planar_frame.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
 #include "core/mechanism/planar_model.hpp"
 #include "core/mechanism/row_laws.hpp"
 
 namespace mbsopt {
-
-// A body's motion as primitives see it; T = LaneDual: with its tangent.
-template <class T>
-struct PlanarFrame {
-  Complex<T> r, rdot, A{1, 0}, Adot, Addot;
-  Plane rddot;  // given, like the angular acceleration: tangents hold it fixed
-
-  //   Adot = 2 P Pdot,   Addot = 2 Pdot^2 + (i omegadot - 2 |Pdot|^2) A
-  void set_turn(const Complex<T>& P, const Complex<T>& Pdot, double omegadot) {
-    A = P * P;
-    Adot = 2 * (P * Pdot);
-    Addot = 2 * (Pdot * Pdot) + times_i(omegadot * A) - (2 * squared_norm(Pdot)) * A;
-  }
-};
-
-// Gradient of a scalar in a frame and in the image A_eta = i A eta_theta of a virtual turn.
-struct PlanarFrameBar {
-  Plane r, rdot, A, Adot, Addot, A_eta;
-};
-
-// A virtual displacement.
-struct PlanarShift {
-  Plane r;
-  double turn = 0;
-  PlanarShift() = default;
-  explicit PlanarShift(const Vec<3>& x) : r{x(0), x(1)}, turn(x(2)) {}
-};
 
 // J' of a row: the force and moment of a unit multiplier on each body (factor left out).
 struct PlanarColumn {

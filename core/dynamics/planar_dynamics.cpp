@@ -12,8 +12,8 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-bool any_force(const MechanismData& d) {
-  return !(d.tsda.empty() && d.rsda.empty() && d.applied.empty() && d.bushings.empty() && d.turning_frictions.empty() &&
+bool any_force_but_springs(const MechanismData& d) {
+  return !(d.rsda.empty() && d.applied.empty() && d.bushings.empty() && d.turning_frictions.empty() &&
            d.sliding_frictions.empty());
 }
 
@@ -44,7 +44,9 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
       laws_(data, model_.rows),
       constraints_(data),
       solver_(data, in_plane(model_, alpha), compliance),
-      has_forces_(any_force(data)),
+      springs_(data),
+      has_springs_(!data.tsda.empty()),
+      has_other_forces_(any_force_but_springs(data)),
       forces_(data) {
   const std::size_t n = at(data.n);
   y_.setZero(14 * data.n);
@@ -66,7 +68,7 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
   for (std::size_t i = 1; i <= n; ++i) {
     if (dual[i]) dual_bodies_.push_back(i);
   }
-  if (!has_forces_) return;
+  if (!has_springs_ && !has_other_forces_) return;
   std::vector<bool> loaded(n + 1, false);
   forces_.mark_units(loaded);
   for (std::size_t i = 1; i <= n; ++i) {
@@ -90,12 +92,19 @@ void PlanarDynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::
     f.set_turn(b.P, b.Pdot, 0);
   }
   angles_ = angles;
-  if (!has_forces_) return;
+  if (!has_springs_ && !has_other_forces_) return;
   y_ = y;
+  in_space_ = false;
+  springs_in_plane_ = has_springs_ && springs_.lie_in_plane(y);
+  if (has_other_forces_ || !springs_in_plane_) place_in_space();
+}
+
+void PlanarDynamics::place_in_space() {
+  in_space_ = true;
   for (const std::size_t k : loaded_) {
     const Eigen::Index q = 7 * (static_cast<Eigen::Index>(k) - 1);
-    set_position(y.segment<7>(q), states_in_space_[k], frames_in_space_[k]);
-    set_velocity(y.segment<7>(half + q), states_in_space_[k], frames_in_space_[k]);
+    set_position(y_.segment<7>(q), states_in_space_[k], frames_in_space_[k]);
+    set_velocity(y_.segment<7>(7 * data_.n + q), states_in_space_[k], frames_in_space_[k]);
   }
 }
 
@@ -110,10 +119,15 @@ void PlanarDynamics::set_loads() {
     const PlanarBody& b = model_.bodies[k];
     loads_[k - 1] << b.mass * model_.gravity.re, b.mass * model_.gravity.im, 0;
   }
-  if (!has_forces_) return;
+  if (springs_in_plane_) springs_.add_loads(t_, frames_, forces_.law_scratch(), loads_);
+  if (!in_space_) return;
   body_loads_[0].setZero();
   for (const std::size_t k : loaded_) body_loads_[k].setZero();
-  forces_.add_loads(here(), body_loads_);
+  if (springs_in_plane_) {
+    forces_.add_loads_but_springs(here(), body_loads_);
+  } else {
+    forces_.add_loads(here(), body_loads_);
+  }
   for (const std::size_t k : loaded_) loads_[k - 1] += bodies_in_y_.reduced(k, body_loads_[k]);
 }
 
@@ -196,7 +210,7 @@ void PlanarDynamics::prepare_tangents() {
     x.Addot.row(0).tail<2>() -= 4 * A.re * along, x.Addot.row(1).tail<2>() -= 4 * A.im * along;
     x.Pddot.row(0).tail<2>() = -2 * P.re * along, x.Pddot.row(1).tail<2>() = -2 * P.im * along;
   }
-  if (has_forces_) prepare_force_tangents();
+  if (!loaded_.empty()) prepare_force_tangents();
 }
 
 // The blocks of forces, as the plane sees them.
@@ -206,6 +220,7 @@ void PlanarDynamics::prepare_force_tangents() {
         ForceLinearisation{force_blocks(data_), std::vector<UnitTangents>(bodies_.size()), {}});
     force_linearisation_->in_plane.resize(force_linearisation_->blocks.b.size());
   }
+  if (!in_space_) place_in_space();
   ForceLinearisation& x = *force_linearisation_;
   x.blocks.set_zero();
   for (const std::size_t k : loaded_) set_unit_tangents(states_in_space_[k], x.units[k]);
@@ -318,7 +333,7 @@ void PlanarDynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir,
       b.row(2) -= z(2) * (bodies_in_y_.inertia_weights(k).transpose() * *dJ);
     }
   }
-  if (has_forces_) add_force_tangent(block, y_dir);
+  if (!loaded_.empty()) add_force_tangent(block, y_dir);
   solver_.solve(rhs_lanes_, gamma_dir_, derivative_refinements_, z_dir_, lambda_dir_);
 
   ydot_dir.topRows(half) = y_dir.bottomRows(half);
@@ -361,7 +376,10 @@ void PlanarDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::Vec
     weights.mu0 = &phi_, weights.mu1 = &phi_dot_;
   }
   constraints_.add_pull_back(frames_, shifts_, laws_, angles_, weights, -1, bars_, theta_bar, rho_bar);
-  if (has_forces_) add_force_adjoint(y_bar, theta_bar, rho_bar);
+  if (springs_in_plane_) {
+    springs_.add_pull_back(t_, frames_, shifts_, forces_.law_scratch(), bars_, theta_bar, rho_bar);
+  }
+  if (has_other_forces_ || (has_springs_ && !springs_in_plane_)) add_force_adjoint(y_bar, theta_bar, rho_bar);
 
   for (int i = 1; i <= data_.n; ++i) {
     const std::size_t k = at(i);
@@ -400,7 +418,11 @@ void PlanarDynamics::add_force_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen:
     bars_in_space_[k].set_zero();
     set_virtual(bodies_in_y_.in_space(k, eta_[k - 1]), frames_in_space_[k]);
   }
-  forces_.add_pull_back(here(), bars_in_space_, y_bar, theta_bar, rho_bar);
+  if (springs_in_plane_) {
+    forces_.add_pull_back_but_springs(here(), bars_in_space_, y_bar, theta_bar, rho_bar);
+  } else {
+    forces_.add_pull_back(here(), bars_in_space_, y_bar, theta_bar, rho_bar);
+  }
   const Eigen::Index half = 7 * data_.n;
   for (const std::size_t k : loaded_) {
     const Eigen::Index q = 7 * (static_cast<Eigen::Index>(k) - 1);

@@ -3,7 +3,8 @@
 //
 //   pddot:  Pddot = (i omegadot/2 - |Pdot|^2) P
 //
-// and with the gyroscopic term gone. Forces are evaluated in space, where they act, and reduced to the plane.
+// and with the gyroscopic term gone. Springs act in the plane where their points lie in one; other forces are evaluated
+// in space and reduced to the plane.
 // Allocates nothing after construction, but in the first tangent.
 #pragma once
 
@@ -12,6 +13,7 @@
 
 #include "core/dynamics/force_terms.hpp"
 #include "core/dynamics/planar_bodies.hpp"
+#include "core/dynamics/planar_springs.hpp"
 #include "core/dynamics/saddle_solver.hpp"
 #include "core/scene/settings.hpp"
 
@@ -44,6 +46,7 @@ class PlanarDynamics {
     double omegadot = 0;
   };
   void set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
+  void place_in_space();
   void set_loads();
   void set_acceleration(std::size_t body, const Vec<3>& z);
   void prepare_tangents();  // what all directions share, after linearise()
@@ -70,8 +73,11 @@ class PlanarDynamics {
   Eigen::VectorXd gamma_, phi_, phi_dot_, lambda_, mu_, g_;  // of the rows in the plane
   Eigen::VectorXd lambda_of_phi_;                            // of all; those that hold by themselves have none
 
+  PlanarSprings springs_;
+  bool springs_in_plane_ = false;  // at this state
   // Forces, and the bodies that they read and load, in space.
-  bool has_forces_ = false;
+  bool has_springs_, has_other_forces_;
+  bool in_space_ = false;  // whether the bodies are placed there at this state
   ForceTerms forces_;
   std::vector<std::size_t> loaded_;
   std::vector<BodyState> states_in_space_;

@@ -23,6 +23,8 @@ struct TsdaForce {
     double l, ldot;
   };
   Span span(const Frame& f1, const Frame& f2) const;
+  // Without free length, actuator and damping the force is k d, smooth at zero length, too.
+  bool is_k_times_d() const { return !law.program && law.x0 == 0 && law.f0 == 0 && law.c == 0; }
 
   // Adds the loads (force in global axes, moment in body axes) on each body.
   void add_load(double t, const Eigen::VectorXd& rho, const Frame& f1, const Frame& f2, Law::Scratch& scratch,
@@ -39,9 +41,6 @@ struct TsdaForce {
                Lanes<6>& load1, Lanes<6>& load2) const;
 
  private:
-  // Without free length, actuator and damping the force is k d, smooth at zero length, too.
-  bool is_k_times_d() const { return !law.program && law.x0 == 0 && law.f0 == 0 && law.c == 0; }
-
   static void add_point(const Frame& f, const Vector3d& s, double sign, int slot, const Vector3d& d, const Vector3d& dd,
                         const Vector3d& eta, FrameBar& bar, Eigen::VectorXd& theta_bar);
 };

@@ -4,153 +4,115 @@
 
 namespace mbsopt {
 
-StoredStep::StoredStep(const Step& step, const Method& rk, std::span<const SampleEvent> events)
-    : t(step.t),
-      h(step.h),
-      t1(step.t1),
-      dense(step.dense),
-      y0(step.y0),
-      y_hat(step.y_hat),
-      y1(step.y1),
-      angles0(step.angles0),
-      a(step.K.bottomRows(step.K.rows() / 2).leftCols(step.stages(rk))),
-      lambda(step.lambda.leftCols(step.stages(rk))),
-      projection(step.projection) {
-  for (const SampleEvent& e : events) {
-    if (e.cost) samples.push_back(e);
-  }
-}
-
-std::size_t StoredStep::bytes() const {
-  const Eigen::Index numbers = y0.size() + y_hat.size() + y1.size() + angles0.size() + a.size() + lambda.size() +
-                               projection.nu.size() + projection.kappa.size() +
-                               12 * static_cast<Eigen::Index>(projection.delta.size());
-  return sizeof(*this) + sizeof(double) * static_cast<std::size_t>(numbers) + sizeof(SampleEvent) * samples.size();
-}
-
 AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
                            std::span<const Cost> costs)
     : mechanism_(mechanism),
       rk_(method),
       costs_(costs),
       dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
-      projector_(mechanism, settings.formulation.projection, model_of(mechanism, settings, method)) {
+      projector_(mechanism, settings.formulation.projection, model_of(mechanism, settings, method)),
+      step_(make_step(mechanism, method, projector_.solution())),
+      bars_(costs.size()) {
   const MechanismData& d = mechanism.data();
   if (d.needs_motion) motion_.emplace(mechanism, settings.formulation);
-  const Eigen::Index states = mechanism.states(), objectives = static_cast<Eigen::Index>(costs.size());
-  lambda_.setZero(states, objectives);
-  lambda_hat_.setZero(states, objectives);
-  sample_bar_.setZero(states, objectives);
-  theta_bar_.setZero(d.slots(), objectives);
-  rho_bar_.setZero(d.rho.size(), objectives);
-  Y_.setZero(states, rk_.dense_stages);
-  K_.setZero(states, rk_.dense_stages);
-  K_bar_.assign(costs.size(), Eigen::MatrixXd::Zero(states, rk_.dense_stages));
+  const Eigen::Index states = mechanism.states();
+  for (Bars& b : bars_) {
+    for (Eigen::VectorXd* x : {&b.lambda, &b.lambda_hat, &b.samples}) x->setZero(states);
+    b.theta.setZero(d.slots());
+    b.rho.setZero(d.rho.size());
+    for (Eigen::MatrixXd* x : {&b.K, &b.Y}) x->setZero(states, rk_.dense_stages);
+  }
   if (const int coupled = largest_implicit_group(rk_); coupled > 0) {
     implicit_.emplace(d, rk_);
-    Y_bar_.assign(costs.size(), Eigen::MatrixXd::Zero(states, coupled));
-    x_bar_.setZero(coupled * dynamics_.equations(), objectives);
+    x_bar_.setZero(coupled * dynamics_.equations(), static_cast<Eigen::Index>(costs.size()));
   }
   for (Eigen::VectorXd* x : {&y_, &w_, &y_bar_}) x->setZero(states);
-  theta_.setZero(d.slots());
-  rho_.setZero(d.rho.size());
   r_bar_.setZero(dynamics_.equations());
+  explicit_swept_.reserve(static_cast<std::size_t>(rk_.dense_stages));
 }
 
 void AdjointSweep::begin(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
-  lambda_.setZero(), theta_bar_.setZero(), rho_bar_.setZero();
   for (std::size_t o = 0; o < costs_.size(); ++o) {
-    const Eigen::Index column = static_cast<Eigen::Index>(o);
-    if (costs_[o].terminal) {
-      costs_[o].terminal->add_gradient({t, y, angles, motion()}, 1, lambda_.col(column), rho_bar_.col(column));
-    }
+    Bars& b = bars_[o];
+    b.lambda.setZero(), b.theta.setZero(), b.rho.setZero();
+    if (costs_[o].terminal) costs_[o].terminal->add_gradient({t, y, angles, motion()}, 1, b.lambda, b.rho);
   }
 }
 
 void AdjointSweep::rebuild(const StoredStep& step) {
-  const int stages = static_cast<int>(step.a.cols());
-  K_.bottomRows(mechanism_.states() / 2).leftCols(stages) = step.a;
+  step.restore(rk_, step_);
   for (const StageGroup& g : rk_.stage_groups()) {
-    if (g.first < stages) set_group_stages(rk_, g, step.h, step.y0, Y_, K_);
+    if (g.first < step_.stages(rk_)) set_group_stages(rk_, g, step_.h, step_.y0, step_.Y, step_.K);
+  }
+}
+
+// Shares of y0, k_i, and of (y1 - y^) by the blend.
+void AdjointSweep::sample_back(const StoredStep& step) {
+  const int stages = step_.stages(rk_);
+  for (const SampleEvent& e : step.samples) {
+    const double theta = (e.time - step.t) / step.h, blend = projection_blend(theta);
+    Bars& b = bars_[static_cast<std::size_t>(e.objective)];
+    dense_output(rk_, step_, theta, y_);
+    y_bar_.setZero();
+    e.cost->add_gradient({e.time, y_, step_.angles0, motion()}, 1, y_bar_, b.rho);
+    b.samples += y_bar_;
+    b.lambda += blend * y_bar_;
+    b.lambda_hat -= blend * y_bar_;
+    for (int i = 0; i < stages; ++i) b.K.col(i) += (step.h * rk_.dense_weight(i, theta)) * y_bar_;
   }
 }
 
 bool AdjointSweep::step_back(const StoredStep& step) {
-  const int stages = static_cast<int>(step.a.cols());
-  const Eigen::Index objectives = lambda_.cols();
   rebuild(step);
-  for (Eigen::MatrixXd& K_bar : K_bar_) K_bar.setZero();
-  lambda_hat_.setZero();
-
-  // Samples: shares of y0, k_i, and of (y1 - y^) by the blend.
-  sample_bar_.setZero();
-  for (const SampleEvent& e : step.samples) {
-    const double theta = (e.time - step.t) / step.h, blend = projection_blend(theta);
-    y_ = step.y0 + blend * (step.y1 - step.y_hat);
-    for (int i = 0; i < stages; ++i) y_ += (step.h * rk_.dense_weight(i, theta)) * K_.col(i);
-    y_bar_.setZero();
-    e.cost->add_gradient({e.time, y_, step.angles0, motion()}, 1, y_bar_, rho_bar_.col(e.objective));
-    sample_bar_.col(e.objective) += y_bar_;
-    lambda_.col(e.objective) += blend * y_bar_;
-    lambda_hat_.col(e.objective) -= blend * y_bar_;
-    Eigen::MatrixXd& K_bar = K_bar_[static_cast<std::size_t>(e.objective)];
-    for (int i = 0; i < stages; ++i) K_bar.col(i) += (step.h * rk_.dense_weight(i, theta)) * y_bar_;
-  }
+  for (Bars& b : bars_) b.lambda_hat.setZero(), b.samples.setZero(), b.K.setZero();
+  sample_back(step);
 
   if (projector_.active()) {
-    if (!projector_.linearise(step.t1, step.angles0, step.y_hat, step.y1, step.projection)) return false;
-    for (Eigen::Index o = 0; o < objectives; ++o) {
-      w_ = lambda_.col(o);
-      y_bar_ = lambda_hat_.col(o);
-      theta_ = theta_bar_.col(o);
-      rho_ = rho_bar_.col(o);
-      projector_.add_adjoint(w_, y_bar_, theta_, rho_);
-      lambda_hat_.col(o) = y_bar_;
-      theta_bar_.col(o) = theta_;
-      rho_bar_.col(o) = rho_;
-    }
+    if (!projector_.linearise(step_.t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return false;
+    for (Bars& b : bars_) projector_.add_adjoint(b.lambda, b.lambda_hat, b.theta, b.rho);
   } else {
-    lambda_hat_ += lambda_;
+    for (Bars& b : bars_) b.lambda_hat += b.lambda;
   }
 
-  for (Eigen::Index o = 0; o < objectives; ++o) {
-    Eigen::MatrixXd& K_bar = K_bar_[static_cast<std::size_t>(o)];
+  for (Bars& b : bars_) {
     for (int i = 0; i < rk_.stages; ++i) {
-      if (rk_.b[i] != 0) K_bar.col(i) += (step.h * rk_.b[i]) * lambda_hat_.col(o);
+      if (rk_.b[i] != 0) b.K.col(i) += (step_.h * rk_.b[i]) * b.lambda_hat;
     }
+    b.lambda = b.lambda_hat + b.samples;
   }
-  lambda_ = lambda_hat_ + sample_bar_;  // from here on of y0
 
+  explicit_swept_.clear();
   const std::span<const StageGroup> groups = rk_.stage_groups();
   for (auto g = groups.rbegin(); g != groups.rend(); ++g) {
-    if (g->first >= stages || !is_used(rk_, *g, step.dense)) continue;
-    if (!(is_implicit(rk_, *g) ? implicit_back(step, *g) : explicit_back(step, g->first))) return false;
+    if (g->first >= step_.stages(rk_) || !is_used(rk_, *g, step_.dense)) continue;
+    if (!(is_implicit(rk_, *g) ? implicit_back(*g) : explicit_back(g->first))) return false;
+  }
+  for (Bars& b : bars_) {
+    StageSum sum;
+    for (const int i : explicit_swept_) sum.add(1, b.Y.col(i).data());
+    sum.to(b.lambda.data(), b.lambda.data(), b.lambda.size());
   }
   return true;
 }
 
-bool AdjointSweep::explicit_back(const StoredStep& step, int i) {
-  const double t = step.t + rk_.c[i] * step.h;
-  const bool in_step = i < rk_.stages && rk_.b[i] != 0;
-  y_ = Y_.col(i);
-  if (!dynamics_.linearise(t, y_, step.angles0, step.a.col(i), step.lambda.col(i))) return false;
-  for (Eigen::Index o = 0; o < lambda_.cols(); ++o) {
-    Eigen::MatrixXd& K_bar = K_bar_[static_cast<std::size_t>(o)];
-    w_ = K_bar.col(i);
+bool AdjointSweep::explicit_back(int i) {
+  const double t = step_.t + rk_.c[i] * step_.h;
+  y_ = step_.Y.col(i);
+  const Eigen::Index half = mechanism_.states() / 2;
+  if (!dynamics_.linearise(t, y_, step_.angles0, step_.K.col(i).tail(half), step_.lambda.col(i))) return false;
+  for (std::size_t o = 0; o < bars_.size(); ++o) {
+    Bars& b = bars_[o];
+    StageSum w;  // kbar_i
+    for (const int j : explicit_swept_) w.add(step_.h * rk_.a(j, i), b.Y.col(j).data());
+    w.to(b.K.col(i).data(), w_.data(), w_.size());
     y_bar_.setZero();
-    theta_ = theta_bar_.col(o);
-    rho_ = rho_bar_.col(o);
-    dynamics_.add_adjoint(w_, y_bar_, theta_, rho_);
-    const PointCost* running = costs_[static_cast<std::size_t>(o)].running.get();
-    if (running && in_step) running->add_gradient({t, y_, step.angles0, motion()}, step.h * rk_.b[i], y_bar_, rho_);
-    theta_bar_.col(o) = theta_;
-    rho_bar_.col(o) = rho_;
-    lambda_.col(o) += y_bar_;
-    for (int j = 0; j < i; ++j) {
-      const double a = rk_.a(i, j);
-      if (a != 0) K_bar.col(j) += (step.h * a) * y_bar_;
+    dynamics_.add_adjoint(w_, y_bar_, b.theta, b.rho);
+    if (const PointCost* running = running_cost(o, i)) {
+      running->add_gradient({t, y_, step_.angles0, motion()}, step_.h * rk_.b[i], y_bar_, b.rho);
     }
+    b.Y.col(i) = y_bar_;
   }
+  explicit_swept_.push_back(i);
   return true;
 }
 
@@ -158,80 +120,82 @@ bool AdjointSweep::explicit_back(const StoredStep& step, int i) {
 //   Vbar_i = kbar_q,i + Ybar_v,i + h sum_j A_ji Qbar_j,   abar_i = kbar_v,i + h sum_j A_ji Vbar_j,   N'rbar = (abar, 0)
 //   Q*bar_i = Qbar_i + r_q'rbar_i,   V*bar_i = Vbar_i + r_v'rbar_i + h sum_j A_ji (r_q'rbar_j)
 // Qbar, Ybar: of running costs, whose value is taken at the stage itself.
-bool AdjointSweep::implicit_back(const StoredStep& step, const StageGroup& g) {
-  const Eigen::Index n = mechanism_.states() / 2, rows = dynamics_.equations(), objectives = lambda_.cols();
-  auto time_of = [&](int i) { return step.t + rk_.c[i] * step.h; };
+bool AdjointSweep::implicit_back(const StageGroup& g) {
+  const Eigen::Index n = mechanism_.states() / 2, rows = dynamics_.equations();
+  auto time_of = [&](int i) { return step_.t + rk_.c[i] * step_.h; };
   auto place = [&](int i) {
-    y_ = Y_.col(i);
-    dynamics_.place_at(time_of(i), y_, step.angles0, step.a.col(i), step.lambda.col(i));
+    y_ = step_.Y.col(i);
+    dynamics_.place_at(time_of(i), y_, step_.angles0, step_.K.col(i).tail(n), step_.lambda.col(i));
   };
   for (int i = g.first; i <= g.last; ++i) {
     place(i);
     implicit_->linearise(dynamics_, i - g.first);
   }
-  if (!implicit_->factor(step.h, g)) return false;
+  if (!implicit_->factor(step_.h, g)) return false;
 
-  for (Eigen::Index o = 0; o < objectives; ++o) {
-    const Eigen::MatrixXd& K_bar = K_bar_[static_cast<std::size_t>(o)];
-    Eigen::MatrixXd& Y_bar = Y_bar_[static_cast<std::size_t>(o)];
-    const PointCost* running = costs_[static_cast<std::size_t>(o)].running.get();
-    x_bar_.col(o).setZero();
+  for (std::size_t o = 0; o < bars_.size(); ++o) {
+    Bars& b = bars_[o];
+    auto x_bar = x_bar_.col(static_cast<Eigen::Index>(o));
+    x_bar.setZero();
     for (int i = g.first; i <= g.last; ++i) {
       y_bar_.setZero();
-      if (running && i < rk_.stages && rk_.b[i] != 0) {
-        y_ = Y_.col(i);
-        rho_ = rho_bar_.col(o);
-        running->add_gradient({time_of(i), y_, step.angles0, motion()}, step.h * rk_.b[i], y_bar_, rho_);
-        rho_bar_.col(o) = rho_;
+      if (const PointCost* running = running_cost(o, i)) {
+        y_ = step_.Y.col(i);
+        running->add_gradient({time_of(i), y_, step_.angles0, motion()}, step_.h * rk_.b[i], y_bar_, b.rho);
       }
-      Y_bar.col(i - g.first) = y_bar_;
+      b.Y.col(i) = y_bar_;
     }
     for (int i = g.first; i <= g.last; ++i) {
-      auto V_bar = Y_bar.col(i - g.first).tail(n);
-      V_bar += K_bar.col(i).head(n);
-      for (int j = g.first; j <= g.last; ++j) V_bar += (step.h * rk_.a(j, i)) * Y_bar.col(j - g.first).head(n);
+      for (const int j : explicit_swept_) b.K.col(i) += (step_.h * rk_.a(j, i)) * b.Y.col(j);
+      auto V_bar = b.Y.col(i).tail(n);
+      V_bar += b.K.col(i).head(n);
+      for (int j = g.first; j <= g.last; ++j) V_bar += (step_.h * rk_.a(j, i)) * b.Y.col(j).head(n);
     }
     for (int i = g.first; i <= g.last; ++i) {
-      auto a_bar = x_bar_.col(o).segment((i - g.first) * rows, n);
-      a_bar = K_bar.col(i).tail(n);
-      for (int j = g.first; j <= g.last; ++j) a_bar += (step.h * rk_.a(j, i)) * Y_bar.col(j - g.first).tail(n);
+      auto a_bar = x_bar.segment((i - g.first) * rows, n);
+      a_bar = b.K.col(i).tail(n);
+      for (int j = g.first; j <= g.last; ++j) a_bar += (step_.h * rk_.a(j, i)) * b.Y.col(j).tail(n);
     }
   }
   implicit_->solve_transposed(g, x_bar_);
 
   for (int i = g.last; i >= g.first; --i) {
     if (i != g.last) place(i);  // where the last still is
-    for (Eigen::Index o = 0; o < objectives; ++o) {
-      Eigen::MatrixXd& Y_bar = Y_bar_[static_cast<std::size_t>(o)];
-      r_bar_ = x_bar_.col(o).segment((i - g.first) * rows, rows);
+    for (std::size_t o = 0; o < bars_.size(); ++o) {
+      Bars& b = bars_[o];
+      r_bar_ = x_bar_.col(static_cast<Eigen::Index>(o)).segment((i - g.first) * rows, rows);
       y_bar_.setZero();
-      theta_ = theta_bar_.col(o);
-      rho_ = rho_bar_.col(o);
-      dynamics_.add_residual_adjoint(r_bar_, y_bar_, theta_, rho_);
-      theta_bar_.col(o) = theta_;
-      rho_bar_.col(o) = rho_;
-      Y_bar.col(i - g.first) += y_bar_;
-      for (int j = g.first; j <= g.last; ++j) {
-        Y_bar.col(j - g.first).tail(n) += (step.h * rk_.a(i, j)) * y_bar_.head(n);
-      }
+      dynamics_.add_residual_adjoint(r_bar_, y_bar_, b.theta, b.rho);
+      b.Y.col(i) += y_bar_;
+      for (int j = g.first; j <= g.last; ++j) b.Y.col(j).tail(n) += (step_.h * rk_.a(i, j)) * y_bar_.head(n);
     }
   }
-  for (Eigen::Index o = 0; o < objectives; ++o) {
-    const Eigen::MatrixXd& Y_bar = Y_bar_[static_cast<std::size_t>(o)];
+  for (Bars& b : bars_) {
     for (int i = g.first; i <= g.last; ++i) {
-      lambda_.col(o) += Y_bar.col(i - g.first);
+      b.lambda += b.Y.col(i);
       for (int j = 0; j < g.first; ++j) {
         const double a = rk_.a(i, j);
-        if (a != 0) K_bar_[static_cast<std::size_t>(o)].col(j) += (step.h * a) * Y_bar.col(i - g.first);
+        if (a != 0) b.K.col(j) += (step_.h * a) * b.Y.col(i);
       }
     }
   }
   return true;
 }
 
+Eigen::MatrixXd AdjointSweep::lambda() const {
+  Eigen::MatrixXd lambda(mechanism_.states(), static_cast<Eigen::Index>(bars_.size()));
+  for (std::size_t o = 0; o < bars_.size(); ++o) lambda.col(static_cast<Eigen::Index>(o)) = bars_[o].lambda;
+  return lambda;
+}
+
 Eigen::MatrixXd AdjointSweep::mu() const {
-  Eigen::MatrixXd mu = rho_bar_;
-  for (Eigen::Index o = 0; o < mu.cols(); ++o) mechanism_.data().add_to_rho(theta_bar_.col(o), mu.col(o));
+  const MechanismData& d = mechanism_.data();
+  Eigen::MatrixXd mu(d.rho.size(), static_cast<Eigen::Index>(bars_.size()));
+  for (std::size_t o = 0; o < bars_.size(); ++o) {
+    auto of_objective = mu.col(static_cast<Eigen::Index>(o));
+    of_objective = bars_[o].rho;
+    d.add_to_rho(bars_[o].theta, of_objective);
+  }
   return mu;
 }
 

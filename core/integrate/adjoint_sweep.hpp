@@ -13,24 +13,9 @@
 #include "core/dynamics/motion_solver.hpp"
 #include "core/integrate/cost.hpp"
 #include "core/integrate/linearised_stages.hpp"
-#include "core/integrate/sample_schedule.hpp"
-#include "core/integrate/step.hpp"
+#include "core/integrate/stored_step.hpp"
 
 namespace mbsopt {
-
-// What a backward sweep keeps of a step; stages are rebuilt from their accelerations.
-struct StoredStep {
-  double t = 0, h = 0, t1 = 0;
-  bool dense = false;
-  Eigen::VectorXd y0, y_hat, y1, angles0;
-  Eigen::MatrixXd a;  // qddot of each stage, 7n x stages
-  Eigen::MatrixXd lambda;
-  ProjectionSolution projection;
-  std::vector<SampleEvent> samples;  // of costs
-
-  StoredStep(const Step& step, const Method& rk, std::span<const SampleEvent> events);
-  std::size_t bytes() const;
-};
 
 class AdjointSweep {
  public:
@@ -42,7 +27,7 @@ class AdjointSweep {
   bool step_back(const StoredStep& step);
   // lambda at the current time, 14n x objectives; and d psi/d rho of all that was swept, parameters x objectives
   // (without the dependence of the initial state).
-  const Eigen::MatrixXd& lambda() const { return lambda_; }
+  Eigen::MatrixXd lambda() const;
   Eigen::MatrixXd mu() const;
 
   long linearised_states() const { return dynamics_.linearised_states(); }
@@ -51,24 +36,36 @@ class AdjointSweep {
   }
 
  private:
+  // Of one objective.
+  struct Bars {
+    Eigen::VectorXd lambda, lambda_hat;  // at y1, from there on at y0; at y^
+    Eigen::VectorXd theta, rho;          // of all that was swept
+    Eigen::VectorXd samples;             // what samples in the step see of y0
+    Eigen::MatrixXd K;                   // of the stages' derivatives, without what explicit stages after them see
+    Eigen::MatrixXd Y;                   // of the stages; those of implicit groups are used up within their group
+  };
+
   void rebuild(const StoredStep& step);
-  bool explicit_back(const StoredStep& step, int i);
-  bool implicit_back(const StoredStep& step, const StageGroup& group);
+  void sample_back(const StoredStep& step);
+  bool explicit_back(int i);
+  bool implicit_back(const StageGroup& group);
+  MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
+  const PointCost* running_cost(std::size_t objective, int stage) const {
+    return stage < rk_.stages && rk_.b[stage] != 0 ? costs_[objective].running.get() : nullptr;
+  }
 
   const Mechanism mechanism_;
   const Method& rk_;
   std::span<const Cost> costs_;
-  MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
   std::optional<MotionSolver> motion_;  // where some sensor needs it
   Dynamics dynamics_;
   Projector projector_;
   std::optional<LinearisedStages> implicit_;
-  Eigen::MatrixXd lambda_, theta_bar_, rho_bar_;  // a column per objective
-  Eigen::MatrixXd Y_, K_;                         // stages of the step in hand
-  std::vector<Eigen::MatrixXd> K_bar_;            // per objective
-  std::vector<Eigen::MatrixXd> Y_bar_;            // the same, of coupled stages
-  Eigen::MatrixXd lambda_hat_, sample_bar_, x_bar_;
-  Eigen::VectorXd y_, w_, y_bar_, theta_, rho_, r_bar_;
+  Step step_;                        // in hand
+  std::vector<int> explicit_swept_;  // its explicit stages whose bars are known
+  std::vector<Bars> bars_;           // per objective
+  Eigen::MatrixXd x_bar_;
+  Eigen::VectorXd y_, w_, y_bar_, r_bar_;
 };
 
 }  // namespace mbsopt

@@ -7,7 +7,7 @@ namespace {
 
 constexpr std::size_t kBlock = 24;       // what an allocation costs beside its contents, at most [bytes]
 constexpr std::size_t kStepListed = 32;  // times and sizes in the list of steps, with room to grow
-constexpr std::size_t kStepBlocks = 12;  // allocations of a StoredStep
+constexpr std::size_t kStepBlocks = 2;   // allocations of a StoredStep
 constexpr std::size_t kSnapshotBlocks = 3;
 constexpr std::size_t kLeastSteps = 2, kLeastSnapshots = 8;  // below these no budget can push
 
@@ -101,10 +101,10 @@ void Checkpoints::keep(const Step& step, std::span<const SampleEvent> events) {
 void Checkpoints::turn_steps_into_snapshots() {
   every_ = 1;
   for (long index = 0; !kept_.empty(); ++index) {
-    StoredStep& step = kept_.front();
+    const StoredStep& step = kept_.front();
     bytes_ -= mbsopt::bytes_of(step);
     for (const SampleEvent& e : step.samples) events_.emplace_back(index, e);
-    add({index, std::move(step.y0), std::move(step.angles0)});
+    add({index, step.y0(), step.angles0()});
     kept_.pop_front();
   }
   thin_out();

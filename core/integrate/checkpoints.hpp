@@ -15,7 +15,7 @@
 #include <functional>
 #include <utility>
 
-#include "core/integrate/adjoint_sweep.hpp"
+#include "core/integrate/stored_step.hpp"
 
 namespace mbsopt {
 

@@ -28,24 +28,11 @@ RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSetting
       dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
       projector_(mechanism, settings.formulation.projection, model_of(mechanism, settings, method)),
       guard_(mechanism_.data()),
-      step_(make_step()) {
+      step_(make_step(mechanism, rk_, projector_.solution())) {
   const Eigen::Index states = mechanism.states();
   angles_.setZero(static_cast<Eigen::Index>(mechanism.data().angles.size()));
   for (Eigen::VectorXd* x : {&work_, &ydot_, &y_stage_}) x->setZero(states);
   if (rk_.implicit()) implicit_.emplace(mechanism_, rk_, settings_.integrator, dynamics_);
-}
-
-Step RungeKuttaRun::make_step() const {
-  Step s;
-  const MechanismData& d = mechanism_.data();
-  const Eigen::Index states = mechanism_.states(), angles = static_cast<Eigen::Index>(d.angles.size());
-  for (Eigen::VectorXd* x : {&s.y0, &s.y_hat, &s.y1}) x->setZero(states);
-  for (Eigen::VectorXd* x : {&s.angles0, &s.angles1}) x->setZero(angles);
-  s.Y.setZero(states, rk_.dense_stages);
-  s.K.setZero(states, rk_.dense_stages);
-  s.lambda.setZero(d.m, rk_.dense_stages);
-  s.projection = projector_.solution();
-  return s;
 }
 
 // Hairer, Norsett, Wanner I, section II.4, "Starting step size"; step_.y0 is the initial state.
@@ -88,11 +75,9 @@ std::string RungeKuttaRun::bodies_without_inertia() const {
 }
 
 bool RungeKuttaRun::evaluate_stage(int i) {
-  y_stage_ = step_.y0;
-  for (int j = 0; j < i; ++j) {
-    const double a = rk_.a(i, j);
-    if (a != 0) y_stage_ += (step_.h * a) * step_.K.col(j);
-  }
+  StageSum sum;
+  for (int j = 0; j < i; ++j) sum.add(step_.h * rk_.a(i, j), step_.K.col(j).data());
+  sum.to(step_.y0.data(), y_stage_.data(), y_stage_.size());
   step_.Y.col(i) = y_stage_;
   ++evaluations_;
   if (!dynamics_.evaluate(step_.t + rk_.c[i] * step_.h, y_stage_, step_.angles0, step_.K.col(i))) return false;
@@ -118,9 +103,9 @@ double RungeKuttaRun::error_of_step() {
   const IntegratorSettings& s = settings_.integrator;
   auto norm = [&](const double* weights) {
     work_.setZero();
-    for (int i = 0; i < rk_.stages; ++i) {
-      if (weights[i] != 0) work_ += (step_.h * weights[i]) * step_.K.col(i);
-    }
+    StageSum sum;
+    for (int i = 0; i < rk_.stages; ++i) sum.add(step_.h * weights[i], step_.K.col(i).data());
+    sum.to(work_.data(), work_.data(), work_.size());
     if (rk_.error_filter != 0 && !implicit_->filter(step_, work_)) return double(INFINITY);
     return scaled_norm(work_, step_.y0, step_.y_hat, s.rtol, s.atol);
   };
@@ -195,10 +180,9 @@ std::string RungeKuttaRun::failed(Outcome outcome, double h, bool adaptive) cons
 }
 
 void RungeKuttaRun::set_y_hat() {
-  step_.y_hat = step_.y0;
-  for (int i = 0; i < rk_.stages; ++i) {
-    if (rk_.b[i] != 0) step_.y_hat += (step_.h * rk_.b[i]) * step_.K.col(i);
-  }
+  StageSum sum;
+  for (int i = 0; i < rk_.stages; ++i) sum.add(step_.h * rk_.b[i], step_.K.col(i).data());
+  sum.to(step_.y0.data(), step_.y_hat.data(), step_.y_hat.size());
 }
 
 RungeKuttaRun::Outcome RungeKuttaRun::finish_step(bool dense) {

@@ -25,7 +25,6 @@ class RungeKuttaRun {
            const std::function<bool(double t1)>& wants_dense, const Sink& accepted, const RunOptions& options,
            SimulationResult& result);
 
-  Step make_step() const;  // with all arrays of the right sizes
   const Eigen::VectorXd& angles() const { return angles_; }
 
  private:

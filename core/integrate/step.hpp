@@ -6,7 +6,9 @@
 
 #include "core/dynamics/projection.hpp"
 #include "core/integrate/stage_groups.hpp"
+#include "core/integrate/stage_sum.hpp"
 #include "core/integrate/tableaus.hpp"
+#include "core/mechanism/mechanism.hpp"
 
 namespace mbsopt {
 
@@ -24,17 +26,18 @@ struct Step {
   int stages(const Method& rk) const { return dense ? rk.dense_stages : rk.stages; }
 };
 
+// Of the sizes that the mechanism has; projection: of the right sizes.
+Step make_step(const Mechanism& mechanism, const Method& rk, ProjectionSolution projection);
+
 // Stage states Y and the upper half (v) of their derivatives K, from the lower half (qdd) of K, for a group whose
 // earlier stages are known:  V_i = v0 + h sum_j A_ij a_j,   Q_i = q0 + h sum_j A_ij V_j.
 inline void set_group_stages(const Method& rk, const StageGroup& g, double h, const Eigen::VectorXd& y0,
                              Eigen::MatrixXd& Y, Eigen::MatrixXd& K) {
   const Eigen::Index n = y0.size() / 2;
   auto add_stages = [&](int i, Eigen::Index first) {
-    auto part = Y.col(i).segment(first, n);
-    part = y0.segment(first, n);
-    for (int j = 0; j <= g.last; ++j) {
-      if (rk.a(i, j) != 0) part += (h * rk.a(i, j)) * K.col(j).segment(first, n);
-    }
+    StageSum sum;
+    for (int j = 0; j <= g.last; ++j) sum.add(h * rk.a(i, j), K.col(j).data() + first);
+    sum.to(y0.data() + first, Y.col(i).data() + first, n);
   };
   for (int i = g.first; i <= g.last; ++i) {
     add_stages(i, n);
@@ -49,13 +52,17 @@ inline double projection_blend(double theta) { return theta * theta * (3 - 2 * t
 
 inline void dense_output(const Method& rk, const Step& step, double theta, Eigen::VectorXd& y) {
   y = step.y0 + projection_blend(theta) * (step.y1 - step.y_hat);
-  for (int i = 0; i < rk.dense_stages; ++i) y += (step.h * rk.dense_weight(i, theta)) * step.K.col(i);
+  StageSum sum;
+  for (int i = 0; i < rk.dense_stages; ++i) sum.add(step.h * rk.dense_weight(i, theta), step.K.col(i).data());
+  sum.to(y.data(), y.data(), y.size());
 }
 
 // Its derivative in t.
 inline void dense_output_rate(const Method& rk, const Step& step, double theta, Eigen::VectorXd& ydot) {
   ydot = (6 * theta * (1 - theta) / step.h) * (step.y1 - step.y_hat);
-  for (int i = 0; i < rk.dense_stages; ++i) ydot += rk.dense_weight_rate(i, theta) * step.K.col(i);
+  StageSum sum;
+  for (int i = 0; i < rk.dense_stages; ++i) sum.add(rk.dense_weight_rate(i, theta), step.K.col(i).data());
+  sum.to(ydot.data(), ydot.data(), ydot.size());
 }
 
 }  // namespace mbsopt

@@ -1,29 +1,16 @@
 #include "core/integrate/tangent_sweep.hpp"
 
-#include "core/dynamics/pairs.hpp"
 #include "core/integrate/model_choice.hpp"
 
 namespace mbsopt {
 namespace {
 
-// Y = y0 + h sum_j w_j K_j, over j < count.
+// Y = y0 + h sum_j w(j) K_j, over j < count.
 template <class Weight>
 void combine(const LaneRows& y0, double h, int count, Weight&& w, const std::vector<LaneRows>& K, LaneRows& Y) {
-  const LaneRow* k[Method::kMaxStages];
-  double c[Method::kMaxStages];
-  int terms = 0;
-  for (int j = 0; j < count; ++j) {
-    if (w(j) == 0) continue;
-    k[terms] = entries(K[static_cast<std::size_t>(j)]);
-    c[terms++] = h * w(j);
-  }
-  const LaneRow* from = entries(y0);
-  LaneRow* to = entries(Y);
-  for (Eigen::Index r = 0; r < y0.rows(); ++r) {
-    LaneRow sum = from[r];
-    for (int j = 0; j < terms; ++j) sum += c[j] * k[j][r];
-    to[r] = sum;
-  }
+  StageSum sum;
+  for (int j = 0; j < count; ++j) sum.add(h * w(j), K[static_cast<std::size_t>(j)].data());
+  sum.to(y0.data(), Y.data(), Y.size());
 }
 
 }  // namespace
@@ -75,10 +62,8 @@ void TangentSweep::set_dense(const Step& step, double theta) {
   const double blend = projection_blend(theta);
   for (Block& b : blocks_) {
     b.Y = b.y0 + blend * (b.y1 - b.y_hat);
-    for (int i = 0; i < rk_.dense_stages; ++i) {
-      const double w = rk_.dense_weight(i, theta);
-      if (w != 0) b.Y += (step.h * w) * b.K[static_cast<std::size_t>(i)];
-    }
+    combine(
+        b.Y, step.h, rk_.dense_stages, [&](int i) { return rk_.dense_weight(i, theta); }, b.K, b.Y);
   }
 }
 
@@ -123,11 +108,8 @@ bool TangentSweep::follow_implicit(const Step& step, const StageGroup& g) {
   for (Block& b : blocks_) {
     for (int i = g.first; i <= g.last; ++i) {
       LaneRows& Y = b.Y_stage[static_cast<std::size_t>(i - g.first)];
-      Y = b.y0;
-      for (int j = 0; j < g.first; ++j) {
-        const double a = rk_.a(i, j);
-        if (a != 0) Y += (step.h * a) * b.K[static_cast<std::size_t>(j)];
-      }
+      combine(
+          b.y0, step.h, g.first, [&](int j) { return rk_.a(i, j); }, b.K, Y);
     }
     for (int i = g.first; i <= g.last; ++i) {
       for (int j = g.first; j <= g.last; ++j) {

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "core/body/euler_parameters.hpp"
-
 namespace mbsopt {
 
 namespace {
@@ -13,12 +11,22 @@ bool is_place(const PointSensor& sensor) {
   return sensor.quantity == PointSensor::Quantity::position && sensor.axes_body < 1;
 }
 
-// The body's Euler parameters in y, in which q comes first.
-Vector4d turn_of(const Eigen::VectorXd& y, int body) { return y.segment<4>(7 * (body - 1) + 3); }
+// A body's r, e0 and e in y, in which q comes first, read where they are.
+struct Placed {
+  Eigen::Map<const Vector3d> r;
+  double e0;
+  Eigen::Map<const Vector3d> e;
 
+  Placed(const Eigen::VectorXd& y, int body) : Placed(y.data() + 7 * (body - 1)) {}
+  explicit Placed(const double* q) : r(q), e0(q[3]), e(q + 4) {}
+};
+
+// A(p) s of euler_parameters.hpp.
 Vector3d place(const PointSensor::Point& point, const Eigen::VectorXd& y) {
   if (point.body == 0) return point.s;
-  return y.segment<3>(7 * (point.body - 1)) + A(turn_of(y, point.body)) * point.s;
+  const Placed b(y, point.body);
+  const Vector3d& s = point.s;
+  return b.r + (b.e0 * b.e0 - b.e.squaredNorm()) * s + (2 * b.e.dot(s)) * b.e + (2 * b.e0) * b.e.cross(s);
 }
 
 void add_place_bar(const PointSensor::Point& point, const Eigen::VectorXd& y, const Vector3d& X_bar,
@@ -27,11 +35,14 @@ void add_place_bar(const PointSensor::Point& point, const Eigen::VectorXd& y, co
     s_bar += X_bar;
     return;
   }
-  const Eigen::Index q = 7 * (point.body - 1);
-  const Vector4d p = turn_of(y, point.body);
-  y_bar.segment<3>(q) += X_bar;
-  y_bar.segment<4>(q + 3) += N(p, point.s).transpose() * X_bar;
-  s_bar += A(p).transpose() * X_bar;
+  const Placed b(y, point.body);
+  const Vector3d &s = point.s, e_s = b.e.cross(s);
+  const double along = s.dot(X_bar), e_X = b.e.dot(X_bar);
+  double* q_bar = y_bar.data() + 7 * (point.body - 1);
+  Eigen::Map<Vector3d>{q_bar} += X_bar;
+  q_bar[3] += 2 * (b.e0 * along + e_s.dot(X_bar));
+  Eigen::Map<Vector3d>{q_bar + 4} += 2 * (b.e.dot(s) * X_bar + e_X * s - along * b.e + b.e0 * s.cross(X_bar));
+  s_bar += (b.e0 * b.e0 - b.e.squaredNorm()) * X_bar + (2 * e_X) * b.e - (2 * b.e0) * b.e.cross(X_bar);
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ struct CountedRun {
           return true;
         },
         [&](const StoredStep& s) {
-          outcome.right = outcome.right && s.y0(0) == static_cast<double>(next) && s.t == static_cast<double>(next);
+          outcome.right = outcome.right && s.y0()(0) == static_cast<double>(next) && s.t == static_cast<double>(next);
           --next;
           return true;
         });

@@ -1,0 +1,90 @@
+#include "core/dynamics/planar_springs.hpp"
+
+#include <cmath>
+
+#include "core/mechanism/planar_model.hpp"
+
+namespace mbsopt {
+
+PlanarSprings::PlanarSprings(const MechanismData& data) : data_(data) {
+  for (const TsdaForce& f : data.tsda) {
+    const std::size_t i = static_cast<std::size_t>(f.body1), j = static_cast<std::size_t>(f.body2);
+    const PlanarBody &b1 = data.planar->bodies[i], &b2 = data.planar->bodies[j];
+    springs_.push_back({&f, i, j, b1.in_plane(f.s1), b2.in_plane(f.s2)});
+    points_in_plane_ = points_in_plane_ && b1.n.dot(f.s1) == 0 && b2.n.dot(f.s2) == 0;
+  }
+}
+
+bool PlanarSprings::lie_in_plane(const Eigen::VectorXd& y) const {
+  if (!points_in_plane_) return false;
+  const auto height = [&](std::size_t body) {
+    return body == 0 ? 0.0 : y(7 * (static_cast<Eigen::Index>(body) - 1) + data_.planar->n);
+  };
+  for (const Spring& s : springs_) {
+    if (height(s.body1) != height(s.body2)) return false;
+  }
+  return true;
+}
+
+PlanarSprings::Span PlanarSprings::span(const Spring& s, const std::vector<PlanarFrame<double>>& frames) {
+  const PlanarFrame<double>&f1 = frames[s.body1], &f2 = frames[s.body2];
+  Span x;
+  x.d = f2.r - f1.r + f2.A * s.s2 - f1.A * s.s1;
+  x.ddot = f2.rdot - f1.rdot + f2.Adot * s.s2 - f1.Adot * s.s1;
+  x.l = std::sqrt(squared_norm(x.d));
+  x.u = x.l > 0 ? (1 / x.l) * x.d : Plane{};
+  x.ldot = dot(x.u, x.ddot);
+  return x;
+}
+
+void PlanarSprings::add_loads(double t, const std::vector<PlanarFrame<double>>& frames, Law::Scratch& scratch,
+                              std::vector<Vec<3>>& loads) const {
+  for (const Spring& s : springs_) {
+    const Span x = span(s, frames);
+    const Plane F = s.force->law.value(t, data_.rho, x.l, x.ldot, scratch) * x.u;
+    const auto add = [&](std::size_t body, const Plane& at, const Plane& force) {
+      if (body == 0) return;
+      Vec<3>& load = loads[body - 1];
+      load(0) += force.re, load(1) += force.im, load(2) += cross(frames[body].A * at, force);
+    };
+    add(s.body1, s.s1, F);
+    add(s.body2, s.s2, -F);
+  }
+}
+
+// As TsdaForce::pull_back.
+void PlanarSprings::add_pull_back(double t, const std::vector<PlanarFrame<double>>& frames,
+                                  std::span<const PlanarShift> eta, Law::Scratch& scratch,
+                                  std::vector<PlanarFrameBar>& bars, Eigen::VectorXd& theta_bar,
+                                  Eigen::VectorXd& rho_bar) const {
+  for (const Spring& s : springs_) {
+    const Span x = span(s, frames);
+    const Law& law = s.force->law;
+    const auto moved = [&](std::size_t body, const Plane& at) {
+      return eta[body].r + times_i(eta[body].turn * (frames[body].A * at));
+    };
+    const Plane d_eta = moved(s.body2, s.s2) - moved(s.body1, s.s1);
+    PlanarJetBar bar;
+    if (x.l == 0) {
+      if (!s.force->is_k_times_d()) continue;
+      bar.x = -law.k * d_eta;
+    } else {
+      const Law::Value f = law.derivatives(t, data_.rho, x.l, x.ldot, scratch);
+      const double l_eta = dot(x.u, d_eta);
+      bar.x =
+          (-l_eta) * (f.f_x * x.u + (f.f_xdot / x.l) * (x.ddot - x.ldot * x.u)) - (f.f / x.l) * (d_eta - l_eta * x.u);
+      bar.xd = (-l_eta * f.f_xdot) * x.u;
+      bar.eta = -f.f * x.u;
+      law.add_field_gradient(x.l, x.ldot, -l_eta, scratch, theta_bar, rho_bar);
+    }
+    const auto add = [&](std::size_t body, const Plane& at, double sign, int slot) {
+      Plane s_bar;
+      add_point_bar(frames[body], eta[body].turn, at, bar, sign, bars[body], s_bar);
+      if (slot >= 0) theta_bar.segment<3>(slot) += data_.planar->bodies[body].in_body(s_bar);
+    };
+    add(s.body2, s.s2, 1, s.force->slot2);
+    add(s.body1, s.s1, -1, s.force->slot1);
+  }
+}
+
+}  // namespace mbsopt

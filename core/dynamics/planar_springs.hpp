@@ -1,0 +1,45 @@
+// The springs (tsda.hpp) of a planar model whose points lie in one plane: loads and their pull-back from planar frames,
+// the same numbers as from frames in space at a fraction of the work.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/dynamics/planar_frame.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+
+namespace mbsopt {
+
+class PlanarSprings {
+ public:
+  explicit PlanarSprings(const MechanismData& data);  // with a planar model
+
+  // Whether each spring's points lie at the same height along n. Bodies keep theirs, but states may differ.
+  bool lie_in_plane(const Eigen::VectorXd& y) const;
+
+  // loads: body k at k - 1.
+  void add_loads(double t, const std::vector<PlanarFrame<double>>& frames, Law::Scratch& scratch,
+                 std::vector<Vec<3>>& loads) const;
+  // Gradient of the virtual work sum load'eta in the frames (eta held fixed), the fields and the parameters of laws.
+  void add_pull_back(double t, const std::vector<PlanarFrame<double>>& frames, std::span<const PlanarShift> eta,
+                     Law::Scratch& scratch, std::vector<PlanarFrameBar>& bars, Eigen::VectorXd& theta_bar,
+                     Eigen::VectorXd& rho_bar) const;
+
+ private:
+  struct Spring {
+    const TsdaForce* force;
+    std::size_t body1, body2;
+    Plane s1, s2;
+  };
+  struct Span {
+    Plane d, ddot, u;
+    double l, ldot;
+  };
+  static Span span(const Spring& spring, const std::vector<PlanarFrame<double>>& frames);
+
+  const MechanismData& data_;
+  std::vector<Spring> springs_;
+  bool points_in_plane_ = true;
+};
+
+}  // namespace mbsopt
