@@ -230,13 +230,18 @@ void PlanarDynamics::prepare_force_tangents() {
     if (block.parts == 0) continue;
     const MotionBlocks::Place& place = x.blocks.pairs()[k];
     const PlanarBody &loaded = model_.bodies[at(place.row + 1)], &read = model_.bodies[at(place.body + 1)];
-    const auto reduce = [&](const Mat<6, 7>& of, Mat<3, 4>& to) {
+    const auto in_plane = [&](const Mat<6, 7>& of) {
       Mat<3, 7> rows;
       rows << of.row(model_.t1), of.row(model_.t2), loaded.n.transpose() * of.bottomRows<3>();
-      to << rows.col(model_.t1), rows.col(model_.t2), rows.rightCols<4>() * read.p_a, rows.rightCols<4>() * read.p_b;
+      return rows;
     };
-    reduce(block.q, x.in_plane[k].q);
-    reduce(block.v, x.in_plane[k].v);
+    const auto reduce = [&](const Mat<3, 7>& rows) {
+      Mat<3, 4> to;
+      to << rows.col(model_.t1), rows.col(model_.t2), rows.rightCols<4>() * read.p_a, rows.rightCols<4>() * read.p_b;
+      return to;
+    };
+    const Mat<3, 7> q = in_plane(block.q);
+    x.in_plane[k] = {reduce(q), reduce(in_plane(block.v)), q.col(model_.n)};
   }
 }
 
@@ -252,9 +257,11 @@ void PlanarDynamics::add_force_tangent(const ParameterBlock& block, const LaneRo
     const LaneRow* P = entries(turn_dirs_[at(place.body + 1)]);
     LaneRow* b = entries(rhs_lanes_[at(place.row)]);
     const Mat<3, 4>&q = x.in_plane[k].q, &v = x.in_plane[k].v;
+    const Vec<3>& height = x.in_plane[k].height;
     for (int i = 0; i < 3; ++i) {
       b[i] += q(i, 0) * r[model_.t1] + q(i, 1) * r[model_.t2] + q(i, 2) * P[0] + q(i, 3) * P[1] +
-              v(i, 0) * rdot[model_.t1] + v(i, 1) * rdot[model_.t2] + v(i, 2) * P[2] + v(i, 3) * P[3];
+              v(i, 0) * rdot[model_.t1] + v(i, 1) * rdot[model_.t2] + v(i, 2) * P[2] + v(i, 3) * P[3] +
+              height(i) * r[model_.n];
     }
   }
   for (const std::size_t k : loaded_) body_load_dirs_[k].setZero();

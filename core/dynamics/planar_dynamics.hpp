@@ -94,6 +94,7 @@ class PlanarDynamics {
     std::vector<UnitTangents> units;
     struct Block {
       Mat<3, 4> q, v;  // by (r, P) and (rdot, Pdot)
+      Vec<3> height;   // by r along n, which parameters may change
     };
     std::vector<Block> in_plane;
   };

@@ -184,6 +184,31 @@ TEST_CASE("a planar run takes the spatial run's steps to the same motion and gra
   CHECK(apart(planar_tlm.psi_rho, planar.psi_rho) < 1e-10);
 }
 
+TEST_CASE("a spring feels a parameter that shifts its body along the normal", "[planar]") {
+  Scene scene = pendulum();
+  add_parameters(scene, {{"shift", 0.1}});
+  scene.joints[0].point1 = PointField(vec("0", "0", "shift"));
+  Tsda spring;
+  spring.body1 = "ground", spring.point1 = PointField(vec("1", "0.5", "0.3")), spring.body2 = "bar";
+  spring.point2 = PointField(vec("c", "0", "0")), spring.stiffness = 20.0, spring.free_length = 0.2;
+  scene.forces.push_back({"spring", spring});
+  scene.simulation.end_time = 0.5;
+  scene.simulation.integrator.rtol = 1e-8, scene.simulation.integrator.atol = 1e-10;
+  const Mechanism mechanism(scene, nominal(scene));
+  REQUIRE(mechanism.data().planar);
+  std::vector<Cost> costs(1);
+  costs[0].running = std::make_shared<StateNorm>();
+  SimulationSettings in_space = scene.simulation;
+  in_space.model = ModelChoice::spatial;
+  const SimulationResult tlm = simulate_tlm(mechanism, scene.simulation, costs),
+                         adjoint = simulate_adjoint(mechanism, scene.simulation, costs),
+                         spatial = simulate_adjoint(mechanism, in_space, costs);
+  REQUIRE((tlm.ok() && adjoint.ok() && spatial.ok()));
+  CHECK(std::abs(tlm.psi_rho(0, tlm.psi_rho.cols() - 1)) > 0.01);
+  CHECK(apart(tlm.psi_rho, adjoint.psi_rho) < 1e-10);
+  CHECK(apart(adjoint.psi_rho, spatial.psi_rho) < 1e-9);
+}
+
 TEST_CASE("the N-four-bar through its flat position: the planar model meets the spatial one", "[planar]") {
   Scene scene = n_four_bar(3);
   scene.simulation.end_time = 1;
