@@ -96,7 +96,7 @@ void gradient_scaling(benchmark::State& state, const char* method, Scene (*make)
   const std::vector<Objective> objectives{Objective(scene, spec)};
   for (auto _ : state) {
     GradientTimingOptions options;
-    options.most_seconds = 6;
+    options.most_seconds = 20;
     const GradientTiming timing = time_gradients(scene, objectives, options);
     if (!timing.ok) {
       state.SkipWithError(timing.message.c_str());

@@ -190,20 +190,25 @@ void Dynamics::linearise_here() {
 }
 
 void Dynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir) {
-  if (planar_) return planar_->tangent(block, y_dir, ydot_dir);
+  const Eigen::Index half = 7 * data_.n;
+  ydot_dir.topRows(half) = y_dir.bottomRows(half);
+  acceleration_tangent(block, y_dir, ydot_dir.bottomRows(half));
+}
+
+void Dynamics::acceleration_tangent(const ParameterBlock& block, const LaneRows& y_dir, Eigen::Ref<LaneRows> a_dir) {
+  if (planar_) return planar_->acceleration_tangent(block, y_dir, a_dir);
   const int n = data_.n;
   right_hand_side_tangent(block, y_dir);
   solver_.solve(rhs_lanes_, gamma_dir_, solver_settings(true), z_dir_, lambda_dir_);
 
   const Eigen::Index half = 7 * n;
-  ydot_dir.topRows(half) = y_dir.bottomRows(half);
   for (int i = 1; i <= n; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
     const Vector4d& p = bodies_[k].p;
     const Lanes<3> w = z_dir_[k - 1].bottomRows<3>();
-    ydot_dir.middleRows<3>(half + 7 * (i - 1)) = z_dir_[k - 1].topRows<3>();
+    a_dir.middleRows<3>(7 * (i - 1)) = z_dir_[k - 1].topRows<3>();
     // pddot' = (pddot' with omegadot fixed) + 1/2 G(p)' omegadot'
-    auto out = ydot_dir.middleRows<4>(half + 7 * (i - 1) + 3);
+    auto out = a_dir.middleRows<4>(7 * (i - 1) + 3);
     out = pddot_tangent(bodies_[k], y_dir.middleRows<4>(7 * (i - 1) + 3), y_dir.middleRows<4>(half + 7 * (i - 1) + 3));
     out.row(0) -= 0.5 * dot(p.tail<3>(), w);
     out.bottomRows<3>() += 0.5 * (p(0) * w + cross(p.tail<3>(), w));

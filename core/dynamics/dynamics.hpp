@@ -87,6 +87,8 @@ class Dynamics {
   const MotionBlocks& blocks();
   // y_dir: tangent of y (14n x lanes); ydot_dir: of (v, a).
   void tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir);
+  // Its lower half, (qddot)'.
+  void acceleration_tangent(const ParameterBlock& block, const LaneRows& y_dir, Eigen::Ref<LaneRows> a_dir);
   // w: cotangent of (v, a); adds to the cotangents of y, of the differentiated fields, and of the parameters in laws.
   // motion: a cotangent of z and lambda themselves beside it.
   void add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,

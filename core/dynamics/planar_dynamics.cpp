@@ -299,7 +299,8 @@ void PlanarDynamics::add_other_tangents(const ParameterBlock& block, const LaneR
   for (std::size_t i = 0; i < rhs_lanes_.size(); ++i) rhs_lanes_[i] -= load_dirs_[i + 1];
 }
 
-void PlanarDynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir) {
+void PlanarDynamics::acceleration_tangent(const ParameterBlock& block, const LaneRows& y_dir,
+                                          Eigen::Ref<LaneRows> a_dir) {
   if (!tangents_ready_) prepare_tangents();
   const Eigen::Index half = 7 * data_.n;
   const LaneRow* y = entries(y_dir);
@@ -343,8 +344,7 @@ void PlanarDynamics::tangent(const ParameterBlock& block, const LaneRows& y_dir,
   if (!loaded_.empty()) add_force_tangent(block, y_dir);
   solver_.solve(rhs_lanes_, gamma_dir_, derivative_refinements_, z_dir_, lambda_dir_);
 
-  ydot_dir.topRows(half) = y_dir.bottomRows(half);
-  LaneRow* out = entries(ydot_dir) + half;
+  LaneRow* out = reinterpret_cast<LaneRow*>(a_dir.data());
   for (std::size_t k = 1; k < bodies_.size(); ++k, out += 7) {
     const PlanarBody& body = model_.bodies[k];
     const TurnTangent& x = turns_[k];

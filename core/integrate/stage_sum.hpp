@@ -1,4 +1,5 @@
 // y = y0 + sum_j c_j k_j, of states or of lanes of them, in one pass: each number of y is read and written once.
+// For as many k_j as a method has stages, and two.
 #pragma once
 
 #include "core/dynamics/pairs.hpp"
@@ -14,16 +15,16 @@ class StageSum {
     c_[terms_] = c;
     k_[terms_++] = k;
   }
-  // y may be y0.
-  void to(const double* y0, double* y, Eigen::Index size) const {
+  // y may be y0. Of the numbers first, first + 1, ... before `end`.
+  void to(const double* y0, double* y, Eigen::Index end, Eigen::Index first = 0) const {
     constexpr Eigen::Index kPairs = 4;
-    Eigen::Index r = 0;
-    for (; r + 2 * kPairs <= size; r += 2 * kPairs) {
+    Eigen::Index r = first;
+    for (; r + 2 * kPairs <= end; r += 2 * kPairs) {
       Column<kPairs> sum(y0 + r);
       for (int j = 0; j < terms_; ++j) sum.add(c_[j], k_[j] + r);
       sum.store(y + r);
     }
-    for (; r < size; ++r) {
+    for (; r < end; ++r) {
       double sum = y0[r];
       for (int j = 0; j < terms_; ++j) sum += c_[j] * k_[j][r];
       y[r] = sum;
@@ -31,8 +32,8 @@ class StageSum {
   }
 
  private:
-  double c_[Method::kMaxStages];
-  const double* k_[Method::kMaxStages];
+  double c_[Method::kMaxStages + 2];
+  const double* k_[Method::kMaxStages + 2];
   int terms_ = 0;
 };
 

@@ -3,18 +3,6 @@
 #include "core/integrate/model_choice.hpp"
 
 namespace mbsopt {
-namespace {
-
-// Y = y0 + h sum_j w(j) K_j, over j < count.
-template <class Weight>
-void combine(const LaneRows& y0, double h, int count, Weight&& w, const std::vector<LaneRows>& K, LaneRows& Y) {
-  StageSum sum;
-  for (int j = 0; j < count; ++j) sum.add(h * w(j), K[static_cast<std::size_t>(j)].data());
-  sum.to(y0.data(), Y.data(), Y.size());
-}
-
-}  // namespace
-
 TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
                            const Eigen::MatrixXd& y_initial_rho)
     : mechanism_(mechanism),
@@ -24,13 +12,17 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
   const MechanismData& d = mechanism.data();
   if (d.needs_motion) motion_.emplace(mechanism, settings.formulation);
   const Eigen::Index states = mechanism.states();
+  for (int i = 0; i < rk_.dense_stages; ++i) of_stage_.push_back(integrated(rk_.A + i * rk_.dense_stages));
+  std::array<double, Method::kMaxStages> b_of_all{};
+  std::copy_n(rk_.b, rk_.stages, b_of_all.begin());
+  of_step_ = integrated(b_of_all.data());
   const int coupled = largest_implicit_group(rk_);
   if (coupled > 0) implicit_.emplace(d, rk_);
   for (ParameterBlock& p : parameter_blocks(d)) {
     Block b;
     b.parameters = std::move(p);
     for (LaneRows* x : {&b.y0, &b.y_hat, &b.y1, &b.Y}) x->setZero(states, kLanes);
-    b.K.assign(static_cast<std::size_t>(rk_.dense_stages), LaneRows::Zero(states, kLanes));
+    b.a.assign(static_cast<std::size_t>(rk_.dense_stages), LaneRows::Zero(states / 2, kLanes));
     b.Y_stage.assign(static_cast<std::size_t>(coupled), LaneRows::Zero(states, kLanes));
     b.x.setZero(coupled * dynamics_.equations(), kLanes);
     for (int k = 0; k < kLanes; ++k) {
@@ -42,6 +34,34 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
   rho_bar_.setZero(d.rho.size());
   r_.setZero(dynamics_.equations(), kLanes);
   y_rho_.setZero(states, d.rho.size());
+}
+
+TangentSweep::Weights TangentSweep::integrated(const double* of_k) const {
+  Weights w;
+  for (int i = 0; i < rk_.dense_stages; ++i) {
+    w.c += of_k[i];
+    w.v[static_cast<std::size_t>(i)] = of_k[i];
+    for (int j = 0; j < rk_.dense_stages; ++j) w.q[static_cast<std::size_t>(j)] += of_k[i] * rk_.a(i, j);
+  }
+  return w;
+}
+
+void TangentSweep::add_stages(const Block& b, double h, double c, const Weights& w, int first, int last,
+                              const LaneRows& from, LaneRows& to) {
+  const Eigen::Index half = from.size() / 2;
+  StageSum q, v;
+  q.add(h * c, b.y0.data() + half);
+  for (int j = first; j <= last; ++j) {
+    const std::size_t k = static_cast<std::size_t>(j);
+    q.add(h * h * w.q[k], b.a[k].data());
+    v.add(h * w.v[k], b.a[k].data());
+  }
+  constexpr Eigen::Index kPart = 512;  // accelerations stay in the cache from one sum to the other
+  for (Eigen::Index r = 0; r < half; r += kPart) {
+    const Eigen::Index end = std::min(r + kPart, half);
+    q.to(from.data(), to.data(), end, r);
+    v.to(from.data() + half, to.data() + half, end, r);
+  }
 }
 
 void TangentSweep::add_cost(const PointCost& cost, const StatePoint& at, double weight, LaneRows Block::*direction,
@@ -60,10 +80,12 @@ void TangentSweep::add_cost(const PointCost& cost, const StatePoint& at, double 
 
 void TangentSweep::set_dense(const Step& step, double theta) {
   const double blend = projection_blend(theta);
+  std::array<double, Method::kMaxStages> of_k{};
+  for (int i = 0; i < rk_.dense_stages; ++i) of_k[static_cast<std::size_t>(i)] = rk_.dense_weight(i, theta);
+  const Weights w = integrated(of_k.data());
   for (Block& b : blocks_) {
     b.Y = b.y0 + blend * (b.y1 - b.y_hat);
-    combine(
-        b.Y, step.h, rk_.dense_stages, [&](int i) { return rk_.dense_weight(i, theta); }, b.K, b.Y);
+    add_stages(b, step.h, w.c, w, 0, rk_.dense_stages - 1, b.Y, b.Y);
   }
 }
 
@@ -93,65 +115,38 @@ bool TangentSweep::follow_explicit(const Step& step, int i) {
   y_ = step.Y.col(i);
   const auto a_i = step.K.col(i).tail(mechanism_.states() / 2);
   if (!dynamics_.linearise(step.t + rk_.c[i] * step.h, y_, step.angles0, a_i, step.lambda.col(i))) return false;
+  const std::size_t stage = static_cast<std::size_t>(i);
+  const Weights& w = of_stage_[stage];
   for (Block& b : blocks_) {
-    combine(
-        b.y0, step.h, i, [&](int j) { return rk_.a(i, j); }, b.K, b.Y);
-    dynamics_.tangent(b.parameters, b.Y, b.K[static_cast<std::size_t>(i)]);
+    add_stages(b, step.h, w.c, w, 0, i - 1, b.y0, b.Y);
+    dynamics_.acceleration_tangent(b.parameters, b.Y, b.a[stage]);
   }
   return true;
 }
 
-// Y_i' = Y*_i' + h sum_j A_ij k_j' over the group's own stages j; their accelerations and multipliers solve
-//   N x' = r_y (Q*_i' + h sum_j A_ij V*_j', V*_i') + r_rho
+// Y_i' = Y*_i' + what the group's own accelerations add to it; they and their multipliers solve
+//   N x' = r_y Y*_i' + r_rho
 bool TangentSweep::follow_implicit(const Step& step, const StageGroup& g) {
   const Eigen::Index n = mechanism_.states() / 2, rows = dynamics_.equations();
-  for (Block& b : blocks_) {
-    for (int i = g.first; i <= g.last; ++i) {
-      LaneRows& Y = b.Y_stage[static_cast<std::size_t>(i - g.first)];
-      combine(
-          b.y0, step.h, g.first, [&](int j) { return rk_.a(i, j); }, b.K, Y);
-    }
-    for (int i = g.first; i <= g.last; ++i) {
-      for (int j = g.first; j <= g.last; ++j) {
-        b.Y_stage[static_cast<std::size_t>(i - g.first)].topRows(n) +=
-            (step.h * rk_.a(i, j)) * b.Y_stage[static_cast<std::size_t>(j - g.first)].bottomRows(n);
-      }
-    }
-  }
+  const auto of = [](int i) { return static_cast<std::size_t>(i); };
   for (int i = g.first; i <= g.last; ++i) {
+    const int k = i - g.first;
     y_ = step.Y.col(i);
     dynamics_.place_at(step.t + rk_.c[i] * step.h, y_, step.angles0, step.K.col(i).tail(n), step.lambda.col(i));
-    implicit_->linearise(dynamics_, i - g.first);
+    implicit_->linearise(dynamics_, k);
     for (Block& b : blocks_) {
-      dynamics_.residual_tangent(b.parameters, b.Y_stage[static_cast<std::size_t>(i - g.first)], r_);
-      b.x.middleRows((i - g.first) * rows, rows) = r_;
+      add_stages(b, step.h, of_stage_[of(i)].c, of_stage_[of(i)], 0, g.first - 1, b.y0, b.Y_stage[of(k)]);
+      dynamics_.residual_tangent(b.parameters, b.Y_stage[of(k)], r_);
+      b.x.middleRows(k * rows, rows) = r_;
     }
   }
   if (!implicit_->factor(step.h, g)) return false;
   for (Block& b : blocks_) {
     implicit_->solve(g, b.x);
+    for (int i = g.first; i <= g.last; ++i) b.a[of(i)] = b.x.middleRows((i - g.first) * rows, n);
     for (int i = g.first; i <= g.last; ++i) {
-      LaneRows& K = b.K[static_cast<std::size_t>(i)];
-      K.bottomRows(n) = b.x.middleRows((i - g.first) * rows, n);
-      K.topRows(n) = b.Y_stage[static_cast<std::size_t>(i - g.first)].bottomRows(n);
-    }
-    for (int i = g.first; i <= g.last; ++i) {  // V_i'
-      LaneRows& Y = b.Y_stage[static_cast<std::size_t>(i - g.first)];
-      for (int j = g.first; j <= g.last; ++j) {
-        Y.bottomRows(n) += (step.h * rk_.a(i, j)) * b.K[static_cast<std::size_t>(j)].bottomRows(n);
-      }
-    }
-    // Q_i' has h sum A_ij V*_j' already; what the group's accelerations add to V_j' comes to it.
-    for (int i = g.first; i <= g.last; ++i) {
-      LaneRows& Y = b.Y_stage[static_cast<std::size_t>(i - g.first)];
-      for (int j = g.first; j <= g.last; ++j) {
-        const LaneRows& K = b.K[static_cast<std::size_t>(j)];
-        Y.topRows(n) +=
-            (step.h * rk_.a(i, j)) * (b.Y_stage[static_cast<std::size_t>(j - g.first)].bottomRows(n) - K.topRows(n));
-      }
-    }
-    for (int i = g.first; i <= g.last; ++i) {
-      b.K[static_cast<std::size_t>(i)].topRows(n) = b.Y_stage[static_cast<std::size_t>(i - g.first)].bottomRows(n);
+      LaneRows& Y = b.Y_stage[of(i - g.first)];
+      add_stages(b, step.h, 0, of_stage_[of(i)], g.first, g.last, Y, Y);
     }
   }
   return true;
@@ -180,10 +175,7 @@ bool TangentSweep::follow(const Step& step, std::span<const Cost> costs, std::sp
       add_running_costs(step, i, costs, psi_rho);
     }
   }
-  for (Block& b : blocks_) {
-    combine(
-        b.y0, step.h, rk_.stages, [&](int j) { return rk_.b[j]; }, b.K, b.y_hat);
-  }
+  for (Block& b : blocks_) add_stages(b, step.h, of_step_.c, of_step_, 0, rk_.stages - 1, b.y0, b.y_hat);
   if (projector_.active()) {
     if (!projector_.linearise(step.t1, step.angles0, step.y_hat, step.y1, step.projection)) return false;
     for (Block& b : blocks_) projector_.tangent(b.parameters, b.y_hat, b.y1);

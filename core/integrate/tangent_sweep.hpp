@@ -1,9 +1,12 @@
 // Tangent-linear sweep over accepted steps: for every direction,
 //   Y_i' = y0' + h sum_j A_ij k_j',   k_i' = f_y Y_i' + f_rho,   y^' = y0' + h sum_i b_i k_i',   y1' = projection'(y^')
+// Only the accelerations a_i' of k_i' = (V_i', a_i') are kept, which gives the same sums, since qdot = v:
+//   Q_i' = q0' + h c_i v0' + h^2 sum_j (A^2)_ij a_j',   V_i' = v0' + h sum_j A_ij a_j'
 // with the steps held fixed; stages that need each other solve their linear equations together (linearised_stages.hpp).
 // All directions go through the factor of a stage together, kLanes at a time.
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include "core/dynamics/dynamics.hpp"
@@ -37,10 +40,19 @@ class TangentSweep {
   struct Block {
     ParameterBlock parameters;
     LaneRows y0, y_hat, y1, Y;
-    std::vector<LaneRows> K;
+    std::vector<LaneRows> a;        // of each stage
     std::vector<LaneRows> Y_stage;  // of coupled stages
     Eigen::MatrixXd x;              // their accelerations and multipliers
   };
+  // Weights of stages in a sum: of v0, of the accelerations in q, and in v.
+  struct Weights {
+    double c = 0;
+    std::array<double, Method::kMaxStages> q{}, v{};
+  };
+  Weights integrated(const double* of_k) const;  // from those of all stages' derivatives k_j
+  // to = from + the sum over stages first..last; c: the share of v0, w.c where it is not in `from`.
+  static void add_stages(const Block& b, double h, double c, const Weights& w, int first, int last,
+                         const LaneRows& from, LaneRows& to);
   bool follow_explicit(const Step& step, int i);
   bool follow_implicit(const Step& step, const StageGroup& group);
   void add_running_costs(const Step& step, int i, std::span<const Cost> costs, Eigen::MatrixXd& psi_rho);
@@ -57,6 +69,8 @@ class TangentSweep {
   Dynamics dynamics_;
   Projector projector_;
   std::optional<LinearisedStages> implicit_;
+  std::vector<Weights> of_stage_;  // A
+  Weights of_step_;                // b
   std::vector<Block> blocks_;
   Eigen::VectorXd y_, ydot_, y_bar_, rho_bar_;
   Eigen::MatrixXd y_rho_;
