@@ -217,18 +217,20 @@ bool PlanarProjector::linearise(double t, const Eigen::VectorXd& angles, const E
 // Solves, with J~ = J(q~) and J = J(q) (its columns of turns times E = d theta/d delta at the position level),
 //   [ M  J~' ] or, transposed,  [ M  E J' ]        (velocity level: [ M J'; J 0 ], symmetric)
 //   [ JE  0  ]                  [ J~  0   ]
-// by x += K (rhs - B x) with K the approximate inverse that the factor of S(q~) gives.
+// by x += K (rhs - B x) with K the approximate inverse that the factor of S(q~) gives. directions: what x adds to,
+// against which its rounding counts.
 template <class X, class Y>
-void PlanarProjector::refine(Level level, bool transposed, const std::vector<X>& b, const Y& g, std::vector<X>& x,
-                             Y& nu, std::vector<X>& r, std::vector<X>& dx, std::vector<X>& Ex, Y& rg, Y& dnu) const {
+void PlanarProjector::refine(Level level, bool transposed, const Sizes<X>& directions, const std::vector<X>& b,
+                             const Y& g, std::vector<X>& x, Y& nu, std::vector<X>& r, std::vector<X>& dx,
+                             std::vector<X>& Ex, Y& rg, Y& dnu) const {
   solver_.solve(b, g, kOnePass, x, nu);
   if (rows_.count() == 0) return;
   const bool position = level == Level::position;
   const auto turn_by_E = [&](std::vector<X>& of) {
     for (std::size_t i = 0; i < of.size(); ++i) of[i].row(2) *= bodies_[i + 1].turn_by_delta;
   };
-  const auto size = largest(x);
-  auto before = size;
+  Sizes<X> before = largest(x);
+  const Sizes<X> size = before.max(directions);
   for (int k = 0; k < kMostRefinements; ++k) {
     for (int i = 1; i <= data_.n; ++i) r[at(i - 1)] = b[at(i - 1)] - solver_.mass_times(i, x[at(i - 1)]);
     rg = g;
@@ -297,8 +299,8 @@ void PlanarProjector::tangent(const ParameterBlock& block, const LaneRows& y_hat
   for (std::size_t k = 1; k < bodies_.size(); ++k) place(bodies_[k].r, frames_[k].A, q_dir_[k - 1], dual_frames_[k]);
   constraints_.tangents(Order::phi, dual_frames_, laws_, angles_, block, nu_, dirs_, load_dirs_);
   g_lanes_ = -dirs_.phi;
-  refine(Level::position, false, b_lanes_, g_lanes_, x_lanes_, nu_lanes_, r_lanes_, dx_lanes_, Ex_lanes_, rg_lanes_,
-         dnu_lanes_);
+  refine(Level::position, false, largest(q_dir_), b_lanes_, g_lanes_, x_lanes_, nu_lanes_, r_lanes_, dx_lanes_,
+         Ex_lanes_, rg_lanes_, dnu_lanes_);
   for (std::size_t k = 1; k < bodies_.size(); ++k) {
     x_lanes_[k - 1].row(2) *= bodies_[k].turn_by_delta;
     q_dir_[k - 1] += x_lanes_[k - 1];
@@ -324,8 +326,8 @@ void PlanarProjector::tangent(const ParameterBlock& block, const LaneRows& y_hat
     constraints_.tangents(Order::phi_dot, dual_frames_, laws_, angles_, block, kappa_, dirs_, load_dirs_);
     set_b(block, u_);
     g_lanes_ = -dirs_.phi_dot;
-    refine(Level::velocity, false, b_lanes_, g_lanes_, x_lanes_, nu_lanes_, r_lanes_, dx_lanes_, Ex_lanes_, rg_lanes_,
-           dnu_lanes_);
+    refine(Level::velocity, false, largest(v_dir_), b_lanes_, g_lanes_, x_lanes_, nu_lanes_, r_lanes_, dx_lanes_,
+           Ex_lanes_, rg_lanes_, dnu_lanes_);
     for (std::size_t i = 0; i < v_dir_.size(); ++i) v_dir_[i] += x_lanes_[i];
   }
 
@@ -386,7 +388,7 @@ void PlanarProjector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd&
   if (rows_.count() > 0) {
     for (std::size_t k = 1; k < bodies_.size(); ++k) b_[k - 1] << v_bar_[k].r.re, v_bar_[k].r.im, v_bar_[k].theta;
     g_.setZero();
-    refine(Level::velocity, true, b_, g_, x_, mu_, r_, dx_, Ex_, phi_, dnu_);
+    refine(Level::velocity, true, Sizes<Vec<3>>::Zero(), b_, g_, x_, mu_, r_, dx_, Ex_, phi_, dnu_);
     for (PlanarFrameBar& bar : bars_) bar = {};
     shift(x_);
     constraints_.add_pull_back(frames_, shifts_, laws_, angles_, {&kappa_, nullptr, &mu_, nullptr}, -1, bars_,
@@ -411,7 +413,7 @@ void PlanarProjector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd&
       b_[k - 1] << q_bar_[k].r.re, q_bar_[k].r.im, bodies_[k].turn_by_delta * q_bar_[k].theta;
     }
     g_.setZero();
-    refine(Level::position, true, b_, g_, x_, mu_, r_, dx_, Ex_, phi_, dnu_);
+    refine(Level::position, true, Sizes<Vec<3>>::Zero(), b_, g_, x_, mu_, r_, dx_, Ex_, phi_, dnu_);
     for (PlanarFrameBar& bar : bars_) bar = {};
     constraints_.add_pull_back(frames_, still_, laws_, angles_, {nullptr, &mu_, nullptr, nullptr}, -1, bars_, theta_bar,
                                rho_bar);

@@ -44,9 +44,12 @@ class PlanarProjector {
   void set_positions(const std::vector<Vec<3>>& delta);
   void set_velocities(const std::vector<Vec<3>>& u);
   void read(const Eigen::VectorXd& y);
+  // The largest entry of each direction.
+  template <class X>
+  using Sizes = Eigen::Array<double, 1, X::ColsAtCompileTime>;
   template <class X, class Y>
-  void refine(Level level, bool transposed, const std::vector<X>& b, const Y& g, std::vector<X>& x, Y& nu,
-              std::vector<X>& r, std::vector<X>& dx, std::vector<X>& Ex, Y& rg, Y& dnu) const;
+  void refine(Level level, bool transposed, const Sizes<X>& directions, const std::vector<X>& b, const Y& g,
+              std::vector<X>& x, Y& nu, std::vector<X>& r, std::vector<X>& dx, std::vector<X>& Ex, Y& rg, Y& dnu) const;
   // b = -M' x - (J'nu)' in the directions of the parameters, load_dirs_ holding (J'nu)'.
   void set_b(const ParameterBlock& block, const std::vector<Vec<3>>& x);
   void add_mass_bar(const std::vector<Vec<3>>& eta, const std::vector<Vec<3>>& x, Eigen::VectorXd& theta_bar) const;

@@ -61,9 +61,12 @@ class Projector {
                   std::vector<Frame>& frames) const;
   void set_q(const std::vector<Vec<6>>& delta, Eigen::VectorXd& y);
   void prepare_bodies(const Eigen::VectorXd& y_hat);
+  // The largest entry of each direction.
+  template <class X>
+  using Sizes = Eigen::Array<double, 1, X::ColsAtCompileTime>;
   template <class X, class Y>
-  void refine(Level level, bool transposed, const std::vector<X>& b, const Y& g, std::vector<X>& x, Y& nu,
-              std::vector<X>& r, std::vector<X>& dx, Y& rg, Y& dnu);
+  void refine(Level level, bool transposed, const Sizes<X>& directions, const std::vector<X>& b, const Y& g,
+              std::vector<X>& x, Y& nu, std::vector<X>& r, std::vector<X>& dx, Y& rg, Y& dnu);
   template <class X>
   void rotate_by_E(const std::vector<X>& x, std::vector<X>& out, bool transposed) const;
 

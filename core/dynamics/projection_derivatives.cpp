@@ -94,10 +94,11 @@ void Projector::rotate_by_E(const std::vector<X>& x, std::vector<X>& out, bool t
 // Solves, with J~ = J(q~) and J = J(q) (times E at the position level),
 //   [ M  J~' ] or, transposed,  [ M  E'J' ]        (velocity level: [ M J'; J 0 ], symmetric)
 //   [ JE  0  ]                  [ J~  0   ]
-// by x += K (rhs - B x) with K the approximate inverse that the factor of S(q~) gives.
+// by x += K (rhs - B x) with K the approximate inverse that the factor of S(q~) gives. directions: what x adds to,
+// against which its rounding counts.
 template <class X, class Y>
-void Projector::refine(Level level, bool transposed, const std::vector<X>& b, const Y& g, std::vector<X>& x, Y& nu,
-                       std::vector<X>& r, std::vector<X>& dx, Y& rg, Y& dnu) {
+void Projector::refine(Level level, bool transposed, const Sizes<X>& directions, const std::vector<X>& b, const Y& g,
+                       std::vector<X>& x, Y& nu, std::vector<X>& r, std::vector<X>& dx, Y& rg, Y& dnu) {
   auto& Ex = [&]() -> std::vector<X>& {
     if constexpr (X::ColsAtCompileTime == 1) {
       return Ex_;
@@ -108,8 +109,8 @@ void Projector::refine(Level level, bool transposed, const std::vector<X>& b, co
   solver_.solve(b, g, kOnePass, x, nu);
   if (data_.m == 0) return;
   const bool position = level == Level::position;
-  const auto size = largest(x);
-  auto before = size;
+  Sizes<X> before = largest(x);
+  const Sizes<X> size = before.max(directions);
   for (int k = 0; k < kMostRefinements; ++k) {
     for (int i = 1; i <= data_.n; ++i) r[at(i - 1)] = -solver_.mass_times(i, x[at(i - 1)]);
     rg = g;
@@ -194,7 +195,8 @@ void Projector::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, 
     evaluate_field_tangents(data_, frames_, laws_, angles_, block, mu_, dirs_, loads_);
     g_lanes_ = -dirs_.phi;
     rows_.subtract_times(x_lanes_, g_lanes_);
-    refine(Level::position, false, b_lanes_, g_lanes_, x_lanes_, nu_lanes_, r_lanes_, dx_lanes_, rg_lanes_, dnu_lanes_);
+    refine(Level::position, false, largest(x_lanes_), b_lanes_, g_lanes_, x_lanes_, nu_lanes_, r_lanes_, dx_lanes_,
+           rg_lanes_, dnu_lanes_);
     for (int i = 1; i <= n; ++i) {
       const Body& b = bodies_[at(i)];
       const Lanes<6>& d = x_lanes_[at(i - 1)];
@@ -229,7 +231,8 @@ void Projector::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, 
   evaluate_tangents(data_, frames_, laws_, angles_, frame_dirs_, block, s.kappa, dirs_, loads_);
   mass_directions(s.u);
   g_lanes_ = -dirs_.phi_dot;
-  refine(Level::velocity, false, b_lanes_, g_lanes_, x_lanes_, nu_lanes_, r_lanes_, dx_lanes_, rg_lanes_, dnu_lanes_);
+  refine(Level::velocity, false, y_dir.bottomRows(half).cwiseAbs().colwise().maxCoeff().array(), b_lanes_, g_lanes_,
+         x_lanes_, nu_lanes_, r_lanes_, dx_lanes_, rg_lanes_, dnu_lanes_);
   for (int i = 1; i <= n; ++i) {
     const Lanes<6>& u = x_lanes_[at(i - 1)];
     y_dir.middleRows<3>(half + 7 * (i - 1)) += u.topRows<3>();
@@ -266,7 +269,7 @@ void Projector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat
       b_[at(i - 1)].tail<3>() = 0.5 * G_times(bodies_[at(i)].p, v_bar_.segment<4>(7 * (i - 1) + 3));
     }
     g_.setZero();
-    refine(Level::velocity, true, b_, g_, x_, mu_, r_, dx_, phi_, dnu_);
+    refine(Level::velocity, true, Sizes<Vec<6>>::Zero(), b_, g_, x_, mu_, r_, dx_, phi_, dnu_);
     for (FrameBar& bar : bars_) bar.set_zero();
     for (int i = 1; i <= n; ++i) set_virtual(x_[at(i - 1)], frames_[at(i)]);
     add_pull_back(data_, frames_, laws_, angles_, {&s.kappa, nullptr, &mu_, nullptr}, -1, bars_, theta_bar, rho_bar);
@@ -306,7 +309,7 @@ void Projector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat
       b_[at(i - 1)].tail<3>() = 0.5 * G_times(bodies_[at(i)].p_tilde, pi_bar_of(i));
     }
     g_.setZero();
-    refine(Level::position, true, b_, g_, x_, mu_, r_, dx_, phi_, dnu_);
+    refine(Level::position, true, Sizes<Vec<6>>::Zero(), b_, g_, x_, mu_, r_, dx_, phi_, dnu_);
     add_pull_back(data_, frames_, laws_, angles_, {nullptr, &mu_, nullptr, nullptr}, -1, bars_, theta_bar, rho_bar);
     for (int i = 1; i <= n; ++i) {
       q_bar_.segment<7>(7 * (i - 1)) += pull_back_position(states_[at(i)], bars_[at(i)]);
