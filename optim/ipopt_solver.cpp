@@ -256,7 +256,8 @@ class Adapter : public Ipopt::TNLP {
 
   void look_for_progress() {
     if (!(points_.best().f >= best_f_)) best_f_ = points_.best().f, without_better_ = 0;
-    wandering_ = ++without_better_ > kWandering && round_ < kFreshStarts;
+    const double above_best = (iterate_f_ - best_f_) * problem_.f_scale;
+    wandering_ = ++without_better_ > kWandering && above_best > options_.tolerance && round_ < kFreshStarts;
   }
 
   const Recent& most_stationary() const {

@@ -1,5 +1,7 @@
 #include "optim/secant_curvature.hpp"
 
+#include <algorithm>
+
 namespace mbsopt {
 
 void SecantCurvature::add(const Eigen::VectorXd& x, const Eigen::VectorXd& f_x) {
@@ -29,7 +31,8 @@ Eigen::MatrixXd SecantCurvature::matrix_from(const Eigen::MatrixXd& first) const
 bool SecantCurvature::contradicts(const Eigen::MatrixXd& H) const {
   if (iterates_.size() < 2) return false;
   const auto [s, y] = pair(iterates_.size() - 1);
-  return (y - H * s).norm() > 0.5 * y.norm();
+  const Eigen::VectorXd Hs = H * s;
+  return (y - Hs).norm() > 0.5 * std::min(y.norm(), Hs.norm());
 }
 
 SecantCurvature::Pair SecantCurvature::pair(std::size_t k) const {

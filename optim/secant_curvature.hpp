@@ -8,8 +8,8 @@
 //   curvature.matrix();
 //
 // It also mends approximate Hessians G that leave something out (Gauss-Newton): where G contradicts the last step,
-// |y - G s| > |y|/2, BFGS goes on from G. Al-Baali and Fletcher (J. Oper. Res. Soc. 36 (1985) 405) choose between the
-// two by such a test, too.
+// |y - G s| > min(|y|, |G s|)/2, BFGS goes on from G. Al-Baali and Fletcher (J. Oper. Res. Soc. 36 (1985) 405) choose
+// between the two by such a test, too.
 //
 //   if (curvature.contradicts(G)) G = curvature.matrix_from(G);
 #pragma once
