@@ -137,6 +137,7 @@ NlpResult solved(DesignProgram& program, const Eigen::VectorXd& x_start, const O
     solver.max_iterations = static_cast<int>(spec.max_iterations.value_or(OptimizerSpec::kIpoptIterations));
     solver.max_evaluations = spec.max_evaluations;
     solver.second_order = spec.hessian != "lbfgs";
+    solver.gauss_newton = spec.hessian == "gauss_newton";
     solver.progress = progress;
     solver.records = records;
     NlpResult solution = solve_with_ipopt(program, x_start, solver);
@@ -207,6 +208,7 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
   if (start.ok) result.warnings = idle_variables(start, spec, evaluator);
 
   const auto progress = [&](const NlpProgress& p) {
+    if (abandoned) return false;  // the iterate before the one that was not reached
     result.history.push_back({p.iteration, p.f, p.violation, p.optimality, scaling.to_rho(p.x)});
     return !options.progress || options.progress(result.history.back());
   };

@@ -40,6 +40,7 @@ const NlpPoint& EvaluatedPoints::at(const Eigen::VectorXd& x_asked, Wanted wante
     return found->second.point;
   is_new_ = true;
   NlpPoint point = computed(wanted);
+  if (point.abandoned) return abandoned_ = std::move(point);  // neither an evaluation nor a failure of x
   ++outcome_.evaluations;
   if (point.ok) {
     failed_in_a_row_ = 0;

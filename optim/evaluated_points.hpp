@@ -51,7 +51,7 @@ class EvaluatedPoints {
   std::unordered_map<std::string, Kept> kept_;  // by the bytes of x
   std::deque<std::string> order_;               // oldest first
   Eigen::VectorXd x_, best_x_;
-  NlpPoint best_;
+  NlpPoint best_, abandoned_;
   bool have_best_ = false, is_new_ = false, is_better_ = false;
   int failed_in_a_row_ = 0;
   std::string last_error_;

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <limits>
 #include <vector>
 
 #include "core/expression/counted.hpp"
@@ -25,13 +26,15 @@ using VectorIn = Eigen::Map<const Eigen::VectorXd>;
 using VectorView = Eigen::Map<Eigen::VectorXd>;
 
 constexpr int kFreshStarts = 2;
+constexpr int kWandering = 30;       // iterations without a better point: lost in what was learnt from a wild motion
 constexpr int kStalled = 10;         // iterations between whose objectives there is but noise
 constexpr double kAcceptable = 100;  // times the tolerance: where noise hides the rest
 constexpr const char* kConvergedInNoise =
     "converged: the objective does not change any more, and the optimality conditions hold to the accuracy of its "
     "derivatives";
 constexpr const char* kConverged = "converged: the optimality conditions hold";
-constexpr double kNoise = 1e-2;    // times the tolerance, relative to f
+constexpr double kNoise = 1e-2;  // times the tolerance, relative to f
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr double kNoBound = 1e20;  // Ipopt's: at least 1e19 means none
 
 class Adapter : public Ipopt::TNLP {
@@ -50,6 +53,7 @@ class Adapter : public Ipopt::TNLP {
   bool out_of_evaluations() const { return out_of_evaluations_; }
   bool optimal() const { return optimal_; }
   bool stalled() const { return stalled_; }
+  bool wandering() const { return wandering_; }
 
   // Feasible, and the objective falls nowhere within the bounds: the barrier would only lead away from here.
   bool start_is_optimal() {
@@ -138,25 +142,34 @@ class Adapter : public Ipopt::TNLP {
     return true;
   }
 
-  bool intermediate_callback(Ipopt::AlgorithmMode, Index iteration, Number, Number, Number inf_du, Number, Number,
-                             Number, Number, Number, Index, const Ipopt::IpoptData*,
+  bool intermediate_callback(Ipopt::AlgorithmMode, Index iteration, Number, Number, Number, Number, Number, Number,
+                             Number, Number, Index, const Ipopt::IpoptData*,
                              Ipopt::IpoptCalculatedQuantities*) override {
     if (round_ > 0 && iteration == 0) return true;  // the point it goes on from
     result_.iterations = iterations_before_ + iteration;
     out_of_evaluations_ = options_.max_evaluations && result_.evaluations >= *options_.max_evaluations;
-    if (options_.progress && iterate_.size() > 0 && !told_progress(inf_du)) return false;
-    look_at_iterate();
-    return !out_of_evaluations_ && !optimal_ && !stalled_;
+    if (iterate_.size() == 0) return !out_of_evaluations_;
+    const bool known = evaluate(iterate_);  // in memory
+    double distance = known ? optimality(problem_, iterate_, *point_) : kUnknown;
+    if (known && options_.second_order) take_simplified_step(distance);
+    if (options_.progress && !told_progress(distance)) return false;
+    if (known && points_.feasible(*point_)) look_at_iterate(distance);
+    return !out_of_evaluations_ && !optimal_ && !stalled_ && !wandering_;
   }
 
-  bool told_progress(double inf_du) const {
-    return options_.progress({result_.iterations, iterate_f_, iterate_violation_, inf_du, iterate_});
+  bool told_progress(double distance) const {
+    return options_.progress({result_.iterations, iterate_f_, iterate_violation_, distance, iterate_});
   }
 
+  // Of a run that was ended here, the end was chosen here.
   void finalize_solution(Ipopt::SolverReturn, Index n, const Number* x, const Number*, const Number*, Index,
                          const Number*, const Number*, Number, const Ipopt::IpoptData*,
                          Ipopt::IpoptCalculatedQuantities*) override {
-    final_ = VectorIn(x, n);
+    if (!optimal_ && !stalled_) final_ = VectorIn(x, n);
+  }
+
+  double final_distance() {
+    return final_.size() > 0 && evaluate(final_) ? optimality(problem_, final_, *point_) : kUnknown;
   }
 
   // Of a stalled search, the end point's optimality.
@@ -171,7 +184,7 @@ class Adapter : public Ipopt::TNLP {
   void go_on_from_best() {
     x_start_ = points_.best_x();
     iterations_before_ = result_.iterations;
-    recent_.clear(), stalled_ = false;
+    recent_.clear(), stalled_ = wandering_ = false, without_better_ = 0;
     ++round_;
   }
 
@@ -204,15 +217,32 @@ class Adapter : public Ipopt::TNLP {
     return point_->ok;
   }
 
+  // A point costs one gradient, an exact Hessian many. So near the solution the one at hand serves for one more step,
+  // as a part of the iteration (the simplified Newton method), which counts where it ends well below the tolerance.
+  void take_simplified_step(double& distance) {
+    constexpr double kWellBelow = 0.1;
+    if (problem_.constraints() > 0 || !(distance > options_.tolerance) || hessians_.empty()) return;
+    const Eigen::LLT<Eigen::MatrixXd> factor(hessians_[0]);
+    if (distance > kAcceptable * options_.tolerance || factor.info() != Eigen::Success) return;
+    const Eigen::VectorXd x = iterate_ - factor.solve(point_->f_x);
+    const bool lower = evaluate(x) && point_->f <= iterate_f_;
+    const double there = lower ? optimality(problem_, points_.x(), *point_) : kUnknown;
+    if (there <= kWellBelow * options_.tolerance) {
+      keep_iterate();
+      distance = there;
+    } else {
+      evaluate(iterate_);
+    }
+  }
+
   // Ends that do not depend on the Hessian, nor on what is left of the barrier: an iterate is optimal by the yardstick
   // of all methods, or the last ones differ in nothing but noise, which a line search would go on trying to lower.
-  void look_at_iterate() {
-    if (iterate_.size() == 0 || !evaluate(iterate_) || !points_.feasible(*point_)) return;
-    const double distance = optimality(problem_, iterate_, *point_);
+  void look_at_iterate(double distance) {
     if (distance <= options_.tolerance) {
       optimal_ = true, final_ = iterate_;
       return;
     }
+    if (problem_.constraints() == 0) look_for_progress();
     recent_.push_back({iterate_, point_->f * problem_.f_scale, distance});
     if (recent_.size() <= kStalled) return;
     if (recent_.size() > kStalled + 1) recent_.pop_front();
@@ -224,6 +254,12 @@ class Adapter : public Ipopt::TNLP {
     if (stalled_) final_ = most_stationary().x;
   }
 
+  void look_for_progress() {
+    if (!(points_.best().f >= best_f_)) best_f_ = points_.best().f, without_better_ = 0;
+    const double above_best = (iterate_f_ - best_f_) * problem_.f_scale;
+    wandering_ = ++without_better_ > kWandering && above_best > options_.tolerance && round_ < kFreshStarts;
+  }
+
   const Recent& most_stationary() const {
     return *std::min_element(recent_.begin(), recent_.end(),
                              [](const Recent& a, const Recent& b) { return a.distance < b.distance; });
@@ -231,10 +267,11 @@ class Adapter : public Ipopt::TNLP {
 
   // The Hessian of f; but without constraints, where it is not positive definite, BFGS. Negative curvature holds for a
   // short way only, and Ipopt would add what makes all steps as short; the gradients of the iterates tell of a longer
-  // one.
+  // one. Gauss-Newton's is mended by it where it does not explain how the gradient has changed.
   Eigen::MatrixXd convex_where_free() const {
-    if (problem_.constraints() > 0 || Eigen::LLT<Eigen::MatrixXd>(hessians_[0]).info() == Eigen::Success)
-      return hessians_[0];
+    if (problem_.constraints() > 0) return hessians_[0];
+    if (options_.gauss_newton && secants_.contradicts(hessians_[0])) return secants_.matrix_from(hessians_[0]);
+    if (Eigen::LLT<Eigen::MatrixXd>(hessians_[0]).info() == Eigen::Success) return hessians_[0];
     return secants_.matrix();
   }
 
@@ -269,9 +306,10 @@ class Adapter : public Ipopt::TNLP {
   const NlpPoint* point_ = nullptr;  // the last one
   Eigen::VectorXd final_, iterate_, hessians_x_;
   std::vector<Eigen::MatrixXd> hessians_;
-  bool out_of_evaluations_ = false, optimal_ = false, stalled_ = false;
+  bool out_of_evaluations_ = false, optimal_ = false, stalled_ = false, wandering_ = false;
   std::deque<Recent> recent_;  // oldest first
-  int round_ = 0, iterations_before_ = 0;
+  int round_ = 0, iterations_before_ = 0, without_better_ = 0;
+  double best_f_ = kUnknown;
   double iterate_f_ = 0, iterate_violation_ = 0;
 };
 
@@ -354,7 +392,7 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
   list.SetNumericValue("acceptable_constr_viol_tol", options.constraint_tolerance);
   list.SetIntegerValue("acceptable_iter", 3);
   if (near_solution) {
-    list.SetNumericValue("mu_init", 1e-4);
+    if (!options.second_order || constrained) list.SetNumericValue("mu_init", 1e-4);
     list.SetNumericValue("bound_push", 1e-6), list.SetNumericValue("bound_frac", 1e-6);
   }
 }
@@ -391,10 +429,13 @@ NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_s
     if (adapter->optimal()) outcome = {SolverStatus::converged, kConverged};
     if (adapter->stalled()) outcome = stalled_in_words(adapter->distance(), result, options);
     const bool ended = outcome.status == SolverStatus::converged || outcome.status == SolverStatus::no_progress;
-    if (!ended || !adapter->passed_a_better_point()) break;
+    if (!adapter->wandering() && !(ended && adapter->passed_a_better_point())) break;
     adapter->go_on_from_best();
   }
   result.status = outcome.status, result.message = outcome.words;
+  if (outcome.status == SolverStatus::converged && adapter->final_distance() > options.tolerance)
+    result.message +=
+        fmt::format(" (as Ipopt measures them; by the measure of all methods to {:.1e})", adapter->final_distance());
   adapter->finish(outcome.status == SolverStatus::converged || adapter->stalled());
   const bool gave_up = outcome.status == SolverStatus::no_progress || outcome.status == SolverStatus::infeasible;
   if (gave_up && adapter->best_is_optimal()) {

@@ -44,6 +44,8 @@ constexpr int kFailuresInARow = 40;  // of local methods: they are lost
 constexpr double kFirstStep = 0.1;   // of x, without derivatives
 constexpr double kAcceptable = 100;  // times the tolerance: as Ipopt's second way to converge
 constexpr int kFreshStarts = 2;      // of local methods with gradients, from their best point
+constexpr long kCreeping = 50;       // evaluations in which methods of separable models have to gain
+constexpr double kLeastGain = 0.01;  // so much of f; along a narrow valley they do not, and slsqp goes on
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr long kRequestsPerPoint = 20;  // of points in memory; then a method goes round in circles
 
@@ -88,7 +90,6 @@ class Adapter {
     const Optimizer outer(nlopt_create(augmented ? NLOPT_AUGLAG : algorithm_, n), nlopt_destroy);
     opt_ = outer.get();
     limit(opt_, x_start);
-    nlopt_set_maxeval(opt_, static_cast<int>(std::min(kRequestsPerPoint * max_evaluations_, 2'000'000'000L)));
     if (augmented || algorithm_ == NLOPT_G_MLSL) {
       const Optimizer inner(nlopt_create(augmented ? algorithm_ : NLOPT_LD_LBFGS, n), nlopt_destroy);
       limit(inner.get(), x_start);
@@ -98,9 +99,7 @@ class Adapter {
       }
       nlopt_set_local_optimizer(opt_, inner.get());  // a copy
     }
-    nlopt_set_min_objective(opt_, objective, this);
-    add(inequalities_, nlopt_add_inequality_mconstraint, inequality_values);
-    add(equalities_, nlopt_add_equality_mconstraint, equality_values);
+    state_program();
     if (method_.random) nlopt_srand(options_.seed);
     result_.algorithm = nlopt_algorithm_name(algorithm_);
     if (augmented) result_.algorithm = std::string(nlopt_algorithm_name(NLOPT_AUGLAG)) + ": " + result_.algorithm;
@@ -111,14 +110,13 @@ class Adapter {
       return;
     }
     VectorXd x = x_start;
-    nlopt_result code = NLOPT_SUCCESS;
-    for (int round = 0; round <= kFreshStarts; ++round) {
-      const double f_before = points_.best().f;
-      double f = 0;
-      code = nlopt_optimize(opt_, x.data(), &f);
-      // A line search that got lost in what it had learnt may get on without it.
-      if (ended() || !stalled() || !(points_.best().f < f_before)) break;
+    nlopt_result code = optimized(x);
+    if (creeps_) {
+      const Optimizer finish(nlopt_create(NLOPT_LD_SLSQP, n), nlopt_destroy);
+      hand_over_to(finish.get(), x_start);
       x = points_.best_x();
+      code = optimized(x);
+      opt_ = outer.get();
     }
     if (const char* const words = nlopt_get_errmsg(opt_)) library_message_ = words;
     opt_ = nullptr;
@@ -132,6 +130,45 @@ class Adapter {
     double sign, bound;  // sign (c - bound) <= 0, or = 0
   };
   using AddConstraints = nlopt_result (*)(nlopt_opt, unsigned, nlopt_mfunc, void*, const double*);
+
+  void state_program() {
+    nlopt_set_maxeval(opt_, static_cast<int>(std::min(kRequestsPerPoint * max_evaluations_, 2'000'000'000L)));
+    nlopt_set_min_objective(opt_, objective, this);
+    add(inequalities_, nlopt_add_inequality_mconstraint, inequality_values);
+    add(equalities_, nlopt_add_equality_mconstraint, equality_values);
+  }
+
+  // From x on, which becomes where it ends.
+  nlopt_result optimized(VectorXd& x) {
+    nlopt_result code = NLOPT_SUCCESS;
+    for (int round = 0; round <= kFreshStarts; ++round) {
+      const double f_before = points_.best().f;
+      double f = 0;
+      code = nlopt_optimize(opt_, x.data(), &f);
+      // A line search that got lost in what it had learnt may get on without it.
+      if (ended() || (creeps_ && !handed_over_) || !stalled() || !(points_.best().f < f_before)) break;
+      x = points_.best_x();
+    }
+    return code;
+  }
+
+  void hand_over_to(nlopt_opt finish, const VectorXd& x_start) {
+    opt_ = finish, handed_over_ = true;
+    limit(opt_, x_start);
+    state_program();
+    result_.algorithm +=
+        fmt::format(", from evaluation {} on {}", result_.evaluations + 1, nlopt_algorithm_name(NLOPT_LD_SLSQP));
+  }
+
+  // Separable models know nothing of a valley that lies askew to the variables.
+  void look_for_gain() {
+    if (method_.constraints != ConstraintSupport::inequalities || creeps_ || ended()) return;
+    if (result_.evaluations < next_look_) return;
+    const double f = points_.best().f;
+    creeps_ = points_.feasible(points_.best()) && last_look_f_ - f <= kLeastGain * std::abs(f);
+    next_look_ = result_.evaluations + kCreeping, last_look_f_ = f;
+    if (creeps_ && opt_) nlopt_force_stop(opt_);
+  }
 
   // Bounds, and when steps and changes have become too small to go on.
   void limit(nlopt_opt opt, const VectorXd& x_start) const {
@@ -225,6 +262,7 @@ class Adapter {
       end(Ended::failures);
     }
     if (result_.evaluations >= max_evaluations_) end(Ended::evaluations);
+    look_for_gain();
   }
 
   void took_better(const NlpPoint& point) {
@@ -364,7 +402,12 @@ class Adapter {
         "converged: the steps, or the changes of the objective, are below the tolerance" + failures);
   }
 
-  void put(SolverStatus status, std::string words) { result_.status = status, result_.message = std::move(words); }
+  void put(SolverStatus status, std::string words) {
+    result_.status = status, result_.message = std::move(words);
+    if (handed_over_)
+      result_.message += fmt::format("; {} had hardly gained any more in {}, so slsqp went on from its best point",
+                                     method_.name, counted(kCreeping, "evaluation"));
+  }
 
   NonlinearProgram& problem_;
   const NloptMethod& method_;
@@ -384,6 +427,9 @@ class Adapter {
   NlpPoint solution_;
   double solution_distance_ = 0;
   double f_worst_ = 0;
+  bool creeps_ = false, handed_over_ = false;
+  long next_look_ = kCreeping;
+  double last_look_f_ = std::numeric_limits<double>::infinity();
 };
 
 bool has_equality(const NonlinearProgram& problem) {

@@ -1,5 +1,7 @@
 #include "optim/secant_curvature.hpp"
 
+#include <algorithm>
+
 namespace mbsopt {
 
 void SecantCurvature::add(const Eigen::VectorXd& x, const Eigen::VectorXd& f_x) {
@@ -9,16 +11,32 @@ void SecantCurvature::add(const Eigen::VectorXd& x, const Eigen::VectorXd& f_x) 
 }
 
 Eigen::MatrixXd SecantCurvature::matrix() const {
-  constexpr double kLeast = 1e-8;  // of |s| |y|: less is rounding
   const Eigen::Index n = iterates_.front().x.size();
-  Eigen::MatrixXd B = first_ * Eigen::MatrixXd::Identity(n, n);
+  return matrix_from(first_ * Eigen::MatrixXd::Identity(n, n));
+}
+
+Eigen::MatrixXd SecantCurvature::matrix_from(const Eigen::MatrixXd& first) const {
+  constexpr double kLeast = 1e-8;  // of |s| |y|: less is rounding
+  Eigen::MatrixXd B = first;
   for (std::size_t k = 1; k < iterates_.size(); ++k) {
-    const Eigen::VectorXd s = iterates_[k].x - iterates_[k - 1].x, y = iterates_[k].f_x - iterates_[k - 1].f_x;
+    const auto [s, y] = pair(k);
     if (!(y.dot(s) > kLeast * s.norm() * y.norm())) continue;
     const Eigen::VectorXd Bs = B * s;
-    B += y * y.transpose() / y.dot(s) - Bs * Bs.transpose() / s.dot(Bs);
+    B += y * y.transpose() / y.dot(s);
+    if (s.dot(Bs) > 0) B -= Bs * Bs.transpose() / s.dot(Bs);
   }
   return B;
+}
+
+bool SecantCurvature::contradicts(const Eigen::MatrixXd& H) const {
+  if (iterates_.size() < 2) return false;
+  const auto [s, y] = pair(iterates_.size() - 1);
+  const Eigen::VectorXd Hs = H * s;
+  return (y - Hs).norm() > 0.5 * std::min(y.norm(), Hs.norm());
+}
+
+SecantCurvature::Pair SecantCurvature::pair(std::size_t k) const {
+  return {iterates_[k].x - iterates_[k - 1].x, iterates_[k].f_x - iterates_[k - 1].f_x};
 }
 
 }  // namespace mbsopt

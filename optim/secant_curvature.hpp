@@ -6,6 +6,12 @@
 //   SecantCurvature curvature(1);           // of the first matrix, a multiple of the identity
 //   curvature.add(x, f_x);                  // each iterate
 //   curvature.matrix();
+//
+// It also mends approximate Hessians G that leave something out (Gauss-Newton): where G contradicts the last step,
+// |y - G s| > min(|y|, |G s|)/2, BFGS goes on from G. Al-Baali and Fletcher (J. Oper. Res. Soc. 36 (1985) 405) choose
+// between the two by such a test, too.
+//
+//   if (curvature.contradicts(G)) G = curvature.matrix_from(G);
 #pragma once
 
 #include <Eigen/Core>
@@ -20,12 +26,19 @@ class SecantCurvature {
 
   // The last one again changes nothing.
   void add(const Eigen::VectorXd& x, const Eigen::VectorXd& f_x);
-  Eigen::MatrixXd matrix() const;  // there must have been an iterate
+  Eigen::MatrixXd matrix() const;                                   // there must have been an iterate
+  Eigen::MatrixXd matrix_from(const Eigen::MatrixXd& first) const;  // positive semidefinite
+  bool contradicts(const Eigen::MatrixXd& H) const;                 // false before the second iterate
 
  private:
   struct Iterate {
     Eigen::VectorXd x, f_x;
   };
+  struct Pair {
+    Eigen::VectorXd s, y;
+  };
+  Pair pair(std::size_t k) const;  // between iterates k - 1 and k
+
   double first_;
   std::size_t pairs_;
   std::deque<Iterate> iterates_;  // oldest first

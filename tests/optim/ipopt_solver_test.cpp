@@ -201,3 +201,66 @@ TEST_CASE("ipopt says where noise is all that is left", "[ipopt]") {
   INFO(lost.message << " " << lost.iterations);
   CHECK(lost.iterations < 60);
 }
+
+TEST_CASE("ipopt mends Gauss-Newton's Hessian where residuals stay large", "[ipopt]") {
+  // r = (x + 1, lambda x^2 + x - 1), Powell's example (Fletcher, "Practical Methods of Optimization", 2nd ed., section
+  // 6.1): J'J is about half of f_xx at the minimum 0, so that its own steps overshoot.
+  struct LargeResidual : NonlinearProgram {
+    LargeResidual() : NonlinearProgram(1, 0) {}
+    void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
+      const double a = x(0) + 1, b = lambda * x(0) * x(0) + x(0) - 1, b_x = 2 * lambda * x(0) + 1;
+      p.f = (a * a + b * b) / 2;
+      p.f_x << a + b * b_x;
+    }
+    bool hessians(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& H) override {
+      const double b_x = 2 * lambda * x(0) + 1;
+      H.assign(1, Eigen::MatrixXd::Constant(1, 1, 1 + b_x * b_x));
+      return true;
+    }
+    double lambda = -0.9;  // f_xx(0) = 2 + 1.8
+  } problem;
+  IpoptOptions options;
+  options.second_order = true;
+  const NlpResult plain = solve_with_ipopt(problem, vector({0.3}), options);
+  options.gauss_newton = true;
+  const NlpResult mended = solve_with_ipopt(problem, vector({0.3}), options);
+  INFO(plain.iterations << " iterations plain, " << mended.iterations << " mended");
+  CHECK(mended.status == SolverStatus::converged);
+  CHECK(mended.x(0) == Approx(0).margin(1e-6));
+  CHECK(2 * mended.iterations <= plain.iterations);
+}
+
+TEST_CASE("ipopt: near the solution a Hessian serves for two steps", "[ipopt]") {
+  struct Convex : NonlinearProgram {
+    Convex() : NonlinearProgram(1, 0) {}
+    void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
+      p.f = std::exp(x(0)) - x(0);
+      p.f_x << std::exp(x(0)) - 1;
+    }
+    bool hessians(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& H) override {
+      ++asked;
+      H.assign(1, Eigen::MatrixXd::Constant(1, 1, std::exp(x(0))));
+      return true;
+    }
+    int asked = 0;
+  } problem;
+  const double start = 1.1;
+  int newton = 0;
+  double last = 0;
+  for (double x = start; std::abs(std::exp(x) - 1) > 1e-6; ++newton)
+    last = std::abs(std::exp(x) - 1), x -= (std::exp(x) - 1) / std::exp(x);
+  REQUIRE(last < 1e-4);  // one step before the end
+  IpoptOptions options;
+  options.second_order = true;
+  std::vector<double> distances;
+  options.progress = [&](const NlpProgress& p) { return distances.push_back(p.optimality), true; };
+  const NlpResult result = solve_with_ipopt(problem, vector({start}), options);
+  CHECK(result.status == SolverStatus::converged);
+  CHECK(result.iterations == newton - 1);
+  CHECK(problem.asked == result.iterations);
+  CHECK(result.evaluations == result.iterations + 2);
+  CHECK(std::abs(result.x(0)) < 1e-7);
+  // What progress tells is what the solution is judged by.
+  CHECK(distances.back() == Approx(std::abs(result.point.f_x(0))));
+  CHECK(distances.front() == Approx(std::exp(start) - 1));
+}

@@ -44,3 +44,22 @@ TEST_CASE("secant curvature: old iterates are forgotten", "[secant_curvature]") 
   CHECK(curvature.matrix()(0, 0) == Approx(1));
   CHECK(curvature.matrix()(1, 1) == Approx(9));
 }
+
+TEST_CASE("curvature that a matrix leaves out is learnt from the gradients, and only where it contradicts them",
+          "[secant_curvature]") {
+  const Eigen::Matrix2d H = (Eigen::Matrix2d() << 3, 1, 1, 5).finished();
+  SecantCurvature curvature(1);
+  const Eigen::Matrix2d half = H / 4;
+  curvature.add(Eigen::Vector2d(0, 0), Eigen::Vector2d(0, 0));
+  CHECK_FALSE(curvature.contradicts(half));  // nothing is known yet
+  for (const Eigen::Vector2d& x : {Eigen::Vector2d(1, 0), Eigen::Vector2d(1, 2), Eigen::Vector2d(-1, 1)})
+    curvature.add(x, H * x);
+  CHECK_FALSE(curvature.contradicts(H));
+  CHECK_FALSE(curvature.contradicts(0.7 * H));
+  CHECK(curvature.contradicts(half));
+  CHECK(curvature.contradicts(2 * H));
+  CHECK((curvature.matrix_from(H) - H).norm() < 1e-12);
+  const Eigen::Vector2d last(-2, -1);
+  CHECK((curvature.matrix_from(half) * last - H * last).norm() < 1e-12);
+  CHECK((curvature.matrix_from(half) - H).norm() < (half - H).norm());
+}
