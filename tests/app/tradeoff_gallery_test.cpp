@@ -29,7 +29,7 @@ struct Found {
 };
 
 Found reference_of(const std::string& name, const std::vector<std::string>& sets = {}, bool gradients = false,
-                   double seconds_per_run = 4) {
+                   double seconds_per_run = 0.5) {
   Found found{read_problem(file_of(name), sets), {}};
   CountedClock clock;
   found.reference =
