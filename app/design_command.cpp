@@ -26,17 +26,27 @@ void print_design(std::ostream& out, const DesignResult& design) {
     parameters.add({v.name, significant(v.initial, 10), significant(v.value, 10), v.unit.empty() ? "-" : v.unit,
                     bound_hit(v.at_lower, v.at_upper)});
   }
+  const bool any_smooth =
+      design.objective_true || std::any_of(design.constraints.begin(), design.constraints.end(),
+                                           [](const DesignConstraint& c) { return c.true_value.has_value(); });
   std::vector<std::string> header{"objective", "before", "after"};
+  if (any_smooth) header.push_back("true extreme");
   if (!design.constraints.empty()) header.insert(header.end(), {"at least", "at most"});
   TextTable objectives(header);
-  std::vector<std::string> minimised{design.objective, significant(design.objective_initial),
-                                     significant(design.objective_final) + true_extreme_text(design.objective_true)};
+  const auto row = [&](const std::string& name, double before, double after, const std::optional<double>& true_value) {
+    std::vector<std::string> cells{name, significant(before), significant(after)};
+    if (any_smooth) cells.push_back(true_value ? significant(*true_value) : "");
+    return cells;
+  };
+  std::vector<std::string> minimised =
+      row(design.objective, design.objective_initial, design.objective_final, design.objective_true);
   minimised.resize(header.size());
   objectives.add(minimised);
   const auto bound = [](const std::optional<double>& value) { return value ? significant(*value) : std::string(); };
   for (const DesignConstraint& c : design.constraints) {
-    objectives.add({c.objective, significant(c.initial), significant(c.value) + true_extreme_text(c.true_value),
-                    bound(c.lower), bound(c.upper)});
+    std::vector<std::string> cells = row(c.objective, c.initial, c.value, c.true_value);
+    cells.insert(cells.end(), {bound(c.lower), bound(c.upper)});
+    objectives.add(cells);
   }
   out << '\n' << parameters.text() << '\n' << objectives.text();
   out << fmt::format("\n{} {}: {}, {}, {:.3g} s{}\n", design.optimizer, to_string(design.status),

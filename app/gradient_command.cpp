@@ -95,7 +95,7 @@ int gradient_command(const CommandContext& context) {
   if (!settle_accuracy(run)) return run.finish();
   const Assembly assembly(mechanism, scene.simulation.start_time);
   if (!assembled(run, &mechanism, assembly)) return run.finish();
-  for (const std::string& warning : start_warnings(mechanism, assembly)) run.warn(warning);
+  for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
 
   double last_good_time = scene.simulation.start_time;
   EvaluatorOptions options;

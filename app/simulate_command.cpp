@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "app/accuracy_results.hpp"
 #include "app/command.hpp"
 #include "app/objective_values.hpp"
@@ -15,12 +17,18 @@ namespace {
 void add_objectives(Run& run, const SimulatedMotion& motion) {
   const Eigen::VectorXd& psi = motion.psi;
   if (psi.size() == 0) return;
-  TextTable table({"objective", "value"});
+  const bool any_smooth = std::any_of(motion.true_values.begin(), motion.true_values.end(),
+                                      [](const std::optional<double>& value) { return value.has_value(); });
+  std::vector<std::string> header{"objective", "value"};
+  if (any_smooth) header.push_back("true extreme");
+  TextTable table(header);
   for (Eigen::Index i = 0; i < psi.size(); ++i) {
     const std::string& name = run.problem.objectives[static_cast<std::size_t>(i)].name;
     const std::optional<double>& true_value = motion.true_values[static_cast<std::size_t>(i)];
     run.result["objectives"][name] = objective_json(psi(i), true_value);
-    table.add({name, significant(psi(i), 10) + true_extreme_text(true_value)});
+    std::vector<std::string> row{name, significant(psi(i), 10)};
+    if (any_smooth) row.push_back(true_value ? significant(*true_value, 10) : "");
+    table.add(row);
   }
   run.context.out << '\n' << table.text();
 }
@@ -39,7 +47,9 @@ int simulate_command(const CommandContext& context) {
     run.result["model"] = to_json(motion.model);
     run.result["simulation"] = to_json(simulation.statistics);
     print_model(context.out, scene.name, motion.model);
-    print_simulation(context.out, scene, simulation.statistics);
+    Scene simulated = scene;
+    if (!simulation.ok()) simulated.simulation.end_time = simulation.last_good_time;
+    print_simulation(context.out, simulated, simulation.statistics);
     run.write("trajectory.csv", to_csv(motion.trajectory));
     for (const std::string& warning : simulation_warnings(scene.simulation, simulation.statistics)) run.warn(warning);
     warn_of_stiffness(run, simulation.statistics, false);

@@ -25,7 +25,7 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
   }
   motion.model = assembly.summary();
   add_model(mechanism, settings, motion.model);
-  motion.warnings = start_warnings(mechanism, assembly);
+  motion.warnings = model_warnings(mechanism, assembly);
 
   std::vector<const Objective*> all;
   for (const Objective& objective : objectives) all.push_back(&objective);

@@ -60,7 +60,9 @@ Json errors_json(const std::vector<Quantity>& quantities, const Eigen::VectorXd&
 void add_reference(Run& run, const TradeoffReference& reference) {
   const TradeoffErrors& errors = *reference.errors;
   const auto method = [](const ReferenceMethod& m) {
-    return Json{{"integrator", m.integrator}, {"rtol", m.rtol}, {"wall_seconds", m.wall_seconds}};
+    return Json{{"integrator", m.integrator},
+                m.step ? Json{"step", *m.step} : Json{"rtol", m.rtol},
+                {"wall_seconds", m.wall_seconds}};
   };
   Json& json = run.result["reference"];
   json = {{"first", method(reference.first)}, {"second", method(reference.second)}};
@@ -83,9 +85,8 @@ void add_reference(Run& run, const TradeoffReference& reference) {
     for (std::size_t k = 0; k < parameters.size() && errors.exact().psi_rho.size() > 0; ++k)
       objective["gradient"][parameters[k].name] = errors.exact().psi_rho(row, static_cast<Eigen::Index>(k));
   }
-  run.context.out << fmt::format("reference: {} at rtol {:.0e}, certified by {} at rtol {:.0e}; {}\n",
-                                 reference.first.integrator, reference.first.rtol, reference.second.integrator,
-                                 reference.second.rtol, duration_text(reference.wall_seconds))
+  run.context.out << fmt::format("reference: {}, certified by {}; {}\n", in_words(reference.first),
+                                 in_words(reference.second), duration_text(reference.wall_seconds))
                   << '\n'
                   << table.text();
   for (const Quantity& q : errors.quantities()) {

@@ -59,6 +59,12 @@ def worst(errors, chosen):
     return f"{max(values):.2g}" if values else ""
 
 
+def method_in_words(method, at="at rtol"):
+    if "step" in method:
+        return f"{method['integrator']} with steps of {method['step']:.3g} s"
+    return f"{method['integrator']} {at} {method['rtol']:.0e}"
+
+
 def gallery_row(name, result):
     row = {"problem": name, "status": result["status"], "reference": "", "apart_objective": "", "apart_gradient": "",
            "absolute": "", "defaults_objective": "", "defaults_gradient": "", "defaults_seconds": "", "own_setting": "",
@@ -66,7 +72,7 @@ def gallery_row(name, result):
     if "reference" not in result:
         return row
     reference = result["reference"]
-    row["reference"] = " and ".join(f"{reference[k]['integrator']} at {reference[k]['rtol']:.0e}" for k in ("first", "second"))
+    row["reference"] = " and ".join(method_in_words(reference[k], "at") for k in ("first", "second"))
     objective, gradient = (lambda q: is_objective(result, q)), (lambda q: q.startswith("gradient of "))
     apart = {q: v["apart"] for q, v in reference["quantities"].items()}
     row["apart_objective"], row["apart_gradient"] = worst(apart, objective), worst(apart, gradient)
@@ -123,8 +129,8 @@ def keep(runs):
                 "command": "mbsopt " + result["provenance"]["command_line"].removeprefix("mbsopt ").split(" --out")[0],
                 "machine": f"{result['machine']['cpu']}, {result['machine']['cores']} cores",
                 "load": f"{result['machine']['load'] or 0:.1f}",
-                "first": f"{reference['first']['integrator']} at rtol {reference['first']['rtol']:.0e}",
-                "second": f"{reference['second']['integrator']} at rtol {reference['second']['rtol']:.0e}",
+                "first": method_in_words(reference["first"]),
+                "second": method_in_words(reference["second"]),
                 "apart": json.dumps({q: float(f"{v['apart']:.2g}") for q, v in reference["quantities"].items()}),
                 "advice": json.dumps([r["in_words"] for r in result.get("recommendations", [])]),
             })

@@ -11,7 +11,6 @@
 
 #include "core/dynamics/dynamics.hpp"
 #include "optim/median.hpp"
-#include "optim/stopwatch.hpp"
 
 namespace mbsopt {
 namespace {
@@ -52,7 +51,7 @@ double largest_relative_error(const Eigen::MatrixXd& of, const Eigen::MatrixXd& 
 class Study {
  public:
   Study(const Scene& scene, const std::vector<Objective>& objectives, const PenaltyStudyOptions& options)
-      : runs_(scene, objectives), options_(options) {}
+      : runs_(scene, objectives), options_(options), stopwatch_(options.clock) {}
 
   PenaltyStudy run() {
     find_reference();
@@ -81,13 +80,13 @@ class Study {
   double seconds_per_run() const {
     return std::max(1.0, options_.budget_seconds / (5 * static_cast<double>(options_.alphas.size() + 1)));
   }
-  RunLimit limit() const { return {seconds_per_run(), options_.interrupted}; }
+  RunLimit limit() const { return {seconds_per_run(), options_.interrupted, options_.clock}; }
 
   void find_reference() {
     say("reference", 0);
     ReferenceOptions options;
     options.seconds_per_run = std::max(10.0, options_.budget_seconds / 6);
-    options.interrupted = options_.interrupted;
+    options.interrupted = options_.interrupted, options.clock = options_.clock;
     options.gradients = false;
     result_.reference = converged_reference(runs_, options);
     result_.message = result_.reference.message;

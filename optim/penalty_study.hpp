@@ -53,6 +53,7 @@ struct PenaltyStudyOptions {
   double budget_seconds = 60;
   std::function<bool()> interrupted = {};
   std::function<void(const std::string& doing, double done)> progress = {};
+  Clock clock = {};  // of the budget and of all times
 };
 
 // xi, omega and projection as in the scene where it is a penalty form, else MBSVT's: 1, 10 and none.

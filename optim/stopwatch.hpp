@@ -1,16 +1,27 @@
-// Wall time since it was made.
+// Time since it was made: wall time, unless it is given a clock (a count of work, for runs that are to be repeatable).
 #pragma once
 
 #include <chrono>
+#include <functional>
+#include <utility>
 
 namespace mbsopt {
 
+using Clock = std::function<double()>;  // [s]; empty: wall time
+
 class Stopwatch {
  public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+  explicit Stopwatch(Clock clock = {}) : clock_(std::move(clock)), start_(now()) {}
+  double seconds() const { return now() - start_; }
 
  private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  double now() const {
+    if (clock_) return clock_();
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  }
+
+  Clock clock_;
+  double start_;
 };
 
 }  // namespace mbsopt

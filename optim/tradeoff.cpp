@@ -13,7 +13,6 @@
 #include "core/scene/default_integrator.hpp"
 #include "optim/median.hpp"
 #include "optim/pareto.hpp"
-#include "optim/stopwatch.hpp"
 
 namespace mbsopt {
 namespace {
@@ -35,16 +34,26 @@ std::vector<double> decades(int from, int to, int stride = 1) {
   return values;
 }
 
+// Whether runs of one scene are the same.
+bool same(const SimulationSettings& a, const SimulationSettings& b) {
+  const IntegratorSettings &i = a.integrator, &j = b.integrator;
+  const FormulationSettings &f = a.formulation, &g = b.formulation;
+  return i.type == j.type && i.rtol == j.rtol && i.atol == j.atol && i.step == j.step &&
+         i.initial_step == j.initial_step && i.max_step == j.max_step && i.max_steps == j.max_steps &&
+         f.type == g.type && f.alpha == g.alpha && f.xi == g.xi && f.omega == g.omega && f.iterations == g.iterations &&
+         f.tolerance == g.tolerance && f.linear_solver == g.linear_solver && f.projection == g.projection;
+}
+
 class Sweep {
  public:
   Sweep(const Scene& scene, const std::vector<Objective>& objectives, const TradeoffOptions& options)
-      : runs_(scene, objectives), options_(options) {}
+      : runs_(scene, objectives), options_(options), stopwatch_(options.clock) {}
 
   Tradeoff run() {
     find_reference();
     if (!result_.ok()) return finish();
     measure_given_settings();
-    budget_.emplace();
+    budget_.emplace(options_.clock);
     if (options_.budget_seconds > 0) {
       constexpr double kSimulations = 0.25, kGradients = 0.2, kFormulations = 0.1;  // of the budget; the rest: again
       stage("integrators", simulation_curves(), kSimulations);
@@ -68,7 +77,7 @@ class Sweep {
     say("reference", 0);
     ReferenceOptions options;
     options.seconds_per_run = std::max(10.0, options_.budget_seconds / 6);
-    options.interrupted = options_.interrupted;
+    options.interrupted = options_.interrupted, options.clock = options_.clock;
     result_.reference = converged_reference(runs_, options);
     result_.message = result_.reference.message;
   }
@@ -84,21 +93,22 @@ class Sweep {
   void measure_given_settings() {
     SimulationSettings defaults = own();
     defaults.formulation = {}, defaults.integrator = default_integrator(own().start_time, own().end_time);
-    RunLimit limit{std::max(10.0, options_.budget_seconds / 3), options_.interrupted};
+    const RunLimit limit = within(std::max(10.0, options_.budget_seconds / 3));
     const auto add = [&](const char* curve, const SimulationSettings& settings,
                          std::optional<GradientMethod> method) -> std::optional<std::size_t> {
       if (interrupted()) return {};
       return measure({curve, settings, method}, limit);
     };
+    const bool is_default = same(own(), defaults);
     result_.own = add("as in the file", own(), {});
-    result_.defaults = add("defaults", defaults, {});
+    result_.defaults = is_default ? result_.own : add("defaults", defaults, {});
     if (!has_gradients()) return;
     const GradientCost cost = gradient_cost(runs_.scene().parameters.size(), runs_.objectives().size());
     const bool forward = cost.tlm <= cost.adjoint;
     const auto discrete = forward ? GradientMethod::tlm : GradientMethod::adjoint;
     const auto continuous = forward ? GradientMethod::cvodes_forward : GradientMethod::cvodes_adjoint;
     result_.own_gradient = add("as in the file", own(), is_cvodes(own().integrator.type) ? continuous : discrete);
-    result_.default_gradient = add("defaults", defaults, discrete);
+    result_.default_gradient = is_default ? result_.own_gradient : add("defaults", defaults, discrete);
   }
 
   bool has_gradients() const { return !result_.reference.gradients_by.empty(); }
@@ -205,12 +215,13 @@ class Sweep {
     return curves;
   }
 
+  RunLimit within(double seconds) const { return {seconds, options_.interrupted, options_.clock}; }
   double budget_left() const { return options_.budget_seconds - budget_->seconds(); }
   double most_per_point() const { return options_.budget_seconds / 30; }
 
   // All curves a point further, again and again, until each is done or the stage's share is used up.
   void stage(const char* name, std::vector<Curve> curves, double share) {
-    const Stopwatch stopwatch;
+    const Stopwatch stopwatch(options_.clock);
     const double seconds = share * options_.budget_seconds;
     const double all = static_cast<double>(curves.size());
     for (bool any = true; any && !interrupted();) {
@@ -242,7 +253,7 @@ class Sweep {
       return;
     }
     ++curve.next;
-    const TradeoffRow& row = result_.rows[measure(setting, {most_per_point() * 2, options_.interrupted})];
+    const TradeoffRow& row = result_.rows[measure(setting, within(most_per_point() * 2))];
     if (row.status == RowStatus::abandoned || row.within_floor) curve.next = curve.settings.size();
     if (row.status != RowStatus::ok) return;
     if (curve.last_seconds > 0) curve.growth = std::clamp(row.wall_seconds / curve.last_seconds, 1.3, 5.0);
@@ -299,7 +310,7 @@ class Sweep {
         TradeoffRow& row = result_.rows[i];
         if (interrupted()) return;
         if (row.status != RowStatus::ok || row.wall_seconds > budget_left()) continue;
-        const Answer answer = timed(row.setting, {10 * row.wall_seconds + 1, options_.interrupted});
+        const Answer answer = timed(row.setting, within(10 * row.wall_seconds + 1));
         if (answer.ok) seconds_[i].push_back(answer.wall_seconds);
         row.wall_seconds = median(seconds_[i]);
         row.repetitions = static_cast<int>(seconds_[i].size());

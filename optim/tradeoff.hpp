@@ -72,6 +72,7 @@ struct TradeoffOptions {
   double budget_seconds = 60;  // 0: the reference, the scene's own settings and the defaults only
   std::function<bool()> interrupted = {};
   std::function<void(const std::string& doing, double done)> progress = {};  // done: 0..1
+  Clock clock = {};                                                          // of the budget and of all times
 };
 
 Tradeoff measure_tradeoff(const Scene& scene, const std::vector<Objective>& objectives,

@@ -9,7 +9,6 @@
 #include <string>
 
 #include "optim/parameter_values.hpp"
-#include "optim/stopwatch.hpp"
 
 namespace mbsopt {
 namespace {
@@ -23,19 +22,25 @@ struct Candidate {
   double change = std::numeric_limits<double>::infinity();  // made by the last tightening
 };
 
+struct Stepped {
+  const char* integrator;
+  int order;
+};
+
 class Search {
  public:
   Search(const TradeoffRuns& runs, const ReferenceOptions& options)
       : runs_(runs), options_(options), distance_(runs.mechanism()) {}
 
   TradeoffReference run() {
-    const Stopwatch stopwatch;
+    const Stopwatch stopwatch(options_.clock);
     TradeoffReference reference;
     std::vector<Candidate> found;
     for (const char* integrator : {"dopri853", "gauss6", "verner6", "radau5"}) {
       if (agree(found) || interrupted()) break;
       if (std::optional<Candidate> candidate = converged(integrator)) found.push_back(std::move(*candidate));
     }
+    if (std::any_of(found.begin(), found.end(), is_unmet)) add_stepped(found);
     reference.interrupted = interrupted();
     if (found.size() < 2) {
       reference.message = fmt::format("no reference was found by two methods: {}", problem_);
@@ -54,16 +59,22 @@ class Search {
 
  private:
   bool interrupted() const { return options_.interrupted && options_.interrupted(); }
-  RunLimit limit() const { return {options_.seconds_per_run, options_.interrupted}; }
+  RunLimit limit() const { return {options_.seconds_per_run, options_.interrupted, options_.clock}; }
+
+  static constexpr double kAgreeing = 1e-7;
 
   // Two that each have settled, on the same answer.
   bool agree(const std::vector<Candidate>& found) const {
-    constexpr double kSettled = 1e-9, kSame = 1e-7;
+    constexpr double kSettled = 1e-9;
     const auto settled =
         std::count_if(found.begin(), found.end(), [](const Candidate& c) { return c.change < kSettled; });
     if (settled < 2) return false;
+    return least_apart(found) < kAgreeing;
+  }
+
+  double least_apart(const std::vector<Candidate>& found) const {
     const auto [first, second] = closest(found);
-    return apart(found[first].answer, found[second].answer) < kSame;
+    return apart(found[first].answer, found[second].answer);
   }
 
   // Tightens until the answer no longer settles.
@@ -81,10 +92,59 @@ class Search {
         if (!best) problem_ += fmt::format("{}{}: {}", problem_.empty() ? "" : "; ", integrator, next.answer.message);
         break;
       }
-      next.method = {integrator, rtol, next.answer.wall_seconds};
+      next.method = {integrator, rtol, {}, next.answer.wall_seconds};
       if (best) next.change = apart(next.answer, best->answer);
       if (best && next.change >= best->change) break;
       best = std::move(next);
+    }
+    return best;
+  }
+
+  // Whether a stage came so close to a singular position that its equations were regularised ones.
+  static bool is_unmet(const Candidate& c) { return c.answer.statistics.max_acceleration_residual > 1e-9; }
+
+  // Where these agree nothing else counts.
+  void add_stepped(std::vector<Candidate>& found) {
+    long most_evaluations = 0;
+    for (const Candidate& c : found) most_evaluations = std::max(most_evaluations, c.answer.statistics.rhs_evaluations);
+    for (const Stepped& method : {Stepped{"gauss6", 6}, Stepped{"radau5", 5}}) {
+      if (interrupted()) return;
+      if (std::optional<Candidate> candidate = stepped(method, most_evaluations))
+        found.push_back(std::move(*candidate));
+    }
+    if (std::count_if(found.begin(), found.end(), is_unmet) > static_cast<std::ptrdiff_t>(found.size()) - 2) return;
+    std::vector<Candidate> met;
+    for (const Candidate& c : found)
+      if (!is_unmet(c)) met.push_back(c);
+    if (least_apart(met) < kAgreeing) found = std::move(met);
+  }
+
+  // Halves the steps until what is left of the error is small or the answer no longer settles; with no more right-hand
+  // sides than step-size control took.
+  std::optional<Candidate> stepped(const Stepped& method, long most_evaluations) {
+    constexpr double kResolved = 1e-3;  // above it changes may grow: steps are still too large
+    constexpr double kLeft = 6e-11;
+    constexpr int kMostSteps = 1 << 16;
+    const SimulationSettings& own = runs_.scene().simulation;
+    std::optional<Candidate> best;
+    for (int count = 125; count <= kMostSteps; count *= 2) {
+      if (best && (2 * best->method.wall_seconds > options_.seconds_per_run ||
+                   2 * best->answer.statistics.rhs_evaluations > most_evaluations))
+        break;
+      Candidate next;
+      next.settings = with_tolerance(own, method.integrator, own.integrator.rtol);
+      next.settings.integrator.step = (own.end_time - own.start_time) / count;
+      next.settings.formulation = constrained(next.settings.formulation);
+      next.answer = runs_.motion(next.settings, limit());
+      if (!next.answer.ok) {
+        if (best || next.answer.out_of_time || interrupted()) break;
+        continue;
+      }
+      next.method = {method.integrator, 0, next.settings.integrator.step, next.answer.wall_seconds};
+      if (best) next.change = apart(next.answer, best->answer);
+      if (best && next.change >= best->change && best->change < kResolved) break;
+      best = std::move(next);
+      if (best->change < kLeft * (1 << method.order)) break;
     }
     return best;
   }
@@ -119,11 +179,31 @@ class Search {
     const GradientMethod method = cost.tlm <= cost.adjoint ? GradientMethod::tlm : GradientMethod::adjoint;
     RunLimit longer = limit();
     longer.seconds *= 4;
-    Answer of_a = runs_.gradients(a.settings, method, longer), of_b = runs_.gradients(b.settings, method, longer);
+    const auto gradients = [&](const Candidate& c) {
+      return c.method.step ? least_changing(c, method, longer) : runs_.gradients(c.settings, method, longer);
+    };
+    Answer of_a = gradients(a), of_b = gradients(b);
     if (!of_a.ok || !of_b.ok) return;
-    shorten_steps({a.settings, b.settings}, method, longer, of_a, of_b);
+    if (!a.method.step && !b.method.step) shorten_steps({a.settings, b.settings}, method, longer, of_a, of_b);
     a.answer.psi_rho = std::move(of_a.psi_rho), b.answer.psi_rho = std::move(of_b.psi_rho);
     reference.gradients_by = to_string(method);
+  }
+
+  // Derivatives magnify the rounding of positions next to singular ones, and more steps come closer to them: of steps
+  // up to eight times the motion's, those whose halving changed the gradient least.
+  Answer least_changing(const Candidate& candidate, GradientMethod method, const RunLimit& limit) const {
+    Answer best, last;
+    double least = std::numeric_limits<double>::infinity();
+    for (const double longer : {8.0, 4.0, 2.0, 1.0}) {
+      SimulationSettings settings = candidate.settings;
+      *settings.integrator.step *= longer;
+      Answer next = runs_.gradients(settings, method, limit);
+      if (!next.ok) continue;
+      const double change = last.ok ? gradients_apart(next, last) : std::numeric_limits<double>::infinity();
+      if (!best.ok || change < least) best = next, least = change;
+      last = std::move(next);
+    }
+    return best;
   }
 
   // Step-size control looks at the motion. What only derivatives see, a kink of a law in a parameter say, takes shorter
@@ -173,6 +253,11 @@ class Search {
 };
 
 }  // namespace
+
+std::string in_words(const ReferenceMethod& method) {
+  return method.step ? fmt::format("{} with steps of {:.3g} s", method.integrator, *method.step)
+                     : fmt::format("{} at rtol {:.0e}", method.integrator, method.rtol);
+}
 
 TradeoffReference converged_reference(const TradeoffRuns& runs, const ReferenceOptions& options) {
   return Search(runs, options).run();

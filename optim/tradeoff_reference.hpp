@@ -2,8 +2,9 @@
 // answer no longer settles (rounding) or costs too much. What the two are apart is the reference's certificate.
 //
 // Methods: dopri853 (explicit) and gauss6 (implicit); where one of them does not get there (stiff motion, singular
-// positions) verner6 and radau5. Equations: the constrained ones (augmented Lagrangian, projected), whatever the scene
-// asks for.
+// positions) verner6 and radau5. Where equations were not met next to singular positions, gauss6 and radau5 with steps
+// of one size, too: step-size control takes ever shorter steps around these positions, and some stage comes too close.
+// Equations: the constrained ones (augmented Lagrangian, projected), whatever the scene asks for.
 //
 //   const TradeoffReference reference = converged_reference(runs);
 //   if (reference.ok()) reference.errors->of(answer);
@@ -19,8 +20,12 @@ namespace mbsopt {
 struct ReferenceMethod {
   std::string integrator;
   double rtol = 0;
-  double wall_seconds = 0;  // of its last simulation
+  std::optional<double> step;  // fixed: there is no rtol
+  double wall_seconds = 0;     // of its last simulation
 };
+
+// "gauss6 at rtol 1e-11", "gauss6 with steps of 0.005 s"
+std::string in_words(const ReferenceMethod& method);
 
 struct TradeoffReference {
   std::string message;                   // why there is none
@@ -36,6 +41,7 @@ struct ReferenceOptions {
   double seconds_per_run = 10;  // a run that would take longer is left out
   bool gradients = true;
   std::function<bool()> interrupted = {};
+  Clock clock = {};  // of seconds_per_run
 };
 
 TradeoffReference converged_reference(const TradeoffRuns& runs, const ReferenceOptions& options = {});

@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "optim/objective_run.hpp"
-#include "optim/stopwatch.hpp"
 
 namespace mbsopt {
 namespace {
@@ -15,7 +14,7 @@ std::vector<bool> no_derivatives(const Scene& scene) { return std::vector<bool>(
 // Follows a run and ends it when its time is up.
 class Watch {
  public:
-  explicit Watch(const RunLimit& limit) : limit_(limit) {}
+  explicit Watch(const RunLimit& limit) : limit_(limit), stopwatch_(limit.clock) {}
   bool go_on(double t) {
     out_of_time_ = stopwatch_.seconds() > limit_.seconds;
     t_ = t;

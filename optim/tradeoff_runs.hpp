@@ -14,6 +14,7 @@
 
 #include "optim/evaluator.hpp"
 #include "optim/sampled_motion.hpp"
+#include "optim/stopwatch.hpp"
 
 namespace mbsopt {
 
@@ -33,6 +34,7 @@ struct Answer {
 struct RunLimit {
   double seconds = std::numeric_limits<double>::infinity();  // a run that takes longer is abandoned
   std::function<bool()> interrupted = {};
+  Clock clock = {};  // of the limit and of the times reported
 };
 
 class TradeoffRuns {

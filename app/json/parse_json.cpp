@@ -75,8 +75,11 @@ class NodeBuilder : public nlohmann::json_sax<nlohmann::json> {
   bool key(string_t& value) override {
     const TokenScan::Token token = scan_.next();
     Level& level = levels_.back();
-    if (!level.keys.insert(value).second && findings_)
-      findings_->add_at(token.begin, child_path(level.path, value), "this key is there twice; a key is allowed once");
+    if (!level.keys.insert(value).second) {
+      if (findings_)
+        findings_->add_at(token.begin, child_path(level.path, value), "this key is there twice; a key is allowed once");
+      level.repeated.push_back(level.node.keys.size());
+    }
     level.node.keys.push_back(std::move(value));
     level.node.key_offsets.push_back(token.begin);
     return true;
@@ -95,6 +98,7 @@ class NodeBuilder : public nlohmann::json_sax<nlohmann::json> {
     Node node;
     std::string path;
     std::unordered_set<std::string> keys;
+    std::vector<std::size_t> repeated;  // which of the node's keys were there before
   };
 
   bool number(double value) { return scalar(Node::Kind::number).number = value, true; }
@@ -125,7 +129,14 @@ class NodeBuilder : public nlohmann::json_sax<nlohmann::json> {
 
   bool close() {
     Node node = std::move(levels_.back().node);
+    const std::vector<std::size_t> repeated = std::move(levels_.back().repeated);
     levels_.pop_back();
+    for (auto i = repeated.rbegin(); i != repeated.rend(); ++i) {  // reported: nothing else is to stumble over them
+      const auto at = static_cast<std::ptrdiff_t>(*i);
+      node.keys.erase(node.keys.begin() + at);
+      node.key_offsets.erase(node.key_offsets.begin() + at);
+      node.items.erase(node.items.begin() + at);
+    }
     node.end = scan_.next().end;
     attach(std::move(node));
     return true;

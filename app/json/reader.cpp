@@ -94,12 +94,16 @@ const TypeRow* Reader::type(std::string_view key, std::string_view, std::span<co
   const Node* const node = get(key, {says.description, Need::optional, {}});
   if (!node) {
     missing_.push_back({std::string(key), "is missing; available: " + joined(names_of(rows))});
+    findings_.add_elsewhere(path_);  // what else the object needs depends on it
     return nullptr;
   }
   std::string given;
   if (!read_string(*node, inside(key), given)) return nullptr;
   const TypeRow* const row = find_row(rows, given);
-  if (!row) findings_.add(*node, inside(key), not_among(key, given, names_of(rows)));
+  if (!row) {
+    findings_.add(*node, inside(key), not_among(key, given, names_of(rows)));
+    findings_.add_elsewhere(path_);
+  }
   return row;
 }
 

@@ -18,9 +18,8 @@ std::string error_cell(double error) { return std::isfinite(error) ? fmt::format
 
 void add_reference(HtmlPage& page, const TradeoffReference& reference) {
   page.heading("Reference");
-  page.paragraph(fmt::format(
-      "{} at rtol {:.0e}, certified by {} at rtol {:.0e}: what the two are apart is how far errors can be told.",
-      reference.first.integrator, reference.first.rtol, reference.second.integrator, reference.second.rtol));
+  page.paragraph(fmt::format("{}, certified by {}: what the two are apart is how far errors can be told.",
+                             in_words(reference.first), in_words(reference.second)));
   std::vector<std::vector<std::string>> rows;
   for (const Quantity& q : reference.errors->quantities())
     rows.push_back({q.name, q.relative ? "relative" : "absolute", error_cell(q.certificate)});

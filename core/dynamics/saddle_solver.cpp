@@ -8,6 +8,9 @@ namespace {
 
 // A pass that gains less ends the refinement: rounding is reached, or the position is singular.
 constexpr double kStagnation = 0.97;
+// A pass that gains less than this is near a singular position: what is left of the residual there moves x far along
+// the freedom that opens, so that refinement goes on to rounding, whatever tolerance is enough elsewhere.
+constexpr double kSlow = 1e-7, kRounding = 1e-14;
 
 // Row by row: y = x - alpha z, and z *= 1 - c alpha.
 template <class Y>
@@ -81,7 +84,8 @@ void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, con
       for (const X& xi : x) size = std::max(size, xi.cwiseAbs().maxCoeff());
       residual_ratio_ = size > 0 ? now / size : 0.0;
       residual_size_ = now;
-      if (last || residual_ratio_ <= settings.tolerance || !(now < kStagnation * before)) break;
+      const double tolerance = now > kSlow * before ? std::min(settings.tolerance, kRounding) : settings.tolerance;
+      if (last || residual_ratio_ <= tolerance || !(now < kStagnation * before)) break;
     }
     before = now;
   }

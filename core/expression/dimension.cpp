@@ -193,6 +193,16 @@ std::string known_units() {
 }
 
 std::string to_string(const Dimension& dimension) {
+  // As engineers write them, instead of kg m/s^2 and so on.
+  constexpr std::pair<const char*, Dimension> kNamed[] = {{"N", dimension::kForce},
+                                                          {"N m", dimension::kTorque},
+                                                          {"N/m", dimension::kStiffness},
+                                                          {"N s/m", dimension::kDamping},
+                                                          {"N m s", dimension::kTorsionalDamping},
+                                                          {"W", kPower},
+                                                          {"Pa", kPressure}};
+  for (const auto& [name, named] : kNamed)
+    if (compatible(dimension, named)) return name;
   struct Base {
     std::size_t index;
     const char* name;

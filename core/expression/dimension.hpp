@@ -33,7 +33,7 @@ struct Unit {
 // known here.
 std::optional<Unit> parse_unit(std::string_view text);
 std::string known_units();                          // "m, mm, ..."
-std::string to_string(const Dimension& dimension);  // "kg m/s^2"
+std::string to_string(const Dimension& dimension);  // "N/m", "kg m"
 
 namespace dimension {
 inline constexpr Dimension kNone{};

@@ -103,6 +103,21 @@ TEST_CASE("bodies that something connects with an objective stay", "[costs]") {
   CHECK(looked_at.gradient("other").at("k").get<double>() != 0);
 }
 
+TEST_CASE("a force that no parameter changes costs no factor and no linearised state", "[costs]") {
+  const std::string constant =
+      R"({"name": "weight", "type": "force", "body": "a", "point": "tip", "components": [0, -3, 0]})";
+  const std::string without = scene(body("a", "0"), pin("a", "0"), spring("a", "0"), sensor("a"), kEnd);
+  const std::string with = scene(body("a", "0"), pin("a", "0"), spring("a", "0") + "," + constant, sensor("a"), kEnd);
+  for (const char* command : {"simulate", "gradient"}) {
+    const Costs fewer = costs(command, without), more = costs(command, with);
+    for (const char* counter : kCounters) {
+      INFO(command << ", " << counter);
+      CHECK(more.counter(counter) == fewer.counter(counter));
+    }
+    CHECK(more.result.at("objectives").at("end").at("value") != fewer.result.at("objectives").at("end").at("value"));
+  }
+}
+
 TEST_CASE("a simulation has all bodies, and derives nothing", "[costs]") {
   const Costs both = costs("simulate", two());
   CHECK(both.counter("linearised_states") == 0);

@@ -8,6 +8,7 @@
 
 #include "app/exit_code.hpp"
 #include "tests/app/run_command.hpp"
+#include "tests/app/signal_handler.hpp"
 
 using namespace mbsopt;
 using Catch::Contains;
@@ -88,6 +89,7 @@ TEST_CASE("design: too few iterations is a failure in words that keeps the best 
 TEST_CASE("design: SIGTERM keeps the best so far", "[command]") {
   const TemporaryFolder folder;
   std::thread killer([] {
+    wait_for_handler(SIGTERM);
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     ::kill(::getpid(), SIGTERM);
   });

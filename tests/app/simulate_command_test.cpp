@@ -8,6 +8,7 @@
 
 #include "app/exit_code.hpp"
 #include "tests/app/run_command.hpp"
+#include "tests/app/signal_handler.hpp"
 
 using namespace mbsopt;
 using Catch::Contains;
@@ -142,6 +143,7 @@ TEST_CASE("SIGTERM stops a simulation at the next step and keeps the rows so far
   const TemporaryFolder folder;
   const std::string file = folder.write("rod.json", kPendulum);
   std::thread killer([] {
+    wait_for_handler(SIGTERM);
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     ::kill(::getpid(), SIGTERM);
   });
@@ -155,4 +157,14 @@ TEST_CASE("SIGTERM stops a simulation at the next step and keeps the rows so far
   CHECK_THAT(message, Contains("trajectory.csv holds the motion up to "));
   CHECK_THAT(content_of(folder.path / "out/report.html"), Contains("This run was " + message));
   CHECK(lines_of(content_of(folder.path / "out/trajectory.csv")).size() >= 2);
+}
+
+TEST_CASE("simulate: a run that fails says how far it came", "[command]") {
+  const TemporaryFolder folder;
+  const CommandOutcome outcome = run_command({"simulate", folder.write("rod.json", kPendulum), "--out",
+                                              folder.file("out"), "--set", "simulation.integrator.max_steps=5"});
+  CHECK(outcome.exit_code == kNumericalFailure);
+  const double reached = json_of(folder.path / "out/result.json").at("last_good_time");
+  CHECK(reached < 1);
+  CHECK_THAT(outcome.out, !Contains("0 s to 1 s") && Contains("0 s to 0.0"));
 }

@@ -1,12 +1,15 @@
 #include "optim/process_pool.hpp"
 
 #include <signal.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <csignal>
 #include <map>
+#include <new>
 #include <numeric>
 #include <stdexcept>
 #include <thread>
@@ -15,6 +18,28 @@ using namespace mbsopt;
 using Catch::Contains;
 
 namespace {
+
+// A count that all processes share.
+class SharedCount {
+ public:
+  SharedCount()
+      : count_(new (::mmap(nullptr, sizeof(std::atomic<int>), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1,
+                           0)) std::atomic<int>(0)) {}
+  ~SharedCount() { ::munmap(count_, sizeof(std::atomic<int>)); }
+  SharedCount(const SharedCount&) = delete;
+  SharedCount& operator=(const SharedCount&) = delete;
+  std::atomic<int>& operator*() const { return *count_; }
+
+ private:
+  std::atomic<int>* count_;
+};
+
+// False where it never comes: after a minute.
+template <class Condition>
+bool wait_until(const Condition& condition) {
+  for (int i = 0; i < 6000 && !condition(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  return condition();
+}
 
 std::map<int, JobReply> replies_of(int count, int workers, const std::function<std::string(int)>& work) {
   std::vector<int> jobs(static_cast<std::size_t>(count));
@@ -68,28 +93,26 @@ TEST_CASE("a job that throws, crashes or leaves is one reply in words; the other
 }
 
 TEST_CASE("workers work at the same time", "[process_pool]") {
-  const auto begin = std::chrono::steady_clock::now();
-  replies_of(4, 4, [](int) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(400));
-    return std::string();
+  SharedCount begun;
+  const auto replies = replies_of(4, 4, [&](int) {
+    ++*begun;
+    return std::string(wait_until([&] { return *begun == 4; }) ? "together" : "alone");
   });
-  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::milliseconds(1200));
+  for (const auto& [job, reply] : replies) CHECK(reply.text == "together");
 }
 
 TEST_CASE("when it is to stop, no job begins and those under way are told", "[process_pool]") {
   std::vector<JobReply> replies;
+  SharedCount listening;
   static volatile std::sig_atomic_t told = 0;
   run_in_processes(
       {0, 1, 2, 3}, 2,
-      [](int) {
+      [&](int) {
         ::signal(SIGTERM, [](int) { told = 1; });
-        for (int i = 0; i < 1000 && !told; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-        return std::string(told ? "stopped early" : "ran on");
+        ++*listening;
+        return std::string(wait_until([] { return told != 0; }) ? "stopped early" : "ran on");
       },
-      [&](const JobReply& reply) { replies.push_back(reply); },
-      [begin = std::chrono::steady_clock::now()] {
-        return std::chrono::steady_clock::now() - begin < std::chrono::milliseconds(300);
-      });
+      [&](const JobReply& reply) { replies.push_back(reply); }, [&] { return *listening < 2; });
   REQUIRE(replies.size() == 2);
   for (const JobReply& reply : replies) CHECK(reply.text == "stopped early");
 }

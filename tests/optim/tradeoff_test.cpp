@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "tests/optim/counted_clock.hpp"
 #include "tests/optim/five_bar.hpp"
 #include "tests/optim/pendulum.hpp"
 
@@ -19,15 +20,10 @@ Problem short_five_bar() {
   return p;
 }
 
-#ifdef __SANITIZE_ADDRESS__
-constexpr double kSlower = 6;  // as many settings take longer
-#else
-constexpr double kSlower = 1;
-#endif
-
 Tradeoff measured(const Problem& p, double budget) {
+  CountedClock clock;
   TradeoffOptions options;
-  options.budget_seconds = kSlower * budget;
+  options.budget_seconds = budget, options.clock = clock.clock();
   return measure_tradeoff(p.scene, objectives_of(p), options);
 }
 
@@ -41,11 +37,12 @@ std::size_t index_of(const Tradeoff& tradeoff, const std::string& name) {
 
 TEST_CASE("the five-bar's reference is right to 1e-10 in psi and gradient, and its certificate says so", "[tradeoff]") {
 #ifdef __SANITIZE_ADDRESS__
-  return;  // twenty times slower, and budgets are wall time
+  return;  // twenty times slower
 #endif
   const Problem p = five_bar::problem();
   const TradeoffRuns runs(p.scene, objectives_of(p));
-  const TradeoffReference reference = converged_reference(runs);
+  CountedClock clock;
+  const TradeoffReference reference = converged_reference(runs, {.clock = clock.clock()});
   INFO(reference.message);
   REQUIRE(reference.ok());
   CHECK(reference.first.integrator != reference.second.integrator);
@@ -72,15 +69,16 @@ TEST_CASE("the five-bar's reference is right to 1e-10 in psi and gradient, and i
 
 TEST_CASE("a reference that the time allowed does not suffice for is none, in words", "[tradeoff]") {
   const Problem p = five_bar::problem();
+  CountedClock clock;
   const TradeoffReference reference =
-      converged_reference(TradeoffRuns(p.scene, objectives_of(p)), {.seconds_per_run = 1e-4});
+      converged_reference(TradeoffRuns(p.scene, objectives_of(p)), {.seconds_per_run = 1e-4, .clock = clock.clock()});
   CHECK_FALSE(reference.ok());
   CHECK(reference.message.find("dopri853: took longer than") != std::string::npos);
 }
 
 TEST_CASE("errors fall along every curve of the sweep down to the reference's floor", "[tradeoff]") {
 #ifdef __SANITIZE_ADDRESS__
-  return;  // twenty times slower, and budgets are wall time
+  return;  // twenty times slower
 #endif
   const Tradeoff tradeoff = measured(short_five_bar(), 3);
   REQUIRE(tradeoff.ok());
@@ -119,7 +117,7 @@ TEST_CASE("errors fall along every curve of the sweep down to the reference's fl
 
 TEST_CASE("a recommended setting gives the accuracy it promises", "[tradeoff]") {
 #ifdef __SANITIZE_ADDRESS__
-  return;  // twenty times slower, and budgets are wall time
+  return;  // twenty times slower
 #endif
   const Problem p = short_five_bar();
   const Tradeoff tradeoff = measured(p, 2);
@@ -168,7 +166,7 @@ TEST_CASE("an error that is small by chance is not recommended", "[tradeoff]") {
 
 TEST_CASE("settings that fail are rows with their reasons, and do not end the sweep", "[tradeoff]") {
 #ifdef __SANITIZE_ADDRESS__
-  return;  // twenty times slower, and budgets are wall time
+  return;  // twenty times slower
 #endif
   Problem p = pendulum::problem(100, 0.1, 0.1, 0);
   p.scene.simulation.end_time = 8;  // a 32nd is a step too large: the angle turns by more than half a turn
@@ -206,7 +204,9 @@ TEST_CASE("a sweep keeps to its budget, says what it skipped, and stops where it
   CHECK(std::any_of(tradeoff.rows.begin(), tradeoff.rows.end(), [](const TradeoffRow& row) {
     return row.status == RowStatus::skipped && row.message.find("budget") != std::string::npos;
   }));
+  CountedClock clock;
   TradeoffOptions options;
+  options.clock = clock.clock();
   int asked = 0;
   options.interrupted = [&] { return ++asked > 20000; };
   const Tradeoff part = measure_tradeoff(p.scene, objectives_of(p), options);

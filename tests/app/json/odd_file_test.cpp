@@ -112,3 +112,21 @@ TEST_CASE("keys of any characters are pointed at, in one line each", "[json]") {
   CHECK_THAT(all, Catch::Contains(R"(odd.json:4:29: parameters["\"]."]: the name)"));
   CHECK(std::count(all.begin(), all.end(), '\n') == 4);
 }
+
+TEST_CASE("of a force whose type is unknown or missing nothing else is said", "[json]") {
+  for (const std::string type : {R"("type": "spring", )", ""}) {
+    const std::string error = error_of(R"({"format": 1, "name": "p", )" + kBody + R"(, "forces": [{"name": "f", )" +
+                                       type + R"("body1": "ground", "stiffness": 3}], "simulation": {"end_time": 1}})");
+    INFO(error);
+    CHECK(error.find("forces[0].type: ") != std::string::npos);
+    CHECK(error.find("body2") == std::string::npos);
+  }
+}
+
+TEST_CASE("a key that is there twice is one error, and its value is the first", "[json]") {
+  const std::string error = error_of(R"({"format": 1, "name": "p", )" + kBody +
+                                     R"(, "parameters": {"k": 1, "k": 2, "m": 3}, "simulation": {"end_time": "k2"}})");
+  INFO(error);
+  CHECK(error.find("parameters.k: this key is there twice") != std::string::npos);
+  CHECK(error.find("k, k") == std::string::npos);
+}

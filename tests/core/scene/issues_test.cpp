@@ -163,7 +163,7 @@ TEST_CASE("laws use their own names and the parameters", "[scene]") {
   CHECK_THAT(at(scene, "forces[0].law"),
              Catch::Contains("unknown name 'angle'") && Catch::Contains("unknown name 'theta'"));
   std::get<Tsda>(scene.forces[0].kind).law = Expression::parse("1 [kg]");
-  CHECK_THAT(at(scene, "forces[0].law"), Catch::Contains("expected is kg m/s^2"));
+  CHECK_THAT(at(scene, "forces[0].law"), Catch::Contains("expected is N"));
 }
 
 TEST_CASE("a law beside coefficients is a warning", "[scene]") {
