@@ -64,10 +64,11 @@ TEST_CASE("the reference of Andrews' mechanism is right to 1e-10", "[tradeoff]")
   }
 }
 
-#ifndef __SANITIZE_ADDRESS__  // twenty times slower
-
 // An 8th-order method with projection and complex steps; halved steps agree to 1e-14, and so do the optima's forces.
 TEST_CASE("the reference of the five-bar and its gradient are right to 1e-10", "[tradeoff]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
   const Found found = reference_of("five_bar/sensitivities", {}, true);
   const Answer& exact = found.reference.errors->exact();
   std::size_t travel = 0;
@@ -93,6 +94,9 @@ TEST_CASE("the reference of the five-bar and its gradient are right to 1e-10", "
 // The exact solution, by quadrature: 16 digits; its derivatives by that of the quadrature in 30 digits.
 TEST_CASE("the reference of two windows is right to 1e-10 m after ten passages of their singular positions",
           "[tradeoff]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
   const Found found = reference_of("four_bar/windows", {}, true, 0.25);
   const Answer& exact = found.reference.errors->exact();
   INFO(in_words(found.reference.first) << ", " << in_words(found.reference.second));
@@ -122,6 +126,9 @@ TEST_CASE("the reference of two windows is right to 1e-10 m after ten passages o
 
 TEST_CASE("the reference of two windows is right to 1e-10 m after two passages of their singular positions",
           "[tradeoff]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
   const Found found = reference_of("four_bar/windows", {"simulation.end_time=2"}, false, 0.1);
   const double error = std::hypot(found.sensor("x") - 0.05781579576801143, found.sensor("y") - 0.9983272678634555);
   INFO("error " << error);
@@ -129,6 +136,9 @@ TEST_CASE("the reference of two windows is right to 1e-10 m after two passages o
 }
 
 TEST_CASE("the reference of a stiff governor is found, though its link decays at 8000 1/s", "[tradeoff]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
   const Found found = reference_of("governor/stiff_flyball", {"simulation.end_time=1"});
   CHECK(largest_certificate(found.reference) < 1e-8);
   const TradeoffRuns runs(found.problem.scene, objectives_of(found.problem));
@@ -142,9 +152,10 @@ TEST_CASE("the reference of a stiff governor is found, though its link decays at
 }
 
 TEST_CASE("a chaotic motion's reference says how little it is certain of", "[tradeoff]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
   const Found found = reference_of("double_pendulum/gradient",
                                    {"simulation.end_time=20", "forces[0].damping=0", "parameters.theta1.value=3"});
   CHECK(largest_certificate(found.reference) > 1e-9);
 }
-
-#endif
