@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/json/field_reader.hpp"
 #include "app/json/findings.hpp"
 #include "app/json/overrides.hpp"
 #include "app/json/parse_json.hpp"
-#include "app/json/reader.hpp"
 #include "app/json/source_text.hpp"
 #include "core/scene/default_integrator.hpp"
 #include "optim/csv_table.hpp"
@@ -136,7 +136,7 @@ Problem read_problem_text(const std::string& text, const std::filesystem::path& 
   for (std::size_t i = 0; i < set_overrides.size(); ++i)
     apply_override(root, set_overrides[i], static_cast<int>(i) + 1, findings);
   Problem problem;
-  Reader::read(root, "", findings, problem);
+  FieldReader::read(root, "", findings, problem);
   complete_integrator(problem.scene.simulation, root);
   resolve_data_files(problem, name.parent_path(), root, findings);
   read_sampled_laws(problem, name.parent_path(), root, findings);

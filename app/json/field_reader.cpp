@@ -1,4 +1,4 @@
-#include "app/json/reader.hpp"
+#include "app/json/field_reader.hpp"
 
 #include <fmt/format.h>
 
@@ -19,7 +19,7 @@ const char* shape_of(Node::Kind kind) { return kind == Node::Kind::array ? "a li
 
 }  // namespace
 
-const Node* Reader::get(std::string_view key, const Says& says) {
+const Node* FieldReader::get(std::string_view key, const Says& says) {
   if (says.need == Need::unknown) return nullptr;
   known_.emplace_back(key);
   const Node* const node = node_.find(key);
@@ -28,20 +28,20 @@ const Node* Reader::get(std::string_view key, const Says& says) {
   return node;
 }
 
-const Node* Reader::get_kind(std::string_view key, const Says& says, Node::Kind kind) {
+const Node* FieldReader::get_kind(std::string_view key, const Says& says, Node::Kind kind) {
   const Node* const node = get(key, says);
   if (!node || node->kind == kind) return node;
   findings_.add(*node, inside(key), std::string("must be ") + shape_of(kind) + ", found " + what_is(*node));
   return nullptr;
 }
 
-const Reader::Missing* Reader::missing_like(const std::string& unknown) const {
+const FieldReader::Missing* FieldReader::missing_like(const std::string& unknown) const {
   const auto found = std::find_if(missing_.begin(), missing_.end(),
                                   [&](const Missing& m) { return !did_you_mean(unknown, {m.key}).empty(); });
   return found == missing_.end() ? nullptr : &*found;
 }
 
-void Reader::report_keys() {
+void FieldReader::report_keys() {
   std::vector<std::string> told;
   for (std::size_t i = 0; i < node_.keys.size(); ++i) {
     const std::string& key = node_.keys[i];
@@ -63,7 +63,7 @@ void Reader::report_keys() {
     if (std::find(told.begin(), told.end(), key) == told.end()) findings_.add(node_, inside(key), message);
 }
 
-bool Reader::read_string(const Node& node, const std::string& path, std::string& value) {
+bool FieldReader::read_string(const Node& node, const std::string& path, std::string& value) {
   if (node.kind != Node::Kind::string) {
     findings_.add(node, path, "must be a string, found " + what_is(node));
     return false;
@@ -72,25 +72,26 @@ bool Reader::read_string(const Node& node, const std::string& path, std::string&
   return true;
 }
 
-void Reader::text(std::string_view key, std::string& value, const Says& says) {
+void FieldReader::text(std::string_view key, std::string& value, const Says& says) {
   if (const Node* node = get(key, says)) read_string(*node, inside(key), value);
 }
 
-void Reader::references(std::string_view key, std::vector<std::string>& values, To, const Says& says) {
+void FieldReader::references(std::string_view key, std::vector<std::string>& values, To, const Says& says) {
   const Node* const node = get_kind(key, says, Node::Kind::array);
   if (!node) return;
   for (std::size_t i = 0; i < node->items.size(); ++i)
     read_string(node->items[i], child_path(inside(key), i), values.emplace_back());
 }
 
-void Reader::word(std::string_view key, std::string& value, const Words& words_allowed, const Says& says) {
+void FieldReader::word(std::string_view key, std::string& value, const Words& words_allowed, const Says& says) {
   const Node* const node = get(key, says);
   if (!node || !read_string(*node, inside(key), value)) return;
   if (!has_word(words_allowed.available, value))
     findings_.add(*node, inside(key), not_among(key, value, words(words_allowed.available), words_allowed.later));
 }
 
-const TypeRow* Reader::type(std::string_view key, std::string_view, std::span<const TypeRow> rows, const Says& says) {
+const TypeRow* FieldReader::type(std::string_view key, std::string_view, std::span<const TypeRow> rows,
+                                 const Says& says) {
   const Node* const node = get(key, {says.description, Need::optional, {}});
   if (!node) {
     missing_.push_back({std::string(key), "is missing; available: " + joined(names_of(rows))});
@@ -107,7 +108,7 @@ const TypeRow* Reader::type(std::string_view key, std::string_view, std::span<co
   return row;
 }
 
-bool Reader::read_expression(const Node& node, const std::string& path, Expression& value) {
+bool FieldReader::read_expression(const Node& node, const std::string& path, Expression& value) {
   if (node.kind == Node::Kind::number) {
     value = Expression(node.number);
     return true;
@@ -125,15 +126,16 @@ bool Reader::read_expression(const Node& node, const std::string& path, Expressi
   }
 }
 
-void Reader::number(std::string_view key, Field& value, const Says& says) {
+void FieldReader::number(std::string_view key, Field& value, const Says& says) {
   if (const Node* node = get(key, says)) read_expression(*node, inside(key), value);
 }
 
-void Reader::number(std::string_view key, std::optional<Field>& value, const Says& says) {
+void FieldReader::number(std::string_view key, std::optional<Field>& value, const Says& says) {
   if (const Node* node = get(key, says)) read_expression(*node, inside(key), value.emplace());
 }
 
-void Reader::time_law(std::string_view key, Expression& value, std::optional<SampledLaw>& samples, const Says& says) {
+void FieldReader::time_law(std::string_view key, Expression& value, std::optional<SampledLaw>& samples,
+                           const Says& says) {
   const Node* const node = get(key, says);
   if (!node) return;
   if (node->kind == Node::Kind::object)
@@ -143,7 +145,7 @@ void Reader::time_law(std::string_view key, Expression& value, std::optional<Sam
 }
 
 template <std::size_t N>
-bool Reader::read_vector(const Node& node, const std::string& path, std::array<Field, N>& value) {
+bool FieldReader::read_vector(const Node& node, const std::string& path, std::array<Field, N>& value) {
   if (node.kind != Node::Kind::array || node.items.size() != N) {
     findings_.add(node, path,
                   "must be a list of " + std::to_string(N) + " numbers or expressions, found " + what_is(node));
@@ -154,11 +156,11 @@ bool Reader::read_vector(const Node& node, const std::string& path, std::array<F
   return good;
 }
 
-void Reader::vector(std::string_view key, VectorField& value, const Says& says) {
+void FieldReader::vector(std::string_view key, VectorField& value, const Says& says) {
   if (const Node* node = get(key, says)) read_vector(*node, inside(key), value);
 }
 
-bool Reader::read_point(const Node& node, const std::string& path, PointField& value) {
+bool FieldReader::read_point(const Node& node, const std::string& path, PointField& value) {
   if (node.kind == Node::Kind::string) {
     value = node.string;
     return true;
@@ -170,16 +172,16 @@ bool Reader::read_point(const Node& node, const std::string& path, PointField& v
   return read_vector(node, path, value.emplace<VectorField>());
 }
 
-void Reader::point(std::string_view key, PointField& value, std::string_view, const Says& says) {
+void FieldReader::point(std::string_view key, PointField& value, std::string_view, const Says& says) {
   if (const Node* node = get(key, says)) read_point(*node, inside(key), value);
 }
 
-void Reader::point(std::string_view key, std::optional<PointField>& value, std::string_view, const Says& says) {
+void FieldReader::point(std::string_view key, std::optional<PointField>& value, std::string_view, const Says& says) {
   if (const Node* node = get(key, says)) read_point(*node, inside(key), value.emplace());
 }
 
-void Reader::inertia(std::string_view key, InertiaField& tensor, std::optional<ConsistentInertiaField>& consistent,
-                     const Says& says) {
+void FieldReader::inertia(std::string_view key, InertiaField& tensor, std::optional<ConsistentInertiaField>& consistent,
+                          const Says& says) {
   const Node* const node = get(key, says);
   if (!node) return;
   if (node->kind == Node::Kind::object) {
@@ -200,7 +202,7 @@ void Reader::inertia(std::string_view key, InertiaField& tensor, std::optional<C
   }
 }
 
-void Reader::orientation(std::string_view key, OrientationField& value, const Says& says) {
+void FieldReader::orientation(std::string_view key, OrientationField& value, const Says& says) {
   const Node* const node = get(key, says);
   if (!node) return;
   const bool is_object = node->kind == Node::Kind::object;
@@ -217,15 +219,15 @@ void Reader::orientation(std::string_view key, OrientationField& value, const Sa
   }
 }
 
-void Reader::points(std::string_view key, std::map<std::string, VectorField>& value, const Says& says) {
+void FieldReader::points(std::string_view key, std::map<std::string, VectorField>& value, const Says& says) {
   const Node* const node = get_kind(key, says, Node::Kind::object);
   if (!node) return;
   for (std::size_t i = 0; i < node->keys.size(); ++i)
     read_vector(node->items[i], child_path(inside(key), node->keys[i]), value[node->keys[i]]);
 }
 
-bool Reader::read_plain(const Node& node, const std::string& path, double& value,
-                        const std::optional<Dimension>& expected) {
+bool FieldReader::read_plain(const Node& node, const std::string& path, double& value,
+                             const std::optional<Dimension>& expected) {
   Expression expression;
   if (!read_expression(node, path, expression)) return false;
   if (!expression.is_number()) {
@@ -250,12 +252,12 @@ bool Reader::read_plain(const Node& node, const std::string& path, double& value
   return true;
 }
 
-void Reader::plain(std::string_view key, double& value, const Range&, const Says& says) {
+void FieldReader::plain(std::string_view key, double& value, const Range&, const Says& says) {
   if (const Node* node = get(key, says)) read_plain(*node, inside(key), value, says.dimension);
 }
 
 template <class Integer>
-void Reader::read_integer(const Node& node, const std::string& path, Integer& value) {
+void FieldReader::read_integer(const Node& node, const std::string& path, Integer& value) {
   double given = 0;
   if (!read_plain(node, path, given, Dimension{})) return;
   if (given != std::round(given) || std::abs(given) > static_cast<double>(std::numeric_limits<Integer>::max() / 2)) {
@@ -265,15 +267,15 @@ void Reader::read_integer(const Node& node, const std::string& path, Integer& va
   value = static_cast<Integer>(given);
 }
 
-void Reader::plain(std::string_view key, int& value, const Range&, const Says& says) {
+void FieldReader::plain(std::string_view key, int& value, const Range&, const Says& says) {
   if (const Node* node = get(key, says)) read_integer(*node, inside(key), value);
 }
 
-void Reader::plain(std::string_view key, long& value, const Range&, const Says& says) {
+void FieldReader::plain(std::string_view key, long& value, const Range&, const Says& says) {
   if (const Node* node = get(key, says)) read_integer(*node, inside(key), value);
 }
 
-void Reader::plain(std::string_view key, bool& value, const Range&, const Says& says) {
+void FieldReader::plain(std::string_view key, bool& value, const Range&, const Says& says) {
   const Node* const node = get(key, says);
   if (!node) return;
   if (node->kind == Node::Kind::boolean)
@@ -282,8 +284,8 @@ void Reader::plain(std::string_view key, bool& value, const Range&, const Says& 
     findings_.add(*node, inside(key), "must be true or false, found " + what_is(*node));
 }
 
-void Reader::level(std::string_view key, std::optional<double>& value, std::span<const Choice<double>> choices,
-                   const Range& range, const Says& says) {
+void FieldReader::level(std::string_view key, std::optional<double>& value, std::span<const Choice<double>> choices,
+                        const Range& range, const Says& says) {
   const Node* const node = get(key, says);
   if (!node) return;
   std::vector<std::string> available;
@@ -302,7 +304,7 @@ void Reader::level(std::string_view key, std::optional<double>& value, std::span
     plain(key, value, range, says);
 }
 
-void Reader::instead_of(std::string_view key, std::string_view object, const Words& fields) {
+void FieldReader::instead_of(std::string_view key, std::string_view object, const Words& fields) {
   const Node* const node = node_.find(object);
   if (!has(key) || !node || node->kind != Node::Kind::object) return;
   for (const std::string& field : words(fields.available))
@@ -313,14 +315,15 @@ void Reader::instead_of(std::string_view key, std::string_view object, const Wor
                                 inside(key), inside(object)));
 }
 
-void Reader::numbers(std::string_view key, std::vector<double>& values, const Range&, const Says& says) {
+void FieldReader::numbers(std::string_view key, std::vector<double>& values, const Range&, const Says& says) {
   const Node* const node = get_kind(key, says, Node::Kind::array);
   if (!node) return;
   for (std::size_t i = 0; i < node->items.size(); ++i)
     read_plain(node->items[i], child_path(inside(key), i), values.emplace_back(0.0), says.dimension);
 }
 
-void Reader::overrides(std::string_view key, std::vector<std::pair<std::string, double>>& values, const Says& says) {
+void FieldReader::overrides(std::string_view key, std::vector<std::pair<std::string, double>>& values,
+                            const Says& says) {
   const Node* const node = get_kind(key, says, Node::Kind::object);
   if (!node) return;
   for (std::size_t i = 0; i < node->keys.size(); ++i) {
@@ -330,7 +333,7 @@ void Reader::overrides(std::string_view key, std::vector<std::pair<std::string, 
 }
 
 // "k1": 100  is short for  "k1": {"value": 100}.
-void Reader::read_named(const Node& node, const std::string& path, Parameter& value) {
+void FieldReader::read_named(const Node& node, const std::string& path, Parameter& value) {
   if (node.kind == Node::Kind::object)
     read(node, path, findings_, value);
   else
@@ -344,7 +347,7 @@ void Reader::read_named(const Node& node, const std::string& path, Parameter& va
 }
 
 // A value written with a unit says what "unit" would say, and must not contradict it.
-void Reader::take_unit(const Node& node, const std::string& path, Parameter& parameter) {
+void FieldReader::take_unit(const Node& node, const std::string& path, Parameter& parameter) {
   if (node.kind != Node::Kind::string) return;
   const auto found = infer_dimension(Expression::parse(node.string), [](const std::string&) { return std::nullopt; });
   if (!found || found->is_none()) return;
@@ -356,23 +359,23 @@ void Reader::take_unit(const Node& node, const std::string& path, Parameter& par
         "has the dimension " + to_string(*found) + ", that of the parameter is " + to_string(unit->dimension));
 }
 
-void Reader::read_named(const Node& node, const std::string& path, Definition& value) {
+void FieldReader::read_named(const Node& node, const std::string& path, Definition& value) {
   if (!read_expression(node, path, value.value)) value.value = std::numeric_limits<double>::quiet_NaN();
 }
 
-void Reader::version(std::string_view key, int only, const Says& says) {
+void FieldReader::version(std::string_view key, int only, const Says& says) {
   const Node* const node = get(key, says);
   if (node && (node->kind != Node::Kind::number || node->number != only))
     findings_.add(*node, inside(key), "must be " + std::to_string(only) + ", found " + what_is(*node));
 }
 
-void Reader::later(std::string_view key, std::string_view what) {
+void FieldReader::later(std::string_view key, std::string_view what) {
   refuse(key, std::string(what) + " is not available in this version");
 }
 
-void Reader::misplaced(std::string_view key, std::string_view where) { refuse(key, "is " + std::string(where)); }
+void FieldReader::misplaced(std::string_view key, std::string_view where) { refuse(key, "is " + std::string(where)); }
 
-void Reader::refuse(std::string_view key, const std::string& message) {
+void FieldReader::refuse(std::string_view key, const std::string& message) {
   const Node* const node = node_.find(key);
   if (!node) return;
   known_.emplace_back(key);

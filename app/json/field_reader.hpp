@@ -13,9 +13,9 @@
 
 namespace mbsopt {
 
-class Reader {
+class FieldReader {
  public:
-  Reader(const Node& node, std::string path, Findings& findings)
+  FieldReader(const Node& node, std::string path, Findings& findings)
       : node_(node), path_(std::move(path)), findings_(findings) {}
 
   // Reads an object's fields into `value`, and reports the keys that it does not have.
@@ -25,7 +25,7 @@ class Reader {
       findings.add(node, path, "must be an object {...}, found " + what_is(node));
       return;
     }
-    Reader reader(node, path, findings);
+    FieldReader reader(node, path, findings);
     describe(reader, value);
     reader.report_keys();
   }
@@ -89,7 +89,7 @@ class Reader {
   void group(std::string_view key, const Says& says, F&& fields) {
     const Node* const node = get_kind(key, says, Node::Kind::object);
     if (!node) return;
-    Reader reader(*node, inside(key), findings_);
+    FieldReader reader(*node, inside(key), findings_);
     fields(reader);
     reader.report_keys();
   }
@@ -159,7 +159,7 @@ class Reader {
 };
 
 template <class T, std::size_t N>
-void Reader::choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const Says& says) {
+void FieldReader::choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const Says& says) {
   const Node* const node = get(key, says);
   std::string given;
   if (!node || !read_string(*node, inside(key), given)) return;
