@@ -56,7 +56,7 @@ Scene chain(int rods) {
   height.name = "height", height.quantity = "position", height.component = "z";
   height.body = fmt::format("rod{}", rods - 1);
   scene.sensors.push_back(height);
-  scene.simulation.end_time = rods < 50 ? 1 : 3;  // the start of many rods costs more than some steps
+  scene.simulation.end_time = rods <= 100 ? 1 : 3;  // the start of many rods costs more than some steps
   scene.simulation.integrator.rtol = 1e-6, scene.simulation.integrator.atol = 1e-8;
   return scene;
 }
