@@ -10,7 +10,7 @@ namespace {
 constexpr double kStagnation = 0.97;
 // A pass that gains less than this is near a singular position: what is left of the residual there moves x far along
 // the freedom that opens, so that refinement goes on to rounding, whatever tolerance is enough elsewhere.
-constexpr double kSlow = 1e-5, kRounding = 1e-14;
+constexpr double kSlow = 1e-6, kRounding = 1e-14;
 
 // Row by row: y = x - alpha z, and z *= 1 - c alpha.
 template <class Y>
