@@ -21,6 +21,17 @@ struct __attribute__((may_alias)) LaneRow {
   friend LaneRow operator+(const LaneRow& x, const LaneRow& y) { return {x.low + y.low, x.high + y.high}; }
   friend LaneRow operator-(const LaneRow& x, const LaneRow& y) { return {x.low - y.low, x.high - y.high}; }
   friend LaneRow operator*(double s, const LaneRow& x) { return {s * x.low, s * x.high}; }
+
+  static LaneRow zero() { return {AlignedPair{}, AlignedPair{}}; }
+  // To the absolute values of y, where they are larger.
+  void grow_to(const LaneRow& y) {
+    const AlignedPair a = y.low < 0 ? -y.low : y.low, b = y.high < 0 ? -y.high : y.high;
+    low = low > a ? low : a, high = high > b ? high : b;
+  }
+  double largest() const {
+    const double a = low[0] > low[1] ? low[0] : low[1], b = high[0] > high[1] ? high[0] : high[1];
+    return a > b ? a : b;
+  }
 };
 static_assert(sizeof(LaneRow) == kLanes * sizeof(double));
 

@@ -1,5 +1,6 @@
 #include "core/integrate/tangent_sweep.hpp"
 
+#include "core/dynamics/lane_kernels.hpp"
 #include "core/integrate/model_choice.hpp"
 
 namespace mbsopt {
@@ -49,19 +50,20 @@ TangentSweep::Weights TangentSweep::integrated(const double* of_k) const {
 void TangentSweep::add_stages(const Block& b, double h, double c, const Weights& w, int first, int last,
                               const LaneRows& from, LaneRows& to) {
   const Eigen::Index half = from.size() / 2;
-  StageSum q, v;
-  q.add(h * c, b.y0.data() + half);
+  const double* k[Method::kMaxStages + 1];
+  double of_q[Method::kMaxStages + 1], of_v[Method::kMaxStages + 1];
+  int terms = 0;
+  const auto add = [&](double q, double v, const double* to_both) {
+    if (q == 0 && v == 0) return;
+    of_q[terms] = q, of_v[terms] = v, k[terms++] = to_both;
+  };
+  add(h * c, 0, b.y0.data() + half);
   for (int j = first; j <= last; ++j) {
-    const std::size_t k = static_cast<std::size_t>(j);
-    q.add(h * h * w.q[k], b.a[k].data());
-    v.add(h * w.v[k], b.a[k].data());
+    const std::size_t stage = static_cast<std::size_t>(j);
+    add(h * h * w.q[stage], h * w.v[stage], b.a[stage].data());
   }
-  constexpr Eigen::Index kPart = 512;  // accelerations stay in the cache from one sum to the other
-  for (Eigen::Index r = 0; r < half; r += kPart) {
-    const Eigen::Index end = std::min(r + kPart, half);
-    q.to(from.data(), to.data(), end, r);
-    v.to(from.data() + half, to.data() + half, end, r);
-  }
+  lane_kernels().sum_stages(static_cast<std::size_t>(half / kLanes), terms, k, of_q, of_v, from.data(),
+                            from.data() + half, to.data(), to.data() + half);
 }
 
 void TangentSweep::add_cost(const PointCost& cost, const StatePoint& at, double weight, LaneRows Block::*direction,

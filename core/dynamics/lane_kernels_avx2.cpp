@@ -1,0 +1,43 @@
+// Compiled with -mavx2 -mfma where the compiler has them (CMakeLists.txt), else empty but for the answer no.
+#include "core/dynamics/lane_loops.hpp"
+
+namespace mbsopt {
+
+#if defined(__AVX2__) && defined(__FMA__)
+namespace {
+
+using Four = double __attribute__((vector_size(32), aligned(8), may_alias));
+
+struct __attribute__((may_alias)) Row {
+  Four x;
+
+  Row& operator+=(const Row& y) { return x += y.x, *this; }
+  Row& operator-=(const Row& y) { return x -= y.x, *this; }
+  Row& operator*=(double s) { return x *= s, *this; }
+  friend Row operator+(const Row& a, const Row& b) { return {a.x + b.x}; }
+  friend Row operator-(const Row& a, const Row& b) { return {a.x - b.x}; }
+  friend Row operator*(double s, const Row& a) { return {s * a.x}; }
+
+  static Row zero() { return {Four{}}; }
+  // To the absolute values of y, where they are larger.
+  void grow_to(const Row& y) {
+    const Four size = y.x < 0 ? -y.x : y.x;
+    x = x > size ? x : size;
+  }
+  double largest() const {
+    const double a = x[0] > x[1] ? x[0] : x[1], b = x[2] > x[3] ? x[2] : x[3];
+    return a > b ? a : b;
+  }
+};
+
+}  // namespace
+
+const LaneKernels* avx2_lane_kernels() {
+  static constexpr LaneKernels kKernels = LaneLoops<Row>::kernels();
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? &kKernels : nullptr;
+}
+#else
+const LaneKernels* avx2_lane_kernels() { return nullptr; }
+#endif
+
+}  // namespace mbsopt
