@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/dynamics/block_cholesky.hpp"
-#include "core/dynamics/lane_kernels.hpp"
+#include "core/dynamics/block_kernels.hpp"
 #include "core/dynamics/pairs.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
@@ -44,7 +44,7 @@ class ConstraintRows {
     }
   }
   void subtract_times(const std::vector<Lanes<6>>& x, LaneRows& y) const {
-    if (!x.empty()) lane_kernels().subtract_times_in_space(lanes(), x[0].data(), y.data());
+    if (!x.empty()) block_kernels().subtract_times_in_space(view(), x[0].data(), y.data());
   }
   // x -= J'lambda
   void subtract_transposed_times(const Eigen::VectorXd& lambda, std::vector<Vec<6>>& x) const {
@@ -58,14 +58,20 @@ class ConstraintRows {
     for (const RowGroup& g : data_->groups) subtract(g.body1, J1, g), subtract(g.body2, J2, g);
   }
   void subtract_transposed_times(const LaneRows& lambda, std::vector<Lanes<6>>& x) const {
-    if (!x.empty()) lane_kernels().subtract_transposed_times_in_space(lanes(), lambda.data(), x[0].data());
+    if (!x.empty()) block_kernels().subtract_transposed_times_in_space(view(), lambda.data(), x[0].data());
   }
-  // Steps of BlockSaddleSolver on lanes (lane_kernels.hpp).
-  void load(const LaneIterate& at, bool first, std::vector<Lanes<6>>& correction) const {
-    lane_kernels().load_in_space(lanes(), at, first, correction[0].data());
+  // Steps of BlockSaddleSolver (block_kernels.hpp), of a single vector without sizes.
+  void load(const SaddleIterate& at, bool first, std::vector<Vec<6>>& correction) const {
+    block_kernels().load(view(), at, first, correction[0].data());
   }
-  LaneSizes correct(const LaneIterate& at, bool first, const std::vector<Lanes<6>>& correction) const {
-    return lane_kernels().correct_in_space(lanes(), at, first, correction[0].data());
+  void correct(const SaddleIterate& at, bool first, const std::vector<Vec<6>>& correction) const {
+    block_kernels().correct(view(), at, first, correction[0].data());
+  }
+  void load(const SaddleIterate& at, bool first, std::vector<Lanes<6>>& correction) const {
+    block_kernels().load_lanes_in_space(view(), at, first, correction[0].data());
+  }
+  SaddleSizes correct(const SaddleIterate& at, bool first, const std::vector<Lanes<6>>& correction) const {
+    return block_kernels().correct_lanes_in_space(view(), at, first, correction[0].data());
   }
   // M x for body i (1-based), and S += M.
   template <class X>
@@ -89,16 +95,13 @@ class ConstraintRows {
   Rows J1, J2;  // one row per block row
 
  private:
-  using Columns = LaneRowsInSpace::Columns;
-  const Columns& columns(int block) const { return columns_[static_cast<std::size_t>(block)]; }
-  LaneRowsInSpace lanes() const {
-    return {lane_groups_.data(), lane_groups_.size(), J1.data(),          J2.data(),
-            columns_.data(),     lane_bodies_.data(), lane_bodies_.size()};
+  using Columns = RowsInSpace::Columns;
+  RowsInSpace view() const {
+    return {groups_.data(), groups_.size(), J1.data(), J2.data(), columns_.data(), bodies_.data(), bodies_.size()};
   }
 
   static const double* row(const Rows& J, int block) { return J.data() + 6 * block; }
 
-  void add_cross(double alpha, int block, Mat<6, 6>& S12) const;
   static std::size_t at(int body) { return static_cast<std::size_t>(body - 1); }
   void add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S);
 
@@ -112,8 +115,8 @@ class ConstraintRows {
 
   const MechanismData* data_;
   std::vector<Columns> columns_;  // per block row
-  std::vector<LaneRowsInSpace::Group> lane_groups_;
-  std::vector<LaneRowsInSpace::Body> lane_bodies_;
+  std::vector<RowsInSpace::Group> groups_;
+  std::vector<RowsInSpace::Body> bodies_;
   std::vector<std::size_t> handle_;  // per group: its off-diagonal block
   std::vector<SharedRow> shared_;
   std::vector<std::pair<int, int>> edges_;

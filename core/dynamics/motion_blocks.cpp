@@ -3,7 +3,7 @@
 #include <cassert>
 #include <cstddef>
 
-#include "core/dynamics/lane_kernels.hpp"
+#include "core/dynamics/block_kernels.hpp"
 #include "core/mechanism/coupling.hpp"
 
 namespace mbsopt {
@@ -20,11 +20,11 @@ void list(const std::vector<std::vector<int>>& bodies, std::vector<MotionBlocks:
   begin.push_back(static_cast<int>(places.size()));
 }
 
-// Blocks as lane_kernels.hpp sees them.
+// Blocks as block_kernels.hpp sees them.
 template <int Rows>
-const LaneMotionBlock<Rows>* lanes(const std::vector<MotionBlocks::Block<Rows>>& blocks) {
+const MotionBlockView<Rows>* lanes(const std::vector<MotionBlocks::Block<Rows>>& blocks) {
   using Ours = MotionBlocks::Block<Rows>;
-  using Theirs = LaneMotionBlock<Rows>;
+  using Theirs = MotionBlockView<Rows>;
   static_assert(sizeof(Ours) == sizeof(Theirs) && offsetof(Ours, v) == offsetof(Theirs, v) &&
                 offsetof(Ours, parts) == offsetof(Theirs, parts));
   return reinterpret_cast<const Theirs*>(blocks.data());
@@ -60,7 +60,7 @@ void MotionBlocks::set_zero() {
 }
 
 void MotionBlocks::add_times(const LaneRows& y_dir, std::vector<Lanes<6>>& b_dir, LaneRows& c_dir) const {
-  const LaneKernels& kernels = lane_kernels();
+  const BlockKernels& kernels = block_kernels();
   const std::size_t n = at(n_);
   if (n > 0)
     kernels.add_motion_of_bodies(lanes(b), pairs_.data(), pair_begin_.data(), n, n, y_dir.data(), b_dir[0].data());

@@ -12,7 +12,7 @@ std::size_t index(int i) { return static_cast<std::size_t>(i); }
 PlanarRows::PlanarRows(const MechanismData& data) : model_(data.planar.get()) {
   using Kind = PlanarConstraint::Kind;
   for (std::size_t i = 1; i < model_->bodies.size(); ++i)
-    lane_bodies_.push_back({model_->bodies[i].mass, model_->bodies[i].inertia});
+    bodies_.push_back({model_->bodies[i].mass, model_->bodies[i].inertia});
   std::map<int, std::vector<int>> bodies_of_row;  // that move
   for (const PlanarConstraint& c : model_->constraints) {
     if (c.kind == Kind::point) continue;
@@ -69,6 +69,34 @@ void PlanarRows::evaluate(const Frames& frames) {
     };
     add(s.entry1, column.force1, column.moment1);
     add(s.entry2, column.force2, column.moment2);
+  }
+}
+
+void PlanarRows::load(const SaddleIterate& it, bool first, std::vector<Vec<3>>& correction) const {
+  for (std::size_t k = 0; k < correction.size(); ++k) {
+    const RowsInPlane::Body& m = bodies_[k];
+    const double *b = it.b + 3 * k, *x = it.x + 3 * k;
+    correction[k] =
+        first ? Vec<3>(b[0], b[1], b[2]) : Vec<3>(b[0] - m.mass * x[0], b[1] - m.mass * x[1], b[2] - m.inertia * x[2]);
+  }
+  if (first) {
+    subtract_transposed([&](int row) { return -it.alpha[row] * it.residual[row]; }, correction);
+  } else {
+    subtract_transposed([&](int row) { return it.nu[row] - it.alpha[row] * it.residual[row]; }, correction);
+  }
+}
+
+void PlanarRows::correct(const SaddleIterate& it, bool first, const std::vector<Vec<3>>& correction) const {
+  for (std::size_t k = 0; k < correction.size(); ++k) {
+    for (int i = 0; i < 3; ++i) {
+      double& x = it.x[3 * k + index(i)];
+      x = first ? correction[k](i) : x + correction[k](i);
+    }
+  }
+  subtract_times(correction, it.residual);
+  for (std::size_t r = 0; r < it.rows; ++r) {
+    const double step = it.alpha[r] * it.residual[r];
+    it.nu[r] = first ? -step : it.nu[r] - step;
   }
 }
 

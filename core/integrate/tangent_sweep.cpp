@@ -1,6 +1,6 @@
 #include "core/integrate/tangent_sweep.hpp"
 
-#include "core/dynamics/lane_kernels.hpp"
+#include "core/dynamics/block_kernels.hpp"
 #include "core/integrate/model_choice.hpp"
 
 namespace mbsopt {
@@ -62,8 +62,8 @@ void TangentSweep::add_stages(const Block& b, double h, double c, const Weights&
     const std::size_t stage = static_cast<std::size_t>(j);
     add(h * h * w.q[stage], h * w.v[stage], b.a[stage].data());
   }
-  lane_kernels().sum_stages(static_cast<std::size_t>(half / kLanes), terms, k, of_q, of_v, from.data(),
-                            from.data() + half, to.data(), to.data() + half);
+  block_kernels().sum_stages(static_cast<std::size_t>(half / kLanes), terms, k, of_q, of_v, from.data(),
+                             from.data() + half, to.data(), to.data() + half);
 }
 
 void TangentSweep::add_cost(const PointCost& cost, const StatePoint& at, double weight, LaneRows Block::*direction,

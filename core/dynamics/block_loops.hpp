@@ -1,16 +1,24 @@
-// The loops of lane_kernels.hpp for a type Row, kLanes numbers in registers. For the two files that compile them.
+// The loops of block_kernels.hpp for types of registers: Row, kLanes numbers, and Six, a column of a block of six. For
+// the two files that compile them.
 #pragma once
 
-#include "core/dynamics/lane_kernels.hpp"
+#include "core/dynamics/block_kernels.hpp"
 
 namespace mbsopt {
 namespace {  // of each file its own: compiled for different processors
 
-template <class Row>
-class LaneLoops {
+template <class Row, class Six>
+class BlockLoops {
  public:
-  static constexpr LaneKernels kernels() {
-    return {&solve<6>,
+  static constexpr BlockKernels kernels() {
+    return {&factor_diagonal,
+            &divide,
+            &subtract_product,
+            &solve_vector,
+            &add_weighted_squares,
+            &load_vector,
+            &correct_vector,
+            &solve<6>,
             &solve<3>,
             &subtract_times_in_space,
             &subtract_times_in_plane,
@@ -72,7 +80,7 @@ class LaneLoops {
   }
 
   template <int N>
-  static void solve(const LaneFactor& f, double* numbers) {
+  static void solve(const FactorView& f, double* numbers) {
     Row* const x = rows(numbers);
     for (int k = 0; k < f.bodies; ++k) {
       Row* y = x + N * f.order[k];
@@ -89,10 +97,10 @@ class LaneLoops {
     }
   }
 
-  static void subtract_times(const LaneRowsInSpace& J, const LaneRowsInSpace::Group& g, const double* a,
-                             const Row* from, Row* to) {
+  static void subtract_times(const RowsInSpace& J, const RowsInSpace::Group& g, const double* a, const Row* from,
+                             Row* to) {
     const Row x3 = from[3], x4 = from[4], x5 = from[5];
-    const LaneRowsInSpace::Columns* nonzero = J.columns + g.block;
+    const RowsInSpace::Columns* nonzero = J.columns + g.block;
     for (int r = 0; r < g.rows; ++r, a += 6, ++nonzero) {
       Row sum = to[r];
       if (nonzero->last - nonzero->first == 1) {
@@ -104,23 +112,23 @@ class LaneLoops {
       to[r] = sum;
     }
   }
-  static void subtract_times(const LaneRowsInSpace& J, const Row* x, Row* y) {
+  static void subtract_times(const RowsInSpace& J, const Row* x, Row* y) {
     for (std::size_t k = 0; k < J.group_count; ++k) {
-      const LaneRowsInSpace::Group& g = J.groups[k];
+      const RowsInSpace::Group& g = J.groups[k];
       if (g.body1 > 0) subtract_times(J, g, J.J1 + 6 * g.block, x + 6 * (g.body1 - 1), y + g.row);
       if (g.body2 > 0) subtract_times(J, g, J.J2 + 6 * g.block, x + 6 * (g.body2 - 1), y + g.row);
     }
   }
-  static void subtract_times_in_space(const LaneRowsInSpace& J, const double* x, double* y) {
+  static void subtract_times_in_space(const RowsInSpace& J, const double* x, double* y) {
     subtract_times(J, rows(x), rows(y));
   }
 
   // Lambda: row -> Row.
   template <class Lambda>
-  static void subtract_transposed_times(const LaneRowsInSpace& J, const LaneRowsInSpace::Group& g, const double* a,
+  static void subtract_transposed_times(const RowsInSpace& J, const RowsInSpace::Group& g, const double* a,
                                         const Lambda& lambda, Row* to) {
     Row x3 = to[3], x4 = to[4], x5 = to[5];
-    const LaneRowsInSpace::Columns* nonzero = J.columns + g.block;
+    const RowsInSpace::Columns* nonzero = J.columns + g.block;
     for (int r = 0; r < g.rows; ++r, a += 6, ++nonzero) {
       const Row l = lambda(g.row + r);
       if (nonzero->last - nonzero->first == 1) {
@@ -133,21 +141,21 @@ class LaneLoops {
     to[3] = x3, to[4] = x4, to[5] = x5;
   }
   template <class Lambda>
-  static void subtract_transposed(const LaneRowsInSpace& J, const Lambda& lambda, Row* x) {
+  static void subtract_transposed(const RowsInSpace& J, const Lambda& lambda, Row* x) {
     for (std::size_t k = 0; k < J.group_count; ++k) {
-      const LaneRowsInSpace::Group& g = J.groups[k];
+      const RowsInSpace::Group& g = J.groups[k];
       if (g.body1 > 0) subtract_transposed_times(J, g, J.J1 + 6 * g.block, lambda, x + 6 * (g.body1 - 1));
       if (g.body2 > 0) subtract_transposed_times(J, g, J.J2 + 6 * g.block, lambda, x + 6 * (g.body2 - 1));
     }
   }
-  static void subtract_transposed_times_in_space(const LaneRowsInSpace& J, const double* lambda, double* x) {
+  static void subtract_transposed_times_in_space(const RowsInSpace& J, const double* lambda, double* x) {
     subtract_transposed(
         J, [l = rows(lambda)](int r) { return l[r]; }, rows(x));
   }
 
-  static void subtract_times(const LaneRowsInPlane& J, const Row* x, Row* y) {
+  static void subtract_times(const RowsInPlane& J, const Row* x, Row* y) {
     for (std::size_t k = 0; k < J.point_count; ++k) {
-      const LaneRowsInPlane::Point& p = J.points[k];
+      const RowsInPlane::Point& p = J.points[k];
       Row first = y[p.row], second = y[p.row2];
       if (p.body2 > 0) {
         const Row* b = x + 3 * (p.body2 - 1);
@@ -160,18 +168,18 @@ class LaneLoops {
       y[p.row] = first, y[p.row2] = second;
     }
     for (std::size_t k = 0; k < J.entry_count; ++k) {
-      const LaneRowsInPlane::Entry& e = J.entries[k];
+      const RowsInPlane::Entry& e = J.entries[k];
       const Row* b = x + 3 * (e.body - 1);
       y[e.row] -= e.J[0] * b[0] + e.J[1] * b[1] + e.J[2] * b[2];
     }
   }
-  static void subtract_times_in_plane(const LaneRowsInPlane& J, const double* x, double* y) {
+  static void subtract_times_in_plane(const RowsInPlane& J, const double* x, double* y) {
     subtract_times(J, rows(x), rows(y));
   }
   template <class Lambda>
-  static void subtract_transposed(const LaneRowsInPlane& J, const Lambda& lambda, Row* x) {
+  static void subtract_transposed(const RowsInPlane& J, const Lambda& lambda, Row* x) {
     for (std::size_t k = 0; k < J.point_count; ++k) {
-      const LaneRowsInPlane::Point& p = J.points[k];
+      const RowsInPlane::Point& p = J.points[k];
       const Row first = lambda(p.row), second = lambda(p.row2);
       if (p.body2 > 0) {
         Row* b = x + 3 * (p.body2 - 1);
@@ -183,30 +191,30 @@ class LaneLoops {
       }
     }
     for (std::size_t k = 0; k < J.entry_count; ++k) {
-      const LaneRowsInPlane::Entry& e = J.entries[k];
+      const RowsInPlane::Entry& e = J.entries[k];
       const Row l = lambda(e.row);
       Row* b = x + 3 * (e.body - 1);
       for (int i = 0; i < 3; ++i) b[i] -= e.J[i] * l;
     }
   }
-  static void subtract_transposed_times_in_plane(const LaneRowsInPlane& J, const double* lambda, double* x) {
+  static void subtract_transposed_times_in_plane(const RowsInPlane& J, const double* lambda, double* x) {
     subtract_transposed(
         J, [l = rows(lambda)](int r) { return l[r]; }, rows(x));
   }
 
   // y = b - M x
-  static void subtract_mass_times(const LaneRowsInSpace::Body& m, const Row* b, const Row* x, Row* y) {
+  static void subtract_mass_times(const RowsInSpace::Body& m, const Row* b, const Row* x, Row* y) {
 #pragma GCC unroll 3
     for (int i = 0; i < 3; ++i) y[i] = b[i] - m.mass * x[i];
 #pragma GCC unroll 3
     for (int i = 0; i < 3; ++i) y[3 + i] = b[3 + i] - m.J[i] * x[3] - m.J[i + 3] * x[4] - m.J[i + 6] * x[5];
   }
-  static void subtract_mass_times(const LaneRowsInPlane::Body& m, const Row* b, const Row* x, Row* y) {
+  static void subtract_mass_times(const RowsInPlane::Body& m, const Row* b, const Row* x, Row* y) {
     y[0] = b[0] - m.mass * x[0], y[1] = b[1] - m.mass * x[1], y[2] = b[2] - m.inertia * x[2];
   }
 
   template <int N, class Jacobian>
-  static void load(const Jacobian& J, const LaneIterate& at, bool first, double* numbers) {
+  static void load(const Jacobian& J, const SaddleIterate& at, bool first, double* numbers) {
     const Row* const b = rows(at.b);
     const Row* const x = rows(static_cast<const double*>(at.x));
     Row* const y = rows(numbers);
@@ -223,15 +231,15 @@ class LaneLoops {
           J, [=](int r) { return nu[r] - alpha[r] * residual[r]; }, y);
     }
   }
-  static void load_in_space(const LaneRowsInSpace& J, const LaneIterate& at, bool first, double* correction) {
+  static void load_in_space(const RowsInSpace& J, const SaddleIterate& at, bool first, double* correction) {
     load<6>(J, at, first, correction);
   }
-  static void load_in_plane(const LaneRowsInPlane& J, const LaneIterate& at, bool first, double* correction) {
+  static void load_in_plane(const RowsInPlane& J, const SaddleIterate& at, bool first, double* correction) {
     load<3>(J, at, first, correction);
   }
 
   template <int N, class Jacobian>
-  static LaneSizes correct(const Jacobian& J, const LaneIterate& at, bool first, const double* correction) {
+  static SaddleSizes correct(const Jacobian& J, const SaddleIterate& at, bool first, const double* correction) {
     Row* const x = rows(at.x);
     Row* const nu = rows(at.nu);
     Row* const residual = rows(at.residual);
@@ -250,10 +258,10 @@ class LaneLoops {
     }
     return {largest_x.largest(), largest_residual.largest()};
   }
-  static LaneSizes correct_in_space(const LaneRowsInSpace& J, const LaneIterate& at, bool first, const double* dx) {
+  static SaddleSizes correct_in_space(const RowsInSpace& J, const SaddleIterate& at, bool first, const double* dx) {
     return correct<6>(J, at, first, dx);
   }
-  static LaneSizes correct_in_plane(const LaneRowsInPlane& J, const LaneIterate& at, bool first, const double* dx) {
+  static SaddleSizes correct_in_plane(const RowsInPlane& J, const SaddleIterate& at, bool first, const double* dx) {
     return correct<3>(J, at, first, dx);
   }
 
@@ -267,7 +275,7 @@ class LaneLoops {
     }
   }
   template <int N>
-  static void add_motion(const LaneMotionBlock<N>* blocks, const LaneMotionPlace* places, const int* first_place,
+  static void add_motion(const MotionBlockView<N>* blocks, const MotionPlace* places, const int* first_place,
                          std::size_t count, std::size_t n, const double* y, double* to) {
     const Row* const q = rows(y);
     const Row* const v = q + 7 * n;
@@ -277,7 +285,7 @@ class LaneLoops {
 #pragma GCC unroll 6
       for (int i = 0; i < N; ++i) sum[i] = out[i];
       for (int k = first_place[row]; k < first_place[row + 1]; ++k) {
-        const LaneMotionBlock<N>& b = blocks[k];
+        const MotionBlockView<N>& b = blocks[k];
         const int body = 7 * places[k].body;
         enum { r = 1, p = 2, rdot = 4, pdot = 8 };  // MotionBlocks::Part
         if (b.parts & (r | p)) add_columns<N>(b.q, b.parts & r ? 0 : 3, b.parts & p ? 7 : 3, q + body, sum);
@@ -312,6 +320,176 @@ class LaneLoops {
     }
 #pragma GCC unroll 4
     for (int i = 0; i < Rows; ++i) rows(q)[first + i] = sum_q[i], rows(v)[first + i] = sum_v[i];
+  }
+
+  // Lower triangle of A -> below the diagonal of W = inv(L), zeros elsewhere, and the inverse of D, with A = L D L';
+  // false where D is not positive.
+  static bool factor_diagonal(double* A, double* inverse) {
+    double l[36];  // L below the diagonal, by columns
+#pragma GCC unroll 6
+    for (int j = 0; j < 6; ++j) {
+      if (!(A[7 * j] > 0)) return false;
+      const double d = 1 / A[7 * j];
+      inverse[j] = d;
+      Six column(A + 6 * j);
+#pragma GCC unroll 6
+      for (int k = j + 1; k < 6; ++k) {
+        Six of_k(A + 6 * k);
+        of_k.subtract(A[k + 6 * j] * d, A + 6 * j);
+        of_k.store(A + 6 * k);
+      }
+      column.scale(d);
+      column.store(l + 6 * j);
+    }
+    // W L = I:  W(:, j) = e_j - sum_{k > j} L(k, j) W(:, k), from the last column; the units come last.
+#pragma GCC unroll 6
+    for (int j = 5; j >= 0; --j) {
+      Six w = Six::zero();
+#pragma GCC unroll 6
+      for (int k = 5; k > j; --k) w.subtract(l[k + 6 * j], A + 6 * k);
+      w.store(A + 6 * j);
+      A[7 * j] = 1;
+    }
+    for (int j = 0; j < 6; ++j) A[7 * j] = 0;
+    return true;
+  }
+
+  // LD = A W',  A = LD inv(D), column by column from the last.
+  static void divide(const double* W, const double* inverse, double* A, double* LD) {
+#pragma GCC unroll 6
+    for (int j = 5; j >= 0; --j) {
+      Six sum(A + 6 * j);
+#pragma GCC unroll 6
+      for (int k = 0; k < j; ++k) sum.add(W[j + 6 * k], A + 6 * k);
+      sum.store(LD + 6 * j);
+      sum.scale(inverse[j]);
+      sum.store(A + 6 * j);
+    }
+  }
+
+  // C -= A B'
+  static void subtract_product(const double* A, const double* B, double* C) {
+#pragma GCC unroll 6
+    for (int j = 0; j < 6; ++j) {
+      Six sum(C + 6 * j);
+#pragma GCC unroll 6
+      for (int k = 0; k < 6; ++k) sum.subtract(B[j + 6 * k], A + 6 * k);
+      sum.store(C + 6 * j);
+    }
+  }
+
+  static void solve_vector(const FactorView& f, double* x) {
+    for (int k = 0; k < f.bodies; ++k) {
+      double* y = x + 6 * f.order[k];
+      const double* W = f.W + 36 * k;
+      Six sum(y);
+#pragma GCC unroll 6
+      for (int j = 0; j < 5; ++j) sum.add(y[j], W + 6 * j);
+      sum.store(y);
+      for (int b = f.first_block[k]; b < f.first_block[k + 1]; ++b) {
+        double* z = x + 6 * f.body[b];
+        Six below(z);
+#pragma GCC unroll 6
+        for (int j = 0; j < 6; ++j) below.subtract(y[j], f.L + 36 * b + 6 * j);
+        below.store(z);
+      }
+    }
+    for (int k = f.bodies - 1; k >= 0; --k) {
+      double* y = x + 6 * f.order[k];
+      Six sum = Six(y) * Six(f.inverse_D + 6 * k);
+      for (int b = f.first_block[k]; b < f.first_block[k + 1]; ++b)
+        sum -= Six(x + 6 * f.body[b]).times_columns(f.L + 36 * b);
+      sum += sum.times_columns(f.W + 36 * k);
+      sum.store(y);
+    }
+  }
+
+  // to(:, j) += sum_r alpha_r b_r(j) a_r, a_r and b_r rows of six
+  static void add_square(int count, const double* alpha, const RowsInSpace::Columns* nonzero, const double* a,
+                         const double* b, double* to) {
+#pragma GCC unroll 3
+    for (int j = 0; j < 3; ++j) {
+      Six sum(to + 6 * j);
+      for (int r = 0; r < count; ++r) {
+        if (nonzero[r].first <= j && j < nonzero[r].last) sum.add(alpha[r] * b[6 * r + j], a + 6 * r);
+      }
+      sum.store(to + 6 * j);
+    }
+    Six sum3(to + 18), sum4(to + 24), sum5(to + 30);
+    for (int r = 0; r < count; ++r) {
+      const double* const x = a + 6 * r;
+      const double* const y = b + 6 * r;
+      sum3.add(alpha[r] * y[3], x), sum4.add(alpha[r] * y[4], x), sum5.add(alpha[r] * y[5], x);
+    }
+    sum3.store(to + 18), sum4.store(to + 24), sum5.store(to + 30);
+  }
+  static void add_weighted_squares(int count, const double* alpha, const RowsInSpace::Columns* nonzero, const double* a,
+                                   const double* b, double* aa, double* bb, double* ab) {
+    if (aa) add_square(count, alpha, nonzero, a, a, aa);
+    if (bb) add_square(count, alpha, nonzero, b, b, bb);
+    if (ab) add_square(count, alpha, nonzero, a, b, ab);
+  }
+
+  static void load_vector(const RowsInSpace& J, const SaddleIterate& at, bool first, double* correction) {
+    for (std::size_t k = 0; k < J.body_count; ++k) {
+      const RowsInSpace::Body& m = J.bodies[k];
+      const double* const b = at.b + 6 * k;
+      const double* const x = at.x + 6 * k;
+      double* const y = correction + 6 * k;
+      if (first) {
+        for (int i = 0; i < 6; ++i) y[i] = b[i];
+        continue;
+      }
+      for (int i = 0; i < 3; ++i) y[i] = b[i] - m.mass * x[i];
+      for (int i = 0; i < 3; ++i) y[3 + i] = b[3 + i] - m.J[i] * x[3] - m.J[i + 3] * x[4] - m.J[i + 6] * x[5];
+    }
+    const auto subtract = [&](int body, const double* rows_of_body, const RowsInSpace::Group& g) {
+      if (body == 0) return;
+      double* const to = correction + 6 * (body - 1);
+      Six sum(to);
+      for (int r = 0; r < g.rows; ++r) {
+        const int row = g.row + r;
+        const double step = at.alpha[row] * at.residual[row];
+        sum.subtract(first ? -step : at.nu[row] - step, rows_of_body + 6 * (g.block + r));
+      }
+      sum.store(to);
+    };
+    for (std::size_t k = 0; k < J.group_count; ++k) {
+      const RowsInSpace::Group& g = J.groups[k];
+      subtract(g.body1, J.J1, g), subtract(g.body2, J.J2, g);
+    }
+  }
+
+  static void subtract_times_vector(const RowsInSpace& J, const double* x, double* y) {
+    for (std::size_t k = 0; k < J.group_count; ++k) {
+      const RowsInSpace::Group& g = J.groups[k];
+      const bool both = g.body1 > 0 && g.body2 > 0;
+      const int body = g.body1 > 0 ? g.body1 : g.body2;
+      if (body == 0) continue;
+      const double* const rows1 = (g.body1 > 0 ? J.J1 : J.J2) + 6 * g.block;
+      const double* const rows2 = J.J2 + 6 * g.block;
+      const Six x1(x + 6 * (body - 1)), x2(x + 6 * ((both ? g.body2 : body) - 1));
+      double* const to = y + g.row;
+      int r = 0;
+      for (; r + 2 <= g.rows; r += 2) {
+        auto sum = x1.times_two(rows1 + 6 * r);
+        if (both) sum += x2.times_two(rows2 + 6 * r);
+        to[r] -= sum[0], to[r + 1] -= sum[1];
+      }
+      if (r == g.rows) continue;
+      double sum = x1.times(rows1 + 6 * r);
+      if (both) sum += x2.times(rows2 + 6 * r);
+      to[r] -= sum;
+    }
+  }
+  static void correct_vector(const RowsInSpace& J, const SaddleIterate& at, bool first, const double* correction) {
+    const std::size_t unknowns = 6 * J.body_count;
+    for (std::size_t i = 0; i < unknowns; ++i) at.x[i] = first ? correction[i] : at.x[i] + correction[i];
+    subtract_times_vector(J, correction, at.residual);
+    for (std::size_t r = 0; r < at.rows; ++r) {
+      const double step = at.alpha[r] * at.residual[r];
+      at.nu[r] = first ? -step : at.nu[r] - step;
+    }
   }
 };
 
