@@ -28,8 +28,8 @@ class BlockLoops {
             &load_in_plane,
             &correct_in_space,
             &correct_in_plane,
-            &add_motion<6>,
-            &add_motion<1>,
+            &add_motion_of_bodies,
+            &add_motion_of_rows,
             &sum_stages};
   }
 
@@ -266,33 +266,80 @@ class BlockLoops {
   }
 
   // sum += B x of the columns first to last of B
-  template <int N>
   static void add_columns(const double* B, int first, int last, const Row* x, Row* sum) {
     for (int j = first; j < last; ++j) {
       const Row xj = x[j];
 #pragma GCC unroll 6
-      for (int i = 0; i < N; ++i) sum[i] += B[i + N * j] * xj;
+      for (int i = 0; i < 6; ++i) sum[i] += B[i + 6 * j] * xj;
     }
   }
-  template <int N>
-  static void add_motion(const MotionBlockView<N>* blocks, const MotionPlace* places, const int* first_place,
-                         std::size_t count, std::size_t n, const double* y, double* to) {
+  enum { r = 1, p = 2, rdot = 4, pdot = 8 };  // MotionBlocks::Part
+  static void add_motion_of_bodies(const MotionBlockView<6>* blocks, const MotionPlace* places, const int* first_place,
+                                   std::size_t count, std::size_t n, const double* y, double* to) {
     const Row* const q = rows(y);
     const Row* const v = q + 7 * n;
     for (std::size_t row = 0; row < count; ++row) {
-      Row* const out = rows(to) + N * row;
-      Row sum[N];
+      Row* const out = rows(to) + 6 * row;
+      Row sum[6];
 #pragma GCC unroll 6
-      for (int i = 0; i < N; ++i) sum[i] = out[i];
+      for (int i = 0; i < 6; ++i) sum[i] = out[i];
       for (int k = first_place[row]; k < first_place[row + 1]; ++k) {
-        const MotionBlockView<N>& b = blocks[k];
+        const MotionBlockView<6>& b = blocks[k];
         const int body = 7 * places[k].body;
-        enum { r = 1, p = 2, rdot = 4, pdot = 8 };  // MotionBlocks::Part
-        if (b.parts & (r | p)) add_columns<N>(b.q, b.parts & r ? 0 : 3, b.parts & p ? 7 : 3, q + body, sum);
-        if (b.parts & (rdot | pdot)) add_columns<N>(b.v, b.parts & rdot ? 0 : 3, b.parts & pdot ? 7 : 3, v + body, sum);
+        if (b.parts & (r | p)) add_columns(b.q, b.parts & r ? 0 : 3, b.parts & p ? 7 : 3, q + body, sum);
+        if (b.parts & (rdot | pdot)) add_columns(b.v, b.parts & rdot ? 0 : 3, b.parts & pdot ? 7 : 3, v + body, sum);
       }
 #pragma GCC unroll 6
-      for (int i = 0; i < N; ++i) out[i] = sum[i];
+      for (int i = 0; i < 6; ++i) out[i] = sum[i];
+    }
+  }
+
+  static bool same_places(const MotionBlockView<1>* blocks, const MotionPlace* places, int a, int b, int count) {
+    for (int k = 0; k < count; ++k) {
+      if (places[a + k].body != places[b + k].body || blocks[a + k].parts != blocks[b + k].parts) return false;
+    }
+    return true;
+  }
+  // Rows of the same bodies, those of a joint, read the directions once.
+  template <int Rows>
+  static void add_rows_of_joint(const MotionBlockView<1>* blocks, const MotionPlace* places, int count, const Row* q,
+                                const Row* v, Row* to) {
+    Row sum[Rows];
+#pragma GCC unroll 6
+    for (int i = 0; i < Rows; ++i) sum[i] = to[i];
+    for (int k = 0; k < count; ++k) {
+      const int body = 7 * places[k].body, parts = blocks[k].parts;
+      for (int j = parts & r ? 0 : 3; j < (parts & p ? 7 : 3); ++j) {
+        const Row x = q[body + j];
+#pragma GCC unroll 6
+        for (int i = 0; i < Rows; ++i) sum[i] += blocks[k + i * count].q[j] * x;
+      }
+      for (int j = parts & rdot ? 0 : 3; j < (parts & pdot ? 7 : 3); ++j) {
+        const Row x = v[body + j];
+#pragma GCC unroll 6
+        for (int i = 0; i < Rows; ++i) sum[i] += blocks[k + i * count].v[j] * x;
+      }
+    }
+#pragma GCC unroll 6
+    for (int i = 0; i < Rows; ++i) to[i] = sum[i];
+  }
+  static void add_motion_of_rows(const MotionBlockView<1>* blocks, const MotionPlace* places, const int* first_place,
+                                 std::size_t count, std::size_t n, const double* y, double* to) {
+    const Row* const q = rows(y);
+    const Row* const v = q + 7 * n;
+    for (std::size_t row = 0; row < count;) {
+      const int first = first_place[row], bodies = first_place[row + 1] - first;
+      std::size_t joint = 1;  // rows of it
+      while (joint < 5 && row + joint < count && first_place[row + joint + 1] - first_place[row + joint] == bodies &&
+             same_places(blocks, places, first, first_place[row + joint], bodies))
+        ++joint;
+      const auto add = joint == 5   ? &add_rows_of_joint<5>
+                       : joint == 4 ? &add_rows_of_joint<4>
+                       : joint == 3 ? &add_rows_of_joint<3>
+                       : joint == 2 ? &add_rows_of_joint<2>
+                                    : &add_rows_of_joint<1>;
+      add(blocks + first, places + first, bodies, q, v, rows(to) + row);
+      row += joint;
     }
   }
 

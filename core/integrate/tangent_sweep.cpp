@@ -32,6 +32,7 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
     blocks_.push_back(std::move(b));
   }
   y_.setZero(states), ydot_.setZero(states), y_bar_.setZero(states);
+  seen_.reserve(static_cast<std::size_t>(states));
   rho_bar_.setZero(d.rho.size());
   r_.setZero(dynamics_.equations(), kLanes);
   y_rho_.setZero(states, d.rho.size());
@@ -72,8 +73,13 @@ void TangentSweep::add_cost(const PointCost& cost, const StatePoint& at, double 
   rho_bar_.setZero();
   cost.add_gradient(at, weight, y_bar_, rho_bar_);
   psi_rho.row(objective) += rho_bar_.transpose();
+  seen_.clear();  // most objectives look at few bodies
+  for (Eigen::Index i = 0; i < y_bar_.size(); ++i) {
+    if (y_bar_(i) != 0) seen_.push_back(i);
+  }
   for (const Block& b : blocks_) {
-    const Lanes<1> change = y_bar_.transpose() * (b.*direction);
+    Lanes<1> change = Lanes<1>::Zero();
+    for (const Eigen::Index i : seen_) change += y_bar_(i) * (b.*direction).row(i);
     for (int k = 0; k < kLanes; ++k) {
       if (b.parameters.parameter[k] >= 0) psi_rho(objective, b.parameters.parameter[k]) += change(k);
     }

@@ -198,11 +198,12 @@ template <int N>
 void test_motion(void (*add)(const MotionBlockView<N>*, const MotionPlace*, const int*, std::size_t, std::size_t,
                              const double*, double*)) {
   enum { r = 1, p = 2, rdot = 4, pdot = 8 };
-  const std::vector<int> parts{p | pdot, r | p | rdot | pdot, 0, r, rdot};
-  const std::vector<MotionPlace> places{{0, 0}, {0, 1}, {1, 0}, {1, 1}, {1, 2}};
-  const std::vector<int> first_place{0, 2, 5};
+  const std::vector<int> parts{p | pdot, r | p | rdot | pdot, 0, r, rdot, 0, r, rdot, p, 0, pdot};
+  const std::vector<MotionPlace> places{{0, 0}, {0, 1}, {1, 0}, {1, 1}, {1, 2}, {2, 0},
+                                        {2, 1}, {2, 2}, {3, 0}, {3, 1}, {3, 2}};
+  const std::vector<int> first_place{0, 2, 5, 8, 11};
   std::vector<MotionBlockView<N>> blocks(parts.size());
-  const Rows y = random_rows(42, 15), start = random_rows(2 * N, 16);
+  const Rows y = random_rows(42, 15), start = random_rows(4 * N, 16);
   Eigen::MatrixXd expected = start;
   for (std::size_t k = 0; k < parts.size(); ++k) {
     MotionBlockView<N>& b = blocks[k];
@@ -220,7 +221,7 @@ void test_motion(void (*add)(const MotionBlockView<N>*, const MotionPlace*, cons
     }
   }
   Rows out = start;
-  add(blocks.data(), places.data(), first_place.data(), 2, 3, y.data(), out.data());
+  add(blocks.data(), places.data(), first_place.data(), 4, 3, y.data(), out.data());
   require_equal(out, expected);
 }
 
