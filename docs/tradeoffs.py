@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Keeps the measured figures of `mbsopt tradeoff` in data/tradeoffs/ and writes them into docs/tradeoffs.md.
 
-    docs/tradeoffs.py keep RUNS     from the output folders RUNS/{gallery,sweep,alpha}/NAME to data/tradeoffs/
+    docs/tradeoffs.py keep RUNS     from the output folders RUNS/{gallery,sweep,alpha}/NAME to data/tradeoffs/; what is not there stays
     docs/tradeoffs.py rises OUT     of one output folder: where an error rises along a curve, and why
     docs/tradeoffs.py write         from data/tradeoffs/ to docs/tradeoffs.md (between its two markers) and docs/tradeoffs/*.svg
 
@@ -111,7 +111,8 @@ def keep(runs):
         gallery.append(gallery_row(folder.name.replace("__", "/"), result))
         if "settings" in result.get("fit", {}):
             gallery.append(fit_row(gallery[-1], result["fit"]))
-    write_rows(DATA / "gallery.csv", gallery)
+    if gallery:
+        write_rows(DATA / "gallery.csv", gallery)
     for kind in ("sweep", "alpha"):
         for folder in sorted((runs / kind).glob("*")):
             result = json.loads((folder / "result.json").read_text())
@@ -135,7 +136,9 @@ def keep(runs):
                 "apart": json.dumps({q: float(f"{v['apart']:.2g}") for q, v in reference["quantities"].items()}),
                 "advice": json.dumps([r["in_words"] for r in result.get("recommendations", [])]),
             })
-    write_rows(DATA / "runs.csv", about)
+    again = {a["file"] for a in about}
+    kept = [r for r in rows_of(DATA / "runs.csv") if r["file"] not in again] if (DATA / "runs.csv").exists() else []
+    write_rows(DATA / "runs.csv", sorted(kept + about, key=lambda a: (a["kind"] != "sweep", a["file"])))
 
 
 # ---- plots
