@@ -246,7 +246,7 @@ def why_it_rises(curves, curve, quantity, i):
     points = curves[quantity][curve]
     here, after = points[i], points[i + 1]
     if after.error > NO_DIGIT:
-        return "no digit is right yet: steps are as long as the motion's own changes"
+        return "no digit is right yet"
     of_gradient = quantity.startswith("gradient of ")
     if of_gradient and curve.startswith(("tlm, ", "adjoint, ")):
         twin = curves[quantity].get(curve.replace("tlm", "adjoint") if curve.startswith("tlm") else curve.replace("adjoint", "tlm"), [])
