@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Keeps the measured figures of `mbsopt tradeoff` in data/tradeoffs/ and writes them into docs/tradeoffs.md.
 
-    docs/tradeoffs.py keep RUNS     from the output folders RUNS/{gallery,sweep,alpha}/NAME to data/tradeoffs/
+    docs/tradeoffs.py keep RUNS     from the output folders RUNS/{gallery,sweep,alpha}/NAME to data/tradeoffs/; what is not there stays
+    docs/tradeoffs.py rises OUT     of one output folder: where an error rises along a curve, and why
     docs/tradeoffs.py write         from data/tradeoffs/ to docs/tradeoffs.md (between its two markers) and docs/tradeoffs/*.svg
 
 ./dev tradeoffs does both after measuring. Needs nothing but Python 3.
@@ -110,14 +111,15 @@ def keep(runs):
         gallery.append(gallery_row(folder.name.replace("__", "/"), result))
         if "settings" in result.get("fit", {}):
             gallery.append(fit_row(gallery[-1], result["fit"]))
-    write_rows(DATA / "gallery.csv", gallery)
+    if gallery:
+        write_rows(DATA / "gallery.csv", gallery)
     for kind in ("sweep", "alpha"):
         for folder in sorted((runs / kind).glob("*")):
             result = json.loads((folder / "result.json").read_text())
             name = folder.name
             rows = rows_of(folder / "tradeoff.csv")
             if kind == "sweep":
-                names = [c for c in rows[0] if c in KEPT or c.startswith("error ")]
+                names = [c for c in rows[0] if c in KEPT or c.startswith(("error ", "deviation "))]
                 rows = [{c: r[c] if c in EXACT else short(r[c]) for c in names} for r in rows]
             else:
                 names = [c for c in rows[0] if not c.endswith("message")]
@@ -134,7 +136,9 @@ def keep(runs):
                 "apart": json.dumps({q: float(f"{v['apart']:.2g}") for q, v in reference["quantities"].items()}),
                 "advice": json.dumps([r["in_words"] for r in result.get("recommendations", [])]),
             })
-    write_rows(DATA / "runs.csv", about)
+    again = {a["file"] for a in about}
+    kept = [r for r in rows_of(DATA / "runs.csv") if r["file"] not in again] if (DATA / "runs.csv").exists() else []
+    write_rows(DATA / "runs.csv", sorted(kept + about, key=lambda a: (a["kind"] != "sweep", a["file"])))
 
 
 # ---- plots
@@ -202,35 +206,105 @@ def work_precision(rows, quantity, of_gradient):
     return series, front
 
 
+class Point:
+    """A setting of a curve: what it costs (right-hand sides are no matter of the machine) and how wrong a quantity is."""
+
+    def __init__(self, row, quantity):
+        self.row, self.setting = row, f"rtol {number(row['rtol']):.0e}" if row["rtol"] else f"step {number(row['step']):.3g} s"
+        self.work, self.error = int(row["rhs_evaluations"]), number(row["error " + quantity])
+        self.deviation = number(row.get("deviation " + quantity, ""))  # the error with its sign, where it has one
+
+
 def curves_of(rows, quantity):
-    """Curve -> [(right-hand sides, error)] from loose to tight; penalty forms keep a model error and are left out."""
+    """Curve -> points from loose to tight; penalty forms keep a model error and are left out."""
     curves = {}
     for r in rows:
-        error = number(r["error " + quantity])
-        if r["status"] != "ok" or math.isnan(error) or r["curve"] in ("as in the file", "defaults") or r["curve"].startswith("penalty"):
+        if r["status"] != "ok" or math.isnan(number(r["error " + quantity])) or r["curve"] in ("as in the file", "defaults") or r["curve"].startswith("penalty"):
             continue
-        curves.setdefault(r["curve"], []).append((int(r["rhs_evaluations"]), error))
+        curves.setdefault(r["curve"], []).append(Point(r, quantity))
     return curves
 
 
-def monotony(rows, apart):
-    """In words: whether errors fall as right-hand sides, which are no matter of the machine, grow."""
-    pairs, rises, curves = 0, [], set()
+NO_DIGIT = 0.1   # errors above it are not measured by any order of a method
+SAME_WORK = 1.05  # right-hand sides that a decade of tolerance costs where it does not set the steps
+STARVED = 2.5    # what a decade costs where rounding does: methods of order 2 and more need 10^(1/3)
+
+
+def changes_sign(points, i):
+    """Whether the deviation goes through zero into the point i or out of it: then its error is small by chance."""
+    signs = [p.deviation > 0 for p in points[max(i - 1, 0):i + 2] if p.deviation == p.deviation]
+    return len(set(signs)) > 1
+
+
+def same_setting(points, row, but_curve=False):
+    same = ("integrator", "rtol", "step") if but_curve else ("curve", "rtol", "step")
+    return next((k for k, p in enumerate(points) if all(p.row[c] == row[c] for c in same)), None)
+
+
+def why_it_rises(curves, curve, quantity, i):
+    """What the figures say about a rise from the point i of a curve to the next; curves: quantity -> curve -> points."""
+    points = curves[quantity][curve]
+    here, after = points[i], points[i + 1]
+    if after.error > NO_DIGIT:
+        return "no digit is right yet"
+    of_gradient = quantity.startswith("gradient of ")
+    if of_gradient and curve.startswith(("tlm, ", "adjoint, ")):
+        twin = curves[quantity].get(curve.replace("tlm", "adjoint") if curve.startswith("tlm") else curve.replace("adjoint", "tlm"), [])
+        k = same_setting(twin, after.row, but_curve=True)
+        if k is not None and abs(twin[k].deviation - after.deviation) > 0.3 * after.error:
+            return f"rounding, magnified: TLM and adjoint, one derivative on the same steps, differ by {abs(twin[k].deviation - after.deviation):.1e}"
+    if of_gradient and after.work > STARVED * here.work:
+        return f"rounding: {after.work / here.work:.0f} times the right-hand sides, in steps that are shortened next to singular positions in vain"
+    if changes_sign(points, i):
+        return "the error passes through zero, the first is small by chance"
+    for name in ("motion", "sensors"):
+        other = curves.get(name, {}).get(curve, [])
+        k = same_setting(other, here.row)
+        if quantity in ("motion", "sensors") or k is None or k + 1 >= len(other) or other[k + 1].error > other[k].error:
+            continue
+        return f"the error of the {name} falls, {other[k].error:.1e} to {other[k + 1].error:.1e}: the first is small by chance"
+    for name, others in curves.items():
+        other = others.get(curve, [])
+        k = same_setting(other, here.row)
+        if name != quantity and not of_gradient and k is not None and changes_sign(other, k):
+            return f"the error of {name} passes through zero there, and with it most of this one"
+    if after.work < SAME_WORK * here.work:
+        return "stability, not the tolerance, sets the steps: they are the same but for a few"
+    if i > 0 and after.error < (points[i - 1].error * here.error) ** 0.5:
+        return "the first is below the line through its neighbours, by chance"
+    if after.error < 1.5 * here.error:
+        return "the error stays as it is over this decade"
+    return "a multistep method's error follows the tolerance loosely" if "cvodes" in here.row["integrator"] else "not explained by these figures"
+
+
+def rises(rows, apart):
+    """Of how many steps from a setting to the next, tighter one the error rises: their number, the curves', the rises."""
+    pairs, found, names = 0, [], set()
+    curves = {quantity: curves_of(rows, quantity) for quantity in apart}
     for quantity, certain in apart.items():
         floor = max(3 * certain, 1e-13)
-        for curve, points in curves_of(rows, quantity).items():
-            curves.add(curve)
-            for (work, error), (more, next_error) in zip(points, points[1:]):
-                if error < floor or more <= work:
+        for curve, points in curves[quantity].items():
+            names.add(curve)
+            for i in range(len(points) - 1):
+                here, after = points[i], points[i + 1]
+                if here.error < floor:
                     continue
                 pairs += 1
-                if next_error > max(error, floor):
-                    rises.append((next_error / error, curve, quantity, work, error, next_error))
-    text = f"{len(curves)} curves of {len(apart)} quantities: from one setting to the next, tighter one the error falls in {pairs - len(rises)} of {pairs} cases"
-    if not rises:
-        return text + "."
-    factor, curve, quantity, work, error, next_error = max(rises)
-    return text + f"; it rises most for `{curve}`, {quantity}: from {error:.1e} at {work} right-hand sides to {next_error:.1e}."
+                if after.error > max(here.error, floor):
+                    found.append((curve, quantity, here, after, why_it_rises(curves, curve, quantity, i)))
+    return pairs, names, found
+
+
+def monotony(rows, apart):
+    """In words, and every exception by name."""
+    pairs, curves, found = rises(rows, apart)
+    text = (f"{len(curves)} curves of {len(apart)} quantities: from one setting to the next, tighter one the error falls in "
+            f"{pairs - len(found)} of {pairs} cases")
+    if not found:
+        return [text + ".", ""]
+    cells = [[f"`{curve}`", quantity, f"{here.setting} to {after.setting.split()[1]}", f"{here.error:.1e} to {after.error:.1e}",
+              f"{here.work} to {after.work}", why] for curve, quantity, here, after, why in found]
+    return [text + ". It rises", ""] + table(["curve", "of", "from", "error", "right-hand sides", "because"], cells)
 
 
 # ---- the page
@@ -277,7 +351,7 @@ def sweep_section(run):
     apart, advice = json.loads(run["apart"]), json.loads(run["advice"])
     lines = [f"### `{problem}`", "", f"    {run['command']}", "",
              f"Reference: {run['first']}, certified by {run['second']}; apart by " +
-             ", ".join(f"{v:.0e} ({q})" for q, v in apart.items()) + ".", "", monotony(rows, apart), ""]
+             ", ".join(f"{v:.0e} ({q})" for q, v in apart.items()) + ".", ""] + monotony(rows, apart)
     objective = next((q for q in apart if q not in ("motion", "sensors") and not q.startswith("gradient of ")), "motion")
     gradient = "gradient of " + objective
     for quantity in (objective, gradient):
@@ -340,6 +414,10 @@ def write():
 if __name__ == "__main__":
     if len(sys.argv) == 3 and sys.argv[1] == "keep":
         keep(Path(sys.argv[2]))
+    elif len(sys.argv) == 3 and sys.argv[1] == "rises":
+        result = json.loads((Path(sys.argv[2]) / "result.json").read_text())
+        apart = {q: v["apart"] for q, v in result["reference"]["quantities"].items()}
+        print("\n".join(monotony(rows_of(Path(sys.argv[2]) / "tradeoff.csv"), apart)))
     elif sys.argv[1:] == ["write"]:
         write()
     else:

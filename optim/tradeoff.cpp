@@ -247,7 +247,7 @@ class Sweep {
       row.message = spent ? fmt::format("the budget of {:g} s was spent", options_.budget_seconds)
                           : fmt::format("would take about {:.2g} s, more than its share of the budget", expected);
       if (curve.next + 1 < curve.settings.size()) row.message += "; so were the tighter ones";
-      row.errors.setConstant(count(), kNaN);
+      row.errors.setConstant(count(), kNaN), row.deviations = row.errors;
       result_.rows.push_back(std::move(row));
       curve.next = curve.settings.size();
       return;
@@ -284,14 +284,17 @@ class Sweep {
     row.message = answer.message;
     if (interrupted() && !answer.ok) row.status = RowStatus::abandoned, row.message = "interrupted";
     row.errors = result_.reference.errors->of(answer);
+    row.deviations = result_.reference.errors->deviations(answer);
     if (row.status != RowStatus::ok) seconds.clear();
     row.repetitions = static_cast<int>(seconds.size());
     // A gradient's objectives are those of the simulation, which is its own row.
     const std::vector<Quantity>& quantities = result_.reference.errors->quantities();
     row.within_floor = row.status == RowStatus::ok;
     for (std::size_t i = 0; i < quantities.size(); ++i) {
-      double& error = row.errors(static_cast<Eigen::Index>(i));
-      if (setting.gradient.has_value() != (quantities[i].kind == QuantityKind::gradient)) error = kNaN;
+      const auto q = static_cast<Eigen::Index>(i);
+      double& error = row.errors(q);
+      if (setting.gradient.has_value() != (quantities[i].kind == QuantityKind::gradient))
+        error = row.deviations(q) = kNaN;
       if (error > quantities[i].certificate) row.within_floor = false;
     }
     if (row.status == RowStatus::ok && row.errors.array().isInf().any()) {

@@ -44,9 +44,10 @@ struct TradeoffRow {
   double wall_seconds = 0;
   int repetitions = 0;  // that this is the median of
   SimulationStatistics statistics;
-  Eigen::VectorXd errors;     // per quantity of the reference; NaN: not of this row
-  std::vector<bool> pareto;   // per quantity: nothing is faster and more exact
-  bool within_floor = false;  // no error is larger than what the reference is certain of
+  Eigen::VectorXd errors;      // per quantity of the reference; NaN: not of this row
+  Eigen::VectorXd deviations;  // likewise, with a sign
+  std::vector<bool> pareto;    // per quantity: nothing is faster and more exact
+  bool within_floor = false;   // no error is larger than what the reference is certain of
 };
 
 // The cheapest setting for an accuracy; see recommend().

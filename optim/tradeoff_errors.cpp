@@ -91,6 +91,27 @@ double TradeoffErrors::error(const Quantity& quantity, const Answer& answer) con
   return kNaN;
 }
 
+double TradeoffErrors::deviation(const Quantity& quantity, const Answer& answer) const {
+  const Index row = quantity.objective;
+  if (quantity.kind == QuantityKind::objective && answer.psi.size() > row)
+    return (answer.psi(row) - exact_.psi(row)) / quantity.scale;
+  if (quantity.kind == QuantityKind::gradient && answer.psi_rho.rows() > row) {
+    const auto in_sizes = [&](const Answer& a) -> Eigen::VectorXd {
+      return a.psi_rho.row(row).transpose().cwiseProduct(parameter_size_);
+    };
+    const Eigen::VectorXd exact = in_sizes(exact_);
+    return (in_sizes(answer) - exact).dot(exact.normalized()) / quantity.scale;
+  }
+  return kNaN;
+}
+
+Eigen::VectorXd TradeoffErrors::deviations(const Answer& answer) const {
+  Eigen::VectorXd deviations(static_cast<Index>(quantities_.size()));
+  for (std::size_t i = 0; i < quantities_.size(); ++i)
+    deviations(static_cast<Index>(i)) = answer.ok ? deviation(quantities_[i], answer) : kNaN;
+  return deviations;
+}
+
 Eigen::VectorXd TradeoffErrors::of(const Answer& answer) const {
   Eigen::VectorXd errors(static_cast<Index>(quantities_.size()));
   for (std::size_t i = 0; i < quantities_.size(); ++i)

@@ -7,6 +7,9 @@
 //
 // Where the right answer is zero, or so small that two methods do not agree on its first three digits (`clearly` says
 // otherwise), the error of the motion, an objective or a gradient is absolute, and a sensor is left out.
+//
+// A deviation is an error with its sign: (psi - psi*) / |psi*|, and of a gradient its part along the right one,
+// (D (g - g*))' D g* / |D g*|^2. Where it changes sign from a setting to the next, an error passes through zero.
 #pragma once
 
 #include <Eigen/Core>
@@ -44,9 +47,12 @@ class TradeoffErrors {
   const std::vector<Quantity>& quantities() const { return quantities_; }
   // One per quantity; NaN where the answer does not hold it.
   Eigen::VectorXd of(const Answer& answer) const;
+  // Likewise; NaN for the motion and the sensors, which have no one sign.
+  Eigen::VectorXd deviations(const Answer& answer) const;
 
  private:
   double error(const Quantity& quantity, const Answer& answer) const;
+  double deviation(const Quantity& quantity, const Answer& answer) const;
   bool is_known(double size, double apart) const { return size > clearly_ * apart; }
   double sensor_error(const Answer& answer) const;
   double gradient_size(const Eigen::Ref<const Eigen::RowVectorXd>& gradient) const;

@@ -67,6 +67,27 @@ void add_joint(const MechanismData& d, AssemblyLevel level, int joint, const Eig
   findings.push_back({std::max({apart, skew, turned}), text});
 }
 
+// The drives, conditions and joints whose rows have no number.
+std::vector<std::string> not_finite(const MechanismData& d, const AssemblyEquations& equations,
+                                    const Eigen::VectorXd& F) {
+  std::vector<std::string> names;
+  const auto add = [&](const std::string& name) {
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  };
+  for (const Constraint& c : d.constraints) {
+    if (F.segment(c.row, c.rows()).allFinite()) continue;
+    add(c.drive >= 0 ? "drive '" + d.drive_names[static_cast<std::size_t>(c.drive)] + "'" : joint_name(d, c));
+  }
+  Eigen::Index row = d.m + d.n;
+  for (const AssemblyTarget& target : equations.targets()) {
+    const ConditionData& condition = d.conditions[static_cast<std::size_t>(target.condition)];
+    if (!std::isfinite(F(row++)))
+      add("the condition of '" + d.sensor_names[static_cast<std::size_t>(condition.sensor)] + "'");
+  }
+  if (names.empty()) names.emplace_back("a body's orientation");
+  return names;
+}
+
 void add_drive(const MechanismData& d, AssemblyLevel level, const Constraint& c, const Eigen::VectorXd& F,
                double tolerance, std::vector<Finding>& findings) {
   const double amount = std::abs(F(c.row));
@@ -84,7 +105,12 @@ std::string assembly_failure(const MechanismData& d, AssemblyLevel level, const 
                              const NearestPoint& found) {
   const bool positions = level == AssemblyLevel::position;
   const std::string head = positions ? "initial assembly failed: " : "initial velocities failed: ";
-  if (!found.F.allFinite()) return head + "the equations are not finite at the guess";
+  if (!found.F.allFinite())
+    return head + "the equations are not finite at the guess: " +
+           fmt::format("{}", fmt::join(not_finite(d, equations, found.F), ", ")) +
+           ". Look at the laws of drives and the values of conditions (a root, logarithm or division outside its "
+           "range), "
+           "and at lengths and positions beyond all measure";
   if (found.status == NearestPointStatus::undetermined) {
     return head +
            "several initial states are equally near to the guess; move the guess (position, orientation of the "

@@ -253,9 +253,11 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     const std::string bodies = bodies_without_inertia();
     stop(SimulationStatus::not_finite,
          fmt::format("the accelerations at the start, t = {:.6g} s, cannot be computed. {}", step_.t,
-                     bodies.empty() ? "A force or law is not finite there"
-                                    : "A body without mass or inertia in a direction that no joint holds has none: " +
-                                          bodies + ". Give it some, or hold it") +
+                     bodies.empty()
+                         ? "A force or law is not finite there (a root, logarithm or division outside its range?): "
+                           "look at the laws of forces and drives and at the sensors in them"
+                         : "A body without mass or inertia in a direction that no joint holds has none: " + bodies +
+                               ". Give it some, or hold it") +
              about_alpha(settings_.formulation));
     return;
   }

@@ -45,7 +45,7 @@ Kind kind_of(To what) {
   return {"", ""};
 }
 
-std::string text_of(double value) { return Expression(value).text(); }
+std::string text_of(double value) { return std::isnan(value) ? "not a number" : Expression(value).text(); }
 
 }  // namespace
 

@@ -15,7 +15,9 @@ namespace {
 
 using Vector = std::array<double, 3>;
 
-std::string text_of(double value) { return Expression(value).text(); }
+constexpr double kMostRows = 1e8;  // of trajectory.csv: more than memory holds
+
+std::string text_of(double value) { return std::isnan(value) ? "not a number" : Expression(value).text(); }
 
 double norm(const Vector& v) { return std::hypot(v[0], v[1], v[2]); }
 double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -205,7 +207,21 @@ void check_meaning(Checker& checker, const Joint& joint) {
   if (need_of(*row, "normal1") != Need::unknown) check_normals(checker, joint, axis1, axis2);
 }
 
+// Of a law of time alone: that it has a number at the start, and so have its first `derivatives` ones.
+void check_start(Checker& checker, const std::string& where, const Expression& law, std::size_t derivatives) {
+  static constexpr const char* kOf[] = {"", "the rate of ", "the second derivative of "};
+  const double start = checker.facts().scene().simulation.start_time;
+  const auto values = checker.facts().law_at(law, start);
+  for (std::size_t k = 0; values && k <= derivatives; ++k) {
+    if (std::isfinite((*values)[k])) continue;
+    return checker.issue(where, kOf[k] + ("'" + law.text()) + "' is " + text_of((*values)[k]) + " at the start, t = " +
+                                    text_of(start) + " s; it must be finite from there to the end (a root, logarithm " +
+                                    "or division outside its range?)");
+  }
+}
+
 void check_meaning(Checker& checker, const Drive& drive) {
+  if (!drive.samples) check_start(checker, checker.path("law"), drive.law, 2);
   if (drive.type == "angle" || drive.type == "displacement") check_joint_has(checker, "joint", drive.joint, drive.type);
   if (drive.type == "distance") check_two_bodies(checker, drive.body1, drive.body2, "a distance");
   if (drive.type == "coordinate" && drive.body == "ground")
@@ -213,6 +229,13 @@ void check_meaning(Checker& checker, const Drive& drive) {
 }
 
 void check_meaning(Checker& checker, const Force& force) {
+  const auto check_law = [&](const std::optional<Expression>& law) {
+    if (law) check_start(checker, checker.path("law"), *law, 0);
+  };
+  const auto check_components = [&](const auto& components) {
+    for (std::size_t i = 0; i < 3; ++i)
+      check_start(checker, child_path(checker.path("components"), i), components[i], 0);
+  };
   // A coefficient of 0 beside a law says nothing, any other may be thought to act.
   const auto warn_of_law = [&](bool has_law, std::initializer_list<std::pair<const char*, const Field*>> coefficients) {
     std::vector<std::string> idle;
@@ -224,18 +247,22 @@ void check_meaning(Checker& checker, const Force& force) {
   };
   if (const auto* tsda = std::get_if<Tsda>(&force.kind)) {
     check_two_bodies(checker, tsda->body1, tsda->body2, "a tsda");
+    check_law(tsda->law);
     warn_of_law(tsda->law.has_value(), {{"stiffness", &tsda->stiffness},
                                         {"damping", &tsda->damping},
                                         {"free_length", &tsda->free_length},
                                         {"actuator", &tsda->actuator}});
   } else if (const auto* rsda = std::get_if<Rsda>(&force.kind)) {
     check_joint_has_angle(checker, rsda->joint);
+    check_law(rsda->law);
     warn_of_law(rsda->law.has_value(),
                 {{"stiffness", &rsda->stiffness}, {"damping", &rsda->damping}, {"free_angle", &rsda->free_angle}});
   } else if (const auto* applied = std::get_if<PointForce>(&force.kind)) {
     check_moving(checker, applied->body);
+    check_components(applied->components);
   } else if (const auto* torque = std::get_if<Torque>(&force.kind)) {
     check_moving(checker, torque->body);
+    check_components(torque->components);
   } else if (const auto* bushing = std::get_if<BushingSpec>(&force.kind)) {
     check_two_bodies(checker, bushing->body1, bushing->body2, "a bushing");
   } else if (const auto* friction = std::get_if<FrictionSpec>(&force.kind)) {
@@ -297,12 +324,25 @@ void check_meaning(Checker& checker, const IntegratorSettings& settings) {
   if (settings.initial_step && settings.max_step && *settings.initial_step > *settings.max_step)
     checker.issue(checker.path("initial_step"),
                   "is " + text_of(*settings.initial_step) + ", above max_step " + text_of(*settings.max_step));
+  if (settings.rtol >= 1)
+    checker.issue(checker.path("rtol"), "is " + text_of(settings.rtol) + ", a relative tolerance must be below 1");
 }
 
 void check_meaning(Checker& checker, const SimulationSettings& settings) {
   if (settings.end_time <= settings.start_time)
     checker.issue(checker.path("end_time"), "is " + text_of(settings.end_time) + " s, it must be after start_time, " +
                                                 text_of(settings.start_time) + " s");
+  const double span = settings.end_time - settings.start_time;
+  const IntegratorSettings& integrator = settings.integrator;
+  if (integrator.step && span / *integrator.step > static_cast<double>(integrator.max_steps))
+    checker.issue(child_path(checker.path("integrator"), "step"),
+                  "is " + text_of(*integrator.step) + " s: more steps to the end than max_steps, " +
+                      text_of(static_cast<double>(integrator.max_steps)) +
+                      ", allows; take a longer step, or raise that");
+  if (settings.output_step && span / *settings.output_step > kMostRows)
+    checker.issue(checker.path("output_step"),
+                  "is " + text_of(*settings.output_step) + " s: more than " + text_of(kMostRows) +
+                      " rows of trajectory.csv; take a longer one, or an earlier end_time");
   if (settings.accuracy && *settings.accuracy >= 1)
     checker.issue(checker.path("accuracy"), "is " + text_of(*settings.accuracy) + ", a relative error must be below 1");
   if (!settings.events.empty() && has_word(kMultistepMethods, settings.integrator.type))

@@ -162,6 +162,20 @@ std::optional<std::array<double, 3>> SceneFacts::value(const PointField& field, 
   return it == owner->points.end() ? std::nullopt : value(it->second);
 }
 
+std::optional<std::array<double, 3>> SceneFacts::law_at(const Expression& law, double t) const {
+  if (any_unread_) return std::nullopt;
+  try {
+    const Program f(law, time_law_), f_t = f.derivative(time_law_.input("t")),
+                                     f_tt = f_t.derivative(time_law_.input("t"));
+    for (const Program* program : {&f, &f_t, &f_tt}) program->grow(scratch_);
+    std::vector<double> inputs = parameter_values_;
+    inputs.push_back(t);
+    return std::array{f.value(inputs, scratch_), f_t.value(inputs, scratch_), f_tt.value(inputs, scratch_)};
+  } catch (const UnknownName&) {
+    return std::nullopt;
+  }
+}
+
 std::optional<Dimension> SceneFacts::dimension_of_name(const std::string& name) const {
   if (const auto it = dimensions_.find(name); it != dimensions_.end()) return it->second;
   const Expression* const definition = none_.definition(name);

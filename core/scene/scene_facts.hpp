@@ -44,6 +44,9 @@ class SceneFacts {
   std::optional<std::array<double, 3>> value(const VectorField& field) const;
   std::optional<std::array<double, 3>> value(const PointField& field, const std::string& body) const;
 
+  // A law of time alone, and its first two derivatives in it; nullopt where it depends on more or cannot be evaluated.
+  std::optional<std::array<double, 3>> law_at(const Expression& law, double t) const;
+
   std::optional<Dimension> dimension_of_name(const std::string& name) const;  // nullopt: not known
 
  private:

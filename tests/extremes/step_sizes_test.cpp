@@ -1,4 +1,5 @@
 // Steps too large, and runs of one step.
+#include "tests/app/run_command.hpp"
 #include "tests/extremes/problem_runs.hpp"
 
 using namespace mbsopt;
@@ -13,7 +14,7 @@ TEST_CASE("a fixed step too large for stability ends the run in words, before nu
   const Outcome run = values(p);
   INFO(method << ", step " << step);
   REQUIRE_FALSE(run.ok());
-  CHECK_THAT(run.message(), Contains("smaller") && Contains("step"));
+  CHECK_THAT(run.message(), Contains("a smaller simulation.integrator.step") || Contains("use a smaller step"));
 }
 
 TEST_CASE("a fixed step too large for a swing ends the run in words, by every kind of method", "[extremes]") {
@@ -25,7 +26,26 @@ TEST_CASE("a fixed step too large for a swing ends the run in words, by every ki
   const Outcome run = values(p);
   INFO(method << ", step " << step << ": " << run.message());
   REQUIRE_FALSE(run.ok());
-  CHECK_THAT(run.message(), Contains("step"));
+  CHECK_THAT(run.message(), Contains("a smaller simulation.integrator.step") || Contains("se a smaller step"));
+}
+
+TEST_CASE("steps, tolerances and rows that no run gets through are refused with their place in the file",
+          "[extremes]") {
+  const auto [key, value, words] = GENERATE(table<std::string, double, std::string>(
+      {{"integrator.step", 1e-300, "more steps to the end than max_steps, 1e+07, allows; take a longer step"},
+       {"integrator.step", 0, "greater than 0"},
+       {"integrator.rtol", 1e300, "a relative tolerance must be below 1"},
+       {"integrator.rtol", 0, "greater than 0"},
+       {"integrator.atol", 0, "greater than 0"},
+       {"output_step", 1e-12, "rows of trajectory.csv; take a longer one"}}));
+  Json p = pendulum();
+  Json& settings = p["simulation"];
+  settings[Json::json_pointer("/" + std::string(key == "output_step" ? key : "integrator/" + key.substr(11)))] = value;
+  const TemporaryFolder folder;
+  const CommandOutcome run = run_command({"simulate", folder.write("p.json", p.dump()), "--out", folder.file("out")});
+  INFO(run.err);
+  CHECK(run.exit_code == 2);
+  CHECK_THAT(run.err, Contains("p.json:1:") && Contains("simulation." + key + ": ") && Contains(words));
 }
 
 TEST_CASE("an initial step too large is taken back by step-size control", "[extremes]") {
