@@ -369,7 +369,12 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
   list.SetNumericValue("acceptable_obj_change_tol", options.tolerance * options.tolerance);
   list.SetNumericValue("acceptable_constr_viol_tol", options.constraint_tolerance);
   list.SetIntegerValue("acceptable_iter", 3);
-  if (near_solution) {
+  if (options.warm_start) {
+    list.SetNumericValue("mu_init", std::min(1e-6, options.tolerance));
+    list.SetStringValue("bound_mult_init_method", "mu-based");
+    for (const char* const push : {"bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"})
+      list.SetNumericValue(push, 1e-8);
+  } else if (near_solution) {
     if (!second_order || constrained) list.SetNumericValue("mu_init", 1e-4);
     list.SetNumericValue("bound_push", 1e-6), list.SetNumericValue("bound_frac", 1e-6);
   }

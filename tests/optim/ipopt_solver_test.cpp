@@ -1,10 +1,12 @@
 #include "optim/ipopt_solver.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "optim/search_watch.hpp"
@@ -150,6 +152,34 @@ TEST_CASE("a start that is optimal already is left as it is", "[ipopt]") {
   const NlpResult bounded = solve_with_ipopt(problem, vector({0.5, 0.25}));
   CHECK(bounded.x == vector({0.5, 0.25}));
   CHECK(bounded.evaluations == 1);
+}
+
+TEST_CASE("a warm start stays near, at its bounds and limits, and needs fewer iterations", "[ipopt]") {
+  Hs071 hs071;
+  Rosenbrock valley;
+  valley.x_upper << 0.5, 10;
+  const bool of_hs071 = GENERATE(true, false);
+  NonlinearProgram& problem = of_hs071 ? static_cast<NonlinearProgram&>(hs071) : valley;
+  const Eigen::VectorXd start = of_hs071 ? vector({1, 4.743, 3.821, 1.3794}) : vector({0.5, 0.2502});
+  const auto run = [&](bool warm) {
+    double farthest = 0;
+    IpoptOptions options;
+    options.warm_start = warm;
+    options.progress = [&](const NlpProgress& p) {
+      farthest = std::max(farthest, (p.x - start).cwiseAbs().maxCoeff());
+      return true;
+    };
+    const NlpResult result = solve_with_ipopt(problem, start, options);
+    CHECK(result.status == SolverStatus::converged);
+    return std::pair{result, farthest};
+  };
+  const auto [cold, away] = run(false);
+  const auto [warm, near] = run(true);
+  INFO(cold.iterations << " iterations cold, " << warm.iterations << " warm; " << away << " and " << near << " away");
+  CHECK((warm.x - cold.x).norm() < 1e-5);
+  CHECK(2 * warm.iterations <= cold.iterations + 1);
+  CHECK(near < 1e-3);
+  CHECK(away > 1e-2);
 }
 
 TEST_CASE("ipopt leaves negative curvature by what the gradients tell", "[ipopt]") {
