@@ -6,6 +6,8 @@
 namespace mbsopt {
 namespace {
 
+static_assert(kLanes == 4);  // as in block_kernels_avx2.cpp
+
 struct SixInPairs : Column<3> {
   using Column<3>::Column;
   static SixInPairs zero() {

@@ -63,19 +63,19 @@ struct RowsInPlane {
   std::size_t body_count;
 };
 
-// An iterate of BlockSaddleSolver, with its right-hand side b and the residual of J x = g.
+// An iterate of BlockSaddleSolver, with its right-hand side b and the residual of J x = g. None may overlap.
 struct SaddleIterate {
   const double *alpha, *b;
   double *x, *nu, *residual;
   std::size_t rows;  // of J
 };
 struct SaddleSizes {
-  double x, residual;  // largest entries
+  double x, residual;  // largest entries; one that is not a number may be missed
 };
 
 // A block of MotionBlocks: the same layout.
 template <int Rows>
-struct alignas(Rows % 2 == 0 ? 16 : 8) MotionBlockView {
+struct [[gnu::may_alias]] alignas(Rows % 2 == 0 ? 16 : 8) MotionBlockView {
   double q[7 * Rows], v[7 * Rows];
   int parts;
 };

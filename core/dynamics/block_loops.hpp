@@ -11,26 +11,26 @@ template <class Row, class Six>
 class BlockLoops {
  public:
   static constexpr BlockKernels kernels() {
-    return {&factor_diagonal,
-            &divide,
-            &subtract_product,
-            &solve_vector,
-            &add_weighted_squares,
-            &load_vector,
-            &correct_vector,
-            &solve<6>,
-            &solve<3>,
-            &subtract_times_in_space,
-            &subtract_times_in_plane,
-            &subtract_transposed_times_in_space,
-            &subtract_transposed_times_in_plane,
-            &load_in_space,
-            &load_in_plane,
-            &correct_in_space,
-            &correct_in_plane,
-            &add_motion_of_bodies,
-            &add_motion_of_rows,
-            &sum_stages};
+    return {.factor_diagonal = &factor_diagonal,
+            .divide = &divide,
+            .subtract_product = &subtract_product,
+            .solve = &solve_vector,
+            .add_weighted_squares = &add_weighted_squares,
+            .load = &load_vector,
+            .correct = &correct_vector,
+            .solve_lanes_in_space = &solve<6>,
+            .solve_lanes_in_plane = &solve<3>,
+            .subtract_times_in_space = &subtract_times_in_space,
+            .subtract_times_in_plane = &subtract_times_in_plane,
+            .subtract_transposed_times_in_space = &subtract_transposed_times_in_space,
+            .subtract_transposed_times_in_plane = &subtract_transposed_times_in_plane,
+            .load_lanes_in_space = &load_in_space,
+            .load_lanes_in_plane = &load_in_plane,
+            .correct_lanes_in_space = &correct_in_space,
+            .correct_lanes_in_plane = &correct_in_plane,
+            .add_motion_of_bodies = &add_motion_of_bodies,
+            .add_motion_of_rows = &add_motion_of_rows,
+            .sum_stages = &sum_stages};
   }
 
  private:
@@ -273,7 +273,7 @@ class BlockLoops {
       for (int i = 0; i < 6; ++i) sum[i] += B[i + 6 * j] * xj;
     }
   }
-  enum { r = 1, p = 2, rdot = 4, pdot = 8 };  // MotionBlocks::Part
+  enum { r = 1, p = 2, rdot = 4, pdot = 8 };  // MotionBlocks::Part, whose header has inline functions
   static void add_motion_of_bodies(const MotionBlockView<6>* blocks, const MotionPlace* places, const int* first_place,
                                    std::size_t count, std::size_t n, const double* y, double* to) {
     const Row* const q = rows(y);
@@ -354,9 +354,11 @@ class BlockLoops {
   template <int Rows>
   static void sum_rows(std::size_t first, int terms, const double* const* k, const double* c, const double* d,
                        const double* q0, const double* v0, double* q, double* v) {
+    const Row* const from_q = rows(q0) + first;
+    const Row* const from_v = rows(v0) + first;
     Row sum_q[Rows], sum_v[Rows];
 #pragma GCC unroll 4
-    for (int i = 0; i < Rows; ++i) sum_q[i] = rows(q0)[first + i], sum_v[i] = rows(v0)[first + i];
+    for (int i = 0; i < Rows; ++i) sum_q[i] = from_q[i], sum_v[i] = from_v[i];
     for (int j = 0; j < terms; ++j) {
       const Row* const kj = rows(k[j]) + first;
 #pragma GCC unroll 4
@@ -365,8 +367,10 @@ class BlockLoops {
         sum_q[i] += c[j] * x, sum_v[i] += d[j] * x;
       }
     }
+    Row* const to_q = rows(q) + first;
+    Row* const to_v = rows(v) + first;
 #pragma GCC unroll 4
-    for (int i = 0; i < Rows; ++i) rows(q)[first + i] = sum_q[i], rows(v)[first + i] = sum_v[i];
+    for (int i = 0; i < Rows; ++i) to_q[i] = sum_q[i], to_v[i] = sum_v[i];
   }
 
   // Lower triangle of A -> below the diagonal of W = inv(L), zeros elsewhere, and the inverse of D, with A = L D L';

@@ -22,11 +22,11 @@ void list(const std::vector<std::vector<int>>& bodies, std::vector<MotionBlocks:
 
 // Blocks as block_kernels.hpp sees them.
 template <int Rows>
-const MotionBlockView<Rows>* lanes(const std::vector<MotionBlocks::Block<Rows>>& blocks) {
+const MotionBlockView<Rows>* view(const std::vector<MotionBlocks::Block<Rows>>& blocks) {
   using Ours = MotionBlocks::Block<Rows>;
   using Theirs = MotionBlockView<Rows>;
-  static_assert(sizeof(Ours) == sizeof(Theirs) && offsetof(Ours, v) == offsetof(Theirs, v) &&
-                offsetof(Ours, parts) == offsetof(Theirs, parts));
+  static_assert(sizeof(Ours) == sizeof(Theirs) && alignof(Ours) >= alignof(Theirs) &&
+                offsetof(Ours, v) == offsetof(Theirs, v) && offsetof(Ours, parts) == offsetof(Theirs, parts));
   return reinterpret_cast<const Theirs*>(blocks.data());
 }
 
@@ -63,8 +63,8 @@ void MotionBlocks::add_times(const LaneRows& y_dir, std::vector<Lanes<6>>& b_dir
   const BlockKernels& kernels = block_kernels();
   const std::size_t n = at(n_);
   if (n > 0)
-    kernels.add_motion_of_bodies(lanes(b), pairs_.data(), pair_begin_.data(), n, n, y_dir.data(), b_dir[0].data());
-  kernels.add_motion_of_rows(lanes(c), rows_.data(), row_begin_.data(), row_begin_.size() - 1, n, y_dir.data(),
+    kernels.add_motion_of_bodies(view(b), pairs_.data(), pair_begin_.data(), n, n, y_dir.data(), b_dir[0].data());
+  kernels.add_motion_of_rows(view(c), rows_.data(), row_begin_.data(), row_begin_.size() - 1, n, y_dir.data(),
                              c_dir.data());
 }
 

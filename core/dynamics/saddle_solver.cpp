@@ -75,11 +75,9 @@ void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, con
     } else {
       sizes = rows_.correct(at, first, correction);
     }
-    if (c_ > 0) {
-      reduce(c_, alpha_, residual);
-      sizes.residual = residual.cwiseAbs().maxCoeff();
-    }
+    if (c_ > 0) reduce(c_, alpha_, residual);
     if (!decides) continue;
+    if (c_ > 0) sizes.residual = residual.cwiseAbs().maxCoeff();
     const double now = sizes.residual;
     if (last || k >= settings.least) {
       const double size = std::max(sizes.x, g.cwiseAbs().maxCoeff());

@@ -69,7 +69,7 @@ void Adjoint::take_sample(const SampleEvent& event, const StatePoint& at) {
 }
 
 // The integral of a running cost's gradient is what lambda might become. Not its largest value times the span: that
-// may be the start's of a motion that dies out at once.
+// may be the first steps' of a motion that dies out at once.
 void Adjoint::take_step(const StatePoint& at) {
   for (const Eigen::Index o : run_.running()) {
     y_bar_.setZero(), rho_bar_.setZero();

@@ -54,9 +54,9 @@ void TangentSweep::add_stages(const Block& b, double h, double c, const Weights&
   const double* k[Method::kMaxStages + 1];
   double of_q[Method::kMaxStages + 1], of_v[Method::kMaxStages + 1];
   int terms = 0;
-  const auto add = [&](double q, double v, const double* to_both) {
+  const auto add = [&](double q, double v, const double* of_stage) {
     if (q == 0 && v == 0) return;
-    of_q[terms] = q, of_v[terms] = v, k[terms++] = to_both;
+    of_q[terms] = q, of_v[terms] = v, k[terms++] = of_stage;
   };
   add(h * c, 0, b.y0.data() + half);
   for (int j = first; j <= last; ++j) {

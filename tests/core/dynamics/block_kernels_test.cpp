@@ -83,15 +83,15 @@ void test_solve(void (*solve)(const FactorView&, double*)) {
   require_equal(x, expected);
 }
 
-// A joint of the ground and body 1 (a full row, one of a single displacement) and one of bodies 1 and 2 (a row without
-// displacements).
+// A joint of the ground and body 1 (a full row, one of a single displacement), one of bodies 1 and 2 (a row without
+// displacements, two full ones), and one of body 2 and the ground, which shares the last row.
 struct InSpace {
-  std::vector<RowsInSpace::Group> groups{{0, 1, 0, 0, 2}, {1, 2, 2, 2, 1}};
-  std::vector<RowsInSpace::Columns> columns{{0, 3}, {1, 2}, {3, 3}};
+  std::vector<RowsInSpace::Group> groups{{0, 1, 0, 0, 2}, {1, 2, 2, 2, 3}, {2, 0, 4, 5, 1}};
+  std::vector<RowsInSpace::Columns> columns{{0, 3}, {1, 2}, {3, 3}, {0, 3}, {0, 3}, {0, 3}};
   std::vector<RowsInSpace::Body> bodies{{2.0, {1, 0.1, 0.2, 0.1, 2, 0.3, 0.2, 0.3, 3}},
                                         {3.0, {2, 0.2, 0.1, 0.2, 1, 0.1, 0.1, 0.1, 4}}};
-  std::vector<double> J1 = random_numbers(18, 5), J2 = random_numbers(18, 6);
-  static constexpr int rows = 3, unknowns = 12;
+  std::vector<double> J1 = random_numbers(36, 5), J2 = random_numbers(36, 6);  // per block row
+  static constexpr int rows = 5, unknowns = 12;
 
   InSpace() {
     for (std::vector<double>* J : {&J1, &J2}) {
@@ -103,21 +103,19 @@ struct InSpace {
     return {groups.data(), groups.size(), J1.data(), J2.data(), columns.data(), bodies.data(), bodies.size()};
   }
   Eigen::MatrixXd J() const {
-    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, 12);
-    for (int r = 0; r < 3; ++r) {
-      for (int i = 0; i < 6; ++i) {
-        const std::size_t k = static_cast<std::size_t>(6 * r + i);
-        if (r < 2) {
-          J(r, i) = J2[k];
-        } else {
-          J(r, i) = J1[k], J(r, 6 + i) = J2[k];
-        }
+    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(rows, unknowns);
+    for (const RowsInSpace::Group& g : groups) {
+      for (int r = 0; r < g.rows; ++r) {
+        const Eigen::Map<const Eigen::RowVectorXd> a(J1.data() + 6 * (g.block + r), 6),
+            b(J2.data() + 6 * (g.block + r), 6);
+        if (g.body1 > 0) J.block(g.row + r, 6 * (g.body1 - 1), 1, 6) += a;
+        if (g.body2 > 0) J.block(g.row + r, 6 * (g.body2 - 1), 1, 6) += b;
       }
     }
     return J;
   }
   Eigen::MatrixXd M() const {
-    Eigen::MatrixXd M = Eigen::MatrixXd::Zero(12, 12);
+    Eigen::MatrixXd M = Eigen::MatrixXd::Zero(unknowns, unknowns);
     for (int b = 0; b < 2; ++b) {
       const RowsInSpace::Body& body = bodies[static_cast<std::size_t>(b)];
       M.block(6 * b, 6 * b, 3, 3).diagonal().setConstant(body.mass);
@@ -288,15 +286,15 @@ TEST_CASE("loops of the block solvers add squares of rows and leave out their em
 
 TEST_CASE("loops of the block solvers take a pass of the saddle-point solver on a vector, for whatever processor") {
   const InSpace model;
-  const Eigen::Vector3d alpha(1, 1.5, 2);
+  const Eigen::VectorXd alpha = Eigen::VectorXd::LinSpaced(5, 1, 2);
   const Eigen::VectorXd b = random_rows(12, 9).col(0), dx = random_rows(12, 10).col(0);
   for (const BlockKernels* kernels : all_kernels()) {
     for (const bool first : {true, false}) {
-      Eigen::VectorXd x = random_rows(12, 11).col(0), nu = random_rows(3, 12).col(0),
-                      residual = random_rows(3, 13).col(0);
-      const Eigen::VectorXd x0 = first ? Eigen::VectorXd::Zero(12) : x, nu0 = first ? Eigen::VectorXd::Zero(3) : nu,
+      Eigen::VectorXd x = random_rows(12, 11).col(0), nu = random_rows(5, 12).col(0),
+                      residual = random_rows(5, 13).col(0);
+      const Eigen::VectorXd x0 = first ? Eigen::VectorXd::Zero(12) : x, nu0 = first ? Eigen::VectorXd::Zero(5) : nu,
                             residual0 = residual;
-      const SaddleIterate at{alpha.data(), b.data(), x.data(), nu.data(), residual.data(), 3};
+      const SaddleIterate at{alpha.data(), b.data(), x.data(), nu.data(), residual.data(), 5};
       Eigen::VectorXd correction(12);
       kernels->load(model.view(), at, first, correction.data());
       const Eigen::VectorXd step = nu0 - alpha.asDiagonal() * residual0;
