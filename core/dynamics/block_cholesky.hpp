@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "core/body/fixed_size.hpp"
-#include "core/dynamics/block_kernels.hpp"
 #include "core/dynamics/elimination.hpp"
 
 namespace mbsopt {
@@ -39,10 +38,6 @@ class BlockCholesky {
     }
   }
 
-  // The block of edge `handle` as it is stored: (first, second), or (second, first) where it is transposed.
-  Block& off_diagonal(std::size_t handle) { return lower_[handles_[handle].block]; }
-  bool transposed(std::size_t handle) const { return handles_[handle].transposed; }
-
   bool factor();
 
   void solve(std::span<Vec<N>> x);
@@ -52,7 +47,6 @@ class BlockCholesky {
   std::size_t blocks() const { return diagonal_.size() + lower_.size(); }
 
  private:
-  FactorView view() const;
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
   Elimination elimination_;
