@@ -3,15 +3,9 @@
 #include <algorithm>
 
 #include "core/dynamics/block_kernels.hpp"
-#include "core/dynamics/pairs.hpp"
 
 namespace mbsopt {
 namespace {
-
-using Six = Column<3>;
-
-const double* column(const Mat<6, 6>& A, int j) { return A.data() + 6 * j; }
-double* column(Mat<6, 6>& A, int j) { return A.data() + 6 * j; }
 
 // Lower triangle of A -> below the diagonal of W = inv(L), unit lower, else zeros, and the inverse of D, with
 // A = L D L'; false where D is not positive.
@@ -54,32 +48,11 @@ void divide(const Mat<N, N>& W, const Vec<N>& inverse, Mat<N, N>& A, Mat<N, N>& 
     A.col(j) = inverse(j) * sum;
   }
 }
-void divide(const Mat<6, 6>& W, const Vec<6>& inverse, Mat<6, 6>& A, Mat<6, 6>& LD) {
-#pragma GCC unroll 6
-  for (int j = 5; j >= 0; --j) {
-    Six sum(column(A, j));
-#pragma GCC unroll 6
-    for (int k = 0; k < j; ++k) sum.add(W(j, k), column(A, k));
-    sum.store(column(LD, j));
-    sum.scale(inverse(j));
-    sum.store(column(A, j));
-  }
-}
-
 // C -= A B'
 template <int N>
 void subtract_product(const Mat<N, N>& A, const Mat<N, N>& B, Mat<N, N>& C) {
   C.noalias() -= A.lazyProduct(B.transpose());
 }
-void subtract_product(const Mat<6, 6>& A, const Mat<6, 6>& B, Mat<6, 6>& C) {
-  for (int j = 0; j < 6; ++j) {
-    Six sum(column(C, j));
-#pragma GCC unroll 6
-    for (int k = 0; k < 6; ++k) sum.subtract(B(j, k), column(A, k));
-    sum.store(column(C, j));
-  }
-}
-
 // x = W x and x = W'x, W unit lower; y -= L x and y -= L'x.
 // Of three numbers, written out: pairs would wait for the single numbers just stored.
 void multiply(const Mat<3, 3>& W, Vec<3>& x) {
@@ -97,35 +70,15 @@ void subtract_transposed_times(const Mat<3, 3>& L, const Vec<3>& x, Vec<3>& y) {
   for (int j = 0; j < 3; ++j) y(j) -= L(0, j) * a + L(1, j) * b + L(2, j) * c;
 }
 
-// And of six, in pairs.
-void multiply(const Mat<6, 6>& W, Vec<6>& x) {
-  const Vec<6> b = x;
-  Six sum(b.data());
-  sum.add<0>(b(0), column(W, 0));
-  sum.add<1>(b(1), column(W, 1));
-  sum.add<1>(b(2), column(W, 2));
-  sum.add<2>(b(3), column(W, 3));
-  sum.add<2>(b(4), column(W, 4));
-  sum.store(x.data());
+// Blocks of six are left to block_kernels.hpp.
+bool factor_diagonal(Mat<6, 6>& A, Vec<6>& inverse) {
+  return block_kernels().factor_diagonal(A.data(), inverse.data());
 }
-void multiply_transposed(const Mat<6, 6>& W, Vec<6>& b) {
-  const Six x(b.data());
-  Six sum = x;
-  sum.x[0] += sums(x.times<0>(column(W, 0)), x.times<1>(column(W, 1)));
-  sum.x[1] += sums(x.times<1>(column(W, 2)), x.times<2>(column(W, 3)));
-  sum.x[2] += sums(x.times<2>(column(W, 4)), Pair{0, 0});
-  sum.store(b.data());
+void divide(const Mat<6, 6>& W, const Vec<6>& inverse, Mat<6, 6>& A, Mat<6, 6>& LD) {
+  block_kernels().divide(W.data(), inverse.data(), A.data(), LD.data());
 }
-void subtract_times(const Mat<6, 6>& L, const Vec<6>& x, Vec<6>& y) {
-  Six sum(y.data());
-  for (int j = 0; j < 6; ++j) sum.subtract(x(j), column(L, j));
-  sum.store(y.data());
-}
-void subtract_transposed_times(const Mat<6, 6>& L, const Vec<6>& b, Vec<6>& y) {
-  const Six x(b.data());
-  Six sum(y.data());
-  for (int j = 0; j < 3; ++j) sum.x[j] -= sums(x.times(column(L, 2 * j)), x.times(column(L, 2 * j + 1)));
-  sum.store(y.data());
+void subtract_product(const Mat<6, 6>& A, const Mat<6, 6>& B, Mat<6, 6>& C) {
+  block_kernels().subtract_product(A.data(), B.data(), C.data());
 }
 
 }  // namespace
@@ -169,33 +122,42 @@ bool BlockCholesky<N>::factor() {
   return true;
 }
 
+template <int N>
+FactorView BlockCholesky<N>::view() const {
+  return {elimination_.bodies(), elimination_.order.data(), first_block_.data(),
+          body_.data(),          diagonal_[0].data(),       lower_.empty() ? nullptr : lower_[0].data(),
+          inverse_[0].data()};
+}
+
 // In the order of elimination, in place.
 template <int N>
 void BlockCholesky<N>::solve(std::span<Vec<N>> x) {
-  const std::vector<int>& order = elimination_.order;
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    Vec<N>& y = x[index(order[k])];
-    multiply(diagonal_[k], y);
-    for (int b = first_block_[k]; b < first_block_[k + 1]; ++b)
-      subtract_times(lower_[index(b)], y, x[index(body_[index(b)])]);
-  }
-  for (std::size_t k = order.size(); k-- > 0;) {
-    Vec<N>& y = x[index(order[k])];
-    y.array() *= inverse_[k].array();
-    for (int b = first_block_[k]; b < first_block_[k + 1]; ++b)
-      subtract_transposed_times(lower_[index(b)], x[index(body_[index(b)])], y);
-    multiply_transposed(diagonal_[k], y);
+  if (x.empty()) return;
+  if constexpr (N == 6) {
+    block_kernels().solve(view(), x[0].data());
+  } else {
+    const std::vector<int>& order = elimination_.order;
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      Vec<N>& y = x[index(order[k])];
+      multiply(diagonal_[k], y);
+      for (int b = first_block_[k]; b < first_block_[k + 1]; ++b)
+        subtract_times(lower_[index(b)], y, x[index(body_[index(b)])]);
+    }
+    for (std::size_t k = order.size(); k-- > 0;) {
+      Vec<N>& y = x[index(order[k])];
+      y.array() *= inverse_[k].array();
+      for (int b = first_block_[k]; b < first_block_[k + 1]; ++b)
+        subtract_transposed_times(lower_[index(b)], x[index(body_[index(b)])], y);
+      multiply_transposed(diagonal_[k], y);
+    }
   }
 }
 
 template <int N>
 void BlockCholesky<N>::solve(std::span<Lanes<N>> x) {
   if (x.empty()) return;
-  const FactorView factor{elimination_.bodies(), elimination_.order.data(), first_block_.data(),
-                          body_.data(),          diagonal_[0].data(),       lower_.empty() ? nullptr : lower_[0].data(),
-                          inverse_[0].data()};
   const BlockKernels& kernels = block_kernels();
-  (N == 6 ? kernels.solve_lanes_in_space : kernels.solve_lanes_in_plane)(factor, x[0].data());
+  (N == 6 ? kernels.solve_lanes_in_space : kernels.solve_lanes_in_plane)(view(), x[0].data());
 }
 
 template class BlockCholesky<6>;

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/body/fixed_size.hpp"
+#include "core/dynamics/block_kernels.hpp"
 #include "core/dynamics/elimination.hpp"
 
 namespace mbsopt {
@@ -38,6 +39,10 @@ class BlockCholesky {
     }
   }
 
+  // The block of edge `handle` as it is stored: (first, second), or (second, first) where it is transposed.
+  Block& off_diagonal(std::size_t handle) { return lower_[handles_[handle].block]; }
+  bool transposed(std::size_t handle) const { return handles_[handle].transposed; }
+
   bool factor();
 
   void solve(std::span<Vec<N>> x);
@@ -47,6 +52,7 @@ class BlockCholesky {
   std::size_t blocks() const { return diagonal_.size() + lower_.size(); }
 
  private:
+  FactorView view() const;
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
   Elimination elimination_;

@@ -1,6 +1,6 @@
-// The innermost loops over lanes (core/body/fixed_size.hpp: four tangent directions at a time) of the block solvers,
-// compiled twice: for any processor, and for x86-64 ones with AVX2 and FMA, a register of which holds a row of lanes.
-// The processor chooses, so the last bits of tangents depend on its kind; nothing else does.
+// The innermost loops of the block solvers, over blocks of six and over lanes (core/body/fixed_size.hpp: four tangent
+// directions at a time), compiled twice: for any processor, and for x86-64 ones with AVX2 and FMA, whose registers hold
+// four numbers. The processor chooses, so the last bits of results depend on its kind.
 //
 // Plain arrays and no inline functions: what Eigen or the standard library define inline, compiled for AVX2 and not
 // inlined, would be the same symbol as elsewhere, and a linker may keep either.
@@ -84,17 +84,31 @@ struct MotionPlace {
 };
 
 struct BlockKernels {
-  // x: N rows of lanes per moving body, N = 6 in space, 3 in the plane; y, lambda: one per row of Phi.
-  void (*solve_lanes_in_space)(const FactorView& factor, double* x);  // x = inv(S) x
+  // Over blocks of six, single vectors.
+
+  // Lower triangle of A = L D L' -> inv(L) below the diagonal, zeros elsewhere; false where D is not positive
+  bool (*factor_diagonal)(double* A, double* inverse_D);
+  void (*divide)(const double* W, const double* inverse_D, double* A, double* LD);  // LD = A W', A = LD inv(D)
+  void (*subtract_product)(const double* A, const double* B, double* C);            // C -= A B'
+  void (*solve)(const FactorView& factor, double* x);                               // x = inv(S) x
+  // aa += sum_r alpha_r a_r'a_r, bb and ab likewise, of rows a_r, b_r of six numbers; null: left out
+  void (*add_weighted_squares)(int rows, const double* alpha, const RowsInSpace::Columns* columns, const double* a,
+                               const double* b, double* aa, double* bb, double* ab);
+  // correction = b - M x - J'(nu - alpha residual); first: x = 0, nu = 0
+  void (*load)(const RowsInSpace& J, const SaddleIterate& at, bool first, double* correction);
+  // x += correction, residual -= J correction, nu -= alpha residual; first: x = correction, nu = -alpha residual
+  void (*correct)(const RowsInSpace& J, const SaddleIterate& at, bool first, const double* correction);
+
+  // Over lanes. x: N rows of lanes per moving body, N = 6 in space, 3 in the plane; y, lambda: one per row of Phi.
+
+  void (*solve_lanes_in_space)(const FactorView& factor, double* x);
   void (*solve_lanes_in_plane)(const FactorView& factor, double* x);
   void (*subtract_times_in_space)(const RowsInSpace& J, const double* x, double* y);  // y -= J x
   void (*subtract_times_in_plane)(const RowsInPlane& J, const double* x, double* y);
   void (*subtract_transposed_times_in_space)(const RowsInSpace& J, const double* lambda, double* x);  // x -= J'lambda
   void (*subtract_transposed_times_in_plane)(const RowsInPlane& J, const double* lambda, double* x);
-  // correction = b - M x - J'(nu - alpha residual); first: x = 0, nu = 0
   void (*load_lanes_in_space)(const RowsInSpace& J, const SaddleIterate& at, bool first, double* correction);
   void (*load_lanes_in_plane)(const RowsInPlane& J, const SaddleIterate& at, bool first, double* correction);
-  // x += correction, residual -= J correction, nu -= alpha residual; first: x = correction, nu = -alpha residual
   SaddleSizes (*correct_lanes_in_space)(const RowsInSpace& J, const SaddleIterate& at, bool first,
                                         const double* correction);
   SaddleSizes (*correct_lanes_in_plane)(const RowsInPlane& J, const SaddleIterate& at, bool first,

@@ -88,36 +88,21 @@ void ConstraintRows::add_mass(BlockCholesky<6>& S) const {
   }
 }
 
-// S12 += alpha J1'J2 of one row.
-void ConstraintRows::add_cross(double alpha, int block, Mat<6, 6>& S12) const {
-  const double *a = J1.row(block).data(), *b = J2.row(block).data();
-  const auto [first, last] = columns(block);
-  const auto add_column = [&, first = first, last = last](int j) {
-    const double ab = alpha * b[j];
-    for (int i = first; i < last; ++i) S12(i, j) += a[i] * ab;
-    for (int i = 3; i < 6; ++i) S12(i, j) += a[i] * ab;
-  };
-  for (int j = first; j < last; ++j) add_column(j);
-  for (int j = 3; j < 6; ++j) add_column(j);
-}
-
 void ConstraintRows::add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S) {
+  const BlockKernels& kernels = block_kernels();
   for (std::size_t k = 0; k < data_->groups.size(); ++k) {
     const RowGroup& g = data_->groups[k];
     if (g.shared) continue;
-    for (int r = 0; r < g.rows; ++r) {
-      const auto add_square = [&](int body, const Rows& J) {
-        if (body == 0) return;
-        const Columns& x = columns(g.block + r);
-        add_lower_square(alpha(g.row + r), J.row(g.block + r).data(), x.first, x.last, S.diagonal(body - 1));
-      };
-      add_square(g.body1, J1);
-      add_square(g.body2, J2);
+    const double* const a = J1.row(g.block).data();
+    const double* const b = J2.row(g.block).data();
+    double* const aa = g.body1 > 0 ? S.diagonal(g.body1 - 1).data() : nullptr;
+    double* const bb = g.body2 > 0 ? S.diagonal(g.body2 - 1).data() : nullptr;
+    double* const ab = aa && bb ? S.off_diagonal(handle_[k]).data() : nullptr;
+    if (ab && S.transposed(handle_[k])) {
+      kernels.add_weighted_squares(g.rows, alpha.data() + g.row, columns_.data() + g.block, b, a, bb, aa, ab);
+    } else {
+      kernels.add_weighted_squares(g.rows, alpha.data() + g.row, columns_.data() + g.block, a, b, aa, bb, ab);
     }
-    if (g.body1 == 0 || g.body2 == 0) continue;
-    Mat<6, 6> S12 = Mat<6, 6>::Zero();
-    for (int r = 0; r < g.rows; ++r) add_cross(alpha(g.row + r), g.block + r, S12);
-    S.add_off_diagonal(handle_[k], S12);
   }
   if (!shared_.empty()) add_shared_square(alpha, S);
 }

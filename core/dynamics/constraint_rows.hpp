@@ -60,7 +60,13 @@ class ConstraintRows {
   void subtract_transposed_times(const LaneRows& lambda, std::vector<Lanes<6>>& x) const {
     if (!x.empty()) block_kernels().subtract_transposed_times_in_space(view(), lambda.data(), x[0].data());
   }
-  // Steps of BlockSaddleSolver on lanes (block_kernels.hpp).
+  // Steps of BlockSaddleSolver (block_kernels.hpp), of a single vector without sizes.
+  void load(const SaddleIterate& at, bool first, std::vector<Vec<6>>& correction) const {
+    block_kernels().load(view(), at, first, correction[0].data());
+  }
+  void correct(const SaddleIterate& at, bool first, const std::vector<Vec<6>>& correction) const {
+    block_kernels().correct(view(), at, first, correction[0].data());
+  }
   void load(const SaddleIterate& at, bool first, std::vector<Lanes<6>>& correction) const {
     block_kernels().load_lanes_in_space(view(), at, first, correction[0].data());
   }
@@ -90,14 +96,12 @@ class ConstraintRows {
 
  private:
   using Columns = RowsInSpace::Columns;
-  const Columns& columns(int block) const { return columns_[static_cast<std::size_t>(block)]; }
   RowsInSpace view() const {
     return {groups_.data(), groups_.size(), J1.data(), J2.data(), columns_.data(), bodies_.data(), bodies_.size()};
   }
 
   static const double* row(const Rows& J, int block) { return J.data() + 6 * block; }
 
-  void add_cross(double alpha, int block, Mat<6, 6>& S12) const;
   static std::size_t at(int body) { return static_cast<std::size_t>(body - 1); }
   void add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S);
 

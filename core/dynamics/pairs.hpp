@@ -58,7 +58,7 @@ const LaneRow* entries(const Lanes<N>& x) {
 // (a0 + a1, b0 + b1)
 inline Pair sums(Pair a, Pair b) { return __builtin_shufflevector(a, b, 0, 2) + __builtin_shufflevector(a, b, 1, 3); }
 
-// 2 Pairs numbers. First: the pairs before it are left alone.
+// 2 Pairs numbers.
 template <int Pairs>
 struct Column {
   Pair x[Pairs];
@@ -67,17 +67,15 @@ struct Column {
 #pragma GCC unroll 16
     for (int i = 0; i < Pairs; ++i) x[i] = reinterpret_cast<const Pair*>(from)[i];
   }
-  template <int First = 0>
   void add(double s, const double* y) {
     const Pair ss = {s, s};
 #pragma GCC unroll 16
-    for (int i = First; i < Pairs; ++i) x[i] += ss * reinterpret_cast<const Pair*>(y)[i];
+    for (int i = 0; i < Pairs; ++i) x[i] += ss * reinterpret_cast<const Pair*>(y)[i];
   }
-  template <int First = 0>
   void subtract(double s, const double* y) {
     const Pair ss = {s, s};
 #pragma GCC unroll 16
-    for (int i = First; i < Pairs; ++i) x[i] -= ss * reinterpret_cast<const Pair*>(y)[i];
+    for (int i = 0; i < Pairs; ++i) x[i] -= ss * reinterpret_cast<const Pair*>(y)[i];
   }
   void scale(double s) {
     const Pair ss = {s, s};
@@ -85,11 +83,10 @@ struct Column {
     for (int i = 0; i < Pairs; ++i) x[i] *= ss;
   }
   // x'y, its two halves not yet added.
-  template <int First = 0>
   Pair times(const double* y) const {
-    Pair sum = x[First] * reinterpret_cast<const Pair*>(y)[First];
+    Pair sum = x[0] * reinterpret_cast<const Pair*>(y)[0];
 #pragma GCC unroll 16
-    for (int i = First + 1; i < Pairs; ++i) sum += x[i] * reinterpret_cast<const Pair*>(y)[i];
+    for (int i = 1; i < Pairs; ++i) sum += x[i] * reinterpret_cast<const Pair*>(y)[i];
     return sum;
   }
   void store(double* to) const {

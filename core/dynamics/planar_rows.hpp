@@ -24,9 +24,10 @@ class PlanarRows {
   void evaluate(const Frames& frames);  // J
 
   // y -= J x; x: body i at x[i - 1]
-  void subtract_times(const std::vector<Vec<3>>& x, Eigen::VectorXd& y) const {
+  void subtract_times(const std::vector<Vec<3>>& x, Eigen::VectorXd& y) const { subtract_times(x, y.data()); }
+  void subtract_times(const std::vector<Vec<3>>& x, double* y) const {
     for (const Point& p : points_) {
-      double first = y(p.row), second = y(p.row2);
+      double first = y[p.row], second = y[p.row2];
       if (p.body2 > 0) {
         const Vec<3>& b = x[at(p.body2)];
         first -= b(0) - p.x2[1] * b(2), second -= b(1) + p.x2[0] * b(2);
@@ -35,11 +36,11 @@ class PlanarRows {
         const Vec<3>& b = x[at(p.body1)];
         first += b(0) - p.x1[1] * b(2), second += b(1) + p.x1[0] * b(2);
       }
-      y(p.row) = first, y(p.row2) = second;
+      y[p.row] = first, y[p.row2] = second;
     }
     for (const Entry& e : entries_) {
       const Vec<3>& b = x[at(e.body)];
-      y(e.row) -= e.J[0] * b(0) + e.J[1] * b(1) + e.J[2] * b(2);
+      y[e.row] -= e.J[0] * b(0) + e.J[1] * b(1) + e.J[2] * b(2);
     }
   }
   void subtract_times(const std::vector<Lanes<3>>& x, LaneRows& y) const {
@@ -47,27 +48,15 @@ class PlanarRows {
   }
   // x -= J'lambda
   void subtract_transposed_times(const Eigen::VectorXd& lambda, std::vector<Vec<3>>& x) const {
-    for (const Point& p : points_) {
-      const double first = lambda(p.row), second = lambda(p.row2);
-      if (p.body2 > 0) {
-        Vec<3>& b = x[at(p.body2)];
-        b(0) -= first, b(1) -= second, b(2) -= p.x2[0] * second - p.x2[1] * first;
-      }
-      if (p.body1 > 0) {
-        Vec<3>& b = x[at(p.body1)];
-        b(0) += first, b(1) += second, b(2) += p.x1[0] * second - p.x1[1] * first;
-      }
-    }
-    for (const Entry& e : entries_) {
-      Vec<3>& b = x[at(e.body)];
-      for (int k = 0; k < 3; ++k) b(k) -= e.J[k] * lambda(e.row);
-    }
+    subtract_transposed([&](int row) { return lambda(row); }, x);
   }
   void subtract_transposed_times(const LaneRows& lambda, std::vector<Lanes<3>>& x) const {
     if (!x.empty()) block_kernels().subtract_transposed_times_in_plane(view(), lambda.data(), x[0].data());
   }
 
-  // Steps of BlockSaddleSolver on lanes (block_kernels.hpp).
+  // Steps of BlockSaddleSolver (block_kernels.hpp), of a single vector without sizes.
+  void load(const SaddleIterate& at, bool first, std::vector<Vec<3>>& correction) const;
+  void correct(const SaddleIterate& at, bool first, const std::vector<Vec<3>>& correction) const;
   void load(const SaddleIterate& at, bool first, std::vector<Lanes<3>>& correction) const {
     block_kernels().load_lanes_in_plane(view(), at, first, correction[0].data());
   }
@@ -106,6 +95,25 @@ class PlanarRows {
     int entry1, entry2;
     std::size_t handle;
   };
+  template <class Lambda>  // row -> number
+  void subtract_transposed(const Lambda& lambda, std::vector<Vec<3>>& x) const {
+    for (const Point& p : points_) {
+      const double first = lambda(p.row), second = lambda(p.row2);
+      if (p.body2 > 0) {
+        Vec<3>& b = x[at(p.body2)];
+        b(0) -= first, b(1) -= second, b(2) -= p.x2[0] * second - p.x2[1] * first;
+      }
+      if (p.body1 > 0) {
+        Vec<3>& b = x[at(p.body1)];
+        b(0) += first, b(1) += second, b(2) += p.x1[0] * second - p.x1[1] * first;
+      }
+    }
+    for (const Entry& e : entries_) {
+      Vec<3>& b = x[at(e.body)];
+      const double l = lambda(e.row);
+      for (int k = 0; k < 3; ++k) b(k) -= e.J[k] * l;
+    }
+  }
   static std::size_t at(int body) { return static_cast<std::size_t>(body - 1); }
   RowsInPlane view() const {
     return {points_.data(), points_.size(), entries_.data(), entries_.size(), bodies_.data(), bodies_.size()};

@@ -23,9 +23,10 @@ void reduce(double c, const Eigen::VectorXd& alpha, Y& z) {
 }
 
 template <class X>
-SaddleIterate iterate(const Eigen::VectorXd& alpha, const std::vector<X>& b, std::vector<X>& x, LaneRows& nu,
-                      LaneRows& residual) {
-  return {alpha.data(), b[0].data(), x[0].data(), nu.data(), residual.data(), static_cast<std::size_t>(alpha.size())};
+double largest(const std::vector<X>& x) {
+  double size = 0;
+  for (const X& xi : x) size = std::max(size, xi.cwiseAbs().maxCoeff());
+  return size;
 }
 
 // A residual above it, relative as in Settings, is more than rounding.
@@ -55,73 +56,28 @@ bool BlockSaddleSolver<Rows>::factor(const Frames& frames) {
   return S_.factor();
 }
 
-// correction = b - M x - J'nu + J' alpha residual
-template <class Rows>
-void BlockSaddleSolver<Rows>::load(bool first, const Vector& b, const Vector& x, const Eigen::VectorXd& nu,
-                                   const Eigen::VectorXd& residual, Eigen::VectorXd& step, Vector& correction) const {
-  if (first) {
-    step = -alpha_.cwiseProduct(residual);
-  } else {
-    subtract_scaled(nu, alpha_, residual, step);
-  }
-  for (std::size_t i = 0; i < b.size(); ++i) {
-    correction[i] = b[i];
-    if (!first) correction[i] -= mass_times(static_cast<int>(i) + 1, x[i]);
-  }
-  rows_.subtract_transposed_times(step, correction);
-}
-
-template <class Rows>
-void BlockSaddleSolver<Rows>::load(bool first, const LaneVector& b, LaneVector& x, LaneRows& nu, LaneRows& residual,
-                                   LaneRows&, LaneVector& correction) const {
-  rows_.load(iterate(alpha_, b, x, nu, residual), first, correction);
-}
-
-template <class Rows>
-SaddleSizes BlockSaddleSolver<Rows>::correct(bool first, bool wanted, const Vector&, const Vector& correction,
-                                             Vector& x, Eigen::VectorXd& nu, Eigen::VectorXd& residual) const {
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    if (first) {
-      x[i] = correction[i];
-    } else {
-      x[i] += correction[i];
-    }
-  }
-  rows_.subtract_times(correction, residual);
-  if (first) {
-    nu = -alpha_.cwiseProduct(residual);
-  } else {
-    subtract_scaled(nu, alpha_, residual, nu);
-  }
-  SaddleSizes sizes{0, 0};
-  if (!wanted) return sizes;
-  for (const auto& xi : x) sizes.x = std::max(sizes.x, xi.cwiseAbs().maxCoeff());
-  sizes.residual = residual.cwiseAbs().maxCoeff();
-  return sizes;
-}
-
-template <class Rows>
-SaddleSizes BlockSaddleSolver<Rows>::correct(bool first, bool, const LaneVector& b, const LaneVector& correction,
-                                             LaneVector& x, LaneRows& nu, LaneRows& residual) const {
-  return rows_.correct(iterate(alpha_, b, x, nu, residual), first, correction);
-}
-
 template <class Rows>
 template <class X, class Y>
 void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, const Settings& settings,
                                         std::vector<X>& x, Y& nu, Y& residual, Y& step, std::vector<X>& correction) {
   residual = g;
+  const SaddleIterate at{alpha_.data(), b[0].data(),     x[0].data(),
+                         nu.data(),     residual.data(), static_cast<std::size_t>(alpha_.size())};
   double before = INFINITY;
   for (int k = 0;; ++k) {
     const bool first = k == 0, last = k >= settings.most, decides = last || k + 1 >= settings.least;
-    load(first, b, x, nu, residual, step, correction);
+    rows_.load(at, first, correction);  // b - M x - J'nu + J' alpha residual
     S_.solve(std::span<X>(correction));
-    SaddleSizes sizes = correct(first, decides, b, correction, x, nu, residual);
-    if (c_ > 0) {
-      reduce(c_, alpha_, residual);
-      sizes.residual = residual.cwiseAbs().maxCoeff();
+    SaddleSizes sizes{0, 0};
+    if constexpr (X::ColsAtCompileTime == 1) {
+      rows_.correct(at, first, correction);
+      if (decides) sizes = {largest(x), residual.cwiseAbs().maxCoeff()};
+    } else {
+      sizes = rows_.correct(at, first, correction);
     }
+    if (c_ > 0) reduce(c_, alpha_, residual);
     if (!decides) continue;
+    if (c_ > 0) sizes.residual = residual.cwiseAbs().maxCoeff();
     const double now = sizes.residual;
     if (last || k >= settings.least) {
       const double size = std::max(sizes.x, g.cwiseAbs().maxCoeff());

@@ -225,10 +225,86 @@ void test_motion(void (*add)(const MotionBlockView<N>*, const MotionPlace*, cons
 
 }  // namespace
 
-TEST_CASE("loops of the block solvers solve with a factor, for whatever processor") {
+TEST_CASE("loops of the block solvers solve with a factor, vectors and lanes, for whatever processor") {
   for (const BlockKernels* kernels : all_kernels()) {
+    const Factor<6> factor;
+    const Rows x = random_rows(18, 40);
+    Eigen::VectorXd single = x.col(0);
+    kernels->solve(factor.view(), single.data());
+    REQUIRE((single - factor.inverse() * x.col(0)).norm() < 1e-12 * (1 + single.norm()));
     test_solve<6>(kernels->solve_lanes_in_space);
     test_solve<3>(kernels->solve_lanes_in_plane);
+  }
+}
+
+TEST_CASE("loops of the block solvers factor blocks of six, for whatever processor") {
+  using Block = Eigen::Matrix<double, 6, 6>;
+  for (const BlockKernels* kernels : all_kernels()) {
+    const Block X = Eigen::Map<const Block>(random_numbers(36, 41).data());
+    const Block A = X * X.transpose() + Block::Identity();
+    Block W = A.triangularView<Eigen::Lower>();
+    Eigen::Matrix<double, 6, 1> inverse_D;
+    REQUIRE(kernels->factor_diagonal(W.data(), inverse_D.data()));
+    REQUIRE(W.triangularView<Eigen::Upper>().toDenseMatrix().cwiseAbs().maxCoeff() == 0);
+    const Block inverse_L = W + Block::Identity();
+    const Block D = inverse_D.cwiseInverse().asDiagonal();
+    REQUIRE((inverse_L * A * inverse_L.transpose() - D).cwiseAbs().maxCoeff() < 1e-13 * A.norm());
+
+    Block of_below = Eigen::Map<const Block>(random_numbers(36, 42).data()), LD;
+    const Block below = of_below;
+    kernels->divide(W.data(), inverse_D.data(), of_below.data(), LD.data());
+    REQUIRE((LD - below * inverse_L.transpose()).norm() < 1e-13 * (1 + LD.norm()));
+    REQUIRE((of_below * D - LD).norm() < 1e-13 * (1 + LD.norm()));
+
+    Block C = Block::Ones();
+    kernels->subtract_product(LD.data(), of_below.data(), C.data());
+    REQUIRE((C - (Block::Ones() - LD * of_below.transpose())).norm() < 1e-12 * (1 + C.norm()));
+
+    Block not_positive = -Block::Identity();
+    REQUIRE_FALSE(kernels->factor_diagonal(not_positive.data(), inverse_D.data()));
+  }
+}
+
+TEST_CASE("loops of the block solvers add squares of rows and leave out their empty columns, for whatever processor") {
+  using Block = Eigen::Matrix<double, 6, 6>;
+  using SixRows = Eigen::Matrix<double, 3, 6, Eigen::RowMajor>;
+  const InSpace model;
+  const SixRows a = Eigen::Map<const SixRows>(model.J1.data()), b = Eigen::Map<const SixRows>(model.J2.data());
+  const Eigen::Vector3d alpha(1, 2, 3);
+  for (const BlockKernels* kernels : all_kernels()) {
+    Block aa = Block::Ones(), bb = aa, ab = aa;
+    kernels->add_weighted_squares(3, alpha.data(), model.columns.data(), a.data(), b.data(), aa.data(), bb.data(),
+                                  ab.data());
+    REQUIRE((aa - Block::Ones() - a.transpose() * alpha.asDiagonal() * a).norm() < 1e-13);
+    REQUIRE((bb - Block::Ones() - b.transpose() * alpha.asDiagonal() * b).norm() < 1e-13);
+    REQUIRE((ab - Block::Ones() - a.transpose() * alpha.asDiagonal() * b).norm() < 1e-13);
+    kernels->add_weighted_squares(3, alpha.data(), model.columns.data(), a.data(), b.data(), aa.data(), nullptr,
+                                  nullptr);
+    REQUIRE((aa - Block::Ones() - 2 * a.transpose() * alpha.asDiagonal() * a).norm() < 1e-13);
+  }
+}
+
+TEST_CASE("loops of the block solvers take a pass of the saddle-point solver on a vector, for whatever processor") {
+  const InSpace model;
+  const Eigen::VectorXd alpha = Eigen::VectorXd::LinSpaced(5, 1, 2);
+  const Eigen::VectorXd b = random_rows(12, 9).col(0), dx = random_rows(12, 10).col(0);
+  for (const BlockKernels* kernels : all_kernels()) {
+    for (const bool first : {true, false}) {
+      Eigen::VectorXd x = random_rows(12, 11).col(0), nu = random_rows(5, 12).col(0),
+                      residual = random_rows(5, 13).col(0);
+      const Eigen::VectorXd x0 = first ? Eigen::VectorXd::Zero(12) : x, nu0 = first ? Eigen::VectorXd::Zero(5) : nu,
+                            residual0 = residual;
+      const SaddleIterate at{alpha.data(), b.data(), x.data(), nu.data(), residual.data(), 5};
+      Eigen::VectorXd correction(12);
+      kernels->load(model.view(), at, first, correction.data());
+      const Eigen::VectorXd step = nu0 - alpha.asDiagonal() * residual0;
+      REQUIRE((correction - (b - model.M() * x0 - model.J().transpose() * step)).norm() < 1e-13);
+      kernels->correct(model.view(), at, first, dx.data());
+      const Eigen::VectorXd left = residual0 - model.J() * dx;
+      REQUIRE((x - x0 - dx).norm() < 1e-14);
+      REQUIRE((residual - left).norm() < 1e-14);
+      REQUIRE((nu - nu0 + alpha.asDiagonal() * left).norm() < 1e-14);
+    }
   }
 }
 
