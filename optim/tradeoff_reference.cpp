@@ -179,29 +179,37 @@ class Search {
     const GradientMethod method = cost.tlm <= cost.adjoint ? GradientMethod::tlm : GradientMethod::adjoint;
     RunLimit longer = limit();
     longer.seconds *= 4;
-    const auto gradients = [&](const Candidate& c) {
-      return c.method.step ? least_changing(c, method, longer) : runs_.gradients(c.settings, method, longer);
-    };
-    Answer of_a = gradients(a), of_b = gradients(b);
+    auto [of_a, of_b] = closest_gradients(gradients_of(a, method, longer), gradients_of(b, method, longer));
     if (!of_a.ok || !of_b.ok) return;
     if (!a.method.step && !b.method.step) shorten_steps({a.settings, b.settings}, method, longer, of_a, of_b);
     a.answer.psi_rho = std::move(of_a.psi_rho), b.answer.psi_rho = std::move(of_b.psi_rho);
     reference.gradients_by = to_string(method);
   }
 
-  // Derivatives magnify the rounding of positions next to singular ones, and more steps come closer to them: of steps
-  // up to eight times the motion's, those whose halving changed the gradient least.
-  Answer least_changing(const Candidate& candidate, GradientMethod method, const RunLimit& limit) const {
-    Answer best, last;
-    double least = std::numeric_limits<double>::infinity();
+  // Derivatives magnify the rounding of positions next to singular ones, by how close stages come to them, which is
+  // chance: also with steps up to eight times the motion's, where these are of one size.
+  std::vector<Answer> gradients_of(const Candidate& candidate, GradientMethod method, const RunLimit& limit) const {
+    if (!candidate.method.step) return {runs_.gradients(candidate.settings, method, limit)};
+    std::vector<Answer> answers;
     for (const double longer : {8.0, 4.0, 2.0, 1.0}) {
       SimulationSettings settings = candidate.settings;
       *settings.integrator.step *= longer;
-      Answer next = runs_.gradients(settings, method, limit);
-      if (!next.ok) continue;
-      const double change = last.ok ? gradients_apart(next, last) : std::numeric_limits<double>::infinity();
-      if (!best.ok || change < least) best = next, least = change;
-      last = std::move(next);
+      answers.push_back(runs_.gradients(settings, method, limit));
+    }
+    return answers;
+  }
+
+  // Of two methods the answers that agree best; not ok where one of them has none.
+  std::pair<Answer, Answer> closest_gradients(const std::vector<Answer>& of_a, const std::vector<Answer>& of_b) const {
+    std::pair<Answer, Answer> best;
+    double least = std::numeric_limits<double>::infinity();
+    for (const Answer& a : of_a) {
+      for (const Answer& b : of_b) {
+        if (!a.ok || !b.ok) continue;
+        const double here = gradients_apart(a, b);
+        if (best.first.ok && here >= least) continue;
+        best = {a, b}, least = here;
+      }
     }
     return best;
   }

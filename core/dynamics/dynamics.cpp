@@ -6,6 +6,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/body/lanes.hpp"
+#include "core/mechanism/joint_distance.hpp"
 
 namespace mbsopt {
 namespace {
@@ -26,6 +27,18 @@ double moderate_alpha(const MechanismData& data, double penalty) {
   return penalty <= moderate ? penalty : std::min(moderate, penalty / 100);
 }
 
+// Along a chain of L joints the least eigenvalue of J inv(M) J' falls as 1/L^2, and with it what a pass gains; from ten
+// times alpha on a third pass would be needed for rounding.
+double alpha_along_chains(const MechanismData& data) {
+  const double L = joints_to_farthest_body(data);
+  return std::clamp(L * L / 10, 1.0, 10.0);
+}
+
+FormulationSettings of_mechanism(const MechanismData& data, FormulationSettings settings) {
+  if (settings.type == FormulationType::augmented_lagrangian) settings.alpha *= alpha_along_chains(data);
+  return settings;
+}
+
 Eigen::VectorXd alpha_of_factor(const MechanismData& data, const FormulationSettings& settings) {
   if (settings.type == FormulationType::augmented_lagrangian) return settings.alpha * data.row_alpha;
   const bool moderate = settings.linear_solver == LinearSolver::quasidefinite;
@@ -43,14 +56,14 @@ double compliance_of(const FormulationSettings& settings) {
 Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settings, Model model)
     : mechanism_(mechanism),
       data_(mechanism_.data()),
-      settings_(settings),
+      settings_(of_mechanism(data_, settings)),
       laws_(data_),
       forces_(data_),
-      solver_(data_, alpha_of_factor(data_, settings), compliance_of(settings)) {
+      solver_(data_, alpha_of_factor(data_, settings_), compliance_of(settings)) {
   const std::size_t n = static_cast<std::size_t>(data_.n);
   const Eigen::Index m = data_.m, P = data_.rho.size();
   if (model == Model::planar) {
-    planar_ = std::make_unique<PlanarDynamics>(data_, settings, solver_.alpha(), compliance_of(settings),
+    planar_ = std::make_unique<PlanarDynamics>(data_, settings_, solver_.alpha(), compliance_of(settings),
                                                solver_settings(false), solver_settings(true));
     return;
   }

@@ -42,6 +42,8 @@ Problem to_compare(const std::string& name) {
   simulation.integrator.type = "dopri853";
   simulation.integrator.rtol = 1e-9, simulation.integrator.atol = 1e-11;
   if (name == "governor/stiff_flyball") simulation.end_time = 0.05;  // explicit steps crawl through it
+  // It comes to rest, where steps at the border of stability magnify rounding up to atol.
+  if (name == "quarter_car/ride") simulation.integrator.atol = 1e-13;
   return problem;
 }
 
