@@ -83,7 +83,13 @@ void FrameTangent::set_zero() {
 
 Vector3d BodyState::omega() const { return omega_B(p, pdot); }
 
-Vector4d BodyState::pddot() const { return 0.5 * G_transposed_times(p, omegadot) - pdot.squaredNorm() * p; }
+// G(p)' omegadot/2 - (pdot'pdot) p, entry by entry: a product kept in memory would be waited for.
+Vector4d BodyState::pddot() const {
+  const double x = 0.5 * omegadot(0), y = 0.5 * omegadot(1), z = 0.5 * omegadot(2), s = pdot.squaredNorm();
+  const double e0 = p(0), e1 = p(1), e2 = p(2), e3 = p(3);
+  return {-e1 * x - e2 * y - e3 * z - s * e0, e0 * x - e3 * y + e2 * z - s * e1, e3 * x + e0 * y - e1 * z - s * e2,
+          -e2 * x + e1 * y + e0 * z - s * e3};
+}
 
 void set_position(const Eigen::Ref<const Vec<7>>& q, BodyState& body, Frame& frame) {
   body.p = q.tail<4>();
@@ -102,7 +108,8 @@ void set_velocity(const Eigen::Ref<const Vec<7>>& v, BodyState& body, Frame& fra
 void set_acceleration(const Vec<6>& z, BodyState& body, Frame& frame) {
   body.omegadot = z.tail<3>();
   frame.rddot = z.head<3>();
-  frame.Addot = frame.A * skew(body.omegadot) + 2 * A(body.pdot) - 2 * body.pdot.squaredNorm() * frame.A;
+  frame.Addot = 2 * A(body.pdot) - 2 * body.pdot.squaredNorm() * frame.A;
+  if ((body.omegadot.array() != 0).any()) frame.Addot += frame.A * skew(body.omegadot);
   frame.pddot = body.pddot();
 }
 

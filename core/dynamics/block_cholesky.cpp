@@ -102,8 +102,8 @@ BlockCholesky<N>::BlockCholesky(int bodies, std::span<const std::pair<int, int>>
 
 template <int N>
 void BlockCholesky<N>::set_zero() {
-  for (Block& b : diagonal_) b.setZero();
-  for (Block& b : lower_) b.setZero();
+  for (std::vector<Block>* blocks : {&diagonal_, &lower_})
+    std::fill_n(blocks->empty() ? nullptr : (*blocks)[0].data(), N * N * blocks->size(), 0.0);
 }
 
 // L_ik = A_ik W_k' inv(D_k); A_ij -= L_ik D_k L_jk'

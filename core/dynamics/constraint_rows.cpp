@@ -72,8 +72,12 @@ void ConstraintRows::evaluate(const std::vector<Frame>& frames) {
           constexpr int m = std::decay_t<decltype(p)>::kRows;
           Mat<m, 6> A, B;
           p.jacobian(f1, f2, A, B);
-          J1.middleRows<m>(c.block) = c.factor * A;
-          J2.middleRows<m>(c.block) = c.factor * B;
+          // In the halves in which they are written: a load across them would wait for both.
+          const auto copy = [&](const Mat<m, 6>& from, Rows& J) {
+            J.middleRows<m>(c.block).template leftCols<3>() = c.factor * from.template leftCols<3>();
+            J.middleRows<m>(c.block).template rightCols<3>() = c.factor * from.template rightCols<3>();
+          };
+          copy(A, J1), copy(B, J2);
         },
         c.primitive);
   }
