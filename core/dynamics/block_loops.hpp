@@ -375,22 +375,29 @@ class BlockLoops {
 
   // Lower triangle of A -> below the diagonal of W = inv(L), zeros elsewhere, and the inverse of D, with A = L D L';
   // false where D is not positive.
+  // Two pivots at a time, a and c - b^2/a = (a c - b^2)/a: both quotients are on their way at once.
   static bool factor_diagonal(double* A, double* inverse) {
     double l[36];  // L below the diagonal, by columns
+#pragma GCC unroll 3
+    for (int j = 0; j < 6; j += 2) {
+      const double a = A[7 * j], b = A[7 * j + 1], c = A[7 * j + 7], determinant = a * c - b * b;
+      if (!(a > 0 && determinant > 0)) return false;
+      const double d = 1 / a, e = a * (1 / determinant);
+      inverse[j] = d, inverse[j + 1] = e;
+      Six first(A + 6 * j), second(A + 6 * j + 6);
+      second.subtract(b * d, A + 6 * j);
+      second.store(A + 6 * j + 6);
 #pragma GCC unroll 6
-    for (int j = 0; j < 6; ++j) {
-      if (!(A[7 * j] > 0)) return false;
-      const double d = 1 / A[7 * j];
-      inverse[j] = d;
-      Six column(A + 6 * j);
-#pragma GCC unroll 6
-      for (int k = j + 1; k < 6; ++k) {
+      for (int k = j + 2; k < 6; ++k) {
         Six of_k(A + 6 * k);
         of_k.subtract(A[k + 6 * j] * d, A + 6 * j);
+        of_k.subtract(A[k + 6 * j + 6] * e, A + 6 * j + 6);
         of_k.store(A + 6 * k);
       }
-      column.scale(d);
-      column.store(l + 6 * j);
+      first.scale(d);
+      first.store(l + 6 * j);
+      second.scale(e);
+      second.store(l + 6 * j + 6);
     }
     // W L = I:  W(:, j) = e_j - sum_{k > j} L(k, j) W(:, k), from the last column; the units come last.
 #pragma GCC unroll 6

@@ -27,15 +27,18 @@ double moderate_alpha(const MechanismData& data, double penalty) {
   return penalty <= moderate ? penalty : std::min(moderate, penalty / 100);
 }
 
-// Along a chain of L joints the least eigenvalue of J inv(M) J' falls as 1/L^2, and with it what a pass gains; from ten
-// times alpha on a third pass would be needed for rounding.
-double alpha_along_chains(const MechanismData& data) {
+// Along a chain of L joints the least eigenvalue of J inv(M) J' falls as 1/L^2, and with it what a pass gains. From ten
+// times alpha on rounding takes a third pass, which chains of hundreds of joints in space need anyway; chains in the
+// plane do not (docs/formulations.md).
+double alpha_along_chains(const MechanismData& data, Model model) {
+  constexpr double kLong = 316;
   const double L = joints_to_farthest_body(data);
-  return std::clamp(L * L / 10, 1.0, 10.0);
+  if (model == Model::planar || L < kLong) return std::clamp(L * L / 10, 1.0, 10.0);
+  return std::clamp(L * L / 1000, 10.0, 1000.0);
 }
 
-FormulationSettings of_mechanism(const MechanismData& data, FormulationSettings settings) {
-  if (settings.type == FormulationType::augmented_lagrangian) settings.alpha *= alpha_along_chains(data);
+FormulationSettings of_mechanism(const MechanismData& data, FormulationSettings settings, Model model) {
+  if (settings.type == FormulationType::augmented_lagrangian) settings.alpha *= alpha_along_chains(data, model);
   return settings;
 }
 
@@ -56,7 +59,7 @@ double compliance_of(const FormulationSettings& settings) {
 Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settings, Model model)
     : mechanism_(mechanism),
       data_(mechanism_.data()),
-      settings_(of_mechanism(data_, settings)),
+      settings_(of_mechanism(data_, settings, model)),
       laws_(data_),
       forces_(data_),
       solver_(data_, alpha_of_factor(data_, settings_), compliance_of(settings)) {
