@@ -199,19 +199,29 @@ class Search {
     return answers;
   }
 
-  // Of two methods the answers that agree best; not ok where one of them has none.
+  // Of two methods the answer that agrees best with any of the other's, and what it is certified by: that, or, since
+  // the best of many is chance, the next best of either method. Not ok where a method has none.
   std::pair<Answer, Answer> closest_gradients(const std::vector<Answer>& of_a, const std::vector<Answer>& of_b) const {
-    std::pair<Answer, Answer> best;
+    const Answer *answer = nullptr, *closest = nullptr, *next = nullptr;
     double least = std::numeric_limits<double>::infinity();
     for (const Answer& a : of_a) {
       for (const Answer& b : of_b) {
         if (!a.ok || !b.ok) continue;
         const double here = gradients_apart(a, b);
-        if (best.first.ok && here >= least) continue;
-        best = {a, b}, least = here;
+        if (answer && here >= least) continue;
+        answer = &a, closest = &b, least = here;
       }
     }
-    return best;
+    if (!answer) return {};
+    least = std::numeric_limits<double>::infinity();
+    for (const std::vector<Answer>* answers : {&of_a, &of_b}) {
+      for (const Answer& other : *answers) {
+        if (!other.ok || &other == answer || &other == closest) continue;
+        const double here = gradients_apart(*answer, other);
+        if (here < least) next = &other, least = here;
+      }
+    }
+    return {*answer, next ? *next : *closest};
   }
 
   // Step-size control looks at the motion. What only derivatives see, a kink of a law in a parameter say, takes shorter

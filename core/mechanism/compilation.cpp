@@ -20,20 +20,21 @@ Compilation::Compilation(const Scene& s, const Eigen::VectorXd& rho, const std::
   data.rho = rho;
   data.active = active_list(rho, active);
   data.gravity = numbers(keep(data.slot_gravity, fields.values(scene.gravity, "gravity")));
+  bodies_.emplace("ground", 0);
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) bodies_.emplace(scene.bodies[i].name, static_cast<int>(i) + 1);
+  for (std::size_t i = 0; i < scene.joints.size(); ++i) joints_.emplace(scene.joints[i].name, i);
 }
 
 int Compilation::body_index(const std::string& name, const std::string& where) const {
-  for (std::size_t i = 0; i < data.body_names.size(); ++i) {
-    if (data.body_names[i] == name) return static_cast<int>(i);
-  }
-  throw SceneError(where + ": there is no body '" + name + "'");
+  const auto found = bodies_.find(name);
+  if (found == bodies_.end()) throw SceneError(where + ": there is no body '" + name + "'");
+  return found->second;
 }
 
 std::size_t Compilation::joint_index(const std::string& name, const std::string& where) const {
-  for (std::size_t i = 0; i < scene.joints.size(); ++i) {
-    if (scene.joints[i].name == name) return i;
-  }
-  throw SceneError(where + ": there is no joint '" + name + "'");
+  const auto found = joints_.find(name);
+  if (found == joints_.end()) throw SceneError(where + ": there is no joint '" + name + "'");
+  return found->second;
 }
 
 DualVector3 Compilation::vector(int body, const PointField& field, const std::string& where) const {

@@ -6,6 +6,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "core/mechanism/field_values.hpp"
@@ -62,6 +64,8 @@ struct Compilation {
   Dual joint_displacement_in_file(const std::string& joint, const std::string& where) const;
 
  private:
+  std::unordered_map<std::string_view, int> bodies_;  // by name, as the next
+  std::unordered_map<std::string_view, std::size_t> joints_;
   std::map<std::pair<std::size_t, Zero>, int> angle_of_joint_;
 };
 
