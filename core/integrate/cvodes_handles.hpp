@@ -31,10 +31,19 @@ class Context {
 // The numbers of a vector of SUNDIALS.
 inline Eigen::Map<Eigen::VectorXd> values(N_Vector v) { return {N_VGetArrayPointer(v), N_VGetLength(v)}; }
 
+// CVODES 6.4.1 reads numbers of its copies before it has set them: those of quadratures of sensitivities, when it
+// considers a higher order.
+inline N_Vector clone_of_zeros(N_Vector v) {
+  const N_Vector clone = N_VClone_Serial(v);
+  if (clone) values(clone).setZero();
+  return clone;
+}
+
 class Vector {
  public:
   Vector(Eigen::Index size, const Context& context) : vector_(N_VNew_Serial(size, context)) {
     if (!vector_) throw std::bad_alloc();
+    vector_->ops->nvclone = &clone_of_zeros;
     values(vector_).setZero();
   }
   Vector(Vector&& other) noexcept : vector_(std::exchange(other.vector_, nullptr)) {}
@@ -53,7 +62,6 @@ class VectorArray {
   VectorArray(int count, Eigen::Index size, const Context& context)
       : count_(count), vectors_(N_VCloneVectorArray(count, Vector(size, context))) {
     if (!vectors_) throw std::bad_alloc();
-    for (int i = 0; i < count; ++i) values(vectors_[i]).setZero();
   }
   VectorArray(const VectorArray&) = delete;
   VectorArray& operator=(const VectorArray&) = delete;

@@ -2,6 +2,8 @@
 // the Runge-Kutta runs at tight tolerances, and what it says when it cannot go on.
 #include "core/integrate/cvodes.hpp"
 
+#include <malloc.h>
+
 #include <catch2/catch.hpp>
 #include <limits>
 
@@ -184,6 +186,22 @@ TEST_CASE("CVODES differentiates the penalty form and stabilised constraints, an
   REQUIRE((exact.ok() && forward.ok() && adjoint.ok()));
   check_close(c, forward.psi_rho, exact.psi_rho, 1e-6);
   check_close(c, adjoint.psi_rho, exact.psi_rho, 1e-6);
+}
+
+TEST_CASE("sensitivities of CVODES do not depend on what memory held before", "[cvodes][gradient]") {
+  const Case c = double_pendulum_case();
+  const Mechanism m(c.scene, nominal(c.scene));
+  const SimulationSettings settings = by("cvodes_adams", 1e-9, c.scene.simulation);
+  MatrixXd first;
+  for (const int byte : {0, 1, 0x80, 0xff}) {  // where it is not 0 memory is filled with it, or its complement
+    mallopt(M_PERTURB, byte);
+    const SimulationResult run = simulate_tlm(m, settings, c.costs(m));
+    mallopt(M_PERTURB, 0);
+    REQUIRE(run.ok());
+    if (first.size() == 0) first = run.psi_rho;
+    INFO("memory filled with " << byte);
+    CHECK(run.psi_rho == first);
+  }
 }
 
 TEST_CASE("states sampled from CVODES carry their sensitivities", "[cvodes][gradient]") {
