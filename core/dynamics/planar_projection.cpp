@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/dynamics/test_load.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -163,6 +165,16 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
   }
   model_.spread(nu_, s.nu), model_.spread(kappa_, s.kappa);
   return finite && y.allFinite();
+}
+
+void PlanarProjector::response(Eigen::VectorXd& out) {
+  for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = solver_.mass_times(i, test_load<3>(i));
+  g_.setZero();
+  solver_.solve(b_, g_, kOnePass, dx_, dnu_);
+  g_ = dnu_.cwiseQuotient(solver_.alpha()) * kRelativeAlpha;
+  for (Vec<3>& b : b_) b.setZero();
+  solver_.solve(b_, g_, kOnePass, dx_, dnu_);
+  out = dnu_.cwiseQuotient(solver_.alpha()) * kRelativeAlpha;
 }
 
 // The bodies and frames of a given state.

@@ -27,6 +27,7 @@ class PlanarProjector {
   void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir);
   void add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,
                    Eigen::VectorXd& rho_bar);
+  void response(Eigen::VectorXd& out);
   double position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y);
   double velocity_violation(double t, const Eigen::VectorXd& y);
   long factorisations() const { return solver_.factorisations(); }

@@ -5,6 +5,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/constraint/unit_norm.hpp"
+#include "core/dynamics/test_load.hpp"
 
 namespace mbsopt {
 namespace {
@@ -157,6 +158,17 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
   }
   if (now > kUnmetVelocity * v_size) return false;
   return y.allFinite();
+}
+
+void Projector::response(Eigen::VectorXd& out) {
+  if (planar_) return planar_->response(out);
+  for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = solver_.mass_times(i, test_load<6>(i));
+  g_.setZero();
+  solver_.solve(b_, g_, kOnePass, dx_, dnu_);
+  g_ = dnu_.cwiseQuotient(data_.row_alpha);
+  for (Vec<6>& b : b_) b.setZero();
+  solver_.solve(b_, g_, kOnePass, dx_, dnu_);
+  out = dnu_.cwiseQuotient(data_.row_alpha);
 }
 
 double Projector::position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y) {

@@ -44,6 +44,11 @@ class Projector {
   void add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,
                    Eigen::VectorXd& rho_bar);
 
+  // After project(), with its factor: the constraint forces that a fixed load on all bodies calls for, and those that
+  // these call for as accelerations of the constraints. In the directions that a singular position is about to set free
+  // they grow as 1/d^3, d the distance from it, and change their sign there.
+  void response(Eigen::VectorXd& out);
+
   // Largest violations at y: of Phi and the unit norms, and of their rates.
   double position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y);
   double velocity_violation(double t, const Eigen::VectorXd& y);

@@ -32,6 +32,12 @@ RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSetting
   const Eigen::Index states = mechanism.states();
   angles_.setZero(static_cast<Eigen::Index>(mechanism.data().angles.size()));
   for (Eigen::VectorXd* x : {&work_, &ydot_, &y_stage_}) x->setZero(states);
+  const bool constrained = settings.formulation.type == FormulationType::augmented_lagrangian && mechanism.data().m > 0;
+  if (constrained && !rk_.implicit() && projector_.positions()) {
+    passage_.emplace(rk_, mechanism.data().m);
+    no_parameters_ = block_without_parameters(mechanism_.data());
+    for (LaneRows* x : {&error_, &projected_error_}) x->setZero(states, kLanes);
+  }
   if (rk_.implicit()) implicit_.emplace(mechanism_, rk_, settings_.integrator, dynamics_);
 }
 
@@ -113,6 +119,37 @@ double RungeKuttaRun::error_of_step() {
   return rk_.error_low ? combined_error(high, norm(rk_.error_low)) : high;
 }
 
+// What projection leaves of the error: next to a singular position rounding, magnified, is most of it, in directions
+// that the constraints hold again where the step ends.
+double RungeKuttaRun::error_after_projection() {
+  const IntegratorSettings& s = settings_.integrator;
+  const double t1 = step_.t + step_.h;
+  if (!projector_.project(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return INFINITY;
+  if (!projector_.linearise(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return INFINITY;
+  const double* weights[2] = {rk_.error, rk_.error_low};
+  for (int k = 0; k < 2; ++k) {
+    if (!weights[k]) continue;
+    work_.setZero();
+    StageSum sum;
+    for (int i = 0; i < rk_.stages; ++i) sum.add(step_.h * weights[k][i], step_.K.col(i).data());
+    sum.to(work_.data(), work_.data(), work_.size());
+    error_.col(k) = work_;
+  }
+  projector_.tangent(no_parameters_, error_, projected_error_);
+  auto norm = [&](int k) {
+    work_ = projected_error_.col(k);
+    return scaled_norm(work_, step_.y0, step_.y_hat, s.rtol, s.atol);
+  };
+  return rk_.error_low ? combined_error(norm(0), norm(1)) : norm(0);
+}
+
+// Whether a step of another size, of `wanted` as far as the singular position allows, is to be tried in its place.
+bool RungeKuttaRun::better_placed_by(double wanted) {
+  projector_.response(response_);
+  if (passage_->well_placed(step_.t, step_.h, response_)) return false;
+  return std::abs(passage_->propose(step_.t, wanted) - step_.h) > 0.02 * step_.h;
+}
+
 RungeKuttaRun::Outcome RungeKuttaRun::attempt(double h, bool adaptive, bool exact, double& error) {
   using Goal = ImplicitStages::Goal;
   step_.h = h;
@@ -128,6 +165,7 @@ RungeKuttaRun::Outcome RungeKuttaRun::attempt(double h, bool adaptive, bool exac
   if (!adaptive) return step_.y_hat.allFinite() ? Outcome::accepted : Outcome::failed;
   error = error_of_step();
   if (!std::isfinite(error)) return Outcome::failed;
+  if (error > 1 && passage_ && passage_->near(step_.t, h)) error = std::min(error, error_after_projection());
   if (error > 1) return Outcome::rejected;
   if (implicit_ && exact) {
     if (!solve_stages(Goal::polish)) return Outcome::unsolved;
@@ -280,6 +318,8 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   double h = adaptive ? first_step(s, span) : s.step.value_or(span);
   if (s.max_step) h = std::min(h, *s.max_step);
   std::size_t frozen_index = 0;
+  int placed_again = 0;
+  if (passage_) passage_->forget();
   EventTimes events(settings_.events, settings_.start_time, settings_.end_time);
   while (result.ok() && (options.frozen ? frozen_index < options.frozen->sizes.size() : step_.t < end)) {
     if (result.statistics.steps + result.statistics.rejected >= s.max_steps) {
@@ -291,6 +331,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
       break;
     }
     const double rate = fastest_tracked_rate(step_.y0);
+    double wanted = h;
     if (options.frozen) {
       step_.t = options.frozen->times[frozen_index];
       h = options.frozen->sizes[frozen_index];
@@ -298,6 +339,8 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
       if (adaptive && rate * h > 2)
         h = 2 / rate;  // an angle is followed over turns only when steps are below half a turn
       h = propose_step(step_.t, h, events.stop_after(step_.t), adaptive);
+      wanted = h;
+      if (adaptive && passage_) h = std::min(passage_->propose(step_.t, h), events.stop_after(step_.t) - step_.t);
       if (!adaptive && rate * h > 3) {
         stop(
             SimulationStatus::step_too_large,
@@ -313,6 +356,17 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
                                      : step_.t + h >= end;
     step_.t1 = last ? end : step_.t + h;
     if (outcome == Outcome::accepted) outcome = finish_step(wants_dense(step_.t1));
+    if (outcome == Outcome::accepted && adaptive && passage_) {
+      constexpr int kMostTries = 3;
+      if (placed_again < kMostTries && better_placed_by(wanted)) {
+        ++placed_again;
+        ++result.statistics.rejected;
+        h = wanted;
+        continue;
+      }
+      placed_again = 0;
+      passage_->accept();
+    }
     if (outcome != Outcome::accepted) {
       if (!adaptive) {
         stop(outcome == Outcome::unsolved          ? SimulationStatus::not_solved
@@ -360,6 +414,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     if (event && adaptive) {  // what the steps before an event were fit for says nothing about those after it
       controller = PiController(rk_.error_order);
       h = std::min(first_step(s, end - step_.t), s.max_step.value_or(end - step_.t));
+      if (passage_) passage_->forget();
     }
     if (event && implicit_ && dynamics_.evaluate(step_.t, step_.y0, angles_, ydot_)) {
       ++evaluations_;

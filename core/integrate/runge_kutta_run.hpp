@@ -10,6 +10,7 @@
 #include "core/integrate/implicit_stages.hpp"
 #include "core/integrate/run_guard.hpp"
 #include "core/integrate/simulation.hpp"
+#include "core/integrate/singular_passage.hpp"
 #include "core/integrate/step.hpp"
 #include "core/integrate/step_control.hpp"
 
@@ -38,6 +39,8 @@ class RungeKuttaRun {
   bool evaluate_stage(int i);
   bool solve_stages(ImplicitStages::Goal goal);
   double error_of_step();
+  double error_after_projection();
+  bool better_placed_by(double wanted);
   void set_y_hat();
   Outcome attempt(double h, bool adaptive, bool exact, double& error);
   Outcome finish_step(bool dense);  // dense stages, projection, branches of the angles
@@ -52,6 +55,11 @@ class RungeKuttaRun {
   std::optional<ImplicitStages> implicit_;
   Projector projector_;
   RunGuard guard_;
+  // Where passage_ is there.
+  std::optional<SingularPassage> passage_;
+  Eigen::VectorXd response_;
+  ParameterBlock no_parameters_;
+  LaneRows error_, projected_error_;
   Step step_;
   Eigen::VectorXd angles_, work_, ydot_, y_stage_;
   bool first_stage_known_ = false;

@@ -1,0 +1,61 @@
+// Steps past singular positions, where the constraints' Jacobian J loses rank for an instant (a four-bar lies flat).
+//
+// At a distance d from such a position, of t* - t in time, a state meets the constraints, to rounding e, only up to e/d
+// in the directions that are about to be free. What is left there obeys d u' + 2 d' u = 0, u' = 2 u/(t* - t), and the
+// stages of an explicit step past t* magnify it, one after another, by h/(t + c_i h - t*) each: by how much depends on
+// where they lie, not on how short the step is. Steps are placed such that t* lies where the tableau magnifies least,
+// at theta = (t* - t)/h.
+//
+// t* is found from the response of the constraint forces to a fixed load (Projector::response), which has a pole there:
+// its inverse goes through zero, and its sign changes.
+//
+//   SingularPassage passage(method, constraints);
+//   h = passage.propose(t, h);                               // attempt it; then, with the response at its end:
+//   if (passage.well_placed(t, h, response)) passage.accept();  // otherwise again, with what propose() says now
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+
+#include "core/integrate/tableaus.hpp"
+
+namespace mbsopt {
+
+class SingularPassage {
+ public:
+  // rk: explicit; outlives this. constraints: entries of a response.
+  SingularPassage(const Method& rk, Eigen::Index constraints) : rk_(rk) {
+    for (Place* p : {&last_, &now_}) p->response.setZero(constraints);
+  }
+
+  void forget();  // what went before
+  bool well_placed(double t, double h, const Eigen::VectorXd& response);
+  void accept();
+  // A step from t of size h at most, or a little more, with regard to the next singular position.
+  double propose(double t, double h) const;
+  // Whether a step from t by h is one that passes a singular position, or a neighbour of one.
+  bool near(double t, double h) const;
+
+  // Where a step's t* is best, 0 to 1.
+  double best_theta();
+  // The largest acceleration over its stage's distance from t*, of the stages of a step and of one like it after it,
+  // where u is 1 over the distance at the start.
+  double magnified(double theta) const;
+
+ private:
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+  struct Place {
+    double t = 0, inverse = 0;
+    Eigen::VectorXd response;
+    bool known = false;
+  };
+
+  const Method& rk_;
+  double best_theta_ = 0, least_ = kNone;   // found when first needed
+  Place last_, now_;                        // where the last accepted step and the one looked at end
+  double most_ = 0;                         // the largest inverse so far
+  double found_ = kNone;                    // t* by these two
+  double ahead_ = kNone, behind_ = -kNone;  // the next t* and the one before
+};
+
+}  // namespace mbsopt

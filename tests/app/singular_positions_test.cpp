@@ -1,0 +1,51 @@
+// Values and gradients through the singular positions of two four-bar windows, against the exact solution.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "app/json/read_problem.hpp"
+#include "optim/tradeoff_runs.hpp"
+#include "tests/app/gallery_files.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+
+namespace {
+
+// Of the gradient of x(10), in units of the parameters L, v, g; exact by quadrature in 30 digits.
+double error_of(const Answer& answer) {
+  const double exact[3] = {-9.08810439514276442, 4.60261031129771836, 0.490718878224858454}, sizes[3] = {1, 1, 9.81};
+  double difference = 0, whole = 0;
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    difference = std::hypot(difference, sizes[k] * (answer.psi_rho(0, k) - exact[k]));
+    whole = std::hypot(whole, sizes[k] * exact[k]);
+  }
+  return difference / whole;
+}
+
+}  // namespace
+
+TEST_CASE("gradients through singular positions gain digits with the tolerance, by adjoint and TLM, planar and spatial",
+          "[singular]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
+  const Problem problem = read_problem(file_of("four_bar/windows"));
+  const TradeoffRuns runs(problem.scene, objectives_of(problem));
+  SimulationSettings settings = problem.scene.simulation;
+  settings.integrator.type = GENERATE(as<std::string>{}, "dopri5", "verner6", "dopri853");
+  settings.model = GENERATE(ModelChoice::planar, ModelChoice::spatial);
+  double before = 0;
+  for (const double rtol : {1e-9, 1e-10, 1e-11}) {
+    settings.integrator.rtol = rtol, settings.integrator.atol = 0.01 * rtol;
+    for (const GradientMethod method : {GradientMethod::adjoint, GradientMethod::tlm}) {
+      const Answer answer = runs.gradients(settings, method);
+      REQUIRE(answer.ok);
+      INFO(settings.integrator.type << " at " << rtol << ": gradient off by " << error_of(answer));
+      CHECK(error_of(answer) < (rtol > 5e-10 ? 1e-6 : 1e-7));
+      if (method == GradientMethod::tlm) continue;
+      const double work = static_cast<double>(answer.statistics.rhs_evaluations);
+      if (before > 0) CHECK(work < 1.8 * before);
+      before = work;
+    }
+  }
+}
