@@ -6,7 +6,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/body/lanes.hpp"
-#include "core/mechanism/joint_distance.hpp"
+#include "core/mechanism/joint_graph.hpp"
 
 namespace mbsopt {
 namespace {

@@ -1,4 +1,5 @@
 #include "core/integrate/runge_kutta_run.hpp"
+#include "core/mechanism/joint_graph.hpp"
 
 #include <fmt/format.h>
 
@@ -32,7 +33,8 @@ RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSetting
   const Eigen::Index states = mechanism.states();
   angles_.setZero(static_cast<Eigen::Index>(mechanism.data().angles.size()));
   for (Eigen::VectorXd* x : {&work_, &ydot_, &y_stage_}) x->setZero(states);
-  const bool constrained = settings.formulation.type == FormulationType::augmented_lagrangian && mechanism.data().m > 0;
+  const bool constrained =
+      settings.formulation.type == FormulationType::augmented_lagrangian && closes_loops(mechanism.data());
   if (constrained && !rk_.implicit() && projector_.positions()) {
     passage_.emplace(rk_, mechanism.data().m);
     no_parameters_ = block_without_parameters(mechanism_.data());

@@ -1,6 +1,8 @@
-#include "core/mechanism/joint_distance.hpp"
+#include "core/mechanism/joint_graph.hpp"
 
 #include <algorithm>
+#include <numeric>
+#include <set>
 #include <vector>
 
 #include "core/mechanism/mechanism_data.hpp"
@@ -32,6 +34,24 @@ int joints_to_farthest_body(const MechanismData& data) {
     }
   }
   return *std::max_element(distance.begin(), distance.end());
+}
+
+bool closes_loops(const MechanismData& data) {
+  std::vector<int> group(data.bodies.size());  // of bodies that hang together, by one of them
+  std::iota(group.begin(), group.end(), 0);
+  const auto leader = [&](int body) {
+    while (group[static_cast<std::size_t>(body)] != body) body = group[static_cast<std::size_t>(body)];
+    return body;
+  };
+  std::set<int> joints;
+  for (const Constraint& c : data.constraints) {
+    if (c.drive >= 0) return true;
+    if (!joints.insert(c.joint).second) continue;
+    const int a = leader(c.body1), b = leader(c.body2);
+    if (a == b) return true;
+    group[static_cast<std::size_t>(b)] = a;
+  }
+  return false;
 }
 
 }  // namespace mbsopt
