@@ -7,6 +7,7 @@
 #include "app/interrupt.hpp"
 #include "app/objective_values.hpp"
 #include "app/run.hpp"
+#include "app/simulation_warnings.hpp"
 #include "app/text_table.hpp"
 #include "core/expression/counted.hpp"
 #include "optim/gradient_check.hpp"
@@ -208,6 +209,7 @@ int check_command(const CommandContext& context) {
   }
 
   run.result["simulation"] = to_json(check.statistics);
+  for (const std::string& warning : simulation_warnings(scene.simulation, check.statistics)) run.warn(warning);
   const Evaluator evaluator(scene, objectives_of(run.problem));
   const std::vector<std::optional<double>> true_values = evaluator.true_values(evaluator.start());
   add_to_result(run.result, check, true_values);

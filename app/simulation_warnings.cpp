@@ -6,6 +6,7 @@ namespace mbsopt {
 namespace {
 
 constexpr double kApart = 1e-3;            // [m, -]
+constexpr double kUnmet = 1e-6;            // of the accelerations of the constraints
 constexpr double kLargePenalty = 3e10;     // above it rounding by Cholesky passes 1e-5 of the accelerations
 constexpr double kDigitsPerAlpha = 1e-16;  // docs/formulations.md, measured
 
@@ -32,6 +33,17 @@ std::vector<std::string> simulation_warnings(const SimulationSettings& settings,
                               "default has no such error",
                               f.alpha)
                 : std::string("Tighten rtol and atol, or let simulation.formulation.projection be position_velocity")));
+  }
+  if (statistics.max_acceleration_residual > kUnmet) {
+    warnings.push_back(
+        fmt::format("the constraints' accelerations were met to {:.1e} only, so that digits, or the branch after a "
+                    "singular position, "
+                    "may be wrong: steps that come too close to a singular position (take a Runge-Kutta method, fewer "
+                    "steps by larger "
+                    "rtol and atol, and compare), or masses that differ too much for simulation.formulation (a larger "
+                    "alpha or more "
+                    "iterations)",
+                    statistics.max_acceleration_residual));
   }
   return warnings;
 }

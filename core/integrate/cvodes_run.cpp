@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "core/integrate/run_guard.hpp"
+#include "core/integrate/start_failure.hpp"
 #include "core/integrate/zero_length.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -50,10 +51,7 @@ ForwardRun::ForwardRun(const Mechanism& mechanism, const SimulationSettings& set
   flow_.start(settings.start_time, assembly_.result().angles);
   *y_ = assembly_.result().y;
   if (!flow_.evaluate(settings.start_time, *y_)) {
-    stop(SimulationStatus::not_finite,
-         fmt::format("the accelerations at the start, t = {:.6g} s, cannot be computed. Either a force or law is not "
-                     "finite there, or a body without mass or inertia in a direction that no joint holds has none",
-                     settings.start_time));
+    stop(SimulationStatus::not_finite, start_failure(mechanism_.data(), settings.start_time));
     return;
   }
   set_up();

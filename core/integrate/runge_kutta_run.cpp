@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "core/integrate/model_choice.hpp"
+#include "core/integrate/start_failure.hpp"
 #include "core/integrate/stiffness.hpp"
 
 namespace mbsopt {
@@ -62,18 +62,6 @@ double RungeKuttaRun::propose_step(double t, double h, double end, bool adaptive
 }
 
 // Names the bodies whose mass or inertia vanishes in some direction, for the message of a singular start.
-std::string RungeKuttaRun::bodies_without_inertia() const {
-  const MechanismData& d = mechanism_.data();
-  std::string names;
-  for (int i = 1; i <= d.n; ++i) {
-    const BodyData& b = d.bodies[static_cast<std::size_t>(i)];
-    const double least = Eigen::SelfAdjointEigenSolver<Matrix3d>(b.J, Eigen::EigenvaluesOnly).eigenvalues()(0);
-    if (b.mass > 0 && least > 0) continue;
-    names += (names.empty() ? "'" : ", '") + d.body_names[static_cast<std::size_t>(i)] + "'";
-  }
-  return names;
-}
-
 bool RungeKuttaRun::evaluate_stage(int i) {
   StageSum sum;
   for (int j = 0; j < i; ++j) sum.add(step_.h * rk_.a(i, j), step_.K.col(j).data());
@@ -173,7 +161,9 @@ std::string RungeKuttaRun::failed(Outcome outcome, double h, bool adaptive) cons
     default:
       return fmt::format(
           "the step fell to {:.3g} s at t = {:.6g} s and its error is still too large. Look for a "
-          "singular position, a spring of zero length or a law that is not smooth near this time; "
+          "singular position, a drive that asks for more than the mechanism reaches, a spring of zero length or a law "
+          "that "
+          "is not smooth near this time; "
           "looser tolerances or a fixed step may pass it",
           h, step_.t);
   }
@@ -250,15 +240,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     result.message = std::move(message);
   };
   if (!dynamics_.evaluate(step_.t, y_initial, angles, ydot_)) {
-    const std::string bodies = bodies_without_inertia();
-    stop(SimulationStatus::not_finite,
-         fmt::format("the accelerations at the start, t = {:.6g} s, cannot be computed. {}", step_.t,
-                     bodies.empty()
-                         ? "A force or law is not finite there (a root, logarithm or division outside its range?): "
-                           "look at the laws of forces and drives and at the sensors in them"
-                         : "A body without mass or inertia in a direction that no joint holds has none: " + bodies +
-                               ". Give it some, or hold it") +
-             about_alpha(settings_.formulation));
+    stop(SimulationStatus::not_finite, start_failure(mechanism_.data(), step_.t) + about_alpha(settings_.formulation));
     return;
   }
   // A guard on which scenes are taken to be planar: what was assembled in space satisfies the planar equations.

@@ -87,11 +87,11 @@ TEST_CASE("a law that is no number at the start is refused with its place in the
 TEST_CASE("a force that has no number from some time on ends the run in words, with that time", "[extremes]") {
   Json p = pendulum();
   p["forces"] = {{{"name", "spring"}, {"type", "rsda"}, {"joint", "pin"}, {"law", "sqrt(0.5 - t)"}}};
+  p["simulation"]["integrator"]["type"] = GENERATE(as<std::string>{}, "dopri5", "cvodes_adams");
   const Outcome run = values(p);
   INFO(run.message());
   REQUIRE_FALSE(run.ok());
-  CHECK_THAT(run.message(),
-             Contains("beyond t = 0.5 s") && Contains("a root, logarithm or division outside its range"));
+  CHECK_THAT(run.message(), Contains("beyond t = 0.5 s") && Contains("Look for ") && Contains(" law "));
 }
 
 TEST_CASE("a wheel that a drive turns evenly about its centre needs no acceleration, and that is no failure",
