@@ -140,6 +140,7 @@ NlpResult solved(DesignProgram& program, const Eigen::VectorXd& x_start, const O
     solver.gauss_newton = spec.hessian == "gauss_newton";
     solver.progress = progress;
     solver.records = records;
+    solver.warm_start = spec.warm_start;
     NlpResult solution = solve_with_ipopt(program, x_start, solver);
     if (solver.second_order)
       solution.algorithm = fmt::format("Ipopt: interior point, {} Hessian",

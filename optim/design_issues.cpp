@@ -31,6 +31,13 @@ std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& s
     issues.push_back({path + ".hessian", "is '" + optimizer.hessian +
                                              "', which needs a run on given steps; simulation.integrator.type is '" +
                                              scene.simulation.integrator.type + "', which cannot take them: 'lbfgs'"});
+  if (method && optimizer.warm_start)
+    issues.push_back({path + ".warm_start", "is of ipopt only, whose barrier leads away from the start; '" +
+                                                optimizer.type + "' has none and begins at the given values"});
+  if (!method && optimizer.warm_start && spec.multistart)
+    issues.push_back({path + ".warm_start",
+                      "says that the given values are near the solution, which other starts of design.multistart are "
+                      "not; leave one of them out"});
   if (optimizer.seed && !(method && method->random))
     issues.push_back({path + ".seed", "is given, but '" + optimizer.type + "' draws no random numbers"});
   if (method) {

@@ -159,4 +159,13 @@ bool DesignProgram::hessians(const VectorXd& x, std::vector<MatrixXd>& H) {
   return true;
 }
 
+bool DesignProgram::gradient_beside(const VectorXd& x, const VectorXd& d, VectorXd& f_x) {
+  const Evaluation& at = evaluation(rho_at(x));
+  if (!at.ok) return false;
+  const Evaluation there = evaluator_.gradients_on(at.steps, rho_at(x + d), at.method);
+  ++hessian_gradients_;
+  if (there.ok) f_x = there.psi_rho.row(0).transpose().cwiseProduct(scaling_.rho_x(x + d));
+  return there.ok;
+}
+
 }  // namespace mbsopt

@@ -8,14 +8,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
+#include <exception>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "core/expression/counted.hpp"
 #include "optim/evaluated_points.hpp"
 #include "optim/optimality.hpp"
+#include "optim/search_watch.hpp"
 #include "optim/secant_curvature.hpp"
+#include "optim/third_order_step.hpp"
 
 namespace mbsopt {
 namespace {
@@ -26,14 +29,11 @@ using VectorIn = Eigen::Map<const Eigen::VectorXd>;
 using VectorView = Eigen::Map<Eigen::VectorXd>;
 
 constexpr int kFreshStarts = 2;
-constexpr int kWandering = 30;       // iterations without a better point: lost in what was learnt from a wild motion
-constexpr int kStalled = 10;         // iterations between whose objectives there is but noise
 constexpr double kAcceptable = 100;  // times the tolerance: where noise hides the rest
 constexpr const char* kConvergedInNoise =
     "converged: the objective does not change any more, and the optimality conditions hold to the accuracy of its "
     "derivatives";
 constexpr const char* kConverged = "converged: the optimality conditions hold";
-constexpr double kNoise = 1e-2;  // times the tolerance, relative to f
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr double kNoBound = 1e20;  // Ipopt's: at least 1e19 means none
 
@@ -45,15 +45,18 @@ class Adapter : public Ipopt::TNLP {
         options_(options),
         result_(result),
         points_(problem, result, options.constraint_tolerance, options.records),
-        secants_(1 / problem.f_scale) {
+        secants_(1 / problem.f_scale),
+        watch_(options.tolerance, problem.constraints() == 0),
+        second_order_(options.second_order) {
     result_.x = x_start;
   }
 
   bool start_is_valid() { return evaluate(x_start_); }
   bool out_of_evaluations() const { return out_of_evaluations_; }
-  bool optimal() const { return optimal_; }
-  bool stalled() const { return stalled_; }
-  bool wandering() const { return wandering_; }
+  SearchEnd end() const { return end_; }  // that was chosen here, of the last round
+  bool lost() const { return end_ == SearchEnd::wandering || end_ == SearchEnd::creeping; }
+  bool second_order() const { return second_order_; }
+  int left_newton_at() const { return left_newton_at_; }  // iteration; 0: never
 
   // Feasible, and the objective falls nowhere within the bounds: the barrier would only lead away from here.
   bool start_is_optimal() {
@@ -132,7 +135,7 @@ class Adapter : public Ipopt::TNLP {
       return true;
     }
     update_hessians(VectorIn(x, n));
-    const Eigen::MatrixXd of_f = convex_where_free();
+    const Eigen::MatrixXd of_f = for_steps();
     for (Index i = 0; i < n; ++i) {
       for (Index j = 0; j <= i; ++j, ++k) {
         values[k] = f_factor * of_f(i, j);
@@ -150,11 +153,10 @@ class Adapter : public Ipopt::TNLP {
     out_of_evaluations_ = options_.max_evaluations && result_.evaluations >= *options_.max_evaluations;
     if (iterate_.size() == 0) return !out_of_evaluations_;
     const bool known = evaluate(iterate_);  // in memory
-    double distance = known ? optimality(problem_, iterate_, *point_) : kUnknown;
-    if (known && options_.second_order) take_simplified_step(distance);
+    const double distance = known ? optimality(problem_, iterate_, *point_) : kUnknown;
     if (options_.progress && !told_progress(distance)) return false;
     if (known && points_.feasible(*point_)) look_at_iterate(distance);
-    return !out_of_evaluations_ && !optimal_ && !stalled_ && !wandering_;
+    return !out_of_evaluations_ && end_ == SearchEnd::none;
   }
 
   bool told_progress(double distance) const {
@@ -165,7 +167,7 @@ class Adapter : public Ipopt::TNLP {
   void finalize_solution(Ipopt::SolverReturn, Index n, const Number* x, const Number*, const Number*, Index,
                          const Number*, const Number*, Number, const Ipopt::IpoptData*,
                          Ipopt::IpoptCalculatedQuantities*) override {
-    if (!optimal_ && !stalled_) final_ = VectorIn(x, n);
+    if (end_ != SearchEnd::optimal && end_ != SearchEnd::stalled) final_ = VectorIn(x, n);
   }
 
   double final_distance() {
@@ -173,7 +175,7 @@ class Adapter : public Ipopt::TNLP {
   }
 
   // Of a stalled search, the end point's optimality.
-  double distance() const { return most_stationary().distance; }
+  double distance() const { return watch_.most_stationary().distance; }
 
   // Whether a point seen on the way is feasible and better than the one Ipopt ended at by more than the tolerance.
   bool passed_a_better_point() {
@@ -184,7 +186,8 @@ class Adapter : public Ipopt::TNLP {
   void go_on_from_best() {
     x_start_ = points_.best_x();
     iterations_before_ = result_.iterations;
-    recent_.clear(), stalled_ = wandering_ = false, without_better_ = 0;
+    if (end_ == SearchEnd::creeping) second_order_ = false, left_newton_at_ = result_.iterations;
+    watch_.start_afresh(), end_ = SearchEnd::none;
     ++round_;
   }
 
@@ -206,73 +209,46 @@ class Adapter : public Ipopt::TNLP {
   }
 
  private:
-  struct Recent {
-    Eigen::VectorXd x;
-    double f, distance;  // f: scaled
-  };
-
   // Interior points may leave the bounds by a rounding error; EvaluatedPoints takes them back.
   bool evaluate(const Eigen::VectorXd& x) {
     point_ = &points_.at(x, Wanted::derivatives);
     return point_->ok;
   }
 
-  // A point costs one gradient, an exact Hessian many. So near the solution the one at hand serves for one more step,
-  // as a part of the iteration (the simplified Newton method), which counts where it ends well below the tolerance.
-  void take_simplified_step(double& distance) {
-    constexpr double kWellBelow = 0.1;
-    if (problem_.constraints() > 0 || !(distance > options_.tolerance) || hessians_.empty()) return;
-    const Eigen::LLT<Eigen::MatrixXd> factor(hessians_[0]);
-    if (distance > kAcceptable * options_.tolerance || factor.info() != Eigen::Success) return;
-    const Eigen::VectorXd x = iterate_ - factor.solve(point_->f_x);
-    const bool lower = evaluate(x) && point_->f <= iterate_f_;
-    const double there = lower ? optimality(problem_, points_.x(), *point_) : kUnknown;
-    if (there <= kWellBelow * options_.tolerance) {
-      keep_iterate();
-      distance = there;
-    } else {
-      evaluate(iterate_);
-    }
-  }
-
-  // Ends that do not depend on the Hessian, nor on what is left of the barrier: an iterate is optimal by the yardstick
-  // of all methods, or the last ones differ in nothing but noise, which a line search would go on trying to lower.
+  // Ipopt would go on. Lost searches begin anew, a few times; of Newton's creeping ones BFGS takes over.
   void look_at_iterate(double distance) {
-    if (distance <= options_.tolerance) {
-      optimal_ = true, final_ = iterate_;
-      return;
-    }
-    if (problem_.constraints() == 0) look_for_progress();
-    recent_.push_back({iterate_, point_->f * problem_.f_scale, distance});
-    if (recent_.size() <= kStalled) return;
-    if (recent_.size() > kStalled + 1) recent_.pop_front();
-    const auto by_f = [](const Recent& a, const Recent& b) { return a.f < b.f; };
-    const auto [least, most] = std::minmax_element(recent_.begin(), recent_.end(), by_f);
-    const double noise =
-        std::max(options_.tolerance * options_.tolerance, kNoise * options_.tolerance * std::abs(most->f));
-    stalled_ = most->f - least->f <= noise;
-    if (stalled_) final_ = most_stationary().x;
-  }
-
-  void look_for_progress() {
-    if (!(points_.best().f >= best_f_)) best_f_ = points_.best().f, without_better_ = 0;
-    const double above_best = (iterate_f_ - best_f_) * problem_.f_scale;
-    wandering_ = ++without_better_ > kWandering && above_best > options_.tolerance && round_ < kFreshStarts;
-  }
-
-  const Recent& most_stationary() const {
-    return *std::min_element(recent_.begin(), recent_.end(),
-                             [](const Recent& a, const Recent& b) { return a.distance < b.distance; });
+    end_ = watch_.look({iterate_, point_->f * problem_.f_scale, distance}, points_.best().f * problem_.f_scale);
+    if ((lost() && round_ >= kFreshStarts) || (end_ == SearchEnd::creeping && !second_order_)) end_ = SearchEnd::none;
+    if (end_ == SearchEnd::optimal) final_ = iterate_;
+    if (end_ == SearchEnd::stalled) final_ = watch_.most_stationary().x;
   }
 
   // The Hessian of f; but without constraints, where it is not positive definite, BFGS. Negative curvature holds for a
   // short way only, and Ipopt would add what makes all steps as short; the gradients of the iterates tell of a longer
-  // one. Gauss-Newton's is mended by it where it does not explain how the gradient has changed.
-  Eigen::MatrixXd convex_where_free() const {
+  // one. Gauss-Newton's is mended by it where it does not explain how the gradient has changed, exact ones by the third
+  // derivative along their step.
+  Eigen::MatrixXd for_steps() const {
     if (problem_.constraints() > 0) return hessians_[0];
     if (options_.gauss_newton && secants_.contradicts(hessians_[0])) return secants_.matrix_from(hessians_[0]);
-    if (Eigen::LLT<Eigen::MatrixXd>(hessians_[0]).info() == Eigen::Success) return hessians_[0];
+    if (Eigen::LLT<Eigen::MatrixXd>(hessians_[0]).info() == Eigen::Success) return hessians_.back();
     return secants_.matrix();
+  }
+
+  // Behind H, what is to take its place in a step of third order, where there is one.
+  void add_third_order(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& H) {
+    if (problem_.constraints() > 0 || options_.gauss_newton || !evaluate(x)) return;
+    const Eigen::VectorXd f_x = point_->f_x, at = points_.x();
+    const std::optional<Eigen::VectorXd> d = newton_step(problem_, at, f_x, H[0]);
+    Eigen::VectorXd there;
+    if (!d || !found_beside(at, *d, there)) return;
+    if (const auto B = third_order_hessian(H[0], *d, 2 * (there - f_x - H[0] * *d))) H.push_back(*B);
+  }
+  bool found_beside(const Eigen::VectorXd& x, const Eigen::VectorXd& d, Eigen::VectorXd& f_x) {
+    try {
+      return problem_.gradient_beside(x, d, f_x);
+    } catch (const std::exception&) {
+      return false;
+    }
   }
 
   void update_hessians(const Eigen::VectorXd& x) {
@@ -281,9 +257,11 @@ class Adapter : public Ipopt::TNLP {
     bool ok = options_.records && options_.records->recall(x, found);
     if (!ok) {
       ok = problem_.hessians(x, found);
+      if (ok) add_third_order(x, found);
       if (ok && options_.records) options_.records->record(x, found);
     }
     if (ok) hessians_ = std::move(found);
+    if (!ok && !hessians_.empty()) hessians_.resize(static_cast<std::size_t>(problem_.constraints()) + 1);
     if (hessians_.empty()) {
       const Eigen::Index n = problem_.variables();
       hessians_.assign(static_cast<std::size_t>(problem_.constraints()) + 1, Eigen::MatrixXd::Zero(n, n));
@@ -306,10 +284,10 @@ class Adapter : public Ipopt::TNLP {
   const NlpPoint* point_ = nullptr;  // the last one
   Eigen::VectorXd final_, iterate_, hessians_x_;
   std::vector<Eigen::MatrixXd> hessians_;
-  bool out_of_evaluations_ = false, optimal_ = false, stalled_ = false, wandering_ = false;
-  std::deque<Recent> recent_;  // oldest first
-  int round_ = 0, iterations_before_ = 0, without_better_ = 0;
-  double best_f_ = kUnknown;
+  SearchWatch watch_;
+  SearchEnd end_ = SearchEnd::none;
+  bool second_order_, out_of_evaluations_ = false;
+  int round_ = 0, iterations_before_ = 0, left_newton_at_ = 0;
   double iterate_f_ = 0, iterate_violation_ = 0;
 };
 
@@ -324,7 +302,7 @@ Outcome stalled_in_words(double distance, const NlpResult& result, const IpoptOp
           fmt::format("no further progress: in {} the objective has changed by no more than noise, but the optimality "
                       "conditions hold to {:.1e} only, not to {:g}; try tighter simulation tolerances, or a larger "
                       "optimiser tolerance{}",
-                      counted(kStalled, "iteration"), distance, options.tolerance, result.failures())};
+                      counted(SearchWatch::kStalled, "iteration"), distance, options.tolerance, result.failures())};
 }
 
 Outcome in_words(Ipopt::ApplicationReturnStatus status, const NlpResult& result, const IpoptOptions& options) {
@@ -366,16 +344,16 @@ Outcome in_words(Ipopt::ApplicationReturnStatus status, const NlpResult& result,
   }
 }
 
-void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& options, bool near_solution,
-                 bool constrained) {
+void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& options, bool second_order,
+                 bool near_solution, bool constrained) {
   Ipopt::OptionsList& list = *application.Options();
   list.SetIntegerValue("print_level", 0);
   list.SetStringValue("sb", "yes");  // no banner
-  list.SetStringValue("hessian_approximation", options.second_order ? "exact" : "limited-memory");
+  list.SetStringValue("hessian_approximation", second_order ? "exact" : "limited-memory");
   list.SetIntegerValue("limited_memory_max_history", options.history);
   // Newton's steps converge faster than the barrier falls from its usual 0.1; BFGS needs that time to learn.
-  if (options.second_order) list.SetNumericValue("mu_init", 1e-3);
-  if (options.second_order && !constrained) {  // all matrices are positive definite: Newton's steps need no barrier
+  if (second_order) list.SetNumericValue("mu_init", 1e-3);
+  if (second_order && !constrained) {  // all matrices are positive definite: Newton's steps need no barrier
     list.SetNumericValue("mu_init", 0.1 * options.tolerance);
     list.SetStringValue("bound_mult_init_method", "mu-based");  // multipliers of 1 would count as curvature
   }
@@ -391,8 +369,13 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
   list.SetNumericValue("acceptable_obj_change_tol", options.tolerance * options.tolerance);
   list.SetNumericValue("acceptable_constr_viol_tol", options.constraint_tolerance);
   list.SetIntegerValue("acceptable_iter", 3);
-  if (near_solution) {
-    if (!options.second_order || constrained) list.SetNumericValue("mu_init", 1e-4);
+  if (options.warm_start) {
+    list.SetNumericValue("mu_init", std::min(1e-6, options.tolerance));
+    list.SetStringValue("bound_mult_init_method", "mu-based");
+    for (const char* const push : {"bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"})
+      list.SetNumericValue(push, 1e-8);
+  } else if (near_solution) {
+    if (!second_order || constrained) list.SetNumericValue("mu_init", 1e-4);
     list.SetNumericValue("bound_push", 1e-6), list.SetNumericValue("bound_frac", 1e-6);
   }
 }
@@ -419,24 +402,28 @@ NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_s
   Outcome outcome{SolverStatus::failed, "Ipopt refused its options"};
   for (int round = 0; round <= kFreshStarts; ++round) {
     const Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);  // no console
-    set_options(*application, options, round > 0, problem.constraints() > 0);
+    set_options(*application, options, adapter->second_order(), round > 0, problem.constraints() > 0);
     application->Options()->SetIntegerValue("max_iter", std::max(0, options.max_iterations - result.iterations));
     if (application->Initialize("") != Ipopt::Solve_Succeeded) break;  // "": no options file is read
     outcome = in_words(application->OptimizeTNLP(owner), result, options);
     if (adapter->out_of_evaluations() && outcome.status == SolverStatus::stopped)
       outcome = {SolverStatus::iteration_limit,
                  "stopped at the limit of " + counted(*options.max_evaluations, "evaluation") + result.failures()};
-    if (adapter->optimal()) outcome = {SolverStatus::converged, kConverged};
-    if (adapter->stalled()) outcome = stalled_in_words(adapter->distance(), result, options);
+    if (adapter->end() == SearchEnd::optimal) outcome = {SolverStatus::converged, kConverged};
+    if (adapter->end() == SearchEnd::stalled) outcome = stalled_in_words(adapter->distance(), result, options);
     const bool ended = outcome.status == SolverStatus::converged || outcome.status == SolverStatus::no_progress;
-    if (!adapter->wandering() && !(ended && adapter->passed_a_better_point())) break;
+    if (!adapter->lost() && !(ended && adapter->passed_a_better_point())) break;
     adapter->go_on_from_best();
   }
   result.status = outcome.status, result.message = outcome.words;
   if (outcome.status == SolverStatus::converged && adapter->final_distance() > options.tolerance)
     result.message +=
         fmt::format(" (as Ipopt measures them; by the measure of all methods to {:.1e})", adapter->final_distance());
-  adapter->finish(outcome.status == SolverStatus::converged || adapter->stalled());
+  if (adapter->left_newton_at() > 0)
+    result.message +=
+        fmt::format("; by L-BFGS from iteration {} on, since steps by Hessians gained less than 1 % in {}",
+                    adapter->left_newton_at(), counted(SearchWatch::kCreeping, "iteration"));
+  adapter->finish(outcome.status == SolverStatus::converged || adapter->end() == SearchEnd::stalled);
   const bool gave_up = outcome.status == SolverStatus::no_progress || outcome.status == SolverStatus::infeasible;
   if (gave_up && adapter->best_is_optimal()) {
     result.status = SolverStatus::converged, result.message = kConvergedInNoise;

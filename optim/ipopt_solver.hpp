@@ -25,6 +25,7 @@ struct IpoptOptions {
   bool gauss_newton = false;                         // they leave something out, which the gradients' changes tell of
   std::optional<long> max_evaluations = {};          // looked at after every iteration
   PointRecords* records = nullptr;
+  bool warm_start = false;  // the start is near the solution: hardly any barrier, bounds that it touches stay touched
 };
 
 // Never throws for what an evaluation does: exceptions of evaluate() are failed evaluations, too.

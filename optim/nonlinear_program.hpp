@@ -60,6 +60,16 @@ struct NonlinearProgram {
   // Second derivatives of f, then of each c: n x n each. False where there are none.
   virtual bool hessians(const Eigen::VectorXd&, std::vector<Eigen::MatrixXd>&) { return false; }
 
+  // f_x at x + d, within the bounds; of a simulation on the steps of x, so that differences are smooth. False: it
+  // fails.
+  virtual bool gradient_beside(const Eigen::VectorXd& x, const Eigen::VectorXd& d, Eigen::VectorXd& f_x) {
+    NlpPoint p;
+    p.f_x.setZero(x.size()), p.c.setZero(constraints()), p.c_x.setZero(constraints(), x.size());
+    evaluate(x + d, p);
+    f_x = p.f_x;
+    return p.ok;
+  }
+
   Eigen::Index variables() const { return x_lower.size(); }
   Eigen::Index constraints() const { return c_lower.size(); }
   // The largest amount by which a constraint is violated.

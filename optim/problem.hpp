@@ -40,6 +40,7 @@ struct OptimizerSpec {
   std::optional<long> max_evaluations;  // NLopt: depends on the method, nlopt_solver.hpp
   std::string hessian = "lbfgs";        // of ipopt; or "exact", "gauss_newton"
   std::optional<long> seed;             // of methods that are random; drawn when absent
+  bool warm_start = false;              // of ipopt: the given values are near the solution
   static constexpr int kIpoptIterations = 100;
 };
 

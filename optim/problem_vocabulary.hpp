@@ -51,6 +51,8 @@ void describe(auto& v, Like<OptimizerSpec> auto& o) {
   v.word("hessian", o.hessian, Words{"lbfgs exact gauss_newton"},
          {"of ipopt: limited-memory BFGS, second derivatives, or these without those of the motion"});
   v.plain("seed", o.seed, kNotNegative, {"of methods that are random; drawn when absent"});
+  v.plain("warm_start", o.warm_start, kAny,
+          {"of ipopt: true where the given values are near the solution, as in an earlier run's optimized.json"});
 }
 
 void describe(auto& v, Like<MultistartSpec> auto& m) {

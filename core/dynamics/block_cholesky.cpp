@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/dynamics/block_kernels.hpp"
 #include "core/dynamics/pairs.hpp"
 
 namespace mbsopt {
@@ -79,49 +80,8 @@ void subtract_product(const Mat<6, 6>& A, const Mat<6, 6>& B, Mat<6, 6>& C) {
   }
 }
 
-// Of lanes: x = W x and x = W'x, W unit lower; y -= L x and y -= L'x.
-template <int N>
-void multiply(const Mat<N, N>& W, LaneRow* x) {
-#pragma GCC unroll 6
-  for (int i = N - 1; i > 0; --i) {
-    LaneRow sum = x[i];
-#pragma GCC unroll 6
-    for (int j = 0; j < i; ++j) sum += W(i, j) * x[j];
-    x[i] = sum;
-  }
-}
-template <int N>
-void multiply_transposed(const Mat<N, N>& W, LaneRow* x) {
-#pragma GCC unroll 6
-  for (int j = 0; j < N - 1; ++j) {
-    LaneRow sum = x[j];
-#pragma GCC unroll 6
-    for (int i = j + 1; i < N; ++i) sum += W(i, j) * x[i];
-    x[j] = sum;
-  }
-}
-template <int N>
-void subtract_times(const Mat<N, N>& L, const LaneRow* x, LaneRow* y) {
-#pragma GCC unroll 6
-  for (int i = 0; i < N; ++i) {
-    LaneRow sum = y[i];
-#pragma GCC unroll 6
-    for (int j = 0; j < N; ++j) sum -= L(i, j) * x[j];
-    y[i] = sum;
-  }
-}
-template <int N>
-void subtract_transposed_times(const Mat<N, N>& L, const LaneRow* x, LaneRow* y) {
-#pragma GCC unroll 6
-  for (int j = 0; j < N; ++j) {
-    LaneRow sum = y[j];
-#pragma GCC unroll 6
-    for (int i = 0; i < N; ++i) sum -= L(i, j) * x[i];
-    y[j] = sum;
-  }
-}
-
-// Of one vector of three numbers, written out: pairs would wait for the single numbers just stored.
+// x = W x and x = W'x, W unit lower; y -= L x and y -= L'x.
+// Of three numbers, written out: pairs would wait for the single numbers just stored.
 void multiply(const Mat<3, 3>& W, Vec<3>& x) {
   x = Vec<3>(x(0), x(1) + W(1, 0) * x(0), x(2) + W(2, 0) * x(0) + W(2, 1) * x(1));
 }
@@ -137,7 +97,7 @@ void subtract_transposed_times(const Mat<3, 3>& L, const Vec<3>& x, Vec<3>& y) {
   for (int j = 0; j < 3; ++j) y(j) -= L(0, j) * a + L(1, j) * b + L(2, j) * c;
 }
 
-// And of one of six, in pairs.
+// And of six, in pairs.
 void multiply(const Mat<6, 6>& W, Vec<6>& x) {
   const Vec<6> b = x;
   Six sum(b.data());
@@ -177,7 +137,12 @@ BlockCholesky<N>::BlockCholesky(int bodies, std::span<const std::pair<int, int>>
   inverse_.resize(index(bodies));
   lower_.resize(elimination_.blocks);
   std::size_t longest = 0;
-  for (const auto& column : elimination_.columns) longest = std::max(longest, column.size());
+  first_block_.push_back(0);
+  for (const auto& column : elimination_.columns) {
+    longest = std::max(longest, column.size());
+    for (const Elimination::Entry& e : column) body_.push_back(e.body);  // blocks are numbered column by column
+    first_block_.push_back(static_cast<int>(body_.size()));
+  }
   scaled_.resize(longest);
   set_zero();
 }
@@ -211,31 +176,26 @@ void BlockCholesky<N>::solve(std::span<Vec<N>> x) {
   for (std::size_t k = 0; k < order.size(); ++k) {
     Vec<N>& y = x[index(order[k])];
     multiply(diagonal_[k], y);
-    for (const auto& e : elimination_.columns[k]) subtract_times(lower_[e.block], y, x[index(e.body)]);
+    for (int b = first_block_[k]; b < first_block_[k + 1]; ++b)
+      subtract_times(lower_[index(b)], y, x[index(body_[index(b)])]);
   }
   for (std::size_t k = order.size(); k-- > 0;) {
     Vec<N>& y = x[index(order[k])];
     y.array() *= inverse_[k].array();
-    for (const auto& e : elimination_.columns[k]) subtract_transposed_times(lower_[e.block], x[index(e.body)], y);
+    for (int b = first_block_[k]; b < first_block_[k + 1]; ++b)
+      subtract_transposed_times(lower_[index(b)], x[index(body_[index(b)])], y);
     multiply_transposed(diagonal_[k], y);
   }
 }
 
 template <int N>
-void BlockCholesky<N>::solve(std::span<Lanes<N>> lanes) {
-  const std::vector<int>& order = elimination_.order;
-  const auto rows = [&](int body) { return entries(lanes[index(body)]); };
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    LaneRow* y = rows(order[k]);
-    multiply(diagonal_[k], y);
-    for (const auto& e : elimination_.columns[k]) subtract_times(lower_[e.block], y, rows(e.body));
-  }
-  for (std::size_t k = order.size(); k-- > 0;) {
-    LaneRow* y = rows(order[k]);
-    for (int i = 0; i < N; ++i) y[i] *= inverse_[k](i);
-    for (const auto& e : elimination_.columns[k]) subtract_transposed_times(lower_[e.block], rows(e.body), y);
-    multiply_transposed(diagonal_[k], y);
-  }
+void BlockCholesky<N>::solve(std::span<Lanes<N>> x) {
+  if (x.empty()) return;
+  const FactorView factor{elimination_.bodies(), elimination_.order.data(), first_block_.data(),
+                          body_.data(),          diagonal_[0].data(),       lower_.empty() ? nullptr : lower_[0].data(),
+                          inverse_[0].data()};
+  const BlockKernels& kernels = block_kernels();
+  (N == 6 ? kernels.solve_lanes_in_space : kernels.solve_lanes_in_plane)(factor, x[0].data());
 }
 
 template class BlockCholesky<6>;

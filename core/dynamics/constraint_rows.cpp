@@ -33,7 +33,14 @@ ConstraintRows::ConstraintRows(const MechanismData& data) : data_(&data) {
       if (moved == Displacements::own_axis) x = {r, r + 1};
     }
   }
+  for (int i = 1; i <= data.n; ++i) {
+    const BodyData& b = data.bodies[static_cast<std::size_t>(i)];
+    RowsInSpace::Body& of = bodies_.emplace_back();
+    of.mass = b.mass;
+    std::copy_n(b.J.data(), 9, of.J);
+  }
   for (const RowGroup& g : data.groups) {
+    groups_.push_back({g.body1, g.body2, g.row, g.block, g.rows});
     handle_.push_back(edges_.size());
     if (g.shared) {
       auto row = std::find_if(shared_.begin(), shared_.end(), [&](const SharedRow& s) { return s.row == g.row; });

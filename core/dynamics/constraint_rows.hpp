@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/dynamics/block_cholesky.hpp"
+#include "core/dynamics/block_kernels.hpp"
 #include "core/dynamics/pairs.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
@@ -43,26 +44,7 @@ class ConstraintRows {
     }
   }
   void subtract_times(const std::vector<Lanes<6>>& x, LaneRows& y) const {
-    for (const RowGroup& g : data_->groups) {
-      LaneRow* to = entries(y) + g.row;
-      for (const auto& [body, J] : {std::pair(g.body1, &J1), std::pair(g.body2, &J2)}) {
-        if (body == 0) continue;
-        const LaneRow* from = entries(x[at(body)]);
-        const LaneRow x3 = from[3], x4 = from[4], x5 = from[5];
-        const double* a = row(*J, g.block);
-        const Columns* nonzero = &columns(g.block);
-        for (int r = 0; r < g.rows; ++r, a += 6, ++nonzero) {
-          LaneRow sum = to[r];
-          if (nonzero->single()) {
-            sum -= a[nonzero->first] * from[nonzero->first];
-          } else if (nonzero->any()) {
-            sum -= a[0] * from[0], sum -= a[1] * from[1], sum -= a[2] * from[2];
-          }
-          sum -= a[3] * x3, sum -= a[4] * x4, sum -= a[5] * x5;
-          to[r] = sum;
-        }
-      }
-    }
+    if (!x.empty()) block_kernels().subtract_times_in_space(view(), x[0].data(), y.data());
   }
   // x -= J'lambda
   void subtract_transposed_times(const Eigen::VectorXd& lambda, std::vector<Vec<6>>& x) const {
@@ -76,26 +58,14 @@ class ConstraintRows {
     for (const RowGroup& g : data_->groups) subtract(g.body1, J1, g), subtract(g.body2, J2, g);
   }
   void subtract_transposed_times(const LaneRows& lambda, std::vector<Lanes<6>>& x) const {
-    for (const RowGroup& g : data_->groups) {
-      const LaneRow* from = entries(lambda) + g.row;
-      for (const auto& [body, J] : {std::pair(g.body1, &J1), std::pair(g.body2, &J2)}) {
-        if (body == 0) continue;
-        LaneRow* to = entries(x[at(body)]);
-        LaneRow x3 = to[3], x4 = to[4], x5 = to[5];
-        const double* a = row(*J, g.block);
-        const Columns* nonzero = &columns(g.block);
-        for (int r = 0; r < g.rows; ++r, a += 6, ++nonzero) {
-          const LaneRow l = from[r];
-          if (nonzero->single()) {
-            to[nonzero->first] -= a[nonzero->first] * l;
-          } else if (nonzero->any()) {
-            to[0] -= a[0] * l, to[1] -= a[1] * l, to[2] -= a[2] * l;
-          }
-          x3 -= a[3] * l, x4 -= a[4] * l, x5 -= a[5] * l;
-        }
-        to[3] = x3, to[4] = x4, to[5] = x5;
-      }
-    }
+    if (!x.empty()) block_kernels().subtract_transposed_times_in_space(view(), lambda.data(), x[0].data());
+  }
+  // Steps of BlockSaddleSolver on lanes (block_kernels.hpp).
+  void load(const SaddleIterate& at, bool first, std::vector<Lanes<6>>& correction) const {
+    block_kernels().load_lanes_in_space(view(), at, first, correction[0].data());
+  }
+  SaddleSizes correct(const SaddleIterate& at, bool first, const std::vector<Lanes<6>>& correction) const {
+    return block_kernels().correct_lanes_in_space(view(), at, first, correction[0].data());
   }
   // M x for body i (1-based), and S += M.
   template <class X>
@@ -119,13 +89,11 @@ class ConstraintRows {
   Rows J1, J2;  // one row per block row
 
  private:
-  // Which of a row's three entries for displacements may not be zero; those for turning follow.
-  struct Columns {
-    int first = 0, last = 3;
-    bool single() const { return last - first == 1; }
-    bool any() const { return last != first; }
-  };
+  using Columns = RowsInSpace::Columns;
   const Columns& columns(int block) const { return columns_[static_cast<std::size_t>(block)]; }
+  RowsInSpace view() const {
+    return {groups_.data(), groups_.size(), J1.data(), J2.data(), columns_.data(), bodies_.data(), bodies_.size()};
+  }
 
   static const double* row(const Rows& J, int block) { return J.data() + 6 * block; }
 
@@ -142,7 +110,9 @@ class ConstraintRows {
   };
 
   const MechanismData* data_;
-  std::vector<Columns> columns_;     // per block row
+  std::vector<Columns> columns_;  // per block row
+  std::vector<RowsInSpace::Group> groups_;
+  std::vector<RowsInSpace::Body> bodies_;
   std::vector<std::size_t> handle_;  // per group: its off-diagonal block
   std::vector<SharedRow> shared_;
   std::vector<std::pair<int, int>> edges_;

@@ -1,7 +1,9 @@
 #include "core/dynamics/motion_blocks.hpp"
 
 #include <cassert>
+#include <cstddef>
 
+#include "core/dynamics/block_kernels.hpp"
 #include "core/mechanism/coupling.hpp"
 
 namespace mbsopt {
@@ -18,22 +20,14 @@ void list(const std::vector<std::vector<int>>& bodies, std::vector<MotionBlocks:
   begin.push_back(static_cast<int>(places.size()));
 }
 
-// y += X x, one row of x after the other: the compiler unrolls these.
-template <int Rows, int Columns, class X>
-void add_product(const Mat<Rows, 7>& B, int first, const X& x, Eigen::Index row, Lanes<Rows>& y) {
-  for (int j = 0; j < Columns; ++j) {
-    const Lanes<1> xj = x.row(row + first + j);
-    for (int i = 0; i < Rows; ++i) y.row(i) += B(i, first + j) * xj;
-  }
-}
-
+// Blocks as block_kernels.hpp sees them.
 template <int Rows>
-void add_block(const MotionBlocks::Block<Rows>& B, const LaneRows& y, Eigen::Index q, Eigen::Index v,
-               Lanes<Rows>& out) {
-  if (B.parts & MotionBlocks::p) add_product<Rows, 4>(B.q, 3, y, q, out);
-  if (B.parts & MotionBlocks::pdot) add_product<Rows, 4>(B.v, 3, y, v, out);
-  if (B.parts & MotionBlocks::r) add_product<Rows, 3>(B.q, 0, y, q, out);
-  if (B.parts & MotionBlocks::rdot) add_product<Rows, 3>(B.v, 0, y, v, out);
+const MotionBlockView<Rows>* view(const std::vector<MotionBlocks::Block<Rows>>& blocks) {
+  using Ours = MotionBlocks::Block<Rows>;
+  using Theirs = MotionBlockView<Rows>;
+  static_assert(sizeof(Ours) == sizeof(Theirs) && alignof(Ours) >= alignof(Theirs) &&
+                offsetof(Ours, v) == offsetof(Theirs, v) && offsetof(Ours, parts) == offsetof(Theirs, parts));
+  return reinterpret_cast<const Theirs*>(blocks.data());
 }
 
 }  // namespace
@@ -66,22 +60,12 @@ void MotionBlocks::set_zero() {
 }
 
 void MotionBlocks::add_times(const LaneRows& y_dir, std::vector<Lanes<6>>& b_dir, LaneRows& c_dir) const {
-  for (int i = 0; i < n_; ++i) {
-    Lanes<6> sum = b_dir[at(i)];
-    for (int k = pair_begin_[at(i)]; k < pair_begin_[at(i) + 1]; ++k) {
-      const Eigen::Index q = 7 * pairs_[at(k)].body;
-      add_block(b[at(k)], y_dir, q, 7 * n_ + q, sum);
-    }
-    b_dir[at(i)] = sum;
-  }
-  for (std::size_t row = 0; row + 1 < row_begin_.size(); ++row) {
-    Lanes<1> sum = c_dir.row(static_cast<Eigen::Index>(row));
-    for (int k = row_begin_[row]; k < row_begin_[row + 1]; ++k) {
-      const Eigen::Index q = 7 * rows_[at(k)].body;
-      add_block(c[at(k)], y_dir, q, 7 * n_ + q, sum);
-    }
-    c_dir.row(static_cast<Eigen::Index>(row)) = sum;
-  }
+  const BlockKernels& kernels = block_kernels();
+  const std::size_t n = at(n_);
+  if (n > 0)
+    kernels.add_motion_of_bodies(view(b), pairs_.data(), pair_begin_.data(), n, n, y_dir.data(), b_dir[0].data());
+  kernels.add_motion_of_rows(view(c), rows_.data(), row_begin_.data(), row_begin_.size() - 1, n, y_dir.data(),
+                             c_dir.data());
 }
 
 }  // namespace mbsopt

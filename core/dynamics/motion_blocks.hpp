@@ -11,6 +11,7 @@
 
 #include <vector>
 
+#include "core/dynamics/block_kernels.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
 
@@ -19,9 +20,7 @@ namespace mbsopt {
 class MotionBlocks {
  public:
   enum Part { r = 1, p = 2, rdot = 4, pdot = 8 };
-  struct Place {
-    int row, body;  // the equations' body (0-based) or row of Phi; the body whose coordinates (0-based)
-  };
+  using Place = MotionPlace;  // the equations' body (0-based) or row of Phi; the body whose coordinates (0-based)
   template <int Rows>
   struct Block {
     Mat<Rows, 7> q = Mat<Rows, 7>::Zero(), v = Mat<Rows, 7>::Zero();

@@ -7,7 +7,9 @@
 
 namespace mbsopt {
 
-using Pair = double __attribute__((vector_size(16), aligned(8), may_alias));
+// The attributes of the alias, not of the type: Clang would drop a smaller alignment there.
+using Pair __attribute__((aligned(8), may_alias)) = double __attribute__((vector_size(16)));
+static_assert(alignof(Pair) == 8);
 
 // One row of lanes (fixed_size.hpp) in registers. A single vector of four would live in memory where the processor's
 // registers hold two.
@@ -21,6 +23,17 @@ struct __attribute__((may_alias)) LaneRow {
   friend LaneRow operator+(const LaneRow& x, const LaneRow& y) { return {x.low + y.low, x.high + y.high}; }
   friend LaneRow operator-(const LaneRow& x, const LaneRow& y) { return {x.low - y.low, x.high - y.high}; }
   friend LaneRow operator*(double s, const LaneRow& x) { return {s * x.low, s * x.high}; }
+
+  static LaneRow zero() { return {AlignedPair{}, AlignedPair{}}; }
+  // To the absolute values of y, where they are larger.
+  void grow_to(const LaneRow& y) {
+    const AlignedPair a = y.low < 0 ? -y.low : y.low, b = y.high < 0 ? -y.high : y.high;
+    low = low > a ? low : a, high = high > b ? high : b;
+  }
+  double largest() const {
+    const double a = low[0] > low[1] ? low[0] : low[1], b = high[0] > high[1] ? high[0] : high[1];
+    return a > b ? a : b;
+  }
 };
 static_assert(sizeof(LaneRow) == kLanes * sizeof(double));
 

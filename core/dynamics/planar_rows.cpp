@@ -11,6 +11,8 @@ std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 PlanarRows::PlanarRows(const MechanismData& data) : model_(data.planar.get()) {
   using Kind = PlanarConstraint::Kind;
+  for (std::size_t i = 1; i < model_->bodies.size(); ++i)
+    bodies_.push_back({model_->bodies[i].mass, model_->bodies[i].inertia});
   std::map<int, std::vector<int>> bodies_of_row;  // that move
   for (const PlanarConstraint& c : model_->constraints) {
     if (c.kind == Kind::point) continue;
@@ -35,7 +37,8 @@ PlanarRows::PlanarRows(const MechanismData& data) : model_(data.planar.get()) {
     const PlanarConstraint& c = model_->constraints[k];
     const int constraint = static_cast<int>(k);
     if (c.kind == Kind::point) {
-      points_.push_back({constraint, c.body1, c.body2, c.row, c.row2, edges_.size(), {}, {}});
+      points_.push_back({c.body1, c.body2, c.row, c.row2, {}, {}});
+      point_places_.push_back({constraint, edges_.size()});
       if (c.body1 > 0 && c.body2 > 0) edges_.emplace_back(c.body1 - 1, c.body2 - 1);
       continue;
     }
@@ -49,10 +52,11 @@ PlanarRows::PlanarRows(const MechanismData& data) : model_(data.planar.get()) {
 }
 
 void PlanarRows::evaluate(const Frames& frames) {
-  for (Point& p : points_) {
-    const PlanarConstraint& c = model_->constraints[index(p.constraint)];
-    p.x1 = frames[index(p.body1)].A * c.s1;
-    p.x2 = frames[index(p.body2)].A * c.s2;
+  for (std::size_t k = 0; k < points_.size(); ++k) {
+    Point& p = points_[k];
+    const PlanarConstraint& c = model_->constraints[index(point_places_[k].constraint)];
+    const Plane x1 = frames[index(p.body1)].A * c.s1, x2 = frames[index(p.body2)].A * c.s2;
+    p.x1[0] = x1.re, p.x1[1] = x1.im, p.x2[0] = x2.re, p.x2[1] = x2.im;
   }
   for (Entry& e : entries_) e.J[0] = e.J[1] = e.J[2] = 0;
   for (const Single& s : singles_) {
@@ -77,23 +81,24 @@ void PlanarRows::add_mass(BlockCholesky<3>& S) const {
 }
 
 void PlanarRows::add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky<3>& S) const {
-  for (const Point& p : points_) {
+  for (std::size_t k = 0; k < points_.size(); ++k) {
+    const Point& p = points_[k];
     const double a = alpha(p.row), b = alpha(p.row2);
-    const auto add_square = [&](int body, const Plane& x) {
+    const auto add_square = [&](int body, const double* x) {
       if (body == 0) return;
       Mat<3, 3>& D = S.diagonal(body - 1);  // its lower triangle is what is read
       D(0, 0) += a, D(1, 1) += b;
-      D(2, 0) -= a * x.im, D(2, 1) += b * x.re;
-      D(2, 2) += a * x.im * x.im + b * x.re * x.re;
+      D(2, 0) -= a * x[1], D(2, 1) += b * x[0];
+      D(2, 2) += a * x[1] * x[1] + b * x[0] * x[0];
     };
     add_square(p.body1, p.x1);
     add_square(p.body2, p.x2);
     if (p.body1 == 0 || p.body2 == 0) continue;
     Mat<3, 3> X;
-    X << -a, 0, a * p.x2.im,  //
-        0, -b, -b * p.x2.re,  //
-        a * p.x1.im, -b * p.x1.re, -(a * p.x1.im * p.x2.im + b * p.x1.re * p.x2.re);
-    S.add_off_diagonal(p.handle, X);
+    X << -a, 0, a * p.x2[1],  //
+        0, -b, -b * p.x2[0],  //
+        a * p.x1[1], -b * p.x1[0], -(a * p.x1[1] * p.x2[1] + b * p.x1[0] * p.x2[0]);
+    S.add_off_diagonal(point_places_[k].handle, X);
   }
   for (const Entry& e : entries_) {
     const double a = alpha(e.row);

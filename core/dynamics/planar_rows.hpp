@@ -5,9 +5,11 @@
 #include <vector>
 
 #include "core/dynamics/block_cholesky.hpp"
+#include "core/dynamics/block_kernels.hpp"
 #include "core/dynamics/pairs.hpp"
 #include "core/dynamics/planar_constraints.hpp"
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/parameter_lanes.hpp"
 
 namespace mbsopt {
 
@@ -22,47 +24,56 @@ class PlanarRows {
   void evaluate(const Frames& frames);  // J
 
   // y -= J x; x: body i at x[i - 1]
-  template <class X, class Y>
-  void subtract_times(const std::vector<X>& x, Y& y) const {
-    auto* to = entries(y);
+  void subtract_times(const std::vector<Vec<3>>& x, Eigen::VectorXd& y) const {
     for (const Point& p : points_) {
-      auto first = to[p.row], second = to[p.row2];
+      double first = y(p.row), second = y(p.row2);
       if (p.body2 > 0) {
-        const auto* b = entries(x[at(p.body2)]);
-        first -= b[0] - p.x2.im * b[2], second -= b[1] + p.x2.re * b[2];
+        const Vec<3>& b = x[at(p.body2)];
+        first -= b(0) - p.x2[1] * b(2), second -= b(1) + p.x2[0] * b(2);
       }
       if (p.body1 > 0) {
-        const auto* b = entries(x[at(p.body1)]);
-        first += b[0] - p.x1.im * b[2], second += b[1] + p.x1.re * b[2];
+        const Vec<3>& b = x[at(p.body1)];
+        first += b(0) - p.x1[1] * b(2), second += b(1) + p.x1[0] * b(2);
       }
-      to[p.row] = first, to[p.row2] = second;
+      y(p.row) = first, y(p.row2) = second;
     }
     for (const Entry& e : entries_) {
-      const auto* b = entries(x[at(e.body)]);
-      to[e.row] -= e.J[0] * b[0] + e.J[1] * b[1] + e.J[2] * b[2];
+      const Vec<3>& b = x[at(e.body)];
+      y(e.row) -= e.J[0] * b(0) + e.J[1] * b(1) + e.J[2] * b(2);
     }
+  }
+  void subtract_times(const std::vector<Lanes<3>>& x, LaneRows& y) const {
+    if (!x.empty()) block_kernels().subtract_times_in_plane(view(), x[0].data(), y.data());
   }
   // x -= J'lambda
-  template <class X, class Y>
-  void subtract_transposed_times(const Y& lambda, std::vector<X>& x) const {
-    const auto* l = entries(lambda);
+  void subtract_transposed_times(const Eigen::VectorXd& lambda, std::vector<Vec<3>>& x) const {
     for (const Point& p : points_) {
-      const auto first = l[p.row], second = l[p.row2];
+      const double first = lambda(p.row), second = lambda(p.row2);
       if (p.body2 > 0) {
-        auto* b = entries(x[at(p.body2)]);
-        b[0] -= first, b[1] -= second, b[2] -= p.x2.re * second - p.x2.im * first;
+        Vec<3>& b = x[at(p.body2)];
+        b(0) -= first, b(1) -= second, b(2) -= p.x2[0] * second - p.x2[1] * first;
       }
       if (p.body1 > 0) {
-        auto* b = entries(x[at(p.body1)]);
-        b[0] += first, b[1] += second, b[2] += p.x1.re * second - p.x1.im * first;
+        Vec<3>& b = x[at(p.body1)];
+        b(0) += first, b(1) += second, b(2) += p.x1[0] * second - p.x1[1] * first;
       }
     }
     for (const Entry& e : entries_) {
-      auto* b = entries(x[at(e.body)]);
-      for (int k = 0; k < 3; ++k) b[k] -= e.J[k] * l[e.row];
+      Vec<3>& b = x[at(e.body)];
+      for (int k = 0; k < 3; ++k) b(k) -= e.J[k] * lambda(e.row);
     }
   }
+  void subtract_transposed_times(const LaneRows& lambda, std::vector<Lanes<3>>& x) const {
+    if (!x.empty()) block_kernels().subtract_transposed_times_in_plane(view(), lambda.data(), x[0].data());
+  }
 
+  // Steps of BlockSaddleSolver on lanes (block_kernels.hpp).
+  void load(const SaddleIterate& at, bool first, std::vector<Lanes<3>>& correction) const {
+    block_kernels().load_lanes_in_plane(view(), at, first, correction[0].data());
+  }
+  SaddleSizes correct(const SaddleIterate& at, bool first, const std::vector<Lanes<3>>& correction) const {
+    return block_kernels().correct_lanes_in_plane(view(), at, first, correction[0].data());
+  }
   // M x for body i (1-based), and S += M.
   template <class X>
   X mass_times(int body, const X& x) const {
@@ -80,16 +91,11 @@ class PlanarRows {
   BlockCholesky<3> matrix() const { return BlockCholesky<3>(static_cast<int>(model_->bodies.size()) - 1, edges_); }
 
  private:
-  // A coincidence: [-I, -i x1] of body 1 and [I, i x2] of body 2, the ground's part left out.
-  struct Point {
-    int constraint, body1, body2, row, row2;
+  using Point = RowsInPlane::Point;
+  using Entry = RowsInPlane::Entry;  // those of a row follow each other
+  struct PointPlace {
+    int constraint;
     std::size_t handle;  // of the block of its two bodies
-    Plane x1, x2;
-  };
-  // A moving body in a single row. Those of a row follow each other.
-  struct Entry {
-    int body, row;
-    double J[3];
   };
   // Where a constraint's J goes.
   struct Single {
@@ -101,9 +107,14 @@ class PlanarRows {
     std::size_t handle;
   };
   static std::size_t at(int body) { return static_cast<std::size_t>(body - 1); }
+  RowsInPlane view() const {
+    return {points_.data(), points_.size(), entries_.data(), entries_.size(), bodies_.data(), bodies_.size()};
+  }
 
   const PlanarModel* model_;
   std::vector<Point> points_;
+  std::vector<PointPlace> point_places_;  // per point
+  std::vector<RowsInPlane::Body> bodies_;
   std::vector<Entry> entries_;
   std::vector<Single> singles_;
   std::vector<Pair> pairs_;

@@ -22,6 +22,12 @@ void reduce(double c, const Eigen::VectorXd& alpha, Y& z) {
   for (Eigen::Index r = 0; r < alpha.size(); ++r) entries(z)[r] *= 1 - c * alpha(r);
 }
 
+template <class X>
+SaddleIterate iterate(const Eigen::VectorXd& alpha, const std::vector<X>& b, std::vector<X>& x, LaneRows& nu,
+                      LaneRows& residual) {
+  return {alpha.data(), b[0].data(), x[0].data(), nu.data(), residual.data(), static_cast<std::size_t>(alpha.size())};
+}
+
 // A residual above it, relative as in Settings, is more than rounding.
 constexpr double kDisagreement = 1e-14;
 
@@ -49,39 +55,76 @@ bool BlockSaddleSolver<Rows>::factor(const Frames& frames) {
   return S_.factor();
 }
 
+// correction = b - M x - J'nu + J' alpha residual
+template <class Rows>
+void BlockSaddleSolver<Rows>::load(bool first, const Vector& b, const Vector& x, const Eigen::VectorXd& nu,
+                                   const Eigen::VectorXd& residual, Eigen::VectorXd& step, Vector& correction) const {
+  if (first) {
+    step = -alpha_.cwiseProduct(residual);
+  } else {
+    subtract_scaled(nu, alpha_, residual, step);
+  }
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    correction[i] = b[i];
+    if (!first) correction[i] -= mass_times(static_cast<int>(i) + 1, x[i]);
+  }
+  rows_.subtract_transposed_times(step, correction);
+}
+
+template <class Rows>
+void BlockSaddleSolver<Rows>::load(bool first, const LaneVector& b, LaneVector& x, LaneRows& nu, LaneRows& residual,
+                                   LaneRows&, LaneVector& correction) const {
+  rows_.load(iterate(alpha_, b, x, nu, residual), first, correction);
+}
+
+template <class Rows>
+SaddleSizes BlockSaddleSolver<Rows>::correct(bool first, bool wanted, const Vector&, const Vector& correction,
+                                             Vector& x, Eigen::VectorXd& nu, Eigen::VectorXd& residual) const {
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (first) {
+      x[i] = correction[i];
+    } else {
+      x[i] += correction[i];
+    }
+  }
+  rows_.subtract_times(correction, residual);
+  if (first) {
+    nu = -alpha_.cwiseProduct(residual);
+  } else {
+    subtract_scaled(nu, alpha_, residual, nu);
+  }
+  SaddleSizes sizes{0, 0};
+  if (!wanted) return sizes;
+  for (const auto& xi : x) sizes.x = std::max(sizes.x, xi.cwiseAbs().maxCoeff());
+  sizes.residual = residual.cwiseAbs().maxCoeff();
+  return sizes;
+}
+
+template <class Rows>
+SaddleSizes BlockSaddleSolver<Rows>::correct(bool first, bool, const LaneVector& b, const LaneVector& correction,
+                                             LaneVector& x, LaneRows& nu, LaneRows& residual) const {
+  return rows_.correct(iterate(alpha_, b, x, nu, residual), first, correction);
+}
+
 template <class Rows>
 template <class X, class Y>
 void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, const Settings& settings,
                                         std::vector<X>& x, Y& nu, Y& residual, Y& step, std::vector<X>& correction) {
-  const std::size_t n = b.size();
-  nu.setZero();
   residual = g;
   double before = INFINITY;
   for (int k = 0;; ++k) {
-    // correction = b - M x - J'nu + J' alpha residual
-    subtract_scaled(nu, alpha_, residual, step);
-    for (std::size_t i = 0; i < n; ++i) {
-      correction[i] = b[i];
-      if (k > 0) correction[i] -= mass_times(static_cast<int>(i) + 1, x[i]);
-    }
-    rows_.subtract_transposed_times(step, correction);
+    const bool first = k == 0, last = k >= settings.most, decides = last || k + 1 >= settings.least;
+    load(first, b, x, nu, residual, step, correction);
     S_.solve(std::span<X>(correction));
-    for (std::size_t i = 0; i < n; ++i) {
-      if (k > 0) {
-        x[i] += correction[i];
-      } else {
-        x[i] = correction[i];
-      }
+    SaddleSizes sizes = correct(first, decides, b, correction, x, nu, residual);
+    if (c_ > 0) {
+      reduce(c_, alpha_, residual);
+      sizes.residual = residual.cwiseAbs().maxCoeff();
     }
-    rows_.subtract_times(correction, residual);
-    subtract_scaled(nu, alpha_, residual, nu);
-    if (c_ > 0) reduce(c_, alpha_, residual);
-    const bool last = k >= settings.most;
-    if (!last && k + 1 < settings.least) continue;  // nothing is decided here
-    const double now = residual.cwiseAbs().maxCoeff();
+    if (!decides) continue;
+    const double now = sizes.residual;
     if (last || k >= settings.least) {
-      double size = g.cwiseAbs().maxCoeff();
-      for (const X& xi : x) size = std::max(size, xi.cwiseAbs().maxCoeff());
+      const double size = std::max(sizes.x, g.cwiseAbs().maxCoeff());
       residual_ratio_ = size > 0 ? now / size : 0.0;
       residual_size_ = now;
       const double tolerance = now > kSlow * before ? std::min(settings.tolerance, kRounding) : settings.tolerance;

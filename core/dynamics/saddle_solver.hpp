@@ -73,6 +73,15 @@ class BlockSaddleSolver {
   template <class X, class Y>
   void solve_any(const std::vector<X>& b, const Y& g, const Settings& settings, std::vector<X>& x, Y& nu, Y& residual,
                  Y& step, std::vector<X>& correction);
+  // A pass before and after the solve with S; first: from x = 0, nu = 0. Sizes are told where they are wanted.
+  void load(bool first, const Vector& b, const Vector& x, const Eigen::VectorXd& nu, const Eigen::VectorXd& residual,
+            Eigen::VectorXd& step, Vector& correction) const;
+  void load(bool first, const LaneVector& b, LaneVector& x, LaneRows& nu, LaneRows& residual, LaneRows& step,
+            LaneVector& correction) const;
+  SaddleSizes correct(bool first, bool wanted, const Vector& b, const Vector& correction, Vector& x,
+                      Eigen::VectorXd& nu, Eigen::VectorXd& residual) const;
+  SaddleSizes correct(bool first, bool wanted, const LaneVector& b, const LaneVector& correction, LaneVector& x,
+                      LaneRows& nu, LaneRows& residual) const;
   template <class X, class Y>
   void add_redundant_part(Y& nu, Y& residual, Y& step, std::vector<X>& correction);
 

@@ -37,7 +37,8 @@ Adjoint::Adjoint(ForwardRun& run, const SimulationSettings& settings, std::span<
       mu_vector_(active_ * objectives_, run.context()),
       linear_solver_(run.flow(), run.context()) {
   const MechanismData& d = run.flow().data();
-  source_.setZero(objectives_);
+  for (Eigen::VectorXd* x : {&source_, &running_source_, &last_size_}) x->setZero(objectives_);
+  last_time_ = settings.start_time;
   lambda_.setZero(states_, objectives_);
   mu_.setZero(d.rho.size(), objectives_);
   for (Eigen::VectorXd* x : {&lambda_at_, &lambda_rate_}) x->setZero(states_ * objectives_);
@@ -67,15 +68,18 @@ void Adjoint::take_sample(const SampleEvent& event, const StatePoint& at) {
   jumps_.push_back(std::move(jump));
 }
 
-// A running cost's gradient, held over the whole span, is what lambda might become.
+// The integral of a running cost's gradient is what lambda might become. Not its largest value times the span: that
+// may be the first steps' of a motion that dies out at once.
 void Adjoint::take_step(const StatePoint& at) {
-  const double span = settings_.end_time - settings_.start_time;
   for (const Eigen::Index o : run_.running()) {
     y_bar_.setZero(), rho_bar_.setZero();
     costs_[static_cast<std::size_t>(o)].running->add_gradient(at, 1, y_bar_, rho_bar_);
-    const double size = span * y_bar_.cwiseAbs().maxCoeff();
-    if (std::isfinite(size)) source_(o) = std::max(source_(o), size);
+    const double size = y_bar_.cwiseAbs().maxCoeff();
+    if (!std::isfinite(size)) continue;
+    running_source_(o) += (at.t - last_time_) * std::max(size, last_size_(o));
+    last_size_(o) = size;
   }
+  last_time_ = at.t;
 }
 
 void Adjoint::begin() {
@@ -87,6 +91,7 @@ void Adjoint::begin() {
     cost.terminal->add_gradient(at, 1, lambda_.col(o), mu_.col(o));
     source_(o) = std::max(source_(o), lambda_.col(o).cwiseAbs().maxCoeff());
   }
+  source_ = source_.cwiseMax(running_source_);
 }
 
 void Adjoint::take_jumps(double t) {

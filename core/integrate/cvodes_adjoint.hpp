@@ -53,7 +53,10 @@ class Adjoint {
   int checkpoints_ = 0, which_ = -1;
   double tie_;  // times closer than this are one
   std::vector<Jump> jumps_;
-  Eigen::VectorXd source_;  // per objective: largest entry of any gradient in y that enters
+  // Per objective: largest entry of any gradient in y that enters; the integral over the steps so far of that of the
+  // running cost, and its entry at the last one.
+  Eigen::VectorXd source_, running_source_, last_size_;
+  double last_time_;
   Eigen::MatrixXd lambda_, mu_;
   // The last evaluation.
   double t_;

@@ -1,4 +1,4 @@
-// y = y0 + sum_j c_j k_j, of states or of lanes of them, in one pass: each number of y is read and written once.
+// y = y0 + sum_j c_j k_j, of states, in one pass: each number of y is read and written once.
 // For as many k_j as a method has stages, and two.
 #pragma once
 
@@ -15,16 +15,16 @@ class StageSum {
     c_[terms_] = c;
     k_[terms_++] = k;
   }
-  // y may be y0. Of the numbers first, first + 1, ... before `end`.
-  void to(const double* y0, double* y, Eigen::Index end, Eigen::Index first = 0) const {
+  // y may be y0.
+  void to(const double* y0, double* y, Eigen::Index size) const {
     constexpr Eigen::Index kPairs = 4;
-    Eigen::Index r = first;
-    for (; r + 2 * kPairs <= end; r += 2 * kPairs) {
+    Eigen::Index r = 0;
+    for (; r + 2 * kPairs <= size; r += 2 * kPairs) {
       Column<kPairs> sum(y0 + r);
       for (int j = 0; j < terms_; ++j) sum.add(c_[j], k_[j] + r);
       sum.store(y + r);
     }
-    for (; r < end; ++r) {
+    for (; r < size; ++r) {
       double sum = y0[r];
       for (int j = 0; j < terms_; ++j) sum += c_[j] * k_[j][r];
       y[r] = sum;

@@ -1,5 +1,6 @@
 #include "core/integrate/tangent_sweep.hpp"
 
+#include "core/dynamics/block_kernels.hpp"
 #include "core/integrate/model_choice.hpp"
 
 namespace mbsopt {
@@ -31,6 +32,7 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
     blocks_.push_back(std::move(b));
   }
   y_.setZero(states), ydot_.setZero(states), y_bar_.setZero(states);
+  seen_.reserve(static_cast<std::size_t>(states));
   rho_bar_.setZero(d.rho.size());
   r_.setZero(dynamics_.equations(), kLanes);
   y_rho_.setZero(states, d.rho.size());
@@ -49,19 +51,20 @@ TangentSweep::Weights TangentSweep::integrated(const double* of_k) const {
 void TangentSweep::add_stages(const Block& b, double h, double c, const Weights& w, int first, int last,
                               const LaneRows& from, LaneRows& to) {
   const Eigen::Index half = from.size() / 2;
-  StageSum q, v;
-  q.add(h * c, b.y0.data() + half);
+  const double* k[Method::kMaxStages + 1];
+  double of_q[Method::kMaxStages + 1], of_v[Method::kMaxStages + 1];
+  int terms = 0;
+  const auto add = [&](double q, double v, const double* of_stage) {
+    if (q == 0 && v == 0) return;
+    of_q[terms] = q, of_v[terms] = v, k[terms++] = of_stage;
+  };
+  add(h * c, 0, b.y0.data() + half);
   for (int j = first; j <= last; ++j) {
-    const std::size_t k = static_cast<std::size_t>(j);
-    q.add(h * h * w.q[k], b.a[k].data());
-    v.add(h * w.v[k], b.a[k].data());
+    const std::size_t stage = static_cast<std::size_t>(j);
+    add(h * h * w.q[stage], h * w.v[stage], b.a[stage].data());
   }
-  constexpr Eigen::Index kPart = 512;  // accelerations stay in the cache from one sum to the other
-  for (Eigen::Index r = 0; r < half; r += kPart) {
-    const Eigen::Index end = std::min(r + kPart, half);
-    q.to(from.data(), to.data(), end, r);
-    v.to(from.data() + half, to.data() + half, end, r);
-  }
+  block_kernels().sum_stages(static_cast<std::size_t>(half / kLanes), terms, k, of_q, of_v, from.data(),
+                             from.data() + half, to.data(), to.data() + half);
 }
 
 void TangentSweep::add_cost(const PointCost& cost, const StatePoint& at, double weight, LaneRows Block::*direction,
@@ -70,8 +73,13 @@ void TangentSweep::add_cost(const PointCost& cost, const StatePoint& at, double 
   rho_bar_.setZero();
   cost.add_gradient(at, weight, y_bar_, rho_bar_);
   psi_rho.row(objective) += rho_bar_.transpose();
+  seen_.clear();  // most objectives look at few bodies
+  for (Eigen::Index i = 0; i < y_bar_.size(); ++i) {
+    if (y_bar_(i) != 0) seen_.push_back(i);
+  }
   for (const Block& b : blocks_) {
-    const Lanes<1> change = y_bar_.transpose() * (b.*direction);
+    Lanes<1> change = Lanes<1>::Zero();
+    for (const Eigen::Index i : seen_) change += y_bar_(i) * (b.*direction).row(i);
     for (int k = 0; k < kLanes; ++k) {
       if (b.parameters.parameter[k] >= 0) psi_rho(objective, b.parameters.parameter[k]) += change(k);
     }

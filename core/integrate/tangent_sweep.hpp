@@ -73,6 +73,7 @@ class TangentSweep {
   Weights of_step_;                // b
   std::vector<Block> blocks_;
   Eigen::VectorXd y_, ydot_, y_bar_, rho_bar_;
+  std::vector<Eigen::Index> seen_;  // entries of y_bar_ that are not zero
   Eigen::MatrixXd y_rho_;
   LaneRows r_;
 };

@@ -191,6 +191,8 @@ TEST_CASE("what an optimiser cannot do is said where it is asked for", "[design_
   problem.design->optimizer.seed.reset();
   problem.design->optimizer.hessian = "exact";
   CHECK_THAT(issue(), Contains("design.optimizer.hessian: is of ipopt only"));
+  problem.design->optimizer.hessian = "lbfgs", problem.design->optimizer.warm_start = true;
+  CHECK_THAT(issue(), Contains("design.optimizer.warm_start: is of ipopt only") && Contains("slsqp"));
   problem.design->optimizer = {};
   problem.design->multistart.emplace();
   CHECK_THAT(issue(), Contains("parameters.L02: has no upper bound") && Contains("design.multistart"));

@@ -1,9 +1,15 @@
 #include "optim/ipopt_solver.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <map>
 #include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
+
+#include "optim/search_watch.hpp"
 
 using namespace mbsopt;
 
@@ -148,6 +154,34 @@ TEST_CASE("a start that is optimal already is left as it is", "[ipopt]") {
   CHECK(bounded.evaluations == 1);
 }
 
+TEST_CASE("a warm start stays near, at its bounds and limits, and needs fewer iterations", "[ipopt]") {
+  Hs071 hs071;
+  Rosenbrock valley;
+  valley.x_upper << 0.5, 10;
+  const bool of_hs071 = GENERATE(true, false);
+  NonlinearProgram& problem = of_hs071 ? static_cast<NonlinearProgram&>(hs071) : valley;
+  const Eigen::VectorXd start = of_hs071 ? vector({1, 4.743, 3.821, 1.3794}) : vector({0.5, 0.2502});
+  const auto run = [&](bool warm) {
+    double farthest = 0;
+    IpoptOptions options;
+    options.warm_start = warm;
+    options.progress = [&](const NlpProgress& p) {
+      farthest = std::max(farthest, (p.x - start).cwiseAbs().maxCoeff());
+      return true;
+    };
+    const NlpResult result = solve_with_ipopt(problem, start, options);
+    CHECK(result.status == SolverStatus::converged);
+    return std::pair{result, farthest};
+  };
+  const auto [cold, away] = run(false);
+  const auto [warm, near] = run(true);
+  INFO(cold.iterations << " iterations cold, " << warm.iterations << " warm; " << away << " and " << near << " away");
+  CHECK((warm.x - cold.x).norm() < 1e-5);
+  CHECK(2 * warm.iterations <= cold.iterations + 1);
+  CHECK(near < 1e-3);
+  CHECK(away > 1e-2);
+}
+
 TEST_CASE("ipopt leaves negative curvature by what the gradients tell", "[ipopt]") {
   // Curves down within 0.2 of 0 along x, 1000 times as strong as it curves up elsewhere.
   struct Ridge : NonlinearProgram {
@@ -217,6 +251,9 @@ TEST_CASE("ipopt mends Gauss-Newton's Hessian where residuals stay large", "[ipo
       H.assign(1, Eigen::MatrixXd::Constant(1, 1, 1 + b_x * b_x));
       return true;
     }
+    bool gradient_beside(const Eigen::VectorXd&, const Eigen::VectorXd&, Eigen::VectorXd&) override {
+      return false;  // else that would mend it
+    }
     double lambda = -0.9;  // f_xx(0) = 2 + 1.8
   } problem;
   IpoptOptions options;
@@ -230,37 +267,125 @@ TEST_CASE("ipopt mends Gauss-Newton's Hessian where residuals stay large", "[ipo
   CHECK(2 * mended.iterations <= plain.iterations);
 }
 
-TEST_CASE("ipopt: near the solution a Hessian serves for two steps", "[ipopt]") {
-  struct Convex : NonlinearProgram {
-    Convex() : NonlinearProgram(1, 0) {}
-    void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
-      p.f = std::exp(x(0)) - x(0);
-      p.f_x << std::exp(x(0)) - 1;
-    }
-    bool hessians(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& H) override {
-      ++asked;
-      H.assign(1, Eigen::MatrixXd::Constant(1, 1, std::exp(x(0))));
-      return true;
-    }
-    int asked = 0;
-  } problem;
-  const double start = 1.1;
-  int newton = 0;
-  double last = 0;
-  for (double x = start; std::abs(std::exp(x) - 1) > 1e-6; ++newton)
-    last = std::abs(std::exp(x) - 1), x -= (std::exp(x) - 1) / std::exp(x);
-  REQUIRE(last < 1e-4);  // one step before the end
+namespace {
+
+// f = exp(x) - x, and its exact Hessian.
+struct Convex : NonlinearProgram {
+  Convex() : NonlinearProgram(1, 0) {}
+  void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
+    ++evaluated;
+    p.f = std::exp(x(0)) - x(0);
+    p.f_x << std::exp(x(0)) - 1;
+  }
+  bool hessians(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& H) override {
+    ++asked;
+    H.assign(1, Eigen::MatrixXd::Constant(1, 1, std::exp(x(0))));
+    return true;
+  }
+  bool gradient_beside(const Eigen::VectorXd& x, const Eigen::VectorXd& d, Eigen::VectorXd& f_x) override {
+    ++beside;
+    if (beside_throws) throw std::runtime_error("the crank locks");
+    f_x = (x + d).array().exp() - 1;
+    return beside_works;
+  }
+  int evaluated = 0, asked = 0, beside = 0;
+  bool beside_works = true, beside_throws = false;
+};
+
+struct Remembered : PointRecords {
+  static std::vector<double> key(const Eigen::VectorXd& x) { return {x.begin(), x.end()}; }
+  bool recall(const Eigen::VectorXd& x, Wanted, NlpPoint& point) override {
+    if (!points.contains(key(x))) return false;
+    point = points[key(x)];
+    return true;
+  }
+  void record(const Eigen::VectorXd& x, Wanted, const NlpPoint& point) override { points[key(x)] = point; }
+  bool recall(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& H) override {
+    if (!hessians.contains(key(x))) return false;
+    H = hessians[key(x)];
+    return true;
+  }
+  void record(const Eigen::VectorXd& x, const std::vector<Eigen::MatrixXd>& H) override { hessians[key(x)] = H; }
+  std::map<std::vector<double>, NlpPoint> points;
+  std::map<std::vector<double>, std::vector<Eigen::MatrixXd>> hessians;
+};
+
+int newton_iterations(double x) {
+  int count = 0;
+  for (; std::abs(std::exp(x) - 1) > 1e-6; ++count) x -= (std::exp(x) - 1) / std::exp(x);
+  return count;
+}
+
+}  // namespace
+
+TEST_CASE("ipopt: steps with exact Hessians are of third order, and each is an iteration", "[ipopt]") {
+  Convex problem;
+  const double start = 2;
+  const int newton = newton_iterations(start);
   IpoptOptions options;
   options.second_order = true;
-  std::vector<double> distances;
-  options.progress = [&](const NlpProgress& p) { return distances.push_back(p.optimality), true; };
+  std::vector<double> told, visited;
+  options.progress = [&](const NlpProgress& p) {
+    return told.push_back(p.optimality), visited.push_back(p.x(0)), true;
+  };
   const NlpResult result = solve_with_ipopt(problem, vector({start}), options);
+  INFO(result.iterations << " iterations, " << newton << " of Newton's method");
   CHECK(result.status == SolverStatus::converged);
-  CHECK(result.iterations == newton - 1);
+  CHECK(result.iterations <= newton - 2);
   CHECK(problem.asked == result.iterations);
-  CHECK(result.evaluations == result.iterations + 2);
-  CHECK(std::abs(result.x(0)) < 1e-7);
-  // What progress tells is what the solution is judged by.
-  CHECK(distances.back() == Approx(std::abs(result.point.f_x(0))));
-  CHECK(distances.front() == Approx(std::exp(start) - 1));
+  CHECK(problem.beside == result.iterations);
+  CHECK(result.evaluations == problem.evaluated);  // what is beside is no point of the search
+  REQUIRE(static_cast<int>(told.size()) == result.iterations + 1);
+  CHECK(result.evaluations == result.iterations + 1);  // and no other point was
+  CHECK(visited.back() == result.x(0));
+  CHECK(told.front() == Approx(std::exp(start) - 1));
+  CHECK(told.back() == Approx(std::abs(result.point.f_x(0))));
+}
+
+TEST_CASE("ipopt: where the third derivative cannot be had Newton's steps are taken", "[ipopt]") {
+  Convex problem;
+  problem.beside_works = false, problem.beside_throws = GENERATE(false, true);
+  IpoptOptions options;
+  options.second_order = true;
+  const NlpResult result = solve_with_ipopt(problem, vector({1}), options);
+  CHECK(result.status == SolverStatus::converged);
+  CHECK(std::abs(result.iterations - newton_iterations(1)) <= 1);
+  CHECK(problem.beside > 0);
+}
+
+TEST_CASE("ipopt: records hold all that exact Hessians take", "[ipopt]") {
+  Convex problem;
+  Remembered records;
+  IpoptOptions options;
+  options.second_order = true, options.records = &records;
+  const NlpResult first = solve_with_ipopt(problem, vector({2}), options);
+  REQUIRE(problem.beside > 0);
+  problem.evaluated = problem.asked = problem.beside = 0;
+  const NlpResult again = solve_with_ipopt(problem, vector({2}), options);
+  CHECK(again.x == first.x);
+  CHECK(again.iterations == first.iterations);
+  CHECK(problem.evaluated + problem.asked + problem.beside == 0);
+}
+
+TEST_CASE("ipopt: L-BFGS goes on where steps by Hessians creep", "[ipopt]") {
+  struct Stiff : NonlinearProgram {
+    Stiff() : NonlinearProgram(1, 0) {}
+    void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
+      p.f = 1 + x(0) * x(0) / 2;
+      p.f_x = x;
+    }
+    bool hessians(const Eigen::VectorXd&, std::vector<Eigen::MatrixXd>& H) override {
+      H.assign(1, Eigen::MatrixXd::Constant(1, 1, 1e4));  // as of ripples on f
+      return true;
+    }
+  } problem;
+  IpoptOptions options;
+  options.second_order = true;
+  const NlpResult result = solve_with_ipopt(problem, vector({2}), options);
+  INFO(result.message);
+  CHECK(result.status == SolverStatus::converged);
+  CHECK(result.x(0) == Approx(0).margin(1e-6));
+  CHECK(result.iterations > SearchWatch::kCreeping);
+  CHECK(result.iterations < 2 * SearchWatch::kCreeping);
+  CHECK(result.message.find("by L-BFGS from iteration 20 on") != std::string::npos);
 }
