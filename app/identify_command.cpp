@@ -11,6 +11,7 @@
 #include "app/report/run_report.hpp"
 #include "app/residual_records.hpp"
 #include "app/run.hpp"
+#include "app/simulation_warnings.hpp"
 #include "core/dynamics/assembly.hpp"
 #include "core/integrate/model_choice.hpp"
 #include "optim/experiment.hpp"
@@ -90,9 +91,11 @@ void simulate_first_experiment(Run& run, const Problem& needed, const std::vecto
   const Mechanism mechanism(scene, parameter_values(scene), std::vector<bool>(scene.parameters.size(), false));
   RunOptions options;
   options.progress = [](double) { return !interrupted(); };
-  const SimulationStatistics statistics = simulate(mechanism, scene.simulation, {}, {}, options).statistics;
-  run.result["simulation"] = to_json(statistics);
-  warn_of_stiffness(run, statistics, true);
+  const SimulationResult first = simulate(mechanism, scene.simulation, {}, {}, options);
+  run.result["simulation"] = to_json(first.statistics);
+  if (first.ok())
+    for (const std::string& warning : simulation_warnings(scene.simulation, first.statistics)) run.warn(warning);
+  warn_of_stiffness(run, first.statistics, true);
 }
 
 std::vector<NewValue> new_values(const IdentificationResult& fit) {

@@ -61,7 +61,6 @@ double RungeKuttaRun::propose_step(double t, double h, double end, bool adaptive
   return adaptive && 2 * h > left ? 0.5 * left : h;
 }
 
-// Names the bodies whose mass or inertia vanishes in some direction, for the message of a singular start.
 bool RungeKuttaRun::evaluate_stage(int i) {
   StageSum sum;
   for (int j = 0; j < i; ++j) sum.add(step_.h * rk_.a(i, j), step_.K.col(j).data());
@@ -129,9 +128,9 @@ std::string RungeKuttaRun::failed(Outcome outcome, double h, bool adaptive) cons
     case Outcome::unsolved:
       return fmt::format(
           "the stages of the implicit step from t = {:.6g} s by {:.3g} s were not found: Newton's method did "
-          "not converge. Use a smaller step, or look for a law that is not smooth or not finite, or a "
-          "singular position, near this time",
-          step_.t, h);
+          "not converge. {} for a law that is not smooth or not finite, a singular position, or a drive that asks for "
+          "more than the mechanism reaches, near this time",
+          step_.t, h, adaptive ? "Look" : "Use a smaller step, or look");
     case Outcome::off_constraints:
       return adaptive
                  ? fmt::format(
@@ -316,7 +315,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     result.steps.sizes.push_back(h);
     const Energy energy_now = update_statistics(result);
     if (!options.frozen) {  // given steps have been looked at where they were found
-      const std::string objection = guard_.objection(step_.t1, energy_now, dynamics_.worst_residual());
+      const std::string objection = guard_.objection(step_.t1, step_.y1, energy_now, dynamics_.worst_residual());
       if (!objection.empty()) {
         stop(SimulationStatus::not_credible, objection);
         break;
@@ -357,6 +356,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   result.y_end = step_.y0;
   stiffness.add_to(result.statistics);
   result.statistics.max_acceleration_residual = dynamics_.worst_residual();
+  result.statistics.relative_energy_drift = guard_.relative_energy_drift();
   if (implicit_) {
     evaluations_ += implicit_->evaluations();
     result.statistics.linearised_states += dynamics_.linearised_states();
