@@ -112,6 +112,8 @@ int gradient_command(const CommandContext& context) {
   const Evaluation& evaluation = evaluator.gradients(evaluator.start());
   run.result["simulation"] = to_json(evaluation.statistics);
   add_derivative_counts(run, needed.scene, evaluation.statistics);
+  for (const std::string& warning : simulation_warnings(scene.simulation, evaluation.statistics, evaluation.ok))
+    run.warn(warning);
   if (!evaluation.ok) {
     interrupted() ? run.stopped("no gradient was finished") : run.failed(evaluation.message, last_good_time);
     return run.finish();
@@ -123,7 +125,6 @@ int gradient_command(const CommandContext& context) {
     simulated.simulation = with_cvodes(scene.simulation);
   run.result["methods"][method]["integrator"] = simulated.simulation.integrator.type;
   print_simulation(context.out, simulated, evaluation.statistics);
-  for (const std::string& warning : simulation_warnings(simulated.simulation, evaluation.statistics)) run.warn(warning);
   warn_of_stiffness(run, evaluation.statistics, true);
   context.out << fmt::format("gradients by {}, {:.3g} s\n\n", evaluation.choice.empty() ? method : evaluation.choice,
                              evaluation.wall_seconds);

@@ -16,8 +16,8 @@ constexpr double kDigitsPerAlpha = 1e-16;  // docs/formulations.md, measured
 
 }  // namespace
 
-std::vector<std::string> simulation_warnings(const SimulationSettings& settings,
-                                             const SimulationStatistics& statistics) {
+std::vector<std::string> simulation_warnings(const SimulationSettings& settings, const SimulationStatistics& statistics,
+                                             bool finished) {
   std::vector<std::string> warnings;
   const FormulationSettings& f = settings.formulation;
   const bool penalty = f.type == FormulationType::penalty;
@@ -38,7 +38,8 @@ std::vector<std::string> simulation_warnings(const SimulationSettings& settings,
                               f.alpha)
                 : std::string("Tighten rtol and atol, or let simulation.formulation.projection be position_velocity")));
   }
-  if (statistics.relative_energy_drift > kEnergyLost) {
+  if (!finished) return warnings;
+  if (statistics.relative_energy_drift > kEnergyLost && statistics.max_position_violation <= kApart) {
     warnings.push_back(fmt::format(
         "the energy changed by up to {:.2g} J, {:.2g} % of all there is, although nothing does work: this is not the "
         "motion of the scene. Tighten rtol and atol, or take smaller steps{}",

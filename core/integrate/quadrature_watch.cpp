@@ -12,6 +12,7 @@ namespace {
 constexpr double kPoor = 1e-4;        // of the integral of |g| so far: an estimate above it asks for a look at the step
 constexpr double kNarrowest = 1e-12;  // of a step
 constexpr double kFalls = 0.03;       // |g| times width of an integrable g does by more, over half of all halvings
+constexpr double kBounded = 1e-7;     // of a step: a |g| that has not grown threefold there does not
 constexpr int kPoints = 9;
 constexpr double kOffset = 0.471;  // not half: poles are at round times
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
@@ -96,13 +97,13 @@ double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
   const double first = largest;
   const double narrowest = std::max(kNarrowest, 1e-15 * std::abs(step.t) / h);
   const double halfway = std::sqrt(narrowest);
-  double product = 0;
+  double product = std::numeric_limits<double>::infinity();
   for (double width = 1.0 / kPoints; width > narrowest; width /= 2) {
     const double s = at;
     take(s - 0.5 * width), take(s + 0.5 * width);
     if (!std::isfinite(largest)) return step.t + at * h;
-    if (width < 1e-4 && largest < 10 * first) return kNone;  // bounded: the usual case
-    if (width > halfway) product = width * largest;
+    if (width < kBounded && largest < 3 * first) return kNone;  // the usual case
+    if (width > halfway) product = std::min(product, width * largest);
     if (width * largest < kFalls * product) return kNone;
   }
   return step.t + at * h;

@@ -35,6 +35,7 @@ class RunGuard {
   double last_t_ = 0;
   double energy_initial_ = 0, energy_largest_ = 0, energy_natural_ = 0;  // natural: of weights and springs [J]
   double energy_drift_ = 0;
+  Eigen::Vector2d bounds_;  // of the speed of a centre of mass [m/s] and of turning [rad/s]
 };
 
 }  // namespace mbsopt

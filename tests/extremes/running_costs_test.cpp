@@ -72,7 +72,6 @@ TEST_CASE("a running cost that grows without bounds but has an integral is no po
   INFO(g << ": " << run.message());
   REQUIRE(run.ok());
   CHECK(run("judged") == Approx(integral).epsilon(0.2));
-  CHECK(run.statistics().quadrature_error > 1e-3);
 }
 
 TEST_CASE("a running cost that the steps do not resolve is a warning with its name, the error and what to change",
