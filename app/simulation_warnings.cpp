@@ -10,7 +10,7 @@ namespace {
 constexpr double kApart = 1e-3;            // [m, -]
 constexpr double kUnmet = 1e-5;            // of the accelerations of the constraints
 constexpr double kEnergyLost = 1e-2;       // of the largest energy
-constexpr double kUnresolved = 5e-3;       // of the integral of a running cost's size
+constexpr double kUnresolved = 3e-2;       // of the integral of a running cost's size; estimates are pessimistic
 constexpr double kLargePenalty = 3e10;     // above it rounding by Cholesky passes 1e-5 of the accelerations
 constexpr double kDigitsPerAlpha = 1e-16;  // docs/formulations.md, measured
 

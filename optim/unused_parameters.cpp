@@ -366,9 +366,11 @@ Problem what_measurements_need(const Problem& problem, std::vector<std::string>*
   std::vector<std::string> names;
   if (problem.identification) {
     needed.scene = Search(as_identified(problem)).needed(names);
-    const std::vector<Drive>& drives = needed.scene.drives;
+    const auto has = [](const Scene& scene, const std::string& drive) {
+      return std::any_of(scene.drives.begin(), scene.drives.end(), [&](const Drive& d) { return d.name == drive; });
+    };
     const auto is_left_out = [&](const DriveLaw& law) {
-      return std::none_of(drives.begin(), drives.end(), [&](const Drive& d) { return d.name == law.drive; });
+      return has(problem.scene, law.drive) && !has(needed.scene, law.drive);
     };
     for (ExperimentSpec& experiment : needed.identification->experiments) std::erase_if(experiment.drives, is_left_out);
   }
