@@ -5,11 +5,14 @@
 #include "app/accuracy_results.hpp"
 #include "app/command.hpp"
 #include "app/interrupt.hpp"
+#include "app/left_out_bodies.hpp"
 #include "app/objective_values.hpp"
 #include "app/run.hpp"
+#include "app/simulation_warnings.hpp"
 #include "app/text_table.hpp"
 #include "core/expression/counted.hpp"
 #include "optim/gradient_check.hpp"
+#include "optim/unused_parameters.hpp"
 
 namespace mbsopt {
 namespace {
@@ -200,7 +203,10 @@ int check_command(const CommandContext& context) {
     return !interrupted();
   };
   options.progress = [&](int done, int of) { run.progress.fraction("checking", static_cast<double>(done) / of); };
-  const GradientCheck check = check_gradients(run.problem, options);
+  std::vector<std::string> left_out;
+  const Problem needed = what_objectives_need(run.problem, &left_out);
+  say_left_out(run, left_out, "objective");
+  const GradientCheck check = check_gradients(needed, options);
   run.progress.finish();
   if (interrupted() || !check.ran) {
     interrupted() ? run.stopped("nothing was compared") : run.failed(check.message, last_good_time);
@@ -208,7 +214,9 @@ int check_command(const CommandContext& context) {
   }
 
   run.result["simulation"] = to_json(check.statistics);
-  const Evaluator evaluator(scene, objectives_of(run.problem));
+  add_derivative_counts(run, needed.scene, check.statistics);
+  for (const std::string& warning : simulation_warnings(scene.simulation, check.statistics)) run.warn(warning);
+  const Evaluator evaluator(needed.scene, objectives_of(needed));
   const std::vector<std::optional<double>> true_values = evaluator.true_values(evaluator.start());
   add_to_result(run.result, check, true_values);
   print_simulation(context.out, scene, check.statistics);

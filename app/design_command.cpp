@@ -12,6 +12,7 @@
 #include "app/report/run_report.hpp"
 #include "app/run.hpp"
 #include "app/simulated_motion.hpp"
+#include "app/simulation_warnings.hpp"
 #include "app/text_table.hpp"
 #include "core/expression/counted.hpp"
 
@@ -133,6 +134,8 @@ int design_command(const CommandContext& context) {
   add_to_result(run.result, design);
   print_design(context.out, design);
   for (const std::string& warning : design.warnings) run.warn(warning);
+  for (const std::string& warning : simulation_warnings(scene.simulation, design.final_evaluation.statistics))
+    run.warn(warning);
   warn_of_stiffness(run, design.final_evaluation.statistics, true);
   const SimulatedMotion after = interrupted() ? SimulatedMotion{} : simulated_motion(run, design.rho);
   if (cut_off || design.status == SolverStatus::stopped) {

@@ -7,6 +7,7 @@
 #include "app/command.hpp"
 #include "app/hessian_results.hpp"
 #include "app/interrupt.hpp"
+#include "app/left_out_bodies.hpp"
 #include "app/objective_values.hpp"
 #include "app/run.hpp"
 #include "app/simulation_warnings.hpp"
@@ -106,14 +107,13 @@ int gradient_command(const CommandContext& context) {
   };
   std::vector<std::string> left_out;
   const Problem needed = what_objectives_need(run.problem, &left_out);
-  if (!left_out.empty()) {
-    run.result["model"]["left_out"] = left_out;
-    context.out << fmt::format("not simulated, since no objective depends on them: {}\n", fmt::join(left_out, ", "));
-  }
+  say_left_out(run, left_out, "objective");
   Evaluator evaluator(needed.scene, objectives_of(needed), {}, options);
   const Evaluation& evaluation = evaluator.gradients(evaluator.start());
   run.result["simulation"] = to_json(evaluation.statistics);
-  for (const std::string& warning : simulation_warnings(scene.simulation, evaluation.statistics)) run.warn(warning);
+  add_derivative_counts(run, needed.scene, evaluation.statistics);
+  for (const std::string& warning : simulation_warnings(scene.simulation, evaluation.statistics, evaluation.ok))
+    run.warn(warning);
   if (!evaluation.ok) {
     interrupted() ? run.stopped("no gradient was finished") : run.failed(evaluation.message, last_good_time);
     return run.finish();

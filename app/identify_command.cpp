@@ -5,15 +5,18 @@
 #include "app/identification_results.hpp"
 #include "app/identify_starts.hpp"
 #include "app/interrupt.hpp"
+#include "app/left_out_bodies.hpp"
 #include "app/optimized_problem.hpp"
 #include "app/report/motion_plots.hpp"
 #include "app/report/run_report.hpp"
 #include "app/residual_records.hpp"
 #include "app/run.hpp"
+#include "app/simulation_warnings.hpp"
 #include "core/dynamics/assembly.hpp"
 #include "core/integrate/model_choice.hpp"
 #include "optim/experiment.hpp"
 #include "optim/identification.hpp"
+#include "optim/unused_parameters.hpp"
 
 namespace mbsopt {
 namespace {
@@ -83,12 +86,16 @@ Scene simulated_scene(const Problem& problem, const std::vector<CsvTable>& data)
 }
 
 // Residuals are derived along with the motion, by runs that say nothing of their steps: hence one that does.
-void warn_of_stiff_experiment(Run& run, const std::vector<CsvTable>& data) {
-  const Scene scene = simulated_scene(run.problem, data);
+void simulate_first_experiment(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
+  const Scene scene = simulated_scene(needed, data);
   const Mechanism mechanism(scene, parameter_values(scene), std::vector<bool>(scene.parameters.size(), false));
   RunOptions options;
   options.progress = [](double) { return !interrupted(); };
-  warn_of_stiffness(run, simulate(mechanism, scene.simulation, {}, {}, options).statistics, true);
+  const SimulationResult first = simulate(mechanism, scene.simulation, {}, {}, options);
+  run.result["simulation"] = to_json(first.statistics);
+  if (first.ok())
+    for (const std::string& warning : simulation_warnings(scene.simulation, first.statistics)) run.warn(warning);
+  warn_of_stiffness(run, first.statistics, true);
 }
 
 std::vector<NewValue> new_values(const IdentificationResult& fit) {
@@ -120,7 +127,10 @@ int identify_command(const CommandContext& context) {
     run.result["model"] = to_json(model);
     print_model(context.out, scene.name, model);
   }
-  warn_of_stiff_experiment(run, data);
+  std::vector<std::string> left_out;
+  const Problem needed = what_measurements_need(run.problem, &left_out);
+  say_left_out(run, left_out, "measurement");
+  simulate_first_experiment(run, needed, data);
   LongRun long_run(run);
   const Problem problem = from_best_start(run, long_run, data);
   if (interrupted() && run.problem.identification->multistart) return stopped_within_starts(run, long_run, problem);

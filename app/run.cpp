@@ -138,12 +138,6 @@ void print_simulation(std::ostream& out, const Scene& scene, const SimulationSta
                        static_cast<double>(statistics.adjoint_memory_bytes) / (1024 * 1024),
                        counted(statistics.recomputed_steps, "step"));
   }
-  if (statistics.max_acceleration_residual > 1e-6) {
-    out << fmt::format(
-        "the constraints' accelerations were met to {:.1e} only: a singular position, or masses that differ too much "
-        "for simulation.formulation (try a larger alpha or more iterations)\n",
-        statistics.max_acceleration_residual);
-  }
 }
 
 }  // namespace mbsopt

@@ -51,7 +51,8 @@ int simulate_command(const CommandContext& context) {
     if (!simulation.ok()) simulated.simulation.end_time = simulation.last_good_time;
     print_simulation(context.out, simulated, simulation.statistics);
     run.write("trajectory.csv", to_csv(motion.trajectory));
-    for (const std::string& warning : simulation_warnings(scene.simulation, simulation.statistics)) run.warn(warning);
+    for (const std::string& warning : simulation_warnings(scene.simulation, simulation.statistics, simulation.ok()))
+      run.warn(warning);
     warn_of_stiffness(run, simulation.statistics, false);
   }
   if (simulation.ok()) {

@@ -2,17 +2,22 @@
 
 #include <fmt/format.h>
 
+#include "core/integrate/cvodes.hpp"
+
 namespace mbsopt {
 namespace {
 
 constexpr double kApart = 1e-3;            // [m, -]
+constexpr double kUnmet = 1e-5;            // of the accelerations of the constraints
+constexpr double kEnergyLost = 1e-2;       // of the largest energy
+constexpr double kUnresolved = 3e-2;       // of the integral of a running cost's size; estimates are pessimistic
 constexpr double kLargePenalty = 3e10;     // above it rounding by Cholesky passes 1e-5 of the accelerations
 constexpr double kDigitsPerAlpha = 1e-16;  // docs/formulations.md, measured
 
 }  // namespace
 
-std::vector<std::string> simulation_warnings(const SimulationSettings& settings,
-                                             const SimulationStatistics& statistics) {
+std::vector<std::string> simulation_warnings(const SimulationSettings& settings, const SimulationStatistics& statistics,
+                                             bool finished) {
   std::vector<std::string> warnings;
   const FormulationSettings& f = settings.formulation;
   const bool penalty = f.type == FormulationType::penalty;
@@ -32,6 +37,30 @@ std::vector<std::string> simulation_warnings(const SimulationSettings& settings,
                               "default has no such error",
                               f.alpha)
                 : std::string("Tighten rtol and atol, or let simulation.formulation.projection be position_velocity")));
+  }
+  if (!finished) return warnings;
+  if (statistics.relative_energy_drift > kEnergyLost && statistics.max_position_violation <= kApart) {
+    warnings.push_back(fmt::format(
+        "the energy changed by up to {:.2g} J, {:.2g} % of all there is, although nothing does work: this is not the "
+        "motion of the scene. Tighten rtol and atol, or take smaller steps{}",
+        statistics.energy_drift, 100 * statistics.relative_energy_drift,
+        is_cvodes(settings.integrator.type) ? "; near singular positions a Runge-Kutta method, which projects onto the "
+                                              "constraints, is right where CVODES is not"
+                                            : ""));
+  } else if (statistics.max_acceleration_residual > kUnmet) {
+    warnings.push_back(fmt::format(
+        "the accelerations of the constraints were met to {:.1e} only: steps came close to a singular position, after "
+        "which the branch may be wrong (compare with another Runge-Kutta method, or other tolerances), or masses "
+        "differ "
+        "too much for simulation.formulation (a larger alpha or more iterations)",
+        statistics.max_acceleration_residual));
+  }
+  if (statistics.quadrature_error > kUnresolved) {
+    warnings.push_back(fmt::format(
+        "the steps do not resolve the running cost of objective '{}': its integral has an estimated error of {:.2g} %, "
+        "most of it near t = {:.6g} s. Set simulation.integrator.max_step, tighten rtol, or take cvodes_bdf or "
+        "cvodes_adams, which control this error",
+        statistics.quadrature_error_of, 100 * statistics.quadrature_error, statistics.quadrature_error_time));
   }
   return warnings;
 }

@@ -1,4 +1,4 @@
-// What deserves a word about a simulation that went through: settings that cost digits, joints that came apart.
+// What deserves a word about a simulation: settings that cost digits, joints that came apart.
 #pragma once
 
 #include <string>
@@ -8,7 +8,8 @@
 
 namespace mbsopt {
 
-std::vector<std::string> simulation_warnings(const SimulationSettings& settings,
-                                             const SimulationStatistics& statistics);
+// finished: it went through, so that its numbers will be used.
+std::vector<std::string> simulation_warnings(const SimulationSettings& settings, const SimulationStatistics& statistics,
+                                             bool finished = true);
 
 }  // namespace mbsopt

@@ -38,6 +38,11 @@ class Evaluations {
     }
     if (point_.ok && !(point_.z.allFinite() && point_.z_x.allFinite()))
       point_.ok = false, point_.message = "a residual or its derivative is not finite";
+    if (point_.ok && !std::isfinite(point_.z.squaredNorm() + point_.z_x.squaredNorm()))
+      point_.ok = false, point_.message = fmt::format(
+                             "the squares of the residuals are beyond all numbers: the largest residual is {:.3g} "
+                             "(measured - model)/sigma. Look for values that are none in the data, and at sigma",
+                             point_.z.lpNorm<Eigen::Infinity>());
     if (!point_.ok) {
       ++result_.failed_evaluations;
       if (result_.first_error.empty()) result_.first_error = point_.message;

@@ -16,6 +16,7 @@
 #include "optim/scored_experiment.hpp"
 #include "optim/sigma_estimation.hpp"
 #include "optim/stopwatch.hpp"
+#include "optim/unused_parameters.hpp"
 
 namespace mbsopt {
 namespace {
@@ -306,7 +307,8 @@ class Identification {
 
 IdentificationResult run_identification(const Problem& problem, const std::vector<CsvTable>& data,
                                         const IdentificationOptions& options) {
-  return Identification(problem, data, options).run();
+  const Problem needed = what_measurements_need(problem);
+  return Identification(needed, data, options).run();
 }
 
 }  // namespace mbsopt

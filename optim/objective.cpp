@@ -108,6 +108,8 @@ std::shared_ptr<const PointCost> Objective::expression(const Mechanism& mechanis
 
 Cost Objective::cost(const Mechanism& mechanism, double x0) const {
   Cost cost;
+  cost.name = name_;
+  cost.is_extreme = is_extreme();
   if (running_) cost.running = running_->bind(mechanism);
   if (running_ && is_extreme()) cost.running = std::make_shared<Exponential>(cost.running, exponent(), x0);
   if (running_ && kind_ == ObjectiveKind::rms) cost.running = std::make_shared<Square>(cost.running);

@@ -43,7 +43,7 @@ ResidualAnalysis analyse_residuals(const Eigen::VectorXd& z) {
   a.mean = z.mean();
   const Eigen::VectorXd e = z.array() - a.mean;
   const double sum = e.squaredNorm();
-  if (n < kFewest || !(sum > 0)) return a;
+  if (n < kFewest || !(sum > 0) || !std::isfinite(sum)) return a;
   count_runs(z, a);
   a.lags = static_cast<int>(std::min<Eigen::Index>(10, n / 5));
   for (Eigen::Index k = 1; k <= a.lags; ++k) {

@@ -162,13 +162,17 @@ class Search {
     return largest;
   }
 
+  // Of one method with and without step-size control only where no two methods agree.
   std::pair<std::size_t, std::size_t> closest(const std::vector<Candidate>& found) const {
     std::pair<std::size_t, std::size_t> pair{0, 1};
     double least = std::numeric_limits<double>::infinity();
+    bool methods_differ = false;
     for (std::size_t i = 0; i < found.size(); ++i) {
       for (std::size_t j = i + 1; j < found.size(); ++j) {
         const double here = apart(found[i].answer, found[j].answer);
-        if (here < least) least = here, pair = {i, j};
+        const bool differ = found[i].method.integrator != found[j].method.integrator && here < kAgreeing;
+        if (differ < methods_differ || (differ == methods_differ && here >= least)) continue;
+        least = here, pair = {i, j}, methods_differ = differ;
       }
     }
     return pair;

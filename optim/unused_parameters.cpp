@@ -361,6 +361,23 @@ Problem what_objectives_need(const Problem& problem, std::vector<std::string>* l
   return needed;
 }
 
+Problem what_measurements_need(const Problem& problem, std::vector<std::string>* left_out) {
+  Problem needed = problem;
+  std::vector<std::string> names;
+  if (problem.identification) {
+    needed.scene = Search(as_identified(problem)).needed(names);
+    const auto has = [](const Scene& scene, const std::string& drive) {
+      return std::any_of(scene.drives.begin(), scene.drives.end(), [&](const Drive& d) { return d.name == drive; });
+    };
+    const auto is_left_out = [&](const DriveLaw& law) {
+      return has(problem.scene, law.drive) && !has(needed.scene, law.drive);
+    };
+    for (ExperimentSpec& experiment : needed.identification->experiments) std::erase_if(experiment.drives, is_left_out);
+  }
+  if (left_out) *left_out = std::move(names);
+  return needed;
+}
+
 std::vector<SceneIssue> find_idle_variables(const Problem& problem) {
   std::vector<SceneIssue> issues;
   if (problem.design)

@@ -25,6 +25,9 @@ std::vector<SceneIssue> find_unused_parameters(const Problem& problem);
 // then cost nothing in values and gradients. Parameters stay as they are. For a problem without other issues.
 Problem what_objectives_need(const Problem& problem, std::vector<std::string>* left_out = nullptr);
 
+// Likewise, the problem as far as its measurements depend on it.
+Problem what_measurements_need(const Problem& problem, std::vector<std::string>* left_out = nullptr);
+
 // Variables of a design that matter to none of the objectives it minimises or bounds, and variables and free parameters
 // of an identification that matter to none of its channels, though they may matter to other objectives of the problem.
 std::vector<SceneIssue> find_idle_variables(const Problem& problem);

@@ -1,5 +1,7 @@
 #include "core/integrate/cost.hpp"
 
+#include <cmath>
+
 namespace mbsopt {
 namespace {
 
@@ -38,6 +40,15 @@ class UserTerminal final : public PointCost {
 };
 
 }  // namespace
+
+std::string not_finite_costs(std::span<const Cost> costs, const Eigen::VectorXd& psi) {
+  std::string names;
+  for (std::size_t o = 0; o < costs.size(); ++o) {
+    if (std::isfinite(psi(static_cast<Eigen::Index>(o))) || costs[o].name.empty()) continue;
+    names += (names.empty() ? "objective '" : ", '") + costs[o].name + "'";
+  }
+  return (names.empty() ? "an objective" : names) + " is not finite (a logarithm, root or division outside its range?)";
+}
 
 std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const RunningCost> running, const Eigen::VectorXd& rho) {
   return std::make_shared<UserRunning>(std::move(running), rho);

@@ -8,6 +8,8 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "core/mechanism/state_point.hpp"
@@ -50,7 +52,12 @@ struct Cost {
   std::shared_ptr<const PointCost> running;
   std::shared_ptr<const PointCost> terminal;
   std::vector<SampledCost> samples;
+  std::string name = {};    // of the objective, for messages
+  bool is_extreme = false;  // running is the exponential of a smooth maximum, which may leave the range of numbers
 };
+
+// Which of the costs have no finite value, in words.
+std::string not_finite_costs(std::span<const Cost> costs, const Eigen::VectorXd& psi);
 
 // Adapters from what a user writes; rho is the parameter vector of the mechanism that is simulated.
 std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const RunningCost> running, const Eigen::VectorXd& rho);

@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "core/integrate/run_guard.hpp"
+#include "core/integrate/start_failure.hpp"
 #include "core/integrate/zero_length.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -50,10 +51,7 @@ ForwardRun::ForwardRun(const Mechanism& mechanism, const SimulationSettings& set
   flow_.start(settings.start_time, assembly_.result().angles);
   *y_ = assembly_.result().y;
   if (!flow_.evaluate(settings.start_time, *y_)) {
-    stop(SimulationStatus::not_finite,
-         fmt::format("the accelerations at the start, t = {:.6g} s, cannot be computed. Either a force or law is not "
-                     "finite there, or a body without mass or inertia in a direction that no joint holds has none",
-                     settings.start_time));
+    stop(SimulationStatus::not_finite, start_failure(mechanism_.data(), settings.start_time));
     return;
   }
   set_up();
@@ -184,13 +182,26 @@ void ForwardRun::stop_for(int flag, double t, const char* of_what) {
     case CV_LSETUP_FAIL:
       stop(SimulationStatus::step_too_small,
            fmt::format("no step beyond t = {:.6g} s is small enough for the tolerances (the last one tried was {:.3g} "
-                       "s). Look for a singular position, a spring of zero length or a law that is not smooth near "
+                       "s). Look for {}a singular position, a spring of zero length or a law that is not smooth near "
                        "this time; CVODES does not project onto the constraints, a Runge-Kutta method may pass it",
-                       t, h));
+                       t, h, about_quadratures()));
       return;
     default:
       stop(SimulationStatus::step_too_small, fmt::format("CVODES stopped at t = {:.6g} s: {}", t, last_words_));
   }
+}
+
+// Where it was the integrals that asked for smaller steps: which running costs there are.
+std::string ForwardRun::about_quadratures() const {
+  long fails = 0;
+  if (!running_.empty()) CVodeGetQuadNumErrTestFails(memory(), &fails);
+  if (fails == 0) return {};
+  std::string names;
+  for (const Eigen::Index o : running_) {
+    const std::string& name = costs_[static_cast<std::size_t>(o)].name;
+    if (!name.empty()) names += (names.empty() ? " of objective '" : ", '") + name + "'";
+  }
+  return "a pole or jump of the running cost" + names + ", ";
 }
 
 // A branch is chosen by nearness: a joint that turns by half a turn in one step is lost.
@@ -272,7 +283,7 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
     result_.steps.sizes.push_back(t1 - t);
     flow_.accept(t1, y_now_);
     const Energy energy_now = update_statistics(t1, y_now_);
-    std::string objection = guard.objection(t1, energy_now, flow_.dynamics().worst_residual());
+    std::string objection = guard.objection(t1, y_now_, energy_now, flow_.dynamics().worst_residual());
     if (objection.empty() && derivatives) {
       objection = through_zero_length(mechanism_.data(), t, y_before, t1, y_now_);
     }
@@ -290,6 +301,7 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
     }
   }
   result_.statistics.rejected = rejected();
+  result_.statistics.relative_energy_drift = guard.relative_energy_drift();
   result_.y_end = y_now_;
   if (result_.ok()) finish_costs();
 }
@@ -309,7 +321,7 @@ void ForwardRun::finish_costs() {
     if (costs_[o].terminal) result_.psi(static_cast<Eigen::Index>(o)) += costs_[o].terminal->value(at);
   }
   if (!result_.psi.allFinite()) {
-    stop(SimulationStatus::not_finite, "an objective is not finite (a logarithm, root or division outside its range?)");
+    stop(SimulationStatus::not_finite, not_finite_costs(costs_, result_.psi));
   }
 }
 

@@ -64,6 +64,7 @@ class ForwardRun {
   void stop(SimulationStatus status, std::string message);
   // What a negative return value means, in words.
   void stop_for(int flag, double t, const char* of_what);
+  std::string about_quadratures() const;
   SimulationResult finish();
 
  private:

@@ -10,9 +10,11 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kUnmet = 1e-3;       // relative, of accelerations
-constexpr double kGrown = 0.5;        // of the energy there is
-constexpr double kNoticeable = 1e-3;  // of the natural energy: below it a change is none
+constexpr double kUnmet = 1e-3;                             // relative, of accelerations
+constexpr double kGrown = 0.5;                              // of the energy there is
+constexpr double kNoticeable = 1e-3;                        // of the natural energy: below it a change is none
+constexpr double kFastest = 299792458, kFastestTurn = 1e6;  // light [m/s]; ten times the fastest turbine [rad/s]
+constexpr double kGrowth = 1e3;                             // of what is faster from the start
 
 // Nothing does work but gravity and springs, whose potential is known.
 bool conserves_energy(const MechanismData& d) {
@@ -42,6 +44,11 @@ double natural_energy(const MechanismData& d, const Eigen::VectorXd& y) {
   return sum;
 }
 
+Eigen::Vector2d speeds(const Eigen::VectorXd& y, int i, int n) {
+  const auto v = y.segment<7>(7 * (n + i - 1));
+  return {v.head<3>().norm(), 2 * v.tail<4>().norm()};  // |omega| = 2 |pdot|
+}
+
 double size_of(const Energy& e) { return e.kinetic + std::abs(e.potential); }
 
 }  // namespace
@@ -53,12 +60,15 @@ void RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& energy) {
   last_t_ = t;
   energy_initial_ = energy.kinetic + energy.potential;
   energy_largest_ = size_of(energy);
+  bounds_ = {kFastest, kFastestTurn};
+  for (int i = 1; i <= data_.n; ++i) bounds_ = bounds_.cwiseMax(kGrowth * speeds(y, i, data_.n));
   energy_natural_ = conserves_energy_ ? natural_energy(data_, y) : 0.0;
 }
 
 std::string RunGuard::about_energy(double t, const Energy& energy) {
   energy_largest_ = std::max(energy_largest_, size_of(energy));
   const double now = energy.kinetic + energy.potential, grown = now - energy_initial_;
+  energy_drift_ = std::max(energy_drift_, std::abs(grown));
   if (!(grown > kGrown * energy_largest_ && grown > kNoticeable * energy_natural_)) return {};
   return fmt::format(
       "the energy has grown from {:.3g} J to {:.3g} J at t = {:.6g} s, although nothing does work: the steps are too "
@@ -67,16 +77,37 @@ std::string RunGuard::about_energy(double t, const Energy& energy) {
       energy_initial_, now, t);
 }
 
-std::string RunGuard::objection(double t, const Energy& energy, double acceleration_residual) {
+double RunGuard::relative_energy_drift() const {
+  return energy_drift_ > kNoticeable * energy_natural_ ? energy_drift_ / energy_largest_ : 0;
+}
+
+std::string RunGuard::about_speed(double t, const Eigen::VectorXd& y) const {
+  for (int i = 1; i <= data_.n; ++i) {
+    const Eigen::Vector2d now = speeds(y, i, data_.n);
+    if ((now.array() <= bounds_.array()).all()) continue;
+    return fmt::format(
+        "body '{}' {} at t = {:.6g} s: the motion grows beyond all bounds. Look for a negative damping or stiffness, a "
+        "law of a drive or force that grows without end, or a unit; where steps are fixed, use a smaller step",
+        data_.body_names[static_cast<std::size_t>(i)],
+        now(1) > bounds_(1) ? fmt::format("turns at {:.3g} rad/s", now(1)) : fmt::format("moves at {:.3g} m/s", now(0)),
+        t);
+  }
+  return {};
+}
+
+std::string RunGuard::objection(double t, const Eigen::VectorXd& y, const Energy& energy,
+                                double acceleration_residual) {
   std::string words = law_jumps_.between(last_t_, t);
   last_t_ = t;
   if (words.empty() && acceleration_residual > kUnmet) {
     words = fmt::format(
         "the accelerations of the constraints are met to {:.1e} only at t = {:.6g} s: use a larger "
-        "simulation.formulation.alpha (relative; 1e8 is the default) or more iterations; or the position is singular",
+        "simulation.formulation.alpha (relative; 1e8 is the default) or more iterations; or the position is singular, "
+        "or a drive asks for more than the mechanism reaches",
         acceleration_residual, t);
   }
   if (words.empty() && conserves_energy_) words = about_energy(t, energy);
+  if (words.empty()) words = about_speed(t, y);
   return words;
 }
 

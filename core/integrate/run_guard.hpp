@@ -3,6 +3,7 @@
 //   - the law of a drive jumps, or its rate does (law_jumps.hpp)
 //   - the energy of a mechanism on which nothing does work has grown by half of all it has
 //   - the accelerations of the constraints were not met
+//   - a body is faster than anything is
 #pragma once
 
 #include <string>
@@ -17,18 +18,24 @@ class RunGuard {
   explicit RunGuard(const MechanismData& data);
 
   void begin(double t, const Eigen::VectorXd& y, const Energy& energy);
-  // After a step: its end, the energy there, and the largest relative residual of the constraints' accelerations so
-  // far. Empty: none.
-  std::string objection(double t, const Energy& energy, double acceleration_residual);
+  // After a step: its end, the state and the energy there, and the largest relative residual of the constraints'
+  // accelerations so far. Empty: none.
+  std::string objection(double t, const Eigen::VectorXd& y, const Energy& energy, double acceleration_residual);
+
+  // Largest change of the energy relative to the largest energy, where nothing does work; else 0.
+  double relative_energy_drift() const;
 
  private:
   std::string about_energy(double t, const Energy& energy);
+  std::string about_speed(double t, const Eigen::VectorXd& y) const;
 
   const MechanismData& data_;
   bool conserves_energy_;
   LawJumps law_jumps_;
   double last_t_ = 0;
   double energy_initial_ = 0, energy_largest_ = 0, energy_natural_ = 0;  // natural: of weights and springs [J]
+  double energy_drift_ = 0;
+  Eigen::Vector2d bounds_;  // of the speed of a centre of mass [m/s] and of turning [rad/s]
 };
 
 }  // namespace mbsopt

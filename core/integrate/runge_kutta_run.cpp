@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "core/integrate/model_choice.hpp"
+#include "core/integrate/start_failure.hpp"
 #include "core/integrate/stiffness.hpp"
 
 namespace mbsopt {
@@ -67,19 +67,6 @@ double RungeKuttaRun::propose_step(double t, double h, double end, bool adaptive
   const double left = end - t;
   if (h >= left * (1 - 1e-9)) return left;
   return adaptive && 2 * h > left ? 0.5 * left : h;
-}
-
-// Names the bodies whose mass or inertia vanishes in some direction, for the message of a singular start.
-std::string RungeKuttaRun::bodies_without_inertia() const {
-  const MechanismData& d = mechanism_.data();
-  std::string names;
-  for (int i = 1; i <= d.n; ++i) {
-    const BodyData& b = d.bodies[static_cast<std::size_t>(i)];
-    const double least = Eigen::SelfAdjointEigenSolver<Matrix3d>(b.J, Eigen::EigenvaluesOnly).eigenvalues()(0);
-    if (b.mass > 0 && least > 0) continue;
-    names += (names.empty() ? "'" : ", '") + d.body_names[static_cast<std::size_t>(i)] + "'";
-  }
-  return names;
 }
 
 bool RungeKuttaRun::evaluate_stage(int i) {
@@ -181,9 +168,9 @@ std::string RungeKuttaRun::failed(Outcome outcome, double h, bool adaptive) cons
     case Outcome::unsolved:
       return fmt::format(
           "the stages of the implicit step from t = {:.6g} s by {:.3g} s were not found: Newton's method did "
-          "not converge. Use a smaller step, or look for a law that is not smooth or not finite, or a "
-          "singular position, near this time",
-          step_.t, h);
+          "not converge. {} for a law that is not smooth or not finite, a singular position, or a drive that asks for "
+          "more than the mechanism reaches, near this time",
+          step_.t, h, adaptive ? "Look" : "Use a smaller step, or look");
     case Outcome::off_constraints:
       return adaptive
                  ? fmt::format(
@@ -213,7 +200,9 @@ std::string RungeKuttaRun::failed(Outcome outcome, double h, bool adaptive) cons
     default:
       return fmt::format(
           "the step fell to {:.3g} s at t = {:.6g} s and its error is still too large. Look for a "
-          "singular position, a spring of zero length or a law that is not smooth near this time; "
+          "singular position, a drive that asks for more than the mechanism reaches, a spring of zero length or a law "
+          "that "
+          "is not smooth near this time; "
           "looser tolerances or a fixed step may pass it",
           h, step_.t);
   }
@@ -290,15 +279,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     result.message = std::move(message);
   };
   if (!dynamics_.evaluate(step_.t, y_initial, angles, ydot_)) {
-    const std::string bodies = bodies_without_inertia();
-    stop(SimulationStatus::not_finite,
-         fmt::format("the accelerations at the start, t = {:.6g} s, cannot be computed. {}", step_.t,
-                     bodies.empty()
-                         ? "A force or law is not finite there (a root, logarithm or division outside its range?): "
-                           "look at the laws of forces and drives and at the sensors in them"
-                         : "A body without mass or inertia in a direction that no joint holds has none: " + bodies +
-                               ". Give it some, or hold it") +
-             about_alpha(settings_.formulation));
+    stop(SimulationStatus::not_finite, start_failure(mechanism_.data(), step_.t) + about_alpha(settings_.formulation));
     return;
   }
   // A guard on which scenes are taken to be planar: what was assembled in space satisfies the planar equations.
@@ -390,7 +371,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     result.steps.sizes.push_back(h);
     const Energy energy_now = update_statistics(result);
     if (!options.frozen) {  // given steps have been looked at where they were found
-      const std::string objection = guard_.objection(step_.t1, energy_now, dynamics_.worst_residual());
+      const std::string objection = guard_.objection(step_.t1, step_.y1, energy_now, dynamics_.worst_residual());
       if (!objection.empty()) {
         stop(SimulationStatus::not_credible, objection);
         break;
@@ -432,6 +413,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   result.y_end = step_.y0;
   stiffness.add_to(result.statistics);
   result.statistics.max_acceleration_residual = dynamics_.worst_residual();
+  result.statistics.relative_energy_drift = guard_.relative_energy_drift();
   if (implicit_) {
     evaluations_ += implicit_->evaluations();
     result.statistics.linearised_states += dynamics_.linearised_states();

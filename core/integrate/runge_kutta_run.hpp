@@ -35,7 +35,6 @@ class RungeKuttaRun {
 
   double first_step(const IntegratorSettings& s, double span);
   double propose_step(double t, double h, double end, bool adaptive) const;
-  std::string bodies_without_inertia() const;
   bool evaluate_stage(int i);
   bool solve_stages(ImplicitStages::Goal goal);
   double error_of_step();

@@ -11,6 +11,7 @@
 #include "core/integrate/adjoint_sweep.hpp"
 #include "core/integrate/checkpoints.hpp"
 #include "core/integrate/cvodes.hpp"
+#include "core/integrate/quadrature_watch.hpp"
 #include "core/integrate/runge_kutta_run.hpp"
 #include "core/integrate/tangent_sweep.hpp"
 #include "core/integrate/zero_length.hpp"
@@ -77,10 +78,11 @@ class Run {
     RungeKuttaRun run(mechanism_, settings_, method_);
     Eigen::VectorXd y(mechanism_.states());
     bool followed = true;
-    std::string objection;  // to derivatives
+    QuadratureWatch watch(method_, costs_, motion());
+    std::string objection;  // to running costs, to derivatives
     auto accepted = [&](const Step& step) {
       const std::span<const SampleEvent> events = schedule.take(step.t1);
-      add_running_costs(step, y);
+      add_running_costs(step, y, options.frozen ? nullptr : &watch, objection);
       for (const SampleEvent& e : events) {
         if (!e.cost && !observe) continue;
         dense_output(method_, step, (e.time - step.t) / step.h, y);
@@ -93,17 +95,18 @@ class Run {
       }
       if (!follow) return;
       if (!follow(step, events)) followed = false;
-      objection = through_zero_length(mechanism_.data(), step.t, step.y0, step.t1, step.y1);
+      if (objection.empty()) {
+        objection = through_zero_length(mechanism_.data(), step.t, step.y0, step.t1, step.y1);
+      }
     };
     RunOptions until_objection = options;
-    if (follow) {
-      until_objection.progress = [&](double t) {
-        return objection.empty() && (!options.progress || options.progress(t));
-      };
-    }
+    until_objection.progress = [&](double t) {
+      return objection.empty() && (!options.progress || options.progress(t));
+    };
     run.run(
         assembly_.result().y, assembly_.result().angles, [&](double t1) { return schedule.due(t1); }, accepted,
         until_objection, result_);
+    watch.add_to(result_.statistics);
     if (!objection.empty()) {
       result_.status = SimulationStatus::not_credible;
       result_.message = objection;
@@ -123,7 +126,7 @@ class Run {
     }
     if (!result_.psi.allFinite()) {
       result_.status = SimulationStatus::not_finite;
-      result_.message = "an objective is not finite (a logarithm, root or division outside its range?)";
+      result_.message = not_finite_costs(costs_, result_.psi);
     }
   }
 
@@ -133,7 +136,10 @@ class Run {
   }
 
  private:
-  void add_running_costs(const Step& step, Eigen::VectorXd& y) {
+  // Each stage's state is copied once for all costs. watch: none where steps are given.
+  void add_running_costs(const Step& step, Eigen::VectorXd& y, QuadratureWatch* watch, std::string& objection) {
+    const std::size_t stages = static_cast<std::size_t>(method_.stages);
+    g_.assign(stages * costs_.size(), 0.0);
     for (int i = 0; i < method_.stages; ++i) {
       if (method_.b[i] == 0) continue;
       bool copied = false;
@@ -141,10 +147,14 @@ class Run {
         if (!costs_[o].running) continue;
         if (!copied) y = step.Y.col(i);
         copied = true;
-        result_.psi(static_cast<Eigen::Index>(o)) +=
-            step.h * method_.b[i] *
-            costs_[o].running->value({step.t + method_.c[i] * step.h, y, step.angles0, motion()});
+        const double g = costs_[o].running->value({step.t + method_.c[i] * step.h, y, step.angles0, motion()});
+        result_.psi(static_cast<Eigen::Index>(o)) += step.h * method_.b[i] * g;
+        g_[o * stages + static_cast<std::size_t>(i)] = g;
       }
+    }
+    for (std::size_t o = 0; watch && objection.empty() && o < costs_.size(); ++o) {
+      if (costs_[o].running && !costs_[o].is_extreme)
+        objection = watch->look_at(step, o, {g_.data() + o * stages, stages});
     }
   }
 
@@ -159,6 +169,7 @@ class Run {
   std::optional<MotionSolver> motion_;  // where some sensor needs it
   SimulationResult result_;
   Eigen::VectorXd angles_end_;
+  std::vector<double> g_;  // of the running costs at the stages of a step
 };
 
 // Computes steps of a run again, bit for bit.

@@ -37,6 +37,7 @@ struct SimulationStatistics {
   double max_position_violation = 0;                              // of |Phi| over accepted steps [m, -]
   double max_velocity_violation = 0;                              // of |Phi_q v + Phi_t|
   double energy_initial = 0, energy_final = 0, energy_drift = 0;  // drift: largest |E - E(0)| over accepted steps [J]
+  double relative_energy_drift = 0;      // of the largest energy so far, where nothing does work; else 0
   double max_acceleration_residual = 0;  // relative, of the constraints' accelerations (augmented Lagrangian)
   std::size_t adjoint_memory_bytes = 0;  // the most that the backward sweep kept of the forward run
   long recomputed_steps = 0;             // for want of memory, of the backward sweep
@@ -44,6 +45,11 @@ struct SimulationStatistics {
   // them, and the fastest rate |lambda| there [1/s].
   long watched_steps = 0, stability_limited_steps = 0;
   double stiffest_rate = 0;
+  // The worst resolved running cost: estimated error of its integral relative to that of its size, its objective, and
+  // when most of the error arose (quadrature_watch.hpp; 0 by CVODES, which controls it).
+  double quadrature_error = 0;
+  std::string quadrature_error_of;
+  double quadrature_error_time = 0;  // [s]
 };
 
 enum class SimulationStatus {

@@ -1,5 +1,8 @@
 // What a scene does not require costs nothing, as the counters in result.json show.
+#include <fmt/format.h>
+
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "app/exit_code.hpp"
 #include "tests/app/run_command.hpp"
@@ -86,6 +89,64 @@ TEST_CASE("bodies that no objective depends on cost a gradient nothing, and that
     CHECK_THAT(both.out, Contains("no objective depends on them: b"));
     CHECK_FALSE(alone.result.at("model").contains("left_out"));
   }
+}
+
+TEST_CASE("bodies that no objective depends on cost a check of the gradients nothing", "[costs]") {
+  const Costs alone = costs("check", one()), both = costs("check", two());
+  for (const char* counter : kCounters) {
+    INFO(counter);
+    CHECK(both.counter(counter) == alone.counter(counter));
+  }
+  CHECK(both.counter("derivative_blocks") == alone.counter("derivative_blocks"));
+  CHECK(both.gradient() == alone.gradient());
+  CHECK(both.result.at("model").at("left_out") == nlohmann::json{"b"});
+  CHECK(both.result.at("model").at("bodies") == 2);
+  CHECK_THAT(both.out, Contains("no objective depends on them: b"));
+}
+
+TEST_CASE("bodies that nothing measured depends on cost an identification nothing, and change nothing of it",
+          "[costs]") {
+  const TemporaryFolder folder;
+  std::string rows = "t,y\n";
+  for (int i = 1; i <= 20; ++i) rows += fmt::format("{},{}\n", 0.05 * i, -0.4 * std::sin(0.1 * i));
+  const std::string identification =
+      R"(, "identification": {"experiments": [{"name": "run", "data": ")" + folder.write("run.csv", rows) +
+      R"(", "time": "t", "channels": [{"column": "y", "sensor": "y_a", "sigma": 0.01}]}], "variables": ["k"]}})";
+  const auto identified = [&](std::string text) {
+    text.pop_back();
+    return costs("identify", text + identification, {"--set", "parameters.m.allow_unused=true"});
+  };
+  const Costs alone = identified(one()), both = identified(two());
+  for (const char* counter : {"steps", "rhs_evaluations", "factorisations", "factor_blocks"}) {
+    INFO(counter);
+    CHECK(both.counter(counter) == alone.counter(counter));
+    CHECK(both.counter(counter) > 0);
+  }
+  CHECK(both.result.at("parameters") == alone.result.at("parameters"));
+  CHECK(both.result.at("model").at("left_out") == nlohmann::json{"b"});
+  CHECK_THAT(both.out, Contains("no measurement depends on them: b"));
+}
+
+TEST_CASE("blocks of derivatives are counted: one more for a force that the state changes, none for a constant one",
+          "[costs]") {
+  const auto blocks = [](const std::string& more_forces) {
+    return costs("gradient", scene(body("a", "0"), pin("a", "0"), spring("a", "0") + more_forces, sensor("a"), kEnd));
+  };
+  const Costs without = blocks("");
+  const long states = without.counter("linearised_states");
+  CHECK(without.counter("derivative_blocks") == 3 * states);  // the body, its pin, its spring
+  const Costs constant =
+      blocks(R"(, {"name": "weight", "type": "force", "body": "a", "point": [0.5, 0, 0], "components": [0, -3, 0]})");
+  CHECK(constant.counter("derivative_blocks") == without.counter("derivative_blocks"));
+  CHECK(constant.gradient() != without.gradient());
+  const Costs turning =
+      blocks(R"(, {"name": "weight", "type": "force", "body": "a", "point": "tip", "components": [0, -3, 0]})");
+  CHECK(turning.counter("derivative_blocks") == 4 * states);
+  // What is no parameter is not differentiated: the stiffness alone instead of it and the mass.
+  const Costs fixed =
+      costs("gradient", one(), {"--set", "bodies[0].mass=2", "--set", "parameters.m.allow_unused=true"});
+  CHECK(fixed.counter("differentiated_numbers") > 0);
+  CHECK(fixed.counter("differentiated_numbers") < without.counter("differentiated_numbers"));
 }
 
 TEST_CASE("bodies that something connects with an objective stay", "[costs]") {

@@ -29,6 +29,15 @@ struct FragileResidual : LeastSquaresProblem {
   }
 };
 
+struct OutlyingResidual : LeastSquaresProblem {
+  OutlyingResidual() : LeastSquaresProblem(1, 2) {}
+  void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& p) override {
+    p.z << x(0), outlier;
+    p.z_x << 1, 0;
+  }
+  double outlier = 0;
+};
+
 }  // namespace
 
 TEST_CASE("ceres finds Rosenbrock's minimum with one evaluation per point", "[ceres]") {
@@ -69,6 +78,16 @@ TEST_CASE("a failed evaluation makes ceres shorten the step", "[ceres]") {
   const LeastSquaresResult bad = solve_with_ceres(problem, Eigen::VectorXd::Constant(1, 5));
   CHECK(bad.status == SolverStatus::failed);
   CHECK(bad.message == "the start point cannot be evaluated: the loop cannot be closed");
+}
+
+TEST_CASE("residuals whose squares are no numbers are refused at the start, in words that speak of the data",
+          "[ceres]") {
+  OutlyingResidual problem;
+  problem.outlier = GENERATE(1e302, 1e200);  // the first is what Ceres takes for a residual not written
+  const LeastSquaresResult result = solve_with_ceres(problem, Eigen::VectorXd::Ones(1));
+  CHECK(result.status == SolverStatus::failed);
+  CHECK_THAT(result.message,
+             Catch::Contains("the largest residual is 1e+") && Catch::Contains("in the data, and at sigma"));
 }
 
 TEST_CASE("ceres stops on request and at the limit", "[ceres]") {

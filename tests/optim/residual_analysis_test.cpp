@@ -57,6 +57,9 @@ TEST_CASE("residuals are judged in words", "[residuals]") {
              Catch::Contains("correlated in time (lag 1: 0."));
   CHECK(analyse_residuals(VectorXd::Ones(5)).in_words() == "too few to say");
   CHECK(analyse_residuals(VectorXd()).samples == 0);
+  VectorXd beyond = VectorXd::Zero(30);
+  beyond(7) = 1e300;  // its square is no number
+  CHECK_NOTHROW(analyse_residuals(beyond));
   // A constant offset that autocorrelation, which takes the mean off, does not see.
   const VectorXd offset = autoregressive(300, 0, 2).array() + 10;
   CHECK(analyse_residuals(offset).runs_p == 0);

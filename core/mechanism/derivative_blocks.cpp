@@ -1,0 +1,19 @@
+#include "core/mechanism/derivative_blocks.hpp"
+
+#include <algorithm>
+
+namespace mbsopt {
+
+bool depends_on_state(const AppliedForce& force) {
+  if (!force.sensors.empty()) return true;
+  return force.is_torque ? !force.in_body_axes : force.in_body_axes || !force.s.isZero(0);
+}
+
+long derivative_blocks(const MechanismData& d) {
+  const std::size_t forces = d.tsda.size() + d.rsda.size() + d.bushings.size() + d.turning_frictions.size() +
+                             d.sliding_frictions.size() + d.user_forces.size();
+  return d.n + static_cast<long>(d.groups.size() + forces) +
+         static_cast<long>(std::count_if(d.applied.begin(), d.applied.end(), depends_on_state));
+}
+
+}  // namespace mbsopt

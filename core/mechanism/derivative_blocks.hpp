@@ -1,0 +1,18 @@
+// What the derivatives of the equations of motion at one state are made of: one block per
+//   body                 its inertia forces
+//   group of joint rows  Phi_q, (Phi_q v)_q, (Phi_q' lambda)_q between two bodies
+//   force                on the bodies between which it acts, where the state changes it
+// A force that is the same in every state has none. The numbers of the model that a parameter changes are counted
+// apart: MechanismData::slots().
+#pragma once
+
+#include "core/mechanism/mechanism_data.hpp"
+
+namespace mbsopt {
+
+// Whether the load (force in global axes, moment in body axes) changes with the state.
+bool depends_on_state(const AppliedForce& force);
+
+long derivative_blocks(const MechanismData& data);
+
+}  // namespace mbsopt

@@ -1,0 +1,97 @@
+// Running costs that the steps do not resolve, or that have no integral.
+#include <cmath>
+#include <numbers>
+
+#include "tests/app/run_command.hpp"
+#include "tests/extremes/problem_runs.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::extremes;
+using Catch::Matchers::Contains;
+
+namespace {
+
+Json judged(const std::string& running, const std::string& method, double step = 0) {
+  Json p = pendulum();
+  p["objectives"] = {{"judged", {{"running", running}}}};
+  p["simulation"]["integrator"] = {{"type", method}};
+  if (step > 0) p["simulation"]["integrator"]["step"] = step;
+  return p;
+}
+
+std::string warnings_of(const Json& p) {
+  const TemporaryFolder folder;
+  const CommandOutcome run =
+      run_command({"simulate", folder.write("p.json", p.dump()), "--out", folder.file("out"), "--quiet"});
+  INFO(run.err);
+  REQUIRE(run.exit_code == 0);
+  return run.err;
+}
+
+}  // namespace
+
+TEST_CASE("a running cost with a pole has no integral and ends the run in words, with the objective and the time",
+          "[extremes]") {
+  const auto [method, step] = GENERATE(table<std::string, double>({{"euler", 0.003},
+                                                                   {"rk2", 0.01},
+                                                                   {"bs3", 0},
+                                                                   {"rk4", 0.01},
+                                                                   {"dopri5", 0},
+                                                                   {"dopri853", 0},
+                                                                   {"sdirk4", 0},
+                                                                   {"radau5", 0},
+                                                                   {"gauss4", 0.01}}));
+  for (const char* g : {"1/(t - 0.50123)", "1/(t - 0.50123)^2", "tan(t + pi/2 - 0.50123)", "1/abs(t - 0.50123)"}) {
+    const Outcome run = values(judged(g, method, step));
+    INFO(method << ", " << g << ": " << run.message());
+    CHECK_FALSE(run.ok());
+    CHECK_THAT(run.message(), Contains("running cost of objective 'judged'") && Contains("near t = 0.50123 s") &&
+                                  Contains("its integral does not exist"));
+  }
+}
+
+TEST_CASE("a pole that the motion passes is one, too", "[extremes]") {
+  const Outcome run = values(judged("1/(theta + 0.5)", GENERATE(as<std::string>{}, "dopri5", "radau5")));
+  INFO(run.message());
+  REQUIRE_FALSE(run.ok());
+  CHECK_THAT(run.message(), Contains("'judged'") && Contains("its integral does not exist"));
+}
+
+TEST_CASE("CVODES, whose steps follow running costs, ends at a pole and names the objective", "[extremes]") {
+  const Outcome run = values(judged("1/(t - 0.50123)", GENERATE(as<std::string>{}, "cvodes_bdf", "cvodes_adams")));
+  INFO(run.message());
+  REQUIRE_FALSE(run.ok());
+  CHECK_THAT(run.message(), Contains("beyond t = 0.50123 s") && Contains("pole or jump") && Contains("'judged'"));
+}
+
+TEST_CASE("a running cost that grows without bounds but has an integral is no pole", "[extremes]") {
+  const auto [g, integral] = GENERATE(table<std::string, double>(
+      {{"1/sqrt(abs(t - 0.50123))", 2 * (std::sqrt(0.50123) + std::sqrt(0.49877))},
+       {"-log(abs(t - 0.50123))", 1 - 0.50123 * std::log(0.50123) - 0.49877 * std::log(0.49877)}}));
+  const Outcome run = values(judged(g, GENERATE(as<std::string>{}, "dopri5", "dopri853", "radau5")));
+  INFO(g << ": " << run.message());
+  REQUIRE(run.ok());
+  CHECK(run("judged") == Approx(integral).epsilon(0.2));
+}
+
+TEST_CASE("a running cost that the steps do not resolve is a warning with its name, the error and what to change",
+          "[extremes]") {
+  const std::string method = GENERATE(as<std::string>{}, "dopri5", "dopri853", "radau5", "sdirk4");
+  for (const char* g : {"sin(1000*t)^2", "1/((t - 0.50123)^2 + 1e-8)"}) {
+    INFO(method << ", " << g);
+    CHECK_THAT(warnings_of(judged(g, method)), Contains("do not resolve the running cost of objective 'judged'") &&
+                                                   Contains("estimated error of") && Contains("max_step"));
+  }
+}
+
+TEST_CASE("a resolved running cost is none, and its estimate bounds its error", "[extremes]") {
+  const std::string method = GENERATE(as<std::string>{}, "bs3", "dopri5", "dopri853", "sdirk2", "sdirk4", "radau5");
+  const Json p = judged("2 + sin(10*t)", method);
+  const Outcome run = values(p);
+  REQUIRE(run.ok());
+  const double error = std::abs(run("judged") - (2 + (1 - std::cos(10.0)) / 10));
+  INFO(method << ": error " << error << ", estimate " << run.statistics().quadrature_error);
+  CHECK(error < 2 * run.statistics().quadrature_error * 2 + 1e-13);
+  CHECK(run.statistics().quadrature_error < 1e-2);
+  CHECK_THAT(warnings_of(p), !Contains("do not resolve"));
+}
