@@ -342,6 +342,12 @@ void check_meaning(Checker& checker, const SimulationSettings& settings) {
     checker.issue(checker.path("end_time"), "is " + text_of(settings.end_time) + " s, it must be after start_time, " +
                                                 text_of(settings.start_time) + " s");
   const double span = settings.end_time - settings.start_time;
+  constexpr double kResolved = 1e-8;  // a step of a millionth of the span still has two digits
+  if (span > 0 && span < kResolved * std::max(std::abs(settings.start_time), std::abs(settings.end_time)))
+    checker.issue(checker.path("end_time"), "is " + text_of(span) + " s after start_time, " +
+                                                text_of(settings.start_time) +
+                                                " s: numbers of that size do not resolve steps of so short a time; "
+                                                "let time begin near 0");
   const IntegratorSettings& integrator = settings.integrator;
   if (integrator.step && span / *integrator.step > static_cast<double>(integrator.max_steps))
     checker.issue(child_path(checker.path("integrator"), "step"),

@@ -29,6 +29,19 @@ TEST_CASE("a fixed step too large for a swing ends the run in words, by every ki
   CHECK_THAT(run.message(), Contains("a smaller simulation.integrator.step") || Contains("se a smaller step"));
 }
 
+TEST_CASE("a run too short for the digits of its time is refused", "[extremes]") {
+  Json p = pendulum();
+  const double start = GENERATE(1e9, 1e15, -1e12);
+  p["simulation"]["start_time"] = start, p["simulation"]["end_time"] = start + 1;
+  const TemporaryFolder folder;
+  const CommandOutcome run = run_command({"simulate", folder.write("p.json", p.dump()), "--out", folder.file("out")});
+  INFO(run.err);
+  CHECK(run.exit_code == 2);
+  CHECK_THAT(run.err, Contains("simulation.end_time: is 1 s after start_time") && Contains("let time begin near 0"));
+  p["simulation"]["start_time"] = 1e6, p["simulation"]["end_time"] = 1e6 + 1;
+  CHECK(values(p).ok());
+}
+
 TEST_CASE("steps, tolerances and rows that no run gets through are refused with their place in the file",
           "[extremes]") {
   const auto [key, value, words] = GENERATE(table<std::string, double, std::string>(
