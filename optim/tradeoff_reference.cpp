@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "optim/parameter_values.hpp"
 
@@ -184,7 +185,7 @@ class Search {
     const GradientMethod method = cost.tlm <= cost.adjoint ? GradientMethod::tlm : GradientMethod::adjoint;
     RunLimit longer = limit();
     longer.seconds *= 4;
-    auto [of_a, of_b] = closest_gradients(gradients_of(a, method, longer), gradients_of(b, method, longer));
+    auto [of_a, of_b, apart] = closest_gradients(gradients_of(a, method, longer), gradients_of(b, method, longer));
     if (!of_a.ok || !of_b.ok) return;
     if (!a.method.step && !b.method.step) {
       shorten_steps({a.settings, b.settings}, method, longer, of_a, of_b);
@@ -209,7 +210,11 @@ class Search {
 
   // Of two methods the answer that agrees best with any of the other's, and what it is certified by: that, or, since
   // the best of many is chance, the next best of either method. Not ok where a method has none.
-  std::pair<Answer, Answer> closest_gradients(const std::vector<Answer>& of_a, const std::vector<Answer>& of_b) const {
+  struct Closest {
+    Answer answer, certificate;
+    double apart = std::numeric_limits<double>::infinity();  // of the closest two
+  };
+  Closest closest_gradients(const std::vector<Answer>& of_a, const std::vector<Answer>& of_b) const {
     const Answer *answer = nullptr, *closest = nullptr, *next = nullptr;
     double least = std::numeric_limits<double>::infinity();
     for (const Answer& a : of_a) {
@@ -221,7 +226,7 @@ class Search {
       }
     }
     if (!answer) return {};
-    least = std::numeric_limits<double>::infinity();
+    const double closest_apart = std::exchange(least, std::numeric_limits<double>::infinity());
     for (const std::vector<Answer>* answers : {&of_a, &of_b}) {
       for (const Answer& other : *answers) {
         if (!other.ok || &other == answer || &other == closest) continue;
@@ -229,7 +234,7 @@ class Search {
         if (here < least) next = &other, least = here;
       }
     }
-    return {*answer, next ? *next : *closest};
+    return {*answer, next ? *next : *closest, closest_apart};
   }
 
   // Step-size control looks at the motion. What only derivatives see, a kink of a law in a parameter say, takes shorter
@@ -267,8 +272,8 @@ class Search {
       if (!candidate) return;
       answers.push_back(gradients_of(*candidate, method, limit));
     }
-    auto [a, b] = closest_gradients(answers[0], answers[1]);
-    if (a.ok && gradients_apart(a, b) < apart) best_a = std::move(a), best_b = std::move(b);
+    Closest closest = closest_gradients(answers[0], answers[1]);
+    if (closest.apart < apart) best_a = std::move(closest.answer), best_b = std::move(closest.certificate);
   }
 
   // The largest over the objectives, in units of the parameters' sizes.
