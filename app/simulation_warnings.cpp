@@ -42,8 +42,10 @@ std::vector<std::string> simulation_warnings(const SimulationSettings& settings,
   if (statistics.relative_energy_drift > kEnergyLost && statistics.max_position_violation <= kApart) {
     warnings.push_back(fmt::format(
         "the energy changed by up to {:.2g} J, {:.2g} % of all there is, although nothing does work: this is not the "
-        "motion of the scene. Tighten rtol and atol, or take smaller steps{}",
+        "motion of the scene. {}{}",
         statistics.energy_drift, 100 * statistics.relative_energy_drift,
+        settings.integrator.step ? "Take a smaller simulation.integrator.step"
+                                 : "Tighten simulation.integrator.rtol and atol",
         is_cvodes(settings.integrator.type) ? "; near singular positions a Runge-Kutta method, which projects onto the "
                                               "constraints, is right where CVODES is not"
                                             : ""));
@@ -51,16 +53,16 @@ std::vector<std::string> simulation_warnings(const SimulationSettings& settings,
     warnings.push_back(fmt::format(
         "the accelerations of the constraints were met to {:.1e} only: steps came close to a singular position, after "
         "which the branch may be wrong (compare with another Runge-Kutta method, or other tolerances), or masses "
-        "differ "
-        "too much for simulation.formulation (a larger alpha or more iterations)",
+        "differ too much for simulation.formulation (a larger alpha or more iterations)",
         statistics.max_acceleration_residual));
   }
   if (statistics.quadrature_error > kUnresolved) {
     warnings.push_back(fmt::format(
         "the steps do not resolve the running cost of objective '{}': its integral has an estimated error of {:.2g} %, "
-        "most of it near t = {:.6g} s. Set simulation.integrator.max_step, tighten rtol, or take cvodes_bdf or "
-        "cvodes_adams, which control this error",
-        statistics.quadrature_error_of, 100 * statistics.quadrature_error, statistics.quadrature_error_time));
+        "most of it near t = {:.6g} s. {}, or take cvodes_bdf or cvodes_adams, which control this error",
+        statistics.quadrature_error_of, 100 * statistics.quadrature_error, statistics.quadrature_error_time,
+        settings.integrator.step ? "Take a smaller simulation.integrator.step"
+                                 : "Set simulation.integrator.max_step, tighten rtol"));
   }
   return warnings;
 }

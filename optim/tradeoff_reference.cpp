@@ -234,7 +234,7 @@ class Search {
         if (here < least) next = &other, least = here;
       }
     }
-    return {*answer, next ? *next : *closest, closest_apart};
+    return {*answer, next && least >= closest_apart ? *next : *closest, closest_apart};
   }
 
   // Step-size control looks at the motion. What only derivatives see, a kink of a law in a parameter say, takes shorter

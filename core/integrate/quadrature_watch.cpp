@@ -11,10 +11,11 @@ namespace {
 
 constexpr double kPoor = 1e-4;        // of the integral of |g| so far: an estimate above it asks for a look at the step
 constexpr double kNarrowest = 1e-12;  // of a step
-constexpr double kFalls = 0.03;       // |g| times width of an integrable g does by more, over half of all halvings
+constexpr double kFalls = 0.03;       // |g| times width does by more over half of all halvings, up to |t|^-0.7
 constexpr double kBounded = 1e-7;     // of a step: a |g| that has not grown threefold there does not
-constexpr int kPoints = 9;
-constexpr double kOffset = 0.471;  // not half: poles are at round times
+constexpr int kPoints = 9, kMostSearches = 200;
+constexpr double kOffset = 0.471;    // not half: poles are at round times
+constexpr double kRounding = 1e-12;  // of what is met exactly but for that, estimates say nothing
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
@@ -66,13 +67,12 @@ std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::sp
   const double error = size * std::pow(share, static_cast<double>(method_.order) / power);
   integral.error += error;
   if (error > integral.worst) integral.worst = error, integral.worst_t = step.t;
-  if (!(error > kPoor * integral.of_size)) return {};
+  if (!(error > kPoor * integral.of_size) || integral.searches++ > kMostSearches) return {};
   const double t = pole(step, *costs_[cost].running);
   if (std::isnan(t)) return {};
   return fmt::format(
-      "the running cost{} grows like 1/|t - {:.6g} s| or faster near t = {:.6g} s: its integral does not exist. Keep "
-      "its "
-      "denominators away from zero, or end the run before",
+      "the running cost{} grows about like 1/|t - {:.6g} s| or faster near t = {:.6g} s, so that its integral does not "
+      "exist: keep its denominators away from zero, or end the run before",
       costs_[cost].name.empty() ? "" : " of objective '" + costs_[cost].name + "'", t, t);
 }
 
@@ -93,7 +93,9 @@ double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
     const double here = s >= 0 && s <= 1 ? size(s) : -1;
     if (here > largest) at = s, largest = here;
   };
+  take(0), take(1);
   for (int i = 0; i < kPoints; ++i) take((i + kOffset) / kPoints);
+  if (largest == 0) return kNone;
   const double first = largest;
   const double narrowest = std::max(kNarrowest, 1e-15 * std::abs(step.t) / h);
   const double halfway = std::sqrt(narrowest);
@@ -112,7 +114,7 @@ double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
 void QuadratureWatch::add_to(SimulationStatistics& statistics) const {
   for (std::size_t o = 0; o < integrals_.size(); ++o) {
     const Integral& i = integrals_[o];
-    if (!(i.error > statistics.quadrature_error * i.of_size)) continue;
+    if (!(i.error > statistics.quadrature_error * i.of_size && i.error > kRounding)) continue;
     statistics.quadrature_error = i.error / i.of_size;
     statistics.quadrature_error_of = costs_[o].name;
     statistics.quadrature_error_time = i.worst_t;

@@ -40,6 +40,7 @@ class QuadratureWatch {
     double of_size = 0, error = 0;  // of |g|; of the estimates
     double worst = 0, worst_t = 0;  // the largest estimate, and when
     double last_g = 0;              // of the step before, for methods of one node
+    int searches = 0;               // for poles
   };
   double pole(const Step& step, const PointCost& cost);
 

@@ -59,6 +59,7 @@ RunGuard::RunGuard(const MechanismData& data)
 void RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& energy) {
   last_t_ = t;
   energy_initial_ = energy.kinetic + energy.potential;
+  energy_drift_ = 0;
   energy_largest_ = size_of(energy);
   bounds_ = {kFastest, kFastestTurn};
   for (int i = 1; i <= data_.n; ++i) bounds_ = bounds_.cwiseMax(kGrowth * speeds(y, i, data_.n));

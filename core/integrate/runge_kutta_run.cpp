@@ -1,5 +1,4 @@
 #include "core/integrate/runge_kutta_run.hpp"
-#include "core/mechanism/joint_graph.hpp"
 
 #include <fmt/format.h>
 
@@ -8,6 +7,7 @@
 #include "core/integrate/model_choice.hpp"
 #include "core/integrate/start_failure.hpp"
 #include "core/integrate/stiffness.hpp"
+#include "core/mechanism/joint_graph.hpp"
 
 namespace mbsopt {
 namespace {
@@ -133,10 +133,11 @@ double RungeKuttaRun::error_after_projection() {
 }
 
 // Whether a step of another size, of `wanted` as far as the singular position allows, is to be tried in its place.
-bool RungeKuttaRun::better_placed_by(double wanted) {
+bool RungeKuttaRun::better_placed_by(double wanted, double largest) {
   projector_.response(response_);
   if (passage_->well_placed(step_.t, step_.h, response_)) return false;
-  return std::abs(passage_->propose(step_.t, wanted) - step_.h) > 0.02 * step_.h;
+  const double proposed = std::min(passage_->propose(step_.t, wanted), std::max(largest, wanted));
+  return std::abs(proposed - step_.h) > 0.02 * step_.h;
 }
 
 RungeKuttaRun::Outcome RungeKuttaRun::attempt(double h, bool adaptive, bool exact, double& error) {
@@ -201,8 +202,7 @@ std::string RungeKuttaRun::failed(Outcome outcome, double h, bool adaptive) cons
       return fmt::format(
           "the step fell to {:.3g} s at t = {:.6g} s and its error is still too large. Look for a "
           "singular position, a drive that asks for more than the mechanism reaches, a spring of zero length or a law "
-          "that "
-          "is not smooth near this time; "
+          "that is not smooth near this time; "
           "looser tolerances or a fixed step may pass it",
           h, step_.t);
   }
@@ -314,7 +314,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
       break;
     }
     const double rate = fastest_tracked_rate(step_.y0);
-    double wanted = h;
+    double wanted = h, largest = INFINITY;
     if (options.frozen) {
       step_.t = options.frozen->times[frozen_index];
       h = options.frozen->sizes[frozen_index];
@@ -323,7 +323,10 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
         h = 2 / rate;  // an angle is followed over turns only when steps are below half a turn
       h = propose_step(step_.t, h, events.stop_after(step_.t), adaptive);
       wanted = h;
-      if (adaptive && passage_) h = std::min(passage_->propose(step_.t, h), events.stop_after(step_.t) - step_.t);
+      if (adaptive && passage_) {
+        largest = std::min(settings_.integrator.max_step.value_or(INFINITY), rate > 0 ? 2 / rate : INFINITY);
+        h = std::min({passage_->propose(step_.t, h), std::max(largest, h), events.stop_after(step_.t) - step_.t});
+      }
       if (!adaptive && rate * h > 3) {
         stop(
             SimulationStatus::step_too_large,
@@ -341,7 +344,8 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     if (outcome == Outcome::accepted) outcome = finish_step(wants_dense(step_.t1));
     if (outcome == Outcome::accepted && adaptive && passage_) {
       constexpr int kMostTries = 3;
-      if (placed_again < kMostTries && better_placed_by(wanted)) {
+      const bool again = better_placed_by(wanted, largest);  // passage_ is to know of this step in either case
+      if (again && placed_again < kMostTries) {
         ++placed_again;
         ++result.statistics.rejected;
         h = wanted;

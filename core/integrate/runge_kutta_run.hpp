@@ -39,7 +39,7 @@ class RungeKuttaRun {
   bool solve_stages(ImplicitStages::Goal goal);
   double error_of_step();
   double error_after_projection();
-  bool better_placed_by(double wanted);
+  bool better_placed_by(double wanted, double largest);
   void set_y_hat();
   Outcome attempt(double h, bool adaptive, bool exact, double& error);
   Outcome finish_step(bool dense);  // dense stages, projection, branches of the angles

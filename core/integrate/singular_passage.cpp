@@ -41,6 +41,7 @@ double SingularPassage::magnified(double theta) const {
 
 void SingularPassage::forget() {
   last_.known = false;
+  most_ = 0;
   ahead_ = kNone, behind_ = -kNone;
 }
 

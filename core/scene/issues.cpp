@@ -245,7 +245,8 @@ void check_meaning(Checker& checker, const Force& force) {
       checker.warning(checker.path("law"),
                       "replaces the coefficients of this force: " + joined(idle) + ", given beside it, will not act");
   };
-  const auto warn_of_feeding = [&](const Field& damping) {
+  const auto warn_of_feeding = [&](bool has_law, const Field& damping) {
+    if (has_law) return;
     const auto value = checker.facts().value(damping);
     if (value && *value < 0)
       checker.warning(checker.path("damping"), "is " + text_of(*value) +
@@ -255,7 +256,7 @@ void check_meaning(Checker& checker, const Force& force) {
   if (const auto* tsda = std::get_if<Tsda>(&force.kind)) {
     check_two_bodies(checker, tsda->body1, tsda->body2, "a tsda");
     check_law(tsda->law);
-    warn_of_feeding(tsda->damping);
+    warn_of_feeding(tsda->law.has_value(), tsda->damping);
     warn_of_law(tsda->law.has_value(), {{"stiffness", &tsda->stiffness},
                                         {"damping", &tsda->damping},
                                         {"free_length", &tsda->free_length},
@@ -263,7 +264,7 @@ void check_meaning(Checker& checker, const Force& force) {
   } else if (const auto* rsda = std::get_if<Rsda>(&force.kind)) {
     check_joint_has_angle(checker, rsda->joint);
     check_law(rsda->law);
-    warn_of_feeding(rsda->damping);
+    warn_of_feeding(rsda->law.has_value(), rsda->damping);
     warn_of_law(rsda->law.has_value(),
                 {{"stiffness", &rsda->stiffness}, {"damping", &rsda->damping}, {"free_angle", &rsda->free_angle}});
   } else if (const auto* applied = std::get_if<PointForce>(&force.kind)) {
