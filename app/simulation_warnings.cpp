@@ -36,7 +36,10 @@ std::vector<std::string> simulation_warnings(const SimulationSettings& settings,
                               "in the joints over the violation that is allowed; or leave the formulation out, the "
                               "default has no such error",
                               f.alpha)
-                : std::string("Tighten rtol and atol, or let simulation.formulation.projection be position_velocity")));
+                : std::string("Tighten rtol and atol, or ") +
+                      (is_cvodes(settings.integrator.type)
+                           ? "take a Runge-Kutta method, which projects onto the constraints"
+                           : "let simulation.formulation.projection be position_velocity")));
   }
   if (!finished) return warnings;
   if (statistics.relative_energy_drift > kEnergyLost && statistics.max_position_violation <= kApart) {

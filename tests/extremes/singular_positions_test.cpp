@@ -200,8 +200,9 @@ TEST_CASE("a run of CVODES past singular positions is no silent success", "[extr
   const CommandOutcome run = simulate({"type=" + method, "rtol=" + rtol, "atol=1e-10"});
   INFO(method << " at " << rtol << ": " << run.err);
   if (run.exit_code == 0) {
-    CHECK_THAT(run.err, Contains("warning: the energy changed by") && Contains("this is not the motion of the scene") &&
-                            Contains("near singular positions a Runge-Kutta method"));
+    CHECK_THAT(run.err, (Contains("warning: the energy changed by") &&
+                         Contains("near singular positions a Runge-Kutta method")) ||
+                            (Contains("warning: the joints came apart") && Contains("take a Runge-Kutta method")));
   } else {
     CHECK(run.exit_code == 1);
     CHECK_THAT(run.err, Contains("singular"));
