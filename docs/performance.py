@@ -247,6 +247,8 @@ Profile by `perf record -e cpu-clock` of right-hand sides in the spatial model, 
 solves with their products with J 28, J 14, Phiddot 9, frames with pddot 8, the rest 7. In a run with `dopri5` the right-hand sides are about three quarters; the
 rest is the projection, one to two right-hand sides per step, and the sums of the stages.
 
+* **Absolute times move by half** on this shared machine, with nothing else of ours running: of two runs of all of the above within ten minutes one read 0.45 to
+  0.71 us (spatial, 10 to 1000 bodies) and 49 ms (FB-1), the other up to 0.89 us and 68 ms. The tables are those of the first.
 * **Growth to 10 000 bodies is memory.** A body has some 4 kB of frames, J, S and constraints, which a right-hand side goes through several times. Those of
   100 bodies stay in the second-level cache (2 MB), those of 10 000 come from the third. Passes of the solver no longer grow (`formulations.md`: 3 instead of 21
   along 10 000 rods in space). Tried: large pages, no effect. The ratio has become larger where computing has become faster. Chains of more than 316 joints in
