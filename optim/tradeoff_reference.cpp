@@ -185,14 +185,15 @@ class Search {
     const GradientMethod method = cost.tlm <= cost.adjoint ? GradientMethod::tlm : GradientMethod::adjoint;
     RunLimit longer = limit();
     longer.seconds *= 4;
-    auto [of_a, of_b, apart] = closest_gradients(gradients_of(a, method, longer), gradients_of(b, method, longer));
+    auto [of_a, of_b, closest] = closest_gradients(gradients_of(a, method, longer), gradients_of(b, method, longer));
     if (!of_a.ok || !of_b.ok) return;
+    std::string by(to_string(method));
     if (!a.method.step && !b.method.step) {
       shorten_steps({a.settings, b.settings}, method, longer, of_a, of_b);
-      step_evenly(method, longer, of_a, of_b);
+      if (step_evenly(method, longer, of_a, of_b)) by += " on even steps of gauss6 and radau5";
     }
     a.answer.psi_rho = std::move(of_a.psi_rho), b.answer.psi_rho = std::move(of_b.psi_rho);
-    reference.gradients_by = to_string(method);
+    reference.gradients_by = by;
   }
 
   // Derivatives magnify the rounding of positions next to singular ones, by how close stages come to them, which is
@@ -261,19 +262,21 @@ class Search {
   }
 
   // Derivatives of steps that pass singular positions settle later than the motion, or not at all: by steps of one size
-  // where these agree better.
-  void step_evenly(GradientMethod method, const RunLimit& limit, Answer& best_a, Answer& best_b) const {
+  // where these agree better; whether they do.
+  bool step_evenly(GradientMethod method, const RunLimit& limit, Answer& best_a, Answer& best_b) const {
     constexpr double kSettled = 5e-10;
     const double apart = gradients_apart(best_a, best_b);
-    if (apart < kSettled || interrupted()) return;
+    if (apart < kSettled || interrupted()) return false;
     std::vector<std::vector<Answer>> answers;
     for (const Stepped& by : kStepped) {
       const std::optional<Candidate> candidate = stepped(by, std::numeric_limits<long>::max() / 2);
-      if (!candidate) return;
+      if (!candidate) return false;
       answers.push_back(gradients_of(*candidate, method, limit));
     }
     Closest closest = closest_gradients(answers[0], answers[1]);
-    if (closest.apart < apart) best_a = std::move(closest.answer), best_b = std::move(closest.certificate);
+    if (!(closest.apart < apart)) return false;
+    best_a = std::move(closest.answer), best_b = std::move(closest.certificate);
+    return true;
   }
 
   // The largest over the objectives, in units of the parameters' sizes.

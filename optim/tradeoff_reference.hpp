@@ -31,7 +31,7 @@ struct TradeoffReference {
   std::string message;                   // why there is none
   std::optional<TradeoffErrors> errors;  // against it
   ReferenceMethod first, second;         // the answer is that of the first
-  std::string gradients_by;              // tlm, adjoint; empty: none
+  std::string gradients_by;              // tlm, adjoint, and on which steps, if not these; empty: none
   double wall_seconds = 0;
   bool interrupted = false;
   bool ok() const { return errors.has_value(); }

@@ -8,6 +8,7 @@
 #include "core/integrate/start_failure.hpp"
 #include "core/integrate/stiffness.hpp"
 #include "core/mechanism/joint_graph.hpp"
+#include "core/mechanism/planar_model.hpp"
 
 namespace mbsopt {
 namespace {
@@ -36,7 +37,10 @@ RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSetting
   const bool constrained =
       settings.formulation.type == FormulationType::augmented_lagrangian && closes_loops(mechanism.data());
   if (constrained && !rk_.implicit() && projector_.positions()) {
-    passage_.emplace(rk_, mechanism.data().m);
+    const bool planar = model_of(mechanism, settings, method) == Model::planar;
+    const MechanismData& data = mechanism.data();
+    response_.setZero(planar ? static_cast<Eigen::Index>(data.planar->rows.size()) : data.m);
+    passage_.emplace(rk_, response_.size());
     no_parameters_ = block_without_parameters(mechanism_.data());
     for (LaneRows* x : {&error_, &projected_error_}) x->setZero(states, kLanes);
   }
