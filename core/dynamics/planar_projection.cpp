@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/dynamics/test_load.hpp"
+#include "core/dynamics/constraint_response.hpp"
 
 namespace mbsopt {
 namespace {
@@ -168,13 +168,7 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
 }
 
 void PlanarProjector::response(Eigen::VectorXd& out) {
-  for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = solver_.mass_times(i, test_load<3>(i));
-  g_.setZero();
-  solver_.solve(b_, g_, kOnePass, dx_, dnu_);
-  g_ = dnu_.cwiseQuotient(solver_.alpha()) * kRelativeAlpha;
-  for (Vec<3>& b : b_) b.setZero();
-  solver_.solve(b_, g_, kOnePass, dx_, dnu_);
-  out = dnu_.cwiseQuotient(solver_.alpha()) * kRelativeAlpha;
+  constraint_response(solver_, kRelativeAlpha, b_, g_, dx_, dnu_, out);
 }
 
 // The bodies and frames of a given state.

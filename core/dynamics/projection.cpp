@@ -5,7 +5,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/constraint/unit_norm.hpp"
-#include "core/dynamics/test_load.hpp"
+#include "core/dynamics/constraint_response.hpp"
 
 namespace mbsopt {
 namespace {
@@ -162,13 +162,7 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
 
 void Projector::response(Eigen::VectorXd& out) {
   if (planar_) return planar_->response(out);
-  for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = solver_.mass_times(i, test_load<6>(i));
-  g_.setZero();
-  solver_.solve(b_, g_, kOnePass, dx_, dnu_);
-  g_ = dnu_.cwiseQuotient(data_.row_alpha);
-  for (Vec<6>& b : b_) b.setZero();
-  solver_.solve(b_, g_, kOnePass, dx_, dnu_);
-  out = dnu_.cwiseQuotient(data_.row_alpha);
+  constraint_response(solver_, kRelativeAlpha, b_, g_, dx_, dnu_, out);
 }
 
 double Projector::position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y) {
