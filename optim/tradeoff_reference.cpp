@@ -64,13 +64,16 @@ class Search {
   RunLimit limit() const { return {options_.seconds_per_run, options_.interrupted, options_.clock}; }
 
   static constexpr double kAgreeing = 1e-7;
+  static constexpr double kSettledWell = 1e-10;  // gradients
+
+  static bool has_settled(const Candidate& c) {
+    constexpr double kSettled = 1e-9;
+    return c.change < kSettled;
+  }
 
   // Two that each have settled, on the same answer.
   bool agree(const std::vector<Candidate>& found) const {
-    constexpr double kSettled = 1e-9;
-    const auto settled =
-        std::count_if(found.begin(), found.end(), [](const Candidate& c) { return c.change < kSettled; });
-    if (settled < 2) return false;
+    if (std::count_if(found.begin(), found.end(), has_settled) < 2) return false;
     return least_apart(found) < kAgreeing;
   }
 
@@ -163,22 +166,25 @@ class Search {
     return largest;
   }
 
-  // Of one method with and without step-size control only where no two methods agree.
+  // Of one method with and without step-size control only where no two methods agree; of an answer that has not
+  // settled, which is close by chance, only where there are no two others.
   std::pair<std::size_t, std::size_t> closest(const std::vector<Candidate>& found) const {
     std::pair<std::size_t, std::size_t> pair{0, 1};
     double least = std::numeric_limits<double>::infinity();
-    bool methods_differ = false;
+    int best_rank = -1;
     for (std::size_t i = 0; i < found.size(); ++i) {
       for (std::size_t j = i + 1; j < found.size(); ++j) {
         const double here = apart(found[i].answer, found[j].answer);
         const bool differ = found[i].method.integrator != found[j].method.integrator && here < kAgreeing;
-        if (differ < methods_differ || (differ == methods_differ && here >= least)) continue;
-        least = here, pair = {i, j}, methods_differ = differ;
+        const int rank = 2 * differ + (has_settled(found[i]) && has_settled(found[j]));
+        if (rank < best_rank || (rank == best_rank && here >= least)) continue;
+        least = here, pair = {i, j}, best_rank = rank;
       }
     }
     return pair;
   }
 
+  // The exact one is a; of two that are apart the one whose gradients change less by the last tightening.
   void add_gradients(Candidate& a, Candidate& b, TradeoffReference& reference) const {
     if (!runs_.has_gradients() || !options_.gradients) return;
     const GradientCost cost = gradient_cost(runs_.scene().parameters.size(), runs_.objectives().size());
@@ -190,10 +196,25 @@ class Search {
     std::string by(to_string(method));
     if (!a.method.step && !b.method.step) {
       shorten_steps({a.settings, b.settings}, method, longer, of_a, of_b);
-      if (step_evenly(method, longer, of_a, of_b)) by += " on even steps of gauss6 and radau5";
+      if (step_evenly(method, longer, of_a, of_b)) {
+        by += " on even steps of gauss6 and radau5";
+      } else if (gradients_apart(of_a, of_b) > kSettledWell && settles_better(b, of_b, a, of_a, method, longer)) {
+        std::swap(a, b), std::swap(of_a, of_b);
+      }
     }
     a.answer.psi_rho = std::move(of_a.psi_rho), b.answer.psi_rho = std::move(of_b.psi_rho);
     reference.gradients_by = by;
+  }
+
+  // Whether the gradients of b changed less than those of a by the last tightening of their tolerances.
+  bool settles_better(const Candidate& b, const Answer& of_b, const Candidate& a, const Answer& of_a,
+                      GradientMethod method, const RunLimit& limit) const {
+    const auto change = [&](SimulationSettings s, const Answer& now) {
+      s.integrator.rtol *= 10, s.integrator.atol *= 10;
+      const Answer before = runs_.gradients(s, method, limit);
+      return before.ok ? gradients_apart(now, before) : std::numeric_limits<double>::infinity();
+    };
+    return change(b.settings, of_b) < change(a.settings, of_a);
   }
 
   // Derivatives magnify the rounding of positions next to singular ones, by how close stages come to them, which is

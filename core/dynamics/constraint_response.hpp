@@ -17,20 +17,20 @@ Vec<N> test_load(int i) {
 }
 
 // out: the forces for which the constraints accelerate as those for the load push, in units of row_alpha.
-// relative_alpha: of the solver's alpha. b, g, dx, dnu: scratch.
-template <class Rows>
-void constraint_response(BlockSaddleSolver<Rows>& solver, double relative_alpha, std::vector<Vec<Rows::kUnknowns>>& b,
-                         Eigen::VectorXd& g, std::vector<Vec<Rows::kUnknowns>>& dx, Eigen::VectorXd& dnu,
-                         Eigen::VectorXd& out) {
+// load(i): of body i; relative_alpha: of the solver's alpha; b, g, dx, dnu: scratch.
+template <class Rows, class Load>
+void constraint_response(BlockSaddleSolver<Rows>& solver, const Load& load, double relative_alpha,
+                         std::vector<Vec<Rows::kUnknowns>>& b, Eigen::VectorXd& g,
+                         std::vector<Vec<Rows::kUnknowns>>& dx, Eigen::VectorXd& dnu, Eigen::VectorXd& out) {
   constexpr Refinements kOnePass{};
   for (std::size_t k = 0; k < b.size(); ++k) {
     const int i = static_cast<int>(k) + 1;
-    b[k] = solver.mass_times(i, test_load<Rows::kUnknowns>(i));
+    b[k] = solver.mass_times(i, load(i));
   }
   g.setZero();
   solver.solve(b, g, kOnePass, dx, dnu);
   g = relative_alpha * dnu.cwiseQuotient(solver.alpha());
-  for (auto& load : b) load.setZero();
+  for (auto& zero : b) zero.setZero();
   solver.solve(b, g, kOnePass, dx, dnu);
   out = relative_alpha * dnu.cwiseQuotient(solver.alpha());
 }

@@ -168,7 +168,7 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
 }
 
 void PlanarProjector::response(Eigen::VectorXd& out) {
-  constraint_response(solver_, kRelativeAlpha, b_, g_, dx_, dnu_, out);
+  constraint_response(solver_, test_load<3>, kRelativeAlpha, b_, g_, dx_, dnu_, out);
 }
 
 // The bodies and frames of a given state.

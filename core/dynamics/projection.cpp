@@ -6,6 +6,7 @@
 #include "core/body/euler_parameters.hpp"
 #include "core/constraint/unit_norm.hpp"
 #include "core/dynamics/constraint_response.hpp"
+#include "core/dynamics/planar_bodies.hpp"
 
 namespace mbsopt {
 namespace {
@@ -162,7 +163,11 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
 
 void Projector::response(Eigen::VectorXd& out) {
   if (planar_) return planar_->response(out);
-  constraint_response(solver_, kRelativeAlpha, b_, g_, dx_, dnu_, out);
+  // In the plane where there is one, so that both models take the same steps.
+  const auto load = [&](int i) {
+    return data_.planar ? PlanarBodies(*data_.planar).in_space(at(i), test_load<3>(i)) : test_load<6>(i);
+  };
+  constraint_response(solver_, load, kRelativeAlpha, b_, g_, dx_, dnu_, out);
 }
 
 double Projector::position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y) {

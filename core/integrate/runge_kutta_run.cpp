@@ -139,7 +139,7 @@ double RungeKuttaRun::error_after_projection() {
 // Whether a step of another size, of `wanted` as far as the singular position allows, is to be tried in its place.
 bool RungeKuttaRun::better_placed_by(double wanted, double largest) {
   projector_.response(response_);
-  if (passage_->well_placed(step_.t, step_.h, response_)) return false;
+  if (passage_->well_placed(step_.t, step_.h, wanted, response_)) return false;
   const double proposed = std::min(passage_->propose(step_.t, wanted), std::max(largest, wanted));
   return std::abs(proposed - step_.h) > 0.02 * step_.h;
 }

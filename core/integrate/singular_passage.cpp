@@ -1,90 +1,158 @@
 #include "core/integrate/singular_passage.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
 namespace mbsopt {
 namespace {
 
-constexpr double kUncertain = 0.05;  // of theta, when it is chosen
-constexpr double kWorse = 30;        // than at the best theta, and a step is tried again
-constexpr double kStretch = 1.1;     // a step may grow so much to be placed well,
-constexpr double kLeast = 0.1;       // or shrink
-constexpr double kPole = 0.3;        // an inverse response below so much of the largest tells that a pole is near
-constexpr double kNeighbours = 3;    // steps from t*
+constexpr double kEnds = 0.15;        // least distance of t* from the ends of a step, of its size
+constexpr double kUncertain = 0.015;  // of theta, when a step is proposed
+constexpr double kWorse = 1.5;        // than the best step, and one is tried again
+constexpr double kStretch = 1.1;      // a step may grow so much to be placed well,
+constexpr double kShrink = 0.4;       // or shrink,
+constexpr double kLeast = 0.1;        // or where t* is too near for it
+constexpr double kPole = 0.3;         // an inverse response below so much of the largest tells that a pole is near
+constexpr double kCurved = 0.75;      // and below so much that it bends as d does
+constexpr int kPlanned = 3;           // steps before the one past t* that are fitted
+constexpr double kDense = 0.01;       // of a stage of dense output: what is observed, not the motion
+constexpr double kNeighbours = 3;     // steps from t*
+
+// d of t through three points; x: the root of the line through the last two.
+double root_of_parabola(const std::array<double, 3>& t, const std::array<double, 3>& d, double x) {
+  const double line = x, slope = (d[2] - d[1]) / (t[2] - t[1]);
+  const double bend = (slope - (d[1] - d[0]) / (t[1] - t[0])) / (t[2] - t[0]);
+  for (int k = 0; k < 5; ++k) x = t[2] - d[2] / (slope + bend * (x - t[1]));
+  const double most = 0.5 * std::abs(line - t[2]);
+  return std::clamp(x, line - most, line + most);
+}
 
 }  // namespace
 
 double SingularPassage::best_theta() {
-  if (best_theta_ > 0) return best_theta_;
-  for (double theta = 0.3; theta < 0.9; theta += 0.01) {
-    double now = 0;
-    for (const double off : {-1.0, -0.5, 0.0, 0.5, 1.0}) now = std::max(now, magnified(theta + off * kUncertain));
-    if (now < least_) least_ = now, best_theta_ = theta;
+  tabulate();
+  const auto by_rounding = [](const Passage& a, const Passage& b) { return a.magnified < b.magnified; };
+  return std::min_element(good_.begin(), good_.end(), by_rounding)->theta;
+}
+
+void SingularPassage::tabulate() {
+  if (!good_.empty()) return;
+  constexpr int kGrid = 100;
+  double most[kGrid + 1];
+  for (int i = 0; i <= kGrid; ++i) most[i] = uncertain(double(i) / kGrid);
+  for (int i = 1; i < kGrid; ++i) {
+    const bool far = i >= kEnds * kGrid && i <= (1 - kEnds) * kGrid;
+    if (far && most[i] < most[i - 1] && most[i] <= most[i + 1]) good_.push_back({double(i) / kGrid, most[i]});
   }
-  return best_theta_;
+}
+
+// Of steps of one size, not far from h, that reach t*, `left` away: those after which least is left. Continuous in both
+// but where another number of steps is better: rounding does not change much.
+SingularPassage::Choice SingularPassage::choose(double left, double h) const {
+  Choice best{h, kNone};
+  for (int before = 0; before <= kPlanned; ++before) {
+    for (const Passage& good : good_) {
+      const double wanted = left / (before + good.theta), size = std::min(wanted, kStretch * h);
+      if (size < kShrink * h) continue;
+      const double there = size == wanted ? good.magnified : uncertain(left / size - before);
+      const double rounding = rounding_of(there, size / h);
+      if (rounding < best.rounding) best = {size, rounding};
+    }
+  }
+  return best;
+}
+
+double SingularPassage::uncertain(double theta) const {
+  double most = 0;
+  for (const double off : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
+    const double here = theta + off * kUncertain;
+    most = std::max(most, here > 0 && here < 1 ? magnified(here) : kNone);
+  }
+  return most;
 }
 
 double SingularPassage::magnified(double theta) const {
   double k[Method::kMaxStages], most = 0;
   for (const double to : {theta, theta - 1}) {
-    for (int i = 0; i < rk_.stages; ++i) {
-      double u = 1 / std::abs(to);
+    for (int i = 0; i < rk_.dense_stages; ++i) {
+      double u = 1 / (to * to);
       for (int j = 0; j < i; ++j) u += rk_.a(i, j) * k[j];
       k[i] = 2 * u / (to - rk_.c[i]);
-      most = std::max(most, std::abs(k[i] / (to - rk_.c[i])));
+      most = std::max(most, (i < rk_.stages ? 1 : kDense) * std::abs(k[i] / (to - rk_.c[i])));
     }
   }
   return most;
 }
 
 void SingularPassage::forget() {
-  last_.known = false;
+  before_.known = last_.known = tried_.known = false;
   most_ = 0;
-  ahead_ = kNone, behind_ = -kNone;
+  ahead_ = {}, found_ = {};
+  behind_ = -kNone;
 }
 
-bool SingularPassage::well_placed(double t, double h, const Eigen::VectorXd& response) {
-  // The response grows as 1/d^3.
+// Line or parabola through d at the ends of the last steps and of the one looked at.
+SingularPassage::Estimate SingularPassage::estimate() const {
+  // The response grows as 1/d^3:  1/inverse^3 = 1/most^3 + 1/d^3
+  const double most = std::max(most_, now_.inverse);
+  if (std::min(last_.inverse, now_.inverse) > kPole * most) return {};
+  const auto distance = [&](const Place& p) {
+    const double d = p.inverse / std::cbrt(1.001 - std::pow(p.inverse / most, 3));
+    return std::copysign(d, last_.response.dot(p.response));
+  };
+  const double d0 = distance(last_), d1 = distance(now_);
+  if (d1 >= d0) return {};
+  const double step = now_.t - last_.t;
+  const bool apart = std::min(std::abs(tried_.t - now_.t), std::abs(tried_.t - last_.t)) > 0.1 * step;
+  const Place& third = tried_.known && apart ? tried_ : before_;
+  double t = last_.t + step * d0 / (d0 - d1);
+  if (third.known && third.inverse < kCurved * most) {
+    t = root_of_parabola({third.t, last_.t, now_.t}, {distance(third), d0, d1}, t);
+  }
+  return {t, std::min(std::abs(t - last_.t), std::abs(t - now_.t))};
+}
+
+bool SingularPassage::well_placed(double t, double h, double wanted, const Eigen::VectorXd& response) {
   now_.t = t + h, now_.response = response, now_.known = true;
   now_.inverse = 1 / std::cbrt(std::max(response.norm(), 1e-300));
-  found_ = kNone;
+  found_ = ahead_;
   if (!last_.known) return true;
-  const double most = std::max(most_, now_.inverse);
-  if (std::min(last_.inverse, now_.inverse) > kPole * most) return true;
-  // 1/inverse^3 = 1/most^3 + 1/d^3
-  const auto distance = [most](double inverse) { return inverse / std::cbrt(1.001 - std::pow(inverse / most, 3)); };
-  const double d0 = distance(last_.inverse), d1 = std::copysign(distance(now_.inverse), last_.response.dot(response));
-  if (d1 >= d0) return true;
-  const double theta = d0 / (d0 - d1), best = best_theta();
-  found_ = t + h * theta;
-  if (theta < 1 ? magnified(theta) < kWorse * least_ : theta > 1 + 0.5 * best) return true;
+  const Estimate now = estimate();
+  if (now.reach < found_.reach) found_ = now;
+  if (found_.t == kNone) return true;
+  tabulate();
+  const double left = found_.t - t;
+  const double rounding = left < h ? rounding_of(magnified(left / h), h / wanted) : choose(left - h, wanted).rounding;
+  if (!(rounding > kWorse * choose(left, wanted).rounding)) return true;
   ahead_ = found_;
+  std::swap(tried_, now_);
+  now_.known = false;
   return false;
 }
 
 void SingularPassage::accept() {
+  if (!now_.known) now_ = tried_;
   most_ = std::max(most_, now_.inverse);
-  ahead_ = kNone;
-  if (found_ > now_.t) {
-    ahead_ = found_;
-  } else {
-    behind_ = found_;
-  }
+  ahead_ = found_;
+  std::swap(before_, last_);
   std::swap(last_, now_);
+  if (found_.t > last_.t) return;
+  behind_ = found_.t;
+  ahead_ = {};
+  before_.known = tried_.known = false;
 }
 
 double SingularPassage::propose(double t, double h) const {
-  const double left = ahead_ - t;
-  if (!(left > 0) || left >= (1 + best_theta_) * h) return h;
-  // Past it in this step, or in the next one of the same size.
-  if (left > kStretch * best_theta_ * h) return left / (1 + best_theta_);
-  return std::max(left / best_theta_, kLeast * h);
+  const double left = ahead_.t - t;
+  if (!(left > 0) || left > (kPlanned + 1) * kStretch * h) return h;
+  const Choice best = choose(left, h);
+  return best.rounding < kNone ? best.h : std::max(left, kLeast * h);
 }
 
 bool SingularPassage::near(double t, double h) const {
-  return ahead_ - t < kNeighbours * h || t - behind_ < kNeighbours * h;
+  return ahead_.t - t < kNeighbours * h || t - behind_ < kNeighbours * h;
 }
 
 }  // namespace mbsopt

@@ -11,11 +11,13 @@
 //
 //   SingularPassage passage(method, constraints);
 //   h = passage.propose(t, h);                               // attempt it; then, with the response at its end:
-//   if (passage.well_placed(t, h, response)) passage.accept();  // otherwise again, with what propose() says now
+//   if (passage.well_placed(t, h, wanted, response)) passage.accept();  // otherwise again, with what propose() says
+//   now
 #pragma once
 
 #include <Eigen/Core>
 #include <limits>
+#include <vector>
 
 #include "core/integrate/tableaus.hpp"
 
@@ -25,11 +27,12 @@ class SingularPassage {
  public:
   // rk: explicit; outlives this. constraints: entries of a response.
   SingularPassage(const Method& rk, Eigen::Index constraints) : rk_(rk) {
-    for (Place* p : {&last_, &now_}) p->response.setZero(constraints);
+    for (Place* p : {&before_, &last_, &now_, &tried_}) p->response.setZero(constraints);
   }
 
   void forget();  // what went before
-  bool well_placed(double t, double h, const Eigen::VectorXd& response);
+  // wanted: the size that accuracy asks for.
+  bool well_placed(double t, double h, double wanted, const Eigen::VectorXd& response);
   void accept();
   // A step from t of size h at most, or a little more, with regard to the next singular position.
   double propose(double t, double h) const;
@@ -49,13 +52,31 @@ class SingularPassage {
     Eigen::VectorXd response;
     bool known = false;
   };
+  struct Estimate {
+    double t = kNone;      // t*
+    double reach = kNone;  // from the nearest place that it is made of: the smaller, the better
+  };
+  Estimate estimate() const;
+  // A theta next to which least is magnified, and what is at most.
+  struct Passage {
+    double theta, magnified;
+  };
+  struct Choice {
+    double h, rounding;
+  };
+  double uncertain(double theta) const;  // what is magnified at most, next to theta
+  Choice choose(double left, double h) const;
+  void tabulate();
+  // What a step leaves, of a size relative to that of its neighbours: accelerations next to t* are off by 1/d^3.
+  static double rounding_of(double magnified, double size) { return magnified / (size * size * size); }
 
   const Method& rk_;
-  double best_theta_ = 0, least_ = kNone;   // found when first needed
-  Place last_, now_;                        // where the last accepted step and the one looked at end
-  double most_ = 0;                         // the largest inverse so far
-  double found_ = kNone;                    // t* by these two
-  double ahead_ = kNone, behind_ = -kNone;  // the next t* and the one before
+  std::vector<Passage> good_;          // found when first needed
+  Place before_, last_, now_, tried_;  // where the last two accepted steps, the one looked at, and one that is
+                                       // tried again end
+  double most_ = 0;                    // the largest inverse so far
+  Estimate found_, ahead_;             // the next t*: by all of them, and before this step
+  double behind_ = -kNone;             // the one before
 };
 
 }  // namespace mbsopt

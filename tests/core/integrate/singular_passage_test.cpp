@@ -21,10 +21,10 @@ double theta_of_passage(SingularPassage& passage, double t_star, double h) {
   double t = 0;
   for (int k = 0; k < 1000; ++k) {
     double now = passage.propose(t, h);
-    for (int tries = 0; tries < 3 && !passage.well_placed(t, now, response(t_star, t + now)); ++tries) {
+    for (int tries = 0; tries < 3 && !passage.well_placed(t, now, h, response(t_star, t + now)); ++tries) {
       now = passage.propose(t, h);
     }
-    passage.well_placed(t, now, response(t_star, t + now));
+    passage.well_placed(t, now, h, response(t_star, t + now));
     passage.accept();
     if (t + now > t_star) return (t_star - t) / now;
     t += now;
@@ -51,7 +51,7 @@ TEST_CASE("no step is changed where the constraints stay well", "[singular]") {
     const double t = 0.1 * k, angle = std::sin(t);
     CHECK(passage.propose(t, 0.1) == 0.1);
     CHECK(!passage.near(t, 0.1));
-    CHECK(passage.well_placed(t, 0.1, Eigen::Vector2d(2 + angle, -1 + 3 * angle)));
+    CHECK(passage.well_placed(t, 0.1, 0.1, Eigen::Vector2d(2 + angle, -1 + 3 * angle)));
     passage.accept();
   }
 }
