@@ -48,12 +48,7 @@ void parts(benchmark::State& state, const Linkage& linkage) {
   std::vector<Vec<6>> b(n, Vec<6>::Zero()), x(n);
   for (std::size_t i = 0; i < n; ++i) b[i].head<3>() = data.bodies[i + 1].mass * data.gravity;
   const auto assemble = [&] {
-    S.set_zero();
-    for (int i = 1; i <= data.n; ++i) {
-      const BodyData& body = data.bodies[static_cast<std::size_t>(i)];
-      S.diagonal(i - 1).diagonal().head<3>().setConstant(body.mass);
-      S.diagonal(i - 1).bottomRightCorner<3, 3>() = body.J;
-    }
+    rows.set_mass(S);
     rows.add_weighted_square(alpha, S);
   };
   for (auto _ : state) {

@@ -102,8 +102,12 @@ BlockCholesky<N>::BlockCholesky(int bodies, std::span<const std::pair<int, int>>
 
 template <int N>
 void BlockCholesky<N>::set_zero() {
-  for (std::vector<Block>* blocks : {&diagonal_, &lower_})
-    std::fill_n(blocks->empty() ? nullptr : (*blocks)[0].data(), N * N * blocks->size(), 0.0);
+  std::fill_n(diagonal_.empty() ? nullptr : diagonal_[0].data(), N * N * diagonal_.size(), 0.0);
+  set_off_diagonals_to_zero();
+}
+template <int N>
+void BlockCholesky<N>::set_off_diagonals_to_zero() {
+  std::fill_n(lower_.empty() ? nullptr : lower_[0].data(), N * N * lower_.size(), 0.0);
 }
 
 // L_ik = A_ik W_k' inv(D_k); A_ij -= L_ik D_k L_jk'

@@ -28,6 +28,7 @@ class BlockCholesky {
   BlockCholesky(int bodies, std::span<const std::pair<int, int>> edges);
 
   void set_zero();
+  void set_off_diagonals_to_zero();
   Block& diagonal(int body) { return diagonal_[index(elimination_.position[index(body)])]; }
   // Adds X to the block (first, second) of edge `handle` and its transpose to (second, first).
   void add_off_diagonal(std::size_t handle, const Block& X) {

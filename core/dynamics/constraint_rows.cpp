@@ -64,37 +64,77 @@ ConstraintRows::ConstraintRows(const MechanismData& data) : data_(&data) {
   }
 }
 
-void ConstraintRows::evaluate(const std::vector<Frame>& frames) {
-  for (const Constraint& c : data_->constraints) {
-    const Frame &f1 = frames[static_cast<std::size_t>(c.body1)], &f2 = frames[static_cast<std::size_t>(c.body2)];
+template <bool Accelerations>
+const Constraint* ConstraintRows::evaluate(const Constraint* c, int end_block, const std::vector<Frame>& frames,
+                                           Eigen::VectorXd* phi_ddot) {
+  const Constraint* const last = data_->constraints.data() + data_->constraints.size();
+  for (; c != last && c->block < end_block; ++c) {
+    const Frame &f1 = frames[static_cast<std::size_t>(c->body1)], &f2 = frames[static_cast<std::size_t>(c->body2)];
     std::visit(
         [&](const auto& p) {
           constexpr int m = std::decay_t<decltype(p)>::kRows;
+          if constexpr (Accelerations) {
+            Vec<m> value;
+            p.phi_ddot(f1, f2, value);
+            phi_ddot->segment<m>(c->row) += c->factor * value;
+          }
           Mat<m, 6> A, B;
           p.jacobian(f1, f2, A, B);
           // In the halves in which they are written: a load across them would wait for both.
           const auto copy = [&](const Mat<m, 6>& from, Rows& J) {
-            J.middleRows<m>(c.block).template leftCols<3>() = c.factor * from.template leftCols<3>();
-            J.middleRows<m>(c.block).template rightCols<3>() = c.factor * from.template rightCols<3>();
+            J.middleRows<m>(c->block).template leftCols<3>() = c->factor * from.template leftCols<3>();
+            J.middleRows<m>(c->block).template rightCols<3>() = c->factor * from.template rightCols<3>();
           };
           copy(A, J1), copy(B, J2);
         },
-        c.primitive);
+        c->primitive);
   }
+  return c;
 }
 
-void ConstraintRows::add_mass(BlockCholesky<6>& S) const {
-  for (int i = 1; i <= data_->n; ++i) {
-    const BodyData& b = data_->bodies[static_cast<std::size_t>(i)];
-    Mat<6, 6>& D = S.diagonal(i - 1);
-    D.diagonal().head<3>().array() += b.mass;
-    D.bottomRightCorner<3, 3>() += b.J;
+void ConstraintRows::evaluate(const std::vector<Frame>& frames) {
+  evaluate<false>(data_->constraints.data(), data_->blocks, frames, nullptr);
+}
+
+// A few groups at a time: their J is read again while it is near, but not so soon that it is still being stored.
+void ConstraintRows::assemble(const std::vector<Frame>& frames, const Eigen::VectorXd& alpha, BlockCholesky<6>& S,
+                              Eigen::VectorXd* phi_ddot) {
+  constexpr std::size_t kAtATime = 4;
+  if (phi_ddot) phi_ddot->setZero();
+  set_mass(S);
+  const Constraint* c = data_->constraints.data();
+  const std::size_t count = data_->groups.size();
+  for (std::size_t first = 0; first < count; first += kAtATime) {
+    const std::size_t end = std::min(first + kAtATime, count);
+    const int end_block = end < count ? data_->groups[end].block : data_->blocks;
+    c = phi_ddot ? evaluate<true>(c, end_block, frames, phi_ddot) : evaluate<false>(c, end_block, frames, nullptr);
+    add_squares(first, end, alpha, S);
+  }
+  if (!shared_.empty()) add_shared_square(alpha, S);
+}
+
+void ConstraintRows::set_mass(BlockCholesky<6>& S) const {
+  S.set_off_diagonals_to_zero();
+  for (int i = 0; i < data_->n; ++i) {
+    const RowsInSpace::Body& b = bodies_[static_cast<std::size_t>(i)];
+    double* const D = S.diagonal(i).data();
+    std::fill_n(D, 36, 0.0);
+    for (int k = 0; k < 3; ++k) {
+      D[7 * k] = b.mass;
+      for (int j = 0; j < 3; ++j) D[21 + 6 * k + j] = b.J[3 * k + j];
+    }
   }
 }
 
 void ConstraintRows::add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S) {
+  add_squares(0, data_->groups.size(), alpha, S);
+  if (!shared_.empty()) add_shared_square(alpha, S);
+}
+
+void ConstraintRows::add_squares(std::size_t first, std::size_t end, const Eigen::VectorXd& alpha,
+                                 BlockCholesky<6>& S) {
   const BlockKernels& kernels = block_kernels();
-  for (std::size_t k = 0; k < data_->groups.size(); ++k) {
+  for (std::size_t k = first; k < end; ++k) {
     const RowGroup& g = data_->groups[k];
     if (g.shared) continue;
     const double* const a = J1.row(g.block).data();
@@ -108,7 +148,6 @@ void ConstraintRows::add_weighted_square(const Eigen::VectorXd& alpha, BlockChol
       kernels.add_weighted_squares(g.rows, alpha.data() + g.row, columns_.data() + g.block, a, b, aa, bb, ab);
     }
   }
-  if (!shared_.empty()) add_shared_square(alpha, S);
 }
 
 void ConstraintRows::add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S) {

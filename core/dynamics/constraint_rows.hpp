@@ -73,7 +73,11 @@ class ConstraintRows {
   SaddleSizes correct(const SaddleIterate& at, bool first, const std::vector<Lanes<6>>& correction) const {
     return block_kernels().correct_lanes_in_space(view(), at, first, correction[0].data());
   }
-  // M x for body i (1-based), and S += M.
+  // J and S = M + J' diag(alpha) J at the frames' positions, in one go; and, where asked for, Phiddot of the frames
+  // without the laws.
+  void assemble(const std::vector<Frame>& frames, const Eigen::VectorXd& alpha, BlockCholesky<6>& S,
+                Eigen::VectorXd* phi_ddot = nullptr);
+  // M x for body i (1-based), and S = M.
   template <class X>
   X mass_times(int body, const X& x) const {
     const BodyData& b = data_->bodies[static_cast<std::size_t>(body)];
@@ -84,7 +88,7 @@ class ConstraintRows {
     for (int i = 0; i < 3; ++i) to[3 + i] = b.J(i, 0) * from[3] + b.J(i, 1) * from[4] + b.J(i, 2) * from[5];
     return out;
   }
-  void add_mass(BlockCholesky<6>& S) const;
+  void set_mass(BlockCholesky<6>& S) const;
   // S += J' diag(alpha) J
   void add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S);
 
@@ -103,6 +107,11 @@ class ConstraintRows {
   static const double* row(const Rows& J, int block) { return J.data() + 6 * block; }
 
   static std::size_t at(int body) { return static_cast<std::size_t>(body - 1); }
+  // Constraints from c to the one whose blocks begin at end_block, which is returned.
+  template <bool Accelerations>
+  const Constraint* evaluate(const Constraint* c, int end_block, const std::vector<Frame>& frames,
+                             Eigen::VectorXd* phi_ddot);
+  void add_squares(std::size_t first, std::size_t end, const Eigen::VectorXd& alpha, BlockCholesky<6>& S);  // of groups
   void add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S);
 
   // A row with several constraints: its distinct moving bodies, and the off-diagonal blocks of their pairs.

@@ -30,15 +30,15 @@ double moderate_alpha(const MechanismData& data, double penalty) {
 // Along a chain of L joints the least eigenvalue of J inv(M) J' falls as 1/L^2, and with it what a pass gains. From ten
 // times alpha on rounding takes a third pass, which chains of hundreds of joints in space need anyway; chains in the
 // plane do not (docs/formulations.md).
-double alpha_along_chains(const MechanismData& data, Model model) {
+double alpha_along_chains(const MechanismData& data) {
   constexpr double kLong = 316;
   const double L = joints_to_farthest_body(data);
-  if (model == Model::planar || L < kLong) return std::clamp(L * L / 10, 1.0, 10.0);
+  if (data.planar || L < kLong) return std::clamp(L * L / 10, 1.0, 10.0);
   return std::clamp(L * L / 1000, 10.0, 1000.0);
 }
 
-FormulationSettings of_mechanism(const MechanismData& data, FormulationSettings settings, Model model) {
-  if (settings.type == FormulationType::augmented_lagrangian) settings.alpha *= alpha_along_chains(data, model);
+FormulationSettings of_mechanism(const MechanismData& data, FormulationSettings settings) {
+  if (settings.type == FormulationType::augmented_lagrangian) settings.alpha *= alpha_along_chains(data);
   return settings;
 }
 
@@ -59,7 +59,7 @@ double compliance_of(const FormulationSettings& settings) {
 Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settings, Model model)
     : mechanism_(mechanism),
       data_(mechanism_.data()),
-      settings_(of_mechanism(data_, settings, model)),
+      settings_(of_mechanism(data_, settings)),
       laws_(data_),
       forces_(data_),
       solver_(data_, alpha_of_factor(data_, settings_), compliance_of(settings)) {
@@ -109,7 +109,8 @@ SaddleSolver::Settings Dynamics::solver_settings(bool derivative) const {
 
 double Dynamics::compliance() const { return compliance_of(settings_); }
 
-void Dynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
+void Dynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, bool at_no_acceleration) {
+  const Vec<6> none = Vec<6>::Zero();
   t_ = t;
   y_ = y;
   angles_ = angles;
@@ -119,6 +120,7 @@ void Dynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::Vector
     const std::size_t k = static_cast<std::size_t>(i);
     set_position(y.segment<7>(7 * (i - 1)), bodies_[k], frames_[k]);
     set_velocity(y.segment<7>(7 * (data_.n + i - 1)), bodies_[k], frames_[k]);
+    if (at_no_acceleration) set_acceleration(none, bodies_[k], frames_[k]);
   }
 }
 
@@ -163,17 +165,16 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
     note_residual(planar_->residual_ratio(), planar_->residual_size(), [&] { return planar_->usual_acceleration(); });
     return finite;
   }
-  set_state(t, y, angles);
+  set_state(t, y, angles, true);
   set_loads();
-  const Vec<6> none = Vec<6>::Zero();
-  for (std::size_t i = 1; i < frames_.size(); ++i) set_acceleration(none, bodies_[i], frames_[i]);
-  evaluate_phi_ddot(data_, frames_, laws_, gamma_);
+  const bool positive = solver_.factor(frames_, &gamma_);
+  laws_.subtract_f_tt(gamma_);
   if (settings_.omega != 0) {
     evaluate_phi(data_, frames_, laws_, angles_, phi_);
     evaluate_phi_dot(data_, frames_, laws_, phi_dot_);
     gamma_ += 2 * settings_.xi * settings_.omega * phi_dot_ + settings_.omega * settings_.omega * phi_;
   }
-  if (!solver_.factor(frames_)) return false;
+  if (!positive) return false;
   g_ = -gamma_;
   solver_.solve(loads_, g_, solver_settings(false), z_, lambda_);
   note_residual(solver_.residual_ratio(), solver_.residual_size(), [&] { return usual_acceleration(); });

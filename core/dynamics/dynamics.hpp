@@ -107,7 +107,7 @@ class Dynamics {
   double worst_residual() const { return worst_residual_; }
 
  private:
-  void set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
+  void set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, bool at_no_acceleration = false);
   void set_motion(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                   const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
   // What the state's and the parameters' directions do to b = f - M z - J'lambda (rhs_lanes_) and c = -(J z + gamma)

@@ -100,11 +100,17 @@ void PlanarRows::correct(const SaddleIterate& it, bool first, const std::vector<
   }
 }
 
-void PlanarRows::add_mass(BlockCholesky<3>& S) const {
-  for (std::size_t i = 1; i < model_->bodies.size(); ++i) {
-    const PlanarBody& b = model_->bodies[i];
-    Mat<3, 3>& D = S.diagonal(static_cast<int>(i) - 1);
-    D(0, 0) += b.mass, D(1, 1) += b.mass, D(2, 2) += b.inertia;
+void PlanarRows::assemble(const Frames& frames, const Eigen::VectorXd& alpha, BlockCholesky<3>& S, Eigen::VectorXd*) {
+  evaluate(frames);
+  set_mass(S);
+  add_weighted_square(alpha, S);
+}
+
+void PlanarRows::set_mass(BlockCholesky<3>& S) const {
+  S.set_off_diagonals_to_zero();
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const RowsInPlane::Body& b = bodies_[i];
+    S.diagonal(static_cast<int>(i)) << b.mass, 0, 0, 0, b.mass, 0, 0, 0, b.inertia;
   }
 }
 

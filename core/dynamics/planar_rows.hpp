@@ -63,7 +63,9 @@ class PlanarRows {
   SaddleSizes correct(const SaddleIterate& at, bool first, const std::vector<Lanes<3>>& correction) const {
     return block_kernels().correct_lanes_in_plane(view(), at, first, correction[0].data());
   }
-  // M x for body i (1-based), and S += M.
+  // J and S = M + J' diag(alpha) J; Phiddot is PlanarConstraints'.
+  void assemble(const Frames& frames, const Eigen::VectorXd& alpha, BlockCholesky<3>& S, Eigen::VectorXd* phi_ddot);
+  // M x for body i (1-based), and S = M.
   template <class X>
   X mass_times(int body, const X& x) const {
     const PlanarBody& b = model_->bodies[static_cast<std::size_t>(body)];
@@ -73,7 +75,7 @@ class PlanarRows {
     to[0] = b.mass * from[0], to[1] = b.mass * from[1], to[2] = b.inertia * from[2];
     return out;
   }
-  void add_mass(BlockCholesky<3>& S) const;
+  void set_mass(BlockCholesky<3>& S) const;
   // S += J' diag(alpha) J
   void add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky<3>& S) const;
 

@@ -47,11 +47,8 @@ BlockSaddleSolver<Rows>::BlockSaddleSolver(const MechanismData& data, const Eige
 }
 
 template <class Rows>
-bool BlockSaddleSolver<Rows>::factor(const Frames& frames) {
-  rows_.evaluate(frames);
-  S_.set_zero();
-  rows_.add_mass(S_);
-  rows_.add_weighted_square(alpha_, S_);
+bool BlockSaddleSolver<Rows>::factor(const Frames& frames, Eigen::VectorXd* phi_ddot) {
+  rows_.assemble(frames, alpha_, S_, phi_ddot);
   ++factorisations_;
   return S_.factor();
 }

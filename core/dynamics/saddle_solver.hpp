@@ -47,8 +47,9 @@ class BlockSaddleSolver {
   // alpha: that of S, per row.
   BlockSaddleSolver(const MechanismData& data, const Eigen::VectorXd& alpha, double c = 0);
 
-  // S from J at the frames given; false where it is not positive definite.
-  bool factor(const Frames& frames);
+  // S from J at the frames given; false where it is not positive definite. phi_ddot: the frames' Phiddot, laws left
+  // out.
+  bool factor(const Frames& frames, Eigen::VectorXd* phi_ddot = nullptr);
   // J alone.
   void place(const Frames& frames) { rows_.evaluate(frames); }
   const Rows& rows() const { return rows_; }
