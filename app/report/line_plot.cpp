@@ -115,7 +115,7 @@ void draw_series(const LinePlot& plot, const Frame& frame, std::size_t index, st
     pen_down = true;
   }
   const char* mark = series.mark == Mark::points ? "points" : series.mark == Mark::dashed ? "line dashed" : "line";
-  svg += fmt::format("<path class=\"{} c{}\" d=\"{}\"/>\n", mark, index % kColours, path);
+  svg += fmt::format("<path class=\"{} c{}\" d=\"{}\"/>\n", mark, series.part_of.value_or(index) % kColours, path);
 }
 
 // Whether all of an axis can be written as 0.02, 5, 1000.
@@ -234,6 +234,7 @@ std::string to_svg(const LinePlot& plot) {
   if (plot.series.size() < 2) return svg;
   svg += "<div class=\"legend\">";
   for (std::size_t i = 0; i < plot.series.size(); ++i) {
+    if (plot.series[i].part_of) continue;
     svg += fmt::format("<span>{}{}</span>", legend_key(plot.series[i], i), html_escaped(plot.series[i].name));
   }
   return svg + "</div>\n";

@@ -6,6 +6,8 @@
 //   page.add(plot);
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +19,7 @@ struct PlotSeries {
   std::string name;
   std::vector<double> x, y;  // values that are not finite are left out
   Mark mark = Mark::line;
+  std::optional<std::size_t> part_of = {};  // that series: in its colour, and not in the legend
 };
 
 struct LinePlot {
