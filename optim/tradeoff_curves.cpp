@@ -5,6 +5,7 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <utility>
 
 namespace mbsopt {
 
@@ -23,7 +24,21 @@ void bound_errors(std::vector<TradeoffRow>& rows) {
   }
 }
 
-bool has_digits(const Quantity& quantity, double error) {
+namespace {
+
+// Of rows from loose to tight those that cost less than every tighter one, in the same order.
+template <typename Cost>
+std::vector<std::size_t> not_dominated(const std::vector<std::size_t>& some, const Cost& cost_of) {
+  std::vector<std::size_t> kept;
+  for (auto i = some.rbegin(); i != some.rend(); ++i)
+    if (kept.empty() || cost_of(*i) < cost_of(kept.back())) kept.push_back(*i);
+  std::reverse(kept.begin(), kept.end());
+  return kept;
+}
+
+}  // namespace
+
+bool better_than_zero(const Quantity& quantity, double error) {
   return std::isfinite(error) && (!quantity.relative || error < 1);
 }
 
@@ -32,7 +47,8 @@ std::vector<WorkPrecisionCurve> work_precision_curves(const std::vector<Tradeoff
   std::vector<WorkPrecisionCurve> curves;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const TradeoffRow& row = rows[i];
-    if (stands_alone(row.setting) || !has_digits(quantities[quantity], row.bounds(static_cast<Eigen::Index>(quantity))))
+    if (stands_alone(row.setting) ||
+        !better_than_zero(quantities[quantity], row.bounds(static_cast<Eigen::Index>(quantity))))
       continue;
     auto curve = std::find_if(curves.begin(), curves.end(),
                               [&](const WorkPrecisionCurve& c) { return c.name == row.setting.curve; });
@@ -40,17 +56,15 @@ std::vector<WorkPrecisionCurve> work_precision_curves(const std::vector<Tradeoff
     curve->line.push_back(i);
   }
   for (WorkPrecisionCurve& curve : curves) {
-    std::vector<std::size_t> line;
-    long least = std::numeric_limits<long>::max();  // right-hand sides, of the tighter ones
-    for (auto i = curve.line.rbegin(); i != curve.line.rend(); ++i) {
-      const long work = rows[*i].statistics.rhs_evaluations;
-      (work < least ? line : curve.beside).push_back(*i);
-      least = std::min(least, work);
-    }
-    curve.line.assign(line.rbegin(), line.rend());
-    std::reverse(curve.beside.begin(), curve.beside.end());
+    const std::vector<std::size_t> all = std::exchange(
+        curve.line, not_dominated(curve.line, [&](std::size_t i) { return rows[i].statistics.rhs_evaluations; }));
+    std::set_difference(all.begin(), all.end(), curve.line.begin(), curve.line.end(), std::back_inserter(curve.beside));
   }
   return curves;
+}
+
+std::vector<std::size_t> slower_and_slower(const std::vector<TradeoffRow>& rows, const std::vector<std::size_t>& some) {
+  return not_dominated(some, [&](std::size_t i) { return rows[i].wall_seconds; });
 }
 
 }  // namespace mbsopt

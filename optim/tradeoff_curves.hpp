@@ -21,10 +21,10 @@ namespace mbsopt {
 // where the row is not ok or has no such error; such rows raise no bound.
 void bound_errors(std::vector<TradeoffRow>& rows);
 
-// Whether so large an error leaves a digit right: below 1 where it is relative.
-bool has_digits(const Quantity& quantity, double error);
+// Whether an answer with this error is nearer than zero, for the motion than the start: below 1 where it is relative.
+bool better_than_zero(const Quantity& quantity, double error);
 
-// Rows, by index, from loose to tight; only those whose bound leaves a digit right.
+// Rows, by index, from loose to tight; only those whose bound is better than zero.
 struct WorkPrecisionCurve {
   std::string name;
   std::vector<std::size_t> line;    // right-hand sides grow, bounds fall or stay
@@ -33,5 +33,9 @@ struct WorkPrecisionCurve {
 // Of one quantity; none of settings that stand alone.
 std::vector<WorkPrecisionCurve> work_precision_curves(const std::vector<TradeoffRow>& rows,
                                                       const std::vector<Quantity>& quantities, std::size_t quantity);
+
+// Of rows from loose to tight those that no tighter one was as fast as: what a plot over time connects. Unlike a line's
+// right-hand sides, times are a matter of the machine and of chance.
+std::vector<std::size_t> slower_and_slower(const std::vector<TradeoffRow>& rows, const std::vector<std::size_t>& some);
 
 }  // namespace mbsopt

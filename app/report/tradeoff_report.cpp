@@ -56,19 +56,22 @@ LinePlot work_precision(const Tradeoff& tradeoff, std::size_t quantity, Group gr
     if (group_of(tradeoff.rows[curve.line.front()].setting) != group) continue;
     PlotSeries off_line{"", {}, {}, Mark::points, plot.series.size()};
     PlotSeries& line = plot.series.emplace_back(PlotSeries{curve.name, {}, {}, Mark::line});
-    for (const std::size_t i : curve.line) {
-      const TradeoffRow& row = tradeoff.rows[i];
-      add(line, row, row.bounds);
-      if (row.errors(column) < row.bounds(column)) add(off_line, row, row.errors);
+    const std::vector<std::size_t> connected = slower_and_slower(tradeoff.rows, curve.line);
+    for (const std::size_t i : connected) add(line, tradeoff.rows[i], tradeoff.rows[i].bounds);
+    for (const std::vector<std::size_t>* some : {&curve.line, &curve.beside}) {
+      for (const std::size_t i : *some) {
+        const TradeoffRow& row = tradeoff.rows[i];
+        const bool on_line = std::binary_search(connected.begin(), connected.end(), i);
+        if (!on_line || row.errors(column) < row.bounds(column)) add(off_line, row, row.errors);
+      }
     }
-    for (const std::size_t i : curve.beside) add(off_line, tradeoff.rows[i], tradeoff.rows[i].errors);
     if (!off_line.x.empty()) points.push_back(std::move(off_line));
   }
   if (plot.series.empty()) return plot;
   plot.series.insert(plot.series.end(), points.begin(), points.end());
   PlotSeries front{"Pareto front", {}, {}, Mark::points};
   for (const TradeoffRow& row : tradeoff.rows) {
-    if (group_of(row.setting) == group && row.pareto[quantity] && has_digits(q, row.bounds(column)))
+    if (group_of(row.setting) == group && row.pareto[quantity] && better_than_zero(q, row.bounds(column)))
       add(front, row, row.bounds);
   }
   if (!front.x.empty()) plot.series.push_back(std::move(front));
@@ -79,7 +82,8 @@ constexpr const char* kHowToRead =
     "Lines lead from loose to tight settings through bounds: the bound of a setting is the largest error of it and of "
     "all tighter settings of its curve, since an error that passes through zero is small by chance. Points in a "
     "curve's colour beside its line: errors that are below their bounds, and settings for which a tighter one needed "
-    "no more right-hand sides. Settings whose bound is 1 or more have no digit right and are left out.";
+    "no more right-hand sides or no more time. A relative bound of 1 or more, as the answer zero would have, is left "
+    "out.";
 
 void add_plots(HtmlPage& page, const Tradeoff& tradeoff) {
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();

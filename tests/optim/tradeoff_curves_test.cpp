@@ -67,7 +67,7 @@ TEST_CASE("settings that stand alone have their own errors as bounds and are no 
   CHECK(curves[0].name == "a");
 }
 
-TEST_CASE("a work-precision line leaves out what a tighter setting dominates and what has no digit right",
+TEST_CASE("a work-precision line leaves out what a tighter setting dominates and what is no better than zero",
           "[tradeoff]") {
   // The third setting is at the edge of stability: its steps are rejected more often than those of the fourth.
   std::vector<TradeoffRow> rows{row_of("a", 5, {0.3}),    row_of("a", 10, {2}),    row_of("a", 50, {1e-2}),
@@ -78,6 +78,10 @@ TEST_CASE("a work-precision line leaves out what a tighter setting dominates and
   REQUIRE(relative.size() == 1);  // of `b` nothing is left
   CHECK(relative[0].line == std::vector<std::size_t>{3, 5, 6});
   CHECK(relative[0].beside == std::vector<std::size_t>{2, 4});
+  // Of a line a plot over time connects what no tighter setting was as fast as; the line itself is no matter of time.
+  rows[3].wall_seconds = 0.2, rows[5].wall_seconds = 0.1, rows[6].wall_seconds = 0.3;
+  CHECK(slower_and_slower(rows, relative[0].line) == std::vector<std::size_t>{5, 6});
+  CHECK(work_precision_curves(rows, quantities(true), 0)[0].line == relative[0].line);
   // How large an absolute error may be nobody knows.
   const std::vector<WorkPrecisionCurve> absolute = work_precision_curves(rows, quantities(false), 0);
   REQUIRE(absolute.size() == 2);
