@@ -13,7 +13,7 @@
 
 namespace mbsopt {
 
-enum class Mark { line, dashed, points };
+enum class Mark { line, dashed, points, rings };
 
 struct PlotSeries {
   std::string name;

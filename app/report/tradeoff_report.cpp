@@ -58,6 +58,7 @@ LinePlot work_precision(const Tradeoff& tradeoff, std::size_t quantity, Group gr
     PlotSeries& line = plot.series.emplace_back(PlotSeries{curve.name, {}, {}, Mark::line});
     const std::vector<std::size_t> connected = slower_and_slower(tradeoff.rows, curve.line);
     for (const std::size_t i : connected) add(line, tradeoff.rows[i], tradeoff.rows[i].bounds);
+    if (connected.size() == 1) add(off_line, tradeoff.rows[connected.front()], tradeoff.rows[connected.front()].bounds);
     for (const std::vector<std::size_t>* some : {&curve.line, &curve.beside}) {
       for (const std::size_t i : *some) {
         const TradeoffRow& row = tradeoff.rows[i];
@@ -69,7 +70,7 @@ LinePlot work_precision(const Tradeoff& tradeoff, std::size_t quantity, Group gr
   }
   if (plot.series.empty()) return plot;
   plot.series.insert(plot.series.end(), points.begin(), points.end());
-  PlotSeries front{"Pareto front", {}, {}, Mark::points};
+  PlotSeries front{"Pareto front", {}, {}, Mark::rings};
   for (const TradeoffRow& row : tradeoff.rows) {
     if (group_of(row.setting) == group && row.pareto[quantity] && better_than_zero(q, row.bounds(column)))
       add(front, row, row.bounds);
