@@ -88,6 +88,7 @@ Row row_of(const TradeoffRow& r, const std::vector<Quantity>& quantities) {
   row.real("position_violation", ok ? s.max_position_violation : none);
   row.real("velocity_violation", ok ? s.max_velocity_violation : none);
   add_errors(row, "error ", quantities, r.errors);
+  add_errors(row, "bound ", quantities, r.bounds);
   for (std::size_t q = 0; q < quantities.size(); ++q) {
     const bool has_sign = quantities[q].kind == QuantityKind::objective || quantities[q].kind == QuantityKind::gradient;
     if (has_sign) row.real("deviation " + quantities[q].name, r.deviations(static_cast<Eigen::Index>(q)));

@@ -20,6 +20,13 @@ Json row_json(const Tradeoff& tradeoff, std::size_t index) {
   return json;
 }
 
+// With the bounds, by which it was chosen.
+Json recommended_json(const Tradeoff& tradeoff, std::size_t index) {
+  Json json = row_json(tradeoff, index);
+  json["bounds"] = errors_json(tradeoff.reference.errors->quantities(), tradeoff.rows[index].bounds);
+  return json;
+}
+
 std::string names_of(const std::vector<Quantity>& quantities, const std::vector<std::size_t>& indices) {
   std::string names;
   for (const std::size_t q : indices) names += (names.empty() ? "" : " and ") + quantities[q].name;
@@ -156,7 +163,7 @@ void add_recommendations(Run& run, const Tradeoff& tradeoff) {
       const Recommendation r = recommend(tradeoff, {q}, accuracy);
       const std::string words = recommendation_text(tradeoff, r);
       Json json{{"quantity", quantities[q].name}, {"accuracy", accuracy}, {"in_words", words}};
-      if (r.row) json.update(row_json(tradeoff, *r.row));
+      if (r.row) json.update(recommended_json(tradeoff, *r.row));
       run.result["recommendations"].push_back(json);
       run.context.out << words << '\n';
     }
@@ -183,7 +190,7 @@ void add_applied(Run& run, const Tradeoff& tradeoff, const Recommendation& r) {
   run.context.out << "\napplied " << words << '\n';
   run.result["applied"] = {{"accuracy", r.accuracy}, {"in_words", words}};
   if (r.row) {
-    run.result["applied"].update(row_json(tradeoff, *r.row));
+    run.result["applied"].update(recommended_json(tradeoff, *r.row));
   } else {
     run.failed("no recommended.json: " + words);
   }

@@ -2,7 +2,7 @@
 """Keeps the measured figures of `mbsopt tradeoff` in data/tradeoffs/ and writes them into docs/tradeoffs.md.
 
     docs/tradeoffs.py keep RUNS     from the output folders RUNS/{gallery,sweep,alpha}/NAME to data/tradeoffs/; what is not there stays
-    docs/tradeoffs.py rises OUT     of one output folder: where an error rises along a curve, and why
+    docs/tradeoffs.py rises OUT     of one output folder: whether curves are monotone, where an error rises along one, and why
     docs/tradeoffs.py write         from data/tradeoffs/ to docs/tradeoffs.md (between its two markers) and docs/tradeoffs/*.svg
 
 ./dev tradeoffs does both after measuring. Needs nothing but Python 3.
@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 DATA, PAGE, PLOTS = ROOT / "data/tradeoffs", ROOT / "docs/tradeoffs.md", ROOT / "docs/tradeoffs"
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 KEPT = ("curve", "method", "integrator", "rtol", "step", "status", "wall_seconds", "repetitions", "steps",
-        "rhs_evaluations", "factorisations", "pareto")
+        "rhs_evaluations", "factorisations")
 EXACT = ("curve", "rtol", "step", "steps", "rhs_evaluations", "factorisations")  # of these: as they are
 WANTED = {"objective": 1e-5, "gradient": 1e-4}  # of the gallery at default settings
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7a5195", "#666666")
@@ -103,6 +103,11 @@ def fit_row(row, fit):
     return row
 
 
+def absolute_in(reference):
+    """The quantities whose errors are not relative."""
+    return [q for q, v in reference["quantities"].items() if not v["relative"]]
+
+
 def keep(runs):
     DATA.mkdir(parents=True, exist_ok=True)
     about, gallery = [], []
@@ -134,20 +139,22 @@ def keep(runs):
                 "first": method_in_words(reference["first"]),
                 "second": method_in_words(reference["second"]),
                 "apart": json.dumps({q: float(f"{v['apart']:.2g}") for q, v in reference["quantities"].items()}),
+                "absolute": json.dumps(absolute_in(reference)),
                 "advice": json.dumps([r["in_words"] for r in result.get("recommendations", [])]),
             })
     again = {a["file"] for a in about}
     kept = [r for r in rows_of(DATA / "runs.csv") if r["file"] not in again] if (DATA / "runs.csv").exists() else []
+    kept = [dict({name: r.get(name, "[]") for name in about[0]}) for r in kept] if about else kept
     write_rows(DATA / "runs.csv", sorted(kept + about, key=lambda a: (a["kind"] != "sweep", a["file"])))
 
 
 # ---- plots
 
 
-def log_plot(path, title, x_label, y_label, series, front=()):
-    """Lines on two logarithmic axes; series: name -> [(x, y)]; front: points to mark."""
-    width, height, left, right, top, bottom = 760, 400, 70, 190, 34, 48
-    points = [p for line in series.values() for p in line]
+def log_plot(path, title, x_label, y_label, series, beside={}, front=()):
+    """Lines on two logarithmic axes; series: name -> [(x, y)]; beside: name -> points off that line; front: points to mark."""
+    width, height, left, right, top, bottom = 800, 400, 70, 230, 34, 48
+    points = [p for line in (*series.values(), *beside.values()) for p in line]
     if not points:
         return False
 
@@ -180,49 +187,94 @@ def log_plot(path, title, x_label, y_label, series, front=()):
         path_text = "L".join(f"{px(x):.1f} {py(y):.1f}" for x, y in line)
         svg.append(f'<path d="M{path_text}" fill="none" stroke="{colour}" stroke-width="1.6"{dash}/>')
         svg += [f'<circle cx="{px(x):.1f}" cy="{py(y):.1f}" r="2.2" fill="{colour}"/>' for x, y in line]
+        svg += [f'<circle cx="{px(x):.1f}" cy="{py(y):.1f}" r="1.8" fill="#fff" stroke="{colour}"/>' for x, y in beside.get(name, ())]
         y = top + 10 + 18 * i
         svg.append(f'<path d="M{width - right + 14} {y}h24" stroke="{colour}" stroke-width="1.6"{dash}/>'
                    f'<text x="{width - right + 44}" y="{y + 4}" fill="#1b1f24">{name}</text>')
-    if front:
-        y = top + 10 + 18 * len(series)
-        svg.append(f'<circle cx="{width - right + 26}" cy="{y}" r="5.5" fill="none" stroke="#1b1f24"/>'
-                   f'<text x="{width - right + 44}" y="{y + 4}" fill="#1b1f24">Pareto front</text>')
+    keys = [("error beside its line", 'r="1.8" fill="#fff" stroke="#5d6670"')] if any(beside.values()) else []
+    keys += [("Pareto front", 'r="5.5" fill="none" stroke="#1b1f24"')] if front else []
+    for i, (name, circle) in enumerate(keys, len(series)):
+        y = top + 10 + 18 * i
+        svg.append(f'<circle cx="{width - right + 26}" cy="{y}" {circle}/><text x="{width - right + 44}" y="{y + 4}" fill="#1b1f24">{name}</text>')
     path.write_text("\n".join(svg) + "\n</svg>\n")
     return True
 
 
-def work_precision(rows, quantity, of_gradient):
-    column = "error " + quantity
-    series, front = {}, []
-    for r in rows:
-        error, seconds = number(r[column]), number(r["wall_seconds"])
-        if r["status"] != "ok" or not error > 0 or (r["method"] != "simulate") != of_gradient:
-            continue
-        if r["curve"] in ("as in the file", "defaults") or (not of_gradient and r["curve"] != r["integrator"]):
-            continue
-        series.setdefault(r["curve"], []).append((seconds, error))
-        if quantity in r["pareto"].split("; "):
-            front.append((seconds, error))
-    return series, front
+# ---- curves: optim/tradeoff_curves says the same of a sweep
+
+
+def stands_alone(row):
+    return row["curve"] in ("as in the file", "defaults")
+
+
+def has_error(row, quantity):
+    return row["status"] == "ok" and math.isfinite(number(row["error " + quantity]))
+
+
+def bounds_of(rows, quantity):
+    """Per row the largest error of it and of all tighter settings of its curve; nan where it has none."""
+    largest, bounds = {}, [math.nan] * len(rows)
+    for i in reversed(range(len(rows))):
+        if has_error(rows[i], quantity):
+            curve = rows[i]["curve"]
+            largest[curve] = bounds[i] = max(largest.get(curve, 0.0), number(rows[i]["error " + quantity]))
+    return bounds
 
 
 class Point:
     """A setting of a curve: what it costs (right-hand sides are no matter of the machine) and how wrong a quantity is."""
 
-    def __init__(self, row, quantity):
+    def __init__(self, row, quantity, bound):
         self.row, self.setting = row, f"rtol {number(row['rtol']):.0e}" if row["rtol"] else f"step {number(row['step']):.3g} s"
-        self.work, self.error = int(row["rhs_evaluations"]), number(row["error " + quantity])
+        self.work, self.error, self.bound = int(row["rhs_evaluations"]), number(row["error " + quantity]), bound
+        self.seconds = number(row["wall_seconds"])
         self.deviation = number(row.get("deviation " + quantity, ""))  # the error with its sign, where it has one
 
 
 def curves_of(rows, quantity):
     """Curve -> points from loose to tight; penalty forms keep a model error and are left out."""
     curves = {}
-    for r in rows:
-        if r["status"] != "ok" or math.isnan(number(r["error " + quantity])) or r["curve"] in ("as in the file", "defaults") or r["curve"].startswith("penalty"):
-            continue
-        curves.setdefault(r["curve"], []).append(Point(r, quantity))
+    for r, bound in zip(rows, bounds_of(rows, quantity)):
+        if has_error(r, quantity) and not stands_alone(r) and not r["curve"].startswith("penalty"):
+            curves.setdefault(r["curve"], []).append(Point(r, quantity, bound))
     return curves
+
+
+def better_than_zero(points, relative):
+    """A relative error of 1 is that of the answer zero, or of the mechanism that stays where it is."""
+    return [p for p in points if p.bound < 1 or not relative]
+
+
+def split(points, cost=lambda p: p.work):
+    """The points of a line, and pairs of those that a tighter one dominates, which costs no more, and that one."""
+    line, dominated = [], []
+    for p in reversed(points):
+        if line and cost(p) >= cost(line[-1]):
+            dominated.append((p, line[-1]))
+        else:
+            line.append(p)
+    return line[::-1], dominated[::-1]
+
+
+def work_precision(rows, quantity, relative):
+    """Lines through bounds over time, the errors beside them, and the points that nothing measured beats in both."""
+    lines, beside = {}, {}
+    for curve, points in curves_of(rows, quantity).items():
+        row = points[0].row
+        if row["method"] == "simulate" and curve != row["integrator"]:
+            continue  # a formulation
+        kept = better_than_zero(points, relative)
+        line = split(split(kept)[0], cost=lambda p: p.seconds)[0]  # which time is a matter of the machine, and of chance
+        if line:
+            lines[curve] = [(p.seconds, p.bound) for p in line if p.bound > 0]
+            beside[curve] = [(p.seconds, p.error) for p in kept if p.error > 0 and (p not in line or p.error < p.bound)]
+    drawn, front, least = {p for line in lines.values() for p in line}, [], math.inf
+    measured = sorted((number(r["wall_seconds"]), b) for r, b in zip(rows, bounds_of(rows, quantity)) if not math.isnan(b))
+    for seconds, bound in measured:
+        if bound < least:
+            least = bound
+            front += [(seconds, bound)] if (seconds, bound) in drawn else []
+    return lines, beside, front
 
 
 NO_DIGIT = 0.1   # errors above it are not measured by any order of a method
@@ -277,34 +329,54 @@ def why_it_rises(curves, curve, quantity, i):
     return "a multistep method's error follows the tolerance loosely" if "cvodes" in here.row["integrator"] else "not explained by these figures"
 
 
-def rises(rows, apart):
-    """Of how many steps from a setting to the next, tighter one the error rises: their number, the curves', the rises."""
-    pairs, found, names = 0, [], set()
+def rises(curves, quantity, floor, relative):
+    """Steps from a setting to the next, tighter one that begin with an error that can be told: how many; where it rises, and why."""
+    steps, found = 0, []
+    for curve, points in curves[quantity].items():
+        for i, (here, after) in enumerate(zip(points, points[1:])):
+            if here.error < floor or not better_than_zero([here], relative):
+                continue
+            steps += 1
+            if after.error > max(here.error, floor):
+                found.append((curve, quantity, here, after, why_it_rises(curves, curve, quantity, i)))
+    return steps, found
+
+
+def counted(part, whole):
+    return f"all {whole}" if part == whole else f"{part} of {whole}"
+
+
+def monotony(rows, apart, absolute):
+    """In words: of the bounds, of the work, and every error that rises by name."""
     curves = {quantity: curves_of(rows, quantity) for quantity in apart}
+    settings, points, close, steps, falls, grows, told, found = 0, 0, 0, 0, 0, 0, 0, []
+    dominated = {}
     for quantity, certain in apart.items():
-        floor = max(3 * certain, 1e-13)
-        for curve, points in curves[quantity].items():
-            names.add(curve)
-            for i in range(len(points) - 1):
-                here, after = points[i], points[i + 1]
-                if here.error < floor:
-                    continue
-                pairs += 1
-                if after.error > max(here.error, floor):
-                    found.append((curve, quantity, here, after, why_it_rises(curves, curve, quantity, i)))
-    return pairs, names, found
-
-
-def monotony(rows, apart):
-    """In words, and every exception by name."""
-    pairs, curves, found = rises(rows, apart)
-    text = (f"{len(curves)} curves of {len(apart)} quantities: from one setting to the next, tighter one the error falls in "
-            f"{pairs - len(found)} of {pairs} cases")
+        relative = quantity not in absolute
+        for curve, every in curves[quantity].items():
+            kept = better_than_zero(every, relative)
+            settings, points = settings + len(every), points + len(kept)
+            close += sum(p.bound <= 3 * p.error for p in kept)
+            for here, after in zip(kept, kept[1:]):
+                steps, falls, grows = steps + 1, falls + (after.bound <= here.bound), grows + (after.work > here.work)
+            for p, cheaper in split(kept)[1]:
+                dominated.setdefault((curve, cheaper.setting, cheaper.work), {})[p.setting] = p.work
+        more = rises(curves, quantity, max(3 * certain, 1e-13), relative)
+        told, found = told + more[0], found + more[1]
+    names = {curve for of in curves.values() for curve in of}
+    lines = [f"{len(names)} curves of {len(apart)} quantities, {steps} steps from a setting to the next, tighter one: the bound falls or stays in {counted(falls, steps)},",
+             f"right-hand sides grow in {counted(grows, steps)}. The bound is at most three times the error in {counted(close, points)} points."]
+    if dominated:
+        lines.append("Beside their lines, since a tighter setting needed no more right-hand sides: " + "; ".join(
+            f"`{curve}` at {', '.join(of)} ({', '.join(map(str, of.values()))}; {work} at {setting})" for (curve, setting, work), of in dominated.items()) + ".")
+    if settings > points:
+        lines.append(f"Points on no line, since their bounds are 1 or more: {settings - points}.")
+    lines.append(f"The error itself falls or stays in {counted(told - len(found), told)} steps that begin where it can be told" + ("." if not found else "; it rises"))
     if not found:
-        return [text + ".", ""]
+        return lines + [""]
     cells = [[f"`{curve}`", quantity, f"{here.setting} to {after.setting.split()[1]}", f"{here.error:.1e} to {after.error:.1e}",
               f"{here.work} to {after.work}", why] for curve, quantity, here, after, why in found]
-    return [text + ". It rises", ""] + table(["curve", "of", "from", "error", "right-hand sides", "because"], cells)
+    return lines + [""] + table(["curve", "of", "from", "error", "right-hand sides", "because"], cells)
 
 
 # ---- the page
@@ -349,9 +421,10 @@ def sweep_section(run):
     rows, problem = rows_of(DATA / run["file"]), run["problem"]
     stem = run["file"].removesuffix(".csv").removeprefix("sweep_")
     apart, advice = json.loads(run["apart"]), json.loads(run["advice"])
+    absolute = json.loads(run.get("absolute") or "[]")
     lines = [f"### `{problem}`", "", f"    {run['command']}", "",
              f"Reference: {run['first']}, certified by {run['second']}; apart by " +
-             ", ".join(f"{v:.0e} ({q})" for q, v in apart.items()) + ".", ""] + monotony(rows, apart)
+             ", ".join(f"{v:.0e} ({q})" for q, v in apart.items()) + ".", ""] + monotony(rows, apart, absolute)
     objective = next((q for q in apart if q not in ("motion", "sensors") and not q.startswith("gradient of ")), "motion")
     gradient = "gradient of " + objective
     for quantity in (objective, gradient):
@@ -363,9 +436,10 @@ def sweep_section(run):
         if cells:
             lines += table([f"error of {quantity}", "fastest setting"], cells)
     for quantity, of_gradient in ((objective, False), (gradient, True)):
-        series, front = work_precision(rows, quantity, of_gradient)
+        relative = quantity not in absolute
+        lines_of, beside, front = work_precision(rows, quantity, relative) if quantity in apart else ({}, {}, [])
         file = PLOTS / f"{stem}_{'gradient' if of_gradient else 'objective'}.svg"
-        if log_plot(file, f"{problem}: {quantity}", "time [s]", "relative error", series, front):
+        if log_plot(file, f"{problem}: {quantity}", "time [s]", "relative error" if relative else "absolute error", lines_of, beside, front):
             lines += [f"![error of {quantity} over time](tradeoffs/{file.name})", ""]
     return lines
 
@@ -417,7 +491,7 @@ if __name__ == "__main__":
     elif len(sys.argv) == 3 and sys.argv[1] == "rises":
         result = json.loads((Path(sys.argv[2]) / "result.json").read_text())
         apart = {q: v["apart"] for q, v in result["reference"]["quantities"].items()}
-        print("\n".join(monotony(rows_of(Path(sys.argv[2]) / "tradeoff.csv"), apart)))
+        print("\n".join(monotony(rows_of(Path(sys.argv[2]) / "tradeoff.csv"), apart, absolute_in(result["reference"]))))
     elif sys.argv[1:] == ["write"]:
         write()
     else:

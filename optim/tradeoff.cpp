@@ -13,11 +13,15 @@
 #include "core/scene/default_integrator.hpp"
 #include "optim/median.hpp"
 #include "optim/pareto.hpp"
+#include "optim/tradeoff_curves.hpp"
 
 namespace mbsopt {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// Curves of one setting, or of two: the motion's and the gradient's.
+constexpr const char *kOwnSettings = "as in the file", *kDefaults = "defaults";
 
 // Settings from loose to tight, and how far along they are measured.
 struct Curve {
@@ -85,6 +89,7 @@ class Sweep {
   Tradeoff finish() {
     result_.interrupted = interrupted() || result_.reference.interrupted;
     result_.wall_seconds = stopwatch_.seconds();
+    bound_errors(result_.rows);
     if (result_.ok()) mark_fronts();
     return std::move(result_);
   }
@@ -100,15 +105,15 @@ class Sweep {
       return measure({curve, settings, method}, limit);
     };
     const bool is_default = same(own(), defaults);
-    result_.own = add("as in the file", own(), {});
-    result_.defaults = is_default ? result_.own : add("defaults", defaults, {});
+    result_.own = add(kOwnSettings, own(), {});
+    result_.defaults = is_default ? result_.own : add(kDefaults, defaults, {});
     if (!has_gradients()) return;
     const GradientCost cost = gradient_cost(runs_.scene().parameters.size(), runs_.objectives().size());
     const bool forward = cost.tlm <= cost.adjoint;
     const auto discrete = forward ? GradientMethod::tlm : GradientMethod::adjoint;
     const auto continuous = forward ? GradientMethod::cvodes_forward : GradientMethod::cvodes_adjoint;
-    result_.own_gradient = add("as in the file", own(), is_cvodes(own().integrator.type) ? continuous : discrete);
-    result_.default_gradient = is_default ? result_.own_gradient : add("defaults", defaults, discrete);
+    result_.own_gradient = add(kOwnSettings, own(), is_cvodes(own().integrator.type) ? continuous : discrete);
+    result_.default_gradient = is_default ? result_.own_gradient : add(kDefaults, defaults, discrete);
   }
 
   bool has_gradients() const { return !result_.reference.gradients_by.empty(); }
@@ -323,13 +328,13 @@ class Sweep {
   }
 
   void mark_fronts() {
-    std::vector<double> cost, error;
+    std::vector<double> cost, bound;
     for (const TradeoffRow& row : result_.rows) cost.push_back(row.status == RowStatus::ok ? row.wall_seconds : kNaN);
     for (TradeoffRow& row : result_.rows) row.pareto.clear();
     for (Eigen::Index q = 0; q < count(); ++q) {
-      error.clear();
-      for (const TradeoffRow& row : result_.rows) error.push_back(row.errors(q));
-      const std::vector<bool> front = pareto_front(cost, error);
+      bound.clear();
+      for (const TradeoffRow& row : result_.rows) bound.push_back(row.bounds(q));
+      const std::vector<bool> front = pareto_front(cost, bound);
       for (std::size_t i = 0; i < front.size(); ++i) result_.rows[i].pareto.push_back(front[i]);
     }
   }
@@ -347,13 +352,16 @@ class Sweep {
 std::string in_words(const TradeoffSetting& setting) {
   const IntegratorSettings& s = setting.simulation.integrator;
   std::string name = setting.curve;
-  // These curves are one setting each, of whatever method.
-  if (name == "as in the file" || name == "defaults") {
+  if (stands_alone(setting)) {  // of whatever method
     name = fmt::format("{} ({})", s.type, name);
     if (setting.gradient) name = fmt::format("{}, {}", to_string(*setting.gradient), name);
   }
   return s.step ? fmt::format("{} with steps of {:.3g} s", name, *s.step)
                 : fmt::format("{} at rtol {:.0e}", name, s.rtol);
+}
+
+bool stands_alone(const TradeoffSetting& setting) {
+  return setting.curve == kOwnSettings || setting.curve == kDefaults;
 }
 
 std::string_view to_string(RowStatus status) {
@@ -394,38 +402,27 @@ Recommendation recommend(const Tradeoff& tradeoff, std::vector<std::size_t> quan
     found.why_not = fmt::format("the reference itself is certain to {:.1e} only", certificate);
     return found;
   }
-  const auto worst = [&](const TradeoffRow& row) {
+  const auto bound = [&](const TradeoffRow& row) {
     double largest = 0;
     for (const std::size_t q : found.quantities) {
-      const double error = row.errors(static_cast<Eigen::Index>(q));
-      if (!std::isfinite(error)) return std::numeric_limits<double>::infinity();
-      largest = std::max(largest, error);
+      const double b = row.bounds(static_cast<Eigen::Index>(q));
+      if (!std::isfinite(b)) return std::numeric_limits<double>::infinity();
+      largest = std::max(largest, b);
     }
     return largest;
-  };
-  // Rows of a curve stand in the order of their tolerances, though not side by side.
-  const auto holds_from = [&](std::size_t i) {
-    const std::string& curve = tradeoff.rows[i].setting.curve;
-    for (std::size_t j = i; j < tradeoff.rows.size(); ++j) {
-      const TradeoffRow& row = tradeoff.rows[j];
-      if (row.setting.curve == curve && row.status == RowStatus::ok && std::isfinite(worst(row)) &&
-          worst(row) > accuracy)
-        return false;
-    }
-    return std::isfinite(worst(tradeoff.rows[i]));
   };
   std::vector<std::size_t> candidates;
   double fastest = std::numeric_limits<double>::infinity(), best = fastest;
   for (std::size_t i = 0; i < tradeoff.rows.size(); ++i) {
-    if (tradeoff.rows[i].status != RowStatus::ok) continue;
-    best = std::min(best, worst(tradeoff.rows[i]));
-    if (!holds_from(i)) continue;
+    const double b = bound(tradeoff.rows[i]);
+    best = std::min(best, b);
+    if (b > accuracy) continue;
     candidates.push_back(i);
     fastest = std::min(fastest, tradeoff.rows[i].wall_seconds);
   }
   for (const std::size_t i : candidates) {
     if (tradeoff.rows[i].wall_seconds > 1.1 * fastest) continue;
-    if (!found.row || worst(tradeoff.rows[i]) < worst(tradeoff.rows[*found.row])) found.row = i;
+    if (!found.row || bound(tradeoff.rows[i]) < bound(tradeoff.rows[*found.row])) found.row = i;
   }
   if (!found.row)
     found.why_not = std::isfinite(best)

@@ -28,6 +28,8 @@ struct TradeoffSetting {
 };
 // "dopri5 at rtol 1e-06", "adjoint, rk4 with steps of 0.005 s"
 std::string in_words(const TradeoffSetting& setting);
+// Of no curve: the scene's own settings and the defaults.
+bool stands_alone(const TradeoffSetting& setting);
 
 enum class RowStatus {
   ok,
@@ -46,7 +48,8 @@ struct TradeoffRow {
   SimulationStatistics statistics;
   Eigen::VectorXd errors;      // per quantity of the reference; NaN: not of this row
   Eigen::VectorXd deviations;  // likewise, with a sign
-  std::vector<bool> pareto;    // per quantity: nothing is faster and more exact
+  Eigen::VectorXd bounds;      // likewise, the largest error from here on along the curve (tradeoff_curves.hpp)
+  std::vector<bool> pareto;    // per quantity: nothing is faster and has a lower bound
   bool within_floor = false;   // no error is larger than what the reference is certain of
 };
 
@@ -79,9 +82,9 @@ struct TradeoffOptions {
 Tradeoff measure_tradeoff(const Scene& scene, const std::vector<Objective>& objectives,
                           const TradeoffOptions& options = {});
 
-// The fastest row whose errors in these quantities are within the accuracy, as are those of all tighter rows of its
-// curve, so that none is taken for an error that happens to pass through zero. Of rows that are equally fast to a tenth
-// the most exact one. None where the reference is not three times as exact as what is asked for.
+// The fastest row whose bounds in these quantities are within the accuracy, so that none is taken for an error that
+// happens to pass through zero. Of rows that are equally fast to a tenth the one with the lowest bound. None where the
+// reference is not three times as exact as what is asked for.
 Recommendation recommend(const Tradeoff& tradeoff, std::vector<std::size_t> quantities, double accuracy);
 
 // What the scene is run for: the objectives, or the sensors where there are none, or the motion.

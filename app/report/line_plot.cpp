@@ -96,6 +96,14 @@ std::vector<std::size_t> visible_samples(const LinePlot& plot, const PlotSeries&
   return kept;
 }
 
+const char* style_of(Mark mark) {
+  return mark == Mark::points ? "points" : mark == Mark::dashed ? "line dashed" : "line";
+}
+
+std::string ring(double px, double py) {
+  return fmt::format("M{:.1f} {:.1f}a4 4 0 1 0 8 0a4 4 0 1 0 -8 0", px - 4, py);
+}
+
 void draw_series(const LinePlot& plot, const Frame& frame, std::size_t index, std::string& svg) {
   const PlotSeries& series = plot.series[index];
   std::string path;
@@ -109,13 +117,15 @@ void draw_series(const LinePlot& plot, const Frame& frame, std::size_t index, st
     const double px = frame.px(x), py = frame.py(y);
     if (series.mark == Mark::points) {
       fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}h0", px, py);
+    } else if (series.mark == Mark::rings) {
+      path += ring(px, py);
     } else {
       fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}", pen_down ? 'L' : 'M', px, py);
     }
     pen_down = true;
   }
-  const char* mark = series.mark == Mark::points ? "points" : series.mark == Mark::dashed ? "line dashed" : "line";
-  svg += fmt::format("<path class=\"{} c{}\" d=\"{}\"/>\n", mark, index % kColours, path);
+  svg += fmt::format("<path class=\"{} c{}\" d=\"{}\"/>\n", style_of(series.mark),
+                     series.part_of.value_or(index) % kColours, path);
 }
 
 // Whether all of an axis can be written as 0.02, 5, 1000.
@@ -161,10 +171,11 @@ Ticks x_ticks_of(const LinePlot& plot, const Frame& frame) {
 
 // Drawn like the series itself.
 std::string legend_key(const PlotSeries& series, std::size_t index) {
-  const char* mark = series.mark == Mark::points ? "points" : series.mark == Mark::dashed ? "line dashed" : "line";
-  const char* path = series.mark == Mark::points ? "M5 5h0M15 5h0M25 5h0" : "M0 5H30";
-  return fmt::format("<svg class=\"key\" viewBox=\"0 0 30 10\"><path class=\"{} c{}\" d=\"{}\"/></svg>", mark,
-                     index % kColours, path);
+  const std::string path = series.mark == Mark::points  ? "M5 5h0M15 5h0M25 5h0"
+                           : series.mark == Mark::rings ? ring(15, 5)
+                                                        : "M0 5H30";
+  return fmt::format("<svg class=\"key\" viewBox=\"0 0 30 10\"><path class=\"{} c{}\" d=\"{}\"/></svg>",
+                     style_of(series.mark), index % kColours, path);
 }
 
 void draw_axes(const LinePlot& plot, const Frame& frame, std::string& svg) {
@@ -234,6 +245,7 @@ std::string to_svg(const LinePlot& plot) {
   if (plot.series.size() < 2) return svg;
   svg += "<div class=\"legend\">";
   for (std::size_t i = 0; i < plot.series.size(); ++i) {
+    if (plot.series[i].part_of) continue;
     svg += fmt::format("<span>{}{}</span>", legend_key(plot.series[i], i), html_escaped(plot.series[i].name));
   }
   return svg + "</div>\n";

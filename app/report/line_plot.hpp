@@ -6,17 +6,20 @@
 //   page.add(plot);
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace mbsopt {
 
-enum class Mark { line, dashed, points };
+enum class Mark { line, dashed, points, rings };
 
 struct PlotSeries {
   std::string name;
   std::vector<double> x, y;  // values that are not finite are left out
   Mark mark = Mark::line;
+  std::optional<std::size_t> part_of = {};  // that series: in its colour, and not in the legend
 };
 
 struct LinePlot {

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "app/machine.hpp"
 #include "app/report/line_plot.hpp"
 #include "app/report/report_parts.hpp"
 #include "core/integrate/tableaus.hpp"
+#include "optim/tradeoff_curves.hpp"
 
 namespace mbsopt {
 namespace {
@@ -36,37 +38,53 @@ Group group_of(const TradeoffSetting& setting) {
   return method && !method->implicit() ? Group::explicit_methods : Group::implicit_methods;
 }
 
-bool is_one_point(const TradeoffSetting& setting) {
-  return setting.curve == "as in the file" || setting.curve == "defaults";
-}
-
+// Lines through bounds; points where an error is below its bound, and of settings that a tighter one dominates.
 LinePlot work_precision(const Tradeoff& tradeoff, std::size_t quantity, Group group, const std::string& title) {
-  const Quantity& q = tradeoff.reference.errors->quantities()[quantity];
+  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
+  const Quantity& q = quantities[quantity];
   const auto column = static_cast<Eigen::Index>(quantity);
   LinePlot plot{.title = title,
                 .x_label = "time [s]",
                 .y_label = (q.relative ? "relative error of " : "absolute error of ") + q.name,
                 .logarithmic_y = true,
                 .logarithmic_x = true};
-  PlotSeries front{"Pareto front", {}, {}, Mark::points};
-  for (const TradeoffRow& row : tradeoff.rows) {
-    if (row.status != RowStatus::ok || !(row.errors(column) > 0)) continue;
-    if (group_of(row.setting) != group && !(is_one_point(row.setting) && group == Group::formulations)) continue;
-    if (row.pareto.size() > quantity && row.pareto[quantity]) {
-      front.x.push_back(row.wall_seconds);
-      front.y.push_back(row.errors(column));
+  std::vector<PlotSeries> points;
+  const auto add = [&](PlotSeries& series, const TradeoffRow& row, const Eigen::VectorXd& errors) {
+    series.x.push_back(row.wall_seconds), series.y.push_back(errors(column));
+  };
+  for (const WorkPrecisionCurve& curve : work_precision_curves(tradeoff.rows, quantities, quantity)) {
+    if (group_of(tradeoff.rows[curve.line.front()].setting) != group) continue;
+    PlotSeries off_line{"", {}, {}, Mark::points, plot.series.size()};
+    PlotSeries& line = plot.series.emplace_back(PlotSeries{curve.name, {}, {}, Mark::line});
+    const std::vector<std::size_t> connected = slower_and_slower(tradeoff.rows, curve.line);
+    for (const std::size_t i : connected) add(line, tradeoff.rows[i], tradeoff.rows[i].bounds);
+    if (connected.size() == 1) add(off_line, tradeoff.rows[connected.front()], tradeoff.rows[connected.front()].bounds);
+    for (const std::vector<std::size_t>* some : {&curve.line, &curve.beside}) {
+      for (const std::size_t i : *some) {
+        const TradeoffRow& row = tradeoff.rows[i];
+        const bool on_line = std::binary_search(connected.begin(), connected.end(), i);
+        if (!on_line || row.errors(column) < row.bounds(column)) add(off_line, row, row.errors);
+      }
     }
-    if (is_one_point(row.setting)) continue;
-    auto series = std::find_if(plot.series.begin(), plot.series.end(),
-                               [&](const PlotSeries& s) { return s.name == row.setting.curve; });
-    if (series == plot.series.end())
-      series = plot.series.insert(series, PlotSeries{row.setting.curve, {}, {}, Mark::line});
-    series->x.push_back(row.wall_seconds);
-    series->y.push_back(row.errors(column));
+    if (!off_line.x.empty()) points.push_back(std::move(off_line));
   }
-  if (!front.x.empty() && !plot.series.empty()) plot.series.push_back(std::move(front));
+  if (plot.series.empty()) return plot;
+  plot.series.insert(plot.series.end(), points.begin(), points.end());
+  PlotSeries front{"Pareto front", {}, {}, Mark::rings};
+  for (const TradeoffRow& row : tradeoff.rows) {
+    if (group_of(row.setting) == group && row.pareto[quantity] && better_than_zero(q, row.bounds(column)))
+      add(front, row, row.bounds);
+  }
+  if (!front.x.empty()) plot.series.push_back(std::move(front));
   return plot;
 }
+
+constexpr const char* kHowToRead =
+    "Lines lead from loose to tight settings through bounds: the bound of a setting is the largest error of it and of "
+    "all tighter settings of its curve, since an error that passes through zero is small by chance. Points in a "
+    "curve's colour beside its line: errors that are below their bounds, and settings for which a tighter one needed "
+    "no more right-hand sides or no more time. A relative bound of 1 or more, as the answer zero would have, is left "
+    "out.";
 
 void add_plots(HtmlPage& page, const Tradeoff& tradeoff) {
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
@@ -80,6 +98,7 @@ void add_plots(HtmlPage& page, const Tradeoff& tradeoff) {
                               Titled{Group::gradients, "gradient methods"}};
   for (std::size_t q = 0; q < quantities.size(); ++q) {
     page.heading("Error of " + quantities[q].name + " over time");
+    if (q == 0) page.paragraph(kHowToRead);
     for (const Titled& p : kPlots) {
       const LinePlot plot = work_precision(tradeoff, q, p.group, quantities[q].name + ": " + p.title);
       if (!plot.series.empty()) page.plot(plot);
@@ -118,13 +137,17 @@ void add_rows(HtmlPage& page, const Tradeoff& tradeoff) {
                                  std::to_string(r.statistics.factorisations)};
     for (std::size_t q = 0; q < quantities.size(); ++q) {
       const bool front = q < r.pareto.size() && r.pareto[q];
-      row.push_back(error_cell(r.errors(static_cast<Eigen::Index>(q))) + (front ? " *" : ""));
+      const auto column = static_cast<Eigen::Index>(q);
+      const std::string error = error_cell(r.errors(column)), bound = error_cell(r.bounds(column));
+      row.push_back(error + (bound == error ? "" : " (" + bound + ")") + (front ? " *" : ""));
     }
     row.push_back(ok ? "ok" : fmt::format("{}: {}", to_string(r.status), r.message));
     rows.push_back(std::move(row));
   }
   page.table(header, rows);
-  page.paragraph("* on the Pareto front: nothing measured is both faster and more exact.");
+  page.paragraph(
+      "In brackets: the bound, where it is larger than the error. * on the Pareto front of time and bound: nothing "
+      "measured is both faster and more exact.");
 }
 
 void add_machine(HtmlPage& page, const Json& result) {

@@ -54,9 +54,10 @@ TEST_CASE("tradeoff: a table of all settings, plots, and advice in words for eac
                               Contains("for 1e-06 in gradient of end: ") && Contains("rtol"));
   const Csv csv = csv_of(folder.path / "out/tradeoff.csv");
   CHECK(csv.lines.size() > 30);  // a row per curve, however little time there is
-  for (const char* column : {"integrator", "rtol", "step", "formulation", "alpha", "status", "wall_seconds",
-                             "rhs_evaluations", "factorisations", "memory_bytes", "error motion", "error sensors",
-                             "error track", "error end", "error gradient of track", "pareto", "message"}) {
+  for (const char* column :
+       {"integrator", "rtol", "step", "formulation", "alpha", "status", "wall_seconds", "rhs_evaluations",
+        "factorisations", "memory_bytes", "error motion", "error sensors", "error track", "error end",
+        "error gradient of track", "bound track", "pareto", "message"}) {
     INFO(column);
     CHECK(std::count(csv.columns.begin(), csv.columns.end(), column) == 1);
   }
@@ -69,9 +70,17 @@ TEST_CASE("tradeoff: a table of all settings, plots, and advice in words for eac
   CHECK(result.at("reference").at("quantities").at("track").at("apart").get<double>() < 1e-9);
   CHECK(result.at("objectives").at("track").at("gradient").contains("k"));
   CHECK(result.at("recommendations").size() == 6 * 6);  // motion, sensors, two objectives, two gradients
+  for (const auto& r : result.at("recommendations")) {
+    if (!r.contains("setting")) continue;
+    const std::string quantity = r.at("quantity");
+    const double bound = r.at("bounds").at(quantity);
+    CHECK(bound <= r.at("accuracy").get<double>());
+    CHECK(r.at("errors").at(quantity).get<double>() <= bound);
+  }
   CHECK(result.at("settings").at("defaults").at("errors").at("track").get<double>() < 1e-4);
   const std::string report = content_of(folder.path / "out/report.html");
   CHECK_THAT(report, Contains("<svg") && Contains("Pareto front") && Contains("What to use") &&
+                         Contains("Lines lead from loose to tight settings through bounds") &&
                          Contains(result.at("machine").at("cpu").get<std::string>()));
   CHECK(report.find("nan") == std::string::npos);
 }

@@ -46,10 +46,27 @@ TEST_CASE("a legend shows lines as they are drawn", "[report]") {
   LinePlot plot{.title = "", .x_label = "", .y_label = ""};
   plot.series.push_back({"before", {0, 1}, {0, 1}, Mark::dashed});
   plot.series.push_back({"measured", {0, 1}, {1, 0}, Mark::points});
+  plot.series.push_back({"best", {0.5}, {0.5}, Mark::rings});
   const std::string svg = to_svg(plot);
   const std::string legend = svg.substr(svg.find("legend"));
+  const auto rings = [](const std::string& text) { return text.find("a4 4 0 1 0 8 0"); };
+  CHECK(rings(svg) < svg.find("legend"));
+  CHECK(rings(legend) < legend.find("best"));
   CHECK(legend.find("class=\"line dashed c0\"") < legend.find("before"));
   CHECK(legend.find("class=\"points c1\"") < legend.find("measured"));
+}
+
+TEST_CASE("points that are part of a line have its colour, and no place in the legend", "[report]") {
+  LinePlot plot{.title = "", .x_label = "", .y_label = ""};
+  plot.series.push_back({"first", {0, 1}, {0, 1}, Mark::line});
+  plot.series.push_back({"second", {0, 1}, {1, 0}, Mark::line});
+  plot.series.push_back({"", {0.5}, {0.25}, Mark::points, 1});
+  const std::string svg = to_svg(plot);
+  CHECK(svg.find("class=\"points c1\"") != std::string::npos);
+  CHECK(svg.find("class=\"points c2\"") == std::string::npos);
+  const std::string legend = svg.substr(svg.find("legend"));
+  CHECK(legend.find("second") != std::string::npos);
+  CHECK(legend.find("points") == std::string::npos);
 }
 
 TEST_CASE("values that are not finite interrupt the line and never reach the drawing", "[report]") {
