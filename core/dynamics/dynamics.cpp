@@ -167,14 +167,13 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
   }
   set_state(t, y, angles, true);
   set_loads();
-  const bool positive = solver_.factor(frames_, &gamma_);
+  if (!solver_.factor(frames_, &gamma_)) return false;
   laws_.subtract_f_tt(gamma_);
   if (settings_.omega != 0) {
     evaluate_phi(data_, frames_, laws_, angles_, phi_);
     evaluate_phi_dot(data_, frames_, laws_, phi_dot_);
     gamma_ += 2 * settings_.xi * settings_.omega * phi_dot_ + settings_.omega * settings_.omega * phi_;
   }
-  if (!positive) return false;
   g_ = -gamma_;
   solver_.solve(loads_, g_, solver_settings(false), z_, lambda_);
   note_residual(solver_.residual_ratio(), solver_.residual_size(), [&] { return usual_acceleration(); });

@@ -1,5 +1,6 @@
 #include "core/dynamics/planar_rows.hpp"
 
+#include <cassert>
 #include <map>
 
 namespace mbsopt {
@@ -100,7 +101,9 @@ void PlanarRows::correct(const SaddleIterate& it, bool first, const std::vector<
   }
 }
 
-void PlanarRows::assemble(const Frames& frames, const Eigen::VectorXd& alpha, BlockCholesky<3>& S, Eigen::VectorXd*) {
+void PlanarRows::assemble(const Frames& frames, const Eigen::VectorXd& alpha, BlockCholesky<3>& S,
+                          [[maybe_unused]] Eigen::VectorXd* phi_ddot) {
+  assert(!phi_ddot);
   evaluate(frames);
   set_mass(S);
   add_weighted_square(alpha, S);

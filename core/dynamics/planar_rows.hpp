@@ -63,7 +63,7 @@ class PlanarRows {
   SaddleSizes correct(const SaddleIterate& at, bool first, const std::vector<Lanes<3>>& correction) const {
     return block_kernels().correct_lanes_in_plane(view(), at, first, correction[0].data());
   }
-  // J and S = M + J' diag(alpha) J; Phiddot is PlanarConstraints'.
+  // J and S = M + J' diag(alpha) J; phi_ddot: null, Phiddot is PlanarConstraints'.
   void assemble(const Frames& frames, const Eigen::VectorXd& alpha, BlockCholesky<3>& S, Eigen::VectorXd* phi_ddot);
   // M x for body i (1-based), and S = M.
   template <class X>

@@ -33,33 +33,46 @@ double root_of_parabola(const std::array<double, 3>& t, const std::array<double,
 
 double SingularPassage::best_theta() {
   tabulate();
-  const auto by_rounding = [](const Passage& a, const Passage& b) { return a.magnified < b.magnified; };
-  return std::min_element(good_.begin(), good_.end(), by_rounding)->theta;
+  Passage best{0.5, kNone};
+  for (int k = 0; k < good_count_; ++k) {
+    if (good_[static_cast<std::size_t>(k)].magnified < best.magnified) best = good_[static_cast<std::size_t>(k)];
+  }
+  return best.theta;
 }
 
 void SingularPassage::tabulate() {
-  if (!good_.empty()) return;
+  if (good_count_ >= 0) return;
+  good_count_ = 0;
   constexpr int kGrid = 100;
   double most[kGrid + 1];
   for (int i = 0; i <= kGrid; ++i) most[i] = uncertain(double(i) / kGrid);
   for (int i = 1; i < kGrid; ++i) {
     const bool far = i >= kEnds * kGrid && i <= (1 - kEnds) * kGrid;
-    if (far && most[i] < most[i - 1] && most[i] <= most[i + 1]) good_.push_back({double(i) / kGrid, most[i]});
+    if (!far || most[i] >= most[i - 1] || most[i] > most[i + 1]) continue;
+    if (good_count_ < kMostGood) good_[static_cast<std::size_t>(good_count_++)] = {double(i) / kGrid, most[i]};
   }
 }
 
-// Of steps of one size, not far from h, that reach t*, `left` away: those after which least is left. Continuous in both
-// but where another number of steps is better: rounding does not change much.
+// Of steps of one size, not far from h, that reach t*, `left` away: those after which least is left; where it is too
+// near for them a shorter step past it. Continuous in both but where another number of steps is better: rounding does
+// not change much.
 SingularPassage::Choice SingularPassage::choose(double left, double h) const {
   Choice best{h, kNone};
   for (int before = 0; before <= kPlanned; ++before) {
-    for (const Passage& good : good_) {
+    for (int k = 0; k < good_count_; ++k) {
+      const Passage& good = good_[static_cast<std::size_t>(k)];
       const double wanted = left / (before + good.theta), size = std::min(wanted, kStretch * h);
       if (size < kShrink * h) continue;
       const double there = size == wanted ? good.magnified : uncertain(left / size - before);
       const double rounding = rounding_of(there, size / h);
       if (rounding < best.rounding) best = {size, rounding};
     }
+  }
+  if (best.rounding < kNone || left >= h) return best;
+  for (int k = 0; k < good_count_; ++k) {
+    const double size = std::max(left / good_[static_cast<std::size_t>(k)].theta, kLeast * h);
+    const double rounding = rounding_of(uncertain(left / size), size / h);
+    if (rounding < best.rounding) best = {size, rounding};
   }
   return best;
 }
@@ -110,6 +123,7 @@ SingularPassage::Estimate SingularPassage::estimate() const {
   double t = last_.t + step * d0 / (d0 - d1);
   if (third.known && third.inverse < kCurved * most) {
     t = root_of_parabola({third.t, last_.t, now_.t}, {distance(third), d0, d1}, t);
+    if (d1 < 0) t = std::clamp(t, last_.t, now_.t);
   }
   return {t, std::min(std::abs(t - last_.t), std::abs(t - now_.t))};
 }
@@ -138,6 +152,7 @@ void SingularPassage::accept() {
   ahead_ = found_;
   std::swap(before_, last_);
   std::swap(last_, now_);
+  tried_.known = tried_.known && tried_.t > before_.t;
   if (found_.t > last_.t) return;
   behind_ = found_.t;
   ahead_ = {};
@@ -147,8 +162,7 @@ void SingularPassage::accept() {
 double SingularPassage::propose(double t, double h) const {
   const double left = ahead_.t - t;
   if (!(left > 0) || left > (kPlanned + 1) * kStretch * h) return h;
-  const Choice best = choose(left, h);
-  return best.rounding < kNone ? best.h : std::max(left, kLeast * h);
+  return choose(left, h).h;
 }
 
 bool SingularPassage::near(double t, double h) const {

@@ -10,14 +10,14 @@
 // its inverse goes through zero, and its sign changes.
 //
 //   SingularPassage passage(method, constraints);
-//   h = passage.propose(t, h);                               // attempt it; then, with the response at its end:
-//   if (passage.well_placed(t, h, wanted, response)) passage.accept();  // otherwise again, with what propose() says
-//   now
+//   h = passage.propose(t, wanted);  // attempt it; then, with the response at its end:
+//   if (passage.well_placed(t, h, wanted, response)) passage.accept();
+//   // otherwise again, with what propose() says now
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <limits>
-#include <vector>
 
 #include "core/integrate/tableaus.hpp"
 
@@ -42,7 +42,7 @@ class SingularPassage {
   // Where a step's t* is best, 0 to 1.
   double best_theta();
   // The largest acceleration over its stage's distance from t*, of the stages of a step and of one like it after it,
-  // where u is 1 over the distance at the start.
+  // where u is 1 over the distance at the start, and derivatives of it another 1 over the distance.
   double magnified(double theta) const;
 
  private:
@@ -71,7 +71,9 @@ class SingularPassage {
   static double rounding_of(double magnified, double size) { return magnified / (size * size * size); }
 
   const Method& rk_;
-  std::vector<Passage> good_;          // found when first needed
+  static constexpr int kMostGood = Method::kMaxStages;
+  std::array<Passage, kMostGood> good_{};
+  int good_count_ = -1;                // found when first needed
   Place before_, last_, now_, tried_;  // where the last two accepted steps, the one looked at, and one that is
                                        // tried again end
   double most_ = 0;                    // the largest inverse so far

@@ -1,6 +1,7 @@
 // The hot loops allocate nothing after set-up: right-hand sides, steps, tangents and adjoints.
 #include <catch2/catch.hpp>
 
+#include "core/dynamics/assembly.hpp"
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/projection.hpp"
 #include "core/integrate/cvodes_newton.hpp"
@@ -120,5 +121,31 @@ TEST_CASE("steps allocate nothing after the first, whatever their number", "[all
   const auto [few, few_steps] = allocations(0.05);
   const auto [many, many_steps] = allocations(0.5);
   CHECK(many_steps > 2 * few_steps);
+  CHECK(many == few);
+}
+
+// Where steps are placed anew, and errors are measured after projection.
+TEST_CASE("steps past singular positions allocate nothing", "[allocation][singular]") {
+  const Scene scene = n_four_bar(2);
+  const Mechanism mechanism(scene, VectorXd());
+  const Assembly assembly(mechanism, 0);
+  REQUIRE(assembly.result().ok);
+  auto allocations = [&](double end) {
+    SimulationSettings settings = scene.simulation;
+    settings.end_time = end;
+    RungeKuttaRun run(mechanism, settings, *runge_kutta_method("dopri853"));
+    SimulationResult result;
+    result.steps.times.reserve(100000);
+    result.steps.sizes.reserve(100000);
+    const long before = allocation_count();
+    run.run(
+        assembly.result().y, VectorXd(), [](double) { return true; }, [](const Step&) {}, {}, result);
+    const long count = allocation_count() - before;
+    REQUIRE(result.ok());
+    return std::pair(count, result.statistics.rejected);
+  };
+  const auto [few, none] = allocations(0.3);
+  const auto [many, rejected] = allocations(5);
+  CHECK(rejected > 0);
   CHECK(many == few);
 }
