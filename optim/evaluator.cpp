@@ -137,6 +137,29 @@ void Evaluator::add_parameters_only(Evaluation& e, bool gradients) const {
   }
 }
 
+namespace {
+
+// Where the rungs disagree, since a stage met a singular position in one of them, say, from smaller steps on.
+LadderDerivative certain_differences(const LadderFunction& psi_at, Eigen::Index size, double h, int rungs) {
+  constexpr double kUncertain = 1e-4;  // of a derivative
+  constexpr int kMoreLadders = 2;
+  LadderDerivative best = difference_ladder(psi_at, size, {h, rungs, 0});
+  for (int k = 0; k < kMoreLadders; ++k) {
+    const Eigen::ArrayXd limit = (kUncertain * best.derivative.array().abs()).max(10 * best.rounding.array());
+    if ((best.error.array() <= limit).all()) break;
+    h /= 1 << rungs;
+    const LadderDerivative smaller = difference_ladder(psi_at, size, {h, rungs, 0});
+    for (Eigen::Index i = 0; i < size; ++i) {
+      if (!(smaller.error(i) < best.error(i))) continue;
+      best.error(i) = smaller.error(i), best.derivative(i) = smaller.derivative(i);
+      best.rounding(i) = smaller.rounding(i), best.step(i) = smaller.step(i);
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
 void Evaluator::add_differences(Evaluation& e) const {
   const Stopwatch stopwatch;
   const StepSequence steps = e.steps;
@@ -155,7 +178,7 @@ void Evaluator::add_differences(Evaluation& e) const {
     };
     const Parameter& parameter = scene_.parameters[static_cast<std::size_t>(index)];
     const double h = options_.differences.relative_step * typical_size(parameter, e.rho(index));
-    const LadderDerivative d = difference_ladder(psi_at, e.psi.size(), {h, options_.differences.rungs, 0});
+    const LadderDerivative d = certain_differences(psi_at, e.psi.size(), h, options_.differences.rungs);
     if (!(d.error.array() < std::numeric_limits<double>::infinity()).all()) {
       e.ok = false;
       e.message = fmt::format("no central difference in '{}' could be evaluated", parameter.name);

@@ -29,6 +29,7 @@ struct Curve {
   std::size_t next = 0;
   double last_seconds = 0, growth = 1.5;  // of the cost, from one setting to the next
   bool done() const { return next >= settings.size(); }
+  double expected() const { return last_seconds * growth; }  // of the next
 };
 
 // 10^-from, ..., 10^-to
@@ -224,27 +225,27 @@ class Sweep {
   double budget_left() const { return options_.budget_seconds - budget_->seconds(); }
   double most_per_point() const { return options_.budget_seconds / 30; }
 
-  // All curves a point further, again and again, until each is done or the stage's share is used up.
+  // The curve whose next point costs least a point further, until each is done or the stage's share is used up: what is
+  // cheap is followed to the end, whatever else there is.
   void stage(const char* name, std::vector<Curve> curves, double share) {
     const Stopwatch stopwatch(options_.clock);
     const double seconds = share * options_.budget_seconds;
     const double all = static_cast<double>(curves.size());
-    for (bool any = true; any && !interrupted();) {
-      any = false;
-      for (Curve& curve : curves) {
-        if (curve.done() || interrupted()) continue;
-        any = true;
-        const bool spent = stopwatch.seconds() > seconds || budget_left() < 0;
-        advance(curve, spent);
-        const auto done = static_cast<double>(std::count_if(curves.begin(), curves.end(), std::mem_fn(&Curve::done)));
-        say(name, std::max(done / all, stopwatch.seconds() / seconds));
-      }
+    const auto cheaper = [](const Curve& a, const Curve& b) {
+      return a.done() != b.done() ? b.done() : a.expected() < b.expected();
+    };
+    while (!curves.empty() && !interrupted()) {
+      Curve& curve = *std::min_element(curves.begin(), curves.end(), cheaper);
+      if (curve.done()) break;
+      advance(curve, stopwatch.seconds() > seconds || budget_left() < 0);
+      const auto done = static_cast<double>(std::count_if(curves.begin(), curves.end(), std::mem_fn(&Curve::done)));
+      say(name, std::max(done / all, stopwatch.seconds() / seconds));
     }
   }
 
   void advance(Curve& curve, bool spent) {
     const TradeoffSetting& setting = curve.settings[curve.next];
-    const double expected = curve.last_seconds * curve.growth;
+    const double expected = curve.expected();
     if (spent || expected > most_per_point()) {
       TradeoffRow row;
       row.setting = setting;

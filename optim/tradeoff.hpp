@@ -5,10 +5,10 @@
 //   const Tradeoff tradeoff = measure_tradeoff(problem.scene, objectives_of(problem), {.budget_seconds = 20});
 //   for (const TradeoffRow& row : tradeoff.rows) std::cout << in_words(row.setting) << ' ' << row.wall_seconds << '\n';
 //
-// Settings that differ in tolerance or step only are a curve. Curves are followed from loose to tight, all together;
-// one ends where its next point would cost more than its share of the budget, or where the reference is no more exact
-// than it. Afterwards all points are timed again, in turn, so that a busy minute does not fall on one of them: times
-// are medians.
+// Settings that differ in tolerance or step only are a curve. Curves are followed from loose to tight, the cheapest
+// next point first; one ends where its next point would cost more than its share of the budget, or where the reference
+// is no more exact than it. Afterwards all points are timed again, in turn, so that a busy minute does not fall on one
+// of them: times are medians.
 #pragma once
 
 #include <Eigen/Core>
