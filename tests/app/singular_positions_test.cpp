@@ -22,6 +22,16 @@ double error_of(const Answer& answer) {
   return difference / whole;
 }
 
+struct Windows {
+  Problem problem = read_problem(file_of("four_bar/windows"));
+  TradeoffRuns runs{problem.scene, objectives_of(problem)};
+
+  Answer gradients(SimulationSettings settings, double rtol, GradientMethod method) const {
+    settings.integrator.rtol = rtol, settings.integrator.atol = 0.01 * rtol;
+    return runs.gradients(settings, method);
+  }
+};
+
 }  // namespace
 
 TEST_CASE("gradients through singular positions gain digits with the tolerance, by adjoint and TLM, planar and spatial",
@@ -29,16 +39,14 @@ TEST_CASE("gradients through singular positions gain digits with the tolerance, 
 #ifdef __SANITIZE_ADDRESS__
   return;  // twenty times slower
 #endif
-  const Problem problem = read_problem(file_of("four_bar/windows"));
-  const TradeoffRuns runs(problem.scene, objectives_of(problem));
-  SimulationSettings settings = problem.scene.simulation;
+  const Windows windows;
+  SimulationSettings settings = windows.problem.scene.simulation;
   settings.integrator.type = GENERATE(as<std::string>{}, "dopri5", "verner6", "dopri853");
   settings.model = GENERATE(ModelChoice::planar, ModelChoice::spatial);
   double before = 0;
   for (const double rtol : {1e-9, 1e-10, 1e-11}) {
-    settings.integrator.rtol = rtol, settings.integrator.atol = 0.01 * rtol;
     for (const GradientMethod method : {GradientMethod::adjoint, GradientMethod::tlm}) {
-      const Answer answer = runs.gradients(settings, method);
+      const Answer answer = windows.gradients(settings, rtol, method);
       REQUIRE(answer.ok);
       INFO(settings.integrator.type << " at " << rtol << ": gradient off by " << error_of(answer));
       CHECK(error_of(answer) < 250 * rtol + 5e-9);
@@ -56,13 +64,11 @@ TEST_CASE("differences through singular positions are those of the gradient, wha
 #ifdef __SANITIZE_ADDRESS__
   return;  // twenty times slower
 #endif
-  const Problem problem = read_problem(file_of("four_bar/windows"));
-  const TradeoffRuns runs(problem.scene, objectives_of(problem));
-  SimulationSettings settings = problem.scene.simulation;
+  const Windows windows;
+  SimulationSettings settings = windows.problem.scene.simulation;
   settings.integrator.type = "dopri5";
   for (const double rtol : {1e-7, 1e-8, 3e-9, 1e-9}) {
-    settings.integrator.rtol = rtol, settings.integrator.atol = 0.01 * rtol;
-    const Answer answer = runs.gradients(settings, GradientMethod::differences);
+    const Answer answer = windows.gradients(settings, rtol, GradientMethod::differences);
     REQUIRE(answer.ok);
     INFO("at " << rtol << ": gradient off by " << error_of(answer));
     CHECK(error_of(answer) < 1e-4);
