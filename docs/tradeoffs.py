@@ -396,8 +396,8 @@ def with_verdict(text, wanted):
 def gallery_section():
     rows = rows_of(DATA / "gallery.csv")
     lines = ["### The gallery at default settings", "",
-             "What a file without `integrator` and `formulation` is run with: augmented Lagrangian, `dopri853`, rtol 1e-8, atol 1e-10, steps of at most a",
-             "hundredth of the run. The largest error of its objectives and of their gradients, relative unless said; of files that identify also that of",
+             "What a file without `integrator` and `formulation` is run with: augmented Lagrangian, `dopri853`, rtol 1e-8, atol 1e-10, steps of at most",
+             "1/150 of the run. The largest error of its objectives and of their gradients, relative unless said; of files that identify also that of",
              "the sum of squares and of its gradient, at the values from which they start. Wanted: 1e-5 and 1e-4; **bold** where it is missed. Apart: how",
              "much the two methods of the reference differ. Own: the settings of the file.", ""]
     cells, missed = [], []

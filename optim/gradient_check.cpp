@@ -99,7 +99,7 @@ class Check {
     cost.ratio = one > 0 ? cost.wall_seconds / one : 0;
   }
 
-  std::optional<VectorXd> psi_at(const VectorXd& rho, bool frozen) {
+  Evaluation run_at(const VectorXd& rho, bool frozen) {
     Evaluation e;
     if (frozen) {
       e = tlm_.values_on(steps_, rho);
@@ -108,33 +108,42 @@ class Check {
       e = fresh.values(rho);
     }
     result_.simulations += e.simulations;
+    return e;
+  }
+
+  std::optional<VectorXd> psi_at(const VectorXd& rho, bool frozen) {
+    Evaluation e = run_at(rho, frozen);
     if (!e.ok) return std::nullopt;
-    return e.psi;
+    return std::move(e.psi);
   }
 
   void difference() {
     const Index m = result_.psi.size(), P = rho_.size();
     for (MatrixXd* x : {&result_.frozen, &result_.free, &frozen_error_, &free_error_, &free_step_}) x->setZero(m, P);
     jump_.setZero(m, P);
+    on_base_steps_.setConstant(m, P, false);
     for (Index k = 0; k < P; ++k) {
       std::vector<std::pair<double, VectorXd>> on_frozen_steps;
       const double near = options_.relative_step * size_(k) * std::pow(0.5, options_.rungs - kJumpRungs);
       for (const bool frozen : {true, false}) {
         if (frozen ? !result_.discrete : !options_.free_steps) continue;
         const Stopwatch stopwatch;
-        const auto f = [&](double h) {
+        double other_steps = kInfinity;  // the smallest |h| at which a run took others than the base run
+        const auto f = [&](double h) -> std::optional<VectorXd> {
           VectorXd rho = rho_;
           rho(k) += h;
-          const std::optional<VectorXd> psi = psi_at(rho, frozen);
-          if (psi && std::abs(h) < 1.5 * near) note_jump(k, h, frozen, *psi, on_frozen_steps);
-          return psi;
+          Evaluation e = run_at(rho, frozen);
+          if (!e.ok) return std::nullopt;
+          if (e.steps.sizes != steps_.sizes) other_steps = std::min(other_steps, std::abs(h));
+          if (std::abs(h) < 1.5 * near) note_jump(k, h, frozen, e.psi, on_frozen_steps);
+          return std::move(e.psi);
         };
         LadderDerivative d = difference_ladder(f, m, {options_.relative_step * size_(k), options_.rungs, kPsiRounding});
         for (Index i = 0; i < m; ++i)
           if (!d.has_estimate(i)) d.derivative(i) = kNaN, d.error(i) = kInfinity;
         (frozen ? result_.frozen : result_.free).col(k) = d.derivative;
         (frozen ? frozen_error_ : free_error_).col(k) = d.error;
-        if (!frozen) free_step_.col(k) = d.step;
+        if (!frozen) free_step_.col(k) = d.step, on_base_steps_.col(k) = d.step.array() < 0.75 * other_steps;
         (frozen ? result_.frozen_cost : result_.free_cost).wall_seconds += stopwatch.seconds();
       }
       if (options_.progress) options_.progress(static_cast<int>(k) + 1, static_cast<int>(P));
@@ -156,7 +165,8 @@ class Check {
 
   // Free differences differ from the derivatives of the numbers on frozen steps by the derivative of the integration
   // error, and carry its jumps from step sequence to step sequence, divided by the step. How large these are the
-  // smallest steps show, too, where both differences were taken.
+  // smallest steps show, too, where both differences were taken. Where all runs took the steps of the base run, as
+  // rounded ones mostly do (step_control.hpp), free differences are as good as frozen ones.
   void estimate_integration_error() {
     if (!options_.free_steps && result_.discrete) return;
     const auto error_of = [&](GradientMethod method, const MatrixXd& psi_rho) {
@@ -173,7 +183,7 @@ class Check {
     if (!options_.free_steps) return;
     for (Index k = 0; k < rho_.size(); ++k)
       for (Index i = 0; i < result_.psi.size(); ++i)
-        if (std::isfinite(free_error_(i, k)))
+        if (!on_base_steps_(i, k) && std::isfinite(free_error_(i, k)))
           free_error_(i, k) += e.psi_rho(i, k) + std::max(e.psi(i), jump_(i, k)) / free_step_(i, k);
   }
 
@@ -282,6 +292,7 @@ class Check {
   VectorXd rho_, size_;
   StepSequence steps_;
   MatrixXd frozen_error_, free_error_, free_step_, integration_error_;
+  Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> on_base_steps_;  // a free difference
   MatrixXd jump_;  // of psi, between the steps of the base run and those chosen anew
   std::mt19937 generator_{options_.seed};
   GradientCheck result_;

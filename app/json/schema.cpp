@@ -249,7 +249,7 @@ Json object_schema<IntegratorSettings>() {
   };
   also("rtol", fmt::format("; with another type than {}: {:g}", settings.type, of_other_types.rtol));
   also("atol", fmt::format("; with another type than {}: {:g}", settings.type, of_other_types.atol));
-  also("max_step", "; where type is left out: a hundredth of the run, else none");
+  also("max_step", "; where type is left out: 1/150 of the run, else none");
   return schema;
 }
 

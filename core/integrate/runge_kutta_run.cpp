@@ -63,7 +63,7 @@ double RungeKuttaRun::first_step(const IntegratorSettings& s, double span) {
   const double d2 = scaled_norm(work_, y0, y0, s.rtol, s.atol) / h0;
   const double largest = std::max(d1, d2);
   const double h1 = largest <= 1e-15 ? std::max(1e-6, 1e-3 * h0) : std::pow(0.01 / largest, 1.0 / (rk_.order + 1));
-  return std::min({100 * h0, h1, span});
+  return std::min(rounded_step(std::min(100 * h0, h1)), span);
 }
 
 // Never beyond the end; an adaptive run does not leave a tiny last step.
@@ -324,12 +324,14 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
       h = options.frozen->sizes[frozen_index];
     } else {
       if (adaptive && rate * h > 2)
-        h = 2 / rate;  // an angle is followed over turns only when steps are below half a turn
+        h = rounded_step(2 / rate);  // an angle is followed over turns only when steps are below half a turn
       h = propose_step(step_.t, h, events.stop_after(step_.t), adaptive);
       wanted = h;
       if (adaptive && passage_) {
         largest = std::min(settings_.integrator.max_step.value_or(INFINITY), rate > 0 ? 2 / rate : INFINITY);
-        h = std::min({passage_->propose(step_.t, h), std::max(largest, h), events.stop_after(step_.t) - step_.t});
+        const double placed = passage_->propose(step_.t, h);
+        if (placed != h) h = rounded_step(placed);
+        h = std::min({h, std::max(largest, wanted), events.stop_after(step_.t) - step_.t});
       }
       if (!adaptive && rate * h > 3) {
         stop(
@@ -367,7 +369,8 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
         break;
       }
       ++result.statistics.rejected;
-      h *= outcome == Outcome::rejected ? controller.after_rejection(error) : controller.after_rejection(INFINITY);
+      const double factor = controller.after_rejection(outcome == Outcome::rejected ? error : INFINITY);
+      h = rounded_step(h * factor);
       if (h < 1e-14 * std::max(span, std::abs(step_.t))) {
         stop(SimulationStatus::step_too_small, failed(outcome, h, adaptive));
       }
@@ -389,7 +392,9 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     accepted(step_);
     if (implicit_) implicit_->accept(step_);
     if (adaptive) {
-      double proposed = h * controller.after_acceptance(error);
+      // Past a singular position the estimate is magnified rounding, which is not to decide on the next step.
+      const bool passed = passage_ && passage_->passed_since(step_.t);
+      double proposed = passed ? wanted : rounded_step(h * controller.after_acceptance(error));
       // The factor of an implicit method serves as long as the step stays.
       if (implicit_ && proposed >= h && proposed < ImplicitStages::kKeepStep * h) proposed = h;
       h = s.max_step ? std::min(proposed, *s.max_step) : proposed;

@@ -38,6 +38,8 @@ class SingularPassage {
   double propose(double t, double h) const;
   // Whether a step from t by h is one that passes a singular position, or a neighbour of one.
   bool near(double t, double h) const;
+  // Whether one was passed after t.
+  bool passed_since(double t) const { return behind_ >= t; }
 
   // Where a step's t* is best, 0 to 1.
   double best_theta();

@@ -9,15 +9,24 @@
 
 namespace mbsopt {
 
+// h rounded down to a power of e^(1/100): estimates of error that differ by rounding lead to the very same step, and
+// with it to results that differ by rounding only, where steps that differ in their last digits would put a part of the
+// method's error between them. Costs 0.5 % of h on average. Powers of two would put steps on round times, where laws
+// have their corners.
+inline double rounded_step(double h) { return std::exp(std::floor(100 * std::log(h)) / 100); }
+
 // h -> h * factor with factor = 0.9 err^-(1/k - 0.75 beta) err_old^beta, k the power of h in the estimate (p for an
-// estimate of order p - 1), beta = 0.2/k.
+// estimate of order p - 1), beta = 0.2/k; at most 6, which is taken where the error would stay below a half with it:
+// estimates so small are mostly rounding.
 class PiController {
  public:
-  explicit PiController(int error_order) : beta_(0.2 / error_order), exponent_(1.0 / error_order - 0.75 * beta_) {}
+  explicit PiController(int error_order)
+      : beta_(0.2 / error_order),
+        exponent_(1.0 / error_order - 0.75 * beta_),
+        small_(0.5 * std::pow(6, -error_order)) {}
 
   double after_acceptance(double error) {
-    const double e = std::max(error, 1e-10);
-    double factor = 0.9 * std::pow(e, -exponent_) * std::pow(previous_, beta_);
+    double factor = error < small_ ? 6 : 0.9 * std::pow(error, -exponent_) * std::pow(previous_, beta_);
     factor = std::clamp(factor, 0.2, last_rejected_ ? 1.0 : 6.0);
     previous_ = std::max(error, 1e-4);
     last_rejected_ = false;
@@ -29,7 +38,7 @@ class PiController {
   }
 
  private:
-  double beta_, exponent_;
+  double beta_, exponent_, small_;
   double previous_ = 1e-4;
   bool last_rejected_ = false;
 };

@@ -3,7 +3,7 @@
 namespace mbsopt {
 
 IntegratorSettings default_integrator(double start_time, double end_time) {
-  constexpr double kSteps = 100;  // in the run, at least
+  constexpr double kSteps = 150;  // in the run, at least
   IntegratorSettings settings;
   settings.type = "dopri853";
   settings.rtol = 1e-8, settings.atol = 1e-10;
