@@ -21,6 +21,8 @@ std::string about_alpha(const FormulationSettings& f) {
   return fmt::format(". Or simulation.formulation.alpha is too large: {:.3g}, where 1e8 is usual", f.alpha);
 }
 
+constexpr double kPartsOfPlaced = 1000;  // of rounded_step(): a thousandth moves a stage by less than matters
+
 }  // namespace
 
 RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method)
@@ -139,9 +141,8 @@ double RungeKuttaRun::error_after_projection() {
 // Whether a step of another size, of `wanted` as far as the singular position allows, is to be tried in its place.
 bool RungeKuttaRun::better_placed_by(double wanted, double largest) {
   projector_.response(response_);
-  if (passage_->well_placed(step_.t, step_.h, wanted, response_)) return false;
-  const double proposed = std::min(passage_->propose(step_.t, wanted), std::max(largest, wanted));
-  return std::abs(proposed - step_.h) > 0.02 * step_.h;
+  if (passage_->well_placed(step_.t, step_.h, wanted, largest, response_)) return false;
+  return std::abs(passage_->propose(step_.t, wanted, largest) - step_.h) > 0.02 * step_.h;
 }
 
 RungeKuttaRun::Outcome RungeKuttaRun::attempt(double h, bool adaptive, bool exact, double& error) {
@@ -328,10 +329,10 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
       h = propose_step(step_.t, h, events.stop_after(step_.t), adaptive);
       wanted = h;
       if (adaptive && passage_) {
-        largest = std::min(settings_.integrator.max_step.value_or(INFINITY), rate > 0 ? 2 / rate : INFINITY);
-        const double placed = passage_->propose(step_.t, h);
-        if (placed != h) h = rounded_step(placed);
-        h = std::min({h, std::max(largest, wanted), events.stop_after(step_.t) - step_.t});
+        largest = std::min(
+            {s.max_step.value_or(INFINITY), rate > 0 ? 2 / rate : INFINITY, events.stop_after(step_.t) - step_.t});
+        const double placed = passage_->propose(step_.t, wanted, largest);
+        if (placed != wanted) h = rounded_step(placed, kPartsOfPlaced);
       }
       if (!adaptive && rate * h > 3) {
         stop(

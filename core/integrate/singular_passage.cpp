@@ -56,12 +56,13 @@ void SingularPassage::tabulate() {
 // Of steps of one size, not far from h, that reach t*, `left` away: those after which least is left; where it is too
 // near for them a shorter step past it. Continuous in both but where another number of steps is better: rounding does
 // not change much.
-SingularPassage::Choice SingularPassage::choose(double left, double h) const {
+SingularPassage::Choice SingularPassage::choose(double left, double h, double most) const {
+  const double longest = std::min(kStretch * h, most);
   Choice best{h, kNone};
   for (int before = 0; before <= kPlanned; ++before) {
     for (int k = 0; k < good_count_; ++k) {
       const Passage& good = good_[static_cast<std::size_t>(k)];
-      const double wanted = left / (before + good.theta), size = std::min(wanted, kStretch * h);
+      const double wanted = left / (before + good.theta), size = std::min(wanted, longest);
       if (size < kShrink * h) continue;
       const double there = size == wanted ? good.magnified : uncertain(left / size - before);
       const double rounding = rounding_of(there, size / h);
@@ -128,7 +129,7 @@ SingularPassage::Estimate SingularPassage::estimate() const {
   return {t, std::min(std::abs(t - last_.t), std::abs(t - now_.t))};
 }
 
-bool SingularPassage::well_placed(double t, double h, double wanted, const Eigen::VectorXd& response) {
+bool SingularPassage::well_placed(double t, double h, double wanted, double most, const Eigen::VectorXd& response) {
   now_.t = t + h, now_.response = response, now_.known = true;
   now_.inverse = 1 / std::cbrt(std::max(response.norm(), 1e-300));
   found_ = ahead_;
@@ -138,8 +139,9 @@ bool SingularPassage::well_placed(double t, double h, double wanted, const Eigen
   if (found_.t == kNone) return true;
   tabulate();
   const double left = found_.t - t;
-  const double rounding = left < h ? rounding_of(magnified(left / h), h / wanted) : choose(left - h, wanted).rounding;
-  if (!(rounding > kWorse * choose(left, wanted).rounding)) return true;
+  const double rounding =
+      left < h ? rounding_of(magnified(left / h), h / wanted) : choose(left - h, wanted, most).rounding;
+  if (!(rounding > kWorse * choose(left, wanted, most).rounding)) return true;
   ahead_ = found_;
   std::swap(tried_, now_);
   now_.known = false;
@@ -159,10 +161,10 @@ void SingularPassage::accept() {
   before_.known = tried_.known = false;
 }
 
-double SingularPassage::propose(double t, double h) const {
+double SingularPassage::propose(double t, double wanted, double most) const {
   const double left = ahead_.t - t;
-  if (!(left > 0) || left > (kPlanned + 1) * kStretch * h) return h;
-  return choose(left, h).h;
+  if (!(left > 0) || left > (kPlanned + 1) * kStretch * wanted) return wanted;
+  return choose(left, wanted, most).h;
 }
 
 bool SingularPassage::near(double t, double h) const {

@@ -10,8 +10,8 @@
 // its inverse goes through zero, and its sign changes.
 //
 //   SingularPassage passage(method, constraints);
-//   h = passage.propose(t, wanted);  // attempt it; then, with the response at its end:
-//   if (passage.well_placed(t, h, wanted, response)) passage.accept();
+//   h = passage.propose(t, wanted, most);  // attempt it; then, with the response at its end:
+//   if (passage.well_placed(t, h, wanted, most, response)) passage.accept();
 //   // otherwise again, with what propose() says now
 #pragma once
 
@@ -31,11 +31,11 @@ class SingularPassage {
   }
 
   void forget();  // what went before
-  // wanted: the size that accuracy asks for.
-  bool well_placed(double t, double h, double wanted, const Eigen::VectorXd& response);
+  // wanted: the size that accuracy asks for; most: what no step exceeds, at least that.
+  bool well_placed(double t, double h, double wanted, double most, const Eigen::VectorXd& response);
   void accept();
-  // A step from t of size h at most, or a little more, with regard to the next singular position.
-  double propose(double t, double h) const;
+  // A step from t of the wanted size at most, or a little more, with regard to the next singular position.
+  double propose(double t, double wanted, double most) const;
   // Whether a step from t by h is one that passes a singular position, or a neighbour of one.
   bool near(double t, double h) const;
   // Whether one was passed after t.
@@ -67,7 +67,7 @@ class SingularPassage {
     double h, rounding;
   };
   double uncertain(double theta) const;  // what is magnified at most, next to theta
-  Choice choose(double left, double h) const;
+  Choice choose(double left, double h, double most) const;
   void tabulate();
   // What a step leaves, of a size relative to that of its neighbours: accelerations next to t* are off by 1/d^3.
   static double rounding_of(double magnified, double size) { return magnified / (size * size * size); }

@@ -9,11 +9,11 @@
 
 namespace mbsopt {
 
-// h rounded down to a power of e^(1/100): estimates of error that differ by rounding lead to the very same step, and
+// h rounded down to a power of e^(1/parts): estimates of error that differ by rounding lead to the very same step, and
 // with it to results that differ by rounding only, where steps that differ in their last digits would put a part of the
 // method's error between them. Costs 0.5 % of h on average. Powers of two would put steps on round times, where laws
 // have their corners.
-inline double rounded_step(double h) { return std::exp(std::floor(100 * std::log(h)) / 100); }
+inline double rounded_step(double h, double parts = 100) { return std::exp(std::floor(parts * std::log(h)) / parts); }
 
 // h -> h * factor with factor = 0.9 err^-(1/k - 0.75 beta) err_old^beta, k the power of h in the estimate (p for an
 // estimate of order p - 1), beta = 0.2/k; at most 6, which is taken where the error would stay below a half with it:

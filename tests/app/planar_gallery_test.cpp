@@ -5,6 +5,7 @@
 
 #include "app/json/read_problem.hpp"
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/scene/default_integrator.hpp"
 #include "optim/evaluator.hpp"
 #include "optim/tradeoff_runs.hpp"
 #include "tests/app/gallery_files.hpp"
@@ -40,8 +41,9 @@ Problem to_compare(const std::string& name, By by) {
   if (by == By::file) return problem;
   simulation.formulation = {};
   simulation.accuracy.reset();
-  simulation.integrator = {};
+  simulation.integrator = default_integrator(simulation.start_time, simulation.end_time);
   if (by != By::defaults) {
+    simulation.integrator = {};
     simulation.integrator.type = by == By::dopri5_at_1e9 ? "dopri5" : "dopri853";
     simulation.integrator.rtol = 1e-9, simulation.integrator.atol = 1e-11;
   }
@@ -74,7 +76,7 @@ TEST_CASE("the planar model gives the values and gradients of the spatial one on
   const By by = GENERATE(By::defaults, By::dopri5_at_1e9, By::dopri853_at_1e9);
   int files = 0;
   for (const std::string& name : gallery()) {
-    if (by == By::dopri853_at_1e9 && name == "four_bar/windows") continue;  // magnifies rounding: below
+    if (name == "four_bar/windows" && by != By::dopri5_at_1e9) continue;  // magnifies rounding: below
     const Problem problem = to_compare(name, by);
     const std::vector<Objective> objectives = objectives_of(problem);
     if (objectives.empty() || problem.scene.parameters.empty() || !is_planar(problem)) continue;
@@ -98,6 +100,7 @@ TEST_CASE("both models take steps of their own to the same values and gradients 
   const By by = GENERATE(By::file, By::defaults);
   int files = 0;
   for (const std::string& name : gallery()) {
+    if (name == "four_bar/windows" && by == By::defaults) continue;  // below
     const Problem problem = to_compare(name, by);
     const std::vector<Objective> objectives = objectives_of(problem);
     if (objectives.empty() || problem.scene.parameters.empty() || !is_planar(problem)) continue;
@@ -135,6 +138,24 @@ TEST_CASE("the planar model gives the gradient of the spatial one through singul
     INFO("rtol " << rtol << ": " << a.message << b.message);
     REQUIRE((a.ok && b.ok));
     CHECK(apart(problem, a, b) < 1e-9);
+  }
+}
+
+// A step cut to the limit after it was placed would pass anywhere.
+TEST_CASE("a limit of steps does not spoil gradients through singular positions", "[planar]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
+  Problem problem = to_compare("four_bar/windows", By::defaults);
+  const std::vector<Objective> objectives = objectives_of(problem);
+  for (int k = 0; k < 30; ++k) {
+    problem.scene.simulation.integrator.atol = 1e-10 * (1 + 0.05 * k);
+    Evaluator planar(problem.scene, objectives, {}, by_adjoint());
+    const Evaluation& a = planar.gradients(planar.start());
+    const Evaluation b = spatial(problem.scene, objectives, a.steps);
+    INFO("atol " << problem.scene.simulation.integrator.atol << ": " << a.message << b.message);
+    REQUIRE((a.ok && b.ok));
+    CHECK(apart(problem, a, b) < 3e-10);
   }
 }
 
