@@ -29,7 +29,10 @@ TEST_CASE("work-precision curves are monotone in work and bound, gradients inclu
 #endif
   const Swept swept =
       GENERATE(Swept{"five_bar/design", {"simulation.end_time=1"}, 1}, Swept{"andrews/simulate", {}, 0.5},
-               Swept{"governor/stiff_flyball", {"simulation.end_time=0.1"}, 2});
+               Swept{"governor/stiff_flyball", {"simulation.end_time=0.1"}, 2},
+               Swept{"four_bar/windows",
+                     {"simulation.end_time=2", "simulation.integrator.max_steps=5000"},
+                     0.5});  // past two singular positions
   INFO(swept.name);
   const Problem problem = read_problem(file_of(swept.name), swept.sets);
   CountedClock clock;
