@@ -21,6 +21,13 @@ std::string about_alpha(const FormulationSettings& f) {
   return fmt::format(". Or simulation.formulation.alpha is too large: {:.3g}, where 1e8 is usual", f.alpha);
 }
 
+std::string too_long(double span, double longest) {
+  return fmt::format(
+      "a run of {:.3g} s is too long for this motion, whose steps are {:.3g} s at most: the time could no longer be "
+      "told. Is simulation.end_time in seconds?",
+      span, longest);
+}
+
 constexpr double kPartsOfPlaced = 1000;  // of rounded_step(): a thousandth moves a stage by less than matters
 
 }  // namespace
@@ -305,6 +312,11 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   StiffnessWatch stiffness(rk_, mechanism_.states());
   double h = adaptive ? first_step(s, span) : s.step.value_or(span);
   if (s.max_step) h = std::min(h, *s.max_step);
+  double longest = h;  // step so far
+  constexpr double kMostSteps = 1e10;
+  if (adaptive && longest * kMostSteps * kMostSteps < span) {  // steps may still grow, but not so much
+    stop(SimulationStatus::step_too_small, too_long(span, longest));
+  }
   std::size_t frozen_index = 0;
   int placed_again = 0;
   if (passage_) passage_->forget();
@@ -373,7 +385,8 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
       const double factor = controller.after_rejection(outcome == Outcome::rejected ? error : INFINITY);
       h = rounded_step(h * factor);
       if (h < 1e-14 * std::max(span, std::abs(step_.t))) {
-        stop(SimulationStatus::step_too_small, failed(outcome, h, adaptive));
+        stop(SimulationStatus::step_too_small,
+             longest * kMostSteps < span ? too_long(span, longest) : failed(outcome, h, adaptive));
       }
       continue;
     }
@@ -381,6 +394,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     ++result.statistics.steps;
     result.steps.times.push_back(step_.t);
     result.steps.sizes.push_back(h);
+    longest = std::max(longest, h);
     const Energy energy_now = update_statistics(result);
     if (!options.frozen) {  // given steps have been looked at where they were found
       const std::string objection = guard_.objection(step_.t1, step_.y1, energy_now, dynamics_.worst_residual());

@@ -42,6 +42,18 @@ TEST_CASE("a run too short for the digits of its time is refused", "[extremes]")
   CHECK(values(p).ok());
 }
 
+TEST_CASE("a run so long that its times could not be told from each other says so, and does not blame the mechanism",
+          "[extremes]") {
+  Json p = pendulum();
+  p["simulation"]["end_time"] = GENERATE(1e30, 1e300);
+  const std::string method = GENERATE(as<std::string>{}, "dopri5", "dopri853", "bs3", "radau5");
+  p["simulation"]["integrator"] = {{"type", method}};
+  const Outcome run = values(p);
+  INFO(method << ", to " << p["simulation"]["end_time"] << ": " << run.message());
+  REQUIRE_FALSE(run.ok());
+  CHECK_THAT(run.message(), Contains("is too long for this motion") && Contains("simulation.end_time"));
+}
+
 TEST_CASE("steps, tolerances and rows that no run gets through are refused with their place in the file",
           "[extremes]") {
   const auto [key, value, words] = GENERATE(table<std::string, double, std::string>(
