@@ -21,7 +21,7 @@ LadderDerivative climb(const RungAt& rung_at, Eigen::Index size, double base, do
   LadderDerivative best;
   best.derivative.setZero(size);
   best.error.setConstant(size, kInfinity);
-  best.rounding.setZero(size), best.step.setZero(size);
+  best.rounding.setZero(size), best.step.setZero(size), best.largest.setZero(size);
   std::vector<Eigen::VectorXd> above, row;  // rows j - 1 and j of T
   double h = options.step;
   for (int j = 0; j < options.rungs; ++j, h /= 2) {
@@ -46,6 +46,7 @@ LadderDerivative climb(const RungAt& rung_at, Eigen::Index size, double base, do
         if (!(error < best.error(i))) continue;
         best.error(i) = error, best.derivative(i) = row[k](i);
         best.rounding(i) = rounding(i), best.step(i) = std::abs(h);
+        best.largest(i) = std::ldexp(std::abs(h), static_cast<int>(k));
       }
     }
     above = row;

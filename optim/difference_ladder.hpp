@@ -25,7 +25,8 @@ struct LadderDerivative {
   // Estimated; infinite where no step could be evaluated, the largest double where only one could.
   Eigen::VectorXd error;
   Eigen::VectorXd rounding;  // the part of it that comes from the noise of f
-  Eigen::VectorXd step;      // of the rung taken
+  Eigen::VectorXd step;      // of the rung taken,
+  Eigen::VectorXd largest;   // and of the first of those that it is extrapolated from
   int evaluations = 0;
   bool has_estimate(Eigen::Index i) const { return error(i) < std::numeric_limits<double>::max(); }
 };

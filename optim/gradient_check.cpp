@@ -143,7 +143,8 @@ class Check {
           if (!d.has_estimate(i)) d.derivative(i) = kNaN, d.error(i) = kInfinity;
         (frozen ? result_.frozen : result_.free).col(k) = d.derivative;
         (frozen ? frozen_error_ : free_error_).col(k) = d.error;
-        if (!frozen) free_step_.col(k) = d.step, on_base_steps_.col(k) = d.step.array() < 0.75 * other_steps;
+        if (!frozen) free_step_.col(k) = d.step;
+        if (!frozen && result_.discrete) on_base_steps_.col(k) = d.largest.array() < 0.75 * other_steps;
         (frozen ? result_.frozen_cost : result_.free_cost).wall_seconds += stopwatch.seconds();
       }
       if (options_.progress) options_.progress(static_cast<int>(k) + 1, static_cast<int>(P));
@@ -165,8 +166,9 @@ class Check {
 
   // Free differences differ from the derivatives of the numbers on frozen steps by the derivative of the integration
   // error, and carry its jumps from step sequence to step sequence, divided by the step. How large these are the
-  // smallest steps show, too, where both differences were taken. Where all runs took the steps of the base run, as
-  // rounded ones mostly do (step_control.hpp), free differences are as good as frozen ones.
+  // smallest steps show, too, where both differences were taken. Where all runs that an
+  // entry is made of took the steps of the base run, as rounded ones often do (step_control.hpp), it is as good as one
+  // on frozen steps.
   void estimate_integration_error() {
     if (!options_.free_steps && result_.discrete) return;
     const auto error_of = [&](GradientMethod method, const MatrixXd& psi_rho) {

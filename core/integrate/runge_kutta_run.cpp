@@ -409,6 +409,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
     if (adaptive) {
       // Past a singular position the estimate is magnified rounding, which is not to decide on the next step.
       const bool passed = passage_ && passage_->passed_since(step_.t);
+      if (passed) controller.after_passage();
       double proposed = passed ? wanted : rounded_step(h * controller.after_acceptance(error));
       // The factor of an implicit method serves as long as the step stays.
       if (implicit_ && proposed >= h && proposed < ImplicitStages::kKeepStep * h) proposed = h;

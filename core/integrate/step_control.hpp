@@ -13,11 +13,14 @@ namespace mbsopt {
 // with it to results that differ by rounding only, where steps that differ in their last digits would put a part of the
 // method's error between them. Costs 0.5 % of h on average. Powers of two would put steps on round times, where laws
 // have their corners.
-inline double rounded_step(double h, double parts = 100) { return std::exp(std::floor(parts * std::log(h)) / parts); }
+inline double rounded_step(double h, double parts = 100) {
+  constexpr double kOnIt = 1e-9;  // such a power stays as it is
+  return std::exp(std::floor(parts * std::log(h) + kOnIt) / parts);
+}
 
 // h -> h * factor with factor = 0.9 err^-(1/k - 0.75 beta) err_old^beta, k the power of h in the estimate (p for an
 // estimate of order p - 1), beta = 0.2/k; at most 6, which is taken where the error would stay below a half with it:
-// estimates so small are mostly rounding.
+// estimates so small are mostly rounding, by methods of high order.
 class PiController {
  public:
   explicit PiController(int error_order)
@@ -32,6 +35,8 @@ class PiController {
     last_rejected_ = false;
     return factor;
   }
+  // A step whose estimate is not to decide on the next one.
+  void after_passage() { last_rejected_ = false; }
   double after_rejection(double error) {
     last_rejected_ = true;
     return std::isfinite(error) ? std::max(0.2, 0.9 * std::pow(error, -exponent_)) : 0.2;

@@ -72,6 +72,7 @@ TEST_CASE("a running cost that grows without bounds but has an integral is no po
   const std::string method = GENERATE(as<std::string>{}, "dopri5", "dopri853", "radau5");
   const bool root = GENERATE(true, false);
   const auto integral = [&](double of) { return root ? 2 * std::sqrt(of) : of - of * std::log(of); };  // from 0
+  int all = 0, right = 0;
   for (double pole = 0.40123; pole < 0.6; pole += 0.0107) {
     const std::string distance = fmt::format("abs(t - {})", pole);
     const Json p = judged(root ? "1/sqrt(" + distance + ")" : "-log(" + distance + ")", method);
@@ -80,9 +81,13 @@ TEST_CASE("a running cost that grows without bounds but has an integral is no po
     REQUIRE(run.ok());
     const double exact = integral(pole) + integral(1 - pole);
     INFO(run("judged") << " for " << exact);
-    const bool right = std::abs(run("judged") - exact) < 0.2 * exact;
-    CHECK((right || warnings_of(p).find("do not resolve the running cost of objective 'judged'") != std::string::npos));
+    const bool is_right = std::abs(run("judged") - exact) < 0.2 * exact;
+    ++all, right += is_right;
+    CHECK((is_right ||
+           warnings_of(p).find("do not resolve the running cost of objective 'judged'") != std::string::npos));
   }
+  INFO(method << ": " << right << " of " << all);
+  CHECK(right > 0.6 * all);
 }
 
 TEST_CASE("a running cost that the steps do not resolve is a warning with its name, the error and what to change",

@@ -9,7 +9,8 @@ TEST_CASE("steps are rounded down, by a hundredth at most", "[step_control]") {
   for (double h = 1e-12; h < 1e6; h *= 1.0037) {
     const double rounded = rounded_step(h);
     INFO("h = " << h);
-    CHECK(rounded <= h * (1 + 1e-14));
+    CHECK(rounded <= h * (1 + 1e-10));
+    CHECK(rounded_step(rounded) == Approx(rounded).epsilon(1e-14));
     CHECK(rounded > h * 0.99);
     CHECK(100 * std::log(rounded) == Approx(std::round(100 * std::log(rounded))).margin(1e-9));
   }
