@@ -48,6 +48,11 @@ Eigen::VectorXd alpha_of_factor(const MechanismData& data, const FormulationSett
   return Eigen::VectorXd::Constant(data.m, moderate ? moderate_alpha(data, settings.alpha) : settings.alpha);
 }
 
+bool any_force(const MechanismData& d) {
+  return !(d.tsda.empty() && d.rsda.empty() && d.applied.empty() && d.bushings.empty() && d.turning_frictions.empty() &&
+           d.sliding_frictions.empty() && d.user_forces.empty());
+}
+
 constexpr double kDerivativeTolerance = 1e-12;
 
 double compliance_of(const FormulationSettings& settings) {
@@ -62,7 +67,9 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
       settings_(of_mechanism(data_, settings)),
       laws_(data_),
       forces_(data_),
-      solver_(data_, alpha_of_factor(data_, settings_), compliance_of(settings)) {
+      solver_(data_, alpha_of_factor(data_, settings_), compliance_of(settings)),
+      has_forces_(any_force(data_)),
+      forces_read_y_(!(data_.applied.empty() && data_.user_forces.empty())) {
   const std::size_t n = static_cast<std::size_t>(data_.n);
   const Eigen::Index m = data_.m, P = data_.rho.size();
   if (model == Model::planar) {
@@ -109,32 +116,34 @@ SaddleSolver::Settings Dynamics::solver_settings(bool derivative) const {
 
 double Dynamics::compliance() const { return compliance_of(settings_); }
 
-void Dynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, bool at_no_acceleration) {
-  const Vec<6> none = Vec<6>::Zero();
+void Dynamics::set_time_and_angles(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
   t_ = t;
-  y_ = y;
+  if (forces_read_y_) y_ = y;
   angles_ = angles;
   laws_.set_time(t);
   if (linear_) linear_->current = false;
-  for (int i = 1; i <= data_.n; ++i) {
-    const std::size_t k = static_cast<std::size_t>(i);
-    set_position(y.segment<7>(7 * (i - 1)), bodies_[k], frames_[k]);
-    set_velocity(y.segment<7>(7 * (data_.n + i - 1)), bodies_[k], frames_[k]);
-    if (at_no_acceleration) set_acceleration(none, bodies_[k], frames_[k]);
-  }
 }
 
-void Dynamics::set_loads() {
+void Dynamics::set_body(const Eigen::VectorXd& y, int body) {
+  const std::size_t k = static_cast<std::size_t>(body);
+  set_position(y.segment<7>(7 * (body - 1)), bodies_[k], frames_[k]);
+  set_velocity(y.segment<7>(7 * (data_.n + body - 1)), bodies_[k], frames_[k]);
+}
+
+void Dynamics::set_own_load(int body) {
+  const std::size_t k = static_cast<std::size_t>(body);
+  const BodyData& b = data_.bodies[k];
+  const Vector3d omega = bodies_[k].omega();
+  loads_[k - 1].head<3>() = b.mass * data_.gravity;
+  loads_[k - 1].tail<3>() = -omega.cross(b.J * omega);
+}
+
+void Dynamics::add_forces() {
+  if (!has_forces_) return;
   for (Vec<6>& load : body_loads_) load.setZero();
   forces_.add_loads(here(), body_loads_);
   if (!data_.user_forces.empty()) add_user_loads();
-  for (std::size_t i = 0; i < loads_.size(); ++i) {
-    const BodyData& body = data_.bodies[i + 1];
-    const Vector3d omega = bodies_[i + 1].omega();
-    loads_[i] = body_loads_[i + 1];
-    loads_[i].head<3>() += body.mass * data_.gravity;
-    loads_[i].tail<3>() -= omega.cross(body.J * omega);
-  }
+  for (std::size_t i = 0; i < loads_.size(); ++i) loads_[i] += body_loads_[i + 1];
 }
 
 // What accelerations are of: loads on each body alone, and turning.
@@ -165,8 +174,15 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
     note_residual(planar_->residual_ratio(), planar_->residual_size(), [&] { return planar_->usual_acceleration(); });
     return finite;
   }
-  set_state(t, y, angles, true);
-  set_loads();
+  set_time_and_angles(t, y, angles);
+  const Vec<6> none = Vec<6>::Zero();
+  for (int i = 1; i <= data_.n; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    set_body(y, i);
+    set_acceleration(none, bodies_[k], frames_[k]);
+    set_own_load(i);
+  }
+  add_forces();
   if (!solver_.factor(frames_, &gamma_)) return false;
   laws_.subtract_f_tt(gamma_);
   if (settings_.omega != 0) {
