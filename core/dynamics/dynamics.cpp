@@ -1,6 +1,7 @@
 #include "core/dynamics/dynamics.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 
@@ -72,6 +73,10 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
       forces_read_y_(!(data_.applied.empty() && data_.user_forces.empty())) {
   const std::size_t n = static_cast<std::size_t>(data_.n);
   const Eigen::Index m = data_.m, P = data_.rho.size();
+  if (!has_forces_ && std::any_of(data_.bodies.begin() + 1, data_.bodies.end(), [](auto& b) { return b.mass > 0; })) {
+    const bool planar = model == Model::planar;
+    free_fall_ = planar ? std::sqrt(squared_norm(data_.planar->gravity)) : data_.gravity.norm();
+  }
   if (model == Model::planar) {
     planar_ = std::make_unique<PlanarDynamics>(data_, settings_, solver_.alpha(), compliance_of(settings),
                                                solver_settings(false), solver_settings(true));
@@ -159,19 +164,40 @@ double Dynamics::usual_acceleration() const {
   return largest;
 }
 
-// Where nothing accelerates (a wheel driven at constant speed) what is left is rounding.
+// What usual_acceleration() sees of a body's turning.
+double Dynamics::turning_acceleration(const Eigen::VectorXd& y, int body) const {
+  const Eigen::Index v = 7 * (data_.n + body - 1);
+  const double omega = 2 * y.segment<4>(v + 3).norm();
+  return omega * (omega + y.segment<3>(v).norm());
+}
+
+double Dynamics::least_usual_acceleration(const Eigen::VectorXd& y) const {
+  return std::max(free_fall_, data_.n > 0 ? turning_acceleration(y, fastest_) : 0.0);
+}
+
+// Where nothing accelerates (a wheel driven at constant speed) what is left is rounding. The sweep over all bodies is
+// left out where one of them says that the residual is no larger than those before; which one, is looked for ever more
+// rarely, for loads may be more than any turning.
 template <class Usual>
-void Dynamics::note_residual(double ratio, double size, Usual&& usual_acceleration) {
-  if (settings_.type != FormulationType::augmented_lagrangian) return;
-  if (ratio > worst_residual_) ratio = std::min(ratio, size / usual_acceleration());
-  worst_residual_ = std::max(worst_residual_, ratio);
+void Dynamics::note_residual(double ratio, double size, const Eigen::VectorXd& y, Usual&& usual_acceleration) {
+  constexpr double kRounding = 1e-9;
+  if (settings_.type != FormulationType::augmented_lagrangian || !(ratio > worst_residual_)) return;
+  if (size <= (1 + kRounding) * worst_residual_ * least_usual_acceleration(y)) return;
+  worst_residual_ = std::max(worst_residual_, std::min(ratio, size / usual_acceleration()));
+  if (!std::has_single_bit(++sweeps_)) return;
+  double largest = 0;
+  for (int i = 1; i <= data_.n; ++i) {
+    const double turning = turning_acceleration(y, i);
+    if (turning > largest) largest = turning, fastest_ = i;
+  }
 }
 
 bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                         Eigen::Ref<Eigen::VectorXd> ydot) {
   if (planar_) {
     const bool finite = planar_->evaluate(t, y, angles, ydot);
-    note_residual(planar_->residual_ratio(), planar_->residual_size(), [&] { return planar_->usual_acceleration(); });
+    note_residual(planar_->residual_ratio(), planar_->residual_size(), y,
+                  [&] { return planar_->usual_acceleration(); });
     return finite;
   }
   set_time_and_angles(t, y, angles);
@@ -192,7 +218,7 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
   }
   g_ = -gamma_;
   solver_.solve(loads_, g_, solver_settings(false), z_, lambda_);
-  note_residual(solver_.residual_ratio(), solver_.residual_size(), [&] { return usual_acceleration(); });
+  note_residual(solver_.residual_ratio(), solver_.residual_size(), y, [&] { return usual_acceleration(); });
 
   const Eigen::Index half = 7 * data_.n;
   ydot.head(half) = y.tail(half);

@@ -121,7 +121,9 @@ class Dynamics {
   void set_own_load(int body);
   void add_forces();
   template <class Usual>
-  void note_residual(double ratio, double size, Usual&& usual_acceleration);
+  void note_residual(double ratio, double size, const Eigen::VectorXd& y, Usual&& usual_acceleration);
+  double least_usual_acceleration(const Eigen::VectorXd& y) const;
+  double turning_acceleration(const Eigen::VectorXd& y, int body) const;
   double usual_acceleration() const;
   ForceTerms::At here() const { return {t_, y_, angles_, frames_}; }
   void set_user_state(const UserForceData& force);
@@ -140,6 +142,9 @@ class Dynamics {
   std::unique_ptr<PlanarDynamics> planar_;  // where it is there, it does all the work
 
   double t_ = 0, worst_residual_ = 0;
+  unsigned long sweeps_ = 0;  // of usual accelerations
+  int fastest_ = 1;           // the body that turned fastest when last looked for
+  double free_fall_ = 0;      // what gravity alone gives some body, where there are no forces
   long linearised_states_ = 0;
   bool has_forces_, forces_read_y_;
   Eigen::VectorXd y_, angles_;  // y_: where forces read it
