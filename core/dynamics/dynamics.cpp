@@ -1,6 +1,7 @@
 #include "core/dynamics/dynamics.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 
@@ -48,6 +49,11 @@ Eigen::VectorXd alpha_of_factor(const MechanismData& data, const FormulationSett
   return Eigen::VectorXd::Constant(data.m, moderate ? moderate_alpha(data, settings.alpha) : settings.alpha);
 }
 
+bool any_force(const MechanismData& d) {
+  return !(d.tsda.empty() && d.rsda.empty() && d.applied.empty() && d.bushings.empty() && d.turning_frictions.empty() &&
+           d.sliding_frictions.empty() && d.user_forces.empty());
+}
+
 constexpr double kDerivativeTolerance = 1e-12;
 
 double compliance_of(const FormulationSettings& settings) {
@@ -62,9 +68,15 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
       settings_(of_mechanism(data_, settings)),
       laws_(data_),
       forces_(data_),
-      solver_(data_, alpha_of_factor(data_, settings_), compliance_of(settings)) {
+      solver_(data_, alpha_of_factor(data_, settings_), compliance_of(settings)),
+      has_forces_(any_force(data_)),
+      forces_read_y_(!(data_.applied.empty() && data_.user_forces.empty())) {
   const std::size_t n = static_cast<std::size_t>(data_.n);
   const Eigen::Index m = data_.m, P = data_.rho.size();
+  if (!has_forces_ && std::any_of(data_.bodies.begin() + 1, data_.bodies.end(), [](auto& b) { return b.mass > 0; })) {
+    const bool planar = model == Model::planar;
+    free_fall_ = planar ? std::sqrt(squared_norm(data_.planar->gravity)) : data_.gravity.norm();
+  }
   if (model == Model::planar) {
     planar_ = std::make_unique<PlanarDynamics>(data_, settings_, solver_.alpha(), compliance_of(settings),
                                                solver_settings(false), solver_settings(true));
@@ -109,32 +121,34 @@ SaddleSolver::Settings Dynamics::solver_settings(bool derivative) const {
 
 double Dynamics::compliance() const { return compliance_of(settings_); }
 
-void Dynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, bool at_no_acceleration) {
-  const Vec<6> none = Vec<6>::Zero();
+void Dynamics::set_time_and_angles(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
   t_ = t;
-  y_ = y;
+  if (forces_read_y_) y_ = y;
   angles_ = angles;
   laws_.set_time(t);
   if (linear_) linear_->current = false;
-  for (int i = 1; i <= data_.n; ++i) {
-    const std::size_t k = static_cast<std::size_t>(i);
-    set_position(y.segment<7>(7 * (i - 1)), bodies_[k], frames_[k]);
-    set_velocity(y.segment<7>(7 * (data_.n + i - 1)), bodies_[k], frames_[k]);
-    if (at_no_acceleration) set_acceleration(none, bodies_[k], frames_[k]);
-  }
 }
 
-void Dynamics::set_loads() {
+void Dynamics::set_body(const Eigen::VectorXd& y, int body) {
+  const std::size_t k = static_cast<std::size_t>(body);
+  set_position(y.segment<7>(7 * (body - 1)), bodies_[k], frames_[k]);
+  set_velocity(y.segment<7>(7 * (data_.n + body - 1)), bodies_[k], frames_[k]);
+}
+
+void Dynamics::set_own_load(int body) {
+  const std::size_t k = static_cast<std::size_t>(body);
+  const BodyData& b = data_.bodies[k];
+  const Vector3d omega = bodies_[k].omega();
+  loads_[k - 1].head<3>() = b.mass * data_.gravity;
+  loads_[k - 1].tail<3>() = -omega.cross(b.J * omega);
+}
+
+void Dynamics::add_forces() {
+  if (!has_forces_) return;
   for (Vec<6>& load : body_loads_) load.setZero();
   forces_.add_loads(here(), body_loads_);
   if (!data_.user_forces.empty()) add_user_loads();
-  for (std::size_t i = 0; i < loads_.size(); ++i) {
-    const BodyData& body = data_.bodies[i + 1];
-    const Vector3d omega = bodies_[i + 1].omega();
-    loads_[i] = body_loads_[i + 1];
-    loads_[i].head<3>() += body.mass * data_.gravity;
-    loads_[i].tail<3>() -= omega.cross(body.J * omega);
-  }
+  for (std::size_t i = 0; i < loads_.size(); ++i) loads_[i] += body_loads_[i + 1];
 }
 
 // What accelerations are of: loads on each body alone, and turning.
@@ -150,23 +164,51 @@ double Dynamics::usual_acceleration() const {
   return largest;
 }
 
-// Where nothing accelerates (a wheel driven at constant speed) what is left is rounding.
+// What usual_acceleration() sees of a body's turning.
+double Dynamics::turning_acceleration(const Eigen::VectorXd& y, int body) const {
+  const Eigen::Index v = 7 * (data_.n + body - 1);
+  const double omega = 2 * y.segment<4>(v + 3).norm();
+  return omega * (omega + y.segment<3>(v).norm());
+}
+
+double Dynamics::least_usual_acceleration(const Eigen::VectorXd& y) const {
+  return std::max(free_fall_, data_.n > 0 ? turning_acceleration(y, fastest_) : 0.0);
+}
+
+// Where nothing accelerates (a wheel driven at constant speed) what is left is rounding. The sweep over all bodies is
+// left out where one of them says that the residual is no larger than those before; which one, is looked for ever more
+// rarely, for loads may be more than any turning.
 template <class Usual>
-void Dynamics::note_residual(double ratio, double size, Usual&& usual_acceleration) {
-  if (settings_.type != FormulationType::augmented_lagrangian) return;
-  if (ratio > worst_residual_) ratio = std::min(ratio, size / usual_acceleration());
-  worst_residual_ = std::max(worst_residual_, ratio);
+void Dynamics::note_residual(double ratio, double size, const Eigen::VectorXd& y, Usual&& usual_acceleration) {
+  constexpr double kRounding = 1e-9;
+  if (settings_.type != FormulationType::augmented_lagrangian || !(ratio > worst_residual_)) return;
+  if (size <= (1 + kRounding) * worst_residual_ * least_usual_acceleration(y)) return;
+  worst_residual_ = std::max(worst_residual_, std::min(ratio, size / usual_acceleration()));
+  if (!std::has_single_bit(++sweeps_)) return;
+  double largest = 0;
+  for (int i = 1; i <= data_.n; ++i) {
+    const double turning = turning_acceleration(y, i);
+    if (turning > largest) largest = turning, fastest_ = i;
+  }
 }
 
 bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                         Eigen::Ref<Eigen::VectorXd> ydot) {
   if (planar_) {
     const bool finite = planar_->evaluate(t, y, angles, ydot);
-    note_residual(planar_->residual_ratio(), planar_->residual_size(), [&] { return planar_->usual_acceleration(); });
+    note_residual(planar_->residual_ratio(), planar_->residual_size(), y,
+                  [&] { return planar_->usual_acceleration(); });
     return finite;
   }
-  set_state(t, y, angles, true);
-  set_loads();
+  set_time_and_angles(t, y, angles);
+  const Vec<6> none = Vec<6>::Zero();
+  for (int i = 1; i <= data_.n; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    set_body(y, i);
+    set_acceleration(none, bodies_[k], frames_[k]);
+    set_own_load(i);
+  }
+  add_forces();
   if (!solver_.factor(frames_, &gamma_)) return false;
   laws_.subtract_f_tt(gamma_);
   if (settings_.omega != 0) {
@@ -176,7 +218,7 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
   }
   g_ = -gamma_;
   solver_.solve(loads_, g_, solver_settings(false), z_, lambda_);
-  note_residual(solver_.residual_ratio(), solver_.residual_size(), [&] { return usual_acceleration(); });
+  note_residual(solver_.residual_ratio(), solver_.residual_size(), y, [&] { return usual_acceleration(); });
 
   const Eigen::Index half = 7 * data_.n;
   ydot.head(half) = y.tail(half);

@@ -107,7 +107,9 @@ class Dynamics {
   double worst_residual() const { return worst_residual_; }
 
  private:
-  void set_state(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, bool at_no_acceleration = false);
+  // The time, and what forces see of the state; and a body's part of the state.
+  void set_time_and_angles(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
+  void set_body(const Eigen::VectorXd& y, int body);
   void set_motion(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                   const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
   // What the state's and the parameters' directions do to b = f - M z - J'lambda (rhs_lanes_) and c = -(J z + gamma)
@@ -115,9 +117,13 @@ class Dynamics {
   void right_hand_side_tangent(const ParameterBlock& block, const LaneRows& y_dir);
   // y_bar, ... += gradient of  pddot_bar'pddot - eta'(M z + J'lambda - f) - mu'(J z + gamma)  with z and lambda fixed.
   void pull_back(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
-  void set_loads();  // f
+  // f: of gravity and turning, body by body, and of forces on all.
+  void set_own_load(int body);
+  void add_forces();
   template <class Usual>
-  void note_residual(double ratio, double size, Usual&& usual_acceleration);
+  void note_residual(double ratio, double size, const Eigen::VectorXd& y, Usual&& usual_acceleration);
+  double least_usual_acceleration(const Eigen::VectorXd& y) const;
+  double turning_acceleration(const Eigen::VectorXd& y, int body) const;
   double usual_acceleration() const;
   ForceTerms::At here() const { return {t_, y_, angles_, frames_}; }
   void set_user_state(const UserForceData& force);
@@ -136,8 +142,12 @@ class Dynamics {
   std::unique_ptr<PlanarDynamics> planar_;  // where it is there, it does all the work
 
   double t_ = 0, worst_residual_ = 0;
+  unsigned long sweeps_ = 0;  // of usual accelerations
+  int fastest_ = 1;           // the body that turned fastest when last looked for
+  double free_fall_ = 0;      // what gravity alone gives some body, where there are no forces
   long linearised_states_ = 0;
-  Eigen::VectorXd y_, angles_;
+  bool has_forces_, forces_read_y_;
+  Eigen::VectorXd y_, angles_;  // y_: where forces read it
   std::vector<BodyState> bodies_;
   std::vector<Frame> frames_;
   std::vector<Vec<6>> loads_, z_, eta_;  // loads_: f, without the ground

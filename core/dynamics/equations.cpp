@@ -19,7 +19,8 @@ Lanes<1> dot(const Vector4d& a, const Lanes<4>& b) {
 
 void Dynamics::set_motion(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                           const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda) {
-  set_state(t, y, angles);
+  set_time_and_angles(t, y, angles);
+  for (int i = 1; i <= data_.n; ++i) set_body(y, i);
   a_ = a;
   lambda_ = lambda;
   for (int i = 1; i <= data_.n; ++i) {
@@ -41,7 +42,8 @@ void Dynamics::place_at(double t, const Eigen::VectorXd& y, const Eigen::VectorX
 }
 
 void Dynamics::residual(Eigen::Ref<Eigen::VectorXd> r) {
-  set_loads();
+  for (int i = 1; i <= data_.n; ++i) set_own_load(i);
+  add_forces();
   for (int i = 1; i <= data_.n; ++i)
     loads_[static_cast<std::size_t>(i) - 1] -= solver_.mass_times(i, z_[static_cast<std::size_t>(i) - 1]);
   solver_.rows().subtract_transposed_times(lambda_, loads_);
