@@ -1,7 +1,7 @@
 // What integrates a problem that does not choose: dopri853 at rtol 1e-8, atol 1e-10, with steps of at most 1/150 of the
-// run. It costs some more right-hand sides than dopri5 at 1e-6 and is a thousand times more exact (docs/tradeoffs.md).
-// The limit is for what step-size control cannot see: a pulse between two steps, the quadrature of an objective, a kink
-// of a law in which only a derivative has it.
+// run. It costs three times the right-hand sides of dopri5 at 1e-6 and is a thousand times more exact
+// (docs/tradeoffs.md). The limit is for what step-size control cannot see: a pulse between two steps, the quadrature of
+// an objective, a kink of a law in which only a derivative has it.
 #pragma once
 
 #include "core/scene/settings.hpp"
