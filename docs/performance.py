@@ -247,8 +247,8 @@ Profile by `perf record -e cpu-clock` of right-hand sides in the spatial model, 
 solves with their products with J 28, J 14, Phiddot 9, frames with pddot 8, the rest 7. In a run with `dopri5` the right-hand sides are about three quarters; the
 rest is the projection, one to two right-hand sides per step, and the sums of the stages.
 
-* **Absolute times move by half** on this shared machine, with nothing else of ours running: of two runs of all of the above within ten minutes one read 0.45 to
-  0.71 us (spatial, 10 to 1000 bodies) and 49 ms (FB-1), the other up to 0.89 us and 68 ms. The tables are those of the first.
+* **Absolute times move by two** on this shared machine, with nothing else of ours running: the same program read 0.42 to 0.58 us (spatial, 10 to 1000 bodies) in one quarter of an
+  hour, 0.5 to 1.1 us in others, and 44 to 63 ms (FB-1).
 * **Growth to 10 000 bodies is memory.** A body has some 4 kB of frames, J, S and constraints, which a right-hand side goes through several times. Those of
   100 bodies stay in the second-level cache (2 MB), those of 10 000 come from the third. Passes of the solver no longer grow (`formulations.md`: 3 instead of 21
   along 10 000 rods in space). By parts, nanoseconds per body at 100 and at 10 000 bodies in space (spatial chain, the whole read 940 at the time): frames 62
@@ -258,7 +258,11 @@ rest is the projection, one to two right-hand sides per step, and the sums of th
   it is 1.2 to 1.3, before and after. Tried, without effect on the ratio: large pages; blocks of S set where they are first touched, 3 to 6 per cent slower at 10
   bodies; with it, frames set just before constraints read them, 5 to 8 per cent slower at 100. The ratio becomes larger where computing becomes faster. Chains of more than 316 joints in space take three
   passes instead of the two that stairs in a plane need.
-* **TLM per further parameter** on 501 bodies: the numbers of 50 directions no longer fit the processor's caches.
+* **TLM per further parameter** at 500 bodies: the directions of 50 parameters, 23 MB with their stages, and some 10 kB per body of blocks, J and S that every four directions
+  go through do not fit the second-level cache. Per body, stage and direction 81 bodies take 0.33 us and 500 take 0.44 to 0.47 (chain in space), spread over all loops alike: products with J,
+  sums of stages, substitutions, blocks of the equations. The ratio to a simulation, which grows less, read 0.33 to 0.37 in runs of half a minute and 0.47 to 0.55 in long ones. Tried:
+  one array for the stage's directions of all blocks instead of one each, and exchanged in place of copied states: 1 to 3 per cent. Eight directions at a time would halve what each
+  has to load, and double the cost of problems with up to four parameters.
 * **FB-1** takes nine evaluations with gradients at the tolerance of its file, 1e-9 with `dopri853`; on an idle machine 41 to 44 ms, beside other programs up to 70.
   A twentieth goes to comparing names within the linear solver of Ipopt, 6 to 7 % of each simulation to finding singular positions.
 * **Set-up**: names of bodies and joints are looked up in a table; before, compiling grew with the square of their number. Initial assembly is dense where the guess
