@@ -153,6 +153,7 @@ LadderDerivative certain_differences(const LadderFunction& psi_at, Eigen::Index 
       if (!(smaller.error(i) < best.error(i))) continue;
       best.error(i) = smaller.error(i), best.derivative(i) = smaller.derivative(i);
       best.rounding(i) = smaller.rounding(i), best.step(i) = smaller.step(i);
+      best.largest(i) = smaller.largest(i);
     }
   }
   return best;

@@ -166,9 +166,8 @@ class Check {
 
   // Free differences differ from the derivatives of the numbers on frozen steps by the derivative of the integration
   // error, and carry its jumps from step sequence to step sequence, divided by the step. How large these are the
-  // smallest steps show, too, where both differences were taken. Where all runs that an
-  // entry is made of took the steps of the base run, as rounded ones often do (step_control.hpp), it is as good as one
-  // on frozen steps.
+  // smallest steps show, too, where both differences were taken. Where all runs that an entry is made of took the steps
+  // of the base run, as rounded ones often do (step_control.hpp), it is as good as one on frozen steps.
   void estimate_integration_error() {
     if (!options_.free_steps && result_.discrete) return;
     const auto error_of = [&](GradientMethod method, const MatrixXd& psi_rho) {

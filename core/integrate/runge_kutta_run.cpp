@@ -13,21 +13,6 @@
 namespace mbsopt {
 namespace {
 
-// Where S = M + alpha J'J may have lost M to rounding: what to change, as the end of a message.
-std::string about_alpha(const FormulationSettings& f) {
-  constexpr double kLarge = 1e13;
-  const bool keeps_digits = f.type == FormulationType::penalty && f.linear_solver == LinearSolver::quasidefinite;
-  if (keeps_digits || f.alpha < kLarge) return {};
-  return fmt::format(". Or simulation.formulation.alpha is too large: {:.3g}, where 1e8 is usual", f.alpha);
-}
-
-std::string too_long(double span, double longest) {
-  return fmt::format(
-      "a run of {:.3g} s is too long for this motion, whose steps are {:.3g} s at most: the time could no longer be "
-      "told. Is simulation.end_time in seconds?",
-      span, longest);
-}
-
 constexpr double kPartsOfPlaced = 1000;  // of rounded_step(): a thousandth moves a stage by less than matters
 
 }  // namespace
@@ -176,50 +161,6 @@ RungeKuttaRun::Outcome RungeKuttaRun::attempt(double h, bool adaptive, bool exac
   return Outcome::accepted;
 }
 
-std::string RungeKuttaRun::failed(Outcome outcome, double h, bool adaptive) const {
-  switch (outcome) {
-    case Outcome::unsolved:
-      return fmt::format(
-          "the stages of the implicit step from t = {:.6g} s by {:.3g} s were not found: Newton's method did "
-          "not converge. {} for a law that is not smooth or not finite, a singular position, or a drive that asks for "
-          "more than the mechanism reaches, near this time",
-          step_.t, h, adaptive ? "Look" : "Use a smaller step, or look");
-    case Outcome::off_constraints:
-      return adaptive
-                 ? fmt::format(
-                       "no position and velocity beyond t = {:.6g} s meet the constraints, however small the step. "
-                       "Does a drive ask for more than the mechanism reaches, or is the position singular? Look at the "
-                       "laws of drives and the lengths",
-                       step_.t)
-                 : fmt::format(
-                       "after the step from t = {:.6g} s by {:.3g} s no position and velocity nearby meet the "
-                       "constraints. The step is too large for this motion, or a drive asks for more than the "
-                       "mechanism "
-                       "reaches: use a smaller step, or an adaptive integrator (no \"step\")",
-                       step_.t, h);
-    case Outcome::failed:
-      return (adaptive
-                  ? fmt::format(
-                        "the accelerations cannot be computed beyond t = {:.6g} s, however small the step. Look for a "
-                        "law or "
-                        "force that is not finite there (a root, logarithm or division outside its range), or a "
-                        "body without inertia in a direction that no joint holds",
-                        step_.t)
-                  : fmt::format("the state stopped being finite in the step from t = {:.6g} s by {:.3g} s. The step is "
-                                "too large "
-                                "for this motion: use a smaller step, or an adaptive integrator (no \"step\")",
-                                step_.t, h)) +
-             about_alpha(settings_.formulation);
-    default:
-      return fmt::format(
-          "the step fell to {:.3g} s at t = {:.6g} s and its error is still too large. Look for a "
-          "singular position, a drive that asks for more than the mechanism reaches, a spring of zero length or a law "
-          "that is not smooth near this time; "
-          "looser tolerances or a fixed step may pass it",
-          h, step_.t);
-  }
-}
-
 void RungeKuttaRun::set_y_hat() {
   StageSum sum;
   for (int i = 0; i < rk_.stages; ++i) sum.add(step_.h * rk_.b[i], step_.K.col(i).data());
@@ -315,7 +256,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   double longest = h;  // step so far
   constexpr double kMostSteps = 1e10;
   if (adaptive && longest * kMostSteps * kMostSteps < span) {  // steps may still grow, but not so much
-    stop(SimulationStatus::step_too_small, too_long(span, longest));
+    stop(SimulationStatus::step_too_small, too_long_run(span, longest));
   }
   std::size_t frozen_index = 0;
   int placed_again = 0;
@@ -378,7 +319,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
         stop(outcome == Outcome::unsolved          ? SimulationStatus::not_solved
              : outcome == Outcome::off_constraints ? SimulationStatus::step_too_large
                                                    : SimulationStatus::not_finite,
-             failed(outcome, h, adaptive));
+             step_failure(outcome, step_.t, h, adaptive, settings_.formulation));
         break;
       }
       ++result.statistics.rejected;
@@ -386,7 +327,8 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
       h = rounded_step(h * factor);
       if (h < 1e-14 * std::max(span, std::abs(step_.t))) {
         stop(SimulationStatus::step_too_small,
-             longest * kMostSteps < span ? too_long(span, longest) : failed(outcome, h, adaptive));
+             longest * kMostSteps < span ? too_long_run(span, longest)
+                                         : step_failure(outcome, step_.t, h, adaptive, settings_.formulation));
       }
       continue;
     }

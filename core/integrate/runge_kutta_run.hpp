@@ -13,6 +13,7 @@
 #include "core/integrate/singular_passage.hpp"
 #include "core/integrate/step.hpp"
 #include "core/integrate/step_control.hpp"
+#include "core/integrate/step_failure.hpp"
 
 namespace mbsopt {
 
@@ -29,9 +30,7 @@ class RungeKuttaRun {
   const Eigen::VectorXd& angles() const { return angles_; }
 
  private:
-  // unsolved: Newton's method did not converge; failed: a number is not finite, a matrix is singular; off_constraints:
-  // projection found no state that meets them.
-  enum class Outcome { accepted, rejected, unsolved, failed, off_constraints };
+  using Outcome = StepOutcome;
 
   double first_step(const IntegratorSettings& s, double span);
   double propose_step(double t, double h, double end, bool adaptive) const;
@@ -44,7 +43,6 @@ class RungeKuttaRun {
   Outcome attempt(double h, bool adaptive, bool exact, double& error);
   Outcome finish_step(bool dense);  // dense stages, projection, branches of the angles
   double fastest_tracked_rate(const Eigen::VectorXd& y) const;
-  std::string failed(Outcome outcome, double h, bool adaptive) const;  // in words
   Energy update_statistics(SimulationResult& result);
 
   const Mechanism mechanism_;

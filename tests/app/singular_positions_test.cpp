@@ -26,6 +26,11 @@ struct Windows {
   Problem problem = read_problem(file_of("four_bar/windows"));
   TradeoffRuns runs{problem.scene, objectives_of(problem)};
 
+  SimulationSettings by(const std::string& method) const {
+    SimulationSettings settings = problem.scene.simulation;
+    settings.integrator.type = method;
+    return settings;
+  }
   Answer gradients(SimulationSettings settings, double rtol, GradientMethod method) const {
     settings.integrator.rtol = rtol, settings.integrator.atol = 0.01 * rtol;
     return runs.gradients(settings, method);
@@ -40,8 +45,7 @@ TEST_CASE("gradients through singular positions gain digits with the tolerance, 
   return;  // twenty times slower
 #endif
   const Windows windows;
-  SimulationSettings settings = windows.problem.scene.simulation;
-  settings.integrator.type = GENERATE(as<std::string>{}, "dopri5", "verner6", "dopri853");
+  SimulationSettings settings = windows.by(GENERATE(as<std::string>{}, "dopri5", "verner6", "dopri853"));
   settings.model = GENERATE(ModelChoice::planar, ModelChoice::spatial);
   double before = 0;
   for (const double rtol : {1e-9, 1e-10, 1e-11}) {
@@ -65,8 +69,7 @@ TEST_CASE("differences through singular positions are those of the gradient, wha
   return;  // twenty times slower
 #endif
   const Windows windows;
-  SimulationSettings settings = windows.problem.scene.simulation;
-  settings.integrator.type = "dopri5";
+  const SimulationSettings settings = windows.by("dopri5");
   for (const double rtol : {1e-7, 1e-8, 3e-9, 1e-9}) {
     const Answer answer = windows.gradients(settings, rtol, GradientMethod::differences);
     REQUIRE(answer.ok);

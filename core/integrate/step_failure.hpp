@@ -1,0 +1,22 @@
+// Why a run ends at a step, in words, with what to change.
+#pragma once
+
+#include <string>
+
+#include "core/scene/settings.hpp"
+
+namespace mbsopt {
+
+// unsolved: Newton's method did not converge; failed: a number is not finite, a matrix is singular; off_constraints:
+// projection found no state that meets them.
+enum class StepOutcome { accepted, rejected, unsolved, failed, off_constraints };
+
+// Of the step from t by h; adaptive: the last of smaller and smaller ones.
+std::string step_failure(StepOutcome outcome, double t, double h, bool adaptive,
+                         const FormulationSettings& formulation);
+// longest: of the steps so far.
+std::string too_long_run(double span, double longest);
+// Where S = M + alpha J'J may have lost M to rounding: what to change, as the end of a message.
+std::string about_alpha(const FormulationSettings& formulation);
+
+}  // namespace mbsopt
