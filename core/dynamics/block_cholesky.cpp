@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/dynamics/block_kernels.hpp"
+#include "core/dynamics/prefetch.hpp"
 
 namespace mbsopt {
 namespace {
@@ -96,6 +97,12 @@ BlockCholesky<N>::BlockCholesky(int bodies, std::span<const std::pair<int, int>>
     for (const Elimination::Entry& e : column) body_.push_back(e.body);  // blocks are numbered column by column
     first_block_.push_back(static_cast<int>(body_.size()));
   }
+  first_update_.push_back(0);
+  for (const auto& of_column : elimination_.updates) {
+    updates_.insert(updates_.end(), of_column.begin(), of_column.end());
+    first_update_.push_back(updates_.size());
+  }
+  elimination_.updates.clear();
   scaled_.resize(longest);
   set_zero();
 }
@@ -114,13 +121,15 @@ void BlockCholesky<N>::set_off_diagonals_to_zero() {
 template <int N>
 bool BlockCholesky<N>::factor() {
   for (std::size_t k = 0; k < diagonal_.size(); ++k) {
+    prefetch(&diagonal_[k], kAhead), prefetch(lower_.data(), first_block_[k] + kAhead);
     Block& W = diagonal_[k];
     Vec<N>& inverse = inverse_[k];
     if (!factor_diagonal(W, inverse)) return false;
-    const std::vector<Elimination::Entry>& column = elimination_.columns[k];
-    for (std::size_t e = 0; e < column.size(); ++e) divide(W, inverse, lower_[column[e].block], scaled_[e]);
-    for (const Elimination::Update& u : elimination_.updates[k]) {
-      subtract_product(scaled_[u.i], lower_[column[u.j].block], u.diagonal ? diagonal_[u.target] : lower_[u.target]);
+    const std::size_t first = index(first_block_[k]), count = index(first_block_[k + 1]) - first;
+    for (std::size_t e = 0; e < count; ++e) divide(W, inverse, lower_[first + e], scaled_[e]);
+    for (std::size_t e = first_update_[k]; e < first_update_[k + 1]; ++e) {
+      const Elimination::Update& u = updates_[e];
+      subtract_product(scaled_[u.i], lower_[first + u.j], u.diagonal ? diagonal_[u.target] : lower_[u.target]);
     }
   }
   return true;

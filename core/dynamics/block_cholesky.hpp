@@ -57,7 +57,9 @@ class BlockCholesky {
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
   Elimination elimination_;
-  std::vector<int> first_block_, body_;  // per position, and after the last; per block: the body of its row
+  std::vector<int> first_block_, body_;    // per position, and after the last; per block: the body of its row
+  std::vector<std::size_t> first_update_;  // per position, and after the last
+  std::vector<Elimination::Update> updates_;
   std::vector<Elimination::Place> handles_;
   std::vector<Block> diagonal_, lower_;  // S before factor(), inv(L_kk) below the diagonal and L_ik after
   std::vector<Vec<N>> inverse_;          // of D

@@ -5,6 +5,8 @@
 namespace mbsopt {
 namespace {
 
+std::size_t index(int i) { return static_cast<std::size_t>(i); }
+
 // S += x' alpha x, of x the entries first to last and 3 to 6: the lower triangle only, which is all that a
 // factorisation reads.
 void add_lower_square(double alpha, const double* x, int first, int last, Mat<6, 6>& S) {
@@ -39,7 +41,10 @@ ConstraintRows::ConstraintRows(const MechanismData& data) : data_(&data) {
     of.mass = b.mass;
     std::copy_n(b.J.data(), 9, of.J);
   }
+  std::size_t constraint = 0;
   for (const RowGroup& g : data.groups) {
+    while (data.constraints.at(constraint).block < g.block) ++constraint;
+    first_constraint_.push_back(constraint);
     groups_.push_back({g.body1, g.body2, g.row, g.block, g.rows});
     handle_.push_back(edges_.size());
     if (g.shared) {
@@ -65,11 +70,12 @@ ConstraintRows::ConstraintRows(const MechanismData& data) : data_(&data) {
 }
 
 template <bool Accelerations>
-const Constraint* ConstraintRows::evaluate(const Constraint* c, int end_block, const std::vector<Frame>& frames,
-                                           Eigen::VectorXd* phi_ddot) {
+void ConstraintRows::evaluate(std::size_t group, const Frames& frames, Eigen::VectorXd* phi_ddot) {
+  const RowsInSpace::Group& g = groups_[group];
+  const Constraint* c = data_->constraints.data() + first_constraint_[group];
   const Constraint* const last = data_->constraints.data() + data_->constraints.size();
-  for (; c != last && c->block < end_block; ++c) {
-    const Frame &f1 = frames[static_cast<std::size_t>(c->body1)], &f2 = frames[static_cast<std::size_t>(c->body2)];
+  const Frame &f1 = frames[index(g.body1)], &f2 = frames[index(g.body2)];
+  for (; c != last && c->block < g.block + g.rows; ++c) {
     std::visit(
         [&](const auto& p) {
           constexpr int m = std::decay_t<decltype(p)>::kRows;
@@ -89,11 +95,14 @@ const Constraint* ConstraintRows::evaluate(const Constraint* c, int end_block, c
         },
         c->primitive);
   }
-  return c;
 }
 
 void ConstraintRows::evaluate(const std::vector<Frame>& frames) {
-  evaluate<false>(data_->constraints.data(), data_->blocks, frames, nullptr);
+  const std::size_t count = groups_.size(), ahead = static_cast<std::size_t>(kAhead);
+  for (std::size_t k = 0; k < count; ++k) {
+    if (k + ahead < count) prefetch_geometry(k + ahead, frames);
+    evaluate<false>(k, frames, nullptr);
+  }
 }
 
 // A few groups at a time: their J is read again while it is near, but not so soon that it is still being stored.
@@ -102,13 +111,18 @@ void ConstraintRows::assemble(const std::vector<Frame>& frames, const Eigen::Vec
   constexpr std::size_t kAtATime = 4;
   if (phi_ddot) phi_ddot->setZero();
   set_mass(S);
-  const Constraint* c = data_->constraints.data();
-  const std::size_t count = data_->groups.size();
+  const BlockKernels& kernels = block_kernels();
+  const std::size_t count = groups_.size(), ahead = static_cast<std::size_t>(kAhead);
   for (std::size_t first = 0; first < count; first += kAtATime) {
     const std::size_t end = std::min(first + kAtATime, count);
-    const int end_block = end < count ? data_->groups[end].block : data_->blocks;
-    c = phi_ddot ? evaluate<true>(c, end_block, frames, phi_ddot) : evaluate<false>(c, end_block, frames, nullptr);
-    add_squares(first, end, alpha, S);
+    for (std::size_t k = first; k < end; ++k) {
+      if (k + ahead < count) prefetch_geometry(k + ahead, frames);
+      phi_ddot ? evaluate<true>(k, frames, phi_ddot) : evaluate<false>(k, frames, nullptr);
+    }
+    for (std::size_t k = first; k < end; ++k) {
+      if (k + ahead < count) prefetch_square(k + ahead, S);
+      add_square(k, alpha, kernels, S);
+    }
   }
   if (!shared_.empty()) add_shared_square(alpha, S);
 }
@@ -127,26 +141,23 @@ void ConstraintRows::set_mass(BlockCholesky<6>& S) const {
 }
 
 void ConstraintRows::add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S) {
-  add_squares(0, data_->groups.size(), alpha, S);
+  for (std::size_t k = 0; k < groups_.size(); ++k) add_square(k, alpha, block_kernels(), S);
   if (!shared_.empty()) add_shared_square(alpha, S);
 }
 
-void ConstraintRows::add_squares(std::size_t first, std::size_t end, const Eigen::VectorXd& alpha,
-                                 BlockCholesky<6>& S) {
-  const BlockKernels& kernels = block_kernels();
-  for (std::size_t k = first; k < end; ++k) {
-    const RowGroup& g = data_->groups[k];
-    if (g.shared) continue;
-    const double* const a = J1.row(g.block).data();
-    const double* const b = J2.row(g.block).data();
-    double* const aa = g.body1 > 0 ? S.diagonal(g.body1 - 1).data() : nullptr;
-    double* const bb = g.body2 > 0 ? S.diagonal(g.body2 - 1).data() : nullptr;
-    double* const ab = aa && bb ? S.off_diagonal(handle_[k]).data() : nullptr;
-    if (ab && S.transposed(handle_[k])) {
-      kernels.add_weighted_squares(g.rows, alpha.data() + g.row, columns_.data() + g.block, b, a, bb, aa, ab);
-    } else {
-      kernels.add_weighted_squares(g.rows, alpha.data() + g.row, columns_.data() + g.block, a, b, aa, bb, ab);
-    }
+void ConstraintRows::add_square(std::size_t group, const Eigen::VectorXd& alpha, const BlockKernels& kernels,
+                                BlockCholesky<6>& S) {
+  const RowGroup& g = data_->groups[group];
+  if (g.shared) return;
+  const double* const a = J1.row(g.block).data();
+  const double* const b = J2.row(g.block).data();
+  double* const aa = g.body1 > 0 ? S.diagonal(g.body1 - 1).data() : nullptr;
+  double* const bb = g.body2 > 0 ? S.diagonal(g.body2 - 1).data() : nullptr;
+  double* const ab = aa && bb ? S.off_diagonal(handle_[group]).data() : nullptr;
+  if (ab && S.transposed(handle_[group])) {
+    kernels.add_weighted_squares(g.rows, alpha.data() + g.row, columns_.data() + g.block, b, a, bb, aa, ab);
+  } else {
+    kernels.add_weighted_squares(g.rows, alpha.data() + g.row, columns_.data() + g.block, a, b, aa, bb, ab);
   }
 }
 

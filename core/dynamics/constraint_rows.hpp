@@ -8,6 +8,7 @@
 #include "core/dynamics/block_cholesky.hpp"
 #include "core/dynamics/block_kernels.hpp"
 #include "core/dynamics/pairs.hpp"
+#include "core/dynamics/prefetch.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
 
@@ -107,12 +108,27 @@ class ConstraintRows {
   static const double* row(const Rows& J, int block) { return J.data() + 6 * block; }
 
   static std::size_t at(int body) { return static_cast<std::size_t>(body - 1); }
-  // Constraints from c to the one whose blocks begin at end_block, which is returned.
   template <bool Accelerations>
-  const Constraint* evaluate(const Constraint* c, int end_block, const std::vector<Frame>& frames,
-                             Eigen::VectorXd* phi_ddot);
-  void add_squares(std::size_t first, std::size_t end, const Eigen::VectorXd& alpha, BlockCholesky<6>& S);  // of groups
+  void evaluate(std::size_t group, const Frames& frames, Eigen::VectorXd* phi_ddot);
+  void add_square(std::size_t group, const Eigen::VectorXd& alpha, const BlockKernels& kernels, BlockCholesky<6>& S);
   void add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S);
+  // What the two read and write of a later group (inlined: prefetch.hpp).
+  [[gnu::always_inline]] void prefetch_geometry(std::size_t group, const Frames& frames) const {
+    constexpr int kMotion = 36;  // numbers of a frame: its position, axes and their rates
+    const RowsInSpace::Group& g = groups_[group];
+    prefetch<3>(&data_->constraints[first_constraint_[group]]);
+    for (const int body : {g.body1, g.body2}) {
+      if (body > 0) prefetch<kMotion>(frames[static_cast<std::size_t>(body)].r.data());
+    }
+  }
+  [[gnu::always_inline]] void prefetch_square(std::size_t group, BlockCholesky<6>& S) const {
+    const RowGroup& g = data_->groups[group];
+    if (g.shared) return;
+    prefetch<30>(J1.data(), 6 * g.block), prefetch<30>(J2.data(), 6 * g.block);
+    if (g.body1 > 0) prefetch(&S.diagonal(g.body1 - 1));
+    if (g.body2 > 0) prefetch(&S.diagonal(g.body2 - 1));
+    if (g.body1 > 0 && g.body2 > 0) prefetch(&S.off_diagonal(handle_[group]));
+  }
 
   // A row with several constraints: its distinct moving bodies, and the off-diagonal blocks of their pairs.
   struct SharedRow {
@@ -126,7 +142,8 @@ class ConstraintRows {
   std::vector<Columns> columns_;  // per block row
   std::vector<RowsInSpace::Group> groups_;
   std::vector<RowsInSpace::Body> bodies_;
-  std::vector<std::size_t> handle_;  // per group: its off-diagonal block
+  std::vector<std::size_t> handle_;            // per group: its off-diagonal block
+  std::vector<std::size_t> first_constraint_;  // per group
   std::vector<SharedRow> shared_;
   std::vector<std::pair<int, int>> edges_;
 };

@@ -7,6 +7,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/body/lanes.hpp"
+#include "core/dynamics/prefetch.hpp"
 #include "core/mechanism/joint_graph.hpp"
 
 namespace mbsopt {
@@ -204,6 +205,7 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
   const Vec<6> none = Vec<6>::Zero();
   for (int i = 1; i <= data_.n; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
+    prefetch(&frames_[k], kAhead);
     set_body(y, i);
     set_acceleration(none, bodies_[k], frames_[k]);
     set_own_load(i);

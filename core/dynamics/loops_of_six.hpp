@@ -3,6 +3,7 @@
 #pragma once
 
 #include "core/dynamics/block_kernels.hpp"
+#include "core/dynamics/prefetch.hpp"
 
 namespace mbsopt {
 namespace {  // of each file its own: compiled for different processors
@@ -75,6 +76,7 @@ class LoopsOfSix {
 
   static void solve_vector(const FactorView& f, double* x) {
     for (int k = 0; k < f.bodies; ++k) {
+      prefetch<36>(f.W, 36 * (k + kAhead)), prefetch<36>(f.L, 36 * (f.first_block[k] + kAhead));
       double* y = x + 6 * f.order[k];
       const double* W = f.W + 36 * k;
       Six sum(y);
@@ -90,6 +92,7 @@ class LoopsOfSix {
       }
     }
     for (int k = f.bodies - 1; k >= 0; --k) {
+      prefetch<36>(f.W, 36 * (k - kAhead)), prefetch<36>(f.L, 36 * (f.first_block[k] - kAhead));
       double* y = x + 6 * f.order[k];
       Six sum = Six(y) * Six(f.inverse_D + 6 * k);
       for (int b = f.first_block[k]; b < f.first_block[k + 1]; ++b)
@@ -125,6 +128,12 @@ class LoopsOfSix {
     if (ab) add_square(count, alpha, nonzero, a, b, ab);
   }
 
+  // Of groups ahead, as if they were as large as a hinge's.
+  [[gnu::always_inline]] static void prefetch_rows(const RowsInSpace& J, const RowsInSpace::Group& g) {
+    constexpr int kRows = 5;
+    prefetch<6 * kRows>(J.J1, 6 * (g.block + kRows * kAhead)),
+        prefetch<6 * kRows>(J.J2, 6 * (g.block + kRows * kAhead));
+  }
   static void load_vector(const RowsInSpace& J, const SaddleIterate& at, bool first, double* correction) {
     for (std::size_t k = 0; k < J.body_count; ++k) {
       const RowsInSpace::Body& m = J.bodies[k];
@@ -151,6 +160,7 @@ class LoopsOfSix {
     };
     for (std::size_t k = 0; k < J.group_count; ++k) {
       const RowsInSpace::Group& g = J.groups[k];
+      prefetch_rows(J, g);
       subtract(g.body1, J.J1, g), subtract(g.body2, J.J2, g);
     }
   }
@@ -158,6 +168,7 @@ class LoopsOfSix {
   static void subtract_times_vector(const RowsInSpace& J, const double* x, double* y) {
     for (std::size_t k = 0; k < J.group_count; ++k) {
       const RowsInSpace::Group& g = J.groups[k];
+      prefetch_rows(J, g);
       const bool both = g.body1 > 0 && g.body2 > 0;
       const int body = g.body1 > 0 ? g.body1 : g.body2;
       if (body == 0) continue;

@@ -23,6 +23,14 @@ Eigen::VectorXd in_plane(const PlanarModel& model, const Eigen::VectorXd& of_row
   return out;
 }
 
+std::vector<std::size_t> bodies_with_inertial_slots(const MechanismData& data) {
+  std::vector<std::size_t> bodies;
+  for (std::size_t k = 1; k < data.bodies.size(); ++k) {
+    if (data.bodies[k].slot_mass >= 0 || data.bodies[k].slot_J >= 0) bodies.push_back(k);
+  }
+  return bodies;
+}
+
 // The blocks of forces alone.
 MotionBlocks force_blocks(MechanismData data) {
   data.constraints.clear();
@@ -43,6 +51,7 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
       derivative_refinements_(derivatives),
       laws_(data, model_.rows),
       constraints_(data),
+      bodies_with_slots_(bodies_with_inertial_slots(data)),
       solver_(data, in_plane(model_, alpha), compliance),
       springs_(data),
       has_springs_(!data.tsda.empty()),
@@ -327,7 +336,11 @@ void PlanarDynamics::acceleration_tangent(const ParameterBlock& block, const Lan
 
   Lanes<3> gravity_dir;
   const Lanes<3>* dg = block.field<3>(data_.slot_gravity, gravity_dir);
-  for (std::size_t k = 1; k < bodies_.size(); ++k) {
+  for (std::size_t i = 0; dg && i < rhs_lanes_.size(); ++i) {
+    const double mass = model_.bodies[i + 1].mass;
+    rhs_lanes_[i].row(0) += mass * dg->row(model_.t1), rhs_lanes_[i].row(1) += mass * dg->row(model_.t2);
+  }
+  for (const std::size_t k : bodies_with_slots_) {
     const BodyData& body = data_.bodies[k];
     const Vec<3>& z = z_[k - 1];
     Lanes<3>& b = rhs_lanes_[k - 1];
@@ -335,7 +348,6 @@ void PlanarDynamics::acceleration_tangent(const ParameterBlock& block, const Lan
     if (const Lanes<1>* dm = block.field<1>(body.slot_mass, mass_dir)) {
       b.row(0) += (model_.gravity.re - z(0)) * *dm, b.row(1) += (model_.gravity.im - z(1)) * *dm;
     }
-    if (dg) b.row(0) += body.mass * dg->row(model_.t1), b.row(1) += body.mass * dg->row(model_.t2);
     Lanes<6> J_dir;
     if (const Lanes<6>* dJ = block.field<6>(body.slot_J, J_dir)) {
       b.row(2) -= z(2) * (bodies_in_y_.inertia_weights(k).transpose() * *dJ);

@@ -63,6 +63,7 @@ class PlanarDynamics {
   Refinements value_refinements_, derivative_refinements_;
   RowLaws laws_;
   PlanarConstraints constraints_;
+  const std::vector<std::size_t> bodies_with_slots_;  // of mass or inertia
   PlanarSaddleSolver solver_;
 
   double t_ = 0;
