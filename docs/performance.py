@@ -219,12 +219,14 @@ def time_to_error_section():
 def gradients_section():
     lines = ["## Gradients", "",
              "50 parameters; ratios of wall times to one simulation with its compilation and assembly, medians of rounds in turn. *Start*: the share of",
-             "compilation and assembly in one simulation.", ""] + command("gradient_scaling")
+             "compilation and assembly in one simulation. *TLM of 1, of 50*: with the first parameter alone, and with all; *per further parameter*: their",
+             "difference over 49.", ""] + command("gradient_scaling")
     cells = []
     for r in rows_of("gradient_scaling"):
         kind, method = r["name"].split("/")[1].split("_")
-        cells.append([kind, r["bodies"], method, r["steps"], figure(number(r["start_share"]), 2), figure(number(r["adjoint_ratio"])), figure(number(r["tlm_per_parameter"]))])
-    lines += table_of(["mechanism", "bodies", "method", "steps", "start", "adjoint", "TLM per further parameter"], cells)
+        cells.append([kind, r["bodies"], method, r["steps"], figure(number(r["start_share"]), 2), figure(number(r["adjoint_ratio"])),
+                      figure(number(r.get("tlm_of_one"))), figure(number(r.get("tlm_of_all"))), figure(number(r["tlm_per_parameter"]))])
+    lines += table_of(["mechanism", "bodies", "method", "steps", "start", "adjoint", "TLM of 1", "TLM of 50", "TLM per further parameter"], cells)
     lines += ["A full Hessian in ten parameters (FB-1): " + figure(of("hessian", "hessian/five_bar", "hessian_ratio")) + " simulations, by " +
               figure(of("hessian", "hessian/five_bar", "gradients")) + " gradients.", ""] + command("hessian")
     lines += ["Memory of an adjoint over 10 s [MiB]; *grown*: the largest size of the process during the run beyond that before it, assembly and its",
@@ -240,8 +242,8 @@ def gradients_section():
     return lines
 
 
-# By hand: what stands behind missed aims. Ratios and counts, which do not age with the machine.
-REASONS = """## What is missed, and why
+# By hand: what stands behind aims, missed ones above all. Ratios and counts, which do not age with the machine.
+REASONS = """## What stands behind the figures
 
 Profile by `perf record -e cpu-clock` of right-hand sides in the spatial model, N-four-bar, N = 40, per cent: assembly of S 19, its factorisation 15, both
 solves with their products with J 28, J 14, Phiddot 9, frames with pddot 8, the rest 7. In a run with `dopri5` the right-hand sides are about three quarters; the
@@ -249,20 +251,19 @@ rest is the projection, one to two right-hand sides per step, and the sums of th
 
 * **Absolute times move by two** on this shared machine, with nothing else of ours running: the same program read 0.42 to 0.58 us (spatial, 10 to 1000 bodies) in one quarter of an
   hour, 0.5 to 1.1 us in others, and 44 to 63 ms (FB-1).
-* **Growth to 10 000 bodies is memory.** A body has some 4 kB of frames, J, S and constraints, which a right-hand side goes through several times. Those of
-  100 bodies stay in the second-level cache (2 MB), those of 10 000 come from the third. Passes of the solver no longer grow (`formulations.md`: 3 instead of 21
-  along 10 000 rods in space). By parts, nanoseconds per body at 100 and at 10 000 bodies in space (spatial chain, the whole read 940 at the time): frames 62
-  and 99, assembly of J, S and Phiddot 352 and 378, factorisation 155 and 160, one substitution 59 and 64, one product with J 30 to 34 and 39 to 45. What
-  computes much hides its memory, what sweeps does not. Sweeps left out where nothing needs them (forces, a copy of the state, the usual acceleration) brought
-  the ratio in space from 1.30 to 1.36 down to 1.20 to 1.30, medians of nine runs in turn beside other programs, which move single ones by a tenth; in the plane
-  it is 1.2 to 1.3, before and after. Tried, without effect on the ratio: large pages; blocks of S set where they are first touched, 3 to 6 per cent slower at 10
-  bodies; with it, frames set just before constraints read them, 5 to 8 per cent slower at 100. The ratio becomes larger where computing becomes faster. Chains of more than 316 joints in space take three
-  passes instead of the two that stairs in a plane need.
-* **TLM per further parameter** at 500 bodies: the directions of 50 parameters, 23 MB with their stages, and some 10 kB per body of blocks, J and S that every four directions
-  go through do not fit the second-level cache. Per body, stage and direction 81 bodies take 0.33 us and 500 take 0.44 to 0.47 (chain in space), spread over all loops alike: products with J,
-  sums of stages, substitutions, blocks of the equations. The ratio to a simulation, which grows less, read 0.33 to 0.37 in runs of half a minute and 0.47 to 0.55 in long ones. The adjoint of 1261 steps of the same chain read 3.1 and 5.6 simulations in two single rounds: not looked into yet. Tried:
-  one array for the stage's directions of all blocks instead of one each, and exchanged in place of copied states: 1 to 3 per cent. Eight directions at a time would halve what each
-  has to load, and double the cost of problems with up to four parameters.
+* **Growth to 10 000 bodies is memory.** A body has some 3.4 kB of frames, J, S and constraints, which a right-hand side goes through several times. Those of
+  100 bodies stay in the second-level cache, those of 10 000 come from the third or, where others use it, from memory. So the loops over bodies and over groups of rows ask
+  for what they will need four of them later (`core/dynamics/prefetch.hpp`); the processor's own guesses end with each page of 4 kB. Ratios in turn in four quiet quarters of an
+  hour (a second-level cache of 1 MB), planar chain, spatial chain, N-four-bars, tree, all in space: without 1.26 to 1.36, 1.26 to 1.30, 1.55 to 1.65, 2.0; with it 1.18 to 1.21,
+  1.17 to 1.20, 1.24 to 1.28, 1.64. No difference up to 1000 bodies, nor in tangents, which compute more of what they load. While other programs use the third-level cache the
+  ratios without were up to 1.9, with it up to 1.4. The order of four-bars (all cranks, then all couplers) and of trees jumps between bodies, which costs
+  the rest. Tried: going through the mechanism in portions of 16 to 512 bodies, each placed, assembled, factored and substituted while it is near, 1.4 to 2.4 where whole
+  passes had 1.3, for a portion starts a dozen short streams anew; large pages, nothing; blocks of S set where they are first touched, and frames just before constraints
+  read them, 3 to 8 per cent slower at 10 to 100 bodies. Chains of more than 316 joints in space take three passes of the solver instead of the two that stairs in a plane need.
+* **TLM**: the directions of 50 parameters of 500 bodies, 23 MB with their stages, do not fit the second-level cache, so that a parameter costs a quarter more than with 81 bodies.
+  Tried: one array for the stage's directions of all blocks instead of one each, and exchanged in place of copied states, 1 to 3 per cent; asking for blocks ahead, nothing.
+  Eight directions at a time would halve what each has to load, and double the cost of problems with up to four parameters.
+* **The adjoint** of 1260 steps of 500 rods keeps 0.7 GB. With the budget of 256 MiB of before it computed every step again.
 * **FB-1** takes nine evaluations with gradients at the tolerance of its file, 1e-9 with `dopri853`; on an idle machine 41 to 44 ms, beside other programs up to 70.
   A twentieth goes to comparing names within the linear solver of Ipopt, 6 to 7 % of each simulation to finding singular positions.
 * **Set-up**: names of bodies and joints are looked up in a table; before, compiling grew with the square of their number. Initial assembly is dense where the guess
