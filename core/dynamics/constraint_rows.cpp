@@ -130,6 +130,7 @@ void ConstraintRows::assemble(const std::vector<Frame>& frames, const Eigen::Vec
 void ConstraintRows::set_mass(BlockCholesky<6>& S) const {
   S.set_off_diagonals_to_zero();
   for (int i = 0; i < data_->n; ++i) {
+    if (i + kAhead < data_->n) prefetch(&S.diagonal(i + kAhead));
     const RowsInSpace::Body& b = bodies_[static_cast<std::size_t>(i)];
     double* const D = S.diagonal(i).data();
     std::fill_n(D, 36, 0.0);
