@@ -1,7 +1,7 @@
 // Cost of gradients in simulations, of problems with 20 and more parameters. What one simulation is, and how
 // simulation, adjoint and TLM are timed in turn, says optim/gradient_timing.hpp; `mbsopt check` prints the same
 // figures.
-//   adjoint_ratio = adjoint / simulation          tlm_per_parameter = (TLM / simulation - 1) / parameters
+//   adjoint_ratio = adjoint / simulation          tlm_over_parameters = (TLM / simulation - 1) / parameters
 #include <benchmark/benchmark.h>
 
 #include "app/json/read_problem.hpp"
@@ -30,7 +30,7 @@ void gradient_cost(benchmark::State& state, const char* file, const char* method
     state.counters["rhs_us_per_body"] =
         1e6 * timing.simulation.wall_seconds / static_cast<double>(timing.rhs_evaluations) / bodies;
     state.counters["adjoint_ratio"] = timing.adjoint.ratio;
-    state.counters["tlm_per_parameter"] = (timing.tlm.ratio - 1) / parameters;
+    state.counters["tlm_over_parameters"] = (timing.tlm.ratio - 1) / parameters;
   }
 }
 
