@@ -250,17 +250,19 @@ solves with their products with J 28, J 14, Phiddot 9, frames with pddot 8, the 
 rest is the projection, one to two right-hand sides per step, and the sums of the stages.
 
 * **Absolute times move by two** on this shared machine, with nothing else of ours running: the same program read 0.42 to 0.58 us (spatial, 10 to 1000 bodies) in one quarter of an
-  hour, 0.5 to 1.1 us in others, and 44 to 63 ms (FB-1).
+  hour, 0.5 to 1.1 us in others, and 44 to 63 ms (FB-1); on the machine of this page 0.33 to 0.42 us in most minutes, 0.45 to 0.56 us in the worst.
 * **Growth to 10 000 bodies is memory.** A body has some 3.4 kB of frames, J, S and constraints, which a right-hand side goes through several times. Those of
   100 bodies stay in the second-level cache, those of 10 000 come from the third or, where others use it, from memory. So the loops over bodies and over groups of rows ask
-  for what they will need four of them later (`core/dynamics/prefetch.hpp`); the processor's own guesses end with each page of 4 kB. Ratios in turn in four quiet quarters of an
-  hour (a second-level cache of 1 MB), planar chain, spatial chain, N-four-bars, tree, all in space: without 1.26 to 1.36, 1.26 to 1.30, 1.55 to 1.65, 2.0; with it 1.18 to 1.21,
-  1.17 to 1.20, 1.24 to 1.28, 1.64. No difference up to 1000 bodies, nor in tangents, which compute more of what they load. While other programs use the third-level cache the
+  for what they will need four of them later (`core/dynamics/prefetch.hpp`); the processor's own guesses end with each page of 4 kB. Ratios in turn in quiet
+  minutes (a second-level cache of 1 MB), planar chain, spatial chain, N-four-bars, tree, all in space: without 1.26 to 1.36, 1.26 to 1.30, 1.55 to 1.65, 2.0; with it 1.20 to 1.23,
+  1.17 to 1.18, 1.23 to 1.27, 1.5. No difference up to 1000 bodies, nor in tangents, which compute more of what they load. While other programs use the third-level cache the
   ratios without were up to 1.9, with it up to 1.4. The order of four-bars (all cranks, then all couplers) and of trees jumps between bodies, which costs
   the rest. Tried: going through the mechanism in portions of 16 to 512 bodies, each placed, assembled, factored and substituted while it is near, 1.4 to 2.4 where whole
   passes had 1.3, for a portion starts a dozen short streams anew; large pages, nothing; blocks of S set where they are first touched, and frames just before constraints
   read them, 3 to 8 per cent slower at 10 to 100 bodies. Chains of more than 316 joints in space take three passes of the solver instead of the two that stairs in a plane need.
 * **TLM**: the directions of 50 parameters of 500 bodies, 23 MB with their stages, do not fit the second-level cache, so that a parameter costs a quarter more than with 81 bodies.
+  With all that TLM costs beyond a simulation spread over 49 parameters, the matrices of the stages and the first parameter included, N-four-bars of 5, 21, 81, 501 bodies have
+  0.20, 0.23, 0.27, 0.34 per parameter, chains 0.28, 0.31, 0.30, 0.38.
   Tried: one array for the stage's directions of all blocks instead of one each, and exchanged in place of copied states, 1 to 3 per cent; asking for blocks ahead, nothing.
   Eight directions at a time would halve what each has to load, and double the cost of problems with up to four parameters.
 * **The adjoint** of 1260 steps of 500 rods keeps 0.7 GB. With the budget of 256 MiB of before it computed every step again.
