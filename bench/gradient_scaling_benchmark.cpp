@@ -95,7 +95,7 @@ GradientTiming timed(Scene scene, const char* method) {
   spec.name = "sag", spec.running = Expression::parse("height^2");
   const std::vector<Objective> objectives{Objective(scene, spec)};
   GradientTimingOptions options;
-  options.most_seconds = 100;  // three rounds of 500 rods
+  options.most_seconds = 100;  // two rounds of 500 rods
   return time_gradients(scene, objectives, options);
 }
 

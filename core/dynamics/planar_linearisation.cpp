@@ -1,0 +1,194 @@
+// Tangents of the planar equations: right-hand sides and accelerations in directions of the state and the parameters.
+#include "core/body/lanes.hpp"
+#include "core/dynamics/pairs.hpp"
+#include "core/dynamics/planar_dynamics.hpp"
+
+namespace mbsopt {
+namespace {
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// The blocks of forces alone.
+MotionBlocks force_blocks(MechanismData data) {
+  data.constraints.clear();
+  data.m = 0;
+  return MotionBlocks(data);
+}
+
+}  // namespace
+
+// With P' and Pdot' for directions, products of complex numbers and real dot products:
+//   Addot' = 4 Pdot Pdot' + (i omegadot - 2 |Pdot|^2) 2 P P' - 4 (Pdot'Pdot') A
+//   Pddot' = (i omegadot/2 - |Pdot|^2) P' - 2 (Pdot'Pdot') P        and with omegadot':  + i omegadot'/2 P
+void PlanarDynamics::prepare_tangents() {
+  tangents_ready_ = true;
+  constraints_.set_point_moments(lambda_, moments_);
+  const auto product = [](const Plane& g, auto&& block) { block << g.re, -g.im, g.im, g.re; };
+  for (std::size_t k = 1; k < bodies_.size(); ++k) {
+    const Body& b = bodies_[k];
+    const Plane &A = frames_[k].A, &P = b.P, &Pdot = b.Pdot;
+    const double size = squared_norm(Pdot);
+    TurnTangent& x = turns_[k];
+    x.moment = conj(2 * P) * moments_[k];
+    product(2 * (Plane{-2 * size, b.omegadot} * P), x.Addot.leftCols<2>());
+    product(4 * Pdot, x.Addot.rightCols<2>());
+    product(Plane{-size, 0.5 * b.omegadot}, x.Pddot.leftCols<2>());
+    const Eigen::RowVector2d along(Pdot.re, Pdot.im);
+    x.Addot.row(0).tail<2>() -= 4 * A.re * along, x.Addot.row(1).tail<2>() -= 4 * A.im * along;
+    x.Pddot.row(0).tail<2>() = -2 * P.re * along, x.Pddot.row(1).tail<2>() = -2 * P.im * along;
+  }
+  if (!loaded_.empty()) prepare_force_tangents();
+}
+
+// The blocks of forces, as the plane sees them.
+void PlanarDynamics::prepare_force_tangents() {
+  if (!force_linearisation_) {
+    force_linearisation_.emplace(
+        ForceLinearisation{force_blocks(data_), std::vector<UnitTangents>(bodies_.size()), {}});
+    force_linearisation_->in_plane.resize(force_linearisation_->blocks.b.size());
+  }
+  if (!in_space_) place_in_space();
+  ForceLinearisation& x = *force_linearisation_;
+  x.blocks.set_zero();
+  for (const std::size_t k : loaded_) set_unit_tangents(states_in_space_[k], x.units[k]);
+  forces_.add_blocks(here(), x.units, x.blocks);
+  for (std::size_t k = 0; k < x.in_plane.size(); ++k) {
+    const MotionBlocks::Block<6>& block = x.blocks.b[k];
+    if (block.parts == 0) continue;
+    const MotionBlocks::Place& place = x.blocks.pairs()[k];
+    const PlanarBody &loaded = model_.bodies[at(place.row + 1)], &read = model_.bodies[at(place.body + 1)];
+    const auto in_plane = [&](const Mat<6, 7>& of) {
+      Mat<3, 7> rows;
+      rows << of.row(model_.t1), of.row(model_.t2), loaded.n.transpose() * of.bottomRows<3>();
+      return rows;
+    };
+    const auto reduce = [&](const Mat<3, 7>& rows) {
+      Mat<3, 4> to;
+      to << rows.col(model_.t1), rows.col(model_.t2), rows.rightCols<4>() * read.p_a, rows.rightCols<4>() * read.p_b;
+      return to;
+    };
+    const Mat<3, 7> q = in_plane(block.q);
+    x.in_plane[k] = {reduce(q), reduce(in_plane(block.v)), q.col(model_.n)};
+  }
+}
+
+// What forces add to b: in the state by their blocks, and in the fields.
+void PlanarDynamics::add_force_tangent(const ParameterBlock& block, const LaneRows& y_dir) {
+  const ForceLinearisation& x = *force_linearisation_;
+  const LaneRow* y = entries(y_dir);
+  for (std::size_t k = 0; k < x.in_plane.size(); ++k) {
+    if (x.blocks.b[k].parts == 0) continue;
+    const MotionBlocks::Place& place = x.blocks.pairs()[k];
+    const LaneRow* r = y + 7 * place.body;
+    const LaneRow* rdot = r + 7 * data_.n;
+    const LaneRow* P = entries(turn_dirs_[at(place.body + 1)]);
+    LaneRow* b = entries(rhs_lanes_[at(place.row)]);
+    const Mat<3, 4>&q = x.in_plane[k].q, &v = x.in_plane[k].v;
+    const Vec<3>& height = x.in_plane[k].height;
+    for (int i = 0; i < 3; ++i) {
+      b[i] += q(i, 0) * r[model_.t1] + q(i, 1) * r[model_.t2] + q(i, 2) * P[0] + q(i, 3) * P[1] +
+              v(i, 0) * rdot[model_.t1] + v(i, 1) * rdot[model_.t2] + v(i, 2) * P[2] + v(i, 3) * P[3] +
+              height(i) * r[model_.n];
+    }
+  }
+  for (const std::size_t k : loaded_) body_load_dirs_[k].setZero();
+  body_load_dirs_[0].setZero();
+  forces_.add_field_tangent(here(), block, body_load_dirs_);
+  for (const std::size_t k : loaded_) rhs_lanes_[k - 1] += bodies_in_y_.reduced(k, body_load_dirs_[k]);
+}
+
+// Of constraints that are no points, and of laws: duals.
+void PlanarDynamics::add_other_tangents(const ParameterBlock& block, const LaneRows& y_dir) {
+  using Order = PlanarConstraints::Order;
+  const Eigen::Index half = 7 * data_.n;
+  for (const std::size_t k : dual_bodies_) {
+    const Eigen::Index q = 7 * (static_cast<Eigen::Index>(k) - 1), v = half + q;
+    const Body& b = bodies_[k];
+    PlanarFrame<LaneDual>& f = dual_frames_[k];
+    f.r = bodies_in_y_.vector(frames_[k].r, y_dir, q);
+    f.rdot = bodies_in_y_.vector(frames_[k].rdot, y_dir, v);
+    f.rddot = frames_[k].rddot;
+    const auto turn = [&](const Plane& value, Eigen::Index row) {
+      return PlaneDual{{value.re, turn_dirs_[k].row(row).array()}, {value.im, turn_dirs_[k].row(row + 1).array()}};
+    };
+    f.set_turn(turn(b.P, 0), turn(b.Pdot, 2), b.omegadot);
+  }
+  const auto add = [&](Order order, double factor, const LaneRows& rows, std::vector<Lanes<3>>& loads) {
+    for (Lanes<3>& load : loads) load.setZero();
+    constraints_.tangents(order, dual_frames_, laws_, angles_, block, lambda_, constraint_dirs_, loads);
+    gamma_dir_ -= factor * rows;
+  };
+  if (settings_.omega != 0) {
+    add(Order::phi, settings_.omega * settings_.omega, constraint_dirs_.phi, load_dirs_);
+    add(Order::phi_dot, 2 * settings_.xi * settings_.omega, constraint_dirs_.phi_dot, load_dirs_);
+  }
+  add(Order::phi_ddot, 1, constraint_dirs_.phi_ddot, load_dirs_);
+  for (std::size_t i = 0; i < rhs_lanes_.size(); ++i) rhs_lanes_[i] -= load_dirs_[i + 1];
+}
+
+void PlanarDynamics::acceleration_tangent(const ParameterBlock& block, const LaneRows& y_dir,
+                                          Eigen::Ref<LaneRows> a_dir) {
+  if (!tangents_ready_) prepare_tangents();
+  const Eigen::Index half = 7 * data_.n;
+  const LaneRow* y = entries(y_dir);
+  for (std::size_t k = 1; k < bodies_.size(); ++k) {
+    const PlanarBody& body = model_.bodies[k];
+    const LaneRow* p = y + 7 * (k - 1) + 3;
+    LaneRow* P = entries(turn_dirs_[k]);
+    for (int i = 0; i < 4; i += 2, p += half) {
+      P[i] = body.p_a(0) * p[0] + body.p_a(1) * p[1] + body.p_a(2) * p[2] + body.p_a(3) * p[3];
+      P[i + 1] = body.p_b(0) * p[0] + body.p_b(1) * p[1] + body.p_b(2) * p[2] + body.p_b(3) * p[3];
+    }
+    const TurnTangent& x = turns_[k];
+    LaneRow* Addot = entries(Addot_dirs_[k]);
+    for (int i = 0; i < 2; ++i) {
+      Addot[i] = x.Addot(i, 0) * P[0] + x.Addot(i, 1) * P[1] + x.Addot(i, 2) * P[2] + x.Addot(i, 3) * P[3];
+    }
+    LaneRow* b = entries(rhs_lanes_[k - 1]);
+    b[0] = LaneRow{}, b[1] = LaneRow{};
+    b[2] = x.moment.re * P[1] - x.moment.im * P[0];
+  }
+  gamma_dir_.setZero();
+  if (!dual_bodies_.empty() || !data_.laws.empty()) add_other_tangents(block, y_dir);
+  constraints_.subtract_point_tangents(frames_, Addot_dirs_, block, lambda_, gamma_dir_, rhs_lanes_);
+
+  Lanes<3> gravity_dir;
+  const Lanes<3>* dg = block.field<3>(data_.slot_gravity, gravity_dir);
+  for (std::size_t i = 0; dg && i < rhs_lanes_.size(); ++i) {
+    const double mass = model_.bodies[i + 1].mass;
+    rhs_lanes_[i].row(0) += mass * dg->row(model_.t1), rhs_lanes_[i].row(1) += mass * dg->row(model_.t2);
+  }
+  for (const std::size_t k : bodies_with_slots_) {
+    const BodyData& body = data_.bodies[k];
+    const Vec<3>& z = z_[k - 1];
+    Lanes<3>& b = rhs_lanes_[k - 1];
+    Lanes<1> mass_dir;
+    if (const Lanes<1>* dm = block.field<1>(body.slot_mass, mass_dir)) {
+      b.row(0) += (model_.gravity.re - z(0)) * *dm, b.row(1) += (model_.gravity.im - z(1)) * *dm;
+    }
+    Lanes<6> J_dir;
+    if (const Lanes<6>* dJ = block.field<6>(body.slot_J, J_dir)) {
+      b.row(2) -= z(2) * (bodies_in_y_.inertia_weights(k).transpose() * *dJ);
+    }
+  }
+  if (!loaded_.empty()) add_force_tangent(block, y_dir);
+  solver_.solve(rhs_lanes_, gamma_dir_, derivative_refinements_, z_dir_, lambda_dir_);
+
+  LaneRow* out = reinterpret_cast<LaneRow*>(a_dir.data());
+  for (std::size_t k = 1; k < bodies_.size(); ++k, out += 7) {
+    const PlanarBody& body = model_.bodies[k];
+    const TurnTangent& x = turns_[k];
+    const Plane& turn = bodies_[k].P;
+    const LaneRow *P = entries(turn_dirs_[k]), *z = entries(z_dir_[k - 1]);
+    for (int i = 0; i < 3; ++i) out[i] = LaneRow{};
+    out[model_.t1] = z[0], out[model_.t2] = z[1];
+    LaneRow Pddot[2];
+    for (int i = 0; i < 2; ++i) {
+      Pddot[i] = x.Pddot(i, 0) * P[0] + x.Pddot(i, 1) * P[1] + x.Pddot(i, 2) * P[2] + x.Pddot(i, 3) * P[3];
+    }
+    Pddot[0] -= (0.5 * turn.im) * z[2], Pddot[1] += (0.5 * turn.re) * z[2];
+    for (int i = 0; i < 4; ++i) out[3 + i] = body.p_a(i) * Pddot[0] + body.p_b(i) * Pddot[1];
+  }
+}
+
+}  // namespace mbsopt
