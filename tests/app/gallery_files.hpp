@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "source_folder.hpp"
+
 namespace mbsopt::testing {
 
 inline const std::filesystem::path kProblems = std::filesystem::path(MBSOPT_SOURCE_DIR) / "problems";

@@ -13,6 +13,7 @@
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/type_table.hpp"
 #include "optim/evaluator.hpp"
+#include "source_folder.hpp"
 #include "tests/app/gallery_files.hpp"
 #include "tests/app/run_command.hpp"
 

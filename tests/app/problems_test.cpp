@@ -4,6 +4,7 @@
 
 #include "app/exit_code.hpp"
 #include "app/json/read_problem.hpp"
+#include "source_folder.hpp"
 #include "tests/app/run_command.hpp"
 
 using namespace mbsopt;

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "app/exit_code.hpp"
+#include "source_folder.hpp"
 #include "tests/app/run_command.hpp"
 
 using namespace mbsopt;

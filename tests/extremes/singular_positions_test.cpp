@@ -2,6 +2,7 @@
 #include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <numbers>
 
+#include "source_folder.hpp"
 #include "tests/app/run_command.hpp"
 #include "tests/extremes/problem_runs.hpp"
 

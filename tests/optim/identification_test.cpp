@@ -7,6 +7,7 @@
 
 #include "optim/experiment.hpp"
 #include "pendulum.hpp"
+#include "source_folder.hpp"
 
 using namespace mbsopt;
 using Catch::Matchers::Contains;

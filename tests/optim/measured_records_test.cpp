@@ -6,6 +6,7 @@
 
 #include "optim/identification.hpp"
 #include "repetitions.hpp"
+#include "source_folder.hpp"
 
 using namespace mbsopt;
 

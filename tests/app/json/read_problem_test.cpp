@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <numbers>
 
+#include "source_folder.hpp"
 #include "tests/app/temporary_folder.hpp"
 
 using namespace mbsopt;

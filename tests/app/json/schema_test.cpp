@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/scene/type_table.hpp"
+#include "source_folder.hpp"
 
 TEST_CASE("problems/problem.schema.json is the schema of this version", "[json]") {
   std::ifstream file(MBSOPT_SOURCE_DIR "/problems/problem.schema.json");

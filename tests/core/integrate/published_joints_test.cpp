@@ -8,6 +8,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/integrate/simulation.hpp"
+#include "source_folder.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;
