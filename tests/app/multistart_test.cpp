@@ -217,10 +217,11 @@ TEST_CASE("resume: a run that was interrupted keeps its best and goes on", "[res
       "--threads", "2", "--set", "simulation.integrator.max_step=2e-3", "--set", "design.multistart.starts=4"};
   REQUIRE(design(file, folder.file("whole"), slow).exit_code == kDone);
   const fs::path out = folder.path / "out";
+  const int signal = GENERATE(SIGTERM, SIGHUP, SIGPIPE);
   std::thread killer([&] {
     for (int i = 0; i < 3000 && !(fs::exists(out / kJournalFile) && journal_lines(out, "start") >= 1); ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    ::kill(::getpid(), SIGTERM);
+    ::kill(::getpid(), signal);
   });
   const CommandOutcome outcome = design(file, out.string(), slow);
   killer.join();
@@ -411,7 +412,7 @@ TEST_CASE("resume refuses changed data also where two files have one base name",
   for (const std::string data : {"a/r.csv", "b/r.csv"}) {
     const std::string before = content_of(folder.path / data);
     write_text(out / kJournalFile, lines[0] + "\n" + lines[1] + "\n");
-    folder.write(data, before + "0.6,0.1\n");
+    folder.write(data, before + "1.05,0.1\n");
     const CommandOutcome outcome = run_command({"resume", out.string()});
     CHECK(outcome.exit_code == kBadInput);
     CHECK_THAT(outcome.err, Contains("another content of a data file"));
