@@ -339,8 +339,8 @@ def write():
     loads = [float(r["load"]) for r in runs]
     lines = ["# Performance", "",
              "`./dev bench` writes this page (`docs/performance.py`); do not edit it. The figures are in `data/performance/`, the",
-             "programs in `bench/`. Each table stands below the command that measures it alone. `./dev bench --peers` measures all, the other",
-             "programs included.", "", "Measured on:", "", *[f"* {machine}" for machine in machines], "",
+             "programs in `bench/`. Each table stands below the command that measures it alone. `./dev bench --peers` measures",
+             "all, the other programs included.", "", "Measured on:", "", *[f"* {machine}" for machine in machines], "",
              "All runs use one thread. Times are processor times of this thread, medians. Ratios are taken in one run, in turn.", ""]
     if loads and max(loads) > 0.7 * min(int(r["cores"]) for r in runs):
         lines += [f"**The machine was busy**: its load was {min(loads):.0f} to {max(loads):.0f}. Processor times are longer than on an idle machine, since",
