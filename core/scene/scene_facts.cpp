@@ -1,5 +1,6 @@
 #include "core/scene/scene_facts.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/expression/dimension_inference.hpp"
@@ -33,6 +34,7 @@ SceneFacts::SceneFacts(const Scene& scene)
     : scene_(scene),
       bodies_(by_name(scene.bodies)),
       joints_(by_name(scene.joints)),
+      drives_(by_name(scene.drives)),
       forces_(by_name(scene.forces)),
       sensors_(by_name(scene.sensors)) {
   for (const Parameter& parameter : scene.parameters) {
@@ -115,6 +117,26 @@ std::vector<std::string> SceneFacts::names(To what) const {
       return objectives_;
   }
   return {};
+}
+
+bool SceneFacts::has(To what, const std::string& name) const {
+  switch (what) {
+    case To::body:
+      return name == "ground" || body(name);
+    case To::joint:
+      return joint(name);
+    case To::drive:
+      return drives_.contains(name);
+    case To::force:
+      return force(name);
+    case To::sensor:
+      return sensor(name);
+    case To::parameter:
+      return none_.input(name) >= 0;
+    case To::objective:
+      return std::find(objectives_.begin(), objectives_.end(), name) != objectives_.end();
+  }
+  return false;
 }
 
 const Symbols& SceneFacts::symbols(Names names) const {
