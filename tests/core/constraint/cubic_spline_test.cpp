@@ -50,3 +50,15 @@ TEST_CASE("a spline refuses times that do not increase", "[spline]") {
   CHECK_THROWS_AS(CubicSpline({0, 1, 1}, {0, 1, 2}), std::invalid_argument);
   CHECK_THROWS_AS(CubicSpline({0}, {0}), std::invalid_argument);
 }
+
+TEST_CASE("a spline's slopes do not depend on the unit of time, and one beyond all numbers is refused", "[spline]") {
+  const std::vector<double> values{0, 1, 0.5, 2, 1};
+  const auto spline = [&](double unit) { return CubicSpline({0, unit, 1.5 * unit, 3 * unit, 4 * unit}, values); };
+  const double slope = spline(1)(2).f_t;
+  for (const double unit : {1e-100, 1e-12, 1e12, 1e156}) {
+    INFO(unit);
+    CHECK(spline(unit)(2 * unit).f_t * unit == Approx(slope).epsilon(1e-12));
+  }
+  CHECK_THROWS_AS(spline(1e-162), std::invalid_argument);
+  CHECK_THROWS_AS(CubicSpline({0, 1, 2, 3, 4}, {0, 1e308, -1e308, 1e308, 0}), std::invalid_argument);
+}
