@@ -72,7 +72,7 @@ class Outcome:
             self.look_at_numbers(self.result.get("simulation"), "simulation")
             if self.result.get("status") != "ok":
                 self.complain("result", f"exit code 0, status {self.result.get('status')!r}")
-        elif not self.err.strip() or (self.code == 1 and not self.result.get("message")):
+        elif (self.code != 3 and not self.err.strip()) or (self.code == 1 and not self.result.get("message")):
             self.complain("silence", f"exit code {self.code} without words")
         for text, where in ((self.out, "standard output"), (self.err, "standard error")):
             if NUMBERLESS.search(text):
