@@ -13,7 +13,6 @@ import multiprocessing
 import os
 import sys
 import tempfile
-import time
 from collections import Counter
 from pathlib import Path
 
@@ -35,17 +34,18 @@ CHECKS = [(checks.sweeps, 1), (checks.plane, 1), (checks.energy, 1), (checks.kin
 
 
 def examine(scene, program, chosen, folder):
-    """The failures of a scene as (kind, words), and what may be told of it: whether it was refused, what explained."""
+    """The failures of a scene as (kind, words), by check, and what may be told of it: whether it was refused, what explained."""
     lab = Lab(scene, program, folder)
     try:
         base = lab.run("simulate")
-        failures = [failure for check in chosen for failure in check(lab)] if base.ok else []
-        if not base.ok:
-            for check in (checks.sweeps, checks.other_commands):
-                if check in chosen:
-                    check(lab)
+        failures, seen = {checks.ends: lab.complaints()}, len(lab.complaints())
+        for check in chosen:
+            if base.ok or check in (checks.sweeps, checks.other_commands):
+                found = check(lab)
+                failures[check] = lab.complaints()[seen:] + (found if base.ok else [])
+                seen = len(lab.complaints())
         told = {"refused": "" if base.ok else f"{base.code}: {base.message}", "explained": lab.explained}
-        return lab.complaints() + failures, told
+        return {check: found for check, found in failures.items() if found}, told
     finally:
         lab.close()
 
@@ -54,17 +54,19 @@ def try_seed(job):
     seed, options = job
     program = Program(options.program, options.patience)
     chosen = [check for k, (check, every) in enumerate(CHECKS) if (seed + k) % every == 0]
-    start = time.process_time()
     with tempfile.TemporaryDirectory(prefix="soak_", dir=options.scratch) as folder:
         scene = random_scene(seed)
         failures, told = examine(scene, program, chosen, Path(folder) / "whole")
         if failures and not options.whole:
+            check, found = next(iter(failures.items()))
+
             def kinds(candidate):
-                return {kind for kind, _ in examine(candidate, program, chosen, Path(folder) / "part")[0]}
-            scene = shrunk(scene, failures[0][0], kinds, options.patience)
+                again = examine(candidate, program, [check], Path(folder) / "part")[0]
+                return {kind for kind, _ in again.get(check, [])}
+            scene = shrunk(scene, found[0][0], kinds, options.patience)
         if failures:
             scene.save(options.keep / f"{seed}.json")
-    return seed, scene.about, failures, told, time.process_time() - start
+    return seed, scene.about, [failure for found in failures.values() for failure in found], told
 
 
 def arguments():
@@ -95,6 +97,7 @@ def replay(options):
         with tempfile.TemporaryDirectory(prefix="soak_", dir=options.scratch) as folder:
             scene = load(file)
             failures, told = examine(scene, Program(options.program, options.patience), [check for check, _ in CHECKS], folder)
+            failures = [failure for found in failures.values() for failure in found]
             say(failures, file, scene.about)
             if told["refused"]:
                 print(f"{file}: refused, {told['refused']}")
@@ -107,7 +110,7 @@ def campaign(options):
     seeds = range(options.first, options.first + options.count)
     with multiprocessing.Pool(options.jobs) as pool:
         done = pool.imap_unordered(try_seed, [(seed, options) for seed in seeds])
-        for k, (seed, about, failures, told, _) in enumerate(done, 1):
+        for k, (seed, about, failures, told) in enumerate(done, 1):
             held += not failures
             say(failures, f"seed {seed}", about.split(": ", 1)[-1])
             refused[told["refused"][:90]] += bool(told["refused"])
