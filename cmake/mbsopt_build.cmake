@@ -38,5 +38,7 @@ function(mbsopt_precompile target)
                             <memory> <optional> <span> <stdexcept> <string> <string_view> <utility> <vector> ${ARGN})
   if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
     target_compile_options(${target} PRIVATE -fpch-preprocess)  # ccache's manual, "Precompiled headers"
+  elseif(CMAKE_CXX_COMPILER_ID STREQUAL Clang)
+    target_compile_options(${target} PRIVATE "SHELL:-Xclang -fno-pch-timestamp")  # the same page
   endif()
 endfunction()
