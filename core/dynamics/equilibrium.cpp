@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/QR>
 #include <cmath>
 #include <limits>
 
@@ -10,6 +9,7 @@
 #include "core/dynamics/assembly_equations.hpp"
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/projection.hpp"
+#include "core/linear/dense.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
@@ -98,7 +98,7 @@ class Statics {
   // J, its null space and Phi_rho at y.
   struct Rows {
     MatrixXd J, N, phi_rho;
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> J_scaled;
+    OrthogonalDecomposition J_scaled;
     VectorXd scale;
     MatrixXd particular(const MatrixXd& b) const {  // J xi = b
       if (J.rows() == 0) return MatrixXd::Zero(N.rows(), b.cols());
@@ -117,13 +117,8 @@ class Statics {
     r.J = g.y.topLeftCorner(d_.m, 7 * n_) * to_q(y_.head(7 * n_), MatrixXd::Identity(6 * n_, 6 * n_));
     r.phi_rho = g.rho.topRows(d_.m);
     r.scale = r.J.rowwise().norm().cwiseMax(std::numeric_limits<double>::min()).cwiseInverse();
-    r.J_scaled.setThreshold(kRankThreshold);
-    r.J_scaled.compute(r.scale.asDiagonal() * r.J);
-    Eigen::ColPivHouseholderQR<MatrixXd> qr;
-    qr.setThreshold(kRankThreshold);
-    qr.compute((r.scale.asDiagonal() * r.J).transpose());
-    const MatrixXd Q = qr.householderQ() * MatrixXd::Identity(6 * n_, 6 * n_);
-    r.N = Q.rightCols(6 * n_ - qr.rank());
+    r.J_scaled = OrthogonalDecomposition(r.scale.asDiagonal() * r.J, kRankThreshold);
+    r.N = null_space(r.scale.asDiagonal() * r.J, kRankThreshold);
     return r;
   }
 
@@ -198,8 +193,8 @@ Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const Vecto
     MatrixXd S = -Z;
     S.diagonal().array() += sigma;
     const MatrixXd reduced = rows.N.transpose() * statics.mass_times(S * rows.N);
-    const VectorXd xi = rows.N * reduced.completeOrthogonalDecomposition().solve(
-                                     VectorXd(rows.N.transpose() * statics.mass_times(statics.z())));
+    const VectorXd xi =
+        rows.N * OrthogonalDecomposition(reduced).solve(rows.N.transpose() * statics.mass_times(statics.z()));
     const double size = xi.cwiseAbs().maxCoeff();
     if (!std::isfinite(size)) return fail("a step towards it is not finite");
     e.q += statics.to_q(e.q, (size > kLargestStep ? kLargestStep / size : 1.0) * xi);
@@ -220,7 +215,7 @@ Equilibrium static_equilibrium(const Mechanism& mechanism, double t, const Vecto
     const MatrixXd Z = statics.z_of_positions(), NM = rows.N.transpose();
     const MatrixXd reduced = NM * statics.mass_times(-(Z * rows.N));
     const MatrixXd right = NM * statics.mass_times(statics.z_of_parameters() + Z * particular);
-    xi_rho += rows.N * reduced.completeOrthogonalDecomposition().solve(right);
+    xi_rho += rows.N * OrthogonalDecomposition(reduced).solve(right);
   }
   e.q_rho = statics.to_q(e.q, xi_rho);
   e.ok = true;

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -12,6 +10,7 @@
 #include "core/body/euler_parameters.hpp"
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/projection.hpp"
+#include "core/linear/dense.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
@@ -47,8 +46,7 @@ class DrivenRows {
     rows_.evaluate(frames_);
     J_ = rows_.dense();
     scale_ = J_.rowwise().norm().cwiseMax(1e-300).cwiseInverse();
-    scaled_.setThreshold(kRankThreshold);
-    scaled_.compute(scale_.asDiagonal() * J_);
+    scaled_ = OrthogonalDecomposition(scale_.asDiagonal() * J_, kRankThreshold);
   }
   const VectorXd& phi(const VectorXd& angles) {
     evaluate_phi(d_, frames_, laws_, angles, phi_);
@@ -62,7 +60,7 @@ class DrivenRows {
   MatrixXd unit_rows() const { return scale_.asDiagonal() * J_; }
   VectorXd solve(const VectorXd& b) const { return scaled_.solve(scale_.cwiseProduct(b)); }  // J x = b
   VectorXd solve_transposed(const VectorXd& f) const {                                       // J'x = f
-    const VectorXd x = scaled_.transpose().solve(f);
+    const VectorXd x = scaled_.solve_transposed(f);
     return scale_.cwiseProduct(x);
   }
   VectorXd transposed_times(const VectorXd& x) const { return J_.transpose() * x; }
@@ -75,7 +73,7 @@ class DrivenRows {
   std::vector<Frame> frames_;
   VectorXd phi_, scale_;
   MatrixXd J_;
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> scaled_;
+  OrthogonalDecomposition scaled_;
 };
 
 // Accelerations from the equations of the drives alone, and the multipliers that belong to them: right whatever the
@@ -230,12 +228,12 @@ class Kinematics {
  private:
   // Equations with a share in a dependence that the generic position does not have: null vectors of J'.
   void name_owners(const MatrixXd& J, SingularPosition& s) const {
-    const Eigen::JacobiSVD<MatrixXd> svd(J, Eigen::ComputeFullU);
+    const LeftSingular svd = left_singular(J);
     std::set<std::string> seen;
     for (Index k = 0; k < J.rows(); ++k) {
-      if (k < svd.singularValues().size() && svd.singularValues()(k) > kRankThreshold) continue;
+      if (k < svd.values.size() && svd.values(k) > kRankThreshold) continue;
       for (const Constraint& c : d_.constraints) {
-        if (svd.matrixU().col(k).segment(c.row, c.rows()).cwiseAbs().maxCoeff() < 1e-3) continue;
+        if (svd.U.col(k).segment(c.row, c.rows()).cwiseAbs().maxCoeff() < 1e-3) continue;
         const std::string owner = c.drive >= 0 ? "drive '" + d_.drive_names[static_cast<std::size_t>(c.drive)] + "'"
                                                : "joint '" + d_.joint_names[static_cast<std::size_t>(c.joint)] + "'";
         if (seen.insert(owner).second) s.owners.push_back(owner);

@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <map>
 
 #include "core/dynamics/constraint_rows.hpp"
+#include "core/linear/dense.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -39,7 +38,7 @@ void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::st
   }
   for (int i = 1; i <= d.n; ++i) {
     const BodyData& b = d.bodies[at(i)];
-    const double least = Eigen::SelfAdjointEigenSolver<Matrix3d>(b.J, Eigen::EigenvaluesOnly).eigenvalues()(0);
+    const double least = symmetric_eigenvalues(b.J)(0);
     any = any || b.mass <= kMassless * mass || least <= kMassless * inertia;
   }
   if (!any) return;  // the usual case costs nothing
@@ -48,11 +47,7 @@ void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::st
   MatrixXd J = rows.dense();
   if (d.m == 0) J = MatrixXd::Zero(1, 6 * d.n);
   for (Index r = 0; r < J.rows(); ++r) J.row(r) /= std::max(J.row(r).norm(), 1e-300);
-  Eigen::ColPivHouseholderQR<MatrixXd> qr;
-  qr.setThreshold(kRankThreshold);
-  qr.compute(J.transpose());
-  const MatrixXd Q = qr.householderQ() * MatrixXd::Identity(6 * d.n, 6 * d.n);
-  const MatrixXd N = Q.rightCols(6 * d.n - qr.rank());
+  const MatrixXd N = null_space(J, kRankThreshold);
   if (N.cols() == 0) return;
   MatrixXd MN = N;
   for (int i = 1; i <= d.n; ++i) {
@@ -60,11 +55,11 @@ void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::st
     MN.middleRows(6 * (i - 1) + 3, 3) =
         (d.bodies[at(i)].J / (inertia > 0 ? inertia : 1) * N.middleRows(6 * (i - 1) + 3, 3)).eval();
   }
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(N.transpose() * MN);
+  const SymmetricEigen eigen = symmetric_eigen(N.transpose() * MN);
   std::map<int, bool> bodies;
-  for (Index k = 0; k < N.cols() && eigen.eigenvalues()(k) <= kMassless; ++k) {
+  for (Index k = 0; k < N.cols() && eigen.values(k) <= kMassless; ++k) {
     Index row = 0;
-    (N * eigen.eigenvectors().col(k)).cwiseAbs().maxCoeff(&row);
+    (N * eigen.vectors.col(k)).cwiseAbs().maxCoeff(&row);
     bodies[static_cast<int>(row / 6) + 1] = row % 6 >= 3;
   }
   for (const auto& [body, turns] : bodies) {

@@ -1,10 +1,9 @@
 #include "core/dynamics/nearest_point.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace mbsopt {
 
@@ -16,20 +15,18 @@ NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J) : scale_
     const double norm = J.row(i).norm();
     scale_(i) = norm > 0 ? 1 / norm : 1.0;
   }
-  J_transposed_.setThreshold(kRankThreshold);
-  J_transposed_.compute((scale_.asDiagonal() * J).transpose());
-  const Eigen::Index N = J.cols(), free = N - rank();
-  Z_ = J_transposed_.householderQ() * MatrixXd::Identity(N, N).rightCols(free);
+  J_transposed_ = OrthogonalDecomposition((scale_.asDiagonal() * J).transpose(), kRankThreshold);
+  Z_ = J_transposed_.left_null_space();
 }
 
 VectorXd NearestPointLinearisation::multipliers(const VectorXd& g) const {
-  return scale_.cwiseProduct(VectorXd(J_transposed_.solve(g)));
+  return scale_.asDiagonal() * J_transposed_.solve(g);
 }
 MatrixXd NearestPointLinearisation::pseudo_inverse_times(const Eigen::Ref<const MatrixXd>& b) const {
-  return J_transposed_.transpose().solve(MatrixXd(scale_.asDiagonal() * b));
+  return J_transposed_.solve_transposed(scale_.asDiagonal() * b);
 }
 MatrixXd NearestPointLinearisation::pseudo_inverse_transposed_times(const Eigen::Ref<const MatrixXd>& x) const {
-  return scale_.asDiagonal() * MatrixXd(J_transposed_.solve(MatrixXd(x)));
+  return scale_.asDiagonal() * J_transposed_.solve(x);
 }
 
 void NearestPointLinearisation::set_hessian(const MatrixXd& H) {
@@ -40,9 +37,9 @@ void NearestPointLinearisation::set_hessian(const MatrixXd& H) {
     return;
   }
   const MatrixXd M = Z_.transpose() * H * Z_;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(0.5 * (M + M.transpose()));
-  lambda_ = eigen.eigenvalues();
-  V_ = eigen.eigenvectors();
+  auto [values, vectors] = symmetric_eigen(0.5 * (M + M.transpose()));
+  lambda_ = std::move(values);
+  V_ = std::move(vectors);
 }
 
 MatrixXd NearestPointLinearisation::solve(const Eigen::Ref<const MatrixXd>& b,
@@ -90,7 +87,7 @@ void reduce_violation(NearestPointEquations& equations, VectorXd& x, int& iterat
     if (largest(gradient) < 1e-15) return;
     MatrixXd normal = A.transpose() * A;
     normal.diagonal().array() += mu;
-    VectorXd step = normal.llt().solve(-gradient);
+    VectorXd step = cholesky_solve(normal, -gradient);
     step *= equations.step_fraction(step);
     const VectorXd trial = equations.retracted(x + step), F_trial = equations.values(trial);
     if (violation(F_trial) < violation(F)) {

@@ -18,8 +18,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/QR>
-#include <Eigen/SVD>
+
+#include "core/linear/dense.hpp"
 
 namespace mbsopt {
 
@@ -66,9 +66,9 @@ class NearestPointLinearisation {
   Eigen::VectorXd descent(const Eigen::VectorXd& b, const Eigen::VectorXd& g) const;
 
  private:
-  Eigen::VectorXd scale_;                                                 // of the rows of J
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> J_transposed_;  // of (scale J)'
-  Eigen::MatrixXd Z_, H_, V_;                                             // Z'HZ = V diag(lambda) V'
+  Eigen::VectorXd scale_;                 // of the rows of J
+  OrthogonalDecomposition J_transposed_;  // of (scale J)'
+  Eigen::MatrixXd Z_, H_, V_;             // Z'HZ = V diag(lambda) V'
   Eigen::VectorXd lambda_;
 };
 
