@@ -11,11 +11,11 @@ using fuzz::expect;
 namespace {
 
 template <class Read>
-void refused_in_words(const Read& read) {
+void refused_in_words(std::string_view text, const Read& read) {
   try {
     read();
   } catch (const CsvError& error) {
-    fuzz::expect_words(error.what());
+    fuzz::expect_words(error.what(), text);
     expect(std::string_view(error.what()).starts_with("run.csv:"), "the refusal does not name the file", error.what());
   }
 }
@@ -23,8 +23,9 @@ void refused_in_words(const Read& read) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  refused_in_words([&] {
-    const CsvTable table = parse_csv(fuzz::text_of(data, size), "run.csv");
+  const std::string_view text = fuzz::text_of(data, size);
+  refused_in_words(text, [&] {
+    const CsvTable table = parse_csv(text, "run.csv");
     expect(!table.header.empty() && table.columns.size() == table.header.size(), "columns without names", "");
     expect(std::is_sorted(table.lines.begin(), table.lines.end()), "lines out of order", "");
     for (const std::vector<double>& column : table.columns) {
@@ -34,9 +35,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     for (const std::string& name : table.header) {
       expect(table.has_column(name), "a column that cannot be found", name);
-      refused_in_words([&] { ascending_times(table, name); });
+      refused_in_words(text, [&] { ascending_times(table, name); });
     }
-    refused_in_words([&] { table.column("no such column"); });
+    refused_in_words(text, [&] { table.column("no such column"); });
   });
   return 0;
 }

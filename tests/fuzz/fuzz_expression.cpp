@@ -40,7 +40,7 @@ void infer(const Expression& expression) {
   try {
     if (const std::optional<Dimension> found = infer_dimension(expression, dimension_of)) to_string(*found);
   } catch (const DimensionError& error) {
-    fuzz::expect_words(error.what());
+    fuzz::expect_words(error.what(), expression.text());
     expect(error.offset <= expression.text().size(), "an offset outside of the text", error.what());
   }
 }
@@ -54,7 +54,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     expression = Expression::parse(text);
   } catch (const ExpressionError& error) {
-    fuzz::expect_words(error.what());
+    fuzz::expect_words(error.what(), text);
     expect(error.offset <= size, "an offset outside of the text", error.what());
     return 0;
   }

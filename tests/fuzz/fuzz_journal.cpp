@@ -31,11 +31,11 @@ class Folder {
 };
 
 template <class Read>
-void refused_in_words(const Read& read) {
+void refused_in_words(std::string_view text, const Read& read) {
   try {
     read();
   } catch (const OutputError& error) {
-    fuzz::expect_words(error.what());
+    fuzz::expect_words(error.what(), text);
   }
 }
 
@@ -43,11 +43,13 @@ void refused_in_words(const Read& read) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const Folder folder;
-  std::ofstream(folder.path() / kJournalFile, std::ios::binary) << fuzz::text_of(data, size);
-  refused_in_words([&] {
+  const std::string_view text = fuzz::text_of(data, size);
+  std::ofstream(folder.path() / kJournalFile, std::ios::binary) << text;
+  refused_in_words(text, [&] {
     const JournalContent content = read_journal(folder.path());
-    refused_in_words([&] { JsonPointRecords(content.points, content.hessians, [](const char*, const Json&) {}); });
-    refused_in_words([&] { JsonResidualRecords(content.residuals, [](const Json&) {}); });
+    refused_in_words(text,
+                     [&] { JsonPointRecords(content.points, content.hessians, [](const char*, const Json&) {}); });
+    refused_in_words(text, [&] { JsonResidualRecords(content.residuals, [](const Json&) {}); });
     Journal(folder.path()).add("ended", "ok");
     const JournalContent longer = read_journal(folder.path());
     fuzz::expect(longer.points.size() == content.points.size() && longer.ended == "ok", "a record was lost", "");

@@ -22,11 +22,11 @@ std::vector<std::string> cut_overrides(std::string& text) {
   return sets;
 }
 
-void check(const InputError& error, const std::string& text) {
+void check(const InputError& error, const std::string& text, std::string_view input) {
   expect(!error.findings().empty(), "an error without findings", error.what());
   const auto lines = 1 + std::count(text.begin(), text.end(), '\n');
   for (const Finding& finding : error.findings()) {
-    fuzz::expect_words(finding.message);
+    fuzz::expect_words(finding.message, input);
     expect(finding.line >= 0 && finding.line <= lines, "a line outside of the text", to_string(finding));
   }
 }
@@ -34,22 +34,23 @@ void check(const InputError& error, const std::string& text) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  std::string text(fuzz::text_of(data, size));
+  const std::string_view input = fuzz::text_of(data, size);
+  std::string text(input);
   const std::vector<std::string> sets = cut_overrides(text);
   const std::filesystem::path file = MBSOPT_SOURCE_DIR "/problems/fuzz/problem.json";  // data files lie beside it
   try {
     std::vector<std::string> warnings;
     read_problem_text(text, file, sets, &warnings);
-    for (const std::string& warning : warnings) fuzz::expect_words(warning);
+    for (const std::string& warning : warnings) fuzz::expect_words(warning, input);
   } catch (const InputError& error) {
-    check(error, text);
+    check(error, text, input);
   }
   try {  // what tradeoff and design do to a text
     std::string edited = text;
     for (const std::string& set : sets) edited = with_override(edited, set);
     without_member(edited, "simulation.integrator");
   } catch (const InputError& error) {
-    check(error, text + "\n\n");
+    check(error, text + "\n\n", input);
   }
   return 0;
 }
