@@ -33,6 +33,13 @@ MatrixXd null_space(const MatrixXd& A, double threshold) {
   return Q.rightCols(A.cols() - qr.rank());
 }
 
+MatrixXd orthonormal_columns(const MatrixXd& A) {
+  if (A.cols() == 0) return A;
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(A);
+  const MatrixXd AP = A * qr.colsPermutation(), R = qr.matrixR().topRows(A.cols());
+  return R.triangularView<Eigen::Upper>().solve<Eigen::OnTheRight>(AP);
+}
+
 LeftSingular left_singular(const MatrixXd& A) {
   if (A.size() == 0) return {VectorXd(0), MatrixXd::Identity(A.rows(), A.rows())};
   const Eigen::JacobiSVD<MatrixXd> svd(A, Eigen::ComputeFullU);

@@ -21,6 +21,10 @@ Eigen::VectorXd cholesky_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& 
 // this part of the largest count as zero.
 Eigen::MatrixXd null_space(const Eigen::MatrixXd& A, double threshold);
 
+// A basis of the range of A, whose columns are independent: A times the inverse of its triangular factor, so that small
+// rows keep their digits.
+Eigen::MatrixXd orthonormal_columns(const Eigen::MatrixXd& A);
+
 // A = U diag(values) V', all columns of U, values descending. For small matrices.
 struct LeftSingular {
   Eigen::VectorXd values;

@@ -52,6 +52,7 @@ class SceneFacts {
 
  private:
   void find_broken_definitions();
+  bool can_be_evaluated(const Expression& expression, const Symbols& symbols) const;
 
   const Scene& scene_;
   std::map<std::string, const Body*> bodies_;
