@@ -13,6 +13,8 @@ namespace {
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::size_t kLargestFile = std::size_t{256} << 20;  // no problem file is larger
 
+constexpr std::size_t kStride = 1024;  // a line may be the whole file: columns are counted from the nearest multiple
+
 bool is_continuation(char c) { return (static_cast<unsigned char>(c) & 0xC0) == 0x80; }
 
 // Bytes of the UTF-8 sequence at `at`, 0 where it is none (overlong forms, surrogates and beyond U+10FFFF are none).
@@ -49,6 +51,19 @@ std::size_t sequence_length(std::string_view text, std::size_t at) {
 SourceText::SourceText(std::string content) : content_(std::move(content)), line_starts_{0} {
   for (std::size_t i = 0; i < content_.size(); ++i)
     if (content_[i] == '\n') line_starts_.push_back(i + 1);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < content_.size(); ++i) {
+    if (i % kStride == 0) continuations_.push_back(count);
+    count += is_continuation(content_[i]) ? 1 : 0;
+  }
+}
+
+std::size_t SourceText::continuations(std::size_t end) const {
+  if (end == 0) return 0;
+  const std::size_t stride = (end - 1) / kStride;
+  std::size_t count = continuations_[stride];
+  for (std::size_t i = stride * kStride; i < end; ++i) count += is_continuation(content_[i]) ? 1 : 0;
+  return count;
 }
 
 Position SourceText::position(std::size_t offset) const {
@@ -56,9 +71,8 @@ Position SourceText::position(std::size_t offset) const {
   const auto line = std::upper_bound(line_starts_.begin(), line_starts_.end(), offset) - 1;
   std::size_t start = *line;
   if (start == 0 && content_.starts_with(kByteOrderMark)) start = std::min(kByteOrderMark.size(), offset);
-  Position position{static_cast<int>(line - line_starts_.begin()) + 1, 1};
-  for (std::size_t i = start; i < offset; ++i) position.column += is_continuation(content_[i]) ? 0 : 1;
-  return position;
+  const std::size_t characters = offset - start - (continuations(offset) - continuations(start));
+  return {static_cast<int>(line - line_starts_.begin()) + 1, static_cast<int>(characters) + 1};
 }
 
 std::size_t SourceText::first_invalid_byte() const {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "core/expression/did_you_mean.hpp"
 #include "core/expression/dimension_inference.hpp"
@@ -12,6 +13,8 @@ namespace mbsopt {
 namespace {
 
 constexpr std::size_t kListed = 20;
+// A hint compares a name with all others. Errors beyond that many go without: no more of them are shown.
+constexpr std::size_t kWithHints = 100;
 
 // "; bodies: ground, crank"
 std::string listed(std::string_view what, std::vector<std::string> names) {
@@ -93,32 +96,28 @@ void Checker::must_be_identifier(const std::string& where, const std::string& na
 }
 
 void Checker::check_reference(const std::string& where, const std::string& value, To what) {
-  const std::vector<std::string> names = facts_.names(what);
-  if (std::find(names.begin(), names.end(), value) != names.end()) return;
+  if (facts_.has(what, value)) return;
   const auto [one, all] = kind_of(what);
-  issue(where,
-        std::string("there is no ") + one + " '" + value + "'" + did_you_mean(value, names) + listed(all, names));
+  const std::string text = std::string("there is no ") + one + " '" + value + "'";
+  if (issues_.size() >= kWithHints) return issue(where, text);
+  const std::vector<std::string> names = facts_.names(what);
+  issue(where, text + did_you_mean(value, names) + listed(all, names));
 }
 
 void Checker::reference(std::string_view key, const std::string& value, To what, const Says& says) {
   if (says.need == Need::unknown || (value.empty() && says.need == Need::optional)) return;
   if (value.empty()) return issue(path(key), "is missing; expected: " + std::string(says.description));
-  // Fast for the usual case: a list of all names is made for an error message only.
-  if (what == To::body && (value == "ground" || facts_.body(value))) return;
-  if (what == To::joint && facts_.joint(value)) return;
-  if (what == To::sensor && facts_.sensor(value)) return;
-  check_reference(path(key), value, what);
+  if (!facts_.has(what, value)) check_reference(path(key), value, what);
 }
 
 void Checker::references(std::string_view key, const std::vector<std::string>& values, To what, const Says& says) {
   if (values.empty() && says.need == Need::required)
     issue(path(key), "is empty; expected: " + std::string(says.description));
+  std::set<std::string> listed_before;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const std::string where = child_path(path(key), i);
     check_reference(where, values[i], what);
-    if (std::find(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(i), values[i]) !=
-        values.begin() + static_cast<std::ptrdiff_t>(i))
-      issue(where, "'" + values[i] + "' is listed twice");
+    if (!listed_before.insert(values[i]).second) issue(where, "'" + values[i] + "' is listed twice");
   }
 }
 
@@ -147,13 +146,16 @@ bool Checker::names_are_known(const std::string& where, const Expression& value,
       continue;
     }
     known = false;
+    const std::vector<std::string> known_names =
+        issues_.size() < kWithHints ? symbols.names() : std::vector<std::string>{};
     const std::vector<SyntaxNode>& nodes = value.tree().nodes;
     const auto node = std::find_if(nodes.begin(), nodes.end(), [&](const SyntaxNode& n) {
       return n.operation == Operation::name && n.name == name;
     });
     issues_.push_back(
         {where,
-         "unknown name '" + name + "'" + did_you_mean(name, symbols.names()) + listed("known names", symbols.names()),
+         "unknown name '" + name + "'" +
+             (known_names.empty() ? "" : did_you_mean(name, known_names) + listed("known names", known_names)),
          false, node->offset});
   }
   return known;
