@@ -1,19 +1,17 @@
 #include "app/json/source_text.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <system_error>
+#include <cstdlib>
 
 #include "app/json/input_error.hpp"
+#include "optim/regular_file.hpp"
 
 namespace mbsopt {
 
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-constexpr std::size_t kLargestFile = std::size_t{256} << 20;
+constexpr std::size_t kLargestFile = std::size_t{256} << 20;  // no problem file is larger
 
 constexpr std::size_t kStride = 1024;  // a line may be the whole file: columns are counted from the nearest multiple
 
@@ -106,21 +104,11 @@ std::size_t SourceText::inside_string(std::size_t literal, std::size_t at) const
 }
 
 std::string read_text_file(const std::filesystem::path& file) {
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(file, error);
-  if (status.type() == std::filesystem::file_type::directory) fail(file, "is a directory, a problem file is expected");
-  if (status.type() == std::filesystem::file_type::not_found) fail(file, "there is no such file");
-  if (error) fail(file, "cannot be read: " + error.message());
-  errno = 0;
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) fail(file, std::string("cannot be read: ") + std::strerror(errno));
-  std::string content;
-  char buffer[1 << 16];
-  while (stream.read(buffer, sizeof buffer) || stream.gcount() > 0) {
-    content.append(buffer, static_cast<std::size_t>(stream.gcount()));
-    if (content.size() > kLargestFile) fail(file, "is larger than 256 MiB, which no problem file is");
+  try {
+    return content_of_regular_file(file, kLargestFile);
+  } catch (const FileError& error) {
+    fail(file, error.what());
   }
-  return content;
 }
 
 }  // namespace mbsopt

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <map>
 
 #include "core/dynamics/constraint_rows.hpp"
 #include "core/dynamics/row_dependence.hpp"
+#include "core/linear/dense.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -42,10 +42,10 @@ void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::st
     const BodyData& b = d.bodies[at(i)];
     const int first = 6 * (i - 1);
     for (int k = 0; k < 3 && b.mass > kMassless * mass; ++k) rows.push_back({count++, first + k, 1});
-    const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(b.J);
+    const SymmetricEigen principal = symmetric_eigen(b.J);
     for (int k = 0; k < 3; ++k) {
-      if (!(principal.eigenvalues()(k) > kMassless * inertia)) continue;
-      for (int j = 0; j < 3; ++j) rows.push_back({count, first + 3 + j, principal.eigenvectors()(j, k)});
+      if (!(principal.values(k) > kMassless * inertia)) continue;
+      for (int j = 0; j < 3; ++j) rows.push_back({count, first + 3 + j, principal.vectors(j, k)});
       ++count;
     }
   }
