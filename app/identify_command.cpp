@@ -50,7 +50,7 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
 
 IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem, const std::vector<CsvTable>& data) {
   JsonResidualRecords records(long_run.earlier().residuals,
-                              [&](const Json& content) { long_run.journal().add("residuals", content); });
+                              [&](const Json& content) { long_run.add("residuals", content); });
   IdentificationOptions options;
   options.records = &records;
   options.profiles = run.context.options.profiles;
@@ -59,10 +59,9 @@ IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem,
     run.progress.iteration(fmt::format("iteration {:3d}   cost {:.9e}   gradient {:.1e}   step {:.1e}", row.iteration,
                                        row.cost, row.gradient_norm, row.step_norm));
     if (row.iteration > long_run.earlier().last_iteration)
-      long_run.journal().add("iterate",
-                             {{"iteration", row.iteration},
-                              {"cost", row.cost},
-                              {"parameters", std::vector<double>(row.parameters.begin(), row.parameters.end())}});
+      long_run.add("iterate", {{"iteration", row.iteration},
+                               {"cost", row.cost},
+                               {"parameters", std::vector<double>(row.parameters.begin(), row.parameters.end())}});
     return !interrupted();
   };
   options.profile_progress = [&](const std::string& name, double value, double tau) {
@@ -136,13 +135,11 @@ int identify_command(const CommandContext& context) {
   if (interrupted() && run.problem.identification->multistart) return stopped_within_starts(run, long_run, problem);
   long_run.begin();
   const IdentificationResult fit = fitted(run, long_run, problem, data);
-  long_run.end(fit.status == SolverStatus::stopped ? "interrupted" : fit.ok() ? "ok" : "failed");
   add_to_result(run.result, fit);
   print_fit(context.out, fit);
   const Trajectory history = history_of(fit);
-  if (fit.status == SolverStatus::stopped) {
-    run.stopped(fmt::format("optimized.json holds the best fit so far; 'mbsopt resume {}' goes on",
-                            run.folder.path().string()));
+  if (fit.status == SolverStatus::stopped || interrupted()) {
+    long_run.stopped("optimized.json holds the best fit so far");
   } else if (!fit.ok()) {
     run.failed(fit.message);
   }
@@ -151,7 +148,7 @@ int identify_command(const CommandContext& context) {
   run.write("residuals.csv", residuals_csv(fit));
   if (!fit.profiles.empty()) run.write("profile.csv", profile_csv(fit));
   run.write("report.html", identification_report(scene, run.result, history, fit_plots(run.problem, fit)));
-  return run.finish();
+  return long_run.finish();
 }
 
 }  // namespace mbsopt

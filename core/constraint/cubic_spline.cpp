@@ -1,7 +1,6 @@
 #include "core/constraint/cubic_spline.hpp"
 
 #include <Eigen/Core>
-#include <Eigen/SparseLU>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -10,8 +9,11 @@ namespace mbsopt {
 
 namespace {
 
-// Unknown slopes m_i:  C2 inside,  m_{i-1}/h_i + 2 m_i (1/h_i + 1/h_{i+1}) + m_{i+1}/h_{i+1} = 3 (d_i/h_i +
-// d_{i+1}/h_{i+1}) with d the divided differences; at the ends the third derivatives of neighbours agree.
+// Unknown slopes m_i, with d the divided differences.
+//   C2 inside:              m_{i-1}/h_{i-1} + 2 m_i (1/h_{i-1} + 1/h_i) + m_{i+1}/h_i = 3 (d_{i-1}/h_{i-1} + d_i/h_i)
+//   not-a-knot at the start, reduced by the second row:
+//                           h_1 m_0 + (h_0 + h_1) m_1 = (h_1 (3 h_0 + 2 h_1) d_0 + h_0^2 d_1)/(h_0 + h_1)
+//   at the end the same, read backwards. Elimination needs no exchange of rows: all pivots are positive.
 Eigen::VectorXd slopes_through(const std::vector<double>& times, const std::vector<double>& values) {
   using Index = Eigen::Index;
   const std::size_t n = times.size();
@@ -29,35 +31,22 @@ Eigen::VectorXd slopes_through(const std::vector<double>& times, const std::vect
     m << d(0) - curvature * h(0), d(0) + curvature * h(0), d(0) + curvature * (h(0) + 2 * h(1));
     return m / mean;
   }
-  std::vector<Eigen::Triplet<double>> entries;
-  Eigen::VectorXd b(static_cast<Index>(n));
-  auto put = [&](std::size_t i, std::size_t j, double x) {
-    entries.emplace_back(static_cast<int>(i), static_cast<int>(j), x);
+  std::vector<double> above(n);  // what is right of the diagonal, divided by the pivot
+  const auto eliminate = [&](std::size_t i, double below, double diagonal, double right, double b) {
+    const double pivot = i == 0 ? diagonal : diagonal - below * above[i - 1];
+    above[i] = right / pivot;
+    m(static_cast<Index>(i)) = (i == 0 ? b : b - below * m(static_cast<Index>(i) - 1)) / pivot;
   };
-  for (std::size_t i = 1; i + 1 < n; ++i) {
-    put(i, i - 1, h(i));
-    put(i, i, 2 * (h(i - 1) + h(i)));
-    put(i, i + 1, h(i - 1));
-    b(static_cast<Index>(i)) = 3 * (h(i) * d(i - 1) + h(i - 1) * d(i));
-  }
-  // third derivative of piece i is 6 (m_i + m_{i+1} - 2 d_i)/h_i^2
-  auto end = [&](std::size_t row, std::size_t i, std::size_t j) {
-    const double wi = h(j) * h(j), wj = h(i) * h(i);
-    put(row, i, wi);
-    put(row, i + 1, wi - (j == i + 1 ? wj : 0));
-    if (j != i + 1) put(row, j, -wj);
-    put(row, j + 1, -wj);
-    b(static_cast<Index>(row)) = 2 * (wi * d(i) - wj * d(j));
+  const auto end = [](double h0, double h1, double d0, double d1) {
+    return (h1 * (3 * h0 + 2 * h1) * d0 + h0 * h0 * d1) / (h0 + h1);
   };
-  end(0, 0, 1);
-  end(n - 1, n - 3, n - 2);
-  Eigen::SparseMatrix<double> A(static_cast<Index>(n), static_cast<Index>(n));
-  A.setFromTriplets(entries.begin(), entries.end());
-  Eigen::SparseLU<Eigen::SparseMatrix<double>> solver(A);
-  if (solver.info() != Eigen::Success) {
-    throw std::invalid_argument("no spline goes through the samples: their intervals differ too much in length");
-  }
-  return solver.solve(b) / mean;
+  eliminate(0, 0, h(1), h(0) + h(1), end(h(0), h(1), d(0), d(1)));
+  for (std::size_t i = 1; i + 1 < n; ++i)
+    eliminate(i, h(i), 2 * (h(i - 1) + h(i)), h(i - 1), 3 * (h(i) * d(i - 1) + h(i - 1) * d(i)));
+  const double h0 = h(n - 2), h1 = h(n - 3);
+  eliminate(n - 1, h0 + h1, h1, 0, end(h0, h1, d(n - 2), d(n - 3)));
+  for (Index i = static_cast<Index>(n) - 2; i >= 0; --i) m(i) -= above[static_cast<std::size_t>(i)] * m(i + 1);
+  return m / mean;
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "core/dynamics/assembly_report.hpp"
 #include "core/dynamics/equilibrium.hpp"
 #include "core/dynamics/nearest_point.hpp"
+#include "core/dynamics/row_dependence.hpp"
 #include "core/dynamics/sparse_projection.hpp"
 
 namespace mbsopt {
@@ -426,18 +427,12 @@ std::vector<int> Assembly::obstructed() const {
 // Rows are taken in file order, unit norms first; one that lies in the span of those before it is redundant.
 ModelSummary Assembly::summary() const {
   const MechanismData& d = solution_->data;
-  const MatrixXd J = solution_->position.gradients(solution_->result.y).y.leftCols(7 * d.n);
-  MatrixXd basis(7 * d.n, 7 * d.n);
-  Index rank = 0;
-  auto independent = [&](Index row) {
-    if (rank == basis.cols()) return false;
-    VectorXd x = J.row(row).transpose().normalized();
-    for (int twice = 0; twice < 2; ++twice) x -= basis.leftCols(rank) * (basis.leftCols(rank).transpose() * x);
-    if (!(x.norm() > NearestPointLinearisation::kRankThreshold)) return false;
-    basis.col(rank++) = x.normalized();
-    return true;
-  };
-  for (Index i = 0; i < d.n; ++i) independent(d.m + i);
+  const int equations = d.m + d.n;
+  const auto place = [&](int row) { return row < d.m ? row + d.n : row - d.m; };
+  std::vector<SparseEntry> J = solution_->position.sparse_gradients(solution_->result.y).y;
+  std::erase_if(J, [&](const SparseEntry& e) { return e.row >= equations || e.column >= 7 * d.n; });
+  for (SparseEntry& e : J) e.row = place(e.row);
+  const RowDependence found = row_dependence(equations, d.n, 7, J, NearestPointLinearisation::kRankThreshold);
   const std::size_t joints = d.joint_names.size();
   std::vector<int> rows(joints + d.drive_names.size(), 0), redundant(rows.size(), 0);
   int next_row = 0;
@@ -447,12 +442,13 @@ ModelSummary Assembly::summary() const {
     const std::size_t owner =
         c.drive >= 0 ? joints + static_cast<std::size_t>(c.drive) : static_cast<std::size_t>(c.joint);
     rows[owner] += c.rows();
-    for (int i = 0; i < c.rows(); ++i) redundant[owner] += independent(c.row + i) ? 0 : 1;
+    for (int i = 0; i < c.rows(); ++i)
+      redundant[owner] += found.independent[static_cast<std::size_t>(place(c.row + i))] ? 0 : 1;
   }
   ModelSummary summary;
   summary.bodies = d.n;
-  summary.equations = d.m + d.n;
-  summary.rank = static_cast<int>(rank);
+  summary.equations = equations;
+  summary.rank = found.rank;
   summary.degrees_of_freedom = 7 * d.n - summary.rank;
   for (std::size_t j = 0; j < rows.size(); ++j) {
     if (redundant[j] == 0) continue;
