@@ -235,7 +235,10 @@ const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
   if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho &&
       (last_.has_gradients() || !last_.ok))
     return last_;
-  if (!simulated_.empty() && !last_.has_gradients()) require_unobstructed(scene_, rho, active_, options_.user_forces);
+  if (!simulated_.empty() && !(last_.ok && last_.has_gradients())) {
+    // At other values than the scene's own the loop may close as a structure that cannot move.
+    for (const Eigen::VectorXd& at : {start(), rho}) require_unobstructed(scene_, at, active_, options_.user_forces);
+  }
   GradientMethod method = options_.method;
   std::string choice;
   if (simulated_.empty()) {
