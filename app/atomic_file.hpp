@@ -7,12 +7,21 @@
 
 namespace mbsopt {
 
-// A file or folder that cannot be written, with the reason the system gives.
+// A file or folder that must not or cannot be used, with the reason.
 class OutputError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-void write_file_atomically(const std::filesystem::path& path, std::string_view content);  // throws OutputError
+// The system did not take what was to be written.
+class WriteError : public OutputError {
+ public:
+  WriteError(const std::filesystem::path& path, const char* what);  // with the reason that errno gives
+};
+
+void write_file_atomically(const std::filesystem::path& path, std::string_view content);  // throws WriteError
+
+// Whether a file's name is that of the part of such a file that was never renamed, since its writer was killed.
+bool is_part_of(std::string_view part, std::string_view file);
 
 }  // namespace mbsopt

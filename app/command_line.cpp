@@ -5,6 +5,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <new>
 #include <stdexcept>
@@ -113,9 +115,8 @@ std::string about_the_problem(const CommandContext& context, const std::string& 
 }
 
 // The command's exit code; what was wrong with the input goes to `err` in words.
-int run_guarded(const Command& command, const CommandContext& context) {
+int run_in_words(const Command& command, const CommandContext& context) {
   try {
-    const InterruptGuard guard;
     return command.run(context);
   } catch (const InputError& error) {
     context.err << error.what() << '\n';
@@ -125,6 +126,9 @@ int run_guarded(const Command& command, const CommandContext& context) {
     context.err << error.what() << '\n';
   } catch (const std::invalid_argument& error) {
     context.err << about_the_problem(context, error.what()) << '\n';
+  } catch (const WriteError& error) {
+    context.err << error.what() << '\n';
+    return kNumericalFailure;
   } catch (const OutputError& error) {
     context.err << error.what() << '\n';
   } catch (const std::filesystem::filesystem_error& error) {
@@ -137,6 +141,15 @@ int run_guarded(const Command& command, const CommandContext& context) {
     return kNumericalFailure;
   }
   return kBadInput;
+}
+
+// What was printed may wait in a buffer; that it did not arrive is known only now.
+int flushed(int exit_code, std::ostream& out, std::ostream& err) {
+  errno = 0;
+  if (out.flush()) return exit_code;
+  err << fmt::format("mbsopt: standard output cannot be written{}{}\n", errno ? ": " : "",
+                     errno ? std::strerror(errno) : "");
+  return exit_code == kDone ? kNumericalFailure : exit_code;
 }
 
 void add_commands(CLI::App& app, CommandOptions& options) {
@@ -165,6 +178,7 @@ CommandOptions options_of(const std::vector<std::string>& arguments) {
 
 int run_command_line(const std::vector<std::string>& given, std::ostream& out, std::ostream& err, bool err_is_terminal,
                      Ranks* ranks) {
+  const InterruptGuard guard;
   const std::vector<std::string> arguments = without_help_command(given);
   if (!arguments.empty() && !is_known(arguments[0])) {
     err << fmt::format("mbsopt: {}; available: {}\n", what_is_wrong_with(arguments[0]), joined(command_names()));
@@ -179,12 +193,12 @@ int run_command_line(const std::vector<std::string>& given, std::ostream& out, s
   try {
     parse(app, arguments);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error, out, err) == 0 ? kDone : kBadInput;
+    return flushed(app.exit(error, out, err) == 0 ? kDone : kBadInput, out, err);
   }
   context.command = app.get_subcommands().front()->get_name();
-  return run_guarded(*std::find_if(kCommands.begin(), kCommands.end(),
-                                   [&](const Command& command) { return context.command == command.name; }),
-                     context);
+  const auto command =
+      std::find_if(kCommands.begin(), kCommands.end(), [&](const Command& c) { return context.command == c.name; });
+  return flushed(run_in_words(*command, context), out, err);
 }
 
 }  // namespace mbsopt

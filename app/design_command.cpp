@@ -131,7 +131,8 @@ int design_command(const CommandContext& context) {
   run.result["model"] = to_json(before.model);
   print_model(context.out, scene.name, before.model);
 
-  const auto [design, cut_off] = minimised(run, before.psi);
+  LongRun long_run(run);
+  const auto [design, cut_off] = minimised(run, long_run, before.psi);
   add_to_result(run.result, design);
   const std::optional<MultistartSpec>& starts = run.problem.design->multistart;
   print_design(context.out, design,
@@ -142,9 +143,8 @@ int design_command(const CommandContext& context) {
     run.warn(warning);
   warn_of_stiffness(run, design.final_evaluation.statistics, true);
   const SimulatedMotion after = interrupted() ? SimulatedMotion{} : simulated_motion(run, design.rho);
-  if (cut_off || design.status == SolverStatus::stopped) {
-    run.stopped(fmt::format("optimized.json holds the best design so far; 'mbsopt resume {}' goes on",
-                            run.folder.path().string()));
+  if (cut_off || design.status == SolverStatus::stopped || interrupted()) {
+    long_run.stopped("optimized.json holds the best design so far");
   } else if (!design.ok()) {
     run.failed(design.message);
   }
@@ -153,7 +153,7 @@ int design_command(const CommandContext& context) {
   run.write("history.csv", to_csv(history));
   if (!after.trajectory.rows.empty()) run.write("trajectory.csv", to_csv(after.trajectory));
   run.write("report.html", design_report(scene, design.rho, run.result, history, before.trajectory, after.trajectory));
-  return run.finish();
+  return long_run.finish();
 }
 
 }  // namespace mbsopt

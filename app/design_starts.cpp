@@ -43,18 +43,17 @@ Problem with_seeds(Problem problem, LongRun& long_run) {
 
 DesignResult single_run(Run& run, LongRun& long_run, const Problem& problem) {
   JsonPointRecords records(long_run.earlier().points, long_run.earlier().hessians,
-                           [&](const char* kind, const Json& content) { long_run.journal().add(kind, content); });
+                           [&](const char* kind, const Json& content) { long_run.add(kind, content); });
   DesignOptions options;
   options.records = &records;
   options.simulation_progress = [](double) { return !interrupted(); };
   options.progress = [&](const DesignRow& row) {
     run.progress.iteration(progress_line(row));
     if (row.iteration > long_run.earlier().last_iteration)
-      long_run.journal().add("iterate",
-                             {{"iteration", row.iteration},
-                              {"objective", row.objective},
-                              {"infeasibility", row.violation},
-                              {"parameters", named_values(problem.design->variables, numbers(row.parameters))}});
+      long_run.add("iterate", {{"iteration", row.iteration},
+                               {"objective", row.objective},
+                               {"infeasibility", row.violation},
+                               {"parameters", named_values(problem.design->variables, numbers(row.parameters))}});
     return !interrupted();
   };
   return run_design(problem, options);
@@ -165,8 +164,7 @@ StartWork design_start_work(Problem problem, const Json& task) {
   return {task, [from = starts_of(problem), scale](int start) { return record_of_start(from(start), scale, start); }};
 }
 
-DesignOutcome minimised(Run& run, const Eigen::VectorXd& before) {
-  LongRun long_run(run);
+DesignOutcome minimised(Run& run, LongRun& long_run, const Eigen::VectorXd& before) {
   const Problem problem = with_seeds(run.problem, long_run);
   long_run.begin();
   DesignOutcome outcome;
@@ -175,8 +173,6 @@ DesignOutcome minimised(Run& run, const Eigen::VectorXd& before) {
   else
     outcome.design = single_run(run, long_run, problem);
   run.progress.finish();
-  const bool stopped = outcome.interrupted || outcome.design.status == SolverStatus::stopped;
-  long_run.end(stopped ? "interrupted" : outcome.design.ok() ? "ok" : "failed");
   return outcome;
 }
 

@@ -13,7 +13,7 @@ struct DesignOutcome {
 };
 
 // before: the objectives at the given values, in the problem's order.
-DesignOutcome minimised(Run& run, const Eigen::VectorXd& before);
+DesignOutcome minimised(Run& run, LongRun& long_run, const Eigen::VectorXd& before);
 
 // The starts of its multistart, from the task that this process or another one has made.
 StartWork design_start_work(Problem problem, const Json& task);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "app/csv_cell.hpp"
 #include "app/text_table.hpp"
 #include "core/expression/counted.hpp"
 
@@ -205,19 +206,20 @@ std::string residuals_csv(const IdentificationResult& fit) {
   std::string text = "experiment,channel,t,measured,model,residual\n";
   for (const ResidualRow& row : fit.residuals) {
     const ExperimentFit& experiment = fit.experiments[row.experiment];
-    fmt::format_to(std::back_inserter(text), "{},{},{:.17g},{:.17g},{:.17g},{:.17g}\n", experiment.name,
-                   experiment.channels[row.channel].column, row.t, row.measured, row.model, row.scaled);
+    fmt::format_to(std::back_inserter(text), "{},{},{:.17g},{:.17g},{:.17g},{:.17g}\n", csv_cell(experiment.name),
+                   csv_cell(experiment.channels[row.channel].column), row.t, row.measured, row.model, row.scaled);
   }
   return text;
 }
 
 std::string profile_csv(const IdentificationResult& fit) {
   std::string text = "profile,value,cost,tau";
-  for (const FittedParameter& p : fit.parameters) text += "," + p.name;
+  for (const FittedParameter& p : fit.parameters) text += "," + csv_cell(p.name);
   text += '\n';
   for (const ParameterProfile& profile : fit.profiles) {
     for (const ParameterProfile::Point& p : profile.points) {
-      fmt::format_to(std::back_inserter(text), "{},{:.17g},{:.17g},{:.17g}", profile.name, p.value, p.cost, p.tau);
+      fmt::format_to(std::back_inserter(text), "{},{:.17g},{:.17g},{:.17g}", csv_cell(profile.name), p.value, p.cost,
+                     p.tau);
       for (const double x : p.parameters) fmt::format_to(std::back_inserter(text), ",{:.17g}", x);
       text += '\n';
     }

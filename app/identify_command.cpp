@@ -52,7 +52,7 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
 
 IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem, const std::vector<CsvTable>& data) {
   JsonResidualRecords records(long_run.earlier().residuals,
-                              [&](const Json& content) { long_run.journal().add("residuals", content); });
+                              [&](const Json& content) { long_run.add("residuals", content); });
   IdentificationOptions options;
   options.records = &records;
   options.profiles = run.context.options.profiles;
@@ -61,10 +61,9 @@ IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem,
     run.progress.iteration(fmt::format("iteration {:3d}   cost {:.9e}   gradient {:.1e}   step {:.1e}", row.iteration,
                                        row.cost, row.gradient_norm, row.step_norm));
     if (row.iteration > long_run.earlier().last_iteration)
-      long_run.journal().add("iterate",
-                             {{"iteration", row.iteration},
-                              {"cost", row.cost},
-                              {"parameters", std::vector<double>(row.parameters.begin(), row.parameters.end())}});
+      long_run.add("iterate", {{"iteration", row.iteration},
+                               {"cost", row.cost},
+                               {"parameters", std::vector<double>(row.parameters.begin(), row.parameters.end())}});
     return !interrupted();
   };
   options.profile_progress = [&](const std::string& name, double value, double tau) {
@@ -141,14 +140,12 @@ int identify_command(const CommandContext& context) {
   long_run.begin();
   IdentificationResult fit = fitted(run, long_run, best.problem, data);
   fit.simulations += best.simulations, fit.wall_seconds += best.wall_seconds;
-  long_run.end(fit.status == SolverStatus::stopped ? "interrupted" : fit.ok() ? "ok" : "failed");
   add_to_result(run.result, fit);
   print_fit(context.out, fit, effort(run, starts, fit.simulations, fit.wall_seconds));
   for (const std::string& warning : fit.warnings) run.warn(warning);
   const Trajectory history = history_of(fit);
-  if (fit.status == SolverStatus::stopped) {
-    run.stopped(fmt::format("optimized.json holds the best fit so far; 'mbsopt resume {}' goes on",
-                            run.folder.path().string()));
+  if (fit.status == SolverStatus::stopped || interrupted()) {
+    long_run.stopped("optimized.json holds the best fit so far");
   } else if (!fit.ok()) {
     run.failed(fit.message);
   }
@@ -157,7 +154,7 @@ int identify_command(const CommandContext& context) {
   run.write("residuals.csv", residuals_csv(fit));
   if (!fit.profiles.empty()) run.write("profile.csv", profile_csv(fit));
   run.write("report.html", identification_report(scene, run.result, history, fit_plots(run.problem, fit)));
-  return run.finish();
+  return long_run.finish();
 }
 
 }  // namespace mbsopt

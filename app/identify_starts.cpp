@@ -1,7 +1,5 @@
 #include "app/identify_starts.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -116,10 +114,8 @@ int stopped_within_starts(Run& run, LongRun& long_run, const Problem& best) {
     for (const auto& [name, value] : experiment.overrides) values.push_back({experiment.name, name, value});
   }
   run.write("optimized.json", optimized_problem_text(run, values));
-  run.stopped(fmt::format("optimized.json holds the best of the starts so far; 'mbsopt resume {}' goes on",
-                          run.folder.path().string()));
-  long_run.end("interrupted");
-  return run.finish();
+  long_run.stopped("optimized.json holds the best of the starts so far");
+  return long_run.finish();
 }
 
 void describe_given(const Problem& given, IdentificationResult& fit) {

@@ -4,28 +4,94 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <iterator>
+#include <random>
 
 #include "app/atomic_file.hpp"
+#include "app/sha256.hpp"
+#include "optim/regular_file.hpp"
+#include "optim/write_all.hpp"
 
 namespace mbsopt {
 namespace {
 
-constexpr int kJournalVersion = 1;
+constexpr int kJournalVersion = 2;
+constexpr std::string_view kSealBegin = ",\"sha256\":\"", kSealEnd = "\"}";
+constexpr std::size_t kSealSize = 64;  // of SHA-256 in hex
 
-[[noreturn]] void fail(const std::filesystem::path& path, const char* what) {
-  throw OutputError(fmt::format("{}: {}: {}", path.string(), what, std::strerror(errno)));
+struct Line {
+  std::string text, seal;  // text: with its end
+};
+
+Line sealed(const Json& record, const std::string& run, const std::string& seal_before) {
+  std::string text = record.dump(-1, ' ', false, Json::error_handler_t::replace);
+  text.pop_back();  // the closing bracket
+  text += fmt::format(",\"run\":\"{}\"", run);
+  text += fmt::format(",\"bytes\":{}", text.size());
+  const std::string seal = sha256_of(seal_before + text);
+  text.append(kSealBegin).append(seal).append(kSealEnd).append("\n");
+  return {std::move(text), seal};
 }
 
-std::string whole_lines_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  const std::size_t end = text.rfind('\n');
-  text.resize(end == std::string::npos ? 0 : end + 1);
-  return text;
+// The checksum that a line ends with; empty where it does not fit the line.
+std::string seal_of(std::string_view line, const std::string& seal_before) {
+  const std::size_t tail = kSealBegin.size() + kSealSize + kSealEnd.size();
+  if (line.size() <= tail) return {};
+  const std::string_view body = line.substr(0, line.size() - tail), end = line.substr(body.size());
+  const std::string_view seal = end.substr(kSealBegin.size(), kSealSize);
+  if (!end.starts_with(kSealBegin) || !end.ends_with(kSealEnd)) return {};
+  return sha256_of(seal_before + std::string(body)) == seal ? std::string(seal) : std::string();
+}
+
+Json object_of(std::string_view line) {
+  const Json json = Json::parse(line.begin(), line.end(), nullptr, false);
+  return json.is_object() ? json : Json::object();
+}
+
+std::string drawn_run_id() {
+  std::random_device system;
+  return fmt::format("{:08x}{:08x}", system(), system());
+}
+
+// A file of this name that no run of ours has written is left as it is, and a link is not followed.
+void refuse_foreign(const std::filesystem::path& file) {
+  const std::filesystem::file_type type = std::filesystem::symlink_status(file).type();
+  if (type == std::filesystem::file_type::not_found) return;
+  bool ours = false;
+  if (type == std::filesystem::file_type::regular) {
+    const std::string text = content_of_regular_file(file);
+    const Json first = object_of(std::string_view(text).substr(0, text.find('\n')));
+    ours = first.value("program", Json()) == "mbsopt" && first.contains("journal");
+  }
+  if (!ours)
+    throw OutputError(
+        file.string() +
+        ": is not a journal of mbsopt and is never overwritten; name another folder with --out, or move it");
+}
+
+void add_line(JournalContent& content, const Json& line) {
+  if (line.contains("point")) {
+    content.points.push_back(line["point"]);
+  } else if (line.contains("hessians")) {
+    content.hessians.push_back(line["hessians"]);
+  } else if (line.contains("residuals")) {
+    content.residuals.push_back(line["residuals"]);
+  } else if (line.contains("start")) {
+    content.starts.push_back(line["start"]);
+  } else if (line.contains("iterate")) {
+    content.last_iteration = line["iterate"].value("iteration", content.last_iteration);
+  } else if (line.contains("ended")) {
+    content.ended = line["ended"].get<std::string>();
+  }
+}
+
+std::string text_of(const std::filesystem::path& file) {
+  try {
+    return content_of_regular_file(file);
+  } catch (const FileError& error) {
+    throw OutputError(file.string() + ": " + error.what());
+  }
 }
 
 }  // namespace
@@ -35,66 +101,64 @@ JournalContent read_journal(const std::filesystem::path& folder) {
   const auto refuse = [&](const std::string& why) { throw OutputError(file.string() + ": " + why); };
   if (!std::filesystem::exists(file))
     refuse("there is none; 'resume' goes on with a folder that 'design' or 'identify' of this version has begun");
-  const std::string text = whole_lines_of(file);
+  const std::string text = text_of(file);
   JournalContent content;
   int number = 0;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = text.find('\n', begin);
-    const Json line = Json::parse(text.begin() + static_cast<std::ptrdiff_t>(begin),
-                                  text.begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
-    begin = end + 1, ++number;
-    if (!line.is_object()) refuse(fmt::format("line {} is not JSON", number));
-    if (number == 1) {
-      if (line.value("journal", 0) != kJournalVersion) refuse("is no journal of this version");
-      content.header = line;
-    } else if (line.contains("point")) {
-      content.points.push_back(line["point"]);
-    } else if (line.contains("hessians")) {
-      content.hessians.push_back(line["hessians"]);
-    } else if (line.contains("residuals")) {
-      content.residuals.push_back(line["residuals"]);
-    } else if (line.contains("start")) {
-      content.starts.push_back(line["start"]);
-    } else if (line.contains("iterate")) {
-      content.last_iteration = line["iterate"].value("iteration", content.last_iteration);
-    } else if (line.contains("ended")) {
-      content.ended = line["ended"].get<std::string>();
-    }
+  for (std::size_t end; (end = text.find('\n', content.bytes)) != std::string::npos; content.bytes = end + 1) {
+    const std::string_view line = std::string_view(text).substr(content.bytes, end - content.bytes);
+    const Json record = object_of(line);
+    if (++number == 1 && record.value("journal", Json()) != kJournalVersion) refuse("is no journal of this version");
+    content.seal = seal_of(line, content.seal);
+    if (content.seal.empty())
+      refuse(fmt::format(
+          "line {} is damaged, or not of this run: its checksum does not fit; {}", number,
+          number == 1 ? "start the run anew" : "remove this line and all after it, and 'resume' goes on from there"));
+    if (number == 1)
+      content.header = record, content.run = record.at("run").get<std::string>();
+    else
+      add_line(content, record);
   }
-  if (number == 0) refuse("is empty");
+  if (number == 0) refuse("holds no whole line; start the run anew");
   return content;
 }
 
-Journal::Journal(const std::filesystem::path& folder, const Json& header) : path_(folder / kJournalFile) {
-  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0666);
-  if (descriptor_ < 0) fail(path_, "cannot be created");
+Journal::Journal(const std::filesystem::path& folder, const Json& header)
+    : path_(folder / kJournalFile), run_(drawn_run_id()) {
+  refuse_foreign(path_);
   Json first{{"journal", kJournalVersion}};
   first.update(header);
-  const std::string line = first.dump() + "\n";
-  if (::write(descriptor_, line.data(), line.size()) != static_cast<ssize_t>(line.size()))
-    fail(path_, "cannot be written");
+  const Line line = sealed(first, run_, seal_);
+  write_file_atomically(path_, line.text);
+  seal_ = line.seal, bytes_ = line.text.size();
+  open();
 }
 
-Journal::Journal(const std::filesystem::path& folder) : path_(folder / kJournalFile) {
-  const std::size_t whole = whole_lines_of(path_).size();
-  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
-  if (descriptor_ < 0) fail(path_, "cannot be opened");
-  if (::ftruncate(descriptor_, static_cast<off_t>(whole)) != 0) fail(path_, "cannot be cut to its last whole line");
+Journal::Journal(const std::filesystem::path& folder, const JournalContent& earlier)
+    : path_(folder / kJournalFile), run_(earlier.run), seal_(earlier.seal), bytes_(earlier.bytes) {
+  refuse_foreign(path_);
+  open();
+  if (::ftruncate(descriptor_, static_cast<off_t>(bytes_)) != 0) {
+    ::close(descriptor_);
+    throw WriteError(path_, "cannot be cut to its last whole line");
+  }
 }
 
-Journal::~Journal() {
-  if (descriptor_ >= 0) ::close(descriptor_);
+Journal::~Journal() { ::close(descriptor_); }
+
+void Journal::open() {
+  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_NOFOLLOW | O_CLOEXEC);
+  if (descriptor_ < 0) throw WriteError(path_, "cannot be opened");
 }
 
 void Journal::add(const char* kind, const Json& content) {
-  const std::string line = Json{{kind, content}}.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
-  std::string_view rest = line;
-  while (!rest.empty()) {
-    const ssize_t written = ::write(descriptor_, rest.data(), rest.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) fail(path_, "cannot be written");
-    rest.remove_prefix(static_cast<std::size_t>(written));
+  const Line line = sealed(Json{{kind, content}}, run_, seal_);
+  if (!write_all(descriptor_, line.text) || ::fdatasync(descriptor_) != 0) {
+    const int why = errno;
+    [[maybe_unused]] const int cut = ::ftruncate(descriptor_, static_cast<off_t>(bytes_));  // else a reader drops it
+    errno = why;
+    throw WriteError(path_, "cannot be written");
   }
+  seal_ = line.seal, bytes_ += line.text.size();
 }
 
 }  // namespace mbsopt

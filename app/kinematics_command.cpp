@@ -65,10 +65,10 @@ void add_drives(Run& run, const DriveEfforts& efforts) {
 
 void add_singular(Run& run, const KinematicsResult& kinematics) {
   for (const SingularPosition& s : kinematics.singular) {
-    std::string owners;
-    for (const std::string& owner : s.owners) owners += (owners.empty() ? "" : ", ") + owner;
+    const std::string owners =
+        s.owners.empty() ? std::string() : fmt::format(", between {}", fmt::join(s.owners, ", "));
     run.warn(
-        fmt::format("singular position at t = {:.6g} s: {} equation{} lost, between {}; velocities, accelerations "
+        fmt::format("singular position at t = {:.6g} s: {} equation{} lost{}; velocities, accelerations "
                     "and forces are not settled there",
                     s.t, s.rank_lost, s.rank_lost == 1 ? " is" : "s are", owners));
   }

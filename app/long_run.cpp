@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "app/atomic_file.hpp"
+#include "app/interrupt.hpp"
 #include "optim/seed.hpp"
 
 namespace mbsopt {
@@ -26,6 +27,13 @@ Json header_of(const Run& run, const Json& seeds) {
 
 LongRun::LongRun(Run& run) : run_(run) {
   if (run.context.options.resume) earlier_ = read_journal(run.folder.path());
+}
+
+LongRun::~LongRun() {
+  if (!journal_ || finished_) return;
+  run_.progress.finish();
+  run_.context.err << fmt::format("the journal keeps what was computed; 'mbsopt resume {}' goes on from there\n",
+                                  run_.folder.path().string());
 }
 
 long LongRun::seed(const std::string& of, const std::optional<long>& given) {
@@ -61,9 +69,29 @@ void LongRun::begin() {
     return;
   }
   refuse_what_has_changed();
-  journal_ = std::make_unique<Journal>(run_.folder.path());
+  journal_ = std::make_unique<Journal>(run_.folder.path(), earlier_);
 }
 
-void LongRun::end(const std::string& status) { journal_->add("ended", status); }
+void LongRun::add(const char* kind, const Json& content) {
+  if (failure_) return;
+  try {
+    journal_->add(kind, content);
+  } catch (const WriteError& error) {
+    failure_ = error.what();
+    interrupt();
+  }
+}
+
+void LongRun::stopped(const std::string& kept) {
+  const std::string words = fmt::format("{}; 'mbsopt resume {}' goes on", kept, run_.folder.path().string());
+  failure_ ? run_.failed(*failure_ + "; " + words) : run_.stopped(words);
+}
+
+int LongRun::finish() {
+  const int exit_code = run_.finish();
+  finished_ = true;
+  if (!failure_) journal_->add("ended", run_.result["status"]);
+  return exit_code;
+}
 
 }  // namespace mbsopt

@@ -6,10 +6,12 @@
 #include "app/command_line.hpp"
 #include "app/exit_code.hpp"
 #include "app/mpi_ranks.hpp"
+#include "app/standard_streams.hpp"
 #include "app/start_workers.hpp"
 
 int main(int argc, char** argv) {
   using namespace mbsopt;
+  open_missing_standard_streams();
   std::unique_ptr<Ranks> ranks;
   try {
     ranks = mpi_ranks();

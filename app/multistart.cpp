@@ -121,7 +121,7 @@ MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSp
     const std::string status = record["status"];
     const bool cut_off = status == "stopped" || (!reply.ok && interrupted());
     // A worker that crashed may do better next time: not in the journal either.
-    if (!cut_off && reply.ok) long_run.journal().add("start", record);
+    if (!cut_off && reply.ok) long_run.add("start", record);
     outcome.interrupted = outcome.interrupted || cut_off;
     outcome.ranked.push_back(record);
     run.progress.iteration(fmt::format("start {:3d}   {}   objective {}   {} of {} finished", reply.job, status,

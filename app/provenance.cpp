@@ -4,16 +4,15 @@
 #include <ceres/version.h>
 #include <fmt/format.h>
 #include <nlopt.h>
-#include <openssl/evp.h>
 #include <sundials/sundials_config.h>
 #include <CLI/Version.hpp>
 
 #include <Eigen/Core>
-#include <array>
 #include <filesystem>
-#include <fstream>
-#include <memory>
 #include <nlohmann/json.hpp>
+
+#include "app/sha256.hpp"
+#include "optim/regular_file.hpp"
 
 namespace mbsopt {
 namespace {
@@ -46,23 +45,22 @@ nlohmann::ordered_json library_versions() {
           {"compiler", __VERSION__}};
 }
 
+// Two files may have one base name.
+std::string seen_from(const std::filesystem::path& folder, const std::filesystem::path& file) {
+  const std::filesystem::path relative = file.lexically_relative(folder);
+  return (relative.empty() ? file : relative).generic_string();
+}
+
 }  // namespace
 
 std::string program_version() { return MBSOPT_VERSION; }
 
 std::string sha256_of_file(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) return {};
-  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), EVP_MD_CTX_free);
-  EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr);
-  std::array<char, 1 << 14> buffer;
-  while (in.read(buffer.data(), buffer.size()), in.gcount() > 0) {
-    EVP_DigestUpdate(context.get(), buffer.data(), static_cast<std::size_t>(in.gcount()));
+  try {
+    return sha256_of(content_of_regular_file(path));
+  } catch (const FileError&) {
+    return {};
   }
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
-  unsigned int size = 0;
-  EVP_DigestFinal_ex(context.get(), digest.data(), &size);
-  return fmt::format("{:02x}", fmt::join(digest.begin(), digest.begin() + size, ""));
 }
 
 nlohmann::ordered_json provenance(const std::vector<std::string>& arguments, const std::string& input_as_stored,
@@ -71,9 +69,8 @@ nlohmann::ordered_json provenance(const std::vector<std::string>& arguments, con
   for (const std::string& argument : arguments) command_line += " " + shell_word(argument);
   nlohmann::ordered_json result{
       {"command_line", command_line}, {"input", input_as_stored}, {"input_sha256", sha256_of_file(problem_file)}};
-  for (const std::string& file : data_files) {
-    result["data_sha256"][std::filesystem::path(file).filename().string()] = sha256_of_file(file);
-  }
+  const std::filesystem::path folder = std::filesystem::path(problem_file).parent_path().lexically_normal();
+  for (const std::string& file : data_files) result["data_sha256"][seen_from(folder, file)] = sha256_of_file(file);
   result["libraries"] = library_versions();
   return result;
 }

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "app/atomic_file.hpp"
 #include "app/energy_balance.hpp"
 #include "app/exit_code.hpp"
 #include "app/json/placed_words.hpp"
@@ -54,17 +53,19 @@ Run::Run(const CommandContext& given)
 Run::~Run() {
   if (!running_) return;
   try {
+    progress.finish();
     result["status"] = "failed";
-    finish();
-  } catch (const OutputError&) {
-    return;  // "running" stays; the exception under way says more than this one
+    folder.write("result.json", result_json_text(result));
+  } catch (...) {
+    folder.mark_failed();  // the exception under way says more than this one
   }
 }
 
 void Run::start() {
-  running_ = true;
+  lock_ = folder.claim();
   result["status"] = "running";
   folder.write("result.json", result_json_text(result));
+  running_ = true;
 }
 
 void Run::write(const std::string& file, std::string_view content) {
@@ -93,13 +94,13 @@ void Run::stopped(const std::string& kept) {
 }
 
 int Run::finish() {
-  running_ = false;
   progress.finish();
   if (result["status"] == "running") result["status"] = "ok";
   const std::string status = result["status"], message = result.value("message", "");
   if (status == "interrupted") context.err << message << '\n';
   if (status == "failed" && !message.empty()) context.err << fmt::format("{} failed: {}\n", context.command, message);
   write("result.json", result_json_text(result));
+  running_ = false;
   context.out << fmt::format("\n{}: {}\n", (folder.path() / "").string(), fmt::join(written_, " "));
   return exit_code_of(status);
 }

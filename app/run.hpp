@@ -10,6 +10,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -41,7 +42,7 @@ class Run {
   Json result;  // the parts of result.json
   Progress progress;
 
-  void start();  // claims the folder: result.json with "status": "running"
+  void start();  // claims the folder: locks it, and writes result.json with "status": "running"
   void write(const std::string& file, std::string_view content);  // into the folder; named in the closing line
   void warn(const std::string& words);  // "simulation.accuracy: ...": with the path's place in the file before them
   // In place of what the file says (accuracy_results.hpp).
@@ -56,6 +57,7 @@ class Run {
   int finish();  // the exit code
 
  private:
+  std::unique_ptr<FolderLock> lock_;
   std::vector<std::string> written_;
   bool running_ = false;
 };

@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kApart = 1e-3;            // [m, -]
 constexpr double kUnmet = 1e-5;            // of the accelerations of the constraints
+constexpr double kTakenOut = 1e-4;         // by projections: those of the integration errors are of the order of rtol
 constexpr double kEnergyLost = 1e-2;       // of the largest energy
 constexpr double kUnresolved = 3e-2;       // of the integral of a running cost's size; estimates are pessimistic
 constexpr double kLargePenalty = 3e10;     // above it rounding by Cholesky passes 1e-5 of the accelerations
@@ -52,7 +53,16 @@ std::vector<std::string> simulation_warnings(const SimulationSettings& settings,
         is_cvodes(settings.integrator.type) ? "; near singular positions a Runge-Kutta method, which projects onto the "
                                               "constraints, is right where CVODES is not"
                                             : ""));
-  } else if (statistics.max_acceleration_residual > kUnmet) {
+  } else if (penalty && statistics.max_acceleration_residual > kTakenOut) {
+    warnings.push_back(
+        fmt::format("the projections took out {:.2g} of the change of velocity: the penalty does not hold the joints "
+                    "by itself, and "
+                    "the motion is wrong by as much or more. simulation.formulation.alpha is {:.3g}: raise it with "
+                    "\"linear_solver\": "
+                    "\"quasidefinite\", or leave the formulation out, the default has no such error{}",
+                    statistics.max_acceleration_residual, f.alpha,
+                    settings.integrator.step ? "; or take a smaller simulation.integrator.step" : ""));
+  } else if (!penalty && statistics.max_acceleration_residual > kUnmet) {
     warnings.push_back(fmt::format(
         "the accelerations of the constraints were met to {:.1e} only: steps came close to a singular position, after "
         "which the branch may be wrong (compare with another Runge-Kutta method, or other tolerances), or masses "

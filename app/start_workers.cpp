@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <deque>
 #include <numeric>
 #include <stdexcept>
 #include <thread>
@@ -106,7 +107,7 @@ void compute_on_ranks(Run& run, Ranks& ranks, int workers, const std::vector<int
   std::optional<Clock::time_point> stopped;
   while (!here.idle() || !others.idle() || (next != starts.end() && !stopped)) {
     while (!stopped && next != starts.end() && others.start(*next)) ++next;
-    while (!stopped && next != starts.end() && here.has_room()) here.start(*next++);
+    while (!stopped && next != starts.end() && here.has_room() && here.start(*next)) ++next;
     for (const JobReply& reply : here.ended(kPollMilliseconds)) done(reply);
     for (const JobReply& reply : others.ended()) done(reply);
     if (!stopped && interrupted()) {
@@ -137,6 +138,7 @@ class Server {
   void run() {
     while (!dismissed_) {
       while (const std::optional<Ranks::Message> message = ranks_.receive()) take(Json::parse(message->text));
+      start_what_waits();
       send_what_has_ended();
       if (interrupted() && !told_of_interrupt_) {
         told_of_interrupt_ = true;
@@ -151,15 +153,24 @@ class Server {
 
   void take(const Json& message) {
     if (message.contains("dismissed")) dismissed_ = true;
-    if (message.contains("stop") && pool_) pool_->stop();
+    if (message.contains("stop") && pool_) waiting_.clear(), pool_->stop();
     try {
       if (message.contains("work")) {
         const Json& work = message["work"];
         pool_.emplace(work.at("workers").get<int>(),
                       [record = work_of(work)](int start) { return record(start).dump(); });
       }
-      if (message.contains("start") && pool_) pool_->start(message["start"].get<int>());
+      if (message.contains("start") && pool_) waiting_.push_back(message["start"].get<int>());
     } catch (const std::exception& error) {
+      tell({{"failed", error.what()}});
+    }
+  }
+
+  void start_what_waits() {
+    try {
+      while (!waiting_.empty() && pool_->has_room() && pool_->start(waiting_.front())) waiting_.pop_front();
+    } catch (const std::exception& error) {
+      waiting_.clear();
       tell({{"failed", error.what()}});
     }
   }
@@ -175,6 +186,7 @@ class Server {
 
   Ranks& ranks_;
   std::optional<ProcessPool> pool_;
+  std::deque<int> waiting_;  // starts for which the system has given no process yet
   bool dismissed_ = false, told_of_interrupt_ = false;
 };
 

@@ -6,23 +6,17 @@
 #include <string_view>
 #include <vector>
 
+#include "app/csv_cell.hpp"
+
 namespace mbsopt {
 namespace {
-
-// Quoted where a comma, a quote or a line's end would end it (RFC 4180).
-std::string quoted(std::string_view text) {
-  if (text.find_first_of(",\"\n\r") == std::string_view::npos) return std::string(text);
-  std::string out = "\"";
-  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + '"';
-}
 
 std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.6g}", value) : std::string(); }
 
 // Columns of names and values side by side, so that no row gets out of step.
 class Row {
  public:
-  void text(std::string_view column, std::string_view value) { add(column, quoted(value)); }
+  void text(std::string_view column, std::string_view value) { add(column, csv_cell(value)); }
   void real(std::string_view column, double value) { add(column, number(value)); }
   void count(std::string_view column, long value) { add(column, std::to_string(value)); }
   std::string header() const { return fmt::format("{}\n", fmt::join(columns_, ",")); }
@@ -30,7 +24,7 @@ class Row {
 
  private:
   void add(std::string_view column, std::string value) {
-    columns_.push_back(quoted(column));
+    columns_.push_back(csv_cell(column));
     values_.push_back(std::move(value));
   }
   std::vector<std::string> columns_, values_;

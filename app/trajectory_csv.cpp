@@ -5,6 +5,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "app/csv_cell.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -58,7 +60,9 @@ Sampling record_trajectory(const Mechanism& mechanism, const Scene& scene, Traje
 }
 
 std::string to_csv(const std::vector<std::string>& columns, const std::vector<std::vector<double>>& rows) {
-  std::string text = fmt::format("{}\n", fmt::join(columns, ","));
+  std::string text;
+  for (const std::string& column : columns) text += (text.empty() ? "" : ",") + csv_cell(column);
+  text += '\n';
   for (const std::vector<double>& row : rows) {
     fmt::format_to(std::back_inserter(text), "{:.17g}\n", fmt::join(row, ","));
   }

@@ -33,8 +33,8 @@ void add_parameters(Run& run) {
 int validate_command(const CommandContext& context) {
   Run run(context);
   const Mechanism mechanism(run.problem.scene, parameter_values(run.problem.scene));
-  run.start();
   const Assembly assembly(mechanism, run.problem.scene.simulation.start_time);
+  run.start();
   const bool closed = assembled(run, &mechanism, assembly);
   if (closed && run.problem.scene.simulation.accuracy)
     context.out

@@ -21,12 +21,17 @@ function(mbsopt_compile_options target)
   if(MBSOPT_NATIVE)  # PUBLIC: the alignment of Eigen's types depends on it
     target_compile_options(${target} PUBLIC $<BUILD_INTERFACE:-march=native>)
   endif()
-  if(MBSOPT_SANITIZE)
+  if(MBSOPT_SANITIZE STREQUAL THREAD)
+    target_compile_options(${target} PRIVATE -fsanitize=thread -fno-omit-frame-pointer)
+    target_link_options(${target} PUBLIC $<BUILD_INTERFACE:-fsanitize=thread>)
+  elseif(MBSOPT_SANITIZE)
     # A null access faults by itself and is reported so; checking each load for it and for alignment triples the code.
     target_compile_options(${target} PRIVATE -fsanitize=address,undefined -fno-sanitize=null,alignment
                                              -fno-sanitize-recover=all
-                                             -fno-omit-frame-pointer
-                                             -Wno-maybe-uninitialized)  # false alarms: GCC's manual, -fsanitize
+                                             -fno-omit-frame-pointer)
+    if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+      target_compile_options(${target} PRIVATE -Wno-maybe-uninitialized)  # false alarms: GCC's manual, -fsanitize
+    endif()
     target_link_options(${target} PUBLIC $<BUILD_INTERFACE:-fsanitize=address,undefined>)
   endif()
 endfunction()
@@ -38,5 +43,7 @@ function(mbsopt_precompile target)
                             <memory> <optional> <span> <stdexcept> <string> <string_view> <utility> <vector> ${ARGN})
   if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
     target_compile_options(${target} PRIVATE -fpch-preprocess)  # ccache's manual, "Precompiled headers"
+  elseif(CMAKE_CXX_COMPILER_ID STREQUAL Clang)
+    target_compile_options(${target} PRIVATE "SHELL:-Xclang -fno-pch-timestamp")  # the same page
   endif()
 endfunction()

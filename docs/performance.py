@@ -160,8 +160,9 @@ def targets_section():
 
 def right_hand_side_section():
     lines = ["## Right-hand sides", "",
-             "One evaluation of the equations of motion [microseconds], and per body; *in a run*: per body and right-hand side of a run with the default",
-             "method, its error norms and projections included. N-four-bars have 2N + 1 bodies.", ""] + command("right_hand_side")
+             "The columns are the time of one evaluation of the equations of motion [microseconds], and the same per body. *In a run*",
+             "is the time per body and right-hand side of a run with the default method. It includes error norms and projections.",
+             "N-four-bars have 2N + 1 bodies.", ""] + command("right_hand_side")
     cells = []
     for row in rows_of("right_hand_side"):
         _, kind, size, model = row["name"].split("/")
@@ -177,8 +178,8 @@ def right_hand_side_section():
 
 def parts_section():
     lines = ["## Where a right-hand side goes", "",
-             "Nanoseconds per body, each part by itself, so that their sum differs from the whole; *linear share*: assembly of S, its factorisation and",
-             "the solution with its refinements, of the sum.", ""] + command("right_hand_side_parts")
+             "The figures are nanoseconds per body. Each part is measured by itself, so their sum differs from the whole. The *linear",
+             "share* of the sum is assembly of S, its factorisation and the solution with its refinements.", ""] + command("right_hand_side_parts")
     columns = ("frames", "phi_ddot", "jacobian", "assembly", "factor", "solve", "whole")
     cells = []
     for r in rows_of("right_hand_side_parts"):
@@ -198,16 +199,17 @@ def parts_section():
 def growth_section():
     lines = ["## As mechanisms grow", "", "Time per body at 10 000 bodies over that at 100, in turn in one run:", ""] + command("right_hand_side_growth")
     lines += table_of(["mechanism", "model", "ratio"], [[*r["name"].split("/")[1:], figure(number(r["ratio"]))] for r in rows_of("right_hand_side_growth")])
-    lines += ["Before a run: compiling the scene and assembling the initial state [ms].", ""] + command("start")
+    lines += ["The start of a run compiles the scene and assembles the initial state [ms]:", ""] + command("start")
     return lines + table_of(["N-four-bar", "bodies", "start"], [[r["name"].split("/")[-1], r["bodies"], figure(number(r["start_ms"]))] for r in rows_of("start")])
 
 
 def time_to_error_section():
     lines = ["## Time to an error", "",
-             "10 s of motion; the error is the largest distance of any rod's centre of mass from where it should be, at 201 times: from the exact motion",
-             "(A02 passes its singular position about ten times), of Bricard's mechanism from `dopri853` at rtol 1e-12. The fastest of `dopri5`, `verner6`,",
-             "`dopri853` at two tolerances per decade that meets the error and meets it at a third of the tolerance, too; the whole of `simulate`,",
-             "initial assembly included.", ""] + command("time_to_error")
+             "The runs are 10 s of motion. The error is the largest distance of any rod's centre of mass from its right position, at",
+             "201 times. The right position is that of the exact motion (A02 passes its singular position about ten times), and for",
+             "Bricard's mechanism that of `dopri853` at rtol 1e-12. The table shows the fastest of `dopri5`, `verner6` and `dopri853`",
+             "at two tolerances per decade. It must meet the error at a third of the tolerance, too. The time is that of the whole",
+             "`simulate`, initial assembly included.", ""] + command("time_to_error")
     cells = []
     for r in rows_of("time_to_error"):
         f = lambda c, d=3: figure(number(r.get(c)), d)
@@ -218,9 +220,9 @@ def time_to_error_section():
 
 def gradients_section():
     lines = ["## Gradients", "",
-             "50 parameters; ratios of wall times to one simulation with its compilation and assembly, medians of rounds in turn. *Start*: the share of",
-             "compilation and assembly in one simulation. *TLM of 1, of 50*: with the first parameter alone, and with all; *per further parameter*: their",
-             "difference over 49.", ""] + command("gradient_scaling")
+             "There are 50 parameters. The figures are ratios of wall times to one simulation with its compilation and assembly,",
+             "medians of rounds in turn. *Start* is the share of compilation and assembly in one simulation. *TLM of 1, of 50* is with",
+             "the first parameter alone, and with all. *Per further parameter* is their difference over 49.", ""] + command("gradient_scaling")
     cells = []
     for r in rows_of("gradient_scaling"):
         kind, method = r["name"].split("/")[1].split("_")
@@ -229,8 +231,8 @@ def gradients_section():
     lines += table_of(["mechanism", "bodies", "method", "steps", "start", "adjoint", "TLM of 1", "TLM of 50", "TLM per further parameter"], cells)
     lines += ["A full Hessian in ten parameters (FB-1): " + figure(of("hessian", "hessian/five_bar", "hessian_ratio")) + " simulations, by " +
               figure(of("hessian", "hessian/five_bar", "gradients")) + " gradients.", ""] + command("hessian")
-    lines += ["Memory of an adjoint over 10 s [MiB]; *grown*: the largest size of the process during the run beyond that before it, assembly and its",
-              "derivatives included.", ""] + command("adjoint_memory")
+    lines += ["The memory of an adjoint over 10 s is in MiB. *Grown* is the largest growth of the process during the run, assembly",
+              "and its derivatives included.", ""] + command("adjoint_memory")
     cells = [[r["bodies"], r["budget_mib"], figure(number(r["kept_mib"])), figure(number(r["grown_mib"])), figure(number(r["recomputed"]), 2)]
              for r in rows_of("adjoint_memory") if r["name"].startswith("adjoint_memory/four_bars")]
     lines += table_of(["bodies", "budget", "kept", "grown", "steps computed again, of all"], cells)
@@ -245,31 +247,47 @@ def gradients_section():
 # By hand: what stands behind aims, missed ones above all. Ratios and counts, which do not age with the machine.
 REASONS = """## What stands behind the figures
 
-Profile by `perf record -e cpu-clock` of right-hand sides in the spatial model, N-four-bar, N = 40, per cent: assembly of S 19, its factorisation 15, both
-solves with their products with J 28, J 14, Phiddot 9, frames with pddot 8, the rest 7. In a run with `dopri5` the right-hand sides are about three quarters; the
-rest is the projection, one to two right-hand sides per step, and the sums of the stages.
+`perf record -e cpu-clock` profiles right-hand sides in the spatial model, N-four-bar, N = 40. The shares in per cent
+are: assembly of S 19, its factorisation 15, both solves with their products with J 28, J 14, Phiddot 9, frames with
+pddot 8, the rest 7. In a run with `dopri5` the right-hand sides take about three quarters. The rest is the projection,
+one to two right-hand sides per step, and the sums of the stages.
 
-* **Absolute times move by two** on this shared machine, with nothing else of ours running: the same program read 0.42 to 0.58 us (spatial, 10 to 1000 bodies) in one quarter of an
-  hour, 0.5 to 1.1 us in others, and 44 to 63 ms (FB-1); on the machine of this page 0.33 to 0.42 us in most minutes, 0.45 to 0.56 us in the worst.
-* **Growth to 10 000 bodies is memory.** A body has some 3.4 kB of frames, J, S and constraints, which a right-hand side goes through several times. Those of
-  100 bodies stay in the second-level cache, those of 10 000 come from the third or, where others use it, from memory. So the loops over bodies and over groups of rows ask
-  for what they will need four of them later (`core/dynamics/prefetch.hpp`); the processor's own guesses end with each page of 4 kB. Ratios in turn in quiet
-  minutes (a second-level cache of 1 MB), planar chain, spatial chain, N-four-bars, tree, all in space: without 1.26 to 1.36, 1.26 to 1.30, 1.55 to 1.65, 2.0; with it 1.20 to 1.23,
-  1.17 to 1.18, 1.23 to 1.27, 1.5. No difference up to 1000 bodies, nor in tangents, which compute more of what they load. While other programs use the third-level cache the
-  ratios without were up to 1.9, with it up to 1.4. The order of four-bars (all cranks, then all couplers) and of trees jumps between bodies, which costs
-  the rest. Tried: going through the mechanism in portions of 16 to 512 bodies, each placed, assembled, factored and substituted while it is near, 1.4 to 2.4 where whole
-  passes had 1.3, for a portion starts a dozen short streams anew; large pages, nothing; blocks of S set where they are first touched, and frames just before constraints
-  read them, 3 to 8 per cent slower at 10 to 100 bodies. Chains of more than 316 joints in space take three passes of the solver instead of the two that stairs in a plane need.
-* **TLM**: the directions of 50 parameters of 500 bodies, 23 MB with their stages, do not fit the second-level cache, so that a parameter costs a quarter more than with 81 bodies.
-  With all that TLM costs beyond a simulation spread over 49 parameters, the matrices of the stages and the first parameter included, N-four-bars of 5, 21, 81, 501 bodies have
-  0.20, 0.23, 0.27, 0.34 per parameter, chains 0.28, 0.31, 0.30, 0.38.
-  Tried: one array for the stage's directions of all blocks instead of one each, and exchanged in place of copied states, 1 to 3 per cent; asking for blocks ahead, nothing.
-  Eight directions at a time would halve what each has to load, and double the cost of problems with up to four parameters.
-* **The adjoint** of 1260 steps of 500 rods keeps 0.7 GB. With the budget of 256 MiB of before it computed every step again.
-* **FB-1** takes nine evaluations with gradients at the tolerance of its file, 1e-9 with `dopri853`; on an idle machine 41 to 44 ms, beside other programs up to 70.
-  A twentieth goes to comparing names within the linear solver of Ipopt, 6 to 7 % of each simulation to finding singular positions.
-* **Set-up**: names of bodies and joints are looked up in a table; before, compiling grew with the square of their number. Initial assembly is dense where the guess
-  is not exact.
+* **Absolute times vary by a factor of two** on a shared machine, even if it runs nothing else of ours. The same
+  program took 0.42 to 0.58 us (spatial, 10 to 1000 bodies) in one quarter of an hour, 0.5 to 1.1 us in others, and 44
+  to 63 ms (FB-1). On the machine of this page it took 0.33 to 0.42 us in most minutes, 0.45 to 0.56 us in the worst.
+* **Growth to 10 000 bodies is memory.** A body has some 3.4 kB of frames, J, S and constraints, which a right-hand
+  side reads several times. Those of 100 bodies stay in the second-level cache. Those of 10 000 come from the third or,
+  if others use it, from memory. So the loops over bodies and over groups of rows prefetch the data of the fourth one
+  ahead (`core/dynamics/prefetch.hpp`), since the processor's own prefetching ends with each page of 4 kB. Prefetching
+  makes no difference up to 1000 bodies, nor in tangents, which compute more with the data they load.
+
+  | ratio, in space, in turn, in quiet minutes (second-level cache of 1 MB) | without prefetching | with it |
+  | --- | --- | --- |
+  | planar chain | 1.26 to 1.36 | 1.20 to 1.23 |
+  | spatial chain | 1.26 to 1.30 | 1.17 to 1.18 |
+  | N-four-bars | 1.55 to 1.65 | 1.23 to 1.27 |
+  | tree | 2.0 | 1.5 |
+  | while other programs use the third-level cache | up to 1.9 | up to 1.4 |
+
+  The order of four-bars (all cranks, then all couplers) and of trees jumps between bodies, which costs the rest. Three
+  alternatives do not help. Portions of 16 to 512 bodies, each placed, assembled, factored and substituted together,
+  give 1.4 to 2.4 instead of 1.3, since a portion starts a dozen short streams again. Large pages change nothing.
+  Blocks of S set at their first use, and frames computed just before constraints read them, are 3 to 8 per cent slower
+  at 10 to 100 bodies. Chains of more than 316 joints in space take three passes of the solver. Stairs in a plane need
+  two.
+* **TLM**: the directions of 50 parameters of 500 bodies take 23 MB with their stages. They do not fit the second-level
+  cache, so that a parameter costs a quarter more than with 81 bodies. The following figures spread everything that TLM
+  costs beyond a simulation over 49 parameters, with the matrices of the stages and the first parameter. N-four-bars of
+  5, 21, 81, 501 bodies have 0.20, 0.23, 0.27, 0.34 per parameter, chains 0.28, 0.31, 0.30, 0.38. One array for the
+  stage's directions of all blocks instead of one each, and exchanged instead of copied states, gain 1 to 3 per cent.
+  Prefetching of blocks gains nothing. Eight directions at a time would halve the loads of each, and double the cost of
+  problems with up to four parameters.
+* **The adjoint** of 1260 steps of 500 rods keeps 0.7 GB. With a budget of 256 MiB it computes every step again.
+* **FB-1** takes nine evaluations with gradients at the tolerance of its file, 1e-9 with `dopri853`. It takes 41 to 44
+  ms on an idle machine, up to 70 beside other programs. The linear solver of Ipopt uses a twentieth to compare names.
+  Finding singular positions takes 6 to 7 % of each simulation.
+* **Set-up**: names of bodies and joints are looked up in a table, so that compiling does not grow with the square of
+  their number. Initial assembly is dense if the guess is not exact.
 """
 
 PEERS = {"simbody": "Simbody", "mujoco": "MuJoCo", "dart": "DART"}
@@ -280,10 +298,11 @@ def peers_section():
     lines = ["## Other programs", ""]
     if not rows:
         return lines + ["Not measured: `./dev bench --peers` installs Simbody, MuJoCo and DART (Debian packages, for nothing but this) and measures them.", ""]
-    lines += ["Debian's Simbody 3.7, MuJoCo 2.2 and DART 6.12, the same mechanisms at the same state, in turn in one run, one thread: microseconds per",
-              "right-hand side, and in brackets the ratio to mbsopt (above 1: mbsopt is faster). mbsopt solves for 6 unknowns per body and all reactions;",
-              "Simbody, MuJoCo and DART work in joint coordinates. Accelerations agree to the figure in *apart* (MuJoCo closes loops by regularised",
-              "constraints). DART closes loops only in its time stepping, so that it is on open mechanisms alone; MuJoCo's reader does not take chains of",
+    lines += ["The programs are Debian's Simbody 3.7, MuJoCo 2.2 and DART 6.12. They evaluate the same mechanisms at the same state, in",
+              "turn in one run, in one thread. The figures are microseconds per right-hand side, and in brackets the ratio to mbsopt",
+              "(above 1: mbsopt is faster). mbsopt solves for 6 unknowns per body and all reactions. Simbody, MuJoCo and DART work in",
+              "joint coordinates. Accelerations agree to the figure in *apart* (MuJoCo closes loops by regularised constraints). DART",
+              "closes loops only in its time stepping, so only open mechanisms are compared. MuJoCo's reader does not take chains of",
               "100 bodies and more.", ""] + command("peers_right_hand_side")
     cells = []
     for r in rows:
@@ -294,8 +313,8 @@ def peers_section():
         worst = [f"{p} {figure(number(r[f'{k}_apart']), 1)}" for k, p in PEERS.items() if number(r.get(f"{k}_apart")) is not None]
         cells.append(line + [", ".join(worst)])
     lines += table_of(["mechanism", "bodies", "mbsopt"] + list(PEERS.values()) + ["apart"], cells)
-    lines += ["10 s of motion, the error as above. Of each program the coarsest of its settings that meets the wanted error, else its most exact; mbsopt at",
-              "an error no larger than that.", ""] + command("peers_time_to_error")
+    lines += ["The runs are 10 s of motion, with the error as above. Each program has its coarsest setting that meets the wanted error,",
+              "else its most exact one. mbsopt has an error no larger than that.", ""] + command("peers_time_to_error")
     cells, words = [], []
     for r in rows_of("peers_time_to_error"):
         name = r["name"].split("/", 1)[1]
@@ -319,12 +338,13 @@ def write():
     machines = sorted({f"{r['cpu']}, {r['cores']} cores, {r['compiler']}, {r['flags']}" for r in runs})
     loads = [float(r["load"]) for r in runs]
     lines = ["# Performance", "",
-             "Written by `./dev bench` (`docs/performance.py`); do not edit. The figures are in `data/performance/`, the programs in `bench/`. Each table stands",
-             "below the command that measures it alone; `./dev bench --peers` measures all, the other programs included.", "",
-             f"Measured on: {'; '.join(machines)}. One thread; processor time of that thread, medians; ratios are taken in one run, in turn.", ""]
+             "`./dev bench` writes this page (`docs/performance.py`); do not edit it. The figures are in `data/performance/`, the",
+             "programs in `bench/`. Each table stands below the command that measures it alone. `./dev bench --peers` measures",
+             "all, the other programs included.", "", "Measured on:", "", *[f"* {machine}" for machine in machines], "",
+             "All runs use one thread. Times are processor times of this thread, medians. Ratios are taken in one run, in turn.", ""]
     if loads and max(loads) > 0.7 * min(int(r["cores"]) for r in runs):
-        lines += [f"**The machine was busy**: a load of {min(loads):.0f} to {max(loads):.0f}. Processor times are then longer than they would be alone (a core's",
-                  "caches and arithmetic are shared); ratios within a run hardly depend on it.", ""]
+        lines += [f"**The machine was busy**: its load was {min(loads):.0f} to {max(loads):.0f}. Processor times are longer than on an idle machine, since",
+                  "programs share a core's caches and arithmetic. Ratios within a run hardly depend on it.", ""]
     lines += ["## Aims", ""] + targets_section()
     for section in (right_hand_side_section, parts_section, growth_section, time_to_error_section, gradients_section, peers_section):
         lines += section()

@@ -2,6 +2,7 @@
 error rises along one, and why."""
 
 import math
+import textwrap
 
 from tradeoff_rows import number
 
@@ -106,9 +107,9 @@ def why_it_rises(curves, curve, quantity, i):
         twin = curves[quantity].get(curve.replace("tlm", "adjoint") if curve.startswith("tlm") else curve.replace("adjoint", "tlm"), [])
         k = same_setting(twin, after.row, but_curve=True)
         if k is not None and abs(twin[k].deviation - after.deviation) > 0.3 * after.error:
-            return f"rounding, magnified: TLM and adjoint, one derivative on the same steps, differ by {abs(twin[k].deviation - after.deviation):.1e}"
+            return f"magnified rounding: TLM and adjoint, the same derivative on the same steps, differ by {abs(twin[k].deviation - after.deviation):.1e}"
     if of_gradient and after.work > STARVED * here.work:
-        return f"rounding: {after.work / here.work:.0f} times the right-hand sides, in steps that are shortened next to singular positions in vain"
+        return f"rounding: {after.work / here.work:.0f} times the right-hand sides, in steps that are shortened without effect next to singular positions"
     if changes_sign(points, i):
         return "the error passes through zero, the first is small by chance"
     for name in ("motion", "sensors"):
@@ -148,6 +149,11 @@ def counted(part, whole):
     return f"all {whole}" if part == whole else f"{part} of {whole}"
 
 
+def paragraph(text):
+    """Its lines, of at most 120 characters."""
+    return textwrap.wrap(text, 120, break_long_words=False, break_on_hyphens=False)
+
+
 def monotony(rows, apart, absolute):
     """In words: of the bounds, of the work, and every error that rises by name."""
     curves = {quantity: curves_of(rows, quantity) for quantity in apart}
@@ -166,14 +172,16 @@ def monotony(rows, apart, absolute):
         more = rises(curves, quantity, max(3 * certain, 1e-13), relative)
         told, found = told + more[0], found + more[1]
     names = {curve for of in curves.values() for curve in of}
-    lines = [f"{len(names)} curves of {len(apart)} quantities, {steps} steps from a setting to the next, tighter one: the bound falls or stays in {counted(falls, steps)},",
-             f"right-hand sides grow in {counted(grows, steps)}. The bound is at most three times the error in {counted(close, points)} points."]
+    lines = paragraph(f"{len(names)} curves of {len(apart)} quantities have {steps} pairs of neighbouring settings. From the looser to the tighter one the "
+                      f"bound falls or stays in {counted(falls, steps)} pairs, and right-hand sides grow in {counted(grows, steps)}. The bound is at most "
+                      f"three times the error in {counted(close, points)} points.")
     if dominated:
-        lines.append("Beside their lines, since a tighter setting needed no more right-hand sides: " + "; ".join(
+        lines += [""] + paragraph("These settings stand beside their lines, since a tighter one needed no more right-hand sides: " + "; ".join(
             f"`{curve}` at {', '.join(of)} ({', '.join(map(str, of.values()))}; {work} at {setting})" for (curve, setting, work), of in dominated.items()) + ".")
     if settings > points:
-        lines.append(f"Points on no line, since their bounds are 1 or more: {settings - points}.")
-    lines.append(f"The error itself falls or stays in {counted(told - len(found), told)} steps that begin where it can be told" + ("." if not found else "; it rises"))
+        lines += [""] + paragraph(f"Points on no line, since their bounds are 1 or more: {settings - points}.")
+    lines += [""] + paragraph(f"The error itself falls or stays in {counted(told - len(found), told)} pairs whose first error is certain"
+                              + ("." if not found else ". It rises here:"))
     if not found:
         return lines + [""]
     cells = [[f"`{curve}`", quantity, f"{here.setting} to {after.setting.split()[1]}", f"{here.error:.1e} to {after.error:.1e}",

@@ -12,7 +12,7 @@ import json
 import sys
 from pathlib import Path
 
-from tradeoff_curves import monotony, table, work_precision
+from tradeoff_curves import monotony, paragraph, table, work_precision
 from tradeoff_plots import log_plot
 from tradeoff_rows import number, rows_of, short, write_rows
 
@@ -136,11 +136,11 @@ def with_verdict(text, wanted):
 
 def gallery_section():
     rows = rows_of(DATA / "gallery.csv")
-    lines = ["### The gallery at default settings", "",
-             "What a file without `integrator` and `formulation` is run with: augmented Lagrangian, `dopri853`, rtol 1e-8, atol 1e-10, steps of at most",
-             "1/150 of the run. The largest error of its objectives and of their gradients, relative unless said; of files that identify also that of",
-             "the sum of squares and of its gradient, at the values from which they start. Wanted: 1e-5 and 1e-4; **bold** where it is missed. Apart: how",
-             "much the two methods of the reference differ. Own: the settings of the file.", ""]
+    lines = ["### The gallery at default settings", ""]
+    lines += paragraph("A file without `integrator` and `formulation` runs with the augmented Lagrangian, `dopri853`, rtol 1e-8, atol 1e-10 and steps of "
+                       "at most 1/150 of the run. The columns are the largest error of its objectives and of their gradients, relative unless said. Files "
+                       "that identify have a second row: the sum of squares and its gradient at the initial values. Wanted are 1e-5 and 1e-4; **bold** "
+                       "figures miss them. Own is the setting of the file. Apart is the difference between the two methods of the reference.") + [""]
     cells, missed = [], []
     for r in rows:
         absolute = " (absolute)" if r["absolute"] else ""
@@ -163,9 +163,10 @@ def sweep_section(run):
     stem = run["file"].removesuffix(".csv").removeprefix("sweep_")
     apart, advice = json.loads(run["apart"]), json.loads(run["advice"])
     absolute = json.loads(run.get("absolute") or "[]")
-    lines = [f"### `{problem}`", "", f"    {run['command']}", "",
-             f"Reference: {run['first']}, certified by {run['second']}; apart by " +
-             ", ".join(f"{v:.0e} ({q})" for q, v in apart.items()) + ".", ""] + monotony(rows, apart, absolute)
+    lines = [f"### `{problem}`", "", f"    {run['command']}", ""]
+    lines += paragraph(f"The reference is {run['first']}, certified by {run['second']}. They are apart by " +
+                       ", ".join(f"{v:.0e} ({q})" for q, v in apart.items()) + ".") + [""]
+    lines += monotony(rows, apart, absolute)
     objective = next((q for q in apart if q not in ("motion", "sensors") and not q.startswith("gradient of ")), "motion")
     gradient = "gradient of " + objective
     for quantity in (objective, gradient):
@@ -190,8 +191,8 @@ def alpha_section(run):
     stem = run["file"].removesuffix(".csv")
     objective = next(q for q in json.loads(run["apart"]) if q not in ("motion", "sensors"))
     lines = [f"### Penalty: `{run['problem']}`", "", f"    {run['command']}", "",
-             "Relative errors of the accelerations at 100 states of the motion; then runs, quasi-definite and by Cholesky: error of",
-             f"`{objective}`, right-hand sides, drift of the constraints [m].", ""]
+             "The first columns are relative errors of the accelerations at 100 states of the motion. The others are runs,",
+             f"quasi-definite and by Cholesky: error of `{objective}`, right-hand sides, drift of the constraints [m].", ""]
     cells = []
     for r in rows:
         pair = lambda c: f"{r['quasidefinite ' + c] or '-'}, {r['cholesky ' + c] or '-'}"
@@ -215,8 +216,8 @@ def write():
     loads = [float(r["load"]) for r in runs]
     cores = min(int(r["machine"].rsplit(", ", 1)[1].split()[0]) for r in runs)
     if max(loads) > 0.7 * cores:
-        lines += [f"**The machine was busy**: a load of {min(loads):.0f} to {max(loads):.0f} on {cores} cores, so that times are longer than they would be",
-                  "alone and their order is uncertain where they are close; errors and counts do not depend on it.", ""]
+        lines += paragraph(f"**The machine was busy**: its load was {min(loads):.0f} to {max(loads):.0f} on {cores} cores. Times are longer than on an idle "
+                           "machine, and the order of close ones is uncertain. Errors and counts do not depend on it.") + [""]
     lines += gallery_section()
     for run in runs:
         lines += sweep_section(run) if run["kind"] == "sweep" else alpha_section(run)

@@ -5,13 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <unordered_set>
 
 #include "core/expression/counted.hpp"
 #include "core/expression/did_you_mean.hpp"
+#include "optim/regular_file.hpp"
 
 namespace mbsopt {
 namespace {
@@ -219,11 +218,11 @@ CsvTable parse_csv(std::string_view text, std::string name) {
 }
 
 CsvTable read_csv(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw CsvError(path + ": cannot be read");
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  if (file.bad()) throw CsvError(path + ": reading it failed");
-  return parse_csv(text, path);
+  try {
+    return parse_csv(content_of_regular_file(path), path);
+  } catch (const FileError& error) {
+    throw CsvError(path + ": " + error.what());
+  }
 }
 
 const std::vector<double>& ascending_times(const CsvTable& table, std::string_view column_name) {

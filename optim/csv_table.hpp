@@ -38,7 +38,7 @@ struct CsvTable {
 };
 
 CsvTable parse_csv(std::string_view text, std::string name);
-CsvTable read_csv(const std::string& path);
+CsvTable read_csv(const std::string& path);  // throws CsvError, also where it cannot be read
 
 // A column of times: every cell present and finite, each later than the one before. Throws CsvError naming the row.
 const std::vector<double>& ascending_times(const CsvTable& table, std::string_view column_name);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <exception>
+#include <new>
 #include <utility>
 
 namespace mbsopt {
@@ -69,6 +70,8 @@ NlpPoint EvaluatedPoints::computed(Wanted wanted) {
   }
   try {
     wanted == Wanted::derivatives ? problem_.evaluate(x_, point) : problem_.evaluate_values(x_, point);
+  } catch (const std::bad_alloc&) {
+    throw;  // says nothing about the point, and must not be remembered of it
   } catch (const std::exception& error) {
     point.ok = false, point.message = error.what();
   }

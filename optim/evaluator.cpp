@@ -11,6 +11,7 @@
 #include "core/integrate/cvodes.hpp"
 #include "optim/difference_ladder.hpp"
 #include "optim/objective_run.hpp"
+#include "optim/obstructed_parameters.hpp"
 #include "optim/parameter_values.hpp"
 #include "optim/stopwatch.hpp"
 
@@ -234,6 +235,7 @@ const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
   if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho &&
       (last_.has_gradients() || !last_.ok))
     return last_;
+  if (!simulated_.empty() && !last_.has_gradients()) require_unobstructed(scene_, rho, active_, options_.user_forces);
   GradientMethod method = options_.method;
   std::string choice;
   if (simulated_.empty()) {

@@ -12,6 +12,7 @@
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/field_visitor.hpp"
 #include "optim/expression_cost.hpp"
+#include "optim/obstructed_parameters.hpp"
 #include "optim/parameter_values.hpp"
 
 namespace mbsopt {
@@ -74,6 +75,7 @@ Experiment::Experiment(const Scene& scene, const ExperimentSpec& spec, std::stri
   take_samples(spec, place, data);
   refuse_short_laws(spec, place);
   scene_.simulation = settings_;
+  if (!unknowns_.empty()) require_unobstructed(simulated(), rho_, active_, user_forces_);
 }
 
 void Experiment::replace_laws(const ExperimentSpec& spec, const std::string& place) {

@@ -40,7 +40,7 @@ struct FittedParameter {
   std::string unit;
   double initial = 0, value = 0;
   std::optional<double> lower, upper;
-  std::optional<Parameter::Prior> prior;
+  std::optional<Prior> prior;
   bool at_lower = false, at_upper = false;     // then its std_error, computed as if it were free, says little
   double std_error = FitStatistics::kUnknown;  // infinite where the data do not determine it
   double ci95[2] = {FitStatistics::kUnknown, FitStatistics::kUnknown};

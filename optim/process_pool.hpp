@@ -8,8 +8,10 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,10 +34,12 @@ class ProcessPool {
 
   bool has_room() const { return workers_.size() < room_; }
   bool idle() const { return workers_.empty(); }
-  void start(int job);  // throws std::runtime_error where the system gives no process
+  // False where the system gives no further process: from then on the pool has room for those that are at work only.
+  // Throws std::runtime_error where it gives none at all.
+  bool start(int job);
   // The replies of jobs that have ended; waits at most so long for the first, also where none is under way.
   std::vector<JobReply> ended(int milliseconds);
-  void stop();  // SIGTERM to all that are at work; they may still reply
+  void stop();  // SIGTERM to all that are at work; they may still reply. Who has not after 5 s is killed by ended()
 
   struct Worker {
     int job;
@@ -45,14 +49,18 @@ class ProcessPool {
   };
 
  private:
+  using Clock = std::chrono::steady_clock;
+  void tell(int signal) const;
+
   std::size_t room_;
   std::function<std::string(int)> work_;
   std::vector<Worker> workers_;
+  std::optional<Clock::time_point> kill_at_;
 };
 
 // All jobs, so many at a time; done runs here, in any order. go_on is asked about every 50 ms: when it says no, the
-// jobs under way get SIGTERM and may still reply, and no other job begins. Throws std::runtime_error where the system
-// gives no process.
+// jobs under way get SIGTERM and may still reply, and no other job begins. Where the system gives fewer processes than
+// workers, fewer are used; throws std::runtime_error where it gives none.
 void run_in_processes(const std::vector<int>& jobs, int workers, const std::function<std::string(int job)>& work,
                       const std::function<void(const JobReply&)>& done, const std::function<bool()>& go_on = {});
 

@@ -23,7 +23,8 @@ concept ForceBetweenBodies = requires(const Kind& kind) {
   kind.body1;
 };
 
-// Sets of bodies that joints, forces and conditions connect. The ground is no body here.
+// Sets of bodies that joints, forces and conditions connect: all connections are made before a body is looked at. The
+// ground is no body here.
 class ConnectedBodies {
  public:
   explicit ConnectedBodies(const Scene& scene) : parent_(scene.bodies.size()) {
@@ -43,17 +44,15 @@ class ConnectedBodies {
   }
   void look_at(const std::vector<std::string>& bodies) {
     for (const std::string& body : bodies)
-      if (const auto it = index_.find(body); it != index_.end()) seen_.insert(it->second);
+      if (const auto it = index_.find(body); it != index_.end()) seen_.insert(root_of(it->second));
   }
   void look_at_all() {
-    for (std::size_t i = 0; i < parent_.size(); ++i) seen_.insert(i);
+    for (std::size_t i = 0; i < parent_.size(); ++i) seen_.insert(root_of(i));
   }
-  // After all connections: whether any of them moves with a body that is looked at.
+  // Whether any of them moves with a body that is looked at.
   bool matter(const std::vector<std::string>& bodies) {
-    std::set<std::size_t> roots;
-    for (const std::size_t body : seen_) roots.insert(root_of(body));
     for (const std::string& body : bodies)
-      if (const auto it = index_.find(body); it != index_.end() && roots.contains(root_of(it->second))) return true;
+      if (const auto it = index_.find(body); it != index_.end() && seen_.contains(root_of(it->second))) return true;
     return false;
   }
   bool any_seen() const { return !seen_.empty(); }
@@ -66,7 +65,7 @@ class ConnectedBodies {
 
   std::vector<std::size_t> parent_;
   std::map<std::string, std::size_t> index_;
-  std::set<std::size_t> seen_;
+  std::set<std::size_t> seen_;  // roots
 };
 
 class Search {
@@ -103,18 +102,17 @@ class Search {
       const Sensor* const sensor = facts_.sensor(condition.sensor);
       return sensor && idle(*sensor);
     });
-    std::erase_if(needed.sensors, [&](const Sensor& sensor) { return reads(sensor, left_out); });
+    const std::set<std::string> gone(left_out.begin(), left_out.end());
+    std::erase_if(needed.sensors, [&](const Sensor& sensor) { return reads(sensor, gone); });
     return needed;
   }
 
  private:
   // Also one that looks at several bodies, some of which are there.
-  bool reads(const Sensor& sensor, const std::vector<std::string>& bodies) const {
+  bool reads(const Sensor& sensor, const std::set<std::string>& bodies) const {
     if (measures_everything(sensor)) return false;
     const std::vector<std::string> read = bodies_of(sensor);
-    return std::any_of(read.begin(), read.end(), [&](const std::string& body) {
-      return std::find(bodies.begin(), bodies.end(), body) != bodies.end();
-    });
+    return std::any_of(read.begin(), read.end(), [&](const std::string& body) { return bodies.contains(body); });
   }
 
   std::vector<std::string> bodies_of_joint(const std::string& name) const {
@@ -303,32 +301,32 @@ Problem as_identified(const Problem& problem) {
 void add_idle(const std::vector<std::string>& variables, const Problem& judged_by, const std::string& list,
               const std::string& what, std::vector<SceneIssue>& issues) {
   const std::set<std::string> used = Search(judged_by).used_parameters();
-  const std::vector<Parameter>& all = judged_by.scene.parameters;
+  std::set<std::string> reported;  // when nothing uses them
+  for (const Parameter& parameter : judged_by.scene.parameters)
+    if (!parameter.allow_unused) reported.insert(parameter.name);
   for (std::size_t i = 0; i < variables.size(); ++i) {
-    const auto is_it = [&](const Parameter& p) { return p.name == variables[i]; };
-    const auto parameter = std::find_if(all.begin(), all.end(), is_it);
-    if (parameter == all.end() || parameter->allow_unused || used.contains(variables[i])) continue;
+    if (!reported.contains(variables[i]) || used.contains(variables[i])) continue;
     issues.push_back({child_path(list, i), "'" + variables[i] + "' cannot influence " + what +
                                                ": its derivatives are zero, and it would stay as it is; take it out"});
   }
 }
 
-bool occurs_anywhere(const Problem& problem, const std::string& parameter) {
-  // Judged without objectives and identification, everything that uses a parameter counts.
+// Judged without objectives and identification, everything that uses a parameter counts.
+std::set<std::string> used_anywhere(const Problem& problem) {
   Problem model_only;
   model_only.scene = problem.scene;
-  return Search(model_only).used_parameters().contains(parameter);
+  return Search(model_only).used_parameters();
 }
 
-// Only where a law replaces it.
-bool occurs_beside_a_law(Problem problem, const std::string& parameter) {
+// Also coefficients that a law replaces.
+std::set<std::string> used_beside_laws(Problem problem) {
   for (Force& force : problem.scene.forces)
     std::visit(
         [](auto& kind) {
           if constexpr (requires { kind.law; }) kind.law.reset();
         },
         force.kind);
-  return occurs_anywhere(problem, parameter);
+  return used_anywhere(problem);
 }
 
 }  // namespace
@@ -336,15 +334,19 @@ bool occurs_beside_a_law(Problem problem, const std::string& parameter) {
 std::vector<SceneIssue> find_unused_parameters(const Problem& problem) {
   std::vector<SceneIssue> issues;
   const std::set<std::string> used = Search(problem).used_parameters();
-  for (const Parameter& parameter : problem.scene.parameters) {
-    if (parameter.allow_unused || used.contains(parameter.name)) continue;
+  std::vector<const Parameter*> unused;
+  for (const Parameter& parameter : problem.scene.parameters)
+    if (!parameter.allow_unused && !used.contains(parameter.name)) unused.push_back(&parameter);
+  if (unused.empty()) return issues;
+  const std::set<std::string> anywhere = used_anywhere(problem), beside_laws = used_beside_laws(problem);
+  for (const Parameter* const parameter : unused) {
     const std::string what =
-        occurs_anywhere(problem, parameter.name)
-            ? "'" + parameter.name + "' cannot influence any objective or measurement: its derivatives are zero"
-        : occurs_beside_a_law(problem, parameter.name)
-            ? "'" + parameter.name + "' is used only by coefficients that a law replaces"
-            : "'" + parameter.name + "' is used by nothing";
-    issues.push_back({"parameters." + parameter.name, what + "; \"allow_unused\": true lifts this error"});
+        anywhere.contains(parameter->name)
+            ? "'" + parameter->name + "' cannot influence any objective or measurement: its derivatives are zero"
+        : beside_laws.contains(parameter->name)
+            ? "'" + parameter->name + "' is used only by coefficients that a law replaces"
+            : "'" + parameter->name + "' is used by nothing";
+    issues.push_back({"parameters." + parameter->name, what + "; \"allow_unused\": true lifts this error"});
   }
   return issues;
 }

@@ -2,8 +2,23 @@
 
 #include <algorithm>
 #include <limits>
+#include <set>
 
 namespace mbsopt {
+namespace {
+
+// The path itself and all that it lies in, from within, until `is_it` says so; whether it did.
+template <class Is>
+bool for_each_outer(std::string_view path, Is&& is_it) {
+  for (;;) {
+    if (is_it(path)) return true;
+    if (path.empty()) return false;
+    const std::size_t end = path.find_last_of(".[");
+    path = path.substr(0, end == std::string_view::npos ? 0 : end);
+  }
+}
+
+}  // namespace
 
 void Findings::add(const Node& node, const std::string& path, const std::string& message) {
   if (node.source == 0)
@@ -22,20 +37,22 @@ void Findings::add_inside(const Node& node, std::size_t at, const std::string& p
 void Findings::add_at(std::size_t offset, const std::string& path, const std::string& message) {
   const Position position = text_.position(offset);
   found_.push_back({offset, {file_, position.line, position.column, path, message}});
+  mark(path);
 }
 
 void Findings::add_override(const std::string& path, const std::string& message) {
   found_.push_back({std::numeric_limits<std::size_t>::max(), {"", 0, 0, path, message}});
+  mark(path);
+}
+
+void Findings::mark(std::string_view path) {
+  if (!marked_.emplace(path).second) return;
+  for_each_outer(path, [&](std::string_view outer) { return around_.emplace(outer), false; });
 }
 
 bool Findings::concerns(std::string_view path) const {
-  const auto within = [](std::string_view inner, std::string_view outer) {
-    return inner.starts_with(outer) &&
-           (inner.size() == outer.size() || outer.empty() || inner[outer.size()] == '.' || inner[outer.size()] == '[');
-  };
-  const auto related = [&](std::string_view other) { return within(path, other) || within(other, path); };
-  return std::any_of(found_.begin(), found_.end(), [&](const Found& found) { return related(found.finding.path); }) ||
-         std::any_of(elsewhere_.begin(), elsewhere_.end(), related);
+  if (around_.contains(std::string(path))) return true;
+  return for_each_outer(path, [&](std::string_view outer) { return marked_.contains(std::string(outer)); });
 }
 
 Finding Findings::finding(const Node& node, const std::string& path, const std::string& message) const {
@@ -49,8 +66,9 @@ void Findings::throw_if_any() const {
   std::vector<Found> sorted = found_;
   std::stable_sort(sorted.begin(), sorted.end(), [](const Found& a, const Found& b) { return a.offset < b.offset; });
   std::vector<Finding> all;
+  std::set<std::string> told;
   for (Found& found : sorted)
-    if (std::find(all.begin(), all.end(), found.finding) == all.end()) all.push_back(std::move(found.finding));
+    if (told.insert(to_string(found.finding)).second) all.push_back(std::move(found.finding));
   throw InputError(std::move(all));
 }
 

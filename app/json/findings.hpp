@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <unordered_set>
 #include <vector>
 
 #include "app/json/input_error.hpp"
@@ -25,7 +26,7 @@ class Findings {
   void add_override(const std::string& path, const std::string& message);
 
   // The path counts as having a finding, which is told at another place.
-  void add_elsewhere(const std::string& path) { elsewhere_.push_back(path); }
+  void add_elsewhere(const std::string& path) { mark(path); }
 
   // Whether a path, one it lies in, or one that lies in it has a finding already.
   bool concerns(std::string_view path) const;
@@ -39,10 +40,12 @@ class Findings {
     std::size_t offset;
     Finding finding;
   };
+  void mark(std::string_view path);
+
   std::string file_;
   SourceText text_;
   std::vector<Found> found_;
-  std::vector<std::string> elsewhere_;
+  std::unordered_set<std::string> marked_, around_;  // paths with findings, and these with all paths they lie in
 };
 
 }  // namespace mbsopt

@@ -7,11 +7,13 @@ namespace mbsopt {
 namespace {
 
 std::string lines(const std::vector<Finding>& findings) {
+  constexpr std::size_t kShown = 100;  // more than anyone mends before the next try
   std::string all;
-  for (const Finding& finding : findings) {
+  for (std::size_t i = 0; i < std::min(kShown, findings.size()); ++i) {
     if (!all.empty()) all += '\n';
-    all += to_string(finding);
+    all += to_string(findings[i]);
   }
+  if (findings.size() > kShown) all += "\nand " + std::to_string(findings.size() - kShown) + " more";
   return all;
 }
 

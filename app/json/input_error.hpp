@@ -18,7 +18,7 @@ struct Finding {
 // "suspension.json:41:18: bodies[2].inertia: ..."  or  "--set bodies[2].inertia: ..."
 std::string to_string(const Finding& finding);
 
-// what(): one line per finding.
+// what(): one line per finding, the first hundred of them, and how many more there are.
 class InputError : public std::runtime_error {
  public:
   explicit InputError(std::vector<Finding> all);

@@ -131,15 +131,29 @@ class NodeBuilder : public nlohmann::json_sax<nlohmann::json> {
     Node node = std::move(levels_.back().node);
     const std::vector<std::size_t> repeated = std::move(levels_.back().repeated);
     levels_.pop_back();
-    for (auto i = repeated.rbegin(); i != repeated.rend(); ++i) {  // reported: nothing else is to stumble over them
-      const auto at = static_cast<std::ptrdiff_t>(*i);
-      node.keys.erase(node.keys.begin() + at);
-      node.key_offsets.erase(node.key_offsets.begin() + at);
-      node.items.erase(node.items.begin() + at);
-    }
+    if (!repeated.empty()) leave_out(repeated, node);  // reported: nothing else is to stumble over them
     node.end = scan_.next().end;
     attach(std::move(node));
     return true;
+  }
+
+  // Keys of an object, by ascending numbers.
+  static void leave_out(const std::vector<std::size_t>& numbers, Node& node) {
+    std::size_t kept = 0;
+    auto next = numbers.begin();
+    for (std::size_t i = 0; i < node.keys.size(); ++i) {
+      if (next != numbers.end() && i == *next) {
+        ++next;
+        continue;
+      }
+      if (i != kept) {
+        node.keys[kept] = std::move(node.keys[i]);
+        node.key_offsets[kept] = node.key_offsets[i];
+        node.items[kept] = std::move(node.items[i]);
+      }
+      ++kept;
+    }
+    node.keys.resize(kept), node.key_offsets.resize(kept), node.items.resize(kept);
   }
 
   Node& attach(Node node) {

@@ -1,19 +1,19 @@
 #include "app/json/source_text.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <system_error>
+#include <cstdlib>
 
 #include "app/json/input_error.hpp"
+#include "optim/regular_file.hpp"
 
 namespace mbsopt {
 
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-constexpr std::size_t kLargestFile = std::size_t{256} << 20;
+constexpr std::size_t kLargestFile = std::size_t{256} << 20;  // no problem file is larger
+
+constexpr std::size_t kStride = 1024;  // a line may be the whole file: columns are counted from the nearest multiple
 
 bool is_continuation(char c) { return (static_cast<unsigned char>(c) & 0xC0) == 0x80; }
 
@@ -51,6 +51,19 @@ std::size_t sequence_length(std::string_view text, std::size_t at) {
 SourceText::SourceText(std::string content) : content_(std::move(content)), line_starts_{0} {
   for (std::size_t i = 0; i < content_.size(); ++i)
     if (content_[i] == '\n') line_starts_.push_back(i + 1);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < content_.size(); ++i) {
+    if (i % kStride == 0) continuations_.push_back(count);
+    count += is_continuation(content_[i]) ? 1 : 0;
+  }
+}
+
+std::size_t SourceText::continuations(std::size_t end) const {
+  if (end == 0) return 0;
+  const std::size_t stride = (end - 1) / kStride;
+  std::size_t count = continuations_[stride];
+  for (std::size_t i = stride * kStride; i < end; ++i) count += is_continuation(content_[i]) ? 1 : 0;
+  return count;
 }
 
 Position SourceText::position(std::size_t offset) const {
@@ -58,9 +71,8 @@ Position SourceText::position(std::size_t offset) const {
   const auto line = std::upper_bound(line_starts_.begin(), line_starts_.end(), offset) - 1;
   std::size_t start = *line;
   if (start == 0 && content_.starts_with(kByteOrderMark)) start = std::min(kByteOrderMark.size(), offset);
-  Position position{static_cast<int>(line - line_starts_.begin()) + 1, 1};
-  for (std::size_t i = start; i < offset; ++i) position.column += is_continuation(content_[i]) ? 0 : 1;
-  return position;
+  const std::size_t characters = offset - start - (continuations(offset) - continuations(start));
+  return {static_cast<int>(line - line_starts_.begin()) + 1, static_cast<int>(characters) + 1};
 }
 
 std::size_t SourceText::first_invalid_byte() const {
@@ -92,21 +104,11 @@ std::size_t SourceText::inside_string(std::size_t literal, std::size_t at) const
 }
 
 std::string read_text_file(const std::filesystem::path& file) {
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(file, error);
-  if (status.type() == std::filesystem::file_type::directory) fail(file, "is a directory, a problem file is expected");
-  if (status.type() == std::filesystem::file_type::not_found) fail(file, "there is no such file");
-  if (error) fail(file, "cannot be read: " + error.message());
-  errno = 0;
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) fail(file, std::string("cannot be read: ") + std::strerror(errno));
-  std::string content;
-  char buffer[1 << 16];
-  while (stream.read(buffer, sizeof buffer) || stream.gcount() > 0) {
-    content.append(buffer, static_cast<std::size_t>(stream.gcount()));
-    if (content.size() > kLargestFile) fail(file, "is larger than 256 MiB, which no problem file is");
+  try {
+    return content_of_regular_file(file, kLargestFile);
+  } catch (const FileError& error) {
+    fail(file, error.what());
   }
-  return content;
 }
 
 }  // namespace mbsopt

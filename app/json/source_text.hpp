@@ -26,7 +26,10 @@ class SourceText {
 
  private:
   std::string content_;
+  std::size_t continuations(std::size_t end) const;  // bytes before `end` that begin no character
+
   std::vector<std::size_t> line_starts_;
+  std::vector<std::size_t> continuations_;  // up to every kStride bytes
 };
 
 // The whole file; throws InputError where it cannot be read, naming it as given.

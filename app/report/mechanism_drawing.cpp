@@ -42,6 +42,12 @@ class SketchMaker {
  public:
   explicit SketchMaker(const Scene& scene) : scene_(scene), facts_(scene) {
     for (std::size_t i = 0; i < scene.bodies.size(); ++i) numbers_.emplace(scene.bodies[i].name, i);
+    for (const Joint& joint : scene.joints) {
+      for (const auto* field : {&joint.axis1, &joint.axis2, &joint.normal1, &joint.normal2}) {
+        const std::string* name = *field ? std::get_if<std::string>(&**field) : nullptr;
+        if (name) directions_.insert(*name);
+      }
+    }
   }
 
   Sketch sketch() {
@@ -78,15 +84,8 @@ class SketchMaker {
   // Its named points, but for those that are directions of joints; a body without any gets its centre of mass.
   void add_own_points(std::size_t index) {
     const Body& body = scene_.bodies[index];
-    std::set<std::string> directions;
-    for (const Joint& joint : scene_.joints) {
-      for (const auto* field : {&joint.axis1, &joint.axis2, &joint.normal1, &joint.normal2}) {
-        const std::string* name = *field ? std::get_if<std::string>(&**field) : nullptr;
-        if (name) directions.insert(*name);
-      }
-    }
     for (const auto& [name, coordinates] : body.points)
-      if (!directions.contains(name)) add(point(body.name, coordinates));
+      if (!directions_.contains(name)) add(point(body.name, coordinates));
     for (const Shape& shape : body.shapes) add(point(body.name, shape.from)), add(point(body.name, shape.to));
     if (result_.bodies[index].size() < 2) add(point(body.name, body.com));
   }
@@ -98,6 +97,7 @@ class SketchMaker {
   const Scene& scene_;
   const SceneFacts facts_;
   std::map<std::string, std::size_t> numbers_;
+  std::set<std::string> directions_;  // named by joints
   Sketch result_;
 };
 

@@ -1,6 +1,8 @@
 #include "core/dynamics/assembly.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -11,6 +13,7 @@
 #include "core/dynamics/assembly_report.hpp"
 #include "core/dynamics/equilibrium.hpp"
 #include "core/dynamics/nearest_point.hpp"
+#include "core/dynamics/row_dependence.hpp"
 #include "core/dynamics/sparse_projection.hpp"
 
 namespace mbsopt {
@@ -22,6 +25,21 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// A length for r and 1 for p: the root mean square of entries in p over those in r, in rows of J that have both.
+VectorXd sizes_of_poses(const MatrixXd& J) {
+  double r = 0, p = 0;
+  for (Index k = 0; k < J.cols(); k += 7) {
+    for (Index i = 0; i < J.rows(); ++i) {
+      const double here = J.row(i).segment<3>(k).squaredNorm();
+      if (here > 0) r += here, p += J.row(i).segment<4>(k + 3).squaredNorm();
+    }
+  }
+  const double length = p > 0 ? std::sqrt(p / r) : 1;
+  VectorXd sizes = VectorXd::Ones(J.cols());
+  for (Index k = 0; k < J.cols(); k += 7) sizes.segment<3>(k).setConstant(length);
+  return sizes;
+}
 
 // Unknown q; v plays no part.
 class PositionProblem : public NearestPointEquations {
@@ -44,6 +62,7 @@ class PositionProblem : public NearestPointEquations {
     for (Index i = 3; i < q.size(); i += 7) q.segment<4>(i) = UnitNorm::project(q.segment<4>(i));
     return q;
   }
+  VectorXd sizes(const MatrixXd& J) const override { return sizes_of_poses(J); }
   VectorXd weights() const override { return equations_.weights(); }
   void accept(const VectorXd& q) override { equations_.continue_branches(state(q)); }
 
@@ -68,6 +87,7 @@ class VelocityProblem : public NearestPointEquations {
   }
   double step_fraction(const VectorXd&) const override { return 1; }
   VectorXd retracted(const VectorXd& v) const override { return v; }
+  VectorXd sizes(const MatrixXd& J) const override { return sizes_of_poses(J); }
   VectorXd weights() const override { return equations_.weights(); }
 
  private:
@@ -352,25 +372,54 @@ void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
   rho_bar += d.q_b_rho.transpose() * b_bar + d.q_g_rho.transpose() * g_bar;
 }
 
+namespace {
+
+// Columns of right-hand sides b that J x = b cannot meet. left: what a solution leaves of b, rows scaled to unit
+// length. pieces: the columns of which b is the sum, before they cancel.
+void note_unmet(const MatrixXd& left, const VectorXd& row_scale, std::initializer_list<MatrixXd> pieces,
+                std::vector<bool>& unmet) {
+  constexpr double kUnmet = 1e-7;      // of b: assembly leaves a loop open by far less
+  constexpr double kRounding = 1e-12;  // of b, in the units of J: sin(pi) is not zero
+  if (left.rows() == 0) return;
+  for (Index k = 0; k < left.cols(); ++k) {
+    double size = 0;
+    for (const MatrixXd& piece : pieces) size += row_scale.cwiseProduct(piece.col(k)).norm();
+    if (left.col(k).norm() > kUnmet * size + kRounding * row_scale.maxCoeff())
+      unmet[static_cast<std::size_t>(k)] = true;
+  }
+}
+
+}  // namespace
+
 std::vector<int> Assembly::obstructed() const {
   Solution& s = *solution_;
-  if (!s.result.ok || s.data.equilibrium) return {};
-  s.linearise_both();
-  const Solution::Derivatives d = s.derivatives();
-  // What is left of each right-hand side outside the range of J, rows scaled to unit length.
-  auto left = [](const NearestPointLinearisation& at, const MatrixXd& J, const MatrixXd& b) {
-    return MatrixXd(at.row_scale().asDiagonal() * (b - J * at.pseudo_inverse_times(b)));
-  };
-  const Index N = 7 * s.data.n;
-  const MatrixXd q_left = left(s.q->linearisation, s.position.gradients(s.result.y).y.leftCols(N), d.q_b_rho);
-  const MatrixXd q_rho = s.q->linearisation.solve(d.q_b_rho, d.q_g_rho), v_b = d.v_b_q * q_rho + d.v_b_rho;
-  const MatrixXd v_left = left(s.v->linearisation, s.velocity.gradients(s.result.y).y.rightCols(N), v_b);
+  if (!s.result.ok) return {};
+  const Index N = 7 * s.data.n, P = s.data.rho.size();
+  std::vector<bool> unmet(static_cast<std::size_t>(P), false);
+  if (s.data.equilibrium) {
+    const AssemblyEquations::Gradients F = s.position.gradients(s.result.y);
+    const MatrixXd J = F.y.leftCols(N);
+    const NearestPointLinearisation at(J, sizes_of_poses(J));
+    note_unmet(at.left(J, -F.rho), at.row_scale(), {F.rho}, unmet);
+  } else if (s.is_sparse()) {
+    const Solution::Sparse d = s.sparse_derivatives();
+    const MatrixXd q_rho = d.q.solve(d.q_b_rho, d.q_g_rho);
+    note_unmet(d.q.left(d.q_b_rho, q_rho), d.q.row_scale(), {d.q_b_rho}, unmet);
+    MatrixXd turned = MatrixXd::Zero(d.v_b_rho.rows(), P);
+    for (const SparseEntry& e : d.v_b_q) turned.row(e.row) += e.value * q_rho.row(e.column);
+    const MatrixXd b = turned + d.v_b_rho;
+    note_unmet(d.v.left(b, d.v.solve(b, d.v_g_rho)), d.v.row_scale(), {turned, d.v_b_rho}, unmet);
+  } else {
+    s.linearise_both();
+    const Solution::Derivatives d = s.derivatives();
+    const NearestPointLinearisation &q = s.q->linearisation, &v = s.v->linearisation;
+    note_unmet(q.left(s.position.gradients(s.result.y).y.leftCols(N), d.q_b_rho), q.row_scale(), {d.q_b_rho}, unmet);
+    const MatrixXd turned = d.v_b_q * q.solve(d.q_b_rho, d.q_g_rho), b = turned + d.v_b_rho;
+    note_unmet(v.left(s.velocity.gradients(s.result.y).y.rightCols(N), b), v.row_scale(), {turned, d.v_b_rho}, unmet);
+  }
   std::vector<int> parameters;
-  for (Index k = 0; k < d.q_b_rho.cols(); ++k) {
-    const double q_size = 1 + d.q_b_rho.col(k).norm(), v_size = 1 + v_b.col(k).norm();
-    if (q_left.col(k).norm() > 1e-7 * q_size || v_left.col(k).norm() > 1e-7 * v_size) {
-      parameters.push_back(static_cast<int>(k));
-    }
+  for (Index k = 0; k < P; ++k) {
+    if (unmet[static_cast<std::size_t>(k)]) parameters.push_back(static_cast<int>(k));
   }
   return parameters;
 }
@@ -378,18 +427,12 @@ std::vector<int> Assembly::obstructed() const {
 // Rows are taken in file order, unit norms first; one that lies in the span of those before it is redundant.
 ModelSummary Assembly::summary() const {
   const MechanismData& d = solution_->data;
-  const MatrixXd J = solution_->position.gradients(solution_->result.y).y.leftCols(7 * d.n);
-  MatrixXd basis(7 * d.n, 7 * d.n);
-  Index rank = 0;
-  auto independent = [&](Index row) {
-    if (rank == basis.cols()) return false;
-    VectorXd x = J.row(row).transpose().normalized();
-    for (int twice = 0; twice < 2; ++twice) x -= basis.leftCols(rank) * (basis.leftCols(rank).transpose() * x);
-    if (!(x.norm() > NearestPointLinearisation::kRankThreshold)) return false;
-    basis.col(rank++) = x.normalized();
-    return true;
-  };
-  for (Index i = 0; i < d.n; ++i) independent(d.m + i);
+  const int equations = d.m + d.n;
+  const auto place = [&](int row) { return row < d.m ? row + d.n : row - d.m; };
+  std::vector<SparseEntry> J = solution_->position.sparse_gradients(solution_->result.y).y;
+  std::erase_if(J, [&](const SparseEntry& e) { return e.row >= equations || e.column >= 7 * d.n; });
+  for (SparseEntry& e : J) e.row = place(e.row);
+  const RowDependence found = row_dependence(equations, d.n, 7, J, NearestPointLinearisation::kRankThreshold);
   const std::size_t joints = d.joint_names.size();
   std::vector<int> rows(joints + d.drive_names.size(), 0), redundant(rows.size(), 0);
   int next_row = 0;
@@ -399,12 +442,13 @@ ModelSummary Assembly::summary() const {
     const std::size_t owner =
         c.drive >= 0 ? joints + static_cast<std::size_t>(c.drive) : static_cast<std::size_t>(c.joint);
     rows[owner] += c.rows();
-    for (int i = 0; i < c.rows(); ++i) redundant[owner] += independent(c.row + i) ? 0 : 1;
+    for (int i = 0; i < c.rows(); ++i)
+      redundant[owner] += found.independent[static_cast<std::size_t>(place(c.row + i))] ? 0 : 1;
   }
   ModelSummary summary;
   summary.bodies = d.n;
-  summary.equations = d.m + d.n;
-  summary.rank = static_cast<int>(rank);
+  summary.equations = equations;
+  summary.rank = found.rank;
   summary.degrees_of_freedom = 7 * d.n - summary.rank;
   for (std::size_t j = 0; j < rows.size(); ++j) {
     if (redundant[j] == 0) continue;

@@ -1,7 +1,9 @@
 #include "core/dynamics/assembly_equations.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "core/constraint/unit_norm.hpp"
 #include "core/sensor/body_at.hpp"
@@ -13,6 +15,11 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
+
+struct RowOrder {
+  bool operator()(const Constraint& c, int row) const { return c.row < row; }
+  bool operator()(int row, const Constraint& c) const { return row < c.row; }
+};
 
 // A half turn is +pi: rounding does not decide its sign.
 constexpr double kHalfTurn = -std::numbers::pi + 1e-6;
@@ -130,8 +137,9 @@ void AssemblyEquations::settle_shared_rows(const VectorXd& y, VectorXd& angles) 
     if (!g.shared) continue;
     double sum = 0;
     const Constraint* last = nullptr;
-    for (const Constraint& c : data_.constraints) {
-      if (c.row != g.row) continue;
+    const auto [first, last_of_row] = std::equal_range(  // rows ascend
+        data_.constraints.begin(), data_.constraints.end(), g.row, RowOrder{});
+    for (const Constraint& c : std::span(first, last_of_row)) {
       sum += term_value(c, y, angles);
       if (std::holds_alternative<Angle>(c.primitive)) last = &c;
     }

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -12,6 +10,7 @@
 #include "core/body/euler_parameters.hpp"
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/projection.hpp"
+#include "core/linear/dense.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
@@ -22,7 +21,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kLargestTurn = 0.1;         // of an Euler parameter in one step
-constexpr double kRelativeCorrection = 0.2;  // of the predictor, against the step
+constexpr double kRelativeCorrection = 0.2;  // of the predictor, against h v
 constexpr double kSmallCorrection = 1e-6;    // always accepted
 constexpr double kViolation = 1e-9;
 constexpr double kRankThreshold = 1e-7;  // rows of J scaled to unit length
@@ -44,11 +43,11 @@ class DrivenRows {
     }
   }
   void factor() {
+    if (d_.m == 0) return;
     rows_.evaluate(frames_);
     J_ = rows_.dense();
     scale_ = J_.rowwise().norm().cwiseMax(1e-300).cwiseInverse();
-    scaled_.setThreshold(kRankThreshold);
-    scaled_.compute(scale_.asDiagonal() * J_);
+    scaled_ = OrthogonalDecomposition(scale_.asDiagonal() * J_, kRankThreshold);
   }
   const VectorXd& phi(const VectorXd& angles) {
     evaluate_phi(d_, frames_, laws_, angles, phi_);
@@ -58,11 +57,11 @@ class DrivenRows {
     evaluate_phi_dot(d_, frames_, laws_, phi_);
     return phi_;
   }
-  Index rank() const { return scaled_.rank(); }
+  Index rank() const { return d_.m == 0 ? 0 : scaled_.rank(); }
   MatrixXd unit_rows() const { return scale_.asDiagonal() * J_; }
   VectorXd solve(const VectorXd& b) const { return scaled_.solve(scale_.cwiseProduct(b)); }  // J x = b
   VectorXd solve_transposed(const VectorXd& f) const {                                       // J'x = f
-    const VectorXd x = scaled_.transpose().solve(f);
+    const VectorXd x = scaled_.solve_transposed(f);
     return scale_.cwiseProduct(x);
   }
   VectorXd transposed_times(const VectorXd& x) const { return J_.transpose() * x; }
@@ -75,7 +74,7 @@ class DrivenRows {
   std::vector<Frame> frames_;
   VectorXd phi_, scale_;
   MatrixXd J_;
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> scaled_;
+  OrthogonalDecomposition scaled_;
 };
 
 // Accelerations from the equations of the drives alone, and the multipliers that belong to them: right whatever the
@@ -165,9 +164,7 @@ class Kinematics {
     }
     if (!projector_.project(t1, angles_, y_hat_, y_next_, solution_)) return false;
     polish(t1);
-    const double step = (y_hat_.head(half) - y_.head(half)).lpNorm<Eigen::Infinity>();
-    const double correction = (y_next_.head(half) - y_hat_.head(half)).lpNorm<Eigen::Infinity>();
-    if (correction > std::max(kSmallCorrection, kRelativeCorrection * step)) return false;
+    if (!keeps_branch(h)) return false;
     if (projector_.position_violation(t1, angles_, y_next_) > kViolation) return false;
     t_ = t1;
     y_ = y_next_;
@@ -175,6 +172,26 @@ class Kinematics {
       const JointAngle& a = d_.angles[k];
       double& angle = angles_(static_cast<Index>(k));
       angle = a.value_near(angle, body_at(y_, a.body1).frame, body_at(y_, a.body2).frame);
+    }
+    return true;
+  }
+
+  // Each body's correction is small against h v, and so is the difference from the trapezoidal rule. Beside a dead
+  // point h^2 a/2 may reach the other branch, so that the correction alone is small there; but on that branch the
+  // velocity has the opposite sign, and the trapezoidal rule disagrees.
+  bool keeps_branch(double h) const {
+    const Index half = 7 * d_.n;
+    const auto keeps = [&](Index at, Index size) {
+      const auto v0 = y_.segment(half + at, size), v1 = y_next_.segment(half + at, size);
+      const double allowed =
+          std::max(kSmallCorrection,
+                   kRelativeCorrection * h * std::max(v0.lpNorm<Eigen::Infinity>(), v1.lpNorm<Eigen::Infinity>()));
+      const auto q0 = y_.segment(at, size), q1 = y_next_.segment(at, size);
+      return (q1 - y_hat_.segment(at, size)).lpNorm<Eigen::Infinity>() <= allowed &&
+             (q1 - q0 - 0.5 * h * (v0 + v1)).lpNorm<Eigen::Infinity>() <= allowed;
+    };
+    for (Index i = 0; i < d_.n; ++i) {
+      if (!keeps(7 * i, 3) || !keeps(7 * i + 3, 4)) return false;
     }
     return true;
   }
@@ -223,19 +240,19 @@ class Kinematics {
     SingularPosition s;
     s.t = t_;
     s.rank_lost = static_cast<int>(6 * d_.n - rows_.rank());
-    if (s.rank_lost > 0) name_owners(rows_.unit_rows(), s);
+    if (s.rank_lost > 0 && d_.m > 0) name_owners(rows_.unit_rows(), s);
     return s;
   }
 
  private:
   // Equations with a share in a dependence that the generic position does not have: null vectors of J'.
   void name_owners(const MatrixXd& J, SingularPosition& s) const {
-    const Eigen::JacobiSVD<MatrixXd> svd(J, Eigen::ComputeFullU);
+    const LeftSingular svd = left_singular(J);
     std::set<std::string> seen;
     for (Index k = 0; k < J.rows(); ++k) {
-      if (k < svd.singularValues().size() && svd.singularValues()(k) > kRankThreshold) continue;
+      if (k < svd.values.size() && svd.values(k) > kRankThreshold) continue;
       for (const Constraint& c : d_.constraints) {
-        if (svd.matrixU().col(k).segment(c.row, c.rows()).cwiseAbs().maxCoeff() < 1e-3) continue;
+        if (svd.U.col(k).segment(c.row, c.rows()).cwiseAbs().maxCoeff() < 1e-3) continue;
         const std::string owner = c.drive >= 0 ? "drive '" + d_.drive_names[static_cast<std::size_t>(c.drive)] + "'"
                                                : "joint '" + d_.joint_names[static_cast<std::size_t>(c.joint)] + "'";
         if (seen.insert(owner).second) s.owners.push_back(owner);
@@ -287,9 +304,9 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
       if (h < 1e-9 * std::max(1e-3, times.back() - times.front())) {
         const SingularPosition here = k.rank_here();
         const std::string why =
-            here.rank_lost > 0 ? fmt::format(": a singular position, where the equations of {} depend on each other",
-                                             fmt::join(here.owners, ", "))
-                               : "";
+            here.owners.empty() ? std::string()
+                                : fmt::format(": a singular position, where the equations of {} depend on each other",
+                                              fmt::join(here.owners, ", "));
         result.message = fmt::format(
             "the positions cannot be continued beyond t = {:.6g} s{}. A dead point that the drives cannot "
             "pass, or a position out of reach? Change the law, the lengths, or drive another joint there",

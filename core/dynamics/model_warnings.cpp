@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
 
 #include "core/dynamics/constraint_rows.hpp"
+#include "core/dynamics/row_dependence.hpp"
+#include "core/linear/dense.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/planar_model.hpp"
 #include "core/sensor/body_at.hpp"
@@ -16,8 +16,6 @@
 namespace mbsopt {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kMassless = 1e-12;      // relative to the largest mass or inertia
@@ -34,41 +32,40 @@ std::vector<Frame> frames_at(const MechanismData& d, const VectorXd& q) {
   return frames;
 }
 
+// Directions that neither a joint nor a mass holds: what no row of J and of the masses, one row per principal axis,
+// reaches.
 void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::string>& warnings) {
-  bool any = false;
   double mass = 0, inertia = 0;
   for (int i = 1; i <= d.n; ++i) {
     mass = std::max(mass, d.bodies[at(i)].mass), inertia = std::max(inertia, d.bodies[at(i)].J.trace());
   }
+  std::vector<SparseEntry> rows;
+  int count = d.m;
   for (int i = 1; i <= d.n; ++i) {
     const BodyData& b = d.bodies[at(i)];
-    const double least = Eigen::SelfAdjointEigenSolver<Matrix3d>(b.J, Eigen::EigenvaluesOnly).eigenvalues()(0);
-    any = any || b.mass <= kMassless * mass || least <= kMassless * inertia;
+    const int first = 6 * (i - 1);
+    for (int k = 0; k < 3 && b.mass > kMassless * mass; ++k) rows.push_back({count++, first + k, 1});
+    const SymmetricEigen principal = symmetric_eigen(b.J);
+    for (int k = 0; k < 3; ++k) {
+      if (!(principal.values(k) > kMassless * inertia)) continue;
+      for (int j = 0; j < 3; ++j) rows.push_back({count, first + 3 + j, principal.vectors(j, k)});
+      ++count;
+    }
   }
-  if (!any) return;  // the usual case costs nothing
-  ConstraintRows rows(d);
-  rows.evaluate(frames_at(d, q));
-  MatrixXd J = rows.dense();
-  if (d.m == 0) J = MatrixXd::Zero(1, 6 * d.n);
-  for (Index r = 0; r < J.rows(); ++r) J.row(r) /= std::max(J.row(r).norm(), 1e-300);
-  Eigen::ColPivHouseholderQR<MatrixXd> qr;
-  qr.setThreshold(kRankThreshold);
-  qr.compute(J.transpose());
-  const MatrixXd Q = qr.householderQ() * MatrixXd::Identity(6 * d.n, 6 * d.n);
-  const MatrixXd N = Q.rightCols(6 * d.n - qr.rank());
-  if (N.cols() == 0) return;
-  MatrixXd MN = N;
-  for (int i = 1; i <= d.n; ++i) {
-    MN.middleRows(6 * (i - 1), 3) *= d.bodies[at(i)].mass / (mass > 0 ? mass : 1);
-    MN.middleRows(6 * (i - 1) + 3, 3) =
-        (d.bodies[at(i)].J / (inertia > 0 ? inertia : 1) * N.middleRows(6 * (i - 1) + 3, 3)).eval();
+  if (count == d.m + 6 * d.n) return;  // the usual case costs nothing
+  ConstraintRows J(d);
+  J.evaluate(frames_at(d, q));
+  for (const RowGroup& g : d.groups) {
+    for (int r = 0; r < g.rows; ++r) {
+      for (int k = 0; k < 6; ++k) {
+        if (g.body1 > 0) rows.push_back({g.row + r, 6 * (g.body1 - 1) + k, J.J1(g.block + r, k)});
+        if (g.body2 > 0) rows.push_back({g.row + r, 6 * (g.body2 - 1) + k, J.J2(g.block + r, k)});
+      }
+    }
   }
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(N.transpose() * MN);
   std::map<int, bool> bodies;
-  for (Index k = 0; k < N.cols() && eigen.eigenvalues()(k) <= kMassless; ++k) {
-    Index row = 0;
-    (N * eigen.eigenvectors().col(k)).cwiseAbs().maxCoeff(&row);
-    bodies[static_cast<int>(row / 6) + 1] = row % 6 >= 3;
+  for (const RowDependence::Direction& free : row_dependence(count, d.n, 6, rows, kRankThreshold).unreached) {
+    bodies[free.body + 1] = free.column >= 3;
   }
   for (const auto& [body, turns] : bodies) {
     warnings.push_back(

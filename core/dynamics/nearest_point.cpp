@@ -1,35 +1,37 @@
 #include "core/dynamics/nearest_point.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace mbsopt {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J) : scale_(J.rows()) {
+NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J)
+    : NearestPointLinearisation(J, VectorXd::Ones(J.cols())) {}
+NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J, const VectorXd& sizes)
+    : scale_(J.rows()), sizes_(sizes) {
+  const MatrixXd sized = J * sizes.asDiagonal();
   for (Eigen::Index i = 0; i < J.rows(); ++i) {
-    const double norm = J.row(i).norm();
+    const double norm = sized.row(i).norm();
     scale_(i) = norm > 0 ? 1 / norm : 1.0;
   }
-  J_transposed_.setThreshold(kRankThreshold);
-  J_transposed_.compute((scale_.asDiagonal() * J).transpose());
-  const Eigen::Index N = J.cols(), free = N - rank();
-  Z_ = J_transposed_.householderQ() * MatrixXd::Identity(N, N).rightCols(free);
+  J_transposed_ = OrthogonalDecomposition((scale_.asDiagonal() * sized).transpose(), kRankThreshold);
+  Z_ = orthonormal_columns(sizes.asDiagonal() * J_transposed_.left_null_space());
 }
 
 VectorXd NearestPointLinearisation::multipliers(const VectorXd& g) const {
-  return scale_.cwiseProduct(VectorXd(J_transposed_.solve(g)));
+  return scale_.asDiagonal() * J_transposed_.solve(sizes_.asDiagonal() * g);
+}
+MatrixXd NearestPointLinearisation::particular(const Eigen::Ref<const MatrixXd>& b) const {
+  return sizes_.asDiagonal() * J_transposed_.solve_transposed(scale_.asDiagonal() * b);
 }
 MatrixXd NearestPointLinearisation::pseudo_inverse_times(const Eigen::Ref<const MatrixXd>& b) const {
-  return J_transposed_.transpose().solve(MatrixXd(scale_.asDiagonal() * b));
-}
-MatrixXd NearestPointLinearisation::pseudo_inverse_transposed_times(const Eigen::Ref<const MatrixXd>& x) const {
-  return scale_.asDiagonal() * MatrixXd(J_transposed_.solve(MatrixXd(x)));
+  const MatrixXd x = particular(b);
+  return x - Z_ * (Z_.transpose() * x);
 }
 
 void NearestPointLinearisation::set_hessian(const MatrixXd& H) {
@@ -40,14 +42,14 @@ void NearestPointLinearisation::set_hessian(const MatrixXd& H) {
     return;
   }
   const MatrixXd M = Z_.transpose() * H * Z_;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(0.5 * (M + M.transpose()));
-  lambda_ = eigen.eigenvalues();
-  V_ = eigen.eigenvectors();
+  auto [values, vectors] = symmetric_eigen(0.5 * (M + M.transpose()));
+  lambda_ = std::move(values);
+  V_ = std::move(vectors);
 }
 
 MatrixXd NearestPointLinearisation::solve(const Eigen::Ref<const MatrixXd>& b,
                                           const Eigen::Ref<const MatrixXd>& g) const {
-  const MatrixXd x = pseudo_inverse_times(b);
+  const MatrixXd x = particular(b);
   const MatrixXd w = V_.transpose() * (Z_.transpose() * (g - H_ * x));
   return x + Z_ * (V_ * (lambda_.cwiseInverse().asDiagonal() * w));
 }
@@ -56,7 +58,7 @@ void NearestPointLinearisation::solve_transposed(const Eigen::Ref<const MatrixXd
                                                  MatrixXd& g_bar) const {
   const MatrixXd w = V_.transpose() * (Z_.transpose() * x_bar);
   g_bar = Z_ * (V_ * (lambda_.cwiseInverse().asDiagonal() * w));
-  b_bar = pseudo_inverse_transposed_times(x_bar - H_.transpose() * g_bar);
+  b_bar = scale_.asDiagonal() * J_transposed_.solve(sizes_.asDiagonal() * (x_bar - H_.transpose() * g_bar));
 }
 
 VectorXd NearestPointLinearisation::descent(const VectorXd& b, const VectorXd& g) const {
@@ -90,7 +92,7 @@ void reduce_violation(NearestPointEquations& equations, VectorXd& x, int& iterat
     if (largest(gradient) < 1e-15) return;
     MatrixXd normal = A.transpose() * A;
     normal.diagonal().array() += mu;
-    VectorXd step = normal.llt().solve(-gradient);
+    VectorXd step = cholesky_solve(normal, -gradient);
     step *= equations.step_fraction(step);
     const VectorXd trial = equations.retracted(x + step), F_trial = equations.values(trial);
     if (violation(F_trial) < violation(F)) {
@@ -106,6 +108,11 @@ void reduce_violation(NearestPointEquations& equations, VectorXd& x, int& iterat
   }
 }
 
+NearestPointLinearisation sized_linearisation(const NearestPointEquations& equations, const VectorXd& x) {
+  const MatrixXd J = equations.jacobian(x);
+  return NearestPointLinearisation(J, equations.sizes(J));
+}
+
 class Search {
  public:
   Search(NearestPointEquations& equations, const VectorXd& x_guess) : equations_(equations), x_guess_(x_guess) {
@@ -115,6 +122,10 @@ class Search {
   NearestPoint run() {
     if (guess_is_it()) return result_;
     if (!newton()) sqp();
+    if (result_.status == NearestPointStatus::found) {  // once more, for derivatives
+      result_.linearisation = sized_linearisation(equations_, result_.x);
+      add_curvature();
+    }
     result_.F = equations_.values(result_.x);
     const bool unsettled =
         result_.status == NearestPointStatus::stalled || result_.status == NearestPointStatus::unsatisfiable;
@@ -311,7 +322,7 @@ NearestPoint nearest_point(NearestPointEquations& equations, const VectorXd& x_g
 void linearise(NearestPointEquations& equations, NearestPoint& found) {
   if (found.linearised) return;
   found.linearised = true;
-  found.linearisation = NearestPointLinearisation(equations.jacobian(found.x));
+  found.linearisation = sized_linearisation(equations, found.x);
   MatrixXd H = equations.curvature(found.x, found.nu);
   H.diagonal().array() += 1;
   found.linearisation.set_hessian(H);

@@ -8,8 +8,10 @@
 //   H x' + J'nu' = g,  J x' = b          g = x_guess' - (J'nu)' at fixed x,   b = -F' at fixed x
 //   x' = J+ b + Z (Z'H Z)^-1 Z'(g - H J+ b)          Z: orthonormal basis of the null space of J
 //
-// J may be rank deficient (redundant equations). Nocedal and Wright, "Numerical Optimization" (2006), sections 16.2
-// (null-space method), 18.4 and 18.5 (SQP, merit functions, second-order correction).
+// J may be rank deficient (redundant equations). For derivatives it is decomposed with its unknowns in units of their
+// sizes, so that a mechanism of micrometres or of kilometres loses no digits between metres and Euler parameters.
+// Nocedal and Wright, "Numerical Optimization" (2006), sections 16.2 (null-space method), 18.4 and 18.5 (SQP, merit
+// functions, second-order correction).
 //
 // Far from the solution Gauss-Newton steps (H = I) of limited length follow the guess onto the equations, without a
 // merit function: they keep to the guess's branch and pass redundant equations, whose rank changes on the way, where a
@@ -18,8 +20,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/QR>
-#include <Eigen/SVD>
+
+#include "core/linear/dense.hpp"
 
 namespace mbsopt {
 
@@ -33,6 +35,8 @@ struct NearestPointEquations {
   virtual double step_fraction(const Eigen::VectorXd& step) const = 0;
   // x made to satisfy the equations that can be satisfied one by one (unit norms).
   virtual Eigen::VectorXd retracted(const Eigen::VectorXd& x) const = 0;
+  // The unit of each unknown, in which the entries of J become comparable.
+  virtual Eigen::VectorXd sizes(const Eigen::MatrixXd& J) const { return Eigen::VectorXd::Ones(J.cols()); }
   // What a violation of each equation counts where they cannot all be satisfied.
   virtual Eigen::VectorXd weights() const = 0;
   virtual void accept(const Eigen::VectorXd&) {}  // x is the next iterate: continue what is continued (angles)
@@ -45,13 +49,17 @@ class NearestPointLinearisation {
 
   NearestPointLinearisation() = default;
   explicit NearestPointLinearisation(const Eigen::MatrixXd& J);
+  NearestPointLinearisation(const Eigen::MatrixXd& J, const Eigen::VectorXd& sizes);
 
   Eigen::Index rank() const { return J_transposed_.rank(); }
   const Eigen::VectorXd& row_scale() const { return scale_; }
+  // What is left of b outside the range of J, rows of J scaled to unit length.
+  Eigen::MatrixXd left(const Eigen::MatrixXd& J, const Eigen::Ref<const Eigen::MatrixXd>& b) const {
+    return scale_.asDiagonal() * (b - J * particular(b));
+  }
   const Eigen::MatrixXd& null_space() const { return Z_; }                                 // Z
   Eigen::VectorXd multipliers(const Eigen::VectorXd& g) const;                             // least nu with J'nu = g
   Eigen::MatrixXd pseudo_inverse_times(const Eigen::Ref<const Eigen::MatrixXd>& b) const;  // J+ b
-  Eigen::MatrixXd pseudo_inverse_transposed_times(const Eigen::Ref<const Eigen::MatrixXd>& x) const;
 
   // Must precede solve and solve_transposed.
   void set_hessian(const Eigen::MatrixXd& H);
@@ -66,9 +74,11 @@ class NearestPointLinearisation {
   Eigen::VectorXd descent(const Eigen::VectorXd& b, const Eigen::VectorXd& g) const;
 
  private:
-  Eigen::VectorXd scale_;                                                 // of the rows of J
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> J_transposed_;  // of (scale J)'
-  Eigen::MatrixXd Z_, H_, V_;                                             // Z'HZ = V diag(lambda) V'
+  Eigen::MatrixXd particular(const Eigen::Ref<const Eigen::MatrixXd>& b) const;  // some x with J x = b
+
+  Eigen::VectorXd scale_, sizes_;         // of the rows and of the columns of J
+  OrthogonalDecomposition J_transposed_;  // of (scale J sizes)'
+  Eigen::MatrixXd Z_, H_, V_;             // Z'HZ = V diag(lambda) V'
   Eigen::VectorXd lambda_;
 };
 

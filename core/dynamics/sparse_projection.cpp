@@ -71,6 +71,11 @@ MatrixXd SparseProjection::solve(const Eigen::Ref<const MatrixXd>& b, const Eige
   return x;
 }
 
+const VectorXd& SparseProjection::row_scale() const { return factor_->scale; }
+MatrixXd SparseProjection::left(const Eigen::Ref<const MatrixXd>& b, const Eigen::Ref<const MatrixXd>& x) const {
+  return factor_->scale.asDiagonal() * b - factor_->J * x;
+}
+
 // The system is symmetric: of (x_bar, 0) it gives g_bar = (I - J+ J) x_bar and b_bar = (J+)' x_bar.
 void SparseProjection::solve_transposed(const Eigen::Ref<const MatrixXd>& x_bar, MatrixXd& b_bar,
                                         MatrixXd& g_bar) const {

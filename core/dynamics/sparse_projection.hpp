@@ -30,6 +30,10 @@ class SparseProjection {
   void solve_transposed(const Eigen::Ref<const Eigen::MatrixXd>& x_bar, Eigen::MatrixXd& b_bar,
                         Eigen::MatrixXd& g_bar) const;
 
+  const Eigen::VectorXd& row_scale() const;
+  // What x' leaves of J x' = b, rows of J scaled to unit length.
+  Eigen::MatrixXd left(const Eigen::Ref<const Eigen::MatrixXd>& b, const Eigen::Ref<const Eigen::MatrixXd>& x) const;
+
  private:
   struct Factor;
   void solve_system(const Eigen::MatrixXd& b, const Eigen::Ref<const Eigen::MatrixXd>& g, Eigen::MatrixXd& x,

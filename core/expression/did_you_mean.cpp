@@ -33,17 +33,19 @@ std::size_t distance(std::string_view a, std::string_view b) {
 
 std::string did_you_mean(std::string_view word, const std::vector<std::string>& candidates) {
   if (word.empty() || word.size() > kLongestWord) return "";
+  const std::size_t allowed = std::max<std::size_t>(1, word.size() / 3);
   std::size_t best = std::numeric_limits<std::size_t>::max();
   const std::string* nearest = nullptr;
   for (const std::string& candidate : candidates) {
     if (candidate.empty() || candidate.size() > kLongestWord) continue;
+    const auto [shorter, longer] = std::minmax(word.size(), candidate.size());
+    if (longer - shorter > allowed) continue;  // the distance is at least that
     const std::size_t d = distance(word, candidate);
     if (d < best) {
       best = d;
       nearest = &candidate;
     }
   }
-  const std::size_t allowed = std::max<std::size_t>(1, word.size() / 3);
   // A wrong letter in a name of one letter is another name.
   if (nearest == nullptr || best > allowed || best >= std::max(word.size(), nearest->size())) return "";
   return " (did you mean '" + *nearest + "'?)";

@@ -254,7 +254,8 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
   require(CVodeSetStopTime(memory(), end));
   double t = settings_.start_time;
   RunGuard guard(mechanism_.data());
-  guard.begin(t, y_now_, e);
+  const std::string at_start = guard.begin(t, y_now_, e, end, settings_.integrator.max_steps);
+  if (!at_start.empty()) return stop(SimulationStatus::not_credible, at_start);
   const bool derivatives = hooks.advance || sensitivities_;
   Eigen::VectorXd y_before;
   while (result_.ok() && t < end) {

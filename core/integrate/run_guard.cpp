@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "core/sensor/body_at.hpp"
 
@@ -15,6 +17,7 @@ constexpr double kGrown = 0.5;                              // of the energy the
 constexpr double kNoticeable = 1e-3;                        // of the natural energy: below it a change is none
 constexpr double kFastest = 299792458, kFastestTurn = 1e6;  // light [m/s]; ten times the fastest turbine [rad/s]
 constexpr double kGrowth = 1e3;                             // of what is faster from the start
+constexpr double kHalfTurn = 3.13;  // [rad]: nearer, the axis of the rotation may reverse within two hundredths
 
 // Nothing does work but gravity and springs, whose potential is known.
 bool conserves_energy(const MechanismData& d) {
@@ -54,9 +57,12 @@ double size_of(const Energy& e) { return e.kinetic + std::abs(e.potential); }
 }  // namespace
 
 RunGuard::RunGuard(const MechanismData& data)
-    : data_(data), conserves_energy_(conserves_energy(data)), law_jumps_(data) {}
+    : data_(data),
+      conserves_energy_(conserves_energy(data)),
+      law_jumps_(data),
+      bushing_turns_(data.bushings.size(), Vector3d::Zero()) {}
 
-void RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& energy) {
+std::string RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& energy, double t_end, long max_steps) {
   last_t_ = t;
   energy_initial_ = energy.kinetic + energy.potential;
   energy_drift_ = 0;
@@ -64,6 +70,38 @@ void RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& energy) {
   bounds_ = {kFastest, kFastestTurn};
   for (int i = 1; i <= data_.n; ++i) bounds_ = bounds_.cwiseMax(kGrowth * speeds(y, i, data_.n));
   energy_natural_ = conserves_energy_ ? natural_energy(data_, y) : 0.0;
+  for (int i = 1; i <= data_.n; ++i) {
+    const double omega = speeds(y, i, data_.n)(1), half_turns = omega * (t_end - t) / std::numbers::pi;
+    if (!(half_turns > static_cast<double>(max_steps))) continue;
+    return fmt::format(
+        "body '{}' turns at {:.3g} rad/s at the start and would make {:.3g} half turns until t = {:.6g} s, each of "
+        "which takes a step at least; simulation.integrator.max_steps is {}. Is the angular velocity in rad/s, and "
+        "the end in s?",
+        data_.body_names[static_cast<std::size_t>(i)], omega, half_turns, t_end, max_steps);
+  }
+  for (Vector3d& turn : bushing_turns_) turn.setZero();
+  return about_bushings(t, y);
+}
+
+// Between two steps a rotation vector reverses either through zero or, where that is farther, through half a turn.
+std::string RunGuard::about_bushings(double t, const Eigen::VectorXd& y) {
+  for (std::size_t k = 0; k < bushing_turns_.size(); ++k) {
+    const Bushing& b = data_.bushings[k];
+    if (b.Kt.isZero(0) && b.Ct.isZero(0)) continue;
+    const Matrix3d R = body_at(y, b.body1).frame.A.transpose() * body_at(y, b.body2).frame.A * b.R0.transpose();
+    const Eigen::AngleAxisd turn(R);
+    const double angle = turn.angle();
+    const Vector3d now = angle * turn.axis(), before = bushing_turns_[k];
+    bushing_turns_[k] = now;
+    if (angle < kHalfTurn && !(now.dot(before) < 0 && angle + before.norm() > std::numbers::pi)) continue;
+    return fmt::format(
+        "forces[{}], the bushing between '{}' and '{}', is turned by {:.4g} rad at t = {:.6g} s: at half a turn its "
+        "torque jumps from one side to the other. Keep it below (a stop, stiffer or damped rubber, a slower start), or "
+        "take a joint with an rsda, which counts turns",
+        b.force, data_.body_names[static_cast<std::size_t>(b.body1)],
+        data_.body_names[static_cast<std::size_t>(b.body2)], angle, t);
+  }
+  return {};
 }
 
 std::string RunGuard::about_energy(double t, const Energy& energy) {
@@ -102,13 +140,16 @@ std::string RunGuard::objection(double t, const Eigen::VectorXd& y, const Energy
   last_t_ = t;
   if (words.empty() && acceleration_residual > kUnmet) {
     words = fmt::format(
-        "the accelerations of the constraints are met to {:.1e} only at t = {:.6g} s: use a larger "
-        "simulation.formulation.alpha (relative; 1e8 is the default) or more iterations; or the position is singular, "
-        "or a drive asks for more than the mechanism reaches",
+        "the accelerations of the constraints are met to {:.1e} only at t = {:.6g} s: the linkage locks there (a "
+        "drive, "
+        "or the motion itself, asks for more than it reaches), or its position is singular. If it should go on, look "
+        "at lengths and laws; if masses differ by many orders, use a larger simulation.formulation.alpha (relative; "
+        "1e8 is the default) or more iterations",
         acceleration_residual, t);
   }
   if (words.empty() && conserves_energy_) words = about_energy(t, energy);
   if (words.empty()) words = about_speed(t, y);
+  if (words.empty()) words = about_bushings(t, y);
   return words;
 }
 

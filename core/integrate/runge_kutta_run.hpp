@@ -44,6 +44,7 @@ class RungeKuttaRun {
   Outcome finish_step(bool dense);  // dense stages, projection, branches of the angles
   double fastest_tracked_rate(const Eigen::VectorXd& y) const;
   Energy update_statistics(SimulationResult& result);
+  void add_projection(double h);
 
   const Mechanism mechanism_;
   SimulationSettings settings_;
@@ -61,6 +62,7 @@ class RungeKuttaRun {
   Eigen::VectorXd angles_, work_, ydot_, y_stage_;
   bool first_stage_known_ = false;
   long evaluations_ = 0;
+  double projected_ = 0, moved_ = 0;  // sums over the steps, of velocities by penalties
 };
 
 }  // namespace mbsopt

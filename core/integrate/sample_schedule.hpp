@@ -19,14 +19,16 @@ struct SampleEvent {
 class SampleSchedule {
  public:
   SampleSchedule(std::span<const Cost> costs, std::span<const double> observed, double end) : end_(end) {
+    events_.reserve(observed.size());
     for (std::size_t o = 0; o < costs.size(); ++o) {
       for (const SampledCost& s : costs[o].samples) {
         events_.push_back({s.time, s.cost.get(), static_cast<Eigen::Index>(o), 0});
       }
     }
     for (std::size_t i = 0; i < observed.size(); ++i) events_.push_back({observed[i], nullptr, 0, i});
-    std::stable_sort(events_.begin(), events_.end(),
-                     [](const SampleEvent& a, const SampleEvent& b) { return a.time < b.time; });
+    const auto before = [](const SampleEvent& a, const SampleEvent& b) { return a.time < b.time; };
+    if (!std::is_sorted(events_.begin(), events_.end(), before))  // records of a million rows are
+      std::stable_sort(events_.begin(), events_.end(), before);
   }
 
   bool due(double t1) const { return next_ < events_.size() && (events_[next_].time <= t1 || t1 >= end_); }

@@ -38,7 +38,9 @@ struct SimulationStatistics {
   double max_velocity_violation = 0;                              // of |Phi_q v + Phi_t|
   double energy_initial = 0, energy_final = 0, energy_drift = 0;  // drift: largest |E - E(0)| over accepted steps [J]
   double relative_energy_drift = 0;      // of the largest energy so far, where nothing does work; else 0
-  double max_acceleration_residual = 0;  // relative, of the constraints' accelerations (augmented Lagrangian)
+  // Relative, of the constraints' accelerations; of a penalty with projection, the sum of what projections took out of
+  // velocities relative to that of the changes of velocity.
+  double max_acceleration_residual = 0;
   std::size_t adjoint_memory_bytes = 0;  // the most that the backward sweep kept of the forward run
   long recomputed_steps = 0;             // for want of memory, of the backward sweep
   // Of explicit methods that can tell (stiffness.hpp): steps that were looked at, those at the edge of stability among

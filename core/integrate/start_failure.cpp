@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
+#include "core/linear/dense.hpp"
 
 namespace mbsopt {
 namespace {
@@ -11,7 +11,7 @@ std::string bodies_without_inertia(const MechanismData& d) {
   std::string names;
   for (int i = 1; i <= d.n; ++i) {
     const BodyData& b = d.bodies[static_cast<std::size_t>(i)];
-    const double least = Eigen::SelfAdjointEigenSolver<Matrix3d>(b.J, Eigen::EigenvaluesOnly).eigenvalues()(0);
+    const double least = symmetric_eigenvalues(b.J)(0);
     if (b.mass > 0 && least > 0) continue;
     names += (names.empty() ? "'" : ", '") + d.body_names[static_cast<std::size_t>(i)] + "'";
   }

@@ -1,8 +1,8 @@
 #include "core/mechanism/compile.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 
+#include "core/linear/dense.hpp"
 #include "core/mechanism/compilation.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/mechanism/planar_model.hpp"
@@ -48,8 +48,7 @@ void scale_alpha(MechanismData& data) {
   for (std::size_t i = 1; i < bodies; ++i) {
     const BodyData& b = data.bodies[i];
     mass[i] = b.mass;
-    inertia[i] =
-        Eigen::SelfAdjointEigenSolver<Matrix3d>(b.J, Eigen::EigenvaluesOnly).eigenvalues()(2) + b.mass * reach2[i];
+    inertia[i] = symmetric_eigenvalues(b.J)(2) + b.mass * reach2[i];
     largest_mass = std::max(largest_mass, mass[i]);
     largest_inertia = std::max(largest_inertia, inertia[i]);
   }

@@ -40,7 +40,8 @@ bool closes_loops(const MechanismData& data) {
   std::vector<int> group(data.bodies.size());  // of bodies that hang together, by one of them
   std::iota(group.begin(), group.end(), 0);
   const auto leader = [&](int body) {
-    while (group[static_cast<std::size_t>(body)] != body) body = group[static_cast<std::size_t>(body)];
+    const auto next = [&](int i) -> int& { return group[static_cast<std::size_t>(i)]; };
+    while (next(body) != body) body = next(body) = next(next(body));  // halves the path
     return body;
   };
   std::set<int> joints;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "core/expression/did_you_mean.hpp"
 #include "core/expression/dimension_inference.hpp"
@@ -12,6 +13,8 @@ namespace mbsopt {
 namespace {
 
 constexpr std::size_t kListed = 20;
+// A hint compares a name with all others. Errors beyond that many go without: no more of them are shown.
+constexpr std::size_t kWithHints = 100;
 
 // "; bodies: ground, crank"
 std::string listed(std::string_view what, std::vector<std::string> names) {
@@ -45,20 +48,45 @@ Kind kind_of(To what) {
   return {"", ""};
 }
 
+constexpr std::size_t kLongestName = 255;  // bytes, as of a file: a problem's name becomes one
+
+// The first control character (C0, DEL, C1) or one that changes the order in which text is shown (Unicode UAX #9) or
+// its lines: U+061C, U+200E, U+200F, U+2028 to U+202E, U+2066 to U+2069. npos where there is none; the text is UTF-8.
+std::size_t unreadable_character(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const unsigned b0 = byte(i), b1 = byte(i + 1), b2 = byte(i + 2);
+    const bool control = b0 < 0x20 || b0 == 0x7F || (b0 == 0xC2 && b1 >= 0x80 && b1 < 0xA0);
+    const bool direction = (b0 == 0xD8 && b1 == 0x9C) ||
+                           (b0 == 0xE2 && b1 == 0x80 && (b2 == 0x8E || b2 == 0x8F || (b2 >= 0xA8 && b2 <= 0xAE))) ||
+                           (b0 == 0xE2 && b1 == 0x81 && b2 >= 0xA6 && b2 <= 0xA9);
+    if (control || direction) return i;
+  }
+  return std::string::npos;
+}
+
 std::string text_of(double value) { return std::isnan(value) ? "not a number" : Expression(value).text(); }
 
 }  // namespace
 
 void Checker::name(std::string_view key, const std::string& value, const Says&) {
   if (value.empty()) return issue(path(key), "is empty, a name is expected");
-  const auto bad = std::find_if(value.begin(), value.end(), [](char c) {
-    return static_cast<unsigned char>(c) < 0x20 || std::string_view(".,;\"'[]/\\").find(c) != std::string_view::npos;
-  });
-  if (bad != value.end())
+  must_be_readable(path(key), value);
+  if (value.find_first_of(".,;\"'[]/\\") != std::string::npos)
     issue(path(key), "the name '" + value + "' must not contain . , ; \" ' [ ] / \\ or control characters");
 }
 
+void Checker::must_be_readable(const std::string& where, const std::string& name) {
+  if (name.size() > kLongestName)
+    issue(where, "the name is " + std::to_string(name.size()) + " bytes long, at most " + std::to_string(kLongestName) +
+                     " are allowed");
+  if (const std::size_t at = unreadable_character(name); at != std::string::npos)
+    issue(where, "the name has a control character or a mark of text direction at byte " + std::to_string(at + 1) +
+                     "; it must show as it is written");
+}
+
 void Checker::must_be_identifier(const std::string& where, const std::string& name) {
+  if (is_identifier(name)) must_be_readable(where, name);
   if (!is_identifier(name))
     issue(where, "the name '" + name + "' must be an identifier: letters, digits and _, not beginning with a digit");
   else if (has_word(kReservedNames, name))
@@ -68,32 +96,28 @@ void Checker::must_be_identifier(const std::string& where, const std::string& na
 }
 
 void Checker::check_reference(const std::string& where, const std::string& value, To what) {
-  const std::vector<std::string> names = facts_.names(what);
-  if (std::find(names.begin(), names.end(), value) != names.end()) return;
+  if (facts_.has(what, value)) return;
   const auto [one, all] = kind_of(what);
-  issue(where,
-        std::string("there is no ") + one + " '" + value + "'" + did_you_mean(value, names) + listed(all, names));
+  const std::string text = std::string("there is no ") + one + " '" + value + "'";
+  if (issues_.size() >= kWithHints) return issue(where, text);
+  const std::vector<std::string> names = facts_.names(what);
+  issue(where, text + did_you_mean(value, names) + listed(all, names));
 }
 
 void Checker::reference(std::string_view key, const std::string& value, To what, const Says& says) {
   if (says.need == Need::unknown || (value.empty() && says.need == Need::optional)) return;
   if (value.empty()) return issue(path(key), "is missing; expected: " + std::string(says.description));
-  // Fast for the usual case: a list of all names is made for an error message only.
-  if (what == To::body && (value == "ground" || facts_.body(value))) return;
-  if (what == To::joint && facts_.joint(value)) return;
-  if (what == To::sensor && facts_.sensor(value)) return;
-  check_reference(path(key), value, what);
+  if (!facts_.has(what, value)) check_reference(path(key), value, what);
 }
 
 void Checker::references(std::string_view key, const std::vector<std::string>& values, To what, const Says& says) {
   if (values.empty() && says.need == Need::required)
     issue(path(key), "is empty; expected: " + std::string(says.description));
+  std::set<std::string> listed_before;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const std::string where = child_path(path(key), i);
     check_reference(where, values[i], what);
-    if (std::find(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(i), values[i]) !=
-        values.begin() + static_cast<std::ptrdiff_t>(i))
-      issue(where, "'" + values[i] + "' is listed twice");
+    if (!listed_before.insert(values[i]).second) issue(where, "'" + values[i] + "' is listed twice");
   }
 }
 
@@ -122,13 +146,16 @@ bool Checker::names_are_known(const std::string& where, const Expression& value,
       continue;
     }
     known = false;
+    const std::vector<std::string> known_names =
+        issues_.size() < kWithHints ? symbols.names() : std::vector<std::string>{};
     const std::vector<SyntaxNode>& nodes = value.tree().nodes;
     const auto node = std::find_if(nodes.begin(), nodes.end(), [&](const SyntaxNode& n) {
       return n.operation == Operation::name && n.name == name;
     });
     issues_.push_back(
         {where,
-         "unknown name '" + name + "'" + did_you_mean(name, symbols.names()) + listed("known names", symbols.names()),
+         "unknown name '" + name + "'" +
+             (known_names.empty() ? "" : did_you_mean(name, known_names) + listed("known names", known_names)),
          false, node->offset});
   }
   return known;
@@ -237,6 +264,7 @@ void Checker::orientation(std::string_view key, const OrientationField& value, c
 void Checker::points(std::string_view key, const std::map<std::string, VectorField>& value, const Says& says) {
   for (const auto& [name, coordinates] : value) {
     const std::string where = child_path(path(key), name);
+    if (is_identifier(name)) must_be_readable(where, name);
     if (!is_identifier(name) || name == "O")
       issue(where, "the name '" + name + "' of a point must be an identifier other than 'O', which is the origin");
     check_vector(where, coordinates, says.dimension);

@@ -113,6 +113,7 @@ class Checker {
   void check_expression(const std::string& path, const Expression& value, Names names,
                         const std::optional<Dimension>& expected);
   void must_be_identifier(const std::string& path, const std::string& name);
+  void must_be_readable(const std::string& path, const std::string& name);  // short, and shown as it is written
 
  private:
   Checker at(std::string_view key) const { return {facts_, issues_, path(key)}; }

@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <cmath>
+
+#include "core/linear/dense.hpp"
 
 namespace mbsopt {
 
@@ -15,8 +16,7 @@ std::string inertia_problem(const std::array<double, 6>& tensor) {
   J << xx, xy, xz, xy, yy, yz, xz, yz, zz;
   const double scale = J.cwiseAbs().maxCoeff();
   if (scale == 0) return "";
-  const Eigen::Vector3d moments =
-      scale * Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(J / scale, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::Vector3d moments = scale * symmetric_eigenvalues(J / scale);
   const std::string found =
       fmt::format("has the principal moments {:.4g}, {:.4g}, {:.4g} kg m^2; ", moments(0), moments(1), moments(2));
   const double slack = kTolerance * std::abs(moments.sum()) + 1e-15 * scale;

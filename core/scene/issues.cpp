@@ -375,8 +375,8 @@ void check_meaning(Checker& checker, const SimulationSettings& settings) {
 }
 
 void check_meaning(Checker& checker, const Scene& scene) {
-  const auto is_odd = [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < 0x20; };
-  if (scene.name.empty() || scene.name[0] == '.' || std::any_of(scene.name.begin(), scene.name.end(), is_odd))
+  checker.must_be_readable("name", scene.name);
+  if (scene.name.empty() || scene.name[0] == '.' || scene.name.find_first_of("/\\") != std::string::npos)
     checker.issue("name", "is '" + scene.name +
                               "'; it names a folder, so it must not be empty, begin with '.' or "
                               "contain / \\ or control characters");

@@ -22,6 +22,11 @@ using PointField =
 
 enum class ParameterScale { linear, log, log10 };
 
+// What is known about a parameter before identification: a normal distribution.
+struct Prior {
+  double mean = 0, sigma = 1;
+};
+
 struct Parameter {
   std::string name;
   double value = 0;
@@ -29,10 +34,7 @@ struct Parameter {
   ParameterScale scale = ParameterScale::linear;
   std::string unit = {};  // for display and for the dimension check
   bool allow_unused = false;
-  struct Prior {
-    double mean = 0, sigma = 1;
-  };
-  std::optional<Prior> prior = {};  // normal; a residual of its own in identification
+  std::optional<Prior> prior = {};  // a residual of its own in identification
 };
 
 struct Definition {

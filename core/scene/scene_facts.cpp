@@ -1,5 +1,6 @@
 #include "core/scene/scene_facts.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/expression/dimension_inference.hpp"
@@ -11,6 +12,10 @@ namespace {
 // The first of several equal names counts; duplicates are an issue of their own.
 void add_once(Symbols& symbols, const std::string& name) {
   if (symbols.input(name) < 0 && !symbols.definition(name)) symbols.add_input(name);
+}
+
+bool knows(const Symbols& symbols, const std::string& name) {
+  return symbols.input(name) >= 0 || symbols.definition(name);
 }
 
 template <class T>
@@ -33,6 +38,7 @@ SceneFacts::SceneFacts(const Scene& scene)
     : scene_(scene),
       bodies_(by_name(scene.bodies)),
       joints_(by_name(scene.joints)),
+      drives_(by_name(scene.drives)),
       forces_(by_name(scene.forces)),
       sensors_(by_name(scene.sensors)) {
   for (const Parameter& parameter : scene.parameters) {
@@ -59,8 +65,15 @@ SceneFacts::SceneFacts(const Scene& scene)
 
 void SceneFacts::find_broken_definitions() {
   bool too_deep = false;
+  std::set<std::string> unknown;  // depend on names that nobody knows
   for (const auto& [name, value] : scene_.definitions) {
     if (!is_identifier(name) || !none_.definition(name)) continue;
+    const std::vector<std::string>& names = value.names();
+    const auto nobody_knows = [&](const std::string& n) { return unknown.contains(n) || !knows(none_, n); };
+    if (std::any_of(names.begin(), names.end(), nobody_knows)) {
+      unknown.insert(name), broken_.insert(name);
+      continue;
+    }
     try {
       Program(Expression::parse(name), none_);
     } catch (const UnknownName& error) {
@@ -117,6 +130,26 @@ std::vector<std::string> SceneFacts::names(To what) const {
   return {};
 }
 
+bool SceneFacts::has(To what, const std::string& name) const {
+  switch (what) {
+    case To::body:
+      return name == "ground" || body(name);
+    case To::joint:
+      return joint(name);
+    case To::drive:
+      return drives_.contains(name);
+    case To::force:
+      return force(name);
+    case To::sensor:
+      return sensor(name);
+    case To::parameter:
+      return none_.input(name) >= 0;
+    case To::objective:
+      return std::find(objectives_.begin(), objectives_.end(), name) != objectives_.end();
+  }
+  return false;
+}
+
 const Symbols& SceneFacts::symbols(Names names) const {
   switch (names) {
     case Names::none:
@@ -134,8 +167,16 @@ const Symbols& SceneFacts::symbols(Names names) const {
   return none_;
 }
 
+// Faster than to try: the exception holds all names that are like the wrong one.
+bool SceneFacts::can_be_evaluated(const Expression& expression, const Symbols& symbols) const {
+  const std::vector<std::string>& names = expression.names();
+  return std::all_of(names.begin(), names.end(),
+                     [&](const std::string& name) { return knows(symbols, name) && !is_broken(name); });
+}
+
 std::optional<double> SceneFacts::value(const Field& field) const {
   if (field.is_number()) return field.number();
+  if (!can_be_evaluated(field, none_)) return std::nullopt;
   try {
     const Program program(field, none_);
     program.grow(scratch_);
@@ -163,7 +204,7 @@ std::optional<std::array<double, 3>> SceneFacts::value(const PointField& field, 
 }
 
 std::optional<std::array<double, 3>> SceneFacts::law_at(const Expression& law, double t) const {
-  if (any_unread_) return std::nullopt;
+  if (any_unread_ || !can_be_evaluated(law, time_law_)) return std::nullopt;
   try {
     const Program f(law, time_law_), f_t = f.derivative(time_law_.input("t")),
                                      f_tt = f_t.derivative(time_law_.input("t"));

@@ -28,6 +28,7 @@ class SceneFacts {
   const Force* force(const std::string& name) const;
   const Sensor* sensor(const std::string& name) const;
   std::vector<std::string> names(To what) const;  // objectives: those added with add_objectives
+  bool has(To what, const std::string& name) const;
   void add_objectives(std::vector<std::string> names) { objectives_ = std::move(names); }
 
   // Parameters and definitions, and what else an expression may use.
@@ -51,10 +52,12 @@ class SceneFacts {
 
  private:
   void find_broken_definitions();
+  bool can_be_evaluated(const Expression& expression, const Symbols& symbols) const;
 
   const Scene& scene_;
   std::map<std::string, const Body*> bodies_;
   std::map<std::string, const Joint*> joints_;
+  std::map<std::string, const Drive*> drives_;
   std::map<std::string, const Force*> forces_;
   std::map<std::string, const Sensor*> sensors_;
   std::vector<std::string> objectives_;

@@ -103,7 +103,7 @@ void describe(auto& v, Like<Parameter> auto& p) {
   v.object("prior", p.prior, {"what is known of it beforehand; a residual of its own in identify"});
 }
 
-void describe(auto& v, Like<Parameter::Prior> auto& p) {
+void describe(auto& v, Like<Prior> auto& p) {
   std::string type = "normal";
   v.word("type", type, Words{"normal"}, {"distribution"});
   v.plain("mean", p.mean, kAny, {"in the parameter's unit", Need::required});

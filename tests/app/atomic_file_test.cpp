@@ -1,5 +1,7 @@
 #include "app/atomic_file.hpp"
 
+#include <fmt/format.h>
+
 #include <catch2/catch.hpp>
 #include <iterator>
 
@@ -28,4 +30,12 @@ TEST_CASE("a file in a missing folder is an error that names the file and the re
   const TemporaryFolder folder;
   CHECK_THROWS_WITH(write_file_atomically(folder.path / "absent" / "x.csv", "text"),
                     Catch::Contains("absent/x.csv") && Catch::Contains("No such file"));
+}
+
+TEST_CASE("a link that waits under the name of a part is not followed", "[output]") {
+  const TemporaryFolder folder;
+  const std::string target = folder.write("target", "mine");
+  fs::create_symlink(target, folder.path / fmt::format(".result.json.{}.part", ::getpid()));
+  CHECK_THROWS_AS(write_file_atomically(folder.path / "result.json", "text"), WriteError);
+  CHECK(content_of(target) == "mine");
 }

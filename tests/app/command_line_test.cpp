@@ -87,3 +87,42 @@ TEST_CASE("schema prints JSON that describes a problem", "[command]") {
   const auto schema = nlohmann::json::parse(outcome.out);
   CHECK(schema.at("properties").contains("bodies"));
 }
+
+namespace {
+
+struct FullDisk : std::streambuf {
+  int_type overflow(int_type) override { return traits_type::eof(); }
+  int sync() override { return -1; }
+};
+
+}  // namespace
+
+TEST_CASE("standard output that cannot be written is a failure in words, whatever the command", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kPendulum);
+  const std::vector<std::vector<std::string>> commands{{"schema"},
+                                                       {"--help"},
+                                                       {"--version"},
+                                                       {"validate", file, "--out", folder.file("a")},
+                                                       {"simulate", file, "--out", folder.file("b")},
+                                                       {"design", file, "--out", folder.file("c")}};
+  for (const std::vector<std::string>& arguments : commands) {
+    FullDisk disk;
+    std::ostream out(&disk);
+    std::ostringstream err;
+    CHECK(run_command_line(arguments, out, err) == kNumericalFailure);
+    CHECK_THAT(err.str(), Contains("standard output cannot be written"));
+  }
+  CHECK(json_of(folder.path / "c/result.json").at("status") == "ok");  // nothing that was computed is lost
+}
+
+TEST_CASE("a result that cannot be written is no bad input, and result.json says that the run failed", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kPendulum), out = folder.file("out");
+  REQUIRE(run_command({"validate", file, "--out", out}).exit_code == kDone);
+  fs::create_directory(out + "/trajectory.csv");  // no file can take its place
+  const CommandOutcome outcome = run_command({"simulate", file, "--out", out});
+  CHECK(outcome.exit_code == kNumericalFailure);
+  CHECK_THAT(outcome.err, Contains("trajectory.csv: cannot be put into place"));
+  CHECK(json_of(out + "/result.json").at("status") == "failed");
+}

@@ -437,3 +437,77 @@ TEST_CASE("multistart: starts with sigmas of their own are ranked by the likelih
   CHECK(waterfall.at(0).at("parameters").at("k").get<double>() == Approx(20).epsilon(1e-3));
   CHECK(waterfall.at(0).at("objective").get<double>() < waterfall.at(4).at("objective").get<double>() - 10);
 }
+
+namespace {
+
+// Two experiments, whose data have one base name.
+std::string two_records(const TemporaryFolder& folder) {
+  const std::string csv = swing_csv(folder);
+  fs::create_directories(folder.path / "a"), fs::create_directories(folder.path / "b");
+  folder.write("a/r.csv", csv), folder.write("b/r.csv", csv);
+  nlohmann::json problem = nlohmann::json::parse(content_of(single_fit(folder)));
+  nlohmann::json& experiments = problem["identification"]["experiments"];
+  experiments.push_back(experiments[0]);
+  experiments[0]["data"] = "a/r.csv", experiments[0]["name"] = "first";
+  experiments[1]["data"] = "b/r.csv", experiments[1]["name"] = "second";
+  return folder.write("fit.json", problem.dump(2));
+}
+
+}  // namespace
+
+TEST_CASE("resume refuses changed data also where two files have one base name", "[resume]") {
+  const TemporaryFolder folder;
+  const std::string file = two_records(folder);
+  const fs::path out = folder.path / "out";
+  REQUIRE(run_command({"identify", file, "--out", out.string()}).exit_code == kDone);
+  const std::vector<std::string> lines = lines_of(out / kJournalFile);
+  for (const std::string data : {"a/r.csv", "b/r.csv"}) {
+    const std::string before = content_of(folder.path / data);
+    write_text(out / kJournalFile, lines[0] + "\n" + lines[1] + "\n");
+    folder.write(data, before + "0.6,0.1\n");
+    const CommandOutcome outcome = run_command({"resume", out.string()});
+    CHECK(outcome.exit_code == kBadInput);
+    CHECK_THAT(outcome.err, Contains("another content of a data file"));
+    folder.write(data, before);
+  }
+  CHECK(run_command({"resume", out.string()}).exit_code == kDone);
+}
+
+TEST_CASE("resume: results that could not be written are written when there is room again", "[resume]") {
+  const TemporaryFolder folder;
+  const bool fit = GENERATE(false, true);
+  const std::string command = fit ? "identify" : "design";
+  const std::string file = fit ? single_fit(folder) : folder.write("rod.json", kSwingingRod);
+  REQUIRE(run_command({command, file, "--out", folder.file("whole")}).exit_code == kDone);
+  const fs::path out = folder.path / "out";
+  REQUIRE(run_command({"validate", file, "--out", out.string()}).exit_code == kDone);
+  fs::create_directory(out / "optimized.json");  // no file can take its place
+  const CommandOutcome failed = run_command({command, file, "--out", out.string()});
+  CHECK(failed.exit_code == kNumericalFailure);
+  CHECK_THAT(failed.err, Contains("optimized.json: cannot be put into place") && Contains("mbsopt resume"));
+  CHECK(json_of(out / "result.json").at("status") == "failed");
+  fs::remove(out / "optimized.json");
+  const CommandOutcome resumed = run_command({"resume", out.string()});
+  INFO(resumed.err);
+  CHECK(resumed.exit_code == kDone);
+  CHECK(outcome_of(out) == outcome_of(folder.path / "whole"));
+  CHECK(content_of(out / "optimized.json") == content_of(folder.path / "whole/optimized.json"));
+}
+
+TEST_CASE("a damaged journal is refused in words, whatever the line", "[resume]") {
+  const TemporaryFolder folder;
+  const fs::path out = folder.path / "out";
+  REQUIRE(design(folder.write("rod.json", kPendulum), out.string()).exit_code == kDone);
+  const std::string journal = content_of(out / kJournalFile);
+  for (const auto& [good, bad] : std::vector<std::pair<std::string, std::string>>{
+           {"\"c\":[]", "\"c\":[1]"}, {"\"f\":", "\"f\":1"}, {"\"f_x\":[", "\"f_x\":[1,"}, {"\"x\":", "\"y\":"}}) {
+    std::string damaged = journal;
+    INFO(good);
+    REQUIRE(damaged.find(good) != std::string::npos);
+    damaged.replace(damaged.find(good), good.size(), bad);
+    write_text(out / kJournalFile, damaged);
+    const CommandOutcome outcome = run_command({"resume", out.string()});
+    CHECK(outcome.exit_code == kBadInput);
+    CHECK_THAT(outcome.err, Contains("journal.jsonl: line 2 is damaged"));
+  }
+}

@@ -1,6 +1,7 @@
 #include "app/output_folder.hpp"
 
 #include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
 
 #include "app/atomic_file.hpp"
 #include "tests/app/temporary_folder.hpp"
@@ -57,4 +58,15 @@ TEST_CASE("an output folder where a file lies is an error", "[output]") {
   const TemporaryFolder temporary;
   const std::string problem = temporary.write("a.json", "{}");
   CHECK_THROWS_AS(OutputFolder(problem, "a", problem, "simulate"), OutputError);
+}
+
+TEST_CASE("a run that can write nothing any more is marked as failed in place", "[output]") {
+  const TemporaryFolder temporary;
+  const OutputFolder folder(temporary.file("out"), "a", temporary.write("a.json", "{}"), "simulate");
+  folder.mark_failed();  // there is nothing to mark
+  folder.write("result.json", "{\n  \"status\": \"running\",\n  \"x\": 1\n}");
+  folder.mark_failed();
+  const auto result = nlohmann::json::parse(content_of(temporary.path / "out/result.json"));
+  CHECK(result.at("status") == "failed");
+  CHECK(result.at("x") == 1);
 }

@@ -6,6 +6,7 @@
 #include "tests/app/temporary_folder.hpp"
 
 using namespace mbsopt;
+namespace fs = std::filesystem;
 
 TEST_CASE("sha256 of a file is that of FIPS 180-4", "[provenance]") {
   const TemporaryFolder folder;
@@ -23,4 +24,14 @@ TEST_CASE("the command line is stored as a shell would take it", "[provenance]")
   CHECK(origin.at("command_line") == R"(mbsopt simulate 'it'\''s a.json' --set 'name=x y')");
   CHECK(origin.at("input_sha256") == sha256_of_file(file));
   CHECK(origin.at("libraries").contains("Ipopt"));
+}
+
+TEST_CASE("data files of one base name keep their own checksums, named as seen from the problem", "[output]") {
+  const TemporaryFolder folder;
+  fs::create_directories(folder.path / "a"), fs::create_directories(folder.path / "b");
+  const std::string problem = folder.write("p.json", "{}"), first = folder.write("a/r.csv", "1"),
+                    second = folder.write("b/r.csv", "2");
+  const auto origin = provenance({}, "", problem, {first, second});
+  CHECK(origin.at("data_sha256") ==
+        nlohmann::ordered_json{{"a/r.csv", sha256_of_file(first)}, {"b/r.csv", sha256_of_file(second)}});
 }

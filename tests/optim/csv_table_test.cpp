@@ -107,5 +107,11 @@ TEST_CASE("times must ascend, and the row that does not is named", "[csv]") {
 }
 
 TEST_CASE("a file that is not there is an error with its path", "[csv]") {
-  CHECK_THROWS_WITH(read_csv("no/such/file.csv"), "no/such/file.csv: cannot be read");
+  CHECK_THROWS_WITH(read_csv("no/such/file.csv"), "no/such/file.csv: there is no such file");
+}
+
+TEST_CASE("data are read from regular files only: a device may never end, a pipe is empty the second time", "[csv]") {
+  CHECK_THROWS_WITH(read_csv("/dev/zero"), Catch::Contains("/dev/zero: is a pipe or a device"));
+  CHECK_THROWS_WITH(read_csv("/proc/self/mem"), Catch::Contains("cannot be read: Input/output error"));
+  CHECK_THROWS_WITH(read_csv("/tmp"), Catch::Contains("is a directory"));
 }

@@ -138,7 +138,7 @@ TEST_CASE("a normal prior pulls as one more measurement of the parameter", "[ide
   // Only an offset is unknown: its posterior is the precision-weighted mean of data and prior.
   Problem p = fit_problem(64, 0.055);
   testing::add_parameters(p.scene, {{"offset", 0}});
-  p.scene.parameters.back().prior = Parameter::Prior{0.3, 0.002};
+  p.scene.parameters.back().prior = Prior{0.3, 0.002};
   p.scene.parameters[2].value = 1.53, p.scene.parameters[3].value = 1.55;
   p.identification->variables = {"offset"}, p.identification->experiments[0].free.clear();
   p.identification->experiments[0].channels[0].bias = Expression::parse("offset");
@@ -166,8 +166,8 @@ TEST_CASE("a prior decides what the data leave open, for each free value by itse
   testing::add_parameters(p.scene, {{"m_arm", 0.4}});
   testing::add_parameters(p.scene, {{"m_load", 0.6}});
   p.scene.bodies[0].mass = Expression::parse("m_arm + m_load");
-  p.scene.parameters[4].prior = Parameter::Prior{0.35, 0.02};
-  p.scene.parameters[2].prior = Parameter::Prior{1.5, 10};  // theta0, free in both runs
+  p.scene.parameters[4].prior = Prior{0.35, 0.02};
+  p.scene.parameters[2].prior = Prior{1.5, 10};  // theta0, free in both runs
   p.identification->variables = {"m_arm", "m_load", "c"};
   p.identification->experiments.push_back(pendulum::experiment("run2", {"theta0", "omega0"}));
   const IdentificationResult result = run_identification(p, {noisy(1), noisy(2)});

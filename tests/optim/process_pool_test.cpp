@@ -2,6 +2,7 @@
 
 #include <signal.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -115,4 +116,48 @@ TEST_CASE("when it is to stop, no job begins and those under way are told", "[pr
       [&](const JobReply& reply) { replies.push_back(reply); }, [&] { return *listening < 2; });
   REQUIRE(replies.size() == 2);
   for (const JobReply& reply : replies) CHECK(reply.text == "stopped early");
+}
+
+TEST_CASE("a worker that ignores SIGTERM is killed after a while", "[process_pool]") {
+  std::vector<JobReply> replies;
+  SharedCount deaf;
+  run_in_processes(
+      {0}, 1,
+      [&](int) {
+        ::signal(SIGTERM, SIG_IGN);
+        ++*deaf;
+        std::this_thread::sleep_for(std::chrono::minutes(2));
+        return std::string("slept");
+      },
+      [&](const JobReply& reply) { replies.push_back(reply); }, [&] { return *deaf == 0; });
+  REQUIRE(replies.size() == 1);
+  CHECK_THAT(replies[0].text, Contains("signal 9"));
+}
+
+TEST_CASE("where the system gives fewer processes than workers, fewer are used; where it gives none, it is said",
+          "[process_pool]") {
+  const auto with_descriptors = [](rlim_t most, int workers) {
+    rlimit before = {};
+    ::getrlimit(RLIMIT_NOFILE, &before);
+    const rlimit few{most, before.rlim_max};
+    ::setrlimit(RLIMIT_NOFILE, &few);
+    std::string error;
+    std::size_t count = 0;
+    try {
+      count = replies_of(20, workers, [](int job) {
+                std::this_thread::sleep_for(std::chrono::milliseconds(20));
+                return std::to_string(job);
+              }).size();
+    } catch (const std::runtime_error& e) {
+      error = e.what();
+    }
+    ::setrlimit(RLIMIT_NOFILE, &before);
+    return std::pair(count, error);
+  };
+  const int next = ::dup(0);  // the lowest that is free
+  ::close(next);
+  CHECK(with_descriptors(static_cast<rlim_t>(next) + 4, 16) == std::pair(std::size_t{20}, std::string()));
+  const auto [count, error] = with_descriptors(static_cast<rlim_t>(next), 16);
+  CHECK(count == 0);
+  CHECK_THAT(error, Contains("no worker process") && Contains("Too many open files"));
 }

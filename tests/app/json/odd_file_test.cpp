@@ -1,4 +1,5 @@
 // Files that are hardly problem files.
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 
 #include "app/json/input_error.hpp"
 #include "app/json/read_problem.hpp"
+#include "tests/app/temporary_folder.hpp"
 
 using namespace mbsopt;
 
@@ -88,6 +90,11 @@ TEST_CASE("files that cannot be read are named", "[json]") {
   CHECK_THAT(error_of_file(long_name + ".json"), Catch::Contains("cannot be read"));
   CHECK(error_of_file(long_name + ".json").size() < 500);
   CHECK_FALSE(error_of_file("").empty());
+  CHECK_THAT(error_of_file("/dev/zero"), Catch::Contains("is a pipe or a device"));
+  CHECK_THAT(error_of_file("/proc/self/mem"), Catch::Contains("cannot be read: Input/output error"));
+  const TemporaryFolder own;
+  REQUIRE(::mkfifo(own.file("pipe.json").c_str(), 0600) == 0);
+  CHECK_THAT(error_of_file(own.file("pipe.json")), Catch::Contains("is a pipe or a device"));  // nobody writes into it
 }
 
 TEST_CASE("a data file that is missing is reported where it is named", "[json]") {

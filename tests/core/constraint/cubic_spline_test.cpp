@@ -50,3 +50,32 @@ TEST_CASE("a spline refuses times that do not increase", "[spline]") {
   CHECK_THROWS_AS(CubicSpline({0, 1, 1}, {0, 1, 2}), std::invalid_argument);
   CHECK_THROWS_AS(CubicSpline({0}, {0}), std::invalid_argument);
 }
+
+TEST_CASE("a spline's slopes do not depend on the unit of time, and one beyond all numbers is refused", "[spline]") {
+  const std::vector<double> values{0, 1, 0.5, 2, 1};
+  const auto spline = [&](double unit) { return CubicSpline({0, unit, 1.5 * unit, 3 * unit, 4 * unit}, values); };
+  const double slope = spline(1)(2).f_t;
+  for (const double unit : {1e-100, 1e-12, 1e12, 1e156}) {
+    INFO(unit);
+    CHECK(spline(unit)(2 * unit).f_t * unit == Approx(slope).epsilon(1e-12));
+  }
+  CHECK_THROWS_AS(spline(1e-162), std::invalid_argument);
+  CHECK_THROWS_AS(CubicSpline({0, 1, 2, 3, 4}, {0, 1e308, -1e308, 1e308, 0}), std::invalid_argument);
+}
+
+TEST_CASE("a spline's third derivative is continuous at the second and the last but one sample", "[spline]") {
+  const std::vector<double> times{0, 0.1, 1.3, 1.7, 1.72, 4, 4.5}, values{1, -2, 0.5, 3, 3.1, -7, 2};
+  const CubicSpline spline(times, values);
+  const auto third = [&](std::size_t i) {  // in the piece from sample i
+    const double h = times[i + 1] - times[i];
+    return (spline(times[i] + 0.75 * h).f_tt - spline(times[i] + 0.25 * h).f_tt) / (0.5 * h);
+  };
+  CHECK(third(0) == Approx(third(1)).epsilon(1e-12));
+  CHECK(third(5) == Approx(third(4)).epsilon(1e-12));
+  for (std::size_t i = 1; i + 1 < times.size(); ++i) {
+    const CubicSpline::Jet before = spline(std::nextafter(times[i], 0)), after = spline(times[i]);
+    CHECK(before.f == Approx(after.f).epsilon(1e-12));
+    CHECK(before.f_t == Approx(after.f_t).epsilon(1e-12));
+    CHECK(before.f_tt == Approx(after.f_tt).epsilon(1e-11));
+  }
+}

@@ -468,3 +468,32 @@ TEST_CASE("a planar loop closes from a guess out of its plane, through the redun
   for (int i = 0; i < 3; ++i) CHECK(std::abs(assembly.result().y(7 * i + 2)) < 1e-14);
   check_derivatives(scene);
 }
+
+TEST_CASE("tangent and adjoint of assembly agree from micrometres to ten kilometres", "[assembly]") {
+  const double size = GENERATE(1e-6, 1e-3, 1.0, 1e4);
+  const bool loose = GENERATE(true, false);
+  INFO(size << (loose ? " m, a condition" : " m, a guess"));
+  Scene scene = four_bar();
+  for (const int length : {0, 1, 2, 3}) scene.parameters[static_cast<std::size_t>(length)].value *= size;
+  scene.bodies[1].position = {0.3 * size, 0.6 * size, 0.0};
+  scene.bodies[2].position = {1.1 * size, 0.1 * size, 0.0};
+  if (loose) {
+    scene.conditions.push_back({"theta", f("theta0"), f("rate0")});
+  } else {
+    scene.bodies[0].angular_velocity = vec("0", "0", "rate0");
+  }
+  const Mechanism mechanism(scene, nominal(scene));
+  const Assembly assembly(mechanism, 0);
+  REQUIRE(assembly.result().ok);
+  const MatrixXd y_rho = assembly.tangent();
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  MatrixXd y_bar = MatrixXd::NullaryExpr(y_rho.rows(), 3, [&] { return normal(random); });
+  for (int i = 0; i < 6; ++i) y_bar.middleRows(7 * i + 3, 4) *= size;  // as the coordinates of points depend on p
+  MatrixXd rho_bar = MatrixXd::Zero(y_rho.cols(), 3);
+  assembly.add_adjoint(y_bar, rho_bar);
+  const MatrixXd expected = y_rho.transpose() * y_bar;
+  for (Eigen::Index k = 0; k < expected.size(); ++k) {
+    CHECK(rho_bar(k) == Approx(expected(k)).epsilon(1e-10).margin(1e-300));
+  }
+}

@@ -1,6 +1,7 @@
 #include "core/dynamics/equilibrium.hpp"
 
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "core/dynamics/assembly.hpp"
 #include "core/integrate/simulation.hpp"
@@ -107,4 +108,49 @@ TEST_CASE("a body that nothing holds has no equilibrium, and the message names i
   const Assembly assembly(Mechanism(scene, VectorXd()), 0);
   CHECK_FALSE(assembly.result().ok);
   CHECK_THAT(assembly.result().message, Catch::Contains("static equilibrium not found"));
+}
+
+// A double pendulum of 1 m bars, the lower one ten times as heavy and on two springs, folded up at the start: on the
+// way down the acceleration rises and falls.
+Scene sprung_double_pendulum(double size) {
+  Scene s;
+  s.gravity = {0.0, -9.81 * size, 0.0};
+  const double masses[] = {0.1, 1}, angles[] = {0.415, -1.47};
+  double x = 0, y = 0;
+  for (int i = 0; i < 2; ++i) {
+    Body b = plain_body(i == 0 ? "upper" : "lower", masses[i], {0.01, 0.1, 0.1, 0.0, 0.0, 0.0}, {x, y, 0.0});
+    b.inertia = {0.01 * size * size, 0.1 * size * size, 0.1 * size * size, 0.0, 0.0, 0.0};
+    b.com = {0.5 * size, 0.0, 0.0};
+    b.orientation = turned(fmt::format("{}", angles[i]));
+    s.bodies.push_back(b);
+    x += size * std::cos(angles[i]), y += size * std::sin(angles[i]);
+  }
+  s.joints.push_back(hinge("A", "ground", vec("0", "0", "0"), "upper", vec("0", "0", "0")));
+  s.joints.push_back(hinge("B", "upper", {size, 0.0, 0.0}, "lower", vec("0", "0", "0")));
+  const double springs[2][5] = {{0.606, 1.155, 0.366, 12.16, 1.303}, {0.43, 1.069, 0.787, 62.95, 1.262}};
+  for (const auto& [px, py, at, k, l0] : springs) {
+    Tsda spring;
+    spring.body2 = "lower", spring.point1 = VectorField{px * size, py * size, 0.0};
+    spring.point2 = VectorField{at * size, 0.0, 0.0};
+    spring.stiffness = k, spring.free_length = l0 * size;
+    s.forces.push_back({"spring", spring});
+  }
+  s.equilibrium = true;
+  s.simulation.end_time = 1;
+  return s;
+}
+
+TEST_CASE("an equilibrium is found where the acceleration rises and falls on the way, at any size", "[equilibrium]") {
+  const double size = GENERATE(1e-6, 1.0, 1e4);
+  INFO(size << " m");
+  const Scene scene = sprung_double_pendulum(size);
+  const Mechanism mechanism(scene, VectorXd());
+  const Assembly assembly(mechanism, 0);
+  INFO(assembly.result().message);
+  REQUIRE(assembly.result().ok);
+  SimulationSettings settings = scene.simulation;
+  settings.integrator.atol = 1e-8 * size;
+  const SimulationResult run = simulate(mechanism, settings);  // stable: it stays
+  REQUIRE(run.ok());
+  CHECK((run.y_end - run.y_initial).head(14).lpNorm<Eigen::Infinity>() < 1e-7 * std::max(1.0, size));
 }

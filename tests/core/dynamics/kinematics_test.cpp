@@ -1,6 +1,7 @@
 #include "core/dynamics/kinematics.hpp"
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <numbers>
 
 #include "core/mechanism/mechanism_data.hpp"
@@ -151,4 +152,63 @@ TEST_CASE("a parallelogram passes its flat positions on its branch, and they are
   INFO(result.message);
   REQUIRE(result.ok);
   CHECK(tilt < 1e-9);  // the other branch would tilt the bar
+}
+
+// A slider-crank of crank and rod that its slider drives, from `gap` beside one of its two dead points and away from
+// it. Largest error of the crank's angle, against the law of cosines.
+double error_beside_a_dead_point(double crank, double rod, double gap, double speed, bool folded, int rows) {
+  const double reach = folded ? rod - crank : rod + crank, away = folded ? 1 : -1, x0 = reach + away * gap * crank;
+  const auto crank_angle = [&](double x) { return std::acos((crank * crank + x * x - rod * rod) / (2 * crank * x)); };
+  const double th0 = crank_angle(x0), phi0 = std::asin(crank * std::sin(th0) / rod);
+  Scene s;
+  s.gravity = {0.0, 0.0, 0.0};
+  s.bodies.push_back(plain_body("crank", 1, {0.01, 0.01, 0.01, 0.0, 0.0, 0.0}, vec("0", "0", "0")));
+  s.bodies.push_back(
+      plain_body("rod", 1, {0.01, 0.01, 0.01, 0.0, 0.0, 0.0}, {crank * std::cos(th0), crank * std::sin(th0), 0.0}));
+  s.bodies.push_back(plain_body("slider", 1, {0.01, 0.01, 0.01, 0.0, 0.0, 0.0}, {x0, 0.0, 0.0}));
+  s.bodies[0].orientation = turned(fmt::format("{}", th0));
+  s.bodies[1].orientation = turned(fmt::format("{}", -phi0));
+  s.joints.push_back(hinge("A", "ground", vec("0", "0", "0"), "crank", vec("0", "0", "0")));
+  s.joints.push_back(hinge("B", "crank", {crank, 0.0, 0.0}, "rod", vec("0", "0", "0")));
+  s.joints.push_back(hinge("C", "rod", {rod, 0.0, 0.0}, "slider", vec("0", "0", "0")));
+  Joint slide;
+  slide.name = "guide", slide.type = "translational", slide.body2 = "slider";
+  slide.axis1 = vec("1", "0", "0"), slide.axis2 = vec("1", "0", "0");
+  s.joints.push_back(slide);
+  Drive push;
+  push.name = "piston", push.type = "displacement", push.joint = "guide";
+  push.law = f(fmt::format("{} + {}*t", x0, away * speed));
+  s.drives.push_back(push);
+  s.sensors.push_back(angle_sensor("theta", "A"));
+  const Mechanism mechanism(s, VectorXd());
+  double worst = 0;
+  const KinematicsResult result = solve_kinematics(
+      mechanism, Assembly(mechanism, 0), {}, times(0.5 * crank / speed, rows), [&](std::size_t, const StatePoint& at) {
+        const double th = crank_angle(x0 + away * speed * at.t);
+        worst = std::max(worst, std::abs(mechanism.sensor_value(0, at) - th));
+        return true;
+      });
+  INFO(result.message);
+  CHECK(result.ok);
+  return worst;
+}
+
+TEST_CASE("a slider that moves away from a dead point stays on its branch", "[kinematics]") {
+  int changed = 0;
+  for (int i = 0; i < 150; ++i) {
+    const double gap = std::pow(10, -3 + 2.0 * (i % 25) / 24), rod = i % 3 == 0 ? 0.5 : 1.3;
+    const double worst = error_beside_a_dead_point(0.2, rod, gap, i % 2 == 0 ? 0.1 : 2, i >= 75, i % 2 == 0 ? 5 : 200);
+    changed += worst < 1e-8 ? 0 : 1;
+  }
+  CHECK(changed == 0);
+}
+
+TEST_CASE("kinematics of a body that no joint holds is refused", "[kinematics]") {
+  Scene scene;
+  scene.bodies.push_back(plain_body("stone", 1, {0.1, 0.1, 0.1, 0.0, 0.0, 0.0}, vec("0", "0", "0")));
+  const Mechanism mechanism(scene, VectorXd());
+  const KinematicsResult result = solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 2),
+                                                   [](std::size_t, const StatePoint&) { return true; });
+  CHECK_FALSE(result.ok);
+  CHECK_THAT(result.message, Catch::Contains("6 degrees of freedom"));
 }

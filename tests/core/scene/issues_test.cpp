@@ -243,3 +243,36 @@ TEST_CASE("thousands of bodies are checked", "[scene]") {
   }
   CHECK(find_issues(scene).empty());
 }
+
+TEST_CASE("names show as they are written, and are short enough for a file", "[scene]") {
+  const auto finding = [](const std::string& name) {
+    Scene scene = pendulum();
+    scene.name = scene.bodies[0].name = scene.joints[0].name = name;
+    scene.joints[0].body2 = name, scene.sensors[0].joint = name;
+    const std::string found = at(scene, "bodies[0].name");
+    CHECK(at(scene, "joints[0].name") == found);
+    CHECK(at(scene, "name") == found);
+    return found;
+  };
+  for (const std::string good : {"left rod", "Stange_\xC3\xA4", "\xE6\x9D\x86", "\xE2\x80\x9Ctip\xE2\x80\x9D", "=1+1"})
+    CHECK(finding(good) == "");
+  for (const std::string bad : {"a\x1B[2J", "a\nb", "a\x7F", "a\xC2\x9B",
+                                "a\xE2\x80\xAE"
+                                "b",
+                                "a\xE2\x81\xA6"
+                                "b",
+                                "a\xE2\x80\x8F"
+                                "b",
+                                "a\xD8\x9C"
+                                "b",
+                                "a\xE2\x80\xA8"
+                                "b"}) {
+    INFO(bad);
+    CHECK_THAT(finding(bad), Catch::Contains("control character or a mark of text direction at byte 2"));
+  }
+  CHECK(finding(std::string(255, 'a')) == "");
+  CHECK_THAT(finding(std::string(256, 'a')), Catch::Contains("256 bytes long, at most 255"));
+  Scene scene = pendulum();
+  scene.parameters[0].name = std::string(300, 'm');
+  CHECK_THAT(at(scene, "parameters." + scene.parameters[0].name), Catch::Contains("at most 255"));
+}

@@ -1,0 +1,24 @@
+// An output folder belongs to the one command that writes into it: a lock (flock) on the folder itself, which the
+// system takes back when the process ends, however it ends. It leaves no file. Some network file systems have no such
+// lock; there two commands meet in the journal's checksums at the latest.
+#pragma once
+
+#include <filesystem>
+
+namespace mbsopt {
+
+class FolderLock {
+ public:
+  explicit FolderLock(const std::filesystem::path& folder);  // throws OutputError while another one holds it
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+  bool held() const { return held_; }  // false: this file system has none
+
+ private:
+  int descriptor_ = -1;
+  bool held_ = false;
+};
+
+}  // namespace mbsopt

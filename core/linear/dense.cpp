@@ -1,0 +1,77 @@
+#include "core/linear/dense.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <utility>
+
+namespace mbsopt {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+SymmetricEigen symmetric_eigen(const MatrixXd& A) {
+  if (A.size() == 0) return {};
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(A);
+  return {eigen.eigenvalues(), eigen.eigenvectors()};
+}
+
+Eigen::Vector3d symmetric_eigenvalues(const Eigen::Matrix3d& A) {
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(A, Eigen::EigenvaluesOnly).eigenvalues();
+}
+
+VectorXd cholesky_solve(const MatrixXd& A, const VectorXd& b) { return A.llt().solve(b); }
+
+MatrixXd null_space(const MatrixXd& A, double threshold) {
+  if (A.rows() == 0) return MatrixXd::Identity(A.cols(), A.cols());
+  Eigen::ColPivHouseholderQR<MatrixXd> qr;
+  qr.setThreshold(threshold);
+  qr.compute(A.transpose());
+  const MatrixXd Q = qr.householderQ();
+  return Q.rightCols(A.cols() - qr.rank());
+}
+
+MatrixXd orthonormal_columns(const MatrixXd& A) {
+  if (A.cols() == 0) return A;
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(A);
+  const MatrixXd AP = A * qr.colsPermutation(), R = qr.matrixR().topRows(A.cols());
+  return R.triangularView<Eigen::Upper>().solve<Eigen::OnTheRight>(AP);
+}
+
+LeftSingular left_singular(const MatrixXd& A) {
+  if (A.size() == 0) return {VectorXd(0), MatrixXd::Identity(A.rows(), A.rows())};
+  const Eigen::JacobiSVD<MatrixXd> svd(A, Eigen::ComputeFullU);
+  return {svd.singularValues(), svd.matrixU()};
+}
+
+struct OrthogonalDecomposition::Factors {
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> cod;
+};
+
+OrthogonalDecomposition::OrthogonalDecomposition() : factors_(std::make_unique<Factors>()) {}
+OrthogonalDecomposition::OrthogonalDecomposition(const MatrixXd& A, double threshold) : OrthogonalDecomposition() {
+  if (threshold >= 0) factors_->cod.setThreshold(threshold);
+  factors_->cod.compute(A);
+}
+OrthogonalDecomposition::OrthogonalDecomposition(const OrthogonalDecomposition& other)
+    : factors_(std::make_unique<Factors>(*other.factors_)) {}
+OrthogonalDecomposition::OrthogonalDecomposition(OrthogonalDecomposition&&) noexcept = default;
+OrthogonalDecomposition& OrthogonalDecomposition::operator=(OrthogonalDecomposition other) noexcept {
+  factors_ = std::move(other.factors_);
+  return *this;
+}
+OrthogonalDecomposition::~OrthogonalDecomposition() = default;
+
+Index OrthogonalDecomposition::rank() const { return factors_->cod.rank(); }
+MatrixXd OrthogonalDecomposition::solve(const MatrixXd& b) const { return factors_->cod.solve(b); }
+MatrixXd OrthogonalDecomposition::solve_transposed(const MatrixXd& b) const {
+  return factors_->cod.transpose().solve(b);
+}
+MatrixXd OrthogonalDecomposition::left_null_space() const {
+  const MatrixXd Q = factors_->cod.householderQ();
+  return Q.rightCols(Q.cols() - rank());
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,57 @@
+// Dense decompositions of matrices of any size, compiled once: each of Eigen's costs its source ten seconds.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+
+namespace mbsopt {
+
+// Eigenvalues of a symmetric matrix, ascending, and the orthonormal eigenvectors as columns.
+struct SymmetricEigen {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd vectors;
+};
+SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& A);
+Eigen::Vector3d symmetric_eigenvalues(const Eigen::Matrix3d& A);
+
+// Solves A x = b of a symmetric positive definite A by Cholesky.
+Eigen::VectorXd cholesky_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
+
+// An orthonormal basis of { x : A x = 0 } as columns, by QR of A' with column pivoting. threshold: the pivots below
+// this part of the largest count as zero.
+Eigen::MatrixXd null_space(const Eigen::MatrixXd& A, double threshold);
+
+// A basis of the range of A, whose columns are independent: A times the inverse of its triangular factor, so that small
+// rows keep their digits.
+Eigen::MatrixXd orthonormal_columns(const Eigen::MatrixXd& A);
+
+// A = U diag(values) V', all columns of U, values descending. For small matrices.
+struct LeftSingular {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd U;
+};
+LeftSingular left_singular(const Eigen::MatrixXd& A);
+
+// The complete orthogonal decomposition A P = Q [T 0; 0 0] Z (Golub and Van Loan, "Matrix Computations", section 5.4).
+// Its solutions are the least-squares solutions of least norm, whatever the rank.
+class OrthogonalDecomposition {
+ public:
+  OrthogonalDecomposition();
+  // threshold: the pivots below this part of the largest count as zero; negative: rounding alone decides.
+  explicit OrthogonalDecomposition(const Eigen::MatrixXd& A, double threshold = -1);
+  OrthogonalDecomposition(const OrthogonalDecomposition&);
+  OrthogonalDecomposition(OrthogonalDecomposition&&) noexcept;
+  OrthogonalDecomposition& operator=(OrthogonalDecomposition) noexcept;
+  ~OrthogonalDecomposition();
+
+  Eigen::Index rank() const;
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& b) const;             // A x = b
+  Eigen::MatrixXd solve_transposed(const Eigen::MatrixXd& b) const;  // A'x = b
+  Eigen::MatrixXd left_null_space() const;                           // orthonormal columns x with A'x = 0
+
+ private:
+  struct Factors;
+  std::unique_ptr<Factors> factors_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,10 @@
+// A whole text to a descriptor, also where the system takes it in parts or a signal interrupts it.
+#pragma once
+
+#include <string_view>
+
+namespace mbsopt {
+
+bool write_all(int descriptor, std::string_view text);  // false: errno says why
+
+}  // namespace mbsopt

@@ -1,0 +1,62 @@
+#include "core/linear/dense.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "core/body/fixed_size.hpp"
+
+using namespace mbsopt;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+// Rank 2 in three rows and four columns: the third row is the sum of the others.
+MatrixXd rank_two() {
+  MatrixXd A(3, 4);
+  A << 1, 2, 0, -1, 0, 1, 3, 1, 1, 3, 3, 0;
+  return A;
+}
+
+double largest(const MatrixXd& x) { return x.size() == 0 ? 0 : x.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(); }
+
+}  // namespace
+
+TEST_CASE("a complete orthogonal decomposition meets the four conditions of the pseudo-inverse", "[linear]") {
+  const MatrixXd A = rank_two();
+  const OrthogonalDecomposition decomposition(A, 1e-10);
+  CHECK(decomposition.rank() == 2);
+  const MatrixXd X = decomposition.solve(MatrixXd::Identity(3, 3));
+  CHECK(largest(A * X * A - A) < 1e-14);
+  CHECK(largest(X * A * X - X) < 1e-14);
+  CHECK(largest(A * X - (A * X).transpose()) < 1e-14);
+  CHECK(largest(X * A - (X * A).transpose()) < 1e-14);
+  CHECK(largest(decomposition.solve_transposed(MatrixXd::Identity(4, 4)) - X.transpose()) < 1e-14);
+}
+
+TEST_CASE("null spaces are orthonormal and have the dimension that the rank leaves", "[linear]") {
+  const MatrixXd A = rank_two(), N = null_space(A, 1e-10);
+  CHECK(N.cols() == 2);
+  CHECK(largest(A * N) < 1e-14);
+  CHECK(largest(N.transpose() * N - MatrixXd::Identity(2, 2)) < 1e-14);
+  const MatrixXd left = OrthogonalDecomposition(A, 1e-10).left_null_space();
+  CHECK(left.cols() == 1);
+  CHECK(largest(A.transpose() * left) < 1e-14);
+  CHECK(null_space(MatrixXd(0, 3), 1e-10).isIdentity());
+}
+
+TEST_CASE("symmetric eigenvalues ascend and rebuild the matrix; left singular vectors belong to A A'", "[linear]") {
+  const MatrixXd A = rank_two(), S = A * A.transpose();
+  const SymmetricEigen eigen = symmetric_eigen(S);
+  CHECK(largest(eigen.vectors * eigen.values.asDiagonal() * eigen.vectors.transpose() - S) < 1e-13);
+  CHECK((eigen.values(0) <= eigen.values(1) && eigen.values(1) <= eigen.values(2)));
+  CHECK(largest(symmetric_eigenvalues(S) - eigen.values) < 1e-13);
+  const LeftSingular svd = left_singular(A);
+  CHECK(largest(svd.U.transpose() * S * svd.U - MatrixXd(svd.values.cwiseAbs2().asDiagonal())) < 1e-12);
+  CHECK(left_singular(MatrixXd(0, 2)).values.size() == 0);
+}
+
+TEST_CASE("cholesky solves a symmetric positive definite system", "[linear]") {
+  const MatrixXd A = rank_two() * rank_two().transpose() + MatrixXd::Identity(3, 3);
+  const VectorXd x = VectorXd::LinSpaced(3, 1, 2);
+  CHECK(largest(cholesky_solve(A, A * x) - x) < 1e-13);
+}

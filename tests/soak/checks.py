@@ -1,0 +1,326 @@
+"""What is asked of a scene beyond an end in numbers and words. Each check reads the scene alone, so that it judges a shrunk
+scene as well. It gives the disagreements that no warning of the program explains, as (check, words)."""
+
+import copy
+import random
+
+from rotations import inverse, random_turn
+from tilt import invariant, names_in, tilted, turned_pose
+
+SAME = 1e-7  # relative; what the program may differ by without a word
+ADAPTIVE = {"verner6": 1e-9, "dopri5": 1e-9, "gauss6": 1e-9, "radau5": 1e-8, "sdirk4": 1e-7, "cvodes_adams": 1e-10, "cvodes_bdf": 1e-9}
+SMALL = 1e-3  # [m] below it one atol for lengths and for Euler parameters asks the impossible of methods of low order
+
+
+ROUNDING = 1e-13  # of an objective's natural size: what sums of numbers of that size lose
+ERRORS = 1e-10  # of the same: what the integrator loses at the scene's own tolerances
+
+
+def natural_size(lab, name):
+    """Objectives of random scenes are made of terms of size 1; of kept scenes as well."""
+    return lab.end_time if "running" in lab.problem["objectives"][name] else 1.0
+
+
+def gradient_difference(a, b, sizes, value, noise):
+    """The worst entry of two gradients, apart from noise. Entries below 1e-3 of the largest are compared relative to that level,
+    as `check` does; where all are next to nothing, relative to the value."""
+    contributions = {name: abs(a[name] * sizes[name]) for name in a}
+    level = max(1e-3 * max(contributions.values(), default=0), 1e-3 * abs(value), 1e-300)
+    worst, where = 0.0, ""
+    for name in a:
+        difference = max(0.0, abs(a[name] - b[name]) * sizes[name] - noise)
+        relative = difference / max(contributions[name], level) if difference else 0.0
+        if not relative <= worst:
+            worst, where = relative, f"d/d {name}: {a[name]!r} and {b[name]!r}"
+    return worst, where
+
+
+def compare_gradients(lab, check, first, second, allowed=SAME, noise=ROUNDING, objectives=None):
+    if not (first.ok and second.ok):
+        return []
+    found = []
+    for name in lab.problem["objectives"] if objectives is None else objectives:
+        worst, where = gradient_difference(first.gradient(name), second.gradient(name), lab.parameter_sizes(), first.value(name),
+                                           noise * natural_size(lab, name))
+        if worst > allowed and not lab.doubts(first, second):
+            found.append((check, f"{name}, {where}: {worst:.1e} apart"))
+    return found
+
+
+# ---- the checks
+
+
+def ends(lab):
+    """The run of the scene as it is."""
+    return []
+
+
+def sweeps(lab):
+    """TLM and adjoint, at the scene's own settings."""
+    if not lab.problem.get("parameters"):
+        return []
+    return compare_gradients(lab, "tlm = adjoint", lab.run("gradient", arguments=("--method", "tlm")),
+                             lab.run("gradient", arguments=("--method", "adjoint")))
+
+
+def plane(lab):
+    """The planar model and the spatial one, in motion, sensors and gradients."""
+    base = watched(lab)
+    if not base.ok or base.result["model"].get("type") != "planar":
+        return []
+    space = lab.run("simulate", lab.tight() | {"simulation.model": "spatial"}, file="watched")
+    if not space.ok:
+        return [("planar = spatial", f"planar runs, spatial ends with: {space.message[-300:]}")]
+    worst, where = lab.apart(base.trajectory(), space.trajectory())
+    if worst > SAME and certain(lab, worst) and not lab.doubts(base, space):
+        return [("planar = spatial", f"{where}: {worst:.1e} apart")]
+    if not lab.problem.get("parameters"):
+        return []
+    return compare_gradients(lab, "planar = spatial", lab.run("gradient", lab.tight(), ("--method", "adjoint")),
+                             lab.run("gradient", lab.tight() | {"simulation.model": "spatial"}, ("--method", "adjoint")), 1e-6, ERRORS)
+
+
+def watched(lab):
+    """The scene with sensors of its energies, by an integrator whose errors do not count."""
+    if "watched" not in lab.files:
+        problem = copy.deepcopy(lab.problem)
+        for component in ("kinetic", "potential"):
+            problem.setdefault("sensors", {})[f"e_{component}"] = {"quantity": "energy", "component": component}
+        lab.variant("watched", problem)
+    return lab.run("simulate", lab.tight(), file="watched")
+
+
+def certain(lab, difference):
+    """Whether a difference from the tight run is more than a hundred times what that run changes at ten times its tolerance:
+    some motions magnify rounding by 1e10 and more, and no two runs of them agree."""
+    looser = lab.run("simulate", lab.tight(rtol=1e-10), file="watched")
+    return looser.ok and difference > 100 * lab.apart(watched(lab).trajectory(), looser.trajectory())[0]
+
+
+def integrators(lab):
+    """Other methods, each within ten times what its own result changes at a tenth of its tolerance."""
+    base = watched(lab)
+    if not base.ok:
+        return []
+    found, reference = [], base.trajectory()
+    rng = random.Random(lab.problem["name"])
+    able = sorted(ADAPTIVE) if lab.length > SMALL else ["gauss6", "verner6"]
+    for method in rng.sample(able, 2):
+        run = lambda rtol: lab.run("simulate", lab.tight(type=method, rtol=rtol), file="watched")
+        rtol = ADAPTIVE[method]
+        other = run(rtol)
+        if not other.ok:
+            continue
+        worst, where = lab.apart(reference, other.trajectory())
+        if worst <= 1e-6 or lab.doubts(base, other):
+            continue
+        closer = run(rtol / 10)
+        if not closer.ok or lab.doubts(closer):
+            continue
+        own = lab.apart(other.trajectory(), closer.trajectory())[0]
+        nearer, where = lab.apart(reference, closer.trajectory())
+        if nearer > max(10 * own, 1e-6) and certain(lab, nearer):
+            found.append(("integrators", f"dopri853 and {method}, {where}: {nearer:.1e} apart"))
+    return found
+
+
+def conserves_energy(problem):
+    def nothing(force, *fields):
+        return all(force.get(field, 0) in (0, [0, 0, 0]) for field in fields)
+
+    return not problem.get("drives") and all(
+        force["type"] in ("tsda", "rsda", "bushing") and "law" not in force
+        and nothing(force, "damping", "torsional_damping", "actuator") for force in problem.get("forces", []))
+
+
+def energy(lab):
+    if not conserves_energy(lab.problem):
+        return []
+    base = watched(lab)
+    if not base.ok:
+        return []
+    run = base.trajectory()
+    kinetic, potential = run["e_kinetic"], run["e_potential"]
+    total = [k + p for k, p in zip(kinetic, potential)]
+    size = max(kinetic) + max(potential) - min(potential)
+    change = max(total) - min(total)
+    if change > SAME * size + 1e-12 * max(map(abs, potential)) and not lab.doubts(base):
+        return [("energy", f"changes by {change:.2e} J of {size:.2e} J although nothing does work")]
+    return []
+
+
+def differences(lab):
+    """The gradient along two directions against central differences of runs with other parameters."""
+    parameters = lab.problem.get("parameters")
+    if not parameters:
+        return []
+    base = lab.run("gradient", lab.tight(), ("--method", "adjoint"))
+    if not base.ok:
+        return []
+    rng, sizes, found = random.Random(lab.problem["name"]), lab.parameter_sizes(), []
+    single = rng.choice(sorted(parameters))
+    for direction in ({name: sizes[name] * rng.uniform(-1, 1) for name in parameters}, {single: sizes[single]}):
+        missed = set(lab.problem["objectives"])
+        best = {}
+        for h in (1e-3, 1e-4, 1e-5, 1e-2):
+            slopes = [central(lab, direction, step) for step in (h, h / 2)]
+            if None in slopes:
+                continue
+            for name in sorted(missed):
+                coarse, fine = slopes[0][name], slopes[1][name]
+                exact = sum(base.gradient(name)[k] * d for k, d in direction.items())
+                level = sum(abs(base.gradient(name)[k] * d) for k, d in direction.items())
+                error = abs((4 * fine - coarse) / 3 - exact)
+                allowed = 1e-6 * level + 0.1 * abs(fine - coarse) + 1e-11 * (abs(base.value(name)) + natural_size(lab, name)) / h
+                best[name] = min(best.get(name, (float("inf"), "")), (error / max(level, 1e-300),
+                                 f"{name} along {sorted(direction)}: {exact!r}, differences {(4 * fine - coarse) / 3!r}"))
+                if error <= allowed:
+                    missed.discard(name)
+            if not missed:
+                break
+        for name in missed & set(best):
+            if not lab.doubts(base):
+                found.append(("differences", f"{best[name][1]}: {best[name][0]:.1e} apart"))
+    return found
+
+
+def central(lab, direction, h):
+    values = []
+    for sign in (1, -1):
+        settings = lab.tight()
+        for name, d in direction.items():
+            p = lab.problem["parameters"][name]
+            settings[f"parameters.{name}.value" if isinstance(p, dict) else f"parameters.{name}"] = (
+                (p["value"] if isinstance(p, dict) else p) + sign * h * d)
+        run = lab.run("simulate", settings)
+        if not run.ok:
+            return None
+        values.append({name: run.value(name) for name in lab.problem["objectives"]})
+    return {name: (values[0][name] - values[1][name]) / (2 * h) for name in values[0]}
+
+
+def tilt(lab):
+    """The scene turned as a whole: the same motion in other axes, for a planar one by the equations of space."""
+    turn = random_turn(random.Random(lab.problem["name"]))
+    problem = tilted(lab.problem, turn)
+    base = watched(lab)
+    if problem is None or not base.ok:
+        return []
+    lab.variant("tilted", problem)
+    other = lab.run("simulate", lab.tight(), file="tilted")
+    if not other.ok:
+        return [("tilt", f"runs as it is; turned as a whole it ends with: {other.message[-300:]}")]
+    reference = base.trajectory()
+    worst, where = lab.apart(reference, turned_back(other.trajectory(), lab, turn, reference))
+    if worst > 1e-6 and certain(lab, worst) and not lab.doubts(base, other):
+        return [("tilt", f"{where}: {worst:.1e} apart")]
+    if not lab.problem.get("parameters"):
+        return []
+    sensors = lab.problem.get("sensors", {})
+    same = [name for name, objective in lab.problem["objectives"].items()
+            if all(invariant(sensors[s]) for s in names_in(objective) & set(sensors))]
+    return compare_gradients(lab, "tilt", lab.run("gradient", lab.tight(), ("--method", "adjoint")),
+                             lab.run("gradient", lab.tight(), ("--method", "adjoint"), "tilted"), 1e-5, ERRORS, same)
+
+
+def turned_back(run, lab, turn, reference):
+    back, result = inverse(turn), {"t": run["t"]}
+    for body in (b["name"] for b in lab.problem["bodies"]):
+        names = [f"{body}.{c}" for c in ("x", "y", "z", "e0", "e1", "e2", "e3", "vx", "vy", "vz", "wx", "wy", "wz")]
+        rows = []
+        for k in range(len(run["t"])):
+            row = [run[name][k] for name in names]
+            position, p = turned_pose(back, row[:3], row[3:7])
+            velocity, _ = turned_pose(back, row[7:10], p)
+            omega, _ = turned_pose(back, row[10:], p)
+            rows.append(position + p + velocity + omega)
+        if sum(rows[0][3 + k] * reference[f"{body}.e{k}"][0] for k in range(4)) < 0:
+            rows = [row[:3] + [-x for x in row[3:7]] + row[7:] for row in rows]
+        result |= {name: [row[k] for row in rows] for k, name in enumerate(names)}
+    return result
+
+
+def order(lab):
+    """The same bodies and joints, listed the other way round."""
+    base = watched(lab)
+    if not base.ok:
+        return []
+    problem = copy.deepcopy(lab.problem)
+    for section in ("bodies", "joints", "forces"):
+        problem[section] = problem.get(section, [])[::-1]
+    lab.variant("reversed", problem)
+    other = lab.run("simulate", lab.tight(), file="reversed")
+    if not other.ok:
+        return [("order", f"runs as listed; in reverse it ends with: {other.message[-300:]}")]
+    worst, where = lab.apart(base.trajectory(), other.trajectory())
+    if worst > 1e-6 and certain(lab, worst) and not lab.doubts(base, other):
+        return [("order", f"{where}: {worst:.1e} apart")]
+    return []
+
+
+def kinematics(lab):
+    """Where drives leave nothing free, positions need no integration."""
+    base = watched(lab)
+    if not base.ok or base.result["model"]["degrees_of_freedom"] != 0:
+        return []
+    solved = lab.run("kinematics")
+    if not solved.ok:
+        return [("kinematics = simulate", f"simulate runs, kinematics ends with: {solved.message[-300:]}")]
+    worst, where = lab.apart(base.trajectory(), solved.trajectory())
+    if worst > SAME and not lab.doubts(base, solved):
+        return [("kinematics = simulate", f"{where}: {worst:.1e} apart")]
+    return []
+
+
+def equilibrium(lab):
+    """A start in equilibrium stays there, where nothing depends on time."""
+    if not lab.problem.get("initial", {}).get("equilibrium") or depends_on_time(lab.problem):
+        return []
+    base = watched(lab)
+    if not base.ok:
+        return []
+    run = base.trajectory()
+    start = {name: [column[0]] * len(column) for name, column in run.items()}
+    worst, where = lab.apart(start, run)
+    if worst > 1e-6 and not lab.doubts(base):
+        return [("equilibrium", f"does not stay: {where}: {worst:.1e} apart")]
+    return []
+
+
+def depends_on_time(problem):
+    laws = [problem.get("drives", []), [force.get("law", "") for force in problem.get("forces", [])],
+            [force.get("components", []) for force in problem.get("forces", [])]]
+    return "t" in names_in(laws) or any(isinstance(drive["law"], dict) for drive in problem.get("drives", []))
+
+
+def own_check(lab):
+    if not lab.problem.get("parameters") or len(lab.problem["parameters"]) * len(lab.problem["bodies"]) > 12:
+        return []
+    run = lab.run("check")
+    if run.code == 3 and not lab.doubts(run):
+        return [("check", "; ".join(line.strip() for line in run.out.splitlines() if "DISAGREES" in line or "FAILED" in line))]
+    return []
+
+
+def again(lab):
+    """The same inputs give the same bytes."""
+    first = lab.run("simulate")
+    second = lab.run("simulate", {})  # the same, run anew
+    if first.ok and (first.folder / "trajectory.csv").read_bytes() != (second.folder / "trajectory.csv").read_bytes():
+        return [("again", "a second run writes another trajectory.csv")]
+    return []
+
+
+def other_commands(lab):
+    """Commands that only have to end in numbers or words."""
+    lab.run("validate")
+    if lab.problem.get("parameters"):
+        forward = lab.run("gradient", lab.tight(), ("--method", "cvodes_forward"))
+        found = compare_gradients(lab, "cvodes_forward = adjoint", forward, lab.run("gradient", lab.tight(), ("--method", "adjoint")), 1e-4, 1e-8)
+        lab.run("gradient", {"simulation.integrator": {"type": "dopri5"}}, ("--method", "adjoint", "--hessian"))
+        name = sorted(lab.problem["parameters"])[0]
+        design = {"minimize": sorted(lab.problem["objectives"])[0], "variables": [name],
+                  "optimizer": {"max_iterations": 3, "max_evaluations": 6}}
+        lab.run("design", {"design": design})
+        return found
+    return []

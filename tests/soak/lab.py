@@ -1,0 +1,106 @@
+"""One scene on the bench: its runs, kept by what was asked, and measures to compare them by."""
+
+import math
+import re
+import shutil
+from pathlib import Path
+
+from scene import Scene
+
+# Warnings of the program that say its numbers may be off by more than usual.
+DOUBT = re.compile(r"singular|energy changed|came apart|accelerations of the constraints|not resolve|stability|stiff|zero length|"
+                   r"cannot change|not smooth|jump|peak|disagree|rounding|differ|has no (mass|inertia)|error|faster than", re.IGNORECASE)
+FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh")} | {"pi": math.pi}
+
+
+class Lab:
+    def __init__(self, scene, program, folder):
+        self.scene, self.program, self.folder = scene, program, Path(folder)
+        self.problem, self.outcomes, self.files = scene.problem, {}, {}
+        self.explained = []
+        self.end_time = float(self.problem["simulation"]["end_time"])
+        self.length = self.body_length()
+        self.write("scene", scene)
+
+    def close(self):
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    # ---- runs
+
+    def write(self, name, scene):
+        self.files[name] = self.folder / f"{name}.json"
+        scene.save(self.files[name])
+
+    def variant(self, name, problem):
+        self.write(name, Scene(problem, self.scene.files))
+
+    def run(self, command, settings=None, arguments=(), file="scene"):
+        key = (command, str(settings), tuple(arguments), file)
+        if key not in self.outcomes:
+            folder = self.folder / f"{file}_{len(self.outcomes)}"
+            self.outcomes[key] = self.program.run(command, self.files[file], folder, settings or {}, arguments)
+        return self.outcomes[key]
+
+    def tight(self, **others):
+        """An integrator whose errors do not count."""
+        integrator = {"type": "dopri853", "rtol": 1e-11, "atol": max(1e-12 * min(1, self.length), 1e-15),
+                      "max_step": self.end_time / 40}
+        return {"simulation.integrator": integrator | others}
+
+    def complaints(self):
+        return [complaint for outcome in self.outcomes.values() for complaint in outcome.complaints]
+
+    def doubts(self, *outcomes):
+        """What the program itself said against its numbers; remembered as an explanation."""
+        words = [warning for outcome in outcomes for warning in outcome.warnings if DOUBT.search(warning)]
+        self.explained += words[:1]
+        return bool(words)
+
+    # ---- the scene's own sizes
+
+    def number(self, x):
+        if isinstance(x, (int, float)):
+            return float(x)
+        names = {name: p["value"] if isinstance(p, dict) else p for name, p in self.problem.get("parameters", {}).items()}
+        text = x
+        for _ in range(10):
+            for name, definition in self.problem.get("definitions", {}).items():
+                text = re.sub(rf"\b{name}\b", f"({definition})", text)
+        return float(eval(text.replace("^", "**"), {"__builtins__": {}}, FUNCTIONS | names))
+
+    def body_length(self):
+        """The longest arm of a body: its own points and its centre of mass."""
+        arms = [body.get("com", []) for body in self.problem["bodies"]]
+        arms += [point for body in self.problem["bodies"] for point in body.get("points", {}).values()]
+        for item in self.problem.get("joints", []) + self.problem.get("forces", []):
+            arms += [item.get("point2", [])] + ([item.get("point1", [])] if item.get("body1", "ground") != "ground" else [])
+        lengths = [math.hypot(*(self.number(x) for x in arm)) for arm in arms if isinstance(arm, list) and arm]
+        return max(lengths, default=0.0) or 1.0
+
+    def apart(self, a, b, bodies=None):
+        """The largest difference of two trajectories, relative to the size of each kind of number; and where."""
+        worst, where = 0.0, ""
+        names = [body["name"] for body in self.problem["bodies"]] if bodies is None else bodies
+        speeds = {"v": self.length / self.end_time, "w": 1 / self.end_time}
+        for kind in speeds:
+            for name in names:
+                for axis in "xyz":
+                    speeds[kind] = max(speeds[kind], max(map(abs, a[f"{name}.{kind}{axis}"])))
+        for name in names:
+            groups = [([f"{name}.{c}" for c in "xyz"], self.length), ([f"{name}.e{k}" for k in range(4)], 1.0),
+                      ([f"{name}.v{c}" for c in "xyz"], speeds["v"]), ([f"{name}.w{c}" for c in "xyz"], speeds["w"])]
+            for columns, size in groups:
+                for column in columns:
+                    if len(a[column]) != len(b[column]):
+                        return math.inf, f"{column}: {len(a[column])} and {len(b[column])} rows"
+                    difference = max(abs(x - y) for x, y in zip(a[column], b[column])) / size
+                    if not difference <= worst:
+                        worst, where = difference, f"{column} {a[column][-1]!r} and {b[column][-1]!r} at the end"
+        return worst, where
+
+    def parameter_sizes(self):
+        sizes = {}
+        for name, p in self.problem.get("parameters", {}).items():
+            value, spread = (p["value"], p.get("upper", 1) - p.get("lower", 0)) if isinstance(p, dict) else (p, 1)
+            sizes[name] = abs(value) or abs(spread) / 2 or 1.0
+        return sizes
