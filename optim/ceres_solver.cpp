@@ -42,7 +42,7 @@ class Evaluations {
       point_.ok = false, point_.message = fmt::format(
                              "the squares of the residuals or of their derivatives are beyond all numbers: the largest "
                              "residual is {:.3g} (measured - model)/sigma, the largest derivative {:.3g}. Look for "
-                             "values that are none in the data, at sigma, and at the sigmas of priors",
+                             "values that are none in the data, and at sigma, that of priors too",
                              point_.z.lpNorm<Eigen::Infinity>(), point_.z_x.lpNorm<Eigen::Infinity>());
     if (!point_.ok) {
       ++result_.failed_evaluations;
