@@ -182,7 +182,7 @@ class Identification {
     if (pulling + stack.plain >= stack.variables()) return;
     result_.status = SolverStatus::failed;
     result_.message = fmt::format(
-        "failed: {} of {} lie within the scale of the loss ({:g} sigma), beyond which a sample has no pull; they "
+        "{} of {} lie within the scale of the loss ({:g} sigma), beyond which a sample has no pull; they "
         "cannot "
         "determine {}. Is sigma too small, or are these other data than the model's?",
         pulling, counted(stack.samples(), "sample"), stack.loss.s(), counted(stack.variables(), "parameter"));
