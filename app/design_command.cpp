@@ -7,6 +7,7 @@
 #include "app/command.hpp"
 #include "app/design_starts.hpp"
 #include "app/interrupt.hpp"
+#include "app/multistart.hpp"
 #include "app/objective_values.hpp"
 #include "app/optimized_problem.hpp"
 #include "app/report/run_report.hpp"
@@ -21,7 +22,7 @@ namespace {
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
-void print_design(std::ostream& out, const DesignResult& design) {
+void print_design(std::ostream& out, const DesignResult& design, const std::string& effort) {
   TextTable parameters({"parameter", "initial", "optimum", "unit", "at bound"});
   for (const DesignVariable& v : design.variables) {
     parameters.add({v.name, significant(v.initial, 10), significant(v.value, 10), v.unit.empty() ? "-" : v.unit,
@@ -50,9 +51,9 @@ void print_design(std::ostream& out, const DesignResult& design) {
     objectives.add(cells);
   }
   out << '\n' << parameters.text() << '\n' << objectives.text();
-  out << fmt::format("\n{} {}: {}, {}, {:.3g} s{}\n", design.optimizer, to_string(design.status),
-                     counted(design.iterations, "iteration"), counted(design.evaluations, "evaluation"),
-                     design.wall_seconds, design.seed ? fmt::format(", seed {}", *design.seed) : "");
+  out << fmt::format("\n{} {}: {}, {}, {}{}\n", design.optimizer, to_string(design.status),
+                     counted(design.iterations, "iteration"), counted(design.evaluations, "evaluation"), effort,
+                     design.seed ? fmt::format(", seed {}", *design.seed) : "");
   if (std::isfinite(design.optimality))
     out << fmt::format("optimality {:.1e}, infeasibility {:.1e} at the solution\n", design.optimality,
                        design.violation);
@@ -133,7 +134,10 @@ int design_command(const CommandContext& context) {
   LongRun long_run(run);
   const auto [design, cut_off] = minimised(run, long_run, before.psi);
   add_to_result(run.result, design);
-  print_design(context.out, design);
+  const std::optional<MultistartSpec>& starts = run.problem.design->multistart;
+  print_design(context.out, design,
+               starts ? effort(run, starts, design.simulations, design.wall_seconds)
+                      : fmt::format("{:.3g} s", design.wall_seconds));
   for (const std::string& warning : design.warnings) run.warn(warning);
   for (const std::string& warning : simulation_warnings(scene.simulation, design.final_evaluation.statistics))
     run.warn(warning);

@@ -93,7 +93,9 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, int start) {
               {"infeasibility", design.violation},
               {"optimality", std::isfinite(design.optimality) ? Json(design.optimality) : Json()},
               {"iterations", design.iterations},
-              {"evaluations", design.evaluations}};
+              {"evaluations", design.evaluations},
+              {"simulations", design.simulations},
+              {"wall_seconds", design.wall_seconds}};
   for (const DesignVariable& v : design.variables)
     record["from"][v.name] = v.initial, record["parameters"][v.name] = v.value;
   record["points"] = std::move(points), record["hessians"] = std::move(hessians);
@@ -147,6 +149,7 @@ DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& problem
   result.design =
       best ? told_again(from((*best)["start"].get<int>()), scale, *best) : run_design(from(0), until_interrupted);
   if (best) describe_given(problem, before, result.design);
+  result.design.simulations += outcome.simulations, result.design.wall_seconds += outcome.wall_seconds;
   return result;
 }
 

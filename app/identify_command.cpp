@@ -6,6 +6,7 @@
 #include "app/identify_starts.hpp"
 #include "app/interrupt.hpp"
 #include "app/left_out_bodies.hpp"
+#include "app/multistart.hpp"
 #include "app/optimized_problem.hpp"
 #include "app/report/motion_plots.hpp"
 #include "app/report/run_report.hpp"
@@ -13,6 +14,7 @@
 #include "app/run.hpp"
 #include "app/simulation_warnings.hpp"
 #include "core/dynamics/assembly.hpp"
+#include "core/dynamics/model_warnings.hpp"
 #include "core/integrate/model_choice.hpp"
 #include "optim/experiment.hpp"
 #include "optim/identification.hpp"
@@ -125,18 +127,22 @@ int identify_command(const CommandContext& context) {
     add_model(mechanism, scene.simulation, model);
     run.result["model"] = to_json(model);
     print_model(context.out, scene.name, model);
+    for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
   }
   std::vector<std::string> left_out;
   const Problem needed = what_measurements_need(run.problem, &left_out);
   say_left_out(run, left_out, "measurement");
   simulate_first_experiment(run, needed, data);
   LongRun long_run(run);
-  const Problem problem = from_best_start(run, long_run, data);
-  if (interrupted() && run.problem.identification->multistart) return stopped_within_starts(run, long_run, problem);
+  const BestStart best = from_best_start(run, long_run, data);
+  const std::optional<MultistartSpec>& starts = run.problem.identification->multistart;
+  if (interrupted() && starts) return stopped_within_starts(run, long_run, best.problem);
   long_run.begin();
-  const IdentificationResult fit = fitted(run, long_run, problem, data);
+  IdentificationResult fit = fitted(run, long_run, best.problem, data);
+  fit.simulations += best.simulations, fit.wall_seconds += best.wall_seconds;
   add_to_result(run.result, fit);
-  print_fit(context.out, fit);
+  print_fit(context.out, fit, effort(run, starts, fit.simulations, fit.wall_seconds));
+  for (const std::string& warning : fit.warnings) run.warn(warning);
   const Trajectory history = history_of(fit);
   if (fit.status == SolverStatus::stopped || interrupted()) {
     long_run.stopped("optimized.json holds the best fit so far");

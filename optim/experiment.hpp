@@ -85,6 +85,9 @@ class Experiment {
   double largest_delay(const Program& delay) const;
   void refuse_time_dependence(const Sensor& sensor, const Program& delay, const std::string& place) const;
   void take_samples(const ExperimentSpec& spec, const std::string& place, const CsvTable& data);
+  // The first drive whose sampled law ends before `end` or begins after the start; end() where all reach.
+  std::vector<Drive>::const_iterator uncovered(double end) const;
+  void refuse_short_laws(const ExperimentSpec& spec, const std::string& place) const;
 
   Scene scene_;
   SimulationSettings settings_;

@@ -12,6 +12,7 @@
 
 #include "core/integrate/run_guard.hpp"
 #include "core/integrate/start_failure.hpp"
+#include "core/integrate/step_failure.hpp"
 #include "core/integrate/zero_length.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -164,9 +165,7 @@ void ForwardRun::stop_for(int flag, double t, const char* of_what) {
                of_what, t));
       return;
     case CV_TOO_MUCH_ACC:
-      stop(SimulationStatus::step_too_small,
-           fmt::format("rtol {:.3g} and atol {:.3g} ask for more digits at t = {:.6g} s than numbers have: loosen them",
-                       settings_.integrator.rtol, settings_.integrator.atol, t));
+      stop(SimulationStatus::step_too_small, too_few_digits(settings_.integrator, t));
       return;
     case CV_TOO_MUCH_WORK:
       stop(SimulationStatus::too_many_steps,

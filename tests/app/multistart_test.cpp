@@ -386,6 +386,59 @@ TEST_CASE("resume: an identification that is interrupted within its first simula
   CHECK(journal_lines(out, "residuals") == 0);
 }
 
+TEST_CASE("multistart: simulations and seconds are those of all starts, after a resumption too", "[multistart]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
+  const TemporaryFolder folder;
+  const bool designs = GENERATE(true, false);
+  const std::string command = designs ? "design" : "identify";
+  const std::string file = designs ? folder.write("rod.json", kSwingingRod) : write_swing_fit(folder);
+  const CommandOutcome outcome = run_command({command, file, "--out", folder.file("out")});
+  REQUIRE(outcome.exit_code == kDone);
+  const auto check = [&] {
+    const auto result = json_of(folder.path / "out/result.json");
+    long simulations = 0;
+    double seconds = 0;
+    for (const auto& start : result.at("multistart").at("waterfall")) {
+      CHECK(start.at("simulations").get<long>() > 0);
+      simulations += start.at("simulations").get<long>(), seconds += start.at("wall_seconds").get<double>();
+    }
+    CHECK(result.at("multistart").at("simulations") == simulations);
+    CHECK(result.at("optimizer").at("simulations").get<long>() >= simulations);
+    CHECK(result.at("optimizer").at("wall_seconds").get<double>() >= seconds);
+    return result.at("optimizer").at("simulations").get<long>();
+  };
+  const long whole = check();
+  CHECK_THAT(outcome.out, Contains(std::to_string(whole) + " simulations, ") &&
+                              Contains(designs ? "in all 8 starts" : "in all 5 starts"));
+  std::vector<std::string> lines = lines_of(folder.path / "out" / kJournalFile);
+  const auto is_start = [](const std::string& line) { return line.starts_with("{\"start\":"); };
+  const auto fourth = std::find_if(lines.begin() + 4, lines.end(), is_start);
+  REQUIRE(fourth != lines.end());
+  std::string journal;
+  for (auto line = lines.begin(); line != fourth; ++line) journal += *line + "\n";
+  write_text(folder.path / "out" / kJournalFile, journal);
+  REQUIRE(run_command({"resume", folder.file("out")}).exit_code == kDone);
+  CHECK(check() == whole);
+}
+
+TEST_CASE("multistart: starts with sigmas of their own are ranked by the likelihood", "[multistart]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
+  const TemporaryFolder folder;
+  write_swing_fit(folder);
+  std::string text = fit_problem();
+  text.replace(text.find("\"sigma\": 0.01"), 13, "\"sigma\": 0.01, \"estimate_sigma\": true");
+  REQUIRE(run_command({"identify", folder.write("own.json", text), "--out", folder.file("own")}).exit_code == kDone);
+  const auto result = outcome_of(folder.path / "own");
+  CHECK(result.at("parameters").at("k").at("value").get<double>() == Approx(20).epsilon(1e-3));
+  const auto& waterfall = result.at("multistart").at("waterfall");
+  CHECK(waterfall.at(0).at("parameters").at("k").get<double>() == Approx(20).epsilon(1e-3));
+  CHECK(waterfall.at(0).at("objective").get<double>() < waterfall.at(4).at("objective").get<double>() - 10);
+}
+
 namespace {
 
 // Two experiments, whose data have one base name.
