@@ -13,7 +13,6 @@
 #include "app/report/run_report.hpp"
 #include "app/run.hpp"
 #include "app/simulated_motion.hpp"
-#include "app/simulation_warnings.hpp"
 #include "app/text_table.hpp"
 #include "core/expression/counted.hpp"
 
@@ -55,8 +54,10 @@ void print_design(std::ostream& out, const DesignResult& design, const std::stri
                      counted(design.iterations, "iteration"), counted(design.evaluations, "evaluation"), effort,
                      design.seed ? fmt::format(", seed {}", *design.seed) : "");
   if (std::isfinite(design.optimality))
-    out << fmt::format("optimality {:.1e}, infeasibility {:.1e} at the solution\n", design.optimality,
-                       design.violation);
+    out << fmt::format(
+        "optimality {:.1e}, infeasibility {:.1e} at the solution{}\n", design.optimality, design.violation,
+        design.true_violation > design.violation ? fmt::format(", {:.1e} of true extremes", design.true_violation)
+                                                 : "");
 }
 
 void add_to_result(Json& result, const DesignResult& design) {
@@ -67,7 +68,9 @@ void add_to_result(Json& result, const DesignResult& design) {
     result["objectives"][c.objective] = {{"value", c.value},          {"initial", c.initial},
                                          {"lower", or_null(c.lower)}, {"upper", or_null(c.upper)},
                                          {"violation", c.violation},  {"at_bound", bound_json(c.at_lower, c.at_upper)}};
-    if (c.true_value) result["objectives"][c.objective]["true_value"] = *c.true_value;
+    if (!c.true_value) continue;
+    result["objectives"][c.objective]["true_value"] = *c.true_value;
+    result["objectives"][c.objective]["true_violation"] = c.true_violation;
   }
   for (const DesignVariable& v : design.variables) {
     result["parameters"][v.name] = {
@@ -87,7 +90,8 @@ void add_to_result(Json& result, const DesignResult& design) {
                          {"objective_initial", design.objective_initial},
                          {"objective_final", design.objective_final},
                          {"optimality", number_or_null(design.optimality)},
-                         {"infeasibility", design.violation}};
+                         {"infeasibility", design.violation},
+                         {"true_infeasibility", design.true_violation}};
   if (design.seed) result["optimizer"]["seed"] = *design.seed;
 }
 
@@ -139,8 +143,7 @@ int design_command(const CommandContext& context) {
                starts ? effort(run, starts, design.simulations, design.wall_seconds)
                       : fmt::format("{:.3g} s", design.wall_seconds));
   for (const std::string& warning : design.warnings) run.warn(warning);
-  for (const std::string& warning : simulation_warnings(scene.simulation, design.final_evaluation.statistics))
-    run.warn(warning);
+  for (const std::string& warning : design.final_evaluation.warnings) run.warn(warning);
   warn_of_stiffness(run, design.final_evaluation.statistics, true);
   const SimulatedMotion after = interrupted() ? SimulatedMotion{} : simulated_motion(run, design.rho);
   if (cut_off || design.status == SolverStatus::stopped || interrupted()) {

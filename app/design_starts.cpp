@@ -84,6 +84,7 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, int start) {
   options.simulation_progress = [](double) { return !interrupted(); };
   options.progress = [](const DesignRow&) { return !interrupted(); };
   options.scale = scale;
+  options.compare_differences = false;  // once, at the best one's start
   const DesignResult design = run_design(problem, options);
   const bool evaluated = !design.history.empty();
   Json record{{"start", start},

@@ -12,11 +12,12 @@
 #include "app/report/run_report.hpp"
 #include "app/residual_records.hpp"
 #include "app/run.hpp"
-#include "app/simulation_warnings.hpp"
 #include "core/dynamics/assembly.hpp"
 #include "core/dynamics/model_warnings.hpp"
 #include "core/integrate/model_choice.hpp"
+#include "core/integrate/simulation_warnings.hpp"
 #include "optim/experiment.hpp"
+#include "optim/fit_comparison.hpp"
 #include "optim/identification.hpp"
 #include "optim/unused_parameters.hpp"
 
@@ -95,7 +96,7 @@ void simulate_first_experiment(Run& run, const Problem& needed, const std::vecto
   const SimulationResult first = simulate(mechanism, scene.simulation, {}, {}, options);
   run.result["simulation"] = to_json(first.statistics);
   if (first.ok())
-    for (const std::string& warning : simulation_warnings(scene.simulation, first.statistics)) run.warn(warning);
+    for (const std::string& warning : simulation_warnings(scene, first.statistics)) run.warn(warning);
   warn_of_stiffness(run, first.statistics, true);
 }
 
@@ -133,6 +134,8 @@ int identify_command(const CommandContext& context) {
   const Problem needed = what_measurements_need(run.problem, &left_out);
   say_left_out(run, left_out, "measurement");
   simulate_first_experiment(run, needed, data);
+  for (const std::string& warning : doubts_about_fit(needed, data, {{}, [](double) { return !interrupted(); }}))
+    run.warn(warning);
   LongRun long_run(run);
   const BestStart best = from_best_start(run, long_run, data);
   const std::optional<MultistartSpec>& starts = run.problem.identification->multistart;

@@ -267,7 +267,8 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
     return r;
   }
   try {
-    const Mechanism mechanism(scene_, rho, active_, user_forces_);
+    const std::vector<bool> none(active_.size(), false);
+    const Mechanism mechanism(scene_, rho, limits.derivatives ? active_ : none, user_forces_);
     Eigen::VectorXd y_bar(mechanism.states()), rho_bar(rho.size());
     std::size_t seen = 0;
     const auto take = [&](std::size_t i, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
@@ -294,7 +295,7 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
     RunOptions options;
     options.progress = limits.progress;
     const SimulationResult result = simulate_tlm(mechanism, settings, {}, sampling, options);
-    r.steps = result.statistics.steps;
+    r.steps = result.statistics.steps, r.jumps = result.statistics.jumps;
     r.ok = result.ok() && seen == samples_.size();
     r.message = result.message;
   } catch (const SceneError& error) {  // a field that these values drive out of its range

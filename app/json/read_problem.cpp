@@ -146,6 +146,7 @@ Problem read_problem_text(const std::string& text, const std::filesystem::path& 
   read_sampled_laws(problem, name.parent_path(), root, findings);
   add_issues(problem, root, findings, warnings);
   findings.throw_if_any();
+  allow_what_only_measurements_use(problem);
   return problem;
 }
 

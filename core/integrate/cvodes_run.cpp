@@ -10,6 +10,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "core/integrate/jump_watch.hpp"
 #include "core/integrate/run_guard.hpp"
 #include "core/integrate/start_failure.hpp"
 #include "core/integrate/step_failure.hpp"
@@ -257,6 +258,11 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
   const std::string at_start = guard.begin(t, y_now_, e, end, settings_.integrator.max_steps);
   if (!at_start.empty()) return stop(SimulationStatus::not_credible, at_start);
   const bool derivatives = hooks.advance || sensitivities_;
+  std::optional<JumpWatch> jumps;
+  if (derivatives) {
+    jumps.emplace(mechanism_, settings_, costs_, flow_.motion());
+    jumps->begin({t, y_now_, assembly_.result().angles, flow_.motion()});
+  }
   Eigen::VectorXd y_before;
   while (result_.ok() && t < end) {
     result_.statistics.rejected = rejected();
@@ -294,6 +300,7 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
     t = t1;
     result_.last_good_time = t;
     take_samples(schedule, t, hooks);
+    if (jumps) jumps->look_at({t, y_now_, flow_.angles_at(t), flow_.motion()});
     if (hooks.accepted) hooks.accepted({t, y_now_, flow_.angles_at(t), flow_.motion()});
     if (options.after_step) options.after_step({t, y_now_, flow_.angles_at(t), flow_.motion()});
     if (options.progress && !options.progress(t)) {
@@ -303,6 +310,7 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
   result_.statistics.rejected = rejected();
   result_.statistics.relative_energy_drift = guard.relative_energy_drift();
   result_.y_end = y_now_;
+  if (jumps) jumps->add_to(result_.statistics);
   if (result_.ok()) finish_costs();
 }
 
