@@ -205,9 +205,9 @@ def growth_section():
 
 def sizes_section():
     lines = ["## Whole commands", "",
-             "The problem files have 100 to 10 000 bodies. One parameter is the mass of all of them; the objective is the energy at the",
-             "end. `gradient` chooses its method. A run takes twenty steps of `dopri5`. The table shows the processor time of the whole",
-             "process [s] and the most memory that it held [MiB]. *Growth* is the time per body at 10 000 bodies over that at 1000.", ""] + command("sizes")
+             "The problem files have 100 to 10 000 bodies. One parameter is the mass of all of them. The objective is the energy at",
+             "the end. `gradient` chooses its method. A run takes twenty steps of `dopri5`. The table shows the processor time of the",
+             "whole process [s] and its largest memory [MiB]. *Growth* is the time per body at 10 000 bodies over that at 1000.", ""] + command("sizes")
     kinds, cells = {}, []
     for r in rows_of("sizes"):
         _, kind, size, name = r["name"].split("/")
