@@ -75,7 +75,7 @@ std::vector<std::string> not_finite(const MechanismData& d, const AssemblyEquati
     if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
   };
   for (const Constraint& c : d.constraints) {
-    if (F.segment(c.row, c.rows()).allFinite()) continue;
+    if (std::isfinite(F.segment(c.row, c.rows()).squaredNorm())) continue;
     add(c.drive >= 0 ? "drive '" + d.drive_names[static_cast<std::size_t>(c.drive)] + "'" : joint_name(d, c));
   }
   Eigen::Index row = d.m + d.n;
@@ -105,7 +105,7 @@ std::string assembly_failure(const MechanismData& d, AssemblyLevel level, const 
                              const NearestPoint& found) {
   const bool positions = level == AssemblyLevel::position;
   const std::string head = positions ? "initial assembly failed: " : "initial velocities failed: ";
-  if (!found.F.allFinite())
+  if (!std::isfinite(found.F.squaredNorm()))
     return head + "the equations are not finite at the guess: " +
            fmt::format("{}", fmt::join(not_finite(d, equations, found.F), ", ")) +
            ". Look at the laws of drives and the values of conditions (a root, logarithm or division outside its "

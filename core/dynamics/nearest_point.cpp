@@ -122,9 +122,9 @@ class Search {
   NearestPoint run() {
     if (guess_is_it()) return result_;
     if (!newton()) sqp();
-    if (result_.status == NearestPointStatus::found) {  // once more, for derivatives
-      result_.linearisation = sized_linearisation(equations_, result_.x);
-      add_curvature();
+    if (result_.status == NearestPointStatus::found) {
+      refine();
+      linearise_sized();
     }
     result_.F = equations_.values(result_.x);
     const bool unsettled =
@@ -211,6 +211,16 @@ class Search {
   void linearise() {
     result_.F = equations_.values(result_.x);
     result_.linearisation = NearestPointLinearisation(equations_.jacobian(result_.x));
+  }
+  void linearise_sized() {
+    result_.F = equations_.values(result_.x);
+    result_.linearisation = sized_linearisation(equations_, result_.x);
+    add_curvature();
+  }
+  // A last step whose rounding is that of each unknown, not of the largest.
+  void refine() {
+    linearise_sized();
+    move(result_.x + result_.linearisation.solve(-result_.F, x_guess_ - result_.x));
   }
   void add_curvature() {
     result_.nu = result_.linearisation.multipliers(x_guess_ - result_.x);
