@@ -436,7 +436,11 @@ TEST_CASE("multistart: starts with sigmas of their own are ranked by the likelih
   CHECK(result.at("parameters").at("k").at("value").get<double>() == Approx(20).epsilon(1e-3));
   const auto& waterfall = result.at("multistart").at("waterfall");
   CHECK(waterfall.at(0).at("parameters").at("k").get<double>() == Approx(20).epsilon(1e-3));
-  CHECK(waterfall.at(0).at("objective").get<double>() < waterfall.at(4).at("objective").get<double>() - 10);
+  for (const auto& record : waterfall) {
+    if (record.at("objective").is_null() || record.at("parameters").at("k").get<double>() == Approx(20).epsilon(0.01))
+      continue;  // a start that failed, or found the same
+    CHECK(waterfall.at(0).at("objective").get<double>() < record.at("objective").get<double>() - 10);
+  }
 }
 
 namespace {

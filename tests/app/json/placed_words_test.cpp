@@ -33,7 +33,7 @@ TEST_CASE("a law whose samples are too short is refused at its place in the file
   for (const char* command : {"validate", "simulate"}) {
     const CommandOutcome outcome = run_command({command, file, "--out", folder.file("out")});
     CHECK(outcome.exit_code == kBadInput);
-    CHECK_THAT(outcome.err, Contains("rod.json:12:12: drives[0].law: its samples cover 0 s to 0.4 s"));
+    CHECK_THAT(outcome.err, Contains("rod.json:11:12: drives[0].law: its samples cover 0 s to 0.4 s"));
   }
 }
 
