@@ -8,7 +8,6 @@
 #include "app/left_out_bodies.hpp"
 #include "app/objective_values.hpp"
 #include "app/run.hpp"
-#include "app/simulation_warnings.hpp"
 #include "app/text_table.hpp"
 #include "core/expression/counted.hpp"
 #include "optim/gradient_check.hpp"
@@ -215,7 +214,7 @@ int check_command(const CommandContext& context) {
 
   run.result["simulation"] = to_json(check.statistics);
   add_derivative_counts(run, needed.scene, check.statistics);
-  for (const std::string& warning : simulation_warnings(scene.simulation, check.statistics)) run.warn(warning);
+  for (const std::string& warning : check.warnings) run.warn(warning);
   const Evaluator evaluator(needed.scene, objectives_of(needed));
   const std::vector<std::optional<double>> true_values = evaluator.true_values(evaluator.start());
   add_to_result(run.result, check, true_values);

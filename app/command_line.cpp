@@ -16,6 +16,7 @@
 #include "app/exit_code.hpp"
 #include "app/interrupt.hpp"
 #include "app/json/input_error.hpp"
+#include "app/json/placed_words.hpp"
 #include "app/provenance.hpp"
 #include "core/expression/did_you_mean.hpp"
 #include "core/mechanism/mechanism.hpp"
@@ -108,6 +109,11 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
   }
 }
 
+std::string about_the_problem(const CommandContext& context, const std::string& words) {
+  const std::string& file = context.options.problem_file;
+  return placed(words, file, context.options.sets).value_or(file + ": " + words);
+}
+
 // The command's exit code; what was wrong with the input goes to `err` in words.
 int run_in_words(const Command& command, const CommandContext& context) {
   try {
@@ -115,11 +121,11 @@ int run_in_words(const Command& command, const CommandContext& context) {
   } catch (const InputError& error) {
     context.err << error.what() << '\n';
   } catch (const SceneError& error) {
-    context.err << context.options.problem_file << ": " << error.what() << '\n';
+    context.err << about_the_problem(context, error.what()) << '\n';
   } catch (const CsvError& error) {
     context.err << error.what() << '\n';
   } catch (const std::invalid_argument& error) {
-    context.err << context.options.problem_file << ": " << error.what() << '\n';
+    context.err << about_the_problem(context, error.what()) << '\n';
   } catch (const WriteError& error) {
     context.err << error.what() << '\n';
     return kNumericalFailure;

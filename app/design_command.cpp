@@ -7,12 +7,12 @@
 #include "app/command.hpp"
 #include "app/design_starts.hpp"
 #include "app/interrupt.hpp"
+#include "app/multistart.hpp"
 #include "app/objective_values.hpp"
 #include "app/optimized_problem.hpp"
 #include "app/report/run_report.hpp"
 #include "app/run.hpp"
 #include "app/simulated_motion.hpp"
-#include "app/simulation_warnings.hpp"
 #include "app/text_table.hpp"
 #include "core/expression/counted.hpp"
 
@@ -21,7 +21,7 @@ namespace {
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
-void print_design(std::ostream& out, const DesignResult& design) {
+void print_design(std::ostream& out, const DesignResult& design, const std::string& effort) {
   TextTable parameters({"parameter", "initial", "optimum", "unit", "at bound"});
   for (const DesignVariable& v : design.variables) {
     parameters.add({v.name, significant(v.initial, 10), significant(v.value, 10), v.unit.empty() ? "-" : v.unit,
@@ -50,12 +50,14 @@ void print_design(std::ostream& out, const DesignResult& design) {
     objectives.add(cells);
   }
   out << '\n' << parameters.text() << '\n' << objectives.text();
-  out << fmt::format("\n{} {}: {}, {}, {:.3g} s{}\n", design.optimizer, to_string(design.status),
-                     counted(design.iterations, "iteration"), counted(design.evaluations, "evaluation"),
-                     design.wall_seconds, design.seed ? fmt::format(", seed {}", *design.seed) : "");
+  out << fmt::format("\n{} {}: {}, {}, {}{}\n", design.optimizer, to_string(design.status),
+                     counted(design.iterations, "iteration"), counted(design.evaluations, "evaluation"), effort,
+                     design.seed ? fmt::format(", seed {}", *design.seed) : "");
   if (std::isfinite(design.optimality))
-    out << fmt::format("optimality {:.1e}, infeasibility {:.1e} at the solution\n", design.optimality,
-                       design.violation);
+    out << fmt::format(
+        "optimality {:.1e}, infeasibility {:.1e} at the solution{}\n", design.optimality, design.violation,
+        design.true_violation > design.violation ? fmt::format(", {:.1e} of true extremes", design.true_violation)
+                                                 : "");
 }
 
 void add_to_result(Json& result, const DesignResult& design) {
@@ -66,7 +68,9 @@ void add_to_result(Json& result, const DesignResult& design) {
     result["objectives"][c.objective] = {{"value", c.value},          {"initial", c.initial},
                                          {"lower", or_null(c.lower)}, {"upper", or_null(c.upper)},
                                          {"violation", c.violation},  {"at_bound", bound_json(c.at_lower, c.at_upper)}};
-    if (c.true_value) result["objectives"][c.objective]["true_value"] = *c.true_value;
+    if (!c.true_value) continue;
+    result["objectives"][c.objective]["true_value"] = *c.true_value;
+    result["objectives"][c.objective]["true_violation"] = c.true_violation;
   }
   for (const DesignVariable& v : design.variables) {
     result["parameters"][v.name] = {
@@ -86,7 +90,8 @@ void add_to_result(Json& result, const DesignResult& design) {
                          {"objective_initial", design.objective_initial},
                          {"objective_final", design.objective_final},
                          {"optimality", number_or_null(design.optimality)},
-                         {"infeasibility", design.violation}};
+                         {"infeasibility", design.violation},
+                         {"true_infeasibility", design.true_violation}};
   if (design.seed) result["optimizer"]["seed"] = *design.seed;
 }
 
@@ -133,10 +138,12 @@ int design_command(const CommandContext& context) {
   LongRun long_run(run);
   const auto [design, cut_off] = minimised(run, long_run, before.psi);
   add_to_result(run.result, design);
-  print_design(context.out, design);
+  const std::optional<MultistartSpec>& starts = run.problem.design->multistart;
+  print_design(context.out, design,
+               starts ? effort(run, starts, design.simulations, design.wall_seconds)
+                      : fmt::format("{:.3g} s", design.wall_seconds));
   for (const std::string& warning : design.warnings) run.warn(warning);
-  for (const std::string& warning : simulation_warnings(scene.simulation, design.final_evaluation.statistics))
-    run.warn(warning);
+  for (const std::string& warning : design.final_evaluation.warnings) run.warn(warning);
   warn_of_stiffness(run, design.final_evaluation.statistics, true);
   const SimulatedMotion after = interrupted() ? SimulatedMotion{} : simulated_motion(run, design.rho);
   if (cut_off || design.status == SolverStatus::stopped || interrupted()) {

@@ -84,6 +84,7 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, int start) {
   options.simulation_progress = [](double) { return !interrupted(); };
   options.progress = [](const DesignRow&) { return !interrupted(); };
   options.scale = scale;
+  options.compare_differences = false;  // once, at the best one's start
   const DesignResult design = run_design(problem, options);
   const bool evaluated = !design.history.empty();
   Json record{{"start", start},
@@ -93,7 +94,9 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, int start) {
               {"infeasibility", design.violation},
               {"optimality", std::isfinite(design.optimality) ? Json(design.optimality) : Json()},
               {"iterations", design.iterations},
-              {"evaluations", design.evaluations}};
+              {"evaluations", design.evaluations},
+              {"simulations", design.simulations},
+              {"wall_seconds", design.wall_seconds}};
   for (const DesignVariable& v : design.variables)
     record["from"][v.name] = v.initial, record["parameters"][v.name] = v.value;
   record["points"] = std::move(points), record["hessians"] = std::move(hessians);
@@ -147,6 +150,7 @@ DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& problem
   result.design =
       best ? told_again(from((*best)["start"].get<int>()), scale, *best) : run_design(from(0), until_interrupted);
   if (best) describe_given(problem, before, result.design);
+  result.design.simulations += outcome.simulations, result.design.wall_seconds += outcome.wall_seconds;
   return result;
 }
 

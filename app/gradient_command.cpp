@@ -10,7 +10,6 @@
 #include "app/left_out_bodies.hpp"
 #include "app/objective_values.hpp"
 #include "app/run.hpp"
-#include "app/simulation_warnings.hpp"
 #include "app/text_table.hpp"
 #include "core/dynamics/model_warnings.hpp"
 #include "core/integrate/cvodes.hpp"
@@ -112,8 +111,7 @@ int gradient_command(const CommandContext& context) {
   const Evaluation& evaluation = evaluator.gradients(evaluator.start());
   run.result["simulation"] = to_json(evaluation.statistics);
   add_derivative_counts(run, needed.scene, evaluation.statistics);
-  for (const std::string& warning : simulation_warnings(scene.simulation, evaluation.statistics, evaluation.ok))
-    run.warn(warning);
+  for (const std::string& warning : evaluation.warnings) run.warn(warning);
   if (!evaluation.ok) {
     interrupted() ? run.stopped("no gradient was finished") : run.failed(evaluation.message, last_good_time);
     return run.finish();

@@ -14,11 +14,17 @@ namespace {
 constexpr Eigen::Index kWholeMatrix = 10;  // parameters, up to which the correlation is printed whole
 constexpr double kStrong = 0.9;            // correlation worth a line of its own
 
+std::string interval_of(const FittedParameter& p) {
+  if (std::isnan(p.std_error)) return "-";
+  if (std::isinf(p.std_error)) return "undetermined";
+  return fmt::format("[{}, {}]", significant(p.ci95[0]), significant(p.ci95[1]));
+}
+
 void add_rows(TextTable& table, const std::vector<FittedParameter>& parameters) {
   for (const FittedParameter& p : parameters) {
-    table.add({p.name, significant(p.initial), significant(p.value, 9), significant(p.std_error, 3),
-               fmt::format("[{}, {}]", significant(p.ci95[0]), significant(p.ci95[1])), p.unit.empty() ? "-" : p.unit,
-               bound_hit(p.at_lower, p.at_upper)});
+    table.add({p.name, significant(p.initial), significant(p.value, 9),
+               std::isfinite(p.std_error) ? significant(p.std_error, 3) : "-", interval_of(p),
+               p.unit.empty() ? "-" : p.unit, bound_hit(p.at_lower, p.at_upper)});
   }
 }
 
@@ -124,7 +130,7 @@ Json to_json(const ParameterProfile& p) {
 
 }  // namespace
 
-void print_fit(std::ostream& out, const IdentificationResult& fit) {
+void print_fit(std::ostream& out, const IdentificationResult& fit, const std::string& effort) {
   TextTable parameters({"parameter", "initial", "value", "std error", "95 % interval", "unit", "at bound"});
   add_rows(parameters, fit.parameters);
   TextTable channels({"experiment", "role", "channel", "samples", "rms", "sigma", "rms/sigma", "lag-1", "Ljung-Box p",
@@ -142,11 +148,16 @@ void print_fit(std::ostream& out, const IdentificationResult& fit) {
   print_correlation(out, fit);
   print_profiles(out, fit);
   for (const std::string& words : fit.statistics.unidentifiable) out << "not determined by the data: " << words << '\n';
-  out << fmt::format("\n{}, {}; condition number {:.3g}\n", counted(fit.samples, "sample"),
-                     counted(fit.statistics.degrees_of_freedom, "degree of freedom", "degrees of freedom"),
-                     fit.statistics.condition_number);
-  out << fmt::format("{}: {}, {}, {}, {:.3g} s\n", to_string(fit.status), counted(fit.iterations, "iteration"),
-                     counted(fit.evaluations, "evaluation"), counted(fit.simulations, "simulation"), fit.wall_seconds);
+  const FitStatistics& s = fit.statistics;
+  if (!s.none.empty()) out << fmt::format("no standard errors and intervals: {}\n", s.none);
+  out << fmt::format("\n{}", counted(fit.samples, "sample"));
+  if (s.std_error.size() > 0)
+    out << fmt::format(", {}; condition number {}",
+                       counted(s.degrees_of_freedom, "degree of freedom", "degrees of freedom"),
+                       std::isinf(s.condition_number) ? "infinite" : significant(s.condition_number, 3));
+  out << '\n';
+  out << fmt::format("{}: {}, {}, {}\n", to_string(fit.status), counted(fit.iterations, "iteration"),
+                     counted(fit.evaluations, "evaluation"), effort);
 }
 
 void add_to_result(Json& result, const IdentificationResult& fit) {
@@ -178,6 +189,7 @@ void add_to_result(Json& result, const IdentificationResult& fit) {
   for (const ParameterProfile& p : fit.profiles) result["profiles"][p.name] = to_json(p);
   result["identifiability"] = {{"condition_number", fit.statistics.condition_number},
                                {"unidentifiable", fit.statistics.unidentifiable}};
+  if (!fit.statistics.none.empty()) result["statistics"]["no_standard_errors"] = fit.statistics.none;
 }
 
 Trajectory history_of(const IdentificationResult& fit) {

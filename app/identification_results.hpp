@@ -10,7 +10,8 @@
 
 namespace mbsopt {
 
-void print_fit(std::ostream& out, const IdentificationResult& fit);
+// effort: what it took, effort() of multistart.hpp.
+void print_fit(std::ostream& out, const IdentificationResult& fit, const std::string& effort);
 // parameters, correlation, experiments, optimizer, statistics, identifiability, profiles
 void add_to_result(Json& result, const IdentificationResult& fit);
 

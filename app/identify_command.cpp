@@ -6,15 +6,18 @@
 #include "app/identify_starts.hpp"
 #include "app/interrupt.hpp"
 #include "app/left_out_bodies.hpp"
+#include "app/multistart.hpp"
 #include "app/optimized_problem.hpp"
 #include "app/report/motion_plots.hpp"
 #include "app/report/run_report.hpp"
 #include "app/residual_records.hpp"
 #include "app/run.hpp"
-#include "app/simulation_warnings.hpp"
 #include "core/dynamics/assembly.hpp"
+#include "core/dynamics/model_warnings.hpp"
 #include "core/integrate/model_choice.hpp"
+#include "core/integrate/simulation_warnings.hpp"
 #include "optim/experiment.hpp"
+#include "optim/fit_comparison.hpp"
 #include "optim/identification.hpp"
 #include "optim/unused_parameters.hpp"
 
@@ -93,7 +96,7 @@ void simulate_first_experiment(Run& run, const Problem& needed, const std::vecto
   const SimulationResult first = simulate(mechanism, scene.simulation, {}, {}, options);
   run.result["simulation"] = to_json(first.statistics);
   if (first.ok())
-    for (const std::string& warning : simulation_warnings(scene.simulation, first.statistics)) run.warn(warning);
+    for (const std::string& warning : simulation_warnings(scene, first.statistics)) run.warn(warning);
   warn_of_stiffness(run, first.statistics, true);
 }
 
@@ -125,18 +128,24 @@ int identify_command(const CommandContext& context) {
     add_model(mechanism, scene.simulation, model);
     run.result["model"] = to_json(model);
     print_model(context.out, scene.name, model);
+    for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
   }
   std::vector<std::string> left_out;
   const Problem needed = what_measurements_need(run.problem, &left_out);
   say_left_out(run, left_out, "measurement");
   simulate_first_experiment(run, needed, data);
+  for (const std::string& warning : doubts_about_fit(needed, data, {{}, [](double) { return !interrupted(); }}))
+    run.warn(warning);
   LongRun long_run(run);
-  const Problem problem = from_best_start(run, long_run, data);
-  if (interrupted() && run.problem.identification->multistart) return stopped_within_starts(run, long_run, problem);
+  const BestStart best = from_best_start(run, long_run, data);
+  const std::optional<MultistartSpec>& starts = run.problem.identification->multistart;
+  if (interrupted() && starts) return stopped_within_starts(run, long_run, best.problem);
   long_run.begin();
-  const IdentificationResult fit = fitted(run, long_run, problem, data);
+  IdentificationResult fit = fitted(run, long_run, best.problem, data);
+  fit.simulations += best.simulations, fit.wall_seconds += best.wall_seconds;
   add_to_result(run.result, fit);
-  print_fit(context.out, fit);
+  print_fit(context.out, fit, effort(run, starts, fit.simulations, fit.wall_seconds));
+  for (const std::string& warning : fit.warnings) run.warn(warning);
   const Trajectory history = history_of(fit);
   if (fit.status == SolverStatus::stopped || interrupted()) {
     long_run.stopped("optimized.json holds the best fit so far");

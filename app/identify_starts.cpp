@@ -6,6 +6,7 @@
 #include "app/interrupt.hpp"
 #include "app/multistart.hpp"
 #include "app/optimized_problem.hpp"
+#include "optim/sigma_estimation.hpp"
 #include "optim/start_points.hpp"
 
 namespace mbsopt {
@@ -20,17 +21,31 @@ std::vector<Parameter> shared_parameters(const Problem& problem) {
   return parameters;
 }
 
+// By which starts are ranked. With sigmas of its own each start ends at a cost of half its degrees of freedom, however
+// bad its fit: only with their logarithms is it the likelihood, sigma_estimation.hpp.
+double objective_of(const IdentificationSpec& spec, const IdentificationResult& fit) {
+  double objective = fit.cost_final;
+  if (!estimates_sigma(spec)) return objective;
+  for (const ExperimentFit& experiment : fit.experiments)
+    for (const ChannelFit& channel : experiment.channels)
+      if (!experiment.validate) objective += static_cast<double>(channel.samples) * std::log(channel.sigma);
+  return objective;
+}
+
 Json record_of_start(const Problem& problem, const std::vector<CsvTable>& data, int start) {
   IdentificationOptions options;
   options.simulation_progress = [](double) { return !interrupted(); };
   options.progress = [](const FitRow&) { return !interrupted(); };
   const IdentificationResult fit = run_identification(problem, data, options);
+  const double objective = objective_of(*problem.identification, fit);
   Json record{{"start", start},
               {"status", to_string(fit.status)},
               {"message", fit.message},
-              {"objective", std::isfinite(fit.cost_final) && !fit.history.empty() ? Json(fit.cost_final) : Json()},
+              {"objective", std::isfinite(objective) && !fit.history.empty() ? Json(objective) : Json()},
               {"iterations", fit.iterations},
-              {"evaluations", fit.evaluations}};
+              {"evaluations", fit.evaluations},
+              {"simulations", fit.simulations},
+              {"wall_seconds", fit.wall_seconds}};
   for (const FittedParameter& p : fit.parameters) {
     record[p.experiment.empty() ? "parameters" : "free"][p.name] = p.value;
     if (p.experiment.empty()) record["from"][p.name] = p.initial;
@@ -81,14 +96,15 @@ StartWork identify_start_work(const Problem& problem, const Json& task) {
   return start_work(problem, data_of(problem), task.at("seed").get<long>());
 }
 
-Problem from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data) {
+BestStart from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data) {
   const Problem& problem = run.problem;
-  if (!problem.identification->multistart) return problem;
+  if (!problem.identification->multistart) return {problem};
   MultistartSpec spec = *problem.identification->multistart;
   spec.seed = long_run.seed("multistart", spec.seed);
   long_run.begin();
   const MultistartOutcome outcome = run_multistart(run, long_run, spec, start_work(problem, data, *spec.seed));
-  return outcome.best() ? at_fit(problem, *outcome.best()) : with_values(problem, Json::object());
+  return {outcome.best() ? at_fit(problem, *outcome.best()) : with_values(problem, Json::object()), outcome.simulations,
+          outcome.wall_seconds};
 }
 
 int stopped_within_starts(Run& run, LongRun& long_run, const Problem& best) {

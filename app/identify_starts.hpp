@@ -11,9 +11,15 @@
 
 namespace mbsopt {
 
+struct BestStart {
+  Problem problem;
+  long simulations = 0;     // of all starts
+  double wall_seconds = 0;  // added up over them
+};
+
 // The given problem where no multistart is asked for. Shared variables are spread over their bounds; parameters that
 // are free in an experiment begin at their given values.
-Problem from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data);
+BestStart from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data);
 
 // The starts, from the task that this process or another one has made.
 StartWork identify_start_work(const Problem& problem, const Json& task);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <new>
 #include <random>
 
 #include "app/atomic_file.hpp"
@@ -120,6 +121,16 @@ JournalContent read_journal(const std::filesystem::path& folder) {
   }
   if (number == 0) refuse("holds no whole line; start the run anew");
   return content;
+}
+
+void read_record(const std::function<void()>& read) {
+  try {
+    read();
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception&) {
+    throw OutputError(std::string(kJournalFile) + ": a record does not have the form that this version writes");
+  }
 }
 
 Journal::Journal(const std::filesystem::path& folder, const Json& header)

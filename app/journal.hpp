@@ -21,6 +21,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,9 @@ struct JournalContent {
 
 // Throws OutputError where there is none, or where it is none of this version, or damaged.
 JournalContent read_journal(const std::filesystem::path& folder);
+
+// Reads a record's content. What throws there, a library's words or a wrong size, is refused as an OutputError.
+void read_record(const std::function<void()>& read);
 
 class Journal {
  public:

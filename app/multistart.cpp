@@ -85,6 +85,13 @@ const Json* MultistartOutcome::best() const {
   return !ranked.empty() && has_objective(ranked[0]) ? &ranked[0] : nullptr;
 }
 
+std::string effort(const Run& run, const std::optional<MultistartSpec>& starts, long simulations, double wall_seconds) {
+  return fmt::format("{}, {:.3g} s{}", counted(simulations, "simulation"), wall_seconds,
+                     starts                       ? fmt::format(" in all {}", counted(starts->starts, "start"))
+                     : run.context.options.resume ? " since it was resumed"
+                                                  : "");
+}
+
 Json named_values(const std::vector<std::string>& names, const std::vector<double>& values) {
   Json json = Json::object();
   for (std::size_t k = 0; k < names.size(); ++k) json[names[k]] = values[k];
@@ -126,11 +133,17 @@ MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSp
   std::sort(outcome.ranked.begin(), outcome.ranked.end(),
             [](const Json& a, const Json& b) { return rank(a) < rank(b); });
 
+  for (const Json& record : outcome.ranked) {
+    outcome.simulations += record.value("simulations", 0L);
+    outcome.wall_seconds += record.value("wall_seconds", 0.0);
+  }
   Json& result = run.result["multistart"];
   result = {{"starts", spec.starts},
             {"seed", *spec.seed},
             {"sampling", spec.sampling == StartSampling::sobol ? "sobol" : "latin_hypercube"},
-            {"finished", outcome.ranked.size()}};
+            {"finished", outcome.ranked.size()},
+            {"simulations", outcome.simulations},
+            {"wall_seconds", outcome.wall_seconds}};
   const Json* const best = outcome.best();
   const long same =
       best ? std::count_if(outcome.ranked.begin(), outcome.ranked.end(),

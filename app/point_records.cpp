@@ -1,6 +1,9 @@
 #include "app/point_records.hpp"
 
+#include <stdexcept>
 #include <utility>
+
+#include "app/journal.hpp"
 
 namespace mbsopt {
 namespace {
@@ -21,9 +24,17 @@ VectorXd vector_of(const Json& json) {
   return Eigen::Map<const VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
-MatrixXd matrix_of(const Json& json, Eigen::Index columns) {
-  MatrixXd m(static_cast<Eigen::Index>(json.size()), columns);
-  for (std::size_t i = 0; i < json.size(); ++i) m.row(static_cast<Eigen::Index>(i)) = vector_of(json[i]).transpose();
+VectorXd vector_of(const Json& json, Eigen::Index size) {
+  VectorXd v = vector_of(json);
+  if (v.size() != size) throw std::length_error("a vector of another size");
+  return v;
+}
+
+MatrixXd matrix_of(const Json& json, Eigen::Index rows, Eigen::Index columns) {
+  if (json.size() != static_cast<std::size_t>(rows)) throw std::length_error("a matrix of another size");
+  MatrixXd m(rows, columns);
+  for (Eigen::Index i = 0; i < rows; ++i)
+    m.row(i) = vector_of(json.at(static_cast<std::size_t>(i)), columns).transpose();
   return m;
 }
 
@@ -37,8 +48,8 @@ NlpPoint point_of(const Json& json, Eigen::Index variables) {
   point.f = json.at("f").get<double>();
   point.c = vector_of(json.at("c"));
   if (!json.contains("f_x")) return point;
-  point.f_x = vector_of(json.at("f_x"));
-  point.c_x = matrix_of(json.at("c_x"), variables);
+  point.f_x = vector_of(json.at("f_x"), variables);
+  point.c_x = matrix_of(json.at("c_x"), point.c.size(), variables);
   return point;
 }
 
@@ -46,17 +57,19 @@ NlpPoint point_of(const Json& json, Eigen::Index variables) {
 
 JsonPointRecords::JsonPointRecords(const std::vector<Json>& points, const std::vector<Json>& hessians, Tell tell)
     : tell_(std::move(tell)) {
-  for (const Json& json : points) {
-    const Key x = json.at("x").get<Key>();
-    const Wanted wanted = json.at("derivatives").get<bool>() ? Wanted::derivatives : Wanted::values;
-    points_[{x, wanted}] = {point_of(json, static_cast<Eigen::Index>(x.size())), false};
-  }
+  read_record([&] {
+    for (const Json& json : points) {
+      const Key x = json.at("x").get<Key>();
+      const Wanted wanted = json.at("derivatives").get<bool>() ? Wanted::derivatives : Wanted::values;
+      points_[{x, wanted}] = {point_of(json, static_cast<Eigen::Index>(x.size())), false};
+    }
+    for (const Json& json : hessians) {
+      const Key x = json.at("x").get<Key>();
+      const auto n = static_cast<Eigen::Index>(x.size());
+      for (const Json& matrix : json.at("of")) hessians_[x].push_back(matrix_of(matrix, n, n));
+    }
+  });
   points_left_ = points_.size();
-  for (const Json& json : hessians) {
-    const Key x = json.at("x").get<Key>();
-    for (const Json& matrix : json.at("of"))
-      hessians_[x].push_back(matrix_of(matrix, static_cast<Eigen::Index>(x.size())));
-  }
 }
 
 bool JsonPointRecords::recall(const VectorXd& x, Wanted wanted, NlpPoint& point) {

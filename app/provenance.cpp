@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "app/sha256.hpp"
 #include "optim/regular_file.hpp"
@@ -45,6 +46,13 @@ nlohmann::ordered_json library_versions() {
           {"compiler", __VERSION__}};
 }
 
+// A run whose input has no checksum could not be gone on with.
+std::string checksum_of(const std::string& file) {
+  std::string checksum = sha256_of_file(file);
+  if (checksum.empty()) throw std::runtime_error(file + ": cannot be read");
+  return checksum;
+}
+
 // Two files may have one base name.
 std::string seen_from(const std::filesystem::path& folder, const std::filesystem::path& file) {
   const std::filesystem::path relative = file.lexically_relative(folder);
@@ -68,9 +76,9 @@ nlohmann::ordered_json provenance(const std::vector<std::string>& arguments, con
   std::string command_line = "mbsopt";
   for (const std::string& argument : arguments) command_line += " " + shell_word(argument);
   nlohmann::ordered_json result{
-      {"command_line", command_line}, {"input", input_as_stored}, {"input_sha256", sha256_of_file(problem_file)}};
+      {"command_line", command_line}, {"input", input_as_stored}, {"input_sha256", checksum_of(problem_file)}};
   const std::filesystem::path folder = std::filesystem::path(problem_file).parent_path().lexically_normal();
-  for (const std::string& file : data_files) result["data_sha256"][seen_from(folder, file)] = sha256_of_file(file);
+  for (const std::string& file : data_files) result["data_sha256"][seen_from(folder, file)] = checksum_of(file);
   result["libraries"] = library_versions();
   return result;
 }

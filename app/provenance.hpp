@@ -11,7 +11,8 @@ std::string program_version();
 std::string sha256_of_file(const std::string& path);  // lower-case hex; empty where it cannot be read
 
 // {"command_line", "input", "input_sha256", "data_sha256": {file: hash}, "libraries": {name: version}}
-// Data files are named as seen from the problem file's folder, wherever the command runs.
+// Data files are named as seen from the problem file's folder, wherever the command runs. Throws std::runtime_error
+// where a file cannot be read.
 nlohmann::ordered_json provenance(const std::vector<std::string>& arguments, const std::string& input_as_stored,
                                   const std::string& problem_file, const std::vector<std::string>& data_files);
 

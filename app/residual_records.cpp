@@ -1,6 +1,9 @@
 #include "app/residual_records.hpp"
 
+#include <stdexcept>
 #include <utility>
+
+#include "app/journal.hpp"
 
 namespace mbsopt {
 namespace {
@@ -15,7 +18,10 @@ constexpr Index kMostNumbers = 50'000;
 
 Experiment::Residuals residuals_of(const Json& json) {
   const auto z = json.at("z").get<std::vector<double>>(), z_u = json.at("z_u").get<std::vector<double>>();
-  const Index rows = static_cast<Index>(z.size()), columns = json.at("columns").get<Index>();
+  const Index rows = static_cast<Index>(z.size()), columns = json.at("columns").get<Index>(),
+              numbers = static_cast<Index>(z_u.size());
+  if (columns < 0 || (rows == 0 ? numbers != 0 : numbers % rows != 0 || numbers / rows != columns))
+    throw std::length_error("a matrix of another size");
   Experiment::Residuals r;
   r.ok = true;
   r.z = Eigen::Map<const VectorXd>(z.data(), rows);
@@ -27,9 +33,11 @@ Experiment::Residuals residuals_of(const Json& json) {
 }  // namespace
 
 JsonResidualRecords::JsonResidualRecords(const std::vector<Json>& residuals, Tell tell) : tell_(std::move(tell)) {
-  for (const Json& json : residuals)
-    known_[{json.at("experiment").get<std::size_t>(), json.at("u").get<std::vector<double>>(),
-            json.at("sigma").get<std::vector<double>>()}] = residuals_of(json);
+  read_record([&] {
+    for (const Json& json : residuals)
+      known_[{json.at("experiment").get<std::size_t>(), json.at("u").get<std::vector<double>>(),
+              json.at("sigma").get<std::vector<double>>()}] = residuals_of(json);
+  });
 }
 
 JsonResidualRecords::Key JsonResidualRecords::key_of(const Asked& asked) {

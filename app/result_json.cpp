@@ -6,11 +6,13 @@ namespace mbsopt {
 namespace {
 
 constexpr std::array kOrder{
-    "program",   "version",         "command",     "problem",     "status",          "message",    "last_good_time",
-    "machine",   "model",           "accuracy",    "simulation",  "objectives",      "methods",    "hessian_method",
-    "verdict",   "reference",       "settings",    "fit",         "recommendations", "applied",    "skipped",
-    "penalty",   "parameters",      "experiments", "correlation", "profiles",        "statistics", "multistart",
-    "optimizer", "identifiability", "provenance",  "warnings"};
+    "program",         "version",        "command",    "problem",         "status",
+    "message",         "last_good_time", "machine",    "model",           "accuracy",
+    "simulation",      "objectives",     "methods",    "hessian_method",  "verdict",
+    "reference",       "settings",       "fit",        "recommendations", "task_recommendations",
+    "applied",         "skipped",        "penalty",    "parameters",      "experiments",
+    "correlation",     "profiles",       "statistics", "multistart",      "optimizer",
+    "identifiability", "provenance",     "warnings"};
 
 }  // namespace
 
@@ -39,7 +41,10 @@ Json to_json(const SimulationStatistics& statistics) {
             {"max_position_violation", statistics.max_position_violation},
             {"max_velocity_violation", statistics.max_velocity_violation},
             {"energy_drift", statistics.energy_drift}};
-  if (statistics.quadrature_error > 0) json["quadrature_error"] = statistics.quadrature_error;
+  for (const auto& [key, worst] : {std::pair{"quadrature_error", &statistics.quadrature},
+                                   {"extreme_quadrature_error", &statistics.extreme_quadrature},
+                                   {"gradient_quadrature_error", &statistics.gradient_quadrature}})
+    if (worst->error > 0) json[key] = worst->error;
   if (statistics.watched_steps > 0) {
     json["watched_steps"] = statistics.watched_steps;
     json["stability_limited_steps"] = statistics.stability_limited_steps;

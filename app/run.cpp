@@ -4,6 +4,7 @@
 
 #include "app/energy_balance.hpp"
 #include "app/exit_code.hpp"
+#include "app/json/placed_words.hpp"
 #include "app/json/read_problem.hpp"
 #include "app/provenance.hpp"
 #include "core/expression/counted.hpp"
@@ -72,7 +73,8 @@ void Run::write(const std::string& file, std::string_view content) {
   written_.push_back(file);
 }
 
-void Run::warn(const std::string& warning) {
+void Run::warn(const std::string& words) {
+  const std::string warning = placed(words, context.options.problem_file, context.options.sets).value_or(words);
   progress.finish();
   context.err << "warning: " << warning << '\n';
   result["warnings"].push_back(warning);

@@ -44,7 +44,7 @@ class Run {
 
   void start();  // claims the folder: locks it, and writes result.json with "status": "running"
   void write(const std::string& file, std::string_view content);  // into the folder; named in the closing line
-  void warn(const std::string& warning);
+  void warn(const std::string& words);  // "simulation.accuracy: ...": with the path's place in the file before them
   // In place of what the file says (accuracy_results.hpp).
   void simulate_with(const SimulationSettings& settings) { problem_.scene.simulation = settings; }
 

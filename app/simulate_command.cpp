@@ -8,8 +8,8 @@
 #include "app/report/run_report.hpp"
 #include "app/run.hpp"
 #include "app/simulated_motion.hpp"
-#include "app/simulation_warnings.hpp"
 #include "app/text_table.hpp"
+#include "core/integrate/simulation_warnings.hpp"
 
 namespace mbsopt {
 namespace {
@@ -51,7 +51,7 @@ int simulate_command(const CommandContext& context) {
     if (!simulation.ok()) simulated.simulation.end_time = simulation.last_good_time;
     print_simulation(context.out, simulated, simulation.statistics);
     run.write("trajectory.csv", to_csv(motion.trajectory));
-    for (const std::string& warning : simulation_warnings(scene.simulation, simulation.statistics, simulation.ok()))
+    for (const std::string& warning : simulation_warnings(scene, simulation.statistics, simulation.ok()))
       run.warn(warning);
     warn_of_stiffness(run, simulation.statistics, false);
   }

@@ -19,20 +19,23 @@ namespace {
 constexpr const char* kNothingMeasured = "nothing was measured yet";
 constexpr const char* kMeasuredIsKept = "tradeoff.csv holds what was measured";
 
-void apply_accuracy(Run& run, const Tradeoff& tradeoff, double accuracy) {
-  const Recommendation r = recommend(tradeoff, main_quantities(tradeoff.reference.errors->quantities()), accuracy);
-  add_applied(run, tradeoff, r);
-  if (r.row) run.write("recommended.json", recommended_problem_text(run, tradeoff.rows[*r.row].setting.simulation));
+constexpr double kFits = 0.2;  // of the budget, for the sums of squares at settings that may be advised
+
+void apply_accuracy(Run& run, const Tradeoff& tradeoff, TaskAdviser& adviser, double accuracy) {
+  const TaskAdvice advice = adviser.at(accuracy);
+  add_applied(run, tradeoff, advice);
+  if (const auto row = advice.recommendation.row)
+    run.write("recommended.json", recommended_problem_text(run, tradeoff.rows[*row].setting.simulation));
 }
 
 // What `identify` minimises is no objective of the file, and as exact as the integrator leaves it.
-void add_fit(Run& run) {
-  if (!run.problem.identification) return;
+void add_fit(Run& run, const FitErrorMeasure& fit) {
   const SimulationSettings& own = run.problem.scene.simulation;
   SimulationSettings defaults = own;
   defaults.formulation = {}, defaults.integrator = default_integrator(own.start_time, own.end_time);
-  add_fit_errors(run, measure_fit_errors(run.problem, data_of(run.problem), {{"own", own}, {"defaults", defaults}},
-                                         [] { return interrupted(); }));
+  FitErrors errors = fit.found();
+  if (errors.ok()) errors.settings = {fit.at({"own", own}), fit.at({"defaults", defaults})};
+  add_fit_errors(run, errors);
 }
 
 void sweep(Run& run) {
@@ -49,15 +52,23 @@ void sweep(Run& run) {
   add_reference(run, tradeoff.reference);
   if (!tradeoff.rows.empty()) run.write("tradeoff.csv", to_csv(tradeoff));
   add_given_settings(run, tradeoff);
-  if (!tradeoff.interrupted) add_fit(run);
+  const Problem& problem = run.problem;
+  const std::vector<CsvTable> data = problem.identification ? data_of(problem) : std::vector<CsvTable>();
+  std::optional<FitErrorMeasure> fit;
+  if (problem.identification && !tradeoff.interrupted) {
+    fit.emplace(problem, data, [] { return interrupted(); });
+    add_fit(run, *fit);
+  }
+  TaskAdviser adviser(problem, tradeoff, fit ? &*fit : nullptr, kFits * options.budget_seconds);
   if (options.budget_seconds > 0) {
     add_recommendations(run, tradeoff);
+    if (!tradeoff.interrupted && (problem.design || fit)) add_task_recommendations(run, tradeoff, adviser);
     add_outcomes(run, tradeoff);
   }
   if (tradeoff.interrupted) {
     run.stopped(tradeoff.rows.empty() ? kNothingMeasured : kMeasuredIsKept);
   } else if (run.context.options.apply) {
-    apply_accuracy(run, tradeoff, *run.context.options.apply);
+    apply_accuracy(run, tradeoff, adviser, *run.context.options.apply);
   }
   run.write("report.html", tradeoff_report(run.result, tradeoff));
 }

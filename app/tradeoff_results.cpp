@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "app/text_table.hpp"
@@ -20,10 +21,16 @@ Json row_json(const Tradeoff& tradeoff, std::size_t index) {
   return json;
 }
 
-// With the bounds, by which it was chosen.
+// With the bounds, by which it was chosen; of a gradient with what its simulation adds.
 Json recommended_json(const Tradeoff& tradeoff, std::size_t index) {
+  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
   Json json = row_json(tradeoff, index);
-  json["bounds"] = errors_json(tradeoff.reference.errors->quantities(), tradeoff.rows[index].bounds);
+  json["bounds"] = errors_json(quantities, tradeoff.rows[index].bounds);
+  const std::optional<std::size_t> simulation = simulation_of(tradeoff, index);
+  if (simulation && simulation != index) {
+    json["errors"].update(errors_json(quantities, tradeoff.rows[*simulation].errors));
+    json["bounds"].update(errors_json(quantities, tradeoff.rows[*simulation].bounds));
+  }
   return json;
 }
 
@@ -33,20 +40,44 @@ std::string names_of(const std::vector<Quantity>& quantities, const std::vector<
   return names;
 }
 
-double worst_error(const TradeoffRow& row, const std::vector<std::size_t>& quantities) {
-  double worst = 0;
-  for (const std::size_t q : quantities) worst = std::max(worst, row.errors(static_cast<Eigen::Index>(q)));
-  return worst;
+// "error 3.1e-05", of several "errors: 7.5e-08 in path, 2.9e-06 in gradient of path"
+std::string errors_text(const Tradeoff& tradeoff, const TaskAdvice& advice) {
+  const Recommendation& r = advice.recommendation;
+  const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
+  const std::size_t simulation = simulation_of(tradeoff, *r.row).value_or(*r.row);
+  const auto error = [&](std::size_t q) {
+    const bool of_gradient = quantities[q].kind == QuantityKind::gradient;
+    return tradeoff.rows[of_gradient ? *r.row : simulation].errors(static_cast<Eigen::Index>(q));
+  };
+  if (r.quantities.size() == 1 && !advice.fit) return fmt::format("error {:.1e}", error(r.quantities[0]));
+  std::string text = "errors: ";
+  for (const std::size_t q : r.quantities)
+    text += fmt::format("{}{:.1e} in {}", text.ends_with(": ") ? "" : ", ", error(q), quantities[q].name);
+  if (advice.fit)
+    text +=
+        fmt::format(", {:.1e} in the sum of squares, {:.1e} in its gradient", advice.fit->cost, advice.fit->gradient);
+  return text;
 }
 
 // "for 1e-04 in track: dopri5 at rtol 1e-05, 12 ms (error 3.1e-05)"
-std::string recommendation_text(const Tradeoff& tradeoff, const Recommendation& r) {
+std::string recommendation_text(const Tradeoff& tradeoff, const TaskAdvice& advice, bool of_fit = false) {
+  const Recommendation& r = advice.recommendation;
   const std::string aim =
-      fmt::format("for {:.0e} in {}: ", r.accuracy, names_of(tradeoff.reference.errors->quantities(), r.quantities));
+      fmt::format("for {:.0e} in {}{}: ", r.accuracy, names_of(tradeoff.reference.errors->quantities(), r.quantities),
+                  of_fit ? " and the sum of squares of identify with its gradient" : "");
   if (!r.row) return aim + r.why_not;
   const TradeoffRow& row = tradeoff.rows[*r.row];
-  return aim + fmt::format("{}, {} (error {:.1e})", in_words(row.setting), duration_text(row.wall_seconds),
-                           worst_error(row, r.quantities));
+  return aim + fmt::format("{}, {} ({})", in_words(row.setting), duration_text(row.wall_seconds),
+                           errors_text(tradeoff, advice));
+}
+
+constexpr std::array kAccuracies{1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8};
+
+Json task_json(const Tradeoff& tradeoff, const TaskAdvice& advice, const std::string& words) {
+  Json json{{"accuracy", advice.recommendation.accuracy}, {"in_words", words}};
+  if (advice.recommendation.row) json.update(recommended_json(tradeoff, *advice.recommendation.row));
+  if (advice.fit) json["fit"] = {{"error", advice.fit->cost}, {"gradient_error", advice.fit->gradient}};
+  return json;
 }
 
 }  // namespace
@@ -159,14 +190,24 @@ void add_recommendations(Run& run, const Tradeoff& tradeoff) {
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
   for (std::size_t q = 0; q < quantities.size(); ++q) {
     run.context.out << '\n';
-    for (const double accuracy : {1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8}) {
+    for (const double accuracy : kAccuracies) {
       const Recommendation r = recommend(tradeoff, {q}, accuracy);
-      const std::string words = recommendation_text(tradeoff, r);
+      const std::string words = recommendation_text(tradeoff, {r, {}});
       Json json{{"quantity", quantities[q].name}, {"accuracy", accuracy}, {"in_words", words}};
       if (r.row) json.update(recommended_json(tradeoff, *r.row));
       run.result["recommendations"].push_back(json);
       run.context.out << words << '\n';
     }
+  }
+}
+
+void add_task_recommendations(Run& run, const Tradeoff& tradeoff, TaskAdviser& adviser) {
+  run.context.out << '\n';
+  for (const double accuracy : kAccuracies) {
+    const TaskAdvice advice = adviser.at(accuracy);
+    const std::string words = recommendation_text(tradeoff, advice, run.problem.identification.has_value());
+    run.result["task_recommendations"].push_back(task_json(tradeoff, advice, words));
+    run.context.out << words << '\n';
   }
 }
 
@@ -185,15 +226,11 @@ void add_outcomes(Run& run, const Tradeoff& tradeoff) {
                                  duration_text(tradeoff.wall_seconds));
 }
 
-void add_applied(Run& run, const Tradeoff& tradeoff, const Recommendation& r) {
-  const std::string words = recommendation_text(tradeoff, r);
+void add_applied(Run& run, const Tradeoff& tradeoff, const TaskAdvice& advice) {
+  const std::string words = recommendation_text(tradeoff, advice, run.problem.identification.has_value());
   run.context.out << "\napplied " << words << '\n';
-  run.result["applied"] = {{"accuracy", r.accuracy}, {"in_words", words}};
-  if (r.row) {
-    run.result["applied"].update(recommended_json(tradeoff, *r.row));
-  } else {
-    run.failed("no recommended.json: " + words);
-  }
+  run.result["applied"] = task_json(tradeoff, advice, words);
+  if (!advice.recommendation.row) run.failed("no recommended.json: " + words);
 }
 
 }  // namespace mbsopt

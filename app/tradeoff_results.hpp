@@ -4,8 +4,8 @@
 #include <string>
 
 #include "app/run.hpp"
-#include "optim/fit_errors.hpp"
 #include "optim/penalty_study.hpp"
+#include "optim/task_advice.hpp"
 #include "optim/tradeoff.hpp"
 
 namespace mbsopt {
@@ -20,9 +20,11 @@ void add_reference(Run& run, const TradeoffReference& reference);
 void add_given_settings(Run& run, const Tradeoff& tradeoff);
 void add_fit_errors(Run& run, const FitErrors& errors);
 void add_recommendations(Run& run, const Tradeoff& tradeoff);
+// For what the file is made for, a design or an identification.
+void add_task_recommendations(Run& run, const Tradeoff& tradeoff, TaskAdviser& adviser);
 void add_outcomes(Run& run, const Tradeoff& tradeoff);  // how many were measured; what was not, and why
 // What --apply chose; the run has failed where there is nothing to choose.
-void add_applied(Run& run, const Tradeoff& tradeoff, const Recommendation& recommendation);
+void add_applied(Run& run, const Tradeoff& tradeoff, const TaskAdvice& advice);
 
 void add_penalty_study(Run& run, const PenaltyStudy& study);
 

@@ -40,9 +40,10 @@ class Evaluations {
       point_.ok = false, point_.message = "a residual or its derivative is not finite";
     if (point_.ok && !std::isfinite(point_.z.squaredNorm() + point_.z_x.squaredNorm()))
       point_.ok = false, point_.message = fmt::format(
-                             "the squares of the residuals are beyond all numbers: the largest residual is {:.3g} "
-                             "(measured - model)/sigma. Look for values that are none in the data, and at sigma",
-                             point_.z.lpNorm<Eigen::Infinity>());
+                             "the squares of the residuals or of their derivatives are beyond all numbers: the largest "
+                             "residual is {:.3g} (measured - model)/sigma, the largest derivative {:.3g}. Look for "
+                             "values that are none in the data, and at sigma, that of priors too",
+                             point_.z.lpNorm<Eigen::Infinity>(), point_.z_x.lpNorm<Eigen::Infinity>());
     if (!point_.ok) {
       ++result_.failed_evaluations;
       if (result_.first_error.empty()) result_.first_error = point_.message;
@@ -102,11 +103,12 @@ class Progress : public ceres::IterationCallback {
   int left() const { return options_.max_iterations - iterations(); }
 
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& s) override {
+    if (s.iteration == 0 || s.step_is_successful) cost_ = s.cost;  // else it is the cost of the step that was refused
     if (s.iteration == 0 && count_ >= 0) return ceres::SOLVER_CONTINUE;  // the point just reported
     ++count_;
     last_ = x_;
     if (!options_.progress) return ceres::SOLVER_CONTINUE;
-    const bool go_on = options_.progress({count_, s.cost, s.gradient_max_norm, s.step_norm, x_});
+    const bool go_on = options_.progress({count_, cost_, s.gradient_max_norm, s.step_norm, x_});
     return go_on ? ceres::SOLVER_CONTINUE : ceres::SOLVER_ABORT;
   }
 
@@ -114,6 +116,7 @@ class Progress : public ceres::IterationCallback {
   const CeresOptions& options_;
   const Eigen::VectorXd& x_;  // Ceres keeps it at the last accepted point
   Eigen::VectorXd last_;
+  double cost_ = 0;  // there
   int count_ = -1;
 };
 
@@ -210,7 +213,12 @@ LeastSquaresResult solve_with_ceres(LeastSquaresProblem& problem, const Eigen::V
     result.message = "the start point cannot be evaluated: " + start.message;
     return result;
   }
+  result.z_initial = start.z;
   result.cost_initial = problem.cost(start.z);
+  if (!std::isfinite(result.cost_initial)) {
+    result.message = "the start point cannot be evaluated: the loss of its residuals is not finite";
+    return result;
+  }
 
   // Ceres projects steps onto the bounds, which is slow along an active one: variables that press against their bound
   // are held there, until nothing changes.

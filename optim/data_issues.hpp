@@ -1,5 +1,6 @@
-// Whether the data of an experiment can be used: its columns are there, its times ascend, and something was measured
-// after the start. Placed at the field of the problem that asks for it.
+// Whether the data of an experiment can be used: its columns are there, each is compared once, its times ascend, and
+// something was measured in every channel. Placed at the field of the problem that asks for it. Warnings: angles that
+// jump by a turn.
 #pragma once
 
 #include <string>
@@ -11,8 +12,8 @@
 
 namespace mbsopt {
 
-// place: "identification.experiments[0]"; start_time: of the simulation, for an experiment without its own.
+// place: "identification.experiments[0]"; scene: for its start time and its sensors.
 std::vector<SceneIssue> find_data_issues(const ExperimentSpec& experiment, const std::string& place,
-                                         const CsvTable& data, double start_time);
+                                         const CsvTable& data, const Scene& scene);
 
 }  // namespace mbsopt

@@ -8,8 +8,11 @@
 #include <stdexcept>
 
 #include "core/expression/did_you_mean.hpp"
+#include "core/integrate/simulation_warnings.hpp"
 #include "optim/design_issues.hpp"
 #include "optim/design_program.hpp"
+#include "optim/difference_comparison.hpp"
+#include "optim/integration_error.hpp"
 #include "optim/ipopt_solver.hpp"
 #include "optim/nlopt_solver.hpp"
 #include "optim/optimality.hpp"
@@ -96,6 +99,10 @@ std::vector<std::string> idle_variables(const Evaluation& start, const DesignSpe
   return warnings;
 }
 
+double missed(const DesignConstraint& c, double value) {
+  return std::max({0.0, c.lower ? *c.lower - value : 0.0, c.upper ? value - *c.upper : 0.0});
+}
+
 void describe_end(const Evaluator& evaluator, const DesignProgram& program, const NlpPoint& end, DesignResult& result) {
   for (std::size_t k = 0; k < result.variables.size(); ++k) {
     DesignVariable& v = result.variables[k];
@@ -109,7 +116,7 @@ void describe_end(const Evaluator& evaluator, const DesignProgram& program, cons
     DesignConstraint& c = result.constraints[i];
     const Eigen::Index row = static_cast<Eigen::Index>(i);
     c.value = end.c(row) * program.size(row);
-    c.violation = std::max({0.0, c.lower ? *c.lower - c.value : 0.0, c.upper ? c.value - *c.upper : 0.0});
+    c.violation = missed(c, c.value);
     c.at_lower = touches(c.value, c.lower, program.size(row)),
     c.at_upper = touches(c.value, c.upper, program.size(row));
   }
@@ -125,7 +132,44 @@ void describe_solution(Evaluator& evaluator, DesignProgram& program, const Eigen
   if (end.ok) result.optimality = optimality(program, x, end);
   const std::vector<std::optional<double>> true_values = evaluator.true_values(result.rho);
   result.objective_true = true_values[0];
-  for (std::size_t i = 0; i < result.constraints.size(); ++i) result.constraints[i].true_value = true_values[i + 1];
+  result.true_violation = result.violation;
+  for (std::size_t i = 0; i < result.constraints.size(); ++i) {
+    DesignConstraint& c = result.constraints[i];
+    c.true_value = true_values[i + 1];
+    c.true_violation = missed(c, c.true_value.value_or(c.value));
+    result.true_violation =
+        std::max(result.true_violation, c.true_violation / program.size(static_cast<Eigen::Index>(i)));
+  }
+}
+
+// A smooth maximum is below the true one, so that a limit on it lets the true one pass.
+void judge_true_extremes(const DesignProgram& program, const Evaluator& evaluator, DesignResult& result) {
+  bool beyond = false;
+  for (std::size_t i = 0; i < result.constraints.size(); ++i) {
+    const DesignConstraint& c = result.constraints[i];
+    const ObjectiveKind kind = evaluator.objectives()[i + 1].kind();
+    const bool maximum = kind == ObjectiveKind::maximum;
+    if (!maximum && kind != ObjectiveKind::minimum) continue;
+    const std::string place =
+        fmt::format("design.subject_to[{}]: the {} of '{}'", i, maximum ? "maximum" : "minimum", c.objective);
+    if (!c.true_value) {
+      beyond = true;
+      result.warnings.push_back(place +
+                                " is held by its smooth value only; the run that was to find the true one failed");
+      continue;
+    }
+    const double margin = std::abs(*c.true_value - c.value);
+    if (c.true_violation <= kConstraintTolerance * program.size(static_cast<Eigen::Index>(i))) continue;
+    beyond = true;
+    result.warnings.push_back(fmt::format(
+        "{} is held by its smooth value, {:.6g}, only: the true one is {:.6g}, {} the limit {:.6g}. Bound it with a "
+        "margin of about {:.2g}, or raise its sharpness",
+        place, c.value, *c.true_value, c.upper && *c.true_value > *c.upper ? "above" : "below",
+        c.upper && *c.true_value > *c.upper ? *c.upper : *c.lower, margin));
+  }
+  if (!beyond || result.status != SolverStatus::converged) return;
+  result.status = SolverStatus::converged_beyond_limit;
+  result.message += "; limits hold for smooth extremes only";
 }
 
 NlpResult solved(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
@@ -160,6 +204,40 @@ NlpResult solved(DesignProgram& program, const Eigen::VectorXd& x_start, const O
   solver.progress = progress;
   solver.records = records;
   return solve_with_nlopt(program, x_start, solver);
+}
+
+// Of all objectives of an evaluator.
+DifferenceComparison comparison_at(const Evaluation& start, const Evaluator& evaluator) {
+  DifferenceComparison comparison;
+  const Scene& scene = evaluator.scene();
+  for (const int k : evaluator.variables()) {
+    Parameter p = scene.parameters[static_cast<std::size_t>(k)];
+    p.value = start.rho(k);
+    comparison.variables.push_back(compared_variable(p.name, p));
+  }
+  for (std::size_t i = 0; i < evaluator.objectives().size(); ++i)
+    comparison.groups.push_back(
+        {"objective '" + evaluator.objectives()[i].name() + "'", static_cast<Eigen::Index>(i), 1});
+  comparison.f = start.psi, comparison.f_rho = start.psi_rho;
+  std::vector<std::string> names;
+  for (const ComparedVariable& v : comparison.variables) names.push_back(v.name);
+  comparison.at = [&start, &evaluator, scene, names](std::size_t k, double h) -> std::optional<Eigen::VectorXd> {
+    Eigen::VectorXd rho = start.rho;
+    rho(evaluator.variables()[k]) += h;
+    Evaluator there(scene, evaluator.objectives(), names, evaluator.options());
+    const Evaluation& e = there.values(rho);
+    if (!e.ok) return std::nullopt;
+    return e.psi;
+  };
+  comparison.tighter = [&start, &evaluator, scene, names](Eigen::VectorXd& f, Eigen::MatrixXd& f_rho) {
+    std::optional<Scene> tight = with_other_tolerances(scene);
+    if (!tight) return false;
+    Evaluator there(*std::move(tight), evaluator.objectives(), names, evaluator.options());
+    const Evaluation& e = there.gradients(start.rho);
+    f = e.psi, f_rho = e.psi_rho;
+    return e.ok;
+  };
+  return comparison;
 }
 
 // Forces written in C++ name bodies by their number.
@@ -207,6 +285,11 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
   result.gradient_choice = start.choice.empty() ? std::string(to_string(start.method)) : start.choice;
   describe_start(problem, evaluator, start, result);
   if (start.ok) result.warnings = idle_variables(start, spec, evaluator);
+  if (start.ok && options.compare_differences) {
+    DifferenceComparison comparison = comparison_at(start, evaluator);
+    comparison.go_on = [&] { return !abandoned; };
+    for (std::string& warning : comparison.warnings()) result.warnings.push_back("design.variables: " + warning);
+  }
 
   const auto progress = [&](const NlpProgress& p) {
     if (abandoned) return false;  // the iterate before the one that was not reached
@@ -222,8 +305,14 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
   result.rho = program.rho_at(solution.x);
   if (start.ok) {
     describe_end(evaluator, program, solution.point, result);
-    if (!abandoned) describe_solution(evaluator, program, solution.x, result);
+    if (!abandoned) {
+      describe_solution(evaluator, program, solution.x, result);
+      judge_true_extremes(program, evaluator, result);
+    }
   }
+  if (result.final_evaluation.statistics.jumps.empty())  // those of the solution stand beside it
+    for (const Jump& jump : start.statistics.jumps)
+      result.warnings.push_back("at the start, " + in_words(evaluator.scene(), jump));
   if (!program.hessian_failure().empty())
     result.warnings.push_back(
         "design.optimizer.hessian: could not be computed everywhere, where it was not the one "

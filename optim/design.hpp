@@ -34,6 +34,7 @@ struct DesignConstraint {
   double initial = 0, value = 0;
   std::optional<double> true_value = {};    // at the solution, where the objective is a smooth maximum or minimum
   double violation = 0;                     // amount by which the nearer bound is missed, 0 where it holds
+  double true_violation = 0;                // the same of true_value
   bool at_lower = false, at_upper = false;  // the solution touches this bound
 };
 
@@ -62,6 +63,7 @@ struct DesignResult {
   double optimality = std::numeric_limits<double>::quiet_NaN();  // at the solution, by the yardstick of all:
                                                                  // optimality.hpp; NaN where stopped
   double violation = 0;         // at the solution: largest of the constraints, each relative to its bounds
+  double true_violation = 0;    // the same with true extremes in place of smooth ones
   std::optional<long> seed;     // where the method is random
   NlpScale scale;               // by which convergence was judged
   std::string gradient_choice;  // method and why
@@ -71,7 +73,8 @@ struct DesignResult {
   double wall_seconds = 0;
   std::vector<std::string> warnings;  // sentences
   bool ok() const {
-    return status == SolverStatus::converged || status == SolverStatus::no_progress || status == SolverStatus::searched;
+    return status == SolverStatus::converged || status == SolverStatus::converged_beyond_limit ||
+           status == SolverStatus::no_progress || status == SolverStatus::searched;
   }
 };
 
@@ -81,6 +84,7 @@ struct DesignOptions {
   std::function<bool(const DesignRow&)> progress;     // after every iteration; false stops, the best so far is kept
   std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
   PointRecords* records = nullptr;                    // of an earlier run that this one goes on with
+  bool compare_differences = true;                    // at the start, difference_comparison.hpp; in the warnings
   // By which convergence is judged. Where there is none: about 1 over the objective and its gradient at the start. Runs
   // from several starts share one, so that "converged" means the same of all.
   std::optional<NlpScale> scale = {};

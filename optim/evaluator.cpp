@@ -9,11 +9,13 @@
 
 #include "core/expression/counted.hpp"
 #include "core/integrate/cvodes.hpp"
+#include "core/integrate/simulation_warnings.hpp"
 #include "optim/difference_ladder.hpp"
 #include "optim/objective_run.hpp"
 #include "optim/obstructed_parameters.hpp"
 #include "optim/parameter_values.hpp"
 #include "optim/stopwatch.hpp"
+#include "optim/unused_parameters.hpp"
 
 namespace mbsopt {
 std::string_view to_string(GradientMethod method) {
@@ -49,6 +51,42 @@ Evaluator::Evaluator(Scene scene, std::vector<Objective> objectives, const std::
   for (const int k : variables_) active_[static_cast<std::size_t>(k)] = true;
   for (std::size_t i = 0; i < objectives_.size(); ++i)
     if (objectives_[i].needs_simulation()) simulated_.push_back(i);
+  find_unused();
+}
+
+void Evaluator::find_unused() {
+  if (objectives_.empty()) return;
+  Problem judged{scene_, {}, {}, {}};
+  for (const Objective& o : objectives_)
+    if (!o.is_written_in_cpp()) judged.objectives.push_back(o.spec());
+  std::vector<SceneIssue> unused = find_unused_parameters(judged);
+  const bool opaque = judged.objectives.size() < objectives_.size() || !options_.user_forces.empty();
+  if (opaque) {  // may look at every body
+    judged.objectives.clear();
+    const std::vector<SceneIssue> by_model = find_unused_parameters(judged);
+    const auto is_used = [&](const SceneIssue& issue) {
+      return std::none_of(by_model.begin(), by_model.end(), [&](const SceneIssue& i) { return i.path == issue.path; });
+    };
+    std::erase_if(unused, is_used);
+  }
+  for (const SceneIssue& issue : unused) {
+    for (std::size_t k = 0; k < variables_.size(); ++k) {
+      if (issue.path != "parameters." + scene_.parameters[static_cast<std::size_t>(variables_[k])].name) continue;
+      if (!opaque) throw std::invalid_argument(issue.path + ": " + issue.message);
+      perhaps_unused_.push_back(k);
+    }
+  }
+}
+
+void Evaluator::refuse_zero_columns(Evaluation& e) const {
+  for (const std::size_t k : perhaps_unused_) {
+    if (!e.ok || e.psi_rho.col(static_cast<Eigen::Index>(k)).any()) continue;
+    e.ok = false;
+    e.message = fmt::format(
+        "parameters.{}: is used by nothing in the scene, and no objective or force written in C++ has a derivative in "
+        "it: its gradient entries are all exactly 0; allow_unused lifts this error",
+        scene_.parameters[static_cast<std::size_t>(variables_[k])].name);
+  }
 }
 
 Eigen::VectorXd Evaluator::start() const { return parameter_values(scene_); }
@@ -80,6 +118,7 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
       return e;
     }
     e.statistics = result.statistics;
+    if (!frozen) e.warnings = simulation_warnings(scene_, result.statistics, result.ok());
     e.steps = std::move(result.steps);
     if (!result.ok()) {
       e.ok = false, e.message = result.message;
@@ -235,7 +274,10 @@ const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
   if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho &&
       (last_.has_gradients() || !last_.ok))
     return last_;
-  if (!simulated_.empty() && !last_.has_gradients()) require_unobstructed(scene_, rho, active_, options_.user_forces);
+  if (!simulated_.empty() && !(last_.ok && last_.has_gradients())) {
+    // At other values than the scene's own the loop may close as a structure that cannot move.
+    for (const Eigen::VectorXd& at : {start(), rho}) require_unobstructed(scene_, at, active_, options_.user_forces);
+  }
   GradientMethod method = options_.method;
   std::string choice;
   if (simulated_.empty()) {
@@ -260,6 +302,7 @@ const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
                by_cvodes = method == GradientMethod::cvodes_forward || method == GradientMethod::cvodes_adjoint;
     last_ = run(rho, backward ? Sweep::backward : Sweep::forward, nullptr, by_cvodes);
   }
+  refuse_zero_columns(last_);
   last_.method = simulated_.empty() ? GradientMethod::automatic : method;
   last_.choice = std::move(choice);
   simulations_ += last_.simulations;

@@ -49,6 +49,7 @@ struct Evaluation {
   Eigen::MatrixXd psi_rho;                            // objective x variable; 0 x 0 where only values were asked for
   GradientMethod method = GradientMethod::automatic;  // the one used; automatic where no simulation was needed
   std::string choice;                                 // why, in words, where there is something to say
+  std::vector<std::string> warnings;                  // what makes these numbers doubtful, sentences
   SimulationStatistics statistics;
   StepSequence steps;
   long simulations = 0;  // that this evaluation took
@@ -65,7 +66,9 @@ struct EvaluatorOptions {
 
 class Evaluator {
  public:
-  // variables: names of parameters with respect to which derivatives are wanted; empty: all.
+  // variables: names of parameters with respect to which derivatives are wanted; empty: all. Throws
+  // std::invalid_argument: a variable that nothing uses, unless its allow_unused is set. What costs and forces written
+  // in C++ use shows in gradients(), which fail where such a variable's derivatives are all exactly 0.
   Evaluator(Scene scene, std::vector<Objective> objectives, const std::vector<std::string>& variables = {},
             EvaluatorOptions options = {});
 
@@ -95,6 +98,8 @@ class Evaluator {
   GradientMethod available(GradientMethod method, std::string& choice) const;
   void add_parameters_only(Evaluation& e, bool gradients) const;
   void add_differences(Evaluation& e) const;
+  void find_unused();
+  void refuse_zero_columns(Evaluation& e) const;
   std::vector<const Objective*> simulated() const;
 
   Scene scene_;
@@ -102,7 +107,8 @@ class Evaluator {
   std::vector<int> variables_;
   std::vector<bool> active_;
   EvaluatorOptions options_;
-  std::vector<std::size_t> simulated_;  // objectives that need a simulation
+  std::vector<std::size_t> simulated_;       // objectives that need a simulation
+  std::vector<std::size_t> perhaps_unused_;  // variables that only what is written in C++ may use
   Evaluation last_;
   long simulations_ = 0;
 };

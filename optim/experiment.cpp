@@ -73,6 +73,8 @@ Experiment::Experiment(const Scene& scene, const ExperimentSpec& spec, std::stri
   replace_laws(spec, place);
   compile_channels(spec, place);
   take_samples(spec, place, data);
+  refuse_short_laws(spec, place);
+  scene_.simulation = settings_;
   if (!unknowns_.empty()) require_unobstructed(simulated(), rho_, active_, user_forces_);
 }
 
@@ -188,6 +190,14 @@ void Experiment::take_samples(const ExperimentSpec& spec, const std::string& pla
       samples_.push_back({times_.size() - 1, c, measured});
     }
   }
+  for (std::size_t c = 0; c < channels_.size(); ++c) {
+    const bool used = std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) { return s.channel == c; });
+    if (!used && channels_[c].first > start)
+      throw std::invalid_argument(fmt::format(
+          "{}.channels[{}].delay: is up to {:.6g} s within the bounds of its parameters; no sample of '{}' comes that "
+          "long after the start at {} s, before which the model does not reach back",
+          place, c, channels_[c].first - start, spec.channels[c].column, start));
+  }
   if (times_.empty() || !(times_.back() > start))
     throw std::invalid_argument(
         fmt::format("{}: {} has no sample after the start at {} s{}", place, data.name, start,
@@ -196,6 +206,28 @@ void Experiment::take_samples(const ExperimentSpec& spec, const std::string& pla
   for (std::size_t i = 0; i < samples_.size(); ++i)
     if (samples_[i].time == first_.size()) first_.push_back(i);
   first_.push_back(samples_.size());
+}
+
+std::vector<Drive>::const_iterator Experiment::uncovered(double end) const {
+  const double slack = 1e-9 * (end - settings_.start_time);
+  return std::find_if(scene_.drives.begin(), scene_.drives.end(), [&](const Drive& drive) {
+    const std::vector<double>* const times = drive.samples ? &drive.samples->times : nullptr;
+    return times && !times->empty() && (settings_.start_time < times->front() - slack || end > times->back() + slack);
+  });
+}
+
+void Experiment::refuse_short_laws(const ExperimentSpec& spec, const std::string& place) const {
+  const auto drive = uncovered(settings_.end_time);
+  if (drive == scene_.drives.end()) return;
+  std::string path = fmt::format("drives[{}].law", drive - scene_.drives.begin());
+  for (std::size_t i = 0; i < spec.drives.size(); ++i)
+    if (spec.drives[i].drive == drive->name) path = fmt::format("{}.drives[{}].law", place, i);
+  throw std::invalid_argument(
+      fmt::format("{}: its samples go from {:.6g} s to {:.6g} s, the experiment '{}' from {:.6g} s to {:.6g} s; give "
+                  "that an end_time, "
+                  "or a law of its own",
+                  path, drive->samples->times.front(), drive->samples->times.back(), spec.name, settings_.start_time,
+                  settings_.end_time));
 }
 
 Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limits& limits) const {
@@ -229,8 +261,14 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
       settings.end_time = std::max(settings.end_time, t);
     }
 
+  if (const auto drive = uncovered(settings.end_time); drive != scene_.drives.end()) {
+    r.message = fmt::format("a negative delay asks for the motion at {:.6g} s, beyond the samples of the drive '{}'",
+                            settings.end_time, drive->name);
+    return r;
+  }
   try {
-    const Mechanism mechanism(scene_, rho, active_, user_forces_);
+    const std::vector<bool> none(active_.size(), false);
+    const Mechanism mechanism(scene_, rho, limits.derivatives ? active_ : none, user_forces_);
     Eigen::VectorXd y_bar(mechanism.states()), rho_bar(rho.size());
     std::size_t seen = 0;
     const auto take = [&](std::size_t i, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
@@ -257,7 +295,7 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
     RunOptions options;
     options.progress = limits.progress;
     const SimulationResult result = simulate_tlm(mechanism, settings, {}, sampling, options);
-    r.steps = result.statistics.steps;
+    r.steps = result.statistics.steps, r.jumps = result.statistics.jumps;
     r.ok = result.ok() && seen == samples_.size();
     r.message = result.message;
   } catch (const SceneError& error) {  // a field that these values drive out of its range

@@ -27,6 +27,12 @@ namespace mbsopt {
 
 struct UserForce;
 
+struct ExperimentLimits {
+  std::function<bool(double t)> progress;  // after accepted steps; false stops
+  std::optional<long> max_steps;           // instead of the simulation's
+  bool derivatives = true;                 // else z_u has no meaning
+};
+
 class Experiment {
  public:
   struct Unknown {
@@ -40,10 +46,11 @@ class Experiment {
   };
   struct Residuals {
     bool ok = false;
-    std::string message;  // why not
-    Eigen::VectorXd z;    // per sample
-    Eigen::MatrixXd z_u;  // sample x all unknowns
-    long steps = 0;       // of the simulation
+    std::string message;      // why not
+    Eigen::VectorXd z;        // per sample
+    Eigen::MatrixXd z_u;      // sample x all unknowns
+    long steps = 0;           // of the simulation
+    std::vector<Jump> jumps;  // of it
   };
 
   // rho: values of parameters that are not unknown here (overrides are applied on top). Throws std::invalid_argument
@@ -52,10 +59,7 @@ class Experiment {
              const Eigen::VectorXd& rho, std::vector<Unknown> unknowns,
              std::vector<std::shared_ptr<const UserForce>> user_forces = {});
 
-  struct Limits {
-    std::function<bool(double t)> progress;  // after accepted steps; false stops
-    std::optional<long> max_steps;           // instead of the simulation's
-  };
+  using Limits = ExperimentLimits;
   Residuals residuals(const Eigen::VectorXd& u, const Limits& limits = {}) const;
 
   // What is simulated, as a scene: with its laws and its span, at the values that are not unknown and those at which
@@ -85,6 +89,9 @@ class Experiment {
   double largest_delay(const Program& delay) const;
   void refuse_time_dependence(const Sensor& sensor, const Program& delay, const std::string& place) const;
   void take_samples(const ExperimentSpec& spec, const std::string& place, const CsvTable& data);
+  // The first drive whose sampled law ends before `end` or begins after the start; end() where all reach.
+  std::vector<Drive>::const_iterator uncovered(double end) const;
+  void refuse_short_laws(const ExperimentSpec& spec, const std::string& place) const;
 
   Scene scene_;
   SimulationSettings settings_;

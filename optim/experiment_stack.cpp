@@ -20,6 +20,16 @@ Eigen::Index priors_of(const std::vector<UnknownParameter>& unknowns) {
   return std::count_if(unknowns.begin(), unknowns.end(), [](const auto& u) { return u.description.prior.has_value(); });
 }
 
+// f(model, sample) of every sample.
+template <class F>
+Eigen::VectorXd per_sample(const std::vector<ExperimentStack::Member>& members, F&& f) {
+  Eigen::VectorXd values(samples_of(members));
+  Eigen::Index row = 0;
+  for (const ExperimentStack::Member& m : members)
+    for (const Experiment::Sample& sample : m.model.samples()) values(row++) = f(m.model, sample);
+  return values;
+}
+
 }  // namespace
 
 ExperimentStack::ExperimentStack(std::vector<Member> members, const std::vector<UnknownParameter>& unknowns,
@@ -33,6 +43,15 @@ ExperimentStack::ExperimentStack(std::vector<Member> members, const std::vector<
     if (const auto& prior = unknowns[i].description.prior)
       priors_.push_back({static_cast<Eigen::Index>(i), prior->mean, prior->sigma});
   plain = static_cast<Eigen::Index>(priors_.size());
+}
+
+Eigen::VectorXd ExperimentStack::measured() const {
+  return per_sample(members_, [](const Experiment&, const Experiment::Sample& sample) { return sample.measured; });
+}
+
+Eigen::VectorXd ExperimentStack::sigma() const {
+  return per_sample(members_,
+                    [](const Experiment& model, const Experiment::Sample& s) { return model.sigma(s.channel); });
 }
 
 Experiment::Residuals ExperimentStack::residuals(const Member& member, const Eigen::VectorXd& u) {

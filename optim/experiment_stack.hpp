@@ -45,8 +45,10 @@ class ExperimentStack : public LeastSquaresProblem {
   void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) override;
 
   std::vector<Member>& members() { return members_; }
+  const std::vector<Member>& members() const { return members_; }
   const VariableScaling& scaling() const { return scaling_; }
   Eigen::Index samples() const { return size - plain; }
+  Eigen::VectorXd measured() const, sigma() const;  // per sample
   long simulations() const { return simulations_; }
   std::function<bool(double t)> go_on;  // within a simulation; false abandons it
   ResidualRecords* records = nullptr;

@@ -66,6 +66,9 @@ class ExpressionCost : public PointCost {
     return value;
   }
 
+  const Eigen::VectorXd* rho() const override { return &mechanism_.rho(); }
+  const Program* program() const override { return &compiled_->program; }
+
  private:
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
   // A thread's arrays serve any expression; a program gets as many numbers as it has inputs.

@@ -4,30 +4,23 @@
 
 #include <cmath>
 #include <exception>
+#include <utility>
 
 #include "optim/parameter_values.hpp"
 #include "optim/tradeoff_reference.hpp"
 #include "optim/unknown_parameters.hpp"
 
 namespace mbsopt {
-namespace {
 
 using Eigen::Index;
 
-struct Fit {
-  std::string message;  // why there is none
-  double cost = 0;
-  Eigen::VectorXd gradient;
-  bool ok() const { return message.empty(); }
-};
-
-class FitRuns {
+class FitErrorMeasure::Runs {
  public:
-  FitRuns(const Problem& problem, const std::vector<CsvTable>& data, const std::function<bool()>& interrupted)
+  Runs(const Problem& problem, const std::vector<CsvTable>& data, std::function<bool()> interrupted)
       : scene_(problem.scene),
         spec_(*problem.identification),
         data_(data),
-        interrupted_(interrupted),
+        interrupted_(std::move(interrupted)),
         unknowns_(unknowns_of_fit(scene_, spec_)),
         size_(static_cast<Index>(unknowns_.size())) {
     for (Index k = 0; k < size_.size(); ++k) {
@@ -35,6 +28,8 @@ class FitRuns {
       size_(k) = typical_size(p, p.value);
     }
   }
+
+  const SimulationSettings& own() const { return scene_.simulation; }
 
   Fit at(const SimulationSettings& settings) const {
     Fit fit;
@@ -69,54 +64,68 @@ class FitRuns {
   const Scene& scene_;
   const IdentificationSpec& spec_;
   const std::vector<CsvTable>& data_;
-  const std::function<bool()>& interrupted_;
+  const std::function<bool()> interrupted_;
   std::vector<UnknownParameter> unknowns_;
   Eigen::VectorXd size_;
 };
 
-}  // namespace
+FitErrorMeasure::FitErrorMeasure(const Problem& problem, const std::vector<CsvTable>& data,
+                                 std::function<bool()> interrupted) {
+  try {
+    runs_ = std::make_unique<const Runs>(problem, data, std::move(interrupted));
+    find_right();
+  } catch (const std::exception& error) {
+    right_.message = error.what();
+  }
+}
+
+FitErrorMeasure::~FitErrorMeasure() = default;
+
+void FitErrorMeasure::find_right() {
+  const SimulationSettings& own = runs_->own();
+  const auto tight = [&](const char* integrator, double rtol, double max_step) {
+    SimulationSettings s = with_tolerance(own, integrator, rtol);
+    s.formulation = constrained(s.formulation);
+    s.integrator.max_step = max_step;
+    return s;
+  };
+  constexpr double kSame = 1e-9, kShorter = 3, kShortest = 1e-4;  // steps: of the run
+  for (double part = 1e-2; part > kShortest; part /= kShorter) {
+    const double max_step = part * (own.end_time - own.start_time);
+    Fit first = runs_->at(tight("dopri853", 1e-12, max_step));
+    const Fit second = runs_->at(tight("gauss6", 1e-11, max_step));
+    const bool have_one = right_.gradient.size() > 0;
+    if (!first.ok() || !second.ok()) {
+      if (!have_one) right_.message = first.ok() ? second.message : first.message;
+      break;
+    }
+    const FitErrors::Apart certificate = runs_->apart(second, first);
+    if (have_one && !(certificate.cost + certificate.gradient < certificate_.cost + certificate_.gradient)) break;
+    right_ = std::move(first), certificate_ = certificate;
+    if (certificate.largest() < kSame) break;
+  }
+}
+
+FitErrors FitErrorMeasure::found() const { return {right_.message, right_.cost, certificate_, {}}; }
+
+FitErrors::Setting FitErrorMeasure::at(const NamedSettings& named) const {
+  FitErrors::Setting setting{named.name, {}, {}};
+  try {
+    const Fit fit = runs_->at(named.simulation);
+    setting.message = fit.message;
+    if (fit.ok()) setting.error = runs_->apart(fit, right_);
+  } catch (const std::exception& error) {
+    setting.message = error.what();
+  }
+  return setting;
+}
 
 FitErrors measure_fit_errors(const Problem& problem, const std::vector<CsvTable>& data,
                              const std::vector<NamedSettings>& settings, const std::function<bool()>& interrupted) {
-  FitErrors errors;
-  try {
-    const FitRuns runs(problem, data, interrupted);
-    const SimulationSettings& own = problem.scene.simulation;
-    const auto tight = [&](const char* integrator, double rtol, double max_step) {
-      SimulationSettings s = with_tolerance(own, integrator, rtol);
-      s.formulation = constrained(s.formulation);
-      s.integrator.max_step = max_step;
-      return s;
-    };
-    constexpr double kSame = 1e-9, kShorter = 3, kShortest = 1e-4;  // steps: of the run
-    Fit right;
-    for (double part = 1e-2; part > kShortest; part /= kShorter) {
-      const double max_step = part * (own.end_time - own.start_time);
-      Fit first = runs.at(tight("dopri853", 1e-12, max_step));
-      const Fit second = runs.at(tight("gauss6", 1e-11, max_step));
-      if (!first.ok() || !second.ok()) {
-        if (right.gradient.size() == 0) errors.message = first.ok() ? second.message : first.message;
-        break;
-      }
-      const FitErrors::Apart certificate = runs.apart(second, first);
-      const bool nearer =
-          certificate.cost + certificate.gradient < errors.certificate.cost + errors.certificate.gradient;
-      if (right.gradient.size() > 0 && !nearer) break;
-      right = std::move(first), errors.certificate = certificate;
-      if (certificate.cost < kSame && certificate.gradient < kSame) break;
-    }
-    errors.cost = right.cost;
-    if (!errors.ok()) return errors;
-    for (const NamedSettings& s : settings) {
-      FitErrors::Setting& found = errors.settings.emplace_back();
-      found.name = s.name;
-      const Fit fit = runs.at(s.simulation);
-      found.message = fit.message;
-      if (fit.ok()) found.error = runs.apart(fit, right);
-    }
-  } catch (const std::exception& error) {
-    errors.message = error.what();
-  }
+  const FitErrorMeasure measure(problem, data, interrupted);
+  FitErrors errors = measure.found();
+  for (const NamedSettings& named : settings)
+    if (errors.ok()) errors.settings.push_back(measure.at(named));
   return errors;
 }
 

@@ -7,7 +7,9 @@
 //   errors.settings.at(0).cost;   // |cost - cost*| / |cost*|
 #pragma once
 
+#include <Eigen/Core>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -21,6 +23,7 @@ struct FitErrors {
   // Relative; of the gradient |D (g - g*)|/|D g*|, D the sizes of the unknowns on the diagonal.
   struct Apart {
     double cost = 0, gradient = 0;
+    double largest() const { return cost > gradient ? cost : gradient; }
   };
   struct Setting {
     std::string name;
@@ -37,6 +40,31 @@ struct FitErrors {
 struct NamedSettings {
   std::string name;
   SimulationSettings simulation;
+};
+
+// The right cost and gradient, found once, and errors of any settings against them.
+class FitErrorMeasure {
+ public:
+  // data: one table per experiment; it and the problem must outlive this.
+  FitErrorMeasure(const Problem& problem, const std::vector<CsvTable>& data, std::function<bool()> interrupted = {});
+  ~FitErrorMeasure();
+
+  FitErrors found() const;                                  // without settings
+  FitErrors::Setting at(const NamedSettings& named) const;  // only where found().ok()
+
+ private:
+  class Runs;
+  struct Fit {
+    std::string message;  // why there is none
+    double cost = 0;
+    Eigen::VectorXd gradient;
+    bool ok() const { return message.empty(); }
+  };
+  void find_right();
+
+  std::unique_ptr<const Runs> runs_;
+  Fit right_;
+  FitErrors::Apart certificate_;
 };
 
 // data: one table per experiment.

@@ -91,7 +91,9 @@ struct GradientCheck {
   std::optional<ContinuousCheck> continuous;  // where it was asked for
   MethodCost simulation, tlm_cost, adjoint_cost, frozen_cost, free_cost;  // differences: of all of them
   int timing_rounds = 0;
-  SimulationStatistics statistics;  // of the base run
+  SimulationStatistics statistics;       // of the base run
+  std::vector<std::string> warnings;     // of the base run, and what explains disagreement; sentences
+  std::vector<std::string> wrong_terms;  // of forces and costs written in C++ (user_terms.hpp), sentences
   long simulations = 0;
   bool passed() const;
 };

@@ -9,6 +9,7 @@
 
 #include "core/expression/counted.hpp"
 #include "core/expression/did_you_mean.hpp"
+#include "optim/angle_doubts.hpp"
 #include "optim/ceres_solver.hpp"
 #include "optim/experiment_stack.hpp"
 #include "optim/parameter_values.hpp"
@@ -78,9 +79,14 @@ class Identification {
     data.names = names_of(unknowns, spec_);
     for (const UnknownParameter& u : unknowns) data.units.push_back(u.description.unit);
     data.loss = spec_.loss, data.sigma_is_known = spec_.sigma_is_known;
+    data.change = u_x.cwiseAbs();
+    data.record = stack.measured().cwiseQuotient(stack.sigma()).norm();
     const IntegratorSettings& integrator = scene_.simulation.integrator;
     if (!integrator.step) data.accuracy = std::min(kTolerances * integrator.rtol, kLeastAccuracy);
-    return fit_statistics(data);
+    FitStatistics statistics = fit_statistics(data);
+    if (abandoned_ || solution.status != SolverStatus::converged)
+      withhold_errors(statistics, "they hold at a minimum, and the fit ended before it reached one");
+    return statistics;
   }
 
   std::vector<FittedParameter> described(const std::vector<UnknownParameter>& unknowns, const Eigen::VectorXd& values,
@@ -124,6 +130,7 @@ class Identification {
   LeastSquaresResult minimised(ExperimentStack& stack, const Eigen::VectorXd& x, bool of_fit) {
     CeresOptions solver = solver_options();
     if (!of_fit) return solve_with_ceres(stack, x, solver);
+    const Eigen::VectorXd sigma = stack.sigma();
     const int before = result_.iterations;
     solver.progress = [&](const LeastSquaresProgress& p) {
       result_.history.push_back(
@@ -131,6 +138,10 @@ class Identification {
       return !options_.progress || options_.progress(result_.history.back());
     };
     LeastSquaresResult solution = solve_with_ceres(stack, x, solver);
+    if (apart_at_start_.size() == 0 && solution.z_initial.size() > 0) {
+      apart_at_start_ = solution.z_initial;
+      apart_at_start_.head(stack.samples()).array() *= sigma.array();
+    }
     result_.iterations += solution.iterations;
     result_.evaluations += solution.evaluations, result_.failed_evaluations += solution.failed_evaluations;
     return solution;
@@ -141,9 +152,9 @@ class Identification {
     stack.loss = loss;
     LeastSquaresResult solution = minimised(stack, x, of_fit);
     if (!of_fit || !estimates_sigma(spec_)) return solution;
-    const double cost_initial = solution.cost_initial;
     for (int round = 0; solution.status == SolverStatus::converged; ++round) {
       const SigmaEstimates sigmas = estimated_sigmas(stack, spec_, solution.point.z);
+      sigmas_are_estimated_ = sigmas.change < kSigmaChange || round == kSigmaRounds;
       if (sigmas.change < kSigmaChange) break;
       if (round == kSigmaRounds) {
         solution.message += fmt::format("; estimated sigmas still change by {:.1g} of themselves", sigmas.change);
@@ -152,8 +163,49 @@ class Identification {
       use_sigmas(stack, sigmas);
       solution = minimised(stack, solution.x, of_fit);
     }
-    solution.cost_initial = cost_initial;
     return solution;
+  }
+
+  // The residuals of the start, by the sigmas of the end.
+  Eigen::VectorXd z_of_start(const ExperimentStack& stack) const {
+    Eigen::VectorXd z = apart_at_start_;
+    z.head(stack.samples()).array() /= stack.sigma().array();
+    return z;
+  }
+
+  // A loss without pull far out has a minimum wherever all samples are far out.
+  void refuse_without_pull(const ExperimentStack& stack, const LeastSquaresResult& solution) {
+    if (result_.status != SolverStatus::converged) return;
+    const Eigen::VectorXd& z = solution.point.z;
+    const Eigen::Index pulling =
+        std::count_if(z.begin(), z.begin() + stack.samples(), [&](double x) { return stack.loss.at(x * x).rho1 > 0; });
+    if (pulling + stack.plain >= stack.variables()) return;
+    result_.status = SolverStatus::failed;
+    result_.message = fmt::format(
+        "{} of {} lie within the scale of the loss ({:g} sigma), beyond which a sample has no pull; they "
+        "cannot "
+        "determine {}. Is sigma too small, or are these other data than the model's?",
+        pulling, counted(stack.samples(), "sample"), stack.loss.s(), counted(stack.variables(), "parameter"));
+  }
+
+  void warn_of(const ExperimentStack& stack, const LeastSquaresResult& solution) {
+    for (const std::string& name : spec_.variables)
+      for (const Parameter& p : scene_.parameters)
+        if (p.name == name && is_held(p))
+          result_.warnings.push_back(fmt::format(
+              "parameters.{}.lower: is {}, as is the upper bound: it stays there and is not fitted", name, *p.lower));
+    if (solution.point.z.size() == 0) return;
+    if (estimates_sigma(spec_) && !sigmas_are_estimated_)
+      result_.warnings.push_back("the fit ended before the sigmas were estimated");
+    const Eigen::VectorXd z = solution.point.z.head(stack.samples());
+    const Eigen::Index beyond = (z.array().abs() > stack.loss.s()).count();
+    if (2 * beyond > stack.samples())
+      result_.warnings.push_back(fmt::format(
+          "identification.loss: {} of {} lie beyond its scale, {:g} sigma: these are no outliers. Sigma is too small, "
+          "the model is wrong, or the fit ended in another minimum",
+          beyond, counted(stack.samples(), "sample"), stack.loss.s()));
+    for (std::string& doubt : angle_doubts(scene_, spec_, stack, z_of_start(stack), z))
+      result_.warnings.push_back(std::move(doubt));
   }
 
   // Tukey's loss has no pull far out, so that a start there would find nothing: Huber's estimate comes first.
@@ -180,17 +232,20 @@ class Identification {
     const LeastSquaresResult solution = solved(stack, scaling.to_x(start_of(unknowns)));
     result_.status = abandoned_ ? SolverStatus::stopped : solution.status;
     result_.message = abandoned_ ? "stopped on request" : solution.message;
-    result_.cost_initial = solution.cost_initial, result_.cost_final = solution.cost_final;
+    result_.cost_final = solution.cost_final;
+    if (apart_at_start_.size() > 0) result_.cost_initial = stack.cost(z_of_start(stack));
     result_.samples = static_cast<std::size_t>(stack.samples());
     result_.experiments.resize(spec_.experiments.size());
     const Eigen::VectorXd values = scaling.to_rho(solution.x);
     const bool usable = solution.point.z.size() > 0;
+    if (usable) refuse_without_pull(stack, solution);
     if (usable) result_.statistics = statistics_at(solution, stack, unknowns);
+    warn_of(stack, solution);
     result_.parameters = described(unknowns, values, result_.statistics);
     shared_ = parameter_values(scene_);
     for (std::size_t i = 0; i < unknowns.size(); ++i)
       if (unknowns[i].shared) shared_(unknowns[i].parameter) = values(static_cast<Eigen::Index>(i));
-    if (usable) score_all(stack, solution.point.z);
+    if (usable) score_all(stack, solution.point.z, sigmas_are_estimated_);
     if (result_.status == SolverStatus::converged)
       for (const Eigen::Index k : profiled)
         if (!abandoned_) result_.profiles.push_back(profile_of(stack, k, solution.x));
@@ -270,15 +325,15 @@ class Identification {
                     solution.point.z.size() > 0 ? statistics_at(solution, stack, unknowns) : FitStatistics());
       z = solution.point.z;
     }
-    if (z.size() > 0) score_all(stack, z);
+    if (z.size() > 0) score_all(stack, z, false);
     result_.simulations += stack.simulations();
   }
 
-  void score_all(ExperimentStack& stack, const Eigen::VectorXd& z) {
+  void score_all(ExperimentStack& stack, const Eigen::VectorXd& z, bool estimated) {
     Eigen::Index row = 0;
     for (const ExperimentStack::Member& m : stack.members()) {
       const Eigen::Index n = static_cast<Eigen::Index>(m.model.samples().size());
-      score_experiment(spec_.experiments[m.experiment], m.model, spec_.loss, z.segment(row, n), m.experiment,
+      score_experiment(spec_.experiments[m.experiment], m.model, spec_.loss, z.segment(row, n), estimated, m.experiment,
                        result_.experiments[m.experiment], result_.residuals);
       row += n;
     }
@@ -299,8 +354,9 @@ class Identification {
   const IdentificationOptions& options_;
   IdentificationResult result_;
   std::function<bool(double t)> go_on_;
-  bool abandoned_ = false;
-  Eigen::VectorXd shared_;  // all parameters, the shared ones as fitted
+  bool abandoned_ = false, sigmas_are_estimated_ = false;
+  Eigen::VectorXd apart_at_start_;  // measured - model, then the residuals of the priors
+  Eigen::VectorXd shared_;          // all parameters, the shared ones as fitted
 };
 
 }  // namespace

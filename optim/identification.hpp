@@ -41,9 +41,9 @@ struct FittedParameter {
   double initial = 0, value = 0;
   std::optional<double> lower, upper;
   std::optional<Prior> prior;
-  bool at_lower = false, at_upper = false;  // then its std_error, computed as if it were free, says little
-  double std_error = 0;                     // infinite where the data do not determine it
-  double ci95[2] = {0, 0};
+  bool at_lower = false, at_upper = false;     // then its std_error, computed as if it were free, says little
+  double std_error = FitStatistics::kUnknown;  // infinite where the data do not determine it
+  double ci95[2] = {FitStatistics::kUnknown, FitStatistics::kUnknown};
 };
 
 struct ChannelFit {
@@ -52,8 +52,8 @@ struct ChannelFit {
   double rms = 0;                        // of measured - model, in the column's units
   double rms_scaled = 0;                 // of z
   double sigma = 1;
-  bool sigma_is_estimated = false;
-  ResidualAnalysis analysis;     // of z
+  bool sigma_is_estimated = false;  // not yet where the fit was stopped before
+  ResidualAnalysis analysis;        // of z
   std::size_t beyond_scale = 0;  // samples with |z| above the scale of the loss, which count for less than their square
 };
 
@@ -78,7 +78,7 @@ struct ResidualRow {
 // One iteration of the solver.
 struct FitRow {
   int iteration = 0;
-  double cost = 0;             // what is minimised
+  double cost = 0;             // what is minimised, by the loss and the sigmas of this iteration
   double gradient_norm = 0;    // largest entry, of the scaled variables
   double step_norm = 0;        // of the scaled variables
   Eigen::VectorXd parameters;  // in the order of IdentificationResult::parameters
@@ -104,7 +104,8 @@ struct IdentificationResult {
   std::vector<ResidualRow> residuals;  // by experiment, time, channel
   std::vector<FitRow> history;
   std::vector<ParameterProfile> profiles;
-  double cost_initial = 0, cost_final = 0;  // what is minimised
+  double cost_initial = 0, cost_final = 0;  // what is minimised, both by the loss and the sigmas of the end
+  std::vector<std::string> warnings;        // sentences, some after the path of what they are about
   std::size_t samples = 0;                  // fitted
   int iterations = 0;
   long evaluations = 0, failed_evaluations = 0;  // points at which all experiments were simulated, with derivatives

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/scene/scene.hpp"
@@ -27,6 +28,9 @@ struct IntegrationErrorOptions {
   std::function<bool(double t)> progress = {};  // within a simulation; false abandons it
   GradientMethod method = GradientMethod::automatic;
 };
+
+// The scene with tolerances ten times tighter, or looser; none where its steps are fixed.
+std::optional<Scene> with_other_tolerances(Scene scene);
 
 // psi, psi_rho: at the parameters and tolerances of the scene.
 IntegrationError integration_error(const Scene& scene, const std::vector<Objective>& objectives,

@@ -61,7 +61,8 @@ struct LeastSquaresProgress {
 };
 
 struct LeastSquaresResult : SolverOutcome {
-  LeastSquaresPoint point;  // at x
+  LeastSquaresPoint point;    // at x
+  Eigen::VectorXd z_initial;  // at the start; empty where that could not be evaluated
   double cost_initial = 0, cost_final = 0;
 };
 

@@ -31,6 +31,8 @@ class Exponential final : public PointCost {
     x_->add_gradient(at, scale * k_ * e, y_bar, rho_bar);
     return e;
   }
+  const Eigen::VectorXd* rho() const override { return x_->rho(); }
+  const Program* program() const override { return x_->program(); }
 
  private:
   std::shared_ptr<const PointCost> x_;
@@ -49,6 +51,8 @@ class Square final : public PointCost {
     x_->add_gradient(at, 2 * scale * x, y_bar, rho_bar);
     return x * x;
   }
+  const Eigen::VectorXd* rho() const override { return x_->rho(); }
+  const Program* program() const override { return x_->program(); }
 
  private:
   std::shared_ptr<const PointCost> x_;
@@ -58,7 +62,7 @@ std::span<const double> view(const Eigen::VectorXd& x) { return {x.data(), stati
 
 }  // namespace
 
-Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec.name) {
+Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec.name), spec_(spec) {
   const std::string place = "objectives." + spec.name;
   auto compile = [&](const std::optional<Expression>& expression, const std::string& part) {
     std::optional<CostExpression> result;
@@ -96,7 +100,10 @@ Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec
 
 Objective::Objective(std::string name, std::shared_ptr<const RunningCost> running,
                      std::shared_ptr<const TerminalCost> terminal)
-    : name_(std::move(name)), user_running_(std::move(running)), user_terminal_(std::move(terminal)) {}
+    : name_(std::move(name)), user_running_(std::move(running)), user_terminal_(std::move(terminal)) {
+  if (!user_running_ && !user_terminal_)
+    throw std::invalid_argument(fmt::format("objective '{}': has neither a running nor a terminal cost (null)", name_));
+}
 
 bool Objective::needs_simulation() const {
   return running_ || terminal_ || !samples_.empty() || user_running_ || user_terminal_;

@@ -33,7 +33,7 @@ class Objective {
  public:
   // Throws std::invalid_argument: "objectives.track.running: unknown name ...".
   Objective(const Scene& scene, const ObjectiveSpec& spec);
-  // Written in C++; either part may be absent (null).
+  // Written in C++; either part may be absent (null), not both (std::invalid_argument).
   Objective(std::string name, std::shared_ptr<const RunningCost> running, std::shared_ptr<const TerminalCost> terminal);
 
   const std::string& name() const { return name_; }
@@ -57,6 +57,7 @@ class Objective {
   const std::vector<Sample>& samples() const { return samples_; }
   double exponent() const { return kind_ == ObjectiveKind::maximum ? sharpness_ : -sharpness_; }  // k of an extreme
   bool is_written_in_cpp() const { return user_running_ || user_terminal_; }
+  const ObjectiveSpec& spec() const { return spec_; }  // of one that is not
   // A sum of parts whose second derivatives in parameters and sensors are 0.
   bool is_linear() const;
 
@@ -68,6 +69,7 @@ class Objective {
 
  private:
   std::string name_;
+  ObjectiveSpec spec_;
   ObjectiveKind kind_ = ObjectiveKind::sum;
   double sharpness_ = 1, duration_ = 1;
   std::optional<CostExpression> running_, terminal_;

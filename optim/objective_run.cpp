@@ -11,7 +11,8 @@
 namespace mbsopt {
 namespace {
 
-// Largest of values given one after another, with the parabola through each three whose middle is the highest.
+// Largest of values given one after another, and where parabolas through each three whose middle is the highest have
+// their tops beyond it. Such a top is a place to look at, no value: between few points it may be anything.
 class Peak {
  public:
   void add(double t, double x) {
@@ -24,14 +25,22 @@ class Peak {
     if (!(s0 < 0 && s2 > 0)) return;
     const double d0 = (x_[0] - x_[1]) / s0, d2 = (x_[2] - x_[1]) / s2;
     const double c = (d2 - d0) / (s2 - s0), b = d0 - c * s0;
-    if (c < 0) largest_ = std::max(largest_, x_[1] - b * b / (4 * c));
+    if (c < 0) tops_.push_back({t_[1] - b / (2 * c), x_[1] - b * b / (4 * c)});
   }
   double largest() const { return largest_; }
+  void add_places(std::vector<double>& times) const {
+    for (const Top& top : tops_)
+      if (top.x > largest_) times.push_back(top.t);
+  }
 
  private:
+  struct Top {
+    double t, x;
+  };
   double largest_ = -std::numeric_limits<double>::infinity();
   double t_[3] = {}, x_[3] = {};
   int count_ = 0;
+  std::vector<Top> tops_;
 };
 
 }  // namespace
@@ -118,6 +127,10 @@ std::vector<std::optional<double>> true_extremes(const std::vector<const Objecti
   // CVODES takes its own steps again.
   const RunOptions options{is_cvodes(settings.integrator.type) ? nullptr : &steps, {}};
   if (!simulate(mechanism, settings, {}, sampling, options).ok()) return values;
+  sampling.times.clear();
+  for (const Tracked& t : tracked) t.peak.add_places(sampling.times);
+  std::sort(sampling.times.begin(), sampling.times.end());
+  if (!sampling.times.empty() && !simulate(mechanism, settings, {}, sampling, options).ok()) return values;
   for (const Tracked& t : tracked) values[t.objective] = t.sign * t.peak.largest();
   return values;
 }

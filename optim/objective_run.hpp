@@ -37,7 +37,7 @@ class ObjectiveRun {
 };
 
 // The largest (smallest) value of each smooth maximum's (minimum's) expression on given steps: on the dense output at
-// eight points of each step, and at the top of the parabola through each highest three of them.
+// eight points of each step, and where the parabolas through three of them have tops beyond: a value that is reached.
 std::vector<std::optional<double>> true_extremes(const std::vector<const Objective*>& objectives,
                                                  const Mechanism& mechanism, const SimulationSettings& settings,
                                                  const StepSequence& steps);

@@ -1,6 +1,7 @@
 #include "optim/problem_issues.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "core/scene/checker.hpp"
 #include "optim/design_issues.hpp"
@@ -55,6 +56,8 @@ void check_meaning(Checker& checker, const DesignSpec& design) {
 void check_meaning(Checker& checker, const ChannelSpec& channel) {
   const std::optional<double> sigma = checker.facts().value(channel.sigma);
   if (sigma && *sigma <= 0) checker.issue(checker.path("sigma"), "is " + text_of(*sigma) + ", it must be positive");
+  if (channel.gain.is_number() && channel.gain.number() == 0)
+    checker.issue(checker.path("gain"), "is 0: nothing of the sensor '" + channel.sensor + "' is compared then");
 }
 
 void check_meaning(Checker& checker, const ExperimentSpec& experiment) {
@@ -71,6 +74,47 @@ void check_meaning(Checker& checker, const ExperimentSpec& experiment) {
                                                 " s, which must be after its start at " + text_of(start) + " s");
 }
 
+namespace {
+
+// Samples that two experiments share.
+void check_shared_samples(Checker& checker, const std::vector<ExperimentSpec>& experiments, const std::string& list) {
+  const double start = checker.facts().scene().simulation.start_time;
+  const double never = std::numeric_limits<double>::infinity();
+  const auto column_of_both = [](const ExperimentSpec& a, const ExperimentSpec& b) -> const std::string* {
+    for (const ChannelSpec& x : a.channels)
+      for (const ChannelSpec& y : b.channels)
+        if (x.column == y.column) return &x.column;
+    return nullptr;
+  };
+  for (std::size_t i = 0; i < experiments.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      const ExperimentSpec &a = experiments[i], &b = experiments[k];
+      if (a.data != b.data || a.time != b.time || (a.validate && b.validate)) continue;
+      const double from = std::max(a.start_time.value_or(start), b.start_time.value_or(start));
+      const double to = std::min(a.end_time.value_or(never), b.end_time.value_or(never));
+      const std::string* const column = column_of_both(a, b);
+      if (!column || from >= to) continue;
+      checker.warning(child_path(list, i) + ".data",
+                      "its samples of '" + *column + "' from " + text_of(from) + " s on belong to experiments[" +
+                          std::to_string(k) + "] as well: " +
+                          (a.validate || b.validate ? "what is fitted to them is no test of the model"
+                                                    : "they count twice, and the standard errors come out too small"));
+    }
+  }
+}
+
+void check_loss(Checker& checker, const Loss& loss) {
+  if (!loss.scale) return;
+  const std::string path = checker.path("loss") + ".scale";
+  constexpr double kDigits = 1e8;  // its square is the accuracy of numbers, beyond which a loss has no shape
+  if (loss.type == LossType::squared)
+    checker.issue(path, "is given with the loss 'squared', which has none");
+  else if (*loss.scale < 1 / kDigits || *loss.scale > kDigits)
+    checker.issue(path, "is " + text_of(*loss.scale) + " sigma; it must lie between 1e-8 and 1e8, usual are 1 to 5");
+}
+
+}  // namespace
+
 void check_meaning(Checker& checker, const IdentificationSpec& identification) {
   const std::vector<ExperimentSpec>& experiments = identification.experiments;
   const std::string list = checker.path("experiments");
@@ -82,8 +126,8 @@ void check_meaning(Checker& checker, const IdentificationSpec& identification) {
   const bool any_fit =
       std::any_of(experiments.begin(), experiments.end(), [](const ExperimentSpec& e) { return !e.validate; });
   if (!any_fit) checker.issue(list, "has no experiment of role \"fit\"; at least one is needed");
-  if (identification.loss.type == LossType::squared && identification.loss.scale)
-    checker.issue(checker.path("loss") + ".scale", "is given with the loss 'squared', which has none");
+  check_loss(checker, identification.loss);
+  check_shared_samples(checker, experiments, list);
   for (std::size_t i = 0; identification.sigma_is_known && i < experiments.size(); ++i)
     for (std::size_t k = 0; k < experiments[i].channels.size(); ++k)
       if (experiments[i].channels[k].estimate_sigma)

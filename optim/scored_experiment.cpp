@@ -6,7 +6,7 @@
 namespace mbsopt {
 
 void score_experiment(const ExperimentSpec& spec, const Experiment& model, const Loss& loss, const Eigen::VectorXd& z,
-                      std::size_t experiment, ExperimentFit& fit, std::vector<ResidualRow>& residuals) {
+                      bool estimated, std::size_t experiment, ExperimentFit& fit, std::vector<ResidualRow>& residuals) {
   fit.name = spec.name, fit.validate = spec.validate;
   fit.start_time = model.start_time(), fit.end_time = model.end_time();
   fit.samples = model.samples().size();
@@ -15,7 +15,7 @@ void score_experiment(const ExperimentSpec& spec, const Experiment& model, const
     ChannelFit& channel = fit.channels[c];
     channel.column = spec.channels[c].column, channel.sensor = spec.channels[c].sensor;
     channel.missing = model.missing(c);
-    channel.sigma = model.sigma(c), channel.sigma_is_estimated = spec.channels[c].estimate_sigma && !spec.validate;
+    channel.sigma = model.sigma(c), channel.sigma_is_estimated = estimated && spec.channels[c].estimate_sigma;
   }
   double sum = 0;
   std::vector<std::vector<double>> scaled(fit.channels.size());

@@ -8,6 +8,8 @@ std::string_view to_string(SolverStatus status) {
   switch (status) {
     case SolverStatus::converged:
       return "converged";
+    case SolverStatus::converged_beyond_limit:
+      return "converged_beyond_limit";
     case SolverStatus::searched:
       return "searched";
     case SolverStatus::no_progress:

@@ -8,7 +8,17 @@
 namespace mbsopt {
 
 // searched: a global method that has no other end than its budget has used it up.
-enum class SolverStatus { converged, searched, no_progress, iteration_limit, infeasible, stopped, failed };
+// converged_beyond_limit: limits hold for smooth extremes, but not for the true ones.
+enum class SolverStatus {
+  converged,
+  converged_beyond_limit,
+  searched,
+  no_progress,
+  iteration_limit,
+  infeasible,
+  stopped,
+  failed
+};
 std::string_view to_string(SolverStatus status);  // "converged", "no_progress", "iteration_limit", ...
 
 struct SolverOutcome {

@@ -7,6 +7,7 @@
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "optim/determined_combinations.hpp"
 
@@ -17,10 +18,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kInfinity = std::numeric_limits<double>::infinity(), kNaN = std::numeric_limits<double>::quiet_NaN();
 // Singular values below this part of the largest: exact derivatives of a simulation carry errors of about 1e-12, and a
 // combination 1e8 times less certain than the best one is of no use.
 constexpr double kRankTolerance = 1e-8;
+// Of the record: exact derivatives carry rounding errors of about 1e-12 of what is measured; a margin of 100 above.
+constexpr double kNoInfluence = 1e-10;
 
 double quantile_975(long degrees_of_freedom, bool sigma_is_known) {
   if (sigma_is_known) return boost::math::quantile(boost::math::normal(), 0.975);
@@ -59,10 +62,12 @@ FitStatistics fit_statistics(const FitData& data) {
   const VectorXd& rho = data.rho;
   FitStatistics s;
   s.degrees_of_freedom = static_cast<long>(N + R - P);
-  s.residual_variance = s.degrees_of_freedom > 0 ? data.z.squaredNorm() / static_cast<double>(s.degrees_of_freedom)
-                                                 : std::numeric_limits<double>::quiet_NaN();
+  s.residual_variance =
+      s.degrees_of_freedom > 0 ? data.z.squaredNorm() / static_cast<double>(s.degrees_of_freedom) : kNaN;
   const Variances v = variances(data, s.degrees_of_freedom, s.residual_variance);
   s.variance = v.variance, s.likelihood_scale = v.likelihood_scale;
+  // Without one, what is determined is still found.
+  const double variance = std::isfinite(s.variance) ? s.variance : 1;
   const bool normal = data.sigma_is_known && data.loss.type == LossType::squared;
   s.quantile = quantile_975(s.degrees_of_freedom, normal);
   s.std_error.setZero(P), s.ci95.setZero(P, 2);
@@ -71,16 +76,17 @@ FitStatistics fit_statistics(const FitData& data) {
 
   MatrixXd J(N + R, P);  // v (J'J)^-1 is the covariance
   J.topRows(N) = data.J;
-  if (R > 0) J.bottomRows(R) = data.J_prior * (std::isfinite(s.variance) ? std::sqrt(s.variance) : 1);
+  if (R > 0) J.bottomRows(R) = data.J_prior * std::sqrt(variance);
 
   // Columns of unit length; zero columns are left out.
   VectorXd size = rho.cwiseAbs(), length = J.colwise().norm().transpose();
   for (Index k = 0; k < P; ++k)
     if (size(k) == 0) size(k) = 1;
+  const VectorXd& change = data.change.size() == P ? data.change : size;
   std::vector<Index> used;
   std::vector<VectorXd> unseen;  // directions, in changes over sizes
   for (Index k = 0; k < P; ++k)
-    if (length(k) > 0)
+    if (length(k) > 0 && length(k) * std::abs(change(k)) > kNoInfluence * data.record)
       used.push_back(k);
     else
       unseen.push_back(VectorXd::Unit(P, k));
@@ -98,10 +104,10 @@ FitStatistics fit_statistics(const FitData& data) {
     VectorXd sigma = VectorXd::Zero(U);
     sigma.head(svd.singularValues().size()) = svd.singularValues();
     const Index rank = (sigma.array() > std::max(kRankTolerance, data.accuracy) * sigma(0)).count();
-    if (s.condition_number == 0) s.condition_number = sigma(U - 1) > 0 ? sigma(0) / sigma(U - 1) : kInfinity;
+    if (unseen.empty()) s.condition_number = sigma(U - 1) > 0 ? sigma(0) / sigma(U - 1) : kInfinity;
 
     const MatrixXd V = svd.matrixV().leftCols(rank) * sigma.head(rank).cwiseInverse().asDiagonal();
-    const MatrixXd covariance = s.variance * (V * V.transpose());
+    const MatrixXd covariance = variance * (V * V.transpose());
     for (Index a = 0; a < U; ++a)
       for (Index b = 0; b < U; ++b) {
         const Index ka = used[static_cast<std::size_t>(a)], kb = used[static_cast<std::size_t>(b)];
@@ -127,7 +133,18 @@ FitStatistics fit_statistics(const FitData& data) {
     const double half = s.std_error(k) == 0 ? 0 : s.quantile * s.std_error(k);
     s.ci95.row(k) << rho(k) - half, rho(k) + half;
   }
+  if (!std::isfinite(s.variance))
+    withhold_errors(s,
+                    s.degrees_of_freedom < 1
+                        ? "as many parameters as samples leave no degree of freedom to tell the noise from"
+                        : "so many residuals lie beyond the scale of the loss that its mean curvature is not positive");
   return s;
+}
+
+void withhold_errors(FitStatistics& statistics, std::string why) {
+  statistics.none = std::move(why);
+  statistics.std_error.setConstant(kNaN), statistics.ci95.setConstant(kNaN), statistics.covariance.setConstant(kNaN);
+  statistics.correlation.resize(0, 0);
 }
 
 }  // namespace mbsopt

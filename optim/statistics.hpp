@@ -10,8 +10,10 @@
 //   v = K^2 [sum psi^2/(N + R - P)] / mean(psi_z)^2,   K = 1 + (P/N) var(psi_z)/mean(psi_z)^2
 // Huber, "Robust Statistics" (1981), section 7.6, equation 6.5: errors independent, of one symmetric distribution.
 //
-// Combinations that the data do not determine come from the singular values of J with columns scaled to unit length,
-// whose ratio is the condition number (Belsley, Kuh and Welsch, "Regression Diagnostics" (1980), section 3.2).
+// A column of J counts as zero where a change of the parameter by its own size moves the record by less than 1e-10 of
+// the record's norm. Combinations that the data do not determine come from the singular values of J with columns scaled
+// to unit length, whose ratio is the condition number (Belsley, Kuh and Welsch, "Regression Diagnostics" (1980),
+// section 3.2).
 //
 //   FitData data;
 //   data.J = J, data.z = z, data.rho = rho, data.names = {"m1", "m2"};
@@ -21,6 +23,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -38,22 +41,29 @@ struct FitData {
   Loss loss;
   bool sigma_is_known = false;  // v = 1, and quantiles are normal; not with a loss other than the square
   double accuracy = 0;          // of J, relative: what differs by less is the same
+  Eigen::VectorXd change;       // of each parameter, about its size; empty: |rho|, or 1 where that is 0
+  double record = 0;            // norm of what was measured, in sigma; 0: not known
 };
 
 struct FitStatistics {
+  std::string none;                         // why there are no standard errors, in words; they are NaN then
   Eigen::VectorXd std_error;                // infinite where the data do not determine the parameter
   Eigen::MatrixXd ci95;                     // P x 2
   Eigen::MatrixXd covariance;               // of the determined combinations
   Eigen::MatrixXd correlation;              // ones on the diagonal
-  double residual_variance = 0;             // s^2, also where it is not used; NaN without degrees of freedom
-  double variance = 0;                      // v
-  double likelihood_scale = 0;              // of 2 (cost - least cost), in which it is about chi^2 of a parameter
-  double quantile = 0;                      // of the intervals
+  double residual_variance = kUnknown;      // s^2, also where it is not used; NaN without degrees of freedom
+  double variance = kUnknown;               // v
+  double likelihood_scale = kUnknown;       // of 2 (cost - least cost), in which it is about chi^2 of a parameter
+  double quantile = kUnknown;               // of the intervals
   long degrees_of_freedom = 0;              // N + R - P
-  double condition_number = 0;              // infinite where a column of J is zero
+  double condition_number = kUnknown;       // infinite where a column of J is zero
   std::vector<std::string> unidentifiable;  // in words
+
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 };
 
 FitStatistics fit_statistics(const FitData& data);
+// Takes away what holds at a minimum only: standard errors, intervals, correlations.
+void withhold_errors(FitStatistics& statistics, std::string why);
 
 }  // namespace mbsopt

@@ -394,39 +394,85 @@ std::vector<std::size_t> main_quantities(const std::vector<Quantity>& quantities
   return {};
 }
 
-Recommendation recommend(const Tradeoff& tradeoff, std::vector<std::size_t> quantities, double accuracy) {
+std::vector<std::size_t> design_quantities(const std::vector<Quantity>& quantities,
+                                           const std::vector<std::string>& objectives) {
+  std::vector<std::size_t> found;
+  for (const QuantityKind kind : {QuantityKind::objective, QuantityKind::gradient})
+    for (std::size_t i = 0; i < quantities.size(); ++i)
+      if (quantities[i].kind == kind &&
+          std::find(objectives.begin(), objectives.end(), quantities[i].objective_name) != objectives.end())
+        found.push_back(i);
+  return found;
+}
+
+std::optional<std::size_t> simulation_of(const Tradeoff& tradeoff, std::size_t row) {
+  const TradeoffSetting& setting = tradeoff.rows[row].setting;
+  if (!setting.gradient) return row;
+  std::optional<std::size_t> looser;
+  for (std::size_t i = 0; i < tradeoff.rows.size(); ++i) {
+    const TradeoffRow& other = tradeoff.rows[i];
+    if (other.setting.gradient || other.status != RowStatus::ok) continue;
+    if (same(other.setting.simulation, setting.simulation)) return i;
+    SimulationSettings tightened = other.setting.simulation;
+    tightened.integrator.rtol = setting.simulation.integrator.rtol;
+    tightened.integrator.atol = setting.simulation.integrator.atol;
+    const bool is_looser = other.setting.simulation.integrator.rtol > setting.simulation.integrator.rtol;
+    if (other.within_floor && is_looser && same(tightened, setting.simulation)) looser = i;
+  }
+  return looser;
+}
+
+Recommendation recommend(const Tradeoff& tradeoff, std::vector<std::size_t> quantities, double accuracy,
+                         const std::function<bool(const TradeoffRow&)>& also) {
   Recommendation found{std::move(quantities), accuracy, {}, {}};
   const std::vector<Quantity>& all = tradeoff.reference.errors->quantities();
   double certificate = 0;
-  for (const std::size_t q : found.quantities) certificate = std::max(certificate, all[q].certificate);
+  bool gradients = false, values = false;
+  for (const std::size_t q : found.quantities) {
+    certificate = std::max(certificate, all[q].certificate);
+    (all[q].kind == QuantityKind::gradient ? gradients : values) = true;
+  }
   if (3 * certificate > accuracy) {
     found.why_not = fmt::format("the reference itself is certain to {:.1e} only", certificate);
     return found;
   }
-  const auto bound = [&](const TradeoffRow& row) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const auto bound = [&](std::size_t i) {
+    const TradeoffRow& row = tradeoff.rows[i];
+    const bool both = gradients && values;
+    if (both && (!row.setting.gradient || *row.setting.gradient == GradientMethod::differences)) return kInfinity;
+    const std::optional<std::size_t> simulation = both ? simulation_of(tradeoff, i) : i;
     double largest = 0;
     for (const std::size_t q : found.quantities) {
-      const double b = row.bounds(static_cast<Eigen::Index>(q));
-      if (!std::isfinite(b)) return std::numeric_limits<double>::infinity();
+      const bool of_gradient = all[q].kind == QuantityKind::gradient;
+      if (!of_gradient && !simulation) return kInfinity;
+      const double b = tradeoff.rows[of_gradient ? i : *simulation].bounds(static_cast<Eigen::Index>(q));
+      if (!std::isfinite(b)) return kInfinity;
       largest = std::max(largest, b);
     }
     return largest;
   };
   std::vector<std::size_t> candidates;
-  double fastest = std::numeric_limits<double>::infinity(), best = fastest;
+  double best = kInfinity;
   for (std::size_t i = 0; i < tradeoff.rows.size(); ++i) {
-    const double b = bound(tradeoff.rows[i]);
+    const double b = bound(i);
     best = std::min(best, b);
-    if (b > accuracy) continue;
-    candidates.push_back(i);
-    fastest = std::min(fastest, tradeoff.rows[i].wall_seconds);
+    if (b <= accuracy) candidates.push_back(i);
   }
+  std::stable_sort(candidates.begin(), candidates.end(), [&](std::size_t a, std::size_t b) {
+    return tradeoff.rows[a].wall_seconds < tradeoff.rows[b].wall_seconds;
+  });
+  std::optional<double> fastest;
   for (const std::size_t i : candidates) {
-    if (tradeoff.rows[i].wall_seconds > 1.1 * fastest) continue;
-    if (!found.row || bound(tradeoff.rows[i]) < bound(tradeoff.rows[*found.row])) found.row = i;
+    if (fastest && tradeoff.rows[i].wall_seconds > 1.1 * *fastest) break;
+    if (found.row && bound(i) >= bound(*found.row)) continue;
+    if (also && !also(tradeoff.rows[i])) continue;
+    found.row = i;
+    if (!fastest) fastest = tradeoff.rows[i].wall_seconds;
   }
   if (!found.row)
-    found.why_not = std::isfinite(best)
+    found.why_not = !candidates.empty() ? "no setting that was measured is that exact in all of it"
+                    : std::isfinite(best)
                         ? fmt::format("no setting that was measured gets there; the best has {:.1e}", best)
                         : "it was not measured";
   return found;

@@ -82,12 +82,22 @@ struct TradeoffOptions {
 Tradeoff measure_tradeoff(const Scene& scene, const std::vector<Objective>& objectives,
                           const TradeoffOptions& options = {});
 
+// The row of the simulation with the settings of a gradient's row, or that of a looser one of the same kind that is
+// already as exact as the reference; of a simulation's row itself. None: not measured.
+std::optional<std::size_t> simulation_of(const Tradeoff& tradeoff, std::size_t row);
+
 // The fastest row whose bounds in these quantities are within the accuracy, so that none is taken for an error that
 // happens to pass through zero. Of rows that are equally fast to a tenth the one with the lowest bound. None where the
-// reference is not three times as exact as what is asked for.
-Recommendation recommend(const Tradeoff& tradeoff, std::vector<std::size_t> quantities, double accuracy);
+// reference is not three times as exact as what is asked for. Where gradients and other quantities are asked for, rows
+// of exact gradients, with the bounds of their simulations. also: what else must hold of a row, asked of the fastest
+// rows first, until it does.
+Recommendation recommend(const Tradeoff& tradeoff, std::vector<std::size_t> quantities, double accuracy,
+                         const std::function<bool(const TradeoffRow&)>& also = {});
 
 // What the scene is run for: the objectives, or the sensors where there are none, or the motion.
 std::vector<std::size_t> main_quantities(const std::vector<Quantity>& quantities);
+// What an optimiser uses: the named objectives and their gradients.
+std::vector<std::size_t> design_quantities(const std::vector<Quantity>& quantities,
+                                           const std::vector<std::string>& objectives);
 
 }  // namespace mbsopt

@@ -29,7 +29,9 @@ TradeoffErrors::TradeoffErrors(const TradeoffRuns& runs, Answer exact, const Ans
     if (is_known(size, (sensors.row(s) - second.motion.sensors.row(s)).cwiseAbs().maxCoeff())) sensor_scale_(s) = size;
   }
   const auto add = [&](QuantityKind kind, std::string name, Index objective, double size) {
-    Quantity q{kind, std::move(name), objective, true, 1, 0};
+    Quantity q{kind, std::move(name), {}, objective, true, 1, 0};
+    if (kind == QuantityKind::objective || kind == QuantityKind::gradient)
+      q.objective_name = runs.objectives()[static_cast<std::size_t>(objective)].name();
     const double apart = error(q, second);  // absolute, since the scale is 1
     q.relative = kind == QuantityKind::sensors || is_known(size, apart);
     if (q.relative) q.scale = size;

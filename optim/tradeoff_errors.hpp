@@ -25,6 +25,7 @@ enum class QuantityKind { motion, sensors, objective, gradient };
 struct Quantity {
   QuantityKind kind = QuantityKind::motion;
   std::string name;            // "motion", "sensors", "travel" ("objective motion"), "gradient of travel"
+  std::string objective_name;  // of objective, gradient
   Eigen::Index objective = 0;  // of objective, gradient
   bool relative = true;
   double scale = 1;        // what the error is divided by

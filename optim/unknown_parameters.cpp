@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "optim/parameter_values.hpp"
@@ -21,6 +22,11 @@ bool has_override(const ExperimentSpec& spec, const std::string& name, double* v
 
 }  // namespace
 
+bool is_held(const Parameter& p) {
+  constexpr double kSame = 1e-12;  // of the bounds: nearer ones may be equal in the scaled variables of the solver
+  return p.lower && p.upper && *p.upper - *p.lower <= kSame * std::max(std::abs(*p.lower), std::abs(*p.upper));
+}
+
 std::vector<UnknownParameter> free_in(const Scene& scene, const IdentificationSpec& spec, std::size_t experiment) {
   const ExperimentSpec& here = spec.experiments[experiment];
   std::vector<UnknownParameter> unknowns;
@@ -28,7 +34,7 @@ std::vector<UnknownParameter> free_in(const Scene& scene, const IdentificationSp
   for (const int k : parameter_indices(scene, here.free)) {
     UnknownParameter u{k, experiment, false, scene.parameters[static_cast<std::size_t>(k)]};
     has_override(here, u.description.name, &u.description.value);  // starts there
-    unknowns.push_back(std::move(u));
+    if (!is_held(u.description)) unknowns.push_back(std::move(u));
   }
   return unknowns;
 }
@@ -45,13 +51,17 @@ std::vector<UnknownParameter> unknowns_of_fit(const Scene& scene, const Identifi
       if (std::none_of(spec.experiments.begin(), spec.experiments.end(), uses_it))
         throw std::invalid_argument(fmt::format(
             "identification.variables: '{}' is free or overridden in every fitted experiment", u.description.name));
-      unknowns.push_back(std::move(u));
+      if (!is_held(u.description)) unknowns.push_back(std::move(u));
     }
   for (std::size_t e = 0; e < spec.experiments.size(); ++e) {
     if (spec.experiments[e].validate) continue;
     for (UnknownParameter& u : free_in(scene, spec, e)) unknowns.push_back(std::move(u));
   }
-  if (unknowns.empty()) throw std::invalid_argument("identification.variables: is empty; name what is to be fitted");
+  if (unknowns.empty())
+    throw std::invalid_argument(spec.variables.empty()
+                                    ? "identification.variables: is empty; name what is to be fitted"
+                                    : "identification.variables: none of them can change: their lower bounds are their "
+                                      "upper bounds");
   return unknowns;
 }
 

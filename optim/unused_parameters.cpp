@@ -351,6 +351,16 @@ std::vector<SceneIssue> find_unused_parameters(const Problem& problem) {
   return issues;
 }
 
+void allow_what_only_measurements_use(Problem& problem) {
+  if (problem.objectives.empty() || !problem.identification) return;
+  const std::set<std::string> used = Search(problem).used_parameters();
+  Problem judged = problem;
+  judged.identification.reset();
+  const std::set<std::string> by_objectives = Search(judged).used_parameters();
+  for (Parameter& p : problem.scene.parameters)
+    p.allow_unused = p.allow_unused || (used.contains(p.name) && !by_objectives.contains(p.name));
+}
+
 Problem what_objectives_need(const Problem& problem, std::vector<std::string>* left_out) {
   Problem needed = problem;
   std::vector<std::string> names;

@@ -20,6 +20,9 @@ namespace mbsopt {
 // For a problem without other issues.
 std::vector<SceneIssue> find_unused_parameters(const Problem& problem);
 
+// Sets allow_unused of parameters that matter to measurements alone: commands that look at objectives let them be.
+void allow_what_only_measurements_use(Problem& problem);
+
 // The problem as far as its objectives depend on it: without the bodies that none of them looks at and that nothing
 // connects with one that is looked at (not through the ground), and without what acts on or measures these. Such bodies
 // then cost nothing in values and gradients. Parameters stay as they are. For a problem without other issues.

@@ -3,13 +3,6 @@
 #include <cmath>
 
 namespace mbsopt {
-namespace {
-
-// Estimates of errors are of the right size, no bounds: entries count as explained within some times of them.
-constexpr double kEstimateTrust = 10;
-
-}  // namespace
-
 std::string_view to_string(Verdict verdict) {
   switch (verdict) {
     case Verdict::agrees:

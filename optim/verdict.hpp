@@ -13,6 +13,9 @@ enum class Verdict {
   disagrees,
 };
 std::string_view to_string(Verdict verdict);  // "agrees", "within its error", "zero", "FAILED", "DISAGREES"
+// Estimates of errors are of the right size, no bounds: what is within some times of them counts as explained.
+inline constexpr double kEstimateTrust = 10;
+
 inline bool passes(Verdict verdict) { return verdict != Verdict::failed && verdict != Verdict::disagrees; }
 
 // A derivative that is known to `error` against one that it should equal: within threshold * entry it agrees. Its own

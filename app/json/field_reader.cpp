@@ -77,6 +77,13 @@ void FieldReader::text(std::string_view key, std::string& value, const Says& say
   if (const Node* node = get(key, says)) read_string(*node, inside(key), value);
 }
 
+void FieldReader::reference(std::string_view key, std::string& value, To, const Says& says) {
+  text(key, value, says);
+  const Node* const node = says.need == Need::unknown ? nullptr : node_.find(key);
+  if (node && node->kind == Node::Kind::string && node->string.empty())
+    findings_.add(*node, inside(key), "is empty; expected: " + std::string(says.description));
+}
+
 void FieldReader::references(std::string_view key, std::vector<std::string>& values, To, const Says& says) {
   const Node* const node = get_kind(key, says, Node::Kind::array);
   if (!node) return;

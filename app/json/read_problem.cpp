@@ -82,7 +82,7 @@ void read_sampled_laws(Problem& problem, const std::filesystem::path& folder, co
 }
 
 // Data that an experiment cannot use are found now, before anything runs, whatever the command.
-void check_data(const Problem& problem, const Node& root, Findings& findings) {
+void check_data(const Problem& problem, const Node& root, Findings& findings, std::vector<std::string>* warnings) {
   if (!problem.identification) return;
   const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
   for (std::size_t i = 0; i < experiments.size(); ++i) {
@@ -90,9 +90,13 @@ void check_data(const Problem& problem, const Node& root, Findings& findings) {
     if (findings.concerns(place)) continue;
     try {
       const CsvTable table = read_csv(experiments[i].data);
-      for (const SceneIssue& issue :
-           find_data_issues(experiments[i], place, table, problem.scene.simulation.start_time))
-        findings.add(nearest(root, issue.path), issue.path, issue.message);
+      for (const SceneIssue& issue : find_data_issues(experiments[i], place, table, problem.scene)) {
+        const Node& node = nearest(root, issue.path);
+        if (!issue.is_warning)
+          findings.add(node, issue.path, issue.message);
+        else if (warnings)
+          warnings->push_back(to_string(findings.finding(node, issue.path, issue.message)));
+      }
     } catch (const CsvError& error) {
       findings.add(nearest(root, place + ".data"), place + ".data", error.what());
     }
@@ -120,7 +124,7 @@ void add_issues(const Problem& problem, const Node& root, Findings& findings, st
     }
   }
   for (const SceneIssue& issue : errors) add_issue(issue, root, findings);
-  check_data(problem, root, findings);
+  check_data(problem, root, findings, warnings);
   if (findings.any()) return;
   for (const SceneIssue& issue : find_unused_parameters(problem)) add_issue(issue, root, findings);
   for (const SceneIssue& issue : find_idle_variables(problem))
@@ -142,6 +146,7 @@ Problem read_problem_text(const std::string& text, const std::filesystem::path& 
   read_sampled_laws(problem, name.parent_path(), root, findings);
   add_issues(problem, root, findings, warnings);
   findings.throw_if_any();
+  allow_what_only_measurements_use(problem);
   return problem;
 }
 

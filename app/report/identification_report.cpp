@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "app/report/line_plot.hpp"
 #include "app/report/report_parts.hpp"
 #include "app/report/run_report.hpp"
@@ -8,11 +11,18 @@
 namespace mbsopt {
 namespace {
 
+std::string interval_of(const Json& parameter) {
+  const Json interval = parameter.value("ci95", Json());
+  const bool known = interval.is_array() && std::all_of(interval.begin(), interval.end(), [](const Json& end) {
+                       return end.is_number() && std::isfinite(end.get<double>());
+                     });
+  return known ? "[" + cell(interval) + "]" : "-";
+}
+
 void add_rows(std::vector<std::vector<std::string>>& rows, const Json& parameters) {
   for (const auto& [name, p] : parameters.items()) {
     rows.push_back({name, cell(p.at("initial")), cell(p.at("value"), 9), cell(p.value("std_error", Json()), 3),
-                    "[" + cell(p.value("ci95", Json())) + "]", cell(p.value("unit", Json())),
-                    cell(p.value("at_bound", Json()))});
+                    interval_of(p), cell(p.value("unit", Json())), cell(p.value("at_bound", Json()))});
   }
 }
 
@@ -37,8 +47,10 @@ void add_outcome(HtmlPage& page, const Json& result) {
                         {"degrees of freedom", cell(statistics.at("degrees_of_freedom"))},
                         {"variance of the residuals, in sigma^2", cell(statistics.at("residual_variance"), 4)},
                         {"what is minimised, before", cell(optimizer.at("objective_initial"))},
-                        {"after", cell(optimizer.at("objective_final"))},
+                        {"after, with the same sigmas", cell(optimizer.at("objective_final"))},
                         {"condition number", cell(identifiability.at("condition_number"), 3)}});
+  if (statistics.contains("no_standard_errors"))
+    page.paragraph("There are no standard errors and intervals: " + cell(statistics.at("no_standard_errors")) + ".");
   for (const Json& words : identifiability.at("unidentifiable"))
     page.paragraph("Not determined by the data: " + cell(words));
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <random>
 #include <utility>
 
 #include "app/report/html_page.hpp"
@@ -70,10 +71,29 @@ Frame frame_of(const LinePlot& plot) {
   return frame;
 }
 
+bool is_cloud(const PlotSeries& series) { return series.mark == Mark::points || series.mark == Mark::rings; }
+
+// Any sample is as likely as any other, so that the cloud looks as dense here and as thin there as it is.
+std::vector<std::size_t> random_samples(const std::vector<std::size_t>& all, const std::vector<double>& y) {
+  if (all.size() <= kMostPoints) return all;
+  std::vector<std::size_t> kept;
+  std::sample(all.begin(), all.end(), std::back_inserter(kept), kMostPoints, std::mt19937());
+  const auto less = [&](std::size_t a, std::size_t b) {
+    return y[a] < y[b] || (std::isnan(y[b]) && !std::isnan(y[a]));
+  };
+  const auto greater = [&](std::size_t a, std::size_t b) {
+    return y[a] > y[b] || (std::isnan(y[b]) && !std::isnan(y[a]));
+  };
+  kept.push_back(*std::min_element(all.begin(), all.end(), less));
+  kept.push_back(*std::min_element(all.begin(), all.end(), greater));
+  return kept;
+}
+
 // Many samples to a pixel column become at most its first, lowest, highest and last: the drawing is the same.
 std::vector<std::size_t> visible_samples(const LinePlot& plot, const PlotSeries& series, const Frame& frame) {
   std::vector<std::size_t> all(series.x.size());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
+  if (is_cloud(series)) return random_samples(all, series.y);
   if (series.x.size() <= 2 * static_cast<std::size_t>(kInnerWidth) ||
       !std::is_sorted(series.x.begin(), series.x.end())) {
     return all;
@@ -200,6 +220,11 @@ void draw_axes(const LinePlot& plot, const Frame& frame, std::string& svg) {
       fmt::format("<text class=\"label\" transform=\"translate(14 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
                   kTop + kInnerHeight / 2, html_escaped(plot.y_label));
   svg += fmt::format("<text class=\"title\" x=\"{}\" y=\"18\">{}</text>\n", kLeft, html_escaped(plot.title));
+  for (const PlotSeries& series : plot.series)
+    if (is_cloud(series) && series.x.size() > kMostPoints)
+      svg += fmt::format(
+          "<text class=\"label\" x=\"{}\" y=\"18\" text-anchor=\"end\">{}: {} of {} drawn, at random</text>\n", right,
+          html_escaped(series.name), kMostPoints, series.x.size());
 }
 
 }  // namespace

@@ -1,5 +1,9 @@
 // A line plot as SVG text: axes with round numbers, units in the labels, a legend; colours come from the page's style.
 //
+// A line of many samples keeps the first, lowest, highest and last of every pixel column, which draws the same. Points
+// are a cloud, whose density such a choice would change: beyond kMostPoints a random part of them is drawn (always the
+// same), with the lowest and the highest, and the plot says so.
+//
 //   LinePlot plot{.title = "Angle", .x_label = "t [s]", .y_label = "angle [rad]"};
 //   plot.series.push_back({"model", t, angle});
 //   plot.series.push_back({"measured", t_k, z, Mark::points});
@@ -30,6 +34,8 @@ struct LinePlot {
   bool whole_x = false;        // x counts: ticks at whole numbers only
   bool equal_axes = false;     // one metre is as long in x as in y: for paths
 };
+
+inline constexpr std::size_t kMostPoints = 5000;  // of a series: some 100 kB of the page
 
 std::string to_svg(const LinePlot& plot);
 

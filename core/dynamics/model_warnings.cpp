@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "core/dynamics/constraint_rows.hpp"
 #include "core/dynamics/row_dependence.hpp"
 #include "core/linear/dense.hpp"
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/planar_model.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
@@ -84,6 +87,30 @@ void add_springs(const MechanismData& d, const VectorXd& y, std::vector<std::str
   }
 }
 
+// Whether the ground holds the centre of mass of every body: then no gravity moves anything.
+bool is_balanced(const MechanismData& d) {
+  std::vector<bool> held(at(d.n) + 1, false);
+  held[0] = true;
+  for (const Constraint& c : d.constraints) {
+    const auto* p = std::get_if<Coincidence>(&c.primitive);
+    if (p && c.body1 == 0 && p->s2.norm() <= kZeroLength) held[at(c.body2)] = true;
+    if (p && c.body2 == 0 && p->s1.norm() <= kZeroLength) held[at(c.body1)] = true;
+  }
+  return std::all_of(held.begin(), held.end(), [](bool h) { return h; });
+}
+
+void add_gravity(const MechanismData& d, std::vector<std::string>& warnings) {
+  constexpr double kAlong = 1e-9;  // of gravity: what rounding leaves of a component that is meant to be 0
+  if (!d.planar) return;
+  const Vector3d& g = d.gravity;
+  if (std::hypot(g(d.planar->t1), g(d.planar->t2)) > kAlong * g.norm() || g.norm() == 0 || is_balanced(d)) return;
+  warnings.push_back(
+      fmt::format("gravity: is [{:g}, {:g}, {:g}] m/s^2, normal to the plane in which the mechanism moves: it moves "
+                  "nothing. The default is along -z; in a vertical x-y plane it is [0, -9.81, 0]. [0, 0, 0] says that "
+                  "none is meant",
+                  g(0), g(1), g(2)));
+}
+
 void add_violations(const MechanismData& d, std::vector<std::string>& warnings) {
   double size = 0;
   for (const Constraint& c : d.constraints) {
@@ -127,6 +154,7 @@ std::vector<std::string> model_warnings(const Mechanism& mechanism, const Assemb
   const MechanismData& d = mechanism.data();
   std::vector<std::string> warnings;
   add_violations(d, warnings);
+  add_gravity(d, warnings);
   for (std::string& warning : start_warnings(mechanism, assembly)) warnings.push_back(std::move(warning));
   return warnings;
 }

@@ -29,6 +29,10 @@ class ProgramBuilder {
   // The derivative of another program in one of its inputs, by the chain rule applied to each instruction.
   void build_derivative(const Program& of, int input);
 
+  static std::vector<Program> switches_of(const Program& program);  // program_switches.hpp
+  // Of two instructions of another program: the first (how: name), its cosine (cos) or their difference (subtract).
+  void build_switch(const Program& of, Operation how, int a, int b);
+
  private:
   using Instruction = Program::Instruction;
   static constexpr int kDeepestDefinitions = 500;

@@ -1,6 +1,7 @@
 #include "core/integrate/cost.hpp"
 
 #include <cmath>
+#include <stdexcept>
 
 namespace mbsopt {
 namespace {
@@ -15,6 +16,7 @@ class UserRunning final : public PointCost {
     cost_->add_g_rho(at.t, at.y, rho_, scale, rho_bar);
     return cost_->g(at.t, at.y, rho_);
   }
+  const Eigen::VectorXd* rho() const override { return &rho_; }
 
  private:
   std::shared_ptr<const RunningCost> cost_;
@@ -33,6 +35,7 @@ class UserTerminal final : public PointCost {
     rho_bar += scale * mu;
     return cost_->value(at.y, rho_);
   }
+  const Eigen::VectorXd* rho() const override { return &rho_; }
 
  private:
   std::shared_ptr<const TerminalCost> cost_;
@@ -51,9 +54,11 @@ std::string not_finite_costs(std::span<const Cost> costs, const Eigen::VectorXd&
 }
 
 std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const RunningCost> running, const Eigen::VectorXd& rho) {
+  if (!running) throw std::invalid_argument("point_cost: there is no running cost (null)");
   return std::make_shared<UserRunning>(std::move(running), rho);
 }
 std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const TerminalCost> terminal, const Eigen::VectorXd& rho) {
+  if (!terminal) throw std::invalid_argument("point_cost: there is no terminal cost (null)");
   return std::make_shared<UserTerminal>(std::move(terminal), rho);
 }
 

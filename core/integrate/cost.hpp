@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "core/expression/program.hpp"
 #include "core/mechanism/state_point.hpp"
 
 namespace mbsopt {
@@ -40,6 +41,10 @@ struct PointCost {
   virtual double value(const StatePoint& at) const = 0;
   // y_bar += scale d/dy, rho_bar += scale d/drho; returns the value.
   virtual double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const = 0;
+  // The parameters that it is bound to; null where it is bound to none.
+  virtual const Eigen::VectorXd* rho() const { return nullptr; }
+  // The expression that its value jumps with, of all parameters, t and all sensors; null where there is none.
+  virtual const Program* program() const { return nullptr; }
 };
 
 struct SampledCost {
@@ -59,7 +64,8 @@ struct Cost {
 // Which of the costs have no finite value, in words.
 std::string not_finite_costs(std::span<const Cost> costs, const Eigen::VectorXd& psi);
 
-// Adapters from what a user writes; rho is the parameter vector of the mechanism that is simulated.
+// Adapters from what a user writes; rho is the parameter vector of the mechanism that is simulated. Throw
+// std::invalid_argument where there is no cost (null).
 std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const RunningCost> running, const Eigen::VectorXd& rho);
 std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const TerminalCost> terminal, const Eigen::VectorXd& rho);
 

@@ -10,8 +10,10 @@
 #include <optional>
 #include <stdexcept>
 
+#include "core/integrate/jump_watch.hpp"
 #include "core/integrate/run_guard.hpp"
 #include "core/integrate/start_failure.hpp"
+#include "core/integrate/step_failure.hpp"
 #include "core/integrate/zero_length.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -164,9 +166,7 @@ void ForwardRun::stop_for(int flag, double t, const char* of_what) {
                of_what, t));
       return;
     case CV_TOO_MUCH_ACC:
-      stop(SimulationStatus::step_too_small,
-           fmt::format("rtol {:.3g} and atol {:.3g} ask for more digits at t = {:.6g} s than numbers have: loosen them",
-                       settings_.integrator.rtol, settings_.integrator.atol, t));
+      stop(SimulationStatus::step_too_small, too_few_digits(settings_.integrator, t));
       return;
     case CV_TOO_MUCH_WORK:
       stop(SimulationStatus::too_many_steps,
@@ -258,6 +258,11 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
   const std::string at_start = guard.begin(t, y_now_, e, end, settings_.integrator.max_steps);
   if (!at_start.empty()) return stop(SimulationStatus::not_credible, at_start);
   const bool derivatives = hooks.advance || sensitivities_;
+  std::optional<JumpWatch> jumps;
+  if (derivatives) {
+    jumps.emplace(mechanism_, settings_, costs_, flow_.motion());
+    jumps->begin({t, y_now_, assembly_.result().angles, flow_.motion()});
+  }
   Eigen::VectorXd y_before;
   while (result_.ok() && t < end) {
     result_.statistics.rejected = rejected();
@@ -295,6 +300,7 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
     t = t1;
     result_.last_good_time = t;
     take_samples(schedule, t, hooks);
+    if (jumps) jumps->look_at({t, y_now_, flow_.angles_at(t), flow_.motion()});
     if (hooks.accepted) hooks.accepted({t, y_now_, flow_.angles_at(t), flow_.motion()});
     if (options.after_step) options.after_step({t, y_now_, flow_.angles_at(t), flow_.motion()});
     if (options.progress && !options.progress(t)) {
@@ -304,6 +310,7 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
   result_.statistics.rejected = rejected();
   result_.statistics.relative_energy_drift = guard.relative_energy_drift();
   result_.y_end = y_now_;
+  if (jumps) jumps->add_to(result_.statistics);
   if (result_.ok()) finish_costs();
 }
 

@@ -21,7 +21,7 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 }  // namespace
 
 QuadratureWatch::QuadratureWatch(const Method& method, std::span<const Cost> costs, MotionSource* motion)
-    : method_(method), costs_(costs), motion_(motion), integrals_(costs.size()) {
+    : method_(method), costs_(costs), motion_(motion), integrals_(kIntegrals * costs.size()) {
   for (int i = 0; i < method.stages; ++i) {
     node_of_.push_back(-1);
     if (method.b[i] == 0) continue;
@@ -43,8 +43,8 @@ QuadratureWatch::QuadratureWatch(const Method& method, std::span<const Cost> cos
   g_.resize(nodes_.size());
 }
 
-std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::span<const double> g) {
-  Integral& integral = integrals_[cost];
+std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::span<const double> g, Of what) {
+  Integral& integral = integrals_[kIntegrals * cost + static_cast<std::size_t>(what)];
   std::fill(g_.begin(), g_.end(), 0.0);
   for (std::size_t i = 0; i < g.size(); ++i) {
     if (node_of_[i] < 0) continue;
@@ -67,6 +67,7 @@ std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::sp
   const double error = size * std::pow(share, static_cast<double>(method_.order) / power);
   integral.error += error;
   if (error > integral.worst) integral.worst = error, integral.worst_t = step.t;
+  if (what != Of::value || costs_[cost].is_extreme) return {};
   if (!(error > kPoor * integral.of_size) || integral.searches++ > kMostSearches) return {};
   const double t = pole(step, *costs_[cost].running);
   if (std::isnan(t)) return {};
@@ -112,12 +113,15 @@ double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
 }
 
 void QuadratureWatch::add_to(SimulationStatistics& statistics) const {
-  for (std::size_t o = 0; o < integrals_.size(); ++o) {
-    const Integral& i = integrals_[o];
-    if (!(i.error > statistics.quadrature_error * i.of_size && i.error > kRounding)) continue;
-    statistics.quadrature_error = i.error / i.of_size;
-    statistics.quadrature_error_of = costs_[o].name;
-    statistics.quadrature_error_time = i.worst_t;
+  for (std::size_t k = 0; k < integrals_.size(); ++k) {
+    const Integral& i = integrals_[k];
+    const Cost& cost = costs_[k / kIntegrals];
+    QuadratureError& worst = k % kIntegrals != 0 ? statistics.gradient_quadrature
+                             : cost.is_extreme   ? statistics.extreme_quadrature
+                                                 : statistics.quadrature;
+    // Exponentials are of any size, hence relative to their integral.
+    const double rounding = cost.is_extreme ? kRounding * i.of_size : kRounding;
+    if (i.error > worst.error * i.of_size && i.error > rounding) worst = {i.error / i.of_size, cost.name, i.worst_t};
   }
 }
 

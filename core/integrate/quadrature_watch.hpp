@@ -8,6 +8,10 @@
 // estimated as S r^(p/(m - 1)), p the order of the method: what a smooth g leaves. A method of one node is compared
 // with the node before, m = 2.
 //
+// Derivatives of psi are integrals of g_y y' + g_rho, which may be unresolved where g is not (sqrt(|x|) through zero).
+// What the directions y' are is known to one of the two sweeps only; ydot and rho stand for them: g_y ydot and g_rho
+// rho are estimated like g.
+//
 // Where that is much, a pole is looked for: the interval is halved around the largest |g| along the step's Hermite
 // cubic. If |g| times the interval's length does not fall, |g| grows at least like 1/|t - t*|, which has no integral.
 #pragma once
@@ -27,8 +31,11 @@ class QuadratureWatch {
  public:
   QuadratureWatch(const Method& method, std::span<const Cost> costs, MotionSource* motion);
 
-  // After each step, g of each stage of each cost that runs. In words, what ends the run; empty: nothing.
-  std::string look_at(const Step& step, std::size_t cost, std::span<const double> g);
+  enum class Of { value, along_motion, along_parameters };  // g, g_y ydot, g_rho rho
+  static constexpr std::size_t kIntegrals = 3;              // of each cost
+
+  // After each step, the integrand at each stage, of each cost that runs. In words, what ends the run; empty: nothing.
+  std::string look_at(const Step& step, std::size_t cost, std::span<const double> g, Of what = Of::value);
 
   void add_to(SimulationStatistics& statistics) const;
 

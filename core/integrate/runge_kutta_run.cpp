@@ -281,10 +281,17 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   StiffnessWatch stiffness(rk_, mechanism_.states());
   double h = adaptive ? first_step(s, span) : s.step.value_or(span);
   if (s.max_step) h = std::min(h, *s.max_step);
+  // Tolerances that no step can meet explain whatever else may have become of the steps.
+  const auto tolerances_or = [&](std::string message) {
+    return adaptive && beyond_digits(s, step_.y0) ? too_few_digits(s, step_.t) : std::move(message);
+  };
+  if (!(h > 0))
+    stop(SimulationStatus::step_too_small,
+         tolerances_or(step_failure(Outcome::rejected, step_.t, h, adaptive, settings_.formulation)));
   double longest = h;  // step so far
   constexpr double kMostSteps = 1e10;
   if (adaptive && longest * kMostSteps * kMostSteps < span) {  // steps may still grow, but not so much
-    stop(SimulationStatus::step_too_small, too_long_run(span, longest));
+    stop(SimulationStatus::step_too_small, tolerances_or(too_long_run(span, longest)));
   }
   std::size_t frozen_index = 0;
   int placed_again = 0;
@@ -292,11 +299,11 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   EventTimes events(settings_.events, settings_.start_time, settings_.end_time);
   while (result.ok() && (options.frozen ? frozen_index < options.frozen->sizes.size() : step_.t < end)) {
     if (result.statistics.steps + result.statistics.rejected >= s.max_steps) {
-      stop(
-          SimulationStatus::too_many_steps,
-          fmt::format("more than {} steps were needed; stopped at t = {:.6g} s with steps of {:.3g} s. Loosen rtol and "
-                      "atol, raise simulation.integrator.max_steps, or look for very stiff springs or dampers",
-                      s.max_steps, step_.t, h));
+      stop(SimulationStatus::too_many_steps,
+           tolerances_or(fmt::format(
+               "more than {} steps were needed; stopped at t = {:.6g} s with steps of {:.3g} s. Loosen rtol and atol, "
+               "raise simulation.integrator.max_steps, or look for very stiff springs or dampers",
+               s.max_steps, step_.t, h)));
       break;
     }
     const double rate = fastest_tracked_rate(step_.y0);
@@ -355,8 +362,9 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
       h = rounded_step(h * factor);
       if (h < 1e-14 * std::max(span, std::abs(step_.t))) {
         stop(SimulationStatus::step_too_small,
-             longest * kMostSteps < span ? too_long_run(span, longest)
-                                         : step_failure(outcome, step_.t, h, adaptive, settings_.formulation));
+             tolerances_or(longest * kMostSteps < span
+                               ? too_long_run(span, longest)
+                               : step_failure(outcome, step_.t, h, adaptive, settings_.formulation)));
       }
       continue;
     }

@@ -11,7 +11,9 @@
 #include "core/integrate/adjoint_sweep.hpp"
 #include "core/integrate/checkpoints.hpp"
 #include "core/integrate/cvodes.hpp"
+#include "core/integrate/jump_watch.hpp"
 #include "core/integrate/quadrature_watch.hpp"
+#include "core/integrate/run_arguments.hpp"
 #include "core/integrate/runge_kutta_run.hpp"
 #include "core/integrate/tangent_sweep.hpp"
 #include "core/integrate/zero_length.hpp"
@@ -79,10 +81,16 @@ class Run {
     Eigen::VectorXd y(mechanism_.states());
     bool followed = true;
     QuadratureWatch watch(method_, costs_, motion());
+    std::optional<JumpWatch> jumps;
+    if (follow && !options.frozen) {  // given steps have been looked at where they were found
+      jumps.emplace(mechanism_, settings_, costs_, motion());
+      jumps->begin({settings_.start_time, assembly_.result().y, assembly_.result().angles, motion()});
+    }
     std::string objection;  // to running costs, to derivatives
     auto accepted = [&](const Step& step) {
       const std::span<const SampleEvent> events = schedule.take(step.t1);
-      add_running_costs(step, y, options.frozen ? nullptr : &watch, objection);
+      add_running_costs(step, y, options.frozen ? nullptr : &watch, jumps.has_value(), objection);
+      if (jumps) jumps->look_at({step.t1, step.y1, step.angles1, motion()});
       for (const SampleEvent& e : events) {
         if (!e.cost && !observe) continue;
         dense_output(method_, step, (e.time - step.t) / step.h, y);
@@ -107,6 +115,7 @@ class Run {
         assembly_.result().y, assembly_.result().angles, [&](double t1) { return schedule.due(t1); }, accepted,
         until_objection, result_);
     watch.add_to(result_.statistics);
+    if (jumps) jumps->add_to(result_.statistics);
     if (!objection.empty()) {
       result_.status = SimulationStatus::not_credible;
       result_.message = objection;
@@ -137,9 +146,11 @@ class Run {
 
  private:
   // Each stage's state is copied once for all costs. watch: none where steps are given.
-  void add_running_costs(const Step& step, Eigen::VectorXd& y, QuadratureWatch* watch, std::string& objection) {
+  void add_running_costs(const Step& step, Eigen::VectorXd& y, QuadratureWatch* watch, bool derivatives,
+                         std::string& objection) {
     const std::size_t stages = static_cast<std::size_t>(method_.stages);
     g_.assign(stages * costs_.size(), 0.0);
+    if (derivatives) along_motion_.assign(g_.size(), 0.0), along_parameters_.assign(g_.size(), 0.0);
     for (int i = 0; i < method_.stages; ++i) {
       if (method_.b[i] == 0) continue;
       bool copied = false;
@@ -147,15 +158,31 @@ class Run {
         if (!costs_[o].running) continue;
         if (!copied) y = step.Y.col(i);
         copied = true;
-        const double g = costs_[o].running->value({step.t + method_.c[i] * step.h, y, step.angles0, motion()});
-        result_.psi(static_cast<Eigen::Index>(o)) += step.h * method_.b[i] * g;
-        g_[o * stages + static_cast<std::size_t>(i)] = g;
+        const StatePoint at{step.t + method_.c[i] * step.h, y, step.angles0, motion()};
+        const std::size_t k = o * stages + static_cast<std::size_t>(i);
+        g_[k] = derivatives ? gradient_at(*costs_[o].running, at) : costs_[o].running->value(at);
+        result_.psi(static_cast<Eigen::Index>(o)) += step.h * method_.b[i] * g_[k];
+        if (!derivatives) continue;
+        along_motion_[k] = y_bar_.dot(step.K.col(i));
+        for (const int p : mechanism_.data().active)
+          along_parameters_[k] += rho_bar_(p) * (mechanism_.rho()(p) == 0 ? 1 : mechanism_.rho()(p));
       }
     }
+    using Of = QuadratureWatch::Of;
     for (std::size_t o = 0; watch && objection.empty() && o < costs_.size(); ++o) {
-      if (costs_[o].running && !costs_[o].is_extreme)
-        objection = watch->look_at(step, o, {g_.data() + o * stages, stages});
+      if (!costs_[o].running) continue;
+      const auto of_cost = [&](const std::vector<double>& x) { return std::span(x).subspan(o * stages, stages); };
+      objection = watch->look_at(step, o, of_cost(g_));
+      if (!derivatives) continue;
+      watch->look_at(step, o, of_cost(along_motion_), Of::along_motion);
+      watch->look_at(step, o, of_cost(along_parameters_), Of::along_parameters);
     }
+  }
+
+  // The value; into y_bar_, rho_bar_ its gradient.
+  double gradient_at(const PointCost& cost, const StatePoint& at) {
+    y_bar_.setZero(mechanism_.states()), rho_bar_.setZero(mechanism_.parameters());
+    return cost.add_gradient(at, 1, y_bar_, rho_bar_);
   }
 
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
@@ -169,7 +196,9 @@ class Run {
   std::optional<MotionSolver> motion_;  // where some sensor needs it
   SimulationResult result_;
   Eigen::VectorXd angles_end_;
-  std::vector<double> g_;  // of the running costs at the stages of a step
+  std::vector<double> g_;                                // of the running costs at the stages of a step
+  std::vector<double> along_motion_, along_parameters_;  // g_y ydot, g_rho rho there
+  Eigen::VectorXd y_bar_, rho_bar_;
 };
 
 // Computes steps of a run again, bit for bit.
@@ -217,6 +246,7 @@ class Replayer {
 SimulationResult simulate(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
                           const Sampling& sampling, const RunOptions& options) {
   require_settled(settings);
+  check_run_arguments(mechanism, settings, costs, sampling.times, options);
   if (is_cvodes(settings.integrator.type)) return cvodes_simulate(mechanism, settings, costs, sampling, options);
   Run run(mechanism, settings, costs);
   run.go(sampling.times, sampling.observe, options, {});
@@ -226,6 +256,9 @@ SimulationResult simulate(const Mechanism& mechanism, const SimulationSettings& 
 SimulationResult simulate_tlm(const Mechanism& mechanism, const SimulationSettings& settings,
                               std::span<const Cost> costs, const TangentSampling& sampling, const RunOptions& options) {
   require_settled(settings);
+  check_run_arguments(mechanism, settings, costs, sampling.times, options);
+  if (!sampling.times.empty() && !sampling.observe)
+    throw std::invalid_argument("sampling: times without anything that observes (observe is empty)");
   if (is_cvodes(settings.integrator.type)) return cvodes_forward(mechanism, settings, costs, sampling, options);
   Run run(mechanism, settings, costs);
   SimulationResult& result = run.result();
@@ -244,6 +277,7 @@ SimulationResult simulate_tlm(const Mechanism& mechanism, const SimulationSettin
 SimulationResult simulate_adjoint(const Mechanism& mechanism, const SimulationSettings& settings,
                                   std::span<const Cost> costs, const RunOptions& options) {
   require_settled(settings);
+  check_run_arguments(mechanism, settings, costs, {}, options);
   if (is_cvodes(settings.integrator.type)) return cvodes_adjoint(mechanism, settings, costs, options);
   Run run(mechanism, settings, costs);
   SimulationResult& result = run.result();

@@ -27,6 +27,24 @@ struct StepSequence {
   bool to_the_end = true;  // the last step is the run's last, not one before it
 };
 
+// Estimated error of an integral relative to that of the integrand's size; the objective, and when most of it arose.
+struct QuadratureError {
+  double error = 0;
+  std::string of;
+  double time = 0;  // [s]
+};
+
+// A law, component of a force or running cost that jumps at an instant which parameters move (jump_watch.hpp).
+struct Jump {
+  enum class Of { force, drive, objective };  // of a drive: its law's second derivative
+  Of of = Of::force;
+  int index = 0;                // of the force or drive in the scene
+  std::string objective;        // its name
+  double size = 0, t = 0;       // [unit of the law, s]
+  std::vector<int> parameters;  // active ones that the instant depends on directly
+  bool motion = false;          // and whether it depends on the motion
+};
+
 struct SimulationStatistics {
   // rhs_evaluations: of the equations of motion, each stage of a Newton iteration included; jacobians: of these.
   long steps = 0, rejected = 0, rhs_evaluations = 0, factorisations = 0, jacobians = 0;
@@ -38,20 +56,17 @@ struct SimulationStatistics {
   double max_velocity_violation = 0;                              // of |Phi_q v + Phi_t|
   double energy_initial = 0, energy_final = 0, energy_drift = 0;  // drift: largest |E - E(0)| over accepted steps [J]
   double relative_energy_drift = 0;      // of the largest energy so far, where nothing does work; else 0
-  // Relative, of the constraints' accelerations; of a penalty with projection, the sum of what projections took out of
-  // velocities relative to that of the changes of velocity.
-  double max_acceleration_residual = 0;
+  double max_acceleration_residual = 0;  // relative, of the constraints' accelerations; penalty: of projections
   std::size_t adjoint_memory_bytes = 0;  // the most that the backward sweep kept of the forward run
   long recomputed_steps = 0;             // for want of memory, of the backward sweep
   // Of explicit methods that can tell (stiffness.hpp): steps that were looked at, those at the edge of stability among
   // them, and the fastest rate |lambda| there [1/s].
   long watched_steps = 0, stability_limited_steps = 0;
   double stiffest_rate = 0;
-  // The worst resolved running cost: estimated error of its integral relative to that of its size, its objective, and
-  // when most of the error arose (quadrature_watch.hpp; 0 by CVODES, which controls it).
-  double quadrature_error = 0;
-  std::string quadrature_error_of;
-  double quadrature_error_time = 0;  // [s]
+  // The worst resolved running cost, exponential of a smooth extreme, and derivative of either (quadrature_watch.hpp; 0
+  // by CVODES, which controls this error).
+  QuadratureError quadrature, extreme_quadrature, gradient_quadrature;
+  std::vector<Jump> jumps;  // in runs with derivatives
 };
 
 enum class SimulationStatus {

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <limits>
+
+#include "core/integrate/step_control.hpp"
+
 namespace mbsopt {
 
 std::string about_alpha(const FormulationSettings& f) {
@@ -16,6 +20,15 @@ std::string too_long_run(double span, double longest) {
       "a run of {:.3g} s is too long for this motion, whose steps were {:.3g} s at most: the time could no longer be "
       "told. Is simulation.end_time in seconds?",
       span, longest);
+}
+
+std::string too_few_digits(const IntegratorSettings& settings, double t) {
+  return fmt::format("rtol {:.3g} and atol {:.3g} ask for more digits at t = {:.6g} s than numbers have: loosen them",
+                     settings.rtol, settings.atol, t);
+}
+
+bool beyond_digits(const IntegratorSettings& s, const Eigen::VectorXd& y) {
+  return !(std::numeric_limits<double>::epsilon() * scaled_norm(y, y, y, s.rtol, s.atol) <= 1);
 }
 
 std::string step_failure(StepOutcome outcome, double t, double h, bool adaptive,

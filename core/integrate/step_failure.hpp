@@ -1,6 +1,7 @@
 // Why a run ends at a step, in words, with what to change.
 #pragma once
 
+#include <Eigen/Core>
 #include <string>
 
 #include "core/scene/settings.hpp"
@@ -16,6 +17,10 @@ std::string step_failure(StepOutcome outcome, double t, double h, bool adaptive,
                          const FormulationSettings& formulation);
 // longest: of the steps so far.
 std::string too_long_run(double span, double longest);
+// Tolerances below the rounding errors of numbers.
+std::string too_few_digits(const IntegratorSettings& settings, double t);
+// Whether they are, for the state y, in the norm of the step-size control.
+bool beyond_digits(const IntegratorSettings& settings, const Eigen::VectorXd& y);
 // Where S = M + alpha J'J may have lost M to rounding: what to change, as the end of a message.
 std::string about_alpha(const FormulationSettings& formulation);
 

@@ -145,6 +145,7 @@ void add(Compilation& model, const FrictionSpec& f, int force, const std::string
 }
 
 void add_user_force(Compilation& model, std::shared_ptr<const UserForce> force) {
+  if (!force) throw SceneError("user force: there is none (null)");
   UserForceData out;
   for (const std::string& name : force->bodies()) {
     const int body = model.body_index(name, "user force");

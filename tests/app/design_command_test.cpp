@@ -118,3 +118,70 @@ TEST_CASE("design and identify of a file that does not ask for them are bad inpu
     CHECK_THAT(outcome.err, Contains(command == "design" ? "design: missing" : "identification: missing"));
   }
 }
+
+TEST_CASE("a limit that holds for a smooth maximum only is never a bare 'converged'", "[design]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("peak.json", R"({
+    "format": 1, "name": "peak", "gravity": [0, -9.81, 0],
+    "parameters": {"k": {"value": 20, "lower": 1, "upper": 200}},
+    "bodies": [{"name": "rod", "mass": 2, "com": [0.5, 0, 0], "inertia": [1e-3, 0.1666, 0.1666],
+                "points": {"tip": [1, 0, 0]}}],
+    "joints": [{"name": "pin", "type": "revolute", "body1": "ground", "body2": "rod",
+                "point1": [0, 0, 0], "point2": "O", "axis1": [0, 0, 1], "axis2": [0, 0, 1]}],
+    "forces": [{"name": "spring", "type": "tsda", "body1": "ground", "body2": "rod",
+                "point1": [0, 1, 0], "point2": "tip", "stiffness": "k", "free_length": 0.5}],
+    "sensors": {"F": {"quantity": "force", "force": "spring"},
+                "tip_y": {"quantity": "position", "body": "rod", "point": "tip", "component": "y"}},
+    "simulation": {"end_time": 2, "output_step": 0.25},
+    "objectives": {"track": {"running": "(tip_y - 0.3)^2"}, "peak": {"maximum_of": "F", "sharpness": 1}},
+    "design": {"minimize": "track", "variables": ["k"], "subject_to": [{"objective": "peak", "upper": 12}]}
+  })");
+  const CommandOutcome outcome = run_command({"design", file, "--out", folder.file("out"), "--quiet"});
+  INFO(outcome.out << outcome.err);
+  CHECK(outcome.exit_code == kDone);
+  CHECK(outcome.out.find("ipopt converged_beyond_limit:") != std::string::npos);
+  CHECK(outcome.out.find(" of true extremes") != std::string::npos);
+  const auto result = json_of(folder.path / "out/result.json");
+  CHECK(result.at("optimizer").at("status") == "converged_beyond_limit");
+  CHECK(result.at("optimizer").at("true_infeasibility").get<double>() > 0.1);
+  const auto& peak = result.at("objectives").at("peak");
+  CHECK(peak.at("violation").get<double>() < 1e-6);
+  CHECK(peak.at("true_violation").get<double>() == Approx(peak.at("true_value").get<double>() - 12));
+  std::string said;
+  for (const auto& warning : result.at("warnings")) said += warning.get<std::string>() + "\n";
+  INFO(said);
+  CHECK(said.find("design.subject_to[0]: the maximum of 'peak' is held by its smooth value, 11.") != std::string::npos);
+  CHECK(said.find("above the limit 12") != std::string::npos);
+}
+
+TEST_CASE("a parameter that moves a jump is named by gradient, check and design", "[design]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("jump.json", R"({
+    "format": 1, "name": "jump", "gravity": [0, -9.81, 0],
+    "parameters": {"tp": {"value": 0.4, "lower": 0.1, "upper": 0.9}},
+    "bodies": [{"name": "rod", "mass": 2, "com": [0.5, 0, 0], "inertia": [1e-3, 0.1666, 0.1666],
+                "points": {"tip": [1, 0, 0]}}],
+    "joints": [{"name": "pin", "type": "revolute", "body1": "ground", "body2": "rod",
+                "point1": [0, 0, 0], "point2": "O", "axis1": [0, 0, 1], "axis2": [0, 0, 1]}],
+    "forces": [{"name": "push", "type": "force", "body": "rod", "point": "tip",
+                "components": [0, "10 + 10*abs(t - tp)/(t - tp)", 0]
+}],
+    "sensors": {"tip_y": {"quantity": "position", "body": "rod", "point": "tip", "component": "y"}},
+    "simulation": {"end_time": 1, "output_step": 0.25},
+    "objectives": {"track": {"running": "(tip_y + 0.5)^2"}},
+    "design": {
+  "minimize" : "track", "variables" : ["tp"]
+}
+})");
+  for (const std::string command : {"gradient", "check", "design"}) {
+  const CommandOutcome outcome = run_command({command, file, "--out", folder.file(command), "--quiet"});
+  INFO(command << outcome.out << outcome.err);
+  std::string said;
+  for (const auto& warning : json_of(folder.path / command / "result.json").at("warnings"))
+    said += warning.get<std::string>() + "\n";
+  INFO(said);
+  CHECK(said.find("the law of force 'push' jumps by 20 at t = 0.4 s, an instant that depends on 'tp'") !=
+        std::string::npos);
+  if (command == "design") CHECK(said.find("the derivative of objective 'track' in 'tp' is ") != std::string::npos);
+}
+}

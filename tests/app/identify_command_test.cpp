@@ -115,3 +115,40 @@ TEST_CASE("identify: the same parameter by the forward sensitivities of CVODES",
   const auto result = json_of(folder.path / "out/result.json");
   CHECK(result.at("parameters").at("k").at("value").get<double>() == Approx(20).epsilon(1e-6));
 }
+
+TEST_CASE("identify: a fit that ends without a minimum prints no intervals, and says why", "[command]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", measured_swing(folder));
+  const std::string file = folder.write("fit.json", identification_problem());
+  const CommandOutcome outcome = run_command(
+      {"identify", file, "--out", folder.file("out"), "--set", "identification.optimizer.max_iterations=1"});
+  CHECK(outcome.exit_code == kNumericalFailure);
+  CHECK_THAT(outcome.out, Contains("no standard errors and intervals: they hold at a minimum"));
+  CHECK(outcome.out.find('[') == std::string::npos);
+  const auto result = json_of(folder.path / "out/result.json");
+  CHECK(result.at("parameters").at("k").at("std_error").is_null());
+  CHECK(result.at("parameters").at("k").at("ci95").at(0).is_null());
+  CHECK_THAT(content_of(folder.path / "out/report.html"), Contains("There are no standard errors and intervals"));
+}
+
+TEST_CASE("identify: what only the data can tell is placed in the problem file", "[command]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", measured_swing(folder));
+  const std::string file = folder.write("fit.json", identification_problem());
+  const auto refused = [&](const std::string& set) {
+    const CommandOutcome outcome = run_command({"identify", file, "--out", folder.file("out"), "--set", set});
+    CHECK(outcome.exit_code == kBadInput);
+    return outcome.err;
+  };
+  std::string late = identification_problem();
+  late.replace(late.find("\"sigma\": 0.01"), 13, "\"sigma\": 0.01, \"delay\": 5");
+  const CommandOutcome outcome =
+      run_command({"identify", folder.write("late.json", late), "--out", folder.file("late")});
+  CHECK(outcome.exit_code == kBadInput);
+  CHECK_THAT(outcome.err,
+             Catch::Matches(".*late.json:\\d+:\\d+: identification.experiments\\[0\\].channels\\[0\\].delay: is up to "
+                            "5 s[^]*"));
+  CHECK_THAT(refused("identification.experiments[0].channels[0].gain=0"), Contains("gain: is 0"));
+  CHECK_THAT(refused("identification.loss={\"type\": \"huber\", \"scale\": 1e-300}"),
+             Contains("loss.scale: is 1e-300 sigma"));
+}

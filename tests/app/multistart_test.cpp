@@ -217,10 +217,11 @@ TEST_CASE("resume: a run that was interrupted keeps its best and goes on", "[res
       "--threads", "2", "--set", "simulation.integrator.max_step=2e-3", "--set", "design.multistart.starts=4"};
   REQUIRE(design(file, folder.file("whole"), slow).exit_code == kDone);
   const fs::path out = folder.path / "out";
+  const int signal = GENERATE(SIGTERM, SIGHUP, SIGPIPE);
   std::thread killer([&] {
     for (int i = 0; i < 3000 && !(fs::exists(out / kJournalFile) && journal_lines(out, "start") >= 1); ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    ::kill(::getpid(), SIGTERM);
+    ::kill(::getpid(), signal);
   });
   const CommandOutcome outcome = design(file, out.string(), slow);
   killer.join();
@@ -385,6 +386,59 @@ TEST_CASE("resume: an identification that is interrupted within its first simula
   CHECK(journal_lines(out, "residuals") == 0);
 }
 
+TEST_CASE("multistart: simulations and seconds are those of all starts, after a resumption too", "[multistart]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
+  const TemporaryFolder folder;
+  const bool designs = GENERATE(true, false);
+  const std::string command = designs ? "design" : "identify";
+  const std::string file = designs ? folder.write("rod.json", kSwingingRod) : write_swing_fit(folder);
+  const CommandOutcome outcome = run_command({command, file, "--out", folder.file("out")});
+  REQUIRE(outcome.exit_code == kDone);
+  const auto check = [&] {
+    const auto result = json_of(folder.path / "out/result.json");
+    long simulations = 0;
+    double seconds = 0;
+    for (const auto& start : result.at("multistart").at("waterfall")) {
+      CHECK(start.at("simulations").get<long>() > 0);
+      simulations += start.at("simulations").get<long>(), seconds += start.at("wall_seconds").get<double>();
+    }
+    CHECK(result.at("multistart").at("simulations") == simulations);
+    CHECK(result.at("optimizer").at("simulations").get<long>() >= simulations);
+    CHECK(result.at("optimizer").at("wall_seconds").get<double>() >= seconds);
+    return result.at("optimizer").at("simulations").get<long>();
+  };
+  const long whole = check();
+  CHECK_THAT(outcome.out, Contains(std::to_string(whole) + " simulations, ") &&
+                              Contains(designs ? "in all 8 starts" : "in all 5 starts"));
+  std::vector<std::string> lines = lines_of(folder.path / "out" / kJournalFile);
+  const auto is_start = [](const std::string& line) { return line.starts_with("{\"start\":"); };
+  const auto fourth = std::find_if(lines.begin() + 4, lines.end(), is_start);
+  REQUIRE(fourth != lines.end());
+  std::string journal;
+  for (auto line = lines.begin(); line != fourth; ++line) journal += *line + "\n";
+  write_text(folder.path / "out" / kJournalFile, journal);
+  REQUIRE(run_command({"resume", folder.file("out")}).exit_code == kDone);
+  CHECK(check() == whole);
+}
+
+TEST_CASE("multistart: starts with sigmas of their own are ranked by the likelihood", "[multistart]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
+  const TemporaryFolder folder;
+  write_swing_fit(folder);
+  std::string text = fit_problem();
+  text.replace(text.find("\"sigma\": 0.01"), 13, "\"sigma\": 0.01, \"estimate_sigma\": true");
+  REQUIRE(run_command({"identify", folder.write("own.json", text), "--out", folder.file("own")}).exit_code == kDone);
+  const auto result = outcome_of(folder.path / "own");
+  CHECK(result.at("parameters").at("k").at("value").get<double>() == Approx(20).epsilon(1e-3));
+  const auto& waterfall = result.at("multistart").at("waterfall");
+  CHECK(waterfall.at(0).at("parameters").at("k").get<double>() == Approx(20).epsilon(1e-3));
+  CHECK(waterfall.at(0).at("objective").get<double>() < waterfall.at(4).at("objective").get<double>() - 10);
+}
+
 namespace {
 
 // Two experiments, whose data have one base name.
@@ -411,7 +465,7 @@ TEST_CASE("resume refuses changed data also where two files have one base name",
   for (const std::string data : {"a/r.csv", "b/r.csv"}) {
     const std::string before = content_of(folder.path / data);
     write_text(out / kJournalFile, lines[0] + "\n" + lines[1] + "\n");
-    folder.write(data, before + "0.6,0.1\n");
+    folder.write(data, before + "1.05,0.1\n");
     const CommandOutcome outcome = run_command({"resume", out.string()});
     CHECK(outcome.exit_code == kBadInput);
     CHECK_THAT(outcome.err, Contains("another content of a data file"));

@@ -32,6 +32,8 @@ TEST_CASE("data files of one base name keep their own checksums, named as seen f
   const std::string problem = folder.write("p.json", "{}"), first = folder.write("a/r.csv", "1"),
                     second = folder.write("b/r.csv", "2");
   const auto origin = provenance({}, "", problem, {first, second});
+  CHECK_THROWS_WITH(provenance({}, "", problem, {folder.file("absent.csv")}),
+                    Catch::Contains("absent.csv: cannot be read"));
   CHECK(origin.at("data_sha256") ==
         nlohmann::ordered_json{{"a/r.csv", sha256_of_file(first)}, {"b/r.csv", sha256_of_file(second)}});
 }

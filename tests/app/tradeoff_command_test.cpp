@@ -102,6 +102,9 @@ TEST_CASE("tradeoff --apply writes a problem that runs and has the accuracy, its
   CHECK_THAT(content_of(applied), Contains("// downwards") && Contains("\"value\": 25"));
   const auto result = json_of(folder.path / "out/result.json");
   CHECK(result.at("applied").at("status") == "ok");
+  CHECK(result.at("applied").at("bounds").at("gradient of track").get<double>() <= 1e-6);
+  CHECK(result.at("applied").at("bounds").at("track").get<double>() <= 1e-6);
+  CHECK_THAT(outcome.out, Contains(" in track, ") && Contains(" in gradient of track)"));
   REQUIRE(run_command({"simulate", applied.string(), "--out", folder.file("again"), "--quiet"}).exit_code == kDone);
   const auto again = json_of(folder.path / "again/result.json").at("objectives");
   for (const char* name : {"track", "end"}) {
@@ -109,6 +112,26 @@ TEST_CASE("tradeoff --apply writes a problem that runs and has the accuracy, its
     const double exact = result.at("objectives").at(name).at("value");
     CHECK(std::abs(again.at(name).at("value").get<double>() - exact) <= 1e-6 * std::abs(exact));
   }
+}
+
+TEST_CASE("tradeoff --apply of a file that identifies covers the sum of squares and its gradient", "[command]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
+  const TemporaryFolder folder;
+  folder.write("swing.csv", "t,theta\n0,0.01\n0.25,-0.05\n0.5,-0.2\n0.75,-0.3\n1,-0.35\n");
+  std::string text = kPendulum;
+  text.replace(text.find("\"design\""), std::string::npos, R"("identification": {"variables": ["k"],
+    "experiments": [{"name": "swing", "data": "swing.csv", "channels": [{"column": "theta", "sensor": "swing"}]}]}})");
+  const CommandOutcome outcome = run_command({"tradeoff", folder.write("fit.json", text), "--budget", kBudget,
+                                              "--apply", "1e-4", "--out", folder.file("out"), "--quiet"});
+  INFO(outcome.out << outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  const auto applied = json_of(folder.path / "out/result.json").at("applied");
+  CHECK(applied.at("fit").at("error").get<double>() <= 1e-4);
+  CHECK(applied.at("fit").at("gradient_error").get<double>() <= 1e-4);
+  CHECK_THAT(applied.at("in_words").get<std::string>(),
+             Contains("in the sum of squares, ") && Contains("in its gradient"));
 }
 
 TEST_CASE("tradeoff --apply of an accuracy that nothing has fails in words and keeps the table", "[command]") {

@@ -106,9 +106,9 @@ TEST_CASE("a resolved running cost is none, and its error is less than twice the
   const Outcome run = values(p);
   REQUIRE(run.ok());
   const double error = std::abs(run("judged") - (2 + (1 - std::cos(10.0)) / 10));
-  INFO(method << ": error " << error << ", estimate " << run.statistics().quadrature_error);
-  CHECK(error < 2 * run.statistics().quadrature_error * 2 + 1e-13);  // of an integral of 2
-  CHECK(run.statistics().quadrature_error < 1e-2);
+  INFO(method << ": error " << error << ", estimate " << run.statistics().quadrature.error);
+  CHECK(error < 2 * run.statistics().quadrature.error * 2 + 1e-13);  // of an integral of 2
+  CHECK(run.statistics().quadrature.error < 1e-2);
   CHECK_THAT(warnings_of(p), !Contains("do not resolve"));
 }
 

@@ -71,7 +71,7 @@ extern "C" int open(const char* path, int flags, ...) {
   va_start(more, flags);
   const mode_t mode = flags & O_CREAT ? va_arg(more, mode_t) : 0;
   va_end(more);
-  if (flags & (O_WRONLY | O_RDWR) && fails("open")) return -1;
+  if (flags & O_CREAT ? fails("create") : flags & (O_WRONLY | O_RDWR) && fails("open")) return -1;
   return original<int (*)(const char*, int, ...)>("open")(path, flags, mode);
 }
 

@@ -337,8 +337,8 @@ class Campaign:
 
     def calls(self):
         faults = [("write", errno.ENOSPC, 0), ("write", errno.EIO, 0), ("write", errno.EINTR, 1), ("write", 0, 0),
-                  ("read", errno.EIO, 0), ("read", errno.EINTR, 1), ("read", 0, 3), ("open", errno.ENOSPC, 0),
-                  ("open", errno.EMFILE, 1), ("fsync", errno.EIO, 0), ("fdatasync", errno.EIO, 0),
+                  ("read", errno.EIO, 0), ("read", errno.EINTR, 1), ("read", 0, 3), ("create", errno.ENOSPC, 0),
+                  ("create", errno.EMFILE, 1), ("open", errno.EMFILE, 1), ("fsync", errno.EIO, 0), ("fdatasync", errno.EIO, 0),
                   ("rename", errno.EACCES, 0), ("fork", errno.EAGAIN, 1), ("fork", errno.EAGAIN, 0),
                   ("pipe2", errno.EMFILE, 1), ("pipe2", errno.EMFILE, 0)]
         cases = [(name, *fault) for name in ALL for fault in faults]
@@ -496,14 +496,14 @@ class Campaign:
     def kill(self, name, number):
         folder = self.site.folder()
         process = self.site.start(ALL[name], folder)
-        sent = self.signals(process, self.random.uniform(0, 1.1 * self.seconds[name]))
-        complaint = self.after_signals(self.site.wait(process), sent, folder)
+        listens, sent = self.signals(process, self.random.uniform(0, 1.1 * self.seconds[name]), folder)
+        complaint = self.after_signals(self.site.wait(process), listens, sent, folder)
         resumed_under_fire = ""
         if not complaint and name in LONG and (folder / "out/journal.jsonl").exists() and self.random.random() < 0.3:
             before = starts_in(folder / "out")
             process = self.site.start(["resume", "out"], folder)
-            again = self.signals(process, self.random.uniform(0, self.seconds[name]))
-            complaint = self.after_signals(self.site.wait(process), again, folder)
+            _, again = self.signals(process, self.random.uniform(0, self.seconds[name]), folder)
+            complaint = self.after_signals(self.site.wait(process), False, again, folder)
             resumed_under_fire = f", then {again}"
             if not complaint and any(starts_in(folder / "out").get(s) != line for s, line in before.items()):
                 complaint = "resume has lost a finished start"
@@ -514,10 +514,10 @@ class Campaign:
         else:
             shutil.rmtree(folder)
 
-    def signals(self, process, moment):
-        """One to three signals, to the process or to its group; which ones."""
+    def signals(self, process, moment, folder):
+        """One to three signals, to the process or to its group: whether a new run listened to them, and which ones."""
         time.sleep(moment)
-        sent = []
+        listens, sent = (folder / "out/journal.jsonl").exists(), []
         for _ in range(self.random.choice((1, 1, 1, 2, 2, 3))):
             which = self.random.choice((signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE, signal.SIGKILL))
             to_group = self.random.random() < 0.5
@@ -527,13 +527,15 @@ class Campaign:
                 break
             sent.append(f"{which.name}{' to the group' if to_group else ''}")
             time.sleep(self.random.choice((0, 0, 0.01, 0.1)))
-        return " ".join(sent)
+        return listens and "SIGKILL" not in " ".join(sent), " ".join(sent)
 
-    def after_signals(self, ended, sent, folder):
+    def after_signals(self, ended, listens, sent, folder):
         if ended.hung:
             return "it hangs"
         if ended.code < 0 and signal.Signals(-ended.code).name not in sent:
             return f"ended by {signal.Signals(-ended.code).name}: {ended.err[-300:]}"
+        if ended.code < 0 and listens:  # all within a second, which is one
+            return f"ended at once by {signal.Signals(-ended.code).name}"
         if ended.code > 0 and ended.code not in (1, 130):
             return f"exit code {ended.code}: {ended.err[-300:]}"
         if ended.code >= 0 and status(folder / "out") == "running":

@@ -1,16 +1,21 @@
-// journal.jsonl: what is read of any bytes is a journal, or a refusal in words; so are its records.
+// journal.jsonl. Any bytes are a journal or refused in words. What is written reads back; of a journal with one other
+// byte, the first records do, or it is refused.
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <vector>
 
 #include "app/atomic_file.hpp"
 #include "app/journal.hpp"
 #include "app/point_records.hpp"
 #include "app/residual_records.hpp"
+#include "optim/regular_file.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
 using namespace mbsopt;
+using fuzz::expect;
 
 namespace {
 
@@ -39,20 +44,57 @@ void refused_in_words(std::string_view text, const Read& read) {
   }
 }
 
+void write(const std::filesystem::path& file, std::string_view text) {
+  std::ofstream(file, std::ios::binary | std::ios::trunc) << text;
+}
+
+// The lines of the text that are JSON objects.
+std::vector<Json> records_of(std::string_view text) {
+  std::vector<Json> records;
+  while (!text.empty() && records.size() < 4) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(line.size() + 1, text.size()));
+    const Json json = Json::parse(line.begin(), line.end(), nullptr, false);
+    if (json.is_object()) records.push_back(json);
+  }
+  return records;
+}
+
+bool is_beginning(const std::vector<Json>& of, const std::vector<Json>& found) {
+  return found.size() <= of.size() && std::equal(found.begin(), found.end(), of.begin());
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const Folder folder;
+  const std::filesystem::path file = folder.path() / kJournalFile;
   const std::string_view text = fuzz::text_of(data, size);
-  std::ofstream(folder.path() / kJournalFile, std::ios::binary) << text;
-  refused_in_words(text, [&] {
-    const JournalContent content = read_journal(folder.path());
-    refused_in_words(text,
-                     [&] { JsonPointRecords(content.points, content.hessians, [](const char*, const Json&) {}); });
-    refused_in_words(text, [&] { JsonResidualRecords(content.residuals, [](const Json&) {}); });
-    Journal(folder.path()).add("ended", "ok");
-    const JournalContent longer = read_journal(folder.path());
-    fuzz::expect(longer.points.size() == content.points.size() && longer.ended == "ok", "a record was lost", "");
+  write(file, text);
+  refused_in_words(text, [&] { read_journal(folder.path()); });
+  const std::vector<Json> records = records_of(text);
+  if (records.empty()) return 0;
+  std::filesystem::remove(file);
+  {
+    Journal journal(folder.path(), Json{{"program", "mbsopt"}});
+    for (const Json& record : records) journal.add("point", record);
+  }
+  expect(read_journal(folder.path()).points == records, "records that do not read back as they were written", text);
+  std::string damaged = content_of_regular_file(file);
+  const std::size_t at = (data[0] + 256u * data[size - 1]) % damaged.size();
+  damaged[at] = static_cast<char>(data[size / 2]);
+  write(file, damaged);
+  refused_in_words(damaged, [&] {
+    expect(is_beginning(records, read_journal(folder.path()).points), "a damaged record is read", damaged);
   });
+  // The records, as if their checksums fitted.
+  std::vector<Json> points, hessians, residuals;
+  for (const Json& line : records) {
+    if (line.contains("point")) points.push_back(line["point"]);
+    if (line.contains("hessians")) hessians.push_back(line["hessians"]);
+    if (line.contains("residuals")) residuals.push_back(line["residuals"]);
+  }
+  refused_in_words(text, [&] { JsonPointRecords(points, hessians, [](const char*, const Json&) {}); });
+  refused_in_words(text, [&] { JsonResidualRecords(residuals, [](const Json&) {}); });
   return 0;
 }

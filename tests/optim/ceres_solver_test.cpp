@@ -100,3 +100,24 @@ TEST_CASE("ceres stops on request and at the limit", "[ceres]") {
   const LeastSquaresResult limited = solve_with_ceres(problem, Eigen::Vector2d(-1.2, 1), {1e-10, 2, {}});
   CHECK(limited.status == SolverStatus::iteration_limit);
 }
+
+TEST_CASE("a refused step is reported with the cost of the point that stays", "[ceres]") {
+  FragileResidual problem;
+  std::vector<LeastSquaresProgress> seen;
+  CeresOptions options;
+  options.progress = [&](const LeastSquaresProgress& p) {
+    seen.push_back(p);
+    return true;
+  };
+  REQUIRE(solve_with_ceres(problem, Eigen::VectorXd::Zero(1), options).failed_evaluations > 0);
+  for (const LeastSquaresProgress& p : seen)
+    CHECK(p.cost == Approx(0.5 * std::pow(std::exp(p.x(0)) - 20, 2)).margin(1e-12));
+}
+
+TEST_CASE("a loss that is not finite at the start is refused in words", "[ceres]") {
+  OutlyingResidual problem;
+  problem.outlier = 1, problem.loss = {LossType::cauchy, 1e200};
+  const LeastSquaresResult result = solve_with_ceres(problem, Eigen::VectorXd::Ones(1));
+  CHECK(result.status == SolverStatus::failed);
+  CHECK_THAT(result.message, Catch::Contains("the loss of its residuals is not finite"));
+}

@@ -74,6 +74,7 @@ TEST_CASE("entries that are zero, exactly or nearly, get a sane verdict", "[chec
   x.name = "stiffness";  // of k1 alone: all other entries are exactly zero
   x.parameters_only = Expression::parse("k1^2");
   problem.objectives = {x};
+  for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
   GradientCheckOptions options;
   options.timing = {1, 1, 0};
   const GradientCheck check = check_gradients(problem, options);
@@ -115,6 +116,7 @@ TEST_CASE("differences that cannot be evaluated have failed, they are not zero",
   root.name = "root";  // of a number that is 0 here, and negative on one side
   root.parameters_only = Expression::parse("sqrt(m1 - m4 + 1e-300) + k1");
   problem.objectives = {root};
+  for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
   GradientCheckOptions options;
   options.timing = {1, 1, 0};
   const GradientCheck check = check_gradients(problem, options);
@@ -136,6 +138,7 @@ TEST_CASE("the Taylor remainder of a linear objective has no slope, and that is 
   sum.name = "sum";
   sum.parameters_only = Expression::parse("L01 + 2*k1 + m1 + m2 - c1");
   problem.objectives = {sum};
+  for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
   GradientCheckOptions options;
   options.timing = {1, 1, 0};
   const GradientCheck check = check_gradients(problem, options);
@@ -160,4 +163,56 @@ TEST_CASE("a wrong derivative of a user's cost shows in frozen differences, not 
     disagree += e.frozen_verdict == Verdict::disagrees;
   }
   CHECK(disagree > 5);
+}
+
+TEST_CASE("derivatives that are 0 but for rounding do not disagree", "[check]") {
+  // A bar that turns about z in space: inertias about x and y have no part in it.
+  Problem problem;
+  Scene& s = problem.scene;
+  testing::add_parameters(s, {{"jx", 0.7}, {"jy", 0.8}});
+  s.gravity = {0.0, -9.81, 0.0};
+  s.bodies.push_back(testing::body("bar", {0.7, 0.0, 0.0}, {0.0, 0.0, 0.0}, testing::turned("0.3")));
+  s.bodies[0].inertia = {testing::f("jx"), testing::f("jy"), 1.1, 0.1, 0.2, 0.15};
+  s.joints.push_back(testing::hinge("A", "ground", testing::vec("0", "0", "0"), "bar", testing::vec("0", "0", "0")));
+  s.sensors.push_back(testing::angle_sensor("theta", "A"));
+  s.simulation.model = ModelChoice::spatial;
+  ObjectiveSpec swing;
+  swing.name = "swing", swing.running = Expression::parse("(theta + 1)^2");
+  problem.objectives = {swing};
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0}, options.continuous = false;
+  const GradientCheck check = check_gradients(problem, options);
+  REQUIRE(check.ran);
+  REQUIRE(check.entries.size() == 2);
+  bool apart = false;
+  for (const CheckedEntry& e : check.entries) {
+    INFO(e.parameter << ": tlm " << e.tlm << ", adjoint " << e.adjoint << ", frozen " << e.frozen << " +- "
+                     << e.frozen_error << ", free " << e.free << " +- " << e.free_error);
+    CHECK(std::abs(e.tlm) < 1e-13);
+    apart = apart || e.tlm_adjoint > 1e-10;  // of themselves
+    CHECK(passes(e.exact));
+    CHECK(passes(e.frozen_verdict.value()));
+  }
+  CHECK(apart);
+  CHECK(check.passed());
+}
+
+TEST_CASE("rounding by Cholesky at a large penalty is named as what methods differ by", "[check]") {
+  Problem problem = five_bar::problem(1e-8);
+  problem.scene.simulation.end_time = 0.5;
+  problem.scene.simulation.formulation = FormulationSettings::penalty();
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0}, options.continuous = false;
+  const GradientCheck by_cholesky = check_gradients(problem, options);
+  REQUIRE(by_cholesky.ran);
+  CHECK(by_cholesky.passed());
+  const auto names_it = [](const std::string& w) {
+    return w.find("by cholesky rounds derivatives") != std::string::npos &&
+           w.find("quasidefinite") != std::string::npos;
+  };
+  CHECK(std::any_of(by_cholesky.warnings.begin(), by_cholesky.warnings.end(), names_it));
+  problem.scene.simulation.formulation.linear_solver = LinearSolver::quasidefinite;
+  const GradientCheck quasidefinite = check_gradients(problem, options);
+  CHECK(quasidefinite.passed());
+  CHECK(std::none_of(quasidefinite.warnings.begin(), quasidefinite.warnings.end(), names_it));
 }

@@ -327,3 +327,40 @@ TEST_CASE("of m g a/J only the quotient is determined, and it is called that", "
   const auto value = [&](std::size_t i) { return result.parameters[i].value; };
   CHECK(value(0) * value(1) * value(2) / value(3) == Approx(64).epsilon(1e-3));
 }
+
+TEST_CASE("the cost before and after is by the same sigmas and the same loss", "[identification][loss]") {
+  const CsvTable data = noisy(7);
+  Problem p = fit_problem();
+  p.identification->experiments[0].channels[0].sigma = 0.5;
+  p.identification->experiments[0].channels[0].estimate_sigma = true;
+  const LossType loss = GENERATE(LossType::squared, LossType::tukey);
+  const IdentificationResult result = fitted(p, {loss}, data);
+  INFO(result.message);
+  REQUIRE(result.ok());
+  const double sigma = result.experiments[0].channels[0].sigma;
+  CHECK(result.experiments[0].channels[0].sigma_is_estimated);
+  CHECK(sigma == Approx(kSigma).epsilon(0.2));
+  p.identification->experiments[0].channels[0].sigma = sigma;
+  Eigen::VectorXd start(4);
+  start << 64.5, 0.08, 1.5, 1.5;
+  const Experiment run(p.scene, p.identification->experiments[0], "here", data, start,
+                       {{0, 0}, {1, 1}, {2, 2}, {3, 3}});
+  const Loss by{loss};
+  double cost = 0;
+  for (const double z : run.residuals(start).z) cost += 0.5 * by.at(z * z).rho;
+  CHECK(result.cost_initial == Approx(cost).epsilon(1e-9));
+  CHECK(result.cost_final < result.cost_initial);
+}
+
+TEST_CASE("a fit of wild data under a loss without pull far out is no fit", "[identification][loss]") {
+  CsvTable data = noisy(3);
+  std::mt19937 generator(5);
+  std::uniform_real_distribution<double> wild(-1e3, 1e3);
+  for (double& x : data.columns[1]) x = wild(generator);
+  const IdentificationResult result = fitted(fit_problem(), {LossType::tukey}, data);
+  INFO(result.message);
+  CHECK_FALSE(result.ok());
+  for (const FittedParameter& p : result.parameters) CHECK(std::isnan(p.std_error));
+  CHECK(result.statistics.correlation.size() == 0);
+  CHECK_FALSE(result.statistics.none.empty());
+}

@@ -246,3 +246,60 @@ TEST_CASE("the measured pendulum: the published figures of the record", "[identi
                     << result.experiments[0].rms << ", validation " << result.experiments[1].rms << ", "
                     << result.evaluations << " evaluations, " << result.wall_seconds << " s");
 }
+
+TEST_CASE("a variable whose bounds are one number is a constant, and a warning says so", "[identification]") {
+  Problem p = fit_problem(64, 0.1, 1.53, 1.55);
+  p.scene.parameters[0].lower = p.scene.parameters[0].upper = 64;
+  const CsvTable data = pendulum::exact_motion(64, 0.055, 1.53, 1.55, 2);
+  const IdentificationResult result = run_identification(p, {data});
+  INFO(result.message);
+  REQUIRE(result.ok());
+  REQUIRE(result.parameters.size() == 3);
+  CHECK(result.parameters[0].name == "c");
+  CHECK(result.parameters[0].value == Approx(0.055).epsilon(1e-4));
+  REQUIRE(result.warnings.size() == 1);
+  CHECK_THAT(result.warnings[0], Contains("parameters.w2.lower: is 64, as is the upper bound"));
+  p.identification->variables = {"w2"}, p.identification->experiments[0].free.clear();
+  CHECK_THROWS_WITH(run_identification(p, {data}), Contains("identification.variables: none of them can change"));
+}
+
+TEST_CASE("a fit that was stopped has no standard errors, and no estimated sigma", "[identification]") {
+  Problem p = fit_problem(66, 0.1, 1.5, 1.4);
+  p.identification->experiments[0].channels[0].estimate_sigma = true;
+  CsvTable data = pendulum::exact_motion(64, 0.055, 1.53, 1.55, 2);
+  pendulum::add_noise(data, 0.01, 1);
+  IdentificationOptions options;
+  options.progress = [](const FitRow& row) { return row.iteration < 1; };
+  const IdentificationResult result = run_identification(p, {data}, options);
+  REQUIRE(result.status == SolverStatus::stopped);
+  for (const FittedParameter& fitted : result.parameters) {
+    CHECK(std::isnan(fitted.std_error));
+    CHECK(std::isnan(fitted.ci95[0]));
+  }
+  CHECK_THAT(result.statistics.none, Contains("ended before"));
+  CHECK_FALSE(result.experiments[0].channels[0].sigma_is_estimated);
+  REQUIRE_FALSE(result.warnings.empty());
+  CHECK_THAT(result.warnings[0], Contains("before the sigmas were estimated"));
+}
+
+TEST_CASE("a record of angles in degrees is doubted", "[identification]") {
+  Problem p = fit_problem(64, 0.055, 1.53, 1.55);
+  p.identification->experiments[0].free.clear();
+  CsvTable data = pendulum::exact_motion(64, 0.055, 1.53, 1.55, 2);
+  CHECK(run_identification(p, {data}).warnings.empty());
+  for (double& x : data.columns[1]) x *= 180 / 3.14159265358979;
+  const IdentificationResult result = run_identification(p, {data});
+  REQUIRE_FALSE(result.warnings.empty());
+  CHECK_THAT(result.warnings.back(),
+             Contains("identification.experiments[0].channels[0].column: ") && Contains("in degrees?"));
+  p.identification->experiments[0].channels[0].gain = 180 / 3.14159265358979;
+  p.identification->experiments[0].channels[0].sigma = 0.5;
+  CHECK(run_identification(p, {data}).warnings.empty());
+}
+
+TEST_CASE("a delay longer than the record is refused at the delay", "[identification]") {
+  Problem p = fit_problem(64, 0.05, 1.5, 1.5);
+  p.identification->experiments[0].channels[0].delay = 5.0;
+  CHECK_THROWS_WITH(run_identification(p, {pendulum::exact_motion(64, 0.055, 1.53, 1.55, 1)}),
+                    Contains("identification.experiments[0].channels[0].delay: is up to 5 s"));
+}

@@ -7,6 +7,7 @@
 
 using namespace mbsopt;
 using namespace mbsopt::testing;
+using Eigen::VectorXd;
 
 namespace {
 
@@ -47,6 +48,9 @@ TEST_CASE("a parameter for which a redundant loop closes only once is an error t
   options.method = method;
   Evaluator evaluator(three_cranks("free"), end_of_x(), {}, options);
   CHECK(evaluator.values(evaluator.start()).ok);
+  VectorXd locked = evaluator.start();
+  locked(1) *= 1.01;
+  CHECK_THROWS_WITH(evaluator.gradients(locked), Catch::Contains("parameters.free"));
   CHECK_THROWS_WITH(evaluator.gradients(evaluator.start()),
                     Catch::Contains("parameters.free") && !Catch::Contains("parameters.width"));
 }

@@ -206,3 +206,33 @@ TEST_CASE("the square is the robust formula's special case", "[statistics]") {
     CHECK((fit_statistics(data).covariance - squared.covariance).norm() > 0.01 * squared.covariance.norm());
   }
 }
+
+TEST_CASE("a parameter that moves the record by rounding errors only does not influence it", "[statistics]") {
+  const MatrixXd X = random_matrix(20, 2, 9);
+  FitData data;
+  data.J = X, data.z = random_matrix(20, 1, 10).col(0), data.rho = VectorXd::Ones(2), data.names = {"k", "c"};
+  data.J.col(1) *= 1e-14;
+  data.record = 5;
+  const FitStatistics s = fit_statistics(data);
+  CHECK(s.unidentifiable == std::vector<std::string>{"c: does not influence what is measured"});
+  CHECK(std::isinf(s.std_error(1)));
+  CHECK(std::isfinite(s.std_error(0)));
+  CHECK(std::isinf(s.condition_number));
+  // A tiny parameter has a large derivative, and all the influence of any other.
+  data.J = X * 1e14, data.change = VectorXd::Constant(2, 1e-14);
+  CHECK(fit_statistics(data).unidentifiable.empty());
+}
+
+TEST_CASE("where there is no variance there are no standard errors, and words say why", "[statistics]") {
+  FitData data;
+  data.J = random_matrix(20, 2, 9), data.z = VectorXd::Constant(20, 1e3), data.rho = VectorXd::Ones(2);
+  data.names = {"k", "c"}, data.loss = {LossType::tukey};
+  const FitStatistics s = fit_statistics(data);
+  CHECK(std::isnan(s.std_error(0)));
+  CHECK(std::isnan(s.ci95(1, 0)));
+  CHECK(s.correlation.size() == 0);
+  CHECK_THAT(s.none, Catch::Contains("beyond the scale of the loss"));
+  CHECK(s.unidentifiable.empty());
+  data.J = MatrixXd::Identity(2, 2), data.z = VectorXd::Zero(2), data.loss = {};
+  CHECK_THAT(fit_statistics(data).none, Catch::Contains("no degree of freedom"));
+}

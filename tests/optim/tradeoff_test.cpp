@@ -166,6 +166,41 @@ TEST_CASE("an error that is small by chance is not recommended", "[tradeoff]") {
   CHECK(recommend(tradeoff, {0}, 5e-7).why_not.find("the best has 1.0e-06") != std::string::npos);
 }
 
+TEST_CASE("advice for a design covers the gradient, at the same settings as the value", "[tradeoff]") {
+  Tradeoff tradeoff = measured(short_five_bar(), 0);
+  REQUIRE(tradeoff.ok());
+  const std::vector<Quantity>& all = tradeoff.reference.errors->quantities();
+  const std::vector<std::size_t> asked = design_quantities(all, {"motion"});
+  const std::size_t psi = index_of(tradeoff, "objective motion"), gradient = index_of(tradeoff, "gradient of motion");
+  CHECK(asked == std::vector<std::size_t>{psi, gradient});
+  CHECK(design_quantities(all, {"absent"}).empty());
+  tradeoff.rows.clear();
+  const auto add = [&](double rtol, std::optional<GradientMethod> method, double seconds, double error) {
+    TradeoffRow row;
+    row.setting.curve = method ? "gradient" : "simulation";
+    row.setting.simulation.integrator.rtol = rtol, row.setting.gradient = method;
+    row.wall_seconds = seconds;
+    row.errors.setConstant(static_cast<Eigen::Index>(all.size()), std::nan(""));
+    row.errors(static_cast<Eigen::Index>(method ? gradient : psi)) = error;
+    row.deviations = row.errors;
+    tradeoff.rows.push_back(row);
+  };
+  add(1e-3, {}, 1, 2.8e-4), add(1e-5, {}, 2, 1e-6), add(1e-7, {}, 4, 1e-8);
+  add(1e-3, GradientMethod::tlm, 3, 3.5e-2), add(1e-5, GradientMethod::differences, 3.5, 1e-5);
+  add(1e-5, GradientMethod::tlm, 5, 2e-4), add(1e-9, GradientMethod::tlm, 20, 1e-9);
+  bound_errors(tradeoff.rows);
+  CHECK(*recommend(tradeoff, {psi}, 1e-3).row == 0);
+  CHECK(*recommend(tradeoff, asked, 1e-3).row == 5);
+  CHECK(*recommend(tradeoff, asked, 5e-2).row == 3);
+  CHECK_FALSE(recommend(tradeoff, asked, 1e-4).row);  // no value was measured at 1e-9
+  tradeoff.rows[2].within_floor = true;               // nor need it be: a looser one is as exact as the reference
+  CHECK(*recommend(tradeoff, asked, 1e-4).row == 6);
+  std::vector<double> tried;
+  const auto slow = [&](const TradeoffRow& row) { return tried.push_back(row.wall_seconds), row.wall_seconds > 3; };
+  CHECK(*recommend(tradeoff, {psi}, 1e-3, slow).row == 2);
+  CHECK(tried == std::vector<double>{1, 2, 4});
+}
+
 TEST_CASE("settings that fail are rows with their reasons, and do not end the sweep", "[tradeoff]") {
 #ifdef __SANITIZE_ADDRESS__
   return;  // twenty times slower

@@ -115,3 +115,28 @@ TEST_CASE("on a logarithmic x axis decades are equally wide and values <= 0 are 
   const double first = std::stod(line[1]), second = std::stod(line[2]), third = std::stod(line[3]);
   CHECK(second - first == Approx(third - second).epsilon(1e-3));
 }
+
+TEST_CASE("a cloud of many points is thinned at random, and the plot says so", "[report]") {
+  // Uniform noise: every tenth of its height holds about a tenth of the points that are drawn.
+  PlotSeries noise{"residual", {}, {}, Mark::points};
+  for (int i = 0; i < 60'000; ++i) noise.x.push_back(i), noise.y.push_back(std::fmod(i * 0.6180339887498949, 1.0));
+  LinePlot plot{.title = "", .x_label = "", .y_label = ""};
+  plot.series.push_back(noise);
+  const std::string svg = to_svg(plot);
+  CHECK(svg == to_svg(plot));
+  CHECK(svg.find("residual: 5000 of 60000 drawn, at random") != std::string::npos);
+  std::smatch path;
+  REQUIRE(std::regex_search(svg, path, std::regex("class=\"points c0\" d=\"([^\"]*)\"")));
+  std::vector<int> tenths(10);
+  double low = 1e9, high = -1e9;
+  std::vector<double> heights;
+  const std::string drawn = path[1];
+  for (std::size_t at = drawn.find('M'); at != std::string::npos; at = drawn.find('M', at + 1))
+    heights.push_back(std::stod(drawn.substr(drawn.find(' ', at))));
+  for (const double y : heights) low = std::min(low, y), high = std::max(high, y);
+  for (const double y : heights) ++tenths[std::min(9, static_cast<int>(10 * (y - low) / (high - low)))];
+  CHECK(heights.size() == kMostPoints + 2);
+  for (const int count : tenths) CHECK(std::abs(count - 500) < 100);  // 4.7 standard deviations
+  plot.series[0].x.resize(kMostPoints), plot.series[0].y.resize(kMostPoints);
+  CHECK(to_svg(plot).find("at random") == std::string::npos);
+}

@@ -119,3 +119,21 @@ TEST_CASE("after each accepted step the state is shown, the last one that of the
   CHECK(times.back() == 0.5);
   CHECK(last == run.y_end);
 }
+
+TEST_CASE("tolerances below the rounding errors of numbers are what a run fails by, and its message says so",
+          "[simulation]") {
+  Scene scene = loaded_four_bar();
+  scene.simulation.end_time = 1;
+  const Mechanism mechanism(scene, nominal(scene));
+  const std::string type = GENERATE("dopri5", "dopri853", "radau5");
+  const double tolerance = GENERATE(0.0, 1e-300, 1e-30);
+  INFO(type << " at " << tolerance);
+  SimulationSettings s = scene.simulation;
+  s.integrator = {};
+  s.integrator.type = type, s.integrator.rtol = s.integrator.atol = tolerance, s.integrator.max_steps = 2000;
+  const SimulationResult run = simulate(mechanism, s);
+  REQUIRE_FALSE(run.ok());
+  CHECK(run.message.find("ask for more digits") != std::string::npos);
+  CHECK(run.message.find("nan") == std::string::npos);
+  CHECK(run.message.find("end_time") == std::string::npos);
+}

@@ -1,4 +1,4 @@
-#include "app/simulation_warnings.hpp"
+#include "core/integrate/simulation_warnings.hpp"
 
 #include <fmt/format.h>
 
@@ -17,8 +17,24 @@ constexpr double kDigitsPerAlpha = 1e-16;  // docs/formulations.md, measured
 
 }  // namespace
 
-std::vector<std::string> simulation_warnings(const SimulationSettings& settings, const SimulationStatistics& statistics,
+std::string in_words(const Scene& scene, const Jump& jump) {
+  const std::size_t index = static_cast<std::size_t>(jump.index);
+  const std::string what = jump.of == Jump::Of::force   ? "the law of force '" + scene.forces[index].name + "'"
+                           : jump.of == Jump::Of::drive ? "the acceleration of drive '" + scene.drives[index].name + "'"
+                                                        : "the integrand of objective '" + jump.objective + "'";
+  std::string causes;
+  for (const int k : jump.parameters)
+    causes += (causes.empty() ? "'" : ", '") + scene.parameters[static_cast<std::size_t>(k)].name + "'";
+  if (jump.motion) causes += causes.empty() ? "the motion, and so on the parameters" : " and the motion";
+  return fmt::format(
+      "{} jumps by {:.3g} at t = {:.6g} s, an instant that depends on {}: gradients leave out how it moves, so that "
+      "they may be wrong, even 0. Let the value pass smoothly over a short time, by tanh(x/eps) or smooth_abs(x, eps)",
+      what, jump.size, jump.t, causes);
+}
+
+std::vector<std::string> simulation_warnings(const Scene& scene, const SimulationStatistics& statistics,
                                              bool finished) {
+  const SimulationSettings& settings = scene.simulation;
   std::vector<std::string> warnings;
   const FormulationSettings& f = settings.formulation;
   const bool penalty = f.type == FormulationType::penalty;
@@ -69,14 +85,19 @@ std::vector<std::string> simulation_warnings(const SimulationSettings& settings,
         "differ too much for simulation.formulation (a larger alpha or more iterations)",
         statistics.max_acceleration_residual));
   }
-  if (statistics.quadrature_error > kUnresolved) {
+  const auto add_unresolved = [&](const QuadratureError& worst, const char* what, const char* consequence) {
+    if (!(worst.error > kUnresolved)) return;
     warnings.push_back(fmt::format(
-        "the steps do not resolve the running cost of objective '{}': its integral has an estimated error of {:.2g} %, "
-        "most of it near t = {:.6g} s. {}, or take cvodes_bdf or cvodes_adams, which control this error",
-        statistics.quadrature_error_of, 100 * statistics.quadrature_error, statistics.quadrature_error_time,
+        "the steps do not resolve {} of objective '{}': {} has an estimated error of {:.2g} %, most of it near t = "
+        "{:.6g} s. {}, or take cvodes_bdf or cvodes_adams, which control this error",
+        what, worst.of, consequence, 100 * worst.error, worst.time,
         settings.integrator.step ? "Take a smaller simulation.integrator.step"
                                  : "Set simulation.integrator.max_step, tighten rtol"));
-  }
+  };
+  add_unresolved(statistics.quadrature, "the running cost", "its integral");
+  add_unresolved(statistics.extreme_quadrature, "the peaks", "the integral of their exponential");
+  add_unresolved(statistics.gradient_quadrature, "the derivative of the integrand", "the gradient");
+  for (const Jump& jump : statistics.jumps) warnings.push_back(in_words(scene, jump));
   return warnings;
 }
 
