@@ -21,8 +21,8 @@ def random_scene(seed):
     loads = Loads(rng, mechanism, f"{seed}_{{}}.csv")
     measures = Measures(rng, mechanism, loads)
     problem = {"format": 1, "name": f"scene_{seed}", "gravity": gravity(rng, family), "bodies": mechanism.bodies,
-               "joints": mechanism.joint_fields, "drives": loads.drives, "forces": loads.forces, "sensors": measures.sensors,
-               "simulation": settings(rng, family), "objectives": measures.objectives}
+               "joints": mechanism.joint_fields, "drives": loads.drives, "forces": loads.forces,
+               "sensors": measures.sensors, "simulation": settings(rng, family), "objectives": measures.objectives}
     if family.has("equilibrium"):
         problem["initial"] = {"equilibrium": True}
     elif measures.conditions:
@@ -62,7 +62,8 @@ def roughen(rng, family, bodies):
 
 def give_parameters(rng, family, problem):
     parameters = Parameters(rng)
-    weights = {"bodies": 3, "joints": 3, "forces": 3, "drives": 1, "initial": 1, "gravity": 0.3, "sensors": 0.5, "objectives": 0.3}
+    weights = {"bodies": 3, "joints": 3, "forces": 3, "drives": 1, "initial": 1, "gravity": 0.3,
+               "sensors": 0.5, "objectives": 0.3}
     for _ in range(rng.choices(range(7), [1, 3, 4, 4, 3, 2, 1])[0]):
         section = rng.choices(list(weights), weights.values())[0]
         if not problem.get(section):
@@ -72,15 +73,15 @@ def give_parameters(rng, family, problem):
         if not able:
             continue
         items, key, path = rng.choice(able)
-        size = abs(items[key]) or (1.0 if any(str(part).startswith(("axis", "normal")) for part in path) else family.length)
+        direction = any(str(part).startswith(("axis", "normal")) for part in path)
+        size = abs(items[key]) or (1.0 if direction else family.length)
         items[key] = parameters.defined(parameters.express(items[key], size))
     if parameters.values and rng.random() < 0.15:
         name = rng.choice(list(parameters.values))
         scale = abs(parameters.values[name]["value"]) or 1.0
-        rng.choice([o for o in problem["objectives"].values()]).setdefault("parameters_only", Formula("({}*{})^2", name, 1 / scale))
-        for objective in problem["objectives"].values():
-            if {"maximum_of", "minimum_of", "rms_of"} & set(objective):
-                objective.pop("parameters_only", None)
+        sums = [o for o in problem["objectives"].values() if not {"maximum_of", "minimum_of", "rms_of"} & set(o)]
+        if sums:
+            rng.choice(sums)["parameters_only"] = Formula("({}*{})^2", name, 1 / scale)
     if parameters.values:
         problem["parameters"] = parameters.values
     if parameters.definitions:

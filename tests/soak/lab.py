@@ -8,9 +8,10 @@ from pathlib import Path
 from scene import Scene
 
 # Warnings of the program that say its numbers may be off by more than usual.
-DOUBT = re.compile(r"singular|energy changed|came apart|accelerations of the constraints|not resolve|stability|stiff|zero length|"
-                   r"cannot change|not smooth|jump|peak|disagree|rounding|differ|has no (mass|inertia)|error|faster than", re.IGNORECASE)
-FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh")} | {"pi": math.pi}
+DOUBT = re.compile(r"singular|energy changed|came apart|accelerations of the constraints|not resolve|stability|stiff|"
+                   r"zero length|cannot change|not smooth|jump|peak|disagree|rounding|differ|has no (mass|inertia)|"
+                   r"error|faster than", re.IGNORECASE)
+FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh", "pi")}
 
 
 class Lab:
@@ -61,7 +62,8 @@ class Lab:
     def number(self, x):
         if isinstance(x, (int, float)):
             return float(x)
-        names = {name: p["value"] if isinstance(p, dict) else p for name, p in self.problem.get("parameters", {}).items()}
+        parameters = self.problem.get("parameters", {})
+        names = {name: p["value"] if isinstance(p, dict) else p for name, p in parameters.items()}
         text = x
         for _ in range(10):
             for name, definition in self.problem.get("definitions", {}).items():
@@ -73,7 +75,9 @@ class Lab:
         arms = [body.get("com", []) for body in self.problem["bodies"]]
         arms += [point for body in self.problem["bodies"] for point in body.get("points", {}).values()]
         for item in self.problem.get("joints", []) + self.problem.get("forces", []):
-            arms += [item.get("point2", [])] + ([item.get("point1", [])] if item.get("body1", "ground") != "ground" else [])
+            arms.append(item.get("point2", []))
+            if item.get("body1", "ground") != "ground":
+                arms.append(item.get("point1", []))
         lengths = [math.hypot(*(self.number(x) for x in arm)) for arm in arms if isinstance(arm, list) and arm]
         return max(lengths, default=0.0) or 1.0
 

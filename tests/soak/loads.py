@@ -65,7 +65,8 @@ class Loads:
             self.add_drive({"type": "coordinate", "body": pose.name, "coordinate": f"e{e}"}, pose.turn[e], 0.05)
         else:
             k = rng.randrange(3)
-            self.add_drive({"type": "coordinate", "body": pose.name, "coordinate": "xyz"[k]}, center[k], self.family.length)
+            fields = {"type": "coordinate", "body": pose.name, "coordinate": "xyz"[k]}
+            self.add_drive(fields, center[k], self.family.length)
 
     def add_drive(self, fields, start, size):
         rng, T = self.rng, self.family.time
@@ -202,7 +203,8 @@ class Loads:
             return self.sensor({"quantity": "velocity", "body": pose.name, "component": component}), speed
 
         size = self.least((self.m.poses.index(pose),), "mass") * f.length / f.time**2
-        fields = {"type": "force", "body": pose.name, "point": self.m.local_point(pose), "components": self.pushed(size, measured)}
+        fields = {"type": "force", "body": pose.name, "point": self.m.local_point(pose),
+                  "components": self.pushed(size, measured)}
         if rng.random() < 0.3:
             fields["frame"] = "body"
         return fields

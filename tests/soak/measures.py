@@ -69,9 +69,11 @@ class Measures:
         if kind == "reaction":
             of = rng.choice(["force", "torque"])
             size = f.mass * f.length / f.time**2 * (f.length if of == "torque" else 1)
-            return {"quantity": kind, "joint": joint.name, "kind": of, "component": rng.choice(["x", "y", "z", "norm"])}, size, None
+            component = rng.choice(["x", "y", "z", "norm"])
+            return {"quantity": kind, "joint": joint.name, "kind": of, "component": component}, size, None
         size = {"angle": 1, "rate": 1 / f.time, "displacement": f.length}[kind]
-        return {"quantity": kind, "joint": joint.name}, size, {"angle": joint.angle, "displacement": joint.displacement}.get(kind)
+        start = {"angle": joint.angle, "displacement": joint.displacement}.get(kind)
+        return {"quantity": kind, "joint": joint.name}, size, start
 
     def between(self):
         found = self.loads.two_points()
@@ -88,7 +90,8 @@ class Measures:
         if self.rng.random() < 0.3:
             e = self.rng.randrange(4)
             return {"quantity": "orientation", "body": pose.name, "component": f"e{e}"}, 1, pose.turn[e]
-        fields = {"quantity": "angular_velocity", "body": pose.name, "component": self.rng.choice(["x", "y", "z", "norm"])}
+        component = self.rng.choice(["x", "y", "z", "norm"])
+        fields = {"quantity": "angular_velocity", "body": pose.name, "component": component}
         if self.rng.random() < 0.3:
             fields["frame"] = "body"
         return fields, f.spin or 1 / f.time, None
@@ -97,11 +100,13 @@ class Measures:
         f, springs = self.family, [s for s in self.loads.forces if s["type"] in ("tsda", "rsda")]
         weight = f.mass * f.length / f.time**2
         if self.loads.drives and (not springs or self.rng.random() < 0.5):
-            return {"quantity": "drive_force", "drive": self.rng.choice(self.loads.drives)["name"]}, weight * max(1, f.length), None
+            drive = self.rng.choice(self.loads.drives)["name"]
+            return {"quantity": "drive_force", "drive": drive}, weight * max(1, f.length), None
         if not springs:
             return None
         spring = self.rng.choice(springs)
-        return {"quantity": "force", "force": spring["name"]}, weight * (1 if spring["type"] == "tsda" else f.length), None
+        size = weight * (1 if spring["type"] == "tsda" else f.length)
+        return {"quantity": "force", "force": spring["name"]}, size, None
 
     def of_all(self):
         f = self.family
@@ -118,7 +123,8 @@ class Measures:
         if f.has("equilibrium") or f.has("driven") or f.has("rough") or self.m.freedoms - len(self.loads.drives) < 1:
             return []
         able = [name for name, s in self.sensors.items() if s["quantity"] not in SETTLED_BY_MOTION | RATES
-                and name in self.starts and s.get("component") != "norm" and s.get("joint") not in self.loads.driven_joints]
+                and name in self.starts and s.get("component") != "norm"
+                and s.get("joint") not in self.loads.driven_joints]
         if not able or rng.random() < 0.6:
             return []
         name = rng.choice(able)
@@ -149,13 +155,15 @@ class Measures:
 
     def objective(self):
         rng, f = self.rng, self.family
-        kind = rng.choice(["running"] * 4 + ["terminal"] * 3 + ["samples", "both", "maximum_of", "minimum_of", "rms_of"])
+        rest = ["samples", "both", "maximum_of", "minimum_of", "rms_of"]
+        kind = rng.choice(["running"] * 4 + ["terminal"] * 3 + rest)
         if kind in ("running", "terminal"):
             return {kind: self.cost()}
         if kind == "both":
             return {"running": self.cost(), "terminal": self.cost()}
         if kind == "samples":
-            return {"samples": [{"time": f.end_time * rng.uniform(0, 1), "value": self.cost()} for _ in range(rng.randint(1, 3))]}
+            count = rng.randint(1, 3)
+            return {"samples": [{"time": f.end_time * rng.uniform(0, 1), "value": self.cost()} for _ in range(count)]}
         if kind == "rms_of":
             return {kind: self.cost()}
         return {kind: self.measured(), "sharpness": rng.uniform(5, 50)}

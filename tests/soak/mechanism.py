@@ -1,4 +1,4 @@
-"""Bodies and joints: first poses that fit, then the joints that hold there, so that every loop closes by construction."""
+"""Bodies and joints: first poses that fit, then joints that hold there, so that every loop closes by construction."""
 
 import math
 from dataclasses import dataclass
@@ -125,13 +125,16 @@ class Mechanism:
 
     def body_fields(self, pose):
         rng, f = self.rng, self.family
-        com = [0.0, 0.0, 0.0] if rng.random() < 0.3 else times(pose.length * rng.uniform(0.1, 0.5), random_direction(rng))
+        com = [0.0, 0.0, 0.0]
+        if rng.random() > 0.3:
+            com = times(pose.length * rng.uniform(0.1, 0.5), random_direction(rng))
         fields = {"name": pose.name, "mass": pose.mass, "com": com, "inertia": self.inertia_of(pose),
                   "position": list(pose.position), "orientation": self.orientation_of(pose.turn)}
         speed, rate = f.length / f.time, f.spin or 1 / f.time
         if rng.random() < 0.7:
             flat = f.planar and rng.random() < 0.8
-            fields["velocity"] = times(speed * rng.uniform(0, 1), perpendicular(rng, f.normal) if flat else random_direction(rng))
+            speed *= rng.uniform(0, 1)
+            fields["velocity"] = times(speed, perpendicular(rng, f.normal) if flat else random_direction(rng))
             along = f.normal if flat else random_direction(rng)
             fields["angular_velocity"] = [float(x) for x in times(rate * rng.uniform(-1, 1), along)]
         if rng.random() < 0.3:
@@ -191,8 +194,6 @@ class Mechanism:
             fields["point1"], fields["point2"] = local1(sub(P1, b1.position)), local2(sub(P2, b2.position))
         if kind in ("revolute", "cylindrical", "screw", "translational", "planar"):
             fields["axis1"], fields["axis2"] = local1(axis), local2(axis)
-            if self.family.planar and b1.turn[0] == 1 and norm(cross(axis, [float(x) for x in self.family.normal])) == 0:
-                fields["axis1"] = list(axis)
         if kind in ("universal", "perpendicular"):
             fields["axis1"], fields["axis2"] = local1(axis), local2(perpendicular(rng, axis))
         if kind in ("point_on_line", "point_on_plane"):

@@ -1,4 +1,5 @@
-"""A second solver, where there is one: ../shared/oracle, which needs numpy and scipy. It is slow, so it sees small scenes only."""
+"""A second solver, where there is one: ../shared/oracle, which needs numpy and scipy. It is slow and sees small scenes
+only."""
 
 import csv
 import subprocess
@@ -6,6 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from checks import watched
+from tilt import names_in
 
 ORACLE = Path(__file__).resolve().parents[3] / "shared/oracle/oracle.py"
 PYTHON = "/usr/bin/python3"
@@ -37,12 +39,14 @@ def agrees(lab):
     if not base.ok:
         return []
     problem = {key: value for key, value in lab.problem.items() if key not in ("sensors", "objectives", "design")}
-    used = {name for force in problem.get("forces", []) for name in lab.problem.get("sensors", {}) if name in str(force)}
-    problem["sensors"] = {name: lab.problem["sensors"][name] for name in used}
+    used = names_in([force.get("components", []) for force in problem.get("forces", [])])
+    sensors = lab.problem.get("sensors", {})
+    problem["sensors"] = {name: fields for name, fields in sensors.items() if name in used}
     lab.variant("oracle", problem)
     told = lab.folder / "oracle.csv"
     try:
-        run = subprocess.run([PYTHON, ORACLE, lab.files["oracle"], "--trajectory", told], capture_output=True, timeout=LONGEST)
+        line = [PYTHON, ORACLE, lab.files["oracle"], "--trajectory", told]
+        run = subprocess.run(line, capture_output=True, timeout=LONGEST)
     except subprocess.TimeoutExpired:
         return []
     if run.returncode or not told.exists():

@@ -1,4 +1,5 @@
-"""Runs commands of mbsopt on a scene, as users do, and looks at what every run owes: an end, an exit code, numbers, words."""
+"""Runs commands of mbsopt on a scene, as users do, and looks at what every run owes: an end, an exit code, numbers and
+words."""
 
 import csv
 import json
@@ -16,8 +17,8 @@ CLUMSY = re.compile(r"\S  \S|''|std::|terminate called|0x[0-9a-f]{6,}|\be\+308")
 
 
 class Outcome:
-    def __init__(self, command, code, out, err, folder, seconds):
-        self.command, self.code, self.out, self.err, self.folder, self.seconds = command, code, out, err, folder, seconds
+    def __init__(self, command, code, out, err, folder):
+        self.command, self.code, self.out, self.err, self.folder = command, code, out, err, folder
         self.complaints = []  # (kind, words)
         self.result = self.read_result()
 
@@ -121,14 +122,14 @@ class Program:
                 out, err = process.communicate(timeout=HANG)
                 break
             except subprocess.TimeoutExpired:
-                if processor_seconds(process.pid) < HANG * self.patience and time.monotonic() - start < STUCK * self.patience:
+                waited = time.monotonic() - start
+                if processor_seconds(process.pid) < HANG * self.patience and waited < STUCK * self.patience:
                     continue
                 if hung:  # it was asked to end, and did not
                     process.kill()
                 hung = True
                 process.send_signal(signal.SIGTERM)
-        outcome = Outcome(told, process.returncode, out.decode(errors="replace"), err.decode(errors="replace"), folder,
-                          time.monotonic() - start)
+        outcome = Outcome(told, process.returncode, out.decode(errors="replace"), err.decode(errors="replace"), folder)
         if hung:
             outcome.code = 130
             outcome.complain("hang", f"no end within {HANG:g} s: {outcome.message[-200:]}")

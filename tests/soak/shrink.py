@@ -67,10 +67,12 @@ def drop(problem, section, name):
         del items[name]
     else:
         items[:] = [item for item in items if item["name"] != name]
-    key = {"joints": ("joint", "joint1", "joint2"), "forces": ("force",), "drives": ("drive",), "sensors": ("sensor",)}.get(section, ())
+    key = {"joints": ("joint", "joint1", "joint2"), "forces": ("force",), "drives": ("drive",),
+           "sensors": ("sensor",)}.get(section, ())
     for other in ("joints", "drives", "forces"):
         for item in list(problem.get(other, [])):
-            if any(item.get(k) == name for k in key) or (section == "sensors" and mentions(item.get("components", []), name)):
+            measured = section == "sensors" and mentions(item.get("components", []), name)
+            if measured or any(item.get(k) == name for k in key):
                 drop(problem, other, item["name"])
     for sensor, fields in list(problem.get("sensors", {}).items()):
         if any(fields.get(k) == name for k in key):
@@ -119,8 +121,8 @@ def write_out(problem, section, name):
         if isinstance(node, list):
             return [written(v) for v in node]
         if isinstance(node, str) and mentions(node, name):
-            text = re.sub(rf"\b{re.escape(name)}\b", f"({value!r})" if not isinstance(value, str) else f"({value})", node)
-            return plain(text)
+            inside = f"({value})" if isinstance(value, str) else f"({value!r})"
+            return plain(re.sub(rf"\b{re.escape(name)}\b", inside, node))
         return node
 
     for key in ("definitions", "gravity", "bodies", "joints", "drives", "forces", "sensors", "initial", "objectives"):

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Random scenes: builds one from each seed, runs the program on it as users do, and asks whether all that must agree agrees.
+"""Random scenes: builds one from each seed, runs the program on it as users do, and asks whether all that must agree
+does.
 
     tests/soak/soak.py COUNT [--from SEED] [--program FILE] [--jobs N] [--keep FOLDER]
     tests/soak/soak.py --replay FILE...          a kept scene again, all checks
@@ -34,7 +35,8 @@ CHECKS = [(checks.sweeps, 1), (checks.plane, 1), (checks.energy, 1), (checks.kin
 
 
 def examine(scene, program, chosen, folder):
-    """The failures of a scene as (kind, words), by check, and what may be told of it: whether it was refused, what explained."""
+    """The failures of a scene as (kind, words), by check, and what may be told of it: whether it was refused, and what
+    explained its disagreements."""
     lab = Lab(scene, program, folder)
     try:
         base = lab.run("simulate")
@@ -96,8 +98,9 @@ def replay(options):
     for file in options.replay:
         with tempfile.TemporaryDirectory(prefix="soak_", dir=options.scratch) as folder:
             scene = load(file)
-            failures, told = examine(scene, Program(options.program, options.patience), [check for check, _ in CHECKS], folder)
-            failures = [failure for found in failures.values() for failure in found]
+            program = Program(options.program, options.patience)
+            by_check, told = examine(scene, program, [check for check, _ in CHECKS], folder)
+            failures = [failure for found in by_check.values() for failure in found]
             say(failures, file, scene.about)
             if told["refused"]:
                 print(f"{file}: refused, {told['refused']}")
@@ -107,6 +110,8 @@ def replay(options):
 
 def campaign(options):
     held, refused, explained = 0, Counter(), Counter()
+    if oracle.missing():
+        print(f"without the second solver: {oracle.missing()}")
     seeds = range(options.first, options.first + options.count)
     with multiprocessing.Pool(options.jobs) as pool:
         done = pool.imap_unordered(try_seed, [(seed, options) for seed in seeds])

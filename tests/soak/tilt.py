@@ -8,7 +8,8 @@ from rotations import about, cross, matrix, multiply, rotate
 
 WITH_ANGLE = {"revolute", "cylindrical", "screw"}
 
-TURNED_SENSORS = {"angle", "rate", "displacement", "distance", "distance_rate", "energy", "force"}
+ALIKE = {"angle", "rate", "displacement", "distance", "distance_rate", "energy", "force"}
+VECTORS = {"position", "velocity", "acceleration", "angular_velocity"}
 
 
 def combined(row, components):
@@ -45,15 +46,12 @@ def turned_orientation(turn, orientation):
 
 
 def global_component(fields):
-    return (fields["quantity"] in ("position", "velocity", "acceleration", "angular_velocity", "reaction", "orientation")
-            and fields.get("component") != "norm" and fields.get("frame", "global") == "global")
+    return fields.get("component") != "norm" and fields.get("frame", "global") == "global"
 
 
 def invariant(fields):
     """Whether a sensor measures the same in the turned scene."""
-    return fields["quantity"] in TURNED_SENSORS or (fields["quantity"] != "reaction" and fields["quantity"] not in
-                                                    ("orientation", "drive_force", "constraint_violation")
-                                                    and not global_component(fields))
+    return fields["quantity"] in ALIKE or (fields["quantity"] in VECTORS and not global_component(fields))
 
 
 def names_in(node):
@@ -93,7 +91,8 @@ def tilted(problem, turn):
     for joint in p.get("joints", []):
         if joint.get("body1", "ground") == "ground" and joint["type"] not in ("gear", "rack_pinion"):
             if joint["type"] in WITH_ANGLE and "normal1" not in joint:
-                if joint["name"] in geared or not give_normals(joint):
+                from_file = joint["name"] in geared or joint["type"] == "screw"  # with normals they count from these
+                if from_file or not give_normals(joint):
                     return None
             turn_fields(joint, turn, ("point1", "axis1", "normal1"))
     for item in p.get("forces", []) + p.get("drives", []) + list(sensors.values()):
