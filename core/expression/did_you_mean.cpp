@@ -38,8 +38,8 @@ std::string did_you_mean(std::string_view word, const std::vector<std::string>& 
   const std::string* nearest = nullptr;
   for (const std::string& candidate : candidates) {
     if (candidate.empty() || candidate.size() > kLongestWord) continue;
-    const auto [shorter, longer] = std::minmax(word.size(), candidate.size());
-    if (longer - shorter > allowed) continue;  // the distance is at least that
+    const std::size_t a = word.size(), b = candidate.size();
+    if (std::max(a, b) - std::min(a, b) > allowed) continue;  // the distance is at least that
     const std::size_t d = distance(word, candidate);
     if (d < best) {
       best = d;
