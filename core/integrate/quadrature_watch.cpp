@@ -44,6 +44,8 @@ QuadratureWatch::QuadratureWatch(const Method& method, std::span<const Cost> cos
 }
 
 std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::span<const double> g, Of what) {
+  if (span_ == 0) start_ = step.t;
+  span_ = step.t + step.h - start_;
   Integral& integral = integrals_[kIntegrals * cost + static_cast<std::size_t>(what)];
   std::fill(g_.begin(), g_.end(), 0.0);
   for (std::size_t i = 0; i < g.size(); ++i) {
@@ -113,15 +115,23 @@ double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
 }
 
 void QuadratureWatch::add_to(SimulationStatistics& statistics) const {
-  for (std::size_t k = 0; k < integrals_.size(); ++k) {
-    const Integral& i = integrals_[k];
-    const Cost& cost = costs_[k / kIntegrals];
-    QuadratureError& worst = k % kIntegrals != 0 ? statistics.gradient_quadrature
-                             : cost.is_extreme   ? statistics.extreme_quadrature
-                                                 : statistics.quadrature;
-    // Exponentials are of any size, hence relative to their integral.
-    const double rounding = cost.is_extreme ? kRounding * i.of_size : kRounding;
-    if (i.error > worst.error * i.of_size && i.error > rounding) worst = {i.error / i.of_size, cost.name, i.worst_t};
+  // rounding: what errors are no larger than where they say nothing.
+  const auto judge = [](const Integral& i, double of_size, double rounding, const Cost& cost, QuadratureError& worst) {
+    if (i.error > worst.error * of_size && i.error > rounding) worst = {i.error / of_size, cost.name, i.worst_t};
+  };
+  for (std::size_t o = 0; o < costs_.size(); ++o) {
+    const Cost& cost = costs_[o];
+    const Integral& value = integrals_[kIntegrals * o];
+    // Exponentials are of any size.
+    const double rounding = cost.is_extreme ? kRounding * value.of_size : kRounding;
+    judge(value, value.of_size, rounding, cost,
+          cost.is_extreme ? statistics.extreme_quadrature : statistics.quadrature);
+    // Both parts relative to their sum: one that is next to nothing beside the other does not matter.
+    Integral motion = integrals_[kIntegrals * o + 1];
+    const Integral& parameters = integrals_[kIntegrals * o + 2];
+    motion.error *= span_, motion.of_size *= span_;
+    for (const Integral* part : {static_cast<const Integral*>(&motion), &parameters})
+      judge(*part, motion.of_size + parameters.of_size, rounding, cost, statistics.gradient_quadrature);
   }
 }
 

@@ -57,7 +57,8 @@ class QuadratureWatch {
   std::vector<Node> nodes_;
   std::vector<int> node_of_;  // of each stage; -1: has no weight
   std::vector<Integral> integrals_;
-  std::vector<double> g_;  // at the nodes
+  double start_ = 0, span_ = 0;  // of all steps [s]
+  std::vector<double> g_;        // at the nodes
   Eigen::VectorXd y_;
 };
 

@@ -1,18 +1,18 @@
-#include "app/simulation_warnings.hpp"
+#include "core/integrate/simulation_warnings.hpp"
 
 #include <catch2/catch.hpp>
 
 using namespace mbsopt;
 
 TEST_CASE("a penalty that leaves the joints to the projections is said, with alpha", "[simulate]") {
-  SimulationSettings settings;
-  settings.formulation = FormulationSettings::penalty();
-  settings.formulation.projection = Projection::position_velocity;
+  Scene scene;
+  scene.simulation.formulation = FormulationSettings::penalty();
+  scene.simulation.formulation.projection = Projection::position_velocity;
   SimulationStatistics statistics;
   statistics.max_acceleration_residual = 2e-5;
-  CHECK(simulation_warnings(settings, statistics).empty());
+  CHECK(simulation_warnings(scene, statistics).empty());
   statistics.max_acceleration_residual = 2e-3;
-  const std::vector<std::string> warnings = simulation_warnings(settings, statistics);
+  const std::vector<std::string> warnings = simulation_warnings(scene, statistics);
   REQUIRE(warnings.size() == 1);
   CHECK_THAT(warnings[0], Catch::Contains("simulation.formulation.alpha is 1e+09: raise it"));
 }
