@@ -156,7 +156,7 @@ TEST_CASE("a limit that holds for a smooth maximum only is never a bare 'converg
 
 TEST_CASE("a parameter that moves a jump is named by gradient, check and design", "[design]") {
   const TemporaryFolder folder;
-  const std::string file = folder.write("jump.json", R"({
+  const std::string file = folder.write("jump.json", R"json({
     "format": 1, "name": "jump", "gravity": [0, -9.81, 0],
     "parameters": {"tp": {"value": 0.4, "lower": 0.1, "upper": 0.9}},
     "bodies": [{"name": "rod", "mass": 2, "com": [0.5, 0, 0], "inertia": [1e-3, 0.1666, 0.1666],
@@ -164,24 +164,21 @@ TEST_CASE("a parameter that moves a jump is named by gradient, check and design"
     "joints": [{"name": "pin", "type": "revolute", "body1": "ground", "body2": "rod",
                 "point1": [0, 0, 0], "point2": "O", "axis1": [0, 0, 1], "axis2": [0, 0, 1]}],
     "forces": [{"name": "push", "type": "force", "body": "rod", "point": "tip",
-                "components": [0, "10 + 10*abs(t - tp)/(t - tp)", 0]
-}],
+                "components": [0, "10 + 10*abs(t - tp)/(t - tp)", 0]}],
     "sensors": {"tip_y": {"quantity": "position", "body": "rod", "point": "tip", "component": "y"}},
     "simulation": {"end_time": 1, "output_step": 0.25},
     "objectives": {"track": {"running": "(tip_y + 0.5)^2"}},
-    "design": {
-  "minimize" : "track", "variables" : ["tp"]
-}
-})");
+    "design": {"minimize": "track", "variables": ["tp"]}
+  })json");
   for (const std::string command : {"gradient", "check", "design"}) {
-  const CommandOutcome outcome = run_command({command, file, "--out", folder.file(command), "--quiet"});
-  INFO(command << outcome.out << outcome.err);
-  std::string said;
-  for (const auto& warning : json_of(folder.path / command / "result.json").at("warnings"))
-    said += warning.get<std::string>() + "\n";
-  INFO(said);
-  CHECK(said.find("the law of force 'push' jumps by 20 at t = 0.4 s, an instant that depends on 'tp'") !=
-        std::string::npos);
-  if (command == "design") CHECK(said.find("the derivative of objective 'track' in 'tp' is ") != std::string::npos);
-}
+    const CommandOutcome outcome = run_command({command, file, "--out", folder.file(command), "--quiet"});
+    INFO(command << outcome.out << outcome.err);
+    std::string said;
+    for (const auto& warning : json_of(folder.path / command / "result.json").at("warnings"))
+      said += warning.get<std::string>() + "\n";
+    INFO(said);
+    CHECK(said.find("the law of force 'push' jumps by 20 at t = 0.4 s, an instant that depends on 'tp'") !=
+          std::string::npos);
+    if (command == "design") CHECK(said.find("the derivative of objective 'track' in 'tp' is ") != std::string::npos);
+  }
 }
