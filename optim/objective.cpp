@@ -130,8 +130,9 @@ Cost Objective::cost(const Mechanism& mechanism, double x0) const {
 Objective::OfIntegral Objective::of_integral(double I, double x0) const {
   if (!running_ || kind_ == ObjectiveKind::sum) return {I, 1};
   if (kind_ == ObjectiveKind::rms) {
+    if (I <= 0) return {0, 0};  // rounding: a method with negative weights may sum squares to -1e-33
     const double psi = std::sqrt(I / duration_);
-    return {psi, I == 0 ? 0 : 0.5 * psi / I};
+    return {psi, 0.5 * psi / I};
   }
   const double k = exponent();
   return {x0 + std::log(I / duration_) / k, 1 / (k * I)};

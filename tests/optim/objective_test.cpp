@@ -131,6 +131,16 @@ TEST_CASE("an rms of nothing is zero, with a gradient that is a number", "[objec
   CHECK(e.psi_rho.norm() == 0);
 }
 
+TEST_CASE("an rms of rounding, whose squares sum to less than zero, is zero", "[objective]") {
+  ObjectiveSpec spec;
+  spec.rms_of = f("x");
+  const Problem problem = problem_with(spec);
+  const Objective objective(problem.scene, problem.objectives[0]);
+  const auto [psi, slope] = objective.of_integral(-1e-33, 0);
+  CHECK(psi == 0);
+  CHECK(slope == 0);
+}
+
 TEST_CASE("the gradients of all kinds agree with each other and with differences", "[objective]") {
   Problem problem;
   problem.scene = every_force_four_bar();
