@@ -5,8 +5,9 @@
 //   velocities     Phi_q v = -Phi_t,    accelerations and multipliers from the equations of motion: linear solves
 //
 // Steps are cut where the correction of the predictor is not small against h v, or where the trapezoidal rule
-// disagrees, so that a branch is followed and never changed. Where J loses rank the position is singular: it is crossed when steps to either side of it are
-// possible, and reported with the rank that is lost and the joints and drives whose equations depend on each other.
+// disagrees, so that a branch is followed and never changed. Where J loses rank the position is singular: it is crossed
+// when steps to either side of it are possible, and reported with the rank that is lost and the joints and drives whose
+// equations depend on each other.
 #pragma once
 
 #include <functional>
