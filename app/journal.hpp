@@ -7,8 +7,7 @@
 //   {"residuals": {...}}                                                     an experiment   (residual_records.hpp)
 //   {"iterate": {"iteration": 3, "objective": ..., "parameters": {...}}}     accepted by the optimiser
 //   {"start": {"start": 7, "status": "converged", ...}}                      a finished start of a multistart
-//   {"ended": "ok"}                                                          the status of result.json, written after
-//   it
+//   {"ended": "ok"}                                                          the status of result.json, which is there
 //
 // Each line ends with
 //   "run": "52bd...", "bytes": 310, "sha256": "9f86..."

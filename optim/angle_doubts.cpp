@@ -70,10 +70,8 @@ std::vector<std::string> angle_doubts(const Scene& scene, const IdentificationSp
       if (apart(s.measured, s.end) <= kUnexplained * deviation(s.measured)) continue;
       doubts.push_back(
           fmt::format("identification.experiments[{}].channels[{}].column: the values of '{}' span {:.3g}, those of "
-                      "the model {:.3g} "
-                      "{} at the start of the fit and {:.3g} {} at its end: is the column in degrees? Convert it to "
-                      "rad, or give the "
-                      "channel the gain 180/pi, with sigma and bias in degrees",
+                      "the model {:.3g} {} at the start of the fit and {:.3g} {} at its end: is the column in degrees? "
+                      "Convert it to rad, or give the channel the gain 180/pi, with sigma and bias in degrees",
                       m.experiment, c, channel.column, span, start, unit, end, unit));
     }
   }

@@ -206,7 +206,7 @@ NlpResult solved(DesignProgram& program, const Eigen::VectorXd& x_start, const O
   return solve_with_nlopt(program, x_start, solver);
 }
 
-// Of all objectives of an evaluator.
+// Compares the derivatives of all objectives of an evaluator.
 DifferenceComparison comparison_at(const Evaluation& start, const Evaluator& evaluator) {
   DifferenceComparison comparison;
   const Scene& scene = evaluator.scene();

@@ -90,9 +90,10 @@ std::vector<std::string> DifferenceComparison::warnings() const {
                       v.name));
       continue;
     }
+    std::optional<Difference> shorter;
     for (const Group& g : groups) {
       if (!disagrees(g, k, *d, false)) continue;
-      const std::optional<Difference> shorter = difference(k, kStep / kShorter * v.size);
+      if (!shorter) shorter = difference(k, kStep / kShorter * v.size);
       if (!shorter || !disagrees(g, k, *shorter, false)) continue;
       if (!asked) {
         asked = true;
@@ -106,9 +107,8 @@ std::vector<std::string> DifferenceComparison::warnings() const {
       const VectorXd slope = d->slope.segment(g.first, g.rows);
       said.push_back(fmt::format(
           "the derivative of {} in '{}' is {}{:.6g} at the start, but a difference over {:.2g} says {:.6g}{}: "
-          "something "
-          "is not smooth here (a jump whose instant moves, a limit, an impact), or the steps do not resolve it. An "
-          "optimiser follows the derivative; 'mbsopt check' tells more",
+          "something is not smooth here (a jump whose instant moves, a limit, an impact), or the steps do not resolve "
+          "it. An optimiser follows the derivative; 'mbsopt check' tells more",
           g.name, v.name, one ? "" : "of size ", one ? exact(0) : exact.norm(), d->h, one ? slope(0) : slope.norm(),
           one ? "" : fmt::format(" (apart by {:.6g})", (slope - exact).norm())));
     }

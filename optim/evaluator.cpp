@@ -274,7 +274,7 @@ const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
   if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho &&
       (last_.has_gradients() || !last_.ok))
     return last_;
-  if (!simulated_.empty() && !(last_.ok && last_.has_gradients())) {
+  if (!simulated_.empty() && !has_differentiated_) {
     // At other values than the scene's own the loop may close as a structure that cannot move.
     for (const Eigen::VectorXd& at : {start(), rho}) require_unobstructed(scene_, at, active_, options_.user_forces);
   }
@@ -303,6 +303,7 @@ const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
     last_ = run(rho, backward ? Sweep::backward : Sweep::forward, nullptr, by_cvodes);
   }
   refuse_zero_columns(last_);
+  has_differentiated_ = has_differentiated_ || last_.ok;
   last_.method = simulated_.empty() ? GradientMethod::automatic : method;
   last_.choice = std::move(choice);
   simulations_ += last_.simulations;

@@ -109,6 +109,7 @@ class Evaluator {
   EvaluatorOptions options_;
   std::vector<std::size_t> simulated_;       // objectives that need a simulation
   std::vector<std::size_t> perhaps_unused_;  // variables that only what is written in C++ may use
+  bool has_differentiated_ = false;          // gradients() has succeeded: no loop is a structure that cannot move
   Evaluation last_;
   long simulations_ = 0;
 };

@@ -224,8 +224,7 @@ void Experiment::refuse_short_laws(const ExperimentSpec& spec, const std::string
     if (spec.drives[i].drive == drive->name) path = fmt::format("{}.drives[{}].law", place, i);
   throw std::invalid_argument(
       fmt::format("{}: its samples go from {:.6g} s to {:.6g} s, the experiment '{}' from {:.6g} s to {:.6g} s; give "
-                  "that an end_time, "
-                  "or a law of its own",
+                  "that an end_time, or a law of its own",
                   path, drive->samples->times.front(), drive->samples->times.back(), spec.name, settings_.start_time,
                   settings_.end_time));
 }

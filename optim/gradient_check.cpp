@@ -261,8 +261,8 @@ class Check {
     if (!(worst > options_.thresholds.tlm_adjoint)) return;
     result_.warnings.push_back(
         fmt::format("simulation.formulation: penalty with alpha {:.3g} by cholesky rounds derivatives by up to {:.1g} "
-                    "of them, which "
-                    "is more than methods may differ by; \"linear_solver\": \"quasidefinite\" has no such rounding",
+                    "of them, which is more than methods may differ by; \"linear_solver\": \"quasidefinite\" has no "
+                    "such rounding",
                     f.alpha, worst));
   }
 

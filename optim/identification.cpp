@@ -183,8 +183,7 @@ class Identification {
     result_.status = SolverStatus::failed;
     result_.message = fmt::format(
         "{} of {} lie within the scale of the loss ({:g} sigma), beyond which a sample has no pull; they "
-        "cannot "
-        "determine {}. Is sigma too small, or are these other data than the model's?",
+        "cannot determine {}. Is sigma too small, or are these other data than the model's?",
         pulling, counted(stack.samples(), "sample"), stack.loss.s(), counted(stack.variables(), "parameter"));
   }
 

@@ -30,6 +30,7 @@ constexpr double kWrong = 1e-6;    // of the derivative: ladders reach 1e-9 and 
 struct Direction {
   VectorXd q, v;
   bool of_rates = false;  // v alone
+  bool turns = false;     // an angle or its rate; else a length or its rate
   std::string name;       // "x of 'crank'"
 };
 
@@ -48,12 +49,12 @@ std::vector<Direction> directions(const VectorXd& q, const VectorXd& v, const st
     const Index at = 7 * static_cast<Index>(b);
     const Vector4d p = q.segment<4>(at + 3), pdot = v.segment<4>(at + 3);
     for (int axis = 0; axis < 3; ++axis) {
-      Direction d{VectorXd::Zero(q.size()), VectorXd::Zero(q.size()), false, ""};
+      Direction d{VectorXd::Zero(q.size()), VectorXd::Zero(q.size()), false, false, ""};
       d.q(at + axis) = 1, d.name = fmt::format("{} of '{}'", kAxes[axis], bodies[b]);
       all.push_back(d);
       d.q(at + axis) = 0, d.v(at + axis) = 1, d.of_rates = true, d.name = fmt::format("the rate of {}", d.name);
       all.push_back(d);
-      d.v(at + axis) = 0, d.v.segment<4>(at + 3) = turned(p, axis);
+      d.v(at + axis) = 0, d.v.segment<4>(at + 3) = turned(p, axis), d.turns = true;
       d.name = fmt::format("the angular velocity of '{}' about its {}", bodies[b], kAxes[axis]);
       all.push_back(d);
       d.q.segment<4>(at + 3) = turned(p, axis), d.v.segment<4>(at + 3) = -d.q.segment<4>(at + 3).dot(pdot) * p;
@@ -127,8 +128,8 @@ class UserTerms {
 
   double step_of(const Direction& d) const {
     const double moved = (d.of_rates ? d.v : d.q).cwiseAbs().maxCoeff();
-    const bool of_length = d.name.starts_with("the rate") || d.name[1] == ' ';
-    return kLargest / moved * (of_length ? (d.of_rates ? speed_ : length_) : d.of_rates ? speed_ / length_ : 1);
+    const double size = d.of_rates ? speed_ : length_;
+    return kLargest / moved * (d.turns ? size / length_ : size);
   }
   double step_of_parameter(std::size_t k) const {
     return kLargest * typical_size(scene_.parameters[k], rho_(static_cast<Index>(k)));

@@ -43,12 +43,13 @@ const FieldReader::Missing* FieldReader::missing_like(const std::string& unknown
 
 void FieldReader::report_keys() {
   std::vector<std::string> told;
-  const std::string known_here = "; known here: " + joined(known_);
+  std::string known_here;  // made for the first unknown key, the same for all
   for (std::size_t i = 0; i < node_.keys.size(); ++i) {
     const std::string& key = node_.keys[i];
     if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
     const Missing* const missing = missing_like(key);
     if (rest_unknown_ && !missing) continue;
+    if (known_here.empty()) known_here = "; known here: " + joined(known_);
     std::string message = "unknown key" + did_you_mean(key, known_) + known_here;
     if (missing) {
       message = "unknown key" + did_you_mean(key, {missing->key}) + "; " + missing->key + " " + missing->message;

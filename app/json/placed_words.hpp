@@ -1,7 +1,6 @@
 // Words that begin with a path of the problem get its place in the file before them, as the reader's own findings have:
 //
-//   placed("drives[0].law: its samples cover ...", "crane.json", {})   "crane.json:41:18: drives[0].law: its samples
-//   ..."
+//   placed("drives[0].law: its samples ...", "crane.json", {})   "crane.json:41:18: drives[0].law: its samples ..."
 #pragma once
 
 #include <filesystem>

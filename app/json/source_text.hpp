@@ -25,9 +25,9 @@ class SourceText {
   std::size_t inside_string(std::size_t literal, std::size_t at) const;
 
  private:
-  std::string content_;
   std::size_t continuations(std::size_t end) const;  // bytes before `end` that begin no character
 
+  std::string content_;
   std::vector<std::size_t> line_starts_;
   std::vector<std::size_t> continuations_;  // up to every kStride bytes
 };

@@ -203,10 +203,6 @@ class Statics {
   VectorXd angles_, y_, ydot_, z_;
 };
 
-}  // namespace
-
-namespace {
-
 // N'M (sigma I - Z) N y = N'M z at one position: `stiffness` is -N'M Z N.
 struct FreeMotion {
   MatrixXd N, stiffness, mass;

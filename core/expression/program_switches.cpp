@@ -1,5 +1,6 @@
 #include "core/expression/program_switches.hpp"
 
+#include <algorithm>
 #include <set>
 #include <tuple>
 

@@ -48,7 +48,7 @@ void JumpWatch::add(const Jump& jump, const Program& program, Of of, int index) 
   const int time = of == Of::length || of == Of::angle ? P + 2 : P;
   Function f{jump, &program, of, index, {}, false};
   for (Program& p : switches_of(program)) {
-    Switch s{{}, {}, false, 0};
+    Switch s{{}, {}, false, 0, 0};
     bool varies = false;
     for (const int input : p.used_inputs()) {
       varies = varies || input >= P, s.motion = s.motion || (input >= P && input != time);
@@ -106,17 +106,21 @@ void JumpWatch::place_at(double theta) {
   y_.tail(n) = (6 * theta - 6 * s2) / h * (q1 - q0) + (3 * s2 - 4 * theta + 1) * v0 + (3 * s2 - 2 * theta) * v1;
 }
 
-double JumpWatch::value(const Function& f, const Program& p, double theta) {
+void JumpWatch::set_inputs_at(double theta, const Function& f) {
   place_at(theta);
   set_inputs(f, {t_, y_, angles_, motion_});
+}
+
+double JumpWatch::value(const Function& f, const Program& p, double theta) {
+  set_inputs_at(theta, f);
   return p.value(inputs_, scratch_);
 }
 
-// sign: at `to`, where it is not that at `from`.
-void JumpWatch::search(Function& f, Switch& s, double from, double to, double sign) {
+// The sign is s.now at `to`, and another one at `from`.
+void JumpWatch::search(Function& f, Switch& s, double from, double to) {
   for (int i = 0; i < kBisections; ++i) {
     const double middle = 0.5 * (from + to);
-    (sign_of(value(f, s.program, middle)) == sign ? to : from) = middle;
+    (sign_of(value(f, s.program, middle)) == s.now ? to : from) = middle;
   }
   const auto jump = [&](double distance, double& size) {
     const double before = value(f, *f.program, to - distance), after = value(f, *f.program, to + distance);
@@ -139,10 +143,11 @@ void JumpWatch::look_at(const StatePoint& at) {
     if (f.found) continue;
     double from = 0;
     for (const double theta : {kMiddle, 1.0}) {
+      set_inputs_at(theta, f);  // once for all switches: a sensor may need the equations of motion
+      for (Switch& s : f.switches) s.now = sign_of(s.program.value(inputs_, scratch_));
       for (Switch& s : f.switches) {
-        const double sign = sign_of(value(f, s.program, theta));
-        if (!f.found && sign * s.last < 0) search(f, s, from, theta, sign);
-        if (sign != 0) s.last = sign;
+        if (!f.found && s.now * s.last < 0) search(f, s, from, theta);
+        if (s.now != 0) s.last = s.now;
       }
       from = theta;
     }

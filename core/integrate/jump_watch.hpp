@@ -34,7 +34,7 @@ class JumpWatch {
     Program program;
     std::vector<int> parameters;  // active ones that it uses
     bool motion = false;          // it uses the state
-    double last = 0;              // its sign, where it was not 0 last
+    double last = 0, now = 0;     // its sign, where it was not 0 last; at the instant in hand
   };
   struct Function {
     Jump jump;  // as far as it is known
@@ -47,7 +47,8 @@ class JumpWatch {
   void add(const Jump& jump, const Program& program, Of of, int index = 0);
   void set_inputs(const Function& f, const StatePoint& at);
   void place_at(double theta);  // between the last state and the one in hand: t_, y_
-  void search(Function& f, Switch& s, double from, double to, double sign);
+  void set_inputs_at(double theta, const Function& f);
+  void search(Function& f, Switch& s, double from, double to);
   double value(const Function& f, const Program& p, double theta);
 
   const Mechanism mechanism_;

@@ -141,10 +141,9 @@ std::string RunGuard::objection(double t, const Eigen::VectorXd& y, const Energy
   if (words.empty() && acceleration_residual > kUnmet) {
     words = fmt::format(
         "the accelerations of the constraints are met to {:.1e} only at t = {:.6g} s: the linkage locks there (a "
-        "drive, "
-        "or the motion itself, asks for more than it reaches), or its position is singular. If it should go on, look "
-        "at lengths and laws; if masses differ by many orders, use a larger simulation.formulation.alpha (relative; "
-        "1e8 is the default) or more iterations",
+        "drive, or the motion itself, asks for more than it reaches), or its position is singular. If it should go "
+        "on, look at lengths and laws; if masses differ by many orders, use a larger simulation.formulation.alpha "
+        "(relative; 1e8 is the default) or more iterations",
         acceleration_residual, t);
   }
   if (words.empty() && conserves_energy_) words = about_energy(t, energy);

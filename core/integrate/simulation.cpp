@@ -164,7 +164,7 @@ class Run {
         result_.psi(static_cast<Eigen::Index>(o)) += step.h * method_.b[i] * g_[k];
         if (!derivatives) continue;
         along_motion_[k] = y_bar_.dot(step.K.col(i));
-        for (const int p : mechanism_.data().active)
+        for (const int p : mechanism_.data().active)  // a parameter of value 0 counts with the size 1
           along_parameters_[k] += rho_bar_(p) * (mechanism_.rho()(p) == 0 ? 1 : mechanism_.rho()(p));
       }
     }

@@ -41,8 +41,8 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
   if (penalty && f.linear_solver == LinearSolver::cholesky && f.alpha > kLargePenalty) {
     warnings.push_back(
         fmt::format("simulation.formulation: penalty with alpha {:.3g} by cholesky leaves the accelerations with "
-                    "relative errors of "
-                    "about {:.0e}, from rounding; \"linear_solver\": \"quasidefinite\" has none of them",
+                    "relative errors of about {:.0e}, from rounding; \"linear_solver\": \"quasidefinite\" has none "
+                    "of them",
                     f.alpha, 10 * kDigitsPerAlpha * f.alpha));
   }
   if (statistics.max_position_violation > kApart) {
@@ -72,10 +72,9 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
   } else if (penalty && statistics.max_acceleration_residual > kTakenOut) {
     warnings.push_back(
         fmt::format("the projections took out {:.2g} of the change of velocity: the penalty does not hold the joints "
-                    "by itself, and "
-                    "the motion is wrong by as much or more. simulation.formulation.alpha is {:.3g}: raise it with "
-                    "\"linear_solver\": "
-                    "\"quasidefinite\", or leave the formulation out, the default has no such error{}",
+                    "by itself, and the motion is wrong by as much or more. simulation.formulation.alpha is {:.3g}: "
+                    "raise it with \"linear_solver\": \"quasidefinite\", or leave the formulation out, the default "
+                    "has no such error{}",
                     statistics.max_acceleration_residual, f.alpha,
                     settings.integrator.step ? "; or take a smaller simulation.integrator.step" : ""));
   } else if (!penalty && statistics.max_acceleration_residual > kUnmet) {
