@@ -142,7 +142,7 @@ class Server {
       send_what_has_ended();
       if (interrupted() && !told_of_interrupt_) {
         told_of_interrupt_ = true;
-        if (pool_) pool_->stop();
+        stop();
         tell({{"interrupted", true}});
       }
     }
@@ -153,7 +153,7 @@ class Server {
 
   void take(const Json& message) {
     if (message.contains("dismissed")) dismissed_ = true;
-    if (message.contains("stop") && pool_) waiting_.clear(), pool_->stop();
+    if (message.contains("stop")) stop();
     try {
       if (message.contains("work")) {
         const Json& work = message["work"];
@@ -164,6 +164,12 @@ class Server {
     } catch (const std::exception& error) {
       tell({{"failed", error.what()}});
     }
+  }
+
+  // What waits is not begun any more.
+  void stop() {
+    waiting_.clear();
+    if (pool_) pool_->stop();
   }
 
   void start_what_waits() {
