@@ -127,11 +127,11 @@ TEST_CASE("commands take time linear in the number of free bodies", "[sizes]") {
   check_growth_of(command, Layout::free);
 }
 
-TEST_CASE("a massless body is found in time linear in the bodies", "[sizes]") {
+TEST_CASE("massless directions are looked for in time linear in the bodies", "[sizes]") {
   check_growth_of("validate", Layout::chain, "0");
 }
 
-TEST_CASE("redundant equations of many loops are counted, and named in file order", "[sizes]") {
+TEST_CASE("the rank of the equations of many loops is right", "[sizes]") {
   const TemporaryFolder folder;
   const int bodies = 2 * kSize + 1;
   const CommandOutcome outcome = run_command(
