@@ -276,7 +276,9 @@ const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
     return last_;
   if (!simulated_.empty() && !has_differentiated_) {
     // At other values than the scene's own the loop may close as a structure that cannot move.
-    for (const Eigen::VectorXd& at : {start(), rho}) require_unobstructed(scene_, at, active_, options_.user_forces);
+    const Eigen::VectorXd own = start();
+    require_unobstructed(scene_, own, active_, options_.user_forces);
+    if (rho.size() != own.size() || rho != own) require_unobstructed(scene_, rho, active_, options_.user_forces);
   }
   GradientMethod method = options_.method;
   std::string choice;

@@ -1,9 +1,11 @@
 #include "optim/user_terms.hpp"
 
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "core/force/user_force.hpp"
 #include "optim/gradient_check.hpp"
+#include "tests/core/mechanism/moving_scenes.hpp"
 #include "tests/optim/five_bar.hpp"
 
 using namespace mbsopt;
@@ -59,6 +61,20 @@ struct Height final : TerminalCost {
   double wrong;
 };
 
+// A load -sin(e_0) p on the Euler parameters, whose K may be wrong by a part.
+struct Sine final : UserForce {
+  explicit Sine(double part) : wrong(part) {}
+  std::vector<std::string> bodies() const override { return {"stone"}; }
+  void Q(double, VecIn q, VecIn, VecIn, VecOut out) const override { out.tail<4>() = -std::sin(q(3)) * q.tail<4>(); }
+  void K(double, VecIn q, VecIn, VecIn, MatOut out) const override {
+    out.bottomRightCorner<4, 4>() = (1 + wrong) * std::sin(q(3)) * Eigen::Matrix4d::Identity();
+    out.col(3).tail<4>() += (1 + wrong) * std::cos(q(3)) * q.tail<4>();
+  }
+  void C(double, VecIn, VecIn, VecIn, MatOut) const override {}
+  void Q_rho(double, VecIn, VecIn, VecIn, MatOut) const override {}
+  double wrong;
+};
+
 Scene swinging() {
   Scene s = five_bar::problem(1e-6).scene;
   s.simulation.end_time = 0.4;
@@ -89,6 +105,20 @@ TEST_CASE("a wrong derivative of a force or cost in C++ is named, and only that 
     REQUIRE(said.size() == 1);
     CHECK_THAT(said[0], Contains(c.said) && Contains("differences say"));
   }
+}
+
+TEST_CASE("a wrong derivative along a turn is found at any size", "[check]") {
+  const double size = GENERATE(1e-6, 1.0, 1e4, 1e8);
+  INFO(size << " m");
+  Scene s;
+  s.bodies.push_back(testing::plain_body("stone", 1, {0.1, 0.1, 0.1, 0.0, 0.0, 0.0}, {size, 0.0, 0.0}));
+  s.bodies[0].orientation = testing::turned("0.3");
+  s.gravity = {0.0, 0.0, 0.0};
+  s.simulation.end_time = 0.1;
+  CHECK(wrong_user_terms(s, {}, {std::make_shared<Sine>(0)}).empty());
+  const std::vector<std::string> said = wrong_user_terms(s, {}, {std::make_shared<Sine>(1e-4)});
+  REQUIRE(said.size() == 1);
+  CHECK_THAT(said[0], Contains("its K = -dQ/dq is wrong") && Contains("a turn of 'stone'"));
 }
 
 TEST_CASE("a check with a wrong force in C++ does not pass, and says which force", "[check]") {
