@@ -174,7 +174,8 @@ TEST_CASE("a parameter that moves a jump is named by gradient, check and design"
     const CommandOutcome outcome = run_command({command, file, "--out", folder.file(command), "--quiet"});
     INFO(command << outcome.out << outcome.err);
     std::string said;
-    for (const auto& warning : json_of(folder.path / command / "result.json").at("warnings"))
+    const auto result = json_of(folder.path / command / "result.json");
+    for (const auto& warning : result.at("warnings"))
       said += warning.get<std::string>() + "\n";
     INFO(said);
     CHECK(said.find("the law of force 'push' jumps by 20 at t = 0.4 s, an instant that depends on 'tp'") !=

@@ -26,7 +26,7 @@ std::vector<double> bounds_of(const std::vector<TradeoffRow>& rows, Eigen::Index
 }
 
 std::vector<Quantity> quantities(bool relative) {
-  return {Quantity{QuantityKind::objective, "travel", 0, relative, 1, 0}};
+  return {Quantity{QuantityKind::objective, "travel", "travel", 0, relative, 1, 0}};
 }
 
 }  // namespace

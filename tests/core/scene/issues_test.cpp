@@ -256,7 +256,7 @@ TEST_CASE("names show as they are written, and are short enough for a file", "[s
   };
   for (const std::string good : {"left rod", "Stange_\xC3\xA4", "\xE6\x9D\x86", "\xE2\x80\x9Ctip\xE2\x80\x9D", "=1+1"})
     CHECK(finding(good) == "");
-  for (const std::string bad : {"a\x1B[2J", "a\nb", "a\x7F", "a\xC2\x9B",
+  for (const std::string bad : {"a\x1B(B", "a\nb", "a\x7F", "a\xC2\x9B",
                                 "a\xE2\x80\xAE"
                                 "b",
                                 "a\xE2\x81\xA6"
