@@ -175,8 +175,7 @@ TEST_CASE("a parameter that moves a jump is named by gradient, check and design"
     INFO(command << outcome.out << outcome.err);
     std::string said;
     const auto result = json_of(folder.path / command / "result.json");
-    for (const auto& warning : result.at("warnings"))
-      said += warning.get<std::string>() + "\n";
+    for (const auto& warning : result.at("warnings")) said += warning.get<std::string>() + "\n";
     INFO(said);
     CHECK(said.find("the law of force 'push' jumps by 20 at t = 0.4 s, an instant that depends on 'tp'") !=
           std::string::npos);
