@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/body/euler_parameters.hpp"
 #include "core/integrate/model_choice.hpp"
 #include "core/integrate/start_failure.hpp"
 #include "core/integrate/stiffness.hpp"
+#include "core/integrate/weak_joints.hpp"
 #include "core/mechanism/joint_graph.hpp"
 #include "core/mechanism/planar_model.hpp"
 
@@ -420,8 +422,10 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   }
   result.y_end = step_.y0;
   stiffness.add_to(result.statistics);
+  const double weak = error_of_weak_joints(mechanism_, settings_.formulation, dynamics_.worst_residual(), step_.t,
+                                           step_.y0, step_.angles0);
   result.statistics.max_acceleration_residual =
-      moved_ > 0 ? std::max(dynamics_.worst_residual(), projected_ / moved_) : dynamics_.worst_residual();
+      std::max({dynamics_.worst_residual(), weak, moved_ > 0 ? projected_ / moved_ : 0.0});
   result.statistics.relative_energy_drift = guard_.relative_energy_drift();
   if (implicit_) {
     evaluations_ += implicit_->evaluations();
