@@ -1,5 +1,7 @@
 #include "core/integrate/weak_joints.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "core/dynamics/dynamics.hpp"
@@ -24,6 +26,16 @@ double error_of_weak_joints(const Mechanism& mechanism, const FormulationSetting
   const double size = std::max({ydot.tail(half).lpNorm<Eigen::Infinity>(), firm.tail(half).lpNorm<Eigen::Infinity>(),
                                 mechanism.data().gravity.norm()});
   return size > 0 ? (ydot - firm).tail(half).lpNorm<Eigen::Infinity>() / size : 0;
+}
+
+std::string weak_joints_objection(double error) {
+  constexpr double kRough = 1e-2;
+  if (!(error > kRough)) return {};
+  return fmt::format(
+      "the accelerations there have a relative error of {:.1e}, since joints lock only by a small angle between their "
+      "axes, or the position is nearly singular. Make the axes exactly parallel, or raise "
+      "simulation.formulation.alpha (relative; 1e8 is the default, 1e12 holds angles of 1e-6)",
+      error);
 }
 
 }  // namespace mbsopt

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/settings.hpp"
@@ -16,5 +17,7 @@ namespace mbsopt {
 // meant. worst_residual: of the run (Dynamics); where it is rounding, nothing is asked.
 double error_of_weak_joints(const Mechanism& mechanism, const FormulationSettings& settings, double worst_residual,
                             double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
+// Words for an error that makes accelerations so rough that a run crawls; empty for a smaller one.
+std::string weak_joints_objection(double error);
 
 }  // namespace mbsopt

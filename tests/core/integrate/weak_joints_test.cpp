@@ -49,3 +49,8 @@ TEST_CASE("a loop that only a small angle between its axes locks is warned of, o
   firm.simulation.formulation.alpha = 1e12;
   CHECK_FALSE(warned(firm));
 }
+
+TEST_CASE("a run that crawls because alpha does not hold a loop is ended with the cause", "[simulation]") {
+  CHECK(weak_joints_objection(1e-3).empty());
+  CHECK_THAT(weak_joints_objection(0.5), Catch::Contains("raise simulation.formulation.alpha"));
+}
