@@ -41,6 +41,20 @@ VectorXd sizes_of_poses(const MatrixXd& J) {
   return sizes;
 }
 
+// |J| x with the largest entry of r and of p (or of their rates) for each of theirs.
+VectorXd magnitudes_of_terms(Index rows, const std::vector<SparseEntry>& J, Index first, const VectorXd& x) {
+  VectorXd sums = VectorXd::Zero(rows);
+  for (const SparseEntry& e : J) {
+    const Index k = e.column - first;
+    if (k < 0 || k >= x.size()) continue;
+    const Index body = k / 7 * 7;
+    const double part =
+        k - body < 3 ? x.segment<3>(body).lpNorm<Eigen::Infinity>() : x.segment<4>(body + 3).lpNorm<Eigen::Infinity>();
+    sums(e.row) += std::abs(e.value) * part;
+  }
+  return sums;
+}
+
 // Unknown q; v plays no part.
 class PositionProblem : public NearestPointEquations {
  public:
@@ -63,6 +77,9 @@ class PositionProblem : public NearestPointEquations {
     return q;
   }
   VectorXd sizes(const MatrixXd& J) const override { return sizes_of_poses(J); }
+  VectorXd magnitudes(const VectorXd& q) const override {
+    return magnitudes_of_terms(equations_.rows(), equations_.sparse_gradients(state(q)).y, 0, q);
+  }
   VectorXd weights() const override { return equations_.weights(); }
   void accept(const VectorXd& q) override { equations_.continue_branches(state(q)); }
 
@@ -88,6 +105,9 @@ class VelocityProblem : public NearestPointEquations {
   double step_fraction(const VectorXd&) const override { return 1; }
   VectorXd retracted(const VectorXd& v) const override { return v; }
   VectorXd sizes(const MatrixXd& J) const override { return sizes_of_poses(J); }
+  VectorXd magnitudes(const VectorXd& v) const override {
+    return magnitudes_of_terms(equations_.rows(), equations_.sparse_gradients(state(v)).y, v.size(), v);
+  }
   VectorXd weights() const override { return equations_.weights(); }
 
  private:
@@ -400,7 +420,7 @@ std::vector<int> Assembly::obstructed() const {
     const AssemblyEquations::Gradients F = s.position.gradients(s.result.y);
     const MatrixXd J = F.y.leftCols(N);
     const NearestPointLinearisation at(J, sizes_of_poses(J));
-    note_unmet(at.left(J, -F.rho), at.row_scale(), {F.rho}, unmet);
+    note_unmet(at.left(-F.rho), at.row_scale(), {F.rho}, unmet);
   } else if (s.is_sparse()) {
     const Solution::Sparse d = s.sparse_derivatives();
     const MatrixXd q_rho = d.q.solve(d.q_b_rho, d.q_g_rho);
@@ -413,9 +433,9 @@ std::vector<int> Assembly::obstructed() const {
     s.linearise_both();
     const Solution::Derivatives d = s.derivatives();
     const NearestPointLinearisation &q = s.q->linearisation, &v = s.v->linearisation;
-    note_unmet(q.left(s.position.gradients(s.result.y).y.leftCols(N), d.q_b_rho), q.row_scale(), {d.q_b_rho}, unmet);
+    note_unmet(q.left(d.q_b_rho), q.row_scale(), {d.q_b_rho}, unmet);
     const MatrixXd turned = d.v_b_q * q.solve(d.q_b_rho, d.q_g_rho), b = turned + d.v_b_rho;
-    note_unmet(v.left(s.velocity.gradients(s.result.y).y.rightCols(N), b), v.row_scale(), {turned, d.v_b_rho}, unmet);
+    note_unmet(v.left(b), v.row_scale(), {turned, d.v_b_rho}, unmet);
   }
   std::vector<int> parameters;
   for (Index k = 0; k < P; ++k) {

@@ -4,23 +4,47 @@
 #include <cmath>
 #include <limits>
 #include <utility>
+#include <vector>
 
 namespace mbsopt {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+namespace {
+
+// The columns of W, orthonormal in units of the sizes, span the null space. Those that turn no body (or, where lengths
+// are large, move none) have a part of rounding in p (in r). In the units of x it is eps/L for lengths L, and
+// multiplies the large g of p beside the small one of r: a part eps/L^2 of r would be wrong. So that part is zero,
+// exactly.
+MatrixXd orthonormal_null_space(const MatrixXd& W, const VectorXd& sizes) {
+  const double heavy = sizes.size() > 0 ? sizes.maxCoeff() : 0;
+  std::vector<Eigen::Index> heavy_rows;
+  for (Eigen::Index i = 0; i < sizes.size(); ++i) {
+    if (sizes(i) == heavy) heavy_rows.push_back(i);
+  }
+  if (W.size() == 0 || heavy_rows.size() == static_cast<std::size_t>(sizes.size())) return orthonormal_columns(W);
+  const LeftSingular parts = left_singular(W(heavy_rows, Eigen::all).transpose());
+  const Eigen::Index both = (parts.values.array() > NearestPointLinearisation::kRankThreshold).count();
+  MatrixXd Z(W.rows(), W.cols()), light = W * parts.U.rightCols(W.cols() - both);
+  light(heavy_rows, Eigen::all).setZero();
+  Z << orthonormal_columns(sizes.asDiagonal() * W * parts.U.leftCols(both)), orthonormal_columns(light);
+  return Z;
+}
+
+}  // namespace
+
 NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J)
     : NearestPointLinearisation(J, VectorXd::Ones(J.cols())) {}
 NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J, const VectorXd& sizes)
-    : scale_(J.rows()), sizes_(sizes) {
+    : J_(J), scale_(J.rows()), sizes_(sizes) {
   const MatrixXd sized = J * sizes.asDiagonal();
   for (Eigen::Index i = 0; i < J.rows(); ++i) {
     const double norm = sized.row(i).norm();
     scale_(i) = norm > 0 ? 1 / norm : 1.0;
   }
   J_transposed_ = OrthogonalDecomposition((scale_.asDiagonal() * sized).transpose(), kRankThreshold);
-  Z_ = orthonormal_columns(sizes.asDiagonal() * J_transposed_.left_null_space());
+  Z_ = orthonormal_null_space(J_transposed_.left_null_space(), sizes);
 }
 
 VectorXd NearestPointLinearisation::multipliers(const VectorXd& g) const {
@@ -108,36 +132,45 @@ void reduce_violation(NearestPointEquations& equations, VectorXd& x, int& iterat
   }
 }
 
-NearestPointLinearisation sized_linearisation(const NearestPointEquations& equations, const VectorXd& x) {
-  const MatrixXd J = equations.jacobian(x);
-  return NearestPointLinearisation(J, equations.sizes(J));
-}
-
 class Search {
  public:
   Search(NearestPointEquations& equations, const VectorXd& x_guess) : equations_(equations), x_guess_(x_guess) {
     result_.x = x_guess;
   }
 
+  // In metres; if that fails, where lengths of micrometres or kilometres may have cost digits, in units of the sizes.
   NearestPoint run() {
     if (guess_is_it()) return result_;
-    if (!newton()) sqp();
-    if (result_.status == NearestPointStatus::found) {
-      refine();
-      linearise_sized();
+    search();
+    if (result_.status != NearestPointStatus::found) {
+      const NearestPoint in_metres = std::exchange(result_, NearestPoint{});
+      sized_ = true;
+      move(x_guess_);
+      search();
+      if (result_.status != NearestPointStatus::found) {
+        move(in_metres.x);
+        return in_metres;
+      }
     }
+    refine();
     result_.F = equations_.values(result_.x);
-    const bool unsettled =
-        result_.status == NearestPointStatus::stalled || result_.status == NearestPointStatus::unsatisfiable;
-    if (unsettled && largest(result_.F) < 1e-9 * size()) result_.status = NearestPointStatus::singular;
     return result_;
   }
 
  private:
+  void search() {
+    if (!newton()) sqp();
+    result_.F = equations_.values(result_.x);
+    const bool unsettled =
+        result_.status == NearestPointStatus::stalled || result_.status == NearestPointStatus::unsatisfiable;
+    if (unsettled && largest(result_.F) < 1e-9 * size()) result_.status = NearestPointStatus::singular;
+  }
+
   // The guess satisfies the equations to rounding: nothing is nearer, nu = 0 and H = I.
   bool guess_is_it() {
     const VectorXd x = equations_.retracted(x_guess_), F = equations_.values(x);
-    if (!(largest(F) <= 4 * kEpsilon * size()) || !(largest(x - x_guess_) <= 4 * kEpsilon * size())) return false;
+    if (!(largest(x - x_guess_) <= 4 * kEpsilon)) return false;  // only unit vectors are retracted
+    if (!(F.cwiseAbs().array() <= 4 * kEpsilon * equations_.magnitudes(x).array()).all()) return false;
     result_.x = x, result_.F = F, result_.nu = VectorXd::Zero(F.size());
     result_.status = NearestPointStatus::found;
     result_.linearised = false;
@@ -210,17 +243,21 @@ class Search {
 
   void linearise() {
     result_.F = equations_.values(result_.x);
-    result_.linearisation = NearestPointLinearisation(equations_.jacobian(result_.x));
+    const MatrixXd J = equations_.jacobian(result_.x);
+    result_.linearisation = sized_ ? NearestPointLinearisation(J, equations_.sizes(J)) : NearestPointLinearisation(J);
   }
-  void linearise_sized() {
-    result_.F = equations_.values(result_.x);
-    result_.linearisation = sized_linearisation(equations_, result_.x);
-    add_curvature();
-  }
-  // A last step whose rounding is that of each unknown, not of the largest.
+  // Newton's steps to the rounding of each unknown, not of the largest.
   void refine() {
-    linearise_sized();
-    move(result_.x + result_.linearisation.solve(-result_.F, x_guess_ - result_.x));
+    sized_ = true;
+    for (double last = std::numeric_limits<double>::infinity();;) {
+      linearise();
+      add_curvature();
+      const VectorXd step = result_.linearisation.solve(-result_.F, x_guess_ - result_.x);
+      const double length = largest(step.cwiseQuotient(result_.linearisation.sizes() + VectorXd(result_.x.cwiseAbs())));
+      if (!(length > 2 * kEpsilon) || !(length < 0.5 * last)) return;
+      last = length;
+      move(result_.x + step);
+    }
   }
   void add_curvature() {
     result_.nu = result_.linearisation.multipliers(x_guess_ - result_.x);
@@ -316,6 +353,7 @@ class Search {
   NearestPointEquations& equations_;
   const VectorXd x_guess_;
   NearestPoint result_;
+  bool sized_ = false;
   double sigma_ = 1;
   double shortest_ = std::numeric_limits<double>::infinity(), closest_ = shortest_;
   int waited_ = 0, patience_ = 0;
@@ -332,7 +370,8 @@ NearestPoint nearest_point(NearestPointEquations& equations, const VectorXd& x_g
 void linearise(NearestPointEquations& equations, NearestPoint& found) {
   if (found.linearised) return;
   found.linearised = true;
-  found.linearisation = sized_linearisation(equations, found.x);
+  const MatrixXd J = equations.jacobian(found.x);
+  found.linearisation = NearestPointLinearisation(J, equations.sizes(J));
   MatrixXd H = equations.curvature(found.x, found.nu);
   H.diagonal().array() += 1;
   found.linearisation.set_hessian(H);

@@ -8,8 +8,9 @@
 //   H x' + J'nu' = g,  J x' = b          g = x_guess' - (J'nu)' at fixed x,   b = -F' at fixed x
 //   x' = J+ b + Z (Z'H Z)^-1 Z'(g - H J+ b)          Z: orthonormal basis of the null space of J
 //
-// J may be rank deficient (redundant equations). For derivatives it is decomposed with its unknowns in units of their
-// sizes, so that a mechanism of micrometres or of kilometres loses no digits between metres and Euler parameters.
+// J may be rank deficient (redundant equations). For the last steps and for derivatives it is decomposed with its
+// unknowns in units of their sizes, and Z keeps pure translations (or pure turns) apart, so that a mechanism of
+// micrometres or of kilometres loses no digits between metres and Euler parameters.
 // Nocedal and Wright, "Numerical Optimization" (2006), sections 16.2 (null-space method), 18.4 and 18.5 (SQP, merit
 // functions, second-order correction).
 //
@@ -37,6 +38,8 @@ struct NearestPointEquations {
   virtual Eigen::VectorXd retracted(const Eigen::VectorXd& x) const = 0;
   // The unit of each unknown, in which the entries of J become comparable.
   virtual Eigen::VectorXd sizes(const Eigen::MatrixXd& J) const { return Eigen::VectorXd::Ones(J.cols()); }
+  // What perturbs the terms of each equation by a relative eps, divided by eps: its values are known no better.
+  virtual Eigen::VectorXd magnitudes(const Eigen::VectorXd& x) const { return jacobian(x).cwiseAbs() * x.cwiseAbs(); }
   // What a violation of each equation counts where they cannot all be satisfied.
   virtual Eigen::VectorXd weights() const = 0;
   virtual void accept(const Eigen::VectorXd&) {}  // x is the next iterate: continue what is continued (angles)
@@ -53,9 +56,10 @@ class NearestPointLinearisation {
 
   Eigen::Index rank() const { return J_transposed_.rank(); }
   const Eigen::VectorXd& row_scale() const { return scale_; }
+  const Eigen::VectorXd& sizes() const { return sizes_; }
   // What is left of b outside the range of J, rows of J scaled to unit length.
-  Eigen::MatrixXd left(const Eigen::MatrixXd& J, const Eigen::Ref<const Eigen::MatrixXd>& b) const {
-    return scale_.asDiagonal() * (b - J * particular(b));
+  Eigen::MatrixXd left(const Eigen::Ref<const Eigen::MatrixXd>& b) const {
+    return scale_.asDiagonal() * (b - J_ * particular(b));
   }
   const Eigen::MatrixXd& null_space() const { return Z_; }                                 // Z
   Eigen::VectorXd multipliers(const Eigen::VectorXd& g) const;                             // least nu with J'nu = g
@@ -76,6 +80,7 @@ class NearestPointLinearisation {
  private:
   Eigen::MatrixXd particular(const Eigen::Ref<const Eigen::MatrixXd>& b) const;  // some x with J x = b
 
+  Eigen::MatrixXd J_;
   Eigen::VectorXd scale_, sizes_;         // of the rows and of the columns of J
   OrthogonalDecomposition J_transposed_;  // of (scale J sizes)'
   Eigen::MatrixXd Z_, H_, V_;             // Z'HZ = V diag(lambda) V'

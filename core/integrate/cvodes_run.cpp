@@ -14,6 +14,7 @@
 #include "core/integrate/run_guard.hpp"
 #include "core/integrate/start_failure.hpp"
 #include "core/integrate/step_failure.hpp"
+#include "core/integrate/weak_joints.hpp"
 #include "core/integrate/zero_length.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -337,7 +338,13 @@ SimulationResult ForwardRun::finish() {
   SimulationStatistics& s = result_.statistics;
   s.rhs_evaluations += flow_.evaluations();
   s.factorisations += flow_.dynamics().solver().factorisations() + linear_solver_.factorisations();
-  s.max_acceleration_residual = flow_.dynamics().worst_residual();
+  const double worst = flow_.dynamics().worst_residual();
+  s.max_acceleration_residual = worst;
+  if (worst > 0) {
+    s.max_acceleration_residual =
+        std::max(worst, error_of_weak_joints(mechanism_, settings_.formulation, worst, result_.last_good_time, y_now_,
+                                             flow_.angles_at(result_.last_good_time)));
+  }
   s.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   return std::move(result_);
 }

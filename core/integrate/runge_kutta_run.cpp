@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/body/euler_parameters.hpp"
 #include "core/integrate/model_choice.hpp"
 #include "core/integrate/start_failure.hpp"
 #include "core/integrate/stiffness.hpp"
+#include "core/integrate/weak_joints.hpp"
 #include "core/mechanism/joint_graph.hpp"
 #include "core/mechanism/planar_model.hpp"
 
@@ -295,6 +297,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   }
   std::size_t frozen_index = 0;
   int placed_again = 0;
+  constexpr long kRejectionsToAsk = 1000;  // for the cause: far more than a motion that is resolved has
   if (passage_) passage_->forget();
   EventTimes events(settings_.events, settings_.start_time, settings_.end_time);
   while (result.ok() && (options.frozen ? frozen_index < options.frozen->sizes.size() : step_.t < end)) {
@@ -358,6 +361,16 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
         break;
       }
       ++result.statistics.rejected;
+      if (result.statistics.rejected % kRejectionsToAsk == 0) {
+        const std::string objection = weak_joints_objection(error_of_weak_joints(
+            mechanism_, settings_.formulation, dynamics_.worst_residual(), step_.t, step_.y0, step_.angles0));
+        if (!objection.empty()) {
+          stop(SimulationStatus::not_credible, fmt::format("of {} steps to t = {:.6g} s {} were rejected: {}",
+                                                           result.statistics.steps + result.statistics.rejected,
+                                                           step_.t, result.statistics.rejected, objection));
+          break;
+        }
+      }
       const double factor = controller.after_rejection(outcome == Outcome::rejected ? error : INFINITY);
       h = rounded_step(h * factor);
       if (h < 1e-14 * std::max(span, std::abs(step_.t))) {
@@ -420,8 +433,10 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
   }
   result.y_end = step_.y0;
   stiffness.add_to(result.statistics);
+  const double weak = error_of_weak_joints(mechanism_, settings_.formulation, dynamics_.worst_residual(), step_.t,
+                                           step_.y0, step_.angles0);
   result.statistics.max_acceleration_residual =
-      moved_ > 0 ? std::max(dynamics_.worst_residual(), projected_ / moved_) : dynamics_.worst_residual();
+      std::max({dynamics_.worst_residual(), weak, moved_ > 0 ? projected_ / moved_ : 0.0});
   result.statistics.relative_energy_drift = guard_.relative_energy_drift();
   if (implicit_) {
     evaluations_ += implicit_->evaluations();

@@ -81,7 +81,9 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
     warnings.push_back(fmt::format(
         "the accelerations of the constraints were met to {:.1e} only: steps came close to a singular position, after "
         "which the branch may be wrong (compare with another Runge-Kutta method, or other tolerances), or masses "
-        "differ too much for simulation.formulation (a larger alpha or more iterations)",
+        "differ too much for simulation.formulation (a larger alpha or more iterations), or joints lock only by a "
+        "small angle between their axes and give way: raise simulation.formulation.alpha, or make the axes exactly "
+        "parallel",
         statistics.max_acceleration_residual));
   }
   const auto add_unresolved = [&](const QuadratureError& worst, const char* what, const char* consequence) {
