@@ -1,5 +1,6 @@
-// journal.jsonl of an output folder: what a long run has done so far, a line of JSON each, appended and flushed to the
-// disk at once, so that a run that is killed, or a machine that stops, loses nothing that was done.
+// journal.jsonl of an output folder: what a long run has done so far, a line of JSON each, appended at once. The kernel
+// keeps an appended line when the run is killed. Lines are flushed to the disk, for a machine that stops: evaluations
+// at most every 100 ms, other lines at once.
 //
 //   {"journal": 2, "command": "design", "input": "../five_bar.json", ...}    the first line: what is run, and on what
 //   {"point": {"x": [...], "f": 0.12, "f_x": [...], ...}}                    an evaluation   (point_records.hpp)
@@ -18,6 +19,7 @@
 // ends as it would have, bit by bit.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <functional>
@@ -52,7 +54,7 @@ class Journal {
   Journal(const std::filesystem::path& folder, const Json& header);
   // Goes on with the one that has been read, its cut-off last line removed.
   Journal(const std::filesystem::path& folder, const JournalContent& earlier);
-  ~Journal();
+  ~Journal();  // flushes
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
 
@@ -60,10 +62,14 @@ class Journal {
 
  private:
   void open();
+  bool flush();
+
   std::filesystem::path path_;
   std::string run_, seal_;
   std::size_t bytes_ = 0;
   int descriptor_ = -1;
+  bool is_flushed_ = true;
+  std::chrono::steady_clock::time_point flushed_at_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace mbsopt

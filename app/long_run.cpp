@@ -31,9 +31,12 @@ LongRun::LongRun(Run& run) : run_(run) {
 
 LongRun::~LongRun() {
   if (!journal_ || finished_) return;
-  run_.progress.finish();
-  run_.context.err << fmt::format("the journal keeps what was computed; 'mbsopt resume {}' goes on from there\n",
-                                  run_.folder.path().string());
+  try {
+    run_.progress.finish();
+    run_.context.err << fmt::format("the journal keeps what was computed; 'mbsopt resume {}' goes on from there\n",
+                                    run_.folder.path().string());
+  } catch (...) {  // the exception under way says more than this one
+  }
 }
 
 long LongRun::seed(const std::string& of, const std::optional<long>& given) {

@@ -13,6 +13,13 @@ constexpr std::string_view kClearLine = "\r\x1b[K";
 
 }  // namespace
 
+Progress::~Progress() {
+  try {
+    finish();
+  } catch (...) {  // a stream that throws: the bar stays
+  }
+}
+
 void Progress::fraction(std::string_view what, double done) {
   if (quiet_ || !terminal_) return;
   const int percent = static_cast<int>(std::floor(100 * std::clamp(done, 0.0, 1.0)));

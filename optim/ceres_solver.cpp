@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <limits>
 #include <vector>
 
 #include "core/expression/counted.hpp"
@@ -16,6 +17,10 @@ namespace {
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 constexpr int kInvalidSteps = 30;  // in a row; each shortens the step, the last ones to nothing
+// Part of the cost of the start that the derivatives may still promise at a minimum. The noise of a simulation at
+// rtol 1e-5 promises below 1e-8; in front of a wall of failed points, or with wrong derivatives, it is most of the
+// cost.
+constexpr double kPromise = 1e-4;
 
 // The problem's last point is kept: Ceres asks for the residuals of a trial step first, and for the Jacobian of the
 // same point once it has accepted the step.
@@ -101,12 +106,14 @@ class Progress : public ceres::IterationCallback {
   const Eigen::VectorXd& last() const { return last_; }  // accepted; Ceres itself forgets it when it is stopped
   int iterations() const { return std::max(0, count_); }
   int left() const { return options_.max_iterations - iterations(); }
+  // Refused steps have raised the damping diag(J'J)/radius above J'J itself.
+  bool damped() const { return radius_ < 1; }
 
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& s) override {
     if (s.iteration == 0 || s.step_is_successful) cost_ = s.cost;  // else it is the cost of the step that was refused
     if (s.iteration == 0 && count_ >= 0) return ceres::SOLVER_CONTINUE;  // the point just reported
     ++count_;
-    last_ = x_;
+    last_ = x_, radius_ = s.trust_region_radius;
     if (!options_.progress) return ceres::SOLVER_CONTINUE;
     const bool go_on = options_.progress({count_, cost_, s.gradient_max_norm, s.step_norm, x_});
     return go_on ? ceres::SOLVER_CONTINUE : ceres::SOLVER_ABORT;
@@ -117,6 +124,7 @@ class Progress : public ceres::IterationCallback {
   const Eigen::VectorXd& x_;  // Ceres keeps it at the last accepted point
   Eigen::VectorXd last_;
   double cost_ = 0;  // there
+  double radius_ = std::numeric_limits<double>::infinity();
   int count_ = -1;
 };
 
@@ -145,6 +153,14 @@ std::vector<int> pressed_bounds(const LeastSquaresProblem& problem, const Eigen:
     if ((x(k) <= problem.x_lower(k) && g(k) > 0) || (x(k) >= problem.x_upper(k) && g(k) < 0))
       pressed.push_back(static_cast<int>(k));
   return pressed;
+}
+
+// What the best step along one free variable takes off the cost, by the derivatives: a lower bound of what is left.
+double promised_gain(const LeastSquaresProblem& problem, const Eigen::VectorXd& x, const LeastSquaresPoint& at) {
+  const Eigen::VectorXd g = at.z_x.transpose() * problem.pull(at.z);
+  Eigen::VectorXd gain = g.array().square() / (2 * at.z_x.colwise().squaredNorm().transpose().array()).max(1e-300);
+  for (const int k : pressed_bounds(problem, x, g)) gain(k) = 0;
+  return gain.size() > 0 ? gain.maxCoeff() : 0;
 }
 
 // A loss sees each residual by itself; without one all are a single block. The problem owns the blocks.
@@ -242,6 +258,15 @@ LeastSquaresResult solve_with_ceres(LeastSquaresProblem& problem, const Eigen::V
   result.x = end.ok ? x : x_start;
   result.point = end.ok ? end : start;
   result.cost_final = problem.cost(result.point.z);
+  // Ceres takes steps that were shortened to nothing for convergence.
+  const double promise = promised_gain(problem, result.x, result.point);
+  if (result.status == SolverStatus::converged && progress.damped() && promise > kPromise * result.cost_initial) {
+    result.status = SolverStatus::no_progress;
+    result.message = fmt::format(
+        "no further progress: the derivatives promise to lower the cost by {:.2g}, but no step lowers it{}. Tighten "
+        "rtol of the integrator; check the derivatives of C++ code",
+        promise, result.failures());
+  }
   return result;
 }
 

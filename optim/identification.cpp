@@ -84,7 +84,8 @@ class Identification {
     const IntegratorSettings& integrator = scene_.simulation.integrator;
     if (!integrator.step) data.accuracy = std::min(kTolerances * integrator.rtol, kLeastAccuracy);
     FitStatistics statistics = fit_statistics(data);
-    if (abandoned_ || solution.status != SolverStatus::converged)
+    const bool ended = solution.status == SolverStatus::converged || solution.status == SolverStatus::no_progress;
+    if (abandoned_ || !ended)
       withhold_errors(statistics, "they hold at a minimum, and the fit ended before it reached one");
     return statistics;
   }
@@ -175,7 +176,7 @@ class Identification {
 
   // A loss without pull far out has a minimum wherever all samples are far out.
   void refuse_without_pull(const ExperimentStack& stack, const LeastSquaresResult& solution) {
-    if (result_.status != SolverStatus::converged) return;
+    if (!result_.ok()) return;
     const Eigen::VectorXd& z = solution.point.z;
     const Eigen::Index pulling =
         std::count_if(z.begin(), z.begin() + stack.samples(), [&](double x) { return stack.loss.at(x * x).rho1 > 0; });
@@ -194,6 +195,10 @@ class Identification {
           result_.warnings.push_back(fmt::format(
               "parameters.{}.lower: is {}, as is the upper bound: it stays there and is not fitted", name, *p.lower));
     if (solution.point.z.size() == 0) return;
+    if (result_.status == SolverStatus::no_progress)
+      result_.warnings.push_back(
+          "the fit ended without reaching a minimum, since no step lowered the cost: standard errors and intervals "
+          "hold at a minimum, and may be wrong here");
     if (estimates_sigma(spec_) && !sigmas_are_estimated_)
       result_.warnings.push_back("the fit ended before the sigmas were estimated");
     const Eigen::VectorXd z = solution.point.z.head(stack.samples());

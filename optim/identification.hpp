@@ -111,7 +111,7 @@ struct IdentificationResult {
   long evaluations = 0, failed_evaluations = 0;  // points at which all experiments were simulated, with derivatives
   long simulations = 0;
   double wall_seconds = 0;
-  bool ok() const { return status == SolverStatus::converged; }
+  bool ok() const { return status == SolverStatus::converged || status == SolverStatus::no_progress; }
 };
 
 struct IdentificationOptions {

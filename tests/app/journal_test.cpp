@@ -1,6 +1,11 @@
 #include "app/journal.hpp"
 
+#include <sys/syscall.h>
+#include <unistd.h>
+
 #include <catch2/catch.hpp>
+#include <chrono>
+#include <thread>
 
 #include "app/atomic_file.hpp"
 #include "app/sha256.hpp"
@@ -8,6 +13,17 @@
 
 using namespace mbsopt;
 using Catch::Contains;
+
+namespace {
+int flushes = 0;
+}
+
+// In place of the library's.
+extern "C" int fdatasync(int file) {
+  ++flushes;
+  return static_cast<int>(::syscall(SYS_fdatasync, file));
+}
+
 namespace fs = std::filesystem;
 
 namespace {
@@ -54,6 +70,32 @@ TEST_CASE("journal: what was added is read again, and a run goes on where it was
   CHECK(cut_off.points.size() == 2);
   Journal(folder.path, cut_off).add("point", {{"x", {3.0}}, {"derivatives", false}, {"f", 9.0}, {"c", Json::array()}});
   CHECK(content_of(folder.path / kJournalFile) == text);
+}
+
+TEST_CASE("journal: evaluations are flushed every 100 ms and at the end, iterates and starts at once", "[journal]") {
+  const TemporaryFolder folder;
+  const auto begin = std::chrono::steady_clock::now();
+  flushes = 0;
+  {
+    Journal journal(folder.path, kHeader);
+    for (int i = 0; i < 200; ++i) journal.add(i % 2 ? "point" : "residuals", {{"f", i}});
+    CHECK(read_journal(folder.path).points.size() == 100);  // the kernel has them
+    CHECK(flushes <= (std::chrono::steady_clock::now() - begin) / std::chrono::milliseconds(100));
+    for (const char* kind : {"iterate", "start", "ended"}) {
+      const int before = flushes;
+      journal.add(kind, kind == std::string("ended") ? Json("ok") : Json::object());
+      CHECK(flushes == before + 1);
+    }
+    flushes = 0;
+    std::this_thread::sleep_for(std::chrono::milliseconds(110));
+    journal.add("point", {{"f", 1}});
+    CHECK(flushes == 1);
+    journal.add("hessians", {{"f", 1}});
+  }
+  CHECK(flushes >= 2);  // the end
+  flushes = 0;
+  { Journal(folder.path, read_journal(folder.path)); }
+  CHECK(flushes == 0);
 }
 
 TEST_CASE("journal: no single flipped bit goes unseen", "[journal]") {

@@ -29,6 +29,25 @@ struct FragileResidual : LeastSquaresProblem {
   }
 };
 
+// z = 1 + slope x, with a derivative of the wrong sign; the second row keeps the cost off zero.
+struct WrongDerivative : LeastSquaresProblem {
+  WrongDerivative() : LeastSquaresProblem(1, 2) {}
+  void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& p) override {
+    p.z << 1 + x(0), 1;
+    p.z_x << -1, 0;
+  }
+};
+
+// exp(x) - 20 again, evaluable for x <= 2 only: the minimum at 3 lies behind a wall.
+struct WalledResidual : LeastSquaresProblem {
+  WalledResidual() : LeastSquaresProblem(1, 1) {}
+  void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& p) override {
+    if (x(0) > 2) throw std::runtime_error("the loop cannot be closed");
+    p.z << std::exp(x(0)) - 20;
+    p.z_x << std::exp(x(0));
+  }
+};
+
 struct OutlyingResidual : LeastSquaresProblem {
   OutlyingResidual() : LeastSquaresProblem(1, 2) {}
   void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& p) override {
@@ -78,6 +97,18 @@ TEST_CASE("a failed evaluation makes ceres shorten the step", "[ceres]") {
   const LeastSquaresResult bad = solve_with_ceres(problem, Eigen::VectorXd::Constant(1, 5));
   CHECK(bad.status == SolverStatus::failed);
   CHECK(bad.message == "the start point cannot be evaluated: the loop cannot be closed");
+}
+
+TEST_CASE("ceres has not converged where no step does what the derivatives promise", "[ceres]") {
+  WrongDerivative wrong;
+  const LeastSquaresResult first = solve_with_ceres(wrong, Eigen::VectorXd::Zero(1));
+  CHECK(first.status == SolverStatus::no_progress);
+  CHECK_THAT(first.message, Catch::Contains("promise to lower the cost by 0.5"));
+  WalledResidual walled;
+  const LeastSquaresResult second = solve_with_ceres(walled, Eigen::VectorXd::Zero(1));
+  CHECK(second.status == SolverStatus::no_progress);
+  CHECK(second.x(0) <= 2);
+  CHECK_THAT(second.message, Catch::Contains("the loop cannot be closed"));
 }
 
 TEST_CASE("residuals whose squares are no numbers are refused at the start, in words that speak of the data",

@@ -282,6 +282,31 @@ TEST_CASE("a fit that was stopped has no standard errors, and no estimated sigma
   CHECK_THAT(result.warnings[0], Contains("before the sigmas were estimated"));
 }
 
+TEST_CASE("a fit that ends without progress has standard errors, and a warning", "[identification]") {
+  Problem p = fit_problem(60, 0.055, 1.53, 1.55);
+  p.identification->variables = {"w2"}, p.identification->experiments[0].free.clear();
+  p.identification->experiments[0].channels[0].bias = Expression::parse("1e-9*sqrt(62 - w2)");  // ends at 62
+  CsvTable data = pendulum::exact_motion(64, 0.055, 1.53, 1.55, 2);
+  pendulum::add_noise(data, 0.01, 1);
+  const IdentificationResult result = run_identification(p, {data});
+  INFO(result.message);
+  REQUIRE(result.status == SolverStatus::no_progress);
+  CHECK(result.parameters[0].value <= 62);
+  CHECK(std::isfinite(result.parameters[0].std_error));
+  CHECK(result.statistics.none.empty());
+  REQUIRE_FALSE(result.warnings.empty());
+  CHECK_THAT(result.warnings[0], Contains("standard errors and intervals hold at a minimum"));
+}
+
+TEST_CASE("a fit that reached its iteration limit has no standard errors", "[identification]") {
+  Problem p = fit_problem(66, 0.1, 1.5, 1.4);
+  p.identification->max_iterations = 1;
+  const IdentificationResult result = run_identification(p, {pendulum::exact_motion(64, 0.055, 1.53, 1.55, 2)});
+  REQUIRE(result.status == SolverStatus::iteration_limit);
+  CHECK(std::isnan(result.parameters[0].std_error));
+  CHECK_THAT(result.statistics.none, Contains("ended before"));
+}
+
 TEST_CASE("a record of angles in degrees is doubted", "[identification]") {
   Problem p = fit_problem(64, 0.055, 1.53, 1.55);
   p.identification->experiments[0].free.clear();
