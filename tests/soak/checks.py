@@ -227,8 +227,9 @@ def tilt(lab):
     sensors = lab.problem.get("sensors", {})
     same = [name for name, objective in lab.problem["objectives"].items()
             if all(invariant(sensors[s]) for s in names_in(objective) & set(sensors))]
-    return compare_gradients(lab, "tilt", lab.run("gradient", lab.tight(), ("--method", "adjoint")),
-                             lab.run("gradient", lab.tight(), ("--method", "adjoint"), "tilted"), 1e-5, ERRORS, same, DOUBT)
+    turned = lab.run("gradient", lab.tight(), ("--method", "adjoint"), "tilted")
+    return compare_gradients(lab, "tilt", lab.run("gradient", lab.tight(), ("--method", "adjoint")), turned, 1e-5,
+                             ERRORS, same, DOUBT)
 
 
 def turned_back(run, lab, turn, reference):

@@ -10,9 +10,9 @@ from scene import Scene
 # Warnings of the program that say its motion may be off by more than usual.
 DOUBT = re.compile(r"singular|energy changed|came apart|accelerations of the constraints|not resolve|stability|stiff|"
                    r"zero length|cannot change|not smooth|jump|peak|disagree|rounding|has no (mass|inertia)|"
-                   r"faster than|penalty", re.IGNORECASE)
+                   r"faster than|penalty|contradict", re.IGNORECASE)
 # Of these, the ones that explain why two sweeps or models differentiate the same steps differently.
-SWEEP_DOUBT = re.compile(r"rounding|masses differ|cannot change|penalty", re.IGNORECASE)
+SWEEP_DOUBT = re.compile(r"rounding|masses differ|cannot change|penalty|contradict", re.IGNORECASE)
 FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh", "pi")}
 
 
