@@ -61,17 +61,8 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
                            ? "take a Runge-Kutta method, which projects onto the constraints"
                            : "let simulation.formulation.projection be position_velocity")));
   }
-  const bool projects = f.projection == Projection::position_velocity && !is_cvodes(settings.integrator.type);
-  if (projects && statistics.max_position_violation > kContradicting && statistics.max_position_violation <= kApart) {
-    warnings.push_back(fmt::format(
-        "the equations of the joints contradict each other by {:.1e} [m, -], which no projection takes out: some of "
-        "them nearly depend on each other, as where axes in a closed loop are parallel but for a few digits. Which "
-        "motions they leave is uncertain, and so are the motion and its gradients, even in their first digits. Write "
-        "these axes with all digits, or replace a joint of the loop by one with fewer equations (`validate` names "
-        "joints with redundant equations)",
-        statistics.max_position_violation));
-  }
   if (!finished) return warnings;
+  const bool projects = f.projection == Projection::position_velocity && !is_cvodes(settings.integrator.type);
   if (statistics.relative_energy_drift > kEnergyLost && statistics.max_position_violation <= kApart) {
     warnings.push_back(fmt::format(
         "the energy changed by up to {:.2g} J, {:.2g} % of all there is, although nothing does work: this is not the "
@@ -96,6 +87,14 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
         "which the branch may be wrong (compare with another Runge-Kutta method, or other tolerances), or masses "
         "differ too much for simulation.formulation (a larger alpha or more iterations)",
         statistics.max_acceleration_residual));
+  } else if (projects && statistics.max_position_violation > kContradicting) {
+    warnings.push_back(fmt::format(
+        "the equations of the joints contradict each other by {:.1e} [m, -], which no projection takes out: some of "
+        "them nearly depend on each other, as where axes in a closed loop are parallel but for a few digits. Which "
+        "motions they leave is uncertain, and so are the motion and its gradients, even in their first digits. Write "
+        "these axes with all digits, or replace a joint of the loop by one with fewer equations (`validate` names "
+        "joints with redundant equations)",
+        statistics.max_position_violation));
   }
   const auto add_unresolved = [&](const QuadratureError& worst, const char* what, const char* consequence) {
     if (!(worst.error > kUnresolved)) return;
