@@ -7,7 +7,10 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kApart = 1e-3;            // [m, -]
+constexpr double kApart = 1e-3;  // [m, -]
+// [m, -]: projections leave 1e-11 and less, rounding of coordinates up to 1e4 m. Where rows contradict each other, they
+// give up below 1e-8 (projection.cpp) at the first step.
+constexpr double kContradicting = 1e-10;
 constexpr double kUnmet = 1e-5;            // of the accelerations of the constraints
 constexpr double kTakenOut = 1e-4;         // by projections: those of the integration errors are of the order of rtol
 constexpr double kEnergyLost = 1e-2;       // of the largest energy
@@ -59,6 +62,7 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
                            : "let simulation.formulation.projection be position_velocity")));
   }
   if (!finished) return warnings;
+  const bool projects = f.projection == Projection::position_velocity && !is_cvodes(settings.integrator.type);
   if (statistics.relative_energy_drift > kEnergyLost && statistics.max_position_violation <= kApart) {
     warnings.push_back(fmt::format(
         "the energy changed by up to {:.2g} J, {:.2g} % of all there is, although nothing does work: this is not the "
@@ -85,6 +89,14 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
         "small angle between their axes and give way: raise simulation.formulation.alpha, or make the axes exactly "
         "parallel",
         statistics.max_acceleration_residual));
+  } else if (projects && statistics.max_position_violation > kContradicting) {
+    warnings.push_back(fmt::format(
+        "the equations of the joints contradict each other by {:.1e} [m, -], which no projection takes out: some of "
+        "them nearly depend on each other, as where axes in a closed loop are parallel but for a few digits. Which "
+        "motions they leave is uncertain, and so are the motion and its gradients, even in their first digits. Write "
+        "these axes with all digits, or replace a joint of the loop by one with fewer equations (`validate` names "
+        "joints with redundant equations)",
+        statistics.max_position_violation));
   }
   const auto add_unresolved = [&](const QuadratureError& worst, const char* what, const char* consequence) {
     if (!(worst.error > kUnresolved)) return;

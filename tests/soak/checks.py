@@ -4,6 +4,7 @@ shrunk scene as well. It gives the disagreements that no warning of the program 
 import copy
 import random
 
+from lab import DOUBT, SWEEP_DOUBT
 from rotations import inverse, random_turn
 from tilt import invariant, names_in, tilted, turned_pose
 
@@ -36,16 +37,33 @@ def gradient_difference(a, b, sizes, value, noise):
     return worst, where
 
 
-def compare_gradients(lab, check, first, second, allowed=SAME, noise=ROUNDING, objectives=None):
+def compare_gradients(lab, check, first, second, allowed=SAME, noise=ROUNDING, objectives=None,
+                      doubt=SWEEP_DOUBT):
+    """The gradients of two runs. By default both differentiate the same motion, so that no doubt about the motion
+    explains a difference."""
     if not (first.ok and second.ok):
         return []
     found = []
     for name in lab.problem["objectives"] if objectives is None else objectives:
         worst, where = gradient_difference(first.gradient(name), second.gradient(name), lab.parameter_sizes(),
                                            first.value(name), noise * natural_size(lab, name))
-        if worst > allowed and not lab.doubts(first, second):
+        if worst > allowed and not lab.doubts(first, second, about=doubt):
             found.append((check, f"{name}, {where}: {worst:.1e} apart"))
     return found
+
+
+def compare_by_steps(lab, check, first, second, allowed, noise, objectives=None):
+    """Gradients by (method, file) over different steps. No step is chosen for the quadrature of smooth extremes, so
+    that a difference has to remain at a tenth of the largest step."""
+    def found(settings):
+        runs = [lab.run("gradient", settings, ("--method", method), file) for method, file in (first, second)]
+        return compare_gradients(lab, check, *runs, allowed, noise, objectives, DOUBT)
+
+    return found(lab.tight()) and found(finer(lab))
+
+
+def finer(lab):
+    return lab.tight(max_step=lab.end_time / 400)
 
 
 # ---- the checks
@@ -153,10 +171,14 @@ def energy(lab):
 
 def differences(lab):
     """The gradient along two directions against central differences of runs with other parameters."""
+    return differences_at(lab, lab.tight()) and differences_at(lab, finer(lab))
+
+
+def differences_at(lab, settings):
     parameters = lab.problem.get("parameters")
     if not parameters:
         return []
-    base = lab.run("gradient", lab.tight(), ("--method", "adjoint"))
+    base = lab.run("gradient", settings, ("--method", "adjoint"))
     if not base.ok:
         return []
     rng, sizes, found = random.Random(lab.problem["name"]), lab.parameter_sizes(), []
@@ -165,7 +187,7 @@ def differences(lab):
         missed = set(lab.problem["objectives"])
         best = {}
         for h in (1e-3, 1e-4, 1e-5, 1e-2):
-            slopes = [central(lab, direction, step) for step in (h, h / 2)]
+            slopes = [central(lab, settings, direction, step) for step in (h, h / 2)]
             if None in slopes:
                 continue
             for name in sorted(missed):
@@ -188,15 +210,15 @@ def differences(lab):
     return found
 
 
-def central(lab, direction, h):
+def central(lab, settings, direction, h):
     values = []
     for sign in (1, -1):
-        settings = lab.tight()
+        changed = dict(settings)
         for name, d in direction.items():
             p = lab.problem["parameters"][name]
-            settings[f"parameters.{name}.value" if isinstance(p, dict) else f"parameters.{name}"] = (
+            changed[f"parameters.{name}.value" if isinstance(p, dict) else f"parameters.{name}"] = (
                 (p["value"] if isinstance(p, dict) else p) + sign * h * d)
-        run = lab.run("simulate", settings)
+        run = lab.run("simulate", changed)
         if not run.ok:
             return None
         values.append({name: run.value(name) for name in lab.problem["objectives"]})
@@ -223,8 +245,7 @@ def tilt(lab):
     sensors = lab.problem.get("sensors", {})
     same = [name for name, objective in lab.problem["objectives"].items()
             if all(invariant(sensors[s]) for s in names_in(objective) & set(sensors))]
-    return compare_gradients(lab, "tilt", lab.run("gradient", lab.tight(), ("--method", "adjoint")),
-                             lab.run("gradient", lab.tight(), ("--method", "adjoint"), "tilted"), 1e-5, ERRORS, same)
+    return compare_by_steps(lab, "tilt", ("adjoint", "scene"), ("adjoint", "tilted"), 1e-5, ERRORS, same)
 
 
 def turned_back(run, lab, turn, reference):
@@ -320,9 +341,8 @@ def other_commands(lab):
     """Commands that only have to end in numbers or words."""
     lab.run("validate")
     if lab.problem.get("parameters"):
-        forward = lab.run("gradient", lab.tight(), ("--method", "cvodes_forward"))
-        adjoint = lab.run("gradient", lab.tight(), ("--method", "adjoint"))
-        found = compare_gradients(lab, "cvodes_forward = adjoint", forward, adjoint, 1e-4, 1e-8)
+        found = compare_by_steps(lab, "cvodes_forward = adjoint", ("cvodes_forward", "scene"), ("adjoint", "scene"),
+                                 1e-4, 1e-8)
         lab.run("gradient", {"simulation.integrator": {"type": "dopri5"}}, ("--method", "adjoint", "--hessian"))
         name = sorted(lab.problem["parameters"])[0]
         design = {"minimize": sorted(lab.problem["objectives"])[0], "variables": [name],

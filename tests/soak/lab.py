@@ -7,10 +7,12 @@ from pathlib import Path
 
 from scene import Scene
 
-# Warnings of the program that say its numbers may be off by more than usual.
+# Warnings of the program that say its motion may be off by more than usual.
 DOUBT = re.compile(r"singular|energy changed|came apart|accelerations of the constraints|not resolve|stability|stiff|"
-                   r"zero length|cannot change|not smooth|jump|peak|disagree|rounding|differ|has no (mass|inertia)|"
-                   r"error|faster than", re.IGNORECASE)
+                   r"zero length|cannot change|not smooth|jump|peak|disagree|rounding|has no (mass|inertia)|"
+                   r"faster than|penalty|contradict", re.IGNORECASE)
+# Of these, the ones that explain why two sweeps or models differentiate the same steps differently.
+SWEEP_DOUBT = re.compile(r"rounding|masses differ|cannot change|penalty|contradict", re.IGNORECASE)
 FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh", "pi")}
 
 
@@ -51,9 +53,9 @@ class Lab:
     def complaints(self):
         return [complaint for outcome in self.outcomes.values() for complaint in outcome.complaints]
 
-    def doubts(self, *outcomes):
+    def doubts(self, *outcomes, about=DOUBT):
         """What the program itself said against its numbers; remembered as an explanation."""
-        words = [warning for outcome in outcomes for warning in outcome.warnings if DOUBT.search(warning)]
+        words = [warning for outcome in outcomes for warning in outcome.warnings if about.search(warning)]
         self.explained += words[:1]
         return bool(words)
 
