@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <unordered_map>
+#include <unordered_set>
 
 #include "core/expression/counted.hpp"
 #include "core/integrate/cvodes.hpp"
@@ -64,17 +66,19 @@ void Evaluator::find_unused() {
   if (opaque) {  // may look at every body
     judged.objectives.clear();
     const std::vector<SceneIssue> by_model = find_unused_parameters(judged);
-    const auto is_used = [&](const SceneIssue& issue) {
-      return std::none_of(by_model.begin(), by_model.end(), [&](const SceneIssue& i) { return i.path == issue.path; });
-    };
-    std::erase_if(unused, is_used);
+    std::unordered_set<std::string> paths;
+    for (const SceneIssue& issue : by_model) paths.insert(issue.path);
+    std::erase_if(unused, [&](const SceneIssue& issue) { return !paths.contains(issue.path); });
   }
+  if (unused.empty()) return;
+  std::unordered_map<std::string, std::size_t> variables;  // by path
+  for (std::size_t k = 0; k < variables_.size(); ++k)
+    variables.emplace("parameters." + scene_.parameters[static_cast<std::size_t>(variables_[k])].name, k);
   for (const SceneIssue& issue : unused) {
-    for (std::size_t k = 0; k < variables_.size(); ++k) {
-      if (issue.path != "parameters." + scene_.parameters[static_cast<std::size_t>(variables_[k])].name) continue;
-      if (!opaque) throw std::invalid_argument(issue.path + ": " + issue.message);
-      perhaps_unused_.push_back(k);
-    }
+    const auto variable = variables.find(issue.path);
+    if (variable == variables.end()) continue;
+    if (!opaque) throw std::invalid_argument(issue.path + ": " + issue.message);
+    perhaps_unused_.push_back(variable->second);
   }
 }
 
