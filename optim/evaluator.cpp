@@ -82,14 +82,22 @@ void Evaluator::find_unused() {
   }
 }
 
-void Evaluator::refuse_zero_columns(Evaluation& e) const {
+// The first gradient decides whether C++ code uses a variable. In a search its derivatives may become 0 (max(0, x)).
+void Evaluator::judge_zero_columns(Evaluation& e) const {
   for (const std::size_t k : perhaps_unused_) {
     if (!e.ok || e.psi_rho.col(static_cast<Eigen::Index>(k)).any()) continue;
+    const std::string& name = scene_.parameters[static_cast<std::size_t>(variables_[k])].name;
+    if (has_differentiated_) {
+      e.warnings.push_back(fmt::format(
+          "parameters.{}: its derivatives are all exactly 0 here: only C++ code uses it, and does not at these values",
+          name));
+      continue;
+    }
     e.ok = false;
     e.message = fmt::format(
         "parameters.{}: is used by nothing in the scene, and no objective or force written in C++ has a derivative in "
         "it: its gradient entries are all exactly 0; allow_unused lifts this error",
-        scene_.parameters[static_cast<std::size_t>(variables_[k])].name);
+        name);
   }
 }
 
@@ -308,7 +316,7 @@ const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
                by_cvodes = method == GradientMethod::cvodes_forward || method == GradientMethod::cvodes_adjoint;
     last_ = run(rho, backward ? Sweep::backward : Sweep::forward, nullptr, by_cvodes);
   }
-  refuse_zero_columns(last_);
+  judge_zero_columns(last_);
   has_differentiated_ = has_differentiated_ || last_.ok;
   last_.method = simulated_.empty() ? GradientMethod::automatic : method;
   last_.choice = std::move(choice);
