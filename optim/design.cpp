@@ -221,19 +221,19 @@ DifferenceComparison comparison_at(const Evaluation& start, const Evaluator& eva
   comparison.f = start.psi, comparison.f_rho = start.psi_rho;
   std::vector<std::string> names;
   for (const ComparedVariable& v : comparison.variables) names.push_back(v.name);
-  comparison.at = [&start, &evaluator, scene, names](std::size_t k, double h) -> std::optional<Eigen::VectorXd> {
+  const auto there = std::make_shared<Evaluator>(scene, evaluator.objectives(), names, evaluator.options());
+  comparison.at = [&start, &evaluator, there](std::size_t k, double h) -> std::optional<Eigen::VectorXd> {
     Eigen::VectorXd rho = start.rho;
     rho(evaluator.variables()[k]) += h;
-    Evaluator there(scene, evaluator.objectives(), names, evaluator.options());
-    const Evaluation& e = there.values(rho);
+    const Evaluation& e = there->values(rho);
     if (!e.ok) return std::nullopt;
     return e.psi;
   };
-  comparison.tighter = [&start, &evaluator, scene, names](Eigen::VectorXd& f, Eigen::MatrixXd& f_rho) {
+  comparison.tighter = [&start, &evaluator, &scene, names](Eigen::VectorXd& f, Eigen::MatrixXd& f_rho) {
     std::optional<Scene> tight = with_other_tolerances(scene);
     if (!tight) return false;
-    Evaluator there(*std::move(tight), evaluator.objectives(), names, evaluator.options());
-    const Evaluation& e = there.gradients(start.rho);
+    Evaluator at_tight(*std::move(tight), evaluator.objectives(), names, evaluator.options());
+    const Evaluation& e = at_tight.gradients(start.rho);
     f = e.psi, f_rho = e.psi_rho;
     return e.ok;
   };

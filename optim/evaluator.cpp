@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <unordered_map>
+#include <unordered_set>
 
 #include "core/expression/counted.hpp"
 #include "core/integrate/cvodes.hpp"
@@ -64,28 +66,38 @@ void Evaluator::find_unused() {
   if (opaque) {  // may look at every body
     judged.objectives.clear();
     const std::vector<SceneIssue> by_model = find_unused_parameters(judged);
-    const auto is_used = [&](const SceneIssue& issue) {
-      return std::none_of(by_model.begin(), by_model.end(), [&](const SceneIssue& i) { return i.path == issue.path; });
-    };
-    std::erase_if(unused, is_used);
+    std::unordered_set<std::string> paths;
+    for (const SceneIssue& issue : by_model) paths.insert(issue.path);
+    std::erase_if(unused, [&](const SceneIssue& issue) { return !paths.contains(issue.path); });
   }
+  if (unused.empty()) return;
+  std::unordered_map<std::string, std::size_t> variables;  // by path
+  for (std::size_t k = 0; k < variables_.size(); ++k)
+    variables.emplace("parameters." + scene_.parameters[static_cast<std::size_t>(variables_[k])].name, k);
   for (const SceneIssue& issue : unused) {
-    for (std::size_t k = 0; k < variables_.size(); ++k) {
-      if (issue.path != "parameters." + scene_.parameters[static_cast<std::size_t>(variables_[k])].name) continue;
-      if (!opaque) throw std::invalid_argument(issue.path + ": " + issue.message);
-      perhaps_unused_.push_back(k);
-    }
+    const auto variable = variables.find(issue.path);
+    if (variable == variables.end()) continue;
+    if (!opaque) throw std::invalid_argument(issue.path + ": " + issue.message);
+    perhaps_unused_.push_back(variable->second);
   }
 }
 
-void Evaluator::refuse_zero_columns(Evaluation& e) const {
+// The first gradient decides whether C++ code uses a variable. In a search its derivatives may become 0 (max(0, x)).
+void Evaluator::judge_zero_columns(Evaluation& e) const {
   for (const std::size_t k : perhaps_unused_) {
     if (!e.ok || e.psi_rho.col(static_cast<Eigen::Index>(k)).any()) continue;
+    const std::string& name = scene_.parameters[static_cast<std::size_t>(variables_[k])].name;
+    if (has_differentiated_) {
+      e.warnings.push_back(fmt::format(
+          "parameters.{}: its derivatives are all exactly 0 here: only C++ code uses it, and does not at these values",
+          name));
+      continue;
+    }
     e.ok = false;
     e.message = fmt::format(
         "parameters.{}: is used by nothing in the scene, and no objective or force written in C++ has a derivative in "
         "it: its gradient entries are all exactly 0; allow_unused lifts this error",
-        scene_.parameters[static_cast<std::size_t>(variables_[k])].name);
+        name);
   }
 }
 
@@ -304,7 +316,7 @@ const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
                by_cvodes = method == GradientMethod::cvodes_forward || method == GradientMethod::cvodes_adjoint;
     last_ = run(rho, backward ? Sweep::backward : Sweep::forward, nullptr, by_cvodes);
   }
-  refuse_zero_columns(last_);
+  judge_zero_columns(last_);
   has_differentiated_ = has_differentiated_ || last_.ok;
   last_.method = simulated_.empty() ? GradientMethod::automatic : method;
   last_.choice = std::move(choice);

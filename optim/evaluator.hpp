@@ -68,7 +68,8 @@ class Evaluator {
  public:
   // variables: names of parameters with respect to which derivatives are wanted; empty: all. Throws
   // std::invalid_argument: a variable that nothing uses, unless its allow_unused is set. What costs and forces written
-  // in C++ use shows in gradients(), which fail where such a variable's derivatives are all exactly 0.
+  // in C++ use shows in gradients(): the first fail if such a variable's derivatives are all exactly 0, later ones
+  // warn.
   Evaluator(Scene scene, std::vector<Objective> objectives, const std::vector<std::string>& variables = {},
             EvaluatorOptions options = {});
 
@@ -99,7 +100,7 @@ class Evaluator {
   void add_parameters_only(Evaluation& e, bool gradients) const;
   void add_differences(Evaluation& e) const;
   void find_unused();
-  void refuse_zero_columns(Evaluation& e) const;
+  void judge_zero_columns(Evaluation& e) const;
   std::vector<const Objective*> simulated() const;
 
   Scene scene_;

@@ -2,16 +2,16 @@
 
 #include <algorithm>
 
+#include "core/expression/program_switches.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 
 namespace mbsopt {
 
-struct CostExpression::Compiled {
+struct CostExpression::Compiled : SwitchedProgram {
   struct UsedSensor {
     int input;  // of the program
     int sensor;
   };
-  Program program;
   int inputs = 0;
   int time = 0;                 // input of t
   std::vector<int> parameters;  // used directly
@@ -67,7 +67,7 @@ class ExpressionCost : public PointCost {
   }
 
   const Eigen::VectorXd* rho() const override { return &mechanism_.rho(); }
-  const Program* program() const override { return &compiled_->program; }
+  const SwitchedProgram* program() const override { return compiled_.get(); }
 
  private:
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
@@ -108,6 +108,7 @@ CostExpression::CostExpression(const Expression& expression, const Scene& scene)
   const Symbols symbols = cost_symbols(scene);
   auto compiled = std::make_shared<Compiled>();
   compiled->program = Program(expression, symbols);
+  compiled->switches = switches_of(compiled->program);
   compiled->inputs = symbols.inputs();
   compiled->time = symbols.input("t");
   for (const int i : compiled->program.used_inputs()) {

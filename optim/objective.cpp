@@ -32,7 +32,7 @@ class Exponential final : public PointCost {
     return e;
   }
   const Eigen::VectorXd* rho() const override { return x_->rho(); }
-  const Program* program() const override { return x_->program(); }
+  const SwitchedProgram* program() const override { return x_->program(); }
 
  private:
   std::shared_ptr<const PointCost> x_;
@@ -52,7 +52,7 @@ class Square final : public PointCost {
     return x * x;
   }
   const Eigen::VectorXd* rho() const override { return x_->rho(); }
-  const Program* program() const override { return x_->program(); }
+  const SwitchedProgram* program() const override { return x_->program(); }
 
  private:
   std::shared_ptr<const PointCost> x_;

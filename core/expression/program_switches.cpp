@@ -10,14 +10,24 @@ namespace mbsopt {
 
 // how: cos of a, a - b (subtract), or a itself (name).
 void ProgramBuilder::build_switch(const Program& of, Operation how, int a, int b) {
-  std::vector<int> at(of.code_.size(), -1);
-  for (int i = 0; i <= std::max(a, b); ++i) {
-    const Instruction& in = of.code_[static_cast<std::size_t>(i)];
+  const std::size_t size = static_cast<std::size_t>(std::max(a, b)) + 1;
+  std::vector<char> needed(size, 0);
+  needed[static_cast<std::size_t>(a)] = 1;
+  if (b >= 0) needed[static_cast<std::size_t>(b)] = 1;
+  for (std::size_t i = size; i-- > 0;) {
+    const Instruction& in = of.code_[i];
+    if (!needed[i] || operands(in.operation) == 0) continue;
+    needed[static_cast<std::size_t>(in.a)] = 1;
+    if (in.b >= 0) needed[static_cast<std::size_t>(in.b)] = 1;
+  }
+  std::vector<int> at(size, -1);
+  for (std::size_t i = 0; i < size; ++i) {
+    if (!needed[i]) continue;
+    const Instruction& in = of.code_[i];
     const auto operand = [&](int k) { return k < 0 ? -1 : at[static_cast<std::size_t>(k)]; };
-    at[static_cast<std::size_t>(i)] = in.operation == Operation::number ? number(in.constant)
-                                      : in.operation == Operation::name
-                                          ? add({Operation::name, in.a, -1, 0})
-                                          : operation(in.operation, operand(in.a), operand(in.b));
+    at[i] = in.operation == Operation::number ? number(in.constant)
+            : in.operation == Operation::name ? add({Operation::name, in.a, -1, 0})
+                                              : operation(in.operation, operand(in.a), operand(in.b));
   }
   const int first = at[static_cast<std::size_t>(a)];
   keep_only_what_reaches(how == Operation::cos        ? operation(how, first, -1)

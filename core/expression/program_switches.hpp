@@ -14,4 +14,10 @@ namespace mbsopt {
 
 std::vector<Program> switches_of(const Program& program);
 
+// A program and its switches, which are compiled once for all runs.
+struct SwitchedProgram {
+  Program program;
+  std::vector<Program> switches;  // switches_of(program)
+};
+
 }  // namespace mbsopt

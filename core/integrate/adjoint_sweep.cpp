@@ -5,14 +5,15 @@
 namespace mbsopt {
 
 AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
-                           std::span<const Cost> costs)
+                           std::span<const Cost> costs, GradientQuadrature* watch)
     : mechanism_(mechanism),
       rk_(method),
       costs_(costs),
       dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
       projector_(mechanism, settings.formulation.projection, model_of(mechanism, settings, method)),
       step_(make_step(mechanism, method, projector_.solution())),
-      bars_(costs.size()) {
+      bars_(costs.size()),
+      watch_(watch) {
   const MechanismData& d = mechanism.data();
   if (d.needs_motion) motion_.emplace(mechanism, settings.formulation);
   const Eigen::Index states = mechanism.states();
@@ -26,7 +27,8 @@ AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings&
     implicit_.emplace(d, rk_);
     x_bar_.setZero(coupled * dynamics_.equations(), static_cast<Eigen::Index>(costs.size()));
   }
-  for (Eigen::VectorXd* x : {&y_, &w_, &y_bar_}) x->setZero(states);
+  for (Eigen::VectorXd* x : {&y_, &w_, &y_bar_, &g_y_}) x->setZero(states);
+  g_rho_.setZero(d.rho.size());
   r_bar_.setZero(dynamics_.equations());
   explicit_swept_.reserve(static_cast<std::size_t>(rk_.dense_stages));
 }
@@ -87,12 +89,23 @@ bool AdjointSweep::step_back(const StoredStep& step) {
     if (g->first >= step_.stages(rk_) || !is_used(rk_, *g, step_.dense)) continue;
     if (!(is_implicit(rk_, *g) ? implicit_back(*g) : explicit_back(g->first))) return false;
   }
+  if (watch_) watch_->end_step(step_);
   for (Bars& b : bars_) {
     StageSum sum;
     for (const int i : explicit_swept_) sum.add(1, b.Y.col(i).data());
     sum.to(b.lambda.data(), b.lambda.data(), b.lambda.size());
   }
   return true;
+}
+
+void AdjointSweep::add_running_cost(std::size_t objective, int stage) {
+  const PointCost* const running = costs_[objective].running.get();
+  if (!running || stage >= rk_.stages || rk_.b[stage] == 0) return;
+  const double weight = step_.h * rk_.b[stage];
+  g_y_.setZero(), g_rho_.setZero();
+  running->add_gradient({step_.t + rk_.c[stage] * step_.h, y_, step_.angles0, motion()}, weight, g_y_, g_rho_);
+  if (watch_) watch_->take(objective, stage, weight, g_y_, step_.K.col(stage), g_rho_);
+  y_bar_ += g_y_, bars_[objective].rho += g_rho_;
 }
 
 bool AdjointSweep::explicit_back(int i) {
@@ -107,9 +120,7 @@ bool AdjointSweep::explicit_back(int i) {
     w.to(b.K.col(i).data(), w_.data(), w_.size());
     y_bar_.setZero();
     dynamics_.add_adjoint(w_, y_bar_, b.theta, b.rho);
-    if (const PointCost* running = running_cost(o, i)) {
-      running->add_gradient({t, y_, step_.angles0, motion()}, step_.h * rk_.b[i], y_bar_, b.rho);
-    }
+    add_running_cost(o, i);
     b.Y.col(i) = y_bar_;
   }
   explicit_swept_.push_back(i);
@@ -139,10 +150,8 @@ bool AdjointSweep::implicit_back(const StageGroup& g) {
     x_bar.setZero();
     for (int i = g.first; i <= g.last; ++i) {
       y_bar_.setZero();
-      if (const PointCost* running = running_cost(o, i)) {
-        y_ = step_.Y.col(i);
-        running->add_gradient({time_of(i), y_, step_.angles0, motion()}, step_.h * rk_.b[i], y_bar_, b.rho);
-      }
+      y_ = step_.Y.col(i);
+      add_running_cost(o, i);
       b.Y.col(i) = y_bar_;
     }
     for (int i = g.first; i <= g.last; ++i) {

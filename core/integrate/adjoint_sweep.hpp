@@ -12,6 +12,7 @@
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/motion_solver.hpp"
 #include "core/integrate/cost.hpp"
+#include "core/integrate/gradient_quadrature.hpp"
 #include "core/integrate/linearised_stages.hpp"
 #include "core/integrate/stored_step.hpp"
 
@@ -19,8 +20,9 @@ namespace mbsopt {
 
 class AdjointSweep {
  public:
+  // watch: gets the gradients of running costs; may be null.
   AdjointSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
-               std::span<const Cost> costs);
+               std::span<const Cost> costs, GradientQuadrature* watch);
 
   // Where the sweep starts (AdjInit): lambda and mu from the terminal costs.
   void begin(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
@@ -50,9 +52,8 @@ class AdjointSweep {
   bool explicit_back(int i);
   bool implicit_back(const StageGroup& group);
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
-  const PointCost* running_cost(std::size_t objective, int stage) const {
-    return stage < rk_.stages && rk_.b[stage] != 0 ? costs_[objective].running.get() : nullptr;
-  }
+  // The gradient of the running cost at a stage, whose state is y_, into y_bar_ and the objective's rho.
+  void add_running_cost(std::size_t objective, int stage);
 
   const Mechanism mechanism_;
   const Method& rk_;
@@ -66,6 +67,8 @@ class AdjointSweep {
   std::vector<Bars> bars_;           // per objective
   Eigen::MatrixXd x_bar_;
   Eigen::VectorXd y_, w_, y_bar_, r_bar_;
+  Eigen::VectorXd g_y_, g_rho_;  // of a running cost, times its weight
+  GradientQuadrature* watch_;
 };
 
 }  // namespace mbsopt

@@ -12,10 +12,11 @@
 #include <string>
 #include <vector>
 
-#include "core/expression/program.hpp"
 #include "core/mechanism/state_point.hpp"
 
 namespace mbsopt {
+
+struct SwitchedProgram;  // core/expression/program_switches.hpp
 
 using VecIn = Eigen::Ref<const Eigen::VectorXd>;
 using VecOut = Eigen::Ref<Eigen::VectorXd>;
@@ -44,7 +45,7 @@ struct PointCost {
   // The parameters that it is bound to; null where it is bound to none.
   virtual const Eigen::VectorXd* rho() const { return nullptr; }
   // The expression that its value jumps with, of all parameters, t and all sensors; null where there is none.
-  virtual const Program* program() const { return nullptr; }
+  virtual const SwitchedProgram* program() const { return nullptr; }
 };
 
 struct SampledCost {

@@ -27,27 +27,36 @@ JumpWatch::JumpWatch(const Mechanism& mechanism, const SimulationSettings& setti
   const MechanismData& d = mechanism_.data();
   if (d.active.empty()) return;
   const auto of_force = [](int index) { return Jump{Jump::Of::force, index, {}, 0, 0, {}, false}; };
+  // A mechanism and its laws are compiled at each rho; so are the switches of the laws.
+  const auto add_law = [&](const Jump& jump, const Program& p, Of of, std::size_t index = 0) {
+    add(jump, p, switches_of(p), of, static_cast<int>(index));
+  };
   for (std::size_t i = 0; i < d.tsda.size(); ++i)
-    if (d.tsda[i].law.program) add(of_force(d.tsda[i].force), *d.tsda[i].law.program, Of::length, static_cast<int>(i));
+    if (d.tsda[i].law.program) add_law(of_force(d.tsda[i].force), *d.tsda[i].law.program, Of::length, i);
   for (std::size_t i = 0; i < d.rsda.size(); ++i)
-    if (d.rsda[i].law.program) add(of_force(d.rsda[i].force), *d.rsda[i].law.program, Of::angle, static_cast<int>(i));
+    if (d.rsda[i].law.program) add_law(of_force(d.rsda[i].force), *d.rsda[i].law.program, Of::angle, i);
   for (const AppliedForce& f : d.applied)
-    for (const Program& component : f.components) add(of_force(f.force), component, Of::sensors);
+    for (const Program& component : f.components) add_law(of_force(f.force), component, Of::sensors);
   for (const Constraint& c : d.constraints)
     for (const RowLaw& law : d.laws)
       if (c.drive >= 0 && law.row == c.row && law.law.programs)
-        add({Jump::Of::drive, c.drive, {}, 0, 0, {}, false}, (*law.law.programs)[2], Of::time);
+        add_law({Jump::Of::drive, c.drive, {}, 0, 0, {}, false}, (*law.law.programs)[2], Of::time);
   for (const Cost& cost : costs)
-    if (cost.running && cost.running->program())
-      add({Jump::Of::objective, 0, cost.name, 0, 0, {}, false}, *cost.running->program(), Of::sensors);
+    if (const SwitchedProgram* p = cost.running ? cost.running->program() : nullptr)
+      add({Jump::Of::objective, 0, cost.name, 0, 0, {}, false}, p->program, p->switches, Of::sensors);
 }
 
-void JumpWatch::add(const Jump& jump, const Program& program, Of of, int index) {
+bool JumpWatch::Function::is_new(const Switch& s) const {
+  const auto is_known = [&](int k) { return std::find(parameters.begin(), parameters.end(), k) != parameters.end(); };
+  return (s.motion && !motion) || !std::all_of(s.parameters.begin(), s.parameters.end(), is_known);
+}
+
+void JumpWatch::add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of, int index) {
   const MechanismData& d = mechanism_.data();
   const int P = static_cast<int>(d.rho.size());
   const int time = of == Of::length || of == Of::angle ? P + 2 : P;
-  Function f{jump, &program, of, index, {}, false};
-  for (Program& p : switches_of(program)) {
+  Function f{jump, &program, of, index, {}, {}, false};
+  for (const Program& p : switches) {
     Switch s{{}, {}, false, 0, 0};
     bool varies = false;
     for (const int input : p.used_inputs()) {
@@ -57,7 +66,7 @@ void JumpWatch::add(const Jump& jump, const Program& program, Of of, int index) 
     }
     if (!varies || (s.parameters.empty() && !s.motion)) continue;
     p.grow(scratch_);
-    s.program = std::move(p);
+    s.program = p;
     f.switches.push_back(std::move(s));
   }
   if (f.switches.empty()) return;
@@ -117,7 +126,7 @@ double JumpWatch::value(const Function& f, const Program& p, double theta) {
 }
 
 // The sign is s.now at `to`, and another one at `from`.
-void JumpWatch::search(Function& f, Switch& s, double from, double to) {
+bool JumpWatch::search(Function& f, Switch& s, double from, double to) {
   for (int i = 0; i < kBisections; ++i) {
     const double middle = 0.5 * (from + to);
     (sign_of(value(f, s.program, middle)) == s.now ? to : from) = middle;
@@ -129,28 +138,32 @@ void JumpWatch::search(Function& f, Switch& s, double from, double to) {
   };
   double size = 0;
   const double far = jump(kFar, size), near = jump(kNear, size);
-  if (!std::isfinite(size) || !(near > kNoticeable * size) || near < kKept * far) return;
-  f.found = true;
+  if (!std::isfinite(size) || !(near > kNoticeable * size) || near < kKept * far) return false;
   f.jump.size = near, f.jump.t = t0_ + to * (t1_ - t0_);
   f.jump.parameters = s.parameters, f.jump.motion = s.motion;
   found_.push_back(f.jump);
+  f.parameters.insert(f.parameters.end(), s.parameters.begin(), s.parameters.end());
+  f.motion = f.motion || s.motion;
+  return true;
 }
 
 void JumpWatch::look_at(const StatePoint& at) {
   if (functions_.empty() || at.t < t0_ + apart_) return;
   t1_ = at.t, y1_ = at.y;
   for (Function& f : functions_) {
-    if (f.found) continue;
+    if (f.switches.empty()) continue;
+    bool found = false;
     double from = 0;
     for (const double theta : {kMiddle, 1.0}) {
       set_inputs_at(theta, f);  // once for all switches: a sensor may need the equations of motion
       for (Switch& s : f.switches) s.now = sign_of(s.program.value(inputs_, scratch_));
       for (Switch& s : f.switches) {
-        if (!f.found && s.now * s.last < 0) search(f, s, from, theta);
+        if (s.now * s.last < 0 && f.is_new(s)) found = search(f, s, from, theta) || found;
         if (s.now != 0) s.last = s.now;
       }
       from = theta;
     }
+    if (found) std::erase_if(f.switches, [&](const Switch& s) { return !f.is_new(s); });
   }
   t0_ = t1_, y0_ = y1_, angles_ = at.angles;
 }

@@ -3,7 +3,8 @@
 //
 // A value can jump only where one of its switches goes through zero (program_switches.hpp). Between two states, apart
 // by a millionth of the run at least, the first zero is found by bisection along the Hermite cubic. A jump keeps its
-// size at a hundredth of the distance from the zero; a continuous value does not.
+// size at a hundredth of the distance from the zero; a continuous value does not. A later jump of the same function is
+// reported if it depends on more: on another parameter, or also on the motion.
 //
 //   JumpWatch watch(mechanism, settings, costs, motion);   // in runs with derivatives
 //   watch.begin({t0, y0, angles0}); watch.look_at({t1, y1, angles1}); ... watch.add_to(result.statistics);
@@ -13,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "core/expression/program.hpp"
 #include "core/integrate/cost.hpp"
 #include "core/integrate/simulation.hpp"
 #include "core/mechanism/mechanism.hpp"
@@ -42,13 +44,16 @@ class JumpWatch {
     Of of;
     int index;  // of the tsda or rsda
     std::vector<Switch> switches;
-    bool found = false;
+    std::vector<int> parameters;         // that its reported jumps name
+    bool motion = false;                 // some of them name the motion
+    bool is_new(const Switch& s) const;  // names more
   };
-  void add(const Jump& jump, const Program& program, Of of, int index = 0);
+  // switches: of the program.
+  void add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of, int index = 0);
   void set_inputs(const Function& f, const StatePoint& at);
   void place_at(double theta);  // between the last state and the one in hand: t_, y_
   void set_inputs_at(double theta, const Function& f);
-  void search(Function& f, Switch& s, double from, double to);
+  bool search(Function& f, Switch& s, double from, double to);  // whether a jump was reported
   double value(const Function& f, const Program& p, double theta);
 
   const Mechanism mechanism_;

@@ -44,8 +44,8 @@ QuadratureWatch::QuadratureWatch(const Method& method, std::span<const Cost> cos
 }
 
 std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::span<const double> g, Of what) {
-  if (span_ == 0) start_ = step.t;
-  span_ = step.t + step.h - start_;
+  if (start_ == end_) start_ = end_ = step.t;
+  start_ = std::min(start_, step.t), end_ = std::max(end_, step.t + step.h);
   Integral& integral = integrals_[kIntegrals * cost + static_cast<std::size_t>(what)];
   std::fill(g_.begin(), g_.end(), 0.0);
   for (std::size_t i = 0; i < g.size(); ++i) {
@@ -129,7 +129,7 @@ void QuadratureWatch::add_to(SimulationStatistics& statistics) const {
     // Both parts relative to their sum: one that is next to nothing beside the other does not matter.
     Integral motion = integrals_[kIntegrals * o + 1];
     const Integral& parameters = integrals_[kIntegrals * o + 2];
-    motion.error *= span_, motion.of_size *= span_;
+    motion.error *= end_ - start_, motion.of_size *= end_ - start_;
     for (const Integral* part : {static_cast<const Integral*>(&motion), &parameters})
       judge(*part, motion.of_size + parameters.of_size, rounding, cost, statistics.gradient_quadrature);
   }

@@ -10,7 +10,7 @@
 //
 // Derivatives of psi are integrals of g_y y' + g_rho, which may be unresolved where g is not (sqrt(|x|) through zero).
 // What the directions y' are is known to one of the two sweeps only; ydot and rho stand for them: g_y ydot and g_rho
-// rho are estimated like g.
+// rho are estimated like g (gradient_quadrature.hpp).
 //
 // Where that is much, a pole is looked for: the interval is halved around the largest |g| along the step's Hermite
 // cubic. If |g| times the interval's length does not fall, |g| grows at least like 1/|t - t*|, which has no integral.
@@ -57,8 +57,8 @@ class QuadratureWatch {
   std::vector<Node> nodes_;
   std::vector<int> node_of_;  // of each stage; -1: has no weight
   std::vector<Integral> integrals_;
-  double start_ = 0, span_ = 0;  // of all steps [s]
-  std::vector<double> g_;        // at the nodes
+  double start_ = 0, end_ = 0;  // of all steps [s], which come forward or backward
+  std::vector<double> g_;       // at the nodes
   Eigen::VectorXd y_;
 };
 

@@ -11,6 +11,7 @@
 #include "core/integrate/adjoint_sweep.hpp"
 #include "core/integrate/checkpoints.hpp"
 #include "core/integrate/cvodes.hpp"
+#include "core/integrate/gradient_quadrature.hpp"
 #include "core/integrate/jump_watch.hpp"
 #include "core/integrate/quadrature_watch.hpp"
 #include "core/integrate/run_arguments.hpp"
@@ -89,7 +90,7 @@ class Run {
     std::string objection;  // to running costs, to derivatives
     auto accepted = [&](const Step& step) {
       const std::span<const SampleEvent> events = schedule.take(step.t1);
-      add_running_costs(step, y, options.frozen ? nullptr : &watch, jumps.has_value(), objection);
+      add_running_costs(step, y, options.frozen ? nullptr : &watch, objection);
       if (jumps) jumps->look_at({step.t1, step.y1, step.angles1, motion()});
       for (const SampleEvent& e : events) {
         if (!e.cost && !observe) continue;
@@ -146,11 +147,9 @@ class Run {
 
  private:
   // Each stage's state is copied once for all costs. watch: none where steps are given.
-  void add_running_costs(const Step& step, Eigen::VectorXd& y, QuadratureWatch* watch, bool derivatives,
-                         std::string& objection) {
+  void add_running_costs(const Step& step, Eigen::VectorXd& y, QuadratureWatch* watch, std::string& objection) {
     const std::size_t stages = static_cast<std::size_t>(method_.stages);
     g_.assign(stages * costs_.size(), 0.0);
-    if (derivatives) along_motion_.assign(g_.size(), 0.0), along_parameters_.assign(g_.size(), 0.0);
     for (int i = 0; i < method_.stages; ++i) {
       if (method_.b[i] == 0) continue;
       bool copied = false;
@@ -160,29 +159,12 @@ class Run {
         copied = true;
         const StatePoint at{step.t + method_.c[i] * step.h, y, step.angles0, motion()};
         const std::size_t k = o * stages + static_cast<std::size_t>(i);
-        g_[k] = derivatives ? gradient_at(*costs_[o].running, at) : costs_[o].running->value(at);
+        g_[k] = costs_[o].running->value(at);
         result_.psi(static_cast<Eigen::Index>(o)) += step.h * method_.b[i] * g_[k];
-        if (!derivatives) continue;
-        along_motion_[k] = y_bar_.dot(step.K.col(i));
-        for (const int p : mechanism_.data().active)  // a parameter of value 0 counts with the size 1
-          along_parameters_[k] += rho_bar_(p) * (mechanism_.rho()(p) == 0 ? 1 : mechanism_.rho()(p));
       }
     }
-    using Of = QuadratureWatch::Of;
-    for (std::size_t o = 0; watch && objection.empty() && o < costs_.size(); ++o) {
-      if (!costs_[o].running) continue;
-      const auto of_cost = [&](const std::vector<double>& x) { return std::span(x).subspan(o * stages, stages); };
-      objection = watch->look_at(step, o, of_cost(g_));
-      if (!derivatives) continue;
-      watch->look_at(step, o, of_cost(along_motion_), Of::along_motion);
-      watch->look_at(step, o, of_cost(along_parameters_), Of::along_parameters);
-    }
-  }
-
-  // The value; into y_bar_, rho_bar_ its gradient.
-  double gradient_at(const PointCost& cost, const StatePoint& at) {
-    y_bar_.setZero(mechanism_.states()), rho_bar_.setZero(mechanism_.parameters());
-    return cost.add_gradient(at, 1, y_bar_, rho_bar_);
+    for (std::size_t o = 0; watch && objection.empty() && o < costs_.size(); ++o)
+      if (costs_[o].running) objection = watch->look_at(step, o, std::span(g_).subspan(o * stages, stages));
   }
 
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
@@ -196,9 +178,7 @@ class Run {
   std::optional<MotionSolver> motion_;  // where some sensor needs it
   SimulationResult result_;
   Eigen::VectorXd angles_end_;
-  std::vector<double> g_;                                // of the running costs at the stages of a step
-  std::vector<double> along_motion_, along_parameters_;  // g_y ydot, g_rho rho there
-  Eigen::VectorXd y_bar_, rho_bar_;
+  std::vector<double> g_;  // of the running costs at the stages of a step
 };
 
 // Computes steps of a run again, bit for bit.
@@ -264,10 +244,12 @@ SimulationResult simulate_tlm(const Mechanism& mechanism, const SimulationSettin
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   if (!result.ok()) return run.finish();
-  TangentSweep sweep(mechanism, settings, run.method(), run.assembly().tangent());
+  GradientQuadrature watch(mechanism, run.method(), costs);
+  TangentSweep sweep(mechanism, settings, run.method(), run.assembly().tangent(), options.frozen ? nullptr : &watch);
   run.go(sampling.times, {}, with_exact_stages(options), [&](const Step& step, std::span<const SampleEvent> events) {
     return sweep.follow(step, costs, events, sampling, result.psi_rho);
   });
+  watch.add_to(result.statistics);
   if (result.ok()) sweep.finish(settings.end_time, result.y_end, run.angles_end(), costs, result.psi_rho);
   result.statistics.linearised_states += sweep.linearised_states();
   result.statistics.factorisations += sweep.factorisations();
@@ -288,7 +270,8 @@ SimulationResult simulate_adjoint(const Mechanism& mechanism, const SimulationSe
     return true;
   });
   if (!result.ok()) return run.finish();
-  AdjointSweep sweep(mechanism, settings, run.method(), costs);
+  GradientQuadrature watch(mechanism, run.method(), costs);
+  AdjointSweep sweep(mechanism, settings, run.method(), costs, options.frozen ? nullptr : &watch);
   sweep.begin(settings.end_time, result.y_end, run.angles_end());
   Replayer replayer(mechanism, settings, run.method(), result.steps);
   double t_back = settings.end_time;
@@ -298,6 +281,7 @@ SimulationResult simulate_adjoint(const Mechanism& mechanism, const SimulationSe
                                            t_back = step.t;
                                            return sweep.step_back(step);
                                          });
+  watch.add_to(result.statistics);
   result.statistics.adjoint_memory_bytes = checkpoints.peak_bytes();
   result.statistics.recomputed_steps = checkpoints.recomputed_steps();
   result.statistics.factorisations += replayer.factorisations();

@@ -5,11 +5,12 @@
 
 namespace mbsopt {
 TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
-                           const Eigen::MatrixXd& y_initial_rho)
+                           const Eigen::MatrixXd& y_initial_rho, GradientQuadrature* watch)
     : mechanism_(mechanism),
       rk_(method),
       dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
-      projector_(mechanism, settings.formulation.projection, model_of(mechanism, settings, method)) {
+      projector_(mechanism, settings.formulation.projection, model_of(mechanism, settings, method)),
+      watch_(watch) {
   const MechanismData& d = mechanism.data();
   if (d.needs_motion) motion_.emplace(mechanism, settings.formulation);
   const Eigen::Index states = mechanism.states();
@@ -164,8 +165,10 @@ void TangentSweep::add_running_costs(const Step& step, int i, std::span<const Co
   y_ = step.Y.col(i);
   for (std::size_t o = 0; o < costs.size(); ++o) {
     if (!costs[o].running) continue;
-    add_cost(*costs[o].running, {step.t + rk_.c[i] * step.h, y_, step.angles0, motion()}, step.h * rk_.b[i], &Block::Y,
+    const double weight = step.h * rk_.b[i];
+    add_cost(*costs[o].running, {step.t + rk_.c[i] * step.h, y_, step.angles0, motion()}, weight, &Block::Y,
              static_cast<Eigen::Index>(o), psi_rho);
+    if (watch_) watch_->take(o, i, weight, y_bar_, step.K.col(i), rho_bar_);
   }
 }
 
@@ -183,6 +186,7 @@ bool TangentSweep::follow(const Step& step, std::span<const Cost> costs, std::sp
       add_running_costs(step, i, costs, psi_rho);
     }
   }
+  if (watch_) watch_->end_step(step);
   for (Block& b : blocks_) add_stages(b, step.h, of_step_.c, of_step_, 0, rk_.stages - 1, b.y0, b.y_hat);
   if (projector_.active()) {
     if (!projector_.linearise(step.t1, step.angles0, step.y_hat, step.y1, step.projection)) return false;

@@ -12,6 +12,7 @@
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/motion_solver.hpp"
 #include "core/integrate/cost.hpp"
+#include "core/integrate/gradient_quadrature.hpp"
 #include "core/integrate/linearised_stages.hpp"
 #include "core/integrate/sample_schedule.hpp"
 #include "core/integrate/simulation.hpp"
@@ -21,8 +22,9 @@ namespace mbsopt {
 
 class TangentSweep {
  public:
+  // watch: gets the gradients of running costs; may be null.
   TangentSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
-               const Eigen::MatrixXd& y_initial_rho);
+               const Eigen::MatrixXd& y_initial_rho, GradientQuadrature* watch);
 
   // Advances over one step; adds the costs' derivatives to psi_rho. False where a factorisation failed.
   bool follow(const Step& step, std::span<const Cost> costs, std::span<const SampleEvent> events,
@@ -75,6 +77,7 @@ class TangentSweep {
   Eigen::VectorXd y_, ydot_, y_bar_, rho_bar_;
   std::vector<Eigen::Index> seen_;  // entries of y_bar_ that are not zero
   Eigen::MatrixXd y_rho_;
+  GradientQuadrature* watch_;
   LaneRows r_;
 };
 

@@ -64,6 +64,18 @@ TEST_CASE("a jump at an angle is a warning that the motion moves its instant", "
   CHECK_THAT(said[0], Contains("the law of force 'catch' jumps by 0.2") && Contains("depends on the motion"));
 }
 
+TEST_CASE("a later jump is a warning of its own if it depends on another parameter", "[gradient]") {
+  const std::string passed = "abs(theta + 0.5)/(theta + 0.5)", timed = "abs(t - tp)/(t - tp)",
+                    again = "abs(t - 2*tp)/(t - 2*tp)";
+  Scene s = turned_bar("0.01*(" + passed + " + " + timed + " + " + again + ")");
+  s.conditions = {value_of("theta", "0"), rate_of("theta", "-3")};
+  const std::vector<std::string> said = warnings(s);
+  for (const std::string& w : said) UNSCOPED_INFO(w);
+  REQUIRE(said.size() == 2);
+  CHECK_THAT(said[0], Contains("depends on the motion"));
+  CHECK_THAT(said[1], Contains("at t = 0.4 s") && Contains("depends on 'tp'"));
+}
+
 TEST_CASE("a drive whose acceleration jumps when a parameter says so is a warning by its name", "[gradient]") {
   Scene s = pendulum();
   add_parameters(s, {{"tp", 0.4}});

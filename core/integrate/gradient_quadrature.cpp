@@ -1,0 +1,33 @@
+#include "core/integrate/gradient_quadrature.hpp"
+
+#include "core/mechanism/mechanism_data.hpp"
+
+namespace mbsopt {
+
+GradientQuadrature::GradientQuadrature(const Mechanism& mechanism, const Method& method, std::span<const Cost> costs)
+    : mechanism_(mechanism),
+      costs_(costs),
+      stages_(static_cast<std::size_t>(method.stages)),
+      watch_(method, costs, nullptr),
+      along_motion_(stages_ * costs.size(), 0.0),
+      along_parameters_(stages_ * costs.size(), 0.0) {}
+
+void GradientQuadrature::take(std::size_t cost, int stage, double weight, VecIn y_bar, VecIn ydot, VecIn rho_bar) {
+  const std::size_t k = cost * stages_ + static_cast<std::size_t>(stage);
+  const Eigen::VectorXd& rho = mechanism_.rho();
+  double along_parameters = 0;
+  for (const int p : mechanism_.data().active)  // a parameter of value 0 counts with the size 1
+    along_parameters += rho_bar(p) * (rho(p) == 0 ? 1 : rho(p));
+  along_motion_[k] = y_bar.dot(ydot) / weight, along_parameters_[k] = along_parameters / weight;
+}
+
+void GradientQuadrature::end_step(const Step& step) {
+  using Of = QuadratureWatch::Of;
+  for (std::size_t o = 0; o < costs_.size(); ++o) {
+    if (!costs_[o].running) continue;
+    watch_.look_at(step, o, std::span(along_motion_).subspan(o * stages_, stages_), Of::along_motion);
+    watch_.look_at(step, o, std::span(along_parameters_).subspan(o * stages_, stages_), Of::along_parameters);
+  }
+}
+
+}  // namespace mbsopt

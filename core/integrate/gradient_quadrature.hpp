@@ -1,0 +1,35 @@
+// Integrals in the derivatives of running costs that the steps do not resolve (quadrature_watch.hpp). Both sweeps
+// compute the gradients of the running costs at each stage; what they compute is watched here.
+//
+//   GradientQuadrature watch(mechanism, method, costs);
+//   watch.take(objective, stage, h * b, y_bar, ydot, rho_bar);   // after cost.add_gradient(at, h * b, y_bar, rho_bar)
+//   watch.end_step(step); ... watch.add_to(result.statistics);
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/integrate/cost.hpp"
+#include "core/integrate/quadrature_watch.hpp"
+#include "core/mechanism/mechanism.hpp"
+
+namespace mbsopt {
+
+class GradientQuadrature {
+ public:
+  GradientQuadrature(const Mechanism& mechanism, const Method& method, std::span<const Cost> costs);
+
+  // y_bar, rho_bar: weight times the gradient; ydot: of the stage.
+  void take(std::size_t cost, int stage, double weight, VecIn y_bar, VecIn ydot, VecIn rho_bar);
+  void end_step(const Step& step);  // after all of its stages, in any order of steps
+  void add_to(SimulationStatistics& statistics) const { watch_.add_to(statistics); }
+
+ private:
+  const Mechanism mechanism_;
+  std::span<const Cost> costs_;
+  std::size_t stages_;
+  QuadratureWatch watch_;
+  std::vector<double> along_motion_, along_parameters_;  // g_y ydot, g_rho rho at each stage of each cost
+};
+
+}  // namespace mbsopt
