@@ -3,6 +3,7 @@
 // what cannot be written (WriteError), with exit code 1.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <ostream>
 #include <string>
@@ -10,6 +11,7 @@
 
 namespace mbsopt {
 
+struct ProblemSource;
 struct Ranks;
 
 struct CommandOptions {
@@ -35,6 +37,7 @@ struct CommandContext {
   std::ostream& err;             // progress and errors
   bool err_is_terminal = false;  // a bar may be drawn
   Ranks* ranks = nullptr;        // other processes that compute for this one, under mpirun
+  mutable std::shared_ptr<const ProblemSource> source = nullptr;  // once Run has read the problem
 };
 
 int validate_command(const CommandContext& context);

@@ -16,7 +16,7 @@
 #include "app/exit_code.hpp"
 #include "app/interrupt.hpp"
 #include "app/json/input_error.hpp"
-#include "app/json/placed_words.hpp"
+#include "app/json/problem_source.hpp"
 #include "app/provenance.hpp"
 #include "core/expression/did_you_mean.hpp"
 #include "core/mechanism/mechanism.hpp"
@@ -111,7 +111,8 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
 
 std::string about_the_problem(const CommandContext& context, const std::string& words) {
   const std::string& file = context.options.problem_file;
-  return placed(words, file, context.options.sets).value_or(file + ": " + words);
+  const std::optional<std::string> placed = context.source ? context.source->placed(words) : std::nullopt;
+  return placed.value_or(file + ": " + words);
 }
 
 // The command's exit code; what was wrong with the input goes to `err` in words.

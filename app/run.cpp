@@ -4,8 +4,7 @@
 
 #include "app/energy_balance.hpp"
 #include "app/exit_code.hpp"
-#include "app/json/placed_words.hpp"
-#include "app/json/read_problem.hpp"
+#include "app/json/problem_source.hpp"
 #include "app/provenance.hpp"
 #include "core/expression/counted.hpp"
 #include "core/integrate/model_choice.hpp"
@@ -17,6 +16,12 @@ int exit_code_of(const std::string& status) {
   if (status == "failed") return kNumericalFailure;
   if (status == "disagrees") return kCheckFailed;
   return status == "interrupted" ? kInterrupted : kDone;
+}
+
+Problem problem_of(const CommandContext& context, std::vector<std::string>& warnings) {
+  const std::shared_ptr<ProblemSource> source = read_problem_source(context.options.problem_file, context.options.sets);
+  context.source = source;
+  return read_problem(*source, &warnings);
 }
 
 }  // namespace
@@ -36,7 +41,7 @@ std::vector<std::string> data_files(const Problem& problem) {
 }
 
 Run::Run(const CommandContext& given)
-    : problem_(read_problem(given.options.problem_file, given.options.sets, &reader_warnings_)),
+    : problem_(problem_of(given, reader_warnings_)),
       context(given),
       folder(given.options.out, problem.scene.name, given.options.problem_file, given.command),
       progress(given.err, given.err_is_terminal, given.options.quiet) {
@@ -74,7 +79,7 @@ void Run::write(const std::string& file, std::string_view content) {
 }
 
 void Run::warn(const std::string& words) {
-  const std::string warning = placed(words, context.options.problem_file, context.options.sets).value_or(words);
+  const std::string warning = context.source->placed(words).value_or(words);
   progress.finish();
   context.err << "warning: " << warning << '\n';
   result["warnings"].push_back(warning);

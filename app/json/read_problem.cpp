@@ -5,8 +5,7 @@
 
 #include "app/json/field_reader.hpp"
 #include "app/json/findings.hpp"
-#include "app/json/overrides.hpp"
-#include "app/json/parse_json.hpp"
+#include "app/json/problem_source.hpp"
 #include "app/json/source_text.hpp"
 #include "core/scene/default_integrator.hpp"
 #include "optim/csv_table.hpp"
@@ -133,21 +132,25 @@ void add_issues(const Problem& problem, const Node& root, Findings& findings, st
 
 }  // namespace
 
-Problem read_problem_text(const std::string& text, const std::filesystem::path& name,
-                          const std::vector<std::string>& set_overrides, std::vector<std::string>* warnings) {
-  Findings findings(name.string(), text);
-  Node root = parse_json(findings);
-  for (std::size_t i = 0; i < set_overrides.size(); ++i)
-    apply_override(root, set_overrides[i], static_cast<int>(i) + 1, findings);
+Problem read_problem(ProblemSource& source, std::vector<std::string>* warnings) {
+  Findings& findings = source.findings;
+  const Node& root = source.root;
+  const std::filesystem::path folder = source.file.parent_path();
   Problem problem;
   FieldReader::read(root, "", findings, problem);
   complete_integrator(problem.scene.simulation, root);
-  resolve_data_files(problem, name.parent_path(), root, findings);
-  read_sampled_laws(problem, name.parent_path(), root, findings);
+  resolve_data_files(problem, folder, root, findings);
+  read_sampled_laws(problem, folder, root, findings);
   add_issues(problem, root, findings, warnings);
   findings.throw_if_any();
   allow_what_only_measurements_use(problem);
   return problem;
+}
+
+Problem read_problem_text(const std::string& text, const std::filesystem::path& name,
+                          const std::vector<std::string>& set_overrides, std::vector<std::string>* warnings) {
+  ProblemSource source = problem_source_of(text, name, set_overrides);
+  return read_problem(source, warnings);
 }
 
 Problem read_problem(const std::filesystem::path& file, const std::vector<std::string>& set_overrides,

@@ -1,4 +1,4 @@
-#include "app/json/placed_words.hpp"
+#include "app/json/problem_source.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -11,15 +11,18 @@ using Catch::Contains;
 TEST_CASE("words that begin with a path of the problem get its place", "[json]") {
   const TemporaryFolder folder;
   const std::string file = folder.write("a.json", "{\n  \"gravity\": [0, 0, -9.81],\n  \"drives\": [{\"law\": 1}]\n}");
-  CHECK(placed("gravity: is normal", file, {}) == file + ":2:14: gravity: is normal");
-  CHECK(placed("drives[0].law: is short", file, {}) == file + ":3:22: drives[0].law: is short");
-  CHECK(placed("drives[0].csv: is short", file, {}) == file + ":3:14: drives[0].csv: is short");  // the nearest
-  CHECK(placed("gravity: is 0", file, {"gravity=[0, 0, 0]"}) == "--set gravity: is 0");
-  CHECK_FALSE(placed("the gravity: is normal", file, {}));
-  CHECK_FALSE(placed("simulation: is missing", file, {}));
-  CHECK_FALSE(placed("no path at all", file, {}));
-  CHECK_FALSE(placed("gravity: is normal", folder.file("absent.json"), {}));
-  CHECK_FALSE(placed("gravity: is normal", folder.path, {}));
+  const auto source = read_problem_source(file, {});
+  CHECK(source->placed("gravity: is normal") == file + ":2:14: gravity: is normal");
+  CHECK(source->placed("drives[0].law: is short") == file + ":3:22: drives[0].law: is short");
+  CHECK(source->placed("drives[0].csv: is short") == file + ":3:14: drives[0].csv: is short");  // the nearest
+  CHECK(read_problem_source(file, {"gravity=[0, 0, 0]"})->placed("gravity: is 0") == "--set gravity: is 0");
+  CHECK_FALSE(source->placed("the gravity: is normal"));
+  CHECK_FALSE(source->placed("simulation: is missing"));
+  CHECK_FALSE(source->placed("no path at all"));
+  CHECK_FALSE(source->placed("a..b: is no path"));
+  CHECK(std::filesystem::remove(file));
+  CHECK(source->placed("gravity: is normal") == file + ":2:14: gravity: is normal");
+  CHECK_THROWS_AS(read_problem_source(file, {}), InputError);
 }
 
 TEST_CASE("a law whose samples are too short is refused at its place in the file", "[command]") {

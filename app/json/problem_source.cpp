@@ -1,10 +1,10 @@
-#include "app/json/placed_words.hpp"
+#include "app/json/problem_source.hpp"
 
 #include <algorithm>
 #include <cctype>
-#include <exception>
+#include <stdexcept>
+#include <utility>
 
-#include "app/json/findings.hpp"
 #include "app/json/overrides.hpp"
 #include "app/json/parse_json.hpp"
 #include "app/json/source_text.hpp"
@@ -25,21 +25,30 @@ std::string path_before(const std::string& words) {
 
 }  // namespace
 
-std::optional<std::string> placed(const std::string& words, const std::filesystem::path& file,
-                                  const std::vector<std::string>& sets) {
+std::optional<std::string> ProblemSource::placed(const std::string& words) const {
   const std::string path = path_before(words);
-  std::error_code error;
-  if (path.empty() || !std::filesystem::is_regular_file(file, error)) return std::nullopt;
+  if (path.empty()) return std::nullopt;
   try {
-    Findings findings(file.string(), read_text_file(file));
-    Node root = parse_json(findings);
-    for (std::size_t i = 0; i < sets.size(); ++i) apply_override(root, sets[i], static_cast<int>(i) + 1, findings);
     const Node& node = nearest(root, path);
     if (&node == &root) return std::nullopt;
     return to_string(findings.finding(node, path, words.substr(path.size() + 2)));
-  } catch (const std::exception&) {  // the words alone will do
+  } catch (const std::invalid_argument&) {  // no path: the words alone will do
     return std::nullopt;
   }
+}
+
+ProblemSource problem_source_of(const std::string& text, const std::filesystem::path& name,
+                                const std::vector<std::string>& set_overrides) {
+  Findings findings(name.string(), text);
+  Node root = parse_json(findings);
+  for (std::size_t i = 0; i < set_overrides.size(); ++i)
+    apply_override(root, set_overrides[i], static_cast<int>(i) + 1, findings);
+  return {name, std::move(findings), std::move(root)};
+}
+
+std::shared_ptr<ProblemSource> read_problem_source(const std::filesystem::path& file,
+                                                   const std::vector<std::string>& set_overrides) {
+  return std::make_shared<ProblemSource>(problem_source_of(read_text_file(file), file, set_overrides));
 }
 
 }  // namespace mbsopt

@@ -1,0 +1,39 @@
+// A problem file as it was read, with --set applied. It tells where in the file a path stands, also when the file has
+// changed since.
+//
+//   const auto source = read_problem_source("crane.json", {});
+//   Problem problem = read_problem(*source);
+//   source->placed("drives[0].law: its samples ...")    "crane.json:41:18: drives[0].law: its samples ..."
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/json/findings.hpp"
+#include "app/json/node.hpp"
+#include "optim/problem.hpp"
+
+namespace mbsopt {
+
+struct ProblemSource {
+  std::filesystem::path file;
+  Findings findings;  // of the text, of --set, and of read_problem()
+  Node root;
+
+  // Nothing if the words do not begin with a path of the problem.
+  std::optional<std::string> placed(const std::string& words) const;
+};
+
+// Throws InputError if the file cannot be read, or if its text is no JSON.
+std::shared_ptr<ProblemSource> read_problem_source(const std::filesystem::path& file,
+                                                   const std::vector<std::string>& set_overrides);
+ProblemSource problem_source_of(const std::string& text, const std::filesystem::path& name,
+                                const std::vector<std::string>& set_overrides);
+
+// As the functions of read_problem.hpp.
+Problem read_problem(ProblemSource& source, std::vector<std::string>* warnings = nullptr);
+
+}  // namespace mbsopt
