@@ -59,22 +59,32 @@ std::string errors_text(const Tradeoff& tradeoff, const TaskAdvice& advice) {
   return text;
 }
 
-// "for 1e-04 in track: dopri5 at rtol 1e-05, 12 ms (error 3.1e-05)"
-std::string recommendation_text(const Tradeoff& tradeoff, const TaskAdvice& advice, bool of_fit = false) {
+// What it is for, and what it is.
+struct RecommendationWords {
+  double accuracy;
+  std::string aim, setting;  // "track"; "dopri5 at rtol 1e-05, 12 ms (error 3.1e-05)", or why there is none
+
+  std::string sentence() const { return fmt::format("for {:.0e} in {}: {}", accuracy, aim, setting); }
+  Json json() const {
+    return {{"accuracy", accuracy}, {"aim", aim}, {"setting_in_words", setting}, {"in_words", sentence()}};
+  }
+};
+
+RecommendationWords words_of(const Tradeoff& tradeoff, const TaskAdvice& advice, bool of_fit = false) {
   const Recommendation& r = advice.recommendation;
-  const std::string aim =
-      fmt::format("for {:.0e} in {}{}: ", r.accuracy, names_of(tradeoff.reference.errors->quantities(), r.quantities),
-                  of_fit ? " and the sum of squares of identify with its gradient" : "");
-  if (!r.row) return aim + r.why_not;
+  RecommendationWords words{r.accuracy, names_of(tradeoff.reference.errors->quantities(), r.quantities), r.why_not};
+  if (of_fit) words.aim += " and the sum of squares of identify with its gradient";
+  if (!r.row) return words;
   const TradeoffRow& row = tradeoff.rows[*r.row];
-  return aim + fmt::format("{}, {} ({})", in_words(row.setting), duration_text(row.wall_seconds),
-                           errors_text(tradeoff, advice));
+  words.setting =
+      fmt::format("{}, {} ({})", in_words(row.setting), duration_text(row.wall_seconds), errors_text(tradeoff, advice));
+  return words;
 }
 
 constexpr std::array kAccuracies{1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8};
 
-Json task_json(const Tradeoff& tradeoff, const TaskAdvice& advice, const std::string& words) {
-  Json json{{"accuracy", advice.recommendation.accuracy}, {"in_words", words}};
+Json task_json(const Tradeoff& tradeoff, const TaskAdvice& advice, const RecommendationWords& words) {
+  Json json = words.json();
   if (advice.recommendation.row) json.update(recommended_json(tradeoff, *advice.recommendation.row));
   if (advice.fit) json["fit"] = {{"error", advice.fit->cost}, {"gradient_error", advice.fit->gradient}};
   return json;
@@ -192,11 +202,12 @@ void add_recommendations(Run& run, const Tradeoff& tradeoff) {
     run.context.out << '\n';
     for (const double accuracy : kAccuracies) {
       const Recommendation r = recommend(tradeoff, {q}, accuracy);
-      const std::string words = recommendation_text(tradeoff, {r, {}});
-      Json json{{"quantity", quantities[q].name}, {"accuracy", accuracy}, {"in_words", words}};
+      const RecommendationWords words = words_of(tradeoff, {r, {}});
+      Json json = words.json();
+      json["quantity"] = quantities[q].name;
       if (r.row) json.update(recommended_json(tradeoff, *r.row));
       run.result["recommendations"].push_back(json);
-      run.context.out << words << '\n';
+      run.context.out << words.sentence() << '\n';
     }
   }
 }
@@ -205,9 +216,9 @@ void add_task_recommendations(Run& run, const Tradeoff& tradeoff, TaskAdviser& a
   run.context.out << '\n';
   for (const double accuracy : kAccuracies) {
     const TaskAdvice advice = adviser.at(accuracy);
-    const std::string words = recommendation_text(tradeoff, advice, run.problem.identification.has_value());
+    const RecommendationWords words = words_of(tradeoff, advice, run.problem.identification.has_value());
     run.result["task_recommendations"].push_back(task_json(tradeoff, advice, words));
-    run.context.out << words << '\n';
+    run.context.out << words.sentence() << '\n';
   }
 }
 
@@ -227,10 +238,10 @@ void add_outcomes(Run& run, const Tradeoff& tradeoff) {
 }
 
 void add_applied(Run& run, const Tradeoff& tradeoff, const TaskAdvice& advice) {
-  const std::string words = recommendation_text(tradeoff, advice, run.problem.identification.has_value());
-  run.context.out << "\napplied " << words << '\n';
+  const RecommendationWords words = words_of(tradeoff, advice, run.problem.identification.has_value());
+  run.context.out << "\napplied " << words.sentence() << '\n';
   run.result["applied"] = task_json(tradeoff, advice, words);
-  if (!advice.recommendation.row) run.failed("no recommended.json: " + words);
+  if (!advice.recommendation.row) run.failed("no recommended.json: " + words.sentence());
 }
 
 }  // namespace mbsopt

@@ -110,16 +110,9 @@ void add_recommendations(HtmlPage& page, const Json& result) {
   if (!result.contains("recommendations")) return;
   page.heading("What to use");
   std::vector<std::vector<std::string>> rows;
-  for (const Json& r : result.at("recommendations")) {
-    const std::string words = r.at("in_words");
-    rows.push_back(
-        {r.at("quantity"), fmt::format("{:.0e}", r.at("accuracy").get<double>()), words.substr(words.find(": ") + 2)});
-  }
-  for (const Json& r : result.value("task_recommendations", Json::array())) {
-    const std::string words = r.at("in_words"), aim = words.substr(words.find(" in ") + 4);
-    rows.push_back({aim.substr(0, aim.find(": ")), fmt::format("{:.0e}", r.at("accuracy").get<double>()),
-                    aim.substr(aim.find(": ") + 2)});
-  }
+  for (const char* list : {"recommendations", "task_recommendations"})
+    for (const Json& r : result.value(list, Json::array()))
+      rows.push_back({r.at("aim"), fmt::format("{:.0e}", r.at("accuracy").get<double>()), r.at("setting_in_words")});
   page.table({"quantity", "accuracy", "fastest setting"}, rows);
   if (result.contains("applied"))
     page.paragraph("Applied in recommended.json, " + result.at("applied").at("in_words").get<std::string>() + ".");

@@ -47,7 +47,8 @@ class DrivenRows {
     rows_.evaluate(frames_);
     J_ = rows_.dense();
     scale_ = J_.rowwise().norm().cwiseMax(1e-300).cwiseInverse();
-    scaled_ = OrthogonalDecomposition(scale_.asDiagonal() * J_, kRankThreshold);
+    unit_rows_.noalias() = scale_.asDiagonal() * J_;
+    scaled_.compute(unit_rows_, kRankThreshold);
   }
   const VectorXd& phi(const VectorXd& angles) {
     evaluate_phi(d_, frames_, laws_, angles, phi_);
@@ -58,7 +59,7 @@ class DrivenRows {
     return phi_;
   }
   Index rank() const { return d_.m == 0 ? 0 : scaled_.rank(); }
-  MatrixXd unit_rows() const { return scale_.asDiagonal() * J_; }
+  const MatrixXd& unit_rows() const { return unit_rows_; }
   VectorXd solve(const VectorXd& b) const { return scaled_.solve(scale_.cwiseProduct(b)); }  // J x = b
   VectorXd solve_transposed(const VectorXd& f) const {                                       // J'x = f
     const VectorXd x = scaled_.solve_transposed(f);
@@ -73,8 +74,8 @@ class DrivenRows {
   std::vector<BodyState> states_;
   std::vector<Frame> frames_;
   VectorXd phi_, scale_;
-  MatrixXd J_;
-  OrthogonalDecomposition scaled_;
+  MatrixXd J_, unit_rows_;
+  OrthogonalDecomposition scaled_;  // of unit_rows_
 };
 
 // Accelerations from the equations of the drives alone, and the multipliers that belong to them: right whatever the

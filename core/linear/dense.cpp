@@ -29,8 +29,7 @@ MatrixXd null_space(const MatrixXd& A, double threshold) {
   Eigen::ColPivHouseholderQR<MatrixXd> qr;
   qr.setThreshold(threshold);
   qr.compute(A.transpose());
-  const MatrixXd Q = qr.householderQ();
-  return Q.rightCols(A.cols() - qr.rank());
+  return qr.householderQ() * MatrixXd::Identity(A.cols(), A.cols()).rightCols(A.cols() - qr.rank());
 }
 
 MatrixXd orthonormal_columns(const MatrixXd& A) {
@@ -52,8 +51,7 @@ struct OrthogonalDecomposition::Factors {
 
 OrthogonalDecomposition::OrthogonalDecomposition() : factors_(std::make_unique<Factors>()) {}
 OrthogonalDecomposition::OrthogonalDecomposition(const MatrixXd& A, double threshold) : OrthogonalDecomposition() {
-  if (threshold >= 0) factors_->cod.setThreshold(threshold);
-  factors_->cod.compute(A);
+  compute(A, threshold);
 }
 OrthogonalDecomposition::OrthogonalDecomposition(const OrthogonalDecomposition& other)
     : factors_(std::make_unique<Factors>(*other.factors_)) {}
@@ -64,14 +62,19 @@ OrthogonalDecomposition& OrthogonalDecomposition::operator=(OrthogonalDecomposit
 }
 OrthogonalDecomposition::~OrthogonalDecomposition() = default;
 
+void OrthogonalDecomposition::compute(const MatrixXd& A, double threshold) {
+  threshold < 0 ? factors_->cod.setThreshold(Eigen::Default) : factors_->cod.setThreshold(threshold);
+  factors_->cod.compute(A);
+}
+
 Index OrthogonalDecomposition::rank() const { return factors_->cod.rank(); }
 MatrixXd OrthogonalDecomposition::solve(const MatrixXd& b) const { return factors_->cod.solve(b); }
 MatrixXd OrthogonalDecomposition::solve_transposed(const MatrixXd& b) const {
   return factors_->cod.transpose().solve(b);
 }
 MatrixXd OrthogonalDecomposition::left_null_space() const {
-  const MatrixXd Q = factors_->cod.householderQ();
-  return Q.rightCols(Q.cols() - rank());
+  const Index rows = factors_->cod.rows();
+  return factors_->cod.householderQ() * MatrixXd::Identity(rows, rows).rightCols(rows - rank());
 }
 
 }  // namespace mbsopt

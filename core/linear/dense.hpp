@@ -44,6 +44,8 @@ class OrthogonalDecomposition {
   OrthogonalDecomposition& operator=(OrthogonalDecomposition) noexcept;
   ~OrthogonalDecomposition();
 
+  void compute(const Eigen::MatrixXd& A, double threshold = -1);  // keeps the storage of a matrix of the same size
+
   Eigen::Index rank() const;
   Eigen::MatrixXd solve(const Eigen::MatrixXd& b) const;             // A x = b
   Eigen::MatrixXd solve_transposed(const Eigen::MatrixXd& b) const;  // A'x = b

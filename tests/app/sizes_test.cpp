@@ -47,7 +47,8 @@ void check_growth(F&& run, int size) {
 enum class Layout { chain, ladder, free };
 
 // Rods of 1 m in x-y, named r0, r1, ...; of a ladder the even ones stand on the ground, joined by the odd ones.
-std::string scene(Layout layout, int bodies, const char* last_mass = "m") {
+// last_inertia: of the last rod, about the joints' axis.
+std::string scene(Layout layout, int bodies, const char* last_mass = "m", double last_inertia = 0.1) {
   std::string rods, joints;
   const auto hinge = [&](int b1, int b2, double x1, double y1, double x2, double y2) {
     joints += fmt::format(
@@ -59,8 +60,9 @@ std::string scene(Layout layout, int bodies, const char* last_mass = "m") {
   for (int i = 0; i < bodies; ++i) {
     const bool upright = layout == Layout::ladder && i % 2 == 0;
     const double x = layout == Layout::ladder ? i / 2 + (upright ? 0 : 0.5) : i + 0.5, y = upright ? 0.5 : 1;
-    rods += fmt::format(R"({}{{"name": "r{}", "mass": "{}", "inertia": [0.1, 0.1, 0.1], "position": [{}, {}, 0]}})",
-                        i == 0 ? "" : ",", i, i + 1 == bodies ? last_mass : "m", x, y);
+    rods += fmt::format(R"({}{{"name": "r{}", "mass": "{}", "inertia": [0.1, 0.1, {}], "position": [{}, {}, 0]}})",
+                        i == 0 ? "" : ",", i, i + 1 == bodies ? last_mass : "m", i + 1 == bodies ? last_inertia : 0.1,
+                        x, y);
     if (layout == Layout::chain) hinge(i - 1, i, i == 0 ? 0 : 0.5, i == 0 ? 1 : 0, -0.5, 0);
     if (layout != Layout::ladder) continue;
     if (upright) hinge(-1, i, x, 0, 0, -0.5);
@@ -74,10 +76,10 @@ std::string scene(Layout layout, int bodies, const char* last_mass = "m") {
       rods, joints);
 }
 
-void check_growth_of(const char* command, Layout layout, const char* last_mass = "m") {
+void check_growth_of(const char* command, Layout layout) {
   const TemporaryFolder folder;
   const int least = std::string(command) == "validate" ? kSize : kSize / 2;
-  for (const int size : {least, 4 * least}) folder.write(std::to_string(size), scene(layout, size, last_mass));
+  for (const int size : {least, 4 * least}) folder.write(std::to_string(size), scene(layout, size));
   const auto run = [&](int size) {
     const std::string name = std::to_string(size);
     const CommandOutcome outcome =
@@ -128,7 +130,15 @@ TEST_CASE("commands take time linear in the number of free bodies", "[sizes]") {
 }
 
 TEST_CASE("massless directions are looked for in time linear in the bodies", "[sizes]") {
-  check_growth_of("validate", Layout::chain, "0");
+  const TemporaryFolder folder;
+  for (const int size : {kSize, 4 * kSize}) folder.write(std::to_string(size), scene(Layout::chain, size, "0", 0));
+  const auto run = [&](int size) {
+    const CommandOutcome outcome = run_command(
+        {"validate", folder.file(std::to_string(size)), "--out", folder.file("o" + std::to_string(size)), "--quiet"});
+    REQUIRE(outcome.exit_code == kDone);
+    CHECK_THAT(outcome.err, Contains(fmt::format("body 'r{}' has no inertia in a direction", size - 1)));
+  };
+  check_growth(run, kSize);
 }
 
 TEST_CASE("the rank of the equations of many loops is right", "[sizes]") {

@@ -83,6 +83,12 @@ TEST_CASE("tradeoff: a table of all settings, plots, and advice in words for eac
                          Contains("Lines lead from loose to tight settings through bounds") &&
                          Contains(result.at("machine").at("cpu").get<std::string>()));
   CHECK(report.find("nan") == std::string::npos);
+  for (const char* list : {"recommendations", "task_recommendations"})
+    for (const auto& r : result.at(list))
+      CHECK(
+          r.at("in_words")
+              .get<std::string>()
+              .ends_with(" in " + r.at("aim").get<std::string>() + ": " + r.at("setting_in_words").get<std::string>()));
 }
 
 TEST_CASE("tradeoff --apply writes a problem that runs and has the accuracy, its comments kept", "[command]") {

@@ -33,6 +33,21 @@ TEST_CASE("a complete orthogonal decomposition meets the four conditions of the 
   CHECK(largest(decomposition.solve_transposed(MatrixXd::Identity(4, 4)) - X.transpose()) < 1e-14);
 }
 
+TEST_CASE("a decomposition that is computed again is that of the new matrix and threshold", "[linear]") {
+  MatrixXd A = rank_two();
+  OrthogonalDecomposition decomposition(MatrixXd::Ones(3, 4), 0.5);
+  CHECK(decomposition.rank() == 1);
+  decomposition.compute(A, 1e-10);
+  CHECK(decomposition.rank() == 2);
+  CHECK(decomposition.left_null_space() == OrthogonalDecomposition(A, 1e-10).left_null_space());
+  A(2, 3) = 1e-9;
+  decomposition.compute(A);  // by rounding alone
+  CHECK(decomposition.rank() == 3);
+  decomposition.compute(MatrixXd::Identity(5, 5));
+  CHECK(decomposition.rank() == 5);
+  CHECK(decomposition.left_null_space().cols() == 0);
+}
+
 TEST_CASE("null spaces are orthonormal and have the dimension that the rank leaves", "[linear]") {
   const MatrixXd A = rank_two(), N = null_space(A, 1e-10);
   CHECK(N.cols() == 2);
