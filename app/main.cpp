@@ -3,11 +3,11 @@
 #include <exception>
 #include <iostream>
 
-#include "app/command_line.hpp"
-#include "app/exit_code.hpp"
-#include "app/mpi_ranks.hpp"
-#include "app/standard_streams.hpp"
-#include "app/start_workers.hpp"
+#include "app/command/command_line.hpp"
+#include "app/starts/mpi_ranks.hpp"
+#include "app/starts/rank_server.hpp"
+#include "app/terminal/exit_code.hpp"
+#include "app/terminal/standard_streams.hpp"
 
 int main(int argc, char** argv) {
   using namespace mbsopt;

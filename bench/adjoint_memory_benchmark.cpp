@@ -12,9 +12,9 @@
 #include <string>
 
 #include "bench/linkage.hpp"
-#include "core/integrate/simulation.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/mechanism/state_point.hpp"
+#include "core/simulate/simulation.hpp"
 
 using namespace mbsopt;
 

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "optim/identification.hpp"
+#include "optim/fit/identification.hpp"
 #include "tests/optim/repetitions.hpp"
 
 using namespace mbsopt;

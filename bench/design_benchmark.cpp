@@ -6,9 +6,9 @@
 
 #include "app/json/read_problem.hpp"
 #include "bench/repeated.hpp"
-#include "optim/design.hpp"
-#include "optim/hessian.hpp"
-#include "optim/objective.hpp"
+#include "optim/design/design.hpp"
+#include "optim/objective/hessian.hpp"
+#include "optim/objective/objective.hpp"
 
 using namespace mbsopt;
 using namespace mbsopt::bench;

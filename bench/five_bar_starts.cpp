@@ -24,10 +24,10 @@
 #include <vector>
 
 #include "app/json/read_problem.hpp"
-#include "optim/design.hpp"
-#include "optim/hessian.hpp"
-#include "optim/objective.hpp"
-#include "optim/start_points.hpp"
+#include "optim/design/design.hpp"
+#include "optim/objective/hessian.hpp"
+#include "optim/objective/objective.hpp"
+#include "optim/problem/start_points.hpp"
 
 using namespace mbsopt;
 

@@ -1,12 +1,12 @@
 // Cost of gradients in simulations, of problems with 20 and more parameters. What one simulation is, and how
-// simulation, adjoint and TLM are timed in turn, says optim/gradient_timing.hpp; `mbsopt check` prints the same
+// simulation, adjoint and TLM are timed in turn, says optim/check/gradient_timing.hpp; `mbsopt check` prints the same
 // figures.
 //   adjoint_ratio = adjoint / simulation          tlm_over_parameters = (TLM / simulation - 1) / parameters
 #include <benchmark/benchmark.h>
 
 #include "app/json/read_problem.hpp"
-#include "optim/gradient_timing.hpp"
-#include "optim/objective.hpp"
+#include "optim/check/gradient_timing.hpp"
+#include "optim/objective/objective.hpp"
 
 using namespace mbsopt;
 

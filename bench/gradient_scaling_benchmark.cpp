@@ -9,10 +9,10 @@
 #include <fmt/format.h>
 
 #include "bench/linkage.hpp"
-#include "core/dynamics/assembly.hpp"
-#include "optim/gradient_timing.hpp"
-#include "optim/objective.hpp"
-#include "optim/stopwatch.hpp"
+#include "core/start/assembly.hpp"
+#include "optim/check/gradient_timing.hpp"
+#include "optim/machine/stopwatch.hpp"
+#include "optim/objective/objective.hpp"
 
 using namespace mbsopt;
 

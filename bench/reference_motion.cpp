@@ -2,9 +2,9 @@
 
 #include "bench/models.hpp"
 #include "bench/repeated.hpp"
-#include "core/dynamics/assembly.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/mechanism/state_point.hpp"
+#include "core/start/assembly.hpp"
 
 namespace mbsopt::bench {
 namespace {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "bench/linkage.hpp"
-#include "core/integrate/simulation.hpp"
 #include "core/scene/scene.hpp"
+#include "core/simulate/simulation.hpp"
 
 namespace mbsopt::bench {
 

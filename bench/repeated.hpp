@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "optim/median.hpp"
+#include "optim/machine/median.hpp"
 
 namespace mbsopt::bench {
 

@@ -14,8 +14,8 @@
 #include "app/json/read_problem.hpp"
 #include "bench/repeated.hpp"
 #include "bench/right_hand_side.hpp"
-#include "core/dynamics/assembly.hpp"
 #include "core/integrate/runge_kutta_run.hpp"
+#include "core/start/assembly.hpp"
 
 using namespace mbsopt;
 using namespace mbsopt::bench;

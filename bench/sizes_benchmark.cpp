@@ -14,7 +14,7 @@
 #include <iostream>
 #include <sstream>
 
-#include "app/command_line.hpp"
+#include "app/command/command_line.hpp"
 #include "bench/linkage.hpp"
 
 using namespace mbsopt;

@@ -1,5 +1,5 @@
 # Open MPI's C header, and the program that starts ranks: MBSOPT_HAVE_MPI, OPEN_MPI_INCLUDE_DIRS, MBSOPT_MPIRUN. Nothing
-# is linked: ranks load the library themselves (app/mpi_ranks.cpp).
+# is linked: ranks load the library themselves (app/starts/mpi_ranks.cpp).
 set(MBSOPT_HAVE_MPI OFF)
 if(MBSOPT_MPI AND MBSOPT_SANITIZE)
   message(STATUS "No MPI: the sanitizers cannot load it as the program has to (RTLD_DEEPBIND)")

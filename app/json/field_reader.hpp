@@ -9,7 +9,7 @@
 
 #include "app/json/findings.hpp"
 #include "app/json/node.hpp"
-#include "optim/problem_vocabulary.hpp"
+#include "optim/problem/problem_vocabulary.hpp"
 
 namespace mbsopt {
 

@@ -14,7 +14,7 @@
 
 #include "app/json/findings.hpp"
 #include "app/json/node.hpp"
-#include "optim/problem.hpp"
+#include "optim/problem/problem.hpp"
 
 namespace mbsopt {
 

@@ -8,10 +8,10 @@
 #include "app/json/problem_source.hpp"
 #include "app/json/source_text.hpp"
 #include "core/scene/default_integrator.hpp"
-#include "optim/csv_table.hpp"
-#include "optim/data_issues.hpp"
-#include "optim/problem_issues.hpp"
-#include "optim/unused_parameters.hpp"
+#include "optim/objective/problem_issues.hpp"
+#include "optim/problem/csv_table.hpp"
+#include "optim/problem/data_issues.hpp"
+#include "optim/problem/unused_parameters.hpp"
 
 namespace mbsopt {
 

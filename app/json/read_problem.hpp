@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "app/json/input_error.hpp"
-#include "optim/problem.hpp"
+#include "optim/problem/problem.hpp"
 
 namespace mbsopt {
 

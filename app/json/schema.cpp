@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/scene/default_integrator.hpp"
-#include "optim/problem_vocabulary.hpp"
+#include "optim/problem/problem_vocabulary.hpp"
 
 namespace mbsopt {
 

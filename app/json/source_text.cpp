@@ -4,7 +4,7 @@
 #include <cstdlib>
 
 #include "app/json/input_error.hpp"
-#include "optim/regular_file.hpp"
+#include "optim/problem/regular_file.hpp"
 
 namespace mbsopt {
 

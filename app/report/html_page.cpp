@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "app/report/html_text.hpp"
 #include "app/report/line_plot.hpp"
 
 namespace mbsopt {
@@ -37,29 +38,6 @@ svg.key { display:inline-block; width:2.1em; height:.7em; margin:0 .4em 0 0; ver
 )";
 
 }  // namespace
-
-std::string html_escaped(std::string_view text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
-}
 
 void HtmlPage::heading(std::string_view text) { body_ += fmt::format("<h2>{}</h2>\n", html_escaped(text)); }
 

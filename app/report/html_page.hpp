@@ -10,8 +10,6 @@ namespace mbsopt {
 
 struct LinePlot;
 
-std::string html_escaped(std::string_view text);
-
 class HtmlPage {
  public:
   explicit HtmlPage(std::string title) : title_(std::move(title)) {}

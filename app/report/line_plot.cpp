@@ -9,7 +9,7 @@
 #include <random>
 #include <utility>
 
-#include "app/report/html_page.hpp"
+#include "app/report/html_text.hpp"
 
 namespace mbsopt {
 namespace {

@@ -8,7 +8,7 @@
 #include <map>
 #include <set>
 
-#include "app/report/html_page.hpp"
+#include "app/report/html_text.hpp"
 #include "app/report/line_plot.hpp"
 #include "core/body/euler_parameters.hpp"
 #include "core/scene/scene_facts.hpp"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "app/trajectory_csv.hpp"
+#include "app/results/trajectory_csv.hpp"
 
 namespace mbsopt {
 

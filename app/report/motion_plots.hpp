@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "app/report/line_plot.hpp"
-#include "app/trajectory_csv.hpp"
+#include "app/results/trajectory_csv.hpp"
 
 namespace mbsopt {
 

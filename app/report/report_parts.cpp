@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "app/energy_balance.hpp"
 #include "app/report/line_plot.hpp"
-#include "app/text_table.hpp"
+#include "app/run/energy_balance.hpp"
+#include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
 
 namespace mbsopt {

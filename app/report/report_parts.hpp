@@ -1,9 +1,9 @@
 // The sections that reports of several commands share.
 #pragma once
 
+#include "app/files/result_json.hpp"
 #include "app/report/html_page.hpp"
-#include "app/result_json.hpp"
-#include "app/trajectory_csv.hpp"
+#include "app/results/trajectory_csv.hpp"
 
 namespace mbsopt {
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "app/result_json.hpp"
-#include "app/trajectory_csv.hpp"
+#include "app/files/result_json.hpp"
+#include "app/results/trajectory_csv.hpp"
 
 namespace mbsopt {
 

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <utility>
 
-#include "app/machine.hpp"
 #include "app/report/line_plot.hpp"
 #include "app/report/report_parts.hpp"
-#include "core/integrate/tableaus.hpp"
-#include "optim/tradeoff_curves.hpp"
+#include "app/run/machine.hpp"
+#include "core/tableau/tableaus.hpp"
+#include "optim/tradeoff/tradeoff_curves.hpp"
 
 namespace mbsopt {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <string>
 
-#include "app/result_json.hpp"
-#include "optim/penalty_study.hpp"
-#include "optim/tradeoff.hpp"
+#include "app/files/result_json.hpp"
+#include "optim/tradeoff/penalty_study.hpp"
+#include "optim/tradeoff/tradeoff.hpp"
 
 namespace mbsopt {
 

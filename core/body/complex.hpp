@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "core/body/fixed_size.hpp"
+#include "core/linear/fixed_size.hpp"
 
 namespace mbsopt {
 

@@ -11,7 +11,7 @@
 // (1988), section 6.2. All of these are polynomials and hold off the unit sphere, where Runge-Kutta stages lie.
 #pragma once
 
-#include "core/body/fixed_size.hpp"
+#include "core/linear/fixed_size.hpp"
 
 namespace mbsopt {
 

@@ -9,7 +9,7 @@
 // s and the Euler parameters, which a frame carries along for drives of single coordinates, by 1/2 G(p)' eta_theta.
 #pragma once
 
-#include "core/body/fixed_size.hpp"
+#include "core/linear/fixed_size.hpp"
 
 namespace mbsopt {
 

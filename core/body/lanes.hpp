@@ -2,7 +2,7 @@
 // the headers that declare them.
 #pragma once
 
-#include "core/body/fixed_size.hpp"
+#include "core/linear/fixed_size.hpp"
 
 namespace mbsopt {
 

@@ -4,7 +4,7 @@
 // impose it on positions and velocities.
 #pragma once
 
-#include "core/body/fixed_size.hpp"
+#include "core/linear/fixed_size.hpp"
 
 namespace mbsopt {
 

@@ -7,7 +7,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/body/lanes.hpp"
-#include "core/dynamics/prefetch.hpp"
+#include "core/linear/prefetch.hpp"
 #include "core/mechanism/joint_graph.hpp"
 
 namespace mbsopt {

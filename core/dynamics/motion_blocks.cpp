@@ -3,7 +3,7 @@
 #include <cassert>
 #include <cstddef>
 
-#include "core/dynamics/block_kernels.hpp"
+#include "core/linear/block_kernels.hpp"
 #include "core/mechanism/coupling.hpp"
 
 namespace mbsopt {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/dynamics/pairs.hpp"
+#include "core/linear/pairs.hpp"
 
 namespace mbsopt {
 namespace {

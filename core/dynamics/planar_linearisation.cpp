@@ -1,7 +1,7 @@
 // Tangents of the planar equations: right-hand sides and accelerations in directions of the state and the parameters.
 #include "core/body/lanes.hpp"
-#include "core/dynamics/pairs.hpp"
 #include "core/dynamics/planar_dynamics.hpp"
+#include "core/linear/pairs.hpp"
 
 namespace mbsopt {
 namespace {

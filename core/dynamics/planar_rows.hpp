@@ -4,10 +4,10 @@
 
 #include <vector>
 
-#include "core/dynamics/block_cholesky.hpp"
-#include "core/dynamics/block_kernels.hpp"
-#include "core/dynamics/pairs.hpp"
 #include "core/dynamics/planar_constraints.hpp"
+#include "core/linear/block_cholesky.hpp"
+#include "core/linear/block_kernels.hpp"
+#include "core/linear/pairs.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cassert>
 
-#include "core/expression/program_builder.hpp"
-
 namespace mbsopt {
 
 int Symbols::add_input(const std::string& name) {
@@ -35,10 +33,6 @@ std::vector<std::string> Symbols::names() const {
   for (const auto& [name, expression] : definitions_) all.push_back(name);
   std::sort(all.begin(), all.end());
   return all;
-}
-
-Program::Program(const Expression& expression, const Symbols& symbols) {
-  ProgramBuilder(symbols, *this).build(expression);
 }
 
 Program::Scratch Program::scratch() const {

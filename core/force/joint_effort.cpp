@@ -1,6 +1,6 @@
 #include "core/force/joint_effort.hpp"
 
-#include "core/force/friction.hpp"
+#include "core/force/friction_law.hpp"
 
 namespace mbsopt {
 

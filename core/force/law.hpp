@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "core/body/fixed_size.hpp"
 #include "core/expression/program.hpp"
+#include "core/linear/fixed_size.hpp"
 
 namespace mbsopt {
 

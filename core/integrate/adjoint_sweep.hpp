@@ -11,10 +11,10 @@
 
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/motion_solver.hpp"
-#include "core/integrate/cost.hpp"
 #include "core/integrate/gradient_quadrature.hpp"
-#include "core/integrate/linearised_stages.hpp"
-#include "core/integrate/stored_step.hpp"
+#include "core/run/cost.hpp"
+#include "core/step/linearised_stages.hpp"
+#include "core/step/stored_step.hpp"
 
 namespace mbsopt {
 

@@ -15,7 +15,7 @@
 #include <functional>
 #include <utility>
 
-#include "core/integrate/stored_step.hpp"
+#include "core/step/stored_step.hpp"
 
 namespace mbsopt {
 

@@ -9,9 +9,9 @@
 #include <span>
 #include <vector>
 
-#include "core/integrate/cost.hpp"
-#include "core/integrate/quadrature_watch.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/run/cost.hpp"
+#include "core/watch/quadrature_watch.hpp"
 
 namespace mbsopt {
 

@@ -1,9 +1,9 @@
 // Which model a run of a Runge-Kutta method takes: three unknowns per body or six.
 #pragma once
 
-#include "core/integrate/tableaus.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/settings.hpp"
+#include "core/tableau/tableaus.hpp"
 
 namespace mbsopt {
 

@@ -7,11 +7,11 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/integrate/model_choice.hpp"
-#include "core/integrate/start_failure.hpp"
-#include "core/integrate/stiffness.hpp"
-#include "core/integrate/weak_joints.hpp"
 #include "core/mechanism/joint_graph.hpp"
 #include "core/mechanism/planar_model.hpp"
+#include "core/watch/start_failure.hpp"
+#include "core/watch/stiffness.hpp"
+#include "core/watch/weak_joints.hpp"
 
 namespace mbsopt {
 namespace {

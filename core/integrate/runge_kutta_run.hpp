@@ -6,16 +6,19 @@
 #include <functional>
 
 #include "core/dynamics/dynamics.hpp"
-#include "core/integrate/event_times.hpp"
-#include "core/integrate/implicit_stages.hpp"
-#include "core/integrate/run_guard.hpp"
-#include "core/integrate/simulation.hpp"
-#include "core/integrate/singular_passage.hpp"
-#include "core/integrate/step.hpp"
-#include "core/integrate/step_control.hpp"
-#include "core/integrate/step_failure.hpp"
+#include "core/run/simulation_result.hpp"
+#include "core/scene/settings.hpp"
+#include "core/step/event_times.hpp"
+#include "core/step/implicit_stages.hpp"
+#include "core/step/singular_passage.hpp"
+#include "core/step/step.hpp"
+#include "core/step/step_control.hpp"
+#include "core/step/step_failure.hpp"
+#include "core/watch/run_guard.hpp"
 
 namespace mbsopt {
+
+class Mechanism;
 
 class RungeKuttaRun {
  public:

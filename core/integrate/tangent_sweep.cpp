@@ -1,7 +1,7 @@
 #include "core/integrate/tangent_sweep.hpp"
 
-#include "core/dynamics/block_kernels.hpp"
 #include "core/integrate/model_choice.hpp"
+#include "core/linear/block_kernels.hpp"
 
 namespace mbsopt {
 TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,

@@ -11,14 +11,17 @@
 
 #include "core/dynamics/dynamics.hpp"
 #include "core/dynamics/motion_solver.hpp"
-#include "core/integrate/cost.hpp"
 #include "core/integrate/gradient_quadrature.hpp"
-#include "core/integrate/linearised_stages.hpp"
-#include "core/integrate/sample_schedule.hpp"
-#include "core/integrate/simulation.hpp"
-#include "core/integrate/step.hpp"
+#include "core/run/cost.hpp"
+#include "core/run/sample_schedule.hpp"
+#include "core/run/simulation_result.hpp"
+#include "core/scene/settings.hpp"
+#include "core/step/linearised_stages.hpp"
+#include "core/step/step.hpp"
 
 namespace mbsopt {
+
+class Mechanism;
 
 class TangentSweep {
  public:

@@ -1,6 +1,6 @@
 #include "core/mechanism/compilation.hpp"
 
-#include "core/mechanism/mechanism.hpp"
+#include "core/scene/scene_error.hpp"
 
 namespace mbsopt {
 namespace {

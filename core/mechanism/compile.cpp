@@ -4,8 +4,8 @@
 
 #include "core/linear/dense.hpp"
 #include "core/mechanism/compilation.hpp"
-#include "core/mechanism/mechanism.hpp"
 #include "core/mechanism/planar_model.hpp"
+#include "core/scene/scene_error.hpp"
 
 namespace mbsopt {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "core/mechanism/mechanism.hpp"
+#include "core/scene/scene_error.hpp"
 
 namespace mbsopt {
 

@@ -9,8 +9,8 @@
 #include <unsupported/Eigen/AutoDiff>
 #include <vector>
 
-#include "core/body/fixed_size.hpp"
 #include "core/expression/program.hpp"
+#include "core/linear/fixed_size.hpp"
 #include "core/scene/scene.hpp"
 
 namespace mbsopt {

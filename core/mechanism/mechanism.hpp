@@ -5,23 +5,17 @@
 
 #include <Eigen/Core>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "core/scene/scene.hpp"
+#include "core/scene/scene_error.hpp"
 
 namespace mbsopt {
 
 struct MechanismData;  // mechanism_data.hpp
 struct UserForce;      // core/force/user_force.hpp
 struct StatePoint;
-
-// The scene cannot be compiled: what is wrong, with the place in the scene ("bodies[2].inertia").
-class SceneError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 class Mechanism {
  public:

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "core/body/fixed_size.hpp"
+#include "core/linear/fixed_size.hpp"
 
 namespace mbsopt {
 

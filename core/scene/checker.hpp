@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/scene/issues.hpp"
 #include "core/scene/scene_facts.hpp"
+#include "core/scene/scene_issue.hpp"
 #include "core/scene/scene_path.hpp"
 #include "core/scene/vocabulary.hpp"
 

@@ -48,7 +48,7 @@ struct SimulationSettings {
   FormulationSettings formulation;
   IntegratorSettings integrator;
   // Wanted relative error of the objectives, or of the motion where there is none. While it is there, the integrator is
-  // still to be chosen for it (optim/accuracy.hpp), and nothing can be simulated.
+  // still to be chosen for it (optim/tradeoff/accuracy.hpp), and nothing can be simulated.
   std::optional<double> accuracy;
   std::vector<double> events;        // times at which a step ends and the next begins [s]
   double adjoint_memory_mib = 1024;  // what an adjoint run keeps of the forward motion, at most [MiB]

@@ -1,7 +1,7 @@
 // An adjoint run stays within its budget of memory, by the count of every allocation of the process.
 #include <catch2/catch.hpp>
 
-#include "core/integrate/simulation.hpp"
+#include "core/simulate/simulation.hpp"
 #include "tests/allocation/allocation_count.hpp"
 #include "tests/core/integrate/state_costs.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"

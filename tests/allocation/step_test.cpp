@@ -1,11 +1,11 @@
 // The hot loops allocate nothing after set-up: right-hand sides, steps, tangents and adjoints.
 #include <catch2/catch.hpp>
 
-#include "core/dynamics/assembly.hpp"
+#include "core/cvodes/cvodes_newton.hpp"
 #include "core/dynamics/dynamics.hpp"
-#include "core/dynamics/projection.hpp"
-#include "core/integrate/cvodes_newton.hpp"
 #include "core/integrate/runge_kutta_run.hpp"
+#include "core/projection/projection.hpp"
+#include "core/start/assembly.hpp"
 #include "tests/allocation/allocation_count.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 

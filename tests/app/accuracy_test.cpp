@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include "app/exit_code.hpp"
 #include "app/json/read_problem.hpp"
-#include "optim/accuracy.hpp"
-#include "optim/tradeoff_reference.hpp"
+#include "app/terminal/exit_code.hpp"
+#include "optim/tradeoff/accuracy.hpp"
+#include "optim/tradeoff/tradeoff_reference.hpp"
 #include "tests/app/gallery_files.hpp"
 #include "tests/app/run_command.hpp"
 

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "app/json/read_problem.hpp"
-#include "optim/gradient_check.hpp"
+#include "optim/check/gradient_check.hpp"
 #include "tests/app/gallery_files.hpp"
 
 using namespace mbsopt;

@@ -1,7 +1,7 @@
 // Every command with CVODES: as the file's integrator, and as a method of `gradient` and `check` on any file.
 #include <catch2/catch.hpp>
 
-#include "app/exit_code.hpp"
+#include "app/terminal/exit_code.hpp"
 #include "tests/app/run_command.hpp"
 
 using namespace mbsopt;

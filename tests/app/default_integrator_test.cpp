@@ -6,8 +6,8 @@
 
 #include "app/json/read_problem.hpp"
 #include "core/scene/default_integrator.hpp"
-#include "optim/fit_errors.hpp"
-#include "optim/tradeoff_reference.hpp"
+#include "optim/tradeoff/fit_errors.hpp"
+#include "optim/tradeoff/tradeoff_reference.hpp"
 #include "tests/app/gallery_files.hpp"
 #include "tests/app/run_command.hpp"
 

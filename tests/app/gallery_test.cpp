@@ -7,12 +7,12 @@
 #include <set>
 #include <span>
 
-#include "app/exit_code.hpp"
 #include "app/json/read_problem.hpp"
-#include "core/integrate/simulation.hpp"
+#include "app/terminal/exit_code.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/type_table.hpp"
-#include "optim/evaluator.hpp"
+#include "core/simulate/simulation.hpp"
+#include "optim/objective/evaluator.hpp"
 #include "source_folder.hpp"
 #include "tests/app/gallery_files.hpp"
 #include "tests/app/run_command.hpp"

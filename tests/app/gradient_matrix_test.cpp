@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "app/json/read_problem.hpp"
-#include "core/integrate/tableaus.hpp"
-#include "optim/evaluator.hpp"
+#include "core/tableau/tableaus.hpp"
+#include "optim/objective/evaluator.hpp"
 #include "tests/app/gallery_files.hpp"
 
 using namespace mbsopt;

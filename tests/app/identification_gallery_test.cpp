@@ -3,9 +3,9 @@
 #include <cmath>
 #include <map>
 
-#include "app/exit_code.hpp"
+#include "app/terminal/exit_code.hpp"
 #include "core/scene/inertia_check.hpp"
-#include "optim/csv_table.hpp"
+#include "optim/problem/csv_table.hpp"
 #include "tests/app/gallery_files.hpp"
 #include "tests/app/run_command.hpp"
 

@@ -7,8 +7,8 @@
 #include "app/json/read_problem.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/scene/default_integrator.hpp"
-#include "optim/evaluator.hpp"
-#include "optim/tradeoff_runs.hpp"
+#include "optim/objective/evaluator.hpp"
+#include "optim/tradeoff/tradeoff_runs.hpp"
 #include "tests/app/gallery_files.hpp"
 
 using namespace mbsopt;

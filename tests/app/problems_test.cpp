@@ -2,8 +2,8 @@
 #include <catch2/catch.hpp>
 #include <map>
 
-#include "app/exit_code.hpp"
 #include "app/json/read_problem.hpp"
+#include "app/terminal/exit_code.hpp"
 #include "source_folder.hpp"
 #include "tests/app/run_command.hpp"
 

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <optional>
 
-#include "app/exit_code.hpp"
+#include "app/terminal/exit_code.hpp"
 #include "source_folder.hpp"
 #include "tests/app/run_command.hpp"
 

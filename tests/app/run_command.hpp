@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "app/command_line.hpp"
+#include "app/command/command_line.hpp"
 #include "tests/app/temporary_folder.hpp"
 
 namespace mbsopt {

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "app/json/read_problem.hpp"
-#include "optim/tradeoff_runs.hpp"
+#include "optim/tradeoff/tradeoff_runs.hpp"
 #include "tests/app/gallery_files.hpp"
 
 using namespace mbsopt;

@@ -6,14 +6,14 @@
 #include <catch2/catch.hpp>
 #include <ctime>
 
-#include "app/exit_code.hpp"
 #include "app/json/input_error.hpp"
 #include "app/json/read_problem.hpp"
-#include "core/dynamics/assembly.hpp"
+#include "app/terminal/exit_code.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/start/assembly.hpp"
 #include "tests/app/gallery_files.hpp"
 #include "tests/app/run_command.hpp"
-#include "tests/core/dynamics/dense_redundancy.hpp"
+#include "tests/core/linear/dense_redundancy.hpp"
 #include "tests/core/mechanism/small_scenes.hpp"
 
 using namespace mbsopt;

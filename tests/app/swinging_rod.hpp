@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "app/exit_code.hpp"
-#include "app/journal.hpp"
+#include "app/files/journal.hpp"
+#include "app/terminal/exit_code.hpp"
 #include "tests/app/run_command.hpp"
 
 namespace mbsopt {

@@ -4,13 +4,13 @@
 #include <cmath>
 
 #include "core/body/euler_parameters.hpp"
-#include "core/dynamics/assembly.hpp"
 #include "core/dynamics/constraint_rows.hpp"
-#include "core/dynamics/kinematics.hpp"
 #include "core/dynamics/motion_solver.hpp"
 #include "core/force/user_force.hpp"
-#include "core/integrate/simulation.hpp"
 #include "core/scene/kinematic_scene.hpp"
+#include "core/simulate/simulation.hpp"
+#include "core/start/assembly.hpp"
+#include "core/start/kinematics.hpp"
 #include "tests/core/mechanism/small_scenes.hpp"
 
 using namespace mbsopt;

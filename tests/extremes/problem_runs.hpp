@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "app/json/read_problem.hpp"
-#include "optim/evaluator.hpp"
+#include "optim/objective/evaluator.hpp"
 
 namespace mbsopt::extremes {
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "optim/csv_table.hpp"
+#include "optim/problem/csv_table.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
 using namespace mbsopt;

@@ -7,11 +7,11 @@
 #include <fstream>
 #include <vector>
 
-#include "app/atomic_file.hpp"
-#include "app/journal.hpp"
-#include "app/point_records.hpp"
-#include "app/residual_records.hpp"
-#include "optim/regular_file.hpp"
+#include "app/files/atomic_file.hpp"
+#include "app/files/journal.hpp"
+#include "app/starts/point_records.hpp"
+#include "app/starts/residual_records.hpp"
+#include "optim/problem/regular_file.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
 using namespace mbsopt;

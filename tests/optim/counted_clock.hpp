@@ -2,7 +2,7 @@
 // steps, and what is measured within them is the same on any machine, however busy.
 #pragma once
 
-#include "optim/stopwatch.hpp"
+#include "optim/machine/stopwatch.hpp"
 
 namespace mbsopt {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "optim/problem.hpp"
+#include "optim/problem/problem.hpp"
 #include "tests/core/mechanism/small_scenes.hpp"
 
 namespace five_bar {

@@ -4,8 +4,8 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "optim/design.hpp"
-#include "optim/evaluator.hpp"
+#include "optim/design/design.hpp"
+#include "optim/objective/evaluator.hpp"
 
 using namespace mbsopt;
 

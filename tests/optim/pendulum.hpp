@@ -6,8 +6,8 @@
 #include <random>
 #include <string>
 
-#include "optim/csv_table.hpp"
-#include "optim/problem.hpp"
+#include "optim/problem/csv_table.hpp"
+#include "optim/problem/problem.hpp"
 #include "tests/core/mechanism/small_scenes.hpp"
 
 namespace pendulum {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "optim/nonlinear_program.hpp"
+#include "optim/solver/nonlinear_program.hpp"
 
 namespace mbsopt::testing {
 

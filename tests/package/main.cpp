@@ -2,9 +2,9 @@
 #include <cmath>
 #include <cstdio>
 
-#include "core/integrate/simulation.hpp"
 #include "core/mechanism/mechanism.hpp"
-#include "optim/ipopt_solver.hpp"
+#include "core/simulate/simulation.hpp"
+#include "optim/solver/ipopt_solver.hpp"
 
 namespace {
 

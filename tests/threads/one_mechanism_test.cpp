@@ -3,9 +3,9 @@
 #include <thread>
 #include <vector>
 
-#include "core/integrate/cvodes.hpp"
+#include "core/cvodes/cvodes.hpp"
 #include "core/mechanism/mechanism.hpp"
-#include "optim/evaluator.hpp"
+#include "optim/objective/evaluator.hpp"
 #include "tests/optim/five_bar.hpp"
 
 using namespace mbsopt;

@@ -2,7 +2,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "app/exit_code.hpp"
+#include "app/terminal/exit_code.hpp"
 #include "tests/app/run_command.hpp"
 
 using namespace mbsopt;

@@ -2,8 +2,8 @@
 // differences and against each other.
 #include <catch2/catch.hpp>
 
-#include "core/dynamics/assembly.hpp"
 #include "core/dynamics/motion_jacobian.hpp"
+#include "core/start/assembly.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;

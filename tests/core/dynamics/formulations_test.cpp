@@ -6,7 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/dynamics/dynamics.hpp"
-#include "core/integrate/simulation.hpp"
+#include "core/simulate/simulation.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;

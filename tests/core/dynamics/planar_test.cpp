@@ -3,9 +3,9 @@
 #include <catch2/catch.hpp>
 
 #include "core/dynamics/dynamics.hpp"
-#include "core/dynamics/projection.hpp"
-#include "core/integrate/simulation.hpp"
 #include "core/mechanism/planar_model.hpp"
+#include "core/projection/projection.hpp"
+#include "core/simulate/simulation.hpp"
 #include "tests/core/dynamics/planar_scenes.hpp"
 #include "tests/core/integrate/state_costs.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"

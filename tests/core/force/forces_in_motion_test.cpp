@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/body/euler_parameters.hpp"
-#include "core/integrate/simulation.hpp"
+#include "core/simulate/simulation.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;

@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 #include <map>
 
-#include "core/integrate/simulation.hpp"
+#include "core/simulate/simulation.hpp"
 #include "tests/core/integrate/state_costs.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 

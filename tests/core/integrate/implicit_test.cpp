@@ -1,8 +1,8 @@
 // Implicit methods where they are meant for: stiff scenes; and what their stages promise.
 #include <catch2/catch.hpp>
 
-#include "core/integrate/simulation.hpp"
-#include "core/integrate/tableaus.hpp"
+#include "core/simulate/simulation.hpp"
+#include "core/tableau/tableaus.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;

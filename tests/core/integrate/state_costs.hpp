@@ -1,8 +1,8 @@
 // Costs of the state for tests of integration and its derivatives.
 #pragma once
 
-#include "core/integrate/cost.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/run/cost.hpp"
 
 namespace mbsopt::testing {
 

@@ -2,7 +2,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "core/body/fixed_size.hpp"
+#include "core/linear/fixed_size.hpp"
 
 using namespace mbsopt;
 using Eigen::MatrixXd;

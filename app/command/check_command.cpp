@@ -1,0 +1,233 @@
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "app/results/accuracy_results.hpp"
+#include "app/results/left_out_bodies.hpp"
+#include "app/results/objective_values.hpp"
+#include "app/run/command.hpp"
+#include "app/run/run.hpp"
+#include "app/terminal/interrupt.hpp"
+#include "app/terminal/text_table.hpp"
+#include "core/expression/counted.hpp"
+#include "optim/check/gradient_check.hpp"
+#include "optim/problem/unused_parameters.hpp"
+
+namespace mbsopt {
+namespace {
+
+// "agrees 3.1e-14": the verdict, and the relative difference it is about.
+std::string compared(Verdict verdict, double difference) {
+  const std::string words(to_string(verdict));
+  return std::isfinite(difference) && verdict != Verdict::zero ? fmt::format("{} {:.1e}", words, difference) : words;
+}
+
+std::string derivative(double value) { return std::isfinite(value) ? significant(value, 11) : "failed"; }
+
+void print_entries(std::ostream& out, const GradientCheck& check,
+                   const std::vector<std::optional<double>>& true_values) {
+  out << (check.discrete ? "\nfrozen: differences on the steps of the base run; free: with step-size control at work. "
+                           "Relative to tlm:\n"
+                         : "\nadjoint, tlm: the sensitivities by CVODES, backward and forward; its steps cannot be "
+                           "frozen. Relative to tlm:\n");
+  for (std::size_t i = 0; i < check.objectives.size(); ++i) {
+    out << fmt::format("\n{} = {}{}\n", check.objectives[i], significant(check.psi(static_cast<Eigen::Index>(i)), 12),
+                       true_extreme_text(true_values[i]));
+    TextTable table(
+        {"parameter", "adjoint", "tlm", "fd frozen", "fd free", "adjoint = tlm", "fd frozen = tlm", "fd free = tlm"});
+    for (const CheckedEntry& e : check.entries) {
+      if (e.objective != check.objectives[i]) continue;
+      table.add({e.parameter, derivative(e.adjoint), derivative(e.tlm), e.frozen_verdict ? derivative(e.frozen) : "-",
+                 derivative(e.free), compared(e.exact, e.tlm_adjoint),
+                 e.frozen_verdict ? compared(*e.frozen_verdict, e.frozen_difference) : "-",
+                 e.free_verdict ? compared(*e.free_verdict, e.free_difference) : "-"});
+    }
+    out << table.text();
+  }
+}
+
+void print_taylor(std::ostream& out, const GradientCheck& check) {
+  if (check.taylor.empty()) return;
+  out << "\nTaylor remainder |psi(rho + h d) - psi - h psi_rho d|, frozen steps, d random in all parameters:\n";
+  for (const TaylorCheck& taylor : check.taylor) {
+    const std::string found = taylor.slope          ? fmt::format("falls as h^{:.2f}", *taylor.slope)
+                              : taylor.rows.empty() ? "could not be evaluated at any h"
+                                                    : "has no slope to measure, it is rounding: linear along d";
+    const char* verdict = taylor.passed ? "agrees" : taylor.rows.empty() ? "FAILED" : "DISAGREES";
+    out << fmt::format("  {}: {}: {}\n", taylor.objective, found, verdict);
+  }
+}
+
+std::string weighted_sum(const GradientCheck& check, const Eigen::VectorXd& w) {
+  std::string text;
+  for (std::size_t i = 0; i < check.objectives.size(); ++i) {
+    const double weight = w(static_cast<Eigen::Index>(i));
+    const char* sign = weight < 0 ? "-" : "+";
+    if (!text.empty()) text += fmt::format(" {} {:.3g} {}", sign, std::abs(weight), check.objectives[i]);
+    if (text.empty()) text = fmt::format("{:.3g} {}", weight, check.objectives[i]);
+  }
+  return text;
+}
+
+void print_identities(std::ostream& out, const GradientCheck& check) {
+  if (check.identities.empty()) return;
+  out << "\nadjoint identity w'(psi_rho d) by tlm = (psi_rho'w)'d by adjoint, d random in all parameters, w random:\n";
+  for (const IdentityCheck& identity : check.identities) {
+    out << fmt::format("  of {}: {:.6g}, defect {:.1e} of its terms: {}\n", weighted_sum(check, identity.w),
+                       identity.adjoint, identity.relative_defect, identity.passed ? "agrees" : "DISAGREES");
+  }
+}
+
+// The worst entry of each objective; all of them are in result.json.
+void print_continuous(std::ostream& out, const GradientCheck& check) {
+  if (!check.continuous) return;
+  const ContinuousCheck& c = *check.continuous;
+  if (!c.ran) {
+    out << fmt::format("\nindependent sensitivities by CVODES: not available, {}\n", c.message);
+    return;
+  }
+  out << fmt::format("\n{} by {}, of the differential equation, against the derivatives of {}, both at rtol {:g}:\n",
+                     c.method, c.integrator, c.discrete, c.rtol);
+  for (const std::string& objective : check.objectives) {
+    out << fmt::format("  {}: {}\n", objective, compared(c.worst_verdict(objective), c.worst_difference(objective)));
+  }
+}
+
+void print_costs(std::ostream& out, const GradientCheck& check) {
+  TextTable table({"cost", "seconds", "simulations"});
+  const auto add = [&](const char* name, const MethodCost& cost) {
+    table.add(
+        {name, fmt::format("{:.2g}", cost.wall_seconds), fmt::format("{:.{}f}", cost.ratio, cost.ratio < 10 ? 1 : 0)});
+  };
+  add("one simulation", check.simulation);
+  add("adjoint", check.adjoint_cost);
+  add("tlm", check.tlm_cost);
+  if (check.discrete) add("differences, frozen steps", check.frozen_cost);
+  add("differences, free steps", check.free_cost);
+  out << '\n' << table.text();
+  out << fmt::format(
+      "one simulation: a run with the same objectives and tolerances, without derivatives; medians of {} in turn with "
+      "adjoint and tlm\n",
+      counted(check.timing_rounds, "round"));
+}
+
+Json gradient_json(const GradientCheck& check, const Eigen::MatrixXd& psi_rho) {
+  Json gradient = Json::object();
+  for (std::size_t i = 0; i < check.objectives.size(); ++i) {
+    for (std::size_t k = 0; k < check.parameters.size(); ++k) {
+      gradient[check.objectives[i]][check.parameters[k]] =
+          psi_rho(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
+    }
+  }
+  return gradient;
+}
+
+void add_continuous(Json& result, const GradientCheck& check) {
+  const ContinuousCheck& c = *check.continuous;
+  Json& verdict = result["verdict"]["continuous"];
+  verdict = {{"ran", c.ran}, {"passed", c.passed()}};
+  if (!c.ran) {
+    verdict["message"] = c.message;
+    return;
+  }
+  result["methods"][c.method] = {{"wall_seconds", c.wall_seconds},
+                                 {"integrator", c.integrator},
+                                 {"rtol", c.rtol},
+                                 {"gradient", gradient_json(check, c.psi_rho)}};
+  verdict["method"] = c.method, verdict["against"] = c.discrete, verdict["rtol"] = c.rtol;
+  for (const ContinuousEntry& e : c.entries)
+    verdict["entries"][e.objective][e.parameter] = {{"difference", e.difference}, {"verdict", to_string(e.verdict)}};
+}
+
+void add_to_result(Json& result, const GradientCheck& check, const std::vector<std::optional<double>>& true_values) {
+  const Json adjoint = gradient_json(check, check.adjoint);
+  for (std::size_t i = 0; i < check.objectives.size(); ++i) {
+    const std::string& name = check.objectives[i];
+    result["objectives"][name] = objective_json(check.psi(static_cast<Eigen::Index>(i)), true_values[i]);
+    result["objectives"][name]["gradient"] = adjoint.value(name, Json::object());
+  }
+  const auto add = [&](const char* name, const MethodCost& cost, const Eigen::MatrixXd& psi_rho) {
+    result["methods"][name] = {{"wall_seconds", cost.wall_seconds},
+                               {"simulations_wall_ratio", cost.ratio},
+                               {"gradient", gradient_json(check, psi_rho)}};
+  };
+  add("adjoint", check.adjoint_cost, check.adjoint);
+  add("tlm", check.tlm_cost, check.tlm);
+  if (check.discrete) add("fd_frozen", check.frozen_cost, check.frozen);
+  add("fd_free", check.free_cost, check.free);
+
+  Json& verdict = result["verdict"];
+  verdict["passed"] = check.passed();
+  for (const CheckedEntry& e : check.entries) {
+    verdict["entries"][e.objective][e.parameter] = {
+        {"tlm_adjoint", e.tlm_adjoint},
+        {"frozen_difference", e.frozen_difference},
+        {"free_difference", e.free_difference},
+        {"frozen_error", e.frozen_error},
+        {"free_error", e.free_error},
+        {"exact", to_string(e.exact)},
+        {"frozen", e.frozen_verdict ? Json(to_string(*e.frozen_verdict)) : Json()},
+        {"free", e.free_verdict ? Json(to_string(*e.free_verdict)) : Json()}};
+  }
+  if (check.continuous) add_continuous(result, check);
+  for (const TaylorCheck& t : check.taylor)
+    verdict["taylor"][t.objective] = {{"slope", or_null(t.slope)}, {"passed", t.passed}};
+  for (const IdentityCheck& i : check.identities) {
+    Json weights, direction;
+    for (std::size_t k = 0; k < check.objectives.size(); ++k)
+      weights[check.objectives[k]] = i.w(static_cast<Eigen::Index>(k));
+    for (std::size_t k = 0; k < check.parameters.size(); ++k)
+      direction[check.parameters[k]] = i.d(static_cast<Eigen::Index>(k));
+    verdict["identities"].push_back(
+        {{"weights", weights}, {"direction", direction}, {"relative_defect", i.relative_defect}, {"passed", i.passed}});
+  }
+}
+
+}  // namespace
+
+int check_command(const CommandContext& context) {
+  Run run(context);
+  const Scene& scene = run.problem.scene;
+  if (run.problem.objectives.empty()) throw std::invalid_argument("objectives: there are none to differentiate");
+  if (scene.parameters.empty()) throw std::invalid_argument("parameters: there are none to differentiate with");
+  const Mechanism mechanism(scene, parameter_values(scene));
+  run.start();
+  if (!settle_accuracy(run)) return run.finish();
+  if (!assembled(run, &mechanism, Assembly(mechanism, scene.simulation.start_time))) return run.finish();
+
+  double last_good_time = scene.simulation.start_time;
+  GradientCheckOptions options;
+  options.simulation_progress = [&](double t) {
+    last_good_time = t;
+    return !interrupted();
+  };
+  options.progress = [&](int done, int of) { run.progress.fraction("checking", static_cast<double>(done) / of); };
+  std::vector<std::string> left_out;
+  const Problem needed = what_objectives_need(run.problem, &left_out);
+  say_left_out(run, left_out, "objective");
+  const GradientCheck check = check_gradients(needed, options);
+  run.progress.finish();
+  if (interrupted() || !check.ran) {
+    interrupted() ? run.stopped("nothing was compared") : run.failed(check.message, last_good_time);
+    return run.finish();
+  }
+
+  run.result["simulation"] = to_json(check.statistics);
+  add_derivative_counts(run, needed.scene, check.statistics);
+  for (const std::string& warning : check.warnings) run.warn(warning);
+  const Evaluator evaluator(needed.scene, objectives_of(needed));
+  const std::vector<std::optional<double>> true_values = evaluator.true_values(evaluator.start());
+  add_to_result(run.result, check, true_values);
+  print_simulation(context.out, scene, check.statistics);
+  warn_of_stiffness(run, check.statistics, true);
+  print_entries(context.out, check, true_values);
+  print_taylor(context.out, check);
+  print_identities(context.out, check);
+  print_continuous(context.out, check);
+  print_costs(context.out, check);
+  context.out << fmt::format("\n{}\n", check.passed() ? "all gradients agree" : "THE GRADIENTS DISAGREE");
+  if (!check.passed()) run.disagrees();
+  return run.finish();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,205 @@
+#include "app/command/command_line.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <new>
+#include <stdexcept>
+
+#include "app/files/atomic_file.hpp"
+#include "app/json/input_error.hpp"
+#include "app/json/problem_source.hpp"
+#include "app/run/command.hpp"
+#include "app/run/provenance.hpp"
+#include "app/terminal/exit_code.hpp"
+#include "app/terminal/interrupt.hpp"
+#include "core/expression/did_you_mean.hpp"
+#include "core/mechanism/mechanism.hpp"
+#include "optim/problem/csv_table.hpp"
+
+namespace mbsopt {
+namespace {
+
+struct Command {
+  const char* name;
+  const char* does;
+  int (*run)(const CommandContext&);
+};
+constexpr std::array kCommands{
+    Command{"validate", "check a problem file; print bodies, equations, degrees of freedom", validate_command},
+    Command{"simulate", "forward dynamics", simulate_command},
+    Command{"kinematics", "positions, velocities, accelerations of a fully driven mechanism, and driving forces",
+            kinematics_command},
+    Command{"gradient", "objectives and their gradients", gradient_command},
+    Command{"check", "all gradient methods against each other and against differences", check_command},
+    Command{"design", "optimal design", design_command},
+    Command{"identify", "fit parameters to measurements", identify_command},
+    Command{"tradeoff", "error against cost for integrators, tolerances, formulations and gradient methods",
+            tradeoff_command},
+    Command{"resume", "go on with a design or an identification that was interrupted or killed", resume_command},
+    Command{"schema", "print the JSON Schema of problem files", schema_command},
+};
+
+std::vector<std::string> command_names() {
+  std::vector<std::string> names;
+  for (const Command& command : kCommands) names.emplace_back(command.name);
+  return names;
+}
+
+bool is_known(const std::string& word) {
+  const std::vector<std::string> names = command_names();
+  return word.starts_with('-') || std::find(names.begin(), names.end(), word) != names.end();
+}
+
+std::string what_is_wrong_with(const std::string& word) {
+  return fmt::format("there is no command '{}'{}", word, did_you_mean(word, command_names()));
+}
+
+// "help" is --help, "help design" is design --help.
+std::vector<std::string> without_help_command(std::vector<std::string> arguments) {
+  if (arguments.empty() || arguments[0] != "help") return arguments;
+  arguments.erase(arguments.begin());
+  arguments.push_back("--help");
+  return arguments;
+}
+
+void add_options(CLI::App& sub, const std::string& name, CommandOptions& options) {
+  if (name == "schema") return;
+  sub.add_option("--threads", options.threads, "at most so many threads or processes (results do not depend on it)")
+      ->check(CLI::Range(1, 1024));
+  sub.add_flag("--quiet", options.quiet, "no progress on standard error");
+  if (name == "resume") {
+    sub.add_option("folder", options.problem_file, "output folder of the run, with its journal.jsonl")->required();
+    return;
+  }
+  sub.add_option("problem", options.problem_file, "problem file (*.json)")->required();
+  sub.add_option("--out", options.out, "folder for the results (default: out/<name>/)");
+  sub.add_option("--set", options.sets, "change a field: parameters.k1.value=120; may be repeated")
+      ->type_name("PATH=VALUE")
+      ->allow_extra_args(false);
+  if (name == "identify") {
+    sub.add_option("--profile", options.profiles, "profile likelihood of fitted parameters: k1,run1.theta0")
+        ->delimiter(',')
+        ->type_name("NAME,...");
+  }
+  if (name == "tradeoff") {
+    sub.add_option("--budget", options.budget,
+                   "seconds for the sweep, roughly; 0: only the file's own settings and the defaults")
+        ->check(CLI::Range(0.0, 1e6))
+        ->capture_default_str();
+    sub.add_option("--alpha", options.alpha, "instead of the sweep, what alpha does to the penalty form: 1e2:1e16")
+        ->type_name("LOW:HIGH");
+    sub.add_option("--apply", options.apply,
+                   "also write recommended.json, the problem with the fastest settings of this accuracy: 1e-6")
+        ->check(CLI::Range(1e-15, 1.0))
+        ->type_name("ACCURACY");
+  }
+  if (name == "gradient") {
+    sub.add_option("--method", options.method, "how gradients are computed")
+        ->check(CLI::IsMember({"auto", "tlm", "adjoint", "cvodes_forward", "cvodes_adjoint", "fd"}))
+        ->capture_default_str();
+    sub.add_flag("--hessian", options.hessian,
+                 "second derivatives, too: extrapolated differences of the adjoint gradient (of the tlm gradient with "
+                 "--method tlm) on frozen steps, not forward over adjoint; not for integrators of CVODES");
+  }
+}
+
+std::string about_the_problem(const CommandContext& context, const std::string& words) {
+  const std::string& file = context.options.problem_file;
+  const std::optional<std::string> placed = context.source ? context.source->placed(words) : std::nullopt;
+  return placed.value_or(file + ": " + words);
+}
+
+// The command's exit code; what was wrong with the input goes to `err` in words.
+int run_in_words(const Command& command, const CommandContext& context) {
+  try {
+    return command.run(context);
+  } catch (const InputError& error) {
+    context.err << error.what() << '\n';
+  } catch (const SceneError& error) {
+    context.err << about_the_problem(context, error.what()) << '\n';
+  } catch (const CsvError& error) {
+    context.err << error.what() << '\n';
+  } catch (const std::invalid_argument& error) {
+    context.err << about_the_problem(context, error.what()) << '\n';
+  } catch (const WriteError& error) {
+    context.err << error.what() << '\n';
+    return kNumericalFailure;
+  } catch (const OutputError& error) {
+    context.err << error.what() << '\n';
+  } catch (const std::filesystem::filesystem_error& error) {
+    context.err << error.what() << '\n';
+  } catch (const std::bad_alloc&) {
+    context.err << "mbsopt: out of memory\n";
+    return kNumericalFailure;
+  } catch (const std::exception& e) {
+    context.err << "mbsopt: " << e.what() << '\n';
+    return kNumericalFailure;
+  }
+  return kBadInput;
+}
+
+// What was printed may wait in a buffer; that it did not arrive is known only now.
+int flushed(int exit_code, std::ostream& out, std::ostream& err) {
+  errno = 0;
+  if (out.flush()) return exit_code;
+  err << fmt::format("mbsopt: standard output cannot be written{}{}\n", errno ? ": " : "",
+                     errno ? std::strerror(errno) : "");
+  return exit_code == kDone ? kNumericalFailure : exit_code;
+}
+
+void add_commands(CLI::App& app, CommandOptions& options) {
+  app.require_subcommand(1);
+  for (const Command& command : kCommands)
+    add_options(*app.add_subcommand(command.name, command.does), command.name, options);
+}
+
+void parse(CLI::App& app, const std::vector<std::string>& arguments) {
+  app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them last first
+}
+
+}  // namespace
+
+CommandOptions options_of(const std::vector<std::string>& arguments) {
+  CLI::App app("", "mbsopt");
+  CommandOptions options;
+  add_commands(app, options);
+  try {
+    parse(app, arguments);
+  } catch (const CLI::ParseError& error) {
+    throw std::invalid_argument(fmt::format("'{}' is no command line: {}", fmt::join(arguments, " "), error.what()));
+  }
+  return options;
+}
+
+int run_command_line(const std::vector<std::string>& given, std::ostream& out, std::ostream& err, bool err_is_terminal,
+                     Ranks* ranks) {
+  const InterruptGuard guard;
+  const std::vector<std::string> arguments = without_help_command(given);
+  if (!arguments.empty() && !is_known(arguments[0])) {
+    err << fmt::format("mbsopt: {}; available: {}\n", what_is_wrong_with(arguments[0]), joined(command_names()));
+    return kBadInput;
+  }
+  CLI::App app("Optimal design and parameter identification of mechanisms.", "mbsopt");
+  app.set_version_flag("--version", "mbsopt " + program_version());
+  app.footer("mbsopt help COMMAND, or mbsopt COMMAND --help, lists a command's options.");
+  app.failure_message(CLI::FailureMessage::simple);
+  CommandContext context{"", arguments, {}, out, err, err_is_terminal, ranks};
+  add_commands(app, context.options);
+  try {
+    parse(app, arguments);
+  } catch (const CLI::ParseError& error) {
+    return flushed(app.exit(error, out, err) == 0 ? kDone : kBadInput, out, err);
+  }
+  context.command = app.get_subcommands().front()->get_name();
+  const auto command =
+      std::find_if(kCommands.begin(), kCommands.end(), [&](const Command& c) { return context.command == c.name; });
+  return flushed(run_in_words(*command, context), out, err);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,162 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "app/report/run_report.hpp"
+#include "app/results/accuracy_results.hpp"
+#include "app/results/objective_values.hpp"
+#include "app/results/optimized_problem.hpp"
+#include "app/results/simulated_motion.hpp"
+#include "app/run/command.hpp"
+#include "app/run/run.hpp"
+#include "app/starts/design_starts.hpp"
+#include "app/starts/multistart.hpp"
+#include "app/terminal/interrupt.hpp"
+#include "app/terminal/text_table.hpp"
+#include "core/expression/counted.hpp"
+
+namespace mbsopt {
+namespace {
+
+Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+void print_design(std::ostream& out, const DesignResult& design, const std::string& effort) {
+  TextTable parameters({"parameter", "initial", "optimum", "unit", "at bound"});
+  for (const DesignVariable& v : design.variables) {
+    parameters.add({v.name, significant(v.initial, 10), significant(v.value, 10), v.unit.empty() ? "-" : v.unit,
+                    bound_hit(v.at_lower, v.at_upper)});
+  }
+  const bool any_smooth =
+      design.objective_true || std::any_of(design.constraints.begin(), design.constraints.end(),
+                                           [](const DesignConstraint& c) { return c.true_value.has_value(); });
+  std::vector<std::string> header{"objective", "before", "after"};
+  if (any_smooth) header.push_back("true extreme");
+  if (!design.constraints.empty()) header.insert(header.end(), {"at least", "at most"});
+  TextTable objectives(header);
+  const auto row = [&](const std::string& name, double before, double after, const std::optional<double>& true_value) {
+    std::vector<std::string> cells{name, significant(before), significant(after)};
+    if (any_smooth) cells.push_back(true_value ? significant(*true_value) : "");
+    return cells;
+  };
+  std::vector<std::string> minimised =
+      row(design.objective, design.objective_initial, design.objective_final, design.objective_true);
+  minimised.resize(header.size());
+  objectives.add(minimised);
+  const auto bound = [](const std::optional<double>& value) { return value ? significant(*value) : std::string(); };
+  for (const DesignConstraint& c : design.constraints) {
+    std::vector<std::string> cells = row(c.objective, c.initial, c.value, c.true_value);
+    cells.insert(cells.end(), {bound(c.lower), bound(c.upper)});
+    objectives.add(cells);
+  }
+  out << '\n' << parameters.text() << '\n' << objectives.text();
+  out << fmt::format("\n{} {}: {}, {}, {}{}\n", design.optimizer, to_string(design.status),
+                     counted(design.iterations, "iteration"), counted(design.evaluations, "evaluation"), effort,
+                     design.seed ? fmt::format(", seed {}", *design.seed) : "");
+  if (std::isfinite(design.optimality))
+    out << fmt::format(
+        "optimality {:.1e}, infeasibility {:.1e} at the solution{}\n", design.optimality, design.violation,
+        design.true_violation > design.violation ? fmt::format(", {:.1e} of true extremes", design.true_violation)
+                                                 : "");
+}
+
+void add_to_result(Json& result, const DesignResult& design) {
+  result["simulation"] = to_json(design.final_evaluation.statistics);
+  result["objectives"][design.objective] = objective_json(design.objective_final, design.objective_true);
+  result["objectives"][design.objective]["initial"] = design.objective_initial;
+  for (const DesignConstraint& c : design.constraints) {
+    result["objectives"][c.objective] = {{"value", c.value},          {"initial", c.initial},
+                                         {"lower", or_null(c.lower)}, {"upper", or_null(c.upper)},
+                                         {"violation", c.violation},  {"at_bound", bound_json(c.at_lower, c.at_upper)}};
+    if (!c.true_value) continue;
+    result["objectives"][c.objective]["true_value"] = *c.true_value;
+    result["objectives"][c.objective]["true_violation"] = c.true_violation;
+  }
+  for (const DesignVariable& v : design.variables) {
+    result["parameters"][v.name] = {
+        {"initial", v.initial},      {"value", v.value},          {"unit", v.unit},
+        {"lower", or_null(v.lower)}, {"upper", or_null(v.upper)}, {"at_bound", bound_json(v.at_lower, v.at_upper)}};
+  }
+  result["optimizer"] = {{"type", design.optimizer},
+                         {"algorithm", design.algorithm},
+                         {"status", to_string(design.status)},
+                         {"message", design.message},
+                         {"gradients", design.gradient_choice},
+                         {"iterations", design.iterations},
+                         {"evaluations", design.evaluations},
+                         {"failed_evaluations", design.failed_evaluations},
+                         {"simulations", design.simulations},
+                         {"wall_seconds", design.wall_seconds},
+                         {"objective_initial", design.objective_initial},
+                         {"objective_final", design.objective_final},
+                         {"optimality", number_or_null(design.optimality)},
+                         {"infeasibility", design.violation},
+                         {"true_infeasibility", design.true_violation}};
+  if (design.seed) result["optimizer"]["seed"] = *design.seed;
+}
+
+// Without a column of what the method does not know.
+Trajectory history_of(const DesignResult& design) {
+  const bool optimality = std::all_of(design.history.begin(), design.history.end(),
+                                      [](const DesignRow& row) { return std::isfinite(row.optimality); });
+  Trajectory history{{"iteration", "objective", "infeasibility"}, {}};
+  if (optimality) history.columns.push_back("optimality");
+  for (const DesignVariable& v : design.variables) history.columns.push_back(v.name);
+  for (const DesignRow& row : design.history) {
+    std::vector<double>& line = history.rows.emplace_back(
+        std::vector<double>{static_cast<double>(row.iteration), row.objective, row.violation});
+    if (optimality) line.push_back(row.optimality);
+    line.insert(line.end(), row.parameters.begin(), row.parameters.end());
+  }
+  return history;
+}
+
+std::vector<NewValue> new_values(const DesignResult& design) {
+  std::vector<NewValue> values;
+  for (const DesignVariable& v : design.variables) values.push_back({"", v.name, v.value});
+  return values;
+}
+
+}  // namespace
+
+int design_command(const CommandContext& context) {
+  Run run(context);
+  const Scene& scene = run.problem.scene;
+  if (!run.problem.design) throw std::invalid_argument("design: missing; it says what to minimise and what may change");
+  run.start();
+  if (!settle_accuracy(run)) return run.finish();
+  const SimulatedMotion before = simulated_motion(run, parameter_values(scene));
+  if (!before.simulation.ok()) {
+    interrupted() ? run.stopped("nothing was designed yet")
+                  : run.failed(before.simulation.message, before.simulation.last_good_time);
+    run.write("report.html", simulation_report(scene, run.result, before.trajectory));
+    return run.finish();
+  }
+  run.result["model"] = to_json(before.model);
+  print_model(context.out, scene.name, before.model);
+
+  LongRun long_run(run);
+  const auto [design, cut_off] = minimised(run, long_run, before.psi);
+  add_to_result(run.result, design);
+  const std::optional<MultistartSpec>& starts = run.problem.design->multistart;
+  print_design(context.out, design,
+               starts ? effort(run, starts, design.simulations, design.wall_seconds)
+                      : fmt::format("{:.3g} s", design.wall_seconds));
+  for (const std::string& warning : design.warnings) run.warn(warning);
+  for (const std::string& warning : design.final_evaluation.warnings) run.warn(warning);
+  warn_of_stiffness(run, design.final_evaluation.statistics, true);
+  const SimulatedMotion after = interrupted() ? SimulatedMotion{} : simulated_motion(run, design.rho);
+  if (cut_off || design.status == SolverStatus::stopped || interrupted()) {
+    long_run.stopped("optimized.json holds the best design so far");
+  } else if (!design.ok()) {
+    run.failed(design.message);
+  }
+  const Trajectory history = history_of(design);
+  run.write("optimized.json", optimized_problem_text(run, new_values(design)));
+  run.write("history.csv", to_csv(history));
+  if (!after.trajectory.rows.empty()) run.write("trajectory.csv", to_csv(after.trajectory));
+  run.write("report.html", design_report(scene, design.rho, run.result, history, before.trajectory, after.trajectory));
+  return long_run.finish();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,163 @@
+#include <fmt/format.h>
+
+#include "app/report/motion_plots.hpp"
+#include "app/report/run_report.hpp"
+#include "app/results/accuracy_results.hpp"
+#include "app/results/identification_results.hpp"
+#include "app/results/left_out_bodies.hpp"
+#include "app/results/optimized_problem.hpp"
+#include "app/run/command.hpp"
+#include "app/run/run.hpp"
+#include "app/starts/identify_starts.hpp"
+#include "app/starts/multistart.hpp"
+#include "app/starts/residual_records.hpp"
+#include "app/terminal/interrupt.hpp"
+#include "core/integrate/model_choice.hpp"
+#include "core/simulate/simulation_warnings.hpp"
+#include "core/start/assembly.hpp"
+#include "core/start/model_warnings.hpp"
+#include "optim/fit/experiment.hpp"
+#include "optim/fit/fit_comparison.hpp"
+#include "optim/fit/identification.hpp"
+#include "optim/problem/unused_parameters.hpp"
+
+namespace mbsopt {
+namespace {
+
+// One plot per channel of each experiment.
+std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResult& fit) {
+  std::vector<FitPlot> plots;
+  std::vector<std::size_t> first;  // plot of each experiment's first channel
+  for (const ExperimentFit& experiment : fit.experiments) {
+    first.push_back(plots.size());
+    for (const ChannelFit& channel : experiment.channels) {
+      FitPlot plot{experiment.name, channel.column, "in the column's unit", {}, {}, {}, {}};
+      for (const Sensor& sensor : problem.scene.sensors) {
+        const ChannelSpec& spec =
+            problem.identification->experiments[first.size() - 1].channels[plots.size() - first.back()];
+        const bool same_unit = spec.gain.is_number() && spec.gain.number() == 1;
+        if (sensor.name == channel.sensor && same_unit) plot.unit = unit_of(sensor);
+      }
+      plots.push_back(std::move(plot));
+    }
+  }
+  for (const ResidualRow& row : fit.residuals) {
+    FitPlot& plot = plots[first[row.experiment] + row.channel];
+    plot.times.push_back(row.t);
+    plot.measured.push_back(row.measured);
+    plot.model.push_back(row.model);
+    plot.residual.push_back(row.scaled);
+  }
+  return plots;
+}
+
+IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem, const std::vector<CsvTable>& data) {
+  JsonResidualRecords records(long_run.earlier().residuals,
+                              [&](const Json& content) { long_run.add("residuals", content); });
+  IdentificationOptions options;
+  options.records = &records;
+  options.profiles = run.context.options.profiles;
+  options.simulation_progress = [](double) { return !interrupted(); };
+  options.progress = [&](const FitRow& row) {
+    run.progress.iteration(fmt::format("iteration {:3d}   cost {:.9e}   gradient {:.1e}   step {:.1e}", row.iteration,
+                                       row.cost, row.gradient_norm, row.step_norm));
+    if (row.iteration > long_run.earlier().last_iteration)
+      long_run.add("iterate", {{"iteration", row.iteration},
+                               {"cost", row.cost},
+                               {"parameters", std::vector<double>(row.parameters.begin(), row.parameters.end())}});
+    return !interrupted();
+  };
+  options.profile_progress = [&](const std::string& name, double value, double tau) {
+    run.progress.iteration(fmt::format("profile of {}   {:.6g}   tau {:+.3f}", name, value, tau));
+    return !interrupted();
+  };
+  IdentificationResult fit = run_identification(problem, data, options);
+  run.progress.finish();
+  if (run.problem.identification->multistart) describe_given(run.problem, fit);
+  return fit;
+}
+
+// Of the first experiment that is fitted: it stands for all of them where an integrator is chosen or judged.
+Scene simulated_scene(const Problem& problem, const std::vector<CsvTable>& data) {
+  const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
+  std::size_t e = 0;
+  while (e + 1 < experiments.size() && experiments[e].validate) ++e;
+  return Experiment(problem.scene, experiments[e], fmt::format("identification.experiments[{}]", e), data[e],
+                    parameter_values(problem.scene), {})
+      .simulated();
+}
+
+// Residuals are derived along with the motion, by runs that say nothing of their steps: hence one that does.
+void simulate_first_experiment(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
+  const Scene scene = simulated_scene(needed, data);
+  const Mechanism mechanism(scene, parameter_values(scene), std::vector<bool>(scene.parameters.size(), false));
+  RunOptions options;
+  options.progress = [](double) { return !interrupted(); };
+  const SimulationResult first = simulate(mechanism, scene.simulation, {}, {}, options);
+  run.result["simulation"] = to_json(first.statistics);
+  if (first.ok())
+    for (const std::string& warning : simulation_warnings(scene, first.statistics)) run.warn(warning);
+  warn_of_stiffness(run, first.statistics, true);
+}
+
+std::vector<NewValue> new_values(const IdentificationResult& fit) {
+  std::vector<NewValue> values;
+  for (const FittedParameter& p : fit.parameters) values.push_back({p.experiment, p.parameter, p.value});
+  for (const ExperimentFit& e : fit.experiments) {
+    for (const FittedParameter& p : e.refitted) values.push_back({p.experiment, p.parameter, p.value});
+  }
+  return values;
+}
+
+}  // namespace
+
+int identify_command(const CommandContext& context) {
+  Run run(context);
+  const Scene& scene = run.problem.scene;
+  if (!run.problem.identification) {
+    throw std::invalid_argument("identification: missing; it says which measurements to explain and what may change");
+  }
+  const std::vector<CsvTable> data = data_of(run.problem);
+  // With its drives and overrides, which the scene itself may not even assemble without.
+  const Scene first = simulated_scene(run.problem, data);
+  const Mechanism mechanism(first, parameter_values(first));
+  run.start();
+  if (!settle_accuracy(run, first, {})) return run.finish();
+  if (const Assembly assembly(mechanism, first.simulation.start_time); assembly.result().ok) {
+    ModelSummary model = assembly.summary();
+    add_model(mechanism, scene.simulation, model);
+    run.result["model"] = to_json(model);
+    print_model(context.out, scene.name, model);
+    for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
+  }
+  std::vector<std::string> left_out;
+  const Problem needed = what_measurements_need(run.problem, &left_out);
+  say_left_out(run, left_out, "measurement");
+  simulate_first_experiment(run, needed, data);
+  for (const std::string& warning : doubts_about_fit(needed, data, {{}, [](double) { return !interrupted(); }}))
+    run.warn(warning);
+  LongRun long_run(run);
+  const BestStart best = from_best_start(run, long_run, data);
+  const std::optional<MultistartSpec>& starts = run.problem.identification->multistart;
+  if (interrupted() && starts) return stopped_within_starts(run, long_run, best.problem);
+  long_run.begin();
+  IdentificationResult fit = fitted(run, long_run, best.problem, data);
+  fit.simulations += best.simulations, fit.wall_seconds += best.wall_seconds;
+  add_to_result(run.result, fit);
+  print_fit(context.out, fit, effort(run, starts, fit.simulations, fit.wall_seconds));
+  for (const std::string& warning : fit.warnings) run.warn(warning);
+  const Trajectory history = history_of(fit);
+  if (fit.status == SolverStatus::stopped || interrupted()) {
+    long_run.stopped("optimized.json holds the best fit so far");
+  } else if (!fit.ok()) {
+    run.failed(fit.message);
+  }
+  run.write("optimized.json", optimized_problem_text(run, new_values(fit)));
+  run.write("history.csv", to_csv(history));
+  run.write("residuals.csv", residuals_csv(fit));
+  if (!fit.profiles.empty()) run.write("profile.csv", profile_csv(fit));
+  run.write("report.html", identification_report(scene, run.result, history, fit_plots(run.problem, fit)));
+  return long_run.finish();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,129 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+
+#include "app/report/run_report.hpp"
+#include "app/results/trajectory_csv.hpp"
+#include "app/run/command.hpp"
+#include "app/run/run.hpp"
+#include "app/terminal/interrupt.hpp"
+#include "app/terminal/text_table.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/scene/kinematic_scene.hpp"
+#include "core/start/kinematics.hpp"
+
+namespace mbsopt {
+namespace {
+
+Scene prescribed(const Scene& scene) {
+  std::vector<SceneIssue> issues;
+  Scene out = kinematic_scene(scene, issues);
+  if (issues.empty()) return out;
+  std::string all;
+  for (const SceneIssue& issue : issues) all += (all.empty() ? "" : "\n") + issue.path + ": " + issue.message;
+  throw std::invalid_argument(all);
+}
+
+// Effort of each drive over time: along its coordinate, positive where it pushes the coordinate up.
+struct DriveEfforts {
+  std::vector<int> rows;
+  Trajectory table;
+
+  DriveEfforts(const MechanismData& d) {
+    table.columns = {"t"};
+    for (const Constraint& c : d.constraints) {
+      if (c.drive < 0) continue;
+      rows.push_back(c.row);
+      table.columns.push_back(d.drive_names[static_cast<std::size_t>(c.drive)]);
+    }
+  }
+  void record(const StatePoint& at) {
+    std::vector<double> row{at.t};
+    const Motion& motion = at.motion->motion(at);
+    for (const int r : rows) row.push_back(-motion.lambda(r));
+    table.rows.push_back(std::move(row));
+  }
+};
+
+void add_drives(Run& run, const DriveEfforts& efforts) {
+  if (efforts.rows.empty() || efforts.table.rows.empty()) return;
+  TextTable table({"drive", "least force", "largest force"});
+  for (std::size_t k = 1; k < efforts.table.columns.size(); ++k) {
+    double least = INFINITY, largest = -INFINITY;
+    for (const std::vector<double>& row : efforts.table.rows) {
+      least = std::min(least, row[k]), largest = std::max(largest, row[k]);
+    }
+    const std::string& name = efforts.table.columns[k];
+    run.result["drives"][name] = {{"force_min", least}, {"force_max", largest}};
+    table.add({name, significant(least, 6), significant(largest, 6)});
+  }
+  run.context.out << "\nforce or torque of each drive along its coordinate [N or N m]\n" << table.text();
+}
+
+void add_singular(Run& run, const KinematicsResult& kinematics) {
+  for (const SingularPosition& s : kinematics.singular) {
+    const std::string owners =
+        s.owners.empty() ? std::string() : fmt::format(", between {}", fmt::join(s.owners, ", "));
+    run.warn(
+        fmt::format("singular position at t = {:.6g} s: {} equation{} lost{}; velocities, accelerations "
+                    "and forces are not settled there",
+                    s.t, s.rank_lost, s.rank_lost == 1 ? " is" : "s are", owners));
+  }
+}
+
+}  // namespace
+
+int kinematics_command(const CommandContext& context) {
+  Run run(context);
+  const Scene scene = prescribed(run.problem.scene);
+  run.start();
+  const auto start = std::chrono::steady_clock::now();
+  const Mechanism mechanism(scene, parameter_values(scene), std::vector<bool>(scene.parameters.size(), false));
+  const Assembly assembly(mechanism, scene.simulation.start_time);
+  if (!assembled(run, nullptr, assembly)) return run.finish();
+
+  Trajectory trajectory;
+  const Sampling sampling = record_trajectory(mechanism, scene, trajectory);
+  DriveEfforts efforts(mechanism.data());
+  SimulationStatistics statistics;
+  const SimulationSettings& settings = scene.simulation;
+  const KinematicsResult kinematics = solve_kinematics(
+      mechanism, assembly, settings.formulation, sampling.times, [&](std::size_t i, const StatePoint& at) {
+        sampling.observe(i, at);
+        efforts.record(at);
+        const Energy e = energy(mechanism.data(), at.y, at.angles);
+        statistics.energy_final = e.kinetic + e.potential;
+        if (i == 0) statistics.energy_initial = statistics.energy_final;
+        statistics.energy_drift =
+            std::max(statistics.energy_drift, std::abs(statistics.energy_final - statistics.energy_initial));
+        run.progress.fraction("kinematics", (at.t - settings.start_time) / (settings.end_time - settings.start_time));
+        return !interrupted();
+      });
+  run.progress.finish();
+  statistics.steps = kinematics.steps;
+  statistics.max_position_violation = kinematics.max_position_violation;
+  statistics.max_velocity_violation = kinematics.max_velocity_violation;
+  statistics.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  run.result["simulation"] = to_json(statistics);
+  context.out << fmt::format(
+      "{:.6g} s to {:.6g} s in {} positions by {} steps; largest violation {:.1e} (positions), "
+      "{:.1e} (velocities)\n",
+      settings.start_time, kinematics.last_good_time, trajectory.rows.size(), kinematics.steps,
+      kinematics.max_position_violation, kinematics.max_velocity_violation);
+  run.write("trajectory.csv", to_csv(trajectory));
+  if (!efforts.rows.empty()) run.write("drives.csv", to_csv(efforts.table));
+  add_drives(run, efforts);
+  add_singular(run, kinematics);
+  if (interrupted()) {
+    run.stopped(fmt::format("trajectory.csv holds the motion up to {:.6g} s", kinematics.last_good_time));
+  } else if (!kinematics.ok) {
+    run.failed(kinematics.message, kinematics.last_good_time);
+  }
+  run.write("report.html", simulation_report(scene, run.result, trajectory));
+  return run.finish();
+}
+
+}  // namespace mbsopt

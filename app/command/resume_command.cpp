@@ -1,0 +1,36 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <stdexcept>
+
+#include "app/command/command_line.hpp"
+#include "app/files/journal.hpp"
+#include "app/run/command.hpp"
+#include "app/terminal/exit_code.hpp"
+
+namespace mbsopt {
+
+int resume_command(const CommandContext& context) {
+  const std::filesystem::path folder = context.options.problem_file;
+  const JournalContent journal = read_journal(folder);
+  const std::string command = journal.header.value("command", "");
+  if (!journal.ended.empty() && journal.ended != "interrupted") {
+    context.out << fmt::format("{}: its '{}' came to its end ({}); there is nothing to go on with\n", folder.string(),
+                               command, journal.ended);
+    return kDone;
+  }
+  const auto arguments = journal.header.at("arguments").get<std::vector<std::string>>();
+  CommandOptions options = options_of(arguments);  // as it was begun, but for where we are now
+  options.threads = context.options.threads, options.quiet = context.options.quiet;
+  options.problem_file = (folder / journal.header.at("input").get<std::string>()).lexically_normal().string();
+  options.out = folder.string();
+  options.resume = true;
+  const CommandContext again{command,      arguments, options, context.out, context.err, context.err_is_terminal,
+                             context.ranks};
+  if (command == "design") return design_command(again);
+  if (command == "identify") return identify_command(again);
+  throw std::invalid_argument(
+      fmt::format("{}: is of '{}', which cannot be gone on with", (folder / kJournalFile).string(), command));
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,69 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "app/report/run_report.hpp"
+#include "app/results/accuracy_results.hpp"
+#include "app/results/objective_values.hpp"
+#include "app/results/simulated_motion.hpp"
+#include "app/run/command.hpp"
+#include "app/run/run.hpp"
+#include "app/terminal/text_table.hpp"
+#include "core/simulate/simulation_warnings.hpp"
+
+namespace mbsopt {
+namespace {
+
+void add_objectives(Run& run, const SimulatedMotion& motion) {
+  const Eigen::VectorXd& psi = motion.psi;
+  if (psi.size() == 0) return;
+  const bool any_smooth = std::any_of(motion.true_values.begin(), motion.true_values.end(),
+                                      [](const std::optional<double>& value) { return value.has_value(); });
+  std::vector<std::string> header{"objective", "value"};
+  if (any_smooth) header.push_back("true extreme");
+  TextTable table(header);
+  for (Eigen::Index i = 0; i < psi.size(); ++i) {
+    const std::string& name = run.problem.objectives[static_cast<std::size_t>(i)].name;
+    const std::optional<double>& true_value = motion.true_values[static_cast<std::size_t>(i)];
+    run.result["objectives"][name] = objective_json(psi(i), true_value);
+    std::vector<std::string> row{name, significant(psi(i), 10)};
+    if (any_smooth) row.push_back(true_value ? significant(*true_value, 10) : "");
+    table.add(row);
+  }
+  run.context.out << '\n' << table.text();
+}
+
+}  // namespace
+
+int simulate_command(const CommandContext& context) {
+  Run run(context);
+  const Scene& scene = run.problem.scene;
+  run.start();
+  if (!settle_accuracy(run)) return run.finish();
+  const SimulatedMotion motion = simulated_motion(run, parameter_values(scene));
+  const SimulationResult& simulation = motion.simulation;
+  for (const std::string& warning : motion.warnings) run.warn(warning);
+  if (simulation.status != SimulationStatus::assembly_failed) {
+    run.result["model"] = to_json(motion.model);
+    run.result["simulation"] = to_json(simulation.statistics);
+    print_model(context.out, scene.name, motion.model);
+    Scene simulated = scene;
+    if (!simulation.ok()) simulated.simulation.end_time = simulation.last_good_time;
+    print_simulation(context.out, simulated, simulation.statistics);
+    run.write("trajectory.csv", to_csv(motion.trajectory));
+    for (const std::string& warning : simulation_warnings(scene, simulation.statistics, simulation.ok()))
+      run.warn(warning);
+    warn_of_stiffness(run, simulation.statistics, false);
+  }
+  if (simulation.ok()) {
+    add_objectives(run, motion);
+  } else if (simulation.status == SimulationStatus::stopped) {
+    run.stopped(fmt::format("trajectory.csv holds the motion up to {:.6g} s", simulation.last_good_time));
+  } else {
+    run.failed(simulation.message, simulation.last_good_time);
+  }
+  run.write("report.html", simulation_report(scene, run.result, motion.trajectory));
+  return run.finish();
+}
+
+}  // namespace mbsopt

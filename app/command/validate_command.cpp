@@ -1,0 +1,47 @@
+// Reading a problem is its whole check; what is left to say is what the mechanism is, and what is odd about it.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "app/run/command.hpp"
+#include "app/run/run.hpp"
+#include "app/terminal/text_table.hpp"
+#include "core/start/model_warnings.hpp"
+#include "optim/problem/parameter_uses.hpp"
+
+namespace mbsopt {
+namespace {
+
+void add_parameters(Run& run) {
+  const std::vector<ParameterUse> uses = parameter_uses(run.problem);
+  if (uses.empty()) return;
+  TextTable table({"parameter", "value", "enters"});
+  for (std::size_t k = 0; k < uses.size(); ++k) {
+    const double value = run.problem.scene.parameters[k].value;
+    run.result["parameters"][uses[k].parameter] = {{"value", value}, {"fields", uses[k].fields}};
+    constexpr std::size_t kShown = 4;
+    std::vector<std::string> shown = uses[k].fields;
+    const std::size_t more = shown.size() > kShown ? shown.size() - kShown : 0;
+    if (more > 0) shown.resize(kShown);
+    table.add({uses[k].parameter, significant(value, 6),
+               fmt::format("{}{}", fmt::join(shown, ", "), more > 0 ? fmt::format(" and {} more", more) : "")});
+  }
+  run.context.out << '\n' << table.text();
+}
+
+}  // namespace
+
+int validate_command(const CommandContext& context) {
+  Run run(context);
+  const Mechanism mechanism(run.problem.scene, parameter_values(run.problem.scene));
+  const Assembly assembly(mechanism, run.problem.scene.simulation.start_time);
+  run.start();
+  const bool closed = assembled(run, &mechanism, assembly);
+  if (closed && run.problem.scene.simulation.accuracy)
+    context.out
+        << "simulation.accuracy chooses the integrator when it is run; with an implicit one the model is spatial\n";
+  for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
+  if (closed) add_parameters(run);
+  return run.finish();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,29 @@
+#include "app/files/folder_lock.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+
+#include "app/files/atomic_file.hpp"
+
+namespace mbsopt {
+
+FolderLock::FolderLock(const std::filesystem::path& folder)
+    : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (descriptor_ < 0) throw WriteError(folder, "cannot be opened");
+  held_ = ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0;
+  if (held_ || errno != EWOULDBLOCK) return;
+  ::close(descriptor_);
+  throw OutputError(
+      fmt::format("{}: another mbsopt is writing into this folder; wait for its end, or name another folder with --out",
+                  folder.string()));
+}
+
+FolderLock::~FolderLock() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,75 @@
+#include "app/files/result_json.hpp"
+
+#include <array>
+
+namespace mbsopt {
+namespace {
+
+constexpr std::array kOrder{
+    "program",         "version",        "command",    "problem",         "status",
+    "message",         "last_good_time", "machine",    "model",           "accuracy",
+    "simulation",      "objectives",     "methods",    "hessian_method",  "verdict",
+    "reference",       "settings",       "fit",        "recommendations", "task_recommendations",
+    "applied",         "skipped",        "penalty",    "parameters",      "experiments",
+    "correlation",     "profiles",       "statistics", "multistart",      "optimizer",
+    "identifiability", "provenance",     "warnings"};
+
+}  // namespace
+
+Json to_json(const ModelSummary& summary) {
+  Json json{{"bodies", summary.bodies},
+            {"equations", summary.equations},
+            {"rank", summary.rank},
+            {"degrees_of_freedom", summary.degrees_of_freedom},
+            {"redundant", summary.redundant},
+            {"type", summary.unknowns_per_body == 3 ? "planar" : "spatial"},
+            {"unknowns_per_body", summary.unknowns_per_body}};
+  if (!summary.not_planar.empty()) json["not_planar"] = summary.not_planar;
+  return json;
+}
+
+Json to_json(const SimulationStatistics& statistics) {
+  Json json{{"steps", statistics.steps},
+            {"rejected", statistics.rejected},
+            {"rhs_evaluations", statistics.rhs_evaluations},
+            {"factorisations", statistics.factorisations},
+            {"jacobians", statistics.jacobians},
+            {"factor_blocks", statistics.factor_blocks},
+            {"linearised_states", statistics.linearised_states},
+            {"wall_seconds", statistics.wall_seconds},
+            {"max_acceleration_residual", statistics.max_acceleration_residual},
+            {"max_position_violation", statistics.max_position_violation},
+            {"max_velocity_violation", statistics.max_velocity_violation},
+            {"energy_drift", statistics.energy_drift}};
+  for (const auto& [key, worst] : {std::pair{"quadrature_error", &statistics.quadrature},
+                                   {"extreme_quadrature_error", &statistics.extreme_quadrature},
+                                   {"gradient_quadrature_error", &statistics.gradient_quadrature}})
+    if (worst->error > 0) json[key] = worst->error;
+  if (statistics.watched_steps > 0) {
+    json["watched_steps"] = statistics.watched_steps;
+    json["stability_limited_steps"] = statistics.stability_limited_steps;
+    if (statistics.stability_limited_steps > 0) json["fastest_rate"] = statistics.stiffest_rate;
+  }
+  if (statistics.adjoint_memory_bytes > 0) {
+    json["adjoint_memory_bytes"] = statistics.adjoint_memory_bytes;
+    json["recomputed_steps"] = statistics.recomputed_steps;
+  }
+  return json;
+}
+
+Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+const char* bound_hit(bool lower, bool upper) { return lower ? "lower" : upper ? "upper" : ""; }
+
+Json bound_json(bool lower, bool upper) { return lower || upper ? Json(bound_hit(lower, upper)) : Json(); }
+
+std::string result_json_text(const Json& parts) {
+  Json ordered = Json::object();
+  for (const char* key : kOrder) {
+    if (const auto part = parts.find(key); part != parts.end()) ordered[key] = *part;
+  }
+  for (const auto& [key, part] : parts.items()) ordered[key] = part;  // assigns what is there already to itself
+  return ordered.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,104 @@
+#include "app/results/accuracy_results.hpp"
+
+#include <fmt/format.h>
+
+#include "app/terminal/interrupt.hpp"
+#include "core/expression/counted.hpp"
+#include "core/watch/stiffness.hpp"
+
+namespace mbsopt {
+namespace {
+
+// "engineering (1e-05): dopri5 at rtol 1e-06, atol 1e-08; ..."
+std::string in_words(const AccuracyChoice& choice) {
+  const IntegratorSettings& s = choice.settings.integrator;
+  std::string errors;
+  for (const ErrorEstimate& e : choice.estimates) {
+    const bool rounding = e.error <= AccuracyChoice::kRounding;
+    errors += fmt::format("{}{} {:.1e}{} in {}", errors.empty() ? "" : ", ", rounding ? "at most" : "about", e.error,
+                          e.relative ? "" : " (absolute)", e.quantity);
+  }
+  return fmt::format(
+      "{} is asked for: {} at rtol {:g}, atol {:g} ({}). Estimated error: {}, by a run of {} at rtol {:g}",
+      accuracy_in_words(choice.wanted), s.type, s.rtol, s.atol, choice.why, errors, choice.verified_by.type,
+      choice.verified_by.rtol);
+}
+
+std::string features_in_words(const SceneFeatures& f) {
+  return fmt::format("{}, {}, {}", counted(f.bodies, "body", "bodies"), counted(f.loops, "loop"),
+                     counted(f.drives, "drive"));
+}
+
+Json to_json(const AccuracyChoice& choice, const std::string& words) {
+  const auto integrator = [](const IntegratorSettings& s) {
+    return Json{{"type", s.type}, {"rtol", s.rtol}, {"atol", s.atol}};
+  };
+  Json json{{"in_words", words},
+            {"wanted", choice.wanted},
+            {"reached", choice.reached},
+            {"integrator", integrator(choice.settings.integrator)},
+            {"verified_by", integrator(choice.verified_by)},
+            {"estimated_error", choice.largest_error()},
+            {"rounding", AccuracyChoice::kRounding}};
+  for (const ErrorEstimate& e : choice.estimates)
+    json["errors"][e.quantity] = {{"estimate", e.error}, {"relative", e.relative}};
+  const SceneFeatures& f = choice.features;
+  json["features"] = {{"bodies", f.bodies},
+                      {"loops", f.loops},
+                      {"drives", f.drives},
+                      {"stability_limited", f.limited_steps},
+                      {"fastest_rate", f.stiffest_rate}};
+  json["simulations"] = choice.simulations;
+  return json;
+}
+
+}  // namespace
+
+bool settle_accuracy(Run& run, const Scene& simulated, const std::vector<Objective>& objectives) {
+  const SimulationSettings& given = run.problem.scene.simulation;
+  if (!given.accuracy) return true;
+  AccuracyOptions options;
+  options.limit.interrupted = [] { return interrupted(); };
+  options.progress = [&](int simulations) {
+    run.progress.iteration(fmt::format("choosing an integrator: simulation {}", simulations));
+  };
+  const AccuracyChoice choice = choose_accuracy(simulated, objectives, options);
+  run.progress.finish();
+  if (interrupted()) {
+    run.stopped("the integrator was not chosen yet");
+    return false;
+  }
+  SimulationSettings settings = given;
+  settings.accuracy.reset();
+  settings.integrator = choice.settings.integrator;
+  run.simulate_with(settings);
+  if (!choice.ok) {
+    run.warn(
+        fmt::format("no integrator could be chosen for simulation.accuracy, the default is used: {}", choice.message));
+    return true;
+  }
+  const std::string words = in_words(choice);
+  run.result["accuracy"] = to_json(choice, words);
+  run.context.out << fmt::format("accuracy: {}; {}, {}\n", words, features_in_words(choice.features),
+                                 counted(choice.simulations, "simulation"));
+  if (!choice.reached)
+    run.warn(
+        fmt::format("simulation.accuracy: {:.0e} cannot be had, the estimated error is {:.1e} (rounding, a chaotic "
+                    "motion, a singular "
+                    "position, or a law that is not smooth?)",
+                    choice.wanted, choice.largest_error()));
+  return true;
+}
+
+bool settle_accuracy(Run& run) {
+  const Scene scene = run.problem.scene;
+  return settle_accuracy(run, scene, objectives_of(run.problem));
+}
+
+void warn_of_stiffness(Run& run, const SimulationStatistics& statistics, bool differentiated) {
+  const std::string warning =
+      stiffness_warning(statistics, run.problem.scene.simulation.integrator.type, differentiated);
+  if (!warning.empty()) run.warn(warning);
+}
+
+}  // namespace mbsopt

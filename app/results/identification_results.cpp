@@ -1,0 +1,230 @@
+#include "app/results/identification_results.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "app/files/csv_cell.hpp"
+#include "app/terminal/text_table.hpp"
+#include "core/expression/counted.hpp"
+
+namespace mbsopt {
+namespace {
+
+constexpr Eigen::Index kWholeMatrix = 10;  // parameters, up to which the correlation is printed whole
+constexpr double kStrong = 0.9;            // correlation worth a line of its own
+
+std::string interval_of(const FittedParameter& p) {
+  if (std::isnan(p.std_error)) return "-";
+  if (std::isinf(p.std_error)) return "undetermined";
+  return fmt::format("[{}, {}]", significant(p.ci95[0]), significant(p.ci95[1]));
+}
+
+void add_rows(TextTable& table, const std::vector<FittedParameter>& parameters) {
+  for (const FittedParameter& p : parameters) {
+    table.add({p.name, significant(p.initial), significant(p.value, 9),
+               std::isfinite(p.std_error) ? significant(p.std_error, 3) : "-", interval_of(p),
+               p.unit.empty() ? "-" : p.unit, bound_hit(p.at_lower, p.at_upper)});
+  }
+}
+
+void print_correlation(std::ostream& out, const IdentificationResult& fit) {
+  const Eigen::MatrixXd& r = fit.statistics.correlation;
+  if (r.rows() < 2) return;
+  if (r.rows() <= kWholeMatrix) {
+    std::vector<std::string> header{"correlation"};
+    for (const FittedParameter& p : fit.parameters) header.push_back(p.name);
+    TextTable table(header);
+    for (Eigen::Index i = 0; i < r.rows(); ++i) {
+      std::vector<std::string> row{header[static_cast<std::size_t>(i) + 1]};
+      for (Eigen::Index k = 0; k <= i; ++k) row.push_back(fmt::format("{:.3f}", r(i, k)));
+      row.resize(header.size());
+      table.add(row);
+    }
+    out << '\n' << table.text();
+    return;
+  }
+  TextTable table({"correlated", "with", "correlation"});
+  for (Eigen::Index i = 0; i < r.rows(); ++i)
+    for (Eigen::Index k = 0; k < i; ++k)
+      if (std::abs(r(i, k)) >= kStrong)
+        table.add({fit.parameters[static_cast<std::size_t>(k)].name, fit.parameters[static_cast<std::size_t>(i)].name,
+                   fmt::format("{:.3f}", r(i, k))});
+  if (!table.empty()) out << '\n' << table.text();
+}
+
+void print_profiles(std::ostream& out, const IdentificationResult& fit) {
+  if (fit.profiles.empty()) return;
+  TextTable table({"profile", "95 % interval", "points"});
+  for (const ParameterProfile& p : fit.profiles) {
+    table.add({p.name,
+               fmt::format("[{}, {}]", p.lower ? significant(*p.lower) : "-", p.upper ? significant(*p.upper) : "-"),
+               std::to_string(p.points.size())});
+  }
+  out << '\n' << table.text();
+  for (const ParameterProfile& p : fit.profiles) {
+    if (!p.lower) out << fmt::format("{}: no lower end: {}\n", p.name, p.below);
+    if (!p.upper) out << fmt::format("{}: no upper end: {}\n", p.name, p.above);
+  }
+}
+
+Json to_json(const FittedParameter& p) {
+  Json json{{"initial", p.initial},
+            {"value", p.value},
+            {"std_error", p.std_error},
+            {"ci95", {p.ci95[0], p.ci95[1]}},
+            {"unit", p.unit},
+            {"lower", or_null(p.lower)},
+            {"upper", or_null(p.upper)},
+            {"at_bound", bound_json(p.at_lower, p.at_upper)}};
+  if (p.prior) json["prior"] = {{"mean", p.prior->mean}, {"sigma", p.prior->sigma}};
+  return json;
+}
+
+Json to_json(const ResidualAnalysis& a) {
+  return {{"mean", a.mean},
+          {"autocorrelation", a.autocorrelation},
+          {"lags", a.lags},
+          {"ljung_box", a.ljung_box},
+          {"ljung_box_p", a.ljung_box_p},
+          {"runs", a.runs},
+          {"runs_z", a.runs_z},
+          {"runs_p", a.runs_p},
+          {"in_words", a.in_words()}};
+}
+
+Json to_json(const ExperimentFit& e) {
+  Json json{{"role", e.validate ? "validate" : "fit"},
+            {"start_time", e.start_time},
+            {"end_time", e.end_time},
+            {"samples", e.samples},
+            {"rms", e.rms},
+            {"channels", Json::object()}};
+  for (const ChannelFit& c : e.channels) {
+    json["channels"][c.column] = {{"sensor", c.sensor},
+                                  {"samples", c.samples},
+                                  {"missing", c.missing},
+                                  {"rms", c.rms},
+                                  {"rms_scaled", c.rms_scaled},
+                                  {"sigma", c.sigma},
+                                  {"sigma_is_estimated", c.sigma_is_estimated},
+                                  {"beyond_scale", c.beyond_scale},
+                                  {"residuals", to_json(c.analysis)}};
+  }
+  for (const FittedParameter& p : e.refitted) json["refitted"][p.name] = to_json(p);
+  if (!e.message.empty()) json["message"] = e.message;
+  return json;
+}
+
+Json to_json(const ParameterProfile& p) {
+  Json json{{"ci95", {or_null(p.lower), or_null(p.upper)}}};
+  if (!p.lower) json["no_lower_end"] = p.below;
+  if (!p.upper) json["no_upper_end"] = p.above;
+  for (const ParameterProfile::Point& point : p.points) {
+    json["value"].push_back(point.value);
+    json["cost"].push_back(point.cost);
+    json["tau"].push_back(point.tau);
+  }
+  return json;
+}
+
+}  // namespace
+
+void print_fit(std::ostream& out, const IdentificationResult& fit, const std::string& effort) {
+  TextTable parameters({"parameter", "initial", "value", "std error", "95 % interval", "unit", "at bound"});
+  add_rows(parameters, fit.parameters);
+  TextTable channels({"experiment", "role", "channel", "samples", "rms", "sigma", "rms/sigma", "lag-1", "Ljung-Box p",
+                      "runs p", "residuals"});
+  for (const ExperimentFit& e : fit.experiments) {
+    add_rows(parameters, e.refitted);
+    for (const ChannelFit& c : e.channels) {
+      channels.add({e.name, e.validate ? "validate" : "fit", c.column, std::to_string(c.samples), significant(c.rms, 4),
+                    significant(c.sigma, 4) + (c.sigma_is_estimated ? " (estimated)" : ""),
+                    significant(c.rms_scaled, 4), fmt::format("{:.2f}", c.analysis.autocorrelation),
+                    significant(c.analysis.ljung_box_p, 2), significant(c.analysis.runs_p, 2), c.analysis.in_words()});
+    }
+  }
+  out << '\n' << parameters.text() << '\n' << channels.text();
+  print_correlation(out, fit);
+  print_profiles(out, fit);
+  for (const std::string& words : fit.statistics.unidentifiable) out << "not determined by the data: " << words << '\n';
+  const FitStatistics& s = fit.statistics;
+  if (!s.none.empty()) out << fmt::format("no standard errors and intervals: {}\n", s.none);
+  out << fmt::format("\n{}", counted(fit.samples, "sample"));
+  if (s.std_error.size() > 0)
+    out << fmt::format(", {}; condition number {}",
+                       counted(s.degrees_of_freedom, "degree of freedom", "degrees of freedom"),
+                       std::isinf(s.condition_number) ? "infinite" : significant(s.condition_number, 3));
+  out << '\n';
+  out << fmt::format("{}: {}, {}, {}\n", to_string(fit.status), counted(fit.iterations, "iteration"),
+                     counted(fit.evaluations, "evaluation"), effort);
+}
+
+void add_to_result(Json& result, const IdentificationResult& fit) {
+  result["parameters"] = Json::object();
+  for (const FittedParameter& p : fit.parameters) {
+    result["parameters"][p.name] = to_json(p);
+    if (fit.statistics.correlation.size() > 0) result["correlation"]["names"].push_back(p.name);
+  }
+  for (Eigen::Index i = 0; i < fit.statistics.correlation.rows(); ++i) {
+    const Eigen::VectorXd row = fit.statistics.correlation.row(i);
+    result["correlation"]["matrix"].push_back(std::vector<double>(row.begin(), row.end()));
+  }
+  for (const ExperimentFit& e : fit.experiments) result["experiments"][e.name] = to_json(e);
+  result["optimizer"] = {{"type", "ceres"},
+                         {"status", to_string(fit.status)},
+                         {"message", fit.message},
+                         {"iterations", fit.iterations},
+                         {"evaluations", fit.evaluations},
+                         {"failed_evaluations", fit.failed_evaluations},
+                         {"simulations", fit.simulations},
+                         {"samples", fit.samples},
+                         {"wall_seconds", fit.wall_seconds},
+                         {"objective_initial", fit.cost_initial},
+                         {"objective_final", fit.cost_final}};
+  result["statistics"] = {{"samples", fit.samples},
+                          {"degrees_of_freedom", fit.statistics.degrees_of_freedom},
+                          {"residual_variance", fit.statistics.residual_variance},
+                          {"variance", fit.statistics.variance}};
+  for (const ParameterProfile& p : fit.profiles) result["profiles"][p.name] = to_json(p);
+  result["identifiability"] = {{"condition_number", fit.statistics.condition_number},
+                               {"unidentifiable", fit.statistics.unidentifiable}};
+  if (!fit.statistics.none.empty()) result["statistics"]["no_standard_errors"] = fit.statistics.none;
+}
+
+Trajectory history_of(const IdentificationResult& fit) {
+  Trajectory history{{"iteration", "cost", "gradient_norm", "step_norm"}, {}};
+  for (const FittedParameter& p : fit.parameters) history.columns.push_back(p.name);
+  for (const FitRow& row : fit.history) {
+    history.rows.push_back({static_cast<double>(row.iteration), row.cost, row.gradient_norm, row.step_norm});
+    history.rows.back().insert(history.rows.back().end(), row.parameters.begin(), row.parameters.end());
+  }
+  return history;
+}
+
+std::string residuals_csv(const IdentificationResult& fit) {
+  std::string text = "experiment,channel,t,measured,model,residual\n";
+  for (const ResidualRow& row : fit.residuals) {
+    const ExperimentFit& experiment = fit.experiments[row.experiment];
+    fmt::format_to(std::back_inserter(text), "{},{},{:.17g},{:.17g},{:.17g},{:.17g}\n", csv_cell(experiment.name),
+                   csv_cell(experiment.channels[row.channel].column), row.t, row.measured, row.model, row.scaled);
+  }
+  return text;
+}
+
+std::string profile_csv(const IdentificationResult& fit) {
+  std::string text = "profile,value,cost,tau";
+  for (const FittedParameter& p : fit.parameters) text += "," + csv_cell(p.name);
+  text += '\n';
+  for (const ParameterProfile& profile : fit.profiles) {
+    for (const ParameterProfile::Point& p : profile.points) {
+      fmt::format_to(std::back_inserter(text), "{},{:.17g},{:.17g},{:.17g}", csv_cell(profile.name), p.value, p.cost,
+                     p.tau);
+      for (const double x : p.parameters) fmt::format_to(std::back_inserter(text), ",{:.17g}", x);
+      text += '\n';
+    }
+  }
+  return text;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,22 @@
+// What an identification found, for people on standard output and for scripts in result.json and CSV files.
+#pragma once
+
+#include <ostream>
+#include <string>
+
+#include "app/files/result_json.hpp"
+#include "app/results/trajectory_csv.hpp"
+#include "optim/fit/identification.hpp"
+
+namespace mbsopt {
+
+// effort: what it took, effort() of multistart.hpp.
+void print_fit(std::ostream& out, const IdentificationResult& fit, const std::string& effort);
+// parameters, correlation, experiments, optimizer, statistics, identifiability, profiles
+void add_to_result(Json& result, const IdentificationResult& fit);
+
+Trajectory history_of(const IdentificationResult& fit);      // history.csv
+std::string residuals_csv(const IdentificationResult& fit);  // a row per sample
+std::string profile_csv(const IdentificationResult& fit);    // a row per point of a profile
+
+}  // namespace mbsopt

@@ -1,0 +1,63 @@
+#include "app/results/recommended_problem.hpp"
+
+#include "app/json/edit_text.hpp"
+#include "app/results/optimized_problem.hpp"
+#include "app/run/run.hpp"
+
+namespace mbsopt {
+namespace {
+
+std::string text_of(const Json& object) {
+  std::string text;
+  for (const auto& [key, value] : object.items())
+    text += (text.empty() ? "" : ", ") + Json(key).dump() + ": " + value.dump();
+  return "{" + text + "}";
+}
+
+Json integrator_json(const IntegratorSettings& s) {
+  Json json{{"type", s.type}};
+  if (s.step) {
+    json["step"] = *s.step;
+  } else {
+    json["rtol"] = s.rtol, json["atol"] = s.atol;
+  }
+  if (s.initial_step) json["initial_step"] = *s.initial_step;
+  if (s.max_step) json["max_step"] = *s.max_step;
+  if (s.max_steps != IntegratorSettings{}.max_steps) json["max_steps"] = s.max_steps;
+  return json;
+}
+
+Json formulation_json(const FormulationSettings& f) {
+  const auto projection = f.projection == Projection::none       ? "none"
+                          : f.projection == Projection::velocity ? "velocity"
+                                                                 : "position_velocity";
+  if (f.type == FormulationType::penalty) {
+    return {{"type", "penalty"},
+            {"alpha", f.alpha},
+            {"xi", f.xi},
+            {"omega", f.omega},
+            {"projection", projection},
+            {"linear_solver", f.linear_solver == LinearSolver::cholesky ? "cholesky" : "quasidefinite"}};
+  }
+  return {{"type", "augmented_lagrangian"},
+          {"alpha", f.alpha},
+          {"xi", f.xi},
+          {"omega", f.omega},
+          {"iterations", f.iterations},
+          {"tolerance", f.tolerance},
+          {"projection", projection}};
+}
+
+}  // namespace
+
+std::string recommended_problem_text(const Run& run, const SimulationSettings& settings) {
+  std::string text = optimized_problem_text(run, {});
+  text = without_member(text, "simulation.accuracy");  // it was a choice, too
+  text = with_value(text, "simulation.integrator", text_of(integrator_json(settings.integrator)));
+  const Json formulation = formulation_json(settings.formulation);
+  if (formulation != formulation_json(run.problem.scene.simulation.formulation))
+    text = with_value(text, "simulation.formulation", text_of(formulation));
+  return text;
+}
+
+}  // namespace mbsopt

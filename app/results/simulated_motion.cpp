@@ -1,0 +1,52 @@
+#include "app/results/simulated_motion.hpp"
+
+#include "app/terminal/interrupt.hpp"
+#include "core/integrate/model_choice.hpp"
+#include "core/start/assembly.hpp"
+#include "core/start/model_warnings.hpp"
+#include "optim/objective/objective_run.hpp"
+
+namespace mbsopt {
+
+SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
+  const Scene& scene = run.problem.scene;
+  const SimulationSettings& settings = scene.simulation;
+  const std::vector<Objective> objectives = objectives_of(run.problem);
+  const std::vector<bool> no_derivatives(scene.parameters.size(), false);
+  const Mechanism mechanism(scene, rho, no_derivatives);
+
+  SimulatedMotion motion;
+  const Assembly assembly(mechanism, settings.start_time);
+  if (!assembly.result().ok) {
+    motion.simulation.status = SimulationStatus::assembly_failed;
+    motion.simulation.message = assembly.result().message;
+    motion.simulation.last_good_time = settings.start_time;
+    return motion;
+  }
+  motion.model = assembly.summary();
+  add_model(mechanism, settings, motion.model);
+  motion.warnings = model_warnings(mechanism, assembly);
+
+  std::vector<const Objective*> all;
+  for (const Objective& objective : objectives) all.push_back(&objective);
+  RunOptions options;
+  options.progress = [&](double t) {
+    run.progress.fraction("simulating", (t - settings.start_time) / (settings.end_time - settings.start_time));
+    return !interrupted();
+  };
+  motion.simulation = ObjectiveRun(all, mechanism, settings).run([&](std::span<const Cost> costs) {
+    motion.trajectory = {};
+    const Sampling sampling = record_trajectory(mechanism, scene, motion.trajectory);
+    return simulate(mechanism, settings, costs, sampling, options);
+  });
+  run.progress.finish();
+  if (!motion.simulation.ok()) return motion;
+  motion.psi = motion.simulation.psi;
+  motion.true_values = true_extremes(all, mechanism, settings, motion.simulation.steps);
+  for (std::size_t i = 0; i < objectives.size(); ++i) {
+    motion.psi(static_cast<Eigen::Index>(i)) += objectives[i].parameters_only(rho);
+  }
+  return motion;
+}
+
+}  // namespace mbsopt

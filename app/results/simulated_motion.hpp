@@ -1,0 +1,21 @@
+// A scene simulated at given parameters, with its rows for trajectory.csv and the values of objectives.
+#pragma once
+
+#include "app/results/trajectory_csv.hpp"
+#include "app/run/run.hpp"
+
+namespace mbsopt {
+
+struct SimulatedMotion {
+  SimulationResult simulation;
+  Trajectory trajectory;                           // up to the last good time where the simulation failed
+  Eigen::VectorXd psi;                             // per objective of the problem, where the simulation is ok
+  std::vector<std::optional<double>> true_values;  // of smooth maxima and minima among them
+  ModelSummary model;                              // where the assembly is ok
+  std::vector<std::string> warnings;               // of the start
+};
+
+// Draws the progress of `run`, and stops where the user interrupts.
+SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho);
+
+}  // namespace mbsopt

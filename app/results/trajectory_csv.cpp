@@ -1,0 +1,72 @@
+#include "app/results/trajectory_csv.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iterator>
+
+#include "app/files/csv_cell.hpp"
+
+namespace mbsopt {
+namespace {
+
+constexpr int kDefaultIntervals = 200;
+
+}  // namespace
+
+// start, start + output_step, ..., end: the end is always a row, and never twice.
+std::vector<double> output_times(const SimulationSettings& settings) {
+  const double span = settings.end_time - settings.start_time;
+  const double step = settings.output_step.value_or(span / kDefaultIntervals);
+  const double tolerance = 1e-9;  // of a step: 5/0.01 is not 500 in floating point
+  const auto whole_steps = static_cast<long>(std::floor(span / step + tolerance));
+  std::vector<double> times;
+  times.reserve(static_cast<std::size_t>(whole_steps) + 2);
+  for (long k = 0; k <= whole_steps; ++k) times.push_back(settings.start_time + static_cast<double>(k) * step);
+  if (times.back() < settings.end_time - tolerance * step) {
+    times.push_back(settings.end_time);
+  } else {
+    times.back() = settings.end_time;
+  }
+  return times;
+}
+
+std::vector<std::string> trajectory_columns(const Scene& scene) {
+  std::vector<std::string> columns{"t"};
+  for (const Body& body : scene.bodies) {
+    for (const char* suffix : {"x", "y", "z", "e0", "e1", "e2", "e3", "vx", "vy", "vz", "wx", "wy", "wz"}) {
+      columns.push_back(body.name + "." + suffix);
+    }
+  }
+  for (const Sensor& sensor : scene.sensors) columns.push_back(sensor.name);
+  return columns;
+}
+
+Sampling record_trajectory(const Mechanism& mechanism, const Scene& scene, Trajectory& trajectory) {
+  trajectory.columns = trajectory_columns(scene);
+  Sampling sampling;
+  sampling.times = output_times(scene.simulation);
+  sampling.observe = [&mechanism, &trajectory](std::size_t, const StatePoint& at) {
+    std::vector<double> row{at.t};
+    row.reserve(trajectory.columns.size());
+    for (int body = 0; body < mechanism.bodies(); ++body) {
+      const Eigen::Matrix<double, 13, 1> values = body_row(mechanism, body, at);
+      row.insert(row.end(), values.begin(), values.end());
+    }
+    for (int sensor = 0; sensor < mechanism.sensors(); ++sensor) row.push_back(mechanism.sensor_value(sensor, at));
+    trajectory.rows.push_back(std::move(row));
+  };
+  return sampling;
+}
+
+std::string to_csv(const std::vector<std::string>& columns, const std::vector<std::vector<double>>& rows) {
+  std::string text;
+  for (const std::string& column : columns) text += (text.empty() ? "" : ",") + csv_cell(column);
+  text += '\n';
+  for (const std::vector<double>& row : rows) {
+    fmt::format_to(std::back_inserter(text), "{:.17g}\n", fmt::join(row, ","));
+  }
+  return text;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,29 @@
+// trajectory.csv: t, then per body  .x .y .z .e0 .e1 .e2 .e3 .vx .vy .vz .wx .wy .wz  (body-frame origin and its
+// velocity, angular velocity, global components), then every sensor by name. 17 significant digits, so that numbers
+// read back exactly.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/mechanism/mechanism.hpp"
+#include "core/scene/scene.hpp"
+#include "core/simulate/simulation.hpp"
+
+namespace mbsopt {
+
+struct Trajectory {
+  std::vector<std::string> columns;       // as in the file's header
+  std::vector<std::vector<double>> rows;  // one value per column
+};
+
+std::vector<double> output_times(const SimulationSettings& settings);
+std::vector<std::string> trajectory_columns(const Scene& scene);
+
+// A Sampling that appends a row to the trajectory at each output time. Both arguments must outlive it.
+Sampling record_trajectory(const Mechanism& mechanism, const Scene& scene, Trajectory& trajectory);
+
+std::string to_csv(const std::vector<std::string>& columns, const std::vector<std::vector<double>>& rows);
+inline std::string to_csv(const Trajectory& trajectory) { return to_csv(trajectory.columns, trajectory.rows); }
+
+}  // namespace mbsopt

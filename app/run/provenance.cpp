@@ -1,0 +1,86 @@
+#include "app/run/provenance.hpp"
+
+#include <IpoptConfig.h>
+#include <ceres/version.h>
+#include <fmt/format.h>
+#include <nlopt.h>
+#include <sundials/sundials_config.h>
+#include <CLI/Version.hpp>
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "app/files/sha256.hpp"
+#include "optim/problem/regular_file.hpp"
+
+namespace mbsopt {
+namespace {
+
+// Quoted where a shell would need it, so that the line can be pasted.
+std::string shell_word(const std::string& word) {
+  constexpr const char* plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./:,@%";
+  if (!word.empty() && word.find_first_not_of(plain) == std::string::npos) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+
+std::string nlopt_version_text() {
+  int major = 0, minor = 0, fix = 0;
+  nlopt_version(&major, &minor, &fix);
+  return fmt::format("{}.{}.{}", major, minor, fix);
+}
+
+nlohmann::ordered_json library_versions() {
+  return {{"Eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
+          {"Ipopt", IPOPT_VERSION},
+          {"NLopt", nlopt_version_text()},
+          {"Ceres", CERES_VERSION_STRING},
+          {"SUNDIALS", SUNDIALS_VERSION},
+          {"fmt", fmt::format("{}.{}.{}", FMT_VERSION / 10000, FMT_VERSION / 100 % 100, FMT_VERSION % 100)},
+          {"nlohmann_json", fmt::format("{}.{}.{}", NLOHMANN_JSON_VERSION_MAJOR, NLOHMANN_JSON_VERSION_MINOR,
+                                        NLOHMANN_JSON_VERSION_PATCH)},
+          {"CLI11", CLI11_VERSION},
+          {"compiler", __VERSION__}};
+}
+
+// A run whose input has no checksum could not be gone on with.
+std::string checksum_of(const std::string& file) {
+  std::string checksum = sha256_of_file(file);
+  if (checksum.empty()) throw std::runtime_error(file + ": cannot be read");
+  return checksum;
+}
+
+// Two files may have one base name.
+std::string seen_from(const std::filesystem::path& folder, const std::filesystem::path& file) {
+  const std::filesystem::path relative = file.lexically_relative(folder);
+  return (relative.empty() ? file : relative).generic_string();
+}
+
+}  // namespace
+
+std::string program_version() { return MBSOPT_VERSION; }
+
+std::string sha256_of_file(const std::string& path) {
+  try {
+    return sha256_of(content_of_regular_file(path));
+  } catch (const FileError&) {
+    return {};
+  }
+}
+
+nlohmann::ordered_json provenance(const std::vector<std::string>& arguments, const std::string& input_as_stored,
+                                  const std::string& problem_file, const std::vector<std::string>& data_files) {
+  std::string command_line = "mbsopt";
+  for (const std::string& argument : arguments) command_line += " " + shell_word(argument);
+  nlohmann::ordered_json result{
+      {"command_line", command_line}, {"input", input_as_stored}, {"input_sha256", checksum_of(problem_file)}};
+  const std::filesystem::path folder = std::filesystem::path(problem_file).parent_path().lexically_normal();
+  for (const std::string& file : data_files) result["data_sha256"][seen_from(folder, file)] = checksum_of(file);
+  result["libraries"] = library_versions();
+  return result;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,151 @@
+#include "app/run/run.hpp"
+
+#include <fmt/format.h>
+
+#include "app/json/problem_source.hpp"
+#include "app/run/energy_balance.hpp"
+#include "app/run/provenance.hpp"
+#include "app/terminal/exit_code.hpp"
+#include "core/expression/counted.hpp"
+#include "core/integrate/model_choice.hpp"
+
+namespace mbsopt {
+namespace {
+
+int exit_code_of(const std::string& status) {
+  if (status == "failed") return kNumericalFailure;
+  if (status == "disagrees") return kCheckFailed;
+  return status == "interrupted" ? kInterrupted : kDone;
+}
+
+Problem problem_of(const CommandContext& context, std::vector<std::string>& warnings) {
+  const std::shared_ptr<ProblemSource> source = read_problem_source(context.options.problem_file, context.options.sets);
+  context.source = source;
+  return read_problem(*source, &warnings);
+}
+
+}  // namespace
+
+std::vector<std::string> data_files(const Problem& problem) {
+  std::vector<std::string> files;
+  const auto add = [&](const std::optional<SampledLaw>& law) {
+    if (law) files.push_back(law->csv);
+  };
+  for (const Drive& drive : problem.scene.drives) add(drive.samples);
+  if (!problem.identification) return files;
+  for (const ExperimentSpec& e : problem.identification->experiments) {
+    files.push_back(e.data);
+    for (const DriveLaw& law : e.drives) add(law.samples);
+  }
+  return files;
+}
+
+Run::Run(const CommandContext& given)
+    : problem_(problem_of(given, reader_warnings_)),
+      context(given),
+      folder(given.options.out, problem.scene.name, given.options.problem_file, given.command),
+      progress(given.err, given.err_is_terminal, given.options.quiet) {
+  result["program"] = "mbsopt";
+  result["version"] = program_version();
+  result["command"] = context.command;
+  result["problem"] = problem.scene.name;
+  result["provenance"] =
+      provenance(context.arguments, folder.owner(), context.options.problem_file, data_files(problem));
+  result["warnings"] = Json::array();
+  for (const std::string& warning : reader_warnings_) warn(warning);
+}
+
+Run::~Run() {
+  if (!running_) return;
+  try {
+    progress.finish();
+    result["status"] = "failed";
+    folder.write("result.json", result_json_text(result));
+  } catch (...) {
+    folder.mark_failed();  // the exception under way says more than this one
+  }
+}
+
+void Run::start() {
+  lock_ = folder.claim();
+  result["status"] = "running";
+  folder.write("result.json", result_json_text(result));
+  running_ = true;
+}
+
+void Run::write(const std::string& file, std::string_view content) {
+  folder.write(file, content);
+  written_.push_back(file);
+}
+
+void Run::warn(const std::string& words) {
+  const std::string warning = context.source->placed(words).value_or(words);
+  progress.finish();
+  context.err << "warning: " << warning << '\n';
+  result["warnings"].push_back(warning);
+}
+
+void Run::failed(const std::string& message, std::optional<double> last_good_time) {
+  result["status"] = "failed";
+  result["message"] = message;
+  if (last_good_time) result["last_good_time"] = *last_good_time;
+}
+
+void Run::disagrees() { result["status"] = "disagrees"; }
+
+void Run::stopped(const std::string& kept) {
+  result["status"] = "interrupted";
+  result["message"] = "interrupted; " + kept;
+}
+
+int Run::finish() {
+  progress.finish();
+  if (result["status"] == "running") result["status"] = "ok";
+  const std::string status = result["status"], message = result.value("message", "");
+  if (status == "interrupted") context.err << message << '\n';
+  if (status == "failed" && !message.empty()) context.err << fmt::format("{} failed: {}\n", context.command, message);
+  write("result.json", result_json_text(result));
+  running_ = false;
+  context.out << fmt::format("\n{}: {}\n", (folder.path() / "").string(), fmt::join(written_, " "));
+  return exit_code_of(status);
+}
+
+bool assembled(Run& run, const Mechanism* mechanism, const Assembly& assembly) {
+  const Scene& scene = run.problem.scene;
+  if (!assembly.result().ok) {
+    run.failed(assembly.result().message, scene.simulation.start_time);
+    return false;
+  }
+  ModelSummary model = assembly.summary();
+  if (mechanism) add_model(*mechanism, scene.simulation, model);
+  run.result["model"] = to_json(model);
+  print_model(run.context.out, scene.name, model);
+  return true;
+}
+
+void print_model(std::ostream& out, const std::string& name, const ModelSummary& summary) {
+  out << fmt::format("{}: {}{}, {} of rank {}, {}\n", name, counted(summary.bodies, "body", "bodies"),
+                     summary.unknowns_per_body == 3 ? " in a plane" : "", counted(summary.equations, "equation"),
+                     summary.rank, counted(summary.degrees_of_freedom, "degree of freedom", "degrees of freedom"));
+  if (!summary.redundant.empty()) out << fmt::format("redundant: {}\n", fmt::join(summary.redundant, ", "));
+}
+
+void print_simulation(std::ostream& out, const Scene& scene, const SimulationStatistics& statistics) {
+  const SimulationSettings& settings = scene.simulation;
+  out << fmt::format("{:g} s to {:g} s with {}: {}, {} rejected, {}, {:.3g} s\n", settings.start_time,
+                     settings.end_time, settings.integrator.type, counted(statistics.steps, "step"),
+                     statistics.rejected, counted(statistics.rhs_evaluations, "right-hand side"),
+                     statistics.wall_seconds);
+  out << fmt::format(
+      "largest violation of the constraints {:.1e} (positions), {:.1e} (velocities); largest change of energy {:.1e} "
+      "J{}\n",
+      statistics.max_position_violation, statistics.max_velocity_violation, statistics.energy_drift,
+      conserves_energy(scene) ? "" : fmt::format(" ({})", kWorkIsDone));
+  if (statistics.recomputed_steps > 0) {
+    out << fmt::format("the adjoint kept {:.3g} MiB of the motion and computed {} again\n",
+                       static_cast<double>(statistics.adjoint_memory_bytes) / (1024 * 1024),
+                       counted(statistics.recomputed_steps, "step"));
+  }
+}
+
+}  // namespace mbsopt

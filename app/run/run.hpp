@@ -1,0 +1,77 @@
+// One run of a command on one problem: what all commands share. Reads the problem, claims the output folder, gathers
+// result.json, and ends with an exit code.
+//
+//   Run run(context);                               // throws on bad input
+//   run.start();                                    // from here on there is a result.json
+//   run.result["simulation"] = to_json(statistics);
+//   if (!simulation.ok()) run.failed(simulation.message, simulation.last_good_time);   // how it ended: in the report,
+//   too run.write("report.html", report(run.result)); return run.finish();                            // says how it
+//   ended, and where the results are
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "app/files/result_json.hpp"
+#include "app/run/command.hpp"
+#include "app/run/output_folder.hpp"
+#include "app/terminal/progress.hpp"
+#include "core/start/assembly.hpp"
+#include "optim/problem/parameter_values.hpp"
+#include "optim/problem/problem.hpp"
+
+namespace mbsopt {
+
+class Run {
+ public:
+  explicit Run(const CommandContext& context);
+  ~Run();  // a run that an exception ends has failed, and its result.json says so
+
+ private:
+  std::vector<std::string> reader_warnings_;  // filled while the problem is read, hence before it
+  Problem problem_;
+
+ public:
+  const CommandContext& context;
+  const Problem& problem = problem_;
+  const OutputFolder folder;
+  Json result;  // the parts of result.json
+  Progress progress;
+
+  void start();  // claims the folder: locks it, and writes result.json with "status": "running"
+  void write(const std::string& file, std::string_view content);  // into the folder; named in the closing line
+  void warn(const std::string& words);  // "simulation.accuracy: ...": with the path's place in the file before them
+  // In place of what the file says (accuracy_results.hpp).
+  void simulate_with(const SimulationSettings& settings) { problem_.scene.simulation = settings; }
+
+  // How it ended, unless all went well.
+  // exit 1; last_good_time: of the motion, where it is the simulation that failed
+  void failed(const std::string& message, std::optional<double> last_good_time = {});
+  void disagrees();                       // exit 3
+  void stopped(const std::string& kept);  // exit 130; kept: a sentence, what the folder holds
+
+  int finish();  // the exit code
+
+ private:
+  std::unique_ptr<FolderLock> lock_;
+  std::vector<std::string> written_;
+  bool running_ = false;
+};
+
+// The data files that a problem names.
+std::vector<std::string> data_files(const Problem& problem);
+
+// The model at its assembled start into the result and onto standard output. False where the assembly failed, which
+// then is how the run ended.
+// mechanism: null where its motion is not simulated.
+bool assembled(Run& run, const Mechanism* mechanism, const Assembly& assembly);
+
+// Prints the counts of bodies, equations, degrees of freedom; redundant equations by joint.
+void print_model(std::ostream& out, const std::string& name, const ModelSummary& summary);
+void print_simulation(std::ostream& out, const Scene& scene, const SimulationStatistics& statistics);
+
+}  // namespace mbsopt

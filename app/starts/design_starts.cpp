@@ -1,0 +1,180 @@
+#include "app/starts/design_starts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "app/starts/multistart.hpp"
+#include "app/starts/point_records.hpp"
+#include "app/terminal/interrupt.hpp"
+#include "optim/problem/start_points.hpp"
+#include "optim/solver/nlopt_methods.hpp"
+
+namespace mbsopt {
+namespace {
+
+std::string progress_line(const DesignRow& row) {
+  return fmt::format("iteration {:3d}   objective {:.6e}   infeasibility {:.1e}{}", row.iteration, row.objective,
+                     row.violation,
+                     std::isfinite(row.optimality) ? fmt::format("   optimality {:.1e}", row.optimality) : "");
+}
+
+std::vector<Parameter> designed(const Problem& problem) {
+  std::vector<Parameter> parameters;
+  for (const std::string& name : problem.design->variables) {
+    for (const Parameter& p : problem.scene.parameters)
+      if (p.name == name) parameters.push_back(p);
+  }
+  return parameters;
+}
+
+std::vector<double> numbers(const Eigen::VectorXd& values) { return {values.begin(), values.end()}; }
+
+// All runs draw what is random from seeds that are known before they begin.
+Problem with_seeds(Problem problem, LongRun& long_run) {
+  OptimizerSpec& optimizer = problem.design->optimizer;
+  const NloptMethod* const method = find_nlopt_method(optimizer.type);
+  if (method && method->random) optimizer.seed = long_run.seed("optimizer", optimizer.seed);
+  if (problem.design->multistart)
+    problem.design->multistart->seed = long_run.seed("multistart", problem.design->multistart->seed);
+  return problem;
+}
+
+DesignResult single_run(Run& run, LongRun& long_run, const Problem& problem) {
+  JsonPointRecords records(long_run.earlier().points, long_run.earlier().hessians,
+                           [&](const char* kind, const Json& content) { long_run.add(kind, content); });
+  DesignOptions options;
+  options.records = &records;
+  options.simulation_progress = [](double) { return !interrupted(); };
+  options.progress = [&](const DesignRow& row) {
+    run.progress.iteration(progress_line(row));
+    if (row.iteration > long_run.earlier().last_iteration)
+      long_run.add("iterate", {{"iteration", row.iteration},
+                               {"objective", row.objective},
+                               {"infeasibility", row.violation},
+                               {"parameters", named_values(problem.design->variables, numbers(row.parameters))}});
+    return !interrupted();
+  };
+  return run_design(problem, options);
+}
+
+Problem at_start(Problem problem, int start, const Eigen::VectorXd& values) {
+  problem = with_values(std::move(problem), named_values(problem.design->variables, numbers(values)));
+  if (problem.design->optimizer.seed) *problem.design->optimizer.seed += start;
+  return problem;
+}
+
+// The problem of each start.
+std::function<Problem(int)> starts_of(const Problem& problem) {
+  const MultistartSpec& spec = *problem.design->multistart;
+  return [problem, values = start_values(designed(problem), spec, *spec.seed)](int start) {
+    return at_start(problem, start, values[static_cast<std::size_t>(start)]);
+  };
+}
+
+// In a worker process: the run from one start, with the points it computed, from which the best run is told again.
+Json record_of_start(const Problem& problem, const NlpScale& scale, int start) {
+  Json points = Json::array(), hessians = Json::array();
+  JsonPointRecords records({}, {}, [&](const char* kind, const Json& content) {
+    (std::string_view(kind) == "point" ? points : hessians).push_back(content);
+  });
+  DesignOptions options;
+  options.records = &records;
+  options.simulation_progress = [](double) { return !interrupted(); };
+  options.progress = [](const DesignRow&) { return !interrupted(); };
+  options.scale = scale;
+  options.compare_differences = false;  // once, at the best one's start
+  const DesignResult design = run_design(problem, options);
+  const bool evaluated = !design.history.empty();
+  Json record{{"start", start},
+              {"status", to_string(design.status)},
+              {"message", design.message},
+              {"objective", evaluated ? Json(design.objective_final) : Json()},
+              {"infeasibility", design.violation},
+              {"optimality", std::isfinite(design.optimality) ? Json(design.optimality) : Json()},
+              {"iterations", design.iterations},
+              {"evaluations", design.evaluations},
+              {"simulations", design.simulations},
+              {"wall_seconds", design.wall_seconds}};
+  for (const DesignVariable& v : design.variables)
+    record["from"][v.name] = v.initial, record["parameters"][v.name] = v.value;
+  record["points"] = std::move(points), record["hessians"] = std::move(hessians);
+  return record;
+}
+
+// The run of a record, from the points that it knows.
+DesignResult told_again(const Problem& problem, const NlpScale& scale, const Json& record) {
+  JsonPointRecords records(record.at("points").get<std::vector<Json>>(), record.at("hessians").get<std::vector<Json>>(),
+                           [](const char*, const Json&) {});
+  const auto go_on = [&] { return !interrupted() || !records.all_recalled(); };
+  DesignOptions options;
+  options.records = &records;
+  options.simulation_progress = [&](double) { return go_on(); };
+  options.progress = [&](const DesignRow&) { return go_on(); };
+  options.scale = scale;
+  return run_design(problem, options);
+}
+
+// The best run, but before it the problem as it was given.
+void describe_given(const Problem& problem, const Eigen::VectorXd& before, DesignResult& design) {
+  const std::vector<Parameter> parameters = designed(problem);
+  for (std::size_t k = 0; k < design.variables.size(); ++k) design.variables[k].initial = parameters[k].value;
+  const auto value_before = [&](const std::string& objective) {
+    for (std::size_t i = 0; i < problem.objectives.size(); ++i)
+      if (problem.objectives[i].name == objective) return before(static_cast<Eigen::Index>(i));
+    return std::nan("");
+  };
+  design.objective_initial = value_before(design.objective);
+  for (DesignConstraint& c : design.constraints) c.initial = value_before(c.objective);
+}
+
+// problem: with its seeds.
+Json task_of(const Problem& problem, const NlpScale& scale) {
+  Json task{{"seed", *problem.design->multistart->seed}, {"scale", {{"f", scale.f}, {"c", numbers(scale.c)}}}};
+  if (problem.design->optimizer.seed) task["optimizer_seed"] = *problem.design->optimizer.seed;
+  return task;
+}
+
+DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& problem, const Eigen::VectorXd& before) {
+  const MultistartSpec& spec = *problem.design->multistart;
+  const auto from = starts_of(problem);
+  DesignOptions until_interrupted;
+  until_interrupted.simulation_progress = [](double) { return !interrupted(); };
+  const NlpScale scale = design_scale(from(0), until_interrupted);
+  const MultistartOutcome outcome =
+      run_multistart(run, long_run, spec, design_start_work(problem, task_of(problem, scale)));
+  const Json* const best = outcome.best();
+  DesignOutcome result;
+  result.interrupted = outcome.interrupted;
+  result.design =
+      best ? told_again(from((*best)["start"].get<int>()), scale, *best) : run_design(from(0), until_interrupted);
+  if (best) describe_given(problem, before, result.design);
+  result.design.simulations += outcome.simulations, result.design.wall_seconds += outcome.wall_seconds;
+  return result;
+}
+
+}  // namespace
+
+StartWork design_start_work(Problem problem, const Json& task) {
+  problem.design->multistart->seed = task.at("seed").get<long>();
+  if (task.contains("optimizer_seed")) problem.design->optimizer.seed = task["optimizer_seed"].get<long>();
+  const std::vector<double> c = task.at("scale").at("c").get<std::vector<double>>();
+  const NlpScale scale{task["scale"].at("f").get<double>(),
+                       Eigen::Map<const Eigen::VectorXd>(c.data(), static_cast<Eigen::Index>(c.size()))};
+  return {task, [from = starts_of(problem), scale](int start) { return record_of_start(from(start), scale, start); }};
+}
+
+DesignOutcome minimised(Run& run, LongRun& long_run, const Eigen::VectorXd& before) {
+  const Problem problem = with_seeds(run.problem, long_run);
+  long_run.begin();
+  DesignOutcome outcome;
+  if (problem.design->multistart)
+    outcome = best_of_starts(run, long_run, problem, before);
+  else
+    outcome.design = single_run(run, long_run, problem);
+  run.progress.finish();
+  return outcome;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,21 @@
+// How the design command minimises: one run, or the best of a multistart; journalled, and gone on with.
+#pragma once
+
+#include "app/run/long_run.hpp"
+#include "app/starts/start_workers.hpp"
+#include "optim/design/design.hpp"
+
+namespace mbsopt {
+
+struct DesignOutcome {
+  DesignResult design;
+  bool interrupted = false;  // before all starts had finished
+};
+
+// before: the objectives at the given values, in the problem's order.
+DesignOutcome minimised(Run& run, LongRun& long_run, const Eigen::VectorXd& before);
+
+// The starts of its multistart, from the task that this process or another one has made.
+StartWork design_start_work(Problem problem, const Json& task);
+
+}  // namespace mbsopt

@@ -1,0 +1,133 @@
+#include "app/starts/identify_starts.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "app/results/optimized_problem.hpp"
+#include "app/starts/multistart.hpp"
+#include "app/terminal/interrupt.hpp"
+#include "optim/fit/sigma_estimation.hpp"
+#include "optim/problem/start_points.hpp"
+
+namespace mbsopt {
+namespace {
+
+std::vector<Parameter> shared_parameters(const Problem& problem) {
+  std::vector<Parameter> parameters;
+  for (const std::string& name : problem.identification->variables) {
+    for (const Parameter& p : problem.scene.parameters)
+      if (p.name == name) parameters.push_back(p);
+  }
+  return parameters;
+}
+
+// By which starts are ranked. With sigmas of its own each start ends at a cost of half its degrees of freedom, however
+// bad its fit: only with their logarithms is it the likelihood, sigma_estimation.hpp.
+double objective_of(const IdentificationSpec& spec, const IdentificationResult& fit) {
+  double objective = fit.cost_final;
+  if (!estimates_sigma(spec)) return objective;
+  for (const ExperimentFit& experiment : fit.experiments)
+    for (const ChannelFit& channel : experiment.channels)
+      if (!experiment.validate) objective += static_cast<double>(channel.samples) * std::log(channel.sigma);
+  return objective;
+}
+
+Json record_of_start(const Problem& problem, const std::vector<CsvTable>& data, int start) {
+  IdentificationOptions options;
+  options.simulation_progress = [](double) { return !interrupted(); };
+  options.progress = [](const FitRow&) { return !interrupted(); };
+  const IdentificationResult fit = run_identification(problem, data, options);
+  const double objective = objective_of(*problem.identification, fit);
+  Json record{{"start", start},
+              {"status", to_string(fit.status)},
+              {"message", fit.message},
+              {"objective", std::isfinite(objective) && !fit.history.empty() ? Json(objective) : Json()},
+              {"iterations", fit.iterations},
+              {"evaluations", fit.evaluations},
+              {"simulations", fit.simulations},
+              {"wall_seconds", fit.wall_seconds}};
+  for (const FittedParameter& p : fit.parameters) {
+    record[p.experiment.empty() ? "parameters" : "free"][p.name] = p.value;
+    if (p.experiment.empty()) record["from"][p.name] = p.initial;
+    if (!p.experiment.empty()) record["overrides"][p.experiment][p.parameter] = p.value;
+  }
+  return record;
+}
+
+void override_value(ExperimentSpec& experiment, const std::string& parameter, double value) {
+  const auto found = std::find_if(experiment.overrides.begin(), experiment.overrides.end(),
+                                  [&](const auto& entry) { return entry.first == parameter; });
+  if (found != experiment.overrides.end())
+    found->second = value;
+  else
+    experiment.overrides.emplace_back(parameter, value);
+}
+
+Problem at_fit(const Problem& problem, const Json& record) {
+  Problem fitted = with_values(problem, record.value("parameters", Json::object()));
+  const Json overrides = record.value("overrides", Json::object());
+  for (ExperimentSpec& experiment : fitted.identification->experiments) {
+    if (!overrides.contains(experiment.name)) continue;
+    for (const auto& [name, value] : overrides[experiment.name].items())
+      override_value(experiment, name, value.get<double>());
+  }
+  return fitted;
+}
+
+StartWork start_work(const Problem& problem, const std::vector<CsvTable>& data, long seed) {
+  const MultistartSpec& spec = *problem.identification->multistart;
+  return {{{"seed", seed}}, [problem, data, starts = start_values(shared_parameters(problem), spec, seed)](int start) {
+            const Eigen::VectorXd& values = starts[static_cast<std::size_t>(start)];
+            const Json named = named_values(problem.identification->variables, {values.begin(), values.end()});
+            return record_of_start(with_values(problem, named), data, start);
+          }};
+}
+
+}  // namespace
+
+std::vector<CsvTable> data_of(const Problem& problem) {
+  std::vector<CsvTable> data;
+  for (const ExperimentSpec& experiment : problem.identification->experiments)
+    data.push_back(read_csv(experiment.data));
+  return data;
+}
+
+StartWork identify_start_work(const Problem& problem, const Json& task) {
+  return start_work(problem, data_of(problem), task.at("seed").get<long>());
+}
+
+BestStart from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data) {
+  const Problem& problem = run.problem;
+  if (!problem.identification->multistart) return {problem};
+  MultistartSpec spec = *problem.identification->multistart;
+  spec.seed = long_run.seed("multistart", spec.seed);
+  long_run.begin();
+  const MultistartOutcome outcome = run_multistart(run, long_run, spec, start_work(problem, data, *spec.seed));
+  return {outcome.best() ? at_fit(problem, *outcome.best()) : with_values(problem, Json::object()), outcome.simulations,
+          outcome.wall_seconds};
+}
+
+int stopped_within_starts(Run& run, LongRun& long_run, const Problem& best) {
+  std::vector<NewValue> values;
+  for (const Parameter& p : shared_parameters(best)) values.push_back({"", p.name, p.value});
+  for (const ExperimentSpec& experiment : best.identification->experiments) {
+    for (const auto& [name, value] : experiment.overrides) values.push_back({experiment.name, name, value});
+  }
+  run.write("optimized.json", optimized_problem_text(run, values));
+  long_run.stopped("optimized.json holds the best of the starts so far");
+  return long_run.finish();
+}
+
+void describe_given(const Problem& given, IdentificationResult& fit) {
+  for (FittedParameter& fitted : fit.parameters) {
+    for (const Parameter& p : given.scene.parameters)
+      if (p.name == fitted.parameter) fitted.initial = p.value;
+    for (const ExperimentSpec& experiment : given.identification->experiments) {
+      if (experiment.name != fitted.experiment) continue;
+      for (const auto& [name, value] : experiment.overrides)
+        if (name == fitted.parameter) fitted.initial = value;
+    }
+  }
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,120 @@
+#include "app/starts/mpi_ranks.hpp"
+
+#include <cstdlib>
+#include <stdexcept>
+
+#ifdef MBSOPT_MPI
+#include <dlfcn.h>
+#include <fmt/format.h>
+#include <mpi.h>  // with OMPI_SKIP_MPICXX: the C interface only
+
+#if !defined(OPEN_MPI) || OMPI_MAJOR_VERSION < 3
+#error "Open MPI 3 or later is needed: of others neither the library's name nor its handles are known here"
+#endif
+#endif
+
+namespace mbsopt {
+namespace {
+
+bool started_by_mpirun() {
+  const char* const size = std::getenv("OMPI_COMM_WORLD_SIZE");
+  return size && std::atoi(size) > 1;
+}
+
+}  // namespace
+
+#ifdef MBSOPT_MPI
+namespace {
+
+constexpr const char* kLibrary = "libmpi.so.40";  // of Open MPI 3, 4 and 5
+constexpr int kTag = 1;
+
+// Open MPI, loaded by ranks only: a plain run neither waits for it nor mixes it with the MPI that MUMPS brings along.
+// That one (in libdmumps_seq, a stand-in for one process) exports MPI_Init, MPI_Comm_rank, MPI_Finalize and MPI_Wtime,
+// which MUMPS must go on to find: were Open MPI linked, it would come first. So
+//   RTLD_DEEPBIND   Open MPI finds its own symbols first, not the stand-in's;
+//   RTLD_GLOBAL     its plugins find it, after all that the program was linked with.
+class OpenMpi {
+ public:
+  OpenMpi() : library_(::dlopen(kLibrary, RTLD_NOW | RTLD_GLOBAL | RTLD_DEEPBIND)) {
+    if (!library_) throw std::runtime_error(fmt::format("Open MPI cannot be loaded: {}", ::dlerror()));
+    find(init, "MPI_Init"), find(finalize, "MPI_Finalize");
+    find(comm_rank, "MPI_Comm_rank"), find(comm_size, "MPI_Comm_size");
+    find(send, "MPI_Send"), find(recv, "MPI_Recv"), find(iprobe, "MPI_Iprobe"), find(get_count, "MPI_Get_count");
+    world = static_cast<MPI_Comm>(symbol("ompi_mpi_comm_world"));
+    character = static_cast<MPI_Datatype>(symbol("ompi_mpi_char"));
+  }
+
+  decltype(&MPI_Init) init;
+  decltype(&MPI_Finalize) finalize;
+  decltype(&MPI_Comm_rank) comm_rank;
+  decltype(&MPI_Comm_size) comm_size;
+  decltype(&MPI_Send) send;
+  decltype(&MPI_Recv) recv;
+  decltype(&MPI_Iprobe) iprobe;
+  decltype(&MPI_Get_count) get_count;
+  MPI_Comm world;
+  MPI_Datatype character;
+
+ private:
+  void* symbol(const char* name) const {
+    void* const found = ::dlsym(library_, name);
+    if (!found) throw std::runtime_error(fmt::format("{} has no {}", kLibrary, name));
+    return found;
+  }
+  template <class Function>
+  void find(Function& function, const char* name) const {
+    function = reinterpret_cast<Function>(symbol(name));
+  }
+
+  void* library_;  // stays loaded until the process ends
+};
+
+class MpiRanks : public Ranks {
+ public:
+  MpiRanks() {
+    mpi_.init(nullptr, nullptr);
+    mpi_.comm_rank(mpi_.world, &rank_), mpi_.comm_size(mpi_.world, &size_);
+  }
+  ~MpiRanks() override { mpi_.finalize(); }
+
+  int rank() const override { return rank_; }
+  int size() const override { return size_; }
+
+  void send(int to, const std::string& text) override {
+    mpi_.send(text.data(), static_cast<int>(text.size()), mpi_.character, to, kTag, mpi_.world);
+  }
+
+  std::optional<Message> receive() override {
+    int waiting = 0, length = 0;
+    MPI_Status status;
+    mpi_.iprobe(MPI_ANY_SOURCE, kTag, mpi_.world, &waiting, &status);
+    if (!waiting) return std::nullopt;
+    mpi_.get_count(&status, mpi_.character, &length);
+    Message message{status.MPI_SOURCE, std::string(static_cast<std::size_t>(length), '\0')};
+    mpi_.recv(message.text.data(), length, mpi_.character, status.MPI_SOURCE, kTag, mpi_.world, MPI_STATUS_IGNORE);
+    return message;
+  }
+
+ private:
+  const OpenMpi mpi_;
+  int rank_ = 0, size_ = 1;
+};
+
+}  // namespace
+
+std::unique_ptr<Ranks> mpi_ranks() {
+  if (!started_by_mpirun()) return nullptr;
+  return std::make_unique<MpiRanks>();
+}
+#else
+std::unique_ptr<Ranks> mpi_ranks() {
+  if (started_by_mpirun())
+    throw std::runtime_error(
+        "is one of several processes of mpirun, but was built without MPI: './dev setup --mpi', then build again; or "
+        "leave mpirun away, --threads N uses all cores of one machine");
+  return nullptr;
+}
+#endif
+
+}  // namespace mbsopt

@@ -1,0 +1,42 @@
+// A multistart: one record per start, computed in worker processes (start_workers.hpp), ranked. What a start is, the
+// caller says; a record holds at least
+//
+//   {"start": 7, "status": "converged", "message": "...", "objective": 0.12, "infeasibility": 0, "iterations": 9,
+//    "evaluations": 12, "simulations": 14, "wall_seconds": 0.8, "from": {"k1": 100}, "parameters": {"k1": 87}}
+//
+// and may hold more, which is kept in the journal but not in result.json. Results do not depend on the number of
+// workers: the records are ranked by what they hold, ties by the number of the start.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/files/result_json.hpp"
+#include "app/run/long_run.hpp"
+#include "app/starts/start_workers.hpp"
+#include "optim/problem/problem.hpp"
+
+namespace mbsopt {
+
+struct MultistartOutcome {
+  std::vector<Json> ranked;  // best first; what failed last
+  bool interrupted = false;
+  long simulations = 0;      // of all starts, whichever process or earlier run computed them
+  double wall_seconds = 0;   // added up over them
+  const Json* best() const;  // nullptr: no start has an objective
+};
+
+// spec.seed must be there. Puts "multistart" into the result and prints the waterfall.
+MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSpec& spec, const StartWork& work);
+
+// "412 simulations, 6.9 s in all 20 starts": what the program says of an optimisation's effort.
+std::string effort(const Run& run, const std::optional<MultistartSpec>& starts, long simulations, double wall_seconds);
+
+// Parameter values by name.
+Json named_values(const std::vector<std::string>& names, const std::vector<double>& values);
+
+// The problem with other values of some parameters, and without the multistart.
+Problem with_values(Problem problem, const Json& values);
+
+}  // namespace mbsopt

@@ -1,0 +1,119 @@
+#include "app/starts/rank_server.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <deque>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+
+#include "app/json/read_problem.hpp"
+#include "app/run/provenance.hpp"
+#include "app/starts/design_starts.hpp"
+#include "app/starts/identify_starts.hpp"
+#include "app/terminal/exit_code.hpp"
+#include "app/terminal/interrupt.hpp"
+
+namespace mbsopt {
+namespace {
+
+void set_integrator(Problem& problem, const Json& integrator) {
+  SimulationSettings& settings = problem.scene.simulation;
+  settings.accuracy.reset();
+  settings.integrator.type = integrator.at("type").get<std::string>();
+  settings.integrator.rtol = integrator.at("rtol").get<double>(),
+  settings.integrator.atol = integrator.at("atol").get<double>();
+}
+
+std::function<Json(int)> work_of(const Json& work) {
+  const std::string file = work.at("problem_file"), command = work.at("command");
+  Problem problem = read_problem(file, work.at("sets").get<std::vector<std::string>>());
+  set_integrator(problem, work.at("integrator"));
+  const Json here = provenance({}, "", file, data_files(problem));
+  for (const char* key : {"input_sha256", "data_sha256"})
+    if (here.value(key, Json()) != work.at(key))
+      throw std::runtime_error(
+          fmt::format("{}: it, or a file that it names, has another content here than on rank 0", file));
+  return command == "design" ? design_start_work(problem, work.at("task")).record
+                             : identify_start_work(problem, work.at("task")).record;
+}
+
+class Server {
+ public:
+  explicit Server(Ranks& ranks) : ranks_(ranks) {}
+
+  void run() {
+    while (!dismissed_) {
+      while (const std::optional<Ranks::Message> message = ranks_.receive()) take(Json::parse(message->text));
+      start_what_waits();
+      send_what_has_ended();
+      if (interrupted() && !told_of_interrupt_) {
+        told_of_interrupt_ = true;
+        stop();
+        tell({{"interrupted", true}});
+      }
+    }
+  }
+
+ private:
+  void tell(const Json& message) { ranks_.send(0, message.dump(-1, ' ', false, Json::error_handler_t::replace)); }
+
+  void take(const Json& message) {
+    if (message.contains("dismissed")) dismissed_ = true;
+    if (message.contains("stop")) stop();
+    try {
+      if (message.contains("work")) {
+        const Json& work = message["work"];
+        pool_.emplace(work.at("workers").get<int>(),
+                      [record = work_of(work)](int start) { return record(start).dump(); });
+      }
+      if (message.contains("start") && pool_) waiting_.push_back(message["start"].get<int>());
+    } catch (const std::exception& error) {
+      tell({{"failed", error.what()}});
+    }
+  }
+
+  // What waits is not begun any more.
+  void stop() {
+    waiting_.clear();
+    if (pool_) pool_->stop();
+  }
+
+  void start_what_waits() {
+    try {
+      while (!waiting_.empty() && pool_->has_room() && pool_->start(waiting_.front())) waiting_.pop_front();
+    } catch (const std::exception& error) {
+      waiting_.clear();
+      tell({{"failed", error.what()}});
+    }
+  }
+
+  void send_what_has_ended() {
+    if (!pool_) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(kPollMilliseconds));
+      return;
+    }
+    for (const JobReply& reply : pool_->ended(kPollMilliseconds))
+      tell({{"reply", reply.job}, {"ok", reply.ok}, {"text", reply.text}});
+  }
+
+  Ranks& ranks_;
+  std::optional<ProcessPool> pool_;
+  std::deque<int> waiting_;  // starts for which the system has given no process yet
+  bool dismissed_ = false, told_of_interrupt_ = false;
+};
+
+}  // namespace
+
+int serve(Ranks& ranks) {
+  const InterruptGuard guard;
+  Server(ranks).run();
+  return kDone;
+}
+
+void dismiss(Ranks& ranks) {
+  for (int rank = 1; rank < ranks.size(); ++rank) ranks.send(rank, Json{{"dismissed", true}}.dump());
+}
+
+}  // namespace mbsopt

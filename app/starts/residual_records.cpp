@@ -1,0 +1,66 @@
+#include "app/starts/residual_records.hpp"
+
+#include <stdexcept>
+#include <utility>
+
+#include "app/files/journal.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// Of residuals and their derivatives: longer records are not kept, since simulating again costs less than a journal of
+// many megabytes.
+constexpr Index kMostNumbers = 50'000;
+
+Experiment::Residuals residuals_of(const Json& json) {
+  const auto z = json.at("z").get<std::vector<double>>(), z_u = json.at("z_u").get<std::vector<double>>();
+  const Index rows = static_cast<Index>(z.size()), columns = json.at("columns").get<Index>(),
+              numbers = static_cast<Index>(z_u.size());
+  if (columns < 0 || (rows == 0 ? numbers != 0 : numbers % rows != 0 || numbers / rows != columns))
+    throw std::length_error("a matrix of another size");
+  Experiment::Residuals r;
+  r.ok = true;
+  r.z = Eigen::Map<const VectorXd>(z.data(), rows);
+  r.z_u = Eigen::Map<const MatrixXd>(z_u.data(), rows, columns);
+  r.steps = json.at("steps").get<long>();
+  return r;
+}
+
+}  // namespace
+
+JsonResidualRecords::JsonResidualRecords(const std::vector<Json>& residuals, Tell tell) : tell_(std::move(tell)) {
+  read_record([&] {
+    for (const Json& json : residuals)
+      known_[{json.at("experiment").get<std::size_t>(), json.at("u").get<std::vector<double>>(),
+              json.at("sigma").get<std::vector<double>>()}] = residuals_of(json);
+  });
+}
+
+JsonResidualRecords::Key JsonResidualRecords::key_of(const Asked& asked) {
+  return {asked.experiment, {asked.u.begin(), asked.u.end()}, asked.sigma};
+}
+
+bool JsonResidualRecords::recall(const Asked& asked, Experiment::Residuals& found) {
+  const auto known = known_.find(key_of(asked));
+  if (known == known_.end()) return false;
+  found = known->second;
+  return true;
+}
+
+void JsonResidualRecords::record(const Asked& asked, const Experiment::Residuals& found) {
+  if (found.z.size() + found.z_u.size() > kMostNumbers) return;
+  known_[key_of(asked)] = found;  // nor is a point simulated twice in one run
+  tell_({{"experiment", asked.experiment},
+         {"u", std::vector<double>(asked.u.begin(), asked.u.end())},
+         {"sigma", asked.sigma},
+         {"steps", found.steps},
+         {"columns", found.z_u.cols()},
+         {"z", std::vector<double>(found.z.begin(), found.z.end())},
+         {"z_u", std::vector<double>(found.z_u.data(), found.z_u.data() + found.z_u.size())}});
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,13 @@
+#include "app/terminal/standard_streams.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+namespace mbsopt {
+
+void open_missing_standard_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(stream, F_GETFD) < 0) ::open("/dev/null", O_RDWR);  // takes the lowest free number: this one
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,271 @@
+#include "core/cvodes/cvodes_adjoint.hpp"
+
+#include <fmt/format.h>
+#include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "core/cvodes/cvodes.hpp"
+
+namespace mbsopt::cvodes {
+namespace {
+
+// Of steps between two checkpoints: all of them in memory at once, once forward and once more on the way back.
+constexpr std::size_t kBytesOfSteps = std::size_t{32} << 20;
+constexpr long kFewestSteps = 100, kMostSteps = 20'000;
+
+long steps_between_checkpoints(Eigen::Index states) {
+  const std::size_t bytes = sizeof(double) * static_cast<std::size_t>(states);
+  return std::clamp(static_cast<long>(kBytesOfSteps / bytes), kFewestSteps, kMostSteps);
+}
+
+}  // namespace
+
+Adjoint::Adjoint(ForwardRun& run, const SimulationSettings& settings, std::span<const Cost> costs)
+    : run_(run),
+      settings_(settings),
+      costs_(costs),
+      states_(14 * run.flow().data().n),
+      objectives_(static_cast<Eigen::Index>(costs.size())),
+      active_(static_cast<Eigen::Index>(run.flow().data().active.size())),
+      kept_steps_(steps_between_checkpoints(states_)),
+      tie_(1e-12 * std::max(settings.end_time - settings.start_time,
+                            std::max(std::abs(settings.start_time), std::abs(settings.end_time)))),
+      t_(std::numeric_limits<double>::quiet_NaN()),
+      lambda_vector_(states_ * objectives_, run.context()),
+      mu_vector_(active_ * objectives_, run.context()),
+      linear_solver_(run.flow(), run.context()) {
+  const MechanismData& d = run.flow().data();
+  for (Eigen::VectorXd* x : {&source_, &running_source_, &last_size_}) x->setZero(objectives_);
+  last_time_ = settings.start_time;
+  lambda_.setZero(states_, objectives_);
+  mu_.setZero(d.rho.size(), objectives_);
+  for (Eigen::VectorXd* x : {&lambda_at_, &lambda_rate_}) x->setZero(states_ * objectives_);
+  mu_rate_.setZero(active_ * objectives_);
+  for (Eigen::VectorXd* x : {&w_, &y_bar_}) x->setZero(states_);
+  theta_bar_.setZero(d.slots());
+  rho_bar_.setZero(d.rho.size());
+  run.require(CVodeAdjInit(run.memory(), kept_steps_, CV_POLYNOMIAL));
+}
+
+std::size_t Adjoint::bytes() const {
+  // A checkpoint holds the method's history: at most 13 states, 6 of BDF.
+  const std::size_t vectors = static_cast<std::size_t>(kept_steps_) + 13 * static_cast<std::size_t>(checkpoints_ + 1);
+  return sizeof(double) * static_cast<std::size_t>(states_) * (vectors + jumps_.size()) + run_.flow().history_bytes();
+}
+
+int Adjoint::advance(double end, N_Vector y, double* t) {
+  return CVodeF(run_.memory(), end, y, t, CV_ONE_STEP, &checkpoints_);
+}
+
+void Adjoint::take_sample(const SampleEvent& event, const StatePoint& at) {
+  if (!event.cost) return;
+  Jump jump{event.time, event.objective, Eigen::VectorXd::Zero(states_)};
+  event.cost->add_gradient(at, 1, jump.y_bar, mu_.col(event.objective));
+  double& source = source_(event.objective);
+  source = std::max(source, jump.y_bar.cwiseAbs().maxCoeff());
+  jumps_.push_back(std::move(jump));
+}
+
+// The integral of a running cost's gradient is what lambda might become. Not its largest value times the span: that
+// may be the first steps' of a motion that dies out at once.
+void Adjoint::take_step(const StatePoint& at) {
+  for (const Eigen::Index o : run_.running()) {
+    y_bar_.setZero(), rho_bar_.setZero();
+    costs_[static_cast<std::size_t>(o)].running->add_gradient(at, 1, y_bar_, rho_bar_);
+    const double size = y_bar_.cwiseAbs().maxCoeff();
+    if (!std::isfinite(size)) continue;
+    running_source_(o) += (at.t - last_time_) * std::max(size, last_size_(o));
+    last_size_(o) = size;
+  }
+  last_time_ = at.t;
+}
+
+void Adjoint::begin() {
+  const double end = settings_.end_time;
+  const StatePoint at{end, run_.result().y_end, run_.flow().angles_at(end), run_.flow().motion()};
+  for (Eigen::Index o = 0; o < objectives_; ++o) {
+    const Cost& cost = costs_[static_cast<std::size_t>(o)];
+    if (!cost.terminal) continue;
+    cost.terminal->add_gradient(at, 1, lambda_.col(o), mu_.col(o));
+    source_(o) = std::max(source_(o), lambda_.col(o).cwiseAbs().maxCoeff());
+  }
+  source_ = source_.cwiseMax(running_source_);
+}
+
+void Adjoint::take_jumps(double t) {
+  while (!jumps_.empty() && jumps_.back().time >= t - tie_) {
+    lambda_.col(jumps_.back().objective) += jumps_.back().y_bar;
+    jumps_.pop_back();
+  }
+}
+
+bool Adjoint::evaluate(double t, N_Vector y, N_Vector lambda) {
+  if (t == t_ && values(lambda) == lambda_at_) return true;
+  Flow& flow = run_.flow();
+  if (!flow.linearise(t, values(y))) return false;
+  const MechanismData& d = flow.data();
+  const StatePoint at = flow.point(t, values(y));
+  for (Eigen::Index o = 0; o < objectives_; ++o) {
+    w_ = values(lambda).segment(o * states_, states_);
+    y_bar_.setZero(), theta_bar_.setZero(), rho_bar_.setZero();
+    flow.dynamics().add_adjoint(w_, y_bar_, theta_bar_, rho_bar_);
+    if (const PointCost* running = costs_[static_cast<std::size_t>(o)].running.get()) {
+      running->add_gradient(at, 1, y_bar_, rho_bar_);
+    }
+    d.add_to_rho(theta_bar_, rho_bar_);
+    lambda_rate_.segment(o * states_, states_) = -y_bar_;
+    for (Eigen::Index k = 0; k < active_; ++k) {
+      mu_rate_(o * active_ + k) = -rho_bar_(d.active[static_cast<std::size_t>(k)]);
+    }
+  }
+  if (!lambda_rate_.allFinite() || !mu_rate_.allFinite()) {
+    t_ = std::numeric_limits<double>::quiet_NaN();
+    return false;
+  }
+  t_ = t;
+  lambda_at_ = values(lambda);
+  return true;
+}
+
+int Adjoint::lambda_rate(realtype t, N_Vector y, N_Vector lambda, N_Vector rate, void* self) {
+  Adjoint& adjoint = *static_cast<Adjoint*>(self);
+  return adjoint.run_.flow().thrown().keep([&] {
+    if (!adjoint.evaluate(t, y, lambda)) return kTryASmallerStep;
+    values(rate) = adjoint.lambda_rate_;
+    return kOk;
+  });
+}
+
+int Adjoint::mu_rate(realtype t, N_Vector y, N_Vector lambda, N_Vector rate, void* self) {
+  Adjoint& adjoint = *static_cast<Adjoint*>(self);
+  return adjoint.run_.flow().thrown().keep([&] {
+    if (!adjoint.evaluate(t, y, lambda)) return kTryASmallerStep;
+    values(rate) = adjoint.mu_rate_;
+    return kOk;
+  });
+}
+
+void Adjoint::create_backward() {
+  const IntegratorSettings& s = settings_.integrator;
+  const bool stiff = is_stiff_method(settings_);
+  void* memory = run_.memory();
+  run_.require(CVodeCreateB(memory, stiff ? CV_BDF : CV_ADAMS, &which_));
+  run_.require(CVodeInitB(memory, which_, lambda_rate, settings_.end_time, lambda_vector_));
+  run_.require(CVodeSetUserDataB(memory, which_, this));
+  // atol is meant for a state of size one; lambda is psi's size over the state's.
+  Vector atol(states_ * objectives_, run_.context()), atol_mu(active_ * objectives_, run_.context());
+  const MechanismData& d = run_.flow().data();
+  for (Eigen::Index o = 0; o < objectives_; ++o) {
+    const double atol_o = s.atol * (source_(o) > 0 ? source_(o) : 1);
+    (*atol).segment(o * states_, states_).setConstant(atol_o);
+    for (Eigen::Index k = 0; k < active_; ++k) {
+      (*atol_mu)(o * active_ + k) = atol_o / parameter_size(d.rho(d.active[static_cast<std::size_t>(k)]));
+    }
+  }
+  run_.require(CVodeSVtolerancesB(memory, which_, s.rtol, atol));
+  run_.require(CVodeSetMaxNumStepsB(memory, which_, s.max_steps));
+  if (s.max_step) run_.require(CVodeSetMaxStepB(memory, which_, *s.max_step));
+  if (stiff) {
+    if (!linear_solver_.attach_backward(memory, which_)) run_.require(CV_ILL_INPUT);
+  } else {
+    fixed_point_.reset(SUNNonlinSol_FixedPoint(lambda_vector_, 0, run_.context()));
+    run_.require(CVodeSetNonlinearSolverB(memory, which_, fixed_point_.get()));
+  }
+  if (active_ == 0) return;
+  run_.require(CVodeQuadInitB(memory, which_, mu_rate, mu_vector_));
+  run_.require(CVodeQuadSVtolerancesB(memory, which_, s.rtol, atol_mu));
+  run_.require(CVodeSetQuadErrConB(memory, which_, SUNTRUE));
+}
+
+void Adjoint::failed(int flag) {
+  double t = settings_.end_time;
+  CVodeGetCurrentTime(CVodeGetAdjCVodeBmem(run_.memory(), which_), &t);
+  run_.stop_for(flag, t, "the adjoint's rates");
+  run_.result().message += ". This was on the way back, of the adjoint";
+}
+
+bool Adjoint::go_back_to(double t, double from, const RunOptions& options) {
+  // Stops on the way only to ask whether to go on; they are interpolated and cost nothing.
+  constexpr int kPauses = 50;
+  const double pause = (settings_.end_time - settings_.start_time) / kPauses;
+  for (double next = from; next > t;) {
+    next = next - pause > t + tie_ ? next - pause : t;
+    const int flag = CVodeB(run_.memory(), next, CV_NORMAL);
+    run_.flow().thrown().throw_on();
+    if (flag < 0) {
+      failed(flag);
+      return false;
+    }
+    if (options.progress && !options.progress(settings_.end_time)) {
+      run_.stop(SimulationStatus::stopped, fmt::format("stopped on the way back, at t = {:.6g} s", next));
+      return false;
+    }
+  }
+  double reached = t;
+  run_.require(CVodeGetB(run_.memory(), which_, &reached, lambda_vector_));
+  if (active_ > 0) run_.require(CVodeGetQuadB(run_.memory(), which_, &reached, mu_vector_));
+  lambda_ = Eigen::Map<const Eigen::MatrixXd>((*lambda_vector_).data(), states_, objectives_);
+  return true;
+}
+
+void Adjoint::go_back(const RunOptions& options) {
+  begin();
+  take_jumps(settings_.end_time);
+  *lambda_vector_ = lambda_.reshaped();
+  create_backward();
+  double from = settings_.end_time;
+  while (from > settings_.start_time) {
+    const double to =
+        jumps_.empty() || jumps_.back().time <= settings_.start_time + tie_ ? settings_.start_time : jumps_.back().time;
+    if (!go_back_to(to, from, options)) return;
+    take_jumps(to);
+    if (to > settings_.start_time) {
+      *lambda_vector_ = lambda_.reshaped();
+      run_.require(CVodeReInitB(run_.memory(), which_, to, lambda_vector_));
+      if (active_ > 0) run_.require(CVodeQuadReInitB(run_.memory(), which_, mu_vector_));
+    }
+    from = to;
+  }
+  const std::vector<int>& active = run_.flow().data().active;
+  for (Eigen::Index o = 0; o < objectives_; ++o) {
+    for (Eigen::Index k = 0; k < active_; ++k) {
+      mu_(active[static_cast<std::size_t>(k)], o) += (*mu_vector_)(o * active_ + k);
+    }
+  }
+}
+
+}  // namespace mbsopt::cvodes
+
+namespace mbsopt {
+
+SimulationResult cvodes_adjoint(const Mechanism& mechanism, const SimulationSettings& settings,
+                                std::span<const Cost> costs, const RunOptions& options) {
+  cvodes::refuse_what_cannot_be(settings, options);
+  cvodes::ForwardRun run(mechanism, settings, costs);
+  SimulationResult& result = run.result();
+  result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
+  if (!result.ok()) return run.finish();
+  if (costs.empty()) {
+    run.go({}, options, {});
+    return run.finish();
+  }
+  cvodes::Adjoint adjoint(run, settings, costs);
+  cvodes::ForwardRun::Hooks hooks;
+  hooks.advance = [&](double end, N_Vector y, double* t) { return adjoint.advance(end, y, t); };
+  hooks.sampled = [&](const SampleEvent& event, const StatePoint& at) { adjoint.take_sample(event, at); };
+  hooks.accepted = [&](const StatePoint& at) { adjoint.take_step(at); };
+  run.go({}, options, hooks);
+  if (!result.ok()) return run.finish();
+  result.statistics.adjoint_memory_bytes = adjoint.bytes();
+  adjoint.go_back(options);
+  result.statistics.factorisations += adjoint.factorisations();
+  if (!result.ok()) return run.finish();
+  Eigen::MatrixXd mu = adjoint.mu();
+  run.assembly().add_adjoint(adjoint.lambda(), mu);
+  result.psi_rho = mu.transpose();
+  return run.finish();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,54 @@
+// The equations of motion as a multistep method sees them: ydot = f(t, y), and nothing that hangs on steps. The branch
+// of each followed joint angle is a function of time: that of the last accepted step before it. So the same (t, y)
+// gives the same f when a backward integration comes by again.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/cvodes/cvodes_thrown.hpp"
+#include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/motion_solver.hpp"
+
+namespace mbsopt::cvodes {
+
+class Flow {
+ public:
+  using Numbers = Eigen::Map<Eigen::VectorXd>;
+
+  Flow(const Mechanism& mechanism, const FormulationSettings& settings);
+
+  void start(double t, const Eigen::VectorXd& angles);
+  void accept(double t, const Eigen::VectorXd& y);  // a step ends here
+  const Eigen::VectorXd& angles_at(double t) const;
+  std::size_t history_bytes() const;
+
+  // Solves the equations of motion at (t, y), unless that is where they were solved last. False where that failed.
+  bool evaluate(double t, const Numbers& y);
+  const Eigen::VectorXd& ydot() const { return ydot_; }
+  // The same, ready for dynamics().tangent and .add_adjoint.
+  bool linearise(double t, const Numbers& y);
+
+  // As costs and sensors want it; holds until the next call.
+  StatePoint point(double t, const Numbers& y);
+  MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
+
+  Dynamics& dynamics() { return dynamics_; }
+  const MechanismData& data() const { return mechanism_.data(); }
+  long evaluations() const { return evaluations_; }
+  Thrown& thrown() { return thrown_; }  // in any callback of a run on this flow
+
+ private:
+  const Mechanism mechanism_;
+  Dynamics dynamics_;
+  std::optional<MotionSolver> motion_;  // where some sensor needs it
+  std::vector<double> times_;           // of accepted steps, where angles are followed
+  std::vector<Eigen::VectorXd> angles_;
+  double t_;
+  Eigen::VectorXd y_, ydot_, y_point_;
+  bool solved_ = false, linearised_ = false;
+  long evaluations_ = 0;
+  Thrown thrown_;
+};
+
+}  // namespace mbsopt::cvodes

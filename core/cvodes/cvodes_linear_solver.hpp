@@ -1,0 +1,46 @@
+// NewtonMatrix as SUNDIALS wants a direct linear solver: CVODES decides when f_y is evaluated anew and when its factor
+// may be kept. Forward it solves (I - gamma f_y) x = b; for the adjoint, whose right-hand side is -f_y'lambda per
+// objective, (I + gamma f_y')x = b for each objective's part of the vector.
+#pragma once
+
+#include <sundials/sundials_linearsolver.h>
+#include <sundials/sundials_matrix.h>
+
+#include <memory>
+#include <type_traits>
+
+#include "core/cvodes/cvodes_handles.hpp"
+#include "core/cvodes/cvodes_newton.hpp"
+
+namespace mbsopt::cvodes {
+
+class LinearSolver {
+ public:
+  LinearSolver(Flow& flow, const Context& context);
+  LinearSolver(const LinearSolver&) = delete;
+  LinearSolver& operator=(const LinearSolver&) = delete;
+
+  bool attach(void* memory);                      // to a forward integration
+  bool attach_backward(void* memory, int which);  // to a backward one
+  long factorisations() const { return matrix_.factorisations(); }
+
+ private:
+  struct FreeSolver {
+    void operator()(SUNLinearSolver s) const { SUNLinSolFreeEmpty(s); }
+  };
+  struct FreeMatrix {
+    void operator()(SUNMatrix m) const { SUNMatFreeEmpty(m); }
+  };
+  static LinearSolver& of(SUNMatrix A) { return *static_cast<LinearSolver*>(A->content); }
+  int set_up(double t, const Flow::Numbers& y, bool keep_jacobian, booleantype* jacobian_is_new, double gamma);
+  int solve(N_Vector x, N_Vector b);
+
+  Flow& flow_;
+  NewtonMatrix matrix_;
+  std::unique_ptr<std::remove_pointer_t<SUNLinearSolver>, FreeSolver> solver_;
+  std::unique_ptr<std::remove_pointer_t<SUNMatrix>, FreeMatrix> handle_;
+  bool backward_ = false;
+  Eigen::Index states_;
+};
+
+}  // namespace mbsopt::cvodes

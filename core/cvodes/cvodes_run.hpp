@@ -1,0 +1,102 @@
+// Forward integration by CVODES, one internal step at a time, with the running costs as quadratures whose error is
+// controlled. Samples are read off the method's own interpolating polynomial and never force a step; the end time
+// does. What derivatives need hangs in through Hooks.
+#pragma once
+
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/cvodes/cvodes_flow.hpp"
+#include "core/cvodes/cvodes_handles.hpp"
+#include "core/cvodes/cvodes_linear_solver.hpp"
+#include "core/projection/projection.hpp"
+#include "core/run/sample_schedule.hpp"
+#include "core/run/simulation_result.hpp"
+#include "core/scene/settings.hpp"
+#include "core/start/assembly.hpp"
+
+namespace mbsopt::cvodes {
+
+bool is_stiff_method(const SimulationSettings& settings);  // cvodes_bdf
+// Throws std::invalid_argument: a type that is not CVODES', a fixed step, frozen steps.
+void refuse_what_cannot_be(const SimulationSettings& settings, const RunOptions& options);
+// What the right-hand sides that CVODES calls return.
+inline constexpr int kOk = 0, kTryASmallerStep = 1;
+
+class Sensitivities;  // cvodes_forward.hpp
+
+// The size by which tolerances of a derivative are divided.
+inline double parameter_size(double rho) { return rho == 0 ? 1 : std::abs(rho); }
+
+class ForwardRun {
+ public:
+  struct Hooks {
+    // CVode or CVodeF, one step towards end.
+    std::function<int(double end, N_Vector y, double* t)> advance;
+    std::function<void(const SampleEvent& event, const StatePoint& at)> sampled;  // a cost's, or an observation
+    std::function<void(const StatePoint& at)> accepted;                           // after each step
+  };
+
+  ForwardRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs);
+  ForwardRun(const ForwardRun&) = delete;
+  ForwardRun& operator=(const ForwardRun&) = delete;
+
+  const Assembly& assembly() const { return assembly_; }
+  const Context& context() const { return context_; }
+  void* memory() const { return memory_.get(); }
+  Flow& flow() { return flow_; }
+  SimulationResult& result() { return result_; }
+  const std::vector<Eigen::Index>& running() const { return running_; }  // objectives with a running cost
+  Eigen::VectorXd quadrature_atol() const;                               // of each of these
+
+  // From assembly to the end, with values of all costs; result() says how it ended.
+  void go(std::span<const double> observed, const RunOptions& options, const Hooks& hooks);
+  void set_sensitivities(Sensitivities* sensitivities) { sensitivities_ = sensitivities; }
+  Sensitivities* sensitivities() const { return sensitivities_; }
+  // The value of a running cost within the range that a quadrature can carry; a cost that leaves it makes psi not
+  // finite, as an infinite sum would.
+  double bounded(double g, std::size_t quadrature);
+
+  void require(int flag) const;  // throws std::runtime_error where CVODES refused what is always right
+  void stop(SimulationStatus status, std::string message);
+  // What a negative return value means, in words.
+  void stop_for(int flag, double t, const char* of_what);
+  std::string about_quadratures() const;
+  SimulationResult finish();
+
+ private:
+  void set_up();
+  bool step_is_followed(double h, const Eigen::VectorXd& y);
+  Energy update_statistics(double t, const Eigen::VectorXd& y);
+  void take_samples(SampleSchedule& schedule, double t, const Hooks& hooks);
+  void finish_costs();
+  long rejected() const;  // steps that failed a test of error or did not converge
+  static int f(realtype t, N_Vector y, N_Vector ydot, void* self);
+  static int g(realtype t, N_Vector y, N_Vector gdot, void* self);
+
+  std::chrono::steady_clock::time_point start_;
+  const Mechanism mechanism_;
+  const SimulationSettings settings_;
+  std::span<const Cost> costs_;
+  Assembly assembly_;
+  Flow flow_;
+  Projector violations_;
+  SimulationResult result_;
+  std::vector<Eigen::Index> running_;
+  std::vector<bool> left_range_;
+  std::string last_words_;  // of CVODES
+  Sensitivities* sensitivities_ = nullptr;
+  Eigen::VectorXd y_now_;
+
+  Context context_;
+  Vector y_, y_sample_;
+  LinearSolver linear_solver_;
+  NonlinearSolver fixed_point_;
+  Memory memory_;
+};
+
+}  // namespace mbsopt::cvodes

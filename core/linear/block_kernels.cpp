@@ -1,0 +1,54 @@
+#include "core/linear/block_kernels.hpp"
+
+#include "core/linear/block_loops.hpp"
+#include "core/linear/pairs.hpp"
+
+namespace mbsopt {
+namespace {
+
+static_assert(kLanes == 4);  // as in block_kernels_avx2.cpp
+
+struct SixInPairs : Column<3> {
+  using Column<3>::Column;
+  static SixInPairs zero() {
+    static constexpr double kZeros[6] = {};
+    return SixInPairs(kZeros);
+  }
+  friend SixInPairs operator*(SixInPairs x, const SixInPairs& y) {
+    for (int i = 0; i < 3; ++i) x.x[i] *= y.x[i];
+    return x;
+  }
+  SixInPairs& operator+=(const SixInPairs& y) {
+    for (int i = 0; i < 3; ++i) x[i] += y.x[i];
+    return *this;
+  }
+  SixInPairs& operator-=(const SixInPairs& y) {
+    for (int i = 0; i < 3; ++i) x[i] -= y.x[i];
+    return *this;
+  }
+  // The products with one, two, six columns of six.
+  double times(const double* y) const {
+    const Pair sum = Column<3>::times(y);
+    return sum[0] + sum[1];
+  }
+  Pair times_two(const double* M) const { return sums(Column<3>::times(M), Column<3>::times(M + 6)); }
+  SixInPairs times_columns(const double* M) const {
+    SixInPairs out = *this;
+    for (int i = 0; i < 3; ++i) out.x[i] = times_two(M + 12 * i);
+    return out;
+  }
+};
+
+}  // namespace
+
+const BlockKernels& portable_block_kernels() {
+  static constexpr BlockKernels kKernels = BlockLoops<LaneRow, SixInPairs>::kernels();
+  return kKernels;
+}
+
+const BlockKernels& block_kernels() {
+  static const BlockKernels& kKernels = avx2_block_kernels() ? *avx2_block_kernels() : portable_block_kernels();
+  return kKernels;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,91 @@
+// Compiled with -mavx2 -mfma where the compiler has them (CMakeLists.txt), else empty but for the answer no.
+#include "core/linear/block_kernels.hpp"
+#include "core/linear/block_loops.hpp"
+
+namespace mbsopt {
+
+#if defined(__AVX2__) && defined(__FMA__)
+namespace {
+
+// The attributes of the alias, not of the type: Clang would drop a smaller alignment there.
+using Four __attribute__((aligned(8), may_alias)) = double __attribute__((vector_size(32)));
+static_assert(alignof(Four) == 8);
+
+struct __attribute__((may_alias)) Row {
+  Four x;
+
+  Row& operator+=(const Row& y) { return x += y.x, *this; }
+  Row& operator-=(const Row& y) { return x -= y.x, *this; }
+  Row& operator*=(double s) { return x *= s, *this; }
+  friend Row operator+(const Row& a, const Row& b) { return {a.x + b.x}; }
+  friend Row operator-(const Row& a, const Row& b) { return {a.x - b.x}; }
+  friend Row operator*(double s, const Row& a) { return {s * a.x}; }
+
+  static Row zero() { return {Four{}}; }
+  // To the absolute values of y, where they are larger.
+  void grow_to(const Row& y) {
+    const Four size = y.x < 0 ? -y.x : y.x;
+    x = x > size ? x : size;
+  }
+  double largest() const {
+    const double a = x[0] > x[1] ? x[0] : x[1], b = x[2] > x[3] ? x[2] : x[3];
+    return a > b ? a : b;
+  }
+};
+
+using Two __attribute__((aligned(8), may_alias)) = double __attribute__((vector_size(16)));
+static_assert(alignof(Two) == 8);
+
+class Six {
+ public:
+  explicit Six(const double* from)
+      : a_(*reinterpret_cast<const Four*>(from)), b_(*reinterpret_cast<const Two*>(from + 4)) {}
+  static Six zero() { return Six(Four{}, Two{}); }
+  void add(double s, const double* y) { *this = Six(a_ + s * four(y), b_ + s * two(y)); }
+  void subtract(double s, const double* y) { *this = Six(a_ - s * four(y), b_ - s * two(y)); }
+  void scale(double s) { a_ *= s, b_ *= s; }
+  friend Six operator*(const Six& x, const Six& y) { return Six(x.a_ * y.a_, x.b_ * y.b_); }
+  Six& operator+=(const Six& y) { return a_ += y.a_, b_ += y.b_, *this; }
+  Six& operator-=(const Six& y) { return a_ -= y.a_, b_ -= y.b_, *this; }
+  // The products with one, two, six columns of six.
+  double times(const double* y) const {
+    const Four p = a_ * four(y);
+    const Two sum = __builtin_shufflevector(p, p, 0, 1) + __builtin_shufflevector(p, p, 2, 3) + b_ * two(y);
+    return sum[0] + sum[1];
+  }
+  Two times_two(const double* M) const {
+    const Four p = a_ * four(M), q = a_ * four(M + 6);
+    const Two r = b_ * two(M), s = b_ * two(M + 6);
+    const Four sums = __builtin_shufflevector(p, q, 0, 4, 2, 6) + __builtin_shufflevector(p, q, 1, 5, 3, 7);
+    return __builtin_shufflevector(sums, sums, 0, 1) + __builtin_shufflevector(sums, sums, 2, 3) +
+           (__builtin_shufflevector(r, s, 0, 2) + __builtin_shufflevector(r, s, 1, 3));
+  }
+  Six times_columns(const double* M) const {
+    const Two x = times_two(M), y = times_two(M + 12), z = times_two(M + 24);
+    return Six(__builtin_shufflevector(x, y, 0, 1, 2, 3), z);
+  }
+  void store(double* to) const {
+    *reinterpret_cast<Four*>(to) = a_;
+    *reinterpret_cast<Two*>(to + 4) = b_;
+  }
+
+ private:
+  Six(Four a, Two b) : a_(a), b_(b) {}
+  static Four four(const double* y) { return *reinterpret_cast<const Four*>(y); }
+  static Two two(const double* y) { return *reinterpret_cast<const Two*>(y + 4); }
+
+  Four a_;
+  Two b_;
+};
+
+}  // namespace
+
+const BlockKernels* avx2_block_kernels() {
+  static constexpr BlockKernels kKernels = BlockLoops<Row, Six>::kernels();
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? &kKernels : nullptr;
+}
+#else
+const BlockKernels* avx2_block_kernels() { return nullptr; }
+#endif
+
+}  // namespace mbsopt

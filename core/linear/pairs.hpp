@@ -1,0 +1,98 @@
+// Pairs of doubles, columns of them held in registers, and rows of lanes: vector types of GCC and Clang, which need no
+// particular processor. For the innermost loops of the block solvers, where Eigen's fixed-size expressions go through
+// memory.
+#pragma once
+
+#include "core/linear/fixed_size.hpp"
+
+namespace mbsopt {
+
+// The attributes of the alias, not of the type: Clang would drop a smaller alignment there.
+using Pair __attribute__((aligned(8), may_alias)) = double __attribute__((vector_size(16)));
+static_assert(alignof(Pair) == 8);
+
+// One row of lanes (fixed_size.hpp) in registers. A single vector of four would live in memory where the processor's
+// registers hold two.
+struct __attribute__((may_alias)) LaneRow {
+  using AlignedPair = double __attribute__((vector_size(16), may_alias));
+  AlignedPair low, high;
+
+  LaneRow& operator+=(const LaneRow& x) { return low += x.low, high += x.high, *this; }
+  LaneRow& operator-=(const LaneRow& x) { return low -= x.low, high -= x.high, *this; }
+  LaneRow& operator*=(double s) { return low *= s, high *= s, *this; }
+  friend LaneRow operator+(const LaneRow& x, const LaneRow& y) { return {x.low + y.low, x.high + y.high}; }
+  friend LaneRow operator-(const LaneRow& x, const LaneRow& y) { return {x.low - y.low, x.high - y.high}; }
+  friend LaneRow operator*(double s, const LaneRow& x) { return {s * x.low, s * x.high}; }
+
+  static LaneRow zero() { return {AlignedPair{}, AlignedPair{}}; }
+  // To the absolute values of y, where they are larger.
+  void grow_to(const LaneRow& y) {
+    const AlignedPair a = y.low < 0 ? -y.low : y.low, b = y.high < 0 ? -y.high : y.high;
+    low = low > a ? low : a, high = high > b ? high : b;
+  }
+  double largest() const {
+    const double a = low[0] > low[1] ? low[0] : low[1], b = high[0] > high[1] ? high[0] : high[1];
+    return a > b ? a : b;
+  }
+};
+static_assert(sizeof(LaneRow) == kLanes * sizeof(double));
+
+// The numbers of a vector, or the rows of an array of lanes: formulas written for entries hold for both.
+template <int N>
+double* entries(Vec<N>& x) {
+  return x.data();
+}
+template <int N>
+const double* entries(const Vec<N>& x) {
+  return x.data();
+}
+template <int N>
+LaneRow* entries(Lanes<N>& x) {
+  return reinterpret_cast<LaneRow*>(x.data());
+}
+template <int N>
+const LaneRow* entries(const Lanes<N>& x) {
+  return reinterpret_cast<const LaneRow*>(x.data());
+}
+
+// (a0 + a1, b0 + b1)
+inline Pair sums(Pair a, Pair b) { return __builtin_shufflevector(a, b, 0, 2) + __builtin_shufflevector(a, b, 1, 3); }
+
+// 2 Pairs numbers.
+template <int Pairs>
+struct Column {
+  Pair x[Pairs];
+
+  explicit Column(const double* from) {
+#pragma GCC unroll 16
+    for (int i = 0; i < Pairs; ++i) x[i] = reinterpret_cast<const Pair*>(from)[i];
+  }
+  void add(double s, const double* y) {
+    const Pair ss = {s, s};
+#pragma GCC unroll 16
+    for (int i = 0; i < Pairs; ++i) x[i] += ss * reinterpret_cast<const Pair*>(y)[i];
+  }
+  void subtract(double s, const double* y) {
+    const Pair ss = {s, s};
+#pragma GCC unroll 16
+    for (int i = 0; i < Pairs; ++i) x[i] -= ss * reinterpret_cast<const Pair*>(y)[i];
+  }
+  void scale(double s) {
+    const Pair ss = {s, s};
+#pragma GCC unroll 16
+    for (int i = 0; i < Pairs; ++i) x[i] *= ss;
+  }
+  // x'y, its two halves not yet added.
+  Pair times(const double* y) const {
+    Pair sum = x[0] * reinterpret_cast<const Pair*>(y)[0];
+#pragma GCC unroll 16
+    for (int i = 1; i < Pairs; ++i) sum += x[i] * reinterpret_cast<const Pair*>(y)[i];
+    return sum;
+  }
+  void store(double* to) const {
+#pragma GCC unroll 16
+    for (int i = 0; i < Pairs; ++i) reinterpret_cast<Pair*>(to)[i] = x[i];
+  }
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,166 @@
+#include "core/linear/row_dependence.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/linear/elimination.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using OfBody = Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, 7>;  // no body has more columns
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+// A row's part in the columns of one body, by its elimination position.
+struct Part {
+  int position = 0;
+  OfBody x;
+};
+struct Row {
+  int number = 0;
+  std::vector<Part> parts;  // by ascending position
+};
+
+std::vector<Row> rows_of(int rows, int width, std::span<const SparseEntry> J) {
+  std::vector<Row> all(at(rows));
+  for (const SparseEntry& e : J) {
+    std::vector<Part>& parts = all[at(e.row)].parts;
+    const int body = e.column / width;
+    auto part = std::find_if(parts.begin(), parts.end(), [&](const Part& p) { return p.position == body; });
+    if (part == parts.end()) part = parts.insert(part, {body, OfBody::Zero(width)});
+    part->x(e.column % width) += e.value;
+  }
+  for (int i = 0; i < rows; ++i) {
+    Row& row = all[at(i)];
+    row.number = i;
+    double squares = 0;
+    for (const Part& part : row.parts) squares += part.x.squaredNorm();
+    if (squares > 0)
+      for (Part& part : row.parts) part.x /= std::sqrt(squares);
+  }
+  return all;
+}
+
+std::vector<std::pair<int, int>> pairs_of_bodies(const std::vector<Row>& rows) {
+  std::vector<std::pair<int, int>> pairs;
+  for (const Row& row : rows) {
+    for (std::size_t i = 0; i < row.parts.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j) pairs.emplace_back(row.parts[j].position, row.parts[i].position);
+  }
+  return pairs;
+}
+
+// Rows of a front, in their order, on the columns of its bodies.
+class Front {
+ public:
+  Front(std::size_t rows, Index columns, double threshold)
+      : X_(RowMajor::Zero(static_cast<Index>(rows), columns)), threshold_(threshold) {}
+
+  RowMajor& rows() { return X_; }
+
+  // Rows whose part in the columns [first, first + count) is independent of those before; the others lose it.
+  std::vector<bool> pivots(Index first, Index count) {
+    std::vector<bool> is_pivot(static_cast<std::size_t>(X_.rows()), false);
+    found_.resize(0);
+    for (Index i = 0; i < X_.rows(); ++i) {
+      const double size = std::max(1.0, X_.row(i).norm());
+      for (int twice = 0; twice < 2; ++twice) {
+        for (const Index k : found_) {
+          const double along = X_.row(i).segment(first, count).dot(X_.row(k).segment(first, count));
+          X_.row(i) -= along * X_.row(k);
+        }
+      }
+      const double left = X_.row(i).segment(first, count).norm();
+      if (!(left > threshold_ * size) || static_cast<Index>(found_.size()) == count) continue;
+      X_.row(i) /= left;
+      found_.push_back(i);
+      is_pivot[static_cast<std::size_t>(i)] = true;
+    }
+    return is_pivot;
+  }
+
+  // What the pivots' parts do not span: per direction the column with most of it.
+  std::vector<int> unreached(Index first, Index count) const {
+    MatrixXd left = MatrixXd::Identity(count, count);
+    for (const Index k : found_) {
+      left -= X_.row(k).segment(first, count).transpose() * X_.row(k).segment(first, count);
+    }
+    std::vector<int> columns;
+    for (Index k = static_cast<Index>(found_.size()); k < count; ++k) {
+      Index most = 0;
+      left.diagonal().maxCoeff(&most);
+      columns.push_back(static_cast<int>(most));
+      const Eigen::VectorXd x = left.col(most) / std::sqrt(left(most, most));
+      left -= x * x.transpose();
+    }
+    return columns;
+  }
+
+ private:
+  RowMajor X_;
+  double threshold_;
+  std::vector<Index> found_;
+};
+
+}  // namespace
+
+RowDependence row_dependence(int rows, int bodies, int width, std::span<const SparseEntry> J, double threshold) {
+  RowDependence result;
+  result.independent.assign(at(rows), false);
+  std::vector<Row> all = rows_of(rows, width, J);
+  const Elimination order(bodies, pairs_of_bodies(all));
+  std::vector<std::vector<Row>> waiting(at(bodies));  // for the first body of theirs that is eliminated
+  for (Row& row : all) {
+    for (Part& part : row.parts) part.position = order.position[at(part.position)];
+    std::sort(row.parts.begin(), row.parts.end(), [](const Part& a, const Part& b) { return a.position < b.position; });
+    if (!row.parts.empty()) waiting[at(row.parts.front().position)].push_back(std::move(row));
+  }
+  for (int k = 0; k < bodies; ++k) {
+    std::vector<Row> here = std::move(waiting[at(k)]);
+    waiting[at(k)] = {};
+    std::sort(here.begin(), here.end(), [](const Row& a, const Row& b) { return a.number < b.number; });
+    const std::vector<Elimination::Entry>& others = order.columns[at(k)];
+    const Index passed_on = width * static_cast<Index>(others.size());
+    Front front(here.size(), width + passed_on, threshold);
+    for (std::size_t i = 0; i < here.size(); ++i) {
+      for (const Part& part : here[i].parts) {
+        const auto other = std::lower_bound(others.begin(), others.end(), part.position,
+                                            [](const Elimination::Entry& e, int wanted) { return e.row < wanted; });
+        const Index column = part.position == k ? 0 : width * (1 + (other - others.begin()));
+        front.rows().row(static_cast<Index>(i)).segment(column, width) = part.x;
+      }
+    }
+    const std::vector<bool> is_pivot = front.pivots(0, width);
+    for (const int column : front.unreached(0, width)) result.unreached.push_back({order.order[at(k)], column});
+    std::vector<Index> rest;
+    for (std::size_t i = 0; i < here.size(); ++i) {
+      if (is_pivot[i]) {
+        result.independent[at(here[i].number)] = true;
+      } else if (passed_on > 0) {
+        rest.push_back(static_cast<Index>(i));
+      }
+    }
+    Front next(rest.size(), passed_on, threshold);
+    for (std::size_t i = 0; i < rest.size(); ++i)
+      next.rows().row(static_cast<Index>(i)) = front.rows().row(rest[i]).tail(passed_on);
+    const std::vector<bool> goes_on = next.pivots(0, passed_on);
+    for (std::size_t i = 0; i < rest.size(); ++i) {
+      if (!goes_on[i]) continue;
+      Row row{here[static_cast<std::size_t>(rest[i])].number, {}};
+      for (std::size_t j = 0; j < others.size(); ++j) {
+        row.parts.push_back(
+            {others[j].row, front.rows().row(rest[i]).segment(width * (1 + static_cast<Index>(j)), width)});
+      }
+      waiting[at(others.front().row)].push_back(std::move(row));
+    }
+  }
+  for (const bool independent : result.independent) result.rank += independent ? 1 : 0;
+  return result;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,106 @@
+// What a run may be asked beside its costs, and what it answers: its result, statistics and warnings in numbers.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/run/cost.hpp"
+
+namespace mbsopt {
+
+// Accepted steps: times.size() == sizes.size(); step i goes from times[i] by sizes[i].
+struct StepSequence {
+  std::vector<double> times, sizes;
+  bool to_the_end = true;  // the last step is the run's last, not one before it
+};
+
+// Estimated error of an integral relative to that of the integrand's size; the objective, and when most of it arose.
+struct QuadratureError {
+  double error = 0;
+  std::string of;
+  double time = 0;  // [s]
+};
+
+// A law, component of a force or running cost that jumps at an instant which parameters move (jump_watch.hpp).
+struct Jump {
+  enum class Of { force, drive, objective };  // of a drive: its law's second derivative
+  Of of = Of::force;
+  int index = 0;                // of the force or drive in the scene
+  std::string objective;        // its name
+  double size = 0, t = 0;       // [unit of the law, s]
+  std::vector<int> parameters;  // active ones that the instant depends on directly
+  bool motion = false;          // and whether it depends on the motion
+};
+
+struct SimulationStatistics {
+  // rhs_evaluations: of the equations of motion, each stage of a Newton iteration included; jacobians: of these.
+  long steps = 0, rejected = 0, rhs_evaluations = 0, factorisations = 0, jacobians = 0;
+  // Of the factor of the explicit equations of motion: its blocks (6 x 6, or 3 x 3 in the plane), diagonal ones
+  // included; and at how many states derivatives of these equations were evaluated.
+  long factor_blocks = 0, linearised_states = 0;
+  double wall_seconds = 0;
+  double max_position_violation = 0;                              // of |Phi| over accepted steps [m, -]
+  double max_velocity_violation = 0;                              // of |Phi_q v + Phi_t|
+  double energy_initial = 0, energy_final = 0, energy_drift = 0;  // drift: largest |E - E(0)| over accepted steps [J]
+  double relative_energy_drift = 0;      // of the largest energy so far, where nothing does work; else 0
+  double max_acceleration_residual = 0;  // relative, of the constraints' accelerations; penalty: of projections
+  std::size_t adjoint_memory_bytes = 0;  // the most that the backward sweep kept of the forward run
+  long recomputed_steps = 0;             // for want of memory, of the backward sweep
+  // Of explicit methods that can tell (stiffness.hpp): steps that were looked at, those at the edge of stability among
+  // them, and the fastest rate |lambda| there [1/s].
+  long watched_steps = 0, stability_limited_steps = 0;
+  double stiffest_rate = 0;
+  // The worst resolved running cost, exponential of a smooth extreme, and derivative of either (quadrature_watch.hpp; 0
+  // by CVODES, which controls this error).
+  QuadratureError quadrature, extreme_quadrature, gradient_quadrature;
+  std::vector<Jump> jumps;  // in runs with derivatives
+};
+
+enum class SimulationStatus {
+  ok,
+  assembly_failed,
+  step_too_small,
+  step_too_large,
+  too_many_steps,
+  not_finite,
+  not_solved,    // the stages of an implicit step
+  not_credible,  // run_guard.hpp
+  stopped
+};
+
+struct SimulationResult {
+  SimulationStatus status = SimulationStatus::ok;
+  std::string message;        // in words, with t, h and what to try; empty where ok
+  double last_good_time = 0;  // [s]
+  Eigen::VectorXd psi;        // per cost
+  Eigen::MatrixXd psi_rho;    // cost x parameter; TLM and adjoint only
+  Eigen::VectorXd y_initial, y_end;
+  SimulationStatistics statistics;
+  StepSequence steps;
+  bool ok() const { return status == SimulationStatus::ok; }
+};
+
+// States wanted at given times (ascending, within the simulated span), through dense output; never forces a step.
+struct Sampling {
+  std::vector<double> times;
+  std::function<void(std::size_t index, const StatePoint& at)> observe;
+};
+// The same with derivatives: y_rho is dy/drho at that time, 14n x P; at.ydot is there.
+struct TangentSampling {
+  std::vector<double> times;
+  std::function<void(std::size_t index, const StatePoint& at, const Eigen::MatrixXd& y_rho)> observe;
+};
+
+struct RunOptions {
+  const StepSequence* frozen = nullptr;    // take exactly these steps
+  std::function<bool(double t)> progress;  // called after accepted steps; false stops the run (status: stopped)
+  // The state after each accepted step, the start not counted; for states at times of one's own choice: Sampling.
+  std::function<void(const StatePoint& at)> after_step = {};
+  // Stages of implicit methods to rounding, not to a fraction of the tolerance; always so in runs with derivatives, and
+  // with fixed or given steps. For values that are to be compared with those.
+  bool exact_stages = false;
+};
+
+}  // namespace mbsopt

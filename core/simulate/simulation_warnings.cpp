@@ -1,0 +1,117 @@
+#include "core/simulate/simulation_warnings.hpp"
+
+#include <fmt/format.h>
+
+#include "core/cvodes/cvodes.hpp"
+
+namespace mbsopt {
+namespace {
+
+constexpr double kApart = 1e-3;  // [m, -]
+// [m, -]: projections leave 1e-11 and less, rounding of coordinates up to 1e4 m. Where rows contradict each other, they
+// give up below 1e-8 (projection.cpp) at the first step.
+constexpr double kContradicting = 1e-10;
+constexpr double kUnmet = 1e-5;            // of the accelerations of the constraints
+constexpr double kTakenOut = 1e-4;         // by projections: those of the integration errors are of the order of rtol
+constexpr double kEnergyLost = 1e-2;       // of the largest energy
+constexpr double kUnresolved = 3e-2;       // of the integral of a running cost's size; estimates are pessimistic
+constexpr double kLargePenalty = 3e10;     // above it rounding by Cholesky passes 1e-5 of the accelerations
+constexpr double kDigitsPerAlpha = 1e-16;  // docs/formulations.md, measured
+
+}  // namespace
+
+std::string in_words(const Scene& scene, const Jump& jump) {
+  const std::size_t index = static_cast<std::size_t>(jump.index);
+  const std::string what = jump.of == Jump::Of::force   ? "the law of force '" + scene.forces[index].name + "'"
+                           : jump.of == Jump::Of::drive ? "the acceleration of drive '" + scene.drives[index].name + "'"
+                                                        : "the integrand of objective '" + jump.objective + "'";
+  std::string causes;
+  for (const int k : jump.parameters)
+    causes += (causes.empty() ? "'" : ", '") + scene.parameters[static_cast<std::size_t>(k)].name + "'";
+  if (jump.motion) causes += causes.empty() ? "the motion, and so on the parameters" : " and the motion";
+  return fmt::format(
+      "{} jumps by {:.3g} at t = {:.6g} s, an instant that depends on {}: gradients leave out how it moves, so that "
+      "they may be wrong, even 0. Let the value pass smoothly over a short time, by tanh(x/eps) or smooth_abs(x, eps)",
+      what, jump.size, jump.t, causes);
+}
+
+std::vector<std::string> simulation_warnings(const Scene& scene, const SimulationStatistics& statistics,
+                                             bool finished) {
+  const SimulationSettings& settings = scene.simulation;
+  std::vector<std::string> warnings;
+  const FormulationSettings& f = settings.formulation;
+  const bool penalty = f.type == FormulationType::penalty;
+  if (penalty && f.linear_solver == LinearSolver::cholesky && f.alpha > kLargePenalty) {
+    warnings.push_back(
+        fmt::format("simulation.formulation: penalty with alpha {:.3g} by cholesky leaves the accelerations with "
+                    "relative errors of about {:.0e}, from rounding; \"linear_solver\": \"quasidefinite\" has none "
+                    "of them",
+                    f.alpha, 10 * kDigitsPerAlpha * f.alpha));
+  }
+  if (statistics.max_position_violation > kApart) {
+    warnings.push_back(fmt::format(
+        "the joints came apart: their equations are violated by up to {:.2g} [m, -]. {}",
+        statistics.max_position_violation,
+        penalty ? fmt::format("simulation.formulation.alpha is {:.3g}: raise it, it has to be large against the forces "
+                              "in the joints over the violation that is allowed; or leave the formulation out, the "
+                              "default has no such error",
+                              f.alpha)
+                : std::string("Tighten rtol and atol, or ") +
+                      (is_cvodes(settings.integrator.type)
+                           ? "take a Runge-Kutta method, which projects onto the constraints"
+                           : "let simulation.formulation.projection be position_velocity")));
+  }
+  if (!finished) return warnings;
+  const bool projects = f.projection == Projection::position_velocity && !is_cvodes(settings.integrator.type);
+  if (statistics.relative_energy_drift > kEnergyLost && statistics.max_position_violation <= kApart) {
+    warnings.push_back(fmt::format(
+        "the energy changed by up to {:.2g} J, {:.2g} % of all there is, although nothing does work: this is not the "
+        "motion of the scene. {}{}",
+        statistics.energy_drift, 100 * statistics.relative_energy_drift,
+        settings.integrator.step ? "Take a smaller simulation.integrator.step"
+                                 : "Tighten simulation.integrator.rtol and atol",
+        is_cvodes(settings.integrator.type) ? "; near singular positions a Runge-Kutta method, which projects onto the "
+                                              "constraints, is right where CVODES is not"
+                                            : ""));
+  } else if (penalty && statistics.max_acceleration_residual > kTakenOut) {
+    warnings.push_back(
+        fmt::format("the projections took out {:.2g} of the change of velocity: the penalty does not hold the joints "
+                    "by itself, and the motion is wrong by as much or more. simulation.formulation.alpha is {:.3g}: "
+                    "raise it with \"linear_solver\": \"quasidefinite\", or leave the formulation out, the default "
+                    "has no such error{}",
+                    statistics.max_acceleration_residual, f.alpha,
+                    settings.integrator.step ? "; or take a smaller simulation.integrator.step" : ""));
+  } else if (!penalty && statistics.max_acceleration_residual > kUnmet) {
+    warnings.push_back(fmt::format(
+        "the accelerations of the constraints were met to {:.1e} only: steps came close to a singular position, after "
+        "which the branch may be wrong (compare with another Runge-Kutta method, or other tolerances), or masses "
+        "differ too much for simulation.formulation (a larger alpha or more iterations), or joints lock only by a "
+        "small angle between their axes and give way: raise simulation.formulation.alpha, or make the axes exactly "
+        "parallel",
+        statistics.max_acceleration_residual));
+  } else if (projects && statistics.max_position_violation > kContradicting) {
+    warnings.push_back(fmt::format(
+        "the equations of the joints contradict each other by {:.1e} [m, -], which no projection takes out: some of "
+        "them nearly depend on each other, as where axes in a closed loop are parallel but for a few digits. Which "
+        "motions they leave is uncertain, and so are the motion and its gradients, even in their first digits. Write "
+        "these axes with all digits, or replace a joint of the loop by one with fewer equations (`validate` names "
+        "joints with redundant equations)",
+        statistics.max_position_violation));
+  }
+  const auto add_unresolved = [&](const QuadratureError& worst, const char* what, const char* consequence) {
+    if (!(worst.error > kUnresolved)) return;
+    warnings.push_back(fmt::format(
+        "the steps do not resolve {} of objective '{}': {} has an estimated error of {:.2g} %, most of it near t = "
+        "{:.6g} s. {}, or take cvodes_bdf or cvodes_adams, which control this error",
+        what, worst.of, consequence, 100 * worst.error, worst.time,
+        settings.integrator.step ? "Take a smaller simulation.integrator.step"
+                                 : "Set simulation.integrator.max_step, tighten rtol"));
+  };
+  add_unresolved(statistics.quadrature, "the running cost", "its integral");
+  add_unresolved(statistics.extreme_quadrature, "the peaks", "the integral of their exponential");
+  add_unresolved(statistics.gradient_quadrature, "the derivative of the integrand", "the gradient");
+  for (const Jump& jump : statistics.jumps) warnings.push_back(in_words(scene, jump));
+  return warnings;
+}
+
+}  // namespace mbsopt

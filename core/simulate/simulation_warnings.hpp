@@ -1,0 +1,20 @@
+// What deserves a word about a simulation: settings that cost digits, joints that came apart, integrals that the steps
+// do not resolve, jumps that derivatives do not see.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+#include "core/simulate/simulation.hpp"
+
+namespace mbsopt {
+
+// "the law of force 's1' jumps by 2 at t = 0.5 s, an instant that depends on 'tp': ..."; scene: that was simulated
+std::string in_words(const Scene& scene, const Jump& jump);
+
+// finished: it went through, so that its numbers will be used.
+std::vector<std::string> simulation_warnings(const Scene& scene, const SimulationStatistics& statistics,
+                                             bool finished = true);
+
+}  // namespace mbsopt

@@ -1,0 +1,481 @@
+#include "core/start/assembly.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "core/body/euler_parameters.hpp"
+#include "core/constraint/unit_norm.hpp"
+#include "core/linear/row_dependence.hpp"
+#include "core/linear/sparse_projection.hpp"
+#include "core/start/assembly_equations.hpp"
+#include "core/start/assembly_report.hpp"
+#include "core/start/equilibrium.hpp"
+#include "core/start/nearest_point.hpp"
+
+namespace mbsopt {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// A length for r and 1 for p: the root mean square of entries in p over those in r, in rows of J that have both.
+VectorXd sizes_of_poses(const MatrixXd& J) {
+  double r = 0, p = 0;
+  for (Index k = 0; k < J.cols(); k += 7) {
+    for (Index i = 0; i < J.rows(); ++i) {
+      const double here = J.row(i).segment<3>(k).squaredNorm();
+      if (here > 0) r += here, p += J.row(i).segment<4>(k + 3).squaredNorm();
+    }
+  }
+  const double length = p > 0 ? std::sqrt(p / r) : 1;
+  VectorXd sizes = VectorXd::Ones(J.cols());
+  for (Index k = 0; k < J.cols(); k += 7) sizes.segment<3>(k).setConstant(length);
+  return sizes;
+}
+
+// |J| x with the largest entry of r and of p (or of their rates) for each of theirs.
+VectorXd magnitudes_of_terms(Index rows, const std::vector<SparseEntry>& J, Index first, const VectorXd& x) {
+  VectorXd sums = VectorXd::Zero(rows);
+  for (const SparseEntry& e : J) {
+    const Index k = e.column - first;
+    if (k < 0 || k >= x.size()) continue;
+    const Index body = k / 7 * 7;
+    const double part =
+        k - body < 3 ? x.segment<3>(body).lpNorm<Eigen::Infinity>() : x.segment<4>(body + 3).lpNorm<Eigen::Infinity>();
+    sums(e.row) += std::abs(e.value) * part;
+  }
+  return sums;
+}
+
+// Unknown q; v plays no part.
+class PositionProblem : public NearestPointEquations {
+ public:
+  explicit PositionProblem(AssemblyEquations& equations) : equations_(equations) {}
+
+  VectorXd values(const VectorXd& q) const override { return equations_.values(state(q)); }
+  MatrixXd jacobian(const VectorXd& q) const override { return equations_.gradients(state(q)).y.leftCols(q.size()); }
+  MatrixXd curvature(const VectorXd& q, const VectorXd& nu) const override {
+    return equations_.second(state(q), nu).y.leftCols(q.size());
+  }
+  // No Euler parameter changes by more than 0.3 at once (about 0.6 rad); r enters linearly.
+  double step_fraction(const VectorXd& step) const override {
+    double change = 0;
+    for (Index i = 3; i < step.size(); i += 7) change = std::max(change, step.segment<4>(i).lpNorm<Eigen::Infinity>());
+    return change > 0.3 ? 0.3 / change : 1.0;
+  }
+  VectorXd retracted(const VectorXd& x) const override {
+    VectorXd q = x;
+    for (Index i = 3; i < q.size(); i += 7) q.segment<4>(i) = UnitNorm::project(q.segment<4>(i));
+    return q;
+  }
+  VectorXd sizes(const MatrixXd& J) const override { return sizes_of_poses(J); }
+  VectorXd magnitudes(const VectorXd& q) const override {
+    return magnitudes_of_terms(equations_.rows(), equations_.sparse_gradients(state(q)).y, 0, q);
+  }
+  VectorXd weights() const override { return equations_.weights(); }
+  void accept(const VectorXd& q) override { equations_.continue_branches(state(q)); }
+
+ private:
+  static VectorXd state(const VectorXd& q) {
+    VectorXd y = VectorXd::Zero(2 * q.size());
+    y.head(q.size()) = q;
+    return y;
+  }
+  AssemblyEquations& equations_;
+};
+
+// Unknown v at a fixed q.
+class VelocityProblem : public NearestPointEquations {
+ public:
+  VelocityProblem(const AssemblyEquations& equations, const VectorXd& q) : equations_(equations), q_(q) {}
+
+  VectorXd values(const VectorXd& v) const override { return equations_.values(state(v)); }
+  MatrixXd jacobian(const VectorXd& v) const override { return equations_.gradients(state(v)).y.rightCols(v.size()); }
+  MatrixXd curvature(const VectorXd& v, const VectorXd& nu) const override {
+    return equations_.second(state(v), nu).y.rightCols(v.size());
+  }
+  double step_fraction(const VectorXd&) const override { return 1; }
+  VectorXd retracted(const VectorXd& v) const override { return v; }
+  VectorXd sizes(const MatrixXd& J) const override { return sizes_of_poses(J); }
+  VectorXd magnitudes(const VectorXd& v) const override {
+    return magnitudes_of_terms(equations_.rows(), equations_.sparse_gradients(state(v)).y, v.size(), v);
+  }
+  VectorXd weights() const override { return equations_.weights(); }
+
+ private:
+  VectorXd state(const VectorXd& v) const {
+    VectorXd y(2 * v.size());
+    y << q_, v;
+    return y;
+  }
+  const AssemblyEquations& equations_;
+  const VectorXd& q_;
+};
+
+VectorXd position_guess(const MechanismData& d) {
+  VectorXd q(7 * d.n);
+  for (int i = 0; i < d.n; ++i) q.segment<7>(7 * i) = d.bodies[static_cast<std::size_t>(i + 1)].q;
+  return q;
+}
+
+// pdot = 1/2 E(p)' omega_G as a matrix on p.
+Mat<4, 4> rate_matrix(const Vector3d& omega_G) {
+  Mat<4, 4> W;
+  W << 0, -omega_G.transpose(), omega_G, skew(omega_G);
+  return 0.5 * W;
+}
+
+// rdot = velocity + omega_G x A(p) com
+VectorXd velocity_guess(const MechanismData& d, const VectorXd& q) {
+  VectorXd v(7 * d.n);
+  for (int i = 0; i < d.n; ++i) {
+    const BodyData& body = d.bodies[static_cast<std::size_t>(i + 1)];
+    const Vector4d p = q.segment<4>(7 * i + 3);
+    v.segment<3>(7 * i) = body.velocity + body.angular_velocity.cross(A(p) * body.com);
+    v.segment<4>(7 * i + 3) = rate_matrix(body.angular_velocity) * p;
+  }
+  return v;
+}
+
+// Derivative of rows of a field: out += M (d field/d rho)
+template <int Rows, int N>
+void add_field(const MechanismData& d, int slot, const Mat<Rows, N>& M, Eigen::Ref<MatrixXd> out) {
+  if (slot < 0) return;
+  for (std::size_t k = 0; k < d.active.size(); ++k) {
+    out.col(d.active[k]) += M * d.theta_rho.col(static_cast<Index>(k)).segment<N>(slot);
+  }
+}
+
+MatrixXd position_guess_rho(const MechanismData& d) {
+  MatrixXd out = MatrixXd::Zero(7 * d.n, d.rho.size());
+  for (int i = 0; i < d.n; ++i) {
+    add_field<7, 7>(d, d.bodies[static_cast<std::size_t>(i + 1)].slot_q, Mat<7, 7>::Identity(),
+                    out.middleRows(7 * i, 7));
+  }
+  return out;
+}
+
+// v_q: per body, in its own p.
+void velocity_guess_derivatives(const MechanismData& d, const VectorXd& q, std::vector<Mat<7, 4>>& v_q,
+                                MatrixXd& v_rho) {
+  v_q.resize(static_cast<std::size_t>(d.n));
+  v_rho = MatrixXd::Zero(q.size(), d.rho.size());
+  for (int i = 0; i < d.n; ++i) {
+    const BodyData& body = d.bodies[static_cast<std::size_t>(i + 1)];
+    const Vector4d p = q.segment<4>(7 * i + 3);
+    const Matrix3d W = skew(body.angular_velocity);
+    const Vector3d arm = A(p) * body.com, e = p.tail<3>();
+    v_q[static_cast<std::size_t>(i)] << W * N(p, body.com), rate_matrix(body.angular_velocity);
+    Mat<7, 3> from_omega;
+    from_omega.topRows<3>() = -skew(arm);
+    from_omega.row(3) = -0.5 * e.transpose();
+    from_omega.bottomRows<3>() = 0.5 * (p(0) * Matrix3d::Identity() - skew(e));
+    add_field<3, 3>(d, body.slot_velocity, Matrix3d::Identity(), v_rho.middleRows(7 * i, 3));
+    add_field<3, 3>(d, body.slot_com, W * A(p), v_rho.middleRows(7 * i, 3));
+    add_field<7, 3>(d, body.slot_angular_velocity, from_omega, v_rho.middleRows(7 * i, 7));
+  }
+}
+
+}  // namespace
+
+struct Assembly::Solution {
+  Solution(const Mechanism& m, double t)
+      : mechanism(m),
+        start(t),
+        data(m.data()),
+        position(data, AssemblyLevel::position, t),
+        velocity(data, AssemblyLevel::velocity, t) {
+    solve();
+    set_angles();
+  }
+
+  void solve() {
+    const Index N = 7 * data.n;
+    result.y = VectorXd::Zero(2 * N);
+    PositionProblem positions(position);
+    const VectorXd guess = position_guess(data);
+    result.y.head(N) = guess;
+    position.start_branches(result.y);
+    q.emplace(nearest_point(positions, guess, Decomposition::on_demand));
+    result.y.head(N) = q->x;
+    result.iterations = q->iterations;
+    result.residual = q->F.size() > 0 ? q->F.lpNorm<Eigen::Infinity>() : 0.0;
+    if (q->status != NearestPointStatus::found) {
+      result.message = assembly_failure(data, AssemblyLevel::position, position, *q);
+      return;
+    }
+    if (data.equilibrium) return rest_in_equilibrium();
+    VelocityProblem velocities(velocity, q->x);
+    v.emplace(nearest_point(velocities, velocity_guess(data, q->x), Decomposition::on_demand));
+    result.y.tail(N) = v->x;
+    result.iterations += v->iterations;
+    result.residual = std::max(result.residual, v->F.lpNorm<Eigen::Infinity>());
+    if (v->status != NearestPointStatus::found) {
+      result.message = assembly_failure(data, AssemblyLevel::velocity, velocity, *v);
+      return;
+    }
+    result.ok = true;
+  }
+
+  // From the nearest position that closes the joints to the equilibrium nearest to that.
+  void rest_in_equilibrium() {
+    position.start_branches(result.y);
+    equilibrium = static_equilibrium(mechanism, start, q->x, position.angles());
+    result.iterations += equilibrium.iterations;
+    result.y.head(7 * data.n) = equilibrium.q;
+    result.ok = equilibrium.ok;
+    result.message = equilibrium.message;
+  }
+
+  // A large mechanism whose guess satisfies everything is differentiated by sparse factors, in about the time of some
+  // steps; the dense decomposition below takes as long as a run.
+  struct Sparse {
+    SparseProjection q, v;
+    std::vector<SparseEntry> v_b_q;  // -F_q at velocity level
+    MatrixXd q_b_rho, q_g_rho, v_b_rho, v_g_rho;
+    std::vector<Mat<7, 4>> v_g_q;  // per body, in its own p
+  };
+  bool is_sparse() const {
+    constexpr int kManyBodies = 12;
+    return data.n >= kManyBodies && !q->linearised && !v->linearised;
+  }
+  Sparse sparse_derivatives() const {
+    const Index N = 7 * data.n;
+    AssemblyEquations::SparseGradients F = position.sparse_gradients(result.y), G = velocity.sparse_gradients(result.y);
+    std::vector<SparseEntry> G_q, G_v;
+    for (const SparseEntry& e : G.y) {
+      if (e.column < N) {
+        G_q.push_back({e.row, e.column, -e.value});
+      } else {
+        G_v.push_back({e.row, static_cast<int>(e.column - N), e.value});
+      }
+    }
+    Sparse s{SparseProjection(position.rows(), N, F.y),
+             SparseProjection(velocity.rows(), N, G_v),
+             std::move(G_q),
+             -F.rho,
+             position_guess_rho(data),
+             -G.rho,
+             {},
+             {}};
+    velocity_guess_derivatives(data, q->x, s.v_g_q, s.v_g_rho);
+    return s;
+  }
+  MatrixXd sparse_tangent() const {
+    const Sparse s = sparse_derivatives();
+    const MatrixXd q_rho = s.q.solve(s.q_b_rho, s.q_g_rho);
+    MatrixXd b = s.v_b_rho, g = s.v_g_rho;
+    for (const SparseEntry& e : s.v_b_q) b.row(e.row) += e.value * q_rho.row(e.column);
+    for (Index i = 0; i < data.n; ++i) {
+      g.middleRows<7>(7 * i) += s.v_g_q[static_cast<std::size_t>(i)] * q_rho.middleRows<4>(7 * i + 3);
+    }
+    MatrixXd y_rho(result.y.size(), data.rho.size());
+    y_rho << q_rho, s.v.solve(b, g);
+    return y_rho;
+  }
+  void add_sparse_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
+    const Sparse s = sparse_derivatives();
+    const Index N = 7 * data.n;
+    MatrixXd b_bar, g_bar, q_bar = y_bar.topRows(N);
+    s.v.solve_transposed(y_bar.bottomRows(N), b_bar, g_bar);
+    rho_bar += s.v_b_rho.transpose() * b_bar + s.v_g_rho.transpose() * g_bar;
+    for (const SparseEntry& e : s.v_b_q) q_bar.row(e.column) += e.value * b_bar.row(e.row);
+    for (Index i = 0; i < data.n; ++i) {
+      q_bar.middleRows<4>(7 * i + 3) += s.v_g_q[static_cast<std::size_t>(i)].transpose() * g_bar.middleRows<7>(7 * i);
+    }
+    s.q.solve_transposed(q_bar, b_bar, g_bar);
+    rho_bar += s.q_b_rho.transpose() * b_bar + s.q_g_rho.transpose() * g_bar;
+  }
+
+  // Before the linearisations of q and v are used.
+  void linearise_both() {
+    PositionProblem positions(position);
+    linearise(positions, *q);
+    VelocityProblem velocities(velocity, q->x);
+    linearise(velocities, *v);
+  }
+
+  // On the turn that an angle's condition names, where there is one (so that a measured angle starts where it was
+  // measured), else within half a turn of zero; the last angle of a gear on the branch that the gear asks for.
+  void set_angles() {
+    position.start_branches(result.y);
+    result.angles = position.angles();
+    for (const AssemblyTarget& target : position.targets()) {
+      if (const auto* sensor = std::get_if<AngleSensor>(&target.sensor)) {
+        double& angle = result.angles(sensor->angle);
+        angle = Angle::on_branch(angle, target.value);
+      }
+    }
+    position.settle_shared_rows(result.y, result.angles);
+  }
+
+  // Right-hand sides of both linear systems (nearest_point.hpp); those of v need q' as well:
+  //   J_q q' = -q_F_rho,           H_q q' + .. = q_g_rho
+  //   J_v v' = -F_q q' - F_rho,    H_v v' + .. = g_q q' + g_rho
+  struct Derivatives {
+    MatrixXd q_b_rho, q_g_rho, v_b_q, v_b_rho, v_g_q, v_g_rho;
+  };
+  Derivatives derivatives() const {
+    const Index N = 7 * data.n;
+    Derivatives d;
+    d.q_b_rho = -position.gradients(result.y).rho;
+    d.q_g_rho = position_guess_rho(data) - position.second(result.y, q->nu).rho;
+    const AssemblyEquations::Gradients F = velocity.gradients(result.y), S = velocity.second(result.y, v->nu);
+    d.v_b_q = -F.y.leftCols(N);
+    d.v_b_rho = -F.rho;
+    std::vector<Mat<7, 4>> v_guess_q;
+    velocity_guess_derivatives(data, q->x, v_guess_q, d.v_g_rho);
+    d.v_g_q = -S.y.leftCols(N);
+    for (Index i = 0; i < data.n; ++i) d.v_g_q.block<7, 4>(7 * i, 7 * i + 3) += v_guess_q[static_cast<std::size_t>(i)];
+    d.v_g_rho -= S.rho;
+    return d;
+  }
+
+  const Mechanism mechanism;
+  double start;
+  const MechanismData& data;
+  Equilibrium equilibrium;  // where the scene starts from one
+  AssemblyEquations position, velocity;
+  std::optional<NearestPoint> q, v;
+  AssemblyResult result;
+};
+
+Assembly::Assembly(const Mechanism& mechanism, double start_time)
+    : solution_(std::make_unique<Solution>(mechanism, start_time)) {}
+Assembly::~Assembly() = default;
+
+const AssemblyResult& Assembly::result() const { return solution_->result; }
+
+MatrixXd Assembly::tangent() const {
+  Solution& s = *solution_;
+  if (!s.result.ok) return MatrixXd::Constant(s.result.y.size(), s.data.rho.size(), kNaN);
+  MatrixXd y_rho = MatrixXd::Zero(s.result.y.size(), s.data.rho.size());
+  if (s.data.equilibrium) {
+    y_rho.topRows(7 * s.data.n) = s.equilibrium.q_rho;
+    return y_rho;
+  }
+  if (s.is_sparse()) return s.sparse_tangent();
+  s.linearise_both();
+  const Solution::Derivatives d = s.derivatives();
+  const MatrixXd q_rho = s.q->linearisation.solve(d.q_b_rho, d.q_g_rho);
+  y_rho << q_rho, s.v->linearisation.solve(d.v_b_q * q_rho + d.v_b_rho, d.v_g_q * q_rho + d.v_g_rho);
+  return y_rho;
+}
+
+void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
+  Solution& s = *solution_;
+  if (!s.result.ok) {
+    rho_bar.setConstant(kNaN);
+    return;
+  }
+  const Index N = 7 * s.data.n;
+  if (s.data.equilibrium) {
+    rho_bar += s.equilibrium.q_rho.transpose() * y_bar.topRows(N);
+    return;
+  }
+  if (s.is_sparse()) return s.add_sparse_adjoint(y_bar, rho_bar);
+  s.linearise_both();
+  const Solution::Derivatives d = s.derivatives();
+  MatrixXd b_bar, g_bar;
+  s.v->linearisation.solve_transposed(y_bar.bottomRows(N), b_bar, g_bar);
+  rho_bar += d.v_b_rho.transpose() * b_bar + d.v_g_rho.transpose() * g_bar;
+  const MatrixXd q_bar = y_bar.topRows(N) + d.v_b_q.transpose() * b_bar + d.v_g_q.transpose() * g_bar;
+  s.q->linearisation.solve_transposed(q_bar, b_bar, g_bar);
+  rho_bar += d.q_b_rho.transpose() * b_bar + d.q_g_rho.transpose() * g_bar;
+}
+
+namespace {
+
+// Columns of right-hand sides b that J x = b cannot meet. left: what a solution leaves of b, rows scaled to unit
+// length. pieces: the columns of which b is the sum, before they cancel.
+void note_unmet(const MatrixXd& left, const VectorXd& row_scale, std::initializer_list<MatrixXd> pieces,
+                std::vector<bool>& unmet) {
+  constexpr double kUnmet = 1e-7;      // of b: assembly leaves a loop open by far less
+  constexpr double kRounding = 1e-12;  // of b, in the units of J: sin(pi) is not zero
+  if (left.rows() == 0) return;
+  for (Index k = 0; k < left.cols(); ++k) {
+    double size = 0;
+    for (const MatrixXd& piece : pieces) size += row_scale.cwiseProduct(piece.col(k)).norm();
+    if (left.col(k).norm() > kUnmet * size + kRounding * row_scale.maxCoeff())
+      unmet[static_cast<std::size_t>(k)] = true;
+  }
+}
+
+}  // namespace
+
+std::vector<int> Assembly::obstructed() const {
+  Solution& s = *solution_;
+  if (!s.result.ok) return {};
+  const Index N = 7 * s.data.n, P = s.data.rho.size();
+  std::vector<bool> unmet(static_cast<std::size_t>(P), false);
+  if (s.data.equilibrium) {
+    const AssemblyEquations::Gradients F = s.position.gradients(s.result.y);
+    const MatrixXd J = F.y.leftCols(N);
+    const NearestPointLinearisation at(J, sizes_of_poses(J));
+    note_unmet(at.left(-F.rho), at.row_scale(), {F.rho}, unmet);
+  } else if (s.is_sparse()) {
+    const Solution::Sparse d = s.sparse_derivatives();
+    const MatrixXd q_rho = d.q.solve(d.q_b_rho, d.q_g_rho);
+    note_unmet(d.q.left(d.q_b_rho, q_rho), d.q.row_scale(), {d.q_b_rho}, unmet);
+    MatrixXd turned = MatrixXd::Zero(d.v_b_rho.rows(), P);
+    for (const SparseEntry& e : d.v_b_q) turned.row(e.row) += e.value * q_rho.row(e.column);
+    const MatrixXd b = turned + d.v_b_rho;
+    note_unmet(d.v.left(b, d.v.solve(b, d.v_g_rho)), d.v.row_scale(), {turned, d.v_b_rho}, unmet);
+  } else {
+    s.linearise_both();
+    const Solution::Derivatives d = s.derivatives();
+    const NearestPointLinearisation &q = s.q->linearisation, &v = s.v->linearisation;
+    note_unmet(q.left(d.q_b_rho), q.row_scale(), {d.q_b_rho}, unmet);
+    const MatrixXd turned = d.v_b_q * q.solve(d.q_b_rho, d.q_g_rho), b = turned + d.v_b_rho;
+    note_unmet(v.left(b), v.row_scale(), {turned, d.v_b_rho}, unmet);
+  }
+  std::vector<int> parameters;
+  for (Index k = 0; k < P; ++k) {
+    if (unmet[static_cast<std::size_t>(k)]) parameters.push_back(static_cast<int>(k));
+  }
+  return parameters;
+}
+
+// Rows are taken in file order, unit norms first; one that lies in the span of those before it is redundant.
+ModelSummary Assembly::summary() const {
+  const MechanismData& d = solution_->data;
+  const int equations = d.m + d.n;
+  const auto place = [&](int row) { return row < d.m ? row + d.n : row - d.m; };
+  std::vector<SparseEntry> J = solution_->position.sparse_gradients(solution_->result.y).y;
+  std::erase_if(J, [&](const SparseEntry& e) { return e.row >= equations || e.column >= 7 * d.n; });
+  for (SparseEntry& e : J) e.row = place(e.row);
+  const RowDependence found = row_dependence(equations, d.n, 7, J, NearestPointLinearisation::kRankThreshold);
+  const std::size_t joints = d.joint_names.size();
+  std::vector<int> rows(joints + d.drive_names.size(), 0), redundant(rows.size(), 0);
+  int next_row = 0;
+  for (const Constraint& c : d.constraints) {
+    if (c.row < next_row) continue;  // a further term of a row already seen
+    next_row = c.row + c.rows();
+    const std::size_t owner =
+        c.drive >= 0 ? joints + static_cast<std::size_t>(c.drive) : static_cast<std::size_t>(c.joint);
+    rows[owner] += c.rows();
+    for (int i = 0; i < c.rows(); ++i)
+      redundant[owner] += found.independent[static_cast<std::size_t>(place(c.row + i))] ? 0 : 1;
+  }
+  ModelSummary summary;
+  summary.bodies = d.n;
+  summary.equations = equations;
+  summary.rank = found.rank;
+  summary.degrees_of_freedom = 7 * d.n - summary.rank;
+  for (std::size_t j = 0; j < rows.size(); ++j) {
+    if (redundant[j] == 0) continue;
+    summary.redundant.push_back((j < joints ? d.joint_names[j] : d.drive_names[j - joints]) + " (" +
+                                std::to_string(redundant[j]) + " of " + std::to_string(rows[j]) + ")");
+  }
+  return summary;
+}
+
+}  // namespace mbsopt

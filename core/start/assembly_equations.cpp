@@ -1,0 +1,388 @@
+#include "core/start/assembly_equations.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <span>
+
+#include "core/constraint/unit_norm.hpp"
+#include "core/sensor/body_at.hpp"
+
+namespace mbsopt {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+struct RowOrder {
+  bool operator()(const Constraint& c, int row) const { return c.row < row; }
+  bool operator()(int row, const Constraint& c) const { return row < c.row; }
+};
+
+// A half turn is +pi: rounding does not decide its sign.
+constexpr double kHalfTurn = -std::numbers::pi + 1e-6;
+
+// y = (q, e_j)
+VectorXd with_unit_velocity(const VectorXd& y, Index j) {
+  VectorXd at = y;
+  at.tail(y.size() / 2).setZero();
+  at(y.size() / 2 + j) = 1;
+  return at;
+}
+
+// The components of a norm of velocities, which alone is not linear in v; empty for every other sensor.
+std::vector<SensorKind> components_of_norm(const SensorKind& kind) {
+  std::vector<SensorKind> components;
+  auto split = [&](auto sensor) {
+    for (sensor.component = 0; sensor.component < 3; ++sensor.component) components.emplace_back(sensor);
+  };
+  if (const auto* p = std::get_if<PointSensor>(&kind)) {
+    if (p->quantity == PointSensor::Quantity::velocity && p->component == PointSensor::kNorm) split(*p);
+  } else if (const auto* w = std::get_if<AngularVelocitySensor>(&kind)) {
+    if (w->component == AngularVelocitySensor::kNorm) split(*w);
+  }
+  return components;
+}
+
+template <class P>
+Multipliers<P::kRows> only_mu0(const Vec<P::kRows>& mu0) {
+  Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
+  z.mu0 = mu0;
+  return z;
+}
+template <class P>
+Multipliers<P::kRows> only_mu1(const Vec<P::kRows>& mu1) {
+  Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
+  z.mu1 = mu1;
+  return z;
+}
+
+struct PrimitiveBars {
+  FrameBar bar1, bar2;
+  GeometryBar s;
+  PrimitiveBars() { bar1.set_zero(), bar2.set_zero(); }
+};
+
+BodyAt at_rest(const VectorXd& y, int body) {
+  BodyAt b;
+  if (body > 0) set_position(y.segment<7>(7 * (body - 1)), b.state, b.frame);
+  return b;
+}
+
+// The part of a pull-back that lies in q.
+void add_to_row(const BodyAt& b, int body, const FrameBar& bar, AssemblyEquations::Row row) {
+  if (body == 0) return;
+  Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
+  add_pull_back_velocity(b.state, bar, 1, q_bar, v_bar);
+  row.segment<7>(7 * (body - 1)) += q_bar.transpose();
+}
+
+}  // namespace
+
+AssemblyEquations::AssemblyEquations(const MechanismData& data, AssemblyLevel level, double t)
+    : data_(data),
+      level_(level),
+      t_(t),
+      angles_(Eigen::VectorXd::Zero(static_cast<Index>(data.angles.size()))),
+      laws_(data) {
+  laws_.set_time(t);
+  for (std::size_t i = 0; i < data.conditions.size(); ++i) {
+    const ConditionData& c = data.conditions[i];
+    const SensorKind& sensor = data.sensors[static_cast<std::size_t>(c.sensor)];
+    const int index = static_cast<int>(i);
+    if (level == AssemblyLevel::position) {
+      if (c.has_value && !c.velocity_level) {
+        targets_.push_back({index, sensor, c.rate_kind, c.value, c.slot_value, c.value});
+      }
+    } else if (c.velocity_level) {
+      if (c.has_value) targets_.push_back({index, sensor, sensor, c.value, c.slot_value, 0});
+    } else if (c.has_rate) {
+      targets_.push_back({index, c.rate_kind, c.rate_kind, c.rate, c.slot_rate, 0});
+    }
+  }
+}
+
+Index AssemblyEquations::rows() const { return data_.m + data_.n + static_cast<Index>(targets_.size()); }
+
+VectorXd AssemblyEquations::weights() const {
+  VectorXd w = VectorXd::Ones(rows());
+  w.segment(data_.m, data_.n).setConstant(1e3);
+  return w;
+}
+
+VectorXd AssemblyEquations::branches(const AssemblyTarget& target) const {
+  return VectorXd::Constant(static_cast<Index>(data_.angles.size()), target.branch);
+}
+
+// factor * primitive of a constraint of one row, at position level.
+double AssemblyEquations::term_value(const Constraint& c, const VectorXd& y, const VectorXd& angles) const {
+  const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+  return std::visit(
+      [&]<class P>(const P& p) {
+        Vec<P::kRows> phi;
+        p.phi(b1.frame, b2.frame, phi);
+        if constexpr (std::is_same_v<P, Angle>) {
+          const double reference = c.angle == Constraint::kNearestLaw ? laws_.f_or_zero(c.row) : angles(c.angle);
+          return c.factor * Angle::on_branch(phi(0), reference);
+        }
+        return c.factor * phi(0);
+      },
+      c.primitive);
+}
+
+void AssemblyEquations::settle_shared_rows(const VectorXd& y, VectorXd& angles) const {
+  for (const RowGroup& g : data_.groups) {
+    if (!g.shared) continue;
+    double sum = 0;
+    const Constraint* last = nullptr;
+    const auto [first, last_of_row] = std::equal_range(  // rows ascend
+        data_.constraints.begin(), data_.constraints.end(), g.row, RowOrder{});
+    for (const Constraint& c : std::span(first, last_of_row)) {
+      sum += term_value(c, y, angles);
+      if (std::holds_alternative<Angle>(c.primitive)) last = &c;
+    }
+    sum -= laws_.f_or_zero(g.row);
+    if (!last || last->factor == 0) continue;
+    double& angle = angles(last->angle);
+    angle = Angle::on_branch(angle, angle - sum / last->factor);
+  }
+}
+
+void AssemblyEquations::start_branches(const VectorXd& y) {
+  angles_.setZero();
+  for (std::size_t i = 0; i < data_.angles.size(); ++i) {
+    const JointAngle& a = data_.angles[i];
+    double& angle = angles_(static_cast<Index>(i));
+    angle = a.value(body_at(y, a.body1).frame, body_at(y, a.body2).frame);
+    if (angle < kHalfTurn) angle += 2 * std::numbers::pi;
+  }
+  settle_shared_rows(y, angles_);
+}
+
+void AssemblyEquations::continue_branches(const VectorXd& y) {
+  for (std::size_t i = 0; i < data_.angles.size(); ++i) {
+    const JointAngle& a = data_.angles[i];
+    double& angle = angles_(static_cast<Index>(i));
+    angle = a.value_near(angle, body_at(y, a.body1).frame, body_at(y, a.body2).frame);
+  }
+  for (AssemblyTarget& target : targets_) {
+    if (std::holds_alternative<AngleSensor>(target.sensor)) {
+      target.branch = evaluate(data_, target.sensor, t_, y, branches(target));
+    }
+  }
+}
+
+void AssemblyEquations::add_slot(int slot, const Eigen::Ref<const VectorXd>& bar, Row rho_bar) const {
+  if (slot < 0) return;
+  for (std::size_t k = 0; k < data_.active.size(); ++k) {
+    rho_bar(data_.active[k]) += data_.theta_rho.col(static_cast<Index>(k)).segment(slot, bar.size()).dot(bar);
+  }
+}
+
+VectorXd AssemblyEquations::values(const VectorXd& y) const {
+  VectorXd F = VectorXd::Zero(rows());
+  const bool positions = level_ == AssemblyLevel::position;
+  for (const Constraint& c : data_.constraints) {
+    if (positions && c.rows() == 1) {
+      F(c.row) += term_value(c, y, angles_);
+      continue;
+    }
+    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+    std::visit(
+        [&]<class P>(const P& p) {
+          Vec<P::kRows> phi;
+          if (positions) {
+            p.phi(b1.frame, b2.frame, phi);
+          } else {
+            p.phi_dot(b1.frame, b2.frame, phi);
+          }
+          F.segment<P::kRows>(c.row) += c.factor * phi;
+        },
+        c.primitive);
+  }
+  if (positions) {
+    laws_.subtract_f(F);
+  } else {
+    laws_.subtract_f_t(F);
+  }
+  for (int i = 0; i < data_.n; ++i) {
+    const Vector4d p = y.segment<4>(7 * i + 3), pdot = y.segment<4>(y.size() / 2 + 7 * i + 3);
+    F(data_.m + i) = level_ == AssemblyLevel::position ? UnitNorm::phi(p) : UnitNorm::phi_dot(p, pdot);
+  }
+  Index row = data_.m + data_.n;
+  for (const AssemblyTarget& target : targets_) {
+    F(row++) = evaluate(data_, target.sensor, t_, y, branches(target)) - target.value;
+  }
+  return F;
+}
+
+AssemblyEquations::Gradients AssemblyEquations::gradients(const VectorXd& y) const {
+  Gradients out{MatrixXd::Zero(rows(), y.size()), {}};
+  collect_gradients(
+      y, [&](Index row, Index column, double value) { out.y(row, column) += value; }, out.rho);
+  return out;
+}
+
+AssemblyEquations::SparseGradients AssemblyEquations::sparse_gradients(const VectorXd& y) const {
+  SparseGradients out;
+  collect_gradients(
+      y,
+      [&](Index row, Index column, double value) {
+        if (value != 0) out.y.push_back({static_cast<int>(row), static_cast<int>(column), value});
+      },
+      out.rho);
+  return out;
+}
+
+template <class AddEntry>
+void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, MatrixXd& rho) const {
+  const bool positions = level_ == AssemblyLevel::position;
+  const Index half = y.size() / 2;
+  rho = MatrixXd::Zero(rows(), data_.rho.size());
+  const auto add_body = [&](Index row, const BodyAt& b, int body, const FrameBar& bar) {
+    if (body == 0) return;
+    Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
+    add_pull_back_velocity(b.state, bar, 1, q_bar, v_bar);
+    for (Index k = 0; k < 7; ++k) {
+      add(row, 7 * (body - 1) + k, q_bar(k));
+      add(row, half + 7 * (body - 1) + k, v_bar(k));
+    }
+  };
+  for (const Constraint& c : data_.constraints) {
+    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+    std::visit(
+        [&](const auto& p) {
+          using P = std::decay_t<decltype(p)>;
+          for (int i = 0; i < P::kRows; ++i) {
+            const Vec<P::kRows> unit = c.factor * Vec<P::kRows>::Unit(i);
+            PrimitiveBars bars;
+            p.pull_back(b1.frame, b2.frame, positions ? only_mu0<P>(unit) : only_mu1<P>(unit), bars.bar1, bars.bar2,
+                        bars.s);
+            const Index row = c.row + i;
+            add_body(row, b1, c.body1, bars.bar1);
+            add_body(row, b2, c.body2, bars.bar2);
+            add_slot(c.slot1, bars.s.s1, rho.row(row));
+            add_slot(c.slot2, bars.s.s2, rho.row(row));
+            add_slot(c.slot3, bars.s.s3, rho.row(row));
+          }
+          if (c.slot_factor >= 0) {
+            Vec<P::kRows> phi_dot;
+            p.phi_dot(b1.frame, b2.frame, phi_dot);
+            const double value = positions ? term_value(c, y, angles_) / c.factor : phi_dot(0);
+            add_slot(c.slot_factor, Vec<1>(value), rho.row(c.row));
+          }
+        },
+        c.primitive);
+  }
+  add_law_gradients(rho);
+  for (int i = 0; i < data_.n; ++i) {
+    const Index p = 7 * i + 3, pdot = half + p;
+    for (Index k = 0; k < 4; ++k) {
+      add(data_.m + i, p + k, 2 * y(positions ? p + k : pdot + k));
+      if (!positions) add(data_.m + i, pdot + k, 2 * y(p + k));
+    }
+  }
+  VectorXd y_bar(y.size()), rho_bar(data_.rho.size());
+  Index row = data_.m + data_.n;
+  for (const AssemblyTarget& target : targets_) {
+    y_bar.setZero(), rho_bar.setZero();
+    add_gradient(data_, target.sensor, t_, y, branches(target), 1, y_bar, rho_bar);
+    for (Index k = 0; k < y.size(); ++k) add(row, k, y_bar(k));
+    rho.row(row) = rho_bar.transpose();
+    add_slot(target.slot, Vec<1>(-1), rho.row(row));
+    ++row;
+  }
+}
+
+void AssemblyEquations::add_law_gradients(MatrixXd& rho) const {
+  const RowLaws::Of what = level_ == AssemblyLevel::position ? RowLaws::Of::f : RowLaws::Of::f_t;
+  VectorXd rho_bar(data_.rho.size());
+  for (const RowLaw& law : data_.laws) {
+    rho_bar.setZero();
+    laws_.add_gradient(what, law.row, -1, rho_bar);
+    rho.row(law.row) += rho_bar.transpose();
+  }
+}
+
+AssemblyEquations::Gradients AssemblyEquations::second(const VectorXd& y, const VectorXd& nu) const {
+  const Index N = y.size() / 2;
+  Gradients out{MatrixXd::Zero(N, y.size()), MatrixXd::Zero(N, data_.rho.size())};
+  add_joint_curvature(y, nu, out);
+  for (int i = 0; i < data_.n; ++i) {
+    const Index p = 7 * i + 3;
+    out.y.block<4, 4>(p, p).diagonal().array() += 2 * nu(data_.m + i);
+  }
+  Index row = data_.m + data_.n;
+  for (const AssemblyTarget& target : targets_) add_target_curvature(target, y, nu(row++), out);
+  return out;
+}
+
+void AssemblyEquations::add_joint_curvature(const VectorXd& y, const VectorXd& nu, Gradients& out) const {
+  for (const Constraint& c : data_.constraints) {
+    for (const int moving : {c.body1, c.body2}) {
+      if (moving == 0) continue;
+      for (int k = 0; k < 7; ++k) {
+        BodyAt b1 = at_rest(y, c.body1), b2 = at_rest(y, c.body2);
+        BodyAt& b = moving == c.body1 ? b1 : b2;
+        set_velocity(Vec<7>::Unit(k), b.state, b.frame);
+        const Index j = 7 * (moving - 1) + k;
+        PrimitiveBars bars;
+        std::visit(
+            [&](const auto& p) {
+              using P = std::decay_t<decltype(p)>;
+              p.pull_back(b1.frame, b2.frame, only_mu1<P>(c.factor * nu.segment<P::kRows>(c.row)), bars.bar1, bars.bar2,
+                          bars.s);
+              if (c.slot_factor < 0) return;
+              Vec<P::kRows> rate;
+              p.phi_dot(b1.frame, b2.frame, rate);
+              add_slot(c.slot_factor, Vec<1>(nu(c.row) * rate(0)), out.rho.row(j));
+            },
+            c.primitive);
+        add_to_row(b1, c.body1, bars.bar1, out.y.row(j));
+        add_to_row(b2, c.body2, bars.bar2, out.y.row(j));
+        add_slot(c.slot1, bars.s.s1, out.rho.row(j));
+        add_slot(c.slot2, bars.s.s2, out.rho.row(j));
+        add_slot(c.slot3, bars.s.s3, out.rho.row(j));
+      }
+    }
+  }
+}
+
+void AssemblyEquations::add_target_curvature(const AssemblyTarget& target, const VectorXd& y, double nu,
+                                             Gradients& out) const {
+  const Index N = y.size() / 2, P = data_.rho.size();
+  const VectorXd branch = branches(target);
+  const std::vector<SensorKind> components = components_of_norm(target.rate);
+  VectorXd y_bar(y.size()), rho_bar(P);
+  if (components.empty()) {
+    for (Index j = 0; j < N; ++j) {
+      y_bar.setZero(), rho_bar.setZero();
+      add_gradient(data_, target.rate, t_, with_unit_velocity(y, j), branch, nu, y_bar, rho_bar);
+      out.y.row(j).head(N) += y_bar.head(N).transpose();
+      out.rho.row(j) += rho_bar.transpose();
+    }
+    return;
+  }
+  // f = |c| with components c_i linear in v:  f_v = c'c_v/f,  d f_v = (dc' c_v + c' dc_v - f_v df)/f
+  VectorXd f_y = VectorXd::Zero(y.size()), f_rho = VectorXd::Zero(P);
+  const double f = add_gradient(data_, target.sensor, t_, y, branch, 1, f_y, f_rho);
+  if (f == 0) return;
+  for (const SensorKind& component : components) {
+    VectorXd c_y = VectorXd::Zero(y.size()), c_rho = VectorXd::Zero(P);
+    const double c = add_gradient(data_, component, t_, y, branch, 1, c_y, c_rho);
+    for (Index j = 0; j < N; ++j) {
+      y_bar.setZero(), rho_bar.setZero();
+      add_gradient(data_, component, t_, with_unit_velocity(y, j), branch, nu * c / f, y_bar, rho_bar);
+      out.y.row(j).head(N) += y_bar.head(N).transpose();
+      out.rho.row(j) += rho_bar.transpose();
+    }
+    out.y += nu / f * c_y.tail(N) * c_y.transpose();
+    out.rho += nu / f * c_y.tail(N) * c_rho.transpose();
+  }
+  out.y -= nu / f * f_y.tail(N) * f_y.transpose();
+  out.rho -= nu / f * f_y.tail(N) * f_rho.transpose();
+}
+
+}  // namespace mbsopt

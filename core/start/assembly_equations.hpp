@@ -1,0 +1,83 @@
+// The equations of initial assembly, at position and at velocity level, with first and second derivatives.
+//
+//   position:  F(q, rho)    = [ Phi of all joints;     p'p - 1 per body;    sensor - value per condition ]
+//   velocity:  F(q, v, rho) = [ Phi_q v of all joints; 2 p'pdot per body;   sensor's rate - rate per condition ]
+//
+// Every rate is linear in v (the norm of a velocity apart), so second derivatives need no code of their own: with v set
+// to the unit vector e_j, the gradient of the rate  nu'F_q e_j  in q and rho is the j-th column of (F_q'nu)_q and row
+// of (F_q'nu)_rho. These are exact; nothing is differenced.
+#pragma once
+
+#include <vector>
+
+#include "core/linear/sparse_projection.hpp"
+#include "core/mechanism/row_laws.hpp"
+
+namespace mbsopt {
+
+enum class AssemblyLevel { position, velocity };
+
+// A sensor and the value that it shall have.
+struct AssemblyTarget {
+  int condition = 0;  // index in MechanismData::conditions
+  SensorKind sensor;
+  SensorKind rate;  // its time derivative; at velocity level the sensor itself
+  double value = 0;
+  int slot = -1;
+  double branch = 0;  // of an angle: the value last accepted, from which it is continued
+};
+
+class AssemblyEquations {
+ public:
+  AssemblyEquations(const MechanismData& data, AssemblyLevel level, double t);
+
+  // Branches of followed joint angles: within half a turn of zero at the guess, except that the last angle in a row of
+  // several (a gear) is on the branch that satisfies the row best; from there on they are continued.
+  void start_branches(const Eigen::VectorXd& y);
+  const Eigen::VectorXd& angles() const { return angles_; }
+  void settle_shared_rows(const Eigen::VectorXd& y, Eigen::VectorXd& angles) const;
+
+  Eigen::Index rows() const;  // joints first, then unit norms, then targets
+  const std::vector<AssemblyTarget>& targets() const { return targets_; }
+
+  // y = (q, v); at position level v is ignored.
+  Eigen::VectorXd values(const Eigen::VectorXd& y) const;
+  struct Gradients {
+    Eigen::MatrixXd y, rho;  // rows x 14n, rows x P (all parameters)
+  };
+  Gradients gradients(const Eigen::VectorXd& y) const;
+  // The same with the state's gradient by its entries; those of the same place add up.
+  struct SparseGradients {
+    std::vector<SparseEntry> y;
+    Eigen::MatrixXd rho;
+  };
+  SparseGradients sparse_gradients(const Eigen::VectorXd& y) const;
+  // (F_x'nu) differentiated, x: q at position, v at velocity level.   7n x 14n, 7n x P
+  Gradients second(const Eigen::VectorXd& y, const Eigen::VectorXd& nu) const;
+
+  // Where not all equations can be satisfied, bodies stay rigid: unit norms count a thousand times a metre or radian.
+  Eigen::VectorXd weights() const;
+
+  void continue_branches(const Eigen::VectorXd& y);
+
+  using Row = Eigen::Ref<Eigen::RowVectorXd, 0, Eigen::InnerStride<>>;  // a row of a matrix
+
+ private:
+  Eigen::VectorXd branches(const AssemblyTarget& target) const;
+  void add_joint_curvature(const Eigen::VectorXd& q, const Eigen::VectorXd& nu, Gradients& out) const;
+  void add_target_curvature(const AssemblyTarget& target, const Eigen::VectorXd& y, double nu, Gradients& out) const;
+  template <class AddEntry>
+  void collect_gradients(const Eigen::VectorXd& y, AddEntry&& add, Eigen::MatrixXd& rho) const;
+  void add_law_gradients(Eigen::MatrixXd& rho) const;
+  double term_value(const Constraint& c, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) const;
+  void add_slot(int slot, const Eigen::Ref<const Eigen::VectorXd>& bar, Row rho_bar) const;
+
+  const MechanismData& data_;
+  AssemblyLevel level_;
+  double t_;
+  std::vector<AssemblyTarget> targets_;
+  Eigen::VectorXd angles_;
+  RowLaws laws_;  // at t
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,14 @@
+// What a failed assembly says: which joints and conditions stay violated, by how much, and what to try.
+#pragma once
+
+#include <string>
+
+#include "core/start/assembly_equations.hpp"
+#include "core/start/nearest_point.hpp"
+
+namespace mbsopt {
+
+std::string assembly_failure(const MechanismData& data, AssemblyLevel level, const AssemblyEquations& equations,
+                             const NearestPoint& found);
+
+}  // namespace mbsopt

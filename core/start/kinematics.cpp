@@ -1,0 +1,332 @@
+#include "core/start/kinematics.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <set>
+
+#include "core/body/euler_parameters.hpp"
+#include "core/dynamics/dynamics.hpp"
+#include "core/linear/dense.hpp"
+#include "core/projection/projection.hpp"
+#include "core/sensor/body_at.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kLargestTurn = 0.1;         // of an Euler parameter in one step
+constexpr double kRelativeCorrection = 0.2;  // of the predictor, against h v
+constexpr double kSmallCorrection = 1e-6;    // always accepted
+constexpr double kViolation = 1e-9;
+constexpr double kRankThreshold = 1e-7;  // rows of J scaled to unit length
+
+// J at a state, rows scaled to unit length: linear solves that no mass enters.
+class DrivenRows {
+ public:
+  explicit DrivenRows(const MechanismData& d) : d_(d), rows_(d), laws_(d), states_(static_cast<std::size_t>(d.n) + 1) {
+    frames_.resize(states_.size());
+    phi_.setZero(d.m);
+  }
+
+  void set(double t, const VectorXd& y) {
+    laws_.set_time(t);
+    for (int i = 1; i <= d_.n; ++i) {
+      const std::size_t k = static_cast<std::size_t>(i);
+      set_position(y.segment<7>(7 * (i - 1)), states_[k], frames_[k]);
+      set_velocity(y.segment<7>(7 * (d_.n + i - 1)), states_[k], frames_[k]);
+    }
+  }
+  void factor() {
+    if (d_.m == 0) return;
+    rows_.evaluate(frames_);
+    J_ = rows_.dense();
+    scale_ = J_.rowwise().norm().cwiseMax(1e-300).cwiseInverse();
+    unit_rows_.noalias() = scale_.asDiagonal() * J_;
+    scaled_.compute(unit_rows_, kRankThreshold);
+  }
+  const VectorXd& phi(const VectorXd& angles) {
+    evaluate_phi(d_, frames_, laws_, angles, phi_);
+    return phi_;
+  }
+  const VectorXd& phi_dot() {
+    evaluate_phi_dot(d_, frames_, laws_, phi_);
+    return phi_;
+  }
+  Index rank() const { return d_.m == 0 ? 0 : scaled_.rank(); }
+  const MatrixXd& unit_rows() const { return unit_rows_; }
+  VectorXd solve(const VectorXd& b) const { return scaled_.solve(scale_.cwiseProduct(b)); }  // J x = b
+  VectorXd solve_transposed(const VectorXd& f) const {                                       // J'x = f
+    const VectorXd x = scaled_.solve_transposed(f);
+    return scale_.cwiseProduct(x);
+  }
+  VectorXd transposed_times(const VectorXd& x) const { return J_.transpose() * x; }
+
+ private:
+  const MechanismData& d_;
+  ConstraintRows rows_;
+  RowLaws laws_;
+  std::vector<BodyState> states_;
+  std::vector<Frame> frames_;
+  VectorXd phi_, scale_;
+  MatrixXd J_, unit_rows_;
+  OrthogonalDecomposition scaled_;  // of unit_rows_
+};
+
+// Accelerations from the equations of the drives alone, and the multipliers that belong to them: right whatever the
+// masses, where the equations of motion lose digits.
+class DrivenMotion final : public MotionSource {
+ public:
+  DrivenMotion(const Mechanism& mechanism, const FormulationSettings& formulation)
+      : d_(mechanism.data()), dynamics_(mechanism, formulation), rows_(d_), ydot_(mechanism.states()) {
+    motion_.z.assign(static_cast<std::size_t>(d_.n), Vec<6>::Zero());
+    bar_ = motion_;
+    bar_.lambda.setZero(d_.m);
+  }
+
+  const Motion& motion(const StatePoint& at) override {
+    if (at.t == t_ && at.y.size() == y_.size() && at.y == y_) return motion_;
+    t_ = at.t, y_ = at.y;
+    const bool solved = dynamics_.evaluate(at.t, at.y, at.angles, ydot_);
+    rows_.set(at.t, at.y);
+    rows_.factor();
+    const VectorXd z = rows_.solve(-dynamics_.gamma());
+    VectorXd left(6 * d_.n);  // f - M z - J'lambda
+    motion_.lambda = solved && dynamics_.lambda().allFinite() ? dynamics_.lambda() : VectorXd::Zero(d_.m);
+    for (int i = 1; i <= d_.n; ++i) {
+      const std::size_t k = static_cast<std::size_t>(i - 1);
+      motion_.z[k] = z.segment<6>(6 * (i - 1));
+      left.segment<6>(6 * (i - 1)) = dynamics_.loads()[k] - dynamics_.solver().mass_times(i, motion_.z[k]);
+    }
+    motion_.lambda += rows_.solve_transposed(left - rows_.transposed_times(motion_.lambda));
+    return motion_;
+  }
+  Motion& bar() override { return bar_; }
+  void fold_bar(const StatePoint&, Eigen::Ref<VectorXd>, Eigen::Ref<VectorXd>) override {
+    assert(false && "kinematics carries no derivatives");
+  }
+
+ private:
+  const MechanismData& d_;
+  Dynamics dynamics_;
+  DrivenRows rows_;
+  Motion motion_, bar_;
+  double t_ = 0;
+  VectorXd y_, ydot_;
+};
+
+class Kinematics {
+ public:
+  Kinematics(const Mechanism& mechanism, const FormulationSettings& formulation)
+      : d_(mechanism.data()),
+        motion_(mechanism, formulation),
+        projector_(mechanism, Projection::position_velocity),
+        rows_(d_),
+        solution_(projector_.solution()),
+        y_hat_(mechanism.states()),
+        y_next_(mechanism.states()) {}
+
+  void start(double t, const VectorXd& y, const VectorXd& angles) { t_ = t, y_ = y, angles_ = angles; }
+  StatePoint point() { return {t_, y_, angles_, &motion_}; }
+  const VectorXd& y() const { return y_; }
+  double t() const { return t_; }
+
+  // Largest step allowed by the velocities.
+  double step_limit() const {
+    double fastest = 0;
+    for (int i = 0; i < d_.n; ++i) {
+      fastest = std::max(fastest, y_.segment<4>(7 * (d_.n + i) + 3).lpNorm<Eigen::Infinity>());
+    }
+    return fastest > 0 ? kLargestTurn / fastest : INFINITY;
+  }
+
+  // One step; false where Newton does not converge or the correction says that the step is too long.
+  bool advance(double h, double t1) {
+    const Index half = 7 * d_.n;
+    const Motion& m = motion_.motion(point());
+    const bool accelerated = std::all_of(m.z.begin(), m.z.end(), [](const Vec<6>& z) {
+      return z.allFinite() && z.cwiseAbs().maxCoeff() < 1e8;  // not so next to a singular position
+    });
+    for (int i = 0; i < d_.n; ++i) {
+      const Index q = 7 * i;
+      Vec<7> a = Vec<7>::Zero();
+      if (accelerated) {
+        const Vec<6>& z = m.z[static_cast<std::size_t>(i)];
+        const Vector4d p = y_.segment<4>(q + 3), pdot = y_.segment<4>(half + q + 3);
+        a << z.head<3>(), 0.5 * G_transposed_times(p, z.tail<3>()) - pdot.squaredNorm() * p;
+      }
+      y_hat_.segment<7>(q) = y_.segment<7>(q) + h * y_.segment<7>(half + q) + 0.5 * h * h * a;
+      y_hat_.segment<7>(half + q) = y_.segment<7>(half + q) + h * a;
+    }
+    if (!projector_.project(t1, angles_, y_hat_, y_next_, solution_)) return false;
+    polish(t1);
+    if (!keeps_branch(h)) return false;
+    if (projector_.position_violation(t1, angles_, y_next_) > kViolation) return false;
+    t_ = t1;
+    y_ = y_next_;
+    for (std::size_t k = 0; k < d_.angles.size(); ++k) {
+      const JointAngle& a = d_.angles[k];
+      double& angle = angles_(static_cast<Index>(k));
+      angle = a.value_near(angle, body_at(y_, a.body1).frame, body_at(y_, a.body2).frame);
+    }
+    return true;
+  }
+
+  // Each body's correction is small against h v, and so is the difference from the trapezoidal rule. Beside a dead
+  // point h^2 a/2 may reach the other branch, so that the correction alone is small there; but on that branch the
+  // velocity has the opposite sign, and the trapezoidal rule disagrees.
+  bool keeps_branch(double h) const {
+    const Index half = 7 * d_.n;
+    const auto keeps = [&](Index at, Index size) {
+      const auto v0 = y_.segment(half + at, size), v1 = y_next_.segment(half + at, size);
+      const double allowed =
+          std::max(kSmallCorrection,
+                   kRelativeCorrection * h * std::max(v0.lpNorm<Eigen::Infinity>(), v1.lpNorm<Eigen::Infinity>()));
+      const auto q0 = y_.segment(at, size), q1 = y_next_.segment(at, size);
+      return (q1 - y_hat_.segment(at, size)).lpNorm<Eigen::Infinity>() <= allowed &&
+             (q1 - q0 - 0.5 * h * (v0 + v1)).lpNorm<Eigen::Infinity>() <= allowed;
+    };
+    for (Index i = 0; i < d_.n; ++i) {
+      if (!keeps(7 * i, 3) || !keeps(7 * i + 3, 4)) return false;
+    }
+    return true;
+  }
+
+  // Newton's last steps, and the velocities, without masses.
+  void polish(double t1) {
+    double before = INFINITY;
+    for (int k = 0; k < 10; ++k) {
+      rows_.set(t1, y_next_);
+      const VectorXd phi = rows_.phi(angles_);
+      const double now = phi.cwiseAbs().maxCoeff();
+      rows_.factor();
+      if (now < 1e-15 || !(now < 0.9 * before)) break;
+      before = now;
+      move(rows_.solve(-phi));
+    }
+    const VectorXd u = rows_.solve(-rows_.phi_dot());
+    const Index half = 7 * d_.n;
+    for (int i = 0; i < d_.n; ++i) {
+      y_next_.segment<3>(half + 7 * i) += u.segment<3>(6 * i);
+      y_next_.segment<4>(half + 7 * i + 3) +=
+          0.5 * G_transposed_times(Vector4d(y_next_.segment<4>(7 * i + 3)), u.segment<3>(6 * i + 3));
+    }
+  }
+  void move(const VectorXd& delta) {
+    const Index half = 7 * d_.n;
+    for (int i = 0; i < d_.n; ++i) {
+      y_next_.segment<3>(7 * i) += delta.segment<3>(6 * i);
+      Vector4d p = y_next_.segment<4>(7 * i + 3);
+      p += 0.5 * G_transposed_times(p, delta.segment<3>(6 * i + 3));
+      p.normalize();
+      Vector4d pdot = y_next_.segment<4>(half + 7 * i + 3);
+      pdot -= p * p.dot(pdot);
+      y_next_.segment<4>(7 * i + 3) = p;
+      y_next_.segment<4>(half + 7 * i + 3) = pdot;
+    }
+  }
+
+  double position_violation() { return projector_.position_violation(t_, angles_, y_); }
+  double velocity_violation() { return projector_.velocity_violation(t_, y_); }
+
+  // Degrees of freedom that J leaves at the present position, and who owns the equations that depend on each other.
+  SingularPosition rank_here() {
+    rows_.set(t_, y_);
+    rows_.factor();
+    SingularPosition s;
+    s.t = t_;
+    s.rank_lost = static_cast<int>(6 * d_.n - rows_.rank());
+    if (s.rank_lost > 0 && d_.m > 0) name_owners(rows_.unit_rows(), s);
+    return s;
+  }
+
+ private:
+  // Equations with a share in a dependence that the generic position does not have: null vectors of J'.
+  void name_owners(const MatrixXd& J, SingularPosition& s) const {
+    const LeftSingular svd = left_singular(J);
+    std::set<std::string> seen;
+    for (Index k = 0; k < J.rows(); ++k) {
+      if (k < svd.values.size() && svd.values(k) > kRankThreshold) continue;
+      for (const Constraint& c : d_.constraints) {
+        if (svd.U.col(k).segment(c.row, c.rows()).cwiseAbs().maxCoeff() < 1e-3) continue;
+        const std::string owner = c.drive >= 0 ? "drive '" + d_.drive_names[static_cast<std::size_t>(c.drive)] + "'"
+                                               : "joint '" + d_.joint_names[static_cast<std::size_t>(c.joint)] + "'";
+        if (seen.insert(owner).second) s.owners.push_back(owner);
+      }
+    }
+  }
+
+  const MechanismData& d_;
+  DrivenMotion motion_;
+  Projector projector_;
+  DrivenRows rows_;
+  ProjectionSolution solution_;
+  double t_ = 0;
+  VectorXd y_, angles_, y_hat_, y_next_;
+};
+
+}  // namespace
+
+KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& start,
+                                  const FormulationSettings& formulation, const std::vector<double>& times,
+                                  const std::function<bool(std::size_t, const StatePoint&)>& observe) {
+  KinematicsResult result;
+  result.last_good_time = times.front();
+  if (!start.result().ok) {
+    result.message = start.result().message;
+    return result;
+  }
+  const int freedoms = start.summary().degrees_of_freedom;
+  Kinematics k(mechanism, formulation);
+  k.start(times.front(), start.result().y, start.result().angles);
+  if (freedoms > 0 && k.rank_here().rank_lost > 0) {
+    result.message = "the drives leave " + std::to_string(freedoms) + (freedoms == 1 ? " degree" : " degrees") +
+                     " of freedom at the start; kinematics needs all of them driven, by drives or by a condition on a "
+                     "sensor (initial.conditions) for each. If the start is a singular position, begin beside it";
+    return result;
+  }
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    double h = times[i] - k.t();
+    while (k.t() < times[i]) {
+      const double left = times[i] - k.t();
+      h = std::min({h, left, k.step_limit()});
+      const bool last = h >= left * (1 - 1e-12);
+      if (k.advance(h, last ? times[i] : k.t() + h)) {
+        ++result.steps;
+        h *= 2;
+        continue;
+      }
+      h /= 2;
+      if (h < 1e-9 * std::max(1e-3, times.back() - times.front())) {
+        const SingularPosition here = k.rank_here();
+        const std::string why =
+            here.owners.empty() ? std::string()
+                                : fmt::format(": a singular position, where the equations of {} depend on each other",
+                                              fmt::join(here.owners, ", "));
+        result.message = fmt::format(
+            "the positions cannot be continued beyond t = {:.6g} s{}. A dead point that the drives cannot "
+            "pass, or a position out of reach? Change the law, the lengths, or drive another joint there",
+            k.t(), why);
+        return result;
+      }
+    }
+    result.last_good_time = k.t();
+    result.max_position_violation = std::max(result.max_position_violation, k.position_violation());
+    result.max_velocity_violation = std::max(result.max_velocity_violation, k.velocity_violation());
+    SingularPosition here = k.rank_here();
+    if (here.rank_lost > 0) result.singular.push_back(std::move(here));
+    if (!observe(i, k.point())) {
+      result.message = fmt::format("stopped at t = {:.6g} s", k.t());
+      return result;
+    }
+  }
+  result.ok = true;
+  return result;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,46 @@
+// Motion of a fully driven mechanism: positions, velocities, accelerations and the forces of its drives, without
+// integration.
+//
+//   positions      Phi(q, t) = 0 by Newton's method from a predictor of second order, continued in time
+//   velocities     Phi_q v = -Phi_t,    accelerations and multipliers from the equations of motion: linear solves
+//
+// Steps are cut where the correction of the predictor is not small against h v, or where the trapezoidal rule
+// disagrees, so that a branch is followed and never changed. Where J loses rank the position is singular: it is crossed
+// when steps to either side of it are possible, and reported with the rank that is lost and the joints and drives whose
+// equations depend on each other.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/state_point.hpp"
+#include "core/scene/settings.hpp"
+#include "core/start/assembly.hpp"
+
+namespace mbsopt {
+
+struct SingularPosition {
+  double t = 0;
+  int rank_lost = 0;
+  std::vector<std::string> owners;  // "joint 'A'", "drive 'motor'"
+};
+
+struct KinematicsResult {
+  bool ok = false;
+  std::string message;
+  double last_good_time = 0;
+  long steps = 0, iterations = 0;
+  double max_position_violation = 0, max_velocity_violation = 0;
+  std::vector<SingularPosition> singular;  // among the times wanted
+};
+
+// start: the mechanism assembled at the first of the times, which ascend. observe: with the motion (accelerations,
+// multipliers) in the point.
+KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& start,
+                                  const FormulationSettings& formulation, const std::vector<double>& times,
+                                  const std::function<bool(std::size_t, const StatePoint&)>& observe);
+
+}  // namespace mbsopt

@@ -1,0 +1,171 @@
+#include "core/start/model_warnings.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "core/dynamics/constraint_rows.hpp"
+#include "core/linear/dense.hpp"
+#include "core/linear/row_dependence.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/planar_model.hpp"
+#include "core/sensor/body_at.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::VectorXd;
+
+constexpr double kMassless = 1e-12;      // relative to the largest mass or inertia
+constexpr double kZeroLength = 1e-9;     // [m]
+constexpr double kMuchViolated = 0.1;    // of the mechanism's size for points, rad for axes
+constexpr double kRankThreshold = 1e-8;  // rows of J scaled to unit length
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+std::vector<Frame> frames_at(const MechanismData& d, const VectorXd& q) {
+  std::vector<Frame> frames(at(d.n) + 1);
+  BodyState state;
+  for (int i = 1; i <= d.n; ++i) set_position(q.segment<7>(7 * (i - 1)), state, frames[at(i)]);
+  return frames;
+}
+
+// Directions that neither a joint nor a mass holds: what no row of J and of the masses, one row per principal axis,
+// reaches.
+void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::string>& warnings) {
+  double mass = 0, inertia = 0;
+  for (int i = 1; i <= d.n; ++i) {
+    mass = std::max(mass, d.bodies[at(i)].mass), inertia = std::max(inertia, d.bodies[at(i)].J.trace());
+  }
+  std::vector<SparseEntry> rows;
+  int count = d.m;
+  for (int i = 1; i <= d.n; ++i) {
+    const BodyData& b = d.bodies[at(i)];
+    const int first = 6 * (i - 1);
+    for (int k = 0; k < 3 && b.mass > kMassless * mass; ++k) rows.push_back({count++, first + k, 1});
+    const SymmetricEigen principal = symmetric_eigen(b.J);
+    for (int k = 0; k < 3; ++k) {
+      if (!(principal.values(k) > kMassless * inertia)) continue;
+      for (int j = 0; j < 3; ++j) rows.push_back({count, first + 3 + j, principal.vectors(j, k)});
+      ++count;
+    }
+  }
+  if (count == d.m + 6 * d.n) return;  // the usual case costs nothing
+  ConstraintRows J(d);
+  J.evaluate(frames_at(d, q));
+  for (const RowGroup& g : d.groups) {
+    for (int r = 0; r < g.rows; ++r) {
+      for (int k = 0; k < 6; ++k) {
+        if (g.body1 > 0) rows.push_back({g.row + r, 6 * (g.body1 - 1) + k, J.J1(g.block + r, k)});
+        if (g.body2 > 0) rows.push_back({g.row + r, 6 * (g.body2 - 1) + k, J.J2(g.block + r, k)});
+      }
+    }
+  }
+  std::map<int, bool> bodies;
+  for (const RowDependence::Direction& free : row_dependence(count, d.n, 6, rows, kRankThreshold).unreached) {
+    bodies[free.body + 1] = free.column >= 3;
+  }
+  for (const auto& [body, turns] : bodies) {
+    warnings.push_back(
+        fmt::format("body '{}' has no {} in a direction in which no joint holds it: forces there give no finite "
+                    "acceleration; give it "
+                    "some, or hold it by a joint",
+                    d.body_names[at(body)], turns ? "inertia" : "mass"));
+  }
+}
+
+void add_springs(const MechanismData& d, const VectorXd& y, std::vector<std::string>& warnings) {
+  for (const TsdaForce& f : d.tsda) {
+    const double l = f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l;
+    if (l > kZeroLength) continue;
+    warnings.push_back(fmt::format(
+        "a tsda between '{}' and '{}' has zero length at the start, where it has no direction; its force acts "
+        "once its points have moved apart",
+        d.body_names[at(f.body1)], d.body_names[at(f.body2)]));
+  }
+}
+
+// Whether the ground holds the centre of mass of every body: then no gravity moves anything.
+bool is_balanced(const MechanismData& d) {
+  std::vector<bool> held(at(d.n) + 1, false);
+  held[0] = true;
+  for (const Constraint& c : d.constraints) {
+    const auto* p = std::get_if<Coincidence>(&c.primitive);
+    if (p && c.body1 == 0 && p->s2.norm() <= kZeroLength) held[at(c.body2)] = true;
+    if (p && c.body2 == 0 && p->s1.norm() <= kZeroLength) held[at(c.body1)] = true;
+  }
+  return std::all_of(held.begin(), held.end(), [](bool h) { return h; });
+}
+
+void add_gravity(const MechanismData& d, std::vector<std::string>& warnings) {
+  constexpr double kAlong = 1e-9;  // of gravity: what rounding leaves of a component that is meant to be 0
+  if (!d.planar) return;
+  const Vector3d& g = d.gravity;
+  if (std::hypot(g(d.planar->t1), g(d.planar->t2)) > kAlong * g.norm() || g.norm() == 0 || is_balanced(d)) return;
+  warnings.push_back(
+      fmt::format("gravity: is [{:g}, {:g}, {:g}] m/s^2, normal to the plane in which the mechanism moves: it moves "
+                  "nothing. The default is along -z; in a vertical x-y plane it is [0, -9.81, 0]. [0, 0, 0] says that "
+                  "none is meant",
+                  g(0), g(1), g(2)));
+}
+
+void add_violations(const MechanismData& d, std::vector<std::string>& warnings) {
+  double size = 0;
+  for (const Constraint& c : d.constraints) {
+    if (const auto* p = std::get_if<Coincidence>(&c.primitive)) size = std::max({size, p->s1.norm(), p->s2.norm()});
+  }
+  VectorXd q(7 * d.n);
+  for (int i = 1; i <= d.n; ++i) q.segment<7>(7 * (i - 1)) = d.bodies[at(i)].q;
+  const std::vector<Frame> frames = frames_at(d, q);
+  std::map<int, double> worst_point, worst_axis;
+  for (const Constraint& c : d.constraints) {
+    if (c.joint < 0) continue;
+    if (const auto* p = std::get_if<Coincidence>(&c.primitive)) {
+      Vec<3> phi;
+      p->phi(frames[at(c.body1)], frames[at(c.body2)], phi);
+      worst_point[c.joint] = std::max(worst_point[c.joint], phi.norm());
+    } else if (const auto* x = std::get_if<Dot1>(&c.primitive)) {
+      Vec<1> phi;
+      x->phi(frames[at(c.body1)], frames[at(c.body2)], phi);
+      worst_axis[c.joint] = std::max(worst_axis[c.joint], std::abs(phi(0)));
+    }
+  }
+  for (const auto& [joint, amount] : worst_point) {
+    if (amount <= kMuchViolated * size || size == 0) continue;
+    warnings.push_back(fmt::format(
+        "the guess (position, orientation of the bodies) leaves the points of joint '{}' {:.3g} m apart; "
+        "check that the assembled position is the one that is meant (`simulate` writes a report with a drawing)",
+        d.joint_names[at(joint)], amount));
+  }
+  for (const auto& [joint, amount] : worst_axis) {
+    if (amount <= kMuchViolated) continue;
+    warnings.push_back(fmt::format(
+        "the guess (orientation of the bodies) leaves the axes of joint '{}' {:.3g} rad out of line; check in "
+        "the report that the assembled position is the one that is meant",
+        d.joint_names[at(joint)], std::asin(std::min(1.0, amount))));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> model_warnings(const Mechanism& mechanism, const Assembly& assembly) {
+  const MechanismData& d = mechanism.data();
+  std::vector<std::string> warnings;
+  add_violations(d, warnings);
+  add_gravity(d, warnings);
+  for (std::string& warning : start_warnings(mechanism, assembly)) warnings.push_back(std::move(warning));
+  return warnings;
+}
+
+std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assembly& assembly) {
+  const MechanismData& d = mechanism.data();
+  std::vector<std::string> warnings;
+  if (!assembly.result().ok) return warnings;
+  add_massless(d, assembly.result().y.head(7 * d.n), warnings);
+  add_springs(d, assembly.result().y, warnings);
+  return warnings;
+}
+
+}  // namespace mbsopt

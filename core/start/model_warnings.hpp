@@ -1,0 +1,20 @@
+// What is odd about a mechanism at its assembled start, in words: things that run but seldom mean what they say.
+//
+//   massless directions that no joint holds        (M is singular on the null space of J: no acceleration there)
+//   springs of zero length                         (they have no direction)
+//   gravity normal to the plane of the mechanism   (it moves nothing)
+//   a guess that violates joints by much           (the assembled state may be another than the one that was meant)
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/start/assembly.hpp"
+
+namespace mbsopt {
+
+std::vector<std::string> model_warnings(const Mechanism& mechanism, const Assembly& assembly);
+// The first two of them, which a simulation may end with.
+std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assembly& assembly);
+
+}  // namespace mbsopt

@@ -1,0 +1,380 @@
+#include "core/start/nearest_point.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+namespace mbsopt {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+// The columns of W, orthonormal in units of the sizes, span the null space. Those that turn no body (or, where lengths
+// are large, move none) have a part of rounding in p (in r). In the units of x it is eps/L for lengths L, and
+// multiplies the large g of p beside the small one of r: a part eps/L^2 of r would be wrong. So that part is zero,
+// exactly.
+MatrixXd orthonormal_null_space(const MatrixXd& W, const VectorXd& sizes) {
+  const double heavy = sizes.size() > 0 ? sizes.maxCoeff() : 0;
+  std::vector<Eigen::Index> heavy_rows;
+  for (Eigen::Index i = 0; i < sizes.size(); ++i) {
+    if (sizes(i) == heavy) heavy_rows.push_back(i);
+  }
+  if (W.size() == 0 || heavy_rows.size() == static_cast<std::size_t>(sizes.size())) return orthonormal_columns(W);
+  const LeftSingular parts = left_singular(W(heavy_rows, Eigen::all).transpose());
+  const Eigen::Index both = (parts.values.array() > NearestPointLinearisation::kRankThreshold).count();
+  MatrixXd Z(W.rows(), W.cols()), light = W * parts.U.rightCols(W.cols() - both);
+  light(heavy_rows, Eigen::all).setZero();
+  Z << orthonormal_columns(sizes.asDiagonal() * W * parts.U.leftCols(both)), orthonormal_columns(light);
+  return Z;
+}
+
+}  // namespace
+
+NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J)
+    : NearestPointLinearisation(J, VectorXd::Ones(J.cols())) {}
+NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J, const VectorXd& sizes)
+    : J_(J), scale_(J.rows()), sizes_(sizes) {
+  const MatrixXd sized = J * sizes.asDiagonal();
+  for (Eigen::Index i = 0; i < J.rows(); ++i) {
+    const double norm = sized.row(i).norm();
+    scale_(i) = norm > 0 ? 1 / norm : 1.0;
+  }
+  J_transposed_ = OrthogonalDecomposition((scale_.asDiagonal() * sized).transpose(), kRankThreshold);
+  Z_ = orthonormal_null_space(J_transposed_.left_null_space(), sizes);
+}
+
+VectorXd NearestPointLinearisation::multipliers(const VectorXd& g) const {
+  return scale_.asDiagonal() * J_transposed_.solve(sizes_.asDiagonal() * g);
+}
+MatrixXd NearestPointLinearisation::particular(const Eigen::Ref<const MatrixXd>& b) const {
+  return sizes_.asDiagonal() * J_transposed_.solve_transposed(scale_.asDiagonal() * b);
+}
+MatrixXd NearestPointLinearisation::pseudo_inverse_times(const Eigen::Ref<const MatrixXd>& b) const {
+  const MatrixXd x = particular(b);
+  return x - Z_ * (Z_.transpose() * x);
+}
+
+void NearestPointLinearisation::set_hessian(const MatrixXd& H) {
+  H_ = H;
+  if (Z_.cols() == 0) {
+    lambda_.resize(0);
+    V_.resize(0, 0);
+    return;
+  }
+  const MatrixXd M = Z_.transpose() * H * Z_;
+  auto [values, vectors] = symmetric_eigen(0.5 * (M + M.transpose()));
+  lambda_ = std::move(values);
+  V_ = std::move(vectors);
+}
+
+MatrixXd NearestPointLinearisation::solve(const Eigen::Ref<const MatrixXd>& b,
+                                          const Eigen::Ref<const MatrixXd>& g) const {
+  const MatrixXd x = particular(b);
+  const MatrixXd w = V_.transpose() * (Z_.transpose() * (g - H_ * x));
+  return x + Z_ * (V_ * (lambda_.cwiseInverse().asDiagonal() * w));
+}
+
+void NearestPointLinearisation::solve_transposed(const Eigen::Ref<const MatrixXd>& x_bar, MatrixXd& b_bar,
+                                                 MatrixXd& g_bar) const {
+  const MatrixXd w = V_.transpose() * (Z_.transpose() * x_bar);
+  g_bar = Z_ * (V_ * (lambda_.cwiseInverse().asDiagonal() * w));
+  b_bar = scale_.asDiagonal() * J_transposed_.solve(sizes_.asDiagonal() * (x_bar - H_.transpose() * g_bar));
+}
+
+VectorXd NearestPointLinearisation::descent(const VectorXd& b, const VectorXd& g) const {
+  constexpr double kPositive = 1e-6, kFloor = 0.1;
+  const VectorXd x = pseudo_inverse_times(b);
+  VectorXd lambda = lambda_;
+  if (lambda.size() > 0 && lambda(0) < kPositive) lambda = lambda.cwiseAbs().cwiseMax(kFloor);
+  const VectorXd w = V_.transpose() * (Z_.transpose() * (g - H_ * x));
+  return x + Z_ * (V_ * w.cwiseQuotient(lambda));
+}
+
+namespace {
+
+constexpr int kMaxIterations = 400;
+constexpr double kLocal = 1e-6;       // steps below it are taken whole: the merit function sees only rounding there
+constexpr double kSatisfied = 1e-11;  // of F, per unit of x
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+double largest(const VectorXd& x) { return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>(); }
+
+// Levenberg-Marquardt on 1/2 |weights F|^2: brings x to where the equations are violated least.
+void reduce_violation(NearestPointEquations& equations, VectorXd& x, int& iterations) {
+  double mu = 1e-3;
+  VectorXd F = equations.values(x);
+  MatrixXd J = equations.jacobian(x);
+  const VectorXd scale = equations.weights();
+  auto violation = [&](const VectorXd& f) { return scale.cwiseProduct(f).squaredNorm(); };
+  for (int k = 0; k < kMaxIterations && mu < 1e12; ++k, ++iterations) {
+    const MatrixXd A = scale.asDiagonal() * J;
+    const VectorXd gradient = A.transpose() * scale.cwiseProduct(F);
+    if (largest(gradient) < 1e-15) return;
+    MatrixXd normal = A.transpose() * A;
+    normal.diagonal().array() += mu;
+    VectorXd step = cholesky_solve(normal, -gradient);
+    step *= equations.step_fraction(step);
+    const VectorXd trial = equations.retracted(x + step), F_trial = equations.values(trial);
+    if (violation(F_trial) < violation(F)) {
+      const bool negligible = violation(F) - violation(F_trial) < 1e-14 * violation(F);
+      x = trial, F = F_trial;
+      equations.accept(x);
+      if (negligible) return;
+      J = equations.jacobian(x);
+      mu = std::max(mu / 5, 1e-14);
+    } else {
+      mu *= 4;
+    }
+  }
+}
+
+class Search {
+ public:
+  Search(NearestPointEquations& equations, const VectorXd& x_guess) : equations_(equations), x_guess_(x_guess) {
+    result_.x = x_guess;
+  }
+
+  // In metres; if that fails, where lengths of micrometres or kilometres may have cost digits, in units of the sizes.
+  NearestPoint run() {
+    if (guess_is_it()) return result_;
+    search();
+    if (result_.status != NearestPointStatus::found) {
+      const NearestPoint in_metres = std::exchange(result_, NearestPoint{});
+      sized_ = true;
+      move(x_guess_);
+      search();
+      if (result_.status != NearestPointStatus::found) {
+        move(in_metres.x);
+        return in_metres;
+      }
+    }
+    refine();
+    result_.F = equations_.values(result_.x);
+    return result_;
+  }
+
+ private:
+  void search() {
+    if (!newton()) sqp();
+    result_.F = equations_.values(result_.x);
+    const bool unsettled =
+        result_.status == NearestPointStatus::stalled || result_.status == NearestPointStatus::unsatisfiable;
+    if (unsettled && largest(result_.F) < 1e-9 * size()) result_.status = NearestPointStatus::singular;
+  }
+
+  // The guess satisfies the equations to rounding: nothing is nearer, nu = 0 and H = I.
+  bool guess_is_it() {
+    const VectorXd x = equations_.retracted(x_guess_), F = equations_.values(x);
+    if (!(largest(x - x_guess_) <= 4 * kEpsilon)) return false;  // only unit vectors are retracted
+    if (!(F.cwiseAbs().array() <= 4 * kEpsilon * equations_.magnitudes(x).array()).all()) return false;
+    result_.x = x, result_.F = F, result_.nu = VectorXd::Zero(F.size());
+    result_.status = NearestPointStatus::found;
+    result_.linearised = false;
+    equations_.accept(x);
+    return true;
+  }
+
+  // Gauss-Newton, then Newton; false where neither converges.
+  bool newton() {
+    constexpr double kNear = 0.05;    // Gauss-Newton steps below it, per unit of x, may be Newton's instead
+    constexpr double kConvex = 1e-3;  // least eigenvalue of Z'HZ at which they are
+    constexpr int kPatience = 30;     // steps without a shorter one: it circles
+    double shortest = std::numeric_limits<double>::infinity();
+    for (int waited = 0; waited < kPatience && result_.iterations < kMaxIterations; ++result_.iterations) {
+      const VectorXd& x = result_.x;
+      linearise();
+      if (!result_.F.allFinite()) return true;
+      const NearestPointLinearisation& at = result_.linearisation;
+      const VectorXd away = x_guess_ - x;
+      VectorXd step = at.pseudo_inverse_times(-result_.F) + at.null_space() * (at.null_space().transpose() * away);
+      const double length = largest(step);
+      if (length < 0.9 * shortest) {
+        shortest = length, waited = 0;
+      } else {
+        ++waited;
+      }
+      if (length < kNear * size()) {
+        add_curvature();
+        const VectorXd& lambda = at.reduced_eigenvalues();
+        if (lambda.size() == 0 || lambda(0) > kConvex) step = at.solve(-result_.F, away);
+        if (satisfied() && converged(largest(step))) {
+          result_.status = is_minimum() ? NearestPointStatus::found : NearestPointStatus::undetermined;
+          return true;
+        }
+      }
+      move(x + equations_.step_fraction(step) * step);
+    }
+    return false;
+  }
+
+  void sqp() {
+    constexpr int kRestorations = 3;
+    int restorations = 0;
+    const int last = result_.iterations + kMaxIterations;
+    shortest_ = std::numeric_limits<double>::infinity(), waited_ = 0;
+    for (; result_.iterations < last; ++result_.iterations) {
+      linearise();
+      if (!result_.F.allFinite()) return;
+      add_curvature();
+      const VectorXd step = result_.linearisation.descent(-result_.F, x_guess_ - result_.x);
+      const bool still = converged(largest(step));
+      if (still && satisfied()) {
+        result_.status = is_minimum() ? NearestPointStatus::found : NearestPointStatus::undetermined;
+        return;
+      }
+      if (!still && largest(step) < kLocal * size()) {
+        move(result_.x + step);
+      } else if (still || !gets_closer() || !advance(step)) {
+        if (restorations++ == kRestorations || !restore()) {
+          result_.status = NearestPointStatus::unsatisfiable;
+          return;
+        }
+      }
+    }
+  }
+
+  bool satisfied() const { return largest(result_.F) <= kSatisfied * size(); }
+  double size() const { return 1 + largest(result_.x); }
+  double scaled_violation(const VectorXd& F) const { return result_.linearisation.row_scale().cwiseProduct(F).norm(); }
+
+  void linearise() {
+    result_.F = equations_.values(result_.x);
+    const MatrixXd J = equations_.jacobian(result_.x);
+    result_.linearisation = sized_ ? NearestPointLinearisation(J, equations_.sizes(J)) : NearestPointLinearisation(J);
+  }
+  // Newton's steps to the rounding of each unknown, not of the largest.
+  void refine() {
+    sized_ = true;
+    for (double last = std::numeric_limits<double>::infinity();;) {
+      linearise();
+      add_curvature();
+      const VectorXd step = result_.linearisation.solve(-result_.F, x_guess_ - result_.x);
+      const double length = largest(step.cwiseQuotient(result_.linearisation.sizes() + VectorXd(result_.x.cwiseAbs())));
+      if (!(length > 2 * kEpsilon) || !(length < 0.5 * last)) return;
+      last = length;
+      move(result_.x + step);
+    }
+  }
+  void add_curvature() {
+    result_.nu = result_.linearisation.multipliers(x_guess_ - result_.x);
+    MatrixXd H = equations_.curvature(result_.x, result_.nu);
+    H.diagonal().array() += 1;
+    result_.linearisation.set_hessian(H);
+  }
+
+  // At rounding level, or no longer shrinking just above it.
+  bool converged(double length) {
+    if (length <= 2 * kEpsilon * size()) return true;
+    if (length < 0.5 * shortest_) {
+      shortest_ = length, waited_ = 0;
+      return false;
+    }
+    return shortest_ < 1e-11 * size() && ++waited_ >= 2;
+  }
+
+  // Whether the violation still shrinks from time to time.
+  bool gets_closer() {
+    const double violation = scaled_violation(result_.F);
+    if (violation < 0.7 * closest_ || violation < 1e-9) {
+      closest_ = violation, patience_ = 25;
+      return true;
+    }
+    return --patience_ > 0;
+  }
+
+  // A strict one: the nearest point moves at most 1e9 times as far as the guess.
+  bool is_minimum() const {
+    const VectorXd& lambda = result_.linearisation.reduced_eigenvalues();
+    return lambda.size() == 0 || lambda(0) > 1e-9;
+  }
+
+  void move(const VectorXd& x) {
+    result_.x = equations_.retracted(x);
+    equations_.accept(result_.x);
+  }
+
+  // One step along the merit function 1/2 |x - x_guess|^2 + sigma |scale F|; false where it cannot be reduced.
+  bool advance(VectorXd step) {
+    step *= equations_.step_fraction(step);
+    const VectorXd away = result_.x - x_guess_;
+    const VectorXd scale = result_.linearisation.row_scale();
+    const VectorXd F = scale.cwiseProduct(result_.F);
+    const double violation = F.norm();
+    double slope = away.dot(step);
+    if (violation > 0) {
+      const VectorXd change = scale.cwiseProduct(VectorXd(equations_.jacobian(result_.x) * step));
+      const double reduction = -F.dot(change) / violation;
+      if (violation > 1e-10 && reduction < 1e-8 * std::min(violation, step.norm())) return false;
+      const double rise = slope + 0.5 * step.squaredNorm();
+      if (rise > 0 && reduction > 0) sigma_ = std::max(sigma_, 2 * rise / reduction);
+      slope -= sigma_ * reduction;
+    }
+    if (!(slope < 0)) {
+      if (violation > 1e-8) return false;
+      move(result_.x + step);
+      return true;
+    }
+    auto merit = [&](const VectorXd& x, const VectorXd& f) {
+      return 0.5 * (x - x_guess_).squaredNorm() + sigma_ * scaled_violation(f);
+    };
+    const double now = merit(result_.x, result_.F);
+    for (double part = 1; part > 1e-7; part *= 0.5) {
+      VectorXd trial = result_.x + part * step;
+      VectorXd F_trial = equations_.values(trial);
+      const double enough = now + 1e-4 * part * slope;
+      if (merit(trial, F_trial) <= enough) {
+        move(trial);
+        return true;
+      }
+      if (part == 1) {  // second-order correction: full steps along curved equations
+        trial -= result_.linearisation.pseudo_inverse_times(F_trial);
+        if (merit(trial, equations_.values(trial)) <= enough) {
+          move(trial);
+          return true;
+        }
+      }
+    }
+    return false;
+  }
+
+  // False where even the violation alone does not go to zero.
+  bool restore() {
+    VectorXd x = result_.x;
+    reduce_violation(equations_, x, result_.iterations);
+    result_.x = x;
+    closest_ = shortest_ = std::numeric_limits<double>::infinity();
+    return largest(equations_.values(x)) < 1e-9 * size();
+  }
+
+  NearestPointEquations& equations_;
+  const VectorXd x_guess_;
+  NearestPoint result_;
+  bool sized_ = false;
+  double sigma_ = 1;
+  double shortest_ = std::numeric_limits<double>::infinity(), closest_ = shortest_;
+  int waited_ = 0, patience_ = 0;
+};
+
+}  // namespace
+
+NearestPoint nearest_point(NearestPointEquations& equations, const VectorXd& x_guess, Decomposition decomposition) {
+  NearestPoint found = Search(equations, x_guess).run();
+  if (decomposition == Decomposition::now) linearise(equations, found);
+  return found;
+}
+
+void linearise(NearestPointEquations& equations, NearestPoint& found) {
+  if (found.linearised) return;
+  found.linearised = true;
+  const MatrixXd J = equations.jacobian(found.x);
+  found.linearisation = NearestPointLinearisation(J, equations.sizes(J));
+  MatrixXd H = equations.curvature(found.x, found.nu);
+  H.diagonal().array() += 1;
+  found.linearisation.set_hessian(H);
+}
+
+}  // namespace mbsopt

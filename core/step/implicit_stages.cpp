@@ -1,0 +1,293 @@
+#include "core/step/implicit_stages.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace mbsopt {
+namespace {
+
+constexpr int kMostIterations = 10;       // at a tolerance
+constexpr int kMostExactIterations = 60;  // to rounding, with a new Jacobian wherever convergence is slow
+constexpr double kSlow = 0.1;             // contraction per iteration from which a new Jacobian pays
+constexpr double kRounding = 1e-11;       // relative; iterations that stop falling below it are at rounding
+constexpr int kMostOwnJacobians = 4;      // of each stage, in one step
+constexpr int kOwnSteps = 20;             // steps for which they are used once the Jacobian of the start did not serve
+
+}  // namespace
+
+ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method, const IntegratorSettings& settings,
+                               Dynamics& dynamics)
+    : data_(mechanism.data()),
+      rk_(method),
+      settings_(settings),
+      dynamics_(dynamics),
+      jacobian_(data_),
+      values_(jacobian_.values()) {
+  int largest = 0;
+  for (const StageGroup& g : rk_.stage_groups()) {
+    int found = -1;
+    if (is_implicit(rk_, g)) {
+      Eigen::MatrixXd A(g.size(), g.size());
+      for (int i = 0; i < g.size(); ++i) {
+        for (int j = 0; j < g.size(); ++j) A(i, j) = rk_.a(g.first + i, g.first + j);
+      }
+      for (std::size_t k = 0; k < matrices_.size(); ++k) {
+        if (matrices_[k].A == A) found = static_cast<int>(k);
+      }
+      if (found < 0) {
+        found = static_cast<int>(matrices_.size());
+        matrices_.push_back({A, StageMatrix(data_, jacobian_, g.size())});
+      }
+      largest = std::max(largest, g.size());
+    }
+    for (int i = g.first; i <= g.last; ++i) matrix_of_.push_back(found);
+  }
+  if (rk_.error_filter != 0) filter_.emplace(data_, jacobian_);
+  const Eigen::Index rows = 7 * data_.n + data_.m;
+  own_values_.assign(static_cast<std::size_t>(largest), values_);
+  same_.assign(own_values_.size(), &values_);
+  for (const MotionJacobian::Values& v : own_values_) own_.push_back(&v);
+  for (Points* points : {&past_, &present_}) {
+    points->places.assign(static_cast<std::size_t>(rk_.stages), {0, Eigen::VectorXd::Zero(rows)});
+  }
+  x_.setZero(rows, largest), r_.setZero(rows * largest, 1), change_.setZero(14 * data_.n, largest);
+  a_start_.setZero(7 * data_.n), lambda_start_.setZero(data_.m);
+  y_.setZero(14 * data_.n);
+}
+
+long ImplicitStages::factorisations() const {
+  long sum = filter_ ? filter_->factorisations() : 0;
+  for (const Matrix& m : matrices_) sum += m.matrix.factorisations();
+  return sum;
+}
+
+void ImplicitStages::begin(const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::VectorXd& lambda) {
+  a_start_ = a;
+  lambda_start_ = lambda;
+  past_.count = present_.count = 0;
+  renew_ = true;
+  own_steps_ = 0;
+  age_ = 0;
+  rate_ = 1;
+}
+
+void ImplicitStages::new_attempt() { present_.count = 0; }
+
+void ImplicitStages::accept(const Step& step) {
+  const Eigen::Index n = 7 * data_.n;
+  std::swap(past_, present_);
+  present_.count = 0;
+  // Where the next Jacobian is taken: the latest stage.
+  int latest = 0;
+  for (int i = 1; i < rk_.stages; ++i) {
+    if (rk_.c[i] >= rk_.c[latest]) latest = i;
+  }
+  a_start_ = step.K.col(latest).tail(n);
+  lambda_start_ = step.lambda.col(latest);
+  ++age_;
+  if (rate_ > kSlow) renew_ = true;
+  if (own_steps_ > 0) {
+    --own_steps_;
+    renew_ = true;
+  }
+}
+
+void ImplicitStages::evaluate_jacobian(const Step& step) {
+  dynamics_.place_at(step.t, step.y0, step.angles0, a_start_, lambda_start_);
+  jacobian_.evaluate(dynamics_, values_);
+  ++jacobians_;
+  age_ = 0;
+  renew_ = false;
+}
+
+bool ImplicitStages::ready(const Step& step, Matrix& m) {
+  if (renew_) evaluate_jacobian(step);
+  if (m.jacobian == jacobians_ && m.h == step.h) return true;
+  m.jacobian = -1;
+  if (!m.matrix.factor(step.h, m.A, std::span(same_).first(static_cast<std::size_t>(m.A.rows())))) return false;
+  m.h = step.h;
+  m.jacobian = jacobians_;
+  return true;
+}
+
+// The polynomial through the three nearest points of the past, at most.
+void ImplicitStages::predict(const Step& step, int stage, Eigen::Ref<Eigen::VectorXd> x) const {
+  const double t = step.t + rk_.c[stage] * step.h;
+  std::array<const Point*, 3> nodes;
+  std::size_t count = 0;
+  auto is_new = [&](const Point& p) {
+    return std::all_of(nodes.begin(), nodes.begin() + count,
+                       [&](const Point* q) { return std::abs(q->t - p.t) > 0.05 * step.h; });
+  };
+  while (count < nodes.size()) {
+    const Point* nearest = nullptr;
+    for (const Points* points : {&present_, &past_}) {
+      for (const Point& p : std::span(points->places).first(points->count)) {
+        if (is_new(p) && (!nearest || std::abs(p.t - t) < std::abs(nearest->t - t))) nearest = &p;
+      }
+    }
+    if (!nearest) break;
+    nodes[count++] = nearest;
+  }
+  if (count == 0) {
+    x << a_start_, lambda_start_;
+    return;
+  }
+  x.setZero();
+  for (std::size_t i = 0; i < count; ++i) {
+    double weight = 1;
+    for (std::size_t j = 0; j < count; ++j) {
+      if (j != i) weight *= (t - nodes[j]->t) / (nodes[i]->t - nodes[j]->t);
+    }
+    x += weight * nodes[i]->x;
+  }
+}
+
+// Y and K of the group's stages from the accelerations in x_.
+void ImplicitStages::set_stages(Step& step, const StageGroup& g) {
+  const Eigen::Index n = 7 * data_.n;
+  for (int i = g.first; i <= g.last; ++i) {
+    step.K.col(i).tail(n) = x_.col(i - g.first).head(n);
+    step.lambda.col(i) = x_.col(i - g.first).tail(data_.m);
+  }
+  set_group_stages(rk_, g, step.h, step.y0, step.Y, step.K);
+}
+
+// A Jacobian of each stage's own, where its iterate is.
+bool ImplicitStages::linearise_stages(const Step& step, const StageGroup& g, Matrix& m) {
+  for (int i = 0; i < g.size(); ++i) {
+    const int stage = g.first + i;
+    y_ = step.Y.col(stage);
+    dynamics_.place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, step.K.col(stage).tail(7 * data_.n),
+                       step.lambda.col(stage));
+    MotionJacobian::Values& own = own_values_[static_cast<std::size_t>(i)];
+    jacobian_.evaluate(dynamics_, own);
+    ++own_jacobians_;
+  }
+  m.jacobian = -1;  // not that of the start
+  return m.matrix.factor(step.h, m.A, std::span(own_).first(static_cast<std::size_t>(g.size())));
+}
+
+// Residuals of the group's stages at x_ into r_.
+bool ImplicitStages::evaluate_residuals(Step& step, const StageGroup& g) {
+  const Eigen::Index n = 7 * data_.n, rows = n + data_.m;
+  set_stages(step, g);
+  for (int i = 0; i < g.size(); ++i) {
+    const int stage = g.first + i;
+    y_ = step.Y.col(stage);
+    dynamics_.place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, x_.col(i).head(n), x_.col(i).tail(data_.m));
+    dynamics_.residual(r_.col(0).segment(i * rows, rows));
+    ++evaluations_;
+  }
+  return r_.topRows(g.size() * rows).allFinite();
+}
+
+// Adds the change in r_ to x_; returns what it does to the stages, root mean square in units of the tolerance (exact:
+// of the state's size).
+double ImplicitStages::add_change(const Step& step, const StageGroup& g, const Matrix& m, bool exact) {
+  const Eigen::Index n = 7 * data_.n, rows = n + data_.m;
+  const int s = g.size();
+  double sum = 0;
+  for (int i = 0; i < s; ++i) {
+    auto dV = change_.col(i).tail(n);
+    dV.setZero();
+    for (int j = 0; j < s; ++j) dV += (step.h * m.A(i, j)) * r_.col(0).segment(j * rows, n);
+  }
+  for (int i = 0; i < s; ++i) {
+    auto dQ = change_.col(i).head(n);
+    dQ.setZero();
+    for (int j = 0; j < s; ++j) dQ += (step.h * m.A(i, j)) * change_.col(j).tail(n);
+    for (Eigen::Index e = 0; e < 2 * n; ++e) {
+      const double size = std::abs(step.y0(e));
+      const double unit = exact ? 1 + size : settings_.atol + settings_.rtol * size;
+      const double x = change_(e, i) / unit;
+      sum += x * x;
+    }
+    x_.col(i) += r_.col(0).segment(i * rows, rows);
+  }
+  return std::sqrt(sum / static_cast<double>(2 * n * s));
+}
+
+bool ImplicitStages::iterate(Step& step, const StageGroup& g, Matrix& m, Goal goal, bool own) {
+  const Eigen::Index rows = 7 * data_.n + data_.m;
+  const bool exact = goal != Goal::tolerance;
+  for (int i = 0; i < g.size(); ++i) {
+    if (goal == Goal::polish) {
+      x_.col(i) << step.K.col(g.first + i).tail(7 * data_.n), step.lambda.col(g.first + i);
+    } else {
+      predict(step, g.first + i, x_.col(i));
+    }
+  }
+  if (own) {
+    set_stages(step, g);
+    if (!linearise_stages(step, g, m)) return false;
+  } else if (!ready(step, m)) {
+    return false;
+  }
+  const double tolerance =
+      std::max(std::min(1e-2, std::sqrt(settings_.rtol)), 10 * std::numeric_limits<double>::epsilon() / settings_.rtol);
+  const int most = exact ? kMostExactIterations : kMostIterations;
+  double before = INFINITY;
+  int own_left = kMostOwnJacobians;
+  for (int k = 0, since = 0; k < most; ++k, ++since) {
+    if (!evaluate_residuals(step, g)) return false;
+    m.matrix.solve(r_.topRows(g.size() * rows), 0);
+    const double now = add_change(step, g, m, exact);
+    if (!std::isfinite(now)) return false;
+    bool converges = true;
+    if (since > 0) {
+      rate_ = before > 0 ? now / before : 0;
+      if (exact) {
+        converges = rate_ <= 0.5;
+        if (!converges && now < kRounding) return true;
+      } else {
+        converges = rate_ < 1;
+        if (converges && rate_ / (1 - rate_) * now <= tolerance) return true;
+        if (converges) converges = std::pow(rate_, most - 1 - k) / (1 - rate_) * now <= tolerance;
+      }
+    }
+    if (now <= (exact ? 1e-15 : 1e-10)) return true;
+    before = now;
+    if (converges) continue;
+    if ((!own && !exact) || own_left-- == 0) return false;
+    set_stages(step, g);
+    if (!linearise_stages(step, g, m)) return false;
+    since = -1;
+  }
+  return false;
+}
+
+bool ImplicitStages::solve(Step& step, const StageGroup& g, Goal goal) {
+  Matrix& m = matrices_[static_cast<std::size_t>(matrix_of_[static_cast<std::size_t>(g.first)])];
+  bool solved = own_steps_ == 0 && iterate(step, g, m, goal, false);
+  if (!solved) {
+    if (stale()) return false;  // a new Jacobian at the start is tried first
+    own_steps_ = kOwnSteps;
+    solved = iterate(step, g, m, goal, true);
+  }
+  if (!solved) return false;
+  set_stages(step, g);
+  for (int i = g.first; i <= g.last; ++i) {
+    Point& p = present_.places[present_.count++];
+    p.t = step.t + rk_.c[i] * step.h;
+    p.x << step.K.col(i).tail(7 * data_.n), step.lambda.col(i);
+  }
+  return true;
+}
+
+bool ImplicitStages::filter(const Step& step, Eigen::VectorXd& error) {
+  if (renew_) evaluate_jacobian(step);
+  const double gamma = step.h * rk_.error_filter;
+  if (filter_h_ != step.h || filter_jacobian_ != jacobians_) {
+    filter_jacobian_ = -1;
+    if (!filter_->factor(gamma, values_)) return false;
+    filter_h_ = step.h;
+    filter_jacobian_ = jacobians_;
+  }
+  filter_->solve(error);
+  return true;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,106 @@
+// The coupled stages of an implicit Runge-Kutta step, solved in their accelerations a_i and multipliers lambda_i by
+// simplified Newton iterations: one Jacobian, taken where the step starts and kept over steps while it serves, one
+// factor per step size and distinct block of the tableau. Where it does not serve (a stiff direction turns within the
+// step), each stage gets a Jacobian of its own for some steps.
+//
+//   V_i = v0 + h sum_j A_ij a_j,   Q_i = q0 + h sum_j A_ij V_j,   r(t_i, Q_i, V_i, a_i, lambda_i) = 0
+//
+// Convergence test: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.8. An adaptive
+// run stops at a fraction of its tolerance; where derivatives are taken, or steps are fixed or given, the stages of
+// accepted steps are solved to rounding, so that differences of runs over the same steps mean something.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "core/scene/settings.hpp"
+#include "core/step/shifted_system.hpp"
+#include "core/step/step.hpp"
+#include "core/tableau/stage_groups.hpp"
+
+namespace mbsopt {
+
+class ImplicitStages {
+ public:
+  ImplicitStages(const Mechanism& mechanism, const Method& method, const IntegratorSettings& settings,
+                 Dynamics& dynamics);
+  ImplicitStages(const ImplicitStages&) = delete;  // its matrices refer to its Jacobian
+  ImplicitStages& operator=(const ImplicitStages&) = delete;
+
+  // The motion at the start of the run: a, lambda at step.y0.
+  void begin(const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::VectorXd& lambda);
+  // Before each attempt at a step.
+  void new_attempt();
+  // Solves the stages of a group; earlier groups are solved. False: no convergence.
+  enum class Goal {
+    tolerance,  // a fraction of it, from a guess
+    rounding,   // from a guess
+    polish      // to rounding, from stages that are solved to a tolerance
+  };
+  bool solve(Step& step, const StageGroup& group, Goal goal);
+  // error = (I - h error_filter f_y)^-1 error
+  bool filter(const Step& step, Eigen::VectorXd& error);
+  // After an accepted step.
+  void accept(const Step& step);
+
+  // Whether a failure may be cured at the same step size, by a new Jacobian.
+  bool stale() const { return age_ > 0 && own_steps_ == 0; }
+  void renew() { renew_ = true; }
+  // Fastest contraction is left alone while the step changes by less than this.
+  static constexpr double kKeepStep = 1.2;
+
+  long evaluations() const { return evaluations_; }
+  long jacobians() const { return jacobians_ + own_jacobians_; }
+  long factorisations() const;
+
+ private:
+  struct Matrix {  // of one distinct block of A
+    Eigen::MatrixXd A;
+    StageMatrix matrix;
+    double h = 0;
+    long jacobian = -1;
+  };
+  struct Point {  // of the past, for the first guess
+    double t = 0;
+    Eigen::VectorXd x;  // (a, lambda)
+  };
+  struct Points {
+    std::vector<Point> places;  // room for all stages
+    std::size_t count = 0;
+  };
+
+  bool ready(const Step& step, Matrix& m);
+  void evaluate_jacobian(const Step& step);
+  void predict(const Step& step, int stage, Eigen::Ref<Eigen::VectorXd> x) const;
+  void set_stages(Step& step, const StageGroup& group);
+  bool linearise_stages(const Step& step, const StageGroup& group, Matrix& m);
+  bool evaluate_residuals(Step& step, const StageGroup& group);
+  double add_change(const Step& step, const StageGroup& group, const Matrix& m, bool exact);
+  bool iterate(Step& step, const StageGroup& group, Matrix& m, Goal goal, bool own);
+
+  const MechanismData& data_;
+  const Method& rk_;
+  IntegratorSettings settings_;
+  Dynamics& dynamics_;
+  MotionJacobian jacobian_;
+  MotionJacobian::Values values_;
+  std::vector<MotionJacobian::Values> own_values_;  // per stage of a group
+  std::vector<const MotionJacobian::Values*> same_, own_;
+  std::vector<Matrix> matrices_;
+  std::vector<int> matrix_of_;  // per group, in order
+  std::optional<ShiftedSystem> filter_;
+  double filter_h_ = 0;
+  long filter_jacobian_ = -1;
+
+  Eigen::VectorXd a_start_, lambda_start_;
+  Points past_, present_;  // of the last accepted step; of the attempt in hand
+  Eigen::MatrixXd x_, r_, change_;
+  Eigen::VectorXd y_;
+  double rate_ = 1;  // of the last iteration
+  bool renew_ = true;
+  long age_ = 0;       // steps since the Jacobian was taken
+  int own_steps_ = 0;  // for which each stage still gets a Jacobian of its own
+  long evaluations_ = 0, jacobians_ = 0, own_jacobians_ = 0;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,55 @@
+#include "core/step/linearised_stages.hpp"
+
+#include <algorithm>
+
+namespace mbsopt {
+
+LinearisedStages::LinearisedStages(const MechanismData& data, const Method& method) : rk_(method), jacobian_(data) {
+  values_.assign(static_cast<std::size_t>(largest_implicit_group(method)), jacobian_.values());
+  for (const MotionJacobian::Values& v : values_) pointers_.push_back(&v);
+  std::vector<int> sizes;
+  for (const StageGroup& g : method.stage_groups()) {
+    if (is_implicit(method, g)) sizes.push_back(g.size());
+  }
+  std::sort(sizes.begin(), sizes.end());
+  sizes.erase(std::unique(sizes.begin(), sizes.end()), sizes.end());
+  for (const int stages : sizes) {
+    matrices_.emplace_back(data, jacobian_, stages);
+    A_.push_back(Eigen::MatrixXd::Zero(stages, stages));
+  }
+}
+
+std::size_t LinearisedStages::of(const StageGroup& group) const {
+  std::size_t k = 0;
+  while (matrices_[k].stages() != group.size()) ++k;
+  return k;
+}
+
+bool LinearisedStages::factor(double h, const StageGroup& g) {
+  Eigen::MatrixXd& A = A_[of(g)];
+  for (int i = 0; i < g.size(); ++i) {
+    for (int j = 0; j < g.size(); ++j) A(i, j) = rk_.a(g.first + i, g.first + j);
+  }
+  return matrices_[of(g)].factor(h, A, std::span(pointers_).first(static_cast<std::size_t>(g.size())),
+                                 StageMatrix::Trial::by_solutions);
+}
+
+void LinearisedStages::solve(const StageGroup& g, Eigen::MatrixXd& x) {
+  StageMatrix& N = matrices_[of(g)];
+  N.solve(x.topRows(N.size()), StageMatrix::kExact);
+}
+void LinearisedStages::solve_transposed(const StageGroup& g, Eigen::MatrixXd& x) {
+  StageMatrix& N = matrices_[of(g)];
+  for (Eigen::Index first = 0; first < x.cols(); first += kLanes) {
+    N.solve_transposed(x.block(0, first, N.size(), std::min<Eigen::Index>(kLanes, x.cols() - first)),
+                       StageMatrix::kExact);
+  }
+}
+
+long LinearisedStages::factorisations() const {
+  long sum = 0;
+  for (const StageMatrix& m : matrices_) sum += m.factorisations();
+  return sum;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,37 @@
+// The coupled stages of an accepted implicit step, linearised where they are, each with its own Jacobian: what the
+// tangent and the adjoint sweep solve with.
+#pragma once
+
+#include <vector>
+
+#include "core/step/stage_matrix.hpp"
+#include "core/tableau/stage_groups.hpp"
+
+namespace mbsopt {
+
+class LinearisedStages {
+ public:
+  LinearisedStages(const LinearisedStages&) = delete;  // its matrices refer to its Jacobian
+  LinearisedStages& operator=(const LinearisedStages&) = delete;
+  LinearisedStages(const MechanismData& data, const Method& method);
+
+  // The Jacobian of stage k of a group (from 0), at the place where `dynamics` is.
+  void linearise(Dynamics& dynamics, int k) { jacobian_.evaluate(dynamics, values_[static_cast<std::size_t>(k)]); }
+  bool factor(double h, const StageGroup& group);
+  // In place; x: (7 n + m) rows per stage; columns: kLanes, and any number of the transposed.
+  void solve(const StageGroup& group, Eigen::MatrixXd& x);
+  void solve_transposed(const StageGroup& group, Eigen::MatrixXd& x);
+  long factorisations() const;
+
+ private:
+  std::size_t of(const StageGroup& group) const;  // which matrix
+
+  const Method& rk_;
+  MotionJacobian jacobian_;
+  std::vector<MotionJacobian::Values> values_;  // per stage of the group in hand
+  std::vector<const MotionJacobian::Values*> pointers_;
+  std::vector<StageMatrix> matrices_;  // per size of a group
+  std::vector<Eigen::MatrixXd> A_;     // the same: of the group in hand
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,430 @@
+#include "core/step/stage_matrix.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mbsopt {
+namespace {
+
+// epsilon of a row of Phi in units of the inertia that it sees: what it leaves out and the rounding of W = 1/epsilon
+// are about equal.
+constexpr double kEpsilon = 1e-8;
+
+constexpr double kNegligible = 2e-15;  // relative, of what is left: several units of rounding
+constexpr double kWrong = 1e-4;        // relative residual of forces from which a factor is not used
+constexpr int kSparseRun = 20;         // factorisations by the sparse LU after one that was not
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+using Entries = std::vector<SparseLu::Entry>;
+
+void add_block(int row, int column, int rows, int columns, Entries& entries) {
+  for (int c = 0; c < columns; ++c) {
+    for (int r = 0; r < rows; ++r) entries.push_back({row + r, column + c});
+  }
+}
+
+// The places of all blocks, in the order in which factor_sparse() fills them.
+Entries entries_of(const MotionJacobian& jacobian, int stages) {
+  const int n = 7 * jacobian.bodies(), size = n + jacobian.constraints();
+  Entries entries;
+  for (int i = 0; i < stages; ++i) {
+    for (int j = 0; j < stages; ++j) {
+      for (const auto& p : jacobian.pairs()) add_block(i * size + 7 * p.row, j * size + 7 * p.body, 7, 7, entries);
+      for (const auto& r : jacobian.rows()) add_block(i * size + n + r.row, j * size + 7 * r.body, 1, 7, entries);
+    }
+    for (int b = 0; b < jacobian.bodies(); ++b) add_block(i * size + 7 * b, i * size + 7 * b, 7, 7, entries);
+    for (const auto& r : jacobian.rows()) add_block(i * size + 7 * r.body, i * size + n + r.row, 6, 1, entries);
+    for (int r = 0; r < jacobian.constraints(); ++r) add_block(i * size + n + r, i * size + n + r, 1, 1, entries);
+  }
+  return entries;
+}
+
+}  // namespace
+
+StageMatrix::StageMatrix(const MechanismData& data, const MotionJacobian& jacobian, int stages)
+    : jacobian_(&jacobian),
+      stages_(stages),
+      accelerations_(7 * data.n),
+      per_stage_(7 * data.n + data.m),
+      epsilon_(kEpsilon * data.row_alpha.cwiseInverse()) {
+  const auto& rows = jacobian.rows();
+  for (std::size_t k = 0; k < rows.size();) {
+    std::vector<int> bodies;
+    const std::size_t first = k;
+    for (; k < rows.size() && rows[k].row == rows[first].row; ++k) bodies.push_back(rows[k].body);
+    if (!joints_.empty() && joints_.back().bodies == bodies &&
+        joints_.back().row + joints_.back().rows == rows[first].row) {
+      ++joints_.back().rows;
+    } else {
+      joints_.push_back({rows[first].row, 1, first, bodies, {}});
+    }
+  }
+  if (BlockLu::takes(7 * stages)) {
+    std::vector<std::pair<int, int>> edges;
+    for (const auto& p : jacobian.pairs()) {
+      if (p.row != p.body) edges.push_back({p.row, p.body});
+    }
+    for (const Joint& joint : joints_) {
+      for (const int a : joint.bodies) {
+        for (const int b : joint.bodies) {
+          if (a != b) edges.push_back({a, b});
+        }
+      }
+    }
+    blocks_.emplace(7 * stages, data.n, edges);
+    for (const auto& p : jacobian.pairs()) pairs_.push_back(blocks_->handle(p.row, p.body));
+    for (int b = 0; b < data.n; ++b) diagonal_.push_back(blocks_->handle(b, b));
+    std::size_t most = 0;
+    for (Joint& joint : joints_) {
+      for (const int a : joint.bodies) {
+        for (const int b : joint.bodies) joint.blocks.push_back(blocks_->handle(a, b));
+      }
+      most = std::max(most, at(joint.rows) * joint.bodies.size());
+    }
+    G_.resize(most);
+    by_body_.setZero(data.n * blocks_->stride());
+  }
+  values_.resize(at(stages));
+  P_.setZero(stages, stages), P2_.setZero(stages, stages);
+  W_.setZero(data.m);
+  right_.setZero(size(), kLanes), step_.setZero(size(), kLanes);
+  v_.setZero(stages * accelerations_), q_.setZero(v_.size());
+  probe_.setZero(size()), answer_.setZero(size());
+}
+
+bool StageMatrix::factor(double h, const Eigen::MatrixXd& A, std::span<const MotionJacobian::Values* const> values,
+                         Trial trial) {
+  P_ = h * A;
+  P2_.noalias() = P_.lazyProduct(P_);
+  std::copy(values.begin(), values.end(), values_.begin());
+  W_ = (values_[0]->compliance + epsilon_.array()).inverse();
+  ++factorisations_;
+  use_sparse_ = false;
+  if (blocks_ && sparse_left_ == 0) {
+    tried_ = trial == Trial::now;
+    if (factor_blocks() && (!tried_ || is_right())) return true;
+    sparse_left_ = kSparseRun;
+  }
+  return turn_to_sparse();
+}
+
+bool StageMatrix::turn_to_sparse() {
+  sparse_left_ = std::max(0, sparse_left_ - 1);
+  use_sparse_ = tried_ = true;
+  ++pivoted_;
+  return factor_sparse();
+}
+
+bool StageMatrix::factor_blocks() {
+  BlockLu& S = *blocks_;
+  S.set_zero();
+  for (int i = 0; i < stages_; ++i) {
+    const MotionJacobian::Values& x = *values_[at(i)];
+    for (int j = 0; j < stages_; ++j) {
+      const double p = P_(i, j), pp = P2_(i, j);
+      if (p != 0 || pp != 0) {
+        for (std::size_t k = 0; k < pairs_.size(); ++k) {
+          const MotionJacobian::Block K = p * x.v[k] + pp * x.q[k];
+          S.add(pairs_[k], 7 * i, 7 * j, K);
+        }
+      }
+      if (i == j) {
+        for (std::size_t b = 0; b < diagonal_.size(); ++b) S.add(diagonal_[b], 7 * i, 7 * i, x.mass[b]);
+      }
+      for (const Joint& joint : joints_) {
+        const std::size_t bodies = joint.bodies.size(), rows = at(joint.rows);
+        for (std::size_t k = 0; k < rows * bodies; ++k) {
+          G_[k] = p * x.row_v[joint.place + k] + pp * x.row_q[joint.place + k];
+          if (i == j) G_[k] += x.J_T[joint.place + k];
+        }
+        for (std::size_t a = 0; a < bodies; ++a) {
+          for (std::size_t b = 0; b < bodies; ++b) {
+            Mat<6, 7> JWG = Mat<6, 7>::Zero();
+            for (std::size_t r = 0; r < rows; ++r) {
+              const Vec<6> JW = W_(joint.row + static_cast<int>(r)) * x.J[joint.place + r * bodies + a].transpose();
+              for (int c = 0; c < 7; ++c) JWG.col(c) += G_[r * bodies + b](c) * JW;
+            }
+            S.add(joint.blocks[a * bodies + b], 7 * i, 7 * j, JWG);
+          }
+        }
+      }
+    }
+  }
+  return S.factor();
+}
+
+bool StageMatrix::factor_sparse() {
+  if (!sparse_) sparse_.emplace(static_cast<int>(size()), entries_of(*jacobian_, stages_));
+  std::vector<double>& x = sparse_->values();
+  std::fill(x.begin(), x.end(), 0.0);
+  std::size_t k = 0;
+  auto add = [&](double value) { x[sparse_->slot(k++)] += value; };
+  for (int i = 0; i < stages_; ++i) {
+    const MotionJacobian::Values& of = *values_[at(i)];
+    for (int j = 0; j < stages_; ++j) {
+      const double p = P_(i, j), pp = P2_(i, j);
+      for (std::size_t b = 0; b < of.q.size(); ++b) {
+        for (Eigen::Index e = 0; e < 49; ++e) add(p * of.v[b].data()[e] + pp * of.q[b].data()[e]);
+      }
+      for (std::size_t r = 0; r < of.row_q.size(); ++r) {
+        for (Eigen::Index e = 0; e < 7; ++e) {
+          add(p * of.row_v[r](e) + pp * of.row_q[r](e) + (i == j ? of.J_T[r](e) : 0.0));
+        }
+      }
+    }
+    for (const MotionJacobian::Block& mass : of.mass) {
+      for (Eigen::Index e = 0; e < 49; ++e) add(mass.data()[e]);
+    }
+    for (const Mat<1, 6>& J : of.J) {
+      for (Eigen::Index e = 0; e < 6; ++e) add(J(e));
+    }
+    for (Eigen::Index r = 0; r < W_.size(); ++r) add(-1 / W_(r));
+  }
+  return sparse_->factor();
+}
+
+// Tried on the forces of alternating accelerations of 1, but with constraints: the residual of the answer must be small
+// against the largest force in it.
+bool StageMatrix::is_right() {
+  answer_.setZero(), probe_.setZero();
+  double largest = 0;
+  for (int i = 0; i < stages_; ++i) {
+    for (int b = 0; b < jacobian_->bodies(); ++b) {
+      answer_.segment<7>(i * per_stage_ + 7 * b).setConstant(b % 2 == 0 ? -1 : 1);
+    }
+  }
+  subtract_times<false>(answer_, probe_);
+  for (int i = 0; i < stages_; ++i) {
+    probe_.segment(i * per_stage_ + accelerations_, W_.size()).setZero();
+    largest = std::max(largest, probe_.segment(i * per_stage_, accelerations_).cwiseAbs().maxCoeff());
+  }
+  answer_ = probe_;
+  solve_factored<false>(answer_);
+  subtract_times<false>(answer_, probe_);
+  double wrong = 0;
+  for (int i = 0; i < stages_; ++i) {
+    for (int b = 0; b < jacobian_->bodies(); ++b) {
+      wrong = std::max(wrong, probe_.segment<6>(i * per_stage_ + 7 * b).cwiseAbs().maxCoeff());
+    }
+  }
+  if (!answer_.allFinite()) return false;
+  probe_.setZero();
+  add_J_transposed(1, answer_, probe_);
+  for (int i = 0; i < stages_; ++i) {
+    largest = std::max(largest, probe_.segment(i * per_stage_, accelerations_).cwiseAbs().maxCoeff());
+  }
+  return wrong <= kWrong * largest;
+}
+
+// x += N_epsilon^-1 (b - N x)  until the next step, foreseen from the last two, would be below rounding in each column,
+// of accelerations and multipliers.
+template <bool Transposed>
+void StageMatrix::refine(Eigen::Ref<Eigen::MatrixXd> b, int refinements) {
+  if (refinements == 0) {
+    solve_factored<Transposed>(b);
+    return;
+  }
+  auto right = right_.leftCols(b.cols()), step = step_.leftCols(b.cols());
+  right = b;
+  solve_factored<Transposed>(b);
+  const Sizes size = sizes(b);
+  Sizes before = size;
+  for (int pass = 0; pass < refinements; ++pass) {
+    step = right;
+    for (Eigen::Index c = 0; c < b.cols(); ++c) subtract_times<Transposed>(b.col(c), step.col(c));
+    solve_factored<Transposed>(step);
+    b += step;
+    const Sizes now = sizes(step);
+    if ((now * now <= kNegligible * size * before).all()) {
+      tried_ = true;
+      return;
+    }
+    before = now;
+  }
+  if (tried_ || refinements < kExact) return;
+  b = right;
+  sparse_left_ = kSparseRun;
+  if (turn_to_sparse()) return refine<Transposed>(b, refinements);
+  b.setConstant(NAN);
+}
+
+StageMatrix::Sizes StageMatrix::sizes(const Eigen::Ref<const Eigen::MatrixXd>& x) const {
+  Sizes most = Sizes::Zero();
+  const Eigen::Index m = W_.size();
+  for (int i = 0; i < stages_; ++i) {
+    const auto of_stage = x.middleRows(i * per_stage_, per_stage_);
+    for (Eigen::Index c = 0; c < x.cols(); ++c) {
+      most(0, c) = std::max(most(0, c), of_stage.col(c).head(accelerations_).cwiseAbs().maxCoeff());
+      if (m > 0) most(1, c) = std::max(most(1, c), of_stage.col(c).tail(m).cwiseAbs().maxCoeff());
+    }
+  }
+  return most;
+}
+
+template <bool Transposed>
+void StageMatrix::solve_factored(Eigen::Ref<Eigen::MatrixXd> b) {
+  if (!use_sparse_) {
+    for (Eigen::Index c = 0; c < b.cols(); ++c) solve_blocks<Transposed>(b.col(c));
+  } else if (Transposed) {
+    sparse_->solve_transposed(b);
+  } else {
+    sparse_->solve(b);
+  }
+}
+
+// a = S^-1 (b_a + J'W b_lambda),  lambda = W (G a - b_lambda);  transposed with J and G exchanged.
+template <bool Transposed>
+void StageMatrix::solve_blocks(Eigen::Ref<Eigen::VectorXd> b) {
+  for (int i = 0; i < stages_; ++i) b.segment(i * per_stage_ + accelerations_, W_.size()).array() *= W_.array();
+  if (Transposed) {
+    add_G_transposed(1, b, b);
+  } else {
+    add_J_transposed(1, b, b);
+  }
+  const Eigen::Index stride = blocks_->stride();
+  for (int i = 0; i < stages_; ++i) {
+    for (int body = 0; body < jacobian_->bodies(); ++body) {
+      by_body_.segment<7>(body * stride + 7 * i) = b.segment<7>(i * per_stage_ + 7 * body);
+    }
+  }
+  if (Transposed) {
+    blocks_->solve_transposed(by_body_);
+  } else {
+    blocks_->solve(by_body_);
+  }
+  for (int i = 0; i < stages_; ++i) {
+    for (int body = 0; body < jacobian_->bodies(); ++body) {
+      b.segment<7>(i * per_stage_ + 7 * body) = by_body_.segment<7>(body * stride + 7 * i);
+    }
+    auto lambda = b.segment(i * per_stage_ + accelerations_, W_.size());
+    lambda.array() /= -W_.array();
+  }
+  if (Transposed) {
+    add_J(1, b, b);
+  } else {
+    add_G(1, b, b);
+  }
+  for (int i = 0; i < stages_; ++i) b.segment(i * per_stage_ + accelerations_, W_.size()).array() *= W_.array();
+}
+
+template <bool Transposed>
+void StageMatrix::subtract_times(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y) {
+  if (Transposed) {
+    v_.setZero(), q_.setZero();
+  } else {
+    add_G(-1, x, y);  // leaves x combined
+  }
+  for (int i = 0; i < stages_; ++i) {
+    const MotionJacobian::Values& of = *values_[at(i)];
+    const Eigen::Index stage = i * per_stage_, combined = i * accelerations_;
+    for (std::size_t k = 0; k < jacobian_->pairs().size(); ++k) {
+      const auto& p = jacobian_->pairs()[k];
+      if (Transposed) {
+        const Vec<7> beta = x.segment<7>(stage + 7 * p.row);
+        v_.segment<7>(combined + 7 * p.body).noalias() += of.v[k].transpose() * beta;
+        q_.segment<7>(combined + 7 * p.body).noalias() += of.q[k].transpose() * beta;
+      } else {
+        auto to = y.segment<7>(stage + 7 * p.row);
+        to.noalias() -= of.v[k] * v_.segment<7>(combined + 7 * p.body);
+        to.noalias() -= of.q[k] * q_.segment<7>(combined + 7 * p.body);
+      }
+    }
+    for (int b = 0; b < jacobian_->bodies(); ++b) {
+      if (Transposed) {
+        y.segment<7>(stage + 7 * b).noalias() -= of.mass[at(b)].transpose() * x.segment<7>(stage + 7 * b);
+      } else {
+        y.segment<7>(stage + 7 * b).noalias() -= of.mass[at(b)] * x.segment<7>(stage + 7 * b);
+      }
+    }
+    y.segment(stage + accelerations_, W_.size()) += of.compliance * x.segment(stage + accelerations_, W_.size());
+  }
+  if (Transposed) {
+    spread(-1, y);
+    add_G_transposed(-1, x, y);
+    add_J(-1, x, y);
+  } else {
+    add_J_transposed(-1, x, y);
+  }
+}
+
+// v_i = sum_j P_ij a_j,  q_i = sum_j (P^2)_ij a_j
+void StageMatrix::combine(const Eigen::Ref<const Eigen::VectorXd>& x) {
+  v_.setZero(), q_.setZero();
+  for (int i = 0; i < stages_; ++i) {
+    for (int j = 0; j < stages_; ++j) {
+      const auto a = x.segment(j * per_stage_, accelerations_);
+      v_.segment(i * accelerations_, accelerations_) += P_(i, j) * a;
+      q_.segment(i * accelerations_, accelerations_) += P2_(i, j) * a;
+    }
+  }
+}
+
+// a_j of y += sign (sum_i P_ij v_i + (P^2)_ij q_i)
+void StageMatrix::spread(double sign, Eigen::Ref<Eigen::VectorXd> y) {
+  for (int i = 0; i < stages_; ++i) {
+    for (int j = 0; j < stages_; ++j) {
+      y.segment(j * per_stage_, accelerations_) += (sign * P_(i, j)) * v_.segment(i * accelerations_, accelerations_) +
+                                                   (sign * P2_(i, j)) * q_.segment(i * accelerations_, accelerations_);
+    }
+  }
+}
+
+void StageMatrix::add_G(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y) {
+  combine(x);
+  for (int i = 0; i < stages_; ++i) {
+    const MotionJacobian::Values& of = *values_[at(i)];
+    const Eigen::Index stage = i * per_stage_, combined = i * accelerations_;
+    for (std::size_t k = 0; k < jacobian_->rows().size(); ++k) {
+      const auto& r = jacobian_->rows()[k];
+      y(stage + accelerations_ + r.row) += sign * (of.row_v[k].dot(v_.segment<7>(combined + 7 * r.body)) +
+                                                   of.row_q[k].dot(q_.segment<7>(combined + 7 * r.body)) +
+                                                   of.J_T[k].dot(x.segment<7>(stage + 7 * r.body)));
+    }
+  }
+}
+
+void StageMatrix::add_G_transposed(double sign, const Eigen::Ref<const Eigen::VectorXd>& x,
+                                   Eigen::Ref<Eigen::VectorXd> y) {
+  v_.setZero(), q_.setZero();
+  for (int i = 0; i < stages_; ++i) {
+    const MotionJacobian::Values& of = *values_[at(i)];
+    const Eigen::Index stage = i * per_stage_, combined = i * accelerations_;
+    for (std::size_t k = 0; k < jacobian_->rows().size(); ++k) {
+      const auto& r = jacobian_->rows()[k];
+      const double lambda = x(stage + accelerations_ + r.row);
+      v_.segment<7>(combined + 7 * r.body) += lambda * of.row_v[k].transpose();
+      q_.segment<7>(combined + 7 * r.body) += lambda * of.row_q[k].transpose();
+      y.segment<7>(stage + 7 * r.body) += (sign * lambda) * of.J_T[k].transpose();
+    }
+  }
+  spread(sign, y);
+}
+
+void StageMatrix::add_J(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y) {
+  for (int i = 0; i < stages_; ++i) {
+    const MotionJacobian::Values& of = *values_[at(i)];
+    const Eigen::Index stage = i * per_stage_;
+    for (std::size_t k = 0; k < jacobian_->rows().size(); ++k) {
+      const auto& r = jacobian_->rows()[k];
+      y(stage + accelerations_ + r.row) += sign * of.J[k].dot(x.segment<6>(stage + 7 * r.body));
+    }
+  }
+}
+
+void StageMatrix::add_J_transposed(double sign, const Eigen::Ref<const Eigen::VectorXd>& x,
+                                   Eigen::Ref<Eigen::VectorXd> y) {
+  for (int i = 0; i < stages_; ++i) {
+    const MotionJacobian::Values& of = *values_[at(i)];
+    const Eigen::Index stage = i * per_stage_;
+    for (std::size_t k = 0; k < jacobian_->rows().size(); ++k) {
+      const auto& r = jacobian_->rows()[k];
+      y.segment<6>(stage + 7 * r.body) += (sign * x(stage + accelerations_ + r.row)) * of.J[k].transpose();
+    }
+  }
+}
+
+template void StageMatrix::refine<false>(Eigen::Ref<Eigen::MatrixXd>, int);
+template void StageMatrix::refine<true>(Eigen::Ref<Eigen::MatrixXd>, int);
+
+}  // namespace mbsopt

@@ -1,0 +1,30 @@
+// What a backward sweep keeps of a step, in one piece of memory; stages are rebuilt from their accelerations.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/run/sample_schedule.hpp"
+#include "core/step/step.hpp"
+
+namespace mbsopt {
+
+struct StoredStep {
+  double t = 0, h = 0, t1 = 0;
+  bool dense = false;
+  std::vector<SampleEvent> samples;  // of costs
+
+  StoredStep(const Step& step, const Method& rk, std::span<const SampleEvent> events);
+  // All of it but the stages Y, their velocities in K, and the angles at the end. step: of the same sizes.
+  void restore(const Method& rk, Step& step) const;
+  Eigen::Map<const Eigen::VectorXd> y0() const { return {numbers_.get(), states_}; }
+  Eigen::Map<const Eigen::VectorXd> angles0() const { return {numbers_.get() + states_, angles_}; }
+  std::size_t bytes() const;
+
+ private:
+  Eigen::Index states_, angles_, count_ = 0;
+  std::unique_ptr<double[]> numbers_;  // the parts of a step one after the other, y0 and angles0 first
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,77 @@
+// The explicit methods with few stages, each with dense output of order p - 1 at least.
+//   Hairer, Norsett, Wanner, "Solving Ordinary Differential Equations I" (1993): [HNW].
+#pragma once
+
+#include "core/tableau/method.hpp"
+
+namespace mbsopt {
+
+// Euler's method. No estimate: fixed steps only.
+inline constexpr Tableau<1> kEuler{.name = "euler", .order = 1, .dense_order = 1, .b = {1}, .dense = {{{1}}}};
+static_assert(rows_sum_to_c(kEuler) && is_explicit(kEuler) && dense_ends_at_step(kEuler));
+
+// Ralston, "Runge-Kutta methods with minimum error bounds", Math. Comp. 16 (1962): of the two-stage methods of order 2
+// the one with the least bound of its local error. The estimate is against Euler's method, which lies within.
+inline constexpr Tableau<2> kRk2{.name = "rk2",
+                                 .order = 2,
+                                 .dense_order = 2,
+                                 .error_order = 2,
+                                 .c = {0, 2. / 3},
+                                 .A = {{{0}, {2. / 3}}},
+                                 .b = {1. / 4, 3. / 4},
+                                 .error = {-3. / 4, 3. / 4},
+                                 .dense = {{{1, -3. / 4}, {0, 3. / 4}}}};
+static_assert(rows_sum_to_c(kRk2) && is_explicit(kRk2) && dense_ends_at_step(kRk2));
+
+// Bogacki and Shampine, "A 3(2) pair of Runge-Kutta formulas", Appl. Math. Lett. 2 (1989). The last stage is f(y1),
+// which the estimate needs; dense output is the cubic through y0, y1 and their derivatives.
+inline constexpr Tableau<4> kBs3{.name = "bs3",
+                                 .order = 3,
+                                 .dense_order = 3,
+                                 .error_order = 3,
+                                 .c = {0, 1. / 2, 3. / 4, 1},
+                                 .A = {{{0}, {1. / 2}, {0, 3. / 4}, {2. / 9, 1. / 3, 4. / 9}}},
+                                 .b = {2. / 9, 1. / 3, 4. / 9, 0},
+                                 .error = {-5. / 72, 1. / 12, 1. / 9, -1. / 8},
+                                 .dense = {{{1, -4. / 3, 5. / 9}, {0, 1, -2. / 3}, {0, 4. / 3, -8. / 9}, {0, -1, 1}}}};
+static_assert(rows_sum_to_c(kBs3) && is_explicit(kBs3) && dense_ends_at_step(kBs3));
+
+// Kutta's classical method: [HNW], section II.1; its continuous extension of order 3: section II.6, exercise 1. No
+// estimate: fixed steps only.
+inline constexpr Tableau<4> kRk4{.name = "rk4",
+                                 .order = 4,
+                                 .dense_order = 3,
+                                 .c = {0, 0.5, 0.5, 1},
+                                 .A = {{{0}, {0.5}, {0, 0.5}, {0, 0, 1}}},
+                                 .b = {1. / 6, 1. / 3, 1. / 3, 1. / 6},
+                                 .dense = {{{1, -1.5, 2. / 3}, {0, 1, -2. / 3}, {0, 1, -2. / 3}, {0, -0.5, 2. / 3}}}};
+static_assert(rows_sum_to_c(kRk4) && is_explicit(kRk4) && dense_ends_at_step(kRk4));
+
+// Dormand and Prince, "A family of embedded Runge-Kutta formulae", J. Comp. Appl. Math. 6 (1980); dense output of order
+// 4 by Shampine, "Some practical Runge-Kutta formulas", Math. Comp. 46 (1986), as in Hairer, Norsett, Wanner, section
+// II.6.
+inline constexpr Tableau<7> kDopri5{
+    .name = "dopri5",
+    .order = 5,
+    .dense_order = 4,
+    .error_order = 5,
+    .c = {0, 1. / 5, 3. / 10, 4. / 5, 8. / 9, 1, 1},
+    .A = {{{0},
+           {1. / 5},
+           {3. / 40, 9. / 40},
+           {44. / 45, -56. / 15, 32. / 9},
+           {19372. / 6561, -25360. / 2187, 64448. / 6561, -212. / 729},
+           {9017. / 3168, -355. / 33, 46732. / 5247, 49. / 176, -5103. / 18656},
+           {35. / 384, 0, 500. / 1113, 125. / 192, -2187. / 6784, 11. / 84}}},
+    .b = {35. / 384, 0, 500. / 1113, 125. / 192, -2187. / 6784, 11. / 84, 0},
+    .error = {71. / 57600, 0, -71. / 16695, 71. / 1920, -17253. / 339200, 22. / 525, -1. / 40},
+    .dense = {{{1, -8048581381. / 2820520608, 8663915743. / 2820520608, -12715105075. / 11282082432},
+               {0, 0, 0, 0},
+               {0, 131558114200. / 32700410799, -68118460800. / 10900136933, 87487479700. / 32700410799},
+               {0, -1754552775. / 470086768, 14199869525. / 1410260304, -10690763975. / 1880347072},
+               {0, 127303824393. / 49829197408, -318862633887. / 49829197408, 701980252875. / 199316789632},
+               {0, -282668133. / 205662961, 2019193451. / 616988883, -1453857185. / 822651844},
+               {0, 40617522. / 29380423, -110615467. / 29380423, 69997945. / 29380423}}}};
+static_assert(rows_sum_to_c(kDopri5) && is_explicit(kDopri5) && dense_ends_at_step(kDopri5));
+
+}  // namespace mbsopt

@@ -1,0 +1,151 @@
+// Implicit methods. Stage 0 of each is the explicit one at the start of the step, f(y0): the estimate and dense output
+// use it. Numbers and the weights of dense output are made by tableaus.py, beside this file.
+//   Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996): [HW].
+//
+// error_filter is A_ii where it is the same in all implicit stages and the real eigenvalue of A where there is one.
+//
+// Dense output of the order before last, or better, needs f(y0) (and f(y1), in the Gauss methods): in a stiff direction
+// with rate s it carries h s times what y0 is off the slow motion there. Outputs within a fast transient are rough.
+#pragma once
+
+#include "core/tableau/method.hpp"
+
+namespace mbsopt {
+
+// sdirk2: TR-BDF2, a trapezoidal half and a BDF2 half. Bank et al., IEEE Trans. CAD 4 (1985); the estimate of order 3
+// by Hosea and Shampine, "Analysis and implementation of TR-BDF2", Appl. Numer. Math. 20 (1996). L-stable, stiffly
+// accurate. Preferred to Alexander's two-stage method, which has stage order 1 and no estimate, at the same number of
+// implicit stages.
+inline constexpr Tableau<3> kSdirk2{.name = "sdirk2",
+                                    .order = 2,
+                                    .dense_order = 2,
+                                    .error_order = 3,
+                                    .c = {0, 0.585786437626905, 1},
+                                    .A = {{{0},
+                                           {0.2928932188134525, 0.2928932188134525},
+                                           {0.3535533905932738, 0.3535533905932738, 0.2928932188134525}}},
+                                    .b = {0.3535533905932738, 0.3535533905932738, 0.2928932188134525},
+                                    .error = {0.13807118745769836, -0.3333333333333333, 0.19526214587563498},
+                                    .error_filter = 0.2928932188134525,
+                                    .dense = {{{0.881871005550897, -0.5283176149576233},
+                                               {0.28518862050852034, 0.06836477008475339},
+                                               {-0.16705962605941743, 0.4599528448728699}}}};
+static_assert(rows_sum_to_c(kSdirk2) && dense_ends_at_step(kSdirk2));
+
+// sdirk3, sdirk4: the implicit halves of Kennedy and Carpenter's pairs ARK3(2)4L[2]SA and ARK4(3)6L[2]SA, "Additive
+// Runge-Kutta schemes for convection-diffusion-reaction equations", Appl. Numer. Math. 44 (2003). L-stable, stiffly
+// accurate, and of stage order 2, which the methods of Norsett and Thomsen or [HW], table IV.6.5, are not (they have
+// 1): in stiff mechanisms it is the stage order that is seen. Both have dense output of full order without more stages.
+inline constexpr Tableau<4> kSdirk3{
+    .name = "sdirk3",
+    .order = 3,
+    .dense_order = 3,
+    .error_order = 3,
+    .c = {0, 0.871733043016918, 0.6, 1},
+    .A = {{{0},
+           {0.435866521508459, 0.435866521508459},
+           {0.2576482460664272, -0.09351476757488625, 0.435866521508459},
+           {0.18764102434672383, -0.595297473576955, 0.9717899277217721, 0.435866521508459}}},
+    .b = {0.18764102434672383, -0.595297473576955, 0.9717899277217721, 0.435866521508459},
+    .error = {-0.027099261876665316, -0.11013520969201586, 0.10306492520138458, 0.0341695463672966},
+    .error_filter = 0.435866521508459,
+    .dense = {{{0.9818885137740992, -1.3269677980343402, 0.5327203086069647},
+               {-0.31177988778236104, 0.1095794048285534, -0.3930969906231473},
+               {0.14525635920067737, 2.032280953072411, -1.2057473845513162},
+               {0.18463501480758437, -0.8148925598666242, 1.066124066567499}}}};
+static_assert(rows_sum_to_c(kSdirk3) && dense_ends_at_step(kSdirk3));
+
+inline constexpr Tableau<6> kSdirk4{
+    .name = "sdirk4",
+    .order = 4,
+    .dense_order = 4,
+    .error_order = 4,
+    .c = {0, 0.5, 0.332, 0.62, 0.85, 1},
+    .A = {{{0},
+           {0.25, 0.25},
+           {0.137776, -0.055776, 0.25},
+           {0.14463686602698217, -0.22393190761334475, 0.4492950415863626, 0.25},
+           {0.09825878328356477, -0.5915442428196704, 0.8101210538282996, 0.283164405707806, 0.25},
+           {0.15791629516167136, 0, 0.18675894052400077, 0.6805652953093346, -0.27524053099500667, 0.25}}},
+    .b = {0.15791629516167136, 0, 0.18675894052400077, 0.6805652953093346, -0.27524053099500667, 0.25},
+    .error = {0.0032044943984591762, 0, -0.0024462511366794577, -0.02148007591958727, 0.043946868068572426,
+              -0.02322503541076487},
+    .error_filter = 0.25,
+    .dense = {{{0.9978920955869547, -2.603403860091382, 2.8268376152468915, -1.063409555580793},
+               {-0.017541029848521357, 2.513088691648902, -5.123000982336081, 2.6274533205357007},
+               {0.014843495647197323, 3.2182956695956073, -5.607621923069089, 2.5612416983502846},
+               {-0.0031442421424032812, -3.037812136579333, 8.780529755038309, -5.059008081007237},
+               {0.014385175060609559, -0.9906225408185892, 0.959686757444956, -0.25868992268198304},
+               {-0.006435494303836924, 0.9004541762447945, -1.8364312223249855, 1.1924125403840278}}}};
+static_assert(rows_sum_to_c(kSdirk4) && dense_ends_at_step(kSdirk4));
+
+// gauss4, gauss6: collocation at the zeros of Legendre's polynomials: [HW], section IV.5. A-stable and symplectic, not
+// L-stable: for long motion without fast damping. The last stage of the step is f(y1). The estimate is the divided
+// difference of f over 0 and the nodes, that is, against a formula of order 2 (3 with three nodes), scaled as the one
+// of radau5: error_filter times f(y0). Over 1 as well it would be an order better and vanish wherever f is linear,
+// since f is a polynomial of the collocation polynomial's degree there. With two nodes A has no real eigenvalue and
+// error_filter is their modulus.
+inline constexpr Tableau<4> kGauss4{
+    .name = "gauss4",
+    .order = 4,
+    .dense_order = 3,
+    .error_order = 3,
+    .c = {0, 0.2113248654051871, 0.7886751345948129, 1},
+    .A = {{{0}, {0, 0.25, -0.03867513459481288}, {0, 0.5386751345948129, 0.25}, {0, 0.5, 0.5}}},
+    .b = {0, 0.5, 0.5},
+    .error = {0.28867513459481287, -0.39433756729740643, 0.10566243270259355},
+    .error_filter = 0.28867513459481287,
+    .dense = {{{0.875, -1.875, 1},
+               {0.21650635094610965, 1.2834936490538904, -1},
+               {-0.21650635094610965, 1.7165063509461096, -1},
+               {0.125, -1.125, 1}}}};
+static_assert(rows_sum_to_c(kGauss4) && dense_ends_at_step(kGauss4));
+
+// Dense output of order 5 by one more stage in the middle, at the state of the interpolant of order 4: Hairer, Norsett,
+// Wanner, "Solving Ordinary Differential Equations I" (1993), section II.6.
+inline constexpr Tableau<5, 6> kGauss6{
+    .name = "gauss6",
+    .order = 6,
+    .dense_order = 5,
+    .error_order = 4,
+    .c = {0, 0.11270166537925831, 0.5, 0.8872983346207417, 1, 0.5},
+    .A = {{{0},
+           {0, 0.1388888888888889, -0.0359766675249389, 0.009789444015308325},
+           {0, 0.30026319498086457, 0.2222222222222222, -0.022485417203086815},
+           {0, 0.26798833376246944, 0.48042111196938336, 0.1388888888888889},
+           {0, 0.2777777777777778, 0.4444444444444444, 0.2777777777777778},
+           {-0.0203125, 0.32237760483719186, 0.23680555555555555, -0.08105816039274741, 0.0421875}}},
+    .b = {0, 0.2777777777777778, 0.4444444444444444, 0.2777777777777778},
+    .error = {0.21531442311611218, -0.3184135484179201, 0.14354294874407478, -0.04044382344226686},
+    .error_filter = 0.21531442311611218,
+    .dense = {{{1, -6.5, 14, -12.5, 4},
+               {0, 7.39415278850618, -20.343861132567916, 19.89415278850618, -6.666666666666667},
+               {0, 6.666666666666667, -22.22222222222222, 26.666666666666668, -10.666666666666666},
+               {0, 0.9391805448271526, -7.433916645209861, 13.439180544827153, -6.666666666666667},
+               {0, -0.5, 4, -7.5, 4},
+               {0, -8, 32, -40, 16}}}};
+static_assert(rows_sum_to_c(kGauss6) && dense_ends_at_step(kGauss6));
+
+// radau5: Radau IIA with three stages: [HW], section IV.5; the estimate of order 3, section IV.8:
+// gamma_0 (h f(y0) - h p(0)), p the parabola through the stages' f. L-stable, stiffly accurate. The collocation
+// polynomial has order 3; with f(y0) it is 4.
+inline constexpr Tableau<4> kRadau5{
+    .name = "radau5",
+    .order = 5,
+    .dense_order = 4,
+    .error_order = 4,
+    .c = {0, 0.1550510257216822, 0.6449489742783178, 1},
+    .A = {{{0},
+           {0, 0.1968154772236604, -0.06553542585019839, 0.02377097434822015},
+           {0, 0.3944243147390873, 0.2920734116652285, -0.04154875212599793},
+           {0, 0.37640306270046725, 0.5124858261884216, 0.1111111111111111}}},
+    .b = {0, 0.37640306270046725, 0.5124858261884216, 0.1111111111111111},
+    .error = {0.27488882959567734, -0.42829829411536813, 0.24503907438491654, -0.0916296098652258},
+    .error_filter = 0.27488882959567734,
+    .dense = {{{1, -4.5, 6, -2.5},
+               {0, 5.024404699913708, -8.543197149025547, 3.895195511812306},
+               {0, -0.6910713665803745, 3.4320860379144356, -2.228528845145639},
+               {0, 0.16666666666666666, -0.8888888888888888, 0.8333333333333334}}}};
+static_assert(rows_sum_to_c(kRadau5) && dense_ends_at_step(kRadau5));
+
+}  // namespace mbsopt

@@ -1,0 +1,126 @@
+// Runge-Kutta methods as tables. Step, tangent-linear and adjoint are written once and read these.
+//
+//   Y_i = y0 + h sum_j A_ij k_j,   k_i = f(t0 + c_i h, Y_i),   y1 = y0 + h sum_i b_i k_i
+//   dense output:  y(t0 + theta h) = y0 + h sum_i b_i(theta) k_i,   b_i(theta) = sum_j dense_ij theta^(j+1)
+//
+// Stages beyond the first S serve dense output only and are computed only where it is asked for. The error of a step is
+// the norm of err = h sum_i error_i k_i; where error_low is there, too, the two are combined as in DOP853; where
+// error_filter = g is there, err is replaced by (I - h g f_y)^-1 err, which keeps it bounded in stiff directions.
+//
+// Stages that need each other are solved together: a group is first..last with A_ij = 0 for i <= last < j. In an
+// explicit method every group is one stage with A_ii = 0, in a diagonally implicit one A_ii may differ from 0.
+//
+// A new method is a table in a file of its kind (explicit_tableaus.hpp, implicit_tableaus.hpp, or its own) and a name
+// in the list of tableaus.cpp; the tests go over that list.
+#pragma once
+
+#include <array>
+#include <span>
+#include <string_view>
+
+namespace mbsopt {
+
+template <int S, int T = S>  // stages of the step, and with those of dense output
+struct Tableau {
+  std::string_view name;
+  int order = 0, dense_order = 0;
+  int error_order = 0;  // the error estimate is O(h^error_order) where the motion is smooth; 0: no estimate
+  std::array<double, T> c{};
+  std::array<std::array<double, T>, T> A{};
+  std::array<double, S> b{};
+  std::array<double, S> error{};      // b - b^, all zero: no estimate, fixed steps only
+  std::array<double, S> error_low{};  // a second, lower estimate
+  double error_filter = 0;
+  std::array<std::array<double, 7>, T> dense{};
+};
+
+constexpr double magnitude(double x) { return x < 0 ? -x : x; }
+
+template <int S, int T>
+constexpr bool rows_sum_to_c(const Tableau<S, T>& rk) {
+  for (std::size_t i = 0; i < T; ++i) {
+    double sum = -rk.c[i], size = 1;
+    for (std::size_t j = 0; j < T; ++j) sum += rk.A[i][j], size += magnitude(rk.A[i][j]);
+    if (magnitude(sum) > 1e-15 * size) return false;
+  }
+  return true;
+}
+template <int S, int T>
+constexpr bool is_explicit(const Tableau<S, T>& rk) {
+  for (std::size_t i = 0; i < T; ++i) {
+    for (std::size_t j = i; j < T; ++j) {
+      if (rk.A[i][j] != 0) return false;
+    }
+  }
+  return true;
+}
+// Dense output ends at y1: b_i(1) = b_i.
+template <int S, int T>
+constexpr bool dense_ends_at_step(const Tableau<S, T>& rk) {
+  for (std::size_t i = 0; i < T; ++i) {
+    double sum = i < S ? -rk.b[i] : 0.0, size = 1;
+    for (const double d : rk.dense[i]) sum += d, size += magnitude(d);
+    if (magnitude(sum) > 1e-15 * size) return false;
+  }
+  return true;
+}
+
+// Stages first..last are coupled and solved together.
+struct StageGroup {
+  int first = 0, last = 0;
+  int size() const { return last - first + 1; }
+};
+
+// A tableau with its sizes as data, so that a step is written once and compiled once.
+struct Method {
+  static constexpr int kMaxStages = 16;
+
+  std::string_view name;
+  int order = 0, dense_order = 0, error_order = 0;
+  int stages = 0, dense_stages = 0;  // of the step; with those of dense output
+  const double* c = nullptr;
+  const double* A = nullptr;  // dense_stages x dense_stages, row by row
+  const double* b = nullptr;
+  const double* error = nullptr;
+  const double* error_low = nullptr;  // null: none
+  const double* dense = nullptr;      // dense_stages x 7
+  double error_filter = 0;            // 0: none
+  bool adaptive = false;              // has an error estimate
+  bool stiffly_accurate = false;      // y1 is the last implicit stage: b is its row of A
+  std::array<StageGroup, kMaxStages> group{};
+  int groups = 0, step_groups = 0;
+
+  double a(int i, int j) const { return A[i * dense_stages + j]; }
+  double dense_weight(int i, double theta) const {
+    double x = 0;
+    for (int j = 6; j >= 0; --j) x = (x + dense[7 * i + j]) * theta;
+    return x;
+  }
+  // d b_i/d theta
+  double dense_weight_rate(int i, double theta) const {
+    double x = 0;
+    for (int j = 6; j >= 0; --j) x = x * theta + (j + 1) * dense[7 * i + j];
+    return x;
+  }
+
+  // The groups of coupled stages, in the order of their computation; those of the step come first.
+  std::span<const StageGroup> stage_groups() const { return {group.data(), static_cast<std::size_t>(groups)}; }
+  std::span<const StageGroup> stage_groups_of_step() const {
+    return {group.data(), static_cast<std::size_t>(step_groups)};
+  }
+  // Computed from earlier stages alone.
+  bool is_explicit_stage(int i) const {
+    for (int j = i; j < dense_stages; ++j) {
+      if (a(i, j) != 0) return false;
+    }
+    return true;
+  }
+  bool implicit() const {
+    for (int i = 0; i < dense_stages; ++i) {
+      if (!is_explicit_stage(i)) return true;
+    }
+    return false;
+  }
+};
+
+}  // namespace mbsopt

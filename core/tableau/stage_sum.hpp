@@ -1,0 +1,40 @@
+// y = y0 + sum_j c_j k_j, of states, in one pass: each number of y is read and written once.
+// For as many k_j as a method has stages, and two.
+#pragma once
+
+#include "core/linear/pairs.hpp"
+#include "core/tableau/method.hpp"
+
+namespace mbsopt {
+
+class StageSum {
+ public:
+  // k: as many numbers as y; not read where c is 0.
+  void add(double c, const double* k) {
+    if (c == 0) return;
+    c_[terms_] = c;
+    k_[terms_++] = k;
+  }
+  // y may be y0.
+  void to(const double* y0, double* y, Eigen::Index size) const {
+    constexpr Eigen::Index kPairs = 4;
+    Eigen::Index r = 0;
+    for (; r + 2 * kPairs <= size; r += 2 * kPairs) {
+      Column<kPairs> sum(y0 + r);
+      for (int j = 0; j < terms_; ++j) sum.add(c_[j], k_[j] + r);
+      sum.store(y + r);
+    }
+    for (; r < size; ++r) {
+      double sum = y0[r];
+      for (int j = 0; j < terms_; ++j) sum += c_[j] * k_[j][r];
+      y[r] = sum;
+    }
+  }
+
+ private:
+  double c_[Method::kMaxStages + 2];
+  const double* k_[Method::kMaxStages + 2];
+  int terms_ = 0;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,84 @@
+#include "core/tableau/tableaus.hpp"
+
+#include <algorithm>
+
+#include "core/tableau/dopri853_tableau.hpp"
+#include "core/tableau/explicit_tableaus.hpp"
+#include "core/tableau/implicit_tableaus.hpp"
+#include "core/tableau/verner6_tableau.hpp"
+
+namespace mbsopt {
+namespace {
+
+constexpr bool any_nonzero(std::span<const double> x) {
+  return std::any_of(x.begin(), x.end(), [](double v) { return v != 0; });
+}
+
+// The least blocks on the diagonal of A that have nothing to their right.
+template <int S, int T>
+constexpr void find_groups(const Tableau<S, T>& rk, Method& m) {
+  for (int first = 0; first < T; first = m.group[static_cast<std::size_t>(m.groups - 1)].last + 1) {
+    int last = first;
+    for (int i = first; i <= last; ++i) {
+      for (int j = last + 1; j < T; ++j) {
+        if (rk.A[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] != 0) last = j;
+      }
+    }
+    m.group[static_cast<std::size_t>(m.groups)] = {first, last};
+    ++m.groups;
+    if (first < S) ++m.step_groups;
+  }
+}
+
+template <int S, int T>
+constexpr bool ends_with_implicit_stage(const Tableau<S, T>& rk) {
+  for (std::size_t i = 0; i < S; ++i) {
+    if (rk.A[i][i] != 0 && std::equal(rk.b.begin(), rk.b.end(), rk.A[i].begin())) return true;
+  }
+  return false;
+}
+
+template <int S, int T>
+constexpr Method method(const Tableau<S, T>& rk) {
+  static_assert(T <= Method::kMaxStages);
+  Method m;
+  m.name = rk.name;
+  m.order = rk.order;
+  m.dense_order = rk.dense_order;
+  m.error_order = rk.error_order;
+  m.stages = S;
+  m.dense_stages = T;
+  m.c = rk.c.data();
+  m.A = rk.A[0].data();
+  m.b = rk.b.data();
+  m.error = rk.error.data();
+  if (any_nonzero(rk.error_low)) m.error_low = rk.error_low.data();
+  m.dense = rk.dense[0].data();
+  m.error_filter = rk.error_filter;
+  m.adaptive = any_nonzero(rk.error);
+  m.stiffly_accurate = ends_with_implicit_stage(rk);
+  find_groups(rk, m);
+  return m;
+}
+
+constexpr std::size_t kExplicit = 7;
+constexpr std::array kMethods{method(kEuler),  method(kRk2),     method(kBs3),      method(kRk4),
+                              method(kDopri5), method(kVerner6), method(kDopri853),  // the first kExplicit
+                              method(kSdirk2), method(kSdirk3),  method(kSdirk4),   method(kGauss4),
+                              method(kRadau5), method(kGauss6)};
+
+const Method* find(std::span<const Method> methods, std::string_view name) {
+  const auto found = std::find_if(methods.begin(), methods.end(), [&](const Method& m) { return m.name == name; });
+  return found == methods.end() ? nullptr : &*found;
+}
+
+}  // namespace
+
+std::span<const Method> runge_kutta_methods() { return kMethods; }
+std::span<const Method> explicit_methods() { return runge_kutta_methods().first(kExplicit); }
+std::span<const Method> implicit_methods() { return runge_kutta_methods().subspan(kExplicit); }
+
+const Method* runge_kutta_method(std::string_view name) { return find(runge_kutta_methods(), name); }
+const Method* explicit_method(std::string_view name) { return find(explicit_methods(), name); }
+
+}  // namespace mbsopt

@@ -1,0 +1,173 @@
+#include "core/watch/jump_watch.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/expression/program_switches.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/sensor/body_at.hpp"
+
+namespace mbsopt {
+namespace {
+
+constexpr double kApart = 1e-6;              // of the run: times and states have digits for distances within it
+constexpr double kMiddle = 0.471;            // not half: jumps are at round times
+constexpr double kFar = 1e-2, kNear = 1e-4;  // from the zero, of the interval
+constexpr double kKept = 0.5;                // of the far difference by the near one: |x|^0.15 keeps it, a kink 0.01
+constexpr double kNoticeable = 1e-6;         // of the value: cancellation next to sin(x)/x is less
+constexpr int kBisections = 60;              // to the rounding of theta
+
+double sign_of(double x) { return x > 0 ? 1 : (x < 0 ? -1 : 0); }
+
+}  // namespace
+
+JumpWatch::JumpWatch(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
+                     MotionSource* motion)
+    : mechanism_(mechanism), motion_(motion), apart_(kApart * (settings.end_time - settings.start_time)) {
+  const MechanismData& d = mechanism_.data();
+  if (d.active.empty()) return;
+  const auto of_force = [](int index) { return Jump{Jump::Of::force, index, {}, 0, 0, {}, false}; };
+  // A mechanism and its laws are compiled at each rho; so are the switches of the laws.
+  const auto add_law = [&](const Jump& jump, const Program& p, Of of, std::size_t index = 0) {
+    add(jump, p, switches_of(p), of, static_cast<int>(index));
+  };
+  for (std::size_t i = 0; i < d.tsda.size(); ++i)
+    if (d.tsda[i].law.program) add_law(of_force(d.tsda[i].force), *d.tsda[i].law.program, Of::length, i);
+  for (std::size_t i = 0; i < d.rsda.size(); ++i)
+    if (d.rsda[i].law.program) add_law(of_force(d.rsda[i].force), *d.rsda[i].law.program, Of::angle, i);
+  for (const AppliedForce& f : d.applied)
+    for (const Program& component : f.components) add_law(of_force(f.force), component, Of::sensors);
+  for (const Constraint& c : d.constraints)
+    for (const RowLaw& law : d.laws)
+      if (c.drive >= 0 && law.row == c.row && law.law.programs)
+        add_law({Jump::Of::drive, c.drive, {}, 0, 0, {}, false}, (*law.law.programs)[2], Of::time);
+  for (const Cost& cost : costs)
+    if (const SwitchedProgram* p = cost.running ? cost.running->program() : nullptr)
+      add({Jump::Of::objective, 0, cost.name, 0, 0, {}, false}, p->program, p->switches, Of::sensors);
+}
+
+bool JumpWatch::Function::is_new(const Switch& s) const {
+  const auto is_known = [&](int k) { return std::find(parameters.begin(), parameters.end(), k) != parameters.end(); };
+  return (s.motion && !motion) || !std::all_of(s.parameters.begin(), s.parameters.end(), is_known);
+}
+
+void JumpWatch::add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of, int index) {
+  const MechanismData& d = mechanism_.data();
+  const int P = static_cast<int>(d.rho.size());
+  const int time = of == Of::length || of == Of::angle ? P + 2 : P;
+  Function f{jump, &program, of, index, {}, {}, false};
+  for (const Program& p : switches) {
+    Switch s{{}, {}, false, 0, 0};
+    bool varies = false;
+    for (const int input : p.used_inputs()) {
+      varies = varies || input >= P, s.motion = s.motion || (input >= P && input != time);
+      if (input < P && std::find(d.active.begin(), d.active.end(), input) != d.active.end())
+        s.parameters.push_back(input);
+    }
+    if (!varies || (s.parameters.empty() && !s.motion)) continue;
+    p.grow(scratch_);
+    s.program = p;
+    f.switches.push_back(std::move(s));
+  }
+  if (f.switches.empty()) return;
+  program.grow(scratch_);
+  const std::size_t inputs = static_cast<std::size_t>(of == Of::sensors ? P + 1 + mechanism_.sensors() : time + 1);
+  inputs_.resize(std::max(inputs_.size(), inputs));
+  functions_.push_back(std::move(f));
+}
+
+void JumpWatch::set_inputs(const Function& f, const StatePoint& at) {
+  const MechanismData& d = mechanism_.data();
+  const std::size_t P = static_cast<std::size_t>(d.rho.size()), index = static_cast<std::size_t>(f.index);
+  std::copy(d.rho.begin(), d.rho.end(), inputs_.begin());
+  inputs_[P] = at.t;
+  if (f.of == Of::length) {
+    const TsdaForce& s = d.tsda[index];
+    const TsdaForce::Span span = s.span(body_at(at.y, s.body1).frame, body_at(at.y, s.body2).frame);
+    inputs_[P] = span.l, inputs_[P + 1] = span.ldot, inputs_[P + 2] = at.t;
+  } else if (f.of == Of::angle) {
+    const RsdaForce& s = d.rsda[index];
+    const BodyAt b1 = body_at(at.y, s.joint.body1), b2 = body_at(at.y, s.joint.body2);
+    inputs_[P] = s.joint.value_near(at.angles(s.angle), b1.frame, b2.frame);
+    inputs_[P + 1] = s.joint.rate(b1.frame, b2.frame), inputs_[P + 2] = at.t;
+  } else if (f.of == Of::sensors) {
+    for (const int input : f.program->used_inputs())
+      if (const int sensor = input - static_cast<int>(P) - 1; sensor >= 0)
+        inputs_[static_cast<std::size_t>(input)] = mechanism_.sensor_value(sensor, at);
+  }
+}
+
+void JumpWatch::begin(const StatePoint& at) {
+  t0_ = at.t, y0_ = at.y, angles_ = at.angles;
+  for (Function& f : functions_) {
+    set_inputs(f, at);
+    for (Switch& s : f.switches) s.last = sign_of(s.program.value(inputs_, scratch_));
+  }
+}
+
+void JumpWatch::place_at(double theta) {
+  const double h = t1_ - t0_, s2 = theta * theta, s3 = s2 * theta;
+  const Eigen::Index n = y0_.size() / 2;
+  t_ = t0_ + theta * h;
+  y_.resize(2 * n);
+  const auto q0 = y0_.head(n), v0 = y0_.tail(n), q1 = y1_.head(n), v1 = y1_.tail(n);
+  y_.head(n) = q0 + (3 * s2 - 2 * s3) * (q1 - q0) + h * ((s3 - 2 * s2 + theta) * v0 + (s3 - s2) * v1);
+  y_.tail(n) = (6 * theta - 6 * s2) / h * (q1 - q0) + (3 * s2 - 4 * theta + 1) * v0 + (3 * s2 - 2 * theta) * v1;
+}
+
+void JumpWatch::set_inputs_at(double theta, const Function& f) {
+  place_at(theta);
+  set_inputs(f, {t_, y_, angles_, motion_});
+}
+
+double JumpWatch::value(const Function& f, const Program& p, double theta) {
+  set_inputs_at(theta, f);
+  return p.value(inputs_, scratch_);
+}
+
+// The sign is s.now at `to`, and another one at `from`.
+bool JumpWatch::search(Function& f, Switch& s, double from, double to) {
+  for (int i = 0; i < kBisections; ++i) {
+    const double middle = 0.5 * (from + to);
+    (sign_of(value(f, s.program, middle)) == s.now ? to : from) = middle;
+  }
+  const auto jump = [&](double distance, double& size) {
+    const double before = value(f, *f.program, to - distance), after = value(f, *f.program, to + distance);
+    size = std::max({size, std::abs(before), std::abs(after)});
+    return std::abs(after - before);
+  };
+  double size = 0;
+  const double far = jump(kFar, size), near = jump(kNear, size);
+  if (!std::isfinite(size) || !(near > kNoticeable * size) || near < kKept * far) return false;
+  f.jump.size = near, f.jump.t = t0_ + to * (t1_ - t0_);
+  f.jump.parameters = s.parameters, f.jump.motion = s.motion;
+  found_.push_back(f.jump);
+  f.parameters.insert(f.parameters.end(), s.parameters.begin(), s.parameters.end());
+  f.motion = f.motion || s.motion;
+  return true;
+}
+
+void JumpWatch::look_at(const StatePoint& at) {
+  if (functions_.empty() || at.t < t0_ + apart_) return;
+  t1_ = at.t, y1_ = at.y;
+  for (Function& f : functions_) {
+    if (f.switches.empty()) continue;
+    bool found = false;
+    double from = 0;
+    for (const double theta : {kMiddle, 1.0}) {
+      set_inputs_at(theta, f);  // once for all switches: a sensor may need the equations of motion
+      for (Switch& s : f.switches) s.now = sign_of(s.program.value(inputs_, scratch_));
+      for (Switch& s : f.switches) {
+        if (s.now * s.last < 0 && f.is_new(s)) found = search(f, s, from, theta) || found;
+        if (s.now != 0) s.last = s.now;
+      }
+      from = theta;
+    }
+    if (found) std::erase_if(f.switches, [&](const Switch& s) { return !f.is_new(s); });
+  }
+  t0_ = t1_, y0_ = y1_, angles_ = at.angles;
+}
+
+void JumpWatch::add_to(SimulationStatistics& statistics) const { statistics.jumps = found_; }
+
+}  // namespace mbsopt

@@ -1,0 +1,71 @@
+// Laws, components of forces and running costs that jump at an instant which parameters move. Frozen steps do not know
+// how the instant moves, so that derivatives leave out the jump times its rate: they are wrong, often 0.
+//
+// A value can jump only where one of its switches goes through zero (program_switches.hpp). Between two states, apart
+// by a millionth of the run at least, the first zero is found by bisection along the Hermite cubic. A jump keeps its
+// size at a hundredth of the distance from the zero; a continuous value does not. A later jump of the same function is
+// reported if it depends on more: on another parameter, or also on the motion.
+//
+//   JumpWatch watch(mechanism, settings, costs, motion);   // in runs with derivatives
+//   watch.begin({t0, y0, angles0}); watch.look_at({t1, y1, angles1}); ... watch.add_to(result.statistics);
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/expression/program.hpp"
+#include "core/mechanism/mechanism.hpp"
+#include "core/run/cost.hpp"
+#include "core/run/simulation_result.hpp"
+#include "core/scene/settings.hpp"
+
+namespace mbsopt {
+
+class JumpWatch {
+ public:
+  JumpWatch(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
+            MotionSource* motion);
+
+  void begin(const StatePoint& at);
+  void look_at(const StatePoint& at);  // after each step
+  void add_to(SimulationStatistics& statistics) const;
+
+ private:
+  enum class Of { sensors, length, angle, time };  // what the inputs are, beside parameters and t
+  struct Switch {
+    Program program;
+    std::vector<int> parameters;  // active ones that it uses
+    bool motion = false;          // it uses the state
+    double last = 0, now = 0;     // its sign, where it was not 0 last; at the instant in hand
+  };
+  struct Function {
+    Jump jump;  // as far as it is known
+    const Program* program;
+    Of of;
+    int index;  // of the tsda or rsda
+    std::vector<Switch> switches;
+    std::vector<int> parameters;         // that its reported jumps name
+    bool motion = false;                 // some of them name the motion
+    bool is_new(const Switch& s) const;  // names more
+  };
+  // switches: of the program.
+  void add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of, int index = 0);
+  void set_inputs(const Function& f, const StatePoint& at);
+  void place_at(double theta);  // between the last state and the one in hand: t_, y_
+  void set_inputs_at(double theta, const Function& f);
+  bool search(Function& f, Switch& s, double from, double to);  // whether a jump was reported
+  double value(const Function& f, const Program& p, double theta);
+
+  const Mechanism mechanism_;
+  MotionSource* motion_;
+  double apart_;  // [s]
+  std::vector<Function> functions_;
+  double t0_ = 0, t1_ = 0, t_ = 0;
+  Eigen::VectorXd y0_, y1_, y_, angles_;
+  std::vector<double> inputs_;
+  Program::Scratch scratch_;
+  std::vector<Jump> found_;
+};
+
+}  // namespace mbsopt

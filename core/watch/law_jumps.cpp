@@ -1,0 +1,85 @@
+#include "core/watch/law_jumps.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace mbsopt {
+namespace {
+
+constexpr double kJump = 1e-9;       // relative to the law; below it a difference has vanished
+constexpr double kRounding = 1e-12;  // [m, rad, and these per s]: of 1 in exp(t) - 1
+constexpr double kPart = 0.471;      // not half: jumps are at round times, where a law may have no value
+
+std::string drive_of_row(const MechanismData& d, int row) {
+  for (const Constraint& c : d.constraints) {
+    if (c.row == row && c.drive >= 0) return d.drive_names[static_cast<std::size_t>(c.drive)];
+  }
+  return "?";
+}
+
+}  // namespace
+
+LawJumps::LawJumps(const MechanismData& data)
+    : data_(data), inputs_(data.rho.data(), data.rho.data() + data.rho.size()) {
+  inputs_.push_back(0);
+  for (const RowLaw& law : data.laws) {
+    if (!law.law.programs) continue;
+    laws_.push_back(&law);
+    for (const Program& p : *law.law.programs) p.grow(scratch_);
+  }
+}
+
+CubicSpline::Jet LawJumps::at(const TimeLaw& law, double t) {
+  inputs_.back() = t;
+  return law.at(inputs_, scratch_);
+}
+
+LawJumps::Jump LawJumps::find(const TimeLaw& law, Of what, double t0, double t1) {
+  CubicSpline::Jet a = at(law, t0), b = at(law, t1);
+  const auto value = [&](const CubicSpline::Jet& x) { return what == Of::f ? x.f : x.f_t; };
+  const auto rate = [&](const CubicSpline::Jet& x) { return what == Of::f ? x.f_t : x.f_tt; };
+  const auto difference = [&](const CubicSpline::Jet& from, const CubicSpline::Jet& to, double h) {
+    return value(to) - value(from) - h / 2 * (rate(from) + rate(to));
+  };
+  // What a difference is compared with: the law, and what its rate does with it meanwhile; else it is only rounding.
+  double size = std::max({std::abs(value(a)), std::abs(value(b)), (t1 - t0) * (std::abs(rate(a)) + std::abs(rate(b)))});
+  if (what == Of::f_t) size = std::max(size, std::max(std::abs(a.f), std::abs(b.f)) / (t1 - t0));
+  const double shortest = 1e-14 * std::max(std::abs(t0), std::abs(t1));
+  while (true) {
+    const double left = difference(a, b, t1 - t0);
+    if (!std::isfinite(left) || std::abs(left) <= std::max(kJump * size, kRounding)) return {};
+    const double middle = t0 + kPart * (t1 - t0);
+    if (t1 - t0 <= shortest || middle <= t0 || middle >= t1) return {t1, value(b) - value(a)};
+    const CubicSpline::Jet m = at(law, middle);
+    if (std::abs(difference(a, m, middle - t0)) >= std::abs(difference(m, b, t1 - middle))) {
+      t1 = middle, b = m;
+    } else {
+      t0 = middle, a = m;
+    }
+  }
+}
+
+std::string LawJumps::between(double t0, double t1) {
+  for (const RowLaw* law : laws_) {
+    const Jump f = find(law->law, Of::f, t0, t1);
+    if (f.size != 0) {
+      return fmt::format(
+          "the law of drive '{}' jumps by {:.3g} at t = {:.6g} s, which no motion follows. Let it pass smoothly, over "
+          "a "
+          "short time, from one value to the other",
+          drive_of_row(data_, law->row), f.size, f.t);
+    }
+    const Jump f_t = find(law->law, Of::f_t, t0, t1);
+    if (f_t.size != 0) {
+      return fmt::format(
+          "the law of drive '{}' changes its rate by {:.3g} 1/s at once at t = {:.6g} s: an impact, whose force has no "
+          "bounds. Let the rate change over a short time",
+          drive_of_row(data_, law->row), f_t.size, f_t.t);
+    }
+  }
+  return {};
+}
+
+}  // namespace mbsopt

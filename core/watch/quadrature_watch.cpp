@@ -1,0 +1,138 @@
+#include "core/watch/quadrature_watch.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace mbsopt {
+namespace {
+
+constexpr double kPoor = 1e-4;        // of the integral of |g| so far: an estimate above it asks for a look at the step
+constexpr double kNarrowest = 1e-12;  // of a step
+constexpr double kFalls = 0.03;       // |g| times width does by more over half of all halvings, up to |t|^-0.7
+constexpr double kBounded = 1e-7;     // of a step: a |g| that has not grown threefold there does not
+constexpr int kPoints = 9, kMostSearches = 200;
+constexpr double kOffset = 0.471;    // not half: poles are at round times
+constexpr double kRounding = 1e-12;  // of what is met exactly but for that, estimates say nothing
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
+
+QuadratureWatch::QuadratureWatch(const Method& method, std::span<const Cost> costs, MotionSource* motion)
+    : method_(method), costs_(costs), motion_(motion), integrals_(kIntegrals * costs.size()) {
+  for (int i = 0; i < method.stages; ++i) {
+    node_of_.push_back(-1);
+    if (method.b[i] == 0) continue;
+    const auto same = [&](const Node& n) { return std::abs(n.c - method.c[i]) < 1e-12; };
+    const auto node = std::find_if(nodes_.begin(), nodes_.end(), same);
+    node_of_.back() = static_cast<int>(node - nodes_.begin());
+    if (node == nodes_.end()) nodes_.push_back({method.c[i], 0, 0});
+    nodes_[static_cast<std::size_t>(node_of_.back())].b += method.b[i];
+  }
+  double least = std::numeric_limits<double>::infinity();
+  for (Node& n : nodes_) {
+    n.e = 1;
+    for (const Node& other : nodes_) {
+      if (other.c != n.c) n.e /= n.c - other.c;
+    }
+    least = std::min(least, std::abs(n.e / n.b));
+  }
+  for (Node& n : nodes_) n.e /= least;
+  g_.resize(nodes_.size());
+}
+
+std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::span<const double> g, Of what) {
+  if (start_ == end_) start_ = end_ = step.t;
+  start_ = std::min(start_, step.t), end_ = std::max(end_, step.t + step.h);
+  Integral& integral = integrals_[kIntegrals * cost + static_cast<std::size_t>(what)];
+  std::fill(g_.begin(), g_.end(), 0.0);
+  for (std::size_t i = 0; i < g.size(); ++i) {
+    if (node_of_[i] < 0) continue;
+    const std::size_t node = static_cast<std::size_t>(node_of_[i]);
+    g_[node] += method_.b[i] / nodes_[node].b * g[i];
+  }
+  double size = 0, difference = 0;
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    size += step.h * std::abs(nodes_[k].b * g_[k]), difference += step.h * nodes_[k].e * g_[k];
+  }
+  int power = static_cast<int>(nodes_.size()) - 1;
+  if (power == 0) {
+    difference = integral.of_size > 0 ? step.h * 0.5 * (g_[0] - integral.last_g) : 0;
+    integral.last_g = g_[0];
+    power = 1;
+  }
+  if (!(size > 0 && std::isfinite(size))) return {};  // what is not finite is said at the end
+  integral.of_size += size;
+  const double share = std::min(1.0, std::abs(difference) / size);
+  const double error = size * std::pow(share, static_cast<double>(method_.order) / power);
+  integral.error += error;
+  if (error > integral.worst) integral.worst = error, integral.worst_t = step.t;
+  if (what != Of::value || costs_[cost].is_extreme) return {};
+  if (!(error > kPoor * integral.of_size) || integral.searches++ > kMostSearches) return {};
+  const double t = pole(step, *costs_[cost].running);
+  if (std::isnan(t)) return {};
+  return fmt::format(
+      "the running cost{} grows about like 1/|t - {:.6g} s| or faster near t = {:.6g} s, so that its integral does not "
+      "exist: keep its denominators away from zero, or end the run before",
+      costs_[cost].name.empty() ? "" : " of objective '" + costs_[cost].name + "'", t, t);
+}
+
+// The time of a pole within the step; kNone: there is none.
+double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
+  const double h = step.h;
+  const Eigen::Index n = step.y0.size() / 2;
+  const auto q0 = step.y0.head(n), v0 = step.y0.tail(n), q1 = step.y1.head(n), v1 = step.y1.tail(n);
+  y_.resize(2 * n);
+  const auto size = [&](double s) {
+    const double s2 = s * s, s3 = s2 * s;
+    y_.head(n) = q0 + (3 * s2 - 2 * s3) * (q1 - q0) + h * ((s3 - 2 * s2 + s) * v0 + (s3 - s2) * v1);
+    y_.tail(n) = (6 * s - 6 * s2) / h * (q1 - q0) + (3 * s2 - 4 * s + 1) * v0 + (3 * s2 - 2 * s) * v1;
+    return std::abs(cost.value({step.t + s * h, y_, step.angles0, motion_}));
+  };
+  double at = 0, largest = -1;
+  const auto take = [&](double s) {
+    const double here = s >= 0 && s <= 1 ? size(s) : -1;
+    if (here > largest) at = s, largest = here;
+  };
+  take(0), take(1);
+  for (int i = 0; i < kPoints; ++i) take((i + kOffset) / kPoints);
+  if (largest == 0) return kNone;
+  const double first = largest;
+  const double narrowest = std::max(kNarrowest, 1e-15 * std::abs(step.t) / h);
+  const double halfway = std::sqrt(narrowest);
+  double product = std::numeric_limits<double>::infinity();
+  for (double width = 1.0 / kPoints; width > narrowest; width /= 2) {
+    const double s = at;
+    take(s - 0.5 * width), take(s + 0.5 * width);
+    if (!std::isfinite(largest)) return step.t + at * h;
+    if (width < kBounded && largest < 3 * first) return kNone;  // the usual case
+    if (width > halfway) product = std::min(product, width * largest);
+    if (width * largest < kFalls * product) return kNone;
+  }
+  return step.t + at * h;
+}
+
+void QuadratureWatch::add_to(SimulationStatistics& statistics) const {
+  // rounding: what errors are no larger than where they say nothing.
+  const auto judge = [](const Integral& i, double of_size, double rounding, const Cost& cost, QuadratureError& worst) {
+    if (i.error > worst.error * of_size && i.error > rounding) worst = {i.error / of_size, cost.name, i.worst_t};
+  };
+  for (std::size_t o = 0; o < costs_.size(); ++o) {
+    const Cost& cost = costs_[o];
+    const Integral& value = integrals_[kIntegrals * o];
+    // Exponentials are of any size.
+    const double rounding = cost.is_extreme ? kRounding * value.of_size : kRounding;
+    judge(value, value.of_size, rounding, cost,
+          cost.is_extreme ? statistics.extreme_quadrature : statistics.quadrature);
+    // Both parts relative to their sum: one that is next to nothing beside the other does not matter.
+    Integral motion = integrals_[kIntegrals * o + 1];
+    const Integral& parameters = integrals_[kIntegrals * o + 2];
+    motion.error *= end_ - start_, motion.of_size *= end_ - start_;
+    for (const Integral* part : {static_cast<const Integral*>(&motion), &parameters})
+      judge(*part, motion.of_size + parameters.of_size, rounding, cost, statistics.gradient_quadrature);
+  }
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,65 @@
+// Integrals of running costs that the steps do not resolve: they are sums over the stages of steps that only the motion
+// asked for.
+//
+// In each step g at the method's m nodes c_1..c_m has a highest divided difference, which vanishes for polynomials of
+// degree below m - 1 (a null rule: Laurie, "Practical error estimation in numerical integration", J. Comput. Appl.
+// Math. 12, 1985). It is scaled to be the difference of the b_i to a rule that leaves one node out:
+// min_i |e_i / b_i| = 1. With S = h sum_i |b_i g_i| and its share r = min(1, h |sum_i e_i g_i| / S), the error is
+// estimated as S r^(p/(m - 1)), p the order of the method: what a smooth g leaves. A method of one node is compared
+// with the node before, m = 2.
+//
+// Derivatives of psi are integrals of g_y y' + g_rho, which may be unresolved where g is not (sqrt(|x|) through zero).
+// What the directions y' are is known to one of the two sweeps only; ydot and rho stand for them: g_y ydot and g_rho
+// rho are estimated like g (gradient_quadrature.hpp).
+//
+// Where that is much, a pole is looked for: the interval is halved around the largest |g| along the step's Hermite
+// cubic. If |g| times the interval's length does not fall, |g| grows at least like 1/|t - t*|, which has no integral.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/run/cost.hpp"
+#include "core/run/simulation_result.hpp"
+#include "core/step/step.hpp"
+
+namespace mbsopt {
+
+class QuadratureWatch {
+ public:
+  QuadratureWatch(const Method& method, std::span<const Cost> costs, MotionSource* motion);
+
+  enum class Of { value, along_motion, along_parameters };  // g, g_y ydot, g_rho rho
+  static constexpr std::size_t kIntegrals = 3;              // of each cost
+
+  // After each step, the integrand at each stage, of each cost that runs. In words, what ends the run; empty: nothing.
+  std::string look_at(const Step& step, std::size_t cost, std::span<const double> g, Of what = Of::value);
+
+  void add_to(SimulationStatistics& statistics) const;
+
+ private:
+  struct Node {
+    double c = 0, b = 0, e = 0;
+  };
+  struct Integral {
+    double of_size = 0, error = 0;  // of |g|; of the estimates
+    double worst = 0, worst_t = 0;  // the largest estimate, and when
+    double last_g = 0;              // of the step before, for methods of one node
+    int searches = 0;               // for poles
+  };
+  double pole(const Step& step, const PointCost& cost);
+
+  const Method& method_;
+  std::span<const Cost> costs_;
+  MotionSource* motion_;
+  std::vector<Node> nodes_;
+  std::vector<int> node_of_;  // of each stage; -1: has no weight
+  std::vector<Integral> integrals_;
+  double start_ = 0, end_ = 0;  // of all steps [s], which come forward or backward
+  std::vector<double> g_;       // at the nodes
+  Eigen::VectorXd y_;
+};
+
+}  // namespace mbsopt

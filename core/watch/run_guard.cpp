@@ -1,0 +1,155 @@
+#include "core/watch/run_guard.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/sensor/body_at.hpp"
+
+namespace mbsopt {
+namespace {
+
+constexpr double kUnmet = 1e-3;                             // relative, of accelerations
+constexpr double kGrown = 0.5;                              // of the energy there is
+constexpr double kNoticeable = 1e-3;                        // of the natural energy: below it a change is none
+constexpr double kFastest = 299792458, kFastestTurn = 1e6;  // light [m/s]; ten times the fastest turbine [rad/s]
+constexpr double kGrowth = 1e3;                             // of what is faster from the start
+constexpr double kHalfTurn = 3.13;  // [rad]: nearer, the axis of the rotation may reverse within two hundredths
+
+// Nothing does work but gravity and springs, whose potential is known.
+bool conserves_energy(const MechanismData& d) {
+  const auto is_spring = [](const auto& f) { return !f.law.program && f.law.c == 0 && f.law.f0 == 0; };
+  const auto is_elastic = [](const Bushing& b) { return b.C.isZero(0) && b.Ct.isZero(0); };
+  const auto is_constant = [](const RowLaw& l) { return !l.law.programs && !l.law.spline; };
+  return d.applied.empty() && d.user_forces.empty() && d.turning_frictions.empty() && d.sliding_frictions.empty() &&
+         std::all_of(d.tsda.begin(), d.tsda.end(), is_spring) && std::all_of(d.rsda.begin(), d.rsda.end(), is_spring) &&
+         std::all_of(d.bushings.begin(), d.bushings.end(), is_elastic) &&
+         std::all_of(d.laws.begin(), d.laws.end(), is_constant);
+}
+
+// What moving by its own size would take: a scale, for runs that begin at rest where the potential is zero.
+double natural_energy(const MechanismData& d, const Eigen::VectorXd& y) {
+  double sum = 0;
+  for (int i = 1; i <= d.n; ++i) {
+    sum += d.bodies[static_cast<std::size_t>(i)].mass * d.gravity.norm() * y.segment<3>(7 * (i - 1)).norm();
+  }
+  for (const TsdaForce& f : d.tsda) {
+    const double l = f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l;
+    sum += f.law.k * std::max(l * l, f.law.x0 * f.law.x0);
+  }
+  for (const RsdaForce& f : d.rsda) sum += f.law.k;
+  for (const Bushing& b : d.bushings) {
+    sum += b.Kt.maxCoeff() + b.K.maxCoeff() * std::max(b.s1.squaredNorm(), b.s2.squaredNorm());
+  }
+  return sum;
+}
+
+Eigen::Vector2d speeds(const Eigen::VectorXd& y, int i, int n) {
+  const auto v = y.segment<7>(7 * (n + i - 1));
+  return {v.head<3>().norm(), 2 * v.tail<4>().norm()};  // |omega| = 2 |pdot|
+}
+
+double size_of(const Energy& e) { return e.kinetic + std::abs(e.potential); }
+
+}  // namespace
+
+RunGuard::RunGuard(const MechanismData& data)
+    : data_(data),
+      conserves_energy_(conserves_energy(data)),
+      law_jumps_(data),
+      bushing_turns_(data.bushings.size(), Vector3d::Zero()) {}
+
+std::string RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& energy, double t_end, long max_steps) {
+  last_t_ = t;
+  energy_initial_ = energy.kinetic + energy.potential;
+  energy_drift_ = 0;
+  energy_largest_ = size_of(energy);
+  bounds_ = {kFastest, kFastestTurn};
+  for (int i = 1; i <= data_.n; ++i) bounds_ = bounds_.cwiseMax(kGrowth * speeds(y, i, data_.n));
+  energy_natural_ = conserves_energy_ ? natural_energy(data_, y) : 0.0;
+  for (int i = 1; i <= data_.n; ++i) {
+    const double omega = speeds(y, i, data_.n)(1), half_turns = omega * (t_end - t) / std::numbers::pi;
+    if (!(half_turns > static_cast<double>(max_steps))) continue;
+    return fmt::format(
+        "body '{}' turns at {:.3g} rad/s at the start and would make {:.3g} half turns until t = {:.6g} s, each of "
+        "which takes a step at least; simulation.integrator.max_steps is {}. Is the angular velocity in rad/s, and "
+        "the end in s?",
+        data_.body_names[static_cast<std::size_t>(i)], omega, half_turns, t_end, max_steps);
+  }
+  for (Vector3d& turn : bushing_turns_) turn.setZero();
+  return about_bushings(t, y);
+}
+
+// Between two steps a rotation vector reverses either through zero or, where that is farther, through half a turn.
+std::string RunGuard::about_bushings(double t, const Eigen::VectorXd& y) {
+  for (std::size_t k = 0; k < bushing_turns_.size(); ++k) {
+    const Bushing& b = data_.bushings[k];
+    if (b.Kt.isZero(0) && b.Ct.isZero(0)) continue;
+    const Matrix3d R = body_at(y, b.body1).frame.A.transpose() * body_at(y, b.body2).frame.A * b.R0.transpose();
+    const Eigen::AngleAxisd turn(R);
+    const double angle = turn.angle();
+    const Vector3d now = angle * turn.axis(), before = bushing_turns_[k];
+    bushing_turns_[k] = now;
+    if (angle < kHalfTurn && !(now.dot(before) < 0 && angle + before.norm() > std::numbers::pi)) continue;
+    return fmt::format(
+        "forces[{}], the bushing between '{}' and '{}', is turned by {:.4g} rad at t = {:.6g} s: at half a turn its "
+        "torque jumps from one side to the other. Keep it below (a stop, stiffer or damped rubber, a slower start), or "
+        "take a joint with an rsda, which counts turns",
+        b.force, data_.body_names[static_cast<std::size_t>(b.body1)],
+        data_.body_names[static_cast<std::size_t>(b.body2)], angle, t);
+  }
+  return {};
+}
+
+std::string RunGuard::about_energy(double t, const Energy& energy) {
+  energy_largest_ = std::max(energy_largest_, size_of(energy));
+  const double now = energy.kinetic + energy.potential, grown = now - energy_initial_;
+  energy_drift_ = std::max(energy_drift_, std::abs(grown));
+  if (!(grown > kGrown * energy_largest_ && grown > kNoticeable * energy_natural_)) return {};
+  return fmt::format(
+      "the energy has grown from {:.3g} J to {:.3g} J at t = {:.6g} s, although nothing does work: the steps are too "
+      "large for this motion. Use a smaller simulation.integrator.step, or an adaptive integrator with smaller rtol "
+      "and atol",
+      energy_initial_, now, t);
+}
+
+double RunGuard::relative_energy_drift() const {
+  return energy_drift_ > kNoticeable * energy_natural_ ? energy_drift_ / energy_largest_ : 0;
+}
+
+std::string RunGuard::about_speed(double t, const Eigen::VectorXd& y) const {
+  for (int i = 1; i <= data_.n; ++i) {
+    const Eigen::Vector2d now = speeds(y, i, data_.n);
+    if ((now.array() <= bounds_.array()).all()) continue;
+    return fmt::format(
+        "body '{}' {} at t = {:.6g} s: the motion grows beyond all bounds. Look for a negative damping or stiffness, a "
+        "law of a drive or force that grows without end, or a unit; where steps are fixed, use a smaller step",
+        data_.body_names[static_cast<std::size_t>(i)],
+        now(1) > bounds_(1) ? fmt::format("turns at {:.3g} rad/s", now(1)) : fmt::format("moves at {:.3g} m/s", now(0)),
+        t);
+  }
+  return {};
+}
+
+std::string RunGuard::objection(double t, const Eigen::VectorXd& y, const Energy& energy,
+                                double acceleration_residual) {
+  std::string words = law_jumps_.between(last_t_, t);
+  last_t_ = t;
+  if (words.empty() && acceleration_residual > kUnmet) {
+    words = fmt::format(
+        "the accelerations of the constraints are met to {:.1e} only at t = {:.6g} s: the linkage locks there (a "
+        "drive, or the motion itself, asks for more than it reaches), or its position is singular. If it should go "
+        "on, look at lengths and laws; if masses differ by many orders, use a larger simulation.formulation.alpha "
+        "(relative; 1e8 is the default) or more iterations",
+        acceleration_residual, t);
+  }
+  if (words.empty() && conserves_energy_) words = about_energy(t, energy);
+  if (words.empty()) words = about_speed(t, y);
+  if (words.empty()) words = about_bushings(t, y);
+  return words;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,47 @@
+// What an accepted step may show that makes a run's numbers worthless although all of them are finite. Asked after each
+// step; an objection ends the run, in words.
+//   - the law of a drive jumps, or its rate does (law_jumps.hpp)
+//   - the energy of a mechanism on which nothing does work has grown by half of all it has
+//   - the accelerations of the constraints were not met
+//   - a body is faster than anything is
+//   - a bushing has come to half a turn, where its torque jumps (bushing.hpp)
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/watch/law_jumps.hpp"
+
+namespace mbsopt {
+
+class RunGuard {
+ public:
+  explicit RunGuard(const MechanismData& data);
+
+  // At the start of a run to t_end in at most so many steps, which has to take one in each half turn of a body at
+  // least. Empty: none.
+  std::string begin(double t, const Eigen::VectorXd& y, const Energy& energy, double t_end, long max_steps);
+  // After a step: its end, the state and the energy there, and the largest relative residual of the constraints'
+  // accelerations so far. Empty: none.
+  std::string objection(double t, const Eigen::VectorXd& y, const Energy& energy, double acceleration_residual);
+
+  // Largest change of the energy relative to the largest energy, where nothing does work; else 0.
+  double relative_energy_drift() const;
+
+ private:
+  std::string about_energy(double t, const Energy& energy);
+  std::string about_speed(double t, const Eigen::VectorXd& y) const;
+  std::string about_bushings(double t, const Eigen::VectorXd& y);
+
+  const MechanismData& data_;
+  bool conserves_energy_;
+  LawJumps law_jumps_;
+  std::vector<Vector3d> bushing_turns_;  // rotation vectors after the step before [rad]
+  double last_t_ = 0;
+  double energy_initial_ = 0, energy_largest_ = 0, energy_natural_ = 0;  // natural: of weights and springs [J]
+  double energy_drift_ = 0;
+  Eigen::Vector2d bounds_;  // of the speed of a centre of mass [m/s] and of turning [rad/s]
+};
+
+}  // namespace mbsopt

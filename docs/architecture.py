@@ -1,0 +1,81 @@
+#!/usr/bin/env python3
+"""Prints what docs/architecture.md promises, measured: lines, types and files of each folder, and which includes break
+the order of its table. Exit code 1 where one does, or where files include each other in a circle.
+
+    docs/architecture.py              run from anywhere; needs Python 3 alone
+"""
+
+import re
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+INCLUDE = re.compile(r'^#include "((?:core|optim|app)/[^"]+)"', re.M)
+TYPE = re.compile(r"^ *(?:template *<.*> *)?(?:struct|class|enum class) +(\w+)(?: final)?(?: *:[^:;]*)?(?: *:[^:;].*)? *\{", re.M)
+
+
+def folders_in_order():
+    """The folders of the table, lowest first."""
+    rows = re.findall(r"^\| `((?:core|optim|app)/[\w/]*)` \|", (ROOT / "docs/architecture.md").read_text(), re.M)
+    return [row.rstrip("/") for row in rows]
+
+
+def circles(includes):
+    """The strongly connected sets of more than one file (Tarjan, SIAM J. Comput. 1, 1972)."""
+    index, low, stack, found = {}, {}, [], []
+
+    def visit(file):
+        index[file] = low[file] = len(index)
+        stack.append(file)
+        for other in includes[file]:
+            if other not in index:
+                visit(other)
+                low[file] = min(low[file], low[other])
+            elif other in stack:
+                low[file] = min(low[file], index[other])
+        if low[file] == index[file]:
+            members = []
+            while not members or members[-1] != file:
+                members.append(stack.pop())
+            if len(members) > 1:
+                found.append(sorted(members))
+
+    sys.setrecursionlimit(10000)
+    for file in list(includes):
+        if file not in index:
+            visit(file)
+    return found
+
+
+def main():
+    order = folders_in_order()
+    text = {path.relative_to(ROOT).as_posix(): path.read_text()
+            for top in ("core", "optim", "app") for path in sorted((ROOT / top).rglob("*.[ch]pp"))}
+    # A header and the source that implements it are one concept, so one node.
+    node = lambda file: file.rsplit(".", 1)[0]
+    folder = lambda file: file.rsplit("/", 1)[0]
+    includes, counts = defaultdict(set), defaultdict(lambda: [0, 0, 0])
+    wrong = []
+    for file, content in text.items():
+        count = counts[folder(file)]
+        count[0] += 1
+        count[1] += content.count("\n")
+        count[2] += len(TYPE.findall(content))
+        for other in INCLUDE.findall(content):
+            if node(other) != node(file):
+                includes[node(file)].add(node(other))
+            here, there = folder(file), folder(other)
+            if here != there and not (here in order and there in order and order.index(there) < order.index(here)):
+                wrong.append(f"{file} includes {other}, which the table has below it")
+    wrong += ["a circle: " + ", ".join(members) for members in circles(includes)]
+    print(f"{'folder':<20}{'files':>6}{'lines':>8}{'types':>7}")
+    for name in sorted(counts, key=lambda f: order.index(f) if f in order else len(order)):
+        print(f"{name:<20}{counts[name][0]:>6}{counts[name][1]:>8}{counts[name][2]:>7}")
+    print(f"{'all':<20}" + "".join(f"{sum(c[k] for c in counts.values()):>{w}}" for k, w in enumerate((6, 8, 7))))
+    print("\n".join(wrong) if wrong else "no include against the order of docs/architecture.md, no circle")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

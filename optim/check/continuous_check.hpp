@@ -1,0 +1,57 @@
+// A second opinion on gradients: the sensitivities of the differential equation by CVODES against the discrete
+// derivatives, both at tolerances tight enough for them to be the same number. They share the derivatives of single
+// terms, and assembly; not the steps, the projection, the dense output, the quadrature of running costs.
+//
+//   const ContinuousCheck check = check_continuous(scene, objectives);
+//   if (check.ran) std::cout << check.method << ": " << check.worst_difference();
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+#include "optim/check/gradient_timing.hpp"
+#include "optim/differences/verdict.hpp"
+
+namespace mbsopt {
+
+struct ContinuousEntry {
+  std::string objective, parameter;
+  double discrete = 0, continuous = 0;
+  double difference = 0;  // relative to the entry, or to `floor` times the gradient's size
+  Verdict verdict = Verdict::disagrees;
+};
+
+struct ContinuousCheck {
+  bool ran = false;
+  std::string message;                   // why not
+  std::string method;                    // cvodes_forward, cvodes_adjoint
+  std::string integrator, discrete;      // of CVODES; of the discrete derivatives
+  double rtol = 0;                       // of both
+  Eigen::MatrixXd psi_rho;               // objective x parameter, by CVODES
+  std::vector<ContinuousEntry> entries;  // objective by objective
+  double wall_seconds = 0;               // of CVODES
+  long simulations = 0;
+  bool passed() const;  // also where it could not run
+  double worst_difference(const std::string& objective) const;
+  Verdict worst_verdict(const std::string& objective) const;
+};
+
+struct ContinuousCheckOptions {
+  double rtol = 1e-9;  // or the scene's, where that is tighter
+  double threshold = 1e-6;
+  double floor = 1e-3;        // entries below this part of the largest are compared to that part
+  long typical_steps = 1000;  // of the scene's own run: CVODES gives up at many times these
+  std::vector<std::shared_ptr<const UserForce>> user_forces = {};
+  std::function<bool(double t)> progress = {};
+};
+
+// At the parameters' values in the scene, in all parameters. Where an entry is off by more than the threshold, both
+// sides run once more at ten times tighter tolerances, and these judge; what that changes excuses what is still off.
+ContinuousCheck check_continuous(const Scene& scene, const std::vector<Objective>& objectives,
+                                 const ContinuousCheckOptions& options = {});
+
+}  // namespace mbsopt

@@ -1,0 +1,420 @@
+#include "optim/check/gradient_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <random>
+
+#include "core/cvodes/cvodes.hpp"
+#include "optim/check/user_terms.hpp"
+#include "optim/differences/difference_ladder.hpp"
+#include "optim/machine/median.hpp"
+#include "optim/machine/stopwatch.hpp"
+#include "optim/objective/integration_error.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+// psi carries the rounding of all steps: some units in the last place of the largest numbers it is made of.
+constexpr double kPsiRounding = 100 * kEpsilon;
+constexpr int kJumpRungs = 3;  // the smallest: further off, frozen steps have errors of their own
+
+// Methods, whatever the reason where they do not.
+bool agree(const GradientCheck& check) {
+  auto fine = [](const CheckedEntry& e) {
+    return passes(e.exact) && (!e.frozen_verdict || passes(*e.frozen_verdict)) &&
+           (!e.free_verdict || passes(*e.free_verdict));
+  };
+  auto held = [](const auto& c) { return c.passed; };
+  return check.ran && std::all_of(check.entries.begin(), check.entries.end(), fine) &&
+         std::all_of(check.taylor.begin(), check.taylor.end(), held) &&
+         std::all_of(check.identities.begin(), check.identities.end(), held) &&
+         (!check.continuous || check.continuous->passed());
+}
+
+class Check {
+ public:
+  Check(const Scene& scene, const std::vector<Objective>& objectives, const GradientCheckOptions& options)
+      : scene_(scene),
+        objectives_(objectives),
+        options_(options),
+        adjoint_(evaluator(GradientMethod::adjoint)),
+        tlm_(evaluator(GradientMethod::tlm)) {
+    for (const Objective& objective : objectives) result_.objectives.push_back(objective.name());
+    for (const Parameter& p : scene.parameters) result_.parameters.push_back(p.name);
+    rho_ = adjoint_.start();
+    size_.resize(rho_.size());
+    for (Index k = 0; k < rho_.size(); ++k)
+      size_(k) = typical_size(scene.parameters[static_cast<std::size_t>(k)], rho_(k));
+  }
+
+  GradientCheck run() {
+    if (!base_runs()) return std::move(result_);
+    result_.ran = true;
+    result_.discrete = !is_cvodes(scene_.simulation.integrator.type);
+    measure_times();
+    difference();
+    estimate_integration_error();
+    compare();
+    if (result_.discrete) {
+      check_identity();
+      check_taylor();
+      if (!agree(result_)) {
+        measure_rounding();
+        generator_.seed(options_.seed);
+        compare();
+        check_identity();
+        check_taylor();
+        say_rounding();
+      }
+    }
+    compare_with_cvodes();
+    result_.wrong_terms = wrong_user_terms(scene_, objectives_, options_.user_forces, options_.simulation_progress);
+    result_.simulations += adjoint_.simulations() + tlm_.simulations();
+    return std::move(result_);
+  }
+
+ private:
+  Evaluator evaluator(GradientMethod method) const {
+    EvaluatorOptions options;
+    options.method = method;
+    options.user_forces = options_.user_forces;
+    options.progress = options_.simulation_progress;
+    return Evaluator(scene_, objectives_, {}, options);
+  }
+
+  bool base_runs() {
+    for (Evaluator* e : {&tlm_, &adjoint_}) {
+      const Evaluation& base = e->gradients(rho_);
+      result_.statistics = base.statistics, result_.warnings = base.warnings;
+      if (!base.ok) {
+        result_.message = base.message;
+        return false;
+      }
+      (e == &tlm_ ? result_.tlm : result_.adjoint) = base.psi_rho;
+      result_.psi = base.psi;
+      steps_ = base.steps;
+    }
+    return true;
+  }
+
+  void measure_times() {
+    GradientTimingOptions timing_options = options_.timing;
+    timing_options.user_forces = options_.user_forces;
+    timing_options.progress = options_.simulation_progress;
+    const GradientTiming timing = time_gradients(scene_, objectives_, timing_options);
+    result_.simulation = timing.simulation, result_.tlm_cost = timing.tlm, result_.adjoint_cost = timing.adjoint;
+    result_.timing_rounds = timing.rounds;
+    result_.simulations += timing.simulations;
+  }
+
+  void set_ratio(MethodCost& cost) const {
+    const double one = result_.simulation.wall_seconds;
+    cost.ratio = one > 0 ? cost.wall_seconds / one : 0;
+  }
+
+  Evaluation run_at(const VectorXd& rho, bool frozen) {
+    Evaluation e;
+    if (frozen) {
+      e = tlm_.values_on(steps_, rho);
+    } else {
+      Evaluator fresh = evaluator(GradientMethod::automatic);
+      e = fresh.values(rho);
+    }
+    result_.simulations += e.simulations;
+    return e;
+  }
+
+  std::optional<VectorXd> psi_at(const VectorXd& rho, bool frozen) {
+    Evaluation e = run_at(rho, frozen);
+    if (!e.ok) return std::nullopt;
+    return std::move(e.psi);
+  }
+
+  void difference() {
+    const Index m = result_.psi.size(), P = rho_.size();
+    for (MatrixXd* x :
+         {&result_.frozen, &result_.free, &frozen_error_, &free_error_, &frozen_step_, &free_step_, &rounding_})
+      x->setZero(m, P);
+    psi_rounding_.setZero(m);
+    jump_.setZero(m, P);
+    on_base_steps_.setConstant(m, P, false);
+    for (Index k = 0; k < P; ++k) {
+      std::vector<std::pair<double, VectorXd>> on_frozen_steps;
+      const double near = options_.relative_step * size_(k) * std::pow(0.5, options_.rungs - kJumpRungs);
+      for (const bool frozen : {true, false}) {
+        if (frozen ? !result_.discrete : !options_.free_steps) continue;
+        const Stopwatch stopwatch;
+        double other_steps = kInfinity;  // the smallest |h| at which a run took others than the base run
+        const auto f = [&](double h) -> std::optional<VectorXd> {
+          VectorXd rho = rho_;
+          rho(k) += h;
+          Evaluation e = run_at(rho, frozen);
+          if (!e.ok) return std::nullopt;
+          if (e.steps.sizes != steps_.sizes) other_steps = std::min(other_steps, std::abs(h));
+          if (std::abs(h) < 1.5 * near) note_jump(k, h, frozen, e.psi, on_frozen_steps);
+          return std::move(e.psi);
+        };
+        LadderDerivative d = difference_ladder(f, m, {options_.relative_step * size_(k), options_.rungs, kPsiRounding});
+        for (Index i = 0; i < m; ++i)
+          if (!d.has_estimate(i)) d.derivative(i) = kNaN, d.error(i) = kInfinity;
+        (frozen ? result_.frozen : result_.free).col(k) = d.derivative;
+        (frozen ? frozen_error_ : free_error_).col(k) = d.error;
+        (frozen ? frozen_step_ : free_step_).col(k) = d.step;
+        if (!frozen && result_.discrete) on_base_steps_.col(k) = d.largest.array() < 0.75 * other_steps;
+        (frozen ? result_.frozen_cost : result_.free_cost).wall_seconds += stopwatch.seconds();
+      }
+      if (options_.progress) options_.progress(static_cast<int>(k) + 1, static_cast<int>(P));
+    }
+    set_ratio(result_.frozen_cost), set_ratio(result_.free_cost);
+  }
+
+  // Both ladders take the same steps h, halved exactly.
+  void note_jump(Index k, double h, bool frozen, const VectorXd& psi,
+                 std::vector<std::pair<double, VectorXd>>& on_frozen_steps) {
+    if (frozen) {
+      on_frozen_steps.emplace_back(h, psi);
+      return;
+    }
+    for (const auto& [at, values] : on_frozen_steps)
+      if (at == h && psi.allFinite() && values.allFinite())
+        jump_.col(k) = jump_.col(k).cwiseMax((psi - values).cwiseAbs());
+  }
+
+  // Free differences differ from the derivatives of the numbers on frozen steps by the derivative of the integration
+  // error, and carry its jumps from step sequence to step sequence, divided by the step. How large these are the
+  // smallest steps show, too, where both differences were taken. Where all runs that an entry is made of took the steps
+  // of the base run, as rounded ones often do (step_control.hpp), it is as good as one on frozen steps.
+  void estimate_integration_error() {
+    if (!options_.free_steps && result_.discrete) return;
+    const auto error_of = [&](GradientMethod method, const MatrixXd& psi_rho) {
+      IntegrationError e = integration_error(scene_, objectives_, result_.psi, psi_rho,
+                                             {options_.user_forces, options_.simulation_progress, method});
+      result_.simulations += e.simulations;
+      return e;
+    };
+    IntegrationError e = error_of(result_.discrete ? GradientMethod::automatic : GradientMethod::tlm, result_.tlm);
+    if (!result_.discrete) {  // forward and backward have errors of their own
+      e.psi_rho += error_of(GradientMethod::adjoint, result_.adjoint).psi_rho;
+      integration_error_ = e.psi_rho;
+    }
+    if (!options_.free_steps) return;
+    for (Index k = 0; k < rho_.size(); ++k)
+      for (Index i = 0; i < result_.psi.size(); ++i)
+        if (!on_base_steps_(i, k) && std::isfinite(free_error_(i, k)))
+          free_error_(i, k) += e.psi_rho(i, k) + std::max(e.psi(i), jump_(i, k)) / free_step_(i, k);
+  }
+
+  // What rounding does to psi and its derivatives: how they scatter over points that are a few units in the last place
+  // apart. Each side of rho is looked at alone, since a kink at rho parts the sides and is no rounding. Measured only
+  // if something disagrees.
+  void measure_rounding() {
+    psi_rounding_ = kPsiRounding * result_.psi.cwiseAbs();
+    for (const double side : {1.0, -1.0}) {
+      for (const GradientMethod method : {GradientMethod::tlm, GradientMethod::adjoint}) {
+        std::optional<Evaluation> first;
+        for (const double units : {8.0, 12.0, 16.0}) {
+          const Evaluation e = tlm_.gradients_on(steps_, rho_ + side * units * kEpsilon * size_, method);
+          result_.simulations += e.simulations;
+          if (!e.ok) continue;
+          if (!first) {
+            first = e;
+            continue;
+          }
+          rounding_ = rounding_.cwiseMax((e.psi_rho - first->psi_rho).cwiseAbs());
+          psi_rounding_ = psi_rounding_.cwiseMax((e.psi - first->psi).cwiseAbs());
+        }
+      }
+    }
+    // A parameter that changes psi by less than its rounding, when it changes by its own size, has no other part in it.
+    rounding_ = rounding_.cwiseMax(psi_rounding_ * size_.cwiseInverse().transpose());
+    rounding_known_ = true;
+  }
+
+  // Entries that CVODES disagrees with, within the rounding of the discrete ones.
+  void excuse_rounding(ContinuousCheck& check) {
+    if (check.passed() || !result_.discrete) return;
+    if (!rounding_known_) measure_rounding();
+    for (std::size_t n = 0; n < check.entries.size(); ++n) {
+      ContinuousEntry& e = check.entries[n];
+      const Index at = static_cast<Index>(n), P = rho_.size();
+      const double entry = std::max(std::abs(e.discrete), std::abs(e.continuous));
+      if (!passes(e.verdict))
+        e.verdict =
+            verdict_of(e.continuous, rounding_(at / P, at % P), e.discrete, entry, options_.thresholds.continuous);
+    }
+  }
+
+  // Where rounding is what methods differ by, and the formulation is why there is so much.
+  void say_rounding() {
+    const FormulationSettings& f = scene_.simulation.formulation;
+    if (f.type != FormulationType::penalty || f.linear_solver != LinearSolver::cholesky) return;
+    double worst = 0;
+    for (Index i = 0; i < rounding_.rows(); ++i)
+      for (Index k = 0; k < rounding_.cols(); ++k)
+        if (const double entry = std::abs(result_.tlm(i, k)); entry > 0)
+          worst = std::max(worst, rounding_(i, k) / std::max(entry, floor_of(i, k)));
+    if (!(worst > options_.thresholds.tlm_adjoint)) return;
+    result_.warnings.push_back(
+        fmt::format("simulation.formulation: penalty with alpha {:.3g} by cholesky rounds derivatives by up to {:.1g} "
+                    "of them, which is more than methods may differ by; \"linear_solver\": \"quasidefinite\" has no "
+                    "such rounding",
+                    f.alpha, worst));
+  }
+
+  // What smaller entries of an objective are compared to.
+  double floor_of(Index objective, Index k) const {
+    return options_.thresholds.rounding_floor *
+           result_.tlm.row(objective).cwiseAbs().cwiseProduct(size_.transpose()).maxCoeff() / size_(k);
+  }
+
+  void compare() {
+    result_.entries.clear();
+    const CheckThresholds& limits = options_.thresholds;
+    for (Index i = 0; i < result_.psi.size(); ++i) {
+      for (Index k = 0; k < rho_.size(); ++k) {
+        CheckedEntry e;
+        e.objective = result_.objectives[static_cast<std::size_t>(i)];
+        e.parameter = result_.parameters[static_cast<std::size_t>(k)];
+        e.tlm = result_.tlm(i, k), e.adjoint = result_.adjoint(i, k);
+        e.frozen = result_.frozen(i, k), e.frozen_error = frozen_error_(i, k);
+        e.free = result_.free(i, k), e.free_error = free_error_(i, k);
+        const double entry = std::max(std::abs(e.tlm), std::abs(e.adjoint));
+        const double floor = floor_of(i, k);
+        // Differences carry the rounding of psi, divided by their step, too.
+        const auto rounding = [&](const MatrixXd& step) {
+          return rounding_(i, k) + (step(i, k) > 0 ? psi_rounding_(i) / step(i, k) : 0);
+        };
+        auto relative = [](double difference, double to) { return difference == 0 ? 0 : std::abs(difference) / to; };
+        e.tlm_adjoint = relative(e.tlm - e.adjoint, std::max(entry, floor));
+        e.frozen_difference = relative(e.frozen - e.tlm, entry);
+        e.free_difference = relative(e.free - e.tlm, entry);
+        if (result_.discrete) {
+          e.exact = entry == 0
+                        ? Verdict::zero
+                        : verdict_of(e.adjoint, rounding_(i, k), e.tlm, std::max(entry, floor), limits.tlm_adjoint);
+          e.frozen_error += rounding(frozen_step_);
+          e.frozen_verdict = verdict_of(e.frozen, e.frozen_error, e.tlm, entry, limits.frozen);
+        } else {
+          e.exact = verdict_of(e.adjoint, integration_error_(i, k), e.tlm, std::max(entry, floor), limits.continuous);
+        }
+        e.free_error += rounding(free_step_);
+        if (options_.free_steps) e.free_verdict = verdict_of(e.free, e.free_error, e.tlm, entry, limits.free);
+        result_.entries.push_back(std::move(e));
+      }
+    }
+  }
+
+  void compare_with_cvodes() {
+    if (!options_.continuous) return;
+    ContinuousCheckOptions options;
+    options.threshold = options_.thresholds.continuous, options.floor = options_.thresholds.rounding_floor;
+    options.typical_steps = result_.statistics.steps;
+    options.user_forces = options_.user_forces;
+    options.progress = options_.simulation_progress;
+    result_.continuous = check_continuous(scene_, objectives_, options);
+    result_.simulations += result_.continuous->simulations;
+    excuse_rounding(*result_.continuous);
+  }
+
+  VectorXd random_direction(Index n) {
+    std::normal_distribution<double> normal;
+    VectorXd d(n);
+    for (Index k = 0; k < n; ++k) d(k) = normal(generator_);
+    return d;
+  }
+
+  void check_identity() {
+    constexpr int kDirections = 3;
+    result_.identities.clear();
+    for (int i = 0; i < kDirections; ++i) {
+      const VectorXd d = random_direction(rho_.size()).cwiseProduct(size_);
+      const VectorXd w = random_direction(result_.psi.size());
+      IdentityCheck check;
+      check.d = d, check.w = w;
+      check.tlm = w.dot(result_.tlm * d);
+      check.adjoint = (result_.adjoint.transpose() * w).dot(d);
+      const double terms = w.cwiseAbs().dot(result_.tlm.cwiseAbs() * d.cwiseAbs());
+      check.relative_defect = terms > 0 ? std::abs(check.tlm - check.adjoint) / terms : 0;
+      const double rounding = w.cwiseAbs().dot(rounding_ * d.cwiseAbs());
+      check.passed = check.relative_defect <= options_.thresholds.identity ||
+                     std::abs(check.tlm - check.adjoint) <= kEstimateTrust * rounding;
+      result_.identities.push_back(check);
+    }
+  }
+
+  // R(h) = |psi(rho + h d) - psi - h psi_rho d|: where it stands clear of rounding, it falls by 4 when h is halved.
+  void check_taylor() {
+    constexpr int kRungs = 14;
+    constexpr double kLargest = 1e-2, kClear = 100;  // clear of rounding: that many times above it
+    result_.taylor.clear();
+    const VectorXd d = random_direction(rho_.size()).cwiseProduct(size_) / std::sqrt(static_cast<double>(rho_.size()));
+    const VectorXd slope = result_.tlm * d;
+    std::vector<VectorXd> remainders, noise;
+    std::vector<double> steps;
+    double h = kLargest;
+    for (int j = 0; j < kRungs; ++j, h /= 2) {
+      const std::optional<VectorXd> psi = psi_at(rho_ + h * d, true);
+      if (!psi) continue;
+      steps.push_back(h);
+      remainders.push_back((*psi - result_.psi - h * slope).cwiseAbs());
+      noise.push_back((kPsiRounding * psi->cwiseAbs().cwiseMax(result_.psi.cwiseAbs())).cwiseMax(psi_rounding_) +
+                      h * (rounding_ * d.cwiseAbs()));
+    }
+    for (Index i = 0; i < result_.psi.size(); ++i) {
+      TaylorCheck check;
+      check.objective = result_.objectives[static_cast<std::size_t>(i)];
+      std::vector<double> slopes;
+      for (std::size_t j = 0; j < steps.size(); ++j) {
+        check.rows.push_back({steps[j], remainders[j](i)});
+        if (j == 0 || remainders[j](i) <= kClear * noise[j](i)) continue;
+        slopes.push_back(std::log(remainders[j - 1](i) / remainders[j](i)) / std::log(steps[j - 1] / steps[j]));
+      }
+      // Large h has terms of higher order: the later slopes tell.
+      if (slopes.size() > 4) slopes.erase(slopes.begin(), slopes.end() - 4);
+      if (!slopes.empty()) check.slope = median(std::move(slopes));
+      check.passed = !steps.empty() && (!check.slope || *check.slope >= options_.thresholds.taylor_slope);
+      result_.taylor.push_back(std::move(check));
+    }
+  }
+
+  const Scene& scene_;
+  const std::vector<Objective>& objectives_;
+  const GradientCheckOptions& options_;
+  Evaluator adjoint_, tlm_;
+  VectorXd rho_, size_;
+  StepSequence steps_;
+  MatrixXd frozen_error_, free_error_, frozen_step_, free_step_, integration_error_;
+  MatrixXd rounding_;      // of the derivatives, where it was measured; else 0
+  VectorXd psi_rounding_;  // of psi, the same
+  bool rounding_known_ = false;
+  Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> on_base_steps_;  // a free difference
+  MatrixXd jump_;  // of psi, between the steps of the base run and those chosen anew
+  std::mt19937 generator_{options_.seed};
+  GradientCheck result_;
+};
+
+}  // namespace
+
+bool GradientCheck::passed() const { return agree(*this) && wrong_terms.empty(); }
+
+GradientCheck check_gradients(const Problem& problem, const GradientCheckOptions& options) {
+  return check_gradients(problem.scene, objectives_of(problem), options);
+}
+
+GradientCheck check_gradients(const Scene& scene, const std::vector<Objective>& objectives,
+                              const GradientCheckOptions& options) {
+  return Check(scene, objectives, options).run();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,119 @@
+// Are the gradients right? Every method against every other, for every objective and parameter.
+//
+//   exact        tangent-linear model (TLM) and adjoint: the derivatives of the same numbers, agree to rounding
+//   frozen       central differences, Richardson-extrapolated over a ladder of steps, on the accepted time steps of the
+//                base run: the same function the exact methods differentiate
+//   free         the same with step-size control at work: what a user of differences would get; judged within what
+//                the integrator's error lets them say
+//   identity     for random directions d and weights w: w'(psi_rho d) by TLM = (psi_rho' w)'d by adjoint
+//   Taylor       |psi(rho + h d) - psi(rho) - h psi_rho d| falls as h^2 along a random d, on frozen steps
+//   continuous   sensitivities of the differential equation by CVODES, at tolerances of its own (continuous_check.hpp)
+//
+// A scene whose integrator is CVODES has no discrete derivatives, and its steps cannot be frozen: its forward and
+// adjoint sensitivities stand in the places of TLM and adjoint and agree to `continuous`; frozen, identity and Taylor
+// are left out.
+//
+//   const GradientCheck check = check_gradients(problem);
+//   for (const CheckedEntry& e : check.entries) std::cout << e.parameter << ' ' << e.adjoint << ' ' << e.frozen;
+//   return check.passed() ? 0 : 3;
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "optim/check/continuous_check.hpp"
+#include "optim/check/gradient_timing.hpp"
+#include "optim/differences/verdict.hpp"
+#include "optim/objective/evaluator.hpp"
+#include "optim/problem/problem.hpp"
+
+namespace mbsopt {
+
+// How far methods may differ. docs/gradient-check.md says why these figures.
+struct CheckThresholds {
+  double tlm_adjoint = 1e-10;  // relative to the entry, or to rounding_floor times the gradient's size
+  double frozen = 1e-7;        // relative to the entry, or within the differences' own error where that hides the entry
+  double free = 1e-7;          // the same, or within own error and integration error (integration_error.hpp)
+  double identity = 1e-10;     // relative to the sum of the terms' sizes
+  double taylor_slope = 1.9;   // at least, 2 in theory
+  // Entries below this part of the largest (each times its parameter's size) are compared to that part: they are
+  // differences of numbers so much larger, and carry their rounding.
+  double rounding_floor = 1e-3;
+  // Of CVODES: relative to the entry or to rounding_floor's part, or within the integration errors.
+  double continuous = 1e-6;
+};
+
+struct CheckedEntry {
+  std::string objective, parameter;
+  double tlm = 0, adjoint = 0;
+  double frozen = 0, frozen_error = 0;    // derivative and its estimated error; NaN, infinite where it failed
+  double free = 0, free_error = 0;        // the error with that of the integration
+  double tlm_adjoint = 0;                 // relative difference
+  double frozen_difference = 0;           // |frozen - tlm| relative to the entry
+  double free_difference = 0;             // |free - tlm| relative to the entry
+  Verdict exact = Verdict::disagrees;     // TLM against adjoint
+  std::optional<Verdict> frozen_verdict;  // where steps can be frozen
+  std::optional<Verdict> free_verdict;    // where free differences were asked for
+};
+
+struct TaylorRow {
+  double h = 0, remainder = 0;
+};
+struct TaylorCheck {
+  std::string objective;
+  std::vector<TaylorRow> rows;  // h falling; empty where no step could be evaluated
+  std::optional<double> slope;  // of the part above rounding; none where all of it is rounding: linear along d
+  bool passed = false;
+};
+
+struct IdentityCheck {
+  Eigen::VectorXd d;  // direction in the parameters
+  Eigen::VectorXd w;  // weights of the objectives
+  double tlm = 0, adjoint = 0, relative_defect = 0;
+  bool passed = false;
+};
+
+struct GradientCheck {
+  bool ran = false;     // false: the base run failed
+  std::string message;  // why
+  std::vector<std::string> objectives, parameters;
+  Eigen::VectorXd psi;
+  Eigen::MatrixXd tlm, adjoint, frozen, free;  // objective x parameter
+  std::vector<CheckedEntry> entries;           // objective by objective
+  std::vector<TaylorCheck> taylor;
+  std::vector<IdentityCheck> identities;
+  bool discrete = true;                       // false: tlm and adjoint are sensitivities by CVODES
+  std::optional<ContinuousCheck> continuous;  // where it was asked for
+  MethodCost simulation, tlm_cost, adjoint_cost, frozen_cost, free_cost;  // differences: of all of them
+  int timing_rounds = 0;
+  SimulationStatistics statistics;       // of the base run
+  std::vector<std::string> warnings;     // of the base run, and what explains disagreement; sentences
+  std::vector<std::string> wrong_terms;  // of forces and costs written in C++ (user_terms.hpp), sentences
+  long simulations = 0;
+  bool passed() const;
+};
+
+struct GradientCheckOptions {
+  CheckThresholds thresholds;
+  double relative_step = 1e-2;  // the ladder's largest, of the parameter's size
+  int rungs = 8;
+  bool free_steps = true;
+  bool continuous = true;        // compare with CVODES, too
+  unsigned seed = 1;             // of the random directions
+  GradientTimingOptions timing;  // rounds and seconds
+  std::vector<std::shared_ptr<const UserForce>> user_forces;
+  std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons the check
+  std::function<void(int done, int of)> progress;     // parameters differenced
+};
+
+GradientCheck check_gradients(const Problem& problem, const GradientCheckOptions& options = {});
+// The same for objectives that may be written in C++.
+GradientCheck check_gradients(const Scene& scene, const std::vector<Objective>& objectives,
+                              const GradientCheckOptions& options = {});
+
+}  // namespace mbsopt

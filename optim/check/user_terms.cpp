@@ -1,0 +1,236 @@
+#include "optim/check/user_terms.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/force/user_force.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/simulate/simulation.hpp"
+#include "optim/differences/difference_ladder.hpp"
+#include "optim/differences/verdict.hpp"
+#include "optim/objective/sampled_motion.hpp"
+#include "optim/problem/parameter_values.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kStates = 4;         // of the motion, and its start
+constexpr int kRungs = 12;         // from a hundredth of the size down to 5e-6 of it
+constexpr double kLargest = 1e-2;  // of the size of what moves
+constexpr double kWrong = 1e-6;    // of the derivative: ladders reach 1e-9 and better
+
+// A direction in (q, v) of k bodies, and in words.
+struct Direction {
+  VectorXd q, v;
+  bool of_rates = false;  // v alone
+  bool turns = false;     // an angle or its rate; else a length or its rate
+  std::string name;       // "x of 'crank'"
+};
+
+Vector4d turned(const Vector4d& p, int axis) {
+  const Vector3d e = p.tail<3>(), w = Vector3d::Unit(axis);
+  Vector4d out;
+  out << -0.5 * e.dot(w), 0.5 * (p(0) * w + e.cross(w));
+  return out;
+}
+
+// q, v: 7 numbers each for some bodies, whose names are given.
+std::vector<Direction> directions(const VectorXd& q, const VectorXd& v, const std::vector<std::string>& bodies) {
+  constexpr const char* kAxes[] = {"x", "y", "z"};
+  std::vector<Direction> all;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const Index at = 7 * static_cast<Index>(b);
+    const Vector4d p = q.segment<4>(at + 3), pdot = v.segment<4>(at + 3);
+    for (int axis = 0; axis < 3; ++axis) {
+      Direction d{VectorXd::Zero(q.size()), VectorXd::Zero(q.size()), false, false, ""};
+      d.q(at + axis) = 1, d.name = fmt::format("{} of '{}'", kAxes[axis], bodies[b]);
+      all.push_back(d);
+      d.q(at + axis) = 0, d.v(at + axis) = 1, d.of_rates = true, d.name = fmt::format("the rate of {}", d.name);
+      all.push_back(d);
+      d.v(at + axis) = 0, d.v.segment<4>(at + 3) = turned(p, axis), d.turns = true;
+      d.name = fmt::format("the angular velocity of '{}' about its {}", bodies[b], kAxes[axis]);
+      all.push_back(d);
+      d.q.segment<4>(at + 3) = turned(p, axis), d.v.segment<4>(at + 3) = -d.q.segment<4>(at + 3).dot(pdot) * p;
+      d.of_rates = false, d.name = fmt::format("a turn of '{}' about its {}", bodies[b], kAxes[axis]);
+      all.push_back(d);
+    }
+  }
+  return all;
+}
+
+class UserTerms {
+ public:
+  UserTerms(const Scene& scene, const std::vector<Objective>& objectives,
+            const std::vector<std::shared_ptr<const UserForce>>& user_forces)
+      : scene_(scene),
+        objectives_(objectives),
+        user_forces_(user_forces),
+        rho_(parameter_values(scene)),
+        mechanism_(mechanism_at(rho_)) {}
+
+  std::vector<std::string> find(const std::function<bool(double)>& progress) {
+    SampledMotion motion;
+    motion.times = sample_times(scene_.simulation, kStates);
+    motion.times.insert(motion.times.begin(), scene_.simulation.start_time);
+    RunOptions options;
+    options.progress = progress;
+    if (!simulate(mechanism_, scene_.simulation, {}, record_motion(mechanism_, motion), options).ok()) return {};
+    length_ = speed_ = 0;
+    const Index n = motion.states.rows() / 2;
+    for (Index i = 0; i < n; i += 7) {
+      length_ = std::max(length_, motion.states.middleRows(i, 3).cwiseAbs().maxCoeff());
+      speed_ = std::max(speed_, motion.states.middleRows(n + i, 3).cwiseAbs().maxCoeff());
+    }
+    if (length_ == 0) length_ = 1;
+    if (speed_ == 0) speed_ = length_;  // per second
+    for (Index i = 0; i < motion.states.cols(); ++i) {
+      const double t = motion.times[static_cast<std::size_t>(i)];
+      const VectorXd angles = motion.angles.col(i);
+      for (std::size_t f = 0; f < user_forces_.size(); ++f) check_force(f, t, motion.states.col(i));
+      for (const Objective& o : objectives_)
+        if (o.is_written_in_cpp()) check_objective(o, t, motion.states.col(i), angles, i + 1 == motion.states.cols());
+    }
+    return std::move(wrong_);
+  }
+
+ private:
+  Mechanism mechanism_at(const VectorXd& rho) const {
+    return Mechanism(scene_, rho, std::vector<bool>(scene_.parameters.size(), false), user_forces_);
+  }
+
+  // The worst entry of a derivative along one direction, if it is wrong; said once for each `what`.
+  void compare(const std::string& what, const std::string& along, double t, double step,
+               const std::function<VectorXd(double)>& f, const VectorXd& given) {
+    if (std::find(said_.begin(), said_.end(), what) != said_.end()) return;
+    const auto at = [&](double h) -> std::optional<VectorXd> {
+      VectorXd value = f(h);
+      if (!value.allFinite()) return std::nullopt;
+      return value;
+    };
+    const LadderDerivative d = difference_ladder(at, given.size(), {step, kRungs, 0});
+    const double entry = std::max(given.cwiseAbs().maxCoeff(), d.derivative.cwiseAbs().maxCoeff());
+    for (Index i = 0; i < given.size(); ++i) {
+      if (!d.has_estimate(i) || passes(verdict_of(given(i), d.error(i), d.derivative(i), entry, kWrong))) continue;
+      said_.push_back(what);
+      wrong_.push_back(
+          fmt::format("{} is wrong: at t = {:.6g} s, along {}, its entry {} is {:.6g}, differences say {:.6g}", what, t,
+                      along, i, given(i), d.derivative(i)));
+      return;
+    }
+  }
+
+  double step_of(const Direction& d) const {
+    const double moved = (d.of_rates ? d.v : d.q).cwiseAbs().maxCoeff();
+    const double size = d.of_rates ? speed_ : length_;
+    return kLargest / moved * (d.turns ? size / length_ : size);
+  }
+  double step_of_parameter(std::size_t k) const {
+    return kLargest * typical_size(scene_.parameters[k], rho_(static_cast<Index>(k)));
+  }
+
+  void check_force(std::size_t index, double t, const VectorXd& y) {
+    const UserForce& force = *user_forces_[index];
+    const UserForceData& data = mechanism_.data().user_forces[index];
+    const std::vector<std::string> bodies = force.bodies();
+    const Index size = 7 * static_cast<Index>(bodies.size()), n = y.size() / 2;
+    VectorXd q(size), v(size);
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      const Index at = 7 * static_cast<Index>(b), from = 7 * (data.bodies[b] - 1);
+      q.segment<7>(at) = y.segment<7>(from), v.segment<7>(at) = y.segment<7>(n + from);
+    }
+    const std::string name = fmt::format("user force {} (on '{}')", index, fmt::join(bodies, "', '"));
+    const auto Q = [&](const VectorXd& q_at, const VectorXd& v_at, const VectorXd& rho) {
+      VectorXd value = VectorXd::Zero(size);
+      force.Q(t, q_at, v_at, rho, value);
+      return value;
+    };
+    MatrixXd K = MatrixXd::Zero(size, size), C = K, Q_rho = MatrixXd::Zero(size, rho_.size());
+    force.K(t, q, v, rho_, K), force.C(t, q, v, rho_, C), force.Q_rho(t, q, v, rho_, Q_rho);
+    const std::vector<Direction> all = directions(q, v, bodies);
+    for (const bool rates : {true, false})  // turns use C, too
+      for (const Direction& d : all)
+        if (d.of_rates == rates)
+          compare(
+              name + (rates ? ": its C = -dQ/dv" : ": its K = -dQ/dq"), d.name, t, step_of(d),
+              [&](double h) { return Q(q + h * d.q, v + h * d.v, rho_); }, -(K * d.q + C * d.v));
+    for (std::size_t k = 0; k < scene_.parameters.size(); ++k) {
+      const VectorXd e = VectorXd::Unit(rho_.size(), static_cast<Index>(k));
+      compare(
+          name + ": its Q_rho", "'" + scene_.parameters[k].name + "'", t, step_of_parameter(k),
+          [&](double h) { return Q(q, v, rho_ + h * e); }, Q_rho.col(static_cast<Index>(k)));
+    }
+  }
+
+  void check_objective(const Objective& objective, double t, const VectorXd& y, const VectorXd& angles, bool end) {
+    const Cost cost = objective.cost(mechanism_);
+    const std::string name = "objective '" + objective.name() + "': ";
+    if (cost.running)
+      check_cost(
+          name + "its running cost's", *cost.running, [&](const Mechanism& m) { return objective.cost(m).running; }, t,
+          y, angles);
+    if (cost.terminal && end)
+      check_cost(
+          name + "its terminal cost's", *cost.terminal, [&](const Mechanism& m) { return objective.cost(m).terminal; },
+          t, y, angles);
+  }
+
+  template <class Bound>
+  void check_cost(const std::string& name, const PointCost& cost, const Bound& bound, double t, const VectorXd& y,
+                  const VectorXd& angles) {
+    const Index n = y.size() / 2;
+    std::vector<std::string> bodies;
+    for (const Body& body : scene_.bodies) bodies.push_back(body.name);
+    VectorXd y_bar = VectorXd::Zero(y.size()), rho_bar = VectorXd::Zero(rho_.size());
+    cost.add_gradient({t, y, angles}, 1, y_bar, rho_bar);
+    const auto one = [](double x) { return VectorXd::Constant(1, x); };
+    for (const Direction& d : directions(y.head(n), y.tail(n), bodies)) {
+      VectorXd along(y.size());
+      along << d.q, d.v;
+      compare(
+          name + " gradient in y", d.name, t, step_of(d),
+          [&](double h) {
+            const VectorXd there = y + h * along;
+            return one(cost.value({t, there, angles}));
+          },
+          one(y_bar.dot(along)));
+    }
+    for (std::size_t k = 0; k < scene_.parameters.size(); ++k) {
+      compare(
+          name + " gradient in rho", "'" + scene_.parameters[k].name + "'", t, step_of_parameter(k),
+          [&](double h) {
+            VectorXd rho = rho_;
+            rho(static_cast<Index>(k)) += h;
+            return one(bound(mechanism_at(rho))->value({t, y, angles}));
+          },
+          one(rho_bar(static_cast<Index>(k))));
+    }
+  }
+
+  const Scene& scene_;
+  const std::vector<Objective>& objectives_;
+  const std::vector<std::shared_ptr<const UserForce>>& user_forces_;
+  VectorXd rho_;
+  const Mechanism mechanism_;
+  double length_ = 1, speed_ = 1;
+  std::vector<std::string> said_, wrong_;
+};
+
+}  // namespace
+
+std::vector<std::string> wrong_user_terms(const Scene& scene, const std::vector<Objective>& objectives,
+                                          const std::vector<std::shared_ptr<const UserForce>>& user_forces,
+                                          const std::function<bool(double t)>& progress) {
+  if (user_forces.empty() &&
+      std::none_of(objectives.begin(), objectives.end(), [](const Objective& o) { return o.is_written_in_cpp(); }))
+    return {};
+  return UserTerms(scene, objectives, user_forces).find(progress);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,100 @@
+// Optimal design: parameters within their bounds that minimise one objective, others held within bounds.
+//
+//   minimise psi_0(rho)   subject to   rho_lower <= rho <= rho_upper,   lower_i <= psi_i(rho) <= upper_i
+//
+//   DesignOptions options;
+//   options.progress = [](const DesignRow& row) { std::cerr << row.objective << '\n'; return true; };
+//   const DesignResult result = run_design(problem, options);
+//   if (result.ok()) std::cout << result.variables[0].name << " = " << result.variables[0].value;
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "optim/objective/evaluator.hpp"
+#include "optim/problem/problem.hpp"
+#include "optim/solver/nonlinear_program.hpp"
+
+namespace mbsopt {
+
+struct DesignVariable {
+  std::string name, unit;
+  double initial = 0, value = 0;
+  std::optional<double> lower, upper;
+  bool at_lower = false, at_upper = false;  // the solution touches this bound
+};
+
+struct DesignConstraint {
+  std::string objective;
+  std::optional<double> lower, upper;
+  double initial = 0, value = 0;
+  std::optional<double> true_value = {};    // at the solution, where the objective is a smooth maximum or minimum
+  double violation = 0;                     // amount by which the nearer bound is missed, 0 where it holds
+  double true_violation = 0;                // the same of true_value
+  bool at_lower = false, at_upper = false;  // the solution touches this bound
+};
+
+// One iteration of the optimiser.
+struct DesignRow {
+  int iteration = 0;
+  double objective = 0;
+  double violation = 0;        // largest of the constraints, each relative to its bounds
+  double optimality = 0;       // largest entry of the scaled Lagrangian gradient; 0 at the optimum; NaN: not known
+  Eigen::VectorXd parameters;  // the variables, SI
+};
+
+struct DesignResult {
+  SolverStatus status = SolverStatus::failed;
+  std::string message;  // in words, always
+  std::string objective;
+  double objective_initial = 0, objective_final = 0;
+  std::optional<double> objective_true;  // at the solution, where the objective is a smooth maximum or minimum
+  std::vector<DesignVariable> variables;
+  std::vector<DesignConstraint> constraints;
+  std::vector<DesignRow> history;
+  Eigen::VectorXd rho;          // all parameters at the solution, or at the best point where there is none
+  Evaluation final_evaluation;  // there, unless stopped: the objective that is minimised, then the constraints
+  std::string optimizer;        // as in the problem: "ipopt"
+  std::string algorithm;        // in the words of its library
+  double optimality = std::numeric_limits<double>::quiet_NaN();  // at the solution, by the yardstick of all:
+                                                                 // optimality.hpp; NaN where stopped
+  double violation = 0;         // at the solution: largest of the constraints, each relative to its bounds
+  double true_violation = 0;    // the same with true extremes in place of smooth ones
+  std::optional<long> seed;     // where the method is random
+  NlpScale scale;               // by which convergence was judged
+  std::string gradient_choice;  // method and why
+  int iterations = 0;
+  long evaluations = 0, failed_evaluations = 0;  // points at which objectives and gradients were computed
+  long simulations = 0;                          // also those of second derivatives
+  double wall_seconds = 0;
+  std::vector<std::string> warnings;  // sentences
+  bool ok() const {
+    return status == SolverStatus::converged || status == SolverStatus::converged_beyond_limit ||
+           status == SolverStatus::no_progress || status == SolverStatus::searched;
+  }
+};
+
+struct DesignOptions {
+  GradientMethod method = GradientMethod::automatic;
+  std::vector<std::shared_ptr<const UserForce>> user_forces;
+  std::function<bool(const DesignRow&)> progress;     // after every iteration; false stops, the best so far is kept
+  std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
+  PointRecords* records = nullptr;                    // of an earlier run that this one goes on with
+  bool compare_differences = true;                    // at the start, difference_comparison.hpp; in the warnings
+  // By which convergence is judged. Where there is none: about 1 over the objective and its gradient at the start. Runs
+  // from several starts share one, so that "converged" means the same of all.
+  std::optional<NlpScale> scale = {};
+};
+
+// problem.design must be there. Throws std::invalid_argument where it makes no sense (unknown names, no bounds to
+// hold).
+DesignResult run_design(const Problem& problem, const DesignOptions& options = {});
+
+// The scale that a run from the problem's own values would take.
+NlpScale design_scale(const Problem& problem, const DesignOptions& options = {});
+
+}  // namespace mbsopt

@@ -1,0 +1,68 @@
+// A design as the nonlinear program that solvers see: scaled variables, constraints relative to the size of their
+// bounds. The evaluation of the best point is kept, so that nothing is simulated again for the report.
+//
+//   DesignProgram program(spec, evaluator, scaling);
+//   program.start_from(x_start);
+//   solve_with_ipopt(program, x_start, options);
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "optim/objective/evaluator.hpp"
+#include "optim/problem/problem.hpp"
+#include "optim/problem/variable_scaling.hpp"
+#include "optim/solver/nonlinear_program.hpp"
+
+namespace mbsopt {
+
+class DesignProgram : public NonlinearProgram {
+ public:
+  // The evaluator's objectives: the one that is minimised, then those that are bounded. abandoned: whether an
+  // evaluation that failed did so because the user stopped it.
+  DesignProgram(const DesignSpec& spec, Evaluator& evaluator, const VariableScaling& scaling,
+                std::function<bool()> abandoned = {});
+
+  // Evaluates the start and scales by it. Convergence is judged on an objective whose size and gradient are about 1:
+  // the larger of those at the start and a little way from it, so that a start at the optimum, where both may vanish,
+  // is seen for what it is. Constraints likewise. Or by a given scale.
+  Evaluation start_from(const Eigen::VectorXd& x_start, const std::optional<NlpScale>& scale = {});
+
+  Eigen::VectorXd rho_at(const Eigen::VectorXd& x) const;  // all parameters
+
+  void evaluate(const Eigen::VectorXd& x, NlpPoint& point) override;
+  void evaluate_values(const Eigen::VectorXd& x, NlpPoint& point) override;
+  bool hessians(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& H) override;
+  bool gradient_beside(const Eigen::VectorXd& x, const Eigen::VectorXd& d, Eigen::VectorXd& f_x) override;
+
+  // The evaluation with gradients at rho: the one that was kept, or a new one.
+  const Evaluation& evaluation(const Eigen::VectorXd& rho);
+
+  double size(Eigen::Index constraint) const { return size_(constraint); }
+  long hessian_gradients() const { return hessian_gradients_; }            // that second derivatives took
+  const std::string& hessian_failure() const { return hessian_failure_; }  // the first, in words
+
+ private:
+  NlpScale scale_at(const Eigen::VectorXd& x_start);
+  bool second_derivatives(const Eigen::VectorXd& rho, std::vector<Eigen::MatrixXd>& psi_rhorho);
+  void fill(const Evaluation& e, const Eigen::VectorXd& x, NlpPoint& point) const;
+  void keep(const Evaluation& e);
+  double violation_of(const Evaluation& e) const;
+
+  Evaluator& evaluator_;
+  const VariableScaling& scaling_;
+  const std::function<bool()> abandoned_;
+  const Eigen::VectorXd rho_;  // the scene's values, which parameters that are not designed keep
+  Eigen::VectorXd size_;       // of each constraint's bounds
+  Evaluation best_;
+  double best_f_ = 0, best_violation_ = 0;
+  long hessian_gradients_ = 0;
+  std::string hessian_failure_;
+  const bool gauss_newton_;
+};
+
+inline constexpr double kConstraintTolerance = 1e-8;  // relative to the size of the bounds: what counts as held
+
+}  // namespace mbsopt

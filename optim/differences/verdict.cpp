@@ -1,0 +1,32 @@
+#include "optim/differences/verdict.hpp"
+
+#include <cmath>
+
+namespace mbsopt {
+std::string_view to_string(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::agrees:
+      return "agrees";
+    case Verdict::buried:
+      return "within its error";
+    case Verdict::zero:
+      return "zero";
+    case Verdict::failed:
+      return "FAILED";
+    case Verdict::disagrees:
+      break;
+  }
+  return "DISAGREES";
+}
+
+Verdict verdict_of(double found, double error, double expected, double entry, double threshold) {
+  if (!std::isfinite(found)) return Verdict::failed;
+  if (entry == 0 && found == 0) return Verdict::zero;
+  const double apart = std::abs(found - expected);
+  if (apart <= threshold * entry) return Verdict::agrees;
+  const double own = kEstimateTrust * error;
+  if (own > threshold * entry && apart <= own) return Verdict::buried;
+  return Verdict::disagrees;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,18 @@
+// Channels of angles that look as if the record were in degrees.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "optim/fit/experiment_stack.hpp"
+
+namespace mbsopt {
+
+// Sentences with the path of the column before them: channels whose measured values span about 180/pi times as much as
+// the model at the start or at the end of the fit, angles more than half a turn, and are not explained by it. z:
+// residuals per sample, by the sigmas of the stack.
+std::vector<std::string> angle_doubts(const Scene& scene, const IdentificationSpec& spec, const ExperimentStack& stack,
+                                      const Eigen::VectorXd& z_start, const Eigen::VectorXd& z_end);
+
+}  // namespace mbsopt

@@ -1,0 +1,203 @@
+#include "optim/fit/determined_combinations.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <set>
+
+#include "core/expression/did_you_mean.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kPart = 1e-4;  // parts smaller than this are zero, and ratios this near are equal
+
+bool is_near(double a, double b) { return std::abs(a - b) <= kPart * std::max({1.0, std::abs(a), std::abs(b)}); }
+
+// Orthogonal projector onto the directions.
+MatrixXd projector(const MatrixXd& null_space) {
+  const MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(null_space).householderQ() *
+                     MatrixXd::Identity(null_space.rows(), null_space.cols());
+  return Q * Q.transpose();
+}
+
+// Rows spanning the same space, each with a 1 (its pivot) where the others have 0, as early as possible.
+MatrixXd reduced_rows(MatrixXd rows, std::vector<Index>& pivots) {
+  for (Index k = 0; k < rows.cols() && static_cast<Index>(pivots.size()) < rows.rows(); ++k) {
+    const Index next = static_cast<Index>(pivots.size()), left = rows.rows() - next;
+    Index pivot = 0;
+    const double largest = rows.col(k).tail(left).cwiseAbs().maxCoeff(&pivot);
+    if (largest <= kPart * rows.bottomRows(left).cwiseAbs().maxCoeff()) continue;
+    rows.row(next).swap(rows.row(next + pivot));
+    rows.row(next) /= rows(next, k);
+    for (Index i = 0; i < rows.rows(); ++i)
+      if (i != next) rows.row(i) -= rows(i, k) * rows.row(next);
+    pivots.push_back(k);
+  }
+  return rows.unaryExpr([](double x) { return std::abs(x) < kPart ? 0.0 : x; });
+}
+
+class Group {
+ public:
+  Group(std::vector<Index> members, const MatrixXd& P, const VectorXd& rho, const VectorXd& size,
+        const std::vector<std::string>& names, const std::vector<std::string>& units)
+      : members_(std::move(members)) {
+    const Index c = static_cast<Index>(members_.size());
+    MatrixXd inside(c, c);
+    rho_.resize(c), size_.resize(c);
+    for (Index i = 0; i < c; ++i) {
+      const Index k = members_[static_cast<std::size_t>(i)];
+      for (Index j = 0; j < c; ++j) inside(i, j) = P(k, members_[static_cast<std::size_t>(j)]);
+      rho_(i) = rho(k), size_(i) = size(k);
+      names_.push_back(names[static_cast<std::size_t>(k)]);
+      units_.push_back(units.empty() ? "" : units[static_cast<std::size_t>(k)]);
+    }
+    // A projector's singular values are 1 and 0.
+    const Eigen::JacobiSVD<MatrixXd> svd(inside, Eigen::ComputeFullU);
+    const Index free = (svd.singularValues().array() > 0.5).count();
+    rows_ = reduced_rows(svd.matrixU().rightCols(c - free).transpose(), pivots_);
+  }
+
+  std::string in_words() const {
+    if (rows_.rows() == 0)
+      return fmt::format("{}: {} not influence what is measured", joined(names_), names_.size() == 1 ? "does" : "do");
+    std::optional<std::vector<std::string>> terms = in_sums();
+    if (!terms) terms = in_products();
+    if (!terms) terms = linear_terms();
+    std::string list = terms->front();
+    for (std::size_t i = 1; i < terms->size(); ++i) list += (i + 1 == terms->size() ? " and " : ", ") + (*terms)[i];
+    return fmt::format("{}: only {} {} determined", joined(names_), list, terms->size() == 1 ? "is" : "are");
+  }
+
+ private:
+  // rows_ with each parameter in the given unit instead of its size; pivots stay 1.
+  MatrixXd rows_in(const VectorXd& unit_over_size) const {
+    MatrixXd rows = rows_;
+    for (Index r = 0; r < rows.rows(); ++r)
+      rows.row(r) =
+          rows_.row(r).cwiseProduct(unit_over_size.transpose()) / unit_over_size(pivots_[static_cast<std::size_t>(r)]);
+    return rows;
+  }
+  MatrixXd absolute_rows() const { return rows_in(size_.cwiseInverse()); }       // in changes d rho
+  MatrixXd relative_rows() const { return rows_in(rho_.cwiseQuotient(size_)); }  // in d rho/rho
+
+  std::optional<std::vector<std::string>> in_sums() const {
+    const MatrixXd rows = absolute_rows();
+    for (const double x : rows.reshaped())
+      if (x != 0 && !is_near(std::abs(x), 1)) return std::nullopt;
+    for (Index r = 0; r < rows.rows(); ++r) {
+      std::set<std::string> units;
+      for (Index k = 0; k < rows.cols(); ++k)
+        if (rows(r, k) != 0) units.insert(units_[static_cast<std::size_t>(k)]);
+      units.erase("");
+      if (units.size() > 1) return std::nullopt;
+    }
+    return linear_terms();
+  }
+
+  std::optional<std::vector<std::string>> in_products() const {
+    if ((rho_.array() == 0).any()) return std::nullopt;
+    const MatrixXd exponents = relative_rows();
+    std::vector<std::string> terms;
+    for (Index r = 0; r < exponents.rows(); ++r) {
+      double denominator = 0;
+      for (const double d : {1.0, 2.0, 3.0}) {
+        const VectorXd scaled = d * exponents.row(r).transpose();
+        const bool whole = std::all_of(scaled.begin(), scaled.end(),
+                                       [](double x) { return is_near(x, std::round(x)) && std::abs(x) < 6.5; });
+        if (whole) {
+          denominator = d;
+          break;
+        }
+      }
+      if (denominator == 0) return std::nullopt;
+      terms.push_back(product(denominator * exponents.row(r).transpose()));
+    }
+    return terms;
+  }
+
+  std::string product(const VectorXd& exponents) const {
+    std::string above, below;
+    int factors_below = 0;
+    for (Index k = 0; k < exponents.size(); ++k) {
+      const long e = std::lround(exponents(k));
+      if (e == 0) continue;
+      std::string& part = e > 0 ? above : below;
+      if (!part.empty()) part += '*';
+      part += names_[static_cast<std::size_t>(k)];
+      if (std::abs(e) > 1) part += fmt::format("^{}", std::abs(e));
+      factors_below += e < 0;
+    }
+    if (below.empty()) return above;
+    return above + (factors_below > 1 ? "/(" + below + ")" : "/" + below);
+  }
+
+  std::vector<std::string> linear_terms() const {
+    const MatrixXd rows = absolute_rows();
+    std::vector<std::string> terms;
+    for (Index r = 0; r < rows.rows(); ++r) {
+      std::string sum;
+      for (Index k = 0; k < rows.cols(); ++k) {
+        const double x = rows(r, k);
+        if (x == 0) continue;
+        if (!sum.empty()) sum += x < 0 ? " - " : " + ";
+        if (!is_near(std::abs(x), 1)) sum += fmt::format("{:.4g}*", std::abs(x));
+        sum += names_[static_cast<std::size_t>(k)];
+      }
+      terms.push_back(sum);
+    }
+    return terms;
+  }
+
+  std::vector<Index> members_;
+  std::vector<std::string> names_, units_;
+  VectorXd rho_, size_;
+  MatrixXd rows_;  // determined combinations, in changes over sizes
+  std::vector<Index> pivots_;
+};
+
+}  // namespace
+
+std::vector<bool> changed_parameters(const MatrixXd& null_space) {
+  std::vector<bool> changed(static_cast<std::size_t>(null_space.rows()), false);
+  if (null_space.cols() == 0) return changed;
+  const MatrixXd P = projector(null_space);
+  for (Index k = 0; k < P.rows(); ++k) changed[static_cast<std::size_t>(k)] = std::sqrt(std::abs(P(k, k))) > kPart;
+  return changed;
+}
+
+std::vector<std::string> determined_combinations(const MatrixXd& null_space, const VectorXd& rho, const VectorXd& size,
+                                                 const std::vector<std::string>& names,
+                                                 const std::vector<std::string>& units) {
+  std::vector<std::string> words;
+  if (null_space.cols() == 0) return words;
+  const MatrixXd P = projector(null_space);
+  const std::vector<bool> changed = changed_parameters(null_space);
+  std::vector<Index> group(changed.size());  // by its first member
+  std::iota(group.begin(), group.end(), Index{0});
+  for (std::size_t i = 0; i < group.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k) {
+      if (!changed[i] || !changed[k] || std::abs(P(static_cast<Index>(i), static_cast<Index>(k))) <= kPart) continue;
+      const auto [first, second] = std::minmax({group[i], group[k]});
+      std::replace(group.begin(), group.end(), Index{second}, Index{first});
+    }
+  for (std::size_t k = 0; k < group.size(); ++k) {
+    if (!changed[k] || group[k] != static_cast<Index>(k)) continue;
+    std::vector<Index> members;
+    for (std::size_t i = k; i < group.size(); ++i)
+      if (changed[i] && group[i] == group[k]) members.push_back(static_cast<Index>(i));
+    words.push_back(Group(members, P, rho, size, names, units).in_words());
+  }
+  return words;
+}
+
+}  // namespace mbsopt

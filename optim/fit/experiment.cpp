@@ -1,0 +1,306 @@
+#include "optim/fit/experiment.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <stdexcept>
+
+#include "core/expression/did_you_mean.hpp"
+#include "core/mechanism/mechanism.hpp"
+#include "core/scene/field_visitor.hpp"
+#include "optim/objective/expression_cost.hpp"
+#include "optim/objective/obstructed_parameters.hpp"
+#include "optim/problem/parameter_values.hpp"
+
+namespace mbsopt {
+namespace {
+
+Program compiled(const Field& field, const Symbols& symbols, const std::string& place) {
+  try {
+    return Program(field, symbols);
+  } catch (const UnknownName& error) {
+    throw std::invalid_argument(place + ": " + error.what());
+  }
+}
+
+// Value of a field of a channel, with its gradient in all parameters.
+struct Differentiated {
+  double value = 0;
+  Eigen::VectorXd rho_bar;
+};
+
+Differentiated evaluated(const Program& program, const Eigen::VectorXd& rho, Program::Scratch& scratch) {
+  Differentiated d;
+  d.rho_bar.setZero(rho.size());
+  const std::size_t P = static_cast<std::size_t>(rho.size());
+  program.grow(scratch);
+  d.value = program.add_gradient(std::span(rho.data(), P), 1, std::span(d.rho_bar.data(), P), scratch);
+  return d;
+}
+
+// Whether time acts on the scene other than through its state.
+bool depends_on_time(const Scene& scene) {
+  bool found = !scene.drives.empty();
+  FieldVisitor visitor(
+      [&](const FieldPlace&, const Expression& e, Names) {
+        const std::vector<std::string> names = e.names();
+        found = found || std::find(names.begin(), names.end(), "t") != names.end();
+      },
+      [](const std::string&, const std::string&) {});
+  for (const Force& force : scene.forces) describe(visitor, force);
+  return found;
+}
+
+}  // namespace
+
+Experiment::Experiment(const Scene& scene, const ExperimentSpec& spec, std::string place, const CsvTable& data,
+                       const Eigen::VectorXd& rho, std::vector<Unknown> unknowns,
+                       std::vector<std::shared_ptr<const UserForce>> user_forces)
+    : scene_(scene),
+      settings_(scene.simulation),
+      rho_(rho),
+      unknowns_(std::move(unknowns)),
+      active_(scene.parameters.size(), false),
+      user_forces_(std::move(user_forces)) {
+  for (const auto& [name, value] : spec.overrides) {
+    if (!std::isfinite(value)) throw std::invalid_argument(fmt::format("{}.overrides.{}: is not finite", place, name));
+    rho_(parameter_indices(scene, {name}).front()) = value;
+  }
+  for (const Unknown& unknown : unknowns_) active_[static_cast<std::size_t>(unknown.parameter)] = true;
+  replace_laws(spec, place);
+  compile_channels(spec, place);
+  take_samples(spec, place, data);
+  refuse_short_laws(spec, place);
+  scene_.simulation = settings_;
+  if (!unknowns_.empty()) require_unobstructed(simulated(), rho_, active_, user_forces_);
+}
+
+void Experiment::replace_laws(const ExperimentSpec& spec, const std::string& place) {
+  for (std::size_t i = 0; i < spec.drives.size(); ++i) {
+    const auto drive = std::find_if(scene_.drives.begin(), scene_.drives.end(),
+                                    [&](const Drive& d) { return d.name == spec.drives[i].drive; });
+    if (drive == scene_.drives.end())
+      throw std::invalid_argument(
+          fmt::format("{}.drives[{}].drive: there is no drive '{}'", place, i, spec.drives[i].drive));
+    drive->law = spec.drives[i].law, drive->samples = spec.drives[i].samples;
+  }
+}
+
+double Experiment::largest_delay(const Program& delay) const {
+  std::vector<const Unknown*> bounded;
+  for (const Unknown& unknown : unknowns_) {
+    const Parameter& p = scene_.parameters[static_cast<std::size_t>(unknown.parameter)];
+    if (delay.uses(unknown.parameter) && (p.lower || p.upper)) bounded.push_back(&unknown);
+  }
+  Program::Scratch scratch;
+  double largest = evaluated(delay, rho_, scratch).value;
+  if (bounded.size() > 10) return largest;
+  for (std::size_t corner = 0; corner < (std::size_t{1} << bounded.size()); ++corner) {
+    Eigen::VectorXd rho = rho_;
+    for (std::size_t i = 0; i < bounded.size(); ++i) {
+      const Parameter& p = scene_.parameters[static_cast<std::size_t>(bounded[i]->parameter)];
+      const std::optional<double>& bound = corner >> i & 1 ? p.upper : p.lower;
+      if (bound) rho(bounded[i]->parameter) = *bound;
+    }
+    largest = std::max(largest, evaluated(delay, rho, scratch).value);
+  }
+  return largest;
+}
+
+// d s/dt along the dense output is s_y ydot only where s has no time of its own.
+void Experiment::refuse_time_dependence(const Sensor& sensor, const Program& delay, const std::string& place) const {
+  const bool of_state = sensor.quantity != "acceleration" && sensor.quantity != "reaction" &&
+                        sensor.quantity != "force" && sensor.quantity != "constraint_violation";
+  if (of_state || (!depends_on_time(scene_) && user_forces_.empty())) return;
+  for (const Unknown& unknown : unknowns_)
+    if (delay.uses(unknown.parameter))
+      throw std::invalid_argument(fmt::format(
+          "{}.delay: depends on '{}', which is fitted, and the sensor '{}' is of the quantity '{}', in a model whose "
+          "drives or forces depend on time; such a delay must be known",
+          place, scene_.parameters[static_cast<std::size_t>(unknown.parameter)].name, sensor.name, sensor.quantity));
+}
+
+void Experiment::compile_channels(const ExperimentSpec& spec, const std::string& place) {
+  if (spec.channels.empty()) throw std::invalid_argument(place + ".channels: is empty; give what was measured");
+  std::vector<std::string> sensors;
+  for (const Sensor& s : scene_.sensors) sensors.push_back(s.name);
+  const Symbols symbols = parameter_symbols(scene_);
+  for (std::size_t c = 0; c < spec.channels.size(); ++c) {
+    const ChannelSpec& channel = spec.channels[c];
+    const std::string at = fmt::format("{}.channels[{}]", place, c);
+    const auto sensor = std::find(sensors.begin(), sensors.end(), channel.sensor);
+    if (sensor == sensors.end())
+      throw std::invalid_argument(fmt::format("{}.sensor: there is no sensor '{}'{}; known: {}", at, channel.sensor,
+                                              did_you_mean(channel.sensor, sensors), joined(sensors)));
+    Channel result;
+    result.sensor = static_cast<int>(sensor - sensors.begin());
+    result.gain = compiled(channel.gain, symbols, at + ".gain");
+    result.bias = compiled(channel.bias, symbols, at + ".bias");
+    result.delay = compiled(channel.delay, symbols, at + ".delay");
+    delayed_ = delayed_ || !channel.delay.is_number() || channel.delay.number() != 0;
+    refuse_time_dependence(scene_.sensors[static_cast<std::size_t>(result.sensor)], result.delay, at);
+    const Program sigma = compiled(channel.sigma, symbols, at + ".sigma");
+    for (const Unknown& unknown : unknowns_)
+      if (sigma.uses(unknown.parameter))
+        throw std::invalid_argument(
+            fmt::format("{}.sigma: depends on '{}', which is fitted; a sigma that is fitted would grow until every "
+                        "residual is small (\"estimate_sigma\": true estimates it from the residuals)",
+                        at, scene_.parameters[static_cast<std::size_t>(unknown.parameter)].name));
+    Program::Scratch scratch;
+    result.sigma = evaluated(sigma, rho_, scratch).value;
+    if (!(result.sigma > 0 && std::isfinite(result.sigma)))
+      throw std::invalid_argument(fmt::format("{}.sigma: is {}, must be above 0", at, result.sigma));
+    channels_.push_back(std::move(result));
+  }
+}
+
+Scene Experiment::simulated() const {
+  Scene scene = scene_;
+  scene.simulation = settings_;
+  for (std::size_t k = 0; k < scene.parameters.size(); ++k)
+    scene.parameters[k].value = rho_(static_cast<Eigen::Index>(k));
+  return scene;
+}
+
+void Experiment::take_samples(const ExperimentSpec& spec, const std::string& place, const CsvTable& data) {
+  if (spec.start_time) settings_.start_time = *spec.start_time;
+  const double start = settings_.start_time, end = spec.end_time.value_or(std::numeric_limits<double>::infinity());
+  if (!(end > start))
+    throw std::invalid_argument(
+        fmt::format("{}.end_time: is {} s, must be after the start at {} s", place, end, start));
+  const std::vector<double>& t = ascending_times(data, spec.time);
+  std::vector<const std::vector<double>*> columns;
+  for (const ChannelSpec& channel : spec.channels) columns.push_back(&data.column(channel.column));
+  for (Channel& channel : channels_) channel.first = start + std::max(0.0, largest_delay(channel.delay));
+  for (std::size_t row = 0; row < t.size(); ++row) {
+    if (t[row] < start || t[row] > end) continue;
+    bool any = false;
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const double measured = (*columns[c])[row];
+      if (t[row] < channels_[c].first) continue;
+      if (std::isnan(measured)) {
+        ++channels_[c].missing;
+        continue;
+      }
+      if (!any) times_.push_back(t[row]);
+      any = true;
+      samples_.push_back({times_.size() - 1, c, measured});
+    }
+  }
+  for (std::size_t c = 0; c < channels_.size(); ++c) {
+    const bool used = std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) { return s.channel == c; });
+    if (!used && channels_[c].first > start)
+      throw std::invalid_argument(fmt::format(
+          "{}.channels[{}].delay: is up to {:.6g} s within the bounds of its parameters; no sample of '{}' comes that "
+          "long after the start at {} s, before which the model does not reach back",
+          place, c, channels_[c].first - start, spec.channels[c].column, start));
+  }
+  if (times_.empty() || !(times_.back() > start))
+    throw std::invalid_argument(
+        fmt::format("{}: {} has no sample after the start at {} s{}", place, data.name, start,
+                    t.empty() ? "" : fmt::format("; its times run from {} to {} s", t.front(), t.back())));
+  settings_.end_time = times_.back();
+  for (std::size_t i = 0; i < samples_.size(); ++i)
+    if (samples_[i].time == first_.size()) first_.push_back(i);
+  first_.push_back(samples_.size());
+}
+
+std::vector<Drive>::const_iterator Experiment::uncovered(double end) const {
+  const double slack = 1e-9 * (end - settings_.start_time);
+  return std::find_if(scene_.drives.begin(), scene_.drives.end(), [&](const Drive& drive) {
+    const std::vector<double>* const times = drive.samples ? &drive.samples->times : nullptr;
+    return times && !times->empty() && (settings_.start_time < times->front() - slack || end > times->back() + slack);
+  });
+}
+
+void Experiment::refuse_short_laws(const ExperimentSpec& spec, const std::string& place) const {
+  const auto drive = uncovered(settings_.end_time);
+  if (drive == scene_.drives.end()) return;
+  std::string path = fmt::format("drives[{}].law", drive - scene_.drives.begin());
+  for (std::size_t i = 0; i < spec.drives.size(); ++i)
+    if (spec.drives[i].drive == drive->name) path = fmt::format("{}.drives[{}].law", place, i);
+  throw std::invalid_argument(
+      fmt::format("{}: its samples go from {:.6g} s to {:.6g} s, the experiment '{}' from {:.6g} s to {:.6g} s; give "
+                  "that an end_time, or a law of its own",
+                  path, drive->samples->times.front(), drive->samples->times.back(), spec.name, settings_.start_time,
+                  settings_.end_time));
+}
+
+Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limits& limits) const {
+  Residuals r;
+  const Eigen::Index N = static_cast<Eigen::Index>(samples_.size());
+  r.z.setZero(N), r.z_u.setZero(N, u.size());
+  Eigen::VectorXd rho = rho_;
+  for (const Unknown& unknown : unknowns_) rho(unknown.parameter) = u(unknown.at);
+
+  struct ChannelNow {
+    Differentiated gain, bias, delay;
+  };
+  std::vector<ChannelNow> now;
+  Program::Scratch scratch;
+  for (const Channel& c : channels_)
+    now.push_back({evaluated(c.gain, rho, scratch), evaluated(c.bias, rho, scratch), evaluated(c.delay, rho, scratch)});
+
+  SimulationSettings settings = settings_;
+  if (limits.max_steps) settings.integrator.max_steps = std::min(settings.integrator.max_steps, *limits.max_steps);
+  TangentSampling sampling;
+  if (!delayed_)
+    sampling.times = times_;
+  else
+    for (const Sample& sample : samples_) {  // each at a time of its own
+      const double t = times_[sample.time] - now[sample.channel].delay.value;
+      if (!std::isfinite(t)) {
+        r.message = fmt::format("the delay of channel {} is not finite", sample.channel);
+        return r;
+      }
+      sampling.times.push_back(std::max(t, settings.start_time));
+      settings.end_time = std::max(settings.end_time, t);
+    }
+
+  if (const auto drive = uncovered(settings.end_time); drive != scene_.drives.end()) {
+    r.message = fmt::format("a negative delay asks for the motion at {:.6g} s, beyond the samples of the drive '{}'",
+                            settings.end_time, drive->name);
+    return r;
+  }
+  try {
+    const std::vector<bool> none(active_.size(), false);
+    const Mechanism mechanism(scene_, rho, limits.derivatives ? active_ : none, user_forces_);
+    Eigen::VectorXd y_bar(mechanism.states()), rho_bar(rho.size());
+    std::size_t seen = 0;
+    const auto take = [&](std::size_t i, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
+      const Sample& sample = samples_[i];
+      const ChannelNow& c = now[sample.channel];
+      y_bar.setZero(), rho_bar.setZero();
+      const double s = mechanism.add_sensor_gradient(channels_[sample.channel].sensor, at, 1, y_bar, rho_bar);
+      const bool held = times_[sample.time] - c.delay.value < settings.start_time;
+      const double sdot = delayed_ && !held && !unknowns_.empty() ? y_bar.dot(*at.ydot) : 0.0;
+      const double sigma = channels_[sample.channel].sigma;
+      const Eigen::Index row = static_cast<Eigen::Index>(i);
+      r.z(row) = (sample.measured - c.gain.value * s - c.bias.value) / sigma;
+      for (const Unknown& unknown : unknowns_) {
+        const int k = unknown.parameter;
+        const double s_u = y_bar.dot(y_rho.col(k)) - sdot * c.delay.rho_bar(k) + rho_bar(k);
+        r.z_u(row, unknown.at) = -(c.gain.value * s_u + s * c.gain.rho_bar(k) + c.bias.rho_bar(k)) / sigma;
+      }
+      ++seen;
+    };
+    sampling.observe = [&](std::size_t k, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
+      if (delayed_) return take(k, at, y_rho);
+      for (std::size_t i = first_[k]; i < first_[k + 1]; ++i) take(i, at, y_rho);
+    };
+    RunOptions options;
+    options.progress = limits.progress;
+    const SimulationResult result = simulate_tlm(mechanism, settings, {}, sampling, options);
+    r.steps = result.statistics.steps, r.jumps = result.statistics.jumps;
+    r.ok = result.ok() && seen == samples_.size();
+    r.message = result.message;
+  } catch (const SceneError& error) {  // a field that these values drive out of its range
+    r.message = error.what();
+  }
+  return r;
+}
+
+}  // namespace mbsopt

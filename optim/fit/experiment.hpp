@@ -1,0 +1,109 @@
+// One experiment: what was measured, and the simulation that explains it. Turns values of the unknowns into residuals
+// and their exact Jacobian by one tangent-linear run from its start time to its last sample.
+//
+//   z = (measured - gain s(t - delay) - bias)/sigma
+//   dz/du = -(gain (s_y (y_u - ydot delay_u) + s_rho rho_u) + s gain_u + bias_u)/sigma        sigma: constant in u
+//
+// y, y_u and ydot are the dense output, its derivative in u and in time. Before the start the mechanism stays as it is
+// there; rows that a delay within its bounds could take there are left out.
+//
+//   const Experiment run1(scene, spec, table, {{"k1", 0}, {"theta0", 1}});   // parameter and number of the unknown
+//   Experiment::Residuals r = run1.residuals(u);
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/expression/program.hpp"
+#include "core/simulate/simulation.hpp"
+#include "optim/problem/csv_table.hpp"
+#include "optim/problem/problem.hpp"
+
+namespace mbsopt {
+
+struct UserForce;
+
+struct ExperimentLimits {
+  std::function<bool(double t)> progress;  // after accepted steps; false stops
+  std::optional<long> max_steps;           // instead of the simulation's
+  bool derivatives = true;                 // else z_u has no meaning
+};
+
+class Experiment {
+ public:
+  struct Unknown {
+    int parameter;    // index in the scene
+    Eigen::Index at;  // place in the vector of unknowns
+  };
+  struct Sample {
+    std::size_t time;  // index in times()
+    std::size_t channel;
+    double measured;
+  };
+  struct Residuals {
+    bool ok = false;
+    std::string message;      // why not
+    Eigen::VectorXd z;        // per sample
+    Eigen::MatrixXd z_u;      // sample x all unknowns
+    long steps = 0;           // of the simulation
+    std::vector<Jump> jumps;  // of it
+  };
+
+  // rho: values of parameters that are not unknown here (overrides are applied on top). Throws std::invalid_argument
+  // and CsvError with the place: "identification.experiments[0].channels[1].sigma: ...".
+  Experiment(const Scene& scene, const ExperimentSpec& spec, std::string place, const CsvTable& data,
+             const Eigen::VectorXd& rho, std::vector<Unknown> unknowns,
+             std::vector<std::shared_ptr<const UserForce>> user_forces = {});
+
+  using Limits = ExperimentLimits;
+  Residuals residuals(const Eigen::VectorXd& u, const Limits& limits = {}) const;
+
+  // What is simulated, as a scene: with its laws and its span, at the values that are not unknown and those at which
+  // the unknown ones start.
+  Scene simulated() const;
+
+  const std::vector<double>& times() const { return times_; }
+  const std::vector<Sample>& samples() const { return samples_; }  // by time, then channel
+  std::size_t channels() const { return channels_.size(); }
+  double sigma(std::size_t channel) const { return channels_[channel].sigma; }
+  void set_sigma(std::size_t channel, double sigma) { channels_[channel].sigma = sigma; }
+  std::size_t missing(std::size_t channel) const { return channels_[channel].missing; }
+  double start_time() const { return settings_.start_time; }
+  double end_time() const { return settings_.end_time; }
+
+ private:
+  struct Channel {
+    int sensor = 0;
+    Program gain, bias, delay;  // inputs: all parameters
+    double sigma = 1;
+    double first = 0;  // samples before are left out [s]
+    std::size_t missing = 0;
+  };
+  void replace_laws(const ExperimentSpec& spec, const std::string& place);
+  void compile_channels(const ExperimentSpec& spec, const std::string& place);
+  // The largest delay that the bounds of the unknowns allow, where they say; else at their start values, rho.
+  double largest_delay(const Program& delay) const;
+  void refuse_time_dependence(const Sensor& sensor, const Program& delay, const std::string& place) const;
+  void take_samples(const ExperimentSpec& spec, const std::string& place, const CsvTable& data);
+  // The first drive whose sampled law ends before `end` or begins after the start; end() where all reach.
+  std::vector<Drive>::const_iterator uncovered(double end) const;
+  void refuse_short_laws(const ExperimentSpec& spec, const std::string& place) const;
+
+  Scene scene_;
+  SimulationSettings settings_;
+  Eigen::VectorXd rho_;
+  std::vector<Unknown> unknowns_;
+  std::vector<bool> active_;
+  std::vector<std::shared_ptr<const UserForce>> user_forces_;
+  std::vector<Channel> channels_;
+  std::vector<double> times_;  // at which something was measured
+  std::vector<Sample> samples_;
+  std::vector<std::size_t> first_;  // sample of each time, and the end
+  bool delayed_ = false;            // some channel has a delay
+};
+
+}  // namespace mbsopt

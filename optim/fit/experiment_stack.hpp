@@ -1,0 +1,69 @@
+// The least-squares problem of an identification: the residuals of its experiments one below the other, then one
+// residual per prior, in the scaled variables of variable_scaling.hpp.
+//
+//   z = [ z_1; z_2; ...; (u_k - mean_k)/sigma_k for each unknown with a prior ]
+//
+// The loss does not see priors. A value free in several experiments has its prior in each.
+//
+//   ExperimentStack stack(std::move(experiments), unknowns, scaling, spec.loss);
+//   LeastSquaresResult fit = solve_with_ceres(stack, scaling.to_x(start_of(unknowns)));
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "optim/fit/unknown_parameters.hpp"
+#include "optim/solver/least_squares.hpp"
+
+namespace mbsopt {
+
+// Residuals that were computed in an earlier run, and a place where new ones are written down: a fit that was killed
+// goes on from there.
+struct ResidualRecords {
+  struct Asked {
+    std::size_t experiment;  // in the identification
+    const Eigen::VectorXd& u;
+    std::vector<double> sigma;  // per channel
+  };
+  virtual ~ResidualRecords() = default;
+  virtual bool recall(const Asked& asked, Experiment::Residuals& found) = 0;
+  virtual void record(const Asked& asked, const Experiment::Residuals& found) = 0;  // that are ok
+};
+
+class ExperimentStack : public LeastSquaresProblem {
+ public:
+  struct Member {
+    std::size_t experiment;  // in the identification
+    Experiment model;
+    long most_steps = 0;  // of a simulation that went well
+  };
+
+  // scaling must outlive it.
+  ExperimentStack(std::vector<Member> members, const std::vector<UnknownParameter>& unknowns,
+                  const VariableScaling& scaling, const Loss& fit_loss);
+
+  void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) override;
+
+  std::vector<Member>& members() { return members_; }
+  const std::vector<Member>& members() const { return members_; }
+  const VariableScaling& scaling() const { return scaling_; }
+  Eigen::Index samples() const { return size - plain; }
+  Eigen::VectorXd measured() const, sigma() const;  // per sample
+  long simulations() const { return simulations_; }
+  std::function<bool(double t)> go_on;  // within a simulation; false abandons it
+  ResidualRecords* records = nullptr;
+
+ private:
+  struct Prior {
+    Eigen::Index at;
+    double mean, sigma;
+  };
+  Experiment::Residuals residuals(const Member& member, const Eigen::VectorXd& u);
+
+  std::vector<Member> members_;
+  const VariableScaling& scaling_;
+  std::vector<Prior> priors_;
+  long simulations_ = 0;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,91 @@
+#include "optim/fit/fit_comparison.hpp"
+
+#include <fmt/format.h>
+
+#include "core/simulate/simulation_warnings.hpp"
+#include "optim/differences/difference_comparison.hpp"
+#include "optim/fit/unknown_parameters.hpp"
+#include "optim/objective/integration_error.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+
+struct Fitted {
+  std::vector<Experiment> experiments;
+
+  Fitted(const Scene& scene, const Problem& problem, const std::vector<CsvTable>& data,
+         const std::vector<UnknownParameter>& unknowns, const FitComparisonOptions& options) {
+    const IdentificationSpec& spec = *problem.identification;
+    for (std::size_t e = 0; e < spec.experiments.size(); ++e)
+      if (!spec.experiments[e].validate)
+        experiments.emplace_back(scene, spec.experiments[e], fmt::format("identification.experiments[{}]", e), data[e],
+                                 parameter_values(scene), unknowns_in(scene, spec, e, unknowns), options.user_forces);
+  }
+
+  // All residuals, one experiment below the other; derivatives where z_u is given.
+  bool residuals(const Eigen::VectorXd& u, Experiment::Limits limits, Eigen::VectorXd& z, Eigen::MatrixXd* z_u,
+                 std::vector<Jump>* jumps = nullptr) const {
+    limits.derivatives = z_u != nullptr;
+    std::vector<Experiment::Residuals> of;
+    Index rows = 0;
+    for (const Experiment& experiment : experiments) {
+      of.push_back(experiment.residuals(u, limits));
+      if (!of.back().ok) return false;
+      rows += of.back().z.size();
+    }
+    z.resize(rows);
+    if (z_u) z_u->resize(rows, u.size());
+    Index row = 0;
+    for (const Experiment::Residuals& r : of) {
+      z.segment(row, r.z.size()) = r.z;
+      if (z_u) z_u->middleRows(row, r.z.size()) = r.z_u;
+      if (jumps) jumps->insert(jumps->end(), r.jumps.begin(), r.jumps.end());
+      row += r.z.size();
+    }
+    return true;
+  }
+};
+
+}  // namespace
+
+std::vector<std::string> doubts_about_fit(const Problem& problem, const std::vector<CsvTable>& data,
+                                          const FitComparisonOptions& options) {
+  const IdentificationSpec& spec = *problem.identification;
+  const std::vector<UnknownParameter> unknowns = unknowns_of_fit(problem.scene, spec);
+  const std::vector<std::string> names = names_of(unknowns, spec);
+  const Fitted fitted(problem.scene, problem, data, unknowns, options);
+  bool abandoned = false;
+  Experiment::Limits limits;
+  if (options.progress)
+    limits.progress = [&](double t) { return abandoned = abandoned || !options.progress(t), !abandoned; };
+  const Eigen::VectorXd u = start_of(unknowns);
+
+  DifferenceComparison comparison;
+  SimulationStatistics statistics;
+  if (!fitted.residuals(u, limits, comparison.f, &comparison.f_rho, &statistics.jumps)) return {};
+  Scene scene = problem.scene;
+  scene.simulation = {};  // whose other warnings are said elsewhere
+  std::vector<std::string> said = simulation_warnings(scene, statistics);
+
+  for (std::size_t k = 0; k < unknowns.size(); ++k)
+    comparison.variables.push_back(compared_variable(names[k], unknowns[k].description));
+  comparison.groups = {{"the residuals", 0, comparison.f.size()}};
+  comparison.go_on = [&] { return !abandoned; };
+  comparison.at = [&](std::size_t k, double h) -> std::optional<Eigen::VectorXd> {
+    Eigen::VectorXd moved = u, z;
+    moved(static_cast<Index>(k)) += h;
+    if (!fitted.residuals(moved, limits, z, nullptr)) return std::nullopt;
+    return z;
+  };
+  comparison.tighter = [&](Eigen::VectorXd& z, Eigen::MatrixXd& z_u) {
+    const std::optional<Scene> tight = with_other_tolerances(problem.scene);
+    return tight && Fitted(*tight, problem, data, unknowns, options).residuals(u, limits, z, &z_u);
+  };
+  const std::vector<std::string> differences = comparison.warnings();
+  said.insert(said.end(), differences.begin(), differences.end());
+  return abandoned ? std::vector<std::string>{} : said;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,98 @@
+// What an identification finds: parameters, how well each channel is explained, residuals, the way there.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "optim/fit/residual_analysis.hpp"
+#include "optim/fit/statistics.hpp"
+#include "optim/problem/problem.hpp"
+#include "optim/solver/least_squares.hpp"
+
+namespace mbsopt {
+
+struct FittedParameter {
+  std::string name;        // "k1", or "run1.theta0" where it is free in an experiment
+  std::string parameter;   // in the scene
+  std::string experiment;  // empty where shared
+  std::string unit;
+  double initial = 0, value = 0;
+  std::optional<double> lower, upper;
+  std::optional<Prior> prior;
+  bool at_lower = false, at_upper = false;     // then its std_error, computed as if it were free, says little
+  double std_error = FitStatistics::kUnknown;  // infinite where the data do not determine it
+  double ci95[2] = {FitStatistics::kUnknown, FitStatistics::kUnknown};
+};
+
+struct ChannelFit {
+  std::string column, sensor;
+  std::size_t samples = 0, missing = 0;  // used, and empty cells among its rows
+  double rms = 0;                        // of measured - model, in the column's units
+  double rms_scaled = 0;                 // of z
+  double sigma = 1;
+  bool sigma_is_estimated = false;  // not yet where the fit was stopped before
+  ResidualAnalysis analysis;        // of z
+  std::size_t beyond_scale = 0;  // samples with |z| above the scale of the loss, which count for less than their square
+};
+
+struct ExperimentFit {
+  std::string name;
+  bool validate = false;
+  double start_time = 0, end_time = 0;  // of its simulation [s]
+  std::size_t samples = 0;
+  double rms = 0;  // of measured - model over all its channels, in the columns' units
+  std::vector<ChannelFit> channels;
+  std::vector<FittedParameter> refitted;  // validate: its free parameters
+  std::string message;                    // validate: how the refit ended
+};
+
+// A row of residuals.csv.
+struct ResidualRow {
+  std::size_t experiment = 0, channel = 0;
+  double t = 0, measured = 0, model = 0;
+  double scaled = 0;  // z
+};
+
+// One iteration of the solver.
+struct FitRow {
+  int iteration = 0;
+  double cost = 0;             // what is minimised, by the loss and the sigmas of this iteration
+  double gradient_norm = 0;    // largest entry, of the scaled variables
+  double step_norm = 0;        // of the scaled variables
+  Eigen::VectorXd parameters;  // in the order of IdentificationResult::parameters
+};
+
+struct ParameterProfile {
+  struct Point {
+    double value = 0, cost = 0, tau = 0;
+    Eigen::VectorXd parameters;  // all, in the order of IdentificationResult::parameters
+  };
+  std::string name;                    // "k1", "run1.theta0"
+  std::vector<Point> points;           // by rising value
+  std::optional<double> lower, upper;  // of the 95 % interval
+  std::string below, above;            // why there is none
+};
+
+struct IdentificationResult {
+  SolverStatus status = SolverStatus::failed;
+  std::string message;  // in words, always
+  std::vector<FittedParameter> parameters;
+  FitStatistics statistics;  // in the order of parameters
+  std::vector<ExperimentFit> experiments;
+  std::vector<ResidualRow> residuals;  // by experiment, time, channel
+  std::vector<FitRow> history;
+  std::vector<ParameterProfile> profiles;
+  double cost_initial = 0, cost_final = 0;  // what is minimised, both by the loss and the sigmas of the end
+  std::vector<std::string> warnings;        // sentences, some after the path of what they are about
+  std::size_t samples = 0;                  // fitted
+  int iterations = 0;
+  long evaluations = 0, failed_evaluations = 0;  // points at which all experiments were simulated, with derivatives
+  long simulations = 0;
+  double wall_seconds = 0;
+  bool ok() const { return status == SolverStatus::converged || status == SolverStatus::no_progress; }
+};
+
+}  // namespace mbsopt

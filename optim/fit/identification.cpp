@@ -1,0 +1,374 @@
+#include "optim/fit/identification.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+
+#include "core/expression/counted.hpp"
+#include "core/expression/did_you_mean.hpp"
+#include "optim/fit/angle_doubts.hpp"
+#include "optim/fit/experiment_stack.hpp"
+#include "optim/fit/profile_likelihood.hpp"
+#include "optim/fit/scored_experiment.hpp"
+#include "optim/fit/sigma_estimation.hpp"
+#include "optim/machine/stopwatch.hpp"
+#include "optim/problem/parameter_values.hpp"
+#include "optim/problem/unused_parameters.hpp"
+#include "optim/solver/ceres_solver.hpp"
+
+namespace mbsopt {
+namespace {
+
+// What is the same by the physics, such as a late clock and an early start, differs by a few tolerances of the
+// integration in the numbers. Measured: 1/condition of that pair is 0.3 to 8 times rtol at 1e-5 to 1e-8.
+constexpr double kTolerances = 10, kLeastAccuracy = 1e-5;
+constexpr double kTouches = 1e-9;  // of the bound's size: the trust region puts solutions exactly on bounds
+
+std::string place_of(std::size_t experiment) { return fmt::format("identification.experiments[{}]", experiment); }
+
+class Identification {
+ public:
+  Identification(const Problem& problem, const std::vector<CsvTable>& data, const IdentificationOptions& options)
+      : scene_(problem.scene), spec_(checked(problem, data)), data_(data), options_(options) {
+    if (options.simulation_progress)
+      go_on_ = [this](double t) { return abandoned_ = abandoned_ || !options_.simulation_progress(t), !abandoned_; };
+  }
+
+  IdentificationResult run() {
+    const Stopwatch stopwatch;
+    fit();
+    const bool usable = result_.status != SolverStatus::failed;
+    for (std::size_t e = 0; e < spec_.experiments.size(); ++e)
+      if (spec_.experiments[e].validate && usable && !abandoned_) validate(e);
+    order_residuals();
+    result_.wall_seconds = stopwatch.seconds();
+    return std::move(result_);
+  }
+
+ private:
+  static const IdentificationSpec& checked(const Problem& problem, const std::vector<CsvTable>& data) {
+    if (!problem.identification) throw std::invalid_argument("identification: is missing");
+    const IdentificationSpec& spec = *problem.identification;
+    if (spec.experiments.empty()) throw std::invalid_argument("identification.experiments: is empty");
+    if (data.size() != spec.experiments.size())
+      throw std::invalid_argument(fmt::format("identification.experiments: {}, but {} of data",
+                                              counted(spec.experiments.size(), "experiment"),
+                                              counted(data.size(), "table")));
+    for (std::size_t e = 0; e < spec.experiments.size(); ++e)
+      for (std::size_t d = 0; d < e; ++d)
+        if (spec.experiments[d].name == spec.experiments[e].name)
+          throw std::invalid_argument(
+              fmt::format("{}.name: '{}' is taken already", place_of(e), spec.experiments[e].name));
+    if (std::all_of(spec.experiments.begin(), spec.experiments.end(), [](const auto& e) { return e.validate; }))
+      throw std::invalid_argument("identification.experiments: all of them validate, none is fitted");
+    return spec;
+  }
+
+  // Of the samples and the priors at a solution, in the parameters.
+  FitStatistics statistics_at(const LeastSquaresResult& solution, const ExperimentStack& stack,
+                              const std::vector<UnknownParameter>& unknowns) const {
+    const Eigen::VectorXd u_x = stack.scaling().rho_x(solution.x);
+    const Eigen::MatrixXd J = solution.point.z_x * u_x.cwiseInverse().asDiagonal();
+    FitData data;
+    data.J = J.topRows(stack.samples()), data.J_prior = J.bottomRows(stack.plain);
+    data.z = solution.point.z.head(stack.samples());
+    data.rho = stack.scaling().to_rho(solution.x);
+    data.names = names_of(unknowns, spec_);
+    for (const UnknownParameter& u : unknowns) data.units.push_back(u.description.unit);
+    data.loss = spec_.loss, data.sigma_is_known = spec_.sigma_is_known;
+    data.change = u_x.cwiseAbs();
+    data.record = stack.measured().cwiseQuotient(stack.sigma()).norm();
+    const IntegratorSettings& integrator = scene_.simulation.integrator;
+    if (!integrator.step) data.accuracy = std::min(kTolerances * integrator.rtol, kLeastAccuracy);
+    FitStatistics statistics = fit_statistics(data);
+    const bool ended = solution.status == SolverStatus::converged || solution.status == SolverStatus::no_progress;
+    if (abandoned_ || !ended)
+      withhold_errors(statistics, "they hold at a minimum, and the fit ended before it reached one");
+    return statistics;
+  }
+
+  std::vector<FittedParameter> described(const std::vector<UnknownParameter>& unknowns, const Eigen::VectorXd& values,
+                                         const FitStatistics& statistics) const {
+    std::vector<FittedParameter> fitted;
+    for (std::size_t i = 0; i < unknowns.size(); ++i) {
+      const UnknownParameter& u = unknowns[i];
+      const Parameter& p = u.description;
+      const Eigen::Index k = static_cast<Eigen::Index>(i);
+      FittedParameter f;
+      f.name = name_of(u, spec_), f.parameter = p.name, f.unit = p.unit;
+      if (!u.shared) f.experiment = spec_.experiments[u.experiment].name;
+      f.initial = p.value, f.value = values(k), f.lower = p.lower, f.upper = p.upper, f.prior = p.prior;
+      auto touches = [&](const std::optional<double>& bound) {
+        return bound && std::abs(f.value - *bound) <= kTouches * std::max(std::abs(*bound), std::abs(p.value));
+      };
+      f.at_lower = touches(p.lower), f.at_upper = touches(p.upper);
+      if (statistics.std_error.size() > k) {
+        f.std_error = statistics.std_error(k);
+        f.ci95[0] = statistics.ci95(k, 0), f.ci95[1] = statistics.ci95(k, 1);
+      }
+      fitted.push_back(std::move(f));
+    }
+    return fitted;
+  }
+
+  CeresOptions solver_options() const {
+    CeresOptions solver;
+    solver.tolerance = spec_.tolerance;
+    solver.max_iterations = spec_.max_iterations;
+    return solver;
+  }
+
+  ExperimentStack::Member member(std::size_t e, const Eigen::VectorXd& rho,
+                                 const std::vector<UnknownParameter>& unknowns) const {
+    return {e, Experiment(scene_, spec_.experiments[e], place_of(e), data_[e], rho,
+                          unknowns_in(scene_, spec_, e, unknowns), options_.user_forces)};
+  }
+
+  // of_fit: its iterations are those of the result.
+  LeastSquaresResult minimised(ExperimentStack& stack, const Eigen::VectorXd& x, bool of_fit) {
+    CeresOptions solver = solver_options();
+    if (!of_fit) return solve_with_ceres(stack, x, solver);
+    const Eigen::VectorXd sigma = stack.sigma();
+    const int before = result_.iterations;
+    solver.progress = [&](const LeastSquaresProgress& p) {
+      result_.history.push_back(
+          {before + p.iteration, p.cost, p.gradient_norm, p.step_norm, stack.scaling().to_rho(p.x)});
+      return !options_.progress || options_.progress(result_.history.back());
+    };
+    LeastSquaresResult solution = solve_with_ceres(stack, x, solver);
+    if (apart_at_start_.size() == 0 && solution.z_initial.size() > 0) {
+      apart_at_start_ = solution.z_initial;
+      apart_at_start_.head(stack.samples()).array() *= sigma.array();
+    }
+    result_.iterations += solution.iterations;
+    result_.evaluations += solution.evaluations, result_.failed_evaluations += solution.failed_evaluations;
+    return solution;
+  }
+
+  // The estimate under a loss, with the sigmas that it estimates.
+  LeastSquaresResult estimate(ExperimentStack& stack, const Loss& loss, const Eigen::VectorXd& x, bool of_fit) {
+    stack.loss = loss;
+    LeastSquaresResult solution = minimised(stack, x, of_fit);
+    if (!of_fit || !estimates_sigma(spec_)) return solution;
+    for (int round = 0; solution.status == SolverStatus::converged; ++round) {
+      const SigmaEstimates sigmas = estimated_sigmas(stack, spec_, solution.point.z);
+      sigmas_are_estimated_ = sigmas.change < kSigmaChange || round == kSigmaRounds;
+      if (sigmas.change < kSigmaChange) break;
+      if (round == kSigmaRounds) {
+        solution.message += fmt::format("; estimated sigmas still change by {:.1g} of themselves", sigmas.change);
+        break;
+      }
+      use_sigmas(stack, sigmas);
+      solution = minimised(stack, solution.x, of_fit);
+    }
+    return solution;
+  }
+
+  // The residuals of the start, by the sigmas of the end.
+  Eigen::VectorXd z_of_start(const ExperimentStack& stack) const {
+    Eigen::VectorXd z = apart_at_start_;
+    z.head(stack.samples()).array() /= stack.sigma().array();
+    return z;
+  }
+
+  // A loss without pull far out has a minimum wherever all samples are far out.
+  void refuse_without_pull(const ExperimentStack& stack, const LeastSquaresResult& solution) {
+    if (!result_.ok()) return;
+    const Eigen::VectorXd& z = solution.point.z;
+    const Eigen::Index pulling =
+        std::count_if(z.begin(), z.begin() + stack.samples(), [&](double x) { return stack.loss.at(x * x).rho1 > 0; });
+    if (pulling + stack.plain >= stack.variables()) return;
+    result_.status = SolverStatus::failed;
+    result_.message = fmt::format(
+        "{} of {} lie within the scale of the loss ({:g} sigma), beyond which a sample has no pull; they "
+        "cannot determine {}. Is sigma too small, or are these other data than the model's?",
+        pulling, counted(stack.samples(), "sample"), stack.loss.s(), counted(stack.variables(), "parameter"));
+  }
+
+  void warn_of(const ExperimentStack& stack, const LeastSquaresResult& solution) {
+    for (const std::string& name : spec_.variables)
+      for (const Parameter& p : scene_.parameters)
+        if (p.name == name && is_held(p))
+          result_.warnings.push_back(fmt::format(
+              "parameters.{}.lower: is {}, as is the upper bound: it stays there and is not fitted", name, *p.lower));
+    if (solution.point.z.size() == 0) return;
+    if (result_.status == SolverStatus::no_progress)
+      result_.warnings.push_back(
+          "the fit ended without reaching a minimum, since no step lowered the cost: standard errors and intervals "
+          "hold at a minimum, and may be wrong here");
+    if (estimates_sigma(spec_) && !sigmas_are_estimated_)
+      result_.warnings.push_back("the fit ended before the sigmas were estimated");
+    const Eigen::VectorXd z = solution.point.z.head(stack.samples());
+    const Eigen::Index beyond = (z.array().abs() > stack.loss.s()).count();
+    if (2 * beyond > stack.samples())
+      result_.warnings.push_back(fmt::format(
+          "identification.loss: {} of {} lie beyond its scale, {:g} sigma: these are no outliers. Sigma is too small, "
+          "the model is wrong, or the fit ended in another minimum",
+          beyond, counted(stack.samples(), "sample"), stack.loss.s()));
+    for (std::string& doubt : angle_doubts(scene_, spec_, stack, z_of_start(stack), z))
+      result_.warnings.push_back(std::move(doubt));
+  }
+
+  // Tukey's loss has no pull far out, so that a start there would find nothing: Huber's estimate comes first.
+  LeastSquaresResult solved(ExperimentStack& stack, const Eigen::VectorXd& start, bool of_fit = true) {
+    if (spec_.loss.type != LossType::tukey) return estimate(stack, spec_.loss, start, of_fit);
+    LeastSquaresResult first = estimate(stack, {LossType::huber}, start, of_fit);
+    if (first.status == SolverStatus::failed || first.status == SolverStatus::stopped) return first;
+    return estimate(stack, spec_.loss, first.x, of_fit);
+  }
+
+  void fit() {
+    const std::vector<UnknownParameter> unknowns = unknowns_of_fit(scene_, spec_);
+    const VariableScaling scaling = scaling_of(unknowns);
+    std::vector<ExperimentStack::Member> members;
+    for (std::size_t e = 0; e < spec_.experiments.size(); ++e)
+      if (!spec_.experiments[e].validate) members.push_back(member(e, parameter_values(scene_), unknowns));
+    ExperimentStack stack(std::move(members), unknowns, scaling, spec_.loss);
+    stack.go_on = go_on_, stack.records = options_.records;
+    if (stack.size < stack.variables())
+      throw std::invalid_argument(fmt::format("identification: {} cannot determine {}",
+                                              counted(stack.samples(), "sample"),
+                                              counted(stack.variables(), "parameter")));
+    const std::vector<Eigen::Index> profiled = profiled_unknowns(unknowns);
+    const LeastSquaresResult solution = solved(stack, scaling.to_x(start_of(unknowns)));
+    result_.status = abandoned_ ? SolverStatus::stopped : solution.status;
+    result_.message = abandoned_ ? "stopped on request" : solution.message;
+    result_.cost_final = solution.cost_final;
+    if (apart_at_start_.size() > 0) result_.cost_initial = stack.cost(z_of_start(stack));
+    result_.samples = static_cast<std::size_t>(stack.samples());
+    result_.experiments.resize(spec_.experiments.size());
+    const Eigen::VectorXd values = scaling.to_rho(solution.x);
+    const bool usable = solution.point.z.size() > 0;
+    if (usable) refuse_without_pull(stack, solution);
+    if (usable) result_.statistics = statistics_at(solution, stack, unknowns);
+    warn_of(stack, solution);
+    result_.parameters = described(unknowns, values, result_.statistics);
+    shared_ = parameter_values(scene_);
+    for (std::size_t i = 0; i < unknowns.size(); ++i)
+      if (unknowns[i].shared) shared_(unknowns[i].parameter) = values(static_cast<Eigen::Index>(i));
+    if (usable) score_all(stack, solution.point.z, sigmas_are_estimated_);
+    if (result_.status == SolverStatus::converged)
+      for (const Eigen::Index k : profiled)
+        if (!abandoned_) result_.profiles.push_back(profile_of(stack, k, solution.x));
+    if (abandoned_) result_.status = SolverStatus::stopped, result_.message = "stopped on request";
+    result_.simulations += stack.simulations();
+  }
+
+  std::vector<Eigen::Index> profiled_unknowns(const std::vector<UnknownParameter>& unknowns) const {
+    const std::vector<std::string> names = names_of(unknowns, spec_);
+    std::vector<Eigen::Index> indices;
+    for (const std::string& name : options_.profiles) {
+      const auto found = std::find(names.begin(), names.end(), name);
+      if (found == names.end())
+        throw std::invalid_argument(fmt::format("--profile: '{}' is not fitted{}; fitted are {}", name,
+                                                did_you_mean(name, names), joined(names)));
+      indices.push_back(found - names.begin());
+    }
+    return indices;
+  }
+
+  ParameterProfile profile_of(ExperimentStack& stack, Eigen::Index k, const Eigen::VectorXd& x) {
+    const FitStatistics& s = result_.statistics;
+    ProfileOptions options;
+    options.variable = k;
+    // Where the linear model has no opinion, a hundredth of the variable.
+    const double std_error = s.std_error(k) / std::abs(stack.scaling().rho_x(x)(k));
+    const bool sensible = std::isfinite(std_error) && std_error > 0;
+    options.first_step = sensible ? 0.5 * std_error : 0.01 * std::max(1.0, std::abs(x(k)));
+    options.likelihood_scale = s.likelihood_scale, options.quantile = s.quantile;
+    options.solver = solver_options();
+    ParameterProfile profile{result_.parameters[static_cast<std::size_t>(k)].name, {}, {}, {}, "", ""};
+    if (!(s.likelihood_scale > 0) || !std::isfinite(s.likelihood_scale) || !std::isfinite(s.quantile)) {
+      profile.below = profile.above = "the residuals have no variance to measure it by";
+      return profile;
+    }
+    const auto value_at = [&](double x_k) {
+      Eigen::VectorXd at = x;
+      at(k) = x_k;
+      return stack.scaling().to_rho(at)(k);
+    };
+    options.progress = [&](const ProfilePoint& p) {
+      if (abandoned_) return false;
+      const bool go_on = !options_.profile_progress || options_.profile_progress(profile.name, value_at(p.x), p.tau);
+      abandoned_ = !go_on;
+      return go_on;
+    };
+    const Profile found = profile_likelihood(stack, x, options);
+    for (const ProfilePoint& p : found.points)
+      profile.points.push_back({value_at(p.x), p.cost, p.tau, stack.scaling().to_rho(p.variables)});
+    if (found.lower) profile.lower = value_at(*found.lower);
+    if (found.upper) profile.upper = value_at(*found.upper);
+    profile.below = found.below, profile.above = found.above;
+    return profile;
+  }
+
+  // Its free parameters refitted, the shared ones fixed.
+  void validate(std::size_t e) {
+    const std::vector<UnknownParameter> unknowns = free_in(scene_, spec_, e);
+    const VariableScaling scaling = scaling_of(unknowns);
+    std::vector<ExperimentStack::Member> members;
+    members.push_back(member(e, shared_, unknowns));
+    ExperimentStack stack(std::move(members), unknowns, scaling, spec_.loss);
+    stack.go_on = go_on_;
+    ExperimentFit& scored = result_.experiments[e];
+    Eigen::VectorXd z;
+    if (unknowns.empty()) {
+      LeastSquaresPoint point;
+      point.z.setZero(stack.size), point.z_x.setZero(stack.size, 0);
+      stack.evaluate(Eigen::VectorXd(), point);
+      scored.message = point.ok ? "simulated" : "could not be simulated: " + point.message;
+      if (point.ok) z = point.z;
+    } else {
+      const LeastSquaresResult solution = solved(stack, scaling.to_x(start_of(unknowns)), false);
+      scored.message = "refitted, " + solution.message;
+      scored.refitted =
+          described(unknowns, scaling.to_rho(solution.x),
+                    solution.point.z.size() > 0 ? statistics_at(solution, stack, unknowns) : FitStatistics());
+      z = solution.point.z;
+    }
+    if (z.size() > 0) score_all(stack, z, false);
+    result_.simulations += stack.simulations();
+  }
+
+  void score_all(ExperimentStack& stack, const Eigen::VectorXd& z, bool estimated) {
+    Eigen::Index row = 0;
+    for (const ExperimentStack::Member& m : stack.members()) {
+      const Eigen::Index n = static_cast<Eigen::Index>(m.model.samples().size());
+      score_experiment(spec_.experiments[m.experiment], m.model, spec_.loss, z.segment(row, n), estimated, m.experiment,
+                       result_.experiments[m.experiment], result_.residuals);
+      row += n;
+    }
+  }
+
+  void order_residuals() {
+    std::stable_sort(result_.residuals.begin(), result_.residuals.end(),
+                     [](const ResidualRow& a, const ResidualRow& b) { return a.experiment < b.experiment; });
+    for (std::size_t e = 0; e < result_.experiments.size(); ++e) {  // also those that could not be scored
+      result_.experiments[e].name = spec_.experiments[e].name;
+      result_.experiments[e].validate = spec_.experiments[e].validate;
+    }
+  }
+
+  const Scene& scene_;
+  const IdentificationSpec& spec_;
+  const std::vector<CsvTable>& data_;
+  const IdentificationOptions& options_;
+  IdentificationResult result_;
+  std::function<bool(double t)> go_on_;
+  bool abandoned_ = false, sigmas_are_estimated_ = false;
+  Eigen::VectorXd apart_at_start_;  // measured - model, then the residuals of the priors
+  Eigen::VectorXd shared_;          // all parameters, the shared ones as fitted
+};
+
+}  // namespace
+
+IdentificationResult run_identification(const Problem& problem, const std::vector<CsvTable>& data,
+                                        const IdentificationOptions& options) {
+  const Problem needed = what_measurements_need(problem);
+  return Identification(needed, data, options).run();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,150 @@
+#include "optim/fit/statistics.hpp"
+
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "optim/fit/determined_combinations.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity(), kNaN = std::numeric_limits<double>::quiet_NaN();
+// Singular values below this part of the largest: exact derivatives of a simulation carry errors of about 1e-12, and a
+// combination 1e8 times less certain than the best one is of no use.
+constexpr double kRankTolerance = 1e-8;
+// Of the record: exact derivatives carry rounding errors of about 1e-12 of what is measured; a margin of 100 above.
+constexpr double kNoInfluence = 1e-10;
+
+double quantile_975(long degrees_of_freedom, bool sigma_is_known) {
+  if (sigma_is_known) return boost::math::quantile(boost::math::normal(), 0.975);
+  if (degrees_of_freedom < 1) return kInfinity;
+  return boost::math::quantile(boost::math::students_t(static_cast<double>(degrees_of_freedom)), 0.975);
+}
+
+struct Variances {
+  double variance, likelihood_scale;
+};
+
+// psi = rho1 z, psi_z = rho1 + 2 z^2 rho2. The likelihood's scale is mean(psi^2)/mean(psi_z), by which twice the rise
+// of the cost is about chi^2: Hampel, Ronchetti, Rousseeuw and Stahel, "Robust Statistics" (1986), section 7.2. For the
+// square both are s^2.
+Variances variances(const FitData& data, long degrees_of_freedom, double s2) {
+  if (data.loss.type == LossType::squared) return {data.sigma_is_known ? 1 : s2, data.sigma_is_known ? 1 : s2};
+  const double N = static_cast<double>(data.z.size()), P = static_cast<double>(data.rho.size());
+  if (degrees_of_freedom < 1) return {s2, s2};
+  double squares = 0, slope = 0, slope_squares = 0;
+  for (const double z : data.z) {
+    const LossValue v = data.loss.at(z * z);
+    const double psi_z = v.rho1 + 2 * z * z * v.rho2;
+    squares += v.rho1 * v.rho1 * z * z, slope += psi_z, slope_squares += psi_z * psi_z;
+  }
+  slope /= N;
+  if (!(slope > 0)) return {kInfinity, kInfinity};
+  const double K = 1 + P / N * (slope_squares / N - slope * slope) / (slope * slope);
+  const double mean_square = squares / static_cast<double>(degrees_of_freedom);
+  return {K * K * mean_square / (slope * slope), mean_square / slope};
+}
+
+}  // namespace
+
+FitStatistics fit_statistics(const FitData& data) {
+  const Index N = data.J.rows(), R = data.J_prior.rows(), P = data.rho.size();
+  const VectorXd& rho = data.rho;
+  FitStatistics s;
+  s.degrees_of_freedom = static_cast<long>(N + R - P);
+  s.residual_variance =
+      s.degrees_of_freedom > 0 ? data.z.squaredNorm() / static_cast<double>(s.degrees_of_freedom) : kNaN;
+  const Variances v = variances(data, s.degrees_of_freedom, s.residual_variance);
+  s.variance = v.variance, s.likelihood_scale = v.likelihood_scale;
+  // Without one, what is determined is still found.
+  const double variance = std::isfinite(s.variance) ? s.variance : 1;
+  const bool normal = data.sigma_is_known && data.loss.type == LossType::squared;
+  s.quantile = quantile_975(s.degrees_of_freedom, normal);
+  s.std_error.setZero(P), s.ci95.setZero(P, 2);
+  s.covariance.setZero(P, P), s.correlation.setIdentity(P, P);
+  if (P == 0) return s;
+
+  MatrixXd J(N + R, P);  // v (J'J)^-1 is the covariance
+  J.topRows(N) = data.J;
+  if (R > 0) J.bottomRows(R) = data.J_prior * std::sqrt(variance);
+
+  // Columns of unit length; zero columns are left out.
+  VectorXd size = rho.cwiseAbs(), length = J.colwise().norm().transpose();
+  for (Index k = 0; k < P; ++k)
+    if (size(k) == 0) size(k) = 1;
+  const VectorXd& change = data.change.size() == P ? data.change : size;
+  std::vector<Index> used;
+  std::vector<VectorXd> unseen;  // directions, in changes over sizes
+  for (Index k = 0; k < P; ++k)
+    if (length(k) > 0 && length(k) * std::abs(change(k)) > kNoInfluence * data.record)
+      used.push_back(k);
+    else
+      unseen.push_back(VectorXd::Unit(P, k));
+  if (!unseen.empty()) s.condition_number = kInfinity;
+  const Index U = static_cast<Index>(used.size());
+  if (U > 0) {
+    MatrixXd scaled(N + R, U);
+    for (Index c = 0; c < U; ++c)
+      scaled.col(c) = J.col(used[static_cast<std::size_t>(c)]) / length(used[static_cast<std::size_t>(c)]);
+    // Singular values of the triangular factor, which is as small as the number of parameters.
+    MatrixXd triangle = scaled;
+    if (N + R > U)
+      triangle = Eigen::HouseholderQR<MatrixXd>(scaled).matrixQR().topRows(U).triangularView<Eigen::Upper>();
+    const Eigen::JacobiSVD<MatrixXd> svd(triangle, Eigen::ComputeFullV);
+    VectorXd sigma = VectorXd::Zero(U);
+    sigma.head(svd.singularValues().size()) = svd.singularValues();
+    const Index rank = (sigma.array() > std::max(kRankTolerance, data.accuracy) * sigma(0)).count();
+    if (unseen.empty()) s.condition_number = sigma(U - 1) > 0 ? sigma(0) / sigma(U - 1) : kInfinity;
+
+    const MatrixXd V = svd.matrixV().leftCols(rank) * sigma.head(rank).cwiseInverse().asDiagonal();
+    const MatrixXd covariance = variance * (V * V.transpose());
+    for (Index a = 0; a < U; ++a)
+      for (Index b = 0; b < U; ++b) {
+        const Index ka = used[static_cast<std::size_t>(a)], kb = used[static_cast<std::size_t>(b)];
+        s.covariance(ka, kb) = covariance(a, b) / (length(ka) * length(kb));
+        const double norm = std::sqrt(covariance(a, a) * covariance(b, b));
+        if (a != b) s.correlation(ka, kb) = norm > 0 ? covariance(a, b) / norm : 0;
+      }
+    for (Index c = rank; c < U; ++c) {
+      VectorXd direction = VectorXd::Zero(P);
+      for (Index a = 0; a < U; ++a) {
+        const Index k = used[static_cast<std::size_t>(a)];
+        direction(k) = svd.matrixV()(a, c) / (length(k) * size(k));
+      }
+      unseen.push_back(direction.normalized());
+    }
+  }
+  MatrixXd null_space(P, static_cast<Index>(unseen.size()));
+  for (std::size_t c = 0; c < unseen.size(); ++c) null_space.col(static_cast<Index>(c)) = unseen[c];
+  s.unidentifiable = determined_combinations(null_space, rho, size, data.names, data.units);
+  const std::vector<bool> changed = changed_parameters(null_space);
+  for (Index k = 0; k < P; ++k) {
+    s.std_error(k) = changed[static_cast<std::size_t>(k)] ? kInfinity : std::sqrt(s.covariance(k, k));
+    const double half = s.std_error(k) == 0 ? 0 : s.quantile * s.std_error(k);
+    s.ci95.row(k) << rho(k) - half, rho(k) + half;
+  }
+  if (!std::isfinite(s.variance))
+    withhold_errors(s,
+                    s.degrees_of_freedom < 1
+                        ? "as many parameters as samples leave no degree of freedom to tell the noise from"
+                        : "so many residuals lie beyond the scale of the loss that its mean curvature is not positive");
+  return s;
+}
+
+void withhold_errors(FitStatistics& statistics, std::string why) {
+  statistics.none = std::move(why);
+  statistics.std_error.setConstant(kNaN), statistics.ci95.setConstant(kNaN), statistics.covariance.setConstant(kNaN);
+  statistics.correlation.resize(0, 0);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,69 @@
+// What a least-squares fit says about its parameters.
+//
+//   residuals z(rho) in units of their sigma, Jacobian J = dz/drho, N rows, P columns, at the solution
+//   s^2         = z'z / (N + R - P)                        residual variance, R: number of priors
+//   covariance  = (J'J/v + J_prior'J_prior)^-1             v = s^2; 1 where sigma is known
+//   std_error_k = sqrt(covariance_kk)                      ci95 = rho_k -+ t(0.975, N + R - P) std_error_k
+// Seber and Wild, "Nonlinear Regression" (1989), sections 2.1 and 5.1. Priors are taken at their word.
+//
+// With a loss other than the square the estimate is Huber's M-estimate, and with psi(z) = rho'(z^2) z
+//   v = K^2 [sum psi^2/(N + R - P)] / mean(psi_z)^2,   K = 1 + (P/N) var(psi_z)/mean(psi_z)^2
+// Huber, "Robust Statistics" (1981), section 7.6, equation 6.5: errors independent, of one symmetric distribution.
+//
+// A column of J counts as zero where a change of the parameter by its own size moves the record by less than 1e-10 of
+// the record's norm. Combinations that the data do not determine come from the singular values of J with columns scaled
+// to unit length, whose ratio is the condition number (Belsley, Kuh and Welsch, "Regression Diagnostics" (1980),
+// section 3.2).
+//
+//   FitData data;
+//   data.J = J, data.z = z, data.rho = rho, data.names = {"m1", "m2"};
+//   const FitStatistics s = fit_statistics(data);
+//   s.std_error(0), s.ci95(0, 1), s.correlation(0, 1);
+//   for (const std::string& words : s.unidentifiable) std::cout << words;   // "m1, m2: only m1 + m2 is determined"
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "optim/solver/robust_loss.hpp"
+
+namespace mbsopt {
+
+struct FitData {
+  Eigen::MatrixXd J;        // N x P
+  Eigen::VectorXd z;        // N
+  Eigen::MatrixXd J_prior;  // R x P, or empty
+  Eigen::VectorXd rho;      // P
+  std::vector<std::string> names;
+  std::vector<std::string> units;  // "" where not known; or none at all
+  Loss loss;
+  bool sigma_is_known = false;  // v = 1, and quantiles are normal; not with a loss other than the square
+  double accuracy = 0;          // of J, relative: what differs by less is the same
+  Eigen::VectorXd change;       // of each parameter, about its size; empty: |rho|, or 1 where that is 0
+  double record = 0;            // norm of what was measured, in sigma; 0: not known
+};
+
+struct FitStatistics {
+  std::string none;                         // why there are no standard errors, in words; they are NaN then
+  Eigen::VectorXd std_error;                // infinite where the data do not determine the parameter
+  Eigen::MatrixXd ci95;                     // P x 2
+  Eigen::MatrixXd covariance;               // of the determined combinations
+  Eigen::MatrixXd correlation;              // ones on the diagonal
+  double residual_variance = kUnknown;      // s^2, also where it is not used; NaN without degrees of freedom
+  double variance = kUnknown;               // v
+  double likelihood_scale = kUnknown;       // of 2 (cost - least cost), in which it is about chi^2 of a parameter
+  double quantile = kUnknown;               // of the intervals
+  long degrees_of_freedom = 0;              // N + R - P
+  double condition_number = kUnknown;       // infinite where a column of J is zero
+  std::vector<std::string> unidentifiable;  // in words
+
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+};
+
+FitStatistics fit_statistics(const FitData& data);
+// Takes away what holds at a minimum only: standard errors, intervals, correlations.
+void withhold_errors(FitStatistics& statistics, std::string why);
+
+}  // namespace mbsopt

@@ -1,0 +1,41 @@
+// What an identification fits: parameters shared by its experiments, and those with a value per experiment.
+//
+//   const std::vector<UnknownParameter> unknowns = unknowns_of_fit(scene, spec);   // "k1", "run1.theta0",
+//   "run2.theta0" const VariableScaling scaling = scaling_of(unknowns); Experiment run1(..., unknowns_in(scene, spec,
+//   0, unknowns));                   // those that act in experiment 0
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "optim/fit/experiment.hpp"
+#include "optim/problem/problem.hpp"
+#include "optim/problem/variable_scaling.hpp"
+
+namespace mbsopt {
+
+struct UnknownParameter {
+  int parameter = 0;           // in the scene
+  std::size_t experiment = 0;  // where it is free
+  bool shared = true;
+  Parameter description;  // with the value it starts from
+};
+
+// A parameter whose bounds leave it nowhere to go is a constant, not an unknown.
+bool is_held(const Parameter& parameter);
+// Throws std::invalid_argument with the place where nothing is to be fitted, or something that no experiment sees.
+std::vector<UnknownParameter> unknowns_of_fit(const Scene& scene, const IdentificationSpec& spec);
+// The free ones of one experiment.
+std::vector<UnknownParameter> free_in(const Scene& scene, const IdentificationSpec& spec, std::size_t experiment);
+
+// An experiment's own values of what is free there, else the shared ones; an override replaces a shared value.
+std::vector<Experiment::Unknown> unknowns_in(const Scene& scene, const IdentificationSpec& spec, std::size_t experiment,
+                                             const std::vector<UnknownParameter>& unknowns);
+
+std::string name_of(const UnknownParameter& unknown, const IdentificationSpec& spec);  // "run1.theta0"
+std::vector<std::string> names_of(const std::vector<UnknownParameter>& unknowns, const IdentificationSpec& spec);
+VariableScaling scaling_of(const std::vector<UnknownParameter>& unknowns);
+Eigen::VectorXd start_of(const std::vector<UnknownParameter>& unknowns);
+
+}  // namespace mbsopt

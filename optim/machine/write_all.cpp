@@ -1,0 +1,19 @@
+#include "optim/machine/write_all.hpp"
+
+#include <unistd.h>
+
+#include <cerrno>
+
+namespace mbsopt {
+
+bool write_all(int descriptor, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+}  // namespace mbsopt

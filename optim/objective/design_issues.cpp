@@ -1,0 +1,72 @@
+#include "optim/objective/design_issues.hpp"
+
+#include <algorithm>
+
+#include "core/cvodes/cvodes.hpp"
+#include "core/scene/scene_path.hpp"
+#include "optim/objective/objective.hpp"
+#include "optim/solver/nlopt_methods.hpp"
+
+namespace mbsopt {
+
+std::vector<DesignIssue> missing_bounds(const std::vector<std::string>& variables, const Scene& scene,
+                                        const std::string& by) {
+  std::vector<DesignIssue> issues;
+  for (const Parameter& p : scene.parameters) {
+    if (std::find(variables.begin(), variables.end(), p.name) == variables.end() || (p.lower && p.upper)) continue;
+    const char* const missing = p.lower ? "no upper bound" : p.upper ? "no lower bound" : "no bounds";
+    issues.push_back({child_path("parameters", p.name), std::string("has ") + missing + "; both are needed: " + by});
+  }
+  return issues;
+}
+
+std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& scene) {
+  const OptimizerSpec& optimizer = spec.optimizer;
+  const std::string path = "design.optimizer";
+  std::vector<DesignIssue> issues;
+  const NloptMethod* const method = find_nlopt_method(optimizer.type);
+  if (method && optimizer.hessian != "lbfgs")
+    issues.push_back({path + ".hessian", "is of ipopt only; '" + optimizer.type + "' builds its own, if any"});
+  if (!method && optimizer.hessian != "lbfgs" && is_cvodes(scene.simulation.integrator.type))
+    issues.push_back({path + ".hessian", "is '" + optimizer.hessian +
+                                             "', which needs a run on given steps; simulation.integrator.type is '" +
+                                             scene.simulation.integrator.type + "', which cannot take them: 'lbfgs'"});
+  if (method && optimizer.warm_start)
+    issues.push_back({path + ".warm_start", "is of ipopt only, whose barrier leads away from the start; '" +
+                                                optimizer.type + "' has none and begins at the given values"});
+  if (!method && optimizer.warm_start && spec.multistart)
+    issues.push_back({path + ".warm_start",
+                      "says that the given values are near the solution, which other starts of design.multistart are "
+                      "not; leave one of them out"});
+  if (optimizer.seed && !(method && method->random))
+    issues.push_back({path + ".seed", "is given, but '" + optimizer.type + "' draws no random numbers"});
+  if (method) {
+    const auto is_equality = [](const ObjectiveBound& b) { return b.lower && b.upper && *b.lower == *b.upper; };
+    const NloptNeeds needs{spec.variables.size(), !spec.subject_to.empty(),
+                           std::any_of(spec.subject_to.begin(), spec.subject_to.end(), is_equality)};
+    if (const std::string refusal = nlopt_refusal(*method, needs); !refusal.empty())
+      issues.push_back({path + ".type", refusal});
+    if (method->global) {
+      for (DesignIssue& issue :
+           missing_bounds(spec.variables, scene, path + ".type '" + optimizer.type + "' searches between them"))
+        issues.push_back(std::move(issue));
+    }
+  }
+  if (spec.multistart) {
+    for (DesignIssue& issue : missing_bounds(spec.variables, scene, "design.multistart draws starts between them"))
+      issues.push_back(std::move(issue));
+  }
+  return issues;
+}
+
+std::optional<DesignIssue> curvature_issue(const Problem& problem) {
+  if (!problem.design || problem.design->optimizer.hessian != "gauss_newton") return std::nullopt;
+  const std::string& name = problem.design->minimize;
+  if (!objectives_of(problem, {name}).front().is_linear()) return std::nullopt;
+  return DesignIssue{"design.optimizer.hessian",
+                     "is 'gauss_newton', but '" + name +
+                         "' is linear in its sensors and parameters, which leaves nothing of its second derivatives; "
+                         "it is meant for squares (running, samples, rms_of) and extremes: take 'lbfgs' or 'exact'"};
+}
+
+}  // namespace mbsopt

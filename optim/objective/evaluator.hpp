@@ -1,0 +1,118 @@
+// Objectives and their gradients at a point, by the method that is cheapest or the one asked for. The last point is
+// kept: a solver that asks for f and then for its gradient pays once.
+//
+//   Evaluator evaluator(problem.scene, objectives_of(problem), {"k1", "L01"});
+//   const Evaluation& e = evaluator.gradients(evaluator.start());
+//   if (!e.ok) std::cerr << e.message;
+//   e.psi(0), e.psi_rho(0, 1);   // the first objective, and its derivative in L01
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/simulate/simulation.hpp"
+#include "optim/objective/objective.hpp"
+#include "optim/problem/parameter_values.hpp"
+
+namespace mbsopt {
+
+// tlm and adjoint are the derivatives of the numbers computed; CVODES, which has none of these, answers with its own.
+// cvodes_*: the motion and its continuous sensitivities by CVODES, whatever the scene's integrator (cvodes.hpp).
+enum class GradientMethod { automatic, tlm, adjoint, cvodes_forward, cvodes_adjoint, differences };
+std::string_view to_string(GradientMethod method);  // auto, tlm, adjoint, cvodes_forward, cvodes_adjoint, fd
+
+struct DifferenceSettings {
+  double relative_step = 4e-3;  // the largest: of the parameter's value, or of 1 where that is 0
+  int rungs = 4;                // steps, each half of the one before
+  // On the steps of the run at the point itself, else with step-size control; CVODES always with step-size control.
+  bool frozen_steps = true;
+};
+
+// Estimated cost in simulations, from which `automatic` chooses; measured, see docs/design-optimisation.md.
+//   tlm        1.5 + 2.2 per block of four variables, which go through a step together
+//   adjoint    1.7 + 0.9 per objective
+struct GradientCost {
+  double tlm = 0, adjoint = 0;
+};
+GradientCost gradient_cost(std::size_t variables, std::size_t objectives);
+
+struct Evaluation {
+  bool ok = false;
+  std::string message;                                // why not, in words
+  Eigen::VectorXd rho;                                // all parameters
+  Eigen::VectorXd psi;                                // per objective
+  Eigen::MatrixXd psi_rho;                            // objective x variable; 0 x 0 where only values were asked for
+  GradientMethod method = GradientMethod::automatic;  // the one used; automatic where no simulation was needed
+  std::string choice;                                 // why, in words, where there is something to say
+  std::vector<std::string> warnings;                  // what makes these numbers doubtful, sentences
+  SimulationStatistics statistics;
+  StepSequence steps;
+  long simulations = 0;  // that this evaluation took
+  double wall_seconds = 0;
+  bool has_gradients() const { return psi_rho.size() > 0; }
+};
+
+struct EvaluatorOptions {
+  GradientMethod method = GradientMethod::automatic;
+  DifferenceSettings differences;
+  std::vector<std::shared_ptr<const UserForce>> user_forces;
+  std::function<bool(double t)> progress;  // after accepted steps; false abandons the evaluation
+};
+
+class Evaluator {
+ public:
+  // variables: names of parameters with respect to which derivatives are wanted; empty: all. Throws
+  // std::invalid_argument: a variable that nothing uses, unless its allow_unused is set. What costs and forces written
+  // in C++ use shows in gradients(): the first fail if such a variable's derivatives are all exactly 0, later ones
+  // warn.
+  Evaluator(Scene scene, std::vector<Objective> objectives, const std::vector<std::string>& variables = {},
+            EvaluatorOptions options = {});
+
+  // The reference holds until the next call.
+  const Evaluation& values(const Eigen::VectorXd& rho);
+  const Evaluation& gradients(const Eigen::VectorXd& rho);
+
+  // Of each objective that is a smooth maximum or minimum: the largest, smallest value that it stands for, on a run of
+  // its own. The others have none; none has one where the run fails.
+  std::vector<std::optional<double>> true_values(const Eigen::VectorXd& rho) const;
+
+  // On given steps, away from the point that is kept: values, and discrete gradients by tlm or adjoint. CVODES, which
+  // cannot take given steps, throws std::invalid_argument.
+  Evaluation values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const;
+  Evaluation gradients_on(const StepSequence& steps, const Eigen::VectorXd& rho, GradientMethod method) const;
+
+  const Scene& scene() const { return scene_; }
+  const EvaluatorOptions& options() const { return options_; }
+  const std::vector<Objective>& objectives() const { return objectives_; }
+  const std::vector<int>& variables() const { return variables_; }  // indices of parameters
+  Eigen::VectorXd start() const;                                    // the parameters' values in the scene
+  long simulations() const { return simulations_; }                 // since construction
+
+ private:
+  enum class Sweep { none, forward, backward };
+  Evaluation run(const Eigen::VectorXd& rho, Sweep sweep, const StepSequence* frozen, bool by_cvodes = false) const;
+  GradientMethod available(GradientMethod method, std::string& choice) const;
+  void add_parameters_only(Evaluation& e, bool gradients) const;
+  void add_differences(Evaluation& e) const;
+  void find_unused();
+  void judge_zero_columns(Evaluation& e) const;
+  std::vector<const Objective*> simulated() const;
+
+  Scene scene_;
+  std::vector<Objective> objectives_;
+  std::vector<int> variables_;
+  std::vector<bool> active_;
+  EvaluatorOptions options_;
+  std::vector<std::size_t> simulated_;       // objectives that need a simulation
+  std::vector<std::size_t> perhaps_unused_;  // variables that only what is written in C++ may use
+  bool has_differentiated_ = false;          // gradients() has succeeded: no loop is a structure that cannot move
+  Evaluation last_;
+  long simulations_ = 0;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,52 @@
+// A user's expression over t, sensors and parameters ("(tip_y - 0.5)^2") as a cost of one instant, with exact
+// gradients:
+//
+//   g(t, y, rho) = e(rho, t, s(y, rho))       g_y = sum_k e_sk s_k,y        g_rho = e_rho + sum_k e_sk s_k,rho
+//
+// Compiled once per scene, bound to a mechanism (one value of rho) as often as needed:
+//
+//   const CostExpression compiled(Expression::parse("(tip_y - y0)^2"), scene);
+//   std::shared_ptr<const PointCost> cost = compiled.bind(mechanism);
+//   double g = cost->value({t, y, angles});
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/expression/program.hpp"
+#include "core/mechanism/mechanism.hpp"
+#include "core/run/cost.hpp"
+#include "core/scene/scene.hpp"
+
+namespace mbsopt {
+
+// Names an objective may use: parameters (inputs 0..P-1), "t" (input P), sensors (from P+1), definitions.
+Symbols cost_symbols(const Scene& scene);
+// The same without t and sensors: what depends on parameters alone.
+Symbols parameter_symbols(const Scene& scene);
+
+// A scalar e of u = (parameters, sensors) along the tangents U = du/drho of a motion.
+struct SecondOrder {
+  double value = 0;
+  Eigen::VectorXd first;   // U' e_u, its derivative
+  Eigen::MatrixXd second;  // U' e_uu U, its second derivative but for that of u
+};
+
+class CostExpression {
+ public:
+  CostExpression(const Expression& expression, const Scene& scene);  // throws UnknownName
+  bool is_zero() const { return is_zero_; }                          // the constant 0: costs nothing
+  // Of parameters and sensors, at any fixed time: its second derivatives are 0.
+  bool is_linear() const;
+  std::shared_ptr<const PointCost> bind(const Mechanism& mechanism) const;
+  // y_rho: dy/drho, all parameters; variables: those of rho that are wanted.
+  SecondOrder second_order(const Mechanism& mechanism, const StatePoint& at, const Eigen::MatrixXd& y_rho,
+                           const std::vector<int>& variables) const;
+
+ private:
+  struct Compiled;
+  std::shared_ptr<const Compiled> compiled_;
+  bool is_zero_ = false;
+};
+
+}  // namespace mbsopt

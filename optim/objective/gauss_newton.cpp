@@ -1,0 +1,146 @@
+#include "optim/objective/gauss_newton.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "optim/objective/hessian.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// Gauss-Legendre on [0, 1].
+constexpr std::array<double, 3> kNodes{0.5 - 0.3872983346207417, 0.5, 0.5 + 0.3872983346207417},
+    kWeights{5.0 / 18, 8.0 / 18, 5.0 / 18};
+
+// I, I_rho and I_rhorho of one objective, gathered instant by instant; then its Hessian.
+class Gathered {
+ public:
+  Gathered(const Objective& objective, Index variables) : objective_(objective) {
+    I_rho_.setZero(variables), I_rhorho_.setZero(variables, variables);
+  }
+
+  void add_running(double weight, const SecondOrder& x) {
+    switch (objective_.kind()) {
+      case ObjectiveKind::sum:
+        I_rhorho_ += weight * x.second;
+        return;
+      case ObjectiveKind::rms:  // x^2
+        I_ += weight * x.value * x.value;
+        I_rho_ += 2 * weight * x.value * x.first;
+        I_rhorho_ += 2 * weight * (x.first * x.first.transpose() + x.value * x.second);
+        return;
+      case ObjectiveKind::maximum:
+      case ObjectiveKind::minimum:
+        add_exponential(weight, x);
+    }
+  }
+  void add_value(const SecondOrder& x) { I_rhorho_ += x.second; }
+
+  // d^2 psi/drho^2 = psi_I I_rhorho + psi_II I_rho I_rho'
+  MatrixXd hessian() const {
+    const MatrixXd square = I_rho_ * I_rho_.transpose();
+    if (objective_.kind() == ObjectiveKind::sum || I_ == 0) return I_rhorho_;
+    if (objective_.kind() == ObjectiveKind::rms) {
+      const double psi_I = objective_.of_integral(I_).psi_I;
+      return psi_I * (I_rhorho_ - square / (2 * I_));
+    }
+    return (I_rhorho_ - square / I_) / (objective_.exponent() * I_);
+  }
+
+ private:
+  // exp(k (x - x0)), x0 the extreme so far: the Hessian does not depend on it.
+  void add_exponential(double weight, const SecondOrder& x) {
+    const double k = objective_.exponent(), y = k * x.value;
+    if (y > largest_) {
+      const double factor = std::exp(largest_ - y);  // 0 at first
+      I_ *= factor, I_rho_ *= factor, I_rhorho_ *= factor;
+      largest_ = y;
+    }
+    const double e = weight * std::exp(y - largest_);
+    I_ += e;
+    I_rho_ += e * k * x.first;
+    I_rhorho_ += e * k * (x.second + k * x.first * x.first.transpose());
+  }
+
+  const Objective& objective_;
+  double I_ = 0, largest_ = -std::numeric_limits<double>::infinity();
+  VectorXd I_rho_;
+  MatrixXd I_rhorho_;
+};
+
+// What is looked at during the run, in the order of time.
+struct Look {
+  double time = 0;
+  double weight = 0;                           // of the running expressions; 0: none of them
+  std::size_t objective = 0;                   // else: of this one
+  const CostExpression* expression = nullptr;  // this one
+};
+
+std::vector<Look> looks_of(const std::vector<Objective>& objectives, const StepSequence& steps, double end) {
+  std::vector<Look> looks;
+  for (std::size_t i = 0; i < steps.times.size(); ++i)
+    for (std::size_t j = 0; j < kNodes.size(); ++j)
+      looks.push_back({steps.times[i] + kNodes[j] * steps.sizes[i], kWeights[j] * steps.sizes[i]});
+  for (std::size_t i = 0; i < objectives.size(); ++i) {
+    if (objectives[i].terminal()) looks.push_back({end, 0, i, &*objectives[i].terminal()});
+    for (const Objective::Sample& sample : objectives[i].samples()) looks.push_back({sample.time, 0, i, &sample.value});
+  }
+  std::stable_sort(looks.begin(), looks.end(), [](const Look& a, const Look& b) { return a.time < b.time; });
+  return looks;
+}
+
+}  // namespace
+
+GaussNewton gauss_newton(const Evaluator& evaluator, const Evaluation& at) {
+  const std::vector<Objective>& objectives = evaluator.objectives();
+  const std::vector<int>& variables = evaluator.variables();
+  require_second_order(evaluator.scene(), GradientMethod::automatic);
+  bool simulated = false;
+  std::vector<Gathered> gathered;
+  for (const Objective& objective : objectives) {
+    if (objective.is_written_in_cpp())
+      throw std::invalid_argument("the objective '" + objective.name() +
+                                  "' is written in C++ and says nothing of second derivatives");
+    simulated = simulated || objective.needs_simulation();
+    gathered.emplace_back(objective, static_cast<Index>(variables.size()));
+  }
+  GaussNewton result;
+  if (simulated) {
+    const Scene& scene = evaluator.scene();
+    std::vector<bool> active(scene.parameters.size(), false);
+    for (const int k : variables) active[static_cast<std::size_t>(k)] = true;
+    const Mechanism mechanism(scene, at.rho, active, evaluator.options().user_forces);
+    const std::vector<Look> looks = looks_of(objectives, at.steps, scene.simulation.end_time);
+    TangentSampling sampling;
+    for (const Look& look : looks) sampling.times.push_back(look.time);
+    sampling.observe = [&](std::size_t index, const StatePoint& state, const MatrixXd& y_rho) {
+      const Look& look = looks[index];
+      if (look.expression)
+        return gathered[look.objective].add_value(look.expression->second_order(mechanism, state, y_rho, variables));
+      for (std::size_t i = 0; i < objectives.size(); ++i)
+        if (const auto& running = objectives[i].running())
+          gathered[i].add_running(look.weight, running->second_order(mechanism, state, y_rho, variables));
+    };
+    const SimulationResult run =
+        simulate_tlm(mechanism, scene.simulation, {}, sampling, {&at.steps, evaluator.options().progress});
+    if (!run.ok()) {
+      result.message = run.message;
+      return result;
+    }
+  }
+  for (std::size_t i = 0; i < objectives.size(); ++i) {
+    result.of.push_back(gathered[i].hessian());
+    objectives[i].add_parameters_only_hessian(at.rho, variables, result.of.back());
+  }
+  result.ok = true;
+  return result;
+}
+
+}  // namespace mbsopt

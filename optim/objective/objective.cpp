@@ -1,0 +1,192 @@
+#include "optim/objective/objective.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <stdexcept>
+
+#include "core/expression/did_you_mean.hpp"
+
+namespace mbsopt {
+namespace {
+
+template <class Make>
+auto at_place(const std::string& place, const Make& make) {
+  try {
+    return make();
+  } catch (const UnknownName& error) {
+    throw std::invalid_argument(place + ": " + error.what());
+  }
+}
+
+// exp(k (x - x0)), of which the integral makes a smooth maximum (k > 0) or minimum (k < 0) of x.
+class Exponential final : public PointCost {
+ public:
+  Exponential(std::shared_ptr<const PointCost> x, double k, double x0) : x_(std::move(x)), k_(k), x0_(x0) {}
+  double value(const StatePoint& at) const override { return std::exp(k_ * (x_->value(at) - x0_)); }
+  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
+    const double e = value(at);
+    x_->add_gradient(at, scale * k_ * e, y_bar, rho_bar);
+    return e;
+  }
+  const Eigen::VectorXd* rho() const override { return x_->rho(); }
+  const SwitchedProgram* program() const override { return x_->program(); }
+
+ private:
+  std::shared_ptr<const PointCost> x_;
+  double k_, x0_;
+};
+
+class Square final : public PointCost {
+ public:
+  explicit Square(std::shared_ptr<const PointCost> x) : x_(std::move(x)) {}
+  double value(const StatePoint& at) const override {
+    const double x = x_->value(at);
+    return x * x;
+  }
+  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
+    const double x = x_->value(at);
+    x_->add_gradient(at, 2 * scale * x, y_bar, rho_bar);
+    return x * x;
+  }
+  const Eigen::VectorXd* rho() const override { return x_->rho(); }
+  const SwitchedProgram* program() const override { return x_->program(); }
+
+ private:
+  std::shared_ptr<const PointCost> x_;
+};
+
+std::span<const double> view(const Eigen::VectorXd& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
+
+}  // namespace
+
+Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec.name), spec_(spec) {
+  const std::string place = "objectives." + spec.name;
+  auto compile = [&](const std::optional<Expression>& expression, const std::string& part) {
+    std::optional<CostExpression> result;
+    if (!expression) return result;
+    result = at_place(place + "." + part, [&] { return CostExpression(*expression, scene); });
+    if (result->is_zero()) result.reset();
+    return result;
+  };
+  const std::optional<Expression>* expression = &spec.running;
+  const char* part = "running";
+  if (spec.maximum_of) kind_ = ObjectiveKind::maximum, expression = &spec.maximum_of, part = "maximum_of";
+  if (spec.minimum_of) kind_ = ObjectiveKind::minimum, expression = &spec.minimum_of, part = "minimum_of";
+  if (spec.rms_of) kind_ = ObjectiveKind::rms, expression = &spec.rms_of, part = "rms_of";
+  if (kind_ != ObjectiveKind::sum && (spec.running || spec.terminal || spec.parameters_only || !spec.samples.empty()))
+    throw std::invalid_argument(fmt::format("{}.{}: stands alone; other parts are given beside it", place, part));
+  sharpness_ = spec.sharpness.value_or(ObjectiveSpec::kSharpness);
+  duration_ = scene.simulation.end_time - scene.simulation.start_time;
+  running_ = compile(*expression, part);
+  terminal_ = compile(spec.terminal, "terminal");
+  const double t0 = scene.simulation.start_time, t1 = scene.simulation.end_time;
+  for (std::size_t i = 0; i < spec.samples.size(); ++i) {
+    const ObjectiveSample& sample = spec.samples[i];
+    const std::string sample_part = fmt::format("samples[{}]", i);
+    if (!(sample.time >= t0 && sample.time <= t1))
+      throw std::invalid_argument(fmt::format("{}.{}.time: is {} s, outside the simulated time {} to {} s", place,
+                                              sample_part, sample.time, t0, t1));
+    if (std::optional<CostExpression> value = compile(sample.value, sample_part + ".value"))
+      samples_.push_back({sample.time, *std::move(value)});
+  }
+  std::stable_sort(samples_.begin(), samples_.end(), [](const Sample& a, const Sample& b) { return a.time < b.time; });
+  if (spec.parameters_only)
+    parameters_only_ =
+        at_place(place + ".parameters_only", [&] { return Program(*spec.parameters_only, parameter_symbols(scene)); });
+}
+
+Objective::Objective(std::string name, std::shared_ptr<const RunningCost> running,
+                     std::shared_ptr<const TerminalCost> terminal)
+    : name_(std::move(name)), user_running_(std::move(running)), user_terminal_(std::move(terminal)) {
+  if (!user_running_ && !user_terminal_)
+    throw std::invalid_argument(fmt::format("objective '{}': has neither a running nor a terminal cost (null)", name_));
+}
+
+bool Objective::needs_simulation() const {
+  return running_ || terminal_ || !samples_.empty() || user_running_ || user_terminal_;
+}
+
+std::shared_ptr<const PointCost> Objective::expression(const Mechanism& mechanism) const {
+  return running_ ? running_->bind(mechanism) : nullptr;
+}
+
+Cost Objective::cost(const Mechanism& mechanism, double x0) const {
+  Cost cost;
+  cost.name = name_;
+  cost.is_extreme = is_extreme();
+  if (running_) cost.running = running_->bind(mechanism);
+  if (running_ && is_extreme()) cost.running = std::make_shared<Exponential>(cost.running, exponent(), x0);
+  if (running_ && kind_ == ObjectiveKind::rms) cost.running = std::make_shared<Square>(cost.running);
+  if (terminal_) cost.terminal = terminal_->bind(mechanism);
+  for (const Sample& sample : samples_) cost.samples.push_back({sample.time, sample.value.bind(mechanism)});
+  if (user_running_) cost.running = point_cost(user_running_, mechanism.rho());
+  if (user_terminal_) cost.terminal = point_cost(user_terminal_, mechanism.rho());
+  return cost;
+}
+
+Objective::OfIntegral Objective::of_integral(double I, double x0) const {
+  if (!running_ || kind_ == ObjectiveKind::sum) return {I, 1};
+  if (kind_ == ObjectiveKind::rms) {
+    if (I <= 0) return {0, 0};  // rounding: a method with negative weights may sum squares to -1e-33
+    const double psi = std::sqrt(I / duration_);
+    return {psi, 0.5 * psi / I};
+  }
+  const double k = exponent();
+  return {x0 + std::log(I / duration_) / k, 1 / (k * I)};
+}
+
+double Objective::parameters_only(const Eigen::VectorXd& rho) const {
+  if (!parameters_only_) return 0;
+  Program::Scratch scratch = parameters_only_->scratch();
+  return parameters_only_->value(view(rho), scratch);
+}
+
+double Objective::add_parameters_only_gradient(const Eigen::VectorXd& rho, Eigen::Ref<Eigen::VectorXd> rho_bar) const {
+  if (!parameters_only_) return 0;
+  Program::Scratch scratch = parameters_only_->scratch();
+  const std::span<double> gradient(rho_bar.data(), static_cast<std::size_t>(rho_bar.size()));
+  return parameters_only_->add_gradient(view(rho), 1, gradient, scratch);
+}
+
+void Objective::add_parameters_only_hessian(const Eigen::VectorXd& rho, const std::vector<int>& variables,
+                                            Eigen::MatrixXd& H) const {
+  if (!parameters_only_) return;
+  Program::Scratch scratch = parameters_only_->scratch();
+  Eigen::VectorXd direction(rho.size()), gradient(rho.size()), slope(rho.size());
+  const auto all = [](Eigen::VectorXd& x) { return std::span<double>(x.data(), static_cast<std::size_t>(x.size())); };
+  for (std::size_t j = 0; j < variables.size(); ++j) {
+    direction.setZero(), gradient.setZero(), slope.setZero();
+    direction(variables[j]) = 1;
+    parameters_only_->add_gradient_tangent(view(rho), all(direction), 1, all(gradient), all(slope), scratch);
+    for (std::size_t i = 0; i < variables.size(); ++i)
+      H(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) += slope(variables[i]);
+  }
+}
+
+bool Objective::is_linear() const {
+  if (kind_ != ObjectiveKind::sum) return false;
+  if ((running_ && !running_->is_linear()) || (terminal_ && !terminal_->is_linear())) return false;
+  if (std::any_of(samples_.begin(), samples_.end(), [](const Sample& s) { return !s.value.is_linear(); })) return false;
+  if (!parameters_only_) return true;
+  const std::vector<int>& used = parameters_only_->used_inputs();
+  return std::all_of(used.begin(), used.end(), [&](int i) { return parameters_only_->derivative(i).is_constant(); });
+}
+
+std::vector<Objective> objectives_of(const Problem& problem, const std::vector<std::string>& names) {
+  std::vector<Objective> result;
+  std::vector<std::string> known;
+  for (const ObjectiveSpec& spec : problem.objectives) known.push_back(spec.name);
+  for (const std::string& name : names.empty() ? known : names) {
+    const auto found = std::find(known.begin(), known.end(), name);
+    if (found == known.end())
+      throw std::invalid_argument(
+          fmt::format("there is no objective '{}'{}; known: {}", name, did_you_mean(name, known), joined(known)));
+    result.emplace_back(problem.scene, problem.objectives[static_cast<std::size_t>(found - known.begin())]);
+  }
+  return result;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,45 @@
+// One run of several objectives: what their costs integrate to, turned into psi and its gradient; and the true extremes
+// that smooth maxima and minima stand for.
+//
+//   ObjectiveRun objectives({&track, &peak}, mechanism, settings);
+//   SimulationResult r = objectives.run([&](auto costs) { return simulate_adjoint(mechanism, settings, costs); });
+//   r.psi, r.psi_rho      // of the objectives, without parameters_only
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/simulate/simulation.hpp"
+#include "optim/objective/objective.hpp"
+
+namespace mbsopt {
+
+class ObjectiveRun {
+ public:
+  using Sweep = std::function<SimulationResult(std::span<const Cost>)>;
+
+  ObjectiveRun(std::vector<const Objective*> objectives, const Mechanism& mechanism,
+               const SimulationSettings& settings);
+
+  // Calls the sweep with the objectives' costs, with x0 = 0; and once more with x0 = the extremes of that run where an
+  // exponential of a smooth extreme left the range of numbers.
+  SimulationResult run(const Sweep& sweep) const;
+
+ private:
+  SimulationResult run_with(const std::vector<double>& x0, const Sweep& sweep) const;
+  bool in_range(const Eigen::VectorXd& integrals) const;
+
+  std::vector<const Objective*> objectives_;
+  const Mechanism mechanism_;
+  SimulationSettings settings_;
+};
+
+// The largest (smallest) value of each smooth maximum's (minimum's) expression on given steps: on the dense output at
+// eight points of each step, and where the parabolas through three of them have tops beyond: a value that is reached.
+std::vector<std::optional<double>> true_extremes(const std::vector<const Objective*>& objectives,
+                                                 const Mechanism& mechanism, const SimulationSettings& settings,
+                                                 const StepSequence& steps);
+
+}  // namespace mbsopt

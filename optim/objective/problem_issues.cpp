@@ -1,0 +1,164 @@
+#include "optim/objective/problem_issues.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "core/scene/checker.hpp"
+#include "optim/objective/design_issues.hpp"
+#include "optim/problem/problem_vocabulary.hpp"
+
+namespace mbsopt {
+
+namespace {
+
+std::string text_of(double value) { return Expression(value).text(); }
+
+}  // namespace
+
+// Found by Checker::check through the arguments' namespace.
+void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
+  checker.must_be_identifier(checker.path(), objective.name);
+  const bool sums = objective.running || objective.terminal || objective.parameters_only || !objective.samples.empty();
+  const int alone = objective.maximum_of.has_value() + objective.minimum_of.has_value() + objective.rms_of.has_value();
+  if (!sums && alone == 0)
+    checker.issue(checker.path(),
+                  "has no part; running, terminal, samples and parameters_only (added), or one of maximum_of, "
+                  "minimum_of and rms_of is needed");
+  if (alone > 1 || (alone == 1 && sums))
+    checker.issue(checker.path(),
+                  "has maximum_of, minimum_of or rms_of beside another part; each of them stands alone, so make it an "
+                  "objective of its own");
+  if (objective.sharpness && !objective.maximum_of && !objective.minimum_of)
+    checker.issue(checker.path("sharpness"), "is given without maximum_of or minimum_of, which it belongs to");
+  const SimulationSettings& simulation = checker.facts().scene().simulation;
+  for (std::size_t i = 0; i < objective.samples.size(); ++i) {
+    const double time = objective.samples[i].time;
+    if (time < simulation.start_time || time > simulation.end_time)
+      checker.issue(child_path(checker.path("samples"), i) + ".time",
+                    "is " + text_of(time) + " s, outside the simulated time, " + text_of(simulation.start_time) +
+                        " s to " + text_of(simulation.end_time) + " s");
+  }
+}
+
+void check_meaning(Checker& checker, const ObjectiveBound& bound) {
+  if (!bound.lower && !bound.upper)
+    checker.issue(checker.path(), "has neither \"lower\" nor \"upper\"; at least one is needed");
+  if (bound.lower && bound.upper && *bound.lower > *bound.upper)
+    checker.issue(checker.path("lower"),
+                  "is " + text_of(*bound.lower) + ", above the upper bound " + text_of(*bound.upper));
+}
+
+void check_meaning(Checker& checker, const DesignSpec& design) {
+  for (const DesignIssue& found : optimizer_issues(design, checker.facts().scene()))
+    checker.issue(found.path, found.message);
+}
+
+void check_meaning(Checker& checker, const ChannelSpec& channel) {
+  const std::optional<double> sigma = checker.facts().value(channel.sigma);
+  if (sigma && *sigma <= 0) checker.issue(checker.path("sigma"), "is " + text_of(*sigma) + ", it must be positive");
+  if (channel.gain.is_number() && channel.gain.number() == 0)
+    checker.issue(checker.path("gain"), "is 0: nothing of the sensor '" + channel.sensor + "' is compared then");
+}
+
+void check_meaning(Checker& checker, const ExperimentSpec& experiment) {
+  if (experiment.channels.empty()) checker.issue(checker.path("channels"), "is empty; at least one column is compared");
+  const SimulationSettings& simulation = checker.facts().scene().simulation;
+  const double start = experiment.start_time.value_or(simulation.start_time);
+  for (std::size_t i = 0; i < experiment.drives.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      if (experiment.drives[k].drive == experiment.drives[i].drive)
+        checker.issue(child_path(checker.path("drives"), i) + ".drive",
+                      "'" + experiment.drives[i].drive + "' has a law in this experiment already");
+  if (experiment.end_time && *experiment.end_time <= start)
+    checker.issue(checker.path("end_time"), "the experiment ends at " + text_of(*experiment.end_time) +
+                                                " s, which must be after its start at " + text_of(start) + " s");
+}
+
+namespace {
+
+// Samples that two experiments share.
+void check_shared_samples(Checker& checker, const std::vector<ExperimentSpec>& experiments, const std::string& list) {
+  const double start = checker.facts().scene().simulation.start_time;
+  const double never = std::numeric_limits<double>::infinity();
+  const auto column_of_both = [](const ExperimentSpec& a, const ExperimentSpec& b) -> const std::string* {
+    for (const ChannelSpec& x : a.channels)
+      for (const ChannelSpec& y : b.channels)
+        if (x.column == y.column) return &x.column;
+    return nullptr;
+  };
+  for (std::size_t i = 0; i < experiments.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      const ExperimentSpec &a = experiments[i], &b = experiments[k];
+      if (a.data != b.data || a.time != b.time || (a.validate && b.validate)) continue;
+      const double from = std::max(a.start_time.value_or(start), b.start_time.value_or(start));
+      const double to = std::min(a.end_time.value_or(never), b.end_time.value_or(never));
+      const std::string* const column = column_of_both(a, b);
+      if (!column || from >= to) continue;
+      checker.warning(child_path(list, i) + ".data",
+                      "its samples of '" + *column + "' from " + text_of(from) + " s on belong to experiments[" +
+                          std::to_string(k) + "] as well: " +
+                          (a.validate || b.validate ? "what is fitted to them is no test of the model"
+                                                    : "they count twice, and the standard errors come out too small"));
+    }
+  }
+}
+
+void check_loss(Checker& checker, const Loss& loss) {
+  if (!loss.scale) return;
+  const std::string path = checker.path("loss") + ".scale";
+  constexpr double kDigits = 1e8;  // its square is the accuracy of numbers, beyond which a loss has no shape
+  if (loss.type == LossType::squared)
+    checker.issue(path, "is given with the loss 'squared', which has none");
+  else if (*loss.scale < 1 / kDigits || *loss.scale > kDigits)
+    checker.issue(path, "is " + text_of(*loss.scale) + " sigma; it must lie between 1e-8 and 1e8, usual are 1 to 5");
+}
+
+}  // namespace
+
+void check_meaning(Checker& checker, const IdentificationSpec& identification) {
+  const std::vector<ExperimentSpec>& experiments = identification.experiments;
+  const std::string list = checker.path("experiments");
+  if (identification.multistart) {
+    for (const DesignIssue& found : missing_bounds(identification.variables, checker.facts().scene(),
+                                                   "identification.multistart draws starts between them"))
+      checker.issue(found.path, found.message);
+  }
+  const bool any_fit =
+      std::any_of(experiments.begin(), experiments.end(), [](const ExperimentSpec& e) { return !e.validate; });
+  if (!any_fit) checker.issue(list, "has no experiment of role \"fit\"; at least one is needed");
+  check_loss(checker, identification.loss);
+  check_shared_samples(checker, experiments, list);
+  for (std::size_t i = 0; identification.sigma_is_known && i < experiments.size(); ++i)
+    for (std::size_t k = 0; k < experiments[i].channels.size(); ++k)
+      if (experiments[i].channels[k].estimate_sigma)
+        checker.issue(child_path(child_path(list, i) + ".channels", k) + ".estimate_sigma",
+                      "is true, and so is identification.sigma_is_known; one of them must be false");
+  check_unique_names(checker, experiments, "an experiment",
+                     [&](std::size_t i) { return child_path(list, i) + ".name"; });
+  for (std::size_t i = 0; i < experiments.size(); ++i) {
+    for (std::size_t k = 0; k < experiments[i].free.size(); ++k) {
+      const std::string& name = experiments[i].free[k];
+      if (std::find(identification.variables.begin(), identification.variables.end(), name) !=
+          identification.variables.end())
+        checker.issue(
+            child_path(child_path(list, i) + ".free", k),
+            "'" + name + "' is one of \"variables\", which have one value in all experiments; take it out of one");
+    }
+  }
+}
+
+std::vector<SceneIssue> find_issues(const Problem& problem) {
+  SceneFacts facts(problem.scene);
+  std::vector<std::string> objectives;
+  for (const ObjectiveSpec& objective : problem.objectives) objectives.push_back(objective.name);
+  facts.add_objectives(std::move(objectives));
+  std::vector<SceneIssue> issues;
+  Checker checker(facts, issues);
+  checker.check(problem);
+  check_meaning(checker, problem.scene);
+  if (issues.empty())
+    if (const std::optional<DesignIssue> found = curvature_issue(problem)) checker.issue(found->path, found->message);
+  return without_repetitions(std::move(issues));
+}
+
+}  // namespace mbsopt

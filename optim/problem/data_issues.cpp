@@ -1,0 +1,165 @@
+#include "optim/problem/data_issues.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+
+#include "core/scene/scene_path.hpp"
+#include "optim/machine/median.hpp"
+
+namespace mbsopt {
+namespace {
+
+// Of the start's own place in time: a record as far from the start as this, in its own lengths, was hardly meant to be
+// reached by a simulation from there (clocks count from 1970 or from midnight).
+constexpr double kFar = 100;
+constexpr double kResolved = 1e-8;  // as simulation.end_time: a step of a millionth of the span still has two digits
+
+class DataCheck {
+ public:
+  DataCheck(const ExperimentSpec& experiment, const std::string& place, const CsvTable& data, const Scene& scene)
+      : experiment_(experiment),
+        place_(place),
+        data_(data),
+        scene_(scene),
+        start_(experiment.start_time.value_or(scene.simulation.start_time)) {}
+
+  std::vector<SceneIssue> issues() {
+    attempt(place_ + ".time", [&] { data_.column(experiment_.time); });
+    for (std::size_t c = 0; c < experiment_.channels.size(); ++c) check_column(c);
+    if (issues_.empty()) attempt(place_ + ".data", [&] { ascending_times(data_, experiment_.time); });
+    if (issues_.empty()) check_samples();
+    if (issues_.empty())
+      for (std::size_t c = 0; c < experiment_.channels.size(); ++c) check_turns(c);
+    return std::move(issues_);
+  }
+
+ private:
+  std::string channel_path(std::size_t c, const char* key) const {
+    return child_path(place_ + ".channels", c) + "." + key;
+  }
+
+  void check_column(std::size_t c) {
+    const std::string& column = experiment_.channels[c].column;
+    attempt(channel_path(c, "column"), [&] { data_.column(column); });
+    if (column == experiment_.time)
+      issues_.push_back({channel_path(c, "column"), fmt::format("'{}' is the column of the times", column)});
+    for (std::size_t k = 0; k < c; ++k)
+      if (experiment_.channels[k].column == column)
+        issues_.push_back(
+            {channel_path(c, "column"),
+             fmt::format("'{}' is compared by channels[{}] already; its samples would count twice", column, k)});
+  }
+
+  template <class F>
+  void attempt(const std::string& path, F&& look) {
+    try {
+      look();
+    } catch (const CsvError& error) {
+      issues_.push_back({path, error.what()});
+    }
+  }
+
+  // Rows of the channel's samples within the experiment.
+  std::vector<std::size_t> samples(const ChannelSpec& channel) const {
+    const std::vector<double>& t = data_.column(experiment_.time);
+    const std::vector<double>& measured = data_.column(channel.column);
+    std::vector<std::size_t> rows;
+    for (std::size_t row = 0; row < t.size(); ++row)
+      if (t[row] >= start_ && t[row] <= end_ && !std::isnan(measured[row])) rows.push_back(row);
+    return rows;
+  }
+
+  void check_samples() {
+    const std::vector<double>& t = data_.column(experiment_.time);
+    std::size_t first = t.size(), last = 0;
+    for (std::size_t c = 0; c < experiment_.channels.size(); ++c) {
+      const std::vector<std::size_t> rows = samples(experiment_.channels[c]);
+      if (rows.empty()) {
+        issues_.push_back(
+            {channel_path(c, "column"), fmt::format("'{}' of {} has no sample {}: its cells are empty or NaN there",
+                                                    experiment_.channels[c].column, data_.name, window())});
+        continue;
+      }
+      first = std::min(first, rows.front()), last = std::max(last, rows.back());
+    }
+    if (first == t.size() || !(t[last] > start_)) {
+      const std::string span =
+          t.empty() ? "it has no rows" : fmt::format("its times run from {} to {} s", t.front(), t.back());
+      issues_ = {{place_ + ".data", fmt::format("{} has no sample {}; {}", data_.name, window(), span)}};
+    } else if (issues_.empty()) {
+      check_times(t[first], t[last], data_.lines[first]);
+    }
+  }
+
+  void check_times(double first, double last, std::size_t line) {
+    const double span = last - first;
+    if (!experiment_.start_time && span > 0 && first - start_ > kFar * span)
+      issues_.push_back(
+          {place_ + ".data",
+           fmt::format("{}:{}: the record begins {:.6g} s after the start of the simulation, at {} s, and "
+                       "lasts {:.6g} s: all the time before would be simulated. Take the first time off "
+                       "the column '{}', or say by \"start_time\" where the experiment begins",
+                       data_.name, line, first - start_, start_, span, experiment_.time)});
+    else if (last - start_ < kResolved * std::max(std::abs(start_), std::abs(last)))
+      issues_.push_back(
+          {place_ + ".data", fmt::format("{}:{}: times about {:.6g} s do not resolve the steps of a record "
+                                         "of {:.6g} s: take the first time off the column '{}'",
+                                         data_.name, line, last, last - start_, experiment_.time)});
+  }
+
+  std::string window() const {
+    return fmt::format("after the start at {} s{}", start_,
+                       std::isfinite(end_) ? fmt::format(" and until {} s", end_) : "");
+  }
+
+  // A jump is about a turn, and no usual step of the record.
+  void check_turns(std::size_t c) {
+    constexpr double kAbout = 0.1, kUnusual = 5;  // of a turn; of the median step
+    const ChannelSpec& channel = experiment_.channels[c];
+    const auto sensor = std::find_if(scene_.sensors.begin(), scene_.sensors.end(),
+                                     [&](const Sensor& s) { return s.name == channel.sensor; });
+    if (sensor == scene_.sensors.end() || sensor->quantity != "angle" || !channel.gain.is_number()) return;
+    const std::vector<double>& measured = data_.column(channel.column);
+    const std::vector<std::size_t> rows = samples(channel);
+    if (rows.size() < 3) return;
+    std::vector<double> steps;
+    for (std::size_t i = 1; i < rows.size(); ++i) steps.push_back(std::abs(measured[rows[i]] - measured[rows[i - 1]]));
+    const double usual = kUnusual * median(steps);
+    const double turn = 2 * std::numbers::pi * std::abs(channel.gain.number());
+    for (std::size_t i = 1; i < rows.size(); ++i) {
+      const double step = steps[i - 1];
+      const auto jumps_by = [&](double size) { return std::abs(step - size) < kAbout * size && step > usual; };
+      const bool degrees = channel.gain.number() == 1 && jumps_by(360);
+      if (!degrees && !jumps_by(turn)) continue;
+      issues_.push_back(
+          {channel_path(c, "column"),
+           fmt::format("{}:{}: '{}' jumps from {:.6g} to {:.6g}, by about a turn{}; the sensor '{}' goes on counting. "
+                       "Unwrap the column",
+                       data_.name, data_.lines[rows[i]], channel.column, measured[rows[i - 1]], measured[rows[i]],
+                       degrees ? " in degrees, where rad are expected" : "", sensor->name),
+           true});
+      return;
+    }
+  }
+
+  const ExperimentSpec& experiment_;
+  const std::string& place_;
+  const CsvTable& data_;
+  const Scene& scene_;
+  const double start_, end_ = experiment_.end_time.value_or(std::numeric_limits<double>::infinity());
+  std::vector<SceneIssue> issues_;
+};
+
+}  // namespace
+
+std::vector<SceneIssue> find_data_issues(const ExperimentSpec& experiment, const std::string& place,
+                                         const CsvTable& data, const Scene& scene) {
+  return DataCheck(experiment, place, data, scene).issues();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,107 @@
+// A whole problem: scene, objectives, and what is to be done with them, as plain data. The reader in app/ fills it from
+// a file; a C++ user may fill it by hand.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+#include "optim/solver/robust_loss.hpp"
+
+namespace mbsopt {
+
+struct ObjectiveSample {
+  double time = 0;   // [s]
+  Expression value;  // of t, sensors and parameters
+};
+
+// psi = integral of running + terminal at the end time + sum of samples + parameters_only; or, alone, one of
+//   maximum_of   (1/k) log(mean of exp(k x)), k = sharpness          minimum_of   -(1/k) log(mean of exp(-k x))
+//   rms_of       sqrt(mean of x^2)                                   means over the simulated time
+struct ObjectiveSpec {
+  std::string name;
+  std::optional<Expression> running, terminal, parameters_only;
+  std::vector<ObjectiveSample> samples;
+  std::optional<Expression> maximum_of, minimum_of, rms_of;
+  std::optional<double> sharpness;  // of maximum_of, minimum_of [1/unit of the expression]
+  static constexpr double kSharpness = 100;
+};
+
+struct ObjectiveBound {
+  std::string objective;
+  std::optional<double> lower, upper;
+};
+
+struct OptimizerSpec {
+  std::string type = "ipopt";  // or a method of NLopt: nlopt_solver.hpp
+  double tolerance = 1e-6;
+  std::optional<long> max_iterations;   // ipopt: 100 when absent
+  std::optional<long> max_evaluations;  // NLopt: depends on the method, nlopt_solver.hpp
+  std::string hessian = "lbfgs";        // of ipopt; or "exact", "gauss_newton"
+  std::optional<long> seed;             // of methods that are random; drawn when absent
+  bool warm_start = false;              // of ipopt: the given values are near the solution
+  static constexpr int kIpoptIterations = 100;
+};
+
+enum class StartSampling { latin_hypercube, sobol };
+
+// Runs from several starts: first from the given values, then from points between the bounds.
+struct MultistartSpec {
+  int starts = 20;
+  std::optional<long> seed;  // drawn when absent
+  StartSampling sampling = StartSampling::latin_hypercube;
+};
+
+struct DesignSpec {
+  std::string minimize;
+  std::vector<ObjectiveBound> subject_to;
+  std::vector<std::string> variables;  // parameter names
+  OptimizerSpec optimizer;
+  std::optional<MultistartSpec> multistart;
+};
+
+struct ChannelSpec {
+  std::string column, sensor;
+  Field sigma = 1.0, gain = 1.0, bias = 0.0;  // expressions over parameters
+  Field delay = 0.0;                          // [s]
+  bool estimate_sigma = false;                // sigma is where its estimate starts
+};
+
+// A drive that follows another law in one experiment.
+struct DriveLaw {
+  std::string drive;
+  Expression law;
+  std::optional<SampledLaw> samples;
+};
+
+struct ExperimentSpec {
+  std::string name;
+  std::string data;                            // CSV file, resolved against the problem file's folder
+  std::string time = "t";                      // its time column
+  std::optional<double> start_time, end_time;  // instead of the simulation's; rows outside are left out
+  std::vector<ChannelSpec> channels;
+  std::vector<std::pair<std::string, double>> overrides;  // parameter values of this experiment
+  std::vector<DriveLaw> drives;                           // of this experiment, instead of the scene's laws
+  std::vector<std::string> free;                          // parameters with a value of their own here
+  bool validate = false;                                  // role: scored (only "free" refitted), not fitted
+};
+
+struct IdentificationSpec {
+  std::vector<ExperimentSpec> experiments;
+  std::vector<std::string> variables;
+  bool sigma_is_known = false;
+  Loss loss;
+  std::optional<MultistartSpec> multistart;
+  double tolerance = 1e-10;
+  int max_iterations = 100;
+};
+
+struct Problem {
+  Scene scene;
+  std::vector<ObjectiveSpec> objectives;
+  std::optional<DesignSpec> design;
+  std::optional<IdentificationSpec> identification;
+};
+
+}  // namespace mbsopt

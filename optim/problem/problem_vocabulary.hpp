@@ -1,0 +1,134 @@
+// Every field of a problem beyond its scene, told to a visitor; see core/scene/vocabulary.hpp.
+#pragma once
+
+#include "core/scene/vocabulary.hpp"
+#include "optim/problem/problem.hpp"
+
+namespace mbsopt {
+
+inline constexpr std::string_view kOptimizers =
+    "ipopt slsqp mma ccsaq lbfgs bobyqa cobyla sbplx mlsl direct crs isres esch";
+inline constexpr Choice<StartSampling> kSamplings[] = {{"latin_hypercube", StartSampling::latin_hypercube},
+                                                       {"sobol", StartSampling::sobol}};
+inline constexpr Choice<bool> kRoles[] = {{"fit", false}, {"validate", true}};
+
+inline constexpr Choice<LossType> kLosses[] = {{"squared", LossType::squared},
+                                               {"huber", LossType::huber},
+                                               {"cauchy", LossType::cauchy},
+                                               {"tukey", LossType::tukey}};
+
+void describe(auto& v, Like<ObjectiveSample> auto& s) {
+  v.plain("time", s.time, kAny, {"[s]", Need::required, dimension::kTime});
+  v.expression("value", s.value, Names::objective, {"added to the objective", Need::required});
+}
+
+void describe(auto& v, Like<ObjectiveSpec> auto& o) {
+  v.law("running", o.running, Names::objective, {"integrated over time; of sensors, t and parameters"});
+  v.law("terminal", o.terminal, Names::objective, {"added, at the end time; of sensors, t and parameters"});
+  v.list("samples", o.samples, {"added, each at its time"});
+  v.law("parameters_only", o.parameters_only, Names::none, {"added; of parameters only"});
+  v.law("maximum_of", o.maximum_of, Names::objective, {"alone: its largest value over time, smoothed by sharpness"});
+  v.law("minimum_of", o.minimum_of, Names::objective, {"alone: its smallest value over time, smoothed by sharpness"});
+  v.law("rms_of", o.rms_of, Names::objective, {"alone: root of its mean square over time"});
+  v.plain("sharpness", o.sharpness, kPositive,
+          {"of maximum_of, minimum_of: k in log(mean exp(k x))/k [1/unit of the expression]; 100 when absent"});
+}
+
+void describe(auto& v, Like<ObjectiveBound> auto& b) {
+  v.reference("objective", b.objective, To::objective, {"an objective", Need::required});
+  v.plain("lower", b.lower, kAny, {"it must not be less"});
+  v.plain("upper", b.upper, kAny, {"it must not be more"});
+}
+
+void describe(auto& v, Like<OptimizerSpec> auto& o) {
+  v.word("type", o.type, Words{kOptimizers},
+         {"interior points (ipopt); NLopt's local methods with gradients (slsqp, mma, ccsaq, lbfgs) and without "
+          "(bobyqa, cobyla, sbplx), and global ones (mlsl, direct, crs, isres, esch)"});
+  v.plain("tolerance", o.tolerance, kPositive, {"of the optimality conditions; of the last steps without gradients"});
+  v.plain("max_iterations", o.max_iterations, kNotNegative, {"at most; ipopt: 100 when absent"});
+  v.plain("max_evaluations", o.max_evaluations, kPositive,
+          {"at most; NLopt: 500, without gradients 500 (n + 1), global 1000 (n + 1) when absent, of n variables"});
+  v.word("hessian", o.hessian, Words{"lbfgs exact gauss_newton"},
+         {"of ipopt: limited-memory BFGS, second derivatives, or these without those of the motion"});
+  v.plain("seed", o.seed, kNotNegative, {"of methods that are random; drawn when absent"});
+  v.plain("warm_start", o.warm_start, kAny,
+          {"of ipopt: true where the given values are near the solution, as in an earlier run's optimized.json"});
+}
+
+void describe(auto& v, Like<MultistartSpec> auto& m) {
+  v.plain("starts", m.starts, kPositive, {"how many; the first is from the given values"});
+  v.plain("seed", m.seed, kNotNegative, {"of the starts; drawn when absent"});
+  v.choice("sampling", m.sampling, kSamplings, {"how the starts fill the bounds"});
+}
+
+void describe(auto& v, Like<DesignSpec> auto& d) {
+  v.reference("minimize", d.minimize, To::objective, {"the objective to minimise", Need::required});
+  v.list("subject_to", d.subject_to, {"bounds on objectives"});
+  v.references("variables", d.variables, To::parameter, {"parameters that may change", Need::required});
+  v.object("optimizer", d.optimizer, {"how it is minimised"});
+  v.object("multistart", d.multistart, {"from several starts, in parallel"});
+}
+
+void describe(auto& v, Like<ChannelSpec> auto& c) {
+  v.name("column", c.column, {"column of the data file", Need::required});
+  v.reference("sensor", c.sensor, To::sensor, {"what it measured", Need::required});
+  v.number("sigma", c.sigma, {"standard deviation of the noise, in the column's unit"});
+  v.number("gain", c.gain, {"measured = gain * sensor + bias + noise"});
+  v.number("bias", c.bias, {"in the column's unit"});
+  v.number("delay", c.delay,
+           {"measured(t) = gain * sensor(t - delay) + bias + noise [s]", Need::optional, dimension::kTime});
+  v.plain("estimate_sigma", c.estimate_sigma, kAny,
+          {"true: sigma is estimated from the residuals of this channel, from the given one on"});
+}
+
+void describe(auto& v, Like<DriveLaw> auto& d) {
+  v.reference("drive", d.drive, To::drive, {"the drive", Need::required});
+  v.time_law("law", d.law, d.samples,
+             {"its law in this experiment: of t and parameters, or a CSV file", Need::required});
+}
+
+void describe(auto& v, Like<ExperimentSpec> auto& e) {
+  v.name("name", e.name, {"name of the experiment", Need::required});
+  v.text("data", e.data, {"CSV file, relative to this file's folder", Need::required});
+  v.text("time", e.time, {"column of the time [s]"});
+  v.plain("start_time", e.start_time, kAny, {"[s]; the simulation's when absent", Need::optional, dimension::kTime});
+  v.plain("end_time", e.end_time, kAny,
+          {"[s]; later rows are left out; all are used when absent", Need::optional, dimension::kTime});
+  v.list("channels", e.channels, {"columns that are compared", Need::required});
+  v.overrides("overrides", e.overrides, {"parameter values of this experiment"});
+  v.list("drives", e.drives, {"laws of drives in this experiment"});
+  v.references("free", e.free, To::parameter, {"parameters with a value of their own in this experiment"});
+  v.choice("role", e.validate, kRoles, {"validate: scored, not fitted"});
+}
+
+void describe(auto& v, Like<IdentificationSpec> auto& i) {
+  v.list("experiments", i.experiments, {"measured motions", Need::required});
+  v.references("variables", i.variables, To::parameter, {"parameters to fit", Need::required});
+  v.plain("sigma_is_known", i.sigma_is_known, kAny,
+          {"true: the covariance is not scaled by the variance of the residuals"});
+  v.group("loss", {"what is summed over the residuals"}, [&](auto& inside) {
+    inside.choice("type", i.loss.type, kLosses, {"loss function"});
+    inside.plain("scale", i.loss.scale, kPositive,
+                 {"residual, in units of sigma, beyond which it counts less than its square; 1.345 (huber), 2.385 "
+                  "(cauchy), 4.685 (tukey) when absent"});
+  });
+  v.group("optimizer", {"how the sum is minimised"}, [&](auto& inside) {
+    std::string type = "trust_region";
+    inside.word("type", type, Words{"trust_region"}, {"Levenberg-Marquardt with bounds"});
+    inside.plain("tolerance", i.tolerance, kPositive, {"relative change of the sum"});
+    inside.plain("max_iterations", i.max_iterations, kNotNegative, {"at most"});
+  });
+  v.object("multistart", i.multistart, {"from several starts, in parallel"});
+}
+
+void describe(auto& v, Like<Problem> auto& p) {
+  std::string schema;
+  v.text("$schema", schema, {"for editors: where problem.schema.json is"});
+  v.version("format", 1, {"version of the problem format"});
+  describe(v, p.scene);
+  v.named("objectives", p.objectives, {"scalars of a motion, to minimise, to bound or to differentiate"});
+  v.object("design", p.design, {"optimal design"});
+  v.object("identification", p.identification, {"fit of parameters to measurements"});
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,69 @@
+// A nonlinear least-squares problem, as every solver here sees it:
+//
+//   minimise 1/2 sum rho(z_i(x)^2) + 1/2 sum z_j(x)^2   subject to   x_lower <= x <= x_upper
+//
+// rho is the loss (robust_loss.hpp); the last `plain` residuals, j, are squared whatever it is.
+//
+// Residuals and their Jacobian come together, since one simulation gives both; an evaluation that fails says so in
+// words, and the solver shortens its step.
+//
+//   struct Line : LeastSquaresProblem {
+//     Line() : LeastSquaresProblem(2, 3) {}
+//     void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& p) override { p.z = A * x - b, p.z_x = A; }
+//   };
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <string>
+
+#include "optim/solver/robust_loss.hpp"
+#include "optim/solver/solver_outcome.hpp"
+
+namespace mbsopt {
+
+struct LeastSquaresPoint {
+  bool ok = true;
+  std::string message;  // why not
+  Eigen::VectorXd z;    // N
+  Eigen::MatrixXd z_x;  // N x n
+};
+
+struct LeastSquaresProblem {
+  LeastSquaresProblem(Eigen::Index variables, Eigen::Index residuals)
+      : x_lower(Eigen::VectorXd::Constant(variables, -std::numeric_limits<double>::infinity())),
+        x_upper(-x_lower),
+        size(residuals) {}
+  virtual ~LeastSquaresProblem() = default;
+  LeastSquaresProblem(const LeastSquaresProblem&) = delete;
+  LeastSquaresProblem& operator=(const LeastSquaresProblem&) = delete;
+
+  // point arrives sized, with zeros.
+  virtual void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) = 0;
+
+  Eigen::Index variables() const { return x_lower.size(); }
+  double cost(const Eigen::VectorXd& z) const;
+  // d cost/d z_i, residual by residual.
+  Eigen::VectorXd pull(const Eigen::VectorXd& z) const;
+
+  Eigen::VectorXd x_lower, x_upper;  // +-infinity where there is none
+  Eigen::Index size;                 // N
+  Eigen::Index plain = 0;            // of them, the last: not seen by the loss
+  Loss loss;
+};
+
+struct LeastSquaresProgress {
+  int iteration = 0;
+  double cost = 0;           // as in LeastSquaresProblem::cost
+  double gradient_norm = 0;  // largest entry
+  double step_norm = 0;
+  Eigen::VectorXd x;
+};
+
+struct LeastSquaresResult : SolverOutcome {
+  LeastSquaresPoint point;    // at x
+  Eigen::VectorXd z_initial;  // at the start; empty where that could not be evaluated
+  double cost_initial = 0, cost_final = 0;
+};
+
+}  // namespace mbsopt

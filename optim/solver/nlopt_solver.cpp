@@ -1,0 +1,461 @@
+#include "optim/solver/nlopt_solver.hpp"
+
+#include <fmt/format.h>
+#include <nlopt.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <exception>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+#include "core/expression/counted.hpp"
+#include "optim/solver/evaluated_points.hpp"
+#include "optim/solver/optimality.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using VectorIn = Eigen::Map<const VectorXd>;
+using VectorView = Eigen::Map<VectorXd>;
+
+struct Algorithm {
+  std::string_view name;
+  nlopt_algorithm algorithm;
+};
+constexpr std::array kAlgorithms{
+    Algorithm{"slsqp", NLOPT_LD_SLSQP}, Algorithm{"mma", NLOPT_LD_MMA},       Algorithm{"ccsaq", NLOPT_LD_CCSAQ},
+    Algorithm{"lbfgs", NLOPT_LD_LBFGS}, Algorithm{"bobyqa", NLOPT_LN_BOBYQA}, Algorithm{"cobyla", NLOPT_LN_COBYLA},
+    Algorithm{"sbplx", NLOPT_LN_SBPLX}, Algorithm{"mlsl", NLOPT_G_MLSL},      Algorithm{"direct", NLOPT_GN_DIRECT},
+    Algorithm{"crs", NLOPT_GN_CRS2_LM}, Algorithm{"isres", NLOPT_GN_ISRES},   Algorithm{"esch", NLOPT_GN_ESCH}};
+
+nlopt_algorithm algorithm_of(const NloptMethod& method) {
+  return std::find_if(kAlgorithms.begin(), kAlgorithms.end(),
+                      [&](const Algorithm& row) { return row.name == method.name; })
+      ->algorithm;
+}
+
+constexpr int kFailuresInARow = 40;  // of local methods: they are lost
+constexpr double kFirstStep = 0.1;   // of x, without derivatives
+constexpr double kAcceptable = 100;  // times the tolerance: as Ipopt's second way to converge
+constexpr int kFreshStarts = 2;      // of local methods with gradients, from their best point
+constexpr long kCreeping = 50;       // evaluations in which methods of separable models have to gain
+constexpr double kLeastGain = 0.01;  // so much of f; along a narrow valley they do not, and slsqp goes on
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr long kRequestsPerPoint = 20;  // of points in memory; then a method goes round in circles
+
+using Optimizer = std::unique_ptr<nlopt_opt_s, decltype(&nlopt_destroy)>;
+
+enum class Ended { by_itself, converged, stopped, evaluations, iterations, failures, not_a_number, exception };
+
+class Adapter {
+ public:
+  Adapter(NonlinearProgram& problem, const NloptMethod& method, const NloptOptions& options, NlpResult& result)
+      : problem_(problem),
+        method_(method),
+        algorithm_(algorithm_of(method)),
+        options_(options),
+        result_(result),
+        points_(problem, result, options.constraint_tolerance, options.records),
+        wanted_(method.gradients ? Wanted::derivatives : Wanted::values),
+        max_evaluations_(options.max_evaluations.value_or(default_max_evaluations(method, problem.variables()))) {
+    for (Index i = 0; i < problem.constraints(); ++i) {
+      const double lower = problem.c_lower(i), upper = problem.c_upper(i);
+      if (lower == upper) {
+        equalities_.push_back({i, 1, lower});
+        continue;
+      }
+      if (std::isfinite(lower)) inequalities_.push_back({i, -1, lower});
+      if (std::isfinite(upper)) inequalities_.push_back({i, 1, upper});
+    }
+  }
+
+  bool start_is_valid(const VectorXd& x) {
+    result_.x = x;
+    const NlpPoint& start = points_.at(x, wanted_);
+    took(start);
+    return start.ok;
+  }
+  bool ended() const { return ended_ != Ended::by_itself; }
+
+  void run(const VectorXd& x_start) {
+    const unsigned n = static_cast<unsigned>(problem_.variables());
+    const bool constrained = problem_.constraints() > 0;
+    const bool augmented = constrained && method_.constraints == ConstraintSupport::augmented_lagrangian;
+    const Optimizer outer(nlopt_create(augmented ? NLOPT_AUGLAG : algorithm_, n), nlopt_destroy);
+    opt_ = outer.get();
+    limit(opt_, x_start);
+    if (augmented || algorithm_ == NLOPT_G_MLSL) {
+      const Optimizer inner(nlopt_create(augmented ? algorithm_ : NLOPT_LD_LBFGS, n), nlopt_destroy);
+      limit(inner.get(), x_start);
+      if (algorithm_ == NLOPT_G_MLSL) {  // whose search ends when a local one cannot get anywhere
+        nlopt_set_xtol_abs(inner.get(), VectorXd(options_.tolerance * x_start.cwiseAbs().cwiseMax(1)).data());
+        nlopt_set_ftol_abs(inner.get(), 1e-3 * options_.tolerance);
+      }
+      nlopt_set_local_optimizer(opt_, inner.get());  // a copy
+    }
+    state_program();
+    if (method_.random) nlopt_srand(options_.seed);
+    result_.algorithm = nlopt_algorithm_name(algorithm_);
+    if (augmented) result_.algorithm = std::string(nlopt_algorithm_name(NLOPT_AUGLAG)) + ": " + result_.algorithm;
+    if (ended()) {  // at the start already
+      opt_ = nullptr;
+      say(NLOPT_SUCCESS);
+      if (ended_ == Ended::converged) result_.message = "converged: the start is optimal already";
+      return;
+    }
+    VectorXd x = x_start;
+    nlopt_result code = optimized(x);
+    if (creeps_) {
+      const Optimizer finish(nlopt_create(NLOPT_LD_SLSQP, n), nlopt_destroy);
+      hand_over_to(finish.get(), x_start);
+      x = points_.best_x();
+      code = optimized(x);
+      opt_ = outer.get();
+    }
+    if (const char* const words = nlopt_get_errmsg(opt_)) library_message_ = words;
+    opt_ = nullptr;
+    if (exception_) std::rethrow_exception(exception_);
+    say(code);
+  }
+
+ private:
+  struct Side {
+    Index constraint;
+    double sign, bound;  // sign (c - bound) <= 0, or = 0
+  };
+  using AddConstraints = nlopt_result (*)(nlopt_opt, unsigned, nlopt_mfunc, void*, const double*);
+
+  void state_program() {
+    nlopt_set_maxeval(opt_, static_cast<int>(std::min(kRequestsPerPoint * max_evaluations_, 2'000'000'000L)));
+    nlopt_set_min_objective(opt_, objective, this);
+    add(inequalities_, nlopt_add_inequality_mconstraint, inequality_values);
+    add(equalities_, nlopt_add_equality_mconstraint, equality_values);
+  }
+
+  // From x on, which becomes where it ends.
+  nlopt_result optimized(VectorXd& x) {
+    nlopt_result code = NLOPT_SUCCESS;
+    for (int round = 0; round <= kFreshStarts; ++round) {
+      const double f_before = points_.best().f;
+      double f = 0;
+      code = nlopt_optimize(opt_, x.data(), &f);
+      // A line search that got lost in what it had learnt may get on without it.
+      if (ended() || (creeps_ && !handed_over_) || !stalled() || !(points_.best().f < f_before)) break;
+      x = points_.best_x();
+    }
+    return code;
+  }
+
+  void hand_over_to(nlopt_opt finish, const VectorXd& x_start) {
+    opt_ = finish, handed_over_ = true;
+    limit(opt_, x_start);
+    state_program();
+    result_.algorithm +=
+        fmt::format(", from evaluation {} on {}", result_.evaluations + 1, nlopt_algorithm_name(NLOPT_LD_SLSQP));
+  }
+
+  // Separable models know nothing of a valley that lies askew to the variables.
+  void look_for_gain() {
+    if (method_.constraints != ConstraintSupport::inequalities || creeps_ || ended()) return;
+    if (result_.evaluations < next_look_) return;
+    const double f = points_.best().f;
+    creeps_ = points_.feasible(points_.best()) && last_look_f_ - f <= kLeastGain * std::abs(f);
+    next_look_ = result_.evaluations + kCreeping, last_look_f_ = f;
+    if (creeps_ && opt_) nlopt_force_stop(opt_);
+  }
+
+  // Bounds, and when steps and changes have become too small to go on.
+  void limit(nlopt_opt opt, const VectorXd& x_start) const {
+    nlopt_set_lower_bounds(opt, problem_.x_lower.data());
+    nlopt_set_upper_bounds(opt, problem_.x_upper.data());
+    const VectorXd size = x_start.cwiseAbs().cwiseMax(1);
+    // With gradients, convergence is judged by them; the steps only say when nothing moves any more.
+    const VectorXd x_tolerance = (method_.gradients ? 1e-6 : 1.0) * options_.tolerance * size;
+    nlopt_set_xtol_abs(opt, x_tolerance.data());
+    nlopt_set_ftol_abs(opt, 1e-2 * options_.tolerance * options_.tolerance);
+    if (method_.gradients || method_.global) return;
+    VectorXd step = kFirstStep * size;
+    for (Index k = 0; k < step.size(); ++k) {
+      const double width = problem_.x_upper(k) - problem_.x_lower(k);
+      if (width > 0 && std::isfinite(width)) step(k) = std::min(step(k), width / 4);
+    }
+    nlopt_set_initial_step(opt, step.data());
+  }
+
+  void add(const std::vector<Side>& sides, AddConstraints add_to, nlopt_mfunc values) {
+    if (sides.empty()) return;
+    VectorXd tolerance(static_cast<Index>(sides.size()));
+    for (std::size_t j = 0; j < sides.size(); ++j)
+      tolerance(static_cast<Index>(j)) = options_.constraint_tolerance * problem_.c_scale(sides[j].constraint);
+    add_to(opt_, static_cast<unsigned>(sides.size()), values, this, tolerance.data());
+  }
+
+  // Nothing may be thrown through NLopt, which is C.
+  template <class F>
+  static void guarded(Adapter& self, F&& evaluate) {
+    try {
+      evaluate();
+    } catch (...) {
+      self.exception_ = std::current_exception();
+      self.end(Ended::exception);
+    }
+  }
+
+  static double objective(unsigned n, const double* x, double* f_x, void* data) {
+    Adapter& self = *static_cast<Adapter*>(data);
+    double f = 0;
+    guarded(self, [&] {
+      const NlpPoint& point = self.at(VectorIn(x, n));
+      f = self.problem_.f_scale * point.f;
+      if (f_x) VectorView(f_x, n) = self.problem_.f_scale * point.f_x;
+    });
+    return f;
+  }
+  static void inequality_values(unsigned m, double* values, unsigned n, const double* x, double* c_x, void* data) {
+    Adapter& self = *static_cast<Adapter*>(data);
+    self.constraint_values(self.inequalities_, m, values, n, x, c_x);
+  }
+  static void equality_values(unsigned m, double* values, unsigned n, const double* x, double* c_x, void* data) {
+    Adapter& self = *static_cast<Adapter*>(data);
+    self.constraint_values(self.equalities_, m, values, n, x, c_x);
+  }
+  void constraint_values(const std::vector<Side>& sides, unsigned m, double* values, unsigned n, const double* x,
+                         double* c_x) {
+    std::fill(values, values + m, 0);
+    guarded(*this, [&] {
+      const NlpPoint& point = at(VectorIn(x, n));
+      for (unsigned j = 0; j < m; ++j) {
+        const Side& side = sides[j];
+        const double scale = side.sign * problem_.c_scale(side.constraint);
+        values[j] = scale * (point.c(side.constraint) - side.bound);
+        if (c_x) VectorView(c_x + j * n, n) = scale * point.c_x.row(side.constraint);
+      }
+    });
+  }
+
+  // What NLopt is told: the point, or what stands for it where it cannot be evaluated.
+  const NlpPoint& at(const VectorXd& x) {
+    if (!x.allFinite()) end(Ended::not_a_number);
+    if (ended()) return last_good_;
+    const NlpPoint& point = points_.at(x, wanted_);
+    if (points_.is_new()) took(point);
+    if (point.ok) return point;
+    set_stand_in();
+    return stand_in_;
+  }
+
+  void took(const NlpPoint& point) {
+    if (point.ok) {
+      f_worst_ = last_good_x_.size() > 0 ? std::max(f_worst_, point.f) : point.f;
+      last_good_ = point, last_good_x_ = points_.x();
+      look_at_optimality(point);
+      if (points_.is_better()) took_better(point);
+    } else if (point.abandoned) {
+      end(Ended::stopped);
+    } else if (!method_.global && points_.failed_in_a_row() >= kFailuresInARow) {
+      end(Ended::failures);
+    }
+    if (result_.evaluations >= max_evaluations_) end(Ended::evaluations);
+    look_for_gain();
+  }
+
+  void took_better(const NlpPoint& point) {
+    const bool is_start = result_.evaluations == 1;
+    if (!is_start) ++result_.iterations;
+    const double distance = method_.gradients ? optimality(problem_, points_.x(), point) : kUnknown;
+    const NlpProgress progress{result_.iterations, point.f, problem_.violation(point.c), distance, points_.x()};
+    if (options_.progress && !options_.progress(progress)) end(Ended::stopped);
+    if (options_.max_iterations && result_.iterations >= *options_.max_iterations) end(Ended::iterations);
+  }
+
+  bool stalled() {
+    if (!method_.gradients || method_.global) return false;
+    keep_solution();
+    return points_.feasible(result_.point) &&
+           optimality(problem_, result_.x, result_.point) > kAcceptable * options_.tolerance;
+  }
+
+  // A constraint that is missed by its tolerance buys a lower objective: of points whose objectives differ by no more
+  // than the tolerances, the most stationary one is the solution.
+  bool as_good_as_best(double f) const {
+    const double margin = std::max(options_.tolerance, 10 * options_.constraint_tolerance);
+    return (f - points_.best().f) * problem_.f_scale <= margin;
+  }
+  void look_at_optimality(const NlpPoint& point) {
+    if (!method_.gradients || method_.global || !points_.feasible(point) || !as_good_as_best(point.f)) return;
+    const double distance = optimality(problem_, points_.x(), point);
+    if (solution_x_.size() == 0 || !as_good_as_best(solution_.f) || distance < solution_distance_)
+      solution_x_ = points_.x(), solution_ = point, solution_distance_ = distance;
+    if (distance <= options_.tolerance) end(Ended::converged);
+  }
+  void keep_solution() {
+    if (points_.have_best()) result_.x = points_.best_x(), result_.point = points_.best();
+    if (solution_x_.size() > 0 && as_good_as_best(solution_.f)) result_.x = solution_x_, result_.point = solution_;
+  }
+
+  // Where a point fails, the function rises so that the method comes back: with gradients along the step as much as the
+  // last good gradient promised to fall, which makes a line search take a quarter of its step; without, above all that
+  // was seen. Constraints are as they were.
+  void set_stand_in() {
+    stand_in_ = last_good_;
+    const double least = 1e-3 * std::max(std::abs(last_good_.f), 1 / problem_.f_scale);
+    if (!method_.gradients) {
+      stand_in_.f = f_worst_ + std::max(f_worst_ - points_.best().f, least);
+      return;
+    }
+    const VectorXd d = points_.x() - last_good_x_;
+    const double rise = std::max(std::abs(last_good_.f_x.dot(d)), least);
+    stand_in_.f = std::max(last_good_.f, points_.best().f) + rise;
+    stand_in_.f_x = 2 * rise / std::max(d.squaredNorm(), std::numeric_limits<double>::min()) * d;
+  }
+
+  // The first reason counts.
+  void end(Ended how) {
+    if (!ended()) ended_ = how;
+    if (opt_) nlopt_force_stop(opt_);
+  }
+
+  std::string limit_words() const {
+    return ended_ == Ended::iterations ? counted(*options_.max_iterations, "iteration")
+                                       : counted(max_evaluations_, "evaluation");
+  }
+
+  void say(nlopt_result code) {
+    keep_solution();
+    const std::string failures = result_.failures();
+    switch (ended_) {
+      case Ended::converged:
+        return put(SolverStatus::converged, "converged: the optimality conditions hold");
+      case Ended::stopped:
+        return put(SolverStatus::stopped, "stopped on request");
+      case Ended::iterations:
+      case Ended::evaluations:
+        if (method_.global) return say_searched();
+        return put(SolverStatus::iteration_limit, "stopped at the limit of " + limit_words() + failures);
+      case Ended::failures:
+        return put(SolverStatus::no_progress,
+                   fmt::format("no further progress: {} in a row failed, the last: {}",
+                               counted(points_.failed_in_a_row(), "evaluation"), points_.last_error()));
+      case Ended::not_a_number:
+        return put(SolverStatus::failed,
+                   fmt::format("{} asked for a point that is not a number{}", method_.name, failures));
+      case Ended::exception:
+      case Ended::by_itself:
+        break;
+    }
+    say_by_itself(code, failures);
+  }
+
+  void say_searched() {
+    if (!points_.feasible(result_.point))
+      return put(SolverStatus::infeasible,
+                 fmt::format("infeasible: none of {} satisfies the constraints; relax them, or search longer "
+                             "(max_evaluations){}",
+                             counted(result_.evaluations, "point"), result_.failures()));
+    put(SolverStatus::searched,
+        fmt::format("searched as long as asked, {}: the best point found, which a local method may improve{}",
+                    limit_words(), result_.failures()));
+  }
+
+  void say_by_itself(nlopt_result code, const std::string& failures) {
+    if (code == NLOPT_OUT_OF_MEMORY) return put(SolverStatus::failed, "not enough memory");
+    if (code == NLOPT_INVALID_ARGS)
+      return put(SolverStatus::failed, fmt::format("{} refused the problem{}{}", method_.name,
+                                                   library_message_.empty() ? "" : ": ", library_message_));
+    if (!points_.feasible(result_.point))
+      return put(
+          SolverStatus::infeasible,
+          "infeasible: no point near the last one satisfies the constraints; relax them or start elsewhere" + failures);
+    if (code == NLOPT_MAXEVAL_REACHED) {  // of requests for points that are known
+      if (method_.global) return say_searched();
+      return put(SolverStatus::no_progress, "no further progress: the method goes round in circles" + failures);
+    }
+    if (method_.gradients && !method_.global) {
+      const double distance = optimality(problem_, result_.x, result_.point);
+      if (distance <= kAcceptable * options_.tolerance)
+        return put(SolverStatus::converged,
+                   "converged: the objective does not change any more, and the optimality conditions hold to the "
+                   "accuracy of its derivatives");
+      return put(
+          SolverStatus::no_progress,
+          fmt::format(
+              "no further progress: no step lowers the objective any more, but the optimality conditions hold "
+              "to {:.1e} only, not to {:g}; try tighter simulation tolerances, or a larger optimiser tolerance{}",
+              distance, options_.tolerance, failures));
+    }
+    if (code == NLOPT_ROUNDOFF_LIMITED)
+      return put(SolverStatus::converged, "converged: the steps are down to the accuracy of the objective" + failures);
+    if (code < 0 && method_.global)  // mlsl: one of its local searches
+      return put(SolverStatus::searched,
+                 fmt::format("searched until nothing got any better, {}: the best point found{}",
+                             counted(result_.evaluations, "evaluation"), failures));
+    if (code < 0)
+      return put(SolverStatus::failed, fmt::format("{} failed ({}{}{}){}", method_.name, nlopt_result_to_string(code),
+                                                   library_message_.empty() ? "" : ": ", library_message_, failures));
+    put(SolverStatus::converged,
+        "converged: the steps, or the changes of the objective, are below the tolerance" + failures);
+  }
+
+  void put(SolverStatus status, std::string words) {
+    result_.status = status, result_.message = std::move(words);
+    if (handed_over_)
+      result_.message += fmt::format("; {} had hardly gained any more in {}, so slsqp went on from its best point",
+                                     method_.name, counted(kCreeping, "evaluation"));
+  }
+
+  NonlinearProgram& problem_;
+  const NloptMethod& method_;
+  const nlopt_algorithm algorithm_;
+  const NloptOptions& options_;
+  NlpResult& result_;
+  EvaluatedPoints points_;
+  const Wanted wanted_;
+  const long max_evaluations_;
+  std::vector<Side> inequalities_, equalities_;
+  nlopt_opt opt_ = nullptr;  // while it runs
+  Ended ended_ = Ended::by_itself;
+  std::exception_ptr exception_;
+  std::string library_message_;
+  NlpPoint last_good_, stand_in_;
+  VectorXd last_good_x_, solution_x_;
+  NlpPoint solution_;
+  double solution_distance_ = 0;
+  double f_worst_ = 0;
+  bool creeps_ = false, handed_over_ = false;
+  long next_look_ = kCreeping;
+  double last_look_f_ = std::numeric_limits<double>::infinity();
+};
+
+bool has_equality(const NonlinearProgram& problem) {
+  return problem.constraints() > 0 && (problem.c_lower.array() == problem.c_upper.array()).any();
+}
+
+}  // namespace
+
+NlpResult solve_with_nlopt(NonlinearProgram& problem, const VectorXd& x_start, const NloptOptions& options) {
+  const NloptMethod* const method = find_nlopt_method(options.method);
+  if (!method)
+    throw std::invalid_argument(
+        fmt::format("there is no NLopt method '{}'; available: {}", options.method, kNloptMethods));
+  const NloptNeeds needs{static_cast<std::size_t>(problem.variables()), problem.constraints() > 0,
+                         has_equality(problem)};
+  if (const std::string refusal = nlopt_refusal(*method, needs); !refusal.empty()) throw std::invalid_argument(refusal);
+  if (method->global && !(problem.x_lower.allFinite() && problem.x_upper.allFinite()))
+    throw std::invalid_argument(fmt::format("'{}' searches between bounds; every variable needs both", options.method));
+  NlpResult result;
+  Adapter adapter(problem, *method, options, result);
+  if (!adapter.start_is_valid(x_start)) {
+    result.message = "the start point cannot be evaluated: " + result.first_error;
+    return result;
+  }
+  adapter.run(x_start);
+  return result;
+}
+
+}  // namespace mbsopt

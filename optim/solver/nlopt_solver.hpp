@@ -1,0 +1,36 @@
+// NLopt: a dozen local and global methods behind one call. S. G. Johnson, "The NLopt nonlinear-optimization package".
+//
+// Which ones there are, and what they can do: nlopt_methods.hpp.
+//
+//   NloptOptions options;
+//   options.method = "slsqp";
+//   NlpResult result = solve_with_nlopt(problem, x_start, options);
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "optim/solver/nlopt_methods.hpp"
+#include "optim/solver/nonlinear_program.hpp"
+
+namespace mbsopt {
+
+struct NloptOptions {
+  std::string method = "slsqp";
+  // With gradients: of the scaled optimality conditions. Without: the last steps, relative to x where that is above 1.
+  double tolerance = 1e-6;
+  double constraint_tolerance = 1e-8;  // largest violation of a constraint that counts as feasible, unscaled
+  std::optional<long> max_evaluations;
+  std::optional<long> max_iterations;                // points that were better than all before
+  std::uint32_t seed = 0;                            // of methods that are random
+  std::function<bool(const NlpProgress&)> progress;  // after every iteration; false stops
+  PointRecords* records = nullptr;
+};
+
+// Throws std::invalid_argument with nlopt_refusal(), or where a global method lacks bounds; never for what an
+// evaluation does.
+NlpResult solve_with_nlopt(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const NloptOptions& options = {});
+
+}  // namespace mbsopt

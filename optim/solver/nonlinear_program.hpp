@@ -1,0 +1,111 @@
+// A smooth nonlinear program, as every solver here sees it:
+//
+//   minimise f(x)   subject to   x_lower <= x <= x_upper,   c_lower <= c(x) <= c_upper
+//
+// Value and derivatives come together, since one simulation gives them all; methods without derivatives ask for values
+// alone. An evaluation that fails says so in words, and the solver shortens its step.
+//
+//   struct Sphere : NonlinearProgram {
+//     Sphere() : NonlinearProgram(2, 0) {}
+//     void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override { p.f = x.squaredNorm(), p.f_x = 2 * x; }
+//   };
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "optim/solver/solver_outcome.hpp"
+
+namespace mbsopt {
+
+// What a solver multiplies f and c by where it tests convergence.
+struct NlpScale {
+  double f = 1;
+  Eigen::VectorXd c;
+};
+
+enum class Wanted { values, derivatives };
+
+struct NlpPoint {
+  bool ok = true;
+  bool abandoned = false;  // not ok because the user stopped it: that says nothing about x
+  std::string message;     // why not
+  double f = 0;
+  Eigen::VectorXd f_x;  // n
+  Eigen::VectorXd c;    // m
+  Eigen::MatrixXd c_x;  // m x n
+};
+
+struct NonlinearProgram {
+  NonlinearProgram(Eigen::Index n, Eigen::Index m)
+      : x_lower(Eigen::VectorXd::Constant(n, -std::numeric_limits<double>::infinity())),
+        x_upper(-x_lower),
+        c_lower(Eigen::VectorXd::Constant(m, -std::numeric_limits<double>::infinity())),
+        c_upper(-c_lower),
+        c_scale(Eigen::VectorXd::Ones(m)) {}
+  virtual ~NonlinearProgram() = default;
+  NonlinearProgram(const NonlinearProgram&) = delete;
+  NonlinearProgram& operator=(const NonlinearProgram&) = delete;
+
+  // point arrives sized, with zeros. x is within the bounds.
+  virtual void evaluate(const Eigen::VectorXd& x, NlpPoint& point) = 0;
+  // f and c alone, where they are cheaper than with derivatives.
+  virtual void evaluate_values(const Eigen::VectorXd& x, NlpPoint& point) {
+    point.f_x.setZero(x.size()), point.c_x.setZero(constraints(), x.size());
+    evaluate(x, point);
+  }
+  // Second derivatives of f, then of each c: n x n each. False where there are none.
+  virtual bool hessians(const Eigen::VectorXd&, std::vector<Eigen::MatrixXd>&) { return false; }
+
+  // f_x at x + d, within the bounds; of a simulation on the steps of x, so that differences are smooth. False: it
+  // fails.
+  virtual bool gradient_beside(const Eigen::VectorXd& x, const Eigen::VectorXd& d, Eigen::VectorXd& f_x) {
+    NlpPoint p;
+    p.f_x.setZero(x.size()), p.c.setZero(constraints()), p.c_x.setZero(constraints(), x.size());
+    evaluate(x + d, p);
+    f_x = p.f_x;
+    return p.ok;
+  }
+
+  Eigen::Index variables() const { return x_lower.size(); }
+  Eigen::Index constraints() const { return c_lower.size(); }
+  // The largest amount by which a constraint is violated.
+  double violation(const Eigen::VectorXd& c) const {
+    if (c.size() == 0) return 0;
+    return std::max(0.0, (c_lower - c).cwiseMax(c - c_upper).maxCoeff());
+  }
+
+  Eigen::VectorXd x_lower, x_upper, c_lower, c_upper;  // +-infinity where there is none
+  double f_scale = 1;                                  // multiplies f where the solver tests convergence
+  Eigen::VectorXd c_scale;                             // the same for c; ones
+};
+
+// Points that were computed in an earlier run, and a place where new ones are written down: a run that was killed goes
+// on from there.
+struct PointRecords {
+  virtual ~PointRecords() = default;
+  virtual bool recall(const Eigen::VectorXd& x, Wanted wanted, NlpPoint& point) = 0;
+  virtual void record(const Eigen::VectorXd& x, Wanted wanted, const NlpPoint& point) = 0;
+  virtual bool recall(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& hessians) = 0;
+  virtual void record(const Eigen::VectorXd& x, const std::vector<Eigen::MatrixXd>& hessians) = 0;
+};
+
+// What every solver takes and gives.
+struct NlpProgress {
+  int iteration = 0;
+  double f = 0;
+  double violation = 0;   // of the constraints
+  double optimality = 0;  // largest entry of the Lagrangian's gradient, as the solver scales it; NaN: not known
+  const Eigen::VectorXd& x;
+};
+
+// x: the solution, or the best point seen: feasible before lower f.
+struct NlpResult : SolverOutcome {
+  NlpPoint point;         // at x
+  std::string algorithm;  // in the words of the library that it comes from
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,275 @@
+#include "optim/tradeoff/accuracy.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include "core/expression/counted.hpp"
+#include "core/scene/vocabulary.hpp"
+#include "core/watch/stiffness.hpp"
+#include "optim/tradeoff/tradeoff_errors.hpp"
+#include "optim/tradeoff/tradeoff_reference.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+
+// Independent closed chains: joints that connect what is connected already. The ground is a body here.
+int loops_of(const Scene& scene) {
+  std::vector<std::string> names{"ground"};
+  for (const Body& body : scene.bodies) names.push_back(body.name);
+  std::vector<std::size_t> group(names.size());
+  std::iota(group.begin(), group.end(), std::size_t{0});
+  const auto group_of = [&](const std::string& body) {
+    const auto found = std::find(names.begin(), names.end(), body);
+    return found == names.end() ? 0 : group[static_cast<std::size_t>(found - names.begin())];
+  };
+  int loops = 0;
+  for (const Joint& joint : scene.joints) {
+    const std::size_t one = group_of(joint.body1), other = group_of(joint.body2);
+    if (one == other) ++loops;
+    std::replace(group.begin(), group.end(), one, other);
+  }
+  return loops;
+}
+
+SceneFeatures features_of(const Scene& scene) {
+  SceneFeatures features;
+  features.bodies = static_cast<int>(scene.bodies.size());
+  features.loops = loops_of(scene);
+  features.drives = static_cast<int>(scene.drives.size());
+  features.sampled_drives =
+      std::any_of(scene.drives.begin(), scene.drives.end(), [](const Drive& d) { return d.samples.has_value(); });
+  return features;
+}
+
+double rounded(double rtol) { return std::stod(fmt::format("{:.0e}", rtol)); }
+
+class Chooser {
+ public:
+  Chooser(const Scene& scene, const std::vector<Objective>& objectives, const AccuracyOptions& options)
+      : runs_(scene, objectives), options_(options), base_(scene.simulation) {
+    result_.wanted = base_.accuracy.value();
+    result_.features = features_of(scene);
+    base_.accuracy.reset();
+  }
+
+  AccuracyChoice run() {
+    result_.settings = base_;
+    choose_explicit();
+    std::optional<Point> found = settled(kPilotSteps);
+    if (!stiff_why_.empty() && !interrupted()) {
+      choose_implicit();
+      found = settled(base_.integrator.max_steps);
+    }
+    if (found) conclude(*found);
+    if (!found && result_.message.empty()) result_.message = "no run came to its end";
+    return std::move(result_);
+  }
+
+ private:
+  // Of the pilot run: where that does not suffice the scene is either stiff, or long and worth as many steps as it may.
+  static constexpr long kPilotSteps = 2'000;
+  static constexpr double kTightest = 1e-11, kLoosest = 1e-3;  // of rtol
+  static constexpr double kTighter = 100;  // the verifying run's tolerance; rounding starves step-size control beyond
+  static constexpr int kMostRuns = 8;
+
+  struct Point {
+    SimulationSettings settings;
+    Answer answer;
+    Eigen::VectorXd errors;
+    std::vector<ErrorEstimate> estimates;
+    double rtol() const { return settings.integrator.rtol; }
+    double largest() const { return errors.maxCoeff(); }
+  };
+
+  void choose_explicit() {
+    const bool high_order = result_.wanted < 1e-7 && !result_.features.sampled_drives;
+    method_ = high_order ? "dopri853" : "dopri5";
+    verifier_ = result_.features.sampled_drives ? "dopri5" : "dopri853";
+    result_.why = high_order ? "a high order for an accuracy this high"
+                  : result_.features.sampled_drives && result_.wanted < 1e-7
+                      ? "a drive that follows a file is a cubic spline, on which a high order gains nothing"
+                      : "accuracy and not stability limits its steps";
+  }
+
+  void choose_implicit() {
+    method_ = verifier_ = "radau5";
+    result_.why = "stiff: " + stiff_why_;
+    implicit_ = true;
+  }
+
+  bool interrupted() const { return options_.limit.interrupted && options_.limit.interrupted(); }
+
+  Answer answer(const SimulationSettings& settings) {
+    ++result_.simulations;
+    if (options_.progress) options_.progress(static_cast<int>(result_.simulations));
+    return runs_.motion(settings, options_.limit);
+  }
+
+  // A run much more exact than one at rtol; better than one at the tolerance that there is.
+  Answer verifying(double rtol, double there_is) {
+    Answer verified;
+    for (const double tighter : {kTighter, 0.1 * kTighter}) {
+      const SimulationSettings tight = with_tolerance(base_, verifier_, rounded(rtol / tighter));
+      if (tight.integrator.rtol >= there_is) break;
+      verified = answer(tight);
+      if (verified.ok) result_.verified_by = tight.integrator;
+      if (verified.ok || interrupted()) break;
+    }
+    return verified;
+  }
+
+  SimulationSettings settings_at(const char* method, double rtol, long max_steps) const {
+    SimulationSettings settings = with_tolerance(base_, method, rounded(std::clamp(rtol, kTightest, kLoosest)));
+    settings.integrator.max_steps = std::min(max_steps, settings.integrator.max_steps);
+    return settings;
+  }
+
+  // Whether what an explicit method did shows that it is the wrong one. Keeps what it found.
+  bool is_wrong_method(const Point& point) {
+    const SimulationStatistics& s = point.answer.statistics;
+    if (implicit_ || s.watched_steps == 0) return false;
+    result_.features.limited_steps =
+        static_cast<double>(s.stability_limited_steps) / static_cast<double>(s.watched_steps);
+    result_.features.stiffest_rate = s.stiffest_rate;
+    if (is_stability_limited(s))
+      stiff_why_ = fmt::format("stability limits {:.0f} % of the steps of {}, at rates up to {:.1e} 1/s",
+                               100 * result_.features.limited_steps, method_, s.stiffest_rate);
+    return is_stability_limited(s);
+  }
+
+  // Whether an implicit method needs less than half of the right-hand sides that an unfinished explicit run would need;
+  // their number, unlike the time, is no matter of chance.
+  bool implicit_is_cheaper(const Point& unfinished) {
+    const SimulationSettings settings = settings_at("radau5", unfinished.rtol(), base_.integrator.max_steps);
+    const Answer implicit = answer(settings);
+    if (!implicit.ok || unfinished.answer.steps.times.empty()) return false;
+    const double done = unfinished.answer.steps.times.back() - base_.start_time;
+    const double needed =
+        static_cast<double>(unfinished.answer.statistics.rhs_evaluations) * (base_.end_time - base_.start_time) / done;
+    const double ratio = needed / static_cast<double>(implicit.statistics.rhs_evaluations);
+    if (!(ratio > 2)) return false;
+    stiff_why_ = fmt::format("{} would need {:.1f} times as many right-hand sides", method_, ratio);
+    return true;
+  }
+
+  // A point within what is wanted, or the most exact one that there is; none where nothing ran, or the method is to
+  // change.
+  std::optional<Point> settled(long pilot_steps) {
+    std::optional<Point> best, last;
+    std::optional<Answer> right;  // of the verifying run, and its tolerance
+    double right_rtol = std::numeric_limits<double>::infinity(), rtol = 0.1 * result_.wanted;
+    long max_steps = pilot_steps;
+    for (int runs = 0; runs < kMostRuns; ++runs) {
+      Point point;
+      point.settings = settings_at(method_, rtol, max_steps);
+      point.answer = answer(point.settings);
+      if (interrupted()) return {};
+      if (is_wrong_method(point)) {
+        if (!best || best->largest() > result_.wanted) return {};
+        stiff_why_.clear();  // it was right at a tighter tolerance, and stays
+        break;
+      }
+      if (!point.answer.ok) {
+        if (max_steps < base_.integrator.max_steps && point.answer.statistics.steps >= max_steps / 2) {
+          if (implicit_is_cheaper(point)) return {};
+          max_steps = base_.integrator.max_steps;  // long, not stiff
+          continue;
+        }
+        if (best || rtol <= 1e-6) return failed(point.answer, std::move(best));
+        rtol *= 1e-2;  // too loose to get through
+        continue;
+      }
+      max_steps = base_.integrator.max_steps;
+      if (!right || right_rtol > 1.01 * point.rtol() / kTighter) {
+        Answer verified = verifying(point.rtol(), right_rtol);
+        if (!verified.ok && !right) return failed(verified, std::move(best));
+        if (verified.ok) right = std::move(verified), right_rtol = result_.verified_by.rtol;
+      }
+      judge(point, *right);
+      const double error = std::max(point.largest(), AccuracyChoice::kRounding), aim = result_.wanted / 3;
+      // The order in which the error falls with the tolerance, between the last two points.
+      double order = 1;
+      if (last && last->rtol() != point.rtol() && last->largest() > 0 && error > AccuracyChoice::kRounding)
+        order = std::log(error / last->largest()) / std::log(point.rtol() / last->rtol());
+      order = std::isfinite(order) ? std::clamp(order, 0.5, 1.5) : 1;
+      const bool within = error <= result_.wanted, looser_before = last && last->rtol() > point.rtol();
+      if (!best || (within ? best->largest() > result_.wanted || point.rtol() > best->rtol()
+                           : point.largest() < best->largest()))
+        best = point;
+      if (within && (looser_before || error > 0.03 * result_.wanted || point.rtol() >= kLoosest)) break;
+      if (!within && best->largest() <= result_.wanted) break;  // loosened too far
+      if (!within && point.rtol() <= kTightest) break;
+      const double change = std::pow(aim / error, 1 / order);
+      rtol = point.rtol() * (within ? std::min(change, 100.0) : std::clamp(change, 1e-4, 0.3));
+      last = std::move(point);
+      if (within && rounded(std::clamp(rtol, kTightest, kLoosest)) <= last->rtol()) break;
+    }
+    return best;
+  }
+
+  std::optional<Point> failed(const Answer& answer, std::optional<Point> best) {
+    if (!best) result_.message = answer.message;
+    return best;
+  }
+
+  // The errors of a point against the right answer: of the simulated objectives, or of the motion.
+  void judge(Point& point, const Answer& right) const {
+    constexpr double kKnown = 10;
+    const TradeoffErrors errors(runs_, right, point.answer, kKnown);
+    const std::vector<Quantity>& all = errors.quantities();
+    const bool objectives = std::any_of(all.begin(), all.end(), [](const Quantity& q) { return is_objective(q); });
+    for (const Quantity& q : all) {
+      if (objectives ? !is_objective(q) : q.kind != QuantityKind::motion) continue;
+      const std::string name = objectives ? runs_.objectives()[static_cast<std::size_t>(q.objective)].name() : q.name;
+      point.estimates.push_back({name, q.relative, std::max(q.certificate, AccuracyChoice::kRounding)});
+    }
+    point.errors.resize(static_cast<Index>(point.estimates.size()));
+    for (std::size_t i = 0; i < point.estimates.size(); ++i)
+      point.errors(static_cast<Index>(i)) = point.estimates[i].error;
+  }
+  static bool is_objective(const Quantity& q) { return q.kind == QuantityKind::objective; }
+
+  void conclude(const Point& point) {
+    result_.ok = true;
+    result_.settings = point.settings;
+    result_.settings.integrator.max_steps = base_.integrator.max_steps;
+    result_.estimates = point.estimates;
+    result_.reached = point.largest() <= result_.wanted;
+  }
+
+  const TradeoffRuns runs_;
+  const AccuracyOptions& options_;
+  SimulationSettings base_;
+  const char *method_ = "", *verifier_ = "";
+  bool implicit_ = false;
+  std::string stiff_why_;  // why an explicit method will not do; empty: it does
+  AccuracyChoice result_;
+};
+
+}  // namespace
+
+double AccuracyChoice::largest_error() const {
+  double largest = 0;
+  for (const ErrorEstimate& e : estimates) largest = std::max(largest, e.error);
+  return largest;
+}
+
+AccuracyChoice choose_accuracy(const Scene& scene, const std::vector<Objective>& objectives,
+                               const AccuracyOptions& options) {
+  return Chooser(scene, objectives, options).run();
+}
+
+std::string accuracy_in_words(double accuracy) {
+  for (const Choice<double>& level : kAccuracies)
+    if (level.value == accuracy) return fmt::format("{} ({:.0e})", level.word, accuracy);
+  return fmt::format("{:.0e}", accuracy);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,70 @@
+// Integrator and tolerances for a wanted accuracy (simulation.accuracy), found by running the scene, and the error that
+// is to be expected of them.
+//
+//   wanted   relative error of the objectives; of the motion where none is simulated (tradeoff_errors.hpp)
+//   method   explicit, unless stability and not accuracy limits its steps (core/watch/stiffness.hpp): then implicit
+//   rtol     from error ~ C rtol^p, fitted to the runs made so far, until the estimate is within what is wanted
+//   error    what the answer differs by from that of a run with a tolerance 100 times smaller, by dopri853 where the
+//   method
+//            is explicit: Hairer, Norsett, Wanner, "Solving Ordinary Differential Equations I" (1993), section II.4,
+//            where y_hat - y1 estimates the error of a step; here of the whole run
+//
+//   AccuracyChoice choice = choose_accuracy(problem.scene, objectives_of(problem));
+//   problem.scene.simulation = choice.settings;           // once: what is designed then is a function that does not
+//   jump
+//
+// Nothing in it depends on time measured: the same scene gives the same choice everywhere.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "optim/tradeoff/tradeoff_runs.hpp"
+
+namespace mbsopt {
+
+// What the scene is like, as far as the choice asks.
+struct SceneFeatures {
+  int bodies = 0, loops = 0, drives = 0;
+  bool sampled_drives = false;  // some drive follows a file: a cubic spline, which high orders gain nothing on
+  double stiffest_rate = 0;     // |lambda| of steps at the edge of stability [1/s]; 0: there were none
+  double limited_steps = 0;     // their part of the explicit run's
+};
+
+struct ErrorEstimate {
+  std::string quantity;  // an objective's name, or "motion"
+  bool relative = true;  // absolute where the quantity is near zero
+  double error = 0;      // at least AccuracyChoice::kRounding
+};
+
+struct AccuracyChoice {
+  // What two runs may be apart by rounding alone: no estimate is smaller.
+  static constexpr double kRounding = 1e-12;
+
+  bool ok = false;
+  std::string message;  // why not
+  double wanted = 0;
+  SimulationSettings settings;  // the scene's own, with integrator, rtol and atol chosen; without `accuracy`
+  std::vector<ErrorEstimate> estimates;
+  bool reached = false;  // all of them are within what is wanted
+  SceneFeatures features;
+  std::string why;  // the method, in words
+  IntegratorSettings verified_by;
+  long simulations = 0;
+  double largest_error() const;
+};
+
+struct AccuracyOptions {
+  RunLimit limit = {};
+  std::function<void(int simulations)> progress = {};
+};
+
+// scene.simulation.accuracy must be there.
+AccuracyChoice choose_accuracy(const Scene& scene, const std::vector<Objective>& objectives,
+                               const AccuracyOptions& options = {});
+
+// "engineering (1e-05)", "2e-04"
+std::string accuracy_in_words(double accuracy);
+
+}  // namespace mbsopt

@@ -1,0 +1,72 @@
+// The trade between speed and accuracy of one problem, measured: integrators x tolerances (or steps) x formulations for
+// the motion, the sensors and the objectives, and every gradient method for their gradients; errors against a reference
+// that two methods certify (tradeoff_reference.hpp).
+//
+//   const Tradeoff tradeoff = measure_tradeoff(problem.scene, objectives_of(problem), {.budget_seconds = 20});
+//   for (const TradeoffRow& row : tradeoff.rows) std::cout << in_words(row.setting) << ' ' << row.wall_seconds << '\n';
+//
+// Settings that differ in tolerance or step only are a curve. Curves are followed from loose to tight, the cheapest
+// next point first; one ends where its next point would cost more than its share of the budget, or where the reference
+// is no more exact than it. Afterwards all points are timed again, in turn, so that a busy minute does not fall on one
+// of them: times are medians.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "optim/tradeoff/tradeoff_reference.hpp"
+#include "optim/tradeoff/tradeoff_row.hpp"
+
+namespace mbsopt {
+
+// The cheapest setting for an accuracy; see recommend().
+struct Recommendation {
+  std::vector<std::size_t> quantities;  // indices; all of them within the accuracy
+  double accuracy = 0;
+  std::optional<std::size_t> row;  // absent: none
+  std::string why_not;
+};
+
+struct Tradeoff {
+  std::string message;  // why there is nothing
+  TradeoffReference reference;
+  std::vector<TradeoffRow> rows;
+  std::optional<std::size_t> own, defaults, own_gradient, default_gradient;  // rows of the scene's own settings, and
+                                                                             // of the program's defaults
+  bool interrupted = false;
+  double wall_seconds = 0;
+  bool ok() const { return reference.ok(); }
+};
+
+struct TradeoffOptions {
+  double budget_seconds = 60;  // 0: the reference, the scene's own settings and the defaults only
+  std::function<bool()> interrupted = {};
+  std::function<void(const std::string& doing, double done)> progress = {};  // done: 0..1
+  Clock clock = {};                                                          // of the budget and of all times
+};
+
+Tradeoff measure_tradeoff(const Scene& scene, const std::vector<Objective>& objectives,
+                          const TradeoffOptions& options = {});
+
+// The row of the simulation with the settings of a gradient's row, or that of a looser one of the same kind that is
+// already as exact as the reference; of a simulation's row itself. None: not measured.
+std::optional<std::size_t> simulation_of(const Tradeoff& tradeoff, std::size_t row);
+
+// The fastest row whose bounds in these quantities are within the accuracy, so that none is taken for an error that
+// happens to pass through zero. Of rows that are equally fast to a tenth the one with the lowest bound. None where the
+// reference is not three times as exact as what is asked for. Where gradients and other quantities are asked for, rows
+// of exact gradients, with the bounds of their simulations. also: what else must hold of a row, asked of the fastest
+// rows first, until it does.
+Recommendation recommend(const Tradeoff& tradeoff, std::vector<std::size_t> quantities, double accuracy,
+                         const std::function<bool(const TradeoffRow&)>& also = {});
+
+// What the scene is run for: the objectives, or the sensors where there are none, or the motion.
+std::vector<std::size_t> main_quantities(const std::vector<Quantity>& quantities);
+// What an optimiser uses: the named objectives and their gradients.
+std::vector<std::size_t> design_quantities(const std::vector<Quantity>& quantities,
+                                           const std::vector<std::string>& objectives);
+
+}  // namespace mbsopt

@@ -1,0 +1,69 @@
+// How wrong an answer is against the right one, quantity by quantity; each error is one number:
+//
+//   motion     largest distance (sampled_motion.hpp) over 100 times, relative to how far the motion gets from its start
+//   sensors    largest over sensors and times of |s - s*|, relative to that sensor's largest |s*|
+//   objective  |psi - psi*| / |psi*|
+//   gradient   of an objective: |D (g - g*)| / |D g*|, D: sizes of the parameters, on the diagonal
+//
+// Where the right answer is zero, or so small that two methods do not agree on its first three digits (`clearly` says
+// otherwise), the error of the motion, an objective or a gradient is absolute, and a sensor is left out.
+//
+// A deviation is an error with its sign: (psi - psi*) / |psi*|, and of a gradient its part along the right one,
+// (D (g - g*))' D g* / |D g*|^2. Where it changes sign from a setting to the next, an error passes through zero.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "optim/tradeoff/tradeoff_runs.hpp"
+
+namespace mbsopt {
+
+enum class QuantityKind { motion, sensors, objective, gradient };
+
+struct Quantity {
+  QuantityKind kind = QuantityKind::motion;
+  std::string name;            // "motion", "sensors", "travel" ("objective motion"), "gradient of travel"
+  std::string objective_name;  // of objective, gradient
+  Eigen::Index objective = 0;  // of objective, gradient
+  bool relative = true;
+  double scale = 1;        // what the error is divided by
+  double certificate = 0;  // what two methods are apart in it, in the same measure
+};
+
+class TradeoffErrors {
+ public:
+  // Two answers that should be the same, by different methods; the first is the more exact one. Each has the motion and
+  // the gradients, where there are any.
+  // Errors are relative to what is `clearly` times as large as what the two are apart.
+  TradeoffErrors(const TradeoffRuns& runs, Answer exact, const Answer& second, double clearly = 1e3);
+
+  // The same measures against another answer, by the same scales.
+  TradeoffErrors(TradeoffErrors measures, Answer exact) : TradeoffErrors(std::move(measures)) {
+    exact_ = std::move(exact);
+  }
+
+  const Answer& exact() const { return exact_; }
+  const std::vector<Quantity>& quantities() const { return quantities_; }
+  // One per quantity; NaN where the answer does not hold it.
+  Eigen::VectorXd of(const Answer& answer) const;
+  // Likewise; NaN for the motion and the sensors, which have no one sign.
+  Eigen::VectorXd deviations(const Answer& answer) const;
+
+ private:
+  double error(const Quantity& quantity, const Answer& answer) const;
+  double deviation(const Quantity& quantity, const Answer& answer) const;
+  bool is_known(double size, double apart) const { return size > clearly_ * apart; }
+  double sensor_error(const Answer& answer) const;
+  double gradient_size(const Eigen::Ref<const Eigen::RowVectorXd>& gradient) const;
+
+  MotionDistance distance_;
+  Answer exact_;
+  double clearly_;
+  Eigen::VectorXd sensor_scale_;  // 0: left out
+  Eigen::VectorXd parameter_size_;
+  std::vector<Quantity> quantities_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,56 @@
+// The right answer of a problem, found by two methods that share no table: each goes on to tighter tolerances until its
+// answer no longer settles (rounding) or costs too much. What the two are apart is the reference's certificate.
+//
+// Methods: dopri853 (explicit) and gauss6 (implicit); where one of them does not get there (stiff motion, singular
+// positions) verner6 and radau5. Where equations were not met next to singular positions, gauss6 and radau5 with steps
+// of one size, too: step-size control takes ever shorter steps around these positions, and some stage comes too close.
+// Equations: the constrained ones (augmented Lagrangian, projected), whatever the scene asks for.
+//
+//   const TradeoffReference reference = converged_reference(runs);
+//   if (reference.ok()) reference.errors->of(answer);
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "optim/tradeoff/tradeoff_errors.hpp"
+
+namespace mbsopt {
+
+struct ReferenceMethod {
+  std::string integrator;
+  double rtol = 0;
+  std::optional<double> step;  // fixed: there is no rtol
+  double wall_seconds = 0;     // of its last simulation
+};
+
+// "gauss6 at rtol 1e-11", "gauss6 with steps of 0.005 s"
+std::string in_words(const ReferenceMethod& method);
+
+struct TradeoffReference {
+  std::string message;                   // why there is none
+  std::optional<TradeoffErrors> errors;  // against it
+  ReferenceMethod first, second;         // the answer is that of the first
+  std::string gradients_by;              // tlm, adjoint, and on which steps, if not these; empty: none
+  double wall_seconds = 0;
+  bool interrupted = false;
+  bool ok() const { return errors.has_value(); }
+};
+
+struct ReferenceOptions {
+  double seconds_per_run = 10;  // a run that would take longer is left out
+  bool gradients = true;
+  std::function<bool()> interrupted = {};
+  Clock clock = {};  // of seconds_per_run
+};
+
+TradeoffReference converged_reference(const TradeoffRuns& runs, const ReferenceOptions& options = {});
+
+// The scene's settings with another integrator at a tolerance; atol follows as in the scene (1e-2 of rtol where that
+// has a fixed step).
+SimulationSettings with_tolerance(SimulationSettings settings, const std::string& integrator, double rtol);
+
+// The constrained equations: the scene's own formulation where it is an augmented Lagrangian with full projection.
+FormulationSettings constrained(const FormulationSettings& formulation);
+
+}  // namespace mbsopt

@@ -1,0 +1,184 @@
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <thread>
+
+#include "app/terminal/exit_code.hpp"
+#include "tests/app/run_command.hpp"
+#include "tests/app/signal_handler.hpp"
+
+using namespace mbsopt;
+using Catch::Contains;
+namespace fs = std::filesystem;
+
+namespace {
+
+const std::vector<std::string> kBounds{"--set", "parameters.k.lower=1", "--set", "parameters.k.upper=100"};
+
+CommandOutcome run_design_command(const std::string& file, const std::string& out,
+                                  const std::vector<std::string>& more = kBounds) {
+  std::vector<std::string> arguments{"design", file, "--out", out};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return run_command(arguments);
+}
+
+}  // namespace
+
+TEST_CASE("design: a minimum inside the bounds, told in a table, a history and a result", "[command]") {
+  const TemporaryFolder folder;
+  const CommandOutcome outcome = run_design_command(folder.write("rod.json", kPendulum), folder.file("out"));
+  REQUIRE(outcome.exit_code == kDone);
+  CHECK_THAT(outcome.out, Contains("optimum") && Contains("N/m") && Contains("track"));
+  CHECK_THAT(outcome.err, Contains("iteration   0"));  // a line per iteration: no terminal here
+
+  const auto result = json_of(folder.path / "out/result.json");
+  const auto& k = result.at("parameters").at("k");
+  CHECK(k.at("initial") == 20);
+  const double optimum = k.at("value");
+  CHECK((optimum > 1 && optimum < 100));
+  const auto& optimizer = result.at("optimizer");
+  CHECK(optimizer.at("status") == "converged");
+  CHECK(optimizer.at("objective_final") < optimizer.at("objective_initial"));
+  const std::string report = content_of(folder.path / "out/report.html");
+  CHECK_THAT(report, Contains("At the start, seen in the x-y plane") && Contains("converged: the optimality"));
+  CHECK(report.find("class=\"banner\"") == std::string::npos);
+  const std::string history = content_of(folder.path / "out/history.csv");
+  CHECK_THAT(history, Catch::StartsWith("iteration,objective,infeasibility,optimality,k\n0,"));
+  CHECK(std::count(history.begin(), history.end(), '\n') == optimizer.at("iterations").get<int>() + 2);
+}
+
+TEST_CASE("design: optimized.json is a problem whose objective is the optimum's", "[command]") {
+  const TemporaryFolder folder;
+  REQUIRE(run_design_command(folder.write("rod.json", kPendulum), folder.file("out")).exit_code == kDone);
+  const double found = json_of(folder.path / "out/result.json").at("optimizer").at("objective_final");
+  REQUIRE(run_command({"simulate", folder.file("out/optimized.json"), "--out", folder.file("again")}).exit_code ==
+          kDone);
+  const double again = json_of(folder.path / "again/result.json").at("objectives").at("track").at("value");
+  CHECK(again == Approx(found).epsilon(1e-12));
+}
+
+TEST_CASE("design: a bound that holds the optimum back is named", "[command]") {
+  const TemporaryFolder folder;
+  const CommandOutcome outcome =
+      run_design_command(folder.write("rod.json", kPendulum), folder.file("out"),
+                         {"--set", "parameters.k.lower=18", "--set", "parameters.k.upper=22"});
+  REQUIRE(outcome.exit_code == kDone);
+  const auto k = json_of(folder.path / "out/result.json").at("parameters").at("k");
+  REQUIRE(k.at("at_bound").is_string());
+  CHECK(k.at("value").get<double>() == Approx(k.at(k.at("at_bound").get<std::string>()).get<double>()).epsilon(1e-6));
+}
+
+TEST_CASE("design: too few iterations is a failure in words that keeps the best so far", "[command]") {
+  const TemporaryFolder folder;
+  std::vector<std::string> more = kBounds;
+  more.insert(more.end(), {"--set", "design.optimizer.max_iterations=1"});
+  const CommandOutcome outcome = run_design_command(folder.write("rod.json", kPendulum), folder.file("out"), more);
+  CHECK(outcome.exit_code == kNumericalFailure);
+  CHECK_THAT(outcome.err, Contains("design failed: "));
+  const auto result = json_of(folder.path / "out/result.json");
+  CHECK(result.at("status") == "failed");
+  CHECK(result.at("optimizer").at("objective_final") <= result.at("optimizer").at("objective_initial"));
+  CHECK(fs::exists(folder.path / "out/optimized.json"));
+  CHECK_THAT(content_of(folder.path / "out/report.html"),
+             Contains("class=\"banner\"") && Contains("This run failed: stopped at the limit of 1 iteration"));
+}
+
+TEST_CASE("design: SIGTERM keeps the best so far", "[command]") {
+  const TemporaryFolder folder;
+  std::thread killer([] {
+    wait_for_handler(SIGTERM);
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    ::kill(::getpid(), SIGTERM);
+  });
+  std::vector<std::string> more = kBounds;  // simulations that take seconds, so that the signal comes within one
+  more.insert(more.end(), {"--set", "simulation.integrator.rtol=1e-13", "--set", "simulation.integrator.atol=1e-15",
+                           "--set", "simulation.integrator.max_step=1e-5", "--set", "simulation.output_step=0.1"});
+  const CommandOutcome outcome = run_design_command(folder.write("rod.json", kPendulum), folder.file("out"), more);
+  killer.join();
+  CHECK(outcome.exit_code == kInterrupted);
+  const auto result = json_of(folder.path / "out/result.json");
+  CHECK(result.at("status") == "interrupted");
+  const std::string kept = result.at("message");
+  // Only what is there: the design, unless the signal came before it began.
+  CHECK_THAT(kept, Contains("optimized.json") || Contains("nothing was designed yet"));
+  CHECK(fs::exists(folder.path / "out/optimized.json") == (kept.find("optimized.json") != std::string::npos));
+}
+
+TEST_CASE("design and identify of a file that does not ask for them are bad input", "[command]") {
+  const TemporaryFolder folder;
+  std::string text = kPendulum;
+  text.erase(text.find(",\n  \"design\""));
+  const std::string file = folder.write("bare.json", text + "}");
+  for (const std::string command : {"design", "identify"}) {
+    const CommandOutcome outcome = run_command({command, file, "--out", folder.file("out")});
+    CHECK(outcome.exit_code == kBadInput);
+    CHECK_THAT(outcome.err, Contains(command == "design" ? "design: missing" : "identification: missing"));
+  }
+}
+
+TEST_CASE("a limit that holds for a smooth maximum only is never a bare 'converged'", "[design]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("peak.json", R"({
+    "format": 1, "name": "peak", "gravity": [0, -9.81, 0],
+    "parameters": {"k": {"value": 20, "lower": 1, "upper": 200}},
+    "bodies": [{"name": "rod", "mass": 2, "com": [0.5, 0, 0], "inertia": [1e-3, 0.1666, 0.1666],
+                "points": {"tip": [1, 0, 0]}}],
+    "joints": [{"name": "pin", "type": "revolute", "body1": "ground", "body2": "rod",
+                "point1": [0, 0, 0], "point2": "O", "axis1": [0, 0, 1], "axis2": [0, 0, 1]}],
+    "forces": [{"name": "spring", "type": "tsda", "body1": "ground", "body2": "rod",
+                "point1": [0, 1, 0], "point2": "tip", "stiffness": "k", "free_length": 0.5}],
+    "sensors": {"F": {"quantity": "force", "force": "spring"},
+                "tip_y": {"quantity": "position", "body": "rod", "point": "tip", "component": "y"}},
+    "simulation": {"end_time": 2, "output_step": 0.25},
+    "objectives": {"track": {"running": "(tip_y - 0.3)^2"}, "peak": {"maximum_of": "F", "sharpness": 1}},
+    "design": {"minimize": "track", "variables": ["k"], "subject_to": [{"objective": "peak", "upper": 12}]}
+  })");
+  const CommandOutcome outcome = run_command({"design", file, "--out", folder.file("out"), "--quiet"});
+  INFO(outcome.out << outcome.err);
+  CHECK(outcome.exit_code == kDone);
+  CHECK(outcome.out.find("ipopt converged_beyond_limit:") != std::string::npos);
+  CHECK(outcome.out.find(" of true extremes") != std::string::npos);
+  const auto result = json_of(folder.path / "out/result.json");
+  CHECK(result.at("optimizer").at("status") == "converged_beyond_limit");
+  CHECK(result.at("optimizer").at("true_infeasibility").get<double>() > 0.1);
+  const auto& peak = result.at("objectives").at("peak");
+  CHECK(peak.at("violation").get<double>() < 1e-6);
+  CHECK(peak.at("true_violation").get<double>() == Approx(peak.at("true_value").get<double>() - 12));
+  std::string said;
+  for (const auto& warning : result.at("warnings")) said += warning.get<std::string>() + "\n";
+  INFO(said);
+  CHECK(said.find("design.subject_to[0]: the maximum of 'peak' is held by its smooth value, 11.") != std::string::npos);
+  CHECK(said.find("above the limit 12") != std::string::npos);
+}
+
+TEST_CASE("a parameter that moves a jump is named by gradient, check and design", "[design]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("jump.json", R"json({
+    "format": 1, "name": "jump", "gravity": [0, -9.81, 0],
+    "parameters": {"tp": {"value": 0.4, "lower": 0.1, "upper": 0.9}},
+    "bodies": [{"name": "rod", "mass": 2, "com": [0.5, 0, 0], "inertia": [1e-3, 0.1666, 0.1666],
+                "points": {"tip": [1, 0, 0]}}],
+    "joints": [{"name": "pin", "type": "revolute", "body1": "ground", "body2": "rod",
+                "point1": [0, 0, 0], "point2": "O", "axis1": [0, 0, 1], "axis2": [0, 0, 1]}],
+    "forces": [{"name": "push", "type": "force", "body": "rod", "point": "tip",
+                "components": [0, "10 + 10*abs(t - tp)/(t - tp)", 0]}],
+    "sensors": {"tip_y": {"quantity": "position", "body": "rod", "point": "tip", "component": "y"}},
+    "simulation": {"end_time": 1, "output_step": 0.25},
+    "objectives": {"track": {"running": "(tip_y + 0.5)^2"}},
+    "design": {"minimize": "track", "variables": ["tp"]}
+  })json");
+  for (const std::string command : {"gradient", "check", "design"}) {
+    const CommandOutcome outcome = run_command({command, file, "--out", folder.file(command), "--quiet"});
+    INFO(command << outcome.out << outcome.err);
+    std::string said;
+    const auto result = json_of(folder.path / command / "result.json");
+    for (const auto& warning : result.at("warnings")) said += warning.get<std::string>() + "\n";
+    INFO(said);
+    CHECK(said.find("the law of force 'push' jumps by 20 at t = 0.4 s, an instant that depends on 'tp'") !=
+          std::string::npos);
+    if (command == "design") CHECK(said.find("the derivative of objective 'track' in 'tp' is ") != std::string::npos);
+  }
+}

@@ -1,0 +1,35 @@
+#include "core/start/model_warnings.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "tests/core/mechanism/moving_scenes.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+
+namespace {
+
+std::vector<std::string> warnings_of(const Scene& scene) {
+  const Mechanism mechanism(scene, nominal(scene));
+  return model_warnings(mechanism, Assembly(mechanism, 0));
+}
+
+}  // namespace
+
+TEST_CASE("gravity that moves nothing in the plane of a mechanism is warned of", "[warnings]") {
+  Scene scene = pendulum();  // about z
+  scene.gravity = {0.0, 0.0, -9.81};
+  const std::vector<std::string> found = warnings_of(scene);
+  REQUIRE(found.size() == 1);
+  CHECK(found[0].find("gravity: is [0, 0, -9.81] m/s^2, normal to the plane") == 0);
+  scene.gravity = {0.0, -9.81, 0.0};
+  CHECK(warnings_of(scene).empty());
+  scene.gravity = {0.0, -0.1, -9.81};
+  CHECK(warnings_of(scene).empty());
+  scene.gravity = {0.0, 0.0, -9.81};
+  Scene wheel = scene;  // held at its centre of mass, which no gravity moves
+  wheel.bodies[0].com = {0.0, 0.0, 0.0}, wheel.joints[0].point2 = PointField(std::string("O"));
+  CHECK(warnings_of(wheel).empty());
+  scene.gravity = {0.0, 0.0, 0.0};
+  CHECK(warnings_of(scene).empty());
+}

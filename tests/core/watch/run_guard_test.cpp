@@ -1,0 +1,68 @@
+#include "core/watch/run_guard.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "core/simulate/simulation.hpp"
+#include "tests/core/mechanism/moving_scenes.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+
+namespace {
+
+// A block in a bushing about its centre, set turning.
+Scene block_in_rubber(VectorField omega, double damping) {
+  Scene s;
+  s.gravity = {0.0, 0.0, 0.0};
+  s.bodies.push_back(plain_body("block", 1, {0.1, 0.15, 0.2, 0.0, 0.0, 0.0}, vec("0", "0", "0")));
+  s.bodies[0].angular_velocity = std::move(omega);
+  BushingSpec rubber;
+  rubber.body1 = "ground", rubber.body2 = "block";
+  rubber.stiffness = {100.0, 100.0, 100.0}, rubber.torsional_stiffness = {1.0, 2.0, 3.0};
+  rubber.torsional_damping = {damping, damping, damping};
+  s.forces.push_back({"rubber", rubber});
+  s.simulation.end_time = 5;
+  return s;
+}
+
+SimulationResult run(const Scene& s) { return simulate(Mechanism(s, nominal(s)), s.simulation); }
+
+}  // namespace
+
+TEST_CASE("a bushing that comes to half a turn ends the run by its name and angle", "[simulation]") {
+  const std::string method = GENERATE("dopri5", "radau5", "cvodes_adams");
+  const bool about_one_axis = GENERATE(true, false);
+  Scene scene = about_one_axis ? block_in_rubber(vec("0", "0", "20"), 0) : block_in_rubber(vec("3", "1", "20"), 0.1);
+  scene.simulation.integrator.type = method;
+  const SimulationResult result = run(scene);
+  CHECK(result.status == SimulationStatus::not_credible);
+  CHECK_THAT(result.message, Catch::Contains("forces[0], the bushing between 'ground' and 'block', is turned by 3.1"));
+  CHECK(result.statistics.steps < 1000);
+}
+
+TEST_CASE("a bushing below half a turn runs through", "[simulation]") {
+  const SimulationResult result = run(block_in_rubber(vec("0.3", "0.1", "5"), 0.1));
+  INFO(result.message);
+  CHECK(result.ok());
+}
+
+TEST_CASE("a body that turns more often than steps are allowed is refused at the start", "[simulation]") {
+  Scene scene = block_in_rubber(vec("1e9", "3e8", "0"), 0);
+  scene.forces.clear();
+  scene.simulation.integrator.type = GENERATE("dopri853", "cvodes_adams");
+  const SimulationResult result = run(scene);
+  CHECK(result.status == SimulationStatus::not_credible);
+  CHECK_THAT(result.message, Catch::Contains("body 'block' turns at 1.04e+09 rad/s") && Catch::Contains("half turns"));
+  CHECK(result.statistics.steps == 0);
+}
+
+TEST_CASE("projections say how much of the motion a small penalty leaves to them", "[simulation]") {
+  Scene scene = n_four_bar(1);
+  scene.simulation.end_time = 1;
+  FormulationSettings& formulation = scene.simulation.formulation;
+  formulation = FormulationSettings::penalty();
+  formulation.projection = Projection::position_velocity;
+  CHECK(run(scene).statistics.max_acceleration_residual < 1e-4);
+  formulation.alpha = 1e2;
+  CHECK(run(scene).statistics.max_acceleration_residual > 1e-3);
+}

@@ -1,0 +1,218 @@
+#include "optim/check/gradient_check.hpp"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "five_bar.hpp"
+
+using namespace mbsopt;
+
+namespace {
+
+// A user's cost with a derivative that is wrong by some part of itself.
+struct WrongCost : RunningCost {
+  explicit WrongCost(double part) : wrong_(part) {}
+  double g(double, VecIn y, VecIn) const override { return y(0) * y(0); }
+  void add_g_y(double, VecIn y, VecIn, double scale, VecOut out) const override {
+    out(0) += scale * 2 * y(0) * (1 + wrong_);
+  }
+  void add_g_rho(double, VecIn, VecIn, double, VecOut) const override {}
+
+ private:
+  double wrong_;
+};
+
+}  // namespace
+
+TEST_CASE("five-bar: every gradient method agrees with every other", "[check]") {
+  Problem problem = five_bar::problem(1e-8);
+  ObjectiveSpec terminal;
+  terminal.name = "drop";
+  terminal.terminal = Expression::parse("r2_y");
+  terminal.parameters_only = Expression::parse("0.01*k1*m1");
+  terminal.samples = {{0.5, Expression::parse("r2_x*m2")}, {2.25, Expression::parse("t*r2_y^2")}};
+  problem.objectives.push_back(terminal);
+  problem.scene.simulation.end_time = 3;
+  GradientCheckOptions options;
+  options.timing.least_rounds = 3, options.timing.least_seconds = 0;
+  const GradientCheck check = check_gradients(problem, options);
+  REQUIRE(check.ran);
+  REQUIRE(check.entries.size() == 20);
+  for (const CheckedEntry& e : check.entries) {
+    INFO(e.objective << " " << e.parameter << ": tlm " << e.tlm << " adjoint " << e.adjoint << " frozen " << e.frozen
+                     << " +- " << e.frozen_error << " free " << e.free);
+    CHECK(e.exact == Verdict::agrees);
+    CHECK(e.frozen_verdict == Verdict::agrees);
+    CHECK(e.frozen_difference < 1e-7);
+    REQUIRE(e.free_verdict);
+    CHECK(passes(*e.free_verdict));
+    CHECK(e.free_difference < 1e-3);
+    CHECK(std::abs(e.free - e.tlm) <= std::max(1e-7 * std::abs(e.tlm), 10 * e.free_error));
+  }
+  for (const TaylorCheck& t : check.taylor) {
+    INFO(t.objective << " slope " << t.slope.value_or(0));
+    CHECK(t.passed);
+    REQUIRE(t.slope);
+    CHECK(*t.slope < 2.2);
+  }
+  for (const IdentityCheck& i : check.identities) {
+    CHECK(i.relative_defect < 1e-11);
+    CHECK(i.tlm == Approx(i.w.dot(check.tlm * i.d)).epsilon(1e-14));
+  }
+  CHECK(check.passed());
+  CHECK(check.adjoint_cost.ratio > 0);
+  CHECK(check.tlm_cost.ratio > 0);
+  WARN("one simulation " << check.simulation.wall_seconds << " s; tlm " << check.tlm_cost.ratio << ", adjoint "
+                         << check.adjoint_cost.ratio << ", frozen differences " << check.frozen_cost.ratio);
+}
+
+TEST_CASE("entries that are zero, exactly or nearly, get a sane verdict", "[check]") {
+  Problem problem = five_bar::problem(1e-8);
+  problem.scene.simulation.end_time = 0.5;
+  ObjectiveSpec x;
+  x.name = "stiffness";  // of k1 alone: all other entries are exactly zero
+  x.parameters_only = Expression::parse("k1^2");
+  problem.objectives = {x};
+  for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0};
+  const GradientCheck check = check_gradients(problem, options);
+  REQUIRE(check.ran);
+  for (const CheckedEntry& e : check.entries) {
+    const bool zero = e.parameter != "k1";
+    CHECK(e.exact == (zero ? Verdict::zero : Verdict::agrees));
+    CHECK(e.frozen_verdict == (zero ? Verdict::zero : Verdict::agrees));
+  }
+  CHECK(check.passed());
+}
+
+TEST_CASE("a check whose base run fails says why and does not pass", "[check]") {
+  Problem problem = five_bar::problem(1e-8);
+  problem.scene.simulation.integrator.max_steps = 3;
+  const GradientCheck check = check_gradients(problem);
+  CHECK_FALSE(check.ran);
+  CHECK_FALSE(check.message.empty());
+  CHECK_FALSE(check.passed());
+}
+
+TEST_CASE("free differences that their integration error excuses still judge: wrong by a hundredth is seen",
+          "[check]") {
+  Problem problem = five_bar::problem(1e-6);
+  problem.scene.simulation.end_time = 1;
+  const Objective wrong("wrong", std::make_shared<WrongCost>(1e-2), nullptr);
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0};
+  const GradientCheck check = check_gradients(problem.scene, {wrong}, options);
+  REQUIRE(check.ran);
+  const auto disagrees = [](const CheckedEntry& e) { return e.free_verdict == Verdict::disagrees; };
+  CHECK(std::count_if(check.entries.begin(), check.entries.end(), disagrees) > 5);
+}
+
+TEST_CASE("differences that cannot be evaluated have failed, they are not zero", "[check]") {
+  Problem problem = five_bar::problem(1e-6);
+  problem.scene.simulation.end_time = 0.2;
+  ObjectiveSpec root;
+  root.name = "root";  // of a number that is 0 here, and negative on one side
+  root.parameters_only = Expression::parse("sqrt(m1 - m4 + 1e-300) + k1");
+  problem.objectives = {root};
+  for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0};
+  const GradientCheck check = check_gradients(problem, options);
+  REQUIRE(check.ran);
+  CHECK_FALSE(check.passed());
+  for (const CheckedEntry& e : check.entries) {
+    if (e.parameter != "m1" && e.parameter != "m4") continue;
+    CHECK(e.frozen_verdict == Verdict::failed);
+    CHECK(e.free_verdict == Verdict::failed);
+    CHECK(std::isnan(e.frozen));
+    CHECK(to_string(e.frozen_verdict.value()) == "FAILED");
+  }
+}
+
+TEST_CASE("the Taylor remainder of a linear objective has no slope, and that is right", "[check]") {
+  Problem problem = five_bar::problem(1e-6);
+  problem.scene.simulation.end_time = 0.2;
+  ObjectiveSpec sum;
+  sum.name = "sum";
+  sum.parameters_only = Expression::parse("L01 + 2*k1 + m1 + m2 - c1");
+  problem.objectives = {sum};
+  for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0};
+  const GradientCheck check = check_gradients(problem, options);
+  REQUIRE(check.taylor.size() == 1);
+  CHECK_FALSE(check.taylor[0].slope);
+  CHECK(check.taylor[0].passed);
+  CHECK(check.passed());
+}
+
+TEST_CASE("a wrong derivative of a user's cost shows in frozen differences, not in TLM against adjoint", "[check]") {
+  Problem problem = five_bar::problem(1e-8);
+  problem.scene.simulation.end_time = 1;
+  const Objective wrong("wrong", std::make_shared<WrongCost>(1e-5), nullptr);
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0}, options.free_steps = false;
+  const GradientCheck check = check_gradients(problem.scene, {wrong}, options);
+  REQUIRE(check.ran);
+  CHECK_FALSE(check.passed());
+  int disagree = 0;
+  for (const CheckedEntry& e : check.entries) {
+    CHECK(e.exact == Verdict::agrees);
+    disagree += e.frozen_verdict == Verdict::disagrees;
+  }
+  CHECK(disagree > 5);
+}
+
+TEST_CASE("derivatives that are 0 but for rounding do not disagree", "[check]") {
+  // A bar that turns about z in space: inertias about x and y have no part in it.
+  Problem problem;
+  Scene& s = problem.scene;
+  testing::add_parameters(s, {{"jx", 0.7}, {"jy", 0.8}});
+  s.gravity = {0.0, -9.81, 0.0};
+  s.bodies.push_back(testing::body("bar", {0.7, 0.0, 0.0}, {0.0, 0.0, 0.0}, testing::turned("0.3")));
+  s.bodies[0].inertia = {testing::f("jx"), testing::f("jy"), 1.1, 0.1, 0.2, 0.15};
+  s.joints.push_back(testing::hinge("A", "ground", testing::vec("0", "0", "0"), "bar", testing::vec("0", "0", "0")));
+  s.sensors.push_back(testing::angle_sensor("theta", "A"));
+  s.simulation.model = ModelChoice::spatial;
+  ObjectiveSpec swing;
+  swing.name = "swing", swing.running = Expression::parse("(theta + 1)^2");
+  problem.objectives = {swing};
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0}, options.continuous = false;
+  const GradientCheck check = check_gradients(problem, options);
+  REQUIRE(check.ran);
+  REQUIRE(check.entries.size() == 2);
+  bool apart = false;
+  for (const CheckedEntry& e : check.entries) {
+    INFO(e.parameter << ": tlm " << e.tlm << ", adjoint " << e.adjoint << ", frozen " << e.frozen << " +- "
+                     << e.frozen_error << ", free " << e.free << " +- " << e.free_error);
+    CHECK(std::abs(e.tlm) < 1e-13);
+    apart = apart || e.tlm_adjoint > 1e-10;  // of themselves
+    CHECK(passes(e.exact));
+    CHECK(passes(e.frozen_verdict.value()));
+  }
+  CHECK(apart);
+  CHECK(check.passed());
+}
+
+TEST_CASE("rounding by Cholesky at a large penalty is named as what methods differ by", "[check]") {
+  Problem problem = five_bar::problem(1e-8);
+  problem.scene.simulation.end_time = 0.5;
+  problem.scene.simulation.formulation = FormulationSettings::penalty();
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0}, options.continuous = false;
+  const GradientCheck by_cholesky = check_gradients(problem, options);
+  REQUIRE(by_cholesky.ran);
+  CHECK(by_cholesky.passed());
+  const auto names_it = [](const std::string& w) {
+    return w.find("by cholesky rounds derivatives") != std::string::npos &&
+           w.find("quasidefinite") != std::string::npos;
+  };
+  CHECK(std::any_of(by_cholesky.warnings.begin(), by_cholesky.warnings.end(), names_it));
+  problem.scene.simulation.formulation.linear_solver = LinearSolver::quasidefinite;
+  const GradientCheck quasidefinite = check_gradients(problem, options);
+  CHECK(quasidefinite.passed());
+  CHECK(std::none_of(quasidefinite.warnings.begin(), quasidefinite.warnings.end(), names_it));
+}

@@ -1,0 +1,126 @@
+#include "optim/objective/evaluator.hpp"
+
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+
+#include "core/force/user_force.hpp"
+#include "core/tableau/tableaus.hpp"
+#include "optim/check/gradient_check.hpp"
+#include "tests/optim/five_bar.hpp"
+
+using namespace mbsopt;
+using Catch::Contains;
+
+namespace {
+
+// g = max(0, rho_10 - 1) y_0, and how often its gradient is computed.
+struct ClippedCost final : RunningCost {
+  double g(double, VecIn y, VecIn rho) const override { return std::max(0.0, rho(10) - 1) * y(0); }
+  void add_g_y(double, VecIn, VecIn rho, double scale, VecOut out) const override {
+    ++gradients, out(0) += scale * std::max(0.0, rho(10) - 1);
+  }
+  void add_g_rho(double, VecIn y, VecIn rho, double scale, VecOut out) const override {
+    if (rho(10) > 1) out(10) += scale * y(0);
+  }
+  mutable std::size_t gradients = 0;
+};
+
+// g = rho_k y_0, with k = -1: y_0.
+struct FirstCoordinate final : RunningCost {
+  explicit FirstCoordinate(Eigen::Index parameter) : k(parameter) {}
+  double g(double, VecIn y, VecIn rho) const override { return y(0) * (k < 0 ? 1 : rho(k)); }
+  void add_g_y(double, VecIn, VecIn rho, double scale, VecOut out) const override {
+    out(0) += scale * (k < 0 ? 1 : rho(k));
+  }
+  void add_g_rho(double, VecIn y, VecIn, double scale, VecOut out) const override {
+    if (k >= 0) out(k) += scale * y(0);
+  }
+  Eigen::Index k;
+};
+
+Problem with_idle_parameter() {
+  Problem problem = five_bar::problem(1e-6);
+  problem.scene.simulation.end_time = 0.2;
+  testing::add_parameters(problem.scene, {{"idle", 2.0}});
+  return problem;
+}
+
+}  // namespace
+
+TEST_CASE("a parameter that nothing uses is an error in C++, too", "[gradient]") {
+  Problem problem = with_idle_parameter();
+  CHECK_THROWS_WITH(Evaluator(problem.scene, objectives_of(problem)),
+                    Contains("parameters.idle: 'idle' is used by nothing") && Contains("allow_unused"));
+  CHECK_THROWS_WITH(check_gradients(problem), Contains("'idle' is used by nothing"));
+  CHECK_NOTHROW(Evaluator(problem.scene, objectives_of(problem), {"k1", "m1"}));  // it is no variable
+  problem.scene.parameters.back().allow_unused = true;
+  CHECK_NOTHROW(Evaluator(problem.scene, objectives_of(problem)));
+}
+
+TEST_CASE("a parameter that only a cost in C++ may use fails where its derivatives are all 0", "[gradient]") {
+  const Problem problem = with_idle_parameter();
+  Evaluator unused(problem.scene, {Objective("x", std::make_shared<FirstCoordinate>(-1), nullptr)});
+  const Evaluation& e = unused.gradients(unused.start());
+  CHECK_FALSE(e.ok);
+  CHECK_THAT(e.message, Contains("parameters.idle") && Contains("all exactly 0"));
+  Evaluator used(problem.scene, {Objective("x", std::make_shared<FirstCoordinate>(10), nullptr)});
+  CHECK(used.gradients(used.start()).ok);
+}
+
+TEST_CASE("a search may come where the derivatives in a variable of C++ costs are all 0", "[gradient]") {
+  const Problem problem = with_idle_parameter();
+  Evaluator evaluator(problem.scene, {Objective("x", std::make_shared<ClippedCost>(), nullptr)});
+  Eigen::VectorXd rho = evaluator.start();
+  CHECK(evaluator.gradients(rho).ok);
+  rho(10) = 0.5;  // clipped
+  const Evaluation& e = evaluator.gradients(rho);
+  CHECK(e.ok);
+  REQUIRE(e.warnings.size() == 1);
+  CHECK_THAT(e.warnings[0], Contains("parameters.idle: its derivatives are all exactly 0"));
+  Evaluator from_there(problem.scene, {Objective("x", std::make_shared<ClippedCost>(), nullptr)});
+  CHECK_FALSE(from_there.gradients(rho).ok);
+}
+
+TEST_CASE("the gradient of a running cost is computed once at each stage", "[gradient]") {
+  const Problem problem = with_idle_parameter();
+  const auto cost = std::make_shared<ClippedCost>();
+  const GradientMethod method = GENERATE(GradientMethod::tlm, GradientMethod::adjoint);
+  Evaluator evaluator(problem.scene, {Objective("x", cost, nullptr)}, {}, {method, {}, {}, {}});
+  const Evaluation e = evaluator.gradients(evaluator.start());
+  REQUIRE(e.ok);
+  const Method& rk = *runge_kutta_method(problem.scene.simulation.integrator.type);
+  const long nodes = rk.stages - std::count(rk.b, rk.b + rk.stages, 0.0);
+  CHECK(cost->gradients == e.steps.sizes.size() * static_cast<std::size_t>(nodes));
+  CHECK(e.psi(0) == evaluator.values_on(e.steps, e.rho).psi(0));
+}
+
+TEST_CASE("an objective in C++ without any cost is refused", "[objective]") {
+  CHECK_THROWS_WITH(Objective("nothing", nullptr, nullptr), Contains("objective 'nothing': has neither"));
+}
+
+TEST_CASE("an evaluation warns of a running cost that jumps with the motion, by the objective's name", "[gradient]") {
+  Problem problem = five_bar::problem(1e-6);
+  problem.objectives[0].running = Expression::parse("abs(r2_y + 2.05)/(r2_y + 2.05)");  // the point falls from -2
+  Evaluator evaluator(problem.scene, objectives_of(problem));
+  const Evaluation e = evaluator.gradients(evaluator.start());
+  REQUIRE(e.ok);
+  REQUIRE(e.warnings.size() >= 1);
+  CHECK_THAT(e.warnings.back(), Contains("the integrand of objective '" + problem.objectives[0].name + "' jumps by 2"));
+}
+
+TEST_CASE("the derivative of a root through zero is watched, though the root itself is resolved", "[gradient]") {
+  Problem problem = five_bar::problem(1e-6);
+  problem.scene.simulation.end_time = 2;
+  problem.objectives[0].running = Expression::parse("sqrt(abs(r2_y + 2.05))");
+  const GradientMethod method = GENERATE(GradientMethod::tlm, GradientMethod::adjoint);
+  Evaluator evaluator(problem.scene, objectives_of(problem), {}, {method, {}, {}, {}});
+  const Evaluation e = evaluator.gradients(evaluator.start());
+  REQUIRE(e.ok);
+  CHECK(e.statistics.gradient_quadrature.error > 0.03);
+  REQUIRE(e.warnings.size() == 1);
+  CHECK_THAT(e.warnings[0], Contains("do not resolve the derivative of the integrand of objective"));
+  problem.objectives[0].running = Expression::parse("(r2_y + 2.05)^2");
+  Evaluator smooth(problem.scene, objectives_of(problem));
+  CHECK(smooth.gradients(smooth.start()).warnings.empty());
+}
