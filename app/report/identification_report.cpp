@@ -27,7 +27,7 @@ void add_rows(std::vector<std::vector<std::string>>& rows, const Json& parameter
 }
 
 // Those fitted, then what was refitted to score the experiments that validate.
-void add_parameters(HtmlPage& page, const Json& result) {
+void add_fitted_parameters(HtmlPage& page, const Json& result) {
   std::vector<std::vector<std::string>> rows;
   add_rows(rows, result.at("parameters"));
   for (const Json& experiment : result.value("experiments", Json::object()))
@@ -36,7 +36,7 @@ void add_parameters(HtmlPage& page, const Json& result) {
 }
 
 // How the fit ended, and how much there was to fit.
-void add_outcome(HtmlPage& page, const Json& result) {
+void add_fit_outcome(HtmlPage& page, const Json& result) {
   const Json& optimizer = result.at("optimizer");
   page.paragraph(fmt::format("{}: {}; {}, {}.", cell(optimizer.at("type")), cell(optimizer.at("message")),
                              counted(optimizer.at("iterations").get<long>(), "iteration"),
@@ -137,9 +137,9 @@ std::string identification_report(const Scene& scene, const Json& result, const 
   HtmlPage page(scene.name + ": identify");
   add_status(page, result);
   page.heading("Fit");
-  add_outcome(page, result);
+  add_fit_outcome(page, result);
   page.heading("Parameters");
-  add_parameters(page, result);
+  add_fitted_parameters(page, result);
   add_correlation(page, result);
   add_profiles(page, result);
   page.heading("Measured and model");

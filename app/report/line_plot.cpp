@@ -14,12 +14,12 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kWidth = 760, kHeight = 320;                       // of the drawing [px]
+constexpr double kPlotWidth = 760, kPlotHeight = 320;               // of the drawing [px]
 constexpr double kLeft = 78, kRight = 16, kTop = 30, kBottom = 44;  // margins
-constexpr double kInnerWidth = kWidth - kLeft - kRight, kInnerHeight = kHeight - kTop - kBottom;
+constexpr double kInnerWidth = kPlotWidth - kLeft - kRight, kInnerHeight = kPlotHeight - kTop - kBottom;
 constexpr int kColours = 8;
 
-struct Range {
+struct AxisRange {
   double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
   void include(double value) { low = std::min(low, value), high = std::max(high, value); }
   double span() const { return high - low; }
@@ -38,8 +38,8 @@ struct Range {
 };
 
 // Data to pixels.
-struct Frame {
-  Range x, y;
+struct PlotFrame {
+  AxisRange x, y;
   double px(double value) const { return kLeft + (value - x.low) / x.span() * kInnerWidth; }
   double py(double value) const { return kTop + (y.high - value) / y.span() * kInnerHeight; }
 };
@@ -47,8 +47,8 @@ struct Frame {
 double x_of(const LinePlot& plot, double value) { return plot.logarithmic_x ? std::log10(value) : value; }
 double y_of(const LinePlot& plot, double value) { return plot.logarithmic_y ? std::log10(value) : value; }
 
-Frame frame_of(const LinePlot& plot) {
-  Frame frame;
+PlotFrame frame_of(const LinePlot& plot) {
+  PlotFrame frame;
   for (const PlotSeries& series : plot.series) {
     for (std::size_t i = 0; i < series.x.size(); ++i) {
       const double x = x_of(plot, series.x[i]), y = y_of(plot, series.y[i]);
@@ -61,7 +61,7 @@ Frame frame_of(const LinePlot& plot) {
   frame.y.finish(0.05);
   if (plot.equal_axes) {
     const double scale = std::max(frame.x.span() / kInnerWidth, frame.y.span() / kInnerHeight);
-    const auto widen = [](Range& range, double span) {
+    const auto widen = [](AxisRange& range, double span) {
       const double middle = (range.low + range.high) / 2;
       range.low = middle - span / 2, range.high = middle + span / 2;
     };
@@ -90,7 +90,7 @@ std::vector<std::size_t> random_samples(const std::vector<std::size_t>& all, con
 }
 
 // Many samples to a pixel column become at most its first, lowest, highest and last: the drawing is the same.
-std::vector<std::size_t> visible_samples(const LinePlot& plot, const PlotSeries& series, const Frame& frame) {
+std::vector<std::size_t> visible_samples(const LinePlot& plot, const PlotSeries& series, const PlotFrame& frame) {
   std::vector<std::size_t> all(series.x.size());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
   if (is_cloud(series)) return random_samples(all, series.y);
@@ -124,7 +124,7 @@ std::string ring(double px, double py) {
   return fmt::format("M{:.1f} {:.1f}a4 4 0 1 0 8 0a4 4 0 1 0 -8 0", px - 4, py);
 }
 
-void draw_series(const LinePlot& plot, const Frame& frame, std::size_t index, std::string& svg) {
+void draw_series(const LinePlot& plot, const PlotFrame& frame, std::size_t index, std::string& svg) {
   const PlotSeries& series = plot.series[index];
   std::string path;
   bool pen_down = false;
@@ -169,7 +169,7 @@ Ticks ticks_of(const std::vector<double>& values) {
   return ticks;
 }
 
-Ticks logarithmic_ticks_of(const Range& range, int count) {
+Ticks logarithmic_ticks_of(const AxisRange& range, int count) {
   Ticks ticks;
   const std::vector<double> values = logarithmic_ticks(std::pow(10, range.low), std::pow(10, range.high), count);
   for (const double value : values)
@@ -177,12 +177,12 @@ Ticks logarithmic_ticks_of(const Range& range, int count) {
   return ticks;
 }
 
-Ticks y_ticks_of(const LinePlot& plot, const Frame& frame) {
+Ticks y_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
   if (plot.logarithmic_y) return logarithmic_ticks_of(frame.y, 6);
   return ticks_of(round_ticks(frame.y.low, frame.y.high, plot.equal_axes ? 5 : 6));
 }
 
-Ticks x_ticks_of(const LinePlot& plot, const Frame& frame) {
+Ticks x_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
   if (plot.logarithmic_x) return logarithmic_ticks_of(frame.x, 8);
   std::vector<double> values = round_ticks(frame.x.low, frame.x.high, 8);
   if (plot.whole_x) std::erase_if(values, [](double x) { return x != std::round(x); });
@@ -198,7 +198,7 @@ std::string legend_key(const PlotSeries& series, std::size_t index) {
                      style_of(series.mark), index % kColours, path);
 }
 
-void draw_axes(const LinePlot& plot, const Frame& frame, std::string& svg) {
+void draw_axes(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
   const double bottom = kTop + kInnerHeight, right = kLeft + kInnerWidth;
   for (const auto& [tick, label] : x_ticks_of(plot, frame)) {
     svg += fmt::format(
@@ -215,7 +215,7 @@ void draw_axes(const LinePlot& plot, const Frame& frame, std::string& svg) {
   svg += fmt::format("<rect class=\"frame\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n", kLeft, kTop, kInnerWidth,
                      kInnerHeight);
   svg += fmt::format("<text class=\"label\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n",
-                     kLeft + kInnerWidth / 2, kHeight - 8, html_escaped(plot.x_label));
+                     kLeft + kInnerWidth / 2, kPlotHeight - 8, html_escaped(plot.x_label));
   svg +=
       fmt::format("<text class=\"label\" transform=\"translate(14 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
                   kTop + kInnerHeight / 2, html_escaped(plot.y_label));
@@ -261,8 +261,8 @@ std::vector<double> logarithmic_ticks(double low, double high, int count) {
 }
 
 std::string to_svg(const LinePlot& plot) {
-  const Frame frame = frame_of(plot);
-  std::string svg = fmt::format("<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">\n", kWidth, kHeight,
+  const PlotFrame frame = frame_of(plot);
+  std::string svg = fmt::format("<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">\n", kPlotWidth, kPlotHeight,
                                 html_escaped(plot.title));
   draw_axes(plot, frame, svg);
   for (std::size_t i = 0; i < plot.series.size(); ++i) draw_series(plot, frame, i, svg);

@@ -21,7 +21,7 @@ using Point2 = Eigen::Vector2d;
 
 constexpr double kWidth = 760, kLargestHeight = 460, kSmallestHeight = 160, kMargin = 40;  // [px]
 constexpr double kTitle = 24;                                                              // room above [px]
-constexpr std::size_t kColours = 8, kMostNames = 10;
+constexpr std::size_t kBodyColours = 8, kMostNames = 10;
 
 constexpr std::size_t kGround = static_cast<std::size_t>(-1);
 
@@ -214,7 +214,7 @@ void draw_state(const DrawnSketch& drawn, const View& view, bool last, std::stri
     for (const Point3& s : sketch.bodies[i]) pixels.push_back(view(placed(state.row, {i, s})));
     const std::vector<Point2> hull = outline(std::move(pixels));
     for (const Point2& p : hull) middle += p / static_cast<double>(hull.size());
-    svg += fmt::format("<path class=\"body c{0} f{0}\" d=\"{1}\"/>\n", i % kColours,
+    svg += fmt::format("<path class=\"body c{0} f{0}\" d=\"{1}\"/>\n", i % kBodyColours,
                        hull.size() == 1 ? path_through(hull, false) + "h0" : path_through(hull, hull.size() > 2));
     if (last && sketch.bodies.size() <= kMostNames)
       svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", middle.x() + 6, middle.y() - 6,

@@ -33,15 +33,15 @@ std::vector<double> column(const Trajectory& trajectory, std::size_t index) {
 }
 
 // What goes into one plot: its label, and the trajectory's columns.
-using Group = std::pair<std::string, std::vector<std::size_t>>;
+using SensorGroup = std::pair<std::string, std::vector<std::size_t>>;
 
-std::vector<Group> sensor_groups(const Scene& scene) {
+std::vector<SensorGroup> sensor_groups(const Scene& scene) {
   const std::size_t first = 1 + 13 * scene.bodies.size();
-  std::vector<Group> groups;
+  std::vector<SensorGroup> groups;
   for (std::size_t i = 0; i < scene.sensors.size(); ++i) {
     const Sensor& sensor = scene.sensors[i];
     const std::string label = fmt::format("{} [{}]", sensor.quantity, unit_of(sensor));
-    auto group = std::find_if(groups.rbegin(), groups.rend(), [&](const Group& g) { return g.first == label; });
+    auto group = std::find_if(groups.rbegin(), groups.rend(), [&](const SensorGroup& g) { return g.first == label; });
     if (group == groups.rend() || group->second.size() == kMostSeries) {
       groups.push_back({label, {}});
       group = groups.rbegin();
@@ -51,10 +51,10 @@ std::vector<Group> sensor_groups(const Scene& scene) {
   return groups;
 }
 
-std::vector<Group> position_groups(const Scene& scene, const Trajectory& trajectory) {
-  std::vector<Group> groups;
+std::vector<SensorGroup> position_groups(const Scene& scene, const Trajectory& trajectory) {
+  std::vector<SensorGroup> groups;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    Group group{fmt::format("{} [m]", "xyz"[axis]), {}};
+    SensorGroup group{fmt::format("{} [m]", "xyz"[axis]), {}};
     for (std::size_t body = 0; body < std::min(scene.bodies.size(), kMostSeries); ++body) {
       const std::vector<double> values = column(trajectory, 1 + 13 * body + axis);
       const auto [low, high] = std::minmax_element(values.begin(), values.end());
@@ -65,7 +65,7 @@ std::vector<Group> position_groups(const Scene& scene, const Trajectory& traject
   return groups;
 }
 
-void add_series(LinePlot& plot, const Group& group, const Trajectory& trajectory, const std::string& suffix,
+void add_series(LinePlot& plot, const SensorGroup& group, const Trajectory& trajectory, const std::string& suffix,
                 Mark mark) {
   if (trajectory.rows.empty()) return;  // the run failed before its first row, or was interrupted
   for (const std::size_t index : group.second) {
@@ -73,12 +73,12 @@ void add_series(LinePlot& plot, const Group& group, const Trajectory& trajectory
   }
 }
 
-std::vector<Group> groups_of(const Scene& scene, const Trajectory& trajectory) {
+std::vector<SensorGroup> groups_of(const Scene& scene, const Trajectory& trajectory) {
   if (trajectory.rows.empty()) return {};
   return scene.sensors.empty() ? position_groups(scene, trajectory) : sensor_groups(scene);
 }
 
-std::string title_of(const Group& group, const Trajectory& trajectory) {
+std::string title_of(const SensorGroup& group, const Trajectory& trajectory) {
   return group.second.size() == 1 ? trajectory.columns[group.second.front()] : group.first;
 }
 
@@ -91,7 +91,7 @@ std::string unit_of(const Sensor& sensor) {
 
 std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& trajectory) {
   std::vector<LinePlot> plots;
-  for (const Group& group : groups_of(scene, trajectory)) {
+  for (const SensorGroup& group : groups_of(scene, trajectory)) {
     LinePlot plot{.title = title_of(group, trajectory), .x_label = "t [s]", .y_label = group.first};
     add_series(plot, group, trajectory, "", Mark::line);
     plots.push_back(std::move(plot));
@@ -101,9 +101,9 @@ std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& traject
 
 std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& before, const Trajectory& after) {
   std::vector<LinePlot> plots;
-  for (const Group& group : groups_of(scene, before)) {
+  for (const SensorGroup& group : groups_of(scene, before)) {
     for (const std::size_t index : group.second) {
-      const Group alone{group.first, {index}};
+      const SensorGroup alone{group.first, {index}};
       LinePlot plot{.title = before.columns[index], .x_label = "t [s]", .y_label = group.first};
       add_series(plot, alone, before, ", before", Mark::dashed);
       add_series(plot, alone, after, ", after", Mark::line);

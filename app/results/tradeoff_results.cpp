@@ -81,7 +81,7 @@ RecommendationWords words_of(const Tradeoff& tradeoff, const TaskAdvice& advice,
   return words;
 }
 
-constexpr std::array kAccuracies{1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8};
+constexpr std::array kAdvisedAccuracies{1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8};
 
 Json task_json(const Tradeoff& tradeoff, const TaskAdvice& advice, const RecommendationWords& words) {
   Json json = words.json();
@@ -200,7 +200,7 @@ void add_recommendations(Run& run, const Tradeoff& tradeoff) {
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
   for (std::size_t q = 0; q < quantities.size(); ++q) {
     run.context.out << '\n';
-    for (const double accuracy : kAccuracies) {
+    for (const double accuracy : kAdvisedAccuracies) {
       const Recommendation r = recommend(tradeoff, {q}, accuracy);
       const RecommendationWords words = words_of(tradeoff, {r, {}});
       Json json = words.json();
@@ -214,7 +214,7 @@ void add_recommendations(Run& run, const Tradeoff& tradeoff) {
 
 void add_task_recommendations(Run& run, const Tradeoff& tradeoff, TaskAdviser& adviser) {
   run.context.out << '\n';
-  for (const double accuracy : kAccuracies) {
+  for (const double accuracy : kAdvisedAccuracies) {
     const TaskAdvice advice = adviser.at(accuracy);
     const RecommendationWords words = words_of(tradeoff, advice, run.problem.identification.has_value());
     run.result["task_recommendations"].push_back(task_json(tradeoff, advice, words));

@@ -11,11 +11,11 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-std::vector<double> numbers(const VectorXd& v) { return {v.begin(), v.end()}; }
+std::vector<double> as_vector(const VectorXd& v) { return {v.begin(), v.end()}; }
 
 Json to_json(const MatrixXd& m) {
   Json rows = Json::array();
-  for (const auto& row : m.rowwise()) rows.push_back(numbers(row.transpose()));
+  for (const auto& row : m.rowwise()) rows.push_back(as_vector(row.transpose()));
   return rows;
 }
 
@@ -73,7 +73,7 @@ JsonPointRecords::JsonPointRecords(const std::vector<Json>& points, const std::v
 }
 
 bool JsonPointRecords::recall(const VectorXd& x, Wanted wanted, NlpPoint& point) {
-  const auto known = points_.find({numbers(x), wanted});
+  const auto known = points_.find({as_vector(x), wanted});
   if (known == points_.end()) return false;
   if (!known->second.recalled) --points_left_;
   known->second.recalled = true;
@@ -82,10 +82,10 @@ bool JsonPointRecords::recall(const VectorXd& x, Wanted wanted, NlpPoint& point)
 }
 
 void JsonPointRecords::record(const VectorXd& x, Wanted wanted, const NlpPoint& point) {
-  Json json{{"x", numbers(x)}, {"derivatives", wanted == Wanted::derivatives}};
+  Json json{{"x", as_vector(x)}, {"derivatives", wanted == Wanted::derivatives}};
   if (point.ok) {
-    json["f"] = point.f, json["c"] = numbers(point.c);
-    if (wanted == Wanted::derivatives) json["f_x"] = numbers(point.f_x), json["c_x"] = to_json(point.c_x);
+    json["f"] = point.f, json["c"] = as_vector(point.c);
+    if (wanted == Wanted::derivatives) json["f_x"] = as_vector(point.f_x), json["c_x"] = to_json(point.c_x);
   } else {
     json["failed"] = point.message;
   }
@@ -93,7 +93,7 @@ void JsonPointRecords::record(const VectorXd& x, Wanted wanted, const NlpPoint& 
 }
 
 bool JsonPointRecords::recall(const VectorXd& x, std::vector<MatrixXd>& hessians) {
-  const auto known = hessians_.find(numbers(x));
+  const auto known = hessians_.find(as_vector(x));
   if (known == hessians_.end()) return false;
   hessians = known->second;
   return true;
@@ -102,7 +102,7 @@ bool JsonPointRecords::recall(const VectorXd& x, std::vector<MatrixXd>& hessians
 void JsonPointRecords::record(const VectorXd& x, const std::vector<MatrixXd>& hessians) {
   Json of = Json::array();
   for (const MatrixXd& H : hessians) of.push_back(to_json(H));
-  tell_("hessians", {{"x", numbers(x)}, {"of", of}});
+  tell_("hessians", {{"x", as_vector(x)}, {"of", of}});
 }
 
 }  // namespace mbsopt

@@ -3,8 +3,6 @@
 namespace mbsopt {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 // Moments only.
 void add_moment(int pair, double factor, const Mat<3, 4>& moment_p, MotionBlocks& out) {
   if (pair < 0) return;

@@ -5,8 +5,6 @@
 namespace mbsopt {
 namespace {
 
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
-
 // S += x' alpha x, of x the entries first to last and 3 to 6: the lower triangle only, which is all that a
 // factorisation reads.
 void add_lower_square(double alpha, const double* x, int first, int last, Mat<6, 6>& S) {
@@ -74,7 +72,7 @@ void ConstraintRows::evaluate(std::size_t group, const Frames& frames, Eigen::Ve
   const RowsInSpace::Group& g = groups_[group];
   const Constraint* c = data_->constraints.data() + first_constraint_[group];
   const Constraint* const last = data_->constraints.data() + data_->constraints.size();
-  const Frame &f1 = frames[index(g.body1)], &f2 = frames[index(g.body2)];
+  const Frame &f1 = frames[at(g.body1)], &f2 = frames[at(g.body2)];
   for (; c != last && c->block < g.block + g.rows; ++c) {
     std::visit(
         [&](const auto& p) {

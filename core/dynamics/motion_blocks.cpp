@@ -9,8 +9,6 @@
 namespace mbsopt {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 void list(const std::vector<std::vector<int>>& bodies, std::vector<MotionBlocks::Place>& places,
           std::vector<int>& begin) {
   for (std::size_t i = 0; i < bodies.size(); ++i) {

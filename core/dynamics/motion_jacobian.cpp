@@ -1,11 +1,7 @@
 #include "core/dynamics/motion_jacobian.hpp"
 
 namespace mbsopt {
-namespace {
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
+namespace {}  // namespace
 
 MotionJacobian::MotionJacobian(const MechanismData& data) : n_(data.n), m_(data.m) {
   const MotionBlocks pattern(data);

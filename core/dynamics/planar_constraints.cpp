@@ -9,8 +9,6 @@ namespace {
 
 using Kind = PlanarConstraint::Kind;
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 // The primitive's vectors, constant or with directions of their own.
 template <class S>
 struct Vectors {

@@ -8,8 +8,6 @@
 namespace mbsopt {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 bool any_force_but_springs(const MechanismData& d) {
   return !(d.rsda.empty() && d.applied.empty() && d.bushings.empty() && d.turning_frictions.empty() &&
            d.sliding_frictions.empty());

@@ -6,8 +6,6 @@
 namespace mbsopt {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 // The blocks of forces alone.
 MotionBlocks force_blocks(MechanismData data) {
   data.constraints.clear();

@@ -4,11 +4,7 @@
 #include <map>
 
 namespace mbsopt {
-namespace {
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
+namespace {}  // namespace
 
 PlanarRows::PlanarRows(const MechanismData& data) : model_(data.planar.get()) {
   using Kind = PlanarConstraint::Kind;
@@ -55,17 +51,17 @@ PlanarRows::PlanarRows(const MechanismData& data) : model_(data.planar.get()) {
 void PlanarRows::evaluate(const Frames& frames) {
   for (std::size_t k = 0; k < points_.size(); ++k) {
     Point& p = points_[k];
-    const PlanarConstraint& c = model_->constraints[index(point_places_[k].constraint)];
-    const Plane x1 = frames[index(p.body1)].A * c.s1, x2 = frames[index(p.body2)].A * c.s2;
+    const PlanarConstraint& c = model_->constraints[at(point_places_[k].constraint)];
+    const Plane x1 = frames[at(p.body1)].A * c.s1, x2 = frames[at(p.body2)].A * c.s2;
     p.x1[0] = x1.re, p.x1[1] = x1.im, p.x2[0] = x2.re, p.x2[1] = x2.im;
   }
   for (Entry& e : entries_) e.J[0] = e.J[1] = e.J[2] = 0;
   for (const Single& s : singles_) {
-    const PlanarConstraint& c = model_->constraints[index(s.constraint)];
-    const PlanarColumn column = jacobian_of_row(c, frames[index(c.body1)], frames[index(c.body2)]);
+    const PlanarConstraint& c = model_->constraints[at(s.constraint)];
+    const PlanarColumn column = jacobian_of_row(c, frames[at(c.body1)], frames[at(c.body2)]);
     const auto add = [&](int entry, const Plane& force, double moment) {
       if (entry < 0) return;
-      double* J = entries_[index(entry)].J;
+      double* J = entries_[at(entry)].J;
       J[0] += c.factor * force.re, J[1] += c.factor * force.im, J[2] += c.factor * moment;
     };
     add(s.entry1, column.force1, column.moment1);
@@ -90,7 +86,7 @@ void PlanarRows::load(const SaddleIterate& it, bool first, std::vector<Vec<3>>& 
 void PlanarRows::correct(const SaddleIterate& it, bool first, const std::vector<Vec<3>>& correction) const {
   for (std::size_t k = 0; k < correction.size(); ++k) {
     for (int i = 0; i < 3; ++i) {
-      double& x = it.x[3 * k + index(i)];
+      double& x = it.x[3 * k + at(i)];
       x = first ? correction[k](i) : x + correction[k](i);
     }
   }
@@ -145,7 +141,7 @@ void PlanarRows::add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky
     }
   }
   for (const Pair& p : pairs_) {
-    const Entry &e = entries_[index(p.entry1)], &f = entries_[index(p.entry2)];
+    const Entry &e = entries_[at(p.entry1)], &f = entries_[at(p.entry2)];
     Mat<3, 3> X;
     for (int j = 0; j < 3; ++j) {
       for (int i = 0; i < 3; ++i) X(i, j) = alpha(e.row) * e.J[i] * f.J[j];

@@ -87,8 +87,8 @@ void subtract_product(const Mat<6, 6>& A, const Mat<6, 6>& B, Mat<6, 6>& C) {
 template <int N>
 BlockCholesky<N>::BlockCholesky(int bodies, std::span<const std::pair<int, int>> edges) : elimination_(bodies, edges) {
   for (const auto& [a, b] : edges) handles_.push_back(elimination_.place(a, b));
-  diagonal_.resize(index(bodies));
-  inverse_.resize(index(bodies));
+  diagonal_.resize(at(bodies));
+  inverse_.resize(at(bodies));
   lower_.resize(elimination_.blocks);
   std::size_t longest = 0;
   first_block_.push_back(0);
@@ -125,7 +125,7 @@ bool BlockCholesky<N>::factor() {
     Block& W = diagonal_[k];
     Vec<N>& inverse = inverse_[k];
     if (!factor_diagonal(W, inverse)) return false;
-    const std::size_t first = index(first_block_[k]), count = index(first_block_[k + 1]) - first;
+    const std::size_t first = at(first_block_[k]), count = at(first_block_[k + 1]) - first;
     for (std::size_t e = 0; e < count; ++e) divide(W, inverse, lower_[first + e], scaled_[e]);
     for (std::size_t e = first_update_[k]; e < first_update_[k + 1]; ++e) {
       const Elimination::Update& u = updates_[e];
@@ -151,16 +151,15 @@ void BlockCholesky<N>::solve(std::span<Vec<N>> x) {
   } else {
     const std::vector<int>& order = elimination_.order;
     for (std::size_t k = 0; k < order.size(); ++k) {
-      Vec<N>& y = x[index(order[k])];
+      Vec<N>& y = x[at(order[k])];
       multiply(diagonal_[k], y);
-      for (int b = first_block_[k]; b < first_block_[k + 1]; ++b)
-        subtract_times(lower_[index(b)], y, x[index(body_[index(b)])]);
+      for (int b = first_block_[k]; b < first_block_[k + 1]; ++b) subtract_times(lower_[at(b)], y, x[at(body_[at(b)])]);
     }
     for (std::size_t k = order.size(); k-- > 0;) {
-      Vec<N>& y = x[index(order[k])];
+      Vec<N>& y = x[at(order[k])];
       y.array() *= inverse_[k].array();
       for (int b = first_block_[k]; b < first_block_[k + 1]; ++b)
-        subtract_transposed_times(lower_[index(b)], x[index(body_[index(b)])], y);
+        subtract_transposed_times(lower_[at(b)], x[at(body_[at(b)])], y);
       multiply_transposed(diagonal_[k], y);
     }
   }

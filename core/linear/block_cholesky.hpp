@@ -29,7 +29,7 @@ class BlockCholesky {
 
   void set_zero();
   void set_off_diagonals_to_zero();
-  Block& diagonal(int body) { return diagonal_[index(elimination_.position[index(body)])]; }
+  Block& diagonal(int body) { return diagonal_[at(elimination_.position[at(body)])]; }
   // Adds X to the block (first, second) of edge `handle` and its transpose to (second, first).
   void add_off_diagonal(std::size_t handle, const Block& X) {
     const Elimination::Place& h = handles_[handle];
@@ -54,7 +54,6 @@ class BlockCholesky {
 
  private:
   FactorView view() const;
-  static std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
   Elimination elimination_;
   std::vector<int> first_block_, body_;    // per position, and after the last; per block: the body of its row

@@ -4,12 +4,11 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "core/linear/fixed_size.hpp"
 #include "core/linear/pairs.hpp"
 
 namespace mbsopt {
 namespace {
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 // Columns are padded to an even length, with zeros.
 template <int N>
@@ -124,13 +123,13 @@ BlockLu::BlockLu(int rows, int bodies, std::span<const std::pair<int, int>> edge
       size_(static_cast<std::size_t>(rows_ * stride_)),
       elimination_(bodies, edges) {
   if (!takes(rows)) throw std::invalid_argument("BlockLu: blocks of 7, 14, 21 or 28 rows");
-  values_.assign((index(bodies) + 2 * elimination_.blocks) * size_, 0.0);
-  inverse_.assign(index(bodies) * static_cast<std::size_t>(rows_), 0.0);
+  values_.assign((at(bodies) + 2 * elimination_.blocks) * size_, 0.0);
+  inverse_.assign(at(bodies) * static_cast<std::size_t>(rows_), 0.0);
   exchanged_.assign(inverse_.size(), 0);
 }
 
 BlockLu::Handle BlockLu::handle(int row_body, int column_body) const {
-  if (row_body == column_body) return {index(elimination_.position[index(row_body)]) * size_, false};
+  if (row_body == column_body) return {at(elimination_.position[at(row_body)]) * size_, false};
   const Elimination::Place place = elimination_.place(row_body, column_body);
   return {(place.transposed ? upper(place.block) : lower(place.block)) * size_, place.transposed};
 }
@@ -185,13 +184,13 @@ void BlockLu::solve_blocks(double* x) const {
     for (int j = 0; j < N; ++j) {
       for (int i = j + 1; i < N; ++i) y[i] -= D[i + j * kStride<N>] * y[j];
     }
-    for (const auto& e : elimination_.columns[k]) subtract_times<N>(block(lower(e.block)), y, of(index(e.row)));
+    for (const auto& e : elimination_.columns[k]) subtract_times<N>(block(lower(e.block)), y, of(at(e.row)));
   }
   for (std::size_t k = order.size(); k-- > 0;) {
     const double *D = block(k), *inverse = inverse_.data() + k * N;
     double* y = of(k);
     for (const auto& e : elimination_.columns[k]) {
-      subtract_transposed_times<N>(block(upper(e.block)), of(index(e.row)), y);
+      subtract_transposed_times<N>(block(upper(e.block)), of(at(e.row)), y);
     }
     for (int j = N - 1; j >= 0; --j) {
       y[j] *= inverse[j];
@@ -211,14 +210,14 @@ void BlockLu::solve_blocks_transposed(double* x) const {
       for (int i = 0; i < j; ++i) y[j] -= D[i + j * kStride<N>] * y[i];
       y[j] *= inverse[j];
     }
-    for (const auto& e : elimination_.columns[k]) subtract_times<N>(block(upper(e.block)), y, of(index(e.row)));
+    for (const auto& e : elimination_.columns[k]) subtract_times<N>(block(upper(e.block)), y, of(at(e.row)));
   }
   for (std::size_t k = order.size(); k-- > 0;) {
     const double* D = block(k);
     const int* exchanged = exchanged_.data() + k * N;
     double* y = of(k);
     for (const auto& e : elimination_.columns[k]) {
-      subtract_transposed_times<N>(block(lower(e.block)), of(index(e.row)), y);
+      subtract_transposed_times<N>(block(lower(e.block)), of(at(e.row)), y);
     }
     for (int j = N - 1; j >= 0; --j) {
       for (int i = j + 1; i < N; ++i) y[j] -= D[i + j * kStride<N>] * y[i];

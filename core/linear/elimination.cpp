@@ -7,10 +7,10 @@
 #include <map>
 #include <set>
 
+#include "core/linear/fixed_size.hpp"
+
 namespace mbsopt {
 namespace {
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 std::vector<int> minimum_degree(int n, std::span<const std::pair<int, int>> edges) {
   std::vector<Eigen::Triplet<double>> entries;
@@ -30,41 +30,41 @@ std::vector<int> minimum_degree(int n, std::span<const std::pair<int, int>> edge
 }  // namespace
 
 Elimination::Elimination(int bodies, std::span<const std::pair<int, int>> edges)
-    : position(index(bodies)), order(minimum_degree(bodies, edges)), columns(index(bodies)), updates(index(bodies)) {
-  for (int k = 0; k < bodies; ++k) position[index(order[index(k)])] = k;
+    : position(at(bodies)), order(minimum_degree(bodies, edges)), columns(at(bodies)), updates(at(bodies)) {
+  for (int k = 0; k < bodies; ++k) position[at(order[at(k)])] = k;
 
   // The rows of column k are its own edges and what eliminating its children leaves.
-  std::vector<std::set<int>> rows(index(bodies));
+  std::vector<std::set<int>> rows(at(bodies));
   for (const auto& [a, b] : edges) {
-    const int i = position[index(a)], j = position[index(b)];
-    rows[index(std::min(i, j))].insert(std::max(i, j));
+    const int i = position[at(a)], j = position[at(b)];
+    rows[at(std::min(i, j))].insert(std::max(i, j));
   }
-  std::vector<std::map<int, std::size_t>> places(index(bodies));
-  for (std::size_t k = 0; k < index(bodies); ++k) {
+  std::vector<std::map<int, std::size_t>> places(at(bodies));
+  for (std::size_t k = 0; k < at(bodies); ++k) {
     for (const int i : rows[k]) {
       places[k][i] = blocks;
-      columns[k].push_back({i, order[index(i)], blocks++});
+      columns[k].push_back({i, order[at(i)], blocks++});
     }
     if (rows[k].empty()) continue;
     const int parent = *rows[k].begin();
     for (const int i : rows[k]) {
-      if (i != parent) rows[index(parent)].insert(i);
+      if (i != parent) rows[at(parent)].insert(i);
     }
   }
-  for (std::size_t k = 0; k < index(bodies); ++k) {
+  for (std::size_t k = 0; k < at(bodies); ++k) {
     const std::vector<Entry>& column = columns[k];
     for (std::size_t i = 0; i < column.size(); ++i) {
-      updates[k].push_back({index(column[i].row), i, i, true});
+      updates[k].push_back({at(column[i].row), i, i, true});
       for (std::size_t j = 0; j < i; ++j) {
-        updates[k].push_back({places[index(column[j].row)].at(column[i].row), i, j, false});
+        updates[k].push_back({places[at(column[j].row)].at(column[i].row), i, j, false});
       }
     }
   }
 }
 
 Elimination::Place Elimination::place(int row, int column) const {
-  const int i = position[index(row)], j = position[index(column)];
-  const std::vector<Entry>& entries = columns[index(std::min(i, j))];
+  const int i = position[at(row)], j = position[at(column)];
+  const std::vector<Entry>& entries = columns[at(std::min(i, j))];
   const auto found = std::lower_bound(entries.begin(), entries.end(), std::max(i, j),
                                       [](const Entry& e, int wanted) { return e.row < wanted; });
   assert(found != entries.end() && found->row == std::max(i, j));

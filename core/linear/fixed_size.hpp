@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>  // cross
+#include <cstddef>
 
 namespace mbsopt {
 
@@ -18,6 +19,8 @@ using Eigen::Vector4d;
 inline constexpr int kLanes = 4;
 template <int N>
 using Lanes = Eigen::Matrix<double, N, kLanes, Eigen::RowMajor>;
+
+inline std::size_t at(int i) { return static_cast<std::size_t>(i); }  // of an array
 
 inline Matrix3d skew(const Vector3d& a) {
   Matrix3d S;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/linear/elimination.hpp"
+#include "core/linear/fixed_size.hpp"
 
 namespace mbsopt {
 namespace {
@@ -13,8 +14,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using OfBody = Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, 7>;  // no body has more columns
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 // A row's part in the columns of one body, by its elimination position.
 struct Part {

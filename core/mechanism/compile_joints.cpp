@@ -9,8 +9,6 @@
 namespace mbsopt {
 namespace {
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 // The vectors of a joint, each made when an equation asks for it.
 class JointVectors {
  public:

@@ -15,8 +15,6 @@ namespace {
 
 constexpr double kParallel = 1e-12;  // sine of the angle up to which a direction counts as another
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 // How a body-fixed vector lies to the plane, at every value of the parameters.
 enum class Lies { in_plane, along_normal, across };
 

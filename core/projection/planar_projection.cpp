@@ -8,14 +8,7 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kRelativeAlpha = 1e8;
-constexpr Refinements kOnePass{};  // every use is inside an iteration that refines
-constexpr int kMostIterations = 60, kMostRefinements = 12;
-constexpr double kNegligible = 2e-15;  // as in projection_derivatives.cpp
-// Of the largest coordinate and velocity, at least of 1.
-constexpr double kRounding = 1e-15, kUnmetPosition = 1e-8, kUnmetVelocity = 1e-6;
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+constexpr Refinements kOnePlanarPass{};  // every use is inside an iteration that refines
 
 Eigen::VectorXd alpha_in_plane(const MechanismData& data) {
   Eigen::VectorXd alpha(static_cast<Eigen::Index>(data.planar->rows.size()));
@@ -30,21 +23,13 @@ void set_frame(const Complex<T>& A, const T& w, PlanarFrame<T>& f) {
   f.Adot = times_i(w * A);
 }
 
-template <class X>
-Eigen::Array<double, 1, X::ColsAtCompileTime> largest(const std::vector<X>& x) {
-  Eigen::Array<double, 1, X::ColsAtCompileTime> most;
-  most.setZero();
-  for (const X& xi : x) most = most.max(xi.cwiseAbs().colwise().maxCoeff().array());
-  return most;
-}
-
 }  // namespace
 
 PlanarProjector::PlanarProjector(const MechanismData& data)
     : data_(data),
       model_(*data.planar),
       bodies_in_y_(model_),
-      solver_(data, kRelativeAlpha * alpha_in_plane(data)),
+      solver_(data, kProjectionAlpha * alpha_in_plane(data)),
       rows_(data),
       constraints_(data),
       laws_(data, model_.rows) {
@@ -111,16 +96,17 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
   nu_.setZero();
   set_positions(delta_);
   double before = INFINITY, now = 0;
-  for (int k = 0; k < kMostIterations && rows_.count() > 0; ++k) {
+  for (int k = 0; k < kMostProjectionIterations && rows_.count() > 0; ++k) {
     constraints_.phi(frames_, laws_, angles, phi_);
     now = phi_.cwiseAbs().maxCoeff();
     if (!std::isfinite(now)) return false;
-    if (now < kRounding * q_size || (k > 1 && now > 0.95 * before)) break;  // rounding reached, or a singular position
+    if (now < kProjectionRounding * q_size || (k > 1 && now > 0.95 * before))
+      break;  // rounding reached, or a singular position
     before = now;
     for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, delta_[at(i - 1)]);
     solver_.rows().subtract_transposed_times(nu_, b_);
     g_ = -phi_;
-    solver_.solve(b_, g_, kOnePass, dx_, dnu_);
+    solver_.solve(b_, g_, kOnePlanarPass, dx_, dnu_);
     for (std::size_t i = 0; i < dx_.size(); ++i) delta_[i] += dx_[i];
     nu_ += dnu_;
     set_positions(delta_);
@@ -132,16 +118,16 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
   set_velocities(u_);
   rows_.evaluate(frames_);
   before = INFINITY, now = 0;
-  for (int k = 0; k < kMostIterations && rows_.count() > 0; ++k) {
+  for (int k = 0; k < kMostProjectionIterations && rows_.count() > 0; ++k) {
     constraints_.phi_dot(frames_, laws_, phi_);
     now = phi_.cwiseAbs().maxCoeff();
     if (!std::isfinite(now)) return false;
-    if (now < kRounding * v_size || (k > 1 && now > 0.95 * before)) break;
+    if (now < kProjectionRounding * v_size || (k > 1 && now > 0.95 * before)) break;
     before = now;
     for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, u_[at(i - 1)]);
     rows_.subtract_transposed_times(kappa_, b_);
     g_ = -phi_;
-    solver_.solve(b_, g_, kOnePass, dx_, dnu_);
+    solver_.solve(b_, g_, kOnePlanarPass, dx_, dnu_);
     kappa_ += dnu_;
     for (std::size_t i = 0; i < dx_.size(); ++i) u_[i] += dx_[i];
     set_velocities(u_);
@@ -168,7 +154,7 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
 }
 
 void PlanarProjector::response(Eigen::VectorXd& out) {
-  constraint_response(solver_, test_load<3>, kRelativeAlpha, b_, g_, dx_, dnu_, out);
+  constraint_response(solver_, test_load<3>, kProjectionAlpha, b_, g_, dx_, dnu_, out);
 }
 
 // The bodies and frames of a given state.
@@ -229,7 +215,7 @@ template <class X, class Y>
 void PlanarProjector::refine(Level level, bool transposed, const Sizes<X>& directions, const std::vector<X>& b,
                              const Y& g, std::vector<X>& x, Y& nu, std::vector<X>& r, std::vector<X>& dx,
                              std::vector<X>& Ex, Y& rg, Y& dnu) const {
-  solver_.solve(b, g, kOnePass, x, nu);
+  solver_.solve(b, g, kOnePlanarPass, x, nu);
   if (rows_.count() == 0) return;
   const bool position = level == Level::position;
   const auto turn_by_E = [&](std::vector<X>& of) {
@@ -255,11 +241,11 @@ void PlanarProjector::refine(Level level, bool transposed, const Sizes<X>& direc
       rows_.subtract_transposed_times(nu, r);
       rows_.subtract_times(x, rg);
     }
-    solver_.solve(r, rg, kOnePass, dx, dnu);
+    solver_.solve(r, rg, kOnePlanarPass, dx, dnu);
     for (std::size_t i = 0; i < x.size(); ++i) x[i] += dx[i];
     nu += dnu;
     const auto now = largest(dx);
-    if ((now * now <= kNegligible * size * before).all()) return;
+    if ((now * now <= kNegligibleRefinement * size * before).all()) return;
     before = now;
   }
 }

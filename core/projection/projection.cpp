@@ -11,13 +11,7 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kRelativeAlpha = 1e8;
 constexpr SaddleSolver::Settings kOnePass{};  // every use is inside an iteration that refines
-constexpr int kMostIterations = 60;
-// Of the largest coordinate and velocity, at least of 1.
-constexpr double kRounding = 1e-15, kUnmetPosition = 1e-8, kUnmetVelocity = 1e-6;
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
@@ -26,7 +20,7 @@ Projector::Projector(const Mechanism& mechanism, Projection what, Model model)
       data_(mechanism_.data()),
       what_(what),
       planar_(model == Model::planar ? std::make_unique<PlanarProjector>(data_) : nullptr),
-      solver_(data_, kRelativeAlpha * data_.row_alpha),
+      solver_(data_, kProjectionAlpha * data_.row_alpha),
       rows_(data_),
       laws_(data_) {
   const std::size_t n = at(data_.n);
@@ -108,11 +102,11 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
                v_size = std::max(1.0, y_hat.tail(half).cwiseAbs().maxCoeff());
   if (positions() && data_.m > 0) {
     double before = INFINITY, now = 0;
-    for (int k = 0; k < kMostIterations; ++k) {
+    for (int k = 0; k < kMostProjectionIterations; ++k) {
       evaluate_phi(data_, frames_, laws_, angles, phi_);
       now = phi_.cwiseAbs().maxCoeff();
       if (!std::isfinite(now)) return false;
-      if (now < kRounding * q_size || (k > 1 && now > 0.95 * before))
+      if (now < kProjectionRounding * q_size || (k > 1 && now > 0.95 * before))
         break;  // rounding reached, or a singular position
       before = now;
       // [M J'; J 0] (d delta, d nu) = -(M delta + J'nu, Phi)
@@ -138,12 +132,12 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
   if (data_.m == 0) return y.allFinite();
   rows_.evaluate(frames_);
   double before = INFINITY, now = 0;
-  for (int k = 0; k < kMostIterations; ++k) {
+  for (int k = 0; k < kMostProjectionIterations; ++k) {
     set_frames(y, &y, states_, frames_);
     evaluate_phi_dot(data_, frames_, laws_, phi_);
     now = phi_.cwiseAbs().maxCoeff();
     if (!std::isfinite(now)) return false;
-    if (now < kRounding * v_size || (k > 1 && now > 0.95 * before)) break;
+    if (now < kProjectionRounding * v_size || (k > 1 && now > 0.95 * before)) break;
     before = now;
     for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, s.u[at(i - 1)]);
     rows_.subtract_transposed_times(s.kappa, b_);
@@ -167,7 +161,7 @@ void Projector::response(Eigen::VectorXd& out) {
   const auto load = [&](int i) {
     return data_.planar ? PlanarBodies(*data_.planar).in_space(at(i), test_load<3>(i)) : test_load<6>(i);
   };
-  constraint_response(solver_, load, kRelativeAlpha, b_, g_, dx_, dnu_, out);
+  constraint_response(solver_, load, kProjectionAlpha, b_, g_, dx_, dnu_, out);
 }
 
 double Projector::position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y) {

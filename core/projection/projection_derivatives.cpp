@@ -9,23 +9,10 @@
 namespace mbsopt {
 namespace {
 
-constexpr SaddleSolver::Settings kOnePass{};  // refine() refines
+constexpr SaddleSolver::Settings kOneSolution{};  // refine() refines
 
 // Each pass of refine() gains a factor of about the correction's size, or of 1/alpha times the ratio of masses that
 // meet.
-constexpr int kMostRefinements = 12;
-constexpr double kNegligible = 2e-15;  // relative, of what the next pass would change: several units of rounding
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
-// Largest entry of each direction.
-template <class X>
-Eigen::Array<double, 1, X::ColsAtCompileTime> largest(const std::vector<X>& x) {
-  Eigen::Array<double, 1, X::ColsAtCompileTime> most;
-  most.setZero();
-  for (const X& xi : x) most = most.max(xi.cwiseAbs().colwise().maxCoeff().array());
-  return most;
-}
 
 // p' of p = pi/|pi|, for one direction or lanes of pi'.
 template <class X>
@@ -106,7 +93,7 @@ void Projector::refine(Level level, bool transposed, const Sizes<X>& directions,
       return Ex_lanes_;
     }
   }();
-  solver_.solve(b, g, kOnePass, x, nu);
+  solver_.solve(b, g, kOneSolution, x, nu);
   if (data_.m == 0) return;
   const bool position = level == Level::position;
   Sizes<X> before = largest(x);
@@ -130,11 +117,11 @@ void Projector::refine(Level level, bool transposed, const Sizes<X>& directions,
       rows_.subtract_times(x, rg);
       for (std::size_t i = 0; i < r.size(); ++i) r[i] += b[i];
     }
-    solver_.solve(r, rg, kOnePass, dx, dnu);
+    solver_.solve(r, rg, kOneSolution, dx, dnu);
     for (std::size_t i = 0; i < x.size(); ++i) x[i] += dx[i];
     nu += dnu;
     const auto now = largest(dx);
-    if ((now * now <= kNegligible * size * before).all()) return;
+    if ((now * now <= kNegligibleRefinement * size * before).all()) return;
     before = now;
   }
 }

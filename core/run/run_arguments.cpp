@@ -11,7 +11,7 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kRounding = 1e-12;  // of the times: of sums of sizes, and the gaps at events (event_times.hpp)
+constexpr double kRoundingOfTimes = 1e-12;  // of the times: of sums of sizes, and the gaps at events (event_times.hpp)
 
 template <class... Args>
 [[noreturn]] void refuse(fmt::format_string<Args...> text, Args&&... args) {
@@ -57,7 +57,7 @@ void check_run_arguments(const Mechanism& mechanism, const SimulationSettings& s
   const double start = settings.start_time, end = settings.end_time;
   if (!(end > start) || !std::isfinite(end - start))
     refuse("simulation: end_time is {} s, it has to be after start_time, {} s", end, start);
-  const double tie = kRounding * std::max({end - start, std::abs(start), std::abs(end)});
+  const double tie = kRoundingOfTimes * std::max({end - start, std::abs(start), std::abs(end)});
   const auto within = [&](double t) { return t >= start - tie && t <= end + tie; };
   for (std::size_t i = 0; i < observed.size(); ++i)
     if (!within(observed[i]))

@@ -398,14 +398,13 @@ namespace {
 // length. pieces: the columns of which b is the sum, before they cancel.
 void note_unmet(const MatrixXd& left, const VectorXd& row_scale, std::initializer_list<MatrixXd> pieces,
                 std::vector<bool>& unmet) {
-  constexpr double kUnmet = 1e-7;      // of b: assembly leaves a loop open by far less
+  constexpr double kOpen = 1e-7;       // of b: assembly leaves a loop open by far less
   constexpr double kRounding = 1e-12;  // of b, in the units of J: sin(pi) is not zero
   if (left.rows() == 0) return;
   for (Index k = 0; k < left.cols(); ++k) {
     double size = 0;
     for (const MatrixXd& piece : pieces) size += row_scale.cwiseProduct(piece.col(k)).norm();
-    if (left.col(k).norm() > kUnmet * size + kRounding * row_scale.maxCoeff())
-      unmet[static_cast<std::size_t>(k)] = true;
+    if (left.col(k).norm() > kOpen * size + kRounding * row_scale.maxCoeff()) unmet[static_cast<std::size_t>(k)] = true;
   }
 }
 

@@ -20,12 +20,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostIterations = 500;
-constexpr double kLargestStep = 0.2;     // of a coordinate at once [lengths of the mechanism, rad]
-constexpr double kRankThreshold = 1e-8;  // rows of J scaled to unit length
-constexpr double kTolerance = 1e-11;     // of the last Newton step [lengths of the mechanism, rad]
-constexpr double kPredicted = 0.5;       // of the forces: a downhill step whose end differs more is too long
-constexpr double kWellPredicted = 0.1;   // and one that differs less may be followed by a longer one
+constexpr int kMostEquilibriumIterations = 500;
+constexpr double kLargestStep = 0.2;         // of a coordinate at once [lengths of the mechanism, rad]
+constexpr double kRestRankThreshold = 1e-8;  // rows of J scaled to unit length
+constexpr double kTolerance = 1e-11;         // of the last Newton step [lengths of the mechanism, rad]
+constexpr double kPredicted = 0.5;           // of the forces: a downhill step whose end differs more is too long
+constexpr double kWellPredicted = 0.1;       // and one that differs less may be followed by a longer one
 
 class Statics {
  public:
@@ -123,8 +123,8 @@ class Statics {
     r.J = g.y.topLeftCorner(d_.m, 7 * n_) * to_q(y_.head(7 * n_), MatrixXd::Identity(6 * n_, 6 * n_));
     r.phi_rho = g.rho.topRows(d_.m);
     r.scale = r.J.rowwise().norm().cwiseMax(std::numeric_limits<double>::min()).cwiseInverse();
-    r.J_scaled = OrthogonalDecomposition(r.scale.asDiagonal() * r.J, kRankThreshold);
-    r.N = null_space(r.scale.asDiagonal() * r.J, kRankThreshold);
+    r.J_scaled = OrthogonalDecomposition(r.scale.asDiagonal() * r.J, kRestRankThreshold);
+    r.N = null_space(r.scale.asDiagonal() * r.J, kRestRankThreshold);
     return r;
   }
 
@@ -231,7 +231,7 @@ constexpr const char* kNoAccelerations = "the accelerations cannot be computed o
 // all the way. Empty where q is the equilibrium, else why not.
 std::string continue_to_rest(Statics& statics, VectorXd& q, int& iterations) {
   double sigma = 0, before = 0;
-  for (int k = 0; k < kMostIterations; ++k, ++iterations) {
+  for (int k = 0; k < kMostEquilibriumIterations; ++k, ++iterations) {
     if (!statics.evaluate(q)) return kNoAccelerations;
     const double now = statics.size_of(statics.z());
     sigma = k == 0 ? now / kLargestStep : sigma * std::min(now / before, 4.0);
@@ -254,12 +254,12 @@ std::string continue_to_rest(Statics& statics, VectorXd& q, int& iterations) {
 std::string go_downhill(Statics& statics, VectorXd& q, int& iterations) {
   if (!statics.evaluate(q)) return kNoAccelerations;
   double sigma = statics.size_of(statics.z()) / kLargestStep;
-  for (int tries = 0; tries < 2 * kMostIterations;) {
+  for (int tries = 0; tries < 2 * kMostEquilibriumIterations;) {
     const FreeMotion free(statics);
     const double now = statics.size_of(statics.z());
     if (free.N.cols() == 0 || now == 0) return {};
     const VectorXd angles = statics.angles();
-    for (bool taken = false; !taken && tries < 2 * kMostIterations; ++tries, ++iterations) {
+    for (bool taken = false; !taken && tries < 2 * kMostEquilibriumIterations; ++tries, ++iterations) {
       const VectorXd y = free.step(sigma), xi = free.N * y;
       const double size = statics.size_of(xi);
       double difference = INFINITY;

@@ -24,7 +24,7 @@ constexpr double kLargestTurn = 0.1;         // of an Euler parameter in one ste
 constexpr double kRelativeCorrection = 0.2;  // of the predictor, against h v
 constexpr double kSmallCorrection = 1e-6;    // always accepted
 constexpr double kViolation = 1e-9;
-constexpr double kRankThreshold = 1e-7;  // rows of J scaled to unit length
+constexpr double kDrivenRankThreshold = 1e-7;  // rows of J scaled to unit length
 
 // J at a state, rows scaled to unit length: linear solves that no mass enters.
 class DrivenRows {
@@ -48,7 +48,7 @@ class DrivenRows {
     J_ = rows_.dense();
     scale_ = J_.rowwise().norm().cwiseMax(1e-300).cwiseInverse();
     unit_rows_.noalias() = scale_.asDiagonal() * J_;
-    scaled_.compute(unit_rows_, kRankThreshold);
+    scaled_.compute(unit_rows_, kDrivenRankThreshold);
   }
   const VectorXd& phi(const VectorXd& angles) {
     evaluate_phi(d_, frames_, laws_, angles, phi_);
@@ -251,7 +251,7 @@ class Kinematics {
     const LeftSingular svd = left_singular(J);
     std::set<std::string> seen;
     for (Index k = 0; k < J.rows(); ++k) {
-      if (k < svd.values.size() && svd.values(k) > kRankThreshold) continue;
+      if (k < svd.values.size() && svd.values(k) > kDrivenRankThreshold) continue;
       for (const Constraint& c : d_.constraints) {
         if (svd.U.col(k).segment(c.row, c.rows()).cwiseAbs().maxCoeff() < 1e-3) continue;
         const std::string owner = c.drive >= 0 ? "drive '" + d_.drive_names[static_cast<std::size_t>(c.drive)] + "'"

@@ -18,12 +18,10 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr double kMassless = 1e-12;      // relative to the largest mass or inertia
-constexpr double kZeroLength = 1e-9;     // [m]
-constexpr double kMuchViolated = 0.1;    // of the mechanism's size for points, rad for axes
-constexpr double kRankThreshold = 1e-8;  // rows of J scaled to unit length
-
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
+constexpr double kMassless = 1e-12;           // relative to the largest mass or inertia
+constexpr double kZeroLength = 1e-9;          // [m]
+constexpr double kMuchViolated = 0.1;         // of the mechanism's size for points, rad for axes
+constexpr double kModelRankThreshold = 1e-8;  // rows of J scaled to unit length
 
 std::vector<Frame> frames_at(const MechanismData& d, const VectorXd& q) {
   std::vector<Frame> frames(at(d.n) + 1);
@@ -64,7 +62,7 @@ void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::st
     }
   }
   std::map<int, bool> bodies;
-  for (const RowDependence::Direction& free : row_dependence(count, d.n, 6, rows, kRankThreshold).unreached) {
+  for (const RowDependence::Direction& free : row_dependence(count, d.n, 6, rows, kModelRankThreshold).unreached) {
     bodies[free.body + 1] = free.column >= 3;
   }
   for (const auto& [body, turns] : bodies) {

@@ -8,12 +8,12 @@
 namespace mbsopt {
 namespace {
 
-constexpr int kMostIterations = 10;       // at a tolerance
-constexpr int kMostExactIterations = 60;  // to rounding, with a new Jacobian wherever convergence is slow
-constexpr double kSlow = 0.1;             // contraction per iteration from which a new Jacobian pays
-constexpr double kRounding = 1e-11;       // relative; iterations that stop falling below it are at rounding
-constexpr int kMostOwnJacobians = 4;      // of each stage, in one step
-constexpr int kOwnSteps = 20;             // steps for which they are used once the Jacobian of the start did not serve
+constexpr int kMostNewtonIterations = 10;  // at a tolerance
+constexpr int kMostExactIterations = 60;   // to rounding, with a new Jacobian wherever convergence is slow
+constexpr double kSlow = 0.1;              // contraction per iteration from which a new Jacobian pays
+constexpr double kRounding = 1e-11;        // relative; iterations that stop falling below it are at rounding
+constexpr int kMostOwnJacobians = 4;       // of each stage, in one step
+constexpr int kOwnSteps = 20;              // steps for which they are used once the Jacobian of the start did not serve
 
 }  // namespace
 
@@ -228,7 +228,7 @@ bool ImplicitStages::iterate(Step& step, const StageGroup& g, Matrix& m, Goal go
   }
   const double tolerance =
       std::max(std::min(1e-2, std::sqrt(settings_.rtol)), 10 * std::numeric_limits<double>::epsilon() / settings_.rtol);
-  const int most = exact ? kMostExactIterations : kMostIterations;
+  const int most = exact ? kMostExactIterations : kMostNewtonIterations;
   double before = INFINITY;
   int own_left = kMostOwnJacobians;
   for (int k = 0, since = 0; k < most; ++k, ++since) {

@@ -14,8 +14,6 @@ constexpr double kNegligible = 2e-15;  // relative, of what is left: several uni
 constexpr double kWrong = 1e-4;        // relative residual of forces from which a factor is not used
 constexpr int kSparseRun = 20;         // factorisations by the sparse LU after one that was not
 
-std::size_t at(int i) { return static_cast<std::size_t>(i); }
-
 using Entries = std::vector<SparseLu::Entry>;
 
 void add_block(int row, int column, int rows, int columns, Entries& entries) {

@@ -14,8 +14,8 @@ constexpr double kNarrowest = 1e-12;  // of a step
 constexpr double kFalls = 0.03;       // |g| times width does by more over half of all halvings, up to |t|^-0.7
 constexpr double kBounded = 1e-7;     // of a step: a |g| that has not grown threefold there does not
 constexpr int kPoints = 9, kMostSearches = 200;
-constexpr double kOffset = 0.471;    // not half: poles are at round times
-constexpr double kRounding = 1e-12;  // of what is met exactly but for that, estimates say nothing
+constexpr double kOffset = 0.471;      // not half: poles are at round times
+constexpr double kMetExactly = 1e-12;  // of what is met exactly but for that, estimates say nothing
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
@@ -123,7 +123,7 @@ void QuadratureWatch::add_to(SimulationStatistics& statistics) const {
     const Cost& cost = costs_[o];
     const Integral& value = integrals_[kIntegrals * o];
     // Exponentials are of any size.
-    const double rounding = cost.is_extreme ? kRounding * value.of_size : kRounding;
+    const double rounding = cost.is_extreme ? kMetExactly * value.of_size : kMetExactly;
     judge(value, value.of_size, rounding, cost,
           cost.is_extreme ? statistics.extreme_quadrature : statistics.quadrature);
     // Both parts relative to their sum: one that is next to nothing beside the other does not matter.

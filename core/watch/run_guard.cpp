@@ -12,7 +12,7 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kUnmet = 1e-3;                             // relative, of accelerations
+constexpr double kUnmetAcceleration = 1e-3;                 // relative, of accelerations
 constexpr double kGrown = 0.5;                              // of the energy there is
 constexpr double kNoticeable = 1e-3;                        // of the natural energy: below it a change is none
 constexpr double kFastest = 299792458, kFastestTurn = 1e6;  // light [m/s]; ten times the fastest turbine [rad/s]
@@ -138,7 +138,7 @@ std::string RunGuard::objection(double t, const Eigen::VectorXd& y, const Energy
                                 double acceleration_residual) {
   std::string words = law_jumps_.between(last_t_, t);
   last_t_ = t;
-  if (words.empty() && acceleration_residual > kUnmet) {
+  if (words.empty() && acceleration_residual > kUnmetAcceleration) {
     words = fmt::format(
         "the accelerations of the constraints are met to {:.1e} only at t = {:.6g} s: the linkage locks there (a "
         "drive, or the motion itself, asks for more than it reaches), or its position is singular. If it should go "

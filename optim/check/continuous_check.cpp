@@ -16,9 +16,10 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-class Check {
+class ContinuousComparison {
  public:
-  Check(const Scene& scene, const std::vector<Objective>& objectives, const ContinuousCheckOptions& options)
+  ContinuousComparison(const Scene& scene, const std::vector<Objective>& objectives,
+                       const ContinuousCheckOptions& options)
       : scene_(scene), objectives_(objectives), options_(options) {}
 
   ContinuousCheck run() {
@@ -179,7 +180,7 @@ Verdict ContinuousCheck::worst_verdict(const std::string& objective) const {
 
 ContinuousCheck check_continuous(const Scene& scene, const std::vector<Objective>& objectives,
                                  const ContinuousCheckOptions& options) {
-  return Check(scene, objectives, options).run();
+  return ContinuousComparison(scene, objectives, options).run();
 }
 
 }  // namespace mbsopt

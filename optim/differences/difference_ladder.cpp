@@ -16,11 +16,11 @@ struct Rung {
 template <class RungAt>
 LadderDerivative climb(const RungAt& rung_at, Eigen::Index size, double base, double amplification, int evaluations,
                        const LadderOptions& options) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  constexpr double kUnbounded = std::numeric_limits<double>::infinity();
   const double noise = amplification * std::max(options.noise, std::numeric_limits<double>::epsilon());
   LadderDerivative best;
   best.derivative.setZero(size);
-  best.error.setConstant(size, kInfinity);
+  best.error.setConstant(size, kUnbounded);
   best.rounding.setZero(size), best.step.setZero(size), best.largest.setZero(size);
   std::vector<Eigen::VectorXd> above, row;  // rows j - 1 and j of T
   double h = options.step;

@@ -15,7 +15,6 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 using Eigen::Index;
 
 // Accelerations at the states of a motion, one column each; a column of NaN where they cannot be computed.

@@ -18,8 +18,6 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 // Curves of one setting, or of two: the motion's and the gradient's.
 
 // Settings from loose to tight, and how far along they are measured.

@@ -13,12 +13,15 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <string>
 #include <vector>
 
 #include "optim/tradeoff/tradeoff_runs.hpp"
 
 namespace mbsopt {
+
+inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();  // an error that is not there
 
 enum class QuantityKind { motion, sensors, objective, gradient };
 
