@@ -29,14 +29,14 @@ class ConstraintRows {
   void subtract_times(const std::vector<Vec<6>>& x, Eigen::VectorXd& y) const {
     for (const RowGroup& g : data_->groups) {
       if (g.body1 > 0 && g.body2 > 0) {
-        const Column<3> x1(x[at(g.body1)].data()), x2(x[at(g.body2)].data());
+        const Column<3> x1(x[of_body(g.body1)].data()), x2(x[of_body(g.body2)].data());
         for (int r = 0; r < g.rows; ++r) {
           const Pair sum = x1.times(row(J1, g.block + r)) + x2.times(row(J2, g.block + r));
           y(g.row + r) -= sum[0] + sum[1];
         }
       } else if (g.body1 > 0 || g.body2 > 0) {
         const Rows& J = g.body1 > 0 ? J1 : J2;
-        const Column<3> moving(x[at(std::max(g.body1, g.body2))].data());
+        const Column<3> moving(x[of_body(std::max(g.body1, g.body2))].data());
         for (int r = 0; r < g.rows; ++r) {
           const Pair sum = moving.times(row(J, g.block + r));
           y(g.row + r) -= sum[0] + sum[1];
@@ -51,7 +51,7 @@ class ConstraintRows {
   void subtract_transposed_times(const Eigen::VectorXd& lambda, std::vector<Vec<6>>& x) const {
     const auto subtract = [&](int body, const Rows& J, const RowGroup& g) {
       if (body == 0) return;
-      double* to = x[at(body)].data();
+      double* to = x[of_body(body)].data();
       Column<3> sum(to);
       for (int r = 0; r < g.rows; ++r) sum.subtract(lambda(g.row + r), row(J, g.block + r));
       sum.store(to);
@@ -107,7 +107,7 @@ class ConstraintRows {
 
   static const double* row(const Rows& J, int block) { return J.data() + 6 * block; }
 
-  static std::size_t at(int body) { return static_cast<std::size_t>(body - 1); }
+  static std::size_t of_body(int body) { return static_cast<std::size_t>(body - 1); }
   template <bool Accelerations>
   void evaluate(std::size_t group, const Frames& frames, Eigen::VectorXd* phi_ddot);
   void add_square(std::size_t group, const Eigen::VectorXd& alpha, const BlockKernels& kernels, BlockCholesky<6>& S);

@@ -4,7 +4,6 @@
 #include <map>
 
 namespace mbsopt {
-namespace {}  // namespace
 
 PlanarRows::PlanarRows(const MechanismData& data) : model_(data.planar.get()) {
   using Kind = PlanarConstraint::Kind;

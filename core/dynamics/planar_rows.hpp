@@ -29,17 +29,17 @@ class PlanarRows {
     for (const Point& p : points_) {
       double first = y[p.row], second = y[p.row2];
       if (p.body2 > 0) {
-        const Vec<3>& b = x[at(p.body2)];
+        const Vec<3>& b = x[of_body(p.body2)];
         first -= b(0) - p.x2[1] * b(2), second -= b(1) + p.x2[0] * b(2);
       }
       if (p.body1 > 0) {
-        const Vec<3>& b = x[at(p.body1)];
+        const Vec<3>& b = x[of_body(p.body1)];
         first += b(0) - p.x1[1] * b(2), second += b(1) + p.x1[0] * b(2);
       }
       y[p.row] = first, y[p.row2] = second;
     }
     for (const Entry& e : entries_) {
-      const Vec<3>& b = x[at(e.body)];
+      const Vec<3>& b = x[of_body(e.body)];
       y[e.row] -= e.J[0] * b(0) + e.J[1] * b(1) + e.J[2] * b(2);
     }
   }
@@ -102,21 +102,21 @@ class PlanarRows {
     for (const Point& p : points_) {
       const double first = lambda(p.row), second = lambda(p.row2);
       if (p.body2 > 0) {
-        Vec<3>& b = x[at(p.body2)];
+        Vec<3>& b = x[of_body(p.body2)];
         b(0) -= first, b(1) -= second, b(2) -= p.x2[0] * second - p.x2[1] * first;
       }
       if (p.body1 > 0) {
-        Vec<3>& b = x[at(p.body1)];
+        Vec<3>& b = x[of_body(p.body1)];
         b(0) += first, b(1) += second, b(2) += p.x1[0] * second - p.x1[1] * first;
       }
     }
     for (const Entry& e : entries_) {
-      Vec<3>& b = x[at(e.body)];
+      Vec<3>& b = x[of_body(e.body)];
       const double l = lambda(e.row);
       for (int k = 0; k < 3; ++k) b(k) -= e.J[k] * l;
     }
   }
-  static std::size_t at(int body) { return static_cast<std::size_t>(body - 1); }
+  static std::size_t of_body(int body) { return static_cast<std::size_t>(body - 1); }
   RowsInPlane view() const {
     return {points_.data(), points_.size(), entries_.data(), entries_.size(), bodies_.data(), bodies_.size()};
   }

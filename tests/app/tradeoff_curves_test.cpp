@@ -5,6 +5,7 @@
 #include <string>
 
 #include "app/json/read_problem.hpp"
+#include "optim/tradeoff/tradeoff.hpp"
 #include "optim/tradeoff/tradeoff_curves.hpp"
 #include "tests/app/gallery_files.hpp"
 #include "tests/optim/counted_clock.hpp"

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "core/cvodes/cvodes_newton.hpp"
+#include "core/simulate/simulation.hpp"
 #include "tests/core/integrate/state_costs.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 

@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/force/user_force.hpp"
+#include "core/simulate/simulation.hpp"
 #include "tests/core/integrate/state_costs.hpp"
 #include "tests/core/mechanism/small_scenes.hpp"
 

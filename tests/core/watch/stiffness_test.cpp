@@ -4,6 +4,7 @@
 #include <map>
 
 #include "core/mechanism/mechanism.hpp"
+#include "core/simulate/simulation.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
 using namespace mbsopt;

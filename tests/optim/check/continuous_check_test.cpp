@@ -3,9 +3,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "five_bar.hpp"
 #include "optim/check/gradient_check.hpp"
 #include "optim/objective/evaluator.hpp"
+#include "tests/optim/five_bar.hpp"
 
 using namespace mbsopt;
 using Catch::Contains;

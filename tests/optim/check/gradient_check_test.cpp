@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "five_bar.hpp"
+#include "tests/optim/five_bar.hpp"
 
 using namespace mbsopt;
 

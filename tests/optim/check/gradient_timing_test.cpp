@@ -2,9 +2,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "five_bar.hpp"
 #include "optim/machine/median.hpp"
 #include "optim/objective/objective.hpp"
+#include "tests/optim/five_bar.hpp"
 
 using namespace mbsopt;
 

@@ -4,12 +4,12 @@
 #include <limits>
 #include <map>
 
-#include "five_bar.hpp"
 #include "optim/design/design.hpp"
 #include "optim/design/design_program.hpp"
 #include "optim/objective/design_issues.hpp"
 #include "optim/objective/hessian.hpp"
 #include "optim/problem/start_points.hpp"
+#include "tests/optim/five_bar.hpp"
 
 using namespace mbsopt;
 using Catch::Contains;

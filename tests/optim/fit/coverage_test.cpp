@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "optim/fit/identification.hpp"
-#include "repetitions.hpp"
+#include "tests/optim/repetitions.hpp"
 
 using namespace mbsopt;
 

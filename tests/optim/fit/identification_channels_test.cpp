@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "optim/fit/identification.hpp"
-#include "repetitions.hpp"
+#include "tests/optim/repetitions.hpp"
 
 using namespace mbsopt;
 using Catch::Matchers::Contains;

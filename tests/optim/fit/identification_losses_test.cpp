@@ -5,7 +5,7 @@
 
 #include "optim/fit/experiment.hpp"
 #include "optim/fit/identification.hpp"
-#include "pendulum.hpp"
+#include "tests/optim/pendulum.hpp"
 
 using namespace mbsopt;
 using Catch::Matchers::Contains;

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "optim/fit/experiment.hpp"
-#include "pendulum.hpp"
 #include "source_folder.hpp"
+#include "tests/optim/pendulum.hpp"
 
 using namespace mbsopt;
 using Catch::Matchers::Contains;

@@ -5,7 +5,7 @@
 #include "optim/fit/experiment.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/fit/unknown_parameters.hpp"
-#include "repetitions.hpp"
+#include "tests/optim/repetitions.hpp"
 
 using namespace mbsopt;
 

@@ -5,8 +5,8 @@
 #include <iterator>
 
 #include "optim/fit/identification.hpp"
-#include "repetitions.hpp"
 #include "source_folder.hpp"
+#include "tests/optim/repetitions.hpp"
 
 using namespace mbsopt;
 

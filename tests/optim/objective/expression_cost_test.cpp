@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/start/assembly.hpp"
-#include "five_bar.hpp"
 #include "optim/objective/objective.hpp"
+#include "tests/optim/five_bar.hpp"
 
 using namespace mbsopt;
 using Eigen::VectorXd;

@@ -4,12 +4,12 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "five_bar.hpp"
 #include "optim/design/design.hpp"
 #include "optim/objective/design_issues.hpp"
 #include "optim/objective/hessian.hpp"
 #include "optim/objective/problem_issues.hpp"
-#include "pendulum.hpp"
+#include "tests/optim/five_bar.hpp"
+#include "tests/optim/pendulum.hpp"
 
 using namespace mbsopt;
 using Catch::Contains;

@@ -3,8 +3,8 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "five_bar.hpp"
 #include "optim/problem/parameter_values.hpp"
+#include "tests/optim/five_bar.hpp"
 
 using namespace mbsopt;
 using Catch::Contains;

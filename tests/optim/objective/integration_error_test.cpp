@@ -2,8 +2,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "five_bar.hpp"
 #include "optim/objective/evaluator.hpp"
+#include "tests/optim/five_bar.hpp"
 
 using namespace mbsopt;
 

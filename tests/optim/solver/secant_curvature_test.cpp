@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <catch2/catch.hpp>
 
-#include "small_programs.hpp"
+#include "tests/optim/small_programs.hpp"
 
 using namespace mbsopt;
 using mbsopt::testing::vector;

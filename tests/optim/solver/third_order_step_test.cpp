@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "small_programs.hpp"
+#include "tests/optim/small_programs.hpp"
 
 using namespace mbsopt;
 using mbsopt::testing::vector;

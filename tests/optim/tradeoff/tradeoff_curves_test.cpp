@@ -8,8 +8,6 @@ using namespace mbsopt;
 
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 TradeoffRow row_of(const std::string& curve, long work, std::vector<double> errors, RowStatus status = RowStatus::ok) {
   TradeoffRow row;
   row.setting.curve = curve;
