@@ -27,8 +27,8 @@ void group_rows(MechanismData& data) {
 
 // The inertia a row sees, independent of the configuration: reduced mass of the two bodies for a point or distance,
 // reduced inertia about the body's farthest joint point for a direction or angle, four times that for an Euler
-// parameter (p' = 1/2 G'omega); of several terms, the inverses add up with their factors squared. Bodies without mass
-// count with a small share of the largest mass, so that alpha stays finite and S = M + alpha J'J stays well scaled.
+// parameter (p' = 1/2 G'omega); of several terms, the inverses add up with their factors squared. A body without mass
+// passes the forces of a row on to those that it carries: the row sees the other body, or else the lightest of all.
 void scale_alpha(MechanismData& data) {
   const std::size_t bodies = data.bodies.size();
   std::vector<double> mass(bodies), inertia(bodies), reach2(bodies, 0.0);
@@ -54,17 +54,30 @@ void scale_alpha(MechanismData& data) {
   }
   if (largest_mass == 0) largest_mass = 1;
   if (largest_inertia == 0) largest_inertia = 1;
-  constexpr double kLeast = 1e-6;
-  auto inverse = [&](const std::vector<double>& x, double largest, int body) {
-    return body == 0 ? 0.0 : 1 / std::max(x[static_cast<std::size_t>(body)], kLeast * largest);
+  static constexpr double kLeast = 1e-6;  // of the largest: keeps S = M + alpha J'J well scaled
+  const auto lightest = [](const std::vector<double>& x, double largest) {
+    double least = largest;
+    for (const double here : x) {
+      if (here > 0) least = std::min(least, here);
+    }
+    return std::max(least, kLeast * largest);
+  };
+  const double lightest_mass = lightest(mass, largest_mass), lightest_inertia = lightest(inertia, largest_inertia);
+  const auto inverse = [](const std::vector<double>& x, double largest, double otherwise, const Constraint& c) {
+    double sum = 0;
+    for (const int body : {c.body1, c.body2}) {
+      const double here = x[static_cast<std::size_t>(body)];
+      if (here > 0) sum += 1 / std::max(here, kLeast * largest);
+    }
+    return sum > 0 ? sum : 1 / otherwise;
   };
   data.row_alpha.setZero(data.m);
   for (const Constraint& c : data.constraints) {
     const auto* coordinate = std::get_if<Coordinate>(&c.primitive);
     const bool turns = std::holds_alternative<Dot1>(c.primitive) || std::holds_alternative<Angle>(c.primitive) ||
                        (coordinate && coordinate->index >= 3);
-    const double seen = turns ? inverse(inertia, largest_inertia, c.body1) + inverse(inertia, largest_inertia, c.body2)
-                              : inverse(mass, largest_mass, c.body1) + inverse(mass, largest_mass, c.body2);
+    const double seen =
+        turns ? inverse(inertia, largest_inertia, lightest_inertia, c) : inverse(mass, largest_mass, lightest_mass, c);
     data.row_alpha.segment(c.row, c.rows()).array() += c.factor * c.factor * seen * (turns && coordinate ? 0.25 : 1.0);
   }
   // A factor of zero leaves a row without inertia: any alpha does.

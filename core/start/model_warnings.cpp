@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "core/dynamics/constraint_rows.hpp"
@@ -109,6 +110,29 @@ void add_gravity(const MechanismData& d, std::vector<std::string>& warnings) {
                   g(0), g(1), g(2)));
 }
 
+// Coordinates r carry rounding of eps |r|, in which the arms of bodies are only so long.
+void add_rounding(const MechanismData& d, const VectorXd& q, std::vector<std::string>& warnings) {
+  constexpr double kNoticeable = 1e-8;  // of the arms: below the tolerances of integrators
+  double arm = 0, far = 0;
+  for (const Constraint& c : d.constraints) {
+    std::visit(
+        [&]<class P>(const P& p) {
+          if constexpr (std::is_same_v<P, Coincidence> || std::is_same_v<P, Dot2> || std::is_same_v<P, Distance>) {
+            if (c.body1 > 0) arm = std::max(arm, p.s1.norm());
+            if (c.body2 > 0) arm = std::max(arm, p.s2.norm());
+          }
+        },
+        c.primitive);
+  }
+  for (int i = 0; i < d.n; ++i) far = std::max(far, q.segment<3>(7 * i).norm());
+  const double rounding = std::numeric_limits<double>::epsilon() * far;
+  if (arm == 0 || !(rounding > kNoticeable * arm)) return;
+  warnings.push_back(fmt::format(
+      "the bodies are {:.3g} m from the origin, and their joints within {:.3g} m of their centres of mass: rounding of "
+      "coordinates is {:.0e} of these lengths, which the motion and its gradients lose. Put the origin near the bodies",
+      far, arm, rounding / arm));
+}
+
 void add_violations(const MechanismData& d, std::vector<std::string>& warnings) {
   double size = 0;
   for (const Constraint& c : d.constraints) {
@@ -161,6 +185,7 @@ std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assemb
   const MechanismData& d = mechanism.data();
   std::vector<std::string> warnings;
   if (!assembly.result().ok) return warnings;
+  add_rounding(d, assembly.result().y.head(7 * d.n), warnings);
   add_massless(d, assembly.result().y.head(7 * d.n), warnings);
   add_springs(d, assembly.result().y, warnings);
   return warnings;

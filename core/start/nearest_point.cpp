@@ -47,8 +47,16 @@ NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J, const Ve
   Z_ = orthonormal_null_space(J_transposed_.left_null_space(), sizes);
 }
 
-VectorXd NearestPointLinearisation::multipliers(const VectorXd& g) const {
-  return scale_.asDiagonal() * J_transposed_.solve(sizes_.asDiagonal() * g);
+// With lengths L, entries of r stand as L g_r beside g_p, of which rounding is eps g_p: refinement by g - J'nu, where
+// rows of r see only their own terms, restores the digits of nu that this takes.
+MatrixXd NearestPointLinearisation::multipliers(const Eigen::Ref<const MatrixXd>& g) const {
+  constexpr int kRefinements = 2;  // each gains the digits that one solution has
+  MatrixXd nu = scale_.asDiagonal() * J_transposed_.solve(sizes_.asDiagonal() * g);
+  for (int k = 0; k < kRefinements; ++k) {
+    const MatrixXd left = g - J_.transpose() * nu;
+    nu += scale_.asDiagonal() * J_transposed_.solve(sizes_.asDiagonal() * left);
+  }
+  return nu;
 }
 MatrixXd NearestPointLinearisation::particular(const Eigen::Ref<const MatrixXd>& b) const {
   return sizes_.asDiagonal() * J_transposed_.solve_transposed(scale_.asDiagonal() * b);
@@ -82,7 +90,7 @@ void NearestPointLinearisation::solve_transposed(const Eigen::Ref<const MatrixXd
                                                  MatrixXd& g_bar) const {
   const MatrixXd w = V_.transpose() * (Z_.transpose() * x_bar);
   g_bar = Z_ * (V_ * (lambda_.cwiseInverse().asDiagonal() * w));
-  b_bar = scale_.asDiagonal() * J_transposed_.solve(sizes_.asDiagonal() * (x_bar - H_.transpose() * g_bar));
+  b_bar = multipliers(x_bar - H_.transpose() * g_bar);
 }
 
 VectorXd NearestPointLinearisation::descent(const VectorXd& b, const VectorXd& g) const {

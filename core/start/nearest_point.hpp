@@ -62,7 +62,7 @@ class NearestPointLinearisation {
     return scale_.asDiagonal() * (b - J_ * particular(b));
   }
   const Eigen::MatrixXd& null_space() const { return Z_; }                                 // Z
-  Eigen::VectorXd multipliers(const Eigen::VectorXd& g) const;                             // least nu with J'nu = g
+  Eigen::MatrixXd multipliers(const Eigen::Ref<const Eigen::MatrixXd>& g) const;           // least nu with J'nu = g
   Eigen::MatrixXd pseudo_inverse_times(const Eigen::Ref<const Eigen::MatrixXd>& b) const;  // J+ b
 
   // Must precede solve and solve_transposed.

@@ -118,7 +118,8 @@ class Measures:
     # ---- conditions
 
     def some_conditions(self):
-        """At most one of a value, the start's own, and one of a rate: more could contradict each other."""
+        """At most one of a value, the start's own, and one of a rate: more could contradict each other. Of a coordinate
+        of a body no rate: joints may hold it."""
         rng, f = self.rng, self.family
         if f.has("equilibrium") or f.has("driven") or f.has("rough") or self.m.freedoms - len(self.loads.drives) < 1:
             return []
@@ -129,7 +130,7 @@ class Measures:
             return []
         name = rng.choice(able)
         condition = {"sensor": name, "value": self.starts[name]}
-        if rng.random() < 0.7:
+        if rng.random() < 0.7 and self.sensors[name]["quantity"] in ("angle", "displacement", "distance"):
             condition["rate"] = self.sizes[name] / f.time * rng.uniform(-0.5, 0.5)
         return [condition]
 

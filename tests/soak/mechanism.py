@@ -163,10 +163,13 @@ class Mechanism:
         return list(turn)
 
     def take_masses(self):
-        """From bodies that carry another one by a joint, which can lend them its inertia."""
+        """From bodies that carry another one by a joint, which lends them its inertia in every direction that the joint
+        to their own carrier leaves."""
+        held = {"revolute", "translational", "fixed"}
+        holder = {joint.bodies[1]: joint.type for joint in self.joints}
         for joint in self.joints:
             i, j = joint.bodies
-            if i and self.poses[i].mass and self.poses[j].mass and self.rng.random() < 0.6:
+            if i and holder.get(i) in held and joint.type in held and self.poses[i].mass and self.poses[j].mass and self.rng.random() < 0.6:
                 self.poses[i].mass = self.poses[i].inertia = 0
                 self.bodies[i - 1].update(mass=0, inertia=[0, 0, 0])
 

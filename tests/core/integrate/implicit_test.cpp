@@ -67,6 +67,42 @@ TEST_CASE("a stiff damper does not hold the steps of L-stable methods", "[implic
   }
 }
 
+// A bob on n massless rods of 1 m that are welded together, and on one of n metres.
+TEST_CASE("rods without mass hold a bob as firmly as one does", "[implicit]") {
+  const auto hung = [](int rods) {
+    Scene s;
+    s.gravity = {0.0, -9.81, 0.0};
+    s.simulation.end_time = 2;
+    const std::string length = std::to_string(10.0 / rods);
+    std::string last = "ground";
+    for (int k = 0; k <= rods; ++k) {
+      Body rod = plain_body("b" + std::to_string(k), 0, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, {10.0 * k / rods, 0.0, 0.0});
+      if (k == rods) rod.mass = 2, rod.inertia = {0.01, 0.01, 0.01, 0.0, 0.0, 0.0};
+      Joint held =
+          hinge("j" + std::to_string(k), last, vec(k == 0 ? "0" : length, "0", "0"), rod.name, vec("0", "0", "0"));
+      if (k > 0) held.type = "fixed", held.axis1 = held.axis2 = {};
+      s.bodies.push_back(rod), s.joints.push_back(held);
+      last = rod.name;
+    }
+    return s;
+  };
+  for (const char* method : {"dopri853", "sdirk4", "radau5"}) {
+    const auto run = [&](int rods) {
+      Scene scene = hung(rods);
+      scene.simulation.integrator.type = method;
+      return simulate(Mechanism(scene, nominal(scene)), scene.simulation);
+    };
+    const SimulationResult one = run(1), ten = run(10);
+    INFO(method << ": " << ten.message << ", steps " << ten.statistics.steps << ", of one rod "
+                << one.statistics.steps);
+    REQUIRE(one.ok());
+    REQUIRE(ten.ok());
+    CHECK(2 * ten.statistics.steps < 3 * one.statistics.steps);
+    CHECK(ten.statistics.max_acceleration_residual < 1e-10);
+    CHECK((ten.y_end.segment<3>(7 * 10) - one.y_end.segment<3>(7)).norm() < 1e-5);
+  }
+}
+
 TEST_CASE("the adjoint identity holds to 1e-12 over one step of every method", "[implicit][gradient]") {
   Scene scene = every_force_four_bar();
   for (const Method& rk : runge_kutta_methods()) {

@@ -501,6 +501,52 @@ TEST_CASE("tangent and adjoint of assembly agree from micrometres to ten kilomet
   }
 }
 
+// A slide along e = (cos u, sin u, 0) that turns with u about z. Its velocity is that of the guess along e:
+//   r + A s = lambda e,  lambda = e'(r0 + A s),  rdot = e e'rdot0,  pdot = 0
+TEST_CASE("a guess that turns fast does not cost the derivatives of a slide their digits, whatever its size",
+          "[assembly]") {
+  const double size = GENERATE(1e-6, 1e-3, 1.0, 1e4);
+  INFO(size << " m");
+  const auto sized = [&](double x, double y, double z) {
+    return vec(fmt::format("{}", size * x), fmt::format("{}", size * y), fmt::format("{}", size * z));
+  };
+  constexpr double u = 0.4;
+  Scene scene;
+  add_parameters(scene, {{"u", u}});
+  const Vector3d e(std::cos(u), std::sin(u), 0), across(-std::sin(u), std::cos(u), 0), s(0.3, -0.2, 0.5);
+  const Vector3d As = s(0) * e + s(1) * across + Vector3d(0, 0, s(2)), r = 0.3 * e - As, rdot(0.3, -0.5, 0.7);
+  Body slide = body("slide", vec("0", "0", "0"), sized(r(0), r(1), r(2)), turned(fmt::format("{}", u)));
+  slide.velocity = sized(3e3 * rdot(0), 3e3 * rdot(1), 3e3 * rdot(2));
+  slide.angular_velocity = vec("300", "-200", "3000");
+  scene.bodies.push_back(slide);
+  Joint rail;
+  rail.name = "rail", rail.type = "translational", rail.body1 = "ground", rail.body2 = "slide";
+  rail.point1 = vec("0", "0", "0"), rail.point2 = sized(s(0), s(1), s(2));
+  rail.axis1 = vec("cos(u)", "sin(u)", "0"), rail.axis2 = vec("1", "0", "0");
+  rail.normal1 = rail.normal2 = vec("0", "0", "1");
+  scene.joints.push_back(rail);
+  const Mechanism mechanism(scene, nominal(scene));
+  const Assembly assembly(mechanism, 0);
+  INFO(assembly.result().message);
+  REQUIRE(assembly.result().ok);
+
+  const Vector3d turned_arm = Vector3d::UnitZ().cross(As), r0 = r;
+  const double along = across.dot(r0 + As) + e.dot(turned_arm);
+  VectorXd exact = VectorXd::Zero(14);
+  exact.head<3>() = size * (along * e + 0.3 * across - turned_arm);
+  exact.segment<4>(3) << -0.5 * std::sin(u / 2), 0, 0, 0.5 * std::cos(u / 2);
+  exact.segment<3>(7) = 3e3 * size * (across * e.dot(rdot) + e * across.dot(rdot));
+  VectorXd units(14);
+  units << VectorXd::Constant(3, size), VectorXd::Ones(4), VectorXd::Constant(3, 3e3 * size),
+      VectorXd::Constant(4, 3e3);
+  const MatrixXd y_rho = assembly.tangent();
+  CHECK((y_rho.col(0) - exact).cwiseQuotient(units).lpNorm<Eigen::Infinity>() < 1e-12);
+  const MatrixXd y_bar = units.cwiseInverse().asDiagonal() * MatrixXd::Identity(14, 14);
+  MatrixXd rho_bar = MatrixXd::Zero(1, 14);
+  assembly.add_adjoint(y_bar, rho_bar);
+  CHECK((rho_bar.transpose() - exact.cwiseQuotient(units)).lpNorm<Eigen::Infinity>() < 1e-12);
+}
+
 TEST_CASE("assembly gives a mechanism of micrometres the motion of one of metres", "[assembly]") {
   const auto assembled = [](double size) {
     Scene scene = spatial_four_bar();

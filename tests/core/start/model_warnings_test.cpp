@@ -33,3 +33,20 @@ TEST_CASE("gravity that moves nothing in the plane of a mechanism is warned of",
   scene.gravity = {0.0, 0.0, 0.0};
   CHECK(warnings_of(scene).empty());
 }
+
+TEST_CASE("a mechanism so far from the origin that rounding spoils its lengths is warned of", "[warnings]") {
+  const auto at = [](double far, double size) {
+    const std::string x = std::to_string(far), arm = std::to_string(1e6 * size) + "e-6";
+    Scene scene;
+    scene.gravity = {0.0, -9.81, 0.0};
+    scene.bodies.push_back(body("bar", vec(arm, "0", "0"), vec(x, "0", "0"), turned("0")));
+    scene.joints.push_back(hinge("A", "ground", vec(x + " - " + arm, "0", "0"), "bar", vec("-" + arm, "0", "0")));
+    return warnings_of(scene);
+  };
+  CHECK(at(3000, 1).empty());
+  CHECK(at(0.5, 1e-6).empty());
+  const std::vector<std::string> found = at(3000, 1e-6);  // eps 3000 / 2e-6 = 3e-7, arms from the centre of mass
+  REQUIRE(found.size() == 1);
+  INFO(found[0]);
+  CHECK(found[0].find("rounding of coordinates is 3e-07 of these lengths") != std::string::npos);
+}
