@@ -151,3 +151,14 @@ TEST_CASE("gradient --hessian is refused where there is no discrete gradient on 
   }
   CHECK_THAT(run_command({"gradient", "--help"}).out, Contains("--hessian") && Contains("not forward over adjoint"));
 }
+
+TEST_CASE("gradient shows on a terminal how far it is", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("flight.json", kFlight);
+  for (const std::string method : {"adjoint", "tlm"}) {
+    std::ostringstream out, err;
+    REQUIRE(run_command_line({"gradient", file, "--out", folder.file("out"), "--method", method}, out, err, true) ==
+            kDone);
+    CHECK_THAT(err.str(), Contains("differentiating [") && Contains("100 %") && Catch::EndsWith("\r\x1b[K"));
+  }
+}
