@@ -1,5 +1,5 @@
-// What whole commands take as mechanisms grow: `validate`, `simulate` and `gradient` of 100 to 10 000 bodies, twenty
-// steps each. Every command runs in a process of its own.
+// These benchmarks run `validate`, `simulate` and `gradient` of 100 to 10 000 bodies, twenty steps each, to show how
+// their time and memory grow. Every command runs in a process of its own.
 //   seconds   processor time of the process
 //   mib       the most memory that it held
 #include <benchmark/benchmark.h>
@@ -43,15 +43,17 @@ std::string problem_text(const Linkage& linkage) {
   }
   for (std::size_t k = 0; k < linkage.hinges.size(); ++k) {
     const Linkage::Hinge& hinge = linkage.hinges[k];
-    joints.push_back(fmt::format(
-        R"({{"name": "hinge{}", "type": "revolute", "body1": "{}", "body2": "{}", "point1": {}, "point2": {}, "axis1": {}, "axis2": {}}})",
-        k, name(hinge.body1), name(hinge.body2), list(hinge.point - linkage.centre(hinge.body1)),
-        list(hinge.point - linkage.centre(hinge.body2)), list(hinge.axis), list(hinge.axis)));
+    joints.push_back(fmt::format(R"({{"name": "hinge{}", "type": "revolute", "body1": "{}", "body2": "{}", )"
+                                 R"("point1": {}, "point2": {}, "axis1": {}, "axis2": {}}})",
+                                 k, name(hinge.body1), name(hinge.body2),
+                                 list(hinge.point - linkage.centre(hinge.body1)),
+                                 list(hinge.point - linkage.centre(hinge.body2)), list(hinge.axis), list(hinge.axis)));
   }
   return fmt::format(
       R"({{"format": 1, "name": "sizes", "gravity": {}, "parameters": {{"m": 1}}, "bodies": [
 {}], "joints": [
-{}], "sensors": {{"energy": {{"quantity": "energy", "component": "total"}}}}, "objectives": {{"end": {{"terminal": "energy"}}}},
+{}], "sensors": {{"energy": {{"quantity": "energy", "component": "total"}}}},
+"objectives": {{"end": {{"terminal": "energy"}}}},
 "simulation": {{"end_time": 0.02, "output_step": 0.01, "integrator": {{"type": "dopri5", "step": 1e-3}}}}}})",
       list(linkage.gravity), fmt::join(bodies, ",\n"), fmt::join(joints, ",\n"));
 }

@@ -4,6 +4,13 @@ function(mbsopt_sources variable folder)
   set(${variable} ${sources} PARENT_SCOPE)
 endfunction()
 
+# The release ends at once if an error overwrites the stack or overruns a buffer. If optim/ or app/ index past a
+# container, it ends, too (docs/performance.md).
+set(MBSOPT_HARDENED OFF)
+if(PROJECT_IS_TOP_LEVEL AND CMAKE_BUILD_TYPE STREQUAL Release AND NOT MBSOPT_SANITIZE)
+  set(MBSOPT_HARDENED ON)
+endif()
+
 # mbsopt_compile_options(<target>): what every target of ours is compiled with. Imported targets are SYSTEM, so the
 # warnings are about our own code only.
 function(mbsopt_compile_options target)
@@ -20,6 +27,12 @@ function(mbsopt_compile_options target)
   endif()
   if(MBSOPT_NATIVE)  # PUBLIC: the alignment of Eigen's types depends on it
     target_compile_options(${target} PUBLIC $<BUILD_INTERFACE:-march=native>)
+  endif()
+  if(MBSOPT_HARDENED)
+    target_compile_options(${target} PRIVATE -fstack-protector-strong -U_FORTIFY_SOURCE -D_FORTIFY_SOURCE=2)
+    if(NOT target STREQUAL mbsopt_core)
+      target_compile_options(${target} PRIVATE -D_GLIBCXX_ASSERTIONS)
+    endif()
   endif()
   if(MBSOPT_SANITIZE STREQUAL THREAD)
     target_compile_options(${target} PRIVATE -fsanitize=thread -fno-omit-frame-pointer)

@@ -144,7 +144,7 @@ int run_in_words(const Command& command, const CommandContext& context) {
   return kBadInput;
 }
 
-// What was printed may wait in a buffer; that it did not arrive is known only now.
+// Printed text may wait in a buffer, so only a flush shows whether it arrived.
 int flushed(int exit_code, std::ostream& out, std::ostream& err) {
   errno = 0;
   if (out.flush()) return exit_code;

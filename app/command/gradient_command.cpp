@@ -102,6 +102,8 @@ int gradient_command(const CommandContext& context) {
   options.method = wanted;
   options.progress = [&](double t) {
     last_good_time = t;
+    const SimulationSettings& s = scene.simulation;
+    run.progress.fraction("differentiating", (t - s.start_time) / (s.end_time - s.start_time));
     return !interrupted();
   };
   std::vector<std::string> left_out;
@@ -109,6 +111,7 @@ int gradient_command(const CommandContext& context) {
   say_left_out(run, left_out, "objective");
   Evaluator evaluator(needed.scene, objectives_of(needed), {}, options);
   const Evaluation& evaluation = evaluator.gradients(evaluator.start());
+  run.progress.finish();
   run.result["simulation"] = to_json(evaluation.statistics);
   add_derivative_counts(run, needed.scene, evaluation.statistics);
   for (const std::string& warning : evaluation.warnings) run.warn(warning);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "app/report/html_text.hpp"
@@ -162,21 +163,29 @@ struct DrawnSketch {
   Sketch sketch;
 };
 
-View view_of(std::array<int, 2> plane, const std::vector<DrawnSketch>& drawn) {
+// Returns nullopt if a position in the drawing or its width [m] overflows.
+std::optional<View> view_of(std::array<int, 2> plane, const std::vector<DrawnSketch>& drawn) {
   Eigen::AlignedBox2d box;
   View view{plane};
+  bool finite = true;
+  const auto extend = [&](const DrawnState& state, const BodyPoint& p) {
+    const Point2 at = view.flat(placed(state.row, p));
+    box.extend(at);
+    finite = finite && at.allFinite();
+  };
   for (const auto& [state, sketch] : drawn) {
     for (std::size_t i = 0; i < sketch.bodies.size(); ++i)
-      for (const Point3& s : sketch.bodies[i]) box.extend(view.flat(placed(state.row, {i, s})));
-    for (const BodyPoint& joint : sketch.joints) box.extend(view.flat(placed(state.row, joint)));
+      for (const Point3& s : sketch.bodies[i]) extend(state, {i, s});
+    for (const BodyPoint& joint : sketch.joints) extend(state, joint);
     for (const auto& [from, to] : sketch.springs)
-      for (const BodyPoint& end : {from, to}) box.extend(view.flat(placed(state.row, end)));
+      for (const BodyPoint& end : {from, to}) extend(state, end);
   }
   const double width = std::max(box.sizes().x(), 1e-12), height = std::max(box.sizes().y(), 1e-12);
   view.scale = std::min((kWidth - 2 * kMargin) / width, (kLargestHeight - 2 * kMargin - kTitle) / height);
   view.height = std::max(kSmallestHeight, height * view.scale + 2 * kMargin + kTitle);
   view.x0 = box.center().x() - (kWidth / 2 - kMargin) / view.scale;
   view.y0 = box.center().y() - ((view.height - kTitle) / 2 - kMargin) / view.scale;
+  if (!finite || !Point3(view.x0, view.y0, kWidth / view.scale).allFinite()) return std::nullopt;
   return view;
 }
 
@@ -272,7 +281,9 @@ std::string mechanism_drawing(const std::string& title, std::array<int, 2> plane
   if (states.empty()) return {};
   std::vector<DrawnSketch> drawn;
   for (const DrawnState& state : states) drawn.push_back({state, SketchMaker(state.scene).sketch()});
-  const View view = view_of(plane, drawn);
+  const std::optional<View> found = view_of(plane, drawn);
+  if (!found) return {};
+  const View& view = *found;
   const std::string full_title = fmt::format("{}, seen in the {}-{} plane", title, "xyz"[plane[0]], "xyz"[plane[1]]);
   std::string svg = fmt::format("<svg viewBox=\"0 0 {} {:.0f}\" role=\"img\" aria-label=\"{}\">\n", kWidth, view.height,
                                 html_escaped(full_title));

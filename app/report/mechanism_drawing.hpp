@@ -22,7 +22,7 @@ struct DrawnState {
 // The two axes (0, 1, 2) along which the bodies' points move most; where they move along fewer, are spread most.
 std::array<int, 2> plane_of_motion(const Scene& scene, const Trajectory& trajectory);
 
-// SVG text; empty where there is no state.
+// SVG text; empty if there is no state, or if a distance in it overflows.
 std::string mechanism_drawing(const std::string& title, std::array<int, 2> plane,
                               const std::vector<DrawnState>& states);
 

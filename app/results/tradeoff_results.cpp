@@ -59,7 +59,7 @@ std::string errors_text(const Tradeoff& tradeoff, const TaskAdvice& advice) {
   return text;
 }
 
-// What it is for, and what it is.
+// The words of a recommendation say what it is for and which setting it is.
 struct RecommendationWords {
   double accuracy;
   std::string aim, setting;  // "track"; "dopri5 at rtol 1e-05, 12 ms (error 3.1e-05)", or why there is none

@@ -74,7 +74,7 @@ class Server {
     }
   }
 
-  // What waits is not begun any more.
+  // Drops the starts that wait, and stops those that run.
   void stop() {
     waiting_.clear();
     if (pool_) pool_->stop();

@@ -202,8 +202,8 @@ double RungeKuttaRun::fastest_tracked_rate(const Eigen::VectorXd& y) const {
   return fastest;
 }
 
-// What a penalty leaves of the accelerations of the constraints, projection takes out of the velocities: it hides too
-// small an alpha. Both in the norm of the kinetic energy; where nothing moves, loads would move it as gravity does.
+// Projection takes out of the velocities the constraint accelerations that a penalty leaves: it hides too small an
+// alpha. Both are in the norm of the kinetic energy. If nothing moves, loads would move it as gravity does.
 void RungeKuttaRun::add_projection(double h) {
   if (settings_.formulation.type != FormulationType::penalty || !projector_.active()) return;
   const MechanismData& d = mechanism_.data();

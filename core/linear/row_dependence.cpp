@@ -83,7 +83,7 @@ class Front {
     return is_pivot;
   }
 
-  // What the pivots' parts do not span: per direction the column with most of it.
+  // Returns a column for each direction that the pivots' parts do not span: the one with most of it.
   std::vector<int> unreached(Index first, Index count) const {
     MatrixXd left = MatrixXd::Identity(count, count);
     for (const Index k : found_) {

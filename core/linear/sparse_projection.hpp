@@ -31,7 +31,7 @@ class SparseProjection {
                         Eigen::MatrixXd& g_bar) const;
 
   const Eigen::VectorXd& row_scale() const;
-  // What x' leaves of J x' = b, rows of J scaled to unit length.
+  // Returns the residual b - J x', rows of J scaled to unit length.
   Eigen::MatrixXd left(const Eigen::Ref<const Eigen::MatrixXd>& b, const Eigen::Ref<const Eigen::MatrixXd>& x) const;
 
  private:

@@ -1,6 +1,6 @@
 // The scene compiled at one value of its parameters: bodies numbered, joints turned into primitives, every numeric
-// field a number with its derivative in rho. Const after construction; a Workspace (workspace.hpp) owns what a step
-// touches.
+// field a number with its derivative in rho. It is const after construction; a Dynamics (core/dynamics)
+// owns the arrays of a right-hand side.
 #pragma once
 
 #include <Eigen/Core>

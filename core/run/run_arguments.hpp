@@ -1,4 +1,4 @@
-// What a caller from C++ can get wrong, before anything runs.
+// These checks refuse wrong arguments of a C++ caller before anything runs.
 #pragma once
 
 #include <span>

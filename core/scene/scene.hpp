@@ -22,7 +22,7 @@ using PointField =
 
 enum class ParameterScale { linear, log, log10 };
 
-// What is known about a parameter before identification: a normal distribution.
+// A normal distribution states what is known about a parameter before identification.
 struct Prior {
   double mean = 0, sigma = 1;
 };

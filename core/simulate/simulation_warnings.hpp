@@ -1,5 +1,5 @@
-// What deserves a word about a simulation: settings that cost digits, joints that came apart, integrals that the steps
-// do not resolve, jumps that derivatives do not see.
+// Warnings name settings that cost digits, joints that came apart, integrals that the steps do not resolve and jumps
+// that derivatives do not see.
 #pragma once
 
 #include <string>

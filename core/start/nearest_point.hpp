@@ -38,9 +38,9 @@ struct NearestPointEquations {
   virtual Eigen::VectorXd retracted(const Eigen::VectorXd& x) const = 0;
   // The unit of each unknown, in which the entries of J become comparable.
   virtual Eigen::VectorXd sizes(const Eigen::MatrixXd& J) const { return Eigen::VectorXd::Ones(J.cols()); }
-  // What perturbs the terms of each equation by a relative eps, divided by eps: its values are known no better.
+  // Returns the change of each value per relative change of its terms: rounding leaves it no better known.
   virtual Eigen::VectorXd magnitudes(const Eigen::VectorXd& x) const { return jacobian(x).cwiseAbs() * x.cwiseAbs(); }
-  // What a violation of each equation counts where they cannot all be satisfied.
+  // Returns the weight of each violation if the equations cannot all be satisfied.
   virtual Eigen::VectorXd weights() const = 0;
   virtual void accept(const Eigen::VectorXd&) {}  // x is the next iterate: continue what is continued (angles)
 };
@@ -57,7 +57,7 @@ class NearestPointLinearisation {
   Eigen::Index rank() const { return J_transposed_.rank(); }
   const Eigen::VectorXd& row_scale() const { return scale_; }
   const Eigen::VectorXd& sizes() const { return sizes_; }
-  // What is left of b outside the range of J, rows of J scaled to unit length.
+  // Returns the part of b outside the range of J, rows of J scaled to unit length.
   Eigen::MatrixXd left(const Eigen::Ref<const Eigen::MatrixXd>& b) const {
     return scale_.asDiagonal() * (b - J_ * particular(b));
   }

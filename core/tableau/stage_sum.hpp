@@ -9,6 +9,8 @@ namespace mbsopt {
 
 class StageSum {
  public:
+  // to() reads the first terms_ entries only, so the arrays need no values.
+  StageSum() {}  // cppcheck-suppress uninitMemberVar
   // k: as many numbers as y; not read where c is 0.
   void add(double c, const double* k) {
     if (c == 0) return;

@@ -9,8 +9,8 @@
 // with the node before, m = 2.
 //
 // Derivatives of psi are integrals of g_y y' + g_rho, which may be unresolved where g is not (sqrt(|x|) through zero).
-// What the directions y' are is known to one of the two sweeps only; ydot and rho stand for them: g_y ydot and g_rho
-// rho are estimated like g (gradient_quadrature.hpp).
+// Only one of the two sweeps knows the directions y'. ydot and rho stand for them: g_y ydot and g_rho rho are estimated
+// like g (gradient_quadrature.hpp).
 //
 // Where that is much, a pole is looked for: the interval is halved around the largest |g| along the step's Hermite
 // cubic. If |g| times the interval's length does not fall, |g| grows at least like 1/|t - t*|, which has no integral.

@@ -215,9 +215,9 @@ class Check {
           free_error_(i, k) += e.psi_rho(i, k) + std::max(e.psi(i), jump_(i, k)) / free_step_(i, k);
   }
 
-  // What rounding does to psi and its derivatives: how they scatter over points that are a few units in the last place
-  // apart. Each side of rho is looked at alone, since a kink at rho parts the sides and is no rounding. Measured only
-  // if something disagrees.
+  // Rounding scatters psi and its derivatives over points that are a few units in the last place apart. Each side of
+  // rho is looked at alone, since a kink at rho parts the sides and is no rounding. This runs only if something
+  // disagrees.
   void measure_rounding() {
     psi_rounding_ = kPsiRounding * result_.psi.cwiseAbs();
     for (const double side : {1.0, -1.0}) {
@@ -272,7 +272,7 @@ class Check {
                     f.alpha, worst));
   }
 
-  // What smaller entries of an objective are compared to.
+  // Entries of an objective below this size are compared with it.
   double floor_of(Index objective, Index k) const {
     return options_.thresholds.rounding_floor *
            result_.tlm.row(objective).cwiseAbs().cwiseProduct(size_.transpose()).maxCoeff() / size_(k);

@@ -43,7 +43,7 @@ struct DifferenceComparison {
   std::function<bool(Eigen::VectorXd& f, Eigen::MatrixXd& f_rho)> tighter;
   std::function<bool()> go_on = {};  // false: abandon the comparison
 
-  // What disagrees or could not be compared, a sentence for each variable.
+  // Returns a sentence for each variable that disagrees or could not be compared.
   std::vector<std::string> warnings() const;
 };
 

@@ -1,5 +1,5 @@
-// What makes the derivatives of a fit doubtful at its start: laws that jump at instants which the unknowns move, and
-// residuals whose differences disagree with their derivatives (difference_comparison.hpp).
+// These checks doubt the derivatives of a fit at its start: laws jump at instants which the unknowns move, or
+// differences of residuals disagree with their derivatives (difference_comparison.hpp).
 #pragma once
 
 #include <functional>

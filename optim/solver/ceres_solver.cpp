@@ -155,7 +155,7 @@ std::vector<int> pressed_bounds(const LeastSquaresProblem& problem, const Eigen:
   return pressed;
 }
 
-// What the best step along one free variable takes off the cost, by the derivatives: a lower bound of what is left.
+// Returns how far the best step along one free variable lowers the cost by the derivatives, a lower bound of the rest.
 double promised_gain(const LeastSquaresProblem& problem, const Eigen::VectorXd& x, const LeastSquaresPoint& at) {
   const Eigen::VectorXd g = at.z_x.transpose() * problem.pull(at.z);
   Eigen::VectorXd gain = g.array().square() / (2 * at.z_x.colwise().squaredNorm().transpose().array()).max(1e-300);

@@ -63,9 +63,9 @@ std::optional<std::size_t> simulation_of(const Tradeoff& tradeoff, std::size_t r
 Recommendation recommend(const Tradeoff& tradeoff, std::vector<std::size_t> quantities, double accuracy,
                          const std::function<bool(const TradeoffRow&)>& also = {});
 
-// What the scene is run for: the objectives, or the sensors where there are none, or the motion.
+// Returns the objectives, or the sensors where there are none, or the motion.
 std::vector<std::size_t> main_quantities(const std::vector<Quantity>& quantities);
-// What an optimiser uses: the named objectives and their gradients.
+// Returns what an optimiser uses: the named objectives and their gradients.
 std::vector<std::size_t> design_quantities(const std::vector<Quantity>& quantities,
                                            const std::vector<std::string>& objectives);
 

@@ -151,7 +151,8 @@ TEST_CASE("blocks of derivatives are counted: one more for a force that the stat
 
 TEST_CASE("bodies that something connects with an objective stay", "[costs]") {
   const std::string rope =
-      R"(, {"name": "rope", "type": "tsda", "body1": "a", "body2": "b", "point1": "tip", "point2": "tip", "stiffness": 1, "free_length": 4})";
+      R"(, {"name": "rope", "type": "tsda", "body1": "a", "body2": "b", "point1": "tip", "point2": "tip",
+          "stiffness": 1, "free_length": 4})";
   const std::string by_sensor =
       R"(, {"name": "push", "type": "force", "body": "a", "point": "tip", "components": [0, "0.1*y_b", 0]})";
   for (const std::string& connection : {rope, by_sensor}) {

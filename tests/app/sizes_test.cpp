@@ -51,11 +51,10 @@ enum class Layout { chain, ladder, free };
 std::string scene(Layout layout, int bodies, const char* last_mass = "m", double last_inertia = 0.1) {
   std::string rods, joints;
   const auto hinge = [&](int b1, int b2, double x1, double y1, double x2, double y2) {
-    joints += fmt::format(
-        R"({}{{"name": "h{}", "type": "revolute", "body1": "{}", "body2": "r{}", "point1": [{}, {}, 0], "point2": [{}, {}, 0],)"
-        R"("axis1": [0, 0, 1], "axis2": [0, 0, 1]}})",
-        joints.empty() ? "" : ",", std::count(joints.begin(), joints.end(), '{'),
-        b1 < 0 ? "ground" : fmt::format("r{}", b1), b2, x1, y1, x2, y2);
+    joints += fmt::format(R"({}{{"name": "h{}", "type": "revolute", "body1": "{}", "body2": "r{}",)"
+                          R"("point1": [{}, {}, 0], "point2": [{}, {}, 0], "axis1": [0, 0, 1], "axis2": [0, 0, 1]}})",
+                          joints.empty() ? "" : ",", std::count(joints.begin(), joints.end(), '{'),
+                          b1 < 0 ? "ground" : fmt::format("r{}", b1), b2, x1, y1, x2, y2);
   };
   for (int i = 0; i < bodies; ++i) {
     const bool upright = layout == Layout::ladder && i % 2 == 0;
@@ -69,11 +68,13 @@ std::string scene(Layout layout, int bodies, const char* last_mass = "m", double
     if (upright && i > 0) hinge(i - 1, i, 0.5, 0, 0, 0.5);
     if (!upright) hinge(i - 1, i, 0, 0.5, -0.5, 0);
   }
-  return fmt::format(
-      R"({{"format": 1, "name": "large", "gravity": [0, -9.81, 0], "parameters": {{"m": 1}}, "bodies": [{}], "joints": [{}],)"
-      R"("sensors": {{"e": {{"quantity": "energy", "component": "total"}}}}, "objectives": {{"end": {{"terminal": "e"}}}},)"
-      R"("simulation": {{"end_time": 0.004, "output_step": 0.002, "integrator": {{"type": "dopri5", "step": 1e-3}}}}}})",
-      rods, joints);
+  return fmt::format(R"({{"format": 1, "name": "large", "gravity": [0, -9.81, 0], "parameters": {{"m": 1}},)"
+                     R"("bodies": [{}], "joints": [{}],)"
+                     R"("sensors": {{"e": {{"quantity": "energy", "component": "total"}}}},)"
+                     R"("objectives": {{"end": {{"terminal": "e"}}}},)"
+                     R"("simulation": {{"end_time": 0.004, "output_step": 0.002,)"
+                     R"("integrator": {{"type": "dopri5", "step": 1e-3}}}}}})",
+                     rods, joints);
 }
 
 void check_growth_of(const char* command, Layout layout) {

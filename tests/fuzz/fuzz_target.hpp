@@ -1,5 +1,5 @@
-// What all fuzz targets share. A target is a function of some bytes: libFuzzer calls it with bytes that it mutates
-// (./dev fuzz), replay.cpp with the files of tests/fuzz/corpus. A broken expectation aborts, which both report.
+// All fuzz targets share these checks. A target is a function of some bytes: libFuzzer calls it with bytes that it
+// mutates (./dev fuzz), replay.cpp with the files of tests/fuzz/corpus. A broken expectation aborts; both report that.
 #pragma once
 
 #include <cstddef>

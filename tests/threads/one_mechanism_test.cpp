@@ -14,7 +14,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-// What one thread computes: results that must be those of a single thread, bit by bit.
+// The results of each thread must equal those of a single thread, bit by bit.
 struct Computed {
   double psi = 0;
   MatrixXd psi_rho;

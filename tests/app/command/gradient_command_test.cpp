@@ -46,7 +46,8 @@ const char* const kFlight = R"({
   "format": 1,
   "name": "flight",
   "gravity": [0, 0, 0],
-  "parameters": {"m": {"value": 1.6, "unit": "kg"}, "F": {"value": 3, "unit": "N"}, "v0": {"value": -0.5, "unit": "m/s"}},
+  "parameters": {"m": {"value": 1.6, "unit": "kg"}, "F": {"value": 3, "unit": "N"},
+                 "v0": {"value": -0.5, "unit": "m/s"}},
   "bodies": [{"name": "body", "mass": "m", "inertia": [0.2, 0.3, 0.4], "velocity": ["v0", 0, 0]}],
   "forces": [{"name": "push", "type": "force", "body": "body", "components": ["F", 0, 0]}],
   "sensors": {"x": {"quantity": "position", "body": "body", "component": "x"}},
@@ -149,4 +150,15 @@ TEST_CASE("gradient --hessian is refused where there is no discrete gradient on 
     CHECK_THAT(outcome.err, Contains("second derivatives by " + method + ": there are none"));
   }
   CHECK_THAT(run_command({"gradient", "--help"}).out, Contains("--hessian") && Contains("not forward over adjoint"));
+}
+
+TEST_CASE("gradient shows on a terminal how far it is", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("flight.json", kFlight);
+  for (const std::string method : {"adjoint", "tlm"}) {
+    std::ostringstream out, err;
+    REQUIRE(run_command_line({"gradient", file, "--out", folder.file("out"), "--method", method}, out, err, true) ==
+            kDone);
+    CHECK_THAT(err.str(), Contains("differentiating [") && Contains("100 %") && Catch::EndsWith("\r\x1b[K"));
+  }
 }

@@ -121,12 +121,14 @@ TEST_CASE("an identification is read, its data found beside the problem file", "
   const TemporaryFolder folder;
   folder.write("run.csv", "t,time,x\n0,1,0.1\n0.5,1.5,0.2\n1,2,0.3\n");
   const std::string text =
-      R"({"parameters": {"m": 1, "g0": 1, "th": 0}, "bodies": [{"name": "a", "mass": "m", "inertia": [1, 1, 1], "position": ["th", 0, 0]}],
+      R"({"parameters": {"m": 1, "g0": 1, "th": 0},
+ "bodies": [{"name": "a", "mass": "m", "inertia": [1, 1, 1], "position": ["th", 0, 0]}],
  "sensors": {"x": {"quantity": "position", "body": "a", "component": "x"}},
  "identification": {"variables": ["m"], "loss": {"type": "squared"}, "sigma_is_known": true,
    "optimizer": {"tolerance": 1e-8},
    "experiments": [
-   {"name": "r", "data": "run.csv", "time": "time", "start_time": 1, "end_time": 2, "overrides": {"th": 0.3}, "free": ["th"],
+   {"name": "r", "data": "run.csv", "time": "time", "start_time": 1, "end_time": 2,
+    "overrides": {"th": 0.3}, "free": ["th"],
     "channels": [{"column": "x", "sensor": "x", "sigma": 0.01, "gain": "g0", "bias": "2 [mm]"}]},
    {"name": "v", "data": "run.csv", "role": "validate", "channels": [{"column": "x", "sensor": "x"}]}]}})";
   const Problem problem = read_problem_text(text, folder.path / "p.json");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <limits>
 #include <regex>
 
 #include "tests/core/mechanism/small_scenes.hpp"
@@ -110,4 +111,23 @@ TEST_CASE("a drawing of any size has a scale of a round length", "[report]") {
     CHECK((std::abs(digit - 1) < 1e-9 || std::abs(digit - 2) < 1e-9 || std::abs(digit - 5) < 1e-9));
     CHECK(shown < length);
   }
+}
+
+TEST_CASE("a mechanism of the largest numbers is drawn or left out", "[report]") {
+  Scene scene = pendulum();
+  constexpr double kHalf = std::numeric_limits<double>::max() / 2;
+  scene.bodies[0].points["tip"] = {kHalf, 0.0, 0.0};
+  const std::vector<double> left = bar_at(M_PI), right = bar_at(0);
+  const std::string svg = mechanism_drawing("bar", {0, 1}, {{"start", scene, right}});
+  CHECK_FALSE(svg.empty());
+  CHECK(svg.find("nan") == std::string::npos);
+  CHECK(svg.find("inf") == std::string::npos);
+  // With its margins the drawing is wider than the largest number.
+  CHECK(mechanism_drawing("bar", {0, 1}, {{"start", scene, left}, {"end", scene, right}}).empty());
+  // The drawing is wider than it is high, so that its width overflows.
+  const std::vector<double> upright = bar_at(M_PI / 2);
+  CHECK(mechanism_drawing("bar", {0, 1}, {{"start", scene, upright}}).empty());
+  scene.bodies[0].points["tip"] = {2 * kHalf, 2 * kHalf, 0.0};
+  const std::vector<double> turned = bar_at(M_PI / 4);
+  CHECK(mechanism_drawing("bar", {0, 1}, {{"start", scene, turned}}).empty());
 }

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kEndedBySignal = 1000;
 
-// What a process returns that runs this, or kEndedBySignal + the signal.
+// Runs this in a process. Returns its exit code, or kEndedBySignal + the signal.
 int outcome_of(const std::function<int()>& work) {
   const pid_t process = ::fork();
   if (process == 0) {
