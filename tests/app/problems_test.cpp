@@ -5,16 +5,11 @@
 #include "app/json/read_problem.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "source_folder.hpp"
+#include "tests/app/gallery_files.hpp"
 #include "tests/app/run_command.hpp"
 
 using namespace mbsopt;
 namespace fs = std::filesystem;
-
-namespace {
-
-const fs::path kProblems = fs::path(MBSOPT_SOURCE_DIR) / "problems";
-
-}  // namespace
 
 TEST_CASE("every problem file is right, without a warning", "[problems]") {
   int files = 0;

@@ -13,9 +13,9 @@ using Catch::Matchers::Contains;
 namespace {
 
 #ifdef __SANITIZE_ADDRESS__
-constexpr int kTurns = 4;
+constexpr int kPassages = 4;
 #else
-constexpr int kTurns = 20;
+constexpr int kPassages = 20;
 #endif
 
 // A02 with one window: three unit rods, cranks up, their tops moving at 1 m/s. All lie in line twice a turn.
@@ -86,13 +86,13 @@ TEST_CASE("a four-bar passes its flat position forty times in twenty turns, on i
   const auto [method, rtol, bound] =
       GENERATE(table<std::string, double, double>({{"dopri5", 1e-8, 1e-4}, {"dopri853", 1e-10, 1e-6}}));
   set_accuracy(p, method, rtol);
-  const double end = time_to(2 * std::numbers::pi * kTurns);
+  const double end = time_to(2 * std::numbers::pi * kPassages);
   p["simulation"]["end_time"] = end;
   const Outcome run = values(p);
   INFO(method << ": " << run.message());
   REQUIRE(run.ok());
   const double chi = std::numbers::pi / 2 - run("crank");
-  CHECK(chi / (2 * std::numbers::pi) == Approx(kTurns).epsilon(1e-5));
+  CHECK(chi / (2 * std::numbers::pi) == Approx(kPassages).epsilon(1e-5));
   CHECK(std::abs(time_to(chi) - end) < bound);
   CHECK(std::abs(std::remainder(run("apart"), 2 * std::numbers::pi)) < 1e-7);  // a parallelogram still
   CHECK(run.statistics().max_position_violation < 1e-12);

@@ -61,8 +61,8 @@ inline mbsopt::CsvTable exact_motion(double w2, double c, double theta, double o
 
 inline void add_noise(mbsopt::CsvTable& table, double sigma, unsigned seed) {
   std::mt19937 generator(seed);
-  std::normal_distribution<double> normal(0, sigma);
-  for (double& x : table.columns[1]) x += normal(generator);
+  std::normal_distribution<double> normal;  // sigma may be 0
+  for (double& x : table.columns[1]) x += sigma * normal(generator);
 }
 
 inline mbsopt::ExperimentSpec experiment(const std::string& name, const std::vector<std::string>& free) {

@@ -5,14 +5,11 @@
 #include "tests/core/body/textbook_body.hpp"
 
 using namespace mbsopt;
+using mbsopt::testing::distance;
 using mbsopt::testing::Random;
 
 namespace {
 
-template <class X, class Y>
-double distance(const X& x, const Y& y) {
-  return (x - y).cwiseAbs().template maxCoeff<Eigen::PropagateNaN>();
-}
 constexpr double kTolerance = 1e-13;  // a few dozen roundings of numbers of size ten
 
 }  // namespace

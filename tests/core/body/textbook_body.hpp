@@ -14,6 +14,12 @@ namespace mbsopt::testing {
 
 using Complex = std::complex<double>;
 
+// Largest entry of x - y; NaN where one is.
+template <class X, class Y>
+double distance(const X& x, const Y& y) {
+  return (x - y).cwiseAbs().template maxCoeff<Eigen::PropagateNaN>();
+}
+
 // c0 + c1 t + c2 t^2 + O(t^3)
 template <class T>
 struct Series {

@@ -172,11 +172,6 @@ struct Case {
   }
 };
 
-template <class X, class Y>
-double distance(const X& x, const Y& y) {
-  return (x - y).cwiseAbs().template maxCoeff<Eigen::PropagateNaN>();
-}
-
 constexpr double kExact = 1e-11;      // complex step against hand-derived: rounding of sums of terms up to 1e3
 constexpr double kDifference = 1e-8;  // central differences of polynomials, extrapolated: rounding over the step
 

@@ -39,7 +39,7 @@ SimulationSettings discrete(SimulationSettings s) {
 }
 
 // A scene, and costs of every kind on two of its sensors.
-struct Case {
+struct CvodesCase {
   std::string name;
   Scene scene;
   std::string a, b;
@@ -60,8 +60,8 @@ struct Case {
   }
 };
 
-Case double_pendulum_case() {
-  Case c{"double pendulum", double_pendulum(), "theta1", "tip"};
+CvodesCase double_pendulum_case() {
+  CvodesCase c{"double pendulum", double_pendulum(), "theta1", "tip"};
   c.scene.gravity = {0.0, -9.81, 0.0};
   c.scene.sensors.push_back(point_sensor("tip", "position", "lower", vec("L1", "0", "0"), "y"));
   c.scene.conditions = {value_of("theta1", "theta0")};
@@ -69,8 +69,8 @@ Case double_pendulum_case() {
   return c;
 }
 
-Case four_bar_case() {
-  Case c{"four-bar", four_bar(), "theta", "x"};
+CvodesCase four_bar_case() {
+  CvodesCase c{"four-bar", four_bar(), "theta", "x"};
   c.scene.gravity = {0.0, -9.81, 0.0};
   c.scene.sensors.push_back(point_sensor("x", "position", "coupler", vec("L2/2", "0.1", "0"), "x"));
   c.scene.conditions = {value_of("theta", "theta0"), rate_of("theta", "rate0")};
@@ -78,21 +78,21 @@ Case four_bar_case() {
   return c;
 }
 
-Case every_force_case() {
-  Case c{"every force", every_force_four_bar(), "angle", "z"};
+CvodesCase every_force_case() {
+  CvodesCase c{"every force", every_force_four_bar(), "angle", "z"};
   c.scene.simulation.end_time = 0.5;
   return c;
 }
 
-Case acceleration_case() {
-  Case c = double_pendulum_case();
+CvodesCase acceleration_case() {
+  CvodesCase c = double_pendulum_case();
   c.name = "accelerations", c.b = "a";
   c.scene.sensors.push_back(point_sensor("a", "acceleration", "lower", vec("L1", "0", "0"), "x"));
   c.scene.simulation.end_time = 0.5;
   return c;
 }
 
-void check_close(const Case& c, const MatrixXd& found, const MatrixXd& expected, double tolerance) {
+void check_close(const CvodesCase& c, const MatrixXd& found, const MatrixXd& expected, double tolerance) {
   for (Eigen::Index o = 0; o < expected.rows(); ++o) {
     const double size = expected.row(o).cwiseAbs().maxCoeff();
     for (Eigen::Index k = 0; k < expected.cols(); ++k) {
@@ -136,8 +136,8 @@ TEST_CASE("A01 by CVODES: the simple pendulum is right at 10 s", "[cvodes]") {
 }
 
 TEST_CASE("forward and adjoint sensitivities of CVODES are the discrete ones to 1e-6", "[cvodes][gradient]") {
-  const Case c =
-      GENERATE(values<Case>({double_pendulum_case(), four_bar_case(), every_force_case(), acceleration_case()}));
+  const CvodesCase c =
+      GENERATE(values<CvodesCase>({double_pendulum_case(), four_bar_case(), every_force_case(), acceleration_case()}));
   const std::string method = GENERATE(as<std::string>{}, "cvodes_adams", "cvodes_bdf");
   const Mechanism m(c.scene, nominal(c.scene));
   const std::vector<Cost> costs = c.costs(m);
@@ -158,7 +158,7 @@ TEST_CASE("forward and adjoint sensitivities of CVODES are the discrete ones to 
 
 TEST_CASE("CVODES differentiates the penalty form and stabilised constraints, and drifts less with these",
           "[cvodes][gradient]") {
-  Case c = four_bar_case();
+  CvodesCase c = four_bar_case();
   const Mechanism m(c.scene, nominal(c.scene));
   const std::vector<Cost> costs = c.costs(m);
   const auto drift = [&](const FormulationSettings& formulation) {
@@ -190,7 +190,7 @@ TEST_CASE("CVODES differentiates the penalty form and stabilised constraints, an
 }
 
 TEST_CASE("sensitivities of CVODES do not depend on what memory held before", "[cvodes][gradient]") {
-  const Case c = double_pendulum_case();
+  const CvodesCase c = double_pendulum_case();
   const Mechanism m(c.scene, nominal(c.scene));
   const SimulationSettings settings = by("cvodes_adams", 1e-9, c.scene.simulation);
   MatrixXd first;
@@ -206,7 +206,7 @@ TEST_CASE("sensitivities of CVODES do not depend on what memory held before", "[
 }
 
 TEST_CASE("states sampled from CVODES carry their sensitivities", "[cvodes][gradient]") {
-  const Case c = four_bar_case();
+  const CvodesCase c = four_bar_case();
   const std::string method = GENERATE(as<std::string>{}, "cvodes_adams", "cvodes_bdf");
   const Mechanism m(c.scene, nominal(c.scene));
   const std::vector<double> times{0.0, 0.123, 0.124, 0.7, 1.0};
@@ -228,7 +228,7 @@ TEST_CASE("states sampled from CVODES carry their sensitivities", "[cvodes][grad
 }
 
 TEST_CASE("observers see the samples of CVODES in order, at their times", "[cvodes]") {
-  const Case c = double_pendulum_case();
+  const CvodesCase c = double_pendulum_case();
   const Mechanism m(c.scene, nominal(c.scene));
   std::vector<double> seen, steps;
   Sampling sampling{{0, 0.2, 0.2, 1.5}, [&](std::size_t, const StatePoint& at) { seen.push_back(at.t); }};
@@ -242,7 +242,7 @@ TEST_CASE("observers see the samples of CVODES in order, at their times", "[cvod
 }
 
 TEST_CASE("the matrix of CVODES' Newton iteration solves I - gamma f_y, and its transpose", "[cvodes]") {
-  const Case c = every_force_case();
+  const CvodesCase c = every_force_case();
   const Mechanism m(c.scene, nominal(c.scene));
   const SimulationResult run = simulate(m, c.scene.simulation);
   REQUIRE(run.ok());
@@ -295,7 +295,7 @@ TEST_CASE("cvodes_bdf takes long steps where a stiff mode has died out, and its 
                          exact = simulate_tlm(m, small_steps, costs);
   INFO(forward.message << adjoint.message);
   REQUIRE((forward.ok() && adjoint.ok() && exact.ok()));
-  const Case c{"stiff", scene, "", ""};
+  const CvodesCase c{"stiff", scene, "", ""};
   check_close(c, forward.psi_rho, exact.psi_rho, 1e-6);
   check_close(c, adjoint.psi_rho, exact.psi_rho, 1e-6);
 }
@@ -316,7 +316,7 @@ TEST_CASE("the adjoint of CVODES comes back through checkpoints, and angles over
   REQUIRE((exact.ok() && whole.ok() && pieces.ok()));
   CHECK(pieces.statistics.steps > 25'000);
   CHECK(exact.psi(0) > 100);  // several turns
-  const Case c{"turns", scene, "", ""};
+  const CvodesCase c{"turns", scene, "", ""};
   check_close(c, whole.psi_rho, exact.psi_rho, 1e-6);
   check_close(c, pieces.psi_rho, exact.psi_rho, 1e-6);
   CHECK(whole.statistics.adjoint_memory_bytes > 0);
@@ -397,7 +397,7 @@ TEST_CASE("what CVODES cannot do is said in words", "[cvodes]") {
 }
 
 TEST_CASE("a run of CVODES can be stopped, forward and on the way back", "[cvodes]") {
-  const Case c = double_pendulum_case();
+  const CvodesCase c = double_pendulum_case();
   const Mechanism m(c.scene, nominal(c.scene));
   const std::vector<Cost> costs = c.costs(m);
   const SimulationSettings settings = by("cvodes_adams", 1e-8, c.scene.simulation);

@@ -13,15 +13,16 @@ using namespace mbsopt;
 
 namespace {
 
-using Complex = std::complex<double>;
+using ComplexStep = std::complex<double>;
 
 // An evaluator of its own, over the syntax tree and the complex numbers: its imaginary part at x + ih is h df/dx
 // without any cancellation.
-Complex evaluate(const Expression& expression, const std::vector<std::string>& names, const std::vector<Complex>& x) {
-  std::vector<Complex> v;
+ComplexStep evaluate(const Expression& expression, const std::vector<std::string>& names,
+                     const std::vector<ComplexStep>& x) {
+  std::vector<ComplexStep> v;
   for (const SyntaxNode& node : expression.tree().nodes) {
-    const Complex a = node.a < 0 ? 0 : v[static_cast<std::size_t>(node.a)];
-    const Complex b = node.b < 0 ? 0 : v[static_cast<std::size_t>(node.b)];
+    const ComplexStep a = node.a < 0 ? 0 : v[static_cast<std::size_t>(node.a)];
+    const ComplexStep b = node.b < 0 ? 0 : v[static_cast<std::size_t>(node.b)];
     switch (node.operation) {
       case Operation::number:
         v.push_back(node.value);
@@ -173,8 +174,8 @@ TEST_CASE("gradients equal the complex step, second derivatives central differen
     CHECK(d.value == Approx(evaluate(expression, kNames, {x[0], x[1], x[2]}).real()).epsilon(1e-13));
     double along = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-      std::vector<Complex> z{x[0], x[1], x[2]};
-      z[k] += Complex(0, 1e-100);
+      std::vector<ComplexStep> z{x[0], x[1], x[2]};
+      z[k] += ComplexStep(0, 1e-100);
       CHECK(d.gradient[k] == Approx(evaluate(expression, kNames, z).imag() * 1e100).epsilon(1e-12).margin(1e-13));
       along += d.gradient[k] * u[k];
     }
@@ -329,8 +330,8 @@ TEST_CASE("a derivative program computes the derivative, and its own derivatives
   const Program f(expression, symbols), f_x = f.derivative(0), f_xx = f_x.derivative(0);
   const std::vector<double> at{1.3, 0.8, 2.1};
   auto derivative = [&](std::size_t k, double h) {  // by the complex step, and of that by central differences
-    std::vector<Complex> x{at[0] + h, at[1], at[2]};
-    x[k] += Complex(0, 1e-40);
+    std::vector<ComplexStep> x{at[0] + h, at[1], at[2]};
+    x[k] += ComplexStep(0, 1e-40);
     return evaluate(expression, kNames, x).imag() / 1e-40;
   };
   Program::Scratch scratch;

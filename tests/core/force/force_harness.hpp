@@ -118,11 +118,6 @@ C moved(const C& c, const Eigen::VectorXd& to) {
   return other;
 }
 
-template <class X, class Y>
-double distance(const X& x, const Y& y) {
-  return (x - y).cwiseAbs().template maxCoeff<Eigen::PropagateNaN>();
-}
-
 // (rdot, omega_B) as a virtual displacement: what multiplies loads to power. Needs p'pdot = 0.
 inline Vec<6> rigid_velocity(const BodyState& b, const Frame& f) {
   Vec<6> eta;

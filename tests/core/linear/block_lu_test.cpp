@@ -12,7 +12,7 @@ using Eigen::MatrixXd;
 namespace {
 
 // A matrix on a connected random graph with a few cycles, in parts of 7 x 7, dense as well. Not symmetric.
-struct Case {
+struct GraphCase {
   int rows, bodies;
   std::vector<std::pair<int, int>> edges;
   BlockLu lu;
@@ -30,7 +30,7 @@ struct Case {
     return edges;
   }
 
-  Case(int size, int count, unsigned seed)
+  GraphCase(int size, int count, unsigned seed)
       : rows(size), bodies(count), edges(graph(count, seed)), lu(size, count, edges) {
     fill();
   }
@@ -63,7 +63,7 @@ TEST_CASE("block LU solves with a matrix and its transpose like a dense LU, agai
           "[block_lu]") {
   const int rows = GENERATE(7, 14, 21, 28);
   const unsigned seed = GENERATE(range(0u, 5u));
-  Case c(rows, 1 + 3 * static_cast<int>(seed), seed);
+  GraphCase c(rows, 1 + 3 * static_cast<int>(seed), seed);
   for (int repeat = 0; repeat < 2; ++repeat) {
     REQUIRE(c.lu.factor());
     const MatrixXd b = MatrixXd::Random(rows * c.bodies, 3);

@@ -22,7 +22,7 @@ VectorField varied(Scene& scene, const std::string& name, double x, double y, do
 }
 
 // Two bodies, each on a spring to the ground; "first" hangs on a ball.
-Scene two_bodies() {
+Scene bodies_at_a_joint() {
   Scene s;
   s.gravity = {0.5, 0.2, -9.0};
   s.bodies.push_back(
@@ -63,7 +63,7 @@ Joint varied_joint(Scene& s, const std::string& type, bool normals) {
 }
 
 Scene with_joint(const std::string& type, bool normals) {
-  Scene s = two_bodies();
+  Scene s = bodies_at_a_joint();
   s.joints.push_back(ball("hang", "ground", vec("0", "0", "0"), "first", vec("0", "0", "0")));
   s.joints.push_back(varied_joint(s, type, normals));
   return s;
@@ -71,7 +71,7 @@ Scene with_joint(const std::string& type, bool normals) {
 
 // "first" turns on a skew axis of the ground; a joint that has an angle or a displacement; what ties the two.
 Scene with_tie(const std::string& type, bool normals) {
-  Scene s = two_bodies();
+  Scene s = bodies_at_a_joint();
   Joint turn = hinge("turn", "ground", vec("0", "0", "0"), "first", vec("0", "0", "0"));
   turn.axis1 = varied(s, "c", 0.2, 0.1, 1), turn.axis2 = varied(s, "d", 0.1, -0.1, 1);
   s.joints.push_back(turn);
@@ -85,7 +85,7 @@ Scene with_tie(const std::string& type, bool normals) {
 }
 
 Scene with_drive(const std::string& type, const std::string& coordinate) {
-  Scene s = two_bodies();
+  Scene s = bodies_at_a_joint();
   s.joints.push_back(ball("hang", "ground", vec("0", "0", "0"), "first", vec("0", "0", "0")));
   const bool joint = type == "angle" || type == "displacement";
   if (joint) s.joints.push_back(varied_joint(s, "cylindrical", true));

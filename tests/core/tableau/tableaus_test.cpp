@@ -12,7 +12,7 @@
 
 using namespace mbsopt;
 using namespace mbsopt::testing;
-using Complex = std::complex<double>;
+using ComplexPoint = std::complex<double>;
 
 namespace {
 
@@ -30,11 +30,11 @@ struct StabilityFunction {  // R(z) = 1 + z b'(I - z A)^-1 1
       for (int j = 0; j < rk.stages; ++j) A(i, j) = rk.a(i, j);
     }
   }
-  Complex operator()(Complex z) const {
+  ComplexPoint operator()(ComplexPoint z) const {
     const Eigen::Index n = A.rows();
-    const Eigen::MatrixXcd M = Eigen::MatrixXcd::Identity(n, n) - z * A.cast<Complex>();
+    const Eigen::MatrixXcd M = Eigen::MatrixXcd::Identity(n, n) - z * A.cast<ComplexPoint>();
     const Eigen::VectorXcd x = M.partialPivLu().solve(Eigen::VectorXcd::Ones(n));
-    Complex sum = 1;
+    ComplexPoint sum = 1;
     for (Eigen::Index i = 0; i < n; ++i) sum += z * b(i) * x(i);
     return sum;
   }
@@ -99,7 +99,7 @@ TEST_CASE("the error estimate vanishes up to one order below its own, and not at
 TEST_CASE("the error estimate does not vanish on linear motion", "[tableau]") {
   for (const Method& rk : runge_kutta_methods()) {
     if (!rk.adaptive) continue;
-    const Complex z(0, 0.5);
+    const ComplexPoint z(0, 0.5);
     Eigen::MatrixXcd matrix = Eigen::MatrixXcd::Identity(rk.stages, rk.stages);
     Eigen::RowVectorXcd error(rk.stages);
     for (int i = 0; i < rk.stages; ++i) {
@@ -189,7 +189,7 @@ TEST_CASE("implicit methods are A-stable: R has its poles on the right and |R(iy
     const Eigen::VectorXcd poles = R.A.eigenvalues();  // of their inverses; 0 for an explicit stage
     CHECK(poles.real().minCoeff() > -1e-14);
     for (double exponent = -3; exponent <= 7; exponent += 0.01) {
-      const Complex z(0, std::pow(10, exponent));
+      const ComplexPoint z(0, std::pow(10, exponent));
       INFO("z = " << z);
       CHECK(std::abs(R(z)) <= 1 + 1e-12);
     }

@@ -8,9 +8,7 @@ using namespace mbsopt;
 TEST_CASE("the ladder's derivative is right within its own error estimate", "[differences]") {
   const double x = 0.7;
   const auto f = [&](double h) {
-    Eigen::VectorXd y(3);
-    y << std::exp(x + h), std::sin(40 * (x + h)), 1e6 + (x + h);
-    return std::optional(y);
+    return std::optional<Eigen::VectorXd>(Eigen::Vector3d(std::exp(x + h), std::sin(40 * (x + h)), 1e6 + (x + h)));
   };
   const LadderDerivative d = difference_ladder(f, 3, {1e-2, 8, 0});
   const double exact[] = {std::exp(x), 40 * std::cos(40 * x), 1};

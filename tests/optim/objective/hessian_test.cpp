@@ -52,7 +52,7 @@ struct Rational {
   }
 };
 
-double largest(const MatrixXd& x) { return x.cwiseAbs().maxCoeff(); }
+double largest_entry(const MatrixXd& x) { return x.cwiseAbs().maxCoeff(); }
 
 Evaluator evaluator_of(const Problem& problem, GradientMethod method, const std::vector<std::string>& variables = {}) {
   EvaluatorOptions options;
@@ -118,7 +118,7 @@ TEST_CASE("Hessians of a free body's flight are those of its closed form", "[hes
   for (std::size_t i = 0; i < 3; ++i) {
     const ObjectiveHessian& H = found.of[i];
     INFO("objective " << i << "\n" << H.value << "\nexpected\n" << expected[i] << "\nrelative error " << H.relative());
-    CHECK(largest(H.value - expected[i]) < 1e-8);
+    CHECK(largest_entry(H.value - expected[i]) < 1e-8);
     CHECK(H.value == H.value.transpose());
     CHECK(H.relative() < 1e-8);
     CHECK(H.relative() > 0);

@@ -10,13 +10,15 @@
 #include <vector>
 
 #include "optim/solver/search_watch.hpp"
+#include "tests/optim/small_programs.hpp"
 
 using namespace mbsopt;
+using mbsopt::testing::vector;
 
 namespace {
 
-struct Rosenbrock : NonlinearProgram {
-  Rosenbrock() : NonlinearProgram(2, 0) {}
+struct FreeRosenbrock : NonlinearProgram {
+  FreeRosenbrock() : NonlinearProgram(2, 0) {}
   void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
     const double a = 1 - x(0), b = x(1) - x(0) * x(0);
     p.f = a * a + 100 * b * b;
@@ -25,8 +27,8 @@ struct Rosenbrock : NonlinearProgram {
 };
 
 // Hock and Schittkowski, "Test Examples for Nonlinear Programming Codes" (1981), problem 71.
-struct Hs071 : NonlinearProgram {
-  Hs071() : NonlinearProgram(4, 2) {
+struct FreeHs071 : NonlinearProgram {
+  FreeHs071() : NonlinearProgram(4, 2) {
     x_lower.setConstant(1), x_upper.setConstant(5);
     c_lower << 25, 40;
     c_upper(1) = 40;
@@ -41,8 +43,8 @@ struct Hs071 : NonlinearProgram {
 };
 
 // f = x - log(x), minimum at 1, evaluable for 0.5 <= x only. The first steps from 4 go too far.
-struct Fragile : NonlinearProgram {
-  Fragile() : NonlinearProgram(1, 0) {}
+struct FreeFragile : NonlinearProgram {
+  FreeFragile() : NonlinearProgram(1, 0) {}
   void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
     if (x(0) < 0.5 && throws) throw std::runtime_error("the crank locks");
     if (x(0) < 0.5) {
@@ -55,14 +57,10 @@ struct Fragile : NonlinearProgram {
   bool throws = false;
 };
 
-Eigen::VectorXd vector(std::initializer_list<double> values) {
-  return Eigen::Map<const Eigen::VectorXd>(values.begin(), static_cast<Eigen::Index>(values.size()));
-}
-
 }  // namespace
 
 TEST_CASE("ipopt finds Rosenbrock's minimum and counts what it did", "[ipopt]") {
-  Rosenbrock problem;
+  FreeRosenbrock problem;
   IpoptOptions options;
   options.tolerance = 1e-8;
   const NlpResult result = solve_with_ipopt(problem, vector({-1.2, 1}), options);
@@ -75,7 +73,7 @@ TEST_CASE("ipopt finds Rosenbrock's minimum and counts what it did", "[ipopt]") 
 }
 
 TEST_CASE("ipopt stops at a bound", "[ipopt]") {
-  Rosenbrock problem;
+  FreeRosenbrock problem;
   problem.x_upper << 0.5, 10;
   const NlpResult result = solve_with_ipopt(problem, vector({-1.2, 1}), {1e-8, 1e-8, 200, 20, {}});
   CHECK(result.status == SolverStatus::converged);
@@ -85,7 +83,7 @@ TEST_CASE("ipopt stops at a bound", "[ipopt]") {
 }
 
 TEST_CASE("ipopt solves HS071 with an inequality and an equality", "[ipopt]") {
-  Hs071 problem;
+  FreeHs071 problem;
   const NlpResult result = solve_with_ipopt(problem, vector({1, 5, 5, 1}), {1e-8, 1e-8, 100, 20, {}});
   CHECK(result.status == SolverStatus::converged);
   CHECK(result.point.f == Approx(17.0140172891563).epsilon(1e-7));
@@ -94,7 +92,7 @@ TEST_CASE("ipopt solves HS071 with an inequality and an equality", "[ipopt]") {
 }
 
 TEST_CASE("ipopt recovers from evaluations that fail and reports the first one", "[ipopt]") {
-  Fragile problem;
+  FreeFragile problem;
   problem.throws = GENERATE(false, true);
   const NlpResult result = solve_with_ipopt(problem, vector({4}), {1e-8, 1e-8, 100, 20, {}});
   CHECK(result.status == SolverStatus::converged);
@@ -104,7 +102,7 @@ TEST_CASE("ipopt recovers from evaluations that fail and reports the first one",
 }
 
 TEST_CASE("a start point that cannot be evaluated is said in words", "[ipopt]") {
-  Fragile problem;
+  FreeFragile problem;
   const NlpResult result = solve_with_ipopt(problem, vector({0.1}));
   CHECK(result.status == SolverStatus::failed);
   CHECK(result.message == "the start point cannot be evaluated: the crank locks");
@@ -112,7 +110,7 @@ TEST_CASE("a start point that cannot be evaluated is said in words", "[ipopt]") 
 }
 
 TEST_CASE("ipopt stops on request and keeps the best point", "[ipopt]") {
-  Rosenbrock problem;
+  FreeRosenbrock problem;
   std::vector<double> seen;
   IpoptOptions options;
   options.progress = [&](const NlpProgress& p) {
@@ -129,21 +127,21 @@ TEST_CASE("ipopt stops on request and keeps the best point", "[ipopt]") {
 }
 
 TEST_CASE("ipopt says when it runs out of iterations", "[ipopt]") {
-  Rosenbrock problem;
+  FreeRosenbrock problem;
   const NlpResult result = solve_with_ipopt(problem, vector({-1.2, 1}), {1e-8, 1e-8, 3, 20, {}});
   CHECK(result.status == SolverStatus::iteration_limit);
   CHECK(result.message == "stopped at the limit of 3 iterations");
 }
 
 TEST_CASE("constraints that contradict each other are infeasible", "[ipopt]") {
-  Hs071 problem;
+  FreeHs071 problem;
   problem.c_lower(0) = 2000;  // the product of four numbers up to 5 is at most 625
   const NlpResult result = solve_with_ipopt(problem, vector({1, 5, 5, 1}), {1e-6, 1e-8, 300, 20, {}});
   CHECK(result.status == SolverStatus::infeasible);
 }
 
 TEST_CASE("a start that is optimal already is left as it is", "[ipopt]") {
-  Rosenbrock problem;
+  FreeRosenbrock problem;
   const NlpResult result = solve_with_ipopt(problem, vector({1, 1}));
   CHECK(result.status == SolverStatus::converged);
   CHECK(result.x == vector({1, 1}));
@@ -155,8 +153,8 @@ TEST_CASE("a start that is optimal already is left as it is", "[ipopt]") {
 }
 
 TEST_CASE("a warm start stays near, at its bounds and limits, and needs fewer iterations", "[ipopt]") {
-  Hs071 hs071;
-  Rosenbrock valley;
+  FreeHs071 hs071;
+  FreeRosenbrock valley;
   valley.x_upper << 0.5, 10;
   const bool of_hs071 = GENERATE(true, false);
   NonlinearProgram& problem = of_hs071 ? static_cast<NonlinearProgram&>(hs071) : valley;
