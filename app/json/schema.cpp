@@ -4,14 +4,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "app/files/result_json.hpp"
 #include "core/scene/default_integrator.hpp"
 #include "optim/problem/problem_vocabulary.hpp"
 
 namespace mbsopt {
 
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 Json ref(const char* name) { return {{"$ref", std::string("#/$defs/") + name}}; }
 

@@ -12,10 +12,24 @@
 namespace mbsopt {
 namespace {
 
-int exit_code_of(const std::string& status) {
-  if (status == "failed") return kNumericalFailure;
-  if (status == "disagrees") return kCheckFailed;
-  return status == "interrupted" ? kInterrupted : kDone;
+struct StatusRow {
+  const char* word;  // in result.json
+  int exit_code;
+};
+StatusRow row_of(RunStatus status) {
+  switch (status) {
+    case RunStatus::failed:
+      return {"failed", kNumericalFailure};
+    case RunStatus::disagrees:
+      return {"disagrees", kCheckFailed};
+    case RunStatus::interrupted:
+      return {"interrupted", kInterrupted};
+    case RunStatus::running:
+      return {"running", kDone};
+    case RunStatus::ok:
+      break;
+  }
+  return {"ok", kDone};
 }
 
 Problem problem_of(const CommandContext& context, std::vector<std::string>& warnings) {
@@ -59,7 +73,7 @@ Run::~Run() {
   if (!running_) return;
   try {
     progress.finish();
-    result["status"] = "failed";
+    set(RunStatus::failed);
     folder.write("result.json", result_json_text(result));
   } catch (...) {
     folder.mark_failed();  // the exception under way says more than this one
@@ -68,9 +82,14 @@ Run::~Run() {
 
 void Run::start() {
   lock_ = folder.claim();
-  result["status"] = "running";
+  set(RunStatus::running);
   folder.write("result.json", result_json_text(result));
   running_ = true;
+}
+
+void Run::set(RunStatus status) {
+  status_ = status;
+  result["status"] = row_of(status).word;
 }
 
 void Run::write(const std::string& file, std::string_view content) {
@@ -86,28 +105,29 @@ void Run::warn(const std::string& words) {
 }
 
 void Run::failed(const std::string& message, std::optional<double> last_good_time) {
-  result["status"] = "failed";
+  set(RunStatus::failed);
   result["message"] = message;
   if (last_good_time) result["last_good_time"] = *last_good_time;
 }
 
-void Run::disagrees() { result["status"] = "disagrees"; }
+void Run::disagrees() { set(RunStatus::disagrees); }
 
 void Run::stopped(const std::string& kept) {
-  result["status"] = "interrupted";
+  set(RunStatus::interrupted);
   result["message"] = "interrupted; " + kept;
 }
 
 int Run::finish() {
   progress.finish();
-  if (result["status"] == "running") result["status"] = "ok";
-  const std::string status = result["status"], message = result.value("message", "");
-  if (status == "interrupted") context.err << message << '\n';
-  if (status == "failed" && !message.empty()) context.err << fmt::format("{} failed: {}\n", context.command, message);
+  if (status_ == RunStatus::running) set(RunStatus::ok);
+  const std::string message = result.value("message", "");
+  if (status_ == RunStatus::interrupted) context.err << message << '\n';
+  if (status_ == RunStatus::failed && !message.empty())
+    context.err << fmt::format("{} failed: {}\n", context.command, message);
   write("result.json", result_json_text(result));
   running_ = false;
   context.out << fmt::format("\n{}: {}\n", (folder.path() / "").string(), fmt::join(written_, " "));
-  return exit_code_of(status);
+  return row_of(status_).exit_code;
 }
 
 bool assembled(Run& run, const Mechanism* mechanism, const Assembly& assembly) {

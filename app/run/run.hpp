@@ -26,6 +26,8 @@
 
 namespace mbsopt {
 
+enum class RunStatus { running, ok, failed, disagrees, interrupted };
+
 class Run {
  public:
   explicit Run(const CommandContext& context);
@@ -59,6 +61,8 @@ class Run {
  private:
   std::unique_ptr<FolderLock> lock_;
   std::vector<std::string> written_;
+  void set(RunStatus status);
+  RunStatus status_ = RunStatus::running;
   bool running_ = false;
 };
 

@@ -66,7 +66,9 @@ JsonPointRecords::JsonPointRecords(const std::vector<Json>& points, const std::v
     for (const Json& json : hessians) {
       const Key x = json.at("x").get<Key>();
       const auto n = static_cast<Eigen::Index>(x.size());
-      for (const Json& matrix : json.at("of")) hessians_[x].push_back(matrix_of(matrix, n, n));
+      NlpHessians& known = hessians_[x];
+      for (const Json& matrix : json.at("of")) known.of.push_back(matrix_of(matrix, n, n));
+      if (json.contains("third_order")) known.third_order = matrix_of(json["third_order"], n, n);
     }
   });
   points_left_ = points_.size();
@@ -92,17 +94,19 @@ void JsonPointRecords::record(const VectorXd& x, Wanted wanted, const NlpPoint& 
   tell_("point", json);
 }
 
-bool JsonPointRecords::recall(const VectorXd& x, std::vector<MatrixXd>& hessians) {
+bool JsonPointRecords::recall(const VectorXd& x, NlpHessians& hessians) {
   const auto known = hessians_.find(as_vector(x));
   if (known == hessians_.end()) return false;
   hessians = known->second;
   return true;
 }
 
-void JsonPointRecords::record(const VectorXd& x, const std::vector<MatrixXd>& hessians) {
+void JsonPointRecords::record(const VectorXd& x, const NlpHessians& hessians) {
   Json of = Json::array();
-  for (const MatrixXd& H : hessians) of.push_back(to_json(H));
-  tell_("hessians", {{"x", as_vector(x)}, {"of", of}});
+  for (const MatrixXd& H : hessians.of) of.push_back(to_json(H));
+  Json json{{"x", as_vector(x)}, {"of", of}};
+  if (hessians.third_order) json["third_order"] = to_json(*hessians.third_order);
+  tell_("hessians", json);
 }
 
 }  // namespace mbsopt

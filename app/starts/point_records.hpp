@@ -17,8 +17,8 @@ class JsonPointRecords : public PointRecords {
 
   bool recall(const Eigen::VectorXd& x, Wanted wanted, NlpPoint& point) override;
   void record(const Eigen::VectorXd& x, Wanted wanted, const NlpPoint& point) override;
-  bool recall(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& hessians) override;
-  void record(const Eigen::VectorXd& x, const std::vector<Eigen::MatrixXd>& hessians) override;
+  bool recall(const Eigen::VectorXd& x, NlpHessians& hessians) override;
+  void record(const Eigen::VectorXd& x, const NlpHessians& hessians) override;
 
   bool all_recalled() const { return points_left_ == 0; }
 
@@ -30,7 +30,7 @@ class JsonPointRecords : public PointRecords {
   };
   // Points with values alone and those with derivatives are different points.
   std::map<std::pair<Key, Wanted>, Known> points_;
-  std::map<Key, std::vector<Eigen::MatrixXd>> hessians_;
+  std::map<Key, NlpHessians> hessians_;
   std::size_t points_left_ = 0;
   Tell tell_;
 };

@@ -6,12 +6,11 @@
 namespace mbsopt {
 
 PlanarRows::PlanarRows(const MechanismData& data) : model_(data.planar.get()) {
-  using Kind = PlanarConstraint::Kind;
   for (std::size_t i = 1; i < model_->bodies.size(); ++i)
     bodies_.push_back({model_->bodies[i].mass, model_->bodies[i].inertia});
   std::map<int, std::vector<int>> bodies_of_row;  // that move
   for (const PlanarConstraint& c : model_->constraints) {
-    if (c.kind == Kind::point) continue;
+    if (c.kind == PlanarConstraint::Kind::point) continue;
     std::vector<int>& bodies = bodies_of_row[c.row];
     for (const int body : {c.body1, c.body2}) {
       if (body > 0 && std::find(bodies.begin(), bodies.end(), body) == bodies.end()) bodies.push_back(body);
@@ -32,7 +31,7 @@ PlanarRows::PlanarRows(const MechanismData& data) : model_(data.planar.get()) {
   for (std::size_t k = 0; k < model_->constraints.size(); ++k) {
     const PlanarConstraint& c = model_->constraints[k];
     const int constraint = static_cast<int>(k);
-    if (c.kind == Kind::point) {
+    if (c.kind == PlanarConstraint::Kind::point) {
       points_.push_back({c.body1, c.body2, c.row, c.row2, {}, {}});
       point_places_.push_back({constraint, edges_.size()});
       if (c.body1 > 0 && c.body2 > 0) edges_.emplace_back(c.body1 - 1, c.body2 - 1);

@@ -14,8 +14,6 @@
 namespace mbsopt {
 namespace {
 
-using VecOut = Eigen::Ref<Eigen::VectorXd>;
-
 double branch(const Eigen::VectorXd& angles, int i) { return i < angles.size() ? angles(i) : 0.0; }
 
 // reference: the value on whose turn an angle is.

@@ -8,6 +8,9 @@
 
 namespace mbsopt {
 
+using VecIn = Eigen::Ref<const Eigen::VectorXd>;
+using VecOut = Eigen::Ref<Eigen::VectorXd>;
+
 // The solution of the equations of motion at a state, or a gradient in it.
 struct Motion {
   std::vector<Vec<6>> z;   // per body (rddot, omegadot), omegadot in body axes

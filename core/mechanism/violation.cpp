@@ -9,8 +9,6 @@
 namespace mbsopt {
 namespace {
 
-using VecOut = Eigen::Ref<Eigen::VectorXd>;
-
 RowLaws laws_at(const MechanismData& d, double t) {
   RowLaws laws(d);
   laws.set_time(t);
@@ -63,7 +61,7 @@ Violation worst_violation(const MechanismData& d, double t, const Eigen::VectorX
 }
 
 double add_violation_gradient(const MechanismData& d, double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
-                              double scale, VecOut y_bar, VecOut rho_bar) {
+                              double scale, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) {
   const Violation worst = worst_violation(d, t, y, angles);
   const double s = worst.amount < 0 ? -scale : scale;
   if (worst.body > 0) {

@@ -18,9 +18,6 @@ namespace mbsopt {
 
 struct SwitchedProgram;  // core/expression/program_switches.hpp
 
-using VecIn = Eigen::Ref<const Eigen::VectorXd>;
-using VecOut = Eigen::Ref<Eigen::VectorXd>;
-
 // y = (q, v): q has 7 numbers per body (r_g, p), v = qdot the same; y.head(7n) = q, y.tail(7n) = v.
 struct RunningCost {
   virtual ~RunningCost() = default;

@@ -139,7 +139,7 @@ class Adapter : public Ipopt::TNLP {
     for (Index i = 0; i < n; ++i) {
       for (Index j = 0; j <= i; ++j, ++k) {
         values[k] = f_factor * of_f(i, j);
-        for (Index c = 0; c < m; ++c) values[k] += multipliers[c] * hessians_[static_cast<std::size_t>(c) + 1](i, j);
+        for (Index c = 0; c < m; ++c) values[k] += multipliers[c] * hessians_.of[static_cast<std::size_t>(c) + 1](i, j);
       }
     }
     return true;
@@ -228,20 +228,21 @@ class Adapter : public Ipopt::TNLP {
   // one. Gauss-Newton's is mended by it where it does not explain how the gradient has changed, exact ones by the third
   // derivative along their step.
   Eigen::MatrixXd for_steps() const {
-    if (problem_.constraints() > 0) return hessians_[0];
-    if (options_.gauss_newton && secants_.contradicts(hessians_[0])) return secants_.matrix_from(hessians_[0]);
-    if (Eigen::LLT<Eigen::MatrixXd>(hessians_[0]).info() == Eigen::Success) return hessians_.back();
+    const Eigen::MatrixXd& of_f = hessians_.of[0];
+    if (problem_.constraints() > 0) return of_f;
+    if (options_.gauss_newton && secants_.contradicts(of_f)) return secants_.matrix_from(of_f);
+    if (Eigen::LLT<Eigen::MatrixXd>(of_f).info() == Eigen::Success) return hessians_.third_order.value_or(of_f);
     return secants_.matrix();
   }
 
-  // Behind H, what is to take its place in a step of third order, where there is one.
-  void add_third_order(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& H) {
+  void add_third_order(const Eigen::VectorXd& x, NlpHessians& hessians) {
     if (problem_.constraints() > 0 || options_.gauss_newton || !evaluate(x)) return;
+    const Eigen::MatrixXd& H = hessians.of[0];
     const Eigen::VectorXd f_x = point_->f_x, at = points_.x();
-    const std::optional<Eigen::VectorXd> d = newton_step(problem_, at, f_x, H[0]);
+    const std::optional<Eigen::VectorXd> d = newton_step(problem_, at, f_x, H);
     Eigen::VectorXd there;
     if (!d || !found_beside(at, *d, there)) return;
-    if (const auto B = third_order_hessian(H[0], *d, 2 * (there - f_x - H[0] * *d))) H.push_back(*B);
+    hessians.third_order = third_order_hessian(H, *d, 2 * (there - f_x - H * *d));
   }
   bool found_beside(const Eigen::VectorXd& x, const Eigen::VectorXd& d, Eigen::VectorXd& f_x) {
     try {
@@ -253,19 +254,19 @@ class Adapter : public Ipopt::TNLP {
 
   void update_hessians(const Eigen::VectorXd& x) {
     if (hessians_x_.size() > 0 && hessians_x_ == x) return;
-    std::vector<Eigen::MatrixXd> found;
+    NlpHessians found;
     bool ok = options_.records && options_.records->recall(x, found);
     if (!ok) {
-      ok = problem_.hessians(x, found);
+      ok = problem_.hessians(x, found.of);
       if (ok) add_third_order(x, found);
       if (ok && options_.records) options_.records->record(x, found);
     }
     if (ok) hessians_ = std::move(found);
-    if (!ok && !hessians_.empty()) hessians_.resize(static_cast<std::size_t>(problem_.constraints()) + 1);
-    if (hessians_.empty()) {
+    if (!ok) hessians_.third_order.reset();
+    if (hessians_.of.empty()) {
       const Eigen::Index n = problem_.variables();
-      hessians_.assign(static_cast<std::size_t>(problem_.constraints()) + 1, Eigen::MatrixXd::Zero(n, n));
-      hessians_[0] = Eigen::MatrixXd::Identity(n, n) / problem_.f_scale;
+      hessians_.of.assign(static_cast<std::size_t>(problem_.constraints()) + 1, Eigen::MatrixXd::Zero(n, n));
+      hessians_.of[0] = Eigen::MatrixXd::Identity(n, n) / problem_.f_scale;
     }
     hessians_x_ = x;
   }
@@ -283,7 +284,7 @@ class Adapter : public Ipopt::TNLP {
   SecantCurvature secants_;
   const NlpPoint* point_ = nullptr;  // the last one
   Eigen::VectorXd final_, iterate_, hessians_x_;
-  std::vector<Eigen::MatrixXd> hessians_;
+  NlpHessians hessians_;
   SearchWatch watch_;
   SearchEnd end_ = SearchEnd::none;
   bool second_order_, out_of_evaluations_ = false;

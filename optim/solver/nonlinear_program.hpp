@@ -14,6 +14,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -83,14 +84,20 @@ struct NonlinearProgram {
   Eigen::VectorXd c_scale;                             // the same for c; ones
 };
 
+// At one point.
+struct NlpHessians {
+  std::vector<Eigen::MatrixXd> of;             // f, and each constraint
+  std::optional<Eigen::MatrixXd> third_order;  // takes the place of f's in a step of third order
+};
+
 // Points that were computed in an earlier run, and a place where new ones are written down: a run that was killed goes
 // on from there.
 struct PointRecords {
   virtual ~PointRecords() = default;
   virtual bool recall(const Eigen::VectorXd& x, Wanted wanted, NlpPoint& point) = 0;
   virtual void record(const Eigen::VectorXd& x, Wanted wanted, const NlpPoint& point) = 0;
-  virtual bool recall(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& hessians) = 0;
-  virtual void record(const Eigen::VectorXd& x, const std::vector<Eigen::MatrixXd>& hessians) = 0;
+  virtual bool recall(const Eigen::VectorXd& x, NlpHessians& hessians) = 0;
+  virtual void record(const Eigen::VectorXd& x, const NlpHessians& hessians) = 0;
 };
 
 // What every solver takes and gives.

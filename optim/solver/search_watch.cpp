@@ -54,9 +54,9 @@ bool SearchWatch::is_stalled() const {
 }
 
 bool SearchWatch::is_creeping() const {
-  constexpr double kLittle = 0.01, kNear = 0.1;
+  constexpr double kLittle = 0.01, kBeside = 0.1;
   if (recent_.size() <= kCreeping) return false;
-  const bool far = std::all_of(recent_.begin(), recent_.end(), [&](const Iterate& i) { return i.distance > kNear; });
+  const bool far = std::all_of(recent_.begin(), recent_.end(), [&](const Iterate& i) { return i.distance > kBeside; });
   const auto [least, most] = range_of_f(recent_.begin(), recent_.end());
   return far && most - least <= kLittle * std::abs(most);
 }

@@ -298,14 +298,14 @@ struct Remembered : PointRecords {
     return true;
   }
   void record(const Eigen::VectorXd& x, Wanted, const NlpPoint& point) override { points[key(x)] = point; }
-  bool recall(const Eigen::VectorXd& x, std::vector<Eigen::MatrixXd>& H) override {
+  bool recall(const Eigen::VectorXd& x, NlpHessians& H) override {
     if (!hessians.contains(key(x))) return false;
     H = hessians[key(x)];
     return true;
   }
-  void record(const Eigen::VectorXd& x, const std::vector<Eigen::MatrixXd>& H) override { hessians[key(x)] = H; }
+  void record(const Eigen::VectorXd& x, const NlpHessians& H) override { hessians[key(x)] = H; }
   std::map<std::vector<double>, NlpPoint> points;
-  std::map<std::vector<double>, std::vector<Eigen::MatrixXd>> hessians;
+  std::map<std::vector<double>, NlpHessians> hessians;
 };
 
 int newton_iterations(double x) {
