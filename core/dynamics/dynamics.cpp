@@ -50,10 +50,7 @@ Eigen::VectorXd alpha_of_factor(const MechanismData& data, const FormulationSett
   return Eigen::VectorXd::Constant(data.m, moderate ? moderate_alpha(data, settings.alpha) : settings.alpha);
 }
 
-bool any_force(const MechanismData& d) {
-  return !(d.tsda.empty() && d.rsda.empty() && d.applied.empty() && d.bushings.empty() && d.turning_frictions.empty() &&
-           d.sliding_frictions.empty() && d.user_forces.empty());
-}
+bool any_force(const MechanismData& d) { return !(d.forces.empty() && d.applied.empty() && d.user_forces.empty()); }
 
 constexpr double kDerivativeTolerance = 1e-12;
 

@@ -8,7 +8,7 @@
 // Owns the numbers of one evaluation: one per thread, nothing is allocated after construction.
 #pragma once
 
-#include <initializer_list>
+#include <type_traits>
 #include <vector>
 
 #include "core/dynamics/motion_blocks.hpp"
@@ -26,8 +26,7 @@ class ForceTerms {
     const Eigen::VectorXd& angles;
     const std::vector<Frame>& frames;
   };
-  void add_loads(const At& at, std::vector<Vec<6>>& loads);
-  void add_loads_but_springs(const At& at, std::vector<Vec<6>>& loads);
+  void add_loads(const At& at, std::vector<Vec<6>>& loads, bool but_springs = false);  // PlanarSprings has those
   // Their derivatives in the state as blocks, units: unit tangents of all bodies, the ground first; and in the
   // directions of fields and parameters, bodies at rest.
   void mark_units(std::vector<bool>& bodies) const;  // that add_blocks() reads
@@ -35,25 +34,24 @@ class ForceTerms {
   void add_field_tangent(const At& at, const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs);
   // Gradient of the virtual work sum load'eta, eta in the frames and held fixed.
   void add_pull_back(const At& at, std::vector<FrameBar>& bars, Eigen::Ref<Eigen::VectorXd> y_bar,
-                     Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
-  void add_pull_back_but_springs(const At& at, std::vector<FrameBar>& bars, Eigen::Ref<Eigen::VectorXd> y_bar,
-                                 Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
+                     Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar, bool but_springs = false);
   Law::Scratch& law_scratch() { return law_; }
 
  private:
+  // visitor(force, body1, body2)
   template <class Visitor>
-  void for_each_joint_effort(Visitor&& visitor) const {
-    for (const RsdaForce& f : data_.rsda) visitor(f);
-    for (const TurningFriction& f : data_.turning_frictions) visitor(f);
-    for (const SlidingFriction& f : data_.sliding_frictions) visitor(f);
+  void for_each(bool but_springs, Visitor&& visitor) const {
+    data_.forces.for_each([&]<class Kind>(const Kind& f) {
+      if (std::is_same_v<Kind, TsdaForce> && but_springs) return;
+      const std::array<int, 2> bodies = f.bodies();
+      visitor(f, static_cast<std::size_t>(bodies[0]), static_cast<std::size_t>(bodies[1]));
+    });
   }
+  ForceInputs inputs(const At& at) { return {at.t, data_.rho, at.angles, law_}; }
   // tangent(t1, t2, load_dir1, load_dir2) of a force between two bodies, in each of their coordinates, to its blocks.
   template <class Tangent>
-  static void add_pair(int body1, int body2, const std::vector<UnitTangents>& units, MotionBlocks& out,
+  static void add_pair(std::size_t body1, std::size_t body2, const std::vector<UnitTangents>& units, MotionBlocks& out,
                        Tangent&& tangent);
-  // Whether its law or, by `slots`, a vector of its geometry changes in the block.
-  template <class L>
-  static bool moves(const ParameterBlock& block, const L& law, std::initializer_list<int> slots);
 
   void set_inputs(const AppliedForce& force, const At& at);
   Vector3d components(const AppliedForce& force, const At& at);

@@ -9,8 +9,7 @@ namespace mbsopt {
 namespace {
 
 bool any_force_but_springs(const MechanismData& d) {
-  return !(d.rsda.empty() && d.applied.empty() && d.bushings.empty() && d.turning_frictions.empty() &&
-           d.sliding_frictions.empty());
+  return d.forces.size() > d.forces.of<TsdaForce>().size() || !d.applied.empty();
 }
 
 Eigen::VectorXd in_plane(const PlanarModel& model, const Eigen::VectorXd& of_rows) {
@@ -43,7 +42,7 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
       bodies_with_slots_(bodies_with_inertial_slots(data)),
       solver_(data, in_plane(model_, alpha), compliance),
       springs_(data),
-      has_springs_(!data.tsda.empty()),
+      has_springs_(!data.forces.of<TsdaForce>().empty()),
       has_other_forces_(any_force_but_springs(data)),
       forces_(data) {
   const std::size_t n = at(data.n);
@@ -121,11 +120,7 @@ void PlanarDynamics::set_loads() {
   if (!in_space_) return;
   body_loads_[0].setZero();
   for (const std::size_t k : loaded_) body_loads_[k].setZero();
-  if (springs_in_plane_) {
-    forces_.add_loads_but_springs(here(), body_loads_);
-  } else {
-    forces_.add_loads(here(), body_loads_);
-  }
+  forces_.add_loads(here(), body_loads_, springs_in_plane_);
   for (const std::size_t k : loaded_) loads_[k - 1] += bodies_in_y_.reduced(k, body_loads_[k]);
 }
 
@@ -252,11 +247,7 @@ void PlanarDynamics::add_force_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen:
     bars_in_space_[k].set_zero();
     set_virtual(bodies_in_y_.in_space(k, eta_[k - 1]), frames_in_space_[k]);
   }
-  if (springs_in_plane_) {
-    forces_.add_pull_back_but_springs(here(), bars_in_space_, y_bar, theta_bar, rho_bar);
-  } else {
-    forces_.add_pull_back(here(), bars_in_space_, y_bar, theta_bar, rho_bar);
-  }
+  forces_.add_pull_back(here(), bars_in_space_, y_bar, theta_bar, rho_bar, springs_in_plane_);
   const Eigen::Index half = 7 * data_.n;
   for (const std::size_t k : loaded_) {
     const Eigen::Index q = 7 * (static_cast<Eigen::Index>(k) - 1);

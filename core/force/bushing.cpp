@@ -144,12 +144,12 @@ FrameOf<DualLanes> dual(const Frame& f, const FrameTangent& t) {
 
 }  // namespace
 
-void Bushing::add_load(const Frame& f1, const Frame& f2, Vec<6>& load1, Vec<6>& load2) const {
+void Bushing::add_load(const ForceInputs&, const Frame& f1, const Frame& f2, Vec<6>& load1, Vec<6>& load2) const {
   loads<double>({f1.r, f1.rdot, f1.A, f1.Adot}, {f2.r, f2.rdot, f2.A, f2.Adot}, {s1, s2, K, C, Kt, Ct, R0}, load1,
                 load2);
 }
 
-void Bushing::tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
+void Bushing::tangent(const At&, const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
                       const FieldLanes& dir, Lanes<6>& load1, Lanes<6>& load2) const {
   Vec<12> law;
   law << K, C, Kt, Ct;
@@ -162,6 +162,16 @@ void Bushing::tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, 
     load1.row(i) += l1(i).derivatives().transpose();
     load2.row(i) += l2(i).derivatives().transpose();
   }
+}
+
+void Bushing::add_field_tangent(const ForceInputs&, const ParameterBlock& block, const Frame& f1, const Frame& f2,
+                                Lanes<6>& load1, Lanes<6>& load2) const {
+  Lanes<3> s1_dir, s2_dir;
+  Lanes<9> R0_dir;
+  Lanes<12> law_dir;
+  const FieldLanes dir{block.field<3>(slot1, s1_dir), block.field<3>(slot2, s2_dir), block.field<9>(slot_R0, R0_dir),
+                       block.field<12>(slot_law, law_dir)};
+  if (dir.s1 || dir.s2 || dir.R0 || dir.law) tangent({}, f1, f2, kStill, kStill, dir, load1, load2);
 }
 
 Bushing::Coordinates Bushing::coordinates(const Frame& f1, const Frame& f2) const {
@@ -222,8 +232,8 @@ void Bushing::spread(const Coordinates& x, const CoordinateBars& bars, const Fra
   bar2.A_eta += f1.A * M_eta;
 }
 
-void Bushing::pull_back(const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
-                        Eigen::VectorXd& theta_bar) const {
+void Bushing::pull_back(const ForceInputs&, const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
+                        Eigen::VectorXd& theta_bar, Eigen::VectorXd&) const {
   const Coordinates x = coordinates(f1, f2);
   CoordinateBars bars;
   bars.d = -K.cwiseProduct(x.d_eta), bars.ddot = -C.cwiseProduct(x.d_eta);
@@ -243,19 +253,25 @@ void Bushing::pull_back(const Frame& f1, const Frame& f2, FrameBar& bar1, FrameB
   }
 }
 
-double Bushing::potential(const Frame& f1, const Frame& f2) const {
+double Bushing::potential(const Eigen::VectorXd&, const Frame& f1, const Frame& f2) const {
   const Coordinates x = coordinates(f1, f2);
   return 0.5 * (x.d.dot(K.cwiseProduct(x.d)) + x.theta.dot(Kt.cwiseProduct(x.theta)));
 }
 
-void Bushing::pull_back_potential(const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
-                                  SlotBars& slots) const {
+void Bushing::pull_back_potential(const Eigen::VectorXd&, const Frame& f1, const Frame& f2, FrameBar& bar1,
+                                  FrameBar& bar2, FieldGradient& fields) const {
   const Coordinates x = coordinates(f1, f2);
   CoordinateBars bars;
   bars.d = K.cwiseProduct(x.d), bars.theta = Kt.cwiseProduct(x.theta);
+  SlotBars slots;
   spread(x, bars, f1, f2, bar1, bar2, slots);
-  slots.law.head<3>() += 0.5 * x.d.cwiseAbs2();
-  slots.law.segment<3>(6) += 0.5 * x.theta.cwiseAbs2();
+  Vec<12> law = Vec<12>::Zero();
+  law.head<3>() = 0.5 * x.d.cwiseAbs2();
+  law.segment<3>(6) = 0.5 * x.theta.cwiseAbs2();
+  fields.add<3>(slot1, slots.s1);
+  fields.add<3>(slot2, slots.s2);
+  fields.add<9>(slot_R0, slots.R0);
+  fields.add<12>(slot_law, law);
 }
 
 }  // namespace mbsopt

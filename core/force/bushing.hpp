@@ -15,7 +15,11 @@
 // angles: Bauchau, "Flexible Multibody Dynamics" (2011), section 13.3.
 #pragma once
 
+#include <algorithm>
+#include <array>
+
 #include "core/body/frame.hpp"
+#include "core/force/force_inputs.hpp"
 
 namespace mbsopt {
 
@@ -28,32 +32,42 @@ struct Bushing {
   Vector3d Kt = Vector3d::Zero(), Ct = Vector3d::Zero();  // [N m/rad], [N m s/rad]
   int slot1 = -1, slot2 = -1, slot_R0 = -1 /* 9, row by row */, slot_law = -1 /* K, C, Kt, Ct */;
 
-  void add_load(const Frame& f1, const Frame& f2, Vec<6>& load1, Vec<6>& load2) const;
+  std::array<int, 2> bodies() const { return {body1, body2}; }
+  void add_load(const ForceInputs&, const Frame& f1, const Frame& f2, Vec<6>& load1, Vec<6>& load2) const;
 
   // Gradient of the virtual work (load1'eta1 + load2'eta2) in the frames (eta held fixed) and in the fields.
-  void pull_back(const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2, Eigen::VectorXd& theta_bar) const;
+  void pull_back(const ForceInputs&, const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
+                 Eigen::VectorXd& theta_bar, Eigen::VectorXd&) const;
 
+  struct At {};
+  At at(const ForceInputs&, const Frame&, const Frame&) const { return {}; }
   // Directions of the fields; null: constant.
   struct FieldLanes {
     const Lanes<3>*s1 = nullptr, *s2 = nullptr;
     const Lanes<9>* R0 = nullptr;
     const Lanes<12>* law = nullptr;
   };
-  void tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2, const FieldLanes& dir,
-               Lanes<6>& load1, Lanes<6>& load2) const;
+  void tangent(const At&, const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
+               const FieldLanes& dir, Lanes<6>& load1, Lanes<6>& load2) const;
+  void add_field_tangent(const ForceInputs& in, const ParameterBlock& block, const Frame& f1, const Frame& f2,
+                         Lanes<6>& load1, Lanes<6>& load2) const;
 
-  double potential(const Frame& f1, const Frame& f2) const;  // V [J]
-  // Gradient of a scalar in the fields that have slots.
-  struct SlotBars {
-    Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero();
-    Vec<9> R0 = Vec<9>::Zero();
-    Vec<12> law = Vec<12>::Zero();
-  };
-  void pull_back_potential(const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2, SlotBars& slots) const;
+  double potential(const Eigen::VectorXd&, const Frame& f1, const Frame& f2) const;  // V [J]
+  void pull_back_potential(const Eigen::VectorXd&, const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
+                           FieldGradient& fields) const;
+  bool conserves_energy() const { return C.isZero(0) && Ct.isZero(0); }
+  double natural_energy(const Frame&, const Frame&) const {
+    return Kt.maxCoeff() + K.maxCoeff() * std::max(s1.squaredNorm(), s2.squaredNorm());
+  }
 
  private:
   struct Coordinates;
   struct CoordinateBars;
+  // Gradient of a scalar in the geometry.
+  struct SlotBars {
+    Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero();
+    Vec<9> R0 = Vec<9>::Zero();
+  };
   Coordinates coordinates(const Frame& f1, const Frame& f2) const;
   void spread(const Coordinates& x, const CoordinateBars& bars, const Frame& f1, const Frame& f2, FrameBar& bar1,
               FrameBar& bar2, SlotBars& slots) const;

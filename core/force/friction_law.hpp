@@ -15,9 +15,16 @@ struct FrictionLaw {
   Law::Value derivatives(double, const Eigen::VectorXd&, double, double rate, Law::Scratch&) const;
   void add_field_gradient(double, double rate, double f_bar, const Law::Scratch&, Eigen::VectorXd& theta_bar,
                           Eigen::VectorXd&) const;
+  double potential(double) const { return 0; }
+  double potential_slope(double) const { return 0; }
+  Vec<3> potential_gradient(double) const { return Vec<3>::Zero(); }
+  double stiffness() const { return 0; }
+  bool conserves_energy() const { return false; }
+
+  bool moves(const ParameterBlock& block) const { return block.moves(slot, kFields); }
   template <class RhoDirection>
-  Lanes<1> field_tangent(double, double rate, const Lanes<3>* fields, RhoDirection&&, const Law::Scratch&) const {
-    return fields ? Lanes<1>(field_gradient(rate).transpose() * *fields) : Lanes<1>(Lanes<1>::Zero());
+  Lanes<1> field_tangent(const Law::Point& at, const Lanes<3>* fields, RhoDirection&&, const Law::Scratch&) const {
+    return fields ? Lanes<1>(field_gradient(at.xdot).transpose() * *fields) : Lanes<1>(Lanes<1>::Zero());
   }
 
  private:

@@ -5,9 +5,22 @@
 namespace mbsopt {
 
 template <class P, class L>
-void JointEffort<P, L>::add_load(double t, const Eigen::VectorXd& rho, double reference, const Frame& f1,
-                                 const Frame& f2, Law::Scratch& scratch, Vec<6>& load1, Vec<6>& load2) const {
-  const double f = law.value(t, rho, joint.value_near(reference, f1, f2), joint.rate(f1, f2), scratch);
+void JointEffort<P, L>::pull_back_measured(const Frame& f1, const Frame& f2, double x_bar, double xdot_bar,
+                                           FrameBar& bar1, FrameBar& bar2, FieldGradient& fields) const {
+  Multipliers<1> z = Multipliers<1>::zero();
+  z.mu0(0) = x_bar, z.mu1(0) = xdot_bar;
+  GeometryBar s;
+  joint.measure.pull_back(f1, f2, z, bar1, bar2, s);
+  fields.add<3>(joint.slot1, s.s1);
+  fields.add<3>(joint.slot2, s.s2);
+  fields.add<3>(joint.slot3, s.s3);
+}
+
+template <class P, class L>
+void JointEffort<P, L>::add_load(const ForceInputs& in, const Frame& f1, const Frame& f2, Vec<6>& load1,
+                                 Vec<6>& load2) const {
+  const auto [x, xdot] = measured(in.angles, f1, f2);
+  const double f = law.value(in.t, in.rho, x, xdot, in.scratch);
   Mat<1, 6> J1, J2;
   joint.measure.jacobian(f1, f2, J1, J2);
   load1 -= f * J1.transpose();
@@ -15,13 +28,12 @@ void JointEffort<P, L>::add_load(double t, const Eigen::VectorXd& rho, double re
 }
 
 template <class P, class L>
-void JointEffort<P, L>::pull_back(double t, const Eigen::VectorXd& rho, double reference, const Frame& f1,
-                                  const Frame& f2, Law::Scratch& scratch, FrameBar& bar1, FrameBar& bar2,
-                                  Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const {
-  const double x = joint.value_near(reference, f1, f2), xdot = joint.rate(f1, f2);
+void JointEffort<P, L>::pull_back(const ForceInputs& in, const Frame& f1, const Frame& f2, FrameBar& bar1,
+                                  FrameBar& bar2, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const {
+  const auto [x, xdot] = measured(in.angles, f1, f2);
   const double change = virtual_change(joint.measure, f1, f2)(0);
-  const Law::Value f = law.derivatives(t, rho, x, xdot, scratch);
-  law.add_field_gradient(x, xdot, -change, scratch, theta_bar, rho_bar);
+  const Law::Value f = law.derivatives(in.t, in.rho, x, xdot, in.scratch);
+  law.add_field_gradient(x, xdot, -change, in.scratch, theta_bar, rho_bar);
   Multipliers<1> z = Multipliers<1>::zero();
   z.lambda(0) = -f.f, z.mu0(0) = -change * f.f_x, z.mu1(0) = -change * f.f_xdot;
   GeometryBar s;
@@ -32,16 +44,49 @@ void JointEffort<P, L>::pull_back(double t, const Eigen::VectorXd& rho, double r
 }
 
 template <class P, class L>
-void JointEffort<P, L>::tangent(const Law::Value& f, Lanes<1> df, const Frame& f1, const Frame& f2,
-                                const FrameTangent& t1, const FrameTangent& t2, const GeometryTangent& ds,
-                                Lanes<6>& load1, Lanes<6>& load2) const {
+Law::Value JointEffort<P, L>::at(const ForceInputs& in, const Frame& f1, const Frame& f2) const {
+  const auto [x, xdot] = measured(in.angles, f1, f2);
+  return law.derivatives(in.t, in.rho, x, xdot, in.scratch);
+}
+
+template <class P, class L>
+void JointEffort<P, L>::tangent(const Law::Value& f, const Frame& f1, const Frame& f2, const FrameTangent& t1,
+                                const FrameTangent& t2, const FieldLanes& dir, Lanes<6>& load1, Lanes<6>& load2) const {
   PrimitiveTangent<1> x;
-  joint.measure.tangent(f1, f2, t1, t2, ds, Vec<1>(f.f), x);
-  df += f.f_x * x.phi + f.f_xdot * x.phi_dot;
+  joint.measure.tangent(f1, f2, t1, t2, dir.s, Vec<1>(f.f), x);
+  const Lanes<1> df = dir.f + (f.f_x * x.phi + f.f_xdot * x.phi_dot);
   Mat<1, 6> J1, J2;
   joint.measure.jacobian(f1, f2, J1, J2);
   load1 -= x.load1 + J1.transpose() * df;
   load2 -= x.load2 + J2.transpose() * df;
+}
+
+template <class P, class L>
+void JointEffort<P, L>::add_field_tangent(const ForceInputs& in, const ParameterBlock& block, const Frame& f1,
+                                          const Frame& f2, Lanes<6>& load1, Lanes<6>& load2) const {
+  Lanes<3> s1, s2, s3;
+  const GeometryTangent s{block.field<3>(joint.slot1, s1), block.field<3>(joint.slot2, s2),
+                          block.field<3>(joint.slot3, s3)};
+  if (!law.moves(block) && !s.s1 && !s.s2 && !s.s3) return;
+  const Law::Value f = at(in, f1, f2);
+  Lanes<L::kFields> fields;
+  const Lanes<1> df = law.field_tangent(
+      measured(in.angles, f1, f2), block.field<L::kFields>(law.slot, fields), [&](int k) { return block.direction(k); },
+      in.scratch);
+  tangent(f, f1, f2, kStill, kStill, {df, s}, load1, load2);
+}
+
+template <class P, class L>
+double JointEffort<P, L>::potential(const Eigen::VectorXd& angles, const Frame& f1, const Frame& f2) const {
+  return law.potential(measured(angles, f1, f2).x);
+}
+
+template <class P, class L>
+void JointEffort<P, L>::pull_back_potential(const Eigen::VectorXd& angles, const Frame& f1, const Frame& f2,
+                                            FrameBar& bar1, FrameBar& bar2, FieldGradient& fields) const {
+  const double x = measured(angles, f1, f2).x;
+  pull_back_measured(f1, f2, law.potential_slope(x), 0, bar1, bar2, fields);
+  fields.add<L::kFields>(law.slot, law.potential_gradient(x));
 }
 
 template struct JointEffort<Angle, Law>;

@@ -7,7 +7,9 @@
 // With Angle and the law  k (angle - free_angle) + c rate  or an expression it is the torsional spring-damper, rsda.
 #pragma once
 
-#include "core/force/law.hpp"
+#include <array>
+
+#include "core/force/force_inputs.hpp"
 #include "core/sensor/joint_measure.hpp"
 
 namespace mbsopt {
@@ -19,18 +21,36 @@ struct JointEffort {
   int angle = -1;  // of an Angle: the followed joint angle on whose branch x is
   L law;
 
-  // reference: the value of x on whose turn it is; without meaning for a displacement.
-  void add_load(double t, const Eigen::VectorXd& rho, double reference, const Frame& f1, const Frame& f2,
-                Law::Scratch& scratch, Vec<6>& load1, Vec<6>& load2) const;
+  std::array<int, 2> bodies() const { return {joint.body1, joint.body2}; }
+  Law::Point measured(const Eigen::VectorXd& angles, const Frame& f1, const Frame& f2) const {
+    return {joint.value_near(branch(angles, angle), f1, f2), joint.rate(f1, f2)};
+  }
+  // Gradient of x_bar x + xdot_bar xdot.
+  void pull_back_measured(const Frame& f1, const Frame& f2, double x_bar, double xdot_bar, FrameBar& bar1,
+                          FrameBar& bar2, FieldGradient& fields) const;
+
+  void add_load(const ForceInputs& in, const Frame& f1, const Frame& f2, Vec<6>& load1, Vec<6>& load2) const;
 
   // Gradient of the virtual work (load1'eta1 + load2'eta2) in the frames (eta held fixed) and in the fields.
-  void pull_back(double t, const Eigen::VectorXd& rho, double reference, const Frame& f1, const Frame& f2,
-                 Law::Scratch& scratch, FrameBar& bar1, FrameBar& bar2, Eigen::VectorXd& theta_bar,
-                 Eigen::VectorXd& rho_bar) const;
+  void pull_back(const ForceInputs& in, const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
+                 Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const;
 
-  // Tangent of the loads; f and df as in TsdaForce::tangent; ds: directions of the measure's vectors.
-  void tangent(const Law::Value& f, Lanes<1> df, const Frame& f1, const Frame& f2, const FrameTangent& t1,
-               const FrameTangent& t2, const GeometryTangent& ds, Lanes<6>& load1, Lanes<6>& load2) const;
+  // Directions of the law (Law::field_tangent) and of the measure's vectors.
+  struct FieldLanes {
+    Lanes<1> f = Lanes<1>::Zero();
+    GeometryTangent s = {};
+  };
+  Law::Value at(const ForceInputs& in, const Frame& f1, const Frame& f2) const;
+  void tangent(const Law::Value& f, const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
+               const FieldLanes& dir, Lanes<6>& load1, Lanes<6>& load2) const;
+  void add_field_tangent(const ForceInputs& in, const ParameterBlock& block, const Frame& f1, const Frame& f2,
+                         Lanes<6>& load1, Lanes<6>& load2) const;
+
+  double potential(const Eigen::VectorXd& angles, const Frame& f1, const Frame& f2) const;
+  void pull_back_potential(const Eigen::VectorXd& angles, const Frame& f1, const Frame& f2, FrameBar& bar1,
+                           FrameBar& bar2, FieldGradient& fields) const;
+  bool conserves_energy() const { return law.conserves_energy(); }
+  double natural_energy(const Frame&, const Frame&) const { return law.stiffness(); }
 };
 
 extern template struct JointEffort<Angle, Law>;

@@ -21,6 +21,12 @@ Law::Value Law::derivatives(double t, const Eigen::VectorXd& rho, double x, doub
 
 Vec<4> Law::field_gradient(double x, double xdot) const { return {x - x0, xdot, -k, 1}; }
 
+Vec<4> Law::potential_gradient(double x) const {
+  if (program) return Vec<4>::Zero();
+  const double stretch = x - x0;
+  return {0.5 * stretch * stretch, 0, -k * stretch, 0};
+}
+
 void Law::add_field_gradient(double x, double xdot, double f_bar, const Scratch& s, Eigen::VectorXd& theta_bar,
                              Eigen::VectorXd& rho_bar) const {
   if (program) {

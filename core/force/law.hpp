@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/expression/program.hpp"
-#include "core/linear/fixed_size.hpp"
+#include "core/linear/parameter_block.hpp"
 
 namespace mbsopt {
 
@@ -23,6 +23,9 @@ struct Law {
     Program::Scratch program;
   };
 
+  struct Point {
+    double x, xdot;
+  };
   struct Value {
     double f, f_x, f_xdot;
   };
@@ -32,6 +35,13 @@ struct Law {
   // With derivatives; those in the parameters of a program stay in s.gradient.
   Value derivatives(double t, const Eigen::VectorXd& rho, double x, double xdot, Scratch& s) const;
 
+  // k (x - x0)^2/2, its derivatives in x and in (k, c, x0, f0); an expression has none.
+  double potential(double x) const { return program ? 0.0 : 0.5 * k * (x - x0) * (x - x0); }
+  double potential_slope(double x) const { return program ? 0.0 : k * (x - x0); }
+  Vec<4> potential_gradient(double x) const;
+  double stiffness() const { return k; }
+  bool conserves_energy() const { return !program && c == 0 && f0 == 0; }
+
   // df/d(k, c, x0, f0) of the linear law.
   Vec<4> field_gradient(double x, double xdot) const;
 
@@ -39,11 +49,13 @@ struct Law {
   void add_field_gradient(double x, double xdot, double f_bar, const Scratch& s, Eigen::VectorXd& theta_bar,
                           Eigen::VectorXd& rho_bar) const;
 
+  // Whether f changes in the block at fixed x, xdot.
+  bool moves(const ParameterBlock& block) const { return program || block.moves(slot, kFields); }
+
   // Derivative of f through the law's own fields (directions of k, c, x0, f0; null: constant) and, for a program,
   // through the parameters, whose directions are the rows of rho_dir(parameter).
   template <class RhoDirection>
-  Lanes<1> field_tangent(double x, double xdot, const Lanes<4>* fields, RhoDirection&& rho_dir,
-                         const Scratch& s) const {
+  Lanes<1> field_tangent(const Point& at, const Lanes<4>* fields, RhoDirection&& rho_dir, const Scratch& s) const {
     Lanes<1> df = Lanes<1>::Zero();
     if (program) {
       for (const int input : program->used_inputs()) {
@@ -51,7 +63,7 @@ struct Law {
         if (i + 3 < s.gradient.size()) df += s.gradient[i] * rho_dir(input);
       }
     } else if (fields) {
-      df = field_gradient(x, xdot).transpose() * *fields;
+      df = field_gradient(at.x, at.xdot).transpose() * *fields;
     }
     return df;
   }

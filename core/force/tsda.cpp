@@ -1,5 +1,7 @@
 #include "core/force/tsda.hpp"
 
+#include <algorithm>
+
 #include "core/body/lanes.hpp"
 
 namespace mbsopt {
@@ -14,18 +16,38 @@ TsdaForce::Span TsdaForce::span(const Frame& f1, const Frame& f2) const {
   return x;
 }
 
-void TsdaForce::add_load(double t, const Eigen::VectorXd& rho, const Frame& f1, const Frame& f2, Law::Scratch& scratch,
-                         Vec<6>& load1, Vec<6>& load2) const {
+Law::Point TsdaForce::measured(const Eigen::VectorXd&, const Frame& f1, const Frame& f2) const {
   const Span x = span(f1, f2);
-  const Vector3d F = law.value(t, rho, x.l, x.ldot, scratch) * x.u;
+  return {x.l, x.ldot};
+}
+
+void TsdaForce::pull_back_measured(const Frame& f1, const Frame& f2, double x_bar, double xdot_bar, FrameBar& bar1,
+                                   FrameBar& bar2, FieldGradient& fields) const {
+  const Span x = span(f1, f2);
+  // l_d = u,  (ldot)_d = (ddot - ldot u)/l,  (ldot)_ddot = u; a spring of zero length has no direction
+  const Vector3d ddot_bar = xdot_bar * x.u;
+  Vector3d d_bar = x_bar * x.u;
+  if (x.l > 0) d_bar += xdot_bar * (x.ddot - x.ldot * x.u) / x.l;
+  const auto add = [&](const Frame& f, const Vector3d& s, double sign, int slot, FrameBar& bar) {
+    bar.r += sign * d_bar, bar.rdot += sign * ddot_bar;
+    bar.A += sign * d_bar * s.transpose(), bar.Adot += sign * ddot_bar * s.transpose();
+    fields.add<3>(slot, sign * (f.A.transpose() * d_bar + f.Adot.transpose() * ddot_bar));
+  };
+  add(f1, s1, -1, slot1, bar1);
+  add(f2, s2, 1, slot2, bar2);
+}
+
+void TsdaForce::add_load(const ForceInputs& in, const Frame& f1, const Frame& f2, Vec<6>& load1, Vec<6>& load2) const {
+  const Span x = span(f1, f2);
+  const Vector3d F = law.value(in.t, in.rho, x.l, x.ldot, in.scratch) * x.u;
   load1.head<3>() += F;
   load1.tail<3>() += s1.cross(f1.A.transpose() * F);
   load2.head<3>() -= F;
   load2.tail<3>() -= s2.cross(f2.A.transpose() * F);
 }
 
-void TsdaForce::pull_back(double t, const Eigen::VectorXd& rho, const Frame& f1, const Frame& f2, Law::Scratch& scratch,
-                          FrameBar& bar1, FrameBar& bar2, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const {
+void TsdaForce::pull_back(const ForceInputs& in, const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
+                          Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const {
   const Span x = span(f1, f2);
   if (x.l == 0) {  // work = -k d'd_eta
     if (!is_k_times_d()) return;
@@ -34,7 +56,7 @@ void TsdaForce::pull_back(double t, const Eigen::VectorXd& rho, const Frame& f1,
     add_point(f1, s1, -1, slot1, -law.k * d_eta, zero, zero, bar1, theta_bar);
     return;
   }
-  const Law::Value f = law.derivatives(t, rho, x.l, x.ldot, scratch);
+  const Law::Value f = law.derivatives(in.t, in.rho, x.l, x.ldot, in.scratch);
   const Vector3d d_eta = f2.point_eta(s2) - f1.point_eta(s1);
   const double l_eta = x.u.dot(d_eta);
   // work = -f l_eta;   l_d = u,  (ldot)_d = (ddot - ldot u)/l,  (ldot)_ddot = u,  (l_eta)_d = (d_eta - l_eta u)/l
@@ -42,19 +64,24 @@ void TsdaForce::pull_back(double t, const Eigen::VectorXd& rho, const Frame& f1,
       -l_eta * (f.f_x * x.u + f.f_xdot * (x.ddot - x.ldot * x.u) / x.l) - f.f * (d_eta - l_eta * x.u) / x.l;
   const Vector3d ddot_bar = -l_eta * f.f_xdot * x.u;
   const Vector3d eta_bar = -f.f * x.u;
-  law.add_field_gradient(x.l, x.ldot, -l_eta, scratch, theta_bar, rho_bar);
+  law.add_field_gradient(x.l, x.ldot, -l_eta, in.scratch, theta_bar, rho_bar);
   add_point(f2, s2, 1, slot2, d_bar, ddot_bar, eta_bar, bar2, theta_bar);
   add_point(f1, s1, -1, slot1, d_bar, ddot_bar, eta_bar, bar1, theta_bar);
 }
 
-void TsdaForce::tangent(const Span& x, const Law::Value& f, Lanes<1> df, const Frame& f1, const Frame& f2,
-                        const FrameTangent& t1, const FrameTangent& t2, const Lanes<3>* ds1, const Lanes<3>* ds2,
-                        Lanes<6>& load1, Lanes<6>& load2) const {
+TsdaForce::At TsdaForce::at(const ForceInputs& in, const Frame& f1, const Frame& f2) const {
+  const Span x = span(f1, f2);
+  return {x, law.derivatives(in.t, in.rho, x.l, x.ldot, in.scratch)};
+}
+
+void TsdaForce::tangent(const At& at, const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
+                        const FieldLanes& dir, Lanes<6>& load1, Lanes<6>& load2) const {
+  const auto& [x, f] = at;
   if (x.l == 0 && !is_k_times_d()) return;
   Lanes<3> dd = t2.r + times(t2.A, s2) - t1.r - times(t1.A, s1);
   Lanes<3> dddot = t2.rdot + times(t2.Adot, s2) - t1.rdot - times(t1.Adot, s1);
-  if (ds1) dd -= f1.A * *ds1, dddot -= f1.Adot * *ds1;
-  if (ds2) dd += f2.A * *ds2, dddot += f2.Adot * *ds2;
+  if (dir.s1) dd -= f1.A * *dir.s1, dddot -= f1.Adot * *dir.s1;
+  if (dir.s2) dd += f2.A * *dir.s2, dddot += f2.Adot * *dir.s2;
   if (x.l == 0) {
     const Lanes<3> dF = law.k * dd;
     load1.topRows<3>() += dF;
@@ -66,15 +93,44 @@ void TsdaForce::tangent(const Span& x, const Law::Value& f, Lanes<1> df, const F
   const Lanes<1> dl = dot(x.u, dd);
   const Lanes<3> du = (dd - x.u * dl) / x.l;
   const Lanes<1> dldot = dot(x.ddot, du) + dot(x.u, dddot);
-  df += f.f_x * dl + f.f_xdot * dldot;
+  const Lanes<1> df = dir.f + (f.f_x * dl + f.f_xdot * dldot);
   const Vector3d F = f.f * x.u;
   const Lanes<3> dF = x.u * df + f.f * du;
   load1.topRows<3>() += dF;
   load2.topRows<3>() -= dF;
   load1.bottomRows<3>() += cross(s1, transposed_times(t1.A, F) + f1.A.transpose() * dF);
   load2.bottomRows<3>() -= cross(s2, transposed_times(t2.A, F) + f2.A.transpose() * dF);
-  if (ds1) load1.bottomRows<3>() -= cross(f1.A.transpose() * F, *ds1);
-  if (ds2) load2.bottomRows<3>() += cross(f2.A.transpose() * F, *ds2);
+  if (dir.s1) load1.bottomRows<3>() -= cross(f1.A.transpose() * F, *dir.s1);
+  if (dir.s2) load2.bottomRows<3>() += cross(f2.A.transpose() * F, *dir.s2);
+}
+
+void TsdaForce::add_field_tangent(const ForceInputs& in, const ParameterBlock& block, const Frame& f1, const Frame& f2,
+                                  Lanes<6>& load1, Lanes<6>& load2) const {
+  FieldLanes dir;
+  Lanes<3> s1_dir, s2_dir;
+  dir.s1 = block.field<3>(slot1, s1_dir), dir.s2 = block.field<3>(slot2, s2_dir);
+  if (!law.moves(block) && !dir.s1 && !dir.s2) return;
+  const At x = at(in, f1, f2);
+  Lanes<4> fields;
+  dir.f = law.field_tangent(
+      {x.x.l, x.x.ldot}, block.field<4>(law.slot, fields), [&](int k) { return block.direction(k); }, in.scratch);
+  tangent(x, f1, f2, kStill, kStill, dir, load1, load2);
+}
+
+double TsdaForce::potential(const Eigen::VectorXd&, const Frame& f1, const Frame& f2) const {
+  return law.potential(span(f1, f2).l);
+}
+
+void TsdaForce::pull_back_potential(const Eigen::VectorXd&, const Frame& f1, const Frame& f2, FrameBar& bar1,
+                                    FrameBar& bar2, FieldGradient& fields) const {
+  const double l = span(f1, f2).l;
+  pull_back_measured(f1, f2, law.potential_slope(l), 0, bar1, bar2, fields);
+  fields.add<4>(law.slot, law.potential_gradient(l));
+}
+
+double TsdaForce::natural_energy(const Frame& f1, const Frame& f2) const {
+  const double l = span(f1, f2).l;
+  return law.k * std::max(l * l, law.x0 * law.x0);
 }
 
 void TsdaForce::add_point(const Frame& f, const Vector3d& s, double sign, int slot, const Vector3d& d,

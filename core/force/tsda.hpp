@@ -6,8 +6,10 @@
 // Dynamics of Mechanical Systems" (1989), section 11.3.
 #pragma once
 
+#include <array>
+
 #include "core/body/frame.hpp"
-#include "core/force/law.hpp"
+#include "core/force/force_inputs.hpp"
 
 namespace mbsopt {
 
@@ -26,19 +28,39 @@ struct TsdaForce {
   // Without free length, actuator and damping the force is k d, smooth at zero length, too.
   bool is_k_times_d() const { return !law.program && law.x0 == 0 && law.f0 == 0 && law.c == 0; }
 
+  std::array<int, 2> bodies() const { return {body1, body2}; }
+  Law::Point measured(const Eigen::VectorXd& angles, const Frame& f1, const Frame& f2) const;
+  // Gradient of x_bar l + xdot_bar ldot.
+  void pull_back_measured(const Frame& f1, const Frame& f2, double x_bar, double xdot_bar, FrameBar& bar1,
+                          FrameBar& bar2, FieldGradient& fields) const;
+
   // Adds the loads (force in global axes, moment in body axes) on each body.
-  void add_load(double t, const Eigen::VectorXd& rho, const Frame& f1, const Frame& f2, Law::Scratch& scratch,
-                Vec<6>& load1, Vec<6>& load2) const;
+  void add_load(const ForceInputs& in, const Frame& f1, const Frame& f2, Vec<6>& load1, Vec<6>& load2) const;
 
   // Gradient of the virtual work (load1'eta1 + load2'eta2) in the frames (eta held fixed) and in the fields.
-  void pull_back(double t, const Eigen::VectorXd& rho, const Frame& f1, const Frame& f2, Law::Scratch& scratch,
-                 FrameBar& bar1, FrameBar& bar2, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const;
+  void pull_back(const ForceInputs& in, const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
+                 Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const;
 
-  // Tangent of the loads. f: the law's value and derivatives at x = span(f1, f2); df: its derivative through its own
-  // fields and parameters in each direction (Law::field_tangent).
-  void tangent(const Span& x, const Law::Value& f, Lanes<1> df, const Frame& f1, const Frame& f2,
-               const FrameTangent& t1, const FrameTangent& t2, const Lanes<3>* ds1, const Lanes<3>* ds2,
-               Lanes<6>& load1, Lanes<6>& load2) const;
+  struct At {
+    Span x;
+    Law::Value f;
+  };
+  // Directions of the law (Law::field_tangent) and of the points; null: constant.
+  struct FieldLanes {
+    Lanes<1> f = Lanes<1>::Zero();
+    const Lanes<3>*s1 = nullptr, *s2 = nullptr;
+  };
+  At at(const ForceInputs& in, const Frame& f1, const Frame& f2) const;
+  void tangent(const At& at, const Frame& f1, const Frame& f2, const FrameTangent& t1, const FrameTangent& t2,
+               const FieldLanes& dir, Lanes<6>& load1, Lanes<6>& load2) const;
+  void add_field_tangent(const ForceInputs& in, const ParameterBlock& block, const Frame& f1, const Frame& f2,
+                         Lanes<6>& load1, Lanes<6>& load2) const;
+
+  double potential(const Eigen::VectorXd& angles, const Frame& f1, const Frame& f2) const;
+  void pull_back_potential(const Eigen::VectorXd& angles, const Frame& f1, const Frame& f2, FrameBar& bar1,
+                           FrameBar& bar2, FieldGradient& fields) const;
+  bool conserves_energy() const { return law.conserves_energy(); }
+  double natural_energy(const Frame& f1, const Frame& f2) const;
 
  private:
   static void add_point(const Frame& f, const Vector3d& s, double sign, int slot, const Vector3d& d, const Vector3d& dd,

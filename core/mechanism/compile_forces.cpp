@@ -37,7 +37,7 @@ void add(Compilation& model, const Tsda& f, int force, const std::string& where)
   out.s1 = numbers(model.keep(out.slot1, model.point(out.body1, f.point1, where + ".point1")));
   out.s2 = numbers(model.keep(out.slot2, model.point(out.body2, f.point2, where + ".point2")));
   out.law = law(model, f.law, {"l", "ldot"}, {f.stiffness, f.damping, f.free_length, f.actuator}, where);
-  model.data.tsda.push_back(std::move(out));
+  model.data.forces.of<TsdaForce>().push_back(std::move(out));
 }
 
 void add(Compilation& model, const Rsda& f, int force, const std::string& where) {
@@ -46,7 +46,7 @@ void add(Compilation& model, const Rsda& f, int force, const std::string& where)
   out.angle = model.angle_of(f.joint, where + ".joint");
   out.joint = model.data.angles[static_cast<std::size_t>(out.angle)];
   out.law = law(model, f.law, {"angle", "rate"}, {f.stiffness, f.damping, f.free_angle, 0.0}, where);
-  model.data.rsda.push_back(std::move(out));
+  model.data.forces.of<RsdaForce>().push_back(std::move(out));
 }
 
 // The components' inputs: all parameters, t, all sensors; what is used of them is listed.
@@ -124,7 +124,7 @@ void add(Compilation& model, const BushingSpec& f, int force, const std::string&
   }
   const Vec<12> x = numbers(model.keep(out.slot_law, law));
   out.K = x.segment<3>(0), out.C = x.segment<3>(3), out.Kt = x.segment<3>(6), out.Ct = x.segment<3>(9);
-  model.data.bushings.push_back(std::move(out));
+  model.data.forces.of<Bushing>().push_back(std::move(out));
 }
 
 void add(Compilation& model, const FrictionSpec& f, int force, const std::string& where) {
@@ -137,10 +137,12 @@ void add(Compilation& model, const FrictionSpec& f, int force, const std::string
   law.coulomb = v(0), law.smooth = v(1), law.viscous = v(2);
   if (!(law.smooth > 0)) throw SceneError(where + ".smooth_velocity: must be greater than 0");
   if (is_sliding(f.motion, joint.type)) {
-    model.data.sliding_frictions.push_back({force, model.joint_displacement(f.joint, where + ".joint"), -1, law});
+    model.data.forces.of<SlidingFriction>().push_back(
+        {force, model.joint_displacement(f.joint, where + ".joint"), -1, law});
   } else {
     const int angle = model.angle_of(f.joint, where + ".joint");
-    model.data.turning_frictions.push_back({force, model.data.angles[static_cast<std::size_t>(angle)], angle, law});
+    model.data.forces.of<TurningFriction>().push_back(
+        {force, model.data.angles[static_cast<std::size_t>(angle)], angle, law});
   }
 }
 

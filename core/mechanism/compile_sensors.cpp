@@ -42,12 +42,11 @@ SensorKind tension_sensor(const MechanismData& data, const std::string& name, co
   const auto found = std::find_if(forces.begin(), forces.end(), [&](const Force& f) { return f.name == name; });
   if (found == forces.end()) throw SceneError(where + ": there is no force '" + name + "'");
   const int force = static_cast<int>(found - forces.begin());
-  for (std::size_t i = 0; i < data.tsda.size(); ++i) {
-    if (data.tsda[i].force == force) return TensionSensor{false, static_cast<int>(i)};
-  }
-  for (std::size_t i = 0; i < data.rsda.size(); ++i) {
-    if (data.rsda[i].force == force) return TensionSensor{true, static_cast<int>(i)};
-  }
+  std::optional<TensionSensor> sensor;
+  data.forces.for_each([&]<class Kind>(const Kind& f, Forces::Place place) {
+    if (HasLaw<Kind> && f.force == force) sensor = TensionSensor{place};
+  });
+  if (sensor) return *sensor;
   throw SceneError(where + ": '" + name + "' is a " + std::string(type_of(*found)) +
                    "; only a tsda or an rsda has one number to measure");
 }

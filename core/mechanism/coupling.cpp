@@ -55,22 +55,15 @@ Coupling coupling(const MechanismData& data) {
       if (body > 0) add(read, c.bodies[static_cast<std::size_t>(body) - 1]);
     }
   };
-  auto couple_pair = [&](const auto& forces) {
-    for (const auto& f : forces) couple({f.body1, f.body2}, {f.body1, f.body2});
-  };
   for (int i = 1; i <= data.n; ++i) couple({i}, {i});
   for (const Constraint& k : data.constraints) {
     for (int r = 0; r < k.rows(); ++r) add({k.body1, k.body2}, c.rows[static_cast<std::size_t>(k.row + r)]);
     couple({k.body1, k.body2}, {k.body1, k.body2});  // J'lambda
   }
-  couple_pair(data.tsda);
-  couple_pair(data.bushings);
-  auto couple_efforts = [&](const auto& efforts) {
-    for (const auto& f : efforts) couple({f.joint.body1, f.joint.body2}, {f.joint.body1, f.joint.body2});
-  };
-  couple_efforts(data.rsda);
-  couple_efforts(data.turning_frictions);
-  couple_efforts(data.sliding_frictions);
+  data.forces.for_each([&](const auto& f) {
+    const auto [i, j] = f.bodies();
+    couple({i, j}, {i, j});
+  });
   for (const AppliedForce& f : data.applied) {
     couple({f.body}, {f.body});
     for (const int s : f.sensors) couple({f.body}, read_by(data, data.sensors[static_cast<std::size_t>(s)]));

@@ -10,9 +10,7 @@ bool depends_on_state(const AppliedForce& force) {
 }
 
 long derivative_blocks(const MechanismData& d) {
-  const std::size_t forces = d.tsda.size() + d.rsda.size() + d.bushings.size() + d.turning_frictions.size() +
-                             d.sliding_frictions.size() + d.user_forces.size();
-  return d.n + static_cast<long>(d.groups.size() + forces) +
+  return d.n + static_cast<long>(d.groups.size() + d.forces.size() + d.user_forces.size()) +
          static_cast<long>(std::count_if(d.applied.begin(), d.applied.end(), depends_on_state));
 }
 

@@ -11,9 +11,7 @@
 #include "core/constraint/constraint.hpp"
 #include "core/constraint/time_law.hpp"
 #include "core/force/applied.hpp"
-#include "core/force/bushing.hpp"
-#include "core/force/friction.hpp"
-#include "core/force/tsda.hpp"
+#include "core/force/forces.hpp"
 #include "core/force/user_force.hpp"
 #include "core/sensor/acceleration_sensor.hpp"
 #include "core/sensor/joint_measure.hpp"
@@ -54,9 +52,8 @@ struct DisplacementSensor {  // along a joint's axis, or its rate
   JointDisplacement joint;
   bool rate = false;
 };
-struct TensionSensor {  // what a tsda pulls [N], what an rsda resists [N m]
-  bool is_torque = false;
-  int index = 0;  // among the tsda or the rsda
+struct TensionSensor {  // what the law of a force says: a tsda pulls so [N], an rsda resists so [N m]
+  Forces::Place place;
 };
 
 using SensorKind = std::variant<PointSensor, AngularVelocitySensor, CoordinateSensor, AngleSensor, EnergySensor,
@@ -104,12 +101,8 @@ struct MechanismData {
   Eigen::VectorXd row_alpha;  // per row: alpha of the augmented Lagrangian per unit of its relative alpha
   std::vector<RowGroup> groups;
   std::vector<JointAngle> angles;
-  std::vector<TsdaForce> tsda;
-  std::vector<RsdaForce> rsda;
+  Forces forces;
   std::vector<AppliedForce> applied;
-  std::vector<Bushing> bushings;
-  std::vector<TurningFriction> turning_frictions;
-  std::vector<SlidingFriction> sliding_frictions;
   std::vector<UserForceData> user_forces;
   std::vector<SensorKind> sensors;
   std::vector<std::string> sensor_names;
@@ -136,11 +129,7 @@ struct MechanismData {
 template <int N>
 void add_slot(const MechanismData& data, int slot, const Vec<N>& bar, double scale,
               Eigen::Ref<Eigen::VectorXd> rho_bar) {
-  if (slot < 0) return;
-  for (std::size_t k = 0; k < data.active.size(); ++k) {
-    rho_bar(data.active[k]) +=
-        scale * data.theta_rho.col(static_cast<Eigen::Index>(k)).template segment<N>(slot).dot(bar);
-  }
+  FieldGradient{data.theta_rho, data.active, scale, rho_bar}.add<N>(slot, bar);
 }
 
 // Value of a sensor at (y, branch of the angles), and its gradient: y_bar += scale d/dy, and in the fields and
@@ -168,5 +157,7 @@ struct Energy {
 };
 // Potential: gravity's, zero at the origin, and that of springs with constant coefficients.   [J]
 Energy energy(const MechanismData& data, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
+// Whether nothing does work but gravity and springs, whose potential is known.
+bool conserves_energy(const MechanismData& data);
 
 }  // namespace mbsopt

@@ -1,10 +1,10 @@
 // Sensors evaluated on a compiled mechanism: those of bodies and joints, and the whole model's energy and violation.
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>
 
 #include "core/body/euler_parameters.hpp"
-#include "core/mechanism/measure_gradient.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/reaction_sensor.hpp"
 #include "core/mechanism/state_point.hpp"
@@ -13,8 +13,6 @@
 
 namespace mbsopt {
 namespace {
-
-double branch(const Eigen::VectorXd& angles, int i) { return i < angles.size() ? angles(i) : 0.0; }
 
 // reference: the value on whose turn an angle is.
 template <class P>
@@ -27,7 +25,17 @@ template <class P>
 double measure_gradient(const MechanismData& d, const JointMeasure<P>& joint, bool rate, double reference,
                         const Eigen::VectorXd& y, double scale, VecOut y_bar, VecOut rho_bar) {
   const BodyAt b1 = body_at(y, joint.body1), b2 = body_at(y, joint.body2);
-  add_measure_gradient(d, joint, b1, b2, rate ? 0 : scale, rate ? scale : 0, y_bar, rho_bar);
+  Multipliers<1> z = Multipliers<1>::zero();
+  (rate ? z.mu1 : z.mu0)(0) = scale;
+  FrameBar bar1, bar2;
+  bar1.set_zero(), bar2.set_zero();
+  GeometryBar s;
+  joint.measure.pull_back(b1.frame, b2.frame, z, bar1, bar2, s);
+  add_pull_back(b1, joint.body1, bar1, 1, y_bar);
+  add_pull_back(b2, joint.body2, bar2, 1, y_bar);
+  add_slot<3>(d, joint.slot1, s.s1, 1, rho_bar);
+  add_slot<3>(d, joint.slot2, s.s2, 1, rho_bar);
+  add_slot<3>(d, joint.slot3, s.s3, 1, rho_bar);
   return rate ? joint.rate(b1.frame, b2.frame) : joint.value_near(reference, b1.frame, b2.frame);
 }
 
@@ -64,41 +72,16 @@ void add_potential_gradient(const MechanismData& d, const Eigen::VectorXd& y, co
     add_slot<1>(d, body.slot_mass, Vec<1>(-d.gravity.dot(r)), scale, rho_bar);
     add_slot<3>(d, d.slot_gravity, Vec<3>(-body.mass * r), scale, rho_bar);
   }
-  for (const TsdaForce& f : d.tsda) {
-    if (f.law.program) continue;
-    const BodyAt b1 = body_at(y, f.body1), b2 = body_at(y, f.body2);
-    const TsdaForce::Span x = f.span(b1.frame, b2.frame);
-    const double stretch = x.l - f.law.x0;
-    const Vector3d d_bar = f.law.k * stretch * x.u;
+  FieldGradient fields{d.theta_rho, d.active, scale, rho_bar};
+  d.forces.for_each([&](const auto& f) {
+    const auto [i, j] = f.bodies();
+    const BodyAt b1 = body_at(y, i), b2 = body_at(y, j);
     FrameBar bar1, bar2;
     bar1.set_zero(), bar2.set_zero();
-    bar2.r = d_bar, bar2.A = d_bar * f.s2.transpose();
-    bar1.r = -d_bar, bar1.A = -d_bar * f.s1.transpose();
-    add_pull_back(b1, f.body1, bar1, scale, y_bar);
-    add_pull_back(b2, f.body2, bar2, scale, y_bar);
-    add_slot<3>(d, f.slot1, Vec<3>(-b1.frame.A.transpose() * d_bar), scale, rho_bar);
-    add_slot<3>(d, f.slot2, Vec<3>(b2.frame.A.transpose() * d_bar), scale, rho_bar);
-    add_slot<4>(d, f.law.slot, Vec<4>(0.5 * stretch * stretch, 0, -f.law.k * stretch, 0), scale, rho_bar);
-  }
-  for (const RsdaForce& f : d.rsda) {
-    if (f.law.program) continue;
-    const double stretch = measure_value(f.joint, false, branch(angles, f.angle), y) - f.law.x0;
-    measure_gradient(d, f.joint, false, 0, y, scale * f.law.k * stretch, y_bar, rho_bar);
-    add_slot<4>(d, f.law.slot, Vec<4>(0.5 * stretch * stretch, 0, -f.law.k * stretch, 0), scale, rho_bar);
-  }
-  for (const Bushing& f : d.bushings) {
-    const BodyAt b1 = body_at(y, f.body1), b2 = body_at(y, f.body2);
-    FrameBar bar1, bar2;
-    bar1.set_zero(), bar2.set_zero();
-    Bushing::SlotBars slots;
-    f.pull_back_potential(b1.frame, b2.frame, bar1, bar2, slots);
-    add_pull_back(b1, f.body1, bar1, scale, y_bar);
-    add_pull_back(b2, f.body2, bar2, scale, y_bar);
-    add_slot<3>(d, f.slot1, slots.s1, scale, rho_bar);
-    add_slot<3>(d, f.slot2, slots.s2, scale, rho_bar);
-    add_slot<9>(d, f.slot_R0, slots.R0, scale, rho_bar);
-    add_slot<12>(d, f.slot_law, slots.law, scale, rho_bar);
-  }
+    f.pull_back_potential(angles, b1.frame, b2.frame, bar1, bar2, fields);
+    add_pull_back(b1, i, bar1, scale, y_bar);
+    add_pull_back(b2, j, bar2, scale, y_bar);
+  });
 }
 
 // Sensors that need accelerations are evaluated by the functions below, with a motion.
@@ -125,20 +108,17 @@ Energy energy(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::Vec
     e.kinetic += 0.5 * (body.mass * b.frame.rdot.squaredNorm() + w.dot(body.J * w));
     e.potential -= body.mass * d.gravity.dot(b.frame.r);
   }
-  for (const TsdaForce& f : d.tsda) {
-    if (f.law.program) continue;
-    const double stretch = f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l - f.law.x0;
-    e.potential += 0.5 * f.law.k * stretch * stretch;
-  }
-  for (const RsdaForce& f : d.rsda) {
-    if (f.law.program) continue;
-    const double stretch = measure_value(f.joint, false, branch(angles, f.angle), y) - f.law.x0;
-    e.potential += 0.5 * f.law.k * stretch * stretch;
-  }
-  for (const Bushing& f : d.bushings) {
-    e.potential += f.potential(body_at(y, f.body1).frame, body_at(y, f.body2).frame);
-  }
+  d.forces.for_each([&](const auto& f) {
+    const auto [i, j] = f.bodies();
+    e.potential += f.potential(angles, body_at(y, i).frame, body_at(y, j).frame);
+  });
   return e;
+}
+
+bool conserves_energy(const MechanismData& d) {
+  return d.applied.empty() && d.user_forces.empty() &&
+         d.forces.all_of([](const auto& f) { return f.conserves_energy(); }) &&
+         std::all_of(d.laws.begin(), d.laws.end(), [](auto& l) { return !l.law.programs && !l.law.spline; });
 }
 
 double evaluate(const MechanismData& d, const SensorKind& sensor, double t, const Eigen::VectorXd& y,

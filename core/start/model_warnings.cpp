@@ -76,7 +76,7 @@ void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::st
 }
 
 void add_springs(const MechanismData& d, const VectorXd& y, std::vector<std::string>& warnings) {
-  for (const TsdaForce& f : d.tsda) {
+  for (const TsdaForce& f : d.forces.of<TsdaForce>()) {
     const double l = f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l;
     if (l > kZeroLength) continue;
     warnings.push_back(fmt::format(

@@ -28,13 +28,13 @@ JumpWatch::JumpWatch(const Mechanism& mechanism, const SimulationSettings& setti
   if (d.active.empty()) return;
   const auto of_force = [](int index) { return Jump{Jump::Of::force, index, {}, 0, 0, {}, false}; };
   // A mechanism and its laws are compiled at each rho; so are the switches of the laws.
-  const auto add_law = [&](const Jump& jump, const Program& p, Of of, std::size_t index = 0) {
-    add(jump, p, switches_of(p), of, static_cast<int>(index));
+  const auto add_law = [&](const Jump& jump, const Program& p, Of of, Forces::Place place = {}) {
+    add(jump, p, switches_of(p), of, place);
   };
-  for (std::size_t i = 0; i < d.tsda.size(); ++i)
-    if (d.tsda[i].law.program) add_law(of_force(d.tsda[i].force), *d.tsda[i].law.program, Of::length, i);
-  for (std::size_t i = 0; i < d.rsda.size(); ++i)
-    if (d.rsda[i].law.program) add_law(of_force(d.rsda[i].force), *d.rsda[i].law.program, Of::angle, i);
+  d.forces.for_each([&]<class Kind>(const Kind& f, Forces::Place place) {
+    if constexpr (HasLaw<Kind>)
+      if (f.law.program) add_law(of_force(f.force), *f.law.program, Of::law, place);
+  });
   for (const AppliedForce& f : d.applied)
     for (const Program& component : f.components) add_law(of_force(f.force), component, Of::sensors);
   for (const Constraint& c : d.constraints)
@@ -51,11 +51,12 @@ bool JumpWatch::Function::is_new(const Switch& s) const {
   return (s.motion && !motion) || !std::all_of(s.parameters.begin(), s.parameters.end(), is_known);
 }
 
-void JumpWatch::add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of, int index) {
+void JumpWatch::add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of,
+                    Forces::Place place) {
   const MechanismData& d = mechanism_.data();
   const int P = static_cast<int>(d.rho.size());
-  const int time = of == Of::length || of == Of::angle ? P + 2 : P;
-  Function f{jump, &program, of, index, {}, {}, false};
+  const int time = of == Of::law ? P + 2 : P;
+  Function f{jump, &program, of, place, {}, {}, false};
   for (const Program& p : switches) {
     Switch s{{}, {}, false, 0, 0};
     bool varies = false;
@@ -78,18 +79,15 @@ void JumpWatch::add(const Jump& jump, const Program& program, std::span<const Pr
 
 void JumpWatch::set_inputs(const Function& f, const StatePoint& at) {
   const MechanismData& d = mechanism_.data();
-  const std::size_t P = static_cast<std::size_t>(d.rho.size()), index = static_cast<std::size_t>(f.index);
+  const std::size_t P = static_cast<std::size_t>(d.rho.size());
   std::copy(d.rho.begin(), d.rho.end(), inputs_.begin());
   inputs_[P] = at.t;
-  if (f.of == Of::length) {
-    const TsdaForce& s = d.tsda[index];
-    const TsdaForce::Span span = s.span(body_at(at.y, s.body1).frame, body_at(at.y, s.body2).frame);
-    inputs_[P] = span.l, inputs_[P + 1] = span.ldot, inputs_[P + 2] = at.t;
-  } else if (f.of == Of::angle) {
-    const RsdaForce& s = d.rsda[index];
-    const BodyAt b1 = body_at(at.y, s.joint.body1), b2 = body_at(at.y, s.joint.body2);
-    inputs_[P] = s.joint.value_near(at.angles(s.angle), b1.frame, b2.frame);
-    inputs_[P + 1] = s.joint.rate(b1.frame, b2.frame), inputs_[P + 2] = at.t;
+  if (f.of == Of::law) {
+    d.forces.visit_law(f.place, [&](const auto& force) {
+      const auto [i, j] = force.bodies();
+      const auto [x, xdot] = force.measured(at.angles, body_at(at.y, i).frame, body_at(at.y, j).frame);
+      inputs_[P] = x, inputs_[P + 1] = xdot, inputs_[P + 2] = at.t;
+    });
   } else if (f.of == Of::sensors) {
     for (const int input : f.program->used_inputs())
       if (const int sensor = input - static_cast<int>(P) - 1; sensor >= 0)

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/expression/program.hpp"
+#include "core/force/forces.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/run/cost.hpp"
 #include "core/run/simulation_result.hpp"
@@ -32,7 +33,7 @@ class JumpWatch {
   void add_to(SimulationStatistics& statistics) const;
 
  private:
-  enum class Of { sensors, length, angle, time };  // what the inputs are, beside parameters and t
+  enum class Of { sensors, law, time };  // what the inputs are, beside parameters and t
   struct Switch {
     Program program;
     std::vector<int> parameters;  // active ones that it uses
@@ -43,14 +44,15 @@ class JumpWatch {
     Jump jump;  // as far as it is known
     const Program* program;
     Of of;
-    int index;  // of the tsda or rsda
+    Forces::Place place;  // of a force with a law
     std::vector<Switch> switches;
     std::vector<int> parameters;         // that its reported jumps name
     bool motion = false;                 // some of them name the motion
     bool is_new(const Switch& s) const;  // names more
   };
   // switches: of the program.
-  void add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of, int index = 0);
+  void add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of,
+           Forces::Place place = {});
   void set_inputs(const Function& f, const StatePoint& at);
   void place_at(double theta);  // between the last state and the one in hand: t_, y_
   void set_inputs_at(double theta, const Function& f);

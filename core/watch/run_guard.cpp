@@ -19,31 +19,16 @@ constexpr double kFastest = 299792458, kFastestTurn = 1e6;  // light [m/s]; ten 
 constexpr double kGrowth = 1e3;                             // of what is faster from the start
 constexpr double kHalfTurn = 3.13;  // [rad]: nearer, the axis of the rotation may reverse within two hundredths
 
-// Nothing does work but gravity and springs, whose potential is known.
-bool conserves_energy(const MechanismData& d) {
-  const auto is_spring = [](const auto& f) { return !f.law.program && f.law.c == 0 && f.law.f0 == 0; };
-  const auto is_elastic = [](const Bushing& b) { return b.C.isZero(0) && b.Ct.isZero(0); };
-  const auto is_constant = [](const RowLaw& l) { return !l.law.programs && !l.law.spline; };
-  return d.applied.empty() && d.user_forces.empty() && d.turning_frictions.empty() && d.sliding_frictions.empty() &&
-         std::all_of(d.tsda.begin(), d.tsda.end(), is_spring) && std::all_of(d.rsda.begin(), d.rsda.end(), is_spring) &&
-         std::all_of(d.bushings.begin(), d.bushings.end(), is_elastic) &&
-         std::all_of(d.laws.begin(), d.laws.end(), is_constant);
-}
-
 // What moving by its own size would take: a scale, for runs that begin at rest where the potential is zero.
 double natural_energy(const MechanismData& d, const Eigen::VectorXd& y) {
   double sum = 0;
   for (int i = 1; i <= d.n; ++i) {
     sum += d.bodies[static_cast<std::size_t>(i)].mass * d.gravity.norm() * y.segment<3>(7 * (i - 1)).norm();
   }
-  for (const TsdaForce& f : d.tsda) {
-    const double l = f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l;
-    sum += f.law.k * std::max(l * l, f.law.x0 * f.law.x0);
-  }
-  for (const RsdaForce& f : d.rsda) sum += f.law.k;
-  for (const Bushing& b : d.bushings) {
-    sum += b.Kt.maxCoeff() + b.K.maxCoeff() * std::max(b.s1.squaredNorm(), b.s2.squaredNorm());
-  }
+  d.forces.for_each([&](const auto& f) {
+    const auto [i, j] = f.bodies();
+    sum += f.natural_energy(body_at(y, i).frame, body_at(y, j).frame);
+  });
   return sum;
 }
 
@@ -60,7 +45,7 @@ RunGuard::RunGuard(const MechanismData& data)
     : data_(data),
       conserves_energy_(conserves_energy(data)),
       law_jumps_(data),
-      bushing_turns_(data.bushings.size(), Vector3d::Zero()) {}
+      bushing_turns_(data.forces.of<Bushing>().size(), Vector3d::Zero()) {}
 
 std::string RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& energy, double t_end, long max_steps) {
   last_t_ = t;
@@ -86,7 +71,7 @@ std::string RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& en
 // Between two steps a rotation vector reverses either through zero or, where that is farther, through half a turn.
 std::string RunGuard::about_bushings(double t, const Eigen::VectorXd& y) {
   for (std::size_t k = 0; k < bushing_turns_.size(); ++k) {
-    const Bushing& b = data_.bushings[k];
+    const Bushing& b = data_.forces.of<Bushing>()[k];
     if (b.Kt.isZero(0) && b.Ct.isZero(0)) continue;
     const Matrix3d R = body_at(y, b.body1).frame.A.transpose() * body_at(y, b.body2).frame.A * b.R0.transpose();
     const Eigen::AngleAxisd turn(R);

@@ -42,7 +42,7 @@ double closest(const Vector3d& d0, const Vector3d& rate0, const Vector3d& d1, co
 
 std::string through_zero_length(const MechanismData& d, double t0, const Eigen::VectorXd& y0, double t1,
                                 const Eigen::VectorXd& y1) {
-  for (const TsdaForce& f : d.tsda) {
+  for (const TsdaForce& f : d.forces.of<TsdaForce>()) {
     const auto span = [&](const Eigen::VectorXd& y) {
       return f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame);
     };

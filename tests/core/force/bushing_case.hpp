@@ -87,19 +87,21 @@ struct BushingCase : Bodies {
     return sum;
   }
   Loads loads() const {
+    LawScratch<LinearLaw> s({}, x, 0);
     Loads out;
-    force.add_load(f1, f2, out.load1, out.load2);
+    force.add_load(s.inputs, f1, f2, out.load1, out.load2);
     return out;
   }
-  void pull_back(FrameBar& bar1, FrameBar& bar2, Eigen::VectorXd& theta_bar, Eigen::VectorXd&) const {
-    force.pull_back(f1, f2, bar1, bar2, theta_bar);
+  void pull_back(FrameBar& bar1, FrameBar& bar2, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const {
+    LawScratch<LinearLaw> s({}, x, 0);
+    force.pull_back(s.inputs, f1, f2, bar1, bar2, theta_bar, rho_bar);
   }
   LoadTangents tangent(const FrameTangent& t1, const FrameTangent& t2, const Eigen::MatrixXd& directions) const {
     const Lanes<3> s1 = directions.middleRows<3>(28), s2 = directions.middleRows<3>(31);
     const Lanes<9> R0 = directions.middleRows<9>(34);
     const Lanes<12> law = directions.middleRows<12>(kLaw);
     LoadTangents out;
-    force.tangent(f1, f2, t1, t2, {&s1, &s2, &R0, &law}, out.load1, out.load2);
+    force.tangent({}, f1, f2, t1, t2, {&s1, &s2, &R0, &law}, out.load1, out.load2);
     return out;
   }
 };

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "core/body/euler_parameters.hpp"
+#include "core/force/force_inputs.hpp"
 #include "core/force/friction.hpp"
 #include "tests/core/body/textbook_body.hpp"
 
@@ -99,9 +100,10 @@ struct LoadTangents {
 template <class L>
 struct LawScratch {
   Law::Scratch scratch;
-  Eigen::VectorXd rho;
-  LawScratch(const typename L::ForceLaw& law, const Eigen::VectorXd& at, int first)
-      : rho(at.segment(first, L::kParameters)) {
+  Eigen::VectorXd rho, angles;
+  ForceInputs inputs{kTime, rho, angles, scratch};
+  LawScratch(const typename L::ForceLaw& law, const Eigen::VectorXd& at, int first, double angle = 0)
+      : rho(at.segment(first, L::kParameters)), angles(Vec<1>(angle)) {
     scratch.inputs.resize(static_cast<std::size_t>(L::kParameters + 3));
     scratch.gradient.resize(scratch.inputs.size());
     if constexpr (requires { law.program; }) {

@@ -19,15 +19,16 @@ TEST_CASE("a bushing measures the rotation vector at any angle below half a turn
   f1.A = Eigen::AngleAxisd(1.1, Vector3d(0.3, 1, -1).normalized()).matrix();
   f2.A = f1.A * Eigen::AngleAxisd(angle, axis).matrix();
   const Vector3d theta = angle * axis;
-  CHECK(bushing.potential(f1, f2) ==
+  CHECK(bushing.potential({}, f1, f2) ==
         Approx(0.5 * theta.dot(bushing.Kt.cwiseProduct(theta))).epsilon(1e-9).margin(1e-26));
+  const LawScratch<LinearLaw> none({}, VectorXd(), 0);
   Vec<6> load1 = Vec<6>::Zero(), load2 = Vec<6>::Zero();
-  bushing.add_load(f1, f2, load1, load2);
+  bushing.add_load(none.inputs, f1, f2, load1, load2);
   // Of equal stiffnesses the torque is that of the axis; of these it is so to first order in the angle.
   Bushing uniform;
   uniform.Kt.setConstant(4);
   Vec<6> one = Vec<6>::Zero(), two = Vec<6>::Zero();
-  uniform.add_load(f1, f2, one, two);
+  uniform.add_load(none.inputs, f1, f2, one, two);
   CHECK((two.tail<3>() + 4 * theta).norm() <= 1e-11 * (1 + angle / (3.1416 - angle)));
   CHECK((one.tail<3>() - 4 * theta).norm() <= 1e-11 * (1 + angle / (3.1416 - angle)));
   if (angle < 1e-3) CHECK((load2.tail<3>() + bushing.Kt.cwiseProduct(theta)).norm() <= 10 * angle * angle + 1e-15);
@@ -66,9 +67,9 @@ TEST_CASE("tension is positive when it pulls the points together", "[force]") {
   spring.law.k = 10, spring.law.x0 = 0.5;
   Frame ground, other;
   other.r = Vector3d(2, 0, 0);
-  Law::Scratch scratch;
+  const LawScratch<LinearLaw> none({}, VectorXd(), 0);
   Vec<6> load1 = Vec<6>::Zero(), load2 = Vec<6>::Zero();
-  spring.add_load(0, VectorXd(), ground, other, scratch, load1, load2);
+  spring.add_load(none.inputs, ground, other, load1, load2);
   CHECK(load1(0) == Approx(15));
   CHECK(load2(0) == Approx(-15));
 }
@@ -80,9 +81,9 @@ TEST_CASE("a positive torsional torque resists a positive angle", "[force]") {
   spring.law.k = 4, spring.law.x0 = 0.1;
   Frame ground, other;
   other.A = A(Vector4d(std::cos(0.3), 0, 0, std::sin(0.3)));  // 0.6 rad about z
-  Law::Scratch scratch;
+  const LawScratch<LinearLaw> none({}, VectorXd(), 0);
   Vec<6> load1 = Vec<6>::Zero(), load2 = Vec<6>::Zero();
-  spring.add_load(0, VectorXd(), 0, ground, other, scratch, load1, load2);
+  spring.add_load(none.inputs, ground, other, load1, load2);
   CHECK(load2(5) == Approx(-2));
   CHECK(load1(5) == Approx(2));
 }

@@ -2,6 +2,7 @@
 // more for any scalar (complex step), and against central differences of its own loads. A new force is tested by a case
 // of its own in the list of types below.
 #include <catch2/catch.hpp>
+#include <numeric>
 
 #include "tests/core/force/bushing_case.hpp"
 #include "tests/core/force/joint_force_cases.hpp"
@@ -149,16 +150,19 @@ TEST_CASE("a bushing without damping is the gradient of its potential, and that 
   c.x.segment<3>(c.kLaw + 3).setZero(), c.x.segment<3>(c.kLaw + 9).setZero();
   c.place();
   const std::vector<double> at(c.x.data(), c.x.data() + c.x.size());
-  CHECK(c.force.potential(c.f1, c.f2) == Approx(c.potential(at)).epsilon(1e-12));
+  CHECK(c.force.potential({}, c.f1, c.f2) == Approx(c.potential(at)).epsilon(1e-12));
 
   FrameBar bar1, bar2;
   bar1.set_zero(), bar2.set_zero();
-  Bushing::SlotBars slots;
-  c.force.pull_back_potential(c.f1, c.f2, bar1, bar2, slots);
-  VectorXd found = VectorXd::Zero(c.kInputs);
+  constexpr int fields = BushingCase::kGeometry + BushingCase::kFields;
+  const Eigen::MatrixXd theta_rho = Eigen::MatrixXd::Identity(fields, fields);
+  std::vector<int> active(fields);
+  std::iota(active.begin(), active.end(), 0);
+  VectorXd theta_bar = VectorXd::Zero(fields), found = VectorXd::Zero(c.kInputs);
+  FieldGradient gradient{theta_rho, active, 1, theta_bar};
+  c.force.pull_back_potential({}, c.f1, c.f2, bar1, bar2, gradient);
   found.segment<7>(0) = pull_back_position(c.b1, bar1), found.segment<7>(14) = pull_back_position(c.b2, bar2);
-  found.segment<3>(28) = slots.s1, found.segment<3>(31) = slots.s2;
-  found.segment<9>(34) = slots.R0, found.segment<12>(c.kLaw) = slots.law;
+  found.segment(28, fields) = theta_bar;
   const VectorXd expected = complex_gradient([&](const std::vector<Complex>& x) { return c.potential(x); }, c.x);
   CHECK(distance(found, expected) < 1e-12 * (1 + expected.lpNorm<Eigen::Infinity>()));
 

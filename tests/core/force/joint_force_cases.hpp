@@ -19,6 +19,7 @@ struct RsdaCase : Bodies {
     JointAngle& joint = force.joint;  // in x: n1, axis x n1, n2
     joint.measure.s1 = x.segment<3>(28), joint.measure.s3 = x.segment<3>(31), joint.measure.s2 = x.segment<3>(34);
     joint.slot1 = 0, joint.slot3 = 3, joint.slot2 = 6;
+    force.angle = 0;
     L::fill(force.law, x, kLaw, kGeometry);
   }
 
@@ -47,27 +48,27 @@ struct RsdaCase : Bodies {
     return -L::value(at, kLaw, angle, rate) * change;
   }
   Loads loads() const {
-    LawScratch<L> s(force.law, x, kLaw);
+    LawScratch<L> s(force.law, x, kLaw, kReference);
     Loads out;
-    force.add_load(kTime, s.rho, kReference, f1, f2, s.scratch, out.load1, out.load2);
+    force.add_load(s.inputs, f1, f2, out.load1, out.load2);
     return out;
   }
   void pull_back(FrameBar& bar1, FrameBar& bar2, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const {
-    LawScratch<L> s(force.law, x, kLaw);
-    force.pull_back(kTime, s.rho, kReference, f1, f2, s.scratch, bar1, bar2, theta_bar, rho_bar);
+    LawScratch<L> s(force.law, x, kLaw, kReference);
+    force.pull_back(s.inputs, f1, f2, bar1, bar2, theta_bar, rho_bar);
   }
   LoadTangents tangent(const FrameTangent& t1, const FrameTangent& t2, const Eigen::MatrixXd& directions) const {
-    LawScratch<L> s(force.law, x, kLaw);
-    const double angle = force.joint.value_near(kReference, f1, f2), rate = force.joint.rate(f1, f2);
-    const Law::Value f = force.law.derivatives(kTime, s.rho, angle, rate, s.scratch);
+    LawScratch<L> s(force.law, x, kLaw, kReference);
+    const Law::Value f = force.at(s.inputs, f1, f2);
     Lanes<L::ForceLaw::kFields> fields = Lanes<L::ForceLaw::kFields>::Zero();
     if (L::kFields > 0) fields = directions.middleRows(kLaw, L::ForceLaw::kFields);
     const Lanes<1> df = force.law.field_tangent(
-        angle, rate, &fields, [&](int k) { return Lanes<1>(directions.row(kLaw + k)); }, s.scratch);
+        force.measured(s.angles, f1, f2), &fields, [&](int k) { return Lanes<1>(directions.row(kLaw + k)); },
+        s.scratch);
     const Lanes<3> dx = directions.middleRows<3>(28), dy = directions.middleRows<3>(31),
                    dn = directions.middleRows<3>(34);
     LoadTangents out;
-    force.tangent(f, df, f1, f2, t1, t2, {&dx, &dn, &dy}, out.load1, out.load2);
+    force.tangent(f, f1, f2, t1, t2, {df, {&dx, &dn, &dy}}, out.load1, out.load2);
     return out;
   }
 };
@@ -98,23 +99,22 @@ struct SlidingCase : Bodies {
   Loads loads() const {
     LawScratch<DryFriction> s(force.law, x, kLaw);
     Loads out;
-    force.add_load(kTime, s.rho, 0, f1, f2, s.scratch, out.load1, out.load2);
+    force.add_load(s.inputs, f1, f2, out.load1, out.load2);
     return out;
   }
   void pull_back(FrameBar& bar1, FrameBar& bar2, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const {
     LawScratch<DryFriction> s(force.law, x, kLaw);
-    force.pull_back(kTime, s.rho, 0, f1, f2, s.scratch, bar1, bar2, theta_bar, rho_bar);
+    force.pull_back(s.inputs, f1, f2, bar1, bar2, theta_bar, rho_bar);
   }
   LoadTangents tangent(const FrameTangent& t1, const FrameTangent& t2, const Eigen::MatrixXd& directions) const {
     LawScratch<DryFriction> s(force.law, x, kLaw);
-    const double displacement = force.joint.value(f1, f2), rate = force.joint.rate(f1, f2);
-    const Law::Value f = force.law.derivatives(kTime, s.rho, displacement, rate, s.scratch);
+    const Law::Value f = force.at(s.inputs, f1, f2);
     const Lanes<3> s1 = directions.middleRows<3>(28), s2 = directions.middleRows<3>(31),
                    s3 = directions.middleRows<3>(34), law = directions.middleRows<3>(kLaw);
     const Lanes<1> df = force.law.field_tangent(
-        displacement, rate, &law, [](int) { return Lanes<1>(Lanes<1>::Zero()); }, s.scratch);
+        force.measured(s.angles, f1, f2), &law, [](int) { return Lanes<1>(Lanes<1>::Zero()); }, s.scratch);
     LoadTangents out;
-    force.tangent(f, df, f1, f2, t1, t2, {&s1, &s2, &s3}, out.load1, out.load2);
+    force.tangent(f, f1, f2, t1, t2, {df, {&s1, &s2, &s3}}, out.load1, out.load2);
     return out;
   }
 };

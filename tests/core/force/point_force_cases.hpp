@@ -35,24 +35,24 @@ struct TsdaCase : Bodies {
   Loads loads() const {
     LawScratch<L> s(force.law, x, kLaw);
     Loads out;
-    force.add_load(kTime, s.rho, f1, f2, s.scratch, out.load1, out.load2);
+    force.add_load(s.inputs, f1, f2, out.load1, out.load2);
     return out;
   }
   void pull_back(FrameBar& bar1, FrameBar& bar2, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const {
     LawScratch<L> s(force.law, x, kLaw);
-    force.pull_back(kTime, s.rho, f1, f2, s.scratch, bar1, bar2, theta_bar, rho_bar);
+    force.pull_back(s.inputs, f1, f2, bar1, bar2, theta_bar, rho_bar);
   }
   LoadTangents tangent(const FrameTangent& t1, const FrameTangent& t2, const Eigen::MatrixXd& directions) const {
     LawScratch<L> s(force.law, x, kLaw);
-    const TsdaForce::Span span = force.span(f1, f2);
-    const Law::Value f = force.law.derivatives(kTime, s.rho, span.l, span.ldot, s.scratch);
+    const TsdaForce::At now = force.at(s.inputs, f1, f2);
     Lanes<4> fields = Lanes<4>::Zero();
     if (L::kFields > 0) fields = directions.middleRows(kLaw, 4);
     const Lanes<1> df = force.law.field_tangent(
-        span.l, span.ldot, &fields, [&](int k) { return Lanes<1>(directions.row(kLaw + k)); }, s.scratch);
+        force.measured(s.angles, f1, f2), &fields, [&](int k) { return Lanes<1>(directions.row(kLaw + k)); },
+        s.scratch);
     const Lanes<3> ds1 = directions.middleRows<3>(28), ds2 = directions.middleRows<3>(31);
     LoadTangents out;
-    force.tangent(span, f, df, f1, f2, t1, t2, &ds1, &ds2, out.load1, out.load2);
+    force.tangent(now, f1, f2, t1, t2, {df, &ds1, &ds2}, out.load1, out.load2);
     return out;
   }
 };

@@ -1,0 +1,38 @@
+// What a force sees of a state beside the frames of its bodies, and where the gradient of a scalar in its fields goes.
+#pragma once
+
+#include <vector>
+
+#include "core/force/law.hpp"
+
+namespace mbsopt {
+
+// The value on whose turn a joint's angle is; 0 where none is followed.
+inline double branch(const Eigen::VectorXd& angles, int angle) {
+  return angle >= 0 && angle < angles.size() ? angles(angle) : 0.0;
+}
+
+struct ForceInputs {
+  double t;
+  const Eigen::VectorXd& rho;     // all parameters
+  const Eigen::VectorXd& angles;  // branch of each followed joint angle
+  Law::Scratch& scratch;
+};
+
+struct FieldGradient {
+  const Eigen::MatrixXd& theta_rho;  // of all fields in the active parameters
+  const std::vector<int>& active;
+  double scale;
+  Eigen::Ref<Eigen::VectorXd> rho_bar;  // all parameters
+
+  // rho_bar += scale (d field/d rho)' bar
+  template <int N>
+  void add(int slot, const Vec<N>& bar) {
+    if (slot < 0) return;
+    for (std::size_t k = 0; k < active.size(); ++k) {
+      rho_bar(active[k]) += scale * theta_rho.col(static_cast<Eigen::Index>(k)).template segment<N>(slot).dot(bar);
+    }
+  }
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,86 @@
+// The kinds of forces between two bodies, of which one may be the ground; nothing else lists them. Each kind has
+//   bodies()                       the two
+//   add_load, pull_back            its loads, and the gradient of their virtual work
+//   at, tangent                    what the tangent needs of a state, and the tangent of the loads in the two frames
+//   add_field_tangent              the same in the directions of fields and parameters
+//   potential, pull_back_potential 0 where it has none
+//   conserves_energy               whether it does no work but that of its potential
+//   natural_energy                 a scale of its potential [J]
+// and one with a Law also measured, pull_back_measured: the law's number, which the sensor of a force needs.
+#pragma once
+
+#include <concepts>
+#include <tuple>
+#include <vector>
+
+#include "core/force/bushing.hpp"
+#include "core/force/friction.hpp"
+#include "core/force/tsda.hpp"
+
+namespace mbsopt {
+
+template <class Kind>
+concept HasLaw = std::same_as<decltype(Kind::law), Law>;
+
+template <class... Kinds>
+class ForceLists {
+ public:
+  struct Place {
+    std::size_t kind = 0, index = 0;
+  };
+
+  template <class Kind>
+  std::vector<Kind>& of() {
+    return std::get<std::vector<Kind>>(lists_);
+  }
+  template <class Kind>
+  const std::vector<Kind>& of() const {
+    return std::get<std::vector<Kind>>(lists_);
+  }
+  std::size_t size() const {
+    return std::apply([](const auto&... list) { return (list.size() + ...); }, lists_);
+  }
+  bool empty() const { return size() == 0; }
+
+  // visitor(force), kind by kind; with two arguments visitor(force, place).
+  template <class Visitor>
+  void for_each(Visitor&& visitor) const {
+    std::size_t kind = 0;
+    const auto visit = [&](const auto& list) {
+      for (std::size_t i = 0; i < list.size(); ++i) {
+        if constexpr (std::invocable<Visitor&, decltype(list[i])>) {
+          visitor(list[i]);
+        } else {
+          visitor(list[i], Place{kind, i});
+        }
+      }
+      ++kind;
+    };
+    std::apply([&](const auto&... list) { (visit(list), ...); }, lists_);
+  }
+  template <class Visitor>
+  bool all_of(Visitor&& holds) const {
+    bool all = true;
+    for_each([&](const auto& force) { all = all && holds(force); });
+    return all;
+  }
+  // visitor(force) where its kind has a law.
+  template <class Visitor>
+  void visit_law(Place place, Visitor&& visitor) const {
+    std::size_t kind = 0;
+    const auto visit = [&]<class Kind>(const std::vector<Kind>& list) {
+      if constexpr (HasLaw<Kind>) {
+        if (kind == place.kind) visitor(list[place.index]);
+      }
+      ++kind;
+    };
+    std::apply([&](const auto&... list) { (visit(list), ...); }, lists_);
+  }
+
+ private:
+  std::tuple<std::vector<Kinds>...> lists_;
+};
+
+using Forces = ForceLists<TsdaForce, RsdaForce, TurningFriction, SlidingFriction, Bushing>;
+
+}  // namespace mbsopt
