@@ -9,6 +9,8 @@
 #include "core/integrate/model_choice.hpp"
 #include "core/mechanism/joint_graph.hpp"
 #include "core/mechanism/planar_model.hpp"
+#include "core/step/event_times.hpp"
+#include "core/step/step_control.hpp"
 #include "core/watch/start_failure.hpp"
 #include "core/watch/stiffness.hpp"
 #include "core/watch/weak_joints.hpp"
@@ -16,6 +18,7 @@
 namespace mbsopt {
 namespace {
 
+constexpr double kMostSteps = 1e10;
 constexpr double kPartsOfPlaced = 1000;  // of rounded_step(): a thousandth moves a stage by less than matters
 
 }  // namespace
@@ -234,219 +237,299 @@ Energy RungeKuttaRun::update_statistics(SimulationResult& result) {
   return e;
 }
 
+// What a run knows between its steps.
+struct RungeKuttaRun::Course {
+  const RunOptions& options;
+  SimulationResult& result;
+  const bool adaptive;
+  const double end, span;
+  PiController controller;
+  StiffnessWatch stiffness;
+  EventTimes events;
+  double h = 0, longest = 0;              // the step to try; the longest one so far
+  double error = 0;                       // of the step tried last
+  double wanted = 0, largest = INFINITY;  // sizes that the error and the limits allow, where passage_ chooses h
+  std::size_t frozen_index = 0;
+  int placed_again = 0;
+
+  bool ends_with(double t1) const {
+    const StepSequence* const frozen = options.frozen;
+    return frozen ? frozen_index + 1 == frozen->sizes.size() && frozen->to_the_end : t1 >= end;
+  }
+  bool goes_on(double t) const {
+    return result.ok() && (options.frozen ? frozen_index < options.frozen->sizes.size() : t < end);
+  }
+  void stop(SimulationStatus status, std::string message) {
+    result.status = status;
+    result.message = std::move(message);
+  }
+};
+
 void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& angles,
                         const std::function<bool(double)>& wants_dense, const Sink& accepted, const RunOptions& options,
                         SimulationResult& result) {
   const IntegratorSettings& s = settings_.integrator;
-  const double end = settings_.end_time, span = end - settings_.start_time;
-  const bool adaptive = !s.step && !options.frozen && rk_.adaptive;
+  Course course{.options = options,
+                .result = result,
+                .adaptive = !s.step && !options.frozen && rk_.adaptive,
+                .end = settings_.end_time,
+                .span = settings_.end_time - settings_.start_time,
+                .controller = PiController(rk_.error_order),
+                .stiffness = StiffnessWatch(rk_, mechanism_.states()),
+                .events = EventTimes(settings_.events, settings_.start_time, settings_.end_time)};
+  if (!begin(y_initial, angles, course)) return;
+  choose_first_size(course);
+  while (course.goes_on(step_.t)) {
+    if (!choose_size(course)) break;
+    const Outcome outcome = try_step(wants_dense, course);
+    if (outcome == Outcome::accepted && misplaced(course)) continue;
+    if (outcome != Outcome::accepted) {
+      reject(outcome, course);
+      continue;
+    }
+    if (!credible(course)) break;
+    course.stiffness.look_at(step_);
+    accepted(step_);
+    if (implicit_) implicit_->accept(step_);
+    choose_next_size(course);
+    advance(course);
+  }
+  add_statistics(course);
+}
+
+bool RungeKuttaRun::begin(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& angles, Course& course) {
+  const StepSequence* const frozen = course.options.frozen;
+  SimulationResult& result = course.result;
   angles_ = angles;
-  step_.t = options.frozen && !options.frozen->times.empty() ? options.frozen->times[0] : settings_.start_time;
+  step_.t = frozen && !frozen->times.empty() ? frozen->times[0] : settings_.start_time;
   step_.y0 = y_initial;
   step_.angles0 = angles;
   const Energy e = energy(mechanism_.data(), y_initial, angles);
   result.statistics.energy_initial = result.statistics.energy_final = e.kinetic + e.potential;
   result.last_good_time = step_.t;
-  const std::string at_start = guard_.begin(step_.t, y_initial, e, end, s.max_steps);
-  if (!at_start.empty() && !options.frozen) {
-    result.status = SimulationStatus::not_credible;
-    result.message = at_start;
-    return;
+  const std::string at_start = guard_.begin(step_.t, y_initial, e, course.end, settings_.integrator.max_steps);
+  if (!at_start.empty() && !frozen) {
+    course.stop(SimulationStatus::not_credible, at_start);
+    return false;
   }
   projected_ = moved_ = 0;
   evaluations_ = 0;
   first_stage_known_ = false;
-
-  auto stop = [&](SimulationStatus status, std::string message) {
-    result.status = status;
-    result.message = std::move(message);
-  };
   if (!dynamics_.evaluate(step_.t, y_initial, angles, ydot_)) {
-    stop(SimulationStatus::not_finite, start_failure(mechanism_.data(), step_.t) + about_alpha(settings_.formulation));
-    return;
+    course.stop(SimulationStatus::not_finite,
+                start_failure(mechanism_.data(), step_.t) + about_alpha(settings_.formulation));
+    return false;
   }
   // A guard on which scenes are taken to be planar: what was assembled in space satisfies the planar equations.
-  if (dynamics_.is_planar() && !options.frozen) {
+  if (dynamics_.is_planar() && !frozen) {
     const double unmet = std::max(projector_.position_violation(step_.t, angles, y_initial),
                                   projector_.velocity_violation(step_.t, y_initial));
     if (unmet > 1e-6 * (1 + y_initial.cwiseAbs().maxCoeff())) {
-      stop(SimulationStatus::not_credible,
-           fmt::format(
-               "the start does not satisfy the equations of the planar model, by {:.3g}: set simulation.model to "
-               "\"spatial\"",
-               unmet));
-      return;
+      course.stop(SimulationStatus::not_credible,
+                  fmt::format("the start does not satisfy the equations of the planar model, by {:.3g}: set "
+                              "simulation.model to \"spatial\"",
+                              unmet));
+      return false;
     }
   }
   if (implicit_) implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
-  PiController controller(rk_.error_order);
-  StiffnessWatch stiffness(rk_, mechanism_.states());
-  double h = adaptive ? first_step(s, span) : s.step.value_or(span);
-  if (s.max_step) h = std::min(h, *s.max_step);
-  // Tolerances that no step can meet explain whatever else may have become of the steps.
-  const auto tolerances_or = [&](std::string message) {
-    return adaptive && beyond_digits(s, step_.y0) ? too_few_digits(s, step_.t) : std::move(message);
-  };
-  if (!(h > 0))
-    stop(SimulationStatus::step_too_small,
-         tolerances_or(step_failure(Outcome::rejected, step_.t, h, adaptive, settings_.formulation)));
-  double longest = h;  // step so far
-  constexpr double kMostSteps = 1e10;
-  if (adaptive && longest * kMostSteps * kMostSteps < span) {  // steps may still grow, but not so much
-    stop(SimulationStatus::step_too_small, tolerances_or(too_long_run(span, longest)));
-  }
-  std::size_t frozen_index = 0;
-  int placed_again = 0;
-  constexpr long kRejectionsToAsk = 1000;  // for the cause: far more than a motion that is resolved has
   if (passage_) passage_->forget();
-  EventTimes events(settings_.events, settings_.start_time, settings_.end_time);
-  while (result.ok() && (options.frozen ? frozen_index < options.frozen->sizes.size() : step_.t < end)) {
-    if (result.statistics.steps + result.statistics.rejected >= s.max_steps) {
-      stop(SimulationStatus::too_many_steps,
-           tolerances_or(fmt::format(
-               "more than {} steps were needed; stopped at t = {:.6g} s with steps of {:.3g} s. Loosen rtol and atol, "
-               "raise simulation.integrator.max_steps, or look for very stiff springs or dampers",
-               s.max_steps, step_.t, h)));
-      break;
-    }
-    const double rate = fastest_tracked_rate(step_.y0);
-    double wanted = h, largest = INFINITY;
-    if (options.frozen) {
-      step_.t = options.frozen->times[frozen_index];
-      h = options.frozen->sizes[frozen_index];
-    } else {
-      if (adaptive && rate * h > 2)
-        h = rounded_step(2 / rate);  // an angle is followed over turns only when steps are below half a turn
-      h = propose_step(step_.t, h, events.stop_after(step_.t), adaptive);
-      wanted = h;
-      if (adaptive && passage_) {
-        largest = std::min(
-            {s.max_step.value_or(INFINITY), rate > 0 ? 2 / rate : INFINITY, events.stop_after(step_.t) - step_.t});
-        const double placed = passage_->propose(step_.t, wanted, largest);
-        if (placed != wanted) h = rounded_step(placed, kPartsOfPlaced);
-      }
-      if (!adaptive && rate * h > 3) {
-        stop(
-            SimulationStatus::step_too_large,
-            fmt::format("at t = {:.6g} s a joint whose angle is used turns by {:.3g} rad in one step of {:.3g} s; more "
-                        "than half a turn cannot be followed: use a smaller simulation.integrator.step",
-                        step_.t, rate * h, h));
-        break;
-      }
-    }
-    double error = 0;
-    Outcome outcome = attempt(h, adaptive, options.exact_stages, error);
-    const bool last = options.frozen ? frozen_index + 1 == options.frozen->sizes.size() && options.frozen->to_the_end
-                                     : step_.t + h >= end;
-    step_.t1 = last ? end : step_.t + h;
-    if (outcome == Outcome::accepted) outcome = finish_step(wants_dense(step_.t1));
-    if (outcome == Outcome::accepted && adaptive && passage_) {
-      constexpr int kMostTries = 3;
-      const bool again = better_placed_by(wanted, largest);  // passage_ is to know of this step in either case
-      if (again && placed_again < kMostTries) {
-        ++placed_again;
-        ++result.statistics.rejected;
-        h = wanted;
-        continue;
-      }
-      placed_again = 0;
-      passage_->accept();
-    }
-    if (outcome != Outcome::accepted) {
-      if (!adaptive) {
-        stop(outcome == Outcome::unsolved          ? SimulationStatus::not_solved
-             : outcome == Outcome::off_constraints ? SimulationStatus::step_too_large
-                                                   : SimulationStatus::not_finite,
-             step_failure(outcome, step_.t, h, adaptive, settings_.formulation));
-        break;
-      }
-      ++result.statistics.rejected;
-      if (result.statistics.rejected % kRejectionsToAsk == 0) {
-        const std::string objection = weak_joints_objection(error_of_weak_joints(
-            mechanism_, settings_.formulation, dynamics_.worst_residual(), step_.t, step_.y0, step_.angles0));
-        if (!objection.empty()) {
-          stop(SimulationStatus::not_credible, fmt::format("of {} steps to t = {:.6g} s {} were rejected: {}",
-                                                           result.statistics.steps + result.statistics.rejected,
-                                                           step_.t, result.statistics.rejected, objection));
-          break;
-        }
-      }
-      const double factor = controller.after_rejection(outcome == Outcome::rejected ? error : INFINITY);
-      h = rounded_step(h * factor);
-      if (h < 1e-14 * std::max(span, std::abs(step_.t))) {
-        stop(SimulationStatus::step_too_small,
-             tolerances_or(longest * kMostSteps < span
-                               ? too_long_run(span, longest)
-                               : step_failure(outcome, step_.t, h, adaptive, settings_.formulation)));
-      }
-      continue;
-    }
+  return true;
+}
 
-    ++result.statistics.steps;
-    result.steps.times.push_back(step_.t);
-    result.steps.sizes.push_back(h);
-    longest = std::max(longest, h);
-    const Energy energy_now = update_statistics(result);
-    if (!options.frozen) {  // given steps have been looked at where they were found
-      const std::string objection = guard_.objection(step_.t1, step_.y1, energy_now, dynamics_.worst_residual());
-      if (!objection.empty()) {
-        stop(SimulationStatus::not_credible, objection);
-        break;
-      }
-    }
-    add_projection(h);
-    stiffness.look_at(step_);
-    accepted(step_);
-    if (implicit_) implicit_->accept(step_);
-    if (adaptive) {
-      // Past a singular position the estimate is magnified rounding, which is not to decide on the next step.
-      const bool passed = passage_ && passage_->passed_since(step_.t);
-      if (passed) controller.after_passage();
-      double proposed = passed ? wanted : rounded_step(h * controller.after_acceptance(error));
-      // The factor of an implicit method serves as long as the step stays.
-      if (implicit_ && proposed >= h && proposed < ImplicitStages::kKeepStep * h) proposed = h;
-      h = s.max_step ? std::min(proposed, *s.max_step) : proposed;
-    } else if (!options.frozen) {
-      h = s.step.value_or(span);
-    }
-    const bool event = !options.frozen && events.reached(step_.t1);
-    step_.t = event ? events.resume_time() : step_.t1;
-    step_.y0 = step_.y1;
-    step_.angles0 = step_.angles1;
-    first_stage_known_ = false;
-    angles_ = step_.angles1;
-    if (event && adaptive) {  // what the steps before an event were fit for says nothing about those after it
-      controller = PiController(rk_.error_order);
-      h = std::min(first_step(s, end - step_.t), s.max_step.value_or(end - step_.t));
-      if (passage_) passage_->forget();
-    }
-    if (event && implicit_ && dynamics_.evaluate(step_.t, step_.y0, angles_, ydot_)) {
-      ++evaluations_;
-      implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
-    }
-    result.last_good_time = step_.t;
-    ++frozen_index;
-    if (options.after_step) options.after_step({step_.t, step_.y0, step_.angles0});
-    if (options.progress && !options.progress(step_.t)) {
-      stop(SimulationStatus::stopped, fmt::format("stopped at t = {:.6g} s", step_.t));
+// Tolerances that no step can meet explain whatever else may have become of the steps.
+std::string RungeKuttaRun::tolerances_or(std::string message, const Course& course) const {
+  const IntegratorSettings& s = settings_.integrator;
+  return course.adaptive && beyond_digits(s, step_.y0) ? too_few_digits(s, step_.t) : std::move(message);
+}
+
+void RungeKuttaRun::choose_first_size(Course& course) {
+  const IntegratorSettings& s = settings_.integrator;
+  double& h = course.h;
+  h = course.adaptive ? first_step(s, course.span) : s.step.value_or(course.span);
+  if (s.max_step) h = std::min(h, *s.max_step);
+  course.longest = h;
+  if (!(h > 0)) {
+    course.stop(
+        SimulationStatus::step_too_small,
+        tolerances_or(step_failure(Outcome::rejected, step_.t, h, course.adaptive, settings_.formulation), course));
+  }
+  if (course.adaptive && h * kMostSteps * kMostSteps < course.span) {  // steps may still grow, but not so much
+    course.stop(SimulationStatus::step_too_small, tolerances_or(too_long_run(course.span, h), course));
+  }
+}
+
+bool RungeKuttaRun::choose_size(Course& course) {
+  const IntegratorSettings& s = settings_.integrator;
+  const StepSequence* const frozen = course.options.frozen;
+  double& h = course.h;
+  if (course.result.statistics.steps + course.result.statistics.rejected >= s.max_steps) {
+    course.stop(SimulationStatus::too_many_steps,
+                tolerances_or(fmt::format("more than {} steps were needed; stopped at t = {:.6g} s with steps of "
+                                          "{:.3g} s. Loosen rtol and atol, raise simulation.integrator.max_steps, or "
+                                          "look for very stiff springs or dampers",
+                                          s.max_steps, step_.t, h),
+                              course));
+    return false;
+  }
+  if (frozen) {
+    step_.t = frozen->times[course.frozen_index];
+    h = frozen->sizes[course.frozen_index];
+    return true;
+  }
+  const double rate = fastest_tracked_rate(step_.y0), to_event = course.events.stop_after(step_.t);
+  if (course.adaptive && rate * h > 2)
+    h = rounded_step(2 / rate);  // an angle is followed over turns only when steps are below half a turn
+  h = course.wanted = propose_step(step_.t, h, to_event, course.adaptive);
+  if (course.adaptive && passage_) {
+    course.largest = std::min({s.max_step.value_or(INFINITY), rate > 0 ? 2 / rate : INFINITY, to_event - step_.t});
+    const double placed = passage_->propose(step_.t, h, course.largest);
+    if (placed != h) h = rounded_step(placed, kPartsOfPlaced);
+  }
+  if (course.adaptive || !(rate * h > 3)) return true;
+  course.stop(SimulationStatus::step_too_large,
+              fmt::format("at t = {:.6g} s a joint whose angle is used turns by {:.3g} rad in one step of {:.3g} s; "
+                          "more than half a turn cannot be followed: use a smaller simulation.integrator.step",
+                          step_.t, rate * h, h));
+  return false;
+}
+
+RungeKuttaRun::Outcome RungeKuttaRun::try_step(const std::function<bool(double)>& wants_dense, Course& course) {
+  const Outcome outcome = attempt(course.h, course.adaptive, course.options.exact_stages, course.error);
+  const double t1 = step_.t + course.h;
+  step_.t1 = course.ends_with(t1) ? course.end : t1;
+  return outcome == Outcome::accepted ? finish_step(wants_dense(step_.t1)) : outcome;
+}
+
+// Whether the step is to be tried again, placed otherwise about a singular position.
+bool RungeKuttaRun::misplaced(Course& course) {
+  if (!course.adaptive || !passage_) return false;
+  constexpr int kMostTries = 3;
+  const bool again = better_placed_by(course.wanted, course.largest);  // passage_ is to know of this step in any case
+  if (again && course.placed_again < kMostTries) {
+    ++course.placed_again;
+    ++course.result.statistics.rejected;
+    course.h = course.wanted;
+    return true;
+  }
+  course.placed_again = 0;
+  passage_->accept();
+  return false;
+}
+
+void RungeKuttaRun::reject(Outcome outcome, Course& course) {
+  double& h = course.h;
+  SimulationStatistics& count = course.result.statistics;
+  if (!course.adaptive) {
+    course.stop(outcome == Outcome::unsolved          ? SimulationStatus::not_solved
+                : outcome == Outcome::off_constraints ? SimulationStatus::step_too_large
+                                                      : SimulationStatus::not_finite,
+                step_failure(outcome, step_.t, h, course.adaptive, settings_.formulation));
+    return;
+  }
+  constexpr long kRejectionsToAsk = 1000;  // for the cause: far more than a motion that is resolved has
+  if (++count.rejected % kRejectionsToAsk == 0) {
+    const std::string objection = weak_joints_objection(error_of_weak_joints(
+        mechanism_, settings_.formulation, dynamics_.worst_residual(), step_.t, step_.y0, step_.angles0));
+    if (!objection.empty()) {
+      course.stop(SimulationStatus::not_credible,
+                  fmt::format("of {} steps to t = {:.6g} s {} were rejected: {}", count.steps + count.rejected, step_.t,
+                              count.rejected, objection));
+      return;
     }
   }
-  result.y_end = step_.y0;
-  stiffness.add_to(result.statistics);
+  h = rounded_step(h * course.controller.after_rejection(outcome == Outcome::rejected ? course.error : INFINITY));
+  if (h >= 1e-14 * std::max(course.span, std::abs(step_.t))) return;
+  course.stop(SimulationStatus::step_too_small,
+              tolerances_or(course.longest * kMostSteps < course.span
+                                ? too_long_run(course.span, course.longest)
+                                : step_failure(outcome, step_.t, h, course.adaptive, settings_.formulation),
+                            course));
+}
+
+// Notes an accepted step, and asks the guard; given steps have been looked at where they were found.
+bool RungeKuttaRun::credible(Course& course) {
+  SimulationResult& result = course.result;
+  ++result.statistics.steps;
+  result.steps.times.push_back(step_.t);
+  result.steps.sizes.push_back(course.h);
+  course.longest = std::max(course.longest, course.h);
+  const Energy energy_now = update_statistics(result);
+  if (!course.options.frozen) {
+    const std::string objection = guard_.objection(step_.t1, step_.y1, energy_now, dynamics_.worst_residual());
+    if (!objection.empty()) {
+      course.stop(SimulationStatus::not_credible, objection);
+      return false;
+    }
+  }
+  add_projection(course.h);
+  return true;
+}
+
+void RungeKuttaRun::choose_next_size(Course& course) {
+  const IntegratorSettings& s = settings_.integrator;
+  double& h = course.h;
+  if (course.adaptive) {
+    // Past a singular position the estimate is magnified rounding, which is not to decide on the next step.
+    const bool passed = passage_ && passage_->passed_since(step_.t);
+    if (passed) course.controller.after_passage();
+    double proposed = passed ? course.wanted : rounded_step(h * course.controller.after_acceptance(course.error));
+    // The factor of an implicit method serves as long as the step stays.
+    if (implicit_ && proposed >= h && proposed < ImplicitStages::kKeepStep * h) proposed = h;
+    h = s.max_step ? std::min(proposed, *s.max_step) : proposed;
+  } else if (!course.options.frozen) {
+    h = s.step.value_or(course.span);
+  }
+}
+
+void RungeKuttaRun::advance(Course& course) {
+  const RunOptions& options = course.options;
+  const bool event = !options.frozen && course.events.reached(step_.t1);
+  step_.t = event ? course.events.resume_time() : step_.t1;
+  step_.y0 = step_.y1;
+  angles_ = step_.angles0 = step_.angles1;
+  first_stage_known_ = false;
+  if (event) restart(course);
+  course.result.last_good_time = step_.t;
+  ++course.frozen_index;
+  if (options.after_step) options.after_step({step_.t, step_.y0, step_.angles0});
+  if (options.progress && !options.progress(step_.t)) {
+    course.stop(SimulationStatus::stopped, fmt::format("stopped at t = {:.6g} s", step_.t));
+  }
+}
+
+// The steps before an event say nothing about those after it.
+void RungeKuttaRun::restart(Course& course) {
+  const IntegratorSettings& s = settings_.integrator;
+  if (course.adaptive) {
+    const double left = course.end - step_.t;
+    course.controller = PiController(rk_.error_order);
+    course.h = std::min(first_step(s, left), s.max_step.value_or(left));
+    if (passage_) passage_->forget();
+  }
+  if (implicit_ && dynamics_.evaluate(step_.t, step_.y0, angles_, ydot_)) {
+    ++evaluations_;
+    implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
+  }
+}
+
+void RungeKuttaRun::add_statistics(Course& course) {
+  course.result.y_end = step_.y0;
+  SimulationStatistics& s = course.result.statistics;
+  course.stiffness.add_to(s);
   const double weak = error_of_weak_joints(mechanism_, settings_.formulation, dynamics_.worst_residual(), step_.t,
                                            step_.y0, step_.angles0);
-  result.statistics.max_acceleration_residual =
-      std::max({dynamics_.worst_residual(), weak, moved_ > 0 ? projected_ / moved_ : 0.0});
-  result.statistics.relative_energy_drift = guard_.relative_energy_drift();
+  s.max_acceleration_residual = std::max({dynamics_.worst_residual(), weak, moved_ > 0 ? projected_ / moved_ : 0.0});
+  s.relative_energy_drift = guard_.relative_energy_drift();
   if (implicit_) {
     evaluations_ += implicit_->evaluations();
-    result.statistics.linearised_states += dynamics_.linearised_states();
-    result.statistics.jacobians += implicit_->jacobians();
-    result.statistics.factorisations += implicit_->factorisations();
+    s.linearised_states += dynamics_.linearised_states();
+    s.jacobians += implicit_->jacobians();
+    s.factorisations += implicit_->factorisations();
   }
-  result.statistics.rhs_evaluations += evaluations_;
-  result.statistics.factor_blocks = dynamics_.factor_blocks();
-  result.statistics.factorisations += dynamics_.factorisations() + projector_.factorisations();
+  s.rhs_evaluations += evaluations_;
+  s.factor_blocks = dynamics_.factor_blocks();
+  s.factorisations += dynamics_.factorisations() + projector_.factorisations();
 }
 
 }  // namespace mbsopt

@@ -8,11 +8,9 @@
 #include "core/dynamics/dynamics.hpp"
 #include "core/run/simulation_result.hpp"
 #include "core/scene/settings.hpp"
-#include "core/step/event_times.hpp"
 #include "core/step/implicit_stages.hpp"
 #include "core/step/singular_passage.hpp"
 #include "core/step/step.hpp"
-#include "core/step/step_control.hpp"
 #include "core/step/step_failure.hpp"
 #include "core/watch/run_guard.hpp"
 
@@ -34,6 +32,22 @@ class RungeKuttaRun {
 
  private:
   using Outcome = StepOutcome;
+  struct Course;
+
+  // False, and course.result says why, where the run cannot begin or go on.
+  bool begin(const Eigen::VectorXd& y_initial, const Eigen::VectorXd& angles, Course& course);
+  bool choose_size(Course& course);
+  bool credible(Course& course);
+
+  void choose_first_size(Course& course);
+  Outcome try_step(const std::function<bool(double)>& wants_dense, Course& course);
+  bool misplaced(Course& course);
+  void reject(Outcome outcome, Course& course);
+  void choose_next_size(Course& course);
+  void advance(Course& course);
+  void restart(Course& course);
+  void add_statistics(Course& course);
+  std::string tolerances_or(std::string message, const Course& course) const;
 
   double first_step(const IntegratorSettings& s, double span);
   double propose_step(double t, double h, double end, bool adaptive) const;
