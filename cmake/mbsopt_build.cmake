@@ -61,9 +61,8 @@ function(mbsopt_precompile target)
   endif()
 endfunction()
 
-# mbsopt_unity(<target> <source>...): sources of one folder are compiled together, eight at a time, where MBSOPT_UNITY is
-# on; templates that eight sources use are then made once. The sources given stay alone: headers of theirs define
-# names that clash. The sanitizers' builds compile each source alone, which shows a missing include.
+# mbsopt_unity(<target> <source>...): where MBSOPT_UNITY is on, sources are compiled together, eight at a time, so that
+# templates that they share are made once. The sources given stay alone: headers of theirs define names that clash. The sanitizers' builds compile each source alone, which shows a missing include.
 function(mbsopt_unity target)
   if(MBSOPT_UNITY)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)

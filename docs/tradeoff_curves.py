@@ -1,4 +1,4 @@
-"""Work-precision curves of a sweep, as optim/tradeoff/tradeoff_curves sees them: their lines, whether they are monotone, where an
+"""Work-precision curves of a sweep, as optim/tradeoff/tradeoff_curves sees them: lines, whether they are monotone, where an
 error rises along one, and why."""
 
 import math

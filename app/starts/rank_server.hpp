@@ -1,4 +1,4 @@
-// What the ranks of mpirun other than 0 do: they compute starts for rank 0 (start_workers.hpp).
+// The ranks of mpirun other than 0 compute starts for rank 0 (start_workers.hpp).
 #pragma once
 
 #include "app/starts/ranks.hpp"

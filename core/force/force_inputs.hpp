@@ -1,4 +1,4 @@
-// What a force sees of a state beside the frames of its bodies, and where the gradient of a scalar in its fields goes.
+// The parts of a state that a force reads beside the frames of its bodies, and the gradient in its fields.
 #pragma once
 
 #include <vector>

@@ -237,7 +237,7 @@ Energy RungeKuttaRun::update_statistics(SimulationResult& result) {
   return e;
 }
 
-// What a run knows between its steps.
+// The state of a run between its steps.
 struct RungeKuttaRun::Course {
   const RunOptions& options;
   SimulationResult& result;

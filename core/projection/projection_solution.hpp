@@ -1,4 +1,4 @@
-// What a projection found (projection.hpp); enough to differentiate it later.
+// The result of a projection (projection.hpp), from which its derivatives follow; constants of both projections.
 #pragma once
 
 #include <vector>
@@ -7,12 +7,11 @@
 
 namespace mbsopt {
 
-// Constants of both projections, in space and in the plane.
 inline constexpr double kProjectionAlpha = 1e8;  // times row_alpha
 inline constexpr int kMostProjectionIterations = 60;
-// Of the largest coordinate and velocity, at least of 1.
+// Both are relative to the largest coordinate and velocity, or to 1 where these are smaller.
 inline constexpr double kProjectionRounding = 1e-15, kUnmetPosition = 1e-8, kUnmetVelocity = 1e-6;
-// Derivatives: passes of refinement, and relative what the next pass would change: several units of rounding.
+// A derivative is refined so often at most; a relative change of several units of rounding ends it earlier.
 inline constexpr int kMostRefinements = 12;
 inline constexpr double kNegligibleRefinement = 2e-15;
 

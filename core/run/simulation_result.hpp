@@ -1,4 +1,4 @@
-// What a run may be asked beside its costs, and what it answers: its result, statistics and warnings in numbers.
+// The options of a run beside its costs, and its result: objectives, gradients, statistics, doubts in numbers.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// What is thrown where a scene cannot be compiled.
+// The exception for a scene that cannot be compiled.
 #pragma once
 
 #include <stdexcept>

@@ -1,4 +1,4 @@
-// What an identification finds: parameters, how well each channel is explained, residuals, the way there.
+// The result of an identification: parameters, the fit of each channel, residuals, iterations.
 #pragma once
 
 #include <Eigen/Core>
