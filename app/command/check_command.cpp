@@ -200,9 +200,9 @@ int check_command(const CommandContext& context) {
 
   double last_good_time = scene.simulation.start_time;
   GradientCheckOptions options;
-  options.simulation_progress = [&](double t) {
+  options.simulation_progress = [&, show = run.watched("simulating")](double t) {
     last_good_time = t;
-    return !interrupted();
+    return show(t);
   };
   options.progress = [&](int done, int of) { run.progress.fraction("checking", static_cast<double>(done) / of); };
   std::vector<std::string> left_out;

@@ -15,6 +15,7 @@
 #include "core/start/model_warnings.hpp"
 #include "optim/objective/evaluator.hpp"
 #include "optim/objective/hessian.hpp"
+#include "optim/objective/integration_error.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
 namespace mbsopt {
@@ -77,6 +78,16 @@ void add_second_derivatives(Run& run, Evaluator& evaluator) {
   for (const std::string& warning : hessian_warnings(found, objectives)) run.warn(warning);
 }
 
+void warn_of_unresolved(Run& run, const Evaluator& evaluator, const Evaluation& evaluation) {
+  const IntegrationError error = integration_error(
+      evaluator.scene(), evaluator.objectives(), evaluation.psi, evaluation.psi_rho,
+      {.progress = run.watched("estimating the error"), .method = evaluator.options().method, .fixed_steps = true});
+  run.progress.finish();
+  for (const std::string& doubt :
+       unresolved_gradients(evaluator.scene(), evaluator.objectives(), evaluation.psi, evaluation.psi_rho, error))
+    run.warn(doubt);
+}
+
 }  // namespace
 
 int gradient_command(const CommandContext& context) {
@@ -100,11 +111,9 @@ int gradient_command(const CommandContext& context) {
   double last_good_time = scene.simulation.start_time;
   EvaluatorOptions options;
   options.method = wanted;
-  options.progress = [&](double t) {
+  options.progress = [&, show = run.watched("differentiating")](double t) {
     last_good_time = t;
-    const SimulationSettings& s = scene.simulation;
-    run.progress.fraction("differentiating", (t - s.start_time) / (s.end_time - s.start_time));
-    return !interrupted();
+    return show(t);
   };
   std::vector<std::string> left_out;
   const Problem needed = what_objectives_need(run.problem, &left_out);
@@ -115,6 +124,8 @@ int gradient_command(const CommandContext& context) {
   run.result["simulation"] = to_json(evaluation.statistics);
   add_derivative_counts(run, needed.scene, evaluation.statistics);
   for (const std::string& warning : evaluation.warnings) run.warn(warning);
+  if (evaluation.ok && may_be_unresolved(needed.scene, evaluation))
+    warn_of_unresolved(run, evaluator, evaluation);
   if (!evaluation.ok) {
     interrupted() ? run.stopped("no gradient was finished") : run.failed(evaluation.message, last_good_time);
     return run.finish();

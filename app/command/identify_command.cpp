@@ -57,7 +57,7 @@ IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem,
   IdentificationOptions options;
   options.records = &records;
   options.profiles = run.context.options.profiles;
-  options.simulation_progress = [](double) { return !interrupted(); };
+  options.simulation_progress = run.watched("simulating");
   options.progress = [&](const FitRow& row) {
     run.progress.iteration(fmt::format("iteration {:3d}   cost {:.9e}   gradient {:.1e}   step {:.1e}", row.iteration,
                                        row.cost, row.gradient_norm, row.step_norm));
@@ -92,7 +92,7 @@ void simulate_first_experiment(Run& run, const Problem& needed, const std::vecto
   const Scene scene = simulated_scene(needed, data);
   const Mechanism mechanism(scene, parameter_values(scene), std::vector<bool>(scene.parameters.size(), false));
   RunOptions options;
-  options.progress = [](double) { return !interrupted(); };
+  options.progress = run.watched("simulating");
   const SimulationResult first = simulate(mechanism, scene.simulation, {}, {}, options);
   run.result["simulation"] = to_json(first.statistics);
   if (first.ok())

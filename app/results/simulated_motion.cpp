@@ -1,6 +1,5 @@
 #include "app/results/simulated_motion.hpp"
 
-#include "app/terminal/interrupt.hpp"
 #include "core/integrate/model_choice.hpp"
 #include "core/start/assembly.hpp"
 #include "core/start/model_warnings.hpp"
@@ -30,10 +29,7 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
   std::vector<const Objective*> all;
   for (const Objective& objective : objectives) all.push_back(&objective);
   RunOptions options;
-  options.progress = [&](double t) {
-    run.progress.fraction("simulating", (t - settings.start_time) / (settings.end_time - settings.start_time));
-    return !interrupted();
-  };
+  options.progress = run.watched("simulating");
   motion.simulation = ObjectiveRun(all, mechanism, settings).run([&](std::span<const Cost> costs) {
     motion.trajectory = {};
     const Sampling sampling = record_trajectory(mechanism, scene, motion.trajectory);

@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "app/json/problem_source.hpp"
 #include "app/run/energy_balance.hpp"
 #include "app/run/provenance.hpp"
 #include "app/terminal/exit_code.hpp"
+#include "app/terminal/interrupt.hpp"
 #include "core/expression/counted.hpp"
 #include "core/integrate/model_choice.hpp"
 
@@ -95,6 +98,14 @@ void Run::set(RunStatus status) {
 void Run::write(const std::string& file, std::string_view content) {
   folder.write(file, content);
   written_.push_back(file);
+}
+
+std::function<bool(double t)> Run::watched(std::string doing) {
+  const double start = problem_.scene.simulation.start_time, end = problem_.scene.simulation.end_time;
+  return [this, doing = std::move(doing), start, end](double t) {
+    progress.fraction(doing, (t - start) / (end - start));
+    return !interrupted();
+  };
 }
 
 void Run::warn(const std::string& words) {

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -46,6 +47,8 @@ class Run {
 
   void start();  // claims the folder: locks it, and writes result.json with "status": "running"
   void write(const std::string& file, std::string_view content);  // into the folder; named in the closing line
+  // What simulations call after each step: shows how far they are; false once the run is interrupted.
+  std::function<bool(double t)> watched(std::string doing);
   void warn(const std::string& words);  // "simulation.accuracy: ...": with the path's place in the file before them
   // In place of what the file says (accuracy_results.hpp).
   void simulate_with(const SimulationSettings& settings) { problem_.scene.simulation = settings; }

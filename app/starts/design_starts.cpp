@@ -46,7 +46,7 @@ DesignResult single_run(Run& run, LongRun& long_run, const Problem& problem) {
                            [&](const char* kind, const Json& content) { long_run.add(kind, content); });
   DesignOptions options;
   options.records = &records;
-  options.simulation_progress = [](double) { return !interrupted(); };
+  options.simulation_progress = run.watched("simulating");
   options.progress = [&](const DesignRow& row) {
     run.progress.iteration(progress_line(row));
     if (row.iteration > long_run.earlier().last_iteration)
@@ -140,7 +140,7 @@ DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& problem
   const MultistartSpec& spec = *problem.design->multistart;
   const auto from = starts_of(problem);
   DesignOptions until_interrupted;
-  until_interrupted.simulation_progress = [](double) { return !interrupted(); };
+  until_interrupted.simulation_progress = run.watched("simulating");
   const NlpScale scale = design_scale(from(0), until_interrupted);
   const MultistartOutcome outcome =
       run_multistart(run, long_run, spec, design_start_work(problem, task_of(problem, scale)));

@@ -3,15 +3,33 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <utility>
 
 namespace mbsopt {
 namespace {
 
 constexpr int kBarWidth = 40;
 constexpr std::string_view kClearLine = "\r\x1b[K";
+// [s] of silence. Whoever waits wonders after some seconds, and wants no log of a thousand lines after a night.
+constexpr double kAtFirst = 4, kLongest = 64;
+constexpr double kIterationStays = 0.5;  // [s] on a terminal, before a bar takes its place
 
 }  // namespace
+
+Progress::Progress(std::ostream& err, bool terminal, bool quiet, std::function<double()> seconds)
+    : err_(err),
+      terminal_(terminal),
+      quiet_(quiet),
+      seconds_(std::move(seconds)),
+      start_(seconds_()),
+      said_(start_),
+      patience_(terminal ? 0 : kAtFirst) {}
+
+double Progress::steady_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 Progress::~Progress() {
   try {
@@ -21,18 +39,28 @@ Progress::~Progress() {
 }
 
 void Progress::fraction(std::string_view what, double done) {
-  if (quiet_ || !terminal_) return;
-  const int percent = static_cast<int>(std::floor(100 * std::clamp(done, 0.0, 1.0)));
-  if (percent == shown_percent_) return;
-  shown_percent_ = percent;
-  const int filled = percent * kBarWidth / 100;
-  err_ << kClearLine << fmt::format("{} [{:#>{}}{:.>{}}] {:3d} %", what, "", filled, "", kBarWidth - filled, percent)
+  if (quiet_) return;
+  const double percent = 100 * std::clamp(done, 0.0, 1.0);
+  const int whole = static_cast<int>(std::floor(percent));
+  if (terminal_ && whole == shown_percent_) return;
+  const double now = seconds_();
+  if (now - said_ < patience_) return;
+  if (!terminal_) {
+    err_ << fmt::format("{}: {:.3g} % after {:.0f} s\n", what, percent, now - start_) << std::flush;
+    said_ = now, patience_ = std::min(2 * patience_, kLongest);
+    return;
+  }
+  shown_percent_ = whole;
+  const int filled = whole * kBarWidth / 100;
+  err_ << kClearLine << fmt::format("{} [{:#>{}}{:.>{}}] {:3d} %", what, "", filled, "", kBarWidth - filled, whole)
        << std::flush;
   line_open_ = true;
 }
 
 void Progress::iteration(std::string_view line) {
   if (quiet_) return;
+  said_ = seconds_(), patience_ = terminal_ ? kIterationStays : kAtFirst;
+  shown_percent_ = -1;
   if (terminal_) {
     err_ << kClearLine << line << std::flush;
     line_open_ = true;

@@ -1,11 +1,13 @@
-// Progress on standard error: a bar on a terminal, a line per iteration otherwise, nothing when quiet.
+// Progress on standard error: a bar on a terminal; otherwise a line per iteration, and one wherever a command has said
+// nothing for a while; nothing when quiet.
 //
 //   Progress progress(err, terminal, quiet);
-//   progress.fraction("simulating", 0.4);     // a bar; silent where there is no terminal
+//   progress.fraction("simulating", 0.4);     // a bar; without a terminal "simulating: 40 % after 5 s", now and then
 //   progress.iteration("3   psi 0.0123");     // its own line; on a terminal it replaces the previous one
 //   progress.finish();
 #pragma once
 
+#include <functional>
 #include <ostream>
 #include <string_view>
 
@@ -13,10 +15,13 @@ namespace mbsopt {
 
 class Progress {
  public:
-  Progress(std::ostream& err, bool terminal, bool quiet) : err_(err), terminal_(terminal), quiet_(quiet) {}
+  // seconds: since any fixed moment.
+  Progress(std::ostream& err, bool terminal, bool quiet, std::function<double()> seconds = steady_seconds);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
+
+  static double steady_seconds();
 
   void fraction(std::string_view what, double done);  // done: 0..1
   void iteration(std::string_view line);
@@ -25,6 +30,9 @@ class Progress {
  private:
   std::ostream& err_;
   bool terminal_, quiet_;
+  std::function<double()> seconds_;
+  double start_, said_;  // [s]; said_: when the last line was
+  double patience_;      // [s] of silence
   bool line_open_ = false;
   int shown_percent_ = -1;
 };

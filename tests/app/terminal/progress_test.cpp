@@ -25,6 +25,27 @@ TEST_CASE("on a terminal: a bar that is redrawn in place and cleared", "[progres
   CHECK(err.str() == "\r\x1b[Ksimulating [" + std::string(20, '#') + std::string(20, '.') + "]  50 %\r\x1b[K");
 }
 
+TEST_CASE("without a terminal, a long silence is broken, and ever more rarely", "[progress]") {
+  std::ostringstream err;
+  double now = 100;
+  Progress progress(err, false, false, [&] { return now; });
+  for (; now <= 130; now += 0.5) progress.fraction("simulating", 0.01 * (now - 100));
+  CHECK(err.str() == "simulating: 4 % after 4 s\nsimulating: 12 % after 12 s\nsimulating: 28 % after 28 s\n");
+}
+
+TEST_CASE("on a terminal, an iteration's line stays for a moment", "[progress]") {
+  std::ostringstream err;
+  double now = 0;
+  Progress progress(err, true, false, [&] { return now; });
+  progress.iteration("1  psi 0.5");
+  now = 0.3;
+  progress.fraction("simulating", 0.5);
+  CHECK(err.str() == "\r\x1b[K1  psi 0.5");
+  now = 0.7;
+  progress.fraction("simulating", 0.5);
+  CHECK(err.str().find("50 %") != std::string::npos);
+}
+
 TEST_CASE("quiet prints nothing", "[progress]") {
   std::ostringstream err;
   Progress progress(err, true, true);
