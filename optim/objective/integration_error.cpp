@@ -1,14 +1,47 @@
 #include "optim/objective/integration_error.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/tableau/tableaus.hpp"
+
 namespace mbsopt {
+namespace {
+
+constexpr double kTightest = 1e-12;  // rounding starves the step-size control beyond
+constexpr double kResolved = 1e-4;   // of a gradient: no optimiser's step and no fit's interval shows less
+
+double other_errors(const IntegratorSettings& given) { return given.rtol > 10 * kTightest ? 0.1 : 10; }
+
+// |psi_rho| times the parameters' sizes.
+Eigen::MatrixXd contributions(const Scene& scene, const Eigen::MatrixXd& psi_rho) {
+  Eigen::MatrixXd sized = psi_rho.cwiseAbs();
+  for (Eigen::Index k = 0; k < sized.cols(); ++k) {
+    const Parameter& p = scene.parameters[static_cast<std::size_t>(k)];
+    sized.col(k) *= typical_size(p, p.value);
+  }
+  return sized;
+}
+
+}  // namespace
+
+Scene with_errors_times(double factor, Scene scene) {
+  IntegratorSettings& s = scene.simulation.integrator;
+  s.rtol *= factor, s.atol *= factor;
+  if (const Method* method = runge_kutta_method(s.type)) {
+    const double ratio = std::pow(factor, 1.0 / method->order);
+    if (s.max_step) *s.max_step *= ratio;
+    if (s.step) *s.step *= ratio;
+  }
+  return scene;
+}
 
 std::optional<Scene> with_other_tolerances(Scene scene) {
-  IntegratorSettings& given = scene.simulation.integrator;
+  const IntegratorSettings& given = scene.simulation.integrator;
   if (given.step) return std::nullopt;
-  constexpr double kTightest = 1e-12;  // rounding starves the step-size control beyond
-  const double factor = given.rtol > 10 * kTightest ? 0.1 : 10;
-  given.rtol *= factor, given.atol *= factor;
-  return scene;
+  return with_errors_times(other_errors(given), std::move(scene));
 }
 
 IntegrationError integration_error(const Scene& scene, const std::vector<Objective>& objectives,
@@ -16,16 +49,48 @@ IntegrationError integration_error(const Scene& scene, const std::vector<Objecti
                                    const IntegrationErrorOptions& options) {
   IntegrationError error;
   error.psi.setZero(psi.size()), error.psi_rho.setZero(psi_rho.rows(), psi_rho.cols());
-  std::optional<Scene> other = with_other_tolerances(scene);
-  if (!other) return error;
-  error.psi_rho = scene.simulation.integrator.rtol * psi_rho.cwiseAbs();
-  Evaluator evaluator(*std::move(other), objectives, {}, {options.method, {}, options.user_forces, options.progress});
+  const IntegratorSettings& given = scene.simulation.integrator;
+  if (given.step && !options.fixed_steps) return error;
+  if (!given.step) error.psi_rho = given.rtol * psi_rho.cwiseAbs();
+  Evaluator evaluator(with_errors_times(given.step ? 0.1 : other_errors(given), scene), objectives, {}, {options.method, {}, options.user_forces, options.progress});
   const Evaluation& e = evaluator.gradients(evaluator.start());
   error.simulations = e.simulations;
   if (!e.ok) return error;
   error.psi = error.psi.cwiseMax((e.psi - psi).cwiseAbs());
   error.psi_rho = error.psi_rho.cwiseMax((e.psi_rho - psi_rho).cwiseAbs());
   return error;
+}
+
+bool may_be_unresolved(const Scene& scene, const Evaluation& e) {
+  const SimulationStatistics& s = e.statistics;
+  if (std::max({s.quadrature.error, s.extreme_quadrature.error, s.gradient_quadrature.error}) > kResolved) return true;
+  if (scene.simulation.integrator.step) return false;
+  const Eigen::VectorXd changes = contributions(scene, e.psi_rho).rowwise().sum();
+  return (scene.simulation.integrator.rtol * changes.array() > kResolved * e.psi.array().abs()).any();
+}
+
+std::vector<std::string> unresolved_gradients(const Scene& scene, const std::vector<Objective>& objectives,
+                                              const Eigen::VectorXd& psi, const Eigen::MatrixXd& psi_rho,
+                                              const IntegrationError& error) {
+  constexpr double kNothing = 1e-3;  // of psi: a gradient below it is compared with it, as `check` does
+  const Eigen::MatrixXd sized = contributions(scene, psi_rho), errors = contributions(scene, error.psi_rho);
+  std::vector<std::string> sentences;
+  for (Eigen::Index i = 0; i < psi.size() && psi_rho.cols() > 0; ++i) {
+    Eigen::Index k = 0;
+    const double worst = errors.row(i).maxCoeff(&k);
+    const double size = std::max(sized.row(i).maxCoeff(), kNothing * std::abs(psi(i)));
+    if (!(worst > kResolved * size)) continue;
+    sentences.push_back(fmt::format(
+        "the steps do not resolve the gradient of objective '{}': another run with {} the integration errors "
+        "changes its entry of '{}' by {:.2g}, {:.2g} % of the largest. {}",
+        objectives[static_cast<std::size_t>(i)].name(),
+        scene.simulation.integrator.step || other_errors(scene.simulation.integrator) < 1 ? "a tenth of" : "ten times",
+        scene.parameters[static_cast<std::size_t>(k)].name, error.psi_rho(i, k), 100 * worst / size,
+        scene.simulation.integrator.step ? "Take a smaller simulation.integrator.step"
+                                         : "Set simulation.integrator.max_step or tighten rtol and atol; where that "
+                                           "changes nothing, the motion magnifies errors, and a shorter run helps"));
+  }
+  return sentences;
 }
 
 }  // namespace mbsopt

@@ -1,12 +1,13 @@
 // How much of psi and of its derivatives is the integrator's error: the change that ten times tighter tolerances make
 // (looser ones where tighter are out of reach), of derivatives at least rtol times them. An estimate of its size, no
-// bound. With fixed steps there is nothing that jumps from run to run: zero.
+// bound. With fixed steps there is nothing that jumps from run to run: zero, unless it is asked for.
 #pragma once
 
 #include <Eigen/Core>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/scene/scene.hpp"
@@ -27,7 +28,12 @@ struct IntegrationErrorOptions {
   std::vector<std::shared_ptr<const UserForce>> user_forces = {};
   std::function<bool(double t)> progress = {};  // within a simulation; false abandons it
   GradientMethod method = GradientMethod::automatic;
+  bool fixed_steps = false;  // estimate their error, too
 };
+
+// The scene with factor times the integration errors: tolerances times factor, and max_step and step times
+// factor^(1/order), since the error is O(h^order) where they choose the steps.
+Scene with_errors_times(double factor, Scene scene);
 
 // The scene with tolerances ten times tighter, or looser; none where its steps are fixed.
 std::optional<Scene> with_other_tolerances(Scene scene);
@@ -36,5 +42,15 @@ std::optional<Scene> with_other_tolerances(Scene scene);
 IntegrationError integration_error(const Scene& scene, const std::vector<Objective>& objectives,
                                    const Eigen::VectorXd& psi, const Eigen::MatrixXd& psi_rho,
                                    const IntegrationErrorOptions& options = {});
+
+// Whether the estimates that every run makes leave it possible that a gradient is off by more than kResolved: those of
+// its integrals, and rtol times how much the motion magnifies a change of parameters.
+bool may_be_unresolved(const Scene& scene, const Evaluation& gradients);
+
+// In sentences: the gradients that are off by more than kResolved of their largest entry, each entry times its
+// parameter's size.
+std::vector<std::string> unresolved_gradients(const Scene& scene, const std::vector<Objective>& objectives,
+                                              const Eigen::VectorXd& psi, const Eigen::MatrixXd& psi_rho,
+                                              const IntegrationError& error);
 
 }  // namespace mbsopt

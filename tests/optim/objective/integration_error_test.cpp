@@ -31,3 +31,58 @@ TEST_CASE("with fixed steps there is no error that jumps from run to run", "[int
   CHECK(error.psi_rho.norm() == 0);
   CHECK(error.simulations == 0);
 }
+
+namespace {
+
+Evaluation gradients_of(const Problem& problem) {
+  Evaluator evaluator(problem.scene, objectives_of(problem));
+  return evaluator.gradients(evaluator.start());
+}
+
+std::vector<std::string> doubts(const Problem& problem, const Evaluation& e) {
+  const std::vector<Objective> objectives = objectives_of(problem);
+  return unresolved_gradients(problem.scene, objectives, e.psi, e.psi_rho,
+                              integration_error(problem.scene, objectives, e.psi, e.psi_rho, {.fixed_steps = true}));
+}
+
+}  // namespace
+
+// The integral of L01 exp(-((t - 0.5)/w)^2) over the real axis is L01 w sqrt(pi).
+TEST_CASE("a gradient that the steps do not resolve is doubted, one that they resolve is not", "[integration_error]") {
+  Problem problem = five_bar::problem(1e-8);
+  problem.scene.simulation.end_time = 1;
+  for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
+  if (GENERATE(false, true)) {
+    problem.scene.simulation.integrator.step = 0.01;
+  } else {
+    problem.scene.simulation.integrator.max_step = 0.01;
+  }
+  const double width = GENERATE(1e-3, 0.1);
+  problem.objectives[0].running = Expression::parse("L01*exp(-((t - 0.5)/" + std::to_string(width) + ")^2)");
+  const Evaluation e = gradients_of(problem);
+  REQUIRE(e.ok);
+  const double exact = width * std::sqrt(std::acos(-1.0));
+  const std::vector<std::string> found = doubts(problem, e);
+  INFO("width " << width << ": off by " << e.psi_rho(0, 0) / exact - 1);
+  CHECK((std::abs(e.psi_rho(0, 0) - exact) > 1e-4 * exact) == (width < 0.01));
+  CHECK(may_be_unresolved(problem.scene, e) == (width < 0.01));
+  REQUIRE(found.size() == (width < 0.01 ? 1U : 0U));
+  if (width < 0.01) CHECK(found[0].find("gradient of objective 'motion'") != std::string::npos);
+}
+
+TEST_CASE("a motion that magnifies what changes at its start asks for an estimate", "[integration_error]") {
+  const Problem problem = five_bar::problem(1e-8);
+  Evaluation e = gradients_of(problem);
+  CHECK_FALSE(may_be_unresolved(problem.scene, e));
+  e.psi_rho *= 1e6;
+  CHECK(may_be_unresolved(problem.scene, e));
+}
+
+TEST_CASE("a tenth of the errors: rtol by 10, a largest step by 10^(1/order)", "[integration_error]") {
+  Problem problem = five_bar::problem(1e-5);
+  problem.scene.simulation.integrator.max_step = 0.1;
+  const IntegratorSettings s = with_errors_times(0.1, problem.scene).simulation.integrator;  // dopri5
+  CHECK(s.rtol == Approx(1e-6));
+  CHECK(*s.max_step == Approx(0.1 * std::pow(0.1, 0.2)));
+  CHECK(with_other_tolerances(problem.scene)->simulation.integrator.max_step == s.max_step);
+}
