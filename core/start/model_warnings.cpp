@@ -12,6 +12,7 @@
 #include "core/linear/row_dependence.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/planar_model.hpp"
+#include "core/mechanism/reaction_sensor.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
@@ -29,6 +30,19 @@ std::vector<Frame> frames_at(const MechanismData& d, const VectorXd& q) {
   BodyState state;
   for (int i = 1; i <= d.n; ++i) set_position(q.segment<7>(7 * (i - 1)), state, frames[at(i)]);
   return frames;
+}
+
+void add_jacobian(const MechanismData& d, const VectorXd& q, std::vector<SparseEntry>& rows) {
+  ConstraintRows J(d);
+  J.evaluate(frames_at(d, q));
+  for (const RowGroup& g : d.groups) {
+    for (int r = 0; r < g.rows; ++r) {
+      for (int k = 0; k < 6; ++k) {
+        if (g.body1 > 0) rows.push_back({g.row + r, 6 * (g.body1 - 1) + k, J.J1(g.block + r, k)});
+        if (g.body2 > 0) rows.push_back({g.row + r, 6 * (g.body2 - 1) + k, J.J2(g.block + r, k)});
+      }
+    }
+  }
 }
 
 // Directions that neither a joint nor a mass holds: what no row of J and of the masses, one row per principal axis,
@@ -52,16 +66,7 @@ void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::st
     }
   }
   if (count == d.m + 6 * d.n) return;  // the usual case costs nothing
-  ConstraintRows J(d);
-  J.evaluate(frames_at(d, q));
-  for (const RowGroup& g : d.groups) {
-    for (int r = 0; r < g.rows; ++r) {
-      for (int k = 0; k < 6; ++k) {
-        if (g.body1 > 0) rows.push_back({g.row + r, 6 * (g.body1 - 1) + k, J.J1(g.block + r, k)});
-        if (g.body2 > 0) rows.push_back({g.row + r, 6 * (g.body2 - 1) + k, J.J2(g.block + r, k)});
-      }
-    }
-  }
+  add_jacobian(d, q, rows);
   std::map<int, bool> bodies;
   for (const RowDependence::Direction& free : row_dependence(count, d.n, 6, rows, kModelRankThreshold).unreached) {
     bodies[free.body + 1] = free.column >= 3;
@@ -83,6 +88,55 @@ void add_springs(const MechanismData& d, const VectorXd& y, std::vector<std::str
         "a tsda between '{}' and '{}' has zero length at the start, where it has no direction; its force acts "
         "once its points have moved apart",
         d.body_names[at(f.body1)], d.body_names[at(f.body2)]));
+  }
+}
+
+// Derivatives of a reaction's components in lambda, one column each.
+Eigen::MatrixXd by_lambda(const MechanismData& d, ReactionSensor sensor, const VectorXd& y) {
+  const int components = sensor.component == PointSensor::kNorm ? 3 : 1;
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(d.m, components);
+  const VectorXd none = VectorXd::Zero(d.m);
+  VectorXd y_bar = VectorXd::Zero(y.size()), rho_bar = VectorXd::Zero(d.rho.size()), lambda_bar;
+  for (int k = 0; k < components; ++k) {
+    if (components == 3) sensor.component = k;
+    lambda_bar = none;
+    add_gradient(d, sensor, y, none, 1, y_bar, lambda_bar, rho_bar);
+    columns.col(k) = lambda_bar;
+  }
+  return columns;
+}
+
+// The motion determines J'lambda, and so b'lambda if b = J u for some u: if b as one more column does not raise the
+// rank of J.
+void add_reactions(const MechanismData& d, const VectorXd& y, std::vector<std::string>& warnings) {
+  std::vector<SparseEntry> rows;
+  int rank = -1;
+  std::map<std::string, bool> told;
+  for (const SensorKind& kind : d.sensors) {
+    const auto* sensor = std::get_if<ReactionSensor>(&kind);
+    if (!sensor) continue;
+    if (rank < 0) {
+      add_jacobian(d, y, rows);
+      rank = row_dependence(d.m, d.n, 6, rows, kModelRankThreshold).rank;
+    }
+    if (rank == d.m) return;
+    std::vector<SparseEntry> extended = rows;
+    const Eigen::MatrixXd b = by_lambda(d, *sensor, y);
+    for (Eigen::Index k = 0; k < b.cols(); ++k)
+      for (int r = 0; r < d.m; ++r)
+        if (b(r, k) != 0) extended.push_back({r, 6 * d.n + static_cast<int>(k), b(r, k)});
+    if (row_dependence(d.m, d.n + 1, 6, extended, kModelRankThreshold).rank == rank) continue;
+    const std::string what =
+        sensor->joint >= 0 ? fmt::format("the {} in joint '{}'", sensor->torque ? "reaction torque" : "reaction force",
+                                         d.joint_names[at(sensor->joint)])
+                           : std::string("the effort of a drive");
+    if (!told.emplace(what, true).second) continue;
+    warnings.push_back(fmt::format(
+        "{} is not determined: equations of joints depend on each other, and rigid bodies do not tell how these share "
+        "the load. The value is the share of least size, as the augmented Lagrangian finds it; derivatives leave out "
+        "how the shares change, and may be wrong. A joint with fewer equations (`validate` names the redundant ones) "
+        "settles it",
+        what));
   }
 }
 
@@ -188,6 +242,7 @@ std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assemb
   add_rounding(d, assembly.result().y.head(7 * d.n), warnings);
   add_massless(d, assembly.result().y.head(7 * d.n), warnings);
   add_springs(d, assembly.result().y, warnings);
+  add_reactions(d, assembly.result().y, warnings);
   return warnings;
 }
 

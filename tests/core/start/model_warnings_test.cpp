@@ -50,3 +50,28 @@ TEST_CASE("a mechanism so far from the origin that rounding spoils its lengths i
   INFO(found[0]);
   CHECK(found[0].find("rounding of coordinates is 3e-07 of these lengths") != std::string::npos);
 }
+
+// Three spatial hinges of a planar loop share what holds the bars in their plane in ways that J'lambda leaves open. In
+// the plane there is but one way.
+TEST_CASE("a reaction that redundant equations leave undetermined is warned of, and no other", "[warnings]") {
+  const auto of = [](const std::string& kind, const std::string& component) {
+    Scene scene = four_bar();
+    scene.gravity = {0.0, -9.81, 0.0};
+    for (Body& b : scene.bodies) b.position[2] = 0.0;
+    Sensor s;
+    s.name = "reaction", s.quantity = "reaction", s.joint = "B", s.kind = kind, s.component = component;
+    scene.sensors.push_back(s);
+    std::vector<std::string> found;
+    for (const std::string& warning : warnings_of(scene))
+      if (warning.find("not determined") != std::string::npos) found.push_back(warning);
+    return found;
+  };
+  CHECK(of("force", "x").empty());
+  CHECK(of("force", "y").empty());
+  CHECK(of("torque", "z").empty());
+  const std::vector<std::string> found = of("force", "z");
+  REQUIRE(found.size() == 1);
+  CHECK(found[0].find("the reaction force in joint 'B' is not determined") == 0);
+  CHECK(of("force", "norm").size() == 1);
+  CHECK(of("torque", "x").size() == 1);
+}
