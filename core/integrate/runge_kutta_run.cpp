@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/body/euler_parameters.hpp"
 #include "core/integrate/model_choice.hpp"
@@ -158,7 +159,9 @@ RungeKuttaRun::Outcome RungeKuttaRun::attempt(double h, bool adaptive, bool exac
   if (!adaptive) return step_.y_hat.allFinite() ? Outcome::accepted : Outcome::failed;
   error = error_of_step();
   if (!std::isfinite(error)) return Outcome::failed;
-  if (error > 1 && passage_ && passage_->near(step_.t, h)) error = std::min(error, error_after_projection());
+  projected_out_ = 0;
+  if (error > 1 && passage_ && passage_->near(step_.t, h))
+    projected_out_ = std::exchange(error, std::min(error, error_after_projection()));
   if (error > 1) return Outcome::rejected;
   if (implicit_ && exact) {
     if (!solve_stages(Goal::polish)) return Outcome::unsolved;
@@ -451,6 +454,10 @@ void RungeKuttaRun::reject(Outcome outcome, Course& course) {
 bool RungeKuttaRun::credible(Course& course) {
   SimulationResult& result = course.result;
   ++result.statistics.steps;
+  if (projected_out_ > result.statistics.projected_error) {
+    result.statistics.projected_error = projected_out_;
+    result.statistics.projected_error_time = step_.t;
+  }
   result.steps.times.push_back(step_.t);
   result.steps.sizes.push_back(course.h);
   course.longest = std::max(course.longest, course.h);

@@ -77,6 +77,7 @@ class RungeKuttaRun {
   LaneRows error_, projected_error_;
   Step step_;
   Eigen::VectorXd angles_, work_, ydot_, y_stage_;
+  double projected_out_ = 0;  // of the error of the last attempt, in tolerances
   bool first_stage_known_ = false;
   long evaluations_ = 0;
   double projected_ = 0, moved_ = 0;  // sums over the steps, of velocities by penalties

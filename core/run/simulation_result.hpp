@@ -56,6 +56,9 @@ struct SimulationStatistics {
   // by CVODES, which controls this error).
   QuadratureError quadrature, extreme_quadrature, gradient_quadrature;
   std::vector<Jump> jumps;  // in runs with derivatives
+  // The largest error of a step near a singular position that its projection took out, in tolerances, and when [s]:
+  // states within such steps are not projected.
+  double projected_error = 0, projected_error_time = 0;
 };
 
 enum class SimulationStatus {

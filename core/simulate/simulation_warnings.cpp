@@ -15,6 +15,7 @@ constexpr double kUnmet = 1e-5;            // of the accelerations of the constr
 constexpr double kTakenOut = 1e-4;         // by projections: those of the integration errors are of the order of rtol
 constexpr double kEnergyLost = 1e-2;       // of the largest energy
 constexpr double kUnresolved = 3e-2;       // of the integral of a running cost's size; estimates are pessimistic
+constexpr double kWithinSteps = 100;       // tolerances: two of the digits that were asked for
 constexpr double kLargePenalty = 3e10;     // above it rounding by Cholesky passes 1e-5 of the accelerations
 constexpr double kDigitsPerAlpha = 1e-16;  // docs/formulations.md, measured
 
@@ -110,6 +111,12 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
   add_unresolved(statistics.quadrature, "the running cost", "its integral");
   add_unresolved(statistics.extreme_quadrature, "the peaks", "the integral of their exponential");
   add_unresolved(statistics.gradient_quadrature, "the derivative of the integrand", "the gradient");
+  if (statistics.projected_error > kWithinSteps)
+    warnings.push_back(fmt::format(
+        "near t = {:.6g} s the mechanism comes close to a singular position: states between the ends of steps there, "
+        "as in rows of the trajectory and in sampled values, may be off by {:.1g} of their size. A smaller "
+        "simulation.integrator.max_step helps",
+        statistics.projected_error_time, statistics.projected_error * settings.integrator.rtol));
   for (const Jump& jump : statistics.jumps) warnings.push_back(in_words(scene, jump));
   return warnings;
 }
