@@ -10,9 +10,12 @@ from scene import Scene
 # Warnings of the program that say its motion may be off by more than usual.
 DOUBT = re.compile(r"singular|energy changed|came apart|accelerations of the constraints|not resolve|stability|stiff|"
                    r"zero length|cannot change|not smooth|jump|peak|disagree|rounding|has no (mass|inertia)|"
-                   r"faster than|penalty|contradict", re.IGNORECASE)
-# Of these, the ones that explain why two sweeps or models differentiate the same steps differently.
-SWEEP_DOUBT = re.compile(r"rounding|masses differ|cannot change|penalty|contradict", re.IGNORECASE)
+                   r"faster than|penalty|contradict|not determined", re.IGNORECASE)
+# Of these, the ones that explain why two sweeps differentiate the same steps differently,
+SWEEP_DOUBT = re.compile(r"rounding|masses differ|cannot change|penalty|contradict|do not resolve the gradient",
+                         re.IGNORECASE)
+# and why two models do, whose steps may differ.
+STEP_DOUBT = re.compile(SWEEP_DOUBT.pattern + "|do not resolve|not determined", re.IGNORECASE)
 FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh", "pi")}
 
 
@@ -23,6 +26,7 @@ class Lab:
         self.explained = []
         self.end_time = float(self.problem["simulation"]["end_time"])
         self.length = self.body_length()
+        self.distance = 1 + self.farthest() / self.length  # what coordinates lose of lengths, in units of rounding
         self.write("scene", scene)
 
     def close(self):
@@ -71,6 +75,9 @@ class Lab:
             for name, definition in self.problem.get("definitions", {}).items():
                 text = re.sub(rf"\b{name}\b", f"({definition})", text)
         return float(eval(text.replace("^", "**"), {"__builtins__": {}}, FUNCTIONS | names))
+
+    def farthest(self):
+        return max((math.hypot(*map(self.number, body.get("position", []))) for body in self.problem["bodies"]), default=0)
 
     def body_length(self):
         """The longest arm of a body: its own points and its centre of mass."""

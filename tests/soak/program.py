@@ -13,6 +13,7 @@ from pathlib import Path
 HANG = 8.0  # [s] of processor time without an end
 STUCK = 60.0  # [s] without an end, whatever the processor did
 NUMBERLESS = re.compile(r"(?<![A-Za-z_])[-+]?(nan|inf)(?![A-Za-z_])", re.IGNORECASE)
+PROGRESS = re.compile(r"^.*: \S+ % after \d+ s$", re.MULTILINE)
 CLUMSY = re.compile(r"\S  \S|''|std::|terminate called|0x[0-9a-f]{6,}|\be\+308")
 
 
@@ -20,6 +21,7 @@ class Outcome:
     def __init__(self, command, code, out, err, folder):
         self.command, self.code, self.out, self.err, self.folder = command, code, out, err, folder
         self.complaints = []  # (kind, words)
+        self.slow = []  # its words of progress, where it was stopped because it took long
         self.result = self.read_result()
 
     def complain(self, kind, words):
@@ -78,7 +80,8 @@ class Outcome:
         for text, where in ((self.out, "standard output"), (self.err, "standard error")):
             if NUMBERLESS.search(text):
                 self.complain("no number", f"{where}: {line_of(NUMBERLESS, text)}")
-        for text in self.err.splitlines() + self.warnings:
+        sentences = [line for line in self.err.splitlines() if "   " not in line]  # no line of an optimiser's iterations
+        for text in sentences + self.warnings:
             if CLUMSY.search(text):
                 self.complain("words", text.strip()[:300])
         path = self.folder / "trajectory.csv"
@@ -108,13 +111,13 @@ class Program:
         self.path, self.patience = str(path), patience
 
     def run(self, command, file, folder, settings=(), arguments=()):
-        line = [self.path, command, str(file), "--out", str(folder), "--quiet", *arguments]
+        line = [self.path, command, str(file), "--out", str(folder), *arguments]
         for path, value in dict(settings).items():
             line += ["--set", f"{path}={value if isinstance(value, str) else json.dumps(value)}"]
         folder = Path(folder)
         for left in ("result.json", "trajectory.csv"):
             (folder / left).unlink(missing_ok=True)
-        start, told = time.monotonic(), command + "".join(" " + word for word in line[6:])
+        start, told = time.monotonic(), command + "".join(" " + word for word in line[5:])
         process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL)
         hung = False
         while True:
@@ -132,7 +135,9 @@ class Program:
         outcome = Outcome(told, process.returncode, out.decode(errors="replace"), err.decode(errors="replace"), folder)
         if hung:
             outcome.code = 130
-            outcome.complain("hang", f"no end within {HANG:g} s: {outcome.message[-200:]}")
+            outcome.slow = PROGRESS.findall(outcome.err)
+            if not outcome.slow:
+                outcome.complain("hang", f"no end and no word within {HANG:g} s: {outcome.message[-200:]}")
         else:
             outcome.look()
         return outcome

@@ -46,7 +46,8 @@ def examine(scene, program, chosen, folder):
                 found = check(lab)
                 failures[check] = lab.complaints()[seen:] + (found if base.ok else [])
                 seen = len(lab.complaints())
-        told = {"refused": "" if base.ok else f"{base.code}: {base.message}", "explained": lab.explained}
+        told = {"refused": "" if base.ok else f"{base.code}: {base.message}", "explained": lab.explained,
+                "slow": [f"{run.command}: {run.slow[-1]}" for run in lab.outcomes.values() if run.slow]}
         return {check: found for check, found in failures.items() if found}, told
     finally:
         lab.close()
@@ -109,7 +110,7 @@ def replay(options):
 
 
 def campaign(options):
-    held, refused, explained = 0, Counter(), Counter()
+    held, refused, explained, slow = 0, Counter(), Counter(), Counter()
     if oracle.missing():
         print(f"without the second solver: {oracle.missing()}")
     seeds = range(options.first, options.first + options.count)
@@ -120,9 +121,11 @@ def campaign(options):
             say(failures, f"seed {seed}", about.split(": ", 1)[-1])
             refused[told["refused"][:90]] += bool(told["refused"])
             explained.update({words[:90] for words in told["explained"]})
+            slow.update(words[:90] for words in told["slow"])
             if k % 100 == 0:
                 print(f"{k} of {options.count} tried, {held} held", file=sys.stderr, flush=True)
-    for title, counter in (("refused in words", +refused), ("disagreements that a warning explains", explained)):
+    for title, counter in (("refused in words", +refused), ("disagreements that a warning explains", explained),
+                           ("runs of more than 8 s that say how far they are", slow)):
         print(f"{title}: {sum(counter.values())}")
         for words, count in counter.most_common(12):
             print(f"  {count} x {words}")
