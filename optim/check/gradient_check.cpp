@@ -217,16 +217,16 @@ class Check {
           free_error_(i, k) += e.psi_rho(i, k) + std::max(e.psi(i), jump_(i, k)) / free_step_(i, k);
   }
 
-  // Rounding scatters psi and its derivatives over points that are a few units in the last place apart. Each side of
-  // rho is looked at alone, since a kink at rho parts the sides and is no rounding. This runs only if something
-  // disagrees.
+  // Rounding scatters psi and its derivatives over points that are some units in the last place apart: a few, or some
+  // 10^4, which coordinates at 1 km take for one. Each side of rho is looked at alone, since a kink at rho parts the
+  // sides and is no rounding. This runs only if something disagrees.
   void measure_rounding() {
     psi_rounding_ = kPsiRounding * result_.psi.cwiseAbs();
-    for (const double side : {1.0, -1.0}) {
+    for (const double unit : {kEpsilon, -kEpsilon, 1e4 * kEpsilon, -1e4 * kEpsilon}) {
       for (const GradientMethod method : {GradientMethod::tlm, GradientMethod::adjoint}) {
         std::optional<Evaluation> first;
         for (const double units : {8.0, 12.0, 16.0}) {
-          const Evaluation e = tlm_.gradients_on(steps_, rho_ + side * units * kEpsilon * size_, method);
+          const Evaluation e = tlm_.gradients_on(steps_, rho_ + units * unit * size_, method);
           result_.simulations += e.simulations;
           if (!e.ok) continue;
           if (!first) {
@@ -234,7 +234,8 @@ class Check {
             continue;
           }
           rounding_ = rounding_.cwiseMax((e.psi_rho - first->psi_rho).cwiseAbs());
-          psi_rounding_ = psi_rounding_.cwiseMax((e.psi - first->psi).cwiseAbs());
+          const VectorXd slope = first->psi_rho * (e.rho - first->rho);
+          psi_rounding_ = psi_rounding_.cwiseMax((e.psi - first->psi - slope).cwiseAbs());
         }
       }
     }
