@@ -59,7 +59,7 @@ class Lab:
 
     def doubts(self, *outcomes, about=DOUBT):
         """What the program itself said against its numbers; remembered as an explanation."""
-        words = [warning for outcome in outcomes for warning in outcome.warnings if about.search(warning)]
+        words = [words for outcome in outcomes for words in outcome.warnings + [outcome.message] if about.search(words)]
         self.explained += words[:1]
         return bool(words)
 
