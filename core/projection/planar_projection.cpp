@@ -8,8 +8,6 @@
 namespace mbsopt {
 namespace {
 
-constexpr Refinements kOnePlanarPass{};  // every use is inside an iteration that refines
-
 Eigen::VectorXd alpha_in_plane(const MechanismData& data) {
   Eigen::VectorXd alpha(static_cast<Eigen::Index>(data.planar->rows.size()));
   data.planar->gather(data.row_alpha, alpha);
@@ -36,13 +34,14 @@ PlanarProjector::PlanarProjector(const MechanismData& data)
   const std::size_t n = at(data.n);
   const Eigen::Index m = rows_.count();
   bodies_.resize(n + 1), frames_.resize(n + 1), frames_tilde_.resize(n + 1), dual_frames_.resize(n + 1);
-  for (auto* x : {&delta_, &u_, &b_, &x_, &dx_, &r_, &Ex_}) x->resize(n);
-  for (Eigen::VectorXd* x : {&nu_, &kappa_, &phi_, &g_, &dnu_, &mu_}) x->setZero(m);
+  for (auto* x : {&delta_, &u_, &b_, &x_, &corrections_.r, &corrections_.dx, &corrections_.Ex}) x->resize(n);
+  for (Eigen::VectorXd* x : {&nu_, &kappa_, &phi_, &g_, &mu_, &corrections_.rg, &corrections_.dnu}) x->setZero(m);
   angles_.setZero(static_cast<Eigen::Index>(data.angles.size()));
   shifts_.resize(n + 1), still_.resize(n + 1), bars_.resize(n + 1), q_bar_.resize(n + 1), v_bar_.resize(n + 1);
   load_dirs_.resize(n + 1);
-  for (auto* x : {&q_dir_, &v_dir_, &b_lanes_, &x_lanes_, &dx_lanes_, &r_lanes_, &Ex_lanes_}) x->resize(n);
-  for (LaneRows* x : {&dirs_.phi, &dirs_.phi_dot, &dirs_.phi_ddot, &g_lanes_, &nu_lanes_, &rg_lanes_, &dnu_lanes_}) {
+  auto& lanes = corrections_of_lanes_;
+  for (auto* x : {&q_dir_, &v_dir_, &b_lanes_, &x_lanes_, &lanes.r, &lanes.dx, &lanes.Ex}) x->resize(n);
+  for (LaneRows* x : {&dirs_.phi, &dirs_.phi_dot, &dirs_.phi_ddot, &g_lanes_, &nu_lanes_, &lanes.rg, &lanes.dnu}) {
     x->setZero(m, kLanes);
   }
 }
@@ -61,10 +60,10 @@ void PlanarProjector::set_hat(const Eigen::VectorXd& y_hat) {
   }
 }
 
-void PlanarProjector::set_positions(const std::vector<Vec<3>>& delta) {
+void PlanarProjector::set_positions() {
   for (std::size_t k = 1; k < bodies_.size(); ++k) {
     Body& b = bodies_[k];
-    const Vec<3>& d = delta[k - 1];
+    const Vec<3>& d = delta_[k - 1];
     const double half = 0.5 * d(2), norm2 = 1 + half * half;
     b.r = b.r_hat + Plane{d(0), d(1)};
     b.P = (1 / std::sqrt(norm2)) * (Plane{1, half} * b.P_tilde);
@@ -74,12 +73,12 @@ void PlanarProjector::set_positions(const std::vector<Vec<3>>& delta) {
   }
 }
 
-void PlanarProjector::set_velocities(const std::vector<Vec<3>>& u) {
+void PlanarProjector::set_velocities() {
   for (std::size_t k = 1; k < bodies_.size(); ++k) {
     Body& b = bodies_[k];
     b.w_n = 2 * cross(b.P, b.Pdot_hat);
-    b.w = b.w_n + u[k - 1](2);
-    frames_[k].rdot = b.rdot + Plane{u[k - 1](0), u[k - 1](1)};
+    b.w = b.w_n + u_[k - 1](2);
+    frames_[k].rdot = b.rdot + Plane{u_[k - 1](0), u_[k - 1](1)};
     set_frame(frames_[k].A, b.w, frames_[k]);
   }
 }
@@ -93,46 +92,19 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
   const double q_size = std::max(1.0, y_hat.head(half).cwiseAbs().maxCoeff()),
                v_size = std::max(1.0, y_hat.tail(half).cwiseAbs().maxCoeff());
   for (Vec<3>& d : delta_) d.setZero();
-  nu_.setZero();
-  set_positions(delta_);
-  double before = INFINITY, now = 0;
-  for (int k = 0; k < kMostProjectionIterations && rows_.count() > 0; ++k) {
-    constraints_.phi(frames_, laws_, angles, phi_);
-    now = phi_.cwiseAbs().maxCoeff();
-    if (!std::isfinite(now)) return false;
-    if (now < kProjectionRounding * q_size || (k > 1 && now > 0.95 * before))
-      break;  // rounding reached, or a singular position
-    before = now;
-    for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, delta_[at(i - 1)]);
-    solver_.rows().subtract_transposed_times(nu_, b_);
-    g_ = -phi_;
-    solver_.solve(b_, g_, kOnePlanarPass, dx_, dnu_);
-    for (std::size_t i = 0; i < dx_.size(); ++i) delta_[i] += dx_[i];
-    nu_ += dnu_;
-    set_positions(delta_);
-  }
-  if (now > kUnmetPosition * q_size) return false;
+  set_positions();
+  const auto phi = [&](Eigen::VectorXd& out) { constraints_.phi(frames_, laws_, angles, out); };
+  if (!onto_constraints(solver_, solver_.rows(), q_size, kUnmetPosition, delta_, nu_, corrections_, phi,
+                        [&](const auto&) { set_positions(); }))
+    return false;
 
   for (Vec<3>& u : u_) u.setZero();
-  kappa_.setZero();
-  set_velocities(u_);
+  set_velocities();
   rows_.evaluate(frames_);
-  before = INFINITY, now = 0;
-  for (int k = 0; k < kMostProjectionIterations && rows_.count() > 0; ++k) {
-    constraints_.phi_dot(frames_, laws_, phi_);
-    now = phi_.cwiseAbs().maxCoeff();
-    if (!std::isfinite(now)) return false;
-    if (now < kProjectionRounding * v_size || (k > 1 && now > 0.95 * before)) break;
-    before = now;
-    for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, u_[at(i - 1)]);
-    rows_.subtract_transposed_times(kappa_, b_);
-    g_ = -phi_;
-    solver_.solve(b_, g_, kOnePlanarPass, dx_, dnu_);
-    kappa_ += dnu_;
-    for (std::size_t i = 0; i < dx_.size(); ++i) u_[i] += dx_[i];
-    set_velocities(u_);
-  }
-  if (now > kUnmetVelocity * v_size) return false;
+  const auto phi_dot = [&](Eigen::VectorXd& out) { constraints_.phi_dot(frames_, laws_, out); };
+  if (!onto_constraints(solver_, rows_, v_size, kUnmetVelocity, u_, kappa_, corrections_, phi_dot,
+                        [&](const auto&) { set_velocities(); }))
+    return false;
 
   y = y_hat;
   bool finite = true;
@@ -154,7 +126,7 @@ bool PlanarProjector::project(double t, const Eigen::VectorXd& angles, const Eig
 }
 
 void PlanarProjector::response(Eigen::VectorXd& out) {
-  constraint_response(solver_, test_load<3>, kProjectionAlpha, b_, g_, dx_, dnu_, out);
+  constraint_response(solver_, test_load<3>, kProjectionAlpha, b_, g_, corrections_.dx, corrections_.dnu, out);
 }
 
 // The bodies and frames of a given state.
@@ -200,54 +172,15 @@ bool PlanarProjector::linearise(double t, const Eigen::VectorXd& angles, const E
   if (!solver_.factor(frames_tilde_)) return false;
   for (std::size_t i = 0; i < delta_.size(); ++i) delta_[i] = s.delta[i].head<3>(), u_[i] = s.u[i].head<3>();
   model_.gather(s.nu, nu_), model_.gather(s.kappa, kappa_);
-  set_positions(delta_);
-  set_velocities(u_);
+  set_positions();
+  set_velocities();
   rows_.evaluate(frames_);
   return true;
 }
 
-// Solves, with J~ = J(q~) and J = J(q) (its columns of turns times E = d theta/d delta at the position level),
-//   [ M  J~' ] or, transposed,  [ M  E J' ]        (velocity level: [ M J'; J 0 ], symmetric)
-//   [ JE  0  ]                  [ J~  0   ]
-// by x += K (rhs - B x) with K the approximate inverse that the factor of S(q~) gives. directions: what x adds to,
-// against which its rounding counts.
-template <class X, class Y>
-void PlanarProjector::refine(Level level, bool transposed, const Sizes<X>& directions, const std::vector<X>& b,
-                             const Y& g, std::vector<X>& x, Y& nu, std::vector<X>& r, std::vector<X>& dx,
-                             std::vector<X>& Ex, Y& rg, Y& dnu) const {
-  solver_.solve(b, g, kOnePlanarPass, x, nu);
-  if (rows_.count() == 0) return;
-  const bool position = level == Level::position;
-  const auto turn_by_E = [&](std::vector<X>& of) {
-    for (std::size_t i = 0; i < of.size(); ++i) of[i].row(2) *= bodies_[i + 1].turn_by_delta;
-  };
-  Sizes<X> before = largest(x);
-  const Sizes<X> size = before.max(directions);
-  for (int k = 0; k < kMostRefinements; ++k) {
-    for (int i = 1; i <= data_.n; ++i) r[at(i - 1)] = b[at(i - 1)] - solver_.mass_times(i, x[at(i - 1)]);
-    rg = g;
-    if (position && !transposed) {
-      solver_.rows().subtract_transposed_times(nu, r);
-      Ex = x;
-      turn_by_E(Ex);
-      rows_.subtract_times(Ex, rg);
-    } else if (position) {
-      for (X& e : Ex) e.setZero();
-      rows_.subtract_transposed_times(nu, Ex);
-      turn_by_E(Ex);
-      for (std::size_t i = 0; i < r.size(); ++i) r[i] += Ex[i];
-      solver_.rows().subtract_times(x, rg);
-    } else {
-      rows_.subtract_transposed_times(nu, r);
-      rows_.subtract_times(x, rg);
-    }
-    solver_.solve(r, rg, kOnePlanarPass, dx, dnu);
-    for (std::size_t i = 0; i < x.size(); ++i) x[i] += dx[i];
-    nu += dnu;
-    const auto now = largest(dx);
-    if ((now * now <= kNegligibleRefinement * size * before).all()) return;
-    before = now;
-  }
+template <class X>
+void PlanarProjector::turn_by_E(std::vector<X>& x) const {
+  for (std::size_t i = 0; i < x.size(); ++i) x[i].row(2) *= bodies_[i + 1].turn_by_delta;
 }
 
 void PlanarProjector::set_b(const ParameterBlock& block, const std::vector<Vec<3>>& x) {
@@ -267,6 +200,7 @@ void PlanarProjector::set_b(const ParameterBlock& block, const std::vector<Vec<3
 void PlanarProjector::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) {
   using Order = PlanarConstraints::Order;
   using Lane = LaneDual::Lane;
+  const auto E = [&](std::vector<Lanes<3>>& x, bool) { turn_by_E(x); };
   const Eigen::Index half = 7 * data_.n;
   // A frame's place along the direction of (r, theta).
   const auto place = [](const Plane& r, const Plane& A, const Lanes<3>& dir, PlanarFrame<LaneDual>& f) {
@@ -291,8 +225,8 @@ void PlanarProjector::tangent(const ParameterBlock& block, const LaneRows& y_hat
   for (std::size_t k = 1; k < bodies_.size(); ++k) place(bodies_[k].r, frames_[k].A, q_dir_[k - 1], dual_frames_[k]);
   constraints_.tangents(Order::phi, dual_frames_, laws_, angles_, block, nu_, dirs_, load_dirs_);
   g_lanes_ = -dirs_.phi;
-  refine(Level::position, false, largest(q_dir_), b_lanes_, g_lanes_, x_lanes_, nu_lanes_, r_lanes_, dx_lanes_,
-         Ex_lanes_, rg_lanes_, dnu_lanes_);
+  refine(solver_, rows_, ProjectionLevel::position, false, largest(q_dir_), b_lanes_, g_lanes_, x_lanes_, nu_lanes_,
+         corrections_of_lanes_, E);
   for (std::size_t k = 1; k < bodies_.size(); ++k) {
     x_lanes_[k - 1].row(2) *= bodies_[k].turn_by_delta;
     q_dir_[k - 1] += x_lanes_[k - 1];
@@ -318,8 +252,8 @@ void PlanarProjector::tangent(const ParameterBlock& block, const LaneRows& y_hat
     constraints_.tangents(Order::phi_dot, dual_frames_, laws_, angles_, block, kappa_, dirs_, load_dirs_);
     set_b(block, u_);
     g_lanes_ = -dirs_.phi_dot;
-    refine(Level::velocity, false, largest(v_dir_), b_lanes_, g_lanes_, x_lanes_, nu_lanes_, r_lanes_, dx_lanes_,
-           Ex_lanes_, rg_lanes_, dnu_lanes_);
+    refine(solver_, rows_, ProjectionLevel::velocity, false, largest(v_dir_), b_lanes_, g_lanes_, x_lanes_, nu_lanes_,
+           corrections_of_lanes_, E);
     for (std::size_t i = 0; i < v_dir_.size(); ++i) v_dir_[i] += x_lanes_[i];
   }
 
@@ -356,6 +290,7 @@ void PlanarProjector::add_mass_bar(const std::vector<Vec<3>>& eta, const std::ve
 void PlanarProjector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,
                                   Eigen::VectorXd& rho_bar) {
   const Eigen::Index half = 7 * data_.n;
+  const auto E = [&](std::vector<Vec<3>>& x, bool) { turn_by_E(x); };
   // A gradient in the turn and its rate from one in A and Adot = i w A.
   const auto theta_of = [](const PlanarFrame<double>& f, const PlanarFrameBar& bar) {
     return dot(bar.A, times_i(f.A)) + dot(bar.Adot, times_i(f.Adot));
@@ -380,7 +315,8 @@ void PlanarProjector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd&
   if (rows_.count() > 0) {
     for (std::size_t k = 1; k < bodies_.size(); ++k) b_[k - 1] << v_bar_[k].r.re, v_bar_[k].r.im, v_bar_[k].theta;
     g_.setZero();
-    refine(Level::velocity, true, Sizes<Vec<3>>::Zero(), b_, g_, x_, mu_, r_, dx_, Ex_, phi_, dnu_);
+    refine(solver_, rows_, ProjectionLevel::velocity, true, LargestEntries<Vec<3>>::Zero(), b_, g_, x_, mu_,
+           corrections_, E);
     for (PlanarFrameBar& bar : bars_) bar = {};
     shift(x_);
     constraints_.add_pull_back(frames_, shifts_, laws_, angles_, {&kappa_, nullptr, &mu_, nullptr}, -1, bars_,
@@ -405,7 +341,8 @@ void PlanarProjector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd&
       b_[k - 1] << q_bar_[k].r.re, q_bar_[k].r.im, bodies_[k].turn_by_delta * q_bar_[k].theta;
     }
     g_.setZero();
-    refine(Level::position, true, Sizes<Vec<3>>::Zero(), b_, g_, x_, mu_, r_, dx_, Ex_, phi_, dnu_);
+    refine(solver_, rows_, ProjectionLevel::position, true, LargestEntries<Vec<3>>::Zero(), b_, g_, x_, mu_,
+           corrections_, E);
     for (PlanarFrameBar& bar : bars_) bar = {};
     constraints_.add_pull_back(frames_, still_, laws_, angles_, {nullptr, &mu_, nullptr, nullptr}, -1, bars_, theta_bar,
                                rho_bar);

@@ -11,7 +11,7 @@
 
 #include "core/dynamics/planar_bodies.hpp"
 #include "core/dynamics/saddle_solver.hpp"
-#include "core/projection/projection_solution.hpp"
+#include "core/projection/projection_iterations.hpp"
 
 namespace mbsopt {
 
@@ -39,18 +39,14 @@ class PlanarProjector {
     Plane rdot;
     double w_n = 0, w = 0;
   };
-  enum class Level { position, velocity };
 
   void set_hat(const Eigen::VectorXd& y_hat);
-  void set_positions(const std::vector<Vec<3>>& delta);
-  void set_velocities(const std::vector<Vec<3>>& u);
+  void set_positions();   // of delta_
+  void set_velocities();  // of u_
   void read(const Eigen::VectorXd& y);
-  // The largest entry of each direction.
+  // Of turns times d theta/d delta_theta.
   template <class X>
-  using Sizes = Eigen::Array<double, 1, X::ColsAtCompileTime>;
-  template <class X, class Y>
-  void refine(Level level, bool transposed, const Sizes<X>& directions, const std::vector<X>& b, const Y& g,
-              std::vector<X>& x, Y& nu, std::vector<X>& r, std::vector<X>& dx, std::vector<X>& Ex, Y& rg, Y& dnu) const;
+  void turn_by_E(std::vector<X>& x) const;
   // b = -M' x - (J'nu)' in the directions of the parameters, load_dirs_ holding (J'nu)'.
   void set_b(const ParameterBlock& block, const std::vector<Vec<3>>& x);
   void add_mass_bar(const std::vector<Vec<3>>& eta, const std::vector<Vec<3>>& x, Eigen::VectorXd& theta_bar) const;
@@ -58,16 +54,17 @@ class PlanarProjector {
   const MechanismData& data_;
   const PlanarModel& model_;
   const PlanarBodies bodies_in_y_;
-  mutable PlanarSaddleSolver solver_;  // factor of S(q~); a solve changes its scratch only
-  PlanarRows rows_;                    // J at the projected q
+  PlanarSaddleSolver solver_;  // factor of S(q~)
+  PlanarRows rows_;            // J at the projected q
   PlanarConstraints constraints_;
   RowLaws laws_;
   Eigen::VectorXd angles_;
 
   std::vector<Body> bodies_;
   PlanarConstraints::Frames frames_, frames_tilde_;
-  std::vector<Vec<3>> delta_, u_, b_, x_, dx_, r_, Ex_;
-  Eigen::VectorXd nu_, kappa_, phi_, g_, dnu_, mu_;
+  std::vector<Vec<3>> delta_, u_, b_, x_;
+  Eigen::VectorXd nu_, kappa_, phi_, g_, mu_;
+  Corrections<Vec<3>, Eigen::VectorXd> corrections_;
   std::vector<PlanarShift> shifts_, still_;
   std::vector<PlanarFrameBar> bars_;
   struct PositionBar {
@@ -77,9 +74,10 @@ class PlanarProjector {
   std::vector<PositionBar> q_bar_, v_bar_;
   // Lanes.
   PlanarConstraints::DualFrames dual_frames_;
-  std::vector<Lanes<3>> q_dir_, v_dir_, load_dirs_, b_lanes_, x_lanes_, dx_lanes_, r_lanes_, Ex_lanes_;
+  std::vector<Lanes<3>> q_dir_, v_dir_, load_dirs_, b_lanes_, x_lanes_;
   ConstraintTangents dirs_;
-  LaneRows g_lanes_, nu_lanes_, rg_lanes_, dnu_lanes_;
+  LaneRows g_lanes_, nu_lanes_;
+  Corrections<Lanes<3>, LaneRows> corrections_of_lanes_;
 };
 
 }  // namespace mbsopt

@@ -9,11 +9,6 @@
 #include "core/projection/constraint_response.hpp"
 
 namespace mbsopt {
-namespace {
-
-constexpr SaddleSolver::Settings kOnePass{};  // every use is inside an iteration that refines
-
-}  // namespace
 
 Projector::Projector(const Mechanism& mechanism, Projection what, Model model)
     : mechanism_(mechanism),
@@ -27,17 +22,18 @@ Projector::Projector(const Mechanism& mechanism, Projection what, Model model)
   const Eigen::Index m = data_.m;
   bodies_.resize(n + 1);
   states_.resize(n + 1), states_tilde_.resize(n + 1), frames_.resize(n + 1), frames_tilde_.resize(n + 1);
-  for (Eigen::VectorXd* x : {&phi_, &g_, &dnu_, &mu_}) x->setZero(m);
+  for (Eigen::VectorXd* x : {&phi_, &g_, &mu_, &corrections_.rg, &corrections_.dnu}) x->setZero(m);
   angles_.setZero(static_cast<Eigen::Index>(data_.angles.size()));
   scratch_y_.setZero(14 * data_.n);
   q_bar_.setZero(7 * data_.n), v_bar_.setZero(7 * data_.n);
-  for (auto* x : {&b_, &x_, &dx_, &r_, &Ex_}) x->resize(n);
+  for (auto* x : {&b_, &x_, &corrections_.r, &corrections_.dx, &corrections_.Ex}) x->resize(n);
   bars_.resize(n + 1);
   frame_dirs_.resize(n + 1);
   for (FrameTangent& t : frame_dirs_) t.set_zero();
   loads_.resize(n + 1);
-  for (auto* x : {&b_lanes_, &x_lanes_, &dx_lanes_, &r_lanes_, &Ex_lanes_}) x->resize(n);
-  for (LaneRows* x : {&dirs_.phi, &dirs_.phi_dot, &dirs_.phi_ddot, &g_lanes_, &nu_lanes_, &rg_lanes_, &dnu_lanes_}) {
+  auto& lanes = corrections_of_lanes_;
+  for (auto* x : {&b_lanes_, &x_lanes_, &lanes.r, &lanes.dx, &lanes.Ex}) x->resize(n);
+  for (LaneRows* x : {&dirs_.phi, &dirs_.phi_dot, &dirs_.phi_ddot, &g_lanes_, &nu_lanes_, &lanes.rg, &lanes.dnu}) {
     x->setZero(m, kLanes);
   }
 }
@@ -93,66 +89,38 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
   set_frames(scratch_y_, nullptr, states_tilde_, frames_tilde_);
   if (!solver_.factor(frames_tilde_)) return false;
 
-  for (Vec<6>& d : s.delta) d.setZero();
-  s.nu.setZero();
-  set_q(s.delta, y);
-  set_frames(y, nullptr, states_, frames_);
   const Eigen::Index half = 7 * data_.n;
   const double q_size = std::max(1.0, y_hat.head(half).cwiseAbs().maxCoeff()),
                v_size = std::max(1.0, y_hat.tail(half).cwiseAbs().maxCoeff());
-  if (positions() && data_.m > 0) {
-    double before = INFINITY, now = 0;
-    for (int k = 0; k < kMostProjectionIterations; ++k) {
-      evaluate_phi(data_, frames_, laws_, angles, phi_);
-      now = phi_.cwiseAbs().maxCoeff();
-      if (!std::isfinite(now)) return false;
-      if (now < kProjectionRounding * q_size || (k > 1 && now > 0.95 * before))
-        break;  // rounding reached, or a singular position
-      before = now;
-      // [M J'; J 0] (d delta, d nu) = -(M delta + J'nu, Phi)
-      for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, s.delta[at(i - 1)]);
-      solver_.rows().subtract_transposed_times(s.nu, b_);
-      g_ = -phi_;
-      solver_.solve(b_, g_, kOnePass, dx_, dnu_);
-      for (std::size_t i = 0; i < dx_.size(); ++i) s.delta[i] += dx_[i];
-      s.nu += dnu_;
-      set_q(s.delta, y);
-      set_frames(y, nullptr, states_, frames_);
-    }
-    if (now > kUnmetPosition * q_size) return false;
-  }
+  const auto place = [&](const auto&) {
+    set_q(s.delta, y);
+    set_frames(y, nullptr, states_, frames_);
+  };
+  for (Vec<6>& d : s.delta) d.setZero();
+  s.nu.setZero();
+  place(s.delta);
+  const auto phi = [&](Eigen::VectorXd& out) { evaluate_phi(data_, frames_, laws_, angles, out); };
+  if (positions() && !onto_constraints(solver_, solver_.rows(), q_size, kUnmetPosition, s.delta, s.nu, corrections_,
+                                       phi, place))
+    return false;
 
   for (int i = 1; i <= data_.n; ++i) {
     const Body& b = bodies_[at(i)];
     y.segment<3>(half + 7 * (i - 1)) = y_hat.segment<3>(half + 7 * (i - 1));
     y.segment<4>(half + 7 * (i - 1) + 3) = b.pdot_hat - b.p * (b.p.dot(b.pdot_hat) / b.p.squaredNorm());
   }
-  for (Vec<6>& u : s.u) u.setZero();
-  s.kappa.setZero();
-  if (data_.m == 0) return y.allFinite();
   rows_.evaluate(frames_);
-  double before = INFINITY, now = 0;
-  for (int k = 0; k < kMostProjectionIterations; ++k) {
-    set_frames(y, &y, states_, frames_);
-    evaluate_phi_dot(data_, frames_, laws_, phi_);
-    now = phi_.cwiseAbs().maxCoeff();
-    if (!std::isfinite(now)) return false;
-    if (now < kProjectionRounding * v_size || (k > 1 && now > 0.95 * before)) break;
-    before = now;
-    for (int i = 1; i <= data_.n; ++i) b_[at(i - 1)] = -solver_.mass_times(i, s.u[at(i - 1)]);
-    rows_.subtract_transposed_times(s.kappa, b_);
-    g_ = -phi_;
-    solver_.solve(b_, g_, kOnePass, dx_, dnu_);
-    s.kappa += dnu_;
+  set_frames(y, &y, states_, frames_);
+  const auto phi_dot = [&](Eigen::VectorXd& out) { evaluate_phi_dot(data_, frames_, laws_, out); };
+  const auto move = [&](const std::vector<Vec<6>>& du) {
     for (int i = 1; i <= data_.n; ++i) {
-      const Vec<6>& du = dx_[at(i - 1)];
-      s.u[at(i - 1)] += du;
-      y.segment<3>(half + 7 * (i - 1)) += du.head<3>();
-      y.segment<4>(half + 7 * (i - 1) + 3) += 0.5 * G_transposed_times(bodies_[at(i)].p, du.tail<3>());
+      y.segment<3>(half + 7 * (i - 1)) += du[at(i - 1)].head<3>();
+      y.segment<4>(half + 7 * (i - 1) + 3) += 0.5 * G_transposed_times(bodies_[at(i)].p, du[at(i - 1)].tail<3>());
     }
-  }
-  if (now > kUnmetVelocity * v_size) return false;
-  return y.allFinite();
+    set_frames(y, &y, states_, frames_);
+  };
+  return onto_constraints(solver_, rows_, v_size, kUnmetVelocity, s.u, s.kappa, corrections_, phi_dot, move) &&
+         y.allFinite();
 }
 
 void Projector::response(Eigen::VectorXd& out) {
@@ -161,7 +129,7 @@ void Projector::response(Eigen::VectorXd& out) {
   const auto load = [&](int i) {
     return data_.planar ? PlanarBodies(*data_.planar).in_space(at(i), test_load<3>(i)) : test_load<6>(i);
   };
-  constraint_response(solver_, load, kProjectionAlpha, b_, g_, dx_, dnu_, out);
+  constraint_response(solver_, load, kProjectionAlpha, b_, g_, corrections_.dx, corrections_.dnu, out);
 }
 
 double Projector::position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y) {

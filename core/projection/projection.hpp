@@ -18,7 +18,7 @@
 #include "core/dynamics/saddle_solver.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/projection/planar_projection.hpp"
-#include "core/projection/projection_solution.hpp"
+#include "core/projection/projection_iterations.hpp"
 #include "core/scene/settings.hpp"
 
 namespace mbsopt {
@@ -60,20 +60,13 @@ class Projector {
     double norm_hat = 1, norm_pi = 1;
     Matrix3d E;  // d(virtual rotation at p)/d(delta_theta) = G(p) P G(p~)'/|pi|
   };
-  enum class Level { position, velocity };
 
   void set_frames(const Eigen::VectorXd& q_of, const Eigen::VectorXd* v_of, std::vector<BodyState>& states,
                   std::vector<Frame>& frames) const;
   void set_q(const std::vector<Vec<6>>& delta, Eigen::VectorXd& y);
   void prepare_bodies(const Eigen::VectorXd& y_hat);
-  // The largest entry of each direction.
   template <class X>
-  using Sizes = Eigen::Array<double, 1, X::ColsAtCompileTime>;
-  template <class X, class Y>
-  void refine(Level level, bool transposed, const Sizes<X>& directions, const std::vector<X>& b, const Y& g,
-              std::vector<X>& x, Y& nu, std::vector<X>& r, std::vector<X>& dx, Y& rg, Y& dnu);
-  template <class X>
-  void rotate_by_E(const std::vector<X>& x, std::vector<X>& out, bool transposed) const;
+  void turn_by_E(std::vector<X>& x, bool transposed) const;
 
   const Mechanism mechanism_;
   const MechanismData& data_;
@@ -88,15 +81,17 @@ class Projector {
   std::vector<Body> bodies_;
   std::vector<BodyState> states_, states_tilde_;
   std::vector<Frame> frames_, frames_tilde_;
-  Eigen::VectorXd phi_, g_, dnu_, mu_, scratch_y_;
-  std::vector<Vec<6>> b_, x_, dx_, r_, Ex_;
+  Eigen::VectorXd phi_, g_, mu_, scratch_y_;
+  std::vector<Vec<6>> b_, x_;
+  Corrections<Vec<6>, Eigen::VectorXd> corrections_;
   std::vector<FrameBar> bars_;
   Eigen::VectorXd q_bar_, v_bar_;
   // Lanes.
   std::vector<FrameTangent> frame_dirs_;
-  std::vector<Lanes<6>> loads_, b_lanes_, x_lanes_, dx_lanes_, r_lanes_, Ex_lanes_;
+  std::vector<Lanes<6>> loads_, b_lanes_, x_lanes_;
   ConstraintTangents dirs_;
-  LaneRows g_lanes_, nu_lanes_, rg_lanes_, dnu_lanes_;
+  LaneRows g_lanes_, nu_lanes_;
+  Corrections<Lanes<6>, LaneRows> corrections_of_lanes_;
 };
 
 }  // namespace mbsopt

@@ -9,11 +9,6 @@
 namespace mbsopt {
 namespace {
 
-constexpr SaddleSolver::Settings kOneSolution{};  // refine() refines
-
-// Each pass of refine() gains a factor of about the correction's size, or of 1/alpha times the ratio of masses that
-// meet.
-
 // p' of p = pi/|pi|, for one direction or lanes of pi'.
 template <class X>
 X normalised_direction(const Vector4d& p, double norm, const X& pi_dir) {
@@ -66,63 +61,11 @@ bool Projector::linearise(double t, const Eigen::VectorXd& angles, const Eigen::
 }
 
 template <class X>
-void Projector::rotate_by_E(const std::vector<X>& x, std::vector<X>& out, bool transposed) const {
+void Projector::turn_by_E(std::vector<X>& x, bool transposed) const {
   for (std::size_t i = 0; i < x.size(); ++i) {
-    out[i] = x[i];
     const Matrix3d& E = bodies_[i + 1].E;
-    if (transposed) {
-      out[i].template bottomRows<3>().noalias() = E.transpose() * x[i].template bottomRows<3>();
-    } else {
-      out[i].template bottomRows<3>().noalias() = E * x[i].template bottomRows<3>();
-    }
-  }
-}
-
-// Solves, with J~ = J(q~) and J = J(q) (times E at the position level),
-//   [ M  J~' ] or, transposed,  [ M  E'J' ]        (velocity level: [ M J'; J 0 ], symmetric)
-//   [ JE  0  ]                  [ J~  0   ]
-// by x += K (rhs - B x) with K the approximate inverse that the factor of S(q~) gives. directions: what x adds to,
-// against which its rounding counts.
-template <class X, class Y>
-void Projector::refine(Level level, bool transposed, const Sizes<X>& directions, const std::vector<X>& b, const Y& g,
-                       std::vector<X>& x, Y& nu, std::vector<X>& r, std::vector<X>& dx, Y& rg, Y& dnu) {
-  auto& Ex = [&]() -> std::vector<X>& {
-    if constexpr (X::ColsAtCompileTime == 1) {
-      return Ex_;
-    } else {
-      return Ex_lanes_;
-    }
-  }();
-  solver_.solve(b, g, kOneSolution, x, nu);
-  if (data_.m == 0) return;
-  const bool position = level == Level::position;
-  Sizes<X> before = largest(x);
-  const Sizes<X> size = before.max(directions);
-  for (int k = 0; k < kMostRefinements; ++k) {
-    for (int i = 1; i <= data_.n; ++i) r[at(i - 1)] = -solver_.mass_times(i, x[at(i - 1)]);
-    rg = g;
-    if (position && !transposed) {
-      solver_.rows().subtract_transposed_times(nu, r);
-      rotate_by_E(x, Ex, false);
-      rows_.subtract_times(Ex, rg);
-      for (std::size_t i = 0; i < r.size(); ++i) r[i] += b[i];
-    } else if (position) {
-      for (X& e : Ex) e.setZero();
-      rows_.subtract_transposed_times(nu, Ex);
-      rotate_by_E(Ex, dx, true);
-      for (std::size_t i = 0; i < r.size(); ++i) r[i] += dx[i] + b[i];
-      solver_.rows().subtract_times(x, rg);
-    } else {
-      rows_.subtract_transposed_times(nu, r);
-      rows_.subtract_times(x, rg);
-      for (std::size_t i = 0; i < r.size(); ++i) r[i] += b[i];
-    }
-    solver_.solve(r, rg, kOneSolution, dx, dnu);
-    for (std::size_t i = 0; i < x.size(); ++i) x[i] += dx[i];
-    nu += dnu;
-    const auto now = largest(dx);
-    if ((now * now <= kNegligibleRefinement * size * before).all()) return;
-    before = now;
+    const auto turns = x[i].template bottomRows<3>().eval();
+    x[i].template bottomRows<3>().noalias() = transposed ? (E.transpose() * turns).eval() : (E * turns).eval();
   }
 }
 
@@ -131,6 +74,7 @@ void Projector::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, 
   const int n = data_.n;
   const Eigen::Index half = 7 * n;
   const ProjectionSolution& s = *solution_;
+  const auto E = [&](std::vector<Lanes<6>>& x, bool transposed) { turn_by_E(x, transposed); };
   auto mass_directions = [&](const std::vector<Vec<6>>& x) {  // b = -M' x - (J'nu)', loads_ holding (J'nu)'
     for (int i = 1; i <= n; ++i) {
       const BodyData& body = data_.bodies[at(i)];
@@ -182,8 +126,8 @@ void Projector::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, 
     evaluate_field_tangents(data_, frames_, laws_, angles_, block, mu_, dirs_, loads_);
     g_lanes_ = -dirs_.phi;
     rows_.subtract_times(x_lanes_, g_lanes_);
-    refine(Level::position, false, largest(x_lanes_), b_lanes_, g_lanes_, x_lanes_, nu_lanes_, r_lanes_, dx_lanes_,
-           rg_lanes_, dnu_lanes_);
+    refine(solver_, rows_, ProjectionLevel::position, false, largest(x_lanes_), b_lanes_, g_lanes_, x_lanes_, nu_lanes_,
+           corrections_of_lanes_, E);
     for (int i = 1; i <= n; ++i) {
       const Body& b = bodies_[at(i)];
       const Lanes<6>& d = x_lanes_[at(i - 1)];
@@ -218,8 +162,9 @@ void Projector::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, 
   evaluate_tangents(data_, frames_, laws_, angles_, frame_dirs_, block, s.kappa, dirs_, loads_);
   mass_directions(s.u);
   g_lanes_ = -dirs_.phi_dot;
-  refine(Level::velocity, false, y_dir.bottomRows(half).cwiseAbs().colwise().maxCoeff().array(), b_lanes_, g_lanes_,
-         x_lanes_, nu_lanes_, r_lanes_, dx_lanes_, rg_lanes_, dnu_lanes_);
+  refine(solver_, rows_, ProjectionLevel::velocity, false,
+         LargestEntries<Lanes<6>>(y_dir.bottomRows(half).cwiseAbs().colwise().maxCoeff().array()), b_lanes_, g_lanes_,
+         x_lanes_, nu_lanes_, corrections_of_lanes_, E);
   for (int i = 1; i <= n; ++i) {
     const Lanes<6>& u = x_lanes_[at(i - 1)];
     y_dir.middleRows<3>(half + 7 * (i - 1)) += u.topRows<3>();
@@ -233,6 +178,7 @@ void Projector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat
   const int n = data_.n;
   const Eigen::Index half = 7 * n;
   const ProjectionSolution& s = *solution_;
+  const auto E = [&](std::vector<Vec<6>>& x, bool transposed) { turn_by_E(x, transposed); };
   auto add_mass = [&](const std::vector<Vec<6>>& eta, const std::vector<Vec<6>>& x) {  // -eta'M_theta x
     for (int i = 1; i <= n; ++i) {
       const BodyData& body = data_.bodies[at(i)];
@@ -256,7 +202,8 @@ void Projector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat
       b_[at(i - 1)].tail<3>() = 0.5 * G_times(bodies_[at(i)].p, v_bar_.segment<4>(7 * (i - 1) + 3));
     }
     g_.setZero();
-    refine(Level::velocity, true, Sizes<Vec<6>>::Zero(), b_, g_, x_, mu_, r_, dx_, phi_, dnu_);
+    refine(solver_, rows_, ProjectionLevel::velocity, true, LargestEntries<Vec<6>>::Zero(), b_, g_, x_, mu_,
+           corrections_, E);
     for (FrameBar& bar : bars_) bar.set_zero();
     for (int i = 1; i <= n; ++i) set_virtual(x_[at(i - 1)], frames_[at(i)]);
     add_pull_back(data_, frames_, laws_, angles_, {&s.kappa, nullptr, &mu_, nullptr}, -1, bars_, theta_bar, rho_bar);
@@ -296,7 +243,8 @@ void Projector::add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat
       b_[at(i - 1)].tail<3>() = 0.5 * G_times(bodies_[at(i)].p_tilde, pi_bar_of(i));
     }
     g_.setZero();
-    refine(Level::position, true, Sizes<Vec<6>>::Zero(), b_, g_, x_, mu_, r_, dx_, phi_, dnu_);
+    refine(solver_, rows_, ProjectionLevel::position, true, LargestEntries<Vec<6>>::Zero(), b_, g_, x_, mu_,
+           corrections_, E);
     add_pull_back(data_, frames_, laws_, angles_, {nullptr, &mu_, nullptr, nullptr}, -1, bars_, theta_bar, rho_bar);
     for (int i = 1; i <= n; ++i) {
       q_bar_.segment<7>(7 * (i - 1)) += pull_back_position(states_[at(i)], bars_[at(i)]);

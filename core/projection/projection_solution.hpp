@@ -17,8 +17,10 @@ inline constexpr double kNegligibleRefinement = 2e-15;
 
 // Largest entry of each direction.
 template <class X>
-Eigen::Array<double, 1, X::ColsAtCompileTime> largest(const std::vector<X>& x) {
-  Eigen::Array<double, 1, X::ColsAtCompileTime> most;
+using LargestEntries = Eigen::Array<double, 1, X::ColsAtCompileTime>;
+template <class X>
+LargestEntries<X> largest(const std::vector<X>& x) {
+  LargestEntries<X> most;
   most.setZero();
   for (const X& xi : x) most = most.max(xi.cwiseAbs().colwise().maxCoeff().array());
   return most;
