@@ -379,8 +379,10 @@ class Check {
       TaylorCheck check;
       check.objective = result_.objectives[static_cast<std::size_t>(i)];
       std::vector<double> slopes;
-      // What falls as h or faster has a 1/8192 of it left at the smallest h. The rest is rounding.
-      const double left = steps.empty() ? 0 : remainders.back()(i);
+      // What falls as h or faster has a 1/4096 of it left at the smallest two. The rest is rounding.
+      double left = 0;
+      for (std::size_t j = std::max<std::size_t>(steps.size(), 2) - 2; j < steps.size(); ++j)
+        left = std::max(left, remainders[j](i));
       for (std::size_t j = 0; j < steps.size(); ++j) {
         check.rows.push_back({steps[j], remainders[j](i)});
         if (j == 0 || remainders[j](i) <= kClear * std::max(noise[j](i), left)) continue;

@@ -233,8 +233,8 @@ def values_at(lab, settings, direction, h):
 
 
 def scattered(lab, settings, direction):
-    """How much rounding changes the objectives from run to run: their spread over parameters that differ by 1e-13."""
-    values = [v for v in (values_at(lab, settings, direction, k * 1e-13) for k in (0, 1, -1, 2)) if v]
+    """How much rounding changes the objectives from run to run: their spread over parameters that differ by 1e-11."""
+    values = [v for v in (values_at(lab, settings, direction, k * 1e-11) for k in (0, 1, -1, 2)) if v]
     return {name: 3 * (max(v[name] for v in values) - min(v[name] for v in values)) if values else 0.0
             for name in lab.problem["objectives"]}
 
