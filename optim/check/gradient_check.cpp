@@ -361,6 +361,7 @@ class Check {
   void check_taylor() {
     constexpr int kRungs = 14;
     constexpr double kLargest = 1e-2, kClear = 100;  // clear of rounding: that many times above it
+    const double allowed = options_.thresholds.frozen / kClear;  // of a derivative, as in differences
     result_.taylor.clear();
     const VectorXd d = random_direction(rho_.size()).cwiseProduct(size_) / std::sqrt(static_cast<double>(rho_.size()));
     const VectorXd slope = result_.tlm * d;
@@ -373,7 +374,7 @@ class Check {
       steps.push_back(h);
       remainders.push_back((*psi - result_.psi - h * slope).cwiseAbs());
       noise.push_back((kPsiRounding * psi->cwiseAbs().cwiseMax(result_.psi.cwiseAbs())).cwiseMax(psi_rounding_) +
-                      h * (rounding_ * d.cwiseAbs()));
+                      h * (rounding_ + allowed * result_.tlm.cwiseAbs()) * d.cwiseAbs());
     }
     for (Index i = 0; i < result_.psi.size(); ++i) {
       TaylorCheck check;
