@@ -10,7 +10,6 @@
 #include "app/terminal/interrupt.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
-#include "core/start/model_warnings.hpp"
 #include "optim/check/gradient_check.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
@@ -195,8 +194,7 @@ int check_command(const CommandContext& context) {
   run.start();
   if (!settle_accuracy(run)) return run.finish();
   const Assembly assembly(mechanism, scene.simulation.start_time);
-  if (!assembled(run, &mechanism, assembly)) return run.finish();
-  for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
+  if (!assembled(run, mechanism, assembly)) return run.finish();
 
   double last_good_time = scene.simulation.start_time;
   GradientCheckOptions options;

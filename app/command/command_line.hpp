@@ -10,7 +10,7 @@ namespace mbsopt {
 struct CommandOptions;
 struct Ranks;
 
-// What was typed, without the program's name, as options; throws std::invalid_argument where it makes no sense.
+// Options from the words typed after the program's name; throws std::invalid_argument where they make no sense.
 CommandOptions options_of(const std::vector<std::string>& arguments);
 
 // Runs one command in this process and returns its exit code. arguments: without the program's name; ranks: those that

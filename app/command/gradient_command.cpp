@@ -12,7 +12,6 @@
 #include "app/terminal/interrupt.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/cvodes/cvodes.hpp"
-#include "core/start/model_warnings.hpp"
 #include "optim/objective/evaluator.hpp"
 #include "optim/objective/hessian.hpp"
 #include "optim/objective/integration_error.hpp"
@@ -105,8 +104,7 @@ int gradient_command(const CommandContext& context) {
   run.start();
   if (!settle_accuracy(run)) return run.finish();
   const Assembly assembly(mechanism, scene.simulation.start_time);
-  if (!assembled(run, &mechanism, assembly)) return run.finish();
-  for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
+  if (!assembled(run, mechanism, assembly)) return run.finish();
 
   double last_good_time = scene.simulation.start_time;
   EvaluatorOptions options;
@@ -124,8 +122,7 @@ int gradient_command(const CommandContext& context) {
   run.result["simulation"] = to_json(evaluation.statistics);
   add_derivative_counts(run, needed.scene, evaluation.statistics);
   for (const std::string& warning : evaluation.warnings) run.warn(warning);
-  if (evaluation.ok && may_be_unresolved(needed.scene, evaluation))
-    warn_of_unresolved(run, evaluator, evaluation);
+  if (evaluation.ok && may_be_unresolved(needed.scene, evaluation)) warn_of_unresolved(run, evaluator, evaluation);
   if (!evaluation.ok) {
     interrupted() ? run.stopped("no gradient was finished") : run.failed(evaluation.message, last_good_time);
     return run.finish();

@@ -83,7 +83,7 @@ int kinematics_command(const CommandContext& context) {
   const auto start = std::chrono::steady_clock::now();
   const Mechanism mechanism(scene, parameter_values(scene), std::vector<bool>(scene.parameters.size(), false));
   const Assembly assembly(mechanism, scene.simulation.start_time);
-  if (!assembled(run, nullptr, assembly)) return run.finish();
+  if (!assembled(run, mechanism, assembly, false)) return run.finish();
 
   Trajectory trajectory;
   const Sampling sampling = record_trajectory(mechanism, scene, trajectory);

@@ -109,7 +109,7 @@ int tradeoff_command(const CommandContext& context) {
   const Json machine = machine_json();
   run.result["machine"] = machine;
   if (!settle_accuracy(run)) return run.finish();
-  if (!assembled(run, &mechanism, Assembly(mechanism, scene.simulation.start_time))) return run.finish();
+  if (!assembled(run, mechanism, Assembly(mechanism, scene.simulation.start_time))) return run.finish();
   context.out << machine_name(machine) << '\n';
   const Json& load = machine.at("load");
   if (load.is_number() && load.get<double>() > 0.7 * machine.at("cores").get<double>())

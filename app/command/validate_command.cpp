@@ -5,7 +5,6 @@
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/terminal/text_table.hpp"
-#include "core/start/model_warnings.hpp"
 #include "optim/problem/parameter_uses.hpp"
 
 namespace mbsopt {
@@ -35,11 +34,10 @@ int validate_command(const CommandContext& context) {
   const Mechanism mechanism(run.problem.scene, parameter_values(run.problem.scene));
   const Assembly assembly(mechanism, run.problem.scene.simulation.start_time);
   run.start();
-  const bool closed = assembled(run, &mechanism, assembly);
+  const bool closed = assembled(run, mechanism, assembly);
   if (closed && run.problem.scene.simulation.accuracy)
     context.out
         << "simulation.accuracy chooses the integrator when it is run; with an implicit one the model is spatial\n";
-  for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
   if (closed) add_parameters(run);
   return run.finish();
 }

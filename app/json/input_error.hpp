@@ -1,4 +1,4 @@
-// What is wrong with a problem file: every finding, with the place it is about.
+// The errors of a problem file: every finding, with the place it is about.
 #pragma once
 
 #include <stdexcept>

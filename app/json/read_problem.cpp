@@ -110,7 +110,7 @@ void add_issue(const SceneIssue& issue, const Node& root, Findings& findings) {
     findings.add(node, issue.path, issue.message);
 }
 
-// What is wrong with the meaning, at the place in the file that says it. An error that follows from one in the reading
+// Errors of meaning, at the place in the file that says it. An error that follows from one in the reading
 // is left out.
 void add_issues(const Problem& problem, const Node& root, Findings& findings, std::vector<std::string>* warnings) {
   std::vector<SceneIssue> errors;

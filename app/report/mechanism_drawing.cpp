@@ -32,7 +32,7 @@ struct BodyPoint {
   Point3 s;
 };
 
-// What of a scene is drawn.
+// The parts of a scene that are drawn.
 struct Sketch {
   std::vector<std::vector<Point3>> bodies;  // points of each
   std::vector<BodyPoint> joints;

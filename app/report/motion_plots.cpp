@@ -32,7 +32,7 @@ std::vector<double> column(const Trajectory& trajectory, std::size_t index) {
   return values;
 }
 
-// What goes into one plot: its label, and the trajectory's columns.
+// The content of one plot: its label, and the trajectory's columns.
 using SensorGroup = std::pair<std::string, std::vector<std::size_t>>;
 
 std::vector<SensorGroup> sensor_groups(const Scene& scene) {

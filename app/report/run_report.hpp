@@ -16,7 +16,7 @@ std::string simulation_report(const Scene& scene, const Json& result, const Traj
 std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const Json& result, const Trajectory& history,
                           const Trajectory& before, const Trajectory& after);
 
-// What one channel of one experiment measured, and what the fitted model says at the same times.
+// The measurements of one channel of one experiment, and the fitted model at the same times.
 struct FitPlot {
   std::string experiment, channel, unit;
   std::vector<double> times, measured, model, residual;  // residual: weighted, (measured - model)/sigma

@@ -1,4 +1,4 @@
-// What an identification found, for people on standard output and for scripts in result.json and CSV files.
+// The results of an identification, for people on standard output and for scripts in result.json and CSV files.
 #pragma once
 
 #include <ostream>

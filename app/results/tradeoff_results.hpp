@@ -1,4 +1,4 @@
-// What `tradeoff` found, into result.json and onto standard output.
+// The results of `tradeoff`, into result.json and onto standard output.
 #pragma once
 
 #include <string>
@@ -23,7 +23,7 @@ void add_recommendations(Run& run, const Tradeoff& tradeoff);
 // For what the file is made for, a design or an identification.
 void add_task_recommendations(Run& run, const Tradeoff& tradeoff, TaskAdviser& adviser);
 void add_outcomes(Run& run, const Tradeoff& tradeoff);  // how many were measured; what was not, and why
-// What --apply chose; the run has failed where there is nothing to choose.
+// The choice of --apply; the run has failed where there is nothing to choose.
 void add_applied(Run& run, const Tradeoff& tradeoff, const TaskAdvice& advice);
 
 void add_penalty_study(Run& run, const PenaltyStudy& study);

@@ -1,4 +1,4 @@
-// What every command is given, and the commands. Each returns an exit code (exit_code.hpp); bad input leaves as an
+// The input of every command, and the commands. Each returns an exit code (exit_code.hpp); bad input leaves as an
 // exception (InputError, SceneError, OutputError), which command_line.cpp turns into words and exit code 2; so does
 // what cannot be written (WriteError), with exit code 1.
 #pragma once

@@ -1,4 +1,4 @@
-// What a change of the total energy means: the integrator's error, or the work of what does work.
+// The meaning of a change of the total energy: the integrator's error, or the work of what does work.
 #pragma once
 
 #include "core/scene/scene.hpp"

@@ -11,6 +11,7 @@
 #include "app/terminal/interrupt.hpp"
 #include "core/expression/counted.hpp"
 #include "core/integrate/model_choice.hpp"
+#include "core/start/model_warnings.hpp"
 
 namespace mbsopt {
 namespace {
@@ -141,17 +142,19 @@ int Run::finish() {
   return row_of(status_).exit_code;
 }
 
-bool assembled(Run& run, const Mechanism* mechanism, const Assembly& assembly) {
+bool assembled(Run& run, const Mechanism& mechanism, const Assembly& assembly, bool integrated) {
   const Scene& scene = run.problem.scene;
-  if (!assembly.result().ok) {
+  const bool ok = assembly.result().ok;
+  if (ok) {
+    ModelSummary model = assembly.summary();
+    if (integrated) add_model(mechanism, scene.simulation, model);
+    run.result["model"] = to_json(model);
+    print_model(run.context.out, scene.name, model);
+  } else {
     run.failed(assembly.result().message, scene.simulation.start_time);
-    return false;
   }
-  ModelSummary model = assembly.summary();
-  if (mechanism) add_model(*mechanism, scene.simulation, model);
-  run.result["model"] = to_json(model);
-  print_model(run.context.out, scene.name, model);
-  return true;
+  for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
+  return ok;
 }
 
 void print_model(std::ostream& out, const std::string& name, const ModelSummary& summary) {

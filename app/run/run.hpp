@@ -47,7 +47,7 @@ class Run {
 
   void start();  // claims the folder: locks it, and writes result.json with "status": "running"
   void write(const std::string& file, std::string_view content);  // into the folder; named in the closing line
-  // What simulations call after each step: shows how far they are; false once the run is interrupted.
+  // For simulations to call after each step: shows how far they are; false once the run is interrupted.
   std::function<bool(double t)> watched(std::string doing);
   void warn(const std::string& words);  // "simulation.accuracy: ...": with the path's place in the file before them
   // In place of what the file says (accuracy_results.hpp).
@@ -72,10 +72,9 @@ class Run {
 // The data files that a problem names.
 std::vector<std::string> data_files(const Problem& problem);
 
-// The model at its assembled start into the result and onto standard output. False where the assembly failed, which
-// then is how the run ended.
-// mechanism: null where its motion is not simulated.
-bool assembled(Run& run, const Mechanism* mechanism, const Assembly& assembly);
+// The model at its assembled start into the result and onto standard output, and warnings of what is odd about it.
+// False where the assembly failed, which then is how the run ended. integrated: whether its motion is, by a model.
+bool assembled(Run& run, const Mechanism& mechanism, const Assembly& assembly, bool integrated = true);
 
 // Prints the counts of bodies, equations, degrees of freedom; redundant equations by joint.
 void print_model(std::ostream& out, const std::string& name, const ModelSummary& summary);

@@ -1,4 +1,4 @@
-// What the program says to the shell (docs/cli.md).
+// The exit codes of the program (docs/cli.md).
 #pragma once
 
 namespace mbsopt {

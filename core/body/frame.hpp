@@ -1,4 +1,4 @@
-// What constraints, forces and sensors see of a body: its centre of mass r and the matrix A of its axes, with their
+// The view of a body for constraints, forces, sensors: its centre of mass r and the matrix A of its axes, with their
 // first and second time derivatives. Every primitive is a polynomial in these, so its derivatives in (q, v) are taken
 // in two steps: to the frame here, from the frame to (r, p) and (rdot, pdot) by the pull-backs below, once per body.
 //

@@ -1,5 +1,5 @@
 // The table of joints: each is a list of primitives between vectors that its fields give. A new joint is a new row.
-// What ties the angles or displacements of joints to each other (gear, rack_pinion, the thread of a screw) or to a law
+// A tie of angles or displacements of joints to each other (gear, rack_pinion, the thread of a screw) or to a law
 // (drives) adds primitives to one row and is put together where scenes are compiled.
 #pragma once
 

@@ -1,4 +1,4 @@
-// What a constraint primitive must offer. A primitive is a few scalar functions of two bodies' frames and of up to
+// The concept of a constraint primitive. A primitive is a few scalar functions of two bodies' frames and of up to
 // three body-fixed vectors s1, s2, s3 of its own; the ground is a frame that never moves. Set to zero, or to a law of
 // time, it is a constraint; a single one is also what sensors and forces measure. Bodies move by virtual displacements
 // (eta_r, eta_theta in body axes), so the unit-norm equations never appear here.

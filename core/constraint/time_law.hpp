@@ -1,4 +1,4 @@
-// What the sum of a row's primitives shall be as time goes on: f(t, rho), with f_t and f_tt and the derivatives of all
+// The value of a row's sum of primitives over time: f(t, rho), with f_t and f_tt and the derivatives of all
 // three in the parameters. A constant (the length of a rod), an expression in t and parameters, or samples.
 #pragma once
 

@@ -24,7 +24,7 @@ namespace mbsopt::cvodes {
 bool is_stiff_method(const SimulationSettings& settings);  // cvodes_bdf
 // Throws std::invalid_argument: a type that is not CVODES', a fixed step, frozen steps.
 void refuse_what_cannot_be(const SimulationSettings& settings, const RunOptions& options);
-// What the right-hand sides that CVODES calls return.
+// The return values of right-hand sides that CVODES calls.
 inline constexpr int kOk = 0, kTryASmallerStep = 1;
 
 class Sensitivities;  // cvodes_forward.hpp
@@ -63,7 +63,7 @@ class ForwardRun {
 
   void require(int flag) const;  // throws std::runtime_error where CVODES refused what is always right
   void stop(SimulationStatus status, std::string message);
-  // What a negative return value means, in words.
+  // The meaning of a negative return value, in words.
   void stop_for(int flag, double t, const char* of_what);
   std::string about_quadratures() const;
   SimulationResult finish();

@@ -1,4 +1,4 @@
-// What a user's cost or force throws must not unwind through CVODES, which is C: a callback keeps it and fails for
+// An exception of a user's cost or force must not unwind through CVODES, which is C: a callback keeps it and fails for
 // good, and whoever called CVODES throws it on.
 #pragma once
 

@@ -112,7 +112,7 @@ class ConstraintRows {
   void evaluate(std::size_t group, const Frames& frames, Eigen::VectorXd* phi_ddot);
   void add_square(std::size_t group, const Eigen::VectorXd& alpha, const BlockKernels& kernels, BlockCholesky<6>& S);
   void add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S);
-  // What the two read and write of a later group (inlined: prefetch.hpp).
+  // The memory of a later group that both use (inlined: prefetch.hpp).
   [[gnu::always_inline]] void prefetch_geometry(std::size_t group, const Frames& frames) const {
     constexpr int kMotion = 36;  // numbers of a frame: its position, axes and their rates
     const RowsInSpace::Group& g = groups_[group];

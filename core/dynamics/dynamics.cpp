@@ -149,7 +149,7 @@ void Dynamics::add_forces() {
   for (std::size_t i = 0; i < loads_.size(); ++i) loads_[i] += body_loads_[i + 1];
 }
 
-// What accelerations are of: loads on each body alone, and turning.
+// The scale of accelerations: loads on each body alone, and turning.
 double Dynamics::usual_acceleration() const {
   double largest = 1e-9;
   for (std::size_t i = 0; i < loads_.size(); ++i) {
@@ -162,7 +162,7 @@ double Dynamics::usual_acceleration() const {
   return largest;
 }
 
-// What usual_acceleration() sees of a body's turning.
+// The share of a body's turning in usual_acceleration().
 double Dynamics::turning_acceleration(const Eigen::VectorXd& y, int body) const {
   const Eigen::Index v = 7 * (data_.n + body - 1);
   const double omega = 2 * y.segment<4>(v + 3).norm();

@@ -75,7 +75,7 @@ class Dynamics {
   // a row of J times T, and 1/alpha (0: constrained).
   Mat<7, 7> mass_block(int body) const;
   Mat<1, 7> times_T(int body, const Mat<1, 6>& J_row) const;
-  // What a fixed a adds to the derivatives with z fixed: omegadot in p; and to a body's own block of -r_q, -r_v, its
+  // A fixed a adds omegadot in p to the derivatives with z fixed, and this to a body's own block of -r_q, -r_v, its
   // row of p included.
   Mat<3, 4> omegadot_by_p(int body) const;
   void add_fixed_a(int body, Mat<7, 7>& q, Mat<7, 7>& v) const;
@@ -112,8 +112,8 @@ class Dynamics {
   void set_body(const Eigen::VectorXd& y, int body);
   void set_motion(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                   const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
-  // What the state's and the parameters' directions do to b = f - M z - J'lambda (rhs_lanes_) and c = -(J z + gamma)
-  // (gamma_dir_).
+  // The tangents, in directions of the state and parameters, of b = f - M z - J'lambda (rhs_lanes_) and c = -(J z +
+  // gamma) (gamma_dir_).
   void right_hand_side_tangent(const ParameterBlock& block, const LaneRows& y_dir);
   // y_bar, ... += gradient of  pddot_bar'pddot - eta'(M z + J'lambda - f) - mu'(J z + gamma)  with z and lambda fixed.
   void pull_back(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);

@@ -30,7 +30,7 @@ Jet<T> separation(const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, const Vect
           f2.Addot * s.s2 - f1.Addot * s.s1 + (f2.rddot - f1.rddot)};
 }
 
-// What each kind of a single row says.
+// The equation of each kind of single row.
 template <class T, class S>
 T phi_of(const PlanarConstraint& c, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, const Vectors<S>& s) {
   using std::atan2, std::sqrt;

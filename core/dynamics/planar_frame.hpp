@@ -1,5 +1,6 @@
-// What constraints and forces see of a body that moves in a plane, with tangents and cotangents: the planar counterpart
-// of frame.hpp. A = P^2 is a rotation times |P|^2, as A(p) is in space: both models compute the same numbers.
+// The view that constraints and forces have of a body that moves in a plane, with tangents and cotangents: the planar
+// counterpart of frame.hpp. A = P^2 is a rotation times |P|^2, as A(p) is in space: both models compute the same
+// numbers.
 #pragma once
 
 #include "core/body/complex.hpp"

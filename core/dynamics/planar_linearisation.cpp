@@ -70,7 +70,7 @@ void PlanarDynamics::prepare_force_tangents() {
   }
 }
 
-// What forces add to b: in the state by their blocks, and in the fields.
+// The forces' share of b: in the state by their blocks, and in the fields.
 void PlanarDynamics::add_force_tangent(const ParameterBlock& block, const LaneRows& y_dir) {
   const ForceLinearisation& x = *force_linearisation_;
   const LaneRow* y = entries(y_dir);

@@ -64,7 +64,7 @@ constexpr UnitEntry kUnits[] = {
     {"GPa", 1e9, kPressure},
 };
 
-// What is often typed instead of ASCII.
+// Characters that are often typed instead of ASCII.
 constexpr std::pair<std::string_view, std::string_view> kSpellings[] = {
     {"\u00b7", "*"}, {"\u22c5", "*"},  {"\u00b0", "deg"}, {"\u00b5", "u"},
     {"\u03bc", "u"}, {"\u00b2", "^2"}, {"\u00b3", "^3"},

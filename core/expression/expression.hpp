@@ -1,4 +1,4 @@
-// What a user writes in a numeric field: a number, or an expression over names ("rho*L1*w^2").
+// A numeric field as a user writes it: a number, or an expression over names ("rho*L1*w^2").
 // An Expression is an immutable syntax tree, cheap to copy; it is evaluated by compiling it (program.hpp).
 //
 //   Expression e = Expression::parse("m*g*l/2 + 3 [cm]");

@@ -1,4 +1,4 @@
-// What a parsed expression says: its operations in the order they are evaluated. Operands come before the operation
+// A parsed expression: its operations in the order they are evaluated. Operands come before the operation
 // that uses them and may be used more than once, so that whoever reads a tree does it in one loop, however deep it is.
 #pragma once
 

@@ -6,7 +6,7 @@
 
 namespace mbsopt {
 
-// What the virtual work is made of: D = P2 - P1, M = A1'A2, and the coordinates; each at rest, its rate, its virtual
+// The terms of the virtual work: D = P2 - P1, M = A1'A2, and the coordinates; each at rest, its rate, its virtual
 // change.
 struct Bushing::Coordinates {
   Vector3d D, Ddot, D_eta, d, ddot, d_eta;

@@ -1,4 +1,4 @@
-// What an adjoint run keeps of the forward motion, within a budget of memory.
+// The states that an adjoint run keeps of the forward motion, within a budget of memory.
 //
 // While all steps fit they are kept, and nothing is computed twice. Beyond that the forward run keeps the state at the
 // start of every k-th step, k doubled whenever these snapshots fill half of the budget. Going back, the steps from one

@@ -113,7 +113,7 @@ double RungeKuttaRun::error_of_step() {
   return rk_.error_low ? combined_error(high, norm(rk_.error_low)) : high;
 }
 
-// What projection leaves of the error: next to a singular position rounding, magnified, is most of it, in directions
+// The error after projection: next to a singular position rounding, magnified, is most of it, in directions
 // that the constraints hold again where the step ends.
 double RungeKuttaRun::error_after_projection() {
   const IntegratorSettings& s = settings_.integrator;

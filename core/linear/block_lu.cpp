@@ -100,7 +100,7 @@ void subtract_transposed_times(const double* A, const double* x, double* y) {
   for (int k = 0; k < N; ++k) y[k] -= dot<N>(A + k * kStride<N>, x);
 }
 
-// What depends on the size of a block, for the size at hand.
+// The kernels that depend on the size of a block, for the size at hand.
 template <class Do>
 auto with_size(Eigen::Index rows, const Do& act) {
   switch (rows) {

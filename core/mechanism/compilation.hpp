@@ -1,5 +1,5 @@
-// What the parts of a compilation share: the scene, its fields at one rho, and the numbers found so far. Each part is a
-// file of its own (compile_bodies.cpp, ...) and is run once, in the order of the declarations below.
+// The state that the parts of a compilation share: the scene, its fields at one rho, and the numbers found so far. Each
+// part is a file of its own (compile_bodies.cpp, ...) and is run once, in the order of the declarations below.
 #pragma once
 
 #include <map>

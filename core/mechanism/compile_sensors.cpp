@@ -23,8 +23,8 @@ int component(const std::string& name, const std::string& where) {
   return static_cast<int>(found - names.begin());
 }
 
-// What the sensors of points share (PointSensor, AccelerationSensor): a point, perhaps relative to another, a component
-// in some axes.
+// The fields that sensors of points share (PointSensor, AccelerationSensor): a point, perhaps relative to another, a
+// component in some axes.
 template <class Kind>
 Kind with_points(Compilation& model, const Sensor& s, Kind out, const std::string& where) {
   out.a = sensor_point(model, s.body, s.point, where);

@@ -1,4 +1,4 @@
-// What the derivatives of the equations of motion at one state are made of: one block per
+// The blocks of the derivatives of the equations of motion at one state: one block per
 //   body                 its inertia forces
 //   group of joint rows  Phi_q, (Phi_q v)_q, (Phi_q' lambda)_q between two bodies
 //   force                on the bodies between which it acts, where the state changes it

@@ -1,4 +1,4 @@
-// What the rows of Phi do to body 2 of a joint, and the effort of a drive.
+// The reaction of the rows of Phi on body 2 of a joint, and the effort of a drive.
 //
 //   loads of the constraints on body 2:  [F; T] = -J2'lambda    F global, T about the centre of mass in body axes
 //   force    F            torque  about P2 = r2 + A2 s2, global:  A2 T - (A2 s2) x F

@@ -100,8 +100,8 @@ bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::Ve
   s.nu.setZero();
   place(s.delta);
   const auto phi = [&](Eigen::VectorXd& out) { evaluate_phi(data_, frames_, laws_, angles, out); };
-  if (positions() && !onto_constraints(solver_, solver_.rows(), q_size, kUnmetPosition, s.delta, s.nu, corrections_,
-                                       phi, place))
+  if (positions() &&
+      !onto_constraints(solver_, solver_.rows(), q_size, kUnmetPosition, s.delta, s.nu, corrections_, phi, place))
     return false;
 
   for (int i = 1; i <= data_.n; ++i) {

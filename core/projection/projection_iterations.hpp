@@ -1,4 +1,4 @@
-// What projections in space and in the plane have in common: the iteration onto the constraints, and the refinement of
+// Projections in space and in the plane share two things: the iteration onto the constraints, and the refinement of
 // the linear systems of its derivatives. Rows: J and M of ConstraintRows or PlanarRows.
 #pragma once
 
@@ -21,9 +21,8 @@ struct Corrections {
 //   [ M J'; J 0 ] (dx, dnu) = -(M x + J~'nu, phi)        J: of the solver's factor
 // evaluate(phi): at x; move(dx): the bodies, to x + dx. False if phi is no number or stays above unmet.
 template <class Rows, class X, class Evaluate, class Move>
-bool onto_constraints(BlockSaddleSolver<Rows>& solver, const Rows& rows, double size, double unmet,
-                      std::vector<X>& x, Eigen::VectorXd& nu, Corrections<X, Eigen::VectorXd>& c, Evaluate&& evaluate,
-                      Move&& move) {
+bool onto_constraints(BlockSaddleSolver<Rows>& solver, const Rows& rows, double size, double unmet, std::vector<X>& x,
+                      Eigen::VectorXd& nu, Corrections<X, Eigen::VectorXd>& c, Evaluate&& evaluate, Move&& move) {
   for (X& xi : x) xi.setZero();
   nu.setZero();
   if (nu.size() == 0) return true;

@@ -1,4 +1,4 @@
-// What a simulation is judged by. A value never travels without its derivatives.
+// The costs that a simulation is judged by. A value never travels without its derivatives.
 //
 //   psi(rho) = integral of g(t, y, rho) dt + terminal(y(t_end), rho) + sum of samples(t_k, y(t_k), rho)
 //

@@ -65,9 +65,9 @@ std::size_t unreadable_character(std::string_view text) {
   return std::string::npos;
 }
 
-std::string text_of(double value) { return std::isnan(value) ? "not a number" : Expression(value).text(); }
-
 }  // namespace
+
+std::string text_of(double value) { return std::isnan(value) ? "not a number" : Expression(value).text(); }
 
 void Checker::name(std::string_view key, const std::string& value, const Says&) {
   if (value.empty()) return issue(path(key), "is empty, a name is expected");

@@ -13,6 +13,9 @@
 
 namespace mbsopt {
 
+// A number in a message: the shortest text that reads back as it.
+std::string text_of(double value);
+
 class Checker {
  public:
   Checker(const SceneFacts& facts, std::vector<SceneIssue>& issues, std::string path = "")

@@ -17,8 +17,6 @@ using Vector = std::array<double, 3>;
 
 constexpr double kMostRows = 1e8;  // of trajectory.csv: more than memory holds
 
-std::string text_of(double value) { return std::isnan(value) ? "not a number" : Expression(value).text(); }
-
 double norm(const Vector& v) { return std::hypot(v[0], v[1], v[2]); }
 double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 bool is_finite(const Vector& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }

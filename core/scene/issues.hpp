@@ -1,4 +1,4 @@
-// What is wrong with a scene: everything that can be said from its plain data, at the values of its parameters.
+// The findings on a scene: everything that can be said from its plain data, at the values of its parameters.
 #pragma once
 
 #include <vector>

@@ -174,7 +174,7 @@ struct PointOnBody {
   PointField point = "O";
 };
 
-// What is measured on a state. Fields that a quantity does not use stay at their defaults.
+// A measurement of a state. Fields that a quantity does not use stay at their defaults.
 struct Sensor {
   std::string name;
   std::string quantity;  // position velocity angle rate energy constraint_violation distance ...

@@ -1,4 +1,4 @@
-// What the checks of single fields have to know about the whole scene: its names, and its parameters' values and units.
+// Facts on the whole scene, for checks of single fields: its names, and its parameters' values and units.
 #pragma once
 
 #include <array>

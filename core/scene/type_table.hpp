@@ -119,7 +119,7 @@ bool has_word(std::string_view list, std::string_view word);
 std::string not_among(std::string_view what, std::string_view found, const std::vector<std::string>& available,
                       std::string_view later = "");
 
-// What friction in a joint resists: as said, else rotation where the joint has an angle.
+// Whether friction in a joint resists sliding: as `motion` says, else where the joint has no angle.
 bool is_sliding(std::string_view motion, std::string_view joint_type);
 
 std::string_view type_of(const Force& force);

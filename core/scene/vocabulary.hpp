@@ -4,7 +4,7 @@
 //
 //   describe(visitor, body);      // visitor.name("name", body.name, ...), visitor.number("mass", body.mass, ...), ...
 //
-// What a visitor offers (Says holds description, need and dimension; X may be const):
+// A visitor offers (Says holds description, need and dimension; X may be const):
 //   name(key, string&, says)                    a name that others refer to
 //   text(key, string&, says)                    any text
 //   reference(key, string&, To, says)           the name of a body, joint, force, sensor, parameter, objective

@@ -39,7 +39,7 @@ bool is_speed(const SensorKind& kind) {
   return w && w->component == AngularVelocitySensor::kNorm;
 }
 
-// What is wrong with one joint: points apart, directions out of square.
+// The violation of one joint: points apart, directions out of square.
 void add_joint(const MechanismData& d, AssemblyLevel level, int joint, const Eigen::VectorXd& F, double tolerance,
                std::vector<Finding>& findings) {
   double apart = 0, skew = 0, turned = 0;

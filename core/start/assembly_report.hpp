@@ -1,4 +1,4 @@
-// What a failed assembly says: which joints and conditions stay violated, by how much, and what to try.
+// The message of a failed assembly: which joints and conditions stay violated, by how much, and what to try.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// What is odd about a mechanism at its assembled start, in words: things that run but seldom mean what they say.
+// Sentences on oddities of a mechanism at its assembled start: such scenes run, but seldom mean what they say.
 //
 //   massless directions that no joint holds        (M is singular on the null space of J: no acceleration there)
 //   springs of zero length                         (they have no direction)

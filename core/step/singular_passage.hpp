@@ -69,7 +69,8 @@ class SingularPassage {
   double uncertain(double theta) const;  // what is magnified at most, next to theta
   Choice choose(double left, double h, double most) const;
   void tabulate();
-  // What a step leaves, of a size relative to that of its neighbours: accelerations next to t* are off by 1/d^3.
+  // The error that a step leaves, of a size relative to that of its neighbours: accelerations next to t* are off by
+  // 1/d^3.
   static double rounding_of(double magnified, double size) { return magnified / (size * size * size); }
 
   const Method& rk_;

@@ -1,4 +1,4 @@
-// What a backward sweep keeps of a step, in one piece of memory; stages are rebuilt from their accelerations.
+// The record of a step for a backward sweep, in one piece of memory; stages are rebuilt from their accelerations.
 #pragma once
 
 #include <memory>

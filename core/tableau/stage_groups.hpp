@@ -1,4 +1,4 @@
-// What the sweeps ask of a method's groups of coupled stages (tableaus.hpp).
+// The sweeps' questions on a method's groups of coupled stages (tableaus.hpp).
 #pragma once
 
 #include <algorithm>

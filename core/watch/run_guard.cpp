@@ -19,7 +19,7 @@ constexpr double kFastest = 299792458, kFastestTurn = 1e6;  // light [m/s]; ten 
 constexpr double kGrowth = 1e3;                             // of what is faster from the start
 constexpr double kHalfTurn = 3.13;  // [rad]: nearer, the axis of the rotation may reverse within two hundredths
 
-// What moving by its own size would take: a scale, for runs that begin at rest where the potential is zero.
+// The energy of a motion by its own size: a scale, for runs that begin at rest where the potential is zero.
 double natural_energy(const MechanismData& d, const Eigen::VectorXd& y) {
   double sum = 0;
   for (int i = 1; i <= d.n; ++i) {

@@ -1,4 +1,4 @@
-// What an accepted step may show that makes a run's numbers worthless although all of them are finite. Asked after each
+// Signs in an accepted step that make a run's numbers worthless although all of them are finite. Asked after each
 // step; an objection ends the run, in words.
 //   - the law of a drive jumps, or its rate does (law_jumps.hpp)
 //   - the energy of a mechanism on which nothing does work has grown by half of all it has

@@ -155,11 +155,13 @@ class Check {
       for (const bool frozen : {true, false}) {
         if (frozen ? !result_.discrete : !options_.free_steps) continue;
         const Stopwatch stopwatch;
+        std::string failure;             // of a run
         double other_steps = kInfinity;  // the smallest |h| at which a run took others than the base run
         const auto f = [&](double h) -> std::optional<VectorXd> {
           VectorXd rho = rho_;
           rho(k) += h;
           Evaluation e = run_at(rho, frozen);
+          if (!e.ok) failure = e.message;
           if (!e.ok) return std::nullopt;
           if (e.steps.sizes != steps_.sizes) other_steps = std::min(other_steps, std::abs(h));
           if (std::abs(h) < 1.5 * near) note_jump(k, h, frozen, e.psi, on_frozen_steps);
@@ -168,6 +170,10 @@ class Check {
         LadderDerivative d = difference_ladder(f, m, {options_.relative_step * size_(k), options_.rungs, kPsiRounding});
         for (Index i = 0; i < m; ++i)
           if (!d.has_estimate(i)) d.derivative(i) = kNaN, d.error(i) = kInfinity;
+        if (d.derivative.hasNaN() && !failure.empty())
+          result_.warnings.push_back(fmt::format("differences in '{}' could not be evaluated{}: {}",
+                                                 result_.parameters[static_cast<std::size_t>(k)],
+                                                 frozen ? " on the steps of the base run" : "", failure));
         (frozen ? result_.frozen : result_.free).col(k) = d.derivative;
         (frozen ? frozen_error_ : free_error_).col(k) = d.error;
         (frozen ? frozen_step_ : free_step_).col(k) = d.step;
@@ -360,7 +366,7 @@ class Check {
   // R(h) = |psi(rho + h d) - psi - h psi_rho d|: where it stands clear of rounding, it falls by 4 when h is halved.
   void check_taylor() {
     constexpr int kRungs = 14;
-    constexpr double kLargest = 1e-2, kClear = 100;  // clear of rounding: that many times above it
+    constexpr double kLargest = 1e-2, kClear = 100;              // clear of rounding: that many times above it
     const double allowed = options_.thresholds.frozen / kClear;  // of a derivative, as in differences
     result_.taylor.clear();
     const VectorXd d = random_direction(rho_.size()).cwiseProduct(size_) / std::sqrt(static_cast<double>(rho_.size()));

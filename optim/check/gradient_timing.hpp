@@ -1,4 +1,4 @@
-// What gradients cost, in simulations. One simulation is a run with the same objectives, at the same parameters and
+// The cost of gradients, in simulations. One simulation is a run with the same objectives, at the same parameters and
 // tolerances, without derivatives: compiling the mechanism, assembly and time integration. Simulation, TLM and adjoint
 // run in turn; a ratio is the median over the rounds of that round's ratio, so that it holds on a busy machine.
 //

@@ -42,7 +42,7 @@ const DesignSpec& checked(const Problem& problem) {
   if (spec.variables.empty()) throw std::invalid_argument("design.variables: is empty; name at least one parameter");
   if (spec.optimizer.type != "ipopt" && !find_nlopt_method(spec.optimizer.type))
     throw std::invalid_argument(
-        fmt::format("design.optimizer.type: is '{}'; available: ipopt {}", spec.optimizer.type, kNloptMethods));
+        fmt::format("design.optimizer.type: is '{}'; available: ipopt {}", spec.optimizer.type, nlopt_method_names()));
   for (std::size_t i = 0; i < spec.subject_to.size(); ++i) {
     const ObjectiveBound& bound = spec.subject_to[i];
     if (!bound.lower && !bound.upper)
@@ -122,7 +122,7 @@ void describe_end(const Evaluator& evaluator, const DesignProgram& program, cons
   }
 }
 
-// What takes one more look at the solution: the final evaluation, true extremes, and how stationary it is.
+// One more look at the solution: the final evaluation, true extremes, and how stationary it is.
 void describe_solution(Evaluator& evaluator, DesignProgram& program, const Eigen::VectorXd& x, DesignResult& result) {
   result.final_evaluation = program.evaluation(result.rho);
   NlpPoint end;

@@ -86,7 +86,7 @@ VectorXd DesignProgram::rho_at(const VectorXd& x) const {
   return rho;
 }
 
-// Whatever the evaluation holds: derivatives where the point has room for them.
+// Into the point: values, and derivatives where it has room for them.
 void DesignProgram::fill(const Evaluation& e, const VectorXd& x, NlpPoint& point) const {
   if (!e.ok) {
     point.ok = false, point.message = e.message;

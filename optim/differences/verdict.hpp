@@ -1,4 +1,4 @@
-// What a comparison of two derivatives found.
+// The result of a comparison of two derivatives.
 #pragma once
 
 #include <string_view>

@@ -1,4 +1,4 @@
-// What data determine where they do not determine every parameter, in words.
+// The combinations that data determine where they do not determine every parameter, in words.
 //
 // Given are directions in which nothing that is measured changes. Parameters that such directions tie together form a
 // group; of a group of c parameters with d directions, c - d combinations are determined, those that stay as they are

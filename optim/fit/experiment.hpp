@@ -62,7 +62,7 @@ class Experiment {
   using Limits = ExperimentLimits;
   Residuals residuals(const Eigen::VectorXd& u, const Limits& limits = {}) const;
 
-  // What is simulated, as a scene: with its laws and its span, at the values that are not unknown and those at which
+  // The simulated scene: with its laws and its span, at the values that are not unknown and those at which
   // the unknown ones start.
   Scene simulated() const;
 

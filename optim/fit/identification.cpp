@@ -22,7 +22,7 @@
 namespace mbsopt {
 namespace {
 
-// What is the same by the physics, such as a late clock and an early start, differs by a few tolerances of the
+// Effects that are the same by the physics, such as a late clock and an early start, differs by a few tolerances of the
 // integration in the numbers. Measured: 1/condition of that pair is 0.3 to 8 times rtol at 1e-5 to 1e-8.
 constexpr double kTolerances = 10, kLeastAccuracy = 1e-5;
 constexpr double kTouches = 1e-9;  // of the bound's size: the trust region puts solutions exactly on bounds

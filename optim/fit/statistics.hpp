@@ -1,4 +1,4 @@
-// What a least-squares fit says about its parameters.
+// The statistics of a least-squares fit.
 //
 //   residuals z(rho) in units of their sigma, Jacobian J = dz/drho, N rows, P columns, at the solution
 //   s^2         = z'z / (N + R - P)                        residual variance, R: number of priors

@@ -1,4 +1,4 @@
-// What an identification fits: parameters shared by its experiments, and those with a value per experiment.
+// The unknowns of an identification: parameters shared by its experiments, and those with a value per experiment.
 //
 //   const std::vector<UnknownParameter> unknowns = unknowns_of_fit(scene, spec);   // "k1", "run1.theta0",
 //   "run2.theta0" const VariableScaling scaling = scaling_of(unknowns); Experiment run1(..., unknowns_in(scene, spec,

@@ -1,4 +1,4 @@
-// What a design asks of an optimiser that it cannot do, at the place where it is asked.
+// Requests of a design that its optimiser cannot meet, at the place where it is asked.
 #pragma once
 
 #include <optional>

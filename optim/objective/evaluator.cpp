@@ -142,9 +142,9 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
       if (sweep == Sweep::none) continue;
       const Objective& objective = objectives_[simulated_[j]];
       if (objective.kind() == ObjectiveKind::rms && e.psi(i) == 0 && !frozen)
-        e.warnings.push_back(fmt::format(
-            "objective '{}' is a root mean square of 0, where it is not smooth: its gradient is given as 0",
-            objective.name()));
+        e.warnings.push_back(
+            fmt::format("objective '{}' is a root mean square of 0, where it is not smooth: its gradient is given as 0",
+                        objective.name()));
       for (Eigen::Index k = 0; k < e.psi_rho.cols(); ++k)
         e.psi_rho(i, k) = result.psi_rho(row, variables_[static_cast<std::size_t>(k)]);
     }

@@ -75,7 +75,7 @@ class Gathered {
   MatrixXd I_rhorho_;
 };
 
-// What is looked at during the run, in the order of time.
+// The points of interest during the run, in the order of time.
 struct Look {
   double time = 0;
   double weight = 0;                           // of the running expressions; 0: none of them

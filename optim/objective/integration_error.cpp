@@ -52,7 +52,8 @@ IntegrationError integration_error(const Scene& scene, const std::vector<Objecti
   const IntegratorSettings& given = scene.simulation.integrator;
   if (given.step && !options.fixed_steps) return error;
   if (!given.step) error.psi_rho = given.rtol * psi_rho.cwiseAbs();
-  Evaluator evaluator(with_errors_times(given.step ? 0.1 : other_errors(given), scene), objectives, {}, {options.method, {}, options.user_forces, options.progress});
+  Evaluator evaluator(with_errors_times(given.step ? 0.1 : other_errors(given), scene), objectives, {},
+                      {options.method, {}, options.user_forces, options.progress});
   const Evaluation& e = evaluator.gradients(evaluator.start());
   error.simulations = e.simulations;
   if (!e.ok) return error;

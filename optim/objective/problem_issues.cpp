@@ -9,12 +9,6 @@
 
 namespace mbsopt {
 
-namespace {
-
-std::string text_of(double value) { return Expression(value).text(); }
-
-}  // namespace
-
 // Found by Checker::check through the arguments' namespace.
 void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
   checker.must_be_identifier(checker.path(), objective.name);

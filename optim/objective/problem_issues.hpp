@@ -1,4 +1,4 @@
-// What is wrong with a whole problem: its scene, and what is asked of it.
+// The findings on a whole problem: its scene, and what is asked of it.
 #pragma once
 
 #include <vector>

@@ -1,13 +1,18 @@
 // Every field of a problem beyond its scene, told to a visitor; see core/scene/vocabulary.hpp.
 #pragma once
 
+#include <string>
+
 #include "core/scene/vocabulary.hpp"
 #include "optim/problem/problem.hpp"
+#include "optim/solver/nlopt_methods.hpp"
 
 namespace mbsopt {
 
-inline constexpr std::string_view kOptimizers =
-    "ipopt slsqp mma ccsaq lbfgs bobyqa cobyla sbplx mlsl direct crs isres esch";
+inline std::string_view optimizer_names() {
+  static const std::string names = "ipopt " + std::string(nlopt_method_names());
+  return names;
+}
 inline constexpr Choice<StartSampling> kSamplings[] = {{"latin_hypercube", StartSampling::latin_hypercube},
                                                        {"sobol", StartSampling::sobol}};
 inline constexpr Choice<bool> kRoles[] = {{"fit", false}, {"validate", true}};
@@ -41,7 +46,7 @@ void describe(auto& v, Like<ObjectiveBound> auto& b) {
 }
 
 void describe(auto& v, Like<OptimizerSpec> auto& o) {
-  v.word("type", o.type, Words{kOptimizers},
+  v.word("type", o.type, Words{optimizer_names()},
          {"interior points (ipopt); NLopt's local methods with gradients (slsqp, mma, ccsaq, lbfgs) and without "
           "(bobyqa, cobyla, sbplx), and global ones (mlsl, direct, crs, isres, esch)"});
   v.plain("tolerance", o.tolerance, kPositive, {"of the optimality conditions; of the last steps without gradients"});

@@ -1,6 +1,7 @@
 #include "optim/solver/nlopt_methods.hpp"
 
 #include <fmt/format.h>
+#include <nlopt.h>
 
 #include <algorithm>
 #include <array>
@@ -8,19 +9,21 @@
 namespace mbsopt {
 namespace {
 
-// name, gradients, global, random, constraints
-constexpr std::array kMethods{NloptMethod{"slsqp", true, false, false, ConstraintSupport::all},
-                              NloptMethod{"mma", true, false, false, ConstraintSupport::inequalities},
-                              NloptMethod{"ccsaq", true, false, false, ConstraintSupport::inequalities},
-                              NloptMethod{"lbfgs", true, false, false, ConstraintSupport::augmented_lagrangian},
-                              NloptMethod{"bobyqa", false, false, false, ConstraintSupport::augmented_lagrangian},
-                              NloptMethod{"cobyla", false, false, false, ConstraintSupport::all},
-                              NloptMethod{"sbplx", false, false, false, ConstraintSupport::augmented_lagrangian},
-                              NloptMethod{"mlsl", true, true, true, ConstraintSupport::none},
-                              NloptMethod{"direct", false, true, false, ConstraintSupport::none},
-                              NloptMethod{"crs", false, true, true, ConstraintSupport::none},
-                              NloptMethod{"isres", false, true, true, ConstraintSupport::all},
-                              NloptMethod{"esch", false, true, true, ConstraintSupport::none}};
+using enum ConstraintSupport;
+constexpr bool kGradients = true, kGlobal = true, kRandom = true, kNo = false;
+
+constexpr std::array kMethods{NloptMethod{"slsqp", NLOPT_LD_SLSQP, kGradients, kNo, kNo, all},
+                              NloptMethod{"mma", NLOPT_LD_MMA, kGradients, kNo, kNo, inequalities},
+                              NloptMethod{"ccsaq", NLOPT_LD_CCSAQ, kGradients, kNo, kNo, inequalities},
+                              NloptMethod{"lbfgs", NLOPT_LD_LBFGS, kGradients, kNo, kNo, augmented_lagrangian},
+                              NloptMethod{"bobyqa", NLOPT_LN_BOBYQA, kNo, kNo, kNo, augmented_lagrangian},
+                              NloptMethod{"cobyla", NLOPT_LN_COBYLA, kNo, kNo, kNo, all},
+                              NloptMethod{"sbplx", NLOPT_LN_SBPLX, kNo, kNo, kNo, augmented_lagrangian},
+                              NloptMethod{"mlsl", NLOPT_G_MLSL, kGradients, kGlobal, kRandom, none},
+                              NloptMethod{"direct", NLOPT_GN_DIRECT, kNo, kGlobal, kNo, none},
+                              NloptMethod{"crs", NLOPT_GN_CRS2_LM, kNo, kGlobal, kRandom, none},
+                              NloptMethod{"isres", NLOPT_GN_ISRES, kNo, kGlobal, kRandom, all},
+                              NloptMethod{"esch", NLOPT_GN_ESCH, kNo, kGlobal, kRandom, none}};
 
 }  // namespace
 
@@ -28,6 +31,15 @@ const NloptMethod* find_nlopt_method(std::string_view name) {
   const auto method =
       std::find_if(kMethods.begin(), kMethods.end(), [&](const NloptMethod& m) { return m.name == name; });
   return method == kMethods.end() ? nullptr : &*method;
+}
+
+std::string_view nlopt_method_names() {
+  static const std::string names = [] {
+    std::string all_names;
+    for (const NloptMethod& m : kMethods) all_names += (all_names.empty() ? "" : " ") + std::string(m.name);
+    return all_names;
+  }();
+  return names;
 }
 
 long default_max_evaluations(const NloptMethod& method, Eigen::Index variables) {

@@ -27,12 +27,12 @@ enum class ConstraintSupport { none, inequalities, all, augmented_lagrangian };
 
 struct NloptMethod {
   std::string_view name;
+  int algorithm;  // of nlopt_algorithm
   bool gradients, global, random;
   ConstraintSupport constraints;
 };
 const NloptMethod* find_nlopt_method(std::string_view name);  // nullptr: no such method
-inline constexpr std::string_view kNloptMethods =
-    "slsqp mma ccsaq lbfgs bobyqa cobyla sbplx mlsl direct crs isres esch";
+std::string_view nlopt_method_names();                        // "slsqp mma ..."
 
 // Where none is given: 500 for local methods with gradients, 500 (n + 1) for those without, 1000 (n + 1) for global
 // ones.

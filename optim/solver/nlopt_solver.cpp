@@ -24,22 +24,6 @@ using Eigen::VectorXd;
 using VectorIn = Eigen::Map<const VectorXd>;
 using VectorView = Eigen::Map<VectorXd>;
 
-struct Algorithm {
-  std::string_view name;
-  nlopt_algorithm algorithm;
-};
-constexpr std::array kAlgorithms{
-    Algorithm{"slsqp", NLOPT_LD_SLSQP}, Algorithm{"mma", NLOPT_LD_MMA},       Algorithm{"ccsaq", NLOPT_LD_CCSAQ},
-    Algorithm{"lbfgs", NLOPT_LD_LBFGS}, Algorithm{"bobyqa", NLOPT_LN_BOBYQA}, Algorithm{"cobyla", NLOPT_LN_COBYLA},
-    Algorithm{"sbplx", NLOPT_LN_SBPLX}, Algorithm{"mlsl", NLOPT_G_MLSL},      Algorithm{"direct", NLOPT_GN_DIRECT},
-    Algorithm{"crs", NLOPT_GN_CRS2_LM}, Algorithm{"isres", NLOPT_GN_ISRES},   Algorithm{"esch", NLOPT_GN_ESCH}};
-
-nlopt_algorithm algorithm_of(const NloptMethod& method) {
-  return std::find_if(kAlgorithms.begin(), kAlgorithms.end(),
-                      [&](const Algorithm& row) { return row.name == method.name; })
-      ->algorithm;
-}
-
 constexpr int kFailuresInARow = 40;  // of local methods: they are lost
 constexpr double kFirstStep = 0.1;   // of x, without derivatives
 constexpr double kAcceptable = 100;  // times the tolerance: as Ipopt's second way to converge
@@ -58,7 +42,7 @@ class Adapter {
   Adapter(NonlinearProgram& problem, const NloptMethod& method, const NloptOptions& options, NlpResult& result)
       : problem_(problem),
         method_(method),
-        algorithm_(algorithm_of(method)),
+        algorithm_(static_cast<nlopt_algorithm>(method.algorithm)),
         options_(options),
         result_(result),
         points_(problem, result, options.constraint_tolerance, options.records),
@@ -239,7 +223,7 @@ class Adapter {
     });
   }
 
-  // What NLopt is told: the point, or what stands for it where it cannot be evaluated.
+  // The value for NLopt: of the point, or what stands for it where it cannot be evaluated.
   const NlpPoint& at(const VectorXd& x) {
     if (!x.allFinite()) end(Ended::not_a_number);
     if (ended()) return last_good_;
@@ -442,7 +426,7 @@ NlpResult solve_with_nlopt(NonlinearProgram& problem, const VectorXd& x_start, c
   const NloptMethod* const method = find_nlopt_method(options.method);
   if (!method)
     throw std::invalid_argument(
-        fmt::format("there is no NLopt method '{}'; available: {}", options.method, kNloptMethods));
+        fmt::format("there is no NLopt method '{}'; available: {}", options.method, nlopt_method_names()));
   const NloptNeeds needs{static_cast<std::size_t>(problem.variables()), problem.constraints() > 0,
                          has_equality(problem)};
   if (const std::string refusal = nlopt_refusal(*method, needs); !refusal.empty()) throw std::invalid_argument(refusal);

@@ -22,7 +22,7 @@
 
 namespace mbsopt {
 
-// What a solver multiplies f and c by where it tests convergence.
+// The factors of f and c in a solver's tests of convergence.
 struct NlpScale {
   double f = 1;
   Eigen::VectorXd c;
@@ -100,7 +100,7 @@ struct PointRecords {
   virtual void record(const Eigen::VectorXd& x, const NlpHessians& hessians) = 0;
 };
 
-// What every solver takes and gives.
+// The input and output of every solver.
 struct NlpProgress {
   int iteration = 0;
   double f = 0;

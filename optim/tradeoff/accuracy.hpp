@@ -24,7 +24,7 @@
 
 namespace mbsopt {
 
-// What the scene is like, as far as the choice asks.
+// The properties of the scene that the choice uses.
 struct SceneFeatures {
   int bodies = 0, loops = 0, drives = 0;
   bool sampled_drives = false;  // some drive follows a file: a cubic spline, which high orders gain nothing on
@@ -39,7 +39,7 @@ struct ErrorEstimate {
 };
 
 struct AccuracyChoice {
-  // What two runs may be apart by rounding alone: no estimate is smaller.
+  // The distance of two runs by rounding alone: no estimate is smaller.
   static constexpr double kRounding = 1e-12;
 
   bool ok = false;

@@ -1,6 +1,6 @@
-// What alpha does to the penalty form of the equations of motion of one mechanism: the model's error falls as 1/alpha,
-// the rounding of S = M + J' alpha J, which Cholesky factors, grows with it; the quasi-definite form of the same
-// equations has no such rounding. docs/formulations.md.
+// The effect of alpha on the penalty form of the equations of motion of one mechanism: the model's error falls as
+// 1/alpha, the rounding of S = M + J' alpha J, which Cholesky factors, grows with it; the quasi-definite form of the
+// same equations has no such rounding. docs/formulations.md.
 //
 // Accelerations: at states of the right motion, the largest relative error (of the largest entry).
 //   model      penalty (quasi-definite) against the constrained equations

@@ -92,7 +92,7 @@ class Sweep {
     return std::move(result_);
   }
 
-  // What the file says, and what it would be without a word; with a gradient where there is one.
+  // The settings of the file, and the defaults; with a gradient where there is one.
   void measure_given_settings() {
     SimulationSettings defaults = own();
     defaults.formulation = {}, defaults.integrator = default_integrator(own().start_time, own().end_time);

@@ -10,7 +10,7 @@ from scene import Scene
 # Warnings of the program that say its motion may be off by more than usual.
 DOUBT = re.compile(r"singular|energy changed|came apart|accelerations of the constraints|not resolve|stability|stiff|"
                    r"zero length|cannot change|not smooth|jump|peak|disagree|rounding|has no (mass|inertia)|"
-                   r"faster than|penalty|contradict|not determined", re.IGNORECASE)
+                   r"faster than|penalty|contradict|not determined|could not be evaluated", re.IGNORECASE)
 # Of these, the ones that explain why two sweeps differentiate the same steps differently,
 SWEEP_DOUBT = re.compile(r"rounding|masses differ|cannot change|penalty|contradict|do not resolve the gradient",
                          re.IGNORECASE)

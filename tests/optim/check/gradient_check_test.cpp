@@ -129,6 +129,10 @@ TEST_CASE("differences that cannot be evaluated have failed, they are not zero",
     CHECK(std::isnan(e.frozen));
     CHECK(to_string(e.frozen_verdict.value()) == "FAILED");
   }
+  const auto says_why = [](const std::string& w) {
+    return w.find("differences in 'm1' could not be evaluated: the objective 'root'") == 0;
+  };
+  CHECK(std::any_of(check.warnings.begin(), check.warnings.end(), says_why));
 }
 
 TEST_CASE("the Taylor remainder of a linear objective has no slope, and that is right", "[check]") {

@@ -22,7 +22,7 @@ NloptOptions with(const std::string& method, double tolerance = 1e-8) {
 }
 
 std::vector<std::string> all_methods() {
-  std::istringstream words{std::string(kNloptMethods)};
+  std::istringstream words{std::string(nlopt_method_names())};
   std::vector<std::string> names;
   for (std::string word; words >> word;) names.push_back(word);
   return names;
