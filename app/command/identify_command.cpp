@@ -13,6 +13,7 @@
 #include "app/starts/residual_records.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/integrate/model_choice.hpp"
+#include "core/scene/type_table.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 #include "core/start/assembly.hpp"
 #include "core/start/model_warnings.hpp"

@@ -3,27 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 #include <utility>
+
+#include "core/scene/type_table.hpp"
 
 namespace mbsopt {
 namespace {
 
 constexpr std::size_t kMostSeries = 6;  // in one plot
-
-const std::map<std::string, std::string, std::less<>> kUnits{{"position", "m"},
-                                                             {"velocity", "m/s"},
-                                                             {"acceleration", "m/s^2"},
-                                                             {"angle", "rad"},
-                                                             {"rate", "rad/s"},
-                                                             {"distance", "m"},
-                                                             {"distance_rate", "m/s"},
-                                                             {"displacement", "m"},
-                                                             {"force", "N"},
-                                                             {"angular_velocity", "rad/s"},
-                                                             {"orientation", "-"},
-                                                             {"energy", "J"},
-                                                             {"constraint_violation", "m"}};
 
 std::vector<double> column(const Trajectory& trajectory, std::size_t index) {
   std::vector<double> values;
@@ -83,11 +70,6 @@ std::string title_of(const SensorGroup& group, const Trajectory& trajectory) {
 }
 
 }  // namespace
-
-std::string unit_of(const Sensor& sensor) {
-  const auto unit = kUnits.find(sensor.quantity);
-  return unit == kUnits.end() ? "-" : unit->second;
-}
 
 std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& trajectory) {
   std::vector<LinePlot> plots;

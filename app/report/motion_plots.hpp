@@ -9,7 +9,6 @@
 
 namespace mbsopt {
 
-std::string unit_of(const Sensor& sensor);  // "m", "rad/s", ...
 std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& trajectory);
 // The same plots with a second run dashed: before (dashed) and after.
 std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& before, const Trajectory& after);

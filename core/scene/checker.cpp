@@ -192,7 +192,7 @@ void Checker::check_sensors_of_state(const std::string& where, const Expression&
   for (const std::string& name : value.names()) {
     const Sensor* const sensor = facts_.sensor(name);
     const TypeRow* const row = sensor ? find_row(kSensorQuantities, sensor->quantity) : nullptr;
-    if (row && row->of_accelerations)
+    if (row && row->reads == Reads::motion)
       issue(where, "uses the sensor '" + name + "', whose quantity is " + sensor->quantity +
                        ": it follows from the forces, so a force cannot depend on it; sensors of positions, "
                        "velocities, angles, energies and spring forces can be used");

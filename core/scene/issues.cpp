@@ -306,12 +306,11 @@ void check_meaning(Checker& checker, const Condition& condition) {
   const TypeRow* const row = sensor ? find_row(kSensorQuantities, sensor->quantity) : nullptr;
   if (!row) return;
   const std::string named = "sensor '" + sensor->name + "'";
-  if (row->of_accelerations || sensor->quantity == "energy" || sensor->quantity == "constraint_violation" ||
-      sensor->quantity == "force")
+  if (row->reads > Reads::velocities)
     return checker.issue(checker.path("sensor"), named + " measures " + sensor->quantity +
                                                      ", which a condition cannot prescribe; use positions, angles, "
                                                      "distances, Euler parameters or their rates");
-  if (condition.rate && row->velocity_level)
+  if (condition.rate && row->reads == Reads::velocities)
     checker.issue(checker.path("rate"), named + " measures a " + sensor->quantity + ": give its \"value\"");
   if (condition.rate && sensor->quantity == "position" && sensor->in_body_frame)
     checker.issue(checker.path("rate"), named + " is in a body's axes, where its rate is not available");

@@ -95,6 +95,13 @@ Dimension dimension_of_drive(std::string_view type, std::string_view coordinate)
   return type == "coordinate" && coordinate.starts_with('e') ? Dimension{} : dimension::kLength;
 }
 
+std::string unit_of(const Sensor& sensor) {
+  const TypeRow* const row = find_row(kSensorQuantities, sensor.quantity);
+  if (!row || row->dimension == Dimension{}) return "-";
+  if (sensor.quantity == "energy") return "J";
+  return to_string(sensor.kind == "torque" ? dimension::kTorque : row->dimension);
+}
+
 bool is_identifier(std::string_view text) {
   const auto letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; };
   const auto digit = [](char c) { return c >= '0' && c <= '9'; };

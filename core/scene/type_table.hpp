@@ -13,9 +13,19 @@ namespace mbsopt {
 
 struct Force;
 struct Joint;
+struct Sensor;
 
 // Whether a joint ties two other joints (gear, rack_pinion) and has no bodies of its own.
 bool ties_joints(const Joint& joint);
+
+// What a sensor is a function of.
+enum class Reads {
+  positions,       // q: conditions may prescribe its value and its rate
+  velocities,      // q and v: conditions may prescribe its value
+  state,           // q and v, but no condition may prescribe it
+  time_and_state,  // laws of drives and forces, too
+  motion           // accelerations and reactions: no force may use it
+};
 
 struct TypeRow {
   std::string_view name;
@@ -23,8 +33,7 @@ struct TypeRow {
   std::string_view fields;           // "point1 axis1!": what it has besides its name, type and bodies; "!": required
   std::string_view components = "";  // of a sensor: what "component" may be
   Dimension dimension = {};          // of a sensor: what it measures
-  bool velocity_level = false;       // of a sensor: a condition on it has a value only
-  bool of_accelerations = false;     // of a sensor: not a function of (t, q, v) alone, so that no force may use it
+  Reads reads = Reads::positions;    // of a sensor
 };
 
 inline constexpr TypeRow kJointTypes[] = {
@@ -75,23 +84,24 @@ inline constexpr TypeRow kForceTypes[] = {
 inline constexpr TypeRow kSensorQuantities[] = {
     {"position", "of a body point", "body! point relative_to component! frame", "x y z norm", dimension::kLength},
     {"velocity", "of a body point", "body! point relative_to component! frame", "x y z norm", dimension::kVelocity,
-     true},
+     Reads::velocities},
     {"angle", "of a revolute, cylindrical or screw joint, continuous over many turns", "joint!", "", dimension::kAngle},
-    {"rate", "time derivative of a joint's angle", "joint!", "", dimension::kRate, true},
+    {"rate", "time derivative of a joint's angle", "joint!", "", dimension::kRate, Reads::velocities},
     {"displacement", "along the axis of a translational, cylindrical or screw joint", "joint!", "", dimension::kLength},
     {"distance", "of two body points", "body1 body2! point1 point2", "", dimension::kLength},
-    {"distance_rate", "time derivative of a distance", "body1 body2! point1 point2", "", dimension::kVelocity, true},
-    {"angular_velocity", "of a body", "body! component! frame", "x y z norm", dimension::kRate, true},
+    {"distance_rate", "time derivative of a distance", "body1 body2! point1 point2", "", dimension::kVelocity,
+     Reads::velocities},
+    {"angular_velocity", "of a body", "body! component! frame", "x y z norm", dimension::kRate, Reads::velocities},
     {"orientation", "Euler parameters of a body", "body! component!", "e0 e1 e2 e3"},
-    {"energy", "of the whole mechanism", "component!", "kinetic potential total", dimension::kTorque, true},
-    {"constraint_violation", "largest absolute entry of the constraint equations", ""},
-    {"force", "tension of a tsda, torque of an rsda", "force!", "", dimension::kForce, true},
+    {"energy", "of the whole mechanism", "component!", "kinetic potential total", dimension::kTorque, Reads::state},
+    {"constraint_violation", "largest absolute entry of the constraint equations", "", "", {}, Reads::time_and_state},
+    {"force", "tension of a tsda, torque of an rsda", "force!", "", dimension::kForce, Reads::time_and_state},
     {"acceleration", "of a body point, kinematic: without gravity", "body! point relative_to component! frame",
-     "x y z norm", dimension::kAcceleration, true, true},
+     "x y z norm", dimension::kAcceleration, Reads::motion},
     {"reaction", "force or torque of a joint on body2 at its point2, global axes", "joint! kind! component!",
-     "x y z norm", dimension::kForce, true, true},
+     "x y z norm", dimension::kForce, Reads::motion},
     {"drive_force", "force or torque of a drive along its coordinate, positive where it pushes it up", "drive!", "",
-     dimension::kForce, true, true},
+     dimension::kForce, Reads::motion},
 };
 
 inline constexpr std::string_view kJointsWithAngle = "revolute cylindrical screw";
@@ -121,6 +131,9 @@ std::string not_among(std::string_view what, std::string_view found, const std::
 
 // Whether friction in a joint resists sliding: as `motion` says, else where the joint has no angle.
 bool is_sliding(std::string_view motion, std::string_view joint_type);
+
+// In which a sensor's values are printed: "rad", "m/s"; "-" for a number.
+std::string unit_of(const Sensor& sensor);
 
 std::string_view type_of(const Force& force);
 void set_type(Force& force, std::string_view type);

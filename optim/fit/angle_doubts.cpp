@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/scene/type_table.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -39,8 +41,9 @@ const char* unit_of_angles(const Scene& scene, const std::string& sensor) {
   const auto found =
       std::find_if(scene.sensors.begin(), scene.sensors.end(), [&](const Sensor& s) { return s.name == sensor; });
   if (found == scene.sensors.end()) return nullptr;
-  if (found->quantity == "angle") return "rad";
-  return found->quantity == "rate" || found->quantity == "angular_velocity" ? "rad/s" : nullptr;
+  const TypeRow* const row = find_row(kSensorQuantities, found->quantity);
+  if (row && row->dimension == dimension::kAngle) return "rad";
+  return row && row->dimension == dimension::kRate ? "rad/s" : nullptr;
 }
 
 }  // namespace

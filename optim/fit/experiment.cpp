@@ -11,6 +11,7 @@
 #include "core/expression/did_you_mean.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/field_visitor.hpp"
+#include "core/scene/type_table.hpp"
 #include "optim/objective/expression_cost.hpp"
 #include "optim/objective/obstructed_parameters.hpp"
 #include "optim/problem/parameter_values.hpp"
@@ -112,8 +113,8 @@ double Experiment::largest_delay(const Program& delay) const {
 
 // d s/dt along the dense output is s_y ydot only where s has no time of its own.
 void Experiment::refuse_time_dependence(const Sensor& sensor, const Program& delay, const std::string& place) const {
-  const bool of_state = sensor.quantity != "acceleration" && sensor.quantity != "reaction" &&
-                        sensor.quantity != "force" && sensor.quantity != "constraint_violation";
+  const TypeRow* const row = find_row(kSensorQuantities, sensor.quantity);
+  const bool of_state = !row || row->reads < Reads::time_and_state;
   if (of_state || (!depends_on_time(scene_) && user_forces_.empty())) return;
   for (const Unknown& unknown : unknowns_)
     if (delay.uses(unknown.parameter))
