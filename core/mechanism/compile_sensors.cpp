@@ -70,6 +70,19 @@ ReactionSensor reaction_sensor(Compilation& model, const Sensor& s, const std::s
   return out;
 }
 
+// The angle of the direction n of the body, which is perpendicular to the axis where the body lies along the ground,
+// from n in the ground, seen along the axis.
+AngleSensor body_angle(Compilation& model, const Sensor& s, const std::string& where) {
+  JointAngle angle;
+  angle.body2 = model.body_index(s.body, where);
+  const DualVector3 axis = model.direction(0, s.axis, where + ".axis"), n = perpendicular(axis);
+  angle.measure.s1 = numbers(model.keep(angle.slot1, n));
+  angle.measure.s3 = numbers(model.keep(angle.slot3, cross(axis, n)));
+  angle.measure.s2 = numbers(model.keep(angle.slot2, n));
+  model.data.angles.push_back(angle);
+  return {static_cast<int>(model.data.angles.size()) - 1, false};
+}
+
 SensorKind sensor(Compilation& model, const Sensor& s, const std::string& where) {
   const std::string& quantity = s.quantity;
   if (quantity == "position" || quantity == "velocity") {
@@ -89,6 +102,7 @@ SensorKind sensor(Compilation& model, const Sensor& s, const std::string& where)
   if (quantity == "angle" || quantity == "rate") {
     return AngleSensor{model.angle_of(s.joint, where + ".joint"), quantity == "rate"};
   }
+  if (quantity == "body_angle") return body_angle(model, s, where);
   if (quantity == "angular_velocity") {
     return AngularVelocitySensor{model.body_index(s.body, where), component(s.component, where), s.in_body_frame};
   }

@@ -289,8 +289,9 @@ void check_meaning(Checker& checker, const Sensor& sensor) {
     check_joint_has(checker, "joint", sensor.joint, sensor.quantity == "displacement" ? "displacement" : "angle");
   if (need_of(*row, "body2") != Need::unknown && sensor.body1 == sensor.body2 && !sensor.body2.empty())
     checker.issue(checker.path("body2"), "is '" + sensor.body2 + "' like body1; their distance never changes");
-  if (sensor.quantity == "orientation" && sensor.body == "ground")
+  if ((sensor.quantity == "orientation" || sensor.quantity == "body_angle") && sensor.body == "ground")
     checker.issue(checker.path("body"), "is the ground, whose orientation never changes");
+  direction(checker, "axis", sensor.axis, "");
   if (sensor.quantity == "force") {
     const Force* const force = checker.facts().force(sensor.force);
     if (force && type_of(*force) != Tsda::kType && type_of(*force) != Rsda::kType)

@@ -186,9 +186,10 @@ struct Sensor {
   std::string joint;           // of angle, rate, displacement
   std::string body1, body2;    // of distance, distance_rate
   PointField point1 = "O", point2 = "O";
-  std::string force;  // of force
-  std::string kind;   // of reaction: force or torque
-  std::string drive;  // of drive_force
+  std::string force;               // of force
+  std::string kind;                // of reaction: force or torque
+  std::string drive;               // of drive_force
+  std::optional<PointField> axis;  // of body_angle, in the ground
 };
 
 struct Condition {

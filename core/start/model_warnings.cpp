@@ -164,6 +164,23 @@ void add_gravity(const MechanismData& d, std::vector<std::string>& warnings) {
                   g(0), g(1), g(2)));
 }
 
+// An axis in the plane: the angle about it never changes, or jumps by half a turn.
+void add_axes(const MechanismData& d, std::vector<std::string>& warnings) {
+  if (!d.planar) return;
+  constexpr double kAlong = 1 - 1e-9;
+  const Vector3d normal = Vector3d::Unit(d.planar->n);
+  for (std::size_t k = 0; k < d.sensors.size(); ++k) {
+    const auto* sensor = std::get_if<AngleSensor>(&d.sensors[k]);
+    if (!sensor) continue;
+    const JointAngle& angle = d.angles[at(sensor->angle)];
+    if (angle.body1 != 0 || std::abs(angle.measure.s1.cross(angle.measure.s3).dot(normal)) > kAlong) continue;
+    warnings.push_back(fmt::format(
+        "sensors.{}: its axis is not the normal of the plane in which the mechanism moves, [{}, {}, {}]; the "
+        "angle about it says nothing of the motion",
+        d.sensor_names[k], normal(0), normal(1), normal(2)));
+  }
+}
+
 // Coordinates r carry rounding of eps |r|, in which the arms of bodies are only so long.
 void add_rounding(const MechanismData& d, const VectorXd& q, std::vector<std::string>& warnings) {
   constexpr double kNoticeable = 1e-8;  // of the arms: below the tolerances of integrators
@@ -231,6 +248,7 @@ std::vector<std::string> model_warnings(const Mechanism& mechanism, const Assemb
   std::vector<std::string> warnings;
   add_violations(d, warnings);
   add_gravity(d, warnings);
+  add_axes(d, warnings);
   for (std::string& warning : start_warnings(mechanism, assembly)) warnings.push_back(std::move(warning));
   return warnings;
 }

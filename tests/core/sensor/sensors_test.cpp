@@ -103,6 +103,14 @@ struct TextbookScene {
     const double turn = 2 * std::acos(-1.0);
     return principal + turn * std::round((kTurns * turn - std::real(principal)) / turn);
   }
+  T body_angle() const {
+    const V3<T> axis{rho[n], T(1), T(0.8)}, u = scaled(T(1) / norm(axis), axis);  // least along global x
+    const V3<T> across = cross(u, V3<T>{T(1), T(0), T(0)}), x = scaled(T(1) / norm(across), across);
+    const V3<T> turned = values(times(body(1).moving().A, constant(x)));
+    const T principal = atan2_of(dot(turned, cross(u, x)), dot(turned, x));
+    const double turn = 2 * std::acos(-1.0);
+    return principal + turn * std::round((kTurns * turn - std::real(principal)) / turn);
+  }
   T kinetic() const {
     T sum(0);
     for (std::size_t i = 0; i < 2; ++i) {
@@ -207,6 +215,11 @@ Sensor force_of(const std::string& force) {
   s.force = force;
   return s;
 }
+Sensor about_axis() {
+  Sensor s = plain("body_angle");
+  s.axis = vec("n", "1", "0.8");
+  return s;
+}
 Sensor spin(const std::string& component, bool in_axes) {
   Sensor s = plain("angular_velocity", component);
   s.in_body_frame = in_axes;
@@ -250,6 +263,7 @@ const std::vector<Row>& all_sensors() {
           [](const auto& s) { return norm_rate(s.point(1, s.foot()) - s.point(0, s.tip())); }),
       row("angle", plain("angle"), [](const auto& s) { return s.angle(); }),
       row("rate", plain("rate"), [](const auto& s) { return s.rate(); }),
+      row("body_angle", about_axis(), [](const auto& s) { return s.body_angle(); }),
       row("angular_velocity, global", spin("y", false), [](const auto& s) { return s.omega(1, false)[1]; }),
       row("angular_velocity, body axes", spin("z", true), [](const auto& s) { return s.omega(1, true)[2]; }),
       row("angular_velocity, norm", spin("norm", false), [](const auto& s) { return norm(s.omega(1, false)); }),

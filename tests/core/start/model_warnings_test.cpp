@@ -75,3 +75,19 @@ TEST_CASE("a reaction that redundant equations leave undetermined is warned of, 
   CHECK(of("force", "norm").size() == 1);
   CHECK(of("torque", "x").size() == 1);
 }
+
+TEST_CASE("an angle about an axis in the plane of a mechanism is warned of", "[warnings]") {
+  const auto about = [](const VectorField& axis) {
+    Scene scene = pendulum();  // about z
+    scene.gravity = {0.0, -9.81, 0.0};
+    Sensor turn;
+    turn.name = "turn", turn.quantity = "body_angle", turn.body = scene.bodies[0].name, turn.axis = PointField(axis);
+    scene.sensors = {turn};
+    return warnings_of(scene);
+  };
+  CHECK(about({0.0, 0.0, -2.0}).empty());
+  const std::vector<std::string> found = about({0.0, 1.0, 0.0});
+  REQUIRE(found.size() == 1);
+  CHECK(found[0].find(
+            "sensors.turn: its axis is not the normal of the plane in which the mechanism moves, [0, 0, 1]") == 0);
+}
