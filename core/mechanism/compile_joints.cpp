@@ -263,6 +263,12 @@ int Compilation::angle_of(const std::string& name, const std::string& where, Zer
     if (zero == Zero::normals && (numbers(a1) - numbers(a2)).norm() > 1e-12) {
       throw SceneError(joint_path + ": its angle is used and axis1 differs from axis2: give normal1 and normal2");
     }
+    for (std::size_t k = 0; k < 3 && zero == Zero::normals; ++k) {
+      constexpr double kSame = 1e-12;
+      if ((a1[k].derivatives() - a2[k].derivatives()).norm() <= kSame) continue;
+      throw SceneError(joint_path +
+                       ": its angle is used, and a parameter turns axis1 away from axis2: give normal1 and normal2");
+    }
     n1 = perpendicular(a1);
     n2 = zero == Zero::normals ? perpendicular(a2) : normal_in_file(angle.body1, n1, angle.body2, a2);
     if (!numbers(n2).allFinite()) {

@@ -60,6 +60,12 @@ def roughen(rng, family, bodies):
         body["position"] = [x + family.length * rng.uniform(-0.15, 0.15) for x in body["position"]]
 
 
+def turns_one_axis(problem, section, path):
+    """A joint without normals has no angle where a parameter turns one of its axes away from the other."""
+    return (section == "joints" and str(path[-2]).startswith("axis") and
+            "normal1" not in problem[section][path[0]])
+
+
 def give_parameters(rng, family, problem):
     parameters = Parameters(rng)
     weights = {"bodies": 3, "joints": 3, "forces": 3, "drives": 1, "initial": 1, "gravity": 0.3,
@@ -70,6 +76,7 @@ def give_parameters(rng, family, problem):
             continue
         able = [place for place in places(problem[section]) if not FIXED & set(place[2]) or place[2][-1] == "angle"]
         able = [(items, key, path) for items, key, path in able if items[key] != 0 or rng.random() < 0.1]
+        able = [place for place in able if not turns_one_axis(problem, section, place[2])]
         if not able:
             continue
         items, key, path = rng.choice(able)

@@ -237,6 +237,8 @@ TEST_CASE("only what joints hold in a plane, at every value of the parameters, i
   Scene tilting = double_pendulum();  // parallel now, but a parameter tilts it
   add_parameters(tilting, {{"tilt", 0.0}});
   tilting.joints[1].axis1 = vec("0", "sin(tilt)", "cos(tilt)");
+  CHECK_THROWS_WITH(reason(tilting), Catch::Contains("joints[1]: its angle is used, and a parameter turns axis1 away"));
+  tilting.joints[1].normal1 = tilting.joints[1].normal2 = vec("1", "0", "0");
   CHECK_FALSE(reason(tilting).empty());
 
   Scene hung = double_pendulum();  // by a ball
