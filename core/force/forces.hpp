@@ -11,6 +11,7 @@
 
 #include <concepts>
 #include <tuple>
+#include <type_traits>
 #include <vector>
 
 #include "core/force/bushing.hpp"
@@ -68,8 +69,8 @@ class ForceLists {
   template <class Visitor>
   void visit_law(Place place, Visitor&& visitor) const {
     std::size_t kind = 0;
-    const auto visit = [&]<class Kind>(const std::vector<Kind>& list) {
-      if constexpr (HasLaw<Kind>) {
+    const auto visit = [&](const auto& list) {
+      if constexpr (HasLaw<typename std::decay_t<decltype(list)>::value_type>) {
         if (kind == place.kind) visitor(list[place.index]);
       }
       ++kind;

@@ -124,8 +124,7 @@ class DataCheck {
     const ChannelSpec& channel = experiment_.channels[c];
     const auto sensor = std::find_if(scene_.sensors.begin(), scene_.sensors.end(),
                                      [&](const Sensor& s) { return s.name == channel.sensor; });
-    const TypeRow* const row =
-        sensor == scene_.sensors.end() ? nullptr : find_row(kSensorQuantities, sensor->quantity);
+    const TypeRow* const row = sensor == scene_.sensors.end() ? nullptr : find_row(kSensorQuantities, sensor->quantity);
     if (!row || row->dimension != dimension::kAngle || !channel.gain.is_number()) return;
     const std::vector<double>& measured = data_.column(channel.column);
     const std::vector<std::size_t> rows = samples(channel);
