@@ -52,13 +52,21 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
   return plots;
 }
 
+// An experiment ends with its data, not with the scene's time.
+std::function<bool(double t)> told(Run& run) {
+  return [&run](double t) {
+    run.progress.time("simulating", t);
+    return !interrupted();
+  };
+}
+
 IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem, const std::vector<CsvTable>& data) {
   JsonResidualRecords records(long_run.earlier().residuals,
                               [&](const Json& content) { long_run.add("residuals", content); });
   IdentificationOptions options;
   options.records = &records;
   options.profiles = run.context.options.profiles;
-  options.simulation_progress = run.watched("simulating");
+  options.simulation_progress = told(run);
   options.progress = [&](const FitRow& row) {
     run.progress.iteration(fmt::format("iteration {:3d}   cost {:.9e}   gradient {:.1e}   step {:.1e}", row.iteration,
                                        row.cost, row.gradient_norm, row.step_norm));
@@ -93,7 +101,7 @@ void simulate_first_experiment(Run& run, const Problem& needed, const std::vecto
   const Scene scene = simulated_scene(needed, data);
   const Mechanism mechanism(scene, parameter_values(scene), std::vector<bool>(scene.parameters.size(), false));
   RunOptions options;
-  options.progress = run.watched("simulating");
+  options.progress = told(run);
   const SimulationResult first = simulate(mechanism, scene.simulation, {}, {}, options);
   run.result["simulation"] = to_json(first.statistics);
   if (first.ok())

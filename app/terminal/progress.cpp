@@ -45,16 +45,23 @@ void Progress::fraction(std::string_view what, double done) {
   if (terminal_ && whole == shown_percent_) return;
   const double now = seconds_();
   if (now - said_ < patience_) return;
-  if (!terminal_) {
-    err_ << fmt::format("{}: {:.3g} % after {:.0f} s\n", what, percent, now - start_) << std::flush;
-    said_ = now, patience_ = std::min(2 * patience_, kLongest);
-    return;
-  }
+  if (!terminal_) return break_silence(fmt::format("{}: {:.3g} %", what, percent), now);
   shown_percent_ = whole;
   const int filled = whole * kBarWidth / 100;
   err_ << kClearLine << fmt::format("{} [{:#>{}}{:.>{}}] {:3d} %", what, "", filled, "", kBarWidth - filled, whole)
        << std::flush;
   line_open_ = true;
+}
+
+void Progress::time(std::string_view what, double t) {
+  if (quiet_ || terminal_) return;
+  if (const double now = seconds_(); now - said_ >= patience_)
+    break_silence(fmt::format("{}: t = {:.3g} s", what, t), now);
+}
+
+void Progress::break_silence(std::string_view words, double now) {
+  err_ << fmt::format("{} after {:.0f} s\n", words, now - start_) << std::flush;
+  said_ = now, patience_ = std::min(2 * patience_, kLongest);
 }
 
 void Progress::iteration(std::string_view line) {

@@ -24,10 +24,13 @@ class Progress {
   static double steady_seconds();
 
   void fraction(std::string_view what, double done);  // done: 0..1
+  void time(std::string_view what, double t);         // [s]; of runs whose end is not known: no bar
   void iteration(std::string_view line);
   void finish();  // clears the bar
 
  private:
+  void break_silence(std::string_view words, double now);
+
   std::ostream& err_;
   bool terminal_, quiet_;
   std::function<double()> seconds_;

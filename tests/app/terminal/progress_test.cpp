@@ -33,6 +33,14 @@ TEST_CASE("without a terminal, a long silence is broken, and ever more rarely", 
   CHECK(err.str() == "simulating: 4 % after 4 s\nsimulating: 12 % after 12 s\nsimulating: 28 % after 28 s\n");
 }
 
+TEST_CASE("a run whose end is not known tells its time", "[progress]") {
+  std::ostringstream err;
+  double now = 0;
+  Progress progress(err, false, false, [&] { return now; });
+  for (; now <= 5; now += 0.5) progress.time("simulating", 0.1 * now);
+  CHECK(err.str() == "simulating: t = 0.4 s after 4 s\n");
+}
+
 TEST_CASE("on a terminal, an iteration's line stays for a moment", "[progress]") {
   std::ostringstream err;
   double now = 0;
