@@ -91,17 +91,23 @@ void add_springs(const MechanismData& d, const VectorXd& y, std::vector<std::str
   }
 }
 
-// Derivatives of a reaction's components in lambda, one column each.
+// Derivatives of a reaction's components in lambda, one column each. A norm has those of the plane of a mechanism,
+// since nothing in the plane loads the others.
 Eigen::MatrixXd by_lambda(const MechanismData& d, ReactionSensor sensor, const VectorXd& y) {
-  const int components = sensor.component == PointSensor::kNorm ? 3 : 1;
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(d.m, components);
+  std::vector<int> components{sensor.component};
+  if (sensor.component == PointSensor::kNorm) {
+    components.clear();
+    for (int k = 0; k < 3; ++k)
+      if (!d.planar || (k == d.planar->n) == sensor.torque) components.push_back(k);
+  }
+  Eigen::MatrixXd columns(d.m, static_cast<Eigen::Index>(components.size()));
   const VectorXd none = VectorXd::Zero(d.m);
   VectorXd y_bar = VectorXd::Zero(y.size()), rho_bar = VectorXd::Zero(d.rho.size()), lambda_bar;
-  for (int k = 0; k < components; ++k) {
-    if (components == 3) sensor.component = k;
+  for (std::size_t k = 0; k < components.size(); ++k) {
+    sensor.component = components[k];
     lambda_bar = none;
     add_gradient(d, sensor, y, none, 1, y_bar, lambda_bar, rho_bar);
-    columns.col(k) = lambda_bar;
+    columns.col(static_cast<Eigen::Index>(k)) = lambda_bar;
   }
   return columns;
 }
