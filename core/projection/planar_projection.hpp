@@ -44,7 +44,7 @@ class PlanarProjector {
   void set_positions();   // of delta_
   void set_velocities();  // of u_
   void read(const Eigen::VectorXd& y);
-  // Of turns times d theta/d delta_theta.
+  // Multiplies turns by d theta/d delta_theta.
   template <class X>
   void turn_by_E(std::vector<X>& x) const;
   // b = -M' x - (J'nu)' in the directions of the parameters, load_dirs_ holding (J'nu)'.

@@ -18,7 +18,7 @@ struct Sensor;
 // Whether a joint ties two other joints (gear, rack_pinion) and has no bodies of its own.
 bool ties_joints(const Joint& joint);
 
-// What a sensor is a function of.
+// A sensor is a function of these, or of the ones before them.
 enum class Reads {
   positions,       // q: conditions may prescribe its value and its rate
   velocities,      // q and v: conditions may prescribe its value

@@ -386,7 +386,7 @@ class Check {
       TaylorCheck check;
       check.objective = result_.objectives[static_cast<std::size_t>(i)];
       std::vector<double> slopes;
-      // What falls as h or faster has a 1/4096 of it left at the smallest two. The rest is rounding.
+      // A remainder that falls as h or faster leaves 1/4096 of itself at the smallest two h; more is rounding.
       double left = 0;
       for (std::size_t j = std::max<std::size_t>(steps.size(), 2) - 2; j < steps.size(); ++j)
         left = std::max(left, remainders[j](i));

@@ -77,7 +77,8 @@ class Lab:
         return float(eval(text.replace("^", "**"), {"__builtins__": {}}, FUNCTIONS | names))
 
     def farthest(self):
-        return max((math.hypot(*map(self.number, body.get("position", []))) for body in self.problem["bodies"]), default=0)
+        positions = [body.get("position", []) for body in self.problem["bodies"]]
+        return max((math.hypot(*map(self.number, position)) for position in positions), default=0)
 
     def body_length(self):
         """The longest arm of a body: its own points and its centre of mass."""

@@ -80,7 +80,7 @@ class Outcome:
         for text, where in ((self.out, "standard output"), (self.err, "standard error")):
             if NUMBERLESS.search(text):
                 self.complain("no number", f"{where}: {line_of(NUMBERLESS, text)}")
-        sentences = [line for line in self.err.splitlines() if "   " not in line]  # no line of an optimiser's iterations
+        sentences = [line for line in self.err.splitlines() if "   " not in line]  # not of iterations
         for text in sentences + self.warnings:
             if CLUMSY.search(text):
                 self.complain("words", text.strip()[:300])
