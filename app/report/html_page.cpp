@@ -17,6 +17,7 @@ constexpr std::string_view kStyle = R"(
 body { color:var(--ink); background:var(--paper); font:15px/1.45 system-ui,sans-serif; max-width:820px; margin:2em auto;
   padding:0 1em; }
 h1 { font-size:1.5em } h2 { font-size:1.15em; margin-top:1.8em }
+table + table { margin-top:1.2em }
 table { border-collapse:collapse; font-variant-numeric:tabular-nums; display:block; overflow-x:auto }
 th,td { padding:.25em .8em; border-bottom:1px solid var(--rule); text-align:right; white-space:nowrap }
 th:first-child,td:first-child { text-align:left; padding-left:0 } th { color:var(--soft); font-weight:600 }
