@@ -13,11 +13,14 @@ using Eigen::VectorXd;
 
 namespace {
 
-// The columns of W, orthonormal in units of the sizes, span the null space. Those that turn no body (or, where lengths
-// are large, move none) have a part of rounding in p (in r). In the units of x it is eps/L for lengths L, and
-// multiplies the large g of p beside the small one of r: a part eps/L^2 of r would be wrong. So that part is zero,
-// exactly.
-MatrixXd orthonormal_null_space(const MatrixXd& W, const VectorXd& sizes) {
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+// An orthonormal basis of { x : J x / sizes = 0 }. The columns of W, orthonormal in units of the sizes, span it. Those
+// that turn no body (or, where lengths are large, move none) have a part of rounding in p (in r). In the units of x it
+// is eps/L for lengths L, and multiplies the large g of p beside the small one of r: a part eps/L^2 of r would be wrong.
+// So that part is zero, exactly, unless J needs one: of z without it, J leaves more than rounding, and z - J+ J z has it.
+MatrixXd orthonormal_null_space(const MatrixXd& J, const OrthogonalDecomposition& J_transposed, const VectorXd& sizes) {
+  const MatrixXd W = J_transposed.left_null_space();
   const double heavy = sizes.size() > 0 ? sizes.maxCoeff() : 0;
   std::vector<Eigen::Index> heavy_rows;
   for (Eigen::Index i = 0; i < sizes.size(); ++i) {
@@ -26,9 +29,20 @@ MatrixXd orthonormal_null_space(const MatrixXd& W, const VectorXd& sizes) {
   if (W.size() == 0 || heavy_rows.size() == static_cast<std::size_t>(sizes.size())) return orthonormal_columns(W);
   const LeftSingular parts = left_singular(W(heavy_rows, Eigen::all).transpose());
   const Eigen::Index both = (parts.values.array() > NearestPointLinearisation::kRankThreshold).count();
-  MatrixXd Z(W.rows(), W.cols()), light = W * parts.U.rightCols(W.cols() - both);
+  MatrixXd light = W * parts.U.rightCols(W.cols() - both);
   light(heavy_rows, Eigen::all).setZero();
-  Z << orthonormal_columns(sizes.asDiagonal() * W * parts.U.leftCols(both)), orthonormal_columns(light);
+  const MatrixXd heavy_part = -J_transposed.solve_transposed(J * light), left = J * heavy_part;
+  const double rounding = static_cast<double>(J.cols()) * kEpsilon;  // of sums along a row of length 1
+  Eigen::Index coupled = 0;
+  MatrixXd U = MatrixXd::Identity(light.cols(), light.cols());
+  if (left.size() > 0 && left.lpNorm<Eigen::Infinity>() > rounding) {
+    LeftSingular couplings = left_singular(left.transpose());
+    coupled = (couplings.values.array() > rounding).count();
+    U = std::move(couplings.U);
+  }
+  MatrixXd mixed(W.rows(), both + coupled), Z(W.rows(), W.cols());
+  mixed << W * parts.U.leftCols(both), (light + heavy_part) * U.leftCols(coupled);
+  Z << orthonormal_columns(sizes.asDiagonal() * mixed), orthonormal_columns(light * U.rightCols(U.cols() - coupled));
   return Z;
 }
 
@@ -43,8 +57,9 @@ NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J, const Ve
     const double norm = sized.row(i).norm();
     scale_(i) = norm > 0 ? 1 / norm : 1.0;
   }
-  J_transposed_ = OrthogonalDecomposition((scale_.asDiagonal() * sized).transpose(), kRankThreshold);
-  Z_ = orthonormal_null_space(J_transposed_.left_null_space(), sizes);
+  const MatrixXd scaled = scale_.asDiagonal() * sized;
+  J_transposed_ = OrthogonalDecomposition(scaled.transpose(), kRankThreshold);
+  Z_ = orthonormal_null_space(scaled, J_transposed_, sizes);
 }
 
 // With lengths L, entries of r stand as L g_r beside g_p, of which rounding is eps g_p: refinement by g - J'nu, where
@@ -107,7 +122,6 @@ namespace {
 constexpr int kMaxIterations = 400;
 constexpr double kLocal = 1e-6;       // steps below it are taken whole: the merit function sees only rounding there
 constexpr double kSatisfied = 1e-11;  // of F, per unit of x
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 double largest(const VectorXd& x) { return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>(); }
 

@@ -547,6 +547,35 @@ TEST_CASE("a guess that turns fast does not cost the derivatives of a slide thei
   CHECK((rho_bar.transpose() - exact.cwiseQuotient(units)).lpNorm<Eigen::Infinity>() < 1e-12);
 }
 
+// A point s from the centre of mass is asked onto a plane: Delta r = -nu n, Delta p = -nu B(p, s)'n at the least
+// |Delta r|^2 + |Delta p|^2, however short s is.
+TEST_CASE("a short arm turns its body as the nearest state asks, whatever the size of the mechanism", "[assembly]") {
+  const double size = GENERATE(1e-6, 1.0, 1e4), arm = GENERATE(1e-9, 1e-7) * size;
+  INFO(arm << " m of " << size << " m");
+  const auto sized = [&](double x, double y, double z) {
+    return vec(fmt::format("{}", size * x), fmt::format("{}", size * y), fmt::format("{}", size * z));
+  };
+  Scene scene;
+  scene.bodies.push_back(body("rod", vec("0", "0", "0"), sized(0.3, 0.4, 0.5), turned("0")));
+  scene.bodies.push_back(body("plate", vec("0", "0", "0"), sized(0.2, 0.1, 0), turned("0")));
+  Joint on_plane;
+  on_plane.name = "on_plane", on_plane.type = "point_on_plane", on_plane.body1 = "ground", on_plane.body2 = "rod";
+  on_plane.point1 = sized(0, 0, 0.5), on_plane.axis1 = vec("0", "0", "1");
+  on_plane.point2 = vec(fmt::format("{}", 0.6 * arm), "0", fmt::format("{}", 0.8 * arm));
+  scene.joints.push_back(on_plane);
+  Joint pin;  // a long arm
+  pin.name = "pin", pin.type = "spherical", pin.body1 = "ground", pin.body2 = "plate";
+  pin.point1 = sized(0, 0, 0), pin.point2 = sized(-0.2, -0.1, 0);
+  scene.joints.push_back(pin);
+  const AssemblyResult a = assemble(scene);
+  INFO(a.message);
+  REQUIRE(a.ok);
+  // r_z + s_z (1 - 2 e1^2 - 2 e2^2) + 2 s_x (e1 e3 - e0 e2) = 0.5 size, to first order in e2: e2 = 2 s_x nu
+  const double nu = 0.8 * arm / (1 + 4 * 0.36 * arm * arm);
+  CHECK(a.y(2) - 0.5 * size == Approx(-nu).epsilon(1e-3).margin(4e-16 * size));
+  CHECK(a.y(5) == Approx(2 * 0.6 * arm * nu).epsilon(1e-3).margin(1e-15));
+}
+
 TEST_CASE("assembly gives a mechanism of micrometres the motion of one of metres", "[assembly]") {
   const auto assembled = [](double size) {
     Scene scene = spatial_four_bar();
