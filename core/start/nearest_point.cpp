@@ -17,8 +17,9 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 // An orthonormal basis of { x : J x / sizes = 0 }. The columns of W, orthonormal in units of the sizes, span it. Those
 // that turn no body (or, where lengths are large, move none) have a part of rounding in p (in r). In the units of x it
-// is eps/L for lengths L, and multiplies the large g of p beside the small one of r: a part eps/L^2 of r would be wrong.
-// So that part is zero, exactly, unless J needs one: of z without it, J leaves more than rounding, and z - J+ J z has it.
+// is eps/L for lengths L, and multiplies the large g of p beside the small one of r: a part eps/L^2 of r would be
+// wrong. So that part is zero, exactly, unless J needs one: of z without it, J leaves more than rounding, and z - J+ J
+// z has it.
 MatrixXd orthonormal_null_space(const MatrixXd& J, const OrthogonalDecomposition& J_transposed, const VectorXd& sizes) {
   const MatrixXd W = J_transposed.left_null_space();
   const double heavy = sizes.size() > 0 ? sizes.maxCoeff() : 0;

@@ -46,6 +46,7 @@ StageMatrix::StageMatrix(const MechanismData& data, const MotionJacobian& jacobi
       accelerations_(7 * data.n),
       per_stage_(7 * data.n + data.m),
       epsilon_(kEpsilon * data.row_alpha.cwiseInverse()) {
+  set_scales(data);
   const auto& rows = jacobian.rows();
   for (std::size_t k = 0; k < rows.size();) {
     std::vector<int> bodies;
@@ -91,6 +92,20 @@ StageMatrix::StageMatrix(const MechanismData& data, const MotionJacobian& jacobi
   probe_.setZero(size()), answer_.setZero(size());
 }
 
+// Lengths in units of L, forces in units of J/L, multipliers so that the rows of G see J, where the heaviest body has
+// the inertia J = m L^2: pivots are chosen among entries of one size, in micrometres as in kilometres. Powers of two
+// round nothing.
+void StageMatrix::set_scales(const MechanismData& data) {
+  double mass = 0, inertia = 0;
+  for (const BodyData& body : data.bodies)
+    mass = std::max(mass, body.mass), inertia = std::max(inertia, body.J.trace());
+  const auto power_of_two = [](double x) { return std::exp2(std::round(std::log2(x))); };
+  const double J = inertia > 0 ? power_of_two(inertia) : 1, L = mass > 0 ? power_of_two(std::sqrt(J / mass)) : 1;
+  column_scale_ << L, L, L, 1, 1, 1, 1;
+  row_scale_ << L, L, L, 1, 1, 1, J;
+  multiplier_scale_ = (data.row_alpha * J).cwiseSqrt().unaryExpr(power_of_two);
+}
+
 bool StageMatrix::factor(double h, const Eigen::MatrixXd& A, std::span<const MotionJacobian::Values* const> values,
                          Trial trial) {
   P_ = h * A;
@@ -124,11 +139,11 @@ bool StageMatrix::factor_blocks() {
       if (p != 0 || pp != 0) {
         for (std::size_t k = 0; k < pairs_.size(); ++k) {
           const MotionJacobian::Block K = p * x.v[k] + pp * x.q[k];
-          S.add(pairs_[k], 7 * i, 7 * j, K);
+          S.add(pairs_[k], 7 * i, 7 * j, scaled(K));
         }
       }
       if (i == j) {
-        for (std::size_t b = 0; b < diagonal_.size(); ++b) S.add(diagonal_[b], 7 * i, 7 * i, x.mass[b]);
+        for (std::size_t b = 0; b < diagonal_.size(); ++b) S.add(diagonal_[b], 7 * i, 7 * i, scaled(x.mass[b]));
       }
       for (const Joint& joint : joints_) {
         const std::size_t bodies = joint.bodies.size(), rows = at(joint.rows);
@@ -138,12 +153,12 @@ bool StageMatrix::factor_blocks() {
         }
         for (std::size_t a = 0; a < bodies; ++a) {
           for (std::size_t b = 0; b < bodies; ++b) {
-            Mat<6, 7> JWG = Mat<6, 7>::Zero();
+            MotionJacobian::Block JWG = MotionJacobian::Block::Zero();
             for (std::size_t r = 0; r < rows; ++r) {
               const Vec<6> JW = W_(joint.row + static_cast<int>(r)) * x.J[joint.place + r * bodies + a].transpose();
-              for (int c = 0; c < 7; ++c) JWG.col(c) += G_[r * bodies + b](c) * JW;
+              for (int c = 0; c < 7; ++c) JWG.col(c).head<6>() += G_[r * bodies + b](c) * JW;
             }
-            S.add(joint.blocks[a * bodies + b], 7 * i, 7 * j, JWG);
+            S.add(joint.blocks[a * bodies + b], 7 * i, 7 * j, scaled(JWG));
           }
         }
       }
@@ -163,21 +178,25 @@ bool StageMatrix::factor_sparse() {
     for (int j = 0; j < stages_; ++j) {
       const double p = P_(i, j), pp = P2_(i, j);
       for (std::size_t b = 0; b < of.q.size(); ++b) {
-        for (Eigen::Index e = 0; e < 49; ++e) add(p * of.v[b].data()[e] + pp * of.q[b].data()[e]);
+        const MotionJacobian::Block K = scaled(p * of.v[b] + pp * of.q[b]);
+        for (const double e : K.reshaped()) add(e);
       }
       for (std::size_t r = 0; r < of.row_q.size(); ++r) {
+        const double scale = multiplier_scale_(jacobian_->rows()[r].row);
         for (Eigen::Index e = 0; e < 7; ++e) {
-          add(p * of.row_v[r](e) + pp * of.row_q[r](e) + (i == j ? of.J_T[r](e) : 0.0));
+          add(scale * column_scale_(e) * (p * of.row_v[r](e) + pp * of.row_q[r](e) + (i == j ? of.J_T[r](e) : 0.0)));
         }
       }
     }
     for (const MotionJacobian::Block& mass : of.mass) {
-      for (Eigen::Index e = 0; e < 49; ++e) add(mass.data()[e]);
+      const MotionJacobian::Block M = scaled(mass);
+      for (const double e : M.reshaped()) add(e);
     }
-    for (const Mat<1, 6>& J : of.J) {
-      for (Eigen::Index e = 0; e < 6; ++e) add(J(e));
+    for (std::size_t r = 0; r < of.J.size(); ++r) {
+      const double scale = multiplier_scale_(jacobian_->rows()[r].row);
+      for (Eigen::Index e = 0; e < 6; ++e) add(scale * row_scale_(e) * of.J[r](e));
     }
-    for (Eigen::Index r = 0; r < W_.size(); ++r) add(-1 / W_(r));
+    for (Eigen::Index r = 0; r < W_.size(); ++r) add(-multiplier_scale_(r) * multiplier_scale_(r) / W_(r));
   }
   return sparse_->factor();
 }
@@ -264,10 +283,26 @@ template <bool Transposed>
 void StageMatrix::solve_factored(Eigen::Ref<Eigen::MatrixXd> b) {
   if (!use_sparse_) {
     for (Eigen::Index c = 0; c < b.cols(); ++c) solve_blocks<Transposed>(b.col(c));
-  } else if (Transposed) {
-    sparse_->solve_transposed(b);
   } else {
-    sparse_->solve(b);
+    scale<Transposed>(b);
+    if (Transposed) {
+      sparse_->solve_transposed(b);
+    } else {
+      sparse_->solve(b);
+    }
+    scale<!Transposed>(b);
+  }
+}
+
+// Right-hand sides of the scaled matrix, from those of N; with Columns, solutions of N from its solutions (of N', from
+// right-hand sides).
+template <bool Columns>
+void StageMatrix::scale(Eigen::Ref<Eigen::MatrixXd> b) const {
+  for (int i = 0; i < stages_; ++i) {
+    for (int body = 0; body < jacobian_->bodies(); ++body) {
+      b.middleRows<7>(i * per_stage_ + 7 * body).array().colwise() *= (Columns ? column_scale_ : row_scale_).array();
+    }
+    b.middleRows(i * per_stage_ + accelerations_, W_.size()).array().colwise() *= multiplier_scale_.array();
   }
 }
 
@@ -283,7 +318,8 @@ void StageMatrix::solve_blocks(Eigen::Ref<Eigen::VectorXd> b) {
   const Eigen::Index stride = blocks_->stride();
   for (int i = 0; i < stages_; ++i) {
     for (int body = 0; body < jacobian_->bodies(); ++body) {
-      by_body_.segment<7>(body * stride + 7 * i) = b.segment<7>(i * per_stage_ + 7 * body);
+      by_body_.segment<7>(body * stride + 7 * i) =
+          (Transposed ? column_scale_ : row_scale_).cwiseProduct(b.segment<7>(i * per_stage_ + 7 * body));
     }
   }
   if (Transposed) {
@@ -293,7 +329,8 @@ void StageMatrix::solve_blocks(Eigen::Ref<Eigen::VectorXd> b) {
   }
   for (int i = 0; i < stages_; ++i) {
     for (int body = 0; body < jacobian_->bodies(); ++body) {
-      b.segment<7>(i * per_stage_ + 7 * body) = by_body_.segment<7>(body * stride + 7 * i);
+      b.segment<7>(i * per_stage_ + 7 * body) =
+          (Transposed ? row_scale_ : column_scale_).cwiseProduct(by_body_.segment<7>(body * stride + 7 * i));
     }
     auto lambda = b.segment(i * per_stage_ + accelerations_, W_.size());
     lambda.array() /= -W_.array();

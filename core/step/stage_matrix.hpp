@@ -52,6 +52,13 @@ class StageMatrix {
     std::vector<BlockLu::Handle> blocks;  // (row body, column body), columns fastest
   };
 
+  void set_scales(const MechanismData& data);
+  MotionJacobian::Block scaled(const MotionJacobian::Block& K) const {
+    return row_scale_.asDiagonal() * K * column_scale_.asDiagonal();
+  }
+  template <bool Columns>
+  void scale(Eigen::Ref<Eigen::MatrixXd> b) const;
+
   bool factor_blocks();
   bool factor_sparse();
   bool turn_to_sparse();
@@ -82,7 +89,9 @@ class StageMatrix {
   const MotionJacobian* jacobian_;
   int stages_;
   Eigen::Index accelerations_, per_stage_;
-  Eigen::VectorXd epsilon_;  // per row of Phi
+  Eigen::VectorXd epsilon_;          // per row of Phi
+  Vec<7> row_scale_, column_scale_;  // of a body's equations and accelerations, as they are factored
+  Eigen::VectorXd multiplier_scale_;
   std::vector<Joint> joints_;
   std::vector<BlockLu::Handle> pairs_, diagonal_;  // per pair of the Jacobian; per body
   std::optional<BlockLu> blocks_;                  // none for more stages than it takes
