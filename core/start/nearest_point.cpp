@@ -74,6 +74,25 @@ MatrixXd NearestPointLinearisation::multipliers(const Eigen::Ref<const MatrixXd>
   }
   return nu;
 }
+// Rounding leaves eps L of x in r and eps in p. The rows of the smaller size, r of tiny mechanisms, say what they can
+// of nu; the others say the rest, which is larger: its rounding goes out by another look at the first.
+VectorXd NearestPointLinearisation::multipliers_at(const VectorXd& away) const {
+  const double smallest = sizes_.minCoeff();
+  if (smallest == sizes_.maxCoeff()) return multipliers(away);
+  std::vector<Eigen::Index> fine, coarse;
+  for (Eigen::Index i = 0; i < sizes_.size(); ++i) (sizes_(i) == smallest ? fine : coarse).push_back(i);
+  const MatrixXd A = sizes_.asDiagonal() * J_.transpose() * scale_.asDiagonal();
+  const VectorXd b = sizes_.cwiseProduct(away);
+  const MatrixXd A_fine = A(fine, Eigen::all), A_coarse = A(coarse, Eigen::all);
+  const OrthogonalDecomposition fine_rows(A_fine, kRankThreshold);
+  VectorXd nu = fine_rows.solve(b(fine));
+  const MatrixXd N = mbsopt::null_space(A_fine, kRankThreshold);
+  if (N.cols() > 0) {
+    nu += N * OrthogonalDecomposition(A_coarse * N, kRankThreshold).solve(b(coarse) - A_coarse * nu);
+    nu += fine_rows.solve(b(fine) - A_fine * nu);
+  }
+  return scale_.cwiseProduct(nu);
+}
 MatrixXd NearestPointLinearisation::particular(const Eigen::Ref<const MatrixXd>& b) const {
   return sizes_.asDiagonal() * J_transposed_.solve_transposed(scale_.asDiagonal() * b);
 }
@@ -221,6 +240,7 @@ class Search {
         ++waited;
       }
       if (length < kNear * size()) {
+        result_.nu = at.multipliers(away);
         add_curvature();
         const VectorXd& lambda = at.reduced_eigenvalues();
         if (lambda.size() == 0 || lambda(0) > kConvex) step = at.solve(-result_.F, away);
@@ -242,6 +262,7 @@ class Search {
     for (; result_.iterations < last; ++result_.iterations) {
       linearise();
       if (!result_.F.allFinite()) return;
+      result_.nu = result_.linearisation.multipliers(x_guess_ - result_.x);
       add_curvature();
       const VectorXd step = result_.linearisation.descent(-result_.F, x_guess_ - result_.x);
       const bool still = converged(largest(step));
@@ -274,6 +295,7 @@ class Search {
     sized_ = true;
     for (double last = std::numeric_limits<double>::infinity();;) {
       linearise();
+      result_.nu = result_.linearisation.multipliers_at(x_guess_ - result_.x);
       add_curvature();
       const VectorXd step = result_.linearisation.solve(-result_.F, x_guess_ - result_.x);
       const double length = largest(step.cwiseQuotient(result_.linearisation.sizes() + VectorXd(result_.x.cwiseAbs())));
@@ -283,7 +305,6 @@ class Search {
     }
   }
   void add_curvature() {
-    result_.nu = result_.linearisation.multipliers(x_guess_ - result_.x);
     MatrixXd H = equations_.curvature(result_.x, result_.nu);
     H.diagonal().array() += 1;
     result_.linearisation.set_hessian(H);

@@ -33,6 +33,16 @@ double turn(const AssemblyResult& a, int body) {
   return 2 * std::atan2(p(3), p(0));
 }
 
+Scene spatial_four_bar_of_size(double size) {
+  Scene scene = spatial_four_bar();
+  const auto scale = [&](VectorField& x) {
+    for (Field& c : x) c = f(fmt::format("{}*({})", size, c.text()));
+  };
+  for (Body& b : scene.bodies) scale(b.com), scale(b.position), scale(b.velocity);
+  for (Joint& j : scene.joints) scale(std::get<VectorField>(j.point1)), scale(std::get<VectorField>(j.point2));
+  return scene;
+}
+
 // Rows of y by central differences, extrapolated once: error O(h^4).
 MatrixXd differences(const Scene& scene) {
   const VectorXd rho = nominal(scene);
@@ -53,14 +63,16 @@ MatrixXd differences(const Scene& scene) {
 }
 
 // The derivatives of the assembled state, two ways, against differences of whole assemblies.
-void check_derivatives(const Scene& scene) {
+// Rows of positions and velocities are compared in units of size.
+void check_derivatives(const Scene& scene, double size = 1) {
   const Mechanism mechanism(scene, nominal(scene));
   const Assembly assembly(mechanism, 0);
   INFO(assembly.result().message);
   REQUIRE(assembly.result().ok);
-  const MatrixXd y_rho = assembly.tangent();
+  MatrixXd y_rho = assembly.tangent();
   REQUIRE(y_rho.allFinite());
-  const MatrixXd D = differences(scene);
+  MatrixXd D = differences(scene);
+  for (Eigen::Index i = 0; i < y_rho.rows(); i += 7) y_rho.middleRows(i, 3) /= size, D.middleRows(i, 3) /= size;
   for (Eigen::Index k = 0; k < D.cols(); ++k) {
     INFO(scene.parameters[static_cast<std::size_t>(k)].name);
     CHECK((y_rho.col(k) - D.col(k)).lpNorm<Eigen::Infinity>() < 1e-8 * (1 + D.col(k).lpNorm<Eigen::Infinity>()));
@@ -69,7 +81,9 @@ void check_derivatives(const Scene& scene) {
   std::normal_distribution<double> normal;
   MatrixXd y_bar = MatrixXd::NullaryExpr(y_rho.rows(), 3, [&] { return normal(random); });
   MatrixXd rho_bar = MatrixXd::Ones(y_rho.cols(), 3);
-  assembly.add_adjoint(y_bar, rho_bar);
+  MatrixXd y_bar_in_metres = y_bar;
+  for (Eigen::Index i = 0; i < y_bar.rows(); i += 7) y_bar_in_metres.middleRows(i, 3) /= size;
+  assembly.add_adjoint(y_bar_in_metres, rho_bar);
   rho_bar.array() -= 1;  // it adds
   CHECK((rho_bar - y_rho.transpose() * y_bar).cwiseAbs().maxCoeff() < 1e-13 * (1 + rho_bar.cwiseAbs().maxCoeff()));
 }
@@ -380,6 +394,22 @@ TEST_CASE("derivatives of the assembled state: spatial loop, every kind of field
   check_derivatives(scene);
 }
 
+TEST_CASE("derivatives of a state assembled in micrometres from a rough guess", "[assembly]") {
+  constexpr double size = 1e-6;
+  Scene scene = spatial_four_bar_of_size(size);
+  SECTION("a closed loop") {}
+  SECTION("a slide on the coupler, whose equations couple places with turns") {
+    scene.bodies.push_back(body("slide", vec("0", "0", "0"), vec("0.7e-6", "0.5e-6", "0.1e-6"), turned("0.4")));
+    Joint rail;
+    rail.name = "rail", rail.type = "translational", rail.body1 = "coupler", rail.body2 = "slide";
+    rail.point1 = vec("0.2e-6", "1e-6*off", "0"), rail.point2 = vec("0.1e-6", "0.3e-6", "-0.2e-6");
+    rail.axis1 = vec("1", "w", "0.2"), rail.axis2 = vec("1", "0", "u");
+    rail.normal1 = vec("0", "0.2", "-w"), rail.normal2 = vec("0", "1", "0");
+    scene.joints.push_back(rail);
+  }
+  check_derivatives(scene, size);
+}
+
 TEST_CASE("a parameter that would break a redundant loop is known to have no derivative", "[assembly]") {
   Scene scene = four_bar();
   add_parameters(scene, {{"tilt", 0.0}});
@@ -578,12 +608,7 @@ TEST_CASE("a short arm turns its body as the nearest state asks, whatever the si
 
 TEST_CASE("assembly gives a mechanism of micrometres the motion of one of metres", "[assembly]") {
   const auto assembled = [](double size) {
-    Scene scene = spatial_four_bar();
-    const auto scale = [&](VectorField& x) {
-      for (Field& c : x) c = f(fmt::format("{}*({})", size, c.text()));
-    };
-    for (Body& b : scene.bodies) scale(b.com), scale(b.position), scale(b.velocity);
-    for (Joint& j : scene.joints) scale(std::get<VectorField>(j.point1)), scale(std::get<VectorField>(j.point2));
+    Scene scene = spatial_four_bar_of_size(size);
     Drive drive;
     drive.name = "motor", drive.type = "angle", drive.joint = "A", drive.law = f("0.9 + 2*t");
     scene.drives.push_back(drive);
@@ -615,12 +640,7 @@ TEST_CASE("the order of bodies and joints does not change a state assembled from
           "[assembly]") {
   const double size = GENERATE(1e-6, 1.0, 1e4);
   INFO(size << " m");
-  Scene scene = spatial_four_bar();
-  const auto scale = [&](VectorField& x) {
-    for (Field& c : x) c = f(fmt::format("{}*({})", size, c.text()));
-  };
-  for (Body& b : scene.bodies) scale(b.com), scale(b.position), scale(b.velocity);
-  for (Joint& j : scene.joints) scale(std::get<VectorField>(j.point1)), scale(std::get<VectorField>(j.point2));
+  Scene scene = spatial_four_bar_of_size(size);
   // Free to move as a whole: only metres say where to, only Euler parameters how far it turns.
   scene.bodies.push_back(
       body("frame", vec("0", "0", "0"), vec("0", "0", "0"), AxisAngleField{vec("1", "2", "3"), f("0.01")}));
