@@ -122,7 +122,8 @@ int gradient_command(const CommandContext& context) {
   run.result["simulation"] = to_json(evaluation.statistics);
   add_derivative_counts(run, needed.scene, evaluation.statistics);
   for (const std::string& warning : evaluation.warnings) run.warn(warning);
-  if (evaluation.ok && may_be_unresolved(needed.scene, evaluation)) warn_of_unresolved(run, evaluator, evaluation);
+  if (evaluation.ok && may_be_unresolved(needed.scene, evaluator.objectives(), evaluation))
+    warn_of_unresolved(run, evaluator, evaluation);
   if (!evaluation.ok) {
     interrupted() ? run.stopped("no gradient was finished") : run.failed(evaluation.message, last_good_time);
     return run.finish();

@@ -62,12 +62,17 @@ IntegrationError integration_error(const Scene& scene, const std::vector<Objecti
   return error;
 }
 
-bool may_be_unresolved(const Scene& scene, const Evaluation& e) {
+bool may_be_unresolved(const Scene& scene, const std::vector<Objective>& objectives, const Evaluation& e) {
   const SimulationStatistics& s = e.statistics;
   if (std::max({s.quadrature.error, s.extreme_quadrature.error, s.gradient_quadrature.error}) > kResolved) return true;
-  if (scene.simulation.integrator.step) return false;
+  const IntegratorSettings& given = scene.simulation.integrator;
+  if (given.step) return false;
+  for (std::size_t i = 0; i < objectives.size(); ++i)
+    if (objectives[i].kind() == ObjectiveKind::rms &&
+        given.rtol + given.atol > kResolved * e.psi(static_cast<Eigen::Index>(i)))
+      return true;
   const Eigen::VectorXd changes = contributions(scene, e.psi_rho).rowwise().sum();
-  return (scene.simulation.integrator.rtol * changes.array() > kResolved * e.psi.array().abs()).any();
+  return (given.rtol * changes.array() > kResolved * e.psi.array().abs()).any();
 }
 
 std::vector<std::string> unresolved_gradients(const Scene& scene, const std::vector<Objective>& objectives,

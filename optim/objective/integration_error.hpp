@@ -44,8 +44,9 @@ IntegrationError integration_error(const Scene& scene, const std::vector<Objecti
                                    const IntegrationErrorOptions& options = {});
 
 // Whether the estimates that every run makes leave it possible that a gradient is off by more than kResolved: those of
-// its integrals, and rtol times how much the motion magnifies a change of parameters.
-bool may_be_unresolved(const Scene& scene, const Evaluation& gradients);
+// its integrals, and rtol times how much the motion magnifies a change of parameters. The gradient of an rms divides by
+// the rms: one that is hardly larger than the tolerances may be all error.
+bool may_be_unresolved(const Scene& scene, const std::vector<Objective>& objectives, const Evaluation& gradients);
 
 // In sentences: the gradients that are off by more than kResolved of their largest entry, each entry times its
 // parameter's size.

@@ -65,17 +65,27 @@ TEST_CASE("a gradient that the steps do not resolve is doubted, one that they re
   const std::vector<std::string> found = doubts(problem, e);
   INFO("width " << width << ": off by " << e.psi_rho(0, 0) / exact - 1);
   CHECK((std::abs(e.psi_rho(0, 0) - exact) > 1e-4 * exact) == (width < 0.01));
-  CHECK(may_be_unresolved(problem.scene, e) == (width < 0.01));
+  CHECK(may_be_unresolved(problem.scene, objectives_of(problem), e) == (width < 0.01));
   REQUIRE(found.size() == (width < 0.01 ? 1U : 0U));
   if (width < 0.01) CHECK(found[0].find("gradient of objective 'motion'") != std::string::npos);
 }
 
 TEST_CASE("a motion that magnifies what changes at its start asks for an estimate", "[integration_error]") {
   const Problem problem = five_bar::problem(1e-8);
+  const std::vector<Objective> objectives = objectives_of(problem);
   Evaluation e = gradients_of(problem);
-  CHECK_FALSE(may_be_unresolved(problem.scene, e));
+  CHECK_FALSE(may_be_unresolved(problem.scene, objectives, e));
   e.psi_rho *= 1e6;
-  CHECK(may_be_unresolved(problem.scene, e));
+  CHECK(may_be_unresolved(problem.scene, objectives, e));
+}
+
+TEST_CASE("an rms that is hardly larger than the tolerances asks for an estimate", "[integration_error]") {
+  Problem problem = five_bar::problem(1e-8);
+  for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
+  const bool small = GENERATE(false, true);
+  problem.objectives[0].running.reset();
+  problem.objectives[0].rms_of = Expression::parse(small ? "1e-9*L01" : "L01");
+  CHECK(may_be_unresolved(problem.scene, objectives_of(problem), gradients_of(problem)) == small);
 }
 
 TEST_CASE("a tenth of the errors: rtol by 10, a largest step by 10^(1/order)", "[integration_error]") {
