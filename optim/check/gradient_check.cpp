@@ -85,12 +85,13 @@ class Check {
   }
 
  private:
-  Evaluator evaluator(GradientMethod method) const {
+  Evaluator evaluator(GradientMethod method) const { return evaluator(scene_, method); }
+  Evaluator evaluator(Scene scene, GradientMethod method) const {
     EvaluatorOptions options;
     options.method = method;
     options.user_forces = options_.user_forces;
     options.progress = options_.simulation_progress;
-    return Evaluator(scene_, objectives_, {}, options);
+    return Evaluator(std::move(scene), objectives_, {}, options);
   }
 
   bool base_runs() {
@@ -225,29 +226,59 @@ class Check {
 
   // Rounding scatters psi and its derivatives over points that are some units in the last place apart: a few, or some
   // 10^4, which coordinates at 1 km take for one. Each side of rho is looked at alone, since a kink at rho parts the
-  // sides and is no rounding. This runs only if something disagrees.
+  // sides and is no rounding. Parameters that move nothing show none of it, so that the scene's own numbers are changed
+  // as well. This runs only if something disagrees.
   void measure_rounding() {
     psi_rounding_ = kPsiRounding * result_.psi.cwiseAbs();
+    const std::vector<double> units{8, 12, 16};
     for (const double unit : {kEpsilon, -kEpsilon, 1e4 * kEpsilon, -1e4 * kEpsilon}) {
-      for (const GradientMethod method : {GradientMethod::tlm, GradientMethod::adjoint}) {
-        std::optional<Evaluation> first;
-        for (const double units : {8.0, 12.0, 16.0}) {
-          const Evaluation e = tlm_.gradients_on(steps_, rho_ + units * unit * size_, method);
-          result_.simulations += e.simulations;
-          if (!e.ok) continue;
-          if (!first) {
-            first = e;
-            continue;
-          }
-          rounding_ = rounding_.cwiseMax((e.psi_rho - first->psi_rho).cwiseAbs());
-          const VectorXd slope = first->psi_rho * (e.rho - first->rho);
-          psi_rounding_ = psi_rounding_.cwiseMax((e.psi - first->psi - slope).cwiseAbs());
-        }
-      }
+      std::vector<VectorXd> points;
+      for (const double u : units) points.push_back(rho_ + u * unit * size_);
+      note_scatter(points, std::vector<const Evaluator*>(points.size(), &tlm_));
     }
+    std::vector<Evaluator> evaluators;
+    for (const double u : units)
+      evaluators.push_back(evaluator(with_bodies_changed(u * kEpsilon), GradientMethod::tlm));
+    std::vector<const Evaluator*> others;
+    for (const Evaluator& e : evaluators) others.push_back(&e);
+    note_scatter(std::vector<VectorXd>(others.size(), rho_), others);
     // A parameter that changes psi by less than its rounding, when it changes by its own size, has no other part in it.
     rounding_ = rounding_.cwiseMax(psi_rounding_ * size_.cwiseInverse().transpose());
     rounding_known_ = true;
+  }
+
+  // The scatter among points, each differentiated by an evaluator of its own.
+  void note_scatter(const std::vector<VectorXd>& points, const std::vector<const Evaluator*>& evaluators) {
+    for (const GradientMethod method : {GradientMethod::tlm, GradientMethod::adjoint}) {
+      std::optional<Evaluation> first;
+      for (std::size_t n = 0; n < points.size(); ++n) {
+        const Evaluation e = evaluators[n]->gradients_on(steps_, points[n], method);
+        result_.simulations += e.simulations;
+        if (!e.ok) continue;
+        if (!first) {
+          first = e;
+          continue;
+        }
+        rounding_ = rounding_.cwiseMax((e.psi_rho - first->psi_rho).cwiseAbs());
+        const VectorXd slope = first->psi_rho * (e.rho - first->rho);
+        psi_rounding_ = psi_rounding_.cwiseMax((e.psi - first->psi - slope).cwiseAbs());
+      }
+    }
+  }
+
+  // Poses, rates and masses, each by a relative change of its own of at most `largest`, so that nothing cancels.
+  Scene with_bodies_changed(double largest) {
+    Scene scene = scene_;
+    std::uniform_real_distribution<double> change(-largest, largest);
+    const auto nudge = [&](Field& x) {
+      x = Expression::parse(fmt::format("({})*{:.17g}", x.text(), 1 + change(generator_)));
+    };
+    for (Body& body : scene.bodies) {
+      nudge(body.mass);
+      for (VectorField* v : {&body.position, &body.velocity, &body.angular_velocity})
+        for (Field& x : *v) nudge(x);
+    }
+    return scene;
   }
 
   // Entries that CVODES disagrees with, within the rounding of the discrete ones, which parts TLM and adjoint, too.
