@@ -12,11 +12,7 @@ constexpr double kStagnation = 0.97;
 // the freedom that opens, so that refinement goes on to rounding, whatever tolerance is enough elsewhere.
 constexpr double kSlow = 1e-6, kRounding = 1e-14;
 
-// Row by row: y = x - alpha z, and z *= 1 - c alpha.
-template <class Y>
-void subtract_scaled(const Y& x, const Eigen::VectorXd& alpha, const Y& z, Y& y) {
-  for (Eigen::Index r = 0; r < alpha.size(); ++r) entries(y)[r] = entries(x)[r] - alpha(r) * entries(z)[r];
-}
+// Row by row: z *= 1 - c alpha.
 template <class Y>
 void reduce(double c, const Eigen::VectorXd& alpha, Y& z) {
   for (Eigen::Index r = 0; r < alpha.size(); ++r) entries(z)[r] *= 1 - c * alpha(r);
@@ -40,8 +36,6 @@ BlockSaddleSolver<Rows>::BlockSaddleSolver(const MechanismData& data, const Eige
   const std::size_t n = static_cast<std::size_t>(data.n);
   residual_.setZero(rows_.count());
   residual_lanes_.setZero(rows_.count(), kLanes);
-  step_.setZero(rows_.count());
-  step_lanes_.setZero(rows_.count(), kLanes);
   correction_.resize(n);
   correction_lanes_.resize(n);
 }
@@ -56,13 +50,27 @@ bool BlockSaddleSolver<Rows>::factor(const Frames& frames, Eigen::VectorXd* phi_
 template <class Rows>
 template <class X, class Y>
 void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, const Settings& settings,
-                                        std::vector<X>& x, Y& nu, Y& residual, Y& step, std::vector<X>& correction) {
+                                        std::vector<X>& x, Y& nu, Y& residual, std::vector<X>& correction) {
   residual = g;
   const SaddleIterate at{alpha_.data(), b[0].data(),     x[0].data(),
                          nu.data(),     residual.data(), static_cast<std::size_t>(alpha_.size())};
+  const double size_of_g = g.cwiseAbs().maxCoeff();
+  refine(at, true, size_of_g, settings, x, residual, correction);
+  if (c_ > 0 && residual_ratio_ > kDisagreement) {
+    nu -= residual / c_;
+    residual.setZero();
+    refine(at, false, size_of_g, settings, x, residual, correction);
+  }
+}
+
+template <class Rows>
+template <class X, class Y>
+void BlockSaddleSolver<Rows>::refine(const SaddleIterate& at, bool from_zero, double size_of_g,
+                                     const Settings& settings, std::vector<X>& x, Y& residual,
+                                     std::vector<X>& correction) {
   double before = INFINITY;
   for (int k = 0;; ++k) {
-    const bool first = k == 0, last = k >= settings.most, decides = last || k + 1 >= settings.least;
+    const bool first = from_zero && k == 0, last = k >= settings.most, decides = last || k + 1 >= settings.least;
     rows_.load(at, first, correction);  // b - M x - J'nu + J' alpha residual
     S_.solve(std::span<X>(correction));
     SaddleSizes sizes{0, 0};
@@ -77,33 +85,14 @@ void BlockSaddleSolver<Rows>::solve_any(const std::vector<X>& b, const Y& g, con
     if (c_ > 0) sizes.residual = residual.cwiseAbs().maxCoeff();
     const double now = sizes.residual;
     if (last || k >= settings.least) {
-      const double size = std::max(sizes.x, g.cwiseAbs().maxCoeff());
+      const double size = std::max(sizes.x, size_of_g);
       residual_ratio_ = size > 0 ? now / size : 0.0;
       residual_size_ = now;
       const double tolerance = now > kSlow * before ? std::min(settings.tolerance, kRounding) : settings.tolerance;
-      if (last || residual_ratio_ <= tolerance || !(now < kStagnation * before)) break;
+      if (last || residual_ratio_ <= tolerance || !(now < kStagnation * before)) return;
     }
     before = now;
   }
-  if (c_ > 0 && residual_ratio_ > kDisagreement) add_redundant_part(nu, residual, step, correction);
-}
-
-// nu += d,  d = -s/c with J'd = 0: the rounding of s that lies in the range of J is 1/c times too large there, and goes
-// again as in solve_any, by dx and alpha J dx from the residual -J'd. Twice: each gains a factor of 1/(1 + alpha j).
-template <class Rows>
-template <class X, class Y>
-void BlockSaddleSolver<Rows>::add_redundant_part(Y& nu, Y& residual, Y& step, std::vector<X>& correction) {
-  Y& d = residual;
-  d *= -1 / c_;
-  for (int k = 0; k < 2; ++k) {
-    for (X& x : correction) x.setZero();
-    rows_.subtract_transposed_times(d, correction);
-    S_.solve(std::span<X>(correction));
-    step.setZero();
-    rows_.subtract_times(correction, step);
-    subtract_scaled(d, alpha_, step, d);
-  }
-  nu += d;
 }
 
 template <class Rows>
@@ -114,7 +103,7 @@ void BlockSaddleSolver<Rows>::solve(const Vector& b, const Eigen::VectorXd& g, c
     S_.solve(std::span(x));
     return;
   }
-  solve_any(b, g, settings, x, nu, residual_, step_, correction_);
+  solve_any(b, g, settings, x, nu, residual_, correction_);
 }
 
 template <class Rows>
@@ -125,7 +114,7 @@ void BlockSaddleSolver<Rows>::solve(const LaneVector& b, const LaneRows& g, cons
     S_.solve(std::span(x));
     return;
   }
-  solve_any(b, g, settings, x, nu, residual_lanes_, step_lanes_, correction_lanes_);
+  solve_any(b, g, settings, x, nu, residual_lanes_, correction_lanes_);
 }
 
 template class BlockSaddleSolver<ConstraintRows>;

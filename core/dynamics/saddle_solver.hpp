@@ -16,7 +16,7 @@
 // adjoint solves are exact transposes whatever their convergence.
 //
 // Redundant rows that disagree leave a residual s with J's = 0 that no x removes. Where c > 0, and alpha is the same in
-// all rows, x is right nevertheless, and nu lacks -s/c, which is added at the end.
+// all rows, nu lacks -s/c: it is added, and further passes remove what part of it was not redundant.
 #pragma once
 
 #include <vector>
@@ -73,16 +73,17 @@ class BlockSaddleSolver {
  private:
   template <class X, class Y>
   void solve_any(const std::vector<X>& b, const Y& g, const Settings& settings, std::vector<X>& x, Y& nu, Y& residual,
-                 Y& step, std::vector<X>& correction);
+                 std::vector<X>& correction);
   template <class X, class Y>
-  void add_redundant_part(Y& nu, Y& residual, Y& step, std::vector<X>& correction);
+  void refine(const SaddleIterate& at, bool from_zero, double size_of_g, const Settings& settings, std::vector<X>& x,
+              Y& residual, std::vector<X>& correction);
 
   Rows rows_;
   BlockCholesky<kUnknowns> S_;
   Eigen::VectorXd alpha_;
   double c_;
-  Eigen::VectorXd residual_, step_;
-  LaneRows residual_lanes_, step_lanes_;
+  Eigen::VectorXd residual_;
+  LaneRows residual_lanes_;
   Vector correction_;
   LaneVector correction_lanes_;
   long factorisations_ = 0;

@@ -253,3 +253,23 @@ TEST_CASE("rounding by Cholesky at a large penalty is named as what methods diff
   CHECK(quasidefinite.passed());
   CHECK(std::none_of(quasidefinite.warnings.begin(), quasidefinite.warnings.end(), names_it));
 }
+
+// Penalty lets joints give way across the plane, so that their redundant equations are independent by 1/alpha.
+TEST_CASE("tangent and adjoint agree where a load presses a redundant loop of soft joints out of its plane",
+          "[check]") {
+  Problem problem = five_bar::problem(1e-6);
+  problem.scene.gravity = {1.0, -9.81, 4.0};
+  SimulationSettings& simulation = problem.scene.simulation;
+  simulation.end_time = 0.5;
+  simulation.model = ModelChoice::spatial;
+  simulation.formulation = FormulationSettings::penalty();
+  simulation.formulation.linear_solver = LinearSolver::quasidefinite, simulation.formulation.alpha = 1e9;
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0}, options.continuous = false;
+  const GradientCheck check = check_gradients(problem, options);
+  REQUIRE(check.ran);
+  for (const CheckedEntry& e : check.entries) {
+    INFO(e.parameter << ": tlm " << e.tlm << ", adjoint " << e.adjoint);
+    CHECK(e.tlm_adjoint < 2e-14);
+  }
+}
