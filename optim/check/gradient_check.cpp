@@ -238,7 +238,7 @@ class Check {
     }
     std::vector<Evaluator> evaluators;
     for (const double u : units)
-      evaluators.push_back(evaluator(with_bodies_changed(u * kEpsilon), GradientMethod::tlm));
+      evaluators.push_back(evaluator(with_numbers_changed(u * kEpsilon), GradientMethod::tlm));
     std::vector<const Evaluator*> others;
     for (const Evaluator& e : evaluators) others.push_back(&e);
     note_scatter(std::vector<VectorXd>(others.size(), rho_), others);
@@ -266,18 +266,24 @@ class Check {
     }
   }
 
-  // Poses, rates and masses, each by a relative change of its own of at most `largest`, so that nothing cancels.
-  Scene with_bodies_changed(double largest) {
+  // Masses, places, rates and points, each by a relative change of its own of at most `largest`, so that none cancel.
+  Scene with_numbers_changed(double largest) {
     Scene scene = scene_;
     std::uniform_real_distribution<double> change(-largest, largest);
-    const auto nudge = [&](Field& x) {
-      x = Expression::parse(fmt::format("({})*{:.17g}", x.text(), 1 + change(generator_)));
+    const auto changed = [&](const Field& x) {
+      return Expression::parse(fmt::format("({})*{:.17g}", x.text(), 1 + change(generator_)));
+    };
+    const auto nudge = [&](VectorField& v) {
+      for (Field& x : v) x = changed(x);
     };
     for (Body& body : scene.bodies) {
-      nudge(body.mass);
-      for (VectorField* v : {&body.position, &body.velocity, &body.angular_velocity})
-        for (Field& x : *v) nudge(x);
+      body.mass = changed(body.mass);
+      nudge(body.position), nudge(body.velocity), nudge(body.angular_velocity);
+      for (auto& [name, point] : body.points) nudge(point);
     }
+    for (Joint& joint : scene.joints)
+      for (PointField* point : {&joint.point1, &joint.point2})
+        if (auto* given = std::get_if<VectorField>(point)) nudge(*given);
     return scene;
   }
 

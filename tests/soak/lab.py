@@ -12,8 +12,8 @@ DOUBT = re.compile(r"singular|energy changed|came apart|accelerations of the con
                    r"zero length|cannot change|not smooth|jump|peak|disagree|rounding|has no (mass|inertia)|"
                    r"faster than|penalty|contradict|not determined|could not be evaluated", re.IGNORECASE)
 # Of these, the ones that explain why two sweeps differentiate the same steps differently,
-SWEEP_DOUBT = re.compile(r"rounding|masses differ|cannot change|penalty|contradict|do not resolve the gradient",
-                         re.IGNORECASE)
+SWEEP_DOUBT = re.compile(r"rounding|masses differ|cannot change|penalty|contradict|do not resolve the gradient|"
+                         r"derivatives leave out", re.IGNORECASE)
 # and why two models do, whose steps may differ.
 STEP_DOUBT = re.compile(SWEEP_DOUBT.pattern + "|do not resolve|not determined", re.IGNORECASE)
 FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh", "pi")}
