@@ -148,4 +148,49 @@ inline constexpr Tableau<4> kRadau5{
                {0, 0.16666666666666666, -0.8888888888888888, 0.8333333333333334}}}};
 static_assert(rows_sum_to_c(kRadau5) && dense_ends_at_step(kRadau5));
 
+// lobatto3c: Lobatto IIIC with three stages: [HW], table IV.5.7. L-stable, stiffly accurate, of stage order 2. Its first
+// stage is at the start of the step and not f(y0), so that f adds no fourth node: the estimate is gamma_0 times the
+// second difference of f over f(y0) and the other two stages.
+inline constexpr Tableau<4> kLobatto3c{
+    .name = "lobatto3c",
+    .order = 4,
+    .dense_order = 3,
+    .error_order = 3,
+    .c = {0, 0, 0.5, 1},
+    .A = {{{0},
+           {0, 0.16666666666666666, -0.3333333333333333, 0.16666666666666666},
+           {0, 0.16666666666666666, 0.4166666666666667, -0.08333333333333333},
+           {0, 0.16666666666666666, 0.6666666666666666, 0.16666666666666666}}},
+    .b = {0, 0.16666666666666666, 0.6666666666666666, 0.16666666666666666},
+    .error = {0.380833877207265, 0, -0.76166775441453, 0.380833877207265},
+    .error_filter = 0.380833877207265,
+    .dense = {{{0.4722222222222222, -0.7777777777777778, 0.3055555555555556},
+               {0.5277777777777778, -0.7222222222222222, 0.3611111111111111},
+               {0, 2, -1.3333333333333333},
+               {0, -0.5, 0.6666666666666666}}}};
+static_assert(rows_sum_to_c(kLobatto3c) && dense_ends_at_step(kLobatto3c));
+
+// radau1a: Radau IA with three stages: [HW], section IV.5. L-stable, of stage order 2, not stiffly accurate. The last
+// stage of the step is f(y1); the estimate is gamma_0 times the divided difference of f over 0, the inner nodes and 1.
+inline constexpr Tableau<5> kRadau1a{
+    .name = "radau1a",
+    .order = 5,
+    .dense_order = 4,
+    .error_order = 4,
+    .c = {0, 0, 0.3550510257216822, 0.8449489742783178, 1},
+    .A = {{{0},
+           {0, 0.1111111111111111, -0.1916383190435099, 0.08052720793239879},
+           {0, 0.1111111111111111, 0.2920734116652285, -0.04813349705465739},
+           {0, 0.1111111111111111, 0.5370223859435462, 0.1968154772236604},
+           {0, 0.1111111111111111, 0.5124858261884216, 0.37640306270046725}}},
+    .b = {0, 0.1111111111111111, 0.5124858261884216, 0.37640306270046725},
+    .error = {0.27488882959567734, 0, -0.7351172231547496, 1.2848948823461044, -0.8246664887870321},
+    .error_filter = 0.27488882959567734,
+    .dense = {{{1, -4.5, 6, -2.5},
+               {0, 2, -3.5555555555555554, 1.6666666666666667},
+               {0, 3.765986323710904, -5.482029342668122, 2.228528845145639},
+               {0, -2.765986323710904, 7.0375848982236775, -3.895195511812306},
+               {0, 1.5, -4, 2.5}}}};
+static_assert(rows_sum_to_c(kRadau1a) && dense_ends_at_step(kRadau1a));
+
 }  // namespace mbsopt

@@ -62,10 +62,10 @@ constexpr Method method(const Tableau<S, T>& rk) {
 }
 
 constexpr std::size_t kExplicit = 7;
-constexpr std::array kMethods{method(kEuler),  method(kRk2),     method(kBs3),      method(kRk4),
-                              method(kDopri5), method(kVerner6), method(kDopri853),  // the first kExplicit
-                              method(kSdirk2), method(kSdirk3),  method(kSdirk4),   method(kGauss4),
-                              method(kRadau5), method(kGauss6)};
+constexpr std::array kMethods{method(kEuler),     method(kRk2),     method(kBs3),      method(kRk4),
+                              method(kDopri5),    method(kVerner6), method(kDopri853),  // the first kExplicit
+                              method(kSdirk2),    method(kSdirk3),  method(kSdirk4),   method(kGauss4),
+                              method(kLobatto3c), method(kRadau5),  method(kRadau1a),  method(kGauss6)};
 
 const Method* find(std::span<const Method> methods, std::string_view name) {
   const auto found = std::find_if(methods.begin(), methods.end(), [&](const Method& m) { return m.name == name; });

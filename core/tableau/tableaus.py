@@ -210,6 +210,36 @@ def radau5():
     return c, A, b, error, g
 
 
+def lobatto3c():
+    """Lobatto IIIC with three nodes: Hairer and Wanner II, table IV.5.7. The estimate: gamma0 times the second difference
+    of f over f(y0) and the stages at 1/2 and 1."""
+    b = [D(1) / 6, D(2) / 3, D(1) / 6]
+    c, A, b = with_start([D(0), D(1) / 2, D(1)], [[b[0], -D(1) / 3, b[0]], [b[0], D(5) / 12, -D(1) / 12], b], b)
+    g = real_eigenvalue([row[1:] for row in A[1:]])
+    return c, A, b, [g, D(0), -2 * g, g], g
+
+
+def radau1a():
+    """Radau IA with three nodes, c the zeros of Radau's polynomial from the left: Hairer and Wanner II, section IV.5. A
+    from D(3): sum_i b_i c_i^(q-1) a_ij = b_j (1 - c_j^q)/q. With f(y1), and the estimate of the Gauss methods over 0, the
+    inner nodes and 1."""
+    r = D(6).sqrt()
+    c = [D(0), (6 - r) / 10, (6 + r) / 10]
+    b = collocation(c)[1]
+    A = [[D(0)] * 3 for _ in c]
+    for j in range(3):
+        rows = [[b[i] * (c[i] ** (q - 1) if q > 1 else 1) for i in range(3)] for q in (1, 2, 3)]
+        column = solve(rows, [b[j] * (1 - c[j] ** q) / q for q in (1, 2, 3)])
+        for i in range(3):
+            A[i][j] = column[i]
+    g = real_eigenvalue(A)
+    c, A, b = with_start(c, A, b)
+    w = difference_weights([D(0), c[2], c[3], D(1)])
+    error = [g * x for x in [w[0], D(0)] + w[1:]]
+    c, A = with_explicit_stage(c, A, D(1), b)
+    return c, A, b + [D(0)], error, g
+
+
 def gauss(c, g):
     """With f(y0) and f(y1); the estimate: gamma0 times the divided difference of f over 0 and the nodes, its weight 1 at
     0. (Over 1 as well it would vanish wherever f is linear: f(u) has the degree of the collocation polynomial u then.)"""
@@ -275,6 +305,8 @@ def main():
     show("sdirk3", *kennedy_carpenter3(), 3, 3)
     show("sdirk4", *kennedy_carpenter4(), 4, 4)
     show("radau5", *radau5(), 4, 4)
+    show("lobatto3c", *lobatto3c(), 3, 3)
+    show("radau1a", *radau1a(), 4, 4)
     show("gauss4", *gauss4(), 3, 3)
     for name, (c, A, b, error, g) in (("gauss6", gauss6()), ("verner6", verner6())):
         # A state of order 4 in the middle gives one more stage, and with it order 5; weights are smallest for it there.

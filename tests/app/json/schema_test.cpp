@@ -26,6 +26,6 @@ TEST_CASE("the schema knows names, defaults and what is required", "[json]") {
   CHECK(properties.at("joints").at("items").at("oneOf").at(1).at("properties").contains("axis1") == false);
   CHECK(properties.at("simulation").at("properties").at("integrator").at("properties").at("type").at("enum") ==
         nlohmann::json::parse(R"(["dopri5", "dopri853", "verner6", "bs3", "rk2", "rk4", "euler", "sdirk2", "sdirk3",
-                                  "sdirk4", "radau5", "gauss4", "gauss6", "cvodes_adams", "cvodes_bdf"])"));
+                                  "sdirk4", "radau5", "gauss4", "gauss6", "lobatto3c", "radau1a", "cvodes_adams", "cvodes_bdf"])"));
   CHECK(properties.at("drives").at("items").at("oneOf").size() == std::size(mbsopt::kDriveTypes));
 }
