@@ -15,6 +15,7 @@ SMALL = 1e-3  # [m] below it one atol for lengths and for Euler parameters asks 
 
 
 ROUNDING = 1e-13  # of an objective's natural size: what sums of numbers of that size lose
+STEPS = (1e-3, 1e-4, 1e-5, 1e-2, 1e-6, 1e-7, 1e-8)  # of differences, of a parameter's size
 ERRORS = 1e-10  # of the same: what the integrator loses at the scene's own tolerances
 
 
@@ -201,7 +202,7 @@ def differences_at(lab, settings):
         missed = set(lab.problem["objectives"])
         best = {}
         scatter = scattered(lab, settings, direction)
-        for h in (1e-3, 1e-4, 1e-5, 1e-2, 1e-6, 1e-7, 1e-8):
+        for h in STEPS:
             slopes = [central(lab, settings, direction, step) for step in (h, h / 2)]
             if None in slopes:
                 continue
@@ -220,7 +221,8 @@ def differences_at(lab, settings):
             if not missed:
                 break
         for name in missed & set(best):
-            if not lab.doubts(base):
+            change = abs(sum(base.gradient(name)[k] * d for k, d in direction.items())) * min(STEPS)
+            if change < natural_size(lab, name) and not lab.doubts(base):  # or no step is small enough
                 found.append(("differences", f"{best[name][1]}: {best[name][0]:.1e} apart"))
     return found
 
