@@ -61,8 +61,8 @@ class NearestPointLinearisation {
   Eigen::MatrixXd left(const Eigen::Ref<const Eigen::MatrixXd>& b) const {
     return scale_.asDiagonal() * (b - J_ * particular(b));
   }
-  const Eigen::MatrixXd& null_space() const { return Z_; }                                 // Z
-  Eigen::MatrixXd multipliers(const Eigen::Ref<const Eigen::MatrixXd>& g) const;           // least nu with J'nu = g
+  const Eigen::MatrixXd& null_space() const { return Z_; }                        // Z
+  Eigen::MatrixXd multipliers(const Eigen::Ref<const Eigen::MatrixXd>& g) const;  // least nu with J'nu = g
   // Returns nu with J'nu = x_guess - x, known as well as x is: to eps of each unknown's size.
   Eigen::VectorXd multipliers_at(const Eigen::VectorXd& away) const;
   Eigen::MatrixXd pseudo_inverse_times(const Eigen::Ref<const Eigen::MatrixXd>& b) const;  // J+ b

@@ -148,26 +148,25 @@ inline constexpr Tableau<4> kRadau5{
                {0, 0.16666666666666666, -0.8888888888888888, 0.8333333333333334}}}};
 static_assert(rows_sum_to_c(kRadau5) && dense_ends_at_step(kRadau5));
 
-// lobatto3c: Lobatto IIIC with three stages: [HW], table IV.5.7. L-stable, stiffly accurate, of stage order 2. Its first
-// stage is at the start of the step and not f(y0), so that f adds no fourth node: the estimate is gamma_0 times the
-// second difference of f over f(y0) and the other two stages.
-inline constexpr Tableau<4> kLobatto3c{
-    .name = "lobatto3c",
-    .order = 4,
-    .dense_order = 3,
-    .error_order = 3,
-    .c = {0, 0, 0.5, 1},
-    .A = {{{0},
-           {0, 0.16666666666666666, -0.3333333333333333, 0.16666666666666666},
-           {0, 0.16666666666666666, 0.4166666666666667, -0.08333333333333333},
-           {0, 0.16666666666666666, 0.6666666666666666, 0.16666666666666666}}},
-    .b = {0, 0.16666666666666666, 0.6666666666666666, 0.16666666666666666},
-    .error = {0.380833877207265, 0, -0.76166775441453, 0.380833877207265},
-    .error_filter = 0.380833877207265,
-    .dense = {{{0.4722222222222222, -0.7777777777777778, 0.3055555555555556},
-               {0.5277777777777778, -0.7222222222222222, 0.3611111111111111},
-               {0, 2, -1.3333333333333333},
-               {0, -0.5, 0.6666666666666666}}}};
+// lobatto3c: Lobatto IIIC with three stages: [HW], table IV.5.7. L-stable, stiffly accurate, of stage order 2. Its
+// first stage is at the start of the step and not f(y0), so that f adds no fourth node: the estimate is gamma_0 times
+// the second difference of f over f(y0) and the other two stages.
+inline constexpr Tableau<4> kLobatto3c{.name = "lobatto3c",
+                                       .order = 4,
+                                       .dense_order = 3,
+                                       .error_order = 3,
+                                       .c = {0, 0, 0.5, 1},
+                                       .A = {{{0},
+                                              {0, 0.16666666666666666, -0.3333333333333333, 0.16666666666666666},
+                                              {0, 0.16666666666666666, 0.4166666666666667, -0.08333333333333333},
+                                              {0, 0.16666666666666666, 0.6666666666666666, 0.16666666666666666}}},
+                                       .b = {0, 0.16666666666666666, 0.6666666666666666, 0.16666666666666666},
+                                       .error = {0.380833877207265, 0, -0.76166775441453, 0.380833877207265},
+                                       .error_filter = 0.380833877207265,
+                                       .dense = {{{0.4722222222222222, -0.7777777777777778, 0.3055555555555556},
+                                                  {0.5277777777777778, -0.7222222222222222, 0.3611111111111111},
+                                                  {0, 2, -1.3333333333333333},
+                                                  {0, -0.5, 0.6666666666666666}}}};
 static_assert(rows_sum_to_c(kLobatto3c) && dense_ends_at_step(kLobatto3c));
 
 // radau1a: Radau IA with three stages: [HW], section IV.5. L-stable, of stage order 2, not stiffly accurate. The last

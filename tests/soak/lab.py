@@ -26,6 +26,7 @@ class Lab:
         self.explained = []
         self.end_time = float(self.problem["simulation"]["end_time"])
         self.length = self.body_length()
+        self.mass = max(self.number(body.get("mass", 0)) for body in self.problem["bodies"])
         self.distance = 1 + self.farthest() / self.length  # what coordinates lose of lengths, in units of rounding
         self.write("scene", scene)
 
