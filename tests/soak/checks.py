@@ -55,17 +55,17 @@ def compare_gradients(lab, check, first, second, allowed=SAME, noise=ROUNDING, o
 
 def compare_by_steps(lab, check, first, second, allowed, noise, objectives=None, doubt=DOUBT):
     """Gradients by (method, file, settings) over different steps. No step is chosen for the quadrature of smooth
-    extremes, so that a difference has to remain at a tenth of the largest step."""
+    extremes, so that a difference has to remain at a tenth and a hundredth of the largest step."""
     def found(settings):
         runs = [lab.run("gradient", settings | own, ("--method", method), file)
                 for method, file, own in (first, second)]
         return compare_gradients(lab, check, *runs, allowed, noise, objectives, doubt)
 
-    return found(lab.tight()) and found(finer(lab))
+    return found(lab.tight()) and found(finer(lab)) and found(finer(lab, 100))
 
 
-def finer(lab):
-    return lab.tight(max_step=lab.end_time / 400)
+def finer(lab, times=10):
+    return lab.tight(max_step=lab.tight()["simulation.integrator"]["max_step"] / times)
 
 
 # ---- the checks
