@@ -60,7 +60,7 @@ void parts(benchmark::State& state, const Linkage& linkage) {
     };
     const double all = part("whole", [&] { benchmark::DoNotOptimize(whole()); });
     part("frames", set_frames);
-    part("phi_ddot", [&] { evaluate_phi_ddot(data, frames, laws, gamma); });
+    part("phi_ddot", [&] { ConstraintTerms(data).phi_ddot(frames, laws, gamma); });
     part("jacobian", [&] { rows.evaluate(frames); });
     const double assembly = part("assembly", assemble);
     const double assembly_and_factor = per_body * median_seconds([&] {

@@ -35,7 +35,7 @@ ForwardRun::ForwardRun(const Mechanism& mechanism, const SimulationSettings& set
       costs_(costs),
       assembly_(mechanism, settings.start_time),
       flow_(mechanism, settings.formulation),
-      violations_(mechanism, Projection::none),
+      violations_(make_projector(mechanism, Projection::none)),
       y_(mechanism.states(), context_),
       y_sample_(mechanism.states(), context_),
       linear_solver_(flow_, context_) {
@@ -222,8 +222,8 @@ bool ForwardRun::step_is_followed(double h, const Eigen::VectorXd& y) {
 Energy ForwardRun::update_statistics(double t, const Eigen::VectorXd& y) {
   SimulationStatistics& s = result_.statistics;
   const Eigen::VectorXd& angles = flow_.angles_at(t);
-  s.max_position_violation = std::max(s.max_position_violation, violations_.position_violation(t, angles, y));
-  s.max_velocity_violation = std::max(s.max_velocity_violation, violations_.velocity_violation(t, y));
+  s.max_position_violation = std::max(s.max_position_violation, violations_->position_violation(t, angles, y));
+  s.max_velocity_violation = std::max(s.max_velocity_violation, violations_->velocity_violation(t, y));
   const Energy e = energy(mechanism_.data(), y, angles);
   s.energy_final = e.kinetic + e.potential;
   s.energy_drift = std::max(s.energy_drift, std::abs(s.energy_final - s.energy_initial));

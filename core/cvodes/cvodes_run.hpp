@@ -84,7 +84,7 @@ class ForwardRun {
   std::span<const Cost> costs_;
   Assembly assembly_;
   Flow flow_;
-  Projector violations_;
+  std::unique_ptr<Projector> violations_;
   SimulationResult result_;
   std::vector<Eigen::Index> running_;
   std::vector<bool> left_range_;

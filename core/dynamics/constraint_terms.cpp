@@ -73,33 +73,32 @@ void add_tangent(const Constraint& c, const std::vector<Frame>& frames, const Ro
 
 }  // namespace
 
-void evaluate_phi(const MechanismData& data, const std::vector<Frame>& frames, const RowLaws& laws,
-                  const Eigen::VectorXd& angles, Eigen::VectorXd& phi) {
-  for_each(data, frames, phi,
-           [&]<class P>(const Constraint& c, const P& p, const Frame& a, const Frame& b, Vec<P::kRows>& out) {
-             p.phi(a, b, out);
-             put_on_branch<P>(c, laws, angles, out);
+void ConstraintTerms::phi(const Frames& frames, const RowLaws& laws, const Eigen::VectorXd& angles,
+                          Eigen::VectorXd& out) const {
+  for_each(*data_, frames, out,
+           [&]<class P>(const Constraint& c, const P& p, const Frame& a, const Frame& b, Vec<P::kRows>& value) {
+             p.phi(a, b, value);
+             put_on_branch<P>(c, laws, angles, value);
            });
-  laws.subtract_f(phi);
+  laws.subtract_f(out);
 }
-void evaluate_phi_dot(const MechanismData& data, const std::vector<Frame>& frames, const RowLaws& laws,
-                      Eigen::VectorXd& phi_dot) {
-  for_each(data, frames, phi_dot,
-           [](const Constraint&, const auto& p, const Frame& a, const Frame& b, auto& out) { p.phi_dot(a, b, out); });
-  laws.subtract_f_t(phi_dot);
+void ConstraintTerms::phi_dot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const {
+  for_each(*data_, frames, out, [](const Constraint&, const auto& p, const Frame& a, const Frame& b, auto& value) {
+    p.phi_dot(a, b, value);
+  });
+  laws.subtract_f_t(out);
 }
-void evaluate_phi_ddot(const MechanismData& data, const std::vector<Frame>& frames, const RowLaws& laws,
-                       Eigen::VectorXd& phi_ddot) {
-  for_each(data, frames, phi_ddot,
-           [](const Constraint&, const auto& p, const Frame& a, const Frame& b, auto& out) { p.phi_ddot(a, b, out); });
-  laws.subtract_f_tt(phi_ddot);
+void ConstraintTerms::phi_ddot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const {
+  for_each(*data_, frames, out, [](const Constraint&, const auto& p, const Frame& a, const Frame& b, auto& value) {
+    p.phi_ddot(a, b, value);
+  });
+  laws.subtract_f_tt(out);
 }
 
-void add_pull_back(const MechanismData& data, const std::vector<Frame>& frames, RowLaws& laws,
-                   const Eigen::VectorXd& angles, const ConstraintWeights& weights, double scale,
-                   std::vector<FrameBar>& bars, Eigen::Ref<Eigen::VectorXd> theta_bar,
-                   Eigen::Ref<Eigen::VectorXd> rho_bar) {
-  for (const Constraint& c : data.constraints) {
+void ConstraintTerms::add_pull_back(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
+                                    const ConstraintWeights& weights, double scale, std::vector<FrameBar>& bars,
+                                    Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) const {
+  for (const Constraint& c : data_->constraints) {
     std::visit(
         [&]<class P>(const P& p) {
           constexpr int m = P::kRows;
@@ -127,23 +126,23 @@ void add_pull_back(const MechanismData& data, const std::vector<Frame>& frames, 
   laws.add_pull_back(weights.mu0, weights.mu1, weights.mu2, scale, theta_bar, rho_bar);
 }
 
-void evaluate_tangents(const MechanismData& data, const std::vector<Frame>& frames, RowLaws& laws,
-                       const Eigen::VectorXd& angles, const std::vector<FrameTangent>& directions,
-                       const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,
-                       std::vector<Lanes<6>>& loads) {
+void ConstraintTerms::tangents(const Frames& frames, const std::vector<FrameTangent>& directions, RowLaws& laws,
+                               const Eigen::VectorXd& angles, const ParameterBlock& block,
+                               const Eigen::VectorXd& lambda, ConstraintTangents& out,
+                               std::vector<Lanes<6>>& loads) const {
   for (LaneRows* x : {&out.phi, &out.phi_dot, &out.phi_ddot}) x->setZero();
-  for (const Constraint& c : data.constraints) {
+  for (const Constraint& c : data_->constraints) {
     add_tangent(c, frames, laws, angles, directions[static_cast<std::size_t>(c.body1)],
                 directions[static_cast<std::size_t>(c.body2)], block, lambda, out, loads);
   }
   laws.subtract_tangents(block, out.phi, out.phi_dot, out.phi_ddot);
 }
 
-void evaluate_field_tangents(const MechanismData& data, const std::vector<Frame>& frames, RowLaws& laws,
-                             const Eigen::VectorXd& angles, const ParameterBlock& block, const Eigen::VectorXd& lambda,
-                             ConstraintTangents& out, std::vector<Lanes<6>>& loads) {
+void ConstraintTerms::field_tangents(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
+                                     const ParameterBlock& block, const Eigen::VectorXd& lambda,
+                                     ConstraintTangents& out, std::vector<Lanes<6>>& loads) const {
   for (LaneRows* x : {&out.phi, &out.phi_dot, &out.phi_ddot}) x->setZero();
-  for (const Constraint& c : data.constraints) {
+  for (const Constraint& c : data_->constraints) {
     if (std::max({c.slot1, c.slot2, c.slot3, c.slot_factor}) < 0) continue;
     if (!(block.moves(c.slot1, 3) || block.moves(c.slot2, 3) || block.moves(c.slot3, 3) ||
           block.moves(c.slot_factor, 1))) {

@@ -10,13 +10,6 @@
 
 namespace mbsopt {
 
-void evaluate_phi(const MechanismData& data, const std::vector<Frame>& frames, const RowLaws& laws,
-                  const Eigen::VectorXd& angles, Eigen::VectorXd& phi);
-void evaluate_phi_dot(const MechanismData& data, const std::vector<Frame>& frames, const RowLaws& laws,
-                      Eigen::VectorXd& phi_dot);
-void evaluate_phi_ddot(const MechanismData& data, const std::vector<Frame>& frames, const RowLaws& laws,
-                       Eigen::VectorXd& phi_ddot);
-
 // Weights of the scalar  lambda'J eta + mu0'Phi + mu1'Phidot + mu2'Phiddot  (null: zero); eta is in the frames.
 struct ConstraintWeights {
   const Eigen::VectorXd* lambda = nullptr;
@@ -24,24 +17,39 @@ struct ConstraintWeights {
   const Eigen::VectorXd* mu1 = nullptr;
   const Eigen::VectorXd* mu2 = nullptr;
 };
-// Adds its gradient, times scale, in the frames to bars, in the geometry to theta_bar, through laws to rho_bar.
-void add_pull_back(const MechanismData& data, const std::vector<Frame>& frames, RowLaws& laws,
-                   const Eigen::VectorXd& angles, const ConstraintWeights& weights, double scale,
-                   std::vector<FrameBar>& bars, Eigen::Ref<Eigen::VectorXd> theta_bar,
-                   Eigen::Ref<Eigen::VectorXd> rho_bar);
 
-// Tangents of Phi, Phidot, Phiddot, and of J'lambda (added to loads, one per body, the ground's first).
+// Tangents of Phi, Phidot, Phiddot.
 struct ConstraintTangents {
   LaneRows phi, phi_dot, phi_ddot;
 };
-// In the bodies' directions and those of the fields.
-void evaluate_tangents(const MechanismData& data, const std::vector<Frame>& frames, RowLaws& laws,
-                       const Eigen::VectorXd& angles, const std::vector<FrameTangent>& directions,
-                       const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,
-                       std::vector<Lanes<6>>& loads);
-// In the directions of the fields alone, bodies at rest: only constraints and laws that have some.
-void evaluate_field_tangents(const MechanismData& data, const std::vector<Frame>& frames, RowLaws& laws,
-                             const Eigen::VectorXd& angles, const ParameterBlock& block, const Eigen::VectorXd& lambda,
-                             ConstraintTangents& out, std::vector<Lanes<6>>& loads);
+
+class ConstraintTerms {
+ public:
+  explicit ConstraintTerms(const MechanismData& data) : data_(&data) {}
+
+  using Frames = std::vector<Frame>;
+
+  void phi(const Frames& frames, const RowLaws& laws, const Eigen::VectorXd& angles, Eigen::VectorXd& out) const;
+  void phi_dot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const;
+  void phi_ddot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const;
+
+  // Adds the gradient of the weighted scalar, times scale, in the frames to bars, in the geometry to theta_bar, through
+  // laws to rho_bar.
+  void add_pull_back(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
+                     const ConstraintWeights& weights, double scale, std::vector<FrameBar>& bars,
+                     Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) const;
+
+  // Tangents in the bodies' directions and those of the fields; that of J'lambda is added to loads, one per body, the
+  // ground's first.
+  void tangents(const Frames& frames, const std::vector<FrameTangent>& directions, RowLaws& laws,
+                const Eigen::VectorXd& angles, const ParameterBlock& block, const Eigen::VectorXd& lambda,
+                ConstraintTangents& out, std::vector<Lanes<6>>& loads) const;
+  // In the directions of the fields alone, bodies at rest: only constraints and laws that have some.
+  void field_tangents(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles, const ParameterBlock& block,
+                      const Eigen::VectorXd& lambda, ConstraintTangents& out, std::vector<Lanes<6>>& loads) const;
+
+ private:
+  const MechanismData* data_;
+};
 
 }  // namespace mbsopt

@@ -7,6 +7,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/body/lanes.hpp"
+#include "core/dynamics/space.hpp"
 #include "core/linear/prefetch.hpp"
 #include "core/mechanism/joint_graph.hpp"
 
@@ -65,6 +66,7 @@ Dynamics::Dynamics(const Mechanism& mechanism, const FormulationSettings& settin
       data_(mechanism_.data()),
       settings_(of_mechanism(data_, settings)),
       laws_(data_),
+      constraints_(data_),
       forces_(data_),
       solver_(data_, alpha_of_factor(data_, settings_), compliance_of(settings)),
       has_forces_(any_force(data_)),
@@ -211,8 +213,8 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
   if (!solver_.factor(frames_, &gamma_)) return false;
   laws_.subtract_f_tt(gamma_);
   if (settings_.omega != 0) {
-    evaluate_phi(data_, frames_, laws_, angles_, phi_);
-    evaluate_phi_dot(data_, frames_, laws_, phi_dot_);
+    constraints_.phi(frames_, laws_, angles_, phi_);
+    constraints_.phi_dot(frames_, laws_, phi_dot_);
     gamma_ += 2 * settings_.xi * settings_.omega * phi_dot_ + settings_.omega * settings_.omega * phi_;
   }
   g_ = -gamma_;
@@ -304,7 +306,7 @@ void Dynamics::pull_back(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& the
     phi_ = settings_.omega * settings_.omega * mu_;
     weights.mu0 = &phi_, weights.mu1 = &phi_dot_;
   }
-  add_pull_back(data_, frames_, laws_, angles_, weights, -1, bars_, theta_bar, rho_bar);
+  constraints_.add_pull_back(frames_, laws_, angles_, weights, -1, bars_, theta_bar, rho_bar);
   forces_.add_pull_back(here(), bars_, y_bar, theta_bar, rho_bar);
   if (!data_.user_forces.empty()) add_user_adjoint(y_bar, rho_bar);
 
@@ -325,9 +327,7 @@ void Dynamics::pull_back(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& the
     if (body.slot_J >= 0) {
       // - eta_w'J omegadot - (eta_w x omega)'J omega
       const Matrix3d X = -(eta_w * z_[k - 1].tail<3>().transpose() + eta_w.cross(omega) * omega.transpose());
-      Vec<6> x;
-      x << X(0, 0), X(1, 1), X(2, 2), X(0, 1) + X(1, 0), X(0, 2) + X(2, 0), X(1, 2) + X(2, 1);
-      theta_bar.segment<6>(body.slot_J) += x;
+      theta_bar.segment<6>(body.slot_J) += inertia_gradient(X);
     }
   }
 }

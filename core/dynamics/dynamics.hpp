@@ -137,6 +137,7 @@ class Dynamics {
   const MechanismData& data_;
   FormulationSettings settings_;
   RowLaws laws_;
+  ConstraintTerms constraints_;
   ForceTerms forces_;
   SaddleSolver solver_;
   std::unique_ptr<PlanarDynamics> planar_;  // where it is there, it does all the work

@@ -47,10 +47,10 @@ void Dynamics::residual(Eigen::Ref<Eigen::VectorXd> r) {
   for (int i = 1; i <= data_.n; ++i)
     loads_[static_cast<std::size_t>(i) - 1] -= solver_.mass_times(i, z_[static_cast<std::size_t>(i) - 1]);
   solver_.rows().subtract_transposed_times(lambda_, loads_);
-  evaluate_phi_ddot(data_, frames_, laws_, gamma_);
+  constraints_.phi_ddot(frames_, laws_, gamma_);
   if (settings_.omega != 0) {
-    evaluate_phi(data_, frames_, laws_, angles_, phi_);
-    evaluate_phi_dot(data_, frames_, laws_, phi_dot_);
+    constraints_.phi(frames_, laws_, angles_, phi_);
+    constraints_.phi_dot(frames_, laws_, phi_dot_);
     gamma_ += 2 * settings_.xi * settings_.omega * phi_dot_ + settings_.omega * settings_.omega * phi_;
   }
   for (int i = 1; i <= data_.n; ++i) {

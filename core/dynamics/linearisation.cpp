@@ -3,21 +3,9 @@
 #include "core/body/euler_parameters.hpp"
 #include "core/body/lanes.hpp"
 #include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/space.hpp"
 
 namespace mbsopt {
-namespace {
-
-// y of J x, J' in kLanes directions of its six entries xx yy zz xy xz yz.
-Lanes<3> inertia_tangent_times(const Lanes<6>& J, const Vector3d& x) {
-  Lanes<3> y;
-  y.row(0) = x(0) * J.row(0) + x(1) * J.row(3) + x(2) * J.row(4);
-  y.row(1) = x(0) * J.row(3) + x(1) * J.row(1) + x(2) * J.row(5);
-  y.row(2) = x(0) * J.row(4) + x(1) * J.row(5) + x(2) * J.row(2);
-  return y;
-}
-
-}  // namespace
-
 const MotionBlocks& Dynamics::blocks() {
   const double two_xi_omega = 2 * settings_.xi * settings_.omega, omega2 = settings_.omega * settings_.omega;
   if (!linear_) {
@@ -59,7 +47,7 @@ const MotionBlocks& Dynamics::blocks() {
 
 void Dynamics::right_hand_side_tangent(const ParameterBlock& block, const LaneRows& y_dir) {
   for (Lanes<6>& load : load_dirs_) load.setZero();
-  evaluate_field_tangents(data_, frames_, laws_, angles_, block, lambda_, constraint_dirs_, load_dirs_);
+  constraints_.field_tangents(frames_, laws_, angles_, block, lambda_, constraint_dirs_, load_dirs_);
   for (Lanes<6>& load : load_dirs_) load = -load;  // from (J'lambda)' to its share of the right-hand side
   forces_.add_field_tangent(here(), block, load_dirs_);
   if (!data_.user_forces.empty()) add_user_field_tangent(block);
@@ -70,15 +58,13 @@ void Dynamics::right_hand_side_tangent(const ParameterBlock& block, const LaneRo
     const BodyData& body = data_.bodies[k];
     Lanes<6>& b = rhs_lanes_[k - 1];
     b = load_dirs_[k];
-    Lanes<1> mass_dir;
-    if (const Lanes<1>* dm = block.field<1>(body.slot_mass, mass_dir)) {
-      b.topRows<3>() += (data_.gravity - z_[k - 1].head<3>()) * *dm;
-    }
+    Vec<6> x = z_[k - 1];
+    x.head<3>() -= data_.gravity;
+    InSpace::subtract_mass_tangent(data_, k, block, x, b);
     if (dg) b.topRows<3>() += body.mass * *dg;
     Lanes<6> J_dir;
     if (const Lanes<6>* dJ = block.field<6>(body.slot_J, J_dir)) {
       const Vector3d omega = bodies_[k].omega();
-      b.bottomRows<3>() -= inertia_tangent_times(*dJ, z_[k - 1].tail<3>());
       b.bottomRows<3>() -= cross(omega, inertia_tangent_times(*dJ, omega));
     }
   }

@@ -39,6 +39,9 @@ class PlanarBodies {
     const PlanarBody& b = model_->bodies[body];
     y.template segment<4>(first) += P.re * b.p_a + P.im * b.p_b;
   }
+  void set_vector_direction(const Lanes<3>& x, Eigen::Index first, LaneRows& y_dir) const {
+    y_dir.row(first + model_->t1) = x.row(0), y_dir.row(first + model_->t2) = x.row(1);
+  }
   void add_turn_direction(std::size_t body, const PlaneDual& P, Eigen::Index first, LaneRows& y_dir) const {
     const PlanarBody& b = model_->bodies[body];
     y_dir.middleRows<4>(first) += b.p_a * P.re.d.matrix() + b.p_b * P.im.d.matrix();

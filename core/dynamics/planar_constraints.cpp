@@ -175,9 +175,9 @@ PlanarJetBar distance_bar(const Jet<double>& d, const Plane& d_eta, const Multip
 
 // Of Im w,  w = mu0 log A + mu1 Adot/A + mu2 (Addot/A - (Adot/A)^2) + lambda A_eta/A:  the cotangent of z in Im w is
 // i conj(dw/dz).
-void add_angle_bar(const PlanarFrame<double>& f, double turn, const Multipliers1& z, PlanarFrameBar& bar) {
+void add_angle_bar(const PlanarFrame<double>& f, const Multipliers1& z, PlanarFrameBar& bar) {
   const Plane over = inverse(f.A), rate = f.Adot * over, second = f.Addot * over;
-  const Plane change{0, turn};  // A_eta/A
+  const Plane change{0, f.theta_eta};  // A_eta/A
   const auto add = [](Plane& to, const Plane& w_z) { to += times_i(conj(w_z)); };
   add(bar.A, over * (Plane{z.mu0, 0} - z.mu1 * rate - z.mu2 * (second - 2 * (rate * rate)) - z.lambda * change));
   add(bar.Adot, over * (Plane{z.mu1, 0} - (2 * z.mu2) * rate));
@@ -237,9 +237,9 @@ void PlanarConstraints::phi_ddot(const Frames& frames, const RowLaws& laws, Eige
   laws.subtract_f_tt(out);
 }
 
-void PlanarConstraints::add_pull_back(const Frames& frames, std::span<const PlanarShift> eta, RowLaws& laws,
-                                      const Eigen::VectorXd& angles, const Weights& weights, double scale,
-                                      std::vector<PlanarFrameBar>& bars, Eigen::Ref<Eigen::VectorXd> theta_bar,
+void PlanarConstraints::add_pull_back(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
+                                      const ConstraintWeights& weights, double scale, std::vector<PlanarFrameBar>& bars,
+                                      Eigen::Ref<Eigen::VectorXd> theta_bar,
                                       Eigen::Ref<Eigen::VectorXd> rho_bar) const {
   const auto of = [&](const Eigen::VectorXd* z, int row) { return z ? scale * (*z)(row) : 0.0; };
   const auto point = [&](const Eigen::VectorXd* z, const PlanarConstraint& c) {
@@ -248,45 +248,40 @@ void PlanarConstraints::add_pull_back(const Frames& frames, std::span<const Plan
   for (const PlanarConstraint& c : model_->constraints) {
     const std::size_t i = at(c.body1), j = at(c.body2);
     const PlanarFrame<double>&f1 = frames[i], &f2 = frames[j];
-    const double turn1 = eta[i].turn, turn2 = eta[j].turn;
     Plane s1_bar, s2_bar, s3_bar;
     if (c.kind == Kind::point) {
       const PlanarJetBar bar{point(weights.mu0, c), point(weights.mu1, c), point(weights.mu2, c),
                              point(weights.lambda, c)};
-      add_point_bar(f2, turn2, c.s2, bar, 1, bars[j], s2_bar);
-      add_point_bar(f1, turn1, c.s1, bar, -1, bars[i], s1_bar);
+      add_point_bar(f2, c.s2, bar, 1, bars[j], s2_bar);
+      add_point_bar(f1, c.s1, bar, -1, bars[i], s1_bar);
     } else {
       const Multipliers1 unscaled{of(weights.lambda, c.row), of(weights.mu0, c.row), of(weights.mu1, c.row),
                                   of(weights.mu2, c.row)};
       const Multipliers1 z = times(c.factor, unscaled);
-      const auto changed = [](const PlanarFrame<double>& f, double turn, const Plane& s) {
-        return times_i(turn * (f.A * s));
-      };
-      const Plane d_eta = eta[j].r - eta[i].r + changed(f2, turn2, c.s2) - changed(f1, turn1, c.s1);
+      const auto changed = [](const PlanarFrame<double>& f, const Plane& s) { return f.turned(f.A * s); };
+      const Plane d_eta = f2.r_eta - f1.r_eta + changed(f2, c.s2) - changed(f1, c.s1);
       switch (c.kind) {
         case Kind::dot1:
-          add_vector_bar(f1, turn1, c.s1, product_bar(vector_of(f2, c.s2), changed(f2, turn2, c.s2), z), 1, bars[i],
-                         s1_bar);
-          add_vector_bar(f2, turn2, c.s2, product_bar(vector_of(f1, c.s1), changed(f1, turn1, c.s1), z), 1, bars[j],
-                         s2_bar);
+          add_vector_bar(f1, c.s1, product_bar(vector_of(f2, c.s2), changed(f2, c.s2), z), 1, bars[i], s1_bar);
+          add_vector_bar(f2, c.s2, product_bar(vector_of(f1, c.s1), changed(f1, c.s1), z), 1, bars[j], s2_bar);
           break;
         case Kind::dot2: {
           const Jet<double> d = separation(f1, f2, vectors(c));
-          add_vector_bar(f1, turn1, c.s3, product_bar(d, d_eta, z), 1, bars[i], s3_bar);
-          const PlanarJetBar bar = product_bar(vector_of(f1, c.s3), changed(f1, turn1, c.s3), z);
-          add_point_bar(f2, turn2, c.s2, bar, 1, bars[j], s2_bar);
-          add_point_bar(f1, turn1, c.s1, bar, -1, bars[i], s1_bar);
+          add_vector_bar(f1, c.s3, product_bar(d, d_eta, z), 1, bars[i], s3_bar);
+          const PlanarJetBar bar = product_bar(vector_of(f1, c.s3), changed(f1, c.s3), z);
+          add_point_bar(f2, c.s2, bar, 1, bars[j], s2_bar);
+          add_point_bar(f1, c.s1, bar, -1, bars[i], s1_bar);
           break;
         }
         case Kind::distance: {
           const PlanarJetBar bar = distance_bar(separation(f1, f2, vectors(c)), d_eta, z);
-          add_point_bar(f2, turn2, c.s2, bar, 1, bars[j], s2_bar);
-          add_point_bar(f1, turn1, c.s1, bar, -1, bars[i], s1_bar);
+          add_point_bar(f2, c.s2, bar, 1, bars[j], s2_bar);
+          add_point_bar(f1, c.s1, bar, -1, bars[i], s1_bar);
           break;
         }
         case Kind::angle:
-          add_angle_bar(f2, turn2, times(c.sign, z), bars[j]);
-          add_angle_bar(f1, turn1, times(-c.sign, z), bars[i]);
+          add_angle_bar(f2, times(c.sign, z), bars[j]);
+          add_angle_bar(f1, times(-c.sign, z), bars[i]);
           s2_bar = times_i(conj((c.sign * z.mu0) * inverse(c.s2)));
           s1_bar = times_i(conj((-c.sign * z.mu0) * inverse(c.s1)));
           break;
@@ -295,7 +290,8 @@ void PlanarConstraints::add_pull_back(const Frames& frames, std::span<const Plan
       }
       if (c.slot_factor >= 0) {
         const RowColumn<double> J = column_of(c, f1, f2, vectors(c));
-        const double change = dot(J.force1, eta[i].r) + dot(J.force2, eta[j].r) + J.moment1 * turn1 + J.moment2 * turn2;
+        const double change =
+            dot(J.force1, f1.r_eta) + dot(J.force2, f2.r_eta) + J.moment1 * f1.theta_eta + J.moment2 * f2.theta_eta;
         theta_bar(c.slot_factor) +=
             unscaled.lambda * change + unscaled.mu0 * on_branch(c, laws, angles, phi_of(c, f1, f2, vectors(c))) +
             unscaled.mu1 * phi_dot_of(c, f1, f2, vectors(c)) + unscaled.mu2 * phi_ddot_of(c, f1, f2, vectors(c));

@@ -10,11 +10,10 @@
 // As in space (primitive.hpp), each is a function of the bodies' frames, whose derivatives are taken per body.
 #pragma once
 
-#include <span>
 #include <vector>
 
+#include "core/body/planar_frame.hpp"
 #include "core/dynamics/constraint_terms.hpp"
-#include "core/dynamics/planar_frame.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
 #include "core/mechanism/planar_model.hpp"
 #include "core/mechanism/row_laws.hpp"
@@ -40,18 +39,10 @@ class PlanarConstraints {
   void phi_dot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const;
   void phi_ddot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const;
 
-  // Adds the gradient of  scale (lambda'J eta + mu0'Phi + mu1'Phidot + mu2'Phiddot)  in the frames, the vectors of the
-  // primitives, and the laws. Null: zero.
-  struct Weights {
-    const Eigen::VectorXd* lambda = nullptr;
-    const Eigen::VectorXd* mu0 = nullptr;
-    const Eigen::VectorXd* mu1 = nullptr;
-    const Eigen::VectorXd* mu2 = nullptr;
-  };
-  void add_pull_back(const Frames& frames, std::span<const PlanarShift> eta, RowLaws& laws,
-                     const Eigen::VectorXd& angles, const Weights& weights, double scale,
-                     std::vector<PlanarFrameBar>& bars, Eigen::Ref<Eigen::VectorXd> theta_bar,
-                     Eigen::Ref<Eigen::VectorXd> rho_bar) const;
+  // As that of ConstraintTerms.
+  void add_pull_back(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
+                     const ConstraintWeights& weights, double scale, std::vector<PlanarFrameBar>& bars,
+                     Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) const;
 
   // Tangents in the frames' directions and those of the vectors: of Phi, of Phidot, or of Phiddot (the others
   // hold nothing of use), and of J'lambda, added to loads (the ground's first). Of Phiddot without the points, whose

@@ -3,19 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/body/euler_parameters.hpp"
+#include "core/dynamics/space.hpp"
 
 namespace mbsopt {
 namespace {
 
 bool any_force_but_springs(const MechanismData& d) {
   return d.forces.size() > d.forces.of<TsdaForce>().size() || !d.applied.empty();
-}
-
-Eigen::VectorXd in_plane(const PlanarModel& model, const Eigen::VectorXd& of_rows) {
-  Eigen::VectorXd out(static_cast<Eigen::Index>(model.rows.size()));
-  model.gather(of_rows, out);
-  return out;
 }
 
 std::vector<std::size_t> bodies_with_inertial_slots(const MechanismData& data) {
@@ -37,10 +31,10 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
       settings_(settings),
       value_refinements_(values),
       derivative_refinements_(derivatives),
-      laws_(data, model_.rows),
+      laws_(InPlane::laws(data)),
       constraints_(data),
       bodies_with_slots_(bodies_with_inertial_slots(data)),
-      solver_(data, in_plane(model_, alpha), compliance),
+      solver_(data, rows_of<InPlane>(data, alpha), compliance),
       springs_(data),
       has_springs_(!data.forces.of<TsdaForce>().empty()),
       has_other_forces_(any_force_but_springs(data)),
@@ -50,7 +44,7 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
   angles_.setZero(static_cast<Eigen::Index>(data.angles.size()));
   bodies_.resize(n + 1), frames_.resize(n + 1), dual_frames_.resize(n + 1);
   loads_.resize(n), z_.resize(n), eta_.resize(n);
-  const Eigen::Index m = static_cast<Eigen::Index>(model_.rows.size());
+  const Eigen::Index m = InPlane::rows(data);
   for (Eigen::VectorXd* x : {&gamma_, &phi_, &phi_dot_, &lambda_, &mu_, &g_}) x->setZero(m);
   lambda_of_phi_.setZero(data.m);
   for (LaneRows* x :
@@ -59,7 +53,7 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
   }
   load_dirs_.resize(n + 1), rhs_lanes_.resize(n), z_dir_.resize(n);
   turns_.resize(n + 1), turn_dirs_.resize(n + 1), Addot_dirs_.resize(n + 1), moments_.resize(n + 1);
-  shifts_.resize(n + 1), bars_.resize(n + 1);
+  bars_.resize(n + 1);
   std::vector<bool> dual(n + 1, settings.omega != 0);
   constraints_.mark_others(dual);
   for (std::size_t i = 1; i <= n; ++i) {
@@ -196,17 +190,17 @@ void PlanarDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::Vec
   y_bar.tail(half) += w.head(half);
 
   for (PlanarFrameBar& bar : bars_) bar = {};
-  for (std::size_t k = 1; k < bodies_.size(); ++k) shifts_[k] = PlanarShift(eta_[k - 1]);
+  for (std::size_t k = 1; k < bodies_.size(); ++k) set_virtual(eta_[k - 1], frames_[k]);
   // - eta'J'lambda - mu'(Phiddot + 2 xi omega Phidot + omega^2 Phi)
-  PlanarConstraints::Weights weights{&lambda_, nullptr, nullptr, &mu_};
+  ConstraintWeights weights{&lambda_, nullptr, nullptr, &mu_};
   if (settings_.omega != 0) {
     phi_dot_ = 2 * settings_.xi * settings_.omega * mu_;
     phi_ = settings_.omega * settings_.omega * mu_;
     weights.mu0 = &phi_, weights.mu1 = &phi_dot_;
   }
-  constraints_.add_pull_back(frames_, shifts_, laws_, angles_, weights, -1, bars_, theta_bar, rho_bar);
+  constraints_.add_pull_back(frames_, laws_, angles_, weights, -1, bars_, theta_bar, rho_bar);
   if (springs_in_plane_) {
-    springs_.add_pull_back(t_, frames_, shifts_, forces_.law_scratch(), bars_, theta_bar, rho_bar);
+    springs_.add_pull_back(t_, frames_, forces_.law_scratch(), bars_, theta_bar, rho_bar);
   }
   if (has_other_forces_ || (has_springs_ && !springs_in_plane_)) add_force_adjoint(y_bar, theta_bar, rho_bar);
 
@@ -215,7 +209,7 @@ void PlanarDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::Vec
     const Body& b = bodies_[k];
     const PlanarFrame<double>& f = frames_[k];
     const BodyData& body = data_.bodies[k];
-    const Vec<3>&eta = eta_[k - 1], &z = z_[k - 1];
+    const Vec<3>& eta = eta_[k - 1];
     const PlanarFrameBar& bar = bars_[k];
     const Eigen::Index q = 7 * (i - 1), v = half + q;
     const Plane Pddot_bar = bodies_in_y_.turn(k, w, v + 3);
@@ -230,13 +224,10 @@ void PlanarDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::Vec
     bodies_in_y_.add_vector(bar.rdot, v, y_bar);
     bodies_in_y_.add_turn(k, P_bar, q + 3, y_bar);
     bodies_in_y_.add_turn(k, Pdot_bar, v + 3, y_bar);
-    if (body.slot_mass >= 0) {
-      theta_bar(body.slot_mass) += eta(0) * (model_.gravity.re - z(0)) + eta(1) * (model_.gravity.im - z(1));
-    }
+    InPlane::subtract_mass_bar(data_, k, eta, z_against_gravity(k), theta_bar);
     if (data_.slot_gravity >= 0) {
       theta_bar.segment<3>(data_.slot_gravity) += body.mass * model_.in_space({eta(0), eta(1)});
     }
-    if (body.slot_J >= 0) theta_bar.segment<6>(body.slot_J) -= eta(2) * z(2) * bodies_in_y_.inertia_weights(k);
   }
 }
 

@@ -49,6 +49,10 @@ class PlanarDynamics {
   void place_in_space();
   void set_loads();
   void set_acceleration(std::size_t body, const Vec<3>& z);
+  // z as it appears with the inertia: M (z - gravity).
+  Vec<3> z_against_gravity(std::size_t body) const {
+    return z_[body - 1] - Vec<3>(model_.gravity.re, model_.gravity.im, 0);
+  }
   void prepare_tangents();  // what all directions share, after linearise()
   void prepare_force_tangents();
   void add_force_tangent(const ParameterBlock& block, const LaneRows& y_dir);
@@ -111,7 +115,6 @@ class PlanarDynamics {
   LaneRows gamma_dir_, lambda_dir_;
   std::vector<Lanes<3>> load_dirs_, rhs_lanes_, z_dir_;
   std::vector<Lanes<6>> body_load_dirs_;
-  std::vector<PlanarShift> shifts_;
   std::vector<PlanarFrameBar> bars_;
   std::vector<FrameBar> bars_in_space_;
 };

@@ -1,6 +1,7 @@
 // Tangents of the planar equations: right-hand sides and accelerations in directions of the state and the parameters.
 #include "core/body/lanes.hpp"
 #include "core/dynamics/planar_dynamics.hpp"
+#include "core/dynamics/space.hpp"
 #include "core/linear/pairs.hpp"
 
 namespace mbsopt {
@@ -157,17 +158,7 @@ void PlanarDynamics::acceleration_tangent(const ParameterBlock& block, const Lan
     rhs_lanes_[i].row(0) += mass * dg->row(model_.t1), rhs_lanes_[i].row(1) += mass * dg->row(model_.t2);
   }
   for (const std::size_t k : bodies_with_slots_) {
-    const BodyData& body = data_.bodies[k];
-    const Vec<3>& z = z_[k - 1];
-    Lanes<3>& b = rhs_lanes_[k - 1];
-    Lanes<1> mass_dir;
-    if (const Lanes<1>* dm = block.field<1>(body.slot_mass, mass_dir)) {
-      b.row(0) += (model_.gravity.re - z(0)) * *dm, b.row(1) += (model_.gravity.im - z(1)) * *dm;
-    }
-    Lanes<6> J_dir;
-    if (const Lanes<6>* dJ = block.field<6>(body.slot_J, J_dir)) {
-      b.row(2) -= z(2) * (bodies_in_y_.inertia_weights(k).transpose() * *dJ);
-    }
+    InPlane::subtract_mass_tangent(data_, k, block, z_against_gravity(k), rhs_lanes_[k - 1]);
   }
   if (!loaded_.empty()) add_force_tangent(block, y_dir);
   solver_.solve(rhs_lanes_, gamma_dir_, derivative_refinements_, z_dir_, lambda_dir_);

@@ -53,15 +53,14 @@ void PlanarSprings::add_loads(double t, const std::vector<PlanarFrame<double>>& 
 }
 
 // As TsdaForce::pull_back.
-void PlanarSprings::add_pull_back(double t, const std::vector<PlanarFrame<double>>& frames,
-                                  std::span<const PlanarShift> eta, Law::Scratch& scratch,
+void PlanarSprings::add_pull_back(double t, const std::vector<PlanarFrame<double>>& frames, Law::Scratch& scratch,
                                   std::vector<PlanarFrameBar>& bars, Eigen::VectorXd& theta_bar,
                                   Eigen::VectorXd& rho_bar) const {
   for (const Spring& s : springs_) {
     const Span x = span(s, frames);
     const Law& law = s.force->law;
     const auto moved = [&](std::size_t body, const Plane& at) {
-      return eta[body].r + times_i(eta[body].turn * (frames[body].A * at));
+      return frames[body].r_eta + frames[body].turned(frames[body].A * at);
     };
     const Plane d_eta = moved(s.body2, s.s2) - moved(s.body1, s.s1);
     PlanarJetBar bar;
@@ -79,7 +78,7 @@ void PlanarSprings::add_pull_back(double t, const std::vector<PlanarFrame<double
     }
     const auto add = [&](std::size_t body, const Plane& at, double sign, int slot) {
       Plane s_bar;
-      add_point_bar(frames[body], eta[body].turn, at, bar, sign, bars[body], s_bar);
+      add_point_bar(frames[body], at, bar, sign, bars[body], s_bar);
       if (slot >= 0) theta_bar.segment<3>(slot) += data_.planar->bodies[body].in_body(s_bar);
     };
     add(s.body2, s.s2, 1, s.force->slot2);

@@ -2,10 +2,9 @@
 // the same numbers as from frames in space at a fraction of the work.
 #pragma once
 
-#include <span>
 #include <vector>
 
-#include "core/dynamics/planar_frame.hpp"
+#include "core/body/planar_frame.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 
 namespace mbsopt {
@@ -21,9 +20,8 @@ class PlanarSprings {
   void add_loads(double t, const std::vector<PlanarFrame<double>>& frames, Law::Scratch& scratch,
                  std::vector<Vec<3>>& loads) const;
   // Gradient of the virtual work sum load'eta in the frames (eta held fixed), the fields and the parameters of laws.
-  void add_pull_back(double t, const std::vector<PlanarFrame<double>>& frames, std::span<const PlanarShift> eta,
-                     Law::Scratch& scratch, std::vector<PlanarFrameBar>& bars, Eigen::VectorXd& theta_bar,
-                     Eigen::VectorXd& rho_bar) const;
+  void add_pull_back(double t, const std::vector<PlanarFrame<double>>& frames, Law::Scratch& scratch,
+                     std::vector<PlanarFrameBar>& bars, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const;
 
  private:
   struct Spring {

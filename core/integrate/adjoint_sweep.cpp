@@ -10,8 +10,8 @@ AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings&
       rk_(method),
       costs_(costs),
       dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
-      projector_(mechanism, settings.formulation.projection, model_of(mechanism, settings, method)),
-      step_(make_step(mechanism, method, projector_.solution())),
+      projector_(make_projector(mechanism, settings.formulation.projection, model_of(mechanism, settings, method))),
+      step_(make_step(mechanism, method, projector_->solution())),
       bars_(costs.size()),
       watch_(watch) {
   const MechanismData& d = mechanism.data();
@@ -69,9 +69,9 @@ bool AdjointSweep::step_back(const StoredStep& step) {
   for (Bars& b : bars_) b.lambda_hat.setZero(), b.samples.setZero(), b.K.setZero();
   sample_back(step);
 
-  if (projector_.active()) {
-    if (!projector_.linearise(step_.t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return false;
-    for (Bars& b : bars_) projector_.add_adjoint(b.lambda, b.lambda_hat, b.theta, b.rho);
+  if (projector_->active()) {
+    if (!projector_->linearise(step_.t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return false;
+    for (Bars& b : bars_) projector_->add_adjoint(b.lambda, b.lambda_hat, b.theta, b.rho);
   } else {
     for (Bars& b : bars_) b.lambda_hat += b.lambda;
   }

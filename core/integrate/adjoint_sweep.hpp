@@ -34,7 +34,7 @@ class AdjointSweep {
 
   long linearised_states() const { return dynamics_.linearised_states(); }
   long factorisations() {
-    return dynamics_.factorisations() + projector_.factorisations() + (implicit_ ? implicit_->factorisations() : 0);
+    return dynamics_.factorisations() + projector_->factorisations() + (implicit_ ? implicit_->factorisations() : 0);
   }
 
  private:
@@ -60,7 +60,7 @@ class AdjointSweep {
   std::span<const Cost> costs_;
   std::optional<MotionSolver> motion_;  // where some sensor needs it
   Dynamics dynamics_;
-  Projector projector_;
+  std::unique_ptr<Projector> projector_;
   std::optional<LinearisedStages> implicit_;
   Step step_;                        // in hand
   std::vector<int> explicit_swept_;  // its explicit stages whose bars are known

@@ -29,15 +29,15 @@ RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSetting
       settings_(settings),
       rk_(method),
       dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
-      projector_(mechanism, settings.formulation.projection, model_of(mechanism, settings, method)),
+      projector_(make_projector(mechanism, settings.formulation.projection, model_of(mechanism, settings, method))),
       guard_(mechanism_.data()),
-      step_(make_step(mechanism, rk_, projector_.solution())) {
+      step_(make_step(mechanism, rk_, projector_->solution())) {
   const Eigen::Index states = mechanism.states();
   angles_.setZero(static_cast<Eigen::Index>(mechanism.data().angles.size()));
   for (Eigen::VectorXd* x : {&work_, &ydot_, &y_stage_}) x->setZero(states);
   const bool constrained =
       settings.formulation.type == FormulationType::augmented_lagrangian && closes_loops(mechanism.data());
-  if (constrained && !rk_.implicit() && projector_.positions()) {
+  if (constrained && !rk_.implicit() && projector_->positions()) {
     const bool planar = model_of(mechanism, settings, method) == Model::planar;
     const MechanismData& data = mechanism.data();
     response_.setZero(planar ? static_cast<Eigen::Index>(data.planar->rows.size()) : data.m);
@@ -118,8 +118,8 @@ double RungeKuttaRun::error_of_step() {
 double RungeKuttaRun::error_after_projection() {
   const IntegratorSettings& s = settings_.integrator;
   const double t1 = step_.t + step_.h;
-  if (!projector_.project(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return INFINITY;
-  if (!projector_.linearise(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return INFINITY;
+  if (!projector_->project(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return INFINITY;
+  if (!projector_->linearise(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return INFINITY;
   const double* weights[2] = {rk_.error, rk_.error_low};
   for (int k = 0; k < 2; ++k) {
     if (!weights[k]) continue;
@@ -129,7 +129,7 @@ double RungeKuttaRun::error_after_projection() {
     sum.to(work_.data(), work_.data(), work_.size());
     error_.col(k) = work_;
   }
-  projector_.tangent(no_parameters_, error_, projected_error_);
+  projector_->tangent(no_parameters_, error_, projected_error_);
   auto norm = [&](int k) {
     work_ = projected_error_.col(k);
     return scaled_norm(work_, step_.y0, step_.y_hat, s.rtol, s.atol);
@@ -139,7 +139,7 @@ double RungeKuttaRun::error_after_projection() {
 
 // Whether a step of another size, of `wanted` as far as the singular position allows, is to be tried in its place.
 bool RungeKuttaRun::better_placed_by(double wanted, double largest) {
-  projector_.response(response_);
+  projector_->response(response_);
   if (passage_->well_placed(step_.t, step_.h, wanted, largest, response_)) return false;
   return std::abs(passage_->propose(step_.t, wanted, largest) - step_.h) > 0.02 * step_.h;
 }
@@ -183,8 +183,8 @@ RungeKuttaRun::Outcome RungeKuttaRun::finish_step(bool dense) {
       if (!evaluate_stage(i)) return Outcome::failed;
     }
   }
-  if (projector_.active()) {
-    if (!projector_.project(step_.t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) {
+  if (projector_->active()) {
+    if (!projector_->project(step_.t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) {
       return Outcome::off_constraints;
     }
   } else {
@@ -211,7 +211,7 @@ double RungeKuttaRun::fastest_tracked_rate(const Eigen::VectorXd& y) const {
 // Projection takes out of the velocities the constraint accelerations that a penalty leaves: it hides too small an
 // alpha. Both are in the norm of the kinetic energy. If nothing moves, loads would move it as gravity does.
 void RungeKuttaRun::add_projection(double h) {
-  if (settings_.formulation.type != FormulationType::penalty || !projector_.active()) return;
+  if (settings_.formulation.type != FormulationType::penalty || !projector_->active()) return;
   const MechanismData& d = mechanism_.data();
   double projected = 0, moved = 0, mass = 0;
   for (int i = 1; i <= d.n; ++i) {
@@ -232,8 +232,8 @@ void RungeKuttaRun::add_projection(double h) {
 Energy RungeKuttaRun::update_statistics(SimulationResult& result) {
   SimulationStatistics& s = result.statistics;
   s.max_position_violation =
-      std::max(s.max_position_violation, projector_.position_violation(step_.t1, step_.angles1, step_.y1));
-  s.max_velocity_violation = std::max(s.max_velocity_violation, projector_.velocity_violation(step_.t1, step_.y1));
+      std::max(s.max_position_violation, projector_->position_violation(step_.t1, step_.angles1, step_.y1));
+  s.max_velocity_violation = std::max(s.max_velocity_violation, projector_->velocity_violation(step_.t1, step_.y1));
   const Energy e = energy(mechanism_.data(), step_.y1, step_.angles1);
   s.energy_final = e.kinetic + e.potential;
   s.energy_drift = std::max(s.energy_drift, std::abs(s.energy_final - s.energy_initial));
@@ -325,8 +325,8 @@ bool RungeKuttaRun::begin(const Eigen::VectorXd& y_initial, const Eigen::VectorX
   }
   // A guard on which scenes are taken to be planar: what was assembled in space satisfies the planar equations.
   if (dynamics_.is_planar() && !frozen) {
-    const double unmet = std::max(projector_.position_violation(step_.t, angles, y_initial),
-                                  projector_.velocity_violation(step_.t, y_initial));
+    const double unmet = std::max(projector_->position_violation(step_.t, angles, y_initial),
+                                  projector_->velocity_violation(step_.t, y_initial));
     if (unmet > 1e-6 * (1 + y_initial.cwiseAbs().maxCoeff())) {
       course.stop(SimulationStatus::not_credible,
                   fmt::format("the start does not satisfy the equations of the planar model, by {:.3g}: set "
@@ -536,7 +536,7 @@ void RungeKuttaRun::add_statistics(Course& course) {
   }
   s.rhs_evaluations += evaluations_;
   s.factor_blocks = dynamics_.factor_blocks();
-  s.factorisations += dynamics_.factorisations() + projector_.factorisations();
+  s.factorisations += dynamics_.factorisations() + projector_->factorisations();
 }
 
 }  // namespace mbsopt

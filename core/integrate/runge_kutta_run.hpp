@@ -68,7 +68,7 @@ class RungeKuttaRun {
   const Method& rk_;
   Dynamics dynamics_;
   std::optional<ImplicitStages> implicit_;
-  Projector projector_;
+  std::unique_ptr<Projector> projector_;
   RunGuard guard_;
   // Where passage_ is there.
   std::optional<SingularPassage> passage_;

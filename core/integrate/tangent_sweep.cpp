@@ -9,7 +9,7 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
     : mechanism_(mechanism),
       rk_(method),
       dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
-      projector_(mechanism, settings.formulation.projection, model_of(mechanism, settings, method)),
+      projector_(make_projector(mechanism, settings.formulation.projection, model_of(mechanism, settings, method))),
       watch_(watch) {
   const MechanismData& d = mechanism.data();
   if (d.needs_motion) motion_.emplace(mechanism, settings.formulation);
@@ -188,9 +188,9 @@ bool TangentSweep::follow(const Step& step, std::span<const Cost> costs, std::sp
   }
   if (watch_) watch_->end_step(step);
   for (Block& b : blocks_) add_stages(b, step.h, of_step_.c, of_step_, 0, rk_.stages - 1, b.y0, b.y_hat);
-  if (projector_.active()) {
-    if (!projector_.linearise(step.t1, step.angles0, step.y_hat, step.y1, step.projection)) return false;
-    for (Block& b : blocks_) projector_.tangent(b.parameters, b.y_hat, b.y1);
+  if (projector_->active()) {
+    if (!projector_->linearise(step.t1, step.angles0, step.y_hat, step.y1, step.projection)) return false;
+    for (Block& b : blocks_) projector_->tangent(b.parameters, b.y_hat, b.y1);
   } else {
     for (Block& b : blocks_) b.y1 = b.y_hat;
   }

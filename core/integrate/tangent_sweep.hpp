@@ -38,7 +38,7 @@ class TangentSweep {
 
   long linearised_states() const { return dynamics_.linearised_states(); }
   long factorisations() {
-    return dynamics_.factorisations() + projector_.factorisations() + (implicit_ ? implicit_->factorisations() : 0);
+    return dynamics_.factorisations() + projector_->factorisations() + (implicit_ ? implicit_->factorisations() : 0);
   }
 
  private:
@@ -72,7 +72,7 @@ class TangentSweep {
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
   std::optional<MotionSolver> motion_;  // where some sensor needs it
   Dynamics dynamics_;
-  Projector projector_;
+  std::unique_ptr<Projector> projector_;
   std::optional<LinearisedStages> implicit_;
   std::vector<Weights> of_stage_;  // A
   Weights of_step_;                // b

@@ -3,40 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/body/euler_parameters.hpp"
-#include "core/constraint/unit_norm.hpp"
-#include "core/dynamics/planar_bodies.hpp"
-#include "core/projection/constraint_response.hpp"
+#include "core/projection/body_in_plane.hpp"
+#include "core/projection/body_in_space.hpp"
+#include "core/projection/projection_iterations.hpp"
 
 namespace mbsopt {
-
-Projector::Projector(const Mechanism& mechanism, Projection what, Model model)
-    : mechanism_(mechanism),
-      data_(mechanism_.data()),
-      what_(what),
-      planar_(model == Model::planar ? std::make_unique<PlanarProjector>(data_) : nullptr),
-      solver_(data_, kProjectionAlpha * data_.row_alpha),
-      rows_(data_),
-      laws_(data_) {
-  const std::size_t n = at(data_.n);
-  const Eigen::Index m = data_.m;
-  bodies_.resize(n + 1);
-  states_.resize(n + 1), states_tilde_.resize(n + 1), frames_.resize(n + 1), frames_tilde_.resize(n + 1);
-  for (Eigen::VectorXd* x : {&phi_, &g_, &mu_, &corrections_.rg, &corrections_.dnu}) x->setZero(m);
-  angles_.setZero(static_cast<Eigen::Index>(data_.angles.size()));
-  scratch_y_.setZero(14 * data_.n);
-  q_bar_.setZero(7 * data_.n), v_bar_.setZero(7 * data_.n);
-  for (auto* x : {&b_, &x_, &corrections_.r, &corrections_.dx, &corrections_.Ex}) x->resize(n);
-  bars_.resize(n + 1);
-  frame_dirs_.resize(n + 1);
-  for (FrameTangent& t : frame_dirs_) t.set_zero();
-  loads_.resize(n + 1);
-  auto& lanes = corrections_of_lanes_;
-  for (auto* x : {&b_lanes_, &x_lanes_, &lanes.r, &lanes.dx, &lanes.Ex}) x->resize(n);
-  for (LaneRows* x : {&dirs_.phi, &dirs_.phi_dot, &dirs_.phi_ddot, &g_lanes_, &nu_lanes_, &lanes.rg, &lanes.dnu}) {
-    x->setZero(m, kLanes);
-  }
-}
 
 ProjectionSolution Projector::solution() const {
   ProjectionSolution s;
@@ -48,110 +19,340 @@ ProjectionSolution Projector::solution() const {
   return s;
 }
 
-void Projector::set_frames(const Eigen::VectorXd& q_of, const Eigen::VectorXd* v_of, std::vector<BodyState>& states,
-                           std::vector<Frame>& frames) const {
-  for (int i = 1; i <= data_.n; ++i) {
-    set_position(q_of.segment<7>(7 * (i - 1)), states[at(i)], frames[at(i)]);
-    if (v_of) set_velocity(v_of->segment<7>(7 * (data_.n + i - 1)), states[at(i)], frames[at(i)]);
+namespace {
+
+// Accelerations of body i (1-based), of size 1, that no symmetry of a mechanism leaves a direction out of.
+template <int N>
+Vec<N> test_load(int i) {
+  Vec<N> x;
+  for (int k = 0; k < N; ++k) x(k) = std::cos(1.0 + 2.7 * (N * i + k) + 0.31 * i * i);
+  return x;
+}
+
+// Bodies are counted without the ground, frames with it.
+template <class Body>
+class ProjectorOf final : public Projector {
+  using Space = typename Body::Space;
+  using Direction = typename Body::Direction;
+  using Gradient = typename Body::Gradient;
+  static constexpr int N = Space::kUnknowns;
+
+ public:
+  ProjectorOf(const Mechanism& mechanism, Projection what);
+
+  bool project(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y,
+               ProjectionSolution& s) override;
+  bool linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, const Eigen::VectorXd& y,
+                 const ProjectionSolution& s) override;
+  void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override;
+  void add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,
+                   Eigen::VectorXd& rho_bar) override;
+  void response(Eigen::VectorXd& out) override;
+  double position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y) override;
+  double velocity_violation(double t, const Eigen::VectorXd& y) override;
+  long factorisations() const override { return solver_.factorisations(); }
+
+ private:
+  using X = Vec<N>;
+  using Y = Eigen::VectorXd;
+  using Frames = std::vector<typename Space::Frame>;
+
+  bool constrained() const { return rows_.count() > 0; }
+  bool factor(double t, const Y& y_hat);  // of S(q~)
+  // Calls f(body, its number without the ground, its frame).
+  template <class F>
+  void for_bodies(F&& f) {
+    for (std::size_t i = 0; i < bodies_.size(); ++i) f(bodies_[i], i, frames_[i + 1]);
+  }
+  X test_load_of(int body) const;
+  // Directions of Phi or Phidot (dirs_) and of J'lambda (load_dirs_), along frame_dirs_ and those of the fields.
+  void set_tangents(ProjectionLevel level, const Frames& frames, const ParameterBlock& block, const Y& lambda);
+  // g_lanes_ = -Phi' at q, along the displacements x_lanes_ (frame_dirs_) and those of the fields.
+  void set_position_rows(const ParameterBlock& block);
+  // b_lanes_ = -(M' x + (J'lambda)')
+  void set_loads(const ParameterBlock& block, const std::vector<X>& x);
+  void refine_tangent(ProjectionLevel level, const LargestEntries<Direction>& size);
+  void refine_adjoint(ProjectionLevel level);
+  void add_pull_back(Frames& frames, const ConstraintWeights& weights, Y& theta_bar, Y& rho_bar) {
+    constraints_.add_pull_back(frames, laws_, angles_, weights, -1, bars_, theta_bar, rho_bar);
+  }
+  void subtract_mass_bar(const std::vector<X>& x, Y& theta_bar) const {
+    for (std::size_t i = 0; i < x.size(); ++i) Space::subtract_mass_bar(data_, i + 1, x_[i], x[i], theta_bar);
+  }
+
+  BlockSaddleSolver<typename Space::Rows> solver_;  // factor of S(q~)
+  typename Space::Rows rows_;                       // J at the projected q
+  typename Space::Constraints constraints_;
+  RowLaws laws_;
+  Y angles_;
+
+  std::vector<Body> bodies_;
+  Frames frames_, frames_tilde_;
+  std::vector<X> delta_, u_, b_, x_;
+  Y nu_, kappa_, phi_, g_, mu_;
+  Corrections<X, Y> corrections_;
+  std::vector<typename Space::FrameBar> bars_;
+  std::vector<Gradient> q_bars_, v_bars_;
+  // Lanes.
+  std::vector<typename Space::FrameTangent> frame_dirs_;
+  std::vector<Direction> q_dirs_, v_dirs_;
+  std::vector<Lanes<N>> load_dirs_, b_lanes_, x_lanes_;
+  ConstraintTangents dirs_;
+  LaneRows g_lanes_, nu_lanes_;
+  Corrections<Lanes<N>, LaneRows> corrections_of_lanes_;
+};
+
+template <class Body>
+ProjectorOf<Body>::ProjectorOf(const Mechanism& mechanism, Projection what)
+    : Projector(mechanism, what),
+      solver_(data_, kProjectionAlpha * rows_of<Space>(data_, data_.row_alpha)),
+      rows_(data_),
+      constraints_(data_),
+      laws_(Space::laws(data_)) {
+  const std::size_t n = at(data_.n);
+  const Eigen::Index m = rows_.count();
+  for (int i = 1; i <= data_.n; ++i) bodies_.emplace_back(data_, i, positions());
+  frames_.resize(n + 1), frames_tilde_.resize(n + 1), bars_.resize(n + 1), load_dirs_.resize(n + 1);
+  frame_dirs_.assign(n + 1, Space::still());
+  q_bars_.resize(n), v_bars_.resize(n), q_dirs_.resize(n), v_dirs_.resize(n);
+  for (auto* x : {&delta_, &u_, &b_, &x_, &corrections_.r, &corrections_.dx, &corrections_.Ex}) x->resize(n);
+  for (Y* x : {&nu_, &kappa_, &phi_, &g_, &mu_, &corrections_.rg, &corrections_.dnu}) x->setZero(m);
+  angles_.setZero(static_cast<Eigen::Index>(data_.angles.size()));
+  auto& lanes = corrections_of_lanes_;
+  for (auto* x : {&b_lanes_, &x_lanes_, &lanes.r, &lanes.dx, &lanes.Ex}) x->resize(n);
+  for (LaneRows* x : {&dirs_.phi, &dirs_.phi_dot, &dirs_.phi_ddot, &g_lanes_, &nu_lanes_, &lanes.rg, &lanes.dnu}) {
+    x->setZero(m, kLanes);
   }
 }
 
-void Projector::prepare_bodies(const Eigen::VectorXd& y_hat) {
-  for (int i = 1; i <= data_.n; ++i) {
-    Body& b = bodies_[at(i)];
-    b.p_hat = y_hat.segment<4>(7 * (i - 1) + 3);
-    b.pdot_hat = y_hat.segment<4>(7 * (data_.n + i - 1) + 3);
-    b.norm_hat = positions() ? b.p_hat.norm() : 1.0;
-    b.p_tilde = b.p_hat / b.norm_hat;
-    scratch_y_.segment<3>(7 * (i - 1)) = y_hat.segment<3>(7 * (i - 1));
-    scratch_y_.segment<4>(7 * (i - 1) + 3) = b.p_tilde;
-  }
-}
-
-// The position part of y for a correction delta of q~.
-void Projector::set_q(const std::vector<Vec<6>>& delta, Eigen::VectorXd& y) {
-  for (int i = 1; i <= data_.n; ++i) {
-    Body& b = bodies_[at(i)];
-    const Vec<6>& d = delta[at(i - 1)];
-    b.pi = b.p_tilde + 0.5 * G_transposed_times(b.p_tilde, d.tail<3>());
-    b.norm_pi = positions() ? b.pi.norm() : 1.0;
-    b.p = b.pi / b.norm_pi;
-    y.segment<3>(7 * (i - 1)) = scratch_y_.segment<3>(7 * (i - 1)) + d.head<3>();
-    y.segment<4>(7 * (i - 1) + 3) = b.p;
-  }
-}
-
-bool Projector::project(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y,
-                        ProjectionSolution& s) {
-  if (planar_) return planar_->project(t, angles, y_hat, y, s);
+template <class Body>
+bool ProjectorOf<Body>::factor(double t, const Y& y_hat) {
   laws_.set_time(t);
-  prepare_bodies(y_hat);
-  set_frames(scratch_y_, nullptr, states_tilde_, frames_tilde_);
-  if (!solver_.factor(frames_tilde_)) return false;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].read_hat(y_hat, frames_tilde_[i + 1]);
+  return solver_.factor(frames_tilde_);
+}
 
+template <class Body>
+bool ProjectorOf<Body>::project(double t, const Y& angles, const Y& y_hat, Y& y, ProjectionSolution& s) {
+  if (!factor(t, y_hat)) return false;
   const Eigen::Index half = 7 * data_.n;
   const double q_size = std::max(1.0, y_hat.head(half).cwiseAbs().maxCoeff()),
                v_size = std::max(1.0, y_hat.tail(half).cwiseAbs().maxCoeff());
-  const auto place = [&](const auto&) {
-    set_q(s.delta, y);
-    set_frames(y, nullptr, states_, frames_);
+  const auto displace = [&](const std::vector<X>&) {
+    for_bodies([&](Body& b, std::size_t i, auto& f) { b.displace(delta_[i], f); });
   };
-  for (Vec<6>& d : s.delta) d.setZero();
-  s.nu.setZero();
-  place(s.delta);
-  const auto phi = [&](Eigen::VectorXd& out) { evaluate_phi(data_, frames_, laws_, angles, out); };
+  for (X& d : delta_) d.setZero();
+  nu_.setZero();
+  displace(delta_);
+  const auto phi = [&](Y& out) { constraints_.phi(frames_, laws_, angles, out); };
   if (positions() &&
-      !onto_constraints(solver_, solver_.rows(), q_size, kUnmetPosition, s.delta, s.nu, corrections_, phi, place))
+      !onto_constraints(solver_, solver_.rows(), q_size, kUnmetPosition, delta_, nu_, corrections_, phi, displace))
     return false;
 
-  for (int i = 1; i <= data_.n; ++i) {
-    const Body& b = bodies_[at(i)];
-    y.segment<3>(half + 7 * (i - 1)) = y_hat.segment<3>(half + 7 * (i - 1));
-    y.segment<4>(half + 7 * (i - 1) + 3) = b.pdot_hat - b.p * (b.p.dot(b.pdot_hat) / b.p.squaredNorm());
-  }
+  for_bodies([](Body& b, std::size_t, auto& f) { b.start_velocity(f); });
   rows_.evaluate(frames_);
-  set_frames(y, &y, states_, frames_);
-  const auto phi_dot = [&](Eigen::VectorXd& out) { evaluate_phi_dot(data_, frames_, laws_, out); };
-  const auto move = [&](const std::vector<Vec<6>>& du) {
-    for (int i = 1; i <= data_.n; ++i) {
-      y.segment<3>(half + 7 * (i - 1)) += du[at(i - 1)].head<3>();
-      y.segment<4>(half + 7 * (i - 1) + 3) += 0.5 * G_transposed_times(bodies_[at(i)].p, du[at(i - 1)].tail<3>());
-    }
-    set_frames(y, &y, states_, frames_);
+  const auto phi_dot = [&](Y& out) { constraints_.phi_dot(frames_, laws_, out); };
+  const auto add_velocity = [&](const std::vector<X>& du) {
+    for_bodies([&](Body& b, std::size_t i, auto& f) { b.add_velocity(u_[i], du[i], f); });
   };
-  return onto_constraints(solver_, rows_, v_size, kUnmetVelocity, s.u, s.kappa, corrections_, phi_dot, move) &&
-         y.allFinite();
+  if (!onto_constraints(solver_, rows_, v_size, kUnmetVelocity, u_, kappa_, corrections_, phi_dot, add_velocity))
+    return false;
+
+  y = y_hat;
+  for_bodies([&](Body& b, std::size_t i, auto& f) {
+    b.write(f, y);
+    s.delta[i].template head<N>() = delta_[i];
+    s.u[i].template head<N>() = u_[i];
+  });
+  Space::spread(data_, nu_, s.nu), Space::spread(data_, kappa_, s.kappa);
+  return y.allFinite();
 }
 
-void Projector::response(Eigen::VectorXd& out) {
-  if (planar_) return planar_->response(out);
-  // In the plane where there is one, so that both models take the same steps.
-  const auto load = [&](int i) {
-    return data_.planar ? PlanarBodies(*data_.planar).in_space(at(i), test_load<3>(i)) : test_load<6>(i);
-  };
-  constraint_response(solver_, load, kProjectionAlpha, b_, g_, corrections_.dx, corrections_.dnu, out);
+// In the plane where there is one, so that both models take the same steps.
+template <>
+Vec<6> ProjectorOf<BodyInSpace>::test_load_of(int body) const {
+  return data_.planar ? PlanarBodies(*data_.planar).in_space(at(body), test_load<3>(body)) : test_load<6>(body);
+}
+template <>
+Vec<3> ProjectorOf<BodyInPlane>::test_load_of(int body) const {
+  return test_load<3>(body);
 }
 
-double Projector::position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y) {
-  if (planar_) return planar_->position_violation(t, angles, y);
-  laws_.set_time(t);
-  set_frames(y, nullptr, states_, frames_);
-  evaluate_phi(data_, frames_, laws_, angles, phi_);
-  double worst = data_.m > 0 ? phi_.cwiseAbs().maxCoeff() : 0.0;
-  for (int i = 1; i <= data_.n; ++i) worst = std::max(worst, std::abs(UnitNorm::phi(states_[at(i)].p)));
-  return worst;
-}
-
-double Projector::velocity_violation(double t, const Eigen::VectorXd& y) {
-  if (planar_) return planar_->velocity_violation(t, y);
-  laws_.set_time(t);
-  set_frames(y, &y, states_, frames_);
-  evaluate_phi_dot(data_, frames_, laws_, phi_);
-  double worst = data_.m > 0 ? phi_.cwiseAbs().maxCoeff() : 0.0;
-  for (int i = 1; i <= data_.n; ++i) {
-    worst = std::max(worst, std::abs(UnitNorm::phi_dot(states_[at(i)].p, states_[at(i)].pdot)));
+template <class Body>
+void ProjectorOf<Body>::response(Y& out) {
+  for (std::size_t i = 0; i < b_.size(); ++i) {
+    const int body = static_cast<int>(i) + 1;
+    b_[i] = solver_.mass_times(body, test_load_of(body));
   }
+  g_.setZero();
+  solver_.solve(b_, g_, Refinements{}, corrections_.dx, corrections_.dnu);
+  g_ = kProjectionAlpha * corrections_.dnu.cwiseQuotient(solver_.alpha());
+  for (X& b : b_) b.setZero();
+  solver_.solve(b_, g_, Refinements{}, corrections_.dx, corrections_.dnu);
+  out = kProjectionAlpha * corrections_.dnu.cwiseQuotient(solver_.alpha());
+}
+
+template <class Body>
+double ProjectorOf<Body>::position_violation(double t, const Y& angles, const Y& y) {
+  laws_.set_time(t);
+  for_bodies([&](Body& b, std::size_t, auto& f) { b.read_position(y, f); });
+  constraints_.phi(frames_, laws_, angles, phi_);
+  double worst = constrained() ? phi_.cwiseAbs().maxCoeff() : 0.0;
+  for (const Body& b : bodies_) worst = std::max(worst, b.norm_violation());
   return worst;
+}
+
+template <class Body>
+double ProjectorOf<Body>::velocity_violation(double t, const Y& y) {
+  laws_.set_time(t);
+  for_bodies([&](Body& b, std::size_t, auto& f) { b.read_position(y, f), b.read_velocity(y, f); });
+  constraints_.phi_dot(frames_, laws_, phi_);
+  double worst = constrained() ? phi_.cwiseAbs().maxCoeff() : 0.0;
+  for (const Body& b : bodies_) worst = std::max(worst, b.norm_rate_violation());
+  return worst;
+}
+
+template <class Body>
+bool ProjectorOf<Body>::linearise(double t, const Y& angles, const Y& y_hat, const Y& y, const ProjectionSolution& s) {
+  angles_ = angles;
+  if (!factor(t, y_hat)) return false;
+  Space::gather(data_, s.nu, nu_), Space::gather(data_, s.kappa, kappa_);
+  for_bodies([&](Body& b, std::size_t i, auto& f) {
+    delta_[i] = s.delta[i].template head<N>(), u_[i] = s.u[i].template head<N>();
+    b.displace(delta_[i], f);
+    b.restore_velocity(y, u_[i], f);
+  });
+  rows_.evaluate(frames_);
+  return true;
+}
+
+template <>
+void ProjectorOf<BodyInSpace>::set_tangents(ProjectionLevel, const Frames& frames, const ParameterBlock& block,
+                                            const Y& lambda) {
+  for (Lanes<6>& load : load_dirs_) load.setZero();
+  constraints_.tangents(frames, frame_dirs_, laws_, angles_, block, lambda, dirs_, load_dirs_);
+}
+template <>
+void ProjectorOf<BodyInPlane>::set_tangents(ProjectionLevel level, const Frames&, const ParameterBlock& block,
+                                            const Y& lambda) {
+  using Order = PlanarConstraints::Order;
+  for (Lanes<3>& load : load_dirs_) load.setZero();
+  constraints_.tangents(level == ProjectionLevel::position ? Order::phi : Order::phi_dot, frame_dirs_, laws_, angles_,
+                        block, lambda, dirs_, load_dirs_);
+}
+
+// J times the displacement, since p' turns a unit p.
+template <>
+void ProjectorOf<BodyInSpace>::set_position_rows(const ParameterBlock& block) {
+  mu_.setZero();
+  constraints_.field_tangents(frames_, laws_, angles_, block, mu_, dirs_, load_dirs_);
+  g_lanes_ = -dirs_.phi;
+  rows_.subtract_times(x_lanes_, g_lanes_);
+}
+template <>
+void ProjectorOf<BodyInPlane>::set_position_rows(const ParameterBlock& block) {
+  set_tangents(ProjectionLevel::position, frames_, block, nu_);
+  g_lanes_ = -dirs_.phi;
+}
+
+template <class Body>
+void ProjectorOf<Body>::set_loads(const ParameterBlock& block, const std::vector<X>& x) {
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    b_lanes_[i] = -load_dirs_[i + 1];
+    Space::subtract_mass_tangent(data_, i + 1, block, x[i], b_lanes_[i]);
+  }
+}
+
+template <class Body>
+void ProjectorOf<Body>::refine_tangent(ProjectionLevel level, const LargestEntries<Direction>& size) {
+  const auto turn = [&](std::vector<Lanes<N>>& x, bool transposed) {
+    for (std::size_t i = 0; i < x.size(); ++i) bodies_[i].turn_by_E(x[i], transposed);
+  };
+  refine(solver_, rows_, level, false, size, b_lanes_, g_lanes_, x_lanes_, nu_lanes_, corrections_of_lanes_, turn);
+}
+
+template <class Body>
+void ProjectorOf<Body>::refine_adjoint(ProjectionLevel level) {
+  const auto turn = [&](std::vector<X>& x, bool transposed) {
+    for (std::size_t i = 0; i < x.size(); ++i) bodies_[i].turn_by_E(x[i], transposed);
+  };
+  g_.setZero();
+  refine(solver_, rows_, level, true, LargestEntries<X>::Zero(), b_, g_, x_, mu_, corrections_, turn);
+}
+
+template <class Body>
+void ProjectorOf<Body>::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) {
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    bodies_[i].tilde_tangent(y_hat_dir, frames_tilde_[i + 1], q_dirs_[i], frame_dirs_[i + 1]);
+  }
+  if (positions()) {
+    set_tangents(ProjectionLevel::position, frames_tilde_, block, nu_);
+    set_loads(block, delta_);
+    for_bodies([&](const Body& b, std::size_t i, const auto& f) {
+      b.position_tangent(delta_[i], f, q_dirs_[i], x_lanes_[i], frame_dirs_[i + 1]);
+    });
+    set_position_rows(block);
+    refine_tangent(ProjectionLevel::position, largest(x_lanes_));
+    for_bodies([&](const Body& b, std::size_t i, const auto&) { b.add_displacement(x_lanes_[i], q_dirs_[i]); });
+  }
+
+  for_bodies([&](const Body& b, std::size_t i, const auto& f) {
+    b.velocity_tangent(y_hat_dir, u_[i], f, q_dirs_[i], v_dirs_[i], frame_dirs_[i + 1]);
+  });
+  if (constrained()) {
+    set_tangents(ProjectionLevel::velocity, frames_, block, kappa_);
+    set_loads(block, u_);
+    g_lanes_ = -dirs_.phi_dot;
+    refine_tangent(ProjectionLevel::velocity, largest(v_dirs_));
+    for_bodies([&](const Body& b, std::size_t i, const auto&) { b.add_velocity_tangent(x_lanes_[i], v_dirs_[i]); });
+  }
+  y_dir = y_hat_dir;
+  for_bodies(
+      [&](const Body& b, std::size_t i, const auto&) { b.write_tangent(q_dirs_[i], v_dirs_[i], y_hat_dir, y_dir); });
+}
+
+template <class Body>
+void ProjectorOf<Body>::add_adjoint(const Y& y_bar, Y& y_hat_bar, Y& theta_bar, Y& rho_bar) {
+  for_bodies([&](const Body& b, std::size_t i, const auto&) { b.start_adjoint(y_bar, q_bars_[i], v_bars_[i]); });
+
+  // Velocities: (eta, chi) from v_bar; then the gradient of v_bar'v - eta'(M u + J'kappa) - chi'Phidot.
+  for (auto& bar : bars_) bar.set_zero();
+  if (constrained()) {
+    for_bodies([&](const Body& b, std::size_t i, const auto&) { b_[i] = b.u_bar(v_bars_[i]); });
+    refine_adjoint(ProjectionLevel::velocity);
+    for_bodies([&](const Body&, std::size_t i, auto& f) { set_virtual(x_[i], f); });
+    add_pull_back(frames_, {&kappa_, nullptr, &mu_, nullptr}, theta_bar, rho_bar);
+    subtract_mass_bar(u_, theta_bar);
+    for_bodies([&](const Body& b, std::size_t i, const auto& f) {
+      b.pull_back_velocity(f, bars_[i + 1], q_bars_[i], v_bars_[i]);
+      bars_[i + 1].set_zero();
+    });
+  }
+  for_bodies([&](const Body& b, std::size_t i, const auto&) { b.pull_back_start(u_[i], q_bars_[i], v_bars_[i]); });
+
+  // Positions: (eta, chi) from delta's cotangent; then the gradient of q_bar'q - eta'(M delta + J~'nu) - chi'Phi(q).
+  if (constrained() && positions()) {
+    for_bodies([&](const Body& b, std::size_t i, const auto&) { b_[i] = b.delta_bar(q_bars_[i]); });
+    refine_adjoint(ProjectionLevel::position);
+    add_pull_back(frames_, {nullptr, &mu_, nullptr, nullptr}, theta_bar, rho_bar);
+    for_bodies([&](const Body& b, std::size_t i, const auto& f) {
+      b.pull_back_position(f, bars_[i + 1], q_bars_[i]);
+      bars_[i + 1].set_zero();
+      set_virtual(x_[i], frames_tilde_[i + 1]);
+    });
+    add_pull_back(frames_tilde_, {&nu_, nullptr, nullptr, nullptr}, theta_bar, rho_bar);
+    subtract_mass_bar(delta_, theta_bar);
+  }
+  for_bodies([&](const Body& b, std::size_t i, const auto&) {
+    b.finish_adjoint(delta_[i], frames_tilde_[i + 1], bars_[i + 1], y_bar, q_bars_[i], v_bars_[i], y_hat_bar);
+  });
+}
+
+}  // namespace
+
+std::unique_ptr<Projector> make_projector(const Mechanism& mechanism, Projection what, Model model) {
+  if (model == Model::planar) return std::make_unique<ProjectorOf<BodyInPlane>>(mechanism, what);
+  return std::make_unique<ProjectorOf<BodyInSpace>>(mechanism, what);
 }
 
 }  // namespace mbsopt

@@ -34,7 +34,7 @@ class Statics {
         t_(t),
         n_(d_.n),
         dynamics_(mechanism, FormulationSettings{}),
-        projector_(mechanism, Projection::position_velocity),
+        projector_(make_projector(mechanism, Projection::position_velocity)),
         equations_(d_, AssemblyLevel::position, t),
         angles_(angles),
         ydot_(14 * n_) {
@@ -142,8 +142,8 @@ class Statics {
   bool settle(VectorXd& q) {
     VectorXd y_hat = VectorXd::Zero(14 * n_), y(14 * n_);
     y_hat.head(7 * n_) = q;
-    ProjectionSolution solution = projector_.solution();
-    if (!projector_.project(t_, angles_, y_hat, y, solution)) return false;
+    ProjectionSolution solution = projector_->solution();
+    if (!projector_->project(t_, angles_, y_hat, y, solution)) return false;
     q = y.head(7 * n_);
     for (std::size_t k = 0; k < d_.angles.size(); ++k) {
       const JointAngle& a = d_.angles[k];
@@ -198,7 +198,7 @@ class Statics {
   Index n_;
   double length_ = 1;
   Dynamics dynamics_;
-  Projector projector_;
+  std::unique_ptr<Projector> projector_;
   AssemblyEquations equations_;
   VectorXd angles_, y_, ydot_, z_;
 };

@@ -51,11 +51,11 @@ class DrivenRows {
     scaled_.compute(unit_rows_, kDrivenRankThreshold);
   }
   const VectorXd& phi(const VectorXd& angles) {
-    evaluate_phi(d_, frames_, laws_, angles, phi_);
+    ConstraintTerms(d_).phi(frames_, laws_, angles, phi_);
     return phi_;
   }
   const VectorXd& phi_dot() {
-    evaluate_phi_dot(d_, frames_, laws_, phi_);
+    ConstraintTerms(d_).phi_dot(frames_, laws_, phi_);
     return phi_;
   }
   Index rank() const { return d_.m == 0 ? 0 : scaled_.rank(); }
@@ -125,9 +125,9 @@ class Kinematics {
   Kinematics(const Mechanism& mechanism, const FormulationSettings& formulation)
       : d_(mechanism.data()),
         motion_(mechanism, formulation),
-        projector_(mechanism, Projection::position_velocity),
+        projector_(make_projector(mechanism, Projection::position_velocity)),
         rows_(d_),
-        solution_(projector_.solution()),
+        solution_(projector_->solution()),
         y_hat_(mechanism.states()),
         y_next_(mechanism.states()) {}
 
@@ -163,10 +163,10 @@ class Kinematics {
       y_hat_.segment<7>(q) = y_.segment<7>(q) + h * y_.segment<7>(half + q) + 0.5 * h * h * a;
       y_hat_.segment<7>(half + q) = y_.segment<7>(half + q) + h * a;
     }
-    if (!projector_.project(t1, angles_, y_hat_, y_next_, solution_)) return false;
+    if (!projector_->project(t1, angles_, y_hat_, y_next_, solution_)) return false;
     polish(t1);
     if (!keeps_branch(h)) return false;
-    if (projector_.position_violation(t1, angles_, y_next_) > kViolation) return false;
+    if (projector_->position_violation(t1, angles_, y_next_) > kViolation) return false;
     t_ = t1;
     y_ = y_next_;
     for (std::size_t k = 0; k < d_.angles.size(); ++k) {
@@ -231,8 +231,8 @@ class Kinematics {
     }
   }
 
-  double position_violation() { return projector_.position_violation(t_, angles_, y_); }
-  double velocity_violation() { return projector_.velocity_violation(t_, y_); }
+  double position_violation() { return projector_->position_violation(t_, angles_, y_); }
+  double velocity_violation() { return projector_->velocity_violation(t_, y_); }
 
   // Degrees of freedom that J leaves at the present position, and who owns the equations that depend on each other.
   SingularPosition rank_here() {
@@ -263,7 +263,7 @@ class Kinematics {
 
   const MechanismData& d_;
   DrivenMotion motion_;
-  Projector projector_;
+  std::unique_ptr<Projector> projector_;
   DrivenRows rows_;
   ProjectionSolution solution_;
   double t_ = 0;

@@ -8,7 +8,7 @@ namespace {
 
 // epsilon of a row of Phi in units of the inertia that it sees: what it leaves out and the rounding of W = 1/epsilon
 // are about equal.
-constexpr double kEpsilon = 1e-8;
+constexpr double kRelativeEpsilon = 1e-8;
 
 constexpr double kNegligible = 2e-15;  // relative, of what is left: several units of rounding
 constexpr double kWrong = 1e-4;        // relative residual of forces from which a factor is not used
@@ -45,7 +45,7 @@ StageMatrix::StageMatrix(const MechanismData& data, const MotionJacobian& jacobi
       stages_(stages),
       accelerations_(7 * data.n),
       per_stage_(7 * data.n + data.m),
-      epsilon_(kEpsilon * data.row_alpha.cwiseInverse()) {
+      epsilon_(kRelativeEpsilon * data.row_alpha.cwiseInverse()) {
   set_scales(data);
   const auto& rows = jacobian.rows();
   for (std::size_t k = 0; k < rows.size();) {

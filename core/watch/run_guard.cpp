@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kUnmetAcceleration = 1e-3;                 // relative, of accelerations
 constexpr double kGrown = 0.5;                              // of the energy there is
-constexpr double kNoticeable = 1e-3;                        // of the natural energy: below it a change is none
+constexpr double kNoticeableChange = 1e-3;                  // of the natural energy: below it a change is none
 constexpr double kFastest = 299792458, kFastestTurn = 1e6;  // light [m/s]; ten times the fastest turbine [rad/s]
 constexpr double kGrowth = 1e3;                             // of what is faster from the start
 constexpr double kHalfTurn = 3.13;  // [rad]: nearer, the axis of the rotation may reverse within two hundredths
@@ -93,7 +93,7 @@ std::string RunGuard::about_energy(double t, const Energy& energy) {
   energy_largest_ = std::max(energy_largest_, size_of(energy));
   const double now = energy.kinetic + energy.potential, grown = now - energy_initial_;
   energy_drift_ = std::max(energy_drift_, std::abs(grown));
-  if (!(grown > kGrown * energy_largest_ && grown > kNoticeable * energy_natural_)) return {};
+  if (!(grown > kGrown * energy_largest_ && grown > kNoticeableChange * energy_natural_)) return {};
   return fmt::format(
       "the energy has grown from {:.3g} J to {:.3g} J at t = {:.6g} s, although nothing does work: the steps are too "
       "large for this motion. Use a smaller simulation.integrator.step, or an adaptive integrator with smaller rtol "
@@ -102,7 +102,7 @@ std::string RunGuard::about_energy(double t, const Energy& energy) {
 }
 
 double RunGuard::relative_energy_drift() const {
-  return energy_drift_ > kNoticeable * energy_natural_ ? energy_drift_ / energy_largest_ : 0;
+  return energy_drift_ > kNoticeableChange * energy_natural_ ? energy_drift_ / energy_largest_ : 0;
 }
 
 std::string RunGuard::about_speed(double t, const Eigen::VectorXd& y) const {

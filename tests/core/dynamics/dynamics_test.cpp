@@ -121,7 +121,7 @@ TEST_CASE("accelerations equal a dense solution of the constrained equations", "
   }
   VectorXd gamma(d.m);
   RowLaws laws(d);
-  evaluate_phi_ddot(d, frames, laws, gamma);
+  ConstraintTerms(d).phi_ddot(frames, laws, gamma);
   MatrixXd M = MatrixXd::Zero(18, 18);
   VectorXd f = VectorXd::Zero(18);
   for (int i = 1; i <= 3; ++i) {

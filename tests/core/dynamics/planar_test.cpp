@@ -116,33 +116,33 @@ TEST_CASE("the planar projection, its tangent and its adjoint are the spatial on
   const MechanismData& d = mechanism.data();
   REQUIRE(d.planar);
   const VectorXd angles = VectorXd::Constant(static_cast<Eigen::Index>(d.angles.size()), 0.2);
-  Projector spatial(mechanism, Projection::position_velocity),
-      planar(mechanism, Projection::position_velocity, Model::planar);
-  ProjectionSolution s = spatial.solution(), p = planar.solution();
+  const std::unique_ptr<Projector> spatial = make_projector(mechanism, Projection::position_velocity),
+                                   planar = make_projector(mechanism, Projection::position_velocity, Model::planar);
+  ProjectionSolution s = spatial->solution(), p = planar->solution();
   VectorXd start(14 * d.n), y_hat = state(d, 7), expected(14 * d.n), y(14 * d.n);
-  REQUIRE(spatial.project(kTime, angles, y_hat, start, s));  // onto the constraints, and off them by a step's error
+  REQUIRE(spatial->project(kTime, angles, y_hat, start, s));  // onto the constraints, and off them by a step's error
   y_hat = start + 0.02 * (plane_of(d) * VectorXd::Random(8 * d.n));
-  REQUIRE(spatial.project(kTime, angles, y_hat, expected, s));
-  REQUIRE(planar.project(kTime, angles, y_hat, y, p));
+  REQUIRE(spatial->project(kTime, angles, y_hat, expected, s));
+  REQUIRE(planar->project(kTime, angles, y_hat, y, p));
   CHECK(apart(y, expected) < 1e-12);
-  CHECK(planar.position_violation(kTime, angles, y) < 1e-13);
-  CHECK(planar.velocity_violation(kTime, y) < 1e-13);
-  CHECK(planar.velocity_violation(kTime, y_hat) == Approx(spatial.velocity_violation(kTime, y_hat)));
+  CHECK(planar->position_violation(kTime, angles, y) < 1e-13);
+  CHECK(planar->velocity_violation(kTime, y) < 1e-13);
+  CHECK(planar->velocity_violation(kTime, y_hat) == Approx(spatial->velocity_violation(kTime, y_hat)));
 
-  REQUIRE(spatial.linearise(kTime, angles, y_hat, expected, s));
-  REQUIRE(planar.linearise(kTime, angles, y_hat, expected, p));
+  REQUIRE(spatial->linearise(kTime, angles, y_hat, expected, s));
+  REQUIRE(planar->linearise(kTime, angles, y_hat, expected, p));
   std::srand(8);
   const MatrixXd plane = plane_of(d);
   const VectorXd w = plane * VectorXd::Random(plane.cols());
   VectorXd y_bar = VectorXd::Zero(y.size()), theta_bar = VectorXd::Zero(d.slots()),
            total = VectorXd::Zero(d.rho.size());
-  planar.add_adjoint(w, y_bar, theta_bar, total);
+  planar->add_adjoint(w, y_bar, theta_bar, total);
   d.add_to_rho(theta_bar, total);
   for (const ParameterBlock& block : parameter_blocks(d)) {
     const LaneRows dir = directions(d, 9);
     LaneRows out(y.size(), kLanes), reference(y.size(), kLanes);
-    spatial.tangent(block, dir, reference);
-    planar.tangent(block, dir, out);
+    spatial->tangent(block, dir, reference);
+    planar->tangent(block, dir, out);
     CHECK(apart(out, reference) < 1e-10);
     for (int k = 0; k < kLanes; ++k) {
       const double by_parameter = block.parameter[k] < 0 ? 0 : total(block.parameter[k]);

@@ -20,10 +20,10 @@ VectorXd drifted(const Mechanism& mechanism, double drift) {
 }
 
 VectorXd projected(const Mechanism& mechanism, const VectorXd& y_hat) {
-  Projector projector(mechanism, Projection::position_velocity);
-  ProjectionSolution solution = projector.solution();
+  const std::unique_ptr<Projector> projector = make_projector(mechanism, Projection::position_velocity);
+  ProjectionSolution solution = projector->solution();
   VectorXd y(y_hat.size());
-  REQUIRE(projector.project(0, {}, y_hat, y, solution));
+  REQUIRE(projector->project(0, {}, y_hat, y, solution));
   return y;
 }
 
@@ -57,9 +57,9 @@ TEST_CASE("projection meets positions and velocities to rounding and leaves what
   const Mechanism mechanism(scene, nominal(scene));
   const double drift = GENERATE(1e-2, 1e-5, 1e-9);
   const VectorXd y = projected(mechanism, drifted(mechanism, drift));
-  Projector projector(mechanism, Projection::position_velocity);
-  CHECK(projector.position_violation(0, {}, y) < 1e-14);
-  CHECK(projector.velocity_violation(0, y) < 1e-13);
+  const std::unique_ptr<Projector> projector = make_projector(mechanism, Projection::position_velocity);
+  CHECK(projector->position_violation(0, {}, y) < 1e-14);
+  CHECK(projector->velocity_violation(0, y) < 1e-13);
   CHECK((projected(mechanism, y) - y).cwiseAbs().maxCoeff() < 1e-13);
 }
 
@@ -82,16 +82,16 @@ TEST_CASE("tangent of the projection equals central differences", "[projection]"
   const Mechanism mechanism(scene, rho);
   const double drift = GENERATE(1e-2, 1e-4);
   const VectorXd y_hat = drifted(mechanism, drift);
-  Projector projector(mechanism, Projection::position_velocity);
-  ProjectionSolution solution = projector.solution();
+  const std::unique_ptr<Projector> projector = make_projector(mechanism, Projection::position_velocity);
+  ProjectionSolution solution = projector->solution();
   VectorXd y(y_hat.size());
-  REQUIRE(projector.project(0, {}, y_hat, y, solution));
-  REQUIRE(projector.linearise(0, {}, y_hat, y, solution));
+  REQUIRE(projector->project(0, {}, y_hat, y, solution));
+  REQUIRE(projector->linearise(0, {}, y_hat, y, solution));
   const double h = 1e-6;
   for (const ParameterBlock& block : parameter_blocks(mechanism.data())) {
     const LaneRows direction = LaneRows::Random(y.size(), kLanes);
     LaneRows out(y.size(), kLanes);
-    projector.tangent(block, direction, out);
+    projector->tangent(block, direction, out);
     for (int k = 0; k < kLanes; ++k) {
       VectorXd up = rho, down = rho;
       if (block.parameter[k] >= 0) up(block.parameter[k]) += h, down(block.parameter[k]) -= h;
@@ -110,20 +110,20 @@ TEST_CASE("the adjoint of the projection is the transpose of its tangent", "[pro
   const Projection what = GENERATE(Projection::position_velocity, Projection::velocity);
   const double drift = GENERATE(1e-2, 1e-6);
   const VectorXd y_hat = drifted(mechanism, drift);
-  Projector projector(mechanism, what);
-  ProjectionSolution solution = projector.solution();
+  const std::unique_ptr<Projector> projector = make_projector(mechanism, what);
+  ProjectionSolution solution = projector->solution();
   VectorXd y(y_hat.size());
-  REQUIRE(projector.project(0, {}, y_hat, y, solution));
-  REQUIRE(projector.linearise(0, {}, y_hat, y, solution));
+  REQUIRE(projector->project(0, {}, y_hat, y, solution));
+  REQUIRE(projector->linearise(0, {}, y_hat, y, solution));
   const VectorXd w = VectorXd::Random(y.size());
   VectorXd y_hat_bar = VectorXd::Zero(y.size()), theta_bar = VectorXd::Zero(d.slots()),
            rho_bar = VectorXd::Zero(d.rho.size());
-  projector.add_adjoint(w, y_hat_bar, theta_bar, rho_bar);
+  projector->add_adjoint(w, y_hat_bar, theta_bar, rho_bar);
   d.add_to_rho(theta_bar, rho_bar);
   for (const ParameterBlock& block : parameter_blocks(d)) {
     const LaneRows direction = LaneRows::Random(y.size(), kLanes);
     LaneRows out(y.size(), kLanes);
-    projector.tangent(block, direction, out);
+    projector->tangent(block, direction, out);
     for (int k = 0; k < kLanes; ++k) {
       const double backward =
           y_hat_bar.dot(direction.col(k)) + (block.parameter[k] < 0 ? 0 : rho_bar(block.parameter[k]));

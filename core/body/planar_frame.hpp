@@ -12,6 +12,12 @@ template <class T>
 struct PlanarFrame {
   Complex<T> r, rdot, A{1, 0}, Adot, Addot;
   Plane rddot;  // given, like the angular acceleration: tangents hold it fixed
+  // Virtual displacement of the adjoint sweep.
+  Plane r_eta;
+  double theta_eta = 0;
+
+  // The virtual change of a body-fixed vector x = A s.
+  Plane turned(const Plane& x) const { return times_i(theta_eta * x); }
 
   //   Adot = 2 P Pdot,   Addot = 2 Pdot^2 + (i omegadot - 2 |Pdot|^2) A
   void set_turn(const Complex<T>& P, const Complex<T>& Pdot, double omegadot) {
@@ -24,33 +30,34 @@ struct PlanarFrame {
 // Gradient of a scalar in a frame and in the image A_eta = i A eta_theta of a virtual turn.
 struct PlanarFrameBar {
   Plane r, rdot, A, Adot, Addot, A_eta;
+  void set_zero() { *this = {}; }
 };
 
-// A virtual displacement.
-struct PlanarShift {
-  Plane r;
-  double turn = 0;
-  PlanarShift() = default;
-  explicit PlanarShift(const Vec<3>& x) : r{x(0), x(1)}, turn(x(2)) {}
-};
+inline void set_virtual(const Vec<3>& eta, PlanarFrame<double>& f) {
+  f.r_eta = {eta(0), eta(1)};
+  f.theta_eta = eta(2);
+}
+// The cotangent of A_eta moved to A, eta_theta held fixed.
+inline void fold_virtual(const PlanarFrame<double>& f, PlanarFrameBar& bar) {
+  bar.A -= f.theta_eta * times_i(bar.A_eta);
+}
 
 // Cotangents of x, xd, xdd of a vector or separation, and of its virtual change.
 struct PlanarJetBar {
   Plane x, xd, xdd, eta;
 };
-inline void add_vector_bar(const PlanarFrame<double>& f, double turn, const Plane& s, const PlanarJetBar& bar,
-                           double sign, PlanarFrameBar& frame_bar, Plane& s_bar) {
+inline void add_vector_bar(const PlanarFrame<double>& f, const Plane& s, const PlanarJetBar& bar, double sign,
+                           PlanarFrameBar& frame_bar, Plane& s_bar) {
   const Plane st = conj(sign * s);
   frame_bar.A += bar.x * st, frame_bar.Adot += bar.xd * st, frame_bar.Addot += bar.xdd * st;
   frame_bar.A_eta += bar.eta * st;
-  s_bar += sign *
-           (conj(f.A) * bar.x + conj(f.Adot) * bar.xd + conj(f.Addot) * bar.xdd + conj(times_i(turn * f.A)) * bar.eta);
+  s_bar += sign * (conj(f.A) * bar.x + conj(f.Adot) * bar.xd + conj(f.Addot) * bar.xdd + conj(f.turned(f.A)) * bar.eta);
 }
-inline void add_point_bar(const PlanarFrame<double>& f, double turn, const Plane& s, const PlanarJetBar& bar,
-                          double sign, PlanarFrameBar& frame_bar, Plane& s_bar) {
+inline void add_point_bar(const PlanarFrame<double>& f, const Plane& s, const PlanarJetBar& bar, double sign,
+                          PlanarFrameBar& frame_bar, Plane& s_bar) {
   frame_bar.r += sign * bar.x;
   frame_bar.rdot += sign * bar.xd;
-  add_vector_bar(f, turn, s, bar, sign, frame_bar, s_bar);
+  add_vector_bar(f, s, bar, sign, frame_bar, s_bar);
 }
 
 }  // namespace mbsopt
