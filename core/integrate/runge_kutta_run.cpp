@@ -524,9 +524,10 @@ void RungeKuttaRun::add_statistics(Course& course) {
   course.result.y_end = step_.y0;
   SimulationStatistics& s = course.result.statistics;
   course.stiffness.add_to(s);
-  const double weak = error_of_weak_joints(mechanism_, settings_.formulation, dynamics_.worst_residual(), step_.t,
-                                           step_.y0, step_.angles0);
-  s.max_acceleration_residual = std::max({dynamics_.worst_residual(), weak, moved_ > 0 ? projected_ / moved_ : 0.0});
+  s.weak_joints_error = error_of_weak_joints(mechanism_, settings_.formulation, dynamics_.worst_residual(), step_.t,
+                                             step_.y0, step_.angles0);
+  s.max_acceleration_residual =
+      std::max({dynamics_.worst_residual(), s.weak_joints_error, moved_ > 0 ? projected_ / moved_ : 0.0});
   s.relative_energy_drift = guard_.relative_energy_drift();
   if (implicit_) {
     evaluations_ += implicit_->evaluations();

@@ -46,6 +46,7 @@ struct SimulationStatistics {
   double energy_initial = 0, energy_final = 0, energy_drift = 0;  // drift: largest |E - E(0)| over accepted steps [J]
   double relative_energy_drift = 0;      // of the largest energy so far, where nothing does work; else 0
   double max_acceleration_residual = 0;  // relative, of the constraints' accelerations; penalty: of projections
+  double weak_joints_error = 0;          // relative, of the accelerations at the end (weak_joints.hpp)
   std::size_t adjoint_memory_bytes = 0;  // the most that the backward sweep kept of the forward run
   long recomputed_steps = 0;             // for want of memory, of the backward sweep
   // Of explicit methods that can tell (stiffness.hpp): steps that were looked at, those at the edge of stability among

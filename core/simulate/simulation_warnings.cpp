@@ -12,6 +12,7 @@ constexpr double kApart = 1e-3;  // [m, -]
 // give up below 1e-8 (projection.cpp) at the first step.
 constexpr double kContradicting = 1e-10;
 constexpr double kUnmet = 1e-5;            // of the accelerations of the constraints
+constexpr double kGivingWay = 1e-8;        // of the accelerations; gradients had errors of 500 times as much
 constexpr double kTakenOut = 1e-4;         // by projections: those of the integration errors are of the order of rtol
 constexpr double kEnergyLost = 1e-2;       // of the largest energy
 constexpr double kUnresolved = 3e-2;       // of the integral of a running cost's size; estimates are pessimistic
@@ -90,6 +91,12 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
         "small angle between their axes and give way: raise simulation.formulation.alpha, or make the axes exactly "
         "parallel",
         statistics.max_acceleration_residual));
+  } else if (statistics.weak_joints_error > kGivingWay) {
+    warnings.push_back(fmt::format(
+        "joints lock only by a small angle between their axes and give way: the accelerations have a relative error "
+        "of {:.1e}, and gradients may have a thousand times as much. Make the axes exactly parallel, or raise "
+        "simulation.formulation.alpha ({:.3g} now; 1e12 holds angles of 1e-6)",
+        statistics.weak_joints_error, f.alpha));
   } else if (projects && statistics.max_position_violation > kContradicting) {
     warnings.push_back(fmt::format(
         "the equations of the joints contradict each other by {:.1e} [m, -], which no projection takes out: some of "

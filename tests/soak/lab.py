@@ -10,10 +10,10 @@ from scene import Scene
 # Warnings of the program that say its motion may be off by more than usual.
 DOUBT = re.compile(r"singular|energy changed|came apart|accelerations of the constraints|not resolve|stability|stiff|"
                    r"zero length|cannot change|not smooth|jump|peak|disagree|rounding|has no (mass|inertia)|"
-                   r"faster than|penalty|contradict|not determined|could not be evaluated", re.IGNORECASE)
+                   r"faster than|penalty|contradict|give way|not determined|could not be evaluated", re.IGNORECASE)
 # Of these, the ones that explain why two sweeps differentiate the same steps differently,
 SWEEP_DOUBT = re.compile(r"rounding|masses differ|cannot change|penalty|contradict|do not resolve the gradient|"
-                         r"derivatives leave out", re.IGNORECASE)
+                         r"derivatives leave out|give way", re.IGNORECASE)
 # and why two models do, whose steps may differ.
 STEP_DOUBT = re.compile(SWEEP_DOUBT.pattern + "|do not resolve|not determined", re.IGNORECASE)
 FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh", "pi")}

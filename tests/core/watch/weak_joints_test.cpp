@@ -1,6 +1,11 @@
 #include "core/watch/weak_joints.hpp"
 
+#include <fmt/format.h>
+
+#include <array>
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <numbers>
 #include <string>
 
 #include "core/simulate/simulation.hpp"
@@ -48,6 +53,46 @@ TEST_CASE("a loop that only a small angle between its axes locks is warned of, o
   Scene firm = bar_on_two_hinges("1e-5");
   firm.simulation.formulation.alpha = 1e12;
   CHECK_FALSE(warned(firm));
+}
+
+// A ring of seven bars in the plane on hinges whose axes are tilted at random: they hold it in the plane as the tilt.
+Scene tilted_ring(double tilt) {
+  Scene scene;
+  scene.gravity = {0.3, -9.81, 0.2};
+  std::array<Vector3d, 7> corner;
+  for (std::size_t k = 0; k < 7; ++k) {
+    const double turn = 2 * std::numbers::pi * static_cast<double>(k) / 7;
+    corner[k] = {std::cos(turn), std::sin(turn), 0};
+  }
+  const auto text = [](const Vector3d& x) {
+    return vec(fmt::format("{}", x(0)), fmt::format("{}", x(1)), fmt::format("{}", x(2)));
+  };
+  Vector3d before = Vector3d::Zero();  // origin of the body before
+  for (std::size_t k = 0; k < 7; ++k) {
+    const bool closing = k == 6;
+    const Vector3d here = closing ? Vector3d(Vector3d::Zero()) : Vector3d((corner[k] + corner[k + 1]) / 2);
+    const std::string name = closing ? "ground" : fmt::format("b{}", k);
+    if (!closing) {
+      scene.bodies.push_back(body(name, vec("0", "0", "0"), text(here), turned("0")));
+      scene.bodies.back().mass = 1.0;
+      scene.bodies.back().inertia = {0.02, 0.03, 0.04, 0.0, 0.0, 0.0};
+    }
+    Joint j = hinge(fmt::format("j{}", k), k == 0 ? "ground" : fmt::format("b{}", k - 1), text(corner[k] - before),
+                    name, text(corner[k] - here));
+    const double at = static_cast<double>(k);
+    j.axis1 = j.axis2 = text({tilt * std::cos(3 * at), tilt * std::sin(5 * at), 1});
+    scene.joints.push_back(j);
+    before = here;
+  }
+  scene.simulation.end_time = 0.1;
+  scene.simulation.integrator.type = "dopri853", scene.simulation.integrator.rtol = 1e-8;
+  return scene;
+}
+
+TEST_CASE("a ring that gives way a little between tilted axes is warned of, since gradients magnify it",
+          "[simulation]") {
+  CHECK(warned(tilted_ring(5e-4)));
+  CHECK_FALSE(warned(tilted_ring(1e-3)));
 }
 
 TEST_CASE("a run that crawls because alpha does not hold a loop is ended with the cause", "[simulation]") {
