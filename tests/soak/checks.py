@@ -171,6 +171,11 @@ def conserves_energy(problem):
         and nothing(force, "damping", "torsional_damping", "actuator") for force in problem.get("forces", []))
 
 
+def allowed_by_penalty(lab):
+    """Soft joints move and work; the program warns of errors from 1e-4 on."""
+    return 1e-4 if lab.problem["simulation"].get("formulation", {}).get("type") == "penalty" else SAME
+
+
 def energy(lab):
     if not conserves_energy(lab.problem):
         return []
@@ -183,7 +188,7 @@ def energy(lab):
     size = max(kinetic) + max(potential) - min(potential)
     change = max(total) - min(total)
     still = 1e-24 * lab.mass * (lab.length / lab.end_time) ** 2  # of one that rounding alone moves
-    if change > SAME * size + 1e-12 * max(map(abs, potential)) + still and not lab.doubts(base):
+    if change > allowed_by_penalty(lab) * size + 1e-12 * max(map(abs, potential)) + still and not lab.doubts(base):
         return [("energy", f"changes by {change:.2e} J of {size:.2e} J although nothing does work")]
     return []
 
@@ -326,8 +331,7 @@ def kinematics(lab):
     if not solved.ok:
         return [("kinematics = simulate", f"simulate runs, kinematics ends with: {solved.message[-300:]}")]
     worst, where = lab.apart(base.trajectory(), solved.trajectory())
-    penalty = lab.problem["simulation"].get("formulation", {}).get("type") == "penalty"  # warns of errors from 1e-4 on
-    if worst > (1e-4 if penalty else SAME) and not lab.doubts(base, solved):
+    if worst > allowed_by_penalty(lab) and not lab.doubts(base, solved):
         return [("kinematics = simulate", f"{where}: {worst:.1e} apart")]
     return []
 
