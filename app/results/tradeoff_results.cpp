@@ -12,6 +12,8 @@
 namespace mbsopt {
 namespace {
 
+std::string error_text(double error) { return std::isfinite(error) ? fmt::format("{:.1e}", error) : "-"; }
+
 Json row_json(const Tradeoff& tradeoff, std::size_t index) {
   const TradeoffRow& row = tradeoff.rows[index];
   Json json{{"setting", in_words(row.setting)}, {"status", to_string(row.status)}};
@@ -158,8 +160,7 @@ void add_given_settings(Run& run, const Tradeoff& tradeoff) {
       const TradeoffRow& row = tradeoff.rows[*i];
       std::vector<std::string> cells{in_words(row.setting),
                                      row.status == RowStatus::ok ? duration_text(row.wall_seconds) : "-"};
-      for (Eigen::Index q = 0; q < row.errors.size(); ++q)
-        cells.push_back(std::isfinite(row.errors(q)) ? fmt::format("{:.1e}", row.errors(q)) : "-");
+      for (Eigen::Index q = 0; q < row.errors.size(); ++q) cells.push_back(error_text(row.errors(q)));
       table.add(cells);
       if (row.status != RowStatus::ok) run.warn(fmt::format("{}: {}", cells[0], row.message));
     }
@@ -182,8 +183,7 @@ void add_fit_errors(Run& run, const FitErrors& errors) {
           {"gradient", {{"apart", errors.certificate.gradient}}},
           {"relative", true}};
   TextTable table({"sum of squares of identify", "its error", "of its gradient"});
-  table.add({"two methods apart", fmt::format("{:.1e}", errors.certificate.cost),
-             fmt::format("{:.1e}", errors.certificate.gradient)});
+  table.add({"two methods apart", error_text(errors.certificate.cost), error_text(errors.certificate.gradient)});
   for (const FitErrors::Setting& s : errors.settings) {
     if (!s.message.empty()) {
       json["settings"][s.name] = {{"message", s.message}};
@@ -191,7 +191,7 @@ void add_fit_errors(Run& run, const FitErrors& errors) {
       continue;
     }
     json["settings"][s.name] = {{"error", s.error.cost}, {"gradient_error", s.error.gradient}};
-    table.add({s.name, fmt::format("{:.1e}", s.error.cost), fmt::format("{:.1e}", s.error.gradient)});
+    table.add({s.name, error_text(s.error.cost), error_text(s.error.gradient)});
   }
   run.context.out << '\n' << table.text();
 }

@@ -42,14 +42,14 @@ void Progress::fraction(std::string_view what, double done) {
   if (quiet_) return;
   const double percent = 100 * std::clamp(done, 0.0, 1.0);
   const int whole = static_cast<int>(std::floor(percent));
-  if (terminal_ && whole == shown_percent_) return;
+  const bool stands = terminal_ && whole == shown_percent_;
   const double now = seconds_();
-  if (now - said_ < patience_) return;
+  if (now - said_ < (stands ? kAtFirst : patience_)) return;
   if (!terminal_) return break_silence(fmt::format("{}: {:.3g} %", what, percent), now);
-  shown_percent_ = whole;
+  shown_percent_ = whole, said_ = now;
   const int filled = whole * kBarWidth / 100;
   err_ << kClearLine << fmt::format("{} [{:#>{}}{:.>{}}] {:3d} %", what, "", filled, "", kBarWidth - filled, whole)
-       << std::flush;
+       << (stands ? fmt::format(", {:.0f} s", now - start_) : "") << std::flush;
   line_open_ = true;
 }
 

@@ -373,22 +373,18 @@ def what_is_wrong(case, code, words, out, interrupted):
                     return "a parameter without a value, and exit code 0"
     elif code == 0:
         return "exit code 0 without result.json"
-    own = case_text_words(case)
+    own = (out.parent / "problem.json").read_text(errors="replace")
     raw = [m for m in RAW_WORDS.findall(said) if m not in own]
     if raw:
         return f"a library's words: {raw[0]}"
     # What the file itself says may be quoted.
-    quoted = re.sub(r"is -?(inf|nan) at the values|'[^']*'|\"[^\"]*\"", "", said)
+    quoted = re.sub(r"is -?(inf|nan) at the (?:values|start)|'[^']*'|\"[^\"]*\"", "", said)
     if NOT_A_NUMBER.search(quoted) and not NOT_A_NUMBER.search(own):
         return "NaN or inf in words"
     trajectory = out / "trajectory.csv"
     if trajectory.exists() and NOT_A_NUMBER.search(trajectory.read_text().partition("\n")[2]):
         return "NaN in trajectory.csv"
     return ""
-
-
-def case_text_words(case):
-    return json.dumps(case.problem)
 
 
 def shrink(program, case, wrong, seconds):

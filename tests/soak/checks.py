@@ -157,7 +157,7 @@ def integrators(lab):
             continue
         own = lab.apart(other.trajectory(), closer.trajectory())[0]
         nearer, where = lab.apart(reference, closer.trajectory())
-        if nearer > max(10 * own, 1e-6) and certain(lab, nearer):
+        if nearer > max(10 * own, 1e-6, allowed_by_penalty(lab)) and certain(lab, nearer):
             found.append(("integrators", f"dopri853 and {method}, {where}: {nearer:.1e} apart"))
     return found
 

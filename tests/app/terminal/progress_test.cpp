@@ -25,6 +25,17 @@ TEST_CASE("on a terminal: a bar that is redrawn in place and cleared", "[progres
   CHECK(err.str() == "\r\x1b[Ksimulating [" + std::string(20, '#') + std::string(20, '.') + "]  50 %\r\x1b[K");
 }
 
+TEST_CASE("on a terminal, a bar that stands for long says since when", "[progress]") {
+  std::ostringstream err;
+  double now = 0;
+  Progress progress(err, true, false, [&] { return now; });
+  const auto bar = [&] { return err.str().substr(err.str().rfind(']')); };
+  for (; now < 4; now += 0.5) progress.fraction("simulating", 1e-9 * now);
+  CHECK(bar() == "]   0 %");
+  for (; now < 9; now += 0.5) progress.fraction("simulating", 1e-9 * now);
+  CHECK(bar() == "]   0 %, 8 s");
+}
+
 TEST_CASE("without a terminal, a long silence is broken, and ever more rarely", "[progress]") {
   std::ostringstream err;
   double now = 100;
