@@ -46,9 +46,8 @@ void describe(auto& v, Like<ObjectiveBound> auto& b) {
 }
 
 void describe(auto& v, Like<OptimizerSpec> auto& o) {
-  v.word("type", o.type, Words{optimizer_names()},
-         {"interior points (ipopt); NLopt's local methods with gradients (slsqp, mma, ccsaq, lbfgs) and without "
-          "(bobyqa, cobyla, sbplx), and global ones (mlsl, direct, crs, isres, esch)"});
+  static const std::string methods = "interior points (ipopt); NLopt's " + std::string(nlopt_methods_by_kind());
+  v.word("type", o.type, Words{optimizer_names()}, {methods});
   v.plain("tolerance", o.tolerance, kPositive, {"of the optimality conditions; of the last steps without gradients"});
   v.plain("max_iterations", o.max_iterations, kNotNegative, {"at most; ipopt: 100 when absent"});
   v.plain("max_evaluations", o.max_evaluations, kPositive,
