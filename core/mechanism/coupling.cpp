@@ -1,7 +1,7 @@
 #include "core/mechanism/coupling.hpp"
 
 #include <algorithm>
-#include <type_traits>
+#include <numeric>
 
 namespace mbsopt {
 namespace {
@@ -9,28 +9,12 @@ namespace {
 using Bodies = std::vector<int>;
 
 // The bodies that a sensor of the state reads; those of accelerations and reactions are not inputs of forces.
-Bodies read_by(const MechanismData& data, const SensorKind& sensor) {
-  Bodies all;
-  for (int i = 1; i <= data.n; ++i) all.push_back(i);
-  return std::visit(
-      [&](const auto& s) -> Bodies {
-        using Kind = std::decay_t<decltype(s)>;
-        if constexpr (std::is_same_v<Kind, PointSensor>) {
-          return {s.a.body, s.relative ? s.b.body : 0, std::max(s.axes_body, 0)};
-        } else if constexpr (std::is_same_v<Kind, AngularVelocitySensor>) {
-          return {s.body};
-        } else if constexpr (std::is_same_v<Kind, CoordinateSensor>) {
-          return {static_cast<int>(s.index % (7 * data.n)) / 7 + 1};
-        } else if constexpr (std::is_same_v<Kind, AngleSensor>) {
-          const JointAngle& angle = data.angles[static_cast<std::size_t>(s.angle)];
-          return {angle.body1, angle.body2};
-        } else if constexpr (std::is_same_v<Kind, DisplacementSensor>) {
-          return {s.joint.body1, s.joint.body2};
-        } else {
-          return all;
-        }
-      },
-      sensor);
+Bodies read_by(const MechanismData& data, const SensorPtr& sensor) {
+  Bodies read = sensor->bodies(data);
+  if (!read.empty()) return read;
+  read.resize(static_cast<std::size_t>(data.n));
+  std::iota(read.begin(), read.end(), 1);
+  return read;
 }
 
 void add(const Bodies& from, Bodies& to) {

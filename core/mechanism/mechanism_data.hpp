@@ -13,10 +13,8 @@
 #include "core/force/applied.hpp"
 #include "core/force/forces.hpp"
 #include "core/force/user_force.hpp"
-#include "core/sensor/acceleration_sensor.hpp"
+#include "core/mechanism/sensor_function.hpp"
 #include "core/sensor/joint_measure.hpp"
-#include "core/sensor/point_sensor.hpp"
-#include "core/sensor/rotation_sensor.hpp"
 
 namespace mbsopt {
 
@@ -31,34 +29,6 @@ struct BodyData {
   int slot_q = -1, slot_velocity = -1, slot_angular_velocity = -1;
 };
 
-struct AngleSensor {
-  int angle = 0;  // index of the JointAngle
-  bool rate = false;
-};
-struct EnergySensor {
-  bool kinetic = true, potential = true;
-};
-struct ReactionSensor {  // reaction_sensor.hpp
-  int joint = -1;        // index in the scene
-  bool torque = false;
-  int component = 0;  // 0..2, or PointSensor::kNorm
-  int body2 = 0;
-  Vector3d s2 = Vector3d::Zero();  // the joint's point on body 2, from its centre of mass
-  int slot_s2 = -1;
-  int drive_row = -1;  // of a drive's effort: its row of Phi
-};
-struct ViolationSensor {};   // the largest |Phi| of joints and unit norms
-struct DisplacementSensor {  // along a joint's axis, or its rate
-  JointDisplacement joint;
-  bool rate = false;
-};
-struct TensionSensor {  // what the law of a force says: a tsda pulls so [N], an rsda resists so [N m]
-  Forces::Place place;
-};
-
-using SensorKind = std::variant<PointSensor, AngularVelocitySensor, CoordinateSensor, AngleSensor, EnergySensor,
-                                ViolationSensor, TensionSensor, DisplacementSensor, AccelerationSensor, ReactionSensor>;
-
 // Consecutive rows of Phi that tie the same two bodies, and their Jacobian blocks.
 struct RowGroup {
   int body1 = 0, body2 = 0, row = 0, block = 0, rows = 0;
@@ -72,10 +42,11 @@ struct RowLaw {
 
 struct ConditionData {
   int sensor = 0;
-  SensorKind rate_kind;  // the sensor's time derivative, where rate is set
+  SensorPtr rate_sensor;  // the sensor's time derivative, where it has one
   bool has_value = false, has_rate = false, modulo_turn = false, velocity_level = false;
   double value = 0, rate = 0;
   int slot_value = -1, slot_rate = -1;
+  std::string unit, rate_unit;  // " rad", " rad/s"; empty for a number
 };
 
 struct UserForceData {
@@ -104,7 +75,7 @@ struct MechanismData {
   Forces forces;
   std::vector<AppliedForce> applied;
   std::vector<UserForceData> user_forces;
-  std::vector<SensorKind> sensors;
+  std::vector<SensorPtr> sensors;
   std::vector<std::string> sensor_names;
   std::vector<ConditionData> conditions;
   std::vector<std::string> body_names, joint_names, drive_names;  // body_names[0] = "ground"
@@ -130,26 +101,6 @@ template <int N>
 void add_slot(const MechanismData& data, int slot, const Vec<N>& bar, double scale,
               Eigen::Ref<Eigen::VectorXd> rho_bar) {
   FieldGradient{data.theta_rho, data.active, scale, rho_bar}.add<N>(slot, bar);
-}
-
-// Value of a sensor at (y, branch of the angles), and its gradient: y_bar += scale d/dy, and in the fields and
-// parameters. rho_bar is with respect to all parameters.
-double evaluate(const MechanismData& data, const SensorKind& sensor, double t, const Eigen::VectorXd& y,
-                const Eigen::VectorXd& angles);
-double add_gradient(const MechanismData& data, const SensorKind& sensor, double t, const Eigen::VectorXd& y,
-                    const Eigen::VectorXd& angles, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
-                    Eigen::Ref<Eigen::VectorXd> rho_bar);
-
-struct StatePoint;  // state_point.hpp
-// The same for any sensor; one that needs the motion takes it from the point.
-double evaluate(const MechanismData& data, const SensorKind& sensor, const StatePoint& at);
-double add_gradient(const MechanismData& data, const SensorKind& sensor, const StatePoint& at, double scale,
-                    Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::Ref<Eigen::VectorXd> rho_bar);
-
-// Whether a sensor needs the solution of the equations of motion; such a one is evaluated with a StatePoint that has
-// it.
-inline bool needs_motion(const SensorKind& sensor) {
-  return std::holds_alternative<AccelerationSensor>(sensor) || std::holds_alternative<ReactionSensor>(sensor);
 }
 
 struct Energy {

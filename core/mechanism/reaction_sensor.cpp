@@ -1,5 +1,8 @@
 #include "core/mechanism/reaction_sensor.hpp"
 
+#include <cassert>
+
+#include "core/mechanism/sensor_kinds.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
@@ -73,45 +76,82 @@ void add_pull_back_of_loads(const MechanismData& d, const ReactionSensor& s, con
 
 }  // namespace
 
-double evaluate(const MechanismData& d, const ReactionSensor& s, const Eigen::VectorXd& y,
-                const Eigen::VectorXd& lambda) {
-  if (s.drive_row >= 0) return -lambda(s.drive_row);
-  const Vector3d x = measured(s, loads_on_body2(d, s, y, lambda), body_at(y, s.body2).frame.A);
-  return s.component == PointSensor::kNorm ? x.norm() : x(s.component);
+double ReactionSensor::value(const MechanismData& d, const StatePoint& at) const {
+  assert(at.motion);
+  const Eigen::VectorXd& lambda = at.motion->motion(at).lambda;
+  if (drive_row >= 0) return -lambda(drive_row);
+  const Vector3d x = measured(*this, loads_on_body2(d, *this, at.y, lambda), body_at(at.y, body2).frame.A);
+  return component == kNorm ? x.norm() : x(component);
 }
 
-double add_gradient(const MechanismData& d, const ReactionSensor& s, const Eigen::VectorXd& y,
-                    const Eigen::VectorXd& lambda, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
-                    Eigen::VectorXd& lambda_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) {
-  if (s.drive_row >= 0) {
-    lambda_bar(s.drive_row) -= scale;
-    return -lambda(s.drive_row);
+double ReactionSensor::add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
+                                    VecOut rho_bar) const {
+  assert(at.motion);
+  const Motion& motion = at.motion->motion(at);
+  const double value = add_gradient(d, at.y, motion.lambda, scale, y_bar, at.motion->bar().lambda, rho_bar);
+  at.motion->fold_bar(at, y_bar, rho_bar);
+  return value;
+}
+
+double ReactionSensor::add_gradient(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::VectorXd& lambda,
+                                    double scale, VecOut y_bar, Eigen::VectorXd& lambda_bar, VecOut rho_bar) const {
+  if (drive_row >= 0) {
+    lambda_bar(drive_row) -= scale;
+    return -lambda(drive_row);
   }
-  const BodyAt b2 = body_at(y, s.body2);
+  const BodyAt b2 = body_at(y, body2);
   const Matrix3d& A2 = b2.frame.A;
-  const Loads loads = loads_on_body2(d, s, y, lambda);
-  const Vector3d x = measured(s, loads, A2);
-  const double result = s.component == PointSensor::kNorm ? x.norm() : x(s.component);
-  Vector3d c = Vector3d::Unit(s.component % 3);
-  if (s.component == PointSensor::kNorm) c = result > 0 ? Vector3d(x / result) : Vector3d(Vector3d::Zero());
+  const Loads loads = loads_on_body2(d, *this, y, lambda);
+  const Vector3d x = measured(*this, loads, A2);
+  const double result = component == kNorm ? x.norm() : x(component);
+  Vector3d c = Vector3d::Unit(component % 3);
+  if (component == kNorm) c = result > 0 ? Vector3d(x / result) : Vector3d(Vector3d::Zero());
 
   // c'x = F'eta_r + T'eta_theta with eta_r = c, or for a torque eta_theta = A2'c and eta_r = (A2 s2) x c
   Vec<6> eta = Vec<6>::Zero();
-  if (s.torque) {
-    eta << (A2 * s.s2).cross(c), A2.transpose() * c;
+  if (torque) {
+    eta << (A2 * s2).cross(c), A2.transpose() * c;
   } else {
     eta.head<3>() = c;
   }
-  add_pull_back_of_loads(d, s, y, lambda, eta, scale, y_bar, lambda_bar, rho_bar);
-  if (!s.torque) return result;
+  add_pull_back_of_loads(d, *this, y, lambda, eta, scale, y_bar, lambda_bar, rho_bar);
+  if (!torque) return result;
   // Through eta itself, with F and T fixed.
   const Vector3d arm_bar = c.cross(loads.F);
   FrameBar bar;
   bar.set_zero();
-  bar.A = c * loads.T.transpose() + arm_bar * s.s2.transpose();
-  add_pull_back(b2, s.body2, bar, scale, y_bar);
-  add_slot<3>(d, s.slot_s2, Vec<3>(A2.transpose() * arm_bar), scale, rho_bar);
+  bar.A = c * loads.T.transpose() + arm_bar * s2.transpose();
+  add_pull_back(b2, body2, bar, scale, y_bar);
+  add_slot<3>(d, slot_s2, Vec<3>(A2.transpose() * arm_bar), scale, rho_bar);
   return result;
+}
+
+std::unique_ptr<SensorFunction> make_reaction(Compilation& model, const Sensor& s, const std::string& where) {
+  auto out = std::make_unique<ReactionSensor>();
+  const std::size_t i = model.joint_index(s.joint, where + ".joint");
+  const Joint& joint = model.scene.joints[i];
+  if (ties_joints(joint)) {
+    throw SceneError(where + ".joint: joint '" + s.joint + "' is " + joint.type + ", which has no bodies of its own");
+  }
+  out->joint = static_cast<int>(i);
+  out->torque = s.kind == "torque";
+  if (!out->torque && s.kind != "force") {
+    throw SceneError(where + ".kind: is '" + s.kind + "'; allowed: force, torque");
+  }
+  out->component = component_of(s, where);
+  const std::string path = child_path("joints", i);
+  out->body2 = model.body_index(joint.body2, path + ".body2");
+  out->s2 = numbers(model.keep(out->slot_s2, model.point(out->body2, joint.point2, path + ".point2")));
+  return out;
+}
+
+std::unique_ptr<SensorFunction> make_drive_force(Compilation& model, const Sensor& s, const std::string& where) {
+  auto out = std::make_unique<ReactionSensor>();
+  for (const Constraint& c : model.data.constraints) {
+    if (c.drive >= 0 && model.scene.drives[static_cast<std::size_t>(c.drive)].name == s.drive) out->drive_row = c.row;
+  }
+  if (out->drive_row < 0) throw SceneError(where + ".drive: there is no drive '" + s.drive + "'");
+  return out;
 }
 
 }  // namespace mbsopt

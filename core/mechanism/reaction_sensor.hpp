@@ -8,17 +8,25 @@
 // the augmented Lagrangian tends to.
 #pragma once
 
-#include <vector>
-
 #include "core/mechanism/mechanism_data.hpp"
 
 namespace mbsopt {
 
-double evaluate(const MechanismData& data, const ReactionSensor& sensor, const Eigen::VectorXd& y,
-                const Eigen::VectorXd& lambda);
-// y_bar, lambda_bar, rho_bar += scale times the gradient.
-double add_gradient(const MechanismData& data, const ReactionSensor& sensor, const Eigen::VectorXd& y,
-                    const Eigen::VectorXd& lambda, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
-                    Eigen::VectorXd& lambda_bar, Eigen::Ref<Eigen::VectorXd> rho_bar);
+struct ReactionSensor final : SensorFunction {
+  int joint = -1;  // index in the scene
+  bool torque = false;
+  int component = 0;  // 0..2, or kNorm
+  int body2 = 0;
+  Vector3d s2 = Vector3d::Zero();  // the joint's point on body 2, from its centre of mass
+  int slot_s2 = -1;
+  int drive_row = -1;  // of a drive's effort: its row of Phi
+
+  double value(const MechanismData& data, const StatePoint& at) const override;
+  double add_gradient(const MechanismData& data, const StatePoint& at, double scale, VecOut y_bar,
+                      VecOut rho_bar) const override;
+  // y_bar, lambda_bar, rho_bar += scale times the gradient at given lambda; returns the value.
+  double add_gradient(const MechanismData& data, const Eigen::VectorXd& y, const Eigen::VectorXd& lambda, double scale,
+                      VecOut y_bar, Eigen::VectorXd& lambda_bar, VecOut rho_bar) const;
+};
 
 }  // namespace mbsopt

@@ -1,5 +1,7 @@
-#include "core/mechanism/tension_sensor.hpp"
-
+// The tension of a spring (tsda) and the resisting torque of a torsional one (rsda) as a sensor: the law's value
+//   f(x, xdot, t, rho),   x = l or the joint's angle
+//   f_y = f_x x_y + f_xdot xdot_y          f_rho = the law's own + through the geometry
+#include "core/mechanism/sensor_kinds.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
@@ -27,41 +29,59 @@ void add_law_gradient(const MechanismData& data, const Law& law, double x, doubl
   for (const int k : data.active) rho_bar(k) += scale * scratch.gradient[static_cast<std::size_t>(k)];
 }
 
+struct TensionFunction final : SensorFunction {
+  Forces::Place place;
+
+  double value(const MechanismData& d, const StatePoint& at) const override {
+    double value = 0;
+    d.forces.visit_law(place, [&](const auto& f) {
+      Law::Scratch none;
+      const auto [i, j] = f.bodies();
+      const auto [x, xdot] = f.measured(at.angles, body_at(at.y, i).frame, body_at(at.y, j).frame);
+      value = f.law.value(at.t, d.rho, x, xdot, scratch_for(d, f.law, none));
+    });
+    return value;
+  }
+
+  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
+                      VecOut rho_bar) const override {
+    double value = 0;
+    d.forces.visit_law(place, [&](const auto& f) {
+      Law::Scratch none;
+      Law::Scratch& scratch = scratch_for(d, f.law, none);
+      const auto [i, j] = f.bodies();
+      const BodyAt b1 = body_at(at.y, i), b2 = body_at(at.y, j);
+      const auto [x, xdot] = f.measured(at.angles, b1.frame, b2.frame);
+      const Law::Value law = f.law.derivatives(at.t, d.rho, x, xdot, scratch);
+      add_law_gradient(d, f.law, x, xdot, scale, scratch, rho_bar);
+      FrameBar bar1, bar2;
+      bar1.set_zero(), bar2.set_zero();
+      FieldGradient fields{d.theta_rho, d.active, scale, rho_bar};
+      f.pull_back_measured(b1.frame, b2.frame, law.f_x, law.f_xdot, bar1, bar2, fields);
+      add_pull_back(b1, i, bar1, scale, y_bar);
+      add_pull_back(b2, j, bar2, scale, y_bar);
+      value = law.f;
+    });
+    return value;
+  }
+};
+
 }  // namespace
 
-double tension(const MechanismData& d, const TensionSensor& s, double t, const Eigen::VectorXd& y,
-               const Eigen::VectorXd& angles) {
-  double value = 0;
-  d.forces.visit_law(s.place, [&](const auto& f) {
-    Law::Scratch none;
-    const auto [i, j] = f.bodies();
-    const auto [x, xdot] = f.measured(angles, body_at(y, i).frame, body_at(y, j).frame);
-    value = f.law.value(t, d.rho, x, xdot, scratch_for(d, f.law, none));
+std::unique_ptr<SensorFunction> make_tension(Compilation& model, const Sensor& s, const std::string& where) {
+  const std::vector<Force>& forces = model.scene.forces;
+  const auto found = std::ranges::find(forces, s.force, &Force::name);
+  if (found == forces.end()) throw SceneError(where + ".force: there is no force '" + s.force + "'");
+  const int force = static_cast<int>(found - forces.begin());
+  std::unique_ptr<TensionFunction> out;
+  model.data.forces.for_each([&]<class Kind>(const Kind& f, Forces::Place place) {
+    if (!HasLaw<Kind> || f.force != force) return;
+    out = std::make_unique<TensionFunction>();
+    out->place = place;
   });
-  return value;
-}
-
-double add_tension_gradient(const MechanismData& d, const TensionSensor& s, double t, const Eigen::VectorXd& y,
-                            const Eigen::VectorXd& angles, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
-                            Eigen::Ref<Eigen::VectorXd> rho_bar) {
-  double value = 0;
-  d.forces.visit_law(s.place, [&](const auto& f) {
-    Law::Scratch none;
-    Law::Scratch& scratch = scratch_for(d, f.law, none);
-    const auto [i, j] = f.bodies();
-    const BodyAt b1 = body_at(y, i), b2 = body_at(y, j);
-    const auto [x, xdot] = f.measured(angles, b1.frame, b2.frame);
-    const Law::Value law = f.law.derivatives(t, d.rho, x, xdot, scratch);
-    add_law_gradient(d, f.law, x, xdot, scale, scratch, rho_bar);
-    FrameBar bar1, bar2;
-    bar1.set_zero(), bar2.set_zero();
-    FieldGradient fields{d.theta_rho, d.active, scale, rho_bar};
-    f.pull_back_measured(b1.frame, b2.frame, law.f_x, law.f_xdot, bar1, bar2, fields);
-    add_pull_back(b1, i, bar1, scale, y_bar);
-    add_pull_back(b2, j, bar2, scale, y_bar);
-    value = law.f;
-  });
-  return value;
+  if (out) return out;
+  throw SceneError(where + ".force: '" + s.force + "' is a " + std::string(type_of(*found)) +
+                   "; only a tsda or an rsda has one number to measure");
 }
 
 }  // namespace mbsopt

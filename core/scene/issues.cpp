@@ -40,8 +40,11 @@ bool angle_is_used(const Scene& scene, const std::string& joint, const std::stri
     if (rsda && rsda->joint == joint) return true;
     if (friction && friction->joint == joint && !is_sliding(friction->motion, joint_type)) return true;
   }
-  for (const Sensor& sensor : scene.sensors)
-    if (sensor.joint == joint && (sensor.quantity == "angle" || sensor.quantity == "rate")) return true;
+  for (const Sensor& sensor : scene.sensors) {
+    const TypeRow* const row = find_row(kSensorQuantities, sensor.quantity);
+    if (sensor.joint == joint && row && (row->dimension == dimension::kAngle || row->dimension == dimension::kRate))
+      return true;
+  }
   for (const Drive& drive : scene.drives)
     if (drive.type == "angle" && drive.joint == joint) return true;
   return false;
@@ -286,7 +289,7 @@ void check_meaning(Checker& checker, const Sensor& sensor) {
       checker.issue(checker.path("joint"), "joint '" + sensor.joint + "' is " + joint->type +
                                                ", which has no bodies of its own; name one of the joints that it ties");
   } else if (need_of(*row, "joint") != Need::unknown)
-    check_joint_has(checker, "joint", sensor.joint, sensor.quantity == "displacement" ? "displacement" : "angle");
+    check_joint_has(checker, "joint", sensor.joint, row->dimension == dimension::kLength ? "displacement" : "angle");
   if (need_of(*row, "body2") != Need::unknown && sensor.body1 == sensor.body2 && !sensor.body2.empty())
     checker.issue(checker.path("body2"), "is '" + sensor.body2 + "' like body1; their distance never changes");
   if ((sensor.quantity == "orientation" || sensor.quantity == "body_angle") && sensor.body == "ground")

@@ -98,8 +98,7 @@ Dimension dimension_of_drive(std::string_view type, std::string_view coordinate)
 std::string unit_of(const Sensor& sensor) {
   const TypeRow* const row = find_row(kSensorQuantities, sensor.quantity);
   if (!row || row->dimension == Dimension{}) return "-";
-  if (sensor.quantity == "energy") return "J";
-  if (sensor.quantity == "force" || sensor.quantity == "drive_force") return "N or N m";  // by its spring, its drive
+  if (!row->unit.empty()) return std::string(row->unit);
   return to_string(sensor.kind == "torque" ? dimension::kTorque : row->dimension);
 }
 

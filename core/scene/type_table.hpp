@@ -34,6 +34,7 @@ struct TypeRow {
   std::string_view components = "";  // of a sensor: what "component" may be
   Dimension dimension = {};          // of a sensor: what it measures
   Reads reads = Reads::positions;    // of a sensor
+  std::string_view unit = "";        // of a sensor whose dimension does not say it
 };
 
 inline constexpr TypeRow kJointTypes[] = {
@@ -96,15 +97,17 @@ inline constexpr TypeRow kSensorQuantities[] = {
      Reads::velocities},
     {"angular_velocity", "of a body", "body! component! frame", "x y z norm", dimension::kRate, Reads::velocities},
     {"orientation", "Euler parameters of a body", "body! component!", "e0 e1 e2 e3"},
-    {"energy", "of the whole mechanism", "component!", "kinetic potential total", dimension::kTorque, Reads::state},
+    {"energy", "of the whole mechanism", "component!", "kinetic potential total", dimension::kTorque, Reads::state,
+     "J"},
     {"constraint_violation", "largest absolute entry of the constraint equations", "", "", {}, Reads::time_and_state},
-    {"force", "tension of a tsda, torque of an rsda", "force!", "", dimension::kForce, Reads::time_and_state},
+    {"force", "tension of a tsda, torque of an rsda", "force!", "", dimension::kForce, Reads::time_and_state,
+     "N or N m"},
     {"acceleration", "of a body point, kinematic: without gravity", "body! point relative_to component! frame",
      "x y z norm", dimension::kAcceleration, Reads::motion},
     {"reaction", "force or torque of a joint on body2 at its point2, global axes", "joint! kind! component!",
      "x y z norm", dimension::kForce, Reads::motion},
     {"drive_force", "force or torque of a drive along its coordinate, positive where it pushes it up", "drive!", "",
-     dimension::kForce, Reads::motion},
+     dimension::kForce, Reads::motion, "N or N m"},
 };
 
 inline constexpr std::string_view kJointsWithAngle = "revolute cylindrical screw";

@@ -309,10 +309,9 @@ struct Assembly::Solution {
     position.start_branches(result.y);
     result.angles = position.angles();
     for (const AssemblyTarget& target : position.targets()) {
-      if (const auto* sensor = std::get_if<AngleSensor>(&target.sensor)) {
-        double& angle = result.angles(sensor->angle);
-        angle = Angle::on_branch(angle, target.value);
-      }
+      if (target.sensor->angle() < 0) continue;
+      double& angle = result.angles(target.sensor->angle());
+      angle = Angle::on_branch(angle, target.value);
     }
     position.settle_shared_rows(result.y, result.angles);
   }

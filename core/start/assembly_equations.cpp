@@ -32,20 +32,6 @@ VectorXd with_unit_velocity(const VectorXd& y, Index j) {
   return at;
 }
 
-// The components of a norm of velocities, which alone is not linear in v; empty for every other sensor.
-std::vector<SensorKind> components_of_norm(const SensorKind& kind) {
-  std::vector<SensorKind> components;
-  auto split = [&](auto sensor) {
-    for (sensor.component = 0; sensor.component < 3; ++sensor.component) components.emplace_back(sensor);
-  };
-  if (const auto* p = std::get_if<PointSensor>(&kind)) {
-    if (p->quantity == PointSensor::Quantity::velocity && p->component == PointSensor::kNorm) split(*p);
-  } else if (const auto* w = std::get_if<AngularVelocitySensor>(&kind)) {
-    if (w->component == AngularVelocitySensor::kNorm) split(*w);
-  }
-  return components;
-}
-
 template <class P>
 Multipliers<P::kRows> only_mu0(const Vec<P::kRows>& mu0) {
   Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
@@ -90,16 +76,16 @@ AssemblyEquations::AssemblyEquations(const MechanismData& data, AssemblyLevel le
   laws_.set_time(t);
   for (std::size_t i = 0; i < data.conditions.size(); ++i) {
     const ConditionData& c = data.conditions[i];
-    const SensorKind& sensor = data.sensors[static_cast<std::size_t>(c.sensor)];
+    const SensorPtr& sensor = data.sensors[static_cast<std::size_t>(c.sensor)];
     const int index = static_cast<int>(i);
     if (level == AssemblyLevel::position) {
       if (c.has_value && !c.velocity_level) {
-        targets_.push_back({index, sensor, c.rate_kind, c.value, c.slot_value, c.value});
+        targets_.push_back({index, sensor, c.rate_sensor, c.value, c.slot_value, c.value});
       }
     } else if (c.velocity_level) {
       if (c.has_value) targets_.push_back({index, sensor, sensor, c.value, c.slot_value, 0});
     } else if (c.has_rate) {
-      targets_.push_back({index, c.rate_kind, c.rate_kind, c.rate, c.slot_rate, 0});
+      targets_.push_back({index, c.rate_sensor, c.rate_sensor, c.rate, c.slot_rate, 0});
     }
   }
 }
@@ -168,7 +154,7 @@ void AssemblyEquations::continue_branches(const VectorXd& y) {
     angle = a.value_near(angle, body_at(y, a.body1).frame, body_at(y, a.body2).frame);
   }
   for (AssemblyTarget& target : targets_) {
-    if (std::holds_alternative<AngleSensor>(target.sensor)) {
+    if (target.sensor->angle() >= 0) {
       target.branch = evaluate(data_, target.sensor, t_, y, branches(target));
     }
   }
@@ -354,7 +340,7 @@ void AssemblyEquations::add_target_curvature(const AssemblyTarget& target, const
                                              Gradients& out) const {
   const Index N = y.size() / 2, P = data_.rho.size();
   const VectorXd branch = branches(target);
-  const std::vector<SensorKind> components = components_of_norm(target.rate);
+  const std::vector<SensorPtr> components = target.rate->components();
   VectorXd y_bar(y.size()), rho_bar(P);
   if (components.empty()) {
     for (Index j = 0; j < N; ++j) {
@@ -369,7 +355,7 @@ void AssemblyEquations::add_target_curvature(const AssemblyTarget& target, const
   VectorXd f_y = VectorXd::Zero(y.size()), f_rho = VectorXd::Zero(P);
   const double f = add_gradient(data_, target.sensor, t_, y, branch, 1, f_y, f_rho);
   if (f == 0) return;
-  for (const SensorKind& component : components) {
+  for (const SensorPtr& component : components) {
     VectorXd c_y = VectorXd::Zero(y.size()), c_rho = VectorXd::Zero(P);
     const double c = add_gradient(data_, component, t_, y, branch, 1, c_y, c_rho);
     for (Index j = 0; j < N; ++j) {

@@ -20,8 +20,8 @@ enum class AssemblyLevel { position, velocity };
 // A sensor and the value that it shall have.
 struct AssemblyTarget {
   int condition = 0;  // index in MechanismData::conditions
-  SensorKind sensor;
-  SensorKind rate;  // its time derivative; at velocity level the sensor itself
+  SensorPtr sensor;
+  SensorPtr rate;  // its time derivative; at velocity level the sensor itself
   double value = 0;
   int slot = -1;
   double branch = 0;  // of an angle: the value last accepted, from which it is continued

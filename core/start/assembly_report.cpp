@@ -20,25 +20,6 @@ std::string joint_name(const MechanismData& d, const Constraint& c) {
          ")";
 }
 
-const char* unit_of(const SensorKind& kind) {
-  if (const auto* p = std::get_if<PointSensor>(&kind)) {
-    return p->quantity == PointSensor::Quantity::position ? " m" : " m/s";
-  }
-  if (const auto* a = std::get_if<AngleSensor>(&kind)) return a->rate ? " rad/s" : " rad";
-  if (std::holds_alternative<AngularVelocitySensor>(kind)) return " rad/s";
-  if (const auto* x = std::get_if<DisplacementSensor>(&kind)) return x->rate ? " m/s" : " m";
-  return "";
-}
-
-// The norm of a velocity has no direction to grow into from rest.
-bool is_speed(const SensorKind& kind) {
-  if (const auto* p = std::get_if<PointSensor>(&kind)) {
-    return p->quantity == PointSensor::Quantity::velocity && p->component == PointSensor::kNorm;
-  }
-  const auto* w = std::get_if<AngularVelocitySensor>(&kind);
-  return w && w->component == AngularVelocitySensor::kNorm;
-}
-
 // The violation of one joint: points apart, directions out of square.
 void add_joint(const MechanismData& d, AssemblyLevel level, int joint, const Eigen::VectorXd& F, double tolerance,
                std::vector<Finding>& findings) {
@@ -134,9 +115,10 @@ std::string assembly_failure(const MechanismData& d, AssemblyLevel level, const 
   for (const AssemblyTarget& target : equations.targets()) {
     const double off = F(row++);
     if (!(std::abs(off) > tolerance)) continue;
-    const bool at_rest = is_speed(target.sensor) && std::abs(target.value + off) < 1e-12;
+    // The norm of a velocity has no direction to grow into from rest.
+    const bool at_rest = !target.sensor->components().empty() && std::abs(target.value + off) < 1e-12;
     const ConditionData& c = d.conditions[static_cast<std::size_t>(target.condition)];
-    const char* const unit = unit_of(target.sensor);
+    const std::string& unit = positions || c.velocity_level ? c.unit : c.rate_unit;
     findings.push_back(
         {std::abs(off), fmt::format("condition on '{}': asks for {}{:.3g}{}, nearest possible {:.3g}{}{}",
                                     d.sensor_names[static_cast<std::size_t>(c.sensor)],

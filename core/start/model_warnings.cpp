@@ -95,7 +95,7 @@ void add_springs(const MechanismData& d, const VectorXd& y, std::vector<std::str
 // since nothing in the plane loads the others.
 Eigen::MatrixXd by_lambda(const MechanismData& d, ReactionSensor sensor, const VectorXd& y) {
   std::vector<int> components{sensor.component};
-  if (sensor.component == PointSensor::kNorm) {
+  if (sensor.component == SensorFunction::kNorm) {
     components.clear();
     for (int k = 0; k < 3; ++k)
       if (!d.planar || (k == d.planar->n) == sensor.torque) components.push_back(k);
@@ -106,7 +106,7 @@ Eigen::MatrixXd by_lambda(const MechanismData& d, ReactionSensor sensor, const V
   for (std::size_t k = 0; k < components.size(); ++k) {
     sensor.component = components[k];
     lambda_bar = none;
-    add_gradient(d, sensor, y, none, 1, y_bar, lambda_bar, rho_bar);
+    sensor.add_gradient(d, y, none, 1, y_bar, lambda_bar, rho_bar);
     columns.col(static_cast<Eigen::Index>(k)) = lambda_bar;
   }
   return columns;
@@ -118,8 +118,8 @@ void add_reactions(const MechanismData& d, const VectorXd& y, std::vector<std::s
   std::vector<SparseEntry> rows;
   int rank = -1;
   std::map<std::string, bool> told;
-  for (const SensorKind& kind : d.sensors) {
-    const auto* sensor = std::get_if<ReactionSensor>(&kind);
+  for (const SensorPtr& any : d.sensors) {
+    const auto* sensor = dynamic_cast<const ReactionSensor*>(any.get());
     if (!sensor) continue;
     if (rank < 0) {
       add_jacobian(d, y, rows);
@@ -176,9 +176,8 @@ void add_axes(const MechanismData& d, std::vector<std::string>& warnings) {
   constexpr double kAlong = 1 - 1e-9;
   const Vector3d normal = Vector3d::Unit(d.planar->n);
   for (std::size_t k = 0; k < d.sensors.size(); ++k) {
-    const auto* sensor = std::get_if<AngleSensor>(&d.sensors[k]);
-    if (!sensor) continue;
-    const JointAngle& angle = d.angles[at(sensor->angle)];
+    if (d.sensors[k]->angle() < 0) continue;
+    const JointAngle& angle = d.angles[at(d.sensors[k]->angle())];
     if (angle.body1 != 0 || std::abs(angle.measure.s1.cross(angle.measure.s3).dot(normal)) > kAlong) continue;
     warnings.push_back(fmt::format(
         "sensors.{}: its axis is not the normal of the plane in which the mechanism moves, [{}, {}, {}]; the "

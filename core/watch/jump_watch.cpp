@@ -14,7 +14,7 @@ constexpr double kApart = 1e-6;              // of the run: times and states hav
 constexpr double kMiddle = 0.471;            // not half: jumps are at round times
 constexpr double kFar = 1e-2, kNear = 1e-4;  // from the zero, of the interval
 constexpr double kKept = 0.5;                // of the far difference by the near one: |x|^0.15 keeps it, a kink 0.01
-constexpr double kNoticeable = 1e-6;         // of the value: cancellation next to sin(x)/x is less
+constexpr double kLeastJump = 1e-6;          // of the value: cancellation next to sin(x)/x is less
 constexpr int kBisections = 60;              // to the rounding of theta
 
 double sign_of(double x) { return x > 0 ? 1 : (x < 0 ? -1 : 0); }
@@ -136,7 +136,7 @@ bool JumpWatch::search(Function& f, Switch& s, double from, double to) {
   };
   double size = 0;
   const double far = jump(kFar, size), near = jump(kNear, size);
-  if (!std::isfinite(size) || !(near > kNoticeable * size) || near < kKept * far) return false;
+  if (!std::isfinite(size) || !(near > kLeastJump * size) || near < kKept * far) return false;
   f.jump.size = near, f.jump.t = t0_ + to * (t1_ - t0_);
   f.jump.parameters = s.parameters, f.jump.motion = s.motion;
   found_.push_back(f.jump);

@@ -5,6 +5,7 @@
 
 #include "core/body/euler_parameters.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/point_sensors.hpp"
 #include "core/mechanism/state_point.hpp"
 #include "tests/core/mechanism/small_scenes.hpp"
 
@@ -73,8 +74,9 @@ Numbers numbers_of(const MechanismData& d) {
   for (const TurningFriction& f : d.forces.of<TurningFriction>()) {
     x.add(f.law.slot, Vector3d(f.law.coulomb, f.law.smooth, f.law.viscous));
   }
-  for (const SensorKind& s : d.sensors) {
-    if (const auto* p = std::get_if<PointSensor>(&s)) x.add(p->a.slot, p->a.s), x.add(p->b.slot, p->b.s);
+  for (const SensorPtr& s : d.sensors) {
+    const auto* p = dynamic_cast<const PointSensor*>(s.get());
+    if (p) x.add(p->a.slot, p->a.s), x.add(p->b.slot, p->b.s);
   }
   for (const ConditionData& c : d.conditions) x.add(c.slot_value, Vec<1>(c.value)), x.add(c.slot_rate, Vec<1>(c.rate));
   return x;

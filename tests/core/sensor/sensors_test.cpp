@@ -284,20 +284,9 @@ const std::vector<Row>& all_sensors() {
 
 struct Compiled {
   Mechanism mechanism;
-  std::vector<SensorKind> kind;  // one
+  SensorPtr sensor;
   VectorXd angles;
 };
-std::vector<SensorKind> kind_of(const Row& row, const MechanismData& data) {
-  if (!row.time_derivative) return {data.sensors.at(0)};
-  if (const auto* along = std::get_if<DisplacementSensor>(&data.sensors.at(0))) {
-    DisplacementSensor rate = *along;
-    rate.rate = true;
-    return {rate};
-  }
-  PointSensor rate = std::get<PointSensor>(data.sensors.at(0));
-  rate.quantity = PointSensor::Quantity::position_rate;
-  return {rate};
-}
 Compiled compiled(const Row& row, const VectorXd& rho) {
   Scene scene = two_bodies();
   scene.sensors.push_back(row.sensor);
@@ -310,7 +299,8 @@ Compiled compiled(const Row& row, const VectorXd& rho) {
   const Mechanism mechanism(scene, rho);
   const VectorXd angles = VectorXd::Constant(static_cast<Eigen::Index>(mechanism.data().angles.size()),
                                              TextbookScene<double>::kTurns * 2 * std::acos(-1.0));
-  return {mechanism, kind_of(row, mechanism.data()), angles};
+  const SensorPtr& sensor = mechanism.data().sensors.at(0);
+  return {mechanism, row.time_derivative ? sensor->rate(mechanism.data()) : sensor, angles};
 }
 
 // x = (y, rho)
@@ -332,11 +322,11 @@ TEST_CASE("every sensor has the value of its definition and that value's gradien
   const VectorXd y = x.head(28), rho = x.tail(static_cast<Eigen::Index>(kParameters));
 
   const Compiled c = compiled(row, rho);
-  const double value = evaluate(c.mechanism.data(), c.kind[0], 0, y, c.angles);
+  const double value = evaluate(c.mechanism.data(), c.sensor, 0, y, c.angles);
   CHECK(value == Approx(row.value(textbook(std::vector<double>(x.data(), x.data() + x.size())))).epsilon(1e-13));
 
   VectorXd y_bar = VectorXd::Ones(28), rho_bar = VectorXd::Ones(rho.size());
-  const double again = add_gradient(c.mechanism.data(), c.kind[0], 0, y, c.angles, 0.6, y_bar, rho_bar);
+  const double again = add_gradient(c.mechanism.data(), c.sensor, 0, y, c.angles, 0.6, y_bar, rho_bar);
   CHECK(again == Approx(value).epsilon(1e-15));
   VectorXd found(x.size());
   found << y_bar, rho_bar;
@@ -347,7 +337,7 @@ TEST_CASE("every sensor has the value of its definition and that value's gradien
   const VectorXd differences = difference_gradient(
       [&](const VectorXd& at) {
         const Compiled moved = compiled(row, at.tail(rho.size()));
-        return evaluate(moved.mechanism.data(), moved.kind[0], 0, at.head(28), moved.angles);
+        return evaluate(moved.mechanism.data(), moved.sensor, 0, at.head(28), moved.angles);
       },
       x, 1e-4);
   const double size = 1 + found.lpNorm<Eigen::Infinity>();

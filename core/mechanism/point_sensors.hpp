@@ -5,30 +5,35 @@
 //   velocity       a component of R'Xdot, or |Xdot|
 #pragma once
 
+#include "core/mechanism/sensor_function.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
 
-struct PointSensor {
-  enum class Quantity { position, position_rate, velocity };
-  struct Point {
-    int body = 0;
-    Vector3d s = Vector3d::Zero();  // from the centre of mass, body axes [m]
-    int slot = -1;
-  };
-  static constexpr int kNorm = 3;
+struct BodyPoint {
+  int body = 0;
+  Vector3d s = Vector3d::Zero();  // from the centre of mass, body axes [m]
+  int slot = -1;
+};
 
-  Quantity quantity = Quantity::position;
-  Point a, b;
+// What sensors of points have in common.
+struct SeenPoints {
+  BodyPoint a, b;
   bool relative = false;  // whether b counts
   int component = 0;      // 0..2, or kNorm
   int axes_body = -1;     // body whose axes the components are in; -1: global
+};
 
-  double value(const Eigen::VectorXd& y) const;
+struct PointSensor final : SensorFunction, SeenPoints {
+  enum class Quantity { position, position_rate, velocity };
+  Quantity quantity = Quantity::position;
 
-  // y_bar += scale d/dy; a_bar, b_bar: scale d/ds of the two points.
-  double add_gradient(const Eigen::VectorXd& y, double scale, Eigen::Ref<Eigen::VectorXd> y_bar, Vector3d& a_bar,
-                      Vector3d& b_bar) const;
+  double value(const MechanismData&, const StatePoint& at) const override;
+  double add_gradient(const MechanismData& data, const StatePoint& at, double scale, VecOut y_bar,
+                      VecOut rho_bar) const override;
+  std::vector<int> bodies(const MechanismData&) const override;
+  SensorPtr rate(const MechanismData&) const override;
+  std::vector<SensorPtr> components() const override;
 
  private:
   struct Seen {
@@ -39,9 +44,6 @@ struct PointSensor {
   double pick(const Vector3d& x) const { return component == kNorm ? x.norm() : x(component); }
   // The gradient of pick; zero at a zero vector, where a norm has none.
   Vector3d along(const Vector3d& x) const;
-
-  static void add_point(const BodyAt& body, const Point& point, const Vector3d& X_bar, const Vector3d& V_bar,
-                        double scale, Eigen::Ref<Eigen::VectorXd> y_bar, Vector3d& s_bar);
 };
 
 }  // namespace mbsopt

@@ -1,0 +1,104 @@
+// The energy of a mechanism and its gradient.   [J]
+//   kinetic    sum of (m rdot'rdot + omega'J omega)/2
+//   potential  sum of -m gravity'r, and that of the forces that have one
+#include <algorithm>
+
+#include "core/body/euler_parameters.hpp"
+#include "core/mechanism/sensor_kinds.hpp"
+#include "core/sensor/body_at.hpp"
+
+namespace mbsopt {
+namespace {
+
+Vec<6> inertia_entries(const Matrix3d& X) {  // gradient in xx yy zz xy xz yz of <X, J>
+  Vec<6> x;
+  x << X(0, 0), X(1, 1), X(2, 2), X(0, 1) + X(1, 0), X(0, 2) + X(2, 0), X(1, 2) + X(2, 1);
+  return x;
+}
+
+void add_kinetic_gradient(const MechanismData& d, const Eigen::VectorXd& y, double scale, VecOut y_bar,
+                          VecOut rho_bar) {
+  for (int i = 1; i <= d.n; ++i) {
+    const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
+    const BodyAt b = body_at(y, i);
+    const Vector3d w = b.state.omega(), w_bar = body.J * w;
+    const Eigen::Index q = 7 * (i - 1), v = y.size() / 2 + q;
+    y_bar.segment<3>(v) += scale * body.mass * b.frame.rdot;
+    // w = 2 G(p) pdot = -2 G(pdot) p
+    y_bar.segment<4>(v + 3) += 2 * scale * G_transposed_times(b.state.p, w_bar);
+    y_bar.segment<4>(q + 3) -= 2 * scale * G_transposed_times(b.state.pdot, w_bar);
+    add_slot<1>(d, body.slot_mass, Vec<1>(0.5 * b.frame.rdot.squaredNorm()), scale, rho_bar);
+    add_slot<6>(d, body.slot_J, inertia_entries(0.5 * w * w.transpose()), scale, rho_bar);
+  }
+}
+
+void add_potential_gradient(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                            double scale, VecOut y_bar, VecOut rho_bar) {
+  for (int i = 1; i <= d.n; ++i) {
+    const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
+    const Vector3d r = y.segment<3>(7 * (i - 1));
+    y_bar.segment<3>(7 * (i - 1)) -= scale * body.mass * d.gravity;
+    add_slot<1>(d, body.slot_mass, Vec<1>(-d.gravity.dot(r)), scale, rho_bar);
+    add_slot<3>(d, d.slot_gravity, Vec<3>(-body.mass * r), scale, rho_bar);
+  }
+  FieldGradient fields{d.theta_rho, d.active, scale, rho_bar};
+  d.forces.for_each([&](const auto& f) {
+    const auto [i, j] = f.bodies();
+    const BodyAt b1 = body_at(y, i), b2 = body_at(y, j);
+    FrameBar bar1, bar2;
+    bar1.set_zero(), bar2.set_zero();
+    f.pull_back_potential(angles, b1.frame, b2.frame, bar1, bar2, fields);
+    add_pull_back(b1, i, bar1, scale, y_bar);
+    add_pull_back(b2, j, bar2, scale, y_bar);
+  });
+}
+
+struct EnergyFunction final : SensorFunction {
+  bool kinetic = true, potential = true;
+
+  double value(const MechanismData& d, const StatePoint& at) const override {
+    const Energy e = energy(d, at.y, at.angles);
+    return (kinetic ? e.kinetic : 0) + (potential ? e.potential : 0);
+  }
+  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
+                      VecOut rho_bar) const override {
+    if (kinetic) add_kinetic_gradient(d, at.y, scale, y_bar, rho_bar);
+    if (potential) add_potential_gradient(d, at.y, at.angles, scale, y_bar, rho_bar);
+    return value(d, at);
+  }
+};
+
+}  // namespace
+
+Energy energy(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
+  Energy e;
+  for (int i = 1; i <= d.n; ++i) {
+    const BodyData& body = d.bodies[static_cast<std::size_t>(i)];
+    const BodyAt b = body_at(y, i);
+    const Vector3d w = b.state.omega();
+    e.kinetic += 0.5 * (body.mass * b.frame.rdot.squaredNorm() + w.dot(body.J * w));
+    e.potential -= body.mass * d.gravity.dot(b.frame.r);
+  }
+  d.forces.for_each([&](const auto& f) {
+    const auto [i, j] = f.bodies();
+    e.potential += f.potential(angles, body_at(y, i).frame, body_at(y, j).frame);
+  });
+  return e;
+}
+
+bool conserves_energy(const MechanismData& d) {
+  return d.applied.empty() && d.user_forces.empty() &&
+         d.forces.all_of([](const auto& f) { return f.conserves_energy(); }) &&
+         std::all_of(d.laws.begin(), d.laws.end(), [](auto& l) { return !l.law.programs && !l.law.spline; });
+}
+
+std::unique_ptr<SensorFunction> make_energy(Compilation&, const Sensor& s, const std::string& where) {
+  if (s.component != "kinetic" && s.component != "potential" && s.component != "total") {
+    throw SceneError(where + ".component: is '" + s.component + "'; allowed: kinetic, potential, total");
+  }
+  auto out = std::make_unique<EnergyFunction>();
+  out->kinetic = s.component != "potential", out->potential = s.component != "kinetic";
+  return out;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,86 @@
+// Angular velocity of a body, and its Euler parameters.
+//   omega_B = 2 G(p) pdot,  omega_G = A omega_B = 2 (e0 edot - e0dot e + e x edot)
+#include "core/mechanism/sensor_kinds.hpp"
+#include "core/sensor/body_at.hpp"
+
+namespace mbsopt {
+namespace {
+
+struct AngularVelocitySensor final : SensorFunction {
+  int body = 0;
+  int component = 0;           // 0..2, or kNorm
+  bool in_body_frame = false;  // components in the body's axes, else global
+
+  Vector3d omega(const Eigen::VectorXd& y) const {
+    const BodyAt b = body_at(y, body);
+    const Vector3d e = b.state.p.tail<3>(), f = b.state.pdot.tail<3>();
+    const double sign = in_body_frame ? -1 : 1;
+    return 2 * (b.state.p(0) * f - b.state.pdot(0) * e + sign * e.cross(f));
+  }
+  double value(const MechanismData&, const StatePoint& at) const override {
+    const Vector3d w = omega(at.y);
+    return component == kNorm ? w.norm() : w(component);
+  }
+  double add_gradient(const MechanismData&, const StatePoint& at, double scale, VecOut y_bar, VecOut) const override {
+    const Vector3d w = omega(at.y);
+    const double result = component == kNorm ? w.norm() : w(component);
+    if (body == 0) return result;
+    Vector3d d = Vector3d::Unit(component % 3);
+    if (component == kNorm) d = result > 0 ? Vector3d(w / result) : Vector3d(Vector3d::Zero());
+    const BodyAt b = body_at(at.y, body);
+    const Vector4d &p = b.state.p, &pdot = b.state.pdot;
+    const Vector3d e = p.tail<3>(), f = pdot.tail<3>();
+    const double sign = in_body_frame ? -1 : 1;  // of e x edot
+    Vector4d p_bar, pdot_bar;
+    p_bar << d.dot(f), -pdot(0) * d + sign * f.cross(d);
+    pdot_bar << -d.dot(e), p(0) * d + sign * d.cross(e);
+    y_bar.segment<4>(7 * (body - 1) + 3) += 2 * scale * p_bar;
+    y_bar.segment<4>(y_bar.size() / 2 + 7 * (body - 1) + 3) += 2 * scale * pdot_bar;
+    return result;
+  }
+  std::vector<int> bodies(const MechanismData&) const override { return {body}; }
+  std::vector<SensorPtr> components() const override {
+    std::vector<SensorPtr> all;
+    for (int k = 0; k < 3 && component == kNorm; ++k)
+      all.push_back(changed(*this, [&](AngularVelocitySensor& c) { c.component = k; }));
+    return all;
+  }
+};
+
+// One entry of y: an Euler parameter, or its rate.
+struct CoordinateFunction final : SensorFunction {
+  Eigen::Index index = 0;
+
+  double value(const MechanismData&, const StatePoint& at) const override { return at.y(index); }
+  double add_gradient(const MechanismData&, const StatePoint& at, double scale, VecOut y_bar, VecOut) const override {
+    y_bar(index) += scale;
+    return at.y(index);
+  }
+  std::vector<int> bodies(const MechanismData& d) const override {
+    return {static_cast<int>(index % (7 * d.n)) / 7 + 1};
+  }
+  SensorPtr rate(const MechanismData& d) const override {
+    return changed(*this, [&](CoordinateFunction& r) { r.index += 7 * d.n; });
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<SensorFunction> make_angular_velocity(Compilation& model, const Sensor& s, const std::string& where) {
+  auto out = std::make_unique<AngularVelocitySensor>();
+  out->body = model.body_index(s.body, where), out->component = component_of(s, where);
+  out->in_body_frame = s.in_body_frame;
+  return out;
+}
+
+std::unique_ptr<SensorFunction> make_orientation(Compilation& model, const Sensor& s, const std::string& where) {
+  const int body = model.body_index(s.body, where);
+  if (body == 0 || s.component.size() != 2 || s.component[0] != 'e' || s.component[1] < '0' || s.component[1] > '3') {
+    throw SceneError(where + ": orientation needs a moving body and a component e0, e1, e2 or e3");
+  }
+  auto out = std::make_unique<CoordinateFunction>();
+  out->index = 7 * (body - 1) + 3 + (s.component[1] - '0');
+  return out;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,48 @@
+// Which function makes each quantity of kSensorQuantities from the scene. A new sensor is a file with its maker, a row
+// here and a row there. A maker throws SceneError.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "core/mechanism/compilation.hpp"
+#include "core/scene/scene_error.hpp"
+
+namespace mbsopt {
+
+using SensorMaker = std::unique_ptr<SensorFunction>(Compilation& model, const Sensor& sensor, const std::string& where);
+
+SensorMaker make_place, make_distance, make_acceleration;          // point_sensors.cpp
+SensorMaker make_joint_angle, make_body_angle, make_displacement;  // joint_sensors.cpp
+SensorMaker make_angular_velocity, make_orientation;               // rotation_sensors.cpp
+SensorMaker make_energy, make_violation, make_tension;             // energy_, violation_, tension_sensor.cpp
+SensorMaker make_reaction, make_drive_force;                       // reaction_sensor.cpp
+
+struct SensorMakerRow {
+  std::string_view quantity;
+  SensorMaker* make;
+};
+inline constexpr SensorMakerRow kSensorMakers[] = {
+    {"position", make_place},
+    {"velocity", make_place},
+    {"distance", make_distance},
+    {"distance_rate", make_distance},
+    {"acceleration", make_acceleration},
+    {"angle", make_joint_angle},
+    {"rate", make_joint_angle},
+    {"body_angle", make_body_angle},
+    {"displacement", make_displacement},
+    {"angular_velocity", make_angular_velocity},
+    {"orientation", make_orientation},
+    {"energy", make_energy},
+    {"constraint_violation", make_violation},
+    {"force", make_tension},
+    {"reaction", make_reaction},
+    {"drive_force", make_drive_force},
+};
+
+// Index of the component, 3 for a norm.
+int component_of(const Sensor& sensor, const std::string& where);
+
+}  // namespace mbsopt

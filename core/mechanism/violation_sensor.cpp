@@ -1,0 +1,117 @@
+// The largest |entry| of the constraint equations and the unit norms: which equation is violated most at a state.
+#include <cmath>
+
+#include "core/constraint/unit_norm.hpp"
+#include "core/mechanism/row_laws.hpp"
+#include "core/mechanism/sensor_kinds.hpp"
+#include "core/sensor/body_at.hpp"
+
+namespace mbsopt {
+namespace {
+
+struct Violation {
+  double amount = 0;  // signed
+  int row = -1;       // of Phi, or -1
+  int body = 0;       // of a unit norm, or 0
+};
+
+RowLaws laws_at(const MechanismData& d, double t) {
+  RowLaws laws(d);
+  laws.set_time(t);
+  return laws;
+}
+
+template <class P>
+Vec<P::kRows> phi_of(const RowLaws& laws, const Constraint& c, const P& p, const BodyAt& b1, const BodyAt& b2,
+                     const Eigen::VectorXd& angles) {
+  Vec<P::kRows> phi;
+  p.phi(b1.frame, b2.frame, phi);
+  if constexpr (std::is_same_v<P, Angle>) {
+    double reference = 0;
+    if (c.angle == Constraint::kNearestLaw) {
+      reference = laws.f_or_zero(c.row);
+    } else if (c.angle < angles.size()) {
+      reference = angles(c.angle);
+    }
+    phi(0) = Angle::on_branch(phi(0), reference);
+  }
+  return phi;
+}
+
+Violation worst_violation(const MechanismData& d, double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
+  const RowLaws laws = laws_at(d, t);
+  Violation worst;
+  auto offer = [&](double phi, int row, int body) {
+    if (std::abs(phi) > std::abs(worst.amount)) worst = {phi, row, body};
+  };
+  double sum = 0;
+  for (std::size_t i = 0; i < d.constraints.size(); ++i) {
+    const Constraint& c = d.constraints[i];
+    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+    const bool last_term = i + 1 == d.constraints.size() || d.constraints[i + 1].row != c.row;
+    std::visit(
+        [&](const auto& p) {
+          const auto phi = phi_of(laws, c, p, b1, b2, angles);
+          sum += c.factor * phi(0);
+          if (!last_term) return;
+          offer(sum - laws.f_or_zero(c.row), c.row, 0);
+          for (int k = 1; k < phi.size(); ++k) offer(c.factor * phi(k), c.row + k, 0);
+          sum = 0;
+        },
+        c.primitive);
+  }
+  for (int i = 1; i <= d.n; ++i) offer(UnitNorm::phi(y.segment<4>(7 * (i - 1) + 3)), -1, i);
+  return worst;
+}
+
+struct ViolationFunction final : SensorFunction {
+  double value(const MechanismData& d, const StatePoint& at) const override {
+    return std::abs(worst_violation(d, at.t, at.y, at.angles).amount);
+  }
+  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
+                      VecOut rho_bar) const override {
+    const double t = at.t;
+    const Eigen::VectorXd &y = at.y, &angles = at.angles;
+    const Violation worst = worst_violation(d, t, y, angles);
+    const double s = worst.amount < 0 ? -scale : scale;
+    if (worst.body > 0) {
+      const Eigen::Index p = 7 * (worst.body - 1) + 3;
+      y_bar.segment<4>(p) += s * UnitNorm::phi_p(y.segment<4>(p));
+      return std::abs(worst.amount);
+    }
+    if (worst.row < 0) return 0;
+    const RowLaws laws = laws_at(d, t);
+    laws.add_gradient(RowLaws::Of::f, worst.row, -s, rho_bar);
+    for (const Constraint& c : d.constraints) {
+      if (worst.row < c.row || worst.row >= c.row + c.rows()) continue;
+      const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+      FrameBar bar1, bar2;
+      bar1.set_zero(), bar2.set_zero();
+      GeometryBar s_bar;
+      std::visit(
+          [&]<class P>(const P& p) {
+            Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
+            z.mu0(worst.row - c.row) = c.factor;
+            p.pull_back(b1.frame, b2.frame, z, bar1, bar2, s_bar);
+            if (c.slot_factor < 0) return;
+            const double value = phi_of(laws, c, p, b1, b2, angles)(worst.row - c.row);
+            add_slot<1>(d, c.slot_factor, Vec<1>(value), s, rho_bar);
+          },
+          c.primitive);
+      add_pull_back(b1, c.body1, bar1, s, y_bar);
+      add_pull_back(b2, c.body2, bar2, s, y_bar);
+      add_slot<3>(d, c.slot1, s_bar.s1, s, rho_bar);
+      add_slot<3>(d, c.slot2, s_bar.s2, s, rho_bar);
+      add_slot<3>(d, c.slot3, s_bar.s3, s, rho_bar);
+    }
+    return std::abs(worst.amount);
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<SensorFunction> make_violation(Compilation&, const Sensor&, const std::string&) {
+  return std::make_unique<ViolationFunction>();
+}
+
+}  // namespace mbsopt
