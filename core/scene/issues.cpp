@@ -8,6 +8,7 @@
 #include "core/expression/did_you_mean.hpp"
 #include "core/scene/checker.hpp"
 #include "core/scene/inertia_check.hpp"
+#include "core/tableau/tableaus.hpp"
 
 namespace mbsopt {
 
@@ -326,7 +327,8 @@ void check_meaning(Checker& checker, const Condition& condition) {
 }
 
 void check_meaning(Checker& checker, const IntegratorSettings& settings) {
-  if (has_word(kFixedStepIntegrators, settings.type) && !settings.step)
+  const Method* const method = runge_kutta_method(settings.type);
+  if (method && !method->adaptive && !settings.step)
     checker.issue(checker.path("step"),
                   "is missing; " + settings.type + " has no error estimate and needs a fixed step [s]");
   if (has_word(kMultistepMethods, settings.type) && settings.step)

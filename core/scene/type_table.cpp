@@ -4,6 +4,7 @@
 
 #include "core/expression/did_you_mean.hpp"
 #include "core/scene/scene.hpp"
+#include "core/tableau/tableaus.hpp"
 
 namespace mbsopt {
 
@@ -88,6 +89,15 @@ void emplace_kind(std::variant<Kinds...>& kind, std::string_view type) {
 
 void set_type(Force& force, std::string_view type) {
   if (type != type_of(force)) emplace_kind(force.kind, type);
+}
+
+std::string_view integrator_names() {
+  static const std::string names = [] {
+    std::string all;
+    for (const Method& method : runge_kutta_methods()) all.append(method.name).append(" ");
+    return all.append(kMultistepMethods);
+  }();
+  return names;
 }
 
 Dimension dimension_of_drive(std::string_view type, std::string_view coordinate) {

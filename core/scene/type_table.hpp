@@ -113,10 +113,8 @@ inline constexpr TypeRow kSensorQuantities[] = {
 inline constexpr std::string_view kJointsWithAngle = "revolute cylindrical screw";
 inline constexpr std::string_view kJointsWithDisplacement = "translational cylindrical screw";
 
-inline constexpr std::string_view kIntegrators =
-    "dopri5 dopri853 verner6 bs3 rk2 rk4 euler sdirk2 sdirk3 sdirk4 radau5 gauss4 gauss6 lobatto3c radau1a "
-    "cvodes_adams cvodes_bdf";
-inline constexpr std::string_view kFixedStepIntegrators = "rk4 euler";  // without an error estimate
+// "euler rk2 ...": every tableau, and CVODES.
+std::string_view integrator_names();
 inline constexpr std::string_view kMultistepMethods = "cvodes_adams cvodes_bdf";
 
 // Names that mean something in laws and objectives, so that nothing else may be called so.

@@ -340,7 +340,7 @@ void describe(auto& v, Like<FormulationSettings> auto& f) {
 }
 
 void describe(auto& v, Like<IntegratorSettings> auto& i) {
-  v.word("type", i.type, Words{kIntegrators}, {"integration method"});
+  v.word("type", i.type, Words{integrator_names()}, {"integration method"});
   v.plain("rtol", i.rtol, kPositive, {"relative tolerance of a step"});
   v.plain("atol", i.atol, kPositive, {"absolute tolerance of a step"});
   v.plain("initial_step", i.initial_step, kPositive, {"[s]; chosen automatically when absent"});

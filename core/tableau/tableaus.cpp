@@ -61,11 +61,15 @@ constexpr Method method(const Tableau<S, T>& rk) {
   return m;
 }
 
-constexpr std::size_t kExplicit = 7;
+// The explicit ones first.
 constexpr std::array kMethods{method(kEuler),     method(kRk2),     method(kBs3),      method(kRk4),
-                              method(kDopri5),    method(kVerner6), method(kDopri853),  // the first kExplicit
-                              method(kSdirk2),    method(kSdirk3),  method(kSdirk4),   method(kGauss4),
-                              method(kLobatto3c), method(kRadau5),  method(kRadau1a),  method(kGauss6)};
+                              method(kDopri5),    method(kVerner6), method(kDopri853), method(kSdirk2),
+                              method(kSdirk3),    method(kSdirk4),  method(kGauss4),   method(kLobatto3c),
+                              method(kRadau5),    method(kRadau1a), method(kGauss6)};
+std::size_t explicit_count() {
+  static const auto count = std::ranges::count_if(kMethods, [](const Method& m) { return !m.implicit(); });
+  return static_cast<std::size_t>(count);
+}
 
 const Method* find(std::span<const Method> methods, std::string_view name) {
   const auto found = std::find_if(methods.begin(), methods.end(), [&](const Method& m) { return m.name == name; });
@@ -75,8 +79,8 @@ const Method* find(std::span<const Method> methods, std::string_view name) {
 }  // namespace
 
 std::span<const Method> runge_kutta_methods() { return kMethods; }
-std::span<const Method> explicit_methods() { return runge_kutta_methods().first(kExplicit); }
-std::span<const Method> implicit_methods() { return runge_kutta_methods().subspan(kExplicit); }
+std::span<const Method> explicit_methods() { return runge_kutta_methods().first(explicit_count()); }
+std::span<const Method> implicit_methods() { return runge_kutta_methods().subspan(explicit_count()); }
 
 const Method* runge_kutta_method(std::string_view name) { return find(runge_kutta_methods(), name); }
 const Method* explicit_method(std::string_view name) { return find(explicit_methods(), name); }

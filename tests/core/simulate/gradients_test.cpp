@@ -2,7 +2,6 @@
 // method, formulation and projection; users' own costs and forces.
 #include <catch2/catch.hpp>
 
-#include "core/scene/type_table.hpp"
 #include "core/simulate/simulation.hpp"
 #include "core/tableau/tableaus.hpp"
 #include "tests/core/integrate/state_costs.hpp"
@@ -102,7 +101,7 @@ TEST_CASE("TLM equals adjoint to 1e-10 for every method, formulation and project
                "quasidefinite", "quasidefinite, velocity", "quasidefinite, projected");
   c.scene.simulation.formulation = formulation(form);
   c.scene.simulation.integrator.type = method;
-  if (has_word(kFixedStepIntegrators, method)) c.scene.simulation.integrator.step = 0.01;
+  if (!runge_kutta_method(method)->adaptive) c.scene.simulation.integrator.step = 0.01;
   const Mechanism m = c.mechanism(nominal(c.scene));
   const std::vector<Cost> costs = c.costs(m);
   RunOptions exact;
@@ -130,8 +129,7 @@ TEST_CASE("the gradient equals differences on frozen steps to 1e-7 for every par
   c.scene.simulation.formulation = formulation(GENERATE(as<std::string>{}, "augmented_lagrangian", "quasidefinite"));
   c.scene.simulation.integrator.type = method;
   // With step control methods of low order have stages so near v = 0, a norm, that differences straddle its kink.
-  const bool many_steps = runge_kutta_method(method)->error_order <= 3;
-  if (has_word(kFixedStepIntegrators, method) || many_steps) c.scene.simulation.integrator.step = 0.005;
+  if (runge_kutta_method(method)->error_order <= 3) c.scene.simulation.integrator.step = 0.005;
   const VectorXd rho = nominal(c.scene);
   const Mechanism m = c.mechanism(rho);
   const std::vector<Cost> costs = c.costs(m);

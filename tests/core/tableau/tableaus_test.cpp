@@ -7,7 +7,6 @@
 #include <complex>
 #include <string>
 
-#include "core/scene/type_table.hpp"
 #include "tests/core/tableau/rooted_trees.hpp"
 
 using namespace mbsopt;
@@ -221,17 +220,6 @@ TEST_CASE("implicit methods have stage order 2 at least", "[tableau]") {
       CHECK(std::abs(sum - 0.5 * rk.c[i] * rk.c[i]) < 1e-15);
     }
   }
-}
-
-TEST_CASE("problem files know each method that runs, and which of them need a fixed step", "[tableau]") {
-  for (const std::string& name : words(kIntegrators)) {
-    if (has_word(kMultistepMethods, name)) continue;
-    const Method* rk = runge_kutta_method(name);
-    INFO(name);
-    REQUIRE(rk);
-    CHECK(rk->adaptive == !has_word(kFixedStepIntegrators, name));
-  }
-  for (const Method& rk : runge_kutta_methods()) CHECK(has_word(kIntegrators, rk.name));
 }
 
 TEST_CASE("methods are found by name only", "[tableau]") {
