@@ -32,6 +32,7 @@ inline constexpr SensorMakerRow kSensorMakers[] = {
     {"angle", make_joint_angle},
     {"rate", make_joint_angle},
     {"body_angle", make_body_angle},
+    {"relative_angle", make_body_angle},
     {"displacement", make_displacement},
     {"angular_velocity", make_angular_velocity},
     {"orientation", make_orientation},

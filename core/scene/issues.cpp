@@ -292,10 +292,10 @@ void check_meaning(Checker& checker, const Sensor& sensor) {
   } else if (need_of(*row, "joint") != Need::unknown)
     check_joint_has(checker, "joint", sensor.joint, row->dimension == dimension::kLength ? "displacement" : "angle");
   if (need_of(*row, "body2") != Need::unknown && sensor.body1 == sensor.body2 && !sensor.body2.empty())
-    checker.issue(checker.path("body2"), "is '" + sensor.body2 + "' like body1; their distance never changes");
+    checker.issue(checker.path("body2"), "is '" + sensor.body2 + "' like body1; nothing between them changes");
   if ((sensor.quantity == "orientation" || sensor.quantity == "body_angle") && sensor.body == "ground")
     checker.issue(checker.path("body"), "is the ground, whose orientation never changes");
-  direction(checker, "axis", sensor.axis, "");
+  direction(checker, "axis", sensor.axis, sensor.body1);
   if (sensor.quantity == "force") {
     const Force* const force = checker.facts().force(sensor.force);
     if (force && type_of(*force) != Tsda::kType && type_of(*force) != Rsda::kType)

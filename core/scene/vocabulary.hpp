@@ -310,7 +310,8 @@ void describe(auto& v, Like<Sensor> auto& s) {
   v.reference("force", s.force, To::force, {"a tsda or rsda", need_of(*row, "force")});
   v.word("kind", s.kind, Words{"force torque"}, {"which reaction", need_of(*row, "kind")});
   v.reference("drive", s.drive, To::drive, {"a drive", need_of(*row, "drive")});
-  v.point("axis", s.axis, "ground", {"direction in the ground", need_of(*row, "axis")});
+  v.point("axis", s.axis, s.body1.empty() ? "ground" : s.body1,
+          {"direction in the ground, or in body1", need_of(*row, "axis")});
 }
 
 void describe(auto& v, Like<Condition> auto& c) {

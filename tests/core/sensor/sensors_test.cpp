@@ -103,11 +103,13 @@ struct TextbookScene {
     const double turn = 2 * std::acos(-1.0);
     return principal + turn * std::round((kTurns * turn - std::real(principal)) / turn);
   }
-  T body_angle() const {
+  // Of body two about an axis of body one, or of the ground.
+  T body_angle(bool relative) const {
     const V3<T> axis{rho[n], T(1), T(0.8)}, u = scaled(T(1) / norm(axis), axis);  // least along global x
     const V3<T> across = cross(u, V3<T>{T(1), T(0), T(0)}), x = scaled(T(1) / norm(across), across);
-    const V3<T> turned = values(times(body(1).moving().A, constant(x)));
-    const T principal = atan2_of(dot(turned, cross(u, x)), dot(turned, x));
+    const V3<T> turned = times(body(1).frame().A, x);
+    const V3<T> seen = relative ? transposed_times(body(0).frame().A, turned) : turned;
+    const T principal = atan2_of(dot(seen, cross(u, x)), dot(seen, x));
     const double turn = 2 * std::acos(-1.0);
     return principal + turn * std::round((kTurns * turn - std::real(principal)) / turn);
   }
@@ -215,8 +217,9 @@ Sensor force_of(const std::string& force) {
   s.force = force;
   return s;
 }
-Sensor about_axis() {
-  Sensor s = plain("body_angle");
+Sensor about_axis(const std::string& quantity) {
+  Sensor s = plain(quantity);
+  if (quantity == "body_angle") s.body1.clear(), s.body2.clear();
   s.axis = vec("n", "1", "0.8");
   return s;
 }
@@ -263,7 +266,8 @@ const std::vector<Row>& all_sensors() {
           [](const auto& s) { return norm_rate(s.point(1, s.foot()) - s.point(0, s.tip())); }),
       row("angle", plain("angle"), [](const auto& s) { return s.angle(); }),
       row("rate", plain("rate"), [](const auto& s) { return s.rate(); }),
-      row("body_angle", about_axis(), [](const auto& s) { return s.body_angle(); }),
+      row("body_angle", about_axis("body_angle"), [](const auto& s) { return s.body_angle(false); }),
+      row("relative_angle", about_axis("relative_angle"), [](const auto& s) { return s.body_angle(true); }),
       row("angular_velocity, global", spin("y", false), [](const auto& s) { return s.omega(1, false)[1]; }),
       row("angular_velocity, body axes", spin("z", true), [](const auto& s) { return s.omega(1, true)[2]; }),
       row("angular_velocity, norm", spin("norm", false), [](const auto& s) { return norm(s.omega(1, false)); }),
