@@ -147,11 +147,10 @@ void judge_true_extremes(const DesignProgram& program, const Evaluator& evaluato
   bool beyond = false;
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     const DesignConstraint& c = result.constraints[i];
-    const ObjectiveKind kind = evaluator.objectives()[i + 1].kind();
-    const bool maximum = kind == ObjectiveKind::maximum;
-    if (!maximum && kind != ObjectiveKind::minimum) continue;
+    const int extreme = evaluator.objectives()[i + 1].extreme();
+    if (extreme == 0) continue;
     const std::string place =
-        fmt::format("design.subject_to[{}]: the {} of '{}'", i, maximum ? "maximum" : "minimum", c.objective);
+        fmt::format("design.subject_to[{}]: the {} of '{}'", i, extreme > 0 ? "maximum" : "minimum", c.objective);
     if (!c.true_value) {
       beyond = true;
       result.warnings.push_back(place +

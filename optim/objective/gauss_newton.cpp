@@ -27,50 +27,34 @@ class Gathered {
   }
 
   void add_running(double weight, const SecondOrder& x) {
-    switch (objective_.kind()) {
-      case ObjectiveKind::sum:
-        I_rhorho_ += weight * x.second;
-        return;
-      case ObjectiveKind::rms:  // x^2
-        I_ += weight * x.value * x.value;
-        I_rho_ += 2 * weight * x.value * x.first;
-        I_rhorho_ += 2 * weight * (x.first * x.first.transpose() + x.value * x.second);
-        return;
-      case ObjectiveKind::maximum:
-      case ObjectiveKind::minimum:
-        add_exponential(weight, x);
-    }
+    const Jet m = objective_.integrand(x.value - shifted(x.value));
+    I_ += weight * m.value;
+    I_rho_ += weight * m.first * x.first;
+    I_rhorho_ += weight * (m.second * x.first * x.first.transpose() + m.first * x.second);
   }
   void add_value(const SecondOrder& x) { I_rhorho_ += x.second; }
 
   // d^2 psi/drho^2 = psi_I I_rhorho + psi_II I_rho I_rho'
   MatrixXd hessian() const {
-    const MatrixXd square = I_rho_ * I_rho_.transpose();
-    if (objective_.kind() == ObjectiveKind::sum || I_ == 0) return I_rhorho_;
-    if (objective_.kind() == ObjectiveKind::rms) {
-      const double psi_I = objective_.of_integral(I_).psi_I;
-      return psi_I * (I_rhorho_ - square / (2 * I_));
-    }
-    return (I_rhorho_ - square / I_) / (objective_.exponent() * I_);
+    if (!objective_.mean() || I_ == 0) return I_rhorho_;
+    const Jet psi = objective_.of_integral(I_);
+    return psi.first * I_rhorho_ + psi.second * I_rho_ * I_rho_.transpose();
   }
 
  private:
-  // exp(k (x - x0)), x0 the extreme so far: the Hessian does not depend on it.
-  void add_exponential(double weight, const SecondOrder& x) {
-    const double k = objective_.exponent(), y = k * x.value;
-    if (y > largest_) {
-      const double factor = std::exp(largest_ - y);  // 0 at first
+  // x0 of an extreme: the extreme so far, of which the Hessian is independent. Else 0.
+  double shifted(double x) {
+    if (objective_.extreme() == 0) return 0;
+    if (objective_.extreme() * x > objective_.extreme() * x0_) {
+      const double factor = objective_.integrand(x0_ - x).value;  // 0 at first
       I_ *= factor, I_rho_ *= factor, I_rhorho_ *= factor;
-      largest_ = y;
+      x0_ = x;
     }
-    const double e = weight * std::exp(y - largest_);
-    I_ += e;
-    I_rho_ += e * k * x.first;
-    I_rhorho_ += e * k * (x.second + k * x.first * x.first.transpose());
+    return x0_;
   }
 
   const Objective& objective_;
-  double I_ = 0, largest_ = -std::numeric_limits<double>::infinity();
+  double I_ = 0, x0_ = -objective_.extreme() * std::numeric_limits<double>::infinity();
   VectorXd I_rho_;
   MatrixXd I_rhorho_;
 };

@@ -21,41 +21,24 @@ auto at_place(const std::string& place, const Make& make) {
   }
 }
 
-// exp(k (x - x0)), of which the integral makes a smooth maximum (k > 0) or minimum (k < 0) of x.
-class Exponential final : public PointCost {
+// M(x - x0), of which the integral makes a mean of x.
+class Integrand final : public PointCost {
  public:
-  Exponential(std::shared_ptr<const PointCost> x, double k, double x0) : x_(std::move(x)), k_(k), x0_(x0) {}
-  double value(const StatePoint& at) const override { return std::exp(k_ * (x_->value(at) - x0_)); }
+  Integrand(std::shared_ptr<const PointCost> x, const MeanKind& kind, double k, double x0)
+      : x_(std::move(x)), kind_(kind), k_(k), x0_(x0) {}
+  double value(const StatePoint& at) const override { return kind_.M(x_->value(at) - x0_, k_).value; }
   double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
-    const double e = value(at);
-    x_->add_gradient(at, scale * k_ * e, y_bar, rho_bar);
-    return e;
+    const Jet m = kind_.M(x_->value(at) - x0_, k_);
+    x_->add_gradient(at, scale * m.first, y_bar, rho_bar);
+    return m.value;
   }
   const Eigen::VectorXd* rho() const override { return x_->rho(); }
   const SwitchedProgram* program() const override { return x_->program(); }
 
  private:
   std::shared_ptr<const PointCost> x_;
+  const MeanKind& kind_;
   double k_, x0_;
-};
-
-class Square final : public PointCost {
- public:
-  explicit Square(std::shared_ptr<const PointCost> x) : x_(std::move(x)) {}
-  double value(const StatePoint& at) const override {
-    const double x = x_->value(at);
-    return x * x;
-  }
-  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
-    const double x = x_->value(at);
-    x_->add_gradient(at, 2 * scale * x, y_bar, rho_bar);
-    return x * x;
-  }
-  const Eigen::VectorXd* rho() const override { return x_->rho(); }
-  const SwitchedProgram* program() const override { return x_->program(); }
-
- private:
-  std::shared_ptr<const PointCost> x_;
 };
 
 std::span<const double> view(const Eigen::VectorXd& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
@@ -72,15 +55,14 @@ Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec
     return result;
   };
   const std::optional<Expression>* expression = &spec.running;
-  const char* part = "running";
-  if (spec.maximum_of) kind_ = ObjectiveKind::maximum, expression = &spec.maximum_of, part = "maximum_of";
-  if (spec.minimum_of) kind_ = ObjectiveKind::minimum, expression = &spec.minimum_of, part = "minimum_of";
-  if (spec.rms_of) kind_ = ObjectiveKind::rms, expression = &spec.rms_of, part = "rms_of";
-  if (kind_ != ObjectiveKind::sum && (spec.running || spec.terminal || spec.parameters_only || !spec.samples.empty()))
+  std::string_view part = "running";
+  for (std::size_t k = 0; k < spec.means.size(); ++k)
+    if (spec.means[k]) mean_ = &kMeanKinds[k], expression = &spec.means[k], part = mean_->name;
+  if (mean_ && (spec.running || spec.terminal || spec.parameters_only || !spec.samples.empty()))
     throw std::invalid_argument(fmt::format("{}.{}: stands alone; other parts are given beside it", place, part));
   sharpness_ = spec.sharpness.value_or(ObjectiveSpec::kSharpness);
   duration_ = scene.simulation.end_time - scene.simulation.start_time;
-  running_ = compile(*expression, part);
+  running_ = compile(*expression, std::string(part));
   terminal_ = compile(spec.terminal, "terminal");
   const double t0 = scene.simulation.start_time, t1 = scene.simulation.end_time;
   for (std::size_t i = 0; i < spec.samples.size(); ++i) {
@@ -116,10 +98,9 @@ std::shared_ptr<const PointCost> Objective::expression(const Mechanism& mechanis
 Cost Objective::cost(const Mechanism& mechanism, double x0) const {
   Cost cost;
   cost.name = name_;
-  cost.is_extreme = is_extreme();
+  cost.is_extreme = extreme() != 0;
   if (running_) cost.running = running_->bind(mechanism);
-  if (running_ && is_extreme()) cost.running = std::make_shared<Exponential>(cost.running, exponent(), x0);
-  if (running_ && kind_ == ObjectiveKind::rms) cost.running = std::make_shared<Square>(cost.running);
+  if (running_ && mean_) cost.running = std::make_shared<Integrand>(cost.running, *mean_, exponent(), x0);
   if (terminal_) cost.terminal = terminal_->bind(mechanism);
   for (const Sample& sample : samples_) cost.samples.push_back({sample.time, sample.value.bind(mechanism)});
   if (user_running_) cost.running = point_cost(user_running_, mechanism.rho());
@@ -127,16 +108,13 @@ Cost Objective::cost(const Mechanism& mechanism, double x0) const {
   return cost;
 }
 
-Objective::OfIntegral Objective::of_integral(double I, double x0) const {
-  if (!running_ || kind_ == ObjectiveKind::sum) return {I, 1};
-  if (kind_ == ObjectiveKind::rms) {
-    if (I <= 0) return {0, 0};  // rounding: a method with negative weights may sum squares to -1e-33
-    const double psi = std::sqrt(I / duration_);
-    return {psi, 0.5 * psi / I};
-  }
-  const double k = exponent();
-  return {x0 + std::log(I / duration_) / k, 1 / (k * I)};
+Jet Objective::of_integral(double I, double x0) const {
+  if (!running_ || !mean_) return {I, 1, 0};
+  const Jet n = mean_->N(I / duration_, exponent());
+  return {x0 + n.value, n.first / duration_, n.second / (duration_ * duration_)};
 }
+
+Jet Objective::integrand(double x) const { return mean_ ? mean_->M(x, exponent()) : Jet{x, 1, 0}; }
 
 double Objective::parameters_only(const Eigen::VectorXd& rho) const {
   if (!parameters_only_) return 0;
@@ -167,7 +145,7 @@ void Objective::add_parameters_only_hessian(const Eigen::VectorXd& rho, const st
 }
 
 bool Objective::is_linear() const {
-  if (kind_ != ObjectiveKind::sum) return false;
+  if (mean_) return false;
   if ((running_ && !running_->is_linear()) || (terminal_ && !terminal_->is_linear())) return false;
   if (std::any_of(samples_.begin(), samples_.end(), [](const Sample& s) { return !s.value.is_linear(); })) return false;
   if (!parameters_only_) return true;

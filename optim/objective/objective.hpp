@@ -1,16 +1,13 @@
 // An objective, ready to be evaluated at any rho:
 //
-//   sum        psi(rho) = integral of running dt + terminal at the end time + sum of samples + parameters_only
-//   maximum    psi(rho) = x0 + log(I/T)/k,   I = integral of exp(k (x - x0)) dt over the simulated time T
-//   minimum    psi(rho) = x0 - log(I/T)/k,   I = integral of exp(-k (x - x0)) dt
-//   rms        psi(rho) = sqrt(I/T),         I = integral of x^2 dt
-// Whatever x0, the maximum is the same and below the true one; x0 only keeps exp within the range of numbers.
+//   sum     psi(rho) = integral of running dt + terminal at the end time + sum of samples + parameters_only
+//   mean    psi(rho) = x0 + N(I/T),   I = integral of M(x - x0) dt over the simulated time T (objective_kinds.hpp)
 // A simulation computes what `cost` describes, I (in a sum psi without parameters_only); `of_integral` makes psi of it:
 //
 //   const Objective track(scene, spec);
 //   const Mechanism mechanism(scene, rho);
 //   const SimulationResult run = simulate(mechanism, scene.simulation, std::vector{track.cost(mechanism)});
-//   const double psi = track.of_integral(run.psi(0)).psi + track.parameters_only(rho);
+//   const double psi = track.of_integral(run.psi(0)).value + track.parameters_only(rho);
 //
 // ObjectiveRun (objective_run.hpp) does this for several of them and finds x0.
 #pragma once
@@ -27,8 +24,6 @@
 
 namespace mbsopt {
 
-enum class ObjectiveKind { sum, maximum, minimum, rms };
-
 class Objective {
  public:
   // Throws std::invalid_argument: "objectives.track.running: unknown name ...".
@@ -38,13 +33,11 @@ class Objective {
 
   const std::string& name() const { return name_; }
   bool needs_simulation() const;
-  ObjectiveKind kind() const { return kind_; }
-  bool is_extreme() const { return kind_ == ObjectiveKind::maximum || kind_ == ObjectiveKind::minimum; }
+  const MeanKind* mean() const { return mean_; }               // null: a sum
+  int extreme() const { return mean_ ? mean_->extreme : 0; }   // 1: a maximum, -1: a minimum
   Cost cost(const Mechanism& mechanism, double x0 = 0) const;  // an absent part stays absent
-  struct OfIntegral {
-    double psi, psi_I;  // and its derivative in I; that of an rms at 0, where it has none, is 0
-  };
-  OfIntegral of_integral(double I, double x0 = 0) const;
+  Jet of_integral(double I, double x0 = 0) const;              // psi and its derivatives in I
+  Jet integrand(double x) const;                               // M of objective_kinds.hpp
   // The expression x of a kind that is no sum; null where it is the constant 0.
   std::shared_ptr<const PointCost> expression(const Mechanism& mechanism) const;
   // Its parts, for second derivatives: `running` is the integrand, or the expression x of a kind that is no sum.
@@ -55,7 +48,7 @@ class Objective {
   const std::optional<CostExpression>& running() const { return running_; }
   const std::optional<CostExpression>& terminal() const { return terminal_; }
   const std::vector<Sample>& samples() const { return samples_; }
-  double exponent() const { return kind_ == ObjectiveKind::maximum ? sharpness_ : -sharpness_; }  // k of an extreme
+  double exponent() const { return extreme() * sharpness_; }  // k of an extreme
   bool is_written_in_cpp() const { return user_running_ || user_terminal_; }
   const ObjectiveSpec& spec() const { return spec_; }  // of one that is not
   // A sum of parts whose second derivatives in parameters and sensors are 0.
@@ -70,7 +63,7 @@ class Objective {
  private:
   std::string name_;
   ObjectiveSpec spec_;
-  ObjectiveKind kind_ = ObjectiveKind::sum;
+  const MeanKind* mean_ = nullptr;
   double sharpness_ = 1, duration_ = 1;
   std::optional<CostExpression> running_, terminal_;
   std::vector<Sample> samples_;

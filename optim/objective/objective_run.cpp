@@ -64,8 +64,8 @@ SimulationResult ObjectiveRun::run(const Sweep& sweep) const {
   }
   for (std::size_t i = 0; i < objectives_.size(); ++i) {
     const Eigen::Index row = static_cast<Eigen::Index>(i);
-    const auto [psi, psi_I] = objectives_[i]->of_integral(result.psi(row), x0[i]);
-    if (objectives_[i]->is_extreme() && !std::isfinite(psi)) {
+    const Jet psi = objectives_[i]->of_integral(result.psi(row), x0[i]);
+    if (objectives_[i]->extreme() && !std::isfinite(psi.value)) {
       result.status = SimulationStatus::not_finite;
       result.message = fmt::format(
           "the steps do not resolve the peaks of objective '{}', whose exponentials integrate to {:.3g}: give it less "
@@ -73,8 +73,8 @@ SimulationResult ObjectiveRun::run(const Sweep& sweep) const {
           objectives_[i]->name(), result.psi(row));
       return result;
     }
-    result.psi(row) = psi;
-    if (result.psi_rho.rows() > row) result.psi_rho.row(row) *= psi_I;
+    result.psi(row) = psi.value;
+    if (result.psi_rho.rows() > row) result.psi_rho.row(row) *= psi.first;
   }
   return result;
 }
@@ -89,7 +89,7 @@ bool ObjectiveRun::in_range(const Eigen::VectorXd& integrals) const {
   constexpr double kSmall = 1e-250, kLarge = 1e250;  // what exp and its sums can hold, with room for factors
   for (std::size_t i = 0; i < objectives_.size(); ++i) {
     const double I = std::abs(integrals(static_cast<Eigen::Index>(i)));
-    if (objectives_[i]->is_extreme() && !(I > kSmall && I < kLarge)) return false;
+    if (objectives_[i]->extreme() && !(I > kSmall && I < kLarge)) return false;
   }
   return true;
 }
@@ -106,8 +106,8 @@ std::vector<std::optional<double>> true_extremes(const std::vector<const Objecti
   };
   std::vector<Tracked> tracked;
   for (std::size_t i = 0; i < objectives.size(); ++i) {
-    if (!objectives[i]->is_extreme()) continue;
-    const double sign = objectives[i]->kind() == ObjectiveKind::maximum ? 1 : -1;
+    if (!objectives[i]->extreme()) continue;
+    const double sign = objectives[i]->extreme();
     if (auto x = objectives[i]->expression(mechanism)) {
       tracked.push_back({i, sign, std::move(x), {}});
     } else {

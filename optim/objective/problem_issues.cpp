@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/expression/did_you_mean.hpp"
 #include "core/scene/checker.hpp"
 #include "optim/objective/design_issues.hpp"
 #include "optim/problem/problem_vocabulary.hpp"
@@ -13,16 +14,23 @@ namespace mbsopt {
 void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
   checker.must_be_identifier(checker.path(), objective.name);
   const bool sums = objective.running || objective.terminal || objective.parameters_only || !objective.samples.empty();
-  const int alone = objective.maximum_of.has_value() + objective.minimum_of.has_value() + objective.rms_of.has_value();
+  int alone = 0;
+  bool extreme = false;
+  std::vector<std::string> kinds;
+  for (std::size_t k = 0; k < objective.means.size(); ++k) {
+    kinds.emplace_back(kMeanKinds[k].name);
+    if (!objective.means[k]) continue;
+    ++alone;
+    extreme = extreme || kMeanKinds[k].extreme != 0;
+  }
   if (!sums && alone == 0)
-    checker.issue(checker.path(),
-                  "has no part; running, terminal, samples and parameters_only (added), or one of maximum_of, "
-                  "minimum_of and rms_of is needed");
+    checker.issue(checker.path(), "has no part; running, terminal, samples and parameters_only (added), or one of " +
+                                      joined(kinds) + " is needed");
   if (alone > 1 || (alone == 1 && sums))
     checker.issue(checker.path(),
-                  "has maximum_of, minimum_of or rms_of beside another part; each of them stands alone, so make it an "
-                  "objective of its own");
-  if (objective.sharpness && !objective.maximum_of && !objective.minimum_of)
+                  "has one of " + joined(kinds) +
+                      " beside another part; each of them stands alone, so make it an objective of its own");
+  if (objective.sharpness && !extreme)
     checker.issue(checker.path("sharpness"), "is given without maximum_of or minimum_of, which it belongs to");
   const SimulationSettings& simulation = checker.facts().scene().simulation;
   for (std::size_t i = 0; i < objective.samples.size(); ++i) {

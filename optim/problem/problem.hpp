@@ -2,11 +2,14 @@
 // a file; a C++ user may fill it by hand.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/scene/scene.hpp"
+#include "optim/problem/objective_kinds.hpp"
 #include "optim/solver/robust_loss.hpp"
 
 namespace mbsopt {
@@ -16,16 +19,20 @@ struct ObjectiveSample {
   Expression value;  // of t, sensors and parameters
 };
 
-// psi = integral of running + terminal at the end time + sum of samples + parameters_only; or, alone, one of
-//   maximum_of   (1/k) log(mean of exp(k x)), k = sharpness          minimum_of   -(1/k) log(mean of exp(-k x))
-//   rms_of       sqrt(mean of x^2)                                   means over the simulated time
+// psi = integral of running + terminal at the end time + sum of samples + parameters_only; or, alone, one of the means
+// of objective_kinds.hpp.
 struct ObjectiveSpec {
   std::string name;
   std::optional<Expression> running, terminal, parameters_only;
   std::vector<ObjectiveSample> samples;
-  std::optional<Expression> maximum_of, minimum_of, rms_of;
+  std::array<std::optional<Expression>, std::size(kMeanKinds)> means;
   std::optional<double> sharpness;  // of maximum_of, minimum_of [1/unit of the expression]
   static constexpr double kSharpness = 100;
+
+  // "rms_of"
+  std::optional<Expression>& mean(std::string_view kind) {
+    return means[static_cast<std::size_t>(std::ranges::find(kMeanKinds, kind, &MeanKind::name) - kMeanKinds)];
+  }
 };
 
 struct ObjectiveBound {

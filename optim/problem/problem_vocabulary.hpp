@@ -32,9 +32,8 @@ void describe(auto& v, Like<ObjectiveSpec> auto& o) {
   v.law("terminal", o.terminal, Names::objective, {"added, at the end time; of sensors, t and parameters"});
   v.list("samples", o.samples, {"added, each at its time"});
   v.law("parameters_only", o.parameters_only, Names::none, {"added; of parameters only"});
-  v.law("maximum_of", o.maximum_of, Names::objective, {"alone: its largest value over time, smoothed by sharpness"});
-  v.law("minimum_of", o.minimum_of, Names::objective, {"alone: its smallest value over time, smoothed by sharpness"});
-  v.law("rms_of", o.rms_of, Names::objective, {"alone: root of its mean square over time"});
+  for (std::size_t k = 0; k < std::size(kMeanKinds); ++k)
+    v.law(kMeanKinds[k].name, o.means[k], Names::objective, {kMeanKinds[k].description});
   v.plain("sharpness", o.sharpness, kPositive,
           {"of maximum_of, minimum_of: k in log(mean exp(k x))/k [1/unit of the expression]; 100 when absent"});
 }

@@ -70,8 +70,8 @@ TEST_CASE("smooth maxima, root mean squares and their true values by CVODES", "[
   Problem problem = five_bar::problem(1e-9);
   problem.scene.simulation.end_time = 1;
   ObjectiveSpec highest, rms;
-  highest.name = "highest", highest.maximum_of = Expression::parse("-r2_y"), highest.sharpness = 400.0;
-  rms.name = "rms", rms.rms_of = Expression::parse("r2_x");
+  highest.name = "highest", highest.mean("maximum_of") = Expression::parse("-r2_y"), highest.sharpness = 400.0;
+  rms.name = "rms", rms.mean("rms_of") = Expression::parse("r2_x");
   problem.objectives = {highest, rms};
   const Evaluation discrete = evaluated(problem, GradientMethod::tlm);
   problem.scene.simulation.integrator.type = "cvodes_adams";

@@ -84,7 +84,7 @@ TEST_CASE("an rms that is hardly larger than the tolerances asks for an estimate
   for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
   const bool small = GENERATE(false, true);
   problem.objectives[0].running.reset();
-  problem.objectives[0].rms_of = Expression::parse(small ? "1e-9*L01" : "L01");
+  problem.objectives[0].mean("rms_of") = Expression::parse(small ? "1e-9*L01" : "L01");
   CHECK(may_be_unresolved(problem.scene, objectives_of(problem), gradients_of(problem)) == small);
 }
 

@@ -40,7 +40,7 @@ Problem problem_with(ObjectiveSpec spec) {
 }
 ObjectiveSpec maximum(const std::string& of, double sharpness) {
   ObjectiveSpec spec;
-  spec.maximum_of = f(of), spec.sharpness = sharpness;
+  spec.mean("maximum_of") = f(of), spec.sharpness = sharpness;
   return spec;
 }
 
@@ -94,7 +94,7 @@ TEST_CASE("a smooth maximum far from zero does not leave the range of numbers", 
 
 TEST_CASE("a minimum is minus the maximum of minus its expression", "[objective]") {
   ObjectiveSpec spec;
-  spec.minimum_of = f("x"), spec.sharpness = 40;
+  spec.mean("minimum_of") = f("x"), spec.sharpness = 40;
   const Problem lowest = problem_with(spec), highest = problem_with(maximum("-x", 40));
   const Evaluation a = evaluated(lowest, GradientMethod::adjoint), b = evaluated(highest, GradientMethod::adjoint);
   CHECK(a.psi(0) == Approx(-b.psi(0)).epsilon(1e-13));
@@ -105,7 +105,7 @@ TEST_CASE("a minimum is minus the maximum of minus its expression", "[objective]
 
 TEST_CASE("an rms is the root of the mean square over time", "[objective]") {
   ObjectiveSpec spec;
-  spec.rms_of = f("x + 0.1");
+  spec.mean("rms_of") = f("x + 0.1");
   const Problem problem = problem_with(spec);
   const Evaluation e = evaluated(problem, GradientMethod::tlm);
   // mean over T of (a cos w t + b)^2
@@ -120,12 +120,12 @@ TEST_CASE("an rms is the root of the mean square over time", "[objective]") {
 
 TEST_CASE("an rms of nothing is zero, with a gradient that is a number", "[objective]") {
   ObjectiveSpec spec;
-  spec.rms_of = f("0*x");
+  spec.mean("rms_of") = f("0*x");
   Problem problem = problem_with(spec);
   for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
   const Evaluation constant = evaluated(problem, GradientMethod::tlm);
   CHECK(constant.psi(0) == 0);
-  spec.rms_of = f("x - x");
+  spec.mean("rms_of") = f("x - x");
   const Evaluation e = evaluated(problem_with(spec), GradientMethod::adjoint);
   CHECK(e.psi(0) == 0);
   CHECK(e.psi_rho.norm() == 0);
@@ -133,10 +133,10 @@ TEST_CASE("an rms of nothing is zero, with a gradient that is a number", "[objec
 
 TEST_CASE("an rms of rounding, whose squares sum to less than zero, is zero", "[objective]") {
   ObjectiveSpec spec;
-  spec.rms_of = f("x");
+  spec.mean("rms_of") = f("x");
   const Problem problem = problem_with(spec);
   const Objective objective(problem.scene, problem.objectives[0]);
-  const auto [psi, slope] = objective.of_integral(-1e-33, 0);
+  const auto [psi, slope, curvature] = objective.of_integral(-1e-33, 0);
   CHECK(psi == 0);
   CHECK(slope == 0);
 }
@@ -147,8 +147,8 @@ TEST_CASE("the gradients of all kinds agree with each other and with differences
   problem.scene.simulation.end_time = 0.2;
   ObjectiveSpec peak = maximum("v + 0.1*drag", 8), low, rms, tension = maximum("pull_of_spring", 0.5);
   peak.name = "peak", low.name = "low", rms.name = "rms", tension.name = "tension";
-  low.minimum_of = f("z*angle"), low.sharpness = 50;
-  rms.rms_of = f("vz");
+  low.mean("minimum_of") = f("z*angle"), low.sharpness = 50;
+  rms.mean("rms_of") = f("vz");
   problem.objectives = {peak, low, rms, tension};
   for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
   GradientCheckOptions options;

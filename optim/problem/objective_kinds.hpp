@@ -1,0 +1,46 @@
+// The objectives that are a mean over the simulated time T. A new kind is a row of the table; it is tested by a row of
+// tests/optim/objective/objective_test.cpp.
+//
+//   psi = N(I/T),   I = integral of M(x) dt,   x an expression, N the inverse of M
+//   maximum_of   M = exp(k x)    N = log(m)/k    k = sharpness        minimum_of   the same with k = -sharpness
+//   rms_of       M = x^2         N = sqrt(m)
+// An extreme is the same for every x0 in M(x - x0), x0 + N: x0 keeps exp within the range of numbers.
+#pragma once
+
+#include <cmath>
+#include <string_view>
+
+namespace mbsopt {
+
+// A function of one number, and its first two derivatives.
+struct Jet {
+  double value, first, second;
+};
+
+struct MeanKind {
+  std::string_view name, description;
+  Jet (*M)(double x, double k);
+  Jet (*N)(double m, double k);
+  int extreme = 0;  // 1: a maximum, -1: a minimum; the sign of k
+};
+
+inline Jet exponential(double x, double k) {
+  const double e = std::exp(k * x);
+  return {e, k * e, k * k * e};
+}
+inline Jet logarithm(double m, double k) { return {std::log(m) / k, 1 / (k * m), -1 / (k * m * m)}; }
+inline Jet square(double x, double) { return {x * x, 2 * x, 2}; }
+// At 0 it has no derivative, which is given as 0. Methods with negative weights may sum squares to -1e-33.
+inline Jet root(double m, double) {
+  if (m <= 0) return {0, 0, 0};
+  const double x = std::sqrt(m);
+  return {x, 0.5 / x, -0.25 / (x * m)};
+}
+
+inline constexpr MeanKind kMeanKinds[] = {
+    {"maximum_of", "alone: its largest value over time, smoothed by sharpness", exponential, logarithm, 1},
+    {"minimum_of", "alone: its smallest value over time, smoothed by sharpness", exponential, logarithm, -1},
+    {"rms_of", "alone: root of its mean square over time", square, root},
+};
+
+}  // namespace mbsopt
