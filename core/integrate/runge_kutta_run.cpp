@@ -10,6 +10,7 @@
 #include "core/integrate/model_choice.hpp"
 #include "core/mechanism/joint_graph.hpp"
 #include "core/mechanism/planar_model.hpp"
+#include "core/sensor/body_at.hpp"
 #include "core/step/event_times.hpp"
 #include "core/step/step_control.hpp"
 #include "core/watch/start_failure.hpp"

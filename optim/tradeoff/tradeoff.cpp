@@ -79,7 +79,11 @@ class Sweep {
     say("reference", 0);
     ReferenceOptions options;
     options.seconds_per_run = std::max(10.0, options_.budget_seconds / 6);
-    options.interrupted = options_.interrupted, options.clock = options_.clock;
+    options.interrupted = [this] {  // asked after every step
+      say("reference", 0);
+      return interrupted();
+    };
+    options.clock = options_.clock;
     result_.reference = converged_reference(runs_, options);
     result_.message = result_.reference.message;
   }

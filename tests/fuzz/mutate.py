@@ -337,10 +337,10 @@ def run_on(program, case, file, out):
     code = child.wait()
     os.close(terminal)
     words = output.decode("utf-8", "replace")
-    return Outcome(what_is_wrong(case, code, words, out, interrupted_at is not None), words, interrupted_at is not None)
+    return Outcome(what_is_wrong(case, file, code, words, out, interrupted_at is not None), words, interrupted_at is not None)
 
 
-def what_is_wrong(case, code, words, out, interrupted):
+def what_is_wrong(case, file, code, words, out, interrupted):
     if code < 0:
         return "ended by " + signal.Signals(-code).name
     if code not in ((0, 1, 2, 3, 130) if interrupted else (0, 1, 2, 3)):
@@ -373,7 +373,7 @@ def what_is_wrong(case, code, words, out, interrupted):
                     return "a parameter without a value, and exit code 0"
     elif code == 0:
         return "exit code 0 without result.json"
-    own = (out.parent / "problem.json").read_text(errors="replace")
+    own = file.read_text(errors="replace")
     raw = [m for m in RAW_WORDS.findall(said) if m not in own]
     if raw:
         return f"a library's words: {raw[0]}"
