@@ -40,11 +40,14 @@ struct DriveEfforts {
       table.columns.push_back(d.drive_names[static_cast<std::size_t>(c.drive)]);
     }
   }
-  void record(const StatePoint& at) {
+  // Returns whether they are finite; only then they are kept.
+  bool record(const StatePoint& at) {
     std::vector<double> row{at.t};
     const Motion& motion = at.motion->motion(at);
     for (const int r : rows) row.push_back(-motion.lambda(r));
+    if (!std::ranges::all_of(row, [](double x) { return std::isfinite(x); })) return false;
     table.rows.push_back(std::move(row));
+    return true;
   }
 };
 
@@ -88,19 +91,20 @@ int kinematics_command(const CommandContext& context) {
   Trajectory trajectory;
   const Sampling sampling = record_trajectory(mechanism, scene, trajectory);
   DriveEfforts efforts(mechanism.data());
+  bool finite = true;
   SimulationStatistics statistics;
   const SimulationSettings& settings = scene.simulation;
   const KinematicsResult kinematics = solve_kinematics(
       mechanism, assembly, settings.formulation, sampling.times, [&](std::size_t i, const StatePoint& at) {
         sampling.observe(i, at);
-        efforts.record(at);
+        finite = efforts.record(at);
         const Energy e = energy(mechanism.data(), at.y, at.angles);
         statistics.energy_final = e.kinetic + e.potential;
         if (i == 0) statistics.energy_initial = statistics.energy_final;
         statistics.energy_drift =
             std::max(statistics.energy_drift, std::abs(statistics.energy_final - statistics.energy_initial));
         run.progress.fraction("kinematics", (at.t - settings.start_time) / (settings.end_time - settings.start_time));
-        return !interrupted();
+        return finite && !interrupted();
       });
   run.progress.finish();
   statistics.steps = kinematics.steps;
@@ -119,6 +123,11 @@ int kinematics_command(const CommandContext& context) {
   add_singular(run, kinematics);
   if (interrupted()) {
     run.stopped(fmt::format("trajectory.csv holds the motion up to {:.6g} s", kinematics.last_good_time));
+  } else if (!finite) {
+    run.failed(fmt::format("the forces of the drives are too large for numbers at t = {:.6g} s. Look at masses, "
+                           "inertias, coordinates and the forces on the bodies",
+                           kinematics.last_good_time),
+               kinematics.last_good_time);
   } else if (!kinematics.ok) {
     run.failed(kinematics.message, kinematics.last_good_time);
   }

@@ -129,6 +129,13 @@ void describe_given(const Problem& problem, const Eigen::VectorXd& before, Desig
   for (DesignConstraint& c : design.constraints) c.initial = value_before(c.objective);
 }
 
+// Of a design that ended before its first evaluation.
+void describe_unmoved(const Problem& problem, const Eigen::VectorXd& before, DesignResult& design) {
+  describe_given(problem, before, design);
+  design.objective_final = design.objective_initial;
+  for (DesignConstraint& c : design.constraints) c.value = c.initial;
+}
+
 // problem: with its seeds.
 Json task_of(const Problem& problem, const NlpScale& scale) {
   Json task{{"seed", *problem.design->multistart->seed}, {"scale", {{"f", scale.f}, {"c", numbers(scale.c)}}}};
@@ -173,6 +180,7 @@ DesignOutcome minimised(Run& run, LongRun& long_run, const Eigen::VectorXd& befo
     outcome = best_of_starts(run, long_run, problem, before);
   else
     outcome.design = single_run(run, long_run, problem);
+  if (outcome.design.evaluations == 0) describe_unmoved(problem, before, outcome.design);
   run.progress.finish();
   return outcome;
 }

@@ -16,7 +16,7 @@ struct BodyPoint {
   int slot = -1;
 };
 
-// What sensors of points have in common.
+// Sensors of points share these fields.
 struct SeenPoints {
   BodyPoint a, b;
   bool relative = false;  // whether b counts

@@ -25,7 +25,7 @@ struct SensorFunction {
   virtual std::vector<int> bodies(const MechanismData&) const { return {}; }
   // Its time derivative; null where a condition may not prescribe one.
   virtual SensorPtr rate(const MechanismData&) const { return nullptr; }
-  // Of the norm of a velocity, which is not linear in v: the three sensors of its components. Else none.
+  // The norm of a velocity is not linear in v: it returns the three sensors of its components, others return none.
   virtual std::vector<SensorPtr> components() const { return {}; }
   // The followed angle (MechanismData::angles) of an angle or its rate; else -1.
   virtual int angle() const { return -1; }

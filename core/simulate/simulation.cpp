@@ -275,16 +275,23 @@ SimulationResult simulate_adjoint(const Mechanism& mechanism, const SimulationSe
   sweep.begin(settings.end_time, result.y_end, run.angles_end());
   Replayer replayer(mechanism, settings, run.method(), result.steps);
   double t_back = settings.end_time;
+  bool stopped = false;
   const bool swept = checkpoints.go_back([&](const Snapshot& from, long last, const auto& dense,
                                              const auto& sink) { return replayer.replay(from, last, dense, sink); },
                                          [&](const StoredStep& step) {
                                            t_back = step.t;
-                                           return sweep.step_back(step);
+                                           stopped = options.progress && !options.progress(settings.end_time);
+                                           return !stopped && sweep.step_back(step);
                                          });
   watch.add_to(result.statistics);
   result.statistics.adjoint_memory_bytes = checkpoints.peak_bytes();
   result.statistics.recomputed_steps = checkpoints.recomputed_steps();
   result.statistics.factorisations += replayer.factorisations();
+  if (stopped) {
+    result.status = SimulationStatus::stopped;
+    result.message = fmt::format("stopped on the way back, at t = {:.6g} s", t_back);
+    return run.finish();
+  }
   if (!swept) {
     result.status = SimulationStatus::not_finite;
     result.message =

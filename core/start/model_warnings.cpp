@@ -223,7 +223,7 @@ void add_violations(const MechanismData& d, std::vector<std::string>& warnings) 
     if (const auto* p = std::get_if<Coincidence>(&c.primitive)) {
       Vec<3> phi;
       p->phi(frames[at(c.body1)], frames[at(c.body2)], phi);
-      worst_point[c.joint] = std::max(worst_point[c.joint], phi.norm());
+      worst_point[c.joint] = std::max(worst_point[c.joint], phi.stableNorm());
     } else if (const auto* x = std::get_if<Dot1>(&c.primitive)) {
       Vec<1> phi;
       x->phi(frames[at(c.body1)], frames[at(c.body2)], phi);

@@ -240,8 +240,7 @@ class Search {
         ++waited;
       }
       if (length < kNear * size()) {
-        result_.nu = at.multipliers(away);
-        add_curvature();
+        add_curvature(at.multipliers(away));
         const VectorXd& lambda = at.reduced_eigenvalues();
         if (lambda.size() == 0 || lambda(0) > kConvex) step = at.solve(-result_.F, away);
         if (satisfied() && converged(largest(step))) {
@@ -262,8 +261,7 @@ class Search {
     for (; result_.iterations < last; ++result_.iterations) {
       linearise();
       if (!result_.F.allFinite()) return;
-      result_.nu = result_.linearisation.multipliers(x_guess_ - result_.x);
-      add_curvature();
+      add_curvature(result_.linearisation.multipliers(x_guess_ - result_.x));
       const VectorXd step = result_.linearisation.descent(-result_.F, x_guess_ - result_.x);
       const bool still = converged(largest(step));
       if (still && satisfied()) {
@@ -295,8 +293,7 @@ class Search {
     sized_ = true;
     for (double last = std::numeric_limits<double>::infinity();;) {
       linearise();
-      result_.nu = result_.linearisation.multipliers_at(x_guess_ - result_.x);
-      add_curvature();
+      add_curvature(result_.linearisation.multipliers_at(x_guess_ - result_.x));
       const VectorXd step = result_.linearisation.solve(-result_.F, x_guess_ - result_.x);
       const double length = largest(step.cwiseQuotient(result_.linearisation.sizes() + VectorXd(result_.x.cwiseAbs())));
       if (!(length > 2 * kEpsilon) || !(length < 0.5 * last)) return;
@@ -304,7 +301,8 @@ class Search {
       move(result_.x + step);
     }
   }
-  void add_curvature() {
+  void add_curvature(const VectorXd& nu) {
+    result_.nu = nu;
     MatrixXd H = equations_.curvature(result_.x, result_.nu);
     H.diagonal().array() += 1;
     result_.linearisation.set_hessian(H);

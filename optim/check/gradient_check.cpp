@@ -230,29 +230,27 @@ class Check {
   // as well. This runs only if something disagrees.
   void measure_rounding() {
     psi_rounding_ = kPsiRounding * result_.psi.cwiseAbs();
-    const std::vector<double> units{8, 12, 16};
     for (const double unit : {kEpsilon, -kEpsilon, 1e4 * kEpsilon, -1e4 * kEpsilon}) {
-      std::vector<VectorXd> points;
-      for (const double u : units) points.push_back(rho_ + u * unit * size_);
-      note_scatter(points, std::vector<const Evaluator*>(points.size(), &tlm_));
+      note_scatter([&](double units, GradientMethod method) {
+        return tlm_.gradients_on(steps_, rho_ + units * unit * size_, method);
+      });
     }
-    std::vector<Evaluator> evaluators;
-    for (const double u : units)
-      evaluators.push_back(evaluator(with_numbers_changed(u * kEpsilon), GradientMethod::tlm));
-    std::vector<const Evaluator*> others;
-    for (const Evaluator& e : evaluators) others.push_back(&e);
-    note_scatter(std::vector<VectorXd>(others.size(), rho_), others);
+    note_scatter([&](double units, GradientMethod method) {
+      generator_.seed(options_.seed);  // the same scene for both methods
+      return evaluator(with_numbers_changed(units * kEpsilon), method).gradients_on(steps_, rho_, method);
+    });
     // A parameter that changes psi by less than its rounding, when it changes by its own size, has no other part in it.
     rounding_ = rounding_.cwiseMax(psi_rounding_ * size_.cwiseInverse().transpose());
     rounding_known_ = true;
   }
 
-  // The scatter among points, each differentiated by an evaluator of its own.
-  void note_scatter(const std::vector<VectorXd>& points, const std::vector<const Evaluator*>& evaluators) {
+  // Of what is evaluated some units in the last place away: f(units, method).
+  template <class F>
+  void note_scatter(F&& f) {
     for (const GradientMethod method : {GradientMethod::tlm, GradientMethod::adjoint}) {
       std::optional<Evaluation> first;
-      for (std::size_t n = 0; n < points.size(); ++n) {
-        const Evaluation e = evaluators[n]->gradients_on(steps_, points[n], method);
+      for (const double units : {8.0, 12.0, 16.0}) {
+        const Evaluation e = f(units, method);
         result_.simulations += e.simulations;
         if (!e.ok) continue;
         if (!first) {

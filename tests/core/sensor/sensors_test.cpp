@@ -103,7 +103,7 @@ struct TextbookScene {
     const double turn = 2 * std::acos(-1.0);
     return principal + turn * std::round((kTurns * turn - std::real(principal)) / turn);
   }
-  // Of body two about an axis of body one, or of the ground.
+  // It measures body two about an axis of body one, or of the ground.
   T body_angle(bool relative) const {
     const V3<T> axis{rho[n], T(1), T(0.8)}, u = scaled(T(1) / norm(axis), axis);  // least along global x
     const V3<T> across = cross(u, V3<T>{T(1), T(0), T(0)}), x = scaled(T(1) / norm(across), across);

@@ -85,6 +85,20 @@ TEST_CASE("what goes wrong is said with the time and what to try", "[simulation]
   CHECK(run.last_good_time >= 0.1);
 }
 
+TEST_CASE("an adjoint run is stopped on its way back, too", "[simulation]") {
+  Scene scene = loaded_four_bar();
+  scene.simulation.end_time = 0.3;
+  const Mechanism mechanism(scene, nominal(scene));
+  int on_the_way_back = -1;  // the first call at the end is of the last step
+  const SimulationResult run = simulate_adjoint(mechanism, scene.simulation, {}, {nullptr, [&](double t) {
+                                                                                    if (t == 0.3) ++on_the_way_back;
+                                                                                    return on_the_way_back < 2;
+                                                                                  }});
+  CHECK(run.status == SimulationStatus::stopped);
+  CHECK(run.message.find("on the way back") != std::string::npos);
+  CHECK(on_the_way_back == 2);
+}
+
 TEST_CASE("a fixed step divides the span evenly", "[simulation]") {
   Scene scene = loaded_four_bar();
   scene.simulation.end_time = 0.3;
