@@ -157,7 +157,7 @@ def integrators(lab):
             continue
         own = lab.apart(other.trajectory(), closer.trajectory())[0]
         nearer, where = lab.apart(reference, closer.trajectory())
-        if nearer > max(10 * own, 1e-6, allowed_by_penalty(lab)) and certain(lab, nearer):
+        if nearer > max(10 * own, 1e-6, allowed_by_penalty(lab, base)) and certain(lab, nearer):
             found.append(("integrators", f"dopri853 and {method}, {where}: {nearer:.1e} apart"))
     return found
 
@@ -171,9 +171,13 @@ def conserves_energy(problem):
         and nothing(force, "damping", "torsional_damping", "actuator") for force in problem.get("forces", []))
 
 
-def allowed_by_penalty(lab):
-    """Soft joints move and work; the program warns of errors from 1e-4 on."""
-    return 1e-4 if lab.problem["simulation"].get("formulation", {}).get("type") == "penalty" else SAME
+def has_penalty(lab):
+    return lab.problem["simulation"].get("formulation", {}).get("type") == "penalty"
+
+
+def allowed_by_penalty(lab, run):
+    """Soft joints move and work, by about what projections take out of the motion."""
+    return max(SAME, 10 * run.result["simulation"]["max_acceleration_residual"]) if has_penalty(lab) else SAME
 
 
 def energy(lab):
@@ -188,7 +192,7 @@ def energy(lab):
     size = max(kinetic) + max(potential) - min(potential)
     change = max(total) - min(total)
     still = 1e-24 * lab.mass * (lab.length / lab.end_time) ** 2  # of one that rounding alone moves
-    if change > allowed_by_penalty(lab) * size + 1e-12 * max(map(abs, potential)) + still and not lab.doubts(base):
+    if change > allowed_by_penalty(lab, base) * size + 1e-12 * max(map(abs, potential)) + still and not lab.doubts(base):
         return [("energy", f"changes by {change:.2e} J of {size:.2e} J although nothing does work")]
     return []
 
@@ -331,7 +335,7 @@ def kinematics(lab):
     if not solved.ok:
         return [("kinematics = simulate", f"simulate runs, kinematics ends with: {solved.message[-300:]}")]
     worst, where = lab.apart(base.trajectory(), solved.trajectory())
-    if worst > allowed_by_penalty(lab) and not lab.doubts(base, solved):
+    if worst > (1e-4 if has_penalty(lab) else SAME) and not lab.doubts(base, solved):  # warned of from 1e-4 on
         return [("kinematics = simulate", f"{where}: {worst:.1e} apart")]
     return []
 
