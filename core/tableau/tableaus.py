@@ -211,8 +211,8 @@ def radau5():
 
 
 def lobatto3c():
-    """Lobatto IIIC with three nodes: Hairer and Wanner II, table IV.5.7. The estimate: gamma0 times the second difference
-    of f over f(y0) and the stages at 1/2 and 1."""
+    """Lobatto IIIC with three nodes: Hairer and Wanner II, table IV.5.7. The estimate: gamma0 times the second
+    difference of f over f(y0) and the stages at 1/2 and 1."""
     b = [D(1) / 6, D(2) / 3, D(1) / 6]
     c, A, b = with_start([D(0), D(1) / 2, D(1)], [[b[0], -D(1) / 3, b[0]], [b[0], D(5) / 12, -D(1) / 12], b], b)
     g = real_eigenvalue([row[1:] for row in A[1:]])
@@ -220,9 +220,9 @@ def lobatto3c():
 
 
 def radau1a():
-    """Radau IA with three nodes, c the zeros of Radau's polynomial from the left: Hairer and Wanner II, section IV.5. A
-    from D(3): sum_i b_i c_i^(q-1) a_ij = b_j (1 - c_j^q)/q. With f(y1), and the estimate of the Gauss methods over 0, the
-    inner nodes and 1."""
+    """Radau IA with three nodes, c the zeros of Radau's polynomial from the left: Hairer and Wanner II, section IV.5.
+    A from D(3): sum_i b_i c_i^(q-1) a_ij = b_j (1 - c_j^q)/q. With f(y1), and the estimate of the Gauss methods over 0,
+    the inner nodes and 1."""
     r = D(6).sqrt()
     c = [D(0), (6 - r) / 10, (6 + r) / 10]
     b = collocation(c)[1]

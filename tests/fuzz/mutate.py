@@ -337,7 +337,8 @@ def run_on(program, case, file, out):
     code = child.wait()
     os.close(terminal)
     words = output.decode("utf-8", "replace")
-    return Outcome(what_is_wrong(case, file, code, words, out, interrupted_at is not None), words, interrupted_at is not None)
+    interrupted = interrupted_at is not None
+    return Outcome(what_is_wrong(case, file, code, words, out, interrupted), words, interrupted)
 
 
 def what_is_wrong(case, file, code, words, out, interrupted):
@@ -379,7 +380,7 @@ def what_is_wrong(case, file, code, words, out, interrupted):
         return f"a library's words: {raw[0]}"
     # What the file itself says may be quoted.
     quoted = re.sub(r"is -?(inf|nan) at the (?:values|start)|'[^']*'|\"[^\"]*\"", "", said)
-    if NOT_A_NUMBER.search(quoted) and not NOT_A_NUMBER.search(own):
+    if NOT_A_NUMBER.search(quoted) and not re.search(r"\b(?:nan|inf)\b", own, re.I):
         return "NaN or inf in words"
     trajectory = out / "trajectory.csv"
     if trajectory.exists() and NOT_A_NUMBER.search(trajectory.read_text().partition("\n")[2]):

@@ -8,7 +8,7 @@ using namespace mbsopt;
 using namespace mbsopt::testing;
 
 TEST_CASE("springs and gravity keep the energy, dampers, actuators and laws do not", "[energy]") {
-  Scene scene = pendulum();
+  Scene scene = testing::pendulum();
   CHECK(conserves_energy(scene));
   Tsda spring;
   spring.body2 = "bar", spring.stiffness = 10.0, spring.damping = f("c - 0.7");  // 0 at the parameter's value
