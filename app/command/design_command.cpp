@@ -154,7 +154,7 @@ int design_command(const CommandContext& context) {
   const Trajectory history = history_of(design);
   run.write("optimized.json", optimized_problem_text(run, new_values(design)));
   run.write("history.csv", to_csv(history));
-  if (!after.trajectory.rows.empty()) run.write("trajectory.csv", to_csv(after.trajectory));
+  if (!after.trajectory.rows.empty()) write_trajectory(run, after.trajectory);
   run.write("report.html", design_report(scene, design.rho, run.result, history, before.trajectory, after.trajectory));
   return long_run.finish();
 }

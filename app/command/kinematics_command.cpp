@@ -117,7 +117,7 @@ int kinematics_command(const CommandContext& context) {
       "{:.1e} (velocities)\n",
       settings.start_time, kinematics.last_good_time, trajectory.rows.size(), kinematics.steps,
       kinematics.max_position_violation, kinematics.max_velocity_violation);
-  run.write("trajectory.csv", to_csv(trajectory));
+  write_trajectory(run, trajectory);
   if (!efforts.rows.empty()) run.write("drives.csv", to_csv(efforts.table));
   add_drives(run, efforts);
   add_singular(run, kinematics);

@@ -50,7 +50,7 @@ int simulate_command(const CommandContext& context) {
     Scene simulated = scene;
     if (!simulation.ok()) simulated.simulation.end_time = simulation.last_good_time;
     print_simulation(context.out, simulated, simulation.statistics);
-    run.write("trajectory.csv", to_csv(motion.trajectory));
+    write_trajectory(run, motion.trajectory);
     for (const std::string& warning : simulation_warnings(scene, simulation.statistics, simulation.ok()))
       run.warn(warning);
     warn_of_stiffness(run, simulation.statistics, false);

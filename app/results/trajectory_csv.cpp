@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 
@@ -64,9 +65,25 @@ std::string to_csv(const std::vector<std::string>& columns, const std::vector<st
   for (const std::string& column : columns) text += (text.empty() ? "" : ",") + csv_cell(column);
   text += '\n';
   for (const std::vector<double>& row : rows) {
-    fmt::format_to(std::back_inserter(text), "{:.17g}\n", fmt::join(row, ","));
+    for (std::size_t k = 0; k < row.size(); ++k) {
+      if (k > 0) text += ',';
+      if (std::isfinite(row[k])) fmt::format_to(std::back_inserter(text), "{:.17g}", row[k]);
+    }
+    text += '\n';
   }
   return text;
+}
+
+void write_trajectory(Run& run, const Trajectory& trajectory) {
+  for (std::size_t k = 0; k < trajectory.columns.size(); ++k) {
+    const auto missing = std::ranges::find_if(trajectory.rows, [&](const auto& row) { return !std::isfinite(row[k]); });
+    if (missing != trajectory.rows.end())
+      run.warn(
+          fmt::format("'{}' is too large for a number at t = {:.6g} s, and empty in trajectory.csv. Look at masses, "
+                      "inertias, coordinates and the forces on the bodies",
+                      trajectory.columns[k], missing->front()));
+  }
+  run.write("trajectory.csv", to_csv(trajectory));
 }
 
 }  // namespace mbsopt

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "app/run/run.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/scene.hpp"
 #include "core/simulate/simulation.hpp"
@@ -23,7 +24,11 @@ std::vector<std::string> trajectory_columns(const Scene& scene);
 // A Sampling that appends a row to the trajectory at each output time. Both arguments must outlive it.
 Sampling record_trajectory(const Mechanism& mechanism, const Scene& scene, Trajectory& trajectory);
 
+// A cell without a finite number is empty.
 std::string to_csv(const std::vector<std::string>& columns, const std::vector<std::vector<double>>& rows);
 inline std::string to_csv(const Trajectory& trajectory) { return to_csv(trajectory.columns, trajectory.rows); }
+
+// Writes trajectory.csv, and warns of each column with empty cells.
+void write_trajectory(Run& run, const Trajectory& trajectory);
 
 }  // namespace mbsopt
