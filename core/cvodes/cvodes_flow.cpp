@@ -53,7 +53,7 @@ bool Flow::evaluate(double t, const Numbers& y) {
 
 bool Flow::linearise(double t, const Numbers& y) {
   if (!evaluate(t, y)) return false;
-  if (!linearised_) dynamics_.linearise_here();
+  if (!linearised_) dynamics().linearise_here();
   linearised_ = true;
   return true;
 }

@@ -33,7 +33,8 @@ class Flow {
   StatePoint point(double t, const Numbers& y);
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
 
-  Dynamics& dynamics() { return dynamics_; }
+  SpatialDynamics& dynamics() { return dynamics_.in_space(); }
+  double worst_residual() const { return dynamics_.worst_residual(); }
   const MechanismData& data() const { return mechanism_.data(); }
   long evaluations() const { return evaluations_; }
   Thrown& thrown() { return thrown_; }  // in any callback of a run on this flow

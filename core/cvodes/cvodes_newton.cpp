@@ -3,16 +3,19 @@
 namespace mbsopt::cvodes {
 
 NewtonMatrix::NewtonMatrix(Flow& flow)
-    : flow_(flow), jacobian_(flow.data()), values_(jacobian_.values()), system_(flow.data(), jacobian_) {
+    : flow_(flow),
+      equations_(flow.dynamics()),
+      jacobian_(flow.data()),
+      values_(jacobian_.values()),
+      system_(flow.data(), jacobian_) {
   y_.setZero(14 * flow.data().n);
 }
 
 bool NewtonMatrix::linearise(double t, const Flow::Numbers& y) {
   if (!flow_.linearise(t, y)) return false;
   y_ = y;
-  Dynamics& dynamics = flow_.dynamics();
-  dynamics.place_at(t, y_, flow_.angles_at(t), flow_.ydot().tail(y_.size() / 2), dynamics.lambda());
-  jacobian_.evaluate(dynamics, values_);
+  equations_.place_at(t, y_, flow_.angles_at(t), flow_.ydot().tail(y_.size() / 2), flow_.dynamics().lambda());
+  jacobian_.evaluate(equations_, values_);
   return true;
 }
 

@@ -22,6 +22,7 @@ class NewtonMatrix {
 
  private:
   Flow& flow_;
+  StageEquations equations_;
   MotionJacobian jacobian_;
   MotionJacobian::Values values_;
   ShiftedSystem system_;

@@ -290,7 +290,7 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
     result_.steps.sizes.push_back(t1 - t);
     flow_.accept(t1, y_now_);
     const Energy energy_now = update_statistics(t1, y_now_);
-    std::string objection = guard.objection(t1, y_now_, energy_now, flow_.dynamics().worst_residual());
+    std::string objection = guard.objection(t1, y_now_, energy_now, flow_.worst_residual());
     if (objection.empty() && derivatives) {
       objection = through_zero_length(mechanism_.data(), t, y_before, t1, y_now_);
     }
@@ -338,7 +338,7 @@ SimulationResult ForwardRun::finish() {
   SimulationStatistics& s = result_.statistics;
   s.rhs_evaluations += flow_.evaluations();
   s.factorisations += flow_.dynamics().solver().factorisations() + linear_solver_.factorisations();
-  const double worst = flow_.dynamics().worst_residual();
+  const double worst = flow_.worst_residual();
   s.max_acceleration_residual = worst;
   if (worst > 0) {
     s.max_acceleration_residual =

@@ -1,7 +1,6 @@
 #include "core/dynamics/motion_jacobian.hpp"
 
 namespace mbsopt {
-namespace {}  // namespace
 
 MotionJacobian::MotionJacobian(const MechanismData& data) : n_(data.n), m_(data.m) {
   const MotionBlocks pattern(data);
@@ -28,18 +27,18 @@ MotionJacobian::Values MotionJacobian::values() const {
   return x;
 }
 
-void MotionJacobian::evaluate(Dynamics& dynamics, Values& out) {
-  const MotionBlocks& blocks = dynamics.blocks();
+void MotionJacobian::evaluate(StageEquations& equations, Values& out) {
+  const MotionBlocks& blocks = equations.blocks();
   for (int i = 0; i < n_; ++i) {
-    out.mass[at(i)] = dynamics.mass_block(i + 1);
-    omegadot_p_[at(i)] = dynamics.omegadot_by_p(i + 1);
+    out.mass[at(i)] = equations.mass_block(i + 1);
+    omegadot_p_[at(i)] = equations.omegadot_by_p(i + 1);
   }
-  const ConstraintRows& J = dynamics.place_rows();
+  const ConstraintRows& J = equations.rows();
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     const int body = rows_[k].body;
     out.J[k].setZero();
     for (const int block : blocks_of_[k]) out.J[k] += block >= 0 ? J.J1.row(block) : J.J2.row(-1 - block);
-    out.J_T[k] = dynamics.times_T(body + 1, out.J[k]);
+    out.J_T[k] = equations.times_T(body + 1, out.J[k]);
     out.row_q[k] = -blocks.c[k].q;
     out.row_q[k].tail<4>() += out.J[k].tail<3>() * omegadot_p_[at(body)];
     out.row_v[k] = -blocks.c[k].v;
@@ -47,9 +46,9 @@ void MotionJacobian::evaluate(Dynamics& dynamics, Values& out) {
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     out.q[k].topRows<6>() = -blocks.b[k].q;
     out.v[k].topRows<6>() = -blocks.b[k].v;
-    if (pairs_[k].row == pairs_[k].body) dynamics.add_fixed_a(pairs_[k].row + 1, out.q[k], out.v[k]);
+    if (pairs_[k].row == pairs_[k].body) equations.add_fixed_a(pairs_[k].row + 1, out.q[k], out.v[k]);
   }
-  out.compliance = dynamics.compliance();
+  out.compliance = equations.compliance();
 }
 
 }  // namespace mbsopt

@@ -1,15 +1,15 @@
-// The derivatives of the equations of motion (Dynamics::residual) in (q, v, a, lambda) as blocks on the graph of
+// The derivatives of the equations of motion (StageEquations) in (q, v, a, lambda) as blocks on the graph of
 // bodies.
 //
 //   -r_q, -r_v:  one 7x7 block per coupled pair of bodies, one 1x7 block per row of Phi and body that it ties
 //   -r_a:        one 7x7 block per body (M T), one 1x7 block per row and body (J T);   -r_lambda: J', -1/alpha
 //
-// r_q, r_v are those of MotionBlocks, taken with z fixed, and what a fixed a adds: omegadot' of equations.cpp.
+// r_q, r_v are those of MotionBlocks, taken with z fixed, and what a fixed a adds: omegadot' of stage_equations.hpp.
 #pragma once
 
 #include <vector>
 
-#include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/stage_equations.hpp"
 
 namespace mbsopt {
 
@@ -36,8 +36,8 @@ class MotionJacobian {
   int constraints() const { return m_; }
   Values values() const;  // of the right sizes
 
-  // At the place where `dynamics` is (place_at).
-  void evaluate(Dynamics& dynamics, Values& out);
+  // At the place of the equations.
+  void evaluate(StageEquations& equations, Values& out);
 
  private:
   int n_, m_;

@@ -2,7 +2,7 @@
 // state and the parameters: the equations of motion solved once more, and their adjoint.
 #pragma once
 
-#include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/spatial_dynamics.hpp"
 #include "core/mechanism/state_point.hpp"
 
 namespace mbsopt {
@@ -16,7 +16,7 @@ class MotionSolver final : public MotionSource {
   void fold_bar(const StatePoint& at, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) override;
 
  private:
-  Dynamics dynamics_;
+  SpatialDynamics dynamics_;
   Motion motion_, bar_;
   double t_ = 0;
   Eigen::VectorXd y_, ydot_, w_, y_bar_, theta_bar_, rho_bar_;

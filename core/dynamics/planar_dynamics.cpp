@@ -22,19 +22,16 @@ std::vector<std::size_t> bodies_with_inertial_slots(const MechanismData& data) {
 
 }  // namespace
 
-PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSettings& settings,
-                               const Eigen::VectorXd& alpha, double compliance, const Refinements& values,
-                               const Refinements& derivatives)
+PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSettings& formulation)
     : data_(data),
       model_(*data.planar),
       bodies_in_y_(model_),
-      settings_(settings),
-      value_refinements_(values),
-      derivative_refinements_(derivatives),
+      formulation_(formulation),
+      settings_(saddle_settings(data, formulation)),
       laws_(InPlane::laws(data)),
       constraints_(data),
       bodies_with_slots_(bodies_with_inertial_slots(data)),
-      solver_(data, rows_of<InPlane>(data, alpha), compliance),
+      solver_(data, rows_of<InPlane>(data, settings_.alpha), settings_.compliance),
       springs_(data),
       has_springs_(!data.forces.of<TsdaForce>().empty()),
       has_other_forces_(any_force_but_springs(data)),
@@ -54,7 +51,7 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
   load_dirs_.resize(n + 1), rhs_lanes_.resize(n), z_dir_.resize(n);
   turns_.resize(n + 1), turn_dirs_.resize(n + 1), Addot_dirs_.resize(n + 1), moments_.resize(n + 1);
   bars_.resize(n + 1);
-  std::vector<bool> dual(n + 1, settings.omega != 0);
+  std::vector<bool> dual(n + 1, formulation.omega != 0);
   constraints_.mark_others(dual);
   for (std::size_t i = 1; i <= n; ++i) {
     if (dual[i]) dual_bodies_.push_back(i);
@@ -123,14 +120,14 @@ bool PlanarDynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::V
   set_state(t, y, angles);
   set_loads();
   constraints_.phi_ddot(frames_, laws_, gamma_);
-  if (settings_.omega != 0) {
+  if (formulation_.omega != 0) {
     constraints_.phi(frames_, laws_, angles_, phi_);
     constraints_.phi_dot(frames_, laws_, phi_dot_);
-    gamma_ += 2 * settings_.xi * settings_.omega * phi_dot_ + settings_.omega * settings_.omega * phi_;
+    gamma_ += 2 * formulation_.xi * formulation_.omega * phi_dot_ + formulation_.omega * formulation_.omega * phi_;
   }
   if (!solver_.factor(frames_)) return false;
   g_ = -gamma_;
-  solver_.solve(loads_, g_, value_refinements_, z_, lambda_);
+  solver_.solve(loads_, g_, settings_.values, z_, lambda_);
   model_.spread(lambda_, lambda_of_phi_);
 
   const Eigen::Index half = 7 * data_.n;
@@ -186,16 +183,16 @@ void PlanarDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::Vec
     loads_[at(i - 1)] << rddot_bar.re, rddot_bar.im, 0.5 * cross(bodies_[at(i)].P, Pddot_bar);
   }
   g_.setZero();
-  solver_.solve(loads_, g_, derivative_refinements_, eta_, mu_);
+  solver_.solve(loads_, g_, settings_.derivatives, eta_, mu_);
   y_bar.tail(half) += w.head(half);
 
   for (PlanarFrameBar& bar : bars_) bar = {};
   for (std::size_t k = 1; k < bodies_.size(); ++k) set_virtual(eta_[k - 1], frames_[k]);
   // - eta'J'lambda - mu'(Phiddot + 2 xi omega Phidot + omega^2 Phi)
   ConstraintWeights weights{&lambda_, nullptr, nullptr, &mu_};
-  if (settings_.omega != 0) {
-    phi_dot_ = 2 * settings_.xi * settings_.omega * mu_;
-    phi_ = settings_.omega * settings_.omega * mu_;
+  if (formulation_.omega != 0) {
+    phi_dot_ = 2 * formulation_.xi * formulation_.omega * mu_;
+    phi_ = formulation_.omega * formulation_.omega * mu_;
     weights.mu0 = &phi_, weights.mu1 = &phi_dot_;
   }
   constraints_.add_pull_back(frames_, laws_, angles_, weights, -1, bars_, theta_bar, rho_bar);

@@ -14,18 +14,16 @@
 #include "core/dynamics/force_terms.hpp"
 #include "core/dynamics/planar_bodies.hpp"
 #include "core/dynamics/planar_springs.hpp"
-#include "core/dynamics/saddle_solver.hpp"
+#include "core/dynamics/saddle_settings.hpp"
 #include "core/scene/settings.hpp"
 
 namespace mbsopt {
 
 class PlanarDynamics {
  public:
-  // Settings of a solve: for values, and for derivatives.
-  PlanarDynamics(const MechanismData& data, const FormulationSettings& settings, const Eigen::VectorXd& alpha,
-                 double compliance, const Refinements& values, const Refinements& derivatives);
+  PlanarDynamics(const MechanismData& data, const FormulationSettings& settings);
 
-  // As those of Dynamics.
+  // As those of SpatialDynamics.
   bool evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, Eigen::Ref<Eigen::VectorXd> ydot);
   bool linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                  const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
@@ -34,11 +32,8 @@ class PlanarDynamics {
                    Eigen::VectorXd& rho_bar);
 
   const Eigen::VectorXd& lambda() const { return lambda_of_phi_; }
-  double residual_ratio() const { return solver_.residual_ratio(); }
-  double residual_size() const { return solver_.residual_size(); }
   double usual_acceleration() const;  // what accelerations are of: loads on each body alone, and turning
-  long factorisations() const { return solver_.factorisations(); }
-  long factor_blocks() const { return solver_.factor_blocks(); }
+  const PlanarSaddleSolver& solver() const { return solver_; }
 
  private:
   struct Body {
@@ -63,8 +58,8 @@ class PlanarDynamics {
   const MechanismData& data_;
   const PlanarModel& model_;
   const PlanarBodies bodies_in_y_;
-  FormulationSettings settings_;
-  Refinements value_refinements_, derivative_refinements_;
+  FormulationSettings formulation_;
+  SaddleSettings settings_;
   RowLaws laws_;
   PlanarConstraints constraints_;
   const std::vector<std::size_t> bodies_with_slots_;  // of mass or inertia

@@ -117,9 +117,9 @@ void PlanarDynamics::add_other_tangents(const ParameterBlock& block, const LaneR
     constraints_.tangents(order, dual_frames_, laws_, angles_, block, lambda_, constraint_dirs_, loads);
     gamma_dir_ -= factor * rows;
   };
-  if (settings_.omega != 0) {
-    add(Order::phi, settings_.omega * settings_.omega, constraint_dirs_.phi, load_dirs_);
-    add(Order::phi_dot, 2 * settings_.xi * settings_.omega, constraint_dirs_.phi_dot, load_dirs_);
+  if (formulation_.omega != 0) {
+    add(Order::phi, formulation_.omega * formulation_.omega, constraint_dirs_.phi, load_dirs_);
+    add(Order::phi_dot, 2 * formulation_.xi * formulation_.omega, constraint_dirs_.phi_dot, load_dirs_);
   }
   add(Order::phi_ddot, 1, constraint_dirs_.phi_ddot, load_dirs_);
   for (std::size_t i = 0; i < rhs_lanes_.size(); ++i) rhs_lanes_[i] -= load_dirs_[i + 1];
@@ -161,7 +161,7 @@ void PlanarDynamics::acceleration_tangent(const ParameterBlock& block, const Lan
     InPlane::subtract_mass_tangent(data_, k, block, z_against_gravity(k), rhs_lanes_[k - 1]);
   }
   if (!loaded_.empty()) add_force_tangent(block, y_dir);
-  solver_.solve(rhs_lanes_, gamma_dir_, derivative_refinements_, z_dir_, lambda_dir_);
+  solver_.solve(rhs_lanes_, gamma_dir_, settings_.derivatives, z_dir_, lambda_dir_);
 
   LaneRow* out = reinterpret_cast<LaneRow*>(a_dir.data());
   for (std::size_t k = 1; k < bodies_.size(); ++k, out += 7) {

@@ -1,106 +1,122 @@
-// User forces inside the equations of motion: from the 7 coordinates of a body, Q, to its 6 loads T'Q, and derivatives.
-//   virtual work e'Q with e = T(p) eta = (eta_r, 1/2 G(p)' eta_theta)
+#include "core/dynamics/user_loads.hpp"
+
 #include <algorithm>
 
-#include "core/dynamics/dynamics.hpp"
-
 #include "core/body/euler_parameters.hpp"
+#include "core/body/state_layout.hpp"
 
 namespace mbsopt {
+namespace {
 
-void Dynamics::set_user_state(const UserForceData& f) {
+// The coordinates of the bodies of a force, one after another.
+Eigen::Index block_of(std::size_t k) { return 7 * static_cast<Eigen::Index>(k); }
+Eigen::Index size_of(const UserForceData& f) { return block_of(f.bodies.size()); }
+
+}  // namespace
+
+UserLoads::UserLoads(const MechanismData& data) : data_(data) {
+  Eigen::Index largest = 0;
+  for (const UserForceData& f : data_.user_forces) largest = std::max(largest, size_of(f));
+  for (Eigen::VectorXd* x : {&q_, &v_, &Q_, &e_}) x->setZero(largest);
+  K_.setZero(largest, largest), C_.setZero(largest, largest), Q_rho_.setZero(largest, data_.rho.size());
+}
+
+void UserLoads::set_state(const UserForceData& f, const Eigen::VectorXd& y) {
+  const StateLayout layout{data_.n};
   for (std::size_t k = 0; k < f.bodies.size(); ++k) {
-    const Eigen::Index at = 7 * static_cast<Eigen::Index>(k), q = 7 * (f.bodies[k] - 1);
-    user_q_.segment<7>(at) = y_.segment<7>(q);
-    user_v_.segment<7>(at) = y_.segment<7>(7 * data_.n + q);
+    q_.segment<7>(block_of(k)) = y.segment<7>(layout.q(f.bodies[k]));
+    v_.segment<7>(block_of(k)) = y.segment<7>(layout.v(f.bodies[k]));
   }
 }
 
-void Dynamics::add_user_loads() {
+void UserLoads::add_loads(const ForceTerms::At& at, const Bodies& bodies, std::vector<Vec<6>>& loads) {
   for (const UserForceData& f : data_.user_forces) {
-    const Eigen::Index size = 7 * static_cast<Eigen::Index>(f.bodies.size());
-    set_user_state(f);
-    user_Q_.setZero();
-    f.force->Q(t_, user_q_.head(size), user_v_.head(size), data_.rho, user_Q_.head(size));
+    const Eigen::Index size = size_of(f);
+    set_state(f, at.y);
+    Q_.setZero();
+    f.force->Q(at.t, q_.head(size), v_.head(size), data_.rho, Q_.head(size));
     for (std::size_t k = 0; k < f.bodies.size(); ++k) {
       const std::size_t body = static_cast<std::size_t>(f.bodies[k]);
-      body_loads_[body] += to_virtual(bodies_[body], user_Q_.segment<7>(7 * static_cast<Eigen::Index>(k)));
+      loads[body] += to_virtual(bodies[body], Q_.segment<7>(block_of(k)));
     }
   }
 }
 
 // (T'Q)_y' = T'(-K q' - C v') + (0, 1/2 G(p') Q_p)
-void Dynamics::add_user_blocks(MotionBlocks& out) {
+void UserLoads::add_blocks(const ForceTerms::At& at, const Bodies& bodies, MotionBlocks& out) {
   constexpr int all = MotionBlocks::r | MotionBlocks::p | MotionBlocks::rdot | MotionBlocks::pdot;
   for (const UserForceData& f : data_.user_forces) {
-    const Eigen::Index size = 7 * static_cast<Eigen::Index>(f.bodies.size());
-    const auto q = user_q_.head(size), v = user_v_.head(size);
-    set_user_state(f);
-    user_Q_.setZero(), user_K_.setZero(), user_C_.setZero();
-    f.force->Q(t_, q, v, data_.rho, user_Q_.head(size));
-    f.force->K(t_, q, v, data_.rho, user_K_.topLeftCorner(size, size));
-    f.force->C(t_, q, v, data_.rho, user_C_.topLeftCorner(size, size));
+    const Eigen::Index size = size_of(f);
+    const auto q = q_.head(size), v = v_.head(size);
+    set_state(f, at.y);
+    Q_.setZero(), K_.setZero(), C_.setZero();
+    f.force->Q(at.t, q, v, data_.rho, Q_.head(size));
+    f.force->K(at.t, q, v, data_.rho, K_.topLeftCorner(size, size));
+    f.force->C(at.t, q, v, data_.rho, C_.topLeftCorner(size, size));
     for (std::size_t k = 0; k < f.bodies.size(); ++k) {
-      const Eigen::Index row = 7 * static_cast<Eigen::Index>(k);
-      const BodyState& body = bodies_[static_cast<std::size_t>(f.bodies[k])];
+      const Eigen::Index row = block_of(k);
+      const BodyState& body = bodies[static_cast<std::size_t>(f.bodies[k])];
       for (std::size_t l = 0; l < f.bodies.size(); ++l) {
-        const Eigen::Index column = 7 * static_cast<Eigen::Index>(l);
+        const Eigen::Index column = block_of(l);
         MotionBlocks::Block<6>& block = out.b[static_cast<std::size_t>(out.pair(f.bodies[k] - 1, f.bodies[l] - 1))];
         for (int c = 0; c < 7; ++c) {
-          block.q.col(c) -= to_virtual(body, user_K_.block<7, 1>(row, column + c));
-          block.v.col(c) -= to_virtual(body, user_C_.block<7, 1>(row, column + c));
+          block.q.col(c) -= to_virtual(body, K_.block<7, 1>(row, column + c));
+          block.v.col(c) -= to_virtual(body, C_.block<7, 1>(row, column + c));
         }
         block.parts |= all;
         if (k != l) continue;
-        block.q.block<3, 4>(3, 3) -= 0.5 * G(user_Q_.segment<4>(row + 3));  // G(p') Q_p = -G(Q_p) p'
+        block.q.block<3, 4>(3, 3) -= 0.5 * G(Q_.segment<4>(row + 3));  // G(p') Q_p = -G(Q_p) p'
       }
     }
   }
 }
 
-void Dynamics::add_user_field_tangent(const ParameterBlock& block) {
+void UserLoads::add_field_tangent(const ForceTerms::At& at, const Bodies& bodies, const ParameterBlock& block,
+                                  std::vector<Lanes<6>>& load_dirs) {
   if (std::all_of(std::begin(block.parameter), std::end(block.parameter), [](int k) { return k < 0; })) return;
   for (const UserForceData& f : data_.user_forces) {
-    const Eigen::Index size = 7 * static_cast<Eigen::Index>(f.bodies.size());
-    set_user_state(f);
-    user_Q_rho_.setZero();
-    f.force->Q_rho(t_, user_q_.head(size), user_v_.head(size), data_.rho, user_Q_rho_.topRows(size));
+    const Eigen::Index size = size_of(f);
+    set_state(f, at.y);
+    Q_rho_.setZero();
+    f.force->Q_rho(at.t, q_.head(size), v_.head(size), data_.rho, Q_rho_.topRows(size));
     for (int lane = 0; lane < kLanes; ++lane) {
       if (block.parameter[lane] < 0) continue;
       for (std::size_t k = 0; k < f.bodies.size(); ++k) {
         const std::size_t body = static_cast<std::size_t>(f.bodies[k]);
-        load_dirs_[body].col(lane) += to_virtual(
-            bodies_[body], user_Q_rho_.col(block.parameter[lane]).segment<7>(7 * static_cast<Eigen::Index>(k)));
+        load_dirs[body].col(lane) +=
+            to_virtual(bodies[body], Q_rho_.col(block.parameter[lane]).segment<7>(block_of(k)));
       }
     }
   }
 }
 
-void Dynamics::add_user_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& rho_bar) {
+void UserLoads::add_pull_back(const ForceTerms::At& at, const Bodies& bodies, const std::vector<Vec<6>>& eta,
+                              Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& rho_bar) {
+  const StateLayout layout{data_.n};
   for (const UserForceData& f : data_.user_forces) {
-    const Eigen::Index size = 7 * static_cast<Eigen::Index>(f.bodies.size());
-    const auto q = user_q_.head(size), v = user_v_.head(size);
-    set_user_state(f);
+    const Eigen::Index size = size_of(f);
+    const auto q = q_.head(size), v = v_.head(size);
+    set_state(f, at.y);
     for (std::size_t k = 0; k < f.bodies.size(); ++k) {
-      const Eigen::Index at = 7 * static_cast<Eigen::Index>(k);
+      const Eigen::Index own = block_of(k);
       const std::size_t body = static_cast<std::size_t>(f.bodies[k]);
-      user_e_.segment<3>(at) = eta_[body - 1].head<3>();
-      user_e_.segment<4>(at + 3) = 0.5 * G_transposed_times(bodies_[body].p, eta_[body - 1].tail<3>());
+      e_.segment<3>(own) = eta[body - 1].head<3>();
+      e_.segment<4>(own + 3) = 0.5 * G_transposed_times(bodies[body].p, eta[body - 1].tail<3>());
     }
-    user_Q_.setZero(), user_K_.setZero(), user_C_.setZero(), user_Q_rho_.setZero();
-    f.force->Q(t_, q, v, data_.rho, user_Q_.head(size));
-    f.force->K(t_, q, v, data_.rho, user_K_.topLeftCorner(size, size));
-    f.force->C(t_, q, v, data_.rho, user_C_.topLeftCorner(size, size));
-    f.force->Q_rho(t_, q, v, data_.rho, user_Q_rho_.topRows(size));
-    const auto e = user_e_.head(size);
+    Q_.setZero(), K_.setZero(), C_.setZero(), Q_rho_.setZero();
+    f.force->Q(at.t, q, v, data_.rho, Q_.head(size));
+    f.force->K(at.t, q, v, data_.rho, K_.topLeftCorner(size, size));
+    f.force->C(at.t, q, v, data_.rho, C_.topLeftCorner(size, size));
+    f.force->Q_rho(at.t, q, v, data_.rho, Q_rho_.topRows(size));
+    const auto e = e_.head(size);
     for (std::size_t k = 0; k < f.bodies.size(); ++k) {
-      const Eigen::Index at = 7 * static_cast<Eigen::Index>(k), i = 7 * (f.bodies[k] - 1);
-      const Vector3d eta_w = eta_[static_cast<std::size_t>(f.bodies[k]) - 1].tail<3>();
-      y_bar.segment<7>(i).noalias() -= user_K_.block(0, at, size, 7).transpose().lazyProduct(e);
-      y_bar.segment<7>(7 * data_.n + i).noalias() -= user_C_.block(0, at, size, 7).transpose().lazyProduct(e);
-      y_bar.segment<4>(i + 3) += 0.5 * G_transposed_times_adjoint(eta_w, user_Q_.segment<4>(at + 3));
+      const Eigen::Index own = block_of(k);
+      const Vector3d eta_w = eta[static_cast<std::size_t>(f.bodies[k]) - 1].tail<3>();
+      y_bar.segment<7>(layout.q(f.bodies[k])).noalias() -= K_.block(0, own, size, 7).transpose().lazyProduct(e);
+      y_bar.segment<7>(layout.v(f.bodies[k])).noalias() -= C_.block(0, own, size, 7).transpose().lazyProduct(e);
+      y_bar.segment<4>(layout.p(f.bodies[k])) += 0.5 * G_transposed_times_adjoint(eta_w, Q_.segment<4>(own + 3));
     }
-    rho_bar.noalias() += user_Q_rho_.topRows(size).transpose().lazyProduct(e);
+    rho_bar.noalias() += Q_rho_.topRows(size).transpose().lazyProduct(e);
   }
 }
 

@@ -24,12 +24,13 @@ AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings&
     for (Eigen::MatrixXd* x : {&b.K, &b.Y}) x->setZero(states, rk_.dense_stages);
   }
   if (const int coupled = largest_implicit_group(rk_); coupled > 0) {
+    equations_.emplace(dynamics_.in_space());
     implicit_.emplace(d, rk_);
-    x_bar_.setZero(coupled * dynamics_.equations(), static_cast<Eigen::Index>(costs.size()));
+    x_bar_.setZero(coupled * StageEquations::count(d), static_cast<Eigen::Index>(costs.size()));
   }
   for (Eigen::VectorXd* x : {&y_, &w_, &y_bar_, &g_y_}) x->setZero(states);
   g_rho_.setZero(d.rho.size());
-  r_bar_.setZero(dynamics_.equations());
+  r_bar_.setZero(StageEquations::count(d));
   explicit_swept_.reserve(static_cast<std::size_t>(rk_.dense_stages));
 }
 
@@ -132,15 +133,15 @@ bool AdjointSweep::explicit_back(int i) {
 //   Q*bar_i = Qbar_i + r_q'rbar_i,   V*bar_i = Vbar_i + r_v'rbar_i + h sum_j A_ji (r_q'rbar_j)
 // Qbar, Ybar: of running costs, whose value is taken at the stage itself.
 bool AdjointSweep::implicit_back(const StageGroup& g) {
-  const Eigen::Index n = mechanism_.states() / 2, rows = dynamics_.equations();
+  const Eigen::Index n = mechanism_.states() / 2, rows = StageEquations::count(mechanism_.data());
   auto time_of = [&](int i) { return step_.t + rk_.c[i] * step_.h; };
   auto place = [&](int i) {
     y_ = step_.Y.col(i);
-    dynamics_.place_at(time_of(i), y_, step_.angles0, step_.K.col(i).tail(n), step_.lambda.col(i));
+    equations_->place_at(time_of(i), y_, step_.angles0, step_.K.col(i).tail(n), step_.lambda.col(i));
   };
   for (int i = g.first; i <= g.last; ++i) {
     place(i);
-    implicit_->linearise(dynamics_, i - g.first);
+    implicit_->linearise(*equations_, i - g.first);
   }
   if (!implicit_->factor(step_.h, g)) return false;
 
@@ -174,7 +175,7 @@ bool AdjointSweep::implicit_back(const StageGroup& g) {
       Bars& b = bars_[o];
       r_bar_ = x_bar_.col(static_cast<Eigen::Index>(o)).segment((i - g.first) * rows, rows);
       y_bar_.setZero();
-      dynamics_.add_residual_adjoint(r_bar_, y_bar_, b.theta, b.rho);
+      equations_->add_adjoint(r_bar_, y_bar_, b.theta, b.rho);
       b.Y.col(i) += y_bar_;
       for (int j = g.first; j <= g.last; ++j) b.Y.col(j).tail(n) += (step_.h * rk_.a(i, j)) * y_bar_.head(n);
     }

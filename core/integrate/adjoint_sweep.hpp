@@ -32,7 +32,7 @@ class AdjointSweep {
   Eigen::MatrixXd lambda() const;
   Eigen::MatrixXd mu() const;
 
-  long linearised_states() const { return dynamics_.linearised_states(); }
+  long linearised_states() const { return dynamics_.linearised_states() + (equations_ ? equations_->places() : 0); }
   long factorisations() {
     return dynamics_.factorisations() + projector_->factorisations() + (implicit_ ? implicit_->factorisations() : 0);
   }
@@ -61,6 +61,7 @@ class AdjointSweep {
   std::optional<MotionSolver> motion_;  // where some sensor needs it
   Dynamics dynamics_;
   std::unique_ptr<Projector> projector_;
+  std::optional<StageEquations> equations_;  // of implicit stages
   std::optional<LinearisedStages> implicit_;
   Step step_;                        // in hand
   std::vector<int> explicit_swept_;  // its explicit stages whose bars are known

@@ -46,7 +46,7 @@ RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSetting
     no_parameters_ = block_without_parameters(mechanism_.data());
     for (LaneRows* x : {&error_, &projected_error_}) x->setZero(states, kLanes);
   }
-  if (rk_.implicit()) implicit_.emplace(mechanism_, rk_, settings_.integrator, dynamics_);
+  if (rk_.implicit()) implicit_.emplace(mechanism_, rk_, settings_.integrator, dynamics_.in_space());
 }
 
 // Hairer, Norsett, Wanner I, section II.4, "Starting step size"; step_.y0 is the initial state.
@@ -532,7 +532,7 @@ void RungeKuttaRun::add_statistics(Course& course) {
   s.relative_energy_drift = guard_.relative_energy_drift();
   if (implicit_) {
     evaluations_ += implicit_->evaluations();
-    s.linearised_states += dynamics_.linearised_states();
+    s.linearised_states += implicit_->places();
     s.jacobians += implicit_->jacobians();
     s.factorisations += implicit_->factorisations();
   }

@@ -19,14 +19,17 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
   std::copy_n(rk_.b, rk_.stages, b_of_all.begin());
   of_step_ = integrated(b_of_all.data());
   const int coupled = largest_implicit_group(rk_);
-  if (coupled > 0) implicit_.emplace(d, rk_);
+  if (coupled > 0) {
+    equations_.emplace(dynamics_.in_space());
+    implicit_.emplace(d, rk_);
+  }
   for (ParameterBlock& p : parameter_blocks(d)) {
     Block b;
     b.parameters = std::move(p);
     for (LaneRows* x : {&b.y0, &b.y_hat, &b.y1, &b.Y}) x->setZero(states, kLanes);
     b.a.assign(static_cast<std::size_t>(rk_.dense_stages), LaneRows::Zero(states / 2, kLanes));
     b.Y_stage.assign(static_cast<std::size_t>(coupled), LaneRows::Zero(states, kLanes));
-    b.x.setZero(coupled * dynamics_.equations(), kLanes);
+    b.x.setZero(coupled * StageEquations::count(d), kLanes);
     for (int k = 0; k < kLanes; ++k) {
       if (b.parameters.parameter[k] >= 0) b.y0.col(k) = y_initial_rho.col(b.parameters.parameter[k]);
     }
@@ -35,7 +38,7 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
   y_.setZero(states), ydot_.setZero(states), y_bar_.setZero(states);
   seen_.reserve(static_cast<std::size_t>(states));
   rho_bar_.setZero(d.rho.size());
-  r_.setZero(dynamics_.equations(), kLanes);
+  r_.setZero(StageEquations::count(d), kLanes);
   y_rho_.setZero(states, d.rho.size());
 }
 
@@ -136,16 +139,16 @@ bool TangentSweep::follow_explicit(const Step& step, int i) {
 // Y_i' = Y*_i' + what the group's own accelerations add to it; they and their multipliers solve
 //   N x' = r_y Y*_i' + r_rho
 bool TangentSweep::follow_implicit(const Step& step, const StageGroup& g) {
-  const Eigen::Index n = mechanism_.states() / 2, rows = dynamics_.equations();
+  const Eigen::Index n = mechanism_.states() / 2, rows = StageEquations::count(mechanism_.data());
   const auto of = [](int i) { return static_cast<std::size_t>(i); };
   for (int i = g.first; i <= g.last; ++i) {
     const int k = i - g.first;
     y_ = step.Y.col(i);
-    dynamics_.place_at(step.t + rk_.c[i] * step.h, y_, step.angles0, step.K.col(i).tail(n), step.lambda.col(i));
-    implicit_->linearise(dynamics_, k);
+    equations_->place_at(step.t + rk_.c[i] * step.h, y_, step.angles0, step.K.col(i).tail(n), step.lambda.col(i));
+    implicit_->linearise(*equations_, k);
     for (Block& b : blocks_) {
       add_stages(b, step.h, of_stage_[of(i)].c, of_stage_[of(i)], 0, g.first - 1, b.y0, b.Y_stage[of(k)]);
-      dynamics_.residual_tangent(b.parameters, b.Y_stage[of(k)], r_);
+      equations_->tangent(b.parameters, b.Y_stage[of(k)], r_);
       b.x.middleRows(k * rows, rows) = r_;
     }
   }

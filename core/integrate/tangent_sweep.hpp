@@ -36,7 +36,7 @@ class TangentSweep {
   void finish(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, std::span<const Cost> costs,
               Eigen::MatrixXd& psi_rho);
 
-  long linearised_states() const { return dynamics_.linearised_states(); }
+  long linearised_states() const { return dynamics_.linearised_states() + (equations_ ? equations_->places() : 0); }
   long factorisations() {
     return dynamics_.factorisations() + projector_->factorisations() + (implicit_ ? implicit_->factorisations() : 0);
   }
@@ -73,6 +73,7 @@ class TangentSweep {
   std::optional<MotionSolver> motion_;  // where some sensor needs it
   Dynamics dynamics_;
   std::unique_ptr<Projector> projector_;
+  std::optional<StageEquations> equations_;  // of implicit stages
   std::optional<LinearisedStages> implicit_;
   std::vector<Weights> of_stage_;  // A
   Weights of_step_;                // b

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "core/body/euler_parameters.hpp"
-#include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/spatial_dynamics.hpp"
 #include "core/linear/dense.hpp"
 #include "core/projection/projection.hpp"
 #include "core/sensor/body_at.hpp"
@@ -38,7 +38,7 @@ class Statics {
         equations_(d_, AssemblyLevel::position, t),
         angles_(angles),
         ydot_(14 * n_) {
-    dynamics_.hold_laws();
+    dynamics_.terms().hold_laws();
     VectorXd y = VectorXd::Zero(14 * n_);
     y.head(7 * n_) = q_guess;
     length_ = length_at(y);
@@ -197,7 +197,7 @@ class Statics {
   double t_;
   Index n_;
   double length_ = 1;
-  Dynamics dynamics_;
+  SpatialDynamics dynamics_;
   std::unique_ptr<Projector> projector_;
   AssemblyEquations equations_;
   VectorXd angles_, y_, ydot_, z_;

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "core/body/euler_parameters.hpp"
-#include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/spatial_dynamics.hpp"
 #include "core/linear/dense.hpp"
 #include "core/projection/projection.hpp"
 #include "core/sensor/body_at.hpp"
@@ -113,7 +113,7 @@ class DrivenMotion final : public MotionSource {
 
  private:
   const MechanismData& d_;
-  Dynamics dynamics_;
+  SpatialDynamics dynamics_;
   DrivenRows rows_;
   Motion motion_, bar_;
   double t_ = 0;

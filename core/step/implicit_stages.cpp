@@ -18,11 +18,11 @@ constexpr int kOwnSteps = 20;              // steps for which they are used once
 }  // namespace
 
 ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method, const IntegratorSettings& settings,
-                               Dynamics& dynamics)
+                               SpatialDynamics& dynamics)
     : data_(mechanism.data()),
       rk_(method),
       settings_(settings),
-      dynamics_(dynamics),
+      equations_(dynamics),
       jacobian_(data_),
       values_(jacobian_.values()) {
   int largest = 0;
@@ -45,7 +45,7 @@ ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method,
     for (int i = g.first; i <= g.last; ++i) matrix_of_.push_back(found);
   }
   if (rk_.error_filter != 0) filter_.emplace(data_, jacobian_);
-  const Eigen::Index rows = 7 * data_.n + data_.m;
+  const Eigen::Index rows = StageEquations::count(data_);
   own_values_.assign(static_cast<std::size_t>(largest), values_);
   same_.assign(own_values_.size(), &values_);
   for (const MotionJacobian::Values& v : own_values_) own_.push_back(&v);
@@ -95,8 +95,8 @@ void ImplicitStages::accept(const Step& step) {
 }
 
 void ImplicitStages::evaluate_jacobian(const Step& step) {
-  dynamics_.place_at(step.t, step.y0, step.angles0, a_start_, lambda_start_);
-  jacobian_.evaluate(dynamics_, values_);
+  equations_.place_at(step.t, step.y0, step.angles0, a_start_, lambda_start_);
+  jacobian_.evaluate(equations_, values_);
   ++jacobians_;
   age_ = 0;
   renew_ = false;
@@ -160,10 +160,10 @@ bool ImplicitStages::linearise_stages(const Step& step, const StageGroup& g, Mat
   for (int i = 0; i < g.size(); ++i) {
     const int stage = g.first + i;
     y_ = step.Y.col(stage);
-    dynamics_.place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, step.K.col(stage).tail(7 * data_.n),
-                       step.lambda.col(stage));
+    equations_.place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, step.K.col(stage).tail(7 * data_.n),
+                        step.lambda.col(stage));
     MotionJacobian::Values& own = own_values_[static_cast<std::size_t>(i)];
-    jacobian_.evaluate(dynamics_, own);
+    jacobian_.evaluate(equations_, own);
     ++own_jacobians_;
   }
   m.jacobian = -1;  // not that of the start
@@ -177,8 +177,8 @@ bool ImplicitStages::evaluate_residuals(Step& step, const StageGroup& g) {
   for (int i = 0; i < g.size(); ++i) {
     const int stage = g.first + i;
     y_ = step.Y.col(stage);
-    dynamics_.place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, x_.col(i).head(n), x_.col(i).tail(data_.m));
-    dynamics_.residual(r_.col(0).segment(i * rows, rows));
+    equations_.place_at(step.t + rk_.c[stage] * step.h, y_, step.angles0, x_.col(i).head(n), x_.col(i).tail(data_.m));
+    equations_.residual(r_.col(0).segment(i * rows, rows));
     ++evaluations_;
   }
   return r_.topRows(g.size() * rows).allFinite();
@@ -211,7 +211,7 @@ double ImplicitStages::add_change(const Step& step, const StageGroup& g, const M
 }
 
 bool ImplicitStages::iterate(Step& step, const StageGroup& g, Matrix& m, Goal goal, bool own) {
-  const Eigen::Index rows = 7 * data_.n + data_.m;
+  const Eigen::Index rows = StageEquations::count(data_);
   const bool exact = goal != Goal::tolerance;
   for (int i = 0; i < g.size(); ++i) {
     if (goal == Goal::polish) {

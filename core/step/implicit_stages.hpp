@@ -23,7 +23,7 @@ namespace mbsopt {
 class ImplicitStages {
  public:
   ImplicitStages(const Mechanism& mechanism, const Method& method, const IntegratorSettings& settings,
-                 Dynamics& dynamics);
+                 SpatialDynamics& dynamics);
   ImplicitStages(const ImplicitStages&) = delete;  // its matrices refer to its Jacobian
   ImplicitStages& operator=(const ImplicitStages&) = delete;
 
@@ -50,6 +50,7 @@ class ImplicitStages {
   static constexpr double kKeepStep = 1.2;
 
   long evaluations() const { return evaluations_; }
+  long places() const { return equations_.places(); }  // of stages where something was evaluated
   long jacobians() const { return jacobians_ + own_jacobians_; }
   long factorisations() const;
 
@@ -81,7 +82,7 @@ class ImplicitStages {
   const MechanismData& data_;
   const Method& rk_;
   IntegratorSettings settings_;
-  Dynamics& dynamics_;
+  StageEquations equations_;
   MotionJacobian jacobian_;
   MotionJacobian::Values values_;
   std::vector<MotionJacobian::Values> own_values_;  // per stage of a group

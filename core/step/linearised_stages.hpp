@@ -15,8 +15,10 @@ class LinearisedStages {
   LinearisedStages& operator=(const LinearisedStages&) = delete;
   LinearisedStages(const MechanismData& data, const Method& method);
 
-  // The Jacobian of stage k of a group (from 0), at the place where `dynamics` is.
-  void linearise(Dynamics& dynamics, int k) { jacobian_.evaluate(dynamics, values_[static_cast<std::size_t>(k)]); }
+  // The Jacobian of stage k of a group (from 0), at the place of the equations.
+  void linearise(StageEquations& equations, int k) {
+    jacobian_.evaluate(equations, values_[static_cast<std::size_t>(k)]);
+  }
   bool factor(double h, const StageGroup& group);
   // In place; x: (7 n + m) rows per stage; columns: kLanes, and any number of the transposed.
   void solve(const StageGroup& group, Eigen::MatrixXd& x);

@@ -2,7 +2,7 @@
 //
 //   sum_j N_ij x_j = b_i,   N_ij = [i = j] (-r_(a, lambda)) - P_ij r_v - (P^2)_ij r_q      at stage i,   P = h A
 //
-// since V_i = V*_i + sum_j P_ij a_j and Q_i = Q*_i + sum_j P_ij V_j (Dynamics::residual, MotionJacobian). One factor
+// since V_i = V*_i + sum_j P_ij a_j and Q_i = Q*_i + sum_j P_ij V_j (StageEquations, MotionJacobian). One factor
 // serves Newton's method, the tangents, and transposed the adjoint.
 //
 //   N = [ K  J' ]      factored as     S = K + J' W G,    W = inv(c + epsilon)

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/spatial_dynamics.hpp"
 
 namespace mbsopt {
 
@@ -20,8 +20,8 @@ double error_of_weak_joints(const Mechanism& mechanism, const FormulationSetting
   FormulationSettings larger = settings;
   larger.alpha *= kLarger;
   VectorXd ydot(y.size()), firm(y.size());
-  if (!Dynamics(mechanism, settings).evaluate(t, y, angles, ydot)) return 0;
-  if (!Dynamics(mechanism, larger).evaluate(t, y, angles, firm)) return 0;
+  if (!SpatialDynamics(mechanism, settings).evaluate(t, y, angles, ydot)) return 0;
+  if (!SpatialDynamics(mechanism, larger).evaluate(t, y, angles, firm)) return 0;
   const Eigen::Index half = y.size() / 2;
   const double size = std::max({ydot.tail(half).lpNorm<Eigen::Infinity>(), firm.tail(half).lpNorm<Eigen::Infinity>(),
                                 mechanism.data().gravity.norm()});

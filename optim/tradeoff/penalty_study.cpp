@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/spatial_dynamics.hpp"
 #include "optim/machine/median.hpp"
 
 namespace mbsopt {
@@ -20,7 +20,7 @@ using Eigen::Index;
 // Accelerations at the states of a motion, one column each; a column of NaN where they cannot be computed.
 Eigen::MatrixXd accelerations(const Mechanism& mechanism, const FormulationSettings& formulation,
                               const SampledMotion& motion) {
-  Dynamics dynamics(mechanism, formulation);
+  SpatialDynamics dynamics(mechanism, formulation);
   const Index n = mechanism.states();
   Eigen::MatrixXd a(n / 2, motion.states.cols());
   Eigen::VectorXd ydot(n);

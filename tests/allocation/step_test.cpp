@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/cvodes/cvodes_newton.hpp"
-#include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/spatial_dynamics.hpp"
 #include "core/integrate/runge_kutta_run.hpp"
 #include "core/projection/projection.hpp"
 #include "core/start/assembly.hpp"
@@ -37,12 +37,12 @@ TEST_CASE("a right-hand side, its tangent and its adjoint allocate nothing", "[a
     formulation = FormulationSettings::penalty();
     formulation.linear_solver = LinearSolver::quasidefinite;
   }
-  Dynamics dynamics(p.mechanism, formulation);
+  SpatialDynamics dynamics(p.mechanism, formulation);
   const auto blocks = parameter_blocks(p.mechanism.data());
   LaneRows direction = LaneRows::Random(p.y.size(), kLanes), out(p.y.size(), kLanes);
   VectorXd w = VectorXd::Random(p.y.size()), y_bar = VectorXd::Zero(p.y.size());
   VectorXd theta_bar = VectorXd::Zero(p.mechanism.data().slots()), rho_bar = VectorXd::Zero(p.mechanism.parameters());
-  dynamics.blocks();  // sets up what derivatives need
+  dynamics.terms().blocks();  // sets up what derivatives need
   const long before = allocation_count();
   bool ok = true;
   for (int k = 0; k < 3; ++k) {

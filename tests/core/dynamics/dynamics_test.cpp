@@ -1,6 +1,6 @@
 // The equations of motion at single states: against a dense solution of the constrained equations, and their tangent
 // and adjoint against differences and against each other, at states off the constraints and off the unit sphere.
-#include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/spatial_dynamics.hpp"
 
 #include <Eigen/LU>
 #include <catch2/catch.hpp>
@@ -42,7 +42,7 @@ FormulationSettings formulation(const std::string& name) {
 
 VectorXd ydot(const Mechanism& mechanism, const FormulationSettings& settings, const VectorXd& y,
               const VectorXd& angles) {
-  Dynamics dynamics(mechanism, settings);
+  SpatialDynamics dynamics(mechanism, settings);
   VectorXd out(y.size());
   REQUIRE(dynamics.evaluate(kTime, y, angles, out));
   return out;
@@ -83,7 +83,7 @@ TEST_CASE("the augmented Lagrangian reaches the constrained equations whatever i
   FormulationSettings settings;
   settings.iterations = 40;
   settings.alpha = GENERATE(1e3, 1e5, 1e7, 1e9, 1e11);
-  Dynamics dynamics(mechanism, settings);
+  SpatialDynamics dynamics(mechanism, settings);
   VectorXd rate(y.size());
   REQUIRE(dynamics.evaluate(kTime, y, angles, rate));
   // J z + gamma = 0 and M z + J'lambda = f, residuals against the size of their terms
@@ -105,7 +105,7 @@ TEST_CASE("accelerations equal a dense solution of the constrained equations", "
   const MechanismData& d = mechanism.data();
   const VectorXd y = state(mechanism, 7);
   const VectorXd angles = VectorXd::Zero(1);
-  Dynamics dynamics(mechanism, {});
+  SpatialDynamics dynamics(mechanism, {});
   VectorXd rate(y.size());
   REQUIRE(dynamics.evaluate(kTime, y, angles, rate));
   // Dense: M, J from the rows; gamma by second differences of Phi along the motion with z = 0; planar loops are
@@ -154,7 +154,7 @@ TEST_CASE("tangent of the accelerations equals central differences, in the state
   const VectorXd rho = nominal(scene);
   const Mechanism mechanism(scene, rho, {}, user_forces(scene));
   const VectorXd y = state(mechanism, 11), angles = VectorXd::Constant(1, 0.5);
-  Dynamics dynamics(mechanism, settings);
+  SpatialDynamics dynamics(mechanism, settings);
   VectorXd rate(y.size());
   REQUIRE(dynamics.evaluate(kTime, y, angles, rate));
   dynamics.linearise_here();
@@ -195,11 +195,11 @@ TEST_CASE("the adjoint of the accelerations is the transpose of their tangent", 
   const Mechanism mechanism(scene, nominal(scene), {}, user_forces(scene));
   const MechanismData& d = mechanism.data();
   const VectorXd y = state(mechanism, 13), angles = VectorXd::Constant(1, 0.5);
-  Dynamics dynamics(mechanism, settings);
+  SpatialDynamics dynamics(mechanism, settings);
   VectorXd rate(y.size());
   REQUIRE(dynamics.evaluate(kTime, y, angles, rate));
   // A second one, prepared from the stored solution, must give the same.
-  Dynamics again(mechanism, settings);
+  SpatialDynamics again(mechanism, settings);
   REQUIRE(again.linearise(kTime, y, angles, rate.tail(y.size() / 2), dynamics.lambda()));
   const VectorXd w = VectorXd::Random(y.size());
   VectorXd y_bar = VectorXd::Zero(y.size()), theta_bar = VectorXd::Zero(d.slots()),

@@ -5,7 +5,7 @@
 #include <boost/multiprecision/eigen.hpp>
 #include <catch2/catch.hpp>
 
-#include "core/dynamics/dynamics.hpp"
+#include "core/dynamics/spatial_dynamics.hpp"
 #include "core/simulate/simulation.hpp"
 #include "tests/core/mechanism/moving_scenes.hpp"
 
@@ -48,8 +48,8 @@ VectorXd accelerations(const std::vector<Vec<6>>& z) {
   return x;
 }
 
-// (z, lambda) of [M J'; J -c] (z, lambda) = (f, -gamma), from what Dynamics has evaluated.
-VectorXq exact(Dynamics& at, const Quad& c) {
+// (z, lambda) of [M J'; J -c] (z, lambda) = (f, -gamma), from what SpatialDynamics has evaluated.
+VectorXq exact(SpatialDynamics& at, const Quad& c) {
   const MechanismData& d = at.data();
   const Eigen::Index n = 6 * d.n;
   MatrixXq K = MatrixXq::Zero(n + d.m, n + d.m);
@@ -84,15 +84,15 @@ Errors errors(const Scene& scene, double alpha) {
     y.segment<7>(7 * (i - 1)) += d.bodies[static_cast<std::size_t>(i)].q;
     y.segment<4>(7 * (i - 1) + 3).normalize();
   }
-  Dynamics cholesky(mechanism, penalty(alpha, LinearSolver::cholesky));
-  Dynamics quasidefinite(mechanism, penalty(alpha, LinearSolver::quasidefinite));
+  SpatialDynamics cholesky(mechanism, penalty(alpha, LinearSolver::cholesky));
+  SpatialDynamics quasidefinite(mechanism, penalty(alpha, LinearSolver::quasidefinite));
   FormulationSettings iterated;
   iterated.alpha = alpha, iterated.iterations = 3, iterated.tolerance = 0;
-  Dynamics augmented(mechanism, iterated);
-  for (Dynamics* x : {&cholesky, &quasidefinite, &augmented}) x->evaluate(0, y, VectorXd(), ydot);
+  SpatialDynamics augmented(mechanism, iterated);
+  for (SpatialDynamics* x : {&cholesky, &quasidefinite, &augmented}) x->evaluate(0, y, VectorXd(), ydot);
   const VectorXq with_penalty = exact(quasidefinite, Quad(1) / Quad(alpha)).head(6 * d.n);
   const VectorXq constrained = exact(augmented, 0).head(6 * d.n);
-  auto of = [](const Dynamics& x) { return VectorXq(accelerations(x.z()).cast<Quad>()); };
+  auto of = [](const SpatialDynamics& x) { return VectorXq(accelerations(x.z()).cast<Quad>()); };
   return {relative_error(with_penalty, constrained), relative_error(of(cholesky), with_penalty),
           relative_error(of(quasidefinite), with_penalty), relative_error(of(augmented), constrained)};
 }
@@ -183,7 +183,7 @@ struct RedundantRows {
 TEST_CASE("redundant rows that disagree leave quasi-definite accelerations and multipliers right", "[formulation]") {
   const RedundantRows c;
   const double alpha = GENERATE(1e4, 1e6, 1e8, 1e9, 1e11);
-  Dynamics dynamics(Mechanism(c.scene, c.rho), penalty(alpha, LinearSolver::quasidefinite));
+  SpatialDynamics dynamics(Mechanism(c.scene, c.rho), penalty(alpha, LinearSolver::quasidefinite));
   VectorXd ydot(c.y.size());
   REQUIRE(dynamics.evaluate(0, c.y, c.angles, ydot));
   const VectorXq expected = exact(dynamics, Quad(1) / Quad(alpha));
@@ -198,10 +198,10 @@ TEST_CASE("where redundant rows disagree, the quasi-definite tangent equals diff
   const RedundantRows c;
   const FormulationSettings settings = penalty(GENERATE(1e4, 1e6), LinearSolver::quasidefinite);
   const Mechanism mechanism(c.scene, c.rho);
-  Dynamics dynamics(mechanism, settings);
+  SpatialDynamics dynamics(mechanism, settings);
   auto ydot = [&](const Mechanism& at) {
     VectorXd out(c.y.size());
-    REQUIRE(Dynamics(at, settings).evaluate(0, c.y, c.angles, out));
+    REQUIRE(SpatialDynamics(at, settings).evaluate(0, c.y, c.angles, out));
     return out;
   };
   VectorXd rate(c.y.size());

@@ -19,7 +19,7 @@ void check_scene(const Scene& scene, double tolerance) {
   const Assembly assembly(mechanism, 0);
   REQUIRE(assembly.result().ok);
   const VectorXd &y = assembly.result().y, &angles = assembly.result().angles;
-  Dynamics dynamics(mechanism, scene.simulation.formulation);
+  SpatialDynamics dynamics(mechanism, scene.simulation.formulation);
   VectorXd ydot(y.size());
   REQUIRE(dynamics.evaluate(0, y, angles, ydot));
   dynamics.linearise_here();
@@ -36,8 +36,9 @@ void check_scene(const Scene& scene, double tolerance) {
 
   MotionJacobian jacobian(data);
   MotionJacobian::Values values = jacobian.values();
-  dynamics.place_at(0, y, angles, ydot.tail(y.size() / 2), VectorXd(dynamics.lambda()));
-  jacobian.evaluate(dynamics, values);
+  StageEquations equations(dynamics);
+  equations.place_at(0, y, angles, ydot.tail(y.size() / 2), VectorXd(dynamics.lambda()));
+  jacobian.evaluate(equations, values);
   ShiftedSystem system(data, jacobian);
   for (const double gamma : {1e-3, 0.1, -0.05}) {
     REQUIRE(system.factor(gamma, values));

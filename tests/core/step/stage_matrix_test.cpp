@@ -56,12 +56,13 @@ struct Moving {
     REQUIRE(assembly.result().ok);
     const VectorXd& angles = assembly.result().angles;
     VectorXd y = assembly.result().y, ydot(y.size());
-    Dynamics dynamics(mechanism, scene.simulation.formulation);
+    SpatialDynamics dynamics(mechanism, scene.simulation.formulation);
+    StageEquations equations(dynamics);
     for (int k = 0; k < states; ++k) {
       REQUIRE(dynamics.evaluate(0, y, angles, ydot));
-      dynamics.place_at(0, y, angles, ydot.tail(y.size() / 2), VectorXd(dynamics.lambda()));
+      equations.place_at(0, y, angles, ydot.tail(y.size() / 2), VectorXd(dynamics.lambda()));
       values.push_back(jacobian.values());
-      jacobian.evaluate(dynamics, values.back());
+      jacobian.evaluate(equations, values.back());
       y += 0.01 * ydot;
     }
   }

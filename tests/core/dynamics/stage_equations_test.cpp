@@ -25,7 +25,8 @@ struct Place {
   Scene scene;
   std::vector<std::shared_ptr<const UserForce>> forces;
   Mechanism mechanism;
-  Dynamics dynamics;
+  SpatialDynamics dynamics;
+  StageEquations equations;
   double t = 0.1;
   VectorXd y, angles, a, lambda;
 
@@ -34,7 +35,8 @@ struct Place {
       : scene(std::move(s)),
         forces(std::move(user)),
         mechanism(scene, nominal(scene), {}, forces),
-        dynamics(mechanism, formulation) {
+        dynamics(mechanism, formulation),
+        equations(dynamics) {
     const Assembly assembly(mechanism, t);
     REQUIRE(assembly.result().ok);
     y = assembly.result().y, angles = assembly.result().angles;
@@ -48,10 +50,10 @@ struct Place {
     a += 0.3 * VectorXd::Random(a.size());
     lambda += 0.3 * VectorXd::Random(lambda.size());
   }
-  VectorXd residual(Dynamics& d, const VectorXd& at_y, const VectorXd& at_a, const VectorXd& at_lambda) const {
-    VectorXd r(d.equations());
-    d.place_at(t, at_y, angles, at_a, at_lambda);
-    d.residual(r);
+  VectorXd residual(StageEquations& of, const VectorXd& at_y, const VectorXd& at_a, const VectorXd& at_lambda) const {
+    VectorXd r(StageEquations::count(mechanism.data()));
+    of.place_at(t, at_y, angles, at_a, at_lambda);
+    of.residual(r);
     return r;
   }
 };
@@ -93,7 +95,7 @@ Place moving_four_bar(const FormulationSettings& formulation = {}) {
 TEST_CASE("the residual vanishes at the solved accelerations and multipliers", "[equations]") {
   const FormulationSettings formulation = GENERATE(FormulationSettings{}, stabilised_penalty());
   Place p = moving_four_bar(formulation);
-  const VectorXd r = p.residual(p.dynamics, p.y, p.a, p.lambda);
+  const VectorXd r = p.residual(p.equations, p.y, p.a, p.lambda);
   CHECK(r.cwiseAbs().maxCoeff() < 1e-9 * (1 + p.lambda.cwiseAbs().maxCoeff()));
 }
 
@@ -102,18 +104,20 @@ TEST_CASE("the residual's tangent in state and parameters is its difference", "[
   Place p = moving_four_bar(formulation);
   p.move();
   const Index states = p.y.size(), P = p.mechanism.parameters();
-  p.residual(p.dynamics, p.y, p.a, p.lambda);
-  LaneRows direction = LaneRows::Random(states, kLanes), change = LaneRows::Zero(p.dynamics.equations(), kLanes);
+  p.residual(p.equations, p.y, p.a, p.lambda);
+  LaneRows direction = LaneRows::Random(states, kLanes),
+           change = LaneRows::Zero(StageEquations::count(p.mechanism.data()), kLanes);
   for (const ParameterBlock& block : parameter_blocks(p.mechanism.data())) {
-    p.residual(p.dynamics, p.y, p.a, p.lambda);
-    p.dynamics.residual_tangent(block, direction, change);
+    p.residual(p.equations, p.y, p.a, p.lambda);
+    p.equations.tangent(block, direction, change);
     for (int lane = 0; lane < kLanes; ++lane) {
       auto at = [&](double h) {
         VectorXd rho = nominal(p.scene);
         if (block.parameter[lane] >= 0) rho(block.parameter[lane]) += h;
         const Mechanism moved(p.scene, rho, {}, p.forces);
-        Dynamics dynamics(moved, formulation);
-        return p.residual(dynamics, p.y + h * direction.col(lane), p.a, p.lambda);
+        SpatialDynamics dynamics(moved, formulation);
+        StageEquations equations(dynamics);
+        return p.residual(equations, p.y + h * direction.col(lane), p.a, p.lambda);
       };
       const double h = 1e-3;
       const VectorXd d1 = (at(h) - at(-h)) / (2 * h), d2 = (at(h / 2) - at(-h / 2)) / h,
@@ -130,15 +134,16 @@ TEST_CASE("the residual's adjoint is the transpose of its tangent", "[equations]
   Place p = moving_four_bar(formulation);
   p.move();
   const MechanismData& data = p.mechanism.data();
-  p.residual(p.dynamics, p.y, p.a, p.lambda);
-  const VectorXd r_bar = VectorXd::Random(p.dynamics.equations());
+  p.residual(p.equations, p.y, p.a, p.lambda);
+  const VectorXd r_bar = VectorXd::Random(StageEquations::count(p.mechanism.data()));
   VectorXd y_bar = VectorXd::Zero(p.y.size()), theta_bar = VectorXd::Zero(data.slots()),
            rho_bar = VectorXd::Zero(data.rho.size());
-  p.dynamics.add_residual_adjoint(r_bar, y_bar, theta_bar, rho_bar);
+  p.equations.add_adjoint(r_bar, y_bar, theta_bar, rho_bar);
   data.add_to_rho(theta_bar, rho_bar);
-  LaneRows direction = LaneRows::Random(p.y.size(), kLanes), change = LaneRows::Zero(p.dynamics.equations(), kLanes);
+  LaneRows direction = LaneRows::Random(p.y.size(), kLanes),
+           change = LaneRows::Zero(StageEquations::count(p.mechanism.data()), kLanes);
   for (const ParameterBlock& block : parameter_blocks(data)) {
-    p.dynamics.residual_tangent(block, direction, change);
+    p.equations.tangent(block, direction, change);
     for (int lane = 0; lane < kLanes; ++lane) {
       double expected = y_bar.dot(direction.col(lane));
       if (block.parameter[lane] >= 0) expected += rho_bar(block.parameter[lane]);
@@ -164,10 +169,10 @@ TEST_CASE("the sparse Jacobian has the residual's derivatives in q, v, a and lam
   }();
   p.move();
   const int n = 7 * p.mechanism.data().n, m = p.mechanism.data().m;
-  p.residual(p.dynamics, p.y, p.a, p.lambda);
+  p.residual(p.equations, p.y, p.a, p.lambda);
   MotionJacobian jacobian(p.mechanism.data());
   MotionJacobian::Values values = jacobian.values();
-  jacobian.evaluate(p.dynamics, values);
+  jacobian.evaluate(p.equations, values);
   MatrixXd found = MatrixXd::Zero(n + m, 3 * n + m);  // minus the derivative in (q, v, a, lambda)
   for (std::size_t k = 0; k < jacobian.pairs().size(); ++k) {
     const auto& [row, body] = jacobian.pairs()[k];
@@ -188,17 +193,17 @@ TEST_CASE("the sparse Jacobian has the residual's derivatives in q, v, a and lam
   VectorXd theta_bar = VectorXd::Zero(p.mechanism.data().slots()), rho_bar = VectorXd::Zero(p.mechanism.parameters());
   for (int r = 0; r < n + m; ++r) {
     VectorXd y_bar = VectorXd::Zero(2 * n);
-    p.dynamics.add_residual_adjoint(VectorXd::Unit(n + m, r), y_bar, theta_bar, rho_bar);
+    p.equations.add_adjoint(VectorXd::Unit(n + m, r), y_bar, theta_bar, rho_bar);
     INFO("row " << r);
     CHECK((found.row(r).head(2 * n).transpose() + y_bar).cwiseAbs().maxCoeff() <
           1e-12 * (1 + y_bar.cwiseAbs().maxCoeff()));
   }
   // The residual is linear in (a, lambda).
-  const VectorXd r = p.residual(p.dynamics, p.y, p.a, p.lambda);
+  const VectorXd r = p.residual(p.equations, p.y, p.a, p.lambda);
   for (int c = 0; c < n + m; ++c) {
     VectorXd a = p.a, lambda = p.lambda;
     (c < n ? a(c) : lambda(c - n)) += 1;
-    const VectorXd column = p.residual(p.dynamics, p.y, a, lambda) - r;
+    const VectorXd column = p.residual(p.equations, p.y, a, lambda) - r;
     INFO("column " << 2 * n + c);
     CHECK((found.col(2 * n + c) + column).cwiseAbs().maxCoeff() < 1e-9 * (1 + r.cwiseAbs().maxCoeff()));
   }

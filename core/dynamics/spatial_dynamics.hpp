@@ -1,0 +1,69 @@
+// The equations of motion in space, solved for the accelerations, with their tangent and adjoint (dynamics.hpp).
+//
+// Unknowns per body: z = (rddot, omegadot), omegadot in body axes; a = qddot = (rddot, pddot) follows from it
+// (frame.hpp).
+//
+//   tangent:  [M J'; J -c] (z', lambda') = (b', c')                     b, c: motion_terms.hpp
+//   adjoint:  [M J'; J -c] (eta, mu) = (T'w, 0),  then  y_bar += d/dy [ w'a + eta'b + mu'c ]
+// The adjoint is matrix-free; tangents multiply with blocks that are evaluated once per state (motion_blocks.hpp).
+//
+// Owns every array that a right-hand side touches: one per thread. It allocates nothing after construction, but in the
+// first tangent.
+#pragma once
+
+#include <vector>
+
+#include "core/dynamics/motion_terms.hpp"
+#include "core/dynamics/saddle_settings.hpp"
+#include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/state_point.hpp"
+
+namespace mbsopt {
+
+class SpatialDynamics {
+ public:
+  SpatialDynamics(const Mechanism& mechanism, const FormulationSettings& settings);
+
+  // ydot = (v, a) at (t, y); angles: the branch of each joint angle. False where S is not positive definite or a number
+  // is not finite. The solution stays available as z() and lambda(), f as loads(), and gamma().
+  bool evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, Eigen::Ref<Eigen::VectorXd> ydot);
+  const std::vector<Vec<6>>& z() const { return terms_.z; }
+  const Eigen::VectorXd& lambda() const { return terms_.lambda; }
+  const std::vector<Vec<6>>& loads() const { return terms_.f; }
+  const Eigen::VectorXd& gamma() const { return gamma_; }
+
+  // Prepares derivatives at a state whose solution (a = qddot, lambda) is known.
+  bool linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
+                 const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
+  // The same right after evaluate() at this state, whose factor is still there.
+  void linearise_here() { terms_.set_accelerations(); }
+
+  // y_dir: tangent of y (14n x lanes); ydot_dir: of (v, a). z_tangent(): of z.
+  void tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir);
+  void acceleration_tangent(const ParameterBlock& block, const LaneRows& y_dir, Eigen::Ref<LaneRows> a_dir);
+  const std::vector<Lanes<6>>& z_tangent() const { return z_dir_; }
+  // w: cotangent of (v, a); adds to the cotangents of y, of the differentiated fields, and of the parameters in laws.
+  // motion: a cotangent of z and lambda themselves beside it.
+  void add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
+                   Eigen::VectorXd& rho_bar, const Motion* motion = nullptr);
+
+  const MechanismData& data() const { return data_; }
+  MotionTerms& terms() { return terms_; }
+  SaddleSolver& solver() { return solver_; }
+  double compliance() const { return settings_.compliance; }
+  double usual_acceleration() const { return terms_.usual_acceleration(); }
+
+ private:
+  const Mechanism mechanism_;  // keeps the data alive
+  const MechanismData& data_;
+  const SaddleSettings settings_;
+  MotionTerms terms_;
+  SaddleSolver solver_;
+  std::vector<Vec<6>> loads_bar_, eta_;
+  Eigen::VectorXd gamma_, mu_, g_;
+  std::vector<Vector4d> pddot_bar_;
+  std::vector<Lanes<6>> z_dir_;
+  LaneRows lambda_dir_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,35 @@
+// The forces of users inside the equations of motion: from the 7 coordinates of a body, Q, to its 6 loads T'Q, with
+// derivatives. Virtual work e'Q with e = T(p) eta = (eta_r, 1/2 G(p)' eta_theta).
+//
+// Owns the numbers of one evaluation: one per thread, nothing is allocated after construction.
+#pragma once
+
+#include <vector>
+
+#include "core/dynamics/force_terms.hpp"
+
+namespace mbsopt {
+
+class UserLoads {
+ public:
+  explicit UserLoads(const MechanismData& data);
+
+  using Bodies = std::vector<BodyState>;  // the ground first
+  void add_loads(const ForceTerms::At& at, const Bodies& bodies, std::vector<Vec<6>>& loads);
+  // Derivatives of the loads in the state as blocks, and in the directions of the parameters.
+  void add_blocks(const ForceTerms::At& at, const Bodies& bodies, MotionBlocks& out);
+  void add_field_tangent(const ForceTerms::At& at, const Bodies& bodies, const ParameterBlock& block,
+                         std::vector<Lanes<6>>& load_dirs);
+  // Gradient of the virtual work sum load'eta; eta: per body, without the ground.
+  void add_pull_back(const ForceTerms::At& at, const Bodies& bodies, const std::vector<Vec<6>>& eta,
+                     Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& rho_bar);
+
+ private:
+  void set_state(const UserForceData& force, const Eigen::VectorXd& y);
+
+  const MechanismData& data_;
+  Eigen::VectorXd q_, v_, Q_, e_;
+  Eigen::MatrixXd K_, C_, Q_rho_;
+};
+
+}  // namespace mbsopt
