@@ -95,7 +95,8 @@ int kinematics_command(const CommandContext& context) {
   SimulationStatistics statistics;
   const SimulationSettings& settings = scene.simulation;
   const KinematicsResult kinematics = solve_kinematics(
-      mechanism, assembly, settings.formulation, sampling.times, [&](std::size_t i, const StatePoint& at) {
+      mechanism, assembly, settings, sampling.times,
+      [&](std::size_t i, const StatePoint& at) {
         sampling.observe(i, at);
         finite = efforts.record(at);
         const Energy e = energy(mechanism.data(), at.y, at.angles);
@@ -103,8 +104,11 @@ int kinematics_command(const CommandContext& context) {
         if (i == 0) statistics.energy_initial = statistics.energy_final;
         statistics.energy_drift =
             std::max(statistics.energy_drift, std::abs(statistics.energy_final - statistics.energy_initial));
-        run.progress.fraction("kinematics", (at.t - settings.start_time) / (settings.end_time - settings.start_time));
-        return finite && !interrupted();
+        return finite;
+      },
+      [&](double t) {
+        run.progress.fraction("kinematics", (t - settings.start_time) / (settings.end_time - settings.start_time));
+        return !interrupted();
       });
   run.progress.finish();
   statistics.steps = kinematics.steps;

@@ -272,9 +272,10 @@ class Kinematics {
 
 }  // namespace
 
-KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& start,
-                                  const FormulationSettings& formulation, const std::vector<double>& times,
-                                  const std::function<bool(std::size_t, const StatePoint&)>& observe) {
+KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& start, const SimulationSettings& settings,
+                                  const std::vector<double>& times,
+                                  const std::function<bool(std::size_t, const StatePoint&)>& observe,
+                                  const std::function<bool(double)>& go_on) {
   KinematicsResult result;
   result.last_good_time = times.front();
   if (!start.result().ok) {
@@ -282,7 +283,7 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
     return result;
   }
   const int freedoms = start.summary().degrees_of_freedom;
-  Kinematics k(mechanism, formulation);
+  Kinematics k(mechanism, settings.formulation);
   k.start(times.front(), start.result().y, start.result().angles);
   if (freedoms > 0 && k.rank_here().rank_lost > 0) {
     result.message = "the drives leave " + std::to_string(freedoms) + (freedoms == 1 ? " degree" : " degrees") +
@@ -290,9 +291,23 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
                      "sensor (initial.conditions) for each. If the start is a singular position, begin beside it";
     return result;
   }
+  const auto stopped = [&] {
+    result.message = fmt::format("stopped at t = {:.6g} s", k.t());
+    return result;
+  };
+  long tried = 0;
   for (std::size_t i = 0; i < times.size(); ++i) {
     double h = times[i] - k.t();
     while (k.t() < times[i]) {
+      if (go_on && !go_on(k.t())) return stopped();
+      const double most = static_cast<double>(settings.integrator.max_steps - tried++);
+      if (times.back() - k.t() > most * k.step_limit()) {
+        result.message = fmt::format(
+            "at t = {:.6g} s the drives turn a body so fast that the motion until {:.6g} s takes more steps than "
+            "simulation.integrator.max_steps, {}. Is the law in rad and s?",
+            k.t(), times.back(), settings.integrator.max_steps);
+        return result;
+      }
       const double left = times[i] - k.t();
       h = std::min({h, left, k.step_limit()});
       const bool last = h >= left * (1 - 1e-12);
@@ -320,10 +335,7 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
     result.max_velocity_violation = std::max(result.max_velocity_violation, k.velocity_violation());
     SingularPosition here = k.rank_here();
     if (here.rank_lost > 0) result.singular.push_back(std::move(here));
-    if (!observe(i, k.point())) {
-      result.message = fmt::format("stopped at t = {:.6g} s", k.t());
-      return result;
-    }
+    if (!observe(i, k.point())) return stopped();
   }
   result.ok = true;
   return result;

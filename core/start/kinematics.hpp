@@ -37,10 +37,12 @@ struct KinematicsResult {
   std::vector<SingularPosition> singular;  // among the times wanted
 };
 
-// start: the mechanism assembled at the first of the times, which ascend. observe: with the motion (accelerations,
-// multipliers) in the point.
-KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& start,
-                                  const FormulationSettings& formulation, const std::vector<double>& times,
-                                  const std::function<bool(std::size_t, const StatePoint&)>& observe);
+// start: the mechanism assembled at the first of the times, which ascend. settings: the formulation, and the steps that
+// may be tried (integrator.max_steps). observe: with the motion (accelerations, multipliers) in the point. go_on: asked
+// before each step, at its time. Either ends the run by false.
+KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& start, const SimulationSettings& settings,
+                                  const std::vector<double>& times,
+                                  const std::function<bool(std::size_t, const StatePoint&)>& observe,
+                                  const std::function<bool(double)>& go_on = {});
 
 }  // namespace mbsopt

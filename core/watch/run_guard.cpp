@@ -34,7 +34,7 @@ double natural_energy(const MechanismData& d, const Eigen::VectorXd& y) {
 
 Eigen::Vector2d speeds(const Eigen::VectorXd& y, int i, int n) {
   const auto v = y.segment<7>(7 * (n + i - 1));
-  return {v.head<3>().norm(), 2 * v.tail<4>().norm()};  // |omega| = 2 |pdot|
+  return {v.head<3>().stableNorm(), 2 * v.tail<4>().stableNorm()};  // |omega| = 2 |pdot|
 }
 
 double size_of(const Energy& e) { return e.kinetic + std::abs(e.potential); }
@@ -56,13 +56,15 @@ std::string RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& en
   for (int i = 1; i <= data_.n; ++i) bounds_ = bounds_.cwiseMax(kGrowth * speeds(y, i, data_.n));
   energy_natural_ = conserves_energy_ ? natural_energy(data_, y) : 0.0;
   for (int i = 1; i <= data_.n; ++i) {
-    const double omega = speeds(y, i, data_.n)(1), half_turns = omega * (t_end - t) / std::numbers::pi;
-    if (!(half_turns > static_cast<double>(max_steps))) continue;
+    const double omega = speeds(y, i, data_.n)(1);
+    if (!(omega * (t_end - t) > std::numbers::pi * static_cast<double>(max_steps))) continue;
+    const std::string& body = data_.body_names[static_cast<std::size_t>(i)];
+    if (!std::isfinite(omega)) return fmt::format("body '{}' turns at the start faster than numbers can say", body);
     return fmt::format(
-        "body '{}' turns at {:.3g} rad/s at the start and would make {:.3g} half turns until t = {:.6g} s, each of "
-        "which takes a step at least; simulation.integrator.max_steps is {}. Is the angular velocity in rad/s, and "
-        "the end in s?",
-        data_.body_names[static_cast<std::size_t>(i)], omega, half_turns, t_end, max_steps);
+        "body '{}' turns at {:.3g} rad/s at the start. Each half turn takes a step at least, and until t = {:.6g} s "
+        "there are more of them than simulation.integrator.max_steps, {}. Is the angular velocity in rad/s, and the "
+        "end in s?",
+        body, omega, t_end, max_steps);
   }
   for (Vector3d& turn : bushing_turns_) turn.setZero();
   return about_bushings(t, y);

@@ -149,8 +149,7 @@ TEST_CASE("MBSVT: setDOF, position_, velocity_ and acceleration_kinematics", "[m
   REQUIRE(issues.empty());
   int seen = 0;
   const KinematicsResult result = solve_kinematics(
-      mechanism, Assembly(mechanism, 0), scene.simulation.formulation, {0, 0.3, 1.1},
-      [&](std::size_t, const StatePoint& at) {
+      mechanism, Assembly(mechanism, 0), scene.simulation, {0, 0.3, 1.1}, [&](std::size_t, const StatePoint& at) {
         const SliderMotion expected(0.4 + 3 * at.t, 3);
         CHECK(mechanism.sensor_value(mechanism.sensor("x"), at) == Approx(expected.x).epsilon(1e-12));
         CHECK(mechanism.sensor_value(mechanism.sensor("vx"), at) == Approx(expected.v).epsilon(1e-11).margin(1e-12));

@@ -281,6 +281,15 @@ TEST_CASE("a finding is one line: file, line, column, path, message", "[json]") 
                     "suspension.json:10:31: bodies[0].mass: is -2 kg, a mass must not be negative");
 }
 
+TEST_CASE("a number that is not finite is said once", "[json]") {
+  const std::string text = replaced(
+      kGood, R"("forces": [)",
+      R"("forces": [{"name": "f", "type": "friction", "joint": "A", "coulomb": 1, "smooth_velocity": "-1/0"}, )");
+  const std::vector<Finding> findings = findings_of(text);
+REQUIRE(findings.size() == 1);
+CHECK_THAT(findings[0].message, Catch::Contains("it must be finite"));
+}
+
 TEST_CASE("columns count characters, not bytes", "[json]") {
   const std::string text =
       replaced(kGood, R"("name": "crank", "mass": 1.0)", R"("name": "crank", /* \u00e4\u00f6 äö */ "mass": -2)");

@@ -112,6 +112,28 @@ TEST_CASE("what is not driven is said", "[kinematics]") {
   CHECK_THAT(result.message, Catch::Contains("1 degree of freedom"));
 }
 
+TEST_CASE("a drive too fast for the steps that are allowed fails at once, in words", "[kinematics]") {
+  Scene scene = slider_crank();
+  scene.drives.push_back(angle_drive("A", "1e19*t"));
+  const Mechanism mechanism(scene, VectorXd());
+  const KinematicsResult result = solve_kinematics(mechanism, Assembly(mechanism, 0), {}, times(1, 2),
+                                                   [](std::size_t, const StatePoint&) { return true; });
+  CHECK_FALSE(result.ok);
+  CHECK(result.steps == 0);
+  CHECK_THAT(result.message, Catch::Contains("max_steps"));
+}
+
+TEST_CASE("kinematics stops between two times that are wanted, too", "[kinematics]") {
+  Scene scene = slider_crank();
+  scene.drives.push_back(angle_drive("A", "100*t"));
+  const Mechanism mechanism(scene, VectorXd());
+  const KinematicsResult result = solve_kinematics(
+      mechanism, Assembly(mechanism, 0), {}, times(1, 2), [](std::size_t, const StatePoint&) { return true; },
+      [](double t) { return t < 0.5; });
+  CHECK_FALSE(result.ok);
+  CHECK_THAT(result.message, Catch::Contains("stopped at t = 0.5"));
+}
+
 TEST_CASE("a drive that cannot pass a dead point fails with the time and the joints", "[kinematics]") {
   Scene scene = slider_crank();
   Drive push;
