@@ -58,9 +58,14 @@ bool settle_accuracy(Run& run, const Scene& simulated, const std::vector<Objecti
   const SimulationSettings& given = run.problem.scene.simulation;
   if (!given.accuracy) return true;
   AccuracyOptions options;
-  options.limit.interrupted = [] { return interrupted(); };
+  std::string doing;
   options.progress = [&](int simulations) {
-    run.progress.iteration(fmt::format("choosing an integrator: simulation {}", simulations));
+    doing = fmt::format("choosing an integrator: simulation {}", simulations);
+    run.progress.iteration(doing);
+  };
+  options.limit.interrupted = [&] {  // asked after each step
+    run.progress.stands(doing);
+    return interrupted();
   };
   const AccuracyChoice choice = choose_accuracy(simulated, objectives, options);
   run.progress.finish();

@@ -53,6 +53,16 @@ void Progress::fraction(std::string_view what, double done) {
   line_open_ = true;
 }
 
+void Progress::stands(std::string_view what) {
+  if (quiet_) return;
+  const double now = seconds_();
+  if (now - said_ < (terminal_ ? kAtFirst : patience_)) return;
+  if (!terminal_) return break_silence(what, now);
+  said_ = now;
+  err_ << kClearLine << fmt::format("{}, {:.0f} s", what, now - start_) << std::flush;
+  line_open_ = true;
+}
+
 void Progress::time(std::string_view what, double t) {
   if (quiet_ || terminal_) return;
   if (const double now = seconds_(); now - said_ >= patience_)

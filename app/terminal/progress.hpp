@@ -24,6 +24,7 @@ class Progress {
   static double steady_seconds();
 
   void fraction(std::string_view what, double done);  // done: 0..1
+  void stands(std::string_view what);                 // still at it: the seconds, now and then
   void time(std::string_view what, double t);         // [s]; of runs whose end is not known: no bar
   void iteration(std::string_view line);
   void finish();  // clears the bar

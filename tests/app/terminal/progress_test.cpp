@@ -65,6 +65,18 @@ TEST_CASE("on a terminal, an iteration's line stays for a moment", "[progress]")
   CHECK(err.str().find("50 %") != std::string::npos);
 }
 
+TEST_CASE("what stands for long says since when, with a terminal or without", "[progress]") {
+  std::ostringstream drawn, written;
+  double now = 0;
+  Progress terminal(drawn, true, false, [&] { return now; }), pipe(written, false, false, [&] { return now; });
+  for (Progress* progress : {&terminal, &pipe}) progress->iteration("choosing: 1");
+  for (; now < 6; now += 0.5) {
+    for (Progress* progress : {&terminal, &pipe}) progress->stands("choosing: 1");
+  }
+  CHECK(drawn.str() == "\r\x1b[Kchoosing: 1\r\x1b[Kchoosing: 1, 4 s");
+  CHECK(written.str() == "choosing: 1\nchoosing: 1 after 4 s\n");
+}
+
 TEST_CASE("quiet prints nothing", "[progress]") {
   std::ostringstream err;
   Progress progress(err, true, true);
