@@ -35,6 +35,7 @@ constexpr std::array kCommands{
     Command{"simulate", "forward dynamics", simulate_command},
     Command{"kinematics", "positions, velocities, accelerations of a fully driven mechanism, and driving forces",
             kinematics_command},
+    Command{"linearise", "eigenvalues, modes and A, B, C, D of the motion beside the initial state", linearise_command},
     Command{"gradient", "objectives and their gradients", gradient_command},
     Command{"check", "all gradient methods against each other and against differences", check_command},
     Command{"design", "optimal design", design_command},
@@ -82,6 +83,16 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
   sub.add_option("--set", options.sets, "change a field: parameters.k1.value=120; may be repeated")
       ->type_name("PATH=VALUE")
       ->allow_extra_args(false);
+  if (name == "linearise") {
+    sub.add_option("--at", options.at, "the state that the simulation reaches then, instead of the initial one")
+        ->type_name("TIME");
+    sub.add_option("--inputs", options.inputs, "parameters u of B and D: forces, stiffnesses, masses")
+        ->delimiter(',')
+        ->type_name("NAME,...");
+    sub.add_option("--outputs", options.outputs, "sensors of C and D (default: all)")
+        ->delimiter(',')
+        ->type_name("NAME,...");
+  }
   if (name == "identify") {
     sub.add_option("--profile", options.profiles, "profile likelihood of fitted parameters: k1,run1.theta0")
         ->delimiter(',')

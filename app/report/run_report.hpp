@@ -12,6 +12,10 @@ namespace mbsopt {
 
 std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory);
 
+// state: t and the bodies' part of a row of trajectory.csv; shapes: the same, displaced along each mode.
+std::string linearisation_report(const Scene& scene, const Json& result, const std::vector<double>& state,
+                                 const std::vector<std::vector<double>>& shapes);
+
 // rho: the designed parameters; history: columns and rows of history.csv (iteration, objective, infeasibility, ...).
 std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const Json& result, const Trajectory& history,
                           const Trajectory& before, const Trajectory& after);

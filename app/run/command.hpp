@@ -24,6 +24,9 @@ struct CommandOptions {
   double budget = 60;                 // --budget of tradeoff [s]
   std::string alpha;                  // --alpha of tradeoff: the penalty study
   std::optional<double> apply;        // --apply of tradeoff: the accuracy wanted
+  std::optional<double> at;           // --at of linearise [s]
+  std::vector<std::string> inputs;    // --inputs of linearise: parameters
+  std::vector<std::string> outputs;   // --outputs of linearise: sensors; empty: all
   int threads = 0;                    // --threads, also worker processes; 0: as many as the machine has
   bool quiet = false;                 // --quiet
   bool resume = false;                // go on with the journal in `out`
@@ -43,6 +46,7 @@ struct CommandContext {
 int validate_command(const CommandContext& context);
 int simulate_command(const CommandContext& context);
 int kinematics_command(const CommandContext& context);
+int linearise_command(const CommandContext& context);
 int gradient_command(const CommandContext& context);
 int check_command(const CommandContext& context);
 int design_command(const CommandContext& context);

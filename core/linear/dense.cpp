@@ -2,8 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <Eigen/SVD>
+#include <limits>
 #include <utility>
 
 namespace mbsopt {
@@ -20,6 +22,26 @@ SymmetricEigen symmetric_eigen(const MatrixXd& A) {
 
 Eigen::Vector3d symmetric_eigenvalues(const Eigen::Matrix3d& A) {
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(A, Eigen::EigenvaluesOnly).eigenvalues();
+}
+
+GeneralEigen general_eigen(const MatrixXd& A) {
+  const Eigen::EigenSolver<MatrixXd> eigen(A);
+  GeneralEigen x{eigen.eigenvalues(), eigen.eigenvectors(), VectorXd(A.rows())};
+  x.vectors.colwise().normalize();
+  const Eigen::MatrixXcd left = x.vectors.partialPivLu().inverse();  // whose rows have w'v = 1
+  x.conditions = left.rowwise().norm();
+  return x;
+}
+
+Eigen::VectorXcd left_eigenvector(const MatrixXd& A, std::complex<double> lambda) {
+  // w'A = lambda w' is A'w = conj(lambda) w. The shift keeps the matrix regular; two iterations reach rounding.
+  const std::complex<double> shifted = std::conj(lambda) + A.norm() * std::numeric_limits<double>::epsilon();
+  Eigen::MatrixXcd M = A.transpose();
+  M.diagonal().array() -= shifted;
+  const Eigen::PartialPivLU<Eigen::MatrixXcd> lu(M);
+  Eigen::VectorXcd w = Eigen::VectorXcd::Ones(A.rows());
+  for (int k = 0; k < 3; ++k) w = lu.solve(w).normalized();
+  return w;
 }
 
 VectorXd cholesky_solve(const MatrixXd& A, const VectorXd& b) { return A.llt().solve(b); }

@@ -14,6 +14,18 @@ struct SymmetricEigen {
 SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& A);
 Eigen::Vector3d symmetric_eigenvalues(const Eigen::Matrix3d& A);
 
+// Eigenvalues and eigenvectors of a real square matrix, the latter of unit length as columns, and the condition of each
+// eigenvalue: 1/|w'v| for left and right eigenvectors w, v of unit length (Golub and Van Loan, section 7.2).
+struct GeneralEigen {
+  Eigen::VectorXcd values;
+  Eigen::MatrixXcd vectors;
+  Eigen::VectorXd conditions;
+};
+GeneralEigen general_eigen(const Eigen::MatrixXd& A);
+
+// w with w'A = lambda w' for a simple eigenvalue lambda, by inverse iteration; of unit length.
+Eigen::VectorXcd left_eigenvector(const Eigen::MatrixXd& A, std::complex<double> lambda);
+
 // Solves A x = b of a symmetric positive definite A by Cholesky.
 Eigen::VectorXd cholesky_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
 

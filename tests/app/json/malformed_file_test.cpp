@@ -286,8 +286,8 @@ TEST_CASE("a number that is not finite is said once", "[json]") {
       kGood, R"("forces": [)",
       R"("forces": [{"name": "f", "type": "friction", "joint": "A", "coulomb": 1, "smooth_velocity": "-1/0"}, )");
   const std::vector<Finding> findings = findings_of(text);
-REQUIRE(findings.size() == 1);
-CHECK_THAT(findings[0].message, Catch::Contains("it must be finite"));
+  REQUIRE(findings.size() == 1);
+  CHECK_THAT(findings[0].message, Catch::Contains("it must be finite"));
 }
 
 TEST_CASE("columns count characters, not bytes", "[json]") {

@@ -7,17 +7,17 @@ using namespace mbsopt;
 
 namespace {
 
-Parameter parameter(const std::string& name, double value, std::optional<double> lower, std::optional<double> upper,
-                    ParameterScale scale) {
+Parameter variable(const std::string& name, double value, std::optional<double> lower, std::optional<double> upper,
+                   ParameterScale scale) {
   Parameter p;
   p.name = name, p.value = value, p.lower = lower, p.upper = upper, p.scale = scale;
   return p;
 }
 
 std::vector<Parameter> every_scale() {
-  return {parameter("L", -0.5, {}, {}, ParameterScale::linear), parameter("z", 0, {}, {}, ParameterScale::linear),
-          parameter("a", 1e-9, -1, 1, ParameterScale::linear), parameter("k", 120, 1, 1e4, ParameterScale::log),
-          parameter("c", 3e-4, 1e-6, {}, ParameterScale::log10)};
+  return {variable("L", -0.5, {}, {}, ParameterScale::linear), variable("z", 0, {}, {}, ParameterScale::linear),
+          variable("a", 1e-9, -1, 1, ParameterScale::linear), variable("k", 120, 1, 1e4, ParameterScale::log),
+          variable("c", 3e-4, 1e-6, {}, ParameterScale::log10)};
 }
 
 Eigen::VectorXd values(const std::vector<Parameter>& parameters) {
@@ -48,14 +48,14 @@ TEST_CASE("rho_x is the derivative of to_rho", "[scaling]") {
 }
 
 TEST_CASE("a tiny value between wide bounds does not set the scale", "[scaling]") {
-  const VariableScaling scaling({parameter("a", 1e-9, -1, 1, ParameterScale::linear)});
+  const VariableScaling scaling({variable("a", 1e-9, -1, 1, ParameterScale::linear)});
   CHECK(scaling.x_upper()(0) == Approx(50));
   CHECK(scaling.x_lower()(0) == Approx(-50));
 }
 
 TEST_CASE("bounds go through the scale and are never left", "[scaling]") {
   const VariableScaling scaling(
-      {parameter("k", 120, 1, 1e4, ParameterScale::log), parameter("L", 0.3, {}, 0.7, ParameterScale::linear)});
+      {variable("k", 120, 1, 1e4, ParameterScale::log), variable("L", 0.3, {}, 0.7, ParameterScale::linear)});
   CHECK(scaling.x_lower()(0) == 0);
   CHECK(scaling.x_upper()(0) == Approx(std::log(1e4)));
   CHECK(std::isinf(scaling.x_lower()(1)));
@@ -66,9 +66,9 @@ TEST_CASE("bounds go through the scale and are never left", "[scaling]") {
 
 TEST_CASE("scales and bounds that contradict each other are refused with the parameter's name", "[scaling]") {
   using Catch::Matchers::Contains;
-  CHECK_THROWS_WITH(VariableScaling({parameter("k", -1, {}, {}, ParameterScale::log)}),
+  CHECK_THROWS_WITH(VariableScaling({variable("k", -1, {}, {}, ParameterScale::log)}),
                     Contains("parameters.k") && Contains("above 0"));
-  CHECK_THROWS_WITH(VariableScaling({parameter("k", 1, 0, {}, ParameterScale::log10)}), Contains("lower 0"));
-  CHECK_THROWS_WITH(VariableScaling({parameter("k", 1, 3, 2, ParameterScale::linear)}), Contains("lower is 3, above"));
-  CHECK_THROWS_WITH(VariableScaling({parameter("k", 5, 0, 2, ParameterScale::linear)}), Contains("outside its bounds"));
+  CHECK_THROWS_WITH(VariableScaling({variable("k", 1, 0, {}, ParameterScale::log10)}), Contains("lower 0"));
+  CHECK_THROWS_WITH(VariableScaling({variable("k", 1, 3, 2, ParameterScale::linear)}), Contains("lower is 3, above"));
+  CHECK_THROWS_WITH(VariableScaling({variable("k", 5, 0, 2, ParameterScale::linear)}), Contains("outside its bounds"));
 }

@@ -1,0 +1,228 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "app/report/run_report.hpp"
+#include "app/run/command.hpp"
+#include "app/run/run.hpp"
+#include "app/terminal/interrupt.hpp"
+#include "app/terminal/text_table.hpp"
+#include "core/body/euler_parameters.hpp"
+#include "core/body/state_layout.hpp"
+#include "core/expression/did_you_mean.hpp"
+#include "core/simulate/simulation.hpp"
+#include "core/start/linearisation.hpp"
+
+namespace mbsopt {
+namespace {
+
+constexpr double kWrongDigits = 1e-6;  // of an eigenvalue, from which its error is said
+
+// The places of names in a list, all of them for none.
+template <class Named>
+std::vector<int> places(const char* option, const std::vector<std::string>& names, const std::vector<Named>& list) {
+  std::vector<std::string> known;
+  for (const Named& x : list) known.push_back(x.name);
+  std::vector<int> out;
+  for (const std::string& name : names) {
+    const auto found = std::find(known.begin(), known.end(), name);
+    if (found == known.end())
+      throw std::invalid_argument(fmt::format("{}: there is no '{}'{}", option, name, did_you_mean(name, known)));
+    out.push_back(static_cast<int>(found - known.begin()));
+  }
+  return out;
+}
+
+struct State {
+  double t;
+  Eigen::VectorXd y, angles;
+};
+
+// The state of the simulation at the time; nothing where it fails, which then is how the run ended.
+std::optional<State> state_at(Run& run, const Mechanism& mechanism, double time) {
+  SimulationSettings settings = run.problem.scene.simulation;
+  if (!(time > settings.start_time))
+    throw std::invalid_argument(fmt::format("--at {}: must be after start_time, {} s", time, settings.start_time));
+  settings.end_time = time;
+  State state{};
+  RunOptions options;
+  options.progress = run.watched("simulating");
+  const SimulationResult simulation = simulate(mechanism, settings, {},
+                                               {{time},
+                                                [&](std::size_t, const StatePoint& at) {
+                                                  state = {at.t, at.y, at.angles};
+                                                }},
+                                               options);
+  run.progress.finish();
+  if (simulation.ok()) return state;
+  interrupted() ? run.stopped("nothing was linearised") : run.failed(simulation.message, simulation.last_good_time);
+  return {};
+}
+
+Json rows_of(const Eigen::MatrixXd& A) {
+  Json rows = Json::array();
+  for (Eigen::Index i = 0; i < A.rows(); ++i) {
+    rows.push_back(std::vector<double>(A.row(i).begin(), A.row(i).end()));
+  }
+  return rows;
+}
+
+std::vector<std::string> names_of(const std::vector<int>& places, const auto& list) {
+  std::vector<std::string> names;
+  for (const int k : places) names.push_back(list[static_cast<std::size_t>(k)].name);
+  return names;
+}
+
+// The body that moves most in a mode, and how: "block along z", "block about x" (global axes).
+std::string moves_most(const Scene& scene, const Linearisation& x, const State& state, Eigen::Index mode) {
+  const StateLayout layout{static_cast<int>(scene.bodies.size())};
+  std::string words;
+  double largest = 0;
+  const auto offer = [&](const Eigen::Vector3cd& moves, const std::string& body, const char* how) {
+    Eigen::Index axis = 0;
+    moves.cwiseAbs().maxCoeff(&axis);
+    if (moves.norm() > largest) largest = moves.norm(), words = body + how + "xyz"[axis];
+  };
+  for (std::size_t k = 1; k <= scene.bodies.size(); ++k) {
+    const Eigen::Vector4d p = state.y.segment<4>(layout.p(k));
+    offer(x.modes.col(mode).segment<3>(layout.q(k)), scene.bodies[k - 1].name, " along ");
+    offer(2 * x.length * (A(p) * (G(p) * x.modes.col(mode).segment<4>(layout.p(k)))), scene.bodies[k - 1].name,
+          " about ");
+  }
+  return words;
+}
+
+Json modes_of(const Scene& scene, const Linearisation& x, const State& state) {
+  Json modes = Json::array();
+  for (Eigen::Index k = 0; k < x.eigenvalues.size(); ++k) {
+    const std::complex<double> e = x.eigenvalues(k);
+    if (e.imag() < 0) continue;
+    modes.push_back({{"eigenvalue", {e.real(), e.imag()}},
+                     {"frequency", frequency(e)},
+                     {"damping_ratio", damping_ratio(e)},
+                     {"error", x.errors(k)},
+                     {"moves_most", moves_most(scene, x, state, k)}});
+  }
+  return modes;
+}
+
+Json to_json(const Scene& scene, const Linearisation& x, const State& state, const std::vector<int>& inputs,
+             const std::vector<int>& outputs) {
+  Json eigenvalues = Json::array(), frequencies = Json::array(), damping_ratios = Json::array();
+  for (const std::complex<double>& e : x.eigenvalues) {
+    eigenvalues.push_back({e.real(), e.imag()});
+    frequencies.push_back(frequency(e));
+    damping_ratios.push_back(damping_ratio(e));
+  }
+  return {{"time", state.t},
+          {"degrees_of_freedom", x.A.rows() / 2},
+          {"eigenvalues", eigenvalues},
+          {"frequencies", frequencies},
+          {"damping_ratios", damping_ratios},
+          {"modes", modes_of(scene, x, state)},
+          {"inputs", names_of(inputs, scene.parameters)},
+          {"outputs", names_of(outputs, scene.sensors)},
+          {"A", rows_of(x.A)},
+          {"B", rows_of(x.B)},
+          {"C", rows_of(x.C)},
+          {"D", rows_of(x.D)},
+          {"basis", rows_of(x.basis)}};
+}
+
+void print_modes(std::ostream& out, const Json& modes) {
+  TextTable table({"mode", "eigenvalue [1/s]", "frequency [Hz]", "damping ratio", "moves most"});
+  int mode = 0;
+  for (const Json& m : modes) {
+    const double re = m["eigenvalue"][0], im = m["eigenvalue"][1];
+    const std::string value =
+        im == 0 ? significant(re, 6) : fmt::format("{} +- {} i", significant(re, 6), significant(im, 6));
+    table.add({std::to_string(++mode), value, significant(m["frequency"], 6), significant(m["damping_ratio"], 4),
+               m["moves_most"]});
+  }
+  out << '\n' << table.text();
+}
+
+void warn_of(Run& run, const Linearisation& x, const State& state) {
+  if (!is_equilibrium(x))
+    run.warn(
+        fmt::format("the state at t = {:.6g} s is no equilibrium, bodies {} there: the eigenvalues are those of the "
+                    "motion frozen at this instant. initial.equilibrium starts from an equilibrium",
+                    state.t, x.largest_rate > 0 ? "move" : "accelerate"));
+  for (Eigen::Index k = 0; k < x.eigenvalues.size(); ++k) {
+    const double size = std::abs(x.eigenvalues(k));
+    if (x.eigenvalues(k).imag() < 0 || x.errors(k) <= kWrongDigits * size || size <= x.errors(k)) continue;
+    run.warn(fmt::format("the eigenvalue of size {:.6g} 1/s may be off by {:.2g} 1/s: stiffer modes round it", size,
+                         x.errors(k)));
+  }
+}
+
+// t and the bodies' part of a row of trajectory.csv.
+std::vector<double> row_of(const Mechanism& mechanism, double t, const Eigen::VectorXd& y,
+                           const Eigen::VectorXd& angles) {
+  std::vector<double> row{t};
+  for (int body = 0; body < mechanism.bodies(); ++body) {
+    const auto values = body_row(mechanism, body, {t, y, angles});
+    row.insert(row.end(), values.begin(), values.end());
+  }
+  return row;
+}
+
+// The state displaced along a mode, a sixth of the mechanism's size where that moves most.
+std::vector<double> displaced_row(const Mechanism& mechanism, const State& state, const Linearisation& x,
+                                  Eigen::Index mode) {
+  const StateLayout layout{mechanism.bodies()};
+  Eigen::VectorXcd q = x.modes.col(mode).head(layout.positions());
+  Eigen::Index at = 0;
+  q.cwiseAbs().maxCoeff(&at);
+  q *= std::conj(q(at)) / std::abs(q(at));  // real where it is largest
+  double largest = 0;
+  for (int k = 1; k <= layout.n; ++k) {
+    largest = std::max({largest, q.segment<3>(layout.q(k)).norm(), 2 * x.length * q.segment<4>(layout.p(k)).norm()});
+  }
+  Eigen::VectorXd y = state.y;
+  y.head(layout.positions()) += (x.length / 6 / largest) * q.real();
+  for (int k = 1; k <= layout.n; ++k) y.segment<4>(layout.p(k)).normalize();
+  return row_of(mechanism, state.t, y, state.angles);
+}
+
+}  // namespace
+
+int linearise_command(const CommandContext& context) {
+  Run run(context);
+  const Scene& scene = run.problem.scene;
+  const std::vector<int> inputs = places("--inputs", context.options.inputs, scene.parameters);
+  std::vector<int> outputs = places("--outputs", context.options.outputs, scene.sensors);
+  if (context.options.outputs.empty()) {
+    for (std::size_t k = 0; k < scene.sensors.size(); ++k) outputs.push_back(static_cast<int>(k));
+  }
+  run.start();
+  std::vector<bool> active(scene.parameters.size(), false);
+  for (const int k : inputs) active[static_cast<std::size_t>(k)] = true;
+  const Mechanism mechanism(scene, parameter_values(scene), active);
+  const Assembly assembly(mechanism, scene.simulation.start_time);
+  if (!assembled(run, mechanism, assembly)) return run.finish();
+  std::optional<State> state = State{scene.simulation.start_time, assembly.result().y, assembly.result().angles};
+  if (context.options.at && *context.options.at != state->t) state = state_at(run, mechanism, *context.options.at);
+  if (!state) return run.finish();
+
+  const Linearisation x =
+      linearise(mechanism, scene.simulation.formulation, {state->t, state->y, state->angles}, inputs, outputs);
+  run.result["linearisation"] = to_json(scene, x, *state, inputs, outputs);
+  const Json& modes = run.result["linearisation"]["modes"];
+  context.out << fmt::format("linearised at t = {:.6g} s on {} free coordinate{}\n", state->t, x.A.rows() / 2,
+                             x.A.rows() == 2 ? "" : "s");
+  if (!modes.empty()) print_modes(context.out, modes);
+  warn_of(run, x, *state);
+
+  std::vector<std::vector<double>> shapes;
+  for (Eigen::Index k = 0; k < x.eigenvalues.size(); ++k) {
+    if (x.eigenvalues(k).imag() >= 0) shapes.push_back(displaced_row(mechanism, *state, x, k));
+  }
+  run.write("report.html",
+            linearisation_report(scene, run.result, row_of(mechanism, state->t, state->y, state->angles), shapes));
+  return run.finish();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,34 @@
+#include <fmt/format.h>
+
+#include "app/report/mechanism_drawing.hpp"
+#include "app/report/report_parts.hpp"
+#include "app/report/run_report.hpp"
+
+namespace mbsopt {
+
+std::string linearisation_report(const Scene& scene, const Json& result, const std::vector<double>& state,
+                                 const std::vector<std::vector<double>>& shapes) {
+  constexpr std::size_t kDrawn = 12;  // modes that a reader still tells apart
+  HtmlPage page(report_title(result));
+  add_status(page, result);
+  const Json& modes = result.at("linearisation").at("modes");
+  page.heading("Modes");
+  std::vector<std::vector<std::string>> rows;
+  for (const Json& m : modes) {
+    rows.push_back({std::to_string(rows.size() + 1), cell(m.at("eigenvalue")), cell(m.at("frequency")),
+                    cell(m.at("damping_ratio"), 4), cell(m.at("moves_most"))});
+  }
+  page.table({"mode", "eigenvalue, real and imaginary part [1/s]", "frequency [Hz]", "damping ratio", "moves most"},
+             rows);
+  for (std::size_t k = 0; k < std::min(shapes.size(), kDrawn); ++k) {
+    const std::string title = fmt::format("Mode {}, {} Hz", k + 1, cell(modes[k].at("frequency"), 4));
+    const std::array<int, 2> plane = plane_of_motion(scene, {trajectory_columns(scene), {state, shapes[k]}});
+    page.drawing(mechanism_drawing(title, plane, {{"state", scene, state}, {"displaced", scene, shapes[k]}}));
+  }
+  if (shapes.size() > kDrawn) page.paragraph(fmt::format("The first {} of {} modes are drawn.", kDrawn, shapes.size()));
+  add_model(page, result);
+  add_provenance(page, result);
+  return page.text();
+}
+
+}  // namespace mbsopt
