@@ -62,10 +62,12 @@ std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& s
 std::optional<DesignIssue> curvature_issue(const Problem& problem) {
   if (!problem.design || problem.design->optimizer.hessian != "gauss_newton") return std::nullopt;
   const std::string& name = problem.design->minimize;
-  if (!objectives_of(problem, {name}).front().is_linear()) return std::nullopt;
+  const Objective objective = objectives_of(problem, {name}).front();
+  if (!objective.is_linear() && !objective.is_eigenvalue()) return std::nullopt;
   return DesignIssue{"design.optimizer.hessian",
                      "is 'gauss_newton', but '" + name +
-                         "' is linear in its sensors and parameters, which leaves nothing of its second derivatives; "
+                         "' is linear in its sensors and parameters or an eigenvalue, of whose second derivatives "
+                         "Gauss-Newton leaves nothing; "
                          "it is meant for squares (running, samples, rms_of) and extremes: take 'lbfgs' or 'exact'"};
 }
 

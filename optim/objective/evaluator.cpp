@@ -149,7 +149,12 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
         e.psi_rho(i, k) = result.psi_rho(row, variables_[static_cast<std::size_t>(k)]);
     }
   }
-  add_parameters_only(e, sweep != Sweep::none);
+  try {
+    add_parameters_only(e, sweep != Sweep::none);
+  } catch (const std::runtime_error& error) {  // of an eigenvalue
+    e.ok = false, e.message = error.what();
+    return e;
+  }
   for (Eigen::Index i = 0; i < e.psi.size(); ++i) {
     if (std::isfinite(e.psi(i)) && (sweep == Sweep::none || e.psi_rho.row(i).allFinite())) continue;
     e.ok = false;
@@ -184,11 +189,14 @@ void Evaluator::add_parameters_only(Evaluation& e, bool gradients) const {
   for (Eigen::Index i = 0; i < e.psi.size(); ++i) {
     const Objective& objective = objectives_[static_cast<std::size_t>(i)];
     if (!gradients) {
-      e.psi(i) += objective.parameters_only(e.rho);
+      e.psi(i) += objective.parameters_only(e.rho, options_.user_forces);
       continue;
     }
     gradient.setZero();
-    e.psi(i) += objective.add_parameters_only_gradient(e.rho, gradient);
+    std::vector<std::string> doubts;
+    e.psi(i) += objective.add_parameters_only_gradient(e.rho, gradient, options_.user_forces, &doubts);
+    for (const std::string& doubt : doubts)
+      e.warnings.push_back(fmt::format("objective '{}': {}", objective.name(), doubt));
     for (Eigen::Index k = 0; k < e.psi_rho.cols(); ++k)
       e.psi_rho(i, k) += gradient(variables_[static_cast<std::size_t>(k)]);
   }

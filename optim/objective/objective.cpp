@@ -12,6 +12,15 @@
 namespace mbsopt {
 namespace {
 
+// What f throws, with the objective's name.
+double named(const std::string& objective, const auto& f) {
+  try {
+    return f();
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(fmt::format("objective '{}': {}", objective, error.what()));
+  }
+}
+
 template <class Make>
 auto at_place(const std::string& place, const Make& make) {
   try {
@@ -75,6 +84,7 @@ Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec
       samples_.push_back({sample.time, *std::move(value)});
   }
   std::stable_sort(samples_.begin(), samples_.end(), [](const Sample& a, const Sample& b) { return a.time < b.time; });
+  if (spec.eigenvalue) mode_ = std::make_shared<const FollowedMode>(scene, *spec.eigenvalue);
   if (spec.parameters_only)
     parameters_only_ =
         at_place(place + ".parameters_only", [&] { return Program(*spec.parameters_only, parameter_symbols(scene)); });
@@ -116,13 +126,17 @@ Jet Objective::of_integral(double I, double x0) const {
 
 Jet Objective::integrand(double x) const { return mean_ ? mean_->M(x, exponent()) : Jet{x, 1, 0}; }
 
-double Objective::parameters_only(const Eigen::VectorXd& rho) const {
+double Objective::parameters_only(const Eigen::VectorXd& rho, const FollowedMode::UserForces& forces) const {
+  if (mode_) return named(name_, [&] { return mode_->value(rho, forces); });
   if (!parameters_only_) return 0;
   Program::Scratch scratch = parameters_only_->scratch();
   return parameters_only_->value(view(rho), scratch);
 }
 
-double Objective::add_parameters_only_gradient(const Eigen::VectorXd& rho, Eigen::Ref<Eigen::VectorXd> rho_bar) const {
+double Objective::add_parameters_only_gradient(const Eigen::VectorXd& rho, Eigen::Ref<Eigen::VectorXd> rho_bar,
+                                               const FollowedMode::UserForces& forces,
+                                               std::vector<std::string>* warnings) const {
+  if (mode_) return named(name_, [&] { return mode_->add_gradient(rho, forces, rho_bar, warnings); });
   if (!parameters_only_) return 0;
   Program::Scratch scratch = parameters_only_->scratch();
   const std::span<double> gradient(rho_bar.data(), static_cast<std::size_t>(rho_bar.size()));
@@ -145,7 +159,7 @@ void Objective::add_parameters_only_hessian(const Eigen::VectorXd& rho, const st
 }
 
 bool Objective::is_linear() const {
-  if (mean_) return false;
+  if (mean_ || mode_) return false;
   if ((running_ && !running_->is_linear()) || (terminal_ && !terminal_->is_linear())) return false;
   if (std::any_of(samples_.begin(), samples_.end(), [](const Sample& s) { return !s.value.is_linear(); })) return false;
   if (!parameters_only_) return true;

@@ -20,6 +20,7 @@
 #include "core/mechanism/mechanism.hpp"
 #include "core/run/cost.hpp"
 #include "optim/objective/expression_cost.hpp"
+#include "optim/objective/followed_mode.hpp"
 #include "optim/problem/problem.hpp"
 
 namespace mbsopt {
@@ -49,14 +50,17 @@ class Objective {
   const std::optional<CostExpression>& terminal() const { return terminal_; }
   const std::vector<Sample>& samples() const { return samples_; }
   double exponent() const { return extreme() * sharpness_; }  // k of an extreme
+  bool is_eigenvalue() const { return mode_ != nullptr; }
   bool is_written_in_cpp() const { return user_running_ || user_terminal_; }
   const ObjectiveSpec& spec() const { return spec_; }  // of one that is not
   // A sum of parts whose second derivatives in parameters and sensors are 0.
   bool is_linear() const;
 
-  double parameters_only(const Eigen::VectorXd& rho) const;
-  double add_parameters_only_gradient(const Eigen::VectorXd& rho,
-                                      Eigen::Ref<Eigen::VectorXd> rho_bar) const;  // += d/drho
+  // What depends on the parameters alone, an eigenvalue included (whose errors are std::runtime_error), and += d/drho.
+  double parameters_only(const Eigen::VectorXd& rho, const FollowedMode::UserForces& forces = {}) const;
+  double add_parameters_only_gradient(const Eigen::VectorXd& rho, Eigen::Ref<Eigen::VectorXd> rho_bar,
+                                      const FollowedMode::UserForces& forces = {},
+                                      std::vector<std::string>* warnings = nullptr) const;
   void add_parameters_only_hessian(const Eigen::VectorXd& rho, const std::vector<int>& variables,
                                    Eigen::MatrixXd& H) const;
 
@@ -68,6 +72,7 @@ class Objective {
   std::optional<CostExpression> running_, terminal_;
   std::vector<Sample> samples_;
   std::optional<Program> parameters_only_;
+  std::shared_ptr<const FollowedMode> mode_;
   std::shared_ptr<const RunningCost> user_running_;
   std::shared_ptr<const TerminalCost> user_terminal_;
 };

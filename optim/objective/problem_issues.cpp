@@ -23,6 +23,8 @@ void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
     ++alone;
     extreme = extreme || kMeanKinds[k].extreme != 0;
   }
+  kinds.emplace_back("eigenvalue");
+  if (objective.eigenvalue) ++alone;
   if (!sums && alone == 0)
     checker.issue(checker.path(), "has no part; running, terminal, samples and parameters_only (added), or one of " +
                                       joined(kinds) + " is needed");

@@ -19,14 +19,21 @@ struct ObjectiveSample {
   Expression value;  // of t, sensors and parameters
 };
 
+// Of one mode of the motion beside the initial state, which must be an equilibrium (docs/linearisation.md).
+struct EigenvalueSpec {
+  int mode = 1;                     // from slow to fast, at the values of the file
+  std::string value = "frequency";  // [Hz], or "damping": its ratio
+};
+
 // psi = integral of running + terminal at the end time + sum of samples + parameters_only; or, alone, one of the means
-// of objective_kinds.hpp.
+// of objective_kinds.hpp, or an eigenvalue.
 struct ObjectiveSpec {
   std::string name;
   std::optional<Expression> running, terminal, parameters_only;
   std::vector<ObjectiveSample> samples;
   std::array<std::optional<Expression>, std::size(kMeanKinds)> means;
-  std::optional<double> sharpness;  // of maximum_of, minimum_of [1/unit of the expression]
+  std::optional<EigenvalueSpec> eigenvalue;  // alone
+  std::optional<double> sharpness;           // of maximum_of, minimum_of [1/unit of the expression]
   static constexpr double kSharpness = 100;
 
   // "rms_of"

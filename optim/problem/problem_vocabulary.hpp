@@ -27,6 +27,12 @@ void describe(auto& v, Like<ObjectiveSample> auto& s) {
   v.expression("value", s.value, Names::objective, {"added to the objective", Need::required});
 }
 
+void describe(auto& v, Like<EigenvalueSpec> auto& e) {
+  v.plain("mode", e.mode, kPositive,
+          {"which, from slow to fast at the values of the file, as `mbsopt linearise` counts"});
+  v.word("value", e.value, Words{"frequency damping"}, {"natural frequency [Hz], or damping ratio"});
+}
+
 void describe(auto& v, Like<ObjectiveSpec> auto& o) {
   v.law("running", o.running, Names::objective, {"integrated over time; of sensors, t and parameters"});
   v.law("terminal", o.terminal, Names::objective, {"added, at the end time; of sensors, t and parameters"});
@@ -34,6 +40,7 @@ void describe(auto& v, Like<ObjectiveSpec> auto& o) {
   v.law("parameters_only", o.parameters_only, Names::none, {"added; of parameters only"});
   for (std::size_t k = 0; k < std::size(kMeanKinds); ++k)
     v.law(kMeanKinds[k].name, o.means[k], Names::objective, {kMeanKinds[k].description});
+  v.object("eigenvalue", o.eigenvalue, {"alone: of a mode of the motion beside the initial equilibrium"});
   v.plain("sharpness", o.sharpness, kPositive,
           {"of maximum_of, minimum_of: k in log(mean exp(k x))/k [1/unit of the expression]; 100 when absent"});
 }

@@ -190,7 +190,10 @@ class Search {
     describe(visitor, object);
   }
   void collect(const std::vector<ObjectiveSpec>& objectives) {
-    for (const ObjectiveSpec& objective : objectives) collect(objective);
+    for (const ObjectiveSpec& objective : objectives) {
+      collect(objective);
+      if (objective.eigenvalue) bodies_.look_at_all();
+    }
   }
   void collect(const std::vector<ExperimentSpec>& experiments) {
     for (const ExperimentSpec& experiment : experiments) {

@@ -1,0 +1,195 @@
+#include "optim/objective/followed_mode.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <numbers>
+#include <stdexcept>
+
+#include "core/body/state_layout.hpp"
+#include "core/dynamics/spatial_dynamics.hpp"
+#include "core/linear/dense.hpp"
+#include "core/start/assembly.hpp"
+#include "optim/differences/difference_ladder.hpp"
+#include "optim/problem/parameter_values.hpp"
+
+namespace mbsopt {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXcd;
+using Eigen::VectorXd;
+
+struct FollowedMode::State {
+  Mechanism mechanism;
+  Assembly assembly;
+  FormulationSettings formulation;
+  Linearisation x;
+  double t;
+
+  State(const Scene& scene, const VectorXd& rho, const UserForces& forces, bool derivatives)
+      : mechanism(scene, rho, std::vector<bool>(scene.parameters.size(), derivatives), forces),
+        assembly(mechanism, scene.simulation.start_time),
+        formulation(scene.simulation.formulation),
+        t(scene.simulation.start_time) {
+    if (!assembly.result().ok) throw std::runtime_error(assembly.result().message);
+    x = linearise(mechanism, formulation, {t, y(), angles()}, {}, {});
+    if (!is_equilibrium(x))
+      throw std::runtime_error("the initial state is no equilibrium, so it has no modes: set initial.equilibrium");
+  }
+  const VectorXd& y() const { return assembly.result().y; }
+  const VectorXd& angles() const { return assembly.result().angles; }
+  int bodies() const { return mechanism.bodies(); }
+  // The units of y: lengths by the mechanism's size, rates by the mode's.
+  VectorXd units(double rate) const {
+    const StateLayout layout{bodies()};
+    VectorXd s = VectorXd::Ones(y().size());
+    for (int k = 1; k <= layout.n; ++k) s.segment<3>(layout.q(k)).setConstant(x.length);
+    s.tail(layout.positions()) = rate * s.head(layout.positions());
+    return s;
+  }
+  // The displacements of a mode without units, of unit length.
+  VectorXcd shape(Index mode) const {
+    const Index half = StateLayout{bodies()}.positions();
+    return x.modes.col(mode).head(half).cwiseQuotient(units(1).head(half)).normalized();
+  }
+};
+
+struct FollowedMode::Reference {
+  std::once_flag once;
+  VectorXcd shape;
+};
+
+FollowedMode::FollowedMode(const Scene& scene, const EigenvalueSpec& spec)
+    : scene_(scene), spec_(spec), reference_(std::make_unique<Reference>()) {}
+FollowedMode::~FollowedMode() = default;
+
+std::unique_ptr<FollowedMode::State> FollowedMode::state_at(const VectorXd& rho, const UserForces& forces,
+                                                            bool derivatives) const {
+  return std::make_unique<State>(scene_, rho, forces, derivatives);
+}
+
+Index FollowedMode::mode_of(const State& state, const UserForces& forces) const {
+  std::call_once(reference_->once, [&] {
+    const std::unique_ptr<State> own = state_at(parameter_values(scene_), forces, false);
+    int number = 0;
+    for (Index k = 0; k < own->x.eigenvalues.size(); ++k) {
+      if (own->x.eigenvalues(k).imag() >= 0 && ++number == spec_.mode) reference_->shape = own->shape(k);
+    }
+    if (reference_->shape.size() == 0)
+      throw std::runtime_error(fmt::format("there is no mode {}: the initial state has {}", spec_.mode, number));
+  });
+  Index best = 0;
+  double most = -1;
+  for (Index k = 0; k < state.x.eigenvalues.size(); ++k) {
+    const double alike = std::abs(reference_->shape.dot(state.shape(k)));
+    if (state.x.eigenvalues(k).imag() >= 0 && alike > most) most = alike, best = k;
+  }
+  return best;
+}
+
+double FollowedMode::value_of(std::complex<double> lambda) const {
+  return spec_.value == "frequency" ? frequency(lambda) : damping_ratio(lambda);
+}
+
+double FollowedMode::value(const VectorXd& rho, const UserForces& forces) const {
+  const std::unique_ptr<State> state = state_at(rho, forces, false);
+  return value_of(state->x.eigenvalues(mode_of(*state, forces)));
+}
+
+namespace {
+
+// f_y, column by column.
+MatrixXd state_matrix(SpatialDynamics& dynamics) {
+  const ParameterBlock none = block_without_parameters(dynamics.data());
+  const Index states = 14 * dynamics.data().n;
+  MatrixXd F(states, states);
+  LaneRows y_dir(states, kLanes), ydot_dir(states, kLanes);
+  for (Index first = 0; first < states; first += kLanes) {
+    const Index lanes = std::min<Index>(kLanes, states - first);
+    y_dir.setZero();
+    for (Index k = 0; k < lanes; ++k) y_dir(first + k, k) = 1;
+    dynamics.tangent(none, y_dir, ydot_dir);
+    F.middleCols(first, lanes) = ydot_dir.leftCols(lanes);
+  }
+  return F;
+}
+
+}  // namespace
+
+double FollowedMode::add_gradient(const VectorXd& rho, const UserForces& forces, Eigen::Ref<VectorXd> rho_bar,
+                                  std::vector<std::string>* warnings) const {
+  const std::unique_ptr<State> state = state_at(rho, forces, true);
+  const Index mode = mode_of(*state, forces);
+  const std::complex<double> lambda = state->x.eigenvalues(mode);
+  const double size = std::abs(lambda);
+  if (size <= state->x.errors(mode))
+    throw std::runtime_error("the mode is a free motion, whose eigenvalue 0 has no derivative");
+  for (Index k = 0; warnings && k < state->x.eigenvalues.size(); ++k) {
+    constexpr double kSame = 1e-6;  // relative: closer ones turn into each other within a usual step of a design
+    if (k != mode && std::abs(state->x.eigenvalues(k) - lambda) <= kSame * size)
+      warnings->push_back("another mode has the same eigenvalue: neither has a derivative there");
+  }
+
+  SpatialDynamics dynamics(state->mechanism, state->formulation);
+  const MechanismData& d = dynamics.data();
+  const VectorXd units = state->units(size);
+  VectorXd ydot(units.size());
+  const auto linearise_at = [&](const VectorXd& y) {
+    if (!dynamics.evaluate(state->t, y, state->angles(), ydot)) return false;
+    dynamics.linearise_here();
+    return true;
+  };
+  if (!linearise_at(state->y())) throw std::runtime_error("the accelerations of this state cannot be computed");
+  const MatrixXd F = units.cwiseInverse().asDiagonal() * state_matrix(dynamics) * units.asDiagonal();
+  const VectorXcd v = state->x.modes.col(mode).cwiseQuotient(units).normalized();
+  VectorXcd w = left_eigenvector(F, lambda);
+  w /= std::conj(w.dot(v));  // w'v = 1
+  const VectorXcd w_in_y = w.conjugate().cwiseQuotient(units), v_in_y = v.cwiseProduct(units);
+
+  // Columns: the cotangents Re w, Im w; rows: (y, rho).
+  const Index states = units.size(), P = rho.size();
+  const auto adjoints = [&](const VectorXd& y) -> std::optional<VectorXd> {
+    if (!linearise_at(y)) return std::nullopt;
+    VectorXd out = VectorXd::Zero(2 * (states + P)), theta(d.slots()), of_rho(P);
+    for (const int part : {0, 1}) {
+      const VectorXd cotangent = part == 0 ? VectorXd(w_in_y.real()) : VectorXd(w_in_y.imag());
+      theta.setZero(), of_rho.setZero();
+      dynamics.add_adjoint(cotangent, out.segment(part * (states + P), states), theta, of_rho);
+      d.add_to_rho(theta, of_rho);
+      out.segment(part * (states + P) + states, P) = of_rho;
+    }
+    return out;
+  };
+  // d(w'f_y)/d(y, rho) along u: of Re w and Im w.
+  const auto along = [&](const VectorXd& u) {
+    constexpr double kStep = 0.05;  // of the mechanism's size, or rad: where the highest rung still converges
+    constexpr int kRungs = 5;
+    const double moves = u.cwiseQuotient(units).cwiseAbs().maxCoeff();
+    if (moves == 0) return VectorXd(VectorXd::Zero(2 * (states + P)));
+    const LadderDerivative slope = difference_ladder([&](double h) { return adjoints(state->y() + h * u); },
+                                                     2 * (states + P), {kStep / moves, kRungs});
+    if (!slope.derivative.allFinite()) throw std::runtime_error("the derivative of the mode is not finite");
+    return slope.derivative;
+  };
+  const VectorXd by_re = along(v_in_y.real()), by_im = along(v_in_y.imag());
+  const Index one = states + P;
+  const VectorXd re = by_re.head(one) - by_im.tail(one), im = by_re.tail(one) + by_im.head(one);
+  MatrixXd lambda_rho(P, 2), y_bar(states, 2);
+  lambda_rho << re.tail(P), im.tail(P);
+  y_bar << re.head(states), im.head(states);
+  state->assembly.add_adjoint(y_bar, lambda_rho);
+
+  // d|lambda| = Re(conj(lambda) dlambda)/|lambda|
+  const VectorXd size_rho = (lambda.real() * lambda_rho.col(0) + lambda.imag() * lambda_rho.col(1)) / size;
+  if (spec_.value == "frequency") {
+    rho_bar += size_rho / (2 * std::numbers::pi);
+  } else {
+    rho_bar += -lambda_rho.col(0) / size + (lambda.real() / (size * size)) * size_rho;
+  }
+  return value_of(lambda);
+}
+
+}  // namespace mbsopt
