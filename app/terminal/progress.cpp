@@ -53,10 +53,11 @@ void Progress::fraction(std::string_view what, double done) {
   line_open_ = true;
 }
 
+bool Progress::silent_for_long() const { return !quiet_ && seconds_() - said_ >= (terminal_ ? kAtFirst : patience_); }
+
 void Progress::stands(std::string_view what) {
-  if (quiet_) return;
+  if (!silent_for_long()) return;
   const double now = seconds_();
-  if (now - said_ < (terminal_ ? kAtFirst : patience_)) return;
   if (!terminal_) return break_silence(what, now);
   said_ = now;
   err_ << kClearLine << fmt::format("{}, {:.0f} s", what, now - start_) << std::flush;
@@ -64,9 +65,8 @@ void Progress::stands(std::string_view what) {
 }
 
 void Progress::time(std::string_view what, double t) {
-  if (quiet_ || terminal_) return;
-  if (const double now = seconds_(); now - said_ >= patience_)
-    break_silence(fmt::format("{}: t = {:.3g} s", what, t), now);
+  if (!silent_for_long()) return;
+  stands(fmt::format("{}: t = {:.3g} s", what, t));
 }
 
 void Progress::break_silence(std::string_view words, double now) {

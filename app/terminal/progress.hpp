@@ -25,11 +25,12 @@ class Progress {
 
   void fraction(std::string_view what, double done);  // done: 0..1
   void stands(std::string_view what);                 // still at it: the seconds, now and then
-  void time(std::string_view what, double t);         // [s]; of runs whose end is not known: no bar
+  void time(std::string_view what, double t);         // [s]; the same, of runs whose end is not known
   void iteration(std::string_view line);
   void finish();  // clears the bar
 
  private:
+  bool silent_for_long() const;
   void break_silence(std::string_view words, double now);
 
   std::ostream& err_;

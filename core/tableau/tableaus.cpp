@@ -62,9 +62,10 @@ constexpr Method method(const Tableau<S, T>& rk) {
 }
 
 // The explicit ones first.
-constexpr std::array kMethods{method(kEuler),   method(kRk2),       method(kBs3),    method(kRk4),     method(kDopri5),
-                              method(kVerner6), method(kDopri853),  method(kSdirk2), method(kSdirk3),  method(kSdirk4),
-                              method(kGauss4),  method(kLobatto3c), method(kRadau5), method(kRadau1a), method(kGauss6)};
+constexpr std::array kMethods{method(kEuler),     method(kRk2),    method(kBs3),     method(kRk4),
+                              method(kDopri5),    method(kTsit5),  method(kVerner6), method(kDopri853),
+                              method(kSdirk2),    method(kSdirk3), method(kSdirk4),  method(kGauss4),
+                              method(kLobatto3c), method(kRadau5), method(kRadau1a), method(kGauss6)};
 std::size_t explicit_count() {
   static const auto count = std::ranges::count_if(kMethods, [](const Method& m) { return !m.implicit(); });
   return static_cast<std::size_t>(count);
