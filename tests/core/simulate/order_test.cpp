@@ -124,7 +124,8 @@ TEST_CASE("on a closed loop they do, too, projection included", "[order]") {
   Scene scene = loaded_four_bar();
   scene.simulation.end_time = 0.53;
   for (const Method& rk : measured_methods()) {
-    const int steps = steps_for(rk.order).four_bar;
+    // The term of h^5 is small in tsit5: measured orders are 4.3 to 4.5 from 24 steps, 4.9 to 5.0 from 96.
+    const int steps = rk.name == "tsit5" ? 96 : steps_for(rk.order).four_bar;
     // Between terms of h^9 and rounding there is little room. Measured over 14 to 22 steps: to 0.53 s the state's order
     // rises from 7.80 to 7.84 and falls into rounding, those of TLM and adjoint are 7.95 to 8.04; to 0.55 s the state's
     // is 7.97 to 8.00.
