@@ -180,7 +180,7 @@ void Checker::check_expression(const std::string& where, const Expression& value
   if (names == Names::state) check_sensors_of_state(where, value);
   if (names != Names::objective) check_dimension(where, value, expected);
   if (value.is_number() || names == Names::none) {
-    const std::optional<double> result = facts_.value(value);
+    const std::optional<double> result = facts_.any_value(value);
     if (result && !std::isfinite(*result))
       issue(where,
             "'" + value.text() + "' is " + text_of(*result) + " at the values of the parameters; it must be finite");
@@ -279,7 +279,7 @@ void Checker::expression(std::string_view key, const Expression& value, Names na
   // Names::none here means parameters_only, in which weights without units are as usual as in other objectives.
   if (names == Names::none && !says.dimension) {
     if (!names_are_known(path(key), value, names)) return;
-    const std::optional<double> result = facts_.value(value);
+    const std::optional<double> result = facts_.any_value(value);
     if (result && !std::isfinite(*result))
       issue(path(key),
             "'" + value.text() + "' is " + text_of(*result) + " at the values of the parameters; it must be finite");

@@ -99,7 +99,7 @@ void check_friction(Checker& checker, const FrictionSpec& friction) {
   check("smooth_velocity", friction.smooth_velocity, kRate, kVelocity);
   check("viscous", friction.viscous, kTorsionalDamping, kDamping);
   const std::optional<double> smooth = checker.facts().value(friction.smooth_velocity);
-  if (smooth && std::isfinite(*smooth) && *smooth <= 0)
+  if (smooth && *smooth <= 0)
     checker.issue(checker.path("smooth_velocity"), "is " + text_of(*smooth) + ", it must be greater than 0");
 }
 

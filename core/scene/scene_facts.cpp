@@ -175,6 +175,11 @@ bool SceneFacts::can_be_evaluated(const Expression& expression, const Symbols& s
 }
 
 std::optional<double> SceneFacts::value(const Field& field) const {
+  const std::optional<double> x = any_value(field);
+  return x && std::isfinite(*x) ? x : std::nullopt;
+}
+
+std::optional<double> SceneFacts::any_value(const Field& field) const {
   if (field.is_number()) return field.number();
   if (!can_be_evaluated(field, none_)) return std::nullopt;
   try {

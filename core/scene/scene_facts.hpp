@@ -39,9 +39,10 @@ class SceneFacts {
   // Of those, the ones that are circular or nested too deep: name and what is wrong.
   const std::vector<std::pair<std::string, std::string>>& endless_definitions() const { return endless_; }
 
-  // At the parameters' values; nullopt where it cannot be evaluated. A parameter or definition of NaN has no value that
+  // At the parameters' values, finite; nullopt where it cannot be evaluated. A parameter of NaN has no value that
   // could be read, which is an issue of its own: what depends on it cannot be evaluated either.
   std::optional<double> value(const Field& field) const;
+  std::optional<double> any_value(const Field& field) const;  // infinite ones, too
   std::optional<std::array<double, 3>> value(const VectorField& field) const;
   std::optional<std::array<double, 3>> value(const PointField& field, const std::string& body) const;
 

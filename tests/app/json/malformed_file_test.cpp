@@ -282,10 +282,12 @@ TEST_CASE("a finding is one line: file, line, column, path, message", "[json]") 
 }
 
 TEST_CASE("a number that is not finite is said once", "[json]") {
-  const std::string text = replaced(
-      kGood, R"("forces": [)",
-      R"("forces": [{"name": "f", "type": "friction", "joint": "A", "coulomb": 1, "smooth_velocity": "-1/0"}, )");
-  const std::vector<Finding> findings = findings_of(text);
+  const auto [original, replacement] = GENERATE(table<std::string, std::string>({
+      {R"("forces": [)",
+       R"("forces": [{"name": "f", "type": "friction", "joint": "A", "coulomb": 1, "smooth_velocity": "-1/0"}, )"},
+      {R"("mass": 1.0)", R"("mass": "-1/0")"},
+  }));
+  const std::vector<Finding> findings = findings_of(replaced(kGood, original, replacement));
   REQUIRE(findings.size() == 1);
   CHECK_THAT(findings[0].message, Catch::Contains("it must be finite"));
 }

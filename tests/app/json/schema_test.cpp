@@ -25,7 +25,8 @@ TEST_CASE("the schema knows names, defaults and what is required", "[json]") {
   CHECK(properties.at("joints").at("items").at("oneOf").at(0).at("properties").at("type").at("const") == "revolute");
   CHECK(properties.at("joints").at("items").at("oneOf").at(1).at("properties").contains("axis1") == false);
   CHECK(properties.at("simulation").at("properties").at("integrator").at("properties").at("type").at("enum") ==
-        nlohmann::json::parse(R"(["euler", "rk2", "bs3", "rk4", "dopri5", "verner6", "dopri853", "sdirk2", "sdirk3",
+        nlohmann::json::parse(
+            R"(["euler", "rk2", "bs3", "rk4", "dopri5", "tsit5", "verner6", "dopri853", "sdirk2", "sdirk3",
                                   "sdirk4", "gauss4", "lobatto3c", "radau5", "radau1a", "gauss6", "cvodes_adams",
                                   "cvodes_bdf"])"));
   CHECK(properties.at("drives").at("items").at("oneOf").size() == std::size(mbsopt::kDriveTypes));
