@@ -26,6 +26,7 @@ struct CommandOptions {
   std::optional<double> apply;        // --apply of tradeoff: the accuracy wanted
   int threads = 0;                    // --threads, also worker processes; 0: as many as the machine has
   bool quiet = false;                 // --quiet
+  bool json = false;                  // --json: only result.json on standard output
   bool resume = false;                // go on with the journal in `out`
 };
 
@@ -33,9 +34,10 @@ struct CommandContext {
   std::string command;
   std::vector<std::string> arguments;  // as typed, for the provenance
   CommandOptions options;
-  std::ostream& out;             // results
+  std::ostream& out;             // results as text; with --json they are left out
   std::ostream& err;             // progress and errors
   bool err_is_terminal = false;  // a bar may be drawn
+  std::ostream* json = nullptr;  // with --json: where result.json is printed
   Ranks* ranks = nullptr;        // other processes that compute for this one, under mpirun
   mutable std::shared_ptr<const ProblemSource> source = nullptr;  // once Run has read the problem
 };
