@@ -74,6 +74,7 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
   sub.add_option("--threads", options.threads, "at most so many threads or processes (results do not depend on it)")
       ->check(CLI::Range(1, 1024));
   sub.add_flag("--quiet", options.quiet, "no progress on standard error");
+  sub.add_flag("--json", options.json, "print result.json on standard output, and nothing else there");
   if (name == "resume") {
     sub.add_option("folder", options.problem_file, "output folder of the run, with its journal.jsonl")->required();
     return;
@@ -200,14 +201,22 @@ int run_command_line(const std::vector<std::string>& given, std::ostream& out, s
   app.set_version_flag("--version", "mbsopt " + program_version());
   app.footer("mbsopt help COMMAND, or mbsopt COMMAND --help, lists a command's options.");
   app.failure_message(CLI::FailureMessage::simple);
-  CommandContext context{"", arguments, {}, out, err, err_is_terminal, ranks};
-  add_commands(app, context.options);
+  CommandOptions options;
+  add_commands(app, options);
   try {
     parse(app, arguments);
   } catch (const CLI::ParseError& error) {
     return flushed(app.exit(error, out, err) == 0 ? kDone : kBadInput, out, err);
   }
-  context.command = app.get_subcommands().front()->get_name();
+  std::ostream nowhere(nullptr);
+  const CommandContext context{.command = app.get_subcommands().front()->get_name(),
+                               .arguments = arguments,
+                               .options = options,
+                               .out = options.json ? nowhere : out,
+                               .err = err,
+                               .err_is_terminal = err_is_terminal,
+                               .json = options.json ? &out : nullptr,
+                               .ranks = ranks};
   const auto command =
       std::find_if(kCommands.begin(), kCommands.end(), [&](const Command& c) { return context.command == c.name; });
   return flushed(run_in_words(*command, context), out, err);

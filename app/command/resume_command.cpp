@@ -5,6 +5,7 @@
 
 #include "app/command/command_line.hpp"
 #include "app/files/journal.hpp"
+#include "app/json/source_text.hpp"
 #include "app/run/command.hpp"
 #include "app/terminal/exit_code.hpp"
 
@@ -17,6 +18,7 @@ int resume_command(const CommandContext& context) {
   if (!journal.ended.empty() && journal.ended != "interrupted") {
     context.out << fmt::format("{}: its '{}' came to its end ({}); there is nothing to go on with\n", folder.string(),
                                command, journal.ended);
+    if (context.json) *context.json << read_text_file(folder / "result.json");
     return kDone;
   }
   const auto arguments = journal.header.at("arguments").get<std::vector<std::string>>();
@@ -25,8 +27,14 @@ int resume_command(const CommandContext& context) {
   options.problem_file = (folder / journal.header.at("input").get<std::string>()).lexically_normal().string();
   options.out = folder.string();
   options.resume = true;
-  const CommandContext again{command,      arguments, options, context.out, context.err, context.err_is_terminal,
-                             context.ranks};
+  const CommandContext again{.command = command,
+                             .arguments = arguments,
+                             .options = options,
+                             .out = context.out,
+                             .err = context.err,
+                             .err_is_terminal = context.err_is_terminal,
+                             .json = context.json,
+                             .ranks = context.ranks};
   if (command == "design") return design_command(again);
   if (command == "identify") return identify_command(again);
   throw std::invalid_argument(

@@ -76,6 +76,7 @@ void add_simulation(HtmlPage& page, const Scene& scene, const Json& result) {
               {{"steps", "steps"},
                {"rejected", "rejected steps"},
                {"rhs_evaluations", "right-hand sides"},
+               {"newton_iterations", "Newton iterations"},
                {"adjoint_memory_bytes", "kept for the adjoint [bytes]"},
                {"recomputed_steps", "steps computed again for it"},
                {"max_position_violation", "largest violation, positions", 2},

@@ -14,6 +14,18 @@ std::string text_of(const Json& object) {
   return "{" + text + "}";
 }
 
+Json options_json(const IntegratorOptions& o) {
+  Json json = Json::object();
+  if (o.min_step) json["min_step"] = *o.min_step;
+  if (o.newton_tolerance) json["newton_tolerance"] = *o.newton_tolerance;
+  if (o.newton_iterations) json["newton_iterations"] = *o.newton_iterations;
+  if (o.factor_min) json["factor_min"] = *o.factor_min;
+  if (o.factor_max) json["factor_max"] = *o.factor_max;
+  if (o.safety) json["safety"] = *o.safety;
+  if (!o.controller.empty()) json["controller"] = o.controller;
+  return json;
+}
+
 Json integrator_json(const IntegratorSettings& s) {
   Json json{{"type", s.type}};
   if (s.step) {
@@ -24,6 +36,7 @@ Json integrator_json(const IntegratorSettings& s) {
   if (s.initial_step) json["initial_step"] = *s.initial_step;
   if (s.max_step) json["max_step"] = *s.max_step;
   if (s.max_steps != IntegratorSettings{}.max_steps) json["max_steps"] = s.max_steps;
+  if (const Json options = options_json(s.options); !options.empty()) json["options"] = options;
   return json;
 }
 

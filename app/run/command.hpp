@@ -29,6 +29,7 @@ struct CommandOptions {
   std::vector<std::string> outputs;   // --outputs of linearise: sensors; empty: all
   int threads = 0;                    // --threads, also worker processes; 0: as many as the machine has
   bool quiet = false;                 // --quiet
+  bool json = false;                  // --json: only result.json on standard output
   bool resume = false;                // go on with the journal in `out`
 };
 
@@ -36,9 +37,10 @@ struct CommandContext {
   std::string command;
   std::vector<std::string> arguments;  // as typed, for the provenance
   CommandOptions options;
-  std::ostream& out;             // results
+  std::ostream& out;             // results as text; with --json they are left out
   std::ostream& err;             // progress and errors
   bool err_is_terminal = false;  // a bar may be drawn
+  std::ostream* json = nullptr;  // with --json: where result.json is printed
   Ranks* ranks = nullptr;        // other processes that compute for this one, under mpirun
   mutable std::shared_ptr<const ProblemSource> source = nullptr;  // once Run has read the problem
 };

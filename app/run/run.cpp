@@ -78,7 +78,9 @@ Run::~Run() {
   try {
     progress.finish();
     set(RunStatus::failed);
-    folder.write("result.json", result_json_text(result));
+    const std::string text = result_json_text(result);
+    if (context.json) *context.json << text;
+    folder.write("result.json", text);
   } catch (...) {
     folder.mark_failed();  // the exception under way says more than this one
   }
@@ -136,7 +138,9 @@ int Run::finish() {
   if (status_ == RunStatus::interrupted) context.err << message << '\n';
   if (status_ == RunStatus::failed && !message.empty())
     context.err << fmt::format("{} failed: {}\n", context.command, message);
-  write("result.json", result_json_text(result));
+  const std::string text = result_json_text(result);
+  write("result.json", text);
+  if (context.json) *context.json << text;
   running_ = false;
   context.out << fmt::format("\n{}: {}\n", (folder.path() / "").string(), fmt::join(written_, " "));
   return row_of(status_).exit_code;
@@ -166,10 +170,12 @@ void print_model(std::ostream& out, const std::string& name, const ModelSummary&
 
 void print_simulation(std::ostream& out, const Scene& scene, const SimulationStatistics& statistics) {
   const SimulationSettings& settings = scene.simulation;
-  out << fmt::format("{:g} s to {:g} s with {}: {}, {} rejected, {}, {:.3g} s\n", settings.start_time,
-                     settings.end_time, settings.integrator.type, counted(statistics.steps, "step"),
-                     statistics.rejected, counted(statistics.rhs_evaluations, "right-hand side"),
-                     statistics.wall_seconds);
+  out << fmt::format(
+      "{:g} s to {:g} s with {}: {}, {} rejected, {}{}, {:.3g} s\n", settings.start_time, settings.end_time,
+      settings.integrator.type, counted(statistics.steps, "step"), statistics.rejected,
+      counted(statistics.rhs_evaluations, "right-hand side"),
+      statistics.newton_iterations > 0 ? ", " + counted(statistics.newton_iterations, "Newton iteration") : "",
+      statistics.wall_seconds);
   out << fmt::format(
       "largest violation of the constraints {:.1e} (positions), {:.1e} (velocities); largest change of energy {:.1e} "
       "J{}\n",

@@ -35,6 +35,7 @@ int LinearSolver::solve(N_Vector x, N_Vector b) {
   Eigen::Map<Eigen::VectorXd> out = values(x);
   out = values(b);
   for (Eigen::Index first = 0; first < out.size(); first += states_) {
+    ++solves_;
     if (backward_) {
       matrix_.solve_transposed(out.segment(first, states_));
     } else {

@@ -23,6 +23,7 @@ class LinearSolver {
   bool attach(void* memory);                      // to a forward integration
   bool attach_backward(void* memory, int which);  // to a backward one
   long factorisations() const { return matrix_.factorisations(); }
+  long solves() const { return solves_; }
 
  private:
   struct FreeSolver {
@@ -40,6 +41,7 @@ class LinearSolver {
   std::unique_ptr<std::remove_pointer_t<SUNLinearSolver>, FreeSolver> solver_;
   std::unique_ptr<std::remove_pointer_t<SUNMatrix>, FreeMatrix> handle_;
   bool backward_ = false;
+  long solves_ = 0;
   Eigen::Index states_;
 };
 

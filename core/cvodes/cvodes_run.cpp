@@ -23,6 +23,7 @@ namespace {
 
 // Squares of numbers up to here, divided by tolerances, are still numbers.
 constexpr double kLargestRate = 1e120;
+constexpr long kMostIterations = std::numeric_limits<int>::max();
 
 }  // namespace
 
@@ -89,8 +90,12 @@ void ForwardRun::set_up() {
     require(CVodeSetInitStep(memory(), std::min(*s.initial_step, settings_.end_time - settings_.start_time)));
   }
   if (s.max_step) require(CVodeSetMaxStep(memory(), *s.max_step));
+  if (s.options.min_step) require(CVodeSetMinStep(memory(), *s.options.min_step));
   if (stiff) {
     if (!linear_solver_.attach(memory())) require(CV_ILL_INPUT);
+    if (const auto most = s.options.newton_iterations)
+      require(CVodeSetMaxNonlinIters(memory(), static_cast<int>(std::min(*most, kMostIterations))));
+    if (s.options.newton_tolerance) require(CVodeSetNonlinConvCoef(memory(), *s.options.newton_tolerance));
   } else {
     fixed_point_.reset(SUNNonlinSol_FixedPoint(y_, 0, context_));
     require(CVodeSetNonlinearSolver(memory(), fixed_point_.get()));
@@ -181,6 +186,11 @@ void ForwardRun::stop_for(int flag, double t, const char* of_what) {
     case CV_CONV_FAILURE:
     case CV_TOO_CLOSE:
     case CV_LSETUP_FAIL:
+      if (const auto min_step = settings_.integrator.options.min_step; min_step && h <= *min_step) {
+        stop(SimulationStatus::step_too_small,
+             below_min_step(flag == CV_ERR_FAILURE ? StepOutcome::rejected : StepOutcome::unsolved, t, *min_step));
+        return;
+      }
       stop(SimulationStatus::step_too_small,
            fmt::format("no step beyond t = {:.6g} s is small enough for the tolerances (the last one tried was {:.3g} "
                        "s). Look for {}a singular position, a spring of zero length or a law that is not smooth near "
@@ -239,12 +249,22 @@ void ForwardRun::take_samples(SampleSchedule& schedule, double t, const Hooks& h
   }
 }
 
-long ForwardRun::rejected() const {
-  long state = 0, derivatives = 0, not_converged = 0;
+// Those of the state and of its derivatives.
+void ForwardRun::count_steps() {
+  long state = 0, derivatives = 0, not_converged = 0, iterations = 0, their_iterations = 0;
   CVodeGetNumErrTestFails(memory(), &state);
-  if (sensitivities_) CVodeGetSensNumErrTestFails(memory(), &derivatives);
   CVodeGetNumStepSolveFails(memory(), &not_converged);
-  return state + derivatives + not_converged;
+  CVodeGetNumNonlinSolvIters(memory(), &iterations);
+  if (sensitivities_) {
+    CVodeGetSensNumErrTestFails(memory(), &derivatives);
+    CVodeGetSensNumNonlinSolvIters(memory(), &their_iterations);
+  }
+  SimulationStatistics& s = result_.statistics;
+  s.rejections.error_test = state + derivatives;
+  s.rejections.not_converged = not_converged;
+  s.rejected = s.rejections.error_test + not_converged;
+  if (is_stiff_method(settings_)) s.newton_iterations = iterations + their_iterations;
+  s.linear_solves = flow_.evaluations() + linear_solver_.solves();
 }
 
 void ForwardRun::go(std::span<const double> observed, const RunOptions& options, const Hooks& hooks) {
@@ -266,7 +286,7 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
   }
   Eigen::VectorXd y_before;
   while (result_.ok() && t < end) {
-    result_.statistics.rejected = rejected();
+    count_steps();
     if (result_.statistics.steps + result_.statistics.rejected >= settings_.integrator.max_steps) {
       stop_for(CV_TOO_MUCH_WORK, t, "");
       break;
@@ -308,7 +328,7 @@ void ForwardRun::go(std::span<const double> observed, const RunOptions& options,
       stop(SimulationStatus::stopped, fmt::format("stopped at t = {:.6g} s", t));
     }
   }
-  result_.statistics.rejected = rejected();
+  count_steps();
   result_.statistics.relative_energy_drift = guard.relative_energy_drift();
   result_.y_end = y_now_;
   if (jumps) jumps->add_to(result_.statistics);

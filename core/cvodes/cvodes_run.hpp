@@ -74,7 +74,7 @@ class ForwardRun {
   Energy update_statistics(double t, const Eigen::VectorXd& y);
   void take_samples(SampleSchedule& schedule, double t, const Hooks& hooks);
   void finish_costs();
-  long rejected() const;  // steps that failed a test of error or did not converge
+  void count_steps();  // rejected ones, and the work of their solutions
   static int f(realtype t, N_Vector y, N_Vector ydot, void* self);
   static int g(realtype t, N_Vector y, N_Vector gdot, void* self);
 

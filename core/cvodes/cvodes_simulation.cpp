@@ -13,7 +13,10 @@ bool is_cvodes(std::string_view integrator) { return integrator == "cvodes_adams
 SimulationSettings with_cvodes(SimulationSettings settings) {
   std::string& type = settings.integrator.type;
   const Method* method = runge_kutta_method(type);
-  if (!is_cvodes(type)) type = method && method->implicit() ? "cvodes_bdf" : "cvodes_adams";
+  if (!is_cvodes(type)) {
+    type = method && method->implicit() ? "cvodes_bdf" : "cvodes_adams";
+    settings.integrator.options = {};  // the other method's
+  }
   settings.integrator.step.reset();
   return settings;
 }

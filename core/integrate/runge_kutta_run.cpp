@@ -247,7 +247,7 @@ struct RungeKuttaRun::Course {
   SimulationResult& result;
   const bool adaptive;
   const double end, span;
-  PiController controller;
+  StepController controller;
   StiffnessWatch stiffness;
   EventTimes events;
   double h = 0, longest = 0;              // the step to try; the longest one so far
@@ -278,7 +278,7 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
                 .adaptive = !s.step && !options.frozen && rk_.adaptive,
                 .end = settings_.end_time,
                 .span = settings_.end_time - settings_.start_time,
-                .controller = PiController(rk_.error_order),
+                .controller = StepController(rk_.error_order, s.options),
                 .stiffness = StiffnessWatch(rk_, mechanism_.states()),
                 .events = EventTimes(settings_.events, settings_.start_time, settings_.end_time)};
   if (!begin(y_initial, angles, course)) return;
@@ -352,6 +352,7 @@ void RungeKuttaRun::choose_first_size(Course& course) {
   double& h = course.h;
   h = course.adaptive ? first_step(s, course.span) : s.step.value_or(course.span);
   if (s.max_step) h = std::min(h, *s.max_step);
+  if (course.adaptive) h = std::max(h, s.options.min_step.value_or(0));
   course.longest = h;
   if (!(h > 0)) {
     course.stop(
@@ -413,6 +414,7 @@ bool RungeKuttaRun::misplaced(Course& course) {
   if (again && course.placed_again < kMostTries) {
     ++course.placed_again;
     ++course.result.statistics.rejected;
+    ++course.result.statistics.rejections.placed_again;
     course.h = course.wanted;
     return true;
   }
@@ -431,6 +433,10 @@ void RungeKuttaRun::reject(Outcome outcome, Course& course) {
                 step_failure(outcome, step_.t, h, course.adaptive, settings_.formulation));
     return;
   }
+  ++(outcome == Outcome::rejected          ? count.rejections.error_test
+     : outcome == Outcome::unsolved        ? count.rejections.not_converged
+     : outcome == Outcome::off_constraints ? count.rejections.off_constraints
+                                           : count.rejections.not_finite);
   constexpr long kRejectionsToAsk = 1000;  // for the cause: far more than a motion that is resolved has
   if (++count.rejected % kRejectionsToAsk == 0) {
     const std::string objection = weak_joints_objection(error_of_weak_joints(
@@ -442,7 +448,15 @@ void RungeKuttaRun::reject(Outcome outcome, Course& course) {
       return;
     }
   }
+  const double tried = h;
   h = rounded_step(h * course.controller.after_rejection(outcome == Outcome::rejected ? course.error : INFINITY));
+  const std::optional<double> min_step = settings_.integrator.options.min_step;
+  if (min_step && h < *min_step) {
+    h = *min_step;
+    if (tried > h) return;
+    course.stop(SimulationStatus::step_too_small, tolerances_or(below_min_step(outcome, step_.t, *min_step), course));
+    return;
+  }
   if (h >= 1e-14 * std::max(course.span, std::abs(step_.t))) return;
   course.stop(SimulationStatus::step_too_small,
               tolerances_or(course.longest * kMostSteps < course.span
@@ -484,7 +498,7 @@ void RungeKuttaRun::choose_next_size(Course& course) {
     double proposed = passed ? course.wanted : rounded_step(h * course.controller.after_acceptance(course.error));
     // The factor of an implicit method serves as long as the step stays.
     if (implicit_ && proposed >= h && proposed < ImplicitStages::kKeepStep * h) proposed = h;
-    h = s.max_step ? std::min(proposed, *s.max_step) : proposed;
+    h = std::clamp(proposed, s.options.min_step.value_or(0), s.max_step.value_or(INFINITY));
   } else if (!course.options.frozen) {
     h = s.step.value_or(course.span);
   }
@@ -511,8 +525,8 @@ void RungeKuttaRun::restart(Course& course) {
   const IntegratorSettings& s = settings_.integrator;
   if (course.adaptive) {
     const double left = course.end - step_.t;
-    course.controller = PiController(rk_.error_order);
-    course.h = std::min(first_step(s, left), s.max_step.value_or(left));
+    course.controller = StepController(rk_.error_order, s.options);
+    course.h = std::clamp(first_step(s, left), s.options.min_step.value_or(0), s.max_step.value_or(INFINITY));
     if (passage_) passage_->forget();
   }
   if (implicit_ && dynamics_.evaluate(step_.t, step_.y0, angles_, ydot_)) {
@@ -530,8 +544,11 @@ void RungeKuttaRun::add_statistics(Course& course) {
   s.max_acceleration_residual =
       std::max({dynamics_.worst_residual(), s.weak_joints_error, moved_ > 0 ? projected_ / moved_ : 0.0});
   s.relative_energy_drift = guard_.relative_energy_drift();
+  s.linear_solves += evaluations_;
   if (implicit_) {
     evaluations_ += implicit_->evaluations();
+    s.newton_iterations += implicit_->iterations();
+    s.linear_solves += implicit_->solves();
     s.linearised_states += implicit_->places();
     s.jacobians += implicit_->jacobians();
     s.factorisations += implicit_->factorisations();

@@ -37,6 +37,13 @@ struct Jump {
 struct SimulationStatistics {
   // rhs_evaluations: of the equations of motion, each stage of a Newton iteration included; jacobians: of these.
   long steps = 0, rejected = 0, rhs_evaluations = 0, factorisations = 0, jacobians = 0;
+  // Iterations of Newton's method; solutions of linear systems by these, by the filter of the error, and by explicit
+  // equations of motion (their refinements not counted).
+  long newton_iterations = 0, linear_solves = 0;
+  // The rejected steps by reason: their sum is `rejected`. placed_again: at a singular position (singular_passage.hpp).
+  struct Rejections {
+    long error_test = 0, not_converged = 0, off_constraints = 0, not_finite = 0, placed_again = 0;
+  } rejections;
   // Of the factor of the explicit equations of motion: its blocks (6 x 6, or 3 x 3 in the plane), diagonal ones
   // included; and at how many states derivatives of these equations were evaluated.
   long factor_blocks = 0, linearised_states = 0;

@@ -326,7 +326,64 @@ void check_meaning(Checker& checker, const Condition& condition) {
   check_dimension("rate", condition.rate, row->dimension / dimension::kTime);
 }
 
+void check_meaning(Checker& checker, const IntegratorOptions& o) {
+  const auto below_one = [&](std::string_view key, const std::optional<double>& value) {
+    if (value && *value >= 1) checker.issue(checker.path(key), "is " + text_of(*value) + ", it must be below 1");
+  };
+  below_one("newton_tolerance", o.newton_tolerance);
+  below_one("factor_min", o.factor_min);
+  below_one("safety", o.safety);
+  constexpr double kLeastGrowth = 1.25;  // implicit methods keep a step that would grow by less than 1.2
+  if (o.factor_max && *o.factor_max < kLeastGrowth)
+    checker.issue(checker.path("factor_max"), "is " + text_of(*o.factor_max) +
+                                                  ": steps could hardly grow again; at least " + text_of(kLeastGrowth) +
+                                                  " is allowed");
+}
+
+namespace {
+
+// Options that the method does not have.
+void check_options(Checker& checker, const IntegratorSettings& settings) {
+  const IntegratorOptions& o = settings.options;
+  const std::string path = checker.path("options");
+  const Method* const method = runge_kutta_method(settings.type);
+  const auto refuse = [&](std::string_view key, bool given, const std::string& reason) {
+    if (given) checker.issue(child_path(path, key), "is given, but " + reason + "; leave it out");
+  };
+  const auto refuse_step_control = [&](const std::string& reason) {
+    refuse("factor_min", o.factor_min.has_value(), reason);
+    refuse("factor_max", o.factor_max.has_value(), reason);
+    refuse("safety", o.safety.has_value(), reason);
+    refuse("controller", !o.controller.empty(), reason);
+  };
+  const auto refuse_newton = [&](const std::string& reason) {
+    refuse("newton_tolerance", o.newton_tolerance.has_value(), reason);
+    refuse("newton_iterations", o.newton_iterations.has_value(), reason);
+  };
+  if (settings.step) {
+    const std::string fixed = "the step is fixed (step)";
+    refuse("min_step", o.min_step.has_value(), fixed);
+    refuse_step_control(fixed);
+    refuse_newton(fixed + ", and implicit stages are then solved to rounding");
+    return;
+  }
+  if (has_word(kMultistepMethods, settings.type)) {
+    refuse_step_control(settings.type + " chooses steps by rules of its own");
+    if (settings.type == "cvodes_adams") refuse_newton("cvodes_adams does not use Newton's method");
+  } else if (method && !method->implicit()) {
+    refuse_newton(settings.type + " is explicit and does not use Newton's method");
+  }
+  for (const auto& [key, step] : {std::pair{"initial_step", settings.initial_step}, {"max_step", settings.max_step}}) {
+    if (o.min_step && step && *o.min_step > *step)
+      checker.issue(child_path(path, "min_step"),
+                    "is " + text_of(*o.min_step) + " s, above " + key + ", " + text_of(*step) + " s");
+  }
+}
+
+}  // namespace
+
 void check_meaning(Checker& checker, const IntegratorSettings& settings) {
+  check_options(checker, settings);
   const Method* const method = runge_kutta_method(settings.type);
   if (method && !method->adaptive && !settings.step)
     checker.issue(checker.path("step"),

@@ -33,12 +33,25 @@ struct FormulationSettings {
   }
 };
 
+// What an expert may change of step-size control and of Newton's method. An absent value is the method's own; one that
+// the method has no use for is refused (docs/integrators.md).
+struct IntegratorOptions {
+  std::optional<double> min_step;          // [s], > 0; a rejected step that would fall below it ends the run
+  std::optional<double> newton_tolerance;  // part of the tolerance, in (0, 1); else sqrt(rtol), at most 0.01
+  std::optional<long> newton_iterations;   // at most, per solution of the stages to the tolerance; > 0; else 10
+  std::optional<double> factor_min;        // h_new / h is at least this, in (0, 1); else 0.2
+  std::optional<double> factor_max;        // and at most this, at least 1.25; else 6
+  std::optional<double> safety;            // factor of the step that the error allows, in (0, 1); else 0.9
+  std::string controller;                  // I, PI, PID (step_control.hpp); empty: PI
+};
+
 struct IntegratorSettings {
   std::string type = "dopri5";  // a name of tableaus.hpp
   double rtol = 1e-6, atol = 1e-8;
   std::optional<double> initial_step, max_step;
   std::optional<double> step;  // fixed step
   long max_steps = 10'000'000;
+  IntegratorOptions options;
 };
 
 struct SimulationSettings {

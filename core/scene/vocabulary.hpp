@@ -340,6 +340,22 @@ void describe(auto& v, Like<FormulationSettings> auto& f) {
   }
 }
 
+void describe(auto& v, Like<IntegratorOptions> auto& o) {
+  v.plain("min_step", o.min_step, kPositive, {"a step that would fall below it ends the run [s]"});
+  v.plain("newton_tolerance", o.newton_tolerance, kPositive,
+          {"implicit methods: error of the stages as a part of the tolerance, below 1; when absent sqrt(rtol), at most "
+           "0.01; cvodes_bdf: 0.1"});
+  v.plain("newton_iterations", o.newton_iterations, kPositive,
+          {"implicit methods: iterations at most; when absent 10, of cvodes_bdf 3"});
+  v.plain("factor_min", o.factor_min, kPositive,
+          {"the next step is at least this part of the last one, below 1; when absent 0.2"});
+  v.plain("factor_max", o.factor_max, kPositive,
+          {"the next step is at most this multiple of the last one, at least 1.25; when absent 6"});
+  v.plain("safety", o.safety, kPositive, {"part of the step that the error allows, below 1; when absent 0.9"});
+  v.word("controller", o.controller, Words{"I PI PID"},
+         {"of the step: from the last error, the last two, the last three; when absent PI"});
+}
+
 void describe(auto& v, Like<IntegratorSettings> auto& i) {
   v.word("type", i.type, Words{integrator_names()}, {"integration method"});
   v.plain("rtol", i.rtol, kPositive, {"relative tolerance of a step"});
@@ -348,6 +364,7 @@ void describe(auto& v, Like<IntegratorSettings> auto& i) {
   v.plain("max_step", i.max_step, kPositive, {"[s]"});
   v.plain("step", i.step, kPositive, {"fixed step [s]"});
   v.plain("max_steps", i.max_steps, kPositive, {"a run that needs more fails"});
+  v.object("options", i.options, {"step-size control and Newton's method"});
 }
 
 void describe(auto& v, Like<SimulationSettings> auto& s) {
@@ -361,7 +378,7 @@ void describe(auto& v, Like<SimulationSettings> auto& s) {
           {"wanted relative error of the objectives (of the motion where there is none), from which integrator and "
            "tolerances are chosen: draft 1e-3, engineering 1e-5, reference 1e-9, or a number"});
   v.object("integrator", s.integrator, {"time integration"});
-  v.instead_of("accuracy", "integrator", Words{"type rtol atol step"});
+  v.instead_of("accuracy", "integrator", Words{"type rtol atol step options"});
   v.numbers("events", s.events, kAny,
             {"times at which a law may jump or have a kink: a step ends there [s]", Need::optional, dimension::kTime});
   v.plain("adjoint_memory_mib", s.adjoint_memory_mib, kPositive,

@@ -8,12 +8,12 @@
 namespace mbsopt {
 namespace {
 
-constexpr int kMostNewtonIterations = 10;  // at a tolerance
-constexpr int kMostExactIterations = 60;   // to rounding, with a new Jacobian wherever convergence is slow
-constexpr double kSlow = 0.1;              // contraction per iteration from which a new Jacobian pays
-constexpr double kRounding = 1e-11;        // relative; iterations that stop falling below it are at rounding
-constexpr int kMostOwnJacobians = 4;       // of each stage, in one step
-constexpr int kOwnSteps = 20;              // steps for which they are used once the Jacobian of the start did not serve
+constexpr long kMostNewtonIterations = 10;  // at a tolerance
+constexpr long kMostExactIterations = 60;   // to rounding, with a new Jacobian wherever convergence is slow
+constexpr double kSlow = 0.1;               // contraction per iteration from which a new Jacobian pays
+constexpr double kRounding = 1e-11;         // relative; iterations that stop falling below it are at rounding
+constexpr int kMostOwnJacobians = 4;        // of each stage, in one step
+constexpr int kOwnSteps = 20;  // steps for which they are used once the Jacobian of the start did not serve
 
 }  // namespace
 
@@ -227,13 +227,15 @@ bool ImplicitStages::iterate(Step& step, const StageGroup& g, Matrix& m, Goal go
     return false;
   }
   const double tolerance =
-      std::max(std::min(1e-2, std::sqrt(settings_.rtol)), 10 * std::numeric_limits<double>::epsilon() / settings_.rtol);
-  const int most = exact ? kMostExactIterations : kMostNewtonIterations;
+      std::max(settings_.options.newton_tolerance.value_or(std::min(1e-2, std::sqrt(settings_.rtol))),
+               10 * std::numeric_limits<double>::epsilon() / settings_.rtol);
+  const long most = exact ? kMostExactIterations : settings_.options.newton_iterations.value_or(kMostNewtonIterations);
   double before = INFINITY;
   int own_left = kMostOwnJacobians;
-  for (int k = 0, since = 0; k < most; ++k, ++since) {
+  for (long k = 0, since = 0; k < most; ++k, ++since) {
     if (!evaluate_residuals(step, g)) return false;
     m.matrix.solve(r_.topRows(g.size() * rows), 0);
+    ++iterations_;
     const double now = add_change(step, g, m, exact);
     if (!std::isfinite(now)) return false;
     bool converges = true;
@@ -245,7 +247,7 @@ bool ImplicitStages::iterate(Step& step, const StageGroup& g, Matrix& m, Goal go
       } else {
         converges = rate_ < 1;
         if (converges && rate_ / (1 - rate_) * now <= tolerance) return true;
-        if (converges) converges = std::pow(rate_, most - 1 - k) / (1 - rate_) * now <= tolerance;
+        if (converges) converges = std::pow(rate_, static_cast<double>(most - 1 - k)) / (1 - rate_) * now <= tolerance;
       }
     }
     if (now <= (exact ? 1e-15 : 1e-10)) return true;
@@ -287,6 +289,7 @@ bool ImplicitStages::filter(const Step& step, Eigen::VectorXd& error) {
     filter_jacobian_ = jacobians_;
   }
   filter_->solve(error);
+  ++filters_;
   return true;
 }
 

@@ -50,7 +50,9 @@ class ImplicitStages {
   static constexpr double kKeepStep = 1.2;
 
   long evaluations() const { return evaluations_; }
-  long places() const { return equations_.places(); }  // of stages where something was evaluated
+  long iterations() const { return iterations_; }         // of Newton's method
+  long solves() const { return iterations_ + filters_; }  // of linear systems
+  long places() const { return equations_.places(); }     // of stages where something was evaluated
   long jacobians() const { return jacobians_ + own_jacobians_; }
   long factorisations() const;
 
@@ -101,7 +103,7 @@ class ImplicitStages {
   bool renew_ = true;
   long age_ = 0;       // steps since the Jacobian was taken
   int own_steps_ = 0;  // for which each stage still gets a Jacobian of its own
-  long evaluations_ = 0, jacobians_ = 0, own_jacobians_ = 0;
+  long evaluations_ = 0, jacobians_ = 0, own_jacobians_ = 0, iterations_ = 0, filters_ = 0;
 };
 
 }  // namespace mbsopt

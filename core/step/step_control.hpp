@@ -1,4 +1,4 @@
-// Step-size control: error norm, PI controller, first step.
+// Step-size control: error norm, controllers.
 //   Hairer, Norsett, Wanner, "Solving Ordinary Differential Equations I" (1993), section II.4; PI control: Gustafsson
 //   (1991), Hairer, Wanner, "Solving Ordinary Differential Equations II", section IV.2.
 #pragma once
@@ -6,6 +6,8 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+
+#include "core/scene/settings.hpp"
 
 namespace mbsopt {
 
@@ -18,20 +20,37 @@ inline double rounded_step(double h, double parts = 100) {
   return std::exp(std::floor(parts * std::log(h) + kOnIt) / parts);
 }
 
-// h -> h * factor with factor = 0.9 err^-(1/k - 0.75 beta) err_old^beta, k the power of h in the estimate (p for an
-// estimate of order p - 1), beta = 0.2/k; at most 6, which is taken where the error would stay below a half with it:
-// estimates so small are mostly rounding, by methods of high order.
-class PiController {
+// h -> h * factor with factor = safety err^-a err_old^b err_older^-c, at least factor_min, at most factor_max; k the
+// power of h in the estimate (p for an estimate of order p - 1).
+//   PI:  a = (1 - 0.15)/k, b = 0.2/k
+//   I:   a = 1/k
+//   PID: a = 0.58/k, b = 0.21/k, c = 0.1/k: Kennedy, Carpenter, Applied Numerical Mathematics 44 (2003)
+// factor_max is taken where the error would stay below a half with it: estimates so small are mostly rounding, by
+// methods of high order.
+class StepController {
  public:
-  explicit PiController(int error_order)
-      : beta_(0.2 / error_order),
-        exponent_(1.0 / error_order - 0.75 * beta_),
-        small_(0.5 * std::pow(6, -error_order)) {}
+  StepController(int error_order, const IntegratorOptions& options)
+      : least_(options.factor_min.value_or(0.2)),
+        most_(options.factor_max.value_or(6)),
+        safety_(options.safety.value_or(0.9)),
+        small_(0.5 * std::pow(most_, -error_order)) {
+    const double k = error_order;
+    if (options.controller == "I") {
+      a_ = 1 / k;
+    } else if (options.controller == "PID") {
+      a_ = 0.58 / k, b_ = 0.21 / k, c_ = 0.1 / k;
+    } else {
+      b_ = 0.2 / k;
+      a_ = 1 / k - 0.75 * b_;
+    }
+  }
 
   double after_acceptance(double error) {
-    double factor = error < small_ ? 6 : 0.9 * std::pow(error, -exponent_) * std::pow(previous_, beta_);
-    factor = std::clamp(factor, 0.2, last_rejected_ ? 1.0 : 6.0);
-    previous_ = std::max(error, 1e-4);
+    double factor =
+        error < small_ ? most_ : safety_ * std::pow(error, -a_) * std::pow(previous_, b_) * std::pow(older_, -c_);
+    factor = std::clamp(factor, least_, last_rejected_ ? 1.0 : most_);
+    older_ = previous_;
+    previous_ = std::max(error, kLeastError);
     last_rejected_ = false;
     return factor;
   }
@@ -39,12 +58,14 @@ class PiController {
   void after_passage() { last_rejected_ = false; }
   double after_rejection(double error) {
     last_rejected_ = true;
-    return std::isfinite(error) ? std::max(0.2, 0.9 * std::pow(error, -exponent_)) : 0.2;
+    return std::isfinite(error) ? std::max(least_, safety_ * std::pow(error, -a_)) : least_;
   }
 
  private:
-  double beta_, exponent_, small_;
-  double previous_ = 1e-4;
+  static constexpr double kLeastError = 1e-4;
+  double least_, most_, safety_, small_;
+  double a_ = 0, b_ = 0, c_ = 0;
+  double previous_ = kLeastError, older_ = kLeastError;
   bool last_rejected_ = false;
 };
 

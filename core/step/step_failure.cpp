@@ -22,6 +22,17 @@ std::string too_long_run(double span, double longest) {
       span, longest);
 }
 
+std::string below_min_step(StepOutcome outcome, double t, double min_step) {
+  const char* const reason = outcome == StepOutcome::rejected          ? "its error is too large"
+                             : outcome == StepOutcome::unsolved        ? "Newton's method did not converge"
+                             : outcome == StepOutcome::off_constraints ? "no position and velocity meet the constraints"
+                                                                       : "the accelerations cannot be computed";
+  return fmt::format(
+      "at t = {:.6g} s the step would fall below simulation.integrator.options.min_step, {:.3g} s: {}. Make min_step "
+      "smaller or leave it out, or loosen rtol and atol",
+      t, min_step, reason);
+}
+
 std::string too_few_digits(const IntegratorSettings& settings, double t) {
   return fmt::format("rtol {:.3g} and atol {:.3g} ask for more digits at t = {:.6g} s than numbers have: loosen them",
                      settings.rtol, settings.atol, t);

@@ -15,6 +15,8 @@ enum class StepOutcome { accepted, rejected, unsolved, failed, off_constraints }
 // Of the step from t by h; adaptive: the last of smaller and smaller ones.
 std::string step_failure(StepOutcome outcome, double t, double h, bool adaptive,
                          const FormulationSettings& formulation);
+// A step of simulation.integrator.options.min_step is still too long.
+std::string below_min_step(StepOutcome outcome, double t, double min_step);
 // longest: of the steps so far.
 std::string too_long_run(double span, double longest);
 // Tolerances below the rounding errors of numbers.

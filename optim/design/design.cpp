@@ -179,6 +179,7 @@ NlpResult solved(DesignProgram& program, const Eigen::VectorXd& x_start, const O
     solver.constraint_tolerance = kConstraintTolerance;
     solver.max_iterations = static_cast<int>(spec.max_iterations.value_or(OptimizerSpec::kIpoptIterations));
     solver.max_evaluations = spec.max_evaluations;
+    if (spec.lbfgs_history) solver.history = static_cast<int>(*spec.lbfgs_history);
     solver.second_order = spec.hessian != "lbfgs";
     solver.gauss_newton = spec.hessian == "gauss_newton";
     solver.progress = progress;
@@ -196,6 +197,7 @@ NlpResult solved(DesignProgram& program, const Eigen::VectorXd& x_start, const O
   solver.constraint_tolerance = kConstraintTolerance;
   solver.max_evaluations = spec.max_evaluations;
   solver.max_iterations = spec.max_iterations;
+  if (spec.lbfgs_history) solver.history = static_cast<unsigned>(*spec.lbfgs_history);
   if (find_nlopt_method(spec.type)->random) {
     result.seed = spec.seed.value_or(drawn_seed());
     solver.seed = static_cast<std::uint32_t>(*result.seed);

@@ -31,6 +31,17 @@ std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& s
     issues.push_back({path + ".hessian", "is '" + optimizer.hessian +
                                              "', which needs a run on given steps; simulation.integrator.type is '" +
                                              scene.simulation.integrator.type + "', which cannot take them: 'lbfgs'"});
+  if (optimizer.lbfgs_history) {
+    constexpr long kMostPairs = 1000;  // a run of a design takes fewer iterations
+    const std::string history = path + ".lbfgs_history";
+    if (method && !keeps_pairs(*method))
+      issues.push_back({history, "is given, but '" + optimizer.type + "' keeps no pairs; ipopt, lbfgs and mlsl do"});
+    if (!method && optimizer.hessian != "lbfgs")
+      issues.push_back({history, "is given, but hessian is '" + optimizer.hessian + "', which keeps no pairs"});
+    if (*optimizer.lbfgs_history > kMostPairs)
+      issues.push_back({history, "is " + std::to_string(*optimizer.lbfgs_history) + ", at most " +
+                                     std::to_string(kMostPairs) + " is allowed"});
+  }
   if (method && optimizer.warm_start)
     issues.push_back({path + ".warm_start", "is of ipopt only, whose barrier leads away from the start; '" +
                                                 optimizer.type + "' has none and begins at the given values"});

@@ -55,6 +55,7 @@ struct OptimizerSpec {
   std::string hessian = "lbfgs";        // of ipopt; or "exact", "gauss_newton"
   std::optional<long> seed;             // of methods that are random; drawn when absent
   bool warm_start = false;              // of ipopt: the given values are near the solution
+  std::optional<long> lbfgs_history;    // pairs kept, 1 to 1000; of ipopt (20 when absent), lbfgs and mlsl
   static constexpr int kIpoptIterations = 100;
 };
 

@@ -60,6 +60,10 @@ void describe(auto& v, Like<OptimizerSpec> auto& o) {
           {"at most; NLopt: 500, without gradients 500 (n + 1), global 1000 (n + 1) when absent, of n variables"});
   v.word("hessian", o.hessian, Words{"lbfgs exact gauss_newton"},
          {"of ipopt: limited-memory BFGS, second derivatives, or these without those of the motion"});
+  v.plain(
+      "lbfgs_history", o.lbfgs_history, kPositive,
+      {"of ipopt, lbfgs and mlsl: pairs of steps and gradients kept by limited-memory BFGS, at most 1000; when absent "
+       "ipopt 20, else chosen by NLopt"});
   v.plain("seed", o.seed, kNotNegative, {"of methods that are random; drawn when absent"});
   v.plain("warm_start", o.warm_start, kAny,
           {"of ipopt: true where the given values are near the solution, as in an earlier run's optimized.json"});

@@ -56,6 +56,10 @@ std::string_view nlopt_methods_by_kind() {
   return kinds;
 }
 
+bool keeps_pairs(const NloptMethod& method) {
+  return method.algorithm == NLOPT_LD_LBFGS || method.algorithm == NLOPT_G_MLSL;  // mlsl: its local searches
+}
+
 long default_max_evaluations(const NloptMethod& method, Eigen::Index variables) {
   if (method.global) return 1000 * (variables + 1);
   return method.gradients ? 500 : 500 * (variables + 1);

@@ -23,6 +23,9 @@ const NloptMethod* find_nlopt_method(std::string_view name);  // nullptr: no suc
 std::string_view nlopt_method_names();                        // "slsqp mma ..."
 std::string_view nlopt_methods_by_kind();                     // "local methods with gradients (slsqp, ...) and ..."
 
+// Whether limited-memory BFGS is part of it.
+bool keeps_pairs(const NloptMethod& method);
+
 // Where none is given: 500 for local methods with gradients, 500 (n + 1) for those without, 1000 (n + 1) for global
 // ones.
 long default_max_evaluations(const NloptMethod& method, Eigen::Index variables);

@@ -74,9 +74,11 @@ class Adapter {
     const Optimizer outer(nlopt_create(augmented ? NLOPT_AUGLAG : algorithm_, n), nlopt_destroy);
     opt_ = outer.get();
     limit(opt_, x_start);
+    nlopt_set_vector_storage(opt_, options_.history);
     if (augmented || algorithm_ == NLOPT_G_MLSL) {
       const Optimizer inner(nlopt_create(augmented ? algorithm_ : NLOPT_LD_LBFGS, n), nlopt_destroy);
       limit(inner.get(), x_start);
+      nlopt_set_vector_storage(inner.get(), options_.history);
       if (algorithm_ == NLOPT_G_MLSL) {  // whose search ends when a local one cannot get anywhere
         nlopt_set_xtol_abs(inner.get(), VectorXd(options_.tolerance * x_start.cwiseAbs().cwiseMax(1)).data());
         nlopt_set_ftol_abs(inner.get(), 1e-3 * options_.tolerance);

@@ -24,6 +24,7 @@ struct NloptOptions {
   double constraint_tolerance = 1e-8;  // largest violation of a constraint that counts as feasible, unscaled
   std::optional<long> max_evaluations;
   std::optional<long> max_iterations;                // points that were better than all before
+  unsigned history = 0;                              // pairs of lbfgs and mlsl; 0: NLopt chooses
   std::uint32_t seed = 0;                            // of methods that are random
   std::function<bool(const NlpProgress&)> progress;  // after every iteration; false stops
   PointRecords* records = nullptr;

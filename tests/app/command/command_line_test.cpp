@@ -126,3 +126,22 @@ TEST_CASE("a result that cannot be written is no bad input, and result.json says
   CHECK_THAT(outcome.err, Contains("trajectory.csv: cannot be put into place"));
   CHECK(json_of(out + "/result.json").at("status") == "failed");
 }
+
+TEST_CASE("--json prints result.json and nothing else on standard output", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kPendulum);
+  for (const std::string command : {"validate", "simulate", "gradient", "design"}) {
+    const CommandOutcome outcome = run_command({command, file, "--json", "--out", folder.file(command)});
+    INFO(command << ": " << outcome.err);
+    CHECK(outcome.exit_code == kDone);
+    CHECK(outcome.out == content_of(folder.path / command / "result.json"));
+    CHECK(nlohmann::json::parse(outcome.out).at("status") == "ok");
+  }
+  const CommandOutcome failed = run_command(
+      {"simulate", file, "--json", "--out", folder.file("failed"), "--set", "simulation.integrator.max_steps=3"});
+  CHECK(failed.exit_code == kNumericalFailure);
+  CHECK(nlohmann::json::parse(failed.out).at("status") == "failed");
+  const CommandOutcome bad = run_command({"simulate", file, "--json", "--set", "bodies[0].mass=-1"});
+  CHECK(bad.exit_code == kBadInput);
+  CHECK(bad.out.empty());
+}

@@ -235,3 +235,50 @@ TEST_CASE("what deserves a word but is no error is a warning", "[json]") {
   CHECK_THAT(warnings[0], Catch::StartsWith("p.json:") &&
                               Catch::Contains(": forces[1].law: replaces the coefficients of this force: stiffness,"));
 }
+
+TEST_CASE("an option of the integrator that the method does not use is refused at its path", "[json]") {
+  const std::string options = "simulation.integrator.options.";
+  const auto refused = [&](const std::string& type, const std::string& key, const std::string& value) {
+    const std::string error = error_of({"simulation.integrator.type=" + type, options + key + "=" + value});
+    INFO(type << " " << key << ": " << error);
+    return error.find(options + key + ": ") != std::string::npos;
+  };
+  for (const char* key : {"newton_tolerance", "newton_iterations"}) {
+    const std::string value = std::string(key) == "newton_iterations" ? "4" : "0.1";
+    CHECK(refused("dopri5", key, value));
+    CHECK(refused("cvodes_adams", key, value));
+    CHECK_FALSE(refused("cvodes_bdf", key, value));
+    CHECK_FALSE(refused("radau5", key, value));
+  }
+  for (const auto& [key, value] :
+       {std::pair{"factor_min", "0.3"}, {"factor_max", "4"}, {"safety", "0.8"}, {"controller", "I"}}) {
+    CHECK(refused("cvodes_bdf", key, value));
+    CHECK_FALSE(refused("dopri5", key, value));
+    CHECK_FALSE(refused("radau5", key, value));
+  }
+  CHECK_FALSE(refused("cvodes_adams", "min_step", "1e-9"));
+  const std::string fixed = error_of({"simulation.integrator.step=0.01", options + "min_step=1e-9",
+                                      options + "safety=0.8", options + "controller=PI"});
+  for (const char* key : {"min_step", "safety", "controller"})
+    CHECK(fixed.find(options + key + ": is given, but the step is fixed") != std::string::npos);
+}
+
+TEST_CASE("options of the integrator have ranges", "[json]") {
+  const std::string options = "simulation.integrator.options.";
+  for (const auto& [key, value] : {std::pair{"factor_min", "1"},
+                                   {"factor_min", "0"},
+                                   {"factor_max", "1"},
+                                   {"safety", "1"},
+                                   {"safety", "-1"},
+                                   {"min_step", "0"},
+                                   {"newton_tolerance", "1"},
+                                   {"newton_iterations", "0"},
+                                   {"newton_iterations", "2.5"},
+                                   {"controller", "PD"}}) {
+    const std::string error = error_of({"simulation.integrator.type=radau5", options + key + "=" + value});
+    INFO(key << "=" << value << ": " << error);
+    CHECK(error.find(options + key + ": ") != std::string::npos);
+  }
+  const std::string error = error_of({"simulation.integrator.max_step=1e-3", options + "min_step=1e-2"});
+  CHECK(error.find(options + "min_step: is 0.01 s, above max_step") != std::string::npos);
+}

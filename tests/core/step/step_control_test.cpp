@@ -19,7 +19,7 @@ TEST_CASE("steps are rounded down, by a hundredth at most", "[step_control]") {
 TEST_CASE("estimates of error that differ by rounding propose the very same step", "[step_control]") {
   int same = 0, all = 0;
   for (double error = 1e-12; error < 1; error *= 1.013, ++all) {
-    PiController one(8), other(8);
+    StepController one(8, {}), other(8, {});
     if (rounded_step(0.01 * one.after_acceptance(error)) ==
         rounded_step(0.01 * other.after_acceptance(error * (1 + 1e-6))))
       ++same;
@@ -32,10 +32,10 @@ TEST_CASE("an estimate of error so small that it is mostly rounding asks for the
   for (const int order : {2, 5, 8}) {
     const double small = 0.4 * std::pow(6, -order);
     INFO("order " << order);
-    CHECK(PiController(order).after_acceptance(small) == 6);
-    CHECK(PiController(order).after_acceptance(1e-3 * small) == 6);
-    CHECK(PiController(order).after_acceptance(0) == 6);
-    PiController rejected(order);
+    CHECK(StepController(order, {}).after_acceptance(small) == 6);
+    CHECK(StepController(order, {}).after_acceptance(1e-3 * small) == 6);
+    CHECK(StepController(order, {}).after_acceptance(0) == 6);
+    StepController rejected(order, {});
     CHECK(rejected.after_rejection(20) < 1);
     CHECK(rejected.after_acceptance(0) == 1);
   }

@@ -192,7 +192,9 @@ TEST_CASE("what an optimiser cannot do is said where it is asked for", "[design_
   problem.design->optimizer.seed.reset();
   problem.design->optimizer.hessian = "exact";
   CHECK_THAT(issue(), Contains("design.optimizer.hessian: is of ipopt only"));
-  problem.design->optimizer.hessian = "lbfgs", problem.design->optimizer.warm_start = true;
+  problem.design->optimizer.hessian = "lbfgs", problem.design->optimizer.lbfgs_history = 5;
+  CHECK_THAT(issue(), Contains("design.optimizer.lbfgs_history: is given, but 'slsqp' keeps no pairs"));
+  problem.design->optimizer.lbfgs_history.reset(), problem.design->optimizer.warm_start = true;
   CHECK_THAT(issue(), Contains("design.optimizer.warm_start: is of ipopt only") && Contains("slsqp"));
   problem.design->optimizer = {};
   problem.design->multistart.emplace();
@@ -290,6 +292,22 @@ TEST_CASE("Hessians of a design are right where the motion is wild", "[design_op
   const Eigen::VectorXd s = scaling.rho_x(scaling.to_x(evaluator.start().head<2>()));
   const Eigen::MatrixXd reference = s.asDiagonal() * found.of[0].value * s.asDiagonal();
   CHECK((H[0] - reference).norm() < 1e-3 * reference.norm());
+}
+
+TEST_CASE("five-bar: any length of the history of L-BFGS finds the optimum, by its own steps", "[design_optimizers]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
+  Problem problem = still(1e-7);
+  problem.design->optimizer.type = GENERATE("ipopt", "lbfgs");
+  const DesignResult by_default = run_design(problem);
+  problem.design->optimizer.lbfgs_history = 1;
+  const DesignResult short_history = run_design(problem);
+  INFO(problem.design->optimizer.type << ": " << by_default.evaluations << ", " << short_history.evaluations);
+  CHECK(short_history.variables[0].value == Approx(five_bar::kL01).margin(1e-4));
+  CHECK(short_history.evaluations != by_default.evaluations);
+  problem.design->optimizer.lbfgs_history = 20;  // Ipopt's default here
+  if (problem.design->optimizer.type == "ipopt") CHECK(run_design(problem).evaluations == by_default.evaluations);
 }
 
 TEST_CASE("five-bar: exact Hessians come to a tight tolerance", "[design_optimizers]") {
