@@ -43,6 +43,7 @@ struct IntegratorOptions {
   std::optional<double> factor_max;        // and at most this, at least 1.25; else 6
   std::optional<double> safety;            // factor of the step that the error allows, in (0, 1); else 0.9
   std::string controller;                  // I, PI, PID (step_control.hpp); empty: PI
+  bool operator==(const IntegratorOptions&) const = default;
 };
 
 struct IntegratorSettings {

@@ -36,19 +36,13 @@ std::vector<double> decades(int from, int to, int stride = 1) {
   return values;
 }
 
-bool same(const IntegratorOptions& a, const IntegratorOptions& b) {
-  return a.min_step == b.min_step && a.newton_tolerance == b.newton_tolerance &&
-         a.newton_iterations == b.newton_iterations && a.factor_min == b.factor_min && a.factor_max == b.factor_max &&
-         a.safety == b.safety && a.controller == b.controller;
-}
-
 // Whether runs of one scene are the same.
 bool same(const SimulationSettings& a, const SimulationSettings& b) {
   const IntegratorSettings &i = a.integrator, &j = b.integrator;
   const FormulationSettings &f = a.formulation, &g = b.formulation;
   return i.type == j.type && i.rtol == j.rtol && i.atol == j.atol && i.step == j.step &&
          i.initial_step == j.initial_step && i.max_step == j.max_step && i.max_steps == j.max_steps &&
-         same(i.options, j.options) && f.type == g.type && f.alpha == g.alpha && f.xi == g.xi && f.omega == g.omega &&
+         i.options == j.options && f.type == g.type && f.alpha == g.alpha && f.xi == g.xi && f.omega == g.omega &&
          f.iterations == g.iterations && f.tolerance == g.tolerance && f.linear_solver == g.linear_solver &&
          f.projection == g.projection;
 }
