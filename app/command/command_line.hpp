@@ -1,4 +1,4 @@
-// mbsopt COMMAND problem.json [--out DIR] [--set path=value]... [--quiet] [--threads N]
+// mbsopt COMMAND problem.json [--out DIR] [--set path=value]... [--quiet] [--json] [--threads N]
 #pragma once
 
 #include <ostream>
