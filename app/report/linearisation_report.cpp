@@ -15,11 +15,11 @@ std::string linearisation_report(const Scene& scene, const Json& result, const s
   page.heading("Modes");
   std::vector<std::vector<std::string>> rows;
   for (const Json& m : modes) {
-    rows.push_back({std::to_string(rows.size() + 1), cell(m.at("eigenvalue")), cell(m.at("frequency")),
-                    cell(m.at("damping_ratio"), 4), cell(m.at("moves_most"))});
+    const Json& lambda = m.at("eigenvalue");
+    rows.push_back({std::to_string(rows.size() + 1), cell(m.at("moves_most")), cell(m.at("frequency"), 6),
+                    cell(m.at("damping_ratio"), 4), cell(lambda.at(0), 6), cell(lambda.at(1), 6)});
   }
-  page.table({"mode", "eigenvalue, real and imaginary part [1/s]", "frequency [Hz]", "damping ratio", "moves most"},
-             rows);
+  page.table({"mode", "moves most", "frequency [Hz]", "damping ratio", "Re lambda [1/s]", "Im lambda [1/s]"}, rows);
   for (std::size_t k = 0; k < std::min(shapes.size(), kDrawn); ++k) {
     const std::string title = fmt::format("Mode {}, {} Hz", k + 1, cell(modes[k].at("frequency"), 4));
     const std::array<int, 2> plane = plane_of_motion(scene, {trajectory_columns(scene), {state, shapes[k]}});
