@@ -88,6 +88,7 @@ class ContinuousComparison {
     FormulationSettings& formulation = scene.simulation.formulation;
     if (formulation.type == FormulationType::penalty) formulation.projection = Projection::none;
     IntegratorSettings& s = scene.simulation.integrator;
+    if (s.type != type) s.options = {};  // the other method's
     s.type = type;
     s.step.reset();
     s.max_steps = std::min(s.max_steps, std::max(kAtLeast, kManyTimes * options_.typical_steps));
