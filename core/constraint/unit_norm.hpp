@@ -13,9 +13,8 @@ struct UnitNorm {
   static double phi_dot(const Vector4d& p, const Vector4d& pdot) { return 2 * p.dot(pdot); }
   static Vector4d phi_p(const Vector4d& p) { return 2 * p; }
 
-  // p -> p/|p| and pdot -> pdot - p (p'pdot) for unit p: the nearest numbers that satisfy both equations.
+  // p -> p/|p|: the nearest numbers that satisfy the equation.
   static Vector4d project(const Vector4d& p) { return p / p.norm(); }
-  static Vector4d project_rate(const Vector4d& p, const Vector4d& pdot) { return pdot - p * p.dot(pdot); }
 };
 
 }  // namespace mbsopt

@@ -29,8 +29,6 @@ class VariableScaling {
   Eigen::VectorXd rho_xx(const Eigen::VectorXd& x) const;      // d2 rho_k / d x_k^2
   const Eigen::VectorXd& x_lower() const { return x_lower_; }  // -infinity where there is none
   const Eigen::VectorXd& x_upper() const { return x_upper_; }
-  const Eigen::VectorXd& rho_lower() const { return rho_lower_; }
-  const Eigen::VectorXd& rho_upper() const { return rho_upper_; }
 
  private:
   struct Variable {
