@@ -180,11 +180,18 @@ void Checker::check_expression(const std::string& where, const Expression& value
   if (names == Names::state) check_sensors_of_state(where, value);
   if (names != Names::objective) check_dimension(where, value, expected);
   if (value.is_number() || names == Names::none) {
-    const std::optional<double> result = facts_.any_value(value);
-    if (result && !std::isfinite(*result))
-      issue(where,
-            "'" + value.text() + "' is " + text_of(*result) + " at the values of the parameters; it must be finite");
+    check_size(where, value);
   }
+}
+
+// Sums of squares must stay below the largest double, 1.8e308.
+void Checker::check_size(const std::string& where, const Expression& value) {
+  constexpr double kLargest = 1e150;
+  const std::optional<double> x = facts_.any_value(value);
+  if (!x || std::abs(*x) <= kLargest) return;
+  const std::string is = "'" + value.text() + "' is " + text_of(*x) + " at the values of the parameters; ";
+  issue(where, is + (std::isfinite(*x) ? "its square must be a number: at most " + text_of(kLargest) + " is allowed"
+                                       : "it must be finite"));
 }
 
 // Accelerations and reactions follow from the forces, so no force may depend on them.
@@ -279,11 +286,7 @@ void Checker::expression(std::string_view key, const Expression& value, Names na
   // Names::none here means parameters_only, in which weights without units are as usual as in other objectives.
   if (names == Names::none && !says.dimension) {
     if (!names_are_known(path(key), value, names)) return;
-    const std::optional<double> result = facts_.any_value(value);
-    if (result && !std::isfinite(*result))
-      issue(path(key),
-            "'" + value.text() + "' is " + text_of(*result) + " at the values of the parameters; it must be finite");
-    return;
+    return check_size(path(key), value);
   }
   check_expression(path(key), value, names, says.dimension);
 }

@@ -115,6 +115,7 @@ class Checker {
   // Of a field at any path.
   void check_expression(const std::string& path, const Expression& value, Names names,
                         const std::optional<Dimension>& expected);
+  void check_size(const std::string& where, const Expression& value);
   void must_be_identifier(const std::string& path, const std::string& name);
   void must_be_readable(const std::string& path, const std::string& name);  // short, and shown as it is written
 

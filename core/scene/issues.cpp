@@ -176,15 +176,14 @@ void check_meaning(Checker& checker, const InertiaField& inertia) {
 
 void check_meaning(Checker& checker, const EulerParametersField& orientation) {
   constexpr double kTolerance = 1e-6;
-  double squares = 0;
+  double norm = 0;
   for (const Field& field : orientation.e) {
     const std::optional<double> e = checker.facts().value(field);
-    if (!e || !std::isfinite(*e)) return;
-    squares += *e * *e;
+    if (!e) return;
+    norm = std::hypot(norm, *e);  // squares might overflow
   }
-  if (std::abs(std::sqrt(squares) - 1) > kTolerance)
-    checker.issue(checker.path(),
-                  "Euler parameters of norm " + text_of(std::sqrt(squares)) + "; it must be 1 within 1e-6");
+  if (std::abs(norm - 1) > kTolerance)
+    checker.issue(checker.path(), "Euler parameters of norm " + text_of(norm) + "; it must be 1 within 1e-6");
 }
 
 void check_meaning(Checker& checker, const AxisAngleField& orientation) {

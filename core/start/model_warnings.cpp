@@ -200,7 +200,7 @@ void add_rounding(const MechanismData& d, const VectorXd& q, std::vector<std::st
         },
         c.primitive);
   }
-  for (int i = 0; i < d.n; ++i) far = std::max(far, q.segment<3>(7 * i).norm());
+  for (int i = 0; i < d.n; ++i) far = std::max(far, q.segment<3>(7 * i).stableNorm());
   const double rounding = std::numeric_limits<double>::epsilon() * far;
   if (arm == 0 || !(rounding > kNoticeable * arm)) return;
   warnings.push_back(fmt::format(

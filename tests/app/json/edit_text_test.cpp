@@ -32,7 +32,7 @@ TEST_CASE("parameter values are replaced in place, all else stays as written", "
 TEST_CASE("a number written out reads back as the same double", "[json]") {
   for (const double x : {1.0 / 3, 2.1469536808839935, 1e-300, 1.7976931348623157e308, -0.1}) {
     const std::string text = with_parameter_values(
-        R"({"bodies": [{"name": "a", "mass": "m", "inertia": [1, 1, 1]}],
+        R"({"bodies": [{"name": "a", "mass": 1, "inertia": [1, 1, 1]}],
             "parameters": {"m": {"value": 1, "allow_unused": true}}})",
         {{"m", x}});
     if (x > 0) CHECK(read_problem_text(text, "t.json").scene.parameters.at(0).value == x);

@@ -281,6 +281,12 @@ TEST_CASE("a finding is one line: file, line, column, path, message", "[json]") 
                     "suspension.json:10:31: bodies[0].mass: is -2 kg, a mass must not be negative");
 }
 
+TEST_CASE("a number whose square is none is refused", "[json]") {
+  const std::vector<Finding> findings = findings_of(replaced(kGood, R"("mass": 1.0)", R"("mass": "2*1e150")"));
+  REQUIRE(findings.size() == 1);
+  CHECK_THAT(findings[0].message, Catch::Contains("'2*1e150' is 2e+150") && Catch::Contains("at most 1e+150"));
+}
+
 TEST_CASE("a number that is not finite is said once", "[json]") {
   const auto [original, replacement] = GENERATE(table<std::string, std::string>({
       {R"("forces": [)",

@@ -18,9 +18,9 @@ TEST_CASE("a sensor that is too large for a number is warned of", "[command]") {
   const TemporaryFolder folder;
   const std::string file = folder.write("ball.json", R"({
     "format": 1, "name": "ball", "gravity": [0, 0, 0],
-    "bodies": [{"name": "ball", "mass": 1, "inertia": [1, 1, 1], "velocity": [1, 0, 0]}],
-    "sensors": {"far": {"quantity": "position", "body": "ball", "point": [1e200, 0, 0], "component": "norm"}},
-    "simulation": {"end_time": 1, "output_step": 0.5}})");
+    "bodies": [{"name": "ball", "mass": 1, "inertia": [1, 1, 1], "angular_velocity": [0, 0, 1e5]}],
+    "sensors": {"far": {"quantity": "velocity", "body": "ball", "point": [1e150, 0, 0], "component": "norm"}},
+    "simulation": {"end_time": 1e-5, "output_step": 5e-6}})");
   const CommandOutcome outcome = run_command({"simulate", file, "--out", folder.file("out")});
   INFO(outcome.out << outcome.err);
   CHECK_THAT(outcome.err, Contains("'far' is too large for a number at t = 0 s"));
