@@ -166,6 +166,7 @@ void Adjoint::create_backward() {
   }
   run_.require(CVodeSVtolerancesB(memory, which_, s.rtol, atol));
   run_.require(CVodeSetMaxNumStepsB(memory, which_, s.max_steps));
+  if (s.options.min_step) run_.require(CVodeSetMinStepB(memory, which_, *s.options.min_step));
   if (s.max_step) run_.require(CVodeSetMaxStepB(memory, which_, *s.max_step));
   if (stiff) {
     if (!linear_solver_.attach_backward(memory, which_)) run_.require(CV_ILL_INPUT);

@@ -153,8 +153,8 @@ int ForwardRun::g(realtype t, N_Vector y, N_Vector gdot, void* self) {
 }
 
 void ForwardRun::stop_for(int flag, double t, const char* of_what) {
-  double h = 0;
-  CVodeGetCurrentStep(memory(), &h);
+  // What was tried last; CVODES itself tells only what it proposed before its own reductions.
+  const double h = std::abs(flow_.last_time() - t);
   switch (flag) {
     case CV_RHSFUNC_FAIL:
     case CV_FIRST_RHSFUNC_ERR:
@@ -186,7 +186,8 @@ void ForwardRun::stop_for(int flag, double t, const char* of_what) {
     case CV_CONV_FAILURE:
     case CV_TOO_CLOSE:
     case CV_LSETUP_FAIL:
-      if (const auto min_step = settings_.integrator.options.min_step; min_step && h <= *min_step) {
+      // CVODES gives up where h is the least step but for rounding, by its own measure of 1e-6.
+      if (const auto min_step = settings_.integrator.options.min_step; min_step && h <= *min_step * (1 + 1e-6)) {
         stop(SimulationStatus::step_too_small,
              below_min_step(flag == CV_ERR_FAILURE ? StepOutcome::rejected : StepOutcome::unsolved, t, *min_step));
         return;
