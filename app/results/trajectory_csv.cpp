@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
-#include <iterator>
 
 #include "app/files/csv_cell.hpp"
 
@@ -62,12 +63,13 @@ Sampling record_trajectory(const Mechanism& mechanism, const Scene& scene, Traje
 
 std::string to_csv(const std::vector<std::string>& columns, const std::vector<std::vector<double>>& rows) {
   std::string text;
+  std::array<char, 32> number;  // the shortest text that reads back as the same double has 24 characters at most
   for (const std::string& column : columns) text += (text.empty() ? "" : ",") + csv_cell(column);
   text += '\n';
   for (const std::vector<double>& row : rows) {
     for (std::size_t k = 0; k < row.size(); ++k) {
       if (k > 0) text += ',';
-      if (std::isfinite(row[k])) fmt::format_to(std::back_inserter(text), "{:.17g}", row[k]);
+      if (std::isfinite(row[k])) text.append(number.data(), std::to_chars(number.begin(), number.end(), row[k]).ptr);
     }
     text += '\n';
   }

@@ -16,6 +16,7 @@ bool conserves_energy(const Scene& scene) {
     if (const auto* tsda = std::get_if<Tsda>(&force.kind))
       return !tsda->law && zero(tsda->damping) && zero(tsda->actuator);
     if (const auto* rsda = std::get_if<Rsda>(&force.kind)) return !rsda->law && zero(rsda->damping);
+    if (const auto* bar = std::get_if<TorsionBar>(&force.kind)) return !bar->law && zero(bar->damping);
     if (const auto* bushing = std::get_if<BushingSpec>(&force.kind))
       return std::all_of(bushing->damping.begin(), bushing->damping.end(), zero) &&
              std::all_of(bushing->torsional_damping.begin(), bushing->torsional_damping.end(), zero);

@@ -47,6 +47,9 @@ struct Compilation {
   enum class Zero { normals, start };
   // Index of a joint's angle among data.angles; made when it is first asked for.
   int angle_of(const std::string& joint, const std::string& where, Zero zero = Zero::normals);
+  // A new one: that of body 2 from body 1 about an axis of body 1, 0 as their axes lie along each other. Seen along the
+  // axis it is the angle of that direction of body 2 which is perpendicular to it there.
+  int angle_about(int body1, int body2, const std::optional<PointField>& axis, const std::string& where);
 
   // A vector of body 1 as body 2 sees it at the orientations in the file, made perpendicular to axis2 (not finite where
   // it is along axis2).

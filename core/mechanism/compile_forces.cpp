@@ -40,10 +40,17 @@ void add(Compilation& model, const Tsda& f, int force, const std::string& where)
   model.data.forces.of<TsdaForce>().push_back(std::move(out));
 }
 
-void add(Compilation& model, const Rsda& f, int force, const std::string& where) {
+template <class Torsional>  // Rsda, TorsionBar
+requires requires(const Torsional& f) { f.free_angle; }
+void add(Compilation& model, const Torsional& f, int force, const std::string& where) {
   RsdaForce out;
   out.force = force;
-  out.angle = model.angle_of(f.joint, where + ".joint");
+  if constexpr (requires { f.joint; }) {
+    out.angle = model.angle_of(f.joint, where + ".joint");
+  } else {
+    const int body1 = model.body_index(f.body1, where + ".body1"), body2 = model.body_index(f.body2, where + ".body2");
+    out.angle = model.angle_about(body1, body2, f.axis, where);
+  }
   out.joint = model.data.angles[static_cast<std::size_t>(out.angle)];
   out.law = law(model, f.law, {"angle", "rate"}, {f.stiffness, f.damping, f.free_angle, 0.0}, where);
   model.data.forces.of<RsdaForce>().push_back(std::move(out));

@@ -284,4 +284,15 @@ int Compilation::angle_of(const std::string& name, const std::string& where, Zer
   return angle_of_joint_[{i, zero}] = static_cast<int>(data.angles.size()) - 1;
 }
 
+int Compilation::angle_about(int body1, int body2, const std::optional<PointField>& axis, const std::string& where) {
+  JointAngle angle;
+  angle.body1 = body1, angle.body2 = body2;
+  const DualVector3 a = direction(body1, axis, where + ".axis"), n = perpendicular(a);
+  angle.measure.s1 = numbers(keep(angle.slot1, n));
+  angle.measure.s3 = numbers(keep(angle.slot3, cross(a, n)));
+  angle.measure.s2 = numbers(keep(angle.slot2, n));
+  data.angles.push_back(angle);
+  return static_cast<int>(data.angles.size()) - 1;
+}
+
 }  // namespace mbsopt

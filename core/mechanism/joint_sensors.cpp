@@ -75,19 +75,11 @@ std::unique_ptr<SensorFunction> make_joint_angle(Compilation& model, const Senso
   return out;
 }
 
-// The angle of the direction n of a body, which is perpendicular to the axis where the body lies along the ground or
-// along body1, from n in the ground or in body1, seen along the axis.
 std::unique_ptr<SensorFunction> make_body_angle(Compilation& model, const Sensor& s, const std::string& where) {
-  JointAngle angle;
-  if (!s.body1.empty()) angle.body1 = model.body_index(s.body1, where + ".body1");
-  angle.body2 = model.body_index(s.body2.empty() ? s.body : s.body2, where);
-  const DualVector3 axis = model.direction(angle.body1, s.axis, where + ".axis"), n = perpendicular(axis);
-  angle.measure.s1 = numbers(model.keep(angle.slot1, n));
-  angle.measure.s3 = numbers(model.keep(angle.slot3, cross(axis, n)));
-  angle.measure.s2 = numbers(model.keep(angle.slot2, n));
+  const int body1 = s.body1.empty() ? 0 : model.body_index(s.body1, where + ".body1");
+  const int body2 = model.body_index(s.body2.empty() ? s.body : s.body2, where);
   auto out = std::make_unique<AngleFunction>();
-  out->index = static_cast<int>(model.data.angles.size());
-  model.data.angles.push_back(angle);
+  out->index = model.angle_about(body1, body2, s.axis, where);
   return out;
 }
 

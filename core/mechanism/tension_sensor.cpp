@@ -1,4 +1,5 @@
-// The tension of a spring (tsda) and the resisting torque of a torsional one (rsda) as a sensor: the law's value
+// The tension of a spring (tsda) and the resisting torque of a torsional one (rsda, torsion_bar) as a sensor: the law's
+// value
 //   f(x, xdot, t, rho),   x = l or the joint's angle
 //   f_y = f_x x_y + f_xdot xdot_y          f_rho = the law's own + through the geometry
 #include "core/mechanism/sensor_kinds.hpp"
@@ -81,7 +82,7 @@ std::unique_ptr<SensorFunction> make_tension(Compilation& model, const Sensor& s
   });
   if (out) return out;
   throw SceneError(where + ".force: '" + s.force + "' is a " + std::string(type_of(*found)) +
-                   "; only a tsda or an rsda has one number to measure");
+                   "; only a tsda, an rsda or a torsion_bar has one number to measure");
 }
 
 }  // namespace mbsopt

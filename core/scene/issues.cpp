@@ -254,6 +254,12 @@ void check_meaning(Checker& checker, const Force& force) {
                                                    ": it feeds energy into the motion, which may grow without "
                                                    "bounds; a damper has a positive one");
   };
+  const auto check_torsion = [&](const auto& f) {
+    check_law(f.law);
+    warn_of_feeding(f.law.has_value(), f.damping);
+    warn_of_law(f.law.has_value(),
+                {{"stiffness", &f.stiffness}, {"damping", &f.damping}, {"free_angle", &f.free_angle}});
+  };
   if (const auto* tsda = std::get_if<Tsda>(&force.kind)) {
     check_two_bodies(checker, tsda->body1, tsda->body2, "a tsda");
     check_law(tsda->law);
@@ -264,10 +270,11 @@ void check_meaning(Checker& checker, const Force& force) {
                                         {"actuator", &tsda->actuator}});
   } else if (const auto* rsda = std::get_if<Rsda>(&force.kind)) {
     check_joint_has_angle(checker, rsda->joint);
-    check_law(rsda->law);
-    warn_of_feeding(rsda->law.has_value(), rsda->damping);
-    warn_of_law(rsda->law.has_value(),
-                {{"stiffness", &rsda->stiffness}, {"damping", &rsda->damping}, {"free_angle", &rsda->free_angle}});
+    check_torsion(*rsda);
+  } else if (const auto* bar = std::get_if<TorsionBar>(&force.kind)) {
+    check_two_bodies(checker, bar->body1, bar->body2, "a torsion_bar");
+    direction(checker, "axis", bar->axis, bar->body1);
+    check_torsion(*bar);
   } else if (const auto* applied = std::get_if<PointForce>(&force.kind)) {
     check_moving(checker, applied->body);
     check_components(applied->components);
@@ -297,9 +304,10 @@ void check_meaning(Checker& checker, const Sensor& sensor) {
   direction(checker, "axis", sensor.axis, sensor.body1);
   if (sensor.quantity == "force") {
     const Force* const force = checker.facts().force(sensor.force);
-    if (force && type_of(*force) != Tsda::kType && type_of(*force) != Rsda::kType)
+    if (force && type_of(*force) != Tsda::kType && type_of(*force) != Rsda::kType &&
+        type_of(*force) != TorsionBar::kType)
       checker.issue(checker.path("force"), "'" + sensor.force + "' is a " + std::string(type_of(*force)) +
-                                               "; only a tsda or an rsda has one number to measure");
+                                               "; only a tsda, an rsda or a torsion_bar has one number to measure");
   }
 }
 

@@ -136,6 +136,13 @@ struct Rsda {
   Field stiffness, damping, free_angle;
   std::optional<Expression> law;  // of angle, rate, t and parameters
 };
+struct TorsionBar {  // as an rsda, between two bodies that need no joint
+  static constexpr std::string_view kType = "torsion_bar";
+  std::string body1 = "ground", body2;
+  std::optional<PointField> axis;  // in body1
+  Field stiffness, damping, free_angle;
+  std::optional<Expression> law;
+};
 // Components are expressions of t, parameters and sensors of the state (t, q, v).
 using LawVector = std::array<Expression, 3>;
 struct PointForce {
@@ -166,7 +173,7 @@ struct FrictionSpec {
 };
 struct Force {
   std::string name;
-  std::variant<Tsda, Rsda, PointForce, Torque, BushingSpec, FrictionSpec> kind;
+  std::variant<Tsda, Rsda, TorsionBar, PointForce, Torque, BushingSpec, FrictionSpec> kind;
 };
 
 struct PointOnBody {

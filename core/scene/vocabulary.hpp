@@ -227,15 +227,26 @@ void describe(auto& v, Like<Tsda> auto& f, const TypeRow& row) {
         {"tension [N] as an expression of l, ldot and t, instead of the coefficients", need_of(row, "law"), kForce});
 }
 
-void describe(auto& v, Like<Rsda> auto& f, const TypeRow& row) {
+void describe_torsion(auto& v, auto& f, const TypeRow& row) {
   using namespace dimension;
-  v.reference("joint", f.joint, To::joint, {"joint on whose angle it acts", need_of(row, "joint")});
   v.number("stiffness", f.stiffness, {"k [N m/rad]", need_of(row, "stiffness"), kTorque});
   v.number("damping", f.damping, {"c [N m s/rad]", need_of(row, "damping"), kTorsionalDamping});
   v.number("free_angle", f.free_angle, {"angle without torque [rad]", need_of(row, "free_angle"), kAngle});
   v.law("law", f.law, Names::rsda_law,
         {"resisting torque [N m] as an expression of angle, rate and t, instead of the coefficients",
          need_of(row, "law"), kTorque});
+}
+
+void describe(auto& v, Like<Rsda> auto& f, const TypeRow& row) {
+  v.reference("joint", f.joint, To::joint, {"joint on whose angle it acts", need_of(row, "joint")});
+  describe_torsion(v, f, row);
+}
+
+void describe(auto& v, Like<TorsionBar> auto& f, const TypeRow& row) {
+  v.reference("body1", f.body1, To::body, {"first body, in which the axis is fixed", need_of(row, "body1")});
+  v.reference("body2", f.body2, To::body, {"second body", need_of(row, "body2")});
+  v.point("axis", f.axis, f.body1, {"axis about which it acts, in the axes of body1", need_of(row, "axis")});
+  describe_torsion(v, f, row);
 }
 
 void describe(auto& v, Like<PointForce> auto& f, const TypeRow& row) {
@@ -307,7 +318,7 @@ void describe(auto& v, Like<Sensor> auto& s) {
   v.reference("body2", s.body2, To::body, {"body of the second point", need_of(*row, "body2")});
   v.point("point1", s.point1, s.body1, {"first point [m]", need_of(*row, "point1"), kLength});
   v.point("point2", s.point2, s.body2, {"second point [m]", need_of(*row, "point2"), kLength});
-  v.reference("force", s.force, To::force, {"a tsda or rsda", need_of(*row, "force")});
+  v.reference("force", s.force, To::force, {"a tsda, rsda or torsion_bar", need_of(*row, "force")});
   v.word("kind", s.kind, Words{"force torque"}, {"which reaction", need_of(*row, "kind")});
   v.reference("drive", s.drive, To::drive, {"a drive", need_of(*row, "drive")});
   v.point("axis", s.axis, s.body1.empty() ? "ground" : s.body1,

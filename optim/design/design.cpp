@@ -304,7 +304,7 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
   result.iterations = solution.iterations;
   result.evaluations = solution.evaluations, result.failed_evaluations = solution.failed_evaluations;
   result.rho = program.rho_at(solution.x);
-  if (start.ok) {
+  if (start.ok && solution.point.ok) {
     describe_end(evaluator, program, solution.point, result);
     if (!abandoned) {
       describe_solution(evaluator, program, solution.x, result);

@@ -392,6 +392,7 @@ NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_s
   const Ipopt::SmartPtr<Ipopt::TNLP> owner(adapter);
   if (!adapter->start_is_valid()) {
     result.message = "the start point cannot be evaluated: " + result.first_error;
+    result.point.ok = false;
     return result;
   }
   if (adapter->start_is_optimal()) {

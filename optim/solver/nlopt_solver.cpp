@@ -438,6 +438,7 @@ NlpResult solve_with_nlopt(NonlinearProgram& problem, const VectorXd& x_start, c
   Adapter adapter(problem, *method, options, result);
   if (!adapter.start_is_valid(x_start)) {
     result.message = "the start point cannot be evaluated: " + result.first_error;
+    result.point.ok = false;
     return result;
   }
   adapter.run(x_start);

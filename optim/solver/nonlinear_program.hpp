@@ -111,7 +111,7 @@ struct NlpProgress {
 
 // x: the solution, or the best point seen: feasible before lower f.
 struct NlpResult : SolverOutcome {
-  NlpPoint point;         // at x
+  NlpPoint point;         // at x; not ok where the start could not be evaluated
   std::string algorithm;  // in the words of the library that it comes from
 };
 

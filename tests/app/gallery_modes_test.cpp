@@ -1,9 +1,12 @@
 // Modes of the gallery's mechanisms, beside the equilibria that they have.
 #include <catch2/catch.hpp>
+#include <numbers>
 
 #include "app/json/read_problem.hpp"
+#include "optim/design/design.hpp"
 #include "optim/objective/followed_mode.hpp"
 #include "optim/problem/parameter_values.hpp"
+#include "source_folder.hpp"
 
 using namespace mbsopt;
 
@@ -35,4 +38,14 @@ TEST_CASE("derivatives of modes are those of differences on the gallery", "[foll
     INFO(problem.scene.parameters[static_cast<std::size_t>(k)].name);
     CHECK(std::abs(found(k) - difference) * size < 1e-8 * scale);
   }
+}
+
+TEST_CASE("an anti-roll bar and its dampers are designed as their closed form says", "[followed_mode]") {
+  const DesignResult result =
+      run_design(read_problem(std::string(MBSOPT_SOURCE_DIR "/problems/") + "anti_roll/modes.json"));
+  REQUIRE(result.status == SolverStatus::converged);
+  // I omega^2 = k + 2 k_bar where the arms move against each other, k = I omega_heave^2; c = 2 zeta I omega
+  const double I = 2 + 60 * 0.4 * 0.4, heave = 2 * std::numbers::pi * 1.2, roll = 2 * std::numbers::pi * 2;
+  CHECK(result.variables[0].value == Approx(I * (roll * roll - heave * heave) / 2).epsilon(1e-7));
+  CHECK(result.variables[1].value == Approx(2 * 0.3 * I * roll).epsilon(1e-5));  // the barrier stays off the limit
 }

@@ -286,7 +286,7 @@ def limits():
 
 
 def run(program, case, text):
-    with tempfile.TemporaryDirectory(prefix="mbsopt-fuzz-") as folder:
+    with tempfile.TemporaryDirectory(prefix="mbsopt_fuzz_") as folder:
         folder = pathlib.Path(folder)
         os.symlink(ROOT / "data", folder / "data")
         file = folder / "problems" / "fuzz" / "problem.json"

@@ -42,6 +42,12 @@ double end_value(Scene scene, Sensor sensor) {
   return value;
 }
 
+Sensor tension_of(const std::string& force) {
+  Sensor s;
+  s.quantity = "force", s.force = force;
+  return s;
+}
+
 Scene hinged_block() {
   Scene s = free_body();
   s.joints.push_back(hinge("pin", "ground", vec("0", "0", "0"), "block", vec("0", "0", "0")));
@@ -88,6 +94,46 @@ TEST_CASE("a torque written with sensors is the torsional spring-damper it descr
   torque.body = "block", torque.components = {f("0"), f("0"), f("-5*(theta - 0.2) - 0.3*omega")};
   servo.forces.push_back({"servo", torque});
   CHECK((end_state(spring) - end_state(servo)).norm() < 1e-9);
+}
+
+TEST_CASE("a torsion bar in the axis of a hinge is the hinge's torsional spring", "[force]") {
+  Scene spring = hinged_block();
+  spring.conditions = {value_of("theta", "0.7"), rate_of("theta", "-2")};
+  Scene bar = spring;
+  Rsda torsion;
+  torsion.joint = "pin", torsion.stiffness = 5.0, torsion.damping = 0.3, torsion.free_angle = 0.2;
+  spring.forces.push_back({"torsion", torsion});
+  TorsionBar straight;
+  straight.body2 = "block", straight.axis = PointField(vec("0", "0", "2"));
+  straight.stiffness = 5.0, straight.damping = 0.3, straight.free_angle = 0.2;
+  bar.forces.push_back({"torsion", straight});
+  CHECK((end_state(spring) - end_state(bar)).norm() < 1e-9);
+  CHECK(end_value(bar, tension_of("torsion")) == Approx(end_value(spring, tension_of("torsion"))).epsilon(1e-9));
+}
+
+TEST_CASE("a torsion bar between free bodies keeps their energy and angular momentum", "[force]") {
+  Scene s = free_body();
+  s.bodies.push_back(plain_body("other", 2, {0.1, 0.25, 0.2, 0.0, 0.0, 0.0}, {1.0, 0.0, 0.0}));
+  s.bodies[0].angular_velocity = {0.3, -0.2, 1.5}, s.bodies[1].angular_velocity = {-0.2, 0.4, -1.0};
+  TorsionBar bar;
+  bar.body1 = "block", bar.body2 = "other", bar.axis = PointField(vec("1", "2", "6"));
+  bar.stiffness = f("0.4"), bar.free_angle = f("0.5");
+  s.forces.push_back({"bar", bar});
+  const SimulationResult run = simulate(Mechanism(s, VectorXd()), s.simulation);
+  INFO(run.message);
+  REQUIRE(run.ok());
+  CHECK(run.statistics.energy_drift < 1e-9 * run.statistics.energy_initial);
+  const auto momentum = [&](const VectorXd& y) {  // of the spins; the centres of mass rest
+    const Eigen::Vector3d J[] = {{0.2, 0.3, 0.4}, {0.1, 0.25, 0.2}};
+    Eigen::Vector3d L = Eigen::Vector3d::Zero();
+    for (int b = 0; b < 2; ++b) {
+      const Vector4d p = y.segment<4>(7 * b + 3), pdot = y.segment<4>(7 * b + 17);
+      L += A(p) * J[b].cwiseProduct(omega_B(p, pdot));
+    }
+    return L;
+  };
+  CHECK((momentum(run.y_end) - (Eigen::Vector3d(0.06, -0.06, 0.6) + Eigen::Vector3d(-0.02, 0.1, -0.2))).norm() < 1e-9);
+  CHECK((run.y_end.segment<4>(3) - Vector4d(1, 0, 0, 0)).norm() > 0.1);  // it has turned
 }
 
 TEST_CASE("a body on a bushing oscillates at its natural frequencies", "[force]") {
@@ -217,7 +263,7 @@ TEST_CASE("a force on the ground, or with a name that nobody knows, is refused w
   torque.components[2] = f("theta");
   s.forces[0].kind = torque;
   s.sensors.push_back(tension);
-  CHECK(message(s).find("sensors[2].force: 'torque' is a torque; only a tsda or an rsda") == 0);
+  CHECK(message(s).find("sensors[2].force: 'torque' is a torque; only a tsda, an rsda or a torsion_bar") == 0);
   s.sensors.back().force = "nothing";
   CHECK(message(s).find("sensors[2].force: there is no force 'nothing'") == 0);
   s.sensors.pop_back();

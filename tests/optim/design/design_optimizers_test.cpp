@@ -58,6 +58,17 @@ void add_total_length(Problem& problem, std::optional<double> lower, std::option
 
 }  // namespace
 
+TEST_CASE("a limit that no number can be measured by ends a design in words, at its start", "[design]") {
+  Problem problem = still();
+  add_total_length(problem, {}, 1e-320);
+  problem.design->optimizer.type = GENERATE("ipopt", "slsqp");
+  const DesignResult result = run_design(problem);
+  CHECK(result.status == SolverStatus::failed);
+  CHECK_THAT(result.message, Contains("the start point cannot be evaluated"));
+  CHECK(result.objective_final == result.objective_initial);
+  CHECK(result.variables[0].value == result.variables[0].initial);
+}
+
 TEST_CASE("five-bar: every local optimiser holds the mechanism still", "[design_optimizers]") {
 #ifdef __SANITIZE_ADDRESS__  // twenty times slower
   const std::string type = GENERATE("slsqp", "bobyqa");
