@@ -93,17 +93,22 @@ void Sensitivities::add_cost(const PointCost& cost, const StatePoint& at, Eigen:
   psi_rho_.row(objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
 }
 
+// The state and its rate, which delays of measurements need.
+void observe(ForwardRun& run, const TangentSampling& sampling, const SampleEvent& event, StatePoint at, Vector& rate,
+             const Eigen::MatrixXd& y_rho) {
+  run.require(CVodeGetDky(run.memory(), event.time, 1, rate));
+  const Eigen::VectorXd ydot = *rate;
+  at.ydot = &ydot;
+  sampling.observe(event.index, at, y_rho);
+}
+
 void Sensitivities::take_sample(const SampleEvent& event, const StatePoint& at) {
   run_.require(CVodeGetSensDky(run_.memory(), event.time, 0, s_));
   for (std::size_t k = 0; k < active_.size(); ++k) y_rho_.col(active_[k]) = s_.at(static_cast<int>(k));
   if (event.cost) {
     add_cost(*event.cost, at, event.objective);
   } else if (sampling_.observe) {
-    run_.require(CVodeGetDky(run_.memory(), event.time, 1, rate_));
-    const Eigen::VectorXd ydot = *rate_;
-    StatePoint with_rate = at;
-    with_rate.ydot = &ydot;
-    sampling_.observe(event.index, with_rate, y_rho_);
+    observe(run_, sampling_, event, at, rate_, y_rho_);
   }
 }
 
@@ -141,8 +146,9 @@ SimulationResult cvodes_forward(const Mechanism& mechanism, const SimulationSett
   if (mechanism.data().active.empty()) {  // nothing to follow
     const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(mechanism.states(), mechanism.parameters());
     cvodes::ForwardRun::Hooks hooks;
+    cvodes::Vector rate(mechanism.states(), run.context());
     hooks.sampled = [&](const SampleEvent& event, const StatePoint& at) {
-      if (!event.cost && sampling.observe) sampling.observe(event.index, at, none);
+      if (!event.cost && sampling.observe) cvodes::observe(run, sampling, event, at, rate, none);
     };
     run.go(sampling.times, options, hooks);
     return run.finish();

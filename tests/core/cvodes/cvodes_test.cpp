@@ -227,6 +227,26 @@ TEST_CASE("states sampled from CVODES carry their sensitivities", "[cvodes][grad
   }
 }
 
+TEST_CASE("states sampled from CVODES carry their rate, with and without sensitivities", "[cvodes]") {
+  const CvodesCase c = four_bar_case();
+  const VectorXd rho = nominal(c.scene);
+  const std::vector<bool> none(static_cast<std::size_t>(rho.size()), false);
+  for (const Mechanism& m : {Mechanism(c.scene, rho), Mechanism(c.scene, rho, none)}) {
+    const auto rate = [&](const SimulationSettings& settings) {
+      VectorXd found;
+      TangentSampling sampling{{0.7}, [&](std::size_t, const StatePoint& at, const MatrixXd&) {
+                                 REQUIRE(at.ydot);
+                                 found = *at.ydot;
+                               }};
+      REQUIRE(simulate_tlm(m, settings, {}, sampling).ok());
+      return found;
+    };
+    const VectorXd exact = rate(discrete(c.scene.simulation)),
+                   found = rate(by("cvodes_bdf", 1e-10, c.scene.simulation));
+    CHECK((found - exact).norm() < 1e-5 * exact.norm());
+  }
+}
+
 TEST_CASE("observers see the samples of CVODES in order, at their times", "[cvodes]") {
   const CvodesCase c = double_pendulum_case();
   const Mechanism m(c.scene, nominal(c.scene));
