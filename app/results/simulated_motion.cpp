@@ -1,5 +1,6 @@
 #include "app/results/simulated_motion.hpp"
 
+#include "app/terminal/interrupt.hpp"
 #include "core/integrate/model_choice.hpp"
 #include "core/start/assembly.hpp"
 #include "core/start/model_warnings.hpp"
@@ -30,15 +31,18 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
   for (const Objective& objective : objectives) all.push_back(&objective);
   RunOptions options;
   options.progress = run.watched("simulating");
-  motion.simulation = ObjectiveRun(all, mechanism, settings).run([&](std::span<const Cost> costs) {
+  motion.simulation = ObjectiveRun(all, mechanism, settings, options.progress).run([&](std::span<const Cost> costs) {
     motion.trajectory = {};
     const Sampling sampling = record_trajectory(mechanism, scene, motion.trajectory);
     return simulate(mechanism, settings, costs, sampling, options);
   });
+  if (motion.simulation.ok()) {
+    motion.true_values = true_extremes(all, mechanism, settings, motion.simulation.steps, options.progress);
+    if (interrupted()) motion.simulation.status = SimulationStatus::stopped;
+  }
   run.progress.finish();
   if (!motion.simulation.ok()) return motion;
   motion.psi = motion.simulation.psi;
-  motion.true_values = true_extremes(all, mechanism, settings, motion.simulation.steps);
   for (std::size_t i = 0; i < objectives.size(); ++i) {
     motion.psi(static_cast<Eigen::Index>(i)) += objectives[i].parameters_only(rho);
   }

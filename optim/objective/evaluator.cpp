@@ -117,7 +117,7 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
     SimulationResult result;
     try {
       const Mechanism mechanism(scene_, rho, active, options_.user_forces);
-      ObjectiveRun objective_run(simulated(), mechanism, settings);
+      ObjectiveRun objective_run(simulated(), mechanism, settings, options_.progress);
       result = objective_run.run([&](std::span<const Cost> costs) {
         const RunOptions run_options{.frozen = frozen, .progress = options_.progress, .exact_stages = true};
         ++e.simulations;
@@ -179,7 +179,8 @@ std::vector<std::optional<double>> Evaluator::true_values(const Eigen::VectorXd&
   const Mechanism mechanism(scene_, rho, std::vector<bool>(active_.size(), false), options_.user_forces);
   const SimulationResult run = simulate(mechanism, scene_.simulation, {}, {}, {nullptr, options_.progress});
   if (!run.ok()) return values;
-  const std::vector<std::optional<double>> found = true_extremes(simulated(), mechanism, scene_.simulation, run.steps);
+  const std::vector<std::optional<double>> found =
+      true_extremes(simulated(), mechanism, scene_.simulation, run.steps, options_.progress);
   for (std::size_t j = 0; j < found.size(); ++j) values[simulated_[j]] = found[j];
   return values;
 }

@@ -46,8 +46,8 @@ class Peak {
 }  // namespace
 
 ObjectiveRun::ObjectiveRun(std::vector<const Objective*> objectives, const Mechanism& mechanism,
-                           const SimulationSettings& settings)
-    : objectives_(std::move(objectives)), mechanism_(mechanism), settings_(settings) {}
+                           const SimulationSettings& settings, std::function<bool(double t)> progress)
+    : objectives_(std::move(objectives)), mechanism_(mechanism), settings_(settings), progress_(std::move(progress)) {}
 
 SimulationResult ObjectiveRun::run(const Sweep& sweep) const {
   std::vector<double> x0(objectives_.size(), 0.0);
@@ -57,7 +57,8 @@ SimulationResult ObjectiveRun::run(const Sweep& sweep) const {
   if (!integrated || in_range(result.psi)) {
     if (!result.ok()) return result;
   } else {
-    const std::vector<std::optional<double>> extremes = true_extremes(objectives_, mechanism_, settings_, result.steps);
+    const std::vector<std::optional<double>> extremes =
+        true_extremes(objectives_, mechanism_, settings_, result.steps, progress_);
     for (std::size_t i = 0; i < x0.size(); ++i) x0[i] = extremes[i].value_or(0);
     result = run_with(x0, sweep);
     if (!result.ok()) return result;
@@ -96,7 +97,8 @@ bool ObjectiveRun::in_range(const Eigen::VectorXd& integrals) const {
 
 std::vector<std::optional<double>> true_extremes(const std::vector<const Objective*>& objectives,
                                                  const Mechanism& mechanism, const SimulationSettings& settings,
-                                                 const StepSequence& steps) {
+                                                 const StepSequence& steps,
+                                                 const std::function<bool(double t)>& progress) {
   std::vector<std::optional<double>> values(objectives.size());
   struct Tracked {
     std::size_t objective;
@@ -125,7 +127,7 @@ std::vector<std::optional<double>> true_extremes(const std::vector<const Objecti
     for (Tracked& t : tracked) t.peak.add(at.t, t.sign * t.x->value(at));
   };
   // CVODES takes its own steps again.
-  const RunOptions options{is_cvodes(settings.integrator.type) ? nullptr : &steps, {}};
+  const RunOptions options{is_cvodes(settings.integrator.type) ? nullptr : &steps, progress};
   if (!simulate(mechanism, settings, {}, sampling, options).ok()) return values;
   sampling.times.clear();
   for (const Tracked& t : tracked) t.peak.add_places(sampling.times);

@@ -20,8 +20,9 @@ class ObjectiveRun {
  public:
   using Sweep = std::function<SimulationResult(std::span<const Cost>)>;
 
-  ObjectiveRun(std::vector<const Objective*> objectives, const Mechanism& mechanism,
-               const SimulationSettings& settings);
+  // progress: as in RunOptions, for the search of true extremes.
+  ObjectiveRun(std::vector<const Objective*> objectives, const Mechanism& mechanism, const SimulationSettings& settings,
+               std::function<bool(double t)> progress = {});
 
   // Calls the sweep with the objectives' costs, with x0 = 0; and once more with x0 = the extremes of that run where an
   // exponential of a smooth extreme left the range of numbers.
@@ -34,12 +35,15 @@ class ObjectiveRun {
   std::vector<const Objective*> objectives_;
   const Mechanism mechanism_;
   SimulationSettings settings_;
+  std::function<bool(double t)> progress_;
 };
 
 // The largest (smallest) value of each smooth maximum's (minimum's) expression on given steps: on the dense output at
 // eight points of each step, and where the parabolas through three of them have tops beyond: a value that is reached.
+// None where progress, called after steps as in RunOptions, stops the search.
 std::vector<std::optional<double>> true_extremes(const std::vector<const Objective*>& objectives,
                                                  const Mechanism& mechanism, const SimulationSettings& settings,
-                                                 const StepSequence& steps);
+                                                 const StepSequence& steps,
+                                                 const std::function<bool(double t)>& progress = {});
 
 }  // namespace mbsopt

@@ -69,7 +69,7 @@ Answer TradeoffRuns::run(const SimulationSettings& settings, const RunLimit& lim
   SimulationResult result;
   try {
     const Mechanism mechanism(scene_, rho, no_derivatives(scene_));
-    result = ObjectiveRun(simulated, mechanism, settings).run([&](std::span<const Cost> costs) {
+    result = ObjectiveRun(simulated, mechanism, settings, options.progress).run([&](std::span<const Cost> costs) {
       Sampling sampling;
       if (sampled) {
         answer.motion.times = sample_times(settings, kSamples);

@@ -186,3 +186,15 @@ TEST_CASE("a true extreme is a value that is reached, also of what the steps do 
   const Evaluation resolved = evaluated(problem_with(maximum("x", 30)), GradientMethod::adjoint);
   CHECK(resolved.warnings.empty());
 }
+
+TEST_CASE("the search of a true extreme stops when it is asked to", "[objective]") {
+  const Problem problem = problem_with(maximum("x", 30));
+  const std::vector<Objective> objectives = objectives_of(problem);
+  const Mechanism mechanism(problem.scene, parameter_values(problem.scene));
+  const SimulationSettings& settings = problem.scene.simulation;
+  const StepSequence steps = simulate(mechanism, settings).steps;
+  int looks = 0;
+  const auto stop = [&](double) { return ++looks < 3; };
+  CHECK_FALSE(true_extremes({&objectives[0]}, mechanism, settings, steps, stop)[0]);
+  CHECK(looks == 3);
+}
