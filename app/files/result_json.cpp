@@ -29,7 +29,8 @@ Json to_json(const ModelSummary& summary) {
 }
 
 Json to_json(const SimulationStatistics& statistics) {
-  Json json{{"steps", statistics.steps},
+  Json json{{"solve", statistics.solved ? "kinematics" : "dynamics"},
+            {"steps", statistics.steps},
             {"rejected", statistics.rejected},
             {"rejected_by",
              {{"error_test", statistics.rejections.error_test},

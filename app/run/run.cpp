@@ -170,6 +170,15 @@ void print_model(std::ostream& out, const std::string& name, const ModelSummary&
 
 void print_simulation(std::ostream& out, const Scene& scene, const SimulationStatistics& statistics) {
   const SimulationSettings& settings = scene.simulation;
+  if (statistics.solved) {
+    out << fmt::format(
+        "{:g} s to {:g} s, the drives leave nothing free: solved, not integrated: {}, {} halved, {:.3g} s\n",
+        settings.start_time, settings.end_time, counted(statistics.steps, "interval"), statistics.rejected,
+        statistics.wall_seconds);
+    out << fmt::format("largest violation of the constraints {:.1e} (positions), {:.1e} (velocities)\n",
+                       statistics.max_position_violation, statistics.max_velocity_violation);
+    return;
+  }
   out << fmt::format(
       "{:g} s to {:g} s with {}: {}, {} rejected, {}{}, {:.3g} s\n", settings.start_time, settings.end_time,
       settings.integrator.type, counted(statistics.steps, "step"), statistics.rejected,

@@ -18,6 +18,7 @@ SimulationSettings with_cvodes(SimulationSettings settings) {
     settings.integrator.options = {};  // the other method's
   }
   settings.integrator.step.reset();
+  if (settings.solve == Solve::kinematics) settings.solve = Solve::automatic;
   return settings;
 }
 

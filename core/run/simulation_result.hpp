@@ -35,6 +35,8 @@ struct Jump {
 };
 
 struct SimulationStatistics {
+  bool solved =
+      false;  // drives leave nothing free: positions were solved, steps are panels of quadrature (core/driven)
   // rhs_evaluations: of the equations of motion, each stage of a Newton iteration included; jacobians: of these.
   long steps = 0, rejected = 0, rhs_evaluations = 0, factorisations = 0, jacobians = 0;
   // Iterations of Newton's method; solutions of linear systems by these, by the filter of the error, and by explicit

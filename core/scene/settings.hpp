@@ -17,6 +17,9 @@ enum class Projection { none, velocity, position_velocity };
 // it can be.
 enum class ModelChoice { automatic, planar, spatial };
 enum class Model { spatial, planar };
+// How a mechanism moves whose drives leave nothing free: its positions are solved at each instant (kinematics), or its
+// equations of motion are integrated (dynamics); automatic: solved where it can be (core/driven).
+enum class Solve { automatic, kinematics, dynamics };
 
 struct FormulationSettings {
   FormulationType type = FormulationType::augmented_lagrangian;
@@ -59,6 +62,7 @@ struct SimulationSettings {
   double start_time = 0, end_time = 1;  // [s]
   std::optional<double> output_step;    // default: 200 rows
   ModelChoice model = ModelChoice::automatic;
+  Solve solve = Solve::automatic;
   FormulationSettings formulation;
   IntegratorSettings integrator;
   // Wanted relative error of the objectives, or of the motion where there is none. While it is there, the integrator is

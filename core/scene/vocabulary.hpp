@@ -87,6 +87,8 @@ inline constexpr Choice<LinearSolver> kLinearSolvers[] = {{"cholesky", LinearSol
                                                           {"quasidefinite", LinearSolver::quasidefinite}};
 inline constexpr Choice<ModelChoice> kModels[] = {
     {"auto", ModelChoice::automatic}, {"planar", ModelChoice::planar}, {"spatial", ModelChoice::spatial}};
+inline constexpr Choice<Solve> kSolves[] = {
+    {"auto", Solve::automatic}, {"kinematics", Solve::kinematics}, {"dynamics", Solve::dynamics}};
 inline constexpr Choice<Projection> kProjections[] = {{"none", Projection::none},
                                                       {"velocity", Projection::velocity},
                                                       {"position_velocity", Projection::position_velocity}};
@@ -384,6 +386,9 @@ void describe(auto& v, Like<SimulationSettings> auto& s) {
   v.plain("output_step", s.output_step, kPositive, {"of trajectory.csv [s]; 200 rows when absent"});
   v.choice("model", s.model, kModels,
            {"three unknowns per body (planar) or six (spatial); auto: planar where joints hold all bodies in a plane"});
+  v.choice("solve", s.solve, kSolves,
+           {"where drives leave nothing free: positions solved at each instant (kinematics) or motion integrated "
+            "(dynamics); auto: solved"});
   v.object("formulation", s.formulation, {"form of the equations of motion"});
   v.level("accuracy", s.accuracy, kAccuracies, kPositive,
           {"wanted relative error of the objectives (of the motion where there is none), from which integrator and "

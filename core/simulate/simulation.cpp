@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "core/cvodes/cvodes.hpp"
+#include "core/driven/driven_simulation.hpp"
 #include "core/dynamics/motion_solver.hpp"
 #include "core/integrate/adjoint_sweep.hpp"
 #include "core/integrate/checkpoints.hpp"
@@ -22,8 +23,13 @@
 namespace mbsopt {
 namespace {
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+// run(), with the time that it took.
+template <class F>
+SimulationResult timed(F&& run) {
+  const auto start = std::chrono::steady_clock::now();
+  SimulationResult result = run();
+  result.statistics.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
 }
 
 const Method& method_of(const SimulationSettings& settings) {
@@ -52,13 +58,12 @@ class Run {
  public:
   using Follow = std::function<bool(const Step&, std::span<const SampleEvent>)>;
 
-  Run(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs)
-      : start_(std::chrono::steady_clock::now()),
-        mechanism_(mechanism),
+  Run(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs, Assembly assembly)
+      : mechanism_(mechanism),
         settings_(settings),
         costs_(costs),
         method_(method_of(settings)),
-        assembly_(mechanism, settings.start_time) {
+        assembly_(std::move(assembly)) {
     if (mechanism.data().needs_motion) motion_.emplace(mechanism, settings.formulation);
     result_.psi.setZero(static_cast<Eigen::Index>(costs.size()));
     result_.last_good_time = settings.start_time;
@@ -140,10 +145,7 @@ class Run {
     }
   }
 
-  SimulationResult finish() {
-    result_.statistics.wall_seconds = seconds_since(start_);
-    return std::move(result_);
-  }
+  SimulationResult finish() { return std::move(result_); }
 
  private:
   // Each stage's state is copied once for all costs. watch: none where steps are given.
@@ -169,7 +171,6 @@ class Run {
 
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
 
-  std::chrono::steady_clock::time_point start_;
   const Mechanism mechanism_;
   const SimulationSettings settings_;
   std::span<const Cost> costs_;
@@ -221,26 +222,17 @@ class Replayer {
   long factorisations_ = 0;
 };
 
-}  // namespace
-
-SimulationResult simulate(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
-                          const Sampling& sampling, const RunOptions& options) {
-  require_settled(settings);
-  check_run_arguments(mechanism, settings, costs, sampling.times, options);
-  if (is_cvodes(settings.integrator.type)) return cvodes_simulate(mechanism, settings, costs, sampling, options);
-  Run run(mechanism, settings, costs);
+SimulationResult integrate(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
+                           const Sampling& sampling, const RunOptions& options, Assembly start) {
+  Run run(mechanism, settings, costs, std::move(start));
   run.go(sampling.times, sampling.observe, options, {});
   return run.finish();
 }
 
-SimulationResult simulate_tlm(const Mechanism& mechanism, const SimulationSettings& settings,
-                              std::span<const Cost> costs, const TangentSampling& sampling, const RunOptions& options) {
-  require_settled(settings);
-  check_run_arguments(mechanism, settings, costs, sampling.times, options);
-  if (!sampling.times.empty() && !sampling.observe)
-    throw std::invalid_argument("sampling: times without anything that observes (observe is empty)");
-  if (is_cvodes(settings.integrator.type)) return cvodes_forward(mechanism, settings, costs, sampling, options);
-  Run run(mechanism, settings, costs);
+SimulationResult integrate_tlm(const Mechanism& mechanism, const SimulationSettings& settings,
+                               std::span<const Cost> costs, const TangentSampling& sampling, const RunOptions& options,
+                               Assembly start) {
+  Run run(mechanism, settings, costs, std::move(start));
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   if (!result.ok()) return run.finish();
@@ -256,12 +248,9 @@ SimulationResult simulate_tlm(const Mechanism& mechanism, const SimulationSettin
   return run.finish();
 }
 
-SimulationResult simulate_adjoint(const Mechanism& mechanism, const SimulationSettings& settings,
-                                  std::span<const Cost> costs, const RunOptions& options) {
-  require_settled(settings);
-  check_run_arguments(mechanism, settings, costs, {}, options);
-  if (is_cvodes(settings.integrator.type)) return cvodes_adjoint(mechanism, settings, costs, options);
-  Run run(mechanism, settings, costs);
+SimulationResult integrate_adjoint(const Mechanism& mechanism, const SimulationSettings& settings,
+                                   std::span<const Cost> costs, const RunOptions& options, Assembly start) {
+  Run run(mechanism, settings, costs, std::move(start));
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   Checkpoints checkpoints(run.method(), settings.adjoint_memory_mib);
@@ -304,6 +293,49 @@ SimulationResult simulate_adjoint(const Mechanism& mechanism, const SimulationSe
   result.statistics.linearised_states += sweep.linearised_states();
   result.statistics.factorisations += sweep.factorisations();
   return run.finish();
+}
+
+}  // namespace
+
+SimulationResult simulate(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
+                          const Sampling& sampling, const RunOptions& options) {
+  require_settled(settings);
+  check_run_arguments(mechanism, settings, costs, sampling.times, options);
+  if (is_cvodes(settings.integrator.type)) return cvodes_simulate(mechanism, settings, costs, sampling, options);
+  return timed([&] {
+    Assembly start(mechanism, settings.start_time);
+    return is_solved(mechanism, settings, start)
+               ? driven_simulate(mechanism, settings, costs, sampling, options, start)
+               : integrate(mechanism, settings, costs, sampling, options, std::move(start));
+  });
+}
+
+SimulationResult simulate_tlm(const Mechanism& mechanism, const SimulationSettings& settings,
+                              std::span<const Cost> costs, const TangentSampling& sampling, const RunOptions& options) {
+  require_settled(settings);
+  check_run_arguments(mechanism, settings, costs, sampling.times, options);
+  if (!sampling.times.empty() && !sampling.observe)
+    throw std::invalid_argument("sampling: times without anything that observes (observe is empty)");
+  if (is_cvodes(settings.integrator.type)) return cvodes_forward(mechanism, settings, costs, sampling, options);
+  return timed([&] {
+    Assembly start(mechanism, settings.start_time);
+    return is_solved(mechanism, settings, start)
+               ? driven_tlm(mechanism, settings, costs, sampling, options, start)
+               : integrate_tlm(mechanism, settings, costs, sampling, options, std::move(start));
+  });
+}
+
+SimulationResult simulate_adjoint(const Mechanism& mechanism, const SimulationSettings& settings,
+                                  std::span<const Cost> costs, const RunOptions& options) {
+  require_settled(settings);
+  check_run_arguments(mechanism, settings, costs, {}, options);
+  if (is_cvodes(settings.integrator.type)) return cvodes_adjoint(mechanism, settings, costs, options);
+  return timed([&] {
+    Assembly start(mechanism, settings.start_time);
+    return is_solved(mechanism, settings, start)
+               ? driven_adjoint(mechanism, settings, costs, options, start)
+               : integrate_adjoint(mechanism, settings, costs, options, std::move(start));
+  });
 }
 
 }  // namespace mbsopt

@@ -349,6 +349,7 @@ struct Assembly::Solution {
 
 Assembly::Assembly(const Mechanism& mechanism, double start_time)
     : solution_(std::make_unique<Solution>(mechanism, start_time)) {}
+Assembly::Assembly(Assembly&&) noexcept = default;
 Assembly::~Assembly() = default;
 
 const AssemblyResult& Assembly::result() const { return solution_->result; }

@@ -27,6 +27,7 @@ struct AssemblyResult {
 class Assembly {
  public:
   Assembly(const Mechanism& mechanism, double start_time);
+  Assembly(Assembly&&) noexcept;
   ~Assembly();
   const AssemblyResult& result() const;
   ModelSummary summary() const;

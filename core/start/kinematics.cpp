@@ -10,8 +10,7 @@
 #include "core/body/euler_parameters.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
 #include "core/linear/dense.hpp"
-#include "core/projection/projection.hpp"
-#include "core/sensor/body_at.hpp"
+#include "core/start/driven_path.hpp"
 
 namespace mbsopt {
 namespace {
@@ -20,10 +19,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kLargestTurn = 0.1;         // of an Euler parameter in one step
-constexpr double kRelativeCorrection = 0.2;  // of the predictor, against h v
-constexpr double kSmallCorrection = 1e-6;    // always accepted
-constexpr double kViolation = 1e-9;
 constexpr double kDrivenRankThreshold = 1e-7;  // rows of J scaled to unit length
 
 // J at a state, rows scaled to unit length: linear solves that no mass enters.
@@ -120,89 +115,56 @@ class DrivenMotion final : public MotionSource {
   VectorXd y_, ydot_;
 };
 
+// Degrees of freedom that J leaves at a position, and who owns the equations that depend on each other there: those
+// with a share in null vectors of J'.
+SingularPosition rank_at(const MechanismData& d, DrivenRows& rows, double t, const VectorXd& y) {
+  rows.set(t, y);
+  rows.factor();
+  SingularPosition s;
+  s.t = t;
+  s.rank_lost = static_cast<int>(6 * d.n - rows.rank());
+  if (s.rank_lost == 0 || d.m == 0) return s;
+  const LeftSingular svd = left_singular(rows.unit_rows());
+  std::set<std::string> seen;
+  for (Index k = 0; k < rows.unit_rows().rows(); ++k) {
+    if (k < svd.values.size() && svd.values(k) > kDrivenRankThreshold) continue;
+    for (const Constraint& c : d.constraints) {
+      if (svd.U.col(k).segment(c.row, c.rows()).cwiseAbs().maxCoeff() < 1e-3) continue;
+      const std::string owner = c.drive >= 0 ? "drive '" + d.drive_names[static_cast<std::size_t>(c.drive)] + "'"
+                                             : "joint '" + d.joint_names[static_cast<std::size_t>(c.joint)] + "'";
+      if (seen.insert(owner).second) s.owners.push_back(owner);
+    }
+  }
+  return s;
+}
+
+// The path, with positions and velocities that no mass enters.
 class Kinematics {
  public:
   Kinematics(const Mechanism& mechanism, const FormulationSettings& formulation)
-      : d_(mechanism.data()),
-        motion_(mechanism, formulation),
-        projector_(make_projector(mechanism, Projection::position_velocity)),
-        rows_(d_),
-        solution_(projector_->solution()),
-        y_hat_(mechanism.states()),
-        y_next_(mechanism.states()) {}
+      : d_(mechanism.data()), motion_(mechanism, formulation), path_(mechanism, Model::spatial), rows_(d_) {}
 
-  void start(double t, const VectorXd& y, const VectorXd& angles) { t_ = t, y_ = y, angles_ = angles; }
-  StatePoint point() { return {t_, y_, angles_, &motion_}; }
-  const VectorXd& y() const { return y_; }
-  double t() const { return t_; }
-
-  // Largest step allowed by the velocities.
-  double step_limit() const {
-    double fastest = 0;
-    for (int i = 0; i < d_.n; ++i) {
-      fastest = std::max(fastest, y_.segment<4>(7 * (d_.n + i) + 3).lpNorm<Eigen::Infinity>());
-    }
-    return fastest > 0 ? kLargestTurn / fastest : INFINITY;
-  }
-
-  // One step; false where Newton does not converge or the correction says that the step is too long.
+  void start(double t, const VectorXd& y, const VectorXd& angles) { path_.start(t, y, angles); }
+  StatePoint point() { return {path_.state().t, path_.state().y, path_.state().angles, &motion_}; }
+  double t() const { return path_.state().t; }
+  double step_limit() const { return path_.step_limit(); }
   bool advance(double h, double t1) {
-    const Index half = 7 * d_.n;
-    const Motion& m = motion_.motion(point());
-    const bool accelerated = std::all_of(m.z.begin(), m.z.end(), [](const Vec<6>& z) {
-      return z.allFinite() && z.cwiseAbs().maxCoeff() < 1e8;  // not so next to a singular position
-    });
-    for (int i = 0; i < d_.n; ++i) {
-      const Index q = 7 * i;
-      Vec<7> a = Vec<7>::Zero();
-      if (accelerated) {
-        const Vec<6>& z = m.z[static_cast<std::size_t>(i)];
-        const Vector4d p = y_.segment<4>(q + 3), pdot = y_.segment<4>(half + q + 3);
-        a << z.head<3>(), 0.5 * G_transposed_times(p, z.tail<3>()) - pdot.squaredNorm() * p;
-      }
-      y_hat_.segment<7>(q) = y_.segment<7>(q) + h * y_.segment<7>(half + q) + 0.5 * h * h * a;
-      y_hat_.segment<7>(half + q) = y_.segment<7>(half + q) + h * a;
-    }
-    if (!projector_->project(t1, angles_, y_hat_, y_next_, solution_)) return false;
-    polish(t1);
-    if (!keeps_branch(h)) return false;
-    if (projector_->position_violation(t1, angles_, y_next_) > kViolation) return false;
-    t_ = t1;
-    y_ = y_next_;
-    for (std::size_t k = 0; k < d_.angles.size(); ++k) {
-      const JointAngle& a = d_.angles[k];
-      double& angle = angles_(static_cast<Index>(k));
-      angle = a.value_near(angle, body_at(y_, a.body1).frame, body_at(y_, a.body2).frame);
-    }
+    if (!path_.advance(h, t1)) return false;
+    polish();
     return true;
   }
+  double position_violation() { return path_.position_violation(); }
+  double velocity_violation() { return path_.velocity_violation(); }
+  SingularPosition rank_here() { return rank_at(d_, rows_, t(), path_.state().y); }
 
-  // Each body's correction is small against h v, and so is the difference from the trapezoidal rule. Beside a dead
-  // point h^2 a/2 may reach the other branch, so that the correction alone is small there; but on that branch the
-  // velocity has the opposite sign, and the trapezoidal rule disagrees.
-  bool keeps_branch(double h) const {
-    const Index half = 7 * d_.n;
-    const auto keeps = [&](Index at, Index size) {
-      const auto v0 = y_.segment(half + at, size), v1 = y_next_.segment(half + at, size);
-      const double allowed =
-          std::max(kSmallCorrection,
-                   kRelativeCorrection * h * std::max(v0.lpNorm<Eigen::Infinity>(), v1.lpNorm<Eigen::Infinity>()));
-      const auto q0 = y_.segment(at, size), q1 = y_next_.segment(at, size);
-      return (q1 - y_hat_.segment(at, size)).lpNorm<Eigen::Infinity>() <= allowed &&
-             (q1 - q0 - 0.5 * h * (v0 + v1)).lpNorm<Eigen::Infinity>() <= allowed;
-    };
-    for (Index i = 0; i < d_.n; ++i) {
-      if (!keeps(7 * i, 3) || !keeps(7 * i + 3, 4)) return false;
-    }
-    return true;
-  }
-
+ private:
   // Newton's last steps, and the velocities, without masses.
-  void polish(double t1) {
+  void polish() {
+    y_ = path_.state().y;
     double before = INFINITY;
     for (int k = 0; k < 10; ++k) {
-      rows_.set(t1, y_next_);
-      const VectorXd phi = rows_.phi(angles_);
+      rows_.set(t(), y_);
+      const VectorXd phi = rows_.phi(path_.state().angles);
       const double now = phi.cwiseAbs().maxCoeff();
       rows_.factor();
       if (now < 1e-15 || !(now < 0.9 * before)) break;
@@ -212,65 +174,48 @@ class Kinematics {
     const VectorXd u = rows_.solve(-rows_.phi_dot());
     const Index half = 7 * d_.n;
     for (int i = 0; i < d_.n; ++i) {
-      y_next_.segment<3>(half + 7 * i) += u.segment<3>(6 * i);
-      y_next_.segment<4>(half + 7 * i + 3) +=
-          0.5 * G_transposed_times(Vector4d(y_next_.segment<4>(7 * i + 3)), u.segment<3>(6 * i + 3));
+      y_.segment<3>(half + 7 * i) += u.segment<3>(6 * i);
+      y_.segment<4>(half + 7 * i + 3) +=
+          0.5 * G_transposed_times(Vector4d(y_.segment<4>(7 * i + 3)), u.segment<3>(6 * i + 3));
     }
+    path_.improve(y_);
   }
   void move(const VectorXd& delta) {
     const Index half = 7 * d_.n;
     for (int i = 0; i < d_.n; ++i) {
-      y_next_.segment<3>(7 * i) += delta.segment<3>(6 * i);
-      Vector4d p = y_next_.segment<4>(7 * i + 3);
+      y_.segment<3>(7 * i) += delta.segment<3>(6 * i);
+      Vector4d p = y_.segment<4>(7 * i + 3);
       p += 0.5 * G_transposed_times(p, delta.segment<3>(6 * i + 3));
       p.normalize();
-      Vector4d pdot = y_next_.segment<4>(half + 7 * i + 3);
+      Vector4d pdot = y_.segment<4>(half + 7 * i + 3);
       pdot -= p * p.dot(pdot);
-      y_next_.segment<4>(7 * i + 3) = p;
-      y_next_.segment<4>(half + 7 * i + 3) = pdot;
-    }
-  }
-
-  double position_violation() { return projector_->position_violation(t_, angles_, y_); }
-  double velocity_violation() { return projector_->velocity_violation(t_, y_); }
-
-  // Degrees of freedom that J leaves at the present position, and who owns the equations that depend on each other.
-  SingularPosition rank_here() {
-    rows_.set(t_, y_);
-    rows_.factor();
-    SingularPosition s;
-    s.t = t_;
-    s.rank_lost = static_cast<int>(6 * d_.n - rows_.rank());
-    if (s.rank_lost > 0 && d_.m > 0) name_owners(rows_.unit_rows(), s);
-    return s;
-  }
-
- private:
-  // Equations with a share in a dependence that the generic position does not have: null vectors of J'.
-  void name_owners(const MatrixXd& J, SingularPosition& s) const {
-    const LeftSingular svd = left_singular(J);
-    std::set<std::string> seen;
-    for (Index k = 0; k < J.rows(); ++k) {
-      if (k < svd.values.size() && svd.values(k) > kDrivenRankThreshold) continue;
-      for (const Constraint& c : d_.constraints) {
-        if (svd.U.col(k).segment(c.row, c.rows()).cwiseAbs().maxCoeff() < 1e-3) continue;
-        const std::string owner = c.drive >= 0 ? "drive '" + d_.drive_names[static_cast<std::size_t>(c.drive)] + "'"
-                                               : "joint '" + d_.joint_names[static_cast<std::size_t>(c.joint)] + "'";
-        if (seen.insert(owner).second) s.owners.push_back(owner);
-      }
+      y_.segment<4>(7 * i + 3) = p;
+      y_.segment<4>(half + 7 * i + 3) = pdot;
     }
   }
 
   const MechanismData& d_;
   DrivenMotion motion_;
-  std::unique_ptr<Projector> projector_;
+  DrivenPath path_;
   DrivenRows rows_;
-  ProjectionSolution solution_;
-  double t_ = 0;
-  VectorXd y_, angles_, y_hat_, y_next_;
+  VectorXd y_;
 };
 
 }  // namespace
+
+std::string why_stuck(const Mechanism& mechanism, double t, const VectorXd& y) {
+  DrivenRows rows(mechanism.data());
+  const SingularPosition here = rank_at(mechanism.data(), rows, t, y);
+  const std::string why = here.owners.empty()
+                              ? std::string()
+                              : fmt::format(": a singular position, where the equations of {} depend on each other",
+                                            fmt::join(here.owners, ", "));
+  return fmt::format(
+      "the positions cannot be continued beyond t = {:.6g} s{}. A dead point that the drives cannot pass, or a "
+      "position "
+      "out of reach? Change the law, the lengths, or drive another joint there",
+      t, why);
+}
 
 KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& start, const SimulationSettings& settings,
                                   const std::vector<double>& times,
@@ -318,15 +263,7 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
       }
       h /= 2;
       if (h < 1e-9 * std::max(1e-3, times.back() - times.front())) {
-        const SingularPosition here = k.rank_here();
-        const std::string why =
-            here.owners.empty() ? std::string()
-                                : fmt::format(": a singular position, where the equations of {} depend on each other",
-                                              fmt::join(here.owners, ", "));
-        result.message = fmt::format(
-            "the positions cannot be continued beyond t = {:.6g} s{}. A dead point that the drives cannot "
-            "pass, or a position out of reach? Change the law, the lengths, or drive another joint there",
-            k.t(), why);
+        result.message = why_stuck(mechanism, k.t(), k.point().y);
         return result;
       }
     }

@@ -4,8 +4,7 @@
 //   positions      Phi(q, t) = 0 by Newton's method from a predictor of second order, continued in time
 //   velocities     Phi_q v = -Phi_t,    accelerations and multipliers from the equations of motion: linear solves
 //
-// Steps are cut where the correction of the predictor is not small against h v, or where the trapezoidal rule
-// disagrees, so that a branch is followed and never changed. Where J loses rank the position is singular: it is crossed
+// The positions follow one branch (driven_path.hpp). Where J loses rank the position is singular: it is crossed
 // when steps to either side of it are possible, and reported with the rank that is lost and the joints and drives whose
 // equations depend on each other.
 #pragma once
@@ -44,5 +43,8 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
                                   const std::vector<double>& times,
                                   const std::function<bool(std::size_t, const StatePoint&)>& observe,
                                   const std::function<bool(double)>& go_on = {});
+
+// Why the positions cannot be continued from a state at t, in words.
+std::string why_stuck(const Mechanism& mechanism, double t, const Eigen::VectorXd& y);
 
 }  // namespace mbsopt

@@ -34,6 +34,12 @@ class Watch {
   double t_ = 0;
 };
 
+// Methods and tolerances of integration are compared: a driven mechanism is integrated, too.
+SimulationSettings integrated(SimulationSettings settings) {
+  settings.solve = Solve::dynamics;
+  return settings;
+}
+
 }  // namespace
 
 TradeoffRuns::TradeoffRuns(Scene scene, std::vector<Objective> objectives)
@@ -55,10 +61,11 @@ Answer TradeoffRuns::motion(const SimulationSettings& settings, const RunLimit& 
   return run(settings, limit, frozen, true);
 }
 
-Answer TradeoffRuns::run(const SimulationSettings& settings, const RunLimit& limit, const StepSequence* frozen,
+Answer TradeoffRuns::run(const SimulationSettings& given, const RunLimit& limit, const StepSequence* frozen,
                          bool sampled) const {
   Answer answer;
   Watch watch(limit);
+  const SimulationSettings settings = integrated(given);
   const Eigen::VectorXd rho = parameter_values(scene_);
   std::vector<const Objective*> simulated;
   for (const Objective& o : objectives_)
@@ -105,7 +112,7 @@ Answer TradeoffRuns::gradients(const SimulationSettings& settings, GradientMetho
   Answer answer;
   Watch watch(limit);
   Scene scene = scene_;
-  scene.simulation = settings;
+  scene.simulation = integrated(settings);
   EvaluatorOptions options;
   options.method = method;
   options.progress = [&](double t) { return watch.go_on(t); };

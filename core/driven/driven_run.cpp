@@ -1,0 +1,233 @@
+#include "core/driven/driven_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/integrate/model_choice.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/start/kinematics.hpp"
+#include "core/step/event_times.hpp"
+#include "core/watch/jump_watch.hpp"
+#include "core/watch/zero_length.hpp"
+
+namespace mbsopt {
+namespace {
+
+// A run has at least so many panels: a peak of a sixtieth of the run meets a node, and is resolved from there on.
+constexpr double kFewestPanels = 4;
+// A panel turns bodies by at most so many steps of the path: its 15 nodes then need no steps between them.
+constexpr double kStepsPerPanel = 8;
+// Part of rtol times the integral so far that one panel may be off by, however short: a kink or a jump.
+constexpr double kPartOfRun = 0.1;
+
+}  // namespace
+
+DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
+                     std::span<const double> observed, const RunOptions& options, const Assembly& start,
+                     bool differentiated)
+    : mechanism_(mechanism),
+      settings_(settings),
+      costs_(costs),
+      options_(options),
+      model_(model_of(mechanism, settings, *runge_kutta_method(settings.integrator.type))),
+      path_(mechanism, model_),
+      schedule_(costs, observed, settings.end_time),
+      differentiated_(differentiated),
+      shortest_(1e-9 * std::max(1e-3, settings.end_time - settings.start_time)),
+      absolute_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(costs.size()))) {
+  if (mechanism.data().needs_motion) motion_.emplace(mechanism, settings.formulation);
+  result_.psi.setZero(static_cast<Eigen::Index>(costs.size()));
+  result_.last_good_time = settings.start_time;
+  result_.y_initial = start.result().y;
+  result_.statistics.solved = true;
+  for (std::size_t o = 0; o < costs.size(); ++o) {
+    if (costs[o].running) running_.push_back({costs[o].running.get(), static_cast<Eigen::Index>(o)});
+  }
+  if (!running_.empty()) nodes_.resize(kNodes);
+  g_.resize(running_.size() * kNodes);
+  integrals_.resize(running_.size());
+  path_.start(settings.start_time, start.result().y, start.result().angles);
+}
+
+void DrivenRun::stop(SimulationStatus status, const std::string& message) {
+  result_.status = status, result_.message = message;
+}
+
+SimulationResult DrivenRun::finish() {
+  result_.statistics.factorisations += path_.factorisations();
+  return std::move(result_);
+}
+
+void DrivenRun::go(const Take& take) {
+  const Energy e = energy(mechanism_.data(), path_.state().y, path_.state().angles);
+  result_.statistics.energy_initial = result_.statistics.energy_final = e.kinetic + e.potential;
+  go_through_panels(take);
+  result_.y_end = path_.state().y;
+  if (!result_.ok()) return;
+  if (!take_terminal_costs(take)) {
+    return stop(SimulationStatus::not_finite, fmt::format("the derivatives met a matrix that cannot be factored at "
+                                                          "t = {:.6g} s: a singular position?",
+                                                          path_.state().t));
+  }
+  if (!result_.psi.allFinite()) stop(SimulationStatus::not_finite, not_finite_costs(costs_, result_.psi));
+}
+
+void DrivenRun::go_through_panels(const Take& take) {
+  const double end = settings_.end_time;
+  EventTimes events(settings_.events, settings_.start_time, end);
+  std::optional<JumpWatch> jumps;
+  if (differentiated_ && !options_.frozen) {
+    jumps.emplace(mechanism_, settings_, costs_, motion_ ? &*motion_ : nullptr);
+    jumps->begin(point());
+  }
+  const StepSequence* const frozen = options_.frozen;
+  double h = end - settings_.start_time;
+  std::size_t panel = 0;
+  while (path_.state().t < end) {
+    const double t = path_.state().t;
+    double t1 = end;
+    if (frozen) {
+      if (panel >= frozen->times.size()) break;
+      if (panel + 1 < frozen->times.size() || !frozen->to_the_end) t1 = frozen->times[panel] + frozen->sizes[panel];
+    } else {
+      const double stop_at = events.stop_after(t);
+      h = std::min(h, largest_panel());
+      t1 = h >= (stop_at - t) * (1 - 1e-12) ? stop_at : t + h;
+    }
+    from_ = path_.state();
+    const Panel outcome = try_panel(t1);
+    if (outcome == Panel::refused || (outcome == Panel::stuck && !frozen && t1 - t > shortest_)) {
+      ++result_.statistics.rejected, ++result_.statistics.rejections.error_test;
+      path_.start(from_);
+      h = (t1 - t) / 2;
+      continue;
+    }
+    if (outcome == Panel::stuck)
+      return stop(SimulationStatus::step_too_small, why_stuck(mechanism_, path_.state().t, path_.state().y));
+    if (path_.steps() > settings_.integrator.max_steps) {
+      return stop(SimulationStatus::too_many_steps,
+                  fmt::format("more than {} positions were needed until t = {:.6g} s (integrator.max_steps). Is the "
+                              "law of a drive in rad and s?",
+                              settings_.integrator.max_steps, t));
+    }
+    if (!take_panel(t1, take)) {
+      if (!result_.ok()) return;
+      return stop(SimulationStatus::not_finite, fmt::format("the derivatives met a matrix that cannot be factored at "
+                                                            "t = {:.6g} s: a singular position?",
+                                                            path_.state().t));
+    }
+    end_panel(t, t1);
+    if (jumps) jumps->look_at(point());
+    if (differentiated_) {
+      const std::string objection = through_zero_length(mechanism_.data(), t, from_.y, t1, path_.state().y);
+      if (!objection.empty()) return stop(SimulationStatus::not_credible, objection);
+    }
+    if (options_.after_step) options_.after_step(point());
+    if (options_.progress && !options_.progress(t1)) {
+      return stop(SimulationStatus::stopped, fmt::format("stopped at t = {:.6g} s", t1));
+    }
+    ++panel;
+    h *= 2;
+    const double resume = frozen ? (panel < frozen->times.size() ? frozen->times[panel] : t1)
+                                 : (events.reached(t1) ? events.resume_time() : t1);
+    if (!go_to(resume))
+      return stop(SimulationStatus::step_too_small, why_stuck(mechanism_, path_.state().t, path_.state().y));
+  }
+  if (jumps) jumps->add_to(result_.statistics);
+}
+
+double DrivenRun::largest_panel() const {
+  return std::min((settings_.end_time - settings_.start_time) / kFewestPanels,
+                  (running_.empty() ? 1 : kStepsPerPanel) * path_.step_limit());
+}
+
+// The states and running costs at the nodes, and whether the integrals are exact enough.
+DrivenRun::Panel DrivenRun::try_panel(double t1) {
+  const double t = from_.t, h = t1 - t;
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    if (!go_to(t + kronrod_rule().nodes[k] * h)) return Panel::stuck;
+    nodes_[k] = path_.state();
+    for (std::size_t r = 0; r < running_.size(); ++r) g_[r * kNodes + k] = running_[r].cost->value(point_of(nodes_[k]));
+  }
+  if (!go_to(t1)) return Panel::stuck;
+  const IntegratorSettings& s = settings_.integrator;
+  for (std::size_t r = 0; r < running_.size(); ++r) {
+    const PanelIntegral I = integrals_[r] = integrate_panel(std::span(g_).subspan(r * kNodes, kNodes), h);
+    if (options_.frozen || h <= shortest_) continue;
+    const double of_panel = s.rtol * I.absolute + s.atol * h;
+    const double of_run = kPartOfRun * s.rtol * (absolute_(running_[r].objective) + I.absolute);
+    if (I.error > std::max(of_panel, of_run)) return Panel::refused;  // what is no number is found at the end
+  }
+  return Panel::accepted;
+}
+
+bool DrivenRun::take_panel(double t1, const Take& take) {
+  std::span<const SampleEvent> events = schedule_.take(t1);
+  const bool walks = !events.empty() || !nodes_.empty();
+  const DrivenState end = path_.state();
+  if (!walks) return true;
+  path_.start(from_);
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    if (!take_events_until(nodes_[k].t, events, take)) return false;
+    path_.start(nodes_[k]);
+    for (DrivenTerm& term : running_) term.weight = (t1 - from_.t) * kronrod_rule().kronrod[k];
+    if (take && !take(point(), running_)) return false;
+  }
+  for (std::size_t r = 0; r < running_.size(); ++r) {
+    const PanelIntegral& I = integrals_[r];
+    const Eigen::Index o = running_[r].objective;
+    result_.psi(o) += I.value;
+    absolute_(o) += I.absolute;
+    // The shortest panel was accepted as it is: an integrable singularity, perhaps.
+    QuadratureError& worst = costs_[static_cast<std::size_t>(o)].is_extreme ? result_.statistics.extreme_quadrature
+                                                                            : result_.statistics.quadrature;
+    const double relative = I.absolute > 0 ? I.error / absolute_(o) : 0;
+    if (relative > worst.error) worst = {relative, costs_[static_cast<std::size_t>(o)].name, from_.t};
+  }
+  if (!take_events_until(INFINITY, events, take)) return false;
+  path_.start(end);
+  return true;
+}
+
+bool DrivenRun::take_events_until(double t, std::span<const SampleEvent>& events, const Take& take) {
+  while (!events.empty() && events.front().time <= t) {
+    const SampleEvent& e = events.front();
+    if (!go_to(e.time)) {
+      stop(SimulationStatus::step_too_small, why_stuck(mechanism_, path_.state().t, path_.state().y));
+      return false;
+    }
+    if (e.cost) result_.psi(e.objective) += e.cost->value(point());
+    const DrivenTerm term{e.cost, e.objective, 1, e.index};
+    if (take && !take(point(), std::span(&term, 1))) return false;
+    events = events.subspan(1);
+  }
+  return true;
+}
+
+bool DrivenRun::take_terminal_costs(const Take& take) {
+  for (std::size_t o = 0; o < costs_.size(); ++o) {
+    const PointCost* const cost = costs_[o].terminal.get();
+    if (!cost) continue;
+    const Eigen::Index objective = static_cast<Eigen::Index>(o);
+    result_.psi(objective) += cost->value(point());
+    const DrivenTerm term{cost, objective, 1, 0};
+    if (take && !take(point(), std::span(&term, 1))) return false;
+  }
+  return true;
+}
+
+void DrivenRun::end_panel(double t0, double t1) {
+  SimulationStatistics& s = result_.statistics;
+  ++s.steps;
+  result_.steps.times.push_back(t0), result_.steps.sizes.push_back(t1 - t0);
+  result_.last_good_time = t1;
+  s.max_position_violation = std::max(s.max_position_violation, path_.position_violation());
+  s.max_velocity_violation = std::max(s.max_velocity_violation, path_.velocity_violation());
+  const Energy e = energy(mechanism_.data(), path_.state().y, path_.state().angles);
+  s.energy_final = e.kinetic + e.potential;
+  s.energy_drift = std::max(s.energy_drift, std::abs(s.energy_final - s.energy_initial));
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,82 @@
+// A run of a mechanism whose drives leave nothing free. Its positions and velocities are solved at the instants that
+// costs and observers ask for (core/start/driven_path.hpp); nothing is integrated but the running costs.
+//
+//   integral of g dt    sum over panels of Gauss-Kronrod's 15 nodes (kronrod.hpp), panels halved until
+//                       error <= rtol integral of |g| + atol h       over the panel, or a part of it over the run
+//
+// The panels are the steps of the result: given again (RunOptions::frozen), they make psi a smooth function of rho.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/driven/kronrod.hpp"
+#include "core/dynamics/motion_solver.hpp"
+#include "core/run/cost.hpp"
+#include "core/run/sample_schedule.hpp"
+#include "core/run/simulation_result.hpp"
+#include "core/scene/settings.hpp"
+#include "core/start/assembly.hpp"
+#include "core/start/driven_path.hpp"
+
+namespace mbsopt {
+
+// What is taken at one instant: a cost times its weight, or an observation, of which the cost is null.
+struct DrivenTerm {
+  const PointCost* cost = nullptr;
+  Eigen::Index objective = 0;
+  double weight = 1;
+  std::size_t observation = 0;
+};
+
+class DrivenRun {
+ public:
+  // At the instants in ascending order; false: the derivatives failed there.
+  using Take = std::function<bool(const StatePoint&, std::span<const DrivenTerm>)>;
+
+  DrivenRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
+            std::span<const double> observed, const RunOptions& options, const Assembly& start, bool differentiated);
+
+  // psi into the result. take: besides.
+  void go(const Take& take);
+  SimulationResult& result() { return result_; }
+  SimulationResult finish();
+  Model model() const { return model_; }
+
+ private:
+  enum class Panel { accepted, refused, stuck };
+  void go_through_panels(const Take& take);
+  Panel try_panel(double t1);
+  double largest_panel() const;
+  bool take_panel(double t1, const Take& take);
+  bool take_events_until(double t, std::span<const SampleEvent>& events, const Take& take);
+  bool take_terminal_costs(const Take& take);
+  void end_panel(double t0, double t1);
+  void stop(SimulationStatus status, const std::string& message);
+  bool go_to(double t) { return path_.go_to(t, shortest_); }
+  StatePoint point() { return point_of(path_.state()); }
+  StatePoint point_of(const DrivenState& s) { return {s.t, s.y, s.angles, motion_ ? &*motion_ : nullptr}; }
+
+  const Mechanism mechanism_;
+  const SimulationSettings& settings_;
+  std::span<const Cost> costs_;
+  const RunOptions& options_;
+  const Model model_;
+  DrivenPath path_;
+  std::optional<MotionSolver> motion_;  // where some sensor needs it
+  SampleSchedule schedule_;
+  const bool differentiated_;
+  const double shortest_;            // step or panel [s]
+  std::vector<DrivenTerm> running_;  // of one node
+  std::vector<DrivenState> nodes_;   // of the panel; none without running costs
+  DrivenState from_;                 // where the panel begins
+  std::vector<double> g_;            // running cost x node
+  Eigen::VectorXd absolute_;         // integral of |g| so far, per cost
+  std::vector<PanelIntegral> integrals_;
+  SimulationResult result_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,159 @@
+#include "core/driven/driven_simulation.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <vector>
+
+#include "core/cvodes/cvodes.hpp"
+#include "core/driven/driven_run.hpp"
+#include "core/dynamics/spatial_dynamics.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/parameter_lanes.hpp"
+
+namespace mbsopt {
+namespace {
+
+// Why a run is integrated although drives may leave nothing free; empty: no setting asks for it.
+std::string why_integrated(const MechanismData& d, const SimulationSettings& s) {
+  if (d.equilibrium) return "it starts from static equilibrium";
+  if (is_cvodes(s.integrator.type)) return "CVODES integrates";
+  if (s.integrator.step) return "simulation.integrator.step asks for steps";
+  if (s.formulation.type == FormulationType::penalty) return "the joints of the penalty form give way to loads";
+  if (s.formulation.projection != Projection::position_velocity)
+    return "simulation.formulation.projection lets the state leave the constraints";
+  return "";
+}
+
+// Derivatives of the state in rho at one instant.
+class DrivenDerivatives {
+ public:
+  DrivenDerivatives(const Mechanism& mechanism, Model model)
+      : data_(mechanism.data()),
+        projector_(make_projector(mechanism, Projection::position_velocity, model)),
+        unmoved_(projector_->solution()),
+        blocks_(parameter_blocks(data_)),
+        y_bar_(Eigen::VectorXd::Zero(mechanism.states())),
+        y_hat_bar_(y_bar_),
+        rho_bar_(Eigen::VectorXd::Zero(data_.rho.size())),
+        y_rho_(Eigen::MatrixXd::Zero(mechanism.states(), data_.rho.size())) {
+    none_.setZero(mechanism.states(), kLanes), direction_ = none_;
+  }
+
+  bool linearise(const StatePoint& at) { return projector_->linearise(at.t, at.angles, at.y, at.y, unmoved_); }
+  const Eigen::MatrixXd& y_rho() {
+    for (const ParameterBlock& b : blocks_) {
+      projector_->tangent(b, none_, direction_);
+      for (int k = 0; k < kLanes; ++k) {
+        if (b.parameter[k] >= 0) y_rho_.col(b.parameter[k]) = direction_.col(k);
+      }
+    }
+    return y_rho_;
+  }
+  // psi_rho += weight d(cost)/d(rho) with y_rho known
+  void add_forward(const DrivenTerm& term, const StatePoint& at, Eigen::MatrixXd& psi_rho) {
+    y_bar_.setZero(), rho_bar_.setZero();
+    term.cost->add_gradient(at, term.weight, y_bar_, rho_bar_);
+    psi_rho.row(term.objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
+  }
+  // The same into fields and parameters.
+  void add_backward(const DrivenTerm& term, const StatePoint& at, Eigen::VectorXd& theta_bar,
+                    Eigen::VectorXd& rho_bar) {
+    y_bar_.setZero(), y_hat_bar_.setZero();
+    term.cost->add_gradient(at, term.weight, y_bar_, rho_bar);
+    projector_->add_adjoint(y_bar_, y_hat_bar_, theta_bar, rho_bar);
+  }
+  long factorisations() const { return projector_->factorisations(); }
+
+ private:
+  const MechanismData& data_;
+  std::unique_ptr<Projector> projector_;
+  const ProjectionSolution unmoved_;
+  std::vector<ParameterBlock> blocks_;
+  Eigen::VectorXd y_bar_, y_hat_bar_, rho_bar_;
+  Eigen::MatrixXd y_rho_;
+  LaneRows none_, direction_;
+};
+
+}  // namespace
+
+bool is_solved(const Mechanism& mechanism, const SimulationSettings& settings, const Assembly& start) {
+  const MechanismData& d = mechanism.data();
+  if (settings.solve == Solve::dynamics) return false;
+  const std::string reason = d.drive_names.empty() ? "there are no drives" : why_integrated(d, settings);
+  const int free = reason.empty() && start.result().ok ? start.summary().degrees_of_freedom : 0;
+  if (settings.solve == Solve::kinematics && (!reason.empty() || free > 0)) {
+    throw std::invalid_argument(fmt::format(
+        "simulation.solve: cannot be \"kinematics\": {}",
+        !reason.empty() ? reason : fmt::format("the drives leave {} degree{} of freedom", free, free == 1 ? "" : "s")));
+  }
+  return reason.empty() && start.result().ok && free == 0;
+}
+
+SimulationResult driven_simulate(const Mechanism& mechanism, const SimulationSettings& settings,
+                                 std::span<const Cost> costs, const Sampling& sampling, const RunOptions& options,
+                                 const Assembly& start) {
+  DrivenRun run(mechanism, settings, costs, sampling.times, options, start, false);
+  run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
+    for (const DrivenTerm& term : terms)
+      if (!term.cost && sampling.observe) sampling.observe(term.observation, at);
+    return true;
+  });
+  return run.finish();
+}
+
+SimulationResult driven_tlm(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
+                            const TangentSampling& sampling, const RunOptions& options, const Assembly& start) {
+  DrivenRun run(mechanism, settings, costs, sampling.times, options, start, true);
+  SimulationResult& result = run.result();
+  result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
+  DrivenDerivatives derivatives(mechanism, run.model());
+  SpatialDynamics dynamics(mechanism, settings.formulation);  // of the rates that observers get
+  Eigen::VectorXd ydot(mechanism.states());
+  run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
+    if (!derivatives.linearise(at)) return false;
+    ++result.statistics.linearised_states;
+    const Eigen::MatrixXd& y_rho = derivatives.y_rho();
+    for (const DrivenTerm& term : terms) {
+      if (term.cost) {
+        derivatives.add_forward(term, at, result.psi_rho);
+        continue;
+      }
+      if (!dynamics.evaluate(at.t, at.y, at.angles, ydot)) return false;
+      StatePoint with_rate = at;
+      with_rate.ydot = &ydot;
+      sampling.observe(term.observation, with_rate, y_rho);
+    }
+    return y_rho.allFinite();
+  });
+  result.statistics.factorisations += derivatives.factorisations();
+  return run.finish();
+}
+
+SimulationResult driven_adjoint(const Mechanism& mechanism, const SimulationSettings& settings,
+                                std::span<const Cost> costs, const RunOptions& options, const Assembly& start) {
+  DrivenRun run(mechanism, settings, costs, {}, options, start, true);
+  SimulationResult& result = run.result();
+  const MechanismData& d = mechanism.data();
+  DrivenDerivatives derivatives(mechanism, run.model());
+  std::vector<Eigen::VectorXd> theta_bar(costs.size(), Eigen::VectorXd::Zero(d.slots()));
+  std::vector<Eigen::VectorXd> rho_bar(costs.size(), Eigen::VectorXd::Zero(d.rho.size()));
+  run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
+    if (!derivatives.linearise(at)) return false;
+    ++result.statistics.linearised_states;
+    for (const DrivenTerm& term : terms) {
+      const std::size_t o = static_cast<std::size_t>(term.objective);
+      derivatives.add_backward(term, at, theta_bar[o], rho_bar[o]);
+    }
+    return true;
+  });
+  result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
+  for (std::size_t o = 0; o < costs.size(); ++o) {
+    d.add_to_rho(theta_bar[o], rho_bar[o]);
+    result.psi_rho.row(static_cast<Eigen::Index>(o)) = rho_bar[o].transpose();
+  }
+  result.statistics.factorisations += derivatives.factorisations();
+  return run.finish();
+}
+
+}  // namespace mbsopt
