@@ -10,7 +10,7 @@ using namespace mbsopt;
 
 namespace {
 
-Scene pendulum() {
+Scene hinged_rod() {
   Scene scene;
   scene.parameters.push_back({"m", 2.0});
   scene.definitions.push_back({"half", Expression::parse("m/2")});
@@ -53,14 +53,14 @@ Force spring() {
 }  // namespace
 
 TEST_CASE("a right scene has no issues", "[scene]") {
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   scene.forces.push_back(spring());
   scene.conditions.push_back({"theta", Expression::parse("30 [deg]"), Expression(0.0)});
   for (const SceneIssue& issue : find_issues(scene)) FAIL(issue.path << ": " << issue.message);
 }
 
 TEST_CASE("forces written with sensors and a force sensor are right; of other forces it is refused", "[scene]") {
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   scene.forces.push_back(spring());
   Torque servo;
   servo.body = "bob", servo.components[2] = Expression::parse("-m*theta + sin(t)");
@@ -78,10 +78,10 @@ TEST_CASE("an empty scene needs a body", "[scene]") {
 }
 
 TEST_CASE("a joint of a scene made in C++ lacks or has too many axes", "[scene]") {
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   scene.joints[0].axis2.reset();
   CHECK_THAT(at(scene, "joints[0].axis2"), Catch::Contains("is missing"));
-  scene = pendulum();
+  scene = hinged_rod();
   scene.joints[0].type = "spherical";
   scene.sensors.clear();
   CHECK_THAT(at(scene, "joints[0].axis1"), Catch::Contains("this type does not have it"));
@@ -89,7 +89,7 @@ TEST_CASE("a joint of a scene made in C++ lacks or has too many axes", "[scene]"
 
 TEST_CASE("numbers of a scene made in C++ must be finite", "[scene]") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   scene.bodies[0].position[1] = nan;
   scene.parameters[0].value = std::numeric_limits<double>::infinity();
   scene.simulation.end_time = nan;
@@ -101,7 +101,7 @@ TEST_CASE("numbers of a scene made in C++ must be finite", "[scene]") {
 
 TEST_CASE("inertia tensors at the edge of what a body can have", "[scene]") {
   const auto problem = [](InertiaField inertia) {
-    Scene scene = pendulum();
+    Scene scene = hinged_rod();
     scene.bodies[0].inertia = inertia;
     return at(scene, "bodies[0].inertia");
   };
@@ -118,7 +118,7 @@ TEST_CASE("inertia tensors at the edge of what a body can have", "[scene]") {
 }
 
 TEST_CASE("normals come in pairs and not along the axis", "[scene]") {
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   scene.joints[0].normal1 = VectorField{1.0, 0.0, 0.0};
   CHECK_THAT(at(scene, "joints[0].normal2"), Catch::Contains("give both normals"));
   scene.joints[0].normal2 = VectorField{0.0, 0.0, -2.0};
@@ -126,7 +126,7 @@ TEST_CASE("normals come in pairs and not along the axis", "[scene]") {
 }
 
 TEST_CASE("an angle between different axes needs normals only where it is used", "[scene]") {
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   scene.joints[0].axis2 = VectorField{0.0, 1.0, 0.0};
   CHECK_THAT(at(scene, "joints[0]"), Catch::Contains("give normal1 and normal2"));
   scene.sensors.clear();
@@ -134,11 +134,11 @@ TEST_CASE("an angle between different axes needs normals only where it is used",
 }
 
 TEST_CASE("conditions fit what their sensor measures", "[scene]") {
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   scene.sensors[0].quantity = "rate";
   scene.conditions.push_back({"theta", Expression(1.0), Expression(1.0)});
   CHECK_THAT(at(scene, "initial.conditions[0].rate"), Catch::Contains("give its \"value\""));
-  scene = pendulum();
+  scene = hinged_rod();
   scene.conditions.push_back({"theta", {}, {}});
   CHECK_THAT(at(scene, "initial.conditions[0]"), Catch::Contains("neither"));
   scene.conditions[0].value = Expression::parse("1 [m]");
@@ -153,7 +153,7 @@ TEST_CASE("conditions fit what their sensor measures", "[scene]") {
 }
 
 TEST_CASE("laws use their own names and the parameters", "[scene]") {
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   Force force = spring();
   std::get<Tsda>(force.kind).stiffness = 0.0;
   std::get<Tsda>(force.kind).law = Expression::parse("100*(l - half) + 5*ldot + sin(t)");
@@ -167,7 +167,7 @@ TEST_CASE("laws use their own names and the parameters", "[scene]") {
 }
 
 TEST_CASE("a law beside coefficients is a warning", "[scene]") {
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   Force force = spring();
   std::get<Tsda>(force.kind).law = Expression::parse("l");
   scene.forces.push_back(force);
@@ -179,7 +179,7 @@ TEST_CASE("a law beside coefficients is a warning", "[scene]") {
 }
 
 TEST_CASE("a reaction is that of any joint with bodies, whether it has an angle or not", "[scene]") {
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   scene.sensors[0].quantity = "reaction", scene.sensors[0].kind = "force", scene.sensors[0].component = "x";
   for (const TypeRow& row : kJointTypes) {
     scene.joints[0].type = row.name;
@@ -190,7 +190,7 @@ TEST_CASE("a reaction is that of any joint with bodies, whether it has an angle 
 }
 
 TEST_CASE("circular and endless definitions are reported once, at the definition", "[scene]") {
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   scene.definitions = {{"a", Expression::parse("b + 1")},
                        {"b", Expression::parse("a + 1")},
                        {"c", Expression::parse("a*2")},
@@ -210,7 +210,7 @@ TEST_CASE("circular and endless definitions are reported once, at the definition
 }
 
 TEST_CASE("dimensions follow through parameters and definitions", "[scene]") {
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   scene.parameters.push_back({"L", 1.0, {}, {}, ParameterScale::linear, "m"});
   scene.parameters.push_back({"w", 0.1, {}, {}, ParameterScale::linear, "m"});
   scene.definitions.push_back({"volume", Expression::parse("L*w^2")});
@@ -231,7 +231,7 @@ TEST_CASE("dimensions follow through parameters and definitions", "[scene]") {
 }
 
 TEST_CASE("thousands of bodies are checked", "[scene]") {
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   const Body body = scene.bodies[0];
   const Joint joint = scene.joints[0];
   for (int i = 1; i < 3000; ++i) {
@@ -246,7 +246,7 @@ TEST_CASE("thousands of bodies are checked", "[scene]") {
 
 TEST_CASE("names show as they are written, and are short enough for a file", "[scene]") {
   const auto finding = [](const std::string& name) {
-    Scene scene = pendulum();
+    Scene scene = hinged_rod();
     scene.name = scene.bodies[0].name = scene.joints[0].name = name;
     scene.joints[0].body2 = name, scene.sensors[0].joint = name;
     const std::string found = at(scene, "bodies[0].name");
@@ -272,7 +272,7 @@ TEST_CASE("names show as they are written, and are short enough for a file", "[s
   }
   CHECK(finding(std::string(255, 'a')) == "");
   CHECK_THAT(finding(std::string(256, 'a')), Catch::Contains("256 bytes long, at most 255"));
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   scene.parameters[0].name = std::string(300, 'm');
   CHECK_THAT(at(scene, "parameters." + scene.parameters[0].name), Catch::Contains("at most 255"));
 }
