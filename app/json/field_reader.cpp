@@ -78,6 +78,18 @@ void FieldReader::text(std::string_view key, std::string& value, const Says& say
   if (const Node* node = get(key, says)) read_string(*node, inside(key), value);
 }
 
+void FieldReader::texts(std::string_view key, std::vector<std::string>& values, const Says& says) {
+  const Node* const node = get(key, says);
+  if (!node) return;
+  if (node->kind != Node::Kind::array) {
+    read_string(*node, inside(key), values.emplace_back());
+    return;
+  }
+  if (node->items.empty()) findings_.add(*node, inside(key), "is empty; expected: " + std::string(says.description));
+  for (std::size_t i = 0; i < node->items.size(); ++i)
+    read_string(node->items[i], child_path(inside(key), i), values.emplace_back());
+}
+
 void FieldReader::reference(std::string_view key, std::string& value, To, const Says& says) {
   text(key, value, says);
   const Node* const node = says.need == Need::unknown ? nullptr : node_.find(key);

@@ -32,6 +32,7 @@ class FieldReader {
 
   void name(std::string_view key, std::string& value, const Says& says) { text(key, value, says); }
   void text(std::string_view key, std::string& value, const Says& says);
+  void texts(std::string_view key, std::vector<std::string>& values, const Says& says);
   void reference(std::string_view key, std::string& value, To, const Says& says);
   void references(std::string_view key, std::vector<std::string>& values, To, const Says& says);
   void word(std::string_view key, std::string& value, const Words& words, const Says& says);

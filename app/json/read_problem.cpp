@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "app/json/field_reader.hpp"
 #include "app/json/findings.hpp"
@@ -11,6 +13,7 @@
 #include "optim/objective/problem_issues.hpp"
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/data_issues.hpp"
+#include "optim/problem/logged_columns.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
 namespace mbsopt {
@@ -34,61 +37,84 @@ void resolve_data_files(Problem& problem, const std::filesystem::path& folder, c
   if (!problem.identification) return;
   std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
   for (std::size_t i = 0; i < experiments.size(); ++i) {
-    std::string& data = experiments[i].data;
     const std::string path = child_path("identification.experiments", i) + ".data";
     if (findings.concerns(path)) continue;
-    const std::filesystem::path file = (folder / data).lexically_normal();
-    std::error_code error;
-    const bool found = std::filesystem::exists(file, error) && !std::filesystem::is_directory(file, error);
-    if (!found)
-      findings.add(nearest(root, path), path, "there is no file '" + file.string() + "'; a CSV file is expected");
-    data = file.string();
+    for (std::string& data : experiments[i].data) {
+      const std::filesystem::path file = (folder / data).lexically_normal();
+      std::error_code error;
+      const bool found = std::filesystem::exists(file, error) && !std::filesystem::is_directory(file, error);
+      if (!found)
+        findings.add(nearest(root, path), path, "there is no file '" + file.string() + "'; a CSV file is expected");
+      data = file.string();
+    }
   }
 }
 
-void read_samples(SampledLaw& law, const std::string& path, const std::filesystem::path& folder, const Node& root,
-                  Findings& findings) {
-  if (findings.concerns(path)) return;
-  try {
-    law.csv = (folder / law.csv).lexically_normal().string();
-    const CsvTable table = read_csv(law.csv);
-    law.times = ascending_times(table, law.time);
-    law.values = table.column(law.column);
-    const auto bad = std::find_if(law.values.begin(), law.values.end(), [](double x) { return !std::isfinite(x); });
-    if (bad != law.values.end())
-      throw CsvError(table.name + ":" +
-                     std::to_string(table.lines[static_cast<std::size_t>(bad - law.values.begin())]) + ": column '" +
-                     law.column + "' has no number here; a law needs all of them");
-    if (law.times.size() < 2) throw CsvError(table.name + ": a law needs two rows or more");
-  } catch (const CsvError& error) {
-    findings.add(nearest(root, path + ".csv"), path + ".csv", error.what());
-  }
-}
+// Reads each file once, whoever asks for a column of it.
+class SampleReader {
+ public:
+  SampleReader(std::filesystem::path folder, const Node& root, Findings& findings, std::vector<std::string>& read)
+      : folder_(std::move(folder)), root_(root), findings_(findings), read_(read) {}
 
-// Laws from CSV files: the samples are read here, so that nothing below knows of files.
-void read_sampled_laws(Problem& problem, const std::filesystem::path& folder, const Node& root, Findings& findings) {
-  std::vector<Drive>& drives = problem.scene.drives;
-  for (std::size_t i = 0; i < drives.size(); ++i)
-    if (drives[i].samples) read_samples(*drives[i].samples, child_path("drives", i) + ".law", folder, root, findings);
+  // key: of the file; missing: whether cells may be empty.
+  void read(SampleColumn& samples, Interpolation how, const std::string& path, const char* key, bool missing = false) {
+    if (findings_.concerns(path)) return;
+    try {
+      samples.file = (folder_ / samples.file).lexically_normal().string();
+      auto table = tables_.find(samples.file);
+      if (table == tables_.end()) table = tables_.emplace(samples.file, read_csv(samples.file)).first;
+      read_curve(samples, how, missing, table->second, read_);
+    } catch (const CsvError& error) {
+      findings_.add(nearest(root_, path + key), path + key, error.what());
+    }
+  }
+
+ private:
+  std::filesystem::path folder_;
+  const Node& root_;
+  Findings& findings_;
+  std::vector<std::string>& read_;
+  std::map<std::string, CsvTable> tables_;
+};
+
+// All samples are read here, so that nothing below knows of files.
+void read_samples(Problem& problem, const std::filesystem::path& folder, const Node& root, Findings& findings) {
+  SampleReader reader(folder, root, findings, problem.columns_read);
+  Scene& scene = problem.scene;
+  for (Signal& signal : scene.signals)
+    reader.read(signal, signal.interpolation, child_path("signals", signal.name), ".file");
+  const auto read_law = [&](std::optional<SampledLaw>& law, const std::string& path) {
+    if (law) reader.read(*law, Interpolation::spline, path + ".law", ".csv");
+  };
+  for (std::size_t i = 0; i < scene.drives.size(); ++i) read_law(scene.drives[i].samples, child_path("drives", i));
+  for (ObjectiveSpec& objective : problem.objectives)
+    for (std::size_t k = 0; k < objective.track.size(); ++k) {
+      const std::string list = child_path("objectives", objective.name) + ".track";
+      reader.read(objective.track[k], Interpolation::linear, child_path(list, k), ".file", true);
+    }
   if (!problem.identification) return;
   std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
   for (std::size_t e = 0; e < experiments.size(); ++e) {
-    const std::string list = child_path("identification.experiments", e) + ".drives";
+    const std::string place = child_path("identification.experiments", e);
     for (std::size_t i = 0; i < experiments[e].drives.size(); ++i)
-      if (std::optional<SampledLaw>& law = experiments[e].drives[i].samples)
-        read_samples(*law, child_path(list, i) + ".law", folder, root, findings);
+      read_law(experiments[e].drives[i].samples, child_path(place + ".drives", i));
+    for (SignalSamples& samples : experiments[e].signals) {
+      const auto signal = std::ranges::find(scene.signals, samples.name, &Signal::name);
+      if (signal != scene.signals.end())
+        reader.read(samples, signal->interpolation, child_path(place + ".signals", samples.name), ".file");
+    }
   }
 }
 
 // Data that an experiment cannot use are found now, before anything runs, whatever the command.
-void check_data(const Problem& problem, const Node& root, Findings& findings, std::vector<std::string>* warnings) {
+void check_data(Problem& problem, const Node& root, Findings& findings, std::vector<std::string>* warnings) {
   if (!problem.identification) return;
   const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
   for (std::size_t i = 0; i < experiments.size(); ++i) {
     const std::string place = child_path("identification.experiments", i);
     if (findings.concerns(place)) continue;
     try {
-      const CsvTable table = read_csv(experiments[i].data);
+      const CsvTable table = read_record(experiments[i], &problem.columns_read);
       for (const SceneIssue& issue : find_data_issues(experiments[i], place, table, problem.scene)) {
         const Node& node = nearest(root, issue.path);
         if (!issue.is_warning)
@@ -112,7 +138,7 @@ void add_issue(const SceneIssue& issue, const Node& root, Findings& findings) {
 
 // Errors of meaning, at the place in the file that says it. An error that follows from one in the reading
 // is left out.
-void add_issues(const Problem& problem, const Node& root, Findings& findings, std::vector<std::string>* warnings) {
+void add_issues(Problem& problem, const Node& root, Findings& findings, std::vector<std::string>* warnings) {
   std::vector<SceneIssue> errors;
   for (SceneIssue& issue : find_issues(problem)) {
     if (issue.is_warning) {
@@ -140,7 +166,7 @@ Problem read_problem(ProblemSource& source, std::vector<std::string>* warnings) 
   FieldReader::read(root, "", findings, problem);
   complete_integrator(problem.scene.simulation, root);
   resolve_data_files(problem, folder, root, findings);
-  read_sampled_laws(problem, folder, root, findings);
+  read_samples(problem, folder, root, findings);
   add_issues(problem, root, findings, warnings);
   findings.throw_if_any();
   allow_what_only_measurements_use(problem);

@@ -107,10 +107,16 @@ class SchemaWriter {
   void law(std::string_view key, std::optional<Expression>&, Names, const Says& says) {
     put(key, says, ref("expression"));
   }
-  void expression(std::string_view key, Expression&, Names, const Says& says) { put(key, says, ref("expression")); }
+  void expression(std::string_view key, Expression& value, Names, const Says& says) {
+    put(key, says, ref("expression"), says.need == Need::required ? Json() : default_of(value));
+  }
 
   void time_law(std::string_view key, Expression&, std::optional<SampledLaw>&, const Says& says) {
     put(key, says, {{"anyOf", {ref("expression"), object_schema<SampledLaw>()}}});
+  }
+  void texts(std::string_view key, std::vector<std::string>&, const Says& says) {
+    const Json text = {{"type", "string"}};
+    put(key, says, {{"anyOf", {text, {{"type", "array"}, {"items", text}, {"minItems", 1}}}}});
   }
   void laws(std::string_view key, LawVector& value, Names, const Says& says) { vector(key, value, says); }
 

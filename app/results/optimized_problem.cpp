@@ -44,21 +44,33 @@ std::string optimized_problem_text(const std::string& problem_file, const std::v
   }
   text = with_parameter_values(text, of_parameters);
   // Files are named relative to the folder that the text will be in.
+  const auto relative_to_folder = [&](const std::string& file) {
+    return std::filesystem::relative(file, std::filesystem::canonical(folder)).generic_string();
+  };
   const auto moved = [&](const std::string& path, const std::string& file) {
-    const std::string relative = std::filesystem::relative(file, std::filesystem::canonical(folder)).generic_string();
-    text = with_value(text, path, nlohmann::json(relative).dump());
+    text = with_value(text, path, nlohmann::json(relative_to_folder(file)).dump());
+  };
+  const auto moved_law = [&](const std::string& place, const std::optional<SampledLaw>& law) {
+    if (law) moved(place + ".law.csv", law->file);
   };
   const std::vector<Drive>& drives = problem.scene.drives;
-  for (std::size_t i = 0; i < drives.size(); ++i)
-    if (drives[i].samples) moved(child_path("drives", i) + ".law.csv", drives[i].samples->csv);
+  for (std::size_t i = 0; i < drives.size(); ++i) moved_law(child_path("drives", i), drives[i].samples);
+  for (const Signal& signal : problem.scene.signals) moved(child_path("signals", signal.name) + ".file", signal.file);
+  for (const ObjectiveSpec& objective : problem.objectives)
+    for (std::size_t k = 0; k < objective.track.size(); ++k)
+      moved(child_path(child_path("objectives", objective.name) + ".track", k) + ".file", objective.track[k].file);
   if (!problem.identification) return text;
   text = with_experiment_values(std::move(text), problem, values);
   for (std::size_t i = 0; i < problem.identification->experiments.size(); ++i) {
     const ExperimentSpec& experiment = problem.identification->experiments[i];
-    moved(experiment_path(i) + ".data", experiment.data);
+    const std::string place = experiment_path(i);
+    nlohmann::json data = nlohmann::json::array();
+    for (const std::string& file : experiment.data) data.push_back(relative_to_folder(file));
+    text = with_value(text, place + ".data", (data.size() == 1 ? data[0] : data).dump());
     for (std::size_t k = 0; k < experiment.drives.size(); ++k)
-      if (experiment.drives[k].samples)
-        moved(child_path(experiment_path(i) + ".drives", k) + ".law.csv", experiment.drives[k].samples->csv);
+      moved_law(child_path(place + ".drives", k), experiment.drives[k].samples);
+    for (const SignalSamples& samples : experiment.signals)
+      moved(child_path(place + ".signals", samples.name) + ".file", samples.file);
   }
   return text;
 }

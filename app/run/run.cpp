@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "app/json/problem_source.hpp"
@@ -47,12 +48,16 @@ Problem problem_of(const CommandContext& context, std::vector<std::string>& warn
 std::vector<std::string> data_files(const Problem& problem) {
   std::vector<std::string> files;
   const auto add = [&](const std::optional<SampledLaw>& law) {
-    if (law) files.push_back(law->csv);
+    if (law) files.push_back(law->file);
   };
+  for (const Signal& signal : problem.scene.signals) files.push_back(signal.file);
   for (const Drive& drive : problem.scene.drives) add(drive.samples);
+  for (const ObjectiveSpec& objective : problem.objectives)
+    for (const TrackTerm& term : objective.track) files.push_back(term.file);
   if (!problem.identification) return files;
   for (const ExperimentSpec& e : problem.identification->experiments) {
-    files.push_back(e.data);
+    files.insert(files.end(), e.data.begin(), e.data.end());
+    for (const SignalSamples& samples : e.signals) files.push_back(samples.file);
     for (const DriveLaw& law : e.drives) add(law.samples);
   }
   return files;
@@ -71,6 +76,13 @@ Run::Run(const CommandContext& given)
       provenance(context.arguments, folder.owner(), context.options.problem_file, data_files(problem));
   result["warnings"] = Json::array();
   for (const std::string& warning : reader_warnings_) warn(warning);
+  if (problem.columns_read.empty()) return;
+  result["columns"] = Json::array();
+  for (const std::string& words : problem.columns_read) {
+    if (std::ranges::find(result["columns"], Json(words)) != result["columns"].end()) continue;  // read once again
+    result["columns"].push_back(words);
+    if (!context.options.quiet) context.err << words << '\n';
+  }
 }
 
 Run::~Run() {

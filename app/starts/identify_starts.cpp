@@ -7,6 +7,7 @@
 #include "app/starts/multistart.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "optim/fit/sigma_estimation.hpp"
+#include "optim/problem/logged_columns.hpp"
 #include "optim/problem/start_points.hpp"
 
 namespace mbsopt {
@@ -87,8 +88,7 @@ StartWork start_work(const Problem& problem, const std::vector<CsvTable>& data, 
 
 std::vector<CsvTable> data_of(const Problem& problem) {
   std::vector<CsvTable> data;
-  for (const ExperimentSpec& experiment : problem.identification->experiments)
-    data.push_back(read_csv(experiment.data));
+  for (const ExperimentSpec& experiment : problem.identification->experiments) data.push_back(read_record(experiment));
   return data;
 }
 

@@ -1,13 +1,11 @@
 // The value of a row's sum of primitives over time: f(t, rho), with f_t and f_tt and the derivatives of all
-// three in the parameters. A constant (the length of a rod), an expression in t and parameters, or samples.
+// three in the parameters. A constant (the length of a rod), or an expression in t and parameters.
 #pragma once
 
 #include <Eigen/Core>
 #include <array>
-#include <memory>
 #include <optional>
 
-#include "core/constraint/cubic_spline.hpp"
 #include "core/expression/program.hpp"
 
 namespace mbsopt {
@@ -16,11 +14,13 @@ struct TimeLaw {
   double constant = 0;
   int slot = -1;                                   // row of the constant among the differentiated fields
   std::optional<std::array<Program, 3>> programs;  // f, f_t, f_tt; inputs: all parameters, then t
-  std::shared_ptr<const CubicSpline> spline;
+  bool smooth = false;                             // a spline through samples, which needs no search for jumps
 
+  struct Jet {
+    double f, f_t, f_tt;
+  };
   // inputs: all parameters, then t
-  CubicSpline::Jet at(const std::vector<double>& inputs, Program::Scratch& scratch) const {
-    if (spline) return (*spline)(inputs.back());
+  Jet at(const std::vector<double>& inputs, Program::Scratch& scratch) const {
     if (!programs) return {constant, 0, 0};
     return {(*programs)[0].value(inputs, scratch), (*programs)[1].value(inputs, scratch),
             (*programs)[2].value(inputs, scratch)};

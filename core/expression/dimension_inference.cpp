@@ -71,6 +71,8 @@ Known of_operation(const SyntaxNode& node, const Inferred& a, const Inferred& b)
       }
       return half;
     }
+    case Operation::curve:
+      return std::nullopt;
     case Operation::atan2:
       agreed(a.dimension, b.dimension, node);
       return dimension::kAngle;
@@ -101,7 +103,7 @@ std::optional<Dimension> infer_dimension(const Expression& expression, const Dim
       const Inferred& a = inferred[static_cast<std::size_t>(node.a)];
       const Inferred& b = node.b < 0 ? a : inferred[static_cast<std::size_t>(node.b)];
       result.dimension = of_operation(node, a, b);
-      if (a.number && b.number) result.number = apply(node.operation, *a.number, *b.number);
+      if (a.number && b.number) result.number = value_of(node, *a.number, *b.number);
       result.is_plain = a.is_plain && b.is_plain;
     }
     inferred.push_back(result);

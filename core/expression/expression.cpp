@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <charconv>
+#include <utility>
 
 #include "core/expression/syntax_tree.hpp"
 
@@ -25,7 +26,58 @@ SyntaxTree tree_of(double value) {
   return tree;
 }
 
+// Appends the nodes of an expression, and returns where it ends.
+int append(SyntaxTree& tree, const Expression& expression) {
+  const int shift = static_cast<int>(tree.nodes.size());
+  for (SyntaxNode node : expression.tree().nodes) {
+    if (node.a >= 0) node.a += shift;
+    if (node.b >= 0) node.b += shift;
+    tree.nodes.push_back(std::move(node));
+  }
+  return static_cast<int>(tree.nodes.size()) - 1;
+}
+
 }  // namespace
+
+// Builds expressions of expressions.
+struct ExpressionMaker {
+  static Expression of(SyntaxTree tree) {
+    complete(tree);
+    Expression result;
+    result.tree_ = std::make_shared<const SyntaxTree>(std::move(tree));
+    return result;
+  }
+  static Expression of(Operation operation, char sign, const Expression& a, const Expression& b) {
+    SyntaxTree tree;
+    SyntaxNode node;
+    node.operation = operation;
+    node.a = append(tree, a), node.b = append(tree, b);
+    tree.nodes.push_back(std::move(node));
+    tree.text = "(" + a.text() + ") " + sign + " (" + b.text() + ")";
+    return of(std::move(tree));
+  }
+};
+
+Expression operator+(const Expression& a, const Expression& b) {
+  return ExpressionMaker::of(Operation::add, '+', a, b);
+}
+Expression operator-(const Expression& a, const Expression& b) {
+  return ExpressionMaker::of(Operation::subtract, '-', a, b);
+}
+Expression operator*(const Expression& a, const Expression& b) {
+  return ExpressionMaker::of(Operation::multiply, '*', a, b);
+}
+
+Expression Expression::of_curve(std::shared_ptr<const Curve> f, const Expression& argument, std::string_view name) {
+  SyntaxTree tree;
+  SyntaxNode node;
+  node.operation = Operation::curve;
+  node.curve = std::move(f);
+  node.a = append(tree, argument);
+  tree.nodes.push_back(std::move(node));
+  tree.text = std::string(name) + "(" + argument.text() + ")";
+  return ExpressionMaker::of(std::move(tree));
+}
 
 Expression::Expression(double value) : tree_(std::make_shared<const SyntaxTree>(tree_of(value))) {}
 

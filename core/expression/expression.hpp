@@ -14,6 +14,7 @@
 
 namespace mbsopt {
 
+class Curve;        // curve.hpp
 struct SyntaxTree;  // syntax_tree.hpp
 
 // A text that is not an expression: what is wrong and where (offset in bytes from the start of the text).
@@ -30,6 +31,9 @@ class Expression {
   // Grammar: problem-format, "Numbers, expressions, names". Throws ExpressionError.
   static Expression parse(std::string_view text);
 
+  // f(argument), f a function through samples; the text calls it `name`.
+  static Expression of_curve(std::shared_ptr<const Curve> f, const Expression& argument, std::string_view name);
+
   bool is_number() const;                         // a plain constant: no names, already folded
   double number() const;                          // its value; only where is_number()
   const std::string& text() const;                // as written (a number: shortest form that reads back the same)
@@ -38,7 +42,12 @@ class Expression {
   const SyntaxTree& tree() const { return *tree_; }
 
  private:
+  friend struct ExpressionMaker;  // expression.cpp
   std::shared_ptr<const SyntaxTree> tree_;
 };
+
+Expression operator+(const Expression& a, const Expression& b);
+Expression operator-(const Expression& a, const Expression& b);
+Expression operator*(const Expression& a, const Expression& b);
 
 }  // namespace mbsopt

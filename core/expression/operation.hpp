@@ -41,6 +41,7 @@ enum class Operation : unsigned char {
   smooth_abs,  // sqrt(a^2 + b^2)
   sign,        // -1, 0 or 1: the derivative of abs; only derivative programs use it
   not_above,   // 1 where a <= b, else 0: the choice of min and max; only derivative programs use it
+  curve,       // a function through samples (curve.hpp) of a; whoever holds the curve evaluates it
 };
 
 // 0 for number and name, else 1 or 2.
@@ -61,6 +62,7 @@ inline SecondPartials second_partials(Operation operation, double a, double b, d
 // Functions as users call them.
 //   smooth_abs(x, eps)    = sqrt(x^2 + eps^2)                          eps: 1e-6 unless given
 //   smooth_max(a, b, eps) = (a + b + smooth_abs(a - b, eps)) / 2
+//   spline(x, [x0, ...], [y0, ...]), table(x, [x0, ...], [y0, ...])    y may hold expressions
 // min and max take two or more arguments.
 struct FunctionEntry {
   std::string_view name;
@@ -90,6 +92,8 @@ inline constexpr FunctionEntry kFunctions[] = {
     {"max", Operation::max, 2, -1},
     {"smooth_abs", Operation::smooth_abs, 1, 2},
     {"smooth_max", Operation::smooth_abs, 2, 3},
+    {"spline", Operation::curve, 3, 3},
+    {"table", Operation::curve, 3, 3},
 };
 
 // Inline: a Program spends its time here.
@@ -98,6 +102,7 @@ inline double apply(Operation operation, double a, double b) {
   switch (operation) {
     case Operation::number:
     case Operation::name:
+    case Operation::curve:
       break;
     case Operation::negate:
       return -a;
@@ -150,7 +155,7 @@ inline double apply(Operation operation, double a, double b) {
     case Operation::not_above:
       return a <= b ? 1 : 0;
   }
-  assert(false && "a leaf has no operands");
+  assert(false && "a leaf or a curve");
   return 0;
 }
 
@@ -174,6 +179,7 @@ inline FirstPartials first_partials(Operation operation, double a, double b, dou
   switch (operation) {
     case Operation::number:
     case Operation::name:
+    case Operation::curve:
       break;
     case Operation::negate:
       return {-1, 0};
@@ -229,7 +235,7 @@ inline FirstPartials first_partials(Operation operation, double a, double b, dou
     case Operation::not_above:
       return {};
   }
-  assert(false && "a leaf has no operands");
+  assert(false && "a leaf or a curve");
   return {};
 }
 
@@ -237,6 +243,7 @@ inline SecondPartials second_partials(Operation operation, double a, double b, d
   switch (operation) {
     case Operation::number:
     case Operation::name:
+    case Operation::curve:
       break;
     case Operation::negate:
     case Operation::add:
@@ -295,7 +302,7 @@ inline SecondPartials second_partials(Operation operation, double a, double b, d
       return {s * s / value, -s * c / value, c * c / value};
     }
   }
-  assert(false && "a leaf has no operands");
+  assert(false && "a leaf or a curve");
   return {};
 }
 

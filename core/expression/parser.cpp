@@ -3,10 +3,15 @@
 //   product = signed  { ("*" | "/") signed }
 //   signed  = { "-" | "+" } power
 //   power   = primary [ "^" signed ]                    right-associative; -x^2 is -(x^2)
+//   curve   = ("spline" | "table") "(" sum "," list "," list ")"        list = "[" sum { "," sum } "]"
 //   primary = number [ "[" unit "]" ] | "pi" | name | function "(" sum { "," sum } ")" | "(" sum ")"
 #include <algorithm>
 #include <charconv>
+#include <limits>
+#include <memory>
 #include <numbers>
+#include <span>
+#include <stdexcept>
 #include <system_error>
 
 #include "core/expression/did_you_mean.hpp"
@@ -18,10 +23,25 @@ namespace mbsopt {
 namespace {
 
 constexpr int kDeepestNesting = 200;
+// Each ordinate that is no number has a curve of its own through as many samples.
+constexpr std::size_t kMostOrdinates = 500;
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+
+// Of each node; a name has none (NaN).
+std::vector<double> values_of(std::span<const SyntaxNode> nodes) {
+  std::vector<double> value;
+  value.reserve(nodes.size());
+  for (const SyntaxNode& node : nodes) {
+    const double a = node.a < 0 ? 0 : value[static_cast<std::size_t>(node.a)];
+    const double b = node.b < 0 ? 0 : value[static_cast<std::size_t>(node.b)];
+    value.push_back(node.operation == Operation::name ? std::numeric_limits<double>::quiet_NaN()
+                                                      : value_of(node, a, b));
+  }
+  return value;
+}
 
 class Parser {
  public:
@@ -164,6 +184,7 @@ class Parser {
       for (const FunctionEntry& entry : kFunctions) all.emplace_back(entry.name);
       fail("'" + name + "' is not a function" + did_you_mean(name, all) + "; available: " + joined(all), offset);
     }
+    if (function->operation == Operation::curve) return curve(name, offset);
     std::vector<int> arguments;
     do {
       take();  // '(' or ','
@@ -178,6 +199,83 @@ class Parser {
     if (count < function->least || (function->most >= 0 && count > function->most))
       fail("'" + name + "' takes " + arity(*function) + ", found " + std::to_string(count), offset);
     return lower(*function, arguments, offset);
+  }
+
+  // Through samples whose ordinates y_j may be expressions. The curve is linear in them:
+  //   f(x) = sum_j y_j f_j(x),   f_j the curve through 1 at x_j and 0 at all other abscissae
+  int curve(const std::string& name, std::size_t offset) {
+    const Nested level(*this);
+    const auto next = [&](char expected) {
+      if (peek() != expected)
+        fail("'" + name + "' is written " + name + "(x, [x0, x1, ...], [y0, y1, ...]); expected '" + expected +
+                 "', found " + found(),
+             at_);
+      take();
+    };
+    next('(');
+    const int x = sum();
+    next(',');
+    const std::size_t before = nodes_.size(), abscissae_at = at_;
+    const std::vector<int> abscissae = list(next);
+    for (std::size_t i = before; i < nodes_.size(); ++i)
+      if (nodes_[i].operation == Operation::name)
+        fail("'" + nodes_[i].name + "' is a name; the abscissae of '" + name + "' must be numbers", nodes_[i].offset);
+    const std::vector<double> value = values_of(nodes_);
+    std::vector<double> at;
+    for (const int i : abscissae) at.push_back(value[static_cast<std::size_t>(i)]);
+    next(',');
+    const std::size_t ordinates_at = at_, first_ordinate = nodes_.size();
+    const std::vector<int> ordinates = list(next);
+    next(')');
+    if (ordinates.size() != at.size())
+      fail("'" + name + "' has " + std::to_string(at.size()) + " abscissae and " + std::to_string(ordinates.size()) +
+               " ordinates",
+           ordinates_at);
+    const Interpolation how = name == "table" ? Interpolation::linear : Interpolation::spline;
+    const auto through = [&](std::vector<double> y) {
+      SyntaxNode node;
+      node.operation = Operation::curve;
+      node.a = x;
+      node.offset = offset;
+      try {
+        node.curve = std::make_shared<const Curve>(how, at, std::move(y));
+      } catch (const std::invalid_argument& error) {
+        fail("'" + name + "': " + error.what(), abscissae_at);
+      }
+      nodes_.push_back(std::move(node));
+      return last_node();
+    };
+    const auto is_name = [](const SyntaxNode& node) { return node.operation == Operation::name; };
+    if (std::none_of(nodes_.begin() + static_cast<std::ptrdiff_t>(first_ordinate), nodes_.end(), is_name)) {
+      std::vector<double> y;
+      const std::vector<double> all = values_of(std::span<const SyntaxNode>(nodes_));
+      for (const int i : ordinates) y.push_back(all[static_cast<std::size_t>(i)]);
+      return through(std::move(y));
+    }
+    if (at.size() > kMostOrdinates)
+      fail("'" + name + "' has " + std::to_string(at.size()) + " ordinates that are not all numbers; at most " +
+               std::to_string(kMostOrdinates) + " are allowed",
+           ordinates_at);
+    int total = -1;
+    for (std::size_t j = 0; j < at.size(); ++j) {
+      std::vector<double> unit(at.size(), 0.0);
+      unit[j] = 1;
+      const int term = push(Operation::multiply, ordinates[j], through(std::move(unit)), offset);
+      total = total < 0 ? term : push(Operation::add, total, term, offset);
+    }
+    return total;
+  }
+
+  std::vector<int> list(const auto& next) {
+    std::vector<int> entries;
+    next('[');
+    while (true) {
+      entries.push_back(sum());
+      if (peek() != ',') break;
+      take();
+    }
+    next(']');
+    return entries;
   }
 
   // Functions of more or fewer arguments than their operation has.
@@ -284,24 +382,19 @@ class Parser {
 
 }  // namespace
 
-SyntaxTree parse_expression(std::string_view text) {
-  SyntaxTree tree;
-  tree.nodes = Parser(text).run();
-  tree.text = std::string(text);
+void complete(SyntaxTree& tree) {
   for (const SyntaxNode& node : tree.nodes)
     if (node.operation == Operation::name) tree.names.push_back(node.name);
   std::sort(tree.names.begin(), tree.names.end());
   tree.names.erase(std::unique(tree.names.begin(), tree.names.end()), tree.names.end());
-  if (!tree.names.empty()) return tree;
+  if (tree.names.empty()) tree.number = values_of(tree.nodes).back();
+}
 
-  std::vector<double> value;
-  value.reserve(tree.nodes.size());
-  for (const SyntaxNode& node : tree.nodes) {
-    const double a = node.a < 0 ? 0 : value[static_cast<std::size_t>(node.a)];
-    const double b = node.b < 0 ? 0 : value[static_cast<std::size_t>(node.b)];
-    value.push_back(node.operation == Operation::number ? node.value : apply(node.operation, a, b));
-  }
-  tree.number = value.back();
+SyntaxTree parse_expression(std::string_view text) {
+  SyntaxTree tree;
+  tree.nodes = Parser(text).run();
+  tree.text = std::string(text);
+  complete(tree);
   return tree;
 }
 

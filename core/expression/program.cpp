@@ -46,6 +46,24 @@ void Program::grow(Scratch& scratch) const {
     if (array->size() < code_.size()) array->resize(code_.size());
 }
 
+double Program::value_of(const Instruction& in, double a, double b) const {
+  if (in.operation != Operation::curve) return apply(in.operation, a, b);
+  const auto& [curve, order] = curve_of(in);
+  return curve->at(a, order);
+}
+
+FirstPartials Program::first_partials_of(const Instruction& in, double a, double b, double value) const {
+  if (in.operation != Operation::curve) return first_partials(in.operation, a, b, value);
+  const auto& [curve, order] = curve_of(in);
+  return {curve->at(a, order + 1), 0};
+}
+
+SecondPartials Program::second_partials_of(const Instruction& in, double a, double b, double value) const {
+  if (in.operation != Operation::curve) return second_partials(in.operation, a, b, value);
+  const auto& [curve, order] = curve_of(in);
+  return {curve->at(a, order + 2), 0, 0};
+}
+
 void Program::sweep_values(std::span<const double> x, double* value) const {
   const std::size_t size = code_.size();
   for (std::size_t i = 0; i < size; ++i) {
@@ -55,7 +73,7 @@ void Program::sweep_values(std::span<const double> x, double* value) const {
     else if (in.operation == Operation::name)
       value[i] = x[static_cast<std::size_t>(in.a)];
     else
-      value[i] = apply(in.operation, value[in.a], in.b < 0 ? 0 : value[in.b]);
+      value[i] = value_of(in, value[in.a], in.b < 0 ? 0 : value[in.b]);
   }
 }
 
@@ -89,7 +107,7 @@ double Program::add_gradient(std::span<const double> x, double scale, std::span<
       gradient[static_cast<std::size_t>(in.a)] += seed;
       continue;
     }
-    const FirstPartials d = first_partials(in.operation, value[in.a], in.b < 0 ? 0 : value[in.b], value[i]);
+    const FirstPartials d = first_partials_of(in, value[in.a], in.b < 0 ? 0 : value[in.b], value[i]);
     adjoint[in.a] += seed * d.a;
     if (in.b >= 0) adjoint[in.b] += seed * d.b;
   }
@@ -118,7 +136,7 @@ double Program::add_gradient_tangent(std::span<const double> x, std::span<const 
     } else if (in.operation == Operation::name) {
       tangent[i] = x_tangent[static_cast<std::size_t>(in.a)];
     } else {
-      const FirstPartials d = first_partials(in.operation, value[in.a], in.b < 0 ? 0 : value[in.b], value[i]);
+      const FirstPartials d = first_partials_of(in, value[in.a], in.b < 0 ? 0 : value[in.b], value[i]);
       tangent[i] = seeded(tangent[in.a], d.a) + (in.b < 0 ? 0 : seeded(tangent[in.b], d.b));
     }
   }
@@ -136,8 +154,8 @@ double Program::add_gradient_tangent(std::span<const double> x, std::span<const 
     }
     const double a = value[in.a], b = in.b < 0 ? 0 : value[in.b];
     const double a_tangent = tangent[in.a], b_tangent = in.b < 0 ? 0 : tangent[in.b];
-    const FirstPartials d = first_partials(in.operation, a, b, value[i]);
-    const SecondPartials dd = second_partials(in.operation, a, b, value[i]);
+    const FirstPartials d = first_partials_of(in, a, b, value[i]);
+    const SecondPartials dd = second_partials_of(in, a, b, value[i]);
     adjoint[in.a] += seeded(seed, d.a);
     adjoint_tangent[in.a] +=
         seeded(seed_tangent, d.a) + seeded(seed, seeded(a_tangent, dd.aa) + seeded(b_tangent, dd.ab));

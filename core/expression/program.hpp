@@ -10,6 +10,7 @@
 //   double value = program.add_gradient(x, 1.0, g, scratch);   // 2.25, g[0] = 1.5
 #pragma once
 
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -17,6 +18,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "core/expression/curve.hpp"
 #include "core/expression/expression.hpp"
 #include "core/expression/operation.hpp"
 
@@ -79,12 +81,23 @@ class Program {
   struct Instruction {
     Operation operation = Operation::number;
     int a = -1, b = -1;   // operands: earlier instructions; of a name: the index of the input
-    double constant = 0;  // of a number
+    double constant = 0;  // of a number; of a curve: its place in curves_
+  };
+  // A derivative of a function through samples.
+  struct CurveUse {
+    std::shared_ptr<const Curve> curve;
+    int order = 0;
+    bool operator==(const CurveUse&) const = default;
   };
   friend class ProgramBuilder;
+  const CurveUse& curve_of(const Instruction& in) const { return curves_[static_cast<std::size_t>(in.constant)]; }
+  double value_of(const Instruction& in, double a, double b) const;
+  FirstPartials first_partials_of(const Instruction& in, double a, double b, double value) const;
+  SecondPartials second_partials_of(const Instruction& in, double a, double b, double value) const;
   void sweep_values(std::span<const double> x, double* value) const;
   std::vector<Instruction> code_;
   std::vector<int> used_inputs_;
+  std::vector<CurveUse> curves_;
 };
 
 }  // namespace mbsopt

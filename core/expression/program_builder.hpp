@@ -44,7 +44,9 @@ class ProgramBuilder {
       const SyntaxNode& node = nodes[i];
       const int a = node.a < 0 ? -1 : at[static_cast<std::size_t>(node.a)];
       const int b = node.b < 0 ? -1 : at[static_cast<std::size_t>(node.b)];
-      if (node.operation == Operation::number)
+      if (node.operation == Operation::curve)
+        at[i] = curve({node.curve, 0}, a);
+      else if (node.operation == Operation::number)
         at[i] = number(node.value);
       else if (node.operation == Operation::name)
         at[i] = name(node.name);
@@ -109,8 +111,25 @@ class ProgramBuilder {
     return add({operation, a, b, 0});
   }
 
+  // A derivative of a function through samples, at a.
+  int curve(const Program::CurveUse& use, int a) {
+    if (use.order > use.curve->degree()) return number(0);
+    if (is_number(a)) return number(use.curve->at(constant(a), use.order));
+    std::vector<Program::CurveUse>& all = program_.curves_;
+    const auto place = std::find(all.begin(), all.end(), use) - all.begin();
+    if (place == static_cast<std::ptrdiff_t>(all.size())) all.push_back(use);
+    return add({Operation::curve, a, -1, static_cast<double>(place)});
+  }
+
+  // An instruction of another program, its operands a and b as they are here.
+  int copied(const Program& of, const Instruction& in, int a, int b) {
+    if (in.operation == Operation::number) return number(in.constant);
+    if (in.operation == Operation::name) return add({Operation::name, in.a, -1, 0});
+    return in.operation == Operation::curve ? curve(of.curve_of(in), a) : operation(in.operation, a, b);
+  }
+
   int number(double value) { return add({Operation::number, -1, -1, value}); }
-  int partial(const Instruction& in, int a, int b, int value, bool first);
+  int partial(const Program& of, const Instruction& in, int a, int b, int value, bool first);
 
   int add(const Instruction& instruction) {
     const auto key = std::make_tuple(static_cast<int>(instruction.operation), instruction.a, instruction.b,

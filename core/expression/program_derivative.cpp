@@ -6,7 +6,7 @@ namespace mbsopt {
 
 // df/da (first) or df/db of one instruction as instructions; operands and value are instructions of this builder.
 // Where no derivative exists, those of operation.hpp hold: abs' = sign, min and max take the operand in use.
-int ProgramBuilder::partial(const Instruction& in, int a, int b, int value, bool first) {
+int ProgramBuilder::partial(const Program& of, const Instruction& in, int a, int b, int value, bool first) {
   using Op = Operation;
   auto square = [&](int x) { return operation(Op::multiply, x, x); };
   auto inverse = [&](int x) { return operation(Op::divide, number(1), x); };
@@ -16,6 +16,10 @@ int ProgramBuilder::partial(const Instruction& in, int a, int b, int value, bool
     case Operation::sign:
     case Operation::not_above:
       break;
+    case Operation::curve: {
+      const auto& [f, order] = of.curve_of(in);
+      return curve({f, order + 1}, a);
+    }
     case Operation::negate:
       return number(-1);
     case Operation::add:
@@ -78,19 +82,17 @@ void ProgramBuilder::build_derivative(const Program& of, int input) {
   auto is_zero = [&](int x) { return x < 0 || is(x, 0); };
   for (std::size_t i = 0; i < size; ++i) {
     const Instruction& in = of.code_[i];
-    if (in.operation == Operation::number) {
-      at[i] = number(in.constant);
-    } else if (in.operation == Operation::name) {
-      at[i] = add({Operation::name, in.a, -1, 0});
-      if (in.a == input) d[i] = number(1);
+    if (operands(in.operation) == 0) {
+      at[i] = copied(of, in, -1, -1);
+      if (in.operation == Operation::name && in.a == input) d[i] = number(1);
     } else {
       const std::size_t ia = static_cast<std::size_t>(in.a), ib = static_cast<std::size_t>(std::max(in.b, 0));
       const int a = at[ia], b = in.b < 0 ? -1 : at[ib];
-      at[i] = operation(in.operation, a, b);
+      at[i] = copied(of, in, a, b);
       int sum = -1;
-      if (!is_zero(d[ia])) sum = operation(Operation::multiply, partial(in, a, b, at[i], true), d[ia]);
+      if (!is_zero(d[ia])) sum = operation(Operation::multiply, partial(of, in, a, b, at[i], true), d[ia]);
       if (in.b >= 0 && !is_zero(d[ib])) {
-        const int term = operation(Operation::multiply, partial(in, a, b, at[i], false), d[ib]);
+        const int term = operation(Operation::multiply, partial(of, in, a, b, at[i], false), d[ib]);
         sum = sum < 0 ? term : operation(Operation::add, sum, term);
       }
       d[i] = sum;

@@ -25,9 +25,7 @@ void ProgramBuilder::build_switch(const Program& of, Operation how, int a, int b
     if (!needed[i]) continue;
     const Instruction& in = of.code_[i];
     const auto operand = [&](int k) { return k < 0 ? -1 : at[static_cast<std::size_t>(k)]; };
-    at[i] = in.operation == Operation::number ? number(in.constant)
-            : in.operation == Operation::name ? add({Operation::name, in.a, -1, 0})
-                                              : operation(in.operation, operand(in.a), operand(in.b));
+    at[i] = operands(in.operation) == 0 ? copied(of, in, -1, -1) : copied(of, in, operand(in.a), operand(in.b));
   }
   const int first = at[static_cast<std::size_t>(a)];
   keep_only_what_reaches(how == Operation::cos        ? operation(how, first, -1)

@@ -3,11 +3,13 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "core/expression/curve.hpp"
 #include "core/expression/dimension.hpp"
 #include "core/expression/operation.hpp"
 
@@ -15,11 +17,12 @@ namespace mbsopt {
 
 struct SyntaxNode {
   Operation operation = Operation::number;
-  int a = -1, b = -1;             // operands: earlier nodes
-  double value = 0;               // of a number, in SI
-  std::optional<Dimension> unit;  // of a number that has one; none: it may stand for anything
-  std::string name;               // of a name
-  std::size_t offset = 0;         // where it stands in the text [bytes]
+  int a = -1, b = -1;                       // operands: earlier nodes
+  double value = 0;                         // of a number, in SI
+  std::optional<Dimension> unit;            // of a number that has one; none: it may stand for anything
+  std::string name;                         // of a name
+  std::shared_ptr<const Curve> curve = {};  // of a curve
+  std::size_t offset = 0;                   // where it stands in the text [bytes]
 };
 
 struct SyntaxTree {
@@ -28,6 +31,15 @@ struct SyntaxTree {
   std::vector<std::string> names;  // free names, sorted, each once
   std::optional<double> number;    // the value, where there are no names
 };
+
+// The value of a node whose operands have the values a and b; not of a name.
+inline double value_of(const SyntaxNode& node, double a, double b) {
+  if (node.operation == Operation::number) return node.value;
+  return node.curve ? node.curve->at(a) : apply(node.operation, a, b);
+}
+
+// The names in its nodes, and the value where there are none.
+void complete(SyntaxTree& tree);
 
 SyntaxTree parse_expression(std::string_view text);  // throws ExpressionError
 

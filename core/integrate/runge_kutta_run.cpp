@@ -12,6 +12,7 @@
 #include "core/mechanism/planar_model.hpp"
 #include "core/sensor/body_at.hpp"
 #include "core/step/event_times.hpp"
+#include "core/step/kink_times.hpp"
 #include "core/step/step_control.hpp"
 #include "core/watch/start_failure.hpp"
 #include "core/watch/stiffness.hpp"
@@ -250,15 +251,17 @@ struct RungeKuttaRun::Course {
   StepController controller;
   StiffnessWatch stiffness;
   EventTimes events;
+  KinkControl kinks;
   double h = 0, longest = 0;              // the step to try; the longest one so far
   double error = 0;                       // of the step tried last
+  double wish = 0;                        // h before a kink made it shorter
   double wanted = 0, largest = INFINITY;  // sizes that the error and the limits allow, where passage_ chooses h
   std::size_t frozen_index = 0;
   int placed_again = 0;
 
   bool ends_with(double t1) const {
     const StepSequence* const frozen = options.frozen;
-    return frozen ? frozen_index + 1 == frozen->sizes.size() && frozen->to_the_end : t1 >= end;
+    return frozen ? frozen_index + 1 == frozen->sizes.size() && frozen->to_the_end : t1 >= end - kinks.gap();
   }
   bool goes_on(double t) const {
     return result.ok() && (options.frozen ? frozen_index < options.frozen->sizes.size() : t < end);
@@ -280,7 +283,9 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
                 .span = settings_.end_time - settings_.start_time,
                 .controller = StepController(rk_.error_order, s.options),
                 .stiffness = StiffnessWatch(rk_, mechanism_.states()),
-                .events = EventTimes(settings_.events, settings_.start_time, settings_.end_time)};
+                .events = EventTimes(settings_.events, settings_.start_time, settings_.end_time),
+                .kinks = KinkControl(options.frozen ? std::vector<KinkedSignal>() : mechanism_.data().kinks,
+                                     settings_.start_time, settings_.end_time)};
   if (!begin(y_initial, angles, course)) return;
   choose_first_size(course);
   while (course.goes_on(step_.t)) {
@@ -385,9 +390,11 @@ bool RungeKuttaRun::choose_size(Course& course) {
   const double rate = fastest_tracked_rate(step_.y0), to_event = course.events.stop_after(step_.t);
   if (course.adaptive && rate * h > 2)
     h = rounded_step(2 / rate);  // an angle is followed over turns only when steps are below half a turn
-  h = course.wanted = propose_step(step_.t, h, to_event, course.adaptive);
+  course.wish = propose_step(step_.t, h, to_event, course.adaptive);
+  h = course.wanted = course.kinks.choose(step_.t, course.wish, !course.adaptive);
   if (course.adaptive && passage_) {
-    course.largest = std::min({s.max_step.value_or(INFINITY), rate > 0 ? 2 / rate : INFINITY, to_event - step_.t});
+    course.largest = std::min({s.max_step.value_or(INFINITY), rate > 0 ? 2 / rate : INFINITY, to_event - step_.t,
+                               h < course.wish ? h : INFINITY});
     const double placed = passage_->propose(step_.t, h, course.largest);
     if (placed != h) h = rounded_step(placed, kPartsOfPlaced);
   }
@@ -448,6 +455,11 @@ void RungeKuttaRun::reject(Outcome outcome, Course& course) {
       return;
     }
   }
+  if (course.kinks.crosses()) {
+    course.kinks.rejected_across(h, outcome == Outcome::rejected ? course.error : INFINITY);
+    h = course.wish;
+    return;
+  }
   const double tried = h;
   h = rounded_step(h * course.controller.after_rejection(outcome == Outcome::rejected ? course.error : INFINITY));
   const std::optional<double> min_step = settings_.integrator.options.min_step;
@@ -492,10 +504,21 @@ void RungeKuttaRun::choose_next_size(Course& course) {
   const IntegratorSettings& s = settings_.integrator;
   double& h = course.h;
   if (course.adaptive) {
+    if (course.kinks.crosses()) {
+      course.kinks.accepted_across(h, course.error);
+      if (course.kinks.limits(course.wish)) {
+        h = course.wish;
+        return;
+      }
+    }
     // Past a singular position the estimate is magnified rounding, which is not to decide on the next step.
     const bool passed = passage_ && passage_->passed_since(step_.t);
     if (passed) course.controller.after_passage();
     double proposed = passed ? course.wanted : rounded_step(h * course.controller.after_acceptance(course.error));
+    if (course.kinks.meets()) {
+      course.kinks.met();
+      proposed = std::max(proposed, std::min(course.wish, h * course.controller.allowed(course.error)));
+    }
     // The factor of an implicit method serves as long as the step stays.
     if (implicit_ && proposed >= h && proposed < ImplicitStages::kKeepStep * h) proposed = h;
     h = std::clamp(proposed, s.options.min_step.value_or(0), s.max_step.value_or(INFINITY));
@@ -507,11 +530,13 @@ void RungeKuttaRun::choose_next_size(Course& course) {
 void RungeKuttaRun::advance(Course& course) {
   const RunOptions& options = course.options;
   const bool event = !options.frozen && course.events.reached(step_.t1);
-  step_.t = event ? course.events.resume_time() : step_.t1;
+  const bool kink = !options.frozen && !event && step_.t1 < course.end && course.kinks.reached(step_.t1);
+  step_.t = event ? course.events.resume_time() : kink ? course.kinks.resume_time() : step_.t1;
   step_.y0 = step_.y1;
   angles_ = step_.angles0 = step_.angles1;
   first_stage_known_ = false;
   if (event) restart(course);
+  if (kink) restart_stages();
   course.result.last_good_time = step_.t;
   ++course.frozen_index;
   if (options.after_step) options.after_step({step_.t, step_.y0, step_.angles0});
@@ -529,10 +554,14 @@ void RungeKuttaRun::restart(Course& course) {
     course.h = std::clamp(first_step(s, left), s.options.min_step.value_or(0), s.max_step.value_or(INFINITY));
     if (passage_) passage_->forget();
   }
-  if (implicit_ && dynamics_.evaluate(step_.t, step_.y0, angles_, ydot_)) {
-    ++evaluations_;
-    implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
-  }
+  restart_stages();
+}
+
+// Accelerations jump: the last step is no start for the iterations of the next.
+void RungeKuttaRun::restart_stages() {
+  if (!implicit_ || !dynamics_.evaluate(step_.t, step_.y0, angles_, ydot_)) return;
+  ++evaluations_;
+  implicit_->begin(ydot_.tail(ydot_.size() / 2), dynamics_.lambda());
 }
 
 void RungeKuttaRun::add_statistics(Course& course) {

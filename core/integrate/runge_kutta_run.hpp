@@ -46,6 +46,7 @@ class RungeKuttaRun {
   void choose_next_size(Course& course);
   void advance(Course& course);
   void restart(Course& course);
+  void restart_stages();
   void add_statistics(Course& course);
   std::string tolerances_or(std::string message, const Course& course) const;
 

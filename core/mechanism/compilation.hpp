@@ -72,6 +72,7 @@ struct Compilation {
   std::map<std::pair<std::size_t, Zero>, int> angle_of_joint_;
 };
 
+void compile_signals(Compilation& model);
 void compile_bodies(Compilation& model);
 void compile_joints(Compilation& model);
 void compile_drives(Compilation& model);

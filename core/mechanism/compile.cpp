@@ -93,6 +93,7 @@ MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std:
                      std::to_string(scene.parameters.size()) + " parameters");
   }
   Compilation model(scene, rho, active);
+  compile_signals(model);
   compile_bodies(model);
   compile_joints(model);
   compile_drives(model);

@@ -1,8 +1,7 @@
 // Drives: a coordinate, distance, angle or displacement that follows a law of time, one row of Phi each.
-#include <stdexcept>
-
 #include "core/mechanism/compilation.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/scene/signals.hpp"
 
 namespace mbsopt {
 namespace {
@@ -53,24 +52,17 @@ Constraint measured(Compilation& model, const Drive& drive, const std::string& w
 TimeLaw law_of(Compilation& model, const Drive& drive, const std::string& where) {
   TimeLaw law;
   if (drive.samples) {
-    try {
-      law.spline = std::make_shared<CubicSpline>(drive.samples->times, drive.samples->values);
-    } catch (const std::invalid_argument& e) {
-      throw SceneError(where + ".law: " + e.what());
-    }
+    if (!drive.samples->curve) throw SceneError(where + ".law: has no samples: nothing has read its file");
     const SimulationSettings& s = model.scene.simulation;
-    const double slack = 1e-9 * (s.end_time - s.start_time);
-    if (s.start_time < law.spline->first_time() - slack || s.end_time > law.spline->last_time() + slack) {
-      throw SceneError(where + ".law: its samples cover " + Expression(law.spline->first_time()).text() + " s to " +
-                       Expression(law.spline->last_time()).text() + " s, the simulation " +
-                       Expression(s.start_time).text() + " s to " + Expression(s.end_time).text() + " s");
-    }
-    return law;
+    if (const auto why = uncovered(covered_by(*drive.samples->curve), s.start_time, s.end_time))
+      throw SceneError(where + ".law: " + *why);
+    law.smooth = true;
   }
   Symbols symbols = model.fields.symbols();
   const int t = symbols.add_input("t");
   try {
-    const Program f(drive.law, symbols), f_t = f.derivative(t), f_tt = f_t.derivative(t);
+    const Expression of_t = drive.samples ? expression_of(*drive.samples, "samples") : drive.law;
+    const Program f(of_t, symbols), f_t = f.derivative(t), f_tt = f_t.derivative(t);
     law.programs = {f, f_t, f_tt};
   } catch (const UnknownName& e) {
     throw SceneError(where + ".law: " + e.what());

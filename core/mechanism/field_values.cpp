@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/scene/scene_error.hpp"
+#include "core/scene/signals.hpp"
 
 namespace mbsopt {
 
@@ -10,6 +11,7 @@ FieldValues::FieldValues(const Scene& scene, const Eigen::VectorXd& rho, const s
     : rho_(rho), active_index_(active), active_(static_cast<Eigen::Index>(active.size())) {
   for (const Parameter& p : scene.parameters) symbols_.add_input(p.name);
   for (const Definition& d : scene.definitions) symbols_.add_definition(d.name, d.value);
+  add_signals(symbols_, scene);
 }
 
 Dual FieldValues::value(const Field& field, const std::string& where) const {

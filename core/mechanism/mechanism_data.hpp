@@ -10,6 +10,7 @@
 
 #include "core/constraint/constraint.hpp"
 #include "core/constraint/time_law.hpp"
+#include "core/expression/curve.hpp"
 #include "core/force/applied.hpp"
 #include "core/force/forces.hpp"
 #include "core/force/user_force.hpp"
@@ -49,6 +50,11 @@ struct ConditionData {
   std::string unit, rate_unit;  // " rad", " rad/s"; empty for a number
 };
 
+struct KinkedSignal {  // jumps or kinks at its samples, later by the delay
+  std::shared_ptr<const Curve> curve;
+  double delay = 0;
+};
+
 struct UserForceData {
   std::shared_ptr<const UserForce> force;
   std::vector<int> bodies;  // 1-based
@@ -79,6 +85,7 @@ struct MechanismData {
   std::vector<std::string> sensor_names;
   std::vector<ConditionData> conditions;
   std::vector<std::string> body_names, joint_names, drive_names;  // body_names[0] = "ground"
+  std::vector<KinkedSignal> kinks;                                // of signals that are not smooth
   int largest_law = 0;                                            // inputs of the largest law, for scratch
 
   std::shared_ptr<const PlanarModel> planar;  // where joints hold all bodies in a plane

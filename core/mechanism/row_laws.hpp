@@ -38,7 +38,7 @@ class RowLaws {
 
   const MechanismData* data_;
   std::vector<int> row_of_law_, law_of_row_;
-  std::vector<CubicSpline::Jet> jets_;
+  std::vector<TimeLaw::Jet> jets_;
   std::vector<double> inputs_, gradient_;
   Program::Scratch scratch_;
   bool held_ = false;

@@ -36,6 +36,7 @@ class Checker {
 
   void name(std::string_view key, const std::string& value, const Says& says);
   void text(std::string_view, const std::string&, const Says&) {}
+  void texts(std::string_view, const std::vector<std::string>&, const Says&) {}
   void reference(std::string_view key, const std::string& value, To what, const Says& says);
   void references(std::string_view key, const std::vector<std::string>& values, To what, const Says& says);
   void word(std::string_view key, const std::string& value, const Words& words, const Says& says);
@@ -142,6 +143,8 @@ void check_meaning(Checker& checker, const InertiaField& inertia);
 void check_meaning(Checker& checker, const EulerParametersField& orientation);
 void check_meaning(Checker& checker, const AxisAngleField& orientation);
 void check_meaning(Checker& checker, const Joint& joint);
+void check_meaning(Checker& checker, const SampledLaw& law);
+void check_meaning(Checker& checker, const Signal& signal);
 void check_meaning(Checker& checker, const Drive& drive);
 void check_meaning(Checker& checker, const Force& force);
 void check_meaning(Checker& checker, const Sensor& sensor);
@@ -150,6 +153,9 @@ void check_meaning(Checker& checker, const IntegratorOptions& options);
 void check_meaning(Checker& checker, const IntegratorSettings& settings);
 void check_meaning(Checker& checker, const SimulationSettings& settings);
 void check_meaning(Checker& checker, const Scene& scene);
+
+// The units that samples are given in.
+void check_units(Checker& checker, const SampleColumn& samples);
 
 // Names that occur more than once in a list, at paths of(index).
 template <class T, class PathOf>

@@ -26,6 +26,7 @@ class FieldVisitor {
 
   void name(std::string_view, const std::string&, const Says&) {}
   void text(std::string_view, const std::string&, const Says&) {}
+  void texts(std::string_view, const std::vector<std::string>&, const Says&) {}
   void reference(std::string_view, const std::string&, To, const Says&) {}
   void references(std::string_view, const std::vector<std::string>&, To, const Says&) {}
   void word(std::string_view, const std::string&, const Words&, const Says&) {}

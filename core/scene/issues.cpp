@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "core/expression/did_you_mean.hpp"
+#include "core/expression/syntax_tree.hpp"
 #include "core/scene/checker.hpp"
 #include "core/scene/inertia_check.hpp"
 #include "core/tableau/tableaus.hpp"
@@ -107,7 +108,7 @@ void check_moving(Checker& checker, const std::string& body) {
   if (body == "ground") checker.issue(checker.path("body"), "is the ground, which never moves");
 }
 
-// Parameters, definitions and sensors share one name space.
+// Parameters, definitions, signals and sensors share one name space.
 void check_shared_names(Checker& checker, const Scene& scene) {
   std::map<std::string, std::string> first;
   const auto check = [&](const char* list, const std::string& name) {
@@ -116,10 +117,11 @@ void check_shared_names(Checker& checker, const Scene& scene) {
     const auto [it, is_new] = first.emplace(name, where);
     if (!is_new)
       checker.issue(where, "the name '" + name + "' is taken by " + it->second +
-                               "; parameters, definitions and sensors share one name space");
+                               "; parameters, definitions, signals and sensors share one name space");
   };
   for (const Parameter& parameter : scene.parameters) check("parameters", parameter.name);
   for (const Definition& definition : scene.definitions) check("definitions", definition.name);
+  for (const Signal& signal : scene.signals) check("signals", signal.name);
   for (const Sensor& sensor : scene.sensors) check("sensors", sensor.name);
 }
 
@@ -221,7 +223,45 @@ void check_start(Checker& checker, const std::string& where, const Expression& l
   }
 }
 
+void check_units(Checker& checker, const SampleColumn& samples) {
+  const auto check = [&](std::string_view key, const std::string& unit, const std::optional<Dimension>& expected) {
+    const std::optional<Unit> found = parse_unit(unit);
+    if (unit.empty()) return;
+    if (!found)
+      checker.issue(checker.path(key), "'" + unit +
+                                           "' is not a known unit; units are products, quotients and whole "
+                                           "powers of " +
+                                           known_units());
+    else if (expected && !compatible(found->dimension, *expected))
+      checker.issue(checker.path(key), "'" + unit + "' is no unit of time");
+  };
+  check("unit", samples.unit, std::nullopt);
+  check("time_unit", samples.time_unit, dimension::kTime);
+}
+
+void check_meaning(Checker& checker, const SampledLaw& law) { check_units(checker, law); }
+void check_meaning(Checker& checker, const Signal& signal) { check_units(checker, signal); }
+
+namespace {
+
+// Kinks of a drive's law: no motion follows a rate that jumps.
+void check_smooth(Checker& checker, const Expression& law) {
+  const std::string needs = "; a drive needs two continuous derivatives: take ";
+  for (const Signal& signal : checker.facts().scene().signals)
+    if (law.depends_on(signal.name) && signal.interpolation != Interpolation::spline)
+      checker.issue(checker.path("law"), "uses the signal '" + signal.name + "', which " +
+                                             (signal.interpolation == Interpolation::hold ? "jumps" : "has kinks") +
+                                             " at its samples" + needs + "\"interpolation\": \"spline\"");
+  for (const SyntaxNode& node : law.tree().nodes) {
+    if (!node.curve || node.curve->interpolation() == Interpolation::spline) continue;
+    return checker.issue(checker.path("law"), "has a table, which has kinks" + needs + "spline(x, [..], [..])");
+  }
+}
+
+}  // namespace
+
 void check_meaning(Checker& checker, const Drive& drive) {
+  check_smooth(checker, drive.law);
   if (!drive.samples) check_start(checker, checker.path("law"), drive.law, 2);
   if (drive.type == "angle" || drive.type == "displacement") check_joint_has(checker, "joint", drive.joint, drive.type);
   if (drive.type == "distance") check_two_bodies(checker, drive.body1, drive.body2, "a distance");

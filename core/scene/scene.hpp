@@ -3,13 +3,16 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
 
+#include "core/expression/curve.hpp"
 #include "core/expression/expression.hpp"
 #include "core/scene/settings.hpp"
 
@@ -105,10 +108,23 @@ struct Joint {
   Field pitch;        // of screw: displacement = pitch angle/(2 pi) [m per turn]
 };
 
-// A column of a CSV file over another, interpolated by a C2 cubic spline. The reader of the file fills in the samples.
-struct SampledLaw {
-  std::string csv, time, column;
-  std::vector<double> times = {}, values = {};
+// A column of a CSV file over the column of its times. The reader of the file fills in the curve, in SI units.
+struct SampleColumn {
+  std::string file, column, time = "t";
+  std::string unit = {}, time_unit = {};  // instead of the units that the headers name; empty: these, else SI
+  std::optional<double> time_zero = {};   // what the file shows at t = 0 [s]
+  std::shared_ptr<const Curve> curve = {};
+  static constexpr double kFirstRow = std::numeric_limits<double>::lowest();  // a time_zero: that of the first row
+};
+
+// A law of a drive through samples, always a spline.
+struct SampledLaw : SampleColumn {};
+
+// A function of time that laws, costs and channels use by name: gain f(t - delay) + offset, f through the samples.
+struct Signal : SampleColumn {
+  std::string name;
+  Interpolation interpolation = Interpolation::linear;
+  Field delay = 0.0, gain = 1.0, offset = 0.0;  // of parameters; delay in s
 };
 
 // A rheonomic constraint: a coordinate, distance, angle or displacement that follows a law of time.
@@ -209,6 +225,7 @@ struct Scene {
   VectorField gravity{0.0, 0.0, -9.81};
   std::vector<Parameter> parameters;
   std::vector<Definition> definitions;
+  std::vector<Signal> signals;
   std::vector<Body> bodies;
   std::vector<Joint> joints;
   std::vector<Drive> drives;

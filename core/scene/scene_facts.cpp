@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/expression/dimension_inference.hpp"
+#include "core/scene/signals.hpp"
 
 namespace mbsopt {
 
@@ -54,8 +55,14 @@ SceneFacts::SceneFacts(const Scene& scene)
       none_.add_definition(definition.name, definition.value);
     any_unread_ = any_unread_ || (definition.value.is_number() && std::isnan(definition.value.number()));
   }
+  for (const Signal& signal : scene.signals) {
+    const std::optional<Unit> unit = parse_unit(signal.unit);
+    dimensions_[signal.name] = unit && signal.gain.is_number() ? std::optional(unit->dimension) : std::nullopt;
+  }
   find_broken_definitions();
-  tsda_law_ = rsda_law_ = time_law_ = objective_ = none_;
+  Symbols with_signals = none_;
+  add_signals(with_signals, scene);
+  tsda_law_ = rsda_law_ = time_law_ = objective_ = with_signals;
   for (const char* name : {"l", "ldot", "t"}) add_once(tsda_law_, name);
   for (const char* name : {"angle", "rate", "t"}) add_once(rsda_law_, name);
   add_once(time_law_, "t");

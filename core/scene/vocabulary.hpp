@@ -9,6 +9,7 @@
 //   text(key, string&, says)                    any text
 //   reference(key, string&, To, says)           the name of a body, joint, force, sensor, parameter, objective
 //   references(key, vector<string>&, To, says)
+//   texts(key, vector<string>&, says)           a text, or a list of them
 //   choice(key, T&, Choice<T>[], says)       one of a few words that stand for values
 //   word(key, string&, Words, says)             one of a few words
 //   type(key, word, rows, says)                 the type of an object; returns its row, nullptr when there is none
@@ -93,6 +94,9 @@ inline constexpr Choice<Projection> kProjections[] = {{"none", Projection::none}
                                                       {"velocity", Projection::velocity},
                                                       {"position_velocity", Projection::position_velocity}};
 inline constexpr Choice<double> kAccuracies[] = {{"draft", 1e-3}, {"engineering", 1e-5}, {"reference", 1e-9}};
+inline constexpr Choice<Interpolation> kInterpolations[] = {
+    {"hold", Interpolation::hold}, {"linear", Interpolation::linear}, {"spline", Interpolation::spline}};
+inline constexpr Choice<double> kTimeZeros[] = {{"first", SampleColumn::kFirstRow}};
 inline constexpr Choice<bool> kFrames[] = {{"global", false}, {"body", true}};
 
 void describe(auto& v, Like<Parameter> auto& p) {
@@ -189,10 +193,27 @@ void describe(auto& v, Like<Joint> auto& j) {
   v.number("pitch", j.pitch, {"displacement per turn, right-handed [m]", need_of(*row, "pitch"), kLength});
 }
 
-void describe(auto& v, Like<SampledLaw> auto& l) {
-  v.text("csv", l.csv, {"file with a header row, relative to the problem file", Need::required});
-  v.text("time", l.time, {"name of the column of times [s]", Need::required});
-  v.text("column", l.column, {"name of the column of values, SI", Need::required});
+void describe_samples(auto& v, auto& c, std::string_view file) {
+  v.text(file, c.file, {"CSV file with a header row, relative to the problem file", Need::required});
+  v.text("column", c.column,
+         {"header of the column of values, with its unit (\"tau [N m]\") or without it", Need::required});
+  v.text("time", c.time, {"header of the column of times"});
+  v.text("unit", c.unit, {"of the values, instead of the unit in the header; without either they are SI"});
+  v.text("time_unit", c.time_unit, {"of the times, instead of the unit in the header; without either they are in s"});
+  v.level("time_zero", c.time_zero, kTimeZeros, kAny,
+          {"time of the file at t = 0 [s], or first: that of the first row; 0 when absent", Need::optional,
+           dimension::kTime});
+}
+
+void describe(auto& v, Like<SampledLaw> auto& l) { describe_samples(v, l, "csv"); }
+
+void describe(auto& v, Like<Signal> auto& s) {
+  describe_samples(v, s, "file");
+  v.choice("interpolation", s.interpolation, kInterpolations,
+           {"between samples: hold keeps the last value, linear has kinks, spline is C2"});
+  v.number("delay", s.delay, {"gain f(t - delay) + offset [s]", Need::optional, dimension::kTime});
+  v.number("gain", s.gain, {"factor of the samples"});
+  v.number("offset", s.offset, {"added, in SI units"});
 }
 
 void describe(auto& v, Like<Drive> auto& d) {
@@ -406,6 +427,7 @@ void describe(auto& v, Like<Scene> auto& s) {
   v.vector("gravity", s.gravity, {"[m/s^2]", Need::optional, dimension::kAcceleration});
   v.named("parameters", s.parameters, {"what may be designed or identified"});
   v.named("definitions", s.definitions, {"named sub-expressions"});
+  v.named("signals", s.signals, {"functions of time from CSV files, which laws use by name"});
   v.list("bodies", s.bodies, {"rigid bodies", Need::required});
   v.list("joints", s.joints, {"joints between bodies"});
   v.list("drives", s.drives, {"rheonomic constraints: what follows a law of time"});

@@ -33,7 +33,8 @@ class StepController {
       : least_(options.factor_min.value_or(0.2)),
         most_(options.factor_max.value_or(6)),
         safety_(options.safety.value_or(0.9)),
-        small_(0.5 * std::pow(most_, -error_order)) {
+        small_(0.5 * std::pow(most_, -error_order)),
+        k_(error_order) {
     const double k = error_order;
     if (options.controller == "I") {
       a_ = 1 / k;
@@ -54,6 +55,8 @@ class StepController {
     last_rejected_ = false;
     return factor;
   }
+  // The factor that the error allows, without memory and limits.
+  double allowed(double error) const { return safety_ * std::pow(std::max(error, 1e-12), -1 / k_); }
   // A step whose estimate is not to decide on the next one.
   void after_passage() { last_rejected_ = false; }
   double after_rejection(double error) {
@@ -63,7 +66,7 @@ class StepController {
 
  private:
   static constexpr double kLeastError = 1e-4;
-  double least_, most_, safety_, small_;
+  double least_, most_, safety_, small_, k_;
   double a_ = 0, b_ = 0, c_ = 0;
   double previous_ = kLeastError, older_ = kLeastError;
   bool last_rejected_ = false;

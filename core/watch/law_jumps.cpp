@@ -25,22 +25,22 @@ LawJumps::LawJumps(const MechanismData& data)
     : data_(data), inputs_(data.rho.data(), data.rho.data() + data.rho.size()) {
   inputs_.push_back(0);
   for (const RowLaw& law : data.laws) {
-    if (!law.law.programs) continue;
+    if (!law.law.programs || law.law.smooth) continue;
     laws_.push_back(&law);
     for (const Program& p : *law.law.programs) p.grow(scratch_);
   }
 }
 
-CubicSpline::Jet LawJumps::at(const TimeLaw& law, double t) {
+TimeLaw::Jet LawJumps::at(const TimeLaw& law, double t) {
   inputs_.back() = t;
   return law.at(inputs_, scratch_);
 }
 
 LawJumps::Jump LawJumps::find(const TimeLaw& law, Of what, double t0, double t1) {
-  CubicSpline::Jet a = at(law, t0), b = at(law, t1);
-  const auto value = [&](const CubicSpline::Jet& x) { return what == Of::f ? x.f : x.f_t; };
-  const auto rate = [&](const CubicSpline::Jet& x) { return what == Of::f ? x.f_t : x.f_tt; };
-  const auto difference = [&](const CubicSpline::Jet& from, const CubicSpline::Jet& to, double h) {
+  TimeLaw::Jet a = at(law, t0), b = at(law, t1);
+  const auto value = [&](const TimeLaw::Jet& x) { return what == Of::f ? x.f : x.f_t; };
+  const auto rate = [&](const TimeLaw::Jet& x) { return what == Of::f ? x.f_t : x.f_tt; };
+  const auto difference = [&](const TimeLaw::Jet& from, const TimeLaw::Jet& to, double h) {
     return value(to) - value(from) - h / 2 * (rate(from) + rate(to));
   };
   // A difference counts against the size of the law and of its change at its rate; else it is only rounding.
@@ -52,7 +52,7 @@ LawJumps::Jump LawJumps::find(const TimeLaw& law, Of what, double t0, double t1)
     if (!std::isfinite(left) || std::abs(left) <= std::max(kJump * size, kRounding)) return {};
     const double middle = t0 + kPart * (t1 - t0);
     if (t1 - t0 <= shortest || middle <= t0 || middle >= t1) return {t1, value(b) - value(a)};
-    const CubicSpline::Jet m = at(law, middle);
+    const TimeLaw::Jet m = at(law, middle);
     if (std::abs(difference(a, m, middle - t0)) >= std::abs(difference(m, b, t1 - middle))) {
       t1 = middle, b = m;
     } else {

@@ -24,7 +24,7 @@ class LawJumps {
   struct Jump {
     double t = 0, size = 0;
   };
-  CubicSpline::Jet at(const TimeLaw& law, double t);
+  TimeLaw::Jet at(const TimeLaw& law, double t);
   Jump find(const TimeLaw& law, Of what, double t0, double t1);
 
   const MechanismData& data_;

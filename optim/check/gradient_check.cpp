@@ -9,6 +9,7 @@
 #include <random>
 
 #include "core/cvodes/cvodes.hpp"
+#include "core/scene/signals.hpp"
 #include "optim/check/user_terms.hpp"
 #include "optim/differences/difference_ladder.hpp"
 #include "optim/machine/median.hpp"
@@ -62,6 +63,7 @@ class Check {
     if (!base_runs()) return std::move(result_);
     result_.ran = true;
     result_.discrete = !is_cvodes(scene_.simulation.integrator.type);
+    set_what_moves_kinks();
     measure_times();
     difference();
     estimate_integration_error();
@@ -109,6 +111,21 @@ class Check {
     return true;
   }
 
+  // Steps that end at kinks of a signal lose them as its delay changes: differences need steps of their own then.
+  void set_what_moves_kinks() {
+    const std::vector<bool> moves = parameters_that_move_kinks(scene_);
+    on_frozen_steps_.setConstant(rho_.size(), result_.discrete);
+    std::string names;
+    for (std::size_t k = 0; k < moves.size(); ++k) {
+      if (!moves[k]) continue;
+      on_frozen_steps_(static_cast<Index>(k)) = false;
+      names += (names.empty() ? "'" : ", '") + result_.parameters[k] + "'";
+    }
+    if (!names.empty() && result_.discrete)
+      result_.warnings.push_back(fmt::format(
+          "{} moves kinks of a signal, at which steps end: compared with differences on free steps only", names));
+  }
+
   void measure_times() {
     GradientTimingOptions timing_options = options_.timing;
     timing_options.user_forces = options_.user_forces;
@@ -151,10 +168,11 @@ class Check {
     jump_.setZero(m, P);
     on_base_steps_.setConstant(m, P, false);
     for (Index k = 0; k < P; ++k) {
+      if (result_.discrete && !on_frozen_steps_(k)) result_.frozen.col(k).setConstant(kNaN);
       std::vector<std::pair<double, VectorXd>> on_frozen_steps;
       const double near = options_.relative_step * size_(k) * std::pow(0.5, options_.rungs - kJumpRungs);
       for (const bool frozen : {true, false}) {
-        if (frozen ? !result_.discrete : !options_.free_steps) continue;
+        if (frozen ? !on_frozen_steps_(k) : !options_.free_steps) continue;
         const Stopwatch stopwatch;
         std::string failure;             // of a run
         double other_steps = kInfinity;  // the smallest |h| at which a run took others than the base run
@@ -349,7 +367,7 @@ class Check {
                         ? Verdict::zero
                         : verdict_of(e.adjoint, rounding_(i, k), e.tlm, std::max(entry, floor), limits.tlm_adjoint);
           e.frozen_error += rounding(frozen_step_);
-          e.frozen_verdict = verdict_of(e.frozen, e.frozen_error, e.tlm, entry, limits.frozen);
+          if (on_frozen_steps_(k)) e.frozen_verdict = verdict_of(e.frozen, e.frozen_error, e.tlm, entry, limits.frozen);
         } else {
           e.exact = verdict_of(e.adjoint, integration_error_(i, k), e.tlm, std::max(entry, floor), limits.continuous);
         }
@@ -404,7 +422,9 @@ class Check {
     constexpr double kLargest = 1e-2, kClear = 100;              // clear of rounding: that many times above it
     const double allowed = options_.thresholds.frozen / kClear;  // of a derivative, as in differences
     result_.taylor.clear();
-    const VectorXd d = random_direction(rho_.size()).cwiseProduct(size_) / std::sqrt(static_cast<double>(rho_.size()));
+    const VectorXd d =
+        random_direction(rho_.size()).cwiseProduct(size_).cwiseProduct(on_frozen_steps_.cast<double>().matrix()) /
+        std::sqrt(static_cast<double>(rho_.size()));
     const VectorXd slope = result_.tlm * d;
     std::vector<VectorXd> remainders, noise;
     std::vector<double> steps;
@@ -450,6 +470,7 @@ class Check {
   MatrixXd rounding_;      // of the derivatives, where it was measured; else 0
   VectorXd psi_rounding_;  // of psi, the same
   bool rounding_known_ = false;
+  Eigen::Array<bool, Eigen::Dynamic, 1> on_frozen_steps_;             // parameters whose differences they serve
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> on_base_steps_;  // a free difference
   MatrixXd jump_;  // of psi, between the steps of the base run and those chosen anew
   std::mt19937 generator_{options_.seed};

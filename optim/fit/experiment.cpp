@@ -11,6 +11,7 @@
 #include "core/expression/did_you_mean.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/field_visitor.hpp"
+#include "core/scene/signals.hpp"
 #include "core/scene/type_table.hpp"
 #include "optim/objective/expression_cost.hpp"
 #include "optim/objective/obstructed_parameters.hpp"
@@ -27,24 +28,25 @@ Program compiled(const Field& field, const Symbols& symbols, const std::string& 
   }
 }
 
-// Value of a field of a channel, with its gradient in all parameters.
+// Value of a field of a channel, with its gradient in all parameters and t.
 struct Differentiated {
   double value = 0;
   Eigen::VectorXd rho_bar;
 };
 
-Differentiated evaluated(const Program& program, const Eigen::VectorXd& rho, Program::Scratch& scratch) {
+Differentiated evaluated(const Program& program, const Eigen::VectorXd& rho, double t, Program::Scratch& scratch) {
   Differentiated d;
-  d.rho_bar.setZero(rho.size());
-  const std::size_t P = static_cast<std::size_t>(rho.size());
+  std::vector<double> inputs(rho.begin(), rho.end());
+  inputs.push_back(t);
+  d.rho_bar.setZero(rho.size() + 1);
   program.grow(scratch);
-  d.value = program.add_gradient(std::span(rho.data(), P), 1, std::span(d.rho_bar.data(), P), scratch);
+  d.value = program.add_gradient(inputs, 1, std::span(d.rho_bar.data(), inputs.size()), scratch);
   return d;
 }
 
 // Whether time acts on the scene other than through its state.
 bool depends_on_time(const Scene& scene) {
-  bool found = !scene.drives.empty();
+  bool found = !scene.drives.empty() || !scene.signals.empty();
   FieldVisitor visitor(
       [&](const FieldPlace&, const Expression& e, Names) {
         const std::vector<std::string> names = e.names();
@@ -80,6 +82,12 @@ Experiment::Experiment(const Scene& scene, const ExperimentSpec& spec, std::stri
 }
 
 void Experiment::replace_laws(const ExperimentSpec& spec, const std::string& place) {
+  for (const SignalSamples& samples : spec.signals) {
+    const auto signal = std::ranges::find(scene_.signals, samples.name, &Signal::name);
+    if (signal == scene_.signals.end())
+      throw std::invalid_argument(fmt::format("{}.signals.{}: there is no such signal", place, samples.name));
+    static_cast<SampleColumn&>(*signal) = samples;
+  }
   for (std::size_t i = 0; i < spec.drives.size(); ++i) {
     const auto drive = std::find_if(scene_.drives.begin(), scene_.drives.end(),
                                     [&](const Drive& d) { return d.name == spec.drives[i].drive; });
@@ -90,14 +98,20 @@ void Experiment::replace_laws(const ExperimentSpec& spec, const std::string& pla
   }
 }
 
-double Experiment::largest_delay(const Program& delay) const {
+double Experiment::largest_delay(const Program& delay, const std::vector<double>& times) const {
   std::vector<const Unknown*> bounded;
   for (const Unknown& unknown : unknowns_) {
     const Parameter& p = scene_.parameters[static_cast<std::size_t>(unknown.parameter)];
     if (delay.uses(unknown.parameter) && (p.lower || p.upper)) bounded.push_back(&unknown);
   }
   Program::Scratch scratch;
-  double largest = evaluated(delay, rho_, scratch).value;
+  const auto largest_at = [&](const Eigen::VectorXd& rho) {
+    double largest = evaluated(delay, rho, settings_.start_time, scratch).value;
+    if (delay.uses(static_cast<int>(rho.size())))
+      for (const double t : times) largest = std::max(largest, evaluated(delay, rho, t, scratch).value);
+    return largest;
+  };
+  double largest = largest_at(rho_);
   if (bounded.size() > 10) return largest;
   for (std::size_t corner = 0; corner < (std::size_t{1} << bounded.size()); ++corner) {
     Eigen::VectorXd rho = rho_;
@@ -106,7 +120,7 @@ double Experiment::largest_delay(const Program& delay) const {
       const std::optional<double>& bound = corner >> i & 1 ? p.upper : p.lower;
       if (bound) rho(bounded[i]->parameter) = *bound;
     }
-    largest = std::max(largest, evaluated(delay, rho, scratch).value);
+    largest = std::max(largest, largest_at(rho));
   }
   return largest;
 }
@@ -128,7 +142,7 @@ void Experiment::compile_channels(const ExperimentSpec& spec, const std::string&
   if (spec.channels.empty()) throw std::invalid_argument(place + ".channels: is empty; give what was measured");
   std::vector<std::string> sensors;
   for (const Sensor& s : scene_.sensors) sensors.push_back(s.name);
-  const Symbols symbols = parameter_symbols(scene_);
+  const Symbols symbols = parameter_symbols(scene_), of_time = time_symbols(scene_);
   for (std::size_t c = 0; c < spec.channels.size(); ++c) {
     const ChannelSpec& channel = spec.channels[c];
     const std::string at = fmt::format("{}.channels[{}]", place, c);
@@ -139,8 +153,8 @@ void Experiment::compile_channels(const ExperimentSpec& spec, const std::string&
     Channel result;
     result.sensor = static_cast<int>(sensor - sensors.begin());
     result.gain = compiled(channel.gain, symbols, at + ".gain");
-    result.bias = compiled(channel.bias, symbols, at + ".bias");
-    result.delay = compiled(channel.delay, symbols, at + ".delay");
+    result.bias = compiled(channel.bias, of_time, at + ".bias");
+    result.delay = compiled(channel.delay, of_time, at + ".delay");
     delayed_ = delayed_ || !channel.delay.is_number() || channel.delay.number() != 0;
     refuse_time_dependence(scene_.sensors[static_cast<std::size_t>(result.sensor)], result.delay, at);
     const Program sigma = compiled(channel.sigma, symbols, at + ".sigma");
@@ -151,7 +165,7 @@ void Experiment::compile_channels(const ExperimentSpec& spec, const std::string&
                         "residual is small (\"estimate_sigma\": true estimates it from the residuals)",
                         at, scene_.parameters[static_cast<std::size_t>(unknown.parameter)].name));
     Program::Scratch scratch;
-    result.sigma = evaluated(sigma, rho_, scratch).value;
+    result.sigma = evaluated(sigma, rho_, settings_.start_time, scratch).value;
     if (!(result.sigma > 0 && std::isfinite(result.sigma)))
       throw std::invalid_argument(fmt::format("{}.sigma: is {}, must be above 0", at, result.sigma));
     channels_.push_back(std::move(result));
@@ -175,7 +189,7 @@ void Experiment::take_samples(const ExperimentSpec& spec, const std::string& pla
   const std::vector<double>& t = ascending_times(data, spec.time);
   std::vector<const std::vector<double>*> columns;
   for (const ChannelSpec& channel : spec.channels) columns.push_back(&data.column(channel.column));
-  for (Channel& channel : channels_) channel.first = start + std::max(0.0, largest_delay(channel.delay));
+  for (Channel& channel : channels_) channel.first = start + std::max(0.0, largest_delay(channel.delay, t));
   for (std::size_t row = 0; row < t.size(); ++row) {
     if (t[row] < start || t[row] > end) continue;
     bool any = false;
@@ -209,25 +223,39 @@ void Experiment::take_samples(const ExperimentSpec& spec, const std::string& pla
   first_.push_back(samples_.size());
 }
 
-std::vector<Drive>::const_iterator Experiment::uncovered(double end) const {
-  const double slack = 1e-9 * (end - settings_.start_time);
-  return std::find_if(scene_.drives.begin(), scene_.drives.end(), [&](const Drive& drive) {
-    const std::vector<double>* const times = drive.samples ? &drive.samples->times : nullptr;
-    return times && !times->empty() && (settings_.start_time < times->front() - slack || end > times->back() + slack);
-  });
+std::optional<Experiment::ShortSamples> Experiment::short_samples(const Eigen::VectorXd& rho, double end) const {
+  for (std::size_t i = 0; i < scene_.drives.size(); ++i) {
+    const std::optional<SampledLaw>& law = scene_.drives[i].samples;
+    if (!law || !law->curve) continue;
+    if (auto words = uncovered(covered_by(*law->curve), settings_.start_time, end)) return {{false, i, *words}};
+  }
+  const Symbols symbols = parameter_symbols(scene_);
+  Program::Scratch scratch;
+  for (std::size_t i = 0; i < scene_.signals.size(); ++i) {
+    const Signal& signal = scene_.signals[i];
+    if (!signal.curve) continue;
+    const double delay =
+        evaluated(compiled(signal.delay, symbols, "signals." + signal.name), rho, settings_.start_time, scratch).value;
+    if (auto words = uncovered(covered_by(*signal.curve, delay), settings_.start_time, end)) return {{true, i, *words}};
+  }
+  return std::nullopt;
 }
 
 void Experiment::refuse_short_laws(const ExperimentSpec& spec, const std::string& place) const {
-  const auto drive = uncovered(settings_.end_time);
-  if (drive == scene_.drives.end()) return;
-  std::string path = fmt::format("drives[{}].law", drive - scene_.drives.begin());
-  for (std::size_t i = 0; i < spec.drives.size(); ++i)
-    if (spec.drives[i].drive == drive->name) path = fmt::format("{}.drives[{}].law", place, i);
-  throw std::invalid_argument(
-      fmt::format("{}: its samples go from {:.6g} s to {:.6g} s, the experiment '{}' from {:.6g} s to {:.6g} s; give "
-                  "that an end_time, or a law of its own",
-                  path, drive->samples->times.front(), drive->samples->times.back(), spec.name, settings_.start_time,
-                  settings_.end_time));
+  const std::optional<ShortSamples> found = short_samples(rho_, settings_.end_time);
+  if (!found) return;
+  std::string path;
+  if (found->of_signal) {
+    const std::string& name = scene_.signals[found->index].name;
+    const bool own = std::ranges::find(spec.signals, name, &SignalSamples::name) != spec.signals.end();
+    path = fmt::format("{}signals.{}", own ? place + "." : "", name);
+  } else {
+    path = fmt::format("drives[{}].law", found->index);
+    for (std::size_t i = 0; i < spec.drives.size(); ++i)
+      if (spec.drives[i].drive == scene_.drives[found->index].name) path = fmt::format("{}.drives[{}].law", place, i);
+  }
+  throw std::invalid_argument(fmt::format("{}: {}, in the experiment '{}'; give that an end_time, or {} of its own",
+                                          path, found->words, spec.name, found->of_signal ? "samples" : "a law"));
 }
 
 Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limits& limits) const {
@@ -240,10 +268,20 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
   struct ChannelNow {
     Differentiated gain, bias, delay;
   };
-  std::vector<ChannelNow> now;
   Program::Scratch scratch;
-  for (const Channel& c : channels_)
-    now.push_back({evaluated(c.gain, rho, scratch), evaluated(c.bias, rho, scratch), evaluated(c.delay, rho, scratch)});
+  const auto at_time = [&](const Channel& c, double t) {
+    return ChannelNow{evaluated(c.gain, rho, t, scratch), evaluated(c.bias, rho, t, scratch),
+                      evaluated(c.delay, rho, t, scratch)};
+  };
+  const int time = static_cast<int>(rho.size());
+  std::vector<ChannelNow> now;
+  for (const Channel& c : channels_) now.push_back(at_time(c, settings_.start_time));
+  const auto of_sample = [&](const Sample& sample) -> const ChannelNow& {
+    const Channel& c = channels_[sample.channel];
+    ChannelNow& values = now[sample.channel];
+    if (c.bias.uses(time) || c.delay.uses(time)) values = at_time(c, times_[sample.time]);
+    return values;
+  };
 
   SimulationSettings settings = settings_;
   if (limits.max_steps) settings.integrator.max_steps = std::min(settings.integrator.max_steps, *limits.max_steps);
@@ -252,7 +290,7 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
     sampling.times = times_;
   else
     for (const Sample& sample : samples_) {  // each at a time of its own
-      const double t = times_[sample.time] - now[sample.channel].delay.value;
+      const double t = times_[sample.time] - of_sample(sample).delay.value;
       if (!std::isfinite(t)) {
         r.message = fmt::format("the delay of channel {} is not finite", sample.channel);
         return r;
@@ -261,9 +299,11 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
       settings.end_time = std::max(settings.end_time, t);
     }
 
-  if (const auto drive = uncovered(settings.end_time); drive != scene_.drives.end()) {
-    r.message = fmt::format("a negative delay asks for the motion at {:.6g} s, beyond the samples of the drive '{}'",
-                            settings.end_time, drive->name);
+  if (const auto found = short_samples(rho, settings.end_time)) {
+    r.message = fmt::format("the motion until {:.6g} s is beyond the samples of the {} '{}': {}", settings.end_time,
+                            found->of_signal ? "signal" : "drive",
+                            found->of_signal ? scene_.signals[found->index].name : scene_.drives[found->index].name,
+                            found->words);
     return r;
   }
   try {
@@ -273,7 +313,7 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
     std::size_t seen = 0;
     const auto take = [&](std::size_t i, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
       const Sample& sample = samples_[i];
-      const ChannelNow& c = now[sample.channel];
+      const ChannelNow& c = of_sample(sample);
       y_bar.setZero(), rho_bar.setZero();
       const double s = mechanism.add_sensor_gradient(channels_[sample.channel].sensor, at, 1, y_bar, rho_bar);
       const bool held = times_[sample.time] - c.delay.value < settings.start_time;

@@ -1,7 +1,7 @@
 // One experiment: what was measured, and the simulation that explains it. Turns values of the unknowns into residuals
 // and their exact Jacobian by one tangent-linear run from its start time to its last sample.
 //
-//   z = (measured - gain s(t - delay) - bias)/sigma
+//   z = (measured - gain s(t - delay) - bias)/sigma             bias and delay may be functions of t
 //   dz/du = -(gain (s_y (y_u - ydot delay_u) + s_rho rho_u) + s gain_u + bias_u)/sigma        sigma: constant in u
 //
 // y, y_u and ydot are the dense output, its derivative in u and in time. Before the start the mechanism stays as it is
@@ -78,19 +78,25 @@ class Experiment {
  private:
   struct Channel {
     int sensor = 0;
-    Program gain, bias, delay;  // inputs: all parameters
+    Program gain, bias, delay;  // inputs: all parameters, then t
     double sigma = 1;
     double first = 0;  // samples before are left out [s]
     std::size_t missing = 0;
   };
   void replace_laws(const ExperimentSpec& spec, const std::string& place);
   void compile_channels(const ExperimentSpec& spec, const std::string& place);
-  // The largest delay that the bounds of the unknowns allow, where they say; else at their start values, rho.
-  double largest_delay(const Program& delay) const;
+  // The largest delay at any of the times that the bounds of the unknowns allow, where they say; else at their start
+  // values, rho.
+  double largest_delay(const Program& delay, const std::vector<double>& times) const;
   void refuse_time_dependence(const Sensor& sensor, const Program& delay, const std::string& place) const;
   void take_samples(const ExperimentSpec& spec, const std::string& place, const CsvTable& data);
-  // The first drive whose sampled law ends before `end` or begins after the start; end() where all reach.
-  std::vector<Drive>::const_iterator uncovered(double end) const;
+  // The samples that do not reach from the start to `end`: whose they are, and what they cover.
+  struct ShortSamples {
+    bool of_signal;
+    std::size_t index;  // among the scene's drives or signals
+    std::string words;
+  };
+  std::optional<ShortSamples> short_samples(const Eigen::VectorXd& rho, double end) const;
   void refuse_short_laws(const ExperimentSpec& spec, const std::string& place) const;
 
   Scene scene_;

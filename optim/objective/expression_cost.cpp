@@ -4,6 +4,7 @@
 
 #include "core/expression/program_switches.hpp"
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/scene/signals.hpp"
 
 namespace mbsopt {
 
@@ -95,12 +96,16 @@ Symbols parameter_symbols(const Scene& scene) {
   return symbols;
 }
 
-Symbols cost_symbols(const Scene& scene) {
-  Symbols symbols;
-  for (const Parameter& p : scene.parameters) symbols.add_input(p.name);
+Symbols time_symbols(const Scene& scene) {
+  Symbols symbols = parameter_symbols(scene);
   symbols.add_input("t");
+  add_signals(symbols, scene);
+  return symbols;
+}
+
+Symbols cost_symbols(const Scene& scene) {
+  Symbols symbols = time_symbols(scene);
   for (const Sensor& s : scene.sensors) symbols.add_input(s.name);
-  for (const Definition& d : scene.definitions) symbols.add_definition(d.name, d.value);
   return symbols;
 }
 

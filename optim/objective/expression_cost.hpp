@@ -20,10 +20,13 @@
 
 namespace mbsopt {
 
-// Names an objective may use: parameters (inputs 0..P-1), "t" (input P), sensors (from P+1), definitions.
+// Names an objective may use: parameters (inputs 0..P-1), "t" (input P), sensors (from P+1), definitions,
+// signals.
 Symbols cost_symbols(const Scene& scene);
-// The same without t and sensors: what depends on parameters alone.
+// The same without t, signals and sensors: what depends on parameters alone.
 Symbols parameter_symbols(const Scene& scene);
+// Parameters, then t; definitions and signals.
+Symbols time_symbols(const Scene& scene);
 
 // A scalar e of u = (parameters, sensors) along the tangents U = du/drho of a motion.
 struct SecondOrder {
@@ -36,6 +39,7 @@ class CostExpression {
  public:
   CostExpression(const Expression& expression, const Scene& scene);  // throws UnknownName
   bool is_zero() const { return is_zero_; }                          // the constant 0: costs nothing
+  const void* id() const { return compiled_.get(); }                 // the same of copies
   // Of parameters and sensors, at any fixed time: its second derivatives are 0.
   bool is_linear() const;
   std::shared_ptr<const PointCost> bind(const Mechanism& mechanism) const;

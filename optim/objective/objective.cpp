@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <span>
 #include <stdexcept>
 
 #include "core/expression/did_you_mean.hpp"
+#include "core/scene/signals.hpp"
 
 namespace mbsopt {
 namespace {
@@ -67,7 +69,7 @@ Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec
   std::string_view part = "running";
   for (std::size_t k = 0; k < spec.means.size(); ++k)
     if (spec.means[k]) mean_ = &kMeanKinds[k], expression = &spec.means[k], part = mean_->name;
-  if (mean_ && (spec.running || spec.terminal || spec.parameters_only || !spec.samples.empty()))
+  if (mean_ && (spec.running || spec.terminal || spec.parameters_only || !spec.samples.empty() || !spec.track.empty()))
     throw std::invalid_argument(fmt::format("{}.{}: stands alone; other parts are given beside it", place, part));
   sharpness_ = spec.sharpness.value_or(ObjectiveSpec::kSharpness);
   duration_ = scene.simulation.end_time - scene.simulation.start_time;
@@ -83,11 +85,24 @@ Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec
     if (std::optional<CostExpression> value = compile(sample.value, sample_part + ".value"))
       samples_.push_back({sample.time, *std::move(value)});
   }
+  for (std::size_t i = 0; i < spec.track.size(); ++i)
+    follow(spec.track[i], scene, fmt::format("{}.track[{}]", place, i));
   std::stable_sort(samples_.begin(), samples_.end(), [](const Sample& a, const Sample& b) { return a.time < b.time; });
   if (spec.eigenvalue) mode_ = std::make_shared<const FollowedMode>(scene, *spec.eigenvalue);
   if (spec.parameters_only)
     parameters_only_ =
         at_place(place + ".parameters_only", [&] { return Program(*spec.parameters_only, parameter_symbols(scene)); });
+}
+
+// sum over rows k of weight (sensor(t_k) - column_k)^2
+void Objective::follow(const TrackTerm& term, const Scene& scene, const std::string& place) {
+  if (!term.curve) throw std::invalid_argument(place + ": has no samples: nothing has read its file");
+  const Expression off = Expression::parse(term.sensor) - expression_of(term, "column");
+  const CostExpression square =
+      at_place(place + ".weight", [&] { return CostExpression(term.weight * (off * off), scene); });
+  const double t0 = scene.simulation.start_time, t1 = scene.simulation.end_time;
+  for (const double t : term.curve->x())
+    if (t >= t0 && t <= t1) samples_.push_back({t, square});
 }
 
 Objective::Objective(std::string name, std::shared_ptr<const RunningCost> running,
@@ -112,7 +127,12 @@ Cost Objective::cost(const Mechanism& mechanism, double x0) const {
   if (running_) cost.running = running_->bind(mechanism);
   if (running_ && mean_) cost.running = std::make_shared<Integrand>(cost.running, *mean_, exponent(), x0);
   if (terminal_) cost.terminal = terminal_->bind(mechanism);
-  for (const Sample& sample : samples_) cost.samples.push_back({sample.time, sample.value.bind(mechanism)});
+  std::map<const void*, std::shared_ptr<const PointCost>> bound;  // rows of a file share an expression
+  for (const Sample& sample : samples_) {
+    std::shared_ptr<const PointCost>& value = bound[sample.value.id()];
+    if (!value) value = sample.value.bind(mechanism);
+    cost.samples.push_back({sample.time, value});
+  }
   if (user_running_) cost.running = point_cost(user_running_, mechanism.rho());
   if (user_terminal_) cost.terminal = point_cost(user_terminal_, mechanism.rho());
   return cost;

@@ -65,6 +65,8 @@ class Objective {
                                    Eigen::MatrixXd& H) const;
 
  private:
+  void follow(const TrackTerm& term, const Scene& scene, const std::string& place);
+
   std::string name_;
   ObjectiveSpec spec_;
   const MeanKind* mean_ = nullptr;

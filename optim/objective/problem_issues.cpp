@@ -5,15 +5,64 @@
 
 #include "core/expression/did_you_mean.hpp"
 #include "core/scene/checker.hpp"
+#include "core/scene/type_table.hpp"
 #include "optim/objective/design_issues.hpp"
+#include "optim/problem/logged_columns.hpp"
 #include "optim/problem/problem_vocabulary.hpp"
 
 namespace mbsopt {
 
+namespace {
+
+// The dimension that the unit of a column has, against that of the sensor.
+void check_column_unit(Checker& checker, const std::string& unit_text, const std::string& sensor_name) {
+  const Sensor* const sensor = checker.facts().sensor(sensor_name);
+  const TypeRow* const row = sensor ? find_row(kSensorQuantities, sensor->quantity) : nullptr;
+  const std::optional<Unit> unit = parse_column_unit(unit_text);
+  if (unit_text.empty() || !row) return;
+  if (!unit)
+    checker.issue(checker.path("unit"), "'" + unit_text + "' is not a known unit; units are products, quotients and " +
+                                            "whole powers of " + known_units());
+  else if (!unit->dimension.is_none() && !compatible(unit->dimension, row->dimension))
+    checker.issue(checker.path("column"), "is in " + to_string(unit->dimension) + ", the sensor '" + sensor_name +
+                                              "' in " + to_string(row->dimension));
+}
+
+// Rows of the file outside the run are left out.
+void check_track(Checker& checker, const TrackTerm& term, const std::string& place) {
+  if (!term.curve) return;
+  const SimulationSettings& simulation = checker.facts().scene().simulation;
+  const std::vector<double>& t = term.curve->x();
+  const auto rows =
+      std::ranges::count_if(t, [&](double x) { return x >= simulation.start_time && x <= simulation.end_time; });
+  const std::string of_run = "the run, " + text_of(simulation.start_time) + " s to " + text_of(simulation.end_time) +
+                             " s; its times go from " + text_of(t.front()) + " s to " + text_of(t.back()) + " s";
+  if (rows == 0)
+    checker.issue(child_path(place, "file"), "has no row within " + of_run);
+  else if (static_cast<std::size_t>(rows) < t.size())
+    checker.warning(child_path(place, "file"), "only " + std::to_string(rows) + " of its " + std::to_string(t.size()) +
+                                                   " rows lie within " + of_run + "; the others are left out");
+}
+
+}  // namespace
+
+void check_meaning(Checker& checker, const TrackTerm& term) { check_column_unit(checker, term.unit, term.sensor); }
+
+void check_meaning(Checker& checker, const SignalSamples& samples) {
+  check_units(checker, samples);
+  const std::vector<Signal>& signals = checker.facts().scene().signals;
+  std::vector<std::string> names;
+  for (const Signal& signal : signals) names.push_back(signal.name);
+  if (std::ranges::find(names, samples.name) == names.end())
+    checker.issue(checker.path(), "there is no signal '" + samples.name + "'" + did_you_mean(samples.name, names) +
+                                      (names.empty() ? "; there are no signals" : "; signals: " + joined(names)));
+}
+
 // Found by Checker::check through the arguments' namespace.
 void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
   checker.must_be_identifier(checker.path(), objective.name);
-  const bool sums = objective.running || objective.terminal || objective.parameters_only || !objective.samples.empty();
+  const bool sums = objective.running || objective.terminal || objective.parameters_only ||
+                    !objective.samples.empty() || !objective.track.empty();
   int alone = 0;
   bool extreme = false;
   std::vector<std::string> kinds;
@@ -26,8 +75,9 @@ void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
   kinds.emplace_back("eigenvalue");
   if (objective.eigenvalue) ++alone;
   if (!sums && alone == 0)
-    checker.issue(checker.path(), "has no part; running, terminal, samples and parameters_only (added), or one of " +
-                                      joined(kinds) + " is needed");
+    checker.issue(checker.path(),
+                  "has no part; running, terminal, samples, track and parameters_only (added), or one of " +
+                      joined(kinds) + " is needed");
   if (alone > 1 || (alone == 1 && sums))
     checker.issue(checker.path(),
                   "has one of " + joined(kinds) +
@@ -35,6 +85,8 @@ void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
   if (objective.sharpness && !extreme)
     checker.issue(checker.path("sharpness"), "is given without maximum_of or minimum_of, which it belongs to");
   const SimulationSettings& simulation = checker.facts().scene().simulation;
+  for (std::size_t i = 0; i < objective.track.size(); ++i)
+    check_track(checker, objective.track[i], child_path(checker.path("track"), i));
   for (std::size_t i = 0; i < objective.samples.size(); ++i) {
     const double time = objective.samples[i].time;
     if (time < simulation.start_time || time > simulation.end_time)
@@ -66,6 +118,9 @@ void check_meaning(Checker& checker, const ChannelSpec& channel) {
 
 void check_meaning(Checker& checker, const ExperimentSpec& experiment) {
   if (experiment.channels.empty()) checker.issue(checker.path("channels"), "is empty; at least one column is compared");
+  if (const std::optional<Unit> unit = parse_unit(experiment.time_unit);
+      !experiment.time_unit.empty() && (!unit || !compatible(unit->dimension, dimension::kTime)))
+    checker.issue(checker.path("time_unit"), "'" + experiment.time_unit + "' is no unit of time");
   const SimulationSettings& simulation = checker.facts().scene().simulation;
   const double start = experiment.start_time.value_or(simulation.start_time);
   for (std::size_t i = 0; i < experiment.drives.size(); ++i)
@@ -93,7 +148,8 @@ void check_shared_samples(Checker& checker, const std::vector<ExperimentSpec>& e
   for (std::size_t i = 0; i < experiments.size(); ++i) {
     for (std::size_t k = 0; k < i; ++k) {
       const ExperimentSpec &a = experiments[i], &b = experiments[k];
-      if (a.data != b.data || a.time != b.time || (a.validate && b.validate)) continue;
+      if (std::ranges::find_first_of(a.data, b.data) == a.data.end() || a.time != b.time || (a.validate && b.validate))
+        continue;
       const double from = std::max(a.start_time.value_or(start), b.start_time.value_or(start));
       const double to = std::min(a.end_time.value_or(never), b.end_time.value_or(never));
       const std::string* const column = column_of_both(a, b);

@@ -198,16 +198,34 @@ class Reader {
 
 }  // namespace
 
-bool CsvTable::has_column(std::string_view column_name) const {
-  return std::find(header.begin(), header.end(), column_name) != header.end();
+ColumnHeader parts_of_header(std::string_view header) {
+  const std::size_t opening = header.rfind('[');
+  if (opening == std::string_view::npos || header.back() != ']') return {header, std::nullopt};
+  return {trimmed(header.substr(0, opening)), trimmed(header.substr(opening + 1, header.size() - opening - 2))};
+}
+
+std::string CsvTable::place(std::size_t row) const {
+  return fmt::format("{}:{}", files.empty() ? name : files[file_of_row[row]], lines[row]);
+}
+
+std::size_t CsvTable::find_column(std::string_view column_name) const {
+  const auto exact = std::find(header.begin(), header.end(), column_name);
+  if (exact != header.end()) return static_cast<std::size_t>(exact - header.begin());
+  const auto is_named = [&](const std::string& text) { return parts_of_header(text).name == column_name; };
+  const auto first = std::find_if(header.begin(), header.end(), is_named);
+  const bool once = first != header.end() && std::none_of(first + 1, header.end(), is_named);
+  return once ? static_cast<std::size_t>(first - header.begin()) : header.size();
 }
 
 const std::vector<double>& CsvTable::column(std::string_view column_name) const {
-  const auto found = std::find(header.begin(), header.end(), column_name);
-  if (found == header.end())
+  const std::size_t found = find_column(column_name);
+  if (found == header.size()) {
+    std::vector<std::string> names = header;
+    for (const std::string& text : header) names.emplace_back(parts_of_header(text).name);
     throw CsvError(fmt::format("{}: has no column '{}'{}; its columns: {}", name, column_name,
-                               did_you_mean(column_name, header), joined(header)));
-  return columns[static_cast<std::size_t>(found - header.begin())];
+                               did_you_mean(column_name, names), joined(header)));
+  }
+  return columns[found];
 }
 
 CsvTable parse_csv(std::string_view text, std::string name) {
@@ -229,10 +247,10 @@ const std::vector<double>& ascending_times(const CsvTable& table, std::string_vi
   const std::vector<double>& t = table.column(column_name);
   for (std::size_t i = 0; i < t.size(); ++i) {
     if (!std::isfinite(t[i]))
-      throw CsvError(fmt::format("{}:{}: the time in column '{}' is missing", table.name, table.lines[i], column_name));
+      throw CsvError(fmt::format("{}: the time in column '{}' is missing", table.place(i), column_name));
     if (i > 0 && !(t[i] > t[i - 1]))
-      throw CsvError(fmt::format("{}:{}: column '{}': {} comes after {}; times must be ascending", table.name,
-                                 table.lines[i], column_name, t[i], t[i - 1]));
+      throw CsvError(fmt::format("{}: column '{}': {} comes after {}; times must be ascending", table.place(i),
+                                 column_name, t[i], t[i - 1]));
   }
   return t;
 }

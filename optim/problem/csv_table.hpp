@@ -12,6 +12,7 @@
 //   const std::vector<double>& theta = table.column("theta");
 #pragma once
 
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -26,19 +27,31 @@ class CsvError : public std::runtime_error {
 };
 
 struct CsvTable {
-  std::string name;                          // of the file, for errors
-  std::vector<std::string> header;           // each once
-  std::vector<std::vector<double>> columns;  // NaN where a cell is missing
-  std::vector<std::size_t> lines;            // where in the file each row is, counted from 1
+  std::string name;                           // of the file or files, for errors
+  std::vector<std::string> header;            // each once
+  std::vector<std::vector<double>> columns;   // NaN where a cell is missing
+  std::vector<std::size_t> lines;             // where in the file each row is, counted from 1
+  std::vector<std::string> files = {};        // of a table made of several files: their names,
+  std::vector<std::size_t> file_of_row = {};  // and the one that each row is of
 
   std::size_t rows() const { return lines.size(); }
-  bool has_column(std::string_view column_name) const;
+  std::string place(std::size_t row) const;  // "run1.csv:17"
+  // A column by its header, or by its header without the unit in brackets where only one has that name.
+  bool has_column(std::string_view column_name) const { return find_column(column_name) < header.size(); }
+  std::size_t find_column(std::string_view column_name) const;  // header.size() where there is none
   const std::vector<double>& column(
       std::string_view column_name) const;  // throws CsvError, listing the names there are
 };
 
 CsvTable parse_csv(std::string_view text, std::string name);
 CsvTable read_csv(const std::string& path);  // throws CsvError, also where it cannot be read
+
+// "theta [deg]": "theta" and "deg"; a header without brackets at its end has no unit.
+struct ColumnHeader {
+  std::string_view name;
+  std::optional<std::string_view> unit;
+};
+ColumnHeader parts_of_header(std::string_view header);
 
 // A column of times: every cell present and finite, each later than the one before. Throws CsvError naming the row.
 const std::vector<double>& ascending_times(const CsvTable& table, std::string_view column_name);

@@ -11,6 +11,7 @@
 #include "core/scene/scene_path.hpp"
 #include "core/scene/type_table.hpp"
 #include "optim/machine/median.hpp"
+#include "optim/problem/logged_columns.hpp"
 
 namespace mbsopt {
 namespace {
@@ -49,11 +50,27 @@ class DataCheck {
     attempt(channel_path(c, "column"), [&] { data_.column(column); });
     if (column == experiment_.time)
       issues_.push_back({channel_path(c, "column"), fmt::format("'{}' is the column of the times", column)});
+    check_unit(c);
     for (std::size_t k = 0; k < c; ++k)
       if (experiment_.channels[k].column == column)
         issues_.push_back(
             {channel_path(c, "column"),
              fmt::format("'{}' is compared by channels[{}] already; its samples would count twice", column, k)});
+  }
+
+  void check_unit(std::size_t c) {
+    const ChannelSpec& channel = experiment_.channels[c];
+    const auto sensor = std::ranges::find(scene_.sensors, channel.sensor, &Sensor::name);
+    const TypeRow* const row = sensor == scene_.sensors.end() ? nullptr : find_row(kSensorQuantities, sensor->quantity);
+    if (!row || !channel.gain.is_number() || !data_.has_column(channel.column)) return;
+    const std::string& header = data_.header[data_.find_column(channel.column)];
+    const std::string text =
+        channel.unit.empty() ? std::string(parts_of_header(header).unit.value_or("")) : channel.unit;
+    const std::optional<Unit> unit = parse_column_unit(text);
+    if (text.empty() || !unit || unit->dimension.is_none() || compatible(unit->dimension, row->dimension)) return;
+    issues_.push_back({channel_path(c, "column"),
+                       fmt::format("'{}' is in {}, the sensor '{}' in {}", channel.column, to_string(unit->dimension),
+                                   channel.sensor, to_string(row->dimension))});
   }
 
   template <class F>
@@ -93,24 +110,26 @@ class DataCheck {
           t.empty() ? "it has no rows" : fmt::format("its times run from {} to {} s", t.front(), t.back());
       issues_ = {{place_ + ".data", fmt::format("{} has no sample {}; {}", data_.name, window(), span)}};
     } else if (issues_.empty()) {
-      check_times(t[first], t[last], data_.lines[first]);
+      check_times(t[first], t[last], data_.place(first));
     }
   }
 
-  void check_times(double first, double last, std::size_t line) {
+  void check_times(double first, double last, const std::string& place) {
     const double span = last - first;
     if (!experiment_.start_time && span > 0 && first - start_ > kFar * span)
       issues_.push_back(
           {place_ + ".data",
-           fmt::format("{}:{}: the record begins {:.6g} s after the start of the simulation, at {} s, and "
-                       "lasts {:.6g} s: all the time before would be simulated. Take the first time off "
-                       "the column '{}', or say by \"start_time\" where the experiment begins",
-                       data_.name, line, first - start_, start_, span, experiment_.time)});
+           fmt::format(
+               "{}: the record begins {:.6g} s after the start of the simulation, at {} s, and "
+               "lasts {:.6g} s: all the time before would be simulated. Take the first time off "
+               "the column '{}' (\"time_zero\": \"first\" does), or say by \"start_time\" where the experiment begins",
+               place, first - start_, start_, span, experiment_.time)});
     else if (last - start_ < kResolved * std::max(std::abs(start_), std::abs(last)))
       issues_.push_back(
-          {place_ + ".data", fmt::format("{}:{}: times about {:.6g} s do not resolve the steps of a record "
-                                         "of {:.6g} s: take the first time off the column '{}'",
-                                         data_.name, line, last, last - start_, experiment_.time)});
+          {place_ + ".data",
+           fmt::format("{}: times about {:.6g} s do not resolve the steps of a record "
+                       "of {:.6g} s: take the first time off the column '{}' (\"time_zero\": \"first\" does)",
+                       place, last, last - start_, experiment_.time)});
   }
 
   std::string window() const {
@@ -118,8 +137,29 @@ class DataCheck {
                        std::isfinite(end_) ? fmt::format(" and until {} s", end_) : "");
   }
 
+  // An unwrapped angle is right where its samples are dense: steps of less than half a turn.
+  void check_unwrapped(std::size_t c) {
+    constexpr double kDoubtful = 0.4;  // of a turn
+    const ChannelSpec& channel = experiment_.channels[c];
+    const double turn = 2 * std::numbers::pi * (channel.gain.is_number() ? std::abs(channel.gain.number()) : 1);
+    const std::vector<double>& measured = data_.column(channel.column);
+    const std::vector<std::size_t> rows = samples(channel);
+    for (std::size_t i = 1; i < rows.size(); ++i) {
+      const double step = std::abs(measured[rows[i]] - measured[rows[i - 1]]) / turn;
+      if (!(step > kDoubtful)) continue;
+      issues_.push_back(
+          {channel_path(c, "unwrap"),
+           fmt::format("{}: '{}' still steps by {:.2g} of a turn: steps of half a turn and more cannot be "
+                       "told from its jumps, so the unwrapped angle may be wrong from here on",
+                       data_.place(rows[i]), channel.column, step),
+           true});
+      return;
+    }
+  }
+
   // A jump is about a turn, and no usual step of the record.
   void check_turns(std::size_t c) {
+    if (experiment_.channels[c].unwrap) return check_unwrapped(c);
     constexpr double kAbout = 0.1, kUnusual = 5;  // of a turn; of the median step
     const ChannelSpec& channel = experiment_.channels[c];
     const auto sensor = std::find_if(scene_.sensors.begin(), scene_.sensors.end(),
@@ -140,9 +180,9 @@ class DataCheck {
       if (!degrees && !jumps_by(turn)) continue;
       issues_.push_back(
           {channel_path(c, "column"),
-           fmt::format("{}:{}: '{}' jumps from {:.6g} to {:.6g}, by about a turn{}; the sensor '{}' goes on counting. "
-                       "Unwrap the column",
-                       data_.name, data_.lines[rows[i]], channel.column, measured[rows[i - 1]], measured[rows[i]],
+           fmt::format("{}: '{}' jumps from {:.6g} to {:.6g}, by about a turn{}; the sensor '{}' goes on counting. "
+                       "Unwrap the column (\"unwrap\": true does)",
+                       data_.place(rows[i]), channel.column, measured[rows[i - 1]], measured[rows[i]],
                        degrees ? " in degrees, where rad are expected" : "", sensor->name),
            true});
       return;

@@ -25,12 +25,19 @@ struct EigenvalueSpec {
   std::string value = "frequency";  // [Hz], or "damping": its ratio
 };
 
-// psi = integral of running + terminal at the end time + sum of samples + parameters_only; or, alone, one of the means
-// of objective_kinds.hpp, or an eigenvalue.
+// A sensor's samples to follow: adds sum over the rows k of a file of weight (sensor(t_k) - column_k)^2.
+struct TrackTerm : SampleColumn {
+  std::string sensor;
+  Field weight = 1.0;  // of parameters
+};
+
+// psi = integral of running + terminal at the end time + sum of samples and track + parameters_only; or, alone, one of
+// the means of objective_kinds.hpp, or an eigenvalue.
 struct ObjectiveSpec {
   std::string name;
   std::optional<Expression> running, terminal, parameters_only;
   std::vector<ObjectiveSample> samples;
+  std::vector<TrackTerm> track;
   std::array<std::optional<Expression>, std::size(kMeanKinds)> means;
   std::optional<EigenvalueSpec> eigenvalue;  // alone
   std::optional<double> sharpness;           // of maximum_of, minimum_of [1/unit of the expression]
@@ -78,8 +85,10 @@ struct DesignSpec {
 
 struct ChannelSpec {
   std::string column, sensor;
+  std::string unit = {};                      // instead of the one in the header; empty: this, else SI
+  bool unwrap = false;                        // the column jumps by turns, which the sensor counts
   Field sigma = 1.0, gain = 1.0, bias = 0.0;  // expressions over parameters
-  Field delay = 0.0;                          // [s]
+  Field delay = 0.0;                          // [s]; gain, bias and delay may also use t and signals
   bool estimate_sigma = false;                // sigma is where its estimate starts
 };
 
@@ -90,13 +99,21 @@ struct DriveLaw {
   std::optional<SampledLaw> samples;
 };
 
+// Samples of a signal in one experiment, instead of its own.
+struct SignalSamples : SampleColumn {
+  std::string name;  // of the signal
+};
+
 struct ExperimentSpec {
   std::string name;
-  std::string data;                            // CSV file, resolved against the problem file's folder
-  std::string time = "t";                      // its time column
+  std::vector<std::string> data;               // CSV files, resolved against the problem file's folder
+  std::string time = "t";                      // their time column
+  std::string time_unit = {};                  // of it, as of a SampleColumn
+  std::optional<double> time_zero = {};        // as of a SampleColumn; first: of the first file
   std::optional<double> start_time, end_time;  // instead of the simulation's; rows outside are left out
   std::vector<ChannelSpec> channels;
   std::vector<std::pair<std::string, double>> overrides;  // parameter values of this experiment
+  std::vector<SignalSamples> signals;                     // of this experiment, instead of the scene's
   std::vector<DriveLaw> drives;                           // of this experiment, instead of the scene's laws
   std::vector<std::string> free;                          // parameters with a value of their own here
   bool validate = false;                                  // role: scored (only "free" refitted), not fitted
@@ -117,6 +134,7 @@ struct Problem {
   std::vector<ObjectiveSpec> objectives;
   std::optional<DesignSpec> design;
   std::optional<IdentificationSpec> identification;
+  std::vector<std::string> columns_read = {};  // what the reader converted to SI, in words
 };
 
 }  // namespace mbsopt

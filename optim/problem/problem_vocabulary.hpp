@@ -27,6 +27,12 @@ void describe(auto& v, Like<ObjectiveSample> auto& s) {
   v.expression("value", s.value, Names::objective, {"added to the objective", Need::required});
 }
 
+void describe(auto& v, Like<TrackTerm> auto& t) {
+  v.reference("sensor", t.sensor, To::sensor, {"what is to follow the data", Need::required});
+  describe_samples(v, t, "file");
+  v.number("weight", t.weight, {"of each square"});
+}
+
 void describe(auto& v, Like<EigenvalueSpec> auto& e) {
   v.plain("mode", e.mode, kPositive,
           {"which, from slow to fast at the values of the file, as `mbsopt linearise` counts"});
@@ -37,6 +43,7 @@ void describe(auto& v, Like<ObjectiveSpec> auto& o) {
   v.law("running", o.running, Names::objective, {"integrated over time; of sensors, t and parameters"});
   v.law("terminal", o.terminal, Names::objective, {"added, at the end time; of sensors, t and parameters"});
   v.list("samples", o.samples, {"added, each at its time"});
+  v.list("track", o.track, {"added: weighted squares of sensor minus data at the rows of a CSV file"});
   v.law("parameters_only", o.parameters_only, Names::none, {"added; of parameters only"});
   for (std::size_t k = 0; k < std::size(kMeanKinds); ++k)
     v.law(kMeanKinds[k].name, o.means[k], Names::objective, {kMeanKinds[k].description});
@@ -84,16 +91,20 @@ void describe(auto& v, Like<DesignSpec> auto& d) {
 }
 
 void describe(auto& v, Like<ChannelSpec> auto& c) {
-  v.name("column", c.column, {"column of the data file", Need::required});
+  v.text("column", c.column, {"header of the column, with its unit (\"theta [deg]\") or without it", Need::required});
   v.reference("sensor", c.sensor, To::sensor, {"what it measured", Need::required});
+  v.text("unit", c.unit, {"of the column, instead of the unit in the header; without either it is SI"});
+  v.plain("unwrap", c.unwrap, kAny, {"true: the column jumps by whole turns, which are taken out"});
   v.number("sigma", c.sigma, {"standard deviation of the noise, in the column's unit"});
   v.number("gain", c.gain, {"measured = gain * sensor + bias + noise"});
-  v.number("bias", c.bias, {"in the column's unit"});
-  v.number("delay", c.delay,
-           {"measured(t) = gain * sensor(t - delay) + bias + noise [s]", Need::optional, dimension::kTime});
+  v.expression("bias", c.bias, Names::time_law, {"in the unit of the column's values; also of t and signals"});
+  v.expression("delay", c.delay, Names::time_law,
+               {"measured(t) = gain * sensor(t - delay) + bias + noise [s]", Need::optional, dimension::kTime});
   v.plain("estimate_sigma", c.estimate_sigma, kAny,
           {"true: sigma is estimated from the residuals of this channel, from the given one on"});
 }
+
+void describe(auto& v, Like<SignalSamples> auto& s) { describe_samples(v, s, "file"); }
 
 void describe(auto& v, Like<DriveLaw> auto& d) {
   v.reference("drive", d.drive, To::drive, {"the drive", Need::required});
@@ -103,13 +114,18 @@ void describe(auto& v, Like<DriveLaw> auto& d) {
 
 void describe(auto& v, Like<ExperimentSpec> auto& e) {
   v.name("name", e.name, {"name of the experiment", Need::required});
-  v.text("data", e.data, {"CSV file, relative to this file's folder", Need::required});
-  v.text("time", e.time, {"column of the time [s]"});
+  v.texts("data", e.data, {"CSV file or list of them, relative to this file's folder", Need::required});
+  v.text("time", e.time, {"header of the column of times"});
+  v.text("time_unit", e.time_unit, {"of the times, instead of the unit in the header; without either they are in s"});
+  v.level("time_zero", e.time_zero, kTimeZeros, kAny,
+          {"time of the files at t = 0 [s], or first: that of the first row of the first file; 0 when absent",
+           Need::optional, dimension::kTime});
   v.plain("start_time", e.start_time, kAny, {"[s]; the simulation's when absent", Need::optional, dimension::kTime});
   v.plain("end_time", e.end_time, kAny,
           {"[s]; later rows are left out; all are used when absent", Need::optional, dimension::kTime});
   v.list("channels", e.channels, {"columns that are compared", Need::required});
   v.overrides("overrides", e.overrides, {"parameter values of this experiment"});
+  v.named("signals", e.signals, {"samples of signals in this experiment, instead of the signals' own"});
   v.list("drives", e.drives, {"laws of drives in this experiment"});
   v.references("free", e.free, To::parameter, {"parameters with a value of their own in this experiment"});
   v.choice("role", e.validate, kRoles, {"validate: scored, not fitted"});

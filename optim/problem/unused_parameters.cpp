@@ -192,6 +192,7 @@ class Search {
   void collect(const std::vector<ObjectiveSpec>& objectives) {
     for (const ObjectiveSpec& objective : objectives) {
       collect(objective);
+      for (const TrackTerm& term : objective.track) use_sensor(term.sensor);
       if (objective.eigenvalue) bodies_.look_at_all();
     }
   }

@@ -6,6 +6,7 @@
 
 #include "app/json/read_problem.hpp"
 #include "core/scene/default_integrator.hpp"
+#include "optim/problem/logged_columns.hpp"
 #include "optim/tradeoff/fit_errors.hpp"
 #include "optim/tradeoff/tradeoff_reference.hpp"
 #include "tests/app/gallery_files.hpp"
@@ -89,7 +90,7 @@ TEST_CASE("default settings give objectives to 1e-5 and gradients to 1e-4", "[de
 TEST_CASE("what identify minimises has an error like any objective", "[defaults][gallery]") {
   const Problem problem = read_problem(file_of("spring_damper/identify"));
   std::vector<CsvTable> data;
-  for (const ExperimentSpec& e : problem.identification->experiments) data.push_back(read_csv(e.data));
+  for (const ExperimentSpec& e : problem.identification->experiments) data.push_back(read_record(e));
   SimulationSettings defaults = problem.scene.simulation, loose = defaults;
   defaults.integrator = default_integrator(defaults.start_time, defaults.end_time);
   loose.integrator.type = "bs3", loose.integrator.rtol = 1e-3, loose.integrator.atol = 1e-5;

@@ -138,7 +138,7 @@ TEST_CASE("an identification is read, its data found beside the problem file", "
   CHECK(identification.tolerance == 1e-8);
   REQUIRE(identification.experiments.size() == 2);
   const ExperimentSpec& run = identification.experiments[0];
-  CHECK(run.data == folder.file("run.csv"));
+  CHECK(run.data == std::vector{std::string(folder.file("run.csv"))});
   CHECK(run.time == "time");
   CHECK(run.start_time == 1.0);
   CHECK(run.overrides == std::vector<std::pair<std::string, double>>{{"th", 0.3}});

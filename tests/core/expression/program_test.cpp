@@ -99,6 +99,9 @@ ComplexStep evaluate(const Expression& expression, const std::vector<std::string
       case Operation::smooth_abs:
         v.push_back(std::sqrt(a * a + b * b));
         break;
+      case Operation::curve:
+        v.emplace_back(node.curve->at(a.real()), a.imag() * node.curve->at(a.real(), 1));
+        break;
       case Operation::sign:
       case Operation::not_above:
         FAIL("only derivative programs have these");

@@ -14,7 +14,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-struct StateNorm final : RunningCost {  // g = |y|^2 + cos(t) y_1
+struct NormAndCosine final : RunningCost {  // g = |y|^2 + cos(t) y_1
   double g(double t, VecIn y, VecIn) const override { return y.squaredNorm() + std::cos(t) * y(1); }
   void add_g_y(double t, VecIn y, VecIn, double scale, VecOut out) const override {
     out += 2 * scale * y;
@@ -41,7 +41,7 @@ Derivatives solve(Scene scene, const std::string& method, int steps) {
   scene.simulation.integrator.step = scene.simulation.end_time / steps;
   const Mechanism m(scene, nominal(scene));
   std::vector<Cost> costs(1);
-  costs[0].running = point_cost(std::make_shared<StateNorm>(), m.rho());
+  costs[0].running = point_cost(std::make_shared<NormAndCosine>(), m.rho());
   costs[0].terminal = point_cost(std::make_shared<EndNorm>(), m.rho());
   Derivatives d;
   TangentSampling end;

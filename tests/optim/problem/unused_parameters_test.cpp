@@ -180,7 +180,7 @@ TEST_CASE("a variable must matter to what the design uses, or to what is measure
   CHECK(find_idle_variables(problem).empty());
 
   ExperimentSpec experiment;
-  experiment.channels.push_back({"theta", "ya", 1.0, 1.0, 0.0});
+  experiment.channels.push_back({"theta", "ya", "", false, 1.0, 1.0, 0.0});
   problem.identification.emplace();
   problem.identification->experiments = {experiment};
   problem.identification->variables = {"mb"};
@@ -209,7 +209,7 @@ TEST_CASE("channels of an identification look at their sensors", "[unused]") {
   problem.scene.parameters.push_back({"gain", 1.0});
   ExperimentSpec experiment;
   experiment.name = "run";
-  experiment.channels.push_back({"theta", "ya", 1.0, Expression::parse("gain"), 0.0});
+  experiment.channels.push_back({"theta", "ya", "", false, 1.0, Expression::parse("gain"), 0.0});
   problem.identification.emplace();
   problem.identification->experiments.push_back(experiment);
   problem.identification->variables = {"ma"};

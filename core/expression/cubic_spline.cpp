@@ -1,4 +1,4 @@
-#include "core/constraint/cubic_spline.hpp"
+#include "core/expression/cubic_spline.hpp"
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -75,7 +75,7 @@ CubicSpline::Jet CubicSpline::operator()(double t) const {
   const double h = times_[i + 1] - times_[i], u = (t - times_[i]) / h, d = values_[i + 1] - values_[i];
   const double m0 = h * slopes_[i], m1 = h * slopes_[i + 1], c2 = 3 * d - 2 * m0 - m1, c3 = m0 + m1 - 2 * d;
   return {values_[i] + u * (m0 + u * (c2 + u * c3)), (m0 + u * (2 * c2 + 3 * u * c3)) / h,
-          (2 * c2 + 6 * u * c3) / h / h};
+          (2 * c2 + 6 * u * c3) / h / h, 6 * c3 / h / h / h};
 }
 
 }  // namespace mbsopt

@@ -10,7 +10,7 @@ namespace mbsopt {
 class CubicSpline {
  public:
   struct Jet {
-    double f, f_t, f_tt;
+    double f, f_t, f_tt, f_ttt;
   };
 
   // At least two samples, times strictly increasing (std::invalid_argument otherwise).
@@ -18,8 +18,8 @@ class CubicSpline {
 
   // Outside the samples the end polynomials go on.
   Jet operator()(double t) const;
-  double first_time() const { return times_.front(); }
-  double last_time() const { return times_.back(); }
+  const std::vector<double>& times() const { return times_; }
+  const std::vector<double>& values() const { return values_; }
 
  private:
   std::vector<double> times_, values_, slopes_;

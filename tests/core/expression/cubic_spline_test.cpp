@@ -1,4 +1,4 @@
-#include "core/constraint/cubic_spline.hpp"
+#include "core/expression/cubic_spline.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>

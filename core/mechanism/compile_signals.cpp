@@ -1,0 +1,25 @@
+// Signals: what a run has to know of them beside the expressions that use them.
+#include "core/mechanism/compilation.hpp"
+#include "core/scene/scene_error.hpp"
+#include "core/scene/signals.hpp"
+
+namespace mbsopt {
+
+void compile_signals(Compilation& model) {
+  const SimulationSettings& s = model.scene.simulation;
+  for (const Signal& signal : model.scene.signals) {
+    const std::string where = child_path("signals", signal.name);
+    if (!signal.curve) throw SceneError(where + ": has no samples: nothing has read its file");
+    const Dual delay = model.fields.value(signal.delay, where + ".delay");
+    if (const auto why = uncovered(covered_by(*signal.curve, delay.value()), s.start_time, s.end_time))
+      throw SceneError(where + ": " + *why);
+    if (signal.interpolation == Interpolation::spline) continue;
+    if (signal.interpolation == Interpolation::hold && !delay.derivatives().isZero(0))
+      throw SceneError(where + ".delay: '" + signal.delay.text() +
+                       "' depends on a parameter that is varied, and hold jumps at times that move with it: its "
+                       "derivative has no value; take \"interpolation\": \"linear\" or \"spline\"");
+    model.data.kinks.push_back({signal.curve, delay.value()});
+  }
+}
+
+}  // namespace mbsopt

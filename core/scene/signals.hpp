@@ -1,0 +1,33 @@
+// Signals of a scene as expressions of time and parameters, so that every law uses them by name:
+//   signal(t) = gain f(t - delay) + offset        f: through the samples of its file
+// Whatever differentiates expressions differentiates signals, in time and in the parameters of gain, delay, offset.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/expression/program.hpp"
+#include "core/scene/scene.hpp"
+
+namespace mbsopt {
+
+// f(t), the samples alone; 0 where nothing has read them.
+Expression expression_of(const SampleColumn& samples, const std::string& name);
+Expression expression_of(const Signal& signal);
+
+// Adds all signals as definitions, which need an input "t".
+void add_signals(Symbols& symbols, const Scene& scene);
+
+// The parameters that move jumps or kinks of signals, and with these the ends of steps: those of their delays.
+std::vector<bool> parameters_that_move_kinks(const Scene& scene);
+
+// The span of time that samples cover, later by delay. The last value of hold counts for one more interval.  [s]
+struct Covered {
+  double first = 0, last = 0;
+};
+Covered covered_by(const Curve& samples, double delay = 0);
+// Why samples do not cover the run, in words.
+std::optional<std::string> uncovered(const Covered& samples, double start_time, double end_time);
+
+}  // namespace mbsopt

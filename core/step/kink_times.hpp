@@ -1,0 +1,126 @@
+// Times at which signals jump (hold) or have kinks (linear), and how steps meet them.
+//
+// A step across a kink loses the order of its method, so the step ends there and the next begins there, a few roundings
+// apart (event_times.hpp). Many kinks are smaller than the tolerance, and a step for each would cost more than it
+// gains. So two sizes are controlled: h of steps without kinks inside, and `across` of steps with kinks inside, whose
+// error behaves as h^2. A step crosses kinks where `across` reaches over at least two intervals; it ends at a kink,
+// too, so that as few as possible lie inside. Each step that ends at the next kink lets `across` grow again.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "core/mechanism/mechanism_data.hpp"
+
+namespace mbsopt {
+
+// Kinks of several signals in the order of time, for times that only grow.
+class KinkTimes {
+ public:
+  KinkTimes(const std::vector<KinkedSignal>& signals, double start, double end)
+      : end_(end), gap_(16 * std::numeric_limits<double>::epsilon() * std::max(std::abs(start), std::abs(end))) {
+    for (const KinkedSignal& signal : signals) sources_.push_back({signal, 0, significant_change(*signal.curve)});
+  }
+
+  bool any() const { return !sources_.empty(); }
+  double gap() const { return gap_; }
+
+  // The first kink after t, and the last one that is not after t1; infinity where there is none in the run.
+  double first_after(double t) {
+    double first = std::numeric_limits<double>::infinity();
+    for (Source& source : sources_) {
+      const std::vector<double>& x = source.signal.curve->x();
+      while (source.next < x.size() && (!source.matters(source.next) || source.time(source.next) <= t + 2 * gap_))
+        ++source.next;
+      if (source.next < x.size()) first = std::min(first, source.time(source.next));
+    }
+    return first <= end_ + gap_ ? first : std::numeric_limits<double>::infinity();
+  }
+  double last_until(double t1) const {
+    double last = -std::numeric_limits<double>::infinity();
+    for (const Source& source : sources_) {
+      const std::vector<double>& x = source.signal.curve->x();
+      const auto after = std::upper_bound(x.begin(), x.end(), t1 - source.signal.delay);
+      for (std::size_t i = static_cast<std::size_t>(after - x.begin()); i-- > source.next;) {
+        if (!source.matters(i)) continue;
+        last = std::max(last, source.time(i));
+        break;
+      }
+    }
+    return last;
+  }
+
+ private:
+  struct Source {
+    KinkedSignal signal;
+    std::size_t next;
+    double significant;
+    double time(std::size_t i) const { return signal.curve->x()[i] + signal.delay; }
+    bool matters(std::size_t i) const { return std::abs(signal.curve->change_at(i)) > significant; }
+  };
+
+  // Changes below the rounding of samples are none: held values that repeat, samples on one line.
+  static double significant_change(const Curve& curve) {
+    constexpr double kDigits = 1e-9;  // more digits than loggers write
+    const auto [low, high] = std::minmax_element(curve.y().begin(), curve.y().end());
+    const double size = std::max(std::abs(*low), std::abs(*high));
+    const double span = curve.x().back() - curve.x().front();
+    return kDigits * (curve.interpolation() == Interpolation::hold ? size : size / span);
+  }
+
+  std::vector<Source> sources_;
+  double end_, gap_;
+};
+
+class KinkControl {
+ public:
+  KinkControl(const std::vector<KinkedSignal>& signals, double start, double end) : kinks_(signals, start, end) {}
+
+  // The size of the step at t, of which h is proposed; fixed: steps that no error controls.
+  double choose(double t, double h, bool fixed) {
+    state_ = State::clear;
+    if (!kinks_.any()) return h;
+    const double next = kinks_.first_after(t);
+    if (t + h < next - 1.5 * kinks_.gap()) return h;
+    const double reach = fixed ? h : std::min(h, across_);
+    const double last = reach >= 2 * (next - t) ? kinks_.last_until(t + reach) : next;
+    state_ = last > next ? State::crosses : State::meets;
+    kink_ = std::max(last, next);
+    return kink_ - kinks_.gap() - t;
+  }
+  // How near to the end a step may stop where a kink lies there.
+  double gap() const { return kinks_.any() ? 1.5 * kinks_.gap() : 0; }
+  bool crosses() const { return state_ == State::crosses; }
+  bool meets() const { return state_ == State::meets; }
+  // Whether kinks allow less than h.
+  bool limits(double h) const { return across_ < h; }
+  // Whether a step that ends at t1 has come to the kink that choose() gave.
+  bool reached(double t1) const { return state_ != State::clear && t1 >= kink_ - 1.5 * kinks_.gap(); }
+  double resume_time() const { return kink_ + kinks_.gap(); }
+
+  // Of a step of size h that crosses kinks, whose error is given in tolerances.
+  void accepted_across(double h, double error) { across_ = h * factor(error, kMost); }
+  void rejected_across(double h, double error) { across_ = h * factor(error, kShrunk); }
+  void met() { across_ *= kRecovery; }
+
+ private:
+  enum class State { clear, meets, crosses };
+  static constexpr double kLeast = 0.01;       // sizes without kinks may have grown far beyond what crosses them
+  static constexpr double kMost = 6;           // as of other steps (step_control.hpp)
+  static constexpr double kSmallError = 1e-6;  // allows more than kMost
+  static constexpr double kShrunk = 0.9;       // after a rejection at most
+  static constexpr double kRecovery = 1.1;     // of two intervals down to half of one: 15 steps until the next try
+  static double factor(double error, double most) {
+    return std::isfinite(error) ? std::clamp(0.9 / std::sqrt(std::max(error, kSmallError)), kLeast, most) : kLeast;
+  }
+
+  KinkTimes kinks_;
+  State state_ = State::clear;
+  double kink_ = 0;
+  double across_ = std::numeric_limits<double>::infinity();  // nothing is known against it
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,88 @@
+// Objectives that follow the samples of a file.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "optim/objective/evaluator.hpp"
+#include "optim/objective/gauss_newton.hpp"
+#include "optim/objective/problem_issues.hpp"
+#include "tests/core/mechanism/small_scenes.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+using Catch::Contains;
+using Eigen::VectorXd;
+
+namespace {
+
+// A mass on a slide along x under a constant force: x = p t^2/2.
+Problem slide() {
+  Problem problem;
+  Scene& s = problem.scene;
+  s.gravity = {0.0, 0.0, 0.0};
+  add_parameters(s, {{"p", 3.0}, {"w", 2.0}});
+  s.bodies = {body("cart", vec("0", "0", "0"), vec("0", "0", "0"), turned("0"))};
+  Joint joint;
+  joint.name = "slide", joint.type = "translational", joint.body1 = "ground", joint.body2 = "cart";
+  joint.axis1 = vec("1", "0", "0"), joint.axis2 = vec("1", "0", "0");
+  s.joints = {joint};
+  PointForce push;
+  push.body = "cart", push.components = {f("p"), f("0"), f("0")};
+  s.forces.push_back({"push", push});
+  Sensor x;
+  x.name = "x", x.quantity = "displacement", x.joint = "slide";
+  s.sensors = {x};
+  s.simulation.end_time = 1;
+  s.simulation.integrator.rtol = 1e-10, s.simulation.integrator.atol = 1e-12;
+  TrackTerm term;
+  term.sensor = "x", term.weight = f("w^2");
+  term.curve = std::make_shared<const Curve>(Interpolation::linear, std::vector{0.2, 0.5, 1.0, 1.5},
+                                             std::vector{0.1, 0.3, 1.2, 9.0});
+  ObjectiveSpec track;
+  track.name = "path", track.track = {term};
+  problem.objectives = {track};
+  return problem;
+}
+
+}  // namespace
+
+TEST_CASE("track is the sum of weighted squares at the rows within the run, with exact gradients", "[objective]") {
+  const Problem problem = slide();
+  Evaluator evaluator(problem.scene, objectives_of(problem));
+  const VectorXd start = evaluator.start();
+  const Evaluation& e = evaluator.gradients(start);
+  INFO(e.message);
+  REQUIRE(e.ok);
+  double value = 0, slope = 0;
+  for (const auto& [t, d] : {std::pair{0.2, 0.1}, {0.5, 0.3}, {1.0, 1.2}}) {
+    const double off = 3 * t * t / 2 - d;
+    value += 4 * off * off, slope += 8 * off * t * t / 2;
+  }
+  CHECK(e.psi(0) == Approx(value));
+  CHECK(e.psi_rho(0, 0) == Approx(slope));
+  CHECK(e.psi_rho(0, 1) == Approx(value));  // 2 w/w^2 of the value, w = 2
+}
+
+TEST_CASE("Gauss-Newton's matrix of a track is that of its residuals", "[objective]") {
+  const Problem problem = slide();
+  Evaluator evaluator(problem.scene, objectives_of(problem));
+  const Evaluation e = evaluator.gradients(evaluator.start());
+  const GaussNewton found = gauss_newton(evaluator, e);
+  INFO(found.message);
+  REQUIRE(found.ok);
+  double expected = 0;
+  for (const double t : {0.2, 0.5, 1.0}) expected += 2 * 4 * std::pow(t * t / 2, 2);
+  CHECK(found.of[0](0, 0) == Approx(expected));
+}
+
+TEST_CASE("rows of a track outside the run are named", "[objective]") {
+  Problem problem = slide();
+  const auto issues = find_issues(problem);
+  REQUIRE(issues.size() == 1);
+  CHECK(issues[0].is_warning);
+  CHECK(issues[0].path == "objectives.path.track[0].file");
+  CHECK_THAT(issues[0].message, Contains("only 3 of its 4 rows"));
+  problem.scene.simulation.start_time = 0.1, problem.scene.simulation.end_time = 0.15;
+  CHECK_THAT(find_issues(problem).at(0).message, Contains("has no row within the run"));
+  problem.objectives[0].track[0].unit = "rad";
+  CHECK_THAT(find_issues(problem).at(0).message, Contains("is in rad, the sensor 'x' in m"));
+}
