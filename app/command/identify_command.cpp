@@ -2,6 +2,7 @@
 
 #include "app/report/motion_plots.hpp"
 #include "app/report/run_report.hpp"
+#include "app/report/sensor_unit.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/identification_results.hpp"
 #include "app/results/left_out_bodies.hpp"
@@ -13,7 +14,6 @@
 #include "app/starts/residual_records.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/integrate/model_choice.hpp"
-#include "core/scene/type_table.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 #include "core/start/assembly.hpp"
 #include "core/start/model_warnings.hpp"
@@ -37,7 +37,7 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
         const ChannelSpec& spec =
             problem.identification->experiments[first.size() - 1].channels[plots.size() - first.back()];
         const bool same_unit = spec.gain.is_number() && spec.gain.number() == 1;
-        if (sensor.name == channel.sensor && same_unit) plot.unit = unit_of(sensor);
+        if (sensor.name == channel.sensor && same_unit) plot.unit = unit_in(problem.scene, sensor);
       }
       plots.push_back(std::move(plot));
     }
