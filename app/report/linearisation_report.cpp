@@ -13,7 +13,7 @@ namespace mbsopt {
 namespace {
 
 // "3 modes from 1.2 Hz to 8.4 Hz; the least damped has the damping ratio 0.012, all decay."
-void add_verdict(HtmlPage& page, const Json& modes) {
+void add_modes_verdict(HtmlPage& page, const Json& modes) {
   if (modes.empty()) return;
   double slowest = INFINITY, fastest = 0, growth = -INFINITY, damping = INFINITY;
   for (const Json& m : modes) {
@@ -35,7 +35,7 @@ std::string linearisation_report(const Scene& scene, const Json& result, const s
   constexpr std::size_t kDrawn = 12;  // modes that a reader still tells apart
   HtmlPage page(report_title(result));
   const Json& modes = result.at("linearisation").at("modes");
-  add_verdict(page, modes);
+  add_modes_verdict(page, modes);
   add_status(page, result);
   page.heading("Modes");
   std::vector<TableRow> rows;

@@ -13,6 +13,8 @@
 namespace mbsopt {
 namespace {
 
+constexpr std::size_t kMostCurves = 16;  // in one plot: each colour twice
+
 // Rows "name, value" for the entries of an object that the list names.
 struct Entry {
   const char* key;
@@ -122,7 +124,7 @@ void add_objectives(HtmlPage& page, const Json& result) {
   page.table(header, rows);
 }
 
-void add_convergence(HtmlPage& page, const Trajectory& history) {
+void add_convergence(HtmlPage& page, const Trajectory& history, const Json& parameters) {
   if (history.rows.size() < 2) return;
   page.heading("Convergence");
   const auto column = [&](std::size_t index) {
@@ -140,6 +142,27 @@ void add_convergence(HtmlPage& page, const Trajectory& history) {
     plot.series.push_back({name, column(0), values, Mark::line});
     page.plot(plot);
   }
+  // Between bounds where there are two, else relative to the start.
+  LinePlot bounded{.title = "Parameters between their bounds",
+                   .x_label = "iteration",
+                   .y_label = "(value - lower)/(upper - lower) [-]",
+                   .whole_x = true,
+                   .limits = {{"lower bound", 0, false}, {"upper bound", 1, true}}};
+  LinePlot free{.title = "Parameters", .x_label = "iteration", .y_label = "value/initial value [-]", .whole_x = true};
+  for (const auto& [name, p] : parameters.items()) {
+    const auto found = std::find(history.columns.begin(), history.columns.end(), name);
+    if (found == history.columns.end()) continue;
+    std::vector<double> values = column(static_cast<std::size_t>(found - history.columns.begin()));
+    const Json lower = p.value("lower", Json()), upper = p.value("upper", Json());
+    const bool between = lower.is_number() && upper.is_number();
+    const double origin = between ? lower.get<double>() : 0;
+    const double width = between ? upper.get<double>() - origin : p.at("initial").get<double>();
+    if (width == 0 || !std::isfinite(width)) continue;
+    for (double& value : values) value = (value - origin) / width;
+    (between ? bounded : free).series.push_back({name, column(0), values, Mark::line});
+  }
+  for (const LinePlot& plot : {bounded, free})
+    if (!plot.series.empty() && plot.series.size() <= kMostCurves) page.plot(plot);
 }
 
 void add_multistart(HtmlPage& page, const Json& result) {

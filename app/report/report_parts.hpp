@@ -19,8 +19,9 @@ void add_simulation(HtmlPage& page, const Scene& scene, const Json& result);  //
 void add_objectives(HtmlPage& page, const Json& result);                      // name and value
 // Whether any objective is a smooth maximum or minimum, with the true one beside it.
 bool has_true_values(const Json& result);
-void add_convergence(HtmlPage& page, const Trajectory& history);  // objective over iterations
-void add_multistart(HtmlPage& page, const Json& result);          // the waterfall, where there is one
+// Objective, infeasibility and parameters over iterations; parameters: as in result.json, by the names of columns.
+void add_convergence(HtmlPage& page, const Trajectory& history, const Json& parameters);
+void add_multistart(HtmlPage& page, const Json& result);  // the waterfall, where there is one
 // A mechanism that moves, over its drawings at start and end.
 void add_motion(HtmlPage& page, std::array<int, 2> plane, const std::vector<MovingState>& states,
                 const std::string& stills);

@@ -13,7 +13,7 @@ namespace mbsopt {
 namespace {
 
 // "5 s of motion in 312 steps; constraints hold within 2.1e-11; track = 1.234."
-void add_verdict(HtmlPage& page, const Json& result, const Trajectory& trajectory) {
+void add_motion_verdict(HtmlPage& page, const Json& result, const Trajectory& trajectory) {
   if (trajectory.rows.empty() || !result.contains("simulation")) return;
   const Json& simulation = result.at("simulation");
   std::string words = fmt::format("{:.6g} s of motion in {}; the constraints hold within {}",
@@ -48,7 +48,7 @@ void add_extremes(HtmlPage& page, const Scene& scene, const Trajectory& trajecto
 
 std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory) {
   HtmlPage page(report_title(result));
-  add_verdict(page, result, trajectory);
+  add_motion_verdict(page, result, trajectory);
   add_status(page, result);
   add_objectives(page, result);
   page.heading("Motion");
