@@ -113,7 +113,7 @@ std::string check_report(const Scene& scene, const Json& result) {
   add_status(page, result);
   if (!entries.empty()) {
     page.heading("Digits that agree");
-    page.note("A darker cell has more agreeing digits, 16 at most. The pointer shows the relative difference.");
+    page.note("A stronger colour means more agreeing digits, 16 at most. The pointer shows the relative difference.");
     add_digits(page, entries, "tlm_adjoint", "Tangent-linear model and adjoint:");
     add_digits(page, entries, "frozen_difference", "Tangent-linear model and differences on frozen steps:");
     add_digits(page, entries, "free_difference", "Tangent-linear model and differences with step-size control:");

@@ -36,7 +36,7 @@ void add_design_verdict(HtmlPage& page, const Json& result) {
 
 void add_parameters(HtmlPage& page, const Json& result) {
   std::vector<TableRow> rows;
-  RowPlot plot{.title = "Variables between their bounds: ring at the start, dot at the optimum",
+  RowPlot plot{.title = "Variables between their bounds (ring: start, dot: optimum)",
                .x_label = "(value - lower)/(upper - lower) [-]",
                .range = std::pair(-0.03, 1.03),
                .track = true};

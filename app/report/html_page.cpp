@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "app/report/html_text.hpp"
 #include "app/report/line_plot.hpp"
@@ -29,23 +28,6 @@ std::string cell_of(const TableCell& cell) {
 }
 
 }  // namespace
-
-std::size_t PageArrays::add(const std::vector<double>& values, int digits) {
-  std::string text = "[";
-  for (const double value : values) {
-    if (text.size() > 1) text += ',';
-    if (std::isfinite(value)) {
-      fmt::format_to(std::back_inserter(text), "{:.{}g}", value, digits);
-    } else {
-      text += "null";
-    }
-  }
-  const auto [at, is_new] = numbers_.emplace(text + "]", texts_.size());
-  if (is_new) texts_.push_back(at->first);
-  return at->second;
-}
-
-std::string PageArrays::text() const { return fmt::format("[{}]", fmt::join(texts_, ",\n")); }
 
 void HtmlPage::verdict(std::string_view text) {
   body_ += fmt::format("<p class=\"verdict\">{}</p>\n", html_escaped(text));

@@ -6,12 +6,13 @@
 // from one block of JSON, in which equal arrays stand once.
 #pragma once
 
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "app/report/page_arrays.hpp"
 
 namespace mbsopt {
 
@@ -25,18 +26,6 @@ struct TableCell {
   TableCell(const char* shown) : text(shown) {}
 };
 using TableRow = std::vector<TableCell>;
-
-// The arrays of a page's data, each once.
-class PageArrays {
- public:
-  // The number of the array; values with so many digits.
-  std::size_t add(const std::vector<double>& values, int digits = 6);
-  std::string text() const;
-
- private:
-  std::map<std::string, std::size_t> numbers_;
-  std::vector<std::string> texts_;
-};
 
 class HtmlPage {
  public:

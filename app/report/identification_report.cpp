@@ -61,7 +61,7 @@ void add_fitted_parameters(HtmlPage& page, const Json& result) {
   for (const Json& experiment : result.value("experiments", Json::object()))
     add_rows(rows, experiment.value("refitted", Json::object()));
   page.table({"parameter", "initial", "value", "standard error", "95 % interval", "unit", "at bound"}, rows);
-  RowPlot plot{.title = "95 % intervals around the estimates (ring: initial value, where it is near)",
+  RowPlot plot{.title = "95 % intervals (ring: initial value, where it is near)",
                .x_label = "deviation from the estimate [%]"};
   constexpr double kFar = 100;  // [%]: an interval that is wider says that the data do not determine the parameter
   double widest = 0;

@@ -10,8 +10,8 @@
 #include <random>
 #include <utility>
 
-#include "app/report/html_page.hpp"
 #include "app/report/html_text.hpp"
+#include "app/report/page_arrays.hpp"
 
 namespace mbsopt {
 namespace {

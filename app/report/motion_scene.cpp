@@ -42,9 +42,11 @@ std::string coordinate(PageArrays& arrays, const std::vector<double>& values) {
   return fmt::format("[{}]", arrays.add(values));
 }
 
-bool all_finite(const Trajectory& trajectory) {
-  return std::ranges::all_of(trajectory.rows, [&](const std::vector<double>& row) {
-    return std::all_of(row.begin(), row.end(), [](double x) { return std::abs(x) < 1e100; });
+// Of time and poses; a sensor may have no value.
+bool poses_are_finite(const MovingState& state) {
+  const auto columns = static_cast<std::ptrdiff_t>(1 + 13 * state.scene.bodies.size());
+  return std::ranges::all_of(state.trajectory.rows, [&](const std::vector<double>& row) {
+    return std::all_of(row.begin(), row.begin() + columns, [](double x) { return std::isfinite(x); });
   });
 }
 
@@ -109,7 +111,7 @@ bool moves_in(std::array<int, 2> plane, const Scene& scene, const Trajectory& tr
 std::string motion_scene(PageArrays& arrays, std::array<int, 2> plane, const std::vector<MovingState>& states) {
   std::size_t bodies = 0, rows = 0;
   for (const MovingState& state : states) {
-    if (state.trajectory.rows.size() < 2 || !all_finite(state.trajectory)) return {};
+    if (state.trajectory.rows.size() < 2 || !poses_are_finite(state)) return {};
     bodies += state.scene.bodies.size();
     rows = std::max(rows, state.trajectory.rows.size());
   }

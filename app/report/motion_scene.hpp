@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "app/report/html_page.hpp"
+#include "app/report/page_arrays.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "core/scene/scene.hpp"
 

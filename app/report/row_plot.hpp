@@ -17,7 +17,7 @@ struct PlotRow {
   double low = 0, high = 0;         // the bar
   std::optional<double> ring = {};  // where something started
   std::optional<double> dot = {};   // where it ended
-  std::string words;                // at the right, with the numbers
+  std::string words = {};           // at the right, with the numbers
 };
 
 struct RowPlot {

@@ -12,7 +12,9 @@
 
 namespace mbsopt {
 
-std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory);
+// efforts: t, then the force or torque of each drive of the scene, by name; of kinematics.
+std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory,
+                              const Trajectory& efforts = {});
 
 // state: t and the bodies' part of a row of trajectory.csv; shapes: the same, displaced along each mode.
 std::string linearisation_report(const Scene& scene, const Json& result, const std::vector<double>& state,

@@ -44,9 +44,26 @@ void add_extremes(HtmlPage& page, const Scene& scene, const Trajectory& trajecto
   page.table({"sensor", "unit", "least", "at t [s]", "largest", "at t [s]", "at the end"}, rows);
 }
 
+void add_efforts(HtmlPage& page, const Scene& scene, const Trajectory& efforts) {
+  if (efforts.rows.empty()) return;
+  std::vector<double> t;
+  for (const auto& row : efforts.rows) t.push_back(row.front());
+  for (std::size_t k = 1; k < efforts.columns.size(); ++k) {
+    const auto drive = std::ranges::find(scene.drives, efforts.columns[k], &Drive::name);
+    const std::string unit = drive == scene.drives.end() ? "N or N m" : unit_of_effort(*drive);
+    LinePlot plot{.title = (unit == "N" ? "Force of " : "Torque of ") + efforts.columns[k],
+                  .x_label = "t [s]",
+                  .y_label = fmt::format("{} [{}]", unit == "N" ? "force" : "torque", unit)};
+    PlotSeries& series = plot.series.emplace_back(PlotSeries{efforts.columns[k], t, {}, Mark::line});
+    for (const auto& row : efforts.rows) series.y.push_back(row[k]);
+    page.plot(plot);
+  }
+}
+
 }  // namespace
 
-std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory) {
+std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory,
+                              const Trajectory& efforts) {
   HtmlPage page(report_title(result));
   add_motion_verdict(page, result, trajectory);
   add_status(page, result);
@@ -59,6 +76,7 @@ std::string simulation_report(const Scene& scene, const Json& result, const Traj
                                  {{"start", scene, trajectory.rows.front()}, {"end", scene, trajectory.rows.back()}}));
   }
   for (const LinePlot& plot : motion_plots(scene, trajectory)) page.plot(plot);
+  add_efforts(page, scene, efforts);
   add_extremes(page, scene, trajectory);
   add_simulation(page, scene, result);
   add_model(page, result);

@@ -18,9 +18,9 @@ import tempfile
 
 PROBLEMS = pathlib.Path(__file__).resolve().parents[2] / "problems"
 # Command, problem file, whether a mechanism moves in the report.
-RUNS = [("simulate", "quarter_car/ride.json", True), ("kinematics", "slider_crank/kinematics.json", True),
+RUNS = [("simulate", "quarter_car/ride.json", True), ("kinematics", "four_bar/kinematics.json", True),
         ("linearise", "quarter_car/ride.json", False), ("gradient", "five_bar/sensitivities.json", False),
-        ("check", "pendulum/check.json", False), ("design", "five_bar/design.json", True),
+        ("check", "quarter_car/ride.json", False), ("design", "five_bar/design.json", True),
         ("identify", "pendulum/identify.json", True)]
 WIDTHS = (420, 1300)
 
@@ -29,7 +29,9 @@ PROBE = r"""
 const found = {errors: window.probe_errors, plots: 0, cells_outside: 0, overflow: 0, small: 0};
 const wait = ms => new Promise(done => setTimeout(done, ms));
 const ink = canvas => {
-  const d = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d", {willReadFrequently: true});
+  copy.drawImage(canvas, 0, 0);
+  const d = copy.getImageData(0, 0, canvas.width, canvas.height).data;
   let sum = 0, hash = 0;
   for (let i = 3; i < d.length; i += 4) if (d[i]) sum += 1, hash = (hash * 31 + i) % 1000003;
   return [sum, hash];
@@ -56,7 +58,7 @@ const ink = canvas => {
   found.overflow = document.documentElement.scrollWidth - document.documentElement.clientWidth;
   if (innerWidth < 700) {
     for (const e of document.querySelectorAll("p,td,th,a,h2,button,svg text")) {
-      const box = e.ownerSVGElement ? e.getScreenCTM().a : 1;
+      const box = e.ownerSVGElement ? Math.hypot(e.getScreenCTM().a, e.getScreenCTM().b) : 1;
       if (e.getClientRects().length && e.textContent.trim() && !e.closest("tspan") &&
           parseFloat(getComputedStyle(e).fontSize) * box < 11.9) found.small += 1;
     }
