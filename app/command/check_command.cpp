@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/left_out_bodies.hpp"
 #include "app/results/objective_values.hpp"
@@ -228,6 +229,7 @@ int check_command(const CommandContext& context) {
   print_costs(context.out, check);
   context.out << fmt::format("\n{}\n", check.passed() ? "all gradients agree" : "THE GRADIENTS DISAGREE");
   if (!check.passed()) run.disagrees();
+  run.write("report.html", check_report(scene, run.result));
   return run.finish();
 }
 

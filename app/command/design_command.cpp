@@ -95,6 +95,24 @@ void add_to_result(Json& result, const DesignResult& design) {
   if (design.seed) result["optimizer"]["seed"] = *design.seed;
 }
 
+// Limits that bound the extreme of a sensor bound the sensor at all times.
+SensorLimits sensor_limits(const Problem& problem) {
+  SensorLimits limits;
+  for (const ObjectiveBound& bound : problem.design->subject_to) {
+    const auto spec = std::ranges::find(problem.objectives, bound.objective, &ObjectiveSpec::name);
+    if (spec == problem.objectives.end()) continue;
+    for (std::size_t k = 0; k < std::size(kMeanKinds); ++k) {
+      const bool largest = kMeanKinds[k].extreme > 0, smallest = kMeanKinds[k].extreme < 0;
+      if (!spec->means[k]) continue;
+      if (largest && bound.upper)
+        limits.push_back({spec->means[k]->text(), {bound.objective + ", at most", *bound.upper, true}});
+      if (smallest && bound.lower)
+        limits.push_back({spec->means[k]->text(), {bound.objective + ", at least", *bound.lower, false}});
+    }
+  }
+  return limits;
+}
+
 // Without a column of what the method does not know.
 Trajectory history_of(const DesignResult& design) {
   const bool optimality = std::all_of(design.history.begin(), design.history.end(),
@@ -155,7 +173,8 @@ int design_command(const CommandContext& context) {
   run.write("optimized.json", optimized_problem_text(run, new_values(design)));
   run.write("history.csv", to_csv(history));
   if (!after.trajectory.rows.empty()) write_trajectory(run, after.trajectory);
-  run.write("report.html", design_report(scene, design.rho, run.result, history, before.trajectory, after.trajectory));
+  run.write("report.html", design_report(scene, design.rho, run.result, history, before.trajectory, after.trajectory,
+                                         sensor_limits(run.problem)));
   return long_run.finish();
 }
 

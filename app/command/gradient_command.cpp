@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/hessian_results.hpp"
 #include "app/results/left_out_bodies.hpp"
@@ -140,6 +141,7 @@ int gradient_command(const CommandContext& context) {
                              evaluation.wall_seconds);
   add_objectives(run, evaluation, evaluator.true_values(evaluator.start()));
   if (context.options.hessian) add_second_derivatives(run, evaluator);
+  run.write("report.html", gradient_report(scene, run.result));
   return run.finish();
 }
 

@@ -2,10 +2,12 @@
 
 #include "app/report/motion_plots.hpp"
 #include "app/report/run_report.hpp"
+#include "app/report/sensor_unit.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/identification_results.hpp"
 #include "app/results/left_out_bodies.hpp"
 #include "app/results/optimized_problem.hpp"
+#include "app/results/trajectory_csv.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/starts/identify_starts.hpp"
@@ -13,7 +15,6 @@
 #include "app/starts/residual_records.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/integrate/model_choice.hpp"
-#include "core/scene/type_table.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 #include "core/start/assembly.hpp"
 #include "core/start/model_warnings.hpp"
@@ -37,7 +38,7 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
         const ChannelSpec& spec =
             problem.identification->experiments[first.size() - 1].channels[plots.size() - first.back()];
         const bool same_unit = spec.gain.is_number() && spec.gain.number() == 1;
-        if (sensor.name == channel.sensor && same_unit) plot.unit = unit_of(sensor);
+        if (sensor.name == channel.sensor && same_unit) plot.unit = unit_in(problem.scene, sensor);
       }
       plots.push_back(std::move(plot));
     }
@@ -96,17 +97,58 @@ Scene simulated_scene(const Problem& problem, const std::vector<CsvTable>& data)
       .simulated();
 }
 
-// Residuals are derived along with the motion, by runs that say nothing of their steps: hence one that does.
-void simulate_first_experiment(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
-  const Scene scene = simulated_scene(needed, data);
-  const Mechanism mechanism(scene, parameter_values(scene), std::vector<bool>(scene.parameters.size(), false));
+struct SimulatedExperiment {
+  Scene scene;
+  Trajectory trajectory;
+  SimulationResult simulation;
+};
+
+SimulatedExperiment simulated_experiment(Run& run, Scene scene) {
+  SimulatedExperiment motion{std::move(scene), {}, {}};
+  const Mechanism mechanism(motion.scene, parameter_values(motion.scene),
+                            std::vector<bool>(motion.scene.parameters.size(), false));
   RunOptions options;
   options.progress = told(run);
-  const SimulationResult first = simulate(mechanism, scene.simulation, {}, {}, options);
+  motion.simulation = simulate(mechanism, motion.scene.simulation, {},
+                               record_trajectory(mechanism, motion.scene, motion.trajectory), options);
+  return motion;
+}
+
+// With the fitted values in place of those it starts from.
+Problem fitted_problem(Problem problem, const IdentificationResult& fit) {
+  for (const FittedParameter& p : fit.parameters) {
+    for (Parameter& shared : problem.scene.parameters)
+      if (p.experiment.empty() && shared.name == p.parameter) shared.value = p.value;
+    for (ExperimentSpec& e : problem.identification->experiments)
+      if (e.name == p.experiment) e.overrides.emplace_back(p.parameter, p.value);
+  }
+  return problem;
+}
+
+// Residuals are derived along with the motion, by runs that say nothing of their steps: hence one that does.
+SimulatedExperiment simulate_first_experiment(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
+  auto [scene, trajectory, first] = simulated_experiment(run, simulated_scene(needed, data));
   run.result["simulation"] = to_json(first.statistics);
   if (first.ok())
     for (const std::string& warning : simulation_warnings(scene, first.statistics)) run.warn(warning);
   warn_of_stiffness(run, first.statistics, true);
+  return {std::move(scene), std::move(trajectory), first};
+}
+
+// Before and after the fit, for the report; without the fitted one where its simulation stops.
+std::string report_of(Run& run, const Problem& needed, const std::vector<CsvTable>& data,
+                      const SimulatedExperiment& before, const IdentificationResult& fit, const Trajectory& history) {
+  std::vector<MovingState> states;
+  std::optional<SimulatedExperiment> after;
+  if (!interrupted() && before.simulation.ok()) {
+    after = simulated_experiment(run, simulated_scene(fitted_problem(needed, fit), data));
+    run.progress.finish();
+    if (after->simulation.ok()) {
+      states.push_back({"initial", before.scene, before.trajectory, true});
+      states.push_back({"fitted", after->scene, after->trajectory});
+    }
+  }
+  return identification_report(run.problem.scene, run.result, history, fit_plots(run.problem, fit), states);
 }
 
 std::vector<NewValue> new_values(const IdentificationResult& fit) {
@@ -142,7 +184,7 @@ int identify_command(const CommandContext& context) {
   std::vector<std::string> left_out;
   const Problem needed = what_measurements_need(run.problem, &left_out);
   say_left_out(run, left_out, "measurement");
-  simulate_first_experiment(run, needed, data);
+  const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
   for (const std::string& warning : doubts_about_fit(needed, data, {{}, [](double) { return !interrupted(); }}))
     run.warn(warning);
   LongRun long_run(run);
@@ -165,7 +207,7 @@ int identify_command(const CommandContext& context) {
   run.write("history.csv", to_csv(history));
   run.write("residuals.csv", residuals_csv(fit));
   if (!fit.profiles.empty()) run.write("profile.csv", profile_csv(fit));
-  run.write("report.html", identification_report(scene, run.result, history, fit_plots(run.problem, fit)));
+  run.write("report.html", report_of(run, needed, data, before, fit, history));
   return long_run.finish();
 }
 

@@ -135,7 +135,7 @@ int kinematics_command(const CommandContext& context) {
   } else if (!kinematics.ok) {
     run.failed(kinematics.message, kinematics.last_good_time);
   }
-  run.write("report.html", simulation_report(scene, run.result, trajectory));
+  run.write("report.html", simulation_report(scene, run.result, trajectory, efforts.table));
   return run.finish();
 }
 

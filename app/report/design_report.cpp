@@ -1,21 +1,62 @@
 #include <fmt/format.h>
 
+#include <cmath>
+#include <utility>
+
 #include "app/report/mechanism_drawing.hpp"
 #include "app/report/motion_plots.hpp"
 #include "app/report/report_parts.hpp"
+#include "app/report/row_plot.hpp"
 #include "app/report/run_report.hpp"
 #include "core/expression/counted.hpp"
 
 namespace mbsopt {
 namespace {
 
+// "track fell from 12.3 to 0.45 (-96 %) in 12 iterations; no limit is missed; k is at a bound."
+void add_design_verdict(HtmlPage& page, const Json& result) {
+  const Json& optimizer = result.at("optimizer");
+  if (result.at("objectives").empty()) return;
+  const double before = optimizer.at("objective_initial").get<double>(),
+               after = optimizer.at("objective_final").get<double>();
+  std::string words = fmt::format("{} {} from {:.5g} to {:.5g}", result.at("objectives").begin().key(),
+                                  after < before   ? "fell"
+                                  : after > before ? "rose"
+                                                   : "stayed",
+                                  before, after);
+  if (before != 0) words += fmt::format(" ({:+.3g} %)", 100 * (after - before) / std::abs(before));
+  words += " in " + counted(optimizer.at("iterations").get<long>(), "iteration");
+  if (result.at("objectives").size() > 1)
+    words += fmt::format("; the largest relative violation of a limit is {}", cell(optimizer.at("infeasibility"), 2));
+  long at_bounds = 0;
+  for (const Json& p : result.at("parameters")) at_bounds += p.value("at_bound", Json()).is_string() ? 1 : 0;
+  page.verdict(fmt::format("{}; {} of {} at a bound.", words, at_bounds,
+                           counted(static_cast<long>(result.at("parameters").size()), "variable")));
+}
+
 void add_parameters(HtmlPage& page, const Json& result) {
-  std::vector<std::vector<std::string>> rows;
+  std::vector<TableRow> rows;
+  RowPlot plot{.title = "Variables between their bounds (ring: start, dot: optimum)",
+               .x_label = "(value - lower)/(upper - lower) [-]",
+               .range = std::pair(-0.03, 1.03),
+               .track = true};
   for (const auto& [name, p] : result.at("parameters").items()) {
-    rows.push_back({name, cell(p.at("initial")), cell(p.at("value")), cell(p.value("unit", Json())),
-                    cell(p.value("lower", Json())), cell(p.value("upper", Json())), cell(p.value("at_bound", Json()))});
+    const Json lower = p.value("lower", Json()), upper = p.value("upper", Json());
+    rows.push_back({name, number_cell(p.at("initial")), number_cell(p.at("value")), cell(p.value("unit", Json())),
+                    number_cell(lower), number_cell(upper), cell(p.value("at_bound", Json()))});
+    if (!lower.is_number() || !upper.is_number()) continue;
+    const double l = lower.get<double>(), width = upper.get<double>() - l;
+    if (!(width > 0) || !std::isfinite(width)) continue;
+    const double from = (p.at("initial").get<double>() - l) / width, to = (p.at("value").get<double>() - l) / width;
+    plot.rows.push_back({.name = name,
+                         .low = from,
+                         .high = to,
+                         .ring = from,
+                         .dot = to,
+                         .words = cell(p.at("initial"), 4) + " \u2192 " + cell(p.at("value"), 4)});
   }
   page.table({"parameter", "initial", "optimum", "unit", "lower", "upper", "at bound"}, rows);
+  page.drawing(to_svg(plot));
 }
 
 void add_outcome(HtmlPage& page, const Json& result) {
@@ -43,31 +84,34 @@ void add_drawings(HtmlPage& page, const Scene& scene, const Eigen::VectorXd& rho
   if (before.rows.empty()) return;
   const std::array<int, 2> plane = plane_of_motion(scene, before);
   if (after.rows.empty()) {
-    page.drawing(mechanism_drawing("Before, at start and end", plane,
-                                   {{"start", scene, before.rows.front()}, {"end", scene, before.rows.back()}}));
+    add_motion(page, plane, {{"before", scene, before}},
+               mechanism_drawing("Before, at start and end", plane,
+                                 {{"start", scene, before.rows.front()}, {"end", scene, before.rows.back()}}));
     return;
   }
   const Scene designed = with_values(scene, rho);
-  page.drawing(mechanism_drawing("At the start", plane,
-                                 {{"before", scene, before.rows.front()}, {"after", designed, after.rows.front()}}));
-  page.drawing(mechanism_drawing("At the end", plane,
-                                 {{"before", scene, before.rows.back()}, {"after", designed, after.rows.back()}}));
+  const std::string start = mechanism_drawing(
+      "At the start", plane, {{"before", scene, before.rows.front()}, {"after", designed, after.rows.front()}});
+  const std::string end = mechanism_drawing(
+      "At the end", plane, {{"before", scene, before.rows.back()}, {"after", designed, after.rows.back()}});
+  add_motion(page, plane, {{"before", scene, before, true}, {"after", designed, after}}, start + end);
 }
 
 }  // namespace
 
 std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const Json& result, const Trajectory& history,
-                          const Trajectory& before, const Trajectory& after) {
+                          const Trajectory& before, const Trajectory& after, const SensorLimits& limits) {
   HtmlPage page(report_title(result));
+  add_design_verdict(page, result);
   add_status(page, result);
   page.heading("Result");
   add_outcome(page, result);
   add_parameters(page, result);
-  add_convergence(page, history);
+  add_convergence(page, history, result.at("parameters"));
   add_multistart(page, result);
   page.heading("Motion before and after");
   add_drawings(page, scene, rho, before, after);
-  for (const LinePlot& plot : motion_plots(scene, before, after)) page.plot(plot);
+  for (const LinePlot& plot : motion_plots(scene, before, after, limits)) page.plot(plot);
   add_model(page, result);
   add_provenance(page, result);
   return page.text();

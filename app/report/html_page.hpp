@@ -1,30 +1,62 @@
-// A static, self-contained HTML page: headings, sentences, tables and plots; light and dark. No scripts, nothing from
-// the network, no time stamp.
+// A self-contained HTML page: a verdict, warnings, then headings, sentences, tables and plots; light and dark, with its
+// contents at the side, and fit for print. Nothing comes from the network, there is no time stamp.
+//
+// The page shows all of it without scripts. Its script (report.js) adds to plots the values under the pointer, zoom and
+// legends that hide; to a mechanism its motion; to tables a copy as CSV. The script reads the data of plots and motions
+// from one block of JSON, in which equal arrays stand once.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
+
+#include "app/report/page_arrays.hpp"
 
 namespace mbsopt {
 
 struct LinePlot;
 
+// A cell shows a rounded number and, under the pointer, all digits.
+struct TableCell {
+  std::string text, full = {};
+  std::optional<double> shade = {};  // from -1 to 1: the colour of a heat map
+  TableCell(std::string shown, std::string digits = {}) : text(std::move(shown)), full(std::move(digits)) {}
+  TableCell(const char* shown) : text(shown) {}
+};
+using TableRow = std::vector<TableCell>;
+
 class HtmlPage {
  public:
   explicit HtmlPage(std::string title) : title_(std::move(title)) {}
 
+  void verdict(std::string_view text);  // one sentence with the numbers that matter most
+  void warning(std::string_view text);
   void heading(std::string_view text);
   void paragraph(std::string_view text);
+  void note(std::string_view text);    // in small print
   void banner(std::string_view text);  // what a reader must see first
+  void code(std::string_view text);
   // The first column holds names; the others are numbers or short words.
-  void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
+  void table(const std::vector<std::string>& header, const std::vector<TableRow>& rows);
+  template <class Text>
+  void table(const std::vector<std::string>& header, const std::vector<std::vector<Text>>& rows) {
+    std::vector<TableRow> cells;
+    for (const auto& row : rows) cells.emplace_back(row.begin(), row.end());
+    table(header, cells);
+  }
   void plot(const LinePlot& plot);
   void drawing(std::string_view svg) { body_ += svg; }
+  // A mechanism that moves, as JSON for report.js, above the drawings that stand for it where there is no script.
+  void motion(std::string_view json, std::string_view stills);
+  PageArrays& arrays() { return arrays_; }
   std::string text() const;
 
  private:
   std::string title_, body_;
+  std::vector<std::string> headings_, plots_, motions_;
+  PageArrays arrays_;
 };
 
 }  // namespace mbsopt

@@ -1,5 +1,7 @@
 #include "app/report/html_text.hpp"
 
+#include <nlohmann/json.hpp>
+
 namespace mbsopt {
 
 std::string html_escaped(std::string_view text) {
@@ -23,6 +25,12 @@ std::string html_escaped(std::string_view text) {
     }
   }
   return escaped;
+}
+
+std::string json_quoted(std::string_view text) {
+  std::string quoted = nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  for (std::size_t at = 0; (at = quoted.find("</", at)) != std::string::npos; at += 3) quoted.insert(at + 1, 1, '\\');
+  return quoted;
 }
 
 }  // namespace mbsopt

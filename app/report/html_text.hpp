@@ -1,4 +1,4 @@
-// Text as HTML shows it.
+// Text as HTML shows it, and as a string of the JSON within a page.
 #pragma once
 
 #include <string>
@@ -7,5 +7,6 @@
 namespace mbsopt {
 
 std::string html_escaped(std::string_view text);
+std::string json_quoted(std::string_view text);  // in quotes, without "</", which would end the script
 
 }  // namespace mbsopt

@@ -1,10 +1,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "app/report/line_plot.hpp"
+#include "app/report/mechanism_drawing.hpp"
 #include "app/report/report_parts.hpp"
+#include "app/report/row_plot.hpp"
 #include "app/report/run_report.hpp"
 #include "core/expression/counted.hpp"
 
@@ -16,23 +20,72 @@ std::string interval_of(const Json& parameter) {
   const bool known = interval.is_array() && std::all_of(interval.begin(), interval.end(), [](const Json& end) {
                        return end.is_number() && std::isfinite(end.get<double>());
                      });
-  return known ? "[" + cell(interval) + "]" : "-";
+  if (!known) return "-";
+  const Json error = parameter.value("std_error", Json());
+  return "[" + rounded_cell(interval[0], error).text + ", " + rounded_cell(interval[1], error).text + "]";
 }
 
-void add_rows(std::vector<std::vector<std::string>>& rows, const Json& parameters) {
+// "4 parameters from 400 samples, rms of residuals 1.02 sigma: k = 20.13 +- 0.05 N/m, ..."
+void add_fit_verdict(HtmlPage& page, const Json& result) {
+  constexpr std::size_t kMost = 4;  // parameters in a sentence
+  const Json& parameters = result.at("parameters");
+  const Json& statistics = result.at("statistics");
+  std::string words = fmt::format("{} from {}", counted(static_cast<long>(parameters.size()), "parameter"),
+                                  counted(statistics.at("samples").get<long>(), "sample"));
+  const Json& variance = statistics.at("residual_variance");
+  if (variance.is_number() && variance.get<double>() >= 0)
+    words += fmt::format(", residuals of {:.3g} sigma", std::sqrt(variance.get<double>()));
+  std::size_t k = 0;
   for (const auto& [name, p] : parameters.items()) {
-    rows.push_back({name, cell(p.at("initial")), cell(p.at("value"), 9), cell(p.value("std_error", Json()), 3),
-                    interval_of(p), cell(p.value("unit", Json())), cell(p.value("at_bound", Json()))});
+    if (k == kMost) break;
+    const Json error = p.value("std_error", Json());
+    words += fmt::format("{} {} = {}", k++ == 0 ? ":" : ",", name, rounded_cell(p.at("value"), error).text);
+    if (error.is_number() && std::isfinite(error.get<double>())) words += " \u00b1 " + cell(error, 2);
+    if (!p.value("unit", "").empty()) words += " " + p.value("unit", "");
+  }
+  page.verdict(words + (parameters.size() > kMost ? ", ..." : "."));
+}
+
+void add_rows(std::vector<TableRow>& rows, const Json& parameters) {
+  for (const auto& [name, p] : parameters.items()) {
+    rows.push_back({name, number_cell(p.at("initial")), rounded_cell(p.at("value"), p.value("std_error", Json())),
+                    number_cell(p.value("std_error", Json()), 2), interval_of(p), cell(p.value("unit", Json())),
+                    cell(p.value("at_bound", Json()))});
   }
 }
 
 // Those fitted, then what was refitted to score the experiments that validate.
 void add_fitted_parameters(HtmlPage& page, const Json& result) {
-  std::vector<std::vector<std::string>> rows;
+  std::vector<TableRow> rows;
   add_rows(rows, result.at("parameters"));
   for (const Json& experiment : result.value("experiments", Json::object()))
     add_rows(rows, experiment.value("refitted", Json::object()));
   page.table({"parameter", "initial", "value", "standard error", "95 % interval", "unit", "at bound"}, rows);
+  RowPlot plot{.title = "95 % intervals (ring: initial value, where it is near)",
+               .x_label = "deviation from the estimate [%]"};
+  constexpr double kFar = 100;  // [%]: an interval that is wider says that the data do not determine the parameter
+  double widest = 0;
+  for (const auto& [name, p] : result.at("parameters").items()) {
+    const double value = p.at("value").get<double>(),
+                 half = 100 * 1.96 * p.at("std_error").get<double>() / std::abs(value);
+    if (value == 0 || !std::isfinite(half)) continue;
+    const Json& ends = p.at("ci95");
+    const auto percent = [&](double x) { return 100 * (x - value) / std::abs(value); };
+    PlotRow row{.name = name,
+                .low = percent(ends[0].get<double>()),
+                .high = percent(ends[1].get<double>()),
+                .dot = 0,
+                .words = rounded_cell(p.at("value"), p.at("std_error")).text + " \u00b1 " + cell(p.at("std_error"), 2) +
+                         " " + p.value("unit", "")};
+    const double start = percent(p.at("initial").get<double>());
+    if (std::abs(start) < kFar) row.ring = start;
+    widest = std::max(widest, std::min(half, kFar));
+    plot.rows.push_back(std::move(row));
+  }
+  if (widest > 0) plot.range = std::pair(-1.6 * widest, 1.6 * widest);
+  for (PlotRow& row : plot.rows)
+    if (row.ring && std::abs(*row.ring) > 1.6 * widest) row.ring.reset();
+  page.drawing(to_svg(plot));
 }
 
 // How the fit ended, and how much there was to fit.
@@ -61,12 +114,17 @@ void add_correlation(HtmlPage& page, const Json& result) {
   page.heading("Correlation of the estimates");
   const Json& correlation = result.at("correlation");
   std::vector<std::string> header{""};
-  std::vector<std::vector<std::string>> rows;
+  std::vector<TableRow> rows;
   for (std::size_t i = 0; i < correlation.at("names").size(); ++i) {
     header.push_back(cell(correlation.at("names")[i]));
     rows.push_back({header.back()});
     for (const Json& entry : correlation.at("matrix")[i]) {
-      rows.back().push_back(entry.is_number() ? fmt::format("{:.3f}", entry.get<double>()) : "-");
+      if (!entry.is_number()) {
+        rows.back().push_back("-");
+        continue;
+      }
+      rows.back().push_back({fmt::format("{:.2f}", entry.get<double>()), fmt::format("{}", entry.get<double>())});
+      rows.back().back().shade = entry.get<double>();
     }
   }
   page.table(header, rows);
@@ -116,6 +174,55 @@ void add_profiles(HtmlPage& page, const Json& result) {
   }
 }
 
+constexpr std::size_t kFewest = 20;  // samples, below which a histogram says nothing
+
+// Shares of the residuals in bins of half a sigma within four; those beyond count in the outermost bins. The curve is
+// the normal distribution.
+LinePlot histogram(const FitPlot& fit) {
+  constexpr double kWidth = 0.5, kEnd = 4;
+  constexpr int kBins = 16;
+  PlotSeries found{"share of the residuals", {}, {}, Mark::bars}, normal{"normal distribution", {}, {}, Mark::line};
+  std::vector<double> share(kBins, 0.0);
+  for (const double z : fit.residual) {
+    if (!std::isfinite(z)) continue;
+    const double bin = std::clamp(std::floor((z + kEnd) / kWidth), 0.0, kBins - 1.0);
+    share[static_cast<std::size_t>(bin)] += 1 / static_cast<double>(fit.residual.size());
+  }
+  for (int k = 0; k < kBins; ++k) {
+    const double z = -kEnd + (k + 0.5) * kWidth;
+    found.x.push_back(z), found.y.push_back(share[static_cast<std::size_t>(k)]);
+    const auto below = [](double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); };
+    normal.x.push_back(z), normal.y.push_back(below(z + kWidth / 2) - below(z - kWidth / 2));
+  }
+  return {.title = fmt::format("{}: histogram of the residuals of {}", fit.experiment, fit.channel),
+          .x_label = "(measured - model)/sigma [-]",
+          .y_label = "share per half sigma [-]",
+          .series = {found, normal}};
+}
+
+// r_k = sum_i z_i z_{i+k} / sum_i z_i^2 about the mean; of white noise 95 % lie within +-1.96/sqrt(n).
+LinePlot autocorrelation(const FitPlot& fit) {
+  constexpr std::size_t kMostLags = 40;
+  const std::vector<double>& z = fit.residual;
+  const std::size_t lags = std::min(kMostLags, z.size() / 4);
+  double mean = 0, power = 0;
+  for (const double value : z) mean += value / static_cast<double>(z.size());
+  for (const double value : z) power += (value - mean) * (value - mean);
+  PlotSeries r{"autocorrelation", {}, {}, Mark::bars};
+  for (std::size_t lag = 1; lag <= lags; ++lag) {
+    double sum = 0;
+    for (std::size_t i = 0; i + lag < z.size(); ++i) sum += (z[i] - mean) * (z[i + lag] - mean);
+    r.x.push_back(static_cast<double>(lag)), r.y.push_back(power > 0 ? sum / power : 0);
+  }
+  const double limit = 1.96 / std::sqrt(static_cast<double>(z.size()));
+  return {.title = fmt::format("{}: autocorrelation of the residuals of {}", fit.experiment, fit.channel),
+          .x_label = "lag [samples]",
+          .y_label = "autocorrelation [-]",
+          .series = {r},
+          .whole_x = true,
+          .limits = {{"95 % of white noise", limit, true}, {"", -limit, false}}};
+}
+
 void add_fit(HtmlPage& page, const FitPlot& fit) {
   LinePlot plot{.title = fmt::format("{}: {}", fit.experiment, fit.channel),
                 .x_label = "t [s]",
@@ -128,13 +235,17 @@ void add_fit(HtmlPage& page, const FitPlot& fit) {
                     .y_label = "(measured - model)/sigma [-]"};
   residual.series.push_back({"residual", fit.times, fit.residual, Mark::points});
   page.plot(residual);
+  if (fit.residual.size() < kFewest) return;
+  page.plot(histogram(fit));
+  page.plot(autocorrelation(fit));
 }
 
 }  // namespace
 
 std::string identification_report(const Scene& scene, const Json& result, const Trajectory& history,
-                                  const std::vector<FitPlot>& fits) {
+                                  const std::vector<FitPlot>& fits, const std::vector<MovingState>& motion) {
   HtmlPage page(scene.name + ": identify");
+  add_fit_verdict(page, result);
   add_status(page, result);
   page.heading("Fit");
   add_fit_outcome(page, result);
@@ -142,10 +253,18 @@ std::string identification_report(const Scene& scene, const Json& result, const 
   add_fitted_parameters(page, result);
   add_correlation(page, result);
   add_profiles(page, result);
+  if (!motion.empty()) {
+    page.heading("Motion of the first experiment");
+    const MovingState& last = motion.back();
+    const std::array<int, 2> plane = plane_of_motion(last.scene, last.trajectory);
+    std::vector<DrawnState> states;
+    for (const MovingState& state : motion) states.push_back({state.name, state.scene, state.trajectory.rows.front()});
+    add_motion(page, plane, motion, mechanism_drawing("The mechanism at the start", plane, states));
+  }
   page.heading("Measured and model");
   add_experiments(page, result);
   for (const FitPlot& fit : fits) add_fit(page, fit);
-  add_convergence(page, history);
+  add_convergence(page, history, result.at("parameters"));
   add_provenance(page, result);
   return page.text();
 }

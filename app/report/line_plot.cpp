@@ -1,6 +1,7 @@
 #include "app/report/line_plot.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include <utility>
 
 #include "app/report/html_text.hpp"
+#include "app/report/page_arrays.hpp"
 
 namespace mbsopt {
 namespace {
@@ -55,7 +57,14 @@ PlotFrame frame_of(const LinePlot& plot) {
       if (!std::isfinite(x) || !std::isfinite(y)) continue;
       frame.x.include(x);
       frame.y.include(y);
+      if (series.mark == Mark::bars) frame.y.include(0);
     }
+  }
+  // A limit that is far from all values would flatten them: only one within their range, or as far again, is shown.
+  const AxisRange data = frame.y;
+  for (const PlotLimit& limit : plot.limits) {
+    const double y = y_of(plot, limit.value);
+    if (y > data.low - data.span() && y < data.high + data.span()) frame.y.include(y);
   }
   frame.x.finish(plot.equal_axes || plot.logarithmic_x ? 0.05 : 0);
   frame.y.finish(0.05);
@@ -89,15 +98,17 @@ std::vector<std::size_t> random_samples(const std::vector<std::size_t>& all, con
   return kept;
 }
 
+bool is_thinned(const PlotSeries& series) {
+  return !is_cloud(series) && series.x.size() > 2 * static_cast<std::size_t>(kInnerWidth) &&
+         std::is_sorted(series.x.begin(), series.x.end());
+}
+
 // Many samples to a pixel column become at most its first, lowest, highest and last: the drawing is the same.
 std::vector<std::size_t> visible_samples(const LinePlot& plot, const PlotSeries& series, const PlotFrame& frame) {
   std::vector<std::size_t> all(series.x.size());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
   if (is_cloud(series)) return random_samples(all, series.y);
-  if (series.x.size() <= 2 * static_cast<std::size_t>(kInnerWidth) ||
-      !std::is_sorted(series.x.begin(), series.x.end())) {
-    return all;
-  }
+  if (!is_thinned(series)) return all;
   std::vector<std::size_t> kept;
   for (std::size_t begin = 0; begin < all.size();) {
     const auto column_of = [&](std::size_t i) { return std::floor(frame.px(x_of(plot, series.x[i]))); };
@@ -117,7 +128,18 @@ std::vector<std::size_t> visible_samples(const LinePlot& plot, const PlotSeries&
 }
 
 const char* style_of(Mark mark) {
-  return mark == Mark::points ? "points" : mark == Mark::dashed ? "line dashed" : "line";
+  switch (mark) {
+    case Mark::points:
+      return "points";
+    case Mark::dashed:
+      return "line dashed";
+    case Mark::bars:
+      return "bars";
+    case Mark::line:
+    case Mark::rings:
+      break;
+  }
+  return "line";
 }
 
 std::string ring(double px, double py) {
@@ -139,13 +161,51 @@ void draw_series(const LinePlot& plot, const PlotFrame& frame, std::size_t index
       fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}h0", px, py);
     } else if (series.mark == Mark::rings) {
       path += ring(px, py);
+    } else if (series.mark == Mark::bars) {
+      fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}V{:.1f}", px, frame.py(0), py);
     } else {
       fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}", pen_down ? 'L' : 'M', px, py);
     }
     pen_down = true;
   }
-  svg += fmt::format("<path class=\"{} c{}\" d=\"{}\"/>\n", style_of(series.mark),
+  svg += fmt::format("<path data-series=\"{}\" class=\"{} c{}\" d=\"{}\"/>\n", index, style_of(series.mark),
                      series.part_of.value_or(index) % kColours, path);
+}
+
+// The area between a limit and what of a line lies beyond it.
+std::string area_beyond(const LinePlot& plot, const PlotFrame& frame, const PlotSeries& series,
+                        const PlotLimit& limit) {
+  const double y_limit = y_of(plot, limit.value);
+  std::string path;
+  bool any = false;
+  double last = 0;
+  for (const std::size_t i : visible_samples(plot, series, frame)) {
+    const double x = x_of(plot, series.x[i]), y = y_of(plot, series.y[i]);
+    if (!std::isfinite(x) || !std::isfinite(y)) continue;
+    const bool beyond = limit.upper ? y > y_limit : y < y_limit;
+    any = any || beyond;
+    if (path.empty()) path = fmt::format("M{:.1f} {:.1f}", frame.px(x), frame.py(y_limit));
+    fmt::format_to(std::back_inserter(path), "L{:.1f} {:.1f}", frame.px(x), frame.py(beyond ? y : y_limit));
+    last = frame.px(x);
+  }
+  return any ? path + fmt::format("L{:.1f} {:.1f}Z", last, frame.py(y_limit)) : std::string();
+}
+
+void draw_limits(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
+  for (const PlotLimit& limit : plot.limits) {
+    const double y = y_of(plot, limit.value);
+    if (!(y >= frame.y.low && y <= frame.y.high)) continue;
+    for (const PlotSeries& series : plot.series) {
+      if (series.mark != Mark::line) continue;
+      const std::string area = area_beyond(plot, frame, series, limit);
+      if (!area.empty()) svg += fmt::format("<path class=\"beyond\" d=\"{}\"/>\n", area);
+    }
+    const double py = frame.py(y);
+    svg += fmt::format(
+        "<path class=\"limit\" d=\"M{} {:.1f}h{}\"/><text class=\"limit-name\" x=\"{}\" y=\"{:.1f}\" "
+        "text-anchor=\"end\">{}</text>\n",
+        kLeft, py, kInnerWidth, kLeft + kInnerWidth - 4, py - kTop < 16 ? py + 14 : py - 4, html_escaped(limit.name));
+  }
 }
 
 // Whether all of an axis can be written as 0.02, 5, 1000.
@@ -193,6 +253,7 @@ Ticks x_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
 std::string legend_key(const PlotSeries& series, std::size_t index) {
   const std::string path = series.mark == Mark::points  ? "M5 5h0M15 5h0M25 5h0"
                            : series.mark == Mark::rings ? ring(15, 5)
+                           : series.mark == Mark::bars  ? "M15 0V10"
                                                         : "M0 5H30";
   return fmt::format("<svg class=\"key\" viewBox=\"0 0 30 10\"><path class=\"{} c{}\" d=\"{}\"/></svg>",
                      style_of(series.mark), index % kColours, path);
@@ -200,6 +261,7 @@ std::string legend_key(const PlotSeries& series, std::size_t index) {
 
 void draw_axes(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
   const double bottom = kTop + kInnerHeight, right = kLeft + kInnerWidth;
+  svg += "<g class=\"ticks\">";
   for (const auto& [tick, label] : x_ticks_of(plot, frame)) {
     svg += fmt::format(
         "<path class=\"grid\" d=\"M{0:.1f} {1:.1f}V{2:.1f}\"/><text x=\"{0:.1f}\" y=\"{3:.1f}\" "
@@ -212,6 +274,7 @@ void draw_axes(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
         "text-anchor=\"end\">{5}</text>\n",
         frame.py(tick), kLeft, right, kLeft - 6, frame.py(tick) + 4, label);
   }
+  svg += "</g>\n";
   svg += fmt::format("<rect class=\"frame\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n", kLeft, kTop, kInnerWidth,
                      kInnerHeight);
   svg += fmt::format("<text class=\"label\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n",
@@ -220,6 +283,11 @@ void draw_axes(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
       fmt::format("<text class=\"label\" transform=\"translate(14 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
                   kTop + kInnerHeight / 2, html_escaped(plot.y_label));
   svg += fmt::format("<text class=\"title\" x=\"{}\" y=\"18\">{}</text>\n", kLeft, html_escaped(plot.title));
+  if (std::any_of(plot.series.begin(), plot.series.end(), [](const PlotSeries& s) { return is_thinned(s); }))
+    svg += fmt::format(
+        "<text class=\"label\" x=\"{}\" y=\"18\" text-anchor=\"end\">first, lowest, highest, last of each "
+        "pixel</text>\n",
+        right);
   for (const PlotSeries& series : plot.series)
     if (is_cloud(series) && series.x.size() > kMostPoints)
       svg += fmt::format(
@@ -265,15 +333,39 @@ std::string to_svg(const LinePlot& plot) {
   std::string svg = fmt::format("<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">\n", kPlotWidth, kPlotHeight,
                                 html_escaped(plot.title));
   draw_axes(plot, frame, svg);
+  draw_limits(plot, frame, svg);
   for (std::size_t i = 0; i < plot.series.size(); ++i) draw_series(plot, frame, i, svg);
   svg += "</svg>\n";
   if (plot.series.size() < 2) return svg;
   svg += "<div class=\"legend\">";
   for (std::size_t i = 0; i < plot.series.size(); ++i) {
     if (plot.series[i].part_of) continue;
-    svg += fmt::format("<span>{}{}</span>", legend_key(plot.series[i], i), html_escaped(plot.series[i].name));
+    svg += fmt::format("<span data-series=\"{}\">{}{}</span>", i, legend_key(plot.series[i], i),
+                       html_escaped(plot.series[i].name));
   }
   return svg + "</div>\n";
+}
+
+std::string plot_data(const LinePlot& plot, PageArrays& arrays) {
+  constexpr int kTimeDigits = 9;  // of x: 1000.001 s and 1000.002 s are two instants
+  const char* const kMarks[] = {"line", "dashed", "points", "rings", "bars"};
+  const PlotFrame frame = frame_of(plot);
+  std::vector<std::string> series, limits;
+  for (const PlotSeries& s : plot.series) {
+    std::vector<double> x, y;
+    for (const std::size_t i : visible_samples(plot, s, frame)) x.push_back(s.x[i]), y.push_back(s.y[i]);
+    series.push_back(fmt::format(R"({{"name":{},"mark":"{}","part":{},"x":{},"y":{}}})", json_quoted(s.name),
+                                 kMarks[static_cast<int>(s.mark)], s.part_of ? static_cast<long>(*s.part_of) : -1,
+                                 arrays.add(x, kTimeDigits), arrays.add(y)));
+  }
+  for (const PlotLimit& limit : plot.limits)
+    limits.push_back(fmt::format(R"({{"value":{:.9g},"upper":{}}})", limit.value, limit.upper));
+  return fmt::format(
+      R"({{"box":[{},{},{},{}],"x":[{},{}],"y":[{},{}],"logx":{},"logy":{},"whole":{},"equal":{},"xlabel":{},"ylabel":{},)"
+      R"("series":[{}],"limits":[{}]}})",
+      kLeft, kTop, kInnerWidth, kInnerHeight, frame.x.low, frame.x.high, frame.y.low, frame.y.high, plot.logarithmic_x,
+      plot.logarithmic_y, plot.whole_x, plot.equal_axes, json_quoted(plot.x_label), json_quoted(plot.y_label),
+      fmt::join(series, ","), fmt::join(limits, ","));
 }
 
 }  // namespace mbsopt

@@ -17,13 +17,20 @@
 
 namespace mbsopt {
 
-enum class Mark { line, dashed, points, rings };
+enum class Mark { line, dashed, points, rings, bars };  // bars: from zero to y
 
 struct PlotSeries {
   std::string name;
   std::vector<double> x, y;  // values that are not finite are left out
   Mark mark = Mark::line;
   std::optional<std::size_t> part_of = {};  // that series: in its colour, and not in the legend
+};
+
+// A horizontal line that no series should pass; the part of a series beyond it is shaded.
+struct PlotLimit {
+  std::string name;
+  double value = 0;
+  bool upper = true;  // else a lower limit
 };
 
 struct LinePlot {
@@ -33,11 +40,16 @@ struct LinePlot {
   bool logarithmic_x = false;  // likewise
   bool whole_x = false;        // x counts: ticks at whole numbers only
   bool equal_axes = false;     // one metre is as long in x as in y: for paths
+  std::vector<PlotLimit> limits = {};
 };
 
 inline constexpr std::size_t kMostPoints = 5000;  // of a series: some 100 kB of the page
 
 std::string to_svg(const LinePlot& plot);
+
+class PageArrays;
+// The data of the plot as JSON, for the script of the page: the samples that to_svg draws, with six digits.
+std::string plot_data(const LinePlot& plot, PageArrays& arrays);
 
 // About `count` round numbers (1, 2 or 5 times a power of ten) that cover [low, high].
 std::vector<double> round_ticks(double low, double high, int count);

@@ -5,14 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <map>
 #include <optional>
-#include <set>
 
 #include "app/report/html_text.hpp"
 #include "app/report/line_plot.hpp"
-#include "core/body/euler_parameters.hpp"
-#include "core/scene/scene_facts.hpp"
+#include "app/report/mechanism_sketch.hpp"
 
 namespace mbsopt {
 namespace {
@@ -23,92 +20,6 @@ using Point2 = Eigen::Vector2d;
 constexpr double kWidth = 760, kLargestHeight = 460, kSmallestHeight = 160, kMargin = 40;  // [px]
 constexpr double kTitle = 24;                                                              // room above [px]
 constexpr std::size_t kBodyColours = 8, kMostNames = 10;
-
-constexpr std::size_t kGround = static_cast<std::size_t>(-1);
-
-// A point of a body, in that body's frame.
-struct BodyPoint {
-  std::size_t body;  // its number, or kGround
-  Point3 s;
-};
-
-// The parts of a scene that are drawn.
-struct Sketch {
-  std::vector<std::vector<Point3>> bodies;  // points of each
-  std::vector<BodyPoint> joints;
-  std::vector<std::pair<BodyPoint, BodyPoint>> springs;
-};
-
-class SketchMaker {
- public:
-  explicit SketchMaker(const Scene& scene) : scene_(scene), facts_(scene) {
-    for (std::size_t i = 0; i < scene.bodies.size(); ++i) numbers_.emplace(scene.bodies[i].name, i);
-    for (const Joint& joint : scene.joints) {
-      for (const auto* field : {&joint.axis1, &joint.axis2, &joint.normal1, &joint.normal2}) {
-        const std::string* name = *field ? std::get_if<std::string>(&**field) : nullptr;
-        if (name) directions_.insert(*name);
-      }
-    }
-  }
-
-  Sketch sketch() {
-    result_.bodies.resize(scene_.bodies.size());
-    for (const Joint& joint : scene_.joints) {
-      const BodyPoint p1 = point(joint.body1, joint.point1), p2 = point(joint.body2, joint.point2);
-      add(p1), add(p2);
-      result_.joints.push_back(p1.body == kGround ? p1 : p2);
-    }
-    for (const Force& force : scene_.forces) {
-      const auto* tsda = std::get_if<Tsda>(&force.kind);
-      if (!tsda) continue;
-      const BodyPoint p1 = point(tsda->body1, tsda->point1), p2 = point(tsda->body2, tsda->point2);
-      add(p1), add(p2);
-      result_.springs.emplace_back(p1, p2);
-    }
-    for (const Sensor& sensor : scene_.sensors) {
-      if (!sensor.body.empty()) add(point(sensor.body, sensor.point));
-      if (!sensor.body1.empty() && !sensor.body2.empty())
-        add(point(sensor.body1, sensor.point1)), add(point(sensor.body2, sensor.point2));
-    }
-    for (std::size_t i = 0; i < scene_.bodies.size(); ++i) add_own_points(i);
-    return std::move(result_);
-  }
-
- private:
-  BodyPoint point(const std::string& body, const PointField& field) const {
-    const auto s = facts_.value(field, body);
-    const auto number = numbers_.find(body);
-    return {number == numbers_.end() ? kGround : number->second,
-            s ? Point3((*s)[0], (*s)[1], (*s)[2]) : Point3(Point3::Zero())};
-  }
-
-  // Its named points, but for those that are directions of joints; a body without any gets its centre of mass.
-  void add_own_points(std::size_t index) {
-    const Body& body = scene_.bodies[index];
-    for (const auto& [name, coordinates] : body.points)
-      if (!directions_.contains(name)) add(point(body.name, coordinates));
-    for (const Shape& shape : body.shapes) add(point(body.name, shape.from)), add(point(body.name, shape.to));
-    if (result_.bodies[index].size() < 2) add(point(body.name, body.com));
-  }
-
-  void add(const BodyPoint& p) {
-    if (p.body != kGround) result_.bodies[p.body].push_back(p.s);
-  }
-
-  const Scene& scene_;
-  const SceneFacts facts_;
-  std::map<std::string, std::size_t> numbers_;
-  std::set<std::string> directions_;  // named by joints
-  Sketch result_;
-};
-
-// Global position of a point, from a trajectory's row: t, then 13 numbers per body.
-Point3 placed(const std::vector<double>& row, const BodyPoint& p) {
-  if (p.body == kGround) return p.s;
-  const double* const b = row.data() + 1 + 13 * p.body;
-  const Eigen::Vector4d e(b[3], b[4], b[5], b[6]);
-  return Point3(b[0], b[1], b[2]) + A(e) * p.s;
-}
 
 double cross(const Point2& a, const Point2& b) { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -158,6 +69,11 @@ struct View {
   }
 };
 
+// A joint is drawn where it holds on the ground, else on its second body.
+const BodyPoint& drawn_point(const SketchedJoint& joint) {
+  return joint.on_body1.body == kGround ? joint.on_body1 : joint.on_body2;
+}
+
 struct DrawnSketch {
   const DrawnState& state;
   Sketch sketch;
@@ -176,9 +92,9 @@ std::optional<View> view_of(std::array<int, 2> plane, const std::vector<DrawnSke
   for (const auto& [state, sketch] : drawn) {
     for (std::size_t i = 0; i < sketch.bodies.size(); ++i)
       for (const Point3& s : sketch.bodies[i]) extend(state, {i, s});
-    for (const BodyPoint& joint : sketch.joints) extend(state, joint);
-    for (const auto& [from, to] : sketch.springs)
-      for (const BodyPoint& end : {from, to}) extend(state, end);
+    for (const SketchedJoint& joint : sketch.joints) extend(state, drawn_point(joint));
+    for (const SketchedSpring& spring : sketch.springs)
+      for (const BodyPoint& end : {spring.from, spring.to}) extend(state, end);
   }
   const double width = std::max(box.sizes().x(), 1e-12), height = std::max(box.sizes().y(), 1e-12);
   view.scale = std::min((kWidth - 2 * kMargin) / width, (kLargestHeight - 2 * kMargin - kTitle) / height);
@@ -213,9 +129,9 @@ std::string zigzag(const Point2& from, const Point2& to) {
 void draw_state(const DrawnSketch& drawn, const View& view, bool last, std::string& svg) {
   const auto& [state, sketch] = drawn;
   svg += last ? "<g>\n" : "<g class=\"earlier\">\n";
-  for (const auto& [from, to] : sketch.springs) {
+  for (const SketchedSpring& spring : sketch.springs) {
     svg += fmt::format("<path class=\"spring\" d=\"{}\"/>\n",
-                       zigzag(view(placed(state.row, from)), view(placed(state.row, to))));
+                       zigzag(view(placed(state.row, spring.from)), view(placed(state.row, spring.to))));
   }
   for (std::size_t i = 0; i < sketch.bodies.size(); ++i) {
     std::vector<Point2> pixels;
@@ -229,9 +145,10 @@ void draw_state(const DrawnSketch& drawn, const View& view, bool last, std::stri
       svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", middle.x() + 6, middle.y() - 6,
                          html_escaped(state.scene.bodies[i].name));
   }
-  for (const BodyPoint& joint : sketch.joints) {
-    const Point2 p = view(placed(state.row, joint));
-    if (joint.body == kGround)
+  for (const SketchedJoint& joint : sketch.joints) {
+    const BodyPoint at = drawn_point(joint);
+    const Point2 p = view(placed(state.row, at));
+    if (at.body == kGround)
       svg += fmt::format("<path class=\"ground\" d=\"M{0:.1f} {1:.1f}l-7 12h14Z\"/>\n", p.x(), p.y());
     svg += fmt::format("<circle class=\"joint\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\"/>\n", p.x(), p.y());
   }
@@ -252,7 +169,7 @@ void draw_scale(const View& view, std::string& svg) {
 std::array<int, 2> plane_of_motion(const Scene& scene, const Trajectory& trajectory) {
   constexpr std::size_t kInstants = 50;
   constexpr double kStandstill = 1e-6;  // of the spread: motion below is none
-  const Sketch sketch = SketchMaker(scene).sketch();
+  const Sketch sketch = sketch_of(scene);
   Eigen::AlignedBox3d all;
   Point3 motion = Point3::Zero();  // largest way of a point along each axis
   const std::size_t stride = std::max<std::size_t>(1, trajectory.rows.size() / kInstants);
@@ -280,7 +197,7 @@ std::string mechanism_drawing(const std::string& title, std::array<int, 2> plane
                               const std::vector<DrawnState>& states) {
   if (states.empty()) return {};
   std::vector<DrawnSketch> drawn;
-  for (const DrawnState& state : states) drawn.push_back({state, SketchMaker(state.scene).sketch()});
+  for (const DrawnState& state : states) drawn.push_back({state, sketch_of(state.scene)});
   const std::optional<View> found = view_of(plane, drawn);
   if (!found) return {};
   const View& view = *found;

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/scene/type_table.hpp"
+#include "app/report/sensor_unit.hpp"
 
 namespace mbsopt {
 namespace {
@@ -27,7 +27,7 @@ std::vector<SensorGroup> sensor_groups(const Scene& scene) {
   std::vector<SensorGroup> groups;
   for (std::size_t i = 0; i < scene.sensors.size(); ++i) {
     const Sensor& sensor = scene.sensors[i];
-    const std::string label = fmt::format("{} [{}]", sensor.quantity, unit_of(sensor));
+    const std::string label = fmt::format("{} [{}]", sensor.quantity, unit_in(scene, sensor));
     auto group = std::find_if(groups.rbegin(), groups.rend(), [&](const SensorGroup& g) { return g.first == label; });
     if (group == groups.rend() || group->second.size() == kMostSeries) {
       groups.push_back({label, {}});
@@ -81,7 +81,8 @@ std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& traject
   return plots;
 }
 
-std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& before, const Trajectory& after) {
+std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& before, const Trajectory& after,
+                                   const SensorLimits& limits) {
   std::vector<LinePlot> plots;
   for (const SensorGroup& group : groups_of(scene, before)) {
     for (const std::size_t index : group.second) {
@@ -89,6 +90,8 @@ std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& before,
       LinePlot plot{.title = before.columns[index], .x_label = "t [s]", .y_label = group.first};
       add_series(plot, alone, before, ", before", Mark::dashed);
       add_series(plot, alone, after, ", after", Mark::line);
+      for (const auto& [sensor, limit] : limits)
+        if (sensor == before.columns[index]) plot.limits.push_back(limit);
       plots.push_back(std::move(plot));
     }
   }

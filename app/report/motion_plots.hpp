@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app/report/line_plot.hpp"
@@ -10,7 +11,10 @@
 namespace mbsopt {
 
 std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& trajectory);
+// Limits of sensors over the whole run, by the names of the sensors.
+using SensorLimits = std::vector<std::pair<std::string, PlotLimit>>;
 // The same plots with a second run dashed: before (dashed) and after.
-std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& before, const Trajectory& after);
+std::vector<LinePlot> motion_plots(const Scene& scene, const Trajectory& before, const Trajectory& after,
+                                   const SensorLimits& limits = {});
 
 }  // namespace mbsopt

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "app/report/line_plot.hpp"
 #include "app/run/energy_balance.hpp"
@@ -12,6 +13,8 @@
 namespace mbsopt {
 namespace {
 
+constexpr std::size_t kMostCurves = 16;  // in one plot: each colour twice
+
 // Rows "name, value" for the entries of an object that the list names.
 struct Entry {
   const char* key;
@@ -20,9 +23,9 @@ struct Entry {
 };
 
 void add_entries(HtmlPage& page, const Json& object, std::initializer_list<Entry> entries) {
-  std::vector<std::vector<std::string>> rows;
+  std::vector<TableRow> rows;
   for (const Entry& entry : entries) {
-    if (object.contains(entry.key)) rows.push_back({entry.label, cell(object.at(entry.key), entry.digits)});
+    if (object.contains(entry.key)) rows.push_back({entry.label, number_cell(object.at(entry.key), entry.digits)});
   }
   page.table({"", ""}, rows);
 }
@@ -40,6 +43,21 @@ std::string cell(const Json& value, int digits) {
   return text.empty() ? "none" : text;
 }
 
+TableCell number_cell(const Json& value, int digits) {
+  if (!value.is_number_float() || !std::isfinite(value.get<double>())) return cell(value, digits);
+  return {significant(value.get<double>(), digits), fmt::format("{}", value.get<double>())};
+}
+
+TableCell rounded_cell(const Json& value, const Json& error) {
+  constexpr int kMostDigits = 12;
+  if (!value.is_number() || !error.is_number() || !(error.get<double>() > 0)) return number_cell(value);
+  const double v = std::abs(value.get<double>()), e = error.get<double>();
+  if (!std::isfinite(e) || !(v > 0)) return number_cell(value);
+  // Two digits of the error remain.
+  const double digits = std::floor(std::log10(v)) - std::floor(std::log10(e)) + 2;
+  return number_cell(value, static_cast<int>(std::clamp(digits, 2.0, static_cast<double>(kMostDigits))));
+}
+
 std::string report_title(const Json& result) {
   return result.at("problem").get<std::string>() + ": " + result.at("command").get<std::string>();
 }
@@ -55,7 +73,7 @@ void add_status(HtmlPage& page, const Json& result) {
   }
   if (result.contains("accuracy"))
     page.paragraph("Accuracy: " + result.at("accuracy").at("in_words").get<std::string>());
-  for (const Json& warning : result.at("warnings")) page.paragraph("Warning: " + warning.get<std::string>());
+  for (const Json& warning : result.at("warnings")) page.warning(warning.get<std::string>());
 }
 
 void add_model(HtmlPage& page, const Json& result) {
@@ -95,18 +113,18 @@ bool has_true_values(const Json& result) {
 void add_objectives(HtmlPage& page, const Json& result) {
   if (!result.contains("objectives") || result.at("objectives").empty()) return;
   page.heading("Objectives");
-  std::vector<std::vector<std::string>> rows;
+  std::vector<TableRow> rows;
   std::vector<std::string> header{"objective", "value"};
   const bool any_smooth = has_true_values(result);
   if (any_smooth) header.push_back("true extreme");
   for (const auto& [name, objective] : result.at("objectives").items()) {
-    rows.push_back({name, cell(objective.at("value"))});
-    if (any_smooth) rows.back().push_back(cell(objective.value("true_value", Json())));
+    rows.push_back({name, number_cell(objective.at("value"))});
+    if (any_smooth) rows.back().push_back(number_cell(objective.value("true_value", Json())));
   }
   page.table(header, rows);
 }
 
-void add_convergence(HtmlPage& page, const Trajectory& history) {
+void add_convergence(HtmlPage& page, const Trajectory& history, const Json& parameters) {
   if (history.rows.size() < 2) return;
   page.heading("Convergence");
   const auto column = [&](std::size_t index) {
@@ -124,6 +142,27 @@ void add_convergence(HtmlPage& page, const Trajectory& history) {
     plot.series.push_back({name, column(0), values, Mark::line});
     page.plot(plot);
   }
+  // Between bounds where there are two, else relative to the start.
+  LinePlot bounded{.title = "Parameters between their bounds",
+                   .x_label = "iteration",
+                   .y_label = "(value - lower)/(upper - lower) [-]",
+                   .whole_x = true,
+                   .limits = {{"lower bound", 0, false}, {"upper bound", 1, true}}};
+  LinePlot free{.title = "Parameters", .x_label = "iteration", .y_label = "value/initial value [-]", .whole_x = true};
+  for (const auto& [name, p] : parameters.items()) {
+    const auto found = std::find(history.columns.begin(), history.columns.end(), name);
+    if (found == history.columns.end()) continue;
+    std::vector<double> values = column(static_cast<std::size_t>(found - history.columns.begin()));
+    const Json lower = p.value("lower", Json()), upper = p.value("upper", Json());
+    const bool between = lower.is_number() && upper.is_number();
+    const double origin = between ? lower.get<double>() : 0;
+    const double width = between ? upper.get<double>() - origin : p.at("initial").get<double>();
+    if (width == 0 || !std::isfinite(width)) continue;
+    for (double& value : values) value = (value - origin) / width;
+    (between ? bounded : free).series.push_back({name, column(0), values, Mark::line});
+  }
+  for (const LinePlot& plot : {bounded, free})
+    if (!plot.series.empty() && plot.series.size() <= kMostCurves) page.plot(plot);
 }
 
 void add_multistart(HtmlPage& page, const Json& result) {
@@ -135,15 +174,16 @@ void add_multistart(HtmlPage& page, const Json& result) {
                              multistart.at("at_the_best_optimum").get<long>()));
   LinePlot plot{.title = "Waterfall", .x_label = "rank", .y_label = "objective", .whole_x = true};
   PlotSeries& series = plot.series.emplace_back(PlotSeries{"objective", {}, {}, Mark::points});
-  std::vector<std::vector<std::string>> rows;
+  std::vector<TableRow> rows;
   for (const Json& record : multistart.at("waterfall")) {
     const Json objective = record.value("objective", Json());
     if (objective.is_number()) {
       series.x.push_back(static_cast<double>(series.x.size() + 1));
       series.y.push_back(objective.get<double>());
     }
-    rows.push_back({cell(record.at("start")), cell(objective), cell(record.value("infeasibility", Json())),
-                    cell(record.value("optimality", Json())), cell(record.at("message"))});
+    rows.push_back({cell(record.at("start")), number_cell(objective),
+                    number_cell(record.value("infeasibility", Json()), 2),
+                    number_cell(record.value("optimality", Json()), 2), cell(record.at("message"))});
   }
   plot.logarithmic_y =
       !series.y.empty() && std::all_of(series.y.begin(), series.y.end(), [](double y) { return y > 0; });
@@ -151,12 +191,19 @@ void add_multistart(HtmlPage& page, const Json& result) {
   page.table({"start", "objective", "infeasibility", "optimality", "outcome"}, rows);
 }
 
+void add_motion(HtmlPage& page, std::array<int, 2> plane, const std::vector<MovingState>& states,
+                const std::string& stills) {
+  const std::string motion = motion_scene(page.arrays(), plane, states);
+  motion.empty() ? page.drawing(stills) : page.motion(motion, stills);
+}
+
 void add_provenance(HtmlPage& page, const Json& result) {
   page.heading("Where this comes from");
   const Json& origin = result.at("provenance");
-  std::vector<std::vector<std::string>> rows{{"command", cell(origin.at("command_line"))},
-                                             {"sha256 of the problem file", cell(origin.at("input_sha256"))},
-                                             {"mbsopt", cell(result.at("version"))}};
+  page.paragraph("The command that repeats this run:");
+  page.code(cell(origin.at("command_line")));
+  std::vector<TableRow> rows{{"sha256 of the problem file", cell(origin.at("input_sha256"))},
+                             {"mbsopt", cell(result.at("version"))}};
   for (const auto& [name, version] : origin.at("libraries").items()) rows.push_back({name, cell(version)});
   page.table({"", ""}, rows);
 }

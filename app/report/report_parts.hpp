@@ -1,8 +1,13 @@
 // The sections that reports of several commands share.
 #pragma once
 
+#include <array>
+#include <string>
+#include <vector>
+
 #include "app/files/result_json.hpp"
 #include "app/report/html_page.hpp"
+#include "app/report/motion_scene.hpp"
 #include "app/results/trajectory_csv.hpp"
 
 namespace mbsopt {
@@ -14,9 +19,17 @@ void add_simulation(HtmlPage& page, const Scene& scene, const Json& result);  //
 void add_objectives(HtmlPage& page, const Json& result);                      // name and value
 // Whether any objective is a smooth maximum or minimum, with the true one beside it.
 bool has_true_values(const Json& result);
-void add_convergence(HtmlPage& page, const Trajectory& history);  // objective over iterations
-void add_multistart(HtmlPage& page, const Json& result);          // the waterfall, where there is one
+// Objective, infeasibility and parameters over iterations; parameters: as in result.json, by the names of columns.
+void add_convergence(HtmlPage& page, const Trajectory& history, const Json& parameters);
+void add_multistart(HtmlPage& page, const Json& result);  // the waterfall, where there is one
+// A mechanism that moves, over its drawings at start and end.
+void add_motion(HtmlPage& page, std::array<int, 2> plane, const std::vector<MovingState>& states,
+                const std::string& stills);
 void add_provenance(HtmlPage& page, const Json& result);
+// A rounded number that shows all its digits under the pointer; a word where it is none.
+TableCell number_cell(const Json& value, int digits = 6);
+// A value with the digits that its standard error leaves: 20.13 for 20.1273 +- 0.05.
+TableCell rounded_cell(const Json& value, const Json& error);
 // A number, a word, an interval, "-" where there is none.
 std::string cell(const Json& value, int digits = 7);
 

@@ -6,26 +6,34 @@
 #include <vector>
 
 #include "app/files/result_json.hpp"
+#include "app/report/motion_plots.hpp"
+#include "app/report/motion_scene.hpp"
 #include "app/results/trajectory_csv.hpp"
 
 namespace mbsopt {
 
-std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory);
+// efforts: t, then the force or torque of each drive of the scene, by name; of kinematics.
+std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory,
+                              const Trajectory& efforts = {});
 
 // state: t and the bodies' part of a row of trajectory.csv; shapes: the same, displaced along each mode.
 std::string linearisation_report(const Scene& scene, const Json& result, const std::vector<double>& state,
                                  const std::vector<std::vector<double>>& shapes);
 
+std::string gradient_report(const Scene& scene, const Json& result);
+std::string check_report(const Scene& scene, const Json& result);
+
 // rho: the designed parameters; history: columns and rows of history.csv (iteration, objective, infeasibility, ...).
 std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const Json& result, const Trajectory& history,
-                          const Trajectory& before, const Trajectory& after);
+                          const Trajectory& before, const Trajectory& after, const SensorLimits& limits = {});
 
 // The measurements of one channel of one experiment, and the fitted model at the same times.
 struct FitPlot {
   std::string experiment, channel, unit;
   std::vector<double> times, measured, model, residual;  // residual: weighted, (measured - model)/sigma
 };
+// motion: of the first experiment that is fitted.
 std::string identification_report(const Scene& scene, const Json& result, const Trajectory& history,
-                                  const std::vector<FitPlot>& fits);
+                                  const std::vector<FitPlot>& fits, const std::vector<MovingState>& motion = {});
 
 }  // namespace mbsopt

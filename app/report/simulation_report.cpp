@@ -1,21 +1,83 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "app/report/mechanism_drawing.hpp"
 #include "app/report/motion_plots.hpp"
 #include "app/report/report_parts.hpp"
 #include "app/report/run_report.hpp"
+#include "app/report/sensor_unit.hpp"
+#include "core/expression/counted.hpp"
 
 namespace mbsopt {
+namespace {
 
-std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory) {
+// "5 s of motion in 312 steps; constraints hold within 2.1e-11; track = 1.234."
+void add_motion_verdict(HtmlPage& page, const Json& result, const Trajectory& trajectory) {
+  if (trajectory.rows.empty() || !result.contains("simulation")) return;
+  const Json& simulation = result.at("simulation");
+  std::string words = fmt::format("{:.6g} s of motion in {}; the constraints hold within {}",
+                                  trajectory.rows.back().front() - trajectory.rows.front().front(),
+                                  counted(simulation.at("steps").get<long>(), "step"),
+                                  cell(simulation.at("max_position_violation"), 2));
+  constexpr std::size_t kMost = 3;  // objectives in a sentence
+  const Json objectives = result.value("objectives", Json::object());
+  if (objectives.size() <= kMost)
+    for (const auto& [name, objective] : objectives.items())
+      words += fmt::format("; {} = {}", name, cell(objective.at("value"), 5));
+  page.verdict(words + ".");
+}
+
+// Least and largest value of each sensor, and when.
+void add_extremes(HtmlPage& page, const Scene& scene, const Trajectory& trajectory) {
+  if (scene.sensors.empty() || trajectory.rows.empty()) return;
+  std::vector<TableRow> rows;
+  const std::size_t first = 1 + 13 * scene.bodies.size();
+  for (std::size_t i = 0; i < scene.sensors.size(); ++i) {
+    const auto less = [&](const auto& a, const auto& b) { return a[first + i] < b[first + i]; };
+    const auto [low, high] = std::minmax_element(trajectory.rows.begin(), trajectory.rows.end(), less);
+    rows.push_back({scene.sensors[i].name, unit_in(scene, scene.sensors[i]), number_cell((*low)[first + i], 5),
+                    number_cell(low->front(), 4), number_cell((*high)[first + i], 5), number_cell(high->front(), 4),
+                    number_cell(trajectory.rows.back()[first + i], 5)});
+  }
+  page.heading("Sensors");
+  page.table({"sensor", "unit", "least", "at t [s]", "largest", "at t [s]", "at the end"}, rows);
+}
+
+void add_efforts(HtmlPage& page, const Scene& scene, const Trajectory& efforts) {
+  if (efforts.rows.empty()) return;
+  std::vector<double> t;
+  for (const auto& row : efforts.rows) t.push_back(row.front());
+  for (std::size_t k = 1; k < efforts.columns.size(); ++k) {
+    const auto drive = std::ranges::find(scene.drives, efforts.columns[k], &Drive::name);
+    const std::string unit = drive == scene.drives.end() ? "N or N m" : unit_of_effort(*drive);
+    LinePlot plot{.title = (unit == "N" ? "Force of " : "Torque of ") + efforts.columns[k],
+                  .x_label = "t [s]",
+                  .y_label = fmt::format("{} [{}]", unit == "N" ? "force" : "torque", unit)};
+    PlotSeries& series = plot.series.emplace_back(PlotSeries{efforts.columns[k], t, {}, Mark::line});
+    for (const auto& row : efforts.rows) series.y.push_back(row[k]);
+    page.plot(plot);
+  }
+}
+
+}  // namespace
+
+std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory,
+                              const Trajectory& efforts) {
   HtmlPage page(report_title(result));
+  add_motion_verdict(page, result, trajectory);
   add_status(page, result);
   add_objectives(page, result);
   page.heading("Motion");
   if (!trajectory.rows.empty()) {
-    page.drawing(
-        mechanism_drawing("The mechanism at start and end", plane_of_motion(scene, trajectory),
-                          {{"start", scene, trajectory.rows.front()}, {"end", scene, trajectory.rows.back()}}));
+    const std::array<int, 2> plane = plane_of_motion(scene, trajectory);
+    add_motion(page, plane, {{scene.name, scene, trajectory}},
+               mechanism_drawing("The mechanism at start and end", plane,
+                                 {{"start", scene, trajectory.rows.front()}, {"end", scene, trajectory.rows.back()}}));
   }
   for (const LinePlot& plot : motion_plots(scene, trajectory)) page.plot(plot);
+  add_efforts(page, scene, efforts);
+  add_extremes(page, scene, trajectory);
   add_simulation(page, scene, result);
   add_model(page, result);
   add_provenance(page, result);

@@ -1,0 +1,108 @@
+#include "app/report/mechanism_sketch.hpp"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "core/body/euler_parameters.hpp"
+#include "core/scene/scene_facts.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Vector3d;
+
+class SketchMaker {
+ public:
+  explicit SketchMaker(const Scene& scene) : scene_(scene), facts_(scene) {
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i) numbers_.emplace(scene.bodies[i].name, i);
+    for (const Joint& joint : scene.joints) {
+      for (const auto* field : {&joint.axis1, &joint.axis2, &joint.normal1, &joint.normal2}) {
+        const std::string* name = *field ? std::get_if<std::string>(&**field) : nullptr;
+        if (name) directions_.insert(*name);
+      }
+    }
+  }
+
+  Sketch sketch() {
+    result_.bodies.resize(scene_.bodies.size());
+    for (const Joint& joint : scene_.joints) add_joint(joint);
+    for (const Force& force : scene_.forces)
+      if (const auto* tsda = std::get_if<Tsda>(&force.kind)) add_spring(*tsda);
+    for (const Sensor& sensor : scene_.sensors) add_points_of(sensor);
+    for (std::size_t i = 0; i < scene_.bodies.size(); ++i) add_own_points(i);
+    return std::move(result_);
+  }
+
+ private:
+  BodyPoint point(const std::string& body, const PointField& field) const {
+    const auto s = facts_.value(field, body);
+    const auto number = numbers_.find(body);
+    return {number == numbers_.end() ? kGround : number->second,
+            s ? Vector3d((*s)[0], (*s)[1], (*s)[2]) : Vector3d(Vector3d::Zero())};
+  }
+
+  void add_joint(const Joint& joint) {
+    const BodyPoint p1 = point(joint.body1, joint.point1), p2 = point(joint.body2, joint.point2);
+    add(p1), add(p2);
+    std::optional<Vector3d> axis;
+    if (joint.axis1) axis = point(joint.body1, *joint.axis1).s;
+    if (!ties_joints(joint)) result_.joints.push_back({joint.type, p1, p2, axis});
+  }
+
+  void add_spring(const Tsda& tsda) {
+    const BodyPoint p1 = point(tsda.body1, tsda.point1), p2 = point(tsda.body2, tsda.point2);
+    add(p1), add(p2);
+    const auto acts = [&](const Field& coefficient) { return facts_.value(coefficient).value_or(1) != 0; };
+    result_.springs.push_back({p1, p2, tsda.law || acts(tsda.stiffness), acts(tsda.damping)});
+  }
+
+  void add_points_of(const Sensor& sensor) {
+    if (!sensor.body.empty()) add(point(sensor.body, sensor.point));
+    if (!sensor.body1.empty() && !sensor.body2.empty())
+      add(point(sensor.body1, sensor.point1)), add(point(sensor.body2, sensor.point2));
+    if (sensor.quantity != "position") return;
+    const BodyPoint p = point(sensor.body, sensor.point);
+    const auto same = [&](const TracedPoint& t) { return t.point.body == p.body && t.point.s == p.s; };
+    if (p.body == kGround || std::ranges::any_of(result_.traces, same)) return;
+    const std::string* const name = std::get_if<std::string>(&sensor.point);
+    result_.traces.push_back({name ? sensor.body + "." + *name : sensor.name, p});
+  }
+
+  // Its named points, but for those that are directions of joints; a body without any gets its centre of mass.
+  void add_own_points(std::size_t index) {
+    const Body& body = scene_.bodies[index];
+    for (const auto& [name, coordinates] : body.points)
+      if (!directions_.contains(name)) add(point(body.name, coordinates));
+    for (const Shape& shape : body.shapes) {
+      const BodyPoint from = point(body.name, shape.from), to = point(body.name, shape.to);
+      add(from), add(to);
+      result_.shapes.push_back({index, shape.type, from.s, to.s, shape.radius});
+    }
+    if (result_.bodies[index].size() < 2) add(point(body.name, body.com));
+  }
+
+  void add(const BodyPoint& p) {
+    if (p.body != kGround) result_.bodies[p.body].push_back(p.s);
+  }
+
+  const Scene& scene_;
+  const SceneFacts facts_;
+  std::map<std::string, std::size_t> numbers_;
+  std::set<std::string> directions_;  // named by joints
+  Sketch result_;
+};
+
+}  // namespace
+
+Sketch sketch_of(const Scene& scene) { return SketchMaker(scene).sketch(); }
+
+Vector3d placed(const std::vector<double>& row, const BodyPoint& p) {
+  if (p.body == kGround) return p.s;
+  const double* const b = row.data() + 1 + 13 * p.body;
+  const Eigen::Vector4d e(b[3], b[4], b[5], b[6]);
+  return Vector3d(b[0], b[1], b[2]) + A(e) * p.s;
+}
+
+}  // namespace mbsopt

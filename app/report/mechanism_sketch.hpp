@@ -1,0 +1,60 @@
+// The parts of a mechanism that drawings show: points of its bodies, joints, springs and dampers, points of sensors.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/scene/scene.hpp"
+
+namespace mbsopt {
+
+inline constexpr std::size_t kGround = static_cast<std::size_t>(-1);
+
+// A point of a body, in that body's frame.
+struct BodyPoint {
+  std::size_t body;  // its number, or kGround
+  Eigen::Vector3d s;
+};
+
+struct SketchedJoint {
+  std::string type;
+  BodyPoint on_body1, on_body2;
+  std::optional<Eigen::Vector3d> axis;  // in body 1
+};
+
+struct SketchedSpring {
+  BodyPoint from, to;
+  bool spring, damper;  // which of the two acts
+};
+
+// The point of a position sensor, whose path is worth a look.
+struct TracedPoint {
+  std::string name;
+  BodyPoint point;
+};
+
+struct SketchedShape {
+  std::size_t body;
+  std::string type;
+  Eigen::Vector3d from, to;
+  double radius;
+};
+
+struct Sketch {
+  std::vector<std::vector<Eigen::Vector3d>> bodies;  // points of each
+  std::vector<SketchedJoint> joints;
+  std::vector<SketchedSpring> springs;
+  std::vector<TracedPoint> traces;
+  std::vector<SketchedShape> shapes;
+};
+
+// At the values that the scene's parameters have.
+Sketch sketch_of(const Scene& scene);
+
+// Global position of a point, from a trajectory's row: t, then 13 numbers per body.
+Eigen::Vector3d placed(const std::vector<double>& row, const BodyPoint& p);
+
+}  // namespace mbsopt

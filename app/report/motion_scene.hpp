@@ -1,0 +1,28 @@
+// A mechanism over time, as JSON for the viewer in report.js: poses of its bodies, points, joints, springs, paths.
+//
+//   page.motion(motion_scene(page.arrays(), plane, {{"before", scene, before, true}, {"after", designed, after}}),
+//   stills);
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "app/report/page_arrays.hpp"
+#include "app/results/trajectory_csv.hpp"
+#include "core/scene/scene.hpp"
+
+namespace mbsopt {
+
+struct MovingState {
+  std::string name;
+  const Scene& scene;  // its points, at the values that its parameters have
+  const Trajectory& trajectory;
+  bool ghost = false;  // drawn faintly behind the others
+};
+
+// plane: in which the mechanism is shown first if it moves in no other direction. Empty if a state has less than two
+// rows or a number in it is not finite.
+std::string motion_scene(PageArrays& arrays, std::array<int, 2> plane, const std::vector<MovingState>& states);
+
+}  // namespace mbsopt

@@ -1,0 +1,10 @@
+// The style and the script of every report: report.css and report.js beside this file, embedded by CMake.
+#pragma once
+
+#include <string_view>
+
+namespace mbsopt {
+
+extern const std::string_view kReportStyle, kReportScript;
+
+}  // namespace mbsopt

@@ -1,0 +1,33 @@
+// Rows of bars along one axis, as SVG text: intervals of estimates, variables between their bounds, sizes of effects.
+//
+//   RowPlot plot{.title = "Effect of 1 %", .x_label = "p dpsi/dp / psi [-]"};
+//   plot.rows.push_back({.name = "k", .low = 0, .high = 0.3, .words = "0.3"});
+//   page.drawing(to_svg(plot));
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace mbsopt {
+
+struct PlotRow {
+  std::string name;
+  double low = 0, high = 0;         // the bar
+  std::optional<double> ring = {};  // where something started
+  std::optional<double> dot = {};   // where it ended
+  std::string words = {};           // at the right, with the numbers
+};
+
+struct RowPlot {
+  std::string title, x_label;
+  std::vector<PlotRow> rows = {};
+  std::optional<std::pair<double, double>> range = {};  // else that of the bars; what is outside ends at the edge
+  bool track = false;                                   // a grey bar over the whole range, beneath
+};
+
+// Empty without rows.
+std::string to_svg(const RowPlot& plot);
+
+}  // namespace mbsopt

@@ -1,0 +1,15 @@
+// The unit of a sensor in its scene, which says whether a force or a drive acts along a line or about an axis.
+#pragma once
+
+#include <string>
+
+#include "core/scene/scene.hpp"
+
+namespace mbsopt {
+
+std::string unit_in(const Scene& scene, const Sensor& sensor);
+
+// Of the force or torque along a drive's coordinate.
+std::string unit_of_effort(const Drive& drive);
+
+}  // namespace mbsopt

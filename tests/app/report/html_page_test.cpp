@@ -1,0 +1,75 @@
+#include "app/report/html_page.hpp"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "app/report/line_plot.hpp"
+#include "app/report/row_plot.hpp"
+
+using namespace mbsopt;
+using Catch::Contains;
+
+namespace {
+
+// The block of JSON that the page's script reads.
+nlohmann::json data_of(const std::string& page) {
+  const std::string before = "<script type=\"application/json\" id=\"data\">";
+  const std::size_t begin = page.find(before) + before.size();
+  return nlohmann::json::parse(page.substr(begin, page.find("</script>", begin) - begin));
+}
+
+LinePlot line(const std::string& name, const std::vector<double>& y) {
+  LinePlot plot{.title = name, .x_label = "t [s]", .y_label = "y [m]"};
+  plot.series.push_back({name, {0, 0.5, 1}, y, Mark::line});
+  return plot;
+}
+
+}  // namespace
+
+TEST_CASE("a page holds the data of its plots, each array once", "[report]") {
+  HtmlPage page("p");
+  page.plot(line("</script><b>", {1, 2, std::numeric_limits<double>::quiet_NaN()}));
+  page.plot(line("second", {3, 2, 1}));
+  const nlohmann::json data = data_of(page.text());
+  CHECK(data.at("arrays").size() == 3);
+  const auto& first = data.at("plots")[0].at("series")[0];
+  const auto& second = data.at("plots")[1].at("series")[0];
+  CHECK(first.at("name") == "</script><b>");
+  CHECK(first.at("x") == second.at("x"));
+  CHECK(data.at("arrays")[first.at("y").get<std::size_t>()] == nlohmann::json({1, 2, nullptr}));
+}
+
+TEST_CASE("a cell shows rounded numbers and holds all their digits", "[report]") {
+  HtmlPage page("p");
+  page.table({"name", "value"}, {{"a", TableCell("1.23", "1.2345678901234567")}, {"b", "2"}});
+  CHECK_THAT(page.text(), Contains("<td title=\"1.2345678901234567\">1.23</td>") && Contains("<td>2</td>"));
+}
+
+TEST_CASE("headings make the contents of the page", "[report]") {
+  HtmlPage page("p");
+  page.heading("a < b");
+  CHECK_THAT(page.text(), Contains("<a href=\"#part1\">a &lt; b</a>") && Contains("<h2 id=\"part1\">a &lt; b</h2>"));
+}
+
+TEST_CASE("what of a line lies beyond a limit is shaded", "[report]") {
+  LinePlot plot = line("y", {0, 2, 0});
+  plot.limits.push_back({"at most", 1, true});
+  CHECK_THAT(to_svg(plot), Contains("class=\"beyond\"") && Contains("class=\"limit\"") && Contains(">at most</text>"));
+  plot.limits = {{"at most", 2.5, true}};
+  CHECK_THAT(to_svg(plot), !Contains("class=\"beyond\"") && Contains("class=\"limit\""));
+  plot.limits = {{"at least", 1, false}};
+  CHECK_THAT(to_svg(plot), Contains("class=\"beyond\""));
+  plot.limits = {{"far away", 1000, true}};  // would flatten the line
+  CHECK_THAT(to_svg(plot), !Contains("class=\"limit\""));
+}
+
+TEST_CASE("bars of a row plot begin at zero and end at their values, within its range", "[report]") {
+  RowPlot plot{.title = "t", .x_label = "x [-]", .range = std::pair(-1.0, 1.0)};
+  CHECK(to_svg(plot).empty());
+  plot.rows.push_back({.name = "k", .low = 0, .high = 0.5, .words = "0.5"});
+  plot.rows.push_back({.name = "far", .low = 0, .high = 5, .words = "5"});
+  // 420 px from -1 to 1, from 150 px on.
+  CHECK_THAT(to_svg(plot), Contains("M360.0 47.0H465.0") && Contains("M360.0 73.0H570.0"));
+}

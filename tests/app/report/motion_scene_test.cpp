@@ -1,0 +1,84 @@
+#include "app/report/motion_scene.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "app/report/sensor_unit.hpp"
+#include "tests/core/mechanism/small_scenes.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+
+namespace {
+
+// The pendulum's bar turned about z.
+std::vector<double> bar_turned(double t, double angle) {
+  return {t, 0, 0, 0, std::cos(angle / 2), 0, 0, std::sin(angle / 2), 0, 0, 0, 0, 0, 1};
+}
+
+}  // namespace
+
+TEST_CASE("a motion holds what moves as arrays and what rests as numbers", "[report]") {
+  const Scene scene = pendulum();
+  const Trajectory swing{{}, {bar_turned(0, 0), bar_turned(0.5, 0.2), bar_turned(1, 0.4)}};
+  PageArrays arrays;
+  const auto motion = nlohmann::json::parse(motion_scene(arrays, {0, 1}, {{"bar", scene, swing}}));
+  const auto all = nlohmann::json::parse(arrays.text());
+  CHECK(motion.at("planar") == true);
+  const auto& state = motion.at("states")[0];
+  CHECK(all[state.at("t").get<std::size_t>()] == nlohmann::json({0, 0.5, 1}));
+  const auto& row = state.at("bodies")[0].at("row");
+  CHECK(row[0] == 0);
+  REQUIRE(row[6].is_array());
+  CHECK(all[row[6][0].get<std::size_t>()][2].get<double>() == Approx(std::sin(0.2)).epsilon(1e-5));
+  CHECK(state.at("joints").size() == 1);
+  CHECK(state.at("joints")[0].at("b1") == -1);
+}
+
+TEST_CASE("a motion out of its plane is not planar, one without two rows or with infinite poses is none", "[report]") {
+  const Scene scene = pendulum();
+  PageArrays arrays;
+  Trajectory swing{{}, {bar_turned(0, 0), bar_turned(1, 0.4)}};
+  swing.rows[1][3] = 0.1;
+  CHECK(nlohmann::json::parse(motion_scene(arrays, {0, 1}, {{"bar", scene, swing}})).at("planar") == false);
+  swing.rows[1][3] = std::numeric_limits<double>::infinity();
+  CHECK(motion_scene(arrays, {0, 1}, {{"bar", scene, swing}}).empty());
+  swing.rows.pop_back();
+  CHECK(motion_scene(arrays, {0, 1}, {{"bar", scene, swing}}).empty());
+}
+
+TEST_CASE("a long motion is thinned, keeps its end, and says so", "[report]") {
+  const Scene scene = pendulum();
+  Trajectory swing;
+  for (int k = 0; k <= 100'000; ++k) swing.rows.push_back(bar_turned(k, k * 1e-4));
+  PageArrays arrays;
+  const std::string text = motion_scene(arrays, {0, 1}, {{"bar", scene, swing}});
+  const auto motion = nlohmann::json::parse(text);
+  const auto t = nlohmann::json::parse(arrays.text())[motion.at("states")[0].at("t").get<std::size_t>()];
+  CHECK(t.size() < 3000);
+  CHECK(t.back() == 100'000);
+  CHECK(motion.at("note") == "The motion shows every 36th of 100001 rows of trajectory.csv.");
+}
+
+TEST_CASE("a force has the unit of what it acts along", "[report]") {
+  Scene scene;
+  Drive slide, turn;
+  slide.name = "slide", slide.type = "displacement", turn.name = "turn", turn.type = "angle";
+  scene.drives = {slide, turn};
+  scene.forces = {{"spring", Tsda{}}, {"bar", TorsionBar{}}};
+  Sensor sensor;
+  sensor.quantity = "drive_force";
+  sensor.drive = "slide";
+  CHECK(unit_in(scene, sensor) == "N");
+  sensor.drive = "turn";
+  CHECK(unit_in(scene, sensor) == "N m");
+  sensor.quantity = "force";
+  sensor.force = "spring";
+  CHECK(unit_in(scene, sensor) == "N");
+  sensor.force = "bar";
+  CHECK(unit_in(scene, sensor) == "N m");
+  sensor.quantity = "reaction", sensor.kind = "torque";
+  CHECK(unit_in(scene, sensor) == "N m");
+}

@@ -1,0 +1,186 @@
+#!/usr/bin/env python3
+"""Reports in headless Chromium: each opens without errors, is live, and loses nothing in print.
+
+    tests/browser/reports.py PROGRAM [--keep FOLDER]
+
+A probe is added to a copy of each report. It runs in the page, works its controls and leaves what it found in the
+document, which Chromium prints. With --keep the reports and screenshots (420 and 1300 px wide, light and dark) stay
+in the folder. Exit code 77, a skipped test for CTest, where Chromium is not installed.
+"""
+import argparse
+import json
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+PROBLEMS = pathlib.Path(__file__).resolve().parents[2] / "problems"
+# Command, problem file, whether a mechanism moves in the report.
+RUNS = [("simulate", "quarter_car/ride.json", True), ("kinematics", "four_bar/kinematics.json", True),
+        ("linearise", "quarter_car/ride.json", False), ("gradient", "five_bar/sensitivities.json", False),
+        ("check", "quarter_car/ride.json", False), ("design", "five_bar/design.json", True),
+        ("identify", "pendulum/identify.json", True)]
+WIDTHS = (420, 1300)
+
+# Runs in the page after its own script. The widths of tables in print are measured with the rules for print in force.
+PROBE = r"""
+const found = {errors: window.probe_errors, plots: 0, cells_outside: 0, overflow: 0, small: 0};
+const wait = ms => new Promise(done => setTimeout(done, ms));
+const ink = canvas => {
+  const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d", {willReadFrequently: true});
+  copy.drawImage(canvas, 0, 0);
+  const d = copy.getImageData(0, 0, canvas.width, canvas.height).data;
+  let sum = 0, hash = 0;
+  for (let i = 3; i < d.length; i += 4) if (d[i]) sum += 1, hash = (hash * 31 + i) % 1000003;
+  return [sum, hash];
+};
+(async () => {
+  await wait(200);
+  for (const plot of document.querySelectorAll("figure[data-plot]")) {
+    const svg = plot.querySelector("svg"), box = svg.querySelector(".catch").getBoundingClientRect();
+    const at = {clientX: box.x + box.width / 2, clientY: box.y + box.height / 2, bubbles: true, pointerId: 1};
+    svg.querySelector(".catch").dispatchEvent(new PointerEvent("pointermove", at));
+    if (/=/.test(plot.querySelector(".readout").textContent)) found.plots += 1;
+  }
+  found.expected_plots = document.querySelectorAll("figure[data-plot]").length;
+  const canvas = document.querySelector(".viewer canvas");
+  if (canvas) {
+    const [before, first] = ink(canvas), slider = document.querySelector(".viewer input[type=range]");
+    slider.value = 430;
+    slider.dispatchEvent(new Event("input"));
+    const [after, second] = ink(canvas);
+    found.ink = Math.min(before, after), found.moved = first != second;
+    found.cursors = document.querySelectorAll("path.cursor[d^=M]").length;
+  }
+  // A page that is wider than its window scrolls sideways.
+  found.overflow = document.documentElement.scrollWidth - document.documentElement.clientWidth;
+  if (innerWidth < 700) {
+    for (const e of document.querySelectorAll("p,td,th,a,h2,button,svg text")) {
+      const box = e.ownerSVGElement ? Math.hypot(e.getScreenCTM().a, e.getScreenCTM().b) : 1;
+      if (e.getClientRects().length && e.textContent.trim() && !e.closest("tspan") &&
+          parseFloat(getComputedStyle(e).fontSize) * box < 11.9) found.small += 1;
+    }
+  }
+  // Print: the page's rules for it, on the width of A4 with margins of 1 cm.
+  let rules = "";
+  for (const sheet of document.styleSheets)
+    for (const rule of sheet.cssRules)
+      if (rule.media && rule.media.mediaText == "print") for (const r of rule.cssRules) rules += r.cssText;
+  const style = document.createElement("style");
+  style.textContent = rules + " body { width: 718px !important }";
+  document.head.append(style);
+  for (const cell of document.querySelectorAll("td,th")) {
+    const r = cell.getBoundingClientRect();
+    if (r.right > 719 || r.left < -1 || cell.scrollWidth > cell.clientWidth + 1) found.cells_outside += 1;
+  }
+  style.remove();
+  const out = document.createElement("pre");
+  out.id = "probe", out.textContent = JSON.stringify(found);
+  document.body.append(out);
+})();
+"""
+CATCH = "window.probe_errors = []; window.onerror = (m, s, l) => { window.probe_errors.push(m + ' at ' + l); };"
+
+
+def chromium(program, url, *options):
+    with tempfile.TemporaryDirectory(prefix="mbsopt_browser_") as user:
+        return subprocess.run(
+            [program, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+             "--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars",
+             f"--user-data-dir={user}", "--enable-logging=stderr", "--virtual-time-budget=5000", *options, url],
+            capture_output=True, text=True, timeout=120)
+
+
+def framed(report, width, height, folder):
+    """A page that shows the report in a frame: a window of Chromium is at least 500 px wide."""
+    page = folder / f"frame_{width}.html"
+    page.write_text(f'<body style="margin:0"><iframe src="{report.resolve().as_uri()}" '
+                    f'style="border:0;width:{width}px;height:{height}px"></iframe>')
+    return page.resolve().as_uri()
+
+
+def probed(program, report, width, folder):
+    """What the probe found, and errors on the console."""
+    copy = folder / f"probe_{width}.html"
+    text = report.read_text()
+    # The last </body>, and the first <head>: the page's own script comes between.
+    at = text.rindex("</body>")
+    text = text[:at] + f"<script>{PROBE}</script>" + text[at:]
+    copy.write_text(text.replace("<head>", f"<head><script>{CATCH}</script>", 1))
+    if width < 500:  # the frame hands on what it found
+        frame = folder / f"probe_frame_{width}.html"
+        frame.write_text('<body style="margin:0"><script>onmessage = e => document.body.append(e.data);</script>'
+                         f'<iframe src="{copy.resolve().as_uri()}" style="border:0;width:{width}px;height:2000px"></iframe>')
+        copy.write_text(copy.read_text().replace("document.body.append(out);",
+                                                 "parent.postMessage('<pre id=probe>' + out.textContent + '</pre>', '*');"))
+        copy = frame
+    run = chromium(program, copy.resolve().as_uri(), "--dump-dom", f"--window-size={max(width, 500)},2000")
+    match = re.search(r'(?:<|&lt;)pre id="?probe"?(?:>|&gt;)(.*?)(?:<|&lt;)/pre', run.stdout, re.S)
+    console = [line for line in run.stderr.splitlines() if "CONSOLE" in line]
+    return (json.loads(match[1].replace("&quot;", '"')) if match else None), console
+
+
+def problems_of(found, console, moves, width):
+    if found is None:
+        return ["the probe did not run"] + console
+    wrong = [f"console: {line}" for line in console] + [f"error: {e}" for e in found["errors"]]
+    if found["plots"] != found["expected_plots"]:
+        wrong.append(f"{found['plots']} of {found['expected_plots']} plots show values")
+    if moves and found.get("ink", 0) < 500:
+        wrong.append("the mechanism is not drawn")
+    if moves and not found.get("moved"):
+        wrong.append("the slider does not move the mechanism")
+    if found["cells_outside"]:
+        wrong.append(f"{found['cells_outside']} cells are cut in print")
+    if found["overflow"] > 0:
+        wrong.append(f"the page is {found['overflow']} px wider than its window")
+    if found["small"]:
+        wrong.append(f"{found['small']} texts are below 12 px")
+    return [f"{width} px: {w}" for w in wrong]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("program")
+    parser.add_argument("--keep", type=pathlib.Path)
+    parser.add_argument("--only", help="one command")
+    arguments = parser.parse_args()
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if not browser:
+        print("skipped: Chromium is not installed (Debian package chromium)")
+        return 77
+    failed = False
+    with tempfile.TemporaryDirectory(prefix="mbsopt_reports_") as temporary:
+        base = arguments.keep or pathlib.Path(temporary)
+        for command, problem, moves in RUNS:
+            if arguments.only and command != arguments.only:
+                continue
+            folder = base / command
+            run = subprocess.run([arguments.program, command, str(PROBLEMS / problem), "--out", str(folder)],
+                                 capture_output=True, text=True, timeout=600)
+            report = folder / "report.html"
+            if not report.is_file():
+                print(f"{command}: no report; {run.stderr.strip()}")
+                failed = True
+                continue
+            wrong = []
+            for width in WIDTHS:
+                wrong += problems_of(*probed(browser, report, width, folder), moves, width)
+                if not arguments.keep:
+                    continue
+                for scheme, value in (("light", 1), ("dark", 0)):
+                    chromium(browser, framed(report, width, 2600, folder), f"--window-size={max(width, 500)},2600",
+                             f"--blink-settings=preferredColorScheme={value}",
+                             f"--screenshot={folder / f'{scheme}_{width}.png'}")
+            size = report.stat().st_size / 1024
+            if size > 400:
+                wrong.append(f"the report has {size:.0f} KB, more than 400")
+            print(f"{command}: {size:.0f} KB, " + ("ok" if not wrong else "; ".join(wrong)))
+            failed = failed or bool(wrong)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
