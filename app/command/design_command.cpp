@@ -32,7 +32,7 @@ void print_design(std::ostream& out, const DesignResult& design, const std::stri
                                            [](const DesignConstraint& c) { return c.true_value.has_value(); });
   std::vector<std::string> header{"objective", "before", "after"};
   if (any_smooth) header.push_back("true extreme");
-  if (!design.constraints.empty()) header.insert(header.end(), {"at least", "at most"});
+  if (!design.constraints.empty()) header.insert(header.end(), {"at least", "at most", "price"});
   TextTable objectives(header);
   const auto row = [&](const std::string& name, double before, double after, const std::optional<double>& true_value) {
     std::vector<std::string> cells{name, significant(before), significant(after)};
@@ -46,7 +46,7 @@ void print_design(std::ostream& out, const DesignResult& design, const std::stri
   const auto bound = [](const std::optional<double>& value) { return value ? significant(*value) : std::string(); };
   for (const DesignConstraint& c : design.constraints) {
     std::vector<std::string> cells = row(c.objective, c.initial, c.value, c.true_value);
-    cells.insert(cells.end(), {bound(c.lower), bound(c.upper)});
+    cells.insert(cells.end(), {bound(c.lower), bound(c.upper), c.price != 0 ? significant(c.price) : ""});
     objectives.add(cells);
   }
   out << '\n' << parameters.text() << '\n' << objectives.text();
@@ -58,6 +58,16 @@ void print_design(std::ostream& out, const DesignResult& design, const std::stri
         "optimality {:.1e}, infeasibility {:.1e} at the solution{}\n", design.optimality, design.violation,
         design.true_violation > design.violation ? fmt::format(", {:.1e} of true extremes", design.true_violation)
                                                  : "");
+  if (std::any_of(design.constraints.begin(), design.constraints.end(),
+                  [](const DesignConstraint& c) { return c.price != 0; }))
+    out << fmt::format("price: fall of '{}' per unit by which the limit is eased\n", design.objective);
+  if (design.limit_rounds > 0)
+    out << fmt::format("{} to make limits hold for true extremes\n", counted(design.limit_rounds, "further round"));
+  if (design.conflicts.empty()) return;
+  TextTable conflicts({"limit in conflict", "missed by", "price"});
+  for (const DesignConflict& c : design.conflicts)
+    conflicts.add({c.limit, c.missed > 0 ? significant(c.missed) : "", significant(c.price)});
+  out << '\n' << conflicts.text() << "price: fall of the sum of relative violations per unit by which it is eased\n";
 }
 
 void add_to_result(Json& result, const DesignResult& design) {
@@ -65,9 +75,13 @@ void add_to_result(Json& result, const DesignResult& design) {
   result["objectives"][design.objective] = objective_json(design.objective_final, design.objective_true);
   result["objectives"][design.objective]["initial"] = design.objective_initial;
   for (const DesignConstraint& c : design.constraints) {
-    result["objectives"][c.objective] = {{"value", c.value},          {"initial", c.initial},
-                                         {"lower", or_null(c.lower)}, {"upper", or_null(c.upper)},
-                                         {"violation", c.violation},  {"at_bound", bound_json(c.at_lower, c.at_upper)}};
+    result["objectives"][c.objective] = {{"value", c.value},
+                                         {"initial", c.initial},
+                                         {"lower", or_null(c.lower)},
+                                         {"upper", or_null(c.upper)},
+                                         {"violation", c.violation},
+                                         {"price", c.price},
+                                         {"at_bound", bound_json(c.at_lower, c.at_upper)}};
     if (!c.true_value) continue;
     result["objectives"][c.objective]["true_value"] = *c.true_value;
     result["objectives"][c.objective]["true_violation"] = c.true_violation;
@@ -93,6 +107,9 @@ void add_to_result(Json& result, const DesignResult& design) {
                          {"infeasibility", design.violation},
                          {"true_infeasibility", design.true_violation}};
   if (design.seed) result["optimizer"]["seed"] = *design.seed;
+  if (design.limit_rounds > 0) result["optimizer"]["limit_rounds"] = design.limit_rounds;
+  for (const DesignConflict& c : design.conflicts)
+    result["conflicts"].push_back({{"limit", c.limit}, {"missed", c.missed}, {"price", c.price}});
 }
 
 // Limits that bound the extreme of a sensor bound the sensor at all times.

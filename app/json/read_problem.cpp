@@ -11,6 +11,7 @@
 #include "app/json/source_text.hpp"
 #include "core/scene/default_integrator.hpp"
 #include "optim/objective/problem_issues.hpp"
+#include "optim/problem/bounded_means.hpp"
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/data_issues.hpp"
 #include "optim/problem/logged_columns.hpp"
@@ -137,7 +138,7 @@ void add_issue(const SceneIssue& issue, const Node& root, Findings& findings) {
 }
 
 // Errors of meaning, at the place in the file that says it. An error that follows from one in the reading
-// is left out.
+// is left out. Names the means that are bounded, once they are known to be right.
 void add_issues(Problem& problem, const Node& root, Findings& findings, std::vector<std::string>* warnings) {
   std::vector<SceneIssue> errors;
   for (SceneIssue& issue : find_issues(problem)) {
@@ -151,6 +152,7 @@ void add_issues(Problem& problem, const Node& root, Findings& findings, std::vec
   for (const SceneIssue& issue : errors) add_issue(issue, root, findings);
   check_data(problem, root, findings, warnings);
   if (findings.any()) return;
+  name_bounded_means(problem);
   for (const SceneIssue& issue : find_unused_parameters(problem)) add_issue(issue, root, findings);
   for (const SceneIssue& issue : find_idle_variables(problem))
     if (!findings.concerns(issue.path)) add_issue(issue, root, findings);

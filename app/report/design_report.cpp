@@ -67,9 +67,10 @@ void add_outcome(HtmlPage& page, const Json& result) {
   std::vector<std::vector<std::string>> rows;
   for (const auto& [name, objective] : result.at("objectives").items()) {
     rows.push_back({name, cell(objective.value("initial", Json())), cell(objective.at("value")),
-                    cell(objective.value("lower", Json())), cell(objective.value("upper", Json()))});
+                    cell(objective.value("lower", Json())), cell(objective.value("upper", Json())),
+                    cell(objective.value("price", Json()))});
   }
-  std::vector<std::string> header{"objective", "before", "after", "at least", "at most"};
+  std::vector<std::string> header{"objective", "before", "after", "at least", "at most", "price"};
   if (has_true_values(result)) {
     header.push_back("true extreme after");
     std::size_t i = 0;
@@ -77,6 +78,12 @@ void add_outcome(HtmlPage& page, const Json& result) {
       rows[i++].push_back(cell(objective.value("true_value", Json())));
   }
   page.table(header, rows);
+  if (!result.contains("conflicts")) return;
+  page.paragraph("These limits and bounds are in conflict:");
+  std::vector<std::vector<std::string>> conflicts;
+  for (const Json& c : result["conflicts"])
+    conflicts.push_back({cell(c.at("limit")), cell(c.at("missed")), cell(c.at("price"))});
+  page.table({"limit", "missed by", "price"}, conflicts);
 }
 
 void add_drawings(HtmlPage& page, const Scene& scene, const Eigen::VectorXd& rho, const Trajectory& before,

@@ -91,7 +91,7 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, int start) {
               {"status", to_string(design.status)},
               {"message", design.message},
               {"objective", evaluated ? Json(design.objective_final) : Json()},
-              {"infeasibility", design.violation},
+              {"infeasibility", design.true_violation},
               {"optimality", std::isfinite(design.optimality) ? Json(design.optimality) : Json()},
               {"iterations", design.iterations},
               {"evaluations", design.evaluations},

@@ -10,13 +10,16 @@
 #include "core/expression/did_you_mean.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 #include "optim/design/design_program.hpp"
+#include "optim/design/true_limits.hpp"
 #include "optim/differences/difference_comparison.hpp"
 #include "optim/machine/stopwatch.hpp"
 #include "optim/objective/design_issues.hpp"
 #include "optim/objective/integration_error.hpp"
+#include "optim/problem/bounded_means.hpp"
 #include "optim/problem/seed.hpp"
 #include "optim/problem/unused_parameters.hpp"
 #include "optim/problem/variable_scaling.hpp"
+#include "optim/solver/evaluated_points.hpp"
 #include "optim/solver/ipopt_solver.hpp"
 #include "optim/solver/nlopt_solver.hpp"
 #include "optim/solver/optimality.hpp"
@@ -117,62 +120,119 @@ void describe_end(const Evaluator& evaluator, const DesignProgram& program, cons
     const Eigen::Index row = static_cast<Eigen::Index>(i);
     c.value = end.c(row) * program.size(row);
     c.violation = missed(c, c.value);
-    c.at_lower = touches(c.value, c.lower, program.size(row)),
-    c.at_upper = touches(c.value, c.upper, program.size(row));
+    c.at_lower = c.lower && touches(end.c(row), program.c_lower(row), 1);
+    c.at_upper = c.upper && touches(end.c(row), program.c_upper(row), 1);
   }
 }
 
-// One more look at the solution: the final evaluation, true extremes, and how stationary it is.
-void describe_solution(Evaluator& evaluator, DesignProgram& program, const Eigen::VectorXd& x, DesignResult& result) {
+// The solution of the last round.
+struct LimitedSolution {
+  NlpResult solution;  // counts those of all rounds
+  std::vector<std::optional<double>> true_values;
+  Eigen::VectorXd slopes;  // of true values in smooth ones
+};
+
+std::string limit_text(const std::string& name, bool is_upper, double bound) {
+  return fmt::format("{} {} {:.6g}", name, is_upper ? "<=" : ">=", bound);
+}
+
+// The limits and bounds that stand against each other where no point near satisfies all limits.
+void describe_conflict(const DesignProgram& program, const VariableScaling& scaling, const Eigen::VectorXd& x,
+                       const NlpPoint& end, DesignResult& result) {
+  constexpr double kNoPrice = 1e-6;  // relative to that of a limit that is violated, 1
+  const Conflict found = conflict(program, x, end, kConstraintTolerance);
+  for (std::size_t i = 0; i < result.constraints.size(); ++i) {
+    const DesignConstraint& c = result.constraints[i];
+    const double z = found.of_constraints(static_cast<Eigen::Index>(i));
+    if (std::abs(z) <= kNoPrice) continue;
+    result.conflicts.push_back({limit_text(c.objective, z > 0, z > 0 ? *c.upper : *c.lower),
+                                std::max(c.violation, c.true_violation),
+                                std::abs(z) / program.size(static_cast<Eigen::Index>(i))});
+  }
+  const Eigen::VectorXd rho_x = scaling.rho_x(x);
+  for (std::size_t k = 0; k < result.variables.size(); ++k) {
+    const DesignVariable& v = result.variables[k];
+    const Eigen::Index row = static_cast<Eigen::Index>(k);
+    const double z = found.of_bounds(row);
+    if (std::abs(z) <= kNoPrice) continue;
+    result.conflicts.push_back(
+        {limit_text(v.name, z > 0, z > 0 ? *v.upper : *v.lower), 0, std::abs(z) / std::abs(rho_x(row))});
+  }
+  std::string words;
+  for (const DesignConflict& c : result.conflicts)
+    words +=
+        fmt::format("{}{} ({})", words.empty() ? "" : ", ", c.limit,
+                    c.missed > 0 ? fmt::format("missed by {:.3g}", c.missed) : fmt::format("price {:.3g}", c.price));
+  if (!words.empty()) result.message += "; in conflict: " + words;
+}
+
+// One more look at the solution: the final evaluation, true extremes, how stationary it is, and what limits cost.
+void describe_solution(Evaluator& evaluator, DesignProgram& program, const VariableScaling& scaling,
+                       const LimitedSolution& rounds, DesignResult& result) {
+  const Eigen::VectorXd& x = rounds.solution.x;
   result.final_evaluation = program.evaluation(result.rho);
+  result.objective_true = rounds.true_values[0];
+  result.true_violation = result.violation;
+  for (std::size_t i = 0; i < result.constraints.size(); ++i) {
+    DesignConstraint& c = result.constraints[i];
+    c.true_value = rounds.true_values[i + 1];
+    c.true_violation = missed(c, c.true_value.value_or(c.value));
+    if (evaluator.objectives()[i + 1].is_extreme() && c.true_value) c.violation = c.true_violation;
+    result.true_violation =
+        std::max(result.true_violation, c.true_violation / program.size(static_cast<Eigen::Index>(i)));
+  }
   NlpPoint end;
   end.f_x.setZero(program.variables()), end.c.setZero(program.constraints());
   end.c_x.setZero(program.constraints(), program.variables());
   program.evaluate(x, end);
-  if (end.ok) result.optimality = optimality(program, x, end);
-  const std::vector<std::optional<double>> true_values = evaluator.true_values(result.rho);
-  result.objective_true = true_values[0];
-  result.true_violation = result.violation;
+  if (!end.ok) return;
+  const Stationarity found = stationarity(program, x, end);
+  result.optimality = found.distance;
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     DesignConstraint& c = result.constraints[i];
-    c.true_value = true_values[i + 1];
-    c.true_violation = missed(c, c.true_value.value_or(c.value));
-    result.true_violation =
-        std::max(result.true_violation, c.true_violation / program.size(static_cast<Eigen::Index>(i)));
+    const Eigen::Index row = static_cast<Eigen::Index>(i);
+    const double fall =
+        found.multipliers(row) * program.c_scale(row) / (program.f_scale * program.size(row) * rounds.slopes(row));
+    c.price = c.lower && c.upper && *c.lower == *c.upper ? fall : std::abs(fall);
   }
+  if (result.status == SolverStatus::infeasible) describe_conflict(program, scaling, x, end, result);
 }
 
-// A smooth maximum is below the true one, so that a limit on it lets the true one pass.
+// Says where a limit on an extreme does not hold for the true one, in spite of bounds that were moved.
 void judge_true_extremes(const DesignProgram& program, const Evaluator& evaluator, DesignResult& result) {
   bool beyond = false;
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     const DesignConstraint& c = result.constraints[i];
-    const int extreme = evaluator.objectives()[i + 1].extreme();
-    if (extreme == 0) continue;
-    const std::string place =
-        fmt::format("design.subject_to[{}]: the {} of '{}'", i, extreme > 0 ? "maximum" : "minimum", c.objective);
+    const Extreme extreme = evaluator.objectives()[i + 1].extreme();
+    if (extreme == Extreme::none) continue;
+    const char* const what = extreme == Extreme::maximum   ? "maximum"
+                             : extreme == Extreme::minimum ? "minimum"
+                                                           : "peak to peak value";
+    const std::string place = fmt::format("design.subject_to[{}]: the {} of '{}'", i, what, c.objective);
     if (!c.true_value) {
       beyond = true;
       result.warnings.push_back(place +
                                 " is held by its smooth value only; the run that was to find the true one failed");
       continue;
     }
-    const double margin = std::abs(*c.true_value - c.value);
-    if (c.true_violation <= kConstraintTolerance * program.size(static_cast<Eigen::Index>(i))) continue;
+    const bool equality = c.lower && c.upper && *c.lower == *c.upper;
+    const double size = program.size(static_cast<Eigen::Index>(i));
+    if (c.true_violation <= (equality ? kTrueLimitTolerance * size : 0)) continue;
     beyond = true;
-    result.warnings.push_back(fmt::format(
-        "{} is held by its smooth value, {:.6g}, only: the true one is {:.6g}, {} the limit {:.6g}. Bound it with a "
-        "margin of about {:.2g}, or raise its sharpness",
-        place, c.value, *c.true_value, c.upper && *c.true_value > *c.upper ? "above" : "below",
-        c.upper && *c.true_value > *c.upper ? *c.upper : *c.lower, margin));
+    const bool above = c.upper && *c.true_value > *c.upper;
+    result.warnings.push_back(
+        fmt::format("{} is {:.6g}, {} the limit {:.6g}, though its smooth value is {:.6g}; more sharpness brings the "
+                    "two together",
+                    place, *c.true_value, above ? "above" : "below", above ? *c.upper : *c.lower, c.value));
   }
   if (!beyond || result.status != SolverStatus::converged) return;
   result.status = SolverStatus::converged_beyond_limit;
   result.message += "; limits hold for smooth extremes only";
 }
 
-NlpResult solved(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
-                 const std::function<bool(const NlpProgress&)>& progress, PointRecords* records, DesignResult& result) {
+NlpResult solved_once(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
+                      const std::function<bool(const NlpProgress&)>& progress, PointRecords* records,
+                      std::optional<long>& seed) {
   if (spec.type == "ipopt") {
     IpoptOptions solver;
     solver.tolerance = spec.tolerance;
@@ -199,12 +259,84 @@ NlpResult solved(DesignProgram& program, const Eigen::VectorXd& x_start, const O
   solver.max_iterations = spec.max_iterations;
   if (spec.lbfgs_history) solver.history = static_cast<unsigned>(*spec.lbfgs_history);
   if (find_nlopt_method(spec.type)->random) {
-    result.seed = spec.seed.value_or(drawn_seed());
-    solver.seed = static_cast<std::uint32_t>(*result.seed);
+    if (!seed) seed = spec.seed.value_or(drawn_seed());
+    solver.seed = static_cast<std::uint32_t>(*seed);
   }
   solver.progress = progress;
   solver.records = records;
   return solve_with_nlopt(program, x_start, solver);
+}
+
+// What an optimiser may still do after an earlier round. A global method searches as long in every round.
+OptimizerSpec remaining(OptimizerSpec spec, const NlpResult& done) {
+  const NloptMethod* const method = find_nlopt_method(spec.type);
+  if (method && method->global) return spec;
+  if (!method) spec.max_iterations = spec.max_iterations.value_or(OptimizerSpec::kIpoptIterations);
+  if (spec.max_iterations) *spec.max_iterations = std::max(0L, *spec.max_iterations - done.iterations);
+  if (spec.max_evaluations) *spec.max_evaluations = std::max(0L, *spec.max_evaluations - done.evaluations);
+  return spec;
+}
+
+bool may_go_on(const OptimizerSpec& spec) {
+  return spec.max_iterations.value_or(1) > 0 && spec.max_evaluations.value_or(1) > 0;
+}
+
+bool is_an_end(SolverStatus status) {
+  return status == SolverStatus::converged || status == SolverStatus::no_progress || status == SolverStatus::searched;
+}
+
+bool is_an_improvement(const DesignProgram& program, const NlpResult& found, const NlpResult& before) {
+  if (found.status == SolverStatus::converged) return true;
+  return found.point.ok && is_better(found.point.f, program.violation(found.point.c), before.point.f,
+                                     program.violation(before.point.c), kConstraintTolerance);
+}
+
+// Solves in rounds, with bounds that are moved until true extremes keep their limits.
+LimitedSolution solved(const DesignSpec& spec, DesignProgram& program, Evaluator& evaluator,
+                       const Eigen::VectorXd& x_start, const std::function<bool(const NlpProgress&)>& progress,
+                       const std::function<bool()>& abandoned, PointRecords* records, DesignResult& result) {
+  TrueLimits limits(spec, evaluator.objectives());
+  LimitedSolution rounds;
+  NlpResult& solution = rounds.solution;
+  solution = solved_once(program, x_start, spec.optimizer, progress, records, result.seed);
+  while (true) {
+    if (!solution.point.ok || abandoned()) break;
+    const Eigen::VectorXd rho = program.rho_at(solution.x);
+    rounds.true_values = evaluator.true_values(rho);
+    if (!is_an_end(solution.status)) break;
+    Eigen::VectorXd psi(program.constraints() + 1);
+    psi(0) = solution.point.f;
+    for (Eigen::Index i = 0; i < program.constraints(); ++i) psi(i + 1) = solution.point.c(i) * program.size(i);
+    if (!limits.move(program, psi, rounds.true_values)) break;
+    // From the last solution; from the first start where a method gets stuck there, beyond a bound that was moved.
+    for (const bool from_solution : {true, false}) {
+      OptimizerSpec rest = remaining(spec.optimizer, solution);
+      if (!may_go_on(rest)) {
+        solution.status = SolverStatus::iteration_limit;
+        solution.message =
+            "stopped at the limit of iterations or evaluations, before the limits held for true extremes";
+        break;
+      }
+      rest.warm_start = from_solution || rest.warm_start;
+      const NlpResult before = solution;
+      const auto shown = [&](NlpProgress p) {
+        if (p.iteration == 0) return true;  // known from before
+        p.iteration += before.iterations;
+        return progress(p);
+      };
+      NlpResult found = solved_once(program, from_solution ? before.x : x_start, rest, shown, records, result.seed);
+      const bool is_worse = !from_solution && !is_an_improvement(program, found, before);
+      solution = is_worse ? before : found;
+      solution.iterations = found.iterations + before.iterations;
+      solution.evaluations = found.evaluations + before.evaluations;
+      solution.failed_evaluations = found.failed_evaluations + before.failed_evaluations;
+      if (solution.status != SolverStatus::no_progress && solution.status != SolverStatus::infeasible) break;
+    }
+  }
+  result.limit_rounds = limits.rounds();
+  rounds.slopes.resize(program.constraints());
+  for (Eigen::Index i = 0; i < program.constraints(); ++i) rounds.slopes(i) = limits.slope(i);
+  return rounds;
 }
 
 // Compares the derivatives of all objectives of an evaluator.
@@ -241,6 +373,11 @@ DifferenceComparison comparison_at(const Evaluation& start, const Evaluator& eva
   return comparison;
 }
 
+Problem with_named_means(Problem problem) {
+  name_bounded_means(problem);
+  return problem;
+}
+
 // Forces written in C++ name bodies by their number.
 Problem simulated(const Problem& problem, const DesignOptions& options) {
   return options.user_forces.empty() ? what_objectives_need(problem) : problem;
@@ -248,7 +385,8 @@ Problem simulated(const Problem& problem, const DesignOptions& options) {
 
 }  // namespace
 
-NlpScale design_scale(const Problem& problem, const DesignOptions& options) {
+NlpScale design_scale(const Problem& given, const DesignOptions& options) {
+  const Problem problem = with_named_means(given);
   const DesignSpec& spec = checked(problem);
   EvaluatorOptions evaluator_options;
   evaluator_options.method = options.method;
@@ -262,8 +400,9 @@ NlpScale design_scale(const Problem& problem, const DesignOptions& options) {
   return {program.f_scale, program.c_scale};
 }
 
-DesignResult run_design(const Problem& problem, const DesignOptions& options) {
+DesignResult run_design(const Problem& given, const DesignOptions& options) {
   const Stopwatch stopwatch;
+  const Problem problem = with_named_means(given);
   const DesignSpec& spec = checked(problem);
   EvaluatorOptions evaluator_options;
   evaluator_options.method = options.method;
@@ -297,7 +436,9 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
     result.history.push_back({p.iteration, p.f, p.violation, p.optimality, scaling.to_rho(p.x)});
     return !options.progress || options.progress(result.history.back());
   };
-  const NlpResult solution = solved(program, x_start, spec.optimizer, progress, options.records, result);
+  const LimitedSolution rounds = solved(
+      spec, program, evaluator, x_start, progress, [&] { return abandoned; }, options.records, result);
+  const NlpResult& solution = rounds.solution;
   result.status = abandoned ? SolverStatus::stopped : solution.status;
   result.message = abandoned ? "stopped on request" : solution.message;
   result.algorithm = solution.algorithm;
@@ -306,8 +447,8 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options) {
   result.rho = program.rho_at(solution.x);
   if (start.ok && solution.point.ok) {
     describe_end(evaluator, program, solution.point, result);
-    if (!abandoned) {
-      describe_solution(evaluator, program, solution.x, result);
+    if (!abandoned && !rounds.true_values.empty()) {
+      describe_solution(evaluator, program, scaling, rounds, result);
       judge_true_extremes(program, evaluator, result);
     }
   }

@@ -2,6 +2,8 @@
 //
 //   minimise psi_0(rho)   subject to   rho_lower <= rho <= rho_upper,   lower_i <= psi_i(rho) <= upper_i
 //
+// An extreme psi_i is smooth for the optimiser, but its limits hold for the true value (true_limits.hpp).
+//
 //   DesignOptions options;
 //   options.progress = [](const DesignRow& row) { std::cerr << row.objective << '\n'; return true; };
 //   const DesignResult result = run_design(problem, options);
@@ -32,10 +34,20 @@ struct DesignConstraint {
   std::string objective;
   std::optional<double> lower, upper;
   double initial = 0, value = 0;
-  std::optional<double> true_value = {};    // at the solution, where the objective is a smooth maximum or minimum
+  std::optional<double> true_value = {};    // at the solution, where the objective is a smooth extreme
   double violation = 0;                     // amount by which the nearer bound is missed, 0 where it holds
   double true_violation = 0;                // the same of true_value
   bool at_lower = false, at_upper = false;  // the solution touches this bound
+  // By how much the minimised objective falls per unit by which the bound is eased, >= 0. Of an equality: its fall per
+  // unit by which the value is raised, of any sign.
+  double price = 0;
+};
+
+// Where no point satisfies the limits: one of those that stand against each other there.
+struct DesignConflict {
+  std::string limit;  // "maximum_of F <= 33", "k1 >= 1"
+  double missed = 0;  // 0: it holds, but keeps others from doing so
+  double price = 0;   // fall of the sum of relative violations per unit by which it is eased
 };
 
 // One iteration of the optimiser.
@@ -52,9 +64,10 @@ struct DesignResult {
   std::string message;  // in words, always
   std::string objective;
   double objective_initial = 0, objective_final = 0;
-  std::optional<double> objective_true;  // at the solution, where the objective is a smooth maximum or minimum
+  std::optional<double> objective_true;  // at the solution, where the objective is a smooth extreme
   std::vector<DesignVariable> variables;
   std::vector<DesignConstraint> constraints;
+  std::vector<DesignConflict> conflicts;  // where the limits cannot all hold
   std::vector<DesignRow> history;
   Eigen::VectorXd rho;          // all parameters at the solution, or at the best point where there is none
   Evaluation final_evaluation;  // there, unless stopped: the objective that is minimised, then the constraints
@@ -67,6 +80,7 @@ struct DesignResult {
   std::optional<long> seed;     // where the method is random
   NlpScale scale;               // by which convergence was judged
   std::string gradient_choice;  // method and why
+  int limit_rounds = 0;         // in which bounds of smooth extremes were moved so that the true ones keep their limits
   int iterations = 0;
   long evaluations = 0, failed_evaluations = 0;  // points at which objectives and gradients were computed
   long simulations = 0;                          // also those of second derivatives

@@ -73,6 +73,13 @@ Evaluation DesignProgram::start_from(const VectorXd& x_start, const std::optiona
   return start;
 }
 
+void DesignProgram::set_bounds(Index constraint, const std::optional<double>& lower,
+                               const std::optional<double>& upper) {
+  if (lower) c_lower(constraint) = *lower / size_(constraint);
+  if (upper) c_upper(constraint) = *upper / size_(constraint);
+  if (best_.ok) best_violation_ = violation_of(best_);
+}
+
 double DesignProgram::violation_of(const Evaluation& e) const {
   VectorXd c(constraints());
   for (Index i = 0; i < constraints(); ++i) c(i) = e.psi(1 + i) / size_(i);

@@ -41,6 +41,8 @@ class DesignProgram : public NonlinearProgram {
   const Evaluation& evaluation(const Eigen::VectorXd& rho);
 
   double size(Eigen::Index constraint) const { return size_(constraint); }
+  // Other bounds for the objective of a constraint; the best point is judged by them from now on.
+  void set_bounds(Eigen::Index constraint, const std::optional<double>& lower, const std::optional<double>& upper);
   long hessian_gradients() const { return hessian_gradients_; }            // that second derivatives took
   const std::string& hessian_failure() const { return hessian_failure_; }  // the first, in words
 

@@ -141,7 +141,7 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
       e.psi(i) = result.psi(row);
       if (sweep == Sweep::none) continue;
       const Objective& objective = objectives_[simulated_[j]];
-      if (objective.mean() && !objective.extreme() && e.psi(i) == 0 && !frozen)
+      if (objective.mean() && !objective.is_extreme() && e.psi(i) == 0 && !frozen)
         e.warnings.push_back(
             fmt::format("objective '{}' is a root mean square of 0, where it is not smooth: its gradient is given as 0",
                         objective.name()));
@@ -174,7 +174,7 @@ std::vector<const Objective*> Evaluator::simulated() const {
 
 std::vector<std::optional<double>> Evaluator::true_values(const Eigen::VectorXd& rho) const {
   std::vector<std::optional<double>> values(objectives_.size());
-  if (std::none_of(objectives_.begin(), objectives_.end(), [](const Objective& o) { return o.extreme() != 0; }))
+  if (std::none_of(objectives_.begin(), objectives_.end(), [](const Objective& o) { return o.is_extreme(); }))
     return values;
   const Mechanism mechanism(scene_, rho, std::vector<bool>(active_.size(), false), options_.user_forces);
   const SimulationResult run = simulate(mechanism, scene_.simulation, {}, {}, {nullptr, options_.progress});

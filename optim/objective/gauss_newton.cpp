@@ -19,15 +19,16 @@ using Eigen::VectorXd;
 constexpr std::array<double, 3> kNodes{0.5 - 0.3872983346207417, 0.5, 0.5 + 0.3872983346207417},
     kWeights{5.0 / 18, 8.0 / 18, 5.0 / 18};
 
-// I, I_rho and I_rhorho of one objective, gathered instant by instant; then its Hessian.
+// I, I_rho and I_rhorho of one part of an objective, gathered instant by instant; then its Hessian.
 class Gathered {
  public:
-  Gathered(const Objective& objective, Index variables) : objective_(objective) {
+  Gathered(const Objective& objective, const ObjectivePart& part, Index variables)
+      : objective_(objective), part_(part) {
     I_rho_.setZero(variables), I_rhorho_.setZero(variables, variables);
   }
 
   void add_running(double weight, const SecondOrder& x) {
-    const Jet m = objective_.integrand(x.value - shifted(x.value));
+    const Jet m = objective_.integrand(x.value - shifted(x.value), part_);
     I_ += weight * m.value;
     I_rho_ += weight * m.first * x.first;
     I_rhorho_ += weight * (m.second * x.first * x.first.transpose() + m.first * x.second);
@@ -37,16 +38,16 @@ class Gathered {
   // d^2 psi/drho^2 = psi_I I_rhorho + psi_II I_rho I_rho'
   MatrixXd hessian() const {
     if (!objective_.mean() || I_ == 0) return I_rhorho_;
-    const Jet psi = objective_.of_integral(I_);
-    return psi.first * I_rhorho_ + psi.second * I_rho_ * I_rho_.transpose();
+    const Jet psi = objective_.of_integral(I_, part_);
+    return part_.factor * (psi.first * I_rhorho_ + psi.second * I_rho_ * I_rho_.transpose());
   }
 
  private:
   // x0 of an extreme: the extreme so far, of which the Hessian is independent. Else 0.
   double shifted(double x) {
-    if (objective_.extreme() == 0) return 0;
-    if (objective_.extreme() * x > objective_.extreme() * x0_) {
-      const double factor = objective_.integrand(x0_ - x).value;  // 0 at first
+    if (part_.side == 0) return 0;
+    if (part_.side * x > part_.side * x0_) {
+      const double factor = objective_.integrand(x0_ - x, part_).value;  // 0 at first
       I_ *= factor, I_rho_ *= factor, I_rhorho_ *= factor;
       x0_ = x;
     }
@@ -54,7 +55,8 @@ class Gathered {
   }
 
   const Objective& objective_;
-  double I_ = 0, x0_ = -objective_.extreme() * std::numeric_limits<double>::infinity();
+  const ObjectivePart part_;
+  double I_ = 0, x0_ = -part_.side * std::numeric_limits<double>::infinity();
   VectorXd I_rho_;
   MatrixXd I_rhorho_;
 };
@@ -87,13 +89,15 @@ GaussNewton gauss_newton(const Evaluator& evaluator, const Evaluation& at) {
   const std::vector<int>& variables = evaluator.variables();
   require_second_order(evaluator.scene(), GradientMethod::automatic);
   bool simulated = false;
-  std::vector<Gathered> gathered;
+  std::vector<std::vector<Gathered>> gathered;  // the parts of each objective
   for (const Objective& objective : objectives) {
     if (objective.is_written_in_cpp())
       throw std::invalid_argument("the objective '" + objective.name() +
                                   "' is written in C++ and says nothing of second derivatives");
     simulated = simulated || objective.needs_simulation();
-    gathered.emplace_back(objective, static_cast<Index>(variables.size()));
+    std::vector<Gathered>& parts = gathered.emplace_back();
+    for (const ObjectivePart& part : objective.parts())
+      parts.emplace_back(objective, part, static_cast<Index>(variables.size()));
   }
   GaussNewton result;
   if (simulated) {
@@ -107,10 +111,13 @@ GaussNewton gauss_newton(const Evaluator& evaluator, const Evaluation& at) {
     sampling.observe = [&](std::size_t index, const StatePoint& state, const MatrixXd& y_rho) {
       const Look& look = looks[index];
       if (look.expression)
-        return gathered[look.objective].add_value(look.expression->second_order(mechanism, state, y_rho, variables));
-      for (std::size_t i = 0; i < objectives.size(); ++i)
-        if (const auto& running = objectives[i].running())
-          gathered[i].add_running(look.weight, running->second_order(mechanism, state, y_rho, variables));
+        return gathered[look.objective].front().add_value(
+            look.expression->second_order(mechanism, state, y_rho, variables));
+      for (std::size_t i = 0; i < objectives.size(); ++i) {
+        if (!objectives[i].running()) continue;
+        const SecondOrder x = objectives[i].running()->second_order(mechanism, state, y_rho, variables);
+        for (Gathered& part : gathered[i]) part.add_running(look.weight, x);
+      }
     };
     const SimulationResult run =
         simulate_tlm(mechanism, scene.simulation, {}, sampling, {&at.steps, evaluator.options().progress});
@@ -120,8 +127,9 @@ GaussNewton gauss_newton(const Evaluator& evaluator, const Evaluation& at) {
     }
   }
   for (std::size_t i = 0; i < objectives.size(); ++i) {
-    result.of.push_back(gathered[i].hessian());
-    objectives[i].add_parameters_only_hessian(at.rho, variables, result.of.back());
+    MatrixXd& H = result.of.emplace_back(gathered[i].front().hessian());
+    for (std::size_t p = 1; p < gathered[i].size(); ++p) H += gathered[i][p].hessian();
+    objectives[i].add_parameters_only_hessian(at.rho, variables, H);
   }
   result.ok = true;
   return result;

@@ -68,7 +68,7 @@ bool may_be_unresolved(const Scene& scene, const std::vector<Objective>& objecti
   const IntegratorSettings& given = scene.simulation.integrator;
   if (given.step) return false;
   for (std::size_t i = 0; i < objectives.size(); ++i)
-    if (objectives[i].mean() && !objectives[i].extreme() &&
+    if (objectives[i].mean() && !objectives[i].is_extreme() &&
         given.rtol + given.atol > kResolved * e.psi(static_cast<Eigen::Index>(i)))
       return true;
   const Eigen::VectorXd changes = contributions(scene, e.psi_rho).rowwise().sum();

@@ -120,12 +120,26 @@ std::shared_ptr<const PointCost> Objective::expression(const Mechanism& mechanis
   return running_ ? running_->bind(mechanism) : nullptr;
 }
 
-Cost Objective::cost(const Mechanism& mechanism, double x0) const {
+std::vector<ObjectivePart> Objective::parts() const {
+  switch (extreme()) {
+    case Extreme::maximum:
+      return {{1, 1}};
+    case Extreme::minimum:
+      return {{-1, 1}};
+    case Extreme::both:
+      return {{1, 1}, {-1, -1}};
+    case Extreme::none:
+      break;
+  }
+  return {{}};
+}
+
+Cost Objective::cost(const Mechanism& mechanism, const ObjectivePart& part, double x0) const {
   Cost cost;
   cost.name = name_;
-  cost.is_extreme = extreme() != 0;
+  cost.is_extreme = is_extreme();
   if (running_) cost.running = running_->bind(mechanism);
-  if (running_ && mean_) cost.running = std::make_shared<Integrand>(cost.running, *mean_, exponent(), x0);
+  if (running_ && mean_) cost.running = std::make_shared<Integrand>(cost.running, *mean_, exponent(part), x0);
   if (terminal_) cost.terminal = terminal_->bind(mechanism);
   std::map<const void*, std::shared_ptr<const PointCost>> bound;  // rows of a file share an expression
   for (const Sample& sample : samples_) {
@@ -138,13 +152,15 @@ Cost Objective::cost(const Mechanism& mechanism, double x0) const {
   return cost;
 }
 
-Jet Objective::of_integral(double I, double x0) const {
+Jet Objective::of_integral(double I, const ObjectivePart& part, double x0) const {
   if (!running_ || !mean_) return {I, 1, 0};
-  const Jet n = mean_->N(I / duration_, exponent());
+  const Jet n = mean_->N(I / duration_, exponent(part));
   return {x0 + n.value, n.first / duration_, n.second / (duration_ * duration_)};
 }
 
-Jet Objective::integrand(double x) const { return mean_ ? mean_->M(x, exponent()) : Jet{x, 1, 0}; }
+Jet Objective::integrand(double x, const ObjectivePart& part) const {
+  return mean_ ? mean_->M(x, exponent(part)) : Jet{x, 1, 0};
+}
 
 double Objective::parameters_only(const Eigen::VectorXd& rho, const FollowedMode::UserForces& forces) const {
   if (mode_) return named(name_, [&] { return mode_->value(rho, forces); });

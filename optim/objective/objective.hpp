@@ -2,6 +2,7 @@
 //
 //   sum     psi(rho) = integral of running dt + terminal at the end time + sum of samples + parameters_only
 //   mean    psi(rho) = x0 + N(I/T),   I = integral of M(x - x0) dt over the simulated time T (objective_kinds.hpp)
+//           or the difference of two such means, its parts
 // A simulation computes what `cost` describes, I (in a sum psi without parameters_only); `of_integral` makes psi of it:
 //
 //   const Objective track(scene, spec);
@@ -25,6 +26,12 @@
 
 namespace mbsopt {
 
+// A mean that psi is made of, and its factor in psi. side 1: of a maximum, -1: of a minimum, 0: of neither.
+struct ObjectivePart {
+  int side = 0;
+  double factor = 1;
+};
+
 class Objective {
  public:
   // Throws std::invalid_argument: "objectives.track.running: unknown name ...".
@@ -34,11 +41,14 @@ class Objective {
 
   const std::string& name() const { return name_; }
   bool needs_simulation() const;
-  const MeanKind* mean() const { return mean_; }               // null: a sum
-  int extreme() const { return mean_ ? mean_->extreme : 0; }   // 1: a maximum, -1: a minimum
-  Cost cost(const Mechanism& mechanism, double x0 = 0) const;  // an absent part stays absent
-  Jet of_integral(double I, double x0 = 0) const;              // psi and its derivatives in I
-  Jet integrand(double x) const;                               // M of objective_kinds.hpp
+  const MeanKind* mean() const { return mean_; }  // null: a sum
+  Extreme extreme() const { return mean_ ? mean_->extreme : Extreme::none; }
+  bool is_extreme() const { return extreme() != Extreme::none; }
+  std::vector<ObjectivePart> parts() const;
+  // Of a part; what is absent stays absent.
+  Cost cost(const Mechanism& mechanism, const ObjectivePart& part = {}, double x0 = 0) const;
+  Jet of_integral(double I, const ObjectivePart& part = {}, double x0 = 0) const;  // its mean, without the factor
+  Jet integrand(double x, const ObjectivePart& part = {}) const;                   // M of objective_kinds.hpp
   // The expression x of a kind that is no sum; null where it is the constant 0.
   std::shared_ptr<const PointCost> expression(const Mechanism& mechanism) const;
   // Its parts, for second derivatives: `running` is the integrand, or the expression x of a kind that is no sum.
@@ -49,7 +59,7 @@ class Objective {
   const std::optional<CostExpression>& running() const { return running_; }
   const std::optional<CostExpression>& terminal() const { return terminal_; }
   const std::vector<Sample>& samples() const { return samples_; }
-  double exponent() const { return extreme() * sharpness_; }  // k of an extreme
+  double exponent(const ObjectivePart& part) const { return part.side * sharpness_; }  // k of an extreme
   bool is_eigenvalue() const { return mode_ != nullptr; }
   bool is_written_in_cpp() const { return user_running_ || user_terminal_; }
   const ObjectiveSpec& spec() const { return spec_; }  // of one that is not

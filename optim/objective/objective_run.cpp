@@ -43,75 +43,28 @@ class Peak {
   std::vector<Top> tops_;
 };
 
-}  // namespace
+// A side of an objective, as in ObjectivePart.
+struct ExtremeOf {
+  const Objective* objective;
+  int side;
+};
 
-ObjectiveRun::ObjectiveRun(std::vector<const Objective*> objectives, const Mechanism& mechanism,
-                           const SimulationSettings& settings, std::function<bool(double t)> progress)
-    : objectives_(std::move(objectives)), mechanism_(mechanism), settings_(settings), progress_(std::move(progress)) {}
-
-SimulationResult ObjectiveRun::run(const Sweep& sweep) const {
-  std::vector<double> x0(objectives_.size(), 0.0);
-  SimulationResult result = run_with(x0, sweep);
-  const bool integrated =
-      result.ok() || (result.status == SimulationStatus::not_finite && result.last_good_time >= settings_.end_time);
-  if (!integrated || in_range(result.psi)) {
-    if (!result.ok()) return result;
-  } else {
-    const std::vector<std::optional<double>> extremes =
-        true_extremes(objectives_, mechanism_, settings_, result.steps, progress_);
-    for (std::size_t i = 0; i < x0.size(); ++i) x0[i] = extremes[i].value_or(0);
-    result = run_with(x0, sweep);
-    if (!result.ok()) return result;
-  }
-  for (std::size_t i = 0; i < objectives_.size(); ++i) {
-    const Eigen::Index row = static_cast<Eigen::Index>(i);
-    const Jet psi = objectives_[i]->of_integral(result.psi(row), x0[i]);
-    if (objectives_[i]->extreme() && !std::isfinite(psi.value)) {
-      result.status = SimulationStatus::not_finite;
-      result.message = fmt::format(
-          "the steps do not resolve the peaks of objective '{}', whose exponentials integrate to {:.3g}: give it less "
-          "sharpness, or set simulation.integrator.max_step",
-          objectives_[i]->name(), result.psi(row));
-      return result;
-    }
-    result.psi(row) = psi.value;
-    if (result.psi_rho.rows() > row) result.psi_rho.row(row) *= psi.first;
-  }
-  return result;
-}
-
-SimulationResult ObjectiveRun::run_with(const std::vector<double>& x0, const Sweep& sweep) const {
-  std::vector<Cost> costs;
-  for (std::size_t i = 0; i < objectives_.size(); ++i) costs.push_back(objectives_[i]->cost(mechanism_, x0[i]));
-  return sweep(costs);
-}
-
-bool ObjectiveRun::in_range(const Eigen::VectorXd& integrals) const {
-  constexpr double kSmall = 1e-250, kLarge = 1e250;  // what exp and its sums can hold, with room for factors
-  for (std::size_t i = 0; i < objectives_.size(); ++i) {
-    const double I = std::abs(integrals(static_cast<Eigen::Index>(i)));
-    if (objectives_[i]->extreme() && !(I > kSmall && I < kLarge)) return false;
-  }
-  return true;
-}
-
-std::vector<std::optional<double>> true_extremes(const std::vector<const Objective*>& objectives,
-                                                 const Mechanism& mechanism, const SimulationSettings& settings,
-                                                 const StepSequence& steps,
-                                                 const std::function<bool(double t)>& progress) {
-  std::vector<std::optional<double>> values(objectives.size());
+// The extreme of each objective's expression on its side; none for side 0, and where the run fails.
+std::vector<std::optional<double>> extremes_of(const std::vector<ExtremeOf>& all, const Mechanism& mechanism,
+                                               const SimulationSettings& settings, const StepSequence& steps,
+                                               const std::function<bool(double t)>& progress) {
+  std::vector<std::optional<double>> values(all.size());
   struct Tracked {
-    std::size_t objective;
-    double sign;
+    std::size_t index;
+    double side;
     std::shared_ptr<const PointCost> x;
     Peak peak;
   };
   std::vector<Tracked> tracked;
-  for (std::size_t i = 0; i < objectives.size(); ++i) {
-    if (!objectives[i]->extreme()) continue;
-    const double sign = objectives[i]->extreme();
-    if (auto x = objectives[i]->expression(mechanism)) {
-      tracked.push_back({i, sign, std::move(x), {}});
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (all[i].side == 0) continue;
+    if (auto x = all[i].objective->expression(mechanism)) {
+      tracked.push_back({i, static_cast<double>(all[i].side), std::move(x), {}});
     } else {
       values[i] = 0;
     }
@@ -124,7 +77,7 @@ std::vector<std::optional<double>> true_extremes(const std::vector<const Objecti
   }
   sampling.times.push_back(settings.end_time);
   sampling.observe = [&](std::size_t, const StatePoint& at) {
-    for (Tracked& t : tracked) t.peak.add(at.t, t.sign * t.x->value(at));
+    for (Tracked& t : tracked) t.peak.add(at.t, t.side * t.x->value(at));
   };
   // CVODES takes its own steps again.
   const RunOptions options{is_cvodes(settings.integrator.type) ? nullptr : &steps, progress};
@@ -133,7 +86,89 @@ std::vector<std::optional<double>> true_extremes(const std::vector<const Objecti
   for (const Tracked& t : tracked) t.peak.add_places(sampling.times);
   std::sort(sampling.times.begin(), sampling.times.end());
   if (!sampling.times.empty() && !simulate(mechanism, settings, {}, sampling, options).ok()) return values;
-  for (const Tracked& t : tracked) values[t.objective] = t.sign * t.peak.largest();
+  for (const Tracked& t : tracked) values[t.index] = t.side * t.peak.largest();
+  return values;
+}
+
+}  // namespace
+
+ObjectiveRun::ObjectiveRun(std::vector<const Objective*> objectives, const Mechanism& mechanism,
+                           const SimulationSettings& settings, std::function<bool(double t)> progress)
+    : objectives_(std::move(objectives)), mechanism_(mechanism), settings_(settings), progress_(std::move(progress)) {}
+
+SimulationResult ObjectiveRun::run(const Sweep& sweep) const {
+  std::vector<Integral> integrals;
+  std::vector<ExtremeOf> sides;
+  for (std::size_t i = 0; i < objectives_.size(); ++i)
+    for (const ObjectivePart& part : objectives_[i]->parts()) {
+      integrals.push_back({static_cast<Eigen::Index>(i), part});
+      sides.push_back({objectives_[i], part.side});
+    }
+  SimulationResult result = integrated(integrals, sweep);
+  const bool complete =
+      result.ok() || (result.status == SimulationStatus::not_finite && result.last_good_time >= settings_.end_time);
+  if (!complete || in_range(integrals, result.psi)) {
+    if (!result.ok()) return result;
+  } else {
+    const std::vector<std::optional<double>> extremes =
+        extremes_of(sides, mechanism_, settings_, result.steps, progress_);
+    for (std::size_t k = 0; k < integrals.size(); ++k) integrals[k].x0 = extremes[k].value_or(0);
+    result = integrated(integrals, sweep);
+    if (!result.ok()) return result;
+  }
+  const Eigen::VectorXd I = result.psi;
+  const Eigen::MatrixXd I_rho = result.psi_rho;
+  const Eigen::Index count = static_cast<Eigen::Index>(objectives_.size());
+  result.psi.setZero(count);
+  if (I_rho.rows() > 0) result.psi_rho.setZero(count, I_rho.cols());
+  for (std::size_t k = 0; k < integrals.size(); ++k) {
+    const Integral& integral = integrals[k];
+    const Eigen::Index row = static_cast<Eigen::Index>(k);
+    const Jet mean = of(integral).of_integral(I(row), integral.part, integral.x0);
+    if (integral.part.side != 0 && !std::isfinite(mean.value)) {
+      result.status = SimulationStatus::not_finite;
+      result.message = fmt::format(
+          "the steps do not resolve the peaks of objective '{}', whose exponentials integrate to {:.3g}: give it less "
+          "sharpness, or set simulation.integrator.max_step",
+          of(integral).name(), I(row));
+      return result;
+    }
+    result.psi(integral.objective) += integral.part.factor * mean.value;
+    if (I_rho.rows() > 0) result.psi_rho.row(integral.objective) += integral.part.factor * mean.first * I_rho.row(row);
+  }
+  return result;
+}
+
+SimulationResult ObjectiveRun::integrated(const std::vector<Integral>& integrals, const Sweep& sweep) const {
+  std::vector<Cost> costs;
+  for (const Integral& integral : integrals) costs.push_back(of(integral).cost(mechanism_, integral.part, integral.x0));
+  return sweep(costs);
+}
+
+bool ObjectiveRun::in_range(const std::vector<Integral>& integrals, const Eigen::VectorXd& values) const {
+  constexpr double kSmall = 1e-250, kLarge = 1e250;  // what exp and its sums can hold, with room for factors
+  for (std::size_t k = 0; k < integrals.size(); ++k) {
+    const double I = std::abs(values(static_cast<Eigen::Index>(k)));
+    if (integrals[k].part.side != 0 && !(I > kSmall && I < kLarge)) return false;
+  }
+  return true;
+}
+
+std::vector<std::optional<double>> true_extremes(const std::vector<const Objective*>& objectives,
+                                                 const Mechanism& mechanism, const SimulationSettings& settings,
+                                                 const StepSequence& steps,
+                                                 const std::function<bool(double t)>& progress) {
+  std::vector<ExtremeOf> sides;
+  for (const Objective* const objective : objectives)
+    for (const ObjectivePart& part : objective->parts()) sides.push_back({objective, part.side});
+  const std::vector<std::optional<double>> extremes = extremes_of(sides, mechanism, settings, steps, progress);
+  std::vector<std::optional<double>> values(objectives.size());
+  auto extreme = extremes.begin();
+  for (std::size_t i = 0; i < objectives.size(); ++i)
+    for (const ObjectivePart& part : objectives[i]->parts()) {
+      if (*extreme) values[i] = values[i].value_or(0) + part.factor * **extreme;
+      ++extreme;
+    }
   return values;
 }
 

@@ -29,8 +29,16 @@ class ObjectiveRun {
   SimulationResult run(const Sweep& sweep) const;
 
  private:
-  SimulationResult run_with(const std::vector<double>& x0, const Sweep& sweep) const;
-  bool in_range(const Eigen::VectorXd& integrals) const;
+  struct Integral {
+    Eigen::Index objective;
+    ObjectivePart part;
+    double x0 = 0;
+  };
+  SimulationResult integrated(const std::vector<Integral>& integrals, const Sweep& sweep) const;
+  bool in_range(const std::vector<Integral>& integrals, const Eigen::VectorXd& values) const;
+  const Objective& of(const Integral& integral) const {
+    return *objectives_[static_cast<std::size_t>(integral.objective)];
+  }
 
   std::vector<const Objective*> objectives_;
   const Mechanism mechanism_;
@@ -38,9 +46,9 @@ class ObjectiveRun {
   std::function<bool(double t)> progress_;
 };
 
-// The largest (smallest) value of each smooth maximum's (minimum's) expression on given steps: on the dense output at
-// eight points of each step, and where the parabolas through three of them have tops beyond: a value that is reached.
-// None where progress, called after steps as in RunOptions, stops the search.
+// The value that each objective stands for which is an extreme, on given steps: on the dense output at eight points of
+// each step, and where the parabolas through three of them have tops beyond: a value that is reached. None where
+// progress, called after steps as in RunOptions, stops the search.
 std::vector<std::optional<double>> true_extremes(const std::vector<const Objective*>& objectives,
                                                  const Mechanism& mechanism, const SimulationSettings& settings,
                                                  const StepSequence& steps,

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 
 #include "core/expression/did_you_mean.hpp"
 #include "core/scene/checker.hpp"
 #include "core/scene/type_table.hpp"
 #include "optim/objective/design_issues.hpp"
+#include "optim/problem/bounded_means.hpp"
 #include "optim/problem/logged_columns.hpp"
 #include "optim/problem/problem_vocabulary.hpp"
 
@@ -70,7 +72,7 @@ void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
     kinds.emplace_back(kMeanKinds[k].name);
     if (!objective.means[k]) continue;
     ++alone;
-    extreme = extreme || kMeanKinds[k].extreme != 0;
+    extreme = extreme || kMeanKinds[k].extreme != Extreme::none;
   }
   kinds.emplace_back("eigenvalue");
   if (objective.eigenvalue) ++alone;
@@ -83,7 +85,8 @@ void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
                   "has one of " + joined(kinds) +
                       " beside another part; each of them stands alone, so make it an objective of its own");
   if (objective.sharpness && !extreme)
-    checker.issue(checker.path("sharpness"), "is given without maximum_of or minimum_of, which it belongs to");
+    checker.issue(checker.path("sharpness"),
+                  "is given without maximum_of, minimum_of or peak_to_peak_of, which it belongs to");
   const SimulationSettings& simulation = checker.facts().scene().simulation;
   for (std::size_t i = 0; i < objective.track.size(); ++i)
     check_track(checker, objective.track[i], child_path(checker.path("track"), i));
@@ -97,6 +100,20 @@ void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
 }
 
 void check_meaning(Checker& checker, const ObjectiveBound& bound) {
+  std::vector<std::string> kinds;
+  long given = bound.objective.empty() ? 0 : 1;
+  bool extreme = false;
+  for (std::size_t k = 0; k < bound.means.size(); ++k) {
+    kinds.emplace_back(kMeanKinds[k].name);
+    given += bound.means[k].has_value();
+    extreme = extreme || (bound.means[k] && kMeanKinds[k].extreme != Extreme::none);
+  }
+  if (given != 1)
+    checker.issue(checker.path(), std::string(given == 0 ? "does not say what it bounds" : "bounds several things") +
+                                      "; one is needed: objective, or in its place " + joined(kinds));
+  if (bound.sharpness && !extreme)
+    checker.issue(checker.path("sharpness"),
+                  "is given without maximum_of, minimum_of or peak_to_peak_of; a named objective has its own");
   if (!bound.lower && !bound.upper)
     checker.issue(checker.path(), "has neither \"lower\" nor \"upper\"; at least one is needed");
   if (bound.lower && bound.upper && *bound.lower > *bound.upper)
@@ -107,6 +124,17 @@ void check_meaning(Checker& checker, const ObjectiveBound& bound) {
 void check_meaning(Checker& checker, const DesignSpec& design) {
   for (const DesignIssue& found : optimizer_issues(design, checker.facts().scene()))
     checker.issue(found.path, found.message);
+  std::map<std::string, std::size_t> first;
+  for (std::size_t i = 0; i < design.subject_to.size(); ++i) {
+    const ObjectiveBound& bound = design.subject_to[i];
+    const std::optional<std::size_t> kind = bounded_mean(bound);
+    if (!kind) continue;
+    const auto [it, is_new] = first.emplace(name_of_mean(*kind, *bound.means[*kind]), i);
+    if (!is_new)
+      checker.issue(child_path(checker.path("subject_to"), i), "bounds " + it->first + " once more; " +
+                                                                   child_path(checker.path("subject_to"), it->second) +
+                                                                   " may have both \"lower\" and \"upper\"");
+  }
 }
 
 void check_meaning(Checker& checker, const ChannelSpec& channel) {

@@ -4,6 +4,7 @@
 //   psi = N(I/T),   I = integral of M(x) dt,   x an expression, N the inverse of M
 //   maximum_of   M = exp(k x)    N = log(m)/k    k = sharpness        minimum_of   the same with k = -sharpness
 //   rms_of       M = x^2         N = sqrt(m)
+//   peak_to_peak_of   psi = maximum_of - minimum_of, two such means
 // An extreme is the same for every x0 in M(x - x0), x0 + N: x0 keeps exp within the range of numbers.
 #pragma once
 
@@ -17,11 +18,13 @@ struct Jet {
   double value, first, second;
 };
 
+enum class Extreme { none, maximum, minimum, both };
+
 struct MeanKind {
   std::string_view name, description;
   Jet (*M)(double x, double k);
   Jet (*N)(double m, double k);
-  int extreme = 0;  // 1: a maximum, -1: a minimum; the sign of k
+  Extreme extreme = Extreme::none;
 };
 
 inline Jet exponential(double x, double k) {
@@ -38,8 +41,12 @@ inline Jet root(double m, double) {
 }
 
 inline constexpr MeanKind kMeanKinds[] = {
-    {"maximum_of", "alone: its largest value over time, smoothed by sharpness", exponential, logarithm, 1},
-    {"minimum_of", "alone: its smallest value over time, smoothed by sharpness", exponential, logarithm, -1},
+    {"maximum_of", "alone: its largest value over time, smoothed by sharpness", exponential, logarithm,
+     Extreme::maximum},
+    {"minimum_of", "alone: its smallest value over time, smoothed by sharpness", exponential, logarithm,
+     Extreme::minimum},
+    {"peak_to_peak_of", "alone: its largest less its smallest value over time, smoothed by sharpness", exponential,
+     logarithm, Extreme::both},
     {"rms_of", "alone: root of its mean square over time", square, root},
 };
 

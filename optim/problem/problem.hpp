@@ -40,18 +40,22 @@ struct ObjectiveSpec {
   std::vector<TrackTerm> track;
   std::array<std::optional<Expression>, std::size(kMeanKinds)> means;
   std::optional<EigenvalueSpec> eigenvalue;  // alone
-  std::optional<double> sharpness;           // of maximum_of, minimum_of [1/unit of the expression]
+  std::optional<double> sharpness;           // of an extreme [1/unit of the expression]
   static constexpr double kSharpness = 100;
 
-  // "rms_of"
+  // kind: "rms_of"
   std::optional<Expression>& mean(std::string_view kind) {
     return means[static_cast<std::size_t>(std::ranges::find(kMeanKinds, kind, &MeanKind::name) - kMeanKinds)];
   }
 };
 
+// Of a named objective, or of a mean of an expression that has no name (bounded_means.hpp).
 struct ObjectiveBound {
   std::string objective;
-  std::optional<double> lower, upper;
+  std::optional<double> lower = {}, upper = {};
+  std::array<std::optional<Expression>, std::size(kMeanKinds)> means = {};
+  std::optional<double> sharpness = {};  // when absent kSharpness over the size of the bounds
+  static constexpr double kSharpness = 100;
 };
 
 struct OptimizerSpec {

@@ -39,21 +39,29 @@ void describe(auto& v, Like<EigenvalueSpec> auto& e) {
   v.word("value", e.value, Words{"frequency damping"}, {"natural frequency [Hz], or damping ratio"});
 }
 
+void describe_means(auto& v, auto& means) {
+  for (std::size_t k = 0; k < std::size(kMeanKinds); ++k)
+    v.law(kMeanKinds[k].name, means[k], Names::objective, {kMeanKinds[k].description});
+}
+
 void describe(auto& v, Like<ObjectiveSpec> auto& o) {
   v.law("running", o.running, Names::objective, {"integrated over time; of sensors, t and parameters"});
   v.law("terminal", o.terminal, Names::objective, {"added, at the end time; of sensors, t and parameters"});
   v.list("samples", o.samples, {"added, each at its time"});
   v.list("track", o.track, {"added: weighted squares of sensor minus data at the rows of a CSV file"});
   v.law("parameters_only", o.parameters_only, Names::none, {"added; of parameters only"});
-  for (std::size_t k = 0; k < std::size(kMeanKinds); ++k)
-    v.law(kMeanKinds[k].name, o.means[k], Names::objective, {kMeanKinds[k].description});
+  describe_means(v, o.means);
   v.object("eigenvalue", o.eigenvalue, {"alone: of a mode of the motion beside the initial equilibrium"});
   v.plain("sharpness", o.sharpness, kPositive,
-          {"of maximum_of, minimum_of: k in log(mean exp(k x))/k [1/unit of the expression]; 100 when absent"});
+          {"of maximum_of, minimum_of, peak_to_peak_of: k in log(mean exp(k x))/k [1/unit of the expression]; 100 when "
+           "absent"});
 }
 
 void describe(auto& v, Like<ObjectiveBound> auto& b) {
-  v.reference("objective", b.objective, To::objective, {"an objective", Need::required});
+  v.reference("objective", b.objective, To::objective, {"an objective; or, in its place, one of the next four"});
+  describe_means(v, b.means);
+  v.plain("sharpness", b.sharpness, kPositive,
+          {"of an extreme in place of an objective; when absent 100 over the larger absolute value of the bounds"});
   v.plain("lower", b.lower, kAny, {"it must not be less"});
   v.plain("upper", b.upper, kAny, {"it must not be more"});
 }
@@ -84,7 +92,7 @@ void describe(auto& v, Like<MultistartSpec> auto& m) {
 
 void describe(auto& v, Like<DesignSpec> auto& d) {
   v.reference("minimize", d.minimize, To::objective, {"the objective to minimise", Need::required});
-  v.list("subject_to", d.subject_to, {"bounds on objectives"});
+  v.list("subject_to", d.subject_to, {"bounds on objectives; those of extremes hold for the true ones"});
   v.references("variables", d.variables, To::parameter, {"parameters that may change", Need::required});
   v.object("optimizer", d.optimizer, {"how it is minimised"});
   v.object("multistart", d.multistart, {"from several starts, in parallel"});

@@ -83,8 +83,38 @@ VectorXd non_negative_least_squares(const MatrixXd& A, const VectorXd& b) {
   return z;
 }
 
-double optimality(const NonlinearProgram& problem, const VectorXd& x, const NlpPoint& point) {
-  const Index n = problem.variables();
+namespace {
+
+// Near bounds as columns: sign * gradient of a constraint, or a step out of a bound that x is near, which costs
+// nothing.
+struct NearBounds {
+  std::vector<Multiplier> constraints;
+  std::vector<std::pair<Index, double>> variables;  // x_k, and the sign of the step that leaves the bounds
+  MatrixXd columns;                                 // of the constraints, then of the variables
+  Index count() const { return static_cast<Index>(constraints.size()); }
+};
+
+NearBounds near_bounds(const NonlinearProgram& problem, const VectorXd& x, const NlpPoint& point,
+                       std::vector<Multiplier> constraints) {
+  NearBounds found;
+  found.constraints = std::move(constraints);
+  for (Index k = 0; k < x.size(); ++k) {
+    if (near(x(k), problem.x_lower(k))) found.variables.emplace_back(k, -1);
+    if (near(x(k), problem.x_upper(k))) found.variables.emplace_back(k, 1);
+  }
+  found.columns.setZero(x.size(), found.count() + static_cast<Index>(found.variables.size()));
+  for (Index j = 0; j < found.count(); ++j) {
+    const Multiplier& y = found.constraints[static_cast<std::size_t>(j)];
+    found.columns.col(j) = y.sign * problem.c_scale(y.constraint) * point.c_x.row(y.constraint).transpose();
+  }
+  for (std::size_t j = 0; j < found.variables.size(); ++j)
+    found.columns(found.variables[j].first, found.count() + static_cast<Index>(j)) = found.variables[j].second;
+  return found;
+}
+
+}  // namespace
+
+Stationarity stationarity(const NonlinearProgram& problem, const VectorXd& x, const NlpPoint& point) {
   VectorXd r = problem.f_scale * point.f_x;
   std::vector<Multiplier> multipliers;
   for (Index i = 0; i < problem.constraints(); ++i) {
@@ -92,32 +122,56 @@ double optimality(const NonlinearProgram& problem, const VectorXd& x, const NlpP
     if (near(c, upper)) multipliers.push_back({i, 1, upper - c});
     if (near(c, lower)) multipliers.push_back({i, -1, c - lower});
   }
+  Stationarity found;
+  found.multipliers.setZero(problem.constraints());
   double complementarity = 0;
   if (!multipliers.empty()) {
-    // A step out of a bound that x is near costs nothing: columns of their own.
-    std::vector<std::pair<Index, double>> at_bound;
-    for (Index k = 0; k < n; ++k) {
-      if (near(x(k), problem.x_lower(k))) at_bound.emplace_back(k, -1);
-      if (near(x(k), problem.x_upper(k))) at_bound.emplace_back(k, 1);
-    }
-    const Index m = static_cast<Index>(multipliers.size());
-    MatrixXd A = MatrixXd::Zero(n, m + static_cast<Index>(at_bound.size()));
-    for (Index j = 0; j < m; ++j) {
-      const Multiplier& y = multipliers[static_cast<std::size_t>(j)];
-      A.col(j) = y.sign * problem.c_scale(y.constraint) * point.c_x.row(y.constraint).transpose();
-    }
-    for (std::size_t j = 0; j < at_bound.size(); ++j)
-      A(at_bound[j].first, m + static_cast<Index>(j)) = at_bound[j].second;
-    const VectorXd y = non_negative_least_squares(A, -r).head(m);
-    r += A.leftCols(m) * y;
-    for (Index j = 0; j < m; ++j) {
-      const Multiplier& multiplier = multipliers[static_cast<std::size_t>(j)];
+    const NearBounds bounds = near_bounds(problem, x, point, std::move(multipliers));
+    const VectorXd y = non_negative_least_squares(bounds.columns, -r).head(bounds.count());
+    r += bounds.columns.leftCols(bounds.count()) * y;
+    for (Index j = 0; j < bounds.count(); ++j) {
+      const Multiplier& multiplier = bounds.constraints[static_cast<std::size_t>(j)];
+      found.multipliers(multiplier.constraint) += multiplier.sign * y(j);
       complementarity =
           std::max(complementarity, y(j) * problem.c_scale(multiplier.constraint) * std::abs(multiplier.slack));
     }
   }
   const VectorXd step = (-r).cwiseMin(problem.x_upper - x).cwiseMax(problem.x_lower - x);
-  return std::max(step.cwiseAbs().maxCoeff(), complementarity);
+  found.distance = std::max(step.cwiseAbs().maxCoeff(), complementarity);
+  return found;
+}
+
+double optimality(const NonlinearProgram& problem, const VectorXd& x, const NlpPoint& point) {
+  return stationarity(problem, x, point).distance;
+}
+
+Conflict conflict(const NonlinearProgram& problem, const VectorXd& x, const NlpPoint& point, double tolerance) {
+  Conflict found;
+  found.of_constraints.setZero(problem.constraints()), found.of_bounds.setZero(x.size());
+  VectorXd V_x = VectorXd::Zero(x.size());
+  std::vector<Multiplier> others;
+  for (Index i = 0; i < problem.constraints(); ++i) {
+    const double above = point.c(i) - problem.c_upper(i), below = problem.c_lower(i) - point.c(i);
+    if (std::max(above, below) > tolerance) {
+      found.of_constraints(i) = above > below ? 1 : -1;
+      V_x += found.of_constraints(i) * point.c_x.row(i).transpose();
+      continue;
+    }
+    if (near(point.c(i), problem.c_upper(i))) others.push_back({i, 1, -above});
+    if (near(point.c(i), problem.c_lower(i))) others.push_back({i, -1, -below});
+  }
+  const NearBounds bounds = near_bounds(problem, x, point, std::move(others));
+  const VectorXd z = non_negative_least_squares(bounds.columns, -V_x);
+  for (Index j = 0; j < bounds.count(); ++j) {
+    const Multiplier& multiplier = bounds.constraints[static_cast<std::size_t>(j)];
+    found.of_constraints(multiplier.constraint) += multiplier.sign * z(j) * problem.c_scale(multiplier.constraint);
+  }
+  for (std::size_t k = 0; k < bounds.variables.size(); ++k)
+    found.of_bounds(bounds.variables[k].first) +=
+        bounds.variables[k].second * z(bounds.count() + static_cast<Index>(k));
+  const double size = V_x.norm();
+  found.residual = size > 0 ? (V_x + bounds.columns * z).norm() / size : 0;
+  return found;
 }
 
 }  // namespace mbsopt

@@ -12,6 +12,8 @@
 // 0 at a Karush-Kuhn-Tucker point. It says nothing about feasibility.
 //
 //   if (optimality(problem, x, point) < 1e-6 && problem.violation(point.c) < 1e-8) ...   // stationary
+//
+// The multipliers are the prices of the constraints: f falls by y_i S_i/s per unit by which c_i's bound is eased.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,6 +24,24 @@ namespace mbsopt {
 
 // point: at x, with derivatives.
 double optimality(const NonlinearProgram& problem, const Eigen::VectorXd& x, const NlpPoint& point);
+
+struct Stationarity {
+  double distance = 0;          // the optimality
+  Eigen::VectorXd multipliers;  // y
+};
+Stationarity stationarity(const NonlinearProgram& problem, const Eigen::VectorXd& x, const NlpPoint& point);
+
+// What keeps the violated constraints from being satisfied at a point where their sum V of violations is smallest:
+//
+//   V_x + sum of z_i (gradient of constraint i towards its near bound) + sum of z_k (bound of x_k) = 0,   z >= 0
+//
+// z is found as above. V falls by z_i per unit by which bound i is eased, by 1 where constraint i is violated itself.
+struct Conflict {
+  Eigen::VectorXd of_constraints;  // z_i; 1 where violated; negative of these for lower bounds
+  Eigen::VectorXd of_bounds;       // z_k, negative for lower bounds
+  double residual = 0;             // |sum|/|V_x|: near 0 where the point is such a point
+};
+Conflict conflict(const NonlinearProgram& problem, const Eigen::VectorXd& x, const NlpPoint& point, double tolerance);
 
 // min |A z - b|, z >= 0.
 Eigen::VectorXd non_negative_least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);

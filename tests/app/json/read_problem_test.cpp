@@ -282,3 +282,24 @@ TEST_CASE("options of the integrator have ranges", "[json]") {
   const std::string error = error_of({"simulation.integrator.max_step=1e-3", options + "min_step=1e-2"});
   CHECK(error.find(options + "min_step: is 0.01 s, above max_step") != std::string::npos);
 }
+
+TEST_CASE("a limit on a mean of an expression becomes one on an objective of its own", "[read_problem]") {
+  const std::string limit = "design.subject_to=[{\"maximum_of\": \"tip_y + 1\", \"lower\": -4, \"upper\": 2}]";
+  const Problem problem = read_problem_text(kFile, "file.json", {limit});
+  const ObjectiveBound& bound = problem.design->subject_to.at(0);
+  CHECK(bound.objective == "maximum_of tip_y + 1");
+  const ObjectiveSpec& objective = problem.objectives.back();
+  CHECK(objective.name == bound.objective);
+  CHECK(objective.sharpness == 25);  // 100/4
+  const auto of = [](const std::string& bounds) { return error_of({"design.subject_to=[" + bounds + "]"}); };
+  CHECK_THAT(of(R"({"upper": 2})"), Catch::Contains("design.subject_to[0]: does not say what it bounds"));
+  CHECK_THAT(of(R"({"objective": "track", "rms_of": "tip_y", "upper": 2})"),
+             Catch::Contains("design.subject_to[0]: bounds several things"));
+  CHECK_THAT(of(R"({"objective": "track", "sharpness": 3, "upper": 2})"),
+             Catch::Contains("design.subject_to[0].sharpness: is given without maximum_of"));
+  CHECK_THAT(of(R"({"maximum_of": "tip_z", "upper": 2})"),
+             Catch::Contains("design.subject_to[0].maximum_of: ") && Catch::Contains("tip_y"));
+  CHECK_THAT(of(R"({"maximum_of": "tip_y"})"), Catch::Contains("has neither \"lower\" nor \"upper\""));
+  CHECK_THAT(of(R"({"maximum_of": "tip_y", "upper": 2}, {"maximum_of": "tip_y", "lower": 1})"),
+             Catch::Contains("design.subject_to[1]: bounds maximum_of tip_y once more"));
+}

@@ -89,7 +89,8 @@ TEST_CASE("Gauss-Newton of an integral of squares is the integral of 2 J'J", "[g
 
 TEST_CASE("Gauss-Newton is exact where no second derivatives of the motion come in", "[gauss_newton]") {
   // Expressions of parameters and time: every kind of objective, its chain rule and all.
-  std::vector<ObjectiveSpec> objectives{named("sum"), named("rms"), named("most"), named("least"), named("sharp")};
+  std::vector<ObjectiveSpec> objectives{named("sum"),   named("rms"),   named("most"),
+                                        named("least"), named("sharp"), named("width")};
   objectives[0].running = testing::f("sin(t*w2/10)*c + w2^2*t/100");
   objectives[0].terminal = testing::f("exp(c)*w2 + 0*theta"), objectives[0].parameters_only = testing::f("w2^2*c");
   objectives[0].samples = {{0.3, testing::f("(w2 - t)^3")}};
@@ -97,6 +98,7 @@ TEST_CASE("Gauss-Newton is exact where no second derivatives of the motion come 
   objectives[2].mean("maximum_of") = objectives[3].mean("minimum_of") = testing::f("c*sin(t*w2/10)*w2/20");
   objectives[2].sharpness = objectives[3].sharpness = 5;
   objectives[4].mean("maximum_of") = testing::f("100 + c*sin(t*w2/10)*w2"), objectives[4].sharpness = 60;
+  objectives[5].mean("peak_to_peak_of") = testing::f("c*sin(t*w2/10)*w2/20"), objectives[5].sharpness = 5;
   Problem problem = swing();
   problem.scene.simulation.integrator.rtol = 1e-10, problem.scene.simulation.integrator.atol = 1e-12;
   problem.scene.simulation.integrator.max_step = 0.005;  // quadratures of both are exact to 1e-8 then

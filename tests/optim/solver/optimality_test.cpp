@@ -45,6 +45,34 @@ TEST_CASE("multipliers of the constraints are found: HS071 is optimal at its sol
   CHECK(optimality(problem, moved, at(problem, moved)) > 1e-3);
 }
 
+TEST_CASE("multipliers are the prices of constraints: those of HS071 are the published ones", "[optimality]") {
+  Hs071 problem;
+  const Stationarity found = stationarity(problem, Hs071::solution(), at(problem, Hs071::solution()));
+  // Hock and Schittkowski 71: 0.55229366 of the product, at its lower bound, 0.16146857 of the sphere
+  CHECK(found.multipliers.cwiseAbs().maxCoeff() == Approx(0.55229366).epsilon(1e-5));
+  CHECK(found.multipliers.cwiseAbs().minCoeff() == Approx(0.16146857).epsilon(1e-5));
+}
+
+TEST_CASE("a conflict names what keeps a violated constraint from holding, with its price", "[optimality]") {
+  // x0 + x1 >= 3 is violated, x0 - x1 <= 0.5 and x1 <= 1 bind: 1 = z_c, 1 = -z_c + z_b
+  struct Corner : NonlinearProgram {
+    Corner() : NonlinearProgram(2, 2) { c_lower(0) = 3, c_upper(1) = 0.5, x_upper(1) = 1; }
+    void evaluate(const Eigen::VectorXd& x, NlpPoint& p) override {
+      p.c << x(0) + x(1), x(0) - x(1);
+      p.c_x << 1, 1, 1, -1;
+    }
+  } problem;
+  const auto x = vector({1.5, 1});
+  const Conflict found = conflict(problem, x, at(problem, x), 1e-8);
+  CHECK(found.of_constraints(0) == -1);
+  CHECK(found.of_constraints(1) == Approx(1));
+  CHECK(found.of_bounds(0) == 0);
+  CHECK(found.of_bounds(1) == Approx(2));
+  CHECK(found.residual < 1e-12);
+  const auto inside = vector({0, 0});
+  CHECK(conflict(problem, inside, at(problem, inside), 1e-8).residual == Approx(1));
+}
+
 TEST_CASE("a multiplier of the wrong sign is no excuse", "[optimality]") {
   struct Line : Counted {
     Line() : Counted(1, 1) {}
