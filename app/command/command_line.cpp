@@ -98,6 +98,9 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
     sub.add_option("--profile", options.profiles, "profile likelihood of fitted parameters: k1,run1.theta0")
         ->delimiter(',')
         ->type_name("NAME,...");
+    sub.add_flag("--preflight", options.preflight, "say what the data hold and would determine, and fit nothing");
+    sub.add_option("--recover", options.recover, "known-truth recovery: fits of so many simulated records")
+        ->check(CLI::Range(2, 1'000'000));
   }
   if (name == "tradeoff") {
     sub.add_option("--budget", options.budget,

@@ -7,6 +7,7 @@
 #include "app/results/identification_results.hpp"
 #include "app/results/left_out_bodies.hpp"
 #include "app/results/optimized_problem.hpp"
+#include "app/results/preflight_results.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
@@ -21,6 +22,7 @@
 #include "optim/fit/experiment.hpp"
 #include "optim/fit/fit_comparison.hpp"
 #include "optim/fit/identification.hpp"
+#include "optim/fit/recovery.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
 namespace mbsopt {
@@ -85,6 +87,41 @@ IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem,
   run.progress.finish();
   if (run.problem.identification->multistart) describe_given(run.problem, fit);
   return fit;
+}
+
+Recovery recovered(Run& run, const std::vector<CsvTable>& data, const IdentificationResult& fit) {
+  RecoveryOptions options;
+  options.seeds = run.context.options.recover;
+  options.simulation_progress = told(run);
+  options.progress = [&](int done) {
+    run.progress.iteration(fmt::format("recovery   {} of {}", done, options.seeds));
+    return !interrupted();
+  };
+  Recovery recovery = recover(run.problem, data, fit, options);
+  run.progress.finish();
+  if (recovery.failed > 0)
+    run.warn(fmt::format("--recover: {} of {} fits of simulated records failed", recovery.failed,
+                         recovery.failed + recovery.fits));
+  return recovery;
+}
+
+int preflight(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
+  IdentificationOptions options;
+  options.preflight = true, options.simulation_progress = told(run);
+  const IdentificationResult start = run_identification(needed, data, options);
+  run.progress.finish();
+  if (start.residuals.empty()) {
+    run.failed(start.message);
+    return run.finish();
+  }
+  const std::vector<ChannelData> channels = channel_data(start);
+  print_preflight(run.context.out, start, channels);
+  add_preflight(run.result, start, channels);
+  for (const std::string& warning : start.warnings) run.warn(warning);
+  for (const ChannelData& c : channels)
+    if (c.least == c.most && c.samples > 1)
+      run.warn(fmt::format("experiment '{}': the column '{}' never changes", c.experiment, c.column));
+  return run.finish();
 }
 
 // Of the first experiment that is fitted: it stands for all of them where an integrator is chosen or judged.
@@ -187,6 +224,7 @@ int identify_command(const CommandContext& context) {
   const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
   for (const std::string& warning : doubts_about_fit(needed, data, {{}, [](double) { return !interrupted(); }}))
     run.warn(warning);
+  if (context.options.preflight) return preflight(run, needed, data);
   LongRun long_run(run);
   const BestStart best = from_best_start(run, long_run, data);
   const std::optional<MultistartSpec>& starts = run.problem.identification->multistart;
@@ -197,6 +235,11 @@ int identify_command(const CommandContext& context) {
   add_to_result(run.result, fit);
   print_fit(context.out, fit, effort(run, starts, fit.simulations, fit.wall_seconds));
   for (const std::string& warning : fit.warnings) run.warn(warning);
+  if (context.options.recover > 0 && fit.ok() && !interrupted()) {
+    const Recovery recovery = recovered(run, data, fit);
+    print_recovery(context.out, recovery);
+    add_to_result(run.result, recovery);
+  }
   const Trajectory history = history_of(fit);
   if (fit.status == SolverStatus::stopped || interrupted()) {
     long_run.stopped("optimized.json holds the best fit so far");

@@ -2,6 +2,8 @@
 // and syntax; meanings are checked on the finished problem.
 #pragma once
 
+#include <algorithm>
+#include <iterator>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -163,7 +165,12 @@ template <class T, std::size_t N>
 void FieldReader::choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const Says& says) {
   const Node* const node = get(key, says);
   std::string given;
-  if (!node || !read_string(*node, inside(key), given)) return;
+  if (!node) return;
+  const bool has_truth = std::ranges::find(choices, "true", &Choice<T>::word) != std::end(choices);
+  if (node->kind == Node::Kind::boolean && has_truth)
+    given = node->boolean ? "true" : "false";
+  else if (!read_string(*node, inside(key), given))
+    return;
   std::vector<std::string> available;
   for (const Choice<T>& choice : choices) {
     if (choice.word == given) {

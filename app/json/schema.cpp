@@ -59,8 +59,9 @@ class SchemaWriter {
   void choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const Says& says) {
     Json all = Json::array(), initial;
     for (const Choice<T>& choice : choices) {
-      all.push_back(choice.word);
-      if (choice.value == value) initial = choice.word;
+      const bool is_truth = choice.word == "true" || choice.word == "false";
+      all.push_back(is_truth ? Json(choice.word == "true") : Json(choice.word));
+      if (choice.value == value) initial = all.back();
     }
     put(key, says, {{"enum", all}}, initial);
   }

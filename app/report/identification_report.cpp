@@ -98,6 +98,7 @@ void add_fit_outcome(HtmlPage& page, const Json& result) {
   const Json& identifiability = result.at("identifiability");
   page.table({"", ""}, {{"samples", cell(statistics.at("samples"))},
                         {"degrees of freedom", cell(statistics.at("degrees_of_freedom"))},
+                        {"standard errors", cell(statistics.at("covariance"))},
                         {"variance of the residuals, in sigma^2", cell(statistics.at("residual_variance"), 4)},
                         {"what is minimised, before", cell(optimizer.at("objective_initial"))},
                         {"after, with the same sigmas", cell(optimizer.at("objective_final"))},

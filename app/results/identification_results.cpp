@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "app/files/csv_cell.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
+#include "optim/problem/problem_vocabulary.hpp"
 
 namespace mbsopt {
 namespace {
@@ -150,7 +152,9 @@ void print_fit(std::ostream& out, const IdentificationResult& fit, const std::st
   for (const std::string& words : fit.statistics.unidentifiable) out << "not determined by the data: " << words << '\n';
   const FitStatistics& s = fit.statistics;
   if (!s.none.empty()) out << fmt::format("no standard errors and intervals: {}\n", s.none);
-  out << fmt::format("\n{}", counted(fit.samples, "sample"));
+  out << '\n';
+  if (s.none.empty()) out << fmt::format("standard errors: {}\n", s.covariance_in_words());
+  out << counted(fit.samples, "sample");
   if (s.std_error.size() > 0)
     out << fmt::format(", {}; condition number {}",
                        counted(s.degrees_of_freedom, "degree of freedom", "degrees of freedom"),
@@ -160,10 +164,28 @@ void print_fit(std::ostream& out, const IdentificationResult& fit, const std::st
                      counted(fit.evaluations, "evaluation"), effort);
 }
 
+void print_recovery(std::ostream& out, const Recovery& recovery) {
+  TextTable table({"recovery", "truth", "mean", "bias", "scatter", "95 % intervals that hold it", "unit"});
+  for (const RecoveredParameter& p : recovery.parameters)
+    table.add({p.name, significant(p.truth, 9), significant(p.mean, 9), significant(p.bias(), 3),
+               significant(p.scatter, 3), fmt::format("{:.1f} %", 100 * p.share), p.unit.empty() ? "-" : p.unit});
+  out << '\n' << table.text() << fmt::format("{} of simulated records\n", counted(recovery.fits, "fit"));
+}
+
+void add_to_result(Json& result, const Recovery& recovery) {
+  result["recovery"] = Json::object();
+  for (const RecoveredParameter& p : recovery.parameters)
+    result["recovery"][p.name] = {{"truth", p.truth},     {"mean", p.mean},   {"bias", p.bias()},
+                                  {"scatter", p.scatter}, {"share", p.share}, {"fits", recovery.fits}};
+}
+
 void add_to_result(Json& result, const IdentificationResult& fit) {
   result["parameters"] = Json::object();
-  for (const FittedParameter& p : fit.parameters) {
+  for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
+    const FittedParameter& p = fit.parameters[k];
     result["parameters"][p.name] = to_json(p);
+    if (const Eigen::VectorXd& inflation = fit.statistics.inflation; inflation.size() > 0)
+      result["parameters"][p.name]["variance_inflation"] = inflation(static_cast<Eigen::Index>(k));
     if (fit.statistics.correlation.size() > 0) result["correlation"]["names"].push_back(p.name);
   }
   for (Eigen::Index i = 0; i < fit.statistics.correlation.rows(); ++i) {
@@ -171,21 +193,21 @@ void add_to_result(Json& result, const IdentificationResult& fit) {
     result["correlation"]["matrix"].push_back(std::vector<double>(row.begin(), row.end()));
   }
   for (const ExperimentFit& e : fit.experiments) result["experiments"][e.name] = to_json(e);
-  result["optimizer"] = {{"type", "ceres"},
-                         {"status", to_string(fit.status)},
-                         {"message", fit.message},
-                         {"iterations", fit.iterations},
-                         {"evaluations", fit.evaluations},
-                         {"failed_evaluations", fit.failed_evaluations},
-                         {"simulations", fit.simulations},
-                         {"samples", fit.samples},
-                         {"wall_seconds", fit.wall_seconds},
-                         {"objective_initial", fit.cost_initial},
+  result["optimizer"] = {{"type", "trust_region"},           {"status", to_string(fit.status)},
+                         {"message", fit.message},           {"iterations", fit.iterations},
+                         {"evaluations", fit.evaluations},   {"failed_evaluations", fit.failed_evaluations},
+                         {"simulations", fit.simulations},   {"samples", fit.samples},
+                         {"wall_seconds", fit.wall_seconds}, {"objective_initial", fit.cost_initial},
                          {"objective_final", fit.cost_final}};
+  const auto type = std::ranges::find(kCovariances, fit.statistics.covariance_type, &Choice<CovarianceType>::value);
+  result["covariance"] = type->word;
   result["statistics"] = {{"samples", fit.samples},
+                          {"covariance", fit.statistics.covariance_in_words()},
                           {"degrees_of_freedom", fit.statistics.degrees_of_freedom},
                           {"residual_variance", fit.statistics.residual_variance},
-                          {"variance", fit.statistics.variance}};
+                          {"variance", fit.statistics.variance},
+                          {"aic", fit.aic},
+                          {"bic", fit.bic}};
   for (const ParameterProfile& p : fit.profiles) result["profiles"][p.name] = to_json(p);
   result["identifiability"] = {{"condition_number", fit.statistics.condition_number},
                                {"unidentifiable", fit.statistics.unidentifiable}};

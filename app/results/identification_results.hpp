@@ -7,12 +7,15 @@
 #include "app/files/result_json.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "optim/fit/identification.hpp"
+#include "optim/fit/recovery.hpp"
 
 namespace mbsopt {
 
 // effort: what it took, effort() of multistart.hpp.
 void print_fit(std::ostream& out, const IdentificationResult& fit, const std::string& effort);
-// parameters, correlation, experiments, optimizer, statistics, identifiability, profiles
+void print_recovery(std::ostream& out, const Recovery& recovery);
+void add_to_result(Json& result, const Recovery& recovery);
+// parameters, correlation, covariance, experiments, optimizer, statistics, identifiability, profiles
 void add_to_result(Json& result, const IdentificationResult& fit);
 
 Trajectory history_of(const IdentificationResult& fit);      // history.csv

@@ -21,6 +21,8 @@ struct CommandOptions {
   std::string method = "auto";        // --method of gradient
   bool hessian = false;               // --hessian of gradient
   std::vector<std::string> profiles;  // --profile of identify: fitted parameters
+  bool preflight = false;             // --preflight of identify: no fit
+  int recover = 0;                    // --recover of identify: fits of simulated records
   double budget = 60;                 // --budget of tradeoff [s]
   std::string alpha;                  // --alpha of tradeoff: the penalty study
   std::optional<double> apply;        // --apply of tradeoff: the accuracy wanted

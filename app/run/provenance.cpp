@@ -1,7 +1,6 @@
 #include "app/run/provenance.hpp"
 
 #include <IpoptConfig.h>
-#include <ceres/version.h>
 #include <fmt/format.h>
 #include <nlopt.h>
 #include <sundials/sundials_config.h>
@@ -37,7 +36,6 @@ nlohmann::ordered_json library_versions() {
   return {{"Eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
           {"Ipopt", IPOPT_VERSION},
           {"NLopt", nlopt_version_text()},
-          {"Ceres", CERES_VERSION_STRING},
           {"SUNDIALS", SUNDIALS_VERSION},
           {"fmt", fmt::format("{}.{}.{}", FMT_VERSION / 10000, FMT_VERSION / 100 % 100, FMT_VERSION % 100)},
           {"nlohmann_json", fmt::format("{}.{}.{}", NLOHMANN_JSON_VERSION_MAJOR, NLOHMANN_JSON_VERSION_MINOR,

@@ -10,7 +10,7 @@
 //   reference(key, string&, To, says)           the name of a body, joint, force, sensor, parameter, objective
 //   references(key, vector<string>&, To, says)
 //   texts(key, vector<string>&, says)           a text, or a list of them
-//   choice(key, T&, Choice<T>[], says)       one of a few words that stand for values
+//   choice(key, T&, Choice<T>[], says)       one of a few words that stand for values; true and false as such
 //   word(key, string&, Words, says)             one of a few words
 //   type(key, word, rows, says)                 the type of an object; returns its row, nullptr when there is none
 //   number(key, Field&, says)                   a number or an expression over parameters and definitions

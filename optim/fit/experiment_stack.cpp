@@ -54,6 +54,19 @@ Eigen::VectorXd ExperimentStack::sigma() const {
                     [](const Experiment& model, const Experiment::Sample& s) { return model.sigma(s.channel); });
 }
 
+std::vector<SampledRecord> ExperimentStack::records_in_time() const {
+  const Eigen::VectorXd t =
+      per_sample(members_, [](const Experiment& model, const Experiment::Sample& s) { return model.times()[s.time]; });
+  std::vector<SampledRecord> in_time;
+  Eigen::Index row = 0;
+  for (const Member& m : members_) {
+    const Eigen::Index n = static_cast<Eigen::Index>(m.model.samples().size());
+    in_time.push_back({row, t.segment(row, n)});
+    row += n;
+  }
+  return in_time;
+}
+
 Experiment::Residuals ExperimentStack::residuals(const Member& member, const Eigen::VectorXd& u) {
   ResidualRecords::Asked asked{member.experiment, u, {}};
   Experiment::Residuals r;

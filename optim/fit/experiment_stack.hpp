@@ -6,12 +6,13 @@
 // The loss does not see priors. A value free in several experiments has its prior in each.
 //
 //   ExperimentStack stack(std::move(experiments), unknowns, scaling, spec.loss);
-//   LeastSquaresResult fit = solve_with_ceres(stack, scaling.to_x(start_of(unknowns)));
+//   LeastSquaresResult fit = solve_least_squares(stack, scaling.to_x(start_of(unknowns)));
 #pragma once
 
 #include <functional>
 #include <vector>
 
+#include "optim/fit/score_variance.hpp"
 #include "optim/fit/unknown_parameters.hpp"
 #include "optim/solver/least_squares.hpp"
 
@@ -48,7 +49,8 @@ class ExperimentStack : public LeastSquaresProblem {
   const std::vector<Member>& members() const { return members_; }
   const VariableScaling& scaling() const { return scaling_; }
   Eigen::Index samples() const { return size - plain; }
-  Eigen::VectorXd measured() const, sigma() const;  // per sample
+  Eigen::VectorXd measured() const, sigma() const;     // per sample
+  std::vector<SampledRecord> records_in_time() const;  // one per member
   long simulations() const { return simulations_; }
   std::function<bool(double t)> go_on;  // within a simulation; false abandons it
   ResidualRecords* records = nullptr;

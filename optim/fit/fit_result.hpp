@@ -86,8 +86,9 @@ struct IdentificationResult {
   std::vector<FitRow> history;
   std::vector<ParameterProfile> profiles;
   double cost_initial = 0, cost_final = 0;  // what is minimised, both by the loss and the sigmas of the end
-  std::vector<std::string> warnings;        // sentences, some after the path of what they are about
-  std::size_t samples = 0;                  // fitted
+  double aic = FitStatistics::kUnknown, bic = FitStatistics::kUnknown;  // of fits by the square
+  std::vector<std::string> warnings;  // sentences, some after the path of what they are about
+  std::size_t samples = 0;            // fitted
   int iterations = 0;
   long evaluations = 0, failed_evaluations = 0;  // points at which all experiments were simulated, with derivatives
   long simulations = 0;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <stdexcept>
 
 #include "core/expression/counted.hpp"
@@ -17,7 +18,7 @@
 #include "optim/machine/stopwatch.hpp"
 #include "optim/problem/parameter_values.hpp"
 #include "optim/problem/unused_parameters.hpp"
-#include "optim/solver/ceres_solver.hpp"
+#include "optim/solver/levenberg_marquardt.hpp"
 
 namespace mbsopt {
 namespace {
@@ -25,6 +26,8 @@ namespace {
 // Effects that are the same by the physics, such as a late clock and an early start, differs by a few tolerances of the
 // integration in the numbers. Measured: 1/condition of that pair is 0.3 to 8 times rtol at 1e-5 to 1e-8.
 constexpr double kTolerances = 10, kLeastAccuracy = 1e-5;
+// Records, from which on their sums tell a variance: Student's quantile is then 2.09, against 1.96 for any number.
+constexpr std::size_t kManyRecords = 20;
 constexpr double kTouches = 1e-9;  // of the bound's size: the trust region puts solutions exactly on bounds
 
 std::string place_of(std::size_t experiment) { return fmt::format("identification.experiments[{}]", experiment); }
@@ -42,7 +45,7 @@ class Identification {
     fit();
     const bool usable = result_.status != SolverStatus::failed;
     for (std::size_t e = 0; e < spec_.experiments.size(); ++e)
-      if (spec_.experiments[e].validate && usable && !abandoned_) validate(e);
+      if (spec_.experiments[e].validate && usable && !abandoned_ && !options_.preflight) validate(e);
     order_residuals();
     result_.wall_seconds = stopwatch.seconds();
     return std::move(result_);
@@ -80,14 +83,30 @@ class Identification {
     for (const UnknownParameter& u : unknowns) data.units.push_back(u.description.unit);
     data.loss = spec_.loss, data.sigma_is_known = spec_.sigma_is_known;
     data.change = u_x.cwiseAbs();
+    data.covariance = covariance_for(stack);
+    for (const UnknownParameter& u : unknowns) data.of_one_record.push_back(!u.shared);
+    data.records = stack.records_in_time();
     data.record = stack.measured().cwiseQuotient(stack.sigma()).norm();
     const IntegratorSettings& integrator = scene_.simulation.integrator;
     if (!integrator.step) data.accuracy = std::min(kTolerances * integrator.rtol, kLeastAccuracy);
+    if (options_.preflight) data.loss = {}, data.sigma_is_known = true, data.covariance = CovarianceType::white;
     FitStatistics statistics = fit_statistics(data);
-    const bool ended = solution.status == SolverStatus::converged || solution.status == SolverStatus::no_progress;
+    const bool ended = options_.preflight || solution.status == SolverStatus::converged ||
+                       solution.status == SolverStatus::no_progress;
     if (abandoned_ || !ended)
       withhold_errors(statistics, "they hold at a minimum, and the fit ended before it reached one");
     return statistics;
+  }
+
+  // By the residuals of the experiments of the stack, which are scored already.
+  CovarianceType covariance_for(const ExperimentStack& stack) const {
+    const bool many = stack.members().size() >= kManyRecords;
+    if (spec_.covariance == CovarianceType::windows && stack.members().size() < 2) return CovarianceType::newey_west;
+    if (spec_.covariance != CovarianceType::automatic) return spec_.covariance;
+    for (const ExperimentStack::Member& m : stack.members())
+      for (const ChannelFit& channel : result_.experiments[m.experiment].channels)
+        if (!channel.analysis.white()) return many ? CovarianceType::windows : CovarianceType::newey_west;
+    return CovarianceType::white;
   }
 
   std::vector<FittedParameter> described(const std::vector<UnknownParameter>& unknowns, const Eigen::VectorXd& values,
@@ -114,10 +133,10 @@ class Identification {
     return fitted;
   }
 
-  CeresOptions solver_options() const {
-    CeresOptions solver;
+  LeastSquaresOptions solver_options() const {
+    LeastSquaresOptions solver;
     solver.tolerance = spec_.tolerance;
-    solver.max_iterations = spec_.max_iterations;
+    solver.max_iterations = options_.preflight ? 0 : spec_.max_iterations;
     return solver;
   }
 
@@ -129,8 +148,8 @@ class Identification {
 
   // of_fit: its iterations are those of the result.
   LeastSquaresResult minimised(ExperimentStack& stack, const Eigen::VectorXd& x, bool of_fit) {
-    CeresOptions solver = solver_options();
-    if (!of_fit) return solve_with_ceres(stack, x, solver);
+    LeastSquaresOptions solver = solver_options();
+    if (!of_fit) return solve_least_squares(stack, x, solver);
     const Eigen::VectorXd sigma = stack.sigma();
     const int before = result_.iterations;
     solver.progress = [&](const LeastSquaresProgress& p) {
@@ -138,7 +157,7 @@ class Identification {
           {before + p.iteration, p.cost, p.gradient_norm, p.step_norm, stack.scaling().to_rho(p.x)});
       return !options_.progress || options_.progress(result_.history.back());
     };
-    LeastSquaresResult solution = solve_with_ceres(stack, x, solver);
+    LeastSquaresResult solution = solve_least_squares(stack, x, solver);
     if (apart_at_start_.size() == 0 && solution.z_initial.size() > 0) {
       apart_at_start_ = solution.z_initial;
       apart_at_start_.head(stack.samples()).array() *= sigma.array();
@@ -151,18 +170,41 @@ class Identification {
   // The estimate under a loss, with the sigmas that it estimates.
   LeastSquaresResult estimate(ExperimentStack& stack, const Loss& loss, const Eigen::VectorXd& x, bool of_fit) {
     stack.loss = loss;
-    LeastSquaresResult solution = minimised(stack, x, of_fit);
-    if (!of_fit || !estimates_sigma(spec_)) return solution;
+    if (!of_fit || !estimates_sigma(spec_)) return minimised(stack, x, of_fit);
+    SigmaEstimation sigmas(stack, spec_);
+    return loss.type == LossType::squared ? without_sigmas(stack, sigmas, x) : in_turn_with_sigmas(stack, sigmas, x);
+  }
+
+  LeastSquaresResult without_sigmas(ExperimentStack& stack, SigmaEstimation& sigmas, const Eigen::VectorXd& x) {
+    stack.groups = sigmas.scale_groups();
+    LeastSquaresResult solution = minimised(stack, x, true);
+    stack.groups.clear();
+    sigmas_are_estimated_ = solution.status == SolverStatus::converged || solution.status == SolverStatus::no_progress;
+    if (sigmas_are_estimated_) take(sigmas, stack, solution);
+    if (solution.point.z.size() > 0) solution.cost_final = stack.cost(solution.point.z);
+    return solution;
+  }
+
+  // The sigmas by the residuals of the solution, which are by these sigmas then. Returns the largest change.
+  static double take(SigmaEstimation& sigmas, const ExperimentStack& stack, LeastSquaresResult& solution) {
+    const Eigen::VectorXd before = stack.sigma();
+    const double change = sigmas.take(solution.point.z);
+    const Eigen::ArrayXd factor = before.cwiseQuotient(stack.sigma()).array();
+    solution.point.z.head(stack.samples()).array() *= factor;
+    solution.point.z_x.topRows(stack.samples()).array().colwise() *= factor;
+    solution.cost_final = stack.cost(solution.point.z);
+    return change;
+  }
+
+  LeastSquaresResult in_turn_with_sigmas(ExperimentStack& stack, SigmaEstimation& sigmas, const Eigen::VectorXd& x) {
+    LeastSquaresResult solution = minimised(stack, x, true);
     for (int round = 0; solution.status == SolverStatus::converged; ++round) {
-      const SigmaEstimates sigmas = estimated_sigmas(stack, spec_, solution.point.z);
-      sigmas_are_estimated_ = sigmas.change < kSigmaChange || round == kSigmaRounds;
-      if (sigmas.change < kSigmaChange) break;
-      if (round == kSigmaRounds) {
-        solution.message += fmt::format("; estimated sigmas still change by {:.1g} of themselves", sigmas.change);
-        break;
-      }
-      use_sigmas(stack, sigmas);
-      solution = minimised(stack, solution.x, of_fit);
+      const double change = take(sigmas, stack, solution);
+      sigmas_are_estimated_ = change < kSigmaChange || round == kSigmaRounds;
+      if (round == kSigmaRounds && change >= kSigmaChange)
+        solution.message += fmt::format("; estimated sigmas still change by {:.1g} of themselves", change);
+      if (sigmas_are_estimated_) break;
+      solution = minimised(stack, solution.x, true);
     }
     return solution;
   }
@@ -199,7 +241,7 @@ class Identification {
       result_.warnings.push_back(
           "the fit ended without reaching a minimum, since no step lowered the cost: standard errors and intervals "
           "hold at a minimum, and may be wrong here");
-    if (estimates_sigma(spec_) && !sigmas_are_estimated_)
+    if (estimates_sigma(spec_) && !sigmas_are_estimated_ && !options_.preflight)
       result_.warnings.push_back("the fit ended before the sigmas were estimated");
     const Eigen::VectorXd z = solution.point.z.head(stack.samples());
     const Eigen::Index beyond = (z.array().abs() > stack.loss.s()).count();
@@ -243,18 +285,35 @@ class Identification {
     const Eigen::VectorXd values = scaling.to_rho(solution.x);
     const bool usable = solution.point.z.size() > 0;
     if (usable) refuse_without_pull(stack, solution);
-    if (usable) result_.statistics = statistics_at(solution, stack, unknowns);
+    if (usable) {
+      score_all(stack, solution.point.z, sigmas_are_estimated_);
+      result_.statistics = statistics_at(solution, stack, unknowns);
+      compare_by_likelihood(stack, solution.point.z,
+                            sigmas_are_estimated_ ? SigmaEstimation(stack, spec_).scale_groups().size() : 0);
+    }
     warn_of(stack, solution);
     result_.parameters = described(unknowns, values, result_.statistics);
     shared_ = parameter_values(scene_);
     for (std::size_t i = 0; i < unknowns.size(); ++i)
       if (unknowns[i].shared) shared_(unknowns[i].parameter) = values(static_cast<Eigen::Index>(i));
-    if (usable) score_all(stack, solution.point.z, sigmas_are_estimated_);
     if (result_.status == SolverStatus::converged)
       for (const Eigen::Index k : profiled)
         if (!abandoned_) result_.profiles.push_back(profile_of(stack, k, solution.x));
     if (abandoned_) result_.status = SolverStatus::stopped, result_.message = "stopped on request";
     result_.simulations += stack.simulations();
+  }
+
+  // Akaike's and Bayes' criteria (Burnham and Anderson, "Model Selection and Multimodel Inference" (2002), chapter 2):
+  //   AIC = 2 k - 2 log L,  BIC = k log N - 2 log L,  -2 log L = sum [z^2/v + log(2 pi v sigma^2)]
+  // v is 1 where sigma is known or estimated, else it is the mean square of z and one more parameter.
+  void compare_by_likelihood(const ExperimentStack& stack, const Eigen::VectorXd& z, std::size_t sigmas) {
+    const double N = static_cast<double>(stack.samples()), squares = z.head(stack.samples()).squaredNorm();
+    const bool scaled = sigmas == 0 && !spec_.sigma_is_known;
+    const double v = scaled ? squares / N : 1;
+    if (spec_.loss.type != LossType::squared || !(v > 0)) return;
+    const double k = static_cast<double>(stack.variables()) + (scaled ? 1 : static_cast<double>(sigmas));
+    const double twice = squares / v + N * std::log(2 * std::numbers::pi * v) + 2 * stack.sigma().array().log().sum();
+    result_.aic = 2 * k + twice, result_.bic = k * std::log(N) + twice;
   }
 
   std::vector<Eigen::Index> profiled_unknowns(const std::vector<UnknownParameter>& unknowns) const {
@@ -278,7 +337,8 @@ class Identification {
     const double std_error = s.std_error(k) / std::abs(stack.scaling().rho_x(x)(k));
     const bool sensible = std::isfinite(std_error) && std_error > 0;
     options.first_step = sensible ? 0.5 * std_error : 0.01 * std::max(1.0, std::abs(x(k)));
-    options.likelihood_scale = s.likelihood_scale, options.quantile = s.quantile;
+    // Correlated residuals: Chandler and Bate, Biometrika 94 (2007) 167, equation 6.
+    options.likelihood_scale = s.likelihood_scale * s.inflation(k), options.quantile = s.quantile;
     options.solver = solver_options();
     ParameterProfile profile{result_.parameters[static_cast<std::size_t>(k)].name, {}, {}, {}, "", ""};
     if (!(s.likelihood_scale > 0) || !std::isfinite(s.likelihood_scale) || !std::isfinite(s.quantile)) {
@@ -324,12 +384,12 @@ class Identification {
     } else {
       const LeastSquaresResult solution = solved(stack, scaling.to_x(start_of(unknowns)), false);
       scored.message = "refitted, " + solution.message;
-      scored.refitted =
-          described(unknowns, scaling.to_rho(solution.x),
-                    solution.point.z.size() > 0 ? statistics_at(solution, stack, unknowns) : FitStatistics());
       z = solution.point.z;
+      if (z.size() > 0) score_all(stack, z, false);
+      scored.refitted = described(unknowns, scaling.to_rho(solution.x),
+                                  z.size() > 0 ? statistics_at(solution, stack, unknowns) : FitStatistics());
     }
-    if (z.size() > 0) score_all(stack, z, false);
+    if (unknowns.empty() && z.size() > 0) score_all(stack, z, false);
     result_.simulations += stack.simulations();
   }
 

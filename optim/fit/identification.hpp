@@ -34,6 +34,8 @@ struct IdentificationOptions {
   std::vector<std::shared_ptr<const UserForce>> user_forces;
   std::function<bool(const FitRow&)> progress;        // after every iteration; false stops, the best so far is kept
   std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
+  // No step is taken: residuals at the start, and the standard errors that the given sigmas predict there.
+  bool preflight = false;
   ResidualRecords* records = nullptr;  // of an earlier run that this one goes on with; of the fit and its profiles
   // After every point of a profile; false ends it there.
   std::function<bool(const std::string& name, double value, double tau)> profile_progress;

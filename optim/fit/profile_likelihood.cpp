@@ -98,7 +98,7 @@ class Side {
       if (!point.ok) return end("it could not be evaluated there: " + point.message), std::nullopt;
       p.cost = held_.cost(point.z), p.variables = held_.with(start);
     } else {
-      const LeastSquaresResult fit = solve_with_ceres(held_, start, options_.solver);
+      const LeastSquaresResult fit = solve_least_squares(held_, start, options_.solver);
       if (fit.status == SolverStatus::failed || fit.status == SolverStatus::stopped)
         return stopped_ = fit.status == SolverStatus::stopped, end(fit.message), std::nullopt;
       p.cost = fit.cost_final, p.variables = held_.with(fit.x);

@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "optim/solver/ceres_solver.hpp"
+#include "optim/solver/levenberg_marquardt.hpp"
 
 namespace mbsopt {
 
@@ -39,7 +39,7 @@ struct ProfileOptions {
   double first_step = 0;        // about half a standard error, in x, > 0
   double likelihood_scale = 1;  // v > 0
   double quantile = 1.96;
-  CeresOptions solver;
+  LeastSquaresOptions solver;
   std::function<bool(const ProfilePoint&)> progress;  // after every point; false stops
 };
 

@@ -15,7 +15,8 @@ void score_experiment(const ExperimentSpec& spec, const Experiment& model, const
     ChannelFit& channel = fit.channels[c];
     channel.column = spec.channels[c].column, channel.sensor = spec.channels[c].sensor;
     channel.missing = model.missing(c);
-    channel.sigma = model.sigma(c), channel.sigma_is_estimated = estimated && spec.channels[c].estimate_sigma;
+    channel.sigma = model.sigma(c),
+    channel.sigma_is_estimated = estimated && spec.channels[c].estimate_sigma != SigmaEstimate::none;
   }
   double sum = 0;
   std::vector<std::vector<double>> scaled(fit.channels.size());

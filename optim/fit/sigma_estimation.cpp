@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
+#include <map>
+#include <string>
 
 #include "optim/machine/median.hpp"
 
@@ -12,54 +13,81 @@ namespace {
 constexpr double kNormalMedian = 1.4826;  // 1 over the median of |x|, x normal
 constexpr double kLeast = 1e-12;          // of the largest measured value: an exact record has no noise
 
-double estimated(const Experiment& model, std::size_t channel, const Eigen::VectorXd& z, const Loss& loss,
-                 double freedom) {
-  std::vector<double> sizes;
-  double squares = 0, largest = 0;
-  for (std::size_t i = 0; i < model.samples().size(); ++i) {
-    if (model.samples()[i].channel != channel) continue;
-    const double r = std::abs(z(static_cast<Eigen::Index>(i)) * model.sigma(channel));
-    sizes.push_back(r);
-    squares += r * r, largest = std::max(largest, std::abs(model.samples()[i].measured));
-  }
-  if (sizes.empty()) return model.sigma(channel);
-  const double n = static_cast<double>(sizes.size());
-  const double sigma =
-      loss.type == LossType::squared ? std::sqrt(squares / (n * freedom)) : kNormalMedian * median(std::move(sizes));
-  return std::max({sigma, kLeast * largest, 1e-300});
-}
-
 }  // namespace
 
 bool estimates_sigma(const IdentificationSpec& spec) {
   return std::any_of(spec.experiments.begin(), spec.experiments.end(), [](const ExperimentSpec& e) {
-    return !e.validate &&
-           std::any_of(e.channels.begin(), e.channels.end(), [](const ChannelSpec& c) { return c.estimate_sigma; });
+    return !e.validate && std::any_of(e.channels.begin(), e.channels.end(),
+                                      [](const ChannelSpec& c) { return c.estimate_sigma != SigmaEstimate::none; });
   });
 }
 
-SigmaEstimates estimated_sigmas(ExperimentStack& stack, const IdentificationSpec& spec, const Eigen::VectorXd& z) {
-  const double N = static_cast<double>(stack.samples()), P = static_cast<double>(stack.variables());
-  const double freedom = N > P ? (N - P) / N : 1;
-  SigmaEstimates found;
+SigmaEstimation::SigmaEstimation(ExperimentStack& stack, const IdentificationSpec& spec) : stack_(stack) {
+  std::map<std::string, std::size_t> shared;  // group of a column
   Eigen::Index row = 0;
-  for (std::size_t i = 0; i < stack.members().size(); ++i) {
-    const ExperimentStack::Member& m = stack.members()[i];
-    const Eigen::Index n = static_cast<Eigen::Index>(m.model.samples().size());
-    const std::vector<ChannelSpec>& channels = spec.experiments[m.experiment].channels;
+  for (std::size_t m = 0; m < stack.members().size(); ++m) {
+    const ExperimentStack::Member& member = stack.members()[m];
+    const std::vector<ChannelSpec>& channels = spec.experiments[member.experiment].channels;
+    std::vector<std::size_t> group_of(channels.size(), 0);
     for (std::size_t c = 0; c < channels.size(); ++c) {
-      if (!channels[c].estimate_sigma) continue;
-      const double before = m.model.sigma(c), sigma = estimated(m.model, c, z.segment(row, n), stack.loss, freedom);
-      found.change = std::max(found.change, std::abs(sigma - before) / before);
-      found.all.push_back({i, c, sigma});
+      group_of[c] = groups_.size();
+      if (channels[c].estimate_sigma == SigmaEstimate::none) continue;
+      if (channels[c].estimate_sigma == SigmaEstimate::shared)
+        group_of[c] = shared.try_emplace(channels[c].column, groups_.size()).first->second;
+      if (group_of[c] == groups_.size()) groups_.emplace_back();
+      groups_[group_of[c]].channels.emplace_back(m, c);
     }
-    row += n;
+    for (const Experiment::Sample& sample : member.model.samples()) {
+      if (channels[sample.channel].estimate_sigma != SigmaEstimate::none) {
+        Group& group = groups_[group_of[sample.channel]];
+        group.rows.push_back(row), group.largest = std::max(group.largest, std::abs(sample.measured));
+      }
+      ++row;
+    }
   }
-  return found;
+  std::erase_if(groups_, [](const Group& group) { return group.rows.empty(); });
+  for (const Group& group : groups_) set(group, sigma(group));
 }
 
-void use_sigmas(ExperimentStack& stack, const SigmaEstimates& sigmas) {
-  for (const SigmaEstimates::One& s : sigmas.all) stack.members()[s.member].model.set_sigma(s.channel, s.sigma);
+double SigmaEstimation::sigma(const Group& group) const {
+  const auto [member, channel] = group.channels.front();
+  return stack_.members()[member].model.sigma(channel);
+}
+
+double SigmaEstimation::least(const Group& group) const { return std::max(kLeast * group.largest, 1e-150); }
+
+double SigmaEstimation::freedom() const {
+  const double N = static_cast<double>(stack_.samples()), P = static_cast<double>(stack_.variables());
+  return N > P ? (N - P) / N : 1;
+}
+
+void SigmaEstimation::set(const Group& group, double sigma) {
+  for (const auto& [member, channel] : group.channels) stack_.members()[member].model.set_sigma(channel, sigma);
+}
+
+std::vector<ScaleGroup> SigmaEstimation::scale_groups() const {
+  std::vector<ScaleGroup> scales;
+  for (const Group& group : groups_)
+    scales.push_back(
+        {group.rows, static_cast<double>(group.rows.size()) * freedom(), std::pow(least(group) / sigma(group), 2)});
+  return scales;
+}
+
+double SigmaEstimation::take(const Eigen::VectorXd& z) {
+  double change = 0;
+  for (const Group& group : groups_) {
+    const double before = sigma(group);
+    std::vector<double> sizes;
+    double squares = 0;
+    for (const Eigen::Index row : group.rows) sizes.push_back(std::abs(z(row))), squares += z(row) * z(row);
+    const double n = static_cast<double>(sizes.size());
+    const double scale = stack_.loss.type == LossType::squared ? std::sqrt(squares / (n * freedom()))
+                                                               : kNormalMedian * median(std::move(sizes));
+    const double after = std::max(scale * before, least(group));
+    change = std::max(change, std::abs(after - before) / before);
+    set(group, after);
+  }
+  return change;
 }
 
 }  // namespace mbsopt

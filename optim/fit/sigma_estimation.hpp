@@ -1,13 +1,23 @@
-// Sigmas that a fit estimates from its own residuals, one per channel and experiment.
+// Sigmas that a fit estimates from its own residuals: one per channel and experiment, or one for all channels of a
+// column.
 //
-// With normal noise the likelihood is largest where, for every channel, sigma^2 is the mean square of its residuals r:
+// With normal noise the likelihood is largest where sigma^2 is the mean square of the residuals r of its channels:
 //   -log L = sum_c [ n_c log sigma_c + 1/2 sum_i (r_ci/sigma_c)^2 ]    =>    sigma_c^2 = sum_i r_ci^2/n_c
-// The fit and the sigmas are found in turn, until no sigma changes any more: each turn lowers -log L. N/(N - P), the
-// number of samples over that without the parameters, makes up for what the fit takes off the residuals. With a loss
-// other than the square, which has outliers in mind, it is 1.4826 times the median of |r| (normal noise has that).
+// The fit eliminates these sigmas: they are the scale groups of LeastSquaresProblem, which weighs the residuals anew at
+// each of its points. N/(N - P), the number of samples over that without the parameters, makes up for what the fit
+// takes off the residuals: f_c = n_c (N - P)/N takes the place of n_c.
+//
+// With a loss other than the square, which has outliers in mind, sigma is 1.4826 times the median of |r| (normal noise
+// has that). Then fit and sigmas are found in turn, until no sigma changes any more.
+//
+//   SigmaEstimation sigmas(stack, spec);
+//   stack.groups = sigmas.scale_groups();
+//   const LeastSquaresResult fit = solve_least_squares(stack, x);
+//   sigmas.take(fit.point.z);
 #pragma once
 
 #include <Eigen/Core>
+#include <utility>
 #include <vector>
 
 #include "optim/fit/experiment_stack.hpp"
@@ -19,17 +29,28 @@ inline constexpr double kSigmaChange = 1e-6;  // relative
 
 bool estimates_sigma(const IdentificationSpec& spec);  // in a fitted experiment
 
-struct SigmaEstimates {
-  struct One {
-    std::size_t member, channel;  // of the stack, of its experiment
-    double sigma;
-  };
-  std::vector<One> all;
-  double change = 0;  // the largest, relative
-};
+class SigmaEstimation {
+ public:
+  // Gives all channels of a shared sigma that of the first one. stack must outlive it.
+  SigmaEstimation(ExperimentStack& stack, const IdentificationSpec& spec);
 
-// z: the residuals with the sigmas so far.
-SigmaEstimates estimated_sigmas(ExperimentStack& stack, const IdentificationSpec& spec, const Eigen::VectorXd& z);
-void use_sigmas(ExperimentStack& stack, const SigmaEstimates& sigmas);
+  std::vector<ScaleGroup> scale_groups() const;
+  // Sets the sigmas by residuals z, which are by the sigmas so far. Returns the largest change, relative.
+  double take(const Eigen::VectorXd& z);
+
+ private:
+  struct Group {
+    std::vector<std::pair<std::size_t, std::size_t>> channels;  // member of the stack, channel of its experiment
+    std::vector<Eigen::Index> rows;                             // of the stack
+    double largest = 0;                                         // measured value, as |x|
+  };
+  double sigma(const Group& group) const;
+  double least(const Group& group) const;
+  double freedom() const;
+  void set(const Group& group, double sigma);
+
+  ExperimentStack& stack_;
+  std::vector<Group> groups_;
+};
 
 }  // namespace mbsopt

@@ -55,6 +55,25 @@ Variances variances(const FitData& data, long degrees_of_freedom, double s2) {
   return {K * K * mean_square / (slope * slope), mean_square / slope};
 }
 
+// psi/mean(psi_z), which is z where the loss is the square.
+VectorXd influences(const FitData& data) {
+  VectorXd psi = data.z;
+  if (data.loss.type == LossType::squared) return psi;
+  double slope = 0;
+  for (Index i = 0; i < psi.size(); ++i) {
+    const double z = data.z(i);
+    const LossValue v = data.loss.at(z * z);
+    psi(i) = v.rho1 * z, slope += v.rho1 + 2 * z * z * v.rho2;
+  }
+  return psi * (static_cast<double>(psi.size()) / slope);
+}
+
+MatrixXd scores_of(const FitData& data) {
+  MatrixXd scores = influences(data).asDiagonal() * data.J;
+  scores.rowwise() -= scores.colwise().mean().eval();  // zero but for the pull of priors
+  return scores;
+}
+
 }  // namespace
 
 FitStatistics fit_statistics(const FitData& data) {
@@ -77,6 +96,13 @@ FitStatistics fit_statistics(const FitData& data) {
   MatrixXd J(N + R, P);  // v (J'J)^-1 is the covariance
   J.topRows(N) = data.J;
   if (R > 0) J.bottomRows(R) = data.J_prior * std::sqrt(variance);
+  const bool sandwich = data.covariance != CovarianceType::white && std::isfinite(s.variance);
+  const ScoreVariance scores_vary(data.covariance, data.records);
+  if (sandwich) {
+    s.quantile = quantile_975(std::min(scores_vary.freedom(), s.degrees_of_freedom), false);
+    s.covariance_type = data.covariance;
+  }
+  s.inflation.setOnes(P);
 
   // Columns of unit length; zero columns are left out.
   VectorXd size = rho.cwiseAbs(), length = J.colwise().norm().transpose();
@@ -107,11 +133,34 @@ FitStatistics fit_statistics(const FitData& data) {
     if (unseen.empty()) s.condition_number = sigma(U - 1) > 0 ? sigma(0) / sigma(U - 1) : kInfinity;
 
     const MatrixXd V = svd.matrixV().leftCols(rank) * sigma.head(rank).cwiseInverse().asDiagonal();
-    const MatrixXd covariance = variance * (V * V.transpose());
+    const MatrixXd white = variance * (V * V.transpose());
+    MatrixXd covariance = white;
+    if (sandwich) {
+      const MatrixXd q = scaled * V, inverse = V * V.transpose(), a_J = scaled.topRows(N) * inverse;
+      const MatrixXd scores = scores_of(data)(Eigen::all, used) * length(used).cwiseInverse().asDiagonal();
+      const MatrixXd within = inverse * scores_vary.within(scores) * inverse;
+      const MatrixXd between = data.covariance == CovarianceType::windows
+                                   ? MatrixXd(inverse * scores_vary.between(scores) * inverse)
+                                   : within;
+      VectorXd larger = VectorXd::Ones(U);  // standard errors than those of `within`
+      for (Index a = 0; a < U; ++a) {
+        const Index k = used[static_cast<std::size_t>(a)];
+        const bool alone = !data.of_one_record.empty() && data.of_one_record[static_cast<std::size_t>(k)];
+        const double variance_k = scores_vary.is_between(alone) ? between(a, a) : within(a, a);
+        if (within(a, a) > 0)
+          larger(a) = std::sqrt(variance_k / (within(a, a) * scores_vary.kept(a_J.col(a), q.topRows(N), alone)));
+      }
+      covariance = larger.asDiagonal() * within * larger.asDiagonal();
+      if (R > 0) {  // v^2 J_prior'J_prior, which the scaled rows have v times
+        const MatrixXd prior = std::sqrt(variance) * scaled.bottomRows(R) * inverse;
+        covariance += prior.transpose() * prior;
+      }
+    }
     for (Index a = 0; a < U; ++a)
       for (Index b = 0; b < U; ++b) {
         const Index ka = used[static_cast<std::size_t>(a)], kb = used[static_cast<std::size_t>(b)];
         s.covariance(ka, kb) = covariance(a, b) / (length(ka) * length(kb));
+        if (a == b && white(a, a) > 0) s.inflation(ka) = covariance(a, a) / white(a, a);
         const double norm = std::sqrt(covariance(a, a) * covariance(b, b));
         if (a != b) s.correlation(ka, kb) = norm > 0 ? covariance(a, b) / norm : 0;
       }
@@ -139,6 +188,19 @@ FitStatistics fit_statistics(const FitData& data) {
                         ? "as many parameters as samples leave no degree of freedom to tell the noise from"
                         : "so many residuals lie beyond the scale of the loss that its mean curvature is not positive");
   return s;
+}
+
+std::string FitStatistics::covariance_in_words() const {
+  switch (covariance_type) {
+    case CovarianceType::newey_west:
+      return "for residuals that are correlated in time (Newey and West), over up to a tenth of each record";
+    case CovarianceType::windows:
+      return "for residuals that are independent between experiments only";
+    case CovarianceType::white:
+    case CovarianceType::automatic:
+      break;
+  }
+  return "for residuals that are white";
 }
 
 void withhold_errors(FitStatistics& statistics, std::string why) {

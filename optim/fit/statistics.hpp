@@ -10,6 +10,10 @@
 //   v = K^2 [sum psi^2/(N + R - P)] / mean(psi_z)^2,   K = 1 + (P/N) var(psi_z)/mean(psi_z)^2
 // Huber, "Robust Statistics" (1981), section 7.6, equation 6.5: errors independent, of one symmetric distribution.
 //
+// Where the residuals are not white the covariance is the sandwich
+//   covariance  = G^-1 (B/v^2 + J_prior'J_prior) G^-1,   G = J'J/v + J_prior'J_prior,   B = variance of J'z
+// with B from the residuals themselves (score_variance.hpp). With another loss z is psi/mean(psi_z) in B.
+//
 // A column of J counts as zero where a change of the parameter by its own size moves the record by less than 1e-10 of
 // the record's norm. Combinations that the data do not determine come from the singular values of J with columns scaled
 // to unit length, whose ratio is the condition number (Belsley, Kuh and Welsch, "Regression Diagnostics" (1980),
@@ -27,6 +31,8 @@
 #include <string>
 #include <vector>
 
+#include "optim/fit/score_variance.hpp"
+#include "optim/problem/problem.hpp"
 #include "optim/solver/robust_loss.hpp"
 
 namespace mbsopt {
@@ -43,21 +49,28 @@ struct FitData {
   double accuracy = 0;          // of J, relative: what differs by less is the same
   Eigen::VectorXd change;       // of each parameter, about its size; empty: |rho|, or 1 where that is 0
   double record = 0;            // norm of what was measured, in sigma; 0: not known
+  CovarianceType covariance = CovarianceType::white;  // any but automatic
+  std::vector<SampledRecord> records;                 // the rows of J, where it is not white
+  std::vector<bool> of_one_record;                    // parameters that act in one record only
 };
 
 struct FitStatistics {
-  std::string none;                         // why there are no standard errors, in words; they are NaN then
-  Eigen::VectorXd std_error;                // infinite where the data do not determine the parameter
-  Eigen::MatrixXd ci95;                     // P x 2
-  Eigen::MatrixXd covariance;               // of the determined combinations
-  Eigen::MatrixXd correlation;              // ones on the diagonal
-  double residual_variance = kUnknown;      // s^2, also where it is not used; NaN without degrees of freedom
-  double variance = kUnknown;               // v
-  double likelihood_scale = kUnknown;       // of 2 (cost - least cost), in which it is about chi^2 of a parameter
+  std::string none;                     // why there are no standard errors, in words; they are NaN then
+  Eigen::VectorXd std_error;            // infinite where the data do not determine the parameter
+  Eigen::MatrixXd ci95;                 // P x 2
+  Eigen::MatrixXd covariance;           // of the determined combinations
+  Eigen::MatrixXd correlation;          // ones on the diagonal
+  double residual_variance = kUnknown;  // s^2, also where it is not used; NaN without degrees of freedom
+  double variance = kUnknown;           // v
+  double likelihood_scale = kUnknown;   // of 2 (cost - least cost), in which it is about chi^2 of a parameter
+  Eigen::VectorXd inflation;            // variance of each parameter over that for white residuals
+  CovarianceType covariance_type = CovarianceType::white;
   double quantile = kUnknown;               // of the intervals
   long degrees_of_freedom = 0;              // N + R - P
   double condition_number = kUnknown;       // infinite where a column of J is zero
   std::vector<std::string> unidentifiable;  // in words
+
+  std::string covariance_in_words() const;  // what the standard errors take the residuals for
 
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 };

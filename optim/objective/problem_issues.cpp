@@ -218,9 +218,12 @@ void check_meaning(Checker& checker, const IdentificationSpec& identification) {
   check_shared_samples(checker, experiments, list);
   for (std::size_t i = 0; identification.sigma_is_known && i < experiments.size(); ++i)
     for (std::size_t k = 0; k < experiments[i].channels.size(); ++k)
-      if (experiments[i].channels[k].estimate_sigma)
+      if (experiments[i].channels[k].estimate_sigma != SigmaEstimate::none)
         checker.issue(child_path(child_path(list, i) + ".channels", k) + ".estimate_sigma",
-                      "is true, and so is identification.sigma_is_known; one of them must be false");
+                      "asks for an estimate, but identification.sigma_is_known is true; one of them must be false");
+  const auto fitted = std::count_if(experiments.begin(), experiments.end(), [](const auto& e) { return !e.validate; });
+  if (identification.covariance == CovarianceType::windows && fitted == 1)
+    checker.issue(checker.path("covariance"), "is \"windows\", which compares experiments, and one is fitted only");
   check_unique_names(checker, experiments, "an experiment",
                      [&](std::size_t i) { return child_path(list, i) + ".name"; });
   for (std::size_t i = 0; i < experiments.size(); ++i) {

@@ -87,13 +87,17 @@ struct DesignSpec {
   std::optional<MultistartSpec> multistart;
 };
 
+// Whether a channel's sigma is given, its own estimate in each experiment, or one estimate for all channels of its
+// column.
+enum class SigmaEstimate { none, own, shared };
+
 struct ChannelSpec {
   std::string column, sensor;
-  std::string unit = {};                      // instead of the one in the header; empty: this, else SI
-  bool unwrap = false;                        // the column jumps by turns, which the sensor counts
-  Field sigma = 1.0, gain = 1.0, bias = 0.0;  // expressions over parameters
-  Field delay = 0.0;                          // [s]; gain, bias and delay may also use t and signals
-  bool estimate_sigma = false;                // sigma is where its estimate starts
+  std::string unit = {};                               // instead of the one in the header; empty: this, else SI
+  bool unwrap = false;                                 // the column jumps by turns, which the sensor counts
+  Field sigma = 1.0, gain = 1.0, bias = 0.0;           // expressions over parameters
+  Field delay = 0.0;                                   // [s]; gain, bias and delay may also use t and signals
+  SigmaEstimate estimate_sigma = SigmaEstimate::none;  // sigma is where the estimate starts
 };
 
 // A drive that follows another law in one experiment.
@@ -123,10 +127,15 @@ struct ExperimentSpec {
   bool validate = false;                                  // role: scored (only "free" refitted), not fitted
 };
 
+// What standard errors take the residuals for: independent noise, noise that is correlated in time, or noise that may
+// be anything within an experiment, but is independent between experiments. automatic: by tests of the residuals.
+enum class CovarianceType { automatic, white, newey_west, windows };
+
 struct IdentificationSpec {
   std::vector<ExperimentSpec> experiments;
   std::vector<std::string> variables;
   bool sigma_is_known = false;
+  CovarianceType covariance = CovarianceType::automatic;
   Loss loss;
   std::optional<MultistartSpec> multistart;
   double tolerance = 1e-10;

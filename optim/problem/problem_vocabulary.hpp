@@ -17,6 +17,12 @@ inline constexpr Choice<StartSampling> kSamplings[] = {{"latin_hypercube", Start
                                                        {"sobol", StartSampling::sobol}};
 inline constexpr Choice<bool> kRoles[] = {{"fit", false}, {"validate", true}};
 
+inline constexpr Choice<SigmaEstimate> kSigmaEstimates[] = {
+    {"false", SigmaEstimate::none}, {"true", SigmaEstimate::own}, {"shared", SigmaEstimate::shared}};
+inline constexpr Choice<CovarianceType> kCovariances[] = {{"auto", CovarianceType::automatic},
+                                                          {"white", CovarianceType::white},
+                                                          {"newey_west", CovarianceType::newey_west},
+                                                          {"windows", CovarianceType::windows}};
 inline constexpr Choice<LossType> kLosses[] = {{"squared", LossType::squared},
                                                {"huber", LossType::huber},
                                                {"cauchy", LossType::cauchy},
@@ -108,8 +114,9 @@ void describe(auto& v, Like<ChannelSpec> auto& c) {
   v.expression("bias", c.bias, Names::time_law, {"in the unit of the column's values; also of t and signals"});
   v.expression("delay", c.delay, Names::time_law,
                {"measured(t) = gain * sensor(t - delay) + bias + noise [s]", Need::optional, dimension::kTime});
-  v.plain("estimate_sigma", c.estimate_sigma, kAny,
-          {"true: sigma is estimated from the residuals of this channel, from the given one on"});
+  v.choice("estimate_sigma", c.estimate_sigma, kSigmaEstimates,
+           {"true: sigma is estimated from the residuals of this channel, from the given one on; shared: from those of "
+            "all fitted channels of this column that say so"});
 }
 
 void describe(auto& v, Like<SignalSamples> auto& s) { describe_samples(v, s, "file"); }
@@ -144,6 +151,9 @@ void describe(auto& v, Like<IdentificationSpec> auto& i) {
   v.references("variables", i.variables, To::parameter, {"parameters to fit", Need::required});
   v.plain("sigma_is_known", i.sigma_is_known, kAny,
           {"true: the covariance is not scaled by the variance of the residuals"});
+  v.choice("covariance", i.covariance, kCovariances,
+           {"what standard errors take the residuals for: white noise, noise that is correlated in time (newey_west), "
+            "or noise that is independent between experiments only (windows); auto: as tests of the residuals say"});
   v.group("loss", {"what is summed over the residuals"}, [&](auto& inside) {
     inside.choice("type", i.loss.type, kLosses, {"loss function"});
     inside.plain("scale", i.loss.scale, kPositive,

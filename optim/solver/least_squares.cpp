@@ -1,20 +1,44 @@
 #include "optim/solver/least_squares.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace mbsopt {
 
-double LeastSquaresProblem::cost(const Eigen::VectorXd& z) const {
-  if (loss.type == LossType::squared) return 0.5 * z.squaredNorm();
-  const Eigen::Index robust = z.size() - plain;
-  double sum = z.tail(plain).squaredNorm();
-  for (Eigen::Index i = 0; i < robust; ++i) sum += loss.at(z(i) * z(i)).rho;
-  return 0.5 * sum;
+using Eigen::Index;
+using Eigen::VectorXd;
+
+double ScaleGroup::squared_scale(const VectorXd& z) const {
+  double squares = 0;
+  for (const Index i : rows) squares += z(i) * z(i);
+  return std::max(squares / freedom, least);
 }
 
-Eigen::VectorXd LeastSquaresProblem::pull(const Eigen::VectorXd& z) const {
-  Eigen::VectorXd p = z;
-  if (loss.type == LossType::squared) return p;
-  for (Eigen::Index i = 0; i < z.size() - plain; ++i) p(i) *= loss.at(z(i) * z(i)).rho1;
-  return p;
+VectorXd LeastSquaresProblem::weights(const VectorXd& z) const {
+  VectorXd w = VectorXd::Ones(z.size());
+  if (loss.type != LossType::squared)
+    for (Index i = 0; i < z.size() - plain; ++i) w(i) = loss.at(z(i) * z(i)).rho1;
+  for (const ScaleGroup& group : groups) {
+    const double s2 = group.squared_scale(z);
+    for (const Index i : group.rows) w(i) = 1 / s2;
+  }
+  return w;
 }
+
+double LeastSquaresProblem::cost(const VectorXd& z) const {
+  if (groups.empty() && loss.type == LossType::squared) return 0.5 * z.squaredNorm();
+  double sum = z.tail(plain).squaredNorm();
+  VectorXd scaled = z;
+  double logarithms = 0;
+  for (const ScaleGroup& group : groups) {
+    const double s2 = group.squared_scale(z);
+    logarithms += group.freedom * std::log(s2);
+    for (const Index i : group.rows) scaled(i) /= std::sqrt(s2);
+  }
+  for (Index i = 0; i < z.size() - plain; ++i) sum += loss.at(scaled(i) * scaled(i)).rho;
+  return 0.5 * (sum + logarithms);
+}
+
+VectorXd LeastSquaresProblem::pull(const VectorXd& z) const { return weights(z).cwiseProduct(z); }
 
 }  // namespace mbsopt

@@ -4,6 +4,13 @@
 //
 // rho is the loss (robust_loss.hpp); the last `plain` residuals, j, are squared whatever it is.
 //
+// Residuals of a scale group have a common standard deviation s that is not known. The fit eliminates it:
+//
+//   minimise over s:  1/2 sum z_i^2/s^2 + f log s      =>      s^2 = sum z_i^2/f,      cost f/2 (1 + log(sum z_i^2/f))
+//
+// which is the likelihood of normal noise if f is the number of residuals (Seber and Wild, "Nonlinear Regression"
+// (1989), section 2.2). Groups are for the loss that is the square.
+//
 // Residuals and their Jacobian come together, since one simulation gives both; an evaluation that fails says so in
 // words, and the solver shortens its step.
 //
@@ -16,6 +23,7 @@
 #include <Eigen/Core>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "optim/solver/robust_loss.hpp"
 #include "optim/solver/solver_outcome.hpp"
@@ -27,6 +35,13 @@ struct LeastSquaresPoint {
   std::string message;  // why not
   Eigen::VectorXd z;    // N
   Eigen::MatrixXd z_x;  // N x n
+};
+
+struct ScaleGroup {
+  std::vector<Eigen::Index> rows;
+  double freedom = 0;  // f > 0
+  double least = 0;    // of s^2, > 0: exact data have no noise
+  double squared_scale(const Eigen::VectorXd& z) const;
 };
 
 struct LeastSquaresProblem {
@@ -43,6 +58,8 @@ struct LeastSquaresProblem {
 
   Eigen::Index variables() const { return x_lower.size(); }
   double cost(const Eigen::VectorXd& z) const;
+  // w, so that d cost/d z_i = w_i z_i.
+  Eigen::VectorXd weights(const Eigen::VectorXd& z) const;
   // d cost/d z_i, residual by residual.
   Eigen::VectorXd pull(const Eigen::VectorXd& z) const;
 
@@ -50,6 +67,7 @@ struct LeastSquaresProblem {
   Eigen::Index size;                 // N
   Eigen::Index plain = 0;            // of them, the last: not seen by the loss
   Loss loss;
+  std::vector<ScaleGroup> groups;  // disjoint
 };
 
 struct LeastSquaresProgress {

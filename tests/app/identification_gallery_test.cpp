@@ -157,6 +157,51 @@ TEST_CASE("friction comes from a run-down with gross errors, in a CSV file with 
   CHECK(squared.at("experiments").at("run_down").at("channels").at("omega").at("sigma").get<double>() > 0.3);
 }
 
+TEST_CASE("before the fit: what the columns hold, and what they would determine", "[identification][command]") {
+  const TemporaryFolder folder;
+  const auto result = identified(folder, "spring_damper/identify", {"--preflight"});
+  const auto& channel = result.at("preflight").at("channels").at(1);
+  CHECK(channel.at("experiment") == "loaded");
+  CHECK(channel.at("samples") == 151);
+  CHECK(channel.at("interval").get<double>() == Approx(0.02));
+  CHECK(channel.at("largest_gap").get<double>() == Approx(0.02));
+  CHECK(channel.at("rms_scaled").get<double>() > 1);
+  // As the fit says, for the sigma that it finds: a tenth of the given one. The start is not the optimum.
+  const TemporaryFolder other;
+  const auto fit = identified(other, "spring_damper/identify", {"--recover", "3"});
+  for (const char* name : {"m", "k", "c"})
+    CHECK(result.at("preflight").at("parameters").at(name).at("predicted_std_error").get<double>() ==
+          Approx(10 * fit.at("parameters").at(name).at("std_error").get<double>()).epsilon(0.6));
+  CHECK(!result.contains("parameters"));
+  CHECK(fit.at("covariance") == "white");
+  CHECK(fit.at("recovery").at("m").at("truth") == fit.at("parameters").at("m").at("value"));
+  CHECK(fit.at("recovery").at("m").at("fits") == 3);
+
+  const TemporaryFolder without;
+  const auto alone = identified(without, "spring_damper/identify",
+                                {"--preflight", "--set", "identification.experiments[1].role=validate"});
+  CHECK(alone.at("identifiability").at("unidentifiable") ==
+        nlohmann::json::array({"m, k, c: only m/c and k/c are determined"}));
+}
+
+TEST_CASE("the standard errors that are asked for are given, or refused with the place", "[identification][command]") {
+  const TemporaryFolder folder;
+  const auto result = identified(folder, "spring_damper/identify", {"--set", "identification.covariance=newey_west"});
+  CHECK(result.at("covariance") == "newey_west");
+  CHECK(result.at("parameters").at("m").at("variance_inflation").get<double>() != 1);
+  const TemporaryFolder one;
+  const CommandOutcome outcome =
+      run_command({"identify", file_of("friction/identify").string(), "--out", one.file("out"), "--quiet", "--set",
+                   "identification.covariance=windows"});
+  CHECK(outcome.exit_code == kBadInput);
+  CHECK_THAT(outcome.err, Contains("identification.covariance: is \"windows\", which compares experiments"));
+  const CommandOutcome word =
+      run_command({"validate", file_of("spring_damper/identify").string(), "--out", one.file("none"), "--set",
+                   "identification.experiments[0].channels[0].estimate_sigma=sharde"});
+  CHECK(word.exit_code == kBadInput);
+  CHECK_THAT(word.err, Contains("estimate_sigma") && Contains("did you mean 'shared'?"));
+}
+
 TEST_CASE("a profile of something that is not fitted is bad input", "[identification][command]") {
   const TemporaryFolder folder;
   const CommandOutcome outcome = run_command({"identify", file_of("friction/identify").string(), "--out",
@@ -185,8 +230,8 @@ TEST_CASE("fields of losses, priors, drives and inertia that make no sense are f
   CHECK_THAT(refusal("friction/identify", R"(parameters.slip.prior={"mean": 1})"),
              Contains("parameters.slip.prior.sigma: is missing"));
   CHECK_THAT(refusal("friction/identify", "identification.sigma_is_known=true"),
-             Contains("identification.experiments[0].channels[0].estimate_sigma: is true, and so is "
-                      "identification.sigma_is_known"));
+             Contains("identification.experiments[0].channels[0].estimate_sigma: asks for an estimate, but "
+                      "identification.sigma_is_known is true"));
   CHECK_THAT(refusal("damper/identify_law", "identification.experiments[0].drives[0].drive=rode"),
              Contains("identification.experiments[0].drives[0].drive") && Contains("did you mean 'ride'?"));
   CHECK_THAT(refusal("damper/identify_law", "identification.experiments[1].drives[0].law.column=raod"),

@@ -179,7 +179,7 @@ TEST_CASE("losses, priors, delays, laws of an experiment and consistent inertia 
   CHECK(identification.loss.scale == 2.0);
   const ExperimentSpec& run = identification.experiments[0];
   CHECK(run.channels[0].delay.number() == 0.02);
-  CHECK(run.channels[0].estimate_sigma);
+  CHECK(run.channels[0].estimate_sigma == SigmaEstimate::own);
   REQUIRE(run.drives.size() == 1);
   CHECK(run.drives[0].drive == "push");
   CHECK(run.drives[0].law.text() == "0.5*t");

@@ -143,6 +143,7 @@ TEST_CASE("a normal prior pulls as one more measurement of the parameter", "[ide
   p.identification->variables = {"offset"}, p.identification->experiments[0].free.clear();
   p.identification->experiments[0].channels[0].bias = Expression::parse("offset");
   p.identification->sigma_is_known = true;
+  p.identification->covariance = CovarianceType::white;  // the prior takes the residuals off zero
   CsvTable data = noisy(4);
   const Experiment run(p.scene, p.identification->experiments[0], "here", data,
                        (Eigen::VectorXd(5) << 64, 0.055, 1.53, 1.55, 0).finished(), {{4, 0}});
@@ -206,7 +207,7 @@ TEST_CASE("sigmas are estimated channel by channel, and weigh the channels", "[i
   rate.column = "omega", rate.sensor = "omega";
   auto& channels = p.identification->experiments[0].channels;
   channels.push_back(rate);
-  for (ChannelSpec& c : channels) c.estimate_sigma = true, c.sigma = 1.0;
+  for (ChannelSpec& c : channels) c.estimate_sigma = SigmaEstimate::own, c.sigma = 1.0;
 
   // Angles to 0.004 rad; rates by differences of the exact motion, to 0.5 rad/s.
   CsvTable data = noisy(8, 0.0);
@@ -235,7 +236,7 @@ TEST_CASE("sigmas are estimated channel by channel, and weigh the channels", "[i
   // The same as with these sigmas given; and far from the fit with equal ones.
   Problem given = p;
   auto& fixed = given.identification->experiments[0].channels;
-  for (std::size_t c = 0; c < 2; ++c) fixed[c].estimate_sigma = false, fixed[c].sigma = fit[c].sigma;
+  for (std::size_t c = 0; c < 2; ++c) fixed[c].estimate_sigma = SigmaEstimate::none, fixed[c].sigma = fit[c].sigma;
   const IdentificationResult same = run_identification(given, {data});
   for (ChannelSpec& c : fixed) c.sigma = 1.0;
   const IdentificationResult equal = run_identification(given, {data});
@@ -247,9 +248,50 @@ TEST_CASE("sigmas are estimated channel by channel, and weigh the channels", "[i
   CHECK_FALSE(same.experiments[0].channels[0].sigma_is_estimated);
 }
 
+TEST_CASE("one sigma for a column of all experiments, at the cost of a fit with given sigmas",
+          "[identification][sigma]") {
+  Problem p = fit_problem();
+  p.identification->experiments.push_back(pendulum::experiment("run2", {"theta0", "omega0"}));
+  for (ExperimentSpec& e : p.identification->experiments) {
+    e.channels[0].estimate_sigma = SigmaEstimate::shared, e.channels[0].sigma = 1.0;
+    e.channels.push_back(e.channels[0]);  // the same angle, by a worse sensor
+    e.channels[1].column = "worse";
+  }
+  std::vector<CsvTable> data{noisy(4), noisy(5)};
+  for (CsvTable& table : data) {
+    table.header.push_back("worse"), table.columns.push_back(noisy(6).columns[1]);
+    std::mt19937 generator(9);
+    std::normal_distribution<double> normal(0, 0.1);
+    for (double& x : table.columns[2]) x += normal(generator);
+  }
+  const IdentificationResult shared = run_identification(p, data);
+  INFO(shared.message);
+  REQUIRE(shared.ok());
+  const auto sigma = [&](std::size_t e, std::size_t c) { return shared.experiments[e].channels[c].sigma; };
+  for (const std::size_t c : {0u, 1u}) {
+    CHECK(sigma(0, c) == sigma(1, c));
+    const auto& one = shared.experiments[0].channels[c];
+    const auto& other = shared.experiments[1].channels[c];
+    const double n = 602, f = (1204. - 6) / 1204;
+    CHECK(sigma(0, c) == Approx(std::sqrt(301 * (one.rms * one.rms + other.rms * other.rms) / (n * f))).epsilon(1e-9));
+    for (ExperimentSpec& e : p.identification->experiments)
+      e.channels[c].sigma = sigma(0, c), e.channels[c].estimate_sigma = SigmaEstimate::none;
+  }
+  CHECK(sigma(0, 0) == Approx(0.01).epsilon(0.1));
+  CHECK(sigma(0, 1) == Approx(0.1).epsilon(0.1));
+  const IdentificationResult known = run_identification(p, data);
+  for (std::size_t k = 0; k < known.parameters.size(); ++k)
+    CHECK(shared.parameters[k].value == Approx(known.parameters[k].value).epsilon(1e-6));
+  WARN(shared.evaluations << " evaluations, with given sigmas " << known.evaluations);
+  CHECK(shared.evaluations <= 2 * known.evaluations);
+  // The likelihoods are equal, two parameters are counted for the sigmas, one for the scale of given ones.
+  CHECK(shared.aic == Approx(known.aic + 2).margin(0.1));
+  CHECK(shared.bic > shared.aic);
+}
+
 TEST_CASE("under a robust loss sigma is that of the bulk, whatever the outliers", "[identification][sigma]") {
   Problem p = fit_problem();
-  p.identification->experiments[0].channels[0].estimate_sigma = true;
+  p.identification->experiments[0].channels[0].estimate_sigma = SigmaEstimate::own;
   p.identification->experiments[0].channels[0].sigma = 0.1;
   p.identification->loss = {LossType::huber};
   const IdentificationResult result = run_identification(p, {with_outliers(noisy(7), 11)});
@@ -265,7 +307,7 @@ TEST_CASE("Tukey's loss finds its way from a sigma that is far too small, in the
           "[identification][loss][sigma]") {
   Problem p = fit_problem(64.5, 0.1);
   p.identification->loss = {LossType::tukey};
-  p.identification->experiments[0].channels[0].estimate_sigma = true;
+  p.identification->experiments[0].channels[0].estimate_sigma = SigmaEstimate::own;
   p.identification->experiments[0].channels[0].sigma = 1e-4;
   p.identification->experiments.push_back(pendulum::experiment("check", {"theta0", "omega0"}));
   p.identification->experiments[1].validate = true;
@@ -281,7 +323,7 @@ TEST_CASE("Tukey's loss finds its way from a sigma that is far too small, in the
 
 TEST_CASE("an exact record has no sigma to estimate, and does not divide by it", "[identification][sigma]") {
   Problem p = fit_problem();
-  p.identification->experiments[0].channels[0].estimate_sigma = true;
+  p.identification->experiments[0].channels[0].estimate_sigma = SigmaEstimate::own;
   const IdentificationResult result = run_identification(p, {pendulum::exact_motion(64, 0.055, 1.53, 1.55, 2)});
   CHECK(result.parameters[0].value == Approx(64).epsilon(1e-6));
   CHECK(std::isfinite(result.statistics.std_error(0)));
@@ -332,7 +374,7 @@ TEST_CASE("the cost before and after is by the same sigmas and the same loss", "
   const CsvTable data = noisy(7);
   Problem p = fit_problem();
   p.identification->experiments[0].channels[0].sigma = 0.5;
-  p.identification->experiments[0].channels[0].estimate_sigma = true;
+  p.identification->experiments[0].channels[0].estimate_sigma = SigmaEstimate::own;
   const LossType loss = GENERATE(LossType::squared, LossType::tukey);
   const IdentificationResult result = fitted(p, {loss}, data);
   INFO(result.message);

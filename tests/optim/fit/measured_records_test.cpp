@@ -48,7 +48,7 @@ Problem gate_problem(const std::vector<std::string>& runs, const std::vector<Csv
   for (std::size_t i = 0; i < runs.size(); ++i) {
     ExperimentSpec e = repetitions::slider_run(runs[i], {"gamma", "x0", "v0", "offset"});
     e.channels[0].bias = Expression::parse("offset");
-    e.channels[0].estimate_sigma = true;
+    e.channels[0].estimate_sigma = SigmaEstimate::own;
     e.overrides = {{"x0", data[i].columns[1][0]}};
     p.identification->experiments.push_back(e);
   }

@@ -71,7 +71,7 @@ TEST_CASE("the profile of a linear model is a straight line, its interval that o
 
 TEST_CASE("the profile of a nonlinear model is not symmetric, and its ends are where the cost says", "[profile]") {
   Decay decay((VectorXd(3) << 0.40, 0.10, 0.05).finished());
-  const LeastSquaresResult fit = solve_with_ceres(decay, VectorXd::Constant(1, 1));
+  const LeastSquaresResult fit = solve_least_squares(decay, VectorXd::Constant(1, 1));
   ProfileOptions options;
   options.first_step = 0.1;
   const Profile profile = profile_likelihood(decay, fit.x, options);
@@ -86,7 +86,7 @@ TEST_CASE("the profile of a nonlinear model is not symmetric, and its ends are w
 TEST_CASE("where the data do not bound a parameter, the profile says so", "[profile]") {
   // Measured zeros: any fast decay explains them.
   Decay fast((VectorXd(2) << 0.01, 0.0).finished());
-  const LeastSquaresResult fit = solve_with_ceres(fast, VectorXd::Constant(1, 3));
+  const LeastSquaresResult fit = solve_least_squares(fast, VectorXd::Constant(1, 3));
   ProfileOptions options;
   options.first_step = 0.2;
   const Profile open = profile_likelihood(fast, fit.x, options);

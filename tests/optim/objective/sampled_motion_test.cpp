@@ -10,12 +10,12 @@ using namespace mbsopt;
 
 namespace {
 
-constexpr double kMass = 3, kIzz = 0.7;
+constexpr double kBobMass = 3, kIzz = 0.7;
 
 Mechanism free_body() {
   Scene scene;
   Body b;
-  b.name = "b", b.mass = kMass;
+  b.name = "b", b.mass = kBobMass;
   b.inertia = {0.4, 0.5, kIzz, 0.0, 0.0, 0.0};
   scene.bodies = {b};
   return Mechanism(scene, Eigen::VectorXd());
@@ -34,7 +34,7 @@ TEST_CASE("two poses of a body are apart by the root mean square of its points' 
   const MotionDistance distance(free_body());
   CHECK(distance.between(state(0, 0), state(0.3, 0)) == Approx(0.3));
   const double a = GENERATE(1e-6, 0.2, 2.0, 3.1);
-  CHECK(distance.between(state(0, 0), state(0, a)) == Approx(2 * std::sin(a / 2) * std::sqrt(kIzz / kMass)));
+  CHECK(distance.between(state(0, 0), state(0, a)) == Approx(2 * std::sin(a / 2) * std::sqrt(kIzz / kBobMass)));
   CHECK(distance.between(state(1, a), state(1, a)) == 0);
   // p and -p are the same pose
   Eigen::VectorXd other = state(1, a);

@@ -1,0 +1,118 @@
+#include "optim/fit/recovery.hpp"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <utility>
+
+#include "optim/fit/score_variance.hpp"
+
+namespace mbsopt {
+namespace {
+
+// One channel of a record: where its samples stand in the table, what the model says there, and what it leaves.
+struct ChannelRecord {
+  std::size_t table, column;
+  std::vector<std::size_t> rows;
+  std::vector<double> model, noise;
+};
+
+std::size_t index_of(const CsvTable& table, const std::string& column) {
+  return static_cast<std::size_t>(std::ranges::find(table.header, column) - table.header.begin());
+}
+
+std::vector<ChannelRecord> records_of(const Problem& problem, const std::vector<CsvTable>& data,
+                                      const IdentificationResult& fit) {
+  const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
+  std::vector<ChannelRecord> records;
+  std::vector<std::size_t> first;  // record of each experiment's first channel
+  for (std::size_t e = 0; e < experiments.size(); ++e) {
+    first.push_back(records.size());
+    for (const ChannelSpec& channel : experiments[e].channels)
+      records.push_back({e, index_of(data[e], channel.column), {}, {}, {}});
+  }
+  std::size_t row = 0, experiment = 0;
+  for (const ResidualRow& sample : fit.residuals) {  // by experiment, then time
+    if (sample.experiment != experiment) experiment = sample.experiment, row = 0;
+    const std::vector<double>& t = data[experiment].column(experiments[experiment].time);
+    while (row + 1 < t.size() && t[row] < sample.t) ++row;
+    ChannelRecord& record = records[first[experiment] + sample.channel];
+    record.rows.push_back(row);
+    record.model.push_back(sample.model), record.noise.push_back(sample.measured - sample.model);
+  }
+  const double N = static_cast<double>(fit.samples), P = static_cast<double>(fit.parameters.size());
+  const double larger = N > P ? std::sqrt(N / (N - P)) : 1;
+  for (ChannelRecord& record : records) {
+    if (record.noise.empty()) continue;
+    const double mean =
+        Eigen::Map<const Eigen::ArrayXd>(record.noise.data(), static_cast<Eigen::Index>(record.noise.size())).mean();
+    for (double& noise : record.noise) noise = larger * (noise - mean);
+  }
+  return records;
+}
+
+void simulate_noise(const ChannelRecord& record, std::size_t block, std::mt19937& generator, CsvTable& table) {
+  const std::size_t n = record.rows.size();
+  std::size_t from = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (i % block == 0) from = generator() % n;
+    table.columns[record.column][record.rows[i]] = record.model[i] + record.noise[(from + i % block) % n];
+  }
+}
+
+// Without the experiments that validate.
+void keep_fitted(Problem& problem, std::vector<CsvTable>& data) {
+  std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
+  for (std::size_t e = experiments.size(); e-- > 0;)
+    if (experiments[e].validate) {
+      experiments.erase(experiments.begin() + static_cast<std::ptrdiff_t>(e));
+      data.erase(data.begin() + static_cast<std::ptrdiff_t>(e));
+    }
+}
+
+}  // namespace
+
+Recovery recover(const Problem& problem, const std::vector<CsvTable>& data, const IdentificationResult& fit,
+                 const RecoveryOptions& options) {
+  const std::vector<ChannelRecord> records = records_of(problem, data, fit);
+  const std::size_t P = fit.parameters.size();
+  std::vector<std::vector<double>> found(P);
+  std::vector<int> held(P, 0);
+  Recovery recovery;
+  for (int seed = 1; seed <= options.seeds; ++seed) {
+    std::mt19937 generator(static_cast<unsigned>(seed));
+    std::vector<CsvTable> simulated = data;
+    for (const ChannelRecord& record : records) {
+      const double blocks = fit.statistics.covariance_type == CovarianceType::white ? 0 : kLagPart;
+      const std::size_t block =
+          std::max<std::size_t>(1, static_cast<std::size_t>(blocks * static_cast<double>(record.rows.size())));
+      simulate_noise(record, block, generator, simulated[record.table]);
+    }
+    Problem again = problem;
+    keep_fitted(again, simulated);
+    IdentificationOptions identification;
+    identification.user_forces = options.user_forces, identification.simulation_progress = options.simulation_progress;
+    const IdentificationResult result = run_identification(again, simulated, identification);
+    if (result.status == SolverStatus::stopped) break;
+    result.ok() ? ++recovery.fits : ++recovery.failed;
+    for (std::size_t k = 0; result.ok() && k < P; ++k) {
+      const FittedParameter& p = result.parameters[k];
+      const double truth = fit.parameters[k].value;
+      found[k].push_back(p.value), held[k] += p.ci95[0] <= truth && truth <= p.ci95[1];
+    }
+    if (options.progress && !options.progress(seed)) break;
+  }
+  if (recovery.fits < 2) return recovery;
+  for (std::size_t k = 0; k < P; ++k) {
+    const Eigen::Map<const Eigen::ArrayXd> values(found[k].data(), recovery.fits);
+    const FittedParameter& p = fit.parameters[k];
+    const double mean = values.mean();
+    recovery.parameters.push_back({p.name, p.unit, p.value, mean,
+                                   std::sqrt((values - mean).square().sum() / (recovery.fits - 1)),
+                                   static_cast<double>(held[k]) / recovery.fits});
+  }
+  return recovery;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,63 @@
+// The variance of a sum of scores s_i = J_i' z_i whose residuals z are not independent. Its inverse image is the
+// uncertainty of a fit: statistics.hpp.
+//
+// Newey and West, Econometrica 55 (1987) 703, within each record:
+//   B = sum_ij k(|t_i - t_j|/H) s_i s_j'          k(u) = 1 - u for u < 1, else 0
+// The lag H is a tenth of the record's duration. It is a time and not a number of samples: rules that find it from the
+// first autocorrelations (Andrews, Econometrica 59 (1991) 817; Newey and West, Review of Economic Studies 61 (1994)
+// 631) miss a slow error of the model below the noise of a fast sensor, and then standard errors fall with the sampling
+// rate. With H a given part b of the record (Kiefer and Vogelsang, Econometric Theory 21 (2005) 1130) the estimate has
+// about 3/(2 b) degrees of freedom, for Student's quantiles (Priestley, "Spectral Analysis and Time Series" (1981),
+// section 6.2.4). k is the share of the windows of length H that hold both samples of those that hold the first one. So
+// B is the mean square of the sums over all such windows, which costs no more than the sum itself.
+//
+// Between records: each record's sum is one observation, whatever happens within the record (Liang and Zeger,
+// Biometrika 73 (1986) 13; Cameron and Miller, Journal of Human Resources 50 (2015) 317), with E - 1 degrees of
+// freedom:
+//   B = sum_e s_e s_e',   s_e = sum_i s_i
+// A parameter that acts in one record only has s_e = 0 at the fit: this record alone says nothing of it between
+// records, and its variance is that of Newey and West. Correlations are those of Newey and West, too.
+//
+// The fit takes off the residuals what it can explain, so that B is too small. Of white noise it keeps, in the
+// direction a of the parameters, with the orthonormal basis q of the columns of J,
+//   kept = 1 - sum_p a' B(J q_p) a/sum_i (a' J_i)^2,       B(J q_p): of the scores J_i q_ip
+// by which B is divided, whatever the noise (Bell and McCaffrey, Survey Methodology 28 (2002) 169).
+//
+//   const ScoreVariance variance(CovarianceType::newey_west, {{0, t}});
+//   variance.within(scores);
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "optim/problem/problem.hpp"
+
+namespace mbsopt {
+
+// Consecutive rows of the scores, at times that do not descend.
+struct SampledRecord {
+  Eigen::Index first = 0;
+  Eigen::VectorXd t;
+  double duration() const { return t.size() > 0 ? t(t.size() - 1) - t(0) : 0; }
+};
+
+inline constexpr double kLagPart = 0.1;  // H over the record's duration
+
+class ScoreVariance {
+ public:
+  // newey_west, or windows (between records): at least two.
+  ScoreVariance(CovarianceType type, std::vector<SampledRecord> records);
+
+  Eigen::MatrixXd within(const Eigen::MatrixXd& scores) const;   // B of Newey and West
+  Eigen::MatrixXd between(const Eigen::MatrixXd& scores) const;  // B between records
+  bool is_between(bool of_one_record) const { return type_ == CovarianceType::windows && !of_one_record; }
+  // The part of the variance that the fit leaves. a_J: a' J_i; q: columns.
+  double kept(const Eigen::VectorXd& a_J, const Eigen::MatrixXd& q, bool of_one_record) const;
+  long freedom() const;  // of the estimate of each variance
+
+ private:
+  CovarianceType type_;
+  std::vector<SampledRecord> records_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,240 @@
+#include "optim/solver/levenberg_marquardt.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <utility>
+
+#include "core/expression/counted.hpp"
+#include "optim/solver/bounded_linear_least_squares.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kFirstDamping = 1e-4;
+constexpr double kLeastDamping = 1e-16;  // its root is the rounding of the factors
+constexpr double kAccepted = 1e-3;       // part of the promised gain
+constexpr int kInvalidSteps = 30;        // in a row; each shortens the step, the last ones to nothing
+constexpr double kNothing = 1e-14;       // norm of the residuals, which are in units of their sigma
+constexpr double kGradient = 1e-14;      // cosine between the residuals and any column: rounding
+// Of its length at the last point, the least that D keeps of a column. Near a point where the column vanishes, steps by
+// its length alone would grow without limit.
+constexpr double kShrinking = 0.5;
+// Part of the cost of the start that the derivatives may still promise at a minimum. The noise of a simulation at
+// rtol 1e-5 promises below 1e-8; in front of a wall of failed points, or with wrong derivatives, it is most of the
+// cost.
+constexpr double kPromise = 1e-4;
+
+// The weighted residuals and their derivatives at a point, as triangles: |z + J d|^2 = |q + R d|^2 + constant.
+struct LinearModel {
+  MatrixXd R;
+  VectorXd q, gradient;
+  VectorXd D;   // lengths of the columns, or more
+  double size;  // half the weighted sum of squares
+
+  LinearModel(const LeastSquaresProblem& problem, const LeastSquaresPoint& point) {
+    const VectorXd w = problem.weights(point.z).cwiseSqrt();
+    MatrixXd J(point.z_x.rows(), point.z_x.cols() + 1);
+    J.leftCols(point.z_x.cols()) = w.asDiagonal() * point.z_x;
+    J.rightCols(1) = w.cwiseProduct(point.z);
+    size = 0.5 * J.rightCols(1).squaredNorm();
+    const Index n = point.z_x.cols(), rows = std::min(J.rows(), n);
+    const Eigen::HouseholderQR<MatrixXd> qr(std::move(J));
+    R = qr.matrixQR().topLeftCorner(rows, n).triangularView<Eigen::Upper>();
+    q = qr.matrixQR().rightCols(1).topRows(rows);
+    D = R.colwise().norm().transpose();
+    gradient = R.transpose() * q;
+  }
+  double promised(const VectorXd& d) const { return 0.5 * (q.squaredNorm() - (q + R * d).squaredNorm()); }
+};
+
+class Search {
+ public:
+  Search(LeastSquaresProblem& problem, const LeastSquaresOptions& options) : problem_(problem), options_(options) {}
+
+  LeastSquaresResult run(const VectorXd& x_start) {
+    x_ = result_.x = x_start.cwiseMax(problem_.x_lower).cwiseMin(problem_.x_upper);
+    point_ = evaluated(x_);
+    if (!point_.ok) return refused_start(point_.message);
+    result_.z_initial = point_.z;
+    cost_ = result_.cost_initial = problem_.cost(point_.z);
+    if (!std::isfinite(cost_)) return refused_start("the loss of its residuals is not finite");
+    iterate();
+    result_.x = x_, result_.cost_final = cost_;
+    result_.point = std::move(point_);
+    return std::move(result_);
+  }
+
+ private:
+  LeastSquaresPoint evaluated(const VectorXd& x) {
+    LeastSquaresPoint point;
+    point.z.setZero(problem_.size), point.z_x.setZero(problem_.size, problem_.variables());
+    ++result_.evaluations;
+    try {
+      problem_.evaluate(x, point);
+    } catch (const std::exception& error) {
+      point.ok = false, point.message = error.what();
+    }
+    if (point.ok && !(point.z.allFinite() && point.z_x.allFinite()))
+      point.ok = false, point.message = "a residual or its derivative is not finite";
+    if (point.ok && !std::isfinite(point.z.squaredNorm() + point.z_x.squaredNorm()))
+      point.ok = false, point.message = fmt::format(
+                            "the squares of the residuals or of their derivatives are beyond all numbers: the largest "
+                            "residual is {:.3g} (measured - model)/sigma, the largest derivative {:.3g}. Look for "
+                            "values that are none in the data, and at sigma, that of priors too",
+                            point.z.lpNorm<Eigen::Infinity>(), point.z_x.lpNorm<Eigen::Infinity>());
+    if (!point.ok) {
+      ++result_.failed_evaluations;
+      if (result_.first_error.empty()) result_.first_error = point.message;
+    }
+    return point;
+  }
+
+  LeastSquaresResult refused_start(const std::string& why) {
+    result_.message = "the start point cannot be evaluated: " + why;
+    return std::move(result_);
+  }
+
+  void end(SolverStatus status, std::string message) { result_.status = status, result_.message = std::move(message); }
+
+  // Ends with a status and a message.
+  void iterate() {
+    double lambda = kFirstDamping;
+    int invalid = 0;
+    if (!told(0, 0)) return;
+    LinearModel model(problem_, point_);
+    first_size_ = model.size;
+    VectorXd d = step(model, lambda);
+    while (true) {
+      if (no_gradient(model)) return converged(model, lambda);
+      if (is_short(model, d)) return converged(model, lambda);
+      if (result_.iterations == options_.max_iterations)
+        return end(SolverStatus::iteration_limit,
+                   fmt::format("stopped at the limit of {}{}", counted(options_.max_iterations, "iteration"),
+                               result_.failures()));
+      ++result_.iterations;
+      const VectorXd x = moved(d);
+      LeastSquaresPoint trial = evaluated(x);
+      const double promised = model.promised(d), cost = trial.ok ? problem_.cost(trial.z) : kInfinity;
+      const double gained = cost_ - cost;
+      const bool settled = std::abs(gained) <= options_.tolerance * model.size;
+      if (std::isfinite(cost) && (gained > kAccepted * promised || (settled && gained >= 0))) {
+        invalid = 0;
+        x_ = x, cost_ = cost, point_ = std::move(trial);
+        const double ratio = gained / promised;
+        lambda = std::max(lambda * std::max(1. / 3, 1 - std::pow(2 * ratio - 1, 3)), kLeastDamping);
+        const VectorXd D = model.D;
+        model = LinearModel(problem_, point_);
+        model.D = model.D.cwiseMax(kShrinking * D);
+        if (!told(model.gradient.lpNorm<Eigen::Infinity>(), d.norm())) return;
+        if (settled) return converged(model, lambda);
+        d = step(model, lambda);
+        continue;
+      }
+      if (!told(model.gradient.lpNorm<Eigen::Infinity>(), d.norm())) return;
+      if (settled) return converged(model, lambda);
+      if (!trial.ok && ++invalid == kInvalidSteps)
+        return end(SolverStatus::failed, "failed: too many evaluations in a row" + result_.failures());
+      // The parabola through both costs with the slope at the start.
+      const double slope = model.gradient.dot(d);
+      const double part = std::isfinite(cost) ? std::clamp(-slope / (2 * (cost - cost_ - slope)), 0.1, 0.5) : 0.25;
+      const double longest = part * model.D.cwiseProduct(d).norm();
+      do {
+        lambda *= 2;
+        d = step(model, lambda);
+      } while (model.D.cwiseProduct(d).norm() > longest);
+    }
+  }
+
+  VectorXd step(const LinearModel& model, double lambda) const {
+    const Index n = model.R.cols(), rows = model.R.rows();
+    const VectorXd D = model.D.unaryExpr([](double length) { return length > 0 ? length : 1; });
+    MatrixXd A = MatrixXd::Zero(rows + n, n);  // of D d: columns of length one
+    A.topRows(rows) = model.R * D.cwiseInverse().asDiagonal();
+    A.bottomRows(n).diagonal().setConstant(std::sqrt(lambda));
+    VectorXd b = VectorXd::Zero(rows + n);
+    b.head(rows) = -model.q;
+    const VectorXd lower = D.cwiseProduct(problem_.x_lower - x_), upper = D.cwiseProduct(problem_.x_upper - x_);
+    return bounded_linear_least_squares(A, b, lower, upper).cwiseQuotient(D);
+  }
+
+  // Where a step ends at a bound, x is that bound.
+  VectorXd moved(const VectorXd& d) const {
+    constexpr double kRounding = 4e-16;
+    VectorXd x = x_ + d;
+    for (Index k = 0; k < x.size(); ++k)
+      for (const double bound : {problem_.x_lower(k), problem_.x_upper(k)})
+        if (std::isfinite(bound) && std::abs(x(k) - bound) <= kRounding * std::max(std::abs(bound), std::abs(x_(k))))
+          x(k) = bound;
+    return x.cwiseMax(problem_.x_lower).cwiseMin(problem_.x_upper);
+  }
+
+  // By what it changes of the residuals, so that units of the variables do not matter.
+  bool is_short(const LinearModel& model, const VectorXd& d) const {
+    const double size = model.D.cwiseProduct(x_).norm() + options_.tolerance * std::sqrt(2 * model.size);
+    return model.D.cwiseProduct(d).norm() <= options_.tolerance * size;
+  }
+
+  bool presses(Index k, double gradient) const {
+    return (x_(k) <= problem_.x_lower(k) && gradient > 0) || (x_(k) >= problem_.x_upper(k) && gradient < 0);
+  }
+
+  bool no_gradient(const LinearModel& model) const {
+    const double size = std::sqrt(2 * model.size);
+    if (size <= kNothing) return true;
+    for (Index k = 0; k < x_.size(); ++k)
+      if (!presses(k, model.gradient(k)) && std::abs(model.gradient(k)) > kGradient * model.D(k) * size) return false;
+    return true;
+  }
+
+  // How far the best step along one free variable lowers the cost by the derivatives, a lower bound of the rest.
+  double promise(const LinearModel& model) const {
+    double most = 0;
+    for (Index k = 0; k < x_.size(); ++k)
+      if (!presses(k, model.gradient(k)) && model.D(k) > 0)
+        most = std::max(most, 0.5 * std::pow(model.gradient(k) / model.D(k), 2));
+    return most;
+  }
+
+  // Steps that were shortened to nothing are no convergence.
+  void converged(const LinearModel& model, double lambda) {
+    const double left = promise(model);
+    if (lambda > 1 && left > kPromise * first_size_)
+      return end(SolverStatus::no_progress,
+                 fmt::format("no further progress: the derivatives promise to lower the cost by {:.2g}, but no step "
+                             "lowers it{}. Tighten rtol of the integrator; check the derivatives of C++ code",
+                             left, result_.failures()));
+    end(SolverStatus::converged,
+        fmt::format("converged: cost and parameters change by less than {:g} of themselves", options_.tolerance));
+  }
+
+  bool told(double gradient, double step) {
+    if (!options_.progress || options_.progress({result_.iterations, cost_, gradient, step, x_})) return true;
+    end(SolverStatus::stopped, "stopped on request");
+    return false;
+  }
+
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  LeastSquaresProblem& problem_;
+  const LeastSquaresOptions& options_;
+  LeastSquaresResult result_;
+  VectorXd x_;
+  LeastSquaresPoint point_;
+  double cost_ = 0, first_size_ = 0;
+};
+
+}  // namespace
+
+LeastSquaresResult solve_least_squares(LeastSquaresProblem& problem, const VectorXd& x_start,
+                                       const LeastSquaresOptions& options) {
+  return Search(problem, options).run(x_start);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,38 @@
+// Levenberg-Marquardt within bounds, for nonlinear least squares. Converges fast where the residuals at the solution
+// are small.
+//
+//   step d:   minimise |z + J d|^2 + lambda |D d|^2   subject to   x_lower <= x + d <= x_upper,   D_k = |column k of J|
+//
+// Each step is the exact solution of this problem by an active set (bounded_linear_least_squares.hpp). So bounds that
+// are active at the solution cost no more evaluations than others, and near it the convergence is that without bounds:
+// Kanzow, Yamashita and Fukushima, Journal of Computational and Applied Mathematics 172 (2004) 375. lambda falls after
+// a step that did what the model promised, by the rule of Nielsen, report IMM-REP-1999-05, Technical University of
+// Denmark. After a step that did not, it rises until the step is as much shorter as a parabola along it says.
+//
+// A loss, and sigmas that the problem eliminates, enter as weights of the residuals (LeastSquaresProblem::weights), set
+// anew at every accepted point.
+//
+//   LeastSquaresOptions options;
+//   options.max_iterations = 50;
+//   LeastSquaresResult result = solve_least_squares(problem, x_start, options);
+//   if (result.status != SolverStatus::converged) std::cerr << result.message;
+#pragma once
+
+#include <functional>
+
+#include "optim/solver/least_squares.hpp"
+
+namespace mbsopt {
+
+struct LeastSquaresOptions {
+  double tolerance = 1e-10;                                   // relative change of the cost, and of x, > 0
+  int max_iterations = 100;                                   // >= 0
+  std::function<bool(const LeastSquaresProgress&)> progress;  // after every iteration; false stops
+};
+
+// x_start is taken into the bounds. Never throws for what an evaluation does: exceptions of evaluate() are failed
+// evaluations, too.
+LeastSquaresResult solve_least_squares(LeastSquaresProblem& problem, const Eigen::VectorXd& x_start,
+                                       const LeastSquaresOptions& options = {});
+
+}  // namespace mbsopt
