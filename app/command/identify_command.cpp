@@ -13,7 +13,7 @@
 #include "app/starts/residual_records.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/integrate/model_choice.hpp"
-#include "core/scene/type_table.hpp"
+#include "core/scene/scene_facts.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 #include "core/start/assembly.hpp"
 #include "core/start/model_warnings.hpp"
@@ -37,7 +37,8 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
         const ChannelSpec& spec =
             problem.identification->experiments[first.size() - 1].channels[plots.size() - first.back()];
         const bool same_unit = spec.gain.is_number() && spec.gain.number() == 1;
-        if (sensor.name == channel.sensor && same_unit) plot.unit = unit_of(sensor);
+        const std::string unit = unit_of(problem.scene, sensor);
+        if (sensor.name == channel.sensor && same_unit && !unit.empty()) plot.unit = unit;
       }
       plots.push_back(std::move(plot));
     }

@@ -4,6 +4,7 @@
 
 #include "core/expression/program_switches.hpp"
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/scene/scene_facts.hpp"
 
 namespace mbsopt {
 
@@ -96,11 +97,8 @@ Symbols parameter_symbols(const Scene& scene) {
 }
 
 Symbols cost_symbols(const Scene& scene) {
-  Symbols symbols;
-  for (const Parameter& p : scene.parameters) symbols.add_input(p.name);
-  symbols.add_input("t");
-  for (const Sensor& s : scene.sensors) symbols.add_input(s.name);
-  for (const Definition& d : scene.definitions) symbols.add_definition(d.name, d.value);
+  Symbols symbols = parameter_symbols(scene);
+  add_time_and_sensors(symbols, scene);
   return symbols;
 }
 

@@ -131,6 +131,9 @@ TEST_CASE("derivatives of accelerations, reactions and efforts equal differences
   Sensor effort;
   effort.name = "effort", effort.quantity = "drive_force", effort.drive = "motor";
   scene.sensors.push_back(effort);
+  Sensor mixed;
+  mixed.name = "mixed", mixed.quantity = "expression", mixed.value = f("acc_a1*reaction_r2 + t*acc_a2^2 + mu");
+  scene.sensors.push_back(mixed);
 
   const VectorXd rho = nominal(scene);
   const Mechanism mechanism(scene, rho);
