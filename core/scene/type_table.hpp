@@ -34,7 +34,7 @@ struct TypeRow {
   std::string_view fields;           // "point1 axis1!": what it has besides its name, type and bodies; "!": required
   std::string_view components = "";  // of a sensor: what "component" may be
   Dimension dimension = {};          // of a sensor: what it measures (dimension_of_quantity says exceptions)
-  Reads reads = Reads::positions;    // of a sensor
+  Reads reads = Reads::positions;    // of a sensor (reads_of_quantity says exceptions)
   std::string_view unit = "";        // of a sensor whose dimension does not say it
 };
 
@@ -114,6 +114,8 @@ inline constexpr TypeRow kSensorQuantities[] = {
      "x y z norm", dimension::kForce, Reads::motion},
     {"drive_force", "force or torque of a drive along its coordinate, positive where it pushes it up", "drive!", "",
      dimension::kForce, Reads::motion, "N or N m"},
+    {"imu", "of a body point, in axes fixed in the body: specific force (acceleration minus gravity), angular velocity",
+     "body! point axes component!", "ax ay az wx wy wz", dimension::kAcceleration, Reads::motion},
     {"expression", "of other sensors, parameters, definitions and t", "value!"},
 };
 

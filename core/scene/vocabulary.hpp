@@ -333,6 +333,8 @@ void describe(auto& v, Like<Sensor> auto& s) {
           {"direction in the ground, or in body1", need_of(*row, "axis")});
   v.expression("value", s.value, Names::sensor,
                {"expression of t, parameters, definitions and other sensors", need_of(*row, "value")});
+  v.orientation("axes", s.axes,
+                {"of its axes in those of the body, as of a body's orientation", need_of(*row, "axes")});
 }
 
 void describe(auto& v, Like<Condition> auto& c) {

@@ -253,6 +253,22 @@ struct Below {
   }
 };
 
+// The rate about the y axis of a mount at roll, pitch and yaw (n, 0.3, a) on body two.
+struct MountRate {
+  template <class T>
+  T operator()(const TextbookScene<T>& s) const {
+    using std::cos, std::sin;
+    const T x = sin(T(0.3)) * sin(s.rho[n]), y = cos(s.rho[n]), z = cos(T(0.3)) * sin(s.rho[n]);
+    const T C = cos(s.rho[a]), S = sin(s.rho[a]);
+    return dot(V3<T>{C * x - S * y, S * x + C * y, z}, s.omega(1, true));
+  }
+};
+Sensor mounted(const std::string& component) {
+  Sensor s = plain("imu", component);
+  s.axes = RollPitchYawField{vec("n", "0.3", "a")};
+  return s;
+}
+
 const std::vector<Row>& all_sensors() {
   static const std::vector<Row> rows{
       row("position", on_point("position", "y"), [](const auto& s) { return s.point(0, s.tip())[1].c[0]; }),
@@ -306,6 +322,7 @@ const std::vector<Row>& all_sensors() {
       row("torque of a law", force_of("stop"),
           [](const auto& s) { return s.rho[kt] * s.angle() * s.angle() + s.rho[n] * s.rate() * s.angle(); }),
       row("constraint_violation", plain("constraint_violation"), [](const auto& s) { return s.violation(); }),
+      row("imu, rate", mounted("wy"), MountRate()),
       row("expression", expression("turn*gap + sin(mean)*turn_rate^2 + a*l0"),
           [](const auto& s) {
             using std::sin;
