@@ -43,6 +43,7 @@ constexpr std::array kCommands{
     Command{"tradeoff", "error against cost for integrators, tolerances, formulations and gradient methods",
             tradeoff_command},
     Command{"resume", "go on with a design or an identification that was interrupted or killed", resume_command},
+    Command{"new", "write a commented starter file into the current folder", new_command},
     Command{"schema", "print the JSON Schema of problem files", schema_command},
 };
 
@@ -71,6 +72,10 @@ std::vector<std::string> without_help_command(std::vector<std::string> arguments
 
 void add_options(CLI::App& sub, const std::string& name, CommandOptions& options) {
   if (name == "schema") return;
+  if (name == "new") {
+    sub.add_option("kind", options.problem_file, "pendulum, four-bar, suspension or identify")->required();
+    return;
+  }
   sub.add_option("--threads", options.threads, "at most so many threads or processes (results do not depend on it)")
       ->check(CLI::Range(1, 1024));
   sub.add_flag("--quiet", options.quiet, "no progress on standard error");

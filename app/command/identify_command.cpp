@@ -40,7 +40,8 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
         const ChannelSpec& spec =
             problem.identification->experiments[first.size() - 1].channels[plots.size() - first.back()];
         const bool same_unit = spec.gain.is_number() && spec.gain.number() == 1;
-        if (sensor.name == channel.sensor && same_unit) plot.unit = unit_in(problem.scene, sensor);
+        const std::string unit = unit_in(problem.scene, sensor);
+        if (sensor.name == channel.sensor && same_unit && !unit.empty()) plot.unit = unit;
       }
       plots.push_back(std::move(plot));
     }

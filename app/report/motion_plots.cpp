@@ -27,7 +27,8 @@ std::vector<SensorGroup> sensor_groups(const Scene& scene) {
   std::vector<SensorGroup> groups;
   for (std::size_t i = 0; i < scene.sensors.size(); ++i) {
     const Sensor& sensor = scene.sensors[i];
-    const std::string label = fmt::format("{} [{}]", sensor.quantity, unit_in(scene, sensor));
+    const std::string unit = unit_in(scene, sensor);
+    const std::string label = unit.empty() ? sensor.quantity : fmt::format("{} [{}]", sensor.quantity, unit);
     auto group = std::find_if(groups.rbegin(), groups.rend(), [&](const SensorGroup& g) { return g.first == label; });
     if (group == groups.rend() || group->second.size() == kMostSeries) {
       groups.push_back({label, {}});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/scene/scene_facts.hpp"
 #include "core/scene/type_table.hpp"
 
 namespace mbsopt {
@@ -20,7 +21,7 @@ std::string unit_in(const Scene& scene, const Sensor& sensor) {
     const auto drive = std::ranges::find(scene.drives, sensor.drive, &Drive::name);
     if (drive != scene.drives.end()) return unit_of_effort(*drive);
   }
-  return unit_of(sensor);
+  return unit_of(scene, sensor);
 }
 
 }  // namespace mbsopt

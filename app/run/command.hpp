@@ -57,6 +57,7 @@ int design_command(const CommandContext& context);
 int identify_command(const CommandContext& context);
 int tradeoff_command(const CommandContext& context);
 int resume_command(const CommandContext& context);  // options.problem_file: the folder
+int new_command(const CommandContext& context);     // options.problem_file: the kind
 int schema_command(const CommandContext& context);
 
 }  // namespace mbsopt

@@ -89,14 +89,15 @@ Known of_operation(const SyntaxNode& node, const Inferred& a, const Inferred& b)
 
 }  // namespace
 
-std::optional<Dimension> infer_dimension(const Expression& expression, const DimensionOfName& dimension_of_name) {
+std::optional<Dimension> infer_dimension(const Expression& expression, const DimensionOfName& dimension_of_name,
+                                         PlainNumbers plain) {
   const std::vector<SyntaxNode>& nodes = expression.tree().nodes;
   std::vector<Inferred> inferred;
   inferred.reserve(nodes.size());
   for (const SyntaxNode& node : nodes) {
     Inferred result;
     if (node.operation == Operation::number) {
-      result = {node.unit.value_or(Dimension{}), node.value, !node.unit};
+      result = {node.unit.value_or(Dimension{}), node.value, !node.unit && plain == PlainNumbers::fit_everything};
     } else if (node.operation == Operation::name) {
       result.dimension = dimension_of_name(node.name);
     } else {

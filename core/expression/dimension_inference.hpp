@@ -25,8 +25,13 @@ class DimensionError : public std::runtime_error {
 
 using DimensionOfName = std::function<std::optional<Dimension>(const std::string& name)>;
 
+// Numbers without units, which fit everything where dimensions are checked, and count as pure where a unit is looked
+// for: the mean (x1 + x2)/2 of two lengths is a length.
+enum class PlainNumbers { fit_everything, are_pure };
+
 // nullopt: not known. Throws DimensionError.
-std::optional<Dimension> infer_dimension(const Expression& expression, const DimensionOfName& dimension_of_name);
+std::optional<Dimension> infer_dimension(const Expression& expression, const DimensionOfName& dimension_of_name,
+                                         PlainNumbers plain = PlainNumbers::fit_everything);
 
 // Whether an expression of that dimension may stand in a field; a dimension that is not known or none always may.
 bool fits(const std::optional<Dimension>& found, const Dimension& expected);

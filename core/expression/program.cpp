@@ -18,6 +18,11 @@ void Symbols::add_definition(const std::string& name, const Expression& expressi
   definitions_.emplace(name, expression);
 }
 
+void Symbols::add_defined_input(const std::string& name, const Expression& expression) {
+  add_definition(name, expression);
+  input_names_.push_back(name);
+}
+
 int Symbols::input(std::string_view name) const {
   const auto it = index_.find(std::string(name));
   return it == index_.end() ? -1 : it->second;
@@ -32,6 +37,7 @@ std::vector<std::string> Symbols::names() const {
   std::vector<std::string> all = input_names_;
   for (const auto& [name, expression] : definitions_) all.push_back(name);
   std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());  // defined inputs are both
   return all;
 }
 

@@ -30,6 +30,8 @@ class Symbols {
  public:
   int add_input(const std::string& name);  // index of the input
   void add_definition(const std::string& name, const Expression& expression);
+  // A definition that counts among the inputs, so that the next ones keep their numbers; no program reads it.
+  void add_defined_input(const std::string& name, const Expression& expression);
   int inputs() const { return static_cast<int>(input_names_.size()); }
   const std::vector<std::string>& input_names() const { return input_names_; }
   int input(std::string_view name) const;                     // its index, -1 when there is none

@@ -62,7 +62,7 @@ class ProgramBuilder {
     if (!definition)
       throw UnknownName("unknown name '" + name + "'" + did_you_mean(name, symbols_.names()) + known_names(), name);
     if (const auto it = done_.find(name); it != done_.end()) return it->second;
-    if (!open_.insert(name).second) throw UnknownName("the definition '" + name + "' refers to itself", name);
+    if (!open_.insert(name).second) throw UnknownName("'" + name + "' refers to itself", name);
     if (open_.size() > kDeepestDefinitions)
       throw UnknownName("definitions nest deeper than " + std::to_string(kDeepestDefinitions) + " levels", name);
     const int result = emit(*definition);

@@ -72,6 +72,9 @@ struct Compilation {
   std::map<std::pair<std::size_t, Zero>, int> angle_of_joint_;
 };
 
+// The unit Euler parameters of an orientation.
+DualVector4 orientation_of(const Compilation& model, const OrientationField& field, const std::string& where);
+
 void compile_signals(Compilation& model);
 void compile_bodies(Compilation& model);
 void compile_joints(Compilation& model);

@@ -11,7 +11,9 @@ DualVector3 unit_vector(const Compilation& model, std::size_t k) {
   return e;
 }
 
-DualVector4 orientation(const Compilation& model, const OrientationField& field, const std::string& where) {
+}  // namespace
+
+DualVector4 orientation_of(const Compilation& model, const OrientationField& field, const std::string& where) {
   if (const auto* e = std::get_if<EulerParametersField>(&field)) {
     const DualVector4 p = model.fields.values(e->e, where);
     if (numbers(p).norm() == 0) throw SceneError(where + ": Euler parameters must not all be zero");
@@ -26,6 +28,8 @@ DualVector4 orientation(const Compilation& model, const OrientationField& field,
   p = quaternion_product(p, euler_parameters(unit_vector(model, 1), rpy[1]));
   return quaternion_product(p, euler_parameters(unit_vector(model, 0), rpy[0]));
 }
+
+namespace {
 
 // J = tr(S) I - S with S = m U U': xx yy zz xy xz yz.
 DualVector<6> tensor_of(const Compilation& model, const ConsistentInertiaField& I, const Dual& m,
@@ -55,7 +59,7 @@ void add_body(Compilation& model, const Body& body, BodyData& out, DualVector3& 
   com = model.fields.values(body.com, where + ".com");
   out.com = numbers(model.keep(out.slot_com, com));
 
-  p = orientation(model, body.orientation, where + ".orientation");
+  p = orientation_of(model, body.orientation, where + ".orientation");
   r = model.fields.values(body.position, where + ".position") + rotated(p, com);
   const DualVector<7> q{r[0], r[1], r[2], p[0], p[1], p[2], p[3]};
   out.q = numbers(model.keep(out.slot_q, q));

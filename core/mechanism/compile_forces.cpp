@@ -4,6 +4,7 @@
 
 #include "core/mechanism/compilation.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/scene/scene_facts.hpp"
 #include "core/scene/type_table.hpp"
 
 namespace mbsopt {
@@ -60,8 +61,8 @@ void add(Compilation& model, const Torsional& f, int force, const std::string& w
 void set_components(const Compilation& model, const LawVector& components, AppliedForce& out,
                     const std::string& where) {
   Symbols symbols = model.fields.symbols();
-  const int t = symbols.add_input("t");
-  for (const Sensor& s : model.scene.sensors) symbols.add_input(s.name);
+  add_time_and_sensors(symbols, model.scene);
+  const int t = symbols.input("t");
   std::set<int> used;
   for (std::size_t i = 0; i < components.size(); ++i) {
     try {

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "core/mechanism/sensor_kinds.hpp"
-#include "core/scene/type_table.hpp"
+#include "core/scene/scene_facts.hpp"
 
 namespace mbsopt {
 namespace {
@@ -12,7 +12,7 @@ std::shared_ptr<SensorFunction> sensor(Compilation& model, const Sensor& s, cons
   if (kind == std::end(kSensorMakers))
     throw SceneError(where + ".quantity: '" + s.quantity + "' is not a quantity known here");
   std::shared_ptr<SensorFunction> made = kind->make(model, s, where);
-  made->reads = find_row(kSensorQuantities, s.quantity)->reads;
+  if (s.quantity != "expression") made->reads = reads_of_quantity(s);  // the maker of an expression knows what it reads
   return made;
 }
 
@@ -32,9 +32,9 @@ void add_condition(Compilation& model, std::size_t i) {
   out.rate_sensor = sensor->rate(model.data);
   out.velocity_level = sensor->reads == Reads::velocities;
   out.modulo_turn = sensor->angle() >= 0 && !out.velocity_level;
-  const Dimension of =
-      find_row(kSensorQuantities, model.scene.sensors[static_cast<std::size_t>(out.sensor)].quantity)->dimension;
-  if (of != Dimension{}) out.unit = " " + to_string(of), out.rate_unit = " " + to_string(of / dimension::kTime);
+  const Sensor& spec = model.scene.sensors[static_cast<std::size_t>(out.sensor)];
+  const Dimension of = shown_dimension(model.scene, spec).value_or(Dimension{});
+  if (!of.is_none()) out.unit = " " + to_string(of), out.rate_unit = " " + to_string(of / dimension::kTime);
   if (c.value) {
     const Dual v = model.fields.value(*c.value, where + ".value");
     out.has_value = true, out.value = v.value(), out.slot_value = model.fields.slot(v);
@@ -59,11 +59,16 @@ int component_of(const Sensor& sensor, const std::string& where) {
 }
 
 void compile_sensors(Compilation& model) {
-  for (std::size_t i = 0; i < model.scene.sensors.size(); ++i) {
-    model.data.sensors.push_back(sensor(model, model.scene.sensors[i], child_path("sensors", i)));
-    model.data.sensor_names.push_back(model.scene.sensors[i].name);
-    if (model.data.sensors.back()->reads == Reads::motion) model.data.needs_motion = true;
+  const std::vector<Sensor>& sensors = model.scene.sensors;
+  model.data.sensors.resize(sensors.size());
+  for (const bool expressions : {false, true}) {  // these measure by the others
+    for (std::size_t i = 0; i < sensors.size(); ++i) {
+      if ((sensors[i].quantity == "expression") != expressions) continue;
+      model.data.sensors[i] = sensor(model, sensors[i], child_path("sensors", i));
+      if (model.data.sensors[i]->reads == Reads::motion) model.data.needs_motion = true;
+    }
   }
+  for (const Sensor& s : sensors) model.data.sensor_names.push_back(s.name);
 }
 
 void compile_conditions(Compilation& model) {

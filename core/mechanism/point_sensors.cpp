@@ -6,6 +6,38 @@
 #include "core/mechanism/sensor_kinds.hpp"
 
 namespace mbsopt {
+
+BodyAt moving(const StatePoint& at, int body) {
+  assert(at.motion);
+  BodyAt b = body_at(at.y, body);
+  if (body > 0) set_acceleration(at.motion->motion(at).z[static_cast<std::size_t>(body - 1)], b.state, b.frame);
+  return b;
+}
+
+void add_acceleration(const MechanismData& d, const StatePoint& at, const BodyPoint& point, const Vector3d& X,
+                      double scale, VecOut y_bar, VecOut rho_bar) {
+  const BodyAt b = moving(at, point.body);
+  add_slot<3>(d, point.slot, Vec<3>(b.frame.Addot.transpose() * X), scale, rho_bar);
+  if (point.body == 0) return;
+  FrameBar bar;
+  bar.set_zero();
+  bar.Addot = scale * X * point.s.transpose();
+  const Eigen::Index q = 7 * (point.body - 1);
+  add_pull_back(b.state, bar, Vector4d::Zero(), Vector3d::Zero(), y_bar.segment<7>(q),
+                y_bar.segment<7>(y_bar.size() / 2 + q));
+  // X'A (omegadot x s) = omegadot'(s x A'X)
+  Vec<6>& out = at.motion->bar().z[static_cast<std::size_t>(point.body - 1)];
+  out.head<3>() += scale * X;
+  out.tail<3>() += scale * point.s.cross(b.frame.A.transpose() * X);
+}
+
+BodyPoint sensor_point(Compilation& model, const std::string& body, const PointField& field, const std::string& where) {
+  BodyPoint result;
+  result.body = model.body_index(body, where);
+  result.s = numbers(model.keep(result.slot, model.point(result.body, field, where)));
+  return result;
+}
+
 namespace {
 
 // A position in the ground's axes, which most objectives look at, needs neither velocities nor frames.
@@ -56,30 +88,6 @@ void add_point(const MechanismData& d, const BodyAt& body, const BodyPoint& poin
   add_slot<3>(d, point.slot, s_bar, scale, rho_bar);
 }
 
-BodyAt moving(const StatePoint& at, int body) {
-  assert(at.motion);
-  BodyAt b = body_at(at.y, body);
-  if (body > 0) set_acceleration(at.motion->motion(at).z[static_cast<std::size_t>(body - 1)], b.state, b.frame);
-  return b;
-}
-
-void add_acceleration(const MechanismData& d, const StatePoint& at, const BodyPoint& point, const Vector3d& X,
-                      double scale, VecOut y_bar, VecOut rho_bar) {
-  const BodyAt b = moving(at, point.body);
-  add_slot<3>(d, point.slot, Vec<3>(b.frame.Addot.transpose() * X), scale, rho_bar);
-  if (point.body == 0) return;
-  FrameBar bar;
-  bar.set_zero();
-  bar.Addot = scale * X * point.s.transpose();
-  const Eigen::Index q = 7 * (point.body - 1);
-  add_pull_back(b.state, bar, Vector4d::Zero(), Vector3d::Zero(), y_bar.segment<7>(q),
-                y_bar.segment<7>(y_bar.size() / 2 + q));
-  // X'A (omegadot x s) = omegadot'(s x A'X)
-  Vec<6>& out = at.motion->bar().z[static_cast<std::size_t>(point.body - 1)];
-  out.head<3>() += scale * X;
-  out.tail<3>() += scale * point.s.cross(b.frame.A.transpose() * X);
-}
-
 // Kinematic acceleration (without gravity) of a body point, or the plain difference of two.   [m/s^2]
 //   W = Pddot_a - Pddot_b,  Pddot = rddot + Addot s;   a component of R'W in the axes R of a body or global, or |W|
 // It depends on the state and on z = (rddot, omegadot) of the bodies, which the equations of motion give.
@@ -122,13 +130,6 @@ struct AccelerationSensor final : SensorFunction, SeenPoints {
     return W;
   }
 };
-
-BodyPoint sensor_point(Compilation& model, const std::string& body, const PointField& field, const std::string& where) {
-  BodyPoint result;
-  result.body = model.body_index(body, where);
-  result.s = numbers(model.keep(result.slot, model.point(result.body, field, where)));
-  return result;
-}
 
 // A point, perhaps relative to another, and a component in some axes.
 void set_points(Compilation& model, const Sensor& s, SeenPoints& of, const std::string& where) {

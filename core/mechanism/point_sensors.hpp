@@ -5,6 +5,9 @@
 //   velocity       a component of R'Xdot, or |Xdot|
 #pragma once
 
+#include <string>
+
+#include "core/mechanism/compilation.hpp"
 #include "core/mechanism/sensor_function.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -15,6 +18,15 @@ struct BodyPoint {
   Vector3d s = Vector3d::Zero();  // from the centre of mass, body axes [m]
   int slot = -1;
 };
+
+BodyPoint sensor_point(Compilation& model, const std::string& body, const PointField& field, const std::string& where);
+
+// A body with the acceleration that the equations of motion give.
+BodyAt moving(const StatePoint& at, int body);
+
+// X' times the acceleration of the point: adds scale times its gradient; that in the motion goes to at.motion->bar().
+void add_acceleration(const MechanismData& data, const StatePoint& at, const BodyPoint& point, const Vector3d& X,
+                      double scale, VecOut y_bar, VecOut rho_bar);
 
 // Sensors of points share these fields.
 struct SeenPoints {

@@ -18,6 +18,8 @@ SensorMaker make_joint_angle, make_body_angle, make_displacement;  // joint_sens
 SensorMaker make_angular_velocity, make_orientation;               // rotation_sensors.cpp
 SensorMaker make_energy, make_violation, make_tension;             // energy_, violation_, tension_sensor.cpp
 SensorMaker make_reaction, make_drive_force;                       // reaction_sensor.cpp
+SensorMaker make_imu;                                              // imu_sensor.cpp
+SensorMaker make_expression;                                       // expression_sensor.cpp
 
 struct SensorMakerRow {
   std::string_view quantity;
@@ -41,6 +43,8 @@ inline constexpr SensorMakerRow kSensorMakers[] = {
     {"force", make_tension},
     {"reaction", make_reaction},
     {"drive_force", make_drive_force},
+    {"imu", make_imu},
+    {"expression", make_expression},
 };
 
 // Index of the component, 3 for a norm.

@@ -161,11 +161,12 @@ bool Checker::names_are_known(const std::string& where, const Expression& value,
   return known;
 }
 
-void Checker::check_dimension(const std::string& where, const Expression& value,
+void Checker::check_dimension(const std::string& where, const Expression& value, Names names,
                               const std::optional<Dimension>& expected) {
   try {
-    const auto found =
-        infer_dimension(value, [this](const std::string& name) { return facts_.dimension_of_name(name); });
+    const auto found = infer_dimension(value, [&](const std::string& name) {
+      return names == Names::sensor ? facts_.dimension_in_sensor(name) : facts_.dimension_of_name(name);
+    });
     if (expected && !fits(found, *expected))
       issue(where,
             "'" + value.text() + "' has the dimension " + to_string(*found) + ", expected is " + to_string(*expected));
@@ -178,7 +179,7 @@ void Checker::check_expression(const std::string& where, const Expression& value
                                const std::optional<Dimension>& expected) {
   if (!names_are_known(where, value, names)) return;
   if (names == Names::state) check_sensors_of_state(where, value);
-  if (names != Names::objective) check_dimension(where, value, expected);
+  if (names != Names::objective) check_dimension(where, value, names, expected);
   if (value.is_number() || names == Names::none) {
     check_size(where, value);
   }
@@ -198,8 +199,7 @@ void Checker::check_size(const std::string& where, const Expression& value) {
 void Checker::check_sensors_of_state(const std::string& where, const Expression& value) {
   for (const std::string& name : value.names()) {
     const Sensor* const sensor = facts_.sensor(name);
-    const TypeRow* const row = sensor ? find_row(kSensorQuantities, sensor->quantity) : nullptr;
-    if (row && row->reads == Reads::motion)
+    if (sensor && facts_.reads_of(*sensor) == Reads::motion)
       issue(where, "uses the sensor '" + name + "', whose quantity is " + sensor->quantity +
                        ": it follows from the forces, so a force cannot depend on it; sensors of positions, "
                        "velocities, angles, energies and spring forces can be used");

@@ -128,7 +128,8 @@ class Checker {
   void check_vector(const std::string& path, const VectorField& value, const std::optional<Dimension>& expected);
   bool names_are_known(const std::string& path, const Expression& value, Names names);
   void check_sensors_of_state(const std::string& path, const Expression& value);
-  void check_dimension(const std::string& path, const Expression& value, const std::optional<Dimension>& expected);
+  void check_dimension(const std::string& path, const Expression& value, Names names,
+                       const std::optional<Dimension>& expected);
 
   const SceneFacts& facts_;
   std::vector<SceneIssue>& issues_;

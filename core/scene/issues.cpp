@@ -355,22 +355,28 @@ void check_meaning(Checker& checker, const Condition& condition) {
   if (!condition.value && !condition.rate)
     checker.issue(checker.path(), "has neither \"value\" nor \"rate\"; at least one is needed");
   const Sensor* const sensor = checker.facts().sensor(condition.sensor);
-  const TypeRow* const row = sensor ? find_row(kSensorQuantities, sensor->quantity) : nullptr;
-  if (!row) return;
+  if (!sensor || !find_row(kSensorQuantities, sensor->quantity)) return;
   const std::string named = "sensor '" + sensor->name + "'";
-  if (row->reads > Reads::velocities)
-    return checker.issue(checker.path("sensor"), named + " measures " + sensor->quantity +
-                                                     ", which a condition cannot prescribe; use positions, angles, "
-                                                     "distances, Euler parameters or their rates");
-  if (condition.rate && row->reads == Reads::velocities)
+  const Reads reads = checker.facts().reads_of(*sensor);
+  if (reads > Reads::velocities)
+    return checker.issue(checker.path("sensor"),
+                         named + (sensor->quantity == "expression"
+                                      ? " is an expression of more than positions, which a condition cannot prescribe; "
+                                        "use expressions of positions, angles, distances or Euler parameters"
+                                      : " measures " + sensor->quantity +
+                                            ", which a condition cannot prescribe; use positions, angles, "
+                                            "distances, Euler parameters or their rates"));
+  if (condition.rate && reads == Reads::velocities)
     checker.issue(checker.path("rate"), named + " measures a " + sensor->quantity + ": give its \"value\"");
   if (condition.rate && sensor->quantity == "position" && sensor->in_body_frame)
     checker.issue(checker.path("rate"), named + " is in a body's axes, where its rate is not available");
+  const std::optional<Dimension> measured = checker.facts().dimension_of(*sensor);
+  if (!measured) return;
   const auto check_dimension = [&](std::string_view key, const std::optional<Field>& field, const Dimension& expected) {
     if (field) checker.number(key, *field, {"", Need::optional, expected});
   };
-  check_dimension("value", condition.value, row->dimension);
-  check_dimension("rate", condition.rate, row->dimension / dimension::kTime);
+  check_dimension("value", condition.value, *measured);
+  check_dimension("rate", condition.rate, *measured / dimension::kTime);
 }
 
 void check_meaning(Checker& checker, const IntegratorOptions& o) {
@@ -498,8 +504,7 @@ void check_meaning(Checker& checker, const Scene& scene) {
     checker.issue("initial.conditions",
                   "stand beside \"equilibrium\": true, which settles the whole initial state; "
                   "give one or the other");
-  for (const auto& [name, what] : checker.facts().endless_definitions())
-    checker.issue(child_path("definitions", name), what);
+  for (const auto& [path, what] : checker.facts().endless_definitions()) checker.issue(path, what);
 }
 
 std::vector<SceneIssue> without_repetitions(std::vector<SceneIssue> issues) {

@@ -213,6 +213,8 @@ struct Sensor {
   std::string kind;                // of reaction: force or torque
   std::string drive;               // of drive_force
   std::optional<PointField> axis;  // of body_angle, in the ground
+  Expression value;                // of expression: of t, parameters, definitions and other sensors
+  OrientationField axes;           // of imu: of its axes in those of the body
 };
 
 struct Condition {

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/expression/dimension_inference.hpp"
+#include "core/scene/scene_path.hpp"
 #include "core/scene/signals.hpp"
 
 namespace mbsopt {
 
 namespace {
+
+bool is_expression(const Sensor& sensor) { return sensor.quantity == "expression"; }
 
 // The first of several equal names counts; duplicates are an issue of their own.
 void add_once(Symbols& symbols, const std::string& name) {
@@ -59,7 +61,9 @@ SceneFacts::SceneFacts(const Scene& scene)
     const std::optional<Unit> unit = parse_unit(signal.unit);
     dimensions_[signal.name] = unit && signal.gain.is_number() ? std::optional(unit->dimension) : std::nullopt;
   }
-  find_broken_definitions();
+  Broken definitions, expressions;
+  for (const auto& [name, value] : scene.definitions)
+    find_broken(child_path("definitions", name), name, value, none_, definitions);
   Symbols with_signals = none_;
   add_signals(with_signals, scene);
   tsda_law_ = rsda_law_ = time_law_ = objective_ = with_signals;
@@ -67,30 +71,37 @@ SceneFacts::SceneFacts(const Scene& scene)
   for (const char* name : {"angle", "rate", "t"}) add_once(rsda_law_, name);
   add_once(time_law_, "t");
   add_once(objective_, "t");
-  for (const Sensor& sensor : scene.sensors) add_once(objective_, sensor.name);
+  for (const Sensor& sensor : scene.sensors) {
+    if (!is_expression(sensor))
+      add_once(objective_, sensor.name);
+    else if (!knows(objective_, sensor.name))
+      objective_.add_definition(sensor.name, sensor.value);
+  }
+  for (const Sensor& sensor : scene.sensors)
+    if (is_expression(sensor))
+      find_broken(child_path(child_path("sensors", sensor.name), "value"), sensor.name, sensor.value, objective_,
+                  expressions);
 }
 
-void SceneFacts::find_broken_definitions() {
-  bool too_deep = false;
-  std::set<std::string> unknown;  // depend on names that nobody knows
-  for (const auto& [name, value] : scene_.definitions) {
-    if (!is_identifier(name) || !none_.definition(name)) continue;
-    const std::vector<std::string>& names = value.names();
-    const auto nobody_knows = [&](const std::string& n) { return unknown.contains(n) || !knows(none_, n); };
-    if (std::any_of(names.begin(), names.end(), nobody_knows)) {
-      unknown.insert(name), broken_.insert(name);
-      continue;
-    }
-    try {
-      Program(Expression::parse(name), none_);
-    } catch (const UnknownName& error) {
-      broken_.insert(name);
-      const bool of_definition = none_.definition(error.name) != nullptr;  // else a name that nobody knows
-      const bool is_deep = of_definition && std::string_view(error.what()).find("deeper") != std::string_view::npos;
-      if (of_definition && (error.name == name || (is_deep && !too_deep))) endless_.emplace_back(name, error.what());
-      too_deep = too_deep || is_deep;
-    } catch (const ExpressionError&) {  // called like a function: an issue of its own
-    }
+void SceneFacts::find_broken(const std::string& path, const std::string& name, const Expression& value,
+                             const Symbols& symbols, Broken& found) {
+  if (!is_identifier(name) || !symbols.definition(name)) return;
+  const std::vector<std::string>& names = value.names();
+  const auto nobody_knows = [&](const std::string& n) { return found.unknown.contains(n) || !knows(symbols, n); };
+  if (std::any_of(names.begin(), names.end(), nobody_knows)) {
+    found.unknown.insert(name), broken_.insert(name);
+    return;
+  }
+  try {
+    Program(Expression::parse(name), symbols);
+  } catch (const UnknownName& error) {
+    broken_.insert(name);
+    const bool of_definition = symbols.definition(error.name) != nullptr;  // else a name that nobody knows
+    const bool is_deep = of_definition && std::string_view(error.what()).find("deeper") != std::string_view::npos;
+    if (of_definition && (error.name == name || (is_deep && !found.too_deep)))
+      endless_.emplace_back(path, error.what());
+    found.too_deep = found.too_deep || is_deep;
+  } catch (const ExpressionError&) {  // called like a function: an issue of its own
   }
 }
 
@@ -168,6 +179,7 @@ const Symbols& SceneFacts::symbols(Names names) const {
     case Names::time_law:
       return time_law_;
     case Names::state:
+    case Names::sensor:
     case Names::objective:
       return objective_;
   }
@@ -240,6 +252,73 @@ std::optional<Dimension> SceneFacts::dimension_of_name(const std::string& name) 
   }
   if (found && found->is_none()) found.reset();  // as a plain number: it may stand for anything
   return dimensions_[name] = found;
+}
+
+std::vector<std::string> SceneFacts::used_names(const Expression& expression, const Symbols& symbols) const {
+  std::vector<std::string> names;
+  if (!can_be_evaluated(expression, symbols)) return names;
+  const Program program(expression, symbols);
+  for (const int input : program.used_inputs()) names.push_back(symbols.input_names()[static_cast<std::size_t>(input)]);
+  return names;
+}
+
+std::vector<const Sensor*> SceneFacts::measured_by(const Sensor& measured) const {
+  if (!is_expression(measured)) return {&measured};
+  std::vector<const Sensor*> all;
+  for (const std::string& name : used_names(measured.value, objective_))
+    if (const Sensor* const below = sensor(name)) all.push_back(below);
+  return all;
+}
+
+Reads SceneFacts::reads_of(const Sensor& measured) const {
+  if (!is_expression(measured)) return reads_of_quantity(measured);
+  Reads reads = Reads::positions;
+  for (const std::string& name : used_names(measured.value, objective_)) {
+    const Sensor* const below = sensor(name);
+    reads = std::max(reads, below ? reads_of_quantity(*below) : name == "t" ? Reads::time_and_state : reads);
+  }
+  return reads == Reads::velocities ? Reads::state : reads;
+}
+
+std::optional<Dimension> SceneFacts::dimension_of(const Sensor& measured, PlainNumbers plain) const {
+  if (!is_expression(measured)) return dimension_of_quantity(measured);
+  if (!can_be_evaluated(measured.value, objective_)) return std::nullopt;
+  const auto [it, is_new] = dimensions_of_sensors_.emplace(std::pair(measured.name, plain), std::nullopt);
+  if (!is_new) return it->second;
+  try {
+    it->second = infer_dimension(
+        measured.value, [&](const std::string& name) { return dimension_in_sensor(name, plain); }, plain);
+  } catch (const DimensionError&) {  // reported at the sensor
+  }
+  return it->second;
+}
+
+std::optional<Dimension> SceneFacts::dimension_in_sensor(const std::string& name, PlainNumbers plain) const {
+  const Sensor* const below = sensor(name);
+  return below ? dimension_of(*below, plain) : dimension_of_name(name);
+}
+
+void add_time_and_sensors(Symbols& symbols, const Scene& scene) {
+  symbols.add_input("t");
+  for (const Sensor& sensor : scene.sensors) {
+    if (is_expression(sensor))
+      symbols.add_defined_input(sensor.name, sensor.value);
+    else
+      symbols.add_input(sensor.name);
+  }
+}
+
+std::optional<Dimension> shown_dimension(const Scene& scene, const Sensor& sensor) {
+  if (!is_expression(sensor)) return dimension_of_quantity(sensor);
+  return SceneFacts(scene).dimension_of(sensor, PlainNumbers::are_pure);
+}
+
+std::string unit_of(const Scene& scene, const Sensor& sensor) {
+  const TypeRow* const row = find_row(kSensorQuantities, sensor.quantity);
+  if (row && !row->unit.empty()) return std::string(row->unit);
+  const std::optional<Dimension> dimension = shown_dimension(scene, sensor);
+  if (!dimension) return "";
+  return dimension->is_none() ? "-" : to_string(*dimension);
 }
 
 }  // namespace mbsopt

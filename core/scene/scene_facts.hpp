@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/expression/dimension.hpp"
+#include "core/expression/dimension_inference.hpp"
 #include "core/expression/program.hpp"
 #include "core/scene/scene.hpp"
 #include "core/scene/vocabulary.hpp"
@@ -34,9 +35,9 @@ class SceneFacts {
   // Parameters and definitions, and what else an expression may use.
   const Symbols& symbols(Names names) const;
 
-  // Definitions that cannot be evaluated: circular, nested too deep, or with unknown names.
+  // Definitions and sensors' expressions that cannot be evaluated: circular, nested too deep, or with unknown names.
   bool is_broken(const std::string& definition) const { return broken_.contains(definition); }
-  // Of those, the ones that are circular or nested too deep: name and what is wrong.
+  // Of those, the ones that are circular or nested too deep: path and what is wrong.
   const std::vector<std::pair<std::string, std::string>>& endless_definitions() const { return endless_; }
 
   // At the parameters' values, finite; nullopt where it cannot be evaluated. A parameter of NaN has no value that
@@ -51,8 +52,26 @@ class SceneFacts {
 
   std::optional<Dimension> dimension_of_name(const std::string& name) const;  // nullopt: not known
 
+  // The sensors that an expression sensor measures by, none of which is an expression; any other sensor measures by
+  // itself.
+  std::vector<const Sensor*> measured_by(const Sensor& sensor) const;
+  // Of an expression: the largest of those; one of velocities is not linear in them, and reads the state.
+  Reads reads_of(const Sensor& sensor) const;
+  std::optional<Dimension> dimension_of(const Sensor& sensor,
+                                        PlainNumbers plain = PlainNumbers::fit_everything) const;  // nullopt: not known
+  // Of a name in a sensor's expression.
+  std::optional<Dimension> dimension_in_sensor(const std::string& name,
+                                               PlainNumbers plain = PlainNumbers::fit_everything) const;
+
  private:
-  void find_broken_definitions();
+  struct Broken {
+    bool too_deep = false;
+    std::set<std::string> unknown;  // depend on names that nobody knows
+  };
+  void find_broken(const std::string& path, const std::string& name, const Expression& value, const Symbols& symbols,
+                   Broken& found);
+  // The program's names of an expression that can be evaluated; else none.
+  std::vector<std::string> used_names(const Expression& expression, const Symbols& symbols) const;
   bool can_be_evaluated(const Expression& expression, const Symbols& symbols) const;
 
   const Scene& scene_;
@@ -69,6 +88,16 @@ class SceneFacts {
   std::vector<std::pair<std::string, std::string>> endless_;
   mutable Program::Scratch scratch_;
   mutable std::map<std::string, std::optional<Dimension>> dimensions_;
+  mutable std::map<std::pair<std::string, PlainNumbers>, std::optional<Dimension>> dimensions_of_sensors_;
 };
+
+// t and the sensors as inputs, in this order. The name of an expression sensor stands for its expression, so that
+// programs read the sensors that it measures by.
+void add_time_and_sensors(Symbols& symbols, const Scene& scene);
+
+// In which a sensor's values are printed: "rad", "m/s"; "-" for a number; empty where it is not known. Plain numbers of
+// an expression count as pure.
+std::optional<Dimension> shown_dimension(const Scene& scene, const Sensor& sensor);
+std::string unit_of(const Scene& scene, const Sensor& sensor);
 
 }  // namespace mbsopt

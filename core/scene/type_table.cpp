@@ -105,11 +105,23 @@ Dimension dimension_of_drive(std::string_view type, std::string_view coordinate)
   return type == "coordinate" && coordinate.starts_with('e') ? Dimension{} : dimension::kLength;
 }
 
-std::string unit_of(const Sensor& sensor) {
+namespace {
+
+bool is_imu_rate(const Sensor& sensor) { return sensor.quantity == "imu" && sensor.component.starts_with('w'); }
+
+}  // namespace
+
+std::optional<Dimension> dimension_of_quantity(const Sensor& sensor) {
   const TypeRow* const row = find_row(kSensorQuantities, sensor.quantity);
-  if (!row || row->dimension == Dimension{}) return "-";
-  if (!row->unit.empty()) return std::string(row->unit);
-  return to_string(sensor.kind == "torque" ? dimension::kTorque : row->dimension);
+  if (!row || has_word(row->unit, "or")) return std::nullopt;
+  if (is_imu_rate(sensor)) return dimension::kRate;
+  return sensor.kind == "torque" ? dimension::kTorque : row->dimension;
+}
+
+Reads reads_of_quantity(const Sensor& sensor) {
+  const TypeRow* const row = find_row(kSensorQuantities, sensor.quantity);
+  if (!row) return Reads::positions;
+  return is_imu_rate(sensor) ? Reads::velocities : row->reads;
 }
 
 bool is_identifier(std::string_view text) {

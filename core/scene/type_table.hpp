@@ -2,6 +2,7 @@
 // files, the checks of a scene and the JSON Schema all read these tables; a new type is one more row.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -32,8 +33,8 @@ struct TypeRow {
   std::string_view description;
   std::string_view fields;           // "point1 axis1!": what it has besides its name, type and bodies; "!": required
   std::string_view components = "";  // of a sensor: what "component" may be
-  Dimension dimension = {};          // of a sensor: what it measures
-  Reads reads = Reads::positions;    // of a sensor
+  Dimension dimension = {};          // of a sensor: what it measures (dimension_of_quantity says exceptions)
+  Reads reads = Reads::positions;    // of a sensor (reads_of_quantity says exceptions)
   std::string_view unit = "";        // of a sensor whose dimension does not say it
 };
 
@@ -113,6 +114,9 @@ inline constexpr TypeRow kSensorQuantities[] = {
      "x y z norm", dimension::kForce, Reads::motion},
     {"drive_force", "force or torque of a drive along its coordinate, positive where it pushes it up", "drive!", "",
      dimension::kForce, Reads::motion, "N or N m"},
+    {"imu", "of a body point, in axes fixed in the body: specific force (acceleration minus gravity), angular velocity",
+     "body! point axes component!", "ax ay az wx wy wz", dimension::kAcceleration, Reads::motion},
+    {"expression", "of other sensors, parameters, definitions and t", "value!"},
 };
 
 inline constexpr std::string_view kJointsWithAngle = "revolute cylindrical screw";
@@ -142,8 +146,9 @@ std::string not_among(std::string_view what, std::string_view found, const std::
 // Whether friction in a joint resists sliding: as `motion` says, else where the joint has no angle.
 bool is_sliding(std::string_view motion, std::string_view joint_type);
 
-// In which a sensor's values are printed: "rad", "m/s"; "-" for a number.
-std::string unit_of(const Sensor& sensor);
+// Of a quantity other than expression, whose are found in the scene (scene_facts.hpp). nullopt: not known (N or N m).
+std::optional<Dimension> dimension_of_quantity(const Sensor& sensor);
+Reads reads_of_quantity(const Sensor& sensor);
 
 std::string_view type_of(const Force& force);
 void set_type(Force& force, std::string_view type);

@@ -57,7 +57,15 @@ struct Says {
 enum class To { body, joint, drive, force, sensor, parameter, objective };
 
 // Names that an expression may use besides parameters and definitions.
-enum class Names { none, tsda_law, rsda_law, time_law, state, objective };  // state: t and sensors of (t, q, v)
+enum class Names {
+  none,
+  tsda_law,
+  rsda_law,
+  time_law,
+  state,  // t and sensors of (t, q, v)
+  sensor,
+  objective  // as sensor: t and all sensors
+};
 
 template <class T>
 struct Choice {
@@ -346,6 +354,10 @@ void describe(auto& v, Like<Sensor> auto& s) {
   v.reference("drive", s.drive, To::drive, {"a drive", need_of(*row, "drive")});
   v.point("axis", s.axis, s.body1.empty() ? "ground" : s.body1,
           {"direction in the ground, or in body1", need_of(*row, "axis")});
+  v.expression("value", s.value, Names::sensor,
+               {"expression of t, parameters, definitions and other sensors", need_of(*row, "value")});
+  v.orientation("axes", s.axes,
+                {"of its axes in those of the body, as of a body's orientation", need_of(*row, "axes")});
 }
 
 void describe(auto& v, Like<Condition> auto& c) {

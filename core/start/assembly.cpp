@@ -213,6 +213,7 @@ struct Assembly::Solution {
       return;
     }
     if (data.equilibrium) return rest_in_equilibrium();
+    velocity.set_angles(position.followed_angles());
     VelocityProblem velocities(velocity, q->x);
     v.emplace(nearest_point(velocities, velocity_guess(data, q->x), Decomposition::on_demand));
     result.y.tail(N) = v->x;
@@ -304,9 +305,16 @@ struct Assembly::Solution {
   }
 
   // On the turn that an angle's condition names, where there is one (so that a measured angle starts where it was
-  // measured), else within half a turn of zero; the last angle of a gear on the branch that the gear asks for.
+  // measured), else within half a turn of zero; the last angle of a gear on the branch that the gear asks for. A
+  // condition on an expression of angles may hold on other turns only, to which they were continued.
   void set_angles() {
+    const VectorXd continued = position.followed_angles();
     position.start_branches(result.y);
+    const auto is_turned = [&](const AssemblyTarget& target) {
+      return target.sensor->angle() < 0 && evaluate(data, target.sensor, start, result.y, continued) !=
+                                               evaluate(data, target.sensor, start, result.y, position.angles());
+    };
+    if (std::ranges::any_of(position.targets(), is_turned)) position.set_angles(continued);
     result.angles = position.angles();
     for (const AssemblyTarget& target : position.targets()) {
       if (target.sensor->angle() < 0) continue;

@@ -98,7 +98,16 @@ VectorXd AssemblyEquations::weights() const {
   return w;
 }
 
+VectorXd AssemblyEquations::followed_angles() const {
+  VectorXd angles = angles_;
+  if (level_ == AssemblyLevel::velocity) return angles;
+  for (const AssemblyTarget& target : targets_)
+    if (target.sensor->angle() >= 0) angles(target.sensor->angle()) = target.branch;
+  return angles;
+}
+
 VectorXd AssemblyEquations::branches(const AssemblyTarget& target) const {
+  if (target.sensor->angle() < 0) return followed_angles();
   return VectorXd::Constant(static_cast<Index>(data_.angles.size()), target.branch);
 }
 

@@ -35,6 +35,10 @@ class AssemblyEquations {
   // several (a gear) is on the branch that satisfies the row best; from there on they are continued.
   void start_branches(const Eigen::VectorXd& y);
   const Eigen::VectorXd& angles() const { return angles_; }
+  // As a condition on an expression of several angles sees them: where an angle has a condition of its own, on its
+  // turn.
+  Eigen::VectorXd followed_angles() const;
+  void set_angles(const Eigen::VectorXd& angles) { angles_ = angles; }
   void settle_shared_rows(const Eigen::VectorXd& y, Eigen::VectorXd& angles) const;
 
   Eigen::Index rows() const;  // joints first, then unit norms, then targets

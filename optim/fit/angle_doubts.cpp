@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/scene/type_table.hpp"
+#include "core/scene/scene_facts.hpp"
 
 namespace mbsopt {
 namespace {
@@ -37,13 +37,12 @@ double deviation(const std::vector<double>& values) {
   return apart(values, std::vector<double>(values.size(), mean));
 }
 
-const char* unit_of_angles(const Scene& scene, const std::string& sensor) {
+std::string unit_of_angles(const Scene& scene, const std::string& sensor) {
   const auto found =
       std::find_if(scene.sensors.begin(), scene.sensors.end(), [&](const Sensor& s) { return s.name == sensor; });
-  if (found == scene.sensors.end()) return nullptr;
-  const TypeRow* const row = find_row(kSensorQuantities, found->quantity);
-  if (row && row->dimension == dimension::kAngle) return "rad";
-  return row && row->dimension == dimension::kRate ? "rad/s" : nullptr;
+  if (found == scene.sensors.end()) return "";
+  const std::string unit = unit_of(scene, *found);
+  return unit == "rad" || unit == "rad/s" ? unit : "";
 }
 
 }  // namespace
@@ -64,11 +63,11 @@ std::vector<std::string> angle_doubts(const Scene& scene, const IdentificationSp
     for (std::size_t c = 0; c < series.size(); ++c) {
       const Series& s = series[c];
       const ChannelSpec& channel = spec.experiments[m.experiment].channels[c];
-      const char* const unit = unit_of_angles(scene, channel.sensor);
-      if (!unit || s.measured.size() < 2) continue;
+      const std::string unit = unit_of_angles(scene, channel.sensor);
+      if (unit.empty() || s.measured.size() < 2) continue;
       const double span = span_of(s.measured), start = span_of(s.start), end = span_of(s.end);
       const auto as_degrees = [&](double model) { return span > kNear * model && span < kNear * kDegrees * model; };
-      const bool plausible = std::string_view(unit) == "rad" && span <= std::numbers::pi;
+      const bool plausible = unit == "rad" && span <= std::numbers::pi;
       if (plausible || !(as_degrees(start) || as_degrees(end))) continue;
       if (apart(s.measured, s.end) <= kUnexplained * deviation(s.measured)) continue;
       doubts.push_back(

@@ -11,8 +11,8 @@
 #include "core/expression/did_you_mean.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/field_visitor.hpp"
+#include "core/scene/scene_facts.hpp"
 #include "core/scene/signals.hpp"
-#include "core/scene/type_table.hpp"
 #include "optim/objective/expression_cost.hpp"
 #include "optim/objective/obstructed_parameters.hpp"
 #include "optim/problem/parameter_values.hpp"
@@ -54,6 +54,7 @@ bool depends_on_time(const Scene& scene) {
       },
       [](const std::string&, const std::string&) {});
   for (const Force& force : scene.forces) describe(visitor, force);
+  for (const Sensor& sensor : scene.sensors) describe(visitor, sensor);
   return found;
 }
 
@@ -127,14 +128,13 @@ double Experiment::largest_delay(const Program& delay, const std::vector<double>
 
 // d s/dt along the dense output is s_y ydot only where s has no time of its own.
 void Experiment::refuse_time_dependence(const Sensor& sensor, const Program& delay, const std::string& place) const {
-  const TypeRow* const row = find_row(kSensorQuantities, sensor.quantity);
-  const bool of_state = !row || row->reads < Reads::time_and_state;
+  const bool of_state = SceneFacts(scene_).reads_of(sensor) < Reads::time_and_state;
   if (of_state || (!depends_on_time(scene_) && user_forces_.empty())) return;
   for (const Unknown& unknown : unknowns_)
     if (delay.uses(unknown.parameter))
       throw std::invalid_argument(fmt::format(
           "{}.delay: depends on '{}', which is fitted, and the sensor '{}' is of the quantity '{}', in a model whose "
-          "drives or forces depend on time; such a delay must be known",
+          "drives, forces or sensors depend on time; such a delay must be known",
           place, scene_.parameters[static_cast<std::size_t>(unknown.parameter)].name, sensor.name, sensor.quantity));
 }
 

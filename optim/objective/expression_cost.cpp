@@ -4,6 +4,7 @@
 
 #include "core/expression/program_switches.hpp"
 #include "core/mechanism/mechanism_data.hpp"
+#include "core/scene/scene_facts.hpp"
 #include "core/scene/signals.hpp"
 
 namespace mbsopt {
@@ -104,8 +105,9 @@ Symbols time_symbols(const Scene& scene) {
 }
 
 Symbols cost_symbols(const Scene& scene) {
-  Symbols symbols = time_symbols(scene);
-  for (const Sensor& s : scene.sensors) symbols.add_input(s.name);
+  Symbols symbols = parameter_symbols(scene);
+  add_time_and_sensors(symbols, scene);
+  add_signals(symbols, scene);
   return symbols;
 }
 

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <optional>
 
+#include "core/scene/scene_facts.hpp"
 #include "core/scene/scene_path.hpp"
-#include "core/scene/type_table.hpp"
 #include "optim/machine/median.hpp"
 #include "optim/problem/logged_columns.hpp"
 
@@ -164,8 +164,7 @@ class DataCheck {
     const ChannelSpec& channel = experiment_.channels[c];
     const auto sensor = std::find_if(scene_.sensors.begin(), scene_.sensors.end(),
                                      [&](const Sensor& s) { return s.name == channel.sensor; });
-    const TypeRow* const row = sensor == scene_.sensors.end() ? nullptr : find_row(kSensorQuantities, sensor->quantity);
-    if (!row || row->dimension != dimension::kAngle || !channel.gain.is_number()) return;
+    if (sensor == scene_.sensors.end() || unit_of(scene_, *sensor) != "rad" || !channel.gain.is_number()) return;
     const std::vector<double>& measured = data_.column(channel.column);
     const std::vector<std::size_t> rows = samples(channel);
     if (rows.size() < 3) return;

@@ -153,7 +153,15 @@ class Search {
     }
   }
 
-  std::vector<std::string> bodies_of(const Sensor& sensor) const {
+  std::vector<std::string> bodies_of(const Sensor& measured) const {
+    std::vector<std::string> all;
+    for (const Sensor* const sensor : facts_.measured_by(measured)) {
+      const std::vector<std::string> read = bodies_read_by(*sensor);
+      all.insert(all.end(), read.begin(), read.end());
+    }
+    return all;
+  }
+  std::vector<std::string> bodies_read_by(const Sensor& sensor) const {
     std::vector<std::string> all = bodies_of_joint(sensor.joint);
     if (measures_everything(sensor))
       for (const Body& body : scene_.bodies) all.push_back(body.name);
@@ -214,7 +222,7 @@ class Search {
       const std::string& name = symbols.input_names()[static_cast<std::size_t>(input)];
       if (input < facts_.symbols(Names::none).inputs())
         used_.insert(name);
-      else if (names == Names::objective || names == Names::state)
+      else if (names == Names::objective || names == Names::sensor || names == Names::state)
         use_sensor(name);
     }
   }

@@ -74,6 +74,55 @@ TEST_CASE("acceleration and reaction of a swinging bar have their closed forms",
   CHECK(std::abs(of("Tz")) < 1e-11);
 }
 
+Sensor imu(const std::string& name, const std::string& on, VectorField point, OrientationField axes,
+           const std::string& component) {
+  Sensor s = point_sensor(name, "imu", on, std::move(point), component);
+  s.axes = std::move(axes);
+  return s;
+}
+
+TEST_CASE("an imu on a swinging bar reads its closed form along the turned axes of its mount", "[sensor]") {
+  SwingingBar bar;
+  constexpr double kMount = 0.4;
+  for (const char* k : {"ax", "ay", "az", "wx", "wy", "wz"})
+    bar.scene.sensors.push_back(imu(k, "bar", vec("1.1", "0", "0"), RollPitchYawField{vec("0", "0", "0.4")}, k));
+  const Mechanism mechanism(bar.scene, VectorXd());
+  const double alpha = -bar.m * bar.g * bar.c * std::cos(bar.theta) / (bar.J + bar.m * bar.c * bar.c);
+  const double along = -1.1 * bar.w * bar.w + bar.g * std::sin(bar.theta);
+  const double across = 1.1 * alpha + bar.g * std::cos(bar.theta);
+  auto of = [&](const char* name) { return value(mechanism, name, 0, bar.y(), VectorXd()); };
+  CHECK(of("ax") == Approx(std::cos(kMount) * along + std::sin(kMount) * across).epsilon(1e-12));
+  CHECK(of("ay") == Approx(std::cos(kMount) * across - std::sin(kMount) * along).epsilon(1e-12));
+  CHECK(std::abs(of("az")) < 1e-12);
+  CHECK(of("wz") == Approx(bar.w).epsilon(1e-14));
+  CHECK(std::abs(of("wx")) + std::abs(of("wy")) < 1e-15);
+}
+
+TEST_CASE("an imu at rest reads g upwards, one on a turning table w^2 r inwards as well", "[sensor]") {
+  constexpr double w = 3, r = 0.5;
+  Scene scene;  // gravity along -z
+  scene.bodies.push_back(plain_body("table", 2, {0.1, 0.1, 0.2, 0.0, 0.0, 0.0}, vec("0", "0", "0")));
+  scene.joints.push_back(hinge("pin", "ground", vec("0", "0", "0"), "table", vec("0", "0", "0")));
+  for (const char* k : {"ax", "ay", "az"}) {
+    scene.sensors.push_back(imu(std::string("table_") + k, "table", vec("0.5", "0", "0"), {}, k));
+    scene.sensors.push_back(imu(std::string("ground_") + k, "ground", vec("0.5", "0", "0"), {}, k));
+  }
+  // Its x axis points downwards.
+  scene.sensors.push_back(
+      imu("nose", "ground", vec("1", "2", "3"), RollPitchYawField{vec("0", "90 [deg]", "0")}, "ax"));
+  const Mechanism mechanism(scene, VectorXd());
+  VectorXd y = VectorXd::Zero(14);
+  y(3) = 1, y(13) = w / 2;
+  auto of = [&](const char* name) { return value(mechanism, name, 0, y, VectorXd()); };
+  CHECK(of("ground_az") == Approx(9.81).epsilon(1e-15));
+  CHECK(of("ground_ax") == 0);
+  CHECK(of("ground_ay") == 0);
+  CHECK(of("nose") == Approx(-9.81).epsilon(1e-14));
+  CHECK(of("table_ax") == Approx(-w * w * r).epsilon(1e-13));
+  CHECK(of("table_az") == Approx(9.81).epsilon(1e-13));
+  CHECK(std::abs(of("table_ay")) < 1e-13);
+}
+
 TEST_CASE("the effort of an angle drive is the torque that the motion asks for", "[sensor]") {
   SwingingBar bar;
   Drive drive;
@@ -131,6 +180,13 @@ TEST_CASE("derivatives of accelerations, reactions and efforts equal differences
   Sensor effort;
   effort.name = "effort", effort.quantity = "drive_force", effort.drive = "motor";
   scene.sensors.push_back(effort);
+  const OrientationField mount = RollPitchYawField{vec("u", "0.3", "c2")};
+  scene.sensors.push_back(imu("imu_force", "coupler", vec("c2", "off", "0.1"), mount, "ax"));
+  scene.sensors.push_back(imu("imu_rate", "crank", vec("0", "0", "0"), mount, "wz"));
+  scene.sensors.push_back(imu("imu_ground", "ground", vec("0", "0", "0"), mount, "ay"));
+  Sensor mixed;
+  mixed.name = "mixed", mixed.quantity = "expression", mixed.value = f("imu_force*reaction_r2 + t*imu_rate^2 + mu");
+  scene.sensors.push_back(mixed);
 
   const VectorXd rho = nominal(scene);
   const Mechanism mechanism(scene, rho);

@@ -66,6 +66,11 @@ inline Sensor angle_sensor(const std::string& name, const std::string& joint) {
   s.name = name, s.quantity = "angle", s.joint = joint;
   return s;
 }
+inline Sensor expression_sensor(const std::string& name, const std::string& value) {
+  Sensor s;
+  s.name = name, s.quantity = "expression", s.value = f(value);
+  return s;
+}
 inline Sensor point_sensor(const std::string& name, const std::string& quantity, const std::string& on,
                            PointField point, const std::string& component) {
   Sensor s;

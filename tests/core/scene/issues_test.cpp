@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <limits>
 
+#include "core/scene/scene_facts.hpp"
 #include "core/scene/type_table.hpp"
 
 using namespace mbsopt;
@@ -207,6 +208,65 @@ TEST_CASE("circular and endless definitions are reported once, at the definition
   const std::vector<SceneIssue> issues = find_issues(scene);
   REQUIRE(issues.size() == 1);
   CHECK_THAT(issues[0].message, Catch::Contains("nest deeper"));
+}
+
+TEST_CASE("sensors that are expressions are checked", "[scene]") {
+  Scene scene = pendulum();
+  const auto add = [&](const std::string& name, const std::string& value) {
+    Sensor s;
+    s.name = name, s.quantity = "expression", s.value = Expression::parse(value);
+    scene.sensors.push_back(s);
+  };
+  add("twice", "theta + theta");
+  scene.conditions = {{"twice", Expression::parse("30 [deg]"), {}}};
+  CHECK(find_issues(scene).empty());
+  CHECK(unit_of(scene, scene.sensors.back()) == "rad");
+
+  SECTION("circles") {
+    add("a", "b + theta");
+    add("b", "2*a");
+    add("c", "a");
+    CHECK_THAT(at(scene, "sensors.a.value"), Catch::Contains("'a' refers to itself"));
+    CHECK_THAT(at(scene, "sensors.b.value"), Catch::Contains("'b' refers to itself"));
+    CHECK(at(scene, "sensors.c.value").empty());
+  }
+  SECTION("unknown names") {
+    add("a", "2*thetta");
+    add("b", "a");
+    CHECK_THAT(at(scene, "sensors.a.value"), Catch::Contains("unknown name 'thetta'; did you mean 'theta'"));
+    CHECK(find_issues(scene).size() == 1);
+  }
+  SECTION("units") {
+    add("mean", "(theta + twice)/2");
+    add("odd", "theta + 3 [m]");
+    CHECK(unit_of(scene, scene.sensors[scene.sensors.size() - 2]) == "rad");
+    CHECK_THAT(at(scene, "sensors.odd.value"), Catch::Contains("combines rad with m"));
+    scene.conditions[0].value = Expression::parse("3 [m]");
+    CHECK_THAT(at(scene, "initial.conditions[0].value"), Catch::Contains("has the dimension m, expected is rad"));
+  }
+  SECTION("conditions and forces") {
+    Sensor rate = scene.sensors[0];
+    rate.name = "omega", rate.quantity = "rate";
+    Sensor acceleration;
+    acceleration.name = "a", acceleration.quantity = "acceleration", acceleration.body = scene.bodies[0].name;
+    acceleration.component = "x";
+    scene.sensors.insert(scene.sensors.end(), {rate, acceleration});
+    add("fast", "omega^2");
+    add("late", "theta*t");
+    add("hard", "a*theta");
+    for (const char* name : {"fast", "late", "hard"}) {
+      scene.conditions[0].sensor = name;
+      CHECK_THAT(at(scene, "initial.conditions[0].sensor"), Catch::Contains("an expression of more than positions"));
+    }
+    scene.conditions.clear();
+    Torque torque;
+    torque.body = scene.bodies[0].name;
+    torque.components = {0.0, Expression::parse("fast + late"), Expression::parse("hard")};
+    scene.forces.push_back({"motor", torque});
+    const std::string path = "forces[" + std::to_string(scene.forces.size() - 1) + "].components";
+    CHECK(at(scene, path + "[1]").empty());
+    CHECK_THAT(at(scene, path + "[2]"), Catch::Contains("a force cannot depend on it"));
+  }
 }
 
 TEST_CASE("dimensions follow through parameters and definitions", "[scene]") {

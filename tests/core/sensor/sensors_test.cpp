@@ -229,6 +229,46 @@ Sensor spin(const std::string& component, bool in_axes) {
   return s;
 }
 
+Sensor expression(const std::string& text) {
+  Sensor s;
+  s.quantity = "expression", s.value = f(text);
+  return s;
+}
+// The sensors that the rows of expressions measure by; the last is an expression, too.
+std::vector<Sensor> below_expressions() {
+  std::vector<Sensor> all{plain("angle"), plain("rate"), plain("distance"), on_point("position", "x"),
+                          expression("(gap + px)/2")};
+  const char* const names[] = {"turn", "turn_rate", "gap", "px", "mean"};
+  for (std::size_t i = 0; i < all.size(); ++i) all[i].name = names[i];
+  return all;
+}
+// Those of positions with their time derivatives.
+template <class T>
+struct Below {
+  T turn, turn_rate, gap, gap_rate, px, px_rate;
+  explicit Below(const TextbookScene<T>& s) : turn(s.angle()), turn_rate(s.rate()) {
+    const auto d = s.point(1, s.foot()) - s.point(0, s.tip()), p = s.point(0, s.tip());
+    gap = norm(s.values(d)), gap_rate = norm_rate(d);
+    px = p[0].c[0], px_rate = p[0].c[1];
+  }
+};
+
+// The rate about the y axis of a mount at roll, pitch and yaw (n, 0.3, a) on body two.
+struct MountRate {
+  template <class T>
+  T operator()(const TextbookScene<T>& s) const {
+    using std::cos, std::sin;
+    const T x = sin(T(0.3)) * sin(s.rho[n]), y = cos(s.rho[n]), z = cos(T(0.3)) * sin(s.rho[n]);
+    const T C = cos(s.rho[a]), S = sin(s.rho[a]);
+    return dot(V3<T>{C * x - S * y, S * x + C * y, z}, s.omega(1, true));
+  }
+};
+Sensor mounted(const std::string& component) {
+  Sensor s = plain("imu", component);
+  s.axes = RollPitchYawField{vec("n", "0.3", "a")};
+  return s;
+}
+
 const std::vector<Row>& all_sensors() {
   static const std::vector<Row> rows{
       row("position", on_point("position", "y"), [](const auto& s) { return s.point(0, s.tip())[1].c[0]; }),
@@ -282,6 +322,22 @@ const std::vector<Row>& all_sensors() {
       row("torque of a law", force_of("stop"),
           [](const auto& s) { return s.rho[kt] * s.angle() * s.angle() + s.rho[n] * s.rate() * s.angle(); }),
       row("constraint_violation", plain("constraint_violation"), [](const auto& s) { return s.violation(); }),
+      row("imu, rate", mounted("wy"), MountRate()),
+      row("expression", expression("turn*gap + sin(mean)*turn_rate^2 + a*l0"),
+          [](const auto& s) {
+            using std::sin;
+            const Below x(s);
+            return x.turn * x.gap + sin((x.gap + x.px) / 2.0) * x.turn_rate * x.turn_rate + s.rho[a] * s.rho[l0];
+          }),
+      row(
+          "rate of an expression", expression("turn*gap + sin(mean)*k + a*l0"),
+          [](const auto& s) {
+            using std::cos;
+            const Below x(s);
+            return x.turn_rate * x.gap + x.turn * x.gap_rate +
+                   cos((x.gap + x.px) / 2.0) * (x.gap_rate + x.px_rate) / 2.0 * s.rho[k];
+          },
+          true),
   };
   return rows;
 }
@@ -300,6 +356,7 @@ Compiled compiled(const Row& row, const VectorXd& rho) {
     scene.joints.push_back(slider);
     scene.sensors.back().joint = "S";
   }
+  for (Sensor& below : below_expressions()) scene.sensors.push_back(std::move(below));
   const Mechanism mechanism(scene, rho);
   const VectorXd angles = VectorXd::Constant(static_cast<Eigen::Index>(mechanism.data().angles.size()),
                                              TextbookScene<double>::kTurns * 2 * std::acos(-1.0));

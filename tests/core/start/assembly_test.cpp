@@ -118,6 +118,23 @@ TEST_CASE("an angle is met modulo a full turn and then counted on the condition'
   CHECK(b.angles(0) == Approx(-20).margin(1e-14));
 }
 
+TEST_CASE("a condition on an expression of angles holds on the turns that it starts with", "[assembly]") {
+  Scene scene = pendulum();
+  scene.sensors.push_back(expression_sensor("twice", "2*theta"));
+  scene.conditions.push_back(value_of("twice", "7"));
+  const AssemblyResult a = assemble(scene);
+  REQUIRE(a.ok);
+  CHECK(a.angles(0) == Approx(3.5).margin(1e-13));  // more than half a turn
+
+  // The angle's own condition names its turn, and the square's rate is 2 theta thetadot.
+  scene.sensors.back() = expression_sensor("square", "theta^2");
+  scene.conditions = {value_of("theta", "7"), {"square", {}, f("14")}};
+  const AssemblyResult b = assemble(scene);
+  REQUIRE(b.ok);
+  CHECK(b.angles(0) == Approx(7).margin(1e-14));
+  CHECK(2 * b.y.segment<4>(10).norm() == Approx(1).margin(1e-13));
+}
+
 TEST_CASE("an angle is reached the short way round, across half a turn, and from exactly opposite", "[assembly]") {
   Scene scene = pendulum();
   scene.parameters[1].value = 3.0;  // the guess
@@ -354,6 +371,15 @@ TEST_CASE("derivatives of the assembled state: spatial loop, every kind of field
     s.point1 = vec("n", "0", "0.2"), s.point2 = vec("0", "off", "n");
     scene.sensors.push_back(s);
     scene.conditions.push_back({"gap", f("x0+0.6"), f("v0")});
+  }
+  SECTION("an expression of positions and its rate") {
+    scene.sensors.push_back(angle_sensor("theta", "A"));
+    Sensor gap;
+    gap.name = "gap", gap.quantity = "distance", gap.body1 = "crank", gap.body2 = "rocker";
+    gap.point1 = vec("n", "0", "0.2"), gap.point2 = vec("0", "off", "n");
+    scene.sensors.push_back(gap);
+    scene.sensors.push_back(expression_sensor("blend", "theta + 0.1*theta*gap + n*gap^2"));
+    scene.conditions.push_back({"blend", f("x0"), f("v0")});
   }
   SECTION("an Euler parameter and its rate") {
     Sensor s;

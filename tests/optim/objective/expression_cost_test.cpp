@@ -33,6 +33,10 @@ struct Setting {
     Sensor rate = angle;
     rate.name = "swing_rate", rate.quantity = "rate";
     s.sensors.insert(s.sensors.end(), {energy, angle, rate});
+    Sensor product;  // before the sensors that it measures by
+    product.name = "product", product.quantity = "expression";
+    product.value = Expression::parse("swing*swing_rate + total*t");
+    s.sensors.insert(s.sensors.begin(), product);
     return s;
   }
   static VectorXd values(const Scene& s) {
@@ -54,11 +58,21 @@ struct Setting {
 
 }  // namespace
 
+TEST_CASE("an expression sensor in a cost stands for its expression", "[cost]") {
+  const Setting s;
+  const Mechanism mechanism(s.scene, s.rho);
+  CHECK(s.value("product^2", s.y, s.rho) == s.value("(swing*swing_rate + total*t)^2", s.y, s.rho));
+  CHECK(s.value("product", s.y, s.rho) ==
+        Approx(mechanism.sensor_value(mechanism.sensor("product"), {0.7, s.y, s.angles})).epsilon(1e-15));
+  CHECK(CostExpression(Expression::parse("2*swing - r2_x"), s.scene).is_linear());
+  CHECK_FALSE(CostExpression(Expression::parse("product"), s.scene).is_linear());
+}
+
 TEST_CASE("a cost's gradient in state and parameters equals central differences of its value", "[cost]") {
   const Setting s;
   const std::string text =
       GENERATE(as<std::string>{}, "(r2_x - 0.1)^2 + t*r2_y", "energy*k1/100", "exp(-t)*swing*swing_rate", "total*reach",
-               "smooth_abs(r2_x, 0.01)*L01^2 + m3", "m1*c1 + 3");
+               "product^2*L01 + r2_x", "smooth_abs(r2_x, 0.01)*L01^2 + m3", "m1*c1 + 3");
   INFO(text);
   const Mechanism mechanism(s.scene, s.rho);
   const std::shared_ptr<const PointCost> cost = CostExpression(Expression::parse(text), s.scene).bind(mechanism);

@@ -137,6 +137,20 @@ TEST_CASE("parameters of sensors matter where the sensor is used", "[unused]") {
   CHECK(unused(problem) == Paths{});
 }
 
+TEST_CASE("an expression of sensors looks at what these look at", "[unused]") {
+  Problem problem = two_pendulums();
+  problem.scene.parameters.push_back({"s", 0.1});
+  Sensor mixed;
+  mixed.name = "mixed", mixed.quantity = "expression", mixed.value = Expression::parse("s*deep");
+  Sensor deep = mixed;
+  deep.name = "deep", deep.value = Expression::parse("2*yb");
+  problem.scene.sensors.insert(problem.scene.sensors.begin(), {mixed, deep});
+  add_objective(problem, "ya");
+  CHECK(unused(problem) == Paths{"parameters.mb", "parameters.s"});
+  add_objective(problem, "mixed^2");
+  CHECK(unused(problem) == Paths{});
+}
+
 TEST_CASE("named points matter where something uses them", "[unused]") {
   Problem problem = two_pendulums();
   problem.scene.parameters.push_back({"s", 0.1});

@@ -1,0 +1,133 @@
+// An expression e of parameters, t and other sensors s as a sensor.
+//   e_y = sum_k e_sk s_k,y               e_rho = e_rho + sum_k e_sk s_k,rho
+//   edot = sum_k e_sk sdot_k  where the s_k are of positions and e is not of t: the tangent of e along sdot, whose
+//   derivatives are those of e_s sdot in s and rho, and e_s in sdot
+// Expressions of expressions are compiled into one, so that all s_k are sensors of other quantities.
+#include <algorithm>
+
+#include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/sensor_kinds.hpp"
+#include "core/scene/scene_facts.hpp"
+
+namespace mbsopt {
+namespace {
+
+// Numbers of one evaluation, one set per thread: they carry nothing from one call to the next, and grow at the first
+// only.
+struct Scratch {
+  Program::Scratch program;
+  std::vector<double> x, xdot, x_bar, xdot_bar;  // inputs, their rates, and gradients in both
+
+  Scratch& grown(const Program& p, std::size_t inputs) {
+    for (std::vector<double>* numbers : {&x, &xdot, &x_bar, &xdot_bar})
+      if (numbers->size() < inputs) numbers->resize(inputs);
+    p.grow(program);
+    return *this;
+  }
+};
+
+Scratch& scratch_of_this_thread() {
+  static thread_local Scratch scratch;
+  return scratch;
+}
+
+struct ExpressionSensor final : SensorFunction {
+  struct Below {
+    std::size_t input;
+    SensorPtr sensor, rate;  // no rate where the expression has none
+  };
+  Program program;
+  std::size_t inputs = 0, time = 0;
+  std::vector<std::size_t> parameters;  // that the expression itself uses
+  std::vector<Below> below;
+  bool is_rate = false;
+
+  double value(const MechanismData& d, const StatePoint& at) const override {
+    Scratch& s = evaluated(d, at);
+    if (!is_rate) return program.value(span(s.x), s.program);
+    return add_rate_gradient(s);
+  }
+
+  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
+                      VecOut rho_bar) const override {
+    Scratch& s = evaluated(d, at);
+    const double result = is_rate ? add_rate_gradient(s) : program.add_gradient(span(s.x), 1, span(s.x_bar), s.program);
+    for (const int k : d.active) rho_bar(k) += scale * s.x_bar[static_cast<std::size_t>(k)];
+    for (const auto& [input, sensor, rate] : below) {
+      if (const double weight = scale * s.x_bar[input]; weight != 0)
+        sensor->add_gradient(d, at, weight, y_bar, rho_bar);
+      if (const double weight = scale * s.xdot_bar[input]; is_rate && weight != 0)
+        rate->add_gradient(d, at, weight, y_bar, rho_bar);
+    }
+    return result;
+  }
+
+  std::vector<int> bodies(const MechanismData& d) const override {
+    std::vector<int> all{0};
+    for (const Below& b : below) {
+      const std::vector<int> read = b.sensor->bodies(d);
+      if (read.empty()) return {};  // all of them
+      all.insert(all.end(), read.begin(), read.end());
+    }
+    return all;
+  }
+
+  SensorPtr rate(const MechanismData& d) const override {
+    if (reads != Reads::positions) return nullptr;
+    return changed(*this, [&](ExpressionSensor& r) {
+      r.is_rate = true;
+      for (Below& b : r.below) b.rate = b.sensor->rate(d);
+    });
+  }
+
+ private:
+  std::span<double> span(std::vector<double>& x) const { return {x.data(), inputs}; }
+
+  // The inputs and their rates, and no gradients yet.
+  Scratch& evaluated(const MechanismData& d, const StatePoint& at) const {
+    Scratch& s = scratch_of_this_thread().grown(program, inputs);
+    for (std::vector<double>* numbers : {&s.xdot, &s.x_bar, &s.xdot_bar}) std::fill_n(numbers->begin(), inputs, 0.0);
+    for (const std::size_t k : parameters) s.x[k] = d.rho(static_cast<Eigen::Index>(k));
+    s.x[time] = at.t;
+    for (const Below& b : below) {
+      s.x[b.input] = b.sensor->value(d, at);
+      if (is_rate) s.xdot[b.input] = b.rate->value(d, at);
+    }
+    return s;
+  }
+
+  // Returns edot, the tangent of e along xdot.
+  double add_rate_gradient(Scratch& s) const {
+    return program.add_gradient_tangent(span(s.x), span(s.xdot), 1, span(s.xdot_bar), span(s.x_bar), s.program);
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<SensorFunction> make_expression(Compilation& model, const Sensor& s, const std::string& where) {
+  Symbols symbols = model.fields.symbols();
+  add_time_and_sensors(symbols, model.scene);
+  auto out = std::make_unique<ExpressionSensor>();
+  try {
+    out->program = Program(s.value, symbols);
+  } catch (const UnknownName& e) {
+    throw SceneError(where + ".value: " + e.what());
+  }
+  out->inputs = static_cast<std::size_t>(symbols.inputs());
+  out->time = static_cast<std::size_t>(symbols.input("t"));
+  for (const int i : out->program.used_inputs()) {
+    const std::size_t input = static_cast<std::size_t>(i);
+    if (input < out->time)
+      out->parameters.push_back(input);
+    else if (input > out->time)
+      out->below.push_back({input, model.data.sensors[input - out->time - 1], nullptr});
+    else
+      out->reads = Reads::time_and_state;
+  }
+  for (const ExpressionSensor::Below& b : out->below) out->reads = std::max(out->reads, b.sensor->reads);
+  // A condition's equation must be linear in the velocities, which an expression of them need not be.
+  if (out->reads == Reads::velocities) out->reads = Reads::state;
+  return out;
+}
+
+}  // namespace mbsopt
