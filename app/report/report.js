@@ -369,6 +369,9 @@ class Viewer {
       for (let k = 0; k <= 40; ++k) {
         const poses = s.poses(this.begin + (this.end - this.begin) * k / 40);
         s.bodies.forEach((b, i) => b.points.forEach(p => include(s.at(poses, i, p))));
+        s.bodies.forEach((b, i) => b.shapes.forEach(shape => {
+          for (const end of [shape.from, shape.to]) for (const r of [-shape.radius, shape.radius]) include(s.at(poses, i, end).map(v => v + r));
+        }));
         for (const j of [...s.joints, ...s.springs]) include(s.at(poses, j.b1, j.p1)), include(s.at(poses, j.b2, j.p2));
       }
     }

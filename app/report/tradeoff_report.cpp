@@ -160,6 +160,10 @@ LinePlot alpha_plot(const std::string& title, const std::string& label) {
 
 std::string tradeoff_report(const Json& result, const Tradeoff& tradeoff) {
   HtmlPage page(report_title(result));
+  const Json recommendations = result.value("recommendations", Json::array());
+  if (!recommendations.empty())
+    page.verdict(fmt::format("Of {} settings the fastest {}.", tradeoff.rows.size(),
+                             recommendations.front().at("in_words").get<std::string>()));
   add_status(page, result);
   add_machine(page, result);
   add_recommendations(page, result);
