@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kTime = 0.37;
+constexpr double kInstant = 0.37;
 
 // The directions of y that stay in the plane, one per column: r, and P along p_a and p_b; their rates.
 MatrixXd plane_of(const MechanismData& d) {
@@ -50,7 +50,7 @@ LaneRows directions(const MechanismData& d, unsigned seed) {
   return plane * LaneRows::Random(plane.cols(), kLanes);
 }
 
-FormulationSettings formulation(const std::string& name) {
+FormulationSettings formulation_of_type(const std::string& name) {
   FormulationSettings s;
   if (name == "stabilised") s.omega = 7, s.xi = 0.8;
   if (name == "penalty") s = FormulationSettings::penalty(), s.alpha = 1e4;
@@ -75,7 +75,7 @@ TEST_CASE("planar accelerations, their tangent and their adjoint are the spatial
   const std::string form = GENERATE(as<std::string>{}, "augmented_lagrangian", "stabilised", "penalty");
   const Scene scene =
       planar_machine(GENERATE(2, 0, 1), form != "penalty");  // which gives way to loads across the plane
-  const FormulationSettings settings = formulation(form);
+  const FormulationSettings settings = formulation_of_type(form);
   const Mechanism mechanism(scene, nominal(scene));
   const MechanismData& d = mechanism.data();
   INFO(d.not_planar);
@@ -83,13 +83,13 @@ TEST_CASE("planar accelerations, their tangent and their adjoint are the spatial
   const VectorXd y = state(d, 3), angles = VectorXd::Constant(static_cast<Eigen::Index>(d.angles.size()), 0.2);
   Dynamics spatial(mechanism, settings), planar(mechanism, settings, Model::planar);
   VectorXd expected(y.size()), rate(y.size());
-  REQUIRE(spatial.evaluate(kTime, y, angles, expected));
-  REQUIRE(planar.evaluate(kTime, y, angles, rate));
+  REQUIRE(spatial.evaluate(kInstant, y, angles, expected));
+  REQUIRE(planar.evaluate(kInstant, y, angles, rate));
   CHECK(apart(rate, expected) < 1e-11);
 
   const VectorXd a = expected.tail(7 * d.n), lambda = spatial.lambda();
-  REQUIRE(spatial.linearise(kTime, y, angles, a, lambda));
-  REQUIRE(planar.linearise(kTime, y, angles, a, lambda));
+  REQUIRE(spatial.linearise(kInstant, y, angles, a, lambda));
+  REQUIRE(planar.linearise(kInstant, y, angles, a, lambda));
   const MatrixXd plane = plane_of(d);
   for (const ParameterBlock& block : parameter_blocks(d)) {
     const LaneRows y_dir = directions(d, 4);
@@ -124,17 +124,17 @@ TEST_CASE("the planar projection, its tangent and its adjoint are the spatial on
                                    planar = make_projector(mechanism, Projection::position_velocity, Model::planar);
   ProjectionSolution s = spatial->solution(), p = planar->solution();
   VectorXd start(14 * d.n), y_hat = state(d, 7), expected(14 * d.n), y(14 * d.n);
-  REQUIRE(spatial->project(kTime, angles, y_hat, start, s));  // onto the constraints, and off them by a step's error
+  REQUIRE(spatial->project(kInstant, angles, y_hat, start, s));  // onto the constraints, and off them by a step's error
   y_hat = start + 0.02 * (plane_of(d) * VectorXd::Random(8 * d.n));
-  REQUIRE(spatial->project(kTime, angles, y_hat, expected, s));
-  REQUIRE(planar->project(kTime, angles, y_hat, y, p));
+  REQUIRE(spatial->project(kInstant, angles, y_hat, expected, s));
+  REQUIRE(planar->project(kInstant, angles, y_hat, y, p));
   CHECK(apart(y, expected) < 1e-12);
-  CHECK(planar->position_violation(kTime, angles, y) < 1e-13);
-  CHECK(planar->velocity_violation(kTime, y) < 1e-13);
-  CHECK(planar->velocity_violation(kTime, y_hat) == Approx(spatial->velocity_violation(kTime, y_hat)));
+  CHECK(planar->position_violation(kInstant, angles, y) < 1e-13);
+  CHECK(planar->velocity_violation(kInstant, y) < 1e-13);
+  CHECK(planar->velocity_violation(kInstant, y_hat) == Approx(spatial->velocity_violation(kInstant, y_hat)));
 
-  REQUIRE(spatial->linearise(kTime, angles, y_hat, expected, s));
-  REQUIRE(planar->linearise(kTime, angles, y_hat, expected, p));
+  REQUIRE(spatial->linearise(kInstant, angles, y_hat, expected, s));
+  REQUIRE(planar->linearise(kInstant, angles, y_hat, expected, p));
   std::srand(8);
   const MatrixXd plane = plane_of(d);
   const VectorXd w = plane * VectorXd::Random(plane.cols());
@@ -159,7 +159,7 @@ TEST_CASE("the planar projection, its tangent and its adjoint are the spatial on
 TEST_CASE("a planar run takes the spatial run's steps to the same motion and gradient", "[planar]") {
   const std::string form = GENERATE(as<std::string>{}, "augmented_lagrangian", "penalty");
   Scene scene = planar_machine(GENERATE(2, 0), form != "penalty");
-  scene.simulation.formulation = formulation(form);
+  scene.simulation.formulation = formulation_of_type(form);
   const VectorXd rho = nominal(scene);
   const Mechanism mechanism(scene, rho);
   const auto run = [&](ModelChoice model, auto simulate_by) {
