@@ -102,7 +102,9 @@ TEST_CASE("the swinging gate: one stiffness for three runs, a damping for each",
                        << result.experiments[i].channels[0].sigma << " V, residuals "
                        << result.experiments[i].channels[0].analysis.in_words());
   }
-  CHECK(error < 0.02);
+  // The residuals are correlated; independent ones would make it half of this.
+  CHECK(result.statistics.covariance_type == CovarianceType::newey_west);
+  CHECK(error < 0.05);
   CHECK(result.statistics.unidentifiable.empty());
   WARN("common period " << common << " +- " << error << " s, " << result.evaluations << " evaluations");
 }
