@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "app/results/accuracy_results.hpp"
+#include "app/results/case_results.hpp"
 #include "app/results/left_out_bodies.hpp"
 #include "app/results/objective_values.hpp"
 #include "app/run/command.hpp"
@@ -227,7 +228,8 @@ int check_command(const CommandContext& context) {
   print_continuous(context.out, check);
   print_costs(context.out, check);
   context.out << fmt::format("\n{}\n", check.passed() ? "all gradients agree" : "THE GRADIENTS DISAGREE");
-  if (!check.passed()) run.disagrees();
+  const bool cases_agree = check_cases(run);
+  if (!check.passed() || !cases_agree) run.disagrees();
   return run.finish();
 }
 

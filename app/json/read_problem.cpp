@@ -71,14 +71,16 @@ void read_sampled_laws(Problem& problem, const std::filesystem::path& folder, co
   std::vector<Drive>& drives = problem.scene.drives;
   for (std::size_t i = 0; i < drives.size(); ++i)
     if (drives[i].samples) read_samples(*drives[i].samples, child_path("drives", i) + ".law", folder, root, findings);
+  const auto read_all = [&](std::vector<DriveLaw>& laws, const std::string& owner) {
+    for (std::size_t i = 0; i < laws.size(); ++i)
+      if (laws[i].samples)
+        read_samples(*laws[i].samples, child_path(owner + ".drives", i) + ".law", folder, root, findings);
+  };
+  for (std::size_t c = 0; c < problem.cases.size(); ++c) read_all(problem.cases[c].drives, child_path("cases", c));
   if (!problem.identification) return;
   std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
-  for (std::size_t e = 0; e < experiments.size(); ++e) {
-    const std::string list = child_path("identification.experiments", e) + ".drives";
-    for (std::size_t i = 0; i < experiments[e].drives.size(); ++i)
-      if (std::optional<SampledLaw>& law = experiments[e].drives[i].samples)
-        read_samples(*law, child_path(list, i) + ".law", folder, root, findings);
-  }
+  for (std::size_t e = 0; e < experiments.size(); ++e)
+    read_all(experiments[e].drives, child_path("identification.experiments", e));
 }
 
 // Data that an experiment cannot use are found now, before anything runs, whatever the command.

@@ -51,14 +51,17 @@ std::string optimized_problem_text(const std::string& problem_file, const std::v
   const std::vector<Drive>& drives = problem.scene.drives;
   for (std::size_t i = 0; i < drives.size(); ++i)
     if (drives[i].samples) moved(child_path("drives", i) + ".law.csv", drives[i].samples->csv);
+  const auto laws_moved = [&](const std::vector<DriveLaw>& laws, const std::string& owner) {
+    for (std::size_t k = 0; k < laws.size(); ++k)
+      if (laws[k].samples) moved(child_path(owner + ".drives", k) + ".law.csv", laws[k].samples->csv);
+  };
+  for (std::size_t c = 0; c < problem.cases.size(); ++c) laws_moved(problem.cases[c].drives, child_path("cases", c));
   if (!problem.identification) return text;
   text = with_experiment_values(std::move(text), problem, values);
   for (std::size_t i = 0; i < problem.identification->experiments.size(); ++i) {
     const ExperimentSpec& experiment = problem.identification->experiments[i];
     moved(experiment_path(i) + ".data", experiment.data);
-    for (std::size_t k = 0; k < experiment.drives.size(); ++k)
-      if (experiment.drives[k].samples)
-        moved(child_path(experiment_path(i) + ".drives", k) + ".law.csv", experiment.drives[k].samples->csv);
+    laws_moved(experiment.drives, experiment_path(i));
   }
   return text;
 }

@@ -50,6 +50,8 @@ std::vector<std::string> data_files(const Problem& problem) {
     if (law) files.push_back(law->csv);
   };
   for (const Drive& drive : problem.scene.drives) add(drive.samples);
+  for (const CaseSpec& c : problem.cases)
+    for (const DriveLaw& law : c.drives) add(law.samples);
   if (!problem.identification) return files;
   for (const ExperimentSpec& e : problem.identification->experiments) {
     files.push_back(e.data);

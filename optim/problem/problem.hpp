@@ -72,8 +72,28 @@ struct MultistartSpec {
   StartSampling sampling = StartSampling::latin_hypercube;
 };
 
+// A drive that follows another law in one experiment or load case.
+struct DriveLaw {
+  std::string drive;
+  Expression law;
+  std::optional<SampledLaw> samples;
+};
+
+// One of several loads that one design must bear: how it differs from the problem.
+struct CaseSpec {
+  std::string name;
+  double weight = 1;                       // factor of the minimised objective
+  std::vector<Definition> overrides = {};  // parameters, as expressions of the parameters of the problem
+  std::vector<DriveLaw> drives = {};       // instead of the scene's laws
+  std::vector<Condition> conditions = {};  // of the start; one on a sensor of the scene's conditions replaces that one
+  std::optional<double> end_time = {};
+};
+
 struct DesignSpec {
   std::string minimize;
+  std::string over = "sum";                  // of load cases; or "max", smooth
+  std::optional<double> sharpness = {};      // of this maximum [1/unit of the objective]
+  static constexpr double kSharpness = 100;  // when absent: this over the largest value at the start
   std::vector<ObjectiveBound> subject_to;
   std::vector<std::string> variables;  // parameter names
   OptimizerSpec optimizer;
@@ -85,13 +105,6 @@ struct ChannelSpec {
   Field sigma = 1.0, gain = 1.0, bias = 0.0;  // expressions over parameters
   Field delay = 0.0;                          // [s]
   bool estimate_sigma = false;                // sigma is where its estimate starts
-};
-
-// A drive that follows another law in one experiment.
-struct DriveLaw {
-  std::string drive;
-  Expression law;
-  std::optional<SampledLaw> samples;
 };
 
 struct ExperimentSpec {
@@ -119,6 +132,7 @@ struct IdentificationSpec {
 struct Problem {
   Scene scene;
   std::vector<ObjectiveSpec> objectives;
+  std::vector<CaseSpec> cases;  // load_cases.hpp
   std::optional<DesignSpec> design;
   std::optional<IdentificationSpec> identification;
 };
