@@ -4,6 +4,7 @@
 
 #include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
+#include "app/results/case_results.hpp"
 #include "app/results/left_out_bodies.hpp"
 #include "app/results/objective_values.hpp"
 #include "app/run/command.hpp"
@@ -228,7 +229,8 @@ int check_command(const CommandContext& context) {
   print_continuous(context.out, check);
   print_costs(context.out, check);
   context.out << fmt::format("\n{}\n", check.passed() ? "all gradients agree" : "THE GRADIENTS DISAGREE");
-  if (!check.passed()) run.disagrees();
+  const bool cases_agree = check_cases(run);
+  if (!check.passed() || !cases_agree) run.disagrees();
   run.write("report.html", check_report(scene, run.result));
   return run.finish();
 }

@@ -27,6 +27,7 @@ void print_design(std::ostream& out, const DesignResult& design, const std::stri
     parameters.add({v.name, significant(v.initial, 10), significant(v.value, 10), v.unit.empty() ? "-" : v.unit,
                     bound_hit(v.at_lower, v.at_upper)});
   }
+  const auto of_case = [&](const std::string& name) { return fmt::format("{} ({})", design.objective, name); };
   const bool any_smooth =
       design.objective_true || std::any_of(design.constraints.begin(), design.constraints.end(),
                                            [](const DesignConstraint& c) { return c.true_value.has_value(); });
@@ -43,9 +44,14 @@ void print_design(std::ostream& out, const DesignResult& design, const std::stri
       row(design.objective, design.objective_initial, design.objective_final, design.objective_true);
   minimised.resize(header.size());
   objectives.add(minimised);
+  for (const DesignCase& c : design.cases) {
+    std::vector<std::string> cells = row(of_case(c.name), c.initial, c.value, c.true_value);
+    cells.resize(header.size());
+    objectives.add(cells);
+  }
   const auto bound = [](const std::optional<double>& value) { return value ? significant(*value) : std::string(); };
   for (const DesignConstraint& c : design.constraints) {
-    std::vector<std::string> cells = row(c.objective, c.initial, c.value, c.true_value);
+    std::vector<std::string> cells = row(c.in_words(), c.initial, c.value, c.true_value);
     cells.insert(cells.end(), {bound(c.lower), bound(c.upper), c.price != 0 ? significant(c.price) : ""});
     objectives.add(cells);
   }
@@ -74,17 +80,23 @@ void add_to_result(Json& result, const DesignResult& design) {
   result["simulation"] = to_json(design.final_evaluation.statistics);
   result["objectives"][design.objective] = objective_json(design.objective_final, design.objective_true);
   result["objectives"][design.objective]["initial"] = design.objective_initial;
+  for (const DesignCase& c : design.cases) {
+    Json& objective = result["cases"][c.name]["objectives"][design.objective];
+    objective = objective_json(c.value, c.true_value);
+    objective["initial"] = c.initial, objective["weight"] = c.weight;
+  }
   for (const DesignConstraint& c : design.constraints) {
-    result["objectives"][c.objective] = {{"value", c.value},
-                                         {"initial", c.initial},
-                                         {"lower", or_null(c.lower)},
-                                         {"upper", or_null(c.upper)},
-                                         {"violation", c.violation},
-                                         {"price", c.price},
-                                         {"at_bound", bound_json(c.at_lower, c.at_upper)}};
+    Json& objectives = c.load_case.empty() ? result["objectives"] : result["cases"][c.load_case]["objectives"];
+    objectives[c.objective] = {{"value", c.value},
+                               {"initial", c.initial},
+                               {"lower", or_null(c.lower)},
+                               {"upper", or_null(c.upper)},
+                               {"violation", c.violation},
+                               {"price", c.price},
+                               {"at_bound", bound_json(c.at_lower, c.at_upper)}};
     if (!c.true_value) continue;
-    result["objectives"][c.objective]["true_value"] = *c.true_value;
-    result["objectives"][c.objective]["true_violation"] = c.true_violation;
+    objectives[c.objective]["true_value"] = *c.true_value;
+    objectives[c.objective]["true_violation"] = c.true_violation;
   }
   for (const DesignVariable& v : design.variables) {
     result["parameters"][v.name] = {

@@ -5,6 +5,7 @@
 
 #include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
+#include "app/results/case_results.hpp"
 #include "app/results/hessian_results.hpp"
 #include "app/results/left_out_bodies.hpp"
 #include "app/results/objective_values.hpp"
@@ -140,6 +141,7 @@ int gradient_command(const CommandContext& context) {
   context.out << fmt::format("gradients by {}, {:.3g} s\n\n", evaluation.choice.empty() ? method : evaluation.choice,
                              evaluation.wall_seconds);
   add_objectives(run, evaluation, evaluator.true_values(evaluator.start()));
+  add_cases(run, true, options.method);
   if (context.options.hessian) add_second_derivatives(run, evaluator);
   run.write("report.html", gradient_report(scene, run.result));
   return run.finish();

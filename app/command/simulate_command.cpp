@@ -4,6 +4,7 @@
 
 #include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
+#include "app/results/case_results.hpp"
 #include "app/results/objective_values.hpp"
 #include "app/results/simulated_motion.hpp"
 #include "app/run/command.hpp"
@@ -57,6 +58,7 @@ int simulate_command(const CommandContext& context) {
   }
   if (simulation.ok()) {
     add_objectives(run, motion);
+    add_cases(run, false);
   } else if (simulation.status == SimulationStatus::stopped) {
     run.stopped(fmt::format("trajectory.csv holds the motion up to {:.6g} s", simulation.last_good_time));
   } else {

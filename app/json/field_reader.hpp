@@ -37,6 +37,14 @@ class FieldReader {
   void texts(std::string_view key, std::vector<std::string>& values, const Says& says);
   void reference(std::string_view key, std::string& value, To, const Says& says);
   void references(std::string_view key, std::vector<std::string>& values, To, const Says& says);
+  void reference_or(std::string_view key, std::string& value, To to, const Says& says, auto&& fields) {
+    const Node* const node = node_.find(key);
+    if (!node || node->kind != Node::Kind::object) return reference(key, value, to, says);
+    group(key, says, [&](FieldReader& inside) {
+      inside.reference(kObjectiveKey, value, to, {says.description, Need::required});
+      fields(inside);
+    });
+  }
   void word(std::string_view key, std::string& value, const Words& words, const Says& says);
   template <class T, std::size_t N>
   void choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const Says& says);

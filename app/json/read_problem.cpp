@@ -87,7 +87,21 @@ void read_samples(Problem& problem, const std::filesystem::path& folder, const N
   const auto read_law = [&](std::optional<SampledLaw>& law, const std::string& path) {
     if (law) reader.read(*law, Interpolation::spline, path + ".law", ".csv");
   };
+  const auto read_laws = [&](std::vector<DriveLaw>& laws, const std::string& owner) {
+    for (std::size_t i = 0; i < laws.size(); ++i) read_law(laws[i].samples, child_path(owner + ".drives", i));
+  };
+  const auto read_signals = [&](std::vector<SignalSamples>& all, const std::string& owner) {
+    for (SignalSamples& samples : all) {
+      const auto signal = std::ranges::find(scene.signals, samples.name, &Signal::name);
+      if (signal != scene.signals.end())
+        reader.read(samples, signal->interpolation, child_path(owner + ".signals", samples.name), ".file");
+    }
+  };
   for (std::size_t i = 0; i < scene.drives.size(); ++i) read_law(scene.drives[i].samples, child_path("drives", i));
+  for (std::size_t c = 0; c < problem.cases.size(); ++c) {
+    read_laws(problem.cases[c].drives, child_path("cases", c));
+    read_signals(problem.cases[c].signals, child_path("cases", c));
+  }
   for (ObjectiveSpec& objective : problem.objectives)
     for (std::size_t k = 0; k < objective.track.size(); ++k) {
       const std::string list = child_path("objectives", objective.name) + ".track";
@@ -97,13 +111,8 @@ void read_samples(Problem& problem, const std::filesystem::path& folder, const N
   std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
   for (std::size_t e = 0; e < experiments.size(); ++e) {
     const std::string place = child_path("identification.experiments", e);
-    for (std::size_t i = 0; i < experiments[e].drives.size(); ++i)
-      read_law(experiments[e].drives[i].samples, child_path(place + ".drives", i));
-    for (SignalSamples& samples : experiments[e].signals) {
-      const auto signal = std::ranges::find(scene.signals, samples.name, &Signal::name);
-      if (signal != scene.signals.end())
-        reader.read(samples, signal->interpolation, child_path(place + ".signals", samples.name), ".file");
-    }
+    read_laws(experiments[e].drives, place);
+    read_signals(experiments[e].signals, place);
   }
 }
 

@@ -55,6 +55,12 @@ class SchemaWriter {
   void references(std::string_view key, std::vector<std::string>&, To, const Says& says) {
     put(key, says, {{"type", "array"}, {"items", {{"type", "string"}}}});
   }
+  void reference_or(std::string_view key, std::string& value, To to, const Says& says, auto&& fields) {
+    SchemaWriter form;
+    form.reference(kObjectiveKey, value, to, {says.description, Need::required});
+    fields(form);
+    put(key, says, {{"anyOf", {{{"type", "string"}}, form.object()}}});
+  }
   template <class T, std::size_t N>
   void choice(std::string_view key, T& value, const Choice<T> (&choices)[N], const Says& says) {
     Json all = Json::array(), initial;

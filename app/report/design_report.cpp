@@ -64,18 +64,27 @@ void add_outcome(HtmlPage& page, const Json& result) {
   page.paragraph(fmt::format("{}: {}; {}, {}.", cell(optimizer.at("type")), cell(optimizer.at("message")),
                              counted(optimizer.at("iterations").get<long>(), "iteration"),
                              counted(optimizer.at("evaluations").get<long>(), "evaluation")));
+  const Json cases = result.value("cases", Json::object());
   std::vector<std::vector<std::string>> rows;
   for (const auto& [name, objective] : result.at("objectives").items()) {
     rows.push_back({name, cell(objective.value("initial", Json())), cell(objective.at("value")),
                     cell(objective.value("lower", Json())), cell(objective.value("upper", Json())),
                     cell(objective.value("price", Json()))});
   }
+  for (const auto& [load_case, of_case] : cases.items())
+    for (const auto& [name, objective] : of_case.at("objectives").items())
+      rows.push_back({fmt::format("{} ({})", name, load_case), cell(objective.value("initial", Json())),
+                      cell(objective.at("value")), cell(objective.value("lower", Json())),
+                      cell(objective.value("upper", Json())), cell(objective.value("price", Json()))});
   std::vector<std::string> header{"objective", "before", "after", "at least", "at most", "price"};
   if (has_true_values(result)) {
     header.push_back("true extreme after");
     std::size_t i = 0;
     for (const auto& [name, objective] : result.at("objectives").items())
       rows[i++].push_back(cell(objective.value("true_value", Json())));
+    for (const auto& [load_case, of_case] : cases.items())
+      for (const auto& [name, objective] : of_case.at("objectives").items())
+        rows[i++].push_back(cell(objective.value("true_value", Json())));
   }
   page.table(header, rows);
   if (!result.contains("conflicts")) return;

@@ -106,8 +106,13 @@ void add_simulation(HtmlPage& page, const Scene& scene, const Json& result) {
 }
 
 bool has_true_values(const Json& result) {
-  const Json& objectives = result.at("objectives");
-  return std::any_of(objectives.begin(), objectives.end(), [](const Json& o) { return o.contains("true_value"); });
+  const auto has_one = [](const Json& objectives) {
+    return std::any_of(objectives.begin(), objectives.end(), [](const Json& o) { return o.contains("true_value"); });
+  };
+  const Json cases = result.value("cases", Json::object());
+  return has_one(result.at("objectives")) || std::any_of(cases.begin(), cases.end(), [&](const Json& of_case) {
+           return of_case.contains("objectives") && has_one(of_case["objectives"]);
+         });
 }
 
 void add_objectives(HtmlPage& page, const Json& result) {

@@ -54,11 +54,22 @@ std::string optimized_problem_text(const std::string& problem_file, const std::v
     if (law) moved(place + ".law.csv", law->file);
   };
   const std::vector<Drive>& drives = problem.scene.drives;
+  const auto laws_moved = [&](const std::vector<DriveLaw>& laws, const std::string& owner) {
+    for (std::size_t k = 0; k < laws.size(); ++k) moved_law(child_path(owner + ".drives", k), laws[k].samples);
+  };
+  const auto signals_moved = [&](const std::vector<SignalSamples>& all, const std::string& owner) {
+    for (const SignalSamples& samples : all)
+      moved(child_path(owner + ".signals", samples.name) + ".file", samples.file);
+  };
   for (std::size_t i = 0; i < drives.size(); ++i) moved_law(child_path("drives", i), drives[i].samples);
   for (const Signal& signal : problem.scene.signals) moved(child_path("signals", signal.name) + ".file", signal.file);
   for (const ObjectiveSpec& objective : problem.objectives)
     for (std::size_t k = 0; k < objective.track.size(); ++k)
       moved(child_path(child_path("objectives", objective.name) + ".track", k) + ".file", objective.track[k].file);
+  for (std::size_t c = 0; c < problem.cases.size(); ++c) {
+    laws_moved(problem.cases[c].drives, child_path("cases", c));
+    signals_moved(problem.cases[c].signals, child_path("cases", c));
+  }
   if (!problem.identification) return text;
   text = with_experiment_values(std::move(text), problem, values);
   for (std::size_t i = 0; i < problem.identification->experiments.size(); ++i) {
@@ -67,10 +78,8 @@ std::string optimized_problem_text(const std::string& problem_file, const std::v
     nlohmann::json data = nlohmann::json::array();
     for (const std::string& file : experiment.data) data.push_back(relative_to_folder(file));
     text = with_value(text, place + ".data", (data.size() == 1 ? data[0] : data).dump());
-    for (std::size_t k = 0; k < experiment.drives.size(); ++k)
-      moved_law(child_path(place + ".drives", k), experiment.drives[k].samples);
-    for (const SignalSamples& samples : experiment.signals)
-      moved(child_path(place + ".signals", samples.name) + ".file", samples.file);
+    laws_moved(experiment.drives, place);
+    signals_moved(experiment.signals, place);
   }
   return text;
 }

@@ -54,6 +54,10 @@ std::vector<std::string> data_files(const Problem& problem) {
   for (const Drive& drive : problem.scene.drives) add(drive.samples);
   for (const ObjectiveSpec& objective : problem.objectives)
     for (const TrackTerm& term : objective.track) files.push_back(term.file);
+  for (const CaseSpec& c : problem.cases) {
+    for (const DriveLaw& law : c.drives) add(law.samples);
+    for (const SignalSamples& samples : c.signals) files.push_back(samples.file);
+  }
   if (!problem.identification) return files;
   for (const ExperimentSpec& e : problem.identification->experiments) {
     files.insert(files.end(), e.data.begin(), e.data.end());

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/results/case_results.hpp"
 #include "app/starts/multistart.hpp"
 #include "app/starts/point_records.hpp"
 #include "app/terminal/interrupt.hpp"
+#include "optim/objective/case_evaluator.hpp"
+#include "optim/objective/case_objective.hpp"
 #include "optim/problem/start_points.hpp"
 #include "optim/solver/nlopt_methods.hpp"
 
@@ -46,6 +49,7 @@ DesignResult single_run(Run& run, LongRun& long_run, const Problem& problem) {
                            [&](const char* kind, const Json& content) { long_run.add(kind, content); });
   DesignOptions options;
   options.records = &records;
+  options.threads = case_threads(run);
   options.simulation_progress = run.watched("simulating");
   options.progress = [&](const DesignRow& row) {
     run.progress.iteration(progress_line(row));
@@ -116,10 +120,27 @@ DesignResult told_again(const Problem& problem, const NlpScale& scale, const Jso
   return run_design(problem, options);
 }
 
+void describe_given_cases(const Problem& problem, DesignResult& design) {
+  std::vector<std::string> objectives{design.objective};
+  for (const ObjectiveBound& bound : problem.design->subject_to) objectives.push_back(bound.objective);
+  CaseEvaluator evaluator(problem, objectives, problem.design->variables);
+  const CaseEvaluation& given = evaluator.values(evaluator.start());
+  if (!given.ok) return;
+  Eigen::VectorXd minimised(static_cast<Eigen::Index>(problem.cases.size()));
+  auto constraint = design.constraints.begin();
+  for (std::size_t c = 0; c < problem.cases.size(); ++c) {
+    const Eigen::VectorXd& psi = given.of_cases[c].psi;
+    design.cases[c].initial = minimised(static_cast<Eigen::Index>(c)) = psi(0);
+    for (Eigen::Index i = 1; i < psi.size(); ++i) (constraint++)->initial = psi(i);
+  }
+  design.objective_initial = CaseObjective(problem.cases, *problem.design).value(minimised);
+}
+
 // The best run, but before it the problem as it was given.
 void describe_given(const Problem& problem, const Eigen::VectorXd& before, DesignResult& design) {
   const std::vector<Parameter> parameters = designed(problem);
   for (std::size_t k = 0; k < design.variables.size(); ++k) design.variables[k].initial = parameters[k].value;
+  if (!problem.cases.empty()) return describe_given_cases(problem, design);
   const auto value_before = [&](const std::string& objective) {
     for (std::size_t i = 0; i < problem.objectives.size(); ++i)
       if (problem.objectives[i].name == objective) return before(static_cast<Eigen::Index>(i));
@@ -140,14 +161,17 @@ void describe_unmoved(const Problem& problem, const Eigen::VectorXd& before, Des
 Json task_of(const Problem& problem, const NlpScale& scale) {
   Json task{{"seed", *problem.design->multistart->seed}, {"scale", {{"f", scale.f}, {"c", numbers(scale.c)}}}};
   if (problem.design->optimizer.seed) task["optimizer_seed"] = *problem.design->optimizer.seed;
+  if (problem.design->sharpness) task["sharpness"] = *problem.design->sharpness;
   return task;
 }
 
-DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& problem, const Eigen::VectorXd& before) {
-  const MultistartSpec& spec = *problem.design->multistart;
-  const auto from = starts_of(problem);
+DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& seeded, const Eigen::VectorXd& before) {
   DesignOptions until_interrupted;
   until_interrupted.simulation_progress = run.watched("simulating");
+  Problem problem = seeded;
+  problem.design->sharpness = design_sharpness(seeded, until_interrupted);
+  const MultistartSpec& spec = *problem.design->multistart;
+  const auto from = starts_of(problem);
   const NlpScale scale = design_scale(from(0), until_interrupted);
   const MultistartOutcome outcome =
       run_multistart(run, long_run, spec, design_start_work(problem, task_of(problem, scale)));
@@ -165,6 +189,7 @@ DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& problem
 
 StartWork design_start_work(Problem problem, const Json& task) {
   problem.design->multistart->seed = task.at("seed").get<long>();
+  if (task.contains("sharpness")) problem.design->sharpness = task["sharpness"].get<double>();
   if (task.contains("optimizer_seed")) problem.design->optimizer.seed = task["optimizer_seed"].get<long>();
   const std::vector<double> c = task.at("scale").at("c").get<std::vector<double>>();
   const NlpScale scale{task["scale"].at("f").get<double>(),

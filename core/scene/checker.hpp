@@ -39,6 +39,11 @@ class Checker {
   void texts(std::string_view, const std::vector<std::string>&, const Says&) {}
   void reference(std::string_view key, const std::string& value, To what, const Says& says);
   void references(std::string_view key, const std::vector<std::string>& values, To what, const Says& says);
+  void reference_or(std::string_view key, const std::string& value, To what, const Says& says, auto&& fields) {
+    reference(key, value, what, says);
+    Checker inside = at(key);
+    fields(inside);
+  }
   void word(std::string_view key, const std::string& value, const Words& words, const Says& says);
   template <class T, std::size_t N>
   void choice(std::string_view, const T&, const Choice<T> (&)[N], const Says&) {}

@@ -29,6 +29,7 @@ class FieldVisitor {
   void texts(std::string_view, const std::vector<std::string>&, const Says&) {}
   void reference(std::string_view, const std::string&, To, const Says&) {}
   void references(std::string_view, const std::vector<std::string>&, To, const Says&) {}
+  void reference_or(std::string_view, const std::string&, To, const Says&, auto&&) {}
   void word(std::string_view, const std::string&, const Words&, const Says&) {}
   template <class T, std::size_t N>
   void choice(std::string_view, const T&, const Choice<T> (&)[N], const Says&) {}

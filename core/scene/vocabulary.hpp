@@ -10,6 +10,7 @@
 //   reference(key, string&, To, says)           the name of a body, joint, force, sensor, parameter, objective
 //   references(key, vector<string>&, To, says)
 //   texts(key, vector<string>&, says)           a text, or a list of them
+//   reference_or(key, string&, To, says, f)     the same, or an object: {"objective": name}, and the fields of f
 //   choice(key, T&, Choice<T>[], says)       one of a few words that stand for values; true and false as such
 //   word(key, string&, Words, says)             one of a few words
 //   type(key, word, rows, says)                 the type of an object; returns its row, nullptr when there is none
@@ -55,6 +56,7 @@ struct Says {
 };
 
 enum class To { body, joint, drive, force, sensor, parameter, objective };
+inline constexpr std::string_view kObjectiveKey = "objective";  // in the object of a reference_or
 
 // Names that an expression may use besides parameters and definitions.
 enum class Names {

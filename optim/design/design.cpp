@@ -13,6 +13,7 @@
 #include "optim/design/true_limits.hpp"
 #include "optim/differences/difference_comparison.hpp"
 #include "optim/machine/stopwatch.hpp"
+#include "optim/objective/case_objective.hpp"
 #include "optim/objective/design_issues.hpp"
 #include "optim/objective/integration_error.hpp"
 #include "optim/problem/bounded_means.hpp"
@@ -67,37 +68,47 @@ std::vector<std::string> objective_names(const DesignSpec& spec) {
   return names;
 }
 
-Eigen::VectorXd start_of(const Evaluator& evaluator, const VariableScaling& scaling) {
+Eigen::VectorXd start_of(const CaseEvaluator& evaluator, const VariableScaling& scaling) {
   Eigen::VectorXd designed(scaling.size());
   for (Eigen::Index k = 0; k < designed.size(); ++k)
     designed(k) = evaluator.start()(evaluator.variables()[static_cast<std::size_t>(k)]);
   return scaling.to_x(designed);
 }
 
-void describe_start(const Problem& problem, const Evaluator& evaluator, const Evaluation& start, DesignResult& result) {
+void describe_start(const Problem& problem, const CaseEvaluator& evaluator, const DesignProgram& program,
+                    const CaseEvaluation& start, DesignResult& result) {
   const DesignSpec& spec = *problem.design;
   result.objective = spec.minimize;
   for (const Parameter& p : chosen(problem.scene, evaluator.variables()))
     result.variables.push_back({p.name, p.unit, p.value, p.value, p.lower, p.upper, false, false});
-  if (start.ok) result.objective_initial = result.objective_final = start.psi(0);
-  for (std::size_t i = 0; i < spec.subject_to.size(); ++i) {
-    const ObjectiveBound& bound = spec.subject_to[i];
-    const double value = start.ok ? start.psi(static_cast<Eigen::Index>(i) + 1) : 0;
-    result.constraints.push_back({bound.objective, bound.lower, bound.upper, value, value, {}, 0, false, false});
+  const Eigen::VectorXd minimised =
+      start.ok ? program.minimised(start.psi) : Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evaluator.cases()));
+  if (start.ok) result.objective_initial = result.objective_final = program.objective().value(minimised);
+  for (std::size_t c = 0; c < problem.cases.size(); ++c) {
+    const double value = minimised(static_cast<Eigen::Index>(c));
+    result.cases.push_back({problem.cases[c].name, problem.cases[c].weight, value, value});
+  }
+  for (std::size_t c = 0; c < evaluator.cases(); ++c) {
+    for (const ObjectiveBound& bound : spec.subject_to) {
+      const Eigen::Index row = static_cast<Eigen::Index>(result.constraints.size());
+      const double value = start.ok ? start.psi(program.psi_of(row)) : 0;
+      DesignConstraint& constraint = result.constraints.emplace_back();
+      constraint.objective = bound.objective, constraint.lower = bound.lower, constraint.upper = bound.upper;
+      constraint.initial = constraint.value = value, constraint.load_case = evaluator.case_name(c);
+    }
   }
 }
 
 // Where a derivative is exactly zero in all that takes part, a variable goes nowhere, by symmetry or because its force
 // does not act (yet).
-std::vector<std::string> idle_variables(const Evaluation& start, const DesignSpec& spec, const Evaluator& evaluator) {
+std::vector<std::string> idle_variables(const Evaluation& start, const Problem& problem) {
   std::vector<std::string> warnings;
-  for (std::size_t k = 0; k < evaluator.variables().size(); ++k) {
+  for (std::size_t k = 0; k < problem.design->variables.size(); ++k) {
     if (start.psi_rho.col(static_cast<Eigen::Index>(k)).any()) continue;
     warnings.push_back(fmt::format(
         "design.variables: '{}' has a derivative of exactly 0 at the start in all that the design uses ({}); it stays "
         "as it is unless others change that",
-        evaluator.scene().parameters[static_cast<std::size_t>(evaluator.variables()[k])].name,
-        joined(objective_names(spec))));
+        problem.design->variables[k], joined(objective_names(*problem.design))));
   }
   return warnings;
 }
@@ -106,7 +117,8 @@ double missed(const DesignConstraint& c, double value) {
   return std::max({0.0, c.lower ? *c.lower - value : 0.0, c.upper ? value - *c.upper : 0.0});
 }
 
-void describe_end(const Evaluator& evaluator, const DesignProgram& program, const NlpPoint& end, DesignResult& result) {
+void describe_end(const CaseEvaluator& evaluator, const DesignProgram& program, const NlpPoint& end,
+                  DesignResult& result) {
   for (std::size_t k = 0; k < result.variables.size(); ++k) {
     DesignVariable& v = result.variables[k];
     v.value = result.rho(evaluator.variables()[k]);
@@ -145,7 +157,7 @@ void describe_conflict(const DesignProgram& program, const VariableScaling& scal
     const DesignConstraint& c = result.constraints[i];
     const double z = found.of_constraints(static_cast<Eigen::Index>(i));
     if (std::abs(z) <= kNoPrice) continue;
-    result.conflicts.push_back({limit_text(c.objective, z > 0, z > 0 ? *c.upper : *c.lower),
+    result.conflicts.push_back({limit_text(c.in_words(), z > 0, z > 0 ? *c.upper : *c.lower),
                                 std::max(c.violation, c.true_violation),
                                 std::abs(z) / program.size(static_cast<Eigen::Index>(i))});
   }
@@ -166,18 +178,37 @@ void describe_conflict(const DesignProgram& program, const VariableScaling& scal
   if (!words.empty()) result.message += "; in conflict: " + words;
 }
 
+// The values that are minimised case by case, and the true one that a smooth objective stands for.
+void describe_objective(const DesignProgram& program, const std::vector<std::optional<double>>& true_values,
+                        DesignResult& result) {
+  if (!result.final_evaluation.ok) return;
+  Eigen::VectorXd values = program.minimised(result.final_evaluation.psi);
+  const Eigen::Index stride = static_cast<Eigen::Index>(true_values.size()) / values.size();
+  bool smooth = program.objective().is_maximum();
+  for (Eigen::Index c = 0; c < values.size(); ++c) {
+    const std::optional<double>& true_value = true_values[static_cast<std::size_t>(c * stride)];
+    if (!result.cases.empty()) {
+      DesignCase& of_case = result.cases[static_cast<std::size_t>(c)];
+      of_case.value = values(c), of_case.true_value = true_value;
+    }
+    smooth = smooth || true_value;
+    values(c) = true_value.value_or(values(c));
+  }
+  if (smooth) result.objective_true = program.objective().true_value(values);
+}
+
 // One more look at the solution: the final evaluation, true extremes, how stationary it is, and what limits cost.
-void describe_solution(Evaluator& evaluator, DesignProgram& program, const VariableScaling& scaling,
-                       const LimitedSolution& rounds, DesignResult& result) {
+void describe_solution(DesignProgram& program, const VariableScaling& scaling, const LimitedSolution& rounds,
+                       DesignResult& result) {
   const Eigen::VectorXd& x = rounds.solution.x;
   result.final_evaluation = program.evaluation(result.rho);
-  result.objective_true = rounds.true_values[0];
+  describe_objective(program, rounds.true_values, result);
   result.true_violation = result.violation;
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     DesignConstraint& c = result.constraints[i];
-    c.true_value = rounds.true_values[i + 1];
+    c.true_value = rounds.true_values[static_cast<std::size_t>(program.psi_of(static_cast<Eigen::Index>(i)))];
     c.true_violation = missed(c, c.true_value.value_or(c.value));
-    if (evaluator.objectives()[i + 1].is_extreme() && c.true_value) c.violation = c.true_violation;
+    if (c.true_value) c.violation = c.true_violation;
     result.true_violation =
         std::max(result.true_violation, c.true_violation / program.size(static_cast<Eigen::Index>(i)));
   }
@@ -199,16 +230,17 @@ void describe_solution(Evaluator& evaluator, DesignProgram& program, const Varia
 }
 
 // Says where a limit on an extreme does not hold for the true one, in spite of bounds that were moved.
-void judge_true_extremes(const DesignProgram& program, const Evaluator& evaluator, DesignResult& result) {
+void judge_true_extremes(const DesignProgram& program, const CaseEvaluator& evaluator, DesignResult& result) {
   bool beyond = false;
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     const DesignConstraint& c = result.constraints[i];
-    const Extreme extreme = evaluator.objectives()[i + 1].extreme();
+    const std::size_t bounds = result.constraints.size() / evaluator.cases();
+    const Extreme extreme = evaluator.of_case(i / bounds).objectives()[i % bounds + 1].extreme();
     if (extreme == Extreme::none) continue;
     const char* const what = extreme == Extreme::maximum   ? "maximum"
                              : extreme == Extreme::minimum ? "minimum"
                                                            : "peak to peak value";
-    const std::string place = fmt::format("design.subject_to[{}]: the {} of '{}'", i, what, c.objective);
+    const std::string place = fmt::format("design.subject_to[{}]: the {} of '{}'", i % bounds, what, c.in_words());
     if (!c.true_value) {
       beyond = true;
       result.warnings.push_back(place +
@@ -292,10 +324,10 @@ bool is_an_improvement(const DesignProgram& program, const NlpResult& found, con
 }
 
 // Solves in rounds, with bounds that are moved until true extremes keep their limits.
-LimitedSolution solved(const DesignSpec& spec, DesignProgram& program, Evaluator& evaluator,
+LimitedSolution solved(const DesignSpec& spec, DesignProgram& program, CaseEvaluator& evaluator,
                        const Eigen::VectorXd& x_start, const std::function<bool(const NlpProgress&)>& progress,
                        const std::function<bool()>& abandoned, PointRecords* records, DesignResult& result) {
-  TrueLimits limits(spec, evaluator.objectives());
+  TrueLimits limits(spec, evaluator);
   LimitedSolution rounds;
   NlpResult& solution = rounds.solution;
   solution = solved_once(program, x_start, spec.optimizer, progress, records, result.seed);
@@ -304,10 +336,7 @@ LimitedSolution solved(const DesignSpec& spec, DesignProgram& program, Evaluator
     const Eigen::VectorXd rho = program.rho_at(solution.x);
     rounds.true_values = evaluator.true_values(rho);
     if (!is_an_end(solution.status)) break;
-    Eigen::VectorXd psi(program.constraints() + 1);
-    psi(0) = solution.point.f;
-    for (Eigen::Index i = 0; i < program.constraints(); ++i) psi(i + 1) = solution.point.c(i) * program.size(i);
-    if (!limits.move(program, psi, rounds.true_values)) break;
+    if (!limits.move(program, solution.point.c, rounds.true_values)) break;
     // From the last solution; from the first start where a method gets stuck there, beyond a bound that was moved.
     for (const bool from_solution : {true, false}) {
       OptimizerSpec rest = remaining(spec.optimizer, solution);
@@ -378,57 +407,85 @@ Problem with_named_means(Problem problem) {
   return problem;
 }
 
-// Forces written in C++ name bodies by their number.
-Problem simulated(const Problem& problem, const DesignOptions& options) {
-  return options.user_forces.empty() ? what_objectives_need(problem) : problem;
-}
+// What runs of a design have in common.
+struct Prepared {
+  Prepared(const Problem& given, const DesignOptions& options, std::function<bool(double t)> progress)
+      : problem(with_named_means(given)),
+        spec(checked(problem)),
+        evaluator(problem, objective_names(spec), spec.variables, evaluator_options(options, std::move(progress)),
+                  options.threads),
+        scaling(chosen(problem.scene, evaluator.variables())),
+        x_start(start_of(evaluator, scaling)) {
+    if (!spec.sharpness) spec.sharpness = sharpness();
+  }
+
+  // Of the maximum over cases: relative to the largest value at the start.
+  std::optional<double> sharpness() {
+    if (spec.over != "max" || problem.cases.size() < 2) return std::nullopt;
+    const CaseEvaluation& start = evaluator.gradients(evaluator.start());
+    double largest = 0;
+    for (std::size_t c = 0; c < problem.cases.size() && start.ok; ++c)
+      largest = std::max(largest, std::abs(problem.cases[c].weight * start.of_cases[c].psi(0)));
+    return DesignSpec::kSharpness / (largest > 0 ? largest : 1);
+  }
+  CaseObjective objective() const { return {problem.cases, spec}; }
+
+  static EvaluatorOptions evaluator_options(const DesignOptions& options, std::function<bool(double t)> progress) {
+    EvaluatorOptions result;
+    result.method = options.method, result.user_forces = options.user_forces, result.progress = std::move(progress);
+    return result;
+  }
+
+  const Problem problem;
+  DesignSpec spec;
+  CaseEvaluator evaluator;
+  const VariableScaling scaling;
+  const Eigen::VectorXd x_start;
+};
 
 }  // namespace
 
-NlpScale design_scale(const Problem& given, const DesignOptions& options) {
-  const Problem problem = with_named_means(given);
-  const DesignSpec& spec = checked(problem);
-  EvaluatorOptions evaluator_options;
-  evaluator_options.method = options.method;
-  evaluator_options.user_forces = options.user_forces;
-  evaluator_options.progress = options.simulation_progress;
-  const Problem needed = simulated(problem, options);
-  Evaluator evaluator(needed.scene, objectives_of(needed, objective_names(spec)), spec.variables, evaluator_options);
-  const VariableScaling scaling(chosen(problem.scene, evaluator.variables()));
-  DesignProgram program(spec, evaluator, scaling);
-  program.start_from(start_of(evaluator, scaling));
+std::string DesignConstraint::in_words() const {
+  return load_case.empty() ? objective : fmt::format("{} ({})", objective, load_case);
+}
+
+std::optional<double> design_sharpness(const Problem& problem, const DesignOptions& options) {
+  return Prepared(problem, options, options.simulation_progress).spec.sharpness;
+}
+
+NlpScale design_scale(const Problem& problem, const DesignOptions& options) {
+  Prepared p(problem, options, options.simulation_progress);
+  DesignProgram program(p.spec, p.evaluator, p.scaling, p.objective());
+  program.start_from(p.x_start);
   return {program.f_scale, program.c_scale};
 }
 
 DesignResult run_design(const Problem& given, const DesignOptions& options) {
   const Stopwatch stopwatch;
-  const Problem problem = with_named_means(given);
-  const DesignSpec& spec = checked(problem);
-  EvaluatorOptions evaluator_options;
-  evaluator_options.method = options.method;
-  evaluator_options.user_forces = options.user_forces;
   bool abandoned = false;
+  std::function<bool(double t)> until_abandoned;
   if (options.simulation_progress)
-    evaluator_options.progress = [&](double t) {
-      return abandoned = abandoned || !options.simulation_progress(t), !abandoned;
-    };
-  const Problem needed = simulated(problem, options);
-  Evaluator evaluator(needed.scene, objectives_of(needed, objective_names(spec)), spec.variables, evaluator_options);
-  const VariableScaling scaling(chosen(problem.scene, evaluator.variables()));
-  DesignProgram program(spec, evaluator, scaling, [&] { return abandoned; });
+    until_abandoned = [&](double t) { return abandoned = abandoned || !options.simulation_progress(t), !abandoned; };
+  Prepared prepared(given, options, until_abandoned);
+  const Problem& problem = prepared.problem;
+  const DesignSpec& spec = prepared.spec;
+  CaseEvaluator& evaluator = prepared.evaluator;
+  const VariableScaling& scaling = prepared.scaling;
+  const Eigen::VectorXd& x_start = prepared.x_start;
+  DesignProgram program(spec, evaluator, scaling, prepared.objective(), [&] { return abandoned; });
 
   DesignResult result;
   result.optimizer = spec.optimizer.type;
-  const Eigen::VectorXd x_start = start_of(evaluator, scaling);
-  const Evaluation start = program.start_from(x_start, options.scale);
+  const CaseEvaluation start = program.start_from(x_start, options.scale);
   result.scale = {program.f_scale, program.c_scale};
   result.gradient_choice = start.choice.empty() ? std::string(to_string(start.method)) : start.choice;
-  describe_start(problem, evaluator, start, result);
-  if (start.ok) result.warnings = idle_variables(start, spec, evaluator);
-  if (start.ok && options.compare_differences) {
-    DifferenceComparison comparison = comparison_at(start, evaluator);
+  describe_start(problem, evaluator, program, start, result);
+  if (start.ok) result.warnings = idle_variables(start, problem);
+  for (std::size_t c = 0; c < evaluator.cases() && start.ok && options.compare_differences; ++c) {
+    DifferenceComparison comparison = comparison_at(start.of_cases[c], evaluator.of_case(c));
     comparison.go_on = [&] { return !abandoned; };
-    for (std::string& warning : comparison.warnings()) result.warnings.push_back("design.variables: " + warning);
+    for (const std::string& warning : comparison.warnings())
+      result.warnings.push_back("design.variables: " + evaluator.in_case(c, warning));
   }
 
   const auto progress = [&](const NlpProgress& p) {
@@ -448,13 +505,13 @@ DesignResult run_design(const Problem& given, const DesignOptions& options) {
   if (start.ok && solution.point.ok) {
     describe_end(evaluator, program, solution.point, result);
     if (!abandoned && !rounds.true_values.empty()) {
-      describe_solution(evaluator, program, scaling, rounds, result);
+      describe_solution(program, scaling, rounds, result);
       judge_true_extremes(program, evaluator, result);
     }
   }
   if (result.final_evaluation.statistics.jumps.empty())  // those of the solution stand beside it
     for (const Jump& jump : start.statistics.jumps)
-      result.warnings.push_back("at the start, " + in_words(evaluator.scene(), jump));
+      result.warnings.push_back("at the start, " + in_words(evaluator.of_case(0).scene(), jump));
   if (!program.hessian_failure().empty())
     result.warnings.push_back(
         "design.optimizer.hessian: could not be computed everywhere, where it was not the one "

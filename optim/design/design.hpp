@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "optim/objective/evaluator.hpp"
+#include "optim/objective/case_evaluator.hpp"
 #include "optim/problem/problem.hpp"
 #include "optim/solver/nonlinear_program.hpp"
 
@@ -41,6 +41,15 @@ struct DesignConstraint {
   // By how much the minimised objective falls per unit by which the bound is eased, >= 0. Of an equality: its fall per
   // unit by which the value is raised, of any sign.
   double price = 0;
+  std::string load_case = {};    // in which the limit holds; empty where the problem has no cases
+  std::string in_words() const;  // "peak", "peak (cold)"
+};
+
+// What is minimised, in one load case.
+struct DesignCase {
+  std::string name;
+  double weight = 1, initial = 0, value = 0;
+  std::optional<double> true_value = {};  // where the objective is a smooth extreme
 };
 
 // Where no point satisfies the limits: one of those that stand against each other there.
@@ -64,15 +73,16 @@ struct DesignResult {
   std::string message;  // in words, always
   std::string objective;
   double objective_initial = 0, objective_final = 0;
-  std::optional<double> objective_true;  // at the solution, where the objective is a smooth extreme
+  std::optional<double> objective_true;  // at the solution, where it is a smooth extreme, or a smooth maximum of cases
   std::vector<DesignVariable> variables;
-  std::vector<DesignConstraint> constraints;
-  std::vector<DesignConflict> conflicts;  // where the limits cannot all hold
+  std::vector<DesignConstraint> constraints;  // of all load cases
+  std::vector<DesignCase> cases;              // where the problem has some
+  std::vector<DesignConflict> conflicts;      // where the limits cannot all hold
   std::vector<DesignRow> history;
-  Eigen::VectorXd rho;          // all parameters at the solution, or at the best point where there is none
-  Evaluation final_evaluation;  // there, unless stopped: the objective that is minimised, then the constraints
-  std::string optimizer;        // as in the problem: "ipopt"
-  std::string algorithm;        // in the words of its library
+  Eigen::VectorXd rho;              // all parameters at the solution, or at the best point where there is none
+  CaseEvaluation final_evaluation;  // there, unless stopped: per case what is minimised, then what is bounded
+  std::string optimizer;            // as in the problem: "ipopt"
+  std::string algorithm;            // in the words of its library
   double optimality = std::numeric_limits<double>::quiet_NaN();  // at the solution, by the yardstick of all:
                                                                  // optimality.hpp; NaN where stopped
   double violation = 0;         // at the solution: largest of the constraints, each relative to its bounds
@@ -95,6 +105,7 @@ struct DesignResult {
 struct DesignOptions {
   GradientMethod method = GradientMethod::automatic;
   std::vector<std::shared_ptr<const UserForce>> user_forces;
+  int threads = 1;                                    // that compute load cases
   std::function<bool(const DesignRow&)> progress;     // after every iteration; false stops, the best so far is kept
   std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
   PointRecords* records = nullptr;                    // of an earlier run that this one goes on with
@@ -107,6 +118,10 @@ struct DesignOptions {
 // problem.design must be there. Throws std::invalid_argument where it makes no sense (unknown names, no bounds to
 // hold).
 DesignResult run_design(const Problem& problem, const DesignOptions& options = {});
+
+// The sharpness of the maximum over load cases that a run from the problem's own values would take; none where it takes
+// none. Runs from several starts share one.
+std::optional<double> design_sharpness(const Problem& problem, const DesignOptions& options = {});
 
 // The scale that a run from the problem's own values would take.
 NlpScale design_scale(const Problem& problem, const DesignOptions& options = {});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "optim/machine/on_threads.hpp"
 #include "optim/objective/gauss_newton.hpp"
 #include "optim/objective/hessian.hpp"
 #include "optim/solver/evaluated_points.hpp"
@@ -27,10 +28,12 @@ HessianOptions for_steps() {
 
 }  // namespace
 
-DesignProgram::DesignProgram(const DesignSpec& spec, Evaluator& evaluator, const VariableScaling& scaling,
-                             std::function<bool()> abandoned)
-    : NonlinearProgram(scaling.size(), static_cast<Index>(spec.subject_to.size())),
+DesignProgram::DesignProgram(const DesignSpec& spec, CaseEvaluator& evaluator, const VariableScaling& scaling,
+                             CaseObjective objective, std::function<bool()> abandoned)
+    : NonlinearProgram(scaling.size(), static_cast<Index>(spec.subject_to.size() * evaluator.cases())),
       evaluator_(evaluator),
+      objective_(std::move(objective)),
+      bounds_(static_cast<Index>(spec.subject_to.size())),
       scaling_(scaling),
       abandoned_(std::move(abandoned)),
       rho_(evaluator.start()),
@@ -38,12 +41,27 @@ DesignProgram::DesignProgram(const DesignSpec& spec, Evaluator& evaluator, const
       gauss_newton_(spec.optimizer.hessian == "gauss_newton") {
   x_lower = scaling.x_lower(), x_upper = scaling.x_upper();
   for (Index i = 0; i < constraints(); ++i) {
-    const ObjectiveBound& bound = spec.subject_to[static_cast<std::size_t>(i)];
+    const ObjectiveBound& bound = spec.subject_to[static_cast<std::size_t>(i % bounds_)];
     size_(i) = std::max(std::abs(bound.lower.value_or(0)), std::abs(bound.upper.value_or(0)));
     if (size_(i) == 0) size_(i) = 1;
     if (bound.lower) c_lower(i) = *bound.lower / size_(i);
     if (bound.upper) c_upper(i) = *bound.upper / size_(i);
   }
+}
+
+Index DesignProgram::row_of(std::size_t load_case) const { return static_cast<Index>(load_case) * (1 + bounds_); }
+Index DesignProgram::psi_of(Index constraint) const {
+  return row_of(static_cast<std::size_t>(constraint / bounds_)) + 1 + constraint % bounds_;
+}
+
+VectorXd DesignProgram::minimised(const VectorXd& psi) const { return psi(Eigen::seq(0, psi.size() - 1, 1 + bounds_)); }
+
+VectorXd DesignProgram::f_rho(const Evaluation& e) const {
+  const VectorXd slopes = objective_.gradient(minimised(e.psi));
+  VectorXd sum = VectorXd::Zero(e.psi_rho.cols());
+  for (std::size_t c = 0; c < evaluator_.cases(); ++c)
+    sum += slopes(static_cast<Index>(c)) * e.psi_rho.row(row_of(c)).transpose();
+  return sum;
 }
 
 NlpScale DesignProgram::scale_at(const VectorXd& x_start) {
@@ -65,11 +83,11 @@ NlpScale DesignProgram::scale_at(const VectorXd& x_start) {
   return {inverse(f_size), c_size.unaryExpr([](double size) { return std::min(1.0, inverse(size)); })};
 }
 
-Evaluation DesignProgram::start_from(const VectorXd& x_start, const std::optional<NlpScale>& given) {
+CaseEvaluation DesignProgram::start_from(const VectorXd& x_start, const std::optional<NlpScale>& given) {
   const NlpScale scale = given ? *given : scale_at(x_start);
   f_scale = scale.f, c_scale = scale.c;
-  const Evaluation start = evaluator_.gradients(rho_at(x_start));  // in memory, unless the scale is given
-  if (start.ok) best_ = start, best_f_ = start.psi(0), best_violation_ = violation_of(start);
+  const CaseEvaluation start = evaluator_.gradients(rho_at(x_start));  // in memory, unless the scale is given
+  if (start.ok) best_ = start, best_f_ = objective_.value(minimised(start.psi)), best_violation_ = violation_of(start);
   return start;
 }
 
@@ -82,7 +100,7 @@ void DesignProgram::set_bounds(Index constraint, const std::optional<double>& lo
 
 double DesignProgram::violation_of(const Evaluation& e) const {
   VectorXd c(constraints());
-  for (Index i = 0; i < constraints(); ++i) c(i) = e.psi(1 + i) / size_(i);
+  for (Index i = 0; i < constraints(); ++i) c(i) = e.psi(psi_of(i)) / size_(i);
   return violation(c);
 }
 
@@ -94,61 +112,73 @@ VectorXd DesignProgram::rho_at(const VectorXd& x) const {
 }
 
 // Into the point: values, and derivatives where it has room for them.
-void DesignProgram::fill(const Evaluation& e, const VectorXd& x, NlpPoint& point) const {
+void DesignProgram::fill(const CaseEvaluation& e, const VectorXd& x, NlpPoint& point) const {
   if (!e.ok) {
     point.ok = false, point.message = e.message;
     point.abandoned = abandoned_ && abandoned_();
     return;
   }
-  point.f = e.psi(0);
-  for (Index i = 0; i < constraints(); ++i) point.c(i) = e.psi(1 + i) / size_(i);
+  point.f = objective_.value(minimised(e.psi));
+  for (Index i = 0; i < constraints(); ++i) point.c(i) = e.psi(psi_of(i)) / size_(i);
   if (point.f_x.size() == 0) return;
   const VectorXd rho_x = scaling_.rho_x(x);
-  point.f_x = e.psi_rho.row(0).transpose().cwiseProduct(rho_x);
+  point.f_x = f_rho(e).cwiseProduct(rho_x);
   for (Index i = 0; i < constraints(); ++i)
-    point.c_x.row(i) = e.psi_rho.row(1 + i).cwiseProduct(rho_x.transpose()) / size_(i);
+    point.c_x.row(i) = e.psi_rho.row(psi_of(i)).cwiseProduct(rho_x.transpose()) / size_(i);
 }
 
-void DesignProgram::keep(const Evaluation& e) {
+void DesignProgram::keep(const CaseEvaluation& e) {
   if (!e.ok || &e == &best_) return;
-  const double now = violation_of(e);
-  if (best_.ok && !is_better(e.psi(0), now, best_f_, best_violation_, kConstraintTolerance)) return;
-  best_ = e, best_f_ = e.psi(0), best_violation_ = now;
+  const double f = objective_.value(minimised(e.psi)), now = violation_of(e);
+  if (best_.ok && !is_better(f, now, best_f_, best_violation_, kConstraintTolerance)) return;
+  best_ = e, best_f_ = f, best_violation_ = now;
 }
 
 void DesignProgram::evaluate(const VectorXd& x, NlpPoint& point) {
-  const Evaluation& e = evaluation(rho_at(x));
+  const CaseEvaluation& e = evaluation(rho_at(x));
   fill(e, x, point);
   keep(e);
 }
 
 void DesignProgram::evaluate_values(const VectorXd& x, NlpPoint& point) {
   const VectorXd rho = rho_at(x);
-  const Evaluation& e = best_.ok && best_.rho == rho ? best_ : evaluator_.values(rho);
+  const CaseEvaluation& e = best_.ok && best_.rho == rho ? best_ : evaluator_.values(rho);
   fill(e, x, point);
   keep(e);
 }
 
-const Evaluation& DesignProgram::evaluation(const VectorXd& rho) {
+const CaseEvaluation& DesignProgram::evaluation(const VectorXd& rho) {
   return best_.ok && best_.has_gradients() && best_.rho == rho ? best_ : evaluator_.gradients(rho);
 }
 
-// Of the evaluator's objectives, exact or by Gauss-Newton.
+// Of the evaluator's objectives, case by case, exact or by Gauss-Newton.
 bool DesignProgram::second_derivatives(const VectorXd& rho, std::vector<MatrixXd>& psi_rhorho) {
-  std::string failure;
-  bool ok = false;
-  if (gauss_newton_) {
-    const Evaluation at = evaluation(rho);
-    GaussNewton found = at.ok ? gauss_newton(evaluator_, at) : GaussNewton{false, at.message, {}};
-    ok = found.ok, failure = found.message, psi_rhorho = std::move(found.of);
-    ++hessian_gradients_;
-  } else {
-    const Hessians found = mbsopt::hessians(evaluator_, rho, for_steps());
-    ok = found.ok, failure = found.message;
-    for (const ObjectiveHessian& H : found.of) psi_rhorho.push_back(H.value);
-    hessian_gradients_ += found.gradients;
+  struct Found {
+    bool ok = false;
+    std::string message;
+    std::vector<MatrixXd> of;
+    long gradients = 1;
+  };
+  std::vector<Found> found(evaluator_.cases());
+  const CaseEvaluation at = evaluation(rho);
+  on_threads(found.size(), evaluator_.threads(), [&](std::size_t c) {
+    if (gauss_newton_) {
+      const Evaluation& e = at.of_cases[c];
+      GaussNewton H = e.ok ? gauss_newton(evaluator_.of_case(c), e) : GaussNewton{false, e.message, {}};
+      found[c] = {H.ok, H.message, std::move(H.of)};
+      return;
+    }
+    const Hessians H = mbsopt::hessians(evaluator_.of_case(c), rho, for_steps());
+    found[c] = {H.ok, H.message, {}, H.gradients};
+    for (const ObjectiveHessian& of : H.of) found[c].of.push_back(of.value);
+  });
+  bool ok = true;
+  for (Found& of_case : found) {
+    if (!of_case.ok && hessian_failure_.empty()) hessian_failure_ = of_case.message;
+    ok = ok && of_case.ok;
+    hessian_gradients_ += of_case.gradients;
+    for (MatrixXd& H : of_case.of) psi_rhorho.push_back(std::move(H));
   }
-  if (!ok && hessian_failure_.empty()) hessian_failure_ = failure;
   return ok;
 }
 
@@ -156,23 +186,43 @@ bool DesignProgram::hessians(const VectorXd& x, std::vector<MatrixXd>& H) {
   const VectorXd rho_x = scaling_.rho_x(x), rho_xx = scaling_.rho_xx(x), rho = rho_at(x);
   std::vector<MatrixXd> psi_rhorho;
   if (!second_derivatives(rho, psi_rhorho)) return false;
-  const MatrixXd psi_rho = evaluation(rho).psi_rho;  // of Gauss-Newton rho(x) is a part of the motion
-  H.clear();
-  for (Index i = 0; i <= constraints(); ++i) {
-    MatrixXd of_x = rho_x.asDiagonal() * psi_rhorho[static_cast<std::size_t>(i)] * rho_x.asDiagonal();
-    if (!gauss_newton_) of_x.diagonal() += psi_rho.row(i).transpose().cwiseProduct(rho_xx);
-    H.push_back(i == 0 ? of_x : MatrixXd(of_x / size_(i - 1)));
+  const CaseEvaluation at = evaluation(rho);  // of Gauss-Newton rho(x) is a part of the motion
+  const auto of_psi = [&](Index row) -> MatrixXd& { return psi_rhorho[static_cast<std::size_t>(row)]; };
+  const auto in_x = [&](const MatrixXd& of_rho, const VectorXd& gradient) {
+    MatrixXd of_x = rho_x.asDiagonal() * of_rho * rho_x.asDiagonal();
+    if (!gauss_newton_) of_x.diagonal() += gradient.cwiseProduct(rho_xx);
+    return of_x;
+  };
+  // f_rhorho = sum of f_psi psi_rhorho + psi_rho' f_psipsi psi_rho
+  const VectorXd psi = minimised(at.psi), slopes = objective_.gradient(psi);
+  MatrixXd f_rhorho = slopes(0) * of_psi(0);
+  for (std::size_t c = 1; c < evaluator_.cases(); ++c) f_rhorho += slopes(static_cast<Index>(c)) * of_psi(row_of(c));
+  if (objective_.is_maximum()) {
+    const MatrixXd psi_rho = at.psi_rho(Eigen::seq(0, at.psi.size() - 1, 1 + bounds_), Eigen::all);
+    f_rhorho += psi_rho.transpose() * objective_.hessian(psi) * psi_rho;
   }
+  H = {in_x(f_rhorho, f_rho(at))};
+  for (Index i = 0; i < constraints(); ++i)
+    H.push_back(in_x(of_psi(psi_of(i)), at.psi_rho.row(psi_of(i)).transpose()) / size_(i));
   return true;
 }
 
 bool DesignProgram::gradient_beside(const VectorXd& x, const VectorXd& d, VectorXd& f_x) {
-  const Evaluation& at = evaluation(rho_at(x));
+  const CaseEvaluation& at = evaluation(rho_at(x));
   if (!at.ok) return false;
-  const Evaluation there = evaluator_.gradients_on(at.steps, rho_at(x + d), at.method);
-  ++hessian_gradients_;
-  if (there.ok) f_x = there.psi_rho.row(0).transpose().cwiseProduct(scaling_.rho_x(x + d));
-  return there.ok;
+  const VectorXd rho = rho_at(x + d);
+  const Index cases = static_cast<Index>(evaluator_.cases());
+  VectorXd psi(cases);
+  MatrixXd psi_rho(cases, variables());
+  for (std::size_t c = 0; c < evaluator_.cases(); ++c) {
+    const Evaluation& of_case = at.of_cases[c];
+    const Evaluation there = evaluator_.of_case(c).gradients_on(of_case.steps, rho, of_case.method);
+    ++hessian_gradients_;
+    if (!there.ok) return false;
+    psi(static_cast<Index>(c)) = there.psi(0), psi_rho.row(static_cast<Index>(c)) = there.psi_rho.row(0);
+  }
+  f_x = (psi_rho.transpose() * objective_.gradient(psi)).cwiseProduct(scaling_.rho_x(x + d));
+  return true;
 }
 
 }  // namespace mbsopt

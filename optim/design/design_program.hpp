@@ -1,5 +1,5 @@
 // A design as the nonlinear program that solvers see: scaled variables, constraints relative to the size of their
-// bounds. The evaluation of the best point is kept, so that nothing is simulated again for the report.
+// bounds, case by case. The evaluation of the best point is kept, so that nothing is simulated again for the report.
 //
 //   DesignProgram program(spec, evaluator, scaling);
 //   program.start_from(x_start);
@@ -11,7 +11,8 @@
 #include <optional>
 #include <vector>
 
-#include "optim/objective/evaluator.hpp"
+#include "optim/objective/case_evaluator.hpp"
+#include "optim/objective/case_objective.hpp"
 #include "optim/problem/problem.hpp"
 #include "optim/problem/variable_scaling.hpp"
 #include "optim/solver/nonlinear_program.hpp"
@@ -22,13 +23,13 @@ class DesignProgram : public NonlinearProgram {
  public:
   // The evaluator's objectives: the one that is minimised, then those that are bounded. abandoned: whether an
   // evaluation that failed did so because the user stopped it.
-  DesignProgram(const DesignSpec& spec, Evaluator& evaluator, const VariableScaling& scaling,
-                std::function<bool()> abandoned = {});
+  DesignProgram(const DesignSpec& spec, CaseEvaluator& evaluator, const VariableScaling& scaling,
+                CaseObjective objective = {}, std::function<bool()> abandoned = {});
 
   // Evaluates the start and scales by it. Convergence is judged on an objective whose size and gradient are about 1:
   // the larger of those at the start and a little way from it, so that a start at the optimum, where both may vanish,
   // is seen for what it is. Constraints likewise. Or by a given scale.
-  Evaluation start_from(const Eigen::VectorXd& x_start, const std::optional<NlpScale>& scale = {});
+  CaseEvaluation start_from(const Eigen::VectorXd& x_start, const std::optional<NlpScale>& scale = {});
 
   Eigen::VectorXd rho_at(const Eigen::VectorXd& x) const;  // all parameters
 
@@ -38,8 +39,12 @@ class DesignProgram : public NonlinearProgram {
   bool gradient_beside(const Eigen::VectorXd& x, const Eigen::VectorXd& d, Eigen::VectorXd& f_x) override;
 
   // The evaluation with gradients at rho: the one that was kept, or a new one.
-  const Evaluation& evaluation(const Eigen::VectorXd& rho);
+  const CaseEvaluation& evaluation(const Eigen::VectorXd& rho);
 
+  // Where the objective of a constraint stands in an evaluation, and the values that are minimised, one of each case.
+  Eigen::Index psi_of(Eigen::Index constraint) const;
+  Eigen::VectorXd minimised(const Eigen::VectorXd& psi) const;
+  const CaseObjective& objective() const { return objective_; }
   double size(Eigen::Index constraint) const { return size_(constraint); }
   // Other bounds for the objective of a constraint; the best point is judged by them from now on.
   void set_bounds(Eigen::Index constraint, const std::optional<double>& lower, const std::optional<double>& upper);
@@ -49,16 +54,20 @@ class DesignProgram : public NonlinearProgram {
  private:
   NlpScale scale_at(const Eigen::VectorXd& x_start);
   bool second_derivatives(const Eigen::VectorXd& rho, std::vector<Eigen::MatrixXd>& psi_rhorho);
-  void fill(const Evaluation& e, const Eigen::VectorXd& x, NlpPoint& point) const;
-  void keep(const Evaluation& e);
+  void fill(const CaseEvaluation& e, const Eigen::VectorXd& x, NlpPoint& point) const;
+  void keep(const CaseEvaluation& e);
   double violation_of(const Evaluation& e) const;
+  Eigen::Index row_of(std::size_t load_case) const;  // in an evaluation, of the objective that is minimised
+  Eigen::VectorXd f_rho(const Evaluation& e) const;
 
-  Evaluator& evaluator_;
+  CaseEvaluator& evaluator_;
+  const CaseObjective objective_;
+  const Eigen::Index bounds_;  // of each case
   const VariableScaling& scaling_;
   const std::function<bool()> abandoned_;
   const Eigen::VectorXd rho_;  // the scene's values, which parameters that are not designed keep
   Eigen::VectorXd size_;       // of each constraint's bounds
-  Evaluation best_;
+  CaseEvaluation best_;
   double best_f_ = 0, best_violation_ = 0;
   long hessian_gradients_ = 0;
   std::string hessian_failure_;

@@ -19,10 +19,11 @@ constexpr double kNoChange = 1e-4;
 
 }  // namespace
 
-TrueLimits::TrueLimits(const DesignSpec& spec, const std::vector<Objective>& objectives) {
-  for (std::size_t i = 0; i < spec.subject_to.size(); ++i) {
-    if (!objectives[i + 1].is_extreme()) continue;
-    const ObjectiveBound& bound = spec.subject_to[i];
+TrueLimits::TrueLimits(const DesignSpec& spec, const CaseEvaluator& evaluator) {
+  const std::size_t bounds = spec.subject_to.size();
+  for (std::size_t i = 0; i < bounds * evaluator.cases(); ++i) {
+    if (!evaluator.of_case(i / bounds).objectives()[i % bounds + 1].is_extreme()) continue;
+    const ObjectiveBound& bound = spec.subject_to[i % bounds];
     limits_.push_back({static_cast<Eigen::Index>(i), bound.lower, bound.upper, 1, bound.lower, bound.upper});
   }
 }
@@ -50,14 +51,14 @@ void TrueLimits::move(Limit& l, double psi, double X) {
   if (l.lower) l.smooth_lower = psi + (*l.lower + inside - X) / l.slope;
 }
 
-bool TrueLimits::move(DesignProgram& program, const Eigen::VectorXd& psi,
+bool TrueLimits::move(DesignProgram& program, const Eigen::VectorXd& c,
                       const std::vector<std::optional<double>>& true_values) {
   bool moved = false;
   for (Limit& l : limits_) {
-    const std::optional<double>& X = true_values[static_cast<std::size_t>(l.constraint) + 1];
+    const std::optional<double>& X = true_values[static_cast<std::size_t>(program.psi_of(l.constraint))];
     if (!X) continue;
     l.size = program.size(l.constraint);
-    const double value = psi(l.constraint + 1);
+    const double value = c(l.constraint) * l.size;
     learn(l, value, *X);
     if (is_settled(l, value, *X)) continue;
     moved = true;

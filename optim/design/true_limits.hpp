@@ -4,7 +4,9 @@
 //
 //   b <- psi + (U - X)/s      psi: the smooth value at the solution,  s: slope dX/dpsi between the last two; 1 at first
 //
-//   TrueLimits limits(spec, evaluator.objectives());
+// Each case has its own.
+//
+//   TrueLimits limits(spec, evaluator);
 //   do solve(program); while (limits.move(program, psi, evaluator.true_values(rho)));
 #pragma once
 
@@ -13,7 +15,7 @@
 #include <vector>
 
 #include "optim/design/design_program.hpp"
-#include "optim/objective/objective.hpp"
+#include "optim/objective/case_evaluator.hpp"
 #include "optim/problem/problem.hpp"
 
 namespace mbsopt {
@@ -23,12 +25,12 @@ inline constexpr double kTrueLimitTolerance = 1e-6;
 
 class TrueLimits {
  public:
-  // objectives: the one that is minimised, then those that are bounded.
-  TrueLimits(const DesignSpec& spec, const std::vector<Objective>& objectives);
+  // The evaluator's objectives: the one that is minimised, then those that are bounded.
+  TrueLimits(const DesignSpec& spec, const CaseEvaluator& evaluator);
 
-  // psi and true values: of the objectives at the solution. False where the limits hold and are used, or where the
-  // bounds were moved often enough; otherwise the program has new bounds.
-  bool move(DesignProgram& program, const Eigen::VectorXd& psi, const std::vector<std::optional<double>>& true_values);
+  // c: of the program at the solution; true values: of the evaluator. False where the limits hold and are used, or
+  // where the bounds were moved often enough; otherwise the program has new bounds.
+  bool move(DesignProgram& program, const Eigen::VectorXd& c, const std::vector<std::optional<double>>& true_values);
 
   int rounds() const { return rounds_; }  // in which bounds were moved
   // dX/dpsi of a constraint along the solutions; 1 where it is no extreme.

@@ -58,7 +58,8 @@ Evaluator::Evaluator(Scene scene, std::vector<Objective> objectives, const std::
 
 void Evaluator::find_unused() {
   if (objectives_.empty()) return;
-  Problem judged{scene_, {}, {}, {}};
+  Problem judged;
+  judged.scene = scene_;
   for (const Objective& o : objectives_)
     if (!o.is_written_in_cpp()) judged.objectives.push_back(o.spec());
   std::vector<SceneIssue> unused = find_unused_parameters(judged);

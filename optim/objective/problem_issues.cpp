@@ -144,6 +144,39 @@ void check_meaning(Checker& checker, const ChannelSpec& channel) {
     checker.issue(checker.path("gain"), "is 0: nothing of the sensor '" + channel.sensor + "' is compared then");
 }
 
+namespace {
+
+void check_drives_once(Checker& checker, const std::vector<DriveLaw>& drives, const std::string& where) {
+  for (std::size_t i = 0; i < drives.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      if (drives[k].drive == drives[i].drive)
+        checker.issue(child_path(checker.path("drives"), i) + ".drive",
+                      "'" + drives[i].drive + "' has a law in this " + where + " already");
+}
+
+}  // namespace
+
+void check_meaning(Checker& checker, const CaseSpec& load_case) {
+  const SceneFacts& facts = checker.facts();
+  const SimulationSettings& simulation = facts.scene().simulation;
+  if (load_case.end_time && *load_case.end_time <= simulation.start_time)
+    checker.issue(checker.path("end_time"), "the case ends at " + text_of(*load_case.end_time) +
+                                                " s, which must be after its start at " +
+                                                text_of(simulation.start_time) + " s");
+  const std::vector<std::string> parameters = facts.names(To::parameter);
+  const std::vector<Definition>& definitions = facts.scene().definitions;
+  for (const Definition& override : load_case.overrides) {
+    const std::string place = child_path(checker.path("overrides"), override.name);
+    if (!facts.has(To::parameter, override.name))
+      checker.issue(place, "there is no parameter '" + override.name + "'" + did_you_mean(override.name, parameters) +
+                               "; known: " + joined(parameters));
+    for (const std::string& name : override.value.names())
+      if (std::ranges::find(definitions, name, &Definition::name) != definitions.end())
+        checker.issue(place, "uses the definition '" + name + "'; an override is an expression of parameters");
+  }
+  check_drives_once(checker, load_case.drives, "case");
+}
+
 void check_meaning(Checker& checker, const ExperimentSpec& experiment) {
   if (experiment.channels.empty()) checker.issue(checker.path("channels"), "is empty; at least one column is compared");
   if (const std::optional<Unit> unit = parse_unit(experiment.time_unit);
@@ -151,11 +184,7 @@ void check_meaning(Checker& checker, const ExperimentSpec& experiment) {
     checker.issue(checker.path("time_unit"), "'" + experiment.time_unit + "' is no unit of time");
   const SimulationSettings& simulation = checker.facts().scene().simulation;
   const double start = experiment.start_time.value_or(simulation.start_time);
-  for (std::size_t i = 0; i < experiment.drives.size(); ++i)
-    for (std::size_t k = 0; k < i; ++k)
-      if (experiment.drives[k].drive == experiment.drives[i].drive)
-        checker.issue(child_path(checker.path("drives"), i) + ".drive",
-                      "'" + experiment.drives[i].drive + "' has a law in this experiment already");
+  check_drives_once(checker, experiment.drives, "experiment");
   if (experiment.end_time && *experiment.end_time <= start)
     checker.issue(checker.path("end_time"), "the experiment ends at " + text_of(*experiment.end_time) +
                                                 " s, which must be after its start at " + text_of(start) + " s");
@@ -236,6 +265,22 @@ void check_meaning(Checker& checker, const IdentificationSpec& identification) {
             "'" + name + "' is one of \"variables\", which have one value in all experiments; take it out of one");
     }
   }
+}
+
+void check_meaning(Checker& checker, const Problem& problem) {
+  const auto place = [](std::size_t c) { return child_path("cases", c); };
+  check_unique_names(checker, problem.cases, "a case", [&](std::size_t c) { return place(c) + ".name"; });
+  for (std::size_t c = 0; c < problem.cases.size(); ++c) {
+    if (!problem.cases[c].end_time) continue;
+    for (const ObjectiveSpec& objective : problem.objectives)
+      for (const ObjectiveSample& sample : objective.samples)
+        if (sample.time > *problem.cases[c].end_time)
+          checker.issue(place(c) + ".end_time", "is " + text_of(*problem.cases[c].end_time) +
+                                                    " s, but the objective '" + objective.name + "' has a sample at " +
+                                                    text_of(sample.time) + " s");
+  }
+  if (problem.cases.size() < 2 && problem.design && problem.design->over == "max")
+    checker.issue("design.minimize.over", "is \"max\", of which there is none without several \"cases\"");
 }
 
 std::vector<SceneIssue> find_issues(const Problem& problem) {

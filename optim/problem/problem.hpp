@@ -79,8 +79,34 @@ struct MultistartSpec {
   StartSampling sampling = StartSampling::latin_hypercube;
 };
 
+// A drive that follows another law in one experiment or load case.
+struct DriveLaw {
+  std::string drive;
+  Expression law;
+  std::optional<SampledLaw> samples;
+};
+
+// Samples of a signal in one experiment or load case, instead of its own.
+struct SignalSamples : SampleColumn {
+  std::string name;  // of the signal
+};
+
+// One of several loads that one design must bear: how it differs from the problem.
+struct CaseSpec {
+  std::string name;
+  double weight = 1;                       // factor of the minimised objective
+  std::vector<Definition> overrides = {};  // parameters, as expressions of the parameters of the problem
+  std::vector<DriveLaw> drives = {};       // instead of the scene's laws
+  std::vector<SignalSamples> signals = {};
+  std::vector<Condition> conditions = {};  // of the start; one on a sensor of the scene's conditions replaces that one
+  std::optional<double> end_time = {};
+};
+
 struct DesignSpec {
   std::string minimize;
+  std::string over = "sum";                  // of load cases; or "max", smooth
+  std::optional<double> sharpness = {};      // of this maximum [1/unit of the objective]
+  static constexpr double kSharpness = 100;  // when absent: this over the largest value at the start
   std::vector<ObjectiveBound> subject_to;
   std::vector<std::string> variables;  // parameter names
   OptimizerSpec optimizer;
@@ -98,18 +124,6 @@ struct ChannelSpec {
   Field sigma = 1.0, gain = 1.0, bias = 0.0;           // expressions over parameters
   Field delay = 0.0;                                   // [s]; gain, bias and delay may also use t and signals
   SigmaEstimate estimate_sigma = SigmaEstimate::none;  // sigma is where the estimate starts
-};
-
-// A drive that follows another law in one experiment.
-struct DriveLaw {
-  std::string drive;
-  Expression law;
-  std::optional<SampledLaw> samples;
-};
-
-// Samples of a signal in one experiment, instead of its own.
-struct SignalSamples : SampleColumn {
-  std::string name;  // of the signal
 };
 
 struct ExperimentSpec {
@@ -145,6 +159,7 @@ struct IdentificationSpec {
 struct Problem {
   Scene scene;
   std::vector<ObjectiveSpec> objectives;
+  std::vector<CaseSpec> cases;  // load_cases.hpp
   std::optional<DesignSpec> design;
   std::optional<IdentificationSpec> identification;
   std::vector<std::string> columns_read = {};  // what the reader converted to SI, in words

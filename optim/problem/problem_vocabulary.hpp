@@ -96,8 +96,34 @@ void describe(auto& v, Like<MultistartSpec> auto& m) {
   v.choice("sampling", m.sampling, kSamplings, {"how the starts fill the bounds"});
 }
 
+void describe(auto& v, Like<DriveLaw> auto& d) {
+  v.reference("drive", d.drive, To::drive, {"the drive", Need::required});
+  v.time_law("law", d.law, d.samples,
+             {"its law in this experiment or case: of t and parameters, or a CSV file", Need::required});
+}
+
+void describe(auto& v, Like<SignalSamples> auto& s) { describe_samples(v, s, "file"); }
+
+void describe(auto& v, Like<CaseSpec> auto& c) {
+  v.name("name", c.name, {"name of the load case", Need::required});
+  v.plain("weight", c.weight, kPositive, {"factor of the minimised objective in this case"});
+  v.named("overrides", c.overrides, {"parameters in this case, as expressions of those of the problem"});
+  v.list("drives", c.drives, {"laws of drives in this case"});
+  v.named("signals", c.signals, {"samples of signals in this case, instead of the signals' own"});
+  v.group("initial", {"the state at the start time in this case"}, [&](auto& inside) {
+    inside.list("conditions", c.conditions, {"instead of those of the problem on the same sensors, or beside them"});
+  });
+  v.plain("end_time", c.end_time, kAny, {"[s]; the simulation's when absent", Need::optional, dimension::kTime});
+}
+
 void describe(auto& v, Like<DesignSpec> auto& d) {
-  v.reference("minimize", d.minimize, To::objective, {"the objective to minimise", Need::required});
+  v.reference_or(
+      "minimize", d.minimize, To::objective, {"the objective to minimise", Need::required}, [&](auto& inside) {
+        inside.word("over", d.over, Words{"sum max"}, {"of its values in the load cases, each by its weight"});
+        inside.plain("sharpness", d.sharpness, kPositive,
+                     {"of max: k in log(sum exp(k x))/k [1/unit of the objective]; when absent 100 over the "
+                      "largest at the start"});
+      });
   v.list("subject_to", d.subject_to, {"bounds on objectives; those of extremes hold for the true ones"});
   v.references("variables", d.variables, To::parameter, {"parameters that may change", Need::required});
   v.object("optimizer", d.optimizer, {"how it is minimised"});
@@ -117,14 +143,6 @@ void describe(auto& v, Like<ChannelSpec> auto& c) {
   v.choice("estimate_sigma", c.estimate_sigma, kSigmaEstimates,
            {"true: sigma is estimated from the residuals of this channel, from the given one on; shared: from those of "
             "all fitted channels of this column that say so"});
-}
-
-void describe(auto& v, Like<SignalSamples> auto& s) { describe_samples(v, s, "file"); }
-
-void describe(auto& v, Like<DriveLaw> auto& d) {
-  v.reference("drive", d.drive, To::drive, {"the drive", Need::required});
-  v.time_law("law", d.law, d.samples,
-             {"its law in this experiment: of t and parameters, or a CSV file", Need::required});
 }
 
 void describe(auto& v, Like<ExperimentSpec> auto& e) {
@@ -175,6 +193,7 @@ void describe(auto& v, Like<Problem> auto& p) {
   v.version("format", 1, {"version of the problem format"});
   describe(v, p.scene);
   v.named("objectives", p.objectives, {"scalars of a motion, to minimise, to bound or to differentiate"});
+  v.list("cases", p.cases, {"loads that one design must bear"});
   v.object("design", p.design, {"optimal design"});
   v.object("identification", p.identification, {"fit of parameters to measurements"});
 }

@@ -8,6 +8,7 @@
 #include "core/scene/field_visitor.hpp"
 #include "core/scene/scene_facts.hpp"
 #include "core/scene/scene_path.hpp"
+#include "optim/problem/load_cases.hpp"
 #include "optim/problem/problem_vocabulary.hpp"
 
 namespace mbsopt {
@@ -290,10 +291,23 @@ class Search {
   std::set<std::string> used_, used_sensors_;
 };
 
+// What is used in the problem or in one of its load cases; by the names of the problem.
+std::set<std::string> used_in(const Problem& problem) {
+  std::set<std::string> used;
+  if (problem.cases.empty() || problem.identification) used = Search(problem).used_parameters();
+  for (const CaseSpec& load_case : problem.cases) {
+    const Problem of_case = problem_of(problem, load_case);
+    const std::set<std::string> names = Search(of_case).used_parameters();
+    for (std::size_t k = 0; k < problem.scene.parameters.size(); ++k)
+      if (names.contains(of_case.scene.parameters[k].name)) used.insert(problem.scene.parameters[k].name);
+  }
+  return used;
+}
+
 // The problem with nothing but the objectives that its design uses.
 Problem as_designed(const Problem& problem) {
   Problem designed;
-  designed.scene = problem.scene;
+  designed.scene = problem.scene, designed.cases = problem.cases;
   for (const ObjectiveSpec& objective : problem.objectives) {
     const std::vector<ObjectiveBound>& bounds = problem.design->subject_to;
     const auto bounds_it = [&](const ObjectiveBound& bound) { return bound.objective == objective.name; };
@@ -312,7 +326,7 @@ Problem as_identified(const Problem& problem) {
 
 void add_idle(const std::vector<std::string>& variables, const Problem& judged_by, const std::string& list,
               const std::string& what, std::vector<SceneIssue>& issues) {
-  const std::set<std::string> used = Search(judged_by).used_parameters();
+  const std::set<std::string> used = used_in(judged_by);
   std::set<std::string> reported;  // when nothing uses them
   for (const Parameter& parameter : judged_by.scene.parameters)
     if (!parameter.allow_unused) reported.insert(parameter.name);
@@ -345,7 +359,7 @@ std::set<std::string> used_beside_laws(Problem problem) {
 
 std::vector<SceneIssue> find_unused_parameters(const Problem& problem) {
   std::vector<SceneIssue> issues;
-  const std::set<std::string> used = Search(problem).used_parameters();
+  const std::set<std::string> used = used_in(problem);
   std::vector<const Parameter*> unused;
   for (const Parameter& parameter : problem.scene.parameters)
     if (!parameter.allow_unused && !used.contains(parameter.name)) unused.push_back(&parameter);
@@ -364,10 +378,10 @@ std::vector<SceneIssue> find_unused_parameters(const Problem& problem) {
 }
 
 void allow_what_only_measurements_use(Problem& problem) {
-  if (problem.objectives.empty() || !problem.identification) return;
-  const std::set<std::string> used = Search(problem).used_parameters();
+  if (problem.objectives.empty() || (!problem.identification && problem.cases.empty())) return;
+  const std::set<std::string> used = used_in(problem);
   Problem judged = problem;
-  judged.identification.reset();
+  judged.identification.reset(), judged.cases.clear();
   const std::set<std::string> by_objectives = Search(judged).used_parameters();
   for (Parameter& p : problem.scene.parameters)
     p.allow_unused = p.allow_unused || (used.contains(p.name) && !by_objectives.contains(p.name));

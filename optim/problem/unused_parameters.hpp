@@ -20,7 +20,8 @@ namespace mbsopt {
 // For a problem without other issues.
 std::vector<SceneIssue> find_unused_parameters(const Problem& problem);
 
-// Sets allow_unused of parameters that matter to measurements alone: commands that look at objectives let them be.
+// Sets allow_unused of parameters that matter to measurements or load cases alone: commands that look at the objectives
+// of the problem itself let them be.
 void allow_what_only_measurements_use(Problem& problem);
 
 // The problem as far as its objectives depend on it: without the bodies that none of them looks at and that nothing

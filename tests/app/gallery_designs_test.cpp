@@ -78,6 +78,23 @@ TEST_CASE("four_bar/reaction_limit: the true peak of the joint's force is at mos
   CHECK(peak > 33 * (1 - 2e-6));
 }
 
+TEST_CASE("quarter_car/loads: the worst comfort of four cases is least, the travel is held in each", "[gallery]") {
+  const nlohmann::json result = designed("quarter_car/loads");
+  CHECK(result.at("optimizer").at("status") == "converged");
+  double worst = 0, longest = 0;
+  CHECK(result.at("cases").size() == 4);
+  for (const auto& [name, of_case] : result.at("cases").items()) {
+    const nlohmann::json& travel = of_case.at("objectives").at("maximum_of 0.5 - strut_length");
+    CHECK(travel.at("true_value").get<double>() <= 0.04);
+    longest = std::max(longest, travel.at("true_value").get<double>());
+    worst = std::max(worst, of_case.at("objectives").at("comfort").at("value").get<double>());
+  }
+  CHECK(longest > 0.04 * (1 - 2e-6));
+  const nlohmann::json& comfort = result.at("objectives").at("comfort");
+  CHECK(comfort.at("true_value").get<double>() == Approx(worst).epsilon(1e-12));
+  CHECK(comfort.at("value").get<double>() >= worst);
+}
+
 TEST_CASE("governor/spring: the spring is that of the statics in the turning frame", "[gallery]") {
   const TurningGovernor governor;
   const double slow = governor.spring_force(0.20, 9), fast = governor.spring_force(0.26, 12);

@@ -303,3 +303,19 @@ TEST_CASE("a limit on a mean of an expression becomes one on an objective of its
   CHECK_THAT(of(R"({"maximum_of": "tip_y", "upper": 2}, {"maximum_of": "tip_y", "lower": 1})"),
              Catch::Contains("design.subject_to[1]: bounds maximum_of tip_y once more"));
 }
+
+TEST_CASE("misuses of load cases are found at their places", "[read_problem]") {
+  const auto of = [](const std::string& cases) { return error_of({"cases=[" + cases + "]"}); };
+  CHECK(of(R"({"name": "cold", "overrides": {"k1": "1.2*k1 + theta0"}, "end_time": 3})").empty());
+  CHECK_THAT(of(R"({"name": "cold", "overrides": {"k2": 1}})"),
+             Catch::Contains("cases[0].overrides.k2: there is no parameter 'k2' (did you mean 'k1'?)"));
+  CHECK_THAT(of(R"({"name": "cold", "overrides": {"k1": "half"}})"), Catch::Contains("uses the definition 'half'"));
+  CHECK_THAT(of(R"({"name": "cold", "overrides": {"k1": "tip_y"}})"), Catch::Contains("cases[0].overrides.k1: "));
+  CHECK_THAT(of(R"({"name": "cold"}, {"name": "cold"})"),
+             Catch::Contains("cases[1].name: there is already a case 'cold'"));
+  CHECK_THAT(of(R"({"name": "cold", "end_time": -1})"), Catch::Contains("cases[0].end_time: the case ends at -1 s"));
+  CHECK_THAT(of(R"({"name": "cold", "weight": 0})"), Catch::Contains("cases[0].weight"));
+  CHECK_THAT(error_of({"design.minimize={\"objective\": \"track\", \"over\": \"max\"}"}),
+             Catch::Contains("design.minimize.over: is \"max\""));
+  CHECK_THAT(error_of({"design.minimize={\"objective\": \"trak\"}"}), Catch::Contains("design.minimize"));
+}

@@ -227,7 +227,7 @@ TEST_CASE("Hessians of a design are those of its scaled program", "[design_optim
   product.parameters_only = Expression::parse("L01^2*L02");
   problem.objectives.push_back(product);
   problem.design->subject_to = {{"product", {}, 10.0}};
-  Evaluator evaluator(problem.scene, objectives_of(problem, {"motion", "product"}), {"L01", "L02"});
+  CaseEvaluator evaluator(problem, {"motion", "product"}, {"L01", "L02"});
   const VariableScaling scaling({problem.scene.parameters[0], problem.scene.parameters[1]});
   DesignProgram program(*problem.design, evaluator, scaling);
   const Eigen::VectorXd x = scaling.to_x(evaluator.start().head<2>());
@@ -289,9 +289,10 @@ TEST_CASE("Hessians of a design are right where the motion is wild", "[design_op
 #endif
   Problem problem = from_start(0, "exact");
   problem.scene.parameters[0].value = 1.383367, problem.scene.parameters[1].value = 2.137718;
-  Evaluator evaluator(problem.scene, objectives_of(problem, {"motion"}), {"L01", "L02"});
+  CaseEvaluator cases(problem, {"motion"}, {"L01", "L02"});
+  Evaluator& evaluator = cases.of_case(0);
   const VariableScaling scaling({problem.scene.parameters[0], problem.scene.parameters[1]});
-  DesignProgram program(*problem.design, evaluator, scaling);
+  DesignProgram program(*problem.design, cases, scaling);
   std::vector<Eigen::MatrixXd> H;
   REQUIRE(program.hessians(scaling.to_x(evaluator.start().head<2>()), H));
   // Shorter and shorter differences until they agree; over 1e-2 of a length they have the wrong sign.

@@ -1,0 +1,81 @@
+#include "app/results/case_results.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "app/results/objective_values.hpp"
+#include "app/terminal/interrupt.hpp"
+#include "app/terminal/text_table.hpp"
+#include "optim/check/gradient_check.hpp"
+#include "optim/objective/case_evaluator.hpp"
+#include "optim/problem/load_cases.hpp"
+#include "optim/problem/unused_parameters.hpp"
+
+namespace mbsopt {
+
+int case_threads(const Run& run) {
+  const int asked = run.context.options.threads;
+  return asked > 0 ? asked : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+}
+
+void add_cases(Run& run, bool gradients, GradientMethod method) {
+  const Problem& problem = run.problem;
+  if (problem.cases.empty() || problem.objectives.empty() || interrupted()) return;
+  std::vector<std::string> objectives, parameters, header{"case"};
+  for (const ObjectiveSpec& o : problem.objectives) objectives.push_back(o.name);
+  for (const Parameter& p : problem.scene.parameters) parameters.push_back(p.name);
+  EvaluatorOptions options;
+  options.method = method, options.progress = run.watched("load cases");
+  CaseEvaluator evaluator(problem, objectives, parameters, options, case_threads(run));
+  const Eigen::VectorXd rho = evaluator.start();
+  const CaseEvaluation& all = gradients ? evaluator.gradients(rho) : evaluator.values(rho);
+  run.progress.finish();
+  if (!all.ok) return interrupted() ? run.stopped("the load cases are incomplete") : run.failed(all.message);
+  const std::vector<std::optional<double>> true_values = evaluator.true_values(rho);
+  header.insert(header.end(), objectives.begin(), objectives.end());
+  TextTable table(header);
+  for (std::size_t c = 0; c < evaluator.cases(); ++c) {
+    const Evaluation& e = all.of_cases[c];
+    std::vector<std::string> row{evaluator.case_name(c)};
+    Json& result = run.result["cases"][evaluator.case_name(c)]["objectives"];
+    for (std::size_t i = 0; i < objectives.size(); ++i) {
+      const Eigen::Index at = static_cast<Eigen::Index>(i);
+      const std::optional<double>& true_value = true_values[c * objectives.size() + i];
+      result[objectives[i]] = objective_json(e.psi(at), true_value);
+      for (std::size_t k = 0; k < parameters.size() && gradients; ++k)
+        result[objectives[i]]["gradient"][parameters[k]] = e.psi_rho(at, static_cast<Eigen::Index>(k));
+      row.push_back(significant(e.psi(at), 10) +
+                    (true_value ? fmt::format(" ({})", significant(*true_value, 10)) : ""));
+    }
+    table.add(std::move(row));
+  }
+  run.context.out << '\n' << table.text();
+  if (std::any_of(true_values.begin(), true_values.end(), [](const auto& value) { return value.has_value(); }))
+    run.context.out << "in brackets: the true extreme\n";
+}
+
+bool check_cases(Run& run) {
+  bool all_agree = true;
+  for (const CaseSpec& load_case : run.problem.cases) {
+    Problem of_case = what_objectives_need(problem_of(run.problem, load_case));
+    for (Parameter& p : of_case.scene.parameters) p.allow_unused = true;
+    GradientCheckOptions options;
+    options.simulation_progress = run.watched("checking case " + load_case.name);
+    const GradientCheck check = check_gradients(of_case, options);
+    run.progress.finish();
+    if (interrupted() || !check.ran) {
+      interrupted() ? run.stopped("not all load cases were compared")
+                    : run.failed(fmt::format("case '{}': {}", load_case.name, check.message));
+      return true;
+    }
+    all_agree = all_agree && check.passed();
+    run.result["cases"][load_case.name]["verdict"]["passed"] = check.passed();
+    run.context.out << fmt::format("case {}: {}\n", load_case.name,
+                                   check.passed() ? "all gradients agree" : "THE GRADIENTS DISAGREE");
+  }
+  return all_agree;
+}
+
+}  // namespace mbsopt

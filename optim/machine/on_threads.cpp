@@ -1,0 +1,33 @@
+#include "optim/machine/on_threads.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <thread>
+#include <vector>
+
+namespace mbsopt {
+
+void on_threads(std::size_t jobs, int threads, const std::function<void(std::size_t job)>& work) {
+  std::vector<std::exception_ptr> thrown(jobs);
+  std::atomic<std::size_t> next = 0;
+  const auto run = [&] {
+    for (std::size_t job = next++; job < jobs; job = next++) {
+      try {
+        work(job);
+      } catch (...) {
+        thrown[job] = std::current_exception();
+      }
+    }
+  };
+  {
+    std::vector<std::jthread> others;
+    const std::size_t wanted = std::min(jobs, static_cast<std::size_t>(std::max(1, threads)));
+    for (std::size_t i = 1; i < wanted; ++i) others.emplace_back(run);
+    run();
+  }
+  for (const std::exception_ptr& exception : thrown)
+    if (exception) std::rethrow_exception(exception);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,93 @@
+#include "optim/objective/case_evaluator.hpp"
+
+#include <fmt/format.h>
+
+#include "optim/machine/on_threads.hpp"
+#include "optim/problem/load_cases.hpp"
+#include "optim/problem/unused_parameters.hpp"
+
+namespace mbsopt {
+
+CaseEvaluator::CaseEvaluator(const Problem& problem, const std::vector<std::string>& objectives,
+                             const std::vector<std::string>& variables, const EvaluatorOptions& options, int threads)
+    : progress_(std::make_shared<std::mutex>()), threads_(threads) {
+  EvaluatorOptions of_case = options;
+  if (options.progress && threads > 1 && problem.cases.size() > 1)
+    of_case.progress = [lock = progress_, told = options.progress](double t) {
+      const std::lock_guard guard(*lock);
+      return told(t);
+    };
+  const std::vector<Problem> problems = problems_of_cases(problem);
+  for (std::size_t c = 0; c < problems.size(); ++c) {
+    Problem needed = options.user_forces.empty() ? what_objectives_need(problems[c]) : problems[c];
+    std::vector<std::string> names = variables;
+    if (!problem.cases.empty()) {
+      for (std::string& name : names) name = name_in(problem.cases[c], name, problem.scene);
+      // A variable may matter in another case only.
+      for (Parameter& p : needed.scene.parameters) p.allow_unused = true;
+    }
+    const std::vector<Objective> all = objectives_of(needed, objectives);
+    evaluators_.emplace_back(std::move(needed.scene), all, names, of_case);
+    names_.push_back(problem.cases.empty() ? std::string() : problem.cases[c].name);
+  }
+}
+
+std::string CaseEvaluator::in_case(std::size_t c, const std::string& what) const {
+  return names_[c].empty() ? what : fmt::format("{} ({})", what, names_[c]);
+}
+
+long CaseEvaluator::simulations() const {
+  long sum = 0;
+  for (const Evaluator& evaluator : evaluators_) sum += evaluator.simulations();
+  return sum;
+}
+
+template <class Evaluate>
+const CaseEvaluation& CaseEvaluator::evaluated(const Eigen::VectorXd& rho, const Evaluate& evaluate) {
+  std::vector<Evaluation> found(cases());
+  on_threads(cases(), threads_, [&](std::size_t c) { found[c] = evaluate(evaluators_[c]); });
+  const Eigen::Index n = static_cast<Eigen::Index>(objectives());
+  CaseEvaluation all;
+  static_cast<Evaluation&>(all) = found[0];
+  all.rho = rho;
+  if (cases() > 1) {
+    const Eigen::Index rows = n * static_cast<Eigen::Index>(cases()), columns = found[0].psi_rho.cols();
+    all.psi.setZero(rows), all.psi_rho.setZero(found[0].has_gradients() ? rows : 0, columns);
+    all.simulations = 0, all.wall_seconds = 0, all.warnings.clear();
+  }
+  for (std::size_t c = 0; c < cases() && cases() > 1; ++c) {
+    const Evaluation& e = found[c];
+    all.simulations += e.simulations, all.wall_seconds += e.wall_seconds;
+    for (const std::string& warning : e.warnings)
+      all.warnings.push_back(fmt::format("case '{}': {}", names_[c], warning));
+    if (!e.ok) {
+      if (all.ok || c == 0) all.message = fmt::format("case '{}': {}", names_[c], e.message);
+      all.ok = false;
+      continue;
+    }
+    const Eigen::Index first = n * static_cast<Eigen::Index>(c);
+    all.psi.segment(first, n) = e.psi;
+    if (all.has_gradients() && e.has_gradients()) all.psi_rho.middleRows(first, n) = e.psi_rho;
+  }
+  all.of_cases = std::move(found);
+  last_ = std::move(all);
+  return last_;
+}
+
+const CaseEvaluation& CaseEvaluator::values(const Eigen::VectorXd& rho) {
+  return evaluated(rho, [&](Evaluator& evaluator) { return evaluator.values(rho); });
+}
+
+const CaseEvaluation& CaseEvaluator::gradients(const Eigen::VectorXd& rho) {
+  return evaluated(rho, [&](Evaluator& evaluator) { return evaluator.gradients(rho); });
+}
+
+std::vector<std::optional<double>> CaseEvaluator::true_values(const Eigen::VectorXd& rho) const {
+  std::vector<std::vector<std::optional<double>>> found(cases());
+  on_threads(cases(), threads_, [&](std::size_t c) { found[c] = evaluators_[c].true_values(rho); });
+  std::vector<std::optional<double>> all;
+  for (const auto& of_case : found) all.insert(all.end(), of_case.begin(), of_case.end());
+  return all;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,62 @@
+// The objectives of a problem in all its load cases, as Evaluator gives them of one. The cases are computed in threads
+// of their own; results do not depend on how many.
+//
+//   CaseEvaluator evaluator(problem, {"track", "peak"}, {"k1"}, {}, 2);
+//   const CaseEvaluation& e = evaluator.gradients(evaluator.start());
+//   e.psi(2 * c), e.psi(2 * c + 1);   // track and peak in case c
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "optim/objective/evaluator.hpp"
+#include "optim/problem/problem.hpp"
+
+namespace mbsopt {
+
+// psi and its derivatives case by case, each with all objectives; ok where all cases are. Statistics are of the first.
+struct CaseEvaluation : Evaluation {
+  std::vector<Evaluation> of_cases;
+};
+
+class CaseEvaluator {
+ public:
+  // A problem without cases is its own only case. Each case is reduced to what its objectives need, unless there are
+  // forces written in C++, which name bodies by their number.
+  CaseEvaluator(const Problem& problem, const std::vector<std::string>& objectives,
+                const std::vector<std::string>& variables, const EvaluatorOptions& options = {}, int threads = 1);
+
+  // The reference holds until the next call.
+  const CaseEvaluation& values(const Eigen::VectorXd& rho);
+  const CaseEvaluation& gradients(const Eigen::VectorXd& rho);
+  // As Evaluator's, case by case.
+  std::vector<std::optional<double>> true_values(const Eigen::VectorXd& rho) const;
+
+  std::size_t cases() const { return evaluators_.size(); }
+  std::size_t objectives() const { return evaluators_[0].objectives().size(); }  // of each case
+  Evaluator& of_case(std::size_t c) { return evaluators_[c]; }
+  const Evaluator& of_case(std::size_t c) const { return evaluators_[c]; }
+  const std::string& case_name(std::size_t c) const { return names_[c]; }  // empty where the problem has no cases
+  std::string in_case(std::size_t c, const std::string& what) const;       // "what (cold)"
+
+  const std::vector<int>& variables() const { return evaluators_[0].variables(); }
+  Eigen::VectorXd start() const { return evaluators_[0].start(); }
+  long simulations() const;
+  int threads() const { return threads_; }
+
+ private:
+  template <class Evaluate>
+  const CaseEvaluation& evaluated(const Eigen::VectorXd& rho, const Evaluate& evaluate);
+
+  std::vector<std::string> names_;
+  std::vector<Evaluator> evaluators_;
+  std::shared_ptr<std::mutex> progress_;  // of all threads, which tell one listener
+  const int threads_;
+  CaseEvaluation last_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,46 @@
+#include "optim/objective/case_objective.hpp"
+
+#include <cmath>
+
+namespace mbsopt {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+CaseObjective::CaseObjective(const std::vector<CaseSpec>& cases, const DesignSpec& design)
+    : w_(VectorXd::Ones(cases.empty() ? 1 : static_cast<Eigen::Index>(cases.size()))) {
+  for (std::size_t c = 0; c < cases.size(); ++c) w_(static_cast<Eigen::Index>(c)) = cases[c].weight;
+  if (cases.size() > 1 && design.over == "max") k_ = design.sharpness.value_or(1);
+}
+
+// exp(k (x_c - largest)), divided by their sum
+VectorXd CaseObjective::shares(const VectorXd& x) const {
+  const VectorXd e = (k_ * (x.array() - x.maxCoeff())).exp();
+  return e / e.sum();
+}
+
+double CaseObjective::value(const VectorXd& psi) const {
+  const VectorXd x = w_.cwiseProduct(psi);
+  if (!is_maximum()) return x.sum();
+  const double largest = x.maxCoeff();
+  return largest + std::log((k_ * (x.array() - largest)).exp().sum()) / k_;
+}
+
+VectorXd CaseObjective::gradient(const VectorXd& psi) const {
+  if (!is_maximum()) return w_;
+  return w_.cwiseProduct(shares(w_.cwiseProduct(psi)));
+}
+
+MatrixXd CaseObjective::hessian(const VectorXd& psi) const {
+  if (!is_maximum()) return MatrixXd::Zero(w_.size(), w_.size());
+  const VectorXd p = shares(w_.cwiseProduct(psi));
+  const MatrixXd H = k_ * (MatrixXd(p.asDiagonal()) - p * p.transpose());
+  return w_.asDiagonal() * H * w_.asDiagonal();
+}
+
+double CaseObjective::true_value(const VectorXd& psi) const {
+  const VectorXd x = w_.cwiseProduct(psi);
+  return is_maximum() ? x.maxCoeff() : x.sum();
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,33 @@
+// What a design minimises over its load cases, of the values psi_c that its objective has in them:
+//
+//   sum   f = sum of w_c psi_c
+//   max   f = (1/k) log( sum of exp(k w_c psi_c) )      above the largest w_c psi_c by log(cases)/k at most
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "optim/problem/problem.hpp"
+
+namespace mbsopt {
+
+class CaseObjective {
+ public:
+  CaseObjective() : CaseObjective({}, {}) {}  // f = psi
+  // The design's sharpness must be there for the maximum of several cases.
+  CaseObjective(const std::vector<CaseSpec>& cases, const DesignSpec& design);
+
+  double value(const Eigen::VectorXd& psi) const;
+  Eigen::VectorXd gradient(const Eigen::VectorXd& psi) const;  // f_psi
+  Eigen::MatrixXd hessian(const Eigen::VectorXd& psi) const;   // f_psipsi
+  double true_value(const Eigen::VectorXd& psi) const;         // of the maximum that is meant; else f
+  bool is_maximum() const { return k_ > 0; }
+
+ private:
+  Eigen::VectorXd shares(const Eigen::VectorXd& weighted) const;
+
+  Eigen::VectorXd w_;
+  double k_ = 0;  // 0: a sum
+};
+
+}  // namespace mbsopt
