@@ -5,6 +5,7 @@
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/terminal/text_table.hpp"
+#include "core/start/free_motion.hpp"
 #include "optim/problem/parameter_uses.hpp"
 
 namespace mbsopt {
@@ -27,6 +28,14 @@ void add_parameters(Run& run) {
   run.context.out << '\n' << table.text();
 }
 
+void add_free_motions(Run& run, const Mechanism& mechanism, const Assembly& assembly) {
+  const int freedoms = run.result.at("model").at("degrees_of_freedom").get<int>();
+  const std::vector<std::string> free =
+      free_motions(mechanism, assembly, run.problem.scene.simulation.start_time, freedoms);
+  run.result["model"]["free"] = free;
+  for (const std::string& motion : free) run.context.out << fmt::format("free: {}\n", motion);
+}
+
 }  // namespace
 
 int validate_command(const CommandContext& context) {
@@ -38,6 +47,7 @@ int validate_command(const CommandContext& context) {
   if (closed && run.problem.scene.simulation.accuracy)
     context.out
         << "simulation.accuracy chooses the integrator when it is run; with an implicit one the model is spatial\n";
+  if (closed) add_free_motions(run, mechanism, assembly);
   if (closed) add_parameters(run);
   return run.finish();
 }

@@ -37,6 +37,8 @@ TEST_CASE("validate counts bodies, equations and degrees of freedom", "[command]
                                              {"rank", 6},
                                              {"degrees_of_freedom", 1},
                                              {"redundant", nlohmann::json::array()},
+                                             {"free", nlohmann::json::array({"'rod' turns about the axis through joint "
+                                                                             "'pin' along [0, 0, 1]"})},
                                              {"type", "planar"},
                                              {"unknowns_per_body", 3}});
 }

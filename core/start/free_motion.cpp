@@ -1,0 +1,274 @@
+// A motion is a null vector of J, six numbers (rdot, omega in body axes) per body. Rows of J are scaled to unit length.
+// Bodies that rows tie to each other are one group; groups move independently of each other.
+//
+//   alone       null vectors L_b of the columns of body b: it moves while all others stand still
+//   together    the null vectors N of the group without their parts in the L_b:  R = N - L L'N,  L = diag(L_b)
+//
+// A null vector may hold for an instant only, as where a crank and its coupler are in line. So all is found again at a
+// position near by, to which a general motion leads: what moves is told from there, and nothing is told where the
+// numbers of degrees of freedom differ.
+//
+// The L_b are independent of each other, so that R has the rank  columns of N - columns of L.
+#include "core/start/free_motion.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include "core/dynamics/constraint_rows.hpp"
+#include "core/linear/dense.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/start/assembly_equations.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kMostBodies = 40;          // dense decompositions of 6n columns stay within milliseconds
+constexpr double kFreeThreshold = 1e-8;  // as for redundant rows
+constexpr double kStep = 1e-3;  // to the position near by [rad]: far above kZero, and within reach of Newton's steps
+constexpr double kZero = 1e-6;  // of a motion's size: above what rounding leaves of a null vector
+constexpr std::size_t kMostNames = 8;  // in one sentence
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+struct JointPoint {
+  std::string joint;
+  Vector3d place;  // global [m]
+};
+
+class MotionNames {
+ public:
+  MotionNames(const MechanismData& data, const VectorXd& y)
+      : d_(data), frames_(at(data.n) + 1), points_(frames_.size()) {
+    BodyState state;
+    for (int i = 1; i <= d_.n; ++i) set_position(y.segment<7>(7 * (i - 1)), state, frames_[at(i)]);
+    set_jacobian();
+    for (const Constraint& c : d_.constraints) add_points(c);
+  }
+
+  struct Told {
+    std::vector<std::string> alone, together;
+    std::vector<Index> freedoms;  // of each body alone, and of each group
+    Index all = 0;
+  };
+  Told told() {
+    for (const std::vector<int>& group : groups()) add_group(group);
+    return said_;
+  }
+
+  // d(q)/d(s) along a general motion of all groups, of at most one radian or of one metre if nothing turns.
+  VectorXd general_motion(const VectorXd& y) const {
+    VectorXd qdot = VectorXd::Zero(7 * d_.n);
+    double fastest = 0, turning = 0;
+    for (const std::vector<int>& group : groups()) {
+      const MatrixXd N = free_in(columns_of(group));
+      const VectorXd weights = VectorXd::LinSpaced(N.cols(), 1, 2), motion = N * weights;
+      for (std::size_t k = 0; k < group.size(); ++k) {
+        const Index q = 7 * (group[k] - 1);
+        const Vector3d v = motion.segment<3>(6 * static_cast<Index>(k)),
+                       omega = motion.segment<3>(6 * static_cast<Index>(k) + 3), e = y.segment<3>(q + 4);
+        qdot.segment<3>(q) = v;
+        qdot(q + 3) = -0.5 * e.dot(omega);  // pdot = 1/2 G(p)'omega
+        qdot.segment<3>(q + 4) = 0.5 * (y(q + 3) * omega + e.cross(omega));
+        fastest = std::max(fastest, v.norm()), turning = std::max(turning, omega.norm());
+      }
+    }
+    const double size = turning > kZero * fastest ? turning : fastest;
+    return size > 0 ? VectorXd(qdot / size) : qdot;
+  }
+
+ private:
+  void set_jacobian() {
+    J_ = MatrixXd::Zero(d_.m, 6 * d_.n);
+    ConstraintRows rows(d_);
+    rows.evaluate(frames_);
+    for (const RowGroup& g : d_.groups) {
+      for (int r = 0; r < g.rows; ++r) {
+        if (g.body1 > 0) J_.block<1, 6>(g.row + r, 6 * (g.body1 - 1)) += rows.J1.row(g.block + r);
+        if (g.body2 > 0) J_.block<1, 6>(g.row + r, 6 * (g.body2 - 1)) += rows.J2.row(g.block + r);
+      }
+    }
+    for (Index r = 0; r < J_.rows(); ++r) {
+      const double length = J_.row(r).norm();
+      if (length > 0) J_.row(r) /= length;
+    }
+  }
+
+  // Where joints touch their bodies.
+  void add_points(const Constraint& c) {
+    if (c.joint < 0) return;
+    std::visit(
+        [&]<class P>(const P& p) {
+          if constexpr (std::is_same_v<P, Coincidence> || std::is_same_v<P, Distance>) {
+            const std::string& name = d_.joint_names[at(c.joint)];
+            if (c.body1 > 0) points_[at(c.body1)].push_back({name, frames_[at(c.body1)].point(p.s1)});
+            if (c.body2 > 0) points_[at(c.body2)].push_back({name, frames_[at(c.body2)].point(p.s2)});
+          }
+        },
+        c.primitive);
+  }
+
+  std::vector<std::vector<int>> groups() const {
+    std::vector<int> parent(at(d_.n) + 1);
+    std::iota(parent.begin(), parent.end(), 0);
+    const auto root = [&](int i) {
+      while (parent[at(i)] != i) i = parent[at(i)];
+      return i;
+    };
+    std::map<int, int> of_row;  // a body in each row
+    for (const Constraint& c : d_.constraints) {
+      for (const int body : {c.body1, c.body2}) {
+        if (body == 0) continue;
+        const auto [entry, is_new] = of_row.emplace(c.row, body);
+        parent[at(root(body))] = root(entry->second);
+      }
+    }
+    std::map<int, std::vector<int>> all;
+    for (int i = 1; i <= d_.n; ++i) all[root(i)].push_back(i);
+    std::vector<std::vector<int>> result;
+    for (auto& [body, group] : all) result.push_back(std::move(group));
+    return result;
+  }
+
+  MatrixXd columns_of(const std::vector<int>& bodies) const {
+    MatrixXd columns(J_.rows(), 6 * static_cast<Index>(bodies.size()));
+    for (std::size_t k = 0; k < bodies.size(); ++k)
+      columns.middleCols<6>(6 * static_cast<Index>(k)) = J_.middleCols<6>(6 * (bodies[k] - 1));
+    return columns;
+  }
+  static MatrixXd free_in(const MatrixXd& J) {
+    if (J.size() == 0 || J.isZero(0)) return MatrixXd::Identity(J.cols(), J.cols());
+    return null_space(J, kFreeThreshold);
+  }
+
+  void add_group(const std::vector<int>& group) {
+    MatrixXd R = free_in(columns_of(group));
+    const Index all = R.cols();
+    Index alone = 0;
+    for (std::size_t k = 0; k < group.size(); ++k) {
+      const MatrixXd L = free_in(columns_of({group[k]}));
+      alone += L.cols();
+      if (L.cols() > 0) add_alone(group[k], L);
+      said_.freedoms.push_back(L.cols());
+      auto part = R.middleRows<6>(6 * static_cast<Index>(k));
+      part -= (L * (L.transpose() * part)).eval();
+    }
+    said_.freedoms.push_back(all);
+    said_.all += all;
+    if (alone < all) add_together(group, R, all - alone);
+  }
+
+  void add_together(const std::vector<int>& group, const MatrixXd& R, Index freedoms) {
+    std::vector<std::string> moving;
+    for (std::size_t k = 0; k < group.size(); ++k)
+      if (R.middleRows<6>(6 * static_cast<Index>(k)).norm() > kZero * R.norm()) moving.push_back(name(group[k]));
+    if (moving.empty()) return;
+    const std::string who = moving.size() > kMostNames ? fmt::format("{} bodies", moving.size())
+                                                       : fmt::format("{}", fmt::join(moving, ", "));
+    const char* const verb = moving.size() == 1 ? "moves" : "move together";
+    said_.together.push_back(freedoms == 1 ? fmt::format("{} {}", who, verb)
+                                           : fmt::format("{} {} with {} degrees of freedom", who, verb, freedoms));
+  }
+
+  void add_alone(int body, const MatrixXd& L) {
+    if (L.cols() == 6) return said_.alone.push_back(name(body) + " moves freely");
+    if (L.cols() == 1) return said_.alone.push_back(name(body) + " " + one_motion(body, L));
+    for (const JointPoint& point : points_[at(body)]) {
+      const Vector3d s = frames_[at(body)].A.transpose() * (point.place - frames_[at(body)].r);
+      double fastest = 0;
+      for (Index k = 0; k < L.cols(); ++k) {
+        const Vector3d omega = L.col(k).tail<3>();
+        fastest = std::max(fastest, (L.col(k).head<3>() + frames_[at(body)].A * omega.cross(s)).norm());
+      }
+      if (L.cols() == 3 && fastest < kZero * (1 + s.norm()))
+        return said_.alone.push_back(fmt::format("{} turns freely about joint '{}'", name(body), point.joint));
+    }
+    said_.alone.push_back(fmt::format("{} moves alone with {} degrees of freedom", name(body), L.cols()));
+  }
+
+  // v of the centre of mass, w: an axis along w through c = r + w x v/w'w, where the body's velocity is along w:
+  // (w'v/w'w) w, zero if the body turns without sliding.
+  std::string one_motion(int body, const VectorXd& motion) const {
+    const Frame& f = frames_[at(body)];
+    const Vector3d v = motion.head<3>(), w = f.A * motion.tail<3>();
+    double size = 0;
+    for (const JointPoint& point : points_[at(body)]) size = std::max(size, (point.place - f.r).norm());
+    if (size == 0) size = 1;
+    if (w.norm() * size < kZero * v.norm()) return "slides along " + direction(v);
+    if (std::abs(w.dot(v)) > kZero * w.squaredNorm() * size) return "turns about and slides along " + direction(w);
+    const Vector3d c = f.r + w.cross(v) / w.squaredNorm(), u = w.normalized();
+    std::vector<const JointPoint*> on_axis;
+    for (const JointPoint& point : points_[at(body)]) {
+      const auto same = [&](const JointPoint* other) { return (other->place - point.place).norm() < kZero * size; };
+      if ((point.place - c).cross(u).norm() < kZero * size && std::none_of(on_axis.begin(), on_axis.end(), same))
+        on_axis.push_back(&point);
+    }
+    if (on_axis.size() >= 2)
+      return fmt::format("turns about the axis through joints '{}' and '{}'", on_axis[0]->joint, on_axis[1]->joint);
+    if (on_axis.size() == 1)
+      return fmt::format("turns about the axis through joint '{}' along {}", on_axis[0]->joint, direction(w));
+    return "turns about an axis along " + direction(w);
+  }
+
+  // Its largest component is positive, and rounding is no component.
+  static std::string direction(const Vector3d& x) {
+    Index largest = 0;
+    x.cwiseAbs().maxCoeff(&largest);
+    Vector3d u = x.normalized() * (x(largest) < 0 ? -1 : 1);
+    for (double& component : u)
+      if (std::abs(component) < kZero) component = 0;
+    return fmt::format("[{:.3g}, {:.3g}, {:.3g}]", u(0), u(1), u(2));
+  }
+
+  std::string name(int body) const { return "'" + d_.body_names[at(body)] + "'"; }
+
+  const MechanismData& d_;
+  std::vector<Frame> frames_;                    // [0] is the ground
+  std::vector<std::vector<JointPoint>> points_;  // by body
+  MatrixXd J_;
+  Told said_;
+};
+
+// Newton's steps of least length to the joints and unit norms, drives held; whether they arrive.
+bool close_again(const MechanismData& data, double time, VectorXd& y) {
+  constexpr int kSteps = 6;
+  constexpr double kClosed = 1e-12;  // [m], 1: rounding
+  AssemblyEquations equations(data, AssemblyLevel::position, time);
+  equations.start_branches(y);
+  const Index rows = data.m + data.n, N = 7 * data.n;
+  for (int i = 0; i < kSteps; ++i) {
+    const VectorXd F = equations.values(y).head(rows);
+    if (F.lpNorm<Eigen::Infinity>() < kClosed) return true;
+    const MatrixXd J = equations.gradients(y).y.topLeftCorner(rows, N);
+    y.head(N) -= OrthogonalDecomposition(J, kFreeThreshold).solve(F);
+  }
+  return equations.values(y).head(rows).lpNorm<Eigen::Infinity>() < kClosed;
+}
+
+}  // namespace
+
+std::vector<std::string> free_motions(const Mechanism& mechanism, const Assembly& assembly, double start_time,
+                                      int degrees_of_freedom) {
+  const MechanismData& data = mechanism.data();
+  if (degrees_of_freedom == 0 || data.n > kMostBodies || !assembly.result().ok) return {};
+  const VectorXd& y = assembly.result().y;
+  MotionNames here(data, y);
+  VectorXd moved = y;
+  moved.head(7 * data.n) += kStep * here.general_motion(y);
+  if (!close_again(data, start_time, moved)) return {};
+  const MotionNames::Told at_start = here.told(), near_by = MotionNames(data, moved).told();
+  if (at_start.freedoms != near_by.freedoms || at_start.all != degrees_of_freedom) return {};
+  std::vector<std::string> all = at_start.alone;
+  all.insert(all.end(), near_by.together.begin(), near_by.together.end());
+  return all;
+}
+
+}  // namespace mbsopt
