@@ -42,6 +42,7 @@ constexpr std::array kCommands{
     Command{"identify", "fit parameters to measurements", identify_command},
     Command{"tradeoff", "error against cost for integrators, tolerances, formulations and gradient methods",
             tradeoff_command},
+    Command{"sweep", "objectives over a grid, samples or a list of parameter values", sweep_command},
     Command{"resume", "go on with a design or an identification that was interrupted or killed", resume_command},
     Command{"new", "write a commented starter file into the current folder", new_command},
     Command{"schema", "print the JSON Schema of problem files", schema_command},
@@ -118,6 +119,18 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
                    "also write recommended.json, the problem with the fastest settings of this accuracy: 1e-6")
         ->check(CLI::Range(1e-15, 1.0))
         ->type_name("ACCURACY");
+  }
+  if (name == "sweep") {
+    SweepOptions& sweep = options.sweep;
+    sub.add_option("--vary", sweep.vary, "a parameter and its values: k1=10:20:5, or k1=10:20 with --samples; repeated")
+        ->type_name("NAME=LOW:HIGH[:COUNT]")
+        ->allow_extra_args(false);
+    sub.add_option("--samples", sweep.samples, "a Latin hypercube of so many points instead of the grid")
+        ->check(CLI::Range(1, 10'000'000));
+    sub.add_option("--seed", sweep.seed, "of the samples; drawn and kept in result.json otherwise");
+    sub.add_option("--points", sweep.points, "a CSV file with a column per parameter, a row per point")
+        ->type_name("FILE");
+    sub.add_flag("--gradients", sweep.gradients, "derivatives in the varied parameters, too");
   }
   if (name == "gradient") {
     sub.add_option("--method", options.method, "how gradients are computed")

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "app/run/sweep_points.hpp"
+
 namespace mbsopt {
 
 struct ProblemSource;
@@ -29,6 +31,7 @@ struct CommandOptions {
   std::optional<double> at;           // --at of linearise [s]
   std::vector<std::string> inputs;    // --inputs of linearise: parameters
   std::vector<std::string> outputs;   // --outputs of linearise: sensors; empty: all
+  SweepOptions sweep;                 // --vary, --samples, --seed, --points, --gradients of sweep
   int threads = 0;                    // --threads, also worker processes; 0: as many as the machine has
   bool quiet = false;                 // --quiet
   bool json = false;                  // --json: only result.json on standard output
@@ -56,6 +59,7 @@ int check_command(const CommandContext& context);
 int design_command(const CommandContext& context);
 int identify_command(const CommandContext& context);
 int tradeoff_command(const CommandContext& context);
+int sweep_command(const CommandContext& context);
 int resume_command(const CommandContext& context);  // options.problem_file: the folder
 int new_command(const CommandContext& context);     // options.problem_file: the kind
 int schema_command(const CommandContext& context);

@@ -233,7 +233,7 @@ TEST_CASE("sensors that are expressions are checked", "[scene]") {
   SECTION("unknown names") {
     add("a", "2*thetta");
     add("b", "a");
-    CHECK_THAT(at(scene, "sensors.a.value"), Catch::Contains("unknown name 'thetta'; did you mean 'theta'"));
+    CHECK_THAT(at(scene, "sensors.a.value"), Catch::Contains("unknown name 'thetta' (did you mean 'theta'"));
     CHECK(find_issues(scene).size() == 1);
   }
   SECTION("units") {

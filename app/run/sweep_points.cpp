@@ -1,0 +1,156 @@
+#include "app/run/sweep_points.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+
+#include "core/expression/did_you_mean.hpp"
+#include "optim/problem/csv_table.hpp"
+#include "optim/problem/start_points.hpp"
+
+namespace mbsopt {
+namespace {
+
+constexpr std::size_t kMostPoints = 10'000'000;  // of a grid: more is a slip, and fills the memory
+
+int parameter_index(const Scene& scene, const std::string& name) {
+  const auto found = std::ranges::find(scene.parameters, name, &Parameter::name);
+  if (found != scene.parameters.end()) return static_cast<int>(found - scene.parameters.begin());
+  std::vector<std::string> names;
+  for (const Parameter& p : scene.parameters) names.push_back(p.name);
+  throw std::invalid_argument(fmt::format("there is no parameter '{}'{}", name, did_you_mean(name, names)));
+}
+
+double number_in(const std::string& text, const std::string& option) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+    throw std::invalid_argument(fmt::format("--vary {}: '{}' is not a number", option, text));
+  return value;
+}
+
+struct Range {
+  Parameter parameter;  // with its ends as bounds
+  int index = 0;
+  std::size_t count = 0;  // 0: not said
+};
+
+Range range_of(const Scene& scene, const std::string& option) {
+  const std::size_t equals = option.find('=');
+  if (equals == std::string::npos)
+    throw std::invalid_argument(fmt::format("--vary {}: is not NAME=LOW:HIGH or NAME=LOW:HIGH:COUNT", option));
+  Range range;
+  range.index = parameter_index(scene, option.substr(0, equals));
+  range.parameter = scene.parameters[static_cast<std::size_t>(range.index)];
+  std::vector<std::string> parts(1);
+  for (const char c : option.substr(equals + 1)) {
+    if (c == ':')
+      parts.emplace_back();
+    else
+      parts.back().push_back(c);
+  }
+  if (parts.size() < 2 || parts.size() > 3)
+    throw std::invalid_argument(fmt::format("--vary {}: is not NAME=LOW:HIGH or NAME=LOW:HIGH:COUNT", option));
+  const double low = number_in(parts[0], option), high = number_in(parts[1], option);
+  if (!(low < high)) throw std::invalid_argument(fmt::format("--vary {}: {} is not below {}", option, low, high));
+  if (range.parameter.scale != ParameterScale::linear && !(low > 0))
+    throw std::invalid_argument(fmt::format("--vary {}: the scale of '{}' is logarithmic, so its values are above 0",
+                                            option, range.parameter.name));
+  range.parameter.lower = low, range.parameter.upper = high;
+  if (parts.size() == 3) {
+    const double count = number_in(parts[2], option);
+    if (!(count >= 2 && count <= static_cast<double>(kMostPoints)) || count != std::floor(count))
+      throw std::invalid_argument(fmt::format("--vary {}: {} is no number of points, from 2 on", option, parts[2]));
+    range.count = static_cast<std::size_t>(count);
+  }
+  return range;
+}
+
+// The k-th of n values from end to end.
+double grid_value(const Range& range, std::size_t k) {
+  const double low = *range.parameter.lower, high = *range.parameter.upper;
+  if (k == 0) return low;
+  if (k + 1 == range.count) return high;
+  const double part = static_cast<double>(k) / static_cast<double>(range.count - 1);
+  return range.parameter.scale == ParameterScale::linear ? low + part * (high - low) : low * std::pow(high / low, part);
+}
+
+std::vector<Eigen::VectorXd> grid(const std::vector<Range>& ranges) {
+  std::size_t total = 1;
+  for (const Range& range : ranges) {
+    if (range.count == 0)
+      throw std::invalid_argument(
+          fmt::format("--vary {}=LOW:HIGH: says no number of points; LOW:HIGH:COUNT does, or "
+                      "--samples for all",
+                      range.parameter.name));
+    total *= range.count;
+    if (total > kMostPoints)
+      throw std::invalid_argument(fmt::format("--vary: the grid has more than {} points", kMostPoints));
+  }
+  std::vector<Eigen::VectorXd> points;
+  points.reserve(total);
+  for (std::size_t point = 0; point < total; ++point) {
+    Eigen::VectorXd values(static_cast<Eigen::Index>(ranges.size()));
+    std::size_t rest = point;
+    for (std::size_t i = ranges.size(); i-- > 0; rest /= ranges[i].count)
+      values(static_cast<Eigen::Index>(i)) = grid_value(ranges[i], rest % ranges[i].count);
+    points.push_back(std::move(values));
+  }
+  return points;
+}
+
+SweepPoints rows_of(const Scene& scene, const std::string& file) {
+  const CsvTable table = read_csv(file);
+  SweepPoints points;
+  for (const std::string& name : table.header) points.parameters.push_back(parameter_index(scene, name));
+  if (table.rows() == 0) throw CsvError(table.name + ": has no rows");
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    Eigen::VectorXd values(static_cast<Eigen::Index>(table.columns.size()));
+    for (std::size_t k = 0; k < table.columns.size(); ++k) {
+      const double value = table.columns[k][row];
+      if (!std::isfinite(value))
+        throw CsvError(fmt::format("{}: column '{}' has no number here", table.place(row), table.header[k]));
+      values(static_cast<Eigen::Index>(k)) = value;
+    }
+    points.values.push_back(std::move(values));
+  }
+  return points;
+}
+
+}  // namespace
+
+SweepPoints sweep_points(const Scene& scene, const SweepOptions& options, long seed) {
+  if (options.points.empty() == options.vary.empty())
+    throw std::invalid_argument("sweep needs either --vary NAME=LOW:HIGH:COUNT, once or more, or --points FILE.csv");
+  if (!options.points.empty()) {
+    if (options.samples) throw std::invalid_argument("--samples: are taken within --vary, not from --points");
+    return rows_of(scene, options.points);
+  }
+  std::vector<Range> ranges;
+  SweepPoints points;
+  for (const std::string& option : options.vary) {
+    ranges.push_back(range_of(scene, option));
+    if (std::ranges::find(points.parameters, ranges.back().index) != points.parameters.end())
+      throw std::invalid_argument(fmt::format("--vary {}: '{}' is varied twice", option, ranges.back().parameter.name));
+    points.parameters.push_back(ranges.back().index);
+  }
+  if (!options.samples) {
+    points.values = grid(ranges);
+    return points;
+  }
+  std::vector<Parameter> parameters;
+  for (const Range& range : ranges) {
+    if (range.count > 0)
+      throw std::invalid_argument(
+          fmt::format("--vary of '{}': has a number of points, and so has --samples", range.parameter.name));
+    parameters.push_back(range.parameter);
+  }
+  points.values = start_values(parameters, {*options.samples + 1, seed, StartSampling::latin_hypercube}, seed);
+  points.values.erase(points.values.begin());  // the given values
+  return points;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,76 @@
+#include <catch2/catch.hpp>
+
+#include "app/terminal/exit_code.hpp"
+#include "optim/problem/csv_table.hpp"
+#include "tests/app/run_command.hpp"
+#include "tests/app/swinging_rod.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+using Catch::Contains;
+
+namespace {
+
+CsvTable swept(const TemporaryFolder& folder, std::vector<std::string> options, const std::string& out) {
+  std::vector<std::string> arguments{"sweep", folder.write("rod.json", kSwingingRod), "--out", folder.file(out)};
+  arguments.insert(arguments.end(), options.begin(), options.end());
+  const CommandOutcome outcome = run_command(arguments);
+  INFO(outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  return read_csv(folder.file(out) + "/sweep.csv");
+}
+
+}  // namespace
+
+TEST_CASE("a swept grid has the values and gradients of single runs, whatever the threads", "[command][sweep]") {
+  const TemporaryFolder folder;
+  const CsvTable table =
+      swept(folder, {"--vary", "k=5:20:3", "--vary", "free=0.4:0.6:2", "--gradients", "--threads", "2"}, "two");
+  REQUIRE(table.rows() == 6);
+  CHECK(table.column("k")[2] == Approx(10));  // the scale of k is logarithmic
+  CHECK(table.column("free")[3] == Approx(0.6));
+  const CommandOutcome single =
+      run_command({"gradient", folder.file("rod.json"), "--out", folder.file("single"), "--set",
+                   "parameters.k.value=" + fmt::format("{:.17g}", table.column("k")[3]), "--set",
+                   "parameters.free.value=" + fmt::format("{:.17g}", table.column("free")[3])});
+  REQUIRE(single.exit_code == kDone);
+  const nlohmann::json track = json_of(folder.path / "single/result.json").at("objectives").at("track");
+  CHECK(table.column("track")[3] == Approx(track.at("value").get<double>()).epsilon(1e-12));
+  CHECK(table.column("d track/d k")[3] == Approx(track.at("gradient").at("k").get<double>()).epsilon(1e-10));
+  swept(folder, {"--vary", "k=5:20:3", "--vary", "free=0.4:0.6:2", "--gradients", "--threads", "1"}, "one");
+  CHECK(content_of(folder.path / "one/sweep.csv") == content_of(folder.path / "two/sweep.csv"));
+}
+
+TEST_CASE("samples of a sweep fill their ranges, and a file gives its own points", "[command][sweep]") {
+  const TemporaryFolder folder;
+  const CsvTable samples = swept(folder, {"--vary", "free=0.3:0.7", "--samples", "4", "--seed", "3"}, "samples");
+  REQUIRE(samples.rows() == 4);
+  std::vector<double> values = samples.column("free");
+  std::ranges::sort(values);
+  for (std::size_t k = 0; k < 4; ++k) {
+    CHECK(values[k] >= 0.3 + 0.1 * static_cast<double>(k));
+    CHECK(values[k] <= 0.4 + 0.1 * static_cast<double>(k));
+  }
+  const CsvTable own = swept(folder, {"--points", folder.write("points.csv", "free,k\n0.5,20\n0.55,30\n")}, "own");
+  CHECK(own.column("k") == std::vector<double>{20, 30});
+  CHECK(json_of(folder.path / "own/result.json").at("sweep").at("computed") == 2);
+}
+
+TEST_CASE("what a sweep cannot vary is said", "[command][sweep]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kSwingingRod);
+  const auto words = [&](std::vector<std::string> options) {
+    std::vector<std::string> arguments{"sweep", file, "--out", folder.file("out")};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const CommandOutcome outcome = run_command(arguments);
+    CHECK(outcome.exit_code == kBadInput);
+    return outcome.err;
+  };
+  CHECK_THAT(words({}), Contains("either --vary") && Contains("--points"));
+  CHECK_THAT(words({"--vary", "fre=1:2:3"}), Contains("no parameter 'fre'") && Contains("free"));
+  CHECK_THAT(words({"--vary", "free=1:2"}), Contains("no number of points"));
+  CHECK_THAT(words({"--vary", "free=2:1:3"}), Contains("not below"));
+  CHECK_THAT(words({"--vary", "k=-1:1:3"}), Contains("logarithmic"));
+  CHECK_THAT(words({"--vary", "free=1:2:3", "--vary", "free=1:2:3"}), Contains("varied twice"));
+  CHECK_THAT(words({"--points", folder.write("bad.csv", "free\n1\n\"\"\n")}), Contains("no number here"));
+}
