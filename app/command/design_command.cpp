@@ -131,7 +131,8 @@ SensorLimits sensor_limits(const Problem& problem) {
     const auto spec = std::ranges::find(problem.objectives, bound.objective, &ObjectiveSpec::name);
     if (spec == problem.objectives.end()) continue;
     for (std::size_t k = 0; k < std::size(kMeanKinds); ++k) {
-      const bool largest = kMeanKinds[k].extreme > 0, smallest = kMeanKinds[k].extreme < 0;
+      const bool largest = kMeanKinds[k].extreme == Extreme::maximum;
+      const bool smallest = kMeanKinds[k].extreme == Extreme::minimum;
       if (!spec->means[k]) continue;
       if (largest && bound.upper)
         limits.push_back({spec->means[k]->text(), {bound.objective + ", at most", *bound.upper, true}});

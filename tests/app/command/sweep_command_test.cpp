@@ -1,3 +1,6 @@
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <catch2/catch.hpp>
 
 #include "app/terminal/exit_code.hpp"
@@ -6,7 +9,6 @@
 #include "tests/app/swinging_rod.hpp"
 
 using namespace mbsopt;
-using namespace mbsopt::testing;
 using Catch::Contains;
 
 namespace {

@@ -84,13 +84,13 @@ struct Tolerance {
 constexpr Tolerance kLoose{1e-3, 3e-3, 3e-4, 2e-3, 2e-2}, kTumbling{5e-5, 5e-4, 5e-5, 2e-3, 2e-2},
     kDecaying{5e-6, 5e-5, 5e-6, 5e-5, 2e-3};
 
-struct Case {
+struct PublishedCase {
   std::string table;
   Scene scene;
   Tolerance tolerance = {};
 };
 
-std::vector<Case> cases() {
+std::vector<PublishedCase> cases() {
   const VectorField zero{0.0, 0.0, 0.0}, aside{1.0, 2.0, 3.0};
   return {{"Revolute_Case01", on_joint("revolute", -kQuarter, zero)},
           {"Revolute_Case02", on_joint("revolute", -kQuarter / 2, aside)},
@@ -150,7 +150,7 @@ TEST_CASE("single bodies on joints and springs follow the ADAMS tables over 5 s"
     WARN("skipped: " << folder.string() << " is not there");
     return;
   }
-  for (const Case& c : cases()) {
+  for (const PublishedCase& c : cases()) {
     auto read = [&](const char* what) { return table(folder / (c.table + "_ADAMS_" + what + ".txt")); };
     const auto position = read("Pos"), velocity = read("Vel"), orientation = read("Quat"), rate = read("Avel");
     INFO(c.table);

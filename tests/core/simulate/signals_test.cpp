@@ -39,7 +39,7 @@ Scene pushed(const Signal& u) {
   return s;
 }
 
-SimulationResult run(const Scene& scene) {
+SimulationResult simulated(const Scene& scene) {
   const SimulationResult result = simulate(Mechanism(scene, nominal(scene)), scene.simulation);
   INFO(result.message);
   REQUIRE(result.ok());
@@ -80,7 +80,7 @@ TEST_CASE("steps meet the kinks of hold and linear: the motion is that of the cl
   const std::vector<double> t{0, 0.31, 0.5, 0.77, 1.3, 1.31, 2}, y{4, -3, 2, 7, -8, 5, 1};
   Scene scene = pushed(signal(how, t, y));
   scene.simulation.integrator.type = method;
-  const SimulationResult result = run(scene);
+  const SimulationResult result = simulated(scene);
   const auto [x, v] = closed_form(*scene.signals[0].curve, 2);
   // Within pieces the motion is a cubic, on which both methods are exact.
   CHECK(result.y_end(0) == Approx(x).margin(1e-8));
@@ -91,7 +91,7 @@ TEST_CASE("steps meet the kinks of hold and linear: the motion is that of the cl
 TEST_CASE("fixed steps end at kinks, too", "[signals]") {
   Scene scene = pushed(signal(Interpolation::hold, times(21, 2), noise(21)));
   scene.simulation.integrator.type = "rk4", scene.simulation.integrator.step = 0.1;
-  const SimulationResult result = run(scene);
+  const SimulationResult result = simulated(scene);
   const auto [x, v] = closed_form(*scene.signals[0].curve, 2);
   CHECK(result.y_end(0) == Approx(x).margin(1e-12));
   CHECK(result.y_end(7) == Approx(v).margin(1e-12));
@@ -100,7 +100,7 @@ TEST_CASE("fixed steps end at kinks, too", "[signals]") {
 
 TEST_CASE("200 samples that matter cost about a step each", "[signals]") {
   Scene scene = pushed(signal(Interpolation::linear, times(201, 2), noise(201)));
-  const SimulationResult result = run(scene);
+  const SimulationResult result = simulated(scene);
   const auto [x, v] = closed_form(*scene.signals[0].curve, 2);
   CHECK(result.y_end(7) == Approx(v).margin(1e-7));
   INFO(result.statistics.steps << " steps, " << result.statistics.rejected << " rejected");
@@ -114,7 +114,7 @@ TEST_CASE("100000 samples whose kinks are below the tolerance cost no steps of t
   for (std::size_t i = 0; i < n; ++i) y.push_back(std::sin(3 * t[i]) + 1e-7 * e[i]);
   Scene scene = pushed(signal(Interpolation::linear, t, y));
   scene.simulation.integrator.rtol = 1e-6, scene.simulation.integrator.atol = 1e-8;
-  const SimulationResult result = run(scene);
+  const SimulationResult result = simulated(scene);
   const auto [x, v] = closed_form(*scene.signals[0].curve, 2);
   CHECK(result.y_end(7) == Approx(v).margin(1e-6));
   INFO(result.statistics.steps << " steps, " << result.statistics.rejected << " rejected");

@@ -35,7 +35,8 @@ Problem switched(const std::string& switch_law) {
   pull.body = "bar2", pull.point = "to";
   pull.components = {Expression::parse("0"), Expression::parse(switch_law), Expression::parse("0")};
   problem.scene.forces.push_back({"pull", pull});
-  problem.design = DesignSpec{problem.objectives[0].name, {}, {"tp"}, {}, {}};
+  problem.design.emplace();
+  problem.design->minimize = problem.objectives[0].name, problem.design->variables = {"tp"};
   problem.design->optimizer.max_iterations = 1;
   return problem;
 }

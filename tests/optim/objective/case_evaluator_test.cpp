@@ -17,7 +17,7 @@ using namespace mbsopt::testing;
 namespace {
 
 // A mass at x = a cos(w t), w = sqrt(k), over 1 s; in cases with other k, a and end time.
-Problem swing() {
+Problem loaded_swing() {
   Problem problem;
   Scene& s = problem.scene;
   add_parameters(s, {{"k", 4.0}, {"a", 0.3}, {"b", 0.1}});
@@ -50,7 +50,7 @@ TEST_CASE("values and gradients in cases are those of the closed form, by the ch
   EvaluatorOptions options;
   options.method = GENERATE(GradientMethod::tlm, GradientMethod::adjoint, GradientMethod::differences);
   const double accuracy = options.method == GradientMethod::differences ? 1e-6 : 1e-9;
-  CaseEvaluator evaluator(swing(), {"end"}, {"k", "a", "b"}, options, 2);
+  CaseEvaluator evaluator(loaded_swing(), {"end"}, {"k", "a", "b"}, options, 2);
   const CaseEvaluation& e = evaluator.gradients(evaluator.start());
   REQUIRE(e.ok);
   CHECK(e.psi(0) == Approx(end_of(6.1, 0.3, 1)).epsilon(1e-9));
@@ -66,14 +66,14 @@ TEST_CASE("values and gradients in cases are those of the closed form, by the ch
 }
 
 TEST_CASE("results of cases do not depend on the number of threads", "[cases]") {
-  CaseEvaluator one(swing(), {"end"}, {"k", "a", "b"}, {}, 1), three(swing(), {"end"}, {"k", "a", "b"}, {}, 3);
+  CaseEvaluator one(loaded_swing(), {"end"}, {"k", "a", "b"}, {}, 1), three(loaded_swing(), {"end"}, {"k", "a", "b"}, {}, 3);
   const CaseEvaluation &a = one.gradients(one.start()), &b = three.gradients(three.start());
   CHECK(a.psi == b.psi);
   CHECK(a.psi_rho == b.psi_rho);
 }
 
 TEST_CASE("the gradients of a case agree: tlm, adjoint, differences", "[cases]") {
-  Problem problem = problem_of(swing(), swing().cases[GENERATE(0u, 1u, 2u)]);
+  Problem problem = problem_of(loaded_swing(), loaded_swing().cases[GENERATE(0u, 1u, 2u)]);
   for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
   const GradientCheck check = check_gradients(problem);
   REQUIRE(check.ran);
@@ -105,7 +105,7 @@ TEST_CASE("the derivatives of sum and smooth maximum over cases are those of the
 
 TEST_CASE("a design over cases: sum and maximum have their closed optimum, limits hold in each case", "[cases]") {
   // (a - 1)^2 and (a - 3)^2 with weights 1 and 3: their sum is least at 2.5, their maximum where they are equal.
-  Problem problem = swing();
+  Problem problem = loaded_swing();
   problem.objectives[0].terminal = f("0*x"), problem.objectives[0].parameters_only = f("(a - b)^2");
   CaseSpec one, three;
   one.name = "one", one.overrides = {{"b", f("1")}};
