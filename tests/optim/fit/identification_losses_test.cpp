@@ -39,6 +39,7 @@ CsvTable with_outliers(CsvTable data, unsigned seed) {
 
 IdentificationResult fitted(Problem problem, const Loss& loss, const CsvTable& data) {
   problem.identification->loss = loss;
+  problem.identification->covariance = CovarianceType::white;  // outliers come at regular times, which is no colour
   return run_identification(problem, {data});
 }
 
