@@ -11,6 +11,7 @@
 #include <new>
 #include <stdexcept>
 
+#include "app/command/starter_files.hpp"
 #include "app/files/atomic_file.hpp"
 #include "app/json/input_error.hpp"
 #include "app/json/problem_source.hpp"
@@ -74,7 +75,10 @@ std::vector<std::string> without_help_command(std::vector<std::string> arguments
 void add_options(CLI::App& sub, const std::string& name, CommandOptions& options) {
   if (name == "schema") return;
   if (name == "new") {
-    sub.add_option("kind", options.problem_file, "pendulum, four-bar, suspension or identify")->required();
+    std::vector<std::string> kinds;
+    for (const Starter& starter : starters()) kinds.emplace_back(starter.kind);
+    sub.add_option("kind", options.starter, "kind of task")->required()->check(CLI::IsMember(kinds));
+    sub.add_option("--out", options.out, "folder for the file (default: the current one)");
     return;
   }
   sub.add_option("--threads", options.threads, "at most so many threads or processes (results do not depend on it)")

@@ -1,40 +1,37 @@
+// Writes a starter file and its data. A file that exists is never overwritten: nothing is written then.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <filesystem>
-#include <string>
-#include <vector>
+#include <stdexcept>
 
 #include "app/command/starter_files.hpp"
 #include "app/files/atomic_file.hpp"
 #include "app/run/command.hpp"
 #include "app/terminal/exit_code.hpp"
-#include "core/expression/did_you_mean.hpp"
 
 namespace mbsopt {
 
-// Writes all files of the kind, or none.
 int new_command(const CommandContext& context) {
-  const std::string& kind = context.options.problem_file;
-  std::vector<StarterFile> files;
-  std::vector<std::string> kinds;
-  for (const StarterFile& file : starter_files()) {
-    if (file.kind == kind) files.push_back(file);
-    if (kinds.empty() || kinds.back() != file.kind) kinds.emplace_back(file.kind);
+  namespace fs = std::filesystem;
+  const auto starter = std::ranges::find(starters(), context.options.starter, &Starter::kind);
+  if (starter == starters().end())
+    throw std::invalid_argument(fmt::format("there is no starter '{}'", context.options.starter));
+  const fs::path folder = context.options.out;
+  for (const StarterFile& file : starter->files) {
+    const fs::path path = folder / file.name;
+    std::error_code unreadable;
+    if (fs::symlink_status(path, unreadable).type() != fs::file_type::not_found)
+      throw OutputError(
+          fmt::format("{}: exists already, and new does not overwrite files; move it away, or name "
+                      "another folder with --out",
+                      path.string()));
   }
-  if (files.empty()) {
-    context.err << fmt::format("mbsopt: there is no starter file of the kind '{}'{}; available: {}\n", kind,
-                               did_you_mean(kind, kinds), joined(kinds));
-    return kBadInput;
-  }
-  for (const StarterFile& file : files)
-    if (std::filesystem::exists(std::filesystem::symlink_status(file.name)))
-      throw OutputError(fmt::format(
-          "{}: exists already, and new never replaces a file; move it, or go to another folder", file.name));
-  for (const StarterFile& file : files) {
-    write_file_atomically(file.name, file.content);
-    context.out << fmt::format("wrote {}\n", file.name);
-  }
+  if (!folder.empty()) fs::create_directories(folder);
+  for (const StarterFile& file : starter->files) write_file_atomically(folder / file.name, file.text);
+  const auto path_of = [&](const StarterFile& file) { return (folder / file.name).string(); };
+  for (const StarterFile& file : starter->files) context.out << path_of(file) << '\n';
+  context.out << fmt::format("try: mbsopt {} {}\n", starter->next, path_of(starter->files.front()));
   return kDone;
 }
 

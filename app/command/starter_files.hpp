@@ -1,4 +1,4 @@
-// The files that the command new writes.
+// Problem files to start from, one per kind of task, with comments that say what to change: what `mbsopt new` writes.
 #pragma once
 
 #include <span>
@@ -7,11 +7,14 @@
 namespace mbsopt {
 
 struct StarterFile {
-  std::string_view kind;  // "pendulum"; a kind may have several
-  std::string_view name;  // of the file
-  std::string_view content;
+  std::string_view name, text;
+};
+struct Starter {
+  std::string_view kind;
+  std::string_view next;               // the command to try first
+  std::span<const StarterFile> files;  // the problem file, then its data
 };
 
-std::span<const StarterFile> starter_files();
+std::span<const Starter> starters();
 
 }  // namespace mbsopt

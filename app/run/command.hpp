@@ -18,6 +18,7 @@ struct Ranks;
 
 struct CommandOptions {
   std::string problem_file;
+  std::string starter;                // of new: its kind
   std::string out;                    // --out; empty: out/<name>/
   std::vector<std::string> sets;      // --set, each "path=value"
   std::string method = "auto";        // --method of gradient
@@ -61,7 +62,7 @@ int identify_command(const CommandContext& context);
 int tradeoff_command(const CommandContext& context);
 int sweep_command(const CommandContext& context);
 int resume_command(const CommandContext& context);  // options.problem_file: the folder
-int new_command(const CommandContext& context);     // options.problem_file: the kind
+int new_command(const CommandContext& context);
 int schema_command(const CommandContext& context);
 
 }  // namespace mbsopt

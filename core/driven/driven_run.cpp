@@ -19,6 +19,8 @@ namespace {
 constexpr double kFewestPanels = 4;
 // A panel turns bodies by at most so many steps of the path: its 15 nodes then need no steps between them.
 constexpr double kStepsPerPanel = 8;
+// A stretch of a panel that takes so many steps of the path is too long: the motion becomes faster in it without end.
+constexpr long kMostStepsOfStretch = 32 * static_cast<long>(kStepsPerPanel);
 // Part of rtol times the integral so far that one panel may be off by, however short: a kink or a jump.
 constexpr double kPartOfRun = 0.1;
 
@@ -34,6 +36,7 @@ DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& setti
       model_(model_of(mechanism, settings, *runge_kutta_method(settings.integrator.type))),
       path_(mechanism, model_),
       schedule_(costs, observed, settings.end_time),
+      law_jumps_(mechanism.data()),
       differentiated_(differentiated),
       shortest_(1e-9 * std::max(1e-3, settings.end_time - settings.start_time)),
       absolute_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(costs.size()))) {
@@ -53,6 +56,17 @@ DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& setti
 
 void DrivenRun::stop(SimulationStatus status, const std::string& message) {
   result_.status = status, result_.message = message;
+}
+
+bool DrivenRun::go_to(double t) { return path_.go_to(t, shortest_, kMostStepsOfStretch); }
+
+std::string DrivenRun::why_it_ends() {
+  const DrivenState& s = path_.state();
+  // A jump is seen over an interval that is long against the rounding of times.
+  const double beside = 1e-3 * (settings_.end_time - settings_.start_time);
+  const std::string jump =
+      law_jumps_.between(std::max(s.t - beside, settings_.start_time), std::min(s.t + beside, settings_.end_time));
+  return jump.empty() ? why_stuck(mechanism_, s.t, s.y) : jump;
 }
 
 SimulationResult DrivenRun::finish() {
@@ -104,13 +118,13 @@ void DrivenRun::go_through_panels(const Take& take) {
       h = (t1 - t) / 2;
       continue;
     }
-    if (outcome == Panel::stuck)
-      return stop(SimulationStatus::step_too_small, why_stuck(mechanism_, path_.state().t, path_.state().y));
+    if (outcome == Panel::stuck) return stop(SimulationStatus::step_too_small, why_it_ends());
     if (path_.steps() > settings_.integrator.max_steps) {
-      return stop(SimulationStatus::too_many_steps,
-                  fmt::format("more than {} positions were needed until t = {:.6g} s (integrator.max_steps). Is the "
-                              "law of a drive in rad and s?",
-                              settings_.integrator.max_steps, t));
+      return stop(
+          SimulationStatus::too_many_steps,
+          fmt::format("more than {} positions were needed until t = {:.6g} s (integrator.max_steps). Look for a "
+                      "pole of the law of a drive; is it in rad and s?",
+                      settings_.integrator.max_steps, t));
     }
     if (!take_panel(t1, take)) {
       if (!result_.ok()) return;
@@ -119,6 +133,10 @@ void DrivenRun::go_through_panels(const Take& take) {
                                                             path_.state().t));
     }
     end_panel(t, t1);
+    if (!frozen) {
+      const std::string jump = law_jumps_.between(t, events.reached(t1) ? events.resume_time() : t1);
+      if (!jump.empty()) return stop(SimulationStatus::not_credible, jump);
+    }
     if (jumps) jumps->look_at(point());
     if (differentiated_) {
       const std::string objection = through_zero_length(mechanism_.data(), t, from_.y, t1, path_.state().y);
@@ -132,8 +150,7 @@ void DrivenRun::go_through_panels(const Take& take) {
     h *= 2;
     const double resume = frozen ? (panel < frozen->times.size() ? frozen->times[panel] : t1)
                                  : (events.reached(t1) ? events.resume_time() : t1);
-    if (!go_to(resume))
-      return stop(SimulationStatus::step_too_small, why_stuck(mechanism_, path_.state().t, path_.state().y));
+    if (!go_to(resume)) return stop(SimulationStatus::step_too_small, why_it_ends());
   }
   if (jumps) jumps->add_to(result_.statistics);
 }
@@ -195,7 +212,7 @@ bool DrivenRun::take_events_until(double t, std::span<const SampleEvent>& events
   while (!events.empty() && events.front().time <= t) {
     const SampleEvent& e = events.front();
     if (!go_to(e.time)) {
-      stop(SimulationStatus::step_too_small, why_stuck(mechanism_, path_.state().t, path_.state().y));
+      stop(SimulationStatus::step_too_small, why_it_ends());
       return false;
     }
     if (e.cost) result_.psi(e.objective) += e.cost->value(point());

@@ -21,6 +21,7 @@
 #include "core/scene/settings.hpp"
 #include "core/start/assembly.hpp"
 #include "core/start/driven_path.hpp"
+#include "core/watch/law_jumps.hpp"
 
 namespace mbsopt {
 
@@ -56,7 +57,8 @@ class DrivenRun {
   bool take_terminal_costs(const Take& take);
   void end_panel(double t0, double t1);
   void stop(SimulationStatus status, const std::string& message);
-  bool go_to(double t) { return path_.go_to(t, shortest_); }
+  bool go_to(double t);
+  std::string why_it_ends();  // where the path cannot go on
   StatePoint point() { return point_of(path_.state()); }
   StatePoint point_of(const DrivenState& s) { return {s.t, s.y, s.angles, motion_ ? &*motion_ : nullptr}; }
 
@@ -68,6 +70,7 @@ class DrivenRun {
   DrivenPath path_;
   std::optional<MotionSolver> motion_;  // where some sensor needs it
   SampleSchedule schedule_;
+  LawJumps law_jumps_;
   const bool differentiated_;
   const double shortest_;            // step or panel [s]
   std::vector<DrivenTerm> running_;  // of one node

@@ -60,9 +60,11 @@ bool DrivenPath::advance(double h, double t1) {
   return true;
 }
 
-bool DrivenPath::go_to(double t1, double shortest) {
+bool DrivenPath::go_to(double t1, double shortest, long most) {
   double h = t1 - state_.t;
+  const long last_step = steps_ + most;
   while (state_.t < t1) {
+    if (steps_ >= last_step) return false;
     const double left = t1 - state_.t;
     h = std::min({h, left, step_limit()});
     const bool last = h >= left * (1 - 1e-12);

@@ -41,8 +41,9 @@ class DrivenPath {
   double step_limit() const;
   // One step by h, to t1 = t + h. False where it is refused; then the path stays where it is.
   bool advance(double h, double t1);
-  // As many steps as the branch needs. False where they become shorter than `shortest`: then it stays where it came to.
-  bool go_to(double t1, double shortest);
+  // As many steps as the branch needs. False where they become shorter than `shortest`, or more than `most`: then it
+  // stays where it came to.
+  bool go_to(double t1, double shortest, long most);
 
   double position_violation() { return projector_->position_violation(state_.t, state_.angles, state_.y); }
   double velocity_violation() { return projector_->velocity_violation(state_.t, state_.y); }

@@ -211,9 +211,9 @@ std::string why_stuck(const Mechanism& mechanism, double t, const VectorXd& y) {
                               : fmt::format(": a singular position, where the equations of {} depend on each other",
                                             fmt::join(here.owners, ", "));
   return fmt::format(
-      "the positions cannot be continued beyond t = {:.6g} s{}. A dead point that the drives cannot pass, or a "
-      "position "
-      "out of reach? Change the law, the lengths, or drive another joint there",
+      "the positions cannot be continued beyond t = {:.6g} s{}. Perhaps a drive asks for more than the mechanism "
+      "reaches, or cannot pass a dead point. Look for poles and jumps of its law, change the lengths, or drive another "
+      "joint there",
       t, why);
 }
 

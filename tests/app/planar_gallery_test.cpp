@@ -90,7 +90,7 @@ TEST_CASE("the planar model gives the values and gradients of the spatial one on
     const Evaluation b = spatial(problem.scene, objectives, a.steps);
     INFO(name << ": " << a.message << b.message);
     REQUIRE((a.ok && b.ok));
-    CHECK(a.statistics.factor_blocks > 0);
+    CHECK((a.statistics.solved || a.statistics.factor_blocks > 0));  // blocks of 3 x 3
     CHECK(apart(problem, a, b) < 1e-10);
   }
   CHECK(files >= 12);

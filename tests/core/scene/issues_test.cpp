@@ -211,7 +211,7 @@ TEST_CASE("circular and endless definitions are reported once, at the definition
 }
 
 TEST_CASE("sensors that are expressions are checked", "[scene]") {
-  Scene scene = pendulum();
+  Scene scene = hinged_rod();
   const auto add = [&](const std::string& name, const std::string& value) {
     Sensor s;
     s.name = name, s.quantity = "expression", s.value = Expression::parse(value);

@@ -66,7 +66,8 @@ TEST_CASE("values and gradients in cases are those of the closed form, by the ch
 }
 
 TEST_CASE("results of cases do not depend on the number of threads", "[cases]") {
-  CaseEvaluator one(loaded_swing(), {"end"}, {"k", "a", "b"}, {}, 1), three(loaded_swing(), {"end"}, {"k", "a", "b"}, {}, 3);
+  CaseEvaluator one(loaded_swing(), {"end"}, {"k", "a", "b"}, {}, 1),
+      three(loaded_swing(), {"end"}, {"k", "a", "b"}, {}, 3);
   const CaseEvaluation &a = one.gradients(one.start()), &b = three.gradients(three.start());
   CHECK(a.psi == b.psi);
   CHECK(a.psi_rho == b.psi_rho);
