@@ -10,6 +10,7 @@
 #include <cmath>
 #include <exception>
 #include <limits>
+#include <new>
 #include <optional>
 #include <vector>
 
@@ -306,8 +307,16 @@ Outcome stalled_in_words(double distance, const NlpResult& result, const IpoptOp
                       counted(SearchWatch::kStalled, "iteration"), distance, options.tolerance, result.failures())};
 }
 
+// Ipopt's linear solver, MUMPS, takes some MB at once. Where it does not get them, Ipopt reports an error in its step.
+// Throws std::bad_alloc where the system has not so much to give.
+void require_memory() {
+  constexpr std::size_t kOfMumps = 16 << 20;  // [bytes]
+  ::operator delete(::operator new(kOfMumps));
+}
+
 Outcome in_words(Ipopt::ApplicationReturnStatus status, const NlpResult& result, const IpoptOptions& options) {
   using namespace Ipopt;  // NOLINT: its enumerators
+  if (status == Error_In_Step_Computation || status == Restoration_Failed || status == Internal_Error) require_memory();
   const std::string failures = result.failures();
   switch (status) {
     case Solve_Succeeded:
