@@ -42,7 +42,7 @@ std::string coordinate(PageArrays& arrays, const std::vector<double>& values) {
   return fmt::format("[{}]", arrays.add(values));
 }
 
-// Of time and poses; a sensor may have no value.
+// The columns of time and poses are finite; a sensor may have no value.
 bool poses_are_finite(const MovingState& state) {
   const auto columns = static_cast<std::ptrdiff_t>(1 + 13 * state.scene.bodies.size());
   return std::ranges::all_of(state.trajectory.rows, [&](const std::vector<double>& row) {

@@ -9,7 +9,7 @@ namespace mbsopt {
 
 std::string unit_in(const Scene& scene, const Sensor& sensor);
 
-// Of the force or torque along a drive's coordinate.
+// Names the unit of the force or torque along a drive's coordinate.
 std::string unit_of_effort(const Drive& drive);
 
 }  // namespace mbsopt

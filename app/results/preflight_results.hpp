@@ -1,4 +1,4 @@
-// What an identification says before the fit: what the columns hold, how far the start is from them, and what the data
+// An identification says this before the fit: what the columns hold, how far the start is from them, and what the data
 // would determine there if sigma is as given.
 //
 //   const std::vector<ChannelData> channels = channel_data(start);    // start: of IdentificationOptions::preflight

@@ -25,7 +25,7 @@
 
 namespace mbsopt {
 
-// What is taken at one instant: a cost times its weight, or an observation, of which the cost is null.
+// A run takes this at one instant: a cost times its weight, or an observation, whose cost is null.
 struct DrivenTerm {
   const PointCost* cost = nullptr;
   Eigen::Index objective = 0;

@@ -30,7 +30,7 @@ bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
-// Of each node; a name has none (NaN).
+// Gives the value of each node; a name has none (NaN).
 std::vector<double> values_of(std::span<const SyntaxNode> nodes) {
   std::vector<double> value;
   value.reserve(nodes.size());

@@ -37,7 +37,7 @@ class SceneFacts {
 
   // Definitions and sensors' expressions that cannot be evaluated: circular, nested too deep, or with unknown names.
   bool is_broken(const std::string& definition) const { return broken_.contains(definition); }
-  // Of those, the ones that are circular or nested too deep: path and what is wrong.
+  // These are the ones among them that are circular or nested too deep: path and what is wrong.
   const std::vector<std::pair<std::string, std::string>>& endless_definitions() const { return endless_; }
 
   // At the parameters' values, finite; nullopt where it cannot be evaluated. A parameter of NaN has no value that
@@ -55,7 +55,7 @@ class SceneFacts {
   // The sensors that an expression sensor measures by, none of which is an expression; any other sensor measures by
   // itself.
   std::vector<const Sensor*> measured_by(const Sensor& sensor) const;
-  // Of an expression: the largest of those; one of velocities is not linear in them, and reads the state.
+  // An expression reads the largest of those; one of velocities is not linear in them, and reads the state.
   Reads reads_of(const Sensor& sensor) const;
   std::optional<Dimension> dimension_of(const Sensor& sensor,
                                         PlainNumbers plain = PlainNumbers::fit_everything) const;  // nullopt: not known
