@@ -61,11 +61,33 @@ function(mbsopt_precompile target)
   endif()
 endfunction()
 
-# mbsopt_unity(<target> <source>...): where MBSOPT_UNITY is on, sources are compiled together, eight at a time, so that
-# templates that they share are made once. The sources given stay alone: headers of theirs define names that clash. The sanitizers' builds compile each source alone, which shows a missing include.
+# mbsopt_unity(<target> <source>...): where MBSOPT_UNITY is on, sources of a folder are compiled together, so that
+# templates that they share are made once. A group ends with its folder, or after ten sources (two minutes of one core at
+# most); small folders share one. Thus a new source changes the groups of its folder only. The sources given stay alone:
+# headers of theirs define names that clash. The sanitizers' builds compile each source alone, which shows a missing
+# include.
 function(mbsopt_unity target)
-  if(MBSOPT_UNITY)
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
-    set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+  if(NOT MBSOPT_UNITY)
+    return()
   endif()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+  get_target_property(sources ${target} SOURCES)
+  list(FILTER sources INCLUDE REGEX "\\.cpp$")
+  list(REMOVE_ITEM sources ${ARGN})
+  list(TRANSFORM ARGN PREPEND ${CMAKE_SOURCE_DIR}/ OUTPUT_VARIABLE alone)
+  list(REMOVE_ITEM sources ${alone})
+  set(group "")
+  set(members 0)
+  set(folder "")
+  foreach(source IN LISTS sources)
+    cmake_path(GET source PARENT_PATH parent)
+    if(members GREATER_EQUAL 10 OR NOT parent STREQUAL folder AND (members GREATER_EQUAL 4 OR group STREQUAL ""))
+      cmake_path(GET source STEM group)
+      set(group ${target}_${group})
+      set(members 0)
+    endif()
+    set(folder ${parent})
+    math(EXPR members "${members} + 1")
+    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${group})
+  endforeach()
 endfunction()
