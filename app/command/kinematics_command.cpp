@@ -121,11 +121,12 @@ int kinematics_command(const CommandContext& context) {
       "{:.1e} (velocities)\n",
       settings.start_time, kinematics.last_good_time, trajectory.rows.size(), kinematics.steps,
       kinematics.max_position_violation, kinematics.max_velocity_violation);
+  const bool motion_ends_early = interrupted();
   write_trajectory(run, trajectory);
   if (!efforts.rows.empty()) run.write("drives.csv", to_csv(efforts.table));
   add_drives(run, efforts);
   add_singular(run, kinematics);
-  if (interrupted()) {
+  if (motion_ends_early) {
     run.stopped(fmt::format("trajectory.csv holds the motion up to {:.6g} s", kinematics.last_good_time));
   } else if (!finite) {
     run.failed(fmt::format("the forces of the drives are too large for numbers at t = {:.6g} s. Look at masses, "

@@ -61,12 +61,13 @@ Sampling record_trajectory(const Mechanism& mechanism, const Scene& scene, Traje
   return sampling;
 }
 
-std::string to_csv(const std::vector<std::string>& columns, const std::vector<std::vector<double>>& rows) {
+std::optional<std::string> to_csv(const Trajectory& trajectory, const std::function<bool(double)>& go_on) {
   std::string text;
   std::array<char, 32> number;  // the shortest text that reads back as the same double has 24 characters at most
-  for (const std::string& column : columns) text += (text.empty() ? "" : ",") + csv_cell(column);
+  for (const std::string& column : trajectory.columns) text += (text.empty() ? "" : ",") + csv_cell(column);
   text += '\n';
-  for (const std::vector<double>& row : rows) {
+  for (const std::vector<double>& row : trajectory.rows) {
+    if (!row.empty() && !go_on(row.front())) return std::nullopt;
     for (std::size_t k = 0; k < row.size(); ++k) {
       if (k > 0) text += ',';
       if (std::isfinite(row[k])) text.append(number.data(), std::to_chars(number.begin(), number.end(), row[k]).ptr);
@@ -76,16 +77,28 @@ std::string to_csv(const std::vector<std::string>& columns, const std::vector<st
   return text;
 }
 
+std::string to_csv(const std::vector<std::string>& columns, const std::vector<std::vector<double>>& rows) {
+  return *to_csv({columns, rows}, [](double) { return true; });
+}
+
 void write_trajectory(Run& run, const Trajectory& trajectory) {
-  for (std::size_t k = 0; k < trajectory.columns.size(); ++k) {
-    const auto missing = std::ranges::find_if(trajectory.rows, [&](const auto& row) { return !std::isfinite(row[k]); });
-    if (missing != trajectory.rows.end())
+  std::vector<std::optional<double>> first_missing(trajectory.columns.size());  // [s], per column
+  for (const std::vector<double>& row : trajectory.rows) {
+    for (std::size_t k = 0; k < row.size(); ++k) {
+      if (!std::isfinite(row[k]) && !first_missing[k]) first_missing[k] = row.front();
+    }
+  }
+  for (std::size_t k = 0; k < first_missing.size(); ++k) {
+    if (first_missing[k])
       run.warn(
           fmt::format("'{}' is too large for a number at t = {:.6g} s, and empty in trajectory.csv. Look at masses, "
                       "inertias, coordinates and the forces on the bodies",
-                      trajectory.columns[k], missing->front()));
+                      trajectory.columns[k], *first_missing[k]));
   }
-  run.write("trajectory.csv", to_csv(trajectory));
+  const bool motion_ends_early = interrupted();  // by an earlier Ctrl-C: what there is of it is kept
+  const std::function<bool(double)> watch = run.watched("writing trajectory.csv");
+  const std::optional<std::string> text = to_csv(trajectory, [&](double t) { return watch(t) || motion_ends_early; });
+  text ? run.write("trajectory.csv", *text) : run.stopped("trajectory.csv was not written");
 }
 
 }  // namespace mbsopt

@@ -1,8 +1,10 @@
 // trajectory.csv: t, then per body  .x .y .z .e0 .e1 .e2 .e3 .vx .vy .vz .wx .wy .wz  (body-frame origin and its
-// velocity, angular velocity, global components), then every sensor by name. 17 significant digits, so that numbers
-// read back exactly.
+// velocity, angular velocity, global components), then every sensor by name. Numbers have the fewest digits that read
+// back as the same number.
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,7 +30,10 @@ Sampling record_trajectory(const Mechanism& mechanism, const Scene& scene, Traje
 std::string to_csv(const std::vector<std::string>& columns, const std::vector<std::vector<double>>& rows);
 inline std::string to_csv(const Trajectory& trajectory) { return to_csv(trajectory.columns, trajectory.rows); }
 
-// Writes trajectory.csv, and warns of each column with empty cells.
+// The same text; nothing once `go_on`, which sees the first number of each row, says no.
+std::optional<std::string> to_csv(const Trajectory& trajectory, const std::function<bool(double)>& go_on);
+
+// Writes trajectory.csv, and warns of each column with empty cells. Ctrl-C meanwhile stops the run without the file.
 void write_trajectory(Run& run, const Trajectory& trajectory);
 
 }  // namespace mbsopt

@@ -32,17 +32,17 @@ double number_in(const std::string& text, const std::string& option) {
   return value;
 }
 
-struct Range {
+struct VariedRange {
   Parameter parameter;  // with its ends as bounds
   int index = 0;
   std::size_t count = 0;  // 0: not said
 };
 
-Range range_of(const Scene& scene, const std::string& option) {
+VariedRange range_of(const Scene& scene, const std::string& option) {
   const std::size_t equals = option.find('=');
   if (equals == std::string::npos)
     throw std::invalid_argument(fmt::format("--vary {}: is not NAME=LOW:HIGH or NAME=LOW:HIGH:COUNT", option));
-  Range range;
+  VariedRange range;
   range.index = parameter_index(scene, option.substr(0, equals));
   range.parameter = scene.parameters[static_cast<std::size_t>(range.index)];
   std::vector<std::string> parts(1);
@@ -70,7 +70,7 @@ Range range_of(const Scene& scene, const std::string& option) {
 }
 
 // The k-th of n values from end to end.
-double grid_value(const Range& range, std::size_t k) {
+double grid_value(const VariedRange& range, std::size_t k) {
   const double low = *range.parameter.lower, high = *range.parameter.upper;
   if (k == 0) return low;
   if (k + 1 == range.count) return high;
@@ -78,9 +78,9 @@ double grid_value(const Range& range, std::size_t k) {
   return range.parameter.scale == ParameterScale::linear ? low + part * (high - low) : low * std::pow(high / low, part);
 }
 
-std::vector<Eigen::VectorXd> grid(const std::vector<Range>& ranges) {
+std::vector<Eigen::VectorXd> grid(const std::vector<VariedRange>& ranges) {
   std::size_t total = 1;
-  for (const Range& range : ranges) {
+  for (const VariedRange& range : ranges) {
     if (range.count == 0)
       throw std::invalid_argument(
           fmt::format("--vary {}=LOW:HIGH: says no number of points; LOW:HIGH:COUNT does, or "
@@ -129,7 +129,7 @@ SweepPoints sweep_points(const Scene& scene, const SweepOptions& options, long s
     if (options.samples) throw std::invalid_argument("--samples: are taken within --vary, not from --points");
     return rows_of(scene, options.points);
   }
-  std::vector<Range> ranges;
+  std::vector<VariedRange> ranges;
   SweepPoints points;
   for (const std::string& option : options.vary) {
     ranges.push_back(range_of(scene, option));
@@ -142,7 +142,7 @@ SweepPoints sweep_points(const Scene& scene, const SweepOptions& options, long s
     return points;
   }
   std::vector<Parameter> parameters;
-  for (const Range& range : ranges) {
+  for (const VariedRange& range : ranges) {
     if (range.count > 0)
       throw std::invalid_argument(
           fmt::format("--vary of '{}': has a number of points, and so has --samples", range.parameter.name));

@@ -69,9 +69,10 @@ class ConnectedBodies {
   std::set<std::size_t> seen_;  // roots
 };
 
-class Search {
+class FieldSearch {
  public:
-  explicit Search(const Problem& problem) : problem_(problem), scene_(problem.scene), facts_(scene_), bodies_(scene_) {}
+  explicit FieldSearch(const Problem& problem)
+      : problem_(problem), scene_(problem.scene), facts_(scene_), bodies_(scene_) {}
 
   std::set<std::string> used_parameters() {
     connect_bodies();
@@ -294,10 +295,10 @@ class Search {
 // What is used in the problem or in one of its load cases; by the names of the problem.
 std::set<std::string> used_in(const Problem& problem) {
   std::set<std::string> used;
-  if (problem.cases.empty() || problem.identification) used = Search(problem).used_parameters();
+  if (problem.cases.empty() || problem.identification) used = FieldSearch(problem).used_parameters();
   for (const CaseSpec& load_case : problem.cases) {
     const Problem of_case = problem_of(problem, load_case);
-    const std::set<std::string> names = Search(of_case).used_parameters();
+    const std::set<std::string> names = FieldSearch(of_case).used_parameters();
     for (std::size_t k = 0; k < problem.scene.parameters.size(); ++k)
       if (names.contains(of_case.scene.parameters[k].name)) used.insert(problem.scene.parameters[k].name);
   }
@@ -341,7 +342,7 @@ void add_idle(const std::vector<std::string>& variables, const Problem& judged_b
 std::set<std::string> used_anywhere(const Problem& problem) {
   Problem model_only;
   model_only.scene = problem.scene;
-  return Search(model_only).used_parameters();
+  return FieldSearch(model_only).used_parameters();
 }
 
 // Also coefficients that a law replaces.
@@ -382,7 +383,7 @@ void allow_what_only_measurements_use(Problem& problem) {
   const std::set<std::string> used = used_in(problem);
   Problem judged = problem;
   judged.identification.reset(), judged.cases.clear();
-  const std::set<std::string> by_objectives = Search(judged).used_parameters();
+  const std::set<std::string> by_objectives = FieldSearch(judged).used_parameters();
   for (Parameter& p : problem.scene.parameters)
     p.allow_unused = p.allow_unused || (used.contains(p.name) && !by_objectives.contains(p.name));
 }
@@ -393,7 +394,7 @@ Problem what_objectives_need(const Problem& problem, std::vector<std::string>* l
   if (!problem.objectives.empty()) {
     Problem judged = problem;
     judged.identification.reset();
-    needed.scene = Search(judged).needed(names);
+    needed.scene = FieldSearch(judged).needed(names);
   }
   if (left_out) *left_out = std::move(names);
   return needed;
@@ -403,7 +404,7 @@ Problem what_measurements_need(const Problem& problem, std::vector<std::string>*
   Problem needed = problem;
   std::vector<std::string> names;
   if (problem.identification) {
-    needed.scene = Search(as_identified(problem)).needed(names);
+    needed.scene = FieldSearch(as_identified(problem)).needed(names);
     const auto has = [](const Scene& scene, const std::string& drive) {
       return std::any_of(scene.drives.begin(), scene.drives.end(), [&](const Drive& d) { return d.name == drive; });
     };

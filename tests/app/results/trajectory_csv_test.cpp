@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 #include <limits>
+#include <vector>
 
 #include "app/terminal/exit_code.hpp"
 #include "tests/app/run_command.hpp"
@@ -12,6 +13,15 @@ using Catch::Contains;
 TEST_CASE("a cell without a finite number is empty", "[csv]") {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   CHECK(to_csv({"t", "x", "y"}, {{0.5, kInfinity, 2}, {1, -3, kInfinity - kInfinity}}) == "t,x,y\n0.5,,2\n1,-3,\n");
+}
+
+TEST_CASE("a trajectory whose writing is stopped has no text", "[csv]") {
+  const Trajectory trajectory{{"t", "x"}, {{0, 1}, {0.5, 2}, {1, 3}}};
+  std::vector<double> seen;
+  const auto until = [&](double last) { return [&seen, last](double t) { return seen.push_back(t), t <= last; }; };
+  CHECK(!to_csv(trajectory, until(0.4)));
+  CHECK(seen == std::vector<double>{0, 0.5});
+  CHECK(to_csv(trajectory, until(1)) == "t,x\n0,1\n0.5,2\n1,3\n");
 }
 
 TEST_CASE("a sensor that is too large for a number is warned of", "[command]") {
