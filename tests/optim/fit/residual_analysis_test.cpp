@@ -22,7 +22,8 @@ VectorXd autoregressive(Eigen::Index n, double phi, unsigned seed) {
 }  // namespace
 
 TEST_CASE("autocorrelation, Ljung-Box and runs of a short record by hand", "[residuals]") {
-  const VectorXd z = (VectorXd(10) << 1, 2, -1, -2, 1, 1, 2, -1, -2, -1).finished();  // mean 0, sum of squares 22
+  VectorXd z(10);
+  z << 1, 2, -1, -2, 1, 1, 2, -1, -2, -1;  // mean 0, sum of squares 22
   const ResidualAnalysis a = analyse_residuals(z);
   CHECK(a.samples == 10);
   CHECK(a.mean == 0);
