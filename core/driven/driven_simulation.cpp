@@ -25,7 +25,8 @@ std::string why_integrated(const MechanismData& d, const SimulationSettings& s) 
   return "";
 }
 
-// Derivatives of the state in rho at one instant.
+// Derivatives of the state in rho at one instant. The constraints say all of it in space. In a plane they say nothing
+// of the coordinates out of it, which stay as they were assembled: y = P(y0(rho), rho), P the projection.
 class DrivenDerivatives {
  public:
   DrivenDerivatives(const Mechanism& mechanism, Model model)
@@ -34,16 +35,19 @@ class DrivenDerivatives {
         unmoved_(projector_->solution()),
         blocks_(parameter_blocks(data_)),
         y_bar_(Eigen::VectorXd::Zero(mechanism.states())),
-        y_hat_bar_(y_bar_),
         rho_bar_(Eigen::VectorXd::Zero(data_.rho.size())),
         y_rho_(Eigen::MatrixXd::Zero(mechanism.states(), data_.rho.size())) {
-    none_.setZero(mechanism.states(), kLanes), direction_ = none_;
+    y0_dir_.setZero(mechanism.states(), kLanes), direction_ = y0_dir_;
   }
 
   bool linearise(const StatePoint& at) { return projector_->linearise(at.t, at.angles, at.y, at.y, unmoved_); }
-  const Eigen::MatrixXd& y_rho() {
+  // y0_rho: dy0/drho
+  const Eigen::MatrixXd& y_rho(const Eigen::MatrixXd& y0_rho) {
     for (const ParameterBlock& b : blocks_) {
-      projector_->tangent(b, none_, direction_);
+      for (int k = 0; k < kLanes; ++k) {
+        if (b.parameter[k] >= 0) y0_dir_.col(k) = y0_rho.col(b.parameter[k]);
+      }
+      projector_->tangent(b, y0_dir_, direction_);
       for (int k = 0; k < kLanes; ++k) {
         if (b.parameter[k] >= 0) y_rho_.col(b.parameter[k]) = direction_.col(k);
       }
@@ -56,12 +60,12 @@ class DrivenDerivatives {
     term.cost->add_gradient(at, term.weight, y_bar_, rho_bar_);
     psi_rho.row(term.objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
   }
-  // The same into fields and parameters.
-  void add_backward(const DrivenTerm& term, const StatePoint& at, Eigen::VectorXd& theta_bar,
+  // The same into the assembled state, fields and parameters.
+  void add_backward(const DrivenTerm& term, const StatePoint& at, Eigen::VectorXd& y0_bar, Eigen::VectorXd& theta_bar,
                     Eigen::VectorXd& rho_bar) {
-    y_bar_.setZero(), y_hat_bar_.setZero();
+    y_bar_.setZero();
     term.cost->add_gradient(at, term.weight, y_bar_, rho_bar);
-    projector_->add_adjoint(y_bar_, y_hat_bar_, theta_bar, rho_bar);
+    projector_->add_adjoint(y_bar_, y0_bar, theta_bar, rho_bar);
   }
   long factorisations() const { return projector_->factorisations(); }
 
@@ -70,9 +74,9 @@ class DrivenDerivatives {
   std::unique_ptr<Projector> projector_;
   const ProjectionSolution unmoved_;
   std::vector<ParameterBlock> blocks_;
-  Eigen::VectorXd y_bar_, y_hat_bar_, rho_bar_;
+  Eigen::VectorXd y_bar_, rho_bar_;
   Eigen::MatrixXd y_rho_;
-  LaneRows none_, direction_;
+  LaneRows y0_dir_, direction_;
 };
 
 }  // namespace
@@ -108,12 +112,14 @@ SimulationResult driven_tlm(const Mechanism& mechanism, const SimulationSettings
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   DrivenDerivatives derivatives(mechanism, run.model());
+  Eigen::MatrixXd y0_rho = Eigen::MatrixXd::Zero(mechanism.states(), mechanism.parameters());
+  if (run.model() == Model::planar) y0_rho = start.tangent();
   SpatialDynamics dynamics(mechanism, settings.formulation);  // of the rates that observers get
   Eigen::VectorXd ydot(mechanism.states());
   run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
     if (!derivatives.linearise(at)) return false;
     ++result.statistics.linearised_states;
-    const Eigen::MatrixXd& y_rho = derivatives.y_rho();
+    const Eigen::MatrixXd& y_rho = derivatives.y_rho(y0_rho);
     for (const DrivenTerm& term : terms) {
       if (term.cost) {
         derivatives.add_forward(term, at, result.psi_rho);
@@ -136,6 +142,7 @@ SimulationResult driven_adjoint(const Mechanism& mechanism, const SimulationSett
   SimulationResult& result = run.result();
   const MechanismData& d = mechanism.data();
   DrivenDerivatives derivatives(mechanism, run.model());
+  std::vector<Eigen::VectorXd> y0_bar(costs.size(), Eigen::VectorXd::Zero(mechanism.states()));
   std::vector<Eigen::VectorXd> theta_bar(costs.size(), Eigen::VectorXd::Zero(d.slots()));
   std::vector<Eigen::VectorXd> rho_bar(costs.size(), Eigen::VectorXd::Zero(d.rho.size()));
   run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
@@ -143,13 +150,18 @@ SimulationResult driven_adjoint(const Mechanism& mechanism, const SimulationSett
     ++result.statistics.linearised_states;
     for (const DrivenTerm& term : terms) {
       const std::size_t o = static_cast<std::size_t>(term.objective);
-      derivatives.add_backward(term, at, theta_bar[o], rho_bar[o]);
+      derivatives.add_backward(term, at, y0_bar[o], theta_bar[o], rho_bar[o]);
     }
     return true;
   });
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   for (std::size_t o = 0; o < costs.size(); ++o) {
     d.add_to_rho(theta_bar[o], rho_bar[o]);
+    if (run.model() == Model::planar) {
+      Eigen::MatrixXd of_start = rho_bar[o];
+      start.add_adjoint(y0_bar[o], of_start);
+      rho_bar[o] = of_start;
+    }
     result.psi_rho.row(static_cast<Eigen::Index>(o)) = rho_bar[o].transpose();
   }
   result.statistics.factorisations += derivatives.factorisations();

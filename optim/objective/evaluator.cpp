@@ -113,6 +113,10 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
   if (sweep != Sweep::none) e.psi_rho.setZero(e.psi.size(), static_cast<Eigen::Index>(variables_.size()));
   e.ok = true;
   if (!simulated_.empty()) {
+    if (options_.progress && !options_.progress(settings.start_time)) {  // the assembly alone may take a second
+      e.ok = false, e.message = "stopped before its simulation";
+      return e;
+    }
     // Derivatives are carried only where a sweep needs them.
     const std::vector<bool> active = sweep == Sweep::none ? std::vector<bool>(active_.size(), false) : active_;
     SimulationResult result;

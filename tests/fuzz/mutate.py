@@ -33,7 +33,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 SILENCE = 8.0  # s of processor time without any output
 PATIENCE = 4.0  # s of processor time after Ctrl-C
 MOST_MEMORY = 4 << 30  # bytes per command
-COMMANDS = ["validate", "simulate", "gradient", "kinematics", "check", "design", "identify", "tradeoff"]
+COMMANDS = ["validate", "simulate", "gradient", "kinematics", "linearise", "check", "design", "identify", "tradeoff", "sweep"]
 
 NUMBERS = ["0", "-0.0", "1", "-1", "1e-320", "2.3e-308", "1e-200", "1e-30", "1e-12", "1e-6", "1e6", "1e12", "1e30", "1e200",
            "1e308", "-1e308", "1.7976931348623157e308", "1e400", "-1e400", "9223372036854775807", "18446744073709551616",
@@ -257,6 +257,10 @@ class Case:
         self.command = r.choice(fitting) if r.random() < 0.85 else r.choice(COMMANDS)
 
     def arguments(self):
+        if self.command == "sweep":
+            parameters = self.problem.get("parameters")
+            name = next(iter(parameters), "") if isinstance(parameters, dict) else ""
+            return ["--vary", f"{name}=0.1:10:3", "--gradients"]
         return {"tradeoff": ["--budget", "0.5"]}.get(self.command, [])
 
 

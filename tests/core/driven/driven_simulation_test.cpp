@@ -166,6 +166,28 @@ TEST_CASE("planar and spatial models are solved alike", "[driven]") {
   CHECK((planar.psi_rho - spatial.psi_rho).cwiseAbs().maxCoeff() < 1e-9 * planar.psi_rho.cwiseAbs().maxCoeff());
 }
 
+// The rod lies in the plane z = h, so that psi = int z x dt of its end has d psi/dh = psi/h.
+TEST_CASE("solved in a plane: a parameter that moves a body out of it", "[driven]") {
+  Scene scene = slider_crank();
+  add_parameters(scene, {{"h", 0.3}});
+  scene.joints[1].point1 = vec("r", "0", "h");
+  scene.joints[2].point1 = vec("l", "0", "-h");
+  scene.sensors.push_back(point_sensor("z", "position", "rod", vec("l", "0", "0"), "z"));
+  const VectorXd rho = nominal(scene);
+  const Mechanism m(scene, rho);
+  std::vector<Cost> costs(1);
+  costs[0].running = std::make_shared<SensorProduct>(m, m.sensor("z"), m.sensor("x"));
+  const SimulationResult tlm = simulate_tlm(m, scene.simulation, costs);
+  const SimulationResult adjoint = simulate_adjoint(m, scene.simulation, costs);
+  INFO(tlm.message << adjoint.message);
+  REQUIRE(tlm.ok());
+  REQUIRE(adjoint.ok());
+  REQUIRE(tlm.statistics.solved);
+  const Eigen::Index h = rho.size() - 1;
+  CHECK(tlm.psi_rho(0, h) == Approx(tlm.psi(0) / rho(h)).epsilon(1e-12));
+  CHECK((tlm.psi_rho - adjoint.psi_rho).cwiseAbs().maxCoeff() < 1e-10 * tlm.psi_rho.cwiseAbs().maxCoeff());
+}
+
 TEST_CASE("observers of solved runs see states, tangents and rates", "[driven]") {
   const Scene scene = slider_crank();
   const VectorXd rho = nominal(scene);

@@ -82,6 +82,17 @@ TEST_CASE("a search may come where the derivatives in a variable of C++ costs ar
   CHECK_FALSE(from_there.gradients(rho).ok);
 }
 
+TEST_CASE("once the user has stopped, an evaluation begins no simulation, not even its assembly", "[gradient]") {
+  const Problem problem = five_bar::problem();
+  EvaluatorOptions options;
+  options.progress = [](double) { return false; };
+  Evaluator evaluator(problem.scene, objectives_of(problem), {}, options);
+  const Evaluation& e = evaluator.gradients(evaluator.start());
+  CHECK_FALSE(e.ok);
+  CHECK(e.simulations == 0);
+  CHECK_THAT(e.message, Contains("stopped"));
+}
+
 TEST_CASE("the gradient of a running cost is computed once at each stage", "[gradient]") {
   const Problem problem = with_idle_parameter();
   const auto cost = std::make_shared<ClippedCost>();
