@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "app/files/csv_cell.hpp"
+#include "app/terminal/interrupt.hpp"
 
 namespace mbsopt {
 namespace {
