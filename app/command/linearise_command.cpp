@@ -203,6 +203,10 @@ int linearise_command(const CommandContext& context) {
   const Mechanism mechanism(scene, parameter_values(scene), active);
   const Assembly assembly(mechanism, scene.simulation.start_time);
   if (!assembled(run, mechanism, assembly)) return run.finish();
+  if (assembly.summary().degrees_of_freedom == 0) {
+    run.failed("joints and drives leave nothing free: there is no motion to linearise. `kinematics` solves this one");
+    return run.finish();
+  }
   std::optional<State> state = State{scene.simulation.start_time, assembly.result().y, assembly.result().angles};
   if (context.options.at && *context.options.at != state->t) state = state_at(run, mechanism, *context.options.at);
   if (!state) return run.finish();

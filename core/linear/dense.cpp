@@ -68,7 +68,9 @@ LeftSingular left_singular(const MatrixXd& A) {
 }
 
 struct OrthogonalDecomposition::Factors {
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> cod;
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> cod;  // Eigen reads beyond matrices without entries
+  Index rows = 0, cols = 0;
+  bool is_empty() const { return rows == 0 || cols == 0; }
 };
 
 OrthogonalDecomposition::OrthogonalDecomposition() : factors_(std::make_unique<Factors>()) {}
@@ -85,17 +87,24 @@ OrthogonalDecomposition& OrthogonalDecomposition::operator=(OrthogonalDecomposit
 OrthogonalDecomposition::~OrthogonalDecomposition() = default;
 
 void OrthogonalDecomposition::compute(const MatrixXd& A, double threshold) {
+  factors_->rows = A.rows(), factors_->cols = A.cols();
+  if (factors_->is_empty()) return;
   threshold < 0 ? factors_->cod.setThreshold(Eigen::Default) : factors_->cod.setThreshold(threshold);
   factors_->cod.compute(A);
 }
 
-Index OrthogonalDecomposition::rank() const { return factors_->cod.rank(); }
-MatrixXd OrthogonalDecomposition::solve(const MatrixXd& b) const { return factors_->cod.solve(b); }
+Index OrthogonalDecomposition::rank() const { return factors_->is_empty() ? 0 : factors_->cod.rank(); }
+MatrixXd OrthogonalDecomposition::solve(const MatrixXd& b) const {
+  if (factors_->is_empty()) return MatrixXd::Zero(factors_->cols, b.cols());
+  return factors_->cod.solve(b);
+}
 MatrixXd OrthogonalDecomposition::solve_transposed(const MatrixXd& b) const {
+  if (factors_->is_empty()) return MatrixXd::Zero(factors_->rows, b.cols());
   return factors_->cod.transpose().solve(b);
 }
 MatrixXd OrthogonalDecomposition::left_null_space() const {
-  const Index rows = factors_->cod.rows();
+  const Index rows = factors_->rows;
+  if (factors_->is_empty()) return MatrixXd::Identity(rows, rows);
   return factors_->cod.householderQ() * MatrixXd::Identity(rows, rows).rightCols(rows - rank());
 }
 

@@ -62,3 +62,14 @@ TEST_CASE("linearise takes a later state, and refuses what is not there", "[comm
   CHECK_THAT(run("--outputs", "y").err, Contains("--outputs: there is no 'y'"));
   CHECK(run("--outputs", "y").exit_code == kBadInput);
 }
+
+TEST_CASE("a mechanism in which nothing is free is not linearised", "[command]") {
+  const TemporaryFolder folder;
+  std::string text = kBlock;
+  text.replace(text.find("translational"), std::string("translational").size(), "fixed");
+  const CommandOutcome outcome =
+      run_command({"linearise", folder.write("block.json", text), "--out", folder.file("out")});
+  INFO(outcome.out << outcome.err);
+  CHECK(outcome.exit_code == kNumericalFailure);
+  CHECK_THAT(outcome.err, Contains("leave nothing free"));
+}

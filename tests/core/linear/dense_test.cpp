@@ -1,6 +1,7 @@
 #include "core/linear/dense.hpp"
 
 #include <catch2/catch.hpp>
+#include <utility>
 
 #include "core/linear/fixed_size.hpp"
 
@@ -68,6 +69,16 @@ TEST_CASE("symmetric eigenvalues ascend and rebuild the matrix; left singular ve
   const LeftSingular svd = left_singular(A);
   CHECK(largest(svd.U.transpose() * S * svd.U - MatrixXd(svd.values.cwiseAbs2().asDiagonal())) < 1e-12);
   CHECK(left_singular(MatrixXd(0, 2)).values.size() == 0);
+}
+
+TEST_CASE("an orthogonal decomposition without rows or columns solves what there is", "[linear]") {
+  for (const auto& [rows, cols] : {std::pair{0, 0}, std::pair{3, 0}, std::pair{0, 3}}) {
+    const OrthogonalDecomposition A(MatrixXd(rows, cols));
+    CHECK(A.rank() == 0);
+    CHECK(A.solve(MatrixXd::Ones(rows, 2)) == MatrixXd::Zero(cols, 2));
+    CHECK(A.solve_transposed(MatrixXd::Ones(cols, 2)) == MatrixXd::Zero(rows, 2));
+    CHECK(A.left_null_space() == MatrixXd::Identity(rows, rows));
+  }
 }
 
 TEST_CASE("cholesky solves a symmetric positive definite system", "[linear]") {
