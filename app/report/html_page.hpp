@@ -1,7 +1,7 @@
 // A self-contained HTML page: a verdict, warnings, then headings, sentences, tables and plots; light and dark, with its
 // contents at the side, and fit for print. Nothing comes from the network, there is no time stamp.
 //
-// The page shows all of it without scripts. Its script (report.js) adds to plots the values under the pointer, zoom and
+// The page shows all of it without scripts. Its script (script/*.js) adds to plots the values under the pointer, zoom and
 // legends that hide; to a mechanism its motion; to tables a copy as CSV. The script reads the data of plots and motions
 // from one block of JSON, in which equal arrays stand once.
 #pragma once
@@ -48,7 +48,7 @@ class HtmlPage {
   }
   void plot(const LinePlot& plot);
   void drawing(std::string_view svg) { body_ += svg; }
-  // A mechanism that moves, as JSON for report.js, above the drawings that stand for it where there is no script.
+  // A mechanism that moves, as JSON for script/viewer.js, above the drawings that stand for it where there is no script.
   void motion(std::string_view json, std::string_view stills);
   PageArrays& arrays() { return arrays_; }
   std::string text() const;

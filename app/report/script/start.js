@@ -1,0 +1,3 @@
+// Brings the page to life.
+for (const figure of document.querySelectorAll("figure[data-plot]")) new Plot(figure, data.plots[figure.dataset.plot]);
+for (const box of document.querySelectorAll("[data-motion]")) new Viewer(box, data.motions[box.dataset.motion]);
