@@ -215,3 +215,16 @@ TEST_CASE("every page that the README links to is there", "[docs]") {
   }
   CHECK(links > 0);
 }
+
+TEST_CASE("the gallery page shows each problem file", "[docs]") {
+  const fs::path docs = fs::path(MBSOPT_SOURCE_DIR) / "docs";
+  const std::string page = content_of(docs / "gallery.md");
+  for (const fs::directory_entry& file : fs::recursive_directory_iterator(docs / "../problems")) {
+    const fs::path folder = file.path().parent_path().filename(), name = file.path().stem();
+    if (file.path().extension() != ".json" || folder == "problems") continue;
+    INFO(file.path());
+    CHECK(page.find("](../problems/" + (folder / name).string() + ".json)") != std::string::npos);
+  }
+  for (std::size_t at = page.find("](gallery/"); at != std::string::npos; at = page.find("](gallery/", at + 1))
+    CHECK(fs::exists(docs / page.substr(at + 2, page.find(')', at) - at - 2)));
+}
