@@ -27,15 +27,15 @@ TEST_CASE("the index lists all runs of its folder and holds their numbers", "[re
       "objectives": {"path </script>": {"value": 0.25}}, "parameters": {"k": {"value": 3, "unit": "N/m"}}})");
   std::ofstream(a / "report.html") << "a report";
   stored_run(folder.path, "b", R"({"program": "mbsopt", "command": "simulate", "status": "failed"})");
-  stored_run(folder.path, "other", R"({"program": "another"})");
-  stored_run(folder.path, "broken", R"({"program": )");
+  stored_run(folder.path, "foreign_run", R"({"program": "another"})");
+  stored_run(folder.path, "broken_run", R"({"program": )");
   const std::string page = run_index(folder.path);
   CHECK(contains(page, R"(<a href="a%20%231/report.html">a #1</a>)"));
   CHECK(contains(page, "<td>b</td><td>simulate</td><td>failed</td>"));  // no report, hence no link
   CHECK(contains(page, R"("objective path <\/script>":0.25)"));
   CHECK(contains(page, R"("parameter k [N/m]":3)"));
-  CHECK_FALSE(contains(page, "other"));
-  CHECK_FALSE(contains(page, "broken"));
+  CHECK_FALSE(contains(page, "foreign_run"));
+  CHECK_FALSE(contains(page, "broken_run"));
 }
 
 TEST_CASE("no index is written where there is no run, and none over another's page", "[report]") {
