@@ -1,6 +1,7 @@
 #include "app/command/command_line.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -15,6 +16,7 @@
 #include "app/files/atomic_file.hpp"
 #include "app/json/input_error.hpp"
 #include "app/json/problem_source.hpp"
+#include "app/report/run_index.hpp"
 #include "app/run/command.hpp"
 #include "app/run/provenance.hpp"
 #include "app/terminal/exit_code.hpp"
@@ -30,23 +32,36 @@ struct Command {
   const char* name;
   const char* does;
   int (*run)(const CommandContext&);
+  const char* example;  // what follows "mbsopt NAME"
 };
+int completion_command(const CommandContext& context);
+
 constexpr std::array kCommands{
-    Command{"validate", "check a problem file; print bodies, equations, degrees of freedom", validate_command},
-    Command{"simulate", "forward dynamics", simulate_command},
+    Command{"validate", "check a problem file; print bodies, equations, degrees of freedom", validate_command,
+            "problems/five_bar/design.json"},
+    Command{"simulate", "forward dynamics", simulate_command,
+            "problems/quarter_car/ride.json --set parameters.k.value=25000"},
     Command{"kinematics", "positions, velocities, accelerations of a fully driven mechanism, and driving forces",
-            kinematics_command},
-    Command{"linearise", "eigenvalues, modes and A, B, C, D of the motion beside the initial state", linearise_command},
-    Command{"gradient", "objectives and their gradients", gradient_command},
-    Command{"check", "all gradient methods against each other and against differences", check_command},
-    Command{"design", "optimal design", design_command},
-    Command{"identify", "fit parameters to measurements", identify_command},
+            kinematics_command, "problems/four_bar/kinematics.json"},
+    Command{"linearise", "eigenvalues, modes and A, B, C, D of the motion beside the initial state", linearise_command,
+            "problems/quarter_car/ride.json"},
+    Command{"gradient", "objectives and their gradients", gradient_command,
+            "problems/five_bar/sensitivities.json --method adjoint"},
+    Command{"check", "all gradient methods against each other and against differences", check_command,
+            "problems/five_bar/sensitivities.json"},
+    Command{"design", "optimal design", design_command, "problems/five_bar/design.json --out out/first_try"},
+    Command{"identify", "fit parameters to measurements", identify_command,
+            "problems/pendulum/identify.json --profile J,k"},
     Command{"tradeoff", "error against cost for integrators, tolerances, formulations and gradient methods",
-            tradeoff_command},
-    Command{"sweep", "objectives over a grid, samples or a list of parameter values", sweep_command},
-    Command{"resume", "go on with a design or an identification that was interrupted or killed", resume_command},
-    Command{"new", "write a commented starter file into the current folder", new_command},
-    Command{"schema", "print the JSON Schema of problem files", schema_command},
+            tradeoff_command, "problems/five_bar/design.json --budget 20"},
+    Command{"sweep", "objectives over a grid, samples or a list of parameter values", sweep_command,
+            "problems/five_bar/design.json --vary L01=1.8:2.4:7"},
+    Command{"resume", "go on with a design or an identification that was interrupted or killed", resume_command,
+            "out/five_bar"},
+    Command{"new", "write a commented starter file into the current folder", new_command, "four-bar"},
+    Command{"completion", "print completion for bash", completion_command,
+            "> ~/.local/share/bash-completion/completions/mbsopt"},
+    Command{"schema", "print the JSON Schema of problem files", schema_command, "> problem.schema.json"},
 };
 
 std::vector<std::string> command_names() {
@@ -73,7 +88,7 @@ std::vector<std::string> without_help_command(std::vector<std::string> arguments
 }
 
 void add_options(CLI::App& sub, const std::string& name, CommandOptions& options) {
-  if (name == "schema") return;
+  if (name == "schema" || name == "completion") return;
   if (name == "new") {
     std::vector<std::string> kinds;
     for (const Starter& starter : starters()) kinds.emplace_back(starter.kind);
@@ -181,6 +196,20 @@ int run_in_words(const Command& command, const CommandContext& context) {
   return kBadInput;
 }
 
+// index.html of the folder `out` that holds the run's folder; folders elsewhere are the user's own.
+void update_index(const CommandContext& context) {
+  if (context.source == nullptr && context.command != "resume") return;  // no problem was run
+  std::filesystem::path run = context.command == "resume" ? context.options.problem_file : context.options.out;
+  if (run.empty()) run = std::filesystem::path("out") / "run";
+  if (!run.has_filename()) run = run.parent_path();  // out/run/
+  if (run.parent_path().filename() != "out") return;
+  try {
+    write_run_index(run.parent_path());
+  } catch (const std::exception& error) {
+    context.err << "warning: " << error.what() << '\n';
+  }
+}
+
 // Printed text may wait in a buffer, so only a flush shows whether it arrived.
 int flushed(int exit_code, std::ostream& out, std::ostream& err) {
   errno = 0;
@@ -192,8 +221,43 @@ int flushed(int exit_code, std::ostream& out, std::ostream& err) {
 
 void add_commands(CLI::App& app, CommandOptions& options) {
   app.require_subcommand(1);
-  for (const Command& command : kCommands)
-    add_options(*app.add_subcommand(command.name, command.does), command.name, options);
+  for (const Command& command : kCommands) {
+    CLI::App* const sub = app.add_subcommand(command.name, command.does);
+    sub->footer(fmt::format("Example:\n  mbsopt {} {}", command.name, command.example));
+    add_options(*sub, command.name, options);
+  }
+}
+
+// Commands first, then a command's options where a word begins with "-", else files.
+int completion_command(const CommandContext& context) {
+  CLI::App app;
+  CommandOptions options;
+  add_commands(app, options);
+  std::string cases;
+  for (const CLI::App* sub : app.get_subcommands({})) {
+    std::vector<std::string> words;
+    for (const CLI::Option* option : sub->get_options())
+      for (const std::string& name : option->get_lnames()) words.push_back("--" + name);
+    cases += fmt::format("    {}) options='{}' ;;\n", sub->get_name(), fmt::join(words, " "));
+  }
+  context.out << fmt::format(R"(_mbsopt() {{
+  local word="${{COMP_WORDS[COMP_CWORD]}}" options
+  if ((COMP_CWORD == 1)); then
+    mapfile -t COMPREPLY < <(compgen -W '{}' -- "$word")
+    return
+  fi
+  case "${{COMP_WORDS[1]}}" in
+{}  esac
+  if [[ "$word" == -* ]]; then
+    mapfile -t COMPREPLY < <(compgen -W "$options" -- "$word")
+  else
+    mapfile -t COMPREPLY < <(compgen -f -- "$word")
+  fi
+}}
+complete -o filenames -F _mbsopt mbsopt
+)",
+                             fmt::join(command_names(), " "), cases);
+  return kDone;
 }
 
 void parse(CLI::App& app, const std::vector<std::string>& arguments) {
@@ -244,7 +308,9 @@ int run_command_line(const std::vector<std::string>& given, std::ostream& out, s
                                .ranks = ranks};
   const auto command =
       std::find_if(kCommands.begin(), kCommands.end(), [&](const Command& c) { return context.command == c.name; });
-  return flushed(run_in_words(*command, context), out, err);
+  const int exit_code = run_in_words(*command, context);
+  if (exit_code != kBadInput) update_index(context);
+  return flushed(exit_code, out, err);
 }
 
 }  // namespace mbsopt

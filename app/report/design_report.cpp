@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "app/report/mechanism_drawing.hpp"
@@ -59,33 +61,38 @@ void add_parameters(HtmlPage& page, const Json& result) {
   page.drawing(to_svg(plot));
 }
 
+// How far a value is from the nearer of its limits; negative where it is beyond.
+TableCell margin_of(const Json& objective, const Json& value) {
+  const Json lower = objective.value("lower", Json()), upper = objective.value("upper", Json());
+  double margin = std::numeric_limits<double>::infinity();
+  if (!value.is_number()) return "-";
+  if (lower.is_number()) margin = std::min(margin, value.get<double>() - lower.get<double>());
+  if (upper.is_number()) margin = std::min(margin, upper.get<double>() - value.get<double>());
+  return std::isfinite(margin) ? number_cell(margin, 3) : "-";
+}
+
 void add_outcome(HtmlPage& page, const Json& result) {
   const Json& optimizer = result.at("optimizer");
   page.paragraph(fmt::format("{}: {}; {}, {}.", cell(optimizer.at("type")), cell(optimizer.at("message")),
                              counted(optimizer.at("iterations").get<long>(), "iteration"),
                              counted(optimizer.at("evaluations").get<long>(), "evaluation")));
-  const Json cases = result.value("cases", Json::object());
-  std::vector<std::vector<std::string>> rows;
-  for (const auto& [name, objective] : result.at("objectives").items()) {
-    rows.push_back({name, cell(objective.value("initial", Json())), cell(objective.at("value")),
-                    cell(objective.value("lower", Json())), cell(objective.value("upper", Json())),
-                    cell(objective.value("price", Json()))});
-  }
+  const bool true_values = has_true_values(result);
+  std::vector<TableRow> rows;
+  const auto add_row = [&](const std::string& name, const Json& objective) {
+    const Json extreme = objective.value("true_value", Json());
+    rows.push_back({name, number_cell(objective.value("initial", Json()), 7), number_cell(objective.at("value"), 7)});
+    if (true_values) rows.back().push_back(number_cell(extreme, 7));
+    for (const char* key : {"lower", "upper"}) rows.back().push_back(number_cell(objective.value(key, Json()), 7));
+    rows.back().push_back(margin_of(objective, extreme.is_number() ? extreme : objective.at("value")));
+    rows.back().push_back(number_cell(objective.value("price", Json()), 7));
+  };
+  for (const auto& [name, objective] : result.at("objectives").items()) add_row(name, objective);
+  const Json cases = result.value("cases", Json::object());  // items() refers to it
   for (const auto& [load_case, of_case] : cases.items())
     for (const auto& [name, objective] : of_case.at("objectives").items())
-      rows.push_back({fmt::format("{} ({})", name, load_case), cell(objective.value("initial", Json())),
-                      cell(objective.at("value")), cell(objective.value("lower", Json())),
-                      cell(objective.value("upper", Json())), cell(objective.value("price", Json()))});
-  std::vector<std::string> header{"objective", "before", "after", "at least", "at most", "price"};
-  if (has_true_values(result)) {
-    header.push_back("true extreme after");
-    std::size_t i = 0;
-    for (const auto& [name, objective] : result.at("objectives").items())
-      rows[i++].push_back(cell(objective.value("true_value", Json())));
-    for (const auto& [load_case, of_case] : cases.items())
-      for (const auto& [name, objective] : of_case.at("objectives").items())
-        rows[i++].push_back(cell(objective.value("true_value", Json())));
-  }
+      add_row(fmt::format("{} ({})", name, load_case), objective);
+  std::vector<std::string> header{"objective", "before", "after", "at least", "at most", "margin", "price"};
+  if (true_values) header.insert(header.begin() + 3, "true extreme after");
   page.table(header, rows);
   if (!result.contains("conflicts")) return;
   page.paragraph("These limits and bounds are in conflict:");

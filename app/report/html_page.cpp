@@ -24,7 +24,9 @@ std::string cell_of(const TableCell& cell) {
   } else if (cell.text.size() >= kWords) {
     attributes += " class=\"words\"";
   }
-  return fmt::format("<td{}>{}</td>", attributes, html_escaped(cell.text));
+  std::string text = html_escaped(cell.text);
+  if (!cell.link.empty()) text = fmt::format("<a href=\"{}\">{}</a>", html_escaped(cell.link), text);
+  return fmt::format("<td{}>{}</td>", attributes, text);
 }
 
 }  // namespace
@@ -80,6 +82,13 @@ void HtmlPage::motion(std::string_view json, std::string_view stills) {
   motions_.emplace_back(json);
 }
 
+void HtmlPage::comparison(std::string_view runs) {
+  heading("Two runs compared");
+  body_ += "<div data-comparison></div><noscript><p>A browser with scripts compares them here.</p></noscript>\n";
+  compared_ = runs;
+  for (std::size_t at = 0; (at = compared_.find("</", at)) != std::string::npos;) compared_.insert(at + 1, "\\");
+}
+
 std::string HtmlPage::text() const {
   std::string contents;
   for (std::size_t k = 0; k < headings_.size(); ++k)
@@ -90,10 +99,10 @@ std::string HtmlPage::text() const {
       "content=\"light dark\">\n<title>{0}</title><style>{1}</style></head>\n<body>\n"
       "<nav aria-label=\"Contents\">{2}</nav>\n<main>\n<h1>{0}</h1>\n{3}</main>\n"
       "<script type=\"application/json\" "
-      "id=\"data\">{{\"arrays\":{4},\n\"plots\":[{5}],\n\"motions\":[{6}]}}</script>\n"
+      "id=\"data\">{{\"arrays\":{4},\n\"plots\":[{5}],\n\"motions\":[{6}],\n\"runs\":{8}}}</script>\n"
       "<script>{7}</script>\n</body></html>\n",
       html_escaped(title_), kReportStyle, contents, body_, arrays_.text(), fmt::join(plots_, ",\n"),
-      fmt::join(motions_, ",\n"), kReportScript);
+      fmt::join(motions_, ",\n"), kReportScript, compared_);
 }
 
 }  // namespace mbsopt

@@ -1,9 +1,9 @@
 // A self-contained HTML page: a verdict, warnings, then headings, sentences, tables and plots; light and dark, with its
 // contents at the side, and fit for print. Nothing comes from the network, there is no time stamp.
 //
-// The page shows all of it without scripts. Its script (report.js) adds to plots the values under the pointer, zoom and
-// legends that hide; to a mechanism its motion; to tables a copy as CSV. The script reads the data of plots and motions
-// from one block of JSON, in which equal arrays stand once.
+// The page shows all of it without scripts. Its script (script/*.js) adds to plots the values under the pointer, zoom
+// and legends that hide; to a mechanism its motion; to tables a copy as CSV. The script reads the data of plots and
+// motions from one block of JSON, in which equal arrays stand once.
 #pragma once
 
 #include <optional>
@@ -22,6 +22,7 @@ struct LinePlot;
 struct TableCell {
   std::string text, full = {};
   std::optional<double> shade = {};  // from -1 to 1: the colour of a heat map
+  std::string link = {};
   TableCell(std::string shown, std::string digits = {}) : text(std::move(shown)), full(std::move(digits)) {}
   TableCell(const char* shown) : text(shown) {}
 };
@@ -48,13 +49,16 @@ class HtmlPage {
   }
   void plot(const LinePlot& plot);
   void drawing(std::string_view svg) { body_ += svg; }
-  // A mechanism that moves, as JSON for report.js, above the drawings that stand for it where there is no script.
+  // A mechanism that moves, as JSON for script/viewer.js, above the drawings that stand for it where there is no
+  // script.
   void motion(std::string_view json, std::string_view stills);
+  // Two of several runs beside each other; runs: [{"name": "a", "numbers": {"objective path": 1.2}}, ...]
+  void comparison(std::string_view runs);
   PageArrays& arrays() { return arrays_; }
   std::string text() const;
 
  private:
-  std::string title_, body_;
+  std::string title_, body_, compared_ = "[]";
   std::vector<std::string> headings_, plots_, motions_;
   PageArrays arrays_;
 };

@@ -61,7 +61,7 @@ void add_fitted_parameters(HtmlPage& page, const Json& result) {
   for (const Json& experiment : result.value("experiments", Json::object()))
     add_rows(rows, experiment.value("refitted", Json::object()));
   page.table({"parameter", "initial", "value", "standard error", "95 % interval", "unit", "at bound"}, rows);
-  RowPlot plot{.title = "95 % intervals (ring: initial value, where it is near)",
+  RowPlot plot{.title = "95 % intervals (ring: initial value, red: bounds, thin: prior; where they are near)",
                .x_label = "deviation from the estimate [%]"};
   constexpr double kFar = 100;  // [%]: an interval that is wider says that the data do not determine the parameter
   double widest = 0;
@@ -77,6 +77,13 @@ void add_fitted_parameters(HtmlPage& page, const Json& result) {
                 .dot = 0,
                 .words = rounded_cell(p.at("value"), p.at("std_error")).text + " \u00b1 " + cell(p.at("std_error"), 2) +
                          " " + p.value("unit", "")};
+    for (const char* bound : {"lower", "upper"})
+      if (p.value(bound, Json()).is_number()) row.bounds.push_back(percent(p.at(bound).get<double>()));
+    if (p.contains("prior")) {
+      const double mean = p.at("prior").at("mean").get<double>(),
+                   width = 1.96 * p.at("prior").at("sigma").get<double>();
+      row.prior = {percent(mean - width), percent(mean + width)};
+    }
     const double start = percent(p.at("initial").get<double>());
     if (std::abs(start) < kFar) row.ring = start;
     widest = std::max(widest, std::min(half, kFar));
@@ -171,6 +178,14 @@ void add_profiles(HtmlPage& page, const Json& result) {
     LinePlot plot{.title = "Profile of " + name, .x_label = name, .y_label = "tau [-]"};
     plot.series.push_back({"tau", profile.at("value").get<std::vector<double>>(),
                            profile.at("tau").get<std::vector<double>>(), Mark::line});
+    // Where tau reaches an end of the interval.
+    for (std::size_t end = 0; end < 2; ++end) {
+      const Json& values = profile.at("value");
+      const auto at = std::find(values.begin(), values.end(), profile.at("ci95")[end]);
+      if (at == values.end()) continue;
+      const double tau = profile.at("tau")[static_cast<std::size_t>(at - values.begin())].get<double>();
+      plot.limits.push_back({end == 0 ? "" : "95 %", tau, tau > 0});
+    }
     page.plot(plot);
   }
 }

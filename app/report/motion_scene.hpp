@@ -1,4 +1,4 @@
-// A mechanism over time, as JSON for the viewer in report.js: poses of its bodies, points, joints, springs, paths.
+// A mechanism over time, as JSON for script/viewer.js: poses of its bodies, points, joints, springs, paths.
 //
 //   page.motion(motion_scene(page.arrays(), plane, {{"before", scene, before, true}, {"after", designed, after}}),
 //   stills);

@@ -1,4 +1,4 @@
-// The style and the script of every report: report.css and report.js beside this file, embedded by CMake.
+// The style and the script of every report: report.css and script/*.js beside this file, embedded by CMake.
 #pragma once
 
 #include <string_view>

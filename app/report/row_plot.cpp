@@ -56,6 +56,12 @@ std::string to_svg(const RowPlot& plot) {
     if (plot.track) svg += fmt::format("<path class=\"track\" d=\"M{} {:.1f}h{}\"/>", kNamesWidth, y, inner);
     svg += fmt::format("<path class=\"thick c{}\" d=\"M{:.1f} {:.1f}H{:.1f}\"/>", row.high < row.low ? 1 : 0,
                        px(row.low), y, px(row.high));
+    if (row.prior)
+      svg += fmt::format("<path class=\"line c1\" d=\"M{:.1f} {:.1f}H{:.1f}\"/>", px(row.prior->first), y - 8,
+                         px(row.prior->second));
+    for (const double bound : row.bounds)
+      if (bound >= low && bound <= high)
+        svg += fmt::format("<path class=\"limit\" d=\"M{:.1f} {:.1f}v16\"/>", px(bound), y - 8);
     if (row.ring) svg += fmt::format("<circle class=\"joint\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"/>", px(*row.ring), y);
     if (row.dot) svg += fmt::format("<circle class=\"f7\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"/>", px(*row.dot), y);
     svg += fmt::format("<text x=\"{}\" y=\"{:.1f}\">{}</text></g>\n", kRowsWidth - kWordsWidth + 10, y + 4,

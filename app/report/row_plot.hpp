@@ -14,10 +14,12 @@ namespace mbsopt {
 
 struct PlotRow {
   std::string name;
-  double low = 0, high = 0;         // the bar
-  std::optional<double> ring = {};  // where something started
-  std::optional<double> dot = {};   // where it ended
-  std::string words = {};           // at the right, with the numbers
+  double low = 0, high = 0;                             // the bar
+  std::optional<double> ring = {};                      // where something started
+  std::optional<double> dot = {};                       // where it ended
+  std::vector<double> bounds = {};                      // what is out of sight is left out
+  std::optional<std::pair<double, double>> prior = {};  // an interval, drawn thin above the bar
+  std::string words = {};                               // at the right, with the numbers
 };
 
 struct RowPlot {

@@ -17,11 +17,12 @@ import sys
 import tempfile
 
 PROBLEMS = pathlib.Path(__file__).resolve().parents[2] / "problems"
-# Command, problem file, whether a mechanism moves in the report.
+# Command with options, problem file, whether a mechanism moves in the report.
 RUNS = [("simulate", "quarter_car/ride.json", True), ("kinematics", "four_bar/kinematics.json", True),
         ("linearise", "quarter_car/ride.json", False), ("gradient", "five_bar/sensitivities.json", False),
         ("check", "quarter_car/ride.json", False), ("design", "five_bar/design.json", True),
-        ("identify", "pendulum/identify.json", True)]
+        ("identify", "pendulum/identify.json", True), ("tradeoff --budget 0", "five_bar/design.json", False)]
+LARGE = ("simulate", "quarter_car/ride.json", "--set", "simulation.output_step=0.00003")  # 100001 rows
 WIDTHS = (420, 1300)
 
 # Runs in the page after its own script. The widths of tables in print are measured with the rules for print in force.
@@ -54,6 +55,7 @@ const ink = canvas => {
     found.ink = Math.min(before, after), found.moved = first != second;
     found.cursors = document.querySelectorAll("path.cursor[d^=M]").length;
   }
+  found.compared = document.querySelectorAll("[data-comparison] tbody tr").length;
   // A page that is wider than its window scrolls sideways.
   found.overflow = document.documentElement.scrollWidth - document.documentElement.clientWidth;
   if (innerWidth < 700) {
@@ -84,12 +86,13 @@ const ink = canvas => {
 CATCH = "window.probe_errors = []; window.onerror = (m, s, l) => { window.probe_errors.push(m + ' at ' + l); };"
 
 
-def chromium(program, url, *options):
+def chromium(program, url, *options, budget=5000):
     with tempfile.TemporaryDirectory(prefix="mbsopt_browser_") as user:
         return subprocess.run(
             [program, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
              "--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars",
-             f"--user-data-dir={user}", "--enable-logging=stderr", "--virtual-time-budget=5000", *options, url],
+             f"--user-data-dir={user}", "--enable-logging=stderr",
+             *([f"--virtual-time-budget={budget}"] if budget else []), *options, url],
             capture_output=True, text=True, timeout=120)
 
 
@@ -122,6 +125,17 @@ def probed(program, report, width, folder):
     return (json.loads(match[1].replace("&quot;", '"')) if match else None), console
 
 
+def seconds_to_open(program, report, folder):
+    """From the start of the navigation to the end of the page's script, in real time."""
+    copy = folder / "timed.html"
+    text = report.read_text()
+    at = text.rindex("</body>")
+    copy.write_text(text[:at] + "<script>document.documentElement.dataset.opened = performance.now();</script>" + text[at:])
+    run = chromium(program, copy.resolve().as_uri(), "--dump-dom", budget=None)
+    match = re.search(r'data-opened="([0-9.]+)"', run.stdout)
+    return float(match[1]) / 1000 if match else float("inf")
+
+
 def problems_of(found, console, moves, width):
     if found is None:
         return ["the probe did not run"] + console
@@ -141,6 +155,26 @@ def problems_of(found, console, moves, width):
     return [f"{width} px: {w}" for w in wrong]
 
 
+def index_opens(browser, runs):
+    wrong = []
+    for width in WIDTHS:
+        found, console = probed(browser, runs / "index.html", width, runs)
+        wrong += problems_of(found, console, False, width)
+        if found and found["compared"] < 3:
+            wrong.append(f"{width} px: two runs are not compared")
+    print("index: " + ("ok" if not wrong else "; ".join(wrong)))
+    return not wrong
+
+
+def large_report_opens(program, browser, folder):
+    subprocess.run([program, *LARGE[:1], str(PROBLEMS / LARGE[1]), *LARGE[2:], "--out", str(folder)], capture_output=True,
+                   timeout=600, check=True)
+    size = (folder / "report.html").stat().st_size / 1e6
+    seconds = seconds_to_open(browser, folder / "report.html", folder)
+    print(f"a report of 100001 rows: {size:.2f} MB, open after {seconds:.2f} s")
+    return size < 3 and seconds < 2
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("program")
@@ -153,12 +187,13 @@ def main():
         return 77
     failed = False
     with tempfile.TemporaryDirectory(prefix="mbsopt_reports_") as temporary:
-        base = arguments.keep or pathlib.Path(temporary)
+        base = (arguments.keep or pathlib.Path(temporary)) / "out"
         for command, problem, moves in RUNS:
+            command, *options = command.split()
             if arguments.only and command != arguments.only:
                 continue
             folder = base / command
-            run = subprocess.run([arguments.program, command, str(PROBLEMS / problem), "--out", str(folder)],
+            run = subprocess.run([arguments.program, command, str(PROBLEMS / problem), *options, "--out", str(folder)],
                                  capture_output=True, text=True, timeout=600)
             report = folder / "report.html"
             if not report.is_file():
@@ -179,6 +214,9 @@ def main():
                 wrong.append(f"the report has {size:.0f} KB, more than 400")
             print(f"{command}: {size:.0f} KB, " + ("ok" if not wrong else "; ".join(wrong)))
             failed = failed or bool(wrong)
+        if not arguments.only:
+            failed = not index_opens(browser, base) or failed
+            failed = not large_report_opens(arguments.program, browser, base / "large") or failed
     return 1 if failed else 0
 
 

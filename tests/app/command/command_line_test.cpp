@@ -1,4 +1,7 @@
 #include <catch2/catch.hpp>
+#include <cstdlib>
+#include <fstream>
+#include <string>
 
 #include "app/terminal/exit_code.hpp"
 #include "tests/app/run_command.hpp"
@@ -144,4 +147,26 @@ TEST_CASE("--json prints result.json and nothing else on standard output", "[com
   const CommandOutcome bad = run_command({"simulate", file, "--json", "--set", "bodies[0].mass=-1"});
   CHECK(bad.exit_code == kBadInput);
   CHECK(bad.out.empty());
+}
+
+TEST_CASE("the help of each command shows an example", "[command]") {
+  for (const char* name : {"validate", "simulate", "kinematics", "linearise", "gradient", "check", "design", "identify",
+                           "tradeoff", "sweep", "resume", "new", "completion", "schema"}) {
+    INFO(name);
+    CHECK(run_command({name, "--help"}).out.find(std::string("Example:\n  mbsopt ") + name) != std::string::npos);
+  }
+}
+
+TEST_CASE("bash completes commands and their options", "[command]") {
+  const TemporaryFolder folder;
+  std::ofstream(folder.path / "completion") << run_command({"completion"}).out;
+  const auto completed = [&](const std::string& words, int last) {
+    const std::string out = (folder.path / "out").string();
+    const std::string script = "source " + (folder.path / "completion").string() + "; COMP_WORDS=(mbsopt " + words +
+                               "); COMP_CWORD=" + std::to_string(last) + "; _mbsopt; echo ${COMPREPLY[@]} > " + out;
+    REQUIRE(std::system(("bash -c '" + script + "'").c_str()) == 0);
+    return content_of(out);
+  };
+  CHECK(completed("des", 1) == "design\n");
+  CHECK(completed("sweep --sa", 2) == "--samples\n");
 }

@@ -1,0 +1,114 @@
+#include "app/report/run_index.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "app/files/atomic_file.hpp"
+#include "app/report/html_page.hpp"
+#include "app/report/report_parts.hpp"
+#include "optim/problem/regular_file.hpp"
+
+namespace mbsopt {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr const char* kTitle = "Runs";
+// A sweep or a study may keep far more than a comparison needs; reading it would delay every command by a second.
+constexpr std::size_t kLargest = 20'000'000;  // [bytes] of result.json
+
+struct StoredRun {
+  std::string folder;
+  Json result;
+  bool has_report;
+};
+
+std::vector<StoredRun> runs_in(const fs::path& folder) {
+  std::vector<StoredRun> runs;
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
+    if (!fs::exists(entry.path() / "result.json", ignored)) continue;
+    Json result;
+    try {
+      result = Json::parse(content_of_regular_file(entry.path() / "result.json", kLargest), nullptr, false);
+    } catch (const FileError&) {
+      continue;
+    }
+    if (!result.is_object() || result.value("program", Json()) != "mbsopt") continue;
+    runs.push_back(
+        {entry.path().filename().string(), std::move(result), fs::exists(entry.path() / "report.html", ignored)});
+  }
+  std::ranges::sort(runs, {}, &StoredRun::folder);
+  return runs;
+}
+
+// A folder's name as part of an address (RFC 3986): letters, digits, - . _ ~ stay.
+std::string address_of(const std::string& folder) {
+  std::string address;
+  for (const char c : folder) {
+    const bool plain = (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
+                       std::string_view("-._~").find(c) != std::string_view::npos;
+    address += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return address;
+}
+
+// What two runs are compared by: "objective path", "parameter k1", ... and their numbers.
+Json numbers_of(const Json& result) {
+  Json numbers = Json::object();
+  const Json objectives = result.value("objectives", Json::object()),  // items() refers to them
+      parameters = result.value("parameters", Json::object());
+  for (const auto& [name, objective] : objectives.items())
+    if (objective.is_object()) numbers["objective " + name] = objective.value("value", Json());
+  for (const auto& [name, p] : parameters.items()) {
+    if (!p.is_object()) continue;
+    const std::string unit = p.value("unit", "");
+    numbers[fmt::format("parameter {}{}", name, unit.empty() ? "" : " [" + unit + "]")] = p.value("value", Json());
+  }
+  for (const auto& [part, keys] : {std::pair{"simulation", std::vector{"steps", "rejected", "rhs_evaluations"}},
+                                   std::pair{"optimizer", std::vector{"iterations", "evaluations"}}}) {
+    for (const char* key : keys)
+      if (result.contains(part) && result.at(part).contains(key)) numbers[key] = result.at(part).at(key);
+  }
+  return numbers;
+}
+
+}  // namespace
+
+std::string run_index(const fs::path& folder) {
+  const std::vector<StoredRun> runs = runs_in(folder);
+  if (runs.empty()) return {};
+  HtmlPage page(kTitle);
+  page.heading("All runs");
+  std::vector<TableRow> rows;
+  Json compared = Json::array();
+  for (const StoredRun& run : runs) {
+    TableCell name(run.folder);
+    if (run.has_report) name.link = address_of(run.folder) + "/report.html";
+    rows.push_back({name, cell(run.result.value("command", Json())), cell(run.result.value("status", Json())),
+                    std::to_string(run.result.value("warnings", Json::array()).size())});
+    compared.push_back({{"name", run.folder}, {"numbers", numbers_of(run.result)}});
+  }
+  page.table({"folder", "command", "status", "warnings"}, rows);
+  if (runs.size() > 1) page.comparison(compared.dump(-1, ' ', false, Json::error_handler_t::replace));
+  return page.text();
+}
+
+void write_run_index(const fs::path& folder) {
+  const fs::path file = folder / "index.html";
+  std::error_code ignored;
+  if (fs::exists(file, ignored)) {
+    try {
+      if (content_of_regular_file(file).find(fmt::format("<title>{}</title>", kTitle)) == std::string::npos) return;
+    } catch (const FileError&) {
+      return;
+    }
+  }
+  if (const std::string text = run_index(folder); !text.empty()) write_file_atomically(file, text);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,17 @@
+// What the scripts of a report share: its data, elements of the page, numbers as text, the instant that it shows. The
+// page holds its data in the JSON block "data" (html_page.cpp, motion_scene.cpp). Nothing is loaded.
+const data = JSON.parse(document.getElementById("data").textContent);
+const array = k => data.arrays[k];
+document.documentElement.classList.add("scripted");
+
+// An element with attributes and children. Within a plot, the namespace is that of its drawing.
+function element(tag, attributes = {}, children = [], namespace = null) {
+  const e = namespace ? document.createElementNS(namespace, tag) : document.createElement(tag);
+  for (const [key, value] of Object.entries(attributes)) e.setAttribute(key, value);
+  e.append(...children);
+  return e;
+}
+const shown = (value, digits = 6) => value === null || value === undefined ? "-" : String(Number(value.toPrecision(digits)));
+
+// The instant that all plots over time and all mechanisms of the page show.
+const cursor = {t: null, listeners: [], set(t) { this.t = t; for (const f of this.listeners) f(t); }};
