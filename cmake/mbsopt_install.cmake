@@ -1,18 +1,21 @@
 # The program, and the libraries as a CMake package:
 #   find_package(mbsopt REQUIRED)
-#   target_link_libraries(mine PRIVATE mbsopt::core mbsopt::optim)
+#   target_link_libraries(mine PRIVATE mbsopt::mbsopt)     # and #include <mbsopt/mbsopt.hpp>
 include(CMakePackageConfigHelpers)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/mbsopt)
 set_target_properties(mbsopt_core PROPERTIES EXPORT_NAME core)
 set_target_properties(mbsopt_optim PROPERTIES EXPORT_NAME optim)
+set_target_properties(mbsopt_json PROPERTIES EXPORT_NAME mbsopt)
 add_library(mbsopt::core ALIAS mbsopt_core)
 add_library(mbsopt::optim ALIAS mbsopt_optim)
+add_library(mbsopt::mbsopt ALIAS mbsopt_json)
 
 install(TARGETS mbsopt RUNTIME COMPONENT program)
-install(TARGETS mbsopt_core mbsopt_optim EXPORT mbsopt_targets ARCHIVE COMPONENT development)
-install(DIRECTORY core optim DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mbsopt COMPONENT development
-        FILES_MATCHING PATTERN "*.hpp")
+install(TARGETS mbsopt_core mbsopt_optim mbsopt_json EXPORT mbsopt_targets ARCHIVE COMPONENT development)
+install(CODE "execute_process(COMMAND \"${CMAKE_COMMAND}\" \"-DSOURCE=${PROJECT_SOURCE_DIR}\"
+                \"-DINCLUDE=\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_INCLUDEDIR}\"
+                -P \"${PROJECT_SOURCE_DIR}/cmake/mbsopt_headers.cmake\" COMMAND_ERROR_IS_FATAL ANY)" COMPONENT development)
 install(EXPORT mbsopt_targets NAMESPACE mbsopt:: FILE mbsopt_targets.cmake DESTINATION ${package_dir}
         COMPONENT development)
 

@@ -343,7 +343,15 @@ void FieldReader::numbers(std::string_view key, std::vector<double>& values, con
     read_plain(node->items[i], child_path(inside(key), i), values.emplace_back(0.0), says.dimension);
 }
 
-void FieldReader::overrides(std::string_view key, std::vector<std::pair<std::string, double>>& values,
+void FieldReader::tolerance(std::string_view key, double& value, std::optional<KindTolerances>& kinds,
+                            const Says& says) {
+  const Node* const node = node_.find(key);
+  if (!node || node->kind != Node::Kind::object) return plain(key, value, kPositive, says);
+  object(key, kinds, says);
+  if (kinds) value = kinds->smallest();
+}
+
+void FieldReader::values_of(std::string_view key, std::vector<std::pair<std::string, double>>& values, To, const Range&,
                             const Says& says) {
   const Node* const node = get_kind(key, says, Node::Kind::object);
   if (!node) return;

@@ -86,7 +86,9 @@ class FieldReader {
              const Says& says);
   void instead_of(std::string_view key, std::string_view object, const Words& fields);
   void numbers(std::string_view key, std::vector<double>& values, const Range&, const Says& says);
-  void overrides(std::string_view key, std::vector<std::pair<std::string, double>>& values, const Says& says);
+  void values_of(std::string_view key, std::vector<std::pair<std::string, double>>& values, To, const Range&,
+                 const Says& says);
+  void tolerance(std::string_view key, double& value, std::optional<KindTolerances>& kinds, const Says& says);
 
   template <class T>
   void object(std::string_view key, T& value, const Says& says) {

@@ -160,8 +160,12 @@ class SchemaWriter {
   void numbers(std::string_view key, std::vector<double>&, const Range& range, const Says& says) {
     put(key, says, {{"type", "array"}, {"items", ranged(ref("number"), range)}});
   }
-  void overrides(std::string_view key, std::vector<std::pair<std::string, double>>&, const Says& says) {
-    put(key, says, {{"type", "object"}, {"additionalProperties", ref("number")}});
+  void values_of(std::string_view key, std::vector<std::pair<std::string, double>>&, To, const Range& range,
+                 const Says& says) {
+    put(key, says, {{"type", "object"}, {"additionalProperties", ranged(ref("number"), range)}});
+  }
+  void tolerance(std::string_view key, double& value, std::optional<KindTolerances>&, const Says& says) {
+    put(key, says, {{"anyOf", {ranged(ref("number"), kPositive), object_schema<KindTolerances>()}}}, value);
   }
 
   template <class T>

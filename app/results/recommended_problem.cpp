@@ -26,12 +26,26 @@ Json options_json(const IntegratorOptions& o) {
   return json;
 }
 
+// The form of a problem file, scaled as the tolerance itself has been.
+Json tolerance_json(double smallest, const std::optional<KindTolerances>& kinds) {
+  if (!kinds) return smallest;
+  Json json = Json::object();
+  const double scale = smallest / kinds->smallest();
+  const auto put = [&](const char* key, const std::optional<double>& value) {
+    if (value) json[key] = scale * *value;
+  };
+  put("position", kinds->position), put("angle", kinds->angle);
+  put("velocity", kinds->velocity), put("rate", kinds->rate);
+  for (const auto& [name, value] : kinds->bodies) json["bodies"][name] = scale * value;
+  return json;
+}
+
 Json integrator_json(const IntegratorSettings& s) {
   Json json{{"type", s.type}};
   if (s.step) {
     json["step"] = *s.step;
   } else {
-    json["rtol"] = s.rtol, json["atol"] = s.atol;
+    json["rtol"] = tolerance_json(s.rtol, s.rtol_of), json["atol"] = tolerance_json(s.atol, s.atol_of);
   }
   if (s.initial_step) json["initial_step"] = *s.initial_step;
   if (s.max_step) json["max_step"] = *s.max_step;

@@ -264,7 +264,9 @@ SimulationResult cvodes_adjoint(const Mechanism& mechanism, const SimulationSett
   result.statistics.factorisations += adjoint.factorisations();
   if (!result.ok()) return run.finish();
   Eigen::MatrixXd mu = adjoint.mu();
-  run.assembly().add_adjoint(adjoint.lambda(), mu);
+  const Eigen::MatrixXd lambda = adjoint.lambda();
+  run.assembly().add_adjoint(lambda, mu);
+  result.psi_y_initial = lambda.transpose();
   result.psi_rho = mu.transpose();
   return run.finish();
 }

@@ -35,6 +35,7 @@ ForwardRun::ForwardRun(const Mechanism& mechanism, const SimulationSettings& set
       settings_(settings),
       costs_(costs),
       assembly_(mechanism, settings.start_time),
+      tolerances_(mechanism.data(), settings.integrator),
       flow_(mechanism, settings.formulation),
       violations_(make_projector(mechanism, Projection::none)),
       y_(mechanism.states(), context_),
@@ -81,7 +82,7 @@ void ForwardRun::set_up() {
   require(CVodeSetErrHandlerFn(memory(), keep_words, this));
   require(CVodeInit(memory(), f, settings_.start_time, y_));
   require(CVodeSetUserData(memory(), this));
-  require(CVodeSStolerances(memory(), s.rtol, s.atol));
+  require(CVodeWFtolerances(memory(), weights));
   require(CVodeSetMaxHnilWarns(memory(), -1));
   require(CVodeSetMaxErrTestFails(memory(), 30));
   require(CVodeSetMaxConvFails(memory(), 60));
@@ -138,6 +139,13 @@ int ForwardRun::f(realtype t, N_Vector y, N_Vector ydot, void* self) {
     values(ydot) = flow.ydot();
     return kOk;
   });
+}
+
+// CVODES' own norm is the root mean square of y_i w_i, too.
+int ForwardRun::weights(N_Vector y, N_Vector w, void* self) {
+  const ComponentTolerances& tolerances = static_cast<ForwardRun*>(self)->tolerances_;
+  for (Eigen::Index i = 0; i < values(y).size(); ++i) values(w)(i) = 1 / tolerances.of(i, std::abs(values(y)(i)));
+  return kOk;
 }
 
 int ForwardRun::g(realtype t, N_Vector y, N_Vector gdot, void* self) {

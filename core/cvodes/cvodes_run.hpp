@@ -18,6 +18,7 @@
 #include "core/run/simulation_result.hpp"
 #include "core/scene/settings.hpp"
 #include "core/start/assembly.hpp"
+#include "core/step/component_tolerances.hpp"
 
 namespace mbsopt::cvodes {
 
@@ -77,12 +78,14 @@ class ForwardRun {
   void count_steps();  // rejected ones, and the work of their solutions
   static int f(realtype t, N_Vector y, N_Vector ydot, void* self);
   static int g(realtype t, N_Vector y, N_Vector gdot, void* self);
+  static int weights(N_Vector y, N_Vector w, void* self);  // of the norm of errors
 
   std::chrono::steady_clock::time_point start_;
   const Mechanism mechanism_;
   const SimulationSettings settings_;
   std::span<const Cost> costs_;
   Assembly assembly_;
+  ComponentTolerances tolerances_;
   Flow flow_;
   std::unique_ptr<Projector> violations_;
   SimulationResult result_;

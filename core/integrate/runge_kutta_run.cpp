@@ -30,6 +30,7 @@ RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSetting
     : mechanism_(mechanism),
       settings_(settings),
       rk_(method),
+      tolerances_(mechanism.data(), settings.integrator),
       dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
       projector_(make_projector(mechanism, settings.formulation.projection, model_of(mechanism, settings, method))),
       guard_(mechanism_.data()),
@@ -56,14 +57,14 @@ double RungeKuttaRun::first_step(const IntegratorSettings& s, double span) {
   const Eigen::VectorXd& y0 = step_.y0;
   if (!dynamics_.evaluate(step_.t, y0, angles_, ydot_)) return 1e-6 * span;
   ++evaluations_;
-  const double d0 = scaled_norm(y0, y0, y0, s.rtol, s.atol), d1 = scaled_norm(ydot_, y0, y0, s.rtol, s.atol);
+  const double d0 = scaled_norm(y0, y0, y0, tolerances_), d1 = scaled_norm(ydot_, y0, y0, tolerances_);
   const double h0 = std::min(d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1, span);
   work_ = ydot_;
   y_stage_ = y0 + h0 * ydot_;
   if (!dynamics_.evaluate(step_.t + h0, y_stage_, angles_, ydot_)) return 1e-3 * h0;
   ++evaluations_;
   work_ -= ydot_;
-  const double d2 = scaled_norm(work_, y0, y0, s.rtol, s.atol) / h0;
+  const double d2 = scaled_norm(work_, y0, y0, tolerances_) / h0;
   const double largest = std::max(d1, d2);
   const double h1 = largest <= 1e-15 ? std::max(1e-6, 1e-3 * h0) : std::pow(0.01 / largest, 1.0 / (rk_.order + 1));
   return std::min(rounded_step(std::min(100 * h0, h1)), span);
@@ -102,14 +103,13 @@ bool RungeKuttaRun::solve_stages(ImplicitStages::Goal goal) {
 }
 
 double RungeKuttaRun::error_of_step() {
-  const IntegratorSettings& s = settings_.integrator;
   auto norm = [&](const double* weights) {
     work_.setZero();
     StageSum sum;
     for (int i = 0; i < rk_.stages; ++i) sum.add(step_.h * weights[i], step_.K.col(i).data());
     sum.to(work_.data(), work_.data(), work_.size());
     if (rk_.error_filter != 0 && !implicit_->filter(step_, work_)) return double(INFINITY);
-    return scaled_norm(work_, step_.y0, step_.y_hat, s.rtol, s.atol);
+    return scaled_norm(work_, step_.y0, step_.y_hat, tolerances_);
   };
   const double high = norm(rk_.error);
   return rk_.error_low ? combined_error(high, norm(rk_.error_low)) : high;
@@ -118,7 +118,6 @@ double RungeKuttaRun::error_of_step() {
 // The error after projection: next to a singular position rounding, magnified, is most of it, in directions
 // that the constraints hold again where the step ends.
 double RungeKuttaRun::error_after_projection() {
-  const IntegratorSettings& s = settings_.integrator;
   const double t1 = step_.t + step_.h;
   if (!projector_->project(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return INFINITY;
   if (!projector_->linearise(t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return INFINITY;
@@ -134,7 +133,7 @@ double RungeKuttaRun::error_after_projection() {
   projector_->tangent(no_parameters_, error_, projected_error_);
   auto norm = [&](int k) {
     work_ = projected_error_.col(k);
-    return scaled_norm(work_, step_.y0, step_.y_hat, s.rtol, s.atol);
+    return scaled_norm(work_, step_.y0, step_.y_hat, tolerances_);
   };
   return rk_.error_low ? combined_error(norm(0), norm(1)) : norm(0);
 }
@@ -349,7 +348,7 @@ bool RungeKuttaRun::begin(const Eigen::VectorXd& y_initial, const Eigen::VectorX
 // Tolerances that no step can meet explain whatever else may have become of the steps.
 std::string RungeKuttaRun::tolerances_or(std::string message, const Course& course) const {
   const IntegratorSettings& s = settings_.integrator;
-  return course.adaptive && beyond_digits(s, step_.y0) ? too_few_digits(s, step_.t) : std::move(message);
+  return course.adaptive && beyond_digits(tolerances_, step_.y0) ? too_few_digits(s, step_.t) : std::move(message);
 }
 
 void RungeKuttaRun::choose_first_size(Course& course) {

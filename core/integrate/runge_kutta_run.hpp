@@ -8,6 +8,7 @@
 #include "core/dynamics/dynamics.hpp"
 #include "core/run/simulation_result.hpp"
 #include "core/scene/settings.hpp"
+#include "core/step/component_tolerances.hpp"
 #include "core/step/implicit_stages.hpp"
 #include "core/step/singular_passage.hpp"
 #include "core/step/step.hpp"
@@ -67,6 +68,7 @@ class RungeKuttaRun {
   const Mechanism mechanism_;
   SimulationSettings settings_;
   const Method& rk_;
+  const ComponentTolerances tolerances_;
   Dynamics dynamics_;
   std::optional<ImplicitStages> implicit_;
   std::unique_ptr<Projector> projector_;

@@ -102,6 +102,7 @@ MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std:
   compile_sensors(model);
   compile_conditions(model);
   model.data.equilibrium = scene.equilibrium;
+  model.data.assembly_iterations = scene.assembly_iterations;
   group_rows(model.data);
   scale_alpha(model.data);
   model.data.theta_rho = model.fields.theta_rho();

@@ -29,6 +29,9 @@ void add_condition(Compilation& model, std::size_t i) {
     throw SceneError(where + ": a condition on sensor '" + c.sensor +
                      "' is not possible; use positions, velocities, angles, distances, their rates, angular "
                      "velocities or Euler parameters");
+  if (c.acceleration)
+    throw SceneError(
+        where + ".acceleration: is of the command kinematics only; elsewhere accelerations follow from the forces");
   out.rate_sensor = sensor->rate(model.data);
   out.velocity_level = sensor->reads == Reads::velocities;
   out.modulo_turn = sensor->angle() >= 0 && !out.velocity_level;

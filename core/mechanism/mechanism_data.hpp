@@ -91,8 +91,9 @@ struct MechanismData {
   std::shared_ptr<const PlanarModel> planar;  // where joints hold all bodies in a plane
   std::string not_planar;                     // else why not
 
-  bool needs_motion = false;  // some sensor does
-  bool equilibrium = false;   // start from static equilibrium
+  bool needs_motion = false;    // some sensor does
+  bool equilibrium = false;     // start from static equilibrium
+  int assembly_iterations = 0;  // at most
 
   Eigen::Index slots() const { return theta_rho.rows(); }
   // rho_bar (all parameters) += (d theta/d rho)' theta_bar

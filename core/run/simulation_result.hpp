@@ -89,6 +89,9 @@ struct SimulationResult {
   double last_good_time = 0;  // [s]
   Eigen::VectorXd psi;        // per cost
   Eigen::MatrixXd psi_rho;    // cost x parameter; TLM and adjoint only
+  // cost x 14n, adjoint only: d psi/dy at the start, in any direction of y (MBSVT's Lambda at the start). Empty where
+  // drives leave nothing free.
+  Eigen::MatrixXd psi_y_initial;
   Eigen::VectorXd y_initial, y_end;
   SimulationStatistics statistics;
   StepSequence steps;

@@ -328,11 +328,20 @@ void Checker::plain(std::string_view key, const std::optional<double>& value, co
   if (value) check_range(key, *value, range);
 }
 
-void Checker::overrides(std::string_view key, const std::vector<std::pair<std::string, double>>& values, const Says&) {
+void Checker::values_of(std::string_view key, const std::vector<std::pair<std::string, double>>& values, To what,
+                        const Range& range, const Says&) {
   for (const auto& [name, value] : values) {
-    check_reference(child_path(path(key), name), name, To::parameter);
-    at(key).check_range(name, value, kAny);
+    check_reference(child_path(path(key), name), name, what);
+    at(key).check_range(name, value, range);
   }
+}
+
+void Checker::tolerance(std::string_view key, double value, const std::optional<KindTolerances>& kinds,
+                        const Says& says) {
+  if (!kinds) return plain(key, value, kPositive, says);
+  at(key).check(*kinds);
+  if (!kinds->position && !kinds->angle && !kinds->velocity && !kinds->rate)
+    issue(path(key), "needs the tolerance of a kind of component: position, angle, velocity or rate");
 }
 
 }  // namespace mbsopt

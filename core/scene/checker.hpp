@@ -84,7 +84,9 @@ class Checker {
   }
   void instead_of(std::string_view, std::string_view, const Words&) {}
   void numbers(std::string_view key, const std::vector<double>& values, const Range& range, const Says& says);
-  void overrides(std::string_view key, const std::vector<std::pair<std::string, double>>& values, const Says& says);
+  void values_of(std::string_view key, const std::vector<std::pair<std::string, double>>& values, To what,
+                 const Range& range, const Says& says);
+  void tolerance(std::string_view key, double value, const std::optional<KindTolerances>& kinds, const Says& says);
 
   template <class T>
   void object(std::string_view key, const T& value, const Says&) {

@@ -90,7 +90,8 @@ class FieldVisitor {
   void level(std::string_view, const std::optional<double>&, const Choice<double> (&)[N], const Range&, const Says&) {}
   void instead_of(std::string_view, std::string_view, const Words&) {}
   void numbers(std::string_view, const std::vector<double>&, const Range&, const Says&) {}
-  void overrides(std::string_view, const std::vector<std::pair<std::string, double>>&, const Says&) {}
+  void values_of(std::string_view, const std::vector<std::pair<std::string, double>>&, To, const Range&, const Says&) {}
+  void tolerance(std::string_view, double, const std::optional<KindTolerances>&, const Says&) {}
   template <class T>
   void object(std::string_view key, const T& value, const Says&) {
     visit(at(key), value);

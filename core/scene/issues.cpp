@@ -377,6 +377,7 @@ void check_meaning(Checker& checker, const Condition& condition) {
   };
   check_dimension("value", condition.value, *measured);
   check_dimension("rate", condition.rate, *measured / dimension::kTime);
+  check_dimension("acceleration", condition.acceleration, *measured / dimension::kTime / dimension::kTime);
 }
 
 void check_meaning(Checker& checker, const IntegratorOptions& o) {
@@ -447,8 +448,19 @@ void check_meaning(Checker& checker, const IntegratorSettings& settings) {
   if (settings.initial_step && settings.max_step && *settings.initial_step > *settings.max_step)
     checker.issue(checker.path("initial_step"),
                   "is " + text_of(*settings.initial_step) + ", above max_step " + text_of(*settings.max_step));
-  if (settings.rtol >= 1)
-    checker.issue(checker.path("rtol"), "is " + text_of(settings.rtol) + ", a relative tolerance must be below 1");
+  const auto relative = [&](const std::string& path, const std::optional<double>& rtol) {
+    if (rtol && *rtol >= 1) checker.issue(path, "is " + text_of(*rtol) + ", a relative tolerance must be below 1");
+  };
+  const std::string rtol = checker.path("rtol");
+  if (const auto& kinds = settings.rtol_of) {
+    relative(child_path(rtol, "position"), kinds->position);
+    relative(child_path(rtol, "angle"), kinds->angle);
+    relative(child_path(rtol, "velocity"), kinds->velocity);
+    relative(child_path(rtol, "rate"), kinds->rate);
+    for (const auto& [name, value] : kinds->bodies) relative(child_path(child_path(rtol, "bodies"), name), value);
+  } else {
+    relative(rtol, settings.rtol);
+  }
 }
 
 void check_meaning(Checker& checker, const SimulationSettings& settings) {

@@ -33,18 +33,22 @@ Scene kinematic_scene(const Scene& scene, std::vector<SceneIssue>& issues) {
                !sensor->in_body_frame) {
       drive.type = "point";
       drive.body = sensor->body, drive.point2 = sensor->point, drive.coordinate = sensor->component;
+    } else if (sensor->quantity == "orientation") {
+      drive.type = "coordinate", drive.body = sensor->body, drive.coordinate = sensor->component;
     } else {
       issues.push_back({where + ".sensor", "sensor '" + c.sensor + "' measures " + sensor->quantity +
-                                               ", which kinematics cannot hold; use an angle, displacement, distance "
-                                               "or global coordinate of a point, or a drive"});
+                                               ", which kinematics cannot hold; use an angle, displacement, distance, "
+                                               "Euler parameter or global coordinate of a point, or a drive"});
       continue;
     }
     if (!c.value) {
       issues.push_back({where + ".value", "is missing; kinematics needs the value at the start beside the rate"});
       continue;
     }
+    const std::string since_start = "(t - " + Expression(scene.simulation.start_time).text() + ")";
     std::string law = in_brackets(*c.value);
-    if (c.rate) law += " + " + in_brackets(*c.rate) + "*(t - " + Expression(scene.simulation.start_time).text() + ")";
+    if (c.rate) law += " + " + in_brackets(*c.rate) + "*" + since_start;
+    if (c.acceleration) law += " + " + in_brackets(*c.acceleration) + "*" + since_start + "^2/2";
     drive.law = Expression::parse(law);
     out.drives.push_back(std::move(drive));
   }

@@ -9,9 +9,9 @@
 
 namespace mbsopt {
 
-// Conditions on angles, displacements, distances and global coordinates of points become drives of the law
-// value + rate (t - start_time); the degrees of freedom that no drive holds are chosen so. The scene returned has no
-// conditions left. Issues: conditions that cannot become drives.
+// Conditions on angles, displacements, distances, Euler parameters and global coordinates of points become drives of
+// the law value + rate (t - start_time) + acceleration (t - start_time)^2 / 2; the degrees of freedom that no drive
+// holds are chosen so. The scene returned has no conditions left. Issues: conditions that cannot become drives.
 Scene kinematic_scene(const Scene& scene, std::vector<SceneIssue>& issues);
 
 }  // namespace mbsopt

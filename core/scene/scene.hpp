@@ -220,6 +220,7 @@ struct Sensor {
 struct Condition {
   std::string sensor;
   std::optional<Field> value = {}, rate = {};
+  std::optional<Field> acceleration = {};  // of kinematics only (kinematic_scene.hpp)
 };
 
 struct Scene {
@@ -233,6 +234,7 @@ struct Scene {
   std::vector<Drive> drives;
   std::vector<Force> forces;
   std::vector<Condition> conditions;  // initial.conditions
+  int assembly_iterations = 400;      // initial.iterations: of positions, and of velocities, at most
   bool equilibrium = false;           // initial.equilibrium: start at rest from the static equilibrium near the guess
   std::vector<Sensor> sensors;
   SimulationSettings simulation;

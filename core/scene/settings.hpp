@@ -2,8 +2,11 @@
 // (docs/formulations.md); a problem file needs none of them.
 #pragma once
 
+#include <algorithm>
+#include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace mbsopt {
@@ -49,9 +52,26 @@ struct IntegratorOptions {
   bool operator==(const IntegratorOptions&) const = default;
 };
 
+// A tolerance that differs between the kinds of components of the state, and between bodies. A kind that is absent has
+// the smallest tolerance given. A body that is named has its own tolerance, of all its components.
+struct KindTolerances {
+  std::optional<double> position, angle, velocity, rate;  // of r [m], p (half an angle), rdot [m/s], pdot [1/s]
+  std::vector<std::pair<std::string, double>> bodies;
+  bool operator==(const KindTolerances&) const = default;
+
+  double smallest() const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const std::optional<double>& kind : {position, angle, velocity, rate})
+      least = std::min(least, kind.value_or(least));
+    for (const auto& [name, tolerance] : bodies) least = std::min(least, tolerance);
+    return least;
+  }
+};
+
 struct IntegratorSettings {
-  std::string type = "dopri5";  // a name of tableaus.hpp
-  double rtol = 1e-6, atol = 1e-8;
+  std::string type = "dopri5";                     // a name of tableaus.hpp
+  double rtol = 1e-6, atol = 1e-8;                 // the smallest of a component
+  std::optional<KindTolerances> rtol_of, atol_of;  // the others, in proportion (component_tolerances.hpp)
   std::optional<double> initial_step, max_step;
   std::optional<double> step;  // fixed step
   long max_steps = 10'000'000;

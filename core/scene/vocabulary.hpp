@@ -29,7 +29,8 @@
 //   group(key, says, f)                         f(visitor) inside: fields that are nested in the file only
 //   list(key, vector<T>&, says)                 describe(visitor, T) for each
 //   named(key, vector<T>&, says)                the same where the file has an object, its keys the names
-//   overrides(key, vector<pair<string, double>>&, says)  values by parameter
+//   values_of(key, vector<pair<string, double>>&, To, Range, says)  numbers by the name of a parameter or body
+//   tolerance(key, double&, optional<KindTolerances>&, says)  a number, or one for each kind of component
 //   version(key, number, says)                  that number and no other
 //   later(key, what)                            in the problem format, not in this version
 //   misplaced(key, where)                       a field of other objects of this kind, which `where` says
@@ -366,6 +367,7 @@ void describe(auto& v, Like<Condition> auto& c) {
   v.reference("sensor", c.sensor, To::sensor, {"a sensor", Need::required});
   v.number("value", c.value, {"its value at the start"});
   v.number("rate", c.rate, {"time derivative of its value at the start"});
+  v.number("acceleration", c.acceleration, {"of kinematics: second time derivative of its value"});
 }
 
 void describe(auto& v, Like<FormulationSettings> auto& f) {
@@ -404,10 +406,18 @@ void describe(auto& v, Like<IntegratorOptions> auto& o) {
          {"of the step: from the last error, the last two, the last three; when absent PI"});
 }
 
+void describe(auto& v, Like<KindTolerances> auto& t) {
+  v.plain("position", t.position, kPositive, {"of positions [m]; when absent the smallest of this object"});
+  v.plain("angle", t.angle, kPositive, {"of Euler parameters, half an angle; likewise"});
+  v.plain("velocity", t.velocity, kPositive, {"of velocities [m/s]; likewise"});
+  v.plain("rate", t.rate, kPositive, {"of the rates of Euler parameters [1/s]; likewise"});
+  v.values_of("bodies", t.bodies, To::body, kPositive, {"of all components of a body, by its name"});
+}
+
 void describe(auto& v, Like<IntegratorSettings> auto& i) {
   v.word("type", i.type, Words{integrator_names()}, {"integration method"});
-  v.plain("rtol", i.rtol, kPositive, {"relative tolerance of a step"});
-  v.plain("atol", i.atol, kPositive, {"absolute tolerance of a step"});
+  v.tolerance("rtol", i.rtol, i.rtol_of, {"relative tolerance of a step: a number, or one for each kind of component"});
+  v.tolerance("atol", i.atol, i.atol_of, {"absolute tolerance of a step: a number, or one for each kind of component"});
   v.plain("initial_step", i.initial_step, kPositive, {"[s]; chosen automatically when absent"});
   v.plain("max_step", i.max_step, kPositive, {"[s]"});
   v.plain("step", i.step, kPositive, {"fixed step [s]"});
@@ -448,6 +458,8 @@ void describe(auto& v, Like<Scene> auto& s) {
   v.list("forces", s.forces, {"springs, dampers and actuators"});
   v.group("initial", {"the state at the start time"}, [&](auto& inside) {
     inside.list("conditions", s.conditions, {"values and rates of sensors that the assembled state must have"});
+    inside.plain("iterations", s.assembly_iterations, kPositive,
+                 {"of the assembly of positions or velocities, at most"});
     inside.plain("equilibrium", s.equilibrium, kAny,
                  {"true: start at rest from the static equilibrium near the guess"});
   });

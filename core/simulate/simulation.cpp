@@ -288,7 +288,9 @@ SimulationResult integrate_adjoint(const Mechanism& mechanism, const SimulationS
     return run.finish();
   }
   Eigen::MatrixXd mu = sweep.mu();
-  run.assembly().add_adjoint(sweep.lambda(), mu);
+  const Eigen::MatrixXd lambda = sweep.lambda();
+  run.assembly().add_adjoint(lambda, mu);
+  result.psi_y_initial = lambda.transpose();
   result.psi_rho = mu.transpose();
   result.statistics.linearised_states += sweep.linearised_states();
   result.statistics.factorisations += sweep.factorisations();

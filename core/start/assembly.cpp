@@ -204,7 +204,7 @@ struct Assembly::Solution {
     const VectorXd guess = position_guess(data);
     result.y.head(N) = guess;
     position.start_branches(result.y);
-    q.emplace(nearest_point(positions, guess, Decomposition::on_demand));
+    q.emplace(nearest_point(positions, guess, Decomposition::on_demand, data.assembly_iterations));
     result.y.head(N) = q->x;
     result.iterations = q->iterations;
     result.residual = q->F.size() > 0 ? q->F.lpNorm<Eigen::Infinity>() : 0.0;
@@ -215,7 +215,8 @@ struct Assembly::Solution {
     if (data.equilibrium) return rest_in_equilibrium();
     velocity.set_angles(position.followed_angles());
     VelocityProblem velocities(velocity, q->x);
-    v.emplace(nearest_point(velocities, velocity_guess(data, q->x), Decomposition::on_demand));
+    v.emplace(
+        nearest_point(velocities, velocity_guess(data, q->x), Decomposition::on_demand, data.assembly_iterations));
     result.y.tail(N) = v->x;
     result.iterations += v->iterations;
     result.residual = std::max(result.residual, v->F.lpNorm<Eigen::Infinity>());

@@ -7,8 +7,8 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "core/body/lanes.hpp"
 #include "core/body/state_layout.hpp"
+#include "core/dynamics/acceleration_tangents.hpp"
 #include "core/dynamics/motion_solver.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
 #include "core/linear/dense.hpp"
@@ -57,35 +57,6 @@ FreeDirections free_directions(const MechanismData& d, const StatePoint& at, dou
   x.P = -OrthogonalDecomposition(J, kRankThreshold).solve(J_dot * x.N);
   x.phi_rho = F.rho.topRows(rows).cwiseAbs() + G.rho.topRows(rows).cwiseAbs();
   return x;
-}
-
-// Tangents of the accelerations in columns of y directions.
-MatrixXd acceleration_tangents(SpatialDynamics& dynamics, const MatrixXd& directions) {
-  const ParameterBlock none = block_without_parameters(dynamics.data());
-  MatrixXd out(directions.rows() / 2, directions.cols());
-  LaneRows y_dir(directions.rows(), kLanes), a_dir(out.rows(), kLanes);
-  for (Index first = 0; first < directions.cols(); first += kLanes) {
-    const Index lanes = std::min<Index>(kLanes, directions.cols() - first);
-    y_dir.setZero();
-    y_dir.leftCols(lanes) = directions.middleCols(first, lanes);
-    dynamics.acceleration_tangent(none, y_dir, a_dir);
-    out.middleCols(first, lanes) = a_dir.leftCols(lanes);
-  }
-  return out;
-}
-
-MatrixXd acceleration_of_parameters(SpatialDynamics& dynamics) {
-  const MechanismData& d = dynamics.data();
-  MatrixXd out = MatrixXd::Zero(StateLayout{d.n}.positions(), d.rho.size());
-  const LaneRows at_rest = LaneRows::Zero(2 * out.rows(), kLanes);
-  LaneRows a_dir(out.rows(), kLanes);
-  for (const ParameterBlock& block : parameter_blocks(d)) {
-    dynamics.acceleration_tangent(block, at_rest, a_dir);
-    for (int lane = 0; lane < kLanes; ++lane) {
-      if (block.parameter[lane] >= 0) out.col(block.parameter[lane]) = a_dir.col(lane);
-    }
-  }
-  return out;
 }
 
 // Eigenvalues, in units of 1/time in which the largest acceleration of a unit displacement is 1, so that no entry of A

@@ -139,20 +139,19 @@ VectorXd NearestPointLinearisation::descent(const VectorXd& b, const VectorXd& g
 
 namespace {
 
-constexpr int kMaxIterations = 400;
 constexpr double kLocal = 1e-6;       // steps below it are taken whole: the merit function sees only rounding there
 constexpr double kSatisfied = 1e-11;  // of F, per unit of x
 
 double largest(const VectorXd& x) { return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>(); }
 
 // Levenberg-Marquardt on 1/2 |weights F|^2: brings x to where the equations are violated least.
-void reduce_violation(NearestPointEquations& equations, VectorXd& x, int& iterations) {
+void reduce_violation(NearestPointEquations& equations, int most, VectorXd& x, int& iterations) {
   double mu = 1e-3;
   VectorXd F = equations.values(x);
   MatrixXd J = equations.jacobian(x);
   const VectorXd scale = equations.weights();
   auto violation = [&](const VectorXd& f) { return scale.cwiseProduct(f).squaredNorm(); };
-  for (int k = 0; k < kMaxIterations && mu < 1e12; ++k, ++iterations) {
+  for (int k = 0; k < most && mu < 1e12; ++k, ++iterations) {
     const MatrixXd A = scale.asDiagonal() * J;
     const VectorXd gradient = A.transpose() * scale.cwiseProduct(F);
     if (largest(gradient) < 1e-15) return;
@@ -176,7 +175,8 @@ void reduce_violation(NearestPointEquations& equations, VectorXd& x, int& iterat
 
 class Search {
  public:
-  Search(NearestPointEquations& equations, const VectorXd& x_guess) : equations_(equations), x_guess_(x_guess) {
+  Search(NearestPointEquations& equations, const VectorXd& x_guess, int most)
+      : equations_(equations), x_guess_(x_guess), most_(most) {
     result_.x = x_guess;
   }
 
@@ -226,7 +226,7 @@ class Search {
     constexpr double kConvex = 1e-3;  // least eigenvalue of Z'HZ at which they are
     constexpr int kPatience = 30;     // steps without a shorter one: it circles
     double shortest = std::numeric_limits<double>::infinity();
-    for (int waited = 0; waited < kPatience && result_.iterations < kMaxIterations; ++result_.iterations) {
+    for (int waited = 0; waited < kPatience && result_.iterations < most_; ++result_.iterations) {
       const VectorXd& x = result_.x;
       linearise();
       if (!result_.F.allFinite()) return true;
@@ -256,7 +256,7 @@ class Search {
   void sqp() {
     constexpr int kRestorations = 3;
     int restorations = 0;
-    const int last = result_.iterations + kMaxIterations;
+    const int last = result_.iterations + most_;
     shortest_ = std::numeric_limits<double>::infinity(), waited_ = 0;
     for (; result_.iterations < last; ++result_.iterations) {
       linearise();
@@ -386,7 +386,7 @@ class Search {
   // False where even the violation alone does not go to zero.
   bool restore() {
     VectorXd x = result_.x;
-    reduce_violation(equations_, x, result_.iterations);
+    reduce_violation(equations_, most_, x, result_.iterations);
     result_.x = x;
     closest_ = shortest_ = std::numeric_limits<double>::infinity();
     return largest(equations_.values(x)) < 1e-9 * size();
@@ -394,6 +394,7 @@ class Search {
 
   NearestPointEquations& equations_;
   const VectorXd x_guess_;
+  const int most_;  // iterations of each method
   NearestPoint result_;
   bool sized_ = false;
   double sigma_ = 1;
@@ -403,8 +404,9 @@ class Search {
 
 }  // namespace
 
-NearestPoint nearest_point(NearestPointEquations& equations, const VectorXd& x_guess, Decomposition decomposition) {
-  NearestPoint found = Search(equations, x_guess).run();
+NearestPoint nearest_point(NearestPointEquations& equations, const VectorXd& x_guess, Decomposition decomposition,
+                           int iterations) {
+  NearestPoint found = Search(equations, x_guess, iterations).run();
   if (decomposition == Decomposition::now) linearise(equations, found);
   return found;
 }

@@ -107,8 +107,9 @@ struct NearestPoint {
 };
 
 enum class Decomposition { now, on_demand };
+// iterations: at most, of each method.
 NearestPoint nearest_point(NearestPointEquations& equations, const Eigen::VectorXd& x_guess,
-                           Decomposition decomposition = Decomposition::now);
+                           Decomposition decomposition = Decomposition::now, int iterations = 400);
 // The dense decomposition, which a guess that satisfies its equations to rounding can do without until it is asked for.
 void linearise(NearestPointEquations& equations, NearestPoint& found);
 

@@ -22,6 +22,7 @@ ImplicitStages::ImplicitStages(const Mechanism& mechanism, const Method& method,
     : data_(mechanism.data()),
       rk_(method),
       settings_(settings),
+      tolerances_(data_, settings),
       equations_(dynamics),
       jacobian_(data_),
       values_(jacobian_.values()) {
@@ -201,7 +202,7 @@ double ImplicitStages::add_change(const Step& step, const StageGroup& g, const M
     for (int j = 0; j < s; ++j) dQ += (step.h * m.A(i, j)) * change_.col(j).tail(n);
     for (Eigen::Index e = 0; e < 2 * n; ++e) {
       const double size = std::abs(step.y0(e));
-      const double unit = exact ? 1 + size : settings_.atol + settings_.rtol * size;
+      const double unit = exact ? 1 + size : tolerances_.of(e, size);
       const double x = change_(e, i) / unit;
       sum += x * x;
     }

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/scene/settings.hpp"
+#include "core/step/component_tolerances.hpp"
 #include "core/step/shifted_system.hpp"
 #include "core/step/step.hpp"
 #include "core/tableau/stage_groups.hpp"
@@ -84,6 +85,7 @@ class ImplicitStages {
   const MechanismData& data_;
   const Method& rk_;
   IntegratorSettings settings_;
+  ComponentTolerances tolerances_;
   StageEquations equations_;
   MotionJacobian jacobian_;
   MotionJacobian::Values values_;

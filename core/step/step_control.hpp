@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "core/scene/settings.hpp"
+#include "core/step/component_tolerances.hpp"
 
 namespace mbsopt {
 
@@ -72,12 +73,12 @@ class StepController {
   bool last_rejected_ = false;
 };
 
-// Root mean square of x_i / (atol + rtol max(|a_i|, |b_i|)).
-inline double scaled_norm(const Eigen::VectorXd& x, const Eigen::VectorXd& a, const Eigen::VectorXd& b, double rtol,
-                          double atol) {
+// Root mean square of x_i / (atol_i + rtol_i max(|a_i|, |b_i|)).
+inline double scaled_norm(const Eigen::VectorXd& x, const Eigen::VectorXd& a, const Eigen::VectorXd& b,
+                          const ComponentTolerances& tolerances) {
   double sum = 0;
   for (Eigen::Index i = 0; i < x.size(); ++i) {
-    const double e = x(i) / (atol + rtol * std::max(std::abs(a(i)), std::abs(b(i))));
+    const double e = x(i) / tolerances.of(i, std::max(std::abs(a(i)), std::abs(b(i))));
     sum += e * e;
   }
   return std::sqrt(sum / static_cast<double>(x.size()));

@@ -38,8 +38,8 @@ std::string too_few_digits(const IntegratorSettings& settings, double t) {
                      settings.rtol, settings.atol, t);
 }
 
-bool beyond_digits(const IntegratorSettings& s, const Eigen::VectorXd& y) {
-  return !(std::numeric_limits<double>::epsilon() * scaled_norm(y, y, y, s.rtol, s.atol) <= 1);
+bool beyond_digits(const ComponentTolerances& tolerances, const Eigen::VectorXd& y) {
+  return !(std::numeric_limits<double>::epsilon() * scaled_norm(y, y, y, tolerances) <= 1);
 }
 
 std::string step_failure(StepOutcome outcome, double t, double h, bool adaptive,

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/scene/settings.hpp"
+#include "core/step/component_tolerances.hpp"
 
 namespace mbsopt {
 
@@ -22,7 +23,7 @@ std::string too_long_run(double span, double longest);
 // Tolerances below the rounding errors of numbers.
 std::string too_few_digits(const IntegratorSettings& settings, double t);
 // Whether they are, for the state y, in the norm of the step-size control.
-bool beyond_digits(const IntegratorSettings& settings, const Eigen::VectorXd& y);
+bool beyond_digits(const ComponentTolerances& tolerances, const Eigen::VectorXd& y);
 // Where S = M + alpha J'J may have lost M to rounding: what to change, as the end of a message.
 std::string about_alpha(const FormulationSettings& formulation);
 

@@ -212,7 +212,11 @@ std::vector<Objective> objectives_of(const Problem& problem, const std::vector<s
     if (found == known.end())
       throw std::invalid_argument(
           fmt::format("there is no objective '{}'{}; known: {}", name, did_you_mean(name, known), joined(known)));
-    result.emplace_back(problem.scene, problem.objectives[static_cast<std::size_t>(found - known.begin())]);
+    const ObjectiveSpec& spec = problem.objectives[static_cast<std::size_t>(found - known.begin())];
+    if (spec.is_written_in_cpp())
+      result.emplace_back(spec.name, spec.running_in_cpp, spec.terminal_in_cpp);
+    else
+      result.emplace_back(problem.scene, spec);
   }
   return result;
 }

@@ -76,6 +76,7 @@ void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
   }
   kinds.emplace_back("eigenvalue");
   if (objective.eigenvalue) ++alone;
+  if (objective.is_written_in_cpp()) ++alone;
   if (!sums && alone == 0)
     checker.issue(checker.path(),
                   "has no part; running, terminal, samples, track and parameters_only (added), or one of " +

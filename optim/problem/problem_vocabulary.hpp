@@ -157,7 +157,7 @@ void describe(auto& v, Like<ExperimentSpec> auto& e) {
   v.plain("end_time", e.end_time, kAny,
           {"[s]; later rows are left out; all are used when absent", Need::optional, dimension::kTime});
   v.list("channels", e.channels, {"columns that are compared", Need::required});
-  v.overrides("overrides", e.overrides, {"parameter values of this experiment"});
+  v.values_of("overrides", e.overrides, To::parameter, kAny, {"parameter values of this experiment"});
   v.named("signals", e.signals, {"samples of signals in this experiment, instead of the signals' own"});
   v.list("drives", e.drives, {"laws of drives in this experiment"});
   v.references("free", e.free, To::parameter, {"parameters with a value of their own in this experiment"});

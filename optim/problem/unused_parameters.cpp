@@ -391,7 +391,9 @@ void allow_what_only_measurements_use(Problem& problem) {
 Problem what_objectives_need(const Problem& problem, std::vector<std::string>* left_out) {
   Problem needed = problem;
   std::vector<std::string> names;
-  if (!problem.objectives.empty()) {
+  // Costs written in C++ read the state by the numbers of bodies: they need all bodies.
+  const bool opaque = std::ranges::any_of(problem.objectives, &ObjectiveSpec::is_written_in_cpp);
+  if (!problem.objectives.empty() && !opaque) {
     Problem judged = problem;
     judged.identification.reset();
     needed.scene = FieldSearch(judged).needed(names);

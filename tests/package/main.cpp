@@ -1,10 +1,7 @@
 // A project of its own: swings a rod, then minimises with Ipopt through the installed libraries.
 #include <cmath>
 #include <cstdio>
-
-#include "core/mechanism/mechanism.hpp"
-#include "core/simulate/simulation.hpp"
-#include "optim/solver/ipopt_solver.hpp"
+#include <mbsopt/mbsopt.hpp>
 
 namespace {
 

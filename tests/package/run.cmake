@@ -1,4 +1,5 @@
-# Installs the build to a folder of its own, then configures, builds and runs a project that uses it.
+# Installs the build to a folder of its own, then configures, builds and runs projects that use it: examples/, and one
+# that has a folder core/ of its own.
 set(work ${BUILD}/package_test)
 file(REMOVE_RECURSE ${work})
 execute_process(COMMAND ${CMAKE_COMMAND} --install ${BUILD} --prefix ${work}/prefix
@@ -7,3 +8,13 @@ execute_process(COMMAND ${CMAKE_COMMAND} -S ${SOURCE} -B ${work}/consumer -G ${G
                         -DCMAKE_PREFIX_PATH=${work}/prefix -DCMAKE_BUILD_TYPE=Release COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND ${CMAKE_COMMAND} --build ${work}/consumer COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND ${work}/consumer/consumer COMMAND_ERROR_IS_FATAL ANY)
+
+file(GLOB headers ${work}/prefix/include/mbsopt/*.hpp)
+list(LENGTH headers count)
+if(count GREATER 40)
+  message(FATAL_ERROR "${count} public headers; at most 40 are wanted")
+endif()
+execute_process(COMMAND ${CMAKE_COMMAND} -S ${SOURCE}/../../examples -B ${work}/examples -G ${GENERATOR}
+                        -DCMAKE_PREFIX_PATH=${work}/prefix -DCMAKE_BUILD_TYPE=Release COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND ${CMAKE_COMMAND} --build ${work}/examples COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND ${CMAKE_CTEST_COMMAND} --test-dir ${work}/examples --output-on-failure COMMAND_ERROR_IS_FATAL ANY)

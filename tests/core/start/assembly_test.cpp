@@ -692,3 +692,12 @@ TEST_CASE("the order of bodies and joints does not change a state assembled from
   CHECK(translations < 1e-12);
   CHECK(turns < 1e-12);
 }
+
+TEST_CASE("an assembly ends after the iterations that the scene allows", "[assembly]") {
+  Scene scene;
+  scene.bodies = {body("rod", vec("0.5", "0", "0"), vec("0.4", "0.3", "0.1"), turned("0.9"))};
+  scene.joints = {hinge("pin", "ground", vec("0", "0", "0"), "rod", vec("0", "0", "0"))};
+  CHECK(Assembly(Mechanism(scene, Eigen::VectorXd()), 0).result().ok);
+  scene.assembly_iterations = 1;
+  CHECK_FALSE(Assembly(Mechanism(scene, Eigen::VectorXd()), 0).result().ok);
+}

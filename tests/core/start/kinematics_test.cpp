@@ -234,3 +234,49 @@ TEST_CASE("kinematics of a body that no joint holds is refused", "[kinematics]")
   CHECK_FALSE(result.ok);
   CHECK_THAT(result.message, Catch::Contains("6 degrees of freedom"));
 }
+
+TEST_CASE("conditions with an acceleration hold a degree of freedom, and so do Euler parameters", "[kinematics]") {
+  Scene scene = slider_crank();
+  scene.sensors.push_back(angle_sensor("theta", "A"));
+  scene.conditions = {{"theta", f("0.4"), f("3"), f("-2")}};  // 0.4 + 3 t - t^2
+  std::vector<SceneIssue> issues;
+  const Mechanism driven(kinematic_scene(scene, issues), VectorXd());
+  REQUIRE(issues.empty());
+  const auto angle = [](double t) { return 0.4 + 3 * t - t * t; };
+  std::vector<double> positions;
+  const auto check = [&](std::size_t, const StatePoint& at) {
+    const double c = angle(at.t), w = 3 - 2 * at.t, s = std::sin(c), k = std::cos(c);
+    const double root = std::sqrt(kRod * kRod - kCrank * kCrank * s * s);
+    const double root_c = -kCrank * kCrank * s * k / root;
+    const double root_cc = (-kCrank * kCrank * (k * k - s * s) - root_c * root_c) / root;
+    CHECK(driven.sensor_value(0, at) == Approx(kCrank * k + root).epsilon(1e-12));
+    CHECK(driven.sensor_value(2, at) ==
+          Approx((-kCrank * k + root_cc) * w * w - 2 * (-kCrank * s + root_c)).epsilon(1e-9));
+    positions.push_back(driven.sensor_value(0, at));
+    return true;
+  };
+  const std::vector<double> when = times(1.2, 6);
+  CHECK(solve_kinematics(driven, Assembly(driven, 0), scene.simulation, when, check).ok);
+  REQUIRE(positions.size() == when.size());
+
+  // e3 = sin(angle/2) as the coordinate of the crank, at a constant rate
+  Sensor e3;
+  e3.name = "e3", e3.quantity = "orientation", e3.body = "crank", e3.component = "e3";
+  scene.sensors.push_back(e3);
+  scene.conditions = {{"e3", f("sin(0.2)"), f("0.5")}};
+  const Mechanism by_parameter(kinematic_scene(scene, issues), VectorXd());
+  REQUIRE(issues.empty());
+  int seen = 0;
+  const auto follow = [&](std::size_t, const StatePoint& at) {
+    const double c = 2 * std::asin(std::sin(0.2) + 0.5 * at.t);
+    CHECK(by_parameter.sensor_value(0, at) ==
+          Approx(kCrank * std::cos(c) + std::sqrt(kRod * kRod - std::pow(kCrank * std::sin(c), 2))).epsilon(1e-11));
+    ++seen;
+    return true;
+  };
+  CHECK(solve_kinematics(by_parameter, Assembly(by_parameter, 0), scene.simulation, times(0.6, 4), follow).ok);
+  CHECK(seen == 5);
+
+  scene.conditions = {{"theta", f("0.4"), f("3"), f("-2")}};
+  CHECK_THROWS_WITH(Mechanism(scene, VectorXd()), Catch::Contains("initial.conditions[0].acceleration"));
+}

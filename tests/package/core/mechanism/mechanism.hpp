@@ -1,0 +1,1 @@
+#error "a folder of the consumer stands for one of mbsopt"
