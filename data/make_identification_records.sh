@@ -71,3 +71,14 @@ LATE=0.012 record ride_fast 15 0.0005 z
 motion run_down friction/identify parameters.coulomb.value=1.2 parameters.viscous.value=0.05 parameters.slip.value=0.4 \
   parameters.omega0.value=20
 WRONG=20 DIALECT=semicolon record run_down 16 0.05 omega
+
+# The arm's torques, and its motion by them from rest. Its columns are those of an arm with measured torques.
+awk 'BEGIN { print "time,tau_meas1,tau_meas2"; for (i = 0; i <= 400; ++i) { t = i / 100
+  printf "%.2f,%.6f,%.6f\n", t, 0.5 * sin(4.5 * t) + 0.3 * sin(7.9 * t), 0.4 * sin(5.7 * t) - 0.3 * sin(10.3 * t) } }' \
+  >data/identification/arm_torque.csv
+printf 'time,pos_meas1,pos_meas2,vel_meas1,vel_meas2\n0,0,0,0,0\n1,0,0,0,0\n4,0,0,0,0\n' >data/identification/arm.csv
+motion arm double_pendulum/identify_windows parameters.h1.value=0.25 parameters.J1.value=0.06 parameters.h2.value=0.16 \
+  parameters.J2.value=0.05 parameters.coulomb1.value=0.1 parameters.coulomb2.value=0.08 parameters.viscous1.value=0.02 \
+  parameters.viscous2.value=0.01
+record arm 17 0.005 pos_meas1 pos_meas2 vel_meas1 vel_meas2
+sed -i '1s/^t,/time,/' data/identification/arm.csv

@@ -4,11 +4,13 @@
 #include "app/report/run_report.hpp"
 #include "app/report/sensor_unit.hpp"
 #include "app/results/accuracy_results.hpp"
+#include "app/results/case_results.hpp"
 #include "app/results/identification_results.hpp"
 #include "app/results/left_out_bodies.hpp"
 #include "app/results/optimized_problem.hpp"
 #include "app/results/preflight_results.hpp"
 #include "app/results/trajectory_csv.hpp"
+#include "app/results/window_results.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/starts/identify_starts.hpp"
@@ -23,6 +25,7 @@
 #include "optim/fit/fit_comparison.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/fit/recovery.hpp"
+#include "optim/fit/windows.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
 namespace mbsopt {
@@ -64,11 +67,13 @@ std::function<bool(double t)> told(Run& run) {
   };
 }
 
-IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem, const std::vector<CsvTable>& data) {
+// given: what the problem file says, cut into windows.
+IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem, const std::vector<CsvTable>& data,
+                            const Problem& given) {
   JsonResidualRecords records(long_run.earlier().residuals,
                               [&](const Json& content) { long_run.add("residuals", content); });
   IdentificationOptions options;
-  options.records = &records;
+  options.records = &records, options.threads = case_threads(run);
   options.profiles = run.context.options.profiles;
   options.simulation_progress = told(run);
   options.progress = [&](const FitRow& row) {
@@ -86,11 +91,11 @@ IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem,
   };
   IdentificationResult fit = run_identification(problem, data, options);
   run.progress.finish();
-  if (run.problem.identification->multistart) describe_given(run.problem, fit);
+  if (run.problem.identification->multistart) describe_given(given, fit);
   return fit;
 }
 
-Recovery recovered(Run& run, const std::vector<CsvTable>& data, const IdentificationResult& fit) {
+Recovery recovered(Run& run, const CutProblem& cut, const IdentificationResult& fit) {
   RecoveryOptions options;
   options.seeds = run.context.options.recover;
   options.simulation_progress = told(run);
@@ -98,7 +103,7 @@ Recovery recovered(Run& run, const std::vector<CsvTable>& data, const Identifica
     run.progress.iteration(fmt::format("recovery   {} of {}", done, options.seeds));
     return !interrupted();
   };
-  Recovery recovery = recover(run.problem, data, fit, options);
+  Recovery recovery = recover(cut.problem, cut.data, fit, options);
   run.progress.finish();
   if (recovery.failed > 0)
     run.warn(fmt::format("--recover: {} of {} fits of simulated records failed", recovery.failed,
@@ -108,7 +113,7 @@ Recovery recovered(Run& run, const std::vector<CsvTable>& data, const Identifica
 
 int preflight(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
   IdentificationOptions options;
-  options.preflight = true, options.simulation_progress = told(run);
+  options.preflight = true, options.threads = case_threads(run), options.simulation_progress = told(run);
   const IdentificationResult start = run_identification(needed, data, options);
   run.progress.finish();
   if (start.residuals.empty()) {
@@ -174,7 +179,7 @@ SimulatedExperiment simulate_first_experiment(Run& run, const Problem& needed, c
 }
 
 // Before and after the fit, for the report; without the fitted one where its simulation stops.
-std::string report_of(Run& run, const Problem& needed, const std::vector<CsvTable>& data,
+std::string report_of(Run& run, const Problem& cut, const Problem& needed, const std::vector<CsvTable>& data,
                       const SimulatedExperiment& before, const IdentificationResult& fit, const Trajectory& history) {
   std::vector<MovingState> states;
   std::optional<SimulatedExperiment> after;
@@ -186,7 +191,7 @@ std::string report_of(Run& run, const Problem& needed, const std::vector<CsvTabl
       states.push_back({"fitted", after->scene, after->trajectory});
     }
   }
-  return identification_report(run.problem.scene, run.result, history, fit_plots(run.problem, fit), states);
+  return identification_report(run.problem.scene, run.result, history, fit_plots(cut, fit), states);
 }
 
 std::vector<NewValue> new_values(const IdentificationResult& fit) {
@@ -206,9 +211,11 @@ int identify_command(const CommandContext& context) {
   if (!run.problem.identification) {
     throw std::invalid_argument("identification: missing; it says which measurements to explain and what may change");
   }
-  const std::vector<CsvTable> data = data_of(run.problem);
+  const std::vector<CsvTable> whole = data_of(run.problem);
+  const CutProblem cut = cut_into_windows(run.problem, whole);
+  const std::vector<CsvTable>& data = cut.data;
   // With its drives and overrides, which the scene itself may not even assemble without.
-  const Scene first = simulated_scene(run.problem, data);
+  const Scene first = simulated_scene(cut.problem, data);
   const Mechanism mechanism(first, parameter_values(first));
   run.start();
   if (!settle_accuracy(run, first, {})) return run.finish();
@@ -220,24 +227,26 @@ int identify_command(const CommandContext& context) {
     for (const std::string& warning : model_warnings(mechanism, assembly)) run.warn(warning);
   }
   std::vector<std::string> left_out;
-  const Problem needed = what_measurements_need(run.problem, &left_out);
+  const Problem needed = what_measurements_need(cut.problem, &left_out);
   say_left_out(run, left_out, "measurement");
+  for (const std::string& warning : cut.warnings) run.warn(warning);
+  add_windows(run, cut.problem);
   const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
   for (const std::string& warning : doubts_about_fit(needed, data, {{}, [](double) { return !interrupted(); }}))
     run.warn(warning);
   if (context.options.preflight) return preflight(run, needed, data);
   LongRun long_run(run);
-  const BestStart best = from_best_start(run, long_run, data);
+  const BestStart best = from_best_start(run, long_run, whole);
   const std::optional<MultistartSpec>& starts = run.problem.identification->multistart;
   if (interrupted() && starts) return stopped_within_starts(run, long_run, best.problem);
   long_run.begin();
-  IdentificationResult fit = fitted(run, long_run, best.problem, data);
+  IdentificationResult fit = fitted(run, long_run, best.problem, whole, cut.problem);
   fit.simulations += best.simulations, fit.wall_seconds += best.wall_seconds;
   add_to_result(run.result, fit);
   print_fit(context.out, fit, effort(run, starts, fit.simulations, fit.wall_seconds));
   for (const std::string& warning : fit.warnings) run.warn(warning);
   if (context.options.recover > 0 && fit.ok() && !interrupted()) {
-    const Recovery recovery = recovered(run, data, fit);
+    const Recovery recovery = recovered(run, cut, fit);
     print_recovery(context.out, recovery);
     add_to_result(run.result, recovery);
   }
@@ -251,7 +260,7 @@ int identify_command(const CommandContext& context) {
   run.write("history.csv", to_csv(history));
   run.write("residuals.csv", residuals_csv(fit));
   if (!fit.profiles.empty()) run.write("profile.csv", profile_csv(fit));
-  run.write("report.html", report_of(run, needed, data, before, fit, history));
+  run.write("report.html", report_of(run, cut.problem, needed, data, before, fit, history));
   return long_run.finish();
 }
 

@@ -11,6 +11,7 @@
 #include "app/starts/identify_starts.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/scene/default_integrator.hpp"
+#include "optim/fit/windows.hpp"
 #include "optim/tradeoff/fit_errors.hpp"
 
 namespace mbsopt {
@@ -54,9 +55,10 @@ void sweep(Run& run) {
   add_given_settings(run, tradeoff);
   const Problem& problem = run.problem;
   const std::vector<CsvTable> data = problem.identification ? data_of(problem) : std::vector<CsvTable>();
+  const CutProblem cut = cut_into_windows(problem, data);
   std::optional<FitErrorMeasure> fit;
   if (problem.identification && !tradeoff.interrupted) {
-    fit.emplace(problem, data, [] { return interrupted(); });
+    fit.emplace(cut.problem, cut.data, [] { return interrupted(); });
     add_fit(run, *fit);
   }
   TaskAdviser adviser(problem, tradeoff, fit ? &*fit : nullptr, kFits * options.budget_seconds);

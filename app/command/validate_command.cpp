@@ -2,10 +2,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/results/window_results.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
+#include "app/starts/identify_starts.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/start/free_motion.hpp"
+#include "optim/fit/windows.hpp"
 #include "optim/problem/parameter_uses.hpp"
 
 namespace mbsopt {
@@ -49,6 +52,7 @@ int validate_command(const CommandContext& context) {
         << "simulation.accuracy chooses the integrator when it is run; with an implicit one the model is spatial\n";
   if (closed) add_free_motions(run, mechanism, assembly);
   if (closed) add_parameters(run);
+  if (run.problem.identification) add_windows(run, cut_into_windows(run.problem, data_of(run.problem)).problem);
   return run.finish();
 }
 

@@ -102,6 +102,7 @@ Json to_json(const ExperimentFit& e) {
             {"samples", e.samples},
             {"rms", e.rms},
             {"channels", Json::object()}};
+  if (e.window) json["window"] = {{"of", e.window->experiment}, {"number", e.window->number}};
   for (const ChannelFit& c : e.channels) {
     json["channels"][c.column] = {{"sensor", c.sensor},
                                   {"samples", c.samples},

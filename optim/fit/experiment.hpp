@@ -68,6 +68,7 @@ class Experiment {
 
   const std::vector<double>& times() const { return times_; }
   const std::vector<Sample>& samples() const { return samples_; }  // by time, then channel
+  const std::vector<Unknown>& unknowns() const { return unknowns_; }
   std::size_t channels() const { return channels_.size(); }
   double sigma(std::size_t channel) const { return channels_[channel].sigma; }
   void set_sigma(std::size_t channel, double sigma) { channels_[channel].sigma = sigma; }

@@ -3,28 +3,33 @@
 #include <algorithm>
 #include <numeric>
 
+#include "optim/machine/on_threads.hpp"
+
 namespace mbsopt {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
 namespace {
 
 // A trial that needs so many times the steps of all before it has gone astray (negative damping, say): it counts as
 // failed before it takes forever.
 constexpr long kStepGrowth = 30;
 
-Eigen::Index samples_of(const std::vector<ExperimentStack::Member>& members) {
-  return std::accumulate(members.begin(), members.end(), Eigen::Index{0}, [](Eigen::Index n, const auto& m) {
-    return n + static_cast<Eigen::Index>(m.model.samples().size());
-  });
+Index samples_of(const std::vector<ExperimentStack::Member>& members) {
+  return std::accumulate(members.begin(), members.end(), Index{0},
+                         [](Index n, const auto& m) { return n + static_cast<Index>(m.model.samples().size()); });
 }
 
-Eigen::Index priors_of(const std::vector<UnknownParameter>& unknowns) {
+Index priors_of(const std::vector<UnknownParameter>& unknowns) {
   return std::count_if(unknowns.begin(), unknowns.end(), [](const auto& u) { return u.description.prior.has_value(); });
 }
 
 // f(model, sample) of every sample.
 template <class F>
-Eigen::VectorXd per_sample(const std::vector<ExperimentStack::Member>& members, F&& f) {
-  Eigen::VectorXd values(samples_of(members));
-  Eigen::Index row = 0;
+VectorXd per_sample(const std::vector<ExperimentStack::Member>& members, F&& f) {
+  VectorXd values(samples_of(members));
+  Index row = 0;
   for (const ExperimentStack::Member& m : members)
     for (const Experiment::Sample& sample : m.model.samples()) values(row++) = f(m.model, sample);
   return values;
@@ -41,58 +46,86 @@ ExperimentStack::ExperimentStack(std::vector<Member> members, const std::vector<
   loss = fit_loss;
   for (std::size_t i = 0; i < unknowns.size(); ++i)
     if (const auto& prior = unknowns[i].description.prior)
-      priors_.push_back({static_cast<Eigen::Index>(i), prior->mean, prior->sigma});
-  plain = static_cast<Eigen::Index>(priors_.size());
+      priors_.push_back({static_cast<Index>(i), prior->mean, prior->sigma});
+  plain = static_cast<Index>(priors_.size());
+  Index row = 0;
+  for (const Member& m : members_) {
+    Dependence& part = parts.emplace_back();
+    part.rows.resize(m.model.samples().size());
+    std::iota(part.rows.begin(), part.rows.end(), row);
+    row += static_cast<Index>(part.rows.size());
+    for (const Experiment::Unknown& unknown : m.model.unknowns()) part.variables.push_back(unknown.at);
+  }
+  for (const Prior& prior : priors_) {  // beside the samples that depend on its variable
+    const auto depends = [&](const Dependence& part) {
+      return std::ranges::find(part.variables, prior.at) != part.variables.end();
+    };
+    const auto part = std::ranges::find_if(parts, depends);
+    if (part == parts.end())
+      parts.push_back({{row++}, {prior.at}});
+    else
+      part->rows.push_back(row++);
+  }
 }
 
-Eigen::VectorXd ExperimentStack::measured() const {
+VectorXd ExperimentStack::measured() const {
   return per_sample(members_, [](const Experiment&, const Experiment::Sample& sample) { return sample.measured; });
 }
 
-Eigen::VectorXd ExperimentStack::sigma() const {
+VectorXd ExperimentStack::sigma() const {
   return per_sample(members_,
                     [](const Experiment& model, const Experiment::Sample& s) { return model.sigma(s.channel); });
 }
 
 std::vector<SampledRecord> ExperimentStack::records_in_time() const {
-  const Eigen::VectorXd t =
+  const VectorXd t =
       per_sample(members_, [](const Experiment& model, const Experiment::Sample& s) { return model.times()[s.time]; });
   std::vector<SampledRecord> in_time;
-  Eigen::Index row = 0;
+  Index row = 0;
   for (const Member& m : members_) {
-    const Eigen::Index n = static_cast<Eigen::Index>(m.model.samples().size());
+    const Index n = static_cast<Index>(m.model.samples().size());
     in_time.push_back({row, t.segment(row, n)});
     row += n;
   }
   return in_time;
 }
 
-Experiment::Residuals ExperimentStack::residuals(const Member& member, const Eigen::VectorXd& u) {
-  ResidualRecords::Asked asked{member.experiment, u, {}};
-  Experiment::Residuals r;
-  if (records) {
-    for (std::size_t c = 0; c < member.model.channels(); ++c) asked.sigma.push_back(member.model.sigma(c));
-    if (records->recall(asked, r)) return r;
+std::vector<Experiment::Residuals> ExperimentStack::residuals(const VectorXd& u) {
+  std::vector<Experiment::Residuals> found(members_.size());
+  std::vector<ResidualRecords::Asked> asked;
+  std::vector<std::size_t> simulated;
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    const Member& m = members_[i];
+    asked.push_back({m.experiment, u, {}});
+    for (std::size_t c = 0; c < m.model.channels(); ++c) asked[i].sigma.push_back(m.model.sigma(c));
+    if (!records || !records->recall(asked[i], found[i])) simulated.push_back(i);
   }
-  ++simulations_;
-  Experiment::Limits limits{go_on, {}};
-  if (member.most_steps > 0) limits.max_steps = kStepGrowth * member.most_steps;
-  r = member.model.residuals(u, limits);
-  if (records && r.ok) records->record(asked, r);
-  return r;
+  simulations_ += static_cast<long>(simulated.size());
+  on_threads(simulated.size(), threads, [&](std::size_t job) {
+    const Member& m = members_[simulated[job]];
+    Experiment::Limits limits{go_on, {}};
+    if (m.most_steps > 0) limits.max_steps = kStepGrowth * m.most_steps;
+    found[simulated[job]] = m.model.residuals(u, limits);
+  });
+  if (records)
+    for (const std::size_t i : simulated)
+      if (found[i].ok) records->record(asked[i], found[i]);
+  return found;
 }
 
-void ExperimentStack::evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) {
-  const Eigen::VectorXd u = scaling_.to_rho(x), u_x = scaling_.rho_x(x);
-  Eigen::Index row = 0;
-  for (Member& m : members_) {
-    const Experiment::Residuals r = residuals(m, u);
+void ExperimentStack::evaluate(const VectorXd& x, LeastSquaresPoint& point) {
+  const VectorXd u = scaling_.to_rho(x), u_x = scaling_.rho_x(x);
+  const std::vector<Experiment::Residuals> found = residuals(u);
+  Index row = 0;
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    Member& m = members_[i];
+    const Experiment::Residuals& r = found[i];
     if (!r.ok) {
       point.ok = false, point.message = r.message;
       return;
     }
     m.most_steps = std::max(m.most_steps, r.steps);
-    const Eigen::Index n = r.z.size();
+    const Index n = r.z.size();
     point.z.segment(row, n) = r.z;
     point.z_x.middleRows(row, n) = r.z_u * u_x.asDiagonal();
     row += n;

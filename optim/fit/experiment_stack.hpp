@@ -52,7 +52,8 @@ class ExperimentStack : public LeastSquaresProblem {
   Eigen::VectorXd measured() const, sigma() const;     // per sample
   std::vector<SampledRecord> records_in_time() const;  // one per member
   long simulations() const { return simulations_; }
-  std::function<bool(double t)> go_on;  // within a simulation; false abandons it
+  int threads = 1;                      // experiments at a time
+  std::function<bool(double t)> go_on;  // within a simulation, in any thread; false abandons it
   ResidualRecords* records = nullptr;
 
  private:
@@ -60,7 +61,7 @@ class ExperimentStack : public LeastSquaresProblem {
     Eigen::Index at;
     double mean, sigma;
   };
-  Experiment::Residuals residuals(const Member& member, const Eigen::VectorXd& u);
+  std::vector<Experiment::Residuals> residuals(const Eigen::VectorXd& u);  // per member
 
   std::vector<Member> members_;
   const VariableScaling& scaling_;

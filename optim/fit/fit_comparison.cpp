@@ -20,8 +20,8 @@ struct Fitted {
     const IdentificationSpec& spec = *problem.identification;
     for (std::size_t e = 0; e < spec.experiments.size(); ++e)
       if (!spec.experiments[e].validate)
-        experiments.emplace_back(scene, spec.experiments[e], fmt::format("identification.experiments[{}]", e), data[e],
-                                 parameter_values(scene), unknowns_in(scene, spec, e, unknowns), options.user_forces);
+        experiments.emplace_back(scene, spec.experiments[e], place_of(spec, e), data[e], parameter_values(scene),
+                                 unknowns_in(scene, spec, e, unknowns), options.user_forces);
   }
 
   // All residuals, one experiment below the other; derivatives where z_u is given.

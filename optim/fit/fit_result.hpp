@@ -40,6 +40,7 @@ struct ChannelFit {
 
 struct ExperimentFit {
   std::string name;
+  std::optional<WindowOrigin> window;  // where it is one
   bool validate = false;
   double start_time = 0, end_time = 0;  // of its simulation [s]
   std::size_t samples = 0;

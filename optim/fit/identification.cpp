@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <mutex>
 #include <numbers>
 #include <stdexcept>
 
@@ -15,6 +16,7 @@
 #include "optim/fit/profile_likelihood.hpp"
 #include "optim/fit/scored_experiment.hpp"
 #include "optim/fit/sigma_estimation.hpp"
+#include "optim/fit/windows.hpp"
 #include "optim/machine/stopwatch.hpp"
 #include "optim/problem/parameter_values.hpp"
 #include "optim/problem/unused_parameters.hpp"
@@ -30,14 +32,15 @@ constexpr double kTolerances = 10, kLeastAccuracy = 1e-5;
 constexpr std::size_t kManyRecords = 20;
 constexpr double kTouches = 1e-9;  // of the bound's size: the trust region puts solutions exactly on bounds
 
-std::string place_of(std::size_t experiment) { return fmt::format("identification.experiments[{}]", experiment); }
-
 class Identification {
  public:
   Identification(const Problem& problem, const std::vector<CsvTable>& data, const IdentificationOptions& options)
       : scene_(problem.scene), spec_(checked(problem, data)), data_(data), options_(options) {
     if (options.simulation_progress)
-      go_on_ = [this](double t) { return abandoned_ = abandoned_ || !options_.simulation_progress(t), !abandoned_; };
+      go_on_ = [this](double t) {  // in any thread
+        const std::scoped_lock lock(told_);
+        return abandoned_ = abandoned_ || !options_.simulation_progress(t), !abandoned_;
+      };
   }
 
   IdentificationResult run() {
@@ -64,7 +67,7 @@ class Identification {
       for (std::size_t d = 0; d < e; ++d)
         if (spec.experiments[d].name == spec.experiments[e].name)
           throw std::invalid_argument(
-              fmt::format("{}.name: '{}' is taken already", place_of(e), spec.experiments[e].name));
+              fmt::format("{}.name: '{}' is taken already", place_of(spec, e), spec.experiments[e].name));
     if (std::all_of(spec.experiments.begin(), spec.experiments.end(), [](const auto& e) { return e.validate; }))
       throw std::invalid_argument("identification.experiments: all of them validate, none is fitted");
     return spec;
@@ -142,7 +145,7 @@ class Identification {
 
   ExperimentStack::Member member(std::size_t e, const Eigen::VectorXd& rho,
                                  const std::vector<UnknownParameter>& unknowns) const {
-    return {e, Experiment(scene_, spec_.experiments[e], place_of(e), data_[e], rho,
+    return {e, Experiment(scene_, spec_.experiments[e], place_of(spec_, e), data_[e], rho,
                           unknowns_in(scene_, spec_, e, unknowns), options_.user_forces)};
   }
 
@@ -269,7 +272,7 @@ class Identification {
     for (std::size_t e = 0; e < spec_.experiments.size(); ++e)
       if (!spec_.experiments[e].validate) members.push_back(member(e, parameter_values(scene_), unknowns));
     ExperimentStack stack(std::move(members), unknowns, scaling, spec_.loss);
-    stack.go_on = go_on_, stack.records = options_.records;
+    stack.go_on = go_on_, stack.records = options_.records, stack.threads = options_.threads;
     if (stack.size < stack.variables())
       throw std::invalid_argument(fmt::format("identification: {} cannot determine {}",
                                               counted(stack.samples(), "sample"),
@@ -418,6 +421,7 @@ class Identification {
   const IdentificationOptions& options_;
   IdentificationResult result_;
   std::function<bool(double t)> go_on_;
+  std::mutex told_;
   bool abandoned_ = false, sigmas_are_estimated_ = false;
   Eigen::VectorXd apart_at_start_;  // measured - model, then the residuals of the priors
   Eigen::VectorXd shared_;          // all parameters, the shared ones as fitted
@@ -427,8 +431,10 @@ class Identification {
 
 IdentificationResult run_identification(const Problem& problem, const std::vector<CsvTable>& data,
                                         const IdentificationOptions& options) {
-  const Problem needed = what_measurements_need(problem);
-  return Identification(needed, data, options).run();
+  const CutProblem cut = cut_into_windows(what_measurements_need(problem), data, options.user_forces);
+  IdentificationResult result = Identification(cut.problem, cut.data, options).run();
+  result.warnings.insert(result.warnings.begin(), cut.warnings.begin(), cut.warnings.end());
+  return result;
 }
 
 }  // namespace mbsopt

@@ -8,7 +8,7 @@
 // estimated from the residuals (sigma_estimation.hpp). Each experiment has a
 // simulation of its own, from its start_time to its last sample, with its own values of the parameters that are `free`
 // there. Experiments with role "validate" take no part: with the shared parameters fixed, only their free ones are
-// refitted, and the residuals are scored.
+// refitted, and the residuals are scored. Experiments with windows are cut first (windows.hpp).
 //
 //   const std::vector<CsvTable> data{read_csv("run1.csv")};      // one per experiment
 //   const IdentificationResult result = run_identification(problem, data);
@@ -36,6 +36,7 @@ struct IdentificationOptions {
   std::function<bool(double t)> simulation_progress;  // within a simulation; false abandons it
   // No step is taken: residuals at the start, and the standard errors that the given sigmas predict there.
   bool preflight = false;
+  int threads = 1;                     // experiments at a time; results do not depend on it
   ResidualRecords* records = nullptr;  // of an earlier run that this one goes on with; of the fit and its profiles
   // After every point of a profile; false ends it there.
   std::function<bool(const std::string& name, double value, double tau)> profile_progress;

@@ -7,7 +7,7 @@ namespace mbsopt {
 
 void score_experiment(const ExperimentSpec& spec, const Experiment& model, const Loss& loss, const Eigen::VectorXd& z,
                       bool estimated, std::size_t experiment, ExperimentFit& fit, std::vector<ResidualRow>& residuals) {
-  fit.name = spec.name, fit.validate = spec.validate;
+  fit.name = spec.name, fit.window = spec.origin, fit.validate = spec.validate;
   fit.start_time = model.start_time(), fit.end_time = model.end_time();
   fit.samples = model.samples().size();
   fit.channels.resize(spec.channels.size());

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 
 #include "optim/problem/parameter_values.hpp"
@@ -21,6 +22,11 @@ bool has_override(const ExperimentSpec& spec, const std::string& name, double* v
 }
 
 }  // namespace
+
+std::string place_of(const IdentificationSpec& spec, std::size_t experiment) {
+  const std::optional<WindowOrigin>& origin = spec.experiments[experiment].origin;
+  return origin ? origin->place : fmt::format("identification.experiments[{}]", experiment);
+}
 
 bool is_held(const Parameter& p) {
   constexpr double kSame = 1e-12;  // of the bounds: nearer ones may be equal in the scaled variables of the solver

@@ -22,6 +22,8 @@ struct UnknownParameter {
   Parameter description;  // with the value it starts from
 };
 
+std::string place_of(const IdentificationSpec& spec, std::size_t experiment);  // its path in the problem file
+
 // A parameter whose bounds leave it nowhere to go is a constant, not an unknown.
 bool is_held(const Parameter& parameter);
 // Throws std::invalid_argument with the place where nothing is to be fitted, or something that no experiment sees.

@@ -132,6 +132,18 @@ struct ChannelSpec {
   SigmaEstimate estimate_sigma = SigmaEstimate::none;  // sigma is where the estimate starts
 };
 
+// Cuts an experiment into windows, each with a start of its own (optim/fit/windows.hpp).
+struct WindowsSpec {
+  double length = 1;                           // [s]
+  std::optional<double> start_time, end_time;  // instead of the experiment's
+};
+
+// Which window of which experiment of the problem file an experiment is.
+struct WindowOrigin {
+  std::string experiment, place;  // its name and its path
+  std::size_t number = 1;         // from 1
+};
+
 struct ExperimentSpec {
   std::string name;
   std::vector<std::string> data;               // CSV files, resolved against the problem file's folder
@@ -144,6 +156,8 @@ struct ExperimentSpec {
   std::vector<SignalSamples> signals;                     // of this experiment, instead of the scene's
   std::vector<DriveLaw> drives;                           // of this experiment, instead of the scene's laws
   std::vector<std::string> free;                          // parameters with a value of their own here
+  std::optional<WindowsSpec> windows = {};                // in which it is simulated
+  std::optional<WindowOrigin> origin = {};                // where it is one of them
   bool validate = false;                                  // role: scored (only "free" refitted), not fitted
 };
 

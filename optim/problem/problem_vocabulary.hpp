@@ -145,6 +145,14 @@ void describe(auto& v, Like<ChannelSpec> auto& c) {
             "all fitted channels of this column that say so"});
 }
 
+void describe(auto& v, Like<WindowsSpec> auto& w) {
+  v.plain("length", w.length, kPositive,
+          {"[s]; the last window takes what is left, from half a length to one and a half", Need::required,
+           dimension::kTime});
+  v.plain("start_time", w.start_time, kAny, {"[s]; the experiment's when absent", Need::optional, dimension::kTime});
+  v.plain("end_time", w.end_time, kAny, {"[s]; the experiment's when absent", Need::optional, dimension::kTime});
+}
+
 void describe(auto& v, Like<ExperimentSpec> auto& e) {
   v.name("name", e.name, {"name of the experiment", Need::required});
   v.texts("data", e.data, {"CSV file or list of them, relative to this file's folder", Need::required});
@@ -161,6 +169,9 @@ void describe(auto& v, Like<ExperimentSpec> auto& e) {
   v.named("signals", e.signals, {"samples of signals in this experiment, instead of the signals' own"});
   v.list("drives", e.drives, {"laws of drives in this experiment"});
   v.references("free", e.free, To::parameter, {"parameters with a value of their own in this experiment"});
+  v.object("windows", e.windows,
+           {"cuts the experiment into windows, in each of which the free parameters, which must act on the start, have "
+            "values of their own"});
   v.choice("role", e.validate, kRoles, {"validate: scored, not fitted"});
 }
 

@@ -1,6 +1,5 @@
 #include "optim/solver/bounded_linear_least_squares.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <vector>
 
@@ -8,15 +7,14 @@ namespace mbsopt {
 namespace {
 
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kZero = 1e-13;  // of a gradient, relative to its column and to b: rounding of some hundred products
 
 class ActiveSet {
  public:
-  ActiveSet(const MatrixXd& A, const VectorXd& b, const VectorXd& lower, const VectorXd& upper)
-      : A_(A), b_(b), lower_(lower), upper_(upper), d_(VectorXd::Zero(A.cols())) {
+  ActiveSet(const RowBlocks& A, const VectorXd& b, const VectorXd& lower, const VectorXd& upper)
+      : A_(A), b_(b), lower_(lower), upper_(upper), d_(VectorXd::Zero(A.columns())) {
     const VectorXd g = gradient();
     for (Index k = 0; k < d_.size(); ++k)
       if (!pushes_out(k, g(k))) free_.push_back(k);
@@ -30,7 +28,7 @@ class ActiveSet {
   }
 
  private:
-  VectorXd gradient() const { return A_.transpose() * (A_ * d_ - b_); }
+  VectorXd gradient() const { return A_.transposed_times(A_ * d_ - b_); }
   // At a bound beyond which the sum would fall. Where both bounds meet, none can move.
   bool pushes_out(Index k, double g) const {
     return (d_(k) <= lower_(k) && g > 0) || (d_(k) >= upper_(k) && g < 0) || lower_(k) >= upper_(k);
@@ -40,10 +38,9 @@ class ActiveSet {
   bool reach_solution_of_free() {
     if (free_.empty()) return true;
     const Index n = static_cast<Index>(free_.size());
-    MatrixXd A(A_.rows(), n);
     VectorXd others = d_;
-    for (Index i = 0; i < n; ++i) A.col(i) = A_.col(at(i)), others(at(i)) = 0;
-    const VectorXd solution = A.householderQr().solve(b_ - A_ * others);
+    for (Index i = 0; i < n; ++i) others(at(i)) = 0;
+    const VectorXd solution = A_.solve(b_ - A_ * others, free_)(free_);
     VectorXd parts = VectorXd::Constant(n, 1);  // of the way to the solution, up to its bound
     for (Index i = 0; i < n; ++i) {
       const double from = d_(at(i)), to = solution(i);
@@ -66,13 +63,13 @@ class ActiveSet {
 
   bool release() {
     const VectorXd g = gradient();
-    const double size = b_.norm();
+    const VectorXd lengths = b_.norm() * A_.column_norms();
     Index best = -1;
     double most = kZero;
     for (Index k = 0; k < d_.size(); ++k) {
       if (std::ranges::find(free_, k) != free_.end() || pushes_out(k, g(k))) continue;
-      const double length = A_.col(k).norm() * size;
-      if (const double inward = length > 0 ? std::abs(g(k)) / length : 0; inward > most) most = inward, best = k;
+      if (const double inward = lengths(k) > 0 ? std::abs(g(k)) / lengths(k) : 0; inward > most)
+        most = inward, best = k;
     }
     if (best < 0) return false;
     free_.push_back(best);
@@ -81,7 +78,7 @@ class ActiveSet {
 
   Index at(Index i) const { return free_[static_cast<std::size_t>(i)]; }
 
-  const MatrixXd& A_;
+  const RowBlocks& A_;
   const VectorXd &b_, &lower_, &upper_;
   VectorXd d_;
   std::vector<Index> free_;
@@ -89,7 +86,7 @@ class ActiveSet {
 
 }  // namespace
 
-VectorXd bounded_linear_least_squares(const MatrixXd& A, const VectorXd& b, const VectorXd& lower,
+VectorXd bounded_linear_least_squares(const RowBlocks& A, const VectorXd& b, const VectorXd& lower,
                                       const VectorXd& upper) {
   return ActiveSet(A, b, lower, upper).solve();
 }

@@ -13,10 +13,12 @@
 
 #include <Eigen/Core>
 
+#include "optim/solver/row_blocks.hpp"
+
 namespace mbsopt {
 
 // Held variables have exactly the value of their bound.
-Eigen::VectorXd bounded_linear_least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b,
-                                             const Eigen::VectorXd& lower, const Eigen::VectorXd& upper);
+Eigen::VectorXd bounded_linear_least_squares(const RowBlocks& A, const Eigen::VectorXd& b, const Eigen::VectorXd& lower,
+                                             const Eigen::VectorXd& upper);
 
 }  // namespace mbsopt

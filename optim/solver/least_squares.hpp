@@ -44,6 +44,11 @@ struct ScaleGroup {
   double squared_scale(const Eigen::VectorXd& z) const;
 };
 
+// Rows of z that depend on these variables only.
+struct Dependence {
+  std::vector<Eigen::Index> rows, variables;
+};
+
 struct LeastSquaresProblem {
   LeastSquaresProblem(Eigen::Index variables, Eigen::Index residuals)
       : x_lower(Eigen::VectorXd::Constant(variables, -std::numeric_limits<double>::infinity())),
@@ -68,6 +73,7 @@ struct LeastSquaresProblem {
   Eigen::Index plain = 0;            // of them, the last: not seen by the loss
   Loss loss;
   std::vector<ScaleGroup> groups;  // disjoint
+  std::vector<Dependence> parts;   // all rows, each once; empty: any row may depend on any variable
 };
 
 struct LeastSquaresProgress {

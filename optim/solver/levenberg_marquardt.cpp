@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <numeric>
 #include <utility>
 
 #include "core/expression/counted.hpp"
@@ -32,27 +33,69 @@ constexpr double kShrinking = 0.5;
 // cost.
 constexpr double kPromise = 1e-4;
 
-// The weighted residuals and their derivatives at a point, as triangles: |z + J d|^2 = |q + R d|^2 + constant.
+// The weighted residuals of one part and their derivatives, as triangles: |z + J d|^2 = |q + R d|^2 + constant.
+struct Triangle {
+  RowBlock R;
+  VectorXd q;
+};
+
+// J: columns of these variables, then z.
+Triangle triangle(std::vector<Index> variables, MatrixXd J) {
+  const Index n = J.cols() - 1, rows = std::min(J.rows(), n);
+  const Eigen::HouseholderQR<MatrixXd> qr(std::move(J));
+  return {{std::move(variables), qr.matrixQR().topLeftCorner(rows, n).triangularView<Eigen::Upper>()},
+          qr.matrixQR().rightCols(1).topRows(rows)};
+}
+
 struct LinearModel {
-  MatrixXd R;
+  RowBlocks R;
   VectorXd q, gradient;
   VectorXd D;   // lengths of the columns, or more
   double size;  // half the weighted sum of squares
 
-  LinearModel(const LeastSquaresProblem& problem, const LeastSquaresPoint& point) {
-    const VectorXd w = problem.weights(point.z).cwiseSqrt();
+  LinearModel(const LeastSquaresProblem& problem, const LeastSquaresPoint& point)
+      : LinearModel(point, problem.weights(point.z).cwiseSqrt(), problem.parts) {}
+  double promised(const VectorXd& d) const { return 0.5 * (q.squaredNorm() - (q + R * d).squaredNorm()); }
+
+ private:
+  LinearModel(const LeastSquaresPoint& point, const VectorXd& w, const std::vector<Dependence>& parts)
+      : LinearModel(triangles(point, w, parts), point.z_x.cols(), 0.5 * w.cwiseProduct(point.z).squaredNorm()) {}
+  LinearModel(std::vector<Triangle> triangles, Index variables, double half_squares)
+      : R(blocks_of(triangles), variables), size(half_squares) {
+    Index rows = 0;
+    for (const Triangle& t : triangles) rows += t.q.size();
+    q.resize(rows);
+    rows = 0;
+    for (const Triangle& t : triangles) q.segment(rows, t.q.size()) = t.q, rows += t.q.size();
+    D = R.column_norms();
+    gradient = R.transposed_times(q);
+  }
+
+  static std::vector<RowBlock> blocks_of(std::vector<Triangle>& triangles) {
+    std::vector<RowBlock> blocks;
+    for (Triangle& t : triangles) blocks.push_back(std::move(t.R));
+    return blocks;
+  }
+
+  static std::vector<Triangle> triangles(const LeastSquaresPoint& point, const VectorXd& w,
+                                         const std::vector<Dependence>& parts) {
+    std::vector<Triangle> all;
+    for (const Dependence& part : parts) {
+      const Index n = static_cast<Index>(part.variables.size());
+      MatrixXd J(static_cast<Index>(part.rows.size()), n + 1);
+      J.leftCols(n) = w(part.rows).asDiagonal() * point.z_x(part.rows, part.variables);
+      J.rightCols(1) = w(part.rows).cwiseProduct(point.z(part.rows));
+      all.push_back(triangle(part.variables, std::move(J)));
+    }
+    if (!parts.empty()) return all;
     MatrixXd J(point.z_x.rows(), point.z_x.cols() + 1);
     J.leftCols(point.z_x.cols()) = w.asDiagonal() * point.z_x;
     J.rightCols(1) = w.cwiseProduct(point.z);
-    size = 0.5 * J.rightCols(1).squaredNorm();
-    const Index n = point.z_x.cols(), rows = std::min(J.rows(), n);
-    const Eigen::HouseholderQR<MatrixXd> qr(std::move(J));
-    R = qr.matrixQR().topLeftCorner(rows, n).triangularView<Eigen::Upper>();
-    q = qr.matrixQR().rightCols(1).topRows(rows);
-    D = R.colwise().norm().transpose();
-    gradient = R.transpose() * q;
+    std::vector<Index> variables(static_cast<std::size_t>(point.z_x.cols()));
+    std::iota(variables.begin(), variables.end(), Index{0});
+    all.push_back(triangle(std::move(variables), std::move(J)));
+    return all;
   }
-  double promised(const VectorXd& d) const { return 0.5 * (q.squaredNorm() - (q + R * d).squaredNorm()); }
 };
 
 class Search {
@@ -154,15 +197,10 @@ class Search {
   }
 
   VectorXd step(const LinearModel& model, double lambda) const {
-    const Index n = model.R.cols(), rows = model.R.rows();
     const VectorXd D = model.D.unaryExpr([](double length) { return length > 0 ? length : 1; });
-    MatrixXd A = MatrixXd::Zero(rows + n, n);  // of D d: columns of length one
-    A.topRows(rows) = model.R * D.cwiseInverse().asDiagonal();
-    A.bottomRows(n).diagonal().setConstant(std::sqrt(lambda));
-    VectorXd b = VectorXd::Zero(rows + n);
-    b.head(rows) = -model.q;
+    const RowBlocks A = model.R.scaled_and_damped(D, lambda);  // of D d: columns of length one
     const VectorXd lower = D.cwiseProduct(problem_.x_lower - x_), upper = D.cwiseProduct(problem_.x_upper - x_);
-    return bounded_linear_least_squares(A, b, lower, upper).cwiseQuotient(D);
+    return bounded_linear_least_squares(A, model.R.beside_damping(-model.q), lower, upper).cwiseQuotient(D);
   }
 
   // Where a step ends at a bound, x is that bound.

@@ -9,6 +9,9 @@
 // a step that did what the model promised, by the rule of Nielsen, report IMM-REP-1999-05, Technical University of
 // Denmark. After a step that did not, it rises until the step is as much shorter as a parabola along it says.
 //
+// Where the problem says which residuals depend on which variables, factors are those of its parts (row_blocks.hpp), so
+// that a step costs no more than linearly in their number.
+//
 // A loss, and sigmas that the problem eliminates, enter as weights of the residuals (LeastSquaresProblem::weights), set
 // anew at every accepted point.
 //

@@ -1,0 +1,55 @@
+// A matrix in blocks of rows, each with entries in a few columns only. Its least-squares problem is solved by
+// elimination: a group of columns in the same blocks leaves the problem through the QR factors of these blocks.
+//
+//   [ A_1          B_1 ]          [ A_b B_b | b ]  =  Q [ R_b S_b | q ]          the rows below, of all blocks b,
+//   [     A_2      B_2 ] d ~ b                          [  0  T_b | p ]          determine the shared columns
+//   [         ...  ... ]
+//
+// So the cost is linear in the number of blocks where each has columns of its own and some that all share. One block
+// with all columns is the usual QR factorisation. Bjorck, "Numerical Methods for Least Squares Problems" (1996),
+// section 6.3.
+//
+//   RowBlocks A({{{0, 2}, A_1}, {{1, 2}, A_2}}, 3);        // columns 0 and 1 in one block each, 2 in both
+//   const VectorXd d = A.solve(b, {0, 1, 2});
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace mbsopt {
+
+struct RowBlock {
+  std::vector<Eigen::Index> columns;
+  Eigen::MatrixXd A;  // with these columns
+};
+
+class RowBlocks {
+ public:
+  RowBlocks(std::vector<RowBlock> blocks, Eigen::Index columns);
+  RowBlocks(const Eigen::MatrixXd& A);  // one block
+
+  Eigen::Index columns() const { return columns_; }
+  const std::vector<RowBlock>& blocks() const { return blocks_; }
+
+  // Vectors of rows are those of the blocks, one below the other.
+  Eigen::VectorXd operator*(const Eigen::VectorXd& d) const;
+  Eigen::VectorXd transposed_times(const Eigen::VectorXd& b) const;
+  Eigen::VectorXd column_norms() const;
+
+  // Minimises |A d - b| over the columns that are free; the others of d are zero. The free ones are independent.
+  Eigen::VectorXd solve(const Eigen::VectorXd& b, const std::vector<Eigen::Index>& free) const;
+
+  // |A D^-1 e|^2 + lambda |e|^2, as a matrix: sqrt(lambda) e_k is a row below the first block with column k.
+  RowBlocks scaled_and_damped(const Eigen::VectorXd& D, double lambda) const;
+  // b, with zeros for the rows that damp.
+  Eigen::VectorXd beside_damping(const Eigen::VectorXd& b) const;
+
+ private:
+  std::vector<std::vector<std::size_t>> damped_places() const;
+
+  std::vector<RowBlock> blocks_;
+  Eigen::Index columns_;
+  std::vector<std::size_t> first_, uses_;  // per column: the first block with it, and their number
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,88 @@
+// The arm with logged torques, in windows: a record of the project, and one of real hardware.
+#include <fmt/format.h>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+
+#include "app/json/read_problem.hpp"
+#include "optim/fit/identification.hpp"
+#include "optim/problem/logged_columns.hpp"
+#include "source_folder.hpp"
+
+using namespace mbsopt;
+
+namespace {
+
+const std::string kArm = MBSOPT_SOURCE_DIR "/problems/double_pendulum/identify_windows.json";
+const std::string kMeasured = MBSOPT_SOURCE_DIR "/../shared/data/measured/dfki_double_pendulum_torque/record.csv";
+const std::string kExperiment = "identification.experiments[0].";
+
+IdentificationResult fitted(const std::vector<std::string>& sets) {
+  const Problem problem = read_problem(kArm, sets);
+  return run_identification(problem, {read_record(problem.identification->experiments[0])});
+}
+
+// The table of docs/identification.md says what these are.
+std::vector<std::string> measured_between(double start, double end) {
+  std::vector<std::string> sets{"signals.tau1.file=" + kMeasured,
+                                "signals.tau2.file=" + kMeasured,
+                                kExperiment + "data=" + kMeasured,
+                                fmt::format("{}windows.start_time={}", kExperiment, start),
+                                fmt::format("{}windows.end_time={}", kExperiment, end),
+                                "simulation.integrator.rtol=1e-5",
+                                "simulation.integrator.atol=1e-7",
+                                "identification.optimizer.tolerance=1e-6"};
+  for (int c = 0; c < 4; ++c) {
+    sets.push_back(fmt::format("{}channels[{}].estimate_sigma=false", kExperiment, c));
+    sets.push_back(fmt::format("{}channels[{}].sigma={}", kExperiment, c, c < 2 ? 0.008 : 0.25));
+  }
+  return sets;
+}
+
+double rms_of(const IdentificationResult& fit, std::size_t channel) {
+  double squares = 0, samples = 0;
+  for (const ExperimentFit& e : fit.experiments) {
+    const double n = static_cast<double>(e.channels[channel].samples);
+    squares += n * std::pow(e.channels[channel].rms, 2), samples += n;
+  }
+  return std::sqrt(squares / samples);
+}
+
+}  // namespace
+
+TEST_CASE("the arm in windows: the parameters with which its record was made", "[identification][windows]") {
+  const IdentificationResult fit = fitted({});
+  REQUIRE(fit.ok());
+  CHECK(fit.experiments.size() == 8);
+  CHECK(fit.evaluations <= 15);
+  const double truth[] = {0.25, 0.06, 0.16, 0.05, 0.1, 0.08, 0.02, 0.01};
+  for (std::size_t k = 0; k < 8; ++k) {
+    INFO(fit.parameters[k].name);
+    CHECK(std::abs(fit.parameters[k].value - truth[k]) < 4 * fit.parameters[k].std_error);
+    CHECK(fit.parameters[k].std_error < 0.01 * truth[k]);
+  }
+}
+
+TEST_CASE("the measured arm in windows: the residuals of its record, and parts that agree",
+          "[identification][measured]") {
+  if (!std::filesystem::exists(kMeasured)) {
+    WARN("the record is not here, nothing was tested: " << kMeasured);
+    return;
+  }
+  // rms of its README, of another program: 9 and 7 mrad, 0.20 and 0.33 rad/s.
+  const IdentificationResult fit = fitted(measured_between(0.5, 4.5));
+  REQUIRE(fit.ok());
+  CHECK(rms_of(fit, 0) == Approx(0.009).margin(0.001));
+  CHECK(rms_of(fit, 1) == Approx(0.007).margin(0.001));
+  CHECK(rms_of(fit, 2) == Approx(0.20).margin(0.01));
+  CHECK(rms_of(fit, 3) == Approx(0.33).margin(0.01));
+  // m2 r2 from disjoint parts: each interval holds the values of the others.
+  std::vector<FittedParameter> parts;
+  for (const double start : {0.5, 2.5, 4.5, 6.5})
+    parts.push_back(fitted(measured_between(start, start + 2)).parameters[2]);
+  for (const FittedParameter& a : parts)
+    for (const FittedParameter& b : parts) {
+      CHECK(a.ci95[0] < b.value);
+      CHECK(b.value < a.ci95[1]);
+    }
+}

@@ -1,0 +1,159 @@
+// Experiments that are cut into windows.
+#include "optim/fit/windows.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "optim/fit/experiment.hpp"
+#include "optim/fit/identification.hpp"
+#include "optim/problem/parameter_values.hpp"
+#include "tests/core/mechanism/small_scenes.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+using Catch::Contains;
+
+namespace {
+
+constexpr double kNoise = 0.003;
+
+// A double pendulum that swings for 4 s, angles at 100 Hz, in windows of 1 s with a start each.
+Problem windowed(double length = 1) {
+  Problem p;
+  p.scene = double_pendulum();
+  p.scene.gravity = {0.0, -9.81, 0.0};
+  add_parameters(p.scene, {{"d", 0.05}, {"q1", 0.4}, {"q2", 0.7}, {"o1", 0.5}, {"o2", -1}});
+  p.scene.bodies[0].angular_velocity = vec("0", "0", "0");
+  for (const char* joint : {"A", "B"}) {
+    Rsda damper;
+    damper.joint = joint, damper.damping = f("d");
+    p.scene.forces.push_back({std::string("damper_") + joint, damper});
+  }
+  p.scene.conditions = {{"theta1", f("q1 - pi/2"), f("o1")}, {"theta2", f("q2"), f("o2")}};
+  p.scene.simulation.integrator.rtol = 1e-8;
+  p.identification.emplace();
+  p.identification->variables = {"c2", "d"};
+  ExperimentSpec e;
+  e.name = "swing", e.free = {"q1", "q2", "o1", "o2"};
+  e.windows.emplace().length = length;
+  for (const char* angle : {"theta1", "theta2"}) {
+    ChannelSpec channel;
+    channel.column = channel.sensor = angle, channel.sigma = kNoise;
+    e.channels.push_back(channel);
+  }
+  p.identification->experiments.push_back(e);
+  return p;
+}
+
+CsvTable motion(const Problem& p, double noise) {
+  CsvTable table;
+  table.name = "swing.csv", table.header = {"t", "theta1", "theta2"}, table.columns.resize(3);
+  for (std::size_t i = 0; i <= 400; ++i) {
+    table.columns[0].push_back(0.01 * static_cast<double>(i)), table.lines.push_back(i + 2);
+    table.columns[1].push_back(0), table.columns[2].push_back(0);
+  }
+  ExperimentSpec whole = p.identification->experiments[0];
+  whole.windows.reset();
+  const Experiment run(p.scene, whole, "here", table, parameter_values(p.scene), {});
+  const Experiment::Residuals r = run.residuals(Eigen::VectorXd());
+  REQUIRE(r.ok);
+  std::mt19937 generator(7);
+  std::normal_distribution<double> normal;
+  for (std::size_t i = 0; i < run.samples().size(); ++i) {
+    const Experiment::Sample& s = run.samples()[i];
+    table.columns[1 + s.channel][s.time] = -kNoise * r.z(static_cast<Eigen::Index>(i)) + noise * normal(generator);
+  }
+  return table;
+}
+
+Parameter& parameter(Problem& p, const std::string& name) {
+  return p.scene.parameters[static_cast<std::size_t>(parameter_indices(p.scene, {name}).front())];
+}
+
+}  // namespace
+
+TEST_CASE("windows take every sample once, and the last takes what is left", "[identification][windows]") {
+  const CsvTable data = motion(windowed(), 0);
+  for (const auto& [length, windows] : {std::pair{1.0, 4u}, {1.5, 3u}, {1.7, 2u}, {9.0, 1u}}) {
+    const CutProblem cut = cut_into_windows(windowed(length), {data});
+    const std::vector<ExperimentSpec>& specs = cut.problem.identification->experiments;
+    REQUIRE(specs.size() == windows);
+    CHECK(cut.warnings.empty());
+    std::vector<double> t;
+    for (std::size_t w = 0; w < specs.size(); ++w) {
+      CHECK(specs[w].name == "swing." + std::to_string(w + 1));
+      CHECK(specs[w].origin->number == w + 1);
+      CHECK(*specs[w].start_time == Approx(static_cast<double>(w) * length));
+      t.insert(t.end(), cut.data[w].columns[0].begin(), cut.data[w].columns[0].end());
+    }
+    CHECK(*specs.back().end_time == 4);
+    CHECK(t == data.columns[0]);
+  }
+}
+
+TEST_CASE("starts of windows are guessed from the samples, with wrong parameters too", "[identification][windows]") {
+  Problem p = windowed();
+  const CsvTable data = motion(p, 0);
+  ExperimentSpec whole = p.identification->experiments[0];
+  parameter(p, "c2").value = 0.8, parameter(p, "d").value = 0.3, parameter(p, "q1").value = 0;
+  const CutProblem cut = cut_into_windows(p, {data});
+  for (std::size_t w = 1; w < 4; ++w) {
+    const std::vector<std::pair<std::string, double>>& starts = cut.problem.identification->experiments[w].overrides;
+    REQUIRE(starts.size() == 4);
+    const std::size_t row = 100 * w;
+    const auto rate = [&](std::size_t c) {  // of the exact record, by central differences: h^2/6 of a third derivative
+      return (data.columns[c][row + 1] - data.columns[c][row - 1]) / 0.02;
+    };
+    CHECK(starts[0].second == Approx(data.columns[1][row] + M_PI / 2).margin(0.01));
+    CHECK(starts[1].second == Approx(data.columns[2][row]).margin(0.01));
+    CHECK(starts[2].second == Approx(rate(1)).margin(0.2));  // rates reach 5 rad/s
+    CHECK(starts[3].second == Approx(rate(2)).margin(0.2));
+  }
+}
+
+TEST_CASE("windows find the parameters from wrong ones", "[identification][windows]") {
+  Problem p = windowed();
+  const std::vector<CsvTable> data{motion(p, kNoise)};
+  parameter(p, "c2").value = 0.9, parameter(p, "d").value = 0.5;
+  parameter(p, "q1").value = -0.5, parameter(p, "q2").value = -1, parameter(p, "o1").value = 3;
+  const IdentificationResult result = run_identification(p, data);
+  REQUIRE(result.ok());
+  CHECK(std::abs(result.parameters[0].value - 0.6) < 4 * result.parameters[0].std_error);
+  CHECK(std::abs(result.parameters[1].value - 0.05) < 4 * result.parameters[1].std_error);
+  CHECK(result.parameters.size() == 2 + 4 * 4);
+  CHECK(result.parameters[2].name == "swing.1.q1");
+  CHECK(result.experiments[3].window->number == 4);
+  for (const ExperimentFit& e : result.experiments) CHECK(e.rms == Approx(kNoise).epsilon(0.2));
+}
+
+TEST_CASE("windows give the same bits in any number of threads", "[identification][windows]") {
+  const Problem p = windowed();
+  const std::vector<CsvTable> data{motion(p, kNoise)};
+  IdentificationOptions two;
+  two.threads = 2;
+  const IdentificationResult a = run_identification(p, data), b = run_identification(p, data, two);
+  REQUIRE(a.ok());
+  CHECK(a.evaluations == b.evaluations);
+  for (std::size_t k = 0; k < a.parameters.size(); ++k) {
+    CHECK(a.parameters[k].value == b.parameters[k].value);
+    CHECK(a.parameters[k].std_error == b.parameters[k].std_error);
+  }
+}
+
+TEST_CASE("windows: what is free must act on the start", "[identification][windows]") {
+  const CsvTable data = motion(windowed(), 0);
+  Problem p = windowed();
+  p.identification->experiments[0].free.clear();
+  CHECK_THROWS_WITH(cut_into_windows(p, {data}), Contains("identification.experiments[0].free: is empty"));
+  p = windowed();
+  p.identification->variables = {"c2"};
+  p.identification->experiments[0].free.push_back("d");
+  CHECK_THROWS_WITH(cut_into_windows(p, {data}),
+                    Contains("experiments[0].free: 'd' does not act on the initial state"));
+  p = windowed(1e-3);
+  CHECK_THROWS_WITH(cut_into_windows(p, {data}), Contains("experiments[0].windows.length: is 0.001 s"));
+  p = windowed();
+  p.identification->experiments[0].windows->start_time = 5;
+  CHECK_THROWS_WITH(cut_into_windows(p, {data}), Contains("experiments[0].windows: end at 4 s"));
+}
