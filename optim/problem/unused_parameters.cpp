@@ -178,7 +178,8 @@ class Search {
     return all;
   }
   static bool measures_everything(const Sensor& sensor) {
-    return sensor.quantity == "energy" || sensor.quantity == "constraint_violation";
+    return sensor.quantity == "energy" || sensor.quantity == "constraint_violation" ||
+           sensor.quantity == "smallest_singular_value";
   }
 
   void connect_bodies() {
