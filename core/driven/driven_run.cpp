@@ -21,6 +21,8 @@ constexpr double kFewestPanels = 4;
 constexpr double kStepsPerPanel = 8;
 // A stretch of a panel that takes so many steps of the path is too long: the motion becomes faster in it without end.
 constexpr long kMostStepsOfStretch = 32 * static_cast<long>(kStepsPerPanel);
+// Of the rest of a run: two ends of a path closer than this are the same; `shortest_` leaves far less between them.
+constexpr double kSameEnd = 1e-6;
 // Part of rtol times the integral so far that one panel may be off by, however short: a kink or a jump.
 constexpr double kPartOfRun = 0.1;
 
@@ -98,6 +100,7 @@ void DrivenRun::go_through_panels(const Take& take) {
   }
   const StepSequence* const frozen = options_.frozen;
   double h = end - settings_.start_time;
+  double ended_at = -INFINITY;  // time at which a panel was stuck last
   std::size_t panel = 0;
   while (path_.state().t < end) {
     const double t = path_.state().t;
@@ -112,10 +115,14 @@ void DrivenRun::go_through_panels(const Take& take) {
     }
     from_ = path_.state();
     const Panel outcome = try_panel(t1);
-    if (outcome == Panel::refused || (outcome == Panel::stuck && !frozen && t1 - t > shortest_)) {
+    const double reached = path_.state().t;
+    if (outcome == Panel::refused || (outcome == Panel::stuck && !frozen && reached - t > shortest_)) {
       ++result_.statistics.rejected, ++result_.statistics.rejections.error_test;
       path_.start(from_);
-      h = (t1 - t) / 2;
+      // Other steps may pass where the path ended. If it ends there again, so does the panel.
+      const bool ends = outcome == Panel::stuck && std::abs(reached - ended_at) <= kSameEnd * (end - t);
+      if (outcome == Panel::stuck) ended_at = reached;
+      h = ends ? reached - t : (t1 - t) / 2;
       continue;
     }
     if (outcome == Panel::stuck) return stop(SimulationStatus::step_too_small, why_it_ends());

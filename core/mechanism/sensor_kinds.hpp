@@ -19,6 +19,8 @@ SensorMaker make_angular_velocity, make_orientation;               // rotation_s
 SensorMaker make_energy, make_violation, make_tension;             // energy_, violation_, tension_sensor.cpp
 SensorMaker make_reaction, make_drive_force;                       // reaction_sensor.cpp
 SensorMaker make_imu;                                              // imu_sensor.cpp
+SensorMaker make_transmission_angle;                               // transmission_sensor.cpp
+SensorMaker make_smallest_singular_value;                          // singular_value_sensor.cpp
 SensorMaker make_expression;                                       // expression_sensor.cpp
 
 struct SensorMakerRow {
@@ -44,6 +46,8 @@ inline constexpr SensorMakerRow kSensorMakers[] = {
     {"reaction", make_reaction},
     {"drive_force", make_drive_force},
     {"imu", make_imu},
+    {"transmission_angle", make_transmission_angle},
+    {"smallest_singular_value", make_smallest_singular_value},
     {"expression", make_expression},
 };
 

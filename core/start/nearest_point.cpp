@@ -303,7 +303,10 @@ class Search {
   }
   void add_curvature(const VectorXd& nu) {
     result_.nu = nu;
-    MatrixXd H = equations_.curvature(result_.x, result_.nu);
+    const Eigen::Index n = result_.x.size();
+    // H acts in the directions that the equations leave free; where there are none, it is not evaluated.
+    const bool determined = result_.linearisation.null_space().cols() == 0;
+    MatrixXd H = determined ? MatrixXd(MatrixXd::Zero(n, n)) : equations_.curvature(result_.x, result_.nu);
     H.diagonal().array() += 1;
     result_.linearisation.set_hessian(H);
   }

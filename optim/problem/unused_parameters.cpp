@@ -179,7 +179,8 @@ class FieldSearch {
     return all;
   }
   static bool measures_everything(const Sensor& sensor) {
-    return sensor.quantity == "energy" || sensor.quantity == "constraint_violation";
+    return sensor.quantity == "energy" || sensor.quantity == "constraint_violation" ||
+           sensor.quantity == "smallest_singular_value";
   }
 
   void connect_bodies() {

@@ -157,6 +157,15 @@ struct TextbookScene {
     const V3<T> axis{rho[n] / length, T(0.2) / length, T(1) / length};
     return dot(times(body(0).moving().A, constant(axis)), point(1, foot()) - point(0, tip()));
   }
+  // Between the links from the hinge to the two balls that compiled() adds, by the cosine law.
+  T transmission_angle() const {
+    using std::acos;
+    const V3<T> here1{rho[a], T(0), T(0)}, here2{T(0), rho[b], T(0)};
+    const V3<T> x1 = times(body(0).frame().A, V3<T>(tip() - here1)),
+                x2 = times(body(1).frame().A, V3<T>(foot() - here2));
+    const V3<T> side = x2 - x1;
+    return acos((dot(x1, x1) + dot(x2, x2) - dot(side, side)) / (T(2) * norm(x1) * norm(x2)));
+  }
   // The largest |Phi| of the hinge and the unit norms.
   T violation() const {
     std::vector<T> phi;
@@ -322,6 +331,7 @@ const std::vector<Row>& all_sensors() {
       row("torque of a law", force_of("stop"),
           [](const auto& s) { return s.rho[kt] * s.angle() * s.angle() + s.rho[n] * s.rate() * s.angle(); }),
       row("constraint_violation", plain("constraint_violation"), [](const auto& s) { return s.violation(); }),
+      row("transmission_angle", plain("transmission_angle"), [](const auto& s) { return s.transmission_angle(); }),
       row("imu, rate", mounted("wy"), MountRate()),
       row("expression", expression("turn*gap + sin(mean)*turn_rate^2 + a*l0"),
           [](const auto& s) {
@@ -355,6 +365,10 @@ Compiled compiled(const Row& row, const VectorXd& rho) {
     slider.type = "cylindrical", slider.axis1 = vec("n", "0.2", "1");
     scene.joints.push_back(slider);
     scene.sensors.back().joint = "S";
+  }
+  if (row.sensor.quantity == "transmission_angle") {
+    scene.joints.push_back(ball("to_one", "ground", vec("0", "0", "0"), "one", vec("a", "b", "0.3")));
+    scene.joints.push_back(ball("to_two", "two", vec("b", "0.5", "a"), "ground", vec("1", "0", "0")));
   }
   for (Sensor& below : below_expressions()) scene.sensors.push_back(std::move(below));
   const Mechanism mechanism(scene, rho);
@@ -430,4 +444,53 @@ TEST_CASE("a sensor on the ground is constant in the state", "[sensor]") {
                      rho_bar) == 0.4);
   CHECK(y_bar.norm() == 0);
   CHECK(rho_bar(a) == 1);
+}
+
+TEST_CASE("smallest_singular_value of a hinged bar has a closed form, and is zero where a drive cannot pass",
+          "[sensor]") {
+  // At angle 0 with L = c, lever -x: the rows (y, -theta_z) and (z, theta_y) have length sqrt(2), and theta_y is also
+  // that of a dot-1 row: the squares of these two singular values are 1 -+ 1/sqrt(2).
+  Scene scene = pendulum();
+  scene.sensors[0].quantity = "smallest_singular_value";
+  VectorXd y = VectorXd::Zero(14);
+  y(0) = 0.7, y(3) = 1;
+  const auto value = [&] {
+    const Mechanism mechanism(scene, nominal(scene));
+    return mechanism.sensor_value(0, {0, y, VectorXd()});
+  };
+  CHECK(value() == Approx(std::sqrt(1 - std::sqrt(0.5))).epsilon(1e-14));
+  Drive push;
+  push.name = "push", push.type = "coordinate", push.body = "bar", push.coordinate = "x", push.law = f("0.7");
+  scene.drives.push_back(push);
+  CHECK(std::abs(value()) < 1e-14);  // x is stationary: the bar lies along it
+  y << 0.7 * std::cos(1.0), 0.7 * std::sin(1.0), 0, std::cos(0.5), 0, 0, std::sin(0.5), VectorXd::Zero(7);
+  CHECK(value() > 0.1);
+}
+
+TEST_CASE("the gradient of smallest_singular_value equals differences", "[sensor]") {
+  const Row row{"", plain("smallest_singular_value"), {}, {}, false};
+  const VectorXd rho = nominal(two_bodies());
+  VectorXd x(28 + rho.size());
+  x << Random(GENERATE(range(0u, 3u))).vector(28), rho;
+  const Compiled c = compiled(row, rho);
+  VectorXd y_bar = VectorXd::Zero(28), rho_bar = VectorXd::Zero(rho.size()), found(x.size());
+  const double value = add_gradient(c.mechanism.data(), c.sensor, 0, x.head(28), c.angles, 1, y_bar, rho_bar);
+  CHECK(value > 1e-3);
+  found << y_bar, rho_bar;
+  CHECK(rho_bar.norm() > 1e-3);
+  const VectorXd differences = difference_gradient(
+      [&](const VectorXd& at) {
+        const Compiled moved = compiled(row, at.tail(rho.size()));
+        return evaluate(moved.mechanism.data(), moved.sensor, 0, at.head(28), moved.angles);
+      },
+      x, 1e-4);
+  CHECK((found - differences).cwiseAbs().maxCoeff<Eigen::PropagateNaN>() < 1e-8 * (1 + found.norm()));
+}
+
+TEST_CASE("a transmission angle names the link whose other pin it cannot tell", "[sensor]") {
+  Scene scene = two_bodies();
+  Sensor s = plain("transmission_angle");
+  s.name = "mu";
+  scene.sensors.push_back(s);
+  CHECK_THROWS_WITH(Mechanism(scene, nominal(scene)), Catch::Contains("body 'one' has 0 other pins"));
 }

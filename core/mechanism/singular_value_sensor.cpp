@@ -1,0 +1,132 @@
+// The smallest singular value of the scaled Jacobian of joints and drives: 0 where they lose hold of a motion.   [-]
+//   J    rows of Phi, columns (delta r [m], L delta theta) of each body: turns are measured at the length L
+//   j_i  row i of J,  J^ its rows of length 1: j^_i = j_i/|j_i|
+//   J^ = sum_k sigma_k u_k v_k',  sigma the least of the min(rows, columns) values
+//   dsigma = u'dJ^ v = sum_i w_i'dj_i,   w_i = u_i/|j_i| (v - (j^_i'v) j^_i)
+//   L^2 = sum |s|^2/N over the points of joints seen from the centres of mass
+//   dsigma/dL = -1/L sum_i (w_i'j_i)_theta
+// Redundant equations beside a free motion give 0 everywhere; in a driven mechanism they do no harm. A sigma that
+// occurs twice has no derivative; the gradient is then that of one of the two. Source of dsigma: G. H. Golub,
+// C. F. Van Loan, "Matrix Computations", section 8.6.
+#include <Eigen/SVD>
+#include <cmath>
+
+#include "core/mechanism/sensor_kinds.hpp"
+#include "core/sensor/body_at.hpp"
+
+namespace mbsopt {
+namespace {
+
+struct Scaled {
+  Eigen::MatrixXd J;            // rows of length 1
+  Eigen::VectorXd norms;        // |j_i|
+  double length = 1;            // L [m]
+  int points = 0;               // N
+  double smallest = 0;          // sigma
+  Eigen::VectorXd left, right;  // u, v
+};
+
+template <class Use>
+void for_each_point(const MechanismData& d, const Use& use) {
+  for (const Constraint& c : d.constraints)
+    if (const auto* p = std::get_if<Coincidence>(&c.primitive)) {
+      if (c.body1 > 0) use(p->s1, c.slot1);
+      if (c.body2 > 0) use(p->s2, c.slot2);
+    }
+}
+
+Scaled scaled(const MechanismData& d, const Eigen::VectorXd& y) {
+  Scaled out;
+  double sum = 0;
+  for_each_point(d, [&](const Vector3d& s, int) { sum += s.squaredNorm(), ++out.points; });
+  if (sum > 0) out.length = std::sqrt(sum / out.points);
+
+  out.J = Eigen::MatrixXd::Zero(d.m, 6 * d.n);
+  for (const Constraint& c : d.constraints) {
+    const BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+    std::visit(
+        [&]<class P>(const P& p) {
+          Mat<P::kRows, 6> J1, J2;
+          p.jacobian(b1.frame, b2.frame, J1, J2);
+          J1.template rightCols<3>() /= out.length, J2.template rightCols<3>() /= out.length;
+          if (c.body1 > 0) out.J.block<P::kRows, 6>(c.row, 6 * (c.body1 - 1)) += c.factor * J1;
+          if (c.body2 > 0) out.J.block<P::kRows, 6>(c.row, 6 * (c.body2 - 1)) += c.factor * J2;
+        },
+        c.primitive);
+  }
+  out.norms = out.J.rowwise().norm();
+  for (Eigen::Index i = 0; i < out.J.rows(); ++i)
+    if (out.norms(i) > 0) out.J.row(i) /= out.norms(i);
+  if (out.J.size() == 0) return out;
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(out.J, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const Eigen::Index last = svd.singularValues().size() - 1;
+  out.smallest = svd.singularValues()(last);
+  out.left = svd.matrixU().col(last), out.right = svd.matrixV().col(last);
+  return out;
+}
+
+struct SingularValueFunction final : SensorFunction {
+  double value(const MechanismData& d, const StatePoint& at) const override { return scaled(d, at.y).smallest; }
+
+  double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
+                      VecOut rho_bar) const override {
+    const Scaled x = scaled(d, at.y);
+    if (x.J.size() == 0) return x.smallest;
+    Eigen::MatrixXd W = Eigen::MatrixXd::Zero(x.J.rows(), x.J.cols());  // w_i, then J's own columns
+    double L_bar = 0;
+    for (Eigen::Index i = 0; i < W.rows(); ++i) {
+      if (!(x.norms(i) > 0)) continue;
+      const Eigen::RowVectorXd j = x.J.row(i);
+      W.row(i) = x.left(i) / x.norms(i) * (x.right.transpose() - j.dot(x.right) * j);
+      for (int b = 0; b < d.n; ++b) {
+        L_bar -= x.norms(i) / x.length * W.row(i).segment<3>(6 * b + 3).dot(j.segment<3>(6 * b + 3));
+        W.row(i).segment<3>(6 * b + 3) /= x.length;
+      }
+    }
+    for (const Constraint& c : d.constraints)
+      for (int i = 0; i < c.rows(); ++i) add_row(d, c, i, W.row(c.row + i).transpose(), at.y, scale, y_bar, rho_bar);
+    for_each_point(d, [&](const Vector3d& s, int slot) {
+      add_slot<3>(d, slot, Vec<3>(L_bar / (x.points * x.length) * s), scale, rho_bar);
+    });
+    return x.smallest;
+  }
+
+ private:
+  // w'j of row i of a constraint, w a virtual displacement of all bodies.
+  static void add_row(const MechanismData& d, const Constraint& c, int i, const Eigen::VectorXd& w,
+                      const Eigen::VectorXd& y, double scale, VecOut y_bar, VecOut rho_bar) {
+    const auto part = [&](int body) {
+      return body > 0 ? Vec<6>(w.segment<6>(6 * (body - 1))) : Vec<6>(Vec<6>::Zero());
+    };
+    const Vec<6> eta1 = part(c.body1), eta2 = part(c.body2);
+    BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+    set_virtual(eta1, b1.frame);
+    set_virtual(eta2, b2.frame);
+    FrameBar bar1, bar2;
+    bar1.set_zero(), bar2.set_zero();
+    GeometryBar geometry;
+    std::visit(
+        [&]<class P>(const P& p) {
+          Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
+          z.lambda(i) = c.factor;
+          p.pull_back(b1.frame, b2.frame, z, bar1, bar2, geometry);
+          add_slot<1>(d, c.slot_factor, Vec<1>(virtual_change(p, b1.frame, b2.frame)(i)), scale, rho_bar);
+        },
+        c.primitive);
+    fold_virtual(eta1.tail<3>(), bar1);
+    fold_virtual(eta2.tail<3>(), bar2);
+    add_pull_back(b1, c.body1, bar1, scale, y_bar);
+    add_pull_back(b2, c.body2, bar2, scale, y_bar);
+    add_slot<3>(d, c.slot1, geometry.s1, scale, rho_bar);
+    add_slot<3>(d, c.slot2, geometry.s2, scale, rho_bar);
+    add_slot<3>(d, c.slot3, geometry.s3, scale, rho_bar);
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<SensorFunction> make_smallest_singular_value(Compilation&, const Sensor&, const std::string&) {
+  return std::make_unique<SingularValueFunction>();
+}
+
+}  // namespace mbsopt
