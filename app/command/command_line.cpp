@@ -44,7 +44,8 @@ constexpr std::array kCommands{
     Command{"tradeoff", "error against cost for integrators, tolerances, formulations and gradient methods",
             tradeoff_command},
     Command{"sweep", "objectives over a grid, samples or a list of parameter values", sweep_command},
-    Command{"resume", "go on with a design or an identification that was interrupted or killed", resume_command},
+    Command{"resume", "go on with a design, an identification or a sweep that was interrupted or killed",
+            resume_command},
     Command{"new", "write a commented starter file into the current folder", new_command},
     Command{"schema", "print the JSON Schema of problem files", schema_command},
 };
