@@ -28,12 +28,16 @@ void add_parameters(Run& run) {
   run.context.out << '\n' << table.text();
 }
 
-void add_free_motions(Run& run, const Mechanism& mechanism, const Assembly& assembly) {
+void add_motions(Run& run, const Mechanism& mechanism, const Assembly& assembly) {
   const int freedoms = run.result.at("model").at("degrees_of_freedom").get<int>();
   const std::vector<std::string> free =
       free_motions(mechanism, assembly, run.problem.scene.simulation.start_time, freedoms);
   run.result["model"]["free"] = free;
   for (const std::string& motion : free) run.context.out << fmt::format("free: {}\n", motion);
+  if (run.result["model"]["redundant"].empty()) return;
+  const std::vector<std::string> twice = motions_forbidden_twice(mechanism, assembly);
+  run.result["model"]["forbidden_twice"] = twice;
+  for (const std::string& motion : twice) run.context.out << fmt::format("forbidden twice: {}\n", motion);
 }
 
 }  // namespace
@@ -47,7 +51,7 @@ int validate_command(const CommandContext& context) {
   if (closed && run.problem.scene.simulation.accuracy)
     context.out
         << "simulation.accuracy chooses the integrator when it is run; with an implicit one the model is spatial\n";
-  if (closed) add_free_motions(run, mechanism, assembly);
+  if (closed) add_motions(run, mechanism, assembly);
   if (closed) add_parameters(run);
   return run.finish();
 }
