@@ -24,7 +24,11 @@ int resume_command(const CommandContext& context) {
   const auto arguments = journal.header.at("arguments").get<std::vector<std::string>>();
   CommandOptions options = options_of(arguments);  // as it was begun, but for where we are now
   options.threads = context.options.threads, options.quiet = context.options.quiet;
-  options.problem_file = (folder / journal.header.at("input").get<std::string>()).lexically_normal().string();
+  const auto from_here = [&](const char* key) {
+    return (folder / journal.header.at(key).get<std::string>()).lexically_normal().string();
+  };
+  options.problem_file = from_here("input");
+  if (!options.sweep.points.empty()) options.sweep.points = from_here("points");
   options.out = folder.string();
   options.resume = true;
   const CommandContext again{.command = command,
@@ -37,6 +41,7 @@ int resume_command(const CommandContext& context) {
                              .ranks = context.ranks};
   if (command == "design") return design_command(again);
   if (command == "identify") return identify_command(again);
+  if (command == "sweep") return sweep_command(again);
   throw std::invalid_argument(
       fmt::format("{}: is of '{}', which cannot be gone on with", (folder / kJournalFile).string(), command));
 }

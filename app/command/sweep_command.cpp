@@ -1,70 +1,24 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
-#include <thread>
+#include <limits>
+#include <stdexcept>
 
 #include "app/results/accuracy_results.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/run/sweep_points.hpp"
+#include "app/starts/sweep_blocks.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "app/terminal/text_table.hpp"
-#include "optim/machine/on_threads.hpp"
-#include "optim/objective/evaluator.hpp"
-#include "optim/problem/seed.hpp"
 
 namespace mbsopt {
 namespace {
 
-struct Row {
-  bool done = false;
-  std::string message;  // why there are no values
-  Eigen::VectorXd psi;
-  std::vector<std::optional<double>> true_values;
-  Eigen::MatrixXd psi_rho;
-};
-
-std::vector<Row> computed(Run& run, const SweepPoints& points) {
-  const Scene& scene = run.problem.scene;
-  const SweepOptions& options = run.context.options.sweep;
-  std::vector<std::string> varied;
-  for (const int p : points.parameters) varied.push_back(scene.parameters[static_cast<std::size_t>(p)].name);
-  const Eigen::VectorXd given = parameter_values(scene);
-  const int asked = run.context.options.threads;
-  const std::size_t threads =
-      std::min(points.values.size(),
-               static_cast<std::size_t>(asked > 0 ? asked : std::max(1u, std::thread::hardware_concurrency())));
-  std::vector<Row> rows(points.values.size());
-  std::atomic<std::size_t> next = 0, done = 0;
-  on_threads(threads, static_cast<int>(threads), [&](std::size_t worker) {
-    EvaluatorOptions evaluator_options;
-    evaluator_options.progress = [](double) { return !interrupted(); };
-    Evaluator evaluator(scene, objectives_of(run.problem), varied, evaluator_options);
-    for (std::size_t i = next++; i < rows.size() && !interrupted(); i = next++) {
-      Eigen::VectorXd rho = given;
-      for (std::size_t k = 0; k < points.parameters.size(); ++k)
-        rho(points.parameters[k]) = points.values[i](static_cast<Eigen::Index>(k));
-      const Evaluation& e = options.gradients ? evaluator.gradients(rho) : evaluator.values(rho);
-      if (interrupted()) break;
-      rows[i].done = true;
-      if (!e.ok) {
-        rows[i].message = e.message;
-      } else {
-        rows[i].psi = e.psi, rows[i].psi_rho = e.psi_rho;
-        rows[i].true_values = evaluator.true_values(rho);
-      }
-      ++done;
-      if (worker == 0) run.progress.fraction("sweep", static_cast<double>(done) / static_cast<double>(rows.size()));
-    }
-  });
-  run.progress.finish();
-  return rows;
-}
-
 // Point, varied parameters, objectives with their true extremes, gradients. Points without values have empty cells.
-std::string table_of(const Problem& problem, const SweepPoints& points, const std::vector<Row>& rows, bool gradients) {
+std::string table_of(const Problem& problem, const SweepPoints& points, const std::vector<SweepRow>& rows,
+                     bool gradients) {
   std::vector<std::string> columns{"point"}, varied;
   for (const int p : points.parameters) varied.push_back(problem.scene.parameters[static_cast<std::size_t>(p)].name);
   columns.insert(columns.end(), varied.begin(), varied.end());
@@ -94,19 +48,19 @@ std::string table_of(const Problem& problem, const SweepPoints& points, const st
   return to_csv(columns, cells);
 }
 
-void add_ranges(Run& run, const SweepPoints& points, const std::vector<Row>& rows) {
+void add_ranges(Run& run, const SweepPoints& points, const std::vector<SweepRow>& rows) {
   TextTable table({"objective", "least", "at point", "largest", "at point"});
   for (std::size_t o = 0; o < run.problem.objectives.size(); ++o) {
     const Eigen::Index k = static_cast<Eigen::Index>(o);
-    const Row* least = nullptr;
-    const Row* largest = nullptr;
-    for (const Row& row : rows) {
+    const SweepRow* least = nullptr;
+    const SweepRow* largest = nullptr;
+    for (const SweepRow& row : rows) {
       if (row.psi.size() == 0) continue;
       if (!least || row.psi(k) < least->psi(k)) least = &row;
       if (!largest || row.psi(k) > largest->psi(k)) largest = &row;
     }
     if (!least) continue;
-    const auto number = [&](const Row* row) { return static_cast<long>(row - rows.data()) + 1; };
+    const auto number = [&](const SweepRow* row) { return static_cast<long>(row - rows.data()) + 1; };
     const std::string& name = run.problem.objectives[o].name;
     run.result["sweep"]["objectives"][name] = {{"least", least->psi(k)},
                                                {"least_at", number(least)},
@@ -126,27 +80,29 @@ int sweep_command(const CommandContext& context) {
   Run run(context);
   const SweepOptions& options = context.options.sweep;
   if (run.problem.objectives.empty()) throw std::invalid_argument("objectives: there are none to compute");
-  const long seed = options.seed ? *options.seed : options.samples ? drawn_seed() : 0;
+  LongRun long_run(run);
+  const long seed = options.samples ? long_run.seed("samples", options.seed) : 0;
   const SweepPoints points = sweep_points(run.problem.scene, options, seed);
   run.start();
   if (!settle_accuracy(run)) return run.finish();
-  const std::vector<Row> rows = computed(run, points);
-  const auto done = std::ranges::count_if(rows, &Row::done);
-  const auto failed = std::ranges::count_if(rows, [](const Row& row) { return !row.message.empty(); });
+  long_run.begin();
+  const std::vector<SweepRow> rows = swept(run, long_run, points, seed);
+  const auto done = std::ranges::count_if(rows, &SweepRow::done);
+  const auto failed = std::ranges::count_if(rows, [](const SweepRow& row) { return !row.message.empty(); });
   run.result["sweep"] = {{"points", rows.size()}, {"computed", done}, {"failed", failed}};
   if (options.samples) run.result["sweep"]["seed"] = seed;
   add_ranges(run, points, rows);
   if (failed > 0) {
-    const auto first = std::ranges::find_if(rows, [](const Row& row) { return !row.message.empty(); });
+    const auto first = std::ranges::find_if(rows, [](const SweepRow& row) { return !row.message.empty(); });
     run.warn(fmt::format("{} of {} points have no values, the first is point {}: {}", failed, rows.size(),
                          first - rows.begin() + 1, first->message));
   }
   run.write("sweep.csv", table_of(run.problem, points, rows, options.gradients));
   if (interrupted())
-    run.stopped(fmt::format("sweep.csv holds {} of {} points", done, rows.size()));
+    long_run.stopped(fmt::format("sweep.csv holds {} of {} points", done, rows.size()));
   else if (failed == done)
     run.failed("no point has values");
-  return run.finish();
+  return long_run.finish();
 }
 
 }  // namespace mbsopt

@@ -31,12 +31,16 @@ void add_parameters(Run& run) {
   run.context.out << '\n' << table.text();
 }
 
-void add_free_motions(Run& run, const Mechanism& mechanism, const Assembly& assembly) {
+void add_motions(Run& run, const Mechanism& mechanism, const Assembly& assembly) {
   const int freedoms = run.result.at("model").at("degrees_of_freedom").get<int>();
   const std::vector<std::string> free =
       free_motions(mechanism, assembly, run.problem.scene.simulation.start_time, freedoms);
   run.result["model"]["free"] = free;
   for (const std::string& motion : free) run.context.out << fmt::format("free: {}\n", motion);
+  if (run.result["model"]["redundant"].empty()) return;
+  const std::vector<std::string> twice = motions_forbidden_twice(mechanism, assembly);
+  run.result["model"]["forbidden_twice"] = twice;
+  for (const std::string& motion : twice) run.context.out << fmt::format("forbidden twice: {}\n", motion);
 }
 
 }  // namespace
@@ -50,7 +54,7 @@ int validate_command(const CommandContext& context) {
   if (closed && run.problem.scene.simulation.accuracy)
     context.out
         << "simulation.accuracy chooses the integrator when it is run; with an implicit one the model is spatial\n";
-  if (closed) add_free_motions(run, mechanism, assembly);
+  if (closed) add_motions(run, mechanism, assembly);
   if (closed) add_parameters(run);
   if (run.problem.identification) add_windows(run, cut_into_windows(run.problem, data_of(run.problem)).problem);
   return run.finish();

@@ -106,7 +106,8 @@ JournalContent read_journal(const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / kJournalFile;
   const auto refuse = [&](const std::string& why) { throw OutputError(file.string() + ": " + why); };
   if (!std::filesystem::exists(file))
-    refuse("there is none; 'resume' goes on with a folder that 'design' or 'identify' of this version has begun");
+    refuse(
+        "there is none; 'resume' goes on with a folder that 'design', 'identify' or 'sweep' of this version has begun");
   const std::string text = text_of(file);
   JournalContent content;
   int number = 0;

@@ -7,7 +7,8 @@
 //   {"hessians": {...}}                                                      second derivatives
 //   {"residuals": {...}}                                                     an experiment   (residual_records.hpp)
 //   {"iterate": {"iteration": 3, "objective": ..., "parameters": {...}}}     accepted by the optimiser
-//   {"start": {"start": 7, "status": "converged", ...}}                      a finished start of a multistart
+//   {"start": {"start": 7, "status": "converged", ...}}                      a finished start of a multistart, or block
+//   of a sweep
 //   {"ended": "ok"}                                                          the status of result.json, which is there
 //
 // Each line ends with

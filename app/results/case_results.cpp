@@ -67,7 +67,8 @@ bool check_cases(Run& run) {
     run.progress.finish();
     if (interrupted() || !check.ran) {
       interrupted() ? run.stopped("not all load cases were compared")
-                    : run.failed(fmt::format("case '{}': {}", load_case.name, check.message));
+                    : run.failed(fmt::format("case '{}': {}", load_case.name,
+                                             in_names_of_problem(check.message, load_case, run.problem.scene)));
       return true;
     }
     all_agree = all_agree && check.passed();

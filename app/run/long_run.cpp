@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "app/files/atomic_file.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "optim/problem/seed.hpp"
@@ -19,6 +21,8 @@ Json header_of(const Run& run, const Json& seeds) {
               {"input", provenance["input"]},
               {"input_sha256", provenance["input_sha256"]},
               {"seeds", seeds}};
+  if (const std::string& points = context.options.sweep.points; !points.empty())
+    header["points"] = std::filesystem::relative(points, run.folder.path()).generic_string();
   if (provenance.contains("data_sha256")) header["data_sha256"] = provenance["data_sha256"];
   return header;
 }

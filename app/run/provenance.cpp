@@ -9,9 +9,9 @@
 #include <Eigen/Core>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 
 #include "app/files/sha256.hpp"
+#include "optim/problem/csv_table.hpp"
 #include "optim/problem/regular_file.hpp"
 
 namespace mbsopt {
@@ -47,14 +47,13 @@ nlohmann::ordered_json library_versions() {
 // A run whose input has no checksum could not be gone on with.
 std::string checksum_of(const std::string& file) {
   std::string checksum = sha256_of_file(file);
-  if (checksum.empty()) throw std::runtime_error(file + ": cannot be read");
+  if (checksum.empty()) throw CsvError(file + ": cannot be read");
   return checksum;
 }
 
-// Two files may have one base name.
+// Two files may have one base name. The result does not depend on the current folder.
 std::string seen_from(const std::filesystem::path& folder, const std::filesystem::path& file) {
-  const std::filesystem::path relative = file.lexically_relative(folder);
-  return (relative.empty() ? file : relative).generic_string();
+  return std::filesystem::absolute(file).lexically_normal().lexically_relative(folder).generic_string();
 }
 
 }  // namespace
@@ -75,7 +74,7 @@ nlohmann::ordered_json provenance(const std::vector<std::string>& arguments, con
   for (const std::string& argument : arguments) command_line += " " + shell_word(argument);
   nlohmann::ordered_json result{
       {"command_line", command_line}, {"input", input_as_stored}, {"input_sha256", checksum_of(problem_file)}};
-  const std::filesystem::path folder = std::filesystem::path(problem_file).parent_path().lexically_normal();
+  const std::filesystem::path folder = std::filesystem::absolute(problem_file).lexically_normal().parent_path();
   for (const std::string& file : data_files) result["data_sha256"][seen_from(folder, file)] = checksum_of(file);
   result["libraries"] = library_versions();
   return result;

@@ -76,8 +76,9 @@ Run::Run(const CommandContext& given)
   result["version"] = program_version();
   result["command"] = context.command;
   result["problem"] = problem.scene.name;
-  result["provenance"] =
-      provenance(context.arguments, folder.owner(), context.options.problem_file, data_files(problem));
+  std::vector<std::string> files = data_files(problem);
+  if (!context.options.sweep.points.empty()) files.push_back(context.options.sweep.points);
+  result["provenance"] = provenance(context.arguments, folder.owner(), context.options.problem_file, files);
   result["warnings"] = Json::array();
   for (const std::string& warning : reader_warnings_) warn(warning);
   if (problem.columns_read.empty()) return;

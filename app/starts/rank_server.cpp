@@ -6,12 +6,15 @@
 #include <deque>
 #include <optional>
 #include <stdexcept>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "app/json/read_problem.hpp"
 #include "app/run/provenance.hpp"
 #include "app/starts/design_starts.hpp"
 #include "app/starts/identify_starts.hpp"
+#include "app/starts/sweep_blocks.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "app/terminal/interrupt.hpp"
 
@@ -30,13 +33,18 @@ std::function<Json(int)> work_of(const Json& work) {
   const std::string file = work.at("problem_file"), command = work.at("command");
   Problem problem = read_problem(file, work.at("sets").get<std::vector<std::string>>());
   set_integrator(problem, work.at("integrator"));
-  const Json here = provenance({}, "", file, data_files(problem));
+  const Json& task = work.at("task");
+  std::vector<std::string> files = data_files(problem);
+  if (const std::string points = task.value("points", ""); !points.empty()) files.push_back(points);
+  const Json here = provenance({}, "", file, files);
   for (const char* key : {"input_sha256", "data_sha256"})
     if (here.value(key, Json()) != work.at(key))
       throw std::runtime_error(
           fmt::format("{}: it, or a file that it names, has another content here than on rank 0", file));
-  return command == "design" ? design_start_work(problem, work.at("task")).record
-                             : identify_start_work(problem, work.at("task")).record;
+  return (command == "design"  ? design_start_work(problem, task)
+          : command == "sweep" ? sweep_work(problem, task)
+                               : identify_start_work(problem, task))
+      .record;
 }
 
 class Server {

@@ -6,9 +6,13 @@
 //
 // A null vector may hold for an instant only, as where a crank and its coupler are in line. So all is found again at a
 // position near by, to which a general motion leads: what moves is told from there, and nothing is told where the
-// numbers of degrees of freedom differ.
+// number of degrees of freedom differs.
 //
 // The L_b are independent of each other, so that R has the rank  columns of N - columns of L.
+//
+// Redundant equations: let J_0 be the rows before those of a joint, J_j the rows of the joint. Its combinations
+// y'J_j that depend on J_0 are y'(J_j N_0) = 0, N_0 the null space of J_0. Each is a wrench (f, m) on a body of the
+// joint: rows before forbid the motion already on which it would do work. Wrenches with f = 0 forbid turns.
 #include "core/start/free_motion.hpp"
 
 #include <fmt/format.h>
@@ -64,6 +68,16 @@ class MotionNames {
     return said_;
   }
 
+  std::vector<std::string> forbidden_twice() const {
+    std::vector<std::string> sentences;
+    for (std::size_t j = 0; j < d_.joint_names.size(); ++j) {
+      const std::string motions = forbidden_twice(static_cast<int>(j));
+      if (!motions.empty())
+        sentences.push_back(fmt::format("joint '{}' forbids again that {}", d_.joint_names[j], motions));
+    }
+    return sentences;
+  }
+
   // d(q)/d(s) along a general motion of all groups, of at most one radian or of one metre if nothing turns.
   VectorXd general_motion(const VectorXd& y) const {
     VectorXd qdot = VectorXd::Zero(7 * d_.n);
@@ -86,6 +100,47 @@ class MotionNames {
   }
 
  private:
+  std::string forbidden_twice(int joint) const {
+    Index begin = J_.rows(), end = 0;
+    int body = 0;
+    for (const Constraint& c : d_.constraints) {
+      if (c.joint != joint || c.drive >= 0) continue;
+      begin = std::min<Index>(begin, c.row), end = std::max<Index>(end, c.row + c.rows());
+      body = c.body2 > 0 ? c.body2 : c.body1;
+    }
+    if (body == 0 || begin >= end) return {};
+    const MatrixXd before = J_.topRows(begin), rows = J_.middleRows(begin, end - begin);
+    const MatrixXd free_before = free_in(before);
+    const MatrixXd y = free_before.cols() == 0 ? MatrixXd(MatrixXd::Identity(rows.rows(), rows.rows()))
+                                               : free_in(without_rounding((rows * free_before).transpose()));
+    if (y.cols() == 0) return {};
+    const MatrixXd wrench = rows.middleCols<6>(6 * (body - 1)).transpose() * y;
+    Vector3d arm = Vector3d::Zero();  // from the joint to the centre of mass, to which moments refer
+    for (const JointPoint& point : points_[at(body)])
+      if (point.joint == d_.joint_names[at(joint)]) arm = frames_[at(body)].r - point.place;
+    const MatrixXd f = without_rounding(wrench.topRows<3>());
+    MatrixXd m = frames_[at(body)].A * wrench.bottomRows<3>();
+    for (Index k = 0; k < m.cols(); ++k) m.col(k) += arm.cross(Vector3d(f.col(k)));
+    std::vector<std::string> motions;
+    if (!f.isZero(0)) motions.push_back("slides along " + directions(f, "direction"));
+    const MatrixXd turns = without_rounding(m * free_in(f));
+    if (!turns.isZero(0)) motions.push_back("turns about " + directions(turns, "axis"));
+    return motions.empty() ? std::string() : fmt::format("{} {}", name(body), fmt::join(motions, ", "));
+  }
+
+  // Rows of J have unit length.
+  static MatrixXd without_rounding(const MatrixXd& A) {
+    return (A.array().abs() < kFreeThreshold).select(MatrixXd::Zero(A.rows(), A.cols()), A);
+  }
+
+  // The space that the columns span: a line, a plane or all.
+  static std::string directions(const MatrixXd& columns, const char* what) {
+    const MatrixXd normals = free_in(columns.transpose());
+    if (normals.cols() == 0) return fmt::format("every {}", what);
+    if (normals.cols() == 1) return fmt::format("every {} normal to {}", what, direction(normals.col(0)));
+    return direction(Vector3d(normals.col(0)).cross(Vector3d(normals.col(1))));
+  }
+
   void set_jacobian() {
     J_ = MatrixXd::Zero(d_.m, 6 * d_.n);
     ConstraintRows rows(d_);
@@ -265,10 +320,17 @@ std::vector<std::string> free_motions(const Mechanism& mechanism, const Assembly
   moved.head(7 * data.n) += kStep * here.general_motion(y);
   if (!close_again(data, start_time, moved)) return {};
   const MotionNames::Told at_start = here.told(), near_by = MotionNames(data, moved).told();
-  if (at_start.freedoms != near_by.freedoms || at_start.all != degrees_of_freedom) return {};
-  std::vector<std::string> all = at_start.alone;
+  if (at_start.all != degrees_of_freedom || near_by.all != degrees_of_freedom) return {};
+  // The axes at the start are those that a user knows.
+  std::vector<std::string> all = at_start.freedoms == near_by.freedoms ? at_start.alone : near_by.alone;
   all.insert(all.end(), near_by.together.begin(), near_by.together.end());
   return all;
+}
+
+std::vector<std::string> motions_forbidden_twice(const Mechanism& mechanism, const Assembly& assembly) {
+  const MechanismData& data = mechanism.data();
+  if (data.n > kMostBodies || !assembly.result().ok) return {};
+  return MotionNames(data, assembly.result().y).forbidden_twice();
 }
 
 }  // namespace mbsopt

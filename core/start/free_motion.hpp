@@ -1,4 +1,4 @@
-// Sentences on the motion that the constraints leave at the assembled start: what each degree of freedom is.
+// Sentences on the motion that the constraints leave at the assembled start, and on that which they forbid twice.
 //
 //   'coupler' turns about the axis through joints 'B' and 'C'
 //   'crank', 'coupler', 'rocker' move together
@@ -16,5 +16,10 @@ namespace mbsopt {
 // degrees_of_freedom: of the summary. Empty where nothing is free, or where the motion cannot be told for sure.
 std::vector<std::string> free_motions(const Mechanism& mechanism, const Assembly& assembly, double start_time,
                                       int degrees_of_freedom);
+
+// The motions that redundant equations forbid a second time, a sentence per joint:
+//
+//   joint 'D' forbids again that 'rocker_bar' slides along [0, 0, 1], turns about every axis normal to [0, 0, 1]
+std::vector<std::string> motions_forbidden_twice(const Mechanism& mechanism, const Assembly& assembly);
 
 }  // namespace mbsopt

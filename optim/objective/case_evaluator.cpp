@@ -10,7 +10,7 @@ namespace mbsopt {
 
 CaseEvaluator::CaseEvaluator(const Problem& problem, const std::vector<std::string>& objectives,
                              const std::vector<std::string>& variables, const EvaluatorOptions& options, int threads)
-    : progress_(std::make_shared<std::mutex>()), threads_(threads) {
+    : problem_(problem), progress_(std::make_shared<std::mutex>()), threads_(threads) {
   EvaluatorOptions of_case = options;
   if (options.progress && threads > 1 && problem.cases.size() > 1)
     of_case.progress = [lock = progress_, told = options.progress](double t) {
@@ -28,12 +28,18 @@ CaseEvaluator::CaseEvaluator(const Problem& problem, const std::vector<std::stri
     }
     const std::vector<Objective> all = objectives_of(needed, objectives);
     evaluators_.emplace_back(std::move(needed.scene), all, names, of_case);
-    names_.push_back(problem.cases.empty() ? std::string() : problem.cases[c].name);
   }
 }
 
 std::string CaseEvaluator::in_case(std::size_t c, const std::string& what) const {
-  return names_[c].empty() ? what : fmt::format("{} ({})", what, names_[c]);
+  if (!has_cases()) return what;
+  const CaseSpec& load_case = problem_.cases[c];
+  return fmt::format("{} ({})", in_names_of_problem(what, load_case, problem_.scene), load_case.name);
+}
+
+std::string CaseEvaluator::told(std::size_t c, const std::string& words) const {
+  const CaseSpec& load_case = problem_.cases[c];
+  return fmt::format("case '{}': {}", load_case.name, in_names_of_problem(words, load_case, problem_.scene));
 }
 
 long CaseEvaluator::simulations() const {
@@ -50,18 +56,17 @@ const CaseEvaluation& CaseEvaluator::evaluated(const Eigen::VectorXd& rho, const
   CaseEvaluation all;
   static_cast<Evaluation&>(all) = found[0];
   all.rho = rho;
-  if (cases() > 1) {
+  if (has_cases()) {
     const Eigen::Index rows = n * static_cast<Eigen::Index>(cases()), columns = found[0].psi_rho.cols();
     all.psi.setZero(rows), all.psi_rho.setZero(found[0].has_gradients() ? rows : 0, columns);
     all.simulations = 0, all.wall_seconds = 0, all.warnings.clear();
   }
-  for (std::size_t c = 0; c < cases() && cases() > 1; ++c) {
+  for (std::size_t c = 0; c < cases() && has_cases(); ++c) {
     const Evaluation& e = found[c];
     all.simulations += e.simulations, all.wall_seconds += e.wall_seconds;
-    for (const std::string& warning : e.warnings)
-      all.warnings.push_back(fmt::format("case '{}': {}", names_[c], warning));
+    for (const std::string& warning : e.warnings) all.warnings.push_back(told(c, warning));
     if (!e.ok) {
-      if (all.ok || c == 0) all.message = fmt::format("case '{}': {}", names_[c], e.message);
+      if (all.ok || c == 0) all.message = told(c, e.message);
       all.ok = false;
       continue;
     }

@@ -40,8 +40,8 @@ class CaseEvaluator {
   std::size_t objectives() const { return evaluators_[0].objectives().size(); }  // of each case
   Evaluator& of_case(std::size_t c) { return evaluators_[c]; }
   const Evaluator& of_case(std::size_t c) const { return evaluators_[c]; }
-  const std::string& case_name(std::size_t c) const { return names_[c]; }  // empty where the problem has no cases
-  std::string in_case(std::size_t c, const std::string& what) const;       // "what (cold)"
+  std::string case_name(std::size_t c) const { return has_cases() ? problem_.cases[c].name : std::string(); }
+  std::string in_case(std::size_t c, const std::string& what) const;  // "what (cold)", with the problem's names
 
   const std::vector<int>& variables() const { return evaluators_[0].variables(); }
   Eigen::VectorXd start() const { return evaluators_[0].start(); }
@@ -52,7 +52,11 @@ class CaseEvaluator {
   template <class Evaluate>
   const CaseEvaluation& evaluated(const Eigen::VectorXd& rho, const Evaluate& evaluate);
 
-  std::vector<std::string> names_;
+  bool has_cases() const { return !problem_.cases.empty(); }
+  // "case 'cold': words", with the problem's names of parameters.
+  std::string told(std::size_t c, const std::string& words) const;
+
+  const Problem problem_;
   std::vector<Evaluator> evaluators_;
   std::shared_ptr<std::mutex> progress_;  // of all threads, which tell one listener
   const int threads_;

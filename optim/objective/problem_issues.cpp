@@ -6,9 +6,12 @@
 
 #include "core/expression/did_you_mean.hpp"
 #include "core/scene/checker.hpp"
+#include "core/scene/signals.hpp"
 #include "core/scene/type_table.hpp"
 #include "optim/objective/design_issues.hpp"
+#include "optim/objective/expression_cost.hpp"
 #include "optim/problem/bounded_means.hpp"
+#include "optim/problem/load_cases.hpp"
 #include "optim/problem/logged_columns.hpp"
 #include "optim/problem/problem_vocabulary.hpp"
 
@@ -32,6 +35,8 @@ void check_column_unit(Checker& checker, const std::string& unit_text, const std
 
 // Rows of the file outside the run are left out.
 void check_track(Checker& checker, const TrackTerm& term, const std::string& place) {
+  if (const std::optional<double> weight = checker.facts().value(term.weight); weight && *weight < 0)
+    checker.issue(place + ".weight", "is " + text_of(*weight) + ", the weight of a square must not be negative");
   if (!term.curve) return;
   const SimulationSettings& simulation = checker.facts().scene().simulation;
   const std::vector<double>& t = term.curve->x();
@@ -268,6 +273,35 @@ void check_meaning(Checker& checker, const IdentificationSpec& identification) {
   }
 }
 
+// A signal that covers the run may not cover that of a case, and a case may have samples of its own.
+void check_coverage(Checker& checker, const CaseSpec& load_case, const Problem& of_case, const std::string& place) {
+  const SceneFacts facts(of_case.scene);
+  const SimulationSettings& run = of_case.scene.simulation;
+  for (const Signal& signal : of_case.scene.signals) {
+    const bool own = std::ranges::find(load_case.signals, signal.name, &SignalSamples::name) != load_case.signals.end();
+    const std::optional<double> delay = facts.value(signal.delay);
+    if (!signal.curve || !delay || (!own && !load_case.end_time)) continue;
+    if (const auto why = uncovered(covered_by(*signal.curve, *delay), run.start_time, run.end_time))
+      checker.issue(own ? child_path(place + ".signals", signal.name) : place + ".end_time",
+                    "signal '" + signal.name + "': " + *why);
+  }
+}
+
+// The jumps of hold would move with the variable.
+void check_delays(Checker& checker, const Scene& scene, const std::vector<std::string>& variables) {
+  for (const Signal& signal : scene.signals) {
+    if (signal.interpolation != Interpolation::hold) continue;
+    const Program delay(signal.delay, parameter_symbols(scene));
+    for (const int input : delay.used_inputs()) {
+      const std::string& name = scene.parameters[static_cast<std::size_t>(input)].name;
+      if (std::ranges::find(variables, name) != variables.end())
+        checker.issue(child_path("signals", signal.name) + ".delay",
+                      "depends on '" + name + "', which is varied, and hold jumps at times that move with it: its " +
+                          "derivative has no value; take \"interpolation\": \"linear\" or \"spline\"");
+    }
+  }
+}
+
 void check_meaning(Checker& checker, const Problem& problem) {
   const auto place = [](std::size_t c) { return child_path("cases", c); };
   check_unique_names(checker, problem.cases, "a case", [&](std::size_t c) { return place(c) + ".name"; });
@@ -293,8 +327,13 @@ std::vector<SceneIssue> find_issues(const Problem& problem) {
   Checker checker(facts, issues);
   checker.check(problem);
   check_meaning(checker, problem.scene);
-  if (issues.empty())
+  if (issues.empty()) {
     if (const std::optional<DesignIssue> found = curvature_issue(problem)) checker.issue(found->path, found->message);
+    for (std::size_t c = 0; c < problem.cases.size(); ++c)
+      check_coverage(checker, problem.cases[c], problem_of(problem, problem.cases[c]), child_path("cases", c));
+    if (problem.design) check_delays(checker, problem.scene, problem.design->variables);
+    if (problem.identification) check_delays(checker, problem.scene, problem.identification->variables);
+  }
   return without_repetitions(std::move(issues));
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <string>
 
 #include "core/expression/syntax_tree.hpp"
 
@@ -38,6 +39,15 @@ std::string name_in(const CaseSpec& load_case, const std::string& parameter, con
   std::string name = parameter + "_of_problem";
   while (is_taken(scene, name)) name += "_";
   return name;
+}
+
+std::string in_names_of_problem(std::string words, const CaseSpec& load_case, const Scene& scene) {
+  for (const Definition& override : load_case.overrides) {
+    const std::string name = name_in(load_case, override.name, scene);
+    for (std::size_t at = 0; (at = words.find(name, at)) != std::string::npos; at += override.name.size())
+      words.replace(at, name.size(), override.name);
+  }
+  return words;
 }
 
 Problem problem_of(const Problem& problem, const CaseSpec& load_case) {

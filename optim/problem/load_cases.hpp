@@ -22,6 +22,9 @@ Problem problem_of(const Problem& problem, const CaseSpec& load_case);
 // What a parameter of the problem is called in a case.
 std::string name_in(const CaseSpec& load_case, const std::string& parameter, const Scene& scene);
 
+// The words with the problem's names of parameters in place of those that they have in the case.
+std::string in_names_of_problem(std::string words, const CaseSpec& load_case, const Scene& scene);
+
 // The problems of all cases; the problem itself where it has none.
 std::vector<Problem> problems_of_cases(const Problem& problem);
 

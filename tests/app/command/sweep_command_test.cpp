@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
 
 #include "app/terminal/exit_code.hpp"
 #include "optim/problem/csv_table.hpp"
+#include "tests/app/killed_run.hpp"
 #include "tests/app/run_command.hpp"
 #include "tests/app/swinging_rod.hpp"
 
@@ -75,4 +78,51 @@ TEST_CASE("what a sweep cannot vary is said", "[command][sweep]") {
   CHECK_THAT(words({"--vary", "k=-1:1:3"}), Contains("logarithmic"));
   CHECK_THAT(words({"--vary", "free=1:2:3", "--vary", "free=1:2:3"}), Contains("varied twice"));
   CHECK_THAT(words({"--points", folder.write("bad.csv", "free\n1\n\"\"\n")}), Contains("no number here"));
+  CHECK_THAT(words({"--points", folder.file("absent.csv")}), Contains("absent.csv: cannot be read"));
+}
+
+TEST_CASE("resume: a sweep that is killed ends with the same bytes, from its journal", "[command][sweep][resume]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kSwingingRod);
+  std::string rows = "free,k\n";
+  for (int i = 0; i < 40; ++i) rows += fmt::format("{},{}\n", 0.3 + 0.01 * i, 10 + i);
+  const std::string points = folder.write("points.csv", rows);
+  // Samples whose seed is drawn are in the journal's first line; points are read again.
+  const bool sampled = GENERATE(true, false);
+  const auto sweep = [&](const std::string& out) {
+    std::vector<std::string> arguments{"sweep", file, "--gradients", "--threads", "2", "--out", folder.file(out)};
+    if (sampled)
+      arguments.insert(arguments.end(), {"--vary", "free=0.3:0.7", "--vary", "k=5:50", "--samples", "40"});
+    else
+      arguments.insert(arguments.end(), {"--points", points});
+    return arguments;
+  };
+  const std::filesystem::path killed = folder.path / "killed";
+  kill_at(sweep("killed"), killed, "start", 3);
+  const long before = journal_lines(killed, "start");
+  CHECK(before >= 3);
+  CHECK(before < 40);
+  const CommandOutcome resumed = run_command({"resume", killed.string(), "--threads", "1"});
+  INFO(resumed.err);
+  REQUIRE(resumed.exit_code == kDone);
+  CHECK(journal_lines(killed, "start") == 40);
+  std::vector<std::string> again = sweep("whole");
+  if (sampled) again.insert(again.end(), {"--seed", json_of(killed / "result.json").at("sweep").at("seed").dump()});
+  REQUIRE(run_command(again).exit_code == kDone);
+  CHECK(content_of(killed / "sweep.csv") == content_of(folder.path / "whole/sweep.csv"));
+  CHECK(outcome_of(killed) == outcome_of(folder.path / "whole"));
+}
+
+TEST_CASE("resume: a sweep whose points have changed is refused", "[command][sweep][resume]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kSwingingRod);
+  const std::string points = folder.write("points.csv", "free\n0.4\n0.5\n");
+  const std::filesystem::path out = folder.path / "out";
+  REQUIRE(run_command({"sweep", file, "--points", points, "--out", out.string()}).exit_code == kDone);
+  const std::string journal = content_of(out / kJournalFile);
+  std::ofstream(out / kJournalFile, std::ios::binary) << journal.substr(0, journal.find('\n') + 1);
+  folder.write("points.csv", "free\n0.4\n0.6\n");
+  const CommandOutcome refused = run_command({"resume", out.string()});
+  CHECK(refused.exit_code == kBadInput);
+  CHECK_THAT(refused.err, Contains("another content of a data file"));
 }

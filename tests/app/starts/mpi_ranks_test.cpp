@@ -112,6 +112,20 @@ TEST_CASE("mpirun: two ranks identify what one worker does, bit by bit", "[mpi]"
   CHECK(content_of(folder.path / "two/residuals.csv") == content_of(folder.path / "one/residuals.csv"));
 }
 
+TEST_CASE("mpirun: two ranks sweep what one worker does, bit by bit", "[mpi]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kSwingingRod);
+  const std::string points = folder.write("points.csv", "free,k\n0.3,10\n0.4,20\n0.5,30\n0.6,40\n0.7,50\n");
+  const auto sweep = [&](const std::string& out) {
+    return std::vector<std::string>{"sweep", file, "--points", points, "--gradients", "--out", folder.file(out)};
+  };
+  REQUIRE(run_command(sweep("one")).exit_code == kDone);
+  const Finished two = mpirun(2, sweep("two"), folder);
+  INFO(two.err);
+  REQUIRE(two.exit_code == kDone);
+  CHECK(content_of(folder.path / "two/sweep.csv") == content_of(folder.path / "one/sweep.csv"));
+}
+
 TEST_CASE("mpirun: bad input is said once, and other commands run as ever", "[mpi]") {
   const TemporaryFolder folder;
   const std::string file = folder.write("rod.json", kSwingingRod);

@@ -1,6 +1,5 @@
 // Multistart, journal and resume, as commands.
 #include <signal.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -8,11 +7,11 @@
 #include <chrono>
 #include <fstream>
 #include <set>
-#include <sstream>
 #include <thread>
 
 #include "app/files/journal.hpp"
 #include "app/terminal/exit_code.hpp"
+#include "tests/app/killed_run.hpp"
 #include "tests/app/run_command.hpp"
 #include "tests/app/swinging_rod.hpp"
 
@@ -31,23 +30,6 @@ CommandOutcome design(const std::string& file, const std::string& out, const Arg
 }
 
 void write_text(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
-
-// A run in a process of its own that is killed as soon as its journal has so many lines of a kind.
-void kill_at(const Arguments& arguments, const fs::path& folder, const std::string& key, long count) {
-  const pid_t process = ::fork();
-  if (process == 0) {
-    std::ostringstream out, err;
-    run_command_line(arguments, out, err);
-    ::_exit(0);
-  }
-  for (int i = 0; i < 6000; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    if (fs::exists(folder / kJournalFile) && journal_lines(folder, key) >= count) break;
-  }
-  ::kill(process, SIGKILL);
-  int status = 0;
-  ::waitpid(process, &status, 0);
-}
 
 }  // namespace
 

@@ -142,3 +142,17 @@ TEST_CASE("a design over cases: sum and maximum have their closed optimum, limit
   for (const DesignConstraint& c : held.constraints) CHECK(*c.true_value <= 2);
   CHECK(held.variables[0].value == Approx(2).epsilon(1e-5));
 }
+
+TEST_CASE("what is said of a case names parameters as the problem does", "[cases]") {
+  Problem problem = loaded_swing();
+  CaseEvaluator evaluator(problem, {"end"}, {"k", "a", "b"});
+  CHECK(evaluator.in_case(0, "k_of_problem moves a jump") == "k moves a jump (stiff)");
+  problem.scene.forces.clear();
+  PointForce pull;
+  pull.body = "mass", pull.components = {f("1/(t - 0.5)"), f("0"), f("0")};
+  problem.scene.forces.push_back({"pull", pull});
+  CaseEvaluator failing(problem, {"end"}, {"k", "a", "b"});
+  const CaseEvaluation& e = failing.values(failing.start());
+  CHECK_FALSE(e.ok);  // no maximum over the cases that did not fail
+  CHECK(e.message.starts_with("case 'stiff': "));
+}

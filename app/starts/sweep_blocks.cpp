@@ -1,0 +1,137 @@
+#include "app/starts/sweep_blocks.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "app/files/journal.hpp"
+#include "app/terminal/interrupt.hpp"
+#include "optim/objective/evaluator.hpp"
+#include "optim/problem/parameter_values.hpp"
+
+namespace mbsopt {
+namespace {
+
+// A block costs a process (1 ms) and a line of the journal. A sweep that is killed loses one block per worker.
+constexpr std::size_t kMostBlocks = 1000;
+
+std::size_t block_size(std::size_t points) { return (points + kMostBlocks - 1) / kMostBlocks; }
+
+std::vector<double> list_of(const Eigen::VectorXd& values) { return {values.begin(), values.end()}; }
+
+Json task_of(const SweepOptions& options, long seed) {
+  return {{"vary", options.vary},
+          {"samples", options.samples ? Json(*options.samples) : Json()},
+          {"points", options.points},
+          {"gradients", options.gradients},
+          {"seed", seed}};
+}
+
+SweepOptions options_in(const Json& task) {
+  SweepOptions options;
+  options.vary = task.at("vary").get<std::vector<std::string>>();
+  if (!task.at("samples").is_null()) options.samples = task["samples"].get<int>();
+  options.points = task.at("points").get<std::string>();
+  options.gradients = task.at("gradients").get<bool>();
+  return options;
+}
+
+Json to_json(const Evaluation& e, const std::vector<std::optional<double>>& true_values) {
+  Json row{{"psi", list_of(e.psi)}};
+  for (const std::optional<double>& value : true_values) row["true"].push_back(value ? Json(*value) : Json());
+  for (const auto& gradient : e.psi_rho.rowwise()) row["psi_rho"].push_back(list_of(gradient.transpose()));
+  return row;
+}
+
+Eigen::VectorXd values_in(const Json& json) {
+  const auto values = json.get<std::vector<double>>();
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+SweepRow row_of(const Json& json) {
+  SweepRow row;
+  row.done = true;
+  if (json.contains("failed")) {
+    row.message = json["failed"].get<std::string>();
+    return row;
+  }
+  row.psi = values_in(json.at("psi"));
+  for (const Json& value : json.at("true"))
+    row.true_values.push_back(value.is_null() ? std::nullopt : std::optional(value.get<double>()));
+  if (!json.contains("psi_rho")) return row;
+  for (const Json& gradient : json["psi_rho"]) {
+    const Eigen::VectorXd values = values_in(gradient);
+    row.psi_rho.conservativeResize(row.psi_rho.rows() + 1, values.size());
+    row.psi_rho.bottomRows<1>() = values.transpose();
+  }
+  return row;
+}
+
+// In a worker process. An interrupt ends the block: it is "stopped", with the rows until then.
+Json record_of_block(const Problem& problem, const SweepPoints& points, bool gradients, int block) {
+  std::vector<std::string> varied;
+  for (const int p : points.parameters) varied.push_back(problem.scene.parameters[static_cast<std::size_t>(p)].name);
+  EvaluatorOptions options;
+  options.progress = [](double) { return !interrupted(); };
+  Evaluator evaluator(problem.scene, objectives_of(problem), varied, options);
+  Json record{{"start", block}, {"status", "ok"}, {"rows", Json::array()}};
+  const std::size_t size = block_size(points.values.size()), first = size * static_cast<std::size_t>(block);
+  for (std::size_t i = first; i < std::min(first + size, points.values.size()); ++i) {
+    Eigen::VectorXd rho = parameter_values(problem.scene);
+    for (std::size_t k = 0; k < points.parameters.size(); ++k)
+      rho(points.parameters[k]) = points.values[i](static_cast<Eigen::Index>(k));
+    const Evaluation& e = gradients ? evaluator.gradients(rho) : evaluator.values(rho);
+    if (interrupted()) {
+      record["status"] = "stopped";
+      break;
+    }
+    record["rows"].push_back(e.ok ? to_json(e, evaluator.true_values(rho)) : Json{{"failed", e.message}});
+  }
+  return record;
+}
+
+}  // namespace
+
+std::vector<SweepRow> swept(Run& run, LongRun& long_run, const SweepPoints& points, long seed) {
+  std::vector<SweepRow> rows(points.values.size());
+  const std::size_t size = block_size(rows.size());
+  const auto take = [&](const Json& record) {
+    std::size_t i = size * record.at("start").get<std::size_t>();
+    for (const Json& row : record.at("rows")) rows.at(i++) = row_of(row);
+  };
+  std::set<int> finished;
+  read_record([&] {
+    for (const Json& record : long_run.earlier().starts) take(record), finished.insert(record.at("start").get<int>());
+  });
+  const int blocks = static_cast<int>((rows.size() + size - 1) / size);
+  std::vector<int> jobs;
+  for (int block = 0; block < blocks; ++block)
+    if (!finished.contains(block)) jobs.push_back(block);
+  std::size_t done = finished.size();
+  compute_starts(run, jobs, sweep_work(run.problem, task_of(run.context.options.sweep, seed)),
+                 [&](const JobReply& reply) {
+                   if (!reply.ok) {  // of a worker that crashed: it may do better next time
+                     for (std::size_t i = size * static_cast<std::size_t>(reply.job), k = 0;
+                          !interrupted() && k < size && i + k < rows.size(); ++k)
+                       rows[i + k].done = true, rows[i + k].message = reply.text;
+                     return;
+                   }
+                   const Json record = Json::parse(reply.text);
+                   take(record);
+                   if (record["status"] == "ok") long_run.add("start", record);
+                   run.progress.fraction("sweep", static_cast<double>(++done) / static_cast<double>(blocks));
+                 });
+  run.progress.finish();
+  return rows;
+}
+
+StartWork sweep_work(const Problem& problem, const Json& task) {
+  const SweepOptions options = options_in(task);
+  return {task,
+          [problem, points = sweep_points(problem.scene, options, task.at("seed").get<long>()),
+           gradients = options.gradients](int block) { return record_of_block(problem, points, gradients, block); }};
+}
+
+}  // namespace mbsopt

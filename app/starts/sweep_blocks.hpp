@@ -1,0 +1,33 @@
+// The points of a sweep, computed block by block: a block is to a sweep what a start is to a multistart. It runs in a
+// worker process or on another rank (start_workers.hpp), and its record is a line of the journal:
+//
+//   {"start": 3, "status": "ok", "rows": [{"psi": [0.2, 1.1], "true": [null, 1.2], "psi_rho": [[...], [...]]},
+//                                         {"failed": "why"}]}
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/run/long_run.hpp"
+#include "app/run/sweep_points.hpp"
+#include "app/starts/start_workers.hpp"
+
+namespace mbsopt {
+
+struct SweepRow {
+  bool done = false;
+  std::string message;  // why there are no values
+  Eigen::VectorXd psi;
+  std::vector<std::optional<double>> true_values;
+  Eigen::MatrixXd psi_rho;  // empty unless gradients are asked for
+};
+
+// A row per point, in their order; those of earlier runs from the journal.
+std::vector<SweepRow> swept(Run& run, LongRun& long_run, const SweepPoints& points, long seed);
+
+// The blocks, from the task that this process or another one has made.
+StartWork sweep_work(const Problem& problem, const Json& task);
+
+}  // namespace mbsopt
