@@ -6,8 +6,8 @@
 //   in a sensor that one of these uses;
 //   in the model of the bodies that such a sensor looks at, and of all bodies that joints, forces or initial conditions
 //   connect with those (not through the ground): their fields, joints, forces and conditions, and gravity.
-// energy, constraint_violation and smallest_singular_value look at all bodies. A problem without objectives and identification is judged as if a
-// sensor looked at everything.
+// energy, constraint_violation and smallest_singular_value look at all bodies. A problem without objectives and
+// identification is judged as if a sensor looked at everything.
 #pragma once
 
 #include <vector>

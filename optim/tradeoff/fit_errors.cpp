@@ -40,8 +40,8 @@ class FitErrorMeasure::Runs {
     limits.progress = [this](double) { return !(interrupted_ && interrupted_()); };
     for (std::size_t e = 0; e < spec_.experiments.size(); ++e) {
       if (spec_.experiments[e].validate) continue;
-      const Experiment experiment(scene, spec_.experiments[e], place_of(spec_, e),
-                                  data_[e], parameter_values(scene), unknowns_in(scene, spec_, e, unknowns_));
+      const Experiment experiment(scene, spec_.experiments[e], place_of(spec_, e), data_[e], parameter_values(scene),
+                                  unknowns_in(scene, spec_, e, unknowns_));
       const Experiment::Residuals r = experiment.residuals(start_of(unknowns_), limits);
       if (!r.ok) {
         fit.message = fmt::format("{}: {}", spec_.experiments[e].name, r.message);
