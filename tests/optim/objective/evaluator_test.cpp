@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <limits>
 
 #include "core/force/user_force.hpp"
 #include "core/tableau/tableaus.hpp"
@@ -91,6 +92,16 @@ TEST_CASE("once the user has stopped, an evaluation begins no simulation, not ev
   CHECK_FALSE(e.ok);
   CHECK(e.simulations == 0);
   CHECK_THAT(e.message, Contains("stopped"));
+}
+
+TEST_CASE("parameters that are no numbers fail in words", "[gradient]") {
+  const Problem problem = five_bar::problem();
+  Evaluator evaluator(problem.scene, objectives_of(problem));
+  Eigen::VectorXd rho = evaluator.start();
+  rho(0) = std::numeric_limits<double>::quiet_NaN();
+  const Evaluation& e = evaluator.values(rho);
+  CHECK_FALSE(e.ok);
+  CHECK(e.message == "a parameter is not a finite number");
 }
 
 TEST_CASE("the gradient of a running cost is computed once at each stage", "[gradient]") {
