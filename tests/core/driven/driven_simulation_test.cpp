@@ -49,7 +49,8 @@ Scene slider_crank() {
   s.sensors.push_back(torque);
   s.sensors.push_back(angle_sensor("theta", "A"));
   s.simulation.end_time = 2;
-  s.simulation.integrator = {"dopri853", 1e-11, 1e-13, {}, {}, {}, 100000, {}};
+  IntegratorSettings& integrator = s.simulation.integrator;
+  integrator.type = "dopri853", integrator.rtol = 1e-11, integrator.atol = 1e-13;
   return s;
 }
 

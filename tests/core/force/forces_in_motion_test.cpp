@@ -16,7 +16,8 @@ Scene free_body() {
   Scene s;
   s.gravity = {0.0, 0.0, 0.0};
   s.bodies.push_back(plain_body("block", 1, {0.2, 0.3, 0.4, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}));
-  s.simulation.integrator = {"dopri853", 1e-11, 1e-13, {}, {}, {}, 100000, {}};
+  IntegratorSettings& integrator = s.simulation.integrator;
+  integrator.type = "dopri853", integrator.rtol = 1e-11, integrator.atol = 1e-13;
   s.simulation.end_time = 2;
   return s;
 }

@@ -17,7 +17,8 @@ TEST_CASE("a torque-free body keeps its energy and its angular momentum", "[simu
   b.angular_velocity = {0.1, 6.0, 0.2};  // about the middle axis: it tumbles
   scene.bodies.push_back(b);
   scene.simulation.end_time = 20;
-  scene.simulation.integrator = {"dopri853", 1e-10, 1e-12, {}, {}, {}, 100000, {}};
+  IntegratorSettings& integrator = scene.simulation.integrator;
+  integrator.type = "dopri853", integrator.rtol = 1e-10, integrator.atol = 1e-12;
   const Mechanism mechanism(scene, VectorXd());
   const SimulationResult run = simulate(mechanism, scene.simulation);
   REQUIRE(run.ok());

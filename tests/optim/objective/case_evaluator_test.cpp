@@ -29,7 +29,8 @@ Problem loaded_swing() {
   s.forces.push_back({"pull", pull});
   s.sensors.push_back(point_sensor("x", "position", "mass", vec("0", "0", "0"), "x"));
   s.simulation.end_time = 1;
-  s.simulation.integrator = {"dopri853", 1e-11, 1e-13, {}, {}, {}, 100000, {}};
+  IntegratorSettings& integrator = s.simulation.integrator;
+  integrator.type = "dopri853", integrator.rtol = 1e-11, integrator.atol = 1e-13;
   ObjectiveSpec end;
   end.name = "end", end.terminal = f("x"), end.parameters_only = f("0*b");
   problem.objectives = {end};

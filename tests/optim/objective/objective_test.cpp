@@ -26,7 +26,8 @@ Scene oscillator() {
   s.forces.push_back({"pull", pull});
   s.sensors.push_back(point_sensor("x", "position", "mass", vec("0", "0", "0"), "x"));
   s.simulation.end_time = 5;
-  s.simulation.integrator = {"dopri853", 1e-10, 1e-12, {}, {}, {}, 100000, {}};
+  IntegratorSettings& integrator = s.simulation.integrator;
+  integrator.type = "dopri853", integrator.rtol = 1e-10, integrator.atol = 1e-12;
   s.simulation.integrator.max_step = 0.02;
   return s;
 }
