@@ -25,6 +25,7 @@
 #include "optim/fit/fit_comparison.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/fit/recovery.hpp"
+#include "optim/fit/unknown_parameters.hpp"
 #include "optim/fit/windows.hpp"
 #include "optim/problem/unused_parameters.hpp"
 
@@ -135,7 +136,7 @@ Scene simulated_scene(const Problem& problem, const std::vector<CsvTable>& data)
   const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
   std::size_t e = 0;
   while (e + 1 < experiments.size() && experiments[e].validate) ++e;
-  return Experiment(problem.scene, experiments[e], fmt::format("identification.experiments[{}]", e), data[e],
+  return Experiment(problem.scene, experiments[e], place_of(*problem.identification, e), data[e],
                     parameter_values(problem.scene), {})
       .simulated();
 }
@@ -212,13 +213,13 @@ int identify_command(const CommandContext& context) {
     throw std::invalid_argument("identification: missing; it says which measurements to explain and what may change");
   }
   const std::vector<CsvTable> whole = data_of(run.problem);
-  const CutProblem cut = cut_into_windows(run.problem, whole);
-  const std::vector<CsvTable>& data = cut.data;
   // With its drives and overrides, which the scene itself may not even assemble without.
-  const Scene first = simulated_scene(cut.problem, data);
+  const Scene first = simulated_scene(run.problem, whole);
   const Mechanism mechanism(first, parameter_values(first));
   run.start();
   if (!settle_accuracy(run, first, {})) return run.finish();
+  const CutProblem cut = cut_into_windows(run.problem, whole);  // by the settled integrator
+  const std::vector<CsvTable>& data = cut.data;
   if (const Assembly assembly(mechanism, first.simulation.start_time); assembly.result().ok) {
     ModelSummary model = assembly.summary();
     add_model(mechanism, scene.simulation, model);
@@ -229,7 +230,8 @@ int identify_command(const CommandContext& context) {
   std::vector<std::string> left_out;
   const Problem needed = what_measurements_need(cut.problem, &left_out);
   say_left_out(run, left_out, "measurement");
-  for (const std::string& warning : cut.warnings) run.warn(warning);
+  if (context.options.preflight)  // the fit says them itself
+    for (const std::string& warning : cut.warnings) run.warn(warning);
   add_windows(run, cut.problem);
   const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
   for (const std::string& warning : doubts_about_fit(needed, data, {{}, [](double) { return !interrupted(); }}))

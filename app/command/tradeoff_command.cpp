@@ -56,6 +56,7 @@ void sweep(Run& run) {
   const Problem& problem = run.problem;
   const std::vector<CsvTable> data = problem.identification ? data_of(problem) : std::vector<CsvTable>();
   const CutProblem cut = cut_into_windows(problem, data);
+  for (const std::string& warning : cut.warnings) run.warn(warning);
   std::optional<FitErrorMeasure> fit;
   if (problem.identification && !tradeoff.interrupted) {
     fit.emplace(cut.problem, cut.data, [] { return interrupted(); });

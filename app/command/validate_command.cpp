@@ -56,7 +56,13 @@ int validate_command(const CommandContext& context) {
         << "simulation.accuracy chooses the integrator when it is run; with an implicit one the model is spatial\n";
   if (closed) add_motions(run, mechanism, assembly);
   if (closed) add_parameters(run);
-  if (run.problem.identification) add_windows(run, cut_into_windows(run.problem, data_of(run.problem)).problem);
+  if (run.problem.identification) {
+    Problem problem = run.problem;
+    problem.scene.simulation.accuracy.reset();  // the default integrator guesses the starts
+    const CutProblem cut = cut_into_windows(problem, data_of(problem));
+    for (const std::string& warning : cut.warnings) run.warn(warning);
+    add_windows(run, cut.problem);
+  }
   return run.finish();
 }
 

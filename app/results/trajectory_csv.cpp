@@ -99,6 +99,7 @@ void write_trajectory(Run& run, const Trajectory& trajectory) {
   const bool motion_ends_early = interrupted();  // by an earlier Ctrl-C: what there is of it is kept
   const std::function<bool(double)> watch = run.watched("writing trajectory.csv");
   const std::optional<std::string> text = to_csv(trajectory, [&](double t) { return watch(t) || motion_ends_early; });
+  run.progress.finish();
   text ? run.write("trajectory.csv", *text) : run.stopped("trajectory.csv was not written");
 }
 

@@ -117,9 +117,13 @@ inline constexpr TypeRow kSensorQuantities[] = {
     {"imu", "of a body point, in axes fixed in the body: specific force (acceleration minus gravity), angular velocity",
      "body! point axes component!", "ax ay az wx wy wz", dimension::kAcceleration, Reads::motion},
     {"transmission_angle", "from 0 to pi, between the two links that meet in a joint, each towards its only other pin",
-     "joint!", "", dimension::kAngle},
+     "joint!", "", dimension::kAngle, Reads::state},
     {"smallest_singular_value",
-     "of the Jacobian of joints and drives, rows and columns scaled: 0 where they lose hold of a motion", "", ""},
+     "of the Jacobian of joints and drives, rows and columns scaled: 0 where they lose hold of a motion",
+     "",
+     "",
+     {},
+     Reads::state},
     {"expression", "of other sensors, parameters, definitions and t", "value!"},
 };
 

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/scene/scene_facts.hpp"
+#include "optim/fit/unknown_parameters.hpp"
 
 namespace mbsopt {
 namespace {
@@ -71,10 +72,10 @@ std::vector<std::string> angle_doubts(const Scene& scene, const IdentificationSp
       if (plausible || !(as_degrees(start) || as_degrees(end))) continue;
       if (apart(s.measured, s.end) <= kUnexplained * deviation(s.measured)) continue;
       doubts.push_back(
-          fmt::format("identification.experiments[{}].channels[{}].column: the values of '{}' span {:.3g}, those of "
+          fmt::format("{}.channels[{}].column: the values of '{}' span {:.3g}, those of "
                       "the model {:.3g} {} at the start of the fit and {:.3g} {} at its end: is the column in degrees? "
                       "Convert it to rad, or give the channel the gain 180/pi, with sigma and bias in degrees",
-                      m.experiment, c, channel.column, span, start, unit, end, unit));
+                      place_of(spec, m.experiment), c, channel.column, span, start, unit, end, unit));
     }
   }
   return doubts;

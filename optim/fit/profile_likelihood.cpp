@@ -21,7 +21,11 @@ class OneHeld : public LeastSquaresProblem {
   OneHeld(LeastSquaresProblem& whole, Eigen::Index held)
       : LeastSquaresProblem(whole.variables() - 1, whole.size), whole_(whole), held_(held) {
     x_lower = without(whole.x_lower), x_upper = without(whole.x_upper);
-    plain = whole.plain, loss = whole.loss;
+    plain = whole.plain, loss = whole.loss, parts = whole.parts;
+    for (Dependence& part : parts) {
+      std::erase(part.variables, held);
+      for (Eigen::Index& variable : part.variables) variable -= variable > held ? 1 : 0;
+    }
     all_.z.resize(size), all_.z_x.resize(size, whole.variables());
   }
   void hold(double value) { value_ = value; }

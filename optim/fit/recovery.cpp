@@ -18,10 +18,6 @@ struct ChannelRecord {
   std::vector<double> model, noise;
 };
 
-std::size_t index_of(const CsvTable& table, const std::string& column) {
-  return static_cast<std::size_t>(std::ranges::find(table.header, column) - table.header.begin());
-}
-
 std::vector<ChannelRecord> records_of(const Problem& problem, const std::vector<CsvTable>& data,
                                       const IdentificationResult& fit) {
   const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
@@ -30,7 +26,7 @@ std::vector<ChannelRecord> records_of(const Problem& problem, const std::vector<
   for (std::size_t e = 0; e < experiments.size(); ++e) {
     first.push_back(records.size());
     for (const ChannelSpec& channel : experiments[e].channels)
-      records.push_back({e, index_of(data[e], channel.column), {}, {}, {}});
+      records.push_back({e, data[e].find_column(channel.column), {}, {}, {}});
   }
   std::size_t row = 0, experiment = 0;
   for (const ResidualRow& sample : fit.residuals) {  // by experiment, then time

@@ -113,7 +113,7 @@ class Cut {
     for (std::size_t k = 0; k < static_cast<std::size_t>(windows); ++k) {
       const bool last = static_cast<double>(k + 1) == windows;
       const double from = start + static_cast<double>(k) * length;
-      window.start_time = from, window.end_time = last ? end : from + length;
+      window.start_time = from, window.end_time = last ? end : start + static_cast<double>(k + 1) * length;
       window.name = fmt::format("{}.{}", whole_.name, k + 1);
       window.origin = {whole_.name, place_, k + 1};
       CsvTable rows = rows_between(data_, t_, from, *window.end_time, last);

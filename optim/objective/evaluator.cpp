@@ -111,11 +111,12 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
   e.rho = rho;
   e.psi.setZero(static_cast<Eigen::Index>(objectives_.size()));
   if (sweep != Sweep::none) e.psi_rho.setZero(e.psi.size(), static_cast<Eigen::Index>(variables_.size()));
-  e.ok = rho.allFinite();
-  if (!e.ok) {  // of an optimiser whose own numbers overflowed
-    e.message = "a parameter is not a finite number";
+  for (Eigen::Index k = 0; k < rho.size(); ++k) {
+    if (std::isfinite(rho(k))) continue;  // of an optimiser whose own numbers overflowed
+    e.message = fmt::format("parameters.{}: is no finite number", scene_.parameters[static_cast<std::size_t>(k)].name);
     return e;
   }
+  e.ok = true;
   if (!simulated_.empty()) {
     if (options_.progress && !options_.progress(settings.start_time)) {  // the assembly alone may take a second
       e.ok = false, e.message = "stopped before its simulation";

@@ -256,8 +256,14 @@ void check_meaning(Checker& checker, const IdentificationSpec& identification) {
       if (experiments[i].channels[k].estimate_sigma != SigmaEstimate::none)
         checker.issue(child_path(child_path(list, i) + ".channels", k) + ".estimate_sigma",
                       "asks for an estimate, but identification.sigma_is_known is true; one of them must be false");
+  for (std::size_t i = 0; i < experiments.size(); ++i)
+    if (experiments[i].windows && experiments[i].windows->continuity)
+      checker.issue(child_path(list, i) + ".windows.continuity",
+                    "is true, which is not available in this version; each window starts from values of its own");
   const auto fitted = std::count_if(experiments.begin(), experiments.end(), [](const auto& e) { return !e.validate; });
-  if (identification.covariance == CovarianceType::windows && fitted == 1)
+  const bool cut =
+      std::any_of(experiments.begin(), experiments.end(), [](const auto& e) { return e.windows && !e.validate; });
+  if (identification.covariance == CovarianceType::windows && fitted == 1 && !cut)
     checker.issue(checker.path("covariance"), "is \"windows\", which compares experiments, and one is fitted only");
   check_unique_names(checker, experiments, "an experiment",
                      [&](std::size_t i) { return child_path(list, i) + ".name"; });

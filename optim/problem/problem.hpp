@@ -136,6 +136,7 @@ struct ChannelSpec {
 struct WindowsSpec {
   double length = 1;                           // [s]
   std::optional<double> start_time, end_time;  // instead of the experiment's
+  bool continuity = false;                     // not available yet: problem_issues.cpp refuses true
 };
 
 // Which window of which experiment of the problem file an experiment is.

@@ -68,7 +68,7 @@ TEST_CASE("a measured torque as a signal equals the displacement of a driven sli
   // Both are the same function. At rtol 1e-12 they differ by 6e-9, the integration error of the signal's run: f_ttt
   // jumps at the samples, and the later motion magnifies errors by 4. At 1e-13 they differ by 8e-10, here by 6e-11.
   const auto tight = [&](std::string text) {
-    text.replace(text.find("\"rtol\": 1e-12, \"atol\": 1e-13"), 29, "\"rtol\": 3e-14, \"atol\": 3e-15");
+    text.replace(text.find("\"rtol\": 1e-12, \"atol\": 1e-13"), 28, "\"rtol\": 3e-14, \"atol\": 3e-15");
     return text;
   };
   const CommandOutcome named = run_text(folder, tight(arm("tau", signal)), "named");

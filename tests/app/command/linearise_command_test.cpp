@@ -66,7 +66,8 @@ TEST_CASE("linearise takes a later state, and refuses what is not there", "[comm
 TEST_CASE("a mechanism in which nothing is free is not linearised", "[command]") {
   const TemporaryFolder folder;
   std::string text = kBlock;
-  text.replace(text.find("translational"), std::string("translational").size(), "fixed");
+  const std::size_t drives = text.find("\"forces\"");
+  text.insert(drives, R"("drives": [{"name": "shift", "type": "displacement", "joint": "rail", "law": "at"}], )");
   const CommandOutcome outcome =
       run_command({"linearise", folder.write("block.json", text), "--out", folder.file("out")});
   INFO(outcome.out << outcome.err);
