@@ -47,7 +47,9 @@ void add_motions(Run& run, const Mechanism& mechanism, const Assembly& assembly)
 
 int validate_command(const CommandContext& context) {
   Run run(context);
-  const Mechanism mechanism(run.problem.scene, parameter_values(run.problem.scene));
+  Scene scene = run.problem.scene;
+  for (Condition& condition : scene.conditions) condition.acceleration.reset();  // `kinematics` alone takes them
+  const Mechanism mechanism(scene, parameter_values(scene));
   const Assembly assembly(mechanism, run.problem.scene.simulation.start_time);
   run.start();
   const bool closed = assembled(run, mechanism, assembly);

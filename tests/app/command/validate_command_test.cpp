@@ -62,3 +62,17 @@ TEST_CASE("validate names the motion that redundant equations forbid twice", "[c
   CHECK_THAT(hinges.out, Contains("forbidden twice: joint 'second' forbids again that 'rod' slides along every "
                                   "direction, turns about every axis normal to [0, 0, 1]"));
 }
+
+TEST_CASE("validate takes a prescribed acceleration, which only kinematics uses", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", R"({
+    "format": 1, "name": "rod", "bodies": [{"name": "rod", "mass": 1, "inertia": [1, 1, 1]}],
+    "joints": [{"name": "pin", "type": "revolute", "body2": "rod", "axis1": [0, 1, 0], "axis2": [0, 1, 0]}],
+    "sensors": {"phi": {"quantity": "angle", "joint": "pin"}},
+    "initial": {"conditions": [{"sensor": "phi", "value": 0.3, "rate": 1, "acceleration": 2}]},
+    "simulation": {"end_time": 1}})");
+  const CommandOutcome outcome = run_command({"validate", file, "--out", folder.file("out")});
+  INFO(outcome.out << outcome.err);
+  CHECK(outcome.exit_code == kDone);
+  CHECK(run_command({"simulate", file, "--out", folder.file("simulated")}).exit_code == kBadInput);
+}
