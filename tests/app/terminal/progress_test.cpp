@@ -82,14 +82,14 @@ TEST_CASE("what stands for long says since when, with a terminal or without", "[
 TEST_CASE("on a terminal a line is cut to its width, and keeps the elapsed time", "[progress]") {
   std::ostringstream err;
   double now = 0;
-  int columns = 20;
+  int columns = 21;
   Progress progress(
       err, true, false, [&] { return now; }, [&] { return columns; });
   const auto last = [&] { return err.str().substr(err.str().rfind("\x1b[K") + 3); };
   now = 75;
   progress.iteration("12  psi 0.0123456789");
   CHECK(last() == "12  psi 0.0123, 75 s");
-  columns = 21;  // the window has become wider
+  columns = 22;  // the window has become wider
   progress.iteration("12  psi 0.0123456789");
   CHECK(last() == "12  psi 0.01234, 75 s");
   columns = 9;  // room for "a" and one of the two bytes of the next letter
