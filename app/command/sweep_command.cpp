@@ -4,6 +4,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "app/report/sweep_report.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "app/run/command.hpp"
@@ -17,8 +18,8 @@ namespace mbsopt {
 namespace {
 
 // Point, varied parameters, objectives with their true extremes, gradients. Points without values have empty cells.
-std::string table_of(const Problem& problem, const SweepPoints& points, const std::vector<SweepRow>& rows,
-                     bool gradients) {
+Trajectory table_of(const Problem& problem, const SweepPoints& points, const std::vector<SweepRow>& rows,
+                    bool gradients) {
   std::vector<std::string> columns{"point"}, varied;
   for (const int p : points.parameters) varied.push_back(problem.scene.parameters[static_cast<std::size_t>(p)].name);
   columns.insert(columns.end(), varied.begin(), varied.end());
@@ -45,7 +46,7 @@ std::string table_of(const Problem& problem, const SweepPoints& points, const st
     }
     cells.push_back(std::move(row));
   }
-  return to_csv(columns, cells);
+  return {std::move(columns), std::move(cells)};
 }
 
 void add_ranges(Run& run, const SweepPoints& points, const std::vector<SweepRow>& rows) {
@@ -97,11 +98,13 @@ int sweep_command(const CommandContext& context) {
     run.warn(fmt::format("{} of {} points have no values, the first is point {}: {}", failed, rows.size(),
                          first - rows.begin() + 1, first->message));
   }
-  run.write("sweep.csv", table_of(run.problem, points, rows, options.gradients));
+  const Trajectory table = table_of(run.problem, points, rows, options.gradients);
+  run.write("sweep.csv", to_csv(table));
   if (interrupted())
     long_run.stopped(fmt::format("sweep.csv holds {} of {} points", done, rows.size()));
   else if (failed == done)
     run.failed("no point has values");
+  run.write("report.html", sweep_report(run.problem, points, run.result, table));
   return long_run.finish();
 }
 

@@ -1,6 +1,8 @@
 #include "app/terminal/progress.hpp"
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -16,19 +18,35 @@ constexpr std::string_view kClearLine = "\r\x1b[K";
 constexpr double kAtFirst = 4, kLongest = 64;
 constexpr double kIterationStays = 0.5;  // [s] on a terminal, before a bar takes its place
 
+std::string in_seconds(double seconds) { return fmt::format(", {:.0f} s", seconds); }
+
+// Bytes count as columns, so a line with other than ASCII letters is cut early; never within a letter of UTF-8.
+std::string_view cut(std::string_view line, std::size_t most) {
+  if (line.size() <= most) return line;
+  while (most > 0 && (static_cast<unsigned char>(line[most]) & 0xC0U) == 0x80U) --most;
+  return line.substr(0, most);
+}
+
 }  // namespace
 
-Progress::Progress(std::ostream& err, bool terminal, bool quiet, std::function<double()> seconds)
+Progress::Progress(std::ostream& err, bool terminal, bool quiet, std::function<double()> seconds,
+                   std::function<int()> columns)
     : err_(err),
       terminal_(terminal),
       quiet_(quiet),
       seconds_(std::move(seconds)),
+      columns_(std::move(columns)),
       start_(seconds_()),
       said_(start_),
       patience_(terminal ? 0 : kAtFirst) {}
 
 double Progress::steady_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+int Progress::terminal_columns() {
+  winsize size{};
+  return ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
 }
 
 Progress::~Progress() {
@@ -48,9 +66,8 @@ void Progress::fraction(std::string_view what, double done) {
   if (!terminal_) return break_silence(fmt::format("{}: {:.3g} %", what, percent), now);
   shown_percent_ = whole, said_ = now;
   const int filled = whole * kBarWidth / 100;
-  err_ << kClearLine << fmt::format("{} [{:#>{}}{:.>{}}] {:3d} %", what, "", filled, "", kBarWidth - filled, whole)
-       << (stands ? fmt::format(", {:.0f} s", now - start_) : "") << std::flush;
-  line_open_ = true;
+  draw(fmt::format("{} [{:#>{}}{:.>{}}] {:3d} %", what, "", filled, "", kBarWidth - filled, whole),
+       stands ? in_seconds(now - start_) : "");
 }
 
 bool Progress::silent_for_long() const { return !quiet_ && seconds_() - said_ >= (terminal_ ? kAtFirst : patience_); }
@@ -60,8 +77,7 @@ void Progress::stands(std::string_view what) {
   const double now = seconds_();
   if (!terminal_) return break_silence(what, now);
   said_ = now;
-  err_ << kClearLine << fmt::format("{}, {:.0f} s", what, now - start_) << std::flush;
-  line_open_ = true;
+  draw(what, in_seconds(now - start_));
 }
 
 void Progress::time(std::string_view what, double t) {
@@ -74,16 +90,21 @@ void Progress::break_silence(std::string_view words, double now) {
   said_ = now, patience_ = std::min(2 * patience_, kLongest);
 }
 
+void Progress::draw(std::string_view line, const std::string& end) {
+  // The last column stays free: a terminal may wrap as soon as it is filled.
+  const int columns = columns_(), room = columns - 1 - static_cast<int>(end.size());
+  err_ << kClearLine << (columns > 0 ? cut(line, static_cast<std::size_t>(std::max(room, 0))) : line) << end
+       << std::flush;
+  line_open_ = true;
+}
+
 void Progress::iteration(std::string_view line) {
   if (quiet_) return;
   said_ = seconds_(), patience_ = terminal_ ? kIterationStays : kAtFirst;
   shown_percent_ = -1;
-  if (terminal_) {
-    err_ << kClearLine << line << std::flush;
-    line_open_ = true;
-  } else {
-    err_ << line << '\n' << std::flush;
-  }
+  const std::string elapsed = in_seconds(said_ - start_);
+  if (terminal_) return draw(line, elapsed);
+  err_ << line << elapsed << '\n' << std::flush;
 }
 
 void Progress::finish() {

@@ -3,25 +3,30 @@
 //
 //   Progress progress(err, terminal, quiet);
 //   progress.fraction("simulating", 0.4);     // a bar; without a terminal "simulating: 40 % after 5 s", now and then
-//   progress.iteration("3   psi 0.0123");     // its own line; on a terminal it replaces the previous one
+//   progress.iteration("3   psi 0.0123");     // "3   psi 0.0123, 5 s"; on a terminal it replaces the previous one
 //   progress.finish();
+//
+// A line on a terminal is cut to its width: a longer one would wrap, and could not be drawn again in its place.
 #pragma once
 
 #include <functional>
 #include <ostream>
+#include <string>
 #include <string_view>
 
 namespace mbsopt {
 
 class Progress {
  public:
-  // seconds: since any fixed moment.
-  Progress(std::ostream& err, bool terminal, bool quiet, std::function<double()> seconds = steady_seconds);
+  // seconds: since any fixed moment. columns: the width of the terminal, 0 if it is not known.
+  Progress(std::ostream& err, bool terminal, bool quiet, std::function<double()> seconds = steady_seconds,
+           std::function<int()> columns = terminal_columns);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
   static double steady_seconds();
+  static int terminal_columns();
 
   void fraction(std::string_view what, double done);  // done: 0..1
   void stands(std::string_view what);                 // still at it: the seconds, now and then
@@ -32,10 +37,12 @@ class Progress {
  private:
   bool silent_for_long() const;
   void break_silence(std::string_view words, double now);
+  void draw(std::string_view line, const std::string& end);  // end: is never cut
 
   std::ostream& err_;
   bool terminal_, quiet_;
   std::function<double()> seconds_;
+  std::function<int()> columns_;
   double start_, said_;  // [s]; said_: when the last line was
   double patience_;      // [s] of silence
   bool line_open_ = false;

@@ -21,7 +21,8 @@ PROBLEMS = pathlib.Path(__file__).resolve().parents[2] / "problems"
 RUNS = [("simulate", "quarter_car/ride.json", True), ("kinematics", "four_bar/kinematics.json", True),
         ("linearise", "quarter_car/ride.json", False), ("gradient", "five_bar/sensitivities.json", False),
         ("check", "quarter_car/ride.json", False), ("design", "five_bar/design.json", True),
-        ("identify", "pendulum/identify.json", True), ("tradeoff --budget 0", "five_bar/design.json", False)]
+        ("identify", "pendulum/identify.json", True), ("tradeoff --budget 0", "five_bar/design.json", False),
+        ("sweep --vary k1=10:30:6 --vary c1=0:2:5", "five_bar/design.json", False)]
 LARGE = ("simulate", "quarter_car/ride.json", "--set", "simulation.output_step=0.00003")  # 100001 rows
 WIDTHS = (420, 1300)
 

@@ -4,6 +4,8 @@
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
+#include <numeric>
+#include <utility>
 
 #include "app/terminal/exit_code.hpp"
 #include "optim/problem/csv_table.hpp"
@@ -59,6 +61,43 @@ TEST_CASE("samples of a sweep fill their ranges, and a file gives its own points
   const CsvTable own = swept(folder, {"--points", folder.write("points.csv", "free,k\n0.5,20\n0.55,30\n")}, "own");
   CHECK(own.column("k") == std::vector<double>{20, 30});
   CHECK(json_of(folder.path / "own/result.json").at("sweep").at("computed") == 2);
+}
+
+TEST_CASE("the report of a sweep names the extremes, plots each objective and lists the best points",
+          "[command][sweep][report]") {
+  const TemporaryFolder folder;
+  // The points below the limit that the design sets: their best is not the best of all.
+  const std::string limit = R"(design.subject_to=[{"objective": "reach", "upper": 0.45}])";
+  const CsvTable table = swept(
+      folder, {"--vary", "free=0.3:0.7:30", "--set", "objectives.reach.parameters_only=free", "--set", limit}, "line");
+  const std::vector<double> track = table.column("track"), reach = table.column("reach");
+  std::vector<std::size_t> order(track.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto key = [&](std::size_t i) { return std::pair(reach[i] > 0.45, track[i]); };
+  std::ranges::stable_sort(order, {}, key);
+  const std::size_t least = static_cast<std::size_t>(std::ranges::min_element(track) - track.begin());
+  REQUIRE(order.front() != least);
+  const std::string line = content_of(folder.path / "line/report.html");
+  CHECK_THAT(line, Contains("30 of 30 points have values") &&
+                       Contains(fmt::format("{} keep the limits",
+                                            std::ranges::count_if(reach, [](double r) { return r <= 0.45; }))));
+  CHECK_THAT(line, Contains(fmt::format("track from {:.5g} at point {} (free = {:.5g})", track[least], least + 1,
+                                        table.column("free")[least])));
+  // The rows of the table, in their order.
+  std::vector<std::string> rows;
+  for (std::size_t at = line.find("<tbody>"); (at = line.find("<tr><td>", at)) < line.find("</table>");) {
+    at += 8;
+    rows.push_back(line.substr(at, line.find('<', at) - at));
+  }
+  std::vector<std::string> expected;
+  for (std::size_t i = 0; i < 20; ++i) expected.push_back(std::to_string(order[i] + 1));
+  CHECK(rows == expected);
+  CHECK_THAT(line, Contains("\"mark\":\"line\"") && Contains("of 30 with values"));
+
+  swept(folder, {"--vary", "k=5:20:3", "--vary", "free=0.4:0.6:2"}, "grid");
+  const std::string grid = content_of(folder.path / "grid/report.html");
+  CHECK_THAT(grid, Contains("track over k") && Contains("track over free") && Contains("\"mark\":\"points\""));
+  CHECK_THAT(grid, !Contains("\"mark\":\"line\"") && !Contains("limits of the design"));
 }
 
 TEST_CASE("what a sweep cannot vary is said", "[command][sweep]") {

@@ -7,12 +7,14 @@ using namespace mbsopt;
 
 TEST_CASE("without a terminal: a line per iteration, and no bar", "[progress]") {
   std::ostringstream err;
-  Progress progress(err, false, false);
+  double now = 0;
+  Progress progress(err, false, false, [&] { return now; });
   progress.fraction("simulating", 0.5);
   progress.iteration("1  psi 0.5");
+  now = 3;
   progress.iteration("2  psi 0.25");
   progress.finish();
-  CHECK(err.str() == "1  psi 0.5\n2  psi 0.25\n");
+  CHECK(err.str() == "1  psi 0.5, 0 s\n2  psi 0.25, 3 s\n");
 }
 
 TEST_CASE("on a terminal: a bar that is redrawn in place and cleared", "[progress]") {
@@ -59,7 +61,7 @@ TEST_CASE("on a terminal, an iteration's line stays for a moment", "[progress]")
   progress.iteration("1  psi 0.5");
   now = 0.3;
   progress.fraction("simulating", 0.5);
-  CHECK(err.str() == "\r\x1b[K1  psi 0.5");
+  CHECK(err.str() == "\r\x1b[K1  psi 0.5, 0 s");
   now = 0.7;
   progress.fraction("simulating", 0.5);
   CHECK(err.str().find("50 %") != std::string::npos);
@@ -73,8 +75,32 @@ TEST_CASE("what stands for long says since when, with a terminal or without", "[
   for (; now < 6; now += 0.5) {
     for (Progress* progress : {&terminal, &pipe}) progress->stands("choosing: 1");
   }
-  CHECK(drawn.str() == "\r\x1b[Kchoosing: 1\r\x1b[Kchoosing: 1, 4 s");
-  CHECK(written.str() == "choosing: 1\nchoosing: 1 after 4 s\n");
+  CHECK(drawn.str() == "\r\x1b[Kchoosing: 1, 0 s\r\x1b[Kchoosing: 1, 4 s");
+  CHECK(written.str() == "choosing: 1, 0 s\nchoosing: 1 after 4 s\n");
+}
+
+TEST_CASE("on a terminal a line is cut to its width, and keeps the elapsed time", "[progress]") {
+  std::ostringstream err;
+  double now = 0;
+  int columns = 21;
+  Progress progress(
+      err, true, false, [&] { return now; }, [&] { return columns; });
+  const auto last = [&] { return err.str().substr(err.str().rfind("\x1b[K") + 3); };
+  now = 75;
+  progress.iteration("12  psi 0.0123456789");
+  CHECK(last() == "12  psi 0.0123, 75 s");
+  columns = 22;  // the window has become wider
+  progress.iteration("12  psi 0.0123456789");
+  CHECK(last() == "12  psi 0.01234, 75 s");
+  columns = 9;  // room for "a" and one of the two bytes of the next letter
+  progress.iteration("a\u00e9bc");
+  CHECK(last() == "a, 75 s");
+  columns = 3;
+  progress.iteration("12");
+  CHECK(last() == ", 75 s");
+  columns = 0;  // not known
+  progress.iteration("12  psi 0.0123456789");
+  CHECK(last() == "12  psi 0.0123456789, 75 s");
 }
 
 TEST_CASE("quiet prints nothing", "[progress]") {
