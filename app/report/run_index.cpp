@@ -57,7 +57,7 @@ std::string address_of(const std::string& folder) {
   return address;
 }
 
-// What two runs are compared by: "objective path", "parameter k1", ... and their numbers.
+// The numbers by which two runs are compared have names: "objective path", "parameter k1", ...
 Json numbers_of(const Json& result) {
   Json numbers = Json::object();
   const Json objectives = result.value("objectives", Json::object()),  // items() refers to them

@@ -21,7 +21,8 @@ constexpr double kFewestPanels = 4;
 constexpr double kStepsPerPanel = 8;
 // A stretch of a panel that takes so many steps of the path is too long: the motion becomes faster in it without end.
 constexpr long kMostStepsOfStretch = 32 * static_cast<long>(kStepsPerPanel);
-// Of the rest of a run: two ends of a path closer than this are the same; `shortest_` leaves far less between them.
+// Two ends of a path are the same if less than this part of the rest of the run lies between them; `shortest_` leaves
+// far less.
 constexpr double kSameEnd = 1e-6;
 // Part of rtol times the integral so far that one panel may be off by, however short: a kink or a jump.
 constexpr double kPartOfRun = 0.1;

@@ -3,6 +3,7 @@
 #include <cassert>
 
 #include "core/mechanism/sensor_kinds.hpp"
+#include "core/mechanism/virtual_work.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
@@ -48,29 +49,9 @@ void add_pull_back_of_loads(const MechanismData& d, const ReactionSensor& s, con
                             Eigen::Ref<Eigen::VectorXd> rho_bar) {
   for (const Constraint& c : d.constraints) {
     if (c.joint != s.joint) continue;
-    BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
-    set_virtual(Vec<6>::Zero(), b1.frame);
-    set_virtual(eta, b2.frame);
-    FrameBar bar1, bar2;
-    bar1.set_zero(), bar2.set_zero();
-    GeometryBar geometry;
-    std::visit(
-        [&]<class P>(const P& p) {
-          Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
-          z.lambda = -weights<P>(c, lambda);
-          p.pull_back(b1.frame, b2.frame, z, bar1, bar2, geometry);
-          const Vec<P::kRows> change = virtual_change(p, b1.frame, b2.frame);
-          lambda_bar.segment<P::kRows>(c.row) -= scale * c.factor * change;
-          add_slot<1>(d, c.slot_factor, Vec<1>(-lambda.segment<P::kRows>(c.row).dot(change)), scale, rho_bar);
-        },
-        c.primitive);
-    fold_virtual(Vector3d::Zero(), bar1);
-    fold_virtual(eta.tail<3>(), bar2);
-    add_pull_back(b1, c.body1, bar1, scale, y_bar);
-    add_pull_back(b2, c.body2, bar2, scale, y_bar);
-    add_slot<3>(d, c.slot1, geometry.s1, scale, rho_bar);
-    add_slot<3>(d, c.slot2, geometry.s2, scale, rho_bar);
-    add_slot<3>(d, c.slot3, geometry.s3, scale, rho_bar);
+    const ConstraintRows change = add_virtual_work_gradient(d, c, y, Vec<6>::Zero(), eta,
+                                                            -lambda.segment(c.row, c.rows()), scale, y_bar, rho_bar);
+    lambda_bar.segment(c.row, c.rows()) -= scale * c.factor * change;
   }
 }
 

@@ -12,6 +12,7 @@
 #include <cmath>
 
 #include "core/mechanism/sensor_kinds.hpp"
+#include "core/mechanism/virtual_work.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
@@ -98,28 +99,8 @@ struct SingularValueFunction final : SensorFunction {
     const auto part = [&](int body) {
       return body > 0 ? Vec<6>(w.segment<6>(6 * (body - 1))) : Vec<6>(Vec<6>::Zero());
     };
-    const Vec<6> eta1 = part(c.body1), eta2 = part(c.body2);
-    BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
-    set_virtual(eta1, b1.frame);
-    set_virtual(eta2, b2.frame);
-    FrameBar bar1, bar2;
-    bar1.set_zero(), bar2.set_zero();
-    GeometryBar geometry;
-    std::visit(
-        [&]<class P>(const P& p) {
-          Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
-          z.lambda(i) = c.factor;
-          p.pull_back(b1.frame, b2.frame, z, bar1, bar2, geometry);
-          add_slot<1>(d, c.slot_factor, Vec<1>(virtual_change(p, b1.frame, b2.frame)(i)), scale, rho_bar);
-        },
-        c.primitive);
-    fold_virtual(eta1.tail<3>(), bar1);
-    fold_virtual(eta2.tail<3>(), bar2);
-    add_pull_back(b1, c.body1, bar1, scale, y_bar);
-    add_pull_back(b2, c.body2, bar2, scale, y_bar);
-    add_slot<3>(d, c.slot1, geometry.s1, scale, rho_bar);
-    add_slot<3>(d, c.slot2, geometry.s2, scale, rho_bar);
-    add_slot<3>(d, c.slot3, geometry.s3, scale, rho_bar);
+    add_virtual_work_gradient(d, c, y, part(c.body1), part(c.body2), ConstraintRows::Unit(c.rows(), i), scale, y_bar,
+                              rho_bar);
   }
 };
 

@@ -160,7 +160,7 @@ class Cut {
     }
   }
 
-  // What is free in a window must act on its start: nothing else can be guessed from samples at its start.
+  // Each free parameter of a window must act on its start, since samples there say nothing of the others.
   void require_starts(const Experiment& model) const {
     const Scene scene = model.simulated();
     std::vector<bool> active(scene.parameters.size(), false);

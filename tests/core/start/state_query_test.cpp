@@ -1,4 +1,4 @@
-// What the equations of motion are at a state: each matrix against differences or the equation that it stands in.
+// Each matrix of the equations of motion is compared with differences, or with the equation that it stands in.
 #include "core/start/state_query.hpp"
 
 #include <catch2/catch.hpp>

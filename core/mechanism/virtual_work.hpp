@@ -1,0 +1,45 @@
+// The virtual work l'(J1 eta1 + J2 eta2) of the forces l = factor times `weights` on the rows of one constraint, and
+// its gradient at fixed weights and virtual displacements eta = (delta r, delta theta).
+#pragma once
+
+#include <variant>
+
+#include "core/mechanism/sensor_kinds.hpp"
+#include "core/sensor/body_at.hpp"
+
+namespace mbsopt {
+
+using ConstraintRows = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;  // of one constraint: three at most
+
+// Adds scale times the gradient in y and rho; returns J1 eta1 + J2 eta2 without the factor.
+inline ConstraintRows add_virtual_work_gradient(const MechanismData& d, const Constraint& c, const Eigen::VectorXd& y,
+                                                const Vec<6>& eta1, const Vec<6>& eta2, const ConstraintRows& weights,
+                                                double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
+                                                Eigen::Ref<Eigen::VectorXd> rho_bar) {
+  BodyAt b1 = body_at(y, c.body1), b2 = body_at(y, c.body2);
+  set_virtual(eta1, b1.frame);
+  set_virtual(eta2, b2.frame);
+  FrameBar bar1, bar2;
+  bar1.set_zero(), bar2.set_zero();
+  GeometryBar geometry;
+  ConstraintRows change(c.rows());
+  std::visit(
+      [&]<class P>(const P& p) {
+        Multipliers<P::kRows> z = Multipliers<P::kRows>::zero();
+        z.lambda = c.factor * weights;
+        p.pull_back(b1.frame, b2.frame, z, bar1, bar2, geometry);
+        change = virtual_change(p, b1.frame, b2.frame);
+      },
+      c.primitive);
+  add_slot<1>(d, c.slot_factor, Vec<1>(weights.dot(change)), scale, rho_bar);
+  fold_virtual(eta1.tail<3>(), bar1);
+  fold_virtual(eta2.tail<3>(), bar2);
+  add_pull_back(b1, c.body1, bar1, scale, y_bar);
+  add_pull_back(b2, c.body2, bar2, scale, y_bar);
+  add_slot<3>(d, c.slot1, geometry.s1, scale, rho_bar);
+  add_slot<3>(d, c.slot2, geometry.s2, scale, rho_bar);
+  add_slot<3>(d, c.slot3, geometry.s3, scale, rho_bar);
+  return change;
+}
+
+}  // namespace mbsopt
