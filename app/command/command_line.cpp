@@ -59,6 +59,8 @@ constexpr std::array kCommands{
     Command{"resume", "go on with a design, an identification or a sweep that was interrupted or killed",
             resume_command, "out/five_bar"},
     Command{"new", "write a commented starter file into the current folder", new_command, "four-bar"},
+    Command{"import", "write a URDF or MJCF model as a problem file into the current folder", import_command,
+            "examples/models/arm.urdf"},
     Command{"completion", "print completion for bash", completion_command,
             "> ~/.local/share/bash-completion/completions/mbsopt"},
     Command{"schema", "print the JSON Schema of problem files", schema_command, "> problem.schema.json"},
@@ -93,6 +95,11 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
     std::vector<std::string> kinds;
     for (const Starter& starter : starters()) kinds.emplace_back(starter.kind);
     sub.add_option("kind", options.starter, "kind of task")->required()->check(CLI::IsMember(kinds));
+    sub.add_option("--out", options.out, "folder for the file (default: the current one)");
+    return;
+  }
+  if (name == "import") {
+    sub.add_option("model", options.problem_file, "model file: URDF (<robot>) or MJCF (<mujoco>)")->required();
     sub.add_option("--out", options.out, "folder for the file (default: the current one)");
     return;
   }

@@ -63,6 +63,7 @@ int tradeoff_command(const CommandContext& context);
 int sweep_command(const CommandContext& context);
 int resume_command(const CommandContext& context);  // options.problem_file: the folder
 int new_command(const CommandContext& context);
+int import_command(const CommandContext& context);  // options.problem_file: the model
 int schema_command(const CommandContext& context);
 
 }  // namespace mbsopt
