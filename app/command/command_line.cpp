@@ -116,6 +116,15 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
   sub.add_option("--set", options.sets, "change a field: parameters.k1.value=120; may be repeated")
       ->type_name("PATH=VALUE")
       ->allow_extra_args(false);
+  if (name == "simulate" || name == "kinematics") {
+    sub.add_flag("--mat", options.mat,
+                 "also write trajectory.mat: the columns of trajectory.csv as vectors for MATLAB");
+    sub.add_flag("--gnuplot", options.gnuplot, "also write trajectory.gp, a gnuplot script that plots trajectory.csv");
+  }
+  if (name == "simulate") {
+    sub.add_flag("--sensitivities", options.sensitivities,
+                 "also write sensitivities.csv: the derivative of each sensor in each parameter over time");
+  }
   if (name == "linearise") {
     sub.add_option("--at", options.at, "the state that the simulation reaches then, instead of the initial one")
         ->type_name("TIME");
