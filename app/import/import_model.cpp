@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 
 #include "app/import/mjcf_model.hpp"
 #include "app/import/model_reader.hpp"
@@ -16,6 +17,16 @@ namespace mbsopt {
 namespace {
 
 constexpr double kSmoothVelocity = 0.01;  // a tenth of a slow joint's rate (docs/forces.md) [rad/s], [m/s]
+
+// What is dropped and acts on the motion in the program that the model is for: inertia of rotors, stops, contact,
+// actuators, a medium. All else is drawing, or settings of that program.
+// clang-format off
+constexpr std::array kActs{
+    "limit", "collision", "safety_controller", "joint armature", "joint range", "joint margin", "actuator",
+    "tendon", "joint springdamper", "option wind", "option density", "option viscosity", "body gravcomp",
+    "body mocap", "weld relpose", "distance", "compiler inertiagrouprange", "compiler boundmass",
+    "compiler boundinertia", "compiler balanceinertia", "geom shellinertia", "geom fluidshape"};
+// clang-format on
 
 // Gears, racks and pinions tie joints with an angle or a displacement.
 void refuse(const ImportedModel& model, ModelErrors& errors) {
@@ -87,7 +98,9 @@ ImportedProblem import_model(const std::filesystem::path& file) {
   imported.name = model.name;
   imported.changed = model.changed;
   for (const XmlElement::Unread& unread : root.unread())
-    imported.dropped.push_back(fmt::format("line {}: {}", unread.line, unread.what));
+    imported.dropped.push_back(
+        fmt::format("line {}: {}{}", unread.line, unread.what,
+                    std::ranges::find(kActs, unread.what) == kActs.end() ? "" : " (may change the motion)"));
   for (std::vector<std::string>* list : {&imported.changed, &imported.dropped})
     for (std::string& words : *list)
       std::ranges::replace_if(

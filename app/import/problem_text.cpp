@@ -2,6 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
 #include "app/import/model_reader.hpp"
 #include "core/expression/expression.hpp"
 #include "core/scene/type_table.hpp"
@@ -9,7 +14,6 @@
 namespace mbsopt {
 namespace {
 
-using Eigen::Isometry3d;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Json = nlohmann::ordered_json;

@@ -138,10 +138,11 @@ TEST_CASE("what an import changes and drops is said with its line", "[import]") 
   const ImportedProblem arm = import_model(example("arm.urdf"));
   CHECK(arm.changed ==
         std::vector<std::string>{"link 'tool' is a part of 'fore'", "the root link 'base' is fixed to the ground"});
-  CHECK(arm.dropped == std::vector<std::string>{"line 11: limit", "line 40: collision", "line 51: transmission"});
+  CHECK(arm.dropped == std::vector<std::string>{"line 11: limit (may change the motion)",
+                                                "line 40: collision (may change the motion)", "line 51: transmission"});
   CHECK_THAT(arm.text, Contains("// Imported from arm.urdf") && Contains("//   line 51: transmission"));
   const ImportedProblem hopper = import_model(example("hopper.xml"));
-  CHECK_THAT(hopper.text, Contains("line 35: actuator") && Contains("line 8: joint range"));
+  CHECK_THAT(hopper.text, Contains("line 35: actuator") && Contains("line 8: joint range (may change the motion)"));
 }
 
 TEST_CASE("a mimicking URDF joint becomes a gear", "[import]") {
