@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "app/import/mjcf_model.hpp"
 #include "app/import/model_reader.hpp"
@@ -12,6 +13,7 @@
 #include "app/import/urdf_model.hpp"
 #include "app/json/node.hpp"
 #include "app/json/read_problem.hpp"
+#include "app/json/source_text.hpp"
 
 namespace mbsopt {
 namespace {
@@ -28,8 +30,13 @@ constexpr std::array kActs{
     "compiler boundinertia", "compiler balanceinertia", "geom shellinertia", "geom fluidshape"};
 // clang-format on
 
-// Gears, racks and pinions tie joints with an angle or a displacement.
+// What no problem file can say: numbers that overflowed, ties between joints without an angle or a displacement.
 void refuse(const ImportedModel& model, ModelErrors& errors) {
+  for (const ImportedBody& b : model.bodies) {
+    const bool finite =
+        std::isfinite(b.mass) && b.com.allFinite() && b.inertia.allFinite() && b.frame.matrix().allFinite();
+    if (b.source && !finite) errors.add(*b.source, "its place, mass or inertia is too large for a number");
+  }
   for (const ImportedTie& tie : model.ties) {
     const auto has = [&](int joint, const char* type) {
       return model.joints[static_cast<std::size_t>(joint)].type == type;
@@ -39,8 +46,8 @@ void refuse(const ImportedModel& model, ModelErrors& errors) {
       errors.add(*tie.source, "ties joints that have neither an angle nor a displacement");
     else if (has(tie.joint1, "translational") && has(tie.joint2, "translational"))
       errors.add(*tie.source, "ties two sliding joints, for which there is no joint here");
-    else if (tie.factor == 0)
-      errors.add(*tie.source, "its factor is 0; use a fixed joint");
+    else if (!std::isfinite(1 / tie.factor))
+      errors.add(*tie.source, "its factor is 0, or too small; use a fixed joint");
   }
   errors.throw_if_any();
 }
@@ -76,9 +83,13 @@ std::string comment(const std::vector<std::string>& lines, const char* heading) 
 
 }  // namespace
 
-ImportedProblem import_model(const std::filesystem::path& file) {
-  const XmlElement root = read_xml(file);
+ImportedProblem import_model(const std::filesystem::path& model) {
+  return import_model_text(read_text_file(model), model);
+}
+
+ImportedProblem import_model_text(const std::string& text, const std::filesystem::path& file) {
   const std::string name = file.string();
+  const XmlElement root = parse_xml(text, name);
   ModelErrors errors(name);
   if (root.name != "robot" && root.name != "mujoco") {
     errors.add(root, "is no model that is read: URDF begins with <robot>, MJCF with <mujoco>");

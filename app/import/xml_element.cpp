@@ -88,9 +88,9 @@ std::vector<XmlElement::Unread> XmlElement::unread() const {
   return list;
 }
 
-XmlElement read_xml(const std::filesystem::path& file) {
-  const SourceText source(read_text_file(file));
-  const XmlReader reader{source, file.string()};
+XmlElement parse_xml(const std::string& text, const std::string& file) {
+  const SourceText source(text);
+  const XmlReader reader{source, file};
   if (const std::size_t bad = source.first_invalid_byte(); bad != std::string::npos)
     reader.refuse(bad, "is not UTF-8 here");
   pugi::xml_document document;

@@ -1,11 +1,10 @@
 // An XML file as a tree that remembers what was read of it: what nobody asked for is what an import drops.
 //
-//   const XmlElement robot = read_xml("arm.urdf");
+//   const XmlElement robot = parse_xml(read_text_file("arm.urdf"), "arm.urdf");
 //   for (const XmlElement* link : robot.children("link")) link->text("name");
 //   robot.unread();          // elements and attributes that no call above named
 #pragma once
 
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -46,7 +45,7 @@ class XmlElement {
   mutable bool read_ = false;
 };
 
-// Throws InputError with line and column where the file cannot be read, or is no XML.
-XmlElement read_xml(const std::filesystem::path& file);
+// Throws InputError with line and column where the text is no XML; `file` stands for it in findings.
+XmlElement parse_xml(const std::string& text, const std::string& file);
 
 }  // namespace mbsopt

@@ -242,5 +242,7 @@ TEST_CASE("a broken model is refused with its line", "[import]") {
   CHECK_THAT(finding_of(mjcf("<body><joint type='screw'/><geom size='1'/></body>")), Contains("available: free"));
   CHECK_THAT(finding_of(mjcf("<body><joint class='x'/><geom size='1'/></body>")), Contains("no default class 'x'"));
   CHECK_THAT(finding_of(mjcf("<body><joint/><geom type='box' size='1 1'/></body>")), Contains("needs 3 numbers"));
+  CHECK_THAT(finding_of(mjcf("<body><joint/><geom size='1e200'/></body>")),
+             Contains("2:12: body: ") && Contains("too large for a number"));
   CHECK_THAT(finding_of(mjcf("<body><joint axis='0 0 0'/><geom size='1'/></body>")), Contains("axis: is zero"));
 }
