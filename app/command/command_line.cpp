@@ -59,6 +59,8 @@ constexpr std::array kCommands{
     Command{"resume", "go on with a design, an identification or a sweep that was interrupted or killed",
             resume_command, "out/five_bar"},
     Command{"new", "write a commented starter file into the current folder", new_command, "four-bar"},
+    Command{"import", "write a URDF or MJCF model as a problem file into the current folder", import_command,
+            "examples/models/arm.urdf"},
     Command{"completion", "print completion for bash", completion_command,
             "> ~/.local/share/bash-completion/completions/mbsopt"},
     Command{"schema", "print the JSON Schema of problem files", schema_command, "> problem.schema.json"},
@@ -96,6 +98,11 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
     sub.add_option("--out", options.out, "folder for the file (default: the current one)");
     return;
   }
+  if (name == "import") {
+    sub.add_option("model", options.problem_file, "model file: URDF (<robot>) or MJCF (<mujoco>)")->required();
+    sub.add_option("--out", options.out, "folder for the file (default: the current one)");
+    return;
+  }
   sub.add_option("--threads", options.threads, "at most so many threads or processes (results do not depend on it)")
       ->check(CLI::Range(1, 1024));
   sub.add_flag("--quiet", options.quiet, "no progress on standard error");
@@ -109,6 +116,15 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
   sub.add_option("--set", options.sets, "change a field: parameters.k1.value=120; may be repeated")
       ->type_name("PATH=VALUE")
       ->allow_extra_args(false);
+  if (name == "simulate" || name == "kinematics") {
+    sub.add_flag("--mat", options.mat,
+                 "also write trajectory.mat: the columns of trajectory.csv as vectors for MATLAB");
+    sub.add_flag("--gnuplot", options.gnuplot, "also write trajectory.gp, a gnuplot script that plots trajectory.csv");
+  }
+  if (name == "simulate") {
+    sub.add_flag("--sensitivities", options.sensitivities,
+                 "also write sensitivities.csv: the derivative of each sensor in each parameter over time");
+  }
   if (name == "linearise") {
     sub.add_option("--at", options.at, "the state that the simulation reaches then, instead of the initial one")
         ->type_name("TIME");

@@ -7,6 +7,7 @@
 
 #include "app/report/run_report.hpp"
 #include "app/results/trajectory_csv.hpp"
+#include "app/results/write_trajectory.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/terminal/interrupt.hpp"

@@ -18,15 +18,7 @@ int new_command(const CommandContext& context) {
   if (starter == starters().end())
     throw std::invalid_argument(fmt::format("there is no starter '{}'", context.options.starter));
   const fs::path folder = context.options.out;
-  for (const StarterFile& file : starter->files) {
-    const fs::path path = folder / file.name;
-    std::error_code unreadable;
-    if (fs::symlink_status(path, unreadable).type() != fs::file_type::not_found)
-      throw OutputError(
-          fmt::format("{}: exists already, and new does not overwrite files; move it away, or name "
-                      "another folder with --out",
-                      path.string()));
-  }
+  for (const StarterFile& file : starter->files) refuse_to_overwrite(folder / file.name, "new");
   if (!folder.empty()) fs::create_directories(folder);
   for (const StarterFile& file : starter->files) write_file_atomically(folder / file.name, file.text);
   const auto path_of = [&](const StarterFile& file) { return (folder / file.name).string(); };

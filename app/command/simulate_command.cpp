@@ -6,7 +6,9 @@
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
 #include "app/results/objective_values.hpp"
+#include "app/results/sensitivities_csv.hpp"
 #include "app/results/simulated_motion.hpp"
+#include "app/results/write_trajectory.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/terminal/text_table.hpp"
@@ -39,6 +41,7 @@ void add_objectives(Run& run, const SimulatedMotion& motion) {
 int simulate_command(const CommandContext& context) {
   Run run(context);
   const Scene& scene = run.problem.scene;
+  if (context.options.sensitivities) require_sensitivities(scene);
   run.start();
   if (!settle_accuracy(run)) return run.finish();
   const SimulatedMotion motion = simulated_motion(run, parameter_values(scene));
@@ -59,6 +62,7 @@ int simulate_command(const CommandContext& context) {
   if (simulation.ok()) {
     add_objectives(run, motion);
     add_cases(run, false);
+    if (context.options.sensitivities) write_sensitivities(run);
   } else if (simulation.status == SimulationStatus::stopped) {
     run.stopped(fmt::format("trajectory.csv holds the motion up to {:.6g} s", simulation.last_good_time));
   } else {

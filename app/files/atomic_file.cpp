@@ -54,6 +54,14 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view c
   flush_folder_of(path);
 }
 
+void refuse_to_overwrite(const std::filesystem::path& path, std::string_view command) {
+  std::error_code unreadable;
+  if (std::filesystem::symlink_status(path, unreadable).type() == std::filesystem::file_type::not_found) return;
+  throw OutputError(fmt::format(
+      "{}: exists already, and {} does not overwrite files; move it away, or name another folder with --out",
+      path.string(), command));
+}
+
 bool is_part_of(std::string_view part, std::string_view file) {
   const std::string begin = fmt::format(".{}.", file);
   if (!part.starts_with(begin) || !part.ends_with(kPart) || part.size() <= begin.size() + kPart.size()) return false;

@@ -21,6 +21,9 @@ class WriteError : public OutputError {
 
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);  // throws WriteError
 
+// For commands that write what a user will edit: throws OutputError where there is anything at `path`.
+void refuse_to_overwrite(const std::filesystem::path& path, std::string_view command);
+
 // Whether a file's name is that of the part of such a file that was never renamed, since its writer was killed.
 bool is_part_of(std::string_view part, std::string_view file);
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "app/report/sensor_unit.hpp"
+#include "app/results/sensor_unit.hpp"
 
 namespace mbsopt {
 namespace {

@@ -33,7 +33,4 @@ inline std::string to_csv(const Trajectory& trajectory) { return to_csv(trajecto
 // The same text; nothing once `go_on`, which sees the first number of each row, says no.
 std::optional<std::string> to_csv(const Trajectory& trajectory, const std::function<bool(double)>& go_on);
 
-// Writes trajectory.csv, and warns of each column with empty cells. Ctrl-C meanwhile stops the run without the file.
-void write_trajectory(Run& run, const Trajectory& trajectory);
-
 }  // namespace mbsopt

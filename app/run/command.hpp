@@ -33,6 +33,9 @@ struct CommandOptions {
   std::vector<std::string> inputs;    // --inputs of linearise: parameters
   std::vector<std::string> outputs;   // --outputs of linearise: sensors; empty: all
   SweepOptions sweep;                 // --vary, --samples, --seed, --points, --gradients of sweep
+  bool mat = false;                   // --mat of simulate and kinematics: trajectory.mat
+  bool gnuplot = false;               // --gnuplot of these: trajectory.gp
+  bool sensitivities = false;         // --sensitivities of simulate: sensitivities.csv
   int threads = 0;                    // --threads, also worker processes; 0: as many as the machine has
   bool quiet = false;                 // --quiet
   bool json = false;                  // --json: only result.json on standard output
@@ -63,6 +66,7 @@ int tradeoff_command(const CommandContext& context);
 int sweep_command(const CommandContext& context);
 int resume_command(const CommandContext& context);  // options.problem_file: the folder
 int new_command(const CommandContext& context);
+int import_command(const CommandContext& context);  // options.problem_file: the model
 int schema_command(const CommandContext& context);
 
 }  // namespace mbsopt

@@ -183,6 +183,48 @@ TEST_CASE("MBSVT: ADDConstr_Drive_rgx, ADDConstr_Drive_dist: drives of a coordin
   CHECK(run.ok());
 }
 
+// STATE::pos, vel, ace of a drive: a routine of the user, here the cycloidal rise of a cam and its fall.
+double cam(double angle) { return 1 + 0.05 * (1 - std::cos(angle)) * std::sin(angle / 2); }
+
+TEST_CASE("MBSVT: STATE::pos, vel, ace: a drive follows a routine in C++", "[mbsvt]") {
+  Scene scene = slider_crank();
+  Drive drive;
+  drive.name = "cam", drive.type = "coordinate", drive.body = "slider", drive.coordinate = "x";
+  // The routine is called once for each sample. Its argument may hold parameters: here omega = 10 r.
+  std::vector<double> angles, lifts;
+  for (int k = -10; k <= 400; ++k) angles.push_back(0.01 * k), lifts.push_back(cam(angles.back()));
+  const auto curve = std::make_shared<const Curve>(Interpolation::spline, angles, lifts);
+  drive.law = Expression::of_curve(curve, f("10*r*t"), "cam");
+  scene.drives = {drive};
+  const Mechanism mechanism(scene, kRho);
+  const double omega = 10 * kRho(0), h = 1e-4;
+  int seen = 0;
+  const KinematicsResult result = solve_kinematics(
+      mechanism, Assembly(mechanism, 0), scene.simulation, {0, 0.4, 1.1}, [&](std::size_t, const StatePoint& at) {
+        const double angle = omega * at.t;
+        const double velocity = omega * (cam(angle + h) - cam(angle - h)) / (2 * h);
+        const double acceleration = omega * omega * (cam(angle + h) - 2 * cam(angle) + cam(angle - h)) / (h * h);
+        // A spline through samples 0.01 rad apart: errors of h^4/384, h^3/24 and h^2/8 times the fourth derivative,
+        // 0.1.
+        CHECK(mechanism.sensor_value(mechanism.sensor("x"), at) == Approx(cam(angle)).margin(1e-11));
+        CHECK(mechanism.sensor_value(mechanism.sensor("vx"), at) == Approx(velocity).margin(3e-8));
+        CHECK(mechanism.sensor_value(mechanism.sensor("ax"), at) == Approx(acceleration).margin(3e-5));
+        ++seen;
+        return true;
+      });
+  INFO(result.message);
+  CHECK(seen == 3);
+  TangentSampling end;
+  end.times = {1};
+  end.observe = [&](std::size_t, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
+    const Eigen::Index x = 7 * 2;  // of the slider
+    const double slope = (cam(omega + h) - cam(omega - h)) / (2 * h);
+    CHECK(y_rho(x, 0) == Approx(10 * at.t * slope).margin(3e-7));  // d x/d r, by the spline's slope
+  };
+  scene.simulation.end_time = 1;
+  CHECK(simulate_tlm(mechanism, scene.simulation, {}, end).ok());
+}
+
 TEST_CASE("MBSVT: acceleration_dynamics at a state", "[mbsvt]") {
   Scene scene;  // a rod from the horizontal
   scene.gravity = {0.0, -9.81, 0.0};

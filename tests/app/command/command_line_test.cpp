@@ -151,7 +151,7 @@ TEST_CASE("--json prints result.json and nothing else on standard output", "[com
 
 TEST_CASE("the help of each command shows an example", "[command]") {
   for (const char* name : {"validate", "simulate", "kinematics", "linearise", "gradient", "check", "design", "identify",
-                           "tradeoff", "sweep", "resume", "new", "completion", "schema"}) {
+                           "tradeoff", "sweep", "resume", "new", "import", "completion", "schema"}) {
     INFO(name);
     CHECK(run_command({name, "--help"}).out.find(std::string("Example:\n  mbsopt ") + name) != std::string::npos);
   }

@@ -1,4 +1,4 @@
-#include "app/report/sensor_unit.hpp"
+#include "app/results/sensor_unit.hpp"
 
 #include <algorithm>
 

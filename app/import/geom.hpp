@@ -1,0 +1,28 @@
+// The solids of MJCF: their mass, inertia and drawing. Axes and centre are those of the solid.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+
+#include "app/import/imported_model.hpp"
+
+namespace mbsopt {
+
+struct Geom {
+  std::string type;      // sphere, capsule, cylinder, ellipsoid, box
+  Eigen::Vector3d size;  // half sides; radius; radius and half length along z  [m]
+  Eigen::Isometry3d at = Eigen::Isometry3d::Identity();
+};
+
+double volume(const Geom& geom);  // [m^3]
+
+// Of a uniform solid of mass 1, about its centre: principal moments.  [m^2]
+//   box        (b^2 + c^2)/3, half sides a b c        ellipsoid  (b^2 + c^2)/5
+//   cylinder   (3 r^2 + 4 h^2)/12, r^2/2              sphere     2 r^2/5
+//   capsule    cylinder and two half spheres, each with its centre 3r/8 beyond the cylinder's end
+Eigen::Vector3d unit_inertia(const Geom& geom);
+
+ImportedShape shape_of(const Geom& geom);
+
+}  // namespace mbsopt

@@ -1,0 +1,26 @@
+// URDF or MJCF to a problem file.
+//
+//   const ImportedProblem imported = import_model("arm.urdf");     // throws InputError: what is wrong, with its line
+//   imported.text                                                  // of arm.json
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace mbsopt {
+
+struct ImportedProblem {
+  std::string name;                  // of the model; that of a file
+  std::string text;                  // of the problem file; the two lists stand in its comments, too
+  std::vector<std::string> changed;  // what it says otherwise, sentences
+  std::vector<std::string> dropped;  // what it does not hold: "line 12: joint range"
+  std::size_t bodies = 0, joints = 0;
+};
+
+ImportedProblem import_model(const std::filesystem::path& model);
+
+// The same from a text; `model` stands for the file in findings.
+ImportedProblem import_model_text(const std::string& text, const std::filesystem::path& model);
+
+}  // namespace mbsopt

@@ -1,0 +1,28 @@
+// Default classes of MJCF: an attribute that an element leaves out is that of its class, else of the classes around it.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/import/model_reader.hpp"
+
+namespace mbsopt {
+
+class MjcfDefaults {
+ public:
+  MjcfDefaults(const XmlElement& mujoco, ModelErrors& errors);
+
+  // An element's own class goes before `childclass`, that of the bodies around it; empty: the outermost class.
+  std::optional<std::string> text(const XmlElement& element, const std::string& childclass, std::string_view attribute);
+
+ private:
+  void add(const XmlElement& node, const std::string& around, bool outermost);
+  ModelErrors& errors_;
+  std::map<std::string, std::string> around_;                                           // the class that holds a class
+  std::map<std::string, std::map<std::string, std::vector<const XmlElement*>>> found_;  // elements of a class by name
+  std::string outermost_ = "main";                                                      // MuJoCo's name for it
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,231 @@
+#include "app/import/problem_text.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "app/import/model_reader.hpp"
+#include "core/expression/expression.hpp"
+#include "core/scene/type_table.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Json = nlohmann::ordered_json;
+
+// Rotations leave some 1e-17 in entries that are 0; relative to `scale` this is rounding.
+double rounded(double value, double scale) {
+  constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
+  return std::abs(value) < kRounding * scale ? 0 : value;
+}
+
+template <class Vector>
+Json list(const Vector& v, double scale) {
+  Json entries = Json::array();
+  for (const double value : v) entries.push_back(rounded(value, scale));
+  return entries;
+}
+
+class ProblemWriter {
+ public:
+  ProblemWriter(const ImportedModel& model, double smooth_velocity) : model_(model), smooth_velocity_(smooth_velocity) {
+    for (const ImportedBody& b : model.bodies) reach_ = std::max(reach_, b.frame.translation().norm());
+    for (const ImportedJoint& j : model.joints)
+      reach_ = std::max({reach_, j.between.translation().norm(), j.point.norm()});
+  }
+
+  Json problem() {
+    Json json{{"format", 1}, {"name", model_.name}, {"gravity", list(model_.gravity, model_.gravity.norm())}};
+    json["bodies"] = Json::array();
+    for (std::size_t i = 1; i < model_.bodies.size(); ++i) json["bodies"].push_back(body(model_.bodies[i]));
+    json["joints"] = Json::array();
+    for (const ImportedJoint& j : model_.joints) add(j);
+    for (const ImportedTie& t : model_.ties) add(t);
+    json["joints"] = joints_;
+    if (!forces_.empty()) json["forces"] = forces_;
+    if (!sensors_.empty()) json["sensors"] = sensors_;
+    json["simulation"] = {{"start_time", 0}, {"end_time", 1}};
+    return json;
+  }
+
+ private:
+  Json body(const ImportedBody& b) {
+    Json json{{"name", b.name}, {"mass", b.mass}};
+    if (!b.com.isZero(0)) json["com"] = point(b.com);
+    const Matrix3d& J = b.inertia;
+    const double size = J.norm();
+    const auto entry = [&](int i, int k) { return rounded((J(i, k) + J(k, i)) / 2, size); };
+    if (entry(0, 1) == 0 && entry(0, 2) == 0 && entry(1, 2) == 0) {
+      json["inertia"] = {entry(0, 0), entry(1, 1), entry(2, 2)};
+    } else {
+      json["inertia"] = {{"xx", entry(0, 0)}, {"yy", entry(1, 1)}, {"zz", entry(2, 2)},
+                         {"xy", entry(0, 1)}, {"xz", entry(0, 2)}, {"yz", entry(1, 2)}};
+    }
+    json["position"] = list(b.frame.translation(), reach_);
+    Eigen::Quaterniond e(b.frame.linear());
+    if (e.w() < 0) e.coeffs() *= -1;
+    if (e.vec().norm() > 0) json["orientation"] = list(Eigen::Vector4d(e.w(), e.x(), e.y(), e.z()), 1);
+    Names names({"O"});
+    for (const auto& [name, at] : b.points) json["points"][names.identifier(name)] = point(at);
+    for (const ImportedShape& s : b.shapes)
+      json["shape"].push_back({{"type", s.type}, {"from", point(s.from)}, {"to", point(s.to)}, {"radius", s.radius}});
+    return json;
+  }
+
+  Json point(const Vector3d& at) const { return list(at, std::max(reach_, at.norm())); }
+  static Json direction(const Vector3d& along) { return list(along, 1); }
+
+  void add(const ImportedJoint& j) {
+    const ImportedBody& b1 = model_.bodies[static_cast<std::size_t>(j.body1)];
+    const ImportedBody& b2 = model_.bodies[static_cast<std::size_t>(j.body2)];
+    Json json{{"name", j.name}, {"type", j.type}, {"body1", b1.name}, {"body2", b2.name}};
+    json["point1"] = point(j.between * j.point);
+    json["point2"] = point(j.point);
+    const bool turns = j.type == "revolute", slides = j.type == "translational";
+    if (turns || slides || j.type == "planar") {
+      json["axis1"] = direction(j.between.linear() * j.axis);
+      json["axis2"] = direction(j.axis);
+    }
+    // The angle is 0 where the model draws the joint. Without normals it is where the two frames are parallel.
+    if (turns && j.between.linear() != Matrix3d::Identity()) {
+      json["normal1"] = direction(j.between.linear() * j.axis.unitOrthogonal());
+      json["normal2"] = direction(j.axis.unitOrthogonal());
+    }
+    joints_.push_back(json);
+    if (turns) sensor_of(j, "angle");
+    if (slides) sensor_of(j, "displacement");
+    if (j.type == "spherical" && j.damping != 0) add_ball_damping(j, b1, b2);
+    if (turns && (j.damping != 0 || j.stiffness != 0)) add_rsda(j);
+    if (slides && j.stiffness != 0) add_spring(j, b1, b2, json);
+    if ((turns || slides) && (j.coulomb != 0 || (slides && j.damping != 0)))
+      forces_.push_back({{"name", j.name + " friction"},
+                         {"type", "friction"},
+                         {"joint", j.name},
+                         {"coulomb", j.coulomb},
+                         {"viscous", slides ? j.damping : 0},
+                         {"smooth_velocity", smooth_velocity_}});
+  }
+
+  // A torque -c (omega_2 - omega_1) on body 2, its opposite on body 1. A bushing resists the rate of the rotation
+  // vector instead, which is another one for large rotations.
+  void add_ball_damping(const ImportedJoint& j, const ImportedBody& b1, const ImportedBody& b2) {
+    Json on_body2 = Json::array(), on_body1 = Json::array();
+    for (const char* axis : {"x", "y", "z"}) {
+      const auto rate = [&](const ImportedBody& b) {
+        const std::string name = sensor_names_.identifier(fmt::format("{}_{}_w{}", j.name, b.name, axis));
+        sensors_[name] = {{"quantity", "angular_velocity"}, {"body", b.name}, {"component", axis}};
+        return name;
+      };
+      const std::string c = Expression(j.damping).text(), w2 = rate(b2);
+      const std::string relative = j.body1 > 0 ? fmt::format("({} - {})", w2, rate(b1)) : w2;
+      on_body2.push_back(fmt::format("-{}*{}", c, relative));
+      on_body1.push_back(fmt::format("{}*{}", c, relative));
+    }
+    const auto add_torque = [&](const char* end, const ImportedBody& b, const Json& components) {
+      forces_.push_back(
+          {{"name", j.name + " damping" + end}, {"type", "torque"}, {"body", b.name}, {"components", components}});
+    };
+    add_torque("", b2, on_body2);
+    if (j.body1 > 0) add_torque(" reaction", b1, on_body1);
+  }
+
+  void add_rsda(const ImportedJoint& j) {
+    Json rsda{{"name", j.name + " spring"}, {"type", "rsda"}, {"joint", j.name}};
+    if (j.stiffness != 0) rsda["stiffness"] = j.stiffness;
+    if (j.damping != 0) rsda["damping"] = j.damping;
+    if (j.free_value != 0) rsda["free_angle"] = j.free_value;
+    forces_.push_back(rsda);
+  }
+
+  // k (x - x0) along the axis, which pulls the two bodies of a translational joint back.
+  void add_spring(const ImportedJoint& j, const ImportedBody& b1, const ImportedBody& b2, const Json& json) {
+    const std::string x = sensor_of_.at(j.name);
+    const std::string extension = j.free_value == 0 ? x : fmt::format("({} - {})", x, Expression(j.free_value).text());
+    const auto add_force = [&](const char* end, const ImportedBody& b, const Json& at, const Json& axis, double k) {
+      Json components = Json::array();
+      for (const double a : axis) {
+        if (a == 0)
+          components.push_back(0);
+        else
+          components.push_back(fmt::format("{}*{}", Expression(k * a).text(), extension));
+      }
+      forces_.push_back({{"name", j.name + " spring" + end},
+                         {"type", "force"},
+                         {"body", b.name},
+                         {"point", at},
+                         {"components", components},
+                         {"frame", "body"}});
+    };
+    add_force("", b2, json["point2"], json["axis2"], -j.stiffness);
+    if (j.body1 > 0) add_force(" reaction", b1, json["point1"], json["axis1"], j.stiffness);
+  }
+
+  void sensor_of(const ImportedJoint& j, const char* quantity) {
+    const std::string name = sensor_names_.identifier(j.name);
+    sensor_of_[j.name] = name;
+    sensors_[name] = {{"quantity", quantity}, {"joint", j.name}};
+  }
+
+  void add(const ImportedTie& t) {
+    const ImportedJoint* first = &model_.joints[static_cast<std::size_t>(t.joint1)];
+    const ImportedJoint* second = &model_.joints[static_cast<std::size_t>(t.joint2)];
+    double factor = t.factor;
+    const bool first_turns = first->type == "revolute", second_turns = second->type == "revolute";
+    if (!first_turns && second_turns) {  // a rack and pinion goes from the angle to the displacement
+      std::swap(first, second);
+      factor = 1 / factor;
+    }
+    const bool gear = first_turns && second_turns;
+    joints_.push_back({{"name", t.name},
+                       {"type", gear ? "gear" : "rack_pinion"},
+                       {"joint1", first->name},
+                       {"joint2", second->name},
+                       {gear ? "ratio" : "radius", factor}});
+  }
+
+  const ImportedModel& model_;
+  double smooth_velocity_;
+  double reach_ = 0;  // the farthest place [m]
+  Json joints_ = Json::array(), forces_ = Json::array(), sensors_ = Json::object();
+  Names sensor_names_{words(kReservedNames)};
+  std::map<std::string, std::string> sensor_of_;  // by joint
+};
+
+std::string one_line(const Json& json) {
+  if (json.is_number_float()) return fmt::format("{}", json.get<double>());  // 0 in place of nlohmann's 0.0
+  if (!json.is_structured()) return json.dump();
+  std::string text;
+  for (const auto& [key, value] : json.items())
+    text += (text.empty() ? "" : ", ") + (json.is_object() ? Json(key).dump() + ": " : "") + one_line(value);
+  return json.is_object() ? "{" + text + "}" : "[" + text + "]";
+}
+
+}  // namespace
+
+nlohmann::ordered_json problem_of(const ImportedModel& model, double smooth_velocity) {
+  return ProblemWriter(model, smooth_velocity).problem();
+}
+
+std::string text_of(const nlohmann::ordered_json& problem) {
+  std::string text;
+  for (const auto& [key, value] : problem.items()) {
+    text += fmt::format("{}  {}: ", text.empty() ? "" : ",\n", Json(key).dump());
+    if (!value.is_structured() || value.empty() || !value.front().is_structured()) {
+      text += one_line(value);
+      continue;
+    }
+    std::string entries;
+    for (const auto& [name, entry] : value.items())
+      entries += fmt::format("{}    {}{}", entries.empty() ? "" : ",\n",
+                             value.is_object() ? Json(name).dump() + ": " : "", one_line(entry));
+    text += value.is_object() ? "{\n" + entries + "\n  }" : "[\n" + entries + "\n  ]";
+  }
+  return "{\n" + text + "\n}\n";
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,51 @@
+// An XML file as a tree that remembers what was read of it: what nobody asked for is what an import drops.
+//
+//   const XmlElement robot = parse_xml(read_text_file("arm.urdf"), "arm.urdf");
+//   for (const XmlElement* link : robot.children("link")) link->text("name");
+//   robot.unread();          // elements and attributes that no call above named
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "app/json/input_error.hpp"
+
+namespace mbsopt {
+
+class XmlElement {
+ public:
+  std::string name;
+  int line = 0, column = 0;  // from 1
+
+  std::optional<std::string> text(std::string_view attribute) const;
+  const XmlElement* child(std::string_view child_name) const;  // the first one; nullptr: there is none
+  std::vector<const XmlElement*> children(std::string_view child_name) const;
+  std::vector<const XmlElement*> children() const;  // all of them, in the order of the file; marks none as read
+  void mark_read() const { read_ = true; }
+  void mark_unread() const { read_ = false; }  // asked for, and then not used
+
+  struct Unread {
+    int line;
+    std::string what;  // "joint range", "actuator"
+  };
+  // Each kind once, with the line of its first place; below an unread element nothing is listed.
+  std::vector<Unread> unread() const;
+
+ private:
+  friend struct XmlReader;
+  struct Attribute {
+    std::string name, value;
+    mutable bool read = false;
+  };
+  void add_unread(std::vector<Unread>& list) const;
+  std::vector<Attribute> attributes_;
+  std::vector<XmlElement> children_;
+  mutable bool read_ = false;
+};
+
+// Throws InputError with line and column where the text is no XML; `file` stands for it in findings.
+XmlElement parse_xml(const std::string& text, const std::string& file);
+
+}  // namespace mbsopt

@@ -1,0 +1,12 @@
+// The files of a motion in the folder of its run.
+#pragma once
+
+#include "app/results/trajectory_csv.hpp"
+
+namespace mbsopt {
+
+// Writes trajectory.csv, with --mat and --gnuplot also trajectory.mat and trajectory.gp. Warns of each column with
+// empty cells. Ctrl-C meanwhile stops the run without the files.
+void write_trajectory(Run& run, const Trajectory& trajectory);
+
+}  // namespace mbsopt
