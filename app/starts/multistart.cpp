@@ -127,7 +127,9 @@ MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSp
     run.progress.iteration(fmt::format("start {:3d}   {}   objective {}   {} of {} finished", reply.job, status,
                                        text_of(record, "objective"), outcome.ranked.size(), spec.starts));
   };
-  compute_starts(run, jobs, work, done);
+  compute_starts(run, jobs, work, done, [&] {
+    run.progress.stands(fmt::format("{} of {} starts finished", outcome.ranked.size(), spec.starts));
+  });
   run.progress.finish();
   outcome.interrupted = outcome.interrupted || outcome.ranked.size() < static_cast<std::size_t>(spec.starts);
   std::sort(outcome.ranked.begin(), outcome.ranked.end(),

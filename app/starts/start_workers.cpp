@@ -79,7 +79,7 @@ class OtherRanks {
 };
 
 void compute_on_ranks(Run& run, Ranks& ranks, int workers, const std::vector<int>& starts, const StartWork& work,
-                      const std::function<void(const JobReply&)>& done) {
+                      const std::function<void(const JobReply&)>& done, const std::function<void()>& waiting) {
   OtherRanks others(ranks, workers);
   others.tell(work_message(run, work.task, workers));
   ProcessPool here(workers, [&](int start) { return work.record(start).dump(); });
@@ -90,6 +90,7 @@ void compute_on_ranks(Run& run, Ranks& ranks, int workers, const std::vector<int
     while (!stopped && next != starts.end() && here.has_room() && here.start(*next)) ++next;
     for (const JobReply& reply : here.ended(kPollMilliseconds)) done(reply);
     for (const JobReply& reply : others.ended()) done(reply);
+    waiting();
     if (!stopped && interrupted()) {
       stopped = Clock::now();
       here.stop(), others.tell({{"stop", true}});
@@ -108,11 +109,14 @@ int workers_of(const Run& run) {
 }  // namespace
 
 void compute_starts(Run& run, const std::vector<int>& starts, const StartWork& work,
-                    const std::function<void(const JobReply&)>& done) {
-  if (run.context.ranks) return compute_on_ranks(run, *run.context.ranks, workers_of(run), starts, work, done);
+                    const std::function<void(const JobReply&)>& done, const std::function<void()>& waiting) {
+  if (run.context.ranks) return compute_on_ranks(run, *run.context.ranks, workers_of(run), starts, work, done, waiting);
   run_in_processes(
       starts, workers_of(run), [&](int start) { return work.record(start).dump(); }, done,
-      [] { return !interrupted(); });
+      [&] {
+        waiting();
+        return !interrupted();
+      });
 }
 
 }  // namespace mbsopt

@@ -22,8 +22,9 @@ struct StartWork {
   std::function<Json(int start)> record;
 };
 
-// Like run_in_processes(); what replies is the text of the record. Throws std::runtime_error where a rank cannot work.
+// Like run_in_processes(); what replies is the text of the record. waiting: called about every 50 ms, to show progress.
+// Throws std::runtime_error where a rank cannot work.
 void compute_starts(Run& run, const std::vector<int>& starts, const StartWork& work,
-                    const std::function<void(const JobReply&)>& done);
+                    const std::function<void(const JobReply&)>& done, const std::function<void()>& waiting);
 
 }  // namespace mbsopt

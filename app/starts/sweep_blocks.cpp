@@ -110,19 +110,22 @@ std::vector<SweepRow> swept(Run& run, LongRun& long_run, const SweepPoints& poin
   for (int block = 0; block < blocks; ++block)
     if (!finished.contains(block)) jobs.push_back(block);
   std::size_t done = finished.size();
-  compute_starts(run, jobs, sweep_work(run.problem, task_of(run.context.options.sweep, seed)),
-                 [&](const JobReply& reply) {
-                   if (!reply.ok) {  // of a worker that crashed: it may do better next time
-                     for (std::size_t i = size * static_cast<std::size_t>(reply.job), k = 0;
-                          !interrupted() && k < size && i + k < rows.size(); ++k)
-                       rows[i + k].done = true, rows[i + k].message = reply.text;
-                     return;
-                   }
-                   const Json record = Json::parse(reply.text);
-                   take(record);
-                   if (record["status"] == "ok") long_run.add("start", record);
-                   run.progress.fraction("sweep", static_cast<double>(++done) / static_cast<double>(blocks));
-                 });
+  const auto show = [&] { run.progress.fraction("sweep", static_cast<double>(done) / static_cast<double>(blocks)); };
+  compute_starts(
+      run, jobs, sweep_work(run.problem, task_of(run.context.options.sweep, seed)),
+      [&](const JobReply& reply) {
+        if (!reply.ok) {  // of a worker that crashed: it may do better next time
+          for (std::size_t i = size * static_cast<std::size_t>(reply.job), k = 0;
+               !interrupted() && k < size && i + k < rows.size(); ++k)
+            rows[i + k].done = true, rows[i + k].message = reply.text;
+          return;
+        }
+        const Json record = Json::parse(reply.text);
+        take(record);
+        if (record["status"] == "ok") long_run.add("start", record);
+        ++done;
+      },
+      show);
   run.progress.finish();
   return rows;
 }

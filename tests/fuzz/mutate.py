@@ -272,11 +272,16 @@ class Outcome:
 
 
 def processor_seconds(pid):
+    """Of a process and its children, those that ended and those that run: what one of them used before a signal is not
+    to be counted after it, when it is waited for."""
     try:
-        fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12]) + int(fields[13]) + int(fields[14])) / os.sysconf("SC_CLK_TCK")
+        process = pathlib.Path(f"/proc/{pid}")
+        fields = (process / "stat").read_text().rpartition(")")[2].split()
+        own = sum(int(field) for field in fields[11:15]) / os.sysconf("SC_CLK_TCK")
+        children = (process / "task" / str(pid) / "children").read_text().split()
     except (FileNotFoundError, ProcessLookupError, IndexError):
         return 0.0
+    return own + sum(processor_seconds(child) for child in children)
 
 
 RAW_WORDS = re.compile(r"std::|bad_alloc|basic_string|vector::|json\.exception|Eigen|\b0x[0-9a-fA-F]{5,}|terminate called|"

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <numeric>
+#include <sstream>
 #include <utility>
 
 #include "app/terminal/exit_code.hpp"
@@ -98,6 +99,16 @@ TEST_CASE("the report of a sweep names the extremes, plots each objective and li
   const std::string grid = content_of(folder.path / "grid/report.html");
   CHECK_THAT(grid, Contains("track over k") && Contains("track over free") && Contains("\"mark\":\"points\""));
   CHECK_THAT(grid, !Contains("\"mark\":\"line\"") && !Contains("limits of the design"));
+}
+
+TEST_CASE("a sweep shows that it works before its first point is done", "[command][sweep]") {
+  const TemporaryFolder folder;
+  std::ostringstream out, err;
+  const bool terminal = true;
+  REQUIRE(run_command_line({"sweep", folder.write("rod.json", kSwingingRod), "--out", folder.file("bar"), "--vary",
+                            "k=5:20:3", "--threads", "1"},
+                           out, err, terminal) == kDone);
+  CHECK_THAT(err.str(), Contains("  0 %"));
 }
 
 TEST_CASE("what a sweep cannot vary is said", "[command][sweep]") {

@@ -100,6 +100,22 @@ TEST_CASE("an adjoint run is stopped on its way back, too", "[simulation]") {
   CHECK(on_the_way_back == 2);
 }
 
+TEST_CASE("an adjoint run asks whether to go on while it computes steps again", "[simulation]") {
+  Scene scene = loaded_four_bar();
+  scene.simulation.end_time = 0.3;
+  scene.simulation.integrator.step = 1e-4;
+  scene.simulation.adjoint_memory_mib = 1e-3;
+  const Mechanism mechanism(scene, nominal(scene));
+  long asked = -1;  // the first call at the end is of the last step
+  const SimulationResult run = simulate_adjoint(mechanism, scene.simulation, {}, {nullptr, [&](double t) {
+                                                                                    if (t == 0.3) ++asked;
+                                                                                    return true;
+                                                                                  }});
+  REQUIRE(run.ok());
+  REQUIRE(run.statistics.recomputed_steps > run.statistics.steps);
+  CHECK(asked >= run.statistics.steps + run.statistics.recomputed_steps / 256);
+}
+
 TEST_CASE("a fixed step divides the span evenly", "[simulation]") {
   Scene scene = loaded_four_bar();
   scene.simulation.end_time = 0.3;

@@ -1,0 +1,133 @@
+#include "core/integrate/forward_run.hpp"
+
+#include <stdexcept>
+#include <utility>
+
+#include "core/integrate/runge_kutta_run.hpp"
+#include "core/watch/jump_watch.hpp"
+#include "core/watch/quadrature_watch.hpp"
+#include "core/watch/zero_length.hpp"
+
+namespace mbsopt {
+namespace {
+
+const Method& method_of(const SimulationSettings& settings) {
+  const Method* method = runge_kutta_method(settings.integrator.type);
+  if (!method) throw std::invalid_argument("integrator '" + settings.integrator.type + "' is not known");
+  if (!method->adaptive && !settings.integrator.step) {
+    throw std::invalid_argument("integrator '" + settings.integrator.type + "' has no error estimate: give a step");
+  }
+  return *method;
+}
+
+}  // namespace
+
+ForwardRun::ForwardRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
+                       Assembly assembly)
+    : mechanism_(mechanism),
+      settings_(settings),
+      costs_(costs),
+      method_(method_of(settings)),
+      assembly_(std::move(assembly)) {
+  if (mechanism.data().needs_motion) motion_.emplace(mechanism, settings.formulation);
+  result_.psi.setZero(static_cast<Eigen::Index>(costs.size()));
+  result_.last_good_time = settings.start_time;
+  result_.y_initial = assembly_.result().y;
+  if (!assembly_.result().ok) {
+    result_.status = SimulationStatus::assembly_failed;
+    result_.message = assembly_.result().message;
+  }
+}
+
+void ForwardRun::go(std::span<const double> observed,
+                    const std::function<void(std::size_t, const StatePoint&)>& observe, const RunOptions& options,
+                    const Follow& follow) {
+  if (!result_.ok()) return;
+  SampleSchedule schedule(costs_, observed, settings_.end_time);
+  RungeKuttaRun run(mechanism_, settings_, method_);
+  Eigen::VectorXd y(mechanism_.states());
+  bool followed = true;
+  QuadratureWatch watch(method_, costs_, motion());
+  std::optional<JumpWatch> jumps;
+  if (follow && !options.frozen) {  // given steps have been looked at where they were found
+    jumps.emplace(mechanism_, settings_, costs_, motion());
+    jumps->begin({settings_.start_time, assembly_.result().y, assembly_.result().angles, motion()});
+  }
+  std::string objection;  // to running costs, to derivatives
+  auto accepted = [&](const Step& step) {
+    const std::span<const SampleEvent> events = schedule.take(step.t1);
+    add_running_costs(step, y, options.frozen ? nullptr : &watch, objection);
+    if (jumps) jumps->look_at({step.t1, step.y1, step.angles1, motion()});
+    for (const SampleEvent& e : events) {
+      if (!e.cost && !observe) continue;
+      dense_output(method_, step, (e.time - step.t) / step.h, y);
+      const StatePoint at{e.time, y, step.angles0, motion()};
+      if (e.cost) {
+        result_.psi(e.objective) += e.cost->value(at);
+      } else {
+        observe(e.index, at);
+      }
+    }
+    if (!follow) return;
+    if (!follow(step, events)) followed = false;
+    if (objection.empty()) {
+      objection = through_zero_length(mechanism_.data(), step.t, step.y0, step.t1, step.y1);
+    }
+  };
+  RunOptions until_objection = options;
+  until_objection.progress = [&](double t) { return objection.empty() && (!options.progress || options.progress(t)); };
+  run.run(
+      assembly_.result().y, assembly_.result().angles, [&](double t1) { return schedule.due(t1); }, accepted,
+      until_objection, result_);
+  watch.add_to(result_.statistics);
+  if (jumps) jumps->add_to(result_.statistics);
+  if (!objection.empty()) {
+    result_.status = SimulationStatus::not_credible;
+    result_.message = objection;
+  }
+  angles_end_ = run.angles();
+  if (result_.ok() && !followed) {
+    result_.status = SimulationStatus::not_finite;
+    result_.message =
+        "the derivatives met a matrix that cannot be factored: a massless direction that no joint covers?";
+  }
+  if (!result_.ok()) return;
+  add_terminal_costs();
+}
+
+void ForwardRun::add_terminal_costs() {
+  for (std::size_t o = 0; o < costs_.size(); ++o) {
+    if (costs_[o].terminal) {
+      result_.psi(static_cast<Eigen::Index>(o)) +=
+          costs_[o].terminal->value({settings_.end_time, result_.y_end, angles_end_, motion()});
+    }
+  }
+  if (!result_.psi.allFinite()) {
+    result_.status = SimulationStatus::not_finite;
+    result_.message = not_finite_costs(costs_, result_.psi);
+  }
+}
+
+// Each stage's state is copied once for all costs. watch: none where steps are given.
+void ForwardRun::add_running_costs(const Step& step, Eigen::VectorXd& y, QuadratureWatch* watch,
+                                   std::string& objection) {
+  const std::size_t stages = static_cast<std::size_t>(method_.stages);
+  g_.assign(stages * costs_.size(), 0.0);
+  for (int i = 0; i < method_.stages; ++i) {
+    if (method_.b[i] == 0) continue;
+    bool copied = false;
+    for (std::size_t o = 0; o < costs_.size(); ++o) {
+      if (!costs_[o].running) continue;
+      if (!copied) y = step.Y.col(i);
+      copied = true;
+      const StatePoint at{step.t + method_.c[i] * step.h, y, step.angles0, motion()};
+      const std::size_t k = o * stages + static_cast<std::size_t>(i);
+      g_[k] = costs_[o].running->value(at);
+      result_.psi(static_cast<Eigen::Index>(o)) += step.h * method_.b[i] * g_[k];
+    }
+  }
+  for (std::size_t o = 0; watch && objection.empty() && o < costs_.size(); ++o)
+    if (costs_[o].running) objection = watch->look_at(step, o, std::span(g_).subspan(o * stages, stages));
+}
+
+}  // namespace mbsopt
