@@ -175,7 +175,10 @@ void add_profiles(HtmlPage& page, const Json& result) {
   page.table({"parameter", "95 % interval", "no lower end", "no upper end"}, rows);
   for (const auto& [name, profile] : result.at("profiles").items()) {
     if (!profile.contains("value")) continue;
-    LinePlot plot{.title = "Profile of " + name, .x_label = name, .y_label = "tau [-]"};
+    const std::string unit = result.at("parameters").value(name, Json::object()).value("unit", "");
+    LinePlot plot{.title = "Profile of " + name,
+                  .x_label = unit.empty() ? name : fmt::format("{} [{}]", name, unit),
+                  .y_label = "tau [-]"};
     plot.series.push_back({"tau", profile.at("value").get<std::vector<double>>(),
                            profile.at("tau").get<std::vector<double>>(), Mark::line});
     // Where tau reaches an end of the interval.
@@ -240,16 +243,19 @@ LinePlot autocorrelation(const FitPlot& fit) {
 }
 
 void add_fit(HtmlPage& page, const FitPlot& fit) {
-  LinePlot plot{.title = fmt::format("{}: {}", fit.experiment, fit.channel),
+  // Colours of what validates: another pair than that of what is fitted.
+  const std::size_t data = fit.validates ? 3 : 0, model = fit.validates ? 2 : 1;
+  const char* const role = fit.validates ? " (validation)" : "";
+  LinePlot plot{.title = fmt::format("{}: {}{}", fit.experiment, fit.channel, role),
                 .x_label = "t [s]",
                 .y_label = fmt::format("{} [{}]", fit.channel, fit.unit)};
-  plot.series.push_back({"measured", fit.times, fit.measured, Mark::points});
-  plot.series.push_back({"model", fit.times, fit.model, Mark::line});
+  plot.series.push_back({"measured", fit.times, fit.measured, Mark::points, {}, data});
+  plot.series.push_back({"model", fit.times, fit.model, Mark::line, {}, model});
   page.plot(plot);
-  LinePlot residual{.title = fmt::format("{}: residual of {}", fit.experiment, fit.channel),
+  LinePlot residual{.title = fmt::format("{}: residual of {}{}", fit.experiment, fit.channel, role),
                     .x_label = "t [s]",
                     .y_label = "(measured - model)/sigma [-]"};
-  residual.series.push_back({"residual", fit.times, fit.residual, Mark::points});
+  residual.series.push_back({"residual", fit.times, fit.residual, Mark::points, {}, data});
   page.plot(residual);
   if (fit.residual.size() < kFewest) return;
   page.plot(histogram(fit));

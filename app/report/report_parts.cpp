@@ -143,7 +143,11 @@ void add_convergence(HtmlPage& page, const Trajectory& history, const Json& para
     const std::vector<double> values = column(static_cast<std::size_t>(found - history.columns.begin()));
     const bool positive = std::all_of(values.begin(), values.end(), [](double v) { return v > 0; });
     if (std::all_of(values.begin(), values.end(), [](double v) { return v == 0; })) continue;
-    LinePlot plot{.title = name, .x_label = "iteration", .y_label = name, .logarithmic_y = positive, .whole_x = true};
+    LinePlot plot{.title = name,
+                  .x_label = "iteration",
+                  .y_label = fmt::format("{} [{}]", name, name == std::string("objective") ? "its unit" : "-"),
+                  .logarithmic_y = positive,
+                  .whole_x = true};
     plot.series.push_back({name, column(0), values, Mark::line});
     page.plot(plot);
   }
@@ -177,7 +181,7 @@ void add_multistart(HtmlPage& page, const Json& result) {
   page.paragraph(fmt::format("{}, seed {}; {} at the best optimum.",
                              counted(multistart.at("starts").get<long>(), "start"), multistart.at("seed").get<long>(),
                              multistart.at("at_the_best_optimum").get<long>()));
-  LinePlot plot{.title = "Waterfall", .x_label = "rank", .y_label = "objective", .whole_x = true};
+  LinePlot plot{.title = "Waterfall", .x_label = "rank", .y_label = "objective [its unit]", .whole_x = true};
   PlotSeries& series = plot.series.emplace_back(PlotSeries{"objective", {}, {}, Mark::points});
   std::vector<TableRow> rows;
   for (const Json& record : multistart.at("waterfall")) {
