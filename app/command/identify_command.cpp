@@ -34,14 +34,17 @@
 namespace mbsopt {
 namespace {
 
-// One plot per channel of each experiment.
-std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResult& fit) {
+std::string without_unit(const std::string& column) { return column.substr(0, column.find(" [")); }
+
+// One plot per channel of each experiment. start: at the initial values; what it does not hold is left out.
+std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResult& fit,
+                               const IdentificationResult& start) {
   std::vector<FitPlot> plots;
   std::vector<std::size_t> first;  // plot of each experiment's first channel
   for (const ExperimentFit& experiment : fit.experiments) {
     first.push_back(plots.size());
     for (const ChannelFit& channel : experiment.channels) {
-      FitPlot plot{experiment.name, channel.column, "in the column's unit", {}, {}, {}, {}, experiment.validate};
+      FitPlot plot{experiment.name, without_unit(channel.column), "SI unit", {}, {}, {}, {}, experiment.validate};
       for (const Sensor& sensor : problem.scene.sensors) {
         const ChannelSpec& spec =
             problem.identification->experiments[first.size() - 1].channels[plots.size() - first.back()];
@@ -58,6 +61,10 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
     plot.measured.push_back(row.measured);
     plot.model.push_back(row.model);
     plot.residual.push_back(row.scaled);
+  }
+  for (const ResidualRow& row : start.residuals) {
+    FitPlot& plot = plots[first[row.experiment] + row.channel];
+    plot.initial_times.push_back(row.t), plot.initial.push_back(row.model);
   }
   return plots;
 }
@@ -114,11 +121,17 @@ Recovery recovered(Run& run, const CutProblem& cut, const IdentificationResult& 
   return recovery;
 }
 
-int preflight(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
+// Residuals at the initial values.
+IdentificationResult at_start(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
   IdentificationOptions options;
   options.preflight = true, options.threads = case_threads(run), options.simulation_progress = told(run);
-  const IdentificationResult start = run_identification(needed, data, options);
+  IdentificationResult start = run_identification(needed, data, options);
   run.progress.finish();
+  return start;
+}
+
+int preflight(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
+  const IdentificationResult start = at_start(run, needed, data);
   if (start.residuals.empty()) {
     run.failed(start.message);
     return run.finish();
@@ -219,7 +232,9 @@ std::string report_of(Run& run, const Problem& cut, const Problem& needed, const
                       const SimulatedExperiment& before, const IdentificationResult& fit, const Trajectory& history) {
   std::vector<MovingState> states;
   std::optional<SimulatedExperiment> after;
+  IdentificationResult start;
   if (!interrupted() && before.simulation.ok()) {
+    start = at_start(run, needed, data);
     const Problem fitted = fitted_problem(needed, fit);
     after = simulated_experiment(run, simulated_scene(fitted, data));
     run.progress.finish();
@@ -229,7 +244,7 @@ std::string report_of(Run& run, const Problem& cut, const Problem& needed, const
                         after->forces});
     }
   }
-  return identification_report(run.problem.scene, run.result, history, fit_plots(cut, fit), states);
+  return identification_report(run.problem.scene, run.result, history, fit_plots(cut, fit, start), states);
 }
 
 std::vector<NewValue> new_values(const IdentificationResult& fit) {

@@ -195,12 +195,30 @@ void add_profiles(HtmlPage& page, const Json& result) {
 
 constexpr std::size_t kFewest = 20;  // samples, below which a histogram says nothing
 
+constexpr std::size_t kInitialColour = 5;
+
+// What validates has other colours than what is fitted.
+std::size_t data_colour(const FitPlot& fit) { return fit.validates ? 3 : 0; }
+
+// An initial model that is far from the data would flatten all other curves.
+bool is_comparable(const std::vector<double>& initial, const std::vector<double>& measured) {
+  constexpr double kFar = 3;  // times the size of the measurements
+  const auto size = [](const std::vector<double>& values) {
+    double largest = 0;
+    for (const double x : values)
+      if (std::isfinite(x)) largest = std::max(largest, std::abs(x));
+    return largest;
+  };
+  return !initial.empty() && size(initial) < kFar * size(measured);
+}
+
 // Shares of the residuals in bins of half a sigma within four; those beyond count in the outermost bins. The curve is
 // the normal distribution.
 LinePlot histogram(const FitPlot& fit) {
   constexpr double kWidth = 0.5, kEnd = 4;
   constexpr int kBins = 16;
-  PlotSeries found{"share of the residuals", {}, {}, Mark::bars}, normal{"normal distribution", {}, {}, Mark::line};
+  PlotSeries found{"share of the residuals", {}, {}, Mark::bars, {}, data_colour(fit)},
+      normal{"normal distribution", {}, {}, Mark::line};
   std::vector<double> share(kBins, 0.0);
   for (const double z : fit.residual) {
     if (!std::isfinite(z)) continue;
@@ -227,7 +245,7 @@ LinePlot autocorrelation(const FitPlot& fit) {
   double mean = 0, power = 0;
   for (const double value : z) mean += value / static_cast<double>(z.size());
   for (const double value : z) power += (value - mean) * (value - mean);
-  PlotSeries r{"autocorrelation", {}, {}, Mark::bars};
+  PlotSeries r{"autocorrelation", {}, {}, Mark::bars, {}, data_colour(fit)};
   for (std::size_t lag = 1; lag <= lags; ++lag) {
     double sum = 0;
     for (std::size_t i = 0; i + lag < z.size(); ++i) sum += (z[i] - mean) * (z[i + lag] - mean);
@@ -243,14 +261,15 @@ LinePlot autocorrelation(const FitPlot& fit) {
 }
 
 void add_fit(HtmlPage& page, const FitPlot& fit) {
-  // Colours of what validates: another pair than that of what is fitted.
-  const std::size_t data = fit.validates ? 3 : 0, model = fit.validates ? 2 : 1;
+  const std::size_t data = data_colour(fit), model = fit.validates ? 2 : 1;
   const char* const role = fit.validates ? " (validation)" : "";
   LinePlot plot{.title = fmt::format("{}: {}{}", fit.experiment, fit.channel, role),
                 .x_label = "t [s]",
                 .y_label = fmt::format("{} [{}]", fit.channel, fit.unit)};
   plot.series.push_back({"measured", fit.times, fit.measured, Mark::points, {}, data});
   plot.series.push_back({"model", fit.times, fit.model, Mark::line, {}, model});
+  if (is_comparable(fit.initial, fit.measured))
+    plot.series.push_back({"initial model", fit.initial_times, fit.initial, Mark::dashed, {}, kInitialColour});
   page.plot(plot);
   LinePlot residual{.title = fmt::format("{}: residual of {}{}", fit.experiment, fit.channel, role),
                     .x_label = "t [s]",

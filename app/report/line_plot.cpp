@@ -273,6 +273,10 @@ Ticks y_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
 }
 
 Ticks x_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
+  Ticks names;
+  for (const std::string& name : plot.x_names)
+    names.emplace_back(static_cast<double>(names.size()), html_escaped(name));
+  if (!names.empty()) return names;
   if (plot.logarithmic_x) return logarithmic_ticks_of(frame.x, 8);
   std::vector<double> values = round_ticks(frame.x.low, frame.x.high, 8);
   if (plot.whole_x) std::erase_if(values, [](double x) { return x != std::round(x); });
@@ -382,7 +386,8 @@ std::string plot_data(const LinePlot& plot, PageArrays& arrays) {
   constexpr int kTimeDigits = 9;  // of x: 1000.001 s and 1000.002 s are two instants
   const char* const kMarks[] = {"line", "dashed", "points", "rings", "bars", "crosses"};
   const PlotFrame frame = frame_of(plot);
-  std::vector<std::string> series, limits, instants;
+  std::vector<std::string> series, limits, instants, names;
+  for (const std::string& name : plot.x_names) names.push_back(json_quoted(name));
   for (const PlotSeries& s : plot.series) {
     std::vector<double> x, y;
     for (const std::size_t i : visible_samples(plot, s, frame)) x.push_back(s.x[i]), y.push_back(s.y[i]);
@@ -396,10 +401,10 @@ std::string plot_data(const LinePlot& plot, PageArrays& arrays) {
   for (const PlotInstant& instant : plot.instants)
     instants.push_back(fmt::format(R"({{"name":{},"x":{:.9g}}})", json_quoted(instant.name), instant.x));
   return fmt::format(R"({{"x":[{},{}],"y":[{},{}],"logx":{},"logy":{},"whole":{},"equal":{},"xlabel":{},"ylabel":{},)"
-                     R"("series":[{}],"limits":[{}],"instants":[{}]}})",
+                     R"("series":[{}],"limits":[{}],"instants":[{}],"names":[{}]}})",
                      frame.x.low, frame.x.high, frame.y.low, frame.y.high, plot.logarithmic_x, plot.logarithmic_y,
                      plot.whole_x, plot.equal_axes, json_quoted(plot.x_label), json_quoted(plot.y_label),
-                     fmt::join(series, ","), fmt::join(limits, ","), fmt::join(instants, ","));
+                     fmt::join(series, ","), fmt::join(limits, ","), fmt::join(instants, ","), fmt::join(names, ","));
 }
 
 }  // namespace mbsopt

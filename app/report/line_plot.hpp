@@ -50,6 +50,7 @@ struct LinePlot {
   bool equal_axes = false;     // one metre is as long in x as in y: for paths
   std::vector<PlotLimit> limits = {};
   std::vector<PlotInstant> instants = {};
+  std::vector<std::string> x_names = {};  // instead of numbers at x = 0, 1, 2, ...
 };
 
 inline constexpr std::size_t kMostPoints = 5000;  // of a series: some 100 kB of the page

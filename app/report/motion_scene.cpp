@@ -63,15 +63,25 @@ std::string targets_json(PageArrays& arrays, const std::vector<PointTarget>& tar
   return fmt::format("[{}]", fmt::join(all, ","));
 }
 
-// null without forces, or where all of them are zero.
-std::string reactions_json(PageArrays& arrays, const MovingState& state) {
-  const Trajectory& forces = state.forces;
-  double largest = 0;
+// The size that 98 % of the forces do not exceed: the others, as at singular positions, would hide them. 0: there are
+// none.
+double large_force(const Trajectory& forces) {
+  constexpr double kShare = 0.98;
+  std::vector<double> sizes;
   for (const std::vector<double>& row : forces.rows)
     for (std::size_t k = 1; k + 2 < row.size(); k += 3)
-      if (const double size = std::hypot(row[k], row[k + 1], row[k + 2]); std::isfinite(size))
-        largest = std::max(largest, size);
-  if (largest == 0) return "null";
+      if (const double size = std::hypot(row[k], row[k + 1], row[k + 2]); std::isfinite(size)) sizes.push_back(size);
+  if (sizes.empty()) return 0;
+  const auto place = static_cast<std::ptrdiff_t>(std::ceil(kShare * static_cast<double>(sizes.size() - 1)));
+  std::nth_element(sizes.begin(), sizes.begin() + place, sizes.end());
+  return sizes[static_cast<std::size_t>(place)];
+}
+
+// null without forces.
+std::string reactions_json(PageArrays& arrays, const MovingState& state) {
+  const Trajectory& forces = state.forces;
+  const double large = large_force(forces);
+  if (large == 0) return "null";
   const auto column = [&](std::size_t index) {
     std::vector<double> values;
     for (const std::vector<double>& row : forces.rows) values.push_back(row[index]);
@@ -86,7 +96,7 @@ std::string reactions_json(PageArrays& arrays, const MovingState& state) {
     joints.push_back(fmt::format(R"({{"b":{},"p":{},"force":[{},{},{}]}})", number_of(on), vector_of(on.s),
                                  arrays.add(column(k)), arrays.add(column(k + 1)), arrays.add(column(k + 2))));
   }
-  return fmt::format(R"({{"t":{},"largest":{:.6g},"joints":[{}]}})", arrays.add(column(0), 9), largest,
+  return fmt::format(R"({{"t":{},"large":{:.6g},"joints":[{}]}})", arrays.add(column(0), 9), large,
                      fmt::join(joints, ","));
 }
 

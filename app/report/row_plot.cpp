@@ -18,7 +18,7 @@ struct RowLayout {
   bool stacked;
   int ticks;
 };
-constexpr RowLayout kLayouts[] = {{"wide", 760, 150, 190, 26, 13, false, 5}, {"narrow", 380, 8, 8, 44, 30, true, 3}};
+constexpr RowLayout kLayouts[] = {{"wide", 760, 150, 190, 26, 13, false, 5}, {"narrow", 380, 8, 8, 44, 30, true, 5}};
 constexpr double kRowsTop = 8, kRowsBottom = 44;  // margins [px]
 
 std::pair<double, double> row_range_of(const RowPlot& plot) {

@@ -45,11 +45,12 @@ std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const 
                           const DesignMotion& before, const DesignMotion& after, const SensorLimits& limits = {},
                           const std::vector<RunningTerm>& terms = {}, const std::vector<PointTarget>& targets = {});
 
-// The measurements of one channel of one experiment, and the fitted model at the same times.
+// The measurements of one channel of one experiment, and the fitted model at the same times. Values are in SI units.
 struct FitPlot {
-  std::string experiment, channel, unit;
+  std::string experiment, channel, unit;                 // channel: its column without the unit
   std::vector<double> times, measured, model, residual;  // residual: weighted, (measured - model)/sigma
   bool validates = false;                                // its experiment is scored, not fitted
+  std::vector<double> initial_times = {}, initial = {};  // the model before the fit; empty: not known
 };
 // motion: of the first experiment that is fitted.
 std::string identification_report(const Scene& scene, const Json& result, const Trajectory& history,

@@ -9,6 +9,7 @@
 
 #include "app/report/line_plot.hpp"
 #include "app/report/report_parts.hpp"
+#include "app/results/tradeoff_results.hpp"
 #include "app/run/machine.hpp"
 #include "core/tableau/tableaus.hpp"
 #include "optim/tradeoff/tradeoff_curves.hpp"
@@ -107,8 +108,9 @@ std::string sentence_of(const Json& result, const Tradeoff& tradeoff, std::size_
   if (const auto own = of_gradient ? tradeoff.own_gradient : tradeoff.own) {
     const TradeoffRow& row = tradeoff.rows[*own];
     if (row.status == RowStatus::ok)
-      words += fmt::format("; as in the file: error {} in {:.3g} s",
-                           error_cell(row.errors(static_cast<Eigen::Index>(quantity))), row.wall_seconds);
+      words +=
+          fmt::format("; as in the file: error {} in {}", error_cell(row.errors(static_cast<Eigen::Index>(quantity))),
+                      duration_text(row.wall_seconds));
   }
   return words + ".";
 }
@@ -162,15 +164,17 @@ void add_recommendations(HtmlPage& page, const Json& result) {
 
 void add_rows(HtmlPage& page, const Tradeoff& tradeoff) {
   page.heading("All settings");
-  std::vector<std::string> header{"setting", "time [s]", "repetitions", "steps", "right-hand sides", "factorisations"};
+  std::vector<std::string> header{"setting", "time [ms]", "repetitions", "steps", "right-hand sides", "factorisations"};
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
   for (const Quantity& q : quantities) header.push_back(q.name);
-  header.push_back("outcome");
-  std::vector<std::vector<std::string>> rows;
+  std::vector<std::vector<std::string>> rows, without;  // without: settings that have no result
   for (const TradeoffRow& r : tradeoff.rows) {
-    const bool ok = r.status == RowStatus::ok;
+    if (r.status != RowStatus::ok) {
+      without.push_back({in_words(r.setting), std::string(to_string(r.status)), r.message});
+      continue;
+    }
     std::vector<std::string> row{in_words(r.setting),
-                                 ok ? fmt::format("{:.3g}", r.wall_seconds) : "-",
+                                 fmt::format("{:.3g}", 1e3 * r.wall_seconds),
                                  std::to_string(r.repetitions),
                                  std::to_string(r.statistics.steps),
                                  std::to_string(r.statistics.rhs_evaluations),
@@ -181,13 +185,15 @@ void add_rows(HtmlPage& page, const Tradeoff& tradeoff) {
       const std::string error = error_cell(r.errors(column)), bound = error_cell(r.bounds(column));
       row.push_back(error + (bound == error ? "" : " (" + bound + ")") + (front ? " *" : ""));
     }
-    row.push_back(ok ? "ok" : fmt::format("{}: {}", to_string(r.status), r.message));
     rows.push_back(std::move(row));
   }
   page.table(header, rows);
   page.paragraph(
       "In brackets: the bound, where it is larger than the error. * on the Pareto front of time and bound: nothing "
       "measured is both faster and more exact.");
+  if (without.empty()) return;
+  page.heading("Settings without a result");
+  page.table({"setting", "outcome", "why"}, without);
 }
 
 void add_machine(HtmlPage& page, const Json& result) {

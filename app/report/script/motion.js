@@ -47,7 +47,10 @@ class State {
   // The force on the second body of a joint [N].
   reaction(joint, t) {
     const [i, f] = this.place(t, this.reactions.t);
-    return joint.force.map(x => x[i] + f * ((x[i + 1] ?? x[i]) - x[i]));
+    return joint.force.map(x => {
+      const a = x[i] ?? NaN, b = i + 1 < x.length ? x[i + 1] ?? NaN : a;
+      return a + f * (b - a);
+    });
   }
   at(poses, body, s) { return body < 0 ? s : plus(poses[body].r, turned(poses[body].p, s)); }
   along(poses, body, v) { return body < 0 ? v : turned(poses[body].p, v); }

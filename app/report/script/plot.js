@@ -53,7 +53,8 @@ class Plot {
     this.listen();
     this.layout(figure.clientWidth || 700);  // a hidden figure has no width yet
     if (this.over_time) cursor.listeners.push(t => this.show(t));
-    new ResizeObserver(() => this.layout()).observe(figure);
+    // In the next frame: a layout changes the height that is observed.
+    new ResizeObserver(() => requestAnimationFrame(() => this.layout())).observe(figure);
     addEventListener("beforeprint", () => this.layout(560));  // 15 cm
     addEventListener("afterprint", () => this.layout());
   }
@@ -250,14 +251,25 @@ class Plot {
       group.append(this.make("path", {class: "grid", d}), text);
     };
     const count = pixels => Math.min(Math.max(Math.floor(width / pixels), 2), 8);
-    for (const [v, words] of this.ticks(this.x, this.plot.logx, count(75))) {
-      if (this.plot.whole && v != Math.round(v)) continue;
+    const names = this.plot.names.map((name, k) => [k, [name]]);
+    for (const [v, words] of names.length ? names : this.ticks(this.x, this.plot.logx, count(75))) {
+      if (this.plot.whole && v != Math.round(v) || v < this.x[0] || v > this.x[1]) continue;
       const x = this.px(v).toFixed(1);
       add(`M${x} ${top}v${height}`, {x, y: top + height + 16, "text-anchor": "middle"}, words);
     }
+    if (names.length) this.thin_names(group);
     for (const [v, words] of this.ticks(this.y, this.plot.logy, height > 220 ? 6 : 5)) {
       const y = this.py(v);
       add(`M${left} ${y.toFixed(1)}h${width}`, {x: left - 6, y: (y + 4).toFixed(1), "text-anchor": "end"}, words);
+    }
+  }
+
+  // Of names that would lie on each other only some are shown; the pointer tells the others.
+  thin_names(group) {
+    let free = -Infinity;
+    for (const text of group.querySelectorAll("text")) {
+      const half = text.getComputedTextLength() / 2, x = Number(text.getAttribute("x"));
+      x - half < free ? text.remove() : free = x + half + 6;
     }
   }
 
@@ -272,7 +284,8 @@ class Plot {
       const keys = s.x.map(v => this.on_x(v));
       const i = s.sorted ? nearest(keys, x) : this.closest(s, pointer || [this.px(x), top + height / 2]);
       if (!words.length && !this.over_time) at = keys[i];
-      words.push((s.name || "value") + (this.over_time ? "" : ` (${shown(s.x[i])})`) + " = " + shown(s.y[i]));
+      const place = this.over_time ? "" : ` (${this.plot.names[s.x[i]] ?? shown(s.x[i])})`;
+      words.push((s.name || "value") + place + " = " + shown(s.y[i]));
     }
     this.line.setAttribute("d", `M${this.px(at).toFixed(1)} ${top}v${height}`);
     this.readout.textContent = (this.over_time ? `t = ${shown(x, 5)} s:  ` : "") + words.join(",  ") +

@@ -1,5 +1,7 @@
 // The mechanism that moves: its controls, the view, the order in which parts are drawn.
 
+const kArrow = 80;  // length of a large force [px]
+
 class Viewer extends Symbols {
   constructor(box, motion) {
     super();
@@ -66,7 +68,8 @@ class Viewer extends Symbols {
     for (const kind of kinds) second.append(check(kind, true, toggle(kind)));
     if (last.reactions) {
       this.hidden.add("reactions");  // on demand
-      second.append(check(`reactions (largest ${shown(last.reactions.largest, 3)} N)`, false, toggle("reactions")));
+      const name = `reactions (${kArrow} px: ${shown(last.reactions.large, 3)} N)`;
+      second.append(check(name, false, toggle("reactions")));
     }
     return [first, second];
   }
@@ -246,11 +249,11 @@ class Viewer extends Symbols {
     c.globalAlpha = 1;
   }
 
-  // The force on the second body of each joint; the largest one of the motion is 80 px long.
+  // The force on the second body of each joint; one that is much larger than most is cut at twice their length.
   draw_reactions(s, spot) {
     for (const joint of s.reactions.joints) {
-      const force = s.reaction(joint, this.t), length = 80 / s.reactions.largest;
-      const v = this.flat(force).map(x => length * x);
+      const force = s.reaction(joint, this.t), size = Math.hypot(...force) / s.reactions.large;
+      const v = this.flat(unit(force)).map(x => kArrow * Math.min(size, 2) * x);
       if (v.every(isFinite)) this.draw_arrow(spot(joint.b, joint.p), v, "limit");
     }
   }
