@@ -61,7 +61,7 @@ std::vector<double> numbers_of(const Json& array) {
 LinePlot ladder_plot(const std::string& objective, const std::string& parameter, const Json& entry, double derivative) {
   LinePlot plot{.title = fmt::format("d {}/d {}: differences over their step", objective, parameter),
                 .x_label = "step h of the parameter [its unit]",
-                .y_label = "|(psi(h) - psi(-h))/(2 h) - derivative| [unit of the derivative]",
+                .y_label = "|difference - derivative| [unit of the derivative]",
                 .logarithmic_y = true,
                 .logarithmic_x = true};
   for (const auto& [key, name] :

@@ -61,9 +61,9 @@ void HtmlPage::banner(std::string_view text) {
 
 void HtmlPage::code(std::string_view text) { body_ += fmt::format("<code>{}</code>\n", html_escaped(text)); }
 
-void HtmlPage::table(const std::vector<std::string>& header, const std::vector<TableRow>& rows) {
+void HtmlPage::table(const std::vector<std::string>& header, const std::vector<TableRow>& rows, bool dense) {
   if (rows.empty()) return;
-  body_ += "<div class=\"table\" tabindex=\"0\"><table>\n";
+  body_ += fmt::format("<div class=\"table\" tabindex=\"0\"><table{}>\n", dense ? " class=\"dense\"" : "");
   if (std::any_of(header.begin(), header.end(), [](const std::string& name) { return !name.empty(); })) {
     body_ += "<thead><tr>";
     for (const std::string& name : header) body_ += fmt::format("<th>{}</th>", html_escaped(name));

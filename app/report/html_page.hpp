@@ -39,8 +39,8 @@ class HtmlPage {
   void note(std::string_view text);    // in small print
   void banner(std::string_view text);  // what a reader must see first
   void code(std::string_view text);
-  // The first column holds names; the others are numbers or short words.
-  void table(const std::vector<std::string>& header, const std::vector<TableRow>& rows);
+  // The first column holds names; the others are numbers or short words. A dense table has narrow columns, for colours.
+  void table(const std::vector<std::string>& header, const std::vector<TableRow>& rows, bool dense = false);
   template <class Text>
   void table(const std::vector<std::string>& header, const std::vector<std::vector<Text>>& rows) {
     std::vector<TableRow> cells;

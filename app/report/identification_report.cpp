@@ -120,7 +120,9 @@ void add_fit_outcome(HtmlPage& page, const Json& result) {
 void add_correlation(HtmlPage& page, const Json& result) {
   if (!result.contains("correlation")) return;
   page.heading("Correlation of the estimates");
+  constexpr std::size_t kMostNumbers = 12;  // columns of numbers that fit a page; with more, cells are colours alone
   const Json& correlation = result.at("correlation");
+  const bool dense = correlation.at("names").size() > kMostNumbers;
   std::vector<std::string> header{""};
   std::vector<TableRow> rows;
   for (std::size_t i = 0; i < correlation.at("names").size(); ++i) {
@@ -131,11 +133,13 @@ void add_correlation(HtmlPage& page, const Json& result) {
         rows.back().push_back("-");
         continue;
       }
-      rows.back().push_back({fmt::format("{:.2f}", entry.get<double>()), fmt::format("{}", entry.get<double>())});
+      rows.back().push_back(
+          {dense ? std::string() : fmt::format("{:.2f}", entry.get<double>()), fmt::format("{}", entry.get<double>())});
       rows.back().back().shade = entry.get<double>();
     }
   }
-  page.table(header, rows);
+  page.table(header, rows, dense);
+  if (dense) page.note("Blue: positive, orange: negative, stronger: nearer to 1. The pointer shows the numbers.");
 }
 
 void add_experiments(HtmlPage& page, const Json& result) {

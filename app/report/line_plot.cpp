@@ -17,7 +17,7 @@ namespace mbsopt {
 namespace {
 
 constexpr double kPlotWidth = 760, kPlotHeight = 320;               // of the drawing [px]
-constexpr double kLeft = 66, kRight = 16, kTop = 26, kBottom = 44;  // margins
+constexpr double kLeft = 66, kRight = 22, kTop = 26, kBottom = 44;  // margins
 constexpr double kInnerWidth = kPlotWidth - kLeft - kRight, kInnerHeight = kPlotHeight - kTop - kBottom;
 constexpr int kColours = 8;
 
@@ -75,7 +75,8 @@ PlotFrame frame_of(const LinePlot& plot) {
   }
   const bool has_marks = std::ranges::any_of(
       plot.series, [](const PlotSeries& series) { return is_cloud(series) || series.mark == Mark::bars; });
-  frame.x.finish(plot.equal_axes || plot.logarithmic_x ? 0.05 : has_marks ? kAirOfMarks : 0);
+  const bool wide = plot.equal_axes || plot.logarithmic_x || !plot.x_names.empty();
+  frame.x.finish(wide ? 0.05 : has_marks ? kAirOfMarks : 0);
   frame.y.finish(0.05);
   if (plot.equal_axes) {
     const double scale = std::max(frame.x.span() / kInnerWidth, frame.y.span() / kInnerHeight);

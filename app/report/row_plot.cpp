@@ -37,7 +37,8 @@ std::string shortened(const std::string& name, std::size_t most) {
 }
 
 std::string drawing_of(const RowPlot& plot, const RowLayout& at) {
-  constexpr std::size_t kBesideBars = 20, kAboveBars = 28;  // characters of a name
+  constexpr std::size_t kBesideBars = 20, kAboveBars = 24;  // characters of a name
+  constexpr std::size_t kMostWords = 27;                    // characters at their full width
   const auto [low, high] = row_range_of(plot);
   const double inner = at.width - at.names - at.words,
                bottom = kRowsTop + at.row * static_cast<double>(plot.rows.size());
@@ -58,6 +59,8 @@ std::string drawing_of(const RowPlot& plot, const RowLayout& at) {
     svg += fmt::format("<g><title>{}: {}</title><text x=\"{}\" y=\"{:.1f}\">{}</text>", html_escaped(row.name),
                        html_escaped(row.words), at.stacked ? at.names + 4 : 0, text,
                        html_escaped(shortened(row.name, at.stacked ? kAboveBars : kBesideBars)));
+    const std::string squeezed =
+        row.words.size() > kMostWords ? " textLength=\"176\" lengthAdjust=\"spacingAndGlyphs\"" : std::string();
     if (plot.track) svg += fmt::format("<path class=\"track\" d=\"M{} {:.1f}h{}\"/>", at.names, y, inner);
     svg += fmt::format("<path class=\"thick c{}\" d=\"M{:.1f} {:.1f}H{:.1f}\"/>", row.high < row.low ? 1 : 0,
                        px(row.low), y, px(row.high));
@@ -69,9 +72,9 @@ std::string drawing_of(const RowPlot& plot, const RowLayout& at) {
         svg += fmt::format("<path class=\"limit\" d=\"M{:.1f} {:.1f}v16\"/>", px(bound), y - 8);
     if (row.ring) svg += fmt::format("<circle class=\"joint\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"/>", px(*row.ring), y);
     if (row.dot) svg += fmt::format("<circle class=\"f7\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\"/>", px(*row.dot), y);
-    svg += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text></g>\n",
+    svg += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"{}\"{}>{}</text></g>\n",
                        at.stacked ? at.width - at.words - 4 : at.width - at.words + 10, text,
-                       at.stacked ? "end" : "start", html_escaped(row.words));
+                       at.stacked ? "end" : "start", squeezed, html_escaped(row.words));
   }
   svg += fmt::format("<rect class=\"frame\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{:.1f}\"/>\n", at.names, kRowsTop,
                      inner, bottom - kRowsTop);

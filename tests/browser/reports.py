@@ -54,6 +54,21 @@ const ink = canvas => {
   }
   for (const e of hidden) e.hidden = true;
   await wait(100);
+  // Words of a drawing lie within it, and not on each other.
+  found.outside = 0, found.overlaps = [];
+  for (const svg of document.querySelectorAll("figure>svg, main>svg")) {
+    const frame = svg.getBoundingClientRect(), words = [...svg.querySelectorAll("text")].filter(e => e.textContent);
+    const boxes = words.map(e => e.getBoundingClientRect());
+    if (!frame.width) continue;
+    boxes.forEach((a, i) => {
+      if (a.left < frame.left - 1 || a.right > frame.right + 1) found.outside += 1;
+      boxes.slice(0, i).forEach((b, k) => {
+        const wide = Math.min(a.right, b.right) - Math.max(a.left, b.left);
+        const high = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+        if (wide > 1 && high > 4) found.overlaps.push(words[k].textContent + " and " + words[i].textContent);
+      });
+    });
+  }
   // A plot in sight is as wide as its place: it neither scrolls nor is cut.
   found.cut = [...document.querySelectorAll("figure")].filter(f => f.scrollWidth > f.clientWidth + 1).length;
   found.expected_plots = document.querySelectorAll("figure[data-plot]").length;
@@ -159,6 +174,9 @@ def problems_of(found, console, moves, width):
         wrong.append("the slider does not move the mechanism")
     if found["shown"] != found["choices"]:
         wrong.append(f"{found['choices']} selectors show {found['shown']} parts")
+    if found["outside"]:
+        wrong.append(f"{found['outside']} words are outside their drawing")
+    wrong += [f"words lie on each other: {pair}" for pair in found["overlaps"]]
     if found["cut"]:
         wrong.append(f"{found['cut']} plots are wider than their place")
     if found["cells_outside"]:

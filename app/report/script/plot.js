@@ -68,7 +68,7 @@ class Plot {
     if (!width || width == this.width) return;
     this.width = width;
     const height = Math.round(Math.min(Math.max(0.42 * width, 250), 360));
-    const [left, top] = [66, 26], [w, h] = [width - left - 14, height - top - 44];
+    const [left, top] = [66, 26], [w, h] = [width - left - 22, height - top - 44];
     this.box = [left, top, w, h];
     const set = (e, values) => { for (const [key, value] of Object.entries(values)) e.setAttribute(key, value); };
     const frame = {x: left, y: top, width: w, height: h};
@@ -76,6 +76,9 @@ class Plot {
     set(this.inner, {...frame, viewBox: this.box.join(" ")});
     for (const rect of [this.svg.querySelector(".frame"), this.catcher]) set(rect, frame);
     set(this.svg.querySelector(".x-label"), {x: left + w / 2, y: height - 8});
+    const name = this.svg.querySelector(".y-label"), most = width - 8;
+    name.removeAttribute("textLength");
+    if (name.getComputedTextLength() > most) set(name, {textLength: most, lengthAdjust: "spacingAndGlyphs"});
     if (this.plot.equal) this.equalise();
     this.draw();
     this.show(this.over_time ? cursor.t : null);

@@ -59,7 +59,7 @@ TEST_CASE("parts of a page that selectors choose hold their keys and their place
 TEST_CASE("an instant is a line across a plot, with its name", "[report]") {
   LinePlot plot = line("y", {0, 2, 0});
   plot.instants = {{"singular", 0.25}, {"outside", 2}};
-  CHECK_THAT(to_svg(plot), Contains("class=\"limit dashed\" d=\"M235.5 26v250\"") && Contains(">singular</text>") &&
+  CHECK_THAT(to_svg(plot), Contains("class=\"limit dashed\" d=\"M234.0 26v250\"") && Contains(">singular</text>") &&
                                !Contains("outside"));
   HtmlPage page("p");
   page.plot(plot);
