@@ -182,15 +182,14 @@ void add_rows(HtmlPage& page, const Tradeoff& tradeoff) {
     for (std::size_t q = 0; q < quantities.size(); ++q) {
       const bool front = q < r.pareto.size() && r.pareto[q];
       const auto column = static_cast<Eigen::Index>(q);
-      const std::string error = error_cell(r.errors(column)), bound = error_cell(r.bounds(column));
-      row.push_back(error + (bound == error ? "" : " (" + bound + ")") + (front ? " *" : ""));
+      row.push_back(error_cell(r.errors(column)) + (front ? " *" : ""));
     }
     rows.push_back(std::move(row));
   }
   page.table(header, rows);
   page.paragraph(
-      "In brackets: the bound, where it is larger than the error. * on the Pareto front of time and bound: nothing "
-      "measured is both faster and more exact.");
+      "* on the Pareto front of time and bound: nothing measured is both faster and more exact. tradeoff.csv holds the "
+      "bounds, too.");
   if (without.empty()) return;
   page.heading("Settings without a result");
   page.table({"setting", "outcome", "why"}, without);
