@@ -66,7 +66,10 @@ void HtmlPage::table(const std::vector<std::string>& header, const std::vector<T
   body_ += fmt::format("<div class=\"table\" tabindex=\"0\"><table{}>\n", dense ? " class=\"dense\"" : "");
   if (std::any_of(header.begin(), header.end(), [](const std::string& name) { return !name.empty(); })) {
     body_ += "<thead><tr>";
-    for (const std::string& name : header) body_ += fmt::format("<th>{}</th>", html_escaped(name));
+    for (std::size_t k = 0; k < header.size(); ++k) {
+      const bool words = k < rows.front().size() && rows.front()[k].text.size() >= kWords;
+      body_ += fmt::format("<th{}>{}</th>", words ? " class=\"words\"" : "", html_escaped(header[k]));
+    }
     body_ += "</tr></thead>\n";
   }
   body_ += "<tbody>";
