@@ -170,10 +170,17 @@ void add_to_result(Json& result, const GradientCheck& check, const std::vector<s
         {"exact", to_string(e.exact)},
         {"frozen", e.frozen_verdict ? Json(to_string(*e.frozen_verdict)) : Json()},
         {"free", e.free_verdict ? Json(to_string(*e.free_verdict)) : Json()}};
+    Json& ladder = verdict["entries"][e.objective][e.parameter]["ladder"];
+    ladder = {{"h", Json::array()}, {"frozen", Json::array()}, {"free", Json::array()}};
+    for (const LadderRung& rung : e.rungs)
+      ladder["h"].push_back(rung.h), ladder["frozen"].push_back(rung.frozen), ladder["free"].push_back(rung.free);
   }
   if (check.continuous) add_continuous(result, check);
-  for (const TaylorCheck& t : check.taylor)
-    verdict["taylor"][t.objective] = {{"slope", or_null(t.slope)}, {"passed", t.passed}};
+  for (const TaylorCheck& t : check.taylor) {
+    Json& taylor = verdict["taylor"][t.objective];
+    taylor = {{"slope", or_null(t.slope)}, {"passed", t.passed}, {"h", Json::array()}, {"remainder", Json::array()}};
+    for (const TaylorRow& row : t.rows) taylor["h"].push_back(row.h), taylor["remainder"].push_back(row.remainder);
+  }
   for (const IdentityCheck& i : check.identities) {
     Json weights, direction;
     for (std::size_t k = 0; k < check.objectives.size(); ++k)

@@ -144,6 +144,30 @@ SensorLimits sensor_limits(const Problem& problem) {
   return limits;
 }
 
+// The running terms of all objectives but those that a plot of a sensor shows already.
+std::vector<RunningTerm> running_terms(const Problem& problem) {
+  std::vector<RunningTerm> terms;
+  for (const ObjectiveSpec& spec : problem.objectives) {
+    RunningTerm term{spec.name, "Integrand of " + spec.name, fmt::format("integrand [unit of {} per s]", spec.name)};
+    bool is_sensor = false;
+    for (std::size_t k = 0; k < std::size(kMeanKinds); ++k) {
+      if (!spec.means[k]) continue;
+      const std::string text = spec.means[k]->text();
+      is_sensor = std::ranges::find(problem.scene.sensors, text, &Sensor::name) != problem.scene.sensors.end();
+      term.title = fmt::format("{}: {} this over time", spec.name, kMeanKinds[k].name);
+      term.y_label = fmt::format("{} [unit of {}]", text, spec.name);
+      const auto bound = std::ranges::find(problem.design->subject_to, spec.name, &ObjectiveBound::objective);
+      if (bound == problem.design->subject_to.end()) continue;
+      if (kMeanKinds[k].extreme == Extreme::maximum && bound->upper)
+        term.limits.push_back({"at most", *bound->upper, true});
+      if (kMeanKinds[k].extreme == Extreme::minimum && bound->lower)
+        term.limits.push_back({"at least", *bound->lower, false});
+    }
+    if (!is_sensor) terms.push_back(std::move(term));
+  }
+  return terms;
+}
+
 // Without a column of what the method does not know.
 Trajectory history_of(const DesignResult& design) {
   const bool optimality = std::all_of(design.history.begin(), design.history.end(),
@@ -178,7 +202,8 @@ int design_command(const CommandContext& context) {
   if (!before.simulation.ok()) {
     interrupted() ? run.stopped("nothing was designed yet")
                   : run.failed(before.simulation.message, before.simulation.last_good_time);
-    run.write("report.html", simulation_report(scene, run.result, before.trajectory));
+    run.write("report.html", simulation_report(scene, run.result, before.trajectory,
+                                               {.targets = prescribed_points(run.problem), .forces = before.forces}));
     return run.finish();
   }
   run.result["model"] = to_json(before.model);
@@ -204,8 +229,10 @@ int design_command(const CommandContext& context) {
   run.write("optimized.json", optimized_problem_text(run, new_values(design)));
   run.write("history.csv", to_csv(history));
   if (!after.trajectory.rows.empty()) write_trajectory(run, after.trajectory);
-  run.write("report.html", design_report(scene, design.rho, run.result, history, before.trajectory, after.trajectory,
-                                         sensor_limits(run.problem)));
+  run.write("report.html",
+            design_report(scene, design.rho, run.result, history, {before.trajectory, before.forces, before.running},
+                          {after.trajectory, after.forces, after.running}, sensor_limits(run.problem),
+                          running_terms(run.problem), prescribed_points(run.problem)));
   return long_run.finish();
 }
 

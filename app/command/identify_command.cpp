@@ -5,6 +5,7 @@
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
 #include "app/results/identification_results.hpp"
+#include "app/results/joint_forces.hpp"
 #include "app/results/left_out_bodies.hpp"
 #include "app/results/optimized_problem.hpp"
 #include "app/results/preflight_results.hpp"
@@ -18,6 +19,7 @@
 #include "app/starts/residual_records.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/integrate/model_choice.hpp"
+#include "core/scene/scene_facts.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 #include "core/start/assembly.hpp"
 #include "core/start/model_warnings.hpp"
@@ -32,14 +34,17 @@
 namespace mbsopt {
 namespace {
 
-// One plot per channel of each experiment.
-std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResult& fit) {
+std::string without_unit(const std::string& column) { return column.substr(0, column.find(" [")); }
+
+// One plot per channel of each experiment. start: at the initial values; what it does not hold is left out.
+std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResult& fit,
+                               const IdentificationResult& start) {
   std::vector<FitPlot> plots;
   std::vector<std::size_t> first;  // plot of each experiment's first channel
   for (const ExperimentFit& experiment : fit.experiments) {
     first.push_back(plots.size());
     for (const ChannelFit& channel : experiment.channels) {
-      FitPlot plot{experiment.name, channel.column, "in the column's unit", {}, {}, {}, {}};
+      FitPlot plot{experiment.name, without_unit(channel.column), "SI unit", {}, {}, {}, {}, experiment.validate};
       for (const Sensor& sensor : problem.scene.sensors) {
         const ChannelSpec& spec =
             problem.identification->experiments[first.size() - 1].channels[plots.size() - first.back()];
@@ -56,6 +61,10 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
     plot.measured.push_back(row.measured);
     plot.model.push_back(row.model);
     plot.residual.push_back(row.scaled);
+  }
+  for (const ResidualRow& row : start.residuals) {
+    FitPlot& plot = plots[first[row.experiment] + row.channel];
+    plot.initial_times.push_back(row.t), plot.initial.push_back(row.model);
   }
   return plots;
 }
@@ -112,11 +121,17 @@ Recovery recovered(Run& run, const CutProblem& cut, const IdentificationResult& 
   return recovery;
 }
 
-int preflight(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
+// Residuals at the initial values.
+IdentificationResult at_start(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
   IdentificationOptions options;
   options.preflight = true, options.threads = case_threads(run), options.simulation_progress = told(run);
-  const IdentificationResult start = run_identification(needed, data, options);
+  IdentificationResult start = run_identification(needed, data, options);
   run.progress.finish();
+  return start;
+}
+
+int preflight(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
+  const IdentificationResult start = at_start(run, needed, data);
   if (start.residuals.empty()) {
     run.failed(start.message);
     return run.finish();
@@ -145,6 +160,7 @@ struct SimulatedExperiment {
   Scene scene;
   Trajectory trajectory;
   SimulationResult simulation;
+  Trajectory forces = {};  // of joints
 };
 
 SimulatedExperiment simulated_experiment(Run& run, Scene scene) {
@@ -153,8 +169,14 @@ SimulatedExperiment simulated_experiment(Run& run, Scene scene) {
                             std::vector<bool>(motion.scene.parameters.size(), false));
   RunOptions options;
   options.progress = told(run);
-  motion.simulation = simulate(mechanism, motion.scene.simulation, {},
-                               record_trajectory(mechanism, motion.scene, motion.trajectory), options);
+  Sampling sampling = record_trajectory(mechanism, motion.scene, motion.trajectory);
+  JointForces forces(motion.scene, parameter_values(motion.scene), sampling.times.size());
+  sampling.observe = [&, record = sampling.observe](std::size_t i, const StatePoint& at) {
+    record(i, at);
+    forces.observe(i, at);
+  };
+  motion.simulation = simulate(mechanism, motion.scene.simulation, {}, sampling, options);
+  motion.forces = forces.table();
   return motion;
 }
 
@@ -171,12 +193,38 @@ Problem fitted_problem(Problem problem, const IdentificationResult& fit) {
 
 // Residuals are derived along with the motion, by runs that say nothing of their steps: hence one that does.
 SimulatedExperiment simulate_first_experiment(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
-  auto [scene, trajectory, first] = simulated_experiment(run, simulated_scene(needed, data));
+  SimulatedExperiment experiment = simulated_experiment(run, simulated_scene(needed, data));
+  const SimulationResult& first = experiment.simulation;
   run.result["simulation"] = to_json(first.statistics);
   if (first.ok())
-    for (const std::string& warning : simulation_warnings(scene, first.statistics)) run.warn(warning);
+    for (const std::string& warning : simulation_warnings(experiment.scene, first.statistics)) run.warn(warning);
   warn_of_stiffness(run, first.statistics, true);
-  return {std::move(scene), std::move(trajectory), first};
+  return experiment;
+}
+
+// Positions that were measured in the first experiment that is fitted. Each sensor is what the channel's gain and bias
+// make of its measurement; channels whose gain or bias needs more than parameters are left out.
+std::vector<PointTarget> measured_points(const Problem& fitted, const Scene& scene, const IdentificationResult& fit) {
+  const std::vector<ExperimentSpec>& experiments = fitted.identification->experiments;
+  const auto first = std::ranges::find(experiments, false, &ExperimentSpec::validate);
+  const auto number = static_cast<std::size_t>(first - experiments.begin());
+  if (first == experiments.end()) return {};
+  const SceneFacts facts(scene);
+  std::vector<SensorValues> values(first->channels.size());
+  std::vector<std::array<std::optional<double>, 3>> corrections;
+  for (std::size_t c = 0; c < values.size(); ++c) {
+    const ChannelSpec& channel = first->channels[c];
+    values[c].sensor = channel.sensor;
+    corrections.push_back({facts.value(channel.gain), facts.value(channel.bias), facts.value(channel.delay)});
+  }
+  for (const ResidualRow& row : fit.residuals) {
+    if (row.experiment != number) continue;
+    const auto& [gain, bias, delay] = corrections[row.channel];
+    if (!gain || !bias || !delay || *gain == 0) continue;
+    values[row.channel].t.push_back(row.t - *delay);
+    values[row.channel].value.push_back((row.measured - *bias) / *gain);
+  }
+  return point_targets(scene, values, true);
 }
 
 // Before and after the fit, for the report; without the fitted one where its simulation stops.
@@ -184,15 +232,19 @@ std::string report_of(Run& run, const Problem& cut, const Problem& needed, const
                       const SimulatedExperiment& before, const IdentificationResult& fit, const Trajectory& history) {
   std::vector<MovingState> states;
   std::optional<SimulatedExperiment> after;
+  IdentificationResult start;
   if (!interrupted() && before.simulation.ok()) {
-    after = simulated_experiment(run, simulated_scene(fitted_problem(needed, fit), data));
+    start = at_start(run, needed, data);
+    const Problem fitted = fitted_problem(needed, fit);
+    after = simulated_experiment(run, simulated_scene(fitted, data));
     run.progress.finish();
     if (after->simulation.ok()) {
       states.push_back({"initial", before.scene, before.trajectory, true});
-      states.push_back({"fitted", after->scene, after->trajectory});
+      states.push_back({"fitted", after->scene, after->trajectory, false, measured_points(fitted, after->scene, fit),
+                        after->forces});
     }
   }
-  return identification_report(run.problem.scene, run.result, history, fit_plots(cut, fit), states);
+  return identification_report(run.problem.scene, run.result, history, fit_plots(cut, fit, start), states);
 }
 
 std::vector<NewValue> new_values(const IdentificationResult& fit) {

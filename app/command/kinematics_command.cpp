@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "app/report/run_report.hpp"
+#include "app/results/joint_forces.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "app/results/write_trajectory.hpp"
 #include "app/run/command.hpp"
@@ -67,7 +68,9 @@ void add_drives(Run& run, const DriveEfforts& efforts) {
   run.context.out << "\nforce or torque of each drive along its coordinate [N or N m]\n" << table.text();
 }
 
-void add_singular(Run& run, const KinematicsResult& kinematics) {
+// Returns their times, for the plots.
+std::vector<PlotInstant> add_singular(Run& run, const KinematicsResult& kinematics) {
+  std::vector<PlotInstant> instants;
   for (const SingularPosition& s : kinematics.singular) {
     const std::string owners =
         s.owners.empty() ? std::string() : fmt::format(", between {}", fmt::join(s.owners, ", "));
@@ -75,7 +78,9 @@ void add_singular(Run& run, const KinematicsResult& kinematics) {
         fmt::format("singular position at t = {:.6g} s: {} equation{} lost{}; velocities, accelerations "
                     "and forces are not settled there",
                     s.t, s.rank_lost, s.rank_lost == 1 ? " is" : "s are", owners));
+    instants.push_back({"singular", s.t});
   }
+  return instants;
 }
 
 }  // namespace
@@ -92,6 +97,7 @@ int kinematics_command(const CommandContext& context) {
   Trajectory trajectory;
   const Sampling sampling = record_trajectory(mechanism, scene, trajectory);
   DriveEfforts efforts(mechanism.data());
+  JointForces forces(scene, parameter_values(scene), sampling.times.size());
   bool finite = true;
   SimulationStatistics statistics;
   const SimulationSettings& settings = scene.simulation;
@@ -99,6 +105,7 @@ int kinematics_command(const CommandContext& context) {
       mechanism, assembly, settings, sampling.times,
       [&](std::size_t i, const StatePoint& at) {
         sampling.observe(i, at);
+        forces.observe(i, at);
         finite = efforts.record(at);
         const Energy e = energy(mechanism.data(), at.y, at.angles);
         statistics.energy_final = e.kinetic + e.potential;
@@ -126,7 +133,7 @@ int kinematics_command(const CommandContext& context) {
   write_trajectory(run, trajectory);
   if (!efforts.rows.empty()) run.write("drives.csv", to_csv(efforts.table));
   add_drives(run, efforts);
-  add_singular(run, kinematics);
+  const std::vector<PlotInstant> singular = add_singular(run, kinematics);
   if (motion_ends_early) {
     run.stopped(fmt::format("trajectory.csv holds the motion up to {:.6g} s", kinematics.last_good_time));
   } else if (!finite) {
@@ -137,7 +144,11 @@ int kinematics_command(const CommandContext& context) {
   } else if (!kinematics.ok) {
     run.failed(kinematics.message, kinematics.last_good_time);
   }
-  run.write("report.html", simulation_report(scene, run.result, trajectory, efforts.table));
+  run.write("report.html", simulation_report(scene, run.result, trajectory,
+                                             {.targets = prescribed_points(run.problem),
+                                              .forces = forces.table(),
+                                              .efforts = efforts.table,
+                                              .instants = singular}));
   return run.finish();
 }
 

@@ -68,7 +68,8 @@ int simulate_command(const CommandContext& context) {
   } else {
     run.failed(simulation.message, simulation.last_good_time);
   }
-  run.write("report.html", simulation_report(scene, run.result, motion.trajectory));
+  run.write("report.html", simulation_report(scene, run.result, motion.trajectory,
+                                             {.targets = prescribed_points(run.problem), .forces = motion.forces}));
   return run.finish();
 }
 

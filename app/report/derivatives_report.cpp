@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
+#include "app/report/line_plot.hpp"
 #include "app/report/report_parts.hpp"
 #include "app/report/row_plot.hpp"
 #include "app/report/run_report.hpp"
@@ -48,11 +51,80 @@ std::optional<double> agreeing_digits(const Json& difference) {
   return std::clamp(-std::log10(std::max(difference.get<double>(), 1e-300)), 0.0, kDouble);
 }
 
+std::vector<double> numbers_of(const Json& array) {
+  std::vector<double> numbers;
+  for (const Json& x : array) numbers.push_back(x.is_number() ? x.get<double>() : NAN);
+  return numbers;
+}
+
+// |central difference - tangent-linear model| over the step h, per kind of steps.
+LinePlot ladder_plot(const std::string& objective, const std::string& parameter, const Json& entry, double derivative) {
+  LinePlot plot{.title = fmt::format("d {}/d {}: differences over their step", objective, parameter),
+                .x_label = "step h of the parameter [its unit]",
+                .y_label = "|difference - derivative| [unit of the derivative]",
+                .logarithmic_y = true,
+                .logarithmic_x = true};
+  for (const auto& [key, name] :
+       {std::pair("frozen", "on frozen steps"), std::pair("free", "with step-size control")}) {
+    PlotSeries series{name, numbers_of(entry.at("ladder").at("h")), numbers_of(entry.at("ladder").at(key)), Mark::line};
+    for (double& y : series.y) y = std::abs(y - derivative);
+    if (std::ranges::any_of(series.y, [](double y) { return y > 0; })) plot.series.push_back(std::move(series));
+  }
+  return plot;
+}
+
+// Where the difference of a pair is found in the page.
+std::string ladder_id(std::size_t objective, std::size_t parameter) {
+  return fmt::format("ladder-{}-{}", objective, parameter);
+}
+
+constexpr std::size_t kMostLadders = 60;  // plots of a page that stays below 400 kB
+
+void add_ladders(HtmlPage& page, const Json& result, const Json& entries) {
+  page.heading("Differences over their step");
+  page.note("Errors fall as h^2 until rounding, or the integrator's error on free steps, takes over as 1/h.");
+  page.begin_choices({"objective", "parameter"});
+  std::size_t o = 0, plots = 0;
+  for (const auto& [objective, parameters] : entries.items()) {
+    std::size_t p = 0;
+    for (const auto& [parameter, entry] : parameters.items()) {
+      const Json derivative = result.at("objectives").at(objective).at("gradient").value(parameter, Json());
+      if (plots++ < kMostLadders && derivative.is_number()) {
+        page.begin_choice({objective, parameter}, ladder_id(o, p));
+        page.plot(ladder_plot(objective, parameter, entry, derivative.get<double>()));
+        page.end_choice();
+      }
+      ++p;
+    }
+    ++o;
+  }
+  page.end_choices();
+  if (plots > kMostLadders) page.note(fmt::format("The first {} of {} plots are drawn.", kMostLadders, plots));
+}
+
+void add_taylor(HtmlPage& page, const Json& taylor) {
+  LinePlot plot{.title = "Taylor remainder along a random direction d of all parameters",
+                .x_label = "h [-]",
+                .y_label = "|psi(rho + h d) - psi - h psi_rho d| [unit of psi]",
+                .logarithmic_y = true,
+                .logarithmic_x = true};
+  for (const auto& [objective, of_one] : taylor.items()) {
+    const Json slope = of_one.value("slope", Json());
+    PlotSeries series{slope.is_number() ? fmt::format("{}: h^{:.2f}", objective, slope.get<double>()) : objective,
+                      numbers_of(of_one.at("h")), numbers_of(of_one.at("remainder")), Mark::line};
+    if (std::ranges::any_of(series.y, [](double y) { return y > 0; })) plot.series.push_back(std::move(series));
+  }
+  if (plot.series.empty()) return;
+  page.heading("Taylor remainder");
+  page.plot(plot);
+}
+
 void add_digits(HtmlPage& page, const Json& entries, const char* difference, const std::string& title) {
   constexpr double kDouble = 16;
   std::vector<std::string> header{"objective"};
   std::vector<TableRow> rows;
   bool any = false;
+  std::size_t plots = 0;
   for (const auto& [objective, parameters] : entries.items()) {
     TableRow& row = rows.emplace_back(TableRow{objective});
     for (const auto& [parameter, entry] : parameters.items()) {
@@ -61,6 +133,7 @@ void add_digits(HtmlPage& page, const Json& entries, const char* difference, con
       any = any || digits;
       row.push_back(digits ? TableCell(fmt::format("{:.0f}", *digits), cell(entry.at(difference), 3)) : TableCell("-"));
       if (digits) row.back().shade = *digits / kDouble;
+      if (digits && plots++ < kMostLadders) row.back().link = "#" + ladder_id(rows.size() - 1, row.size() - 2);
     }
   }
   if (!any) return;
@@ -113,10 +186,14 @@ std::string check_report(const Scene& scene, const Json& result) {
   add_status(page, result);
   if (!entries.empty()) {
     page.heading("Digits that agree");
-    page.note("A stronger colour means more agreeing digits, 16 at most. The pointer shows the relative difference.");
+    page.note(
+        "A stronger colour means more agreeing digits, 16 at most. The pointer shows the relative difference; a click "
+        "shows the differences over their step.");
     add_digits(page, entries, "tlm_adjoint", "Tangent-linear model and adjoint:");
     add_digits(page, entries, "frozen_difference", "Tangent-linear model and differences on frozen steps:");
     add_digits(page, entries, "free_difference", "Tangent-linear model and differences with step-size control:");
+    add_ladders(page, result, entries);
+    add_taylor(page, result.at("verdict").value("taylor", Json::object()));
     page.heading("Verdicts");
     std::vector<TableRow> rows;
     for (const auto& [objective, parameters] : entries.items()) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 #include <utility>
 
 #include "app/report/mechanism_drawing.hpp"
@@ -102,12 +103,13 @@ void add_outcome(HtmlPage& page, const Json& result) {
   page.table({"limit", "missed by", "price"}, conflicts);
 }
 
-void add_drawings(HtmlPage& page, const Scene& scene, const Eigen::VectorXd& rho, const Trajectory& before,
-                  const Trajectory& after) {
+void add_drawings(HtmlPage& page, const Scene& scene, const Eigen::VectorXd& rho, const DesignMotion& earlier,
+                  const DesignMotion& later, const std::vector<PointTarget>& targets) {
+  const Trajectory &before = earlier.trajectory, &after = later.trajectory;
   if (before.rows.empty()) return;
   const std::array<int, 2> plane = plane_of_motion(scene, before);
   if (after.rows.empty()) {
-    add_motion(page, plane, {{"before", scene, before}},
+    add_motion(page, plane, {{"before", scene, before, false, targets, earlier.forces}},
                mechanism_drawing("Before, at start and end", plane,
                                  {{"start", scene, before.rows.front()}, {"end", scene, before.rows.back()}}));
     return;
@@ -117,13 +119,37 @@ void add_drawings(HtmlPage& page, const Scene& scene, const Eigen::VectorXd& rho
       "At the start", plane, {{"before", scene, before.rows.front()}, {"after", designed, after.rows.front()}});
   const std::string end = mechanism_drawing(
       "At the end", plane, {{"before", scene, before.rows.back()}, {"after", designed, after.rows.back()}});
-  add_motion(page, plane, {{"before", scene, before, true}, {"after", designed, after}}, start + end);
+  add_motion(page, plane, {{"before", scene, before, true}, {"after", designed, after, false, targets, later.forces}},
+             start + end);
+}
+
+void add_running_terms(HtmlPage& page, const DesignMotion& before, const DesignMotion& after,
+                       const std::vector<RunningTerm>& terms) {
+  std::vector<LinePlot> plots;
+  for (const RunningTerm& term : terms) {
+    LinePlot plot{.title = term.title, .x_label = "t [s]", .y_label = term.y_label, .limits = term.limits};
+    for (const auto& [name, running, mark] :
+         {std::tuple("before", &before.running, Mark::dashed), std::tuple("after", &after.running, Mark::line)}) {
+      const auto found = std::ranges::find(running->columns, term.objective);
+      const auto column = static_cast<std::size_t>(found - running->columns.begin());
+      if (found == running->columns.end() || running->rows.empty()) continue;
+      PlotSeries& series = plot.series.emplace_back(PlotSeries{name, {}, {}, mark});
+      for (const std::vector<double>& row : running->rows)
+        series.x.push_back(row.front()), series.y.push_back(row[column]);
+    }
+    if (std::ranges::any_of(plot.series, [](const PlotSeries& s) { return std::isfinite(s.y.front()); }))
+      plots.push_back(std::move(plot));
+  }
+  if (plots.empty()) return;
+  page.heading("Objectives over time");
+  for (const LinePlot& plot : plots) page.plot(plot);
 }
 
 }  // namespace
 
 std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const Json& result, const Trajectory& history,
-                          const Trajectory& before, const Trajectory& after, const SensorLimits& limits) {
+                          const DesignMotion& before, const DesignMotion& after, const SensorLimits& limits,
+                          const std::vector<RunningTerm>& terms, const std::vector<PointTarget>& targets) {
   HtmlPage page(report_title(result));
   add_design_verdict(page, result);
   add_status(page, result);
@@ -133,8 +159,9 @@ std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const 
   add_convergence(page, history, result.at("parameters"));
   add_multistart(page, result);
   page.heading("Motion before and after");
-  add_drawings(page, scene, rho, before, after);
-  for (const LinePlot& plot : motion_plots(scene, before, after, limits)) page.plot(plot);
+  add_drawings(page, scene, rho, before, after, targets);
+  for (const LinePlot& plot : motion_plots(scene, before.trajectory, after.trajectory, limits)) page.plot(plot);
+  add_running_terms(page, before, after, terms);
   add_model(page, result);
   add_provenance(page, result);
   return page.text();

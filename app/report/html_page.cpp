@@ -15,6 +15,13 @@ namespace {
 
 constexpr std::size_t kWords = 24;  // characters from which a cell is a sentence, which wraps
 
+// As the value of an attribute.
+std::string list_of(const std::vector<std::string>& words) {
+  std::vector<std::string> quoted;
+  for (const std::string& word : words) quoted.push_back(json_quoted(word));
+  return html_escaped(fmt::format("[{}]", fmt::join(quoted, ",")));
+}
+
 std::string cell_of(const TableCell& cell) {
   std::string attributes;
   if (!cell.full.empty() && cell.full != cell.text) attributes += fmt::format(" title=\"{}\"", html_escaped(cell.full));
@@ -54,12 +61,15 @@ void HtmlPage::banner(std::string_view text) {
 
 void HtmlPage::code(std::string_view text) { body_ += fmt::format("<code>{}</code>\n", html_escaped(text)); }
 
-void HtmlPage::table(const std::vector<std::string>& header, const std::vector<TableRow>& rows) {
+void HtmlPage::table(const std::vector<std::string>& header, const std::vector<TableRow>& rows, bool dense) {
   if (rows.empty()) return;
-  body_ += "<div class=\"table\" tabindex=\"0\"><table>\n";
+  body_ += fmt::format("<div class=\"table\" tabindex=\"0\"><table{}>\n", dense ? " class=\"dense\"" : "");
   if (std::any_of(header.begin(), header.end(), [](const std::string& name) { return !name.empty(); })) {
     body_ += "<thead><tr>";
-    for (const std::string& name : header) body_ += fmt::format("<th>{}</th>", html_escaped(name));
+    for (std::size_t k = 0; k < header.size(); ++k) {
+      const bool words = k < rows.front().size() && rows.front()[k].text.size() >= kWords;
+      body_ += fmt::format("<th{}>{}</th>", words ? " class=\"words\"" : "", html_escaped(header[k]));
+    }
     body_ += "</tr></thead>\n";
   }
   body_ += "<tbody>";
@@ -74,6 +84,14 @@ void HtmlPage::table(const std::vector<std::string>& header, const std::vector<T
 void HtmlPage::plot(const LinePlot& plot) {
   body_ += fmt::format("<figure data-plot=\"{}\">{}</figure>\n", plots_.size(), to_svg(plot));
   plots_.push_back(plot_data(plot, arrays_));
+}
+
+void HtmlPage::begin_choices(const std::vector<std::string>& names) {
+  body_ += fmt::format("<div data-choices=\"{}\">\n", list_of(names));
+}
+
+void HtmlPage::begin_choice(const std::vector<std::string>& keys, std::string_view id) {
+  body_ += fmt::format("<div data-keys=\"{}\"{}>\n", list_of(keys), id.empty() ? "" : fmt::format(" id=\"{}\"", id));
 }
 
 void HtmlPage::motion(std::string_view json, std::string_view stills) {

@@ -39,8 +39,8 @@ class HtmlPage {
   void note(std::string_view text);    // in small print
   void banner(std::string_view text);  // what a reader must see first
   void code(std::string_view text);
-  // The first column holds names; the others are numbers or short words.
-  void table(const std::vector<std::string>& header, const std::vector<TableRow>& rows);
+  // The first column holds names; the others are numbers or short words. A dense table has narrow columns, for colours.
+  void table(const std::vector<std::string>& header, const std::vector<TableRow>& rows, bool dense = false);
   template <class Text>
   void table(const std::vector<std::string>& header, const std::vector<std::vector<Text>>& rows) {
     std::vector<TableRow> cells;
@@ -48,6 +48,13 @@ class HtmlPage {
     table(header, cells);
   }
   void plot(const LinePlot& plot);
+  // Parts of which the script shows one at a time. names: of the selectors; keys: what each selects, id: of links to
+  // it.
+  //   page.begin_choices({"quantity"}), page.begin_choice({"x"}), page.plot(x), page.end_choice(), page.end_choices();
+  void begin_choices(const std::vector<std::string>& names);
+  void begin_choice(const std::vector<std::string>& keys, std::string_view id = "");
+  void end_choice() { body_ += "</div>\n"; }
+  void end_choices() { body_ += "</div>\n"; }
   void drawing(std::string_view svg) { body_ += svg; }
   // A mechanism that moves, as JSON for script/viewer.js, above the drawings that stand for it where there is no
   // script.

@@ -120,7 +120,9 @@ void add_fit_outcome(HtmlPage& page, const Json& result) {
 void add_correlation(HtmlPage& page, const Json& result) {
   if (!result.contains("correlation")) return;
   page.heading("Correlation of the estimates");
+  constexpr std::size_t kMostNumbers = 12;  // columns of numbers that fit a page; with more, cells are colours alone
   const Json& correlation = result.at("correlation");
+  const bool dense = correlation.at("names").size() > kMostNumbers;
   std::vector<std::string> header{""};
   std::vector<TableRow> rows;
   for (std::size_t i = 0; i < correlation.at("names").size(); ++i) {
@@ -131,11 +133,13 @@ void add_correlation(HtmlPage& page, const Json& result) {
         rows.back().push_back("-");
         continue;
       }
-      rows.back().push_back({fmt::format("{:.2f}", entry.get<double>()), fmt::format("{}", entry.get<double>())});
+      rows.back().push_back(
+          {dense ? std::string() : fmt::format("{:.2f}", entry.get<double>()), fmt::format("{}", entry.get<double>())});
       rows.back().back().shade = entry.get<double>();
     }
   }
-  page.table(header, rows);
+  page.table(header, rows, dense);
+  if (dense) page.note("Blue: positive, orange: negative, stronger: nearer to 1. The pointer shows the numbers.");
 }
 
 void add_experiments(HtmlPage& page, const Json& result) {
@@ -175,7 +179,10 @@ void add_profiles(HtmlPage& page, const Json& result) {
   page.table({"parameter", "95 % interval", "no lower end", "no upper end"}, rows);
   for (const auto& [name, profile] : result.at("profiles").items()) {
     if (!profile.contains("value")) continue;
-    LinePlot plot{.title = "Profile of " + name, .x_label = name, .y_label = "tau [-]"};
+    const std::string unit = result.at("parameters").value(name, Json::object()).value("unit", "");
+    LinePlot plot{.title = "Profile of " + name,
+                  .x_label = unit.empty() ? name : fmt::format("{} [{}]", name, unit),
+                  .y_label = "tau [-]"};
     plot.series.push_back({"tau", profile.at("value").get<std::vector<double>>(),
                            profile.at("tau").get<std::vector<double>>(), Mark::line});
     // Where tau reaches an end of the interval.
@@ -192,12 +199,30 @@ void add_profiles(HtmlPage& page, const Json& result) {
 
 constexpr std::size_t kFewest = 20;  // samples, below which a histogram says nothing
 
+constexpr std::size_t kInitialColour = 5;
+
+// What validates has other colours than what is fitted.
+std::size_t data_colour(const FitPlot& fit) { return fit.validates ? 3 : 0; }
+
+// An initial model that is far from the data would flatten all other curves.
+bool is_comparable(const std::vector<double>& initial, const std::vector<double>& measured) {
+  constexpr double kFar = 3;  // times the size of the measurements
+  const auto size = [](const std::vector<double>& values) {
+    double largest = 0;
+    for (const double x : values)
+      if (std::isfinite(x)) largest = std::max(largest, std::abs(x));
+    return largest;
+  };
+  return !initial.empty() && size(initial) < kFar * size(measured);
+}
+
 // Shares of the residuals in bins of half a sigma within four; those beyond count in the outermost bins. The curve is
 // the normal distribution.
 LinePlot histogram(const FitPlot& fit) {
   constexpr double kWidth = 0.5, kEnd = 4;
   constexpr int kBins = 16;
-  PlotSeries found{"share of the residuals", {}, {}, Mark::bars}, normal{"normal distribution", {}, {}, Mark::line};
+  PlotSeries found{"share of the residuals", {}, {}, Mark::bars, {}, data_colour(fit)},
+      normal{"normal distribution", {}, {}, Mark::line};
   std::vector<double> share(kBins, 0.0);
   for (const double z : fit.residual) {
     if (!std::isfinite(z)) continue;
@@ -224,7 +249,7 @@ LinePlot autocorrelation(const FitPlot& fit) {
   double mean = 0, power = 0;
   for (const double value : z) mean += value / static_cast<double>(z.size());
   for (const double value : z) power += (value - mean) * (value - mean);
-  PlotSeries r{"autocorrelation", {}, {}, Mark::bars};
+  PlotSeries r{"autocorrelation", {}, {}, Mark::bars, {}, data_colour(fit)};
   for (std::size_t lag = 1; lag <= lags; ++lag) {
     double sum = 0;
     for (std::size_t i = 0; i + lag < z.size(); ++i) sum += (z[i] - mean) * (z[i + lag] - mean);
@@ -240,16 +265,20 @@ LinePlot autocorrelation(const FitPlot& fit) {
 }
 
 void add_fit(HtmlPage& page, const FitPlot& fit) {
-  LinePlot plot{.title = fmt::format("{}: {}", fit.experiment, fit.channel),
+  const std::size_t data = data_colour(fit), model = fit.validates ? 2 : 1;
+  const char* const role = fit.validates ? " (validation)" : "";
+  LinePlot plot{.title = fmt::format("{}: {}{}", fit.experiment, fit.channel, role),
                 .x_label = "t [s]",
                 .y_label = fmt::format("{} [{}]", fit.channel, fit.unit)};
-  plot.series.push_back({"measured", fit.times, fit.measured, Mark::points});
-  plot.series.push_back({"model", fit.times, fit.model, Mark::line});
+  plot.series.push_back({"measured", fit.times, fit.measured, Mark::points, {}, data});
+  plot.series.push_back({"model", fit.times, fit.model, Mark::line, {}, model});
+  if (is_comparable(fit.initial, fit.measured))
+    plot.series.push_back({"initial model", fit.initial_times, fit.initial, Mark::dashed, {}, kInitialColour});
   page.plot(plot);
-  LinePlot residual{.title = fmt::format("{}: residual of {}", fit.experiment, fit.channel),
+  LinePlot residual{.title = fmt::format("{}: residual of {}{}", fit.experiment, fit.channel, role),
                     .x_label = "t [s]",
                     .y_label = "(measured - model)/sigma [-]"};
-  residual.series.push_back({"residual", fit.times, fit.residual, Mark::points});
+  residual.series.push_back({"residual", fit.times, fit.residual, Mark::points, {}, data});
   page.plot(residual);
   if (fit.residual.size() < kFewest) return;
   page.plot(histogram(fit));

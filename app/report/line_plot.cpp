@@ -17,7 +17,7 @@ namespace mbsopt {
 namespace {
 
 constexpr double kPlotWidth = 760, kPlotHeight = 320;               // of the drawing [px]
-constexpr double kLeft = 78, kRight = 16, kTop = 30, kBottom = 44;  // margins
+constexpr double kLeft = 66, kRight = 22, kTop = 26, kBottom = 44;  // margins
 constexpr double kInnerWidth = kPlotWidth - kLeft - kRight, kInnerHeight = kPlotHeight - kTop - kBottom;
 constexpr int kColours = 8;
 
@@ -49,6 +49,13 @@ struct PlotFrame {
 double x_of(const LinePlot& plot, double value) { return plot.logarithmic_x ? std::log10(value) : value; }
 double y_of(const LinePlot& plot, double value) { return plot.logarithmic_y ? std::log10(value) : value; }
 
+bool is_cloud(const PlotSeries& series) {
+  return series.mark == Mark::points || series.mark == Mark::rings || series.mark == Mark::crosses;
+}
+
+// Part of the width beside the outermost marks, so that the frame cuts none of them: 4 px of 200.
+constexpr double kAirOfMarks = 0.02;
+
 PlotFrame frame_of(const LinePlot& plot) {
   PlotFrame frame;
   for (const PlotSeries& series : plot.series) {
@@ -66,7 +73,10 @@ PlotFrame frame_of(const LinePlot& plot) {
     const double y = y_of(plot, limit.value);
     if (y > data.low - data.span() && y < data.high + data.span()) frame.y.include(y);
   }
-  frame.x.finish(plot.equal_axes || plot.logarithmic_x ? 0.05 : 0);
+  const bool has_marks = std::ranges::any_of(
+      plot.series, [](const PlotSeries& series) { return is_cloud(series) || series.mark == Mark::bars; });
+  const bool wide = plot.equal_axes || plot.logarithmic_x || !plot.x_names.empty();
+  frame.x.finish(wide ? 0.05 : has_marks ? kAirOfMarks : 0);
   frame.y.finish(0.05);
   if (plot.equal_axes) {
     const double scale = std::max(frame.x.span() / kInnerWidth, frame.y.span() / kInnerHeight);
@@ -79,8 +89,6 @@ PlotFrame frame_of(const LinePlot& plot) {
   }
   return frame;
 }
-
-bool is_cloud(const PlotSeries& series) { return series.mark == Mark::points || series.mark == Mark::rings; }
 
 // Any sample is as likely as any other, so that the cloud looks as dense here and as thin there as it is.
 std::vector<std::size_t> random_samples(const std::vector<std::size_t>& all, const std::vector<double>& y) {
@@ -135,6 +143,8 @@ const char* style_of(Mark mark) {
       return "line dashed";
     case Mark::bars:
       return "bars";
+    case Mark::crosses:
+      return "cross";
     case Mark::line:
     case Mark::rings:
       break;
@@ -144,6 +154,12 @@ const char* style_of(Mark mark) {
 
 std::string ring(double px, double py) {
   return fmt::format("M{:.1f} {:.1f}a4 4 0 1 0 8 0a4 4 0 1 0 -8 0", px - 4, py);
+}
+
+std::string cross_at(double px, double py) { return fmt::format("M{:.1f} {:.1f}l10 10m-10 0l10 -10", px - 5, py - 5); }
+
+std::size_t colour_of(const PlotSeries& series, std::size_t index) {
+  return series.colour.value_or(series.part_of.value_or(index)) % kColours;
 }
 
 void draw_series(const LinePlot& plot, const PlotFrame& frame, std::size_t index, std::string& svg) {
@@ -161,6 +177,8 @@ void draw_series(const LinePlot& plot, const PlotFrame& frame, std::size_t index
       fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}h0", px, py);
     } else if (series.mark == Mark::rings) {
       path += ring(px, py);
+    } else if (series.mark == Mark::crosses) {
+      path += cross_at(px, py);
     } else if (series.mark == Mark::bars) {
       fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}V{:.1f}", px, frame.py(0), py);
     } else {
@@ -169,7 +187,7 @@ void draw_series(const LinePlot& plot, const PlotFrame& frame, std::size_t index
     pen_down = true;
   }
   svg += fmt::format("<path data-series=\"{}\" class=\"{} c{}\" d=\"{}\"/>\n", index, style_of(series.mark),
-                     series.part_of.value_or(index) % kColours, path);
+                     colour_of(series, index), path);
 }
 
 // The area between a limit and what of a line lies beyond it.
@@ -208,6 +226,19 @@ void draw_limits(const LinePlot& plot, const PlotFrame& frame, std::string& svg)
   }
 }
 
+void draw_instants(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
+  for (const PlotInstant& instant : plot.instants) {
+    if (!(instant.x >= frame.x.low && instant.x <= frame.x.high)) continue;
+    const double px = frame.px(instant.x);
+    const bool at_left = px < kLeft + kInnerWidth / 2;  // then the name stands to the right of the line
+    svg += fmt::format(
+        "<path class=\"limit dashed\" d=\"M{0:.1f} {1}v{2}\"/><text class=\"limit-name\" x=\"{3:.1f}\" y=\"{4}\" "
+        "text-anchor=\"{5}\">{6}</text>\n",
+        px, kTop, kInnerHeight, px + (at_left ? 4 : -4), kTop + 14, at_left ? "start" : "end",
+        html_escaped(instant.name));
+  }
+}
+
 // Whether all of an axis can be written as 0.02, 5, 1000.
 bool near_one(const std::vector<double>& ticks) {
   return std::all_of(ticks.begin(), ticks.end(), [](double tick) { return tick > 0.9e-3 && tick < 1.1e4; });
@@ -243,6 +274,10 @@ Ticks y_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
 }
 
 Ticks x_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
+  Ticks names;
+  for (const std::string& name : plot.x_names)
+    names.emplace_back(static_cast<double>(names.size()), html_escaped(name));
+  if (!names.empty()) return names;
   if (plot.logarithmic_x) return logarithmic_ticks_of(frame.x, 8);
   std::vector<double> values = round_ticks(frame.x.low, frame.x.high, 8);
   if (plot.whole_x) std::erase_if(values, [](double x) { return x != std::round(x); });
@@ -251,12 +286,13 @@ Ticks x_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
 
 // Drawn like the series itself.
 std::string legend_key(const PlotSeries& series, std::size_t index) {
-  const std::string path = series.mark == Mark::points  ? "M5 5h0M15 5h0M25 5h0"
-                           : series.mark == Mark::rings ? ring(15, 5)
-                           : series.mark == Mark::bars  ? "M15 0V10"
-                                                        : "M0 5H30";
+  const std::string path = series.mark == Mark::points    ? "M5 5h0M15 5h0M25 5h0"
+                           : series.mark == Mark::rings   ? ring(15, 5)
+                           : series.mark == Mark::bars    ? "M15 0V10"
+                           : series.mark == Mark::crosses ? cross_at(15, 5)
+                                                          : "M0 5H30";
   return fmt::format("<svg class=\"key\" viewBox=\"0 0 30 10\"><path class=\"{} c{}\" d=\"{}\"/></svg>",
-                     style_of(series.mark), index % kColours, path);
+                     style_of(series.mark), colour_of(series, index), path);
 }
 
 void draw_axes(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
@@ -277,22 +313,19 @@ void draw_axes(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
   svg += "</g>\n";
   svg += fmt::format("<rect class=\"frame\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n", kLeft, kTop, kInnerWidth,
                      kInnerHeight);
-  svg += fmt::format("<text class=\"label\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n",
+  svg += fmt::format("<text class=\"x-label\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n",
                      kLeft + kInnerWidth / 2, kPlotHeight - 8, html_escaped(plot.x_label));
-  svg +=
-      fmt::format("<text class=\"label\" transform=\"translate(14 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
-                  kTop + kInnerHeight / 2, html_escaped(plot.y_label));
-  svg += fmt::format("<text class=\"title\" x=\"{}\" y=\"18\">{}</text>\n", kLeft, html_escaped(plot.title));
-  if (std::any_of(plot.series.begin(), plot.series.end(), [](const PlotSeries& s) { return is_thinned(s); }))
-    svg += fmt::format(
-        "<text class=\"label\" x=\"{}\" y=\"18\" text-anchor=\"end\">first, lowest, highest, last of each "
-        "pixel</text>\n",
-        right);
+  svg += fmt::format("<text class=\"y-label\" x=\"4\" y=\"16\">{}</text>\n", html_escaped(plot.y_label));
+}
+
+// What is drawn of long series, in words.
+std::string thinning_note(const LinePlot& plot) {
+  std::string note;
+  if (std::ranges::any_of(plot.series, is_thinned)) note += "Drawn: first, lowest, highest, last of each pixel. ";
   for (const PlotSeries& series : plot.series)
     if (is_cloud(series) && series.x.size() > kMostPoints)
-      svg += fmt::format(
-          "<text class=\"label\" x=\"{}\" y=\"18\" text-anchor=\"end\">{}: {} of {} drawn, at random</text>\n", right,
-          html_escaped(series.name), kMostPoints, series.x.size());
+      note += fmt::format("{}: {} of {} drawn, at random. ", html_escaped(series.name), kMostPoints, series.x.size());
+  return note.empty() ? note : fmt::format("<p class=\"note\">{}</p>\n", note.substr(0, note.size() - 1));
 }
 
 }  // namespace
@@ -330,27 +363,32 @@ std::vector<double> logarithmic_ticks(double low, double high, int count) {
 
 std::string to_svg(const LinePlot& plot) {
   const PlotFrame frame = frame_of(plot);
-  std::string svg = fmt::format("<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">\n", kPlotWidth, kPlotHeight,
-                                html_escaped(plot.title));
+  std::string svg = fmt::format("<figcaption class=\"title\">{}</figcaption>\n", html_escaped(plot.title));
+  svg += fmt::format("<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">\n", kPlotWidth, kPlotHeight,
+                     html_escaped(plot.title));
   draw_axes(plot, frame, svg);
   draw_limits(plot, frame, svg);
+  draw_instants(plot, frame, svg);
   for (std::size_t i = 0; i < plot.series.size(); ++i) draw_series(plot, frame, i, svg);
   svg += "</svg>\n";
-  if (plot.series.size() < 2) return svg;
-  svg += "<div class=\"legend\">";
-  for (std::size_t i = 0; i < plot.series.size(); ++i) {
-    if (plot.series[i].part_of) continue;
-    svg += fmt::format("<span data-series=\"{}\">{}{}</span>", i, legend_key(plot.series[i], i),
-                       html_escaped(plot.series[i].name));
+  if (plot.series.size() > 1) {
+    svg += "<div class=\"legend\">";
+    for (std::size_t i = 0; i < plot.series.size(); ++i) {
+      if (plot.series[i].part_of) continue;
+      svg += fmt::format("<span data-series=\"{}\">{}{}</span>", i, legend_key(plot.series[i], i),
+                         html_escaped(plot.series[i].name));
+    }
+    svg += "</div>\n";
   }
-  return svg + "</div>\n";
+  return svg + thinning_note(plot);
 }
 
 std::string plot_data(const LinePlot& plot, PageArrays& arrays) {
   constexpr int kTimeDigits = 9;  // of x: 1000.001 s and 1000.002 s are two instants
-  const char* const kMarks[] = {"line", "dashed", "points", "rings", "bars"};
+  const char* const kMarks[] = {"line", "dashed", "points", "rings", "bars", "crosses"};
   const PlotFrame frame = frame_of(plot);
-  std::vector<std::string> series, limits;
+  std::vector<std::string> series, limits, instants, names;
+  for (const std::string& name : plot.x_names) names.push_back(json_quoted(name));
   for (const PlotSeries& s : plot.series) {
     std::vector<double> x, y;
     for (const std::size_t i : visible_samples(plot, s, frame)) x.push_back(s.x[i]), y.push_back(s.y[i]);
@@ -359,13 +397,15 @@ std::string plot_data(const LinePlot& plot, PageArrays& arrays) {
                                  arrays.add(x, kTimeDigits), arrays.add(y)));
   }
   for (const PlotLimit& limit : plot.limits)
-    limits.push_back(fmt::format(R"({{"value":{:.9g},"upper":{}}})", limit.value, limit.upper));
-  return fmt::format(
-      R"({{"box":[{},{},{},{}],"x":[{},{}],"y":[{},{}],"logx":{},"logy":{},"whole":{},"equal":{},"xlabel":{},"ylabel":{},)"
-      R"("series":[{}],"limits":[{}]}})",
-      kLeft, kTop, kInnerWidth, kInnerHeight, frame.x.low, frame.x.high, frame.y.low, frame.y.high, plot.logarithmic_x,
-      plot.logarithmic_y, plot.whole_x, plot.equal_axes, json_quoted(plot.x_label), json_quoted(plot.y_label),
-      fmt::join(series, ","), fmt::join(limits, ","));
+    limits.push_back(
+        fmt::format(R"({{"name":{},"value":{:.9g},"upper":{}}})", json_quoted(limit.name), limit.value, limit.upper));
+  for (const PlotInstant& instant : plot.instants)
+    instants.push_back(fmt::format(R"({{"name":{},"x":{:.9g}}})", json_quoted(instant.name), instant.x));
+  return fmt::format(R"({{"x":[{},{}],"y":[{},{}],"logx":{},"logy":{},"whole":{},"equal":{},"xlabel":{},"ylabel":{},)"
+                     R"("series":[{}],"limits":[{}],"instants":[{}],"names":[{}]}})",
+                     frame.x.low, frame.x.high, frame.y.low, frame.y.high, plot.logarithmic_x, plot.logarithmic_y,
+                     plot.whole_x, plot.equal_axes, json_quoted(plot.x_label), json_quoted(plot.y_label),
+                     fmt::join(series, ","), fmt::join(limits, ","), fmt::join(instants, ","), fmt::join(names, ","));
 }
 
 }  // namespace mbsopt

@@ -1,4 +1,5 @@
-// A line plot as SVG text: axes with round numbers, units in the labels, a legend; colours come from the page's style.
+// A line plot as HTML text with an SVG in it: a title, axes with round numbers and units in the labels, a legend.
+// Colours come from the page's style. The page's script fits the drawing to the width of the window.
 //
 // A line of many samples keeps the first, lowest, highest and last of every pixel column, which draws the same. Points
 // are a cloud, whose density such a choice would change: beyond kMostPoints a random part of them is drawn (always the
@@ -7,7 +8,7 @@
 //   LinePlot plot{.title = "Angle", .x_label = "t [s]", .y_label = "angle [rad]"};
 //   plot.series.push_back({"model", t, angle});
 //   plot.series.push_back({"measured", t_k, z, Mark::points});
-//   page.add(plot);
+//   page.plot(plot);
 #pragma once
 
 #include <cstddef>
@@ -17,13 +18,14 @@
 
 namespace mbsopt {
 
-enum class Mark { line, dashed, points, rings, bars };  // bars: from zero to y
+enum class Mark { line, dashed, points, rings, bars, crosses };  // bars: from zero to y
 
 struct PlotSeries {
   std::string name;
   std::vector<double> x, y;  // values that are not finite are left out
   Mark mark = Mark::line;
   std::optional<std::size_t> part_of = {};  // that series: in its colour, and not in the legend
+  std::optional<std::size_t> colour = {};   // else the number of the series
 };
 
 // A horizontal line that no series should pass; the part of a series beyond it is shaded.
@@ -31,6 +33,12 @@ struct PlotLimit {
   std::string name;
   double value = 0;
   bool upper = true;  // else a lower limit
+};
+
+// A vertical line at which something happens.
+struct PlotInstant {
+  std::string name;
+  double x = 0;
 };
 
 struct LinePlot {
@@ -41,6 +49,8 @@ struct LinePlot {
   bool whole_x = false;        // x counts: ticks at whole numbers only
   bool equal_axes = false;     // one metre is as long in x as in y: for paths
   std::vector<PlotLimit> limits = {};
+  std::vector<PlotInstant> instants = {};
+  std::vector<std::string> x_names = {};  // instead of numbers at x = 0, 1, 2, ...
 };
 
 inline constexpr std::size_t kMostPoints = 5000;  // of a series: some 100 kB of the page

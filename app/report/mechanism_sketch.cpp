@@ -1,7 +1,6 @@
 #include "app/report/mechanism_sketch.hpp"
 
 #include <algorithm>
-#include <map>
 #include <set>
 #include <utility>
 
@@ -13,10 +12,17 @@ namespace {
 
 using Eigen::Vector3d;
 
+BodyPoint point_by_facts(const SceneFacts& facts, const std::string& body, const PointField& field) {
+  const auto s = facts.value(field, body);
+  const auto& bodies = facts.scene().bodies;
+  const auto found = std::ranges::find(bodies, body, &Body::name);
+  return {found == bodies.end() ? kGround : static_cast<std::size_t>(found - bodies.begin()),
+          s ? Vector3d((*s)[0], (*s)[1], (*s)[2]) : Vector3d(Vector3d::Zero())};
+}
+
 class SketchMaker {
  public:
   explicit SketchMaker(const Scene& scene) : scene_(scene), facts_(scene) {
-    for (std::size_t i = 0; i < scene.bodies.size(); ++i) numbers_.emplace(scene.bodies[i].name, i);
     for (const Joint& joint : scene.joints) {
       for (const auto* field : {&joint.axis1, &joint.axis2, &joint.normal1, &joint.normal2}) {
         const std::string* name = *field ? std::get_if<std::string>(&**field) : nullptr;
@@ -37,10 +43,7 @@ class SketchMaker {
 
  private:
   BodyPoint point(const std::string& body, const PointField& field) const {
-    const auto s = facts_.value(field, body);
-    const auto number = numbers_.find(body);
-    return {number == numbers_.end() ? kGround : number->second,
-            s ? Vector3d((*s)[0], (*s)[1], (*s)[2]) : Vector3d(Vector3d::Zero())};
+    return point_by_facts(facts_, body, field);
   }
 
   void add_joint(const Joint& joint) {
@@ -89,7 +92,6 @@ class SketchMaker {
 
   const Scene& scene_;
   const SceneFacts facts_;
-  std::map<std::string, std::size_t> numbers_;
   std::set<std::string> directions_;  // named by joints
   Sketch result_;
 };
@@ -97,6 +99,10 @@ class SketchMaker {
 }  // namespace
 
 Sketch sketch_of(const Scene& scene) { return SketchMaker(scene).sketch(); }
+
+BodyPoint point_of(const Scene& scene, const std::string& body, const PointField& point) {
+  return point_by_facts(SceneFacts(scene), body, point);
+}
 
 Vector3d placed(const std::vector<double>& row, const BodyPoint& p) {
   if (p.body == kGround) return p.s;

@@ -54,6 +54,9 @@ struct Sketch {
 // At the values that the scene's parameters have.
 Sketch sketch_of(const Scene& scene);
 
+// A point of a body of the scene, or of the ground.
+BodyPoint point_of(const Scene& scene, const std::string& body, const PointField& point);
+
 // Global position of a point, from a trajectory's row: t, then 13 numbers per body.
 Eigen::Vector3d placed(const std::vector<double>& row, const BodyPoint& p);
 

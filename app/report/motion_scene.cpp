@@ -50,6 +50,56 @@ bool poses_are_finite(const MovingState& state) {
   });
 }
 
+std::string targets_json(PageArrays& arrays, const std::vector<PointTarget>& targets) {
+  std::vector<std::string> all;
+  for (const PointTarget& target : targets) {
+    std::vector<std::string> place;
+    for (const std::vector<double>& x : target.place)
+      place.push_back(x.empty() ? "null" : std::to_string(arrays.add(x)));
+    all.push_back(fmt::format(R"({{"measured":{},"b":{},"p":{},"t":{},"place":[{}]}})", target.measured,
+                              number_of(target.point), vector_of(target.point.s), arrays.add(target.t, 9),
+                              fmt::join(place, ",")));
+  }
+  return fmt::format("[{}]", fmt::join(all, ","));
+}
+
+// The size that 98 % of the forces do not exceed: the others, as at singular positions, would hide them. 0: there are
+// none.
+double large_force(const Trajectory& forces) {
+  constexpr double kShare = 0.98;
+  std::vector<double> sizes;
+  for (const std::vector<double>& row : forces.rows)
+    for (std::size_t k = 1; k + 2 < row.size(); k += 3)
+      if (const double size = std::hypot(row[k], row[k + 1], row[k + 2]); std::isfinite(size)) sizes.push_back(size);
+  if (sizes.empty()) return 0;
+  const auto place = static_cast<std::ptrdiff_t>(std::ceil(kShare * static_cast<double>(sizes.size() - 1)));
+  std::nth_element(sizes.begin(), sizes.begin() + place, sizes.end());
+  return sizes[static_cast<std::size_t>(place)];
+}
+
+// null without forces.
+std::string reactions_json(PageArrays& arrays, const MovingState& state) {
+  const Trajectory& forces = state.forces;
+  const double large = large_force(forces);
+  if (large == 0) return "null";
+  const auto column = [&](std::size_t index) {
+    std::vector<double> values;
+    for (const std::vector<double>& row : forces.rows) values.push_back(row[index]);
+    return values;
+  };
+  std::vector<std::string> joints;
+  for (std::size_t k = 1; k + 2 < forces.columns.size(); k += 3) {
+    const std::string name = forces.columns[k].substr(0, forces.columns[k].size() - 2);  // "A.x"
+    const auto joint = std::ranges::find(state.scene.joints, name, &Joint::name);
+    if (joint == state.scene.joints.end()) continue;
+    const BodyPoint on = point_of(state.scene, joint->body2, joint->point2);
+    joints.push_back(fmt::format(R"({{"b":{},"p":{},"force":[{},{},{}]}})", number_of(on), vector_of(on.s),
+                                 arrays.add(column(k)), arrays.add(column(k + 1)), arrays.add(column(k + 2))));
+  }
+  return fmt::format(R"({{"t":{},"large":{:.6g},"joints":[{}]}})", arrays.add(column(0), 9), large,
+                     fmt::join(joints, ","));
+}
+
 std::string state_json(PageArrays& arrays, const MovingState& state, std::size_t most) {
   const Sketch sketch = sketch_of(state.scene);
   const auto& rows = state.trajectory.rows;
@@ -84,9 +134,12 @@ std::string state_json(PageArrays& arrays, const MovingState& state, std::size_t
   for (const TracedPoint& trace : sketch.traces)
     traces.push_back(fmt::format(R"({{"name":{},"b":{},"p":{}}})", json_quoted(trace.name), number_of(trace.point),
                                  vector_of(trace.point.s)));
-  return fmt::format(R"({{"name":{},"ghost":{},"t":{},"bodies":[{}],"joints":[{}],"springs":[{}],"traces":[{}]}})",
-                     json_quoted(state.name), state.ghost, arrays.add(column(0), 9), fmt::join(bodies, ","),
-                     fmt::join(joints, ","), fmt::join(springs, ","), fmt::join(traces, ","));
+  return fmt::format(
+      R"({{"name":{},"ghost":{},"t":{},"bodies":[{}],"joints":[{}],"springs":[{}],"traces":[{}],"targets":{},)"
+      R"("reactions":{}}})",
+      json_quoted(state.name), state.ghost, arrays.add(column(0), 9), fmt::join(bodies, ","), fmt::join(joints, ","),
+      fmt::join(springs, ","), fmt::join(traces, ","), targets_json(arrays, state.targets),
+      reactions_json(arrays, state));
 }
 
 // Whether no point leaves its plane of that normal.

@@ -1,4 +1,5 @@
-// A mechanism over time, as JSON for script/viewer.js: poses of its bodies, points, joints, springs, paths.
+// A mechanism over time, as JSON for script/viewer.js: poses of its bodies, points, joints, springs, paths,
+// prescribed and measured places, forces of joints.
 //
 //   page.motion(motion_scene(page.arrays(), plane, {{"before", scene, before, true}, {"after", designed, after}}),
 //   stills);
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "app/report/page_arrays.hpp"
+#include "app/report/point_targets.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "core/scene/scene.hpp"
 
@@ -19,6 +21,8 @@ struct MovingState {
   const Scene& scene;  // its points, at the values that its parameters have
   const Trajectory& trajectory;
   bool ghost = false;  // drawn faintly behind the others
+  std::vector<PointTarget> targets = {};
+  Trajectory forces = {};  // of joints (joint_forces.hpp)
 };
 
 // plane: in which the mechanism is shown first if it moves in no other direction. Empty if a state has less than two

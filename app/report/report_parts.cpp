@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include "app/report/line_plot.hpp"
 #include "app/run/energy_balance.hpp"
@@ -143,7 +145,11 @@ void add_convergence(HtmlPage& page, const Trajectory& history, const Json& para
     const std::vector<double> values = column(static_cast<std::size_t>(found - history.columns.begin()));
     const bool positive = std::all_of(values.begin(), values.end(), [](double v) { return v > 0; });
     if (std::all_of(values.begin(), values.end(), [](double v) { return v == 0; })) continue;
-    LinePlot plot{.title = name, .x_label = "iteration", .y_label = name, .logarithmic_y = positive, .whole_x = true};
+    LinePlot plot{.title = name,
+                  .x_label = "iteration",
+                  .y_label = fmt::format("{} [{}]", name, name == std::string("objective") ? "its unit" : "-"),
+                  .logarithmic_y = positive,
+                  .whole_x = true};
     plot.series.push_back({name, column(0), values, Mark::line});
     page.plot(plot);
   }
@@ -170,6 +176,38 @@ void add_convergence(HtmlPage& page, const Trajectory& history, const Json& para
     if (!plot.series.empty() && plot.series.size() <= kMostCurves) page.plot(plot);
 }
 
+// Parallel coordinates: a line through the parameters of each start, each between its bounds.
+LinePlot parallel_coordinates(const Json& multistart, const Json& parameters) {
+  constexpr std::size_t kMost = 60;  // lines of one plot
+  LinePlot plot{
+      .title = "Where the starts ended", .x_label = "parameter", .y_label = "(value - lower)/(upper - lower) [-]"};
+  std::vector<std::array<double, 2>> bounds;
+  for (const auto& [name, p] : parameters.items()) {
+    const Json lower = p.value("lower", Json()), upper = p.value("upper", Json());
+    if (!lower.is_number() || !upper.is_number()) continue;
+    plot.x_names.push_back(name), bounds.push_back({lower.get<double>(), upper.get<double>()});
+  }
+  const std::size_t best = multistart.at("at_the_best_optimum").get<std::size_t>();
+  std::optional<std::size_t> first_other;  // the series that stands for all other optima
+  for (const Json& record : multistart.at("waterfall")) {
+    if (plot.series.size() == kMost || !record.contains("parameters") || !record.value("objective", Json()).is_number())
+      continue;
+    const bool is_best = plot.series.size() < best;
+    PlotSeries series{is_best ? "the best optimum" : "other ends", {}, {}, Mark::line};
+    if (is_best && !plot.series.empty()) series.part_of = 0;
+    if (!is_best && first_other) series.part_of = first_other;
+    if (!is_best && !first_other) first_other = plot.series.size();
+    for (std::size_t k = 0; k < bounds.size(); ++k) {
+      const Json value = record.at("parameters").value(plot.x_names[k], Json());
+      series.x.push_back(static_cast<double>(k));
+      series.y.push_back(value.is_number() ? (value.get<double>() - bounds[k][0]) / (bounds[k][1] - bounds[k][0])
+                                           : NAN);
+    }
+    plot.series.push_back(std::move(series));
+  }
+  return plot;
+}
+
 void add_multistart(HtmlPage& page, const Json& result) {
   if (!result.contains("multistart") || !result.at("multistart").contains("waterfall")) return;
   const Json& multistart = result.at("multistart");
@@ -177,7 +215,7 @@ void add_multistart(HtmlPage& page, const Json& result) {
   page.paragraph(fmt::format("{}, seed {}; {} at the best optimum.",
                              counted(multistart.at("starts").get<long>(), "start"), multistart.at("seed").get<long>(),
                              multistart.at("at_the_best_optimum").get<long>()));
-  LinePlot plot{.title = "Waterfall", .x_label = "rank", .y_label = "objective", .whole_x = true};
+  LinePlot plot{.title = "Waterfall", .x_label = "rank", .y_label = "objective [its unit]", .whole_x = true};
   PlotSeries& series = plot.series.emplace_back(PlotSeries{"objective", {}, {}, Mark::points});
   std::vector<TableRow> rows;
   for (const Json& record : multistart.at("waterfall")) {
@@ -193,6 +231,8 @@ void add_multistart(HtmlPage& page, const Json& result) {
   plot.logarithmic_y =
       !series.y.empty() && std::all_of(series.y.begin(), series.y.end(), [](double y) { return y > 0; });
   if (!series.y.empty()) page.plot(plot);
+  const LinePlot ends = parallel_coordinates(multistart, result.value("parameters", Json::object()));
+  if (ends.series.size() > 1 && ends.x_names.size() > 1) page.plot(ends);
   page.table({"start", "objective", "infeasibility", "optimality", "outcome"}, rows);
 }
 

@@ -12,9 +12,15 @@
 
 namespace mbsopt {
 
-// efforts: t, then the force or torque of each drive of the scene, by name; of kinematics.
+// What a report shows of a motion beside its trajectory; each may be empty.
+struct MotionParts {
+  std::vector<PointTarget> targets = {};
+  Trajectory forces = {};                  // of joints (joint_forces.hpp)
+  Trajectory efforts = {};                 // t, then the force or torque of each drive by name; of kinematics
+  std::vector<PlotInstant> instants = {};  // [s] marked in all plots over time
+};
 std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory,
-                              const Trajectory& efforts = {});
+                              const MotionParts& parts = {});
 
 // state: t and the bodies' part of a row of trajectory.csv; shapes: the same, displaced along each mode.
 std::string linearisation_report(const Scene& scene, const Json& result, const std::vector<double>& state,
@@ -23,14 +29,28 @@ std::string linearisation_report(const Scene& scene, const Json& result, const s
 std::string gradient_report(const Scene& scene, const Json& result);
 std::string check_report(const Scene& scene, const Json& result);
 
+// A motion of a design. running: t, then per objective what it integrates or takes the mean or extreme of.
+struct DesignMotion {
+  const Trajectory& trajectory;
+  const Trajectory& forces;
+  const Trajectory& running;
+};
+// What the plot of an objective's running term is called, and its limits.
+struct RunningTerm {
+  std::string objective, title, y_label;
+  std::vector<PlotLimit> limits = {};
+};
 // rho: the designed parameters; history: columns and rows of history.csv (iteration, objective, infeasibility, ...).
 std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const Json& result, const Trajectory& history,
-                          const Trajectory& before, const Trajectory& after, const SensorLimits& limits = {});
+                          const DesignMotion& before, const DesignMotion& after, const SensorLimits& limits = {},
+                          const std::vector<RunningTerm>& terms = {}, const std::vector<PointTarget>& targets = {});
 
-// The measurements of one channel of one experiment, and the fitted model at the same times.
+// The measurements of one channel of one experiment, and the fitted model at the same times. Values are in SI units.
 struct FitPlot {
-  std::string experiment, channel, unit;
+  std::string experiment, channel, unit;                 // channel: its column without the unit
   std::vector<double> times, measured, model, residual;  // residual: weighted, (measured - model)/sigma
+  bool validates = false;                                // its experiment is scored, not fitted
+  std::vector<double> initial_times = {}, initial = {};  // the model before the fit; empty: not known
 };
 // motion: of the first experiment that is fitted.
 std::string identification_report(const Scene& scene, const Json& result, const Trajectory& history,

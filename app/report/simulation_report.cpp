@@ -44,7 +44,8 @@ void add_extremes(HtmlPage& page, const Scene& scene, const Trajectory& trajecto
   page.table({"sensor", "unit", "least", "at t [s]", "largest", "at t [s]", "at the end"}, rows);
 }
 
-void add_efforts(HtmlPage& page, const Scene& scene, const Trajectory& efforts) {
+void add_efforts(HtmlPage& page, const Scene& scene, const MotionParts& parts) {
+  const Trajectory& efforts = parts.efforts;
   if (efforts.rows.empty()) return;
   std::vector<double> t;
   for (const auto& row : efforts.rows) t.push_back(row.front());
@@ -53,7 +54,8 @@ void add_efforts(HtmlPage& page, const Scene& scene, const Trajectory& efforts) 
     const std::string unit = drive == scene.drives.end() ? "N or N m" : unit_of_effort(*drive);
     LinePlot plot{.title = (unit == "N" ? "Force of " : "Torque of ") + efforts.columns[k],
                   .x_label = "t [s]",
-                  .y_label = fmt::format("{} [{}]", unit == "N" ? "force" : "torque", unit)};
+                  .y_label = fmt::format("{} [{}]", unit == "N" ? "force" : "torque", unit),
+                  .instants = parts.instants};
     PlotSeries& series = plot.series.emplace_back(PlotSeries{efforts.columns[k], t, {}, Mark::line});
     for (const auto& row : efforts.rows) series.y.push_back(row[k]);
     page.plot(plot);
@@ -63,7 +65,7 @@ void add_efforts(HtmlPage& page, const Scene& scene, const Trajectory& efforts) 
 }  // namespace
 
 std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory,
-                              const Trajectory& efforts) {
+                              const MotionParts& parts) {
   HtmlPage page(report_title(result));
   add_motion_verdict(page, result, trajectory);
   add_status(page, result);
@@ -71,12 +73,15 @@ std::string simulation_report(const Scene& scene, const Json& result, const Traj
   page.heading("Motion");
   if (!trajectory.rows.empty()) {
     const std::array<int, 2> plane = plane_of_motion(scene, trajectory);
-    add_motion(page, plane, {{scene.name, scene, trajectory}},
+    add_motion(page, plane, {{scene.name, scene, trajectory, false, parts.targets, parts.forces}},
                mechanism_drawing("The mechanism at start and end", plane,
                                  {{"start", scene, trajectory.rows.front()}, {"end", scene, trajectory.rows.back()}}));
   }
-  for (const LinePlot& plot : motion_plots(scene, trajectory)) page.plot(plot);
-  add_efforts(page, scene, efforts);
+  for (LinePlot& plot : motion_plots(scene, trajectory)) {
+    plot.instants = parts.instants;
+    page.plot(plot);
+  }
+  add_efforts(page, scene, parts);
   add_extremes(page, scene, trajectory);
   add_simulation(page, scene, result);
   add_model(page, result);

@@ -143,7 +143,7 @@ LinePlot plot_over(const Sweep& sweep, std::size_t varied, const SweptObjective&
   }
   LinePlot plot{.title = fmt::format("{} over {}", objective.name, p.name),
                 .x_label = unit_label(p),
-                .y_label = objective.name,
+                .y_label = objective.name + " [its unit]",
                 .logarithmic_y = low > 0 && std::log10(high / low) > kDecades,
                 .logarithmic_x = p.scale != ParameterScale::linear};
   const Point& best = *sweep.best.front();

@@ -9,6 +9,7 @@
 
 #include "app/report/line_plot.hpp"
 #include "app/report/report_parts.hpp"
+#include "app/results/tradeoff_results.hpp"
 #include "app/run/machine.hpp"
 #include "core/tableau/tableaus.hpp"
 #include "optim/tradeoff/tradeoff_curves.hpp"
@@ -38,6 +39,8 @@ Group group_of(const TradeoffSetting& setting) {
   return method && !method->implicit() ? Group::explicit_methods : Group::implicit_methods;
 }
 
+constexpr std::size_t kInk = 7;  // the colour of the style that is grey
+
 // Lines through bounds; points where an error is below its bound, and of settings that a tighter one dominates.
 LinePlot work_precision(const Tradeoff& tradeoff, std::size_t quantity, Group group, const std::string& title) {
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
@@ -45,7 +48,8 @@ LinePlot work_precision(const Tradeoff& tradeoff, std::size_t quantity, Group gr
   const auto column = static_cast<Eigen::Index>(quantity);
   LinePlot plot{.title = title,
                 .x_label = "time [s]",
-                .y_label = (q.relative ? "relative error of " : "absolute error of ") + q.name,
+                .y_label = fmt::format("{} error of {} [{}]", q.relative ? "relative" : "absolute", q.name,
+                                       q.relative ? "-" : "its unit"),
                 .logarithmic_y = true,
                 .logarithmic_x = true};
   std::vector<PlotSeries> points;
@@ -76,6 +80,12 @@ LinePlot work_precision(const Tradeoff& tradeoff, std::size_t quantity, Group gr
       add(front, row, row.bounds);
   }
   if (!front.x.empty()) plot.series.push_back(std::move(front));
+  const std::optional<std::size_t> own = group == Group::gradients ? tradeoff.own_gradient : tradeoff.own;
+  if (own && tradeoff.rows[*own].status == RowStatus::ok) {
+    PlotSeries& file = plot.series.emplace_back(PlotSeries{"as in the file", {}, {}, Mark::crosses});
+    file.colour = kInk;
+    add(file, tradeoff.rows[*own], tradeoff.rows[*own].errors);
+  }
   return plot;
 }
 
@@ -86,7 +96,26 @@ constexpr const char* kHowToRead =
     "no more right-hand sides or no more time. A relative bound of 1 or more, as the answer zero would have, is left "
     "out.";
 
-void add_plots(HtmlPage& page, const Tradeoff& tradeoff) {
+// "The fastest setting for 1e-06 in track: dopri5 at rtol 1e-05, 12 ms (error 3e-07); as in the file: 1.2e-04 in 8 ms."
+std::string sentence_of(const Json& result, const Tradeoff& tradeoff, std::size_t quantity) {
+  constexpr double kWanted = 1e-6;  // accuracy that suits most tasks; else the tightest that some setting has
+  const Quantity& q = tradeoff.reference.errors->quantities()[quantity];
+  std::string words = fmt::format("{}: no setting was exact enough to be advised", q.name);
+  for (const Json& r : result.value("recommendations", Json::array()))
+    if (r.value("quantity", "") == q.name && r.contains("setting") && r.at("accuracy").get<double>() >= 0.99 * kWanted)
+      words = "The fastest setting " + r.at("in_words").get<std::string>();
+  const bool of_gradient = q.kind == QuantityKind::gradient;
+  if (const auto own = of_gradient ? tradeoff.own_gradient : tradeoff.own) {
+    const TradeoffRow& row = tradeoff.rows[*own];
+    if (row.status == RowStatus::ok)
+      words +=
+          fmt::format("; as in the file: error {} in {}", error_cell(row.errors(static_cast<Eigen::Index>(quantity))),
+                      duration_text(row.wall_seconds));
+  }
+  return words + ".";
+}
+
+void add_plots(HtmlPage& page, const Json& result, const Tradeoff& tradeoff) {
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
   struct Titled {
     Group group;
@@ -96,14 +125,29 @@ void add_plots(HtmlPage& page, const Tradeoff& tradeoff) {
                               Titled{Group::implicit_methods, "implicit and multistep methods"},
                               Titled{Group::formulations, "formulations"},
                               Titled{Group::gradients, "gradient methods"}};
+  struct Chosen {
+    std::size_t quantity;
+    const char* methods;
+    LinePlot plot;
+  };
+  std::vector<Chosen> choices;
   for (std::size_t q = 0; q < quantities.size(); ++q) {
-    page.heading("Error of " + quantities[q].name + " over time");
-    if (q == 0) page.paragraph(kHowToRead);
     for (const Titled& p : kPlots) {
-      const LinePlot plot = work_precision(tradeoff, q, p.group, quantities[q].name + ": " + p.title);
-      if (!plot.series.empty()) page.plot(plot);
+      LinePlot plot = work_precision(tradeoff, q, p.group, quantities[q].name + ": " + p.title);
+      if (!plot.series.empty()) choices.push_back({q, p.title, std::move(plot)});
     }
   }
+  if (choices.empty()) return;
+  page.heading("Error over time");
+  page.begin_choices({"error of", "with"});
+  for (const Chosen& chosen : choices) {
+    page.begin_choice({quantities[chosen.quantity].name, chosen.methods});
+    page.paragraph(sentence_of(result, tradeoff, chosen.quantity));
+    page.plot(chosen.plot);
+    page.end_choice();
+  }
+  page.end_choices();
+  page.note(kHowToRead);
 }
 
 void add_recommendations(HtmlPage& page, const Json& result) {
@@ -120,15 +164,17 @@ void add_recommendations(HtmlPage& page, const Json& result) {
 
 void add_rows(HtmlPage& page, const Tradeoff& tradeoff) {
   page.heading("All settings");
-  std::vector<std::string> header{"setting", "time [s]", "repetitions", "steps", "right-hand sides", "factorisations"};
+  std::vector<std::string> header{"setting", "time [ms]", "repetitions", "steps", "right-hand sides", "factorisations"};
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
   for (const Quantity& q : quantities) header.push_back(q.name);
-  header.push_back("outcome");
-  std::vector<std::vector<std::string>> rows;
+  std::vector<std::vector<std::string>> rows, without;  // without: settings that have no result
   for (const TradeoffRow& r : tradeoff.rows) {
-    const bool ok = r.status == RowStatus::ok;
+    if (r.status != RowStatus::ok) {
+      without.push_back({in_words(r.setting), std::string(to_string(r.status)), r.message});
+      continue;
+    }
     std::vector<std::string> row{in_words(r.setting),
-                                 ok ? fmt::format("{:.3g}", r.wall_seconds) : "-",
+                                 fmt::format("{:.3g}", 1e3 * r.wall_seconds),
                                  std::to_string(r.repetitions),
                                  std::to_string(r.statistics.steps),
                                  std::to_string(r.statistics.rhs_evaluations),
@@ -136,16 +182,17 @@ void add_rows(HtmlPage& page, const Tradeoff& tradeoff) {
     for (std::size_t q = 0; q < quantities.size(); ++q) {
       const bool front = q < r.pareto.size() && r.pareto[q];
       const auto column = static_cast<Eigen::Index>(q);
-      const std::string error = error_cell(r.errors(column)), bound = error_cell(r.bounds(column));
-      row.push_back(error + (bound == error ? "" : " (" + bound + ")") + (front ? " *" : ""));
+      row.push_back(error_cell(r.errors(column)) + (front ? " *" : ""));
     }
-    row.push_back(ok ? "ok" : fmt::format("{}: {}", to_string(r.status), r.message));
     rows.push_back(std::move(row));
   }
   page.table(header, rows);
   page.paragraph(
-      "In brackets: the bound, where it is larger than the error. * on the Pareto front of time and bound: nothing "
-      "measured is both faster and more exact.");
+      "* on the Pareto front of time and bound: nothing measured is both faster and more exact. tradeoff.csv holds the "
+      "bounds, too.");
+  if (without.empty()) return;
+  page.heading("Settings without a result");
+  page.table({"setting", "outcome", "why"}, without);
 }
 
 void add_machine(HtmlPage& page, const Json& result) {
@@ -153,7 +200,7 @@ void add_machine(HtmlPage& page, const Json& result) {
 }
 
 LinePlot alpha_plot(const std::string& title, const std::string& label) {
-  return {.title = title, .x_label = "alpha", .y_label = label, .logarithmic_y = true, .logarithmic_x = true};
+  return {.title = title, .x_label = "alpha [-]", .y_label = label, .logarithmic_y = true, .logarithmic_x = true};
 }
 
 }  // namespace
@@ -167,7 +214,7 @@ std::string tradeoff_report(const Json& result, const Tradeoff& tradeoff) {
   add_status(page, result);
   add_machine(page, result);
   add_recommendations(page, result);
-  add_plots(page, tradeoff);
+  add_plots(page, result, tradeoff);
   add_reference(page, tradeoff.reference);
   add_rows(page, tradeoff);
   add_model(page, result);
@@ -180,7 +227,7 @@ std::string penalty_report(const Json& result, const PenaltyStudy& study) {
   add_status(page, result);
   add_machine(page, result);
   page.heading("Accelerations");
-  LinePlot accelerations = alpha_plot("Relative error of accelerations", "relative error");
+  LinePlot accelerations = alpha_plot("Relative error of accelerations", "relative error [-]");
   PlotSeries model{"penalty against the constrained equations", {}, {}, Mark::line},
       rounding{"rounding by Cholesky", {}, {}, Mark::line}, augmented{"augmented Lagrangian", {}, {}, Mark::dashed};
   std::vector<std::vector<std::string>> rows;

@@ -1,5 +1,8 @@
 #include "app/results/simulated_motion.hpp"
 
+#include <limits>
+
+#include "app/results/joint_forces.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/integrate/model_choice.hpp"
 #include "core/start/assembly.hpp"
@@ -7,6 +10,17 @@
 #include "optim/objective/objective_run.hpp"
 
 namespace mbsopt {
+namespace {
+
+// Per objective g of a sum, x of a mean or extreme; null where there is none.
+std::vector<std::shared_ptr<const PointCost>> running_terms(const std::vector<Objective>& objectives,
+                                                            const Mechanism& mechanism) {
+  std::vector<std::shared_ptr<const PointCost>> terms;
+  for (const Objective& o : objectives) terms.push_back(o.mean() ? o.expression(mechanism) : o.cost(mechanism).running);
+  return terms;
+}
+
+}  // namespace
 
 SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
   const Scene& scene = run.problem.scene;
@@ -27,14 +41,28 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
   add_model(mechanism, settings, motion.model);
   motion.warnings = model_warnings(mechanism, assembly);
 
+  const std::vector<std::shared_ptr<const PointCost>> terms = running_terms(objectives, mechanism);
+  motion.running.columns = {"t"};
+  for (const Objective& objective : objectives) motion.running.columns.push_back(objective.name());
+
   std::vector<const Objective*> all;
   for (const Objective& objective : objectives) all.push_back(&objective);
   RunOptions options;
   options.progress = run.watched("simulating");
   motion.simulation = ObjectiveRun(all, mechanism, settings, options.progress).run([&](std::span<const Cost> costs) {
     motion.trajectory = {};
-    const Sampling sampling = record_trajectory(mechanism, scene, motion.trajectory);
-    return simulate(mechanism, settings, costs, sampling, options);
+    Sampling sampling = record_trajectory(mechanism, scene, motion.trajectory);
+    JointForces forces(scene, rho, sampling.times.size());
+    motion.running.rows.clear();
+    sampling.observe = [&, record = sampling.observe](std::size_t i, const StatePoint& at) {
+      record(i, at);
+      forces.observe(i, at);
+      std::vector<double>& row = motion.running.rows.emplace_back(std::vector<double>{at.t});
+      for (const auto& term : terms) row.push_back(term ? term->value(at) : std::numeric_limits<double>::quiet_NaN());
+    };
+    const SimulationResult result = simulate(mechanism, settings, costs, sampling, options);
+    motion.forces = forces.table();
+    return result;
   });
   if (motion.simulation.ok()) {
     motion.true_values = true_extremes(all, mechanism, settings, motion.simulation.steps, options.progress);

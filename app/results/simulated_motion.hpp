@@ -13,6 +13,8 @@ struct SimulatedMotion {
   std::vector<std::optional<double>> true_values;  // of smooth maxima and minima among them
   ModelSummary model;                              // where the assembly is ok
   std::vector<std::string> warnings;               // of the start
+  Trajectory forces = {};                          // of joints (joint_forces.hpp)
+  Trajectory running = {};  // t, then per objective what it integrates or takes the mean or extreme of; NaN: nothing
 };
 
 // Draws the progress of `run`, and stops where the user interrupts.

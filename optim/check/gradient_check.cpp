@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <random>
 
@@ -184,6 +186,7 @@ class Check {
           if (!e.ok) return std::nullopt;
           if (e.steps.sizes != steps_.sizes) other_steps = std::min(other_steps, std::abs(h));
           if (std::abs(h) < 1.5 * near) note_jump(k, h, frozen, e.psi, on_frozen_steps);
+          note_rung(k, h, frozen, e.psi);
           return std::move(e.psi);
         };
         LadderDerivative d = difference_ladder(f, m, {options_.relative_step * size_(k), options_.rungs, kPsiRounding});
@@ -202,6 +205,25 @@ class Check {
       if (options_.progress) options_.progress(static_cast<int>(k) + 1, static_cast<int>(P));
     }
     set_ratio(result_.frozen_cost), set_ratio(result_.free_cost);
+  }
+
+  // The difference of the values at h and -h, once both are known.
+  void note_rung(Index k, double h, bool frozen, const VectorXd& psi) {
+    auto& values = rungs_[{k, std::abs(h)}][frozen ? 0 : 1];
+    values[h > 0 ? 0 : 1] = psi;
+  }
+
+  std::vector<LadderRung> rungs_of(Index i, Index k) const {
+    std::vector<LadderRung> rungs;
+    for (const auto& [at, values] : rungs_) {
+      if (at.first != k) continue;
+      const auto slope = [&, h = at.second](const std::array<VectorXd, 2>& psi) {
+        return psi[0].size() == 0 || psi[1].size() == 0 ? kNaN : (psi[0](i) - psi[1](i)) / (2 * h);
+      };
+      rungs.push_back({at.second, slope(values[0]), slope(values[1])});
+    }
+    std::reverse(rungs.begin(), rungs.end());
+    return rungs;
   }
 
   // Both ladders take the same steps h, halved exactly.
@@ -373,6 +395,7 @@ class Check {
         }
         e.free_error += rounding(free_step_);
         if (options_.free_steps) e.free_verdict = verdict_of(e.free, e.free_error, e.tlm, entry, limits.free);
+        e.rungs = rungs_of(i, k);
         result_.entries.push_back(std::move(e));
       }
     }
@@ -472,6 +495,8 @@ class Check {
   bool rounding_known_ = false;
   Eigen::Array<bool, Eigen::Dynamic, 1> on_frozen_steps_;             // parameters whose differences they serve
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> on_base_steps_;  // a free difference
+  // psi at h and -h on frozen and free steps, by the parameter and |h|.
+  std::map<std::pair<Index, double>, std::array<std::array<VectorXd, 2>, 2>> rungs_;
   MatrixXd jump_;  // of psi, between the steps of the base run and those chosen anew
   std::mt19937 generator_{options_.seed};
   GradientCheck result_;

@@ -20,6 +20,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -48,6 +49,12 @@ struct CheckThresholds {
   double continuous = 1e-6;
 };
 
+// Central differences (psi(h) - psi(-h))/(2 h) before extrapolation; NaN where they were not evaluated.
+struct LadderRung {
+  double h = 0;
+  double frozen = std::numeric_limits<double>::quiet_NaN(), free = std::numeric_limits<double>::quiet_NaN();
+};
+
 struct CheckedEntry {
   std::string objective, parameter;
   double tlm = 0, adjoint = 0;
@@ -59,6 +66,7 @@ struct CheckedEntry {
   Verdict exact = Verdict::disagrees;     // TLM against adjoint
   std::optional<Verdict> frozen_verdict;  // where steps can be frozen
   std::optional<Verdict> free_verdict;    // where free differences were asked for
+  std::vector<LadderRung> rungs;          // h falling
 };
 
 struct TaylorRow {

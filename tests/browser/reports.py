@@ -21,7 +21,7 @@ PROBLEMS = pathlib.Path(__file__).resolve().parents[2] / "problems"
 RUNS = [("simulate", "quarter_car/ride.json", True), ("kinematics", "four_bar/kinematics.json", True),
         ("linearise", "quarter_car/ride.json", False), ("gradient", "five_bar/sensitivities.json", False),
         ("check", "quarter_car/ride.json", False), ("design", "five_bar/design.json", True),
-        ("identify", "pendulum/identify.json", True), ("tradeoff --budget 0", "five_bar/design.json", False),
+        ("identify", "pendulum/identify.json", True), ("tradeoff --budget 2", "five_bar/design.json", False),
         ("sweep --vary k1=10:30:6 --vary c1=0:2:5", "five_bar/design.json", False)]
 LARGE = ("simulate", "quarter_car/ride.json", "--set", "simulation.output_step=0.00003")  # 100001 rows
 WIDTHS = (420, 1300)
@@ -40,12 +40,37 @@ const ink = canvas => {
 };
 (async () => {
   await wait(200);
+  const chosen = [...document.querySelectorAll("[data-keys]")];
+  found.choices = document.querySelectorAll("[data-choices]").length;
+  found.shown = chosen.filter(e => !e.hidden).length;
+  const hidden = chosen.filter(e => e.hidden);
+  for (const e of hidden) e.hidden = false;
+  await wait(100);
   for (const plot of document.querySelectorAll("figure[data-plot]")) {
     const svg = plot.querySelector("svg"), box = svg.querySelector(".catch").getBoundingClientRect();
     const at = {clientX: box.x + box.width / 2, clientY: box.y + box.height / 2, bubbles: true, pointerId: 1};
     svg.querySelector(".catch").dispatchEvent(new PointerEvent("pointermove", at));
     if (/=/.test(plot.querySelector(".readout").textContent)) found.plots += 1;
   }
+  for (const e of hidden) e.hidden = true;
+  await wait(100);
+  // Words of a drawing lie within it, and not on each other.
+  found.outside = 0, found.overlaps = [];
+  for (const svg of document.querySelectorAll("figure>svg, main>svg")) {
+    const frame = svg.getBoundingClientRect(), words = [...svg.querySelectorAll("text")].filter(e => e.textContent);
+    const boxes = words.map(e => e.getBoundingClientRect());
+    if (!frame.width) continue;
+    boxes.forEach((a, i) => {
+      if (a.left < frame.left - 1 || a.right > frame.right + 1) found.outside += 1;
+      boxes.slice(0, i).forEach((b, k) => {
+        const wide = Math.min(a.right, b.right) - Math.max(a.left, b.left);
+        const high = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+        if (wide > 1 && high > 4) found.overlaps.push(words[k].textContent + " and " + words[i].textContent);
+      });
+    });
+  }
+  // A plot in sight is as wide as its place: it neither scrolls nor is cut.
+  found.cut = [...document.querySelectorAll("figure")].filter(f => f.scrollWidth > f.clientWidth + 1).length;
   found.expected_plots = document.querySelectorAll("figure[data-plot]").length;
   const canvas = document.querySelector(".viewer canvas");
   if (canvas) {
@@ -147,6 +172,13 @@ def problems_of(found, console, moves, width):
         wrong.append("the mechanism is not drawn")
     if moves and not found.get("moved"):
         wrong.append("the slider does not move the mechanism")
+    if found["shown"] != found["choices"]:
+        wrong.append(f"{found['choices']} selectors show {found['shown']} parts")
+    if found["outside"]:
+        wrong.append(f"{found['outside']} words are outside their drawing")
+    wrong += [f"words lie on each other: {pair}" for pair in found["overlaps"]]
+    if found["cut"]:
+        wrong.append(f"{found['cut']} plots are wider than their place")
     if found["cells_outside"]:
         wrong.append(f"{found['cells_outside']} cells are cut in print")
     if found["overflow"] > 0:

@@ -17,7 +17,8 @@ class Comparison {
 
   show() {
     const [a, b] = this.selects.map(s => this.runs[s.value]);
-    const row = (tag, cells) => element("tr", {}, cells.map(([text, title]) => element(tag, title ? {title} : {}, [text])));
+    const cell = (tag, [text, title]) => element(tag, title ? {title} : {}, [text]);
+    const row = (tag, cells) => element("tr", {}, cells.map(c => cell(tag, c)));
     this.header.replaceChildren(row("th", [[""], [a.name], [b.name], ["difference [%]"]]));
     const number = v => typeof v == "number" ? [shown(v), String(v)] : ["-"];
     const names = new Set([...Object.keys(a.numbers), ...Object.keys(b.numbers)]);

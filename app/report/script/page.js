@@ -11,7 +11,9 @@ function element(tag, attributes = {}, children = [], namespace = null) {
   e.append(...children);
   return e;
 }
-const shown = (value, digits = 6) => value === null || value === undefined ? "-" : String(Number(value.toPrecision(digits)));
+function shown(value, digits = 6) {
+  return value === null || value === undefined ? "-" : String(Number(value.toPrecision(digits)));
+}
 
 // The instant that all plots over time and all mechanisms of the page show.
 const cursor = {t: null, listeners: [], set(t) { this.t = t; for (const f of this.listeners) f(t); }};

@@ -1,8 +1,8 @@
 // Draws parts of a mechanism on a canvas: bodies, springs, joints, ground, axes.
 
 class Symbols {
-  // Set by whoever draws: c, the context; colour(name); axes, rows to the right, up and towards the reader; scale [px/m];
-  // project(point) in pixels.
+  // Set by whoever draws: c, the context; colour(name); axes, rows to the right, up and towards the reader;
+  // scale [px/m]; project(point) in pixels.
 
   stroke(points, closed = false) {
     this.c.beginPath();
@@ -63,7 +63,8 @@ class Symbols {
   }
 
   draw_joint(s, poses, joint) {
-    const c = this.c, a = this.project(s.at(poses, joint.b1, joint.p1)), b = this.project(s.at(poses, joint.b2, joint.p2));
+    const c = this.c, spot = (b, p) => this.project(s.at(poses, b, p));
+    const a = spot(joint.b1, joint.p1), b = spot(joint.b2, joint.p2);
     c.strokeStyle = this.colour("ink"), c.fillStyle = this.colour("paper"), c.lineWidth = 1.4;
     if (joint.b1 < 0 || joint.b2 < 0) this.draw_ground(joint.b1 < 0 ? a : b);
     c.strokeStyle = this.colour("ink"), c.fillStyle = this.colour("paper");
@@ -75,7 +76,11 @@ class Symbols {
       c.save(), c.translate(p[0], p[1]), c.rotate(Math.atan2(flat[1], flat[0]));
       c.fillRect(-9, -5, 18, 10), c.strokeRect(-9, -5, 18, 10), c.restore();
     };
-    const line = (p, n) => this.stroke([[p[0] - n * flat[0], p[1] - n * flat[1]], [p[0] + n * flat[0], p[1] + n * flat[1]]]);
+    const line = (p, n) => this.stroke([-n, n].map(k => [p[0] + k * flat[0], p[1] + k * flat[1]]));
+    const cross = (p, n) => {
+      this.stroke([[p[0] - n, p[1]], [p[0] + n, p[1]]]);
+      this.stroke([[p[0], p[1] - n], [p[0], p[1] + n]]);
+    };
     switch (joint.type) {
       case "translational": line(b, 22), block(b); break;
       case "cylindrical": case "screw": line(b, 22), block(b), disc(b, 3); break;
@@ -83,7 +88,7 @@ class Symbols {
       case "fixed": c.fillStyle = this.colour("ink"), c.fillRect(b[0] - 4, b[1] - 4, 8, 8); break;
       case "distance": c.lineWidth = 2, this.stroke([a, b]), disc(a, 3.5), disc(b, 3.5); break;
       case "spherical": disc(b, 5), c.fillStyle = this.colour("ink"), disc(b, 2); break;
-      case "universal": disc(b, 5), this.stroke([[b[0] - 4, b[1]], [b[0] + 4, b[1]]]), this.stroke([[b[0], b[1] - 4], [b[0], b[1] + 4]]); break;
+      case "universal": disc(b, 5), cross(b, 4); break;
       case "planar": case "point_on_plane": disc(b, 3); break;
       case "perpendicular": break;
       default: if (length > 0.2) line(b, 12 * length); disc(b, 4);
@@ -98,25 +103,41 @@ class Symbols {
     for (const x of [-8, -2, 4, 10]) this.stroke([[p[0] + x, p[1] + 13], [p[0] + x - 4, p[1] + 18]]);
   }
 
+  // From a pixel along v [px]; one that is too short to see is left out.
+  draw_arrow(from, v, colour, name = "") {
+    const c = this.c, n = Math.hypot(v[0], v[1]);
+    if (n < 5) return;
+    const to = [from[0] + v[0], from[1] + v[1]], u = [v[0] / n, v[1] / n];
+    const barb = side => [to[0] - 6 * u[0] - 3 * side * u[1], to[1] - 6 * u[1] + 3 * side * u[0]];
+    c.strokeStyle = c.fillStyle = this.colour(colour), c.lineWidth = 1.6;
+    this.stroke([from, to]);
+    this.stroke([barb(1), to, barb(-1)]);
+    if (name) c.fillText(name, to[0] + 7 * u[0] - 3, to[1] + 10 * u[1] + 4);
+  }
+
+  // A direction of space in pixels.
+  flat(v) { return [dot(this.axes[0], v), -dot(this.axes[1], v)]; }
+
+  // Prescribed places are crosses, measured ones dots; the one of now is larger.
+  draw_target(places, now, measured) {
+    const c = this.c, at = places.map(p => this.project(p));
+    c.strokeStyle = c.fillStyle = this.colour(measured ? "c4" : "limit"), c.lineWidth = 1.4;
+    at.forEach((p, k) => {
+      const r = k == now ? 6 : 3.5;
+      if (measured) { c.beginPath(), c.arc(p[0], p[1], r / 1.8, 0, 7), c.fill(); return; }
+      this.stroke([[p[0] - r, p[1] - r], [p[0] + r, p[1] + r]]);
+      this.stroke([[p[0] - r, p[1] + r], [p[0] + r, p[1] - r]]);
+    });
+  }
+
   // Axes, gravity and a round length, in the corners.
   draw_frame(w, h) {
-    const c = this.c, colours = ["c1", "c2", "c0"];
-    const arrow = (from, v, colour, name) => {
-      const n = Math.hypot(v[0], v[1]);
-      if (n < 5) return;
-      const to = [from[0] + v[0], from[1] + v[1]], u = [v[0] / n, v[1] / n];
-      c.strokeStyle = c.fillStyle = this.colour(colour), c.lineWidth = 1.6;
-      this.stroke([from, to]);
-      this.stroke([[to[0] - 6 * u[0] - 3 * u[1], to[1] - 6 * u[1] + 3 * u[0]], to, [to[0] - 6 * u[0] + 3 * u[1], to[1] - 6 * u[1] - 3 * u[0]]]);
-      c.fillText(name, to[0] + 7 * u[0] - 3, to[1] + 10 * u[1] + 4);
-    };
-    for (let k = 0; k < 3; ++k) arrow([42, h - 42], [26 * this.axes[0][k], -26 * this.axes[1][k]], colours[k], "xyz"[k]);
-    const g = this.motion.gravity;
-    if (Math.hypot(...g) > 0) {
-      const u = unit(g);
-      arrow([w - 34, 24], [30 * dot(this.axes[0], u), -30 * dot(this.axes[1], u)], "soft", "g");
-    }
-    const raw = w / 8 / this.scale, power = 10 ** Math.floor(Math.log10(raw)), length = power * ([1, 2, 5].find(k => raw <= k * power) || 10);
+    const c = this.c, colours = ["c1", "c2", "c0"], g = this.motion.gravity;
+    for (let k = 0; k < 3; ++k)
+      this.draw_arrow([42, h - 42], [26 * this.axes[0][k], -26 * this.axes[1][k]], colours[k], "xyz"[k]);
+    if (Math.hypot(...g) > 0) this.draw_arrow([w - 34, 24], this.flat(unit(g)).map(v => 30 * v), "soft", "g");
+    const raw = w / 8 / this.scale, power = 10 ** Math.floor(Math.log10(raw));
+    const length = power * ([1, 2, 5].find(k => raw <= k * power) || 10);
     const right = w - 16, left = right - length * this.scale;
     c.strokeStyle = c.fillStyle = this.colour("soft"), c.lineWidth = 1.2;
     this.stroke([[left, h - 18], [left, h - 12], [right, h - 12], [right, h - 18]]);

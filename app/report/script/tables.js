@@ -3,7 +3,8 @@
 // Cells as CSV, with all their digits; RFC 4180 quotes.
 function csv_of(table) {
   const quoted = text => /[",\n]/.test(text) ? '"' + text.replaceAll('"', '""') + '"' : text;
-  return [...table.rows].map(row => [...row.cells].map(c => quoted(c.title || c.textContent)).join(",")).join("\n") + "\n";
+  const line = row => [...row.cells].map(c => quoted(c.title || c.textContent)).join(",");
+  return [...table.rows].map(line).join("\n") + "\n";
 }
 
 function copy(text) {

@@ -1,5 +1,7 @@
 // The mechanism that moves: its controls, the view, the order in which parts are drawn.
 
+const kArrow = 80;  // length of a large force [px]
+
 class Viewer extends Symbols {
   constructor(box, motion) {
     super();
@@ -48,11 +50,13 @@ class Viewer extends Symbols {
     this.loop = true, this.names = this.states[0].bodies.length <= 6;
     const first = element("div", {class: "controls"}, [
       this.play_button, this.slider, this.clock, speed, check("loop", true, on => this.loop = on)]);
-    const views = this.motion.planar ? [["flat", "plane"], ["iso", "isometric"]] : [["xy", "x-y"], ["xz", "x-z"], ["yz", "y-z"], ["iso", "isometric"]];
+    const principal = [["xy", "x-y"], ["xz", "x-z"], ["yz", "y-z"]];
+    const views = [...(this.motion.planar ? [["flat", "plane"]] : principal), ["iso", "isometric"]];
     const second = element("div", {class: "controls"}, [
       ...views.map(([key, text]) => button(text, "view: " + text, () => this.view(key))),
       button("\u2212", "zoom out", () => this.zoom(0.8)), button("+", "zoom in", () => this.zoom(1.25)),
-      button("fit", "fit into the frame", () => this.fit()), check("names", this.names, on => { this.names = on; this.draw(); })]);
+      button("fit", "fit into the frame", () => this.fit()),
+      check("names", this.names, on => { this.names = on; this.draw(); })]);
     const toggle = name => on => { on ? this.hidden.delete(name) : this.hidden.add(name); this.draw(); };
     for (const s of this.states) if (s.ghost) second.append(check(s.name, true, toggle("ghost " + s.name)));
     const traces = this.states.at(-1).traces.map(t => t.name);
@@ -60,6 +64,13 @@ class Viewer extends Symbols {
       if (k > 1) this.hidden.add("trace " + name);
       second.append(check("path of " + name, k < 2, toggle("trace " + name)));
     });
+    const last = this.states.at(-1), kinds = new Set(last.targets.map(t => t.measured ? "measured" : "targets"));
+    for (const kind of kinds) second.append(check(kind, true, toggle(kind)));
+    if (last.reactions) {
+      this.hidden.add("reactions");  // on demand
+      const name = `reactions (${kArrow} px: ${shown(last.reactions.large, 3)} N)`;
+      second.append(check(name, false, toggle("reactions")));
+    }
     return [first, second];
   }
 
@@ -72,9 +83,15 @@ class Viewer extends Symbols {
         const poses = s.poses(this.begin + (this.end - this.begin) * k / 40);
         s.bodies.forEach((b, i) => b.points.forEach(p => include(s.at(poses, i, p))));
         s.bodies.forEach((b, i) => b.shapes.forEach(shape => {
-          for (const end of [shape.from, shape.to]) for (const r of [-shape.radius, shape.radius]) include(s.at(poses, i, end).map(v => v + r));
+          for (const end of [shape.from, shape.to])
+            for (const r of [-shape.radius, shape.radius]) include(s.at(poses, i, end).map(v => v + r));
         }));
-        for (const j of [...s.joints, ...s.springs]) include(s.at(poses, j.b1, j.p1)), include(s.at(poses, j.b2, j.p2));
+        for (const j of [...s.joints, ...s.springs])
+          include(s.at(poses, j.b1, j.p1)), include(s.at(poses, j.b2, j.p2));
+      }
+      for (const target of s.targets) {
+        target.places = s.places(target);
+        target.places.forEach(include);
       }
     }
     this.low = low, this.high = high;
@@ -87,7 +104,8 @@ class Viewer extends Symbols {
     if (flat) {
       this.axes = [e[flat[0]], e[flat[1]], cross(e[flat[0]], e[flat[1]])];
     } else {  // from where the three axes look equally long; up is against gravity, or z
-      const up = Math.hypot(...g) > 0 ? unit(g.map(v => -v)) : e[2], k = up.map(Math.abs).indexOf(Math.max(...up.map(Math.abs)));
+      const up = Math.hypot(...g) > 0 ? unit(g.map(v => -v)) : e[2], size = up.map(Math.abs);
+      const k = size.indexOf(Math.max(...size));
       const out = unit(plus(plus(e[(k + 1) % 3], up), e[(k + 2) % 3])), right = unit(cross(up, out));
       this.axes = [right, cross(out, right), out];
     }
@@ -101,7 +119,11 @@ class Viewer extends Symbols {
   zoom(factor) { this.scale *= factor, this.pan = this.pan.map(v => v * factor); this.draw(); }
   turn(dx, dy) {
     const [right, up, out] = this.axes;
-    const about = (axis, v, a) => plus(plus(v.map(x => x * Math.cos(a)), cross(axis, v).map(x => x * Math.sin(a))), axis.map(x => x * dot(axis, v) * (1 - Math.cos(a))));
+    // Rodrigues' formula: v cos a + axis x v sin a + axis (axis.v) (1 - cos a)
+    const about = (axis, v, a) => {
+      const normal = cross(axis, v), along = dot(axis, v) * (1 - Math.cos(a));
+      return v.map((x, k) => x * Math.cos(a) + normal[k] * Math.sin(a) + axis[k] * along);
+    };
     this.axes = [right, up, out].map(v => about(right, about(up, v, -dx), -dy));
     this.draw();
   }
@@ -129,14 +151,19 @@ class Viewer extends Symbols {
         this.turn(dx * 0.008, dy * 0.008);
       }
     });
-    for (const end of ["pointerup", "pointercancel"]) this.canvas.addEventListener(end, e => { pointers.delete(e.pointerId); });
+    for (const end of ["pointerup", "pointercancel"])
+      this.canvas.addEventListener(end, e => { pointers.delete(e.pointerId); });
     this.canvas.addEventListener("contextmenu", e => e.preventDefault());
-    this.canvas.addEventListener("wheel", e => { e.preventDefault(); this.zoom(Math.exp(-e.deltaY * 0.0015)); }, {passive: false});
+    const wheel = e => { e.preventDefault(); this.zoom(Math.exp(-e.deltaY * 0.0015)); };
+    this.canvas.addEventListener("wheel", wheel, {passive: false});
     this.canvas.onkeydown = e => {
       const step = (this.end - this.begin) / 100, to = t => cursor.set(Math.min(Math.max(t, this.begin), this.end));
-      const action = {" ": () => this.play(!this.playing), ArrowLeft: () => to(this.t - step), ArrowRight: () => to(this.t + step),
-                      ArrowUp: () => this.turn(0, 0.1), ArrowDown: () => this.turn(0, -0.1), Home: () => to(this.begin), End: () => to(this.end),
-                      "+": () => this.zoom(1.25), "-": () => this.zoom(0.8), "0": () => this.fit()}[e.key];
+      const action = {
+        " ": () => this.play(!this.playing), Home: () => to(this.begin), End: () => to(this.end),
+        ArrowLeft: () => to(this.t - step), ArrowRight: () => to(this.t + step),
+        ArrowUp: () => this.turn(0, 0.1), ArrowDown: () => this.turn(0, -0.1),
+        "+": () => this.zoom(1.25), "-": () => this.zoom(0.8), "0": () => this.fit(),
+      }[e.key];
       if (action) e.preventDefault(), action();
     };
   }
@@ -167,12 +194,14 @@ class Viewer extends Symbols {
     const c = this.c = this.canvas.getContext("2d"), style = getComputedStyle(document.documentElement);
     this.colour = name => style.getPropertyValue("--" + name);
     if (this.scale === null) {  // the projected box fills most of the frame
-      const half = k => [0, 1, 2].reduce((sum, i) => sum + Math.abs(this.axes[k][i]) * (this.high[i] - this.low[i]) / 2, 0);
+      const share = (k, i) => Math.abs(this.axes[k][i]) * (this.high[i] - this.low[i]) / 2;
+      const half = k => share(k, 0) + share(k, 1) + share(k, 2);
       this.scale = Math.min((w / 2 - 40) / Math.max(half(0), 1e-9), (h / 2 - 45) / Math.max(half(1), 1e-9));
     }
     this.project = p => {
       const d = p.map((v, k) => v - this.target[k]);
-      return [w / 2 + this.pan[0] + this.scale * dot(this.axes[0], d), h / 2 + this.pan[1] - this.scale * dot(this.axes[1], d), dot(this.axes[2], d)];
+      const [right, up, out] = this.axes.map(axis => dot(axis, d));
+      return [w / 2 + this.pan[0] + this.scale * right, h / 2 + this.pan[1] - this.scale * up, out];
     };
     c.setTransform(ratio, 0, 0, ratio, 0, 0);
     c.clearRect(0, 0, w, h);
@@ -180,7 +209,8 @@ class Viewer extends Symbols {
     for (const s of this.states) if (!this.hidden.has("ghost " + s.name)) this.draw_state(s);
     this.draw_frame(w, h);
     this.clock.textContent = "t = " + this.t.toPrecision(4) + " s";
-    if (document.activeElement != this.slider) this.slider.value = 1000 * (this.t - this.begin) / (this.end - this.begin || 1);
+    if (document.activeElement != this.slider)
+      this.slider.value = 1000 * (this.t - this.begin) / (this.end - this.begin || 1);
   }
 
   draw_state(s) {
@@ -194,11 +224,15 @@ class Viewer extends Symbols {
     bodies.sort((a, b) => depth(a) - depth(b));  // what is nearer is drawn later
     for (const {body, i, points} of bodies) {
       c.strokeStyle = c.fillStyle = this.colour("c" + i % 8);
-      if (body.shapes.length) body.shapes.forEach(shape => this.draw_shape(shape, spot(i, shape.from), spot(i, shape.to)));
-      else this.draw_hull(hull_of(points));
+      if (!body.shapes.length) this.draw_hull(hull_of(points));
+      for (const shape of body.shapes) this.draw_shape(shape, spot(i, shape.from), spot(i, shape.to));
     }
     c.setLineDash([]);
     for (const joint of s.joints) this.draw_joint(s, poses, joint);
+    for (const target of s.targets)
+      if (!this.hidden.has(target.measured ? "measured" : "targets"))
+        this.draw_target(target.places, nearest(target.t, this.t), target.measured);
+    if (s.reactions && !this.hidden.has("reactions")) this.draw_reactions(s, spot);
     if (this.names && !s.ghost) {
       c.fillStyle = this.colour("ink");
       const taken = [];
@@ -215,10 +249,20 @@ class Viewer extends Symbols {
     c.globalAlpha = 1;
   }
 
+  // The force on the second body of each joint; one that is much larger than most is cut at twice their length.
+  draw_reactions(s, spot) {
+    for (const joint of s.reactions.joints) {
+      const force = s.reaction(joint, this.t), size = Math.hypot(...force) / s.reactions.large;
+      const v = this.flat(unit(force)).map(x => kArrow * Math.min(size, 2) * x);
+      if (v.every(isFinite)) this.draw_arrow(spot(joint.b, joint.p), v, "limit");
+    }
+  }
+
   draw_trace(s, trace, k) {
     const c = this.c, alpha = c.globalAlpha, path = [], past = [];
     const stride = Math.max(1, Math.floor(s.t.length / 400));
-    trace.path = trace.path || s.t.filter((t, i) => i % stride == 0 || i == s.t.length - 1).map(t => [t, s.at(s.poses(t), trace.b, trace.p)]);
+    const times = s.t.filter((t, i) => i % stride == 0 || i == s.t.length - 1);
+    trace.path = trace.path || times.map(t => [t, s.at(s.poses(t), trace.b, trace.p)]);
     for (const [t, p] of trace.path) path.push(this.project(p)), t <= this.t && past.push(path.at(-1));
     c.strokeStyle = this.colour("c" + (k + 1) % 8), c.lineWidth = 1;
     c.globalAlpha = alpha * 0.4, this.stroke(path), c.globalAlpha = alpha, c.lineWidth = 1.8;

@@ -47,6 +47,25 @@ TEST_CASE("a cell shows rounded numbers and holds all their digits", "[report]")
   CHECK_THAT(page.text(), Contains("<td title=\"1.2345678901234567\">1.23</td>") && Contains("<td>2</td>"));
 }
 
+TEST_CASE("parts of a page that selectors choose hold their keys and their place for links", "[report]") {
+  HtmlPage page("p");
+  page.begin_choices({"objective", "parameter"});
+  page.begin_choice({"path", "\"k\""}, "ladder-0-0");
+  page.end_choice(), page.end_choices();
+  CHECK_THAT(page.text(), Contains("data-choices=\"[&quot;objective&quot;,&quot;parameter&quot;]\"") &&
+                              Contains(" id=\"ladder-0-0\">"));
+}
+
+TEST_CASE("an instant is a line across a plot, with its name", "[report]") {
+  LinePlot plot = line("y", {0, 2, 0});
+  plot.instants = {{"singular", 0.25}, {"outside", 2}};
+  CHECK_THAT(to_svg(plot), Contains("class=\"limit dashed\" d=\"M234.0 26v250\"") && Contains(">singular</text>") &&
+                               !Contains("outside"));
+  HtmlPage page("p");
+  page.plot(plot);
+  CHECK(data_of(page.text()).at("plots")[0].at("instants")[0] == nlohmann::json({{"name", "singular"}, {"x", 0.25}}));
+}
+
 TEST_CASE("headings make the contents of the page", "[report]") {
   HtmlPage page("p");
   page.heading("a < b");
@@ -71,5 +90,5 @@ TEST_CASE("bars of a row plot begin at zero and end at their values, within its 
   plot.rows.push_back({.name = "k", .low = 0, .high = 0.5, .words = "0.5"});
   plot.rows.push_back({.name = "far", .low = 0, .high = 5, .words = "5"});
   // 420 px from -1 to 1, from 150 px on.
-  CHECK_THAT(to_svg(plot), Contains("M360.0 47.0H465.0") && Contains("M360.0 73.0H570.0"));
+  CHECK_THAT(to_svg(plot), Contains("M360.0 21.0H465.0") && Contains("M360.0 47.0H570.0"));
 }

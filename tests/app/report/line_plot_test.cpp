@@ -90,13 +90,23 @@ TEST_CASE("thinning a long record keeps its highest and lowest value", "[report]
   plot.series.push_back(series);
   const std::string svg = to_svg(plot);
   CHECK(svg.size() < 100'000);
-  // The range is [-1, 10] with 5 % of air: the spike is drawn at 30 + 0.55/12.1 * 246 px.
-  CHECK(svg.find(" 41.2") != std::string::npos);
+  // The range is [-1, 10] with 5 % of air: the spike is drawn at 26 + 0.55/12.1 * 250 px.
+  CHECK(svg.find(" 37.4") != std::string::npos);
+}
+
+TEST_CASE("the frame cuts no point", "[report]") {
+  LinePlot plot{.title = "", .x_label = "", .y_label = ""};
+  plot.series.push_back({"measured", {0, 1}, {0, 1}, Mark::points});
+  const std::string svg = to_svg(plot);
+  std::smatch found;
+  REQUIRE(std::regex_search(svg, found, std::regex("d=\"M([0-9.]+) [0-9.]+h0M([0-9.]+) [0-9.]+h0\"")));
+  CHECK(std::stod(found[1]) > 66 + 4);        // the frame begins at 66 px, a point has a radius of 1.5 px
+  CHECK(std::stod(found[2]) < 760 - 16 - 4);  // and ends there
 }
 
 TEST_CASE("a constant, an empty and a logarithmic series are drawn", "[report]") {
   LinePlot plot{.title = "flat", .x_label = "t", .y_label = "y"};
-  CHECK(to_svg(plot).find("<svg") == 0);
+  CHECK(to_svg(plot).find("<svg") != std::string::npos);
   plot.series.push_back({"flat", {0, 1}, {3, 3}, Mark::line});
   CHECK(to_svg(plot).find("nan") == std::string::npos);
   plot.logarithmic_y = true;

@@ -37,6 +37,34 @@ TEST_CASE("a motion holds what moves as arrays and what rests as numbers", "[rep
   CHECK(state.at("joints")[0].at("b1") == -1);
 }
 
+TEST_CASE("a motion holds what its points should follow and the forces of its joints", "[report]") {
+  Scene scene = pendulum();
+  Sensor x;
+  x.name = "x", x.quantity = "position", x.body = scene.bodies[0].name, x.point = VectorField{1.0, 0.0, 0.0};
+  x.component = "x";
+  Sensor y = x;
+  y.name = "y", y.component = "y";
+  scene.sensors = {x, y};
+  const std::vector<PointTarget> targets =
+      point_targets(scene, {{"x", {0, 0.5}, {1, 2}}, {"y", {0, 0.5}, {3, 4}}, {"no sensor", {0}, {1}}}, false);
+  REQUIRE(targets.size() == 1);
+  const Trajectory swing{{}, {bar_turned(0, 0), bar_turned(1, 0.4)}};
+  const std::string joint = scene.joints[0].name;
+  const Trajectory forces{{"t", joint + ".x", joint + ".y", joint + ".z"}, {{0, 3, 4, 0}, {1, 0, 1, 0}}};
+  PageArrays arrays;
+  const auto motion =
+      nlohmann::json::parse(motion_scene(arrays, {0, 1}, {{"bar", scene, swing, false, targets, forces}}));
+  const auto all = nlohmann::json::parse(arrays.text());
+  const auto& state = motion.at("states")[0];
+  const auto& target = state.at("targets")[0];
+  CHECK(target.at("b") == 0);
+  CHECK(all[target.at("place")[0].get<std::size_t>()] == nlohmann::json({1, 2}));
+  CHECK(all[target.at("place")[1].get<std::size_t>()] == nlohmann::json({3, 4}));
+  CHECK(target.at("place")[2].is_null());
+  CHECK(state.at("reactions").at("large") == 5);
+  CHECK(all[state.at("reactions").at("joints")[0].at("force")[1].get<std::size_t>()] == nlohmann::json({4, 1}));
+}
+
 TEST_CASE("a motion out of its plane is not planar, one without two rows or with infinite poses is none", "[report]") {
   const Scene scene = pendulum();
   PageArrays arrays;
