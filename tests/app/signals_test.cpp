@@ -93,6 +93,33 @@ TEST_CASE("a measured torque as a signal equals the displacement of a driven sli
   CHECK(apart < 1e-9);
 }
 
+TEST_CASE("delays that cases and experiments move are judged at the place that moves them", "[signals][cases]") {
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("log.csv")) << "t,tau\n0,1\n1,2\n2,3\n";
+  std::ofstream(folder.file("angle.csv")) << "t,theta\n0,0\n0.5,0.1\n1,0.2\n";
+  const auto error = [&](const std::string& how, const std::string& more, const std::string& command) {
+    const std::string problem =
+        R"("parameters": {"d": 0.1, "late": 0}, "objectives": {"o": {"running": "theta^2"}}, )" + more + ", " +
+        signal_of("log.csv", R"("column": "tau", "delay": "late", "interpolation": ")" + how + "\"");
+    const CommandOutcome outcome = run_text(folder, arm("d*tau", problem), "wrong", "2", command);
+    CHECK(outcome.exit_code == kBadInput);
+    return outcome.err;
+  };
+  const std::string design = R"("design": {"minimize": "o", "variables": ["d"]}, )";
+  CHECK_THAT(
+      error("hold", design + R"("cases": [{"name": "later", "overrides": {"late": "2*d"}}])", "design"),
+      Contains("wrong.json:") && Contains("cases[0].overrides.late: the delay of the signal 'tau' depends on 'd', "
+                                          "which is varied in the case 'later', and hold jumps"));
+  CHECK_THAT(
+      error("linear", design + R"("cases": [{"name": "later", "overrides": {"late": 0.5}}])", "design"),
+      Contains("cases[0].overrides.late: signal 'tau': its samples cover 0.5 s to 2.5 s, the simulation 0 s to 2 s"));
+  CHECK_THAT(
+      error("hold", R"("identification": {"variables": ["d"], "experiments": [{"name": "run", "data": "angle.csv",
+                   "end_time": 1, "channels": [{"column": "theta", "sensor": "theta"}], "free": ["late"]}]})",
+            "identify"),
+      Contains("signals.tau.delay: depends on 'late', which is varied in the experiment 'run', and hold jumps"));
+}
+
 TEST_CASE("a pendulum's motor: torque sensor, friction curve and inertia come from two logged runs",
           "[gallery][identification]") {
   const TemporaryFolder folder;
