@@ -10,6 +10,7 @@
 #include "core/dynamics/spatial_dynamics.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
+#include "core/start/free_motion.hpp"
 
 namespace mbsopt {
 namespace {
@@ -89,7 +90,7 @@ bool is_solved(const Mechanism& mechanism, const SimulationSettings& settings, c
   if (settings.solve == Solve::kinematics && (!reason.empty() || free > 0)) {
     throw std::invalid_argument(fmt::format(
         "simulation.solve: cannot be \"kinematics\": {}",
-        !reason.empty() ? reason : fmt::format("the drives leave {} degree{} of freedom", free, free == 1 ? "" : "s")));
+        !reason.empty() ? reason : "the drives leave " + freedoms_in_words(mechanism, start, settings.start_time)));
   }
   return reason.empty() && start.result().ok && free == 0;
 }

@@ -45,6 +45,7 @@ double Curve::at(double x, int order) const {
 }
 
 double Curve::change_at(std::size_t i) const {
+  if (spline_) return i == 0 || i + 1 >= x().size() ? 0 : at(x()[i], 3) - at(x()[i - 1], 3);
   if (how_ == Interpolation::hold) return i == 0 ? 0 : y_[i] - y_[i - 1];
   return i == 0 || i + 1 >= x_.size() ? 0 : slope(i) - slope(i - 1);
 }

@@ -29,7 +29,7 @@ class Curve {
   Interpolation interpolation() const { return how_; }
   const std::vector<double>& x() const { return spline_ ? spline_->times() : x_; }
   const std::vector<double>& y() const { return spline_ ? spline_->values() : y_; }
-  // The value (hold) or the slope (linear) changes by this at sample i.
+  // The value (hold), the slope (linear) or the third derivative (spline) changes by this at sample i.
   double change_at(std::size_t i) const;
 
  private:

@@ -11,6 +11,7 @@
 
 #include "core/expression/did_you_mean.hpp"
 #include "core/expression/program.hpp"
+#include "core/expression/sampled_functions.hpp"
 #include "core/expression/syntax_tree.hpp"
 
 namespace mbsopt {
@@ -29,7 +30,8 @@ class ProgramBuilder {
   // The derivative of another program in one of its inputs, by the chain rule applied to each instruction.
   void build_derivative(const Program& of, int input);
 
-  static std::vector<Program> switches_of(const Program& program);  // program_switches.hpp
+  static std::vector<Program> switches_of(const Program& program);                   // program_switches.hpp
+  static std::vector<SampledFunction> sampled_functions_of(const Program& program);  // sampled_functions.hpp
   // Of two instructions of another program: the first (how: name), its cosine (cos) or their difference (subtract).
   void build_switch(const Program& of, Operation how, int a, int b);
 

@@ -44,7 +44,7 @@ void ForwardRun::go(std::span<const double> observed,
                     const Follow& follow) {
   if (!result_.ok()) return;
   SampleSchedule schedule(costs_, observed, settings_.end_time);
-  RungeKuttaRun run(mechanism_, settings_, method_);
+  RungeKuttaRun run(mechanism_, settings_, method_, costs_);
   Eigen::VectorXd y(mechanism_.states());
   bool followed = true;
   QuadratureWatch watch(method_, costs_, motion());

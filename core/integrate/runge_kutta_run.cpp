@@ -10,6 +10,7 @@
 #include "core/integrate/model_choice.hpp"
 #include "core/mechanism/joint_graph.hpp"
 #include "core/mechanism/planar_model.hpp"
+#include "core/run/kinks.hpp"
 #include "core/sensor/body_at.hpp"
 #include "core/step/event_times.hpp"
 #include "core/step/kink_times.hpp"
@@ -26,10 +27,12 @@ constexpr double kPartsOfPlaced = 1000;  // of rounded_step(): a thousandth move
 
 }  // namespace
 
-RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method)
+RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
+                             std::span<const Cost> costs)
     : mechanism_(mechanism),
       settings_(settings),
       rk_(method),
+      kinks_(kinks_of(mechanism, costs)),
       tolerances_(mechanism.data(), settings.integrator),
       dynamics_(mechanism, settings.formulation, model_of(mechanism, settings, method)),
       projector_(make_projector(mechanism, settings.formulation.projection, model_of(mechanism, settings, method))),
@@ -283,8 +286,8 @@ void RungeKuttaRun::run(const Eigen::VectorXd& y_initial, const Eigen::VectorXd&
                 .controller = StepController(rk_.error_order, s.options),
                 .stiffness = StiffnessWatch(rk_, mechanism_.states()),
                 .events = EventTimes(settings_.events, settings_.start_time, settings_.end_time),
-                .kinks = KinkControl(options.frozen ? std::vector<KinkedSignal>() : mechanism_.data().kinks,
-                                     settings_.start_time, settings_.end_time)};
+                .kinks = KinkControl(options.frozen ? std::vector<KinkedSignal>() : kinks_, settings_.start_time,
+                                     settings_.end_time)};
   if (!begin(y_initial, angles, course)) return;
   choose_first_size(course);
   while (course.goes_on(step_.t)) {

@@ -4,8 +4,12 @@
 #pragma once
 
 #include <functional>
+#include <span>
+#include <vector>
 
 #include "core/dynamics/dynamics.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/run/cost.hpp"
 #include "core/run/simulation_result.hpp"
 #include "core/scene/settings.hpp"
 #include "core/step/component_tolerances.hpp"
@@ -21,7 +25,9 @@ class Mechanism;
 
 class RungeKuttaRun {
  public:
-  RungeKuttaRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method);
+  // Steps end at the kinks of the mechanism's laws and of the costs.
+  RungeKuttaRun(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
+                std::span<const Cost> costs = {});
 
   using Sink = std::function<void(const Step&)>;
   // wants_dense(t1): whether a step that ends at t1 needs dense output. Fills status, statistics, steps, y_end.
@@ -68,6 +74,7 @@ class RungeKuttaRun {
   const Mechanism mechanism_;
   SimulationSettings settings_;
   const Method& rk_;
+  const std::vector<KinkedSignal> kinks_;
   const ComponentTolerances tolerances_;
   Dynamics dynamics_;
   std::optional<ImplicitStages> implicit_;

@@ -1,5 +1,6 @@
 // Drives: a coordinate, distance, angle or displacement that follows a law of time, one row of Phi each.
 #include "core/mechanism/compilation.hpp"
+#include "core/mechanism/kinks_in_time.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/signals.hpp"
 
@@ -64,6 +65,7 @@ TimeLaw law_of(Compilation& model, const Drive& drive, const std::string& where)
     const Expression of_t = drive.samples ? expression_of(*drive.samples, "samples") : drive.law;
     const Program f(of_t, symbols), f_t = f.derivative(t), f_tt = f_t.derivative(t);
     law.programs = {f, f_t, f_tt};
+    add_kinks_in_time(f_tt, t, model.data.rho, model.data.kinks);
   } catch (const UnknownName& e) {
     throw SceneError(where + ".law: " + e.what());
   }

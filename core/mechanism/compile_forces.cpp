@@ -3,6 +3,7 @@
 #include <set>
 
 #include "core/mechanism/compilation.hpp"
+#include "core/mechanism/kinks_in_time.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/scene/scene_facts.hpp"
 #include "core/scene/type_table.hpp"
@@ -23,6 +24,7 @@ Law law(Compilation& model, const std::optional<Expression>& expression, const s
       throw SceneError(where + ".law: " + e.what());
     }
     model.data.largest_law = std::max(model.data.largest_law, symbols.inputs());
+    add_kinks_in_time(*result.program, symbols.input("t"), model.data.rho, model.data.kinks);
     return result;
   }
   const DualVector<4> x = model.fields.values(coefficients, where);
@@ -58,8 +60,7 @@ void add(Compilation& model, const Torsional& f, int force, const std::string& w
 }
 
 // The components' inputs: all parameters, t, all sensors; what is used of them is listed.
-void set_components(const Compilation& model, const LawVector& components, AppliedForce& out,
-                    const std::string& where) {
+void set_components(Compilation& model, const LawVector& components, AppliedForce& out, const std::string& where) {
   Symbols symbols = model.fields.symbols();
   add_time_and_sensors(symbols, model.scene);
   const int t = symbols.input("t");
@@ -72,6 +73,7 @@ void set_components(const Compilation& model, const LawVector& components, Appli
     }
     const std::vector<int>& inputs = out.components[i].used_inputs();
     used.insert(inputs.begin(), inputs.end());
+    add_kinks_in_time(out.components[i], t, model.data.rho, model.data.kinks);
   }
   for (const int input : used) {
     if (input < t) out.parameters.push_back(input);

@@ -13,12 +13,13 @@ void compile_signals(Compilation& model) {
     const Dual delay = model.fields.value(signal.delay, where + ".delay");
     if (const auto why = uncovered(covered_by(*signal.curve, delay.value()), s.start_time, s.end_time))
       throw SceneError(where + ": " + *why);
-    if (signal.interpolation == Interpolation::spline) continue;
     if (signal.interpolation == Interpolation::hold && !delay.derivatives().isZero(0))
       throw SceneError(where + ".delay: '" + signal.delay.text() +
                        "' depends on a parameter that is varied, and hold jumps at times that move with it: its "
                        "derivative has no value; take \"interpolation\": \"linear\" or \"spline\"");
-    model.data.kinks.push_back({signal.curve, delay.value()});
+    KinkedSignal kinks{signal.curve, delay.value(), {}, signal.curve->degree()};
+    if (kinks.order <= 1) kinks.moved_by = Program(signal.delay, model.fields.symbols()).used_inputs();
+    model.data.kinks.push_back(std::move(kinks));
   }
 }
 

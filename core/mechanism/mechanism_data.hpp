@@ -50,9 +50,12 @@ struct ConditionData {
   std::string unit, rate_unit;  // " rad", " rad/s"; empty for a number
 };
 
-struct KinkedSignal {  // jumps or kinks at its samples, later by the delay
+struct KinkedSignal {  // a derivative jumps at its samples, later by the delay
   std::shared_ptr<const Curve> curve;
   double delay = 0;
+  std::vector<int>
+      moved_by;   // parameters that move jumps and kinks; not those of higher derivatives, which matter less
+  int order = 0;  // of that derivative: 0 of hold, 1 of linear, 3 of spline, less of their derivatives
 };
 
 struct UserForceData {
@@ -85,7 +88,7 @@ struct MechanismData {
   std::vector<std::string> sensor_names;
   std::vector<ConditionData> conditions;
   std::vector<std::string> body_names, joint_names, drive_names;  // body_names[0] = "ground"
-  std::vector<KinkedSignal> kinks;                                // of signals that are not smooth
+  std::vector<KinkedSignal> kinks;                                // of signals and laws
   int largest_law = 0;                                            // inputs of the largest law, for scratch
 
   std::shared_ptr<const PlanarModel> planar;  // where joints hold all bodies in a plane

@@ -22,19 +22,6 @@ void add_signals(Symbols& symbols, const Scene& scene) {
       symbols.add_definition(signal.name, expression_of(signal));
 }
 
-std::vector<bool> parameters_that_move_kinks(const Scene& scene) {
-  Symbols symbols;
-  for (const Parameter& p : scene.parameters) symbols.add_input(p.name);
-  for (const Definition& d : scene.definitions) symbols.add_definition(d.name, d.value);
-  std::vector<bool> moves(scene.parameters.size(), false);
-  for (const Signal& signal : scene.signals) {
-    if (signal.interpolation == Interpolation::spline) continue;
-    const Program delay(signal.delay, symbols);
-    for (const int input : delay.used_inputs()) moves[static_cast<std::size_t>(input)] = true;
-  }
-  return moves;
-}
-
 Covered covered_by(const Curve& samples, double delay) {
   const std::vector<double>& t = samples.x();
   const double beyond = samples.interpolation() == Interpolation::hold ? t.back() - t[t.size() - 2] : 0;

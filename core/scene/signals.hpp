@@ -19,9 +19,6 @@ Expression expression_of(const Signal& signal);
 // Adds all signals as definitions, which need an input "t".
 void add_signals(Symbols& symbols, const Scene& scene);
 
-// The parameters that move jumps or kinks of signals, and with these the ends of steps: those of their delays.
-std::vector<bool> parameters_that_move_kinks(const Scene& scene);
-
 // The span of time that samples cover, later by delay. The last value of hold counts for one more interval.  [s]
 struct Covered {
   double first = 0, last = 0;

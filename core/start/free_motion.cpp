@@ -24,6 +24,7 @@
 #include <numeric>
 
 #include "core/dynamics/constraint_rows.hpp"
+#include "core/expression/counted.hpp"
 #include "core/linear/dense.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/start/assembly_equations.hpp"
@@ -325,6 +326,13 @@ std::vector<std::string> free_motions(const Mechanism& mechanism, const Assembly
   std::vector<std::string> all = at_start.freedoms == near_by.freedoms ? at_start.alone : near_by.alone;
   all.insert(all.end(), near_by.together.begin(), near_by.together.end());
   return all;
+}
+
+std::string freedoms_in_words(const Mechanism& mechanism, const Assembly& assembly, double start_time) {
+  const int freedoms = assembly.summary().degrees_of_freedom;
+  const std::vector<std::string> motions = free_motions(mechanism, assembly, start_time, freedoms);
+  return fmt::format("{}{}{}", counted(freedoms, "degree of freedom", "degrees of freedom"),
+                     motions.empty() ? "" : ": ", fmt::join(motions, "; "));
 }
 
 std::vector<std::string> motions_forbidden_twice(const Mechanism& mechanism, const Assembly& assembly) {

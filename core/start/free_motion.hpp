@@ -17,6 +17,9 @@ namespace mbsopt {
 std::vector<std::string> free_motions(const Mechanism& mechanism, const Assembly& assembly, double start_time,
                                       int degrees_of_freedom);
 
+// "1 degree of freedom: 'coupler' turns about ..."; the number alone where the motion cannot be told.
+std::string freedoms_in_words(const Mechanism& mechanism, const Assembly& assembly, double start_time);
+
 // The motions that redundant equations forbid a second time, a sentence per joint:
 //
 //   joint 'D' forbids again that 'rocker_bar' slides along [0, 0, 1], turns about every axis normal to [0, 0, 1]

@@ -11,6 +11,7 @@
 #include "core/dynamics/spatial_dynamics.hpp"
 #include "core/linear/dense.hpp"
 #include "core/start/driven_path.hpp"
+#include "core/start/free_motion.hpp"
 
 namespace mbsopt {
 namespace {
@@ -231,9 +232,10 @@ KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& st
   Kinematics k(mechanism, settings.formulation);
   k.start(times.front(), start.result().y, start.result().angles);
   if (freedoms > 0 && k.rank_here().rank_lost > 0) {
-    result.message = "the drives leave " + std::to_string(freedoms) + (freedoms == 1 ? " degree" : " degrees") +
-                     " of freedom at the start; kinematics needs all of them driven, by drives or by a condition on a "
-                     "sensor (initial.conditions) for each. If the start is a singular position, begin beside it";
+    result.message = fmt::format(
+        "the drives leave {}. Kinematics needs every motion driven, by drives or by a condition on a sensor "
+        "(initial.conditions) for each. If the start is a singular position, begin beside it",
+        freedoms_in_words(mechanism, start, times.front()));
     return result;
   }
   const auto stopped = [&] {

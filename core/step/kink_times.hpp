@@ -1,10 +1,13 @@
-// Times at which signals jump (hold) or have kinks (linear), and how steps meet them.
+// Times at which signals jump (hold) or have kinks (linear), or their third derivative jumps (spline), and how steps
+// meet them.
 //
 // A step across a kink loses the order of its method, so the step ends there and the next begins there, a few roundings
 // apart (event_times.hpp). Many kinks are smaller than the tolerance, and a step for each would cost more than it
 // gains. So two sizes are controlled: h of steps without kinks inside, and `across` of steps with kinks inside, whose
-// error behaves as h^2. A step crosses kinks where `across` reaches over at least two intervals; it ends at a kink,
-// too, so that as few as possible lie inside. Each step that ends at the next kink lets `across` grow again.
+// error behaves as h^2, of splines as h^4. A step crosses kinks where `across` reaches over at least two intervals; it
+// ends at a kink, too, so that as few as possible lie inside. Each step that ends at the next kink lets `across` grow
+// again. Knots of splines alone are met only where `across` is shorter than h, and not by fixed steps: they are much
+// smoother. Beside jumps and kinks they are left out.
 #pragma once
 
 #include <algorithm>
@@ -64,7 +67,8 @@ class KinkTimes {
 
   // Changes below the rounding of samples are none: held values that repeat, samples on one line.
   static double significant_change(const Curve& curve) {
-    constexpr double kDigits = 1e-9;  // more digits than loggers write
+    if (curve.interpolation() == Interpolation::spline) return 0;  // `across` finds what matters
+    constexpr double kDigits = 1e-9;                               // more digits than loggers write
     const auto [low, high] = std::minmax_element(curve.y().begin(), curve.y().end());
     const double size = std::max(std::abs(*low), std::abs(*high));
     const double span = curve.x().back() - curve.x().front();
@@ -77,14 +81,22 @@ class KinkTimes {
 
 class KinkControl {
  public:
-  KinkControl(const std::vector<KinkedSignal>& signals, double start, double end) : kinks_(signals, start, end) {}
+  KinkControl(const std::vector<KinkedSignal>& signals, double start, double end)
+      : smooth_(std::none_of(signals.begin(), signals.end(), is_sharp)),
+        root_(root_of(signals)),
+        kinks_(sharpest(signals, smooth_), start, end) {}
 
   // The size of the step at t, of which h is proposed; fixed: steps that no error controls.
   double choose(double t, double h, bool fixed) {
     state_ = State::clear;
     if (!kinks_.any()) return h;
     const double next = kinks_.first_after(t);
-    if (t + h < next - 1.5 * kinks_.gap()) return h;
+    if (t + h < next - 1.5 * kinks_.gap() || (smooth_ && fixed)) return h;
+    if (smooth_ && !limits(h)) {
+      state_ = State::crosses;
+      kink_ = std::numeric_limits<double>::infinity();
+      return h;
+    }
     const double reach = fixed ? h : std::min(h, across_);
     const double last = reach >= 2 * (next - t) ? kinks_.last_until(t + reach) : next;
     state_ = last > next ? State::crosses : State::meets;
@@ -113,10 +125,24 @@ class KinkControl {
   static constexpr double kSmallError = 1e-6;  // allows more than kMost
   static constexpr double kShrunk = 0.9;       // after a rejection at most
   static constexpr double kRecovery = 1.1;     // of two intervals down to half of one: 15 steps until the next try
-  static double factor(double error, double most) {
-    return std::isfinite(error) ? std::clamp(0.9 / std::sqrt(std::max(error, kSmallError)), kLeast, most) : kLeast;
+  double factor(double error, double most) const {
+    return std::isfinite(error) ? std::clamp(0.9 / std::pow(std::max(error, kSmallError), root_), kLeast, most)
+                                : kLeast;
   }
 
+  static bool is_sharp(const KinkedSignal& signal) { return signal.curve->interpolation() != Interpolation::spline; }
+  static std::vector<KinkedSignal> sharpest(std::vector<KinkedSignal> signals, bool smooth) {
+    if (!smooth) std::erase_if(signals, [](const KinkedSignal& signal) { return !is_sharp(signal); });
+    return signals;
+  }
+  static double root_of(const std::vector<KinkedSignal>& signals) {
+    int order = 3;
+    for (const KinkedSignal& signal : signals) order = std::min(order, std::max(1, signal.order));
+    return 1.0 / (order + 1);
+  }
+
+  bool smooth_;
+  double root_;
   KinkTimes kinks_;
   State state_ = State::clear;
   double kink_ = 0;

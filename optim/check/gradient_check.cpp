@@ -9,9 +9,10 @@
 #include <map>
 #include <optional>
 #include <random>
+#include <set>
 
 #include "core/cvodes/cvodes.hpp"
-#include "core/scene/signals.hpp"
+#include "core/run/kinks.hpp"
 #include "optim/check/user_terms.hpp"
 #include "optim/differences/difference_ladder.hpp"
 #include "optim/machine/median.hpp"
@@ -113,19 +114,24 @@ class Check {
     return true;
   }
 
-  // Steps that end at kinks of a signal lose them as its delay changes: differences need steps of their own then.
+  // Steps that end at kinks lose them as a parameter moves these: differences need steps of their own then.
   void set_what_moves_kinks() {
-    const std::vector<bool> moves = parameters_that_move_kinks(scene_);
+    const Mechanism mechanism(scene_, rho_, {}, options_.user_forces);
+    std::vector<Cost> costs;
+    for (const Objective& objective : objectives_)
+      if (objective.needs_simulation()) costs.push_back(objective.cost(mechanism));
+    std::set<int> moving;
+    for (const KinkedSignal& kinks : kinks_of(mechanism, costs))
+      moving.insert(kinks.moved_by.begin(), kinks.moved_by.end());
     on_frozen_steps_.setConstant(rho_.size(), result_.discrete);
     std::string names;
-    for (std::size_t k = 0; k < moves.size(); ++k) {
-      if (!moves[k]) continue;
-      on_frozen_steps_(static_cast<Index>(k)) = false;
-      names += (names.empty() ? "'" : ", '") + result_.parameters[k] + "'";
+    for (const int k : moving) {
+      on_frozen_steps_(k) = false;
+      names += (names.empty() ? "'" : ", '") + result_.parameters[static_cast<std::size_t>(k)] + "'";
     }
     if (!names.empty() && result_.discrete)
       result_.warnings.push_back(fmt::format(
-          "{} moves kinks of a signal, at which steps end: compared with differences on free steps only", names));
+          "{} moves kinks of laws, at which steps end: compared with differences on free steps only", names));
   }
 
   void measure_times() {

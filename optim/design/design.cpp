@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -462,7 +463,7 @@ NlpScale design_scale(const Problem& problem, const DesignOptions& options) {
 
 DesignResult run_design(const Problem& given, const DesignOptions& options) {
   const Stopwatch stopwatch;
-  bool abandoned = false;
+  std::atomic<bool> abandoned = false;  // read by the threads of all cases
   std::function<bool(double t)> until_abandoned;
   if (options.simulation_progress)
     until_abandoned = [&](double t) { return abandoned = abandoned || !options.simulation_progress(t), !abandoned; };
@@ -472,7 +473,7 @@ DesignResult run_design(const Problem& given, const DesignOptions& options) {
   CaseEvaluator& evaluator = prepared.evaluator;
   const VariableScaling& scaling = prepared.scaling;
   const Eigen::VectorXd& x_start = prepared.x_start;
-  DesignProgram program(spec, evaluator, scaling, prepared.objective(), [&] { return abandoned; });
+  DesignProgram program(spec, evaluator, scaling, prepared.objective(), [&] { return abandoned.load(); });
 
   DesignResult result;
   result.optimizer = spec.optimizer.type;
@@ -481,11 +482,16 @@ DesignResult run_design(const Problem& given, const DesignOptions& options) {
   result.gradient_choice = start.choice.empty() ? std::string(to_string(start.method)) : start.choice;
   describe_start(problem, evaluator, program, start, result);
   if (start.ok) result.warnings = idle_variables(start, problem);
-  for (std::size_t c = 0; c < evaluator.cases() && start.ok && options.compare_differences; ++c) {
-    DifferenceComparison comparison = comparison_at(start.of_cases[c], evaluator.of_case(c));
-    comparison.go_on = [&] { return !abandoned; };
-    for (const std::string& warning : comparison.warnings())
-      result.warnings.push_back("design.variables: " + evaluator.in_case(c, warning));
+  if (start.ok && options.compare_differences) {
+    std::vector<std::vector<std::string>> warnings(evaluator.cases());
+    evaluator.for_each_case([&](std::size_t c) {
+      DifferenceComparison comparison = comparison_at(start.of_cases[c], evaluator.of_case(c));
+      comparison.go_on = [&] { return !abandoned; };
+      warnings[c] = comparison.warnings();
+    });
+    for (std::size_t c = 0; c < warnings.size(); ++c)
+      for (const std::string& warning : warnings[c])
+        result.warnings.push_back("design.variables: " + evaluator.in_case(c, warning));
   }
 
   const auto progress = [&](const NlpProgress& p) {
@@ -494,7 +500,7 @@ DesignResult run_design(const Problem& given, const DesignOptions& options) {
     return !options.progress || options.progress(result.history.back());
   };
   const LimitedSolution rounds = solved(
-      spec, program, evaluator, x_start, progress, [&] { return abandoned; }, options.records, result);
+      spec, program, evaluator, x_start, progress, [&] { return abandoned.load(); }, options.records, result);
   const NlpResult& solution = rounds.solution;
   result.status = abandoned ? SolverStatus::stopped : solution.status;
   result.message = abandoned ? "stopped on request" : solution.message;

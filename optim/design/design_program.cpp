@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "optim/machine/on_threads.hpp"
 #include "optim/objective/gauss_newton.hpp"
 #include "optim/objective/hessian.hpp"
 #include "optim/solver/evaluated_points.hpp"
@@ -161,7 +160,7 @@ bool DesignProgram::second_derivatives(const VectorXd& rho, std::vector<MatrixXd
   };
   std::vector<Found> found(evaluator_.cases());
   const CaseEvaluation at = evaluation(rho);
-  on_threads(found.size(), evaluator_.threads(), [&](std::size_t c) {
+  evaluator_.for_each_case([&](std::size_t c) {
     if (gauss_newton_) {
       const Evaluation& e = at.of_cases[c];
       GaussNewton H = e.ok ? gauss_newton(evaluator_.of_case(c), e) : GaussNewton{false, e.message, {}};
@@ -214,12 +213,16 @@ bool DesignProgram::gradient_beside(const VectorXd& x, const VectorXd& d, Vector
   const Index cases = static_cast<Index>(evaluator_.cases());
   VectorXd psi(cases);
   MatrixXd psi_rho(cases, variables());
-  for (std::size_t c = 0; c < evaluator_.cases(); ++c) {
+  std::vector<Evaluation> there(evaluator_.cases());
+  evaluator_.for_each_case([&](std::size_t c) {
     const Evaluation& of_case = at.of_cases[c];
-    const Evaluation there = evaluator_.of_case(c).gradients_on(of_case.steps, rho, of_case.method);
-    ++hessian_gradients_;
-    if (!there.ok) return false;
-    psi(static_cast<Index>(c)) = there.psi(0), psi_rho.row(static_cast<Index>(c)) = there.psi_rho.row(0);
+    there[c] = evaluator_.of_case(c).gradients_on(of_case.steps, rho, of_case.method);
+  });
+  hessian_gradients_ += cases;
+  for (Index c = 0; c < cases; ++c) {
+    const Evaluation& e = there[static_cast<std::size_t>(c)];
+    if (!e.ok) return false;
+    psi(c) = e.psi(0), psi_rho.row(c) = e.psi_rho.row(0);
   }
   f_x = (psi_rho.transpose() * objective_.gradient(psi)).cwiseProduct(scaling_.rho_x(x + d));
   return true;

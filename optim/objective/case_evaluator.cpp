@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <numeric>
+
 #include "optim/machine/on_threads.hpp"
 #include "optim/problem/load_cases.hpp"
 #include "optim/problem/unused_parameters.hpp"
@@ -48,10 +51,19 @@ long CaseEvaluator::simulations() const {
   return sum;
 }
 
+void CaseEvaluator::for_each_case(const std::function<void(std::size_t c)>& work) const {
+  std::vector<std::size_t> order(cases());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (last_.of_cases.size() == order.size())
+    std::ranges::stable_sort(order, std::greater(),
+                             [&](std::size_t c) { return last_.of_cases[c].statistics.rhs_evaluations; });
+  on_threads(order.size(), threads_, [&](std::size_t i) { work(order[i]); });
+}
+
 template <class Evaluate>
 const CaseEvaluation& CaseEvaluator::evaluated(const Eigen::VectorXd& rho, const Evaluate& evaluate) {
   std::vector<Evaluation> found(cases());
-  on_threads(cases(), threads_, [&](std::size_t c) { found[c] = evaluate(evaluators_[c]); });
+  for_each_case([&](std::size_t c) { found[c] = evaluate(evaluators_[c]); });
   const Eigen::Index n = static_cast<Eigen::Index>(objectives());
   CaseEvaluation all;
   static_cast<Evaluation&>(all) = found[0];
@@ -89,7 +101,7 @@ const CaseEvaluation& CaseEvaluator::gradients(const Eigen::VectorXd& rho) {
 
 std::vector<std::optional<double>> CaseEvaluator::true_values(const Eigen::VectorXd& rho) const {
   std::vector<std::vector<std::optional<double>>> found(cases());
-  on_threads(cases(), threads_, [&](std::size_t c) { found[c] = evaluators_[c].true_values(rho); });
+  for_each_case([&](std::size_t c) { found[c] = evaluators_[c].true_values(rho); });
   std::vector<std::optional<double>> all;
   for (const auto& of_case : found) all.insert(all.end(), of_case.begin(), of_case.end());
   return all;

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -35,6 +36,9 @@ class CaseEvaluator {
   const CaseEvaluation& gradients(const Eigen::VectorXd& rho);
   // As Evaluator's, case by case.
   std::vector<std::optional<double>> true_values(const Eigen::VectorXd& rho) const;
+
+  // Calls work(c) in up to threads() threads; the case that took most right-hand sides in the last evaluation is first.
+  void for_each_case(const std::function<void(std::size_t c)>& work) const;
 
   std::size_t cases() const { return evaluators_.size(); }
   std::size_t objectives() const { return evaluators_[0].objectives().size(); }  // of each case

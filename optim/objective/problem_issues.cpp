@@ -279,33 +279,85 @@ void check_meaning(Checker& checker, const IdentificationSpec& identification) {
   }
 }
 
-// A signal that covers the run may not cover that of a case, and a case may have samples of its own.
-void check_coverage(Checker& checker, const CaseSpec& load_case, const Problem& of_case, const std::string& place) {
+// The parameters that a signal's delay depends on.
+std::vector<std::string> delayed_by(const Signal& signal, const Scene& scene) {
+  const Program delay(signal.delay, parameter_symbols(scene));
+  std::vector<std::string> names;
+  for (const int input : delay.used_inputs()) names.push_back(scene.parameters[static_cast<std::size_t>(input)].name);
+  return names;
+}
+
+// The override that moves a signal of the problem; empty where none does.
+std::string override_of_delay(const CaseSpec& load_case, const std::string& signal, const Scene& scene) {
+  const auto in_problem = std::ranges::find(scene.signals, signal, &Signal::name);
+  for (const std::string& name : delayed_by(*in_problem, scene))
+    if (std::ranges::find(load_case.overrides, name, &Definition::name) != load_case.overrides.end()) return name;
+  return "";
+}
+
+// A signal that covers the run may not cover that of a case, and a case may have samples and delays of its own.
+void check_coverage(Checker& checker, const CaseSpec& load_case, const Problem& problem, const std::string& place) {
+  const Problem of_case = problem_of(problem, load_case);
   const SceneFacts facts(of_case.scene);
   const SimulationSettings& run = of_case.scene.simulation;
   for (const Signal& signal : of_case.scene.signals) {
     const bool own = std::ranges::find(load_case.signals, signal.name, &SignalSamples::name) != load_case.signals.end();
+    const std::string moved = override_of_delay(load_case, signal.name, problem.scene);
     const std::optional<double> delay = facts.value(signal.delay);
-    if (!signal.curve || !delay || (!own && !load_case.end_time)) continue;
+    if (!signal.curve || !delay || (!own && !load_case.end_time && moved.empty())) continue;
     if (const auto why = uncovered(covered_by(*signal.curve, *delay), run.start_time, run.end_time))
-      checker.issue(own ? child_path(place + ".signals", signal.name) : place + ".end_time",
+      checker.issue(own                  ? child_path(place + ".signals", signal.name)
+                    : load_case.end_time ? place + ".end_time"
+                                         : child_path(place + ".overrides", moved),
                     "signal '" + signal.name + "': " + *why);
   }
 }
 
-// The jumps of hold would move with the variable.
-void check_delays(Checker& checker, const Scene& scene, const std::vector<std::string>& variables) {
+// Signals that jump at times that move with one of the names, which are varied.
+struct MovedJumps {
+  std::string signal, by;
+  std::string words(const std::string& where = "") const {
+    return "depends on '" + by + "', which is varied" + where + ", and hold jumps at times that move with it: its " +
+           "derivative has no value; take \"interpolation\": \"linear\" or \"spline\"";
+  }
+  std::string place() const { return child_path("signals", signal) + ".delay"; }
+};
+std::vector<MovedJumps> moved_jumps(const Scene& scene, const std::vector<std::string>& names) {
+  std::vector<MovedJumps> found;
   for (const Signal& signal : scene.signals) {
     if (signal.interpolation != Interpolation::hold) continue;
-    const Program delay(signal.delay, parameter_symbols(scene));
-    for (const int input : delay.used_inputs()) {
-      const std::string& name = scene.parameters[static_cast<std::size_t>(input)].name;
-      if (std::ranges::find(variables, name) != variables.end())
-        checker.issue(child_path("signals", signal.name) + ".delay",
-                      "depends on '" + name + "', which is varied, and hold jumps at times that move with it: its " +
-                          "derivative has no value; take \"interpolation\": \"linear\" or \"spline\"");
-    }
+    for (const std::string& name : delayed_by(signal, scene))
+      if (std::ranges::find(names, name) != names.end()) found.push_back({signal.name, name});
   }
+  return found;
+}
+
+void check_moved_jumps(Checker& checker, const Problem& problem, const CaseSpec& load_case, const std::string& place) {
+  const Problem of_case = problem_of(problem, load_case);
+  for (MovedJumps& jumps : moved_jumps(of_case.scene, of_case.design->variables)) {
+    const std::string moved = override_of_delay(load_case, jumps.signal, problem.scene);
+    jumps.by = in_names_of_problem(jumps.by, load_case, problem.scene);
+    checker.issue(moved.empty() ? jumps.place() : child_path(place + ".overrides", moved),
+                  moved.empty() ? jumps.words()
+                                : "the delay of the signal '" + jumps.signal + "' " +
+                                      jumps.words(" in the case '" + load_case.name + "'"));
+  }
+}
+
+// Signals where cases and experiments move them, and what is varied.
+void check_signals(Checker& checker, const Problem& problem) {
+  for (std::size_t c = 0; c < problem.cases.size(); ++c) {
+    check_coverage(checker, problem.cases[c], problem, child_path("cases", c));
+    if (problem.design) check_moved_jumps(checker, problem, problem.cases[c], child_path("cases", c));
+  }
+  const auto check = [&](const std::vector<std::string>& names, const std::string& where) {
+    for (const MovedJumps& jumps : moved_jumps(problem.scene, names)) checker.issue(jumps.place(), jumps.words(where));
+  };
+  if (problem.design && problem.cases.empty()) check(problem.design->variables, "");
+  if (!problem.identification) return;
+  check(problem.identification->variables, "");
+  for (const ExperimentSpec& experiment : problem.identification->experiments)
+    check(experiment.free, " in the experiment '" + experiment.name + "'");
 }
 
 void check_meaning(Checker& checker, const Problem& problem) {
@@ -335,10 +387,7 @@ std::vector<SceneIssue> find_issues(const Problem& problem) {
   check_meaning(checker, problem.scene);
   if (issues.empty()) {
     if (const std::optional<DesignIssue> found = curvature_issue(problem)) checker.issue(found->path, found->message);
-    for (std::size_t c = 0; c < problem.cases.size(); ++c)
-      check_coverage(checker, problem.cases[c], problem_of(problem, problem.cases[c]), child_path("cases", c));
-    if (problem.design) check_delays(checker, problem.scene, problem.design->variables);
-    if (problem.identification) check_delays(checker, problem.scene, problem.identification->variables);
+    check_signals(checker, problem);
   }
   return without_repetitions(std::move(issues));
 }

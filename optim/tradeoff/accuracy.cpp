@@ -43,8 +43,6 @@ SceneFeatures features_of(const Scene& scene) {
   features.bodies = static_cast<int>(scene.bodies.size());
   features.loops = loops_of(scene);
   features.drives = static_cast<int>(scene.drives.size());
-  features.sampled_drives =
-      std::any_of(scene.drives.begin(), scene.drives.end(), [](const Drive& d) { return d.samples.has_value(); });
   return features;
 }
 
@@ -89,13 +87,10 @@ class Chooser {
   };
 
   void choose_explicit() {
-    const bool high_order = result_.wanted < 1e-7 && !result_.features.sampled_drives;
+    const bool high_order = result_.wanted < 1e-7;
     method_ = high_order ? "dopri853" : "dopri5";
-    verifier_ = result_.features.sampled_drives ? "dopri5" : "dopri853";
-    result_.why = high_order ? "a high order for an accuracy this high"
-                  : result_.features.sampled_drives && result_.wanted < 1e-7
-                      ? "a drive that follows a file is a cubic spline, on which a high order gains nothing"
-                      : "accuracy and not stability limits its steps";
+    verifier_ = "dopri853";
+    result_.why = high_order ? "a high order for an accuracy this high" : "accuracy and not stability limits its steps";
   }
 
   void choose_implicit() {

@@ -27,9 +27,8 @@ namespace mbsopt {
 // The properties of the scene that the choice uses.
 struct SceneFeatures {
   int bodies = 0, loops = 0, drives = 0;
-  bool sampled_drives = false;  // some drive follows a file: a cubic spline, which high orders gain nothing on
-  double stiffest_rate = 0;     // |lambda| of steps at the edge of stability [1/s]; 0: there were none
-  double limited_steps = 0;     // their part of the explicit run's
+  double stiffest_rate = 0;  // |lambda| of steps at the edge of stability [1/s]; 0: there were none
+  double limited_steps = 0;  // their part of the explicit run's
 };
 
 struct ErrorEstimate {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <map>
 
 #include "app/json/read_problem.hpp"
 #include "app/terminal/exit_code.hpp"
@@ -83,13 +84,23 @@ TEST_CASE("four_bar/reaction_limit: the true peak of the joint's force is at mos
 TEST_CASE("quarter_car/loads: the worst comfort of four cases is least, the travel is held in each", "[gallery]") {
   const nlohmann::json result = designed("quarter_car/loads");
   CHECK(result.at("optimizer").at("status") == "converged");
+  struct Load {
+    double m, c_factor, h;
+  };
+  const std::map<std::string, Load> loads{
+      {"empty", {250, 1, 0.05}}, {"loaded", {420, 1, 0.04}}, {"cold", {300, 1.3, 0.05}}, {"worn", {300, 0.6, 0.03}}};
   double worst = 0, longest = 0;
   CHECK(result.at("cases").size() == 4);
   for (const auto& [name, of_case] : result.at("cases").items()) {
     const nlohmann::json& travel = of_case.at("objectives").at("maximum_of 0.5 - strut_length");
     CHECK(travel.at("true_value").get<double>() <= 0.04);
     longest = std::max(longest, travel.at("true_value").get<double>());
-    worst = std::max(worst, of_case.at("objectives").at("comfort").at("value").get<double>());
+    const double comfort = of_case.at("objectives").at("comfort").at("value").get<double>();
+    worst = std::max(worst, comfort);
+    // h^2/2 (k_t c/m^2 + (m + m_w) k^2/(m^2 c)), the integral over a road's step h by Parseval's theorem
+    const auto [m, c_factor, h] = loads.at(name);
+    const double k = value(result, "k"), c = c_factor * value(result, "c");
+    CHECK(comfort == Approx(h * h / 2 * (180000 * c + (m + 40) * k * k / c) / (m * m)).epsilon(1e-6));
   }
   CHECK(longest > 0.04 * (1 - 2e-6));
   const nlohmann::json& comfort = result.at("objectives").at("comfort");

@@ -50,6 +50,26 @@ TEST_CASE("design: a minimum inside the bounds, told in a table, a history and a
   CHECK(std::count(history.begin(), history.end(), '\n') == optimizer.at("iterations").get<int>() + 2);
 }
 
+// k >= 50 and 2 k <= 80 cannot both hold. Eased by 1, a limit lowers the sum of relative violations by 1/50 and 1/80.
+TEST_CASE("design: limits in conflict stand in the terminal with their prices", "[command]") {
+  const TemporaryFolder folder;
+  std::vector<std::string> sets = kBounds;
+  for (const char* set :
+       {"forces[0].point1=[0, 3, 0]", R"(objectives.stiff={"parameters_only": "k"})",
+        R"(objectives.twice={"parameters_only": "2*k"})",
+        R"(design.subject_to=[{"objective": "stiff", "lower": 50}, {"objective": "twice", "upper": 80}])"})
+    sets.insert(sets.end(), {"--set", set});
+  const CommandOutcome outcome = run_design_command(folder.write("rod.json", kPendulum), folder.file("out"), sets);
+  CHECK(outcome.exit_code == kNumericalFailure);
+  CHECK_THAT(outcome.out, Contains("limit in conflict") && Contains("missed by") && Contains("price") &&
+                              Contains("stiff >= 50") && Contains("twice <= 80") && Contains("0.0125"));
+  const auto conflicts = json_of(folder.path / "out/result.json").at("conflicts");
+  REQUIRE(conflicts.size() == 2);
+  CHECK(conflicts[0].at("missed").get<double>() == Approx(10).epsilon(2e-3));
+  CHECK(conflicts[0].at("price").get<double>() == Approx(1.0 / 50));
+  CHECK(conflicts[1].at("price").get<double>() == Approx(1.0 / 80));
+}
+
 TEST_CASE("design: optimized.json is a problem whose objective is the optimum's", "[command]") {
   const TemporaryFolder folder;
   REQUIRE(run_design_command(folder.write("rod.json", kPendulum), folder.file("out")).exit_code == kDone);

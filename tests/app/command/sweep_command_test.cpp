@@ -10,6 +10,7 @@
 
 #include "app/terminal/exit_code.hpp"
 #include "optim/problem/csv_table.hpp"
+#include "source_folder.hpp"
 #include "tests/app/killed_run.hpp"
 #include "tests/app/run_command.hpp"
 #include "tests/app/swinging_rod.hpp"
@@ -47,6 +48,25 @@ TEST_CASE("a swept grid has the values and gradients of single runs, whatever th
   CHECK(table.column("d track/d k")[3] == Approx(track.at("gradient").at("k").get<double>()).epsilon(1e-10));
   swept(folder, {"--vary", "k=5:20:3", "--vary", "free=0.4:0.6:2", "--gradients", "--threads", "1"}, "one");
   CHECK(content_of(folder.path / "one/sweep.csv") == content_of(folder.path / "two/sweep.csv"));
+}
+
+// Over a road's step h the integral of a sprung mass's acceleration squared is, by Parseval's theorem,
+//   h^2/2 (k_t c/m^2 + (m + m_w) k^2/(m^2 c))
+TEST_CASE("a sweep of quarter_car/ride has the comfort of its closed form at each point", "[command][sweep]") {
+  const TemporaryFolder folder;
+  const CommandOutcome outcome =
+      run_command({"sweep", MBSOPT_SOURCE_DIR "/problems/quarter_car/ride.json", "--vary", "k=20000:40000:5", "--vary",
+                   "c=2000:6000:3", "--out", folder.file("ride"), "--threads", "2"});
+  INFO(outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  const CsvTable table = read_csv(folder.file("ride/sweep.csv"));
+  REQUIRE(table.rows() == 15);
+  constexpr double m = 300, m_w = 40, k_t = 180000, h = 0.05;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double k = table.column("k")[row], c = table.column("c")[row];
+    CHECK(table.column("comfort")[row] ==
+          Approx(h * h / 2 * (k_t * c + (m + m_w) * k * k / c) / (m * m)).epsilon(1e-6));  // less what is after 3 s
+  }
 }
 
 TEST_CASE("samples of a sweep fill their ranges, and a file gives its own points", "[command][sweep]") {

@@ -121,6 +121,84 @@ TEST_CASE("100000 samples whose kinks are below the tolerance cost no steps of t
   CHECK(result.statistics.steps + result.statistics.rejected < 100);
 }
 
+TEST_CASE("steps meet the kinks of a table of time as those of a linear signal", "[signals]") {
+  const std::vector<double> t{0, 0.31, 0.5, 0.77, 1.3, 1.31, 2}, y{4, -3, 2, 7, -8, 5, 1};
+  const auto [x, v] = closed_form(Curve(Interpolation::linear, t, y), 2);
+  Scene scene = pushed(signal(Interpolation::linear, {0, 2}, {0, 0}));
+  add_parameters(scene, {{"p", 7.0}, {"late", 0.25}});
+  const auto components = [&](const std::string& law) {
+    std::get<PointForce>(scene.forces[0].kind).components[0] = f(law);
+  };
+  SECTION("its values are numbers or parameters") {
+    components(GENERATE(as<std::string>{}, "table(t, [0, 0.31, 0.5, 0.77, 1.3, 1.31, 2], [4, -3, 2, 7, -8, 5, 1])",
+                        "table(t, [0, 0.31, 0.5, 0.77, 1.3, 1.31, 2], [4, -3, 2, p, -p - 1, 5, 1])"));
+  }
+  SECTION("its argument is late, stretched, or runs backwards") {
+    components(GENERATE(as<std::string>{},
+                        "table(t - late, [-0.25, 0.06, 0.25, 0.52, 1.05, 1.06, 1.75], [4, -3, 2, 7, -8, 5, 1])",
+                        "table(10*t + 4*late, [1, 4.1, 6, 8.7, 14, 14.1, 21], [4, -3, 2, 7, -8, 5, 1])",
+                        "table(-t, [-2, -1.31, -1.3, -0.77, -0.5, -0.31, 0], [1, 5, -8, 7, 2, -3, 4])"));
+  }
+  const SimulationResult result = simulated(scene);
+  CHECK(result.y_end(0) == Approx(x).margin(1e-8));
+  CHECK(result.y_end(7) == Approx(v).margin(1e-8));
+  CHECK(result.statistics.rejected <= 8);
+}
+
+TEST_CASE("steps meet the knots of a spline that the tolerance sees", "[signals]") {
+  Scene scene = pushed(signal(Interpolation::spline, times(201, 2), noise(201)));
+  scene.simulation.integrator.type = "dopri853";
+  scene.simulation.integrator.rtol = 1e-10, scene.simulation.integrator.atol = 1e-12;
+  const SimulationResult result = simulated(scene);
+  // Integrals of the pieces, cubics, by Taylor's series.
+  const Curve& u = *scene.signals[0].curve;
+  double x = 0, v = 0;
+  for (std::size_t i = 0; i < 200; ++i) {
+    const double h = u.x()[i + 1] - u.x()[i], at = u.x()[i];
+    double x_h = x + h * v, v_h = v, power = h;
+    for (int k = 0; k <= 3; ++k) {
+      v_h += power / (k + 1) * u.at(at, k), x_h += power * h / ((k + 1) * (k + 2)) * u.at(at, k);
+      power *= h / (k + 1);
+    }
+    x = x_h, v = v_h;
+  }
+  CHECK(result.y_end(0) == Approx(x).margin(1e-10));
+  CHECK(result.y_end(7) == Approx(v).margin(1e-10));
+  INFO(result.statistics.steps << " steps, " << result.statistics.rejected << " rejected");
+  CHECK(result.statistics.steps + result.statistics.rejected < 260);
+}
+
+TEST_CASE("knots of a smooth spline cost no steps of their own", "[signals]") {
+  std::vector<double> y;
+  for (const double t : times(2001, 2)) y.push_back(std::sin(3 * t));
+  Scene scene = pushed(signal(Interpolation::spline, times(2001, 2), y));
+  const SimulationResult result = simulated(scene);
+  CHECK(result.y_end(7) == Approx((1 - std::cos(6)) / 3).margin(1e-8));
+  INFO(result.statistics.steps << " steps, " << result.statistics.rejected << " rejected");
+  CHECK(result.statistics.steps + result.statistics.rejected < 100);
+}
+
+TEST_CASE("steps meet the knots of a drive's spline, its acceleration's kinks", "[signals][drives]") {
+  const std::size_t n = 101;
+  Scene scene = pushed(signal(Interpolation::spline, times(n, 2), noise(n)));
+  Body free = scene.bodies[0];  // hangs on the driven cart by a spring: nothing that is solved in place of integrated
+  free.name = "free";
+  scene.bodies.push_back(free);
+  Joint slide = scene.joints[0];
+  slide.name = "slide2", slide.body2 = "free";
+  scene.joints.push_back(slide);
+  std::get<PointForce>(scene.forces[0].kind).components[0] = f("0");
+  Drive drive;
+  drive.name = "play", drive.type = "displacement", drive.joint = "slide", drive.law = f("u");
+  scene.drives = {drive};
+  const SimulationResult result = simulated(scene);
+  const Curve& u = *scene.signals[0].curve;
+  CHECK(result.y_end(0) == Approx(u.at(2)).margin(1e-8));
+  CHECK(result.y_end(14) == Approx(u.at(2, 1)).margin(1e-6));
+  INFO(result.statistics.steps << " steps, " << result.statistics.rejected << " rejected");
+  CHECK(result.statistics.steps + result.statistics.rejected < 400);
+}
+
 TEST_CASE("gain, offset and delay have exact derivatives: TLM = adjoint = differences", "[signals]") {
   const Interpolation how = GENERATE(Interpolation::linear, Interpolation::spline);
   Scene scene = double_pendulum();

@@ -1,4 +1,4 @@
-// Objectives that follow the samples of a file.
+// Objectives that follow the samples of a file, or have a table of time.
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -47,7 +47,9 @@ Problem slide() {
 
 TEST_CASE("track is the sum of weighted squares at the rows within the run, with exact gradients", "[objective]") {
   const Problem problem = slide();
-  Evaluator evaluator(problem.scene, objectives_of(problem));
+  EvaluatorOptions options;
+  options.method = GENERATE(GradientMethod::tlm, GradientMethod::adjoint, GradientMethod::differences);
+  Evaluator evaluator(problem.scene, objectives_of(problem), {}, options);
   const VectorXd start = evaluator.start();
   const Evaluation& e = evaluator.gradients(start);
   INFO(e.message);
@@ -60,6 +62,22 @@ TEST_CASE("track is the sum of weighted squares at the rows within the run, with
   CHECK(e.psi(0) == Approx(value));
   CHECK(e.psi_rho(0, 0) == Approx(slope));
   CHECK(e.psi_rho(0, 1) == Approx(value));  // 2 w/w^2 of the value, w = 2
+}
+
+TEST_CASE("the integral of a table of time is exact: steps end at its kinks", "[objective]") {
+  Problem problem = slide();
+  ObjectiveSpec area;
+  area.name = "area", area.running = f("0*x + table(t, [0, 0.3, 0.7, 1], [p, 5, -1, w])");
+  problem.objectives = {area};
+  EvaluatorOptions options;
+  options.method = GENERATE(GradientMethod::tlm, GradientMethod::adjoint);
+  Evaluator evaluator(problem.scene, objectives_of(problem), {}, options);
+  const Evaluation& e = evaluator.gradients(evaluator.start());
+  INFO(e.message);
+  REQUIRE(e.ok);
+  CHECK(e.psi(0) == Approx(0.15 * (3 + 5) + 0.2 * (5 - 1) + 0.15 * (-1 + 2)).epsilon(1e-13));
+  CHECK(e.psi_rho(0, 0) == Approx(0.15).epsilon(1e-13));
+  CHECK(e.psi_rho(0, 1) == Approx(0.15).epsilon(1e-13));
 }
 
 TEST_CASE("Gauss-Newton's matrix of a track is that of its residuals", "[objective]") {

@@ -1,0 +1,16 @@
+// The times at which functions of time in laws and costs, or their derivatives, jump: steps can end there.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/expression/program.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+
+namespace mbsopt {
+
+// Adds those of a program whose first inputs are all parameters, and whose input `time` is t. The samples x_i of a
+// curve of a t + b, a and b of parameters, lie at (x_i - b)/a. Curves of other arguments are left out.
+void add_kinks_in_time(const Program& program, int time, const Eigen::VectorXd& rho, std::vector<KinkedSignal>& kinks);
+
+}  // namespace mbsopt
