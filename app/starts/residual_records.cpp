@@ -27,6 +27,15 @@ Experiment::Residuals residuals_of(const Json& json) {
   r.z = Eigen::Map<const VectorXd>(z.data(), rows);
   r.z_u = Eigen::Map<const MatrixXd>(z_u.data(), rows, columns);
   r.steps = json.at("steps").get<long>();
+  if (!json.contains("ends")) return r;
+  const auto of = [&](const char* key, VectorXd& s, MatrixXd& s_u) {
+    const auto values = json.at("ends").at(key).get<std::vector<double>>();
+    const Index n = static_cast<Index>(values.size()) / (1 + columns);
+    if (n * (1 + columns) != static_cast<Index>(values.size())) throw std::length_error("a matrix of another size");
+    s = Eigen::Map<const VectorXd>(values.data(), n);
+    s_u = Eigen::Map<const MatrixXd>(values.data() + n, n, columns);
+  };
+  of("start", r.start, r.start_u), of("end", r.end, r.end_u);
   return r;
 }
 
@@ -54,13 +63,21 @@ bool JsonResidualRecords::recall(const Asked& asked, Experiment::Residuals& foun
 void JsonResidualRecords::record(const Asked& asked, const Experiment::Residuals& found) {
   if (found.z.size() + found.z_u.size() > kMostNumbers) return;
   known_[key_of(asked)] = found;  // nor is a point simulated twice in one run
-  tell_({{"experiment", asked.experiment},
-         {"u", std::vector<double>(asked.u.begin(), asked.u.end())},
-         {"sigma", asked.sigma},
-         {"steps", found.steps},
-         {"columns", found.z_u.cols()},
-         {"z", std::vector<double>(found.z.begin(), found.z.end())},
-         {"z_u", std::vector<double>(found.z_u.data(), found.z_u.data() + found.z_u.size())}});
+  Json content{{"experiment", asked.experiment},
+               {"u", std::vector<double>(asked.u.begin(), asked.u.end())},
+               {"sigma", asked.sigma},
+               {"steps", found.steps},
+               {"columns", found.z_u.cols()},
+               {"z", std::vector<double>(found.z.begin(), found.z.end())},
+               {"z_u", std::vector<double>(found.z_u.data(), found.z_u.data() + found.z_u.size())}};
+  const auto add = [&](const char* key, const VectorXd& s, const MatrixXd& s_u) {  // s, then the columns of s_u
+    std::vector<double> values(s.begin(), s.end());
+    values.insert(values.end(), s_u.data(), s_u.data() + s_u.size());
+    content["ends"][key] = values;
+  };
+  if (found.start.size() + found.end.size() > 0)
+    add("start", found.start, found.start_u), add("end", found.end, found.end_u);
+  tell_(content);
 }
 
 }  // namespace mbsopt

@@ -20,7 +20,7 @@
 #include "optim/machine/stopwatch.hpp"
 #include "optim/problem/parameter_values.hpp"
 #include "optim/problem/unused_parameters.hpp"
-#include "optim/solver/levenberg_marquardt.hpp"
+#include "optim/solver/equality_multipliers.hpp"
 
 namespace mbsopt {
 namespace {
@@ -79,7 +79,8 @@ class Identification {
     const Eigen::VectorXd u_x = stack.scaling().rho_x(solution.x);
     const Eigen::MatrixXd J = solution.point.z_x * u_x.cwiseInverse().asDiagonal();
     FitData data;
-    data.J = J.topRows(stack.samples()), data.J_prior = J.bottomRows(stack.plain);
+    data.J = J.topRows(stack.samples()), data.J_prior = J.middleRows(stack.samples(), stack.plain);
+    data.C = J.bottomRows(stack.equalities);
     data.z = solution.point.z.head(stack.samples());
     data.rho = stack.scaling().to_rho(solution.x);
     data.names = names_of(unknowns, spec_);
@@ -103,8 +104,9 @@ class Identification {
 
   // By the residuals of the experiments of the stack, which are scored already.
   CovarianceType covariance_for(const ExperimentStack& stack) const {
-    const bool many = stack.members().size() >= kManyRecords;
-    if (spec_.covariance == CovarianceType::windows && stack.members().size() < 2) return CovarianceType::newey_west;
+    const std::size_t records = stack.records_in_time().size();
+    const bool many = records >= kManyRecords;
+    if (spec_.covariance == CovarianceType::windows && records < 2) return CovarianceType::newey_west;
     if (spec_.covariance != CovarianceType::automatic) return spec_.covariance;
     for (const ExperimentStack::Member& m : stack.members())
       for (const ChannelFit& channel : result_.experiments[m.experiment].channels)
@@ -145,14 +147,16 @@ class Identification {
 
   ExperimentStack::Member member(std::size_t e, const Eigen::VectorXd& rho,
                                  const std::vector<UnknownParameter>& unknowns) const {
-    return {e, Experiment(scene_, spec_.experiments[e], place_of(spec_, e), data_[e], rho,
-                          unknowns_in(scene_, spec_, e, unknowns), options_.user_forces)};
+    return {e,
+            Experiment(scene_, spec_.experiments[e], place_of(spec_, e), data_[e], rho,
+                       unknowns_in(scene_, spec_, e, unknowns), options_.user_forces),
+            spec_.experiments[e].origin && spec_.experiments[e].origin->continues};
   }
 
   // of_fit: its iterations are those of the result.
   LeastSquaresResult minimised(ExperimentStack& stack, const Eigen::VectorXd& x, bool of_fit) {
     LeastSquaresOptions solver = solver_options();
-    if (!of_fit) return solve_least_squares(stack, x, solver);
+    if (!of_fit) return solve_with_equalities(stack, x, solver);
     const Eigen::VectorXd sigma = stack.sigma();
     const int before = result_.iterations;
     solver.progress = [&](const LeastSquaresProgress& p) {
@@ -160,7 +164,7 @@ class Identification {
           {before + p.iteration, p.cost, p.gradient_norm, p.step_norm, stack.scaling().to_rho(p.x)});
       return !options_.progress || options_.progress(result_.history.back());
     };
-    LeastSquaresResult solution = solve_least_squares(stack, x, solver);
+    LeastSquaresResult solution = solve_with_equalities(stack, x, solver);
     if (apart_at_start_.size() == 0 && solution.z_initial.size() > 0) {
       apart_at_start_ = solution.z_initial;
       apart_at_start_.head(stack.samples()).array() *= sigma.array();
@@ -225,7 +229,7 @@ class Identification {
     const Eigen::VectorXd& z = solution.point.z;
     const Eigen::Index pulling =
         std::count_if(z.begin(), z.begin() + stack.samples(), [&](double x) { return stack.loss.at(x * x).rho1 > 0; });
-    if (pulling + stack.plain >= stack.variables()) return;
+    if (pulling + stack.plain >= stack.freedom_of_variables()) return;
     result_.status = SolverStatus::failed;
     result_.message = fmt::format(
         "{} of {} lie within the scale of the loss ({:g} sigma), beyond which a sample has no pull; they "
@@ -314,7 +318,7 @@ class Identification {
     const bool scaled = sigmas == 0 && !spec_.sigma_is_known;
     const double v = scaled ? squares / N : 1;
     if (spec_.loss.type != LossType::squared || !(v > 0)) return;
-    const double k = static_cast<double>(stack.variables()) + (scaled ? 1 : static_cast<double>(sigmas));
+    const double k = static_cast<double>(stack.freedom_of_variables()) + (scaled ? 1 : static_cast<double>(sigmas));
     const double twice = squares / v + N * std::log(2 * std::numbers::pi * v) + 2 * stack.sigma().array().log().sum();
     result_.aic = 2 * k + twice, result_.bic = k * std::log(N) + twice;
   }

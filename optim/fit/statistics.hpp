@@ -41,6 +41,7 @@ struct FitData {
   Eigen::MatrixXd J;        // N x P
   Eigen::VectorXd z;        // N
   Eigen::MatrixXd J_prior;  // R x P, or empty
+  Eigen::MatrixXd C;        // M x P, or empty: C d rho = 0 by equations between the parameters, which are independent
   Eigen::VectorXd rho;      // P
   std::vector<std::string> names;
   std::vector<std::string> units;  // "" where not known; or none at all

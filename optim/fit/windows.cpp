@@ -115,7 +115,7 @@ class Cut {
       const double from = start + static_cast<double>(k) * length;
       window.start_time = from, window.end_time = last ? end : start + static_cast<double>(k + 1) * length;
       window.name = fmt::format("{}.{}", whole_.name, k + 1);
-      window.origin = {whole_.name, place_, k + 1};
+      window.origin = {whole_.name, place_, k + 1, whole_.windows->continuity && !last};
       CsvTable rows = rows_between(data_, t_, from, *window.end_time, last);
       guess_start(window, rows, cut.warnings);
       cut.problem.identification->experiments.push_back(window);
@@ -139,7 +139,7 @@ class Cut {
     const VectorXd rho = parameter_values(scene_);
     const Experiment model(scene_, window, place_, rows, rho, here, user_forces_);
     require_starts(model);
-    alone.experiments[0].end_time.reset();
+    alone.experiments[0].end_time.reset(), alone.experiments[0].origin->continues = false;
     const VariableScaling scaling = scaling_of(unknowns);
     std::vector<ExperimentStack::Member> members;
     members.push_back({0, Experiment(scene_, alone.experiments[0], place_, smoothed(model), rho, here, user_forces_)});
@@ -172,6 +172,13 @@ class Cut {
           fmt::format("{}.windows: the mechanism cannot be assembled at the start of a "
                       "window at {} s: {}",
                       place_, model.start_time(), assembly.result().message));
+    const int degrees = assembly.summary().degrees_of_freedom;
+    if (whole_.windows->continuity && model.unknowns().size() != 2 * static_cast<std::size_t>(degrees))
+      throw std::invalid_argument(
+          fmt::format("{}.windows.continuity: needs a start that is free in all coordinates and rates of the "
+                      "mechanism, {} numbers; "
+                      "the experiment's free parameters are {}",
+                      place_, 2 * degrees, model.unknowns().size()));
     const MatrixXd tangent = assembly.tangent();
     for (const Experiment::Unknown& unknown : model.unknowns())
       if (tangent.col(unknown.parameter).isZero(0))
