@@ -218,7 +218,8 @@ int identify_command(const CommandContext& context) {
   const Mechanism mechanism(first, parameter_values(first));
   run.start();
   if (!settle_accuracy(run, first, {})) return run.finish();
-  const CutProblem cut = cut_into_windows(run.problem, whole);  // by the settled integrator
+  const CutProblem cut = cut_into_windows(run.problem, whole, {}, told(run));  // by the settled integrator
+  run.progress.finish();
   const std::vector<CsvTable>& data = cut.data;
   if (const Assembly assembly(mechanism, first.simulation.start_time); assembly.result().ok) {
     ModelSummary model = assembly.summary();
@@ -230,8 +231,9 @@ int identify_command(const CommandContext& context) {
   std::vector<std::string> left_out;
   const Problem needed = what_measurements_need(cut.problem, &left_out);
   say_left_out(run, left_out, "measurement");
-  if (context.options.preflight)  // the fit says them itself
-    for (const std::string& warning : cut.warnings) run.warn(warning);
+  const std::optional<MultistartSpec>& starts = run.problem.identification->multistart;
+  const bool cut_again = starts && !context.options.preflight;  // for the values of the best start, with its warnings
+  for (std::size_t i = 0; !cut_again && i < cut.warnings.size(); ++i) run.warn(cut.warnings[i]);
   add_windows(run, cut.problem);
   const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
   for (const std::string& warning : doubts_about_fit(needed, data, {{}, [](double) { return !interrupted(); }}))
@@ -239,10 +241,10 @@ int identify_command(const CommandContext& context) {
   if (context.options.preflight) return preflight(run, needed, data);
   LongRun long_run(run);
   const BestStart best = from_best_start(run, long_run, whole);
-  const std::optional<MultistartSpec>& starts = run.problem.identification->multistart;
   if (interrupted() && starts) return stopped_within_starts(run, long_run, best.problem);
   long_run.begin();
-  IdentificationResult fit = fitted(run, long_run, best.problem, whole, cut.problem);
+  IdentificationResult fit = cut_again ? fitted(run, long_run, best.problem, whole, cut.problem)
+                                       : fitted(run, long_run, cut.problem, data, cut.problem);
   fit.simulations += best.simulations, fit.wall_seconds += best.wall_seconds;
   add_to_result(run.result, fit);
   print_fit(context.out, fit, effort(run, starts, fit.simulations, fit.wall_seconds));

@@ -435,7 +435,8 @@ class Identification {
 
 IdentificationResult run_identification(const Problem& problem, const std::vector<CsvTable>& data,
                                         const IdentificationOptions& options) {
-  const CutProblem cut = cut_into_windows(what_measurements_need(problem), data, options.user_forces);
+  const CutProblem cut =
+      cut_into_windows(what_measurements_need(problem), data, options.user_forces, options.simulation_progress);
   IdentificationResult result = Identification(cut.problem, cut.data, options).run();
   result.warnings.insert(result.warnings.begin(), cut.warnings.begin(), cut.warnings.end());
   return result;

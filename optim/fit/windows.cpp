@@ -83,13 +83,15 @@ CsvTable rows_between(const CsvTable& data, const std::vector<double>& t, double
 class Cut {
  public:
   Cut(const Scene& scene, const ExperimentSpec& whole, std::string place, const CsvTable& data,
-      const UserForces& user_forces)
+      const UserForces& user_forces, const std::function<bool(double t)>& go_on)
       : scene_(scene),
         whole_(whole),
         place_(std::move(place)),
         data_(data),
         t_(ascending_times(data, whole.time)),
-        user_forces_(user_forces) {}
+        user_forces_(user_forces) {
+    if (go_on) go_on_ = [this, &go_on](double t) { return abandoned_ = abandoned_ || !go_on(t), !abandoned_; };
+  }
 
   void add_to(CutProblem& cut) {
     const std::string place = place_ + ".windows";
@@ -131,7 +133,7 @@ class Cut {
   }
 
   // Overrides of its free parameters, from those of the window before it.
-  void guess_start(ExperimentSpec& window, const CsvTable& rows, std::vector<std::string>& warnings) const {
+  void guess_start(ExperimentSpec& window, const CsvTable& rows, std::vector<std::string>& warnings) {
     IdentificationSpec alone;
     alone.experiments = {window};
     const std::vector<UnknownParameter> unknowns = free_in(scene_, alone, 0);
@@ -144,9 +146,11 @@ class Cut {
     std::vector<ExperimentStack::Member> members;
     members.push_back({0, Experiment(scene_, alone.experiments[0], place_, smoothed(model), rho, here, user_forces_)});
     ExperimentStack stack(std::move(members), unknowns, scaling, {});
+    stack.go_on = go_on_;
     LeastSquaresOptions options;
     options.tolerance = 1e-6;  // of a guess
     const LeastSquaresResult found = solve_least_squares(stack, scaling.to_x(start_of(unknowns)), options);
+    if (abandoned_) return;
     if (found.point.z.size() == 0) {
       warnings.push_back(fmt::format("{}.windows: the start of window {} could not be guessed: {}", place_,
                                      window.origin->number, found.message));
@@ -224,18 +228,21 @@ class Cut {
   const CsvTable& data_;
   const std::vector<double>& t_;
   const UserForces& user_forces_;
+  std::function<bool(double t)> go_on_;
+  bool abandoned_ = false;
 };
 
 }  // namespace
 
-CutProblem cut_into_windows(const Problem& problem, const std::vector<CsvTable>& data, const UserForces& user_forces) {
+CutProblem cut_into_windows(const Problem& problem, const std::vector<CsvTable>& data, const UserForces& user_forces,
+                            const std::function<bool(double t)>& go_on) {
   if (!problem.identification || data.size() != problem.identification->experiments.size()) return {problem, data, {}};
   CutProblem cut{problem, {}, {}};
   const IdentificationSpec& spec = *problem.identification;
   cut.problem.identification->experiments.clear();
   for (std::size_t e = 0; e < data.size(); ++e) {
     if (spec.experiments[e].windows) {
-      Cut(problem.scene, spec.experiments[e], place_of(spec, e), data[e], user_forces).add_to(cut);
+      Cut(problem.scene, spec.experiments[e], place_of(spec, e), data[e], user_forces, go_on).add_to(cut);
     } else {
       cut.problem.identification->experiments.push_back(spec.experiments[e]);
       cut.data.push_back(data[e]);

@@ -95,3 +95,15 @@ TEST_CASE("windows: what is free must act on the start", "[identification][windo
   p.identification->experiments[0].windows->start_time = 5;
   CHECK_THROWS_WITH(cut_into_windows(p, {data}), Contains("experiments[0].windows: end at 4 s"));
 }
+
+TEST_CASE("windows: the guesses of starts end on request", "[identification][windows]") {
+  const Problem p = windowed();
+  const CsvTable data = motion(p, 0);
+  int asked = 0;
+  const CutProblem cut = cut_into_windows(p, {data}, {}, [&](double) { return ++asked < 3; });
+  CHECK(asked == 3);
+  CHECK(cut.warnings.empty());
+  REQUIRE(cut.problem.identification->experiments.size() == 4);
+  const std::vector<ExperimentSpec>& windows = cut.problem.identification->experiments;
+  CHECK(windows[3].overrides == windows[2].overrides);
+}
