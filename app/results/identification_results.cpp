@@ -180,6 +180,23 @@ void add_to_result(Json& result, const Recovery& recovery) {
                                   {"scatter", p.scatter}, {"share", p.share}, {"fits", recovery.fits}};
 }
 
+void print_bootstrap(std::ostream& out, const IdentificationResult& fit, const Recovery& bootstrap) {
+  TextTable table({"bootstrap", "value", "std error", "of the table", "95 % interval", "unit"});
+  for (std::size_t k = 0; k < bootstrap.parameters.size(); ++k) {
+    const RecoveredParameter& p = bootstrap.parameters[k];
+    table.add({p.name, significant(p.truth, 9), significant(p.scatter, 3), significant(fit.parameters[k].std_error, 3),
+               fmt::format("[{}, {}]", significant(p.ci95[0]), significant(p.ci95[1])), p.unit.empty() ? "-" : p.unit});
+  }
+  out << '\n' << table.text() << fmt::format("{} of resampled residuals\n", counted(bootstrap.fits, "fit"));
+}
+
+void add_bootstrap(Json& result, const Recovery& bootstrap) {
+  result["bootstrap"] = Json::object();
+  for (const RecoveredParameter& p : bootstrap.parameters)
+    result["bootstrap"][p.name] = {
+        {"std_error", p.scatter}, {"ci95", {p.ci95[0], p.ci95[1]}}, {"bias", p.bias()}, {"fits", bootstrap.fits}};
+}
+
 void add_to_result(Json& result, const IdentificationResult& fit) {
   result["parameters"] = Json::object();
   for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
