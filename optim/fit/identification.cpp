@@ -12,6 +12,7 @@
 #include "core/expression/counted.hpp"
 #include "core/expression/did_you_mean.hpp"
 #include "optim/fit/angle_doubts.hpp"
+#include "optim/fit/experiment_influence.hpp"
 #include "optim/fit/experiment_stack.hpp"
 #include "optim/fit/profile_likelihood.hpp"
 #include "optim/fit/scored_experiment.hpp"
@@ -295,6 +296,7 @@ class Identification {
     if (usable) {
       score_all(stack, solution.point.z, sigmas_are_estimated_);
       result_.statistics = statistics_at(solution, stack, unknowns);
+      find_influences(stack, solution, unknowns);
       compare_by_likelihood(stack, solution.point.z,
                             sigmas_are_estimated_ ? SigmaEstimation(stack, spec_).scale_groups().size() : 0);
     }
@@ -308,6 +310,23 @@ class Identification {
         if (!abandoned_) result_.profiles.push_back(profile_of(stack, k, solution.x));
     if (abandoned_) result_.status = SolverStatus::stopped, result_.message = "stopped on request";
     result_.simulations += stack.simulations();
+  }
+
+  void find_influences(const ExperimentStack& stack, const LeastSquaresResult& solution,
+                       const std::vector<UnknownParameter>& unknowns) {
+    if (stack.members().size() < 2 || stack.equalities > 0 || !result_.statistics.none.empty() || options_.preflight)
+      return;
+    const Eigen::VectorXd errors = result_.statistics.std_error.cwiseQuotient(stack.scaling().rho_x(solution.x));
+    const std::vector<Eigen::VectorXd> changes = changes_without(stack, solution.point, unknowns);
+    for (std::size_t m = 0; m < changes.size(); ++m) {
+      std::optional<Influence>& most = result_.experiments[stack.members()[m].experiment].influence;
+      for (Eigen::Index k = 0; k < errors.size(); ++k) {
+        const UnknownParameter& unknown = unknowns[static_cast<std::size_t>(k)];
+        const double change = changes[m](k) / errors(k);
+        if (unknown.shared && std::isfinite(errors(k)) && (!most || std::abs(change) > std::abs(most->change)))
+          most = {unknown.description.name, change};
+      }
+    }
   }
 
   // Akaike's and Bayes' criteria (Burnham and Anderson, "Model Selection and Multimodel Inference" (2002), chapter 2):
