@@ -97,19 +97,26 @@ VectorXd ExperimentStack::sigma() const {
                     [](const Experiment& model, const Experiment::Sample& s) { return model.sigma(s.channel); });
 }
 
-std::vector<SampledRecord> ExperimentStack::records_in_time() const {
+std::vector<SampledRecord> ExperimentStack::in_time(const std::function<bool(std::size_t)>& joins_last) const {
   const VectorXd t =
       per_sample(members_, [](const Experiment& model, const Experiment::Sample& s) { return model.times()[s.time]; });
-  std::vector<SampledRecord> in_time;
+  std::vector<SampledRecord> joined;
   Index row = 0;
-  bool continued = false;
-  for (const Member& m : members_) {
-    const Index n = static_cast<Index>(m.model.samples().size());
-    if (!continued) in_time.push_back({row, {}});
-    in_time.back().t = t(Eigen::seq(in_time.back().first, row + n - 1));
-    row += n, continued = m.continues;
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    row += static_cast<Index>(members_[i].model.samples().size());
+    const Index first = joined.empty() ? 0 : joined.back().first + joined.back().t.size();
+    if (joined.empty() || !joins_last(i)) joined.push_back({first, {}});
+    joined.back().t = t(Eigen::seq(joined.back().first, row - 1));
   }
-  return in_time;
+  return joined;
+}
+
+std::vector<SampledRecord> ExperimentStack::records_in_time() const {
+  return in_time([&](std::size_t i) { return members_[i - 1].continues; });
+}
+
+std::vector<SampledRecord> ExperimentStack::motions_in_time() const {
+  return in_time([&](std::size_t i) { return members_[i].follows; });
 }
 
 std::vector<Experiment::Residuals> ExperimentStack::residuals(const VectorXd& u) {

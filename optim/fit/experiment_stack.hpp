@@ -39,6 +39,7 @@ class ExperimentStack : public LeastSquaresProblem {
     std::size_t experiment;  // in the identification
     Experiment model;
     bool continues = false;  // into the next member
+    bool follows = false;    // in time, in the same experiment of the problem file
     long most_steps = 0;     // of a simulation that went well
   };
 
@@ -55,12 +56,14 @@ class ExperimentStack : public LeastSquaresProblem {
   Eigen::Index freedom_of_variables() const { return variables() - equalities; }
   Eigen::VectorXd measured() const, sigma() const;     // per sample
   std::vector<SampledRecord> records_in_time() const;  // one per member, or per chain of those that continue
+  std::vector<SampledRecord> motions_in_time() const;  // one per member, with all that follow
   long simulations() const { return simulations_; }
   int threads = 1;                      // experiments at a time
   std::function<bool(double t)> go_on;  // within a simulation, in any thread; false abandons it
   ResidualRecords* records = nullptr;
 
  private:
+  std::vector<SampledRecord> in_time(const std::function<bool(std::size_t member)>& joins_last) const;
   void tie(const std::vector<UnknownParameter>& unknowns);
   struct Prior {
     Eigen::Index at;

@@ -90,7 +90,7 @@ class Identification {
     data.change = u_x.cwiseAbs();
     data.covariance = covariance_for(stack);
     for (const UnknownParameter& u : unknowns) data.of_one_record.push_back(!u.shared);
-    data.records = stack.records_in_time();
+    data.records = stack.records_in_time(), data.motions = stack.motions_in_time();
     data.record = stack.measured().cwiseQuotient(stack.sigma()).norm();
     const IntegratorSettings& integrator = scene_.simulation.integrator;
     if (!integrator.step) data.accuracy = std::min(kTolerances * integrator.rtol, kLeastAccuracy);
@@ -148,10 +148,11 @@ class Identification {
 
   ExperimentStack::Member member(std::size_t e, const Eigen::VectorXd& rho,
                                  const std::vector<UnknownParameter>& unknowns) const {
+    const std::optional<WindowOrigin>& origin = spec_.experiments[e].origin;
     return {e,
             Experiment(scene_, spec_.experiments[e], place_of(spec_, e), data_[e], rho,
                        unknowns_in(scene_, spec_, e, unknowns), options_.user_forces),
-            spec_.experiments[e].origin && spec_.experiments[e].origin->continues};
+            origin && origin->continues, origin && origin->number > 1};
   }
 
   // of_fit: its iterations are those of the result.

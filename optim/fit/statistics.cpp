@@ -103,7 +103,7 @@ FitStatistics fit_statistics(const FitData& data) {
   J.topRows(N) = data.J;
   if (R > 0) J.bottomRows(R) = data.J_prior * std::sqrt(variance);
   const bool sandwich = data.covariance != CovarianceType::white && std::isfinite(s.variance);
-  const ScoreVariance scores_vary(data.covariance, data.records);
+  const ScoreVariance scores_vary(data.covariance, data.records, data.motions);
   if (sandwich) {
     s.quantile = quantile_975(std::min(scores_vary.freedom(), s.degrees_of_freedom), false);
     s.covariance_type = data.covariance;

@@ -52,6 +52,7 @@ struct FitData {
   double record = 0;            // norm of what was measured, in sigma; 0: not known
   CovarianceType covariance = CovarianceType::white;  // any but automatic
   std::vector<SampledRecord> records;                 // the rows of J, where it is not white
+  std::vector<SampledRecord> motions;                 // the same in longer parts that are one in time, or empty
   std::vector<bool> of_one_record;                    // parameters that act in one record only
 };
 
