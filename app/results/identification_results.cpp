@@ -41,8 +41,8 @@ void print_influences(std::ostream& out, const IdentificationResult& fit) {
   if (strong.size() > kInfluences) strong.resize(kInfluences);
   for (const ExperimentFit* e : strong)
     out << (std::isinf(e->influence->change)
-                ? fmt::format("without {} {} is not determined\n", e->name, e->influence->parameter)
-                : fmt::format("without {} {} would change by {:.2g} standard errors\n", e->name,
+                ? fmt::format("without {}, {} is not determined\n", e->name, e->influence->parameter)
+                : fmt::format("without {}, {} would change by {:.2g} standard errors\n", e->name,
                               e->influence->parameter, e->influence->change));
 }
 

@@ -19,10 +19,10 @@ double rms_scaled(const IdentificationResult& fit) {
 std::string verdict(const VariantComparison& test, const Variant& first, const Variant& second) {
   if (!test.none.empty()) return "no F-test: " + test.none;
   const std::string& larger = test.second ? second.name : first.name;
-  std::string words = fmt::format(
-      "F({}, {}) = {:.4g}, p = {:.2g}: the {} more of {} {}", test.more, test.freedom, test.F, test.p,
-      test.more == 1 ? "parameter" : "parameters", larger,
-      test.p < kSmall ? "explain the data better than by chance" : "do not explain the data better than by chance");
+  std::string words =
+      fmt::format("F({}, {}) = {:.4g}, p {}: what {} has more explains the data {} by chance", test.more, test.freedom,
+                  test.F, test.p > 0 ? fmt::format("= {:.2g}", test.p) : "< 1e-300", larger,
+                  test.p < kSmall ? "better than" : "no better than");
   if (!test.white) words += "; residuals are correlated, so that p is too small";
   return words;
 }
