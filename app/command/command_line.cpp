@@ -142,6 +142,10 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
     sub.add_flag("--preflight", options.preflight, "say what the data hold and would determine, and fit nothing");
     sub.add_option("--recover", options.recover, "known-truth recovery: fits of so many simulated records")
         ->check(CLI::Range(2, 1'000'000));
+    sub.add_option("--bootstrap", options.bootstrap, "intervals by fits of so many records with resampled residuals")
+        ->check(CLI::Range(2, 1'000'000));
+    sub.add_option("--compare", options.compare, "another problem file: which model explains the data better")
+        ->type_name("FILE.json");
   }
   if (name == "tradeoff") {
     sub.add_option("--budget", options.budget,

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "app/json/read_problem.hpp"
 #include "app/report/motion_plots.hpp"
 #include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
@@ -11,6 +12,7 @@
 #include "app/results/preflight_results.hpp"
 #include "app/results/sensor_unit.hpp"
 #include "app/results/trajectory_csv.hpp"
+#include "app/results/variant_results.hpp"
 #include "app/results/window_results.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
@@ -105,20 +107,55 @@ IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem,
   return fit;
 }
 
-Recovery recovered(Run& run, const CutProblem& cut, const IdentificationResult& fit) {
+Recovery recovered(Run& run, const CutProblem& cut, const IdentificationResult& fit, bool bootstrap) {
+  const std::string name = bootstrap ? "bootstrap" : "recovery";
   RecoveryOptions options;
-  options.seeds = run.context.options.recover;
+  options.bootstrap = bootstrap, options.threads = case_threads(run);
+  options.seeds = bootstrap ? run.context.options.bootstrap : run.context.options.recover;
   options.simulation_progress = told(run);
   options.progress = [&](int done) {
-    run.progress.iteration(fmt::format("recovery   {} of {}", done, options.seeds));
+    run.progress.iteration(fmt::format("{}   {} of {}", name, done, options.seeds));
     return !interrupted();
   };
   Recovery recovery = recover(cut.problem, cut.data, fit, options);
   run.progress.finish();
   if (recovery.failed > 0)
-    run.warn(fmt::format("--recover: {} of {} fits of simulated records failed", recovery.failed,
-                         recovery.failed + recovery.fits));
+    run.warn(fmt::format("--{}: {} of {} fits of simulated records failed", bootstrap ? name : "recover",
+                         recovery.failed, recovery.failed + recovery.fits));
   return recovery;
+}
+
+// What is asked for beside a fit that has converged.
+void examine(Run& run, const CutProblem& cut, const IdentificationResult& fit, const std::optional<Problem>& other) {
+  const CommandOptions& options = run.context.options;
+  if (options.recover > 0 && !interrupted()) {
+    const Recovery recovery = recovered(run, cut, fit, false);
+    print_recovery(run.context.out, recovery);
+    add_to_result(run.result, recovery);
+  }
+  if (options.bootstrap > 0 && !interrupted()) {
+    const Recovery bootstrap = recovered(run, cut, fit, true);
+    print_bootstrap(run.context.out, fit, bootstrap);
+    add_bootstrap(run.result, bootstrap);
+  }
+  if (!other || interrupted()) return;
+  IdentificationOptions of_other;
+  of_other.threads = case_threads(run), of_other.simulation_progress = told(run);
+  const IdentificationResult second = run_identification(*other, data_of(*other), of_other);
+  run.progress.finish();
+  if (second.status == SolverStatus::stopped) return;
+  const Variant variants[] = {{run.problem.scene.name, fit}, {other->scene.name, second}};
+  print_comparison(run.context.out, variants[0], variants[1]);
+  add_comparison(run.result, variants[0], variants[1]);
+}
+
+// Integrated as this problem is, so that errors of the integration are the same.
+std::optional<Problem> compared_problem(const Run& run) {
+  const std::string& file = run.context.options.compare;
+  if (file.empty()) return {};
+  Problem other = read_problem(file);
+  if (!other.identification) throw std::invalid_argument(fmt::format("--compare: {} has no identification", file));
+  return other;
 }
 
 // Residuals at the initial values.
@@ -264,13 +301,15 @@ int identify_command(const CommandContext& context) {
   if (!run.problem.identification) {
     throw std::invalid_argument("identification: missing; it says which measurements to explain and what may change");
   }
+  std::optional<Problem> other = compared_problem(run);
   const std::vector<CsvTable> whole = data_of(run.problem);
   // With its drives and overrides, which the scene itself may not even assemble without.
   const Scene first = simulated_scene(run.problem, whole);
   const Mechanism mechanism(first, parameter_values(first));
   run.start();
   if (!settle_accuracy(run, first, {})) return run.finish();
-  const CutProblem cut = cut_into_windows(run.problem, whole);  // by the settled integrator
+  const CutProblem cut = cut_into_windows(run.problem, whole, {}, told(run));  // by the settled integrator
+  run.progress.finish();
   const std::vector<CsvTable>& data = cut.data;
   if (const Assembly assembly(mechanism, first.simulation.start_time); assembly.result().ok) {
     ModelSummary model = assembly.summary();
@@ -282,8 +321,9 @@ int identify_command(const CommandContext& context) {
   std::vector<std::string> left_out;
   const Problem needed = what_measurements_need(cut.problem, &left_out);
   say_left_out(run, left_out, "measurement");
-  if (context.options.preflight)  // the fit says them itself
-    for (const std::string& warning : cut.warnings) run.warn(warning);
+  const std::optional<MultistartSpec>& starts = run.problem.identification->multistart;
+  const bool cut_again = starts && !context.options.preflight;  // for the values of the best start, with its warnings
+  for (std::size_t i = 0; !cut_again && i < cut.warnings.size(); ++i) run.warn(cut.warnings[i]);
   add_windows(run, cut.problem);
   const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
   for (const std::string& warning : doubts_about_fit(needed, data, {{}, [](double) { return !interrupted(); }}))
@@ -291,19 +331,19 @@ int identify_command(const CommandContext& context) {
   if (context.options.preflight) return preflight(run, needed, data);
   LongRun long_run(run);
   const BestStart best = from_best_start(run, long_run, whole);
-  const std::optional<MultistartSpec>& starts = run.problem.identification->multistart;
   if (interrupted() && starts) return stopped_within_starts(run, long_run, best.problem);
   long_run.begin();
-  IdentificationResult fit = fitted(run, long_run, best.problem, whole, cut.problem);
+  IdentificationResult fit = cut_again ? fitted(run, long_run, best.problem, whole, cut.problem)
+                                       : fitted(run, long_run, cut.problem, data, cut.problem);
   fit.simulations += best.simulations, fit.wall_seconds += best.wall_seconds;
   add_to_result(run.result, fit);
   print_fit(context.out, fit, effort(run, starts, fit.simulations, fit.wall_seconds));
   for (const std::string& warning : fit.warnings) run.warn(warning);
-  if (context.options.recover > 0 && fit.ok() && !interrupted()) {
-    const Recovery recovery = recovered(run, cut, fit);
-    print_recovery(context.out, recovery);
-    add_to_result(run.result, recovery);
+  if (other) {
+    other->scene.simulation.integrator = scene.simulation.integrator;
+    other->scene.simulation.accuracy.reset();
   }
+  if (fit.ok()) examine(run, cut, fit, other);
   const Trajectory history = history_of(fit);
   if (fit.status == SolverStatus::stopped || interrupted()) {
     long_run.stopped("optimized.json holds the best fit so far");

@@ -55,7 +55,7 @@ void sweep(Run& run) {
   add_given_settings(run, tradeoff);
   const Problem& problem = run.problem;
   const std::vector<CsvTable> data = problem.identification ? data_of(problem) : std::vector<CsvTable>();
-  const CutProblem cut = cut_into_windows(problem, data);
+  const CutProblem cut = cut_into_windows(problem, data, {}, [](double) { return !interrupted(); });
   for (const std::string& warning : cut.warnings) run.warn(warning);
   std::optional<FitErrorMeasure> fit;
   if (problem.identification && !tradeoff.interrupted) {

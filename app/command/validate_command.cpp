@@ -6,6 +6,7 @@
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
 #include "app/starts/identify_starts.hpp"
+#include "app/terminal/interrupt.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/start/free_motion.hpp"
 #include "optim/fit/windows.hpp"
@@ -61,7 +62,7 @@ int validate_command(const CommandContext& context) {
   if (run.problem.identification) {
     Problem problem = run.problem;
     problem.scene.simulation.accuracy.reset();  // the default integrator guesses the starts
-    const CutProblem cut = cut_into_windows(problem, data_of(problem));
+    const CutProblem cut = cut_into_windows(problem, data_of(problem), {}, [](double) { return !interrupted(); });
     for (const std::string& warning : cut.warnings) run.warn(warning);
     add_windows(run, cut.problem);
   }

@@ -14,6 +14,7 @@ namespace mbsopt {
 namespace {
 
 constexpr Eigen::Index kWholeMatrix = 10;  // parameters, up to which the correlation is printed whole
+constexpr std::size_t kInfluences = 3;     // that are printed
 constexpr double kStrong = 0.9;            // correlation worth a line of its own
 
 std::string interval_of(const FittedParameter& p) {
@@ -28,6 +29,21 @@ void add_rows(TextTable& table, const std::vector<FittedParameter>& parameters) 
                std::isfinite(p.std_error) ? significant(p.std_error, 3) : "-", interval_of(p),
                p.unit.empty() ? "-" : p.unit, bound_hit(p.at_lower, p.at_upper)});
   }
+}
+
+// The experiments that a parameter depends on most, by more than a standard error.
+void print_influences(std::ostream& out, const IdentificationResult& fit) {
+  std::vector<const ExperimentFit*> strong;
+  const auto size = [](const ExperimentFit* e) { return std::abs(e->influence->change); };
+  for (const ExperimentFit& e : fit.experiments)
+    if (e.influence && size(&e) > 1) strong.push_back(&e);
+  std::ranges::stable_sort(strong, std::ranges::greater(), size);
+  if (strong.size() > kInfluences) strong.resize(kInfluences);
+  for (const ExperimentFit* e : strong)
+    out << (std::isinf(e->influence->change)
+                ? fmt::format("without {}, {} is not determined\n", e->name, e->influence->parameter)
+                : fmt::format("without {}, {} would change by {:.2g} standard errors\n", e->name,
+                              e->influence->parameter, e->influence->change));
 }
 
 void print_correlation(std::ostream& out, const IdentificationResult& fit) {
@@ -114,6 +130,7 @@ Json to_json(const ExperimentFit& e) {
                                   {"beyond_scale", c.beyond_scale},
                                   {"residuals", to_json(c.analysis)}};
   }
+  if (e.influence) json["influence"] = {{"parameter", e.influence->parameter}, {"std_errors", e.influence->change}};
   for (const FittedParameter& p : e.refitted) json["refitted"][p.name] = to_json(p);
   if (!e.message.empty()) json["message"] = e.message;
   return json;
@@ -150,6 +167,7 @@ void print_fit(std::ostream& out, const IdentificationResult& fit, const std::st
   out << '\n' << parameters.text() << '\n' << channels.text();
   print_correlation(out, fit);
   print_profiles(out, fit);
+  print_influences(out, fit);
   for (const std::string& words : fit.statistics.unidentifiable) out << "not determined by the data: " << words << '\n';
   const FitStatistics& s = fit.statistics;
   if (!s.none.empty()) out << fmt::format("no standard errors and intervals: {}\n", s.none);
@@ -178,6 +196,23 @@ void add_to_result(Json& result, const Recovery& recovery) {
   for (const RecoveredParameter& p : recovery.parameters)
     result["recovery"][p.name] = {{"truth", p.truth},     {"mean", p.mean},   {"bias", p.bias()},
                                   {"scatter", p.scatter}, {"share", p.share}, {"fits", recovery.fits}};
+}
+
+void print_bootstrap(std::ostream& out, const IdentificationResult& fit, const Recovery& bootstrap) {
+  TextTable table({"bootstrap", "value", "std error", "of the table", "95 % interval", "unit"});
+  for (std::size_t k = 0; k < bootstrap.parameters.size(); ++k) {
+    const RecoveredParameter& p = bootstrap.parameters[k];
+    table.add({p.name, significant(p.truth, 9), significant(p.scatter, 3), significant(fit.parameters[k].std_error, 3),
+               fmt::format("[{}, {}]", significant(p.ci95[0]), significant(p.ci95[1])), p.unit.empty() ? "-" : p.unit});
+  }
+  out << '\n' << table.text() << fmt::format("{} of resampled residuals\n", counted(bootstrap.fits, "fit"));
+}
+
+void add_bootstrap(Json& result, const Recovery& bootstrap) {
+  result["bootstrap"] = Json::object();
+  for (const RecoveredParameter& p : bootstrap.parameters)
+    result["bootstrap"][p.name] = {
+        {"std_error", p.scatter}, {"ci95", {p.ci95[0], p.ci95[1]}}, {"bias", p.bias()}, {"fits", bootstrap.fits}};
 }
 
 void add_to_result(Json& result, const IdentificationResult& fit) {

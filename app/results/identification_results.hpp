@@ -15,6 +15,8 @@ namespace mbsopt {
 void print_fit(std::ostream& out, const IdentificationResult& fit, const std::string& effort);
 void print_recovery(std::ostream& out, const Recovery& recovery);
 void add_to_result(Json& result, const Recovery& recovery);
+void print_bootstrap(std::ostream& out, const IdentificationResult& fit, const Recovery& bootstrap);
+void add_bootstrap(Json& result, const Recovery& bootstrap);
 // parameters, correlation, covariance, experiments, optimizer, statistics, identifiability, profiles
 void add_to_result(Json& result, const IdentificationResult& fit);
 

@@ -1,5 +1,6 @@
 #include "app/starts/residual_records.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
@@ -15,18 +16,31 @@ using Eigen::VectorXd;
 // Of residuals and their derivatives: longer records are not kept, since simulating again costs less than a journal of
 // many megabytes.
 constexpr Index kMostNumbers = 50'000;
+constexpr Index kMostColumns = 1'000'000;  // of a damaged line, before memory is asked for
 
 Experiment::Residuals residuals_of(const Json& json) {
   const auto z = json.at("z").get<std::vector<double>>(), z_u = json.at("z_u").get<std::vector<double>>();
+  const auto at = json.at("at").get<std::vector<Index>>();  // of the columns of z_u that are not zero
   const Index rows = static_cast<Index>(z.size()), columns = json.at("columns").get<Index>(),
-              numbers = static_cast<Index>(z_u.size());
-  if (columns < 0 || (rows == 0 ? numbers != 0 : numbers % rows != 0 || numbers / rows != columns))
+              written = static_cast<Index>(at.size());
+  const bool within = std::ranges::all_of(at, [&](Index k) { return 0 <= k && k < columns; });
+  if (columns < 0 || columns > kMostColumns || !within || rows * written != static_cast<Index>(z_u.size()))
     throw std::length_error("a matrix of another size");
   Experiment::Residuals r;
   r.ok = true;
   r.z = Eigen::Map<const VectorXd>(z.data(), rows);
-  r.z_u = Eigen::Map<const MatrixXd>(z_u.data(), rows, columns);
+  r.z_u.setZero(rows, columns);
+  r.z_u(Eigen::all, at) = Eigen::Map<const MatrixXd>(z_u.data(), rows, written);
   r.steps = json.at("steps").get<long>();
+  if (!json.contains("ends")) return r;
+  const auto of = [&](const char* key, VectorXd& s, MatrixXd& s_u) {
+    const auto values = json.at("ends").at(key).get<std::vector<double>>();
+    const Index n = static_cast<Index>(values.size()) / (1 + columns);
+    if (n * (1 + columns) != static_cast<Index>(values.size())) throw std::length_error("a matrix of another size");
+    s = Eigen::Map<const VectorXd>(values.data(), n);
+    s_u = Eigen::Map<const MatrixXd>(values.data() + n, n, columns);
+  };
+  of("start", r.start, r.start_u), of("end", r.end, r.end_u);
   return r;
 }
 
@@ -52,15 +66,28 @@ bool JsonResidualRecords::recall(const Asked& asked, Experiment::Residuals& foun
 }
 
 void JsonResidualRecords::record(const Asked& asked, const Experiment::Residuals& found) {
-  if (found.z.size() + found.z_u.size() > kMostNumbers) return;
+  std::vector<Index> at;
+  for (Index k = 0; k < found.z_u.cols(); ++k)
+    if (!found.z_u.col(k).isZero(0)) at.push_back(k);
+  const MatrixXd z_u = found.z_u(Eigen::all, at);
+  if (found.z.size() + z_u.size() > kMostNumbers) return;
   known_[key_of(asked)] = found;  // nor is a point simulated twice in one run
-  tell_({{"experiment", asked.experiment},
-         {"u", std::vector<double>(asked.u.begin(), asked.u.end())},
-         {"sigma", asked.sigma},
-         {"steps", found.steps},
-         {"columns", found.z_u.cols()},
-         {"z", std::vector<double>(found.z.begin(), found.z.end())},
-         {"z_u", std::vector<double>(found.z_u.data(), found.z_u.data() + found.z_u.size())}});
+  Json content{{"experiment", asked.experiment},
+               {"u", std::vector<double>(asked.u.begin(), asked.u.end())},
+               {"sigma", asked.sigma},
+               {"steps", found.steps},
+               {"columns", found.z_u.cols()},
+               {"at", at},
+               {"z", std::vector<double>(found.z.begin(), found.z.end())},
+               {"z_u", std::vector<double>(z_u.data(), z_u.data() + z_u.size())}};
+  const auto add = [&](const char* key, const VectorXd& s, const MatrixXd& s_u) {  // s, then the columns of s_u
+    std::vector<double> values(s.begin(), s.end());
+    values.insert(values.end(), s_u.data(), s_u.data() + s_u.size());
+    content["ends"][key] = values;
+  };
+  if (found.start.size() + found.end.size() > 0)
+    add("start", found.start, found.start_u), add("end", found.end, found.end_u);
+  tell_(content);
 }
 
 }  // namespace mbsopt

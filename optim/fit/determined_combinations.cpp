@@ -11,6 +11,7 @@
 #include <set>
 
 #include "core/expression/did_you_mean.hpp"
+#include "optim/fit/sums_of_products.hpp"
 
 namespace mbsopt {
 namespace {
@@ -64,7 +65,8 @@ class Group {
     // A projector's singular values are 1 and 0.
     const Eigen::JacobiSVD<MatrixXd> svd(inside, Eigen::ComputeFullU);
     const Index free = (svd.singularValues().array() > 0.5).count();
-    rows_ = reduced_rows(svd.matrixU().rightCols(c - free).transpose(), pivots_);
+    Q_ = svd.matrixU().rightCols(c - free);
+    rows_ = reduced_rows(Q_.transpose(), pivots_);
   }
 
   std::string in_words() const {
@@ -72,6 +74,7 @@ class Group {
       return fmt::format("{}: {} not influence what is measured", joined(names_), names_.size() == 1 ? "does" : "do");
     std::optional<std::vector<std::string>> terms = in_sums();
     if (!terms) terms = in_products();
+    if (!terms) terms = sums_of_products(Q_, rho_, size_, names_, units_);
     if (!terms) terms = linear_terms();
     std::string list = terms->front();
     for (std::size_t i = 1; i < terms->size(); ++i) list += (i + 1 == terms->size() ? " and " : ", ") + (*terms)[i];
@@ -161,7 +164,7 @@ class Group {
   std::vector<Index> members_;
   std::vector<std::string> names_, units_;
   VectorXd rho_, size_;
-  MatrixXd rows_;  // determined combinations, in changes over sizes
+  MatrixXd Q_, rows_;  // determined combinations, in changes over sizes: orthonormal columns, and reduced rows
   std::vector<Index> pivots_;
 };
 

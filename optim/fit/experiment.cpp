@@ -13,6 +13,7 @@
 #include "core/scene/field_visitor.hpp"
 #include "core/scene/scene_facts.hpp"
 #include "core/scene/signals.hpp"
+#include "core/start/assembly.hpp"
 #include "optim/objective/expression_cost.hpp"
 #include "optim/objective/obstructed_parameters.hpp"
 #include "optim/problem/parameter_values.hpp"
@@ -172,6 +173,17 @@ void Experiment::compile_channels(const ExperimentSpec& spec, const std::string&
   }
 }
 
+StateChart Experiment::chart_of_start(const std::vector<Unknown>& own) const {
+  const Scene scene = simulated();
+  const Assembly assembly(Mechanism(scene, rho_, active_, user_forces_), settings_.start_time);
+  if (!assembly.result().ok)
+    throw std::invalid_argument(fmt::format("the mechanism cannot be assembled at {:g} s: {}", settings_.start_time,
+                                            assembly.result().message));
+  std::vector<int> columns;
+  for (const Unknown& unknown : own) columns.push_back(unknown.parameter);
+  return {assembly.result().y, assembly.tangent()(Eigen::all, columns)};
+}
+
 Scene Experiment::simulated() const {
   Scene scene = scene_;
   scene.simulation = settings_;
@@ -217,7 +229,7 @@ void Experiment::take_samples(const ExperimentSpec& spec, const std::string& pla
     throw std::invalid_argument(
         fmt::format("{}: {} has no sample after the start at {} s{}", place, data.name, start,
                     t.empty() ? "" : fmt::format("; its times run from {} to {} s", t.front(), t.back())));
-  settings_.end_time = times_.back();
+  settings_.end_time = spec.origin && spec.origin->continues ? end : times_.back();
   for (std::size_t i = 0; i < samples_.size(); ++i)
     if (samples_[i].time == first_.size()) first_.push_back(i);
   first_.push_back(samples_.size());
@@ -299,6 +311,10 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
       settings.end_time = std::max(settings.end_time, t);
     }
 
+  const std::size_t readings = sampling.times.size();  // those of the samples; then the ends
+  if (start_chart_) sampling.times.push_back(settings.start_time);
+  if (end_chart_) sampling.times.push_back(settings_.end_time);
+
   if (const auto found = short_samples(rho, settings.end_time)) {
     r.message = fmt::format("the motion until {:.6g} s is beyond the samples of the {} '{}': {}", settings.end_time,
                             found->of_signal ? "signal" : "drive",
@@ -328,7 +344,16 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
       }
       ++seen;
     };
+    const auto take_end = [&](const StateChart& chart, const StatePoint& at, const Eigen::MatrixXd& y_rho,
+                              Eigen::VectorXd& s, Eigen::MatrixXd& s_u) {
+      Eigen::MatrixXd s_rho;
+      chart.read(at.y, y_rho, s, s_rho);
+      s_u.setZero(s.size(), u.size());
+      for (const Unknown& unknown : unknowns_) s_u.col(unknown.at) = s_rho.col(unknown.parameter);
+    };
     sampling.observe = [&](std::size_t k, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
+      if (k == readings && start_chart_) return take_end(*start_chart_, at, y_rho, r.start, r.start_u);
+      if (k >= readings) return take_end(*end_chart_, at, y_rho, r.end, r.end_u);
       if (delayed_) return take(k, at, y_rho);
       for (std::size_t i = first_[k]; i < first_[k + 1]; ++i) take(i, at, y_rho);
     };

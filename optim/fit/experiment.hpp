@@ -7,6 +7,9 @@
 // y, y_u and ydot are the dense output, its derivative in u and in time. Before the start the mechanism stays as it is
 // there; rows that a delay within its bounds could take there are left out.
 //
+// An experiment that another one continues is simulated to its end_time. Both are read there by the chart of the later
+// one's start, which says how far they are apart (experiment_stack.hpp).
+//
 //   const Experiment run1(scene, spec, table, {{"k1", 0}, {"theta0", 1}});   // parameter and number of the unknown
 //   Experiment::Residuals r = run1.residuals(u);
 #pragma once
@@ -20,6 +23,7 @@
 
 #include "core/expression/program.hpp"
 #include "core/simulate/simulation.hpp"
+#include "optim/fit/state_chart.hpp"
 #include "optim/problem/csv_table.hpp"
 #include "optim/problem/problem.hpp"
 
@@ -46,9 +50,12 @@ class Experiment {
   };
   struct Residuals {
     bool ok = false;
-    std::string message;      // why not
-    Eigen::VectorXd z;        // per sample
-    Eigen::MatrixXd z_u;      // sample x all unknowns
+    std::string message;  // why not
+    Eigen::VectorXd z;    // per sample
+    Eigen::MatrixXd z_u;  // sample x all unknowns
+    // The states at its start and at its end by their charts, where it has them, and derivatives in all unknowns.
+    Eigen::VectorXd start, end;
+    Eigen::MatrixXd start_u, end_u;
     long steps = 0;           // of the simulation
     std::vector<Jump> jumps;  // of it
   };
@@ -61,6 +68,11 @@ class Experiment {
 
   using Limits = ExperimentLimits;
   Residuals residuals(const Eigen::VectorXd& u, const Limits& limits = {}) const;
+
+  // The chart of its start, in its unknowns `own`. Throws std::invalid_argument where it cannot be assembled.
+  StateChart chart_of_start(const std::vector<Unknown>& own) const;
+  void read_start(const StateChart& chart) { start_chart_ = chart; }
+  void read_end(const StateChart& chart) { end_chart_ = chart; }
 
   // The simulated scene: with its laws and its span, at the values that are not unknown and those at which
   // the unknown ones start.
@@ -111,6 +123,7 @@ class Experiment {
   std::vector<Sample> samples_;
   std::vector<std::size_t> first_;  // sample of each time, and the end
   bool delayed_ = false;            // some channel has a delay
+  std::optional<StateChart> start_chart_, end_chart_;
 };
 
 }  // namespace mbsopt

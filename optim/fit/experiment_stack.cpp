@@ -56,6 +56,7 @@ ExperimentStack::ExperimentStack(std::vector<Member> members, const std::vector<
     row += static_cast<Index>(part.rows.size());
     for (const Experiment::Unknown& unknown : m.model.unknowns()) part.variables.push_back(unknown.at);
   }
+  tie(unknowns);
   for (const Prior& prior : priors_) {  // beside the samples that depend on its variable
     const auto depends = [&](const Dependence& part) {
       return std::ranges::find(part.variables, prior.at) != part.variables.end();
@@ -68,6 +69,25 @@ ExperimentStack::ExperimentStack(std::vector<Member> members, const std::vector<
   }
 }
 
+// The equations stand beside the samples of the member that ends there.
+void ExperimentStack::tie(const std::vector<UnknownParameter>& unknowns) {
+  Index row = size;
+  for (std::size_t i = 0; i + 1 < members_.size(); ++i) {
+    if (!members_[i].continues) continue;
+    Experiment& next = members_[i + 1].model;
+    std::vector<Experiment::Unknown> own;
+    for (const Experiment::Unknown& unknown : next.unknowns())
+      if (!unknowns[static_cast<std::size_t>(unknown.at)].shared) own.push_back(unknown);
+    const StateChart chart = next.chart_of_start(own);
+    members_[i].model.read_end(chart), next.read_start(chart);
+    std::vector<Index>& variables = parts[i].variables;
+    for (const Experiment::Unknown& unknown : next.unknowns())
+      if (std::ranges::find(variables, unknown.at) == variables.end()) variables.push_back(unknown.at);
+    for (Index k = 0; k < chart.size(); ++k) parts[i].rows.push_back(row++);
+  }
+  equalities = row - size, size = row;
+}
+
 VectorXd ExperimentStack::measured() const {
   return per_sample(members_, [](const Experiment&, const Experiment::Sample& sample) { return sample.measured; });
 }
@@ -77,17 +97,26 @@ VectorXd ExperimentStack::sigma() const {
                     [](const Experiment& model, const Experiment::Sample& s) { return model.sigma(s.channel); });
 }
 
-std::vector<SampledRecord> ExperimentStack::records_in_time() const {
+std::vector<SampledRecord> ExperimentStack::in_time(const std::function<bool(std::size_t)>& joins_last) const {
   const VectorXd t =
       per_sample(members_, [](const Experiment& model, const Experiment::Sample& s) { return model.times()[s.time]; });
-  std::vector<SampledRecord> in_time;
+  std::vector<SampledRecord> joined;
   Index row = 0;
-  for (const Member& m : members_) {
-    const Index n = static_cast<Index>(m.model.samples().size());
-    in_time.push_back({row, t.segment(row, n)});
-    row += n;
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    row += static_cast<Index>(members_[i].model.samples().size());
+    const Index first = joined.empty() ? 0 : joined.back().first + joined.back().t.size();
+    if (joined.empty() || !joins_last(i)) joined.push_back({first, {}});
+    joined.back().t = t(Eigen::seq(joined.back().first, row - 1));
   }
-  return in_time;
+  return joined;
+}
+
+std::vector<SampledRecord> ExperimentStack::records_in_time() const {
+  return in_time([&](std::size_t i) { return members_[i - 1].continues; });
+}
+
+std::vector<SampledRecord> ExperimentStack::motions_in_time() const {
+  return in_time([&](std::size_t i) { return members_[i].follows; });
 }
 
 std::vector<Experiment::Residuals> ExperimentStack::residuals(const VectorXd& u) {
@@ -134,6 +163,13 @@ void ExperimentStack::evaluate(const VectorXd& x, LeastSquaresPoint& point) {
     point.z(row) = (u(p.at) - p.mean) / p.sigma;
     point.z_x(row, p.at) = u_x(p.at) / p.sigma;
     ++row;
+  }
+  for (std::size_t i = 0; i + 1 < members_.size(); ++i) {
+    if (!members_[i].continues) continue;
+    const Index n = found[i].end.size();
+    point.z.segment(row, n) = found[i].end - found[i + 1].start;
+    point.z_x.middleRows(row, n) = (found[i].end_u - found[i + 1].start_u) * u_x.asDiagonal();
+    row += n;
   }
 }
 

@@ -1,9 +1,11 @@
 // The least-squares problem of an identification: the residuals of its experiments one below the other, then one
-// residual per prior, in the scaled variables of variable_scaling.hpp.
+// residual per prior, in the scaled variables of variable_scaling.hpp. Last come the equations of experiments that
+// continue each other:
 //
-//   z = [ z_1; z_2; ...; (u_k - mean_k)/sigma_k for each unknown with a prior ]
+//   z = [ z_1; z_2; ...; (u_k - mean_k)/sigma_k for each unknown with a prior; s(end of e) - s(start of e + 1); ... ]
 //
-// The loss does not see priors. A value free in several experiments has its prior in each.
+// The loss does not see priors. A value free in several experiments has its prior in each. s is the chart of the later
+// experiment's start (state_chart.hpp).
 //
 //   ExperimentStack stack(std::move(experiments), unknowns, scaling, spec.loss);
 //   LeastSquaresResult fit = solve_least_squares(stack, scaling.to_x(start_of(unknowns)));
@@ -36,7 +38,9 @@ class ExperimentStack : public LeastSquaresProblem {
   struct Member {
     std::size_t experiment;  // in the identification
     Experiment model;
-    long most_steps = 0;  // of a simulation that went well
+    bool continues = false;  // into the next member
+    bool follows = false;    // in time, in the same experiment of the problem file
+    long most_steps = 0;     // of a simulation that went well
   };
 
   // scaling must outlive it.
@@ -48,15 +52,19 @@ class ExperimentStack : public LeastSquaresProblem {
   std::vector<Member>& members() { return members_; }
   const std::vector<Member>& members() const { return members_; }
   const VariableScaling& scaling() const { return scaling_; }
-  Eigen::Index samples() const { return size - plain; }
+  Eigen::Index samples() const { return size - plain - equalities; }
+  Eigen::Index freedom_of_variables() const { return variables() - equalities; }
   Eigen::VectorXd measured() const, sigma() const;     // per sample
-  std::vector<SampledRecord> records_in_time() const;  // one per member
+  std::vector<SampledRecord> records_in_time() const;  // one per member, or per chain of those that continue
+  std::vector<SampledRecord> motions_in_time() const;  // one per member, with all that follow
   long simulations() const { return simulations_; }
   int threads = 1;                      // experiments at a time
   std::function<bool(double t)> go_on;  // within a simulation, in any thread; false abandons it
   ResidualRecords* records = nullptr;
 
  private:
+  std::vector<SampledRecord> in_time(const std::function<bool(std::size_t member)>& joins_last) const;
+  void tie(const std::vector<UnknownParameter>& unknowns);
   struct Prior {
     Eigen::Index at;
     double mean, sigma;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "core/simulate/simulation_warnings.hpp"
 #include "optim/differences/difference_comparison.hpp"
 #include "optim/fit/unknown_parameters.hpp"
@@ -24,10 +26,27 @@ struct Fitted {
                                  unknowns_in(scene, spec, e, unknowns), options.user_forces);
   }
 
-  // All residuals, one experiment below the other; derivatives where z_u is given.
-  bool residuals(const Eigen::VectorXd& u, Experiment::Limits limits, Eigen::VectorXd& z, Eigen::MatrixXd* z_u,
+  // Residuals at u with one unknown moved. z: at u, those of the experiments that it does not act in.
+  bool moved(const Eigen::VectorXd& u, Index k, double h, Experiment::Limits limits, Eigen::VectorXd& z) const {
+    limits.derivatives = false;
+    Eigen::VectorXd at = u;
+    at(k) += h;
+    Index row = 0;
+    for (const Experiment& experiment : experiments) {
+      const Index n = static_cast<Index>(experiment.samples().size());
+      if (std::ranges::find(experiment.unknowns(), k, &Experiment::Unknown::at) != experiment.unknowns().end()) {
+        const Experiment::Residuals r = experiment.residuals(at, limits);
+        if (!r.ok) return false;
+        z.segment(row, n) = r.z;
+      }
+      row += n;
+    }
+    return true;
+  }
+
+  // All residuals, one experiment below the other, and their derivatives.
+  bool residuals(const Eigen::VectorXd& u, const Experiment::Limits& limits, Eigen::VectorXd& z, Eigen::MatrixXd& z_u,
                  std::vector<Jump>* jumps = nullptr) const {
-    limits.derivatives = z_u != nullptr;
     std::vector<Experiment::Residuals> of;
     Index rows = 0;
     for (const Experiment& experiment : experiments) {
@@ -36,11 +55,11 @@ struct Fitted {
       rows += of.back().z.size();
     }
     z.resize(rows);
-    if (z_u) z_u->resize(rows, u.size());
+    z_u.resize(rows, u.size());
     Index row = 0;
     for (const Experiment::Residuals& r : of) {
       z.segment(row, r.z.size()) = r.z;
-      if (z_u) z_u->middleRows(row, r.z.size()) = r.z_u;
+      z_u.middleRows(row, r.z.size()) = r.z_u;
       if (jumps) jumps->insert(jumps->end(), r.jumps.begin(), r.jumps.end());
       row += r.z.size();
     }
@@ -64,7 +83,7 @@ std::vector<std::string> doubts_about_fit(const Problem& problem, const std::vec
 
   DifferenceComparison comparison;
   SimulationStatistics statistics;
-  if (!fitted.residuals(u, limits, comparison.f, &comparison.f_rho, &statistics.jumps)) return {};
+  if (!fitted.residuals(u, limits, comparison.f, comparison.f_rho, &statistics.jumps)) return {};
   Scene scene = problem.scene;
   scene.simulation = {};  // whose other warnings are said elsewhere
   std::vector<std::string> said = simulation_warnings(scene, statistics);
@@ -74,14 +93,13 @@ std::vector<std::string> doubts_about_fit(const Problem& problem, const std::vec
   comparison.groups = {{"the residuals", 0, comparison.f.size()}};
   comparison.go_on = [&] { return !abandoned; };
   comparison.at = [&](std::size_t k, double h) -> std::optional<Eigen::VectorXd> {
-    Eigen::VectorXd moved = u, z;
-    moved(static_cast<Index>(k)) += h;
-    if (!fitted.residuals(moved, limits, z, nullptr)) return std::nullopt;
+    Eigen::VectorXd z = comparison.f;
+    if (!fitted.moved(u, static_cast<Index>(k), h, limits, z)) return std::nullopt;
     return z;
   };
   comparison.tighter = [&](Eigen::VectorXd& z, Eigen::MatrixXd& z_u) {
     const std::optional<Scene> tight = with_other_tolerances(problem.scene);
-    return tight && Fitted(*tight, problem, data, unknowns, options).residuals(u, limits, z, &z_u);
+    return tight && Fitted(*tight, problem, data, unknowns, options).residuals(u, limits, z, z_u);
   };
   const std::vector<std::string> differences = comparison.warnings();
   said.insert(said.end(), differences.begin(), differences.end());

@@ -38,6 +38,12 @@ struct ChannelFit {
   std::size_t beyond_scale = 0;  // samples with |z| above the scale of the loss, which count for less than their square
 };
 
+// The shared parameter that would change most without an experiment, to first order.
+struct Influence {
+  std::string parameter;
+  double change = 0;  // in its standard errors; infinite where the other experiments do not determine it
+};
+
 struct ExperimentFit {
   std::string name;
   std::optional<WindowOrigin> window;  // where it is one
@@ -46,6 +52,7 @@ struct ExperimentFit {
   std::size_t samples = 0;
   double rms = 0;  // of measured - model over all its channels, in the columns' units
   std::vector<ChannelFit> channels;
+  std::optional<Influence> influence;     // fit: of several experiments, where there are standard errors
   std::vector<FittedParameter> refitted;  // validate: its free parameters
   std::string message;                    // validate: how the refit ended
 };

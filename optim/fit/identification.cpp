@@ -12,6 +12,7 @@
 #include "core/expression/counted.hpp"
 #include "core/expression/did_you_mean.hpp"
 #include "optim/fit/angle_doubts.hpp"
+#include "optim/fit/experiment_influence.hpp"
 #include "optim/fit/experiment_stack.hpp"
 #include "optim/fit/profile_likelihood.hpp"
 #include "optim/fit/scored_experiment.hpp"
@@ -20,7 +21,7 @@
 #include "optim/machine/stopwatch.hpp"
 #include "optim/problem/parameter_values.hpp"
 #include "optim/problem/unused_parameters.hpp"
-#include "optim/solver/levenberg_marquardt.hpp"
+#include "optim/solver/equality_multipliers.hpp"
 
 namespace mbsopt {
 namespace {
@@ -79,7 +80,8 @@ class Identification {
     const Eigen::VectorXd u_x = stack.scaling().rho_x(solution.x);
     const Eigen::MatrixXd J = solution.point.z_x * u_x.cwiseInverse().asDiagonal();
     FitData data;
-    data.J = J.topRows(stack.samples()), data.J_prior = J.bottomRows(stack.plain);
+    data.J = J.topRows(stack.samples()), data.J_prior = J.middleRows(stack.samples(), stack.plain);
+    data.C = J.bottomRows(stack.equalities);
     data.z = solution.point.z.head(stack.samples());
     data.rho = stack.scaling().to_rho(solution.x);
     data.names = names_of(unknowns, spec_);
@@ -88,7 +90,7 @@ class Identification {
     data.change = u_x.cwiseAbs();
     data.covariance = covariance_for(stack);
     for (const UnknownParameter& u : unknowns) data.of_one_record.push_back(!u.shared);
-    data.records = stack.records_in_time();
+    data.records = stack.records_in_time(), data.motions = stack.motions_in_time();
     data.record = stack.measured().cwiseQuotient(stack.sigma()).norm();
     const IntegratorSettings& integrator = scene_.simulation.integrator;
     if (!integrator.step) data.accuracy = std::min(kTolerances * integrator.rtol, kLeastAccuracy);
@@ -103,8 +105,9 @@ class Identification {
 
   // By the residuals of the experiments of the stack, which are scored already.
   CovarianceType covariance_for(const ExperimentStack& stack) const {
-    const bool many = stack.members().size() >= kManyRecords;
-    if (spec_.covariance == CovarianceType::windows && stack.members().size() < 2) return CovarianceType::newey_west;
+    const std::size_t records = stack.records_in_time().size();
+    const bool many = records >= kManyRecords;
+    if (spec_.covariance == CovarianceType::windows && records < 2) return CovarianceType::newey_west;
     if (spec_.covariance != CovarianceType::automatic) return spec_.covariance;
     for (const ExperimentStack::Member& m : stack.members())
       for (const ChannelFit& channel : result_.experiments[m.experiment].channels)
@@ -145,14 +148,17 @@ class Identification {
 
   ExperimentStack::Member member(std::size_t e, const Eigen::VectorXd& rho,
                                  const std::vector<UnknownParameter>& unknowns) const {
-    return {e, Experiment(scene_, spec_.experiments[e], place_of(spec_, e), data_[e], rho,
-                          unknowns_in(scene_, spec_, e, unknowns), options_.user_forces)};
+    const std::optional<WindowOrigin>& origin = spec_.experiments[e].origin;
+    return {e,
+            Experiment(scene_, spec_.experiments[e], place_of(spec_, e), data_[e], rho,
+                       unknowns_in(scene_, spec_, e, unknowns), options_.user_forces),
+            origin && origin->continues, origin && origin->number > 1};
   }
 
   // of_fit: its iterations are those of the result.
   LeastSquaresResult minimised(ExperimentStack& stack, const Eigen::VectorXd& x, bool of_fit) {
     LeastSquaresOptions solver = solver_options();
-    if (!of_fit) return solve_least_squares(stack, x, solver);
+    if (!of_fit) return solve_with_equalities(stack, x, solver);
     const Eigen::VectorXd sigma = stack.sigma();
     const int before = result_.iterations;
     solver.progress = [&](const LeastSquaresProgress& p) {
@@ -160,7 +166,7 @@ class Identification {
           {before + p.iteration, p.cost, p.gradient_norm, p.step_norm, stack.scaling().to_rho(p.x)});
       return !options_.progress || options_.progress(result_.history.back());
     };
-    LeastSquaresResult solution = solve_least_squares(stack, x, solver);
+    LeastSquaresResult solution = solve_with_equalities(stack, x, solver);
     if (apart_at_start_.size() == 0 && solution.z_initial.size() > 0) {
       apart_at_start_ = solution.z_initial;
       apart_at_start_.head(stack.samples()).array() *= sigma.array();
@@ -225,7 +231,7 @@ class Identification {
     const Eigen::VectorXd& z = solution.point.z;
     const Eigen::Index pulling =
         std::count_if(z.begin(), z.begin() + stack.samples(), [&](double x) { return stack.loss.at(x * x).rho1 > 0; });
-    if (pulling + stack.plain >= stack.variables()) return;
+    if (pulling + stack.plain >= stack.freedom_of_variables()) return;
     result_.status = SolverStatus::failed;
     result_.message = fmt::format(
         "{} of {} lie within the scale of the loss ({:g} sigma), beyond which a sample has no pull; they "
@@ -291,6 +297,7 @@ class Identification {
     if (usable) {
       score_all(stack, solution.point.z, sigmas_are_estimated_);
       result_.statistics = statistics_at(solution, stack, unknowns);
+      find_influences(stack, solution, unknowns);
       compare_by_likelihood(stack, solution.point.z,
                             sigmas_are_estimated_ ? SigmaEstimation(stack, spec_).scale_groups().size() : 0);
     }
@@ -306,6 +313,23 @@ class Identification {
     result_.simulations += stack.simulations();
   }
 
+  void find_influences(const ExperimentStack& stack, const LeastSquaresResult& solution,
+                       const std::vector<UnknownParameter>& unknowns) {
+    if (stack.members().size() < 2 || stack.equalities > 0 || !result_.statistics.none.empty() || options_.preflight)
+      return;
+    const Eigen::VectorXd errors = result_.statistics.std_error.cwiseQuotient(stack.scaling().rho_x(solution.x));
+    const std::vector<Eigen::VectorXd> changes = changes_without(stack, solution.point, unknowns);
+    for (std::size_t m = 0; m < changes.size(); ++m) {
+      std::optional<Influence>& most = result_.experiments[stack.members()[m].experiment].influence;
+      for (Eigen::Index k = 0; k < errors.size(); ++k) {
+        const UnknownParameter& unknown = unknowns[static_cast<std::size_t>(k)];
+        const double change = changes[m](k) / errors(k);
+        if (unknown.shared && std::isfinite(errors(k)) && (!most || std::abs(change) > std::abs(most->change)))
+          most = {unknown.description.name, change};
+      }
+    }
+  }
+
   // Akaike's and Bayes' criteria (Burnham and Anderson, "Model Selection and Multimodel Inference" (2002), chapter 2):
   //   AIC = 2 k - 2 log L,  BIC = k log N - 2 log L,  -2 log L = sum [z^2/v + log(2 pi v sigma^2)]
   // v is 1 where sigma is known or estimated, else it is the mean square of z and one more parameter.
@@ -314,7 +338,7 @@ class Identification {
     const bool scaled = sigmas == 0 && !spec_.sigma_is_known;
     const double v = scaled ? squares / N : 1;
     if (spec_.loss.type != LossType::squared || !(v > 0)) return;
-    const double k = static_cast<double>(stack.variables()) + (scaled ? 1 : static_cast<double>(sigmas));
+    const double k = static_cast<double>(stack.freedom_of_variables()) + (scaled ? 1 : static_cast<double>(sigmas));
     const double twice = squares / v + N * std::log(2 * std::numbers::pi * v) + 2 * stack.sigma().array().log().sum();
     result_.aic = 2 * k + twice, result_.bic = k * std::log(N) + twice;
   }
@@ -431,7 +455,8 @@ class Identification {
 
 IdentificationResult run_identification(const Problem& problem, const std::vector<CsvTable>& data,
                                         const IdentificationOptions& options) {
-  const CutProblem cut = cut_into_windows(what_measurements_need(problem), data, options.user_forces);
+  const CutProblem cut =
+      cut_into_windows(what_measurements_need(problem), data, options.user_forces, options.simulation_progress);
   IdentificationResult result = Identification(cut.problem, cut.data, options).run();
   result.warnings.insert(result.warnings.begin(), cut.warnings.begin(), cut.warnings.end());
   return result;

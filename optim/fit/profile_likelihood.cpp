@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "optim/solver/equality_multipliers.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -21,7 +23,7 @@ class OneHeld : public LeastSquaresProblem {
   OneHeld(LeastSquaresProblem& whole, Eigen::Index held)
       : LeastSquaresProblem(whole.variables() - 1, whole.size), whole_(whole), held_(held) {
     x_lower = without(whole.x_lower), x_upper = without(whole.x_upper);
-    plain = whole.plain, loss = whole.loss, parts = whole.parts;
+    equalities = whole.equalities, plain = whole.plain, loss = whole.loss, parts = whole.parts;
     for (Dependence& part : parts) {
       std::erase(part.variables, held);
       for (Eigen::Index& variable : part.variables) variable -= variable > held ? 1 : 0;
@@ -102,7 +104,7 @@ class Side {
       if (!point.ok) return end("it could not be evaluated there: " + point.message), std::nullopt;
       p.cost = held_.cost(point.z), p.variables = held_.with(start);
     } else {
-      const LeastSquaresResult fit = solve_least_squares(held_, start, options_.solver);
+      const LeastSquaresResult fit = solve_with_equalities(held_, start, options_.solver);
       if (fit.status == SolverStatus::failed || fit.status == SolverStatus::stopped)
         return stopped_ = fit.status == SolverStatus::stopped, end(fit.message), std::nullopt;
       p.cost = fit.cost_final, p.variables = held_.with(fit.x);

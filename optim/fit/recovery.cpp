@@ -2,11 +2,14 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <mutex>
 #include <random>
 #include <utility>
 
 #include "optim/fit/score_variance.hpp"
+#include "optim/machine/on_threads.hpp"
 
 namespace mbsopt {
 namespace {
@@ -69,44 +72,88 @@ void keep_fitted(Problem& problem, std::vector<CsvTable>& data) {
 
 }  // namespace
 
+namespace {
+
+void start_at(const IdentificationResult& fit, Problem& problem) {
+  for (const FittedParameter& p : fit.parameters) {
+    for (Parameter& shared : problem.scene.parameters)
+      if (p.experiment.empty() && shared.name == p.parameter) shared.value = p.value;
+    for (ExperimentSpec& e : problem.identification->experiments)
+      if (e.name == p.experiment) {
+        std::erase_if(e.overrides, [&](const auto& entry) { return entry.first == p.parameter; });
+        e.overrides.emplace_back(p.parameter, p.value);
+      }
+  }
+}
+
+// By linear interpolation between the order statistics.
+double percentile(std::vector<double>& values, double part) {
+  std::ranges::sort(values);
+  const double at = part * static_cast<double>(values.size() - 1);
+  const std::size_t below = static_cast<std::size_t>(at), above = std::min(below + 1, values.size() - 1);
+  return values[below] + (at - static_cast<double>(below)) * (values[above] - values[below]);
+}
+
+}  // namespace
+
 Recovery recover(const Problem& problem, const std::vector<CsvTable>& data, const IdentificationResult& fit,
                  const RecoveryOptions& options) {
   const std::vector<ChannelRecord> records = records_of(problem, data, fit);
-  const std::size_t P = fit.parameters.size();
-  std::vector<std::vector<double>> found(P);
-  std::vector<int> held(P, 0);
-  Recovery recovery;
-  for (int seed = 1; seed <= options.seeds; ++seed) {
-    std::mt19937 generator(static_cast<unsigned>(seed));
+  const bool in_blocks = options.bootstrap || fit.statistics.covariance_type != CovarianceType::white;
+  std::mutex told;
+  std::atomic<bool> stopped = false;
+  int done = 0;
+  std::vector<IdentificationResult> results(static_cast<std::size_t>(options.seeds));
+  on_threads(results.size(), options.threads, [&](std::size_t job) {
+    if (stopped) return;
+    std::mt19937 generator(static_cast<unsigned>(job + 1));
     std::vector<CsvTable> simulated = data;
     for (const ChannelRecord& record : records) {
-      const double blocks = fit.statistics.covariance_type == CovarianceType::white ? 0 : kLagPart;
+      const double blocks = in_blocks ? kLagPart : 0;
       const std::size_t block =
           std::max<std::size_t>(1, static_cast<std::size_t>(blocks * static_cast<double>(record.rows.size())));
       simulate_noise(record, block, generator, simulated[record.table]);
     }
     Problem again = problem;
+    if (options.bootstrap) start_at(fit, again);
     keep_fitted(again, simulated);
     IdentificationOptions identification;
-    identification.user_forces = options.user_forces, identification.simulation_progress = options.simulation_progress;
-    const IdentificationResult result = run_identification(again, simulated, identification);
-    if (result.status == SolverStatus::stopped) break;
+    identification.user_forces = options.user_forces;
+    identification.simulation_progress = [&](double t) {
+      const std::scoped_lock lock(told);
+      if (options.simulation_progress && !options.simulation_progress(t)) stopped = true;
+      return !stopped;
+    };
+    results[job] = run_identification(again, simulated, identification);
+    const std::scoped_lock lock(told);
+    if (options.progress && !options.progress(++done)) stopped = true;
+  });
+
+  const std::size_t P = fit.parameters.size();
+  std::vector<std::vector<double>> found(P);
+  std::vector<int> held(P, 0);
+  Recovery recovery;
+  for (const IdentificationResult& result : results) {
+    if (result.parameters.empty() || result.status == SolverStatus::stopped) continue;
     result.ok() ? ++recovery.fits : ++recovery.failed;
     for (std::size_t k = 0; result.ok() && k < P; ++k) {
       const FittedParameter& p = result.parameters[k];
       const double truth = fit.parameters[k].value;
       found[k].push_back(p.value), held[k] += p.ci95[0] <= truth && truth <= p.ci95[1];
     }
-    if (options.progress && !options.progress(seed)) break;
   }
   if (recovery.fits < 2) return recovery;
   for (std::size_t k = 0; k < P; ++k) {
     const Eigen::Map<const Eigen::ArrayXd> values(found[k].data(), recovery.fits);
     const FittedParameter& p = fit.parameters[k];
-    const double mean = values.mean();
-    recovery.parameters.push_back({p.name, p.unit, p.value, mean,
-                                   std::sqrt((values - mean).square().sum() / (recovery.fits - 1)),
-                                   static_cast<double>(held[k]) / recovery.fits});
+    const double mean = values.mean(), scatter = std::sqrt((values - mean).square().sum() / (recovery.fits - 1));
+    recovery.parameters.push_back({p.name,
+                                   p.unit,
+                                   p.value,
+                                   mean,
+                                   scatter,
+                                   static_cast<double>(held[k]) / recovery.fits,
+                                   {percentile(found[k], 0.025), percentile(found[k], 0.975)}});
   }
   return recovery;
 }

@@ -23,8 +23,9 @@ namespace mbsopt {
 struct RecoveredParameter {
   std::string name, unit;
   double truth = 0, mean = 0;
-  double scatter = 0;  // standard deviation over the fits
-  double share = 0;    // of the 95 % intervals that hold the truth
+  double scatter = 0;       // standard deviation over the fits
+  double share = 0;         // of the 95 % intervals that hold the truth
+  double ci95[2] = {0, 0};  // the percentiles 2.5 and 97.5 of the fits
   double bias() const { return mean - truth; }
 };
 
@@ -34,10 +35,13 @@ struct Recovery {
 };
 
 struct RecoveryOptions {
-  int seeds = 0;  // 1, 2, ..., seeds
+  int seeds = 0;           // 1, 2, ..., seeds
+  bool bootstrap = false;  // blocks of residuals always, and fits from the values that were found
+  int threads = 1;         // fits at a time; results do not depend on it
   std::vector<std::shared_ptr<const UserForce>> user_forces = {};
-  std::function<bool(int done)> progress = {};             // after each fit; false stops
-  std::function<bool(double t)> simulation_progress = {};  // within a simulation; false abandons it
+  // From any thread, one at a time: after each fit, false stops; within a simulation, false abandons them all.
+  std::function<bool(int done)> progress = {};
+  std::function<bool(double t)> simulation_progress = {};
 };
 
 // fit: of this problem and these data.

@@ -51,17 +51,19 @@ MatrixXd sum_of_squares(const MatrixXd& scores, const std::vector<SampledRecord>
 
 }  // namespace
 
-ScoreVariance::ScoreVariance(CovarianceType type, std::vector<SampledRecord> records)
-    : type_(type), records_(std::move(records)) {}
+ScoreVariance::ScoreVariance(CovarianceType type, std::vector<SampledRecord> records,
+                             std::vector<SampledRecord> motions)
+    : type_(type), records_(std::move(records)), motions_(motions.empty() ? records_ : std::move(motions)) {}
 
-MatrixXd ScoreVariance::within(const MatrixXd& scores) const { return sum_of_squares(scores, records_, true); }
+MatrixXd ScoreVariance::within(const MatrixXd& scores) const { return sum_of_squares(scores, motions_, true); }
 
 MatrixXd ScoreVariance::between(const MatrixXd& scores) const { return sum_of_squares(scores, records_, false); }
 
 double ScoreVariance::kept(const VectorXd& a_J, const MatrixXd& q, bool of_one_record) const {
   const double all = a_J.squaredNorm();
   double explained = 0;
-  for_sums(a_J.asDiagonal() * q, records_, !is_between(of_one_record),
+  const bool within = !is_between(of_one_record);
+  for_sums(a_J.asDiagonal() * q, within ? motions_ : records_, within,
            [&](const VectorXd& S, double weight) { explained += weight * S.squaredNorm(); });
   // So few records or samples that nothing is left would have no standard error at all.
   constexpr double kLeast = 0.05;

@@ -45,8 +45,9 @@ inline constexpr double kLagPart = 0.1;  // H over the record's duration
 
 class ScoreVariance {
  public:
-  // newey_west, or windows (between records): at least two.
-  ScoreVariance(CovarianceType type, std::vector<SampledRecord> records);
+  // newey_west, or windows (between records): at least two. motions: the records that are one in time, for within();
+  // empty: as records.
+  ScoreVariance(CovarianceType type, std::vector<SampledRecord> records, std::vector<SampledRecord> motions = {});
 
   Eigen::MatrixXd within(const Eigen::MatrixXd& scores) const;   // B of Newey and West
   Eigen::MatrixXd between(const Eigen::MatrixXd& scores) const;  // B between records
@@ -57,7 +58,7 @@ class ScoreVariance {
 
  private:
   CovarianceType type_;
-  std::vector<SampledRecord> records_;
+  std::vector<SampledRecord> records_, motions_;
 };
 
 }  // namespace mbsopt

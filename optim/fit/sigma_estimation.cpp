@@ -57,7 +57,7 @@ double SigmaEstimation::sigma(const Group& group) const {
 double SigmaEstimation::least(const Group& group) const { return std::max(kLeast * group.largest, 1e-150); }
 
 double SigmaEstimation::freedom() const {
-  const double N = static_cast<double>(stack_.samples()), P = static_cast<double>(stack_.variables());
+  const double N = static_cast<double>(stack_.samples()), P = static_cast<double>(stack_.freedom_of_variables());
   return N > P ? (N - P) / N : 1;
 }
 

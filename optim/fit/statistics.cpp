@@ -40,7 +40,7 @@ struct Variances {
 // square both are s^2.
 Variances variances(const FitData& data, long degrees_of_freedom, double s2) {
   if (data.loss.type == LossType::squared) return {data.sigma_is_known ? 1 : s2, data.sigma_is_known ? 1 : s2};
-  const double N = static_cast<double>(data.z.size()), P = static_cast<double>(data.rho.size());
+  const double N = static_cast<double>(data.z.size()), P = static_cast<double>(data.rho.size() - data.C.rows());
   if (degrees_of_freedom < 1) return {s2, s2};
   double squares = 0, slope = 0, slope_squares = 0;
   for (const double z : data.z) {
@@ -68,6 +68,12 @@ VectorXd influences(const FitData& data) {
   return psi * (static_cast<double>(psi.size()) / slope);
 }
 
+// Orthonormal columns Z with C Z = 0; C: of independent rows.
+MatrixXd null_space_of(const MatrixXd& C) {
+  const MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(C.transpose()).householderQ();
+  return Q.rightCols(C.cols() - C.rows());
+}
+
 MatrixXd scores_of(const FitData& data) {
   MatrixXd scores = influences(data).asDiagonal() * data.J;
   scores.rowwise() -= scores.colwise().mean().eval();  // zero but for the pull of priors
@@ -77,10 +83,10 @@ MatrixXd scores_of(const FitData& data) {
 }  // namespace
 
 FitStatistics fit_statistics(const FitData& data) {
-  const Index N = data.J.rows(), R = data.J_prior.rows(), P = data.rho.size();
+  const Index N = data.J.rows(), R = data.J_prior.rows(), P = data.rho.size(), M = data.C.rows();
   const VectorXd& rho = data.rho;
   FitStatistics s;
-  s.degrees_of_freedom = static_cast<long>(N + R - P);
+  s.degrees_of_freedom = static_cast<long>(N + R + M - P);
   s.residual_variance =
       s.degrees_of_freedom > 0 ? data.z.squaredNorm() / static_cast<double>(s.degrees_of_freedom) : kNaN;
   const Variances v = variances(data, s.degrees_of_freedom, s.residual_variance);
@@ -97,7 +103,7 @@ FitStatistics fit_statistics(const FitData& data) {
   J.topRows(N) = data.J;
   if (R > 0) J.bottomRows(R) = data.J_prior * std::sqrt(variance);
   const bool sandwich = data.covariance != CovarianceType::white && std::isfinite(s.variance);
-  const ScoreVariance scores_vary(data.covariance, data.records);
+  const ScoreVariance scores_vary(data.covariance, data.records, data.motions);
   if (sandwich) {
     s.quantile = quantile_975(std::min(scores_vary.freedom(), s.degrees_of_freedom), false);
     s.covariance_type = data.covariance;
@@ -122,17 +128,22 @@ FitStatistics fit_statistics(const FitData& data) {
     MatrixXd scaled(N + R, U);
     for (Index c = 0; c < U; ++c)
       scaled.col(c) = J.col(used[static_cast<std::size_t>(c)]) / length(used[static_cast<std::size_t>(c)]);
+    const MatrixXd Z = M > 0 ? null_space_of(data.C(Eigen::all, used) * length(used).cwiseInverse().asDiagonal())
+                             : MatrixXd::Identity(U, U);
+    const Index F = Z.cols();
     // Singular values of the triangular factor, which is as small as the number of parameters.
-    MatrixXd triangle = scaled;
-    if (N + R > U)
-      triangle = Eigen::HouseholderQR<MatrixXd>(scaled).matrixQR().topRows(U).triangularView<Eigen::Upper>();
+    MatrixXd triangle = scaled * Z;
+    if (N + R > F)
+      triangle =
+          Eigen::HouseholderQR<MatrixXd>(triangle).matrixQR().topRows(F).triangularView<Eigen::Upper>().toDenseMatrix();
     const Eigen::JacobiSVD<MatrixXd> svd(triangle, Eigen::ComputeFullV);
-    VectorXd sigma = VectorXd::Zero(U);
+    VectorXd sigma = VectorXd::Zero(F);
     sigma.head(svd.singularValues().size()) = svd.singularValues();
     const Index rank = (sigma.array() > std::max(kRankTolerance, data.accuracy) * sigma(0)).count();
-    if (unseen.empty()) s.condition_number = sigma(U - 1) > 0 ? sigma(0) / sigma(U - 1) : kInfinity;
+    if (unseen.empty()) s.condition_number = sigma(F - 1) > 0 ? sigma(0) / sigma(F - 1) : kInfinity;
+    const MatrixXd directions = Z * svd.matrixV();
 
-    const MatrixXd V = svd.matrixV().leftCols(rank) * sigma.head(rank).cwiseInverse().asDiagonal();
+    const MatrixXd V = directions.leftCols(rank) * sigma.head(rank).cwiseInverse().asDiagonal();
     const MatrixXd white = variance * (V * V.transpose());
     MatrixXd covariance = white;
     if (sandwich) {
@@ -164,11 +175,11 @@ FitStatistics fit_statistics(const FitData& data) {
         const double norm = std::sqrt(covariance(a, a) * covariance(b, b));
         if (a != b) s.correlation(ka, kb) = norm > 0 ? covariance(a, b) / norm : 0;
       }
-    for (Index c = rank; c < U; ++c) {
+    for (Index c = rank; c < F; ++c) {
       VectorXd direction = VectorXd::Zero(P);
       for (Index a = 0; a < U; ++a) {
         const Index k = used[static_cast<std::size_t>(a)];
-        direction(k) = svd.matrixV()(a, c) / (length(k) * size(k));
+        direction(k) = directions(a, c) / (length(k) * size(k));
       }
       unseen.push_back(direction.normalized());
     }

@@ -41,6 +41,7 @@ struct FitData {
   Eigen::MatrixXd J;        // N x P
   Eigen::VectorXd z;        // N
   Eigen::MatrixXd J_prior;  // R x P, or empty
+  Eigen::MatrixXd C;        // M x P, or empty: C d rho = 0 by equations between the parameters, which are independent
   Eigen::VectorXd rho;      // P
   std::vector<std::string> names;
   std::vector<std::string> units;  // "" where not known; or none at all
@@ -51,6 +52,7 @@ struct FitData {
   double record = 0;            // norm of what was measured, in sigma; 0: not known
   CovarianceType covariance = CovarianceType::white;  // any but automatic
   std::vector<SampledRecord> records;                 // the rows of J, where it is not white
+  std::vector<SampledRecord> motions;                 // the same in longer parts that are one in time, or empty
   std::vector<bool> of_one_record;                    // parameters that act in one record only
 };
 

@@ -83,13 +83,15 @@ CsvTable rows_between(const CsvTable& data, const std::vector<double>& t, double
 class Cut {
  public:
   Cut(const Scene& scene, const ExperimentSpec& whole, std::string place, const CsvTable& data,
-      const UserForces& user_forces)
+      const UserForces& user_forces, const std::function<bool(double t)>& go_on)
       : scene_(scene),
         whole_(whole),
         place_(std::move(place)),
         data_(data),
         t_(ascending_times(data, whole.time)),
-        user_forces_(user_forces) {}
+        user_forces_(user_forces) {
+    if (go_on) go_on_ = [this, &go_on](double t) { return abandoned_ = abandoned_ || !go_on(t), !abandoned_; };
+  }
 
   void add_to(CutProblem& cut) {
     const std::string place = place_ + ".windows";
@@ -115,7 +117,7 @@ class Cut {
       const double from = start + static_cast<double>(k) * length;
       window.start_time = from, window.end_time = last ? end : start + static_cast<double>(k + 1) * length;
       window.name = fmt::format("{}.{}", whole_.name, k + 1);
-      window.origin = {whole_.name, place_, k + 1};
+      window.origin = {whole_.name, place_, k + 1, whole_.windows->continuity && !last};
       CsvTable rows = rows_between(data_, t_, from, *window.end_time, last);
       guess_start(window, rows, cut.warnings);
       cut.problem.identification->experiments.push_back(window);
@@ -131,7 +133,7 @@ class Cut {
   }
 
   // Overrides of its free parameters, from those of the window before it.
-  void guess_start(ExperimentSpec& window, const CsvTable& rows, std::vector<std::string>& warnings) const {
+  void guess_start(ExperimentSpec& window, const CsvTable& rows, std::vector<std::string>& warnings) {
     IdentificationSpec alone;
     alone.experiments = {window};
     const std::vector<UnknownParameter> unknowns = free_in(scene_, alone, 0);
@@ -139,14 +141,16 @@ class Cut {
     const VectorXd rho = parameter_values(scene_);
     const Experiment model(scene_, window, place_, rows, rho, here, user_forces_);
     require_starts(model);
-    alone.experiments[0].end_time.reset();
+    alone.experiments[0].end_time.reset(), alone.experiments[0].origin->continues = false;
     const VariableScaling scaling = scaling_of(unknowns);
     std::vector<ExperimentStack::Member> members;
     members.push_back({0, Experiment(scene_, alone.experiments[0], place_, smoothed(model), rho, here, user_forces_)});
     ExperimentStack stack(std::move(members), unknowns, scaling, {});
+    stack.go_on = go_on_;
     LeastSquaresOptions options;
     options.tolerance = 1e-6;  // of a guess
     const LeastSquaresResult found = solve_least_squares(stack, scaling.to_x(start_of(unknowns)), options);
+    if (abandoned_) return;
     if (found.point.z.size() == 0) {
       warnings.push_back(fmt::format("{}.windows: the start of window {} could not be guessed: {}", place_,
                                      window.origin->number, found.message));
@@ -172,6 +176,13 @@ class Cut {
           fmt::format("{}.windows: the mechanism cannot be assembled at the start of a "
                       "window at {} s: {}",
                       place_, model.start_time(), assembly.result().message));
+    const int degrees = assembly.summary().degrees_of_freedom;
+    if (whole_.windows->continuity && model.unknowns().size() != 2 * static_cast<std::size_t>(degrees))
+      throw std::invalid_argument(
+          fmt::format("{}.windows.continuity: needs a start that is free in all coordinates and rates of the "
+                      "mechanism, {} numbers; "
+                      "the experiment's free parameters are {}",
+                      place_, 2 * degrees, model.unknowns().size()));
     const MatrixXd tangent = assembly.tangent();
     for (const Experiment::Unknown& unknown : model.unknowns())
       if (tangent.col(unknown.parameter).isZero(0))
@@ -217,18 +228,21 @@ class Cut {
   const CsvTable& data_;
   const std::vector<double>& t_;
   const UserForces& user_forces_;
+  std::function<bool(double t)> go_on_;
+  bool abandoned_ = false;
 };
 
 }  // namespace
 
-CutProblem cut_into_windows(const Problem& problem, const std::vector<CsvTable>& data, const UserForces& user_forces) {
+CutProblem cut_into_windows(const Problem& problem, const std::vector<CsvTable>& data, const UserForces& user_forces,
+                            const std::function<bool(double t)>& go_on) {
   if (!problem.identification || data.size() != problem.identification->experiments.size()) return {problem, data, {}};
   CutProblem cut{problem, {}, {}};
   const IdentificationSpec& spec = *problem.identification;
   cut.problem.identification->experiments.clear();
   for (std::size_t e = 0; e < data.size(); ++e) {
     if (spec.experiments[e].windows) {
-      Cut(problem.scene, spec.experiments[e], place_of(spec, e), data[e], user_forces).add_to(cut);
+      Cut(problem.scene, spec.experiments[e], place_of(spec, e), data[e], user_forces, go_on).add_to(cut);
     } else {
       cut.problem.identification->experiments.push_back(spec.experiments[e]);
       cut.data.push_back(data[e]);

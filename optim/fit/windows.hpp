@@ -10,6 +10,7 @@
 //   run_identification(cut.problem, cut.data);        // as run_identification(problem, data)
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -27,8 +28,10 @@ struct CutProblem {
   std::vector<std::string> warnings;  // of starts that could not be guessed
 };
 
-// A problem without windows remains as it is. Throws std::invalid_argument and CsvError with the place.
+// A problem without windows remains as it is. go_on: within a simulation; false leaves the other starts as they are
+// given. Throws std::invalid_argument and CsvError with the place.
 CutProblem cut_into_windows(const Problem& problem, const std::vector<CsvTable>& data,
-                            const std::vector<std::shared_ptr<const UserForce>>& user_forces = {});
+                            const std::vector<std::shared_ptr<const UserForce>>& user_forces = {},
+                            const std::function<bool(double t)>& go_on = {});
 
 }  // namespace mbsopt

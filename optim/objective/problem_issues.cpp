@@ -257,9 +257,9 @@ void check_meaning(Checker& checker, const IdentificationSpec& identification) {
         checker.issue(child_path(child_path(list, i) + ".channels", k) + ".estimate_sigma",
                       "asks for an estimate, but identification.sigma_is_known is true; one of them must be false");
   for (std::size_t i = 0; i < experiments.size(); ++i)
-    if (experiments[i].windows && experiments[i].windows->continuity)
+    if (experiments[i].validate && experiments[i].windows && experiments[i].windows->continuity)
       checker.issue(child_path(list, i) + ".windows.continuity",
-                    "is true, which is not available in this version; each window starts from values of its own");
+                    "is true in an experiment of role \"validate\", whose windows are refitted one by one");
   const auto fitted = std::count_if(experiments.begin(), experiments.end(), [](const auto& e) { return !e.validate; });
   const bool cut =
       std::any_of(experiments.begin(), experiments.end(), [](const auto& e) { return e.windows && !e.validate; });

@@ -136,13 +136,14 @@ struct ChannelSpec {
 struct WindowsSpec {
   double length = 1;                           // [s]
   std::optional<double> start_time, end_time;  // instead of the experiment's
-  bool continuity = false;                     // not available yet: problem_issues.cpp refuses true
+  bool continuity = false;                     // each ends where the next one starts
 };
 
 // Which window of which experiment of the problem file an experiment is.
 struct WindowOrigin {
   std::string experiment, place;  // its name and its path
   std::size_t number = 1;         // from 1
+  bool continues = false;         // into the next experiment: its end is the start of that
 };
 
 struct ExperimentSpec {

@@ -151,7 +151,8 @@ void describe(auto& v, Like<WindowsSpec> auto& w) {
            dimension::kTime});
   v.plain("start_time", w.start_time, kAny, {"[s]; the experiment's when absent", Need::optional, dimension::kTime});
   v.plain("end_time", w.end_time, kAny, {"[s]; the experiment's when absent", Need::optional, dimension::kTime});
-  v.plain("continuity", w.continuity, kAny, {"false: each start is free; true is not available yet"});
+  v.plain("continuity", w.continuity, kAny,
+          {"true: each window ends where the next one starts; false: each start is free"});
 }
 
 void describe(auto& v, Like<ExperimentSpec> auto& e) {

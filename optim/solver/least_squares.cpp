@@ -17,7 +17,7 @@ double ScaleGroup::squared_scale(const VectorXd& z) const {
 VectorXd LeastSquaresProblem::weights(const VectorXd& z) const {
   VectorXd w = VectorXd::Ones(z.size());
   if (loss.type != LossType::squared)
-    for (Index i = 0; i < z.size() - plain; ++i) w(i) = loss.at(z(i) * z(i)).rho1;
+    for (Index i = 0; i < z.size() - plain - equalities; ++i) w(i) = loss.at(z(i) * z(i)).rho1;
   for (const ScaleGroup& group : groups) {
     const double s2 = group.squared_scale(z);
     for (const Index i : group.rows) w(i) = 1 / s2;
@@ -26,8 +26,9 @@ VectorXd LeastSquaresProblem::weights(const VectorXd& z) const {
 }
 
 double LeastSquaresProblem::cost(const VectorXd& z) const {
-  if (groups.empty() && loss.type == LossType::squared) return 0.5 * z.squaredNorm();
-  double sum = z.tail(plain).squaredNorm();
+  const Index residuals = z.size() - equalities;
+  if (groups.empty() && loss.type == LossType::squared) return 0.5 * z.head(residuals).squaredNorm();
+  double sum = z.head(residuals).tail(plain).squaredNorm();
   VectorXd scaled = z;
   double logarithms = 0;
   for (const ScaleGroup& group : groups) {
@@ -35,7 +36,7 @@ double LeastSquaresProblem::cost(const VectorXd& z) const {
     logarithms += group.freedom * std::log(s2);
     for (const Index i : group.rows) scaled(i) /= std::sqrt(s2);
   }
-  for (Index i = 0; i < z.size() - plain; ++i) sum += loss.at(scaled(i) * scaled(i)).rho;
+  for (Index i = 0; i < residuals - plain; ++i) sum += loss.at(scaled(i) * scaled(i)).rho;
   return 0.5 * (sum + logarithms);
 }
 

@@ -1,8 +1,9 @@
 // A nonlinear least-squares problem, as every solver here sees it:
 //
-//   minimise 1/2 sum rho(z_i(x)^2) + 1/2 sum z_j(x)^2   subject to   x_lower <= x <= x_upper
+//   minimise 1/2 sum rho(z_i(x)^2) + 1/2 sum z_j(x)^2   subject to   x_lower <= x <= x_upper,   z_k(x) = 0
 //
-// rho is the loss (robust_loss.hpp); the last `plain` residuals, j, are squared whatever it is.
+// rho is the loss (robust_loss.hpp); `plain` residuals, j, are squared whatever it is. The last `equalities` rows, k,
+// are no residuals but equations between the variables (equality_multipliers.hpp).
 //
 // Residuals of a scale group have a common standard deviation s that is not known. The fit eliminates it:
 //
@@ -70,7 +71,8 @@ struct LeastSquaresProblem {
 
   Eigen::VectorXd x_lower, x_upper;  // +-infinity where there is none
   Eigen::Index size;                 // N
-  Eigen::Index plain = 0;            // of them, the last: not seen by the loss
+  Eigen::Index equalities = 0;       // of them, the last: zero at the solution
+  Eigen::Index plain = 0;            // of them, the last before the equalities: not seen by the loss
   Loss loss;
   std::vector<ScaleGroup> groups;  // disjoint
   std::vector<Dependence> parts;   // all rows, each once; empty: any row may depend on any variable

@@ -3,7 +3,9 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <set>
 #include <utility>
 
 namespace mbsopt {
@@ -23,13 +25,9 @@ std::vector<Index> all_columns(Index n) {
 }  // namespace
 
 RowBlocks::RowBlocks(std::vector<RowBlock> blocks, Index columns)
-    : blocks_(std::move(blocks)),
-      columns_(columns),
-      first_(static_cast<std::size_t>(columns)),
-      uses_(static_cast<std::size_t>(columns), 0) {
+    : blocks_(std::move(blocks)), columns_(columns), places_(static_cast<std::size_t>(columns)) {
   for (std::size_t b = 0; b < blocks_.size(); ++b)
-    for (const Index k : blocks_[b].columns)
-      if (uses_[static_cast<std::size_t>(k)]++ == 0) first_[static_cast<std::size_t>(k)] = b;
+    for (const Index k : blocks_[b].columns) places_[static_cast<std::size_t>(k)].push_back(b);
 }
 
 RowBlocks::RowBlocks(const MatrixXd& A) : RowBlocks({{all_columns(A.cols()), A}}, A.cols()) {}
@@ -61,64 +59,98 @@ VectorXd RowBlocks::column_norms() const {
   return squares.cwiseSqrt();
 }
 
+namespace {
+
+// What is left of the rows of some blocks: [A | b] with these columns.
+struct Remainder {
+  std::vector<Index> columns;
+  MatrixXd A_b;
+};
+
+// d_own from R d_own = q - S d_others.
+struct Eliminated {
+  std::vector<Index> own, others;
+  MatrixXd factors;  // [R S q]
+};
+
+// Takes the columns `own` out of these rows.
+Eliminated eliminate(std::vector<Index> own, const std::vector<Remainder>& parts, Remainder& left) {
+  std::set<Index> others;
+  Index rows = 0;
+  for (const Remainder& part : parts) {
+    rows += part.A_b.rows();
+    others.insert(part.columns.begin(), part.columns.end());
+  }
+  for (const Index k : own) others.erase(k);
+  std::vector<Index> order = own;
+  order.insert(order.end(), others.begin(), others.end());
+  std::map<Index, Index> place;
+  for (std::size_t i = 0; i < order.size(); ++i) place[order[i]] = static_cast<Index>(i);
+  const Index m = static_cast<Index>(own.size()), n = static_cast<Index>(order.size());
+  MatrixXd A_b = MatrixXd::Zero(rows, n + 1);
+  rows = 0;
+  for (const Remainder& part : parts) {
+    for (std::size_t i = 0; i < part.columns.size(); ++i)
+      A_b.col(place[part.columns[i]]).segment(rows, part.A_b.rows()) = part.A_b.col(static_cast<Index>(i));
+    A_b.rightCols(1).middleRows(rows, part.A_b.rows()) = part.A_b.rightCols(1);
+    rows += part.A_b.rows();
+  }
+  const Eigen::HouseholderQR<MatrixXd> qr(std::move(A_b));
+  const MatrixXd R = qr.matrixQR().topRows(std::min(rows, n)).triangularView<Eigen::Upper>();
+  left = {{others.begin(), others.end()}, R.bottomRows(R.rows() - m).rightCols(n - m + 1)};
+  return {std::move(own), left.columns, R.topRows(m)};
+}
+
+}  // namespace
+
 VectorXd RowBlocks::solve(const VectorXd& b, const std::vector<Index>& free) const {
+  using Places = std::vector<std::size_t>;
+  std::map<std::pair<std::size_t, Places>, std::vector<Index>> groups;  // by the number of blocks, then their order
+  for (const Index k : free)
+    if (const Places& places = places_[static_cast<std::size_t>(k)]; !places.empty())
+      groups[{places.size(), places}].push_back(k);
+
   std::vector<bool> is_free(static_cast<std::size_t>(columns_), false);
   for (const Index k : free) is_free[static_cast<std::size_t>(k)] = true;
-  // Shared columns, numbered.
-  std::vector<Index> shared, number(static_cast<std::size_t>(columns_), 0);
-  for (const Index k : free)
-    if (uses_[static_cast<std::size_t>(k)] > 1)
-      number[static_cast<std::size_t>(k)] = static_cast<Index>(shared.size()), shared.push_back(k);
+  std::vector<Remainder> remainders;
+  Index row = 0;
+  for (const RowBlock& block : blocks_) {
+    Remainder rest;
+    std::vector<Index> taken;  // columns of the block
+    for (std::size_t i = 0; i < block.columns.size(); ++i)
+      if (is_free[static_cast<std::size_t>(block.columns[i])])
+        rest.columns.push_back(block.columns[i]), taken.push_back(static_cast<Index>(i));
+    rest.A_b.resize(block.A.rows(), static_cast<Index>(taken.size()) + 1);
+    rest.A_b.leftCols(static_cast<Index>(taken.size())) = block.A(Eigen::all, taken);
+    rest.A_b.rightCols(1) = b.segment(row, block.A.rows());
+    row += block.A.rows();
+    remainders.push_back(std::move(rest));
+  }
 
-  struct Eliminated {
-    std::vector<Index> own, shared;
-    MatrixXd factors;  // [R S q], of as many rows as columns of its own
+  // Where the rows of each block are now: followed to its end.
+  std::vector<std::size_t> moved(blocks_.size());
+  std::iota(moved.begin(), moved.end(), std::size_t{0});
+  const auto where = [&](std::size_t block) {
+    while (moved[block] != block) block = moved[block] = moved[moved[block]];
+    return block;
   };
   std::vector<Eliminated> eliminated;
-  std::vector<MatrixXd> left;  // [T p]
-  Index row = 0, rows_left = 0;
-  for (const RowBlock& block : blocks_) {
-    Eliminated e;
-    std::vector<Index> places, shared_places;  // in the block
-    for (std::size_t i = 0; i < block.columns.size(); ++i) {
-      const std::size_t k = static_cast<std::size_t>(block.columns[i]);
-      if (!is_free[k]) continue;
-      (uses_[k] > 1 ? e.shared : e.own).push_back(block.columns[i]);
-      (uses_[k] > 1 ? shared_places : places).push_back(static_cast<Index>(i));
+  for (auto& [places, own] : groups) {
+    std::set<std::size_t> touched;
+    for (const std::size_t block : places.second) touched.insert(where(block));
+    std::vector<Remainder> parts;
+    for (const std::size_t block : touched) {
+      parts.push_back(std::move(remainders[block]));
+      moved[block] = *touched.begin();
     }
-    places.insert(places.end(), shared_places.begin(), shared_places.end());
-    const Index m = static_cast<Index>(e.own.size()), n = static_cast<Index>(places.size()), rows = block.A.rows();
-    MatrixXd A(rows, n + 1);
-    A.leftCols(n) = block.A(Eigen::all, places);
-    A.rightCols(1) = b.segment(row, rows);
-    row += rows;
-    const Eigen::HouseholderQR<MatrixXd> qr(std::move(A));
-    const MatrixXd R = qr.matrixQR().topRows(std::min(rows, n)).triangularView<Eigen::Upper>();
-    e.factors = R.topRows(m);
-    left.push_back(R.bottomRows(R.rows() - m).rightCols(n - m + 1));
-    rows_left += left.back().rows();
-    eliminated.push_back(std::move(e));
+    eliminated.push_back(eliminate(std::move(own), parts, remainders[*touched.begin()]));
   }
 
   VectorXd d = VectorXd::Zero(columns_);
-  if (!shared.empty()) {
-    MatrixXd T = MatrixXd::Zero(rows_left, static_cast<Index>(shared.size()));
-    VectorXd p(rows_left);
-    Index at = 0;
-    for (std::size_t i = 0; i < left.size(); ++i) {
-      const MatrixXd& rest = left[i];
-      for (std::size_t c = 0; c < eliminated[i].shared.size(); ++c)
-        T.col(number[static_cast<std::size_t>(eliminated[i].shared[c])]).segment(at, rest.rows()) =
-            rest.col(static_cast<Index>(c));
-      p.segment(at, rest.rows()) = rest.rightCols(1);
-      at += rest.rows();
-    }
-    d(shared) = T.householderQr().solve(p);
-  }
-  for (const Eliminated& e : eliminated) {
-    const Index m = static_cast<Index>(e.own.size()), s = static_cast<Index>(e.shared.size());
-    VectorXd q = e.factors.rightCols(1);
-    if (s > 0) q -= e.factors.middleCols(m, s) * d(e.shared);
+  for (std::size_t i = eliminated.size(); i-- > 0;) {
+    const Eliminated& e = eliminated[i];
+    const Index m = static_cast<Index>(e.own.size());
+    VectorXd q = e.factors.rightCols(1) - e.factors.middleCols(m, e.factors.cols() - m - 1) * d(e.others);
     e.factors.leftCols(m).triangularView<Eigen::Upper>().solveInPlace(q);
     d(e.own) = q;
   }
@@ -129,7 +161,7 @@ std::vector<std::vector<std::size_t>> RowBlocks::damped_places() const {
   std::vector<std::vector<std::size_t>> damped(blocks_.size());  // places within each block
   for (std::size_t b = 0; b < blocks_.size(); ++b)
     for (std::size_t i = 0; i < blocks_[b].columns.size(); ++i)
-      if (first_[static_cast<std::size_t>(blocks_[b].columns[i])] == b) damped[b].push_back(i);
+      if (places_[static_cast<std::size_t>(blocks_[b].columns[i])].front() == b) damped[b].push_back(i);
   return damped;
 }
 

@@ -1,13 +1,13 @@
 // A matrix in blocks of rows, each with entries in a few columns only. Its least-squares problem is solved by
-// elimination: a group of columns in the same blocks leaves the problem through the QR factors of these blocks.
+// elimination: columns of the same blocks leave the problem through the QR factors of the rows with them,
 //
-//   [ A_1          B_1 ]          [ A_b B_b | b ]  =  Q [ R_b S_b | q ]          the rows below, of all blocks b,
-//   [     A_2      B_2 ] d ~ b                          [  0  T_b | p ]          determine the shared columns
-//   [         ...  ... ]
+//   [ A  B | b ]  =  Q [ R  S | q ]          R d_A = q - S d_B
+//                      [ 0  T | p ]          T d_B ~ p: a new block, which takes the place of these rows
 //
-// So the cost is linear in the number of blocks where each has columns of its own and some that all share. One block
-// with all columns is the usual QR factorisation. Bjorck, "Numerical Methods for Least Squares Problems" (1996),
-// section 6.3.
+// those of the fewest blocks first. The cost is linear in the number of blocks where each has columns of its own, or
+// shares them with its neighbours, beside columns that all share. One block with all columns is the usual QR
+// factorisation. Bjorck, "Numerical Methods for Least Squares Problems" (1996), section 6.3; Duff and Reid, ACM
+// Transactions on Mathematical Software 9 (1983) 302.
 //
 //   RowBlocks A({{{0, 2}, A_1}, {{1, 2}, A_2}}, 3);        // columns 0 and 1 in one block each, 2 in both
 //   const VectorXd d = A.solve(b, {0, 1, 2});
@@ -49,7 +49,7 @@ class RowBlocks {
 
   std::vector<RowBlock> blocks_;
   Eigen::Index columns_;
-  std::vector<std::size_t> first_, uses_;  // per column: the first block with it, and their number
+  std::vector<std::vector<std::size_t>> places_;  // per column: the blocks with it
 };
 
 }  // namespace mbsopt

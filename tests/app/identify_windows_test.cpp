@@ -17,8 +17,10 @@ const std::string kArm = MBSOPT_SOURCE_DIR "/problems/double_pendulum/identify_w
 const std::string kMeasured = MBSOPT_SOURCE_DIR "/../shared/data/measured/dfki_double_pendulum_torque/record.csv";
 const std::string kExperiment = "identification.experiments[0].";
 
-IdentificationResult fitted(const std::vector<std::string>& sets) {
-  const Problem problem = read_problem(kArm, sets);
+const std::string kTumbling = MBSOPT_SOURCE_DIR "/problems/double_pendulum/identify_tumbling.json";
+
+IdentificationResult fitted(const std::vector<std::string>& sets, const std::string& file = kArm) {
+  const Problem problem = read_problem(file, sets);
   return run_identification(problem, {read_record(problem.identification->experiments[0])});
 }
 
@@ -61,6 +63,21 @@ TEST_CASE("the arm in windows: the parameters with which its record was made", "
     CHECK(std::abs(fit.parameters[k].value - truth[k]) < 4 * fit.parameters[k].std_error);
     CHECK(fit.parameters[k].std_error < 0.01 * truth[k]);
   }
+}
+
+TEST_CASE("the tumbling arm: windows that continue each other find what made its chaotic record",
+          "[identification][continuity]") {
+  const IdentificationResult fit = fitted({}, kTumbling);
+  INFO(fit.message);
+  REQUIRE(fit.ok());
+  CHECK(fit.evaluations <= 30);
+  const double truth[] = {0.06, 0.16, 0.05, 0.002, 0.001};
+  for (std::size_t k = 0; k < 5; ++k) {
+    INFO(fit.parameters[k].name);
+    CHECK(std::abs(fit.parameters[k].value - truth[k]) < 4 * fit.parameters[k].std_error);
+    CHECK(fit.parameters[k].std_error < 0.02 * truth[k]);
+  }
+  CHECK(fit.statistics.degrees_of_freedom == 2 * 501 - 9);
 }
 
 TEST_CASE("the measured arm in windows: the residuals of its record, and parts that agree",

@@ -18,7 +18,7 @@ MatrixXd row(double a, double b, double c) {
 }
 
 // What is said where only the given functions are measured, from their gradients at rho (rows).
-Words words_for(const MatrixXd& gradients, const VectorXd& rho, const Words& names) {
+Words words_for(const MatrixXd& gradients, const VectorXd& rho, const Words& names, const Words& units = {}) {
   const VectorXd size = (rho.array() == 0).select(1.0, rho.cwiseAbs());
   const MatrixXd scaled = gradients * size.asDiagonal();
   const Eigen::JacobiSVD<MatrixXd> svd(scaled, Eigen::ComputeFullV);
@@ -26,7 +26,7 @@ Words words_for(const MatrixXd& gradients, const VectorXd& rho, const Words& nam
   // Mixed, so that no direction is a nice one.
   MatrixXd null_space = svd.matrixV().rightCols(rho.size() - rank);
   for (Eigen::Index c = 1; c < null_space.cols(); ++c) null_space.col(c) += 0.3 * null_space.col(c - 1);
-  return determined_combinations(null_space, rho, size, names);
+  return determined_combinations(null_space, rho, size, names, units);
 }
 
 }  // namespace
@@ -94,4 +94,21 @@ TEST_CASE("parameters that no direction changes stay out of it", "[identifiabili
   CHECK(changed_parameters(direction) == std::vector<bool>{true, false, true});
   CHECK(changed_parameters(MatrixXd(3, 0)) == std::vector<bool>{false, false, false});
   CHECK(determined_combinations(MatrixXd(3, 0), VectorXd::Ones(3), VectorXd::Ones(3), {"a", "b", "c"}).empty());
+}
+
+TEST_CASE("base parameters of an arm are named as sums of products", "[identifiability]") {
+  const double m1 = 2.1, a1 = 0.037, I1 = 0.013, m2 = 0.83, a2 = 0.19, I2 = 0.021, l1 = 0.2;
+  VectorXd rho(6);
+  rho << m1, a1, I1, m2, a2, I2;
+  const Words names{"m1", "a1", "I1", "m2", "a2", "I2"}, units{"kg", "m", "kg m^2", "kg", "m", "kg m^2"};
+  MatrixXd f(4, 6);
+  f << a1, m1, 0, l1, 0, 0,                    // m1 a1 + m2 l1
+      a1 * a1, 2 * m1 * a1, 1, l1 * l1, 0, 0,  // I1 + m1 a1^2 + m2 l1^2
+      0, 0, 0, a2, m2, 0,                      // m2 a2
+      0, 0, 0, a2 * a2, 2 * m2 * a2, 1;        // I2 + m2 a2^2
+  CHECK(words_for(f, rho, names, units) ==
+        Words{"m1, a1, I1, m2, a2, I2: only m2*a2, I2 + m2*a2^2, m1*a1 + 0.2*m2 and I1 + m1*a1^2 + 0.04*m2 are "
+              "determined"});
+  CHECK(words_for(f.bottomRightCorner(2, 3), rho.tail(3), {"m", "a", "I"}, {"kg", "m", "kg m^2"}) ==
+        Words{"m, a, I: only m*a and I + m*a^2 are determined"});
 }

@@ -3,75 +3,13 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <random>
 
-#include "optim/fit/experiment.hpp"
 #include "optim/fit/identification.hpp"
-#include "optim/problem/parameter_values.hpp"
-#include "tests/core/mechanism/small_scenes.hpp"
+#include "tests/optim/fit/windowed_pendulum.hpp"
 
 using namespace mbsopt;
 using namespace mbsopt::testing;
 using Catch::Contains;
-
-namespace {
-
-constexpr double kNoise = 0.003;
-
-// A double pendulum that swings for 4 s, angles at 100 Hz, in windows of 1 s with a start each.
-Problem windowed(double length = 1) {
-  Problem p;
-  p.scene = double_pendulum();
-  p.scene.gravity = {0.0, -9.81, 0.0};
-  add_parameters(p.scene, {{"d", 0.05}, {"q1", 0.4}, {"q2", 0.7}, {"o1", 0.5}, {"o2", -1}});
-  p.scene.bodies[0].angular_velocity = vec("0", "0", "0");
-  for (const char* joint : {"A", "B"}) {
-    Rsda damper;
-    damper.joint = joint, damper.damping = f("d");
-    p.scene.forces.push_back({std::string("damper_") + joint, damper});
-  }
-  p.scene.conditions = {{"theta1", f("q1 - pi/2"), f("o1")}, {"theta2", f("q2"), f("o2")}};
-  p.scene.simulation.integrator.rtol = 1e-8;
-  p.identification.emplace();
-  p.identification->variables = {"c2", "d"};
-  ExperimentSpec e;
-  e.name = "swing", e.free = {"q1", "q2", "o1", "o2"};
-  e.windows.emplace().length = length;
-  for (const char* angle : {"theta1", "theta2"}) {
-    ChannelSpec channel;
-    channel.column = channel.sensor = angle, channel.sigma = kNoise;
-    e.channels.push_back(channel);
-  }
-  p.identification->experiments.push_back(e);
-  return p;
-}
-
-CsvTable motion(const Problem& p, double noise) {
-  CsvTable table;
-  table.name = "swing.csv", table.header = {"t", "theta1", "theta2"}, table.columns.resize(3);
-  for (std::size_t i = 0; i <= 400; ++i) {
-    table.columns[0].push_back(0.01 * static_cast<double>(i)), table.lines.push_back(i + 2);
-    table.columns[1].push_back(0), table.columns[2].push_back(0);
-  }
-  ExperimentSpec whole = p.identification->experiments[0];
-  whole.windows.reset();
-  const Experiment run(p.scene, whole, "here", table, parameter_values(p.scene), {});
-  const Experiment::Residuals r = run.residuals(Eigen::VectorXd());
-  REQUIRE(r.ok);
-  std::mt19937 generator(7);
-  std::normal_distribution<double> normal;
-  for (std::size_t i = 0; i < run.samples().size(); ++i) {
-    const Experiment::Sample& s = run.samples()[i];
-    table.columns[1 + s.channel][s.time] = -kNoise * r.z(static_cast<Eigen::Index>(i)) + noise * normal(generator);
-  }
-  return table;
-}
-
-Parameter& parameter(Problem& p, const std::string& name) {
-  return p.scene.parameters[static_cast<std::size_t>(parameter_indices(p.scene, {name}).front())];
-}
-
-}  // namespace
 
 TEST_CASE("windows take every sample once, and the last takes what is left", "[identification][windows]") {
   const CsvTable data = motion(windowed(), 0);
@@ -114,7 +52,7 @@ TEST_CASE("starts of windows are guessed from the samples, with wrong parameters
 
 TEST_CASE("windows find the parameters from wrong ones", "[identification][windows]") {
   Problem p = windowed();
-  const std::vector<CsvTable> data{motion(p, kNoise)};
+  const std::vector<CsvTable> data{motion(p, kWindowNoise)};
   parameter(p, "c2").value = 0.9, parameter(p, "d").value = 0.5;
   parameter(p, "q1").value = -0.5, parameter(p, "q2").value = -1, parameter(p, "o1").value = 3;
   const IdentificationResult result = run_identification(p, data);
@@ -124,12 +62,12 @@ TEST_CASE("windows find the parameters from wrong ones", "[identification][windo
   CHECK(result.parameters.size() == 2 + 4 * 4);
   CHECK(result.parameters[2].name == "swing.1.q1");
   CHECK(result.experiments[3].window->number == 4);
-  for (const ExperimentFit& e : result.experiments) CHECK(e.rms == Approx(kNoise).epsilon(0.2));
+  for (const ExperimentFit& e : result.experiments) CHECK(e.rms == Approx(kWindowNoise).epsilon(0.2));
 }
 
 TEST_CASE("windows give the same bits in any number of threads", "[identification][windows]") {
   const Problem p = windowed();
-  const std::vector<CsvTable> data{motion(p, kNoise)};
+  const std::vector<CsvTable> data{motion(p, kWindowNoise)};
   IdentificationOptions two;
   two.threads = 2;
   const IdentificationResult a = run_identification(p, data), b = run_identification(p, data, two);
@@ -156,4 +94,16 @@ TEST_CASE("windows: what is free must act on the start", "[identification][windo
   p = windowed();
   p.identification->experiments[0].windows->start_time = 5;
   CHECK_THROWS_WITH(cut_into_windows(p, {data}), Contains("experiments[0].windows: end at 4 s"));
+}
+
+TEST_CASE("windows: the guesses of starts end on request", "[identification][windows]") {
+  const Problem p = windowed();
+  const CsvTable data = motion(p, 0);
+  int asked = 0;
+  const CutProblem cut = cut_into_windows(p, {data}, {}, [&](double) { return ++asked < 3; });
+  CHECK(asked == 3);
+  CHECK(cut.warnings.empty());
+  REQUIRE(cut.problem.identification->experiments.size() == 4);
+  const std::vector<ExperimentSpec>& windows = cut.problem.identification->experiments;
+  CHECK(windows[3].overrides == windows[2].overrides);
 }

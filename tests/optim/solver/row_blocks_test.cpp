@@ -82,3 +82,23 @@ TEST_CASE("blocks of rows: the solution within bounds is that of the whole matri
     CHECK((d - bounded_linear_least_squares(dense(A), b, lower, upper)).norm() < 1e-12);
   }
 }
+
+TEST_CASE("blocks of rows: columns shared by neighbours leave the chain one by one", "[row_blocks]") {
+  std::mt19937 generator(7);
+  std::vector<RowBlock> blocks;
+  for (Index w = 0; w < 5; ++w) {  // two columns per link, and the last one shared by all
+    RowBlock block{{2 * w + 1, 2 * w, 12}, random_matrix(6, 3, generator)};
+    if (w < 4) block = {{2 * w, 2 * w + 1, 12, 2 * w + 3, 2 * w + 2}, random_matrix(6, 5, generator)};
+    blocks.push_back(block);
+  }
+  const RowBlocks A(blocks, 13);  // columns 10 and 11 are nowhere
+  MatrixXd all = MatrixXd::Zero(30, 13);
+  for (std::size_t w = 0; w < 5; ++w) all(Eigen::seqN(6 * static_cast<Index>(w), 6), blocks[w].columns) = blocks[w].A;
+  const VectorXd b = random_matrix(30, 1, generator);
+  const std::vector<Index> sets[] = {{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 12}, {12, 3, 8, 5}, {2, 5, 6}};
+  for (const std::vector<Index>& free : sets) {
+    VectorXd expected = VectorXd::Zero(13);
+    expected(free) = all(Eigen::all, free).householderQr().solve(b);
+    CHECK((A.solve(b, free) - expected).norm() < 1e-12);
+  }
+}

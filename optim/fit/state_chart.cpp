@@ -1,0 +1,26 @@
+#include "optim/fit/state_chart.hpp"
+
+#include <Eigen/QR>
+
+namespace mbsopt {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+StateChart::StateChart(const VectorXd& y, const MatrixXd& y_u)
+    : y0_(y), W_(y_u.completeOrthogonalDecomposition().pseudoInverse()) {}
+
+void StateChart::read(const VectorXd& y, const MatrixXd& y_rho, VectorXd& s, MatrixXd& s_rho) const {
+  const Index bodies = y.size() / 14;
+  VectorXd sign = VectorXd::Ones(y.size());
+  for (Index b = 0; b < bodies; ++b) {
+    const Index p = 7 * b + 3, pdot = 7 * (bodies + b) + 3;
+    if (y.segment<4>(p).dot(y0_.segment<4>(p)) < 0)
+      sign.segment<4>(p).setConstant(-1), sign.segment<4>(pdot).setConstant(-1);
+  }
+  s = W_ * (sign.cwiseProduct(y) - y0_);
+  s_rho = W_ * (sign.asDiagonal() * y_rho);
+}
+
+}  // namespace mbsopt

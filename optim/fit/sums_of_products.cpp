@@ -1,0 +1,168 @@
+#include "optim/fit/sums_of_products.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/expression/dimension.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index kMostParameters = 10;  // 290 terms: their triples are looked at within a second
+// Of a gradient: derivatives are exact to about 1e-10, and chance agrees to 1e-3 among some hundred terms.
+constexpr double kNothing = 1e-6;
+
+struct Term {
+  std::string text;
+  int degree = 0;
+  VectorXd gradient, left;  // times size; what the space leaves of it
+  std::optional<Dimension> dimension;
+};
+
+struct Sum {
+  std::string text;
+  double cost = 0;  // terms, then numbers, then degrees; a number stands before a term of low degree
+  VectorXd gradient;
+};
+
+class Search {
+ public:
+  Search(const MatrixXd& Q, const VectorXd& rho, const VectorXd& size, const std::vector<std::string>& names,
+         const std::vector<std::string>& units)
+      : Q_(Q), rho_(rho), size_(size), names_(names) {
+    for (const std::string& unit : units)
+      if (const std::optional<Unit> known = unit.empty() ? std::nullopt : parse_unit(unit))
+        dimensions_.push_back(known->dimension);
+    all_units_ = static_cast<Index>(dimensions_.size()) == rho.size();
+  }
+
+  std::optional<std::vector<std::string>> run() {
+    if (rho_.size() > kMostParameters) return std::nullopt;
+    find_terms();
+    find_sums();
+    std::ranges::stable_sort(sums_, {}, &Sum::cost);
+    std::vector<std::string> chosen;
+    MatrixXd basis(rho_.size(), 0);
+    for (const Sum& sum : sums_) {
+      const VectorXd unit = sum.gradient.normalized(), rest = unit - basis * (basis.transpose() * unit);
+      if (rest.norm() < kDependent) continue;
+      basis.conservativeResize(Eigen::NoChange, basis.cols() + 1);
+      basis.rightCols(1) = rest.normalized();
+      chosen.push_back(sum.text);
+      if (basis.cols() == Q_.cols()) return chosen;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  static constexpr double kDependent = 1e-4;
+
+  void add_term(const std::vector<std::pair<Index, int>>& factors) {
+    Term term;
+    term.gradient.setZero(rho_.size());
+    for (const auto& [k, power] : factors) {
+      term.text += (term.text.empty() ? "" : "*") + names_[static_cast<std::size_t>(k)];
+      if (power > 1) term.text += fmt::format("^{}", power);
+      term.degree += power;
+      term.gradient(k) = power * std::pow(rho_(k), power - 1) * size_(k);
+      for (const auto& [other, other_power] : factors)
+        if (other != k) term.gradient(k) *= std::pow(rho_(other), other_power);
+      if (all_units_) {
+        const Dimension own = pow(dimensions_[static_cast<std::size_t>(k)], power);
+        term.dimension = term.dimension ? *term.dimension * own : own;
+      }
+    }
+    if (!(term.gradient.norm() > 0) || !term.gradient.allFinite()) return;
+    term.left = term.gradient - Q_ * (Q_.transpose() * term.gradient);
+    terms_.push_back(std::move(term));
+  }
+
+  void find_terms() {
+    const Index n = rho_.size();
+    for (Index k = 0; k < n; ++k) add_term({{k, 1}});
+    for (Index k = 0; k < n; ++k)
+      for (Index l = 0; l < n; ++l) {
+        if (k < l) add_term({{k, 1}, {l, 1}});
+        if (k != l) add_term({{k, 1}, {l, 2}});
+        if (k == l) add_term({{k, 2}});
+      }
+  }
+
+  static bool of_one_unit(const Term& a, const Term& b) { return a.dimension == b.dimension; }
+
+  // left is what the space leaves of these terms with 1 or -1 before each.
+  void consider(std::vector<const Term*> terms, std::vector<double> signs, std::optional<double> last) {
+    VectorXd left = VectorXd::Zero(rho_.size()), gradient = left;
+    double length = 0, degrees = 0;
+    if (last) signs.back() = *last;
+    for (std::size_t i = 0; i < terms.size(); ++i) {
+      left += signs[i] * terms[i]->left, gradient += signs[i] * terms[i]->gradient;
+      length = std::max(length, std::abs(signs[i]) * terms[i]->gradient.norm());
+      degrees += terms[i]->degree;
+    }
+    if (left.norm() > kNothing * length || gradient.norm() < kDependent * length) return;
+    std::string text;
+    for (std::size_t i = 0; i < terms.size(); ++i) {
+      if (i > 0) text += signs[i] < 0 ? " - " : " + ";
+      if (std::abs(signs[i]) != 1) text += fmt::format("{:.4g}*", std::abs(signs[i]));
+      text += terms[i]->text;
+    }
+    sums_.push_back(
+        {text, 100.0 * static_cast<double>(terms.size()) + (last ? 50 + terms.back()->degree : 0) + degrees, gradient});
+  }
+
+  void find_sums() {
+    const bool with_numbers = rho_.size() - Q_.cols() >= 2;
+    for (const Term& a : terms_)
+      if (a.left.norm() <= kNothing * a.gradient.norm()) consider({&a}, {1}, {});
+    if (!all_units_) return;
+    std::vector<const Term*> open;  // that alone are not determined
+    for (const Term& a : terms_)
+      if (a.left.norm() > kNothing * a.gradient.norm()) open.push_back(&a);
+    // The factor of c with which it takes away most of the rest.
+    const auto factor = [](const VectorXd& rest, const Term& c) { return -rest.dot(c.left) / c.left.squaredNorm(); };
+    const auto is_number = [&](double x) { return with_numbers && std::abs(std::abs(x) - 1) > kNothing && x != 0; };
+    for (std::size_t i = 0; i < open.size(); ++i)
+      for (std::size_t j = i + 1; j < open.size(); ++j) {
+        const Term &a = *open[i], &b = *open[j];
+        if (of_one_unit(a, b))
+          for (const double sign : {1., -1.}) consider({&a, &b}, {1, sign}, {});
+        if (const double x = factor(a.left, b); is_number(x)) consider({&a, &b}, {1, x}, x);
+        if (const double x = factor(b.left, a); is_number(x)) consider({&b, &a}, {1, x}, x);
+        if (!of_one_unit(a, b)) continue;
+        for (std::size_t k = 0; k < open.size(); ++k) {
+          if (k == i || k == j) continue;
+          for (const double sign : {1., -1.}) {
+            const double x = factor(a.left + sign * b.left, *open[k]);
+            if (is_number(x)) consider({&a, &b, open[k]}, {1, sign, x}, x);
+            if (k > j && of_one_unit(a, *open[k]))
+              for (const double third : {1., -1.}) consider({&a, &b, open[k]}, {1, sign, third}, {});
+          }
+        }
+      }
+  }
+
+  const MatrixXd& Q_;
+  const VectorXd &rho_, &size_;
+  const std::vector<std::string>& names_;
+  std::vector<Dimension> dimensions_;
+  bool all_units_ = false;
+  std::vector<Term> terms_;
+  std::vector<Sum> sums_;
+};
+
+}  // namespace
+
+std::optional<std::vector<std::string>> sums_of_products(const MatrixXd& Q, const VectorXd& rho, const VectorXd& size,
+                                                         const std::vector<std::string>& names,
+                                                         const std::vector<std::string>& units) {
+  return Search(Q, rho, size, names, units).run();
+}
+
+}  // namespace mbsopt
