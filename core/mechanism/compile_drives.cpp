@@ -58,12 +58,8 @@ TimeLaw law_of(Compilation& model, const Drive& drive, const std::string& where)
       throw SceneError(where + ".law: " + *why);
     law.smooth = true;
   }
-  Symbols symbols = model.fields.symbols();
-  const int t = symbols.add_input("t");
   try {
-    const Expression of_t = drive.samples ? expression_of(*drive.samples, "samples") : drive.law;
-    const Program f(of_t, symbols), f_t = f.derivative(t), f_tt = f_t.derivative(t);
-    law.programs = {f, f_t, f_tt};
+    law.programs = model.fields.programs().law(drive.samples ? expression_of(*drive.samples, "samples") : drive.law);
   } catch (const UnknownName& e) {
     throw SceneError(where + ".law: " + e.what());
   }
