@@ -120,6 +120,7 @@ void add_to_result(Json& result, const DesignResult& design) {
                          {"infeasibility", design.violation},
                          {"true_infeasibility", design.true_violation}};
   if (design.seed) result["optimizer"]["seed"] = *design.seed;
+  if (design.mode) result["optimizer"]["assembly_mode"] = mode_json(*design.mode);
   if (design.limit_rounds > 0) result["optimizer"]["limit_rounds"] = design.limit_rounds;
   for (const DesignConflict& c : design.conflicts)
     result["conflicts"].push_back({{"limit", c.limit}, {"missed", c.missed}, {"price", c.price}});
@@ -219,6 +220,8 @@ int design_command(const CommandContext& context) {
   for (const std::string& warning : design.warnings) run.warn(warning);
   for (const std::string& warning : design.final_evaluation.warnings) run.warn(warning);
   warn_of_stiffness(run, design.final_evaluation.statistics, true);
+  const bool other_poses = design.mode && !design.mode->bodies.empty();
+  if (other_poses) run.take_poses(design.mode->bodies);
   const SimulatedMotion after = interrupted() ? SimulatedMotion{} : simulated_motion(run, design.rho);
   if (cut_off || design.status == SolverStatus::stopped || interrupted()) {
     long_run.stopped("optimized.json holds the best design so far");
@@ -226,7 +229,8 @@ int design_command(const CommandContext& context) {
     run.failed(design.message);
   }
   const Trajectory history = history_of(design);
-  run.write("optimized.json", optimized_problem_text(run, new_values(design)));
+  run.write("optimized.json",
+            optimized_problem_text(run, new_values(design), design.mode ? design.mode->bodies : std::vector<Body>{}));
   run.write("history.csv", to_csv(history));
   if (!after.trajectory.rows.empty()) write_trajectory(run, after.trajectory);
   run.write("report.html",

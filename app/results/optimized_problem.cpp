@@ -13,6 +13,22 @@
 namespace mbsopt {
 namespace {
 
+nlohmann::json json_of(const Field& field) {
+  return field.is_number() ? nlohmann::json(field.number()) : nlohmann::json(field.text());
+}
+template <std::size_t N>
+nlohmann::json json_of(const std::array<Field, N>& fields) {
+  nlohmann::json json = nlohmann::json::array();
+  for (const Field& field : fields) json.push_back(json_of(field));
+  return json;
+}
+nlohmann::json json_of(const OrientationField& field) {
+  if (const auto* const e = std::get_if<EulerParametersField>(&field)) return json_of(e->e);
+  if (const auto* const a = std::get_if<AxisAngleField>(&field))
+    return {{"axis", json_of(a->axis)}, {"angle", json_of(a->angle)}};
+  return {{"rpy", json_of(std::get<RollPitchYawField>(field).rpy)}};
+}
+
 std::string experiment_path(std::size_t index) { return child_path("identification.experiments", index); }
 
 // The values that parameters take in one experiment: its overrides.
@@ -28,9 +44,16 @@ std::string with_experiment_values(std::string text, const Problem& problem, con
 
 }  // namespace
 
-std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& values) {
+std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& values,
+                                   const std::vector<Body>& poses) {
   const CommandOptions& options = run.context.options;
-  return optimized_problem_text(options.problem_file, options.sets, run.problem, values, run.folder.path());
+  std::string text = optimized_problem_text(options.problem_file, options.sets, run.problem, values, run.folder.path());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::string body = child_path("bodies", i);
+    text = with_value(text, body + ".position", json_of(poses[i].position).dump());
+    text = with_value(text, body + ".orientation", json_of(poses[i].orientation).dump());
+  }
+  return text;
 }
 
 std::string optimized_problem_text(const std::string& problem_file, const std::vector<std::string>& sets,

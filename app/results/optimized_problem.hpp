@@ -18,7 +18,9 @@ struct NewValue {
 
 class Run;
 
-std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& values);
+// poses: of the scene's bodies, where they are to be written, too.
+std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& values,
+                                   const std::vector<Body>& poses = {});
 
 // problem: as read from that file with those --set; folder: where the text will lie.
 std::string optimized_problem_text(const std::string& problem_file, const std::vector<std::string>& sets,

@@ -53,6 +53,8 @@ class Run {
   // In place of what the file says (accuracy_results.hpp).
   void simulate_with(const SimulationSettings& settings) { problem_.scene.simulation = settings; }
 
+  void take_poses(const std::vector<Body>& bodies) { problem_.scene.bodies = bodies; }
+
   // How it ended, unless all went well.
   // exit 1; last_good_time: of the motion, where it is the simulation that failed
   void failed(const std::string& message, std::optional<double> last_good_time = {});

@@ -69,16 +69,20 @@ Problem at_start(Problem problem, int start, const Eigen::VectorXd& values) {
   return problem;
 }
 
-// The problem of each start.
-std::function<Problem(int)> starts_of(const Problem& problem) {
+// The problem of each start: with all branches, run k of them begins at start k / modes in mode k % modes.
+std::function<Problem(int)> starts_of(const Problem& problem, int modes) {
   const MultistartSpec& spec = *problem.design->multistart;
-  return [problem, values = start_values(designed(problem), spec, *spec.seed)](int start) {
-    return at_start(problem, start, values[static_cast<std::size_t>(start)]);
+  return [problem, modes, values = start_values(designed(problem), spec, *spec.seed)](int run) {
+    return at_start(problem, run, values[static_cast<std::size_t>(run / modes)]);
   };
 }
 
+std::optional<int> mode_of(int run, const std::optional<int>& modes) {
+  return modes ? std::optional(run % *modes) : std::nullopt;
+}
+
 // In a worker process: the run from one start, with the points it computed, from which the best run is told again.
-Json record_of_start(const Problem& problem, const NlpScale& scale, int start) {
+Json record_of_start(const Problem& problem, const NlpScale& scale, std::optional<int> mode, int start) {
   Json points = Json::array(), hessians = Json::array();
   JsonPointRecords records({}, {}, [&](const char* kind, const Json& content) {
     (std::string_view(kind) == "point" ? points : hessians).push_back(content);
@@ -87,7 +91,7 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, int start) {
   options.records = &records;
   options.simulation_progress = [](double) { return !interrupted(); };
   options.progress = [](const DesignRow&) { return !interrupted(); };
-  options.scale = scale;
+  options.scale = scale, options.mode = mode;
   options.compare_differences = false;  // once, at the best one's start
   const DesignResult design = run_design(problem, options);
   const bool evaluated = !design.history.empty();
@@ -101,6 +105,7 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, int start) {
               {"evaluations", design.evaluations},
               {"simulations", design.simulations},
               {"wall_seconds", design.wall_seconds}};
+  if (design.mode) record["assembly_mode"] = mode_json(*design.mode);
   for (const DesignVariable& v : design.variables)
     record["from"][v.name] = v.initial, record["parameters"][v.name] = v.value;
   record["points"] = std::move(points), record["hessians"] = std::move(hessians);
@@ -108,7 +113,7 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, int start) {
 }
 
 // The run of a record, from the points that it knows.
-DesignResult told_again(const Problem& problem, const NlpScale& scale, const Json& record) {
+DesignResult told_again(const Problem& problem, const NlpScale& scale, std::optional<int> mode, const Json& record) {
   JsonPointRecords records(record.at("points").get<std::vector<Json>>(), record.at("hessians").get<std::vector<Json>>(),
                            [](const char*, const Json&) {});
   const auto go_on = [&] { return !interrupted() || !records.all_recalled(); };
@@ -116,7 +121,7 @@ DesignResult told_again(const Problem& problem, const NlpScale& scale, const Jso
   options.records = &records;
   options.simulation_progress = [&](double) { return go_on(); };
   options.progress = [&](const DesignRow&) { return go_on(); };
-  options.scale = scale;
+  options.scale = scale, options.mode = mode;
   return run_design(problem, options);
 }
 
@@ -158,9 +163,10 @@ void describe_unmoved(const Problem& problem, const Eigen::VectorXd& before, Des
 }
 
 // problem: with its seeds.
-Json task_of(const Problem& problem, const NlpScale& scale) {
+Json task_of(const Problem& problem, const NlpScale& scale, const std::optional<int>& modes) {
   Json task{{"seed", *problem.design->multistart->seed}, {"scale", {{"f", scale.f}, {"c", numbers(scale.c)}}}};
   if (problem.design->optimizer.seed) task["optimizer_seed"] = *problem.design->optimizer.seed;
+  if (modes) task["modes"] = *modes;
   if (problem.design->sharpness) task["sharpness"] = *problem.design->sharpness;
   return task;
 }
@@ -170,22 +176,33 @@ DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& seeded,
   until_interrupted.simulation_progress = run.watched("simulating");
   Problem problem = seeded;
   problem.design->sharpness = design_sharpness(seeded, until_interrupted);
-  const MultistartSpec& spec = *problem.design->multistart;
-  const auto from = starts_of(problem);
+  MultistartSpec spec = *problem.design->multistart;
+  std::optional<int> modes;
+  if (spec.all_branches) {
+    modes = design_modes(problem);
+    if (*modes == 0)
+      throw std::invalid_argument(
+          "design.multistart.branches: 'all' needs drives that leave nothing free, and a start that closes");
+    spec.starts *= *modes;
+  }
+  const auto from = starts_of(problem, modes.value_or(1));
   const NlpScale scale = design_scale(from(0), until_interrupted);
   const MultistartOutcome outcome =
-      run_multistart(run, long_run, spec, design_start_work(problem, task_of(problem, scale)));
+      run_multistart(run, long_run, spec, design_start_work(problem, task_of(problem, scale, modes)));
   const Json* const best = outcome.best();
   DesignOutcome result;
   result.interrupted = outcome.interrupted;
   result.design =
-      best ? told_again(from((*best)["start"].get<int>()), scale, *best) : run_design(from(0), until_interrupted);
+      best ? told_again(from((*best)["start"].get<int>()), scale, mode_of((*best)["start"].get<int>(), modes), *best)
+           : run_design(from(0), until_interrupted);
   if (best) describe_given(problem, before, result.design);
   result.design.simulations += outcome.simulations, result.design.wall_seconds += outcome.wall_seconds;
   return result;
 }
 
 }  // namespace
+
+Json mode_json(const DesignMode& mode) { return {{"mode", mode.mode}, {"of", mode.of}}; }
 
 StartWork design_start_work(Problem problem, const Json& task) {
   problem.design->multistart->seed = task.at("seed").get<long>();
@@ -194,7 +211,11 @@ StartWork design_start_work(Problem problem, const Json& task) {
   const std::vector<double> c = task.at("scale").at("c").get<std::vector<double>>();
   const NlpScale scale{task["scale"].at("f").get<double>(),
                        Eigen::Map<const Eigen::VectorXd>(c.data(), static_cast<Eigen::Index>(c.size()))};
-  return {task, [from = starts_of(problem), scale](int start) { return record_of_start(from(start), scale, start); }};
+  std::optional<int> modes;
+  if (task.contains("modes")) modes = task["modes"].get<int>();
+  return {task, [from = starts_of(problem, modes.value_or(1)), scale, modes](int start) {
+            return record_of_start(from(start), scale, mode_of(start, modes), start);
+          }};
 }
 
 DesignOutcome minimised(Run& run, LongRun& long_run, const Eigen::VectorXd& before) {

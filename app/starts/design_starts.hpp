@@ -7,6 +7,9 @@
 
 namespace mbsopt {
 
+// mode, of.
+Json mode_json(const DesignMode& mode);
+
 struct DesignOutcome {
   DesignResult design;
   bool interrupted = false;  // before all starts had finished

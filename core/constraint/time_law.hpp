@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <optional>
+#include <memory>
 
 #include "core/expression/program.hpp"
 
@@ -12,9 +12,9 @@ namespace mbsopt {
 
 struct TimeLaw {
   double constant = 0;
-  int slot = -1;                                   // row of the constant among the differentiated fields
-  std::optional<std::array<Program, 3>> programs;  // f, f_t, f_tt; inputs: all parameters, then t
-  bool smooth = false;                             // a spline through samples, which needs no search for jumps
+  int slot = -1;                                           // row of the constant among the differentiated fields
+  std::shared_ptr<const std::array<Program, 3>> programs;  // f, f_t, f_tt; inputs: all parameters, then t
+  bool smooth = false;                                     // a spline through samples, which needs no search for jumps
 
   struct Jet {
     double f, f_t, f_tt;

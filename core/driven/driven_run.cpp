@@ -113,6 +113,8 @@ void DrivenRun::go_through_panels(const Take& take) {
       const double stop_at = events.stop_after(t);
       h = std::min(h, largest_panel());
       t1 = h >= (stop_at - t) * (1 - 1e-12) ? stop_at : t + h;
+      // Without integrals a panel ends at the next event, so that no part of the path is solved twice.
+      if (const double event = schedule_.next_time(); running_.empty() && event > t) t1 = std::min(t1, event);
     }
     from_ = path_.state();
     const Panel outcome = try_panel(t1);
@@ -191,9 +193,9 @@ DrivenRun::Panel DrivenRun::try_panel(double t1) {
 bool DrivenRun::take_panel(double t1, const Take& take) {
   std::span<const SampleEvent> events = schedule_.take(t1);
   const bool walks = !events.empty() || !nodes_.empty();
-  const DrivenState end = path_.state();
   if (!walks) return true;
-  path_.start(from_);
+  const DrivenState end = path_.state();
+  if (!nodes_.empty() || events.front().time < t1) path_.start(from_);
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
     if (!take_events_until(nodes_[k].t, events, take)) return false;
     path_.start(nodes_[k]);
@@ -218,15 +220,18 @@ bool DrivenRun::take_panel(double t1, const Take& take) {
 
 bool DrivenRun::take_events_until(double t, std::span<const SampleEvent>& events, const Take& take) {
   while (!events.empty() && events.front().time <= t) {
-    const SampleEvent& e = events.front();
-    if (!go_to(e.time)) {
+    const double time = events.front().time;
+    if (!go_to(time)) {
       stop(SimulationStatus::step_too_small, why_it_ends());
       return false;
     }
-    if (e.cost) result_.psi(e.objective) += e.cost->value(point());
-    const DrivenTerm term{e.cost, e.objective, 1, e.index};
-    if (take && !take(point(), std::span(&term, 1))) return false;
-    events = events.subspan(1);
+    at_instant_.clear();
+    for (; !events.empty() && events.front().time == time; events = events.subspan(1)) {
+      const SampleEvent& e = events.front();
+      if (e.cost) result_.psi(e.objective) += e.cost->value(point());
+      at_instant_.push_back({e.cost, e.objective, 1, e.index});
+    }
+    if (take && !take(point(), at_instant_)) return false;
   }
   return true;
 }

@@ -74,10 +74,11 @@ class DrivenRun {
   const bool differentiated_;
   const double shortest_;            // step or panel [s]
   std::vector<DrivenTerm> running_;  // of one node
-  std::vector<DrivenState> nodes_;   // of the panel; none without running costs
-  DrivenState from_;                 // where the panel begins
-  std::vector<double> g_;            // running cost x node
-  Eigen::VectorXd absolute_;         // integral of |g| so far, per cost
+  std::vector<DrivenTerm> at_instant_;
+  std::vector<DrivenState> nodes_;  // of the panel; none without running costs
+  DrivenState from_;                // where the panel begins
+  std::vector<double> g_;           // running cost x node
+  Eigen::VectorXd absolute_;        // integral of |g| so far, per cost
   std::vector<PanelIntegral> integrals_;
   SimulationResult result_;
 };

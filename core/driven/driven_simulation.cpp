@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 #include <vector>
 
 #include "core/cvodes/cvodes.hpp"
 #include "core/driven/driven_run.hpp"
+#include "core/dynamics/planar_bodies.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
@@ -26,13 +28,26 @@ std::string why_integrated(const MechanismData& d, const SimulationSettings& s) 
   return "";
 }
 
+// Whether a gradient in y has a part out of the plane. That in the plane is rounding where the drives settle the state.
+bool leaves_plane(const MechanismData& d, Eigen::VectorXd y_bar) {
+  const PlanarBodies plane(*d.planar);
+  for (int i = 1; i <= d.n; ++i) {
+    for (const Eigen::Index first : {7 * (i - 1), 7 * (d.n + i - 1)}) {
+      const std::size_t body = static_cast<std::size_t>(i);
+      plane.add_vector(-1.0 * plane.vector(y_bar, first), first, y_bar);
+      plane.add_turn(body, -1.0 * plane.turn(body, y_bar, first + 3), first + 3, y_bar);
+    }
+  }
+  return y_bar.any();
+}
+
 // Derivatives of the state in rho at one instant. The constraints say all of it in space. In a plane they say nothing
 // of the coordinates out of it, which stay as they were assembled: y = P(y0(rho), rho), P the projection.
 class DrivenDerivatives {
  public:
   DrivenDerivatives(const Mechanism& mechanism, Model model)
       : data_(mechanism.data()),
-        projector_(make_projector(mechanism, Projection::position_velocity, model)),
+        projector_(make_projector(mechanism, Projection::position_velocity, model, Free::nothing)),
         unmoved_(projector_->solution()),
         blocks_(parameter_blocks(data_)),
         y_bar_(Eigen::VectorXd::Zero(mechanism.states())),
@@ -61,11 +76,11 @@ class DrivenDerivatives {
     term.cost->add_gradient(at, term.weight, y_bar_, rho_bar_);
     psi_rho.row(term.objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
   }
-  // The same into the assembled state, fields and parameters.
-  void add_backward(const DrivenTerm& term, const StatePoint& at, Eigen::VectorXd& y0_bar, Eigen::VectorXd& theta_bar,
-                    Eigen::VectorXd& rho_bar) {
+  // The same of all terms of one objective, into the assembled state, fields and parameters.
+  void add_backward(std::span<const DrivenTerm> terms, const StatePoint& at, Eigen::VectorXd& y0_bar,
+                    Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) {
     y_bar_.setZero();
-    term.cost->add_gradient(at, term.weight, y_bar_, rho_bar);
+    for (const DrivenTerm& term : terms) term.cost->add_gradient(at, term.weight, y_bar_, rho_bar);
     projector_->add_adjoint(y_bar_, y0_bar, theta_bar, rho_bar);
   }
   long factorisations() const { return projector_->factorisations(); }
@@ -86,7 +101,7 @@ bool is_solved(const Mechanism& mechanism, const SimulationSettings& settings, c
   const MechanismData& d = mechanism.data();
   if (settings.solve == Solve::dynamics) return false;
   const std::string reason = d.drive_names.empty() ? "there are no drives" : why_integrated(d, settings);
-  const int free = reason.empty() && start.result().ok ? start.summary().degrees_of_freedom : 0;
+  const int free = reason.empty() && start.result().ok ? start.degrees_of_freedom() : 0;
   if (settings.solve == Solve::kinematics && (!reason.empty() || free > 0)) {
     throw std::invalid_argument(fmt::format(
         "simulation.solve: cannot be \"kinematics\": {}",
@@ -121,12 +136,13 @@ SimulationResult driven_tlm(const Mechanism& mechanism, const SimulationSettings
     if (!derivatives.linearise(at)) return false;
     ++result.statistics.linearised_states;
     const Eigen::MatrixXd& y_rho = derivatives.y_rho(y0_rho);
+    const bool observed = std::ranges::any_of(terms, [](const DrivenTerm& term) { return !term.cost; });
+    if (observed && !dynamics.evaluate(at.t, at.y, at.angles, ydot)) return false;
     for (const DrivenTerm& term : terms) {
       if (term.cost) {
         derivatives.add_forward(term, at, result.psi_rho);
         continue;
       }
-      if (!dynamics.evaluate(at.t, at.y, at.angles, ydot)) return false;
       StatePoint with_rate = at;
       with_rate.ydot = &ydot;
       sampling.observe(term.observation, with_rate, y_rho);
@@ -149,16 +165,20 @@ SimulationResult driven_adjoint(const Mechanism& mechanism, const SimulationSett
   run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
     if (!derivatives.linearise(at)) return false;
     ++result.statistics.linearised_states;
-    for (const DrivenTerm& term : terms) {
-      const std::size_t o = static_cast<std::size_t>(term.objective);
-      derivatives.add_backward(term, at, y0_bar[o], theta_bar[o], rho_bar[o]);
+    while (!terms.empty()) {  // those of one objective stand together
+      const auto other = std::ranges::find_if(
+          terms, [&](const DrivenTerm& term) { return term.objective != terms.front().objective; });
+      const std::size_t o = static_cast<std::size_t>(terms.front().objective),
+                        count = static_cast<std::size_t>(other - terms.begin());
+      derivatives.add_backward(terms.first(count), at, y0_bar[o], theta_bar[o], rho_bar[o]);
+      terms = terms.subspan(count);
     }
     return true;
   });
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   for (std::size_t o = 0; o < costs.size(); ++o) {
     d.add_to_rho(theta_bar[o], rho_bar[o]);
-    if (run.model() == Model::planar) {
+    if (run.model() == Model::planar && leaves_plane(d, y0_bar[o])) {
       Eigen::MatrixXd of_start = rho_bar[o];
       start.add_adjoint(y0_bar[o], of_start);
       rho_bar[o] = of_start;

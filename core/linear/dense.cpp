@@ -46,6 +46,44 @@ Eigen::VectorXcd left_eigenvector(const MatrixXd& A, std::complex<double> lambda
 
 VectorXd cholesky_solve(const MatrixXd& A, const VectorXd& b) { return A.llt().solve(b); }
 
+VectorXd definite_solve(const MatrixXd& A, const VectorXd& b, double threshold) {
+  const Eigen::LLT<MatrixXd> factor(A);
+  if (factor.info() != Eigen::Success || A.size() == 0) return {};
+  const VectorXd pivots = factor.matrixLLT().diagonal().cwiseAbs2();
+  if (!(pivots.minCoeff() >= threshold * pivots.maxCoeff())) return {};
+  return factor.solve(b);
+}
+
+struct SquareFactor::Factors {
+  Eigen::PartialPivLU<MatrixXd> lu;
+  VectorXd x;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows;
+};
+
+SquareFactor::SquareFactor() : factors_(std::make_unique<Factors>()) {}
+SquareFactor::SquareFactor(SquareFactor&&) noexcept = default;
+SquareFactor::~SquareFactor() = default;
+
+bool SquareFactor::compute(const MatrixXd& A) {
+  constexpr double kSingular = 1e-14;
+  factors_->lu.compute(A);
+  const auto pivots = factors_->lu.matrixLU().diagonal().cwiseAbs();
+  return A.size() > 0 && pivots.minCoeff() > kSingular * pivots.maxCoeff();
+}
+void SquareFactor::solve(Eigen::Ref<VectorXd> b) const {
+  factors_->x = factors_->lu.solve(b);
+  b = factors_->x;
+}
+void SquareFactor::solve_lanes(
+    Eigen::Ref<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> b) const {
+  factors_->rows = factors_->lu.solve(b);
+  b = factors_->rows;
+}
+void SquareFactor::solve_transposed(Eigen::Ref<VectorXd> b) const {
+  factors_->x = factors_->lu.transpose().solve(b);
+  b = factors_->x;
+}
+
 MatrixXd null_space(const MatrixXd& A, double threshold) {
   if (A.rows() == 0) return MatrixXd::Identity(A.cols(), A.cols());
   Eigen::ColPivHouseholderQR<MatrixXd> qr;

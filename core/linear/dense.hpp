@@ -28,6 +28,8 @@ Eigen::VectorXcd left_eigenvector(const Eigen::MatrixXd& A, std::complex<double>
 
 // Solves A x = b of a symmetric positive definite A by Cholesky.
 Eigen::VectorXd cholesky_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
+// The same; empty if a pivot is below this part of the largest, or not positive.
+Eigen::VectorXd definite_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b, double threshold);
 
 // An orthonormal basis of { x : A x = 0 } as columns, by QR of A' with column pivoting. threshold: the pivots below
 // this part of the largest count as zero.
@@ -43,6 +45,24 @@ struct LeftSingular {
   Eigen::MatrixXd U;
 };
 LeftSingular left_singular(const Eigen::MatrixXd& A);
+
+// Factors of a small square matrix, by elimination with row pivoting.
+class SquareFactor {
+ public:
+  SquareFactor();
+  SquareFactor(SquareFactor&&) noexcept;
+  ~SquareFactor();
+
+  bool compute(const Eigen::MatrixXd& A);  // false where A is singular to rounding
+  // b becomes x of A x = b, or of A'x = b. _lanes: of several b, its columns.
+  void solve(Eigen::Ref<Eigen::VectorXd> b) const;
+  void solve_lanes(Eigen::Ref<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> b) const;
+  void solve_transposed(Eigen::Ref<Eigen::VectorXd> b) const;
+
+ private:
+  struct Factors;
+  std::unique_ptr<Factors> factors_;
+};
 
 // The complete orthogonal decomposition A P = Q [T 0; 0 0] Z (Golub and Van Loan, "Matrix Computations", section 5.4).
 // Its solutions are the least-squares solutions of least norm, whatever the rank.

@@ -15,8 +15,9 @@ std::vector<int> active_list(const Eigen::VectorXd& rho, const std::vector<bool>
 
 }  // namespace
 
-Compilation::Compilation(const Scene& s, const Eigen::VectorXd& rho, const std::vector<bool>& active)
-    : scene(s), fields(s, rho, active_list(rho, active)) {
+Compilation::Compilation(const Scene& s, const Eigen::VectorXd& rho, const std::vector<bool>& active,
+                         std::shared_ptr<ScenePrograms> programs)
+    : scene(s), fields(std::move(programs), rho, active_list(rho, active)) {
   data.rho = rho;
   data.active = active_list(rho, active);
   data.gravity = numbers(keep(data.slot_gravity, fields.values(scene.gravity, "gravity")));

@@ -17,7 +17,8 @@
 namespace mbsopt {
 
 struct Compilation {
-  Compilation(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active);
+  Compilation(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active,
+              std::shared_ptr<ScenePrograms> programs);
 
   const Scene& scene;
   FieldValues fields;

@@ -87,12 +87,13 @@ void scale_alpha(MechanismData& data) {
 }  // namespace
 
 MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active,
-                      std::vector<std::shared_ptr<const UserForce>> user_forces) {
+                      std::vector<std::shared_ptr<const UserForce>> user_forces,
+                      std::shared_ptr<ScenePrograms> programs) {
   if (rho.size() != static_cast<Eigen::Index>(scene.parameters.size())) {
     throw SceneError("parameters: " + std::to_string(rho.size()) + " values were given for " +
                      std::to_string(scene.parameters.size()) + " parameters");
   }
-  Compilation model(scene, rho, active);
+  Compilation model(scene, rho, active, programs ? std::move(programs) : std::make_shared<ScenePrograms>(scene));
   compile_signals(model);
   compile_bodies(model);
   compile_joints(model);

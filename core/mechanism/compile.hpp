@@ -1,4 +1,4 @@
-// Scene -> MechanismData. Throws SceneError with the place in the scene.
+// Scene -> MechanismData. Throws SceneError with the place in the scene. programs: of this scene; null: new ones.
 #pragma once
 
 #include <memory>
@@ -9,7 +9,10 @@
 
 namespace mbsopt {
 
+class ScenePrograms;
+
 MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active,
-                      std::vector<std::shared_ptr<const UserForce>> user_forces);
+                      std::vector<std::shared_ptr<const UserForce>> user_forces,
+                      std::shared_ptr<ScenePrograms> programs);
 
 }  // namespace mbsopt

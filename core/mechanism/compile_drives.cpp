@@ -2,6 +2,7 @@
 #include "core/mechanism/compilation.hpp"
 #include "core/mechanism/kinks_in_time.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/scene_programs.hpp"
 #include "core/scene/signals.hpp"
 
 namespace mbsopt {
@@ -59,13 +60,10 @@ TimeLaw law_of(Compilation& model, const Drive& drive, const std::string& where)
       throw SceneError(where + ".law: " + *why);
     law.smooth = true;
   }
-  Symbols symbols = model.fields.symbols();
-  const int t = symbols.add_input("t");
   try {
-    const Expression of_t = drive.samples ? expression_of(*drive.samples, "samples") : drive.law;
-    const Program f(of_t, symbols), f_t = f.derivative(t), f_tt = f_t.derivative(t);
-    law.programs = {f, f_t, f_tt};
-    add_kinks_in_time(f_tt, t, model.data.rho, model.data.kinks);
+    ScenePrograms& programs = model.fields.programs();
+    law.programs = drive.samples ? programs.law(*drive.samples) : programs.law(drive.law);
+    add_kinks_in_time((*law.programs)[2], static_cast<int>(model.data.rho.size()), model.data.rho, model.data.kinks);
   } catch (const UnknownName& e) {
     throw SceneError(where + ".law: " + e.what());
   }

@@ -3,25 +3,24 @@
 #include <cmath>
 
 #include "core/scene/scene_error.hpp"
-#include "core/scene/signals.hpp"
 
 namespace mbsopt {
 
-FieldValues::FieldValues(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<int>& active)
-    : rho_(rho), active_index_(active), active_(static_cast<Eigen::Index>(active.size())) {
-  for (const Parameter& p : scene.parameters) symbols_.add_input(p.name);
-  for (const Definition& d : scene.definitions) symbols_.add_definition(d.name, d.value);
-  add_signals(symbols_, scene);
-}
+FieldValues::FieldValues(std::shared_ptr<ScenePrograms> programs, const Eigen::VectorXd& rho,
+                         const std::vector<int>& active)
+    : programs_(std::move(programs)),
+      rho_(rho),
+      active_index_(active),
+      active_(static_cast<Eigen::Index>(active.size())) {}
 
 Dual FieldValues::value(const Field& field, const std::string& where) const {
   if (field.is_number()) return constant(field.number());
   try {
-    const Program program(field, symbols_);
-    Program::Scratch scratch = program.scratch();
+    const std::shared_ptr<const Program> program = programs_->field(field);
+    Program::Scratch scratch = program->scratch();
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(rho_.size());
     const std::span<const double> x(rho_.data(), static_cast<std::size_t>(rho_.size()));
-    const double v = program.add_gradient(
+    const double v = program->add_gradient(
         x, 1.0, std::span<double>(gradient.data(), static_cast<std::size_t>(rho_.size())), scratch);
     Eigen::VectorXd d(active_);
     for (Eigen::Index k = 0; k < active_; ++k) d(k) = gradient(active_index_[static_cast<std::size_t>(k)]);

@@ -11,6 +11,7 @@
 
 #include "core/expression/program.hpp"
 #include "core/linear/fixed_size.hpp"
+#include "core/mechanism/scene_programs.hpp"
 #include "core/scene/scene.hpp"
 
 namespace mbsopt {
@@ -21,7 +22,7 @@ using DualVector = std::array<Dual, N>;
 
 class FieldValues {
  public:
-  FieldValues(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<int>& active);
+  FieldValues(std::shared_ptr<ScenePrograms> programs, const Eigen::VectorXd& rho, const std::vector<int>& active);
 
   // where: place in the scene, for errors ("bodies[2].mass"). Throws SceneError on unknown names and values not finite.
   Dual value(const Field& field, const std::string& where) const;
@@ -33,7 +34,8 @@ class FieldValues {
   }
   Dual constant(double x) const { return Dual(x, Eigen::VectorXd::Zero(active_)); }
 
-  const Symbols& symbols() const { return symbols_; }  // parameters (inputs, in order) and definitions
+  ScenePrograms& programs() const { return *programs_; }
+  const Symbols& symbols() const { return programs_->symbols(); }
 
   // Slot of some numbers: their derivatives become consecutive rows; -1 when all of them are zero.
   template <std::size_t N>
@@ -49,7 +51,7 @@ class FieldValues {
   Eigen::MatrixXd theta_rho() const;  // all rows given out, slots x active
 
  private:
-  Symbols symbols_;
+  std::shared_ptr<ScenePrograms> programs_;
   Eigen::VectorXd rho_;
   std::vector<int> active_index_;
   Eigen::Index active_ = 0;

@@ -10,8 +10,9 @@
 namespace mbsopt {
 
 Mechanism::Mechanism(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active,
-                     std::vector<std::shared_ptr<const UserForce>> user_forces)
-    : data_(std::make_shared<const MechanismData>(compile(scene, rho, active, std::move(user_forces)))) {}
+                     std::vector<std::shared_ptr<const UserForce>> user_forces, std::shared_ptr<ScenePrograms> programs)
+    : data_(std::make_shared<const MechanismData>(
+          compile(scene, rho, active, std::move(user_forces), std::move(programs)))) {}
 
 int Mechanism::bodies() const { return data_->n; }
 int Mechanism::states() const { return 14 * data_->n; }

@@ -13,6 +13,7 @@
 
 namespace mbsopt {
 
+class ScenePrograms;   // scene_programs.hpp
 struct MechanismData;  // mechanism_data.hpp
 struct UserForce;      // core/force/user_force.hpp
 struct StatePoint;
@@ -20,9 +21,10 @@ struct StatePoint;
 class Mechanism {
  public:
   // rho: one value per scene.parameters, in their order. active[k]: whether derivatives in rho_k are wanted (empty:
-  // all).
+  // all). programs: the scene's expressions, from other mechanisms of the same scene; null: they are compiled.
   Mechanism(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active = {},
-            std::vector<std::shared_ptr<const UserForce>> user_forces = {});
+            std::vector<std::shared_ptr<const UserForce>> user_forces = {},
+            std::shared_ptr<ScenePrograms> programs = nullptr);
 
   int bodies() const;  // the ground not counted
   int states() const;  // of y: 14 per body

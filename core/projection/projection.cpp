@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/linear/dense.hpp"
 #include "core/projection/body_in_plane.hpp"
 #include "core/projection/body_in_space.hpp"
 #include "core/projection/projection_iterations.hpp"
@@ -21,6 +22,9 @@ ProjectionSolution Projector::solution() const {
 
 namespace {
 
+// More unknowns than these are solved faster by blocks.
+constexpr Eigen::Index kDenseUnknowns = 48;
+
 // Accelerations of body i (1-based), of size 1, that no symmetry of a mechanism leaves a direction out of.
 template <int N>
 Vec<N> test_load(int i) {
@@ -38,10 +42,11 @@ class ProjectorOf final : public Projector {
   static constexpr int N = Space::kUnknowns;
 
  public:
-  ProjectorOf(const Mechanism& mechanism, Projection what);
+  ProjectorOf(const Mechanism& mechanism, Projection what, Free free);
 
   bool project(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y,
                ProjectionSolution& s) override;
+  bool settle(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y) override;
   bool linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, const Eigen::VectorXd& y,
                  const ProjectionSolution& s) override;
   void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override;
@@ -50,7 +55,7 @@ class ProjectorOf final : public Projector {
   void response(Eigen::VectorXd& out) override;
   double position_violation(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y) override;
   double velocity_violation(double t, const Eigen::VectorXd& y) override;
-  long factorisations() const override { return solver_.factorisations(); }
+  long factorisations() const override { return solver_.factorisations() + square_factorisations_; }
 
  private:
   using X = Vec<N>;
@@ -58,7 +63,10 @@ class ProjectorOf final : public Projector {
   using Frames = std::vector<typename Space::Frame>;
 
   bool constrained() const { return rows_.count() > 0; }
-  bool factor(double t, const Y& y_hat);  // of S(q~)
+  void read_hat(double t, const Y& y_hat);
+  bool factor(double t, const Y& y_hat);                // of S(q~)
+  bool factor_square();                                 // J at the frames
+  void solve_square(const Y& rows, std::vector<X>& x);  // J x = rows
   // Calls f(body, its number without the ground, its frame).
   template <class F>
   void for_bodies(F&& f) {
@@ -79,6 +87,12 @@ class ProjectorOf final : public Projector {
   void subtract_mass_bar(const std::vector<X>& x, Y& theta_bar) const {
     for (std::size_t i = 0; i < x.size(); ++i) Space::subtract_mass_bar(data_, i + 1, x_[i], x[i], theta_bar);
   }
+
+  const bool square_;  // J, which is factored as it is
+  long square_factorisations_ = 0;
+  SquareFactor J_factor_;
+  Eigen::MatrixXd J_;
+  ProjectionSolution settled_;
 
   BlockSaddleSolver<typename Space::Rows> solver_;  // factor of S(q~)
   typename Space::Rows rows_;                       // J at the projected q
@@ -103,8 +117,10 @@ class ProjectorOf final : public Projector {
 };
 
 template <class Body>
-ProjectorOf<Body>::ProjectorOf(const Mechanism& mechanism, Projection what)
+ProjectorOf<Body>::ProjectorOf(const Mechanism& mechanism, Projection what, Free free)
     : Projector(mechanism, what),
+      square_(free == Free::nothing && Space::rows(data_) == N * data_.n && N * data_.n <= kDenseUnknowns),
+      settled_(solution()),
       solver_(data_, kProjectionAlpha * rows_of<Space>(data_, data_.row_alpha)),
       rows_(data_),
       constraints_(data_),
@@ -126,10 +142,91 @@ ProjectorOf<Body>::ProjectorOf(const Mechanism& mechanism, Projection what)
 }
 
 template <class Body>
-bool ProjectorOf<Body>::factor(double t, const Y& y_hat) {
+void ProjectorOf<Body>::read_hat(double t, const Y& y_hat) {
   laws_.set_time(t);
   for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].read_hat(y_hat, frames_tilde_[i + 1]);
+}
+template <class Body>
+bool ProjectorOf<Body>::factor(double t, const Y& y_hat) {
+  read_hat(t, y_hat);
   return solver_.factor(frames_tilde_);
+}
+
+template <class Body>
+bool ProjectorOf<Body>::factor_square() {
+  rows_.evaluate(frames_);
+  const Eigen::Index m = rows_.count();
+  J_.setZero(m, m);
+  for (X& x : x_) x.setZero();
+  for (Eigen::Index k = 0; k < m; ++k) {
+    double& unit = x_[at(static_cast<int>(k / N))](k % N);
+    unit = -1;
+    g_.setZero();
+    rows_.subtract_times(x_, g_);
+    J_.col(k) = g_;
+    unit = 0;
+  }
+  ++square_factorisations_;
+  return J_factor_.compute(J_);
+}
+template <class Body>
+void ProjectorOf<Body>::solve_square(const Y& rows, std::vector<X>& x) {
+  Eigen::Map<Y> all(x[0].data(), N * static_cast<Eigen::Index>(x.size()));
+  all = rows;
+  J_factor_.solve(all);
+}
+
+// Newton's method; a turn of each body by dx adds to delta to first order.
+template <class Body>
+bool ProjectorOf<Body>::settle(double t, const Y& angles, const Y& y_hat, Y& y) {
+  if (!square_) return project(t, angles, y_hat, y, settled_);
+  read_hat(t, y_hat);
+  const Eigen::Index half = 7 * data_.n;
+  const double q_size = std::max(1.0, y_hat.head(half).cwiseAbs().maxCoeff()),
+               v_size = std::max(1.0, y_hat.tail(half).cwiseAbs().maxCoeff());
+  std::vector<X>& dx = corrections_.dx;
+  // Calls step() until |phi| is rounding; false where it does not fall before.
+  const auto iterate = [&](double size, double unmet, auto&& evaluate, auto&& step) {
+    double before = INFINITY;
+    for (int k = 0; k < kMostProjectionIterations; ++k) {
+      evaluate();
+      const double now = phi_.cwiseAbs().maxCoeff();
+      if (now < 4 * kProjectionRounding * size) return true;  // a further step would find rounding
+      if (!(now < 0.5 * before)) return now <= unmet * size;
+      before = now;
+      if (!step()) return false;
+    }
+    return false;
+  };
+  const auto displace = [&] { for_bodies([&](Body& b, std::size_t i, auto& f) { b.displace(delta_[i], f); }); };
+  for (X& d : delta_) d.setZero();
+  displace();
+  bool factored = false;
+  const bool closed = iterate(
+      q_size, kUnmetPosition, [&] { constraints_.phi(frames_, laws_, angles, phi_); },
+      [&] {
+        factored = factor_square();
+        if (!factored) return false;
+        solve_square(phi_, dx);
+        for (std::size_t i = 0; i < dx.size(); ++i) delta_[i] -= dx[i];
+        displace();
+        return true;
+      });
+  if (!closed || (!factored && !factor_square())) return false;
+  for_bodies([](Body& b, std::size_t, auto& f) { b.start_velocity(f); });
+  for (X& u : u_) u.setZero();
+  const bool moves = iterate(
+      v_size, kUnmetVelocity, [&] { constraints_.phi_dot(frames_, laws_, phi_); },
+      [&] {
+        solve_square(phi_, dx);
+        for (std::size_t i = 0; i < dx.size(); ++i) dx[i] = -dx[i], u_[i] += dx[i];
+        for_bodies([&](Body& b, std::size_t i, auto& f) { b.add_velocity(u_[i], dx[i], f); });
+        return true;
+      });
+  if (!moves) return false;
+  y = y_hat;
+  for_bodies([&](Body& b, std::size_t, auto& f) { b.write(f, y); });
+  return y.allFinite();
 }
 
 template <class Body>
@@ -215,13 +312,17 @@ double ProjectorOf<Body>::velocity_violation(double t, const Y& y) {
 template <class Body>
 bool ProjectorOf<Body>::linearise(double t, const Y& angles, const Y& y_hat, const Y& y, const ProjectionSolution& s) {
   angles_ = angles;
-  if (!factor(t, y_hat)) return false;
+  if (square_)
+    read_hat(t, y_hat);
+  else if (!factor(t, y_hat))
+    return false;
   Space::gather(data_, s.nu, nu_), Space::gather(data_, s.kappa, kappa_);
   for_bodies([&](Body& b, std::size_t i, auto& f) {
     delta_[i] = s.delta[i].template head<N>(), u_[i] = s.u[i].template head<N>();
     b.displace(delta_[i], f);
     b.restore_velocity(y, u_[i], f);
   });
+  if (square_) return factor_square();
   rows_.evaluate(frames_);
   return true;
 }
@@ -265,6 +366,12 @@ void ProjectorOf<Body>::set_loads(const ParameterBlock& block, const std::vector
 
 template <class Body>
 void ProjectorOf<Body>::refine_tangent(ProjectionLevel level, const LargestEntries<Direction>& size) {
+  if (square_) {  // J x = g settles x, and nu is 0
+    Eigen::Map<LaneRows> x(x_lanes_[0].data(), rows_.count(), kLanes);
+    x = g_lanes_;
+    J_factor_.solve_lanes(x);
+    return;
+  }
   const auto turn = [&](std::vector<Lanes<N>>& x, bool transposed) {
     for (std::size_t i = 0; i < x.size(); ++i) bodies_[i].turn_by_E(x[i], transposed);
   };
@@ -273,6 +380,12 @@ void ProjectorOf<Body>::refine_tangent(ProjectionLevel level, const LargestEntri
 
 template <class Body>
 void ProjectorOf<Body>::refine_adjoint(ProjectionLevel level) {
+  if (square_) {  // x = 0, J'mu = b
+    mu_ = Eigen::Map<const Y>(b_[0].data(), rows_.count());
+    J_factor_.solve_transposed(mu_);
+    for (X& x : x_) x.setZero();
+    return;
+  }
   const auto turn = [&](std::vector<X>& x, bool transposed) {
     for (std::size_t i = 0; i < x.size(); ++i) bodies_[i].turn_by_E(x[i], transposed);
   };
@@ -350,9 +463,9 @@ void ProjectorOf<Body>::add_adjoint(const Y& y_bar, Y& y_hat_bar, Y& theta_bar, 
 
 }  // namespace
 
-std::unique_ptr<Projector> make_projector(const Mechanism& mechanism, Projection what, Model model) {
-  if (model == Model::planar) return std::make_unique<ProjectorOf<BodyInPlane>>(mechanism, what);
-  return std::make_unique<ProjectorOf<BodyInSpace>>(mechanism, what);
+std::unique_ptr<Projector> make_projector(const Mechanism& mechanism, Projection what, Model model, Free free) {
+  if (model == Model::planar) return std::make_unique<ProjectorOf<BodyInPlane>>(mechanism, what, free);
+  return std::make_unique<ProjectorOf<BodyInSpace>>(mechanism, what, free);
 }
 
 }  // namespace mbsopt

@@ -31,6 +31,10 @@ class Projector {
   virtual bool project(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y,
                        ProjectionSolution& solution) = 0;
 
+  // As project, for a mechanism whose constraints leave nothing free, near a state that satisfies them: Newton's
+  // method.
+  virtual bool settle(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y) = 0;
+
   // Prepares derivatives at a projection made before (also of another Projector of the same mechanism).
   virtual bool linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat,
                          const Eigen::VectorXd& y, const ProjectionSolution& solution) = 0;
@@ -60,7 +64,11 @@ class Projector {
   const Projection what_;
 };
 
-// planar: what is none or position_velocity, and the mechanism has a planar model.
-std::unique_ptr<Projector> make_projector(const Mechanism& mechanism, Projection what, Model model = Model::spatial);
+// planar: what is none or position_velocity, and the mechanism has a planar model. Free::nothing: what is
+// position_velocity, states come from settle() and derivatives are taken where they are, with a solution of zeros.
+// Where the rows are as many as the unknowns, and few, J itself is factored then.
+enum class Free { something, nothing };
+std::unique_ptr<Projector> make_projector(const Mechanism& mechanism, Projection what, Model model = Model::spatial,
+                                          Free free = Free::something);
 
 }  // namespace mbsopt

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -30,6 +31,9 @@ class SampleSchedule {
     if (!std::is_sorted(events_.begin(), events_.end(), before))  // records of a million rows are
       std::stable_sort(events_.begin(), events_.end(), before);
   }
+
+  // Of the next event; infinite if there is none.
+  double next_time() const { return next_ < events_.size() ? events_[next_].time : INFINITY; }
 
   bool due(double t1) const { return next_ < events_.size() && (events_[next_].time <= t1 || t1 >= end_); }
 

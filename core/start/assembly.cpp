@@ -12,6 +12,7 @@
 #include "core/linear/row_dependence.hpp"
 #include "core/linear/sparse_projection.hpp"
 #include "core/start/assembly_equations.hpp"
+#include "core/start/assembly_problems.hpp"
 #include "core/start/assembly_report.hpp"
 #include "core/start/equilibrium.hpp"
 #include "core/start/nearest_point.hpp"
@@ -25,106 +26,6 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-// A length for r and 1 for p: the root mean square of entries in p over those in r, in rows of J that have both.
-VectorXd sizes_of_poses(const MatrixXd& J) {
-  double r = 0, p = 0;
-  for (Index k = 0; k < J.cols(); k += 7) {
-    for (Index i = 0; i < J.rows(); ++i) {
-      const double here = J.row(i).segment<3>(k).squaredNorm();
-      if (here > 0) r += here, p += J.row(i).segment<4>(k + 3).squaredNorm();
-    }
-  }
-  const double length = p > 0 ? std::sqrt(p / r) : 1;
-  VectorXd sizes = VectorXd::Ones(J.cols());
-  for (Index k = 0; k < J.cols(); k += 7) sizes.segment<3>(k).setConstant(length);
-  return sizes;
-}
-
-// |J| x with the largest entry of r and of p (or of their rates) for each of theirs.
-VectorXd magnitudes_of_terms(Index rows, const std::vector<SparseEntry>& J, Index first, const VectorXd& x) {
-  VectorXd sums = VectorXd::Zero(rows);
-  for (const SparseEntry& e : J) {
-    const Index k = e.column - first;
-    if (k < 0 || k >= x.size()) continue;
-    const Index body = k / 7 * 7;
-    const double part =
-        k - body < 3 ? x.segment<3>(body).lpNorm<Eigen::Infinity>() : x.segment<4>(body + 3).lpNorm<Eigen::Infinity>();
-    sums(e.row) += std::abs(e.value) * part;
-  }
-  return sums;
-}
-
-// Unknown q; v plays no part.
-class PositionProblem : public NearestPointEquations {
- public:
-  explicit PositionProblem(AssemblyEquations& equations) : equations_(equations) {}
-
-  VectorXd values(const VectorXd& q) const override { return equations_.values(state(q)); }
-  MatrixXd jacobian(const VectorXd& q) const override { return equations_.gradients(state(q)).y.leftCols(q.size()); }
-  MatrixXd curvature(const VectorXd& q, const VectorXd& nu) const override {
-    return equations_.second(state(q), nu).y.leftCols(q.size());
-  }
-  // No Euler parameter changes by more than 0.3 at once (about 0.6 rad); r enters linearly.
-  double step_fraction(const VectorXd& step) const override {
-    double change = 0;
-    for (Index i = 3; i < step.size(); i += 7) change = std::max(change, step.segment<4>(i).lpNorm<Eigen::Infinity>());
-    return change > 0.3 ? 0.3 / change : 1.0;
-  }
-  VectorXd retracted(const VectorXd& x) const override {
-    VectorXd q = x;
-    for (Index i = 3; i < q.size(); i += 7) q.segment<4>(i) = UnitNorm::project(q.segment<4>(i));
-    return q;
-  }
-  VectorXd sizes(const MatrixXd& J) const override { return sizes_of_poses(J); }
-  VectorXd magnitudes(const VectorXd& q) const override {
-    return magnitudes_of_terms(equations_.rows(), equations_.sparse_gradients(state(q)).y, 0, q);
-  }
-  VectorXd weights() const override { return equations_.weights(); }
-  void accept(const VectorXd& q) override { equations_.continue_branches(state(q)); }
-
- private:
-  static VectorXd state(const VectorXd& q) {
-    VectorXd y = VectorXd::Zero(2 * q.size());
-    y.head(q.size()) = q;
-    return y;
-  }
-  AssemblyEquations& equations_;
-};
-
-// Unknown v at a fixed q.
-class VelocityProblem : public NearestPointEquations {
- public:
-  VelocityProblem(const AssemblyEquations& equations, const VectorXd& q) : equations_(equations), q_(q) {}
-
-  VectorXd values(const VectorXd& v) const override { return equations_.values(state(v)); }
-  MatrixXd jacobian(const VectorXd& v) const override { return equations_.gradients(state(v)).y.rightCols(v.size()); }
-  MatrixXd curvature(const VectorXd& v, const VectorXd& nu) const override {
-    return equations_.second(state(v), nu).y.rightCols(v.size());
-  }
-  double step_fraction(const VectorXd&) const override { return 1; }
-  VectorXd retracted(const VectorXd& v) const override { return v; }
-  VectorXd sizes(const MatrixXd& J) const override { return sizes_of_poses(J); }
-  VectorXd magnitudes(const VectorXd& v) const override {
-    return magnitudes_of_terms(equations_.rows(), equations_.sparse_gradients(state(v)).y, v.size(), v);
-  }
-  VectorXd weights() const override { return equations_.weights(); }
-
- private:
-  VectorXd state(const VectorXd& v) const {
-    VectorXd y(2 * v.size());
-    y << q_, v;
-    return y;
-  }
-  const AssemblyEquations& equations_;
-  const VectorXd& q_;
-};
-
-VectorXd position_guess(const MechanismData& d) {
-  VectorXd q(7 * d.n);
-  for (int i = 0; i < d.n; ++i) q.segment<7>(7 * i) = d.bodies[static_cast<std::size_t>(i + 1)].q;
-  return q;
-}
 
 // pdot = 1/2 E(p)' omega_G as a matrix on p.
 Mat<4, 4> rate_matrix(const Vector3d& omega_G) {
@@ -450,6 +351,12 @@ std::vector<int> Assembly::obstructed() const {
     if (unmet[static_cast<std::size_t>(k)]) parameters.push_back(static_cast<int>(k));
   }
   return parameters;
+}
+
+int Assembly::degrees_of_freedom() const {
+  const Solution& s = *solution_;
+  const bool joints_alone = s.position.targets().empty();
+  return s.q && s.q->determined && joints_alone ? 0 : summary().degrees_of_freedom;
 }
 
 // Rows are taken in file order, unit norms first; one that lies in the span of those before it is redundant.

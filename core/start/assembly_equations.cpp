@@ -216,8 +216,15 @@ VectorXd AssemblyEquations::values(const VectorXd& y) const {
 AssemblyEquations::Gradients AssemblyEquations::gradients(const VectorXd& y) const {
   Gradients out{MatrixXd::Zero(rows(), y.size()), {}};
   collect_gradients(
-      y, [&](Index row, Index column, double value) { out.y(row, column) += value; }, out.rho);
+      y, [&](Index row, Index column, double value) { out.y(row, column) += value; }, &out.rho);
   return out;
+}
+
+MatrixXd AssemblyEquations::gradients_in_y(const VectorXd& y) const {
+  MatrixXd F_y = MatrixXd::Zero(rows(), y.size());
+  collect_gradients(
+      y, [&](Index row, Index column, double value) { F_y(row, column) += value; }, nullptr);
+  return F_y;
 }
 
 AssemblyEquations::SparseGradients AssemblyEquations::sparse_gradients(const VectorXd& y) const {
@@ -227,15 +234,16 @@ AssemblyEquations::SparseGradients AssemblyEquations::sparse_gradients(const Vec
       [&](Index row, Index column, double value) {
         if (value != 0) out.y.push_back({static_cast<int>(row), static_cast<int>(column), value});
       },
-      out.rho);
+      &out.rho);
   return out;
 }
 
+// rho: null where it is not wanted.
 template <class AddEntry>
-void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, MatrixXd& rho) const {
+void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, MatrixXd* rho) const {
   const bool positions = level_ == AssemblyLevel::position;
   const Index half = y.size() / 2;
-  rho = MatrixXd::Zero(rows(), data_.rho.size());
+  if (rho) *rho = MatrixXd::Zero(rows(), data_.rho.size());
   const auto add_body = [&](Index row, const BodyAt& b, int body, const FrameBar& bar) {
     if (body == 0) return;
     Vec<7> q_bar = Vec<7>::Zero(), v_bar = Vec<7>::Zero();
@@ -258,20 +266,21 @@ void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, Mat
             const Index row = c.row + i;
             add_body(row, b1, c.body1, bars.bar1);
             add_body(row, b2, c.body2, bars.bar2);
-            add_slot(c.slot1, bars.s.s1, rho.row(row));
-            add_slot(c.slot2, bars.s.s2, rho.row(row));
-            add_slot(c.slot3, bars.s.s3, rho.row(row));
+            if (!rho) continue;
+            add_slot(c.slot1, bars.s.s1, rho->row(row));
+            add_slot(c.slot2, bars.s.s2, rho->row(row));
+            add_slot(c.slot3, bars.s.s3, rho->row(row));
           }
-          if (c.slot_factor >= 0) {
+          if (rho && c.slot_factor >= 0) {
             Vec<P::kRows> phi_dot;
             p.phi_dot(b1.frame, b2.frame, phi_dot);
             const double value = positions ? term_value(c, y, angles_) / c.factor : phi_dot(0);
-            add_slot(c.slot_factor, Vec<1>(value), rho.row(c.row));
+            add_slot(c.slot_factor, Vec<1>(value), rho->row(c.row));
           }
         },
         c.primitive);
   }
-  add_law_gradients(rho);
+  if (rho) add_law_gradients(*rho);
   for (int i = 0; i < data_.n; ++i) {
     const Index p = 7 * i + 3, pdot = half + p;
     for (Index k = 0; k < 4; ++k) {
@@ -285,8 +294,10 @@ void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, Mat
     y_bar.setZero(), rho_bar.setZero();
     add_gradient(data_, target.sensor, t_, y, branches(target), 1, y_bar, rho_bar);
     for (Index k = 0; k < y.size(); ++k) add(row, k, y_bar(k));
-    rho.row(row) = rho_bar.transpose();
-    add_slot(target.slot, Vec<1>(-1), rho.row(row));
+    if (rho) {
+      rho->row(row) = rho_bar.transpose();
+      add_slot(target.slot, Vec<1>(-1), rho->row(row));
+    }
     ++row;
   }
 }

@@ -50,6 +50,7 @@ class AssemblyEquations {
     Eigen::MatrixXd y, rho;  // rows x 14n, rows x P (all parameters)
   };
   Gradients gradients(const Eigen::VectorXd& y) const;
+  Eigen::MatrixXd gradients_in_y(const Eigen::VectorXd& y) const;
   // The same with the state's gradient by its entries; those of the same place add up.
   struct SparseGradients {
     std::vector<SparseEntry> y;
@@ -71,7 +72,7 @@ class AssemblyEquations {
   void add_joint_curvature(const Eigen::VectorXd& q, const Eigen::VectorXd& nu, Gradients& out) const;
   void add_target_curvature(const AssemblyTarget& target, const Eigen::VectorXd& y, double nu, Gradients& out) const;
   template <class AddEntry>
-  void collect_gradients(const Eigen::VectorXd& y, AddEntry&& add, Eigen::MatrixXd& rho) const;
+  void collect_gradients(const Eigen::VectorXd& y, AddEntry&& add, Eigen::MatrixXd* rho) const;
   void add_law_gradients(Eigen::MatrixXd& rho) const;
   double term_value(const Constraint& c, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) const;
   void add_slot(int slot, const Eigen::Ref<const Eigen::VectorXd>& bar, Row rho_bar) const;

@@ -20,8 +20,7 @@ constexpr double kViolation = 1e-9;
 
 DrivenPath::DrivenPath(const Mechanism& mechanism, Model model)
     : mechanism_(mechanism),
-      projector_(make_projector(mechanism, Projection::position_velocity, model)),
-      solution_(projector_->solution()) {
+      projector_(make_projector(mechanism, Projection::position_velocity, model, Free::nothing)) {
   y_hat_.setZero(mechanism.states()), y_next_.setZero(mechanism.states());
 }
 
@@ -44,7 +43,7 @@ bool DrivenPath::advance(double h, double t1) {
   const Index half = mechanism_.states() / 2;
   y_hat_.head(half) = state_.y.head(half) + h * state_.y.tail(half) + (0.5 * h * h) * state_.a;
   y_hat_.tail(half) = state_.y.tail(half) + h * state_.a;
-  if (!projector_->project(t1, state_.angles, y_hat_, y_next_, solution_)) return false;
+  if (!projector_->settle(t1, state_.angles, y_hat_, y_next_)) return false;
   if (!keeps_branch(h)) return false;
   if (projector_->position_violation(t1, state_.angles, y_next_) > kViolation) return false;
   state_.t = t1;

@@ -55,7 +55,6 @@ class DrivenPath {
 
   const Mechanism mechanism_;
   std::unique_ptr<Projector> projector_;
-  ProjectionSolution solution_;
   DrivenState state_;
   Eigen::VectorXd y_hat_, y_next_;
   long steps_ = 0;

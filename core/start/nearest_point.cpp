@@ -183,6 +183,8 @@ class Search {
   // In metres; if that fails, where lengths of micrometres or kilometres may have cost digits, in units of the sizes.
   NearestPoint run() {
     if (guess_is_it()) return result_;
+    if (newton_of_determined()) return result_;
+    move(x_guess_);
     search();
     if (result_.status != NearestPointStatus::found) {
       const NearestPoint in_metres = std::exchange(result_, NearestPoint{});
@@ -218,6 +220,38 @@ class Search {
     result_.linearised = false;
     equations_.accept(x);
     return true;
+  }
+
+  // Where the equations leave nothing free, their Newton steps alone; by the normal equations, whose lost digits the
+  // next steps and refine() restore. Empty where these are not positive definite to kDigits.
+  VectorXd determined_step(const MatrixXd& J) const {
+    constexpr double kDigits = 1e-8;  // of the pivots, squares of those of J
+    if (J.rows() < J.cols()) return {};
+    const VectorXd scale = J.rowwise().norm().unaryExpr([](double norm) { return norm > 0 ? 1 / norm : 1.0; });
+    const MatrixXd A = scale.asDiagonal() * J;
+    return definite_solve(A.transpose() * A, -(A.transpose() * scale.cwiseProduct(result_.F)), kDigits);
+  }
+
+  // As newton(), while the equations leave nothing free; false where they do, or where that does not converge.
+  bool newton_of_determined() {
+    constexpr int kMost = 20;        // quadratic convergence takes far fewer
+    constexpr double kClose = 1e-8;  // a step that the next one ends
+    for (int k = 0; k < kMost; ++k, ++result_.iterations) {
+      result_.F = equations_.values(result_.x);
+      if (!result_.F.allFinite()) return false;
+      const VectorXd step = determined_step(equations_.jacobian(result_.x));
+      if (step.size() == 0) return false;
+      const double length = largest(step);
+      move(result_.x + equations_.step_fraction(step) * step);
+      if (length > kClose * size()) continue;
+      result_.F = equations_.values(result_.x);
+      if (!satisfied()) continue;
+      result_.nu = VectorXd::Zero(result_.F.size());
+      result_.status = NearestPointStatus::found;
+      result_.determined = true, result_.linearised = false;
+      return true;
+    }
+    return false;
   }
 
   // Gauss-Newton, then Newton; false where neither converges.

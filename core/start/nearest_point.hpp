@@ -101,7 +101,9 @@ struct NearestPoint {
   NearestPointStatus status = NearestPointStatus::stalled;
   Eigen::VectorXd x, nu, F;
   int iterations = 0;
-  // At x, with its Hessian where status is found; on demand (linearise below) where the guess itself was found.
+  bool determined = false;  // the equations were seen to leave nothing free: no multipliers are computed, nu = 0
+  // At x, with its Hessian where status is found; on demand (linearise below) where the guess itself was found, or
+  // where nothing is free.
   bool linearised = true;
   NearestPointLinearisation linearisation;
 };

@@ -8,9 +8,12 @@
 #include <limits>
 #include <stdexcept>
 
+#include "core/expression/counted.hpp"
 #include "core/expression/did_you_mean.hpp"
 #include "core/simulate/simulation_warnings.hpp"
+#include "core/start/assembly_modes.hpp"
 #include "optim/design/design_program.hpp"
+#include "optim/design/tracked_squares.hpp"
 #include "optim/design/true_limits.hpp"
 #include "optim/differences/difference_comparison.hpp"
 #include "optim/machine/stopwatch.hpp"
@@ -45,9 +48,11 @@ const DesignSpec& checked(const Problem& problem) {
   if (!problem.design) throw std::invalid_argument("design: is missing; it says what to minimise and what to vary");
   const DesignSpec& spec = *problem.design;
   if (spec.variables.empty()) throw std::invalid_argument("design.variables: is empty; name at least one parameter");
-  if (spec.optimizer.type != "ipopt" && !find_nlopt_method(spec.optimizer.type))
-    throw std::invalid_argument(
-        fmt::format("design.optimizer.type: is '{}'; available: ipopt {}", spec.optimizer.type, nlopt_method_names()));
+  const bool is_known = spec.optimizer.type == "ipopt" || spec.optimizer.type == OptimizerSpec::kLeastSquares ||
+                        find_nlopt_method(spec.optimizer.type);
+  if (!is_known)
+    throw std::invalid_argument(fmt::format("design.optimizer.type: is '{}'; available: ipopt {} {}",
+                                            spec.optimizer.type, OptimizerSpec::kLeastSquares, nlopt_method_names()));
   for (std::size_t i = 0; i < spec.subject_to.size(); ++i) {
     const ObjectiveBound& bound = spec.subject_to[i];
     if (!bound.lower && !bound.upper)
@@ -263,9 +268,12 @@ void judge_true_extremes(const DesignProgram& program, const CaseEvaluator& eval
   result.message += "; limits hold for smooth extremes only";
 }
 
-NlpResult solved_once(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
-                      const std::function<bool(const NlpProgress&)>& progress, PointRecords* records,
-                      std::optional<long>& seed) {
+NlpResult solved_once(DesignProgram& program, const CaseEvaluator& evaluator, const Eigen::VectorXd& x_start,
+                      const OptimizerSpec& spec, const std::function<bool(const NlpProgress&)>& progress,
+                      PointRecords* records, DesignResult& result) {
+  std::optional<long>& seed = result.seed;
+  if (spec.type == OptimizerSpec::kLeastSquares)
+    return solve_tracked_squares(program, evaluator, x_start, spec, progress, result.simulations);
   if (spec.type == "ipopt") {
     IpoptOptions solver;
     solver.tolerance = spec.tolerance;
@@ -331,7 +339,7 @@ LimitedSolution solved(const DesignSpec& spec, DesignProgram& program, CaseEvalu
   TrueLimits limits(spec, evaluator);
   LimitedSolution rounds;
   NlpResult& solution = rounds.solution;
-  solution = solved_once(program, x_start, spec.optimizer, progress, records, result.seed);
+  solution = solved_once(program, evaluator, x_start, spec.optimizer, progress, records, result);
   while (true) {
     if (!solution.point.ok || abandoned()) break;
     const Eigen::VectorXd rho = program.rho_at(solution.x);
@@ -354,7 +362,8 @@ LimitedSolution solved(const DesignSpec& spec, DesignProgram& program, CaseEvalu
         p.iteration += before.iterations;
         return progress(p);
       };
-      NlpResult found = solved_once(program, from_solution ? before.x : x_start, rest, shown, records, result.seed);
+      NlpResult found =
+          solved_once(program, evaluator, from_solution ? before.x : x_start, rest, shown, records, result);
       const bool is_worse = !from_solution && !is_an_improvement(program, found, before);
       solution = is_worse ? before : found;
       solution.iterations = found.iterations + before.iterations;
@@ -461,7 +470,55 @@ NlpScale design_scale(const Problem& problem, const DesignOptions& options) {
   return {program.f_scale, program.c_scale};
 }
 
-DesignResult run_design(const Problem& given, const DesignOptions& options) {
+namespace {
+
+std::vector<AssemblyMode> modes_at(const Scene& scene) {
+  const Mechanism mechanism(scene, parameter_values(scene), std::vector<bool>(scene.parameters.size(), false));
+  return assembly_modes(mechanism, scene.simulation.start_time);
+}
+
+DesignResult designed(const Problem& given, const DesignOptions& options);
+
+// As designed, with the poses of the mode.
+DesignResult designed_in_mode(const Problem& given, const DesignOptions& options) {
+  const int mode = *options.mode;
+  const std::vector<AssemblyMode> modes = modes_at(given.scene);
+  if (mode >= static_cast<int>(modes.size())) {
+    DesignResult none;
+    none.objective = given.design->minimize, none.optimizer = given.design->optimizer.type;
+    for (const std::string& name : given.design->variables) {
+      const Parameter& p = *std::ranges::find(given.scene.parameters, name, &Parameter::name);
+      none.variables.push_back({p.name, p.unit, p.value, p.value, p.lower, p.upper, false, false});
+    }
+    none.rho = parameter_values(given.scene);
+    none.mode = DesignMode{mode, static_cast<int>(modes.size())};
+    none.message = fmt::format("has no assembly mode {}: {} found at its start", mode, counted(modes.size(), "mode"));
+    return none;
+  }
+  Problem problem = given;
+  const std::vector<bool> none(given.scene.parameters.size(), false);
+  if (mode > 0)
+    set_guess(problem.scene, Mechanism(given.scene, parameter_values(given.scene), none),
+              modes[static_cast<std::size_t>(mode)]);
+  DesignOptions without_mode = options;
+  without_mode.mode.reset();
+  DesignResult result = designed(problem, without_mode);
+  result.mode = DesignMode{mode, static_cast<int>(modes.size()), {}};
+  if (mode > 0) result.mode->bodies = problem.scene.bodies;
+  return result;
+}
+
+}  // namespace
+
+int design_modes(const Problem& problem) { return static_cast<int>(modes_at(problem.scene).size()); }
+
+DesignResult run_design(const Problem& problem, const DesignOptions& options) {
+  return options.mode ? designed_in_mode(problem, options) : designed(problem, options);
+}
+
+namespace {
+
+DesignResult designed(const Problem& given, const DesignOptions& options) {
   const Stopwatch stopwatch;
   std::atomic<bool> abandoned = false;  // read by the threads of all cases
   std::function<bool(double t)> until_abandoned;
@@ -523,9 +580,11 @@ DesignResult run_design(const Problem& given, const DesignOptions& options) {
         "design.optimizer.hessian: could not be computed everywhere, where it was not the one "
         "before served again; first: " +
         program.hessian_failure());
-  result.simulations = evaluator.simulations() + program.hessian_gradients();
+  result.simulations += evaluator.simulations() + program.hessian_gradients();
   result.wall_seconds = stopwatch.seconds();
   return result;
 }
+
+}  // namespace
 
 }  // namespace mbsopt

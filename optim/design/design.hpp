@@ -59,6 +59,12 @@ struct DesignConflict {
   double price = 0;   // fall of the sum of relative violations per unit by which it is eased
 };
 
+// In which assembly mode a mechanism is designed (core/start/assembly_modes.hpp).
+struct DesignMode {
+  int mode = 0, of = 1;        // 0: that of the scene's poses at the start; and how many there are
+  std::vector<Body> bodies{};  // of the scene, their poses those of the mode; empty: the scene's own
+};
+
 // One iteration of the optimiser.
 struct DesignRow {
   int iteration = 0;
@@ -96,6 +102,7 @@ struct DesignResult {
   long simulations = 0;                          // also those of second derivatives
   double wall_seconds = 0;
   std::vector<std::string> warnings;  // sentences
+  std::optional<DesignMode> mode;     // where one was asked for
   bool ok() const {
     return status == SolverStatus::converged || status == SolverStatus::converged_beyond_limit ||
            status == SolverStatus::no_progress || status == SolverStatus::searched;
@@ -113,6 +120,7 @@ struct DesignOptions {
   // By which convergence is judged. Where there is none: about 1 over the objective and its gradient at the start. Runs
   // from several starts share one, so that "converged" means the same of all.
   std::optional<NlpScale> scale = {};
+  std::optional<int> mode = {};  // assembly mode at the start (DesignMode); none: that of the scene's poses
 };
 
 // problem.design must be there. Throws std::invalid_argument where it makes no sense (unknown names, no bounds to
@@ -122,6 +130,9 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options = {
 // The sharpness of the maximum over load cases that a run from the problem's own values would take; none where it takes
 // none. Runs from several starts share one.
 std::optional<double> design_sharpness(const Problem& problem, const DesignOptions& options = {});
+
+// The assembly modes at the start from the problem's own values; 0 where something is free, or nothing closes.
+int design_modes(const Problem& problem);
 
 // The scale that a run from the problem's own values would take.
 NlpScale design_scale(const Problem& problem, const DesignOptions& options = {});

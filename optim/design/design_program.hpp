@@ -45,6 +45,7 @@ class DesignProgram : public NonlinearProgram {
   Eigen::Index psi_of(Eigen::Index constraint) const;
   Eigen::VectorXd minimised(const Eigen::VectorXd& psi) const;
   const CaseObjective& objective() const { return objective_; }
+  const VariableScaling& scaling() const { return scaling_; }
   double size(Eigen::Index constraint) const { return size_(constraint); }
   // Other bounds for the objective of a constraint; the best point is judged by them from now on.
   void set_bounds(Eigen::Index constraint, const std::optional<double>& lower, const std::optional<double>& upper);

@@ -10,11 +10,11 @@
 namespace mbsopt {
 namespace {
 
-constexpr int kMostPoints = 30;     // on each side
-constexpr double kStep = 0.5;       // of tau, aimed at
-constexpr double kLongest = 4;      // a step against the one before
-constexpr double kBeyond = 1.15;    // of the quantile: so far the profile is drawn
-constexpr double kCrossing = 1e-3;  // of the quantile
+constexpr int kMostPoints = 30;       // on each side
+constexpr double kProfileStep = 0.5;  // of tau, aimed at
+constexpr double kLongest = 4;        // a step against the one before
+constexpr double kBeyond = 1.15;      // of the quantile: so far the profile is drawn
+constexpr double kCrossing = 1e-3;    // of the quantile
 constexpr int kSecants = 8;
 
 // The problem with one variable held.
@@ -79,7 +79,7 @@ class Side {
         return;
       }
       const double rise = std::abs(next->tau) - std::abs(last.tau), taken = std::abs(next->x - last.x);
-      step = taken * std::clamp(rise > 0 ? kStep / rise : kLongest, 0.25, kLongest);
+      step = taken * std::clamp(rise > 0 ? kProfileStep / rise : kLongest, 0.25, kLongest);
       last = *next;
     }
     if (!crossing) end("the data do not bound it as far as was looked");

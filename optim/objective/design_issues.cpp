@@ -25,6 +25,18 @@ std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& s
   const std::string path = "design.optimizer";
   std::vector<DesignIssue> issues;
   const NloptMethod* const method = find_nlopt_method(optimizer.type);
+  if (optimizer.type == OptimizerSpec::kLeastSquares) {
+    if (!spec.subject_to.empty())
+      issues.push_back({path + ".type",
+                        "is 'least_squares', which holds bounds of variables alone; design.subject_to "
+                        "needs another one: ipopt with \"hessian\": \"gauss_newton\""});
+    if (spec.over == "max")
+      issues.push_back({path + ".type", "is 'least_squares', which minimises sums over the cases, not their maximum"});
+    for (const auto& [key, given] : {std::pair("hessian", optimizer.hessian != "lbfgs"),
+                                     std::pair("lbfgs_history", optimizer.lbfgs_history.has_value()),
+                                     std::pair("warm_start", optimizer.warm_start)})
+      if (given) issues.push_back({path + "." + key, "is of other optimisers; 'least_squares' has none"});
+  }
   if (method && optimizer.hessian != "lbfgs")
     issues.push_back({path + ".hessian", "is of ipopt only; '" + optimizer.type + "' builds its own, if any"});
   if (!method && optimizer.hessian != "lbfgs" && is_cvodes(scene.simulation.integrator.type))
@@ -71,6 +83,10 @@ std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& s
 }
 
 std::optional<DesignIssue> curvature_issue(const Problem& problem) {
+  if (problem.design && problem.design->optimizer.type == OptimizerSpec::kLeastSquares &&
+      !objectives_of(problem, {problem.design->minimize}).front().is_sum_of_squares())
+    return DesignIssue{"design.optimizer.type", "is 'least_squares', but '" + problem.design->minimize +
+                                                    "' is not a sum of squares: it may have `track` alone; take ipopt"};
   if (!problem.design || problem.design->optimizer.hessian != "gauss_newton") return std::nullopt;
   const std::string& name = problem.design->minimize;
   const Objective objective = objectives_of(problem, {name}).front();

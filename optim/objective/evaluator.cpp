@@ -11,6 +11,7 @@
 
 #include "core/cvodes/cvodes.hpp"
 #include "core/expression/counted.hpp"
+#include "core/mechanism/scene_programs.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 #include "optim/differences/difference_ladder.hpp"
 #include "optim/machine/stopwatch.hpp"
@@ -49,7 +50,8 @@ Evaluator::Evaluator(Scene scene, std::vector<Objective> objectives, const std::
       objectives_(std::move(objectives)),
       variables_(parameter_indices(scene_, variables)),
       active_(scene_.parameters.size(), false),
-      options_(std::move(options)) {
+      options_(std::move(options)),
+      programs_(std::make_shared<ScenePrograms>(scene_)) {
   for (const int k : variables_) active_[static_cast<std::size_t>(k)] = true;
   for (std::size_t i = 0; i < objectives_.size(); ++i)
     if (objectives_[i].needs_simulation()) simulated_.push_back(i);
@@ -126,7 +128,7 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
     const std::vector<bool> active = sweep == Sweep::none ? std::vector<bool>(active_.size(), false) : active_;
     SimulationResult result;
     try {
-      const Mechanism mechanism(scene_, rho, active, options_.user_forces);
+      const Mechanism mechanism(scene_, rho, active, options_.user_forces, programs_);
       ObjectiveRun objective_run(simulated(), mechanism, settings, options_.progress);
       result = objective_run.run([&](std::span<const Cost> costs) {
         const RunOptions run_options{.frozen = frozen, .progress = options_.progress, .exact_stages = true};
@@ -186,7 +188,7 @@ std::vector<std::optional<double>> Evaluator::true_values(const Eigen::VectorXd&
   std::vector<std::optional<double>> values(objectives_.size());
   if (std::none_of(objectives_.begin(), objectives_.end(), [](const Objective& o) { return o.is_extreme(); }))
     return values;
-  const Mechanism mechanism(scene_, rho, std::vector<bool>(active_.size(), false), options_.user_forces);
+  const Mechanism mechanism(scene_, rho, std::vector<bool>(active_.size(), false), options_.user_forces, programs_);
   const SimulationResult run = simulate(mechanism, scene_.simulation, {}, {}, {nullptr, options_.progress});
   if (!run.ok()) return values;
   const std::vector<std::optional<double>> found =

@@ -88,6 +88,7 @@ class Evaluator {
 
   const Scene& scene() const { return scene_; }
   const EvaluatorOptions& options() const { return options_; }
+  const std::shared_ptr<ScenePrograms>& programs() const { return programs_; }  // of the scene
   const std::vector<Objective>& objectives() const { return objectives_; }
   const std::vector<int>& variables() const { return variables_; }  // indices of parameters
   Eigen::VectorXd start() const;                                    // the parameters' values in the scene
@@ -108,6 +109,7 @@ class Evaluator {
   std::vector<int> variables_;
   std::vector<bool> active_;
   EvaluatorOptions options_;
+  std::shared_ptr<ScenePrograms> programs_;
   std::vector<std::size_t> simulated_;       // objectives that need a simulation
   std::vector<std::size_t> perhaps_unused_;  // variables that only what is written in C++ may use
   bool has_differentiated_ = false;          // gradients() has succeeded: no loop is a structure that cannot move

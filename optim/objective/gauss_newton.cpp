@@ -104,7 +104,7 @@ GaussNewton gauss_newton(const Evaluator& evaluator, const Evaluation& at) {
     const Scene& scene = evaluator.scene();
     std::vector<bool> active(scene.parameters.size(), false);
     for (const int k : variables) active[static_cast<std::size_t>(k)] = true;
-    const Mechanism mechanism(scene, at.rho, active, evaluator.options().user_forces);
+    const Mechanism mechanism(scene, at.rho, active, evaluator.options().user_forces, evaluator.programs());
     const std::vector<Look> looks = looks_of(objectives, at.steps, scene.simulation.end_time);
     TangentSampling sampling;
     for (const Look& look : looks) sampling.times.push_back(look.time);

@@ -87,7 +87,8 @@ Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec
   }
   for (std::size_t i = 0; i < spec.track.size(); ++i)
     follow(spec.track[i], scene, fmt::format("{}.track[{}]", place, i));
-  std::stable_sort(samples_.begin(), samples_.end(), [](const Sample& a, const Sample& b) { return a.time < b.time; });
+  for (std::vector<Sample>* const all : {&samples_, &residuals_})
+    std::stable_sort(all->begin(), all->end(), [](const Sample& a, const Sample& b) { return a.time < b.time; });
   if (spec.eigenvalue) mode_ = std::make_shared<const FollowedMode>(scene, *spec.eigenvalue);
   if (spec.parameters_only)
     parameters_only_ =
@@ -100,9 +101,12 @@ void Objective::follow(const TrackTerm& term, const Scene& scene, const std::str
   const Expression off = Expression::parse(term.sensor) - expression_of(term, "column");
   const CostExpression square =
       at_place(place + ".weight", [&] { return CostExpression(term.weight * (off * off), scene); });
+  const Expression root = term.weight.is_number() ? Expression(std::sqrt(term.weight.number()))
+                                                  : Expression::parse("sqrt(" + term.weight.text() + ")");
+  const CostExpression residual = at_place(place + ".weight", [&] { return CostExpression(root * off, scene); });
   const double t0 = scene.simulation.start_time, t1 = scene.simulation.end_time;
   for (const double t : term.curve->x())
-    if (t >= t0 && t <= t1) samples_.push_back({t, square});
+    if (t >= t0 && t <= t1) samples_.push_back({t, square}), residuals_.push_back({t, residual});
 }
 
 Objective::Objective(std::string name, std::shared_ptr<const RunningCost> running,
@@ -192,6 +196,10 @@ void Objective::add_parameters_only_hessian(const Eigen::VectorXd& rho, const st
     for (std::size_t i = 0; i < variables.size(); ++i)
       H(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) += slope(variables[i]);
   }
+}
+
+bool Objective::is_sum_of_squares() const {
+  return !residuals_.empty() && residuals_.size() == samples_.size() && !running_ && !terminal_ && !parameters_only_;
 }
 
 bool Objective::is_linear() const {

@@ -59,6 +59,9 @@ class Objective {
   const std::optional<CostExpression>& running() const { return running_; }
   const std::optional<CostExpression>& terminal() const { return terminal_; }
   const std::vector<Sample>& samples() const { return samples_; }
+  // Their sum of squares is psi where is_sum_of_squares(): of `track` alone. In the order of time.
+  const std::vector<Sample>& residuals() const { return residuals_; }
+  bool is_sum_of_squares() const;
   double exponent(const ObjectivePart& part) const { return part.side * sharpness_; }  // k of an extreme
   bool is_eigenvalue() const { return mode_ != nullptr; }
   bool is_written_in_cpp() const { return user_running_ || user_terminal_; }
@@ -82,7 +85,7 @@ class Objective {
   const MeanKind* mean_ = nullptr;
   double sharpness_ = 1, duration_ = 1;
   std::optional<CostExpression> running_, terminal_;
-  std::vector<Sample> samples_;
+  std::vector<Sample> samples_, residuals_;
   std::optional<Program> parameters_only_;
   std::shared_ptr<const FollowedMode> mode_;
   std::shared_ptr<const RunningCost> user_running_;

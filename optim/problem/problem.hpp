@@ -65,7 +65,8 @@ struct ObjectiveBound {
 };
 
 struct OptimizerSpec {
-  std::string type = "ipopt";  // or a method of NLopt: nlopt_solver.hpp
+  static constexpr const char* kLeastSquares = "least_squares";
+  std::string type = "ipopt";  // or least_squares (tracked_squares.hpp), or a method of NLopt: nlopt_solver.hpp
   double tolerance = 1e-6;
   std::optional<long> max_iterations;   // ipopt: 100 when absent
   std::optional<long> max_evaluations;  // NLopt: depends on the method, nlopt_solver.hpp
@@ -83,6 +84,7 @@ struct MultistartSpec {
   int starts = 20;
   std::optional<long> seed;  // drawn when absent
   StartSampling sampling = StartSampling::latin_hypercube;
+  bool all_branches = false;  // of a design: each start in every assembly mode
 };
 
 // A drive that follows another law in one experiment or load case.

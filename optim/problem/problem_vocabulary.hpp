@@ -10,11 +10,12 @@
 namespace mbsopt {
 
 inline std::string_view optimizer_names() {
-  static const std::string names = "ipopt " + std::string(nlopt_method_names());
+  static const std::string names = "ipopt least_squares " + std::string(nlopt_method_names());
   return names;
 }
 inline constexpr Choice<StartSampling> kSamplings[] = {{"latin_hypercube", StartSampling::latin_hypercube},
                                                        {"sobol", StartSampling::sobol}};
+inline constexpr Choice<bool> kBranches[] = {{"guess", false}, {"all", true}};
 inline constexpr Choice<bool> kRoles[] = {{"fit", false}, {"validate", true}};
 
 inline constexpr Choice<SigmaEstimate> kSigmaEstimates[] = {
@@ -73,10 +74,12 @@ void describe(auto& v, Like<ObjectiveBound> auto& b) {
 }
 
 void describe(auto& v, Like<OptimizerSpec> auto& o) {
-  static const std::string methods = "interior points (ipopt); NLopt's " + std::string(nlopt_methods_by_kind());
+  static const std::string methods =
+      "interior points (ipopt); Levenberg-Marquardt on tracked squares (least_squares); NLopt's " +
+      std::string(nlopt_methods_by_kind());
   v.word("type", o.type, Words{optimizer_names()}, {methods});
   v.plain("tolerance", o.tolerance, kPositive, {"of the optimality conditions; of the last steps without gradients"});
-  v.plain("max_iterations", o.max_iterations, kNotNegative, {"at most; ipopt: 100 when absent"});
+  v.plain("max_iterations", o.max_iterations, kNotNegative, {"at most; ipopt and least_squares: 100 when absent"});
   v.plain("max_evaluations", o.max_evaluations, kPositive,
           {"at most; NLopt: 500, without gradients 500 (n + 1), global 1000 (n + 1) when absent, of n variables"});
   v.word("hessian", o.hessian, Words{"lbfgs exact gauss_newton"},
@@ -94,6 +97,8 @@ void describe(auto& v, Like<MultistartSpec> auto& m) {
   v.plain("starts", m.starts, kPositive, {"how many; the first is from the given values"});
   v.plain("seed", m.seed, kNotNegative, {"of the starts; drawn when absent"});
   v.choice("sampling", m.sampling, kSamplings, {"how the starts fill the bounds"});
+  v.choice("branches", m.all_branches, kBranches,
+           {"of design: assembly modes in which each start is designed, that of the poses in the file or all"});
 }
 
 void describe(auto& v, Like<DriveLaw> auto& d) {

@@ -1,0 +1,43 @@
+// The expressions of a scene as programs, each compiled once. Mechanisms of the scene, each at other values of its
+// parameters, share them; several threads may ask for them.
+//
+//   const auto programs = std::make_shared<ScenePrograms>(scene);
+//   const Mechanism first(scene, rho, active, {}, programs), second(scene, other_rho, active, {}, programs);
+#pragma once
+
+#include <array>
+#include <memory>
+#include <mutex>
+#include <unordered_map>
+
+#include "core/expression/program.hpp"
+#include "core/scene/scene.hpp"
+
+namespace mbsopt {
+
+class ScenePrograms {
+ public:
+  explicit ScenePrograms(const Scene& scene);
+
+  const Symbols& symbols() const { return symbols_; }  // parameters (inputs, in order), definitions, signals
+
+  // Of a numeric field, and f, f_t, f_tt of a law of time, whose last input is t. Both throw UnknownName.
+  std::shared_ptr<const Program> field(const Expression& field);
+  std::shared_ptr<const std::array<Program, 3>> law(const Expression& law);
+
+ private:
+  template <class Made>
+  struct Entry {
+    Expression expression;  // keeps the tree, by which it is found
+    std::shared_ptr<const Made> made;
+  };
+  template <class Made>
+  using Table = std::unordered_map<const SyntaxTree*, Entry<Made>>;
+
+  Symbols symbols_, symbols_of_time_;
+  std::mutex mutex_;
+  Table<Program> fields_;
+  Table<std::array<Program, 3>> laws_;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,95 @@
+// The assembly modes of a four-bar and of a two-loop linkage are known; scenes moved to them assemble there.
+#include "core/start/assembly_modes.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "core/start/assembly.hpp"
+#include "tests/core/mechanism/moving_scenes.hpp"
+
+using namespace mbsopt;
+using namespace mbsopt::testing;
+using Eigen::VectorXd;
+
+namespace {
+
+Drive crank_drive(const std::string& law) {
+  Drive drive;
+  drive.name = "motor", drive.type = "angle", drive.joint = "A", drive.law = f(law);
+  return drive;
+}
+
+// Crank r at angle a, coupler l, rocker b, pivots at the origin and at (g, 0).
+Scene linkage() {
+  Scene s;
+  add_parameters(s, {{"r", 0.4}, {"l", 1.5}, {"b", 1.2}, {"g", 1.6}, {"a", 0.7}});
+  const InertiaField I{0.1, 0.1, 0.1, 0.0, 0.0, 0.0};
+  s.bodies.push_back(plain_body("crank", 1, I, vec("0", "0", "0")));
+  s.bodies.push_back(plain_body("coupler", 1, I, vec("r*cos(a)", "r*sin(a)", "0")));
+  s.bodies.push_back(plain_body("rocker", 1, I, vec("g", "0", "0")));
+  s.bodies[0].orientation = turned("a"), s.bodies[1].orientation = turned("0.5"), s.bodies[2].orientation = turned("2");
+  s.joints.push_back(hinge("A", "ground", vec("0", "0", "0"), "crank", vec("0", "0", "0")));
+  s.joints.push_back(hinge("B", "crank", vec("r", "0", "0"), "coupler", vec("0", "0", "0")));
+  s.joints.push_back(hinge("C", "coupler", vec("l", "0", "0"), "rocker", vec("b", "0", "0")));
+  s.joints.push_back(hinge("D", "ground", vec("g", "0", "0"), "rocker", vec("0", "0", "0")));
+  s.drives.push_back(crank_drive("a"));
+  return s;
+}
+
+// A second loop of two bars on the rocker's end: the two loops close in two ways each.
+Scene two_loops() {
+  Scene s = linkage();
+  const InertiaField I{0.1, 0.1, 0.1, 0.0, 0.0, 0.0};
+  s.bodies.push_back(plain_body("link", 1, I, vec("1.6", "1.2", "0")));
+  s.bodies.push_back(plain_body("output", 1, I, vec("2.5", "0", "0")));
+  s.bodies[4].orientation = turned("1.5");
+  s.joints.push_back(hinge("E", "rocker", vec("b", "0", "0"), "link", vec("0", "0", "0")));
+  s.joints.push_back(hinge("F", "link", vec("1.8", "0", "0"), "output", vec("1.6", "0", "0")));
+  s.joints.push_back(hinge("G", "ground", vec("2.5", "0", "0"), "output", vec("0", "0", "0")));
+  return s;
+}
+
+}  // namespace
+
+TEST_CASE("a four-bar has two assembly modes, mirror images about the line from pin to pivot", "[modes]") {
+  const Scene scene = linkage();
+  const VectorXd rho = nominal(scene);
+  const std::vector<AssemblyMode> modes = assembly_modes(Mechanism(scene, rho), 0);
+  REQUIRE(modes.size() == 2);
+  CHECK(modes[0].distance == 0);
+  CHECK((modes[0].q - Assembly(Mechanism(scene, rho), 0).result().y.head(21)).norm() < 1e-12);
+  const double line = std::atan2(-rho(0) * std::sin(rho(4)), rho(3) - rho(0) * std::cos(rho(4)));
+  const auto angle = [](const VectorXd& q) { return 2 * std::atan2(q(13), q(10)); };  // of the coupler
+  const double sum = angle(modes[0].q) + angle(modes[1].q) - 2 * line;
+  CHECK(std::abs(std::remainder(sum, 2 * 3.141592653589793)) < 1e-9);
+}
+
+TEST_CASE("two loops have four assembly modes", "[modes]") {
+  const Scene scene = two_loops();
+  CHECK(assembly_modes(Mechanism(scene, nominal(scene)), 0).size() == 4);
+}
+
+TEST_CASE("a scene moved to a mode assembles to it, at other parameters, too", "[modes]") {
+  const Scene scene = two_loops();
+  const VectorXd rho = nominal(scene);
+  const Mechanism mechanism(scene, rho);
+  const std::vector<AssemblyMode> modes = assembly_modes(mechanism, 0);
+  for (const AssemblyMode& mode : modes) {
+    Scene moved = scene;
+    set_guess(moved, mechanism, mode);
+    const Assembly there(Mechanism(moved, rho), 0);
+    REQUIRE(there.result().ok);
+    CHECK((there.result().y.head(mode.q.size()) - mode.q).norm() < 1e-9);
+    VectorXd other = rho;
+    other(4) += 0.3;  // the crank's guess turns with its parameter
+    const Assembly later(Mechanism(moved, other), 0);
+    REQUIRE(later.result().ok);
+    CHECK((later.result().y.head(mode.q.size()) - mode.q).norm() < 1.5);
+  }
+}
+
+TEST_CASE("what is free has no assembly modes", "[modes]") {
+  Scene scene = linkage();
+  scene.drives.clear();
+  CHECK(assembly_modes(Mechanism(scene, nominal(scene)), 0).empty());
+}
