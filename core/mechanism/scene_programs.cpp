@@ -1,15 +1,21 @@
 #include "core/mechanism/scene_programs.hpp"
 
+#include <utility>
+
 #include "core/scene/signals.hpp"
 
 namespace mbsopt {
 namespace {
 
+// make() returns an expression that keeps `key` in use, and what is made of it.
 template <class Table, class Make>
-auto found_or_made(Table& table, std::mutex& mutex, const Expression& expression, Make&& make) {
+auto found_or_made(Table& table, std::mutex& mutex, const void* key, Make&& make) {
   const std::lock_guard lock(mutex);
-  auto& entry = table[&expression.tree()];
-  if (!entry.made) entry = {expression, make()};
+  auto& entry = table[key];
+  if (!entry.made) {
+    auto [expression, made] = make();
+    entry = {expression, std::make_shared<const decltype(made)>(std::move(made))};
+  }
   return entry.made;
 }
 
@@ -24,14 +30,23 @@ ScenePrograms::ScenePrograms(const Scene& scene) {
 }
 
 std::shared_ptr<const Program> ScenePrograms::field(const Expression& field) {
-  return found_or_made(fields_, mutex_, field, [&] { return std::make_shared<const Program>(field, symbols_); });
+  return found_or_made(fields_, mutex_, &field.tree(), [&] { return std::pair(field, Program(field, symbols_)); });
+}
+
+ScenePrograms::Law ScenePrograms::made(const Expression& law) const {
+  const int t = symbols_of_time_.input("t");
+  const Program f(law, symbols_of_time_), f_t = f.derivative(t);
+  return {f, f_t, f_t.derivative(t)};
 }
 
 std::shared_ptr<const std::array<Program, 3>> ScenePrograms::law(const Expression& law) {
-  return found_or_made(laws_, mutex_, law, [&] {
-    const int t = symbols_of_time_.input("t");
-    const Program f(law, symbols_of_time_), f_t = f.derivative(t);
-    return std::make_shared<const std::array<Program, 3>>(std::array<Program, 3>{f, f_t, f_t.derivative(t)});
+  return found_or_made(laws_, mutex_, &law.tree(), [&] { return std::pair(law, made(law)); });
+}
+
+std::shared_ptr<const std::array<Program, 3>> ScenePrograms::law(const SampledLaw& samples) {
+  return found_or_made(laws_, mutex_, samples.curve.get(), [&] {
+    const Expression law = expression_of(samples, "samples");
+    return std::pair(law, made(law));
   });
 }
 

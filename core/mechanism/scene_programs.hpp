@@ -24,20 +24,24 @@ class ScenePrograms {
   // Of a numeric field, and f, f_t, f_tt of a law of time, whose last input is t. Both throw UnknownName.
   std::shared_ptr<const Program> field(const Expression& field);
   std::shared_ptr<const std::array<Program, 3>> law(const Expression& law);
+  std::shared_ptr<const std::array<Program, 3>> law(const SampledLaw& samples);
 
  private:
+  using Law = std::array<Program, 3>;
   template <class Made>
   struct Entry {
-    Expression expression;  // keeps the tree, by which it is found
+    Expression expression;  // keeps the tree or the curve, by which it is found
     std::shared_ptr<const Made> made;
   };
   template <class Made>
-  using Table = std::unordered_map<const SyntaxTree*, Entry<Made>>;
+  using Table = std::unordered_map<const void*, Entry<Made>>;
+
+  Law made(const Expression& law) const;
 
   Symbols symbols_, symbols_of_time_;
   std::mutex mutex_;
   Table<Program> fields_;
-  Table<std::array<Program, 3>> laws_;
+  Table<Law> laws_;
 };
 
 }  // namespace mbsopt

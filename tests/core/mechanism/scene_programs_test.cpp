@@ -25,6 +25,10 @@ TEST_CASE("an expression is compiled once, by whichever mechanism asks first", "
   CHECK((*programs.law(law))[1].value(inputs, scratch) == 30);
   CHECK((*programs.law(law))[2].value(inputs, scratch) == 6);
   CHECK_THROWS_AS(programs.field(f("unknown")), UnknownName);
+  SampledLaw samples;
+  samples.curve =
+      std::make_shared<const Curve>(Interpolation::spline, std::vector{0.0, 1.0, 2.0}, std::vector{0.0, 1.0, 4.0});
+  CHECK(programs.law(samples) == programs.law(SampledLaw(samples)));
 }
 
 TEST_CASE("mechanisms that share programs have the numbers of those that do not", "[mechanism]") {
