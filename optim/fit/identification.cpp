@@ -315,8 +315,9 @@ class Identification {
 
   void find_influences(const ExperimentStack& stack, const LeastSquaresResult& solution,
                        const std::vector<UnknownParameter>& unknowns) {
-    if (stack.members().size() < 2 || stack.equalities > 0 || !result_.statistics.none.empty() || options_.preflight)
-      return;
+    const FitStatistics& s = result_.statistics;
+    const bool determined = s.none.empty() && s.unidentifiable.empty();
+    if (stack.members().size() < 2 || stack.equalities > 0 || !determined || options_.preflight) return;
     const Eigen::VectorXd errors = result_.statistics.std_error.cwiseQuotient(stack.scaling().rho_x(solution.x));
     const std::vector<Eigen::VectorXd> changes = changes_without(stack, solution.point, unknowns);
     for (std::size_t m = 0; m < changes.size(); ++m) {

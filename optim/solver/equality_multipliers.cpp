@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/expression/counted.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -110,6 +112,9 @@ LeastSquaresResult solve_with_equalities(LeastSquaresProblem& problem, const Vec
     all = std::move(found);
     all.z_initial = z_initial;
     if (all.point.z.size() == 0) return all;
+    if (all.status == SolverStatus::iteration_limit)  // of all rounds, not of this one
+      all.message =
+          fmt::format("stopped at the limit of {}{}", counted(options.max_iterations, "iteration"), all.failures());
     round.end(all);
     all.cost_initial = problem.cost(all.z_initial);
     const bool satisfied = round.left() <= kSatisfied;
