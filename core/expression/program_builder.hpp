@@ -11,10 +11,11 @@
 
 #include "core/expression/did_you_mean.hpp"
 #include "core/expression/program.hpp"
-#include "core/expression/sampled_functions.hpp"
 #include "core/expression/syntax_tree.hpp"
 
 namespace mbsopt {
+
+struct SampledFunction;  // sampled_functions.hpp
 
 // Turns a tree and the definitions it uses into instructions: equal sub-expressions become one (value numbering),
 // constants are folded, and factors that cannot matter (x^0, 0 x) drop out, so that used_inputs() is structural.
