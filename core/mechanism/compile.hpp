@@ -13,6 +13,6 @@ class ScenePrograms;
 
 MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active,
                       std::vector<std::shared_ptr<const UserForce>> user_forces,
-                      std::shared_ptr<ScenePrograms> programs);
+                      std::shared_ptr<ScenePrograms> programs = nullptr);
 
 }  // namespace mbsopt
