@@ -24,7 +24,7 @@ constexpr double kSmoothVelocity = 0.01;  // a tenth of a slow joint's rate (doc
 // actuators, a medium. All else is drawing, or settings of that program.
 // clang-format off
 constexpr std::array kActs{
-    "limit", "collision", "safety_controller", "joint armature", "joint range", "joint margin", "actuator",
+    "limit", "collision", "geom", "contact", "safety_controller", "joint armature", "joint range", "joint margin", "actuator",
     "tendon", "joint springdamper", "option wind", "option density", "option viscosity", "body gravcomp",
     "body mocap", "weld relpose", "distance", "compiler inertiagrouprange", "compiler boundmass",
     "compiler boundinertia", "compiler balanceinertia", "geom shellinertia", "geom fluidshape"};

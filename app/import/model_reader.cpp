@@ -17,6 +17,10 @@ std::string described(const XmlElement& element) {
   return name ? fmt::format("{} '{}'", element.name, *name) : element.name;
 }
 
+std::string left_out(const XmlElement& element, const std::string& what) {
+  return fmt::format("line {}: {} is left out (may change the motion)", element.line, what);
+}
+
 void ModelErrors::add(const XmlElement& element, const std::string& message) {
   const Finding finding{file_, element.line, element.column, described(element), message};
   if (std::ranges::find(findings_, finding) == findings_.end()) findings_.push_back(finding);

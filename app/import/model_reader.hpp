@@ -13,6 +13,9 @@ namespace mbsopt {
 // "joint 'a'", "joint".
 std::string described(const XmlElement& element);
 
+// A sentence for ImportedModel::changed: the problem file lacks `what` of the element, which acts on the motion.
+std::string left_out(const XmlElement& element, const std::string& what);
+
 class ModelErrors {
  public:
   explicit ModelErrors(std::string file) : file_(std::move(file)) {}

@@ -157,6 +157,8 @@ class UrdfReader {
     const int body = static_cast<int>(model_.bodies.size());
     const Isometry3d frame = model_.bodies[static_cast<std::size_t>(parent)].frame * between;
     model_.bodies.push_back({.name = body_names_.body(*child.text("name")), .frame = frame, .source = &child});
+    const XmlElement* const dynamics = element.child("dynamics");
+    if (dynamics && (type.empty() || type == "planar")) leave_out(*dynamics, *element.text("type"));
     if (type.empty()) return body;
     ImportedJoint joint{.name = joint_names_.body(*element.text("name")), .type = type, .body1 = parent, .body2 = body};
     joint.source = &element;
@@ -165,13 +167,21 @@ class UrdfReader {
     if (const XmlElement* const a = element.child("axis")) axis = vector(*a, "xyz", axis);
     if (axis.norm() == 0) errors_.add(element, "the axis is zero");
     joint.axis = axis.normalized();
-    if (const XmlElement* const dynamics = element.child("dynamics"); dynamics && type != "planar") {
+    if (dynamics && type != "planar") {
       joint.damping = number(*dynamics, "damping", 0);
       joint.coulomb = number(*dynamics, "friction", 0);
     }
     joint_index_[*element.text("name")] = static_cast<int>(model_.joints.size());
     model_.joints.push_back(joint);
     return body;
+  }
+
+  void leave_out(const XmlElement& dynamics, const std::string& type) {
+    for (const char* attribute : {"damping", "friction"}) {
+      const double value = number(dynamics, attribute, 0);
+      if (value != 0)
+        model_.changed.push_back(left_out(dynamics, fmt::format("{} {} of a {} joint", attribute, value, type)));
+    }
   }
 
   void add_link(const XmlElement& link, ImportedBody& body, const Isometry3d& frame) {
