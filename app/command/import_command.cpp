@@ -17,7 +17,7 @@ int import_command(const CommandContext& context) {
   const fs::path folder = context.options.out;
   const fs::path path = folder / (imported.name + ".json");
   refuse_to_overwrite(path, "import");
-  if (!folder.empty()) fs::create_directories(folder);
+  if (!folder.empty()) create_folder(folder);
   write_file_atomically(path, imported.text);
   context.out << fmt::format("{}: {}, {}\n", path.string(), counted(imported.bodies, "body", "bodies"),
                              counted(imported.joints, "joint"));
