@@ -113,7 +113,7 @@ class MjcfReader {
     for (const XmlElement* site : element.children("site")) {
       const auto name = site->text("name");
       const Vector3d at = around.frame * vector(*site, around, "pos", Vector3d::Zero());
-      if (name && around.body > 0) body(around).points[*name] = at;
+      if (name && around.body > 0) body(around).points.emplace_back(*name, at);
     }
     for (const XmlElement* child : element.children()) {  // in the order of the file
       if (child->name != "body" && child->name != "frame") continue;
@@ -153,7 +153,7 @@ class MjcfReader {
         if (!free) read_joint(joints[k], joint_name, parent, between, inside.body);
       }
     } else if (around.body > 0) {
-      body(around).points[name] = inside.frame.translation();
+      body(around).points.emplace_back(name, inside.frame.translation());
       model_.changed.push_back(fmt::format("body '{}' has no joint and is a part of '{}'", name, body(around).name));
     }
     placed_[name] = inside;
@@ -257,8 +257,8 @@ class MjcfReader {
       tensor.diagonal() = vector(inertial, inside, "diaginertia", Vector3d::Zero());
     }
     if (!inertial.text("mass")) errors_.add(inertial, "has no attribute 'mass'");
-    add_mass(body(inside), number(inertial, inside, "mass", 0), at.translation(),
-             at.linear() * tensor * at.linear().transpose());
+    add_part(body(inside), inertial, number(inertial, inside, "mass", 0), at.translation(),
+             at.linear() * tensor * at.linear().transpose(), errors_);
   }
 
   void read_geom(const XmlElement& element, const Around& around) {
@@ -278,7 +278,8 @@ class MjcfReader {
       const double density = number(element, around, "density", kDensity);
       const double mass = given ? number(element, around, "mass", 0) : density * volume(*geom);
       const Matrix3d R = geom->at.linear();
-      add_mass(body(around), mass, geom->at.translation(), mass * R * unit_inertia(*geom).asDiagonal() * R.transpose());
+      add_part(body(around), element, mass, geom->at.translation(),
+               mass * R * unit_inertia(*geom).asDiagonal() * R.transpose(), errors_);
     }
     if (around.body > 0) body(around).shapes.push_back(shape_of(*geom));
   }
@@ -470,7 +471,7 @@ class MjcfReader {
   ModelErrors errors_;
   MjcfDefaults defaults_;
   ImportedModel model_;
-  Names body_names_{{"ground"}}, joint_names_{{}};
+  Names body_names_{{"ground"}, &model_.changed}, joint_names_{{}, &model_.changed};
   std::map<std::string, Around> placed_;                               // bodies of the model by name
   std::map<std::string, int> joint_index_;                             // of hinges, slides and balls
   bool degrees_ = true;                                                // compiler: angle

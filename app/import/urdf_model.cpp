@@ -185,15 +185,15 @@ class UrdfReader {
   }
 
   void add_link(const XmlElement& link, ImportedBody& body, const Isometry3d& frame) {
-    if (body.source && body.source != &link) body.points[*link.text("name")] = frame.translation();
-    if (const XmlElement* const inertial = link.child("inertial")) add_inertial(*inertial, body, frame);
+    if (body.source && body.source != &link) body.points.emplace_back(*link.text("name"), frame.translation());
+    if (const XmlElement* const inertial = link.child("inertial")) add_inertial(link, *inertial, body, frame);
     for (const XmlElement* visual : link.children("visual")) {
       const XmlElement* const geometry = visual->child("geometry");
       if (geometry) add_shape(*geometry, body, frame * origin(*visual));
     }
   }
 
-  void add_inertial(const XmlElement& inertial, ImportedBody& body, const Isometry3d& frame) {
+  void add_inertial(const XmlElement& link, const XmlElement& inertial, ImportedBody& body, const Isometry3d& frame) {
     const Isometry3d at = frame * origin(inertial);
     const XmlElement* const mass = inertial.child("mass");
     const XmlElement* const inertia = inertial.child("inertia");
@@ -202,7 +202,8 @@ class UrdfReader {
     const auto J = [&](const char* entry) { return required_number(*inertia, entry); };
     Matrix3d tensor;
     tensor << J("ixx"), J("ixy"), J("ixz"), J("ixy"), J("iyy"), J("iyz"), J("ixz"), J("iyz"), J("izz");
-    add_mass(body, required_number(*mass, "value"), at.translation(), at.linear() * tensor * at.linear().transpose());
+    add_part(body, link, required_number(*mass, "value"), at.translation(),
+             at.linear() * tensor * at.linear().transpose(), errors_);
   }
 
   void add_shape(const XmlElement& geometry, ImportedBody& body, const Isometry3d& at) {
@@ -241,7 +242,7 @@ class UrdfReader {
   const XmlElement& robot_;
   ModelErrors errors_;
   ImportedModel model_;
-  Names body_names_{{"ground"}}, joint_names_{{}};
+  Names body_names_{{"ground"}, &model_.changed}, joint_names_{{}, &model_.changed};
   Elements links_, joints_;
   std::map<std::string, std::vector<const XmlElement*>> children_;  // joints of a link
   Elements parents_;                                                // the joint that carries a link

@@ -331,3 +331,33 @@ TEST_CASE("words of MuJoCo's options are those that it takes", "[import]") {
   CHECK(free.joints == 1);
   CHECK_THAT(free.text, Contains("weld is not active"));
 }
+
+TEST_CASE("names keep their letters, and what is renamed is said", "[import]") {
+  const ImportedProblem imported = imported_text(R"(<mujoco model="a/b"><worldbody>
+  <body name="Körper"><joint name="t" axis="0 1 0"/><geom size="0.1" pos="0.2 0 0"/>
+  <site name="tool" pos="0 0 -1"/><body name="tool" pos="0 0 -0.5"/></body></worldbody></mujoco>)");
+  const Problem problem = tight(imported);
+  CHECK(problem.scene.bodies[0].name == "Körper");
+  CHECK(problem.scene.bodies[0].points.size() == 2);  // the site and the body
+  CHECK_THAT(imported.text, Contains("'a/b' is named 'a_b'") && Contains("'tool' is named 'tool_2'") &&
+                                Contains(R"("tool": [0, 0, -1], "tool_2": [0, 0, -0.5])"));
+}
+
+TEST_CASE("a body without mass on a joint of its own is warned of", "[import]") {
+  const ImportedProblem imported =
+      imported_text(robot(link("a") + "<link name=\"tip\"/>" + joint("j", "base", "a") + joint("k", "a", "tip")));
+  REQUIRE(imported.warnings.size() == 1);
+  CHECK_THAT(imported.warnings[0], Contains("line 4: 'tip' has no mass or inertia"));
+  CHECK(imported_text(robot(link("a") + joint("j", "base", "a"))).warnings.empty());
+}
+
+TEST_CASE("a part that no body can have is refused, also where it is a part of another", "[import]") {
+  const auto with = [](const std::string& mass, const std::string& J) {
+    return finding_of(robot(link("a") + "<link name=\"t\"><inertial><mass value=\"" + mass + "\"/><inertia ixx=\"" + J +
+                            "\" ixy=\"0\" ixz=\"0\" iyy=\"" + J + "\" iyz=\"0\" izz=\"1\"/></inertial></link>" +
+                            joint("j", "base", "a") + joint("k", "a", "t", "", "fixed")));
+  };
+  CHECK_THAT(with("-0.5", "1"), Contains("model.xml:4:1: link 't': mass: is -0.5 kg"));
+  CHECK_THAT(with("0.5", "-0.3"), Contains("model.xml:4:1: link 't': inertia: "));
+  CHECK(with("0.5", "1") == "none");
+}
