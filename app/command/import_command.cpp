@@ -17,10 +17,11 @@ int import_command(const CommandContext& context) {
   const fs::path folder = context.options.out;
   const fs::path path = folder / (imported.name + ".json");
   refuse_to_overwrite(path, "import");
-  if (!folder.empty()) fs::create_directories(folder);
+  if (!folder.empty()) create_folder(folder);
   write_file_atomically(path, imported.text);
   context.out << fmt::format("{}: {}, {}\n", path.string(), counted(imported.bodies, "body", "bodies"),
                              counted(imported.joints, "joint"));
+  for (const std::string& words : imported.warnings) context.out << "warning: " << words << '\n';
   for (const std::string& words : imported.changed) context.out << "said otherwise: " << words << '\n';
   for (const std::string& words : imported.dropped) context.out << "dropped: " << words << '\n';
   context.out << fmt::format("try: mbsopt simulate {}\n", path.string());

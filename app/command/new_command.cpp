@@ -19,7 +19,7 @@ int new_command(const CommandContext& context) {
     throw std::invalid_argument(fmt::format("there is no starter '{}'", context.options.starter));
   const fs::path folder = context.options.out;
   for (const StarterFile& file : starter->files) refuse_to_overwrite(folder / file.name, "new");
-  if (!folder.empty()) fs::create_directories(folder);
+  if (!folder.empty()) create_folder(folder);
   for (const StarterFile& file : starter->files) write_file_atomically(folder / file.name, file.text);
   const auto path_of = [&](const StarterFile& file) { return (folder / file.name).string(); };
   for (const StarterFile& file : starter->files) context.out << path_of(file) << '\n';

@@ -54,6 +54,14 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view c
   flush_folder_of(path);
 }
 
+void create_folder(const std::filesystem::path& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (error || !std::filesystem::is_directory(path))
+    throw OutputError(fmt::format("{}: the output folder cannot be created: {}", path.string(),
+                                  error ? error.message() : "a file has this name"));
+}
+
 void refuse_to_overwrite(const std::filesystem::path& path, std::string_view command) {
   std::error_code unreadable;
   if (std::filesystem::symlink_status(path, unreadable).type() == std::filesystem::file_type::not_found) return;

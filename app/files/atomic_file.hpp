@@ -21,6 +21,9 @@ class WriteError : public OutputError {
 
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);  // throws WriteError
 
+// With the folders around it. Throws OutputError where that is not possible, or where a file has the name.
+void create_folder(const std::filesystem::path& path);
+
 // For commands that write what a user will edit: throws OutputError where there is anything at `path`.
 void refuse_to_overwrite(const std::filesystem::path& path, std::string_view command);
 

@@ -14,6 +14,8 @@
 #include "app/json/node.hpp"
 #include "app/json/read_problem.hpp"
 #include "app/json/source_text.hpp"
+#include "core/start/model_warnings.hpp"
+#include "optim/problem/parameter_values.hpp"
 
 namespace mbsopt {
 namespace {
@@ -24,7 +26,7 @@ constexpr double kSmoothVelocity = 0.01;  // a tenth of a slow joint's rate (doc
 // actuators, a medium. All else is drawing, or settings of that program.
 // clang-format off
 constexpr std::array kActs{
-    "limit", "collision", "safety_controller", "joint armature", "joint range", "joint margin", "actuator",
+    "limit", "collision", "geom", "contact", "safety_controller", "joint armature", "joint range", "joint margin", "actuator",
     "tendon", "joint springdamper", "option wind", "option density", "option viscosity", "body gravcomp",
     "body mocap", "weld relpose", "distance", "compiler inertiagrouprange", "compiler boundmass",
     "compiler boundinertia", "compiler balanceinertia", "geom shellinertia", "geom fluidshape"};
@@ -52,10 +54,10 @@ void refuse(const ImportedModel& model, ModelErrors& errors) {
   errors.throw_if_any();
 }
 
-// The findings about a body or a joint of the problem, at their element of the model.
-void check(const std::string& text, const ImportedModel& model, const std::string& file) {
+// The problem; its findings about a body or a joint at their element of the model.
+Problem checked(const std::string& text, const ImportedModel& model, const std::string& file) {
   try {
-    read_problem_text(text, file);
+    return read_problem_text(text, file);
   } catch (const InputError& error) {
     std::vector<Finding> findings;
     for (Finding finding : error.findings()) {
@@ -74,6 +76,21 @@ void check(const std::string& text, const ImportedModel& model, const std::strin
     }
     throw InputError(findings);
   }
+}
+
+// Bodies whose accelerations no simulation can compute. The model may still serve kinematics.
+std::vector<std::string> warnings_of(const Problem& problem, const ImportedModel& model) {
+  const Mechanism mechanism(problem.scene, parameter_values(problem.scene));
+  const Assembly assembly(mechanism, problem.scene.simulation.start_time);
+  std::vector<std::string> warnings;
+  for (const int body : massless_bodies(mechanism, assembly)) {
+    const ImportedBody& b = model.bodies[static_cast<std::size_t>(body)];
+    warnings.push_back(
+        fmt::format("line {}: '{}' has no mass or inertia in a direction that no joint holds, and "
+                    "simulate fails; give it some",
+                    b.source ? b.source->line : 0, b.name));
+  }
+  return warnings;
 }
 
 std::string comment(const std::vector<std::string>& lines, const char* heading) {
@@ -101,10 +118,11 @@ ImportedProblem import_model_text(const std::string& text, const std::filesystem
     errors.throw_if_any();
   }
   refuse(model, errors);
-  model.name = Names({}).body(model.name);
+  model.name = Names({}, &model.changed).body(model.name);
   if (std::ranges::any_of(model.joints, [](const ImportedJoint& j) { return j.coulomb != 0; }))
     model.changed.push_back(fmt::format(
         "dry friction does not stick: it is smoothed over {} rad/s, m/s (smooth_velocity)", kSmoothVelocity));
+  const nlohmann::ordered_json problem = problem_of(model, kSmoothVelocity, model.changed);
   ImportedProblem imported;
   imported.name = model.name;
   imported.changed = model.changed;
@@ -112,18 +130,18 @@ ImportedProblem import_model_text(const std::string& text, const std::filesystem
     imported.dropped.push_back(
         fmt::format("line {}: {}{}", unread.line, unread.what,
                     std::ranges::find(kActs, unread.what) == kActs.end() ? "" : " (may change the motion)"));
-  for (std::vector<std::string>* list : {&imported.changed, &imported.dropped})
+  const std::string json = text_of(problem);
+  imported.warnings = warnings_of(checked(json, model, name), model);
+  for (std::vector<std::string>* list : {&imported.changed, &imported.dropped, &imported.warnings})
     for (std::string& words : *list)
       std::ranges::replace_if(
           words, [](unsigned char c) { return c < ' '; }, ' ');
-  const nlohmann::ordered_json problem = problem_of(model, kSmoothVelocity);
   imported.bodies = problem.at("bodies").size();
   imported.joints = problem.at("joints").size();
   imported.text = fmt::format("// Imported from {}.\n", file.filename().string()) +
-                  comment(imported.changed, "Said otherwise:") +
+                  comment(imported.warnings, "Warnings:") + comment(imported.changed, "Said otherwise:") +
                   comment(imported.dropped, "Dropped (kinds of elements and attributes, with their first line):") +
-                  text_of(problem);
-  check(imported.text, model, name);
+                  json;
   return imported;
 }
 

@@ -3,9 +3,9 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app/import/xml_element.hpp"
@@ -23,11 +23,11 @@ ImportedShape box_shape(const Eigen::Vector3d& half_sides, const Eigen::Isometry
 
 struct ImportedBody {
   std::string name;
-  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();  // global
-  double mass = 0;                                          // [kg]
-  Eigen::Vector3d com = Eigen::Vector3d::Zero();            // [m]
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();        // about com [kg m^2]
-  std::map<std::string, Eigen::Vector3d> points = {};       // [m]
+  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();           // global
+  double mass = 0;                                                   // [kg]
+  Eigen::Vector3d com = Eigen::Vector3d::Zero();                     // [m]
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();                 // about com [kg m^2]
+  std::vector<std::pair<std::string, Eigen::Vector3d>> points = {};  // [m]
   std::vector<ImportedShape> shapes = {};
   const XmlElement* source = nullptr;
 };

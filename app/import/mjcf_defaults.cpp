@@ -24,27 +24,33 @@ void MjcfDefaults::add(const XmlElement& node, const std::string& around, bool o
   for (const XmlElement* child : node.children("default")) add(*child, name, false);
 }
 
-std::optional<std::string> MjcfDefaults::text(const XmlElement& element, const std::string& childclass,
-                                              std::string_view attribute) {
-  std::optional<std::string> value = element.text(attribute);
+std::vector<const XmlElement*> MjcfDefaults::sources(const XmlElement& element, const std::string& childclass) {
+  std::vector<const XmlElement*> list{&element};
   std::string name = element.text("class").value_or(childclass);
   if (name.empty()) name = outermost_;
   if (name != outermost_ && !around_.contains(name)) {
     errors_.add(element, fmt::format("there is no default class '{}'", name));
-    return value;
+    return list;
   }
-  // All of them are read: a class that a nearer one overrides is not dropped.
   for (;;) {
-    const std::string kind = element.name == "freejoint" ? "joint" : element.name;
-    for (const XmlElement* node : found_[name][kind]) {
+    for (const XmlElement* node : found_[name][element.name]) {
       node->mark_read();
-      const std::optional<std::string> own = node->text(attribute);
-      if (!value) value = own;
+      list.push_back(node);
     }
     const auto next = around_.find(name);
-    if (next == around_.end()) return value;
+    if (next == around_.end()) return list;
     name = next->second;
   }
+}
+
+std::optional<std::string> MjcfDefaults::text(const XmlElement& element, const std::string& childclass,
+                                              std::string_view attribute) {
+  std::optional<std::string> value;
+  for (const XmlElement* source : sources(element, childclass)) {
+    const std::optional<std::string> own = source->text(attribute);
+    if (!value) value = own;
+  }
+  return value;
 }
 
 }  // namespace mbsopt

@@ -14,7 +14,11 @@ class MjcfDefaults {
  public:
   MjcfDefaults(const XmlElement& mujoco, ModelErrors& errors);
 
+  // The element, and the elements of its kind in its class and in the classes around this one, from near to far.
   // An element's own class goes before `childclass`, that of the bodies around it; empty: the outermost class.
+  std::vector<const XmlElement*> sources(const XmlElement& element, const std::string& childclass);
+
+  // The attribute of the first source that has it. All are read: a class that a nearer one overrides is not dropped.
   std::optional<std::string> text(const XmlElement& element, const std::string& childclass, std::string_view attribute);
 
  private:

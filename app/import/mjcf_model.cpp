@@ -1,6 +1,7 @@
 #include "app/import/mjcf_model.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -42,8 +43,9 @@ class MjcfReader {
     refuse_unread_mechanics(mujoco_);
     for (const XmlElement* compiler : mujoco_.children("compiler")) read_compiler(*compiler);
     for (const XmlElement* option : mujoco_.children("option")) read_option(*option);
+    if (!enabled("gravity")) model_.gravity.setZero();
     for (const XmlElement* world : mujoco_.children("worldbody"))
-      read_contents(*world, {0, Isometry3d::Identity(), "", true});
+      read_contents(*world, {0, Isometry3d::Identity(), "", false});
     if (total_mass_) scale_masses();
     for (const XmlElement* equality : mujoco_.children("equality")) {
       for (const XmlElement* e : equality->children("connect")) read_connect(*e);
@@ -59,7 +61,7 @@ class MjcfReader {
     int body;
     Isometry3d frame;
     std::string childclass;
-    bool geoms_weigh;  // the body has no <inertial> that says its mass
+    bool geoms_weigh;  // not those of the world, nor of a body whose <inertial> says its mass
   };
 
   void refuse_unread_mechanics(const XmlElement& element) {
@@ -71,11 +73,7 @@ class MjcfReader {
   }
 
   void read_compiler(const XmlElement& compiler) {
-    if (const auto angle = compiler.text("angle")) {
-      if (*angle != "degree" && *angle != "radian")
-        errors_.add(compiler, fmt::format("angle: is '{}', must be degree or radian", *angle));
-      degrees_ = *angle == "degree";
-    }
+    degrees_ = keyword(compiler, "angle", {"degree", "radian"}, degrees_ ? "degree" : "radian") == "degree";
     if (const auto sequence = compiler.text("eulerseq")) {
       if (sequence->size() != 3 || sequence->find_first_not_of("xyzXYZ") != std::string::npos)
         errors_.add(compiler, fmt::format("eulerseq: is '{}', must be three of x y z X Y Z", *sequence));
@@ -84,7 +82,7 @@ class MjcfReader {
     }
     if (compiler.text("coordinate").value_or("local") != "local")
       errors_.add(compiler, "coordinate: only local coordinates are read");
-    if (const auto from = compiler.text("inertiafromgeom")) inertia_from_geoms_ = *from;
+    inertia_from_geoms_ = keyword(compiler, "inertiafromgeom", {"auto", "true", "false"}, inertia_from_geoms_);
     if (const auto sum = compiler.text("settotalmass")) {
       const double mass = numbers(compiler, "settotalmass", *sum, 1, errors_)(0);
       if (mass > 0) total_mass_ = mass;
@@ -94,7 +92,19 @@ class MjcfReader {
   void read_option(const XmlElement& option) {
     if (const auto g = option.text("gravity")) model_.gravity = numbers(option, "gravity", *g, 3, errors_);
     const XmlElement* const flag = option.child("flag");
-    if (flag && flag->text("gravity").value_or("enable") == "disable") model_.gravity.setZero();
+    if (!flag) return;
+    for (auto& [name, value] : flags_) value = keyword(*flag, name, {"enable", "disable"}, value);
+  }
+
+  bool enabled(const std::string& flag) const { return flags_.at(flag) == "enable"; }
+
+  // One of the words that MuJoCo takes; a finding, and the first one, for any other.
+  std::string keyword(const XmlElement& element, const std::string& attribute, const std::vector<std::string>& words,
+                      const std::string& otherwise) {
+    const std::string word = element.text(attribute).value_or(otherwise);
+    if (std::ranges::find(words, word) != words.end()) return word;
+    errors_.add(element, fmt::format("{}: is '{}', must be {}", attribute, word, fmt::join(words, " or ")));
+    return words.front();
   }
 
   // Bodies, geoms and sites of the world, of a body or of a <frame>, which only moves and turns what it holds.
@@ -103,7 +113,7 @@ class MjcfReader {
     for (const XmlElement* site : element.children("site")) {
       const auto name = site->text("name");
       const Vector3d at = around.frame * vector(*site, around, "pos", Vector3d::Zero());
-      if (name && around.body > 0) body(around).points[*name] = at;
+      if (name && around.body > 0) body(around).points.emplace_back(*name, at);
     }
     for (const XmlElement* child : element.children()) {  // in the order of the file
       if (child->name != "body" && child->name != "frame") continue;
@@ -119,14 +129,13 @@ class MjcfReader {
   void read_body(const XmlElement& element, const Around& around) {
     Around inside{around.body, around.frame * placement(element, around), childclass(element, around), true};
     const std::string name = element.text("name").value_or(fmt::format("body{}", model_.bodies.size()));
-    std::vector<const XmlElement*> joints = element.children("joint");
-    const std::vector<const XmlElement*> free_joints = element.children("freejoint");
-    for (const XmlElement* joint : free_joints) joint->text("name");
-    const bool free = !free_joints.empty() || (joints.size() == 1 && joint_type(*joints[0], inside) == "free");
-    if (free) joints.clear();
-    if (free || !joints.empty()) {
+    std::vector<PlacedJoint> joints;
+    collect_joints(element, {inside.body, Isometry3d::Identity(), inside.childclass, false}, joints);
+    const bool free = joints.size() == 1 && is_free(joints[0]);
+    if (free) read_free_joint(joints[0]);
+    if (!joints.empty()) {
       // A joint each between two bodies; those before the last one have no mass.
-      const std::size_t count = free ? 1 : joints.size();
+      const std::size_t count = joints.size();
       for (std::size_t k = 0; k < count; ++k) {
         const int parent = inside.body;
         const Isometry3d between = inside.frame;
@@ -134,17 +143,17 @@ class MjcfReader {
         inside.frame = Isometry3d::Identity();
         const bool last = k + 1 == count;
         const std::string joint_name =
-            free ? "" : joints[k]->text("name").value_or(fmt::format("{}_joint{}", name, k + 1));
+            free ? "" : joints[k].element->text("name").value_or(fmt::format("{}_joint{}", name, k + 1));
         model_.bodies.push_back({.name = body_names_.body(last ? name : name + "_" + joint_name),
                                  .frame = model_.bodies[static_cast<std::size_t>(parent)].frame * between,
                                  .source = &element});
         if (!last)
           model_.changed.push_back(fmt::format("'{}' has {} joints: '{}' without mass stands between two of them", name,
                                                count, model_.bodies.back().name));
-        if (!free) read_joint(*joints[k], joint_name, parent, between, inside);
+        if (!free) read_joint(joints[k], joint_name, parent, between, inside.body);
       }
     } else if (around.body > 0) {
-      body(around).points[name] = inside.frame.translation();
+      body(around).points.emplace_back(name, inside.frame.translation());
       model_.changed.push_back(fmt::format("body '{}' has no joint and is a part of '{}'", name, body(around).name));
     }
     placed_[name] = inside;
@@ -154,13 +163,61 @@ class MjcfReader {
     read_contents(element, inside);
   }
 
+  struct PlacedJoint {
+    const XmlElement* element;
+    Around around;  // frame: that of the <frame> around the joint, in the frame of its body
+  };
+
+  // The joints of a body, also those in a <frame>, in the order of the file.
+  void collect_joints(const XmlElement& element, const Around& around, std::vector<PlacedJoint>& joints) {
+    for (const XmlElement* child : element.children()) {
+      if (child->name == "joint" || child->name == "freejoint") {
+        child->mark_read();
+        joints.push_back({child, around});
+      } else if (child->name == "frame") {
+        collect_joints(
+            *child, {around.body, around.frame * placement(*child, around), childclass(*child, around), false}, joints);
+        if (const XmlElement* const inertial = child->child("inertial"))
+          errors_.add(*inertial, "stands in a <frame>; it must stand in its body");
+      }
+    }
+  }
+
   std::string joint_type(const XmlElement& joint, const Around& around) {
     return text(joint, around, "type").value_or("hinge");
   }
+  bool is_free(const PlacedJoint& joint) {
+    return joint.element->name == "freejoint" || joint_type(*joint.element, joint.around) == "free";
+  }
 
-  void read_joint(const XmlElement& element, const std::string& name, int parent, const Isometry3d& between,
-                  const Around& inside) {
-    const std::string type = joint_type(element, inside);
+  // No class acts on <freejoint>.
+  void read_free_joint(const PlacedJoint& joint) {
+    joint.element->text("name");
+    if (joint.element->name == "joint") leave_out(joint, {"damping", "stiffness", "frictionloss"});
+  }
+
+  // damping, stiffness or frictionloss; 0 if a flag switches it off.
+  double coefficient(const PlacedJoint& joint, const std::string& attribute) {
+    const double value = number(*joint.element, joint.around, attribute, 0);
+    const bool acts =
+        attribute == "frictionloss" ? enabled("frictionloss") && enabled("constraint") : enabled("passive");
+    return acts ? value : 0;
+  }
+
+  void leave_out(const PlacedJoint& joint, const std::vector<std::string>& attributes) {
+    for (const std::string& attribute : attributes) {
+      const double value = coefficient(joint, attribute);
+      if (value == 0) continue;
+      const std::string type = joint_type(*joint.element, joint.around);
+      model_.changed.push_back(left_out(*joint.element, fmt::format("{} {} of a {} joint", attribute, value, type)));
+    }
+  }
+
+  void read_joint(const PlacedJoint& placed_joint, const std::string& name, int parent, const Isometry3d& between,
+                  int child) {
+    const auto& [source, around] = placed_joint;
+    const XmlElement& element = *source;
+    const std::string type = is_free(placed_joint) ? "free" : joint_type(element, around);
     const std::string ours = type == "hinge"   ? "revolute"
                              : type == "slide" ? "translational"
                              : type == "ball"  ? "spherical"
@@ -169,20 +226,22 @@ class MjcfReader {
       return errors_.add(element, type == "free"
                                       ? "a free joint must be its body's only one"
                                       : fmt::format("the type is '{}'; available: free, ball, slide, hinge", type));
-    ImportedJoint joint{.name = joint_names_.body(name), .type = ours, .body1 = parent, .body2 = inside.body};
+    ImportedJoint joint{.name = joint_names_.body(name), .type = ours, .body1 = parent, .body2 = child};
     joint.source = &element;
     joint.between = between;
-    joint.point = vector(element, inside, "pos", Vector3d::Zero());
-    const Vector3d axis = vector(element, inside, "axis", Vector3d::UnitZ());
+    joint.point = around.frame * vector(element, around, "pos", Vector3d::Zero());
+    const Vector3d axis = around.frame.linear() * vector(element, around, "axis", Vector3d::UnitZ());
     if (axis.norm() == 0) errors_.add(element, "axis: is zero");
     joint.axis = axis.normalized();
-    joint.damping = number(element, inside, "damping", 0);
-    if (type != "ball") {
+    joint.damping = coefficient(placed_joint, "damping");
+    if (type == "ball") {
+      leave_out(placed_joint, {"stiffness", "frictionloss"});
+    } else {
       // The spring is at rest at springref; the model is drawn at ref.
       const double unit = type == "hinge" ? angle_unit() : 1;
-      joint.stiffness = number(element, inside, "stiffness", 0);
-      joint.free_value = unit * (number(element, inside, "springref", 0) - number(element, inside, "ref", 0));
-      joint.coulomb = number(element, inside, "frictionloss", 0);
+      joint.stiffness = coefficient(placed_joint, "stiffness");
+      joint.free_value = unit * (number(element, around, "springref", 0) - number(element, around, "ref", 0));
+      joint.coulomb = coefficient(placed_joint, "frictionloss");
     }
     joint_index_[name] = static_cast<int>(model_.joints.size());
     model_.joints.push_back(joint);
@@ -198,13 +257,14 @@ class MjcfReader {
       tensor.diagonal() = vector(inertial, inside, "diaginertia", Vector3d::Zero());
     }
     if (!inertial.text("mass")) errors_.add(inertial, "has no attribute 'mass'");
-    add_mass(body(inside), number(inertial, inside, "mass", 0), at.translation(),
-             at.linear() * tensor * at.linear().transpose());
+    add_part(body(inside), inertial, number(inertial, inside, "mass", 0), at.translation(),
+             at.linear() * tensor * at.linear().transpose(), errors_);
   }
 
   void read_geom(const XmlElement& element, const Around& around) {
     const std::string type = text(element, around, "type").value_or("sphere");
-    if (around.body == 0 && !total_mass_) return element.mark_unread();  // the ground has neither mass nor shape
+    // The ground has no shape. Its bodies without joints count in settotalmass.
+    if (around.body == 0 && !(total_mass_ && around.geoms_weigh)) return element.mark_unread();
     if (type == "plane" || type == "hfield" || type == "sdf") return element.mark_unread();
     if (type == "mesh" || element.text("mesh")) {
       if (around.geoms_weigh && number(element, around, "mass", 1) != 0)
@@ -218,7 +278,8 @@ class MjcfReader {
       const double density = number(element, around, "density", kDensity);
       const double mass = given ? number(element, around, "mass", 0) : density * volume(*geom);
       const Matrix3d R = geom->at.linear();
-      add_mass(body(around), mass, geom->at.translation(), mass * R * unit_inertia(*geom).asDiagonal() * R.transpose());
+      add_part(body(around), element, mass, geom->at.translation(),
+               mass * R * unit_inertia(*geom).asDiagonal() * R.transpose(), errors_);
     }
     if (around.body > 0) body(around).shapes.push_back(shape_of(*geom));
   }
@@ -234,6 +295,7 @@ class MjcfReader {
     std::vector<double> size = numbers(element, "size", text(element, around, "size").value_or("0"), errors_);
     Geom geom{.type = type, .size = Vector3d::Zero()};
     const std::optional<std::string> fromto = text(element, around, "fromto");
+    if (fromto && element.text("pos")) errors_.add(element, "pos: must not stand beside fromto, also that of a class");
     if (fromto && type != "sphere") {  // the z axis runs from one end to the other
       const Eigen::VectorXd ends = numbers(element, "fromto", *fromto, 6, errors_);
       const Vector3d from = ends.head<3>(), along = Vector3d(ends.tail<3>()) - from;
@@ -281,7 +343,8 @@ class MjcfReader {
   }
 
   bool is_active(const XmlElement& element) {
-    const bool active = element.text("active").value_or("true") == "true";
+    const bool active =
+        keyword(element, "active", {"true", "false"}, "true") == "true" && enabled("equality") && enabled("constraint");
     if (!active)
       model_.changed.push_back(fmt::format("line {}: {} is not active, and left out", element.line, element.name));
     return active;
@@ -357,9 +420,19 @@ class MjcfReader {
     return frame;
   }
 
+  // That of the element; else of its class, and of the classes around this one.
   Matrix3d orientation(const XmlElement& element, const Around& around) {
+    std::optional<Matrix3d> found;
+    for (const XmlElement* source : defaults_.sources(element, around.childclass)) {
+      const std::optional<Matrix3d> own = own_orientation(*source);
+      if (!found) found = own;
+    }
+    return found.value_or(Matrix3d::Identity());
+  }
+
+  std::optional<Matrix3d> own_orientation(const XmlElement& element) {
     const auto given = [&](const char* attribute, Eigen::Index count) -> std::optional<Eigen::VectorXd> {
-      const std::optional<std::string> words = text(element, around, attribute);
+      const std::optional<std::string> words = element.text(attribute);
       if (!words) return std::nullopt;
       const Eigen::VectorXd values = numbers(element, attribute, *words, count, errors_);
       if (values.head(std::min<Eigen::Index>(count, 4)).norm() > 0 || std::string(attribute) == "euler") return values;
@@ -382,28 +455,34 @@ class MjcfReader {
       return R;
     }
     if (const auto z = given("zaxis", 3)) return with_z_along(*z);
-    Matrix3d R = Matrix3d::Identity();
     if (const auto angles = given("euler", 3)) {
+      Matrix3d R = Matrix3d::Identity();
       for (std::size_t k = 0; k < 3; ++k) {  // small letters: about the turned axes; capitals: about the fixed ones
         const char c = euler_sequence_[k];
         const Matrix3d turn = rotation((c | 0x20) - 'x', angle_unit() * (*angles)(static_cast<Eigen::Index>(k)));
         R = c >= 'x' ? Matrix3d(R * turn) : Matrix3d(turn * R);
       }
+      return R;
     }
-    return R;
+    return std::nullopt;
   }
 
   const XmlElement& mujoco_;
   ModelErrors errors_;
   MjcfDefaults defaults_;
   ImportedModel model_;
-  Names body_names_{{"ground"}}, joint_names_{{}};
-  std::map<std::string, Around> placed_;     // bodies of the model by name
-  std::map<std::string, int> joint_index_;   // of hinges, slides and balls
-  bool degrees_ = true;                      // compiler: angle
-  std::string euler_sequence_ = "xyz";       // compiler: eulerseq
-  std::string inertia_from_geoms_ = "auto";  // compiler: inertiafromgeom
-  std::optional<double> total_mass_;         // compiler: settotalmass [kg]
+  Names body_names_{{"ground"}, &model_.changed}, joint_names_{{}, &model_.changed};
+  std::map<std::string, Around> placed_;                               // bodies of the model by name
+  std::map<std::string, int> joint_index_;                             // of hinges, slides and balls
+  bool degrees_ = true;                                                // compiler: angle
+  std::string euler_sequence_ = "xyz";                                 // compiler: eulerseq
+  std::string inertia_from_geoms_ = "auto";                            // compiler: inertiafromgeom
+  std::optional<double> total_mass_;                                   // compiler: settotalmass [kg]
+  std::map<std::string, std::string> flags_{{"gravity", "enable"},     // option: flag
+                                            {"passive", "enable"},     // springs and dampers
+                                            {"constraint", "enable"},  // equality, frictionloss and others
+                                            {"equality", "enable"},
+                                            {"frictionloss", "enable"}};
 };
 
 }  // namespace

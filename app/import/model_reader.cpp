@@ -9,12 +9,17 @@
 #include <sstream>
 
 #include "core/expression/operation.hpp"
+#include "core/scene/inertia_check.hpp"
 
 namespace mbsopt {
 
 std::string described(const XmlElement& element) {
   const std::optional<std::string> name = element.text("name");
   return name ? fmt::format("{} '{}'", element.name, *name) : element.name;
+}
+
+std::string left_out(const XmlElement& element, const std::string& what) {
+  return fmt::format("line {}: {} is left out (may change the motion)", element.line, what);
 }
 
 void ModelErrors::add(const XmlElement& element, const std::string& message) {
@@ -55,25 +60,41 @@ Eigen::VectorXd numbers(const XmlElement& element, std::string_view attribute, c
   return Eigen::VectorXd::Zero(count);
 }
 
+void add_part(ImportedBody& body, const XmlElement& element, double mass, const Eigen::Vector3d& com,
+              const Eigen::Matrix3d& inertia, ModelErrors& errors) {
+  if (mass < 0) return errors.add(element, fmt::format("mass: is {} kg, a mass must not be negative", mass));
+  if (inertia.allFinite()) {
+    const Eigen::Matrix3d& J = inertia;
+    const std::string problem = inertia_problem({J(0, 0), J(1, 1), J(2, 2), J(0, 1), J(0, 2), J(1, 2)});
+    if (!problem.empty()) return errors.add(element, "inertia: " + problem);
+  }
+  add_mass(body, mass, com, inertia);
+}
+
 Eigen::Matrix3d rotation(int axis, double angle) {
   return Eigen::AngleAxisd(angle, Eigen::Vector3d::Unit(axis)).toRotationMatrix();
 }
 
-std::string Names::unique(std::string name) {
+std::string Names::unique(std::string name, const std::string& wanted) {
   const auto is_taken = [&](const std::string& n) {
     return std::ranges::find(taken_, n) != taken_.end() || find_function(n) != nullptr;
   };
   const std::string stem = name;
   for (int k = 2; is_taken(name); ++k) name = fmt::format("{}_{}", stem, k);
   taken_.push_back(name);
+  if (renamed_ && name != wanted) renamed_->push_back(fmt::format("'{}' is named '{}'", wanted, name));
   return name;
 }
 
 std::string Names::body(const std::string& wanted) {
   std::string name = wanted;
   std::ranges::replace_if(
-      name, [](char c) { return std::string_view(".,;\"'[]/\\").find(c) != std::string_view::npos || c < ' '; }, '_');
-  return unique(name.empty() ? "unnamed" : name);
+      name,
+      [](unsigned char c) {
+        return c < ' ' || std::string_view(".,;\"'[]/\\").find(static_cast<char>(c)) != std::string_view::npos;
+      },
+      '_');
+  return unique(name.empty() ? "unnamed" : name, wanted);
 }
 
 std::string Names::identifier(const std::string& wanted) {
@@ -82,7 +103,7 @@ std::string Names::identifier(const std::string& wanted) {
   std::ranges::replace_if(
       name, [&](char c) { return !fits(c); }, '_');
   if (name.empty() || (name[0] >= '0' && name[0] <= '9')) name.insert(0, "_");
-  return unique(name);
+  return unique(name, wanted);
 }
 
 }  // namespace mbsopt

@@ -33,7 +33,8 @@ Json list(const Vector& v, double scale) {
 
 class ProblemWriter {
  public:
-  ProblemWriter(const ImportedModel& model, double smooth_velocity) : model_(model), smooth_velocity_(smooth_velocity) {
+  ProblemWriter(const ImportedModel& model, double smooth_velocity, std::vector<std::string>& renamed)
+      : model_(model), smooth_velocity_(smooth_velocity), renamed_(renamed) {
     for (const ImportedBody& b : model.bodies) reach_ = std::max(reach_, b.frame.translation().norm());
     for (const ImportedJoint& j : model.joints)
       reach_ = std::max({reach_, j.between.translation().norm(), j.point.norm()});
@@ -70,7 +71,7 @@ class ProblemWriter {
     Eigen::Quaterniond e(b.frame.linear());
     if (e.w() < 0) e.coeffs() *= -1;
     if (e.vec().norm() > 0) json["orientation"] = list(Eigen::Vector4d(e.w(), e.x(), e.y(), e.z()), 1);
-    Names names({"O"});
+    Names names({"O"}, &renamed_);
     for (const auto& [name, at] : b.points) json["points"][names.identifier(name)] = point(at);
     for (const ImportedShape& s : b.shapes)
       json["shape"].push_back({{"type", s.type}, {"from", point(s.from)}, {"to", point(s.to)}, {"radius", s.radius}});
@@ -190,6 +191,7 @@ class ProblemWriter {
 
   const ImportedModel& model_;
   double smooth_velocity_;
+  std::vector<std::string>& renamed_;
   double reach_ = 0;  // the farthest place [m]
   Json joints_ = Json::array(), forces_ = Json::array(), sensors_ = Json::object();
   Names sensor_names_{words(kReservedNames)};
@@ -207,8 +209,9 @@ std::string one_line(const Json& json) {
 
 }  // namespace
 
-nlohmann::ordered_json problem_of(const ImportedModel& model, double smooth_velocity) {
-  return ProblemWriter(model, smooth_velocity).problem();
+nlohmann::ordered_json problem_of(const ImportedModel& model, double smooth_velocity,
+                                  std::vector<std::string>& renamed) {
+  return ProblemWriter(model, smooth_velocity, renamed).problem();
 }
 
 std::string text_of(const nlohmann::ordered_json& problem) {

@@ -157,6 +157,8 @@ class UrdfReader {
     const int body = static_cast<int>(model_.bodies.size());
     const Isometry3d frame = model_.bodies[static_cast<std::size_t>(parent)].frame * between;
     model_.bodies.push_back({.name = body_names_.body(*child.text("name")), .frame = frame, .source = &child});
+    const XmlElement* const dynamics = element.child("dynamics");
+    if (dynamics && (type.empty() || type == "planar")) leave_out(*dynamics, *element.text("type"));
     if (type.empty()) return body;
     ImportedJoint joint{.name = joint_names_.body(*element.text("name")), .type = type, .body1 = parent, .body2 = body};
     joint.source = &element;
@@ -165,7 +167,7 @@ class UrdfReader {
     if (const XmlElement* const a = element.child("axis")) axis = vector(*a, "xyz", axis);
     if (axis.norm() == 0) errors_.add(element, "the axis is zero");
     joint.axis = axis.normalized();
-    if (const XmlElement* const dynamics = element.child("dynamics"); dynamics && type != "planar") {
+    if (dynamics && type != "planar") {
       joint.damping = number(*dynamics, "damping", 0);
       joint.coulomb = number(*dynamics, "friction", 0);
     }
@@ -174,16 +176,24 @@ class UrdfReader {
     return body;
   }
 
+  void leave_out(const XmlElement& dynamics, const std::string& type) {
+    for (const char* attribute : {"damping", "friction"}) {
+      const double value = number(dynamics, attribute, 0);
+      if (value != 0)
+        model_.changed.push_back(left_out(dynamics, fmt::format("{} {} of a {} joint", attribute, value, type)));
+    }
+  }
+
   void add_link(const XmlElement& link, ImportedBody& body, const Isometry3d& frame) {
-    if (body.source && body.source != &link) body.points[*link.text("name")] = frame.translation();
-    if (const XmlElement* const inertial = link.child("inertial")) add_inertial(*inertial, body, frame);
+    if (body.source && body.source != &link) body.points.emplace_back(*link.text("name"), frame.translation());
+    if (const XmlElement* const inertial = link.child("inertial")) add_inertial(link, *inertial, body, frame);
     for (const XmlElement* visual : link.children("visual")) {
       const XmlElement* const geometry = visual->child("geometry");
       if (geometry) add_shape(*geometry, body, frame * origin(*visual));
     }
   }
 
-  void add_inertial(const XmlElement& inertial, ImportedBody& body, const Isometry3d& frame) {
+  void add_inertial(const XmlElement& link, const XmlElement& inertial, ImportedBody& body, const Isometry3d& frame) {
     const Isometry3d at = frame * origin(inertial);
     const XmlElement* const mass = inertial.child("mass");
     const XmlElement* const inertia = inertial.child("inertia");
@@ -192,7 +202,8 @@ class UrdfReader {
     const auto J = [&](const char* entry) { return required_number(*inertia, entry); };
     Matrix3d tensor;
     tensor << J("ixx"), J("ixy"), J("ixz"), J("ixy"), J("iyy"), J("iyz"), J("ixz"), J("iyz"), J("izz");
-    add_mass(body, required_number(*mass, "value"), at.translation(), at.linear() * tensor * at.linear().transpose());
+    add_part(body, link, required_number(*mass, "value"), at.translation(),
+             at.linear() * tensor * at.linear().transpose(), errors_);
   }
 
   void add_shape(const XmlElement& geometry, ImportedBody& body, const Isometry3d& at) {
@@ -231,7 +242,7 @@ class UrdfReader {
   const XmlElement& robot_;
   ModelErrors errors_;
   ImportedModel model_;
-  Names body_names_{{"ground"}}, joint_names_{{}};
+  Names body_names_{{"ground"}, &model_.changed}, joint_names_{{}, &model_.changed};
   Elements links_, joints_;
   std::map<std::string, std::vector<const XmlElement*>> children_;  // joints of a link
   Elements parents_;                                                // the joint that carries a link

@@ -67,12 +67,7 @@ void remove_parts(const fs::path& folder) {
 OutputFolder::OutputFolder(const std::string& requested, const std::string& problem_name,
                            const std::string& problem_file, const std::string& command)
     : path_(requested.empty() ? fs::path("out") / folder_name(problem_name) : fs::path(requested)), command_(command) {
-  std::error_code error;
-  fs::create_directories(path_, error);
-  if (error || !fs::is_directory(path_)) {
-    throw OutputError(fmt::format("{}: the output folder cannot be created: {}", path_.string(),
-                                  error ? error.message() : "a file has this name"));
-  }
+  create_folder(path_);
   owner_ = fs::relative(fs::canonical(problem_file), fs::canonical(path_)).generic_string();
   refuse_if_taken();
 }

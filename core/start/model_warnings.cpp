@@ -46,8 +46,8 @@ void add_jacobian(const MechanismData& d, const VectorXd& q, std::vector<SparseE
 }
 
 // Directions that neither a joint nor a mass holds: what no row of J and of the masses, one row per principal axis,
-// reaches.
-void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::string>& warnings) {
+// reaches. By body: whether it may turn so, else only move.
+std::map<int, bool> massless_directions(const MechanismData& d, const VectorXd& q) {
   double mass = 0, inertia = 0;
   for (int i = 1; i <= d.n; ++i) {
     mass = std::max(mass, d.bodies[at(i)].mass), inertia = std::max(inertia, d.bodies[at(i)].J.trace());
@@ -65,13 +65,17 @@ void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::st
       ++count;
     }
   }
-  if (count == d.m + 6 * d.n) return;  // the usual case costs nothing
+  if (count == d.m + 6 * d.n) return {};  // the usual case costs nothing
   add_jacobian(d, q, rows);
   std::map<int, bool> bodies;
   for (const RowDependence::Direction& free : row_dependence(count, d.n, 6, rows, kModelRankThreshold).unreached) {
     bodies[free.body + 1] = free.column >= 3;
   }
-  for (const auto& [body, turns] : bodies) {
+  return bodies;
+}
+
+void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::string>& warnings) {
+  for (const auto& [body, turns] : massless_directions(d, q)) {
     warnings.push_back(
         fmt::format("body '{}' has no {} in a direction in which no joint holds it: forces there give no finite "
                     "acceleration; give it "
@@ -256,6 +260,14 @@ std::vector<std::string> model_warnings(const Mechanism& mechanism, const Assemb
   add_axes(d, warnings);
   for (std::string& warning : start_warnings(mechanism, assembly)) warnings.push_back(std::move(warning));
   return warnings;
+}
+
+std::vector<int> massless_bodies(const Mechanism& mechanism, const Assembly& assembly) {
+  std::vector<int> bodies;
+  if (!assembly.result().ok) return bodies;
+  const MechanismData& d = mechanism.data();
+  for (const auto& [body, turns] : massless_directions(d, assembly.result().y.head(7 * d.n))) bodies.push_back(body);
+  return bodies;
 }
 
 std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assembly& assembly) {

@@ -14,6 +14,8 @@
 namespace mbsopt {
 
 std::vector<std::string> model_warnings(const Mechanism& mechanism, const Assembly& assembly);
+// The bodies with massless directions, from 1; none if the assembly failed.
+std::vector<int> massless_bodies(const Mechanism& mechanism, const Assembly& assembly);
 // The first two of them, which a simulation may end with.
 std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assembly& assembly);
 

@@ -28,6 +28,20 @@ TEST_CASE("import writes a problem that validates and simulates, and says what i
   }
 }
 
+TEST_CASE("import and new into a folder that cannot be created say so", "[command]") {
+  const TemporaryFolder folder;
+  const std::string taken = folder.write("taken", "a file");
+  const std::string model = std::string(MBSOPT_SOURCE_DIR) + "/examples/models/arm.urdf";
+  for (const std::vector<std::string>& command :
+       {std::vector<std::string>{"import", model}, std::vector<std::string>{"new", "four-bar"}}) {
+    std::vector<std::string> words = command;
+    words.insert(words.end(), {"--out", taken});
+    const CommandOutcome outcome = run_command(words);
+    CHECK(outcome.exit_code == kBadInput);
+    CHECK_THAT(outcome.err, Contains("taken: the output folder cannot be created"));
+  }
+}
+
 TEST_CASE("import of a broken model ends with exit 2, its line, and no file", "[command]") {
   const TemporaryFolder folder;
   const std::string model = folder.write("arm.urdf", "<robot name='arm'>\n<link name='a'></lnk></robot>");

@@ -246,3 +246,118 @@ TEST_CASE("a broken model is refused with its line", "[import]") {
              Contains("2:12: body: ") && Contains("too large for a number"));
   CHECK_THAT(finding_of(mjcf("<body><joint axis='0 0 0'/><geom size='1'/></body>")), Contains("axis: is zero"));
 }
+
+TEST_CASE("settotalmass counts neither geoms nor meshes of the world, as in MuJoCo", "[import]") {
+  const ImportedProblem imported = imported_text(R"(<mujoco><compiler settotalmass="6"/><worldbody>
+  <geom type="box" size="5 5 0.1"/><geom type="mesh" mesh="x"/>
+  <body pos="0 0 3"><geom size="0.1" mass="3"/></body>
+  <body><joint/><geom size="0.1" mass="1"/></body></worldbody></mujoco>)");
+  CHECK(tight(imported).scene.bodies[0].mass.number() == Approx(1.5));  // MuJoCo 2.2.2: 4.5 kg on the fixed body
+  CHECK(imported.dropped == std::vector<std::string>{"line 2: geom (may change the motion)"});
+}
+
+TEST_CASE("MJCF joints in a frame are placed by it", "[import]") {
+  const auto body = [](const std::string& joints) {
+    return imported_text("<mujoco><worldbody><body><joint axis='0 1 0'/><geom size='0.1'/><body pos='0 0 1'>" + joints +
+                         "<geom size='0.1' pos='0.2 0 0'/></body></body></worldbody></mujoco>");
+  };
+  const std::string plain = body("<joint name='j' axis='1 0 0' pos='0 0 0.5'/><joint name='k' axis='0 0 1'/>").text;
+  CHECK(body("<frame pos='0 0 0.5' euler='0 90 0'><joint name='j'/></frame><joint name='k' axis='0 0 1'/>").text ==
+        plain);
+  CHECK(body("<frame euler='30 0 0'><freejoint/></frame>").joints == 1);
+  CHECK_THAT(finding_of("<mujoco><worldbody><body><joint/><frame><inertial mass='1' pos='0 0 0'/></frame></body>"
+                        "</worldbody></mujoco>"),
+             Contains("inertial: stands in a <frame>"));
+}
+
+TEST_CASE("resistance of a joint that a problem file lacks is listed, also that of a class", "[import]") {
+  const auto joints = [](const std::string& option) {
+    return imported_text("<mujoco>" + option +
+                         R"(<default><joint stiffness="7" frictionloss="0.3" damping="1"/></default>
+<worldbody>
+<body><joint type="ball"/><geom size="0.1" pos="0.2 0 0"/>
+<body><joint name="h" axis="0 1 0"/><geom size="0.1" pos="0.2 0 0"/></body></body>
+<body><joint type="free"/><geom size="0.1"/></body>
+<body><freejoint/><geom size="0.1"/></body>
+</worldbody></mujoco>)");
+  };
+  const ImportedProblem all = joints("");
+  CHECK(all.changed ==
+        std::vector<std::string>{"line 3: stiffness 7 of a ball joint is left out (may change the motion)",
+                                 "line 3: frictionloss 0.3 of a ball joint is left out (may change the motion)",
+                                 "line 5: damping 1 of a free joint is left out (may change the motion)",
+                                 "line 5: stiffness 7 of a free joint is left out (may change the motion)",
+                                 "line 5: frictionloss 0.3 of a free joint is left out (may change the motion)",
+                                 "dry friction does not stick: it is smoothed over 0.01 rad/s, m/s (smooth_velocity)"});
+  CHECK(all.dropped.empty());
+  // MuJoCo's flags switch springs, dampers and dry friction off.
+  const ImportedProblem none = joints("<option><flag passive='disable' frictionloss='disable'/></option>");
+  CHECK(none.changed.empty());
+  CHECK(tight(none).scene.forces.empty());
+
+  const ImportedProblem urdf =
+      imported_text(robot(link("a") + link("b") + joint("p", "base", "a", "<dynamics damping='3'/>", "planar") +
+                          joint("f", "base", "b", "<dynamics friction='2'/>", "floating")));
+  CHECK_THAT(urdf.text, Contains("line 5: damping 3 of a planar joint is left out (may change the motion)") &&
+                            Contains("line 6: friction 2 of a floating joint is left out (may change the motion)"));
+}
+
+TEST_CASE("an orientation of an MJCF element goes before that of its class", "[import]") {
+  const auto box = [](const std::string& defaults, const std::string& own) {
+    return imported_text("<mujoco><default><geom " + defaults + "/></default><worldbody><body><joint/>" +
+                         "<geom type='box' size='0.1 0.2 0.3' " + own + "/></body></worldbody></mujoco>")
+        .text;
+  };
+  const std::string turned = box("", "euler='0 0 90'");
+  CHECK(box("quat='0.6 0.8 0 0'", "euler='0 0 90'") == turned);
+  CHECK(box("euler='0 0 90'", "") == turned);
+  CHECK(turned != box("", ""));
+  CHECK_THAT(finding_of("<mujoco><default><geom fromto='0 0 0 0 0 1'/></default><worldbody><body><joint/>"
+                        "<geom type='capsule' size='0.1' pos='1 0 0'/></body></worldbody></mujoco>"),
+             Contains("geom: pos: must not stand beside fromto"));
+}
+
+TEST_CASE("words of MuJoCo's options are those that it takes", "[import]") {
+  const auto model = [](const std::string& settings, const std::string& weld = "") {
+    return "<mujoco>" + settings + "<worldbody><body name='a'><joint/><geom size='0.1'/></body></worldbody><equality>" +
+           "<weld body1='a' " + weld + "/></equality></mujoco>";
+  };
+  CHECK_THAT(finding_of(model("<compiler inertiafromgeom='True'/>")),
+             Contains("compiler: inertiafromgeom: is 'True', must be auto or true or false"));
+  CHECK_THAT(finding_of(model("<option><flag gravity='off'/></option>")),
+             Contains("flag: gravity: is 'off', must be enable or disable"));
+  CHECK_THAT(finding_of(model("", "active='no'")), Contains("weld: active: is 'no', must be true or false"));
+  const ImportedProblem free = imported_text(model("<option><flag equality='disable'/></option>"));
+  CHECK(free.joints == 1);
+  CHECK_THAT(free.text, Contains("weld is not active"));
+}
+
+TEST_CASE("names keep their letters, and what is renamed is said", "[import]") {
+  const ImportedProblem imported = imported_text(R"(<mujoco model="a/b"><worldbody>
+  <body name="Körper"><joint name="t" axis="0 1 0"/><geom size="0.1" pos="0.2 0 0"/>
+  <site name="tool" pos="0 0 -1"/><body name="tool" pos="0 0 -0.5"/></body></worldbody></mujoco>)");
+  const Problem problem = tight(imported);
+  CHECK(problem.scene.bodies[0].name == "Körper");
+  CHECK(problem.scene.bodies[0].points.size() == 2);  // the site and the body
+  CHECK_THAT(imported.text, Contains("'a/b' is named 'a_b'") && Contains("'tool' is named 'tool_2'") &&
+                                Contains(R"("tool": [0, 0, -1], "tool_2": [0, 0, -0.5])"));
+}
+
+TEST_CASE("a body without mass on a joint of its own is warned of", "[import]") {
+  const ImportedProblem imported =
+      imported_text(robot(link("a") + "<link name=\"tip\"/>" + joint("j", "base", "a") + joint("k", "a", "tip")));
+  REQUIRE(imported.warnings.size() == 1);
+  CHECK_THAT(imported.warnings[0], Contains("line 4: 'tip' has no mass or inertia"));
+  CHECK(imported_text(robot(link("a") + joint("j", "base", "a"))).warnings.empty());
+}
+
+TEST_CASE("a part that no body can have is refused, also where it is a part of another", "[import]") {
+  const auto with = [](const std::string& mass, const std::string& J) {
+    return finding_of(robot(link("a") + "<link name=\"t\"><inertial><mass value=\"" + mass + "\"/><inertia ixx=\"" + J +
+                            "\" ixy=\"0\" ixz=\"0\" iyy=\"" + J + "\" iyz=\"0\" izz=\"1\"/></inertial></link>" +
+                            joint("j", "base", "a") + joint("k", "a", "t", "", "fixed")));
+  };
+  CHECK_THAT(with("-0.5", "1"), Contains("model.xml:4:1: link 't': mass: is -0.5 kg"));
+  CHECK_THAT(with("0.5", "-0.3"), Contains("model.xml:4:1: link 't': inertia: "));
+  CHECK(with("0.5", "1") == "none");
+}
