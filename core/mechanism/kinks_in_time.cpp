@@ -43,10 +43,14 @@ void add_kinks_in_time(const Program& program, int time, const Eigen::VectorXd& 
       found.curve = stretched(*curve, a, b);
     if (!found.curve) continue;
     const auto is_same = [&](const KinkedSignal& k) { return k.curve == found.curve && k.delay == found.delay; };
-    if (const auto known = std::ranges::find_if(kinks, is_same); known != kinks.end())
-      known->order = std::min(known->order, found.order);
-    else
+    const auto known = std::ranges::find_if(kinks, is_same);
+    if (known == kinks.end()) {
       kinks.push_back(std::move(found));
+      continue;
+    }
+    known->order = std::min(known->order, found.order);
+    for (const int input : found.moved_by)
+      if (std::ranges::find(known->moved_by, input) == known->moved_by.end()) known->moved_by.push_back(input);
   }
 }
 

@@ -191,7 +191,7 @@ bool ProjectorOf<Body>::settle(double t, const Y& angles, const Y& y_hat, Y& y) 
     for (int k = 0; k < kMostProjectionIterations; ++k) {
       evaluate();
       const double now = phi_.cwiseAbs().maxCoeff();
-      if (now < 4 * kProjectionRounding * size) return true;  // a further step would find rounding
+      if (now < kProjectionRounding * size) return true;  // a further step would find rounding
       if (!(now < 0.5 * before)) return now <= unmet * size;
       before = now;
       if (!step()) return false;

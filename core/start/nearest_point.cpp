@@ -222,8 +222,8 @@ class Search {
     return true;
   }
 
-  // Where the equations leave nothing free, their Newton steps alone; by the normal equations, whose lost digits the
-  // next steps and refine() restore. Empty where these are not positive definite to kDigits.
+  // Where the equations leave nothing free, their Newton step alone; by the normal equations, whose lost digits the
+  // next step restores. Empty where these are not positive definite to kDigits.
   VectorXd determined_step(const MatrixXd& J) const {
     constexpr double kDigits = 1e-8;  // of the pivots, squares of those of J
     if (J.rows() < J.cols()) return {};
@@ -235,15 +235,17 @@ class Search {
   // As newton(), while the equations leave nothing free; false where they do, or where that does not converge.
   bool newton_of_determined() {
     constexpr int kMost = 20;        // quadratic convergence takes far fewer
-    constexpr double kClose = 1e-8;  // a step that the next one ends
+    constexpr double kClose = 1e-8;  // of each unknown's size: its square, the error left, is rounding
     for (int k = 0; k < kMost; ++k, ++result_.iterations) {
       result_.F = equations_.values(result_.x);
       if (!result_.F.allFinite()) return false;
-      const VectorXd step = determined_step(equations_.jacobian(result_.x));
+      const MatrixXd J = equations_.jacobian(result_.x);
+      const VectorXd step = determined_step(J);
       if (step.size() == 0) return false;
-      const double length = largest(step);
+      const Eigen::ArrayXd close = (kClose * equations_.sizes(J)).cwiseMax(4 * kEpsilon * result_.x.cwiseAbs());
+      const bool last = (step.array().abs() <= close).all();
       move(result_.x + equations_.step_fraction(step) * step);
-      if (length > kClose * size()) continue;
+      if (!last) continue;
       result_.F = equations_.values(result_.x);
       if (!satisfied()) continue;
       result_.nu = VectorXd::Zero(result_.F.size());

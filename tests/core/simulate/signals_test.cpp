@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "core/mechanism/mechanism_data.hpp"
 #include "core/scene/issues.hpp"
 #include "core/simulate/simulation.hpp"
 #include "tests/core/integrate/state_costs.hpp"
@@ -277,4 +278,18 @@ TEST_CASE("what a signal cannot do is refused in words", "[signals]") {
     scene.bodies[0].mass = f("u");
     CHECK_THAT(find_issues(scene).at(0).message, Contains("unknown name 'u'"));
   }
+}
+
+TEST_CASE("the delay of a spline that a drive follows moves kinks of its acceleration", "[signals]") {
+  Signal u = signal(Interpolation::spline, {-1, 0.3, 0.7, 1.1, 3}, {0, 1, -1, 2, 0});
+  u.delay = f("late");
+  Scene scene = pushed(u);
+  add_parameters(scene, {{"late", 0.1}});
+  Drive drive;
+  drive.name = "drive", drive.type = "displacement", drive.joint = "slide", drive.law = f("0.2*u");
+  scene.drives = {drive};
+  const std::vector<KinkedSignal> kinks = Mechanism(scene, nominal(scene)).data().kinks;
+  REQUIRE(kinks.size() == 1);
+  CHECK(kinks[0].order == 1);
+  CHECK(kinks[0].moved_by == std::vector<int>{0});
 }
