@@ -319,7 +319,7 @@ class Identification {
     const bool determined = s.none.empty() && s.unidentifiable.empty();
     if (stack.members().size() < 2 || stack.equalities > 0 || !determined || options_.preflight) return;
     const Eigen::VectorXd errors = result_.statistics.std_error.cwiseQuotient(stack.scaling().rho_x(solution.x));
-    const std::vector<Eigen::VectorXd> changes = changes_without(stack, solution.point, unknowns);
+    const std::vector<Eigen::VectorXd> changes = changes_without(stack, solution, unknowns);
     for (std::size_t m = 0; m < changes.size(); ++m) {
       std::optional<Influence>& most = result_.experiments[stack.members()[m].experiment].influence;
       for (Eigen::Index k = 0; k < errors.size(); ++k) {
