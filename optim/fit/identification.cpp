@@ -248,8 +248,9 @@ class Identification {
     if (solution.point.z.size() == 0) return;
     if (result_.status == SolverStatus::no_progress)
       result_.warnings.push_back(
-          "the fit ended without reaching a minimum, since no step lowered the cost: standard errors and intervals "
-          "hold at a minimum, and may be wrong here");
+          fmt::format("the fit ended without reaching a minimum ({}): standard errors and intervals hold at a minimum, "
+                      "and may be wrong here",
+                      result_.message));
     if (estimates_sigma(spec_) && !sigmas_are_estimated_ && !options_.preflight)
       result_.warnings.push_back("the fit ended before the sigmas were estimated");
     const Eigen::VectorXd z = solution.point.z.head(stack.samples());
