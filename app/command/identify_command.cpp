@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include "app/json/read_problem.hpp"
 #include "app/report/motion_plots.hpp"
 #include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
@@ -18,6 +17,7 @@
 #include "app/run/run.hpp"
 #include "app/starts/identify_starts.hpp"
 #include "app/starts/multistart.hpp"
+#include "app/starts/other_model.hpp"
 #include "app/starts/residual_records.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "core/integrate/model_choice.hpp"
@@ -79,6 +79,13 @@ std::function<bool(double t)> told(Run& run) {
   };
 }
 
+// Of fits and simulations that keep no records.
+IdentificationOptions simulating(Run& run) {
+  IdentificationOptions options;
+  options.threads = case_threads(run), options.simulation_progress = told(run);
+  return options;
+}
+
 // given: what the problem file says, cut into windows.
 IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem, const std::vector<CsvTable>& data,
                             const Problem& given) {
@@ -125,8 +132,22 @@ Recovery recovered(Run& run, const CutProblem& cut, const IdentificationResult& 
   return recovery;
 }
 
+// Variants are named by their problems, or by their files where both have one name.
+void compare(Run& run, const IdentificationResult& fit, const OtherModel& other) {
+  const CommandOptions& options = run.context.options;
+  const IdentificationResult second = other.fit(simulating(run));
+  run.progress.finish();
+  if (second.status == SolverStatus::stopped) return;
+  std::string names[] = {run.problem.scene.name, other.problem().scene.name};
+  if (names[0] == names[1])
+    names[0] = options.problem_file + (options.sets.empty() ? "" : " with --set"), names[1] = options.compare;
+  const Variant variants[] = {{names[0], fit}, {names[1], second}};
+  print_comparison(run.context.out, variants[0], variants[1]);
+  add_comparison(run.result, variants[0], variants[1]);
+}
+
 // What is asked for beside a fit that has converged.
-void examine(Run& run, const CutProblem& cut, const IdentificationResult& fit, const std::optional<Problem>& other) {
+void examine(Run& run, const CutProblem& cut, const IdentificationResult& fit, const std::optional<OtherModel>& other) {
   const CommandOptions& options = run.context.options;
   if (options.recover > 0 && !interrupted()) {
     const Recovery recovery = recovered(run, cut, fit, false);
@@ -139,29 +160,29 @@ void examine(Run& run, const CutProblem& cut, const IdentificationResult& fit, c
     add_bootstrap(run.result, bootstrap);
   }
   if (!other || interrupted()) return;
-  IdentificationOptions of_other;
-  of_other.threads = case_threads(run), of_other.simulation_progress = told(run);
-  const IdentificationResult second = run_identification(*other, data_of(*other), of_other);
-  run.progress.finish();
-  if (second.status == SolverStatus::stopped) return;
-  const Variant variants[] = {{run.problem.scene.name, fit}, {other->scene.name, second}};
-  print_comparison(run.context.out, variants[0], variants[1]);
-  add_comparison(run.result, variants[0], variants[1]);
+  try {
+    compare(run, fit, *other);
+  } catch (const std::exception& error) {
+    run.warn(fmt::format("--compare: {}: {}", options.compare, error.what()));
+  }
 }
 
-// Integrated as this problem is, so that errors of the integration are the same.
-std::optional<Problem> compared_problem(const Run& run) {
-  const std::string& file = run.context.options.compare;
-  if (file.empty()) return {};
-  Problem other = read_problem(file);
-  if (!other.identification) throw std::invalid_argument(fmt::format("--compare: {} has no identification", file));
-  return other;
+// By the settled integrator of this problem.
+void check(Run& run, OtherModel& other) {
+  const CommandOptions& options = run.context.options;
+  other.check(run.problem.scene, simulating(run));
+  run.progress.finish();
+  if (other.problem().identification->multistart)
+    run.warn(
+        fmt::format("--compare: the multistart of {} is not run, its fit begins at its given values", options.compare));
+  if (!options.sets.empty()) run.warn(fmt::format("--compare: --set does not change {}", options.compare));
+  if (options.preflight) run.warn("--compare: is skipped by --preflight, which fits nothing");
 }
 
 // Residuals at the initial values.
 IdentificationResult at_start(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
-  IdentificationOptions options;
-  options.preflight = true, options.threads = case_threads(run), options.simulation_progress = told(run);
+  IdentificationOptions options = simulating(run);
+  options.preflight = true;
   IdentificationResult start = run_identification(needed, data, options);
   run.progress.finish();
   return start;
@@ -301,7 +322,8 @@ int identify_command(const CommandContext& context) {
   if (!run.problem.identification) {
     throw std::invalid_argument("identification: missing; it says which measurements to explain and what may change");
   }
-  std::optional<Problem> other = compared_problem(run);
+  std::optional<OtherModel> other;
+  if (!context.options.compare.empty()) other.emplace(context.options.compare);
   const std::vector<CsvTable> whole = data_of(run.problem);
   // With its drives and overrides, which the scene itself may not even assemble without.
   const Scene first = simulated_scene(run.problem, whole);
@@ -328,6 +350,7 @@ int identify_command(const CommandContext& context) {
   const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
   for (const std::string& warning : doubts_about_fit(needed, data, {{}, [](double) { return !interrupted(); }}))
     run.warn(warning);
+  if (other) check(run, *other);
   if (context.options.preflight) return preflight(run, needed, data);
   LongRun long_run(run);
   const BestStart best = from_best_start(run, long_run, whole);
@@ -339,21 +362,18 @@ int identify_command(const CommandContext& context) {
   add_to_result(run.result, fit);
   print_fit(context.out, fit, effort(run, starts, fit.simulations, fit.wall_seconds));
   for (const std::string& warning : fit.warnings) run.warn(warning);
-  if (other) {
-    other->scene.simulation.integrator = scene.simulation.integrator;
-    other->scene.simulation.accuracy.reset();
-  }
-  if (fit.ok()) examine(run, cut, fit, other);
   const Trajectory history = history_of(fit);
-  if (fit.status == SolverStatus::stopped || interrupted()) {
-    long_run.stopped("optimized.json holds the best fit so far");
-  } else if (!fit.ok()) {
-    run.failed(fit.message);
-  }
   run.write("optimized.json", optimized_problem_text(run, new_values(fit)));
   run.write("history.csv", to_csv(history));
   run.write("residuals.csv", residuals_csv(fit));
   if (!fit.profiles.empty()) run.write("profile.csv", profile_csv(fit));
+  if (fit.ok()) examine(run, cut, fit, other);
+  if (fit.status == SolverStatus::stopped || interrupted()) {
+    long_run.stopped("optimized.json holds the best fit so far");
+  } else if (!fit.ok()) {
+    run.failed(fit.message);
+    if (other) run.warn("--compare: is skipped, since the fit did not converge");
+  }
   run.write("report.html", report_of(run, cut.problem, needed, data, before, fit, history));
   return long_run.finish();
 }

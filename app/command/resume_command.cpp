@@ -29,6 +29,7 @@ int resume_command(const CommandContext& context) {
   };
   options.problem_file = from_here("input");
   if (!options.sweep.points.empty()) options.sweep.points = from_here("points");
+  if (!options.compare.empty()) options.compare = from_here("compare");
   options.out = folder.string();
   options.resume = true;
   const CommandContext again{.command = command,

@@ -44,7 +44,7 @@ void sweep(Run& run) {
   options.budget_seconds = run.context.options.budget;
   options.interrupted = [] { return interrupted(); };
   options.progress = [&](const std::string& doing, double done) { run.progress.fraction(doing, done); };
-  const Tradeoff tradeoff = measure_tradeoff(run.problem.scene, objectives_of(run.problem), options);
+  Tradeoff tradeoff = measure_tradeoff(run.problem.scene, objectives_of(run.problem), options);
   run.progress.finish();
   if (!tradeoff.ok()) {
     tradeoff.interrupted ? run.stopped("there was no reference yet, nothing is kept") : run.failed(tradeoff.message);
@@ -57,6 +57,7 @@ void sweep(Run& run) {
   const std::vector<CsvTable> data = problem.identification ? data_of(problem) : std::vector<CsvTable>();
   const CutProblem cut = cut_into_windows(problem, data, {}, [](double) { return !interrupted(); });
   for (const std::string& warning : cut.warnings) run.warn(warning);
+  tradeoff.interrupted = tradeoff.interrupted || interrupted();
   std::optional<FitErrorMeasure> fit;
   if (problem.identification && !tradeoff.interrupted) {
     fit.emplace(cut.problem, cut.data, [] { return interrupted(); });

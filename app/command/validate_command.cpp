@@ -65,6 +65,7 @@ int validate_command(const CommandContext& context) {
     const CutProblem cut = cut_into_windows(problem, data_of(problem), {}, [](double) { return !interrupted(); });
     for (const std::string& warning : cut.warnings) run.warn(warning);
     add_windows(run, cut.problem);
+    if (interrupted()) run.stopped("the starts of some windows were not guessed");
   }
   return run.finish();
 }

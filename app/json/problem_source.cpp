@@ -25,16 +25,21 @@ std::string path_before(const std::string& words) {
 
 }  // namespace
 
-std::optional<std::string> ProblemSource::placed(const std::string& words) const {
+std::optional<Finding> ProblemSource::finding(const std::string& words) const {
   const std::string path = path_before(words);
   if (path.empty()) return std::nullopt;
   try {
     const Node& node = nearest(root, path);
     if (&node == &root) return std::nullopt;
-    return to_string(findings.finding(node, path, words.substr(path.size() + 2)));
+    return findings.finding(node, path, words.substr(path.size() + 2));
   } catch (const std::invalid_argument&) {  // no path: the words alone will do
     return std::nullopt;
   }
+}
+
+std::optional<std::string> ProblemSource::placed(const std::string& words) const {
+  const std::optional<Finding> found = finding(words);
+  return found ? std::optional(to_string(*found)) : std::nullopt;
 }
 
 ProblemSource problem_source_of(const std::string& text, const std::filesystem::path& name,

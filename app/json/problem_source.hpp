@@ -25,6 +25,7 @@ struct ProblemSource {
 
   // Nothing if the words do not begin with a path of the problem.
   std::optional<std::string> placed(const std::string& words) const;
+  std::optional<Finding> finding(const std::string& words) const;
 };
 
 // Throws InputError if the file cannot be read, or if its text is no JSON.

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "app/files/csv_cell.hpp"
 #include "app/terminal/text_table.hpp"
 
@@ -11,10 +9,6 @@ namespace mbsopt {
 namespace {
 
 constexpr double kSmall = 0.01;  // p
-
-double rms_scaled(const IdentificationResult& fit) {
-  return std::sqrt(2 * fit.cost_final / static_cast<double>(fit.samples));
-}
 
 std::string verdict(const VariantComparison& test, const Variant& first, const Variant& second) {
   if (!test.none.empty()) return "no F-test: " + test.none;
@@ -30,24 +24,25 @@ std::string verdict(const VariantComparison& test, const Variant& first, const V
 }  // namespace
 
 void print_comparison(std::ostream& out, const Variant& first, const Variant& second) {
+  const VariantComparison test = compare_variants(first.fit, second.fit);
   TextTable table({"variant", "parameters", "degrees of freedom", "rms/sigma", "AIC", "BIC"});
   for (const Variant* v : {&first, &second})
     table.add({v->name, std::to_string(v->fit.parameters.size()), std::to_string(v->fit.statistics.degrees_of_freedom),
-               significant(rms_scaled(v->fit), 4), significant(v->fit.aic, 7), significant(v->fit.bic, 7)});
-  out << '\n' << table.text() << verdict(compare_variants(first.fit, second.fit), first, second) << '\n';
+               significant(test.rms_scaled[v == &second], 4), significant(v->fit.aic, 7), significant(v->fit.bic, 7)});
+  out << '\n' << table.text() << verdict(test, first, second) << '\n';
 }
 
 void add_comparison(Json& result, const Variant& first, const Variant& second) {
+  const VariantComparison test = compare_variants(first.fit, second.fit);
   Json& comparison = result["comparison"];
   for (const Variant* v : {&first, &second})
     comparison["variants"].push_back({{"problem", v->name},
                                       {"status", to_string(v->fit.status)},
                                       {"parameters", v->fit.parameters.size()},
                                       {"degrees_of_freedom", v->fit.statistics.degrees_of_freedom},
-                                      {"rms_scaled", rms_scaled(v->fit)},
+                                      {"rms_scaled", test.rms_scaled[v == &second]},
                                       {"aic", v->fit.aic},
                                       {"bic", v->fit.bic}});
-  const VariantComparison test = compare_variants(first.fit, second.fit);
   if (test.none.empty())
     comparison.update({{"larger", (test.second ? second : first).name},
                        {"more_parameters", test.more},

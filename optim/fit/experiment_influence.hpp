@@ -1,9 +1,10 @@
 // How far the shared parameters would move without one of the experiments, to first order, by the linear model at the
 // solution. Parameters that are free in one experiment leave by QR factors of its rows:
 //
-//   [ J_own  J_shared | z ] = Q [ R S | q ]        S = sum_e T_e'T_e + J_prior'J_prior
-//                               [ 0 T | p ]        d = (S - T_e'T_e)^-1 T_e'p_e
+//   [ J_own  J_shared | z ] = Q [ R S | q ]
+//                               [ 0 T | p ]        d = argmin sum_{i != e} |T_i d + p_i|^2 + |J_prior d + z_prior|^2
 //
+// within the bounds of the shared parameters. Own parameters at a bound stay there.
 // Cook and Weisberg, "Residuals and Influence in Regression" (1982), section 3.4.
 #pragma once
 
@@ -11,12 +12,13 @@
 #include <vector>
 
 #include "optim/fit/experiment_stack.hpp"
+#include "optim/solver/levenberg_marquardt.hpp"
 
 namespace mbsopt {
 
 // Per member of the stack, for each variable x the change without it; 0 for those that are not shared. Infinite where
-// the others do not determine the shared ones. Of stacks without equalities.
-std::vector<Eigen::VectorXd> changes_without(const ExperimentStack& stack, const LeastSquaresPoint& solution,
+// the others and priors do not determine one. Of stacks without equalities.
+std::vector<Eigen::VectorXd> changes_without(const ExperimentStack& stack, const LeastSquaresResult& solution,
                                              const std::vector<UnknownParameter>& unknowns);
 
 }  // namespace mbsopt

@@ -1,6 +1,7 @@
 #include "optim/fit/experiment_stack.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "optim/machine/on_threads.hpp"
@@ -15,6 +16,7 @@ namespace {
 // A trial that needs so many times the steps of all before it has gone astray (negative damping, say): it counts as
 // failed before it takes forever.
 constexpr long kStepGrowth = 30;
+constexpr double kRounding = 1e-12;  // of a motion with fixed steps, relative
 
 Index samples_of(const std::vector<ExperimentStack::Member>& members) {
   return std::accumulate(members.begin(), members.end(), Index{0},
@@ -71,7 +73,16 @@ ExperimentStack::ExperimentStack(std::vector<Member> members, const std::vector<
 
 // The equations stand beside the samples of the member that ends there.
 void ExperimentStack::tie(const std::vector<UnknownParameter>& unknowns) {
+  // The largest start value of a parameter in any member.
+  const auto size_of = [&](const Experiment::Unknown& given) {
+    const std::string& name = unknowns[static_cast<std::size_t>(given.at)].description.name;
+    double largest = 0;
+    for (const UnknownParameter& u : unknowns)
+      if (u.description.name == name) largest = std::max(largest, std::abs(u.description.value));
+    return largest;
+  };
   Index row = size;
+  std::vector<double> sizes;  // of the equations, which are in units of the start parameters
   for (std::size_t i = 0; i + 1 < members_.size(); ++i) {
     if (!members_[i].continues) continue;
     Experiment& next = members_[i + 1].model;
@@ -84,8 +95,13 @@ void ExperimentStack::tie(const std::vector<UnknownParameter>& unknowns) {
     for (const Experiment::Unknown& unknown : next.unknowns())
       if (std::ranges::find(variables, unknown.at) == variables.end()) variables.push_back(unknown.at);
     for (Index k = 0; k < chart.size(); ++k) parts[i].rows.push_back(row++);
+    for (const Experiment::Unknown& unknown : own) sizes.push_back(size_of(unknown));
   }
   equalities = row - size, size = row;
+  if (sizes.empty()) return;
+  const IntegratorSettings integrator = members_.front().model.simulated().simulation.integrator;
+  closed = (integrator.step ? kRounding : integrator.rtol) *
+           Eigen::Map<const VectorXd>(sizes.data(), static_cast<Index>(sizes.size()));
 }
 
 VectorXd ExperimentStack::measured() const {

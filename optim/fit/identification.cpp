@@ -248,8 +248,9 @@ class Identification {
     if (solution.point.z.size() == 0) return;
     if (result_.status == SolverStatus::no_progress)
       result_.warnings.push_back(
-          "the fit ended without reaching a minimum, since no step lowered the cost: standard errors and intervals "
-          "hold at a minimum, and may be wrong here");
+          fmt::format("the fit ended without reaching a minimum ({}): standard errors and intervals hold at a minimum, "
+                      "and may be wrong here",
+                      result_.message));
     if (estimates_sigma(spec_) && !sigmas_are_estimated_ && !options_.preflight)
       result_.warnings.push_back("the fit ended before the sigmas were estimated");
     const Eigen::VectorXd z = solution.point.z.head(stack.samples());
@@ -319,7 +320,7 @@ class Identification {
     const bool determined = s.none.empty() && s.unidentifiable.empty();
     if (stack.members().size() < 2 || stack.equalities > 0 || !determined || options_.preflight) return;
     const Eigen::VectorXd errors = result_.statistics.std_error.cwiseQuotient(stack.scaling().rho_x(solution.x));
-    const std::vector<Eigen::VectorXd> changes = changes_without(stack, solution.point, unknowns);
+    const std::vector<Eigen::VectorXd> changes = changes_without(stack, solution, unknowns);
     for (std::size_t m = 0; m < changes.size(); ++m) {
       std::optional<Influence>& most = result_.experiments[stack.members()[m].experiment].influence;
       for (Eigen::Index k = 0; k < errors.size(); ++k) {

@@ -14,10 +14,10 @@
 namespace mbsopt {
 namespace {
 
-// One channel of a record: where its samples stand in the table, what the model says there, and what it leaves.
+// One channel of a motion: where its samples stand in the tables, what the model says there, and what it leaves.
 struct ChannelRecord {
-  std::size_t table, column;
-  std::vector<std::size_t> rows;
+  std::size_t column;
+  std::vector<std::pair<std::size_t, std::size_t>> rows;  // tables, and rows of these
   std::vector<double> model, noise;
 };
 
@@ -27,9 +27,10 @@ std::vector<ChannelRecord> records_of(const Problem& problem, const std::vector<
   std::vector<ChannelRecord> records;
   std::vector<std::size_t> first;  // record of each experiment's first channel
   for (std::size_t e = 0; e < experiments.size(); ++e) {
-    first.push_back(records.size());
-    for (const ChannelSpec& channel : experiments[e].channels)
-      records.push_back({e, data[e].find_column(channel.column), {}, {}, {}});
+    const bool follows = experiments[e].origin && experiments[e].origin->number > 1;  // a window of one motion
+    first.push_back(follows ? first.back() : records.size());
+    for (std::size_t c = 0; !follows && c < experiments[e].channels.size(); ++c)
+      records.push_back({data[e].find_column(experiments[e].channels[c].column), {}, {}, {}});
   }
   std::size_t row = 0, experiment = 0;
   for (const ResidualRow& sample : fit.residuals) {  // by experiment, then time
@@ -37,11 +38,14 @@ std::vector<ChannelRecord> records_of(const Problem& problem, const std::vector<
     const std::vector<double>& t = data[experiment].column(experiments[experiment].time);
     while (row + 1 < t.size() && t[row] < sample.t) ++row;
     ChannelRecord& record = records[first[experiment] + sample.channel];
-    record.rows.push_back(row);
+    record.rows.emplace_back(experiment, row);
     record.model.push_back(sample.model), record.noise.push_back(sample.measured - sample.model);
   }
-  const double N = static_cast<double>(fit.samples), P = static_cast<double>(fit.parameters.size());
-  const double larger = N > P ? std::sqrt(N / (N - P)) : 1;
+  // P less the equations of tied windows.
+  const auto priors = std::ranges::count_if(fit.parameters, [](const auto& p) { return p.prior.has_value(); });
+  const double N = static_cast<double>(fit.samples);
+  const double left = static_cast<double>(fit.statistics.degrees_of_freedom - priors);
+  const double larger = left > 0 ? std::sqrt(N / left) : 1;
   for (ChannelRecord& record : records) {
     if (record.noise.empty()) continue;
     const double mean =
@@ -51,12 +55,14 @@ std::vector<ChannelRecord> records_of(const Problem& problem, const std::vector<
   return records;
 }
 
-void simulate_noise(const ChannelRecord& record, std::size_t block, std::mt19937& generator, CsvTable& table) {
+void simulate_noise(const ChannelRecord& record, std::size_t block, std::mt19937& generator,
+                    std::vector<CsvTable>& tables) {
   const std::size_t n = record.rows.size();
   std::size_t from = 0;
   for (std::size_t i = 0; i < n; ++i) {
     if (i % block == 0) from = generator() % n;
-    table.columns[record.column][record.rows[i]] = record.model[i] + record.noise[(from + i % block) % n];
+    const auto [table, row] = record.rows[i];
+    tables[table].columns[record.column][row] = record.model[i] + record.noise[(from + i % block) % n];
   }
 }
 
@@ -112,7 +118,7 @@ Recovery recover(const Problem& problem, const std::vector<CsvTable>& data, cons
       const double blocks = in_blocks ? kLagPart : 0;
       const std::size_t block =
           std::max<std::size_t>(1, static_cast<std::size_t>(blocks * static_cast<double>(record.rows.size())));
-      simulate_noise(record, block, generator, simulated[record.table]);
+      simulate_noise(record, block, generator, simulated);
     }
     Problem again = problem;
     if (options.bootstrap) start_at(fit, again);

@@ -2,9 +2,10 @@
 // were found, with noise as it was found, and are fitted from the start that the problem gives. Over many seeds this
 // shows the bias of each parameter, its scatter, and how many of the intervals hold the truth.
 //
-// The noise of a channel is made of its residuals, centred and enlarged by N/(N - P) in the variance. White residuals
-// are drawn one by one. Others are drawn in blocks of a tenth of the record, the lag of score_variance.hpp, so that
-// they stay correlated: the moving blocks of Kuensch, Annals of Statistics 17 (1989) 1217, on a circle. Hence the
+// The noise of a channel is made of its residuals, centred and enlarged by N/(N - P) in the variance, where P counts
+// parameters less the equations between them. White residuals are drawn one by one. Others are drawn in blocks of a
+// tenth of the record, the lag of score_variance.hpp, so that they stay correlated. All windows of an experiment are
+// one record: the moving blocks of Kuensch, Annals of Statistics 17 (1989) 1217, on a circle. Hence the
 // scatter is a bootstrap of the standard errors.
 //
 //   const Recovery recovery = recover(problem, data, run_identification(problem, data), {.seeds = 100});

@@ -110,18 +110,25 @@ FitStatistics fit_statistics(const FitData& data) {
   }
   s.inflation.setOnes(P);
 
-  // Columns of unit length; zero columns are left out.
+  // Columns of unit length; zero columns are left out, unless equations tie their parameters to others.
   VectorXd size = rho.cwiseAbs(), length = J.colwise().norm().transpose();
   for (Index k = 0; k < P; ++k)
     if (size(k) == 0) size(k) = 1;
   const VectorXd& change = data.change.size() == P ? data.change : size;
+  const double most_seen = length.cwiseProduct(change.cwiseAbs()).maxCoeff();
   std::vector<Index> used;
   std::vector<VectorXd> unseen;  // directions, in changes over sizes
-  for (Index k = 0; k < P; ++k)
-    if (length(k) > 0 && length(k) * std::abs(change(k)) > kNoInfluence * data.record)
+  for (Index k = 0; k < P; ++k) {
+    const double seen = length(k) * std::abs(change(k));
+    const bool tied = M > 0 && !data.C.col(k).isZero(0) && change(k) != 0 && most_seen > 0;
+    if (seen > 0 && seen > kNoInfluence * data.record) {
       used.push_back(k);
-    else
+    } else if (tied) {  // the equations may determine it by what others show
+      used.push_back(k), length(k) = most_seen / std::abs(change(k));
+    } else {
       unseen.push_back(VectorXd::Unit(P, k));
+    }
+  }
   if (!unseen.empty()) s.condition_number = kInfinity;
   const Index U = static_cast<Index>(used.size());
   if (U > 0) {

@@ -15,8 +15,9 @@
 // with B from the residuals themselves (score_variance.hpp). With another loss z is psi/mean(psi_z) in B.
 //
 // A column of J counts as zero where a change of the parameter by its own size moves the record by less than 1e-10 of
-// the record's norm. Combinations that the data do not determine come from the singular values of J with columns scaled
-// to unit length, whose ratio is the condition number (Belsley, Kuh and Welsch, "Regression Diagnostics" (1980),
+// the record's norm. With equations C between the parameters, such a column stays if C has one: what the data say of
+// others may determine it. Combinations that the data do not determine come from the singular values of J with columns
+// scaled to unit length, whose ratio is the condition number (Belsley, Kuh and Welsch, "Regression Diagnostics" (1980),
 // section 3.2).
 //
 //   FitData data;

@@ -33,13 +33,17 @@ VariantComparison compare_variants(const IdentificationResult& first, const Iden
   const IdentificationResult &large = test.second ? second : first, &small = test.second ? first : second;
   test.more = small.statistics.degrees_of_freedom - large.statistics.degrees_of_freedom;
   test.freedom = large.statistics.degrees_of_freedom;
+  const bool same = of_the_same_samples(first, second);
+  for (const IdentificationResult* fit : {&first, &second})
+    test.rms_scaled[fit == &second] =
+        std::sqrt(sum_of_squares(*fit, same ? large : *fit) / static_cast<double>(fit->samples));
   for (const ExperimentFit& e : large.experiments)
     for (const ChannelFit& channel : e.channels) test.white = test.white && (e.validate || channel.analysis.white());
   if (!first.ok() || !second.ok())
     test.none = "a fit did not converge";
   else if (!std::isfinite(first.aic) || !std::isfinite(second.aic))
     test.none = "it is for the squared loss, and for residuals that are not zero";
-  else if (!of_the_same_samples(first, second))
+  else if (!same)
     test.none = "the fits are of different samples";
   else if (test.more == 0)
     test.none = "both have as many parameters";

@@ -22,6 +22,9 @@ struct VariantComparison {
   long more = 0, freedom = 0;  // n_1 - n_2, n_2
   double F = FitStatistics::kUnknown, p = FitStatistics::kUnknown;
   bool white = true;  // residuals of the larger model
+  // Root mean squares of (measured - model)/sigma, of the first and of the second, both by the sigmas of the larger
+  // model; each by its own if the fits are of different samples.
+  double rms_scaled[2] = {FitStatistics::kUnknown, FitStatistics::kUnknown};
 };
 
 VariantComparison compare_variants(const IdentificationResult& first, const IdentificationResult& second);

@@ -33,6 +33,8 @@ constexpr std::size_t kLeastSamples = 2 * kCoefficients;
 // Between the two times where the model meets a polynomial, in lengths of a window: wrong accelerations spoil the
 // velocity in proportion to it, and the integrator's tolerance in proportion to its inverse.
 constexpr double kApart = 0.01;
+// Directions of the start that differ by less are the same: the assembly's derivatives are exact to about 1e-12.
+constexpr double kSameStart = 1e-8;
 
 // Value of the local polynomial about `centre` at t.
 class LocalPolynomial {
@@ -184,12 +186,33 @@ class Cut {
                       "the experiment's free parameters are {}",
                       place_, 2 * degrees, model.unknowns().size()));
     const MatrixXd tangent = assembly.tangent();
+    if (whole_.windows->continuity) require_all_motions(model, tangent, degrees);
     for (const Experiment::Unknown& unknown : model.unknowns())
       if (tangent.col(unknown.parameter).isZero(0))
         throw std::invalid_argument(fmt::format(
             "{}.free: '{}' does not act on the initial state; in an experiment with windows only start parameters can "
             "be free, each window has a value of its own",
             place_, scene.parameters[static_cast<std::size_t>(unknown.parameter)].name));
+  }
+
+  // Windows that continue each other meet in all coordinates and rates.
+  void require_all_motions(const Experiment& model, const MatrixXd& tangent, int degrees) const {
+    std::vector<Index> columns;
+    for (const Experiment::Unknown& unknown : model.unknowns()) columns.push_back(unknown.parameter);
+    MatrixXd y_u = tangent(Eigen::all, columns);
+    for (Index k = 0; k < y_u.cols(); ++k)
+      if (const double norm = y_u.col(k).norm(); norm > 0) y_u.col(k) /= norm;
+    const auto rank_of = [](const MatrixXd& A) {
+      Eigen::ColPivHouseholderQR<MatrixXd> qr;
+      qr.setThreshold(kSameStart);
+      return static_cast<int>(qr.compute(A).rank());
+    };
+    const int all = rank_of(y_u), coordinates = rank_of(y_u.topRows(y_u.rows() / 2));
+    if (all == 2 * degrees) return;
+    throw std::invalid_argument(
+        fmt::format("{}.windows.continuity: needs a start that is free in all coordinates and rates of the mechanism, "
+                    "{} each; the experiment's free parameters move {} and {} of them",
+                    place_, degrees, coordinates, all - coordinates));
   }
 
   // Two rows per channel: where its samples begin, and shortly after.

@@ -72,6 +72,7 @@ struct LeastSquaresProblem {
   Eigen::VectorXd x_lower, x_upper;  // +-infinity where there is none
   Eigen::Index size;                 // N
   Eigen::Index equalities = 0;       // of them, the last: zero at the solution
+  Eigen::VectorXd closed;            // per equality: |c| that its own errors leave; empty: none
   Eigen::Index plain = 0;            // of them, the last before the equalities: not seen by the loss
   Loss loss;
   std::vector<ScaleGroup> groups;  // disjoint

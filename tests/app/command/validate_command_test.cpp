@@ -1,7 +1,13 @@
+#include <signal.h>
+#include <unistd.h>
+
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <map>
+#include <thread>
 
 #include "app/terminal/exit_code.hpp"
+#include "source_folder.hpp"
 #include "tests/app/gallery_files.hpp"
 #include "tests/app/run_command.hpp"
 
@@ -75,4 +81,22 @@ TEST_CASE("validate takes a prescribed acceleration, which only kinematics uses"
   INFO(outcome.out << outcome.err);
   CHECK(outcome.exit_code == kDone);
   CHECK(run_command({"simulate", file, "--out", folder.file("simulated")}).exit_code == kBadInput);
+}
+
+TEST_CASE("validate that is interrupted within the guesses of starts says so", "[command]") {
+  const TemporaryFolder folder;
+  struct sigaction of_tests = {};
+  ::sigaction(SIGTERM, nullptr, &of_tests);
+  std::thread interrupting([&] {
+    struct sigaction now = of_tests;
+    for (; now.sa_handler == of_tests.sa_handler; ::sigaction(SIGTERM, nullptr, &now))
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    ::kill(::getpid(), SIGTERM);
+  });
+  const CommandOutcome outcome =
+      run_command({"validate", MBSOPT_SOURCE_DIR "/problems/double_pendulum/identify_windows.json", "--set",
+                   "identification.experiments[0].windows.length=0.05", "--out", folder.file("out")});
+  interrupting.join();
+  CHECK(outcome.exit_code == kInterrupted);
+  CHECK(json_of(folder.path / "out/result.json").at("status") == "interrupted");
 }

@@ -6,6 +6,7 @@
 
 #include "optim/fit/identification.hpp"
 #include "optim/fit/recovery.hpp"
+#include "optim/fit/windows.hpp"
 #include "tests/optim/pendulum.hpp"
 #include "tests/optim/repetitions.hpp"
 
@@ -91,6 +92,57 @@ TEST_CASE("standard errors of one motion do not shrink with its sampling rate", 
     CHECK(fast.parameters[k].std_error == Approx(slow.parameters[k].std_error).epsilon(0.1));
     const Eigen::Index i = static_cast<Eigen::Index>(k);
     CHECK(fast.statistics.inflation(i) > 5 * slow.statistics.inflation(i));  // as white they would: by sqrt(10)
+  }
+}
+
+namespace {
+
+// A slider's record of 10 s with noise of first order, in windows of 1 s or whole.
+struct Decay {
+  Problem problem = repetitions::slider(50, 0.4);
+  std::vector<CsvTable> data;
+  Decay(bool windows, bool continuity, double tau) {
+    problem.identification.emplace();
+    problem.identification->variables = {"k", "c"};
+    problem.identification->experiments = {repetitions::slider_run("run", {"x0", "v0"})};
+    problem.identification->experiments[0].overrides = {{"v0", 0.1}};
+    if (windows) problem.identification->experiments[0].windows = WindowsSpec{1, {}, {}, continuity};
+    data = {repetitions::damped_decay(25, 0.2, 0.2, 0.1, 10, 0.02)};
+    const std::vector<double> noise = coloured_noise(10001, tau, 0.005, tau > 0.01 ? 0 : 0.005, 5);
+    for (std::size_t i = 0; i < data[0].rows(); ++i) data[0].columns[1][i] += noise[20 * i];
+  }
+};
+
+}  // namespace
+
+TEST_CASE("tied windows have the standard errors and the bootstrap of the whole record", "[covariance][recovery]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
+  for (const double tau : {0.001, 0.3}) {
+    const Decay whole(false, false, tau), untied(true, false, tau), tied(true, true, tau);
+    const IdentificationResult one = run_identification(whole.problem, whole.data),
+                               free = run_identification(untied.problem, untied.data),
+                               other = run_identification(tied.problem, tied.data);
+    REQUIRE((one.ok() && free.ok() && other.ok()));
+    const CutProblem cut = cut_into_windows(tied.problem, tied.data),
+                     cut_free = cut_into_windows(untied.problem, untied.data);
+    const RecoveryOptions options{.seeds = 40, .bootstrap = true};
+    const Recovery of_one = recover(whole.problem, whole.data, one, options),
+                   of_other = recover(cut.problem, cut.data, other, options),
+                   of_free = recover(cut_free.problem, cut_free.data, free, options);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const double error = one.parameters[k].std_error;
+      INFO(tau << " " << one.parameters[k].name << ": whole " << error << ", tied " << other.parameters[k].std_error
+               << ", untied " << free.parameters[k].std_error << "; bootstraps " << of_one.parameters[k].scatter << ", "
+               << of_other.parameters[k].scatter << ", " << of_free.parameters[k].scatter);
+      CHECK(other.parameters[k].value == Approx(one.parameters[k].value).epsilon(1e-4));
+      CHECK(other.parameters[k].std_error == Approx(error).epsilon(0.02));
+      // The table by ten blocks; of the untied ones these cross windows, which gives up to 40 % less.
+      CHECK(of_one.parameters[k].scatter == Approx(error).epsilon(0.25));
+      CHECK(of_free.parameters[k].scatter == Approx(free.parameters[k].std_error).epsilon(0.4));
+      CHECK(of_other.parameters[k].scatter == Approx(of_one.parameters[k].scatter).epsilon(0.02));
+    }
   }
 }
 

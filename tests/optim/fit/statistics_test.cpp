@@ -129,6 +129,29 @@ TEST_CASE("combinations that data do not determine are named", "[statistics]") {
   }
 }
 
+TEST_CASE("equations between parameters determine what its own data do not show", "[statistics]") {
+  // b is what a becomes, b = 3 a; a's own samples are missing. The same fit in a alone has the column 3 J_b.
+  const MatrixXd X = random_matrix(30, 2, 9);
+  FitData whole, tied;
+  whole.J.resize(30, 2), whole.J << 3 * X.col(0), X.col(1);
+  whole.z = tied.z = random_matrix(30, 1, 10).col(0);
+  whole.rho = VectorXd::Ones(2), whole.names = {"a", "k"};
+  tied.J.resize(30, 3), tied.J << VectorXd::Zero(30), X;
+  tied.C.resize(1, 3), tied.C << 3, -1, 0;
+  tied.rho = (VectorXd(3) << 1, 3, 1).finished(), tied.names = {"a", "b", "k"};
+  const FitStatistics one = mbsopt::fit_statistics(whole), other = mbsopt::fit_statistics(tied);
+  CHECK(other.unidentifiable.empty());
+  CHECK(other.std_error(0) == Approx(one.std_error(0)).epsilon(1e-10));
+  CHECK(other.std_error(1) == Approx(3 * one.std_error(0)).epsilon(1e-10));
+  CHECK(other.std_error(2) == Approx(one.std_error(1)).epsilon(1e-10));
+  CHECK(other.condition_number < 10);
+  // Where nothing shows b either, a is not determined.
+  tied.J.col(1).setZero();
+  const FitStatistics unseen = mbsopt::fit_statistics(tied);
+  CHECK(std::isinf(unseen.std_error(0)));
+  CHECK(std::isfinite(unseen.std_error(2)));
+}
+
 TEST_CASE("as many parameters as samples leave no residual variance", "[statistics]") {
   const FitStatistics s = fit_statistics(MatrixXd::Identity(2, 2), VectorXd::Zero(2), VectorXd::Ones(2), {"a", "b"});
   CHECK(s.degrees_of_freedom == 0);

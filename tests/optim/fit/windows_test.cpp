@@ -96,6 +96,28 @@ TEST_CASE("windows: what is free must act on the start", "[identification][windo
   CHECK_THROWS_WITH(cut_into_windows(p, {data}), Contains("experiments[0].windows: end at 4 s"));
 }
 
+TEST_CASE("windows that continue each other start freely in all coordinates and rates", "[identification][windows]") {
+  Problem p = windowed();
+  const CsvTable data = motion(p, 0);
+  p.identification->experiments[0].windows->continuity = true;
+  CHECK_NOTHROW(cut_into_windows(p, {data}));
+  p.scene.conditions[0].rate = f("0.5"), p.scene.conditions[0].value = f("q1 + o1 - pi/2");
+  CHECK_THROWS_WITH(cut_into_windows(p, {data}),
+                    Contains("experiments[0].windows.continuity: needs a start that is free") &&
+                        Contains("2 each; the experiment's free parameters move 2 and 1 of them"));
+}
+
+TEST_CASE("windows that continue each other: exact data are fitted exactly", "[identification][windows]") {
+  Problem p = windowed(0.5);
+  const CsvTable data = motion(p, 0);
+  p.identification->experiments[0].windows->continuity = true;
+  parameter(p, "c2").value = 0.62;
+  const IdentificationResult fit = run_identification(p, {data});
+  INFO(fit.message);
+  CHECK(fit.status == SolverStatus::converged);
+  CHECK(fit.parameters[0].value == Approx(0.6).epsilon(1e-6));
+}
+
 TEST_CASE("windows: the guesses of starts end on request", "[identification][windows]") {
   const Problem p = windowed();
   const CsvTable data = motion(p, 0);
