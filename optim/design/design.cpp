@@ -273,7 +273,7 @@ NlpResult solved_once(DesignProgram& program, const CaseEvaluator& evaluator, co
                       PointRecords* records, DesignResult& result) {
   std::optional<long>& seed = result.seed;
   if (spec.type == OptimizerSpec::kLeastSquares)
-    return solve_tracked_squares(program, evaluator, x_start, spec, progress, result.simulations);
+    return solve_tracked_squares(program, evaluator, x_start, spec, progress, records, result.simulations);
   if (spec.type == "ipopt") {
     IpoptOptions solver;
     solver.tolerance = spec.tolerance;
