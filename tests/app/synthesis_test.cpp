@@ -8,6 +8,7 @@
 #include "app/starts/point_records.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "optim/design/design.hpp"
+#include "optim/objective/design_issues.hpp"
 #include "source_folder.hpp"
 #include "tests/app/run_command.hpp"
 
@@ -105,6 +106,29 @@ TEST_CASE("least squares whose steps end where a weight is negative has not conv
   INFO(result.message);
   CHECK(result.status == SolverStatus::no_progress);
   CHECK_THAT(result.message, Contains("a tracked weight is negative"));
+}
+
+TEST_CASE("assembly modes are refused where they mean nothing, and their search can be stopped", "[synthesis]") {
+  Problem problem = eighteen_points();
+  problem.design->multistart.emplace();
+  problem.design->multistart->all_branches = true;
+  CHECK(optimizer_issues(*problem.design, problem.scene).empty());
+  problem.scene.joints.emplace_back().type = "rack_pinion";
+  const std::vector<DesignIssue> issues = optimizer_issues(*problem.design, problem.scene);
+  REQUIRE(issues.size() == 1);
+  CHECK(issues[0].path == "joints[4]");
+  CHECK_THAT(issues[0].message, Contains("design.multistart.branches"));
+
+  const TemporaryFolder folder;
+  const CommandOutcome fit =
+      run_command({"validate", MBSOPT_SOURCE_DIR + std::string("/problems/double_pendulum/identify_tumbling.json"),
+                   "--set", "identification.multistart={\"starts\": 2, \"branches\": \"all\"}"});
+  CHECK(fit.exit_code == kBadInput);
+  CHECK_THAT(fit.err, Contains("identification.multistart.branches") && Contains("design.multistart only"));
+
+  DesignOptions options = without_comparison();
+  options.mode = 1, options.simulation_progress = [](double) { return false; };
+  CHECK(run_design(eighteen_points(), options).status == SolverStatus::stopped);
 }
 
 TEST_CASE("eighteen points: least squares ends where the literature does", "[synthesis]") {
