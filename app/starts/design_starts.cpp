@@ -179,7 +179,7 @@ DesignOutcome best_of_starts(Run& run, LongRun& long_run, const Problem& seeded,
   MultistartSpec spec = *problem.design->multistart;
   std::optional<int> modes;
   if (spec.all_branches) {
-    modes = design_modes(problem);
+    modes = design_modes(problem, until_interrupted);
     if (*modes == 0)
       throw std::invalid_argument(
           "design.multistart.branches: 'all' needs drives that leave nothing free, and a start that closes");

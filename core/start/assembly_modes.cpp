@@ -1,11 +1,14 @@
 #include "core/start/assembly_modes.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <string>
 
 #include "core/body/euler_parameters.hpp"
+#include "core/constraint/constraint.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/planar_model.hpp"
 #include "core/start/assembly_problems.hpp"
@@ -17,7 +20,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kFruitless = 40;  // guesses in a row that find nothing new: a mode that one in ten finds is missed 1:70
+constexpr int kFruitless = 40;  // guesses in a row that find nothing new: a mode that one in ten finds is missed 1:70;
+                                // those that end inside out say nothing
 constexpr int kMost = 400;      // guesses
 constexpr double kSame = 1e-6;  // distance of equal modes, relative to the size of the mechanism
 
@@ -36,6 +40,25 @@ double distance(const VectorXd& a, const VectorXd& b) {
     sum += (a.segment<3>(i) - b.segment<3>(i)).squaredNorm() + (A(p) - A(other)).squaredNorm();
   }
   return std::sqrt(sum);
+}
+
+// Whether a joint holds only because an axis or a normal points the other way than in the first mode. Two dot products
+// or more of a joint leave no motion between the two.
+bool is_inside_out(const MechanismData& d, const VectorXd& first, const VectorXd& q) {
+  const auto axes = [](const VectorXd& at, int body) {
+    return body == 0 ? Matrix3d(Matrix3d::Identity()) : Matrix3d(A(Vector4d(at.segment<4>(7 * (body - 1) + 3))));
+  };
+  std::vector<int> products(d.joint_names.size(), 0);
+  for (const Constraint& c : d.constraints)
+    if (c.joint >= 0 && std::holds_alternative<Dot1>(c.primitive)) ++products[static_cast<std::size_t>(c.joint)];
+  return std::ranges::any_of(d.constraints, [&](const Constraint& c) {
+    const auto* const dot1 = std::get_if<Dot1>(&c.primitive);
+    if (!dot1 || c.joint < 0 || products[static_cast<std::size_t>(c.joint)] < 2) return false;
+    const auto seen = [&](const VectorXd& at) -> Vector3d {  // from body 1
+      return axes(at, c.body1).transpose() * (axes(at, c.body2) * dot1->s2);
+    };
+    return seen(first).dot(seen(q)) < 0;
+  });
 }
 
 // The guess with every body turned; the standard's distributions differ from library to library.
@@ -66,15 +89,34 @@ class RandomTurns {
   std::mt19937_64 generator_{1};  // the same modes in every run
 };
 
-// The orientation turned in the body's axes; numbers p where the field has no place for the turn.
-OrientationField turned(const OrientationField& given, const Vector4d& turn, const Vector4d& p) {
-  const auto* const e = std::get_if<EulerParametersField>(&given);
-  if (e && !std::ranges::all_of(e->e, &Field::is_number)) {
-    const auto [a, b, c, d] = e->e;
-    const Expression t0(turn(0)), t1(turn(1)), t2(turn(2)), t3(turn(3));
-    return EulerParametersField{{a * t0 - b * t1 - c * t2 - d * t3, a * t1 + b * t0 + c * t3 - d * t2,
-                                 a * t2 - b * t3 + c * t0 + d * t1, a * t3 + b * t2 - c * t1 + d * t0}};
-  }
+using Quaternion = std::array<Expression, 4>;
+
+Quaternion product(const Quaternion& a, const Quaternion& b) {
+  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
+}
+
+Expression of(const std::string& function, const Expression& x) {
+  return Expression::parse(function + "(" + x.text() + ")");
+}
+
+Quaternion rotation(const VectorField& axis, const Field& angle) {
+  const Expression half = Expression(0.5) * angle, c = of("cos", half);
+  const Expression length = of("sqrt", axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
+  const Expression s = of("sin", half) * of("1/", length);
+  return {c, s * axis[0], s * axis[1], s * axis[2]};
+}
+
+Quaternion quaternion(const OrientationField& field) {
+  if (const auto* const e = std::get_if<EulerParametersField>(&field)) return e->e;
+  if (const auto* const about = std::get_if<AxisAngleField>(&field)) return rotation(about->axis, about->angle);
+  const VectorField& rpy = std::get<RollPitchYawField>(field).rpy;
+  return product(rotation({0.0, 0.0, 1.0}, rpy[2]),
+                 product(rotation({0.0, 1.0, 0.0}, rpy[1]), rotation({1.0, 0.0, 0.0}, rpy[0])));
+}
+
+// The orientation turned in global axes.
+OrientationField turned(const OrientationField& given, const Vector4d& turn) {
   const auto* const about = std::get_if<AxisAngleField>(&given);
   if (about && std::ranges::all_of(about->axis, &Field::is_number)) {
     constexpr double kParallel = 1e-9;
@@ -84,17 +126,18 @@ OrientationField turned(const OrientationField& given, const Vector4d& turn, con
     if (axis.cross(v).norm() <= kParallel)
       return AxisAngleField{about->axis, about->angle + Expression(2 * std::atan2(axis.dot(v), turn(0)))};
   }
-  return EulerParametersField{{p(0), p(1), p(2), p(3)}};
+  return EulerParametersField{product({turn(0), turn(1), turn(2), turn(3)}, quaternion(given))};
 }
 
 }  // namespace
 
-std::vector<AssemblyMode> assembly_modes(const Mechanism& mechanism, double t) {
+std::vector<AssemblyMode> assembly_modes(const Mechanism& mechanism, double t, const std::function<bool()>& go_on) {
   const MechanismData& d = mechanism.data();
   const VectorXd guess = position_guess(d);
   std::vector<AssemblyMode> modes;
   RandomTurns turns(d);
-  for (int k = 0, fruitless = 0; k < kMost && fruitless < kFruitless; ++k, ++fruitless) {
+  for (int k = 0, fruitless = 0; k < kMost && fruitless < kFruitless; ++k) {
+    if (k > 0 && go_on && !go_on()) break;
     AssemblyEquations equations(d, AssemblyLevel::position, t);
     PositionProblem positions(equations);
     const VectorXd from = k == 0 ? guess : turns.of(guess);
@@ -105,12 +148,17 @@ std::vector<AssemblyMode> assembly_modes(const Mechanism& mechanism, double t) {
     const bool settled = found.status == NearestPointStatus::found && found.linearisation.rank() == found.x.size();
     if (!settled) {
       if (k == 0) return {};
+      ++fruitless;
       continue;
     }
+    if (k > 0 && is_inside_out(d, modes[0].q, found.x)) continue;
     const double size = 1 + found.x.lpNorm<Eigen::Infinity>();
     const bool known =
         std::ranges::any_of(modes, [&](const AssemblyMode& mode) { return distance(mode.q, found.x) <= kSame * size; });
-    if (known) continue;
+    if (known) {
+      ++fruitless;
+      continue;
+    }
     modes.push_back({found.x, k == 0 ? 0 : distance(modes[0].q, found.x)});
     fruitless = 0;
   }
@@ -132,8 +180,7 @@ void set_guess(Scene& scene, const Mechanism& mechanism, const AssemblyMode& mod
     }
     Vector4d inverse = p0;
     inverse.tail<3>() *= -1;
-    const Vector4d turn = product(inverse, p);  // in the body's axes
-    body.orientation = turned(body.orientation, turn, p);
+    body.orientation = turned(body.orientation, product(p, inverse));
   }
 }
 

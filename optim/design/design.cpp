@@ -273,7 +273,7 @@ NlpResult solved_once(DesignProgram& program, const CaseEvaluator& evaluator, co
                       PointRecords* records, DesignResult& result) {
   std::optional<long>& seed = result.seed;
   if (spec.type == OptimizerSpec::kLeastSquares)
-    return solve_tracked_squares(program, evaluator, x_start, spec, progress, result.simulations);
+    return solve_tracked_squares(program, evaluator, x_start, spec, progress, records, result.simulations);
   if (spec.type == "ipopt") {
     IpoptOptions solver;
     solver.tolerance = spec.tolerance;
@@ -472,9 +472,20 @@ NlpScale design_scale(const Problem& problem, const DesignOptions& options) {
 
 namespace {
 
-std::vector<AssemblyMode> modes_at(const Scene& scene) {
+struct StartModes {
+  std::vector<AssemblyMode> modes;
+  bool abandoned = false;
+};
+
+StartModes modes_at(const Scene& scene, const DesignOptions& options) {
   const Mechanism mechanism(scene, parameter_values(scene), std::vector<bool>(scene.parameters.size(), false));
-  return assembly_modes(mechanism, scene.simulation.start_time);
+  const double t = scene.simulation.start_time;
+  StartModes found;
+  found.modes = assembly_modes(mechanism, t, [&] {
+    found.abandoned = options.simulation_progress && !options.simulation_progress(t);
+    return !found.abandoned;
+  });
+  return found;
 }
 
 DesignResult designed(const Problem& given, const DesignOptions& options);
@@ -482,8 +493,8 @@ DesignResult designed(const Problem& given, const DesignOptions& options);
 // As designed, with the poses of the mode.
 DesignResult designed_in_mode(const Problem& given, const DesignOptions& options) {
   const int mode = *options.mode;
-  const std::vector<AssemblyMode> modes = modes_at(given.scene);
-  if (mode >= static_cast<int>(modes.size())) {
+  const auto [modes, abandoned] = modes_at(given.scene, options);
+  if (abandoned || mode >= static_cast<int>(modes.size())) {
     DesignResult none;
     none.objective = given.design->minimize, none.optimizer = given.design->optimizer.type;
     for (const std::string& name : given.design->variables) {
@@ -491,6 +502,10 @@ DesignResult designed_in_mode(const Problem& given, const DesignOptions& options
       none.variables.push_back({p.name, p.unit, p.value, p.value, p.lower, p.upper, false, false});
     }
     none.rho = parameter_values(given.scene);
+    if (abandoned) {
+      none.status = SolverStatus::stopped, none.message = "stopped on request";
+      return none;
+    }
     none.mode = DesignMode{mode, static_cast<int>(modes.size())};
     none.message = fmt::format("has no assembly mode {}: {} found at its start", mode, counted(modes.size(), "mode"));
     return none;
@@ -510,7 +525,9 @@ DesignResult designed_in_mode(const Problem& given, const DesignOptions& options
 
 }  // namespace
 
-int design_modes(const Problem& problem) { return static_cast<int>(modes_at(problem.scene).size()); }
+int design_modes(const Problem& problem, const DesignOptions& options) {
+  return static_cast<int>(modes_at(problem.scene, options).modes.size());
+}
 
 DesignResult run_design(const Problem& problem, const DesignOptions& options) {
   return options.mode ? designed_in_mode(problem, options) : designed(problem, options);

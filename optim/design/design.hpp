@@ -131,8 +131,9 @@ DesignResult run_design(const Problem& problem, const DesignOptions& options = {
 // none. Runs from several starts share one.
 std::optional<double> design_sharpness(const Problem& problem, const DesignOptions& options = {});
 
-// The assembly modes at the start from the problem's own values; 0 where something is free, or nothing closes.
-int design_modes(const Problem& problem);
+// The assembly modes at the start from the problem's own values; 0 where something is free, or nothing closes; those
+// found so far where it is abandoned.
+int design_modes(const Problem& problem, const DesignOptions& options = {});
 
 // The scale that a run from the problem's own values would take.
 NlpScale design_scale(const Problem& problem, const DesignOptions& options = {});

@@ -1,5 +1,6 @@
 #include "optim/design/tracked_squares.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -15,6 +16,11 @@ using Eigen::VectorXd;
 
 namespace {
 
+// Of a point in the records, as in those of a fit: simulating again costs less than a journal of many megabytes.
+constexpr Index kMostNumbers = 50'000;
+constexpr const char* kNoValue =
+    "a residual or its derivative is not a number: a tracked weight is negative, or a sensor has no value";
+
 const std::vector<Objective::Sample>& residuals_of(const CaseEvaluator& evaluator, std::size_t load_case) {
   return evaluator.of_case(load_case).objectives()[0].residuals();
 }
@@ -27,12 +33,38 @@ Index residuals(const CaseEvaluator& evaluator) {
 
 }  // namespace
 
-TrackedSquares::TrackedSquares(const DesignProgram& program, const CaseEvaluator& evaluator)
-    : LeastSquaresProblem(program.variables(), residuals(evaluator)), program_(program), evaluator_(evaluator) {
+TrackedSquares::TrackedSquares(const DesignProgram& program, const CaseEvaluator& evaluator, PointRecords* records)
+    : LeastSquaresProblem(program.variables(), residuals(evaluator)),
+      program_(program),
+      evaluator_(evaluator),
+      records_(size * (1 + variables()) <= kMostNumbers ? records : nullptr) {
   x_lower = program.x_lower, x_upper = program.x_upper;
 }
 
 void TrackedSquares::evaluate(const VectorXd& x, LeastSquaresPoint& point) {
+  NlpPoint known;
+  if (records_ && records_->recall(x, Wanted::derivatives, known) && (!known.ok || known.c.size() == size)) {
+    point.ok = known.ok, point.message = known.message;
+    if (known.ok) point.z = known.c, point.z_x = known.c_x;
+  } else {
+    known = {};
+    simulate(x, point);
+    if (abandoned_) return;
+    if (point.ok && !(point.z.allFinite() && point.z_x.allFinite())) point.ok = false, point.message = kNoValue;
+    known.ok = point.ok, known.message = point.message;
+    known.f = point.z.squaredNorm(), known.f_x.setZero(variables());
+    known.c = point.z, known.c_x = point.z_x;
+    if (records_) records_->record(x, Wanted::derivatives, known);
+  }
+  without_value_ = without_value_ || point.message == kNoValue;
+}
+
+void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
+  const auto go_on = [&](double t) {
+    abandoned_ =
+        abandoned_ || (evaluator_.of_case(0).options().progress && !evaluator_.of_case(0).options().progress(t));
+    return !abandoned_;
+  };
   const VectorXd rho = program_.rho_at(x), rho_x = program_.scaling().rho_x(x);
   const VectorXd weights = program_.objective().gradient(VectorXd::Zero(static_cast<Index>(evaluator_.cases())));
   Index first = 0;
@@ -62,8 +94,7 @@ void TrackedSquares::evaluate(const VectorXd& x, LeastSquaresPoint& point) {
       }
     };
     ++simulations_;
-    const SimulationResult run =
-        simulate_tlm(mechanism, evaluator.scene().simulation, {}, sampling, {nullptr, evaluator.options().progress});
+    const SimulationResult run = simulate_tlm(mechanism, evaluator.scene().simulation, {}, sampling, {nullptr, go_on});
     if (!run.ok()) {
       point.ok = false, point.message = run.message;
       return;
@@ -72,24 +103,55 @@ void TrackedSquares::evaluate(const VectorXd& x, LeastSquaresPoint& point) {
   }
 }
 
+namespace {
+
+// Part of the sum of squares that the best step along one free variable would gain by the derivatives.
+double promise(const TrackedSquares& problem, const LeastSquaresPoint& point, const VectorXd& x) {
+  double most = 0;
+  for (Index k = 0; k < x.size(); ++k) {
+    const double slope = point.z_x.col(k).dot(point.z), length = point.z_x.col(k).norm() * point.z.norm();
+    const bool presses = (x(k) <= problem.x_lower(k) && slope > 0) || (x(k) >= problem.x_upper(k) && slope < 0);
+    if (!presses && length > 0) most = std::max(most, std::pow(slope / length, 2));
+  }
+  return most;
+}
+
+}  // namespace
+
 NlpResult solve_tracked_squares(DesignProgram& program, const CaseEvaluator& evaluator, const VectorXd& x_start,
                                 const OptimizerSpec& spec, const std::function<bool(const NlpProgress&)>& progress,
-                                long& simulations) {
-  TrackedSquares problem(program, evaluator);
+                                PointRecords* records, long& simulations) {
+  TrackedSquares problem(program, evaluator, records);
   LeastSquaresOptions options;
-  options.tolerance = std::min(options.tolerance, spec.tolerance);
+  options.tolerance *= spec.tolerance / OptimizerSpec{}.tolerance;  // the default of one is that of the other
   if (spec.max_iterations) options.max_iterations = static_cast<int>(*spec.max_iterations);
+  options.max_evaluations = spec.max_evaluations;
   options.progress = [&](const LeastSquaresProgress& p) {
     constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-    return !progress || progress({p.iteration, 2 * p.cost, 0, kUnknown, p.x});
+    return !problem.abandoned() && (!progress || progress({p.iteration, 2 * p.cost, 0, kUnknown, p.x}));
   };
+  LeastSquaresResult found = solve_least_squares(problem, x_start, options);
+  if (problem.abandoned()) --found.evaluations, --found.failed_evaluations;
+  constexpr double kPromise = 1e-4;  // that of levenberg_marquardt.cpp: the noise of a simulation promises much less
+  if (found.status == SolverStatus::converged && problem.without_value() &&
+      promise(problem, found.point, found.x) > kPromise) {
+    found.status = SolverStatus::no_progress;
+    found.message =
+        "no further progress: the steps lead to where a tracked weight is negative, or a sensor has no value" +
+        found.failures();
+  }
   NlpResult result;
-  static_cast<SolverOutcome&>(result) = solve_least_squares(problem, x_start, options);
+  static_cast<SolverOutcome&>(result) = found;
   result.algorithm = "Levenberg-Marquardt within bounds";
   simulations += problem.simulations();
   NlpPoint& point = result.point;
-  point.f_x.setZero(program.variables()), point.c.setZero(0), point.c_x.setZero(0, program.variables());
-  program.evaluate(result.x, point);
+  point.c.setZero(0), point.c_x.setZero(0, program.variables());
+  point.ok = found.point.z.size() == problem.size;  // not where the start could not be evaluated
+  if (!point.ok) {
+    point.message = found.message;
+    return result;
+  }
+  point.f = found.point.z.squaredNorm(), point.f_x = 2 * found.point.z_x.transpose() * found.point.z;
   return result;
 }
 

@@ -14,19 +14,27 @@ namespace mbsopt {
 
 class TrackedSquares : public LeastSquaresProblem {
  public:
-  TrackedSquares(const DesignProgram& program, const CaseEvaluator& evaluator);
+  // records: may be null. A point is recorded as one of constraints c = z, c_x = z_x.
+  TrackedSquares(const DesignProgram& program, const CaseEvaluator& evaluator, PointRecords* records = nullptr);
 
   void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) override;
   long simulations() const { return simulations_; }
+  bool abandoned() const { return abandoned_; }          // the last evaluation, by the user
+  bool without_value() const { return without_value_; }  // whether a residual was not a number somewhere
 
  private:
+  void simulate(const Eigen::VectorXd& x, LeastSquaresPoint& point);
+
   const DesignProgram& program_;
   const CaseEvaluator& evaluator_;
+  PointRecords* const records_;
   long simulations_ = 0;
+  bool abandoned_ = false, without_value_ = false;
 };
 
+// simulations: is added to.
 NlpResult solve_tracked_squares(DesignProgram& program, const CaseEvaluator& evaluator, const Eigen::VectorXd& x_start,
                                 const OptimizerSpec& spec, const std::function<bool(const NlpProgress&)>& progress,
-                                long& simulations);
+                                PointRecords* records, long& simulations);
 
 }  // namespace mbsopt

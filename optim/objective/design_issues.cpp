@@ -75,6 +75,16 @@ std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& s
         issues.push_back(std::move(issue));
     }
   }
+  if (spec.multistart && spec.multistart->all_branches) {
+    for (std::size_t i = 0; i < scene.joints.size(); ++i) {
+      const Joint& joint = scene.joints[i];
+      if (joint.type == "rack_pinion" || joint.type == "screw" || (joint.type == "gear" && !joint.ratio.is_number()))
+        issues.push_back({child_path("joints", i), "is a " + joint.type +
+                                                       ", which begins at the poses in the file; other assembly modes "
+                                                       "have others, so that design.multistart.branches must be "
+                                                       "\"guess\""});
+    }
+  }
   if (spec.multistart) {
     for (DesignIssue& issue : missing_bounds(spec.variables, scene, "design.multistart draws starts between them"))
       issues.push_back(std::move(issue));

@@ -162,6 +162,10 @@ class Search {
         return end(SolverStatus::iteration_limit,
                    fmt::format("stopped at the limit of {}{}", counted(options_.max_iterations, "iteration"),
                                result_.failures()));
+      if (options_.max_evaluations && result_.evaluations >= *options_.max_evaluations)
+        return end(SolverStatus::iteration_limit,
+                   fmt::format("stopped at the limit of {}{}", counted(*options_.max_evaluations, "evaluation"),
+                               result_.failures()));
       ++result_.iterations;
       const VectorXd x = moved(d);
       LeastSquaresPoint trial = evaluated(x);

@@ -22,6 +22,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "optim/solver/least_squares.hpp"
 
@@ -31,6 +32,7 @@ struct LeastSquaresOptions {
   double tolerance = 1e-10;                                   // relative change of the cost, and of x, > 0
   int max_iterations = 100;                                   // >= 0
   std::function<bool(const LeastSquaresProgress&)> progress;  // after every iteration; false stops
+  std::optional<long> max_evaluations = {};                   // > 0, that of the start counted
 };
 
 // x_start is taken into the bounds. Never throws for what an evaluation does: exceptions of evaluate() are failed

@@ -1,7 +1,14 @@
 // Dimensional synthesis as commands: least squares, every assembly mode.
 #include <catch2/catch.hpp>
+#include <limits>
+#include <utility>
+#include <vector>
 
+#include "app/json/read_problem.hpp"
+#include "app/starts/point_records.hpp"
 #include "app/terminal/exit_code.hpp"
+#include "optim/design/design.hpp"
+#include "optim/objective/design_issues.hpp"
 #include "source_folder.hpp"
 #include "tests/app/run_command.hpp"
 
@@ -33,7 +40,96 @@ Arguments and_also(Arguments a, const Arguments& b) {
   return a;
 }
 
+Problem eighteen_points() {
+  Problem problem = read_problem(MBSOPT_SOURCE_DIR + std::string("/problems/synthesis/eighteen_points.json"));
+  problem.design->optimizer = {};
+  problem.design->optimizer.type = OptimizerSpec::kLeastSquares;
+  return problem;
+}
+
+DesignOptions without_comparison() {
+  DesignOptions options;
+  options.compare_differences = false;
+  return options;
+}
+
 }  // namespace
+
+TEST_CASE("least squares that is interrupted keeps its best design, and goes on from its records", "[synthesis]") {
+  const Problem problem = eighteen_points();
+  long calls = 0, allowed = std::numeric_limits<long>::max();
+  DesignOptions options = without_comparison();
+  options.simulation_progress = [&](double) { return ++calls <= allowed; };
+  const DesignResult whole = run_design(problem, options);
+  REQUIRE(whole.status == SolverStatus::converged);
+  std::vector<Json> points;
+  const auto keep = [&](const char*, const Json& point) { points.push_back(point); };
+  JsonPointRecords none({}, {}, keep);
+  options.records = &none;
+  allowed = calls / 2, calls = 0;
+  const DesignResult part = run_design(problem, options);
+  CHECK(part.status == SolverStatus::stopped);
+  REQUIRE(!part.history.empty());
+  CHECK(part.objective_final < 0.9 * part.objective_initial);
+  CHECK(part.objective_final == Approx(part.history.back().objective));
+  CHECK(part.variables[0].value != part.variables[0].initial);
+  CHECK(part.evaluations < whole.evaluations);
+  REQUIRE(static_cast<long>(points.size()) == part.evaluations);
+  JsonPointRecords known(std::exchange(points, {}), {}, keep);
+  options.records = &known, allowed = std::numeric_limits<long>::max();
+  const DesignResult rest = run_design(problem, options);
+  CHECK(rest.rho == whole.rho);
+  CHECK(rest.evaluations == whole.evaluations);
+  CHECK(rest.simulations == whole.simulations - part.evaluations);
+}
+
+TEST_CASE("least squares keeps to max_evaluations and to the tolerance", "[synthesis]") {
+  Problem problem = eighteen_points();
+  problem.design->optimizer.max_evaluations = 3;
+  const DesignResult limited = run_design(problem, without_comparison());
+  CHECK(limited.status == SolverStatus::iteration_limit);
+  CHECK(limited.evaluations == 3);
+  CHECK_THAT(limited.message, Contains("3 evaluations"));
+  problem.design->optimizer.max_evaluations.reset();
+  const DesignResult fine = run_design(problem, without_comparison());
+  problem.design->optimizer.tolerance = 10;  // of the sum of squares: 1e-3
+  const DesignResult coarse = run_design(problem, without_comparison());
+  CHECK(coarse.ok());
+  CHECK(coarse.evaluations < fine.evaluations);
+}
+
+TEST_CASE("least squares whose steps end where a weight is negative has not converged", "[synthesis]") {
+  Problem problem = eighteen_points();
+  for (ObjectiveSpec& objective : problem.objectives)
+    for (TrackTerm& term : objective.track) term.weight = Expression::parse("coupler - 1.4");
+  const DesignResult result = run_design(problem, without_comparison());
+  INFO(result.message);
+  CHECK(result.status == SolverStatus::no_progress);
+  CHECK_THAT(result.message, Contains("a tracked weight is negative"));
+}
+
+TEST_CASE("assembly modes are refused where they mean nothing, and their search can be stopped", "[synthesis]") {
+  Problem problem = eighteen_points();
+  problem.design->multistart.emplace();
+  problem.design->multistart->all_branches = true;
+  CHECK(optimizer_issues(*problem.design, problem.scene).empty());
+  problem.scene.joints.emplace_back().type = "rack_pinion";
+  const std::vector<DesignIssue> issues = optimizer_issues(*problem.design, problem.scene);
+  REQUIRE(issues.size() == 1);
+  CHECK(issues[0].path == "joints[4]");
+  CHECK_THAT(issues[0].message, Contains("design.multistart.branches"));
+
+  const TemporaryFolder folder;
+  const CommandOutcome fit =
+      run_command({"validate", MBSOPT_SOURCE_DIR + std::string("/problems/double_pendulum/identify_tumbling.json"),
+                   "--set", "identification.multistart={\"starts\": 2, \"branches\": \"all\"}"});
+  CHECK(fit.exit_code == kBadInput);
+  CHECK_THAT(fit.err, Contains("identification.multistart.branches") && Contains("design.multistart only"));
+
+  DesignOptions options = without_comparison();
+  options.mode = 1, options.simulation_progress = [](double) { return false; };
+  CHECK(run_design(eighteen_points(), options).status == SolverStatus::stopped);
+}
 
 TEST_CASE("eighteen points: least squares ends where the literature does", "[synthesis]") {
   const TemporaryFolder folder;
