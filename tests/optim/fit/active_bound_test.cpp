@@ -5,7 +5,7 @@
 #include "optim/fit/experiment.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/problem/parameter_values.hpp"
-#include "tests/core/mechanism/small_scenes.hpp"
+#include "tests/optim/fit/windowed_pendulum.hpp"
 
 using namespace mbsopt;
 using namespace mbsopt::testing;
@@ -21,16 +21,7 @@ constexpr double kAngleNoise = 0.005;
 // Unknown: centre of mass c2 of the lower bar and damping d of both joints, shared; a start per window.
 Problem two_windows() {
   Problem p;
-  p.scene = double_pendulum();
-  p.scene.gravity = {0.0, -9.81, 0.0};
-  add_parameters(p.scene, {{"d", 0.05}, {"q1", 0}, {"q2", 0}, {"o1", 0}, {"o2", 0}});
-  p.scene.bodies[0].angular_velocity = vec("0", "0", "0");
-  for (const char* joint : {"A", "B"}) {
-    Rsda damper;
-    damper.joint = joint, damper.damping = f("d");
-    p.scene.forces.push_back({std::string("damper_") + joint, damper});
-  }
-  p.scene.conditions = {{"theta1", f("q1 - pi/2"), f("o1")}, {"theta2", f("q2"), f("o2")}};
+  p.scene = damped_double_pendulum();
   p.scene.simulation.integrator.rtol = 1e-7;
   p.identification.emplace();
   p.identification->variables = {"c2", "d"};
@@ -72,10 +63,6 @@ std::vector<CsvTable> motions(const Problem& p) {
     data.push_back(std::move(table));
   }
   return data;
-}
-
-Parameter& parameter(Problem& p, const std::string& name) {
-  return p.scene.parameters[static_cast<std::size_t>(parameter_indices(p.scene, {name}).front())];
 }
 
 }  // namespace

@@ -13,19 +13,25 @@ namespace mbsopt::testing {
 
 inline constexpr double kWindowNoise = 0.003;
 
-// A double pendulum that swings for 4 s, angles at 100 Hz, in windows of 1 s with a start each.
-inline Problem windowed(double length = 1) {
-  Problem p;
-  p.scene = double_pendulum();
-  p.scene.gravity = {0.0, -9.81, 0.0};
-  add_parameters(p.scene, {{"d", 0.05}, {"q1", 0.4}, {"q2", 0.7}, {"o1", 0.5}, {"o2", -1}});
-  p.scene.bodies[0].angular_velocity = vec("0", "0", "0");
+// Damping d in both joints; angles q1, q2 and rates o1, o2 at the start.
+inline Scene damped_double_pendulum() {
+  Scene s = double_pendulum();
+  s.gravity = {0.0, -9.81, 0.0};
+  add_parameters(s, {{"d", 0.05}, {"q1", 0.4}, {"q2", 0.7}, {"o1", 0.5}, {"o2", -1}});
+  s.bodies[0].angular_velocity = vec("0", "0", "0");
   for (const char* joint : {"A", "B"}) {
     Rsda damper;
     damper.joint = joint, damper.damping = f("d");
-    p.scene.forces.push_back({std::string("damper_") + joint, damper});
+    s.forces.push_back({std::string("damper_") + joint, damper});
   }
-  p.scene.conditions = {{"theta1", f("q1 - pi/2"), f("o1")}, {"theta2", f("q2"), f("o2")}};
+  s.conditions = {{"theta1", f("q1 - pi/2"), f("o1")}, {"theta2", f("q2"), f("o2")}};
+  return s;
+}
+
+// A double pendulum that swings for 4 s, angles at 100 Hz, in windows of 1 s with a start each.
+inline Problem windowed(double length = 1) {
+  Problem p;
+  p.scene = damped_double_pendulum();
   p.scene.simulation.integrator.rtol = 1e-8;
   p.identification.emplace();
   p.identification->variables = {"c2", "d"};
