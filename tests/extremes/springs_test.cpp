@@ -91,3 +91,15 @@ TEST_CASE("a spring that starts at zero length has no direction and no force: a 
   CHECK(run.exit_code == 0);
   CHECK_THAT(run.err, Contains("warning: ") && Contains("zero length at the start"));
 }
+
+TEST_CASE("a law without a value at zero length is refused in words, not numbers", "[extremes]") {
+  Json p = oscillator(100, 0.1, 0.3);
+  Json& spring = p["forces"][0];
+  for (const char* field : {"stiffness", "free_length", "damping"}) spring.erase(field);
+  spring["law"] = "k*(l - 0.1) + 1e-30/l";
+  p["simulation"]["end_time"] = 0.3;
+  set_accuracy(p, "dopri5", 1e-9);
+  const Outcome refused = gradients(p);
+  REQUIRE_FALSE(refused.ok());
+  CHECK_THAT(refused.message(), Contains("zero length") && Contains("its law has no finite value") && !Contains("inf"));
+}
