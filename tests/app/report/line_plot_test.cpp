@@ -145,7 +145,8 @@ TEST_CASE("a cloud of many points is thinned at random, and the plot says so", "
   for (std::size_t at = drawn.find('M'); at != std::string::npos; at = drawn.find('M', at + 1))
     heights.push_back(std::stod(drawn.substr(drawn.find(' ', at))));
   for (const double y : heights) low = std::min(low, y), high = std::max(high, y);
-  for (const double y : heights) ++tenths[std::min(9, static_cast<int>(10 * (y - low) / (high - low)))];
+  for (const double y : heights)
+    ++tenths[std::min<std::size_t>(9, static_cast<std::size_t>(10 * (y - low) / (high - low)))];
   CHECK(heights.size() == kMostPoints + 2);
   for (const int count : tenths) CHECK(std::abs(count - 500) < 100);  // 4.7 standard deviations
   plot.series[0].x.resize(kMostPoints), plot.series[0].y.resize(kMostPoints);

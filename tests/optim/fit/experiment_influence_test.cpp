@@ -80,5 +80,5 @@ TEST_CASE("influence: the parameter that no other experiment determines is named
   REQUIRE(all.ok());
   CHECK(all.experiments[1].influence->parameter == "g");
   CHECK(std::isinf(all.experiments[1].influence->change));
-  for (const std::size_t e : {0, 2, 3}) CHECK(std::isfinite(all.experiments[e].influence->change));
+  for (const std::size_t e : {0UL, 2UL, 3UL}) CHECK(std::isfinite(all.experiments[e].influence->change));
 }
