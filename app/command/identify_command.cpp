@@ -79,7 +79,7 @@ std::function<bool(double t)> told(Run& run) {
   };
 }
 
-// Of fits and simulations that keep no records.
+// Fits and simulations with these options keep no records.
 IdentificationOptions simulating(Run& run) {
   IdentificationOptions options;
   options.threads = case_threads(run), options.simulation_progress = told(run);
@@ -146,7 +146,7 @@ void compare(Run& run, const IdentificationResult& fit, const OtherModel& other)
   add_comparison(run.result, variants[0], variants[1]);
 }
 
-// What is asked for beside a fit that has converged.
+// Recovers, draws again and compares a fit that has converged, as the command line asks.
 void examine(Run& run, const CutProblem& cut, const IdentificationResult& fit, const std::optional<OtherModel>& other) {
   const CommandOptions& options = run.context.options;
   if (options.recover > 0 && !interrupted()) {

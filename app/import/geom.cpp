@@ -8,7 +8,7 @@ namespace {
 using Eigen::Vector3d;
 using std::numbers::pi;
 
-// Of a capsule: its cylinder and its sphere.
+// A capsule is a cylinder and a sphere.
 double cylinder_volume(const Geom& g) { return 2 * pi * g.size(0) * g.size(0) * g.size(1); }
 double sphere_volume(const Geom& g) { return 4. / 3 * pi * g.size(0) * g.size(0) * g.size(0); }
 

@@ -17,7 +17,7 @@ struct Geom {
 
 double volume(const Geom& geom);  // [m^3]
 
-// Of a uniform solid of mass 1, about its centre: principal moments.  [m^2]
+// A uniform solid of mass 1 has these principal moments about its centre [m^2]:
 //   box        (b^2 + c^2)/3, half sides a b c        ellipsoid  (b^2 + c^2)/5
 //   cylinder   (3 r^2 + 4 h^2)/12, r^2/2              sphere     2 r^2/5
 //   capsule    cylinder and two half spheres, each with its centre 3r/8 beyond the cylinder's end

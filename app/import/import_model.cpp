@@ -22,8 +22,8 @@ namespace {
 
 constexpr double kSmoothVelocity = 0.01;  // a tenth of a slow joint's rate (docs/forces.md) [rad/s], [m/s]
 
-// What is dropped and acts on the motion in the program that the model is for: inertia of rotors, stops, contact,
-// actuators, a medium. All else is drawing, or settings of that program.
+// These elements act on the motion in the program that the model is for: inertia of rotors, stops, contact, actuators,
+// a medium. All else is drawing, or settings of that program.
 // clang-format off
 constexpr std::array kActs{
     "limit", "collision", "geom", "contact", "safety_controller", "joint armature", "joint range", "joint margin", "actuator",
@@ -32,7 +32,8 @@ constexpr std::array kActs{
     "compiler boundinertia", "compiler balanceinertia", "geom shellinertia", "geom fluidshape"};
 // clang-format on
 
-// What no problem file can say: numbers that overflowed, ties between joints without an angle or a displacement.
+// No problem file can say numbers that overflowed, or ties between joints without an angle or a displacement: they are
+// findings.
 void refuse(const ImportedModel& model, ModelErrors& errors) {
   for (const ImportedBody& b : model.bodies) {
     const bool finite =

@@ -1,4 +1,4 @@
-// What the readers of URDF and MJCF share: numbers in attributes, names, and findings with their place in the file.
+// The readers of URDF and MJCF share numbers in attributes, names, and findings with their place in the file.
 #pragma once
 
 #include <Eigen/Core>

@@ -15,7 +15,7 @@ using Eigen::Isometry3d;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// What becomes of a joint's type: the type of the problem format; "" for none: the child is free, "fixed" one body.
+// Each type of URDF becomes one of the problem format. "" leaves the child free; "fixed" makes one body of the two.
 const std::map<std::string, std::string> kUrdfTypes{
     {"revolute", "revolute"}, {"continuous", "revolute"}, {"prismatic", "translational"},
     {"planar", "planar"},     {"fixed", "fixed"},         {"floating", ""}};
