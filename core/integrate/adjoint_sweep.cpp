@@ -1,5 +1,7 @@
 #include "core/integrate/adjoint_sweep.hpp"
 
+#include <algorithm>
+
 #include "core/integrate/model_choice.hpp"
 
 namespace mbsopt {
@@ -28,7 +30,12 @@ AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings&
     implicit_.emplace(d, rk_);
     x_bar_.setZero(coupled * StageEquations::count(d), static_cast<Eigen::Index>(costs.size()));
   }
-  for (Eigen::VectorXd* x : {&y_, &w_, &y_bar_, &g_y_}) x->setZero(states);
+  if (rk_.gamma) {
+    rosenbrock_.emplace(mechanism, rk_, dynamics_);
+    for (Bars& b : bars_) b.start.setZero(states);
+    x_bar_.setZero(states, static_cast<Eigen::Index>(costs.size()));
+  }
+  for (Eigen::VectorXd* x : {&y_, &ydot_, &w_, &y_bar_, &g_y_}) x->setZero(states);
   g_rho_.setZero(d.rho.size());
   r_bar_.setZero(StageEquations::count(d));
   explicit_swept_.reserve(static_cast<std::size_t>(rk_.dense_stages));
@@ -69,6 +76,7 @@ bool AdjointSweep::step_back(const StoredStep& step) {
   rebuild(step);
   for (Bars& b : bars_) b.lambda_hat.setZero(), b.samples.setZero(), b.K.setZero();
   sample_back(step);
+  if (rosenbrock_) nodes_back();
 
   if (projector_->active()) {
     if (!projector_->linearise(step_.t1, step_.angles0, step_.y_hat, step_.y1, step_.projection)) return false;
@@ -84,6 +92,10 @@ bool AdjointSweep::step_back(const StoredStep& step) {
     b.lambda = b.lambda_hat + b.samples;
   }
 
+  if (rosenbrock_) {
+    if (watch_) watch_->end_step(step_);
+    return rosenbrock_back();
+  }
   explicit_swept_.clear();
   const std::span<const StageGroup> groups = rk_.stage_groups();
   for (auto g = groups.rbegin(); g != groups.rend(); ++g) {
@@ -99,13 +111,76 @@ bool AdjointSweep::step_back(const StoredStep& step) {
   return true;
 }
 
-void AdjointSweep::add_running_cost(std::size_t objective, int stage) {
+// Shares of y0 and k_i of the running costs at nodes of the dense output.
+void AdjointSweep::nodes_back() {
+  for (int m = 0; m < rk_.nodes; ++m) {
+    node_state(rk_, step_, m, y_);
+    for (std::size_t o = 0; o < bars_.size(); ++o) {
+      Bars& b = bars_[o];
+      y_bar_.setZero();
+      add_running_cost(o, m);
+      b.samples += y_bar_;
+      for (int i = 0; i < rk_.stages; ++i) b.K.col(i) += (step_.h * rk_.dense_weight(i, rk_.node_c[m])) * y_bar_;
+    }
+  }
+}
+
+// The transpose of TangentSweep::follow_rosenbrock, where kbar_i is known:
+//   rbar = inverse of (I - h g f_y)' times kbar_i,   sbar = rbar - kbar_i,   kbar_j += gamma_ij/g sbar, j < i
+//   Ybar_i = f_y(Y_i)'rbar,   kbar_j += h A_ij Ybar_i,   y0bar += Ybar_i + sum_k weight_k f_y(e_k)'rbar
+bool AdjointSweep::rosenbrock_back() {
+  RosenbrockStages& rosenbrock = *rosenbrock_;
+  const Eigen::Index n = mechanism_.states() / 2;
+  const double g = rk_.gamma_of(0, 0);
+  if (!rosenbrock.factor(step_)) return false;
+  for (Bars& b : bars_) b.start.setZero();
+  for (int i = rk_.stages - 1; i >= 0; --i) {
+    for (std::size_t o = 0; o < bars_.size(); ++o) x_bar_.col(static_cast<Eigen::Index>(o)) = bars_[o].K.col(i);
+    for (Eigen::Index first = 0; first < x_bar_.cols(); first += kLanes) {
+      rosenbrock.solve_transposed(x_bar_.middleCols(first, std::min<Eigen::Index>(kLanes, x_bar_.cols() - first)));
+    }
+    if (i > 0 && !rosenbrock.linearise_stage(step_, i)) return false;
+    for (std::size_t o = 0; o < bars_.size(); ++o) {
+      Bars& b = bars_[o];
+      const auto r_bar = x_bar_.col(static_cast<Eigen::Index>(o));
+      for (int j = 0; j < i; ++j) b.K.col(j) += (rk_.gamma_of(i, j) / g) * (r_bar - b.K.col(i));
+      b.start.tail(n) += rosenbrock.weight(i, 0) * r_bar.tail(n);
+      if (i == 0) {
+        b.start += r_bar;
+        continue;
+      }
+      w_ = r_bar;
+      y_bar_.setZero();
+      dynamics_.add_adjoint(w_, y_bar_, b.theta, b.rho);
+      b.lambda += y_bar_;
+      for (int j = 0; j < i; ++j) {
+        if (rk_.a(i, j) != 0) b.K.col(j) += (step_.h * rk_.a(i, j)) * y_bar_;
+      }
+    }
+    for (int k = 1; k < RosenbrockStages::kPoints; ++k) {
+      if (!rosenbrock.linearise_point(step_, i, k)) return false;
+      for (std::size_t o = 0; o < bars_.size(); ++o) {
+        w_.setZero();
+        w_.tail(n) = rosenbrock.weight(i, k) * x_bar_.col(static_cast<Eigen::Index>(o)).tail(n);
+        dynamics_.add_adjoint(w_, bars_[o].lambda, bars_[o].theta, bars_[o].rho);
+      }
+    }
+  }
+  if (!rosenbrock.linearise_stage(step_, 0)) return false;
+  for (Bars& b : bars_) dynamics_.add_adjoint(b.start, b.lambda, b.theta, b.rho);
+  return true;
+}
+
+void AdjointSweep::add_running_cost(std::size_t objective, int node) {
   const PointCost* const running = costs_[objective].running.get();
-  if (!running || stage >= rk_.stages || rk_.b[stage] == 0) return;
-  const double weight = step_.h * rk_.b[stage];
+  if (!running || node >= rk_.nodes || rk_.node_b[node] == 0) return;
+  const double weight = step_.h * rk_.node_b[node];
   g_y_.setZero(), g_rho_.setZero();
-  running->add_gradient({step_.t + rk_.c[stage] * step_.h, y_, step_.angles0, motion()}, weight, g_y_, g_rho_);
-  if (watch_) watch_->take(objective, stage, weight, g_y_, step_.K.col(stage), g_rho_);
+  running->add_gradient({step_.t + rk_.node_c[node] * step_.h, y_, step_.angles0, motion()}, weight, g_y_, g_rho_);
+  if (watch_) {
+    node_rate(rk_, step_, node, ydot_);
+    watch_->take(objective, node, weight, g_y_, ydot_, g_rho_);
+  }
   y_bar_ += g_y_, bars_[objective].rho += g_rho_;
 }
 

@@ -14,6 +14,7 @@
 #include "core/integrate/gradient_quadrature.hpp"
 #include "core/run/cost.hpp"
 #include "core/step/linearised_stages.hpp"
+#include "core/step/rosenbrock_stages.hpp"
 #include "core/step/stored_step.hpp"
 
 namespace mbsopt {
@@ -32,9 +33,13 @@ class AdjointSweep {
   Eigen::MatrixXd lambda() const;
   Eigen::MatrixXd mu() const;
 
-  long linearised_states() const { return dynamics_.linearised_states() + (equations_ ? equations_->places() : 0); }
+  long linearised_states() const {
+    return dynamics_.linearised_states() + (equations_ ? equations_->places() : 0) +
+           (rosenbrock_ ? rosenbrock_->linearised_states() : 0);
+  }
   long factorisations() {
-    return dynamics_.factorisations() + projector_->factorisations() + (implicit_ ? implicit_->factorisations() : 0);
+    return dynamics_.factorisations() + projector_->factorisations() + (implicit_ ? implicit_->factorisations() : 0) +
+           (rosenbrock_ ? rosenbrock_->factorisations() : 0);
   }
 
  private:
@@ -43,6 +48,7 @@ class AdjointSweep {
     Eigen::VectorXd lambda, lambda_hat;  // at y1, from there on at y0; at y^
     Eigen::VectorXd theta, rho;          // of all that was swept
     Eigen::VectorXd samples;             // what samples in the step see of y0
+    Eigen::VectorXd start;               // of f(t0, y0), by a Rosenbrock method
     Eigen::MatrixXd K;                   // of the stages' derivatives, without what explicit stages after them see
     Eigen::MatrixXd Y;                   // of the stages; those of implicit groups are used up within their group
   };
@@ -51,9 +57,11 @@ class AdjointSweep {
   void sample_back(const StoredStep& step);
   bool explicit_back(int i);
   bool implicit_back(const StageGroup& group);
+  bool rosenbrock_back();
+  void nodes_back();
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
-  // The gradient of the running cost at a stage, whose state is y_, into y_bar_ and the objective's rho.
-  void add_running_cost(std::size_t objective, int stage);
+  // The gradient of the running cost at a node, whose state is y_, into y_bar_ and the objective's rho.
+  void add_running_cost(std::size_t objective, int node);
 
   const Mechanism mechanism_;
   const Method& rk_;
@@ -63,11 +71,12 @@ class AdjointSweep {
   std::unique_ptr<Projector> projector_;
   std::optional<StageEquations> equations_;  // of implicit stages
   std::optional<LinearisedStages> implicit_;
+  std::optional<RosenbrockStages> rosenbrock_;
   Step step_;                        // in hand
   std::vector<int> explicit_swept_;  // its explicit stages whose bars are known
   std::vector<Bars> bars_;           // per objective
   Eigen::MatrixXd x_bar_;
-  Eigen::VectorXd y_, w_, y_bar_, r_bar_;
+  Eigen::VectorXd y_, ydot_, w_, y_bar_, r_bar_;
   Eigen::VectorXd g_y_, g_rho_;  // of a running cost, times its weight
   GradientQuadrature* watch_;
 };

@@ -108,26 +108,26 @@ void ForwardRun::add_terminal_costs() {
   }
 }
 
-// Each stage's state is copied once for all costs. watch: none where steps are given.
+// Each node's state is copied once for all costs. watch: none where steps are given.
 void ForwardRun::add_running_costs(const Step& step, Eigen::VectorXd& y, QuadratureWatch* watch,
                                    std::string& objection) {
-  const std::size_t stages = static_cast<std::size_t>(method_.stages);
-  g_.assign(stages * costs_.size(), 0.0);
-  for (int i = 0; i < method_.stages; ++i) {
-    if (method_.b[i] == 0) continue;
+  const std::size_t nodes = static_cast<std::size_t>(method_.nodes);
+  g_.assign(nodes * costs_.size(), 0.0);
+  for (int i = 0; i < method_.nodes; ++i) {
+    if (method_.node_b[i] == 0) continue;
     bool copied = false;
     for (std::size_t o = 0; o < costs_.size(); ++o) {
       if (!costs_[o].running) continue;
-      if (!copied) y = step.Y.col(i);
+      if (!copied) node_state(method_, step, i, y);
       copied = true;
-      const StatePoint at{step.t + method_.c[i] * step.h, y, step.angles0, motion()};
-      const std::size_t k = o * stages + static_cast<std::size_t>(i);
+      const StatePoint at{step.t + method_.node_c[i] * step.h, y, step.angles0, motion()};
+      const std::size_t k = o * nodes + static_cast<std::size_t>(i);
       g_[k] = costs_[o].running->value(at);
-      result_.psi(static_cast<Eigen::Index>(o)) += step.h * method_.b[i] * g_[k];
+      result_.psi(static_cast<Eigen::Index>(o)) += step.h * method_.node_b[i] * g_[k];
     }
   }
   for (std::size_t o = 0; watch && objection.empty() && o < costs_.size(); ++o)
-    if (costs_[o].running) objection = watch->look_at(step, o, std::span(g_).subspan(o * stages, stages));
+    if (costs_[o].running) objection = watch->look_at(step, o, std::span(g_).subspan(o * nodes, nodes));
 }
 
 }  // namespace mbsopt

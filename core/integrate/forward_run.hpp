@@ -54,7 +54,7 @@ class ForwardRun {
   std::optional<MotionSolver> motion_;  // where some sensor needs it
   SimulationResult result_;
   Eigen::VectorXd angles_end_;
-  std::vector<double> g_;  // of the running costs at the stages of a step
+  std::vector<double> g_;  // of the running costs at their nodes of a step
 };
 
 }  // namespace mbsopt

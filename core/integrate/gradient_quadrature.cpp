@@ -7,13 +7,13 @@ namespace mbsopt {
 GradientQuadrature::GradientQuadrature(const Mechanism& mechanism, const Method& method, std::span<const Cost> costs)
     : mechanism_(mechanism),
       costs_(costs),
-      stages_(static_cast<std::size_t>(method.stages)),
+      nodes_(static_cast<std::size_t>(method.nodes)),
       watch_(method, costs, nullptr),
-      along_motion_(stages_ * costs.size(), 0.0),
-      along_parameters_(stages_ * costs.size(), 0.0) {}
+      along_motion_(nodes_ * costs.size(), 0.0),
+      along_parameters_(nodes_ * costs.size(), 0.0) {}
 
-void GradientQuadrature::take(std::size_t cost, int stage, double weight, VecIn y_bar, VecIn ydot, VecIn rho_bar) {
-  const std::size_t k = cost * stages_ + static_cast<std::size_t>(stage);
+void GradientQuadrature::take(std::size_t cost, int node, double weight, VecIn y_bar, VecIn ydot, VecIn rho_bar) {
+  const std::size_t k = cost * nodes_ + static_cast<std::size_t>(node);
   const Eigen::VectorXd& rho = mechanism_.rho();
   double along_parameters = 0;
   for (const int p : mechanism_.data().active)  // a parameter of value 0 counts with the size 1
@@ -25,8 +25,8 @@ void GradientQuadrature::end_step(const Step& step) {
   using Of = QuadratureWatch::Of;
   for (std::size_t o = 0; o < costs_.size(); ++o) {
     if (!costs_[o].running) continue;
-    watch_.look_at(step, o, std::span(along_motion_).subspan(o * stages_, stages_), Of::along_motion);
-    watch_.look_at(step, o, std::span(along_parameters_).subspan(o * stages_, stages_), Of::along_parameters);
+    watch_.look_at(step, o, std::span(along_motion_).subspan(o * nodes_, nodes_), Of::along_motion);
+    watch_.look_at(step, o, std::span(along_parameters_).subspan(o * nodes_, nodes_), Of::along_parameters);
   }
 }
 

@@ -51,7 +51,11 @@ RungeKuttaRun::RungeKuttaRun(const Mechanism& mechanism, const SimulationSetting
     no_parameters_ = block_without_parameters(mechanism_.data());
     for (LaneRows* x : {&error_, &projected_error_}) x->setZero(states, kLanes);
   }
-  if (rk_.implicit()) implicit_.emplace(mechanism_, rk_, settings_.integrator, dynamics_.in_space());
+  if (rk_.gamma) {
+    rosenbrock_.emplace(mechanism_, rk_, dynamics_);
+  } else if (rk_.implicit()) {
+    implicit_.emplace(mechanism_, rk_, settings_.integrator, dynamics_.in_space());
+  }
 }
 
 // Hairer, Norsett, Wanner I, section II.4, "Starting step size"; step_.y0 is the initial state.
@@ -93,6 +97,10 @@ bool RungeKuttaRun::evaluate_stage(int i) {
 
 // All stages but those of dense output.
 bool RungeKuttaRun::solve_stages(ImplicitStages::Goal goal) {
+  if (rosenbrock_) {
+    first_stage_known_ = first_stage_known_ || rosenbrock_->begin(step_);
+    return first_stage_known_ && rosenbrock_->solve(step_);
+  }
   if (implicit_) implicit_->new_attempt();
   for (const StageGroup& g : rk_.stage_groups_of_step()) {
     if (is_implicit(rk_, g)) {
@@ -583,6 +591,12 @@ void RungeKuttaRun::add_statistics(Course& course) {
     s.linearised_states += implicit_->places();
     s.jacobians += implicit_->jacobians();
     s.factorisations += implicit_->factorisations();
+  }
+  if (rosenbrock_) {
+    evaluations_ += rosenbrock_->evaluations();
+    s.linear_solves += rosenbrock_->evaluations() + rosenbrock_->solves();
+    s.jacobians += rosenbrock_->jacobians();
+    s.factorisations += rosenbrock_->factorisations();
   }
   s.rhs_evaluations += evaluations_;
   s.factor_blocks = dynamics_.factor_blocks();

@@ -14,6 +14,7 @@
 #include "core/scene/settings.hpp"
 #include "core/step/component_tolerances.hpp"
 #include "core/step/implicit_stages.hpp"
+#include "core/step/rosenbrock_stages.hpp"
 #include "core/step/singular_passage.hpp"
 #include "core/step/step.hpp"
 #include "core/step/step_failure.hpp"
@@ -78,6 +79,7 @@ class RungeKuttaRun {
   const ComponentTolerances tolerances_;
   Dynamics dynamics_;
   std::optional<ImplicitStages> implicit_;
+  std::optional<RosenbrockStages> rosenbrock_;
   std::unique_ptr<Projector> projector_;
   RunGuard guard_;
   // Where passage_ is there.

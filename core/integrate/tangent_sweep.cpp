@@ -18,6 +18,16 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
   std::array<double, Method::kMaxStages> b_of_all{};
   std::copy_n(rk_.b, rk_.stages, b_of_all.begin());
   of_step_ = integrated(b_of_all.data());
+  if (rk_.gamma) {
+    rosenbrock_.emplace(mechanism, rk_, dynamics_);
+    for (int i = 0; i < rk_.stages; ++i) {
+      std::array<double, Method::kMaxStages> of_k{};
+      for (int j = 0; j < i; ++j) of_k[static_cast<std::size_t>(j)] = rk_.gamma_of(i, j) / rk_.gamma_of(0, 0);
+      of_s_.push_back(integrated(of_k.data()));
+    }
+    a_.setZero(states / 2, kLanes);
+    for (LaneRows* x : {&s_, &zero_}) x->setZero(states, kLanes);
+  }
   const int coupled = largest_implicit_group(rk_);
   if (coupled > 0) {
     equations_.emplace(dynamics_.in_space());
@@ -29,7 +39,8 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
     for (LaneRows* x : {&b.y0, &b.y_hat, &b.y1, &b.Y}) x->setZero(states, kLanes);
     b.a.assign(static_cast<std::size_t>(rk_.dense_stages), LaneRows::Zero(states / 2, kLanes));
     b.Y_stage.assign(static_cast<std::size_t>(coupled), LaneRows::Zero(states, kLanes));
-    b.x.setZero(coupled * StageEquations::count(d), kLanes);
+    b.x.setZero(rk_.gamma ? states : coupled * StageEquations::count(d), kLanes);
+    if (rk_.gamma) b.a_start.setZero(states / 2, kLanes);
     for (int k = 0; k < kLanes; ++k) {
       if (b.parameters.parameter[k] >= 0) b.y0.col(k) = y_initial_rho.col(b.parameters.parameter[k]);
     }
@@ -47,7 +58,7 @@ TangentSweep::Weights TangentSweep::integrated(const double* of_k) const {
   for (int i = 0; i < rk_.dense_stages; ++i) {
     w.c += of_k[i];
     w.v[static_cast<std::size_t>(i)] = of_k[i];
-    for (int j = 0; j < rk_.dense_stages; ++j) w.q[static_cast<std::size_t>(j)] += of_k[i] * rk_.a(i, j);
+    for (int j = 0; j < rk_.dense_stages; ++j) w.q[static_cast<std::size_t>(j)] += of_k[i] * rk_.beta(i, j);
   }
   return w;
 }
@@ -90,15 +101,17 @@ void TangentSweep::add_cost(const PointCost& cost, const StatePoint& at, double 
   }
 }
 
-void TangentSweep::set_dense(const Step& step, double theta) {
-  const double blend = projection_blend(theta);
+void TangentSweep::set_inside(const Step& step, double theta) {
   std::array<double, Method::kMaxStages> of_k{};
   for (int i = 0; i < rk_.dense_stages; ++i) of_k[static_cast<std::size_t>(i)] = rk_.dense_weight(i, theta);
   const Weights w = integrated(of_k.data());
-  for (Block& b : blocks_) {
-    b.Y = b.y0 + blend * (b.y1 - b.y_hat);
-    add_stages(b, step.h, w.c, w, 0, rk_.dense_stages - 1, b.Y, b.Y);
-  }
+  for (Block& b : blocks_) add_stages(b, step.h, w.c, w, 0, rk_.dense_stages - 1, b.y0, b.Y);
+}
+
+void TangentSweep::set_dense(const Step& step, double theta) {
+  set_inside(step, theta);
+  const double blend = projection_blend(theta);
+  for (Block& b : blocks_) b.Y += blend * (b.y1 - b.y_hat);
 }
 
 void TangentSweep::take_samples(const Step& step, std::span<const SampleEvent> events, const TangentSampling& sampling,
@@ -164,21 +177,68 @@ bool TangentSweep::follow_implicit(const Step& step, const StageGroup& g) {
   return true;
 }
 
-void TangentSweep::add_running_costs(const Step& step, int i, std::span<const Cost> costs, Eigen::MatrixXd& psi_rho) {
-  y_ = step.Y.col(i);
+// h x_i' = inverse of (I - h g f_y) times the right-hand side of rosenbrock_stages.hpp, h a_i' its lower half less h
+// s_i'
+bool TangentSweep::follow_rosenbrock(const Step& step) {
+  RosenbrockStages& rosenbrock = *rosenbrock_;
+  const Eigen::Index n = mechanism_.states() / 2;
+  const double h = step.h;
+  if (!rosenbrock.factor(step) || !rosenbrock.linearise_stage(step, 0)) return false;
+  for (Block& b : blocks_) dynamics_.acceleration_tangent(b.parameters, b.y0, b.a_start);
+  for (int i = 0; i < rk_.stages; ++i) {
+    const std::size_t stage = static_cast<std::size_t>(i);
+    if (i > 0 && !rosenbrock.linearise_stage(step, i)) return false;
+    for (Block& b : blocks_) {
+      if (i == 0) {
+        b.Y = b.y0, a_ = b.a_start;
+      } else {
+        add_stages(b, h, of_stage_[stage].c, of_stage_[stage], 0, i - 1, b.y0, b.Y);
+        dynamics_.acceleration_tangent(b.parameters, b.Y, a_);
+      }
+      b.x.topRows(n) = h * b.Y.bottomRows(n);
+      b.x.bottomRows(n) = h * (a_ + rosenbrock.weight(i, 0) * b.a_start);
+    }
+    for (int k = 1; k < RosenbrockStages::kPoints; ++k) {
+      if (!rosenbrock.linearise_point(step, i, k)) return false;
+      for (Block& b : blocks_) {
+        dynamics_.acceleration_tangent(b.parameters, b.y0, a_);
+        b.x.bottomRows(n) += h * rosenbrock.weight(i, k) * a_;
+      }
+    }
+    for (Block& b : blocks_) {
+      add_stages(b, h, of_s_[stage].c, of_s_[stage], 0, i - 1, zero_, s_);
+      b.x += s_;
+      rosenbrock.solve(b.x);
+      b.a[stage] = (b.x.bottomRows(n) - s_.bottomRows(n)) / h;
+    }
+  }
+  return true;
+}
+
+void TangentSweep::add_running_costs(const Step& step, int node, std::span<const Cost> costs,
+                                     Eigen::MatrixXd& psi_rho) {
+  node_state(rk_, step, node, y_);
+  if (watch_) node_rate(rk_, step, node, ydot_);
   for (std::size_t o = 0; o < costs.size(); ++o) {
     if (!costs[o].running) continue;
-    const double weight = step.h * rk_.b[i];
-    add_cost(*costs[o].running, {step.t + rk_.c[i] * step.h, y_, step.angles0, motion()}, weight, &Block::Y,
+    const double weight = step.h * rk_.node_b[node];
+    add_cost(*costs[o].running, {step.t + rk_.node_c[node] * step.h, y_, step.angles0, motion()}, weight, &Block::Y,
              static_cast<Eigen::Index>(o), psi_rho);
-    if (watch_) watch_->take(o, i, weight, y_bar_, step.K.col(i), rho_bar_);
+    if (watch_) watch_->take(o, node, weight, y_bar_, ydot_, rho_bar_);
   }
 }
 
 bool TangentSweep::follow(const Step& step, std::span<const Cost> costs, std::span<const SampleEvent> events,
                           const TangentSampling& sampling, Eigen::MatrixXd& psi_rho) {
+  if (rosenbrock_) {
+    if (!follow_rosenbrock(step)) return false;
+    for (int m = 0; m < rk_.nodes; ++m) {
+      set_inside(step, rk_.node_c[m]);
+      add_running_costs(step, m, costs, psi_rho);
+    }
+  }
   for (const StageGroup& g : step.dense ? rk_.stage_groups() : rk_.stage_groups_of_step()) {
-    if (!is_used(rk_, g, step.dense)) continue;
+    if (rosenbrock_ || !is_used(rk_, g, step.dense)) continue;
     const bool implicit = is_implicit(rk_, g);
     if (!(implicit ? follow_implicit(step, g) : follow_explicit(step, g.first))) return false;
     for (int i = g.first; i <= g.last; ++i) {

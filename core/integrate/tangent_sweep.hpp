@@ -3,6 +3,7 @@
 // Only the accelerations a_i' of k_i' = (V_i', a_i') are kept, which gives the same sums, since qdot = v:
 //   Q_i' = q0' + h c_i v0' + h^2 sum_j (A^2)_ij a_j',   V_i' = v0' + h sum_j A_ij a_j'
 // with the steps held fixed; stages that need each other solve their linear equations together (linearised_stages.hpp).
+// A Rosenbrock step: rosenbrock_stages.hpp.
 // All directions go through the factor of a stage together, kLanes at a time.
 #pragma once
 
@@ -17,6 +18,7 @@
 #include "core/run/simulation_result.hpp"
 #include "core/scene/settings.hpp"
 #include "core/step/linearised_stages.hpp"
+#include "core/step/rosenbrock_stages.hpp"
 #include "core/step/step.hpp"
 
 namespace mbsopt {
@@ -36,9 +38,13 @@ class TangentSweep {
   void finish(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, std::span<const Cost> costs,
               Eigen::MatrixXd& psi_rho);
 
-  long linearised_states() const { return dynamics_.linearised_states() + (equations_ ? equations_->places() : 0); }
+  long linearised_states() const {
+    return dynamics_.linearised_states() + (equations_ ? equations_->places() : 0) +
+           (rosenbrock_ ? rosenbrock_->linearised_states() : 0);
+  }
   long factorisations() {
-    return dynamics_.factorisations() + projector_->factorisations() + (implicit_ ? implicit_->factorisations() : 0);
+    return dynamics_.factorisations() + projector_->factorisations() + (implicit_ ? implicit_->factorisations() : 0) +
+           (rosenbrock_ ? rosenbrock_->factorisations() : 0);
   }
 
  private:
@@ -47,7 +53,8 @@ class TangentSweep {
     LaneRows y0, y_hat, y1, Y;
     std::vector<LaneRows> a;        // of each stage
     std::vector<LaneRows> Y_stage;  // of coupled stages
-    Eigen::MatrixXd x;              // their accelerations and multipliers
+    Eigen::MatrixXd x;              // their accelerations and multipliers; of a Rosenbrock stage h x_i
+    LaneRows a_start;               // of f(t0, y0), by a Rosenbrock method
   };
   // Weights of stages in a sum: of v0, of the accelerations in q, and in v.
   struct Weights {
@@ -60,7 +67,10 @@ class TangentSweep {
                          const LaneRows& from, LaneRows& to);
   bool follow_explicit(const Step& step, int i);
   bool follow_implicit(const Step& step, const StageGroup& group);
-  void add_running_costs(const Step& step, int i, std::span<const Cost> costs, Eigen::MatrixXd& psi_rho);
+  bool follow_rosenbrock(const Step& step);
+  void set_inside(const Step& step, double theta);  // Block::Y = y0' + h sum_i b_i(theta) k_i'
+  // At a node, where the directions are in Block::Y.
+  void add_running_costs(const Step& step, int node, std::span<const Cost> costs, Eigen::MatrixXd& psi_rho);
   void add_cost(const PointCost& cost, const StatePoint& at, double weight, LaneRows Block::*direction,
                 Eigen::Index objective, Eigen::MatrixXd& psi_rho);
   void set_dense(const Step& step, double theta);  // into Block::Y
@@ -75,14 +85,16 @@ class TangentSweep {
   std::unique_ptr<Projector> projector_;
   std::optional<StageEquations> equations_;  // of implicit stages
   std::optional<LinearisedStages> implicit_;
+  std::optional<RosenbrockStages> rosenbrock_;
   std::vector<Weights> of_stage_;  // A
+  std::vector<Weights> of_s_;      // gamma_ij/gamma_ii, j < i
   Weights of_step_;                // b
   std::vector<Block> blocks_;
   Eigen::VectorXd y_, ydot_, y_bar_, rho_bar_;
   std::vector<Eigen::Index> seen_;  // entries of y_bar_ that are not zero
   Eigen::MatrixXd y_rho_;
   GradientQuadrature* watch_;
-  LaneRows r_;
+  LaneRows r_, a_, s_, zero_;
 };
 
 }  // namespace mbsopt

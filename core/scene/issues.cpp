@@ -426,6 +426,8 @@ void check_options(Checker& checker, const IntegratorSettings& settings) {
     if (settings.type == "cvodes_adams") refuse_newton("cvodes_adams does not use Newton's method");
   } else if (method && !method->implicit()) {
     refuse_newton(settings.type + " is explicit and does not use Newton's method");
+  } else if (method && method->gamma) {
+    refuse_newton("the stages of " + settings.type + " solve linear equations, without Newton's method");
   }
   for (const auto& [key, step] : {std::pair{"initial_step", settings.initial_step}, {"max_step", settings.max_step}}) {
     if (o.min_step && step && *o.min_step > *step)

@@ -13,9 +13,10 @@ class ShiftedSystem {
   ShiftedSystem(const MechanismData& data, const MotionJacobian& jacobian);
 
   bool factor(double gamma,
-              const MotionJacobian::Values& values);               // values are kept by reference until the next factor
-  void solve(Eigen::Ref<Eigen::VectorXd> x, int refinements = 0);  // in place, 14 n
-  void solve_transposed(Eigen::Ref<Eigen::VectorXd> x, int refinements = 0);
+              const MotionJacobian::Values& values);  // values are kept by reference until the next factor
+  // In place, 14 n x at most kLanes.
+  void solve(Eigen::Ref<Eigen::MatrixXd> x, int refinements = 0);
+  void solve_transposed(Eigen::Ref<Eigen::MatrixXd> x, int refinements = 0);
   long factorisations() const { return matrix_.factorisations(); }
 
  private:
@@ -24,8 +25,7 @@ class ShiftedSystem {
   StageMatrix matrix_;
   double gamma_ = 0;
   Eigen::Index half_;
-  Eigen::MatrixXd one_ = Eigen::MatrixXd::Ones(1, 1), r_;
-  Eigen::VectorXd y_;
+  Eigen::MatrixXd one_ = Eigen::MatrixXd::Ones(1, 1), r_, y_;
 };
 
 }  // namespace mbsopt

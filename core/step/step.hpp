@@ -29,8 +29,17 @@ struct Step {
 // Of the sizes that the mechanism has; projection: of the right sizes.
 Step make_step(const Mechanism& mechanism, const Method& rk, ProjectionSolution projection);
 
+// The upper half of k_i of a Rosenbrock method, from the lower halves of k_0..k_i.
+inline void set_rosenbrock_rates(const Method& rk, int i, double h, const Eigen::VectorXd& y0, Eigen::MatrixXd& K) {
+  const Eigen::Index n = y0.size() / 2;
+  StageSum sum;
+  for (int j = 0; j <= i; ++j) sum.add(h * rk.beta(i, j), K.col(j).data() + n);
+  sum.to(y0.data() + n, K.col(i).data(), n);
+}
+
 // Stage states Y and the upper half (v) of their derivatives K, from the lower half (qdd) of K, for a group whose
 // earlier stages are known:  V_i = v0 + h sum_j A_ij a_j,   Q_i = q0 + h sum_j A_ij V_j.
+// Of a Rosenbrock method V_j is not the upper half of k_j, which is v0 + h sum_l beta_jl a_l.
 inline void set_group_stages(const Method& rk, const StageGroup& g, double h, const Eigen::VectorXd& y0,
                              Eigen::MatrixXd& Y, Eigen::MatrixXd& K) {
   const Eigen::Index n = y0.size() / 2;
@@ -41,7 +50,11 @@ inline void set_group_stages(const Method& rk, const StageGroup& g, double h, co
   };
   for (int i = g.first; i <= g.last; ++i) {
     add_stages(i, n);
-    K.col(i).head(n) = Y.col(i).tail(n);
+    if (rk.gamma) {
+      set_rosenbrock_rates(rk, i, h, y0, K);
+    } else {
+      K.col(i).head(n) = Y.col(i).tail(n);
+    }
   }
   for (int i = g.first; i <= g.last; ++i) add_stages(i, 0);
 }
@@ -62,6 +75,27 @@ inline void dense_output_rate(const Method& rk, const Step& step, double theta, 
   ydot = (6 * theta * (1 - theta) / step.h) * (step.y1 - step.y_hat);
   StageSum sum;
   for (int i = 0; i < rk.dense_stages; ++i) sum.add(rk.dense_weight_rate(i, theta), step.K.col(i).data());
+  sum.to(ydot.data(), ydot.data(), ydot.size());
+}
+
+// The state at node m of a running cost, and its derivative in t.
+inline void node_state(const Method& rk, const Step& step, int m, Eigen::VectorXd& y) {
+  if (!rk.gamma) {
+    y = step.Y.col(m);
+    return;
+  }
+  StageSum sum;
+  for (int i = 0; i < rk.stages; ++i) sum.add(step.h * rk.dense_weight(i, rk.node_c[m]), step.K.col(i).data());
+  sum.to(step.y0.data(), y.data(), y.size());
+}
+inline void node_rate(const Method& rk, const Step& step, int m, Eigen::VectorXd& ydot) {
+  if (!rk.gamma) {
+    ydot = step.K.col(m);
+    return;
+  }
+  ydot.setZero();
+  StageSum sum;
+  for (int i = 0; i < rk.stages; ++i) sum.add(rk.dense_weight_rate(i, rk.node_c[m]), step.K.col(i).data());
   sum.to(ydot.data(), ydot.data(), ydot.size());
 }
 

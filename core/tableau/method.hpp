@@ -10,6 +10,13 @@
 // Stages that need each other are solved together: a group is first..last with A_ij = 0 for i <= last < j. In an
 // explicit method every group is one stage with A_ii = 0, in a diagonally implicit one A_ii may differ from 0.
 //
+// A Rosenbrock method has a second table, gamma, with equal numbers on its diagonal. Its stages solve linear equations:
+//
+//   k_i = f(t0 + c_i h, Y_i) + h f_y(t0, y0) sum_j gamma_ij k_j + h gamma_i f_t(t0, y0),   gamma_i = sum_j gamma_ij
+//
+// Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.7. Its Y_i are of low order, so that
+// running costs are integrated along the dense output: nodes of a Gauss rule take the place of the stages.
+//
 // A new method is a table in a file of its kind (explicit_tableaus.hpp, implicit_tableaus.hpp, or its own) and a name
 // in the list of tableaus.cpp; the tests go over that list.
 #pragma once
@@ -32,6 +39,8 @@ struct Tableau {
   std::array<double, S> error_low{};  // a second, lower estimate
   double error_filter = 0;
   std::array<std::array<double, 7>, T> dense{};
+  std::array<std::array<double, T>, T> gamma{};  // of a Rosenbrock method
+  std::array<double, T> gamma_sum{};             // gamma_i
 };
 
 constexpr double magnitude(double x) { return x < 0 ? -x : x; }
@@ -42,6 +51,15 @@ constexpr bool rows_sum_to_c(const Tableau<S, T>& rk) {
     double sum = -rk.c[i], size = 1;
     for (std::size_t j = 0; j < T; ++j) sum += rk.A[i][j], size += magnitude(rk.A[i][j]);
     if (magnitude(sum) > 1e-15 * size) return false;
+  }
+  return true;
+}
+template <int S, int T>
+constexpr bool gamma_rows_sum(const Tableau<S, T>& rk) {
+  for (std::size_t i = 0; i < T; ++i) {
+    double sum = -rk.gamma_sum[i], size = 1;
+    for (std::size_t j = 0; j < T; ++j) sum += rk.gamma[i][j], size += magnitude(rk.gamma[i][j]);
+    if (magnitude(sum) > 1e-15 * size || rk.gamma[i][i] != rk.gamma[0][0]) return false;
   }
   return true;
 }
@@ -84,13 +102,21 @@ struct Method {
   const double* error = nullptr;
   const double* error_low = nullptr;  // null: none
   const double* dense = nullptr;      // dense_stages x 7
-  double error_filter = 0;            // 0: none
-  bool adaptive = false;              // has an error estimate
-  bool stiffly_accurate = false;      // y1 is the last implicit stage: b is its row of A
+  const double* gamma = nullptr;      // dense_stages x dense_stages; null: not a Rosenbrock method
+  const double* gamma_sum = nullptr;  // of its rows
+  int nodes = 0;                      // of running costs: psi += sum_m h node_b_m g(t0 + node_c_m h), m < nodes
+  const double* node_c = nullptr;     // c, b: node m is stage m; otherwise nodes are on the dense output
+  const double* node_b = nullptr;
+  double error_filter = 0;        // 0: none
+  bool adaptive = false;          // has an error estimate
+  bool stiffly_accurate = false;  // y1 is the last implicit stage: b is its row of A
   std::array<StageGroup, kMaxStages> group{};
   int groups = 0, step_groups = 0;
 
   double a(int i, int j) const { return A[i * dense_stages + j]; }
+  double gamma_of(int i, int j) const { return gamma[i * dense_stages + j]; }
+  // The upper half of k_i is v0 + h sum_j beta_ij a_j, since qdot = v.
+  double beta(int i, int j) const { return gamma ? a(i, j) + gamma_of(i, j) : a(i, j); }
   double dense_weight(int i, double theta) const {
     double x = 0;
     for (int j = 6; j >= 0; --j) x = (x + dense[7 * i + j]) * theta;
@@ -108,7 +134,7 @@ struct Method {
   std::span<const StageGroup> stage_groups_of_step() const {
     return {group.data(), static_cast<std::size_t>(step_groups)};
   }
-  // Computed from earlier stages alone.
+  // Y_i is computed from earlier stages alone.
   bool is_explicit_stage(int i) const {
     for (int j = i; j < dense_stages; ++j) {
       if (a(i, j) != 0) return false;
@@ -116,6 +142,7 @@ struct Method {
     return true;
   }
   bool implicit() const {
+    if (gamma) return true;
     for (int i = 0; i < dense_stages; ++i) {
       if (!is_explicit_stage(i)) return true;
     }

@@ -5,10 +5,14 @@
 #include "core/tableau/dopri853_tableau.hpp"
 #include "core/tableau/explicit_tableaus.hpp"
 #include "core/tableau/implicit_tableaus.hpp"
+#include "core/tableau/rosenbrock_tableaus.hpp"
 #include "core/tableau/verner6_tableau.hpp"
 
 namespace mbsopt {
 namespace {
+
+constexpr std::array kGaussNodes{0.1127016653792583, 0.5, 0.8872983346207417};  // on [0, 1], exact to degree 5
+constexpr std::array kGaussWeights{5.0 / 18, 4.0 / 9, 5.0 / 18};
 
 constexpr bool any_nonzero(std::span<const double> x) {
   return std::any_of(x.begin(), x.end(), [](double v) { return v != 0; });
@@ -39,6 +43,15 @@ constexpr bool ends_with_implicit_stage(const Tableau<S, T>& rk) {
 }
 
 template <int S, int T>
+constexpr bool ends_with_rosenbrock_stage(const Tableau<S, T>& rk) {
+  if (rk.gamma[0][0] == 0) return false;
+  for (std::size_t j = 0; j < S; ++j) {
+    if (magnitude(rk.A[S - 1][j] + rk.gamma[S - 1][j] - rk.b[j]) > 1e-14) return false;
+  }
+  return true;
+}
+
+template <int S, int T>
 constexpr Method method(const Tableau<S, T>& rk) {
   static_assert(T <= Method::kMaxStages);
   Method m;
@@ -54,18 +67,24 @@ constexpr Method method(const Tableau<S, T>& rk) {
   m.error = rk.error.data();
   if (any_nonzero(rk.error_low)) m.error_low = rk.error_low.data();
   m.dense = rk.dense[0].data();
+  m.nodes = S, m.node_c = m.c, m.node_b = m.b;
+  if (rk.gamma[0][0] != 0) {
+    m.gamma = rk.gamma[0].data();
+    m.gamma_sum = rk.gamma_sum.data();
+    m.nodes = static_cast<int>(kGaussNodes.size()), m.node_c = kGaussNodes.data(), m.node_b = kGaussWeights.data();
+  }
   m.error_filter = rk.error_filter;
   m.adaptive = any_nonzero(rk.error);
-  m.stiffly_accurate = ends_with_implicit_stage(rk);
+  m.stiffly_accurate = ends_with_implicit_stage(rk) || ends_with_rosenbrock_stage(rk);
   find_groups(rk, m);
   return m;
 }
 
 // The explicit ones first.
-constexpr std::array kMethods{method(kEuler),     method(kRk2),    method(kBs3),     method(kRk4),
-                              method(kDopri5),    method(kTsit5),  method(kVerner6), method(kDopri853),
-                              method(kSdirk2),    method(kSdirk3), method(kSdirk4),  method(kGauss4),
-                              method(kLobatto3c), method(kRadau5), method(kRadau1a), method(kGauss6)};
+constexpr std::array kMethods{method(kEuler),   method(kRk2),     method(kBs3),       method(kRk4),    method(kDopri5),
+                              method(kTsit5),   method(kVerner6), method(kDopri853),  method(kSdirk2), method(kSdirk3),
+                              method(kSdirk4),  method(kGauss4),  method(kLobatto3c), method(kRodas4), method(kRadau5),
+                              method(kRadau1a), method(kGauss6)};
 std::size_t explicit_count() {
   static const auto count = std::ranges::count_if(kMethods, [](const Method& m) { return !m.implicit(); });
   return static_cast<std::size_t>(count);

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Coefficients of the implicit tableaus and of verner6, for implicit_tableaus.hpp and verner6_tableau.hpp.
+"""Coefficients of the implicit tableaus, of verner6 and of rodas4, for *_tableaus.hpp beside this file.
 
 Works in decimals of 60 digits and prints each number with the 17 that a double holds. A tableau has its A, b, c from
 their defining equations; the weights of dense output,
@@ -278,6 +278,40 @@ def verner6():
     return c, A, A[8], [x - y for x, y in zip(A[8], low)], D(0)
 
 
+def rodas4():
+    """RODAS of Hairer and Wanner, from the form that they publish: (1/(h g) - f_y) u_i = f(y0 + sum_j A_ij u_j)
+    + sum_j C_ij u_j/h + h gamma_i f_t, y1 = y0 + sum_i m_i u_i, into that of method.hpp. u = h Gamma k, and
+    C = diag(1/g) - inv(Gamma); dense output y0 + theta (sum m u + (1 - theta) (sum D2 u + theta sum D3 u))."""
+    def rows(*text):
+        return [[D(x) for x in row.split()] + [D(0)] * (6 - len(row.split())) for row in text]
+
+    a5 = "1.221224509226641 6.019134481288629 12.53708332932087 -0.6878860361058950"
+    A = rows("", "1.544", "0.9466785280815826 0.2557011698983284",
+             "3.314825187068521 2.896124015972201 0.9986419139977817", a5, a5 + " 1")
+    C = rows("", "-5.6688", "-2.430093356833875 -0.2063599157091915",
+             "-0.1073529058151375 -9.594562251023355 -20.47028614809616",
+             "7.496443313967647 -10.24680431464352 -33.99990352819905 11.70890893206160",
+             "8.083246795921522 -7.981132988064893 -31.52159432874371 16.31930543123136 -6.058818238834054")
+    D2, D3, m, e = rows("10.12623508344586 -7.487995877610167 -34.80091861555747 -7.992771707568823 1.025137723295662",
+                        "-0.6762803392806898 6.087714651680015 16.43084320892478 24.76722511418386 -6.594389125716872",
+                        a5 + " 1 1", "0 0 0 0 0 1")
+    g = D("0.25")
+    n = range(6)
+    inverse = [[(1 / g if i == j else D(0)) - C[i][j] for j in n] for i in n]
+    gammas = [[D(0)] * 6 for _ in n]
+    for j in n:
+        for i in range(j, 6):
+            right = D(i == j) - sum(inverse[i][k] * gammas[k][j] for k in range(j, i))
+            gammas[i][j] = right / inverse[i][i]
+
+    def of_k(weights):
+        return [sum(weights[k] * gammas[k][j] for k in n) for j in n]
+
+    powers = [[x + y for x, y in zip(m, D2)], [y - x for x, y in zip(D2, D3)], [-x for x in D3]]
+    dense = [list(w) for w in zip(*(of_k(p) for p in powers))]
+    return [of_k(row) for row in A], gammas, of_k(m), of_k(e), dense
+
+
 def order_of(A, b, up_to=8):
     b = b + [D(0)] * (len(A) - len(b))
     for n in range(1, up_to + 1):
@@ -287,17 +321,21 @@ def order_of(A, b, up_to=8):
     return up_to
 
 
+def print_rows(label, rows):
+    for row in rows:
+        row = [x if abs(x) > ZERO else D(0) for x in row]
+        while len(row) > 1 and row[-1] == 0:
+            row.pop()
+        print(f"  {label:6}" + "{" + ", ".join(f"{float(x)!r}" for x in row) + "},")
+
+
 def show(name, c, A, b, error, filter, dense_order, degree, stages=None):
     stages = stages or len(b)
     dense = dense_weights(A, b, dense_order, degree)
     low = [x - y for x, y in zip(b, error)]
     print(f"{name}: order {order_of(A, b)}, of the estimate's formula {order_of(A, low)}, filter {float(filter)!r}")
     for label, rows in (("c", [c]), ("A", A), ("b", [b[:stages]]), ("error", [error]), ("dense", dense)):
-        for row in rows:
-            row = [x if abs(x) > ZERO else D(0) for x in row]
-            while len(row) > 1 and row[-1] == 0:
-                row.pop()
-            print(f"  {label:6}" + "{" + ", ".join(f"{float(x)!r}" for x in row) + "},")
+        print_rows(label, rows)
 
 
 def main():
@@ -315,6 +353,10 @@ def main():
         stages = len(b)
         c, A = with_explicit_stage(c, A, theta, row)
         show(name, c, A, b, error, g, 5, 5, stages)
+    print("rodas4")
+    A, gammas, b, error, dense = rodas4()
+    for label, rows in (("A", A), ("gamma", gammas), ("b", [b]), ("error", [error]), ("dense", dense)):
+        print_rows(label, rows)
 
 
 main()

@@ -22,14 +22,14 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 QuadratureWatch::QuadratureWatch(const Method& method, std::span<const Cost> costs, MotionSource* motion)
     : method_(method), costs_(costs), motion_(motion), integrals_(kIntegrals * costs.size()) {
-  for (int i = 0; i < method.stages; ++i) {
+  for (int i = 0; i < method.nodes; ++i) {
     node_of_.push_back(-1);
-    if (method.b[i] == 0) continue;
-    const auto same = [&](const Node& n) { return std::abs(n.c - method.c[i]) < 1e-12; };
+    if (method.node_b[i] == 0) continue;
+    const auto same = [&](const Node& n) { return std::abs(n.c - method.node_c[i]) < 1e-12; };
     const auto node = std::find_if(nodes_.begin(), nodes_.end(), same);
     node_of_.back() = static_cast<int>(node - nodes_.begin());
-    if (node == nodes_.end()) nodes_.push_back({method.c[i], 0, 0});
-    nodes_[static_cast<std::size_t>(node_of_.back())].b += method.b[i];
+    if (node == nodes_.end()) nodes_.push_back({method.node_c[i], 0, 0});
+    nodes_[static_cast<std::size_t>(node_of_.back())].b += method.node_b[i];
   }
   double least = std::numeric_limits<double>::infinity();
   for (Node& n : nodes_) {
@@ -51,7 +51,7 @@ std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::sp
   for (std::size_t i = 0; i < g.size(); ++i) {
     if (node_of_[i] < 0) continue;
     const std::size_t node = static_cast<std::size_t>(node_of_[i]);
-    g_[node] += method_.b[i] / nodes_[node].b * g[i];
+    g_[node] += method_.node_b[i] / nodes_[node].b * g[i];
   }
   double size = 0, difference = 0;
   for (std::size_t k = 0; k < nodes_.size(); ++k) {

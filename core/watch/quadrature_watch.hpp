@@ -1,4 +1,4 @@
-// Integrals of running costs that the steps do not resolve: they are sums over the stages of steps that only the motion
+// Integrals of running costs that the steps do not resolve: they are sums over nodes of steps that only the motion
 // asked for.
 //
 // In each step g at the method's m nodes c_1..c_m has a highest divided difference, which vanishes for polynomials of
@@ -34,7 +34,8 @@ class QuadratureWatch {
   enum class Of { value, along_motion, along_parameters };  // g, g_y ydot, g_rho rho
   static constexpr std::size_t kIntegrals = 3;              // of each cost
 
-  // After each step, the integrand at each stage, of each cost that runs. In words, what ends the run; empty: nothing.
+  // After each step, the integrand at each node (Method::nodes), of each cost that runs. In words, what ends the run;
+  // empty: nothing.
   std::string look_at(const Step& step, std::size_t cost, std::span<const double> g, Of what = Of::value);
 
   void add_to(SimulationStatistics& statistics) const;
@@ -55,7 +56,7 @@ class QuadratureWatch {
   std::span<const Cost> costs_;
   MotionSource* motion_;
   std::vector<Node> nodes_;
-  std::vector<int> node_of_;  // of each stage; -1: has no weight
+  std::vector<int> node_of_;  // of each node of the method; -1: has no weight
   std::vector<Integral> integrals_;
   double start_ = 0, end_ = 0;  // of all steps [s], which come forward or backward
   std::vector<double> g_;       // at the nodes

@@ -247,6 +247,7 @@ TEST_CASE("an option of the integrator that the method does not use is refused a
     const std::string value = std::string(key) == "newton_iterations" ? "4" : "0.1";
     CHECK(refused("dopri5", key, value));
     CHECK(refused("cvodes_adams", key, value));
+    CHECK(refused("rodas4", key, value));
     CHECK_FALSE(refused("cvodes_bdf", key, value));
     CHECK_FALSE(refused("radau5", key, value));
   }

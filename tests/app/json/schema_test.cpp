@@ -27,7 +27,7 @@ TEST_CASE("the schema knows names, defaults and what is required", "[json]") {
   CHECK(properties.at("simulation").at("properties").at("integrator").at("properties").at("type").at("enum") ==
         nlohmann::json::parse(
             R"(["euler", "rk2", "bs3", "rk4", "dopri5", "tsit5", "verner6", "dopri853", "sdirk2", "sdirk3",
-                                  "sdirk4", "gauss4", "lobatto3c", "radau5", "radau1a", "gauss6", "cvodes_adams",
+                                  "sdirk4", "gauss4", "lobatto3c", "rodas4", "radau5", "radau1a", "gauss6", "cvodes_adams",
                                   "cvodes_bdf"])"));
   CHECK(properties.at("drives").at("items").at("oneOf").size() == std::size(mbsopt::kDriveTypes));
 }

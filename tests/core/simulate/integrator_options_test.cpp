@@ -99,7 +99,7 @@ TEST_CASE("newton_tolerance says how far the stages are from their solution", "[
 }
 
 TEST_CASE("every controller keeps the tolerance, and its gradients by TLM and adjoint agree", "[options]") {
-  Scene scene = swinging(GENERATE("dopri5", "radau5"));
+  Scene scene = swinging(GENERATE("dopri5", "radau5", "rodas4"));
   add_parameters(scene, {{"push", 4.0}});
   Torque motor;
   motor.body = "upper", motor.components = {f("0"), f("0"), f("push*t")};

@@ -116,7 +116,13 @@ TEST_CASE("on the double pendulum state, TLM and adjoint gradient converge at th
     } else if (rk.order == 6) {  // longer, to be further from rounding
       scene.simulation.end_time = 6;
     }
-    check_order(scene, rk, steps_for(rk.order).pendulum);
+    int steps = steps_for(rk.order).pendulum;
+    if (rk.gamma) {  // falling, since without weight its errors are next to rounding
+      scene.gravity = {0.0, -9.81, 0.0};
+      scene.simulation.end_time = 1;
+      steps = 192;
+    }
+    check_order(scene, rk, steps);
   }
 }
 

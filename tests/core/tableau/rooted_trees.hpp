@@ -2,6 +2,8 @@
 //   Hairer, Norsett, Wanner, "Solving Ordinary Differential Equations I" (1993), section II.2:
 //   a method has order p where sum_i b_i Phi_i(t) = 1/gamma(t) for every rooted tree t of up to p nodes,
 //   gamma(t) = |t| prod gamma(children),   Phi_i(t) = prod over children u of sum_j A_ij Phi_j(u).
+// Of a Rosenbrock method A_ij + gamma_ij takes the place of A_ij where a node has one child: "Solving Ordinary
+// Differential Equations II" (1996), section IV.7.
 #pragma once
 
 #include <vector>
@@ -52,7 +54,8 @@ inline std::vector<std::vector<double>> elementary_weights(const Method& rk, con
     for (const std::size_t child : tree.children) {
       for (int i = 0; i < rk.dense_stages; ++i) {
         double sum = 0;
-        for (int j = 0; j < rk.dense_stages; ++j) sum += rk.a(i, j) * weights[child][static_cast<std::size_t>(j)];
+        for (int j = 0; j < rk.dense_stages; ++j)
+          sum += (tree.children.size() == 1 ? rk.beta(i, j) : rk.a(i, j)) * weights[child][static_cast<std::size_t>(j)];
         Phi[static_cast<std::size_t>(i)] *= sum;
       }
     }

@@ -1,0 +1,71 @@
+// The stages of a Rosenbrock step (method.hpp), and their linearisation. One linear system, with g = gamma_ii:
+//
+//   (I - h g f_y) x_i = f(t0 + c_i h, Y_i) + s_i + gamma_i h f_t,    s_i = sum_{j<i} gamma_ij/g k_j,    k_i = x_i - s_i
+//
+// f_y is exact. Since h f_y sum_j gamma_ij k_j + gamma_i h f_t is a derivative of f along the direction (h gamma_i,
+// u_i) of (t, y), u_i = h sum_{j<=i} gamma_ij k_j, the derivative of a stage in y0 and in the parameters is
+//
+//   (I - h g f_y) x_i' = f_y(Y_i) Y_i' + f_rho + s_i' + d/de [ f_y(e) y0' + f_rho(e) ],     e = 0
+//   f_y(e), f_rho(e): at t0 + e h gamma_i, y0 + e u_i
+//
+// Second derivatives appear only along that direction, where they are taken by a formula of order 4 from exact first
+// ones at e = 0, d, .., 4 d. Both sweeps use the same formula, so that they are transposes of each other. Points stay
+// on the step's side of t0, where a law may have a kink. f_t is taken by the same formula.
+#pragma once
+
+#include <array>
+
+#include "core/dynamics/dynamics.hpp"
+#include "core/step/shifted_system.hpp"
+#include "core/step/step.hpp"
+
+namespace mbsopt {
+
+class RosenbrockStages {
+ public:
+  RosenbrockStages(const Mechanism& mechanism, const Method& method, Dynamics& dynamics);
+  RosenbrockStages(const RosenbrockStages&) = delete;  // its matrix refers to its Jacobian
+  RosenbrockStages& operator=(const RosenbrockStages&) = delete;
+
+  // f and f_y at the start of the step, for all attempts from there. False: not finite.
+  bool begin(const Step& step);
+  // All stages of an attempt of size step.h into Y and K. False: a matrix cannot be factored, or f is not finite.
+  bool solve(Step& step);
+
+  // For the sweeps, whose step is solved: f_y at the start and the factor of I - h g f_y.
+  bool factor(const Step& step);
+  void solve(Eigen::Ref<Eigen::MatrixXd> x) { matrix_.solve(x, StageMatrix::kExact); }
+  void solve_transposed(Eigen::Ref<Eigen::MatrixXd> x) { matrix_.solve_transposed(x, StageMatrix::kExact); }
+  // Linearises the dynamics at Y_i; and at the point e = k d of stage i, k = 0..4.
+  static constexpr int kPoints = 5;
+  bool linearise_stage(const Step& step, int i);
+  bool linearise_point(const Step& step, int i, int k);
+  // d/de of a function of e is the sum of weight(i, k) times its values at the points.
+  double weight(int i, int k) const { return kWeights[static_cast<std::size_t>(k)] / spacing(i); }
+
+  long evaluations() const { return evaluations_; }
+  long jacobians() const { return jacobians_; }
+  long solves() const { return solves_; }
+  long linearised_states() const { return linearised_; }
+  long factorisations() const { return matrix_.factorisations(); }
+
+ private:
+  // d = 1/64, a power of two. With u_i about h g f, points are 1/256 of a step apart. The formula leaves out
+  // (1/256)^4/5 = 5e-11 times (h/T)^5, T the time in which the motion changes: 5e-14 for steps whose error is 1e-6.
+  // Rounding leaves 10 * 64 * 1e-16.
+  static constexpr double kSpacing = 1.0 / 64;
+  static constexpr std::array<double, kPoints> kWeights{-25.0 / 12, 4, -3, 4.0 / 3, -1.0 / 4};
+  double spacing(int i) const { return rk_.gamma_sum[i] < 0 ? -kSpacing : kSpacing; }
+  bool linearise_at(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
+
+  const Method& rk_;
+  Dynamics& dynamics_;
+  StageEquations equations_;
+  MotionJacobian jacobian_;
+  MotionJacobian::Values values_;
+  ShiftedSystem matrix_;
+  Eigen::VectorXd f_, f_t_, y_, ydot_, s_, x_;  // f_t_: times h
+  long evaluations_ = 0, jacobians_ = 0, solves_ = 0, linearised_ = 0;
+};
+
+}  // namespace mbsopt
