@@ -1,6 +1,7 @@
 #include "core/expression/curve.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 namespace mbsopt {
@@ -16,7 +17,12 @@ Curve::Curve(Interpolation how, std::vector<double> x, std::vector<double> y) : 
     if (!(x_[i] > x_[i - 1])) throw std::invalid_argument("a curve's abscissae must increase");
 }
 
+Curve::Curve(std::function<double(double, int)> f) : how_(Interpolation::spline), routine_(std::move(f)) {
+  if (!routine_) throw std::invalid_argument("a curve's routine is empty");
+}
+
 int Curve::degree() const {
+  if (routine_) return std::numeric_limits<int>::max();
   switch (how_) {
     case Interpolation::hold:
       return 0;
@@ -29,6 +35,7 @@ int Curve::degree() const {
 }
 
 double Curve::at(double x, int order) const {
+  if (routine_) return routine_(x, order);
   if (order > degree()) return 0;
   if (spline_) {
     const CubicSpline::Jet jet = (*spline_)(x);
