@@ -34,6 +34,7 @@ MotionTerms::MotionTerms(const MechanismData& data, const FormulationSettings& s
 void MotionTerms::set_time(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles) {
   t_ = t;
   if (forces_read_y_) y_ = y;
+  if (!user_.inertias().empty()) user_.set_inertias(y);
   angles_ = angles;
   laws_.set_time(t);
   if (linear_) linear_->current = false;
@@ -52,11 +53,11 @@ void MotionTerms::set_own_load(std::size_t body) {
   f[body - 1].tail<3>() = -omega.cross(b.J * omega);
 }
 
-void MotionTerms::add_forces() {
+void MotionTerms::add_forces(const std::vector<Vec<6>>* accelerations) {
   if (!has_forces_) return;
   for (Vec<6>& load : body_loads_) load.setZero();
   forces_.add_loads(here(), body_loads_);
-  if (!data_.user_forces.empty()) user_.add_loads(here(), bodies, body_loads_);
+  if (!data_.user_forces.empty()) user_.add_loads(here(), bodies, accelerations, body_loads_);
   for (std::size_t i = 0; i < f.size(); ++i) f[i] += body_loads_[i + 1];
 }
 
@@ -69,7 +70,7 @@ void MotionTerms::set_state(double t, const Eigen::VectorXd& y, const Eigen::Vec
     set_acceleration(none, bodies[k], frames[k]);
     set_own_load(k);
   }
-  add_forces();
+  add_forces(nullptr);
 }
 
 void MotionTerms::set_motion(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
@@ -94,7 +95,7 @@ void MotionTerms::set_accelerations() {
 
 void MotionTerms::set_loads() {
   for (std::size_t k = 1; k < bodies.size(); ++k) set_own_load(k);
-  add_forces();
+  add_forces(&z);
 }
 
 void MotionTerms::add_stabilisation(Eigen::VectorXd& gamma) {
@@ -148,7 +149,7 @@ const MotionBlocks& MotionTerms::blocks() {
   for (const std::size_t i : x.bodies_of_units) set_unit_tangents(bodies[i], x.units[i]);
   x.constraints.add(bodies, frames, x.units, lambda, x.blocks);
   forces_.add_blocks(here(), x.units, x.blocks);
-  if (!data_.user_forces.empty()) user_.add_blocks(here(), bodies, x.blocks);
+  if (!data_.user_forces.empty()) user_.add_blocks(here(), bodies, z, x.blocks);
   for (int i = 0; i < data_.n; ++i) {
     // -(omega x J omega)' = (skew(J omega) - skew(omega) J) omega',   omega' = 2 (G(p) pdot' - G(pdot) p')
     const std::size_t k = static_cast<std::size_t>(i) + 1;
@@ -169,7 +170,7 @@ void MotionTerms::set_tangents(const ParameterBlock& block, const LaneRows& y_di
   constraints_.field_tangents(frames, laws_, angles_, block, lambda, constraint_dirs_, load_dirs_);
   for (Lanes<6>& load : load_dirs_) load = -load;  // from (J'lambda)' to its share of b'
   forces_.add_field_tangent(here(), block, load_dirs_);
-  if (!data_.user_forces.empty()) user_.add_field_tangent(here(), bodies, block, load_dirs_);
+  if (!data_.user_forces.empty()) user_.add_field_tangent(here(), bodies, z, block, load_dirs_);
 
   Lanes<3> gravity_dir;
   const Lanes<3>* dg = block.field<3>(data_.slot_gravity, gravity_dir);
@@ -207,7 +208,7 @@ void MotionTerms::add_pull_back(const std::vector<Vec<6>>& eta, const Eigen::Vec
   }
   constraints_.add_pull_back(frames, laws_, angles_, weights, -1, bars_, theta_bar, rho_bar);
   forces_.add_pull_back(here(), bars_, y_bar, theta_bar, rho_bar);
-  if (!data_.user_forces.empty()) user_.add_pull_back(here(), bodies, eta, y_bar, rho_bar);
+  if (!data_.user_forces.empty()) user_.add_pull_back(here(), bodies, z, eta, y_bar, rho_bar);
 
   for (std::size_t k = 1; k < bodies.size(); ++k) {
     const BodyData& body = data_.bodies[k];

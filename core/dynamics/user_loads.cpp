@@ -19,6 +19,20 @@ UserLoads::UserLoads(const MechanismData& data) : data_(data) {
   for (const UserForceData& f : data_.user_forces) largest = std::max(largest, size_of(f));
   for (Eigen::VectorXd* x : {&q_, &v_, &Q_, &e_}) x->setZero(largest);
   K_.setZero(largest, largest), C_.setZero(largest, largest), Q_rho_.setZero(largest, data_.rho.size());
+  for (const UserForceData& f : data_.user_forces) {
+    if (f.force->inertia()) inertias_.push_back({&f, f.bodies.front(), Mat<6, 6>::Zero()});
+  }
+  if (inertias_.empty()) return;
+  z_.setZero(6), L_.setZero(6), M_.setZero(6, 6), L_q_.setZero(6, 7), L_rho_.setZero(6, data_.rho.size());
+}
+
+void UserLoads::set_inertias(const Eigen::VectorXd& y) {
+  for (Inertia& i : inertias_) {
+    set_state(*i.force, y);
+    M_.setZero();
+    i.force->force->inertia()->M(q_.head(7), data_.rho, M_);
+    i.M = M_;
+  }
 }
 
 void UserLoads::set_state(const UserForceData& f, const Eigen::VectorXd& y) {
@@ -29,7 +43,15 @@ void UserLoads::set_state(const UserForceData& f, const Eigen::VectorXd& y) {
   }
 }
 
-void UserLoads::add_loads(const ForceTerms::At& at, const Bodies& bodies, std::vector<Vec<6>>& loads) {
+void UserLoads::add_loads(const ForceTerms::At& at, const Bodies& bodies, const Accelerations* z,
+                          std::vector<Vec<6>>& loads) {
+  for (const Inertia& i : inertias_) {
+    set_state(*i.force, at.y);
+    L_.setZero(), z_.setZero();
+    if (z) z_ = (*z)[static_cast<std::size_t>(i.body) - 1];
+    i.force->force->inertia()->L(q_.head(7), v_.head(7), z_, data_.rho, L_);
+    loads[static_cast<std::size_t>(i.body)] += L_;
+  }
   for (const UserForceData& f : data_.user_forces) {
     const Eigen::Index size = size_of(f);
     set_state(f, at.y);
@@ -43,8 +65,21 @@ void UserLoads::add_loads(const ForceTerms::At& at, const Bodies& bodies, std::v
 }
 
 // (T'Q)_y' = T'(-K q' - C v') + (0, 1/2 G(p') Q_p)
-void UserLoads::add_blocks(const ForceTerms::At& at, const Bodies& bodies, MotionBlocks& out) {
+void UserLoads::add_blocks(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z, MotionBlocks& out) {
   constexpr int all = MotionBlocks::r | MotionBlocks::p | MotionBlocks::rdot | MotionBlocks::pdot;
+  for (const Inertia& i : inertias_) {
+    const InertialLoad& load = *i.force->force->inertia();
+    MotionBlocks::Block<6>& block = out.b[static_cast<std::size_t>(out.pair(i.body - 1, i.body - 1))];
+    set_state(*i.force, at.y);
+    z_ = z[static_cast<std::size_t>(i.body) - 1];
+    L_q_.setZero();
+    load.L_q(q_.head(7), v_.head(7), z_, data_.rho, L_q_);
+    block.q += L_q_;
+    L_q_.setZero();
+    load.L_v(q_.head(7), v_.head(7), z_, data_.rho, L_q_);
+    block.v += L_q_;
+    block.parts |= all;
+  }
   for (const UserForceData& f : data_.user_forces) {
     const Eigen::Index size = size_of(f);
     const auto q = q_.head(size), v = v_.head(size);
@@ -71,9 +106,19 @@ void UserLoads::add_blocks(const ForceTerms::At& at, const Bodies& bodies, Motio
   }
 }
 
-void UserLoads::add_field_tangent(const ForceTerms::At& at, const Bodies& bodies, const ParameterBlock& block,
-                                  std::vector<Lanes<6>>& load_dirs) {
+void UserLoads::add_field_tangent(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z,
+                                  const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs) {
   if (std::all_of(std::begin(block.parameter), std::end(block.parameter), [](int k) { return k < 0; })) return;
+  for (const Inertia& i : inertias_) {
+    set_state(*i.force, at.y);
+    z_ = z[static_cast<std::size_t>(i.body) - 1];
+    L_rho_.setZero();
+    i.force->force->inertia()->L_rho(q_.head(7), v_.head(7), z_, data_.rho, L_rho_);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      if (block.parameter[lane] >= 0)
+        load_dirs[static_cast<std::size_t>(i.body)].col(lane) += L_rho_.col(block.parameter[lane]);
+    }
+  }
   for (const UserForceData& f : data_.user_forces) {
     const Eigen::Index size = size_of(f);
     set_state(f, at.y);
@@ -90,9 +135,25 @@ void UserLoads::add_field_tangent(const ForceTerms::At& at, const Bodies& bodies
   }
 }
 
-void UserLoads::add_pull_back(const ForceTerms::At& at, const Bodies& bodies, const std::vector<Vec<6>>& eta,
-                              Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& rho_bar) {
+void UserLoads::add_pull_back(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z,
+                              const std::vector<Vec<6>>& eta, Eigen::Ref<Eigen::VectorXd> y_bar,
+                              Eigen::VectorXd& rho_bar) {
   const StateLayout layout{data_.n};
+  for (const Inertia& i : inertias_) {
+    const InertialLoad& load = *i.force->force->inertia();
+    const Vec<6>& of_body = eta[static_cast<std::size_t>(i.body) - 1];
+    set_state(*i.force, at.y);
+    z_ = z[static_cast<std::size_t>(i.body) - 1];
+    L_q_.setZero();
+    load.L_q(q_.head(7), v_.head(7), z_, data_.rho, L_q_);
+    y_bar.segment<7>(layout.q(i.body)) += L_q_.transpose() * of_body;
+    L_q_.setZero();
+    load.L_v(q_.head(7), v_.head(7), z_, data_.rho, L_q_);
+    y_bar.segment<7>(layout.v(i.body)) += L_q_.transpose() * of_body;
+    L_rho_.setZero();
+    load.L_rho(q_.head(7), v_.head(7), z_, data_.rho, L_rho_);
+    rho_bar += L_rho_.transpose() * of_body;
+  }
   for (const UserForceData& f : data_.user_forces) {
     const Eigen::Index size = size_of(f);
     const auto q = q_.head(size), v = v_.head(size);

@@ -52,4 +52,61 @@ struct DifferentiatedForce : UserForce {
   const Force& own() const { return static_cast<const Force&>(*this); }
 };
 
+// Mass that a user adds to one body, written once: M, L_q, L_v and L_rho follow from its L.
+//
+//   struct AddedMass final : DifferentiatedInertia<AddedMass> {  // of a sphere: rho_0 on the centre of mass
+//     std::vector<std::string> bodies() const override { return {"ball"}; }
+//     template <class T>
+//     void load(const VectorX<T>&, const VectorX<T>&, const VectorX<T>& z, const VectorX<T>& rho, VectorX<T>& L) const
+//     {
+//       L.template head<3>() = -rho(0) * z.template head<3>();
+//     }
+//   };
+//
+// load() has the arguments of InertialLoad::L, and must be affine in z.
+template <class Load>
+struct DifferentiatedInertia : UserForce, InertialLoad {
+  template <class T>
+  using VectorX = Eigen::VectorX<T>;
+  using VecIn = UserForce::VecIn;
+  using VecOut = UserForce::VecOut;
+  using MatOut = UserForce::MatOut;
+
+  const InertialLoad* inertia() const final { return this; }
+  void Q(double, VecIn, VecIn, VecIn, VecOut) const final {}
+  void K(double, VecIn, VecIn, VecIn, MatOut) const final {}
+  void C(double, VecIn, VecIn, VecIn, MatOut) const final {}
+  void Q_rho(double, VecIn, VecIn, VecIn, MatOut) const final {}
+
+  void L(VecIn q, VecIn v, VecIn z, VecIn rho, VecOut L) const final {
+    VectorX<double> out = L;
+    own().load(VectorX<double>(q), VectorX<double>(v), VectorX<double>(z), VectorX<double>(rho), out);
+    L = out;
+  }
+  void M(VecIn q, VecIn rho, MatOut M) const final {
+    const Eigen::VectorXd none = Eigen::VectorXd::Zero(7);  // M is the same at any v and z
+    const auto of_z = [&, q = constants(q), v = constants(none), rho = constants(rho)](
+                          const VectorX<Dual>& x, VectorX<Dual>& out) { own().load(q, v, x, rho, out); };
+    add_jacobian(of_z, none.head(6), -1, M);
+  }
+  void L_q(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_q) const final {
+    const auto of_q = [&, v = constants(v), z = constants(z), rho = constants(rho)](
+                          const VectorX<Dual>& x, VectorX<Dual>& out) { own().load(x, v, z, rho, out); };
+    add_jacobian(of_q, q, 1, L_q);
+  }
+  void L_v(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_v) const final {
+    const auto of_v = [&, q = constants(q), z = constants(z), rho = constants(rho)](
+                          const VectorX<Dual>& x, VectorX<Dual>& out) { own().load(q, x, z, rho, out); };
+    add_jacobian(of_v, v, 1, L_v);
+  }
+  void L_rho(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_rho) const final {
+    const auto of_rho = [&, q = constants(q), v = constants(v), z = constants(z)](
+                            const VectorX<Dual>& x, VectorX<Dual>& out) { own().load(q, v, z, x, out); };
+    add_jacobian(of_rho, rho, 1, L_rho);
+  }
+
+ private:
+  const Load& own() const { return static_cast<const Load&>(*this); }
+};
+
 }  // namespace mbsopt

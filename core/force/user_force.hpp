@@ -14,10 +14,29 @@
 
 namespace mbsopt {
 
+// Mass that a user adds to one body: the load L = -(M(q, rho) z + h(q, v, rho)), 6 numbers, on the body's accelerations
+// z = (rddot, omegadot in body axes).   [N, N m]
+struct InertialLoad {
+  using VecIn = Eigen::Ref<const Eigen::VectorXd>;
+  using VecOut = Eigen::Ref<Eigen::VectorXd>;
+  using MatOut = Eigen::Ref<Eigen::MatrixXd>;
+
+  virtual ~InertialLoad() = default;
+  // q, v: 7 numbers each. All outputs arrive zeroed.
+  virtual void L(VecIn q, VecIn v, VecIn z, VecIn rho, VecOut L) const = 0;
+  virtual void M(VecIn q, VecIn rho, MatOut M) const = 0;                            // -dL/dz, symmetric, not negative
+  virtual void L_q(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_q) const = 0;      // dL/dq, z fixed, 6 x 7
+  virtual void L_v(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_v) const = 0;      // dL/dv, 6 x 7
+  virtual void L_rho(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_rho) const = 0;  // dL/drho, z fixed, 6 x P
+};
+
 struct UserForce {
   using VecIn = Eigen::Ref<const Eigen::VectorXd>;
   using VecOut = Eigen::Ref<Eigen::VectorXd>;
   using MatOut = Eigen::Ref<Eigen::MatrixXd>;
+
+  // Mass terms beside Q, of a force on one body; null: none.
+  virtual const InertialLoad* inertia() const { return nullptr; }
 
   virtual ~UserForce() = default;
   virtual std::vector<std::string> bodies()

@@ -164,6 +164,7 @@ void add_user_force(Compilation& model, std::shared_ptr<const UserForce> force) 
     if (body == 0) throw SceneError("user force: acts on the ground, which never moves");
     out.bodies.push_back(body);
   }
+  if (force->inertia() && out.bodies.size() != 1) throw SceneError("user force: mass terms act on one body");
   out.force = std::move(force);
   model.data.user_forces.push_back(std::move(out));
 }

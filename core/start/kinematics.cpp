@@ -92,13 +92,16 @@ class DrivenMotion final : public MotionSource {
     rows_.set(at.t, at.y);
     rows_.factor();
     const VectorXd z = rows_.solve(-dynamics_.gamma());
+    std::vector<Vec<6>> loads = dynamics_.loads();
     VectorXd left(6 * d_.n);  // f - M z - J'lambda
     motion_.lambda = solved && dynamics_.lambda().allFinite() ? dynamics_.lambda() : VectorXd::Zero(d_.m);
     for (int i = 1; i <= d_.n; ++i) {
       const std::size_t k = static_cast<std::size_t>(i - 1);
       motion_.z[k] = z.segment<6>(6 * (i - 1));
-      left.segment<6>(6 * (i - 1)) = dynamics_.loads()[k] - dynamics_.solver().mass_times(i, motion_.z[k]);
+      left.segment<6>(6 * (i - 1)) = -dynamics_.solver().mass_times(i, motion_.z[k]);
     }
+    dynamics_.terms().add_user_mass(-1, motion_.z, loads);
+    for (int i = 1; i <= d_.n; ++i) left.segment<6>(6 * (i - 1)) += loads[static_cast<std::size_t>(i - 1)];
     motion_.lambda += rows_.solve_transposed(left - rows_.transposed_times(motion_.lambda));
     return motion_;
   }

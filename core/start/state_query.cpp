@@ -124,6 +124,15 @@ MatrixXd StateQuery::M() const {
     out.block<3, 3>(layout.q(i), layout.q(i)) = body.mass * Matrix3d::Identity();
     out.block<4, 4>(layout.p(i), layout.p(i)) = 4 * G_p.transpose() * body.J * G_p;
   }
+  for (const UserForceData& f : data_.user_forces) {  // z = (rddot, 2 G(p) pddot)
+    if (!f.force->inertia()) continue;
+    const Eigen::Index q = layout.q(f.bodies.front());
+    MatrixXd M_z = MatrixXd::Zero(6, 6);
+    Mat<6, 7> z_a = Mat<6, 7>::Identity();
+    f.force->inertia()->M(y_.segment<7>(q), data_.rho, M_z);
+    z_a.bottomRightCorner<3, 4>() = 2 * G(y_.segment<4>(q + 3));
+    out.block<7, 7>(q, q) += z_a.transpose() * M_z * z_a;
+  }
   return out;
 }
 

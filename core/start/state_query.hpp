@@ -56,7 +56,7 @@ class StateQuery {
   Eigen::VectorXd Phidot() const;
   Eigen::VectorXd Phiddot_v() const;
   Eigen::MatrixXd Phi_q() const;
-  Eigen::MatrixXd M() const;  // diag(m I, 4 G'J G): without an entry for changes of |p|
+  Eigen::MatrixXd M() const;  // diag(m I, 4 G'J G) and mass terms of users: without an entry for changes of |p|
   Eigen::VectorXd Q() const;
   Eigen::MatrixXd K();
   Eigen::MatrixXd C();

@@ -166,6 +166,40 @@ class UserTerms {
           name + ": its Q_rho", "'" + scene_.parameters[k].name + "'", t, step_of_parameter(k),
           [&](double h) { return Q(q, v, rho_ + h * e); }, Q_rho.col(static_cast<Index>(k)));
     }
+    if (const InertialLoad* inertia = force.inertia()) check_inertia(*inertia, name, t, q, v, bodies);
+  }
+
+  // At accelerations of the size that moves the body by its length within a second.
+  void check_inertia(const InertialLoad& load, const std::string& name, double t, const VectorXd& q, const VectorXd& v,
+                     const std::vector<std::string>& bodies) {
+    VectorXd z(6);
+    z << length_ * Vector3d(1, -0.7, 0.4), Vector3d(0.6, -1, 0.8);
+    const auto L = [&](const VectorXd& q_at, const VectorXd& v_at, const VectorXd& z_at, const VectorXd& rho) {
+      VectorXd value = VectorXd::Zero(6);
+      load.L(q_at, v_at, z_at, rho, value);
+      return value;
+    };
+    MatrixXd M = MatrixXd::Zero(6, 6), L_q = MatrixXd::Zero(6, 7), L_v = L_q, L_rho = MatrixXd::Zero(6, rho_.size());
+    load.M(q, rho_, M), load.L_q(q, v, z, rho_, L_q), load.L_v(q, v, z, rho_, L_v), load.L_rho(q, v, z, rho_, L_rho);
+    for (Index k = 0; k < 6; ++k) {
+      const VectorXd e = VectorXd::Unit(6, k);
+      compare(
+          name + ": its M = -dL/dz", fmt::format("acceleration {}", k), t, kLargest * (k < 3 ? length_ : 1),
+          [&](double h) { return L(q, v, z + h * e, rho_); }, -M.col(k));
+    }
+    const std::vector<Direction> all = directions(q, v, bodies);
+    for (const bool rates : {true, false})
+      for (const Direction& d : all)
+        if (d.of_rates == rates)
+          compare(
+              name + (rates ? ": its L_v" : ": its L_q"), d.name, t, step_of(d),
+              [&](double h) { return L(q + h * d.q, v + h * d.v, z, rho_); }, L_q * d.q + L_v * d.v);
+    for (std::size_t k = 0; k < scene_.parameters.size(); ++k) {
+      const VectorXd e = VectorXd::Unit(rho_.size(), static_cast<Index>(k));
+      compare(
+          name + ": its L_rho", "'" + scene_.parameters[k].name + "'", t, step_of_parameter(k),
+          [&](double h) { return L(q, v, z, rho_ + h * e); }, L_rho.col(static_cast<Index>(k)));
+    }
   }
 
   void check_objective(const Objective& objective, double t, const VectorXd& y, const VectorXd& angles, bool end) {

@@ -2,6 +2,7 @@
 // one is wrong, where all gradients only say that one is.
 //
 //   Q of a force against K = -dQ/dq, C = -dQ/dv, Q_rho        g and terminal costs against their gradients in y and rho
+//   L of a mass term against M = -dL/dz, L_q, L_v, L_rho
 //
 // Directions in (q, v) are such that the state moves: p'p = 1, p'pdot = 0, to first order. A derivative may say what it
 // likes in the others.

@@ -75,6 +75,35 @@ struct Sine final : UserForce {
   double wrong;
 };
 
+// Added mass rho_k in the direction of the body's first axis, whose derivatives may be wrong.
+struct Fin final : UserForce, InertialLoad {
+  enum Wrong { none, in_M, in_L_q, in_L_v, in_L_rho };
+  using VecIn = UserForce::VecIn;
+  using VecOut = UserForce::VecOut;
+  using MatOut = UserForce::MatOut;
+  static constexpr Eigen::Index k = 2;
+  explicit Fin(Wrong part) : wrong(part) {}
+  std::vector<std::string> bodies() const override { return {"bar2"}; }
+  void Q(double, VecIn, VecIn, VecIn, VecOut) const override {}
+  void K(double, VecIn, VecIn, VecIn, MatOut) const override {}
+  void C(double, VecIn, VecIn, VecIn, MatOut) const override {}
+  void Q_rho(double, VecIn, VecIn, VecIn, MatOut) const override {}
+  const InertialLoad* inertia() const override { return this; }
+  // -rho_k e_0^2 rddot_x - e_0 v_x
+  void L(VecIn q, VecIn v, VecIn z, VecIn rho, VecOut out) const override {
+    out(0) = -rho(k) * q(3) * q(3) * z(0) - q(3) * v(0);
+  }
+  void M(VecIn q, VecIn rho, MatOut out) const override { out(0, 0) = (wrong == in_M ? 2 : 1) * rho(k) * q(3) * q(3); }
+  void L_q(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut out) const override {
+    out(0, 3) = -(wrong == in_L_q ? 1 : 2) * rho(k) * q(3) * z(0) - v(0);
+  }
+  void L_v(VecIn q, VecIn, VecIn, VecIn, MatOut out) const override { out(0, 0) = -(wrong == in_L_v ? 2 : 1) * q(3); }
+  void L_rho(VecIn q, VecIn, VecIn z, VecIn, MatOut out) const override {
+    out(0, k) = -(wrong == in_L_rho ? 2 : 1) * q(3) * q(3) * z(0);
+  }
+  Wrong wrong;
+};
+
 Scene swinging() {
   Scene s = five_bar::problem(1e-6).scene;
   s.simulation.end_time = 0.4;
@@ -104,6 +133,21 @@ TEST_CASE("a wrong derivative of a force or cost in C++ is named, and only that 
     INFO(c.said);
     REQUIRE(said.size() == 1);
     CHECK_THAT(said[0], Contains(c.said) && Contains("differences say"));
+  }
+}
+
+TEST_CASE("a wrong derivative of a mass term in C++ is named, and only that one", "[check]") {
+  const auto found = [&](Fin::Wrong wrong) { return wrong_user_terms(swinging(), {}, {std::make_shared<Fin>(wrong)}); };
+  CHECK(found(Fin::none).empty());
+  const std::pair<Fin::Wrong, const char*> cases[] = {{Fin::in_M, "its M = -dL/dz is wrong"},
+                                                      {Fin::in_L_q, "its L_q is wrong"},
+                                                      {Fin::in_L_v, "its L_v is wrong"},
+                                                      {Fin::in_L_rho, "its L_rho is wrong"}};
+  for (const auto& [wrong, sentence] : cases) {
+    const std::vector<std::string> said = found(wrong);
+    INFO(sentence);
+    REQUIRE(said.size() == 1);
+    CHECK_THAT(said[0], Contains(sentence));
   }
 }
 

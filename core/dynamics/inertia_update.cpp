@@ -1,0 +1,62 @@
+#include "core/dynamics/inertia_update.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+
+namespace mbsopt {
+
+InertiaUpdate::InertiaUpdate(const MechanismData& data, const MotionTerms& terms) : terms_(terms) {
+  const Eigen::Index size = 6 * static_cast<Eigen::Index>(terms.user_inertias().size());
+  if (size == 0) return;
+  const std::size_t bodies = static_cast<std::size_t>(data.n),
+                    groups = static_cast<std::size_t>((size + kLanes - 1) / kLanes);
+  Z_.assign(groups, std::vector<Lanes<6>>(bodies, Lanes<6>::Zero()));
+  Lambda_.assign(groups, LaneRows::Zero(data.m, kLanes));
+  unit_.assign(bodies, Lanes<6>::Zero());
+  no_rows_.setZero(data.m, kLanes);
+  for (Eigen::MatrixXd* x : {&Mu_, &A_, &inverse_}) x->setZero(size, size);
+}
+
+void InertiaUpdate::set(SaddleSolver& solver, const SaddleSolver::Settings& settings) {
+  const std::vector<UserLoads::Inertia>& added = terms_.user_inertias();
+  const auto body_of = [&](Eigen::Index row) {
+    return static_cast<std::size_t>(added[static_cast<std::size_t>(row / 6)].body) - 1;
+  };
+  for (std::size_t g = 0; g < Z_.size(); ++g) {
+    const Eigen::Index first = kLanes * static_cast<Eigen::Index>(g);
+    const Eigen::Index last = std::min<Eigen::Index>(first + kLanes, A_.cols());
+    for (Eigen::Index c = first; c < last; ++c) unit_[body_of(c)](c % 6, c - first) = 1;
+    solver.solve(unit_, no_rows_, settings, Z_[g], Lambda_[g]);
+    for (Eigen::Index c = first; c < last; ++c) {
+      unit_[body_of(c)].setZero();
+      for (Eigen::Index r = 0; r < A_.rows(); ++r) A_(r, c) = Z_[g][body_of(r)](r % 6, c - first);
+    }
+  }
+  if (Z_.empty()) return;
+  for (std::size_t i = 0; i < added.size(); ++i) {
+    const Eigen::Index at = 6 * static_cast<Eigen::Index>(i);
+    Mu_.block<6, 6>(at, at) = added[i].M;
+  }
+  inverse_ = Mu_ * (Eigen::MatrixXd::Identity(A_.rows(), A_.cols()) + A_ * Mu_).partialPivLu().inverse();
+}
+
+template <class X, class Multipliers>
+void InertiaUpdate::correct_columns(std::vector<X>& z, Multipliers& lambda) {
+  if (Z_.empty()) return;
+  const std::vector<UserLoads::Inertia>& added = terms_.user_inertias();
+  Eigen::MatrixXd w(A_.rows(), X::ColsAtCompileTime);
+  for (std::size_t i = 0; i < added.size(); ++i)
+    w.middleRows<6>(6 * static_cast<Eigen::Index>(i)) = z[static_cast<std::size_t>(added[i].body) - 1];
+  w = (inverse_ * w).eval();
+  for (std::size_t g = 0; g < Z_.size(); ++g) {
+    const Eigen::Index first = kLanes * static_cast<Eigen::Index>(g);
+    const Eigen::Index count = std::min<Eigen::Index>(kLanes, A_.cols() - first);
+    for (std::size_t k = 0; k < z.size(); ++k) z[k] -= Z_[g][k].leftCols(count) * w.middleRows(first, count);
+    lambda -= Lambda_[g].leftCols(count) * w.middleRows(first, count);
+  }
+}
+
+void InertiaUpdate::correct(std::vector<Vec<6>>& z, Eigen::VectorXd& lambda) { correct_columns(z, lambda); }
+void InertiaUpdate::correct(std::vector<Lanes<6>>& z, LaneRows& lambda) { correct_columns(z, lambda); }
+
+}  // namespace mbsopt

@@ -1,0 +1,39 @@
+// The saddle system with mass terms of users, by the factor without them. With E the rows of their bodies, 6 each,
+//
+//   [M + E Mu E'  J'] (z, lambda) = (b, g)       (z, lambda) = (z0, lambda0) - (Z, Lambda) Mu w,   (I + A Mu) w = E'z0
+//   [J            -c]
+//
+// (z0, lambda0): the solution without Mu. (Z, Lambda): those of the columns of E. A = E'Z. (Sherman, Morrison,
+// Woodbury.) Nothing is done, and nothing allocated, where users add no mass.
+#pragma once
+
+#include <vector>
+
+#include "core/dynamics/motion_terms.hpp"
+#include "core/dynamics/saddle_solver.hpp"
+#include "core/linear/dense.hpp"
+
+namespace mbsopt {
+
+class InertiaUpdate {
+ public:
+  InertiaUpdate(const MechanismData& data, const MotionTerms& terms);
+
+  // After each factor, at the state of the terms.
+  void set(SaddleSolver& solver, const SaddleSolver::Settings& settings);
+  void correct(std::vector<Vec<6>>& z, Eigen::VectorXd& lambda);
+  void correct(std::vector<Lanes<6>>& z, LaneRows& lambda);
+
+ private:
+  template <class X, class Multipliers>
+  void correct_columns(std::vector<X>& z, Multipliers& lambda);
+
+  const MotionTerms& terms_;
+  std::vector<std::vector<Lanes<6>>> Z_;  // kLanes columns each
+  std::vector<LaneRows> Lambda_;
+  std::vector<Lanes<6>> unit_;
+  LaneRows no_rows_;
+  Eigen::MatrixXd Mu_, A_, inverse_;  // inverse_: Mu inv(I + A Mu)
+};
+
+}  // namespace mbsopt
