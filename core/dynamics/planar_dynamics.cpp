@@ -9,7 +9,7 @@ namespace mbsopt {
 namespace {
 
 bool any_force_but_springs(const MechanismData& d) {
-  return d.forces.size() > d.forces.of<TsdaForce>().size() || !d.applied.empty();
+  return d.forces.size() > d.forces.of<TsdaForce>().size() || !d.applied.empty() || !d.user_forces.empty();
 }
 
 std::vector<std::size_t> bodies_with_inertial_slots(const MechanismData& data) {
@@ -35,7 +35,8 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
       springs_(data),
       has_springs_(!data.forces.of<TsdaForce>().empty()),
       has_other_forces_(any_force_but_springs(data)),
-      forces_(data) {
+      forces_(data),
+      user_(data) {
   const std::size_t n = at(data.n);
   y_.setZero(14 * data.n);
   angles_.setZero(static_cast<Eigen::Index>(data.angles.size()));
@@ -59,6 +60,10 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
   if (!has_springs_ && !has_other_forces_) return;
   std::vector<bool> loaded(n + 1, false);
   forces_.mark_units(loaded);
+  for (const UserForceData& f : data.user_forces) {
+    for (const int body : f.bodies) loaded[at(body)] = true;
+  }
+  eta_in_space_.assign(n, Vec<6>::Zero());
   for (std::size_t i = 1; i <= n; ++i) {
     if (loaded[i]) loaded_.push_back(i);
   }
@@ -112,6 +117,7 @@ void PlanarDynamics::set_loads() {
   body_loads_[0].setZero();
   for (const std::size_t k : loaded_) body_loads_[k].setZero();
   forces_.add_loads(here(), body_loads_, springs_in_plane_);
+  user_.add_loads(here(), states_in_space_, nullptr, body_loads_);
   for (const std::size_t k : loaded_) loads_[k - 1] += bodies_in_y_.reduced(k, body_loads_[k]);
 }
 
@@ -233,8 +239,10 @@ void PlanarDynamics::add_force_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen:
   bars_in_space_[0].set_zero();
   for (const std::size_t k : loaded_) {
     bars_in_space_[k].set_zero();
-    set_virtual(bodies_in_y_.in_space(k, eta_[k - 1]), frames_in_space_[k]);
+    eta_in_space_[k - 1] = bodies_in_y_.in_space(k, eta_[k - 1]);
+    set_virtual(eta_in_space_[k - 1], frames_in_space_[k]);
   }
+  user_.add_pull_back(here(), states_in_space_, no_mass_terms_, eta_in_space_, y_bar, rho_bar);
   forces_.add_pull_back(here(), bars_in_space_, y_bar, theta_bar, rho_bar, springs_in_plane_);
   const Eigen::Index half = 7 * data_.n;
   for (const std::size_t k : loaded_) {

@@ -15,6 +15,7 @@
 #include "core/dynamics/planar_bodies.hpp"
 #include "core/dynamics/planar_springs.hpp"
 #include "core/dynamics/saddle_settings.hpp"
+#include "core/dynamics/user_loads.hpp"
 #include "core/scene/settings.hpp"
 
 namespace mbsopt {
@@ -79,6 +80,9 @@ class PlanarDynamics {
   bool has_springs_, has_other_forces_;
   bool in_space_ = false;  // whether the bodies are placed there at this state
   ForceTerms forces_;
+  UserLoads user_;
+  const UserLoads::Accelerations no_mass_terms_;
+  std::vector<Vec<6>> eta_in_space_;
   std::vector<std::size_t> loaded_;
   std::vector<BodyState> states_in_space_;
   std::vector<Frame> frames_in_space_;

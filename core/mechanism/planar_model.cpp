@@ -27,7 +27,8 @@ class Search {
   // Why there is no model; empty when there is.
   std::string run() {
     if (data_.n == 0) return "there is no moving body";
-    if (!data_.user_forces.empty()) return "forces written in C++ act in space";
+    for (const UserForceData& f : data_.user_forces)
+      if (f.force->inertia()) return "mass terms written in C++ act in space";
     place_bodies();
     terms_.assign(at(data_.m), 0);
     for (const Constraint& c : data_.constraints) ++terms_[at(c.row)];

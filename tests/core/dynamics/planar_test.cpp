@@ -283,3 +283,27 @@ TEST_CASE("a planar model that is asked for and is none is refused with the reas
   implicit.simulation.model = ModelChoice::planar, implicit.simulation.integrator.type = "radau5";
   CHECK_THROWS_WITH(simulate(Mechanism(implicit, nominal(implicit)), implicit.simulation), Catch::Contains("explicit"));
 }
+
+TEST_CASE("forces written in C++ keep the planar model, whose numbers are the spatial ones", "[planar]") {
+  Scene scene = planar_machine(GENERATE(2, 0));
+  add_parameters(scene, {{"drag", 0.4}});
+  scene.simulation.end_time = 0.3;
+  scene.simulation.integrator.type = "dopri5";
+  scene.simulation.integrator.step = 0.005;
+  const Eigen::Index drag = static_cast<Eigen::Index>(scene.parameters.size()) - 1;
+  const Mechanism m(scene, nominal(scene), {}, {std::make_shared<CubicDrag>(scene.bodies[1].name, drag)});
+  INFO(m.data().not_planar);
+  REQUIRE(m.data().planar);
+  std::vector<Cost> costs(1);
+  costs[0].terminal = costs[0].running = std::make_shared<StateNorm>();
+  SimulationSettings in_plane = scene.simulation, in_space = scene.simulation;
+  in_plane.model = ModelChoice::planar, in_space.model = ModelChoice::spatial;
+  const SimulationResult expected = simulate_adjoint(m, in_space, costs),
+                         adjoint = simulate_adjoint(m, in_plane, costs), tlm = simulate_tlm(m, in_plane, costs);
+  INFO(expected.message << adjoint.message << tlm.message);
+  REQUIRE((expected.ok() && adjoint.ok() && tlm.ok()));
+  CHECK(apart(adjoint.y_end, expected.y_end) < 1e-10);
+  CHECK(std::abs(expected.psi_rho(0, drag)) > 1e-6 * size_of(expected.psi_rho));
+  CHECK(apart(adjoint.psi_rho, expected.psi_rho) < 1e-9);
+  CHECK(apart(tlm.psi_rho, expected.psi_rho) < 1e-9);
+}
