@@ -93,6 +93,10 @@ MechanismData compile(const Scene& scene, const Eigen::VectorXd& rho, const std:
     throw SceneError("parameters: " + std::to_string(rho.size()) + " values were given for " +
                      std::to_string(scene.parameters.size()) + " parameters");
   }
+  if (!active.empty() && active.size() != scene.parameters.size()) {
+    throw SceneError("active: " + std::to_string(active.size()) + " flags were given for " +
+                     std::to_string(scene.parameters.size()) + " parameters");
+  }
   Compilation model(scene, rho, active, programs ? std::move(programs) : std::make_shared<ScenePrograms>(scene));
   compile_signals(model);
   compile_bodies(model);
