@@ -97,7 +97,7 @@ TEST_CASE("a projection, its tangent and its adjoint allocate nothing", "[alloca
 
 TEST_CASE("steps allocate nothing after the first, whatever their number", "[allocation]") {
   Prepared p;
-  const std::string method = GENERATE(as<std::string>{}, "dopri5", "dopri853", "sdirk4", "radau5");
+  const std::string method = GENERATE(as<std::string>{}, "dopri5", "dopri853", "sdirk4", "rodas4", "radau5");
   // The same motion over two spans: all that may differ is the growth of the recorded list of steps.
   auto allocations = [&](double end) {
     SimulationSettings settings = p.scene.simulation;

@@ -220,6 +220,9 @@ TEST_CASE("output rows hold the body frame's origin, its velocity and the global
 }
 
 TEST_CASE("what cannot be compiled is refused with its place in the scene", "[mechanism]") {
+  const Scene two = double_pendulum();
+  CHECK_THROWS_WITH(Mechanism(two, nominal(two), {true}), "active: 1 flags were given for 7 parameters");
+  CHECK_THROWS_WITH(Mechanism(two, nominal(two).head(6)), "parameters: 6 values were given for 7 parameters");
   auto message = [](const Scene& scene) {
     try {
       compiled(scene, nominal(scene));
