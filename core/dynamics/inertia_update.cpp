@@ -5,8 +5,8 @@
 
 namespace mbsopt {
 
-InertiaUpdate::InertiaUpdate(const MechanismData& data, const MotionTerms& terms) : terms_(terms) {
-  const Eigen::Index size = 6 * static_cast<Eigen::Index>(terms.user_inertias().size());
+InertiaUpdate::InertiaUpdate(const MechanismData& data, const Inertias& added) {
+  const Eigen::Index size = 6 * static_cast<Eigen::Index>(added.size());
   if (size == 0) return;
   const std::size_t bodies = static_cast<std::size_t>(data.n),
                     groups = static_cast<std::size_t>((size + kLanes - 1) / kLanes);
@@ -17,8 +17,7 @@ InertiaUpdate::InertiaUpdate(const MechanismData& data, const MotionTerms& terms
   for (Eigen::MatrixXd* x : {&Mu_, &A_, &inverse_}) x->setZero(size, size);
 }
 
-void InertiaUpdate::set(SaddleSolver& solver, const SaddleSolver::Settings& settings) {
-  const std::vector<UserLoads::Inertia>& added = terms_.user_inertias();
+void InertiaUpdate::set(const Inertias& added, SaddleSolver& solver, const SaddleSolver::Settings& settings) {
   const auto body_of = [&](Eigen::Index row) {
     return static_cast<std::size_t>(added[static_cast<std::size_t>(row / 6)].body) - 1;
   };
@@ -41,9 +40,8 @@ void InertiaUpdate::set(SaddleSolver& solver, const SaddleSolver::Settings& sett
 }
 
 template <class X, class Multipliers>
-void InertiaUpdate::correct_columns(std::vector<X>& z, Multipliers& lambda) {
+void InertiaUpdate::correct_columns(const Inertias& added, std::vector<X>& z, Multipliers& lambda) {
   if (Z_.empty()) return;
-  const std::vector<UserLoads::Inertia>& added = terms_.user_inertias();
   Eigen::MatrixXd w(A_.rows(), X::ColsAtCompileTime);
   for (std::size_t i = 0; i < added.size(); ++i)
     w.middleRows<6>(6 * static_cast<Eigen::Index>(i)) = z[static_cast<std::size_t>(added[i].body) - 1];
@@ -56,7 +54,11 @@ void InertiaUpdate::correct_columns(std::vector<X>& z, Multipliers& lambda) {
   }
 }
 
-void InertiaUpdate::correct(std::vector<Vec<6>>& z, Eigen::VectorXd& lambda) { correct_columns(z, lambda); }
-void InertiaUpdate::correct(std::vector<Lanes<6>>& z, LaneRows& lambda) { correct_columns(z, lambda); }
+void InertiaUpdate::correct(const Inertias& added, std::vector<Vec<6>>& z, Eigen::VectorXd& lambda) {
+  correct_columns(added, z, lambda);
+}
+void InertiaUpdate::correct(const Inertias& added, std::vector<Lanes<6>>& z, LaneRows& lambda) {
+  correct_columns(added, z, lambda);
+}
 
 }  // namespace mbsopt

@@ -9,26 +9,25 @@
 
 #include <vector>
 
-#include "core/dynamics/motion_terms.hpp"
 #include "core/dynamics/saddle_solver.hpp"
-#include "core/linear/dense.hpp"
+#include "core/dynamics/user_loads.hpp"
 
 namespace mbsopt {
 
 class InertiaUpdate {
  public:
-  InertiaUpdate(const MechanismData& data, const MotionTerms& terms);
+  using Inertias = std::vector<UserLoads::Inertia>;  // at the state in hand, the same ones in all calls
+  InertiaUpdate(const MechanismData& data, const Inertias& added);
 
-  // After each factor, at the state of the terms.
-  void set(SaddleSolver& solver, const SaddleSolver::Settings& settings);
-  void correct(std::vector<Vec<6>>& z, Eigen::VectorXd& lambda);
-  void correct(std::vector<Lanes<6>>& z, LaneRows& lambda);
+  // After each factor.
+  void set(const Inertias& added, SaddleSolver& solver, const SaddleSolver::Settings& settings);
+  void correct(const Inertias& added, std::vector<Vec<6>>& z, Eigen::VectorXd& lambda);
+  void correct(const Inertias& added, std::vector<Lanes<6>>& z, LaneRows& lambda);
 
  private:
   template <class X, class Multipliers>
-  void correct_columns(std::vector<X>& z, Multipliers& lambda);
+  void correct_columns(const Inertias& added, std::vector<X>& z, Multipliers& lambda);
 
-  const MotionTerms& terms_;
   std::vector<std::vector<Lanes<6>>> Z_;  // kLanes columns each
   std::vector<LaneRows> Lambda_;
   std::vector<Lanes<6>> unit_;
