@@ -76,7 +76,7 @@ class BlockSaddleSolver {
                  std::vector<X>& correction);
   template <class X, class Y>
   void refine(const SaddleIterate& at, bool from_zero, double size_of_g, const Settings& settings, std::vector<X>& x,
-              Y& residual, std::vector<X>& correction);
+              Y& nu, Y& residual, std::vector<X>& correction);
 
   Rows rows_;
   BlockCholesky<kUnknowns> S_;

@@ -146,9 +146,10 @@ class ContinuousComparison {
             std::max({std::abs(e.discrete), std::abs(e.continuous), options_.floor * largest / size(k)});
         const double apart = std::abs(e.continuous - e.discrete);
         e.difference = apart == 0 ? 0 : apart / entry;
-        // To the integrators an objective below atol is zero, and so are changes of it by as much.
+        // To the integrators an objective below atol is zero. A parameter that changes it by less than its error, when
+        // it changes by its own size, changes nothing.
         const double atol = scene_.simulation.integrator.atol * result_.rtol / scene_.simulation.integrator.rtol;
-        const double nothing = std::abs(psi_(i)) < atol ? atol / size(k) : 0;
+        const double psi = std::abs(psi_(i)), nothing = (psi < atol ? atol : result_.rtol * psi) / size(k);
         e.verdict = verdict_of(e.continuous, error(i, k) + nothing, e.discrete, entry, options_.threshold);
         result_.entries.push_back(std::move(e));
       }

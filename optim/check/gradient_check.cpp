@@ -60,6 +60,7 @@ class Check {
     size_.resize(rho_.size());
     for (Index k = 0; k < rho_.size(); ++k)
       size_(k) = typical_size(scene.parameters[static_cast<std::size_t>(k)], rho_(k));
+    taylor_size_ = size_;
   }
 
   GradientCheck run() {
@@ -76,8 +77,9 @@ class Check {
       check_taylor();
       if (!agree(result_)) {
         measure_rounding();
-        generator_.seed(options_.seed);
         compare();
+        if (difference_finer()) compare();
+        generator_.seed(options_.seed);
         check_identity();
         check_taylor();
         say_rounding();
@@ -177,40 +179,86 @@ class Check {
     on_base_steps_.setConstant(m, P, false);
     for (Index k = 0; k < P; ++k) {
       if (result_.discrete && !on_frozen_steps_(k)) result_.frozen.col(k).setConstant(kNaN);
-      std::vector<std::pair<double, VectorXd>> on_frozen_steps;
-      const double near = options_.relative_step * size_(k) * std::pow(0.5, options_.rungs - kJumpRungs);
       for (const bool frozen : {true, false}) {
         if (frozen ? !on_frozen_steps_(k) : !options_.free_steps) continue;
         const Stopwatch stopwatch;
-        std::string failure;             // of a run
-        double other_steps = kInfinity;  // the smallest |h| at which a run took others than the base run
-        const auto f = [&](double h) -> std::optional<VectorXd> {
-          VectorXd rho = rho_;
-          rho(k) += h;
-          Evaluation e = run_at(rho, frozen);
-          if (!e.ok) failure = e.message;
-          if (!e.ok) return std::nullopt;
-          if (e.steps.sizes != steps_.sizes) other_steps = std::min(other_steps, std::abs(h));
-          if (std::abs(h) < 1.5 * near) note_jump(k, h, frozen, e.psi, on_frozen_steps);
-          note_rung(k, h, frozen, e.psi);
-          return std::move(e.psi);
-        };
-        LadderDerivative d = difference_ladder(f, m, {options_.relative_step * size_(k), options_.rungs, kPsiRounding});
-        for (Index i = 0; i < m; ++i)
-          if (!d.has_estimate(i)) d.derivative(i) = kNaN, d.error(i) = kInfinity;
-        if (d.derivative.hasNaN() && !failure.empty())
+        const Ladder ladder = ladder_of(k, frozen, options_.relative_step * size_(k));
+        const LadderDerivative& d = ladder.d;
+        if (d.derivative.hasNaN() && !ladder.failure.empty())
           result_.warnings.push_back(fmt::format("differences in '{}' could not be evaluated{}: {}",
                                                  result_.parameters[static_cast<std::size_t>(k)],
-                                                 frozen ? " on the steps of the base run" : "", failure));
-        (frozen ? result_.frozen : result_.free).col(k) = d.derivative;
-        (frozen ? frozen_error_ : free_error_).col(k) = d.error;
-        (frozen ? frozen_step_ : free_step_).col(k) = d.step;
-        if (!frozen && result_.discrete) on_base_steps_.col(k) = d.largest.array() < 0.75 * other_steps;
+                                                 frozen ? " on the steps of the base run" : "", ladder.failure));
+        for (Index i = 0; i < m; ++i) take(ladder, i, k, frozen);
         (frozen ? result_.frozen_cost : result_.free_cost).wall_seconds += stopwatch.seconds();
       }
       if (options_.progress) options_.progress(static_cast<int>(k) + 1, static_cast<int>(P));
     }
     set_ratio(result_.frozen_cost), set_ratio(result_.free_cost);
+  }
+
+  struct Ladder {
+    LadderDerivative d;
+    std::string failure;             // of a run
+    double other_steps = kInfinity;  // the smallest |h| at which a run took others than the base run
+  };
+
+  // Differences in parameter k, by steps of `largest` and below.
+  Ladder ladder_of(Index k, bool frozen, double largest) {
+    Ladder ladder;
+    const double near = largest * std::pow(0.5, options_.rungs - kJumpRungs);
+    const auto f = [&](double h) -> std::optional<VectorXd> {
+      VectorXd rho = rho_;
+      rho(k) += h;
+      Evaluation e = run_at(rho, frozen);
+      if (!e.ok) ladder.failure = e.message;
+      if (!e.ok) return std::nullopt;
+      if (e.steps.sizes != steps_.sizes) ladder.other_steps = std::min(ladder.other_steps, std::abs(h));
+      if (std::abs(h) < 1.5 * near) note_jump(k, h, frozen, e.psi);
+      note_rung(k, h, frozen, e.psi);
+      return std::move(e.psi);
+    };
+    ladder.d = difference_ladder(f, result_.psi.size(), {largest, options_.rungs, kPsiRounding});
+    for (Index i = 0; i < result_.psi.size(); ++i)
+      if (!ladder.d.has_estimate(i)) ladder.d.derivative(i) = kNaN, ladder.d.error(i) = kInfinity;
+    return ladder;
+  }
+
+  void take(const Ladder& ladder, Index i, Index k, bool frozen) {
+    const LadderDerivative& d = ladder.d;
+    (frozen ? result_.frozen : result_.free)(i, k) = d.derivative(i);
+    (frozen ? frozen_error_ : free_error_)(i, k) = d.error(i);
+    (frozen ? frozen_step_ : free_step_)(i, k) = d.step(i);
+    if (!frozen && result_.discrete) on_base_steps_(i, k) = d.largest(i) < 0.75 * ladder.other_steps;
+  }
+
+  // Steps that are coarse for psi may show a plateau that is no derivative (a coordinate of kilometres, of which
+  // metres matter). Where a difference disagrees, a ladder that begins below the first holds, if it contradicts it by
+  // more than its own error.
+  bool difference_finer() {
+    const Index m = result_.psi.size(), P = rho_.size();
+    const double finer = std::pow(0.5, options_.rungs);
+    bool found = false;
+    for (Index k = 0; k < P; ++k) {
+      for (const bool frozen : {true, false}) {
+        const auto disagrees = [&](Index i) {
+          const CheckedEntry& e = result_.entries[static_cast<std::size_t>(i * P + k)];
+          const std::optional<Verdict>& verdict = frozen ? e.frozen_verdict : e.free_verdict;
+          return verdict && !passes(*verdict);
+        };
+        std::optional<Ladder> ladder;
+        for (Index i = 0; i < m; ++i) {
+          if (!disagrees(i)) continue;
+          if (!ladder) ladder = ladder_of(k, frozen, options_.relative_step * size_(k) * finer);
+          const double coarse = (frozen ? result_.frozen : result_.free)(i, k);
+          if (!(std::abs(ladder->d.derivative(i) - coarse) > kEstimateTrust * ladder->d.error(i))) continue;
+          take(*ladder, i, k, frozen);
+          if (!frozen) add_integration_error(i, k);
+          taylor_size_(k) = size_(k) * finer;
+          found = true;
+        }
+      }
+    }
+    return found;
   }
 
   // The difference of the values at h and -h, once both are known.
@@ -233,15 +281,13 @@ class Check {
   }
 
   // Both ladders take the same steps h, halved exactly.
-  void note_jump(Index k, double h, bool frozen, const VectorXd& psi,
-                 std::vector<std::pair<double, VectorXd>>& on_frozen_steps) {
-    if (frozen) {
-      on_frozen_steps.emplace_back(h, psi);
-      return;
-    }
-    for (const auto& [at, values] : on_frozen_steps)
-      if (at == h && psi.allFinite() && values.allFinite())
-        jump_.col(k) = jump_.col(k).cwiseMax((psi - values).cwiseAbs());
+  void note_jump(Index k, double h, bool frozen, const VectorXd& psi) {
+    if (frozen) return;
+    const auto rung = rungs_.find({k, std::abs(h)});
+    if (rung == rungs_.end()) return;
+    const VectorXd& values = rung->second[0][h > 0 ? 0 : 1];
+    if (values.size() > 0 && psi.allFinite() && values.allFinite())
+      jump_.col(k) = jump_.col(k).cwiseMax((psi - values).cwiseAbs());
   }
 
   // Free differences differ from the derivatives of the numbers on frozen steps by the derivative of the integration
@@ -261,13 +307,15 @@ class Check {
       result_.warnings.push_back(std::move(doubt));
     if (!result_.discrete) {  // forward and backward have errors of their own
       e.psi_rho += error_of(GradientMethod::adjoint, result_.adjoint).psi_rho;
-      integration_error_ = e.psi_rho;
     }
+    integration_ = std::move(e);
     if (!options_.free_steps) return;
     for (Index k = 0; k < rho_.size(); ++k)
-      for (Index i = 0; i < result_.psi.size(); ++i)
-        if (!on_base_steps_(i, k) && std::isfinite(free_error_(i, k)))
-          free_error_(i, k) += e.psi_rho(i, k) + std::max(e.psi(i), jump_(i, k)) / free_step_(i, k);
+      for (Index i = 0; i < result_.psi.size(); ++i) add_integration_error(i, k);
+  }
+  void add_integration_error(Index i, Index k) {
+    if (!on_base_steps_(i, k) && std::isfinite(free_error_(i, k)))
+      free_error_(i, k) += integration_.psi_rho(i, k) + std::max(integration_.psi(i), jump_(i, k)) / free_step_(i, k);
   }
 
   // Rounding scatters psi and its derivatives over points that are some units in the last place apart: a few, or some
@@ -397,7 +445,7 @@ class Check {
           e.frozen_error += rounding(frozen_step_);
           if (on_frozen_steps_(k)) e.frozen_verdict = verdict_of(e.frozen, e.frozen_error, e.tlm, entry, limits.frozen);
         } else {
-          e.exact = verdict_of(e.adjoint, integration_error_(i, k), e.tlm, std::max(entry, floor), limits.continuous);
+          e.exact = verdict_of(e.adjoint, integration_.psi_rho(i, k), e.tlm, std::max(entry, floor), limits.continuous);
         }
         e.free_error += rounding(free_step_);
         if (options_.free_steps) e.free_verdict = verdict_of(e.free, e.free_error, e.tlm, entry, limits.free);
@@ -451,9 +499,10 @@ class Check {
     constexpr double kLargest = 1e-2, kClear = 100;              // clear of rounding: that many times above it
     const double allowed = options_.thresholds.frozen / kClear;  // of a derivative, as in differences
     result_.taylor.clear();
-    const VectorXd d =
-        random_direction(rho_.size()).cwiseProduct(size_).cwiseProduct(on_frozen_steps_.cast<double>().matrix()) /
-        std::sqrt(static_cast<double>(rho_.size()));
+    const VectorXd d = random_direction(rho_.size())
+                           .cwiseProduct(taylor_size_)
+                           .cwiseProduct(on_frozen_steps_.cast<double>().matrix()) /
+                       std::sqrt(static_cast<double>(rho_.size()));
     const VectorXd slope = result_.tlm * d;
     std::vector<VectorXd> remainders, noise;
     std::vector<double> steps;
@@ -494,8 +543,10 @@ class Check {
   const GradientCheckOptions& options_;
   Evaluator adjoint_, tlm_;
   VectorXd rho_, size_;
+  VectorXd taylor_size_;  // smaller where steps of that part of the size are coarse
   StepSequence steps_;
-  MatrixXd frozen_error_, free_error_, frozen_step_, free_step_, integration_error_;
+  MatrixXd frozen_error_, free_error_, frozen_step_, free_step_;
+  IntegrationError integration_;
   MatrixXd rounding_;      // of the derivatives, where it was measured; else 0
   VectorXd psi_rounding_;  // of psi, the same
   bool rounding_known_ = false;

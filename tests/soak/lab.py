@@ -42,11 +42,12 @@ class Lab:
     def variant(self, name, problem):
         self.write(name, Scene(problem, self.scene.files))
 
-    def run(self, command, settings=None, arguments=(), file="scene"):
+    def run(self, command, settings=None, arguments=(), file="scene", patience=1.0):
         key = (command, str(settings), tuple(arguments), file)
         if key not in self.outcomes:
             folder = self.folder / f"{file}_{len(self.outcomes)}"
-            self.outcomes[key] = self.program.run(command, self.files[file], folder, settings or {}, arguments)
+            self.outcomes[key] = self.program.run(command, self.files[file], folder, settings or {}, arguments,
+                                                  patience)
         return self.outcomes[key]
 
     def tight(self, **others):

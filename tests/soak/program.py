@@ -110,13 +110,14 @@ class Program:
     def __init__(self, path, patience=1.0):
         self.path, self.patience = str(path), patience
 
-    def run(self, command, file, folder, settings=(), arguments=()):
+    def run(self, command, file, folder, settings=(), arguments=(), patience=1.0):
         line = [self.path, command, str(file), "--out", str(folder), *arguments]
         for path, value in dict(settings).items():
             line += ["--set", f"{path}={value if isinstance(value, str) else json.dumps(value)}"]
         folder = Path(folder)
         for left in ("result.json", "trajectory.csv"):
             (folder / left).unlink(missing_ok=True)
+        patience *= self.patience
         start, told = time.monotonic(), command + "".join(" " + word for word in line[5:])
         process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL)
         hung = False
@@ -126,7 +127,7 @@ class Program:
                 break
             except subprocess.TimeoutExpired:
                 waited = time.monotonic() - start
-                if processor_seconds(process.pid) < HANG * self.patience and waited < STUCK * self.patience:
+                if processor_seconds(process.pid) < HANG * patience and waited < STUCK * patience:
                     continue
                 if hung:  # it was asked to end, and did not
                     process.kill()
