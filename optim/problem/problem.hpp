@@ -30,7 +30,8 @@ struct EigenvalueSpec {
 // A sensor's samples to follow: adds sum over the rows k of a file of weight (sensor(t_k) - column_k)^2.
 struct TrackTerm : SampleColumn {
   std::string sensor;
-  Field weight = 1.0;  // of parameters
+  Field weight = 1.0;        // of parameters
+  bool free_timing = false;  // t_k: where the motion is nearest to row k (free_instants.hpp); the curve is over rows
 };
 
 // psi = integral of running + terminal at the end time + sum of samples and track + parameters_only; or, alone, one of
