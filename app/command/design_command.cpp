@@ -215,7 +215,7 @@ int design_command(const CommandContext& context) {
   add_to_result(run.result, design);
   const std::optional<MultistartSpec>& starts = run.problem.design->multistart;
   print_design(context.out, design,
-               starts ? effort(run, starts, design.simulations, design.wall_seconds)
+               starts ? effort(run, design.simulations, design.wall_seconds)
                       : fmt::format("{:.3g} s", design.wall_seconds));
   for (const std::string& warning : design.warnings) run.warn(warning);
   for (const std::string& warning : design.final_evaluation.warnings) run.warn(warning);

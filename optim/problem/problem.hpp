@@ -85,7 +85,8 @@ struct MultistartSpec {
   int starts = 20;
   std::optional<long> seed;  // drawn when absent
   StartSampling sampling = StartSampling::latin_hypercube;
-  bool all_branches = false;  // of a design: each start in every assembly mode
+  bool all_branches = false;     // of a design: each start in every assembly mode
+  bool until_all_found = false;  // `starts` are the most: an estimate of the optima that are left ends them before
 };
 
 // A drive that follows another law in one experiment or load case.

@@ -17,6 +17,7 @@ inline constexpr Choice<StartSampling> kSamplings[] = {{"latin_hypercube", Start
                                                        {"sobol", StartSampling::sobol}};
 inline constexpr Choice<bool> kTimings[] = {{"prescribed", false}, {"free", true}};
 inline constexpr Choice<bool> kBranches[] = {{"guess", false}, {"all", true}};
+inline constexpr Choice<bool> kUntil[] = {{"all_starts", false}, {"all_found", true}};
 inline constexpr Choice<bool> kRoles[] = {{"fit", false}, {"validate", true}};
 
 inline constexpr Choice<SigmaEstimate> kSigmaEstimates[] = {
@@ -102,6 +103,9 @@ void describe(auto& v, Like<MultistartSpec> auto& m) {
   v.choice("sampling", m.sampling, kSamplings, {"how the starts fill the bounds"});
   v.choice("branches", m.all_branches, kBranches,
            {"of design: assembly modes in which each start is designed, that of the poses in the file or all"});
+  v.choice(
+      "until", m.until_all_found, kUntil,
+      {"all_starts, or all_found: the starts end where fewer than half an optimum is expected beside those found"});
 }
 
 void describe(auto& v, Like<DriveLaw> auto& d) {
