@@ -214,9 +214,9 @@ int design_command(const CommandContext& context) {
   const auto [design, cut_off] = minimised(run, long_run, before.psi);
   add_to_result(run.result, design);
   const std::optional<MultistartSpec>& starts = run.problem.design->multistart;
-  print_design(context.out, design,
-               starts ? effort(run, design.simulations, design.wall_seconds)
-                      : fmt::format("{:.3g} s", design.wall_seconds));
+  print_design(
+      context.out, design,
+      starts ? effort(run, design.simulations, design.wall_seconds) : fmt::format("{:.3g} s", design.wall_seconds));
   for (const std::string& warning : design.warnings) run.warn(warning);
   for (const std::string& warning : design.final_evaluation.warnings) run.warn(warning);
   warn_of_stiffness(run, design.final_evaluation.statistics, true);
@@ -227,6 +227,11 @@ int design_command(const CommandContext& context) {
     long_run.stopped("optimized.json holds the best design so far");
   } else if (!design.ok()) {
     run.failed(design.message);
+  }
+  for (std::size_t i = 0; i < after.instants.size(); ++i) {
+    const std::string& name = run.problem.objectives[i].name;
+    if (!after.instants[i].empty() && run.result["objectives"].contains(name))
+      run.result["objectives"][name]["instants"] = after.instants[i];
   }
   const Trajectory history = history_of(design);
   run.write("optimized.json",

@@ -107,7 +107,7 @@ void read_samples(Problem& problem, const std::filesystem::path& folder, const N
     for (std::size_t k = 0; k < objective.track.size(); ++k) {
       const std::string list = child_path("objectives", objective.name) + ".track";
       TrackTerm& term = objective.track[k];
-      reader.read(term, Interpolation::linear, child_path(list, k), ".file", true, term.free_timing);
+      reader.read(term, Interpolation::linear, child_path(list, k), ".file", true, term.timing != Timing::prescribed);
     }
   if (!problem.identification) return;
   std::vector<ExperimentSpec>& experiments = problem.identification->experiments;

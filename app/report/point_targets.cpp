@@ -46,7 +46,7 @@ std::vector<PointTarget> prescribed_points(const Problem& problem) {
       SensorValues& v = values.emplace_back(SensorValues{term.sensor, {}, {}});
       for (std::size_t k = 0; k < term.curve->x().size(); ++k) {
         const double t = term.curve->x()[k];
-        if (!term.free_timing && (t < settings.start_time || t > settings.end_time)) continue;
+        if (term.timing == Timing::prescribed && (t < settings.start_time || t > settings.end_time)) continue;
         v.t.push_back(t), v.value.push_back(term.curve->y()[k]);
       }
     }

@@ -32,16 +32,15 @@ Index residuals(const CaseEvaluator& evaluator) {
   return static_cast<Index>(count);
 }
 
-// Takes out of the rows of each point what its instant can change: z_x -= z_t (z_t' z_x)/(z_t' z_t). L. Kaufman, "A
-// variable projection method for solving separable nonlinear least squares problems", BIT 15 (1975) 49-57.
-void project_free_instants(const Objective& objective, const std::vector<double>& times, Index first,
+// Takes out of the rows of each block of points what its instant can change: z_x -= z_t (z_t' z_x)/(z_t' z_t). L.
+// Kaufman, "A variable projection method for solving separable nonlinear least squares problems", BIT 15 (1975) 49-57.
+void project_free_instants(const Objective& objective, const std::vector<Objective::Instant>& instants, Index first,
                            const VectorXd& z_t, Eigen::MatrixXd& z_x) {
-  std::map<std::size_t, std::vector<Index>> rows_of_point;
-  for (std::size_t i = 0; i < times.size(); ++i)
-    if (const std::optional<std::size_t> p = objective.residuals()[i].point;
-        p && objective.free_instants()->is_inside(times[i]))
-      rows_of_point[*p].push_back(static_cast<Index>(i));
-  for (const auto& [point, rows] : rows_of_point) {
+  std::map<std::size_t, std::vector<Index>> rows_of_block;
+  for (std::size_t i = 0; i < instants.size(); ++i)
+    if (instants[i].block && objective.free_instants()->is_inside(instants[i].time))
+      rows_of_block[*instants[i].block].push_back(static_cast<Index>(i));
+  for (const auto& [block, rows] : rows_of_block) {
     const VectorXd along = z_t(rows);
     const double square = along.squaredNorm();
     if (square == 0) continue;  // a dwell
@@ -96,17 +95,17 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
     std::vector<bool> active(evaluator.scene().parameters.size(), false);
     for (const int k : evaluator.variables()) active[static_cast<std::size_t>(k)] = true;
     const Mechanism mechanism(evaluator.scene(), rho, active, evaluator.options().user_forces, evaluator.programs());
-    const std::vector<double> times = objective.times_of(rows, mechanism, go_on);
+    const std::vector<Objective::Instant> instants = objective.instants_of(rows, mechanism, go_on);
     std::vector<std::size_t> order(rows.size());  // of the rows in time
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return times[i]; });
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return instants[i].time; });
     std::map<const void*, std::shared_ptr<const PointCost>> bound;  // rows of a file share an expression
     TangentSampling sampling;
     std::vector<const PointCost*> costs;
     for (const std::size_t i : order) {
       std::shared_ptr<const PointCost>& cost = bound[rows[i].value.id()];
       if (!cost) cost = rows[i].value.bind(mechanism);
-      costs.push_back(cost.get()), sampling.times.push_back(times[i]);
+      costs.push_back(cost.get()), sampling.times.push_back(instants[i].time);
     }
     const double weight = std::sqrt(weights(static_cast<Index>(c)));
     const Index half = mechanism.states() / 2;
@@ -127,7 +126,7 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
       point.ok = false, point.message = run.message;
       return;
     }
-    project_free_instants(objective, times, first, z_t, point.z_x);
+    project_free_instants(objective, instants, first, z_t, point.z_x);
     first += static_cast<Index>(rows.size());
   }
 }

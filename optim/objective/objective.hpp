@@ -49,7 +49,7 @@ class Objective {
   Extreme extreme() const { return mean_ ? mean_->extreme : Extreme::none; }
   bool is_extreme() const { return extreme() != Extreme::none; }
   std::vector<ObjectivePart> parts() const;
-  // Of a part; what is absent stays absent. Throws as times_of().
+  // Of a part; what is absent stays absent. Throws as instants_of().
   Cost cost(const Mechanism& mechanism, const ObjectivePart& part = {}, double x0 = 0,
             const Progress& progress = {}) const;
   Jet of_integral(double I, const ObjectivePart& part = {}, double x0 = 0) const;  // its mean, without the factor
@@ -65,9 +65,13 @@ class Objective {
   const std::optional<CostExpression>& running() const { return running_; }
   const std::optional<CostExpression>& terminal() const { return terminal_; }
   const std::vector<Sample>& samples() const { return samples_; }
-  // The times of these samples, in their order; free ones depend on the motion. Throws as FreeInstants::nearest().
-  std::vector<double> times_of(const std::vector<Sample>& samples, const Mechanism& mechanism,
-                               const Progress& progress = {}) const;
+  // When these samples are taken, in their order; free ones depend on the motion. Throws as FreeInstants::nearest().
+  struct Instant {
+    double time;
+    std::optional<std::size_t> block;  // of free ones, FreeInstants::Instant
+  };
+  std::vector<Instant> instants_of(const std::vector<Sample>& samples, const Mechanism& mechanism,
+                                   const Progress& progress = {}) const;
   const std::optional<FreeInstants>& free_instants() const { return free_instants_; }
   // Their sum of squares is psi where is_sum_of_squares(): of `track` alone. In the order of time, but for free ones.
   const std::vector<Sample>& residuals() const { return residuals_; }

@@ -37,16 +37,17 @@ void check_column_unit(Checker& checker, const std::string& unit_text, const std
 void check_track(Checker& checker, const TrackTerm& term, const std::string& place) {
   if (const std::optional<double> weight = checker.facts().value(term.weight); weight && *weight < 0)
     checker.issue(place + ".weight", "is " + text_of(*weight) + ", the weight of a square must not be negative");
-  if (term.free_timing) {
+  const bool prescribed = term.timing == Timing::prescribed;
+  if (!prescribed) {
     const Sensor* const sensor = checker.facts().sensor(term.sensor);
     if (sensor && checker.facts().reads_of(*sensor) != Reads::positions)
-      checker.issue(place + ".timing", "is 'free', but the sensor '" + term.sensor +
+      checker.issue(place + ".timing", "is not 'prescribed', but the sensor '" + term.sensor +
                                            "' is no function of positions alone; free timing seeks the position of "
                                            "the motion that is nearest to each row");
     if (checker.facts().scene().drives.empty())
-      checker.issue(place + ".timing", "is 'free', but there are no drives, whose values it frees");
+      checker.issue(place + ".timing", "is not 'prescribed', but there are no drives, whose values it frees");
   }
-  if (!term.curve || term.free_timing) return;
+  if (!term.curve || !prescribed) return;
   const SimulationSettings& simulation = checker.facts().scene().simulation;
   const std::vector<double>& t = term.curve->x();
   const auto rows =

@@ -27,11 +27,14 @@ struct EigenvalueSpec {
   std::string value = "frequency";  // [Hz], or "damping": its ratio
 };
 
+// When a tracked row is taken: at its time; where the motion is nearest to it; or that in the order of the rows.
+enum class Timing { prescribed, free, ordered };
+
 // A sensor's samples to follow: adds sum over the rows k of a file of weight (sensor(t_k) - column_k)^2.
 struct TrackTerm : SampleColumn {
   std::string sensor;
-  Field weight = 1.0;        // of parameters
-  bool free_timing = false;  // t_k: where the motion is nearest to row k (free_instants.hpp); the curve is over rows
+  Field weight = 1.0;                  // of parameters
+  Timing timing = Timing::prescribed;  // else the curve is over rows, from 0 (free_instants.hpp)
 };
 
 // psi = integral of running + terminal at the end time + sum of samples and track + parameters_only; or, alone, one of

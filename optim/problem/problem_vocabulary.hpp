@@ -15,7 +15,8 @@ inline std::string_view optimizer_names() {
 }
 inline constexpr Choice<StartSampling> kSamplings[] = {{"latin_hypercube", StartSampling::latin_hypercube},
                                                        {"sobol", StartSampling::sobol}};
-inline constexpr Choice<bool> kTimings[] = {{"prescribed", false}, {"free", true}};
+inline constexpr Choice<Timing> kTimings[] = {
+    {"prescribed", Timing::prescribed}, {"free", Timing::free}, {"ordered", Timing::ordered}};
 inline constexpr Choice<bool> kBranches[] = {{"guess", false}, {"all", true}};
 inline constexpr Choice<bool> kUntil[] = {{"all_starts", false}, {"all_found", true}};
 inline constexpr Choice<bool> kRoles[] = {{"fit", false}, {"validate", true}};
@@ -40,8 +41,10 @@ void describe(auto& v, Like<TrackTerm> auto& t) {
   v.reference("sensor", t.sensor, To::sensor, {"what is to follow the data", Need::required});
   describe_samples(v, t, "file");
   v.number("weight", t.weight, {"of each square"});
-  v.choice("timing", t.free_timing, kTimings,
-           {"prescribed: at the times of the rows; free: each row where the driven motion is nearest to it"});
+  v.choice(
+      "timing", t.timing, kTimings,
+      {"prescribed: at the times of the rows; free: each row where the driven motion is nearest to it; ordered: free, "
+       "but one row after another"});
 }
 
 void describe(auto& v, Like<EigenvalueSpec> auto& e) {

@@ -20,7 +20,7 @@ constexpr double kPi = std::numbers::pi;
 
 TrackTerm term(const std::string& sensor, const std::vector<double>& values, const std::string& file = "points.csv") {
   TrackTerm t;
-  t.sensor = sensor, t.file = file, t.free_timing = true;
+  t.sensor = sensor, t.file = file, t.timing = Timing::free;
   std::vector<double> rows(values.size());
   for (std::size_t k = 0; k < rows.size(); ++k) rows[k] = static_cast<double>(k);
   t.curve = std::make_shared<const Curve>(Interpolation::linear, rows, values);
@@ -99,7 +99,8 @@ TEST_CASE("each point takes the lowest of its minima along the curve", "[objecti
   const Problem problem = crank(1, {x, x}, {y, y});
   const Objective objective = objectives_of(problem).front();
   const Mechanism mechanism(problem.scene, parameter_values(problem.scene));
-  for (const double t : objective.times_of(objective.samples(), mechanism)) CHECK(t == Approx(0.7).epsilon(1e-12));
+  for (const auto& instant : objective.instants_of(objective.samples(), mechanism))
+    CHECK(instant.time == Approx(0.7).epsilon(1e-12));
 }
 
 TEST_CASE("residuals of free timing: the gradient is that of the sum, the instant is projected out", "[objective]") {
@@ -128,6 +129,57 @@ TEST_CASE("residuals of free timing: the gradient is that of the sum, the instan
   CHECK((2 * point.z_x.transpose() * point.z - nlp.f_x).norm() < 1e-9 * nlp.f_x.norm());
   // With r the tip moves along the radius: nothing of it is projected out at the three points, w = 3.
   CHECK(point.z_x.col(0).norm() == Approx(scaling.rho_x(x)(0) * std::sqrt(3 * 3.0)).epsilon(1e-9));
+}
+
+namespace {
+
+// The instants of x, one per row.
+std::vector<double> met_at(const Problem& problem) {
+  const Objective objective = objectives_of(problem).front();
+  const Mechanism mechanism(problem.scene, parameter_values(problem.scene));
+  std::vector<double> times;
+  for (const auto& instant : objective.instants_of(objective.samples(), mechanism)) times.push_back(instant.time);
+  times.resize(problem.objectives[0].track[0].curve->x().size());
+  return times;
+}
+
+Problem points_in_order(double end_time, const std::vector<double>& turns, double radius = 2.1) {
+  std::vector<double> x, y;
+  for (const double turn : turns)
+    x.push_back(0.5 + radius * std::cos(2 * kPi * turn)), y.push_back(radius * std::sin(2 * kPi * turn));
+  Problem problem = crank(end_time, x, y);
+  for (TrackTerm& t : problem.objectives[0].track) t.timing = Timing::ordered;
+  return problem;
+}
+
+void check_exact_gradients(const Problem& problem) {
+  const Evaluation tlm = evaluated(problem, GradientMethod::tlm), adjoint = evaluated(problem, GradientMethod::adjoint),
+                   differences = evaluated(problem, GradientMethod::differences);
+  CHECK((tlm.psi_rho - adjoint.psi_rho).norm() < 1e-12 * tlm.psi_rho.norm());
+  CHECK((tlm.psi_rho - differences.psi_rho).norm() < 1e-7 * tlm.psi_rho.norm());
+}
+
+}  // namespace
+
+TEST_CASE("ordered points that stand in order are met as free ones", "[objective]") {
+  const std::vector<double> turns{0.1, 0.3, 0.4, 0.9};
+  const std::vector<double> found = met_at(points_in_order(1, turns));
+  for (std::size_t k = 0; k < turns.size(); ++k) CHECK(found[k] == Approx(turns[k]).epsilon(1e-10));
+  // A circle may begin with any of them.
+  const std::vector<double> turned{0.4, 0.9, 0.1, 0.3}, round = met_at(points_in_order(1, turned));
+  for (std::size_t k = 0; k < turned.size(); ++k) CHECK(round[k] == Approx(turned[k]).epsilon(1e-10));
+}
+
+TEST_CASE("ordered points in the other order share an instant, with exact gradients", "[objective]") {
+  // On an open path the second and third row change places: both are met half way.
+  const Problem problem = points_in_order(0.9, {0.1, 0.4, 0.3, 0.6});
+  const std::vector<double> found = met_at(problem);
+  CHECK(found[0] == Approx(0.1).epsilon(1e-10));
+  CHECK(found[1] == Approx(0.35).epsilon(1e-10));
+  CHECK(found[2] == found[1]);
+  CHECK(found[3] == Approx(0.6).epsilon(1e-10));
+  check_exact_gradients(problem);
+  check_exact_gradients(points_in_order(1, {0.05, 0.3, 0.25, 0.2, 0.8, 0.7}, 1.5));
 }
 
 TEST_CASE("hundreds of points of free timing are met at once", "[objective]") {
