@@ -203,8 +203,9 @@ int design_command(const CommandContext& context) {
   if (!before.simulation.ok()) {
     interrupted() ? run.stopped("nothing was designed yet")
                   : run.failed(before.simulation.message, before.simulation.last_good_time);
-    run.write("report.html", simulation_report(scene, run.result, before.trajectory,
-                                               {.targets = prescribed_points(run.problem), .forces = before.forces}));
+    run.write("report.html",
+              simulation_report(scene, run.result, before.trajectory,
+                                {.targets = prescribed_points(run.problem, before.instants), .forces = before.forces}));
     return run.finish();
   }
   run.result["model"] = to_json(before.model);
@@ -241,7 +242,7 @@ int design_command(const CommandContext& context) {
   run.write("report.html",
             design_report(scene, design.rho, run.result, history, {before.trajectory, before.forces, before.running},
                           {after.trajectory, after.forces, after.running}, sensor_limits(run.problem),
-                          running_terms(run.problem), prescribed_points(run.problem)));
+                          running_terms(run.problem), prescribed_points(run.problem, after.instants)));
   return long_run.finish();
 }
 

@@ -70,8 +70,9 @@ int simulate_command(const CommandContext& context) {
   } else {
     run.failed(simulation.message, simulation.last_good_time);
   }
-  run.write("report.html", simulation_report(scene, run.result, motion.trajectory,
-                                             {.targets = prescribed_points(run.problem), .forces = motion.forces}));
+  run.write("report.html",
+            simulation_report(scene, run.result, motion.trajectory,
+                              {.targets = prescribed_points(run.problem, motion.instants), .forces = motion.forces}));
   return run.finish();
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "app/json/read_problem.hpp"
+#include "app/report/point_targets.hpp"
 #include "app/starts/point_records.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "optim/design/design.hpp"
@@ -149,6 +150,20 @@ TEST_CASE("the instants of free timing are stored; a motion that ends is shown u
   CHECK(ends.exit_code == kNumericalFailure);
   CHECK_THAT(ends.err, Contains("the positions cannot be continued beyond"));
   CHECK(std::filesystem::exists(folder.path / "ends/trajectory.csv"));
+}
+
+TEST_CASE("a report shows points of free timing at their instants", "[synthesis]") {
+  const Problem problem = synthesis("nine_points");
+  std::vector<double> backwards;
+  for (int k = 0; k < 9; ++k) backwards.push_back(0.9 - 0.1 * k);
+  const std::vector<PointTarget> targets = prescribed_points(problem, {backwards});
+  REQUIRE(targets.size() == 1);
+  const std::vector<double>& x = problem.objectives[0].track[0].curve->y();
+  for (std::size_t k = 0; k < 9; ++k) {
+    CHECK(targets[0].t[k] == backwards[8 - k]);
+    CHECK(targets[0].place[0][k] == x[8 - k]);
+  }
+  CHECK(prescribed_points(problem).empty());
 }
 
 TEST_CASE("five poses, free timing: the known linkage is recovered", "[synthesis]") {
