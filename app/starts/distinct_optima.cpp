@@ -4,8 +4,6 @@
 #include <cmath>
 #include <string>
 
-#include "app/starts/multistart.hpp"
-
 namespace mbsopt {
 namespace {
 

@@ -17,6 +17,8 @@
 
 namespace mbsopt {
 
+inline constexpr double kFeasible = 1e-6;  // violation relative to the bounds: what ranks as feasible
+
 // The same within 1e-3 of the range of each parameter that has bounds.
 bool same_optimum(const Json& a, const Json& b, const Scene& scene);
 

@@ -16,7 +16,7 @@ namespace mbsopt {
 namespace {
 
 constexpr std::size_t kPrinted = 20;
-// Starts between two looks at whether all optima are found: their number is that of no machine's workers.
+// So many starts end between two looks at whether all optima are found. The number does not depend on the machine.
 constexpr int kBatch = 20;
 
 bool has_objective(const Json& record) { return record.contains("objective") && record["objective"].is_number(); }

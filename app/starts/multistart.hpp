@@ -19,8 +19,6 @@
 
 namespace mbsopt {
 
-inline constexpr double kFeasible = 1e-6;  // violation relative to the bounds: what ranks as feasible
-
 struct MultistartOutcome {
   std::vector<Json> ranked;  // best first; what failed last
   bool interrupted = false;
