@@ -104,8 +104,15 @@ void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
     checker.issue(checker.path("sharpness"),
                   "is given without maximum_of, minimum_of or peak_to_peak_of, which it belongs to");
   const SimulationSettings& simulation = checker.facts().scene().simulation;
-  for (std::size_t i = 0; i < objective.track.size(); ++i)
-    check_track(checker, objective.track[i], child_path(checker.path("track"), i));
+  for (std::size_t i = 0; i < objective.track.size(); ++i) {
+    const TrackTerm& term = objective.track[i];
+    const std::string place = child_path(checker.path("track"), i);
+    check_track(checker, term, place);
+    const auto first = std::ranges::find(objective.track, term.file, &TrackTerm::file);
+    if (first->timing != term.timing)
+      checker.issue(place + ".timing",
+                    "is not that of the first term of its file; the terms of a file share the instants of its rows");
+  }
   for (std::size_t i = 0; i < objective.samples.size(); ++i) {
     const double time = objective.samples[i].time;
     if (time < simulation.start_time || time > simulation.end_time)

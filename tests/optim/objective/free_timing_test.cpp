@@ -198,6 +198,9 @@ TEST_CASE("free timing needs positions and drives, and no Gauss-Newton", "[objec
   problem.scene.drives.clear();
   CHECK_THAT(issues_in_words(problem), Contains("there are no drives"));
   problem = crank(1, {3.0, 1.0}, {1.0, 2.0});
+  problem.objectives[0].track[1].timing = Timing::ordered;
+  CHECK_THAT(issues_in_words(problem), Contains("track[1].timing: is not that of the first term of its file"));
+  problem = crank(1, {3.0, 1.0}, {1.0, 2.0});
   Evaluator evaluator(problem.scene, objectives_of(problem));
   const Evaluation e = evaluator.gradients(evaluator.start());
   CHECK_THROWS_WITH(gauss_newton(evaluator, e), Contains("free timing"));
