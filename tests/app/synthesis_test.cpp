@@ -138,8 +138,8 @@ TEST_CASE("the instants of free timing are stored; a motion that ends is shown u
   REQUIRE(known.exit_code == kDone);
   const nlohmann::json path = json_of(folder.path / "known/result.json")["objectives"]["path"];
   REQUIRE(path["instants"].size() == 9);
-  for (int k = 0; k < 9; ++k)
-    CHECK(path["instants"][k].get<double>() == Approx(0.3 / (2 * kPi) + 0.1 * k).epsilon(1e-9));
+  for (std::size_t k = 0; k < 9; ++k)
+    CHECK(path["instants"][k].get<double>() == Approx(0.3 / (2 * kPi) + 0.1 * static_cast<double>(k)).epsilon(1e-9));
 
   const std::string term = "\"file\": \"../../data/synthesis/eighteen_points.csv\", \"timing\": \"free\"}";
   const CommandOutcome ends =
