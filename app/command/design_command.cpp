@@ -203,8 +203,9 @@ int design_command(const CommandContext& context) {
   if (!before.simulation.ok()) {
     interrupted() ? run.stopped("nothing was designed yet")
                   : run.failed(before.simulation.message, before.simulation.last_good_time);
-    run.write("report.html", simulation_report(scene, run.result, before.trajectory,
-                                               {.targets = prescribed_points(run.problem), .forces = before.forces}));
+    run.write("report.html",
+              simulation_report(scene, run.result, before.trajectory,
+                                {.targets = prescribed_points(run.problem, before.instants), .forces = before.forces}));
     return run.finish();
   }
   run.result["model"] = to_json(before.model);
@@ -214,9 +215,9 @@ int design_command(const CommandContext& context) {
   const auto [design, cut_off] = minimised(run, long_run, before.psi);
   add_to_result(run.result, design);
   const std::optional<MultistartSpec>& starts = run.problem.design->multistart;
-  print_design(context.out, design,
-               starts ? effort(run, starts, design.simulations, design.wall_seconds)
-                      : fmt::format("{:.3g} s", design.wall_seconds));
+  print_design(
+      context.out, design,
+      starts ? effort(run, design.simulations, design.wall_seconds) : fmt::format("{:.3g} s", design.wall_seconds));
   for (const std::string& warning : design.warnings) run.warn(warning);
   for (const std::string& warning : design.final_evaluation.warnings) run.warn(warning);
   warn_of_stiffness(run, design.final_evaluation.statistics, true);
@@ -228,6 +229,11 @@ int design_command(const CommandContext& context) {
   } else if (!design.ok()) {
     run.failed(design.message);
   }
+  for (std::size_t i = 0; i < after.instants.size(); ++i) {
+    const std::string& name = run.problem.objectives[i].name;
+    if (!after.instants[i].empty() && run.result["objectives"].contains(name))
+      run.result["objectives"][name]["instants"] = after.instants[i];
+  }
   const Trajectory history = history_of(design);
   run.write("optimized.json",
             optimized_problem_text(run, new_values(design), design.mode ? design.mode->bodies : std::vector<Body>{}));
@@ -236,7 +242,7 @@ int design_command(const CommandContext& context) {
   run.write("report.html",
             design_report(scene, design.rho, run.result, history, {before.trajectory, before.forces, before.running},
                           {after.trajectory, after.forces, after.running}, sensor_limits(run.problem),
-                          running_terms(run.problem), prescribed_points(run.problem)));
+                          running_terms(run.problem), prescribed_points(run.problem, after.instants)));
   return long_run.finish();
 }
 

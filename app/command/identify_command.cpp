@@ -360,7 +360,7 @@ int identify_command(const CommandContext& context) {
                                        : fitted(run, long_run, cut.problem, data, cut.problem);
   fit.simulations += best.simulations, fit.wall_seconds += best.wall_seconds;
   add_to_result(run.result, fit);
-  print_fit(context.out, fit, effort(run, starts, fit.simulations, fit.wall_seconds));
+  print_fit(context.out, fit, effort(run, fit.simulations, fit.wall_seconds));
   for (const std::string& warning : fit.warnings) run.warn(warning);
   const Trajectory history = history_of(fit);
   run.write("optimized.json", optimized_problem_text(run, new_values(fit)));

@@ -29,6 +29,8 @@ void add_objectives(Run& run, const SimulatedMotion& motion) {
     const std::string& name = run.problem.objectives[static_cast<std::size_t>(i)].name;
     const std::optional<double>& true_value = motion.true_values[static_cast<std::size_t>(i)];
     run.result["objectives"][name] = objective_json(psi(i), true_value);
+    if (const std::vector<double>& instants = motion.instants[static_cast<std::size_t>(i)]; !instants.empty())
+      run.result["objectives"][name]["instants"] = instants;
     std::vector<std::string> row{name, significant(psi(i), 10)};
     if (any_smooth) row.push_back(true_value ? significant(*true_value, 10) : "");
     table.add(row);
@@ -68,8 +70,9 @@ int simulate_command(const CommandContext& context) {
   } else {
     run.failed(simulation.message, simulation.last_good_time);
   }
-  run.write("report.html", simulation_report(scene, run.result, motion.trajectory,
-                                             {.targets = prescribed_points(run.problem), .forces = motion.forces}));
+  run.write("report.html",
+            simulation_report(scene, run.result, motion.trajectory,
+                              {.targets = prescribed_points(run.problem, motion.instants), .forces = motion.forces}));
   return run.finish();
 }
 

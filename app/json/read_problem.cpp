@@ -57,14 +57,15 @@ class SampleReader {
   SampleReader(std::filesystem::path folder, const Node& root, Findings& findings, std::vector<std::string>& read)
       : folder_(std::move(folder)), root_(root), findings_(findings), read_(read) {}
 
-  // key: of the file; missing: whether cells may be empty.
-  void read(SampleColumn& samples, Interpolation how, const std::string& path, const char* key, bool missing = false) {
+  // key: of the file; missing: whether cells may be empty; by_row: over the number of the row, not over time.
+  void read(SampleColumn& samples, Interpolation how, const std::string& path, const char* key, bool missing = false,
+            bool by_row = false) {
     if (findings_.concerns(path)) return;
     try {
       samples.file = (folder_ / samples.file).lexically_normal().string();
       auto table = tables_.find(samples.file);
       if (table == tables_.end()) table = tables_.emplace(samples.file, read_csv(samples.file)).first;
-      read_curve(samples, how, missing, table->second, read_);
+      read_curve(samples, how, missing, by_row, table->second, read_);
     } catch (const CsvError& error) {
       findings_.add(nearest(root_, path + key), path + key, error.what());
     }
@@ -105,7 +106,8 @@ void read_samples(Problem& problem, const std::filesystem::path& folder, const N
   for (ObjectiveSpec& objective : problem.objectives)
     for (std::size_t k = 0; k < objective.track.size(); ++k) {
       const std::string list = child_path("objectives", objective.name) + ".track";
-      reader.read(objective.track[k], Interpolation::linear, child_path(list, k), ".file", true);
+      TrackTerm& term = objective.track[k];
+      reader.read(term, Interpolation::linear, child_path(list, k), ".file", true, term.timing != Timing::prescribed);
     }
   if (!problem.identification) return;
   std::vector<ExperimentSpec>& experiments = problem.identification->experiments;

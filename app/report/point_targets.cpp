@@ -1,7 +1,12 @@
 #include "app/report/point_targets.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
 #include <string_view>
+#include <tuple>
+#include <utility>
 
 namespace mbsopt {
 namespace {
@@ -37,18 +42,26 @@ std::vector<PointTarget> point_targets(const Scene& scene, const std::vector<Sen
   return targets;
 }
 
-std::vector<PointTarget> prescribed_points(const Problem& problem) {
+std::vector<PointTarget> prescribed_points(const Problem& problem, const std::vector<std::vector<double>>& instants) {
   const SimulationSettings& settings = problem.scene.simulation;
   std::vector<SensorValues> values;
-  for (const ObjectiveSpec& objective : problem.objectives) {
-    for (const TrackTerm& term : objective.track) {
+  for (std::size_t i = 0; i < problem.objectives.size(); ++i) {
+    std::map<std::tuple<std::string, bool, double>, std::size_t> points;  // as FreeInstants numbers them
+    for (const TrackTerm& term : problem.objectives[i].track) {
       if (!term.curve) continue;
-      SensorValues& v = values.emplace_back(SensorValues{term.sensor, {}, {}});
+      std::vector<std::pair<double, double>> rows;  // time, value
       for (std::size_t k = 0; k < term.curve->x().size(); ++k) {
-        const double t = term.curve->x()[k];
-        if (t < settings.start_time || t > settings.end_time) continue;
-        v.t.push_back(t), v.value.push_back(term.curve->y()[k]);
+        double t = term.curve->x()[k];
+        if (term.timing != Timing::prescribed) {
+          const std::tuple key(term.file, term.timing == Timing::ordered, t);
+          const std::size_t point = points.emplace(key, points.size()).first->second;
+          t = i < instants.size() && point < instants[i].size() ? instants[i][point] : INFINITY;
+        }
+        if (t >= settings.start_time && t <= settings.end_time) rows.emplace_back(t, term.curve->y()[k]);
       }
+      std::ranges::stable_sort(rows, {}, &std::pair<double, double>::first);
+      SensorValues& v = values.emplace_back(SensorValues{term.sensor, {}, {}});
+      for (const auto& [t, value] : rows) v.t.push_back(t), v.value.push_back(value);
     }
   }
   return point_targets(problem.scene, values, false);

@@ -31,7 +31,9 @@ struct SensorValues {
 // target. A target keeps at most 200 times.
 std::vector<PointTarget> point_targets(const Scene& scene, const std::vector<SensorValues>& values, bool measured);
 
-// From all terms `track` of the problem, within the time that is simulated.
-std::vector<PointTarget> prescribed_points(const Problem& problem);
+// From all terms `track` of the problem, within the time that is simulated. instants: per objective, of its points
+// without prescribed timing (SimulatedMotion); where there are none, such points are left out.
+std::vector<PointTarget> prescribed_points(const Problem& problem,
+                                           const std::vector<std::vector<double>>& instants = {});
 
 }  // namespace mbsopt

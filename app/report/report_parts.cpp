@@ -213,7 +213,7 @@ void add_multistart(HtmlPage& page, const Json& result) {
   const Json& multistart = result.at("multistart");
   page.heading("Starts");
   page.paragraph(fmt::format("{}, seed {}; {} at the best optimum.",
-                             counted(multistart.at("starts").get<long>(), "start"), multistart.at("seed").get<long>(),
+                             counted(multistart.at("finished").get<long>(), "start"), multistart.at("seed").get<long>(),
                              multistart.at("at_the_best_optimum").get<long>()));
   LinePlot plot{.title = "Waterfall", .x_label = "rank", .y_label = "objective [its unit]", .whole_x = true};
   PlotSeries& series = plot.series.emplace_back(PlotSeries{"objective", {}, {}, Mark::points});
@@ -234,6 +234,12 @@ void add_multistart(HtmlPage& page, const Json& result) {
   const LinePlot ends = parallel_coordinates(multistart, result.value("parameters", Json::object()));
   if (ends.series.size() > 1 && ends.x_names.size() > 1) page.plot(ends);
   page.table({"start", "objective", "infeasibility", "optimality", "outcome"}, rows);
+  if (multistart.at("optima").empty()) return;
+  std::vector<TableRow> optima;
+  for (const Json& optimum : multistart.at("optima"))
+    optima.push_back({cell(optimum.at("start")), cell(optimum.at("found_by")), number_cell(optimum.at("objective"))});
+  page.paragraph(fmt::format("Distinct optima: {}.", optima.size()));
+  page.table({"best start", "starts that ended there", "objective"}, optima);
 }
 
 void add_motion(HtmlPage& page, std::array<int, 2> plane, const std::vector<MovingState>& states,

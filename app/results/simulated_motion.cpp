@@ -16,8 +16,19 @@ namespace {
 std::vector<std::shared_ptr<const PointCost>> running_terms(const std::vector<Objective>& objectives,
                                                             const Mechanism& mechanism) {
   std::vector<std::shared_ptr<const PointCost>> terms;
-  for (const Objective& o : objectives) terms.push_back(o.mean() ? o.expression(mechanism) : o.cost(mechanism).running);
+  for (const Objective& o : objectives) terms.push_back(o.expression(mechanism));
   return terms;
+}
+
+std::vector<std::vector<double>> instants_of(const std::vector<Objective>& objectives, const Mechanism& mechanism,
+                                             const std::function<bool(double t)>& progress) {
+  std::vector<std::vector<double>> instants(objectives.size());
+  for (std::size_t i = 0; i < objectives.size(); ++i) {
+    if (!objectives[i].free_instants()) continue;
+    for (const FreeInstants::Instant& instant : objectives[i].free_instants()->nearest(mechanism, progress))
+      instants[i].push_back(instant.tau);
+  }
+  return instants;
 }
 
 }  // namespace
@@ -49,7 +60,7 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
   for (const Objective& objective : objectives) all.push_back(&objective);
   RunOptions options;
   options.progress = run.watched("simulating");
-  motion.simulation = ObjectiveRun(all, mechanism, settings, options.progress).run([&](std::span<const Cost> costs) {
+  const ObjectiveRun::Sweep recorded = [&](std::span<const Cost> costs) {
     motion.trajectory = {};
     Sampling sampling = record_trajectory(mechanism, scene, motion.trajectory);
     JointForces forces(scene, rho, sampling.times.size());
@@ -63,7 +74,14 @@ SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho) {
     const SimulationResult result = simulate(mechanism, settings, costs, sampling, options);
     motion.forces = forces.table();
     return result;
-  });
+  };
+  try {
+    motion.simulation = ObjectiveRun(all, mechanism, settings, options.progress).run(recorded);
+    motion.instants = instants_of(objectives, mechanism, options.progress);
+  } catch (const NoMotion&) {  // the simulation ends there, too
+    motion.simulation = recorded({});
+    if (motion.simulation.ok()) throw;
+  }
   if (motion.simulation.ok()) {
     motion.true_values = true_extremes(all, mechanism, settings, motion.simulation.steps, options.progress);
     if (interrupted()) motion.simulation.status = SimulationStatus::stopped;

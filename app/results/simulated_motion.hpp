@@ -14,6 +14,7 @@ struct SimulatedMotion {
   ModelSummary model;                              // where the assembly is ok
   std::vector<std::string> warnings;               // of the start
   Trajectory forces = {};                          // of joints (joint_forces.hpp)
+  std::vector<std::vector<double>> instants = {};  // per objective, of its tracked points without prescribed timing [s]
   Trajectory running = {};  // t, then per objective what it integrates or takes the mean or extreme of; NaN: nothing
 };
 

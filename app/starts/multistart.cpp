@@ -7,6 +7,7 @@
 #include <set>
 #include <tuple>
 
+#include "app/starts/distinct_optima.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
@@ -14,9 +15,9 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kFeasible = 1e-6;     // relative to the bounds
-constexpr double kSameOptimum = 1e-3;  // of the range of a parameter
 constexpr std::size_t kPrinted = 20;
+// So many starts end between two looks at whether all optima are found. The number does not depend on the machine.
+constexpr int kBatch = 20;
 
 bool has_objective(const Json& record) { return record.contains("objective") && record["objective"].is_number(); }
 
@@ -33,18 +34,6 @@ std::tuple<int, double, double, int> rank(const Json& record) {
 Json record_of(const JobReply& reply) {
   if (reply.ok) return Json::parse(reply.text);
   return {{"start", reply.job}, {"status", "failed"}, {"message", reply.text}, {"objective", nullptr}};
-}
-
-bool same_optimum(const Json& a, const Json& b, const Scene& scene) {
-  for (const auto& [name, value] : a["parameters"].items()) {
-    if (!b["parameters"].contains(name)) return false;
-    const auto parameter = std::find_if(scene.parameters.begin(), scene.parameters.end(),
-                                        [&, key = name](const Parameter& p) { return p.name == key; });
-    if (parameter == scene.parameters.end() || !parameter->lower || !parameter->upper) continue;
-    const double range = *parameter->upper - *parameter->lower;
-    if (std::abs(value.get<double>() - b["parameters"][name].get<double>()) > kSameOptimum * range) return false;
-  }
-  return true;
 }
 
 std::string text_of(const Json& record, const char* key) {
@@ -72,6 +61,35 @@ void print_waterfall(std::ostream& out, const std::vector<Json>& ranked) {
   if (ranked.size() > kPrinted) out << fmt::format("... and {} more, in result.json\n", ranked.size() - kPrinted);
 }
 
+void describe(const std::vector<DistinctOptimum>& optima, const SearchedOptima& found, bool all_found, Json& result) {
+  Json list = Json::array();
+  for (const DistinctOptimum& o : optima) {
+    Json& entry = list.emplace_back(Json{{"start", number_of(*o.best)}, {"found_by", o.starts}});
+    for (const char* key : {"objective", "infeasibility", "assembly_mode", "parameters"})
+      if (o.best->contains(key)) entry[key] = (*o.best)[key];
+  }
+  result["optima"] = std::move(list);
+  result["expected_optima"] = found.expected() ? Json(*found.expected()) : Json();
+  result["covered"] = found.covered();
+  result["all_found"] = all_found;
+}
+
+void print(const std::vector<DistinctOptimum>& optima, const SearchedOptima& found, bool all_found, std::ostream& out) {
+  if (optima.empty()) return;
+  TextTable table({"optimum", "found by", "first start", "objective"});
+  for (std::size_t i = 0; i < std::min(kPrinted, optima.size()); ++i)
+    table.add({std::to_string(i + 1), counted(optima[i].starts, "start"), text_of(*optima[i].best, "start"),
+               text_of(*optima[i].best, "objective")});
+  out << '\n' << table.text();
+  if (optima.size() > kPrinted) out << fmt::format("... and {} more, in result.json\n", optima.size() - kPrinted);
+  out << fmt::format("{} in {} that converged", counted(found.optima, "optimum", "optima"),
+                     counted(found.searches, "search", "searches"));
+  if (found.expected())
+    out << fmt::format("; {:.3g} are expected in all, and {:.0f} % of further searches at known ones{}",
+                       *found.expected(), 100 * found.covered(), all_found ? ": the search ends" : "");
+  out << '\n';
+}
+
 Json without_points(const Json& record) {
   Json short_record = Json::object();
   for (const auto& [key, value] : record.items())
@@ -85,11 +103,13 @@ const Json* MultistartOutcome::best() const {
   return !ranked.empty() && has_objective(ranked[0]) ? &ranked[0] : nullptr;
 }
 
-std::string effort(const Run& run, const std::optional<MultistartSpec>& starts, long simulations, double wall_seconds) {
-  return fmt::format("{}, {:.3g} s{}", counted(simulations, "simulation"), wall_seconds,
-                     starts                       ? fmt::format(" in all {}", counted(starts->starts, "start"))
-                     : run.context.options.resume ? " since it was resumed"
-                                                  : "");
+std::string effort(const Run& run, long simulations, double wall_seconds) {
+  std::string of;
+  if (run.result.contains("multistart"))
+    of = fmt::format(" in all {}", counted(run.result["multistart"]["finished"].get<long>(), "start"));
+  else if (run.context.options.resume)
+    of = " since it was resumed";
+  return fmt::format("{}, {:.3g} s{}", counted(simulations, "simulation"), wall_seconds, of);
 }
 
 Json named_values(const std::vector<std::string>& names, const std::vector<double>& values) {
@@ -112,10 +132,6 @@ MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSp
   for (const Json& record : long_run.earlier().starts) {
     if (finished.insert(number_of(record)).second) outcome.ranked.push_back(record);
   }
-  std::vector<int> jobs;
-  for (int start = 0; start < spec.starts; ++start)
-    if (!finished.contains(start)) jobs.push_back(start);
-
   const auto done = [&](const JobReply& reply) {
     const Json record = record_of(reply);
     const std::string status = record["status"];
@@ -127,13 +143,25 @@ MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSp
     run.progress.iteration(fmt::format("start {:3d}   {}   objective {}   {} of {} finished", reply.job, status,
                                        text_of(record, "objective"), outcome.ranked.size(), spec.starts));
   };
-  compute_starts(run, jobs, work, done, [&] {
-    run.progress.stands(fmt::format("{} of {} starts finished", outcome.ranked.size(), spec.starts));
-  });
+  const auto sort = [&] {
+    std::sort(outcome.ranked.begin(), outcome.ranked.end(),
+              [](const Json& a, const Json& b) { return rank(a) < rank(b); });
+  };
+  const int batch = spec.until_all_found ? kBatch : spec.starts;
+  bool all_found = false;
+  for (int first = 0; first < spec.starts && !all_found && !outcome.interrupted; first += batch) {
+    const int last = std::min(first + batch, spec.starts);
+    std::vector<int> jobs;
+    for (int start = first; start < last; ++start)
+      if (!finished.contains(start)) jobs.push_back(start);
+    compute_starts(run, jobs, work, done, [&] {
+      run.progress.stands(fmt::format("{} of {} starts finished", outcome.ranked.size(), spec.starts));
+    });
+    outcome.interrupted = outcome.interrupted || outcome.ranked.size() < static_cast<std::size_t>(last);
+    sort();
+    all_found = spec.until_all_found && searched(distinct_optima(outcome.ranked, run.problem.scene)).all_found();
+  }
   run.progress.finish();
-  outcome.interrupted = outcome.interrupted || outcome.ranked.size() < static_cast<std::size_t>(spec.starts);
-  std::sort(outcome.ranked.begin(), outcome.ranked.end(),
-            [](const Json& a, const Json& b) { return rank(a) < rank(b); });
 
   for (const Json& record : outcome.ranked) {
     outcome.simulations += record.value("simulations", 0L);
@@ -155,8 +183,11 @@ MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSp
   result["at_the_best_optimum"] = same;
   for (const Json& record : outcome.ranked) result["waterfall"].push_back(without_points(record));
   print_waterfall(run.context.out, outcome.ranked);
-  run.context.out << fmt::format("{}, seed {}: {} at the best optimum\n", counted(spec.starts, "start"), *spec.seed,
-                                 same);
+  run.context.out << fmt::format("{}, seed {}: {} at the best optimum\n",
+                                 counted(static_cast<long>(outcome.ranked.size()), "start"), *spec.seed, same);
+  const std::vector<DistinctOptimum> optima = distinct_optima(outcome.ranked, run.problem.scene);
+  describe(optima, searched(optima), all_found, result);
+  print(optima, searched(optima), all_found, run.context.out);
   return outcome;
 }
 

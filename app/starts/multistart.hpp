@@ -31,7 +31,7 @@ struct MultistartOutcome {
 MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSpec& spec, const StartWork& work);
 
 // "412 simulations, 6.9 s in all 20 starts": what the program says of an optimisation's effort.
-std::string effort(const Run& run, const std::optional<MultistartSpec>& starts, long simulations, double wall_seconds);
+std::string effort(const Run& run, long simulations, double wall_seconds);
 
 // Parameter values by name.
 Json named_values(const std::vector<std::string>& names, const std::vector<double>& values);

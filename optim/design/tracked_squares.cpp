@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include "core/mechanism/scene_programs.hpp"
 #include "core/simulate/simulation.hpp"
@@ -21,14 +22,33 @@ constexpr Index kMostNumbers = 50'000;
 constexpr const char* kNoValue =
     "a residual or its derivative is not a number: a tracked weight is negative, or a sensor has no value";
 
-const std::vector<Objective::Sample>& residuals_of(const CaseEvaluator& evaluator, std::size_t load_case) {
-  return evaluator.of_case(load_case).objectives()[0].residuals();
+const Objective& minimised(const CaseEvaluator& evaluator, std::size_t load_case) {
+  return evaluator.of_case(load_case).objectives()[0];
 }
 
 Index residuals(const CaseEvaluator& evaluator) {
   std::size_t count = 0;
-  for (std::size_t c = 0; c < evaluator.cases(); ++c) count += residuals_of(evaluator, c).size();
+  for (std::size_t c = 0; c < evaluator.cases(); ++c) count += minimised(evaluator, c).residuals().size();
   return static_cast<Index>(count);
+}
+
+// Takes out of the rows of each block of points what its instant can change: z_x -= z_t (z_t' z_x)/(z_t' z_t). L.
+// Kaufman, "A variable projection method for solving separable nonlinear least squares problems", BIT 15 (1975) 49-57.
+void project_free_instants(const Objective& objective, const std::vector<Objective::Instant>& instants, Index first,
+                           const VectorXd& z_t, Eigen::MatrixXd& z_x) {
+  std::map<std::size_t, std::vector<Index>> rows_of_block;
+  for (std::size_t i = 0; i < instants.size(); ++i)
+    if (instants[i].block && objective.free_instants()->is_inside(instants[i].time))
+      rows_of_block[*instants[i].block].push_back(static_cast<Index>(i));
+  for (const auto& [block, rows] : rows_of_block) {
+    const VectorXd along = z_t(rows);
+    const double square = along.squaredNorm();
+    if (square == 0) continue;  // a dwell
+    std::vector<Index> in_all = rows;
+    for (Index& row : in_all) row += first;
+    const Eigen::RowVectorXd moved = along.transpose() * z_x(in_all, Eigen::all) / square;
+    z_x(in_all, Eigen::all) -= along * moved;
+  }
 }
 
 }  // namespace
@@ -70,24 +90,31 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
   Index first = 0;
   for (std::size_t c = 0; c < evaluator_.cases(); ++c) {
     const Evaluator& evaluator = evaluator_.of_case(c);
-    const std::vector<Objective::Sample>& rows = residuals_of(evaluator_, c);
+    const Objective& objective = minimised(evaluator_, c);
+    const std::vector<Objective::Sample>& rows = objective.residuals();
     std::vector<bool> active(evaluator.scene().parameters.size(), false);
     for (const int k : evaluator.variables()) active[static_cast<std::size_t>(k)] = true;
     const Mechanism mechanism(evaluator.scene(), rho, active, evaluator.options().user_forces, evaluator.programs());
+    const std::vector<Objective::Instant> instants = objective.instants_of(rows, mechanism, go_on);
+    std::vector<std::size_t> order(rows.size());  // of the rows in time
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return instants[i].time; });
     std::map<const void*, std::shared_ptr<const PointCost>> bound;  // rows of a file share an expression
     TangentSampling sampling;
     std::vector<const PointCost*> costs;
-    for (const Objective::Sample& row : rows) {
-      std::shared_ptr<const PointCost>& cost = bound[row.value.id()];
-      if (!cost) cost = row.value.bind(mechanism);
-      costs.push_back(cost.get()), sampling.times.push_back(row.time);
+    for (const std::size_t i : order) {
+      std::shared_ptr<const PointCost>& cost = bound[rows[i].value.id()];
+      if (!cost) cost = rows[i].value.bind(mechanism);
+      costs.push_back(cost.get()), sampling.times.push_back(instants[i].time);
     }
     const double weight = std::sqrt(weights(static_cast<Index>(c)));
-    VectorXd y_bar(mechanism.states()), rho_bar(rho.size());
+    const Index half = mechanism.states() / 2;
+    VectorXd y_bar(mechanism.states()), rho_bar(rho.size()), z_t(static_cast<Index>(rows.size()));
     sampling.observe = [&](std::size_t k, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
       y_bar.setZero(), rho_bar.setZero();
-      const Index row = first + static_cast<Index>(k);
+      const Index row = first + static_cast<Index>(order[k]);
       point.z(row) = weight * costs[k]->add_gradient(at, 1, y_bar, rho_bar);
+      z_t(row - first) = weight * y_bar.head(half).dot(at.y.tail(half));
       for (Index j = 0; j < x.size(); ++j) {
         const int parameter = evaluator.variables()[static_cast<std::size_t>(j)];
         point.z_x(row, j) = weight * rho_x(j) * (y_bar.dot(y_rho.col(parameter)) + rho_bar(parameter));
@@ -99,6 +126,7 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
       point.ok = false, point.message = run.message;
       return;
     }
+    project_free_instants(objective, instants, first, z_t, point.z_x);
     first += static_cast<Index>(rows.size());
   }
 }

@@ -100,6 +100,10 @@ std::optional<DesignIssue> curvature_issue(const Problem& problem) {
   if (!problem.design || problem.design->optimizer.hessian != "gauss_newton") return std::nullopt;
   const std::string& name = problem.design->minimize;
   const Objective objective = objectives_of(problem, {name}).front();
+  if (objective.free_instants())
+    return DesignIssue{"design.optimizer.hessian", "is 'gauss_newton', but '" + name +
+                                                       "' tracks points of free timing; take the optimizer "
+                                                       "'least_squares', or 'lbfgs' or 'exact'"};
   if (!objective.is_linear() && !objective.is_eigenvalue()) return std::nullopt;
   return DesignIssue{"design.optimizer.hessian",
                      "is 'gauss_newton', but '" + name +

@@ -140,6 +140,9 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
     } catch (const SceneError& error) {  // a field that this rho drives out of its range
       e.ok = false, e.message = error.what();
       return e;
+    } catch (const NoMotion& error) {
+      e.ok = false, e.message = error.what();
+      return e;
     }
     e.statistics = result.statistics;
     if (!frozen) e.warnings = simulation_warnings(scene_, result.statistics, result.ok());

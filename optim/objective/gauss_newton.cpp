@@ -94,6 +94,9 @@ GaussNewton gauss_newton(const Evaluator& evaluator, const Evaluation& at) {
     if (objective.is_written_in_cpp())
       throw std::invalid_argument("the objective '" + objective.name() +
                                   "' is written in C++ and says nothing of second derivatives");
+    if (objective.free_instants())
+      throw std::invalid_argument("the objective '" + objective.name() +
+                                  "' tracks points of free timing, which Gauss-Newton Hessians do not know");
     simulated = simulated || objective.needs_simulation();
     std::vector<Gathered>& parts = gathered.emplace_back();
     for (const ObjectivePart& part : objective.parts())

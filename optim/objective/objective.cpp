@@ -98,15 +98,52 @@ Objective::Objective(const Scene& scene, const ObjectiveSpec& spec) : name_(spec
 // sum over rows k of weight (sensor(t_k) - column_k)^2
 void Objective::follow(const TrackTerm& term, const Scene& scene, const std::string& place) {
   if (!term.curve) throw std::invalid_argument(place + ": has no samples: nothing has read its file");
-  const Expression off = Expression::parse(term.sensor) - expression_of(term, "column");
-  const CostExpression square =
-      at_place(place + ".weight", [&] { return CostExpression(term.weight * (off * off), scene); });
+  const Expression sensor = Expression::parse(term.sensor);
   const Expression root = term.weight.is_number() ? Expression(std::sqrt(term.weight.number()))
                                                   : Expression::parse("sqrt(" + term.weight.text() + ")");
-  const CostExpression residual = at_place(place + ".weight", [&] { return CostExpression(root * off, scene); });
+  const auto compile = [&](const Expression& expression) {
+    return at_place(place + ".weight", [&] { return CostExpression(expression, scene); });
+  };
   const double t0 = scene.simulation.start_time, t1 = scene.simulation.end_time;
-  for (const double t : term.curve->x())
-    if (t >= t0 && t <= t1) samples_.push_back({t, square}), residuals_.push_back({t, residual});
+  if (term.timing == Timing::prescribed) {
+    const Expression off = sensor - expression_of(term, "column");
+    const CostExpression square = compile(term.weight * (off * off)), residual = compile(root * off);
+    for (const double t : term.curve->x())
+      if (t >= t0 && t <= t1) samples_.push_back({t, square}), residuals_.push_back({t, residual});
+    return;
+  }
+  if (!free_instants_) free_instants_.emplace(scene.simulation);
+  const std::size_t channel = free_instants_->channel(compile(sensor), compile(term.weight));
+  for (std::size_t k = 0; k < term.curve->x().size(); ++k) {
+    const double target = term.curve->y()[k];
+    const std::size_t point =
+        free_instants_->point(term.file, term.timing == Timing::ordered, static_cast<std::size_t>(term.curve->x()[k]));
+    free_instants_->add(point, channel, target);
+    const Expression off = sensor - Expression(target);
+    samples_.push_back({t0, compile(term.weight * (off * off)), point});
+    residuals_.push_back({t0, compile(root * off), point});
+  }
+}
+
+std::vector<Objective::Instant> Objective::instants_of(const std::vector<Sample>& samples, const Mechanism& mechanism,
+                                                       const Progress& progress) const {
+  std::vector<FreeInstants::Instant> free;
+  try {
+    if (free_instants_) free = free_instants_->nearest(mechanism, progress);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(
+        fmt::format("objectives.{}.track: timing that is not prescribed needs a motion that the "
+                    "drives determine ({})",
+                    name_, error.what()));
+  }
+  std::vector<Instant> instants;
+  for (const Sample& sample : samples) {
+    if (sample.point)
+      instants.push_back({free[*sample.point].tau, free[*sample.point].block});
+    else
+      instants.push_back({sample.time, {}});
+  }
+  return instants;
 }
 
 Objective::Objective(std::string name, std::shared_ptr<const RunningCost> running,
@@ -138,7 +175,7 @@ std::vector<ObjectivePart> Objective::parts() const {
   return {{}};
 }
 
-Cost Objective::cost(const Mechanism& mechanism, const ObjectivePart& part, double x0) const {
+Cost Objective::cost(const Mechanism& mechanism, const ObjectivePart& part, double x0, const Progress& progress) const {
   Cost cost;
   cost.name = name_;
   cost.is_extreme = is_extreme();
@@ -146,10 +183,11 @@ Cost Objective::cost(const Mechanism& mechanism, const ObjectivePart& part, doub
   if (running_ && mean_) cost.running = std::make_shared<Integrand>(cost.running, *mean_, exponent(part), x0);
   if (terminal_) cost.terminal = terminal_->bind(mechanism);
   std::map<const void*, std::shared_ptr<const PointCost>> bound;  // rows of a file share an expression
-  for (const Sample& sample : samples_) {
-    std::shared_ptr<const PointCost>& value = bound[sample.value.id()];
-    if (!value) value = sample.value.bind(mechanism);
-    cost.samples.push_back({sample.time, value});
+  const std::vector<Instant> instants = instants_of(samples_, mechanism, progress);
+  for (std::size_t i = 0; i < samples_.size(); ++i) {
+    std::shared_ptr<const PointCost>& value = bound[samples_[i].value.id()];
+    if (!value) value = samples_[i].value.bind(mechanism);
+    cost.samples.push_back({instants[i].time, value});
   }
   if (user_running_) cost.running = point_cost(user_running_, mechanism.rho());
   if (user_terminal_) cost.terminal = point_cost(user_terminal_, mechanism.rho());

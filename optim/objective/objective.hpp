@@ -13,6 +13,7 @@
 // ObjectiveRun (objective_run.hpp) does this for several of them and finds x0.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,6 +23,7 @@
 #include "core/run/cost.hpp"
 #include "optim/objective/expression_cost.hpp"
 #include "optim/objective/followed_mode.hpp"
+#include "optim/objective/free_instants.hpp"
 #include "optim/problem/problem.hpp"
 
 namespace mbsopt {
@@ -34,6 +36,8 @@ struct ObjectivePart {
 
 class Objective {
  public:
+  using Progress = std::function<bool(double t)>;  // as in RunOptions
+
   // Throws std::invalid_argument: "objectives.track.running: unknown name ...".
   Objective(const Scene& scene, const ObjectiveSpec& spec);
   // Written in C++; either part may be absent (null), not both (std::invalid_argument).
@@ -45,8 +49,9 @@ class Objective {
   Extreme extreme() const { return mean_ ? mean_->extreme : Extreme::none; }
   bool is_extreme() const { return extreme() != Extreme::none; }
   std::vector<ObjectivePart> parts() const;
-  // Of a part; what is absent stays absent.
-  Cost cost(const Mechanism& mechanism, const ObjectivePart& part = {}, double x0 = 0) const;
+  // Of a part; what is absent stays absent. Throws as instants_of().
+  Cost cost(const Mechanism& mechanism, const ObjectivePart& part = {}, double x0 = 0,
+            const Progress& progress = {}) const;
   Jet of_integral(double I, const ObjectivePart& part = {}, double x0 = 0) const;  // its mean, without the factor
   Jet integrand(double x, const ObjectivePart& part = {}) const;                   // M of objective_kinds.hpp
   // The expression x of a kind that is no sum; null where it is the constant 0.
@@ -55,11 +60,20 @@ class Objective {
   struct Sample {
     double time;
     CostExpression value;
+    std::optional<std::size_t> point = {};  // of free_instants(); it says the time then
   };
   const std::optional<CostExpression>& running() const { return running_; }
   const std::optional<CostExpression>& terminal() const { return terminal_; }
   const std::vector<Sample>& samples() const { return samples_; }
-  // Their sum of squares is psi where is_sum_of_squares(): of `track` alone. In the order of time.
+  // When these samples are taken, in their order; free ones depend on the motion. Throws as FreeInstants::nearest().
+  struct Instant {
+    double time;
+    std::optional<std::size_t> block;  // of free ones, FreeInstants::Instant
+  };
+  std::vector<Instant> instants_of(const std::vector<Sample>& samples, const Mechanism& mechanism,
+                                   const Progress& progress = {}) const;
+  const std::optional<FreeInstants>& free_instants() const { return free_instants_; }
+  // Their sum of squares is psi where is_sum_of_squares(): of `track` alone. In the order of time, but for free ones.
   const std::vector<Sample>& residuals() const { return residuals_; }
   bool is_sum_of_squares() const;
   double exponent(const ObjectivePart& part) const { return part.side * sharpness_; }  // k of an extreme
@@ -86,6 +100,7 @@ class Objective {
   double sharpness_ = 1, duration_ = 1;
   std::optional<CostExpression> running_, terminal_;
   std::vector<Sample> samples_, residuals_;
+  std::optional<FreeInstants> free_instants_;
   std::optional<Program> parameters_only_;
   std::shared_ptr<const FollowedMode> mode_;
   std::shared_ptr<const RunningCost> user_running_;

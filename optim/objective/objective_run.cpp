@@ -141,7 +141,8 @@ SimulationResult ObjectiveRun::run(const Sweep& sweep) const {
 
 SimulationResult ObjectiveRun::integrated(const std::vector<Integral>& integrals, const Sweep& sweep) const {
   std::vector<Cost> costs;
-  for (const Integral& integral : integrals) costs.push_back(of(integral).cost(mechanism_, integral.part, integral.x0));
+  for (const Integral& integral : integrals)
+    costs.push_back(of(integral).cost(mechanism_, integral.part, integral.x0, progress_));
   return sweep(costs);
 }
 

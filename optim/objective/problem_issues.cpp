@@ -37,7 +37,17 @@ void check_column_unit(Checker& checker, const std::string& unit_text, const std
 void check_track(Checker& checker, const TrackTerm& term, const std::string& place) {
   if (const std::optional<double> weight = checker.facts().value(term.weight); weight && *weight < 0)
     checker.issue(place + ".weight", "is " + text_of(*weight) + ", the weight of a square must not be negative");
-  if (!term.curve) return;
+  const bool prescribed = term.timing == Timing::prescribed;
+  if (!prescribed) {
+    const Sensor* const sensor = checker.facts().sensor(term.sensor);
+    if (sensor && checker.facts().reads_of(*sensor) != Reads::positions)
+      checker.issue(place + ".timing", "is not 'prescribed', but the sensor '" + term.sensor +
+                                           "' is no function of positions alone; free timing seeks the position of "
+                                           "the motion that is nearest to each row");
+    if (checker.facts().scene().drives.empty())
+      checker.issue(place + ".timing", "is not 'prescribed', but there are no drives, whose values it frees");
+  }
+  if (!term.curve || !prescribed) return;
   const SimulationSettings& simulation = checker.facts().scene().simulation;
   const std::vector<double>& t = term.curve->x();
   const auto rows =
@@ -94,8 +104,15 @@ void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
     checker.issue(checker.path("sharpness"),
                   "is given without maximum_of, minimum_of or peak_to_peak_of, which it belongs to");
   const SimulationSettings& simulation = checker.facts().scene().simulation;
-  for (std::size_t i = 0; i < objective.track.size(); ++i)
-    check_track(checker, objective.track[i], child_path(checker.path("track"), i));
+  for (std::size_t i = 0; i < objective.track.size(); ++i) {
+    const TrackTerm& term = objective.track[i];
+    const std::string place = child_path(checker.path("track"), i);
+    check_track(checker, term, place);
+    const auto first = std::ranges::find(objective.track, term.file, &TrackTerm::file);
+    if (first->timing != term.timing)
+      checker.issue(place + ".timing",
+                    "is not that of the first term of its file; the terms of a file share the instants of its rows");
+  }
   for (std::size_t i = 0; i < objective.samples.size(); ++i) {
     const double time = objective.samples[i].time;
     if (time < simulation.start_time || time > simulation.end_time)

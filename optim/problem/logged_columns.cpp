@@ -136,18 +136,19 @@ LoggedColumn times_in_seconds(const CsvTable& table, std::string_view column, co
   return result;
 }
 
-void read_curve(SampleColumn& samples, Interpolation how, bool missing, const CsvTable& table,
+void read_curve(SampleColumn& samples, Interpolation how, bool missing, bool by_row, const CsvTable& table,
                 std::vector<std::string>& read) {
-  LoggedColumn times = times_in_seconds(table, samples.time, samples.time_unit, samples.time_zero);
+  LoggedColumn times;
+  if (!by_row) times = times_in_seconds(table, samples.time, samples.time_unit, samples.time_zero);
   LoggedColumn values = column_in_si(table, samples.column, samples.unit);
   for (const std::string& words : {times.read, values.read})
     if (!words.empty()) read.push_back(words);
   samples.unit = values.unit;
   std::vector<double> x, y;
-  x.reserve(times.values.size()), y.reserve(times.values.size());
-  for (std::size_t row = 0; row < times.values.size(); ++row) {
+  x.reserve(values.values.size()), y.reserve(values.values.size());
+  for (std::size_t row = 0; row < values.values.size(); ++row) {
     if (std::isfinite(values.values[row])) {
-      x.push_back(times.values[row]), y.push_back(values.values[row]);
+      x.push_back(by_row ? static_cast<double>(row) : times.values[row]), y.push_back(values.values[row]);
     } else if (!missing) {
       throw CsvError(
           fmt::format("{}: column '{}' has no number here; a law needs all of them", table.place(row), samples.column));

@@ -32,8 +32,9 @@ LoggedColumn column_in_si(const CsvTable& table, std::string_view column, const 
 LoggedColumn times_in_seconds(const CsvTable& table, std::string_view column, const std::string& given,
                               std::optional<double> time_zero);
 
-// The curve through the rows of a table that have a number; missing: whether rows may have none. Sets the SI unit, too.
-void read_curve(SampleColumn& samples, Interpolation how, bool missing, const CsvTable& table,
+// The curve through the rows of a table that have a number; missing: whether rows may have none; by_row: over the
+// number of the row, from 0, not over time. Sets the SI unit, too.
+void read_curve(SampleColumn& samples, Interpolation how, bool missing, bool by_row, const CsvTable& table,
                 std::vector<std::string>& read);
 
 // The files of an experiment as one table in the order of time, its used columns in SI, angles unwrapped where wanted.

@@ -27,10 +27,14 @@ struct EigenvalueSpec {
   std::string value = "frequency";  // [Hz], or "damping": its ratio
 };
 
+// When a tracked row is taken: at its time; where the motion is nearest to it; or that in the order of the rows.
+enum class Timing { prescribed, free, ordered };
+
 // A sensor's samples to follow: adds sum over the rows k of a file of weight (sensor(t_k) - column_k)^2.
 struct TrackTerm : SampleColumn {
   std::string sensor;
-  Field weight = 1.0;  // of parameters
+  Field weight = 1.0;                  // of parameters
+  Timing timing = Timing::prescribed;  // else the curve is over rows, from 0 (free_instants.hpp)
 };
 
 // psi = integral of running + terminal at the end time + sum of samples and track + parameters_only; or, alone, one of
@@ -84,7 +88,8 @@ struct MultistartSpec {
   int starts = 20;
   std::optional<long> seed;  // drawn when absent
   StartSampling sampling = StartSampling::latin_hypercube;
-  bool all_branches = false;  // of a design: each start in every assembly mode
+  bool all_branches = false;     // of a design: each start in every assembly mode
+  bool until_all_found = false;  // `starts` are the most: an estimate of the optima that are left ends them before
 };
 
 // A drive that follows another law in one experiment or load case.

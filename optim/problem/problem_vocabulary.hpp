@@ -15,7 +15,10 @@ inline std::string_view optimizer_names() {
 }
 inline constexpr Choice<StartSampling> kSamplings[] = {{"latin_hypercube", StartSampling::latin_hypercube},
                                                        {"sobol", StartSampling::sobol}};
+inline constexpr Choice<Timing> kTimings[] = {
+    {"prescribed", Timing::prescribed}, {"free", Timing::free}, {"ordered", Timing::ordered}};
 inline constexpr Choice<bool> kBranches[] = {{"guess", false}, {"all", true}};
+inline constexpr Choice<bool> kUntil[] = {{"all_starts", false}, {"all_found", true}};
 inline constexpr Choice<bool> kRoles[] = {{"fit", false}, {"validate", true}};
 
 inline constexpr Choice<SigmaEstimate> kSigmaEstimates[] = {
@@ -38,6 +41,10 @@ void describe(auto& v, Like<TrackTerm> auto& t) {
   v.reference("sensor", t.sensor, To::sensor, {"what is to follow the data", Need::required});
   describe_samples(v, t, "file");
   v.number("weight", t.weight, {"of each square"});
+  v.choice(
+      "timing", t.timing, kTimings,
+      {"prescribed: at the times of the rows; free: each row where the driven motion is nearest to it; ordered: free, "
+       "but one row after another"});
 }
 
 void describe(auto& v, Like<EigenvalueSpec> auto& e) {
@@ -99,6 +106,9 @@ void describe(auto& v, Like<MultistartSpec> auto& m) {
   v.choice("sampling", m.sampling, kSamplings, {"how the starts fill the bounds"});
   v.choice("branches", m.all_branches, kBranches,
            {"of design: assembly modes in which each start is designed, that of the poses in the file or all"});
+  v.choice(
+      "until", m.until_all_found, kUntil,
+      {"all_starts, or all_found: the starts end where fewer than half an optimum is expected beside those found"});
 }
 
 void describe(auto& v, Like<DriveLaw> auto& d) {

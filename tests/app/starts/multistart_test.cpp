@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "app/files/journal.hpp"
+#include "app/starts/distinct_optima.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "tests/app/killed_run.hpp"
 #include "tests/app/run_command.hpp"
@@ -496,5 +497,38 @@ TEST_CASE("a damaged journal is refused in words, whatever the line", "[resume]"
     const CommandOutcome outcome = run_command({"resume", out.string()});
     CHECK(outcome.exit_code == kBadInput);
     CHECK_THAT(outcome.err, Contains("journal.jsonl: line 2 is damaged"));
+  }
+}
+
+TEST_CASE("the rule of Boender and Rinnooy Kan", "[multistart]") {
+  CHECK_FALSE(SearchedOptima{3, 1}.expected());
+  CHECK(*SearchedOptima{10, 2}.expected() == Approx(2 * 9. / 6));
+  CHECK_FALSE(SearchedOptima{10, 2}.all_found());
+  CHECK(SearchedOptima{20, 2}.all_found());  // 2.375
+  CHECK(SearchedOptima{10, 2}.covered() == Approx(7 * 12. / 90));
+}
+
+TEST_CASE("until all_found: starts end when no other optimum is expected, for any number of workers", "[multistart]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kSwingingRod);
+  nlohmann::json first;
+  for (const std::string workers : {"1", "3"}) {
+    const CommandOutcome outcome = design(file, folder.file(workers),
+                                          {"--threads", workers, "--set", "design.multistart.starts=90", "--set",
+                                           "design.multistart.until=\"all_found\""});
+    INFO(outcome.out << outcome.err);
+    REQUIRE(outcome.exit_code == kDone);
+    const nlohmann::json multistart = outcome_of(folder.path / workers).at("multistart");
+    if (first.is_null()) first = multistart;
+    CHECK(multistart == first);
+    CHECK(multistart.at("all_found") == true);
+    CHECK(multistart.at("finished").get<int>() < 90);
+    CHECK(multistart.at("finished").get<int>() % 20 == 0);
+    const auto& optima = multistart.at("optima");
+    REQUIRE(!optima.empty());
+    CHECK(optima.at(0).at("start") == multistart.at("best"));
+    CHECK(optima.at(0).at("found_by") == multistart.at("at_the_best_optimum"));
+    CHECK(multistart.at("expected_optima").get<double>() < static_cast<double>(optima.size()) + 0.5);
+    CHECK_THAT(outcome.out, Contains("found by") && Contains("are expected in all") && Contains("the search ends"));
   }
 }

@@ -1,0 +1,41 @@
+// The optima that the starts of a multistart ended at, each once; and how many others there may be.
+//
+// If every start ends at the optimum of the region that it lies in, and nothing is known of the sizes of these regions,
+// then of n searches that ended at w optima one expects as many optima in all, and searches in regions that are known:
+//
+//   w (n - 1)/(n - w - 2), n > w + 2         (n - w - 1)(n + w)/(n (n - 1))
+//
+// C. G. E. Boender, A. H. G. Rinnooy Kan, "Bayesian stopping rules for multistart global optimization methods",
+// Mathematical Programming 37 (1987) 59-80. The search ends where the first is below w + 1/2.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "app/files/result_json.hpp"
+#include "core/scene/scene.hpp"
+
+namespace mbsopt {
+
+inline constexpr double kFeasible = 1e-6;  // violation relative to the bounds: what ranks as feasible
+
+// The same within 1e-3 of the range of each parameter that has bounds.
+bool same_optimum(const Json& a, const Json& b, const Scene& scene);
+
+struct DistinctOptimum {
+  const Json* best = nullptr;  // record of the best start that ended there
+  long starts = 0;
+};
+
+// Of the records that converged with all limits held, in their order.
+std::vector<DistinctOptimum> distinct_optima(const std::vector<Json>& ranked, const Scene& scene);
+
+struct SearchedOptima {
+  long searches = 0, optima = 0;
+  std::optional<double> expected() const;  // optima in all; none: too few searches
+  double covered() const;                  // part of the searches to come
+  bool all_found() const { return expected() && *expected() < static_cast<double>(optima) + 0.5; }
+};
+SearchedOptima searched(const std::vector<DistinctOptimum>& optima);
+
+}  // namespace mbsopt
