@@ -108,7 +108,10 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, std::optiona
   if (design.mode) record["assembly_mode"] = mode_json(*design.mode);
   for (const DesignVariable& v : design.variables)
     record["from"][v.name] = v.initial, record["parameters"][v.name] = v.value;
-  record["points"] = std::move(points), record["hessians"] = std::move(hessians);
+  constexpr double kLong = 2e-3;  // [s] per point; a shorter one is sooner computed again than written and read
+  const bool is_long = design.wall_seconds > kLong * static_cast<double>(points.size());
+  record["points"] = is_long ? std::move(points) : Json::array();
+  record["hessians"] = is_long ? std::move(hessians) : Json::array();
   return record;
 }
 
