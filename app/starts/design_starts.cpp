@@ -106,6 +106,7 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, std::optiona
               {"simulations", design.simulations},
               {"wall_seconds", design.wall_seconds}};
   if (design.mode) record["assembly_mode"] = mode_json(*design.mode);
+  if (design.closing_steps > 0) record["closing_steps"] = design.closing_steps;
   for (const DesignVariable& v : design.variables)
     record["from"][v.name] = v.initial, record["parameters"][v.name] = v.value;
   constexpr double kLong = 2e-3;  // [s] per point; a shorter one is sooner computed again than written and read

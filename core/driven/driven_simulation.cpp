@@ -139,6 +139,12 @@ bool is_solved(const Mechanism& mechanism, const SimulationSettings& settings, c
   return reason.empty() && start.result().ok && free == 0;
 }
 
+bool may_be_solved(const Mechanism& mechanism, const SimulationSettings& settings) {
+  const MechanismData& d = mechanism.data();
+  const bool enough = d.planar ? d.planar->rows.size() >= 3 * at(d.n) : d.m >= 6 * d.n;
+  return settings.solve != Solve::dynamics && !d.drive_names.empty() && enough && why_integrated(d, settings).empty();
+}
+
 SimulationResult driven_simulate(const Mechanism& mechanism, const SimulationSettings& settings,
                                  std::span<const Cost> costs, const Sampling& sampling, const RunOptions& options,
                                  const Assembly& start) {

@@ -23,6 +23,9 @@ class Mechanism;
 // Throws std::invalid_argument where solve is "kinematics" and that cannot be.
 bool is_solved(const Mechanism& mechanism, const SimulationSettings& settings, const Assembly& start);
 
+// Whether a run would be solved if its mechanism could be assembled: by its settings and the number of its equations.
+bool may_be_solved(const Mechanism& mechanism, const SimulationSettings& settings);
+
 SimulationResult driven_simulate(const Mechanism& mechanism, const SimulationSettings& settings,
                                  std::span<const Cost> costs, const Sampling& sampling, const RunOptions& options,
                                  const Assembly& start);
