@@ -121,6 +121,7 @@ void add_to_result(Json& result, const DesignResult& design) {
                          {"true_infeasibility", design.true_violation}};
   if (design.seed) result["optimizer"]["seed"] = *design.seed;
   if (design.mode) result["optimizer"]["assembly_mode"] = mode_json(*design.mode);
+  if (design.closing_steps > 0) result["optimizer"]["closing_steps"] = design.closing_steps;
   if (design.limit_rounds > 0) result["optimizer"]["limit_rounds"] = design.limit_rounds;
   for (const DesignConflict& c : design.conflicts)
     result["conflicts"].push_back({{"limit", c.limit}, {"missed", c.missed}, {"price", c.price}});

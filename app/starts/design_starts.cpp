@@ -106,9 +106,13 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, std::optiona
               {"simulations", design.simulations},
               {"wall_seconds", design.wall_seconds}};
   if (design.mode) record["assembly_mode"] = mode_json(*design.mode);
+  if (design.closing_steps > 0) record["closing_steps"] = design.closing_steps;
   for (const DesignVariable& v : design.variables)
     record["from"][v.name] = v.initial, record["parameters"][v.name] = v.value;
-  record["points"] = std::move(points), record["hessians"] = std::move(hessians);
+  constexpr double kLong = 2e-3;  // [s] per point; a shorter one is sooner computed again than written and read
+  const bool is_long = design.wall_seconds > kLong * static_cast<double>(points.size());
+  record["points"] = is_long ? std::move(points) : Json::array();
+  record["hessians"] = is_long ? std::move(hessians) : Json::array();
   return record;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "core/dynamics/spatial_dynamics.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/parameter_lanes.hpp"
+#include "core/mechanism/planar_model.hpp"
 #include "core/start/free_motion.hpp"
 
 namespace mbsopt {
@@ -39,6 +41,33 @@ bool leaves_plane(const MechanismData& d, Eigen::VectorXd y_bar) {
     }
   }
   return y_bar.any();
+}
+
+// Whether a parameter moves a body, or a point of a joint, out of the plane.
+bool moves_out_of_plane(const MechanismData& d) {
+  const PlanarModel& plane = *d.planar;
+  const auto moves = [&](int slot, const auto& normal) {
+    if (slot < 0) return false;
+    constexpr double kRounding = 1e-14;  // of unit axes, in d theta/d rho
+    return (normal.transpose() * d.theta_rho.middleRows(slot, normal.size())).cwiseAbs().maxCoeff() >
+           kRounding * d.theta_rho.middleRows(slot, normal.size()).cwiseAbs().maxCoeff();
+  };
+  for (int i = 1; i <= d.n; ++i) {
+    const BodyData& body = d.bodies[at(i)];
+    const PlanarBody& seen = plane.bodies[at(i)];
+    Eigen::Matrix4d in_plane = seen.p_a * seen.p_a.transpose() + seen.p_b * seen.p_b.transpose();
+    if (moves(body.slot_com, seen.n) || moves(body.slot_velocity, Vec<3>(Vec<3>::Unit(plane.n)))) return true;
+    if (body.slot_angular_velocity >= 0) return true;
+    if (body.slot_q < 0) continue;
+    if (moves(body.slot_q, Vec<3>(Vec<3>::Unit(plane.n)))) return true;
+    const Eigen::Matrix4d out = Eigen::Matrix4d::Identity() - in_plane;
+    for (int k = 0; k < 4; ++k)
+      if (moves(body.slot_q + 3, Vec<4>(out.col(k)))) return true;
+  }
+  return std::ranges::any_of(d.constraints, [&](const Constraint& c) {
+    const Vec<3> n1 = plane.bodies[at(c.body1)].n, n2 = plane.bodies[at(c.body2)].n;
+    return moves(c.slot1, n1) || moves(c.slot2, n2) || moves(c.slot3, n1) || moves(c.slot3, n2);
+  });
 }
 
 // Derivatives of the state in rho at one instant. The constraints say all of it in space. In a plane they say nothing
@@ -110,6 +139,12 @@ bool is_solved(const Mechanism& mechanism, const SimulationSettings& settings, c
   return reason.empty() && start.result().ok && free == 0;
 }
 
+bool may_be_solved(const Mechanism& mechanism, const SimulationSettings& settings) {
+  const MechanismData& d = mechanism.data();
+  const bool enough = d.planar ? d.planar->rows.size() >= 3 * at(d.n) : d.m >= 6 * d.n;
+  return settings.solve != Solve::dynamics && !d.drive_names.empty() && enough && why_integrated(d, settings).empty();
+}
+
 SimulationResult driven_simulate(const Mechanism& mechanism, const SimulationSettings& settings,
                                  std::span<const Cost> costs, const Sampling& sampling, const RunOptions& options,
                                  const Assembly& start) {
@@ -123,28 +158,30 @@ SimulationResult driven_simulate(const Mechanism& mechanism, const SimulationSet
 }
 
 SimulationResult driven_tlm(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
-                            const TangentSampling& sampling, const RunOptions& options, const Assembly& start) {
+                            const TangentSampling& sampling, const RunOptions& options, const Assembly& start,
+                            Rates rates) {
   DrivenRun run(mechanism, settings, costs, sampling.times, options, start, true);
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
   DrivenDerivatives derivatives(mechanism, run.model());
   Eigen::MatrixXd y0_rho = Eigen::MatrixXd::Zero(mechanism.states(), mechanism.parameters());
-  if (run.model() == Model::planar) y0_rho = start.tangent();
-  SpatialDynamics dynamics(mechanism, settings.formulation);  // of the rates that observers get
+  if (run.model() == Model::planar && moves_out_of_plane(mechanism.data())) y0_rho = start.tangent();
+  std::optional<SpatialDynamics> dynamics;  // of the rates that observers get
+  if (rates == Rates::known) dynamics.emplace(mechanism, settings.formulation);
   Eigen::VectorXd ydot(mechanism.states());
   run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
     if (!derivatives.linearise(at)) return false;
     ++result.statistics.linearised_states;
     const Eigen::MatrixXd& y_rho = derivatives.y_rho(y0_rho);
     const bool observed = std::ranges::any_of(terms, [](const DrivenTerm& term) { return !term.cost; });
-    if (observed && !dynamics.evaluate(at.t, at.y, at.angles, ydot)) return false;
+    if (observed && dynamics && !dynamics->evaluate(at.t, at.y, at.angles, ydot)) return false;
     for (const DrivenTerm& term : terms) {
       if (term.cost) {
         derivatives.add_forward(term, at, result.psi_rho);
         continue;
       }
       StatePoint with_rate = at;
-      with_rate.ydot = &ydot;
+      if (dynamics) with_rate.ydot = &ydot;
       sampling.observe(term.observation, with_rate, y_rho);
     }
     return y_rho.allFinite();

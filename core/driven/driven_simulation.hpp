@@ -23,11 +23,17 @@ class Mechanism;
 // Throws std::invalid_argument where solve is "kinematics" and that cannot be.
 bool is_solved(const Mechanism& mechanism, const SimulationSettings& settings, const Assembly& start);
 
+// Whether a run would be solved if its mechanism could be assembled: by its settings and the number of its equations.
+bool may_be_solved(const Mechanism& mechanism, const SimulationSettings& settings);
+
 SimulationResult driven_simulate(const Mechanism& mechanism, const SimulationSettings& settings,
                                  std::span<const Cost> costs, const Sampling& sampling, const RunOptions& options,
                                  const Assembly& start);
+// unknown: observers get no ydot, so that no equations of motion are solved for it.
+enum class Rates { known, unknown };
 SimulationResult driven_tlm(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
-                            const TangentSampling& sampling, const RunOptions& options, const Assembly& start);
+                            const TangentSampling& sampling, const RunOptions& options, const Assembly& start,
+                            Rates rates = Rates::known);
 SimulationResult driven_adjoint(const Mechanism& mechanism, const SimulationSettings& settings,
                                 std::span<const Cost> costs, const RunOptions& options, const Assembly& start);
 

@@ -47,6 +47,8 @@ class ProjectorOf final : public Projector {
   bool project(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y,
                ProjectionSolution& s) override;
   bool settle(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y) override;
+  double approach(double t, const Eigen::VectorXd& angles, Eigen::VectorXd& y, Eigen::VectorXd& theta_bar,
+                  Eigen::VectorXd& rho_bar) override;
   bool linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, const Eigen::VectorXd& y,
                  const ProjectionSolution& s) override;
   void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override;
@@ -65,6 +67,7 @@ class ProjectorOf final : public Projector {
   bool constrained() const { return rows_.count() > 0; }
   void read_hat(double t, const Y& y_hat);
   bool factor(double t, const Y& y_hat);                // of S(q~)
+  void set_rows_of(Eigen::MatrixXd& J);                 // J at the frames, dense
   bool factor_square();                                 // J at the frames
   void solve_square(const Y& rows, std::vector<X>& x);  // J x = rows
   // Calls f(body, its number without the ground, its frame).
@@ -153,19 +156,23 @@ bool ProjectorOf<Body>::factor(double t, const Y& y_hat) {
 }
 
 template <class Body>
-bool ProjectorOf<Body>::factor_square() {
+void ProjectorOf<Body>::set_rows_of(Eigen::MatrixXd& J) {
   rows_.evaluate(frames_);
-  const Eigen::Index m = rows_.count();
-  J_.setZero(m, m);
+  const Eigen::Index unknowns = N * static_cast<Eigen::Index>(x_.size());
+  J.setZero(rows_.count(), unknowns);
   for (X& x : x_) x.setZero();
-  for (Eigen::Index k = 0; k < m; ++k) {
+  for (Eigen::Index k = 0; k < unknowns; ++k) {
     double& unit = x_[at(static_cast<int>(k / N))](k % N);
     unit = -1;
     g_.setZero();
     rows_.subtract_times(x_, g_);
-    J_.col(k) = g_;
+    J.col(k) = g_;
     unit = 0;
   }
+}
+template <class Body>
+bool ProjectorOf<Body>::factor_square() {
+  set_rows_of(J_);
   ++square_factorisations_;
   return J_factor_.compute(J_);
 }
@@ -227,6 +234,57 @@ bool ProjectorOf<Body>::settle(double t, const Y& angles, const Y& y_hat, Y& y) 
   y = y_hat;
   for_bodies([&](Body& b, std::size_t, auto& f) { b.write(f, y); });
   return y.allFinite();
+}
+
+// Levenberg-Marquardt with a damping of the size of |Phi|: quadratic where the constraints can hold (Yamashita and
+// Fukushima, Computing Supplementum 15 (2001) 239); and of the size of the curvature |Phi| Phi_qq where they cannot.
+template <class Body>
+double ProjectorOf<Body>::approach(double t, const Y& angles, Y& y, Y& theta_bar, Y& rho_bar) {
+  constexpr int kMost = 100;
+  constexpr double kStationary = 1e-12;  // relative fall of |Phi| per step
+  constexpr double kLongest = 0.5;       // of a turn in one step [rad]
+  const auto read = [&] {
+    read_hat(t, y);
+    for_bodies([&](Body& b, std::size_t, auto& f) { b.displace(X::Zero(), f); });
+    constraints_.phi(frames_, laws_, angles, phi_);
+    return phi_.norm();
+  };
+  double violation = read(), damping = 1;
+  Y trial = y;
+  for (int k = 0; k < kMost && violation > kProjectionRounding; ++k) {
+    set_rows_of(J_);
+    const Y gradient = J_.transpose() * phi_;
+    Eigen::MatrixXd A = J_.transpose() * J_;
+    A.diagonal().array() += damping * violation;
+    Y step = cholesky_solve(A, -gradient);
+    const double longest = step.cwiseAbs().maxCoeff();
+    double turn = 0;
+    for (Eigen::Index i = N - 1; i < step.size(); i += N) turn = std::max(turn, std::abs(step(i)));
+    if (turn > kLongest) step *= kLongest / turn;
+    for_bodies([&](Body& b, std::size_t i, auto& f) {
+      b.displace(step.segment<N>(N * static_cast<Eigen::Index>(i)), f);
+      b.start_velocity(f);
+    });
+    trial = y;
+    for_bodies([&](Body& b, std::size_t, auto& f) { b.write(f, trial); });
+    std::swap(y, trial);
+    const double before = violation;
+    violation = read();
+    if (violation < before) {
+      damping = std::max(damping / 4, 1e-3);
+      if (before - violation <= kStationary * before) break;
+    } else {
+      std::swap(y, trial);
+      violation = read();
+      if (longest < kStationary) break;
+      damping *= 4;
+    }
+  }
+  mu_ = -phi_;
+  for (auto& bar : bars_) bar.set_zero();
+  add_pull_back(frames_, {nullptr, &mu_, nullptr, nullptr}, theta_bar, rho_bar);
+  for (auto& bar : bars_) bar.set_zero();
+  return violation;
 }
 
 template <class Body>

@@ -35,6 +35,11 @@ class Projector {
   // method.
   virtual bool settle(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y) = 0;
 
+  // Moves the positions of y to where |Phi|^2/2 is least, near y, and returns |Phi| there; theta_bar and rho_bar += the
+  // gradient of |Phi|^2/2 in the fields and in the parameters of laws, q being stationary.
+  virtual double approach(double t, const Eigen::VectorXd& angles, Eigen::VectorXd& y, Eigen::VectorXd& theta_bar,
+                          Eigen::VectorXd& rho_bar) = 0;
+
   // Prepares derivatives at a projection made before (also of another Projector of the same mechanism).
   virtual bool linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat,
                          const Eigen::VectorXd& y, const ProjectionSolution& solution) = 0;

@@ -8,10 +8,12 @@
 #include <limits>
 #include <stdexcept>
 
+#include "core/driven/driven_simulation.hpp"
 #include "core/expression/counted.hpp"
 #include "core/expression/did_you_mean.hpp"
 #include "core/simulate/simulation_warnings.hpp"
 #include "core/start/assembly_modes.hpp"
+#include "optim/design/closing.hpp"
 #include "optim/design/design_program.hpp"
 #include "optim/design/tracked_squares.hpp"
 #include "optim/design/true_limits.hpp"
@@ -490,6 +492,33 @@ StartModes modes_at(const Scene& scene, const DesignOptions& options) {
 
 DesignResult designed(const Problem& given, const DesignOptions& options);
 
+// The problem with a start at which its linkage closes, where it does not at the given one and such a start is found.
+Problem closed(const Problem& given, const DesignOptions& options, int& steps) {
+  try {
+    const std::vector<bool> none(given.scene.parameters.size(), false);
+    if (!may_be_solved(Mechanism(given.scene, parameter_values(given.scene), none), given.scene.simulation))
+      return given;
+  } catch (const SceneError&) {  // a field is out of its range here: the first evaluation says so
+    return given;
+  }
+  bool abandoned = false;
+  const auto go_on = [&] {
+    abandoned =
+        abandoned || (options.simulation_progress && !options.simulation_progress(given.scene.simulation.start_time));
+    return !abandoned;
+  };
+  const Prepared prepared(given, options, options.simulation_progress);
+  const ClosedStart start = close_start(prepared.evaluator, prepared.scaling, prepared.x_start, go_on);
+  steps = start.closes ? start.steps : 0;
+  if (steps == 0) return given;
+  Problem problem = given;
+  const Eigen::VectorXd values = prepared.scaling.to_rho(start.x);
+  for (std::size_t k = 0; k < prepared.evaluator.variables().size(); ++k)
+    problem.scene.parameters[static_cast<std::size_t>(prepared.evaluator.variables()[k])].value =
+        values(static_cast<Eigen::Index>(k));
+  return problem;
+}
+
 // As designed, with the poses of the mode.
 DesignResult designed_in_mode(const Problem& given, const DesignOptions& options) {
   const int mode = *options.mode;
@@ -529,8 +558,15 @@ int design_modes(const Problem& problem, const DesignOptions& options) {
   return static_cast<int>(modes_at(problem.scene, options).modes.size());
 }
 
-DesignResult run_design(const Problem& problem, const DesignOptions& options) {
-  return options.mode ? designed_in_mode(problem, options) : designed(problem, options);
+DesignResult run_design(const Problem& given, const DesignOptions& options) {
+  int steps = 0;
+  const Problem problem = closed(given, options, steps);
+  DesignResult result = options.mode ? designed_in_mode(problem, options) : designed(problem, options);
+  result.closing_steps = steps;
+  if (steps > 0)
+    for (DesignVariable& v : result.variables)
+      v.initial = std::ranges::find(given.scene.parameters, v.name, &Parameter::name)->value;
+  return result;
 }
 
 namespace {

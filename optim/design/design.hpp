@@ -103,6 +103,7 @@ struct DesignResult {
   double wall_seconds = 0;
   std::vector<std::string> warnings;  // sentences
   std::optional<DesignMode> mode;     // where one was asked for
+  int closing_steps = 0;              // that led a start which does not close to one that does (closing.hpp)
   bool ok() const {
     return status == SolverStatus::converged || status == SolverStatus::converged_beyond_limit ||
            status == SolverStatus::no_progress || status == SolverStatus::searched;

@@ -6,8 +6,11 @@
 #include <map>
 #include <numeric>
 
+#include "core/driven/driven_simulation.hpp"
 #include "core/mechanism/scene_programs.hpp"
+#include "core/run/run_arguments.hpp"
 #include "core/simulate/simulation.hpp"
+#include "core/start/assembly.hpp"
 #include "optim/solver/levenberg_marquardt.hpp"
 
 namespace mbsopt {
@@ -79,6 +82,24 @@ void TrackedSquares::evaluate(const VectorXd& x, LeastSquaresPoint& point) {
   without_value_ = without_value_ || point.message == kNoValue;
 }
 
+// Residuals read no rates of the state, so that a solved run goes without the equations of motion.
+SimulationResult TrackedSquares::with_tangents(const Mechanism& mechanism, const SimulationSettings& settings,
+                                               const TangentSampling& sampling, const RunOptions& options) {
+  if (is_solved_) {
+    check_run_arguments(mechanism, settings, {}, sampling.times, options);
+    const Assembly start(mechanism, settings.start_time);
+    if (!start.result().ok) {
+      SimulationResult failed;
+      failed.status = SimulationStatus::assembly_failed, failed.message = start.result().message;
+      return failed;
+    }
+    if (is_solved(mechanism, settings, start))
+      return driven_tlm(mechanism, settings, {}, sampling, options, start, Rates::unknown);
+    is_solved_ = false;
+  }
+  return simulate_tlm(mechanism, settings, {}, sampling, options);
+}
+
 void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
   const auto go_on = [&](double t) {
     abandoned_ =
@@ -121,7 +142,7 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
       }
     };
     ++simulations_;
-    const SimulationResult run = simulate_tlm(mechanism, evaluator.scene().simulation, {}, sampling, {nullptr, go_on});
+    const SimulationResult run = with_tangents(mechanism, evaluator.scene().simulation, sampling, {nullptr, go_on});
     if (!run.ok()) {
       point.ok = false, point.message = run.message;
       return;

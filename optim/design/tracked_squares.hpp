@@ -24,12 +24,15 @@ class TrackedSquares : public LeastSquaresProblem {
 
  private:
   void simulate(const Eigen::VectorXd& x, LeastSquaresPoint& point);
+  SimulationResult with_tangents(const Mechanism& mechanism, const SimulationSettings& settings,
+                                 const TangentSampling& sampling, const RunOptions& options);
 
   const DesignProgram& program_;
   const CaseEvaluator& evaluator_;
   PointRecords* const records_;
   long simulations_ = 0;
   bool abandoned_ = false, without_value_ = false;
+  bool is_solved_ = true;  // until a run is integrated
 };
 
 // simulations: is added to.

@@ -14,6 +14,7 @@
 #include "app/report/point_targets.hpp"
 #include "app/starts/point_records.hpp"
 #include "app/terminal/exit_code.hpp"
+#include "core/start/nearest_approach.hpp"
 #include "optim/design/design.hpp"
 #include "optim/objective/design_issues.hpp"
 #include "optim/problem/start_points.hpp"
@@ -373,4 +374,49 @@ TEST_CASE("eighteen points: all branches start in both assembly modes, and the r
   REQUIRE(again.exit_code == kDone);
   CHECK(json_of(folder.path / "g/result.json")["objectives"]["path"]["value"].get<double>() ==
         Approx(d.result["optimizer"]["objective_final"].get<double>()).epsilon(1e-9));
+}  // The file's four-bar with a coupler that is too short to reach all points.
+Problem open_four_bar() {
+  Problem problem = eighteen_points();
+  for (Parameter& p : problem.scene.parameters)
+    if (p.name == "coupler") p.value = 0.3;
+  problem.design->multistart.reset();
+  problem.design->optimizer = {};
+  problem.design->optimizer.type = "least_squares";
+  return problem;
+}
+
+TEST_CASE("nearest approach: gradients of defects equal differences where the linkage is open", "[synthesis]") {
+  const Problem problem = open_four_bar();
+  const auto defects = [&](const Eigen::VectorXd& rho, Eigen::MatrixXd& e_rho) {
+    NearestApproach approach(Mechanism(problem.scene, rho), 0);
+    Eigen::VectorXd e(18), gradient(rho.size());
+    e_rho.resize(18, rho.size());
+    for (int k = 0; k < 18; ++k) {
+      e(k) = approach.defect(k, gradient);
+      e_rho.row(k) = gradient.transpose();
+    }
+    return e;
+  };
+  const Eigen::VectorXd rho = parameter_values(problem.scene);
+  Eigen::MatrixXd e_rho, unused;
+  const Eigen::VectorXd e = defects(rho, e_rho);
+  CHECK(e.maxCoeff() > 0.01);
+  CHECK(e.minCoeff() == 0);
+  const double h = 1e-6;
+  for (Eigen::Index k = 0; k < rho.size(); ++k) {
+    const Eigen::VectorXd d = h * Eigen::VectorXd::Unit(rho.size(), k);
+    const Eigen::VectorXd difference = (defects(rho + d, unused) - defects(rho - d, unused)) / (2 * h);
+    CHECK((difference - e_rho.col(k)).lpNorm<Eigen::Infinity>() < 1e-5);
+  }
+}
+
+TEST_CASE("a start that does not close is led to one that does, by its closure defects", "[synthesis]") {
+  DesignOptions options;
+  const Problem problem = open_four_bar();
+  const DesignResult result = run_design(problem, options);
+  CHECK(result.closing_steps > 0);
+  CHECK(result.ok());
+  CHECK(result.objective_final < result.objective_initial);
+  CHECK(result.variables[1].initial == 0.3);
+  CHECK(run_design(eighteen_points(), options).closing_steps == 0);
 }

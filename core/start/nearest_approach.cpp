@@ -1,0 +1,46 @@
+#include "core/start/nearest_approach.hpp"
+
+#include <cmath>
+
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/mechanism/planar_model.hpp"
+#include "core/sensor/body_at.hpp"
+#include "core/start/assembly_equations.hpp"
+#include "core/start/assembly_problems.hpp"
+
+namespace mbsopt {
+
+NearestApproach::NearestApproach(const Mechanism& mechanism, double start_time)
+    : mechanism_(mechanism),
+      projector_(make_projector(mechanism, Projection::position_velocity,
+                                mechanism.data().planar ? Model::planar : Model::spatial, Free::nothing)),
+      y_(Eigen::VectorXd::Zero(mechanism.states())) {
+  const MechanismData& d = mechanism_.data();
+  y_.head(7 * d.n) = position_guess(d);
+  AssemblyEquations equations(d, AssemblyLevel::position, start_time);
+  equations.start_branches(y_);
+  angles_ = equations.angles();
+}
+
+double NearestApproach::defect(double t, Eigen::VectorXd& e_rho) {
+  constexpr double kClosed = 1e-9;  // as far as a path may leave the constraints
+  const MechanismData& d = mechanism_.data();
+  Eigen::VectorXd theta_bar = Eigen::VectorXd::Zero(d.slots());
+  e_rho.setZero(d.rho.size());
+  const double violation = projector_->approach(t, angles_, y_, theta_bar, e_rho);
+  for (std::size_t k = 0; k < d.angles.size(); ++k) {
+    const JointAngle& a = d.angles[k];
+    double& angle = angles_(static_cast<Eigen::Index>(k));
+    angle = a.value_near(angle, body_at(y_, a.body1).frame, body_at(y_, a.body2).frame);
+  }
+  if (violation <= kClosed) {
+    e_rho.setZero();
+    return 0;
+  }
+  d.add_to_rho(theta_bar, e_rho);
+  const double root = std::sqrt(static_cast<double>(d.m));
+  e_rho /= violation * root;
+  return violation / root;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,35 @@
+// Leads a start that does not close to parameters at which the linkage closes at all instants of a design.
+//
+//   e_k(rho) = |Phi|/sqrt(m) at the nearest approach: the least over q of |Phi(q, t_k, rho)|      0 where it closes
+//   de_k     = Phi'Phi_rho/(|Phi| sqrt(m))                                     q is stationary, so that dq drops out
+//   step p:    least |p| in units of the bounds' ranges with  e_k + de_k p = -max e  at all open instants, within
+//   bounds
+//
+// Each step aims as far beyond closing as the worst instant lacks: such reflections end in the interior of a convex
+// set after finitely many steps, where projections end on its border, the dead points. Motzkin and Schoenberg, Canadian
+// Journal of Mathematics 6 (1954) 393.
+//
+//   const ClosedStart start = close_start(evaluator, scaling, x_start);
+//   if (start.closes) use(start.x);
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+
+#include "optim/objective/case_evaluator.hpp"
+#include "optim/problem/variable_scaling.hpp"
+
+namespace mbsopt {
+
+struct ClosedStart {
+  Eigen::VectorXd x;    // scaled variables
+  bool closes = false;  // at all instants, and whether it could be told
+  int steps = 0;        // 0: it was not moved
+  double defect = 0;    // max e_k at the start [m, rad]
+};
+
+// go_on: asked before every step.
+ClosedStart close_start(const CaseEvaluator& evaluator, const VariableScaling& scaling, const Eigen::VectorXd& x_start,
+                        const std::function<bool()>& go_on = {});
+
+}  // namespace mbsopt
