@@ -253,7 +253,7 @@ class Check {
           if (!(std::abs(ladder->d.derivative(i) - coarse) > kEstimateTrust * ladder->d.error(i))) continue;
           take(*ladder, i, k, frozen);
           if (!frozen) add_integration_error(i, k);
-          taylor_size_(k) = size_(k) * finer;
+          taylor_size_(k) = std::min(taylor_size_(k), ladder->d.largest(i) / options_.relative_step);
           found = true;
         }
       }
@@ -519,14 +519,19 @@ class Check {
       TaylorCheck check;
       check.objective = result_.objectives[static_cast<std::size_t>(i)];
       std::vector<double> slopes;
-      // A remainder that falls as h or faster leaves 1/4096 of itself at the smallest two h; more is rounding.
+      const auto slope_at = [&](std::size_t j) {
+        return std::log(remainders[j - 1](i) / remainders[j](i)) / std::log(steps[j - 1] / steps[j]);
+      };
+      // A remainder that falls as h or faster leaves 1/4096 of itself at the smallest two h; more is rounding, unless
+      // it falls as h^2 to the last.
       double left = 0;
-      for (std::size_t j = std::max<std::size_t>(steps.size(), 2) - 2; j < steps.size(); ++j)
-        left = std::max(left, remainders[j](i));
+      const std::size_t n = steps.size();
+      if (n < 3 || !(std::min(slope_at(n - 1), slope_at(n - 2)) >= options_.thresholds.taylor_slope))
+        for (std::size_t j = std::max<std::size_t>(n, 2) - 2; j < n; ++j) left = std::max(left, remainders[j](i));
       for (std::size_t j = 0; j < steps.size(); ++j) {
         check.rows.push_back({steps[j], remainders[j](i)});
         if (j == 0 || remainders[j](i) <= kClear * std::max(noise[j](i), left)) continue;
-        slopes.push_back(std::log(remainders[j - 1](i) / remainders[j](i)) / std::log(steps[j - 1] / steps[j]));
+        slopes.push_back(slope_at(j));
       }
       // Large h has terms of higher order: the later slopes tell.
       if (slopes.size() > 4) slopes.erase(slopes.begin(), slopes.end() - 4);
@@ -543,7 +548,7 @@ class Check {
   const GradientCheckOptions& options_;
   Evaluator adjoint_, tlm_;
   VectorXd rho_, size_;
-  VectorXd taylor_size_;  // smaller where steps of that part of the size are coarse
+  VectorXd taylor_size_;  // smaller where finer differences hold: the steps that they come from are its largest
   StepSequence steps_;
   MatrixXd frozen_error_, free_error_, frozen_step_, free_step_;
   IntegrationError integration_;
