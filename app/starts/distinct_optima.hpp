@@ -27,7 +27,7 @@ struct DistinctOptimum {
   long starts = 0;
 };
 
-// Of the records that converged with all limits held, in their order.
+// Collects the optima of the records that converged with all limits held, in their order.
 std::vector<DistinctOptimum> distinct_optima(const std::vector<Json>& ranked, const Scene& scene);
 
 struct SearchedOptima {

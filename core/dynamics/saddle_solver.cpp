@@ -6,7 +6,8 @@
 namespace mbsopt {
 namespace {
 
-// A pass that gains less ends the refinement: rounding is reached, or the position is singular.
+// A pass that gains less ends the refinement: rounding is reached, the position is singular, or redundant rows
+// disagree.
 constexpr double kStagnation = 0.97;
 // A pass that gains less than this is near a singular position: what is left of the residual there moves x far along
 // the freedom that opens, so that refinement goes on to rounding, whatever tolerance is enough elsewhere.
@@ -99,7 +100,7 @@ void BlockSaddleSolver<Rows>::refine(const SaddleIterate& at, bool from_zero, do
       const double tolerance = now > kSlow * before ? std::min(settings.tolerance, kRounding) : settings.tolerance;
       if (residual_ratio_ <= tolerance) return;
       if (!(now < kStagnation * before)) {
-        if (k > settings.least) take_back(alpha_, x, nu, residual, correction);
+        if (c_ == 0 && k > settings.least) take_back(alpha_, x, nu, residual, correction);
         return;
       }
       if (last) return;

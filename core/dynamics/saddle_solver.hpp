@@ -16,7 +16,9 @@
 // adjoint solves are exact transposes whatever their convergence.
 //
 // Redundant rows that disagree leave a residual s with J's = 0 that no x removes. Where c > 0, and alpha is the same in
-// all rows, nu lacks -s/c: it is added, and further passes remove what part of it was not redundant.
+// all rows, nu lacks -s/c: it is added, and further passes remove what part of it was not redundant. Where c = 0, each
+// pass moves x by as much along directions that J hardly holds: one that gains nothing is taken back, so that tangent
+// and adjoint solves have equally many.
 #pragma once
 
 #include <vector>

@@ -39,7 +39,7 @@ inline void set_rosenbrock_rates(const Method& rk, int i, double h, const Eigen:
 
 // Stage states Y and the upper half (v) of their derivatives K, from the lower half (qdd) of K, for a group whose
 // earlier stages are known:  V_i = v0 + h sum_j A_ij a_j,   Q_i = q0 + h sum_j A_ij V_j.
-// Of a Rosenbrock method V_j is not the upper half of k_j, which is v0 + h sum_l beta_jl a_l.
+// In a Rosenbrock method V_j is not the upper half of k_j, which is v0 + h sum_l beta_jl a_l.
 inline void set_group_stages(const Method& rk, const StageGroup& g, double h, const Eigen::VectorXd& y0,
                              Eigen::MatrixXd& Y, Eigen::MatrixXd& K) {
   const Eigen::Index n = y0.size() / 2;

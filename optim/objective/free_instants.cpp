@@ -176,7 +176,7 @@ struct FreeInstants::Scan {
     return (motion.s.col(static_cast<Index>(last())) - motion.s.col(0)).norm() <= kClosed * extent.norm();
   }
 
-  // Of the points of a file in the order of its rows: the best nodes in that order, then minima downhill from these.
+  // Finds the best nodes in the order of a file's rows, then goes downhill from these to minima.
   // Neighbours whose minima stand in the other order have one instant.
   std::vector<Block> in_order(const Points& rows) const {
     MatrixXd D(static_cast<Index>(rows.size()), motion.s.cols());

@@ -49,8 +49,8 @@ class FreeInstants {
     double tau = 0;         // [s]
     std::size_t block = 0;  // points of one block have one instant
   };
-  // Of each point. progress: as in RunOptions. Throws NoMotion, and std::invalid_argument where drives leave something
-  // free.
+  // Returns the instant of each point. progress: as in RunOptions. Throws NoMotion, and std::invalid_argument where
+  // drives leave something free.
   std::vector<Instant> nearest(const Mechanism& mechanism, const std::function<bool(double t)>& progress = {}) const;
   // Whether an instant lies within the run, so that dD/dt = 0 there.
   bool is_inside(double tau) const { return tau > settings_.start_time && tau < settings_.end_time; }

@@ -49,7 +49,7 @@ class Objective {
   Extreme extreme() const { return mean_ ? mean_->extreme : Extreme::none; }
   bool is_extreme() const { return extreme() != Extreme::none; }
   std::vector<ObjectivePart> parts() const;
-  // Of a part; what is absent stays absent. Throws as instants_of().
+  // Returns the cost of a part; what is absent stays absent. Throws as instants_of().
   Cost cost(const Mechanism& mechanism, const ObjectivePart& part = {}, double x0 = 0,
             const Progress& progress = {}) const;
   Jet of_integral(double I, const ObjectivePart& part = {}, double x0 = 0) const;  // its mean, without the factor

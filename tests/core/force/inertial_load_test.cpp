@@ -30,7 +30,7 @@ Vector3<T> turned_by(const Eigen::VectorX<T>& q, const Vector3<T>& x, double sig
   return x + 2.0 * (q(3) * c + e.cross(c));
 }
 
-// What mass m and inertia j (1, 2, 0; xy 0.3) add to the coupler: rho(m) (g - rddot), -(J omegadot + omega x J omega).
+// Mass m and inertia j (1, 2, 0; xy 0.3) load the coupler by rho(m) (g - rddot), -(J omegadot + omega x J omega).
 struct Ballast final : DifferentiatedInertia<Ballast> {
   Eigen::Index m, j, g;
   Ballast(Eigen::Index mass, Eigen::Index inertia, Eigen::Index gravity) : m(mass), j(inertia), g(gravity) {}

@@ -2,7 +2,7 @@
 //   Hairer, Norsett, Wanner, "Solving Ordinary Differential Equations I" (1993), section II.2:
 //   a method has order p where sum_i b_i Phi_i(t) = 1/gamma(t) for every rooted tree t of up to p nodes,
 //   gamma(t) = |t| prod gamma(children),   Phi_i(t) = prod over children u of sum_j A_ij Phi_j(u).
-// Of a Rosenbrock method A_ij + gamma_ij takes the place of A_ij where a node has one child: "Solving Ordinary
+// In a Rosenbrock method A_ij + gamma_ij takes the place of A_ij where a node has one child: "Solving Ordinary
 // Differential Equations II" (1996), section IV.7.
 #pragma once
 
