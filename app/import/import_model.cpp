@@ -99,13 +99,7 @@ std::string comment(const std::vector<std::string>& lines, const char* heading) 
   return fmt::format("// {}\n//   {}\n", heading, fmt::join(lines, "\n//   "));
 }
 
-}  // namespace
-
-ImportedProblem import_model(const std::filesystem::path& model) {
-  return import_model_text(read_text_file(model), model);
-}
-
-ImportedProblem import_model_text(const std::string& text, const std::filesystem::path& file) {
+ImportedProblem imported_from(const std::string& text, const std::filesystem::path& file, const auto& warnings) {
   const std::string name = file.string();
   const XmlElement root = parse_xml(text, name);
   ModelErrors errors(name);
@@ -132,7 +126,7 @@ ImportedProblem import_model_text(const std::string& text, const std::filesystem
         fmt::format("line {}: {}{}", unread.line, unread.what,
                     std::ranges::find(kActs, unread.what) == kActs.end() ? "" : " (may change the motion)"));
   const std::string json = text_of(problem);
-  imported.warnings = warnings_of(checked(json, model, name), model);
+  imported.warnings = warnings(checked(json, model, name), model);
   for (std::vector<std::string>* list : {&imported.changed, &imported.dropped, &imported.warnings})
     for (std::string& words : *list)
       std::ranges::replace_if(
@@ -144,6 +138,16 @@ ImportedProblem import_model_text(const std::string& text, const std::filesystem
                   comment(imported.dropped, "Dropped (kinds of elements and attributes, with their first line):") +
                   json;
   return imported;
+}
+
+}  // namespace
+
+ImportedProblem import_model(const std::filesystem::path& model) {
+  return imported_from(read_text_file(model), model, warnings_of);
+}
+
+ImportedProblem read_model_text(const std::string& text, const std::filesystem::path& model) {
+  return imported_from(text, model, [](const Problem&, const ImportedModel&) { return std::vector<std::string>{}; });
 }
 
 }  // namespace mbsopt

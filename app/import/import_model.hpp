@@ -21,7 +21,7 @@ struct ImportedProblem {
 
 ImportedProblem import_model(const std::filesystem::path& model);
 
-// The same from a text; `model` stands for the file in findings.
-ImportedProblem import_model_text(const std::string& text, const std::filesystem::path& model);
+// The same from a text, without warnings: no mechanism is assembled. `model` stands for the file in findings.
+ImportedProblem read_model_text(const std::string& text, const std::filesystem::path& model);
 
 }  // namespace mbsopt

@@ -12,7 +12,7 @@ using fuzz::expect;
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view input = fuzz::text_of(data, size);
   try {
-    const ImportedProblem imported = import_model_text(std::string(input), "model.xml");
+    const ImportedProblem imported = read_model_text(std::string(input), "model.xml");
     try {
       read_problem_text(imported.text, "model.json");
     } catch (const InputError& error) {
