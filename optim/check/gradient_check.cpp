@@ -83,6 +83,7 @@ class Check {
         check_identity();
         check_taylor();
         say_rounding();
+        say_kinks();
       }
     }
     compare_with_cvodes();
@@ -409,6 +410,35 @@ class Check {
                     "of them, which is more than methods may differ by; \"linear_solver\": \"quasidefinite\" has no "
                     "such rounding",
                     f.alpha, worst));
+  }
+
+  // psi(+-h) = psi + s h +- b h + O(h^2) beside a kink: the slopes s - b and s + b differ at its two sides.
+  // b(h) = (psi(h) + psi(-h) - 2 psi)/(2h) falls as h where psi is smooth, and not at all at a kink.
+  void say_kinks() {
+    for (const CheckedEntry& e : result_.entries) {
+      const auto failed = [](const std::optional<Verdict>& v) { return v && !passes(*v); };
+      const bool frozen = failed(e.frozen_verdict);
+      if (!frozen && !failed(e.free_verdict)) continue;
+      const auto at = [](const auto& names, const std::string& name) {
+        return static_cast<Index>(std::ranges::find(names, name) - names.begin());
+      };
+      const Index i = at(result_.objectives, e.objective), k = at(result_.parameters, e.parameter);
+      double b = kNaN, wider = kNaN;  // at h and 2h, the smallest steps at which psi's rounding does not count
+      for (auto rung = rungs_.rbegin(); rung != rungs_.rend(); ++rung) {
+        const auto& [plus, minus] = rung->second[frozen ? 0 : 1];
+        if (rung->first.first != k || plus.size() == 0 || minus.size() == 0) continue;
+        const double bend = plus(i) + minus(i) - 2 * result_.psi(i);
+        if (!(std::abs(bend) > kEstimateTrust * psi_rounding_(i))) break;
+        wider = b, b = bend / (2 * rung->first.second);
+      }
+      constexpr double kFalls = 0.75;  // between 1/2 of a smooth psi and 1 of a kink
+      const double s = frozen ? e.frozen : e.free;
+      if (!(b / wider > kFalls) || std::abs(e.tlm - s) > std::abs(b) / kFalls) continue;
+      result_.warnings.push_back(fmt::format(
+          "{} is not smooth in {}: its slope is {:.6g} below the value and {:.6g} above it, as at a norm or "
+          "an absolute value that is zero. There is no derivative",
+          e.objective, e.parameter, s - b, s + b));
+    }
   }
 
   // Entries of an objective below this size are compared with it.

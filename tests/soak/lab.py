@@ -16,6 +16,7 @@ SWEEP_DOUBT = re.compile(r"rounding|masses differ|cannot change|penalty|contradi
                          r"derivatives leave out|give way", re.IGNORECASE)
 # and why two models do, whose steps may differ.
 STEP_DOUBT = re.compile(SWEEP_DOUBT.pattern + "|do not resolve|not determined", re.IGNORECASE)
+KINK = re.compile(r"is not smooth in \w+: its slope")  # of `check`
 FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh", "pi")}
 
 

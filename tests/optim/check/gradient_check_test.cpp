@@ -152,6 +152,25 @@ TEST_CASE("the Taylor remainder of a linear objective has no slope, and that is 
   CHECK(check.passed());
 }
 
+TEST_CASE("a kink is named with the slopes at its two sides", "[check]") {
+  Problem problem = five_bar::problem(1e-6);
+  problem.scene.simulation.end_time = 0.2;
+  testing::add_parameters(problem.scene, {{"p", 0.1 + 0.2}});  // 0.3 and its last place
+  ObjectiveSpec sum;
+  sum.name = "sum";
+  sum.parameters_only = Expression::parse("5*p + 2*sqrt((p - 0.3)^2)");
+  problem.objectives = {sum};
+  for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0};
+  const GradientCheck check = check_gradients(problem, options);
+  REQUIRE(check.ran);
+  CHECK_FALSE(check.passed());
+  REQUIRE(check.warnings.size() == 1);
+  CHECK_THAT(check.warnings[0],
+             Catch::StartsWith("sum is not smooth in p: its slope is 3 below the value and 7 above it"));
+}
+
 TEST_CASE("a wrong derivative of a user's cost shows in frozen differences, not in TLM against adjoint", "[check]") {
   Problem problem = five_bar::problem(1e-8);
   problem.scene.simulation.end_time = 1;
