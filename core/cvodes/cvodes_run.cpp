@@ -367,13 +367,9 @@ SimulationResult ForwardRun::finish() {
   SimulationStatistics& s = result_.statistics;
   s.rhs_evaluations += flow_.evaluations();
   s.factorisations += flow_.dynamics().solver().factorisations() + linear_solver_.factorisations();
-  const double worst = flow_.worst_residual();
-  s.max_acceleration_residual = worst;
-  if (worst > 0) {
-    s.max_acceleration_residual =
-        std::max(worst, error_of_weak_joints(mechanism_, settings_.formulation, worst, result_.last_good_time, y_now_,
-                                             flow_.angles_at(result_.last_good_time)));
-  }
+  const double worst = flow_.worst_residual(), t = result_.last_good_time;
+  s.weak_joints_error = error_of_weak_joints(mechanism_, settings_.formulation, worst, t, y_now_, flow_.angles_at(t));
+  s.max_acceleration_residual = std::max(worst, s.weak_joints_error);
   s.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   return std::move(result_);
 }
