@@ -192,6 +192,27 @@ std::vector<NewValue> new_values(const DesignResult& design) {
   return values;
 }
 
+// Where the linkage does not close at the values of the file, the design starts from some at which it does.
+void lead_to_closing(Run& run, SimulatedMotion& before) {
+  DesignOptions options;
+  options.simulation_progress = run.watched("closing the linkage");
+  const std::optional<Problem> closing = problem_that_closes(run.problem, options);
+  if (!closing) return;
+  const Eigen::VectorXd rho = parameter_values(closing->scene);
+  SimulatedMotion motion = simulated_motion(run, rho);
+  if (!motion.simulation.ok()) return;
+  std::string start;
+  for (const std::string& name : run.problem.design->variables) {
+    const auto p = std::ranges::find(closing->scene.parameters, name, &Parameter::name);
+    start += fmt::format("{}{} = {}", start.empty() ? "" : ", ", name, significant(p->value));
+  }
+  run.warn(
+      fmt::format("the linkage does not close at the values of the file ({}): the design starts at {}, where it does",
+                  before.simulation.message, start));
+  run.start_from(closing->scene.parameters);
+  before = std::move(motion);
+}
+
 }  // namespace
 
 int design_command(const CommandContext& context) {
@@ -200,7 +221,8 @@ int design_command(const CommandContext& context) {
   if (!run.problem.design) throw std::invalid_argument("design: missing; it says what to minimise and what may change");
   run.start();
   if (!settle_accuracy(run)) return run.finish();
-  const SimulatedMotion before = simulated_motion(run, parameter_values(scene));
+  SimulatedMotion before = simulated_motion(run, parameter_values(scene));
+  if (!before.simulation.ok() && !interrupted()) lead_to_closing(run, before);
   if (!before.simulation.ok()) {
     interrupted() ? run.stopped("nothing was designed yet")
                   : run.failed(before.simulation.message, before.simulation.last_good_time);

@@ -53,6 +53,7 @@ class Run {
   // In place of what the file says (accuracy_results.hpp).
   void simulate_with(const SimulationSettings& settings) { problem_.scene.simulation = settings; }
 
+  void start_from(const std::vector<Parameter>& parameters) { problem_.scene.parameters = parameters; }
   void take_poses(const std::vector<Body>& bodies) { problem_.scene.bodies = bodies; }
 
   // How it ended, unless all went well.

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
+
+#include "optim/problem/variable_scaling.hpp"
 
 namespace mbsopt {
 namespace {
 
-constexpr double kSameOptimum = 1e-3;  // of the range of a parameter
+constexpr double kSameOptimum = 1e-3;  // of the range of a parameter, in its scale
 
 bool is_an_optimum(const Json& record) {
   const std::string status = record.value("status", "");
@@ -23,8 +26,10 @@ bool same_optimum(const Json& a, const Json& b, const Scene& scene) {
     const auto parameter = std::find_if(scene.parameters.begin(), scene.parameters.end(),
                                         [&, key = name](const Parameter& p) { return p.name == key; });
     if (parameter == scene.parameters.end() || !parameter->lower || !parameter->upper) continue;
-    const double range = *parameter->upper - *parameter->lower;
-    if (std::abs(value.get<double>() - b["parameters"][name].get<double>()) > kSameOptimum * range) return false;
+    const VariableScaling scaling({*parameter});
+    const auto x = [&](const Json& rho) { return scaling.to_x(Eigen::VectorXd::Constant(1, rho.get<double>()))(0); };
+    const double range = scaling.x_upper()(0) - scaling.x_lower()(0);
+    if (std::abs(x(value) - x(b["parameters"][name])) > kSameOptimum * range) return false;
   }
   return true;
 }
@@ -58,6 +63,17 @@ SearchedOptima searched(const std::vector<DistinctOptimum>& optima) {
   SearchedOptima found;
   for (const DistinctOptimum& o : optima) found.searches += o.starts, ++found.optima;
   return found;
+}
+
+bool all_found(const std::vector<Json>& ranked, const Scene& scene) {
+  std::map<long, std::vector<Json>> by_mode;
+  for (const Json& record : ranked) {
+    if (!record["objective"].is_number()) continue;
+    by_mode[record.contains("assembly_mode") ? record["assembly_mode"]["mode"].get<long>() : 0].push_back(record);
+  }
+  return !by_mode.empty() && std::ranges::all_of(by_mode, [&](const auto& mode) {
+    return searched(distinct_optima(mode.second, scene)).all_found();
+  });
 }
 
 }  // namespace mbsopt

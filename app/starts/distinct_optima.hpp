@@ -6,7 +6,8 @@
 //   w (n - 1)/(n - w - 2), n > w + 2         (n - w - 1)(n + w)/(n (n - 1))
 //
 // C. G. E. Boender, A. H. G. Rinnooy Kan, "Bayesian stopping rules for multistart global optimization methods",
-// Mathematical Programming 37 (1987) 59-80. The search ends where the first is below w + 1/2.
+// Mathematical Programming 37 (1987) 59-80. The search ends where the first is below w + 1/2, in each assembly mode:
+// each has optima of its own, and one where few searches converge says little of them.
 #pragma once
 
 #include <optional>
@@ -19,7 +20,7 @@ namespace mbsopt {
 
 inline constexpr double kFeasible = 1e-6;  // violation relative to the bounds: what ranks as feasible
 
-// The same within 1e-3 of the range of each parameter that has bounds.
+// The same within 1e-3 of the range of each parameter that has bounds; of its logarithm where the scale is one.
 bool same_optimum(const Json& a, const Json& b, const Scene& scene);
 
 struct DistinctOptimum {
@@ -37,5 +38,8 @@ struct SearchedOptima {
   bool all_found() const { return expected() && *expected() < static_cast<double>(optima) + 0.5; }
 };
 SearchedOptima searched(const std::vector<DistinctOptimum>& optima);
+
+// Whether the rule holds in each assembly mode that was searched.
+bool all_found(const std::vector<Json>& ranked, const Scene& scene);
 
 }  // namespace mbsopt

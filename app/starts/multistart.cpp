@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 #include <tuple>
 
@@ -85,7 +86,7 @@ void print(const std::vector<DistinctOptimum>& optima, const SearchedOptima& fou
   out << fmt::format("{} in {} that converged", counted(found.optima, "optimum", "optima"),
                      counted(found.searches, "search", "searches"));
   if (found.expected())
-    out << fmt::format("; {:.3g} are expected in all, and {:.0f} % of further searches at known ones{}",
+    out << fmt::format("; {:.3g} are expected in all, and {:.0f} % of further searches that converge at known ones{}",
                        *found.expected(), 100 * found.covered(), all_found ? ": the search ends" : "");
   out << '\n';
 }
@@ -148,8 +149,8 @@ MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSp
               [](const Json& a, const Json& b) { return rank(a) < rank(b); });
   };
   const int batch = spec.until_all_found ? kBatch : spec.starts;
-  bool all_found = false;
-  for (int first = 0; first < spec.starts && !all_found && !outcome.interrupted; first += batch) {
+  bool ends = false;
+  for (int first = 0; first < spec.starts && !ends && !outcome.interrupted; first += batch) {
     const int last = std::min(first + batch, spec.starts);
     std::vector<int> jobs;
     for (int start = first; start < last; ++start)
@@ -159,7 +160,11 @@ MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSp
     });
     outcome.interrupted = outcome.interrupted || outcome.ranked.size() < static_cast<std::size_t>(last);
     sort();
-    all_found = spec.until_all_found && searched(distinct_optima(outcome.ranked, run.problem.scene)).all_found();
+    if (!spec.until_all_found) continue;
+    std::vector<Json> looked_at;  // a resumed run may know starts of a later batch
+    std::ranges::copy_if(outcome.ranked, std::back_inserter(looked_at),
+                         [&](const Json& record) { return number_of(record) < last; });
+    ends = all_found(looked_at, run.problem.scene);
   }
   run.progress.finish();
 
@@ -186,8 +191,8 @@ MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSp
   run.context.out << fmt::format("{}, seed {}: {} at the best optimum\n",
                                  counted(static_cast<long>(outcome.ranked.size()), "start"), *spec.seed, same);
   const std::vector<DistinctOptimum> optima = distinct_optima(outcome.ranked, run.problem.scene);
-  describe(optima, searched(optima), all_found, result);
-  print(optima, searched(optima), all_found, run.context.out);
+  describe(optima, searched(optima), ends, result);
+  print(optima, searched(optima), ends, run.context.out);
   return outcome;
 }
 

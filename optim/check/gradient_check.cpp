@@ -232,9 +232,17 @@ class Check {
     if (!frozen && result_.discrete) on_base_steps_(i, k) = d.largest(i) < 0.75 * ladder.other_steps;
   }
 
+  // Of a difference: by its ladder, by the rounding of psi, and on steps of its own by the integration.
+  double own_error(const Ladder& ladder, Index i, Index k, bool frozen) const {
+    const LadderDerivative& d = ladder.d;
+    if (!(d.step(i) > 0)) return kInfinity;
+    const bool on_base_steps = frozen || d.largest(i) < 0.75 * ladder.other_steps;
+    return d.error(i) + psi_rounding_(i) / d.step(i) + (on_base_steps ? 0 : integration_error_of(i, k, d.step(i)));
+  }
+
   // Steps that are coarse for psi may show a plateau that is no derivative (a coordinate of kilometres, of which
   // metres matter). Where a difference disagrees, a ladder that begins below the first holds, if it contradicts it by
-  // more than its own error.
+  // more than its own error: smaller steps magnify rounding and jumps, which must not excuse a wrong gradient.
   bool difference_finer() {
     const Index m = result_.psi.size(), P = rho_.size();
     const double finer = std::pow(0.5, options_.rungs);
@@ -251,7 +259,8 @@ class Check {
           if (!disagrees(i)) continue;
           if (!ladder) ladder = ladder_of(k, frozen, options_.relative_step * size_(k) * finer);
           const double coarse = (frozen ? result_.frozen : result_.free)(i, k);
-          if (!(std::abs(ladder->d.derivative(i) - coarse) > kEstimateTrust * ladder->d.error(i))) continue;
+          if (!(std::abs(ladder->d.derivative(i) - coarse) > kEstimateTrust * own_error(*ladder, i, k, frozen)))
+            continue;
           take(*ladder, i, k, frozen);
           if (!frozen) add_integration_error(i, k);
           taylor_size_(k) = std::min(taylor_size_(k), ladder->d.largest(i) / options_.relative_step);
@@ -316,7 +325,11 @@ class Check {
   }
   void add_integration_error(Index i, Index k) {
     if (!on_base_steps_(i, k) && std::isfinite(free_error_(i, k)))
-      free_error_(i, k) += integration_.psi_rho(i, k) + std::max(integration_.psi(i), jump_(i, k)) / free_step_(i, k);
+      free_error_(i, k) += integration_error_of(i, k, free_step_(i, k));
+  }
+  // Of a free difference by steps of size `step`.
+  double integration_error_of(Index i, Index k, double step) const {
+    return integration_.psi_rho(i, k) + std::max(integration_.psi(i), jump_(i, k)) / step;
   }
 
   // Rounding scatters psi and its derivatives over points that are some units in the last place apart: a few, or some

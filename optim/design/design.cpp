@@ -558,6 +558,13 @@ int design_modes(const Problem& problem, const DesignOptions& options) {
   return static_cast<int>(modes_at(problem.scene, options).modes.size());
 }
 
+std::optional<Problem> problem_that_closes(const Problem& problem, const DesignOptions& options) {
+  int steps = 0;
+  Problem found = closed(problem, options, steps);
+  if (steps == 0) return {};
+  return found;
+}
+
 DesignResult run_design(const Problem& given, const DesignOptions& options) {
   int steps = 0;
   const Problem problem = closed(given, options, steps);

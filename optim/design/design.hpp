@@ -128,6 +128,10 @@ struct DesignOptions {
 // hold).
 DesignResult run_design(const Problem& problem, const DesignOptions& options = {});
 
+// The problem from values at which its linkage closes, where it does not at its own and such values are found; else
+// none. run_design does the same. (closing.hpp)
+std::optional<Problem> problem_that_closes(const Problem& problem, const DesignOptions& options = {});
+
 // The sharpness of the maximum over load cases that a run from the problem's own values would take; none where it takes
 // none. Runs from several starts share one.
 std::optional<double> design_sharpness(const Problem& problem, const DesignOptions& options = {});

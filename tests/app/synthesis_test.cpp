@@ -420,3 +420,13 @@ TEST_CASE("a start that does not close is led to one that does, by its closure d
   CHECK(result.variables[1].initial == 0.3);
   CHECK(run_design(eighteen_points(), options).closing_steps == 0);
 }
+
+TEST_CASE("design: values of the file that do not close are led to some that do, with a warning", "[synthesis]") {
+  const TemporaryFolder folder;
+  const Designed d = designed_points(folder, and_also(kLeastSquares, {"--set", "parameters.crank.value=2"}));
+  INFO(d.outcome.out << d.outcome.err);  // the search may be long: it is enough that it has begun
+  CHECK_THAT(d.outcome.err, Contains("does not close at the values of the file") && Contains("the design starts at"));
+  REQUIRE(d.result.contains("optimizer"));
+  CHECK(d.result.at("optimizer").at("objective_final") < d.result.at("optimizer").at("objective_initial"));
+  CHECK(d.result.at("parameters").at("crank").at("initial") != 2);
+}

@@ -508,6 +508,38 @@ TEST_CASE("the rule of Boender and Rinnooy Kan", "[multistart]") {
   CHECK(SearchedOptima{10, 2}.covered() == Approx(7 * 12. / 90));
 }
 
+namespace {
+
+Json ended_at(int start, double k, const char* status = "converged") {
+  return {{"start", start}, {"status", status}, {"objective", k}, {"parameters", {{"k", k}}}};
+}
+
+}  // namespace
+
+TEST_CASE("optima of a parameter with a logarithmic scale differ by their ratio", "[multistart]") {
+  Scene scene;
+  scene.parameters.push_back({"k", 100, 1.0, 1e4, ParameterScale::log});
+  const std::vector<Json> ranked{ended_at(0, 2), ended_at(1, 2.001), ended_at(2, 6), ended_at(3, 3000)};
+  const std::vector<DistinctOptimum> optima = distinct_optima(ranked, scene);
+  REQUIRE(optima.size() == 3);
+  CHECK(optima[0].starts == 2);
+}
+
+TEST_CASE("an assembly mode in which few searches converge keeps the search from its end", "[multistart]") {
+  Scene scene;
+  scene.parameters.push_back({"k", 100, 1.0, 1e4, ParameterScale::linear});
+  std::vector<Json> ranked;
+  for (int i = 0; i < 20; ++i) ranked.push_back(ended_at(i, 7));
+  CHECK(all_found(ranked, scene));
+  for (Json& record : ranked) record["assembly_mode"] = {{"mode", 0}, {"of", 2}};
+  CHECK(all_found(ranked, scene));
+  for (int i = 20; i < 40; ++i) {
+    ranked.push_back(ended_at(i, 9, "no_progress"));
+    ranked.back()["assembly_mode"] = {{"mode", 1}, {"of", 2}};
+  }
+  CHECK_FALSE(all_found(ranked, scene));
+}
+
 TEST_CASE("until all_found: starts end when no other optimum is expected, for any number of workers", "[multistart]") {
   const TemporaryFolder folder;
   const std::string file = folder.write("rod.json", kSwingingRod);
@@ -531,4 +563,27 @@ TEST_CASE("until all_found: starts end when no other optimum is expected, for an
     CHECK(multistart.at("expected_optima").get<double>() < static_cast<double>(optima.size()) + 0.5);
     CHECK_THAT(outcome.out, Contains("found by") && Contains("are expected in all") && Contains("the search ends"));
   }
+}
+
+TEST_CASE("resume: until all_found ends where it would have, whatever starts the journal knows", "[multistart]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("three.json", R"({
+    "parameters": {"g": {"value": 1.2, "lower": 0, "upper": 6}},
+    "bodies": [{"name": "b", "mass": 1, "inertia": [1, 1, 1]}],
+    "objectives": {"o": {"parameters_only": "cos(pi*g) + 0.01*g"}},
+    "design": {"minimize": "o", "variables": ["g"],
+               "multistart": {"starts": 100, "seed": 1, "until": "all_found"}}})");
+  const fs::path out = folder.path / "out";
+  REQUIRE(design(file, out.string()).exit_code == kDone);
+  const nlohmann::json whole = outcome_of(out);
+  REQUIRE(whole.at("multistart").at("finished") == 40);  // three optima: the rule does not hold after 20, but after 30
+  const std::string journal = content_of(out / kJournalFile);
+  std::size_t end = 0;
+  for (int line = 0; line < 31; ++line) end = journal.find('\n', end) + 1;
+  write_text(out / kJournalFile, journal.substr(0, end));
+  REQUIRE(journal_lines(out, "start") == 30);
+  const CommandOutcome outcome = run_command({"resume", out.string()});
+  INFO(outcome.out << outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  CHECK(outcome_of(out) == whole);
 }

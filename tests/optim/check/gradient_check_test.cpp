@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "tests/core/mechanism/moving_scenes.hpp"
 #include "tests/optim/five_bar.hpp"
 
 using namespace mbsopt;
@@ -18,6 +19,16 @@ struct WrongCost : RunningCost {
     out(0) += scale * 2 * y(0) * (1 + wrong_);
   }
   void add_g_rho(double, VecIn, VecIn, double, VecOut) const override {}
+
+ private:
+  double wrong_;
+};
+
+// x of the second body at the end, with a derivative that is wrong by some part of itself.
+struct WrongEnd : TerminalCost {
+  explicit WrongEnd(double part) : wrong_(part) {}
+  double value(VecIn y, VecIn) const override { return y(7); }
+  void adjoint_init(VecIn, VecIn, VecOut lambda, VecOut) const override { lambda(7) += 1 + wrong_; }
 
  private:
   double wrong_;
@@ -107,6 +118,50 @@ TEST_CASE("free differences that their integration error excuses still judge: wr
   REQUIRE(check.ran);
   const auto disagrees = [](const CheckedEntry& e) { return e.free_verdict == Verdict::disagrees; };
   CHECK(std::count_if(check.entries.begin(), check.entries.end(), disagrees) > 5);
+}
+
+// The delay of a signal moves the kinks at which steps end: its differences have steps of their own.
+TEST_CASE("finer differences do not excuse a wrong derivative by the errors that their steps magnify", "[check]") {
+  namespace t = mbsopt::testing;
+  Scene scene;
+  t::add_parameters(scene, {{"late", -0.113}});
+  scene.gravity = {0.0, 0.0, 0.0};
+  scene.bodies = {t::plain_body("cart", 1, {}, {0.1, 0.0, 0.0}), t::plain_body("trailer", 0.5, {}, {1.1, 0.0, 0.0})};
+  for (const Body& b : scene.bodies) {
+    Joint slide;
+    slide.name = "slide_" + b.name, slide.type = "translational", slide.body1 = "ground", slide.body2 = b.name;
+    slide.axis1 = slide.axis2 = t::vec("1", "0", "0");
+    scene.joints.push_back(slide);
+  }
+  Tsda left, right;
+  left.body2 = "cart", left.point1 = t::vec("-1", "0.5", "0");
+  left.stiffness = 200.0, left.damping = 2.0, left.free_length = 0.9;
+  right.body1 = "cart", right.body2 = "trailer", right.stiffness = 600.0, right.damping = 1.0, right.free_length = 0.9;
+  scene.forces = {{"left", left}, {"right", right}};
+  std::vector<double> times, push;
+  for (int i = 0; i <= 40; ++i)
+    times.push_back(0.05 * i), push.push_back(20 * std::sin(0.15 * i) + 0.5 * (i * 7919 % 13));
+  Signal u;
+  u.name = "u", u.interpolation = Interpolation::linear, u.delay = t::f("late");
+  u.curve = std::make_shared<const Curve>(Interpolation::linear, times, push);
+  scene.signals = {u};
+  PointForce motor;
+  motor.body = "trailer", motor.components = {t::f("u"), t::f("0"), t::f("0")};
+  scene.forces.push_back({"motor", motor});
+  scene.simulation.end_time = 1.8;
+  scene.simulation.integrator.type = "radau5";
+  scene.simulation.integrator.rtol = 1e-6, scene.simulation.integrator.atol = 1e-8;
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0}, options.continuous = false;
+  for (const double part : {0.0, 1e-1, 1e-2, -1e-2}) {
+    const Objective objective("x", nullptr, std::make_shared<WrongEnd>(part));
+    const GradientCheck check = check_gradients(scene, {objective}, options);
+    INFO(check.message);
+    REQUIRE(check.ran);
+    const CheckedEntry& late = check.entries.back();
+    INFO(part << ' ' << late.tlm << ' ' << late.free << " +- " << late.free_error);
+    CHECK(passes(*late.free_verdict) == (part == 0));
+  }
 }
 
 TEST_CASE("differences that cannot be evaluated have failed, they are not zero", "[check]") {
