@@ -161,7 +161,7 @@ TEST_CASE("identify --compare: the other file is checked before the fit, and fou
   held.replace(held.find("\"L\": {\"value\": 1"), 16, "\"L\": {\"value\": 1.01");
   const std::string other = folder.write("other.json", held);
   const auto compared = [&](const std::string& with, const std::string& out) {
-    return run_command({"identify", file, "--compare", with, "--out", folder.file(out)});
+    return run_command({"identify", file, "--compare", with, "--out", folder.file(out), "--keep-journal"});
   };
   const CommandOutcome good = compared(other, "out");
   INFO(good.err);
