@@ -56,7 +56,7 @@ TEST_CASE("identify: the parameter that made the motion is found, with its uncer
   CHECK(result.at("provenance").at("data_sha256").contains("swing.csv"));
 
   const std::string residuals = content_of(folder.path / "out/residuals.csv");
-  CHECK_THAT(residuals, Catch::StartsWith("experiment,channel,t,measured,model,residual\nswing,theta,0,"));
+  CHECK_THAT(residuals, Catch::StartsWith("experiment,channel,t,measured,model,residual,prediction\nswing,theta,0,"));
   CHECK_THAT(content_of(folder.path / "out/report.html"), Contains("residual of theta") &&
                                                               Contains("degrees of freedom") && Contains("rms/sigma") &&
                                                               Contains("condition number"));
