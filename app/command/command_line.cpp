@@ -171,6 +171,8 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
         ->type_name("FILE");
     sub.add_flag("--gradients", sweep.gradients, "derivatives in the varied parameters, too");
   }
+  if (name == "design" || name == "identify" || name == "sweep")
+    sub.add_flag("--keep-journal", options.keep_journal, "keep journal.jsonl when the run has come to a good end");
   if (name == "gradient") {
     sub.add_option("--method", options.method, "how gradients are computed")
         ->check(CLI::IsMember({"auto", "tlm", "adjoint", "cvodes_forward", "cvodes_adjoint", "fd"}))

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "app/report/motion_plots.hpp"
 #include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
@@ -46,7 +48,10 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
   for (const ExperimentFit& experiment : fit.experiments) {
     first.push_back(plots.size());
     for (const ChannelFit& channel : experiment.channels) {
-      FitPlot plot{experiment.name, without_unit(channel.column), "SI unit", {}, {}, {}, {}, experiment.validate};
+      FitPlot plot{.experiment = experiment.name,
+                   .channel = without_unit(channel.column),
+                   .unit = "SI unit",
+                   .validates = experiment.validate};
       for (const Sensor& sensor : problem.scene.sensors) {
         const ChannelSpec& spec =
             problem.identification->experiments[first.size() - 1].channels[plots.size() - first.back()];
@@ -63,6 +68,7 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
     plot.measured.push_back(row.measured);
     plot.model.push_back(row.model);
     plot.residual.push_back(row.scaled);
+    if (std::isfinite(row.prediction)) plot.prediction.push_back(row.prediction);
   }
   for (const ResidualRow& row : start.residuals) {
     FitPlot& plot = plots[first[row.experiment] + row.channel];

@@ -10,17 +10,36 @@
 #include "app/terminal/exit_code.hpp"
 
 namespace mbsopt {
+namespace {
+
+int nothing_left(const CommandContext& context, const std::string& command, const std::string& ended) {
+  const std::filesystem::path folder = context.options.problem_file;
+  context.out << fmt::format("{}: its '{}' came to its end ({}); there is nothing to go on with\n", folder.string(),
+                             command, ended);
+  if (context.json) *context.json << read_text_file(folder / "result.json");
+  return kDone;
+}
+
+// The command whose journal was removed at its good end; empty where there was none.
+std::string ended_well(const std::filesystem::path& folder) {
+  if (std::filesystem::exists(folder / kJournalFile) || !std::filesystem::exists(folder / "result.json")) return {};
+  const Json result = Json::parse(read_text_file(folder / "result.json"), nullptr, false);
+  const auto text = [&](const char* key) {
+    return result.is_object() && result.contains(key) && result[key].is_string() ? result[key].get<std::string>() : "";
+  };
+  const std::string command = text("command");
+  const bool resumes = command == "design" || command == "identify" || command == "sweep";
+  return text("program") == "mbsopt" && text("status") == "ok" && resumes ? command : "";
+}
+
+}  // namespace
 
 int resume_command(const CommandContext& context) {
   const std::filesystem::path folder = context.options.problem_file;
+  if (const std::string ended = ended_well(folder); !ended.empty()) return nothing_left(context, ended, "ok");
   const JournalContent journal = read_journal(folder);
   const std::string command = journal.header.value("command", "");
-  if (!journal.ended.empty() && journal.ended != "interrupted") {
-    context.out << fmt::format("{}: its '{}' came to its end ({}); there is nothing to go on with\n", folder.string(),
-                               command, journal.ended);
-    if (context.json) *context.json << read_text_file(folder / "result.json");
-    return kDone;
-  }
+  if (!journal.ended.empty() && journal.ended != "interrupted") return nothing_left(context, command, journal.ended);
   const auto arguments = journal.header.at("arguments").get<std::vector<std::string>>();
   CommandOptions options = options_of(arguments);  // as it was begun, but for where we are now
   options.threads = context.options.threads, options.quiet = context.options.quiet;

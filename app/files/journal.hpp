@@ -2,7 +2,7 @@
 // keeps an appended line when the run is killed. Lines are flushed to the disk, for a machine that stops: evaluations
 // at most every 100 ms, other lines at once.
 //
-//   {"journal": 2, "command": "design", "input": "../five_bar.json", ...}    the first line: what is run, and on what
+//   {"journal": 3, "command": "design", "input": "../five_bar.json", ...}    the first line: what is run, and on what
 //   {"point": {"x": [...], "f": 0.12, "f_x": [...], ...}}                    an evaluation   (point_records.hpp)
 //   {"hessians": {...}}                                                      second derivatives
 //   {"residuals": {...}}                                                     an experiment   (residual_records.hpp)

@@ -199,7 +199,7 @@ void add_profiles(HtmlPage& page, const Json& result) {
 
 constexpr std::size_t kFewest = 20;  // samples, below which a histogram says nothing
 
-constexpr std::size_t kInitialColour = 5;
+constexpr std::size_t kInitialColour = 5, kBandColour = 4;
 
 // What validates has other colours than what is fitted.
 std::size_t data_colour(const FitPlot& fit) { return fit.validates ? 3 : 0; }
@@ -272,6 +272,12 @@ void add_fit(HtmlPage& page, const FitPlot& fit) {
                 .y_label = fmt::format("{} [{}]", fit.channel, fit.unit)};
   plot.series.push_back({"measured", fit.times, fit.measured, Mark::points, {}, data});
   plot.series.push_back({"model", fit.times, fit.model, Mark::line, {}, model});
+  if (!fit.prediction.empty() && fit.prediction.size() == fit.times.size())
+    for (const double side : {1.0, -1.0}) {
+      PlotSeries band{side > 0 ? "95 % of measurements" : "", fit.times, fit.model, Mark::line, {}, kBandColour};
+      for (std::size_t i = 0; i < band.y.size(); ++i) band.y[i] += side * fit.prediction[i];
+      plot.series.push_back(std::move(band));
+    }
   if (is_comparable(fit.initial, fit.measured))
     plot.series.push_back({"initial model", fit.initial_times, fit.initial, Mark::dashed, {}, kInitialColour});
   page.plot(plot);

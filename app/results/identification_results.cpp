@@ -128,10 +128,12 @@ Json to_json(const ExperimentFit& e) {
                                   {"sigma", c.sigma},
                                   {"sigma_is_estimated", c.sigma_is_estimated},
                                   {"beyond_scale", c.beyond_scale},
+                                  {"within_prediction", c.within_prediction},
                                   {"residuals", to_json(c.analysis)}};
   }
   if (e.influence) json["influence"] = {{"parameter", e.influence->parameter}, {"std_errors", e.influence->change}};
   for (const FittedParameter& p : e.refitted) json["refitted"][p.name] = to_json(p);
+  if (e.rms_scaled_at_start) json["rms_scaled_at_start"] = *e.rms_scaled_at_start;
   if (!e.message.empty()) json["message"] = e.message;
   return json;
 }
@@ -261,11 +263,12 @@ Trajectory history_of(const IdentificationResult& fit) {
 }
 
 std::string residuals_csv(const IdentificationResult& fit) {
-  std::string text = "experiment,channel,t,measured,model,residual\n";
+  std::string text = "experiment,channel,t,measured,model,residual,prediction\n";
   for (const ResidualRow& row : fit.residuals) {
     const ExperimentFit& experiment = fit.experiments[row.experiment];
-    fmt::format_to(std::back_inserter(text), "{},{},{:.17g},{:.17g},{:.17g},{:.17g}\n", csv_cell(experiment.name),
-                   csv_cell(experiment.channels[row.channel].column), row.t, row.measured, row.model, row.scaled);
+    fmt::format_to(std::back_inserter(text), "{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n",
+                   csv_cell(experiment.name), csv_cell(experiment.channels[row.channel].column), row.t, row.measured,
+                   row.model, row.scaled, row.prediction);
   }
   return text;
 }

@@ -41,6 +41,7 @@ struct CommandOptions {
   int threads = 0;                    // --threads, also worker processes; 0: as many as the machine has
   bool quiet = false;                 // --quiet
   bool json = false;                  // --json: only result.json on standard output
+  bool keep_journal = false;          // --keep-journal of design, identify and sweep
   bool resume = false;                // go on with the journal in `out`
 };
 

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "app/files/atomic_file.hpp"
+#include "app/terminal/exit_code.hpp"
 #include "app/terminal/interrupt.hpp"
 #include "optim/problem/seed.hpp"
 
@@ -100,6 +102,11 @@ int LongRun::finish() {
   const int exit_code = run_.finish();
   finished_ = true;
   if (!failure_) journal_->add("ended", run_.result["status"]);
+  if (exit_code == kDone && !run_.context.options.keep_journal) {
+    journal_.reset();
+    std::error_code ignored;  // a journal that stays says that the run has ended
+    std::filesystem::remove(run_.folder.path() / kJournalFile, ignored);
+  }
   return exit_code;
 }
 

@@ -5,7 +5,7 @@
 //   long_run.begin();                                     // throws OutputError when the input has changed
 //   long_run.earlier().starts ...                         // what was done before
 //   long_run.add("start", record);
-//   return long_run.finish();                             // that of Run, and its status into the journal
+//   return long_run.finish();                             // that of Run; what came to a good end needs no journal
 #pragma once
 
 #include <memory>
@@ -27,6 +27,7 @@ class LongRun {
   long seed(const std::string& of, const std::optional<long>& given);
   void begin();  // once; further calls do nothing
   // The exit code. Only when all files are written has the journal come to its end: till then `resume` writes them.
+  // Then it is removed, unless the run failed or --keep-journal asks for it.
   int finish();
 
   const JournalContent& earlier() const { return earlier_; }

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "app/files/base64.hpp"
 #include "app/files/journal.hpp"
 
 namespace mbsopt {
@@ -19,7 +20,8 @@ constexpr Index kMostNumbers = 50'000;
 constexpr Index kMostColumns = 1'000'000;  // of a damaged line, before memory is asked for
 
 Experiment::Residuals residuals_of(const Json& json) {
-  const auto z = json.at("z").get<std::vector<double>>(), z_u = json.at("z_u").get<std::vector<double>>();
+  const auto numbers = [](const Json& text) { return doubles_of(text.get_ref<const std::string&>()); };
+  const std::vector<double> z = numbers(json.at("z")), z_u = numbers(json.at("z_u"));
   const auto at = json.at("at").get<std::vector<Index>>();  // of the columns of z_u that are not zero
   const Index rows = static_cast<Index>(z.size()), columns = json.at("columns").get<Index>(),
               written = static_cast<Index>(at.size());
@@ -34,7 +36,7 @@ Experiment::Residuals residuals_of(const Json& json) {
   r.steps = json.at("steps").get<long>();
   if (!json.contains("ends")) return r;
   const auto of = [&](const char* key, VectorXd& s, MatrixXd& s_u) {
-    const auto values = json.at("ends").at(key).get<std::vector<double>>();
+    const std::vector<double> values = numbers(json.at("ends").at(key));
     const Index n = static_cast<Index>(values.size()) / (1 + columns);
     if (n * (1 + columns) != static_cast<Index>(values.size())) throw std::length_error("a matrix of another size");
     s = Eigen::Map<const VectorXd>(values.data(), n);
@@ -78,12 +80,12 @@ void JsonResidualRecords::record(const Asked& asked, const Experiment::Residuals
                {"steps", found.steps},
                {"columns", found.z_u.cols()},
                {"at", at},
-               {"z", std::vector<double>(found.z.begin(), found.z.end())},
-               {"z_u", std::vector<double>(z_u.data(), z_u.data() + z_u.size())}};
+               {"z", base64_of({found.z.data(), static_cast<std::size_t>(found.z.size())})},
+               {"z_u", base64_of({z_u.data(), static_cast<std::size_t>(z_u.size())})}};
   const auto add = [&](const char* key, const VectorXd& s, const MatrixXd& s_u) {  // s, then the columns of s_u
     std::vector<double> values(s.begin(), s.end());
     values.insert(values.end(), s_u.data(), s_u.data() + s_u.size());
-    content["ends"][key] = values;
+    content["ends"][key] = base64_of(values);
   };
   if (found.start.size() + found.end.size() > 0)
     add("start", found.start, found.start_u), add("end", found.end, found.end_u);

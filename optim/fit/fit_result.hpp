@@ -33,8 +33,9 @@ struct ChannelFit {
   double rms = 0;                        // of measured - model, in the column's units
   double rms_scaled = 0;                 // of z
   double sigma = 1;
-  bool sigma_is_estimated = false;  // not yet where the fit was stopped before
-  ResidualAnalysis analysis;        // of z
+  bool sigma_is_estimated = false;                     // not yet where the fit was stopped before
+  ResidualAnalysis analysis;                           // of z
+  double within_prediction = FitStatistics::kUnknown;  // share of its samples within their prediction intervals
   std::size_t beyond_scale = 0;  // samples with |z| above the scale of the loss, which count for less than their square
 };
 
@@ -52,16 +53,18 @@ struct ExperimentFit {
   std::size_t samples = 0;
   double rms = 0;  // of measured - model over all its channels, in the columns' units
   std::vector<ChannelFit> channels;
-  std::optional<Influence> influence;     // fit: of several experiments, where there are standard errors
-  std::vector<FittedParameter> refitted;  // validate: its free parameters
-  std::string message;                    // validate: how the refit ended
+  std::optional<Influence> influence;         // fit: of several experiments, where there are standard errors
+  std::vector<FittedParameter> refitted;      // validate: its free parameters
+  std::optional<double> rms_scaled_at_start;  // validate: of z with the shared parameters as at the start
+  std::string message;                        // validate: how the refit ended
 };
 
 // A row of residuals.csv.
 struct ResidualRow {
   std::size_t experiment = 0, channel = 0;
   double t = 0, measured = 0, model = 0;
-  double scaled = 0;  // z
+  double scaled = 0;                            // z
+  double prediction = FitStatistics::kUnknown;  // half of the 95 % interval for a measurement there, about the model
 };
 
 // One iteration of the solver.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <memory>
 #include <mutex>
@@ -31,6 +32,7 @@ namespace {
 constexpr double kTolerances = 10, kLeastAccuracy = 1e-5;
 // Records, from which on their sums tell a variance: Student's quantile is then 2.09, against 1.96 for any number.
 constexpr std::size_t kManyRecords = 20;
+constexpr double kWorse = 0.99;    // probability that a right model worsens what validates by less
 constexpr double kTouches = 1e-9;  // of the bound's size: the trust region puts solutions exactly on bounds
 
 class Identification {
@@ -298,6 +300,7 @@ class Identification {
     if (usable) {
       score_all(stack, solution.point.z, sigmas_are_estimated_);
       result_.statistics = statistics_at(solution, stack, unknowns);
+      predict(stack, z_in_parameters(stack, solution.point, values), result_.statistics.covariance, 0);
       find_influences(stack, solution, unknowns);
       compare_by_likelihood(stack, solution.point.z,
                             sigmas_are_estimated_ ? SigmaEstimation(stack, spec_).scale_groups().size() : 0);
@@ -312,6 +315,31 @@ class Identification {
         if (!abandoned_) result_.profiles.push_back(profile_of(stack, k, solution.x));
     if (abandoned_) result_.status = SolverStatus::stopped, result_.message = "stopped on request";
     result_.simulations += stack.simulations();
+  }
+
+  // dz/drho of the samples.
+  static Eigen::MatrixXd z_in_parameters(const ExperimentStack& stack, const LeastSquaresPoint& point,
+                                         const Eigen::VectorXd& rho) {
+    const Eigen::VectorXd u_x = stack.scaling().rho_x(stack.scaling().to_x(rho));
+    return point.z_x.topRows(stack.samples()) * u_x.cwiseInverse().asDiagonal();
+  }
+
+  // Half-widths of the 95 % intervals for one more measurement (Seber and Wild, "Nonlinear Regression" (1989), section
+  // 5.1.1), of the samples whose rows of residuals begin at `first`:
+  //   t sigma sqrt(v + j covariance j'),   j = dz/drho
+  void predict(const ExperimentStack& stack, const Eigen::MatrixXd& J, const Eigen::MatrixXd& covariance,
+               std::size_t first) {
+    const FitStatistics& s = result_.statistics;
+    if (!s.none.empty() || options_.preflight) return;
+    const Eigen::VectorXd variances = (J * covariance).cwiseProduct(J).rowwise().sum(), sigma = stack.sigma();
+    for (Eigen::Index i = 0; i < sigma.size(); ++i) {
+      ResidualRow& row = result_.residuals[first + static_cast<std::size_t>(i)];
+      row.prediction = s.quantile * sigma(i) * std::sqrt(s.variance + variances(i));
+      ChannelFit& channel = result_.experiments[row.experiment].channels[row.channel];
+      if (std::isnan(channel.within_prediction)) channel.within_prediction = 0;
+      if (std::abs(row.measured - row.model) <= row.prediction)
+        channel.within_prediction += 1 / static_cast<double>(channel.samples);
+    }
   }
 
   void find_influences(const ExperimentStack& stack, const LeastSquaresResult& solution,
@@ -398,28 +426,109 @@ class Identification {
   void validate(std::size_t e) {
     const std::vector<UnknownParameter> unknowns = free_in(scene_, spec_, e);
     const VariableScaling scaling = scaling_of(unknowns);
-    std::vector<ExperimentStack::Member> members;
-    members.push_back(member(e, shared_, unknowns));
-    ExperimentStack stack(std::move(members), unknowns, scaling, spec_.loss);
+    ExperimentStack stack(alone(e, shared_, unknowns), unknowns, scaling, spec_.loss);
     stack.go_on = go_on_;
+    const LeastSquaresResult refit = refitted(stack, unknowns);
     ExperimentFit& scored = result_.experiments[e];
-    Eigen::VectorXd z;
-    if (unknowns.empty()) {
-      LeastSquaresPoint point;
-      point.z.setZero(stack.size), point.z_x.setZero(stack.size, 0);
-      stack.evaluate(Eigen::VectorXd(), point);
-      scored.message = point.ok ? "simulated" : "could not be simulated: " + point.message;
-      if (point.ok) z = point.z;
-    } else {
-      const LeastSquaresResult solution = solved(stack, scaling.to_x(start_of(unknowns)), false);
-      scored.message = "refitted, " + solution.message;
-      z = solution.point.z;
-      if (z.size() > 0) score_all(stack, z, false);
-      scored.refitted = described(unknowns, scaling.to_rho(solution.x),
-                                  z.size() > 0 ? statistics_at(solution, stack, unknowns) : FitStatistics());
+    scored.message = refit.message;
+    if (refit.point.z.size() > 0) {
+      const std::size_t first = result_.residuals.size();
+      score_all(stack, refit.point.z, false);
+      FitStatistics own;
+      if (!unknowns.empty()) own = statistics_at(refit, stack, unknowns);
+      scored.refitted = described(unknowns, scaling.to_rho(refit.x), own);
+      predict_validation(e, stack, refit, own, first);
+      compare_with_start(e, unknowns, scaling, refit.point.z.head(stack.samples()).squaredNorm());
+    } else if (!unknowns.empty()) {
+      scored.refitted = described(unknowns, scaling.to_rho(refit.x), FitStatistics());
     }
-    if (unknowns.empty() && z.size() > 0) score_all(stack, z, false);
     result_.simulations += stack.simulations();
+  }
+
+  std::vector<ExperimentStack::Member> alone(std::size_t e, const Eigen::VectorXd& shared,
+                                             const std::vector<UnknownParameter>& unknowns) const {
+    std::vector<ExperimentStack::Member> members;
+    members.push_back(member(e, shared, unknowns));
+    return members;
+  }
+
+  static LeastSquaresPoint simulated(ExperimentStack& stack, const Eigen::VectorXd& x) {
+    LeastSquaresPoint point;
+    point.z.setZero(stack.size), point.z_x.setZero(stack.size, stack.variables());
+    stack.evaluate(x, point);
+    return point;
+  }
+
+  // Without residuals where nothing could be simulated.
+  LeastSquaresResult refitted(ExperimentStack& stack, const std::vector<UnknownParameter>& unknowns) {
+    LeastSquaresResult refit;
+    if (unknowns.empty()) {
+      refit.point = simulated(stack, refit.x);
+      refit.message = refit.point.ok ? "simulated" : "could not be simulated: " + refit.point.message;
+      if (!refit.point.ok) refit.point.z.resize(0);
+    } else {
+      refit = solved(stack, stack.scaling().to_x(start_of(unknowns)), false);
+      refit.message = "refitted, " + refit.message;
+    }
+    return refit;
+  }
+
+  // The refit takes off what the shared parameters s are in error by, as far as its own parameters f can:
+  //   j = j_s - J_f (J_f^+ J_s),   variance = j cov(s) j' + j_f cov(f) j_f'
+  void predict_validation(std::size_t e, const ExperimentStack& stack, const LeastSquaresResult& refit,
+                          const FitStatistics& own, std::size_t first) {
+    const std::vector<UnknownParameter> fitted = unknowns_of_fit(scene_, spec_);
+    std::vector<UnknownParameter> all = free_in(scene_, spec_, e);
+    const Eigen::Index F = static_cast<Eigen::Index>(all.size()), N = stack.samples();
+    std::vector<Eigen::Index> shared;
+    for (std::size_t i = 0; i < fitted.size(); ++i)
+      if (fitted[i].shared) all.push_back(fitted[i]), shared.push_back(static_cast<Eigen::Index>(i));
+    const VariableScaling scaling = scaling_of(all);
+    ExperimentStack whole(alone(e, shared_, all), all, scaling, spec_.loss);
+    whole.go_on = go_on_;
+    Eigen::VectorXd rho(static_cast<Eigen::Index>(all.size()));
+    if (F > 0) rho.head(F) = stack.scaling().to_rho(refit.x);
+    for (std::size_t i = 0; i < shared.size(); ++i)
+      rho(F + static_cast<Eigen::Index>(i)) = shared_(all[static_cast<std::size_t>(F) + i].parameter);
+    const LeastSquaresPoint point = simulated(whole, scaling.to_x(rho));
+    result_.simulations += whole.simulations();
+    if (!point.ok || !result_.statistics.none.empty() || !own.none.empty()) return;
+    Eigen::MatrixXd J = z_in_parameters(whole, point, rho);
+    if (F > 0) {
+      const Eigen::MatrixXd J_f = J.leftCols(F), J_s = J.rightCols(J.cols() - F);
+      J.rightCols(J.cols() - F) -= J_f * J_f.completeOrthogonalDecomposition().solve(J_s);
+    }
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(J.cols(), J.cols());
+    if (F > 0) covariance.topLeftCorner(F, F) = own.covariance;
+    covariance.bottomRightCorner(J.cols() - F, J.cols() - F) = result_.statistics.covariance(shared, shared);
+    predict(stack, J.topRows(N), covariance, first);
+  }
+
+  // A right model with the true values at its start worsens what validates by about chi^2 of its P parameters, for as
+  // many samples as are fitted. What is beyond, by residuals that may be correlated, the fit has learnt wrongly.
+  void compare_with_start(std::size_t e, const std::vector<UnknownParameter>& unknowns, const VariableScaling& scaling,
+                          double squares) {
+    const FitStatistics& s = result_.statistics;
+    ExperimentStack before(alone(e, parameter_values(scene_), unknowns), unknowns, scaling, spec_.loss);
+    before.go_on = go_on_;
+    const LeastSquaresResult start = refitted(before, unknowns);
+    result_.simulations += before.simulations();
+    if (start.point.z.size() == 0 || abandoned_) return;
+    const double n = static_cast<double>(before.samples());
+    const double squares_at_start = start.point.z.head(before.samples()).squaredNorm();
+    result_.experiments[e].rms_scaled_at_start = std::sqrt(squares_at_start / n);
+    const long P = std::ranges::count_if(result_.parameters, [](const auto& p) { return p.experiment.empty(); });
+    if (!s.none.empty() || P == 0 || !(result_.cost_final < result_.cost_initial)) return;
+    const double chi2 = boost::math::quantile(boost::math::chi_squared(static_cast<double>(P)), kWorse);
+    const double expected = chi2 * s.likelihood_scale * std::max(1.0, s.inflation.maxCoeff()) *
+                            std::max(1.0, n / static_cast<double>(result_.samples));
+    if (squares - squares_at_start > expected)
+      result_.warnings.push_back(fmt::format(
+          "experiment '{}': the fit has lowered its own residuals, but raised those that validate from {:.3g} to "
+          "{:.3g} "
+          "sigma: the values that it found do not hold for other motions. The model leaves something out, or has "
+          "parameters that these data do not determine",
+          spec_.experiments[e].name, std::sqrt(squares_at_start / n), std::sqrt(squares / n)));
   }
 
   void score_all(ExperimentStack& stack, const Eigen::VectorXd& z, bool estimated) {

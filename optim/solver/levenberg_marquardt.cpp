@@ -32,6 +32,11 @@ constexpr double kShrinking = 0.5;
 // rtol 1e-5 promises below 1e-8; in front of a wall of failed points, or with wrong derivatives, it is most of the
 // cost.
 constexpr double kPromise = 1e-4;
+// Part of the cost up to which a jump counts as an error of the simulation, as with kPromise.
+constexpr double kSimulationNoise = 1e-4;
+// Change of a step, relative, below which it is weighed well enough; a rest of a hundredth costs no evaluation.
+constexpr double kWeighed = 1e-2;
+constexpr int kWeighings = 100;  // of one step; each lowers its cost, so that fewer do no harm
 
 // The weighted residuals of one part and their derivatives, as triangles: |z + J d|^2 = |q + R d|^2 + constant.
 struct Triangle {
@@ -55,11 +60,12 @@ struct LinearModel {
 
   LinearModel(const LeastSquaresProblem& problem, const LeastSquaresPoint& point)
       : LinearModel(point, problem.weights(point.z).cwiseSqrt(), problem.parts) {}
+  // w: square roots of the weights.
+  LinearModel(const LeastSquaresPoint& point, const VectorXd& w, const std::vector<Dependence>& parts)
+      : LinearModel(triangles(point, w, parts), point.z_x.cols(), 0.5 * w.cwiseProduct(point.z).squaredNorm()) {}
   double promised(const VectorXd& d) const { return 0.5 * (q.squaredNorm() - (q + R * d).squaredNorm()); }
 
  private:
-  LinearModel(const LeastSquaresPoint& point, const VectorXd& w, const std::vector<Dependence>& parts)
-      : LinearModel(triangles(point, w, parts), point.z_x.cols(), 0.5 * w.cwiseProduct(point.z).squaredNorm()) {}
   LinearModel(std::vector<Triangle> triangles, Index variables, double half_squares)
       : R(blocks_of(triangles), variables), size(half_squares) {
     Index rows = 0;
@@ -155,6 +161,7 @@ class Search {
     LinearModel model(problem_, point_);
     first_size_ = model.size;
     VectorXd d = step(model, lambda);
+    double missed = 0, missed_by = 0;  // length of the step refused last at this point, and what its model missed
     while (true) {
       if (no_gradient(model)) return converged(model, lambda);
       if (is_short(model, d)) return converged(model, lambda);
@@ -168,27 +175,36 @@ class Search {
                                result_.failures()));
       ++result_.iterations;
       const VectorXd x = moved(d);
+      const double promised = promised_by(model, d);
       LeastSquaresPoint trial = evaluated(x);
-      const double promised = model.promised(d), cost = trial.ok ? problem_.cost(trial.z) : kInfinity;
+      const double cost = trial.ok ? problem_.cost(trial.z) : kInfinity;
       const double gained = cost_ - cost;
       const bool settled = std::abs(gained) <= options_.tolerance * model.size;
       if (std::isfinite(cost) && (gained > kAccepted * promised || (settled && gained >= 0))) {
-        invalid = 0;
+        invalid = 0, missed = 0;
         x_ = x, cost_ = cost, point_ = std::move(trial);
         const double ratio = gained / promised;
         lambda = std::max(lambda * std::max(1. / 3, 1 - std::pow(2 * ratio - 1, 3)), kLeastDamping);
         const VectorXd D = model.D;
         model = LinearModel(problem_, point_);
         model.D = model.D.cwiseMax(kShrinking * D);
-        if (!told(model.gradient.lpNorm<Eigen::Infinity>(), d.norm())) return;
+        if (!told(free_gradient(model), d.norm())) return;
         if (settled) return converged(model, lambda);
         d = step(model, lambda);
         continue;
       }
-      if (!told(model.gradient.lpNorm<Eigen::Infinity>(), d.norm())) return;
+      if (!told(free_gradient(model), d.norm())) return;
       if (settled) return converged(model, lambda);
       if (!trial.ok && ++invalid == kInvalidSteps)
         return end(SolverStatus::failed, "failed: too many evaluations in a row" + result_.failures());
+      // What a smooth model misses falls with the square of the step, at a kink in proportion to it.
+      const double length = model.D.cwiseProduct(d).norm(), miss = std::abs(promised - gained);
+      if (missed > 0 && miss < kSimulationNoise * model.size && miss > std::sqrt(length / missed) * missed_by)
+        return end(SolverStatus::converged,
+                   fmt::format("converged: errors of the simulation change the cost by {:.1g}, more than the {:.1g} "
+                               "that the derivatives promise",
+                               miss, promised));
+      missed = std::isfinite(miss) ? length : 0, missed_by = miss;
       // The parabola through both costs with the slope at the start.
       const double slope = model.gradient.dot(d);
       const double part = std::isfinite(cost) ? std::clamp(-slope / (2 * (cost - cost_ - slope)), 0.1, 0.5) : 0.25;
@@ -200,8 +216,25 @@ class Search {
     }
   }
 
+  // The weights follow the residuals z + J d that the step leads to (levenberg_marquardt.hpp).
   VectorXd step(const LinearModel& model, double lambda) const {
-    const VectorXd D = model.D.unaryExpr([](double length) { return length > 0 ? length : 1; });
+    VectorXd d = weighed_step(model, model.D, lambda);
+    for (int i = 0; i < kWeighings && has_weights(); ++i) {
+      const VectorXd w = problem_.weights(point_.z + point_.z_x * d).cwiseSqrt();
+      const VectorXd before = std::exchange(d, weighed_step(LinearModel(point_, w, problem_.parts), model.D, lambda));
+      if (model.D.cwiseProduct(d - before).norm() <= kWeighed * model.D.cwiseProduct(d).norm()) break;
+    }
+    return d;
+  }
+
+  bool has_weights() const { return !problem_.groups.empty() || problem_.loss.type != LossType::squared; }
+
+  double promised_by(const LinearModel& model, const VectorXd& d) const {
+    return has_weights() ? cost_ - problem_.cost(point_.z + point_.z_x * d) : model.promised(d);
+  }
+
+  VectorXd weighed_step(const LinearModel& model, const VectorXd& lengths, double lambda) const {
+    const VectorXd D = lengths.unaryExpr([](double length) { return length > 0 ? length : 1; });
     const RowBlocks A = model.R.scaled_and_damped(D, lambda);  // of D d: columns of length one
     const VectorXd lower = D.cwiseProduct(problem_.x_lower - x_), upper = D.cwiseProduct(problem_.x_upper - x_);
     return bounded_linear_least_squares(A, model.R.beside_damping(-model.q), lower, upper).cwiseQuotient(D);
@@ -234,6 +267,14 @@ class Search {
     for (Index k = 0; k < x_.size(); ++k)
       if (!presses(k, model.gradient(k)) && std::abs(model.gradient(k)) > kGradient * model.D(k) * size) return false;
     return true;
+  }
+
+  // Largest entry of the gradient, without those that only press on a bound.
+  double free_gradient(const LinearModel& model) const {
+    double largest = 0;
+    for (Index k = 0; k < x_.size(); ++k)
+      if (!presses(k, model.gradient(k))) largest = std::max(largest, std::abs(model.gradient(k)));
+    return largest;
   }
 
   // How far the best step along one free variable lowers the cost by the derivatives, a lower bound of the rest.

@@ -12,8 +12,14 @@
 // Where the problem says which residuals depend on which variables, factors are those of its parts (row_blocks.hpp), so
 // that a step costs no more than linearly in their number.
 //
-// A loss, and sigmas that the problem eliminates, enter as weights of the residuals (LeastSquaresProblem::weights), set
-// anew at every accepted point.
+// A loss, and sigmas that the problem eliminates, make a cost of the residuals that is no square. The step minimises
+// this cost of the linear residuals, by weights (LeastSquaresProblem::weights) of the residuals that it leads to:
+//   minimise cost(z + J d) + lambda |D d|^2/2:   d <- the step above with the weights at z + J d,   until d is settled
+// The costs are concave in the squares, so that each d lowers them (Hunter and Lange, The American Statistician 58
+// (2004) 30). With the weights at z alone the convergence would be linear where residuals of several scales disagree.
+//
+// Where the sequence of an integrator's steps changes, the cost jumps. The search ends where what a step missed does
+// not fall with its length, and is more than it promised.
 //
 //   LeastSquaresOptions options;
 //   options.max_iterations = 50;

@@ -82,10 +82,10 @@ PROBLEMS = {
     "driven": ROD_ON_A_DRIVE,
 }
 LONG = {  # commands that journal and resume
-    "one design": ["design", "one_design.json"],
-    "four designs": ["design", "four_designs.json", "--threads", "2"],
-    "one fit": ["identify", "one_fit.json", "--profile", "k"],
-    "four fits": ["identify", "four_fits.json", "--threads", "2"],
+    "one design": ["design", "one_design.json", "--keep-journal"],
+    "four designs": ["design", "four_designs.json", "--threads", "2", "--keep-journal"],
+    "one fit": ["identify", "one_fit.json", "--profile", "k", "--keep-journal"],
+    "four fits": ["identify", "four_fits.json", "--threads", "2", "--keep-journal"],
 }
 SHORT = {
     "validate": ["validate", "one_design.json"],

@@ -56,7 +56,7 @@ TEST_CASE("identify: the parameter that made the motion is found, with its uncer
   CHECK(result.at("provenance").at("data_sha256").contains("swing.csv"));
 
   const std::string residuals = content_of(folder.path / "out/residuals.csv");
-  CHECK_THAT(residuals, Catch::StartsWith("experiment,channel,t,measured,model,residual\nswing,theta,0,"));
+  CHECK_THAT(residuals, Catch::StartsWith("experiment,channel,t,measured,model,residual,prediction\nswing,theta,0,"));
   CHECK_THAT(content_of(folder.path / "out/report.html"), Contains("residual of theta") &&
                                                               Contains("degrees of freedom") && Contains("rms/sigma") &&
                                                               Contains("condition number"));
@@ -161,7 +161,7 @@ TEST_CASE("identify --compare: the other file is checked before the fit, and fou
   held.replace(held.find("\"L\": {\"value\": 1"), 16, "\"L\": {\"value\": 1.01");
   const std::string other = folder.write("other.json", held);
   const auto compared = [&](const std::string& with, const std::string& out) {
-    return run_command({"identify", file, "--compare", with, "--out", folder.file(out)});
+    return run_command({"identify", file, "--compare", with, "--out", folder.file(out), "--keep-journal"});
   };
   const CommandOutcome good = compared(other, "out");
   INFO(good.err);

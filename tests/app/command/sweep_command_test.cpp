@@ -168,7 +168,9 @@ TEST_CASE("resume: a sweep that is killed ends with the same bytes, from its jou
     return arguments;
   };
   const std::filesystem::path killed = folder.path / "killed";
-  kill_at(sweep("killed"), killed, "start", 3);
+  std::vector<std::string> kept = sweep("killed");
+  kept.emplace_back("--keep-journal");
+  kill_at(kept, killed, "start", 3);
   const long before = journal_lines(killed, "start");
   CHECK(before >= 3);
   CHECK(before < 40);
@@ -188,7 +190,7 @@ TEST_CASE("resume: a sweep whose points have changed is refused", "[command][swe
   const std::string file = folder.write("rod.json", kSwingingRod);
   const std::string points = folder.write("points.csv", "free\n0.4\n0.5\n");
   const std::filesystem::path out = folder.path / "out";
-  REQUIRE(run_command({"sweep", file, "--points", points, "--out", out.string()}).exit_code == kDone);
+  REQUIRE(run_command({"sweep", file, "--points", points, "--out", out.string(), "--keep-journal"}).exit_code == kDone);
   const std::string journal = content_of(out / kJournalFile);
   std::ofstream(out / kJournalFile, std::ios::binary) << journal.substr(0, journal.find('\n') + 1);
   folder.write("points.csv", "free\n0.4\n0.6\n");

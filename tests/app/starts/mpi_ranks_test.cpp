@@ -89,7 +89,7 @@ TEST_CASE("mpirun: two ranks design what one worker does, bit by bit, and only o
   const std::string file = folder.write("rod.json", kSwingingRod);
   const CommandOutcome one = run_command({"design", file, "--out", folder.file("one"), "--threads", "1"});
   REQUIRE(one.exit_code == kDone);
-  const Finished two = mpirun(2, {"design", file, "--out", folder.file("two")}, folder);
+  const Finished two = mpirun(2, {"design", file, "--out", folder.file("two"), "--keep-journal"}, folder);
   INFO(two.err);
   REQUIRE(two.exit_code == kDone);
   CHECK(outcome_of(folder.path / "two") == outcome_of(folder.path / "one"));
@@ -141,10 +141,15 @@ TEST_CASE("mpirun: Ctrl-C, and the loss of a rank, leave what resume goes on wit
   const TemporaryFolder folder;
   const std::string file = folder.write("rod.json", kSwingingRod);
   const auto design = [&](const fs::path& out) {
-    return std::vector<std::string>{"design", file,
-                                    "--out",  out.string(),
-                                    "--set",  "design.multistart.starts=12",
-                                    "--set",  "simulation.integrator.max_step=0.001"};
+    return std::vector<std::string>{"design",
+                                    file,
+                                    "--out",
+                                    out.string(),
+                                    "--keep-journal",
+                                    "--set",
+                                    "design.multistart.starts=12",
+                                    "--set",
+                                    "simulation.integrator.max_step=0.001"};
   };
   REQUIRE(run_command(design(folder.path / "whole")).exit_code == kDone);
   for (const bool lose_a_rank : {false, true}) {

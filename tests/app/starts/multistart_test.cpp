@@ -121,8 +121,8 @@ TEST_CASE("resume: a multistart that is killed ends as if it had not been", "[re
   REQUIRE(design(file, folder.file("whole")).exit_code == kDone);
   const fs::path killed = folder.path / "killed";
   const long at = GENERATE(0, 1, 4, 7);
-  kill_at({"design", file, "--out", killed.string(), "--threads", "2"}, killed, at == 0 ? "journal" : "start",
-          std::max(at, 1L));
+  kill_at({"design", file, "--out", killed.string(), "--threads", "2", "--keep-journal"}, killed,
+          at == 0 ? "journal" : "start", std::max(at, 1L));
   const long finished = journal_lines(killed, "start");
   INFO("killed after " << finished << " starts");
   REQUIRE(finished >= at);
@@ -147,7 +147,7 @@ TEST_CASE("resume: a single run goes on from its journal, wherever that was cut 
                "\"optimizer\": {\"type\": \"" + optimizer + "\"}");
   const std::string alone = folder.write("alone.json", text);
   const fs::path out = folder.path / "out";
-  REQUIRE(design(alone, out.string()).exit_code == kDone);
+  REQUIRE(design(alone, out.string(), {"--keep-journal"}).exit_code == kDone);
   const auto whole = outcome_of(out);
   const std::string history = content_of(out / "history.csv"), journal = content_of(out / kJournalFile);
   const long points = journal_lines(out, "point");
@@ -181,7 +181,7 @@ TEST_CASE("resume: exact Hessians are in the journal, too", "[resume]") {
                "\"optimizer\": {\"hessian\": \"exact\"}");
   const std::string file = folder.write("rod.json", text);
   const fs::path out = folder.path / "out";
-  REQUIRE(design(file, out.string()).exit_code == kDone);
+  REQUIRE(design(file, out.string(), {"--keep-journal"}).exit_code == kDone);
   const auto whole = outcome_of(out);
   const long hessians = journal_lines(out, "hessians");
   CHECK(hessians > 0);
@@ -227,10 +227,15 @@ TEST_CASE("resume refuses what it cannot go on with", "[resume]") {
 
   const std::string file = folder.write("rod.json", kSwingingRod);
   const fs::path out = folder.path / "out";
-  REQUIRE(design(file, out.string(), {"--set", "design.multistart.starts=2"}).exit_code == kDone);
-  outcome = run_command({"resume", out.string()});
-  CHECK(outcome.exit_code == kDone);
-  CHECK_THAT(outcome.out, Contains("came to its end (ok)"));
+  for (const bool keep : {false, true}) {
+    Arguments arguments{"--set", "design.multistart.starts=2"};
+    if (keep) arguments.push_back("--keep-journal");
+    REQUIRE(design(file, out.string(), arguments).exit_code == kDone);
+    CHECK(fs::exists(out / kJournalFile) == keep);
+    outcome = run_command({"resume", out.string()});
+    CHECK(outcome.exit_code == kDone);
+    CHECK_THAT(outcome.out, Contains("its 'design' came to its end (ok)"));
+  }
 
   std::vector<std::string> lines = lines_of(out / kJournalFile);
   write_text(out / kJournalFile, lines[0] + "\n" + lines[1] + "\n");
@@ -261,7 +266,7 @@ TEST_CASE("multistart: identify fits from several starts, the same with any numb
   CHECK(outcome_of(folder.path / "three") == one);
 
   const fs::path killed = folder.path / "killed";
-  kill_at({"identify", file, "--out", killed.string(), "--threads", "2"}, killed, "start", 2);
+  kill_at({"identify", file, "--out", killed.string(), "--threads", "2", "--keep-journal"}, killed, "start", 2);
   const bool was_done = journal_lines(killed, "ended") > 0;
   REQUIRE(run_command({"resume", killed.string()}).exit_code == kDone);
   CHECK(journal_lines(killed, "start") == 5);
@@ -318,7 +323,8 @@ TEST_CASE("resume: a single identification goes on from its journal, its profile
   const TemporaryFolder folder;
   const std::string file = single_fit(folder);
   const fs::path out = folder.path / "out";
-  REQUIRE(run_command({"identify", file, "--out", out.string(), "--profile", "k"}).exit_code == kDone);
+  REQUIRE(run_command({"identify", file, "--out", out.string(), "--profile", "k", "--keep-journal"}).exit_code ==
+          kDone);
   const auto whole = outcome_of(out);
   const std::vector<std::string> files{"history.csv", "residuals.csv", "profile.csv", "optimized.json"};
   std::vector<std::string> contents;
@@ -377,7 +383,7 @@ TEST_CASE("multistart: simulations and seconds are those of all starts, after a 
   const bool designs = GENERATE(true, false);
   const std::string command = designs ? "design" : "identify";
   const std::string file = designs ? folder.write("rod.json", kSwingingRod) : write_swing_fit(folder);
-  const CommandOutcome outcome = run_command({command, file, "--out", folder.file("out")});
+  const CommandOutcome outcome = run_command({command, file, "--out", folder.file("out"), "--keep-journal"});
   REQUIRE(outcome.exit_code == kDone);
   const auto check = [&] {
     const auto result = json_of(folder.path / "out/result.json");
@@ -447,7 +453,7 @@ TEST_CASE("resume refuses changed data also where two files have one base name",
   const TemporaryFolder folder;
   const std::string file = two_records(folder);
   const fs::path out = folder.path / "out";
-  REQUIRE(run_command({"identify", file, "--out", out.string()}).exit_code == kDone);
+  REQUIRE(run_command({"identify", file, "--out", out.string(), "--keep-journal"}).exit_code == kDone);
   const std::vector<std::string> lines = lines_of(out / kJournalFile);
   for (const std::string data : {"a/r.csv", "b/r.csv"}) {
     const std::string before = content_of(folder.path / data);
@@ -485,7 +491,7 @@ TEST_CASE("resume: results that could not be written are written when there is r
 TEST_CASE("a damaged journal is refused in words, whatever the line", "[resume]") {
   const TemporaryFolder folder;
   const fs::path out = folder.path / "out";
-  REQUIRE(design(folder.write("rod.json", kPendulum), out.string()).exit_code == kDone);
+  REQUIRE(design(folder.write("rod.json", kPendulum), out.string(), {"--keep-journal"}).exit_code == kDone);
   const std::string journal = content_of(out / kJournalFile);
   for (const auto& [good, bad] : std::vector<std::pair<std::string, std::string>>{
            {"\"c\":[]", "\"c\":[1]"}, {"\"f\":", "\"f\":1"}, {"\"f_x\":[", "\"f_x\":[1,"}, {"\"x\":", "\"y\":"}}) {

@@ -1,5 +1,6 @@
 #include "optim/fit/identification.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
@@ -131,6 +132,36 @@ TEST_CASE("several experiments share parameters, own others, and override", "[id
   CHECK(result.residuals.size() == 3 * 201);
   CHECK(result.residuals.back().experiment == 2);
   CHECK(result.samples == 2 * 201);
+}
+
+TEST_CASE("what validates is compared with the start, and predicted with its measurements", "[identification]") {
+  Problem p = fit_problem(60, 0.1, 1.5, 1.5);
+  p.identification->experiments.push_back(pendulum::experiment("other", {"theta0", "omega0"}));
+  ExperimentSpec& other = p.identification->experiments[1];
+  other.validate = true, other.overrides = {{"theta0", 2.3}};
+  CsvTable fitted = pendulum::exact_motion(64, 0.055, 1.53, 1.55, 4);
+  pendulum::add_noise(fitted, 0.01, 1);
+  for (const bool same : {true, false}) {
+    CsvTable second = pendulum::exact_motion(same ? 64 : 60, same ? 0.055 : 0.1, 2.4, 1, 4);
+    pendulum::add_noise(second, 0.01, 2);
+    const IdentificationResult result = run_identification(p, {fitted, second});
+    REQUIRE(result.ok());
+    const ExperimentFit& validation = result.experiments[1];
+    REQUIRE(validation.rms_scaled_at_start);
+    const double rms = validation.channels[0].rms_scaled;
+    CHECK((rms < *validation.rms_scaled_at_start) == same);
+    const auto says = [](const std::string& w) { return w.find("raised those that validate") != std::string::npos; };
+    CHECK(std::ranges::count_if(result.warnings, says) == (same ? 0 : 1));
+    // 95 % of 401 measurements, to three standard deviations of that share.
+    CHECK(result.experiments[0].channels[0].within_prediction == Approx(0.95).margin(0.033));
+    if (same) CHECK(validation.channels[0].within_prediction == Approx(0.95).margin(0.033));
+    // A measurement is known to its noise, and a little less to the model; a refit of a wrong model knows less.
+    for (const ResidualRow& row : result.residuals) {
+      if (!same && row.experiment == 1) continue;
+      CHECK(row.prediction > 0.018);
+      CHECK(row.prediction < 0.024);
+    }
+  }
 }
 
 TEST_CASE("what a motion cannot tell is named", "[identification]") {

@@ -51,6 +51,18 @@ struct WalledResidual : LeastSquaresProblem {
   }
 };
 
+// Smooth residuals with jumps, as of a simulation whose sequence of steps changes.
+struct JumpingResiduals : LeastSquaresProblem {
+  explicit JumpingResiduals(double of_size) : LeastSquaresProblem(2, 3), jump(of_size) {}
+  void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& p) override {
+    const double at = 1e12 * (x(0) + x(1));
+    p.z << 10 * (x(1) - x(0) * x(0)), 3 + x(0) * x(1), 2 + x(1) * x(1);
+    for (Eigen::Index i = 0; i < 3; ++i) p.z(i) += jump * std::sin(std::floor(at) * (1 + static_cast<double>(i)));
+    p.z_x << -20 * x(0), 10, x(1), x(0), 0, 2 * x(1);
+  }
+  double jump;
+};
+
 // Of the same function in variables of other units: y = scale x.
 struct Rescaled : LeastSquaresProblem {
   Rescaled(testing::TestFunction& function, Eigen::VectorXd y_x)
@@ -90,6 +102,13 @@ struct OutlyingResidual : LeastSquaresProblem {
   }
   double outlier = 0;
 };
+
+// The same of residuals with weights.
+double uphill_of_pull(const LeastSquaresProblem& problem, const LeastSquaresResult& result) {
+  const Eigen::VectorXd w = problem.weights(result.point.z).cwiseSqrt(), z = w.cwiseProduct(result.point.z);
+  const Eigen::MatrixXd J = w.asDiagonal() * result.point.z_x;
+  return (J.transpose() * z).cwiseQuotient(J.colwise().norm().transpose()).lpNorm<Eigen::Infinity>() / z.norm();
+}
 
 }  // namespace
 
@@ -143,6 +162,20 @@ TEST_CASE("the search has not converged where no step does what the derivatives 
   CHECK(second.status == SolverStatus::no_progress);
   CHECK(second.x(0) <= 2);
   CHECK_THAT(second.message, Catch::Contains("the loop cannot be closed"));
+}
+
+TEST_CASE("the search ends where jumps of the cost hide what the derivatives promise", "[least_squares]") {
+  JumpingResiduals smooth(0);
+  const LeastSquaresResult exact = solve_least_squares(smooth, Eigen::Vector2d(3, 2));
+  REQUIRE(exact.status == SolverStatus::converged);
+  for (const double jump : {1e-9, 1e-7, 1e-5}) {
+    JumpingResiduals problem(jump);
+    const LeastSquaresResult result = solve_least_squares(problem, Eigen::Vector2d(3, 2));
+    INFO(jump << ": " << result.message << ", " << result.evaluations << " against " << exact.evaluations);
+    CHECK(result.status == SolverStatus::converged);
+    CHECK(result.cost_final == Approx(exact.cost_final).epsilon(10 * jump));
+    CHECK(result.evaluations <= exact.evaluations + 5);
+  }
 }
 
 TEST_CASE("residuals whose squares are no numbers are refused at the start, in words that speak of the data",
@@ -329,4 +362,39 @@ TEST_CASE("eliminated scales: their weights are the derivatives of the cost, the
   CHECK(result.x(0) == Approx(w.dot(y) / w.sum()).epsilon(1e-8));
   CHECK(w(0) / w(4) > 100);
   CHECK(w(0) == Approx(4 / result.point.z.head(4).squaredNorm()));
+}
+
+TEST_CASE("eliminated scales of linear residuals, and a loss of them, are found in a step or two",
+          "[least_squares][sigma]") {
+  // Two groups that disagree about a line: the cost falls in one direction far beyond what its curvature at the start
+  // says.
+  constexpr Eigen::Index n = 20;
+  Eigen::MatrixXd A(2 * n, 2);
+  Eigen::VectorXd y(2 * n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double t = static_cast<double>(i) / n, noise = 0.1 * std::sin(37.0 * static_cast<double>(i));
+    A.row(i) << 1, t;
+    A.row(n + i) << t, -1;
+    y(i) = 1 + 2 * t + noise, y(n + i) = 3 * t + 1 + 0.3 * noise;
+  }
+  for (const bool by_groups : {true, false}) {
+    testing::TestFunction line("line", testing::vector({50, -20}), 2 * n, 0, [&](const auto& x, auto& z, auto& J) {
+      z = A * x - y;
+      J = A;
+    });
+    std::vector<Eigen::Index> first(n), second(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      first[k] = i, second[k] = n + i;
+    }
+    if (by_groups)
+      line.groups = {{first, n, 1e-20}, {second, n, 1e-20}};
+    else
+      line.loss = {LossType::huber, 0.2};
+    const LeastSquaresResult result = solve_least_squares(line, line.x0);
+    INFO(result.message << ", " << result.evaluations << " evaluations");
+    CHECK(result.status == SolverStatus::converged);
+    CHECK(result.evaluations <= 8);
+    CHECK(uphill_of_pull(line, result) < 1e-5);
+  }
 }
