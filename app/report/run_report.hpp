@@ -45,7 +45,8 @@ std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const 
                           const DesignMotion& before, const DesignMotion& after, const SensorLimits& limits = {},
                           const std::vector<RunningTerm>& terms = {}, const std::vector<PointTarget>& targets = {});
 
-// The measurements of one channel of one experiment, and the fitted model at the same times. Values are in SI units.
+// The measurements of one channel of one experiment, and the fitted model at the same times. Values are in SI units;
+// NaN stands between the windows of an experiment.
 struct FitPlot {
   std::string experiment, channel, unit;                 // channel: its column without the unit
   std::vector<double> times, measured, model, residual;  // residual: weighted, (measured - model)/sigma
