@@ -17,6 +17,8 @@ namespace {
 // has 30: [-1.234567e-05, -1.234567e-05].
 constexpr std::size_t kWords = 32;
 
+constexpr std::size_t kFewColumns = 8;  // that fit a printed page of 18 cm without breaks within words
+
 // As the value of an attribute.
 std::string list_of(const std::vector<std::string>& words) {
   std::vector<std::string> quoted;
@@ -70,9 +72,11 @@ void HtmlPage::table(const std::vector<std::string>& header, const std::vector<T
     for (std::size_t k = 0; k < std::min(row.size(), words.size()); ++k)
       words[k] = words[k] || row[k].text.size() >= kWords;
   const bool named = std::ranges::any_of(header, [](const std::string& name) { return !name.empty(); });
-  body_ += fmt::format("<div class=\"table\" tabindex=\"0\"><table{}>\n", dense    ? " class=\"dense\""
-                                                                          : !named ? " class=\"pairs\""
-                                                                                   : "");
+  const char* const kind = dense                         ? " class=\"dense\""
+                           : !named                      ? " class=\"pairs\""
+                           : header.size() > kFewColumns ? " class=\"wide\""
+                                                         : "";
+  body_ += fmt::format("<div class=\"table\" tabindex=\"0\"><table{}>\n", kind);
   if (named) {
     body_ += "<thead><tr>";
     for (std::size_t k = 0; k < header.size(); ++k)

@@ -56,6 +56,14 @@ TEST_CASE("a column with a sentence is text in all its rows, a column of interva
                               Contains("<td>-</td><td class=\"words\">" + sentence + "</td>"));
 }
 
+TEST_CASE("headers of many columns may break, so that print does not cut them", "[report]") {
+  HtmlPage few("p"), many("p");
+  few.table(std::vector<std::string>(8, "name"), std::vector<TableRow>(1, TableRow(8, "1")));
+  many.table(std::vector<std::string>(9, "name"), std::vector<TableRow>(1, TableRow(9, "1")));
+  CHECK_THAT(few.text(), Contains("<table>") && !Contains("<table class="));
+  CHECK_THAT(many.text(), Contains("<table class=\"wide\">"));
+}
+
 TEST_CASE("parts of a page that selectors choose hold their keys and their place for links", "[report]") {
   HtmlPage page("p");
   page.begin_choices({"objective", "parameter"});
