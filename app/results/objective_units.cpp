@@ -16,10 +16,15 @@ class Dimensions {
  public:
   explicit Dimensions(const Scene& scene) : scene_(scene), facts_(scene) {}
 
-  // Throws DimensionError where parts of the expression do not fit each other.
+  // Numbers are pure; where they cannot be, as in sin(5*t), they may stand for anything. Throws DimensionError where
+  // parts of the expression do not fit each other even so.
   Known of(const Expression& expression) const {
-    return infer_dimension(
-        expression, [this](const std::string& name) { return of_name(name); }, PlainNumbers::are_pure);
+    const auto of_names = [this](const std::string& name) { return of_name(name); };
+    try {
+      return infer_dimension(expression, of_names, PlainNumbers::are_pure);
+    } catch (const DimensionError&) {
+      return infer_dimension(expression, of_names, PlainNumbers::fit_everything);
+    }
   }
 
   Known of_name(const std::string& name) const {

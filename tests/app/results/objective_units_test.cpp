@@ -33,7 +33,7 @@ TEST_CASE("the unit of an objective follows from its sensors, parameters and the
   const ObjectiveUnits units = units_with(R"({
     "miss": {"terminal": "(x - goal)^2"}, "travel": {"running": "theta^2"}, "work": {"running": "E"},
     "peak": {"maximum_of": "F"}, "rms": {"rms_of": "theta - 0.5"}, "samples": {"samples": [{"time": 1, "value": "x"}]},
-    "ratio": {"terminal": "x/goal"}, "sum": {"running": "x^2", "terminal": "3*x^2*t"}})");
+    "ratio": {"terminal": "x/goal"}, "sum": {"running": "x^2", "terminal": "3*x^2*t"}, "wave": {"running": "(x - 0.2*sin(5*t))^2"}})");
   CHECK(units.at("miss") == "m^2");
   CHECK(units.at("travel") == "rad^2 s");
   CHECK(units.at("work") == "N m s");
@@ -42,6 +42,7 @@ TEST_CASE("the unit of an objective follows from its sensors, parameters and the
   CHECK(units.at("samples") == "m");
   CHECK(units.at("ratio") == "-");
   CHECK(units.at("sum") == "m^2 s");
+  CHECK(units.at("wave") == "m^2 s");
 }
 
 TEST_CASE("where parts have no unit or do not fit each other, that of the objective is not known", "[results]") {
