@@ -6,6 +6,7 @@
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
 #include "app/results/left_out_bodies.hpp"
+#include "app/results/objective_units.hpp"
 #include "app/results/objective_values.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
@@ -26,15 +27,15 @@ std::string compared(Verdict verdict, double difference) {
 
 std::string derivative(double value) { return std::isfinite(value) ? significant(value, 11) : "failed"; }
 
-void print_entries(std::ostream& out, const GradientCheck& check,
+void print_entries(std::ostream& out, const GradientCheck& check, const ObjectiveUnits& units,
                    const std::vector<std::optional<double>>& true_values) {
   out << (check.discrete ? "\nfrozen: differences on the steps of the base run; free: with step-size control at work. "
                            "Relative to tlm:\n"
                          : "\nadjoint, tlm: the sensitivities by CVODES, backward and forward; its steps cannot be "
                            "frozen. Relative to tlm:\n");
   for (std::size_t i = 0; i < check.objectives.size(); ++i) {
-    out << fmt::format("\n{} = {}{}\n", check.objectives[i], significant(check.psi(static_cast<Eigen::Index>(i)), 12),
-                       true_extreme_text(true_values[i]));
+    out << fmt::format("\n{} = {}{}{}\n", check.objectives[i], significant(check.psi(static_cast<Eigen::Index>(i)), 12),
+                       after_value(units, check.objectives[i]), true_extreme_text(true_values[i]));
     TextTable table(
         {"parameter", "adjoint", "tlm", "fd frozen", "fd free", "adjoint = tlm", "fd frozen = tlm", "fd free = tlm"});
     for (const CheckedEntry& e : check.entries) {
@@ -228,9 +229,11 @@ int check_command(const CommandContext& context) {
   const Evaluator evaluator(needed.scene, objectives_of(needed));
   const std::vector<std::optional<double>> true_values = evaluator.true_values(evaluator.start());
   add_to_result(run.result, check, true_values);
+  const ObjectiveUnits units = objective_units(run.problem);
+  add_units(run.result, units);
   print_simulation(context.out, scene, check.statistics);
   warn_of_stiffness(run, check.statistics, true);
-  print_entries(context.out, check, true_values);
+  print_entries(context.out, check, units, true_values);
   print_taylor(context.out, check);
   print_identities(context.out, check);
   print_continuous(context.out, check);

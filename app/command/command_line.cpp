@@ -250,35 +250,57 @@ void add_commands(CLI::App& app, CommandOptions& options) {
   }
 }
 
-// Commands first, then a command's options where a word begins with "-", else files.
+// "auto tlm adjoint" of an option that takes one of these words: its type is "TEXT:{auto,tlm,adjoint}".
+std::string choices_of(const CLI::Option& option) {
+  std::string type = option.get_type_name();
+  const std::size_t begin = type.find('{'), end = type.find('}');
+  if (begin == std::string::npos || end == std::string::npos) return "";
+  type = type.substr(begin + 1, end - begin - 1);
+  std::ranges::replace(type, ',', ' ');
+  return type;
+}
+
+// Commands first; then a command's options where a word begins with "-", the words that an option or the command takes,
+// else files.
 int completion_command(const CommandContext& context) {
   CLI::App app;
   CommandOptions options;
   add_commands(app, options);
-  std::string cases;
+  std::string cases, after;
   for (const CLI::App* sub : app.get_subcommands({})) {
     std::vector<std::string> words;
-    for (const CLI::Option* option : sub->get_options())
-      for (const std::string& name : option->get_lnames()) words.push_back("--" + name);
-    cases += fmt::format("    {}) options='{}' ;;\n", sub->get_name(), fmt::join(words, " "));
+    std::string takes;
+    for (const CLI::Option* option : sub->get_options()) {
+      const std::string choices = choices_of(*option);
+      if (option->get_positional()) takes = choices;
+      for (const std::string& name : option->get_lnames()) {
+        words.push_back("--" + name);
+        if (!choices.empty()) after += fmt::format("    --{}) takes='{}' ;;\n", name, choices);
+      }
+    }
+    cases += fmt::format("    {}) options='{}' takes='{}' ;;\n", sub->get_name(), fmt::join(words, " "), takes);
   }
   context.out << fmt::format(R"(_mbsopt() {{
-  local word="${{COMP_WORDS[COMP_CWORD]}}" options
+  local word="${{COMP_WORDS[COMP_CWORD]}}" options takes
   if ((COMP_CWORD == 1)); then
     mapfile -t COMPREPLY < <(compgen -W '{}' -- "$word")
     return
   fi
   case "${{COMP_WORDS[1]}}" in
 {}  esac
+  case "${{COMP_WORDS[COMP_CWORD - 1]}}" in
+{}  esac
   if [[ "$word" == -* ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$options" -- "$word")
+  elif [[ "$takes" ]]; then
+    mapfile -t COMPREPLY < <(compgen -W "$takes" -- "$word")
   else
     mapfile -t COMPREPLY < <(compgen -f -- "$word")
   fi
 }}
 complete -o filenames -F _mbsopt mbsopt
 )",
-                             fmt::join(command_names(), " "), cases);
+                             fmt::join(command_names(), " "), cases, after);
   return kDone;
 }
 
@@ -310,10 +332,16 @@ int run_command_line(const std::vector<std::string>& given, std::ostream& out, s
   }
   CLI::App app("Optimal design and parameter identification of mechanisms.", "mbsopt");
   app.set_version_flag("--version", "mbsopt " + program_version());
-  app.footer("mbsopt help COMMAND, or mbsopt COMMAND --help, lists a command's options.");
+  app.footer(
+      "mbsopt help COMMAND, or mbsopt COMMAND --help, lists a command's options.\n"
+      "Example:\n  mbsopt new four-bar\n  mbsopt design four-bar.json\nThen open out/four_bar/report.html.");
   app.failure_message(CLI::FailureMessage::simple);
   CommandOptions options;
   add_commands(app, options);
+  if (arguments.empty()) {
+    err << app.help();
+    return kBadInput;
+  }
   try {
     parse(app, arguments);
   } catch (const CLI::ParseError& error) {

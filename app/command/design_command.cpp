@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/report/report_parts.hpp"
 #include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
+#include "app/results/objective_units.hpp"
 #include "app/results/objective_values.hpp"
 #include "app/results/optimized_problem.hpp"
 #include "app/results/simulated_motion.hpp"
@@ -22,7 +24,8 @@ namespace {
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
-void print_design(std::ostream& out, const DesignResult& design, const std::string& effort) {
+void print_design(std::ostream& out, const DesignResult& design, const ObjectiveUnits& units,
+                  const std::string& effort) {
   TextTable parameters({"parameter", "initial", "optimum", "unit", "at bound"});
   for (const DesignVariable& v : design.variables) {
     parameters.add({v.name, significant(v.initial, 10), significant(v.value, 10), v.unit.empty() ? "-" : v.unit,
@@ -32,27 +35,28 @@ void print_design(std::ostream& out, const DesignResult& design, const std::stri
   const bool any_smooth =
       design.objective_true || std::any_of(design.constraints.begin(), design.constraints.end(),
                                            [](const DesignConstraint& c) { return c.true_value.has_value(); });
-  std::vector<std::string> header{"objective", "before", "after"};
+  std::vector<std::string> header{"objective", "unit", "before", "after"};
   if (any_smooth) header.push_back("true extreme");
   if (!design.constraints.empty()) header.insert(header.end(), {"at least", "at most", "price"});
   TextTable objectives(header);
-  const auto row = [&](const std::string& name, double before, double after, const std::optional<double>& true_value) {
-    std::vector<std::string> cells{name, significant(before), significant(after)};
+  const auto row = [&](const std::string& name, const std::string& objective, double before, double after,
+                       const std::optional<double>& true_value) {
+    std::vector<std::string> cells{name, shown_unit(units, objective), significant(before), significant(after)};
     if (any_smooth) cells.push_back(true_value ? significant(*true_value) : "");
     return cells;
   };
   std::vector<std::string> minimised =
-      row(design.objective, design.objective_initial, design.objective_final, design.objective_true);
+      row(design.objective, design.objective, design.objective_initial, design.objective_final, design.objective_true);
   minimised.resize(header.size());
   objectives.add(minimised);
   for (const DesignCase& c : design.cases) {
-    std::vector<std::string> cells = row(of_case(c.name), c.initial, c.value, c.true_value);
+    std::vector<std::string> cells = row(of_case(c.name), design.objective, c.initial, c.value, c.true_value);
     cells.resize(header.size());
     objectives.add(cells);
   }
   const auto bound = [](const std::optional<double>& value) { return value ? significant(*value) : std::string(); };
   for (const DesignConstraint& c : design.constraints) {
-    std::vector<std::string> cells = row(c.in_words(), c.initial, c.value, c.true_value);
+    std::vector<std::string> cells = row(c.in_words(), c.objective, c.initial, c.value, c.true_value);
     cells.insert(cells.end(), {bound(c.lower), bound(c.upper), c.price != 0 ? significant(c.price) : ""});
     objectives.add(cells);
   }
@@ -147,17 +151,18 @@ SensorLimits sensor_limits(const Problem& problem) {
 }
 
 // The running terms of all objectives but those that a plot of a sensor shows already.
-std::vector<RunningTerm> running_terms(const Problem& problem) {
+std::vector<RunningTerm> running_terms(const Problem& problem, const ObjectiveUnits& units) {
   std::vector<RunningTerm> terms;
   for (const ObjectiveSpec& spec : problem.objectives) {
-    RunningTerm term{spec.name, "Integrand of " + spec.name, fmt::format("integrand [unit of {} per s]", spec.name)};
+    const std::string unit = units.at(spec.name).empty() ? "SI unit" : units.at(spec.name);
+    RunningTerm term{spec.name, "Integrand of " + spec.name, fmt::format("integrand [{}]", unit_per(unit, "s"))};
     bool is_sensor = false;
     for (std::size_t k = 0; k < std::size(kMeanKinds); ++k) {
       if (!spec.means[k]) continue;
       const std::string text = spec.means[k]->text();
       is_sensor = std::ranges::find(problem.scene.sensors, text, &Sensor::name) != problem.scene.sensors.end();
       term.title = fmt::format("{}: {} this over time", spec.name, kMeanKinds[k].name);
-      term.y_label = fmt::format("{} [unit of {}]", text, spec.name);
+      term.y_label = fmt::format("{} [{}]", text, unit);
       const auto bound = std::ranges::find(problem.design->subject_to, spec.name, &ObjectiveBound::objective);
       if (bound == problem.design->subject_to.end()) continue;
       if (kMeanKinds[k].extreme == Extreme::maximum && bound->upper)
@@ -237,9 +242,11 @@ int design_command(const CommandContext& context) {
   LongRun long_run(run);
   const auto [design, cut_off] = minimised(run, long_run, before.psi);
   add_to_result(run.result, design);
+  const ObjectiveUnits units = objective_units(run.problem);
+  add_units(run.result, units);
   const std::optional<MultistartSpec>& starts = run.problem.design->multistart;
   print_design(
-      context.out, design,
+      context.out, design, units,
       starts ? effort(run, design.simulations, design.wall_seconds) : fmt::format("{:.3g} s", design.wall_seconds));
   for (const std::string& warning : design.warnings) run.warn(warning);
   for (const std::string& warning : design.final_evaluation.warnings) run.warn(warning);
@@ -265,7 +272,7 @@ int design_command(const CommandContext& context) {
   run.write("report.html",
             design_report(scene, design.rho, run.result, history, {before.trajectory, before.forces, before.running},
                           {after.trajectory, after.forces, after.running}, sensor_limits(run.problem),
-                          running_terms(run.problem), prescribed_points(run.problem, after.instants)));
+                          running_terms(run.problem, units), prescribed_points(run.problem, after.instants)));
   return long_run.finish();
 }
 

@@ -8,6 +8,7 @@
 #include "app/results/case_results.hpp"
 #include "app/results/hessian_results.hpp"
 #include "app/results/left_out_bodies.hpp"
+#include "app/results/objective_units.hpp"
 #include "app/results/objective_values.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
@@ -33,6 +34,7 @@ void add_objectives(Run& run, const Evaluation& evaluation, const std::vector<st
   const Scene& scene = run.problem.scene;
   std::vector<std::string> header{"parameter", "value"};
   std::vector<std::string> values{"", ""};
+  const ObjectiveUnits units = objective_units(run.problem);
   for (std::size_t i = 0; i < run.problem.objectives.size(); ++i) {
     const std::string& name = run.problem.objectives[i].name;
     const auto row = static_cast<Eigen::Index>(i);
@@ -42,10 +44,11 @@ void add_objectives(Run& run, const Evaluation& evaluation, const std::vector<st
     }
     run.result["objectives"][name] = objective_json(evaluation.psi(row), true_values[i]);
     run.result["objectives"][name]["gradient"] = gradient;
-    run.context.out << fmt::format("{} = {}{}\n", name, significant(evaluation.psi(row), 12),
-                                   true_extreme_text(true_values[i]));
+    run.context.out << fmt::format("{} = {}{}{}\n", name, significant(evaluation.psi(row), 12),
+                                   after_value(units, name), true_extreme_text(true_values[i]));
     header.push_back("d " + name);
   }
+  add_units(run.result, units);
   TextTable table(header);
   for (std::size_t k = 0; k < scene.parameters.size(); ++k) {
     std::vector<std::string> row{scene.parameters[k].name, significant(scene.parameters[k].value)};

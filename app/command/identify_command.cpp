@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
-#include <cmath>
+#include <algorithm>
+#include <limits>
 
 #include "app/report/motion_plots.hpp"
 #include "app/report/run_report.hpp"
@@ -22,6 +23,7 @@
 #include "app/starts/other_model.hpp"
 #include "app/starts/residual_records.hpp"
 #include "app/terminal/interrupt.hpp"
+#include "core/expression/counted.hpp"
 #include "core/integrate/model_choice.hpp"
 #include "core/scene/scene_facts.hpp"
 #include "core/simulate/simulation_warnings.hpp"
@@ -40,38 +42,61 @@ namespace {
 
 std::string without_unit(const std::string& column) { return column.substr(0, column.find(" [")); }
 
-// One plot per channel of each experiment. start: at the initial values; what it does not hold is left out.
+// The windows of one experiment are one record in the report.
+std::string record_of(const ExperimentFit& experiment) {
+  return experiment.window ? experiment.window->experiment : experiment.name;
+}
+
+std::string unit_of_channel(const Scene& scene, const ChannelSpec& spec) {
+  const auto sensor = std::ranges::find(scene.sensors, spec.sensor, &Sensor::name);
+  const bool same_unit = spec.gain.is_number() && spec.gain.number() == 1;
+  const std::string unit = sensor == scene.sensors.end() || !same_unit ? "" : unit_in(scene, *sensor);
+  return unit.empty() ? "SI unit" : unit;
+}
+
+// Ends a part of the plot: neither a curve nor a correlation goes on from one window to the next.
+void add_gap(std::vector<double>& times, double next, std::initializer_list<std::vector<double>*> values) {
+  if (times.empty()) return;
+  times.push_back((times.back() + next) / 2);
+  for (std::vector<double>* v : values) v->push_back(std::numeric_limits<double>::quiet_NaN());
+}
+
+// One plot per channel of each record. start: at the initial values; what it does not hold is left out.
 std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResult& fit,
                                const IdentificationResult& start) {
   std::vector<FitPlot> plots;
   std::vector<std::size_t> first;  // plot of each experiment's first channel
-  for (const ExperimentFit& experiment : fit.experiments) {
-    first.push_back(plots.size());
-    for (const ChannelFit& channel : experiment.channels) {
-      FitPlot plot{.experiment = experiment.name,
-                   .channel = without_unit(channel.column),
-                   .unit = "SI unit",
-                   .validates = experiment.validate};
-      for (const Sensor& sensor : problem.scene.sensors) {
-        const ChannelSpec& spec =
-            problem.identification->experiments[first.size() - 1].channels[plots.size() - first.back()];
-        const bool same_unit = spec.gain.is_number() && spec.gain.number() == 1;
-        const std::string unit = unit_in(problem.scene, sensor);
-        if (sensor.name == channel.sensor && same_unit && !unit.empty()) plot.unit = unit;
-      }
-      plots.push_back(std::move(plot));
+  for (std::size_t e = 0; e < fit.experiments.size(); ++e) {
+    const ExperimentFit& experiment = fit.experiments[e];
+    if (e > 0 && experiment.window && record_of(experiment) == record_of(fit.experiments[e - 1])) {
+      first.push_back(first.back());
+      continue;
     }
+    first.push_back(plots.size());
+    for (std::size_t c = 0; c < experiment.channels.size(); ++c)
+      plots.push_back({.experiment = record_of(experiment),
+                       .channel = without_unit(experiment.channels[c].column),
+                       .unit = unit_of_channel(problem.scene, problem.identification->experiments[e].channels[c]),
+                       .validates = experiment.validate});
   }
+  std::vector<std::optional<std::size_t>> last(plots.size()), last_at_start(plots.size());  // experiment of a plot
   for (const ResidualRow& row : fit.residuals) {
-    FitPlot& plot = plots[first[row.experiment] + row.channel];
+    const std::size_t k = first[row.experiment] + row.channel;
+    FitPlot& plot = plots[k];
+    if (last[k] && last[k] != row.experiment)
+      add_gap(plot.times, row.t, {&plot.measured, &plot.model, &plot.residual, &plot.prediction});
+    last[k] = row.experiment;
     plot.times.push_back(row.t);
     plot.measured.push_back(row.measured);
     plot.model.push_back(row.model);
     plot.residual.push_back(row.scaled);
-    if (std::isfinite(row.prediction)) plot.prediction.push_back(row.prediction);
+    plot.prediction.push_back(row.prediction);
   }
   for (const ResidualRow& row : start.residuals) {
-    FitPlot& plot = plots[first[row.experiment] + row.channel];
+    const std::size_t k = first[row.experiment] + row.channel;
+    FitPlot& plot = plots[k];
+    if (last_at_start[k] && last_at_start[k] != row.experiment) add_gap(plot.initial_times, row.t, {&plot.initial});
+    last_at_start[k] = row.experiment;
     plot.initial_times.push_back(row.t), plot.initial.push_back(row.model);
   }
   return plots;
@@ -102,8 +127,9 @@ IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem,
   options.profiles = run.context.options.profiles;
   options.simulation_progress = told(run);
   options.progress = [&](const FitRow& row) {
-    run.progress.iteration(fmt::format("iteration {:3d}   cost {:.9e}   gradient {:.1e}   step {:.1e}", row.iteration,
-                                       row.cost, row.gradient_norm, row.step_norm));
+    run.progress.iteration(fmt::format("iteration {:3d}   cost {:.6e}   gradient {:.1e}   step {:.1e}   {}",
+                                       row.iteration, row.cost, row.gradient_norm, row.step_norm,
+                                       counted(row.simulations, "simulation")));
     if (row.iteration > long_run.earlier().last_iteration)
       long_run.add("iterate", {{"iteration", row.iteration},
                                {"cost", row.cost},

@@ -7,6 +7,7 @@
 
 #include "app/report/run_report.hpp"
 #include "app/results/joint_forces.hpp"
+#include "app/results/sensor_unit.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "app/results/write_trajectory.hpp"
 #include "app/run/command.hpp"
@@ -53,19 +54,21 @@ struct DriveEfforts {
   }
 };
 
-void add_drives(Run& run, const DriveEfforts& efforts) {
+void add_drives(Run& run, const Scene& scene, const DriveEfforts& efforts) {
   if (efforts.rows.empty() || efforts.table.rows.empty()) return;
-  TextTable table({"drive", "least force", "largest force"});
+  TextTable table({"drive", "least", "largest", "unit"});
   for (std::size_t k = 1; k < efforts.table.columns.size(); ++k) {
     double least = INFINITY, largest = -INFINITY;
     for (const std::vector<double>& row : efforts.table.rows) {
       least = std::min(least, row[k]), largest = std::max(largest, row[k]);
     }
     const std::string& name = efforts.table.columns[k];
-    run.result["drives"][name] = {{"force_min", least}, {"force_max", largest}};
-    table.add({name, significant(least, 6), significant(largest, 6)});
+    const auto drive = std::ranges::find(scene.drives, name, &Drive::name);
+    const std::string unit = drive == scene.drives.end() ? "N or N m" : unit_of_effort(*drive);
+    run.result["drives"][name] = {{"force_min", least}, {"force_max", largest}, {"unit", unit}};
+    table.add({name, significant(least, 6), significant(largest, 6), unit});
   }
-  run.context.out << "\nforce or torque of each drive along its coordinate [N or N m]\n" << table.text();
+  run.context.out << "\nforce or torque of each drive along its coordinate\n" << table.text();
 }
 
 // Returns their times, for the plots.
@@ -132,7 +135,7 @@ int kinematics_command(const CommandContext& context) {
   const bool motion_ends_early = interrupted();
   write_trajectory(run, trajectory);
   if (!efforts.rows.empty()) run.write("drives.csv", to_csv(efforts.table));
-  add_drives(run, efforts);
+  add_drives(run, scene, efforts);
   const std::vector<PlotInstant> singular = add_singular(run, kinematics);
   if (motion_ends_early) {
     run.stopped(fmt::format("trajectory.csv holds the motion up to {:.6g} s", kinematics.last_good_time));

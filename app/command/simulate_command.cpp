@@ -5,6 +5,7 @@
 #include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
+#include "app/results/objective_units.hpp"
 #include "app/results/objective_values.hpp"
 #include "app/results/sensitivities_csv.hpp"
 #include "app/results/simulated_motion.hpp"
@@ -22,7 +23,8 @@ void add_objectives(Run& run, const SimulatedMotion& motion) {
   if (psi.size() == 0) return;
   const bool any_smooth = std::any_of(motion.true_values.begin(), motion.true_values.end(),
                                       [](const std::optional<double>& value) { return value.has_value(); });
-  std::vector<std::string> header{"objective", "value"};
+  const ObjectiveUnits units = objective_units(run.problem);
+  std::vector<std::string> header{"objective", "value", "unit"};
   if (any_smooth) header.push_back("true extreme");
   TextTable table(header);
   for (Eigen::Index i = 0; i < psi.size(); ++i) {
@@ -31,10 +33,11 @@ void add_objectives(Run& run, const SimulatedMotion& motion) {
     run.result["objectives"][name] = objective_json(psi(i), true_value);
     if (const std::vector<double>& instants = motion.instants[static_cast<std::size_t>(i)]; !instants.empty())
       run.result["objectives"][name]["instants"] = instants;
-    std::vector<std::string> row{name, significant(psi(i), 10)};
+    std::vector<std::string> row{name, significant(psi(i), 10), shown_unit(units, name)};
     if (any_smooth) row.push_back(true_value ? significant(*true_value, 10) : "");
     table.add(row);
   }
+  add_units(run.result, units);
   run.context.out << '\n' << table.text();
 }
 

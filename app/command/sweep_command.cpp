@@ -6,6 +6,7 @@
 
 #include "app/report/sweep_report.hpp"
 #include "app/results/accuracy_results.hpp"
+#include "app/results/objective_units.hpp"
 #include "app/results/trajectory_csv.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
@@ -50,7 +51,8 @@ Trajectory table_of(const Problem& problem, const SweepPoints& points, const std
 }
 
 void add_ranges(Run& run, const SweepPoints& points, const std::vector<SweepRow>& rows) {
-  TextTable table({"objective", "least", "at point", "largest", "at point"});
+  TextTable table({"objective", "unit", "least", "at point", "largest", "at point"});
+  const ObjectiveUnits units = objective_units(run.problem);
   for (std::size_t o = 0; o < run.problem.objectives.size(); ++o) {
     const Eigen::Index k = static_cast<Eigen::Index>(o);
     const SweepRow* least = nullptr;
@@ -67,8 +69,9 @@ void add_ranges(Run& run, const SweepPoints& points, const std::vector<SweepRow>
                                                {"least_at", number(least)},
                                                {"largest", largest->psi(k)},
                                                {"largest_at", number(largest)}};
-    table.add({name, significant(least->psi(k)), std::to_string(number(least)), significant(largest->psi(k)),
-               std::to_string(number(largest))});
+    if (!units.at(name).empty()) run.result["sweep"]["objectives"][name]["unit"] = units.at(name);
+    table.add({name, shown_unit(units, name), significant(least->psi(k)), std::to_string(number(least)),
+               significant(largest->psi(k)), std::to_string(number(largest))});
   }
   run.context.out << fmt::format("{} points of {} parameter{}\n\n", rows.size(), points.parameters.size(),
                                  points.parameters.size() == 1 ? "" : "s");

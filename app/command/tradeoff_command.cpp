@@ -2,6 +2,7 @@
 
 #include "app/report/tradeoff_report.hpp"
 #include "app/results/accuracy_results.hpp"
+#include "app/results/objective_units.hpp"
 #include "app/results/recommended_problem.hpp"
 #include "app/results/tradeoff_csv.hpp"
 #include "app/results/tradeoff_results.hpp"
@@ -74,7 +75,7 @@ void sweep(Run& run) {
   } else if (run.context.options.apply) {
     apply_accuracy(run, tradeoff, adviser, *run.context.options.apply);
   }
-  run.write("report.html", tradeoff_report(run.result, tradeoff));
+  run.write("report.html", tradeoff_report(run.result, tradeoff, objective_units(run.problem)));
 }
 
 void penalty_study(Run& run) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
+#include <string>
 #include <utility>
 
 #include "app/report/line_plot.hpp"
@@ -17,7 +19,8 @@ namespace {
 // p dpsi/dp, the change of psi per relative change of p; largest first. Where p is zero it would hide the derivative.
 void add_tornado(HtmlPage& page, const Scene& scene, const std::string& name, const Json& objective) {
   constexpr std::size_t kMost = 15;  // rows of one plot
-  RowPlot plot{.title = name + ": what a change of each parameter does", .x_label = "p dpsi/dp [unit of " + name + "]"};
+  RowPlot plot{.title = name + ": what a change of each parameter does",
+               .x_label = fmt::format("p dpsi/dp [{}]", unit_of(objective))};
   for (const Parameter& p : scene.parameters) {
     const Json derivative = objective.at("gradient").value(p.name, Json());
     if (!derivative.is_number() || !std::isfinite(derivative.get<double>()) || p.value == 0) continue;
@@ -26,15 +29,18 @@ void add_tornado(HtmlPage& page, const Scene& scene, const std::string& name, co
   }
   const auto larger = [](const PlotRow& a, const PlotRow& b) { return std::abs(a.high) > std::abs(b.high); };
   std::stable_sort(plot.rows.begin(), plot.rows.end(), larger);
-  if (plot.rows.size() > kMost) plot.rows.resize(kMost);
+  const std::size_t all = plot.rows.size();
+  if (all > kMost) plot.rows.resize(kMost);
   page.drawing(to_svg(plot));
+  if (all > kMost) page.note(fmt::format("The {} largest of {} are drawn.", kMost, all));
 }
 
 void add_gradients(HtmlPage& page, const Scene& scene, const Json& result) {
   page.heading("Gradients");
   std::vector<std::string> header{"parameter", "value", "unit"};
   std::vector<TableRow> rows;
-  for (const auto& [name, objective] : result.at("objectives").items()) header.push_back("d " + name);
+  for (const auto& [name, objective] : result.at("objectives").items())
+    header.push_back(fmt::format("d {} [{} per unit]", name, unit_of(objective)));
   for (const Parameter& p : scene.parameters) {
     TableRow& row = rows.emplace_back(TableRow{p.name, number_cell(p.value), p.unit.empty() ? "-" : p.unit});
     for (const auto& [name, objective] : result.at("objectives").items())
@@ -58,10 +64,12 @@ std::vector<double> numbers_of(const Json& array) {
 }
 
 // |central difference - tangent-linear model| over the step h, per kind of steps.
-LinePlot ladder_plot(const std::string& objective, const std::string& parameter, const Json& entry, double derivative) {
-  LinePlot plot{.title = fmt::format("d {}/d {}: differences over their step", objective, parameter),
-                .x_label = "step h of the parameter [its unit]",
-                .y_label = "|difference - derivative| [unit of the derivative]",
+LinePlot ladder_plot(const std::string& objective, const std::string& unit, const Parameter& parameter,
+                     const Json& entry, double derivative) {
+  const std::string step = parameter.unit.empty() ? "SI unit" : parameter.unit;
+  LinePlot plot{.title = fmt::format("d {}/d {}: differences over their step", objective, parameter.name),
+                .x_label = fmt::format("step h of {} [{}]", parameter.name, step),
+                .y_label = fmt::format("|difference - derivative| [{}]", unit_per(unit, step)),
                 .logarithmic_y = true,
                 .logarithmic_x = true};
   for (const auto& [key, name] :
@@ -80,7 +88,7 @@ std::string ladder_id(std::size_t objective, std::size_t parameter) {
 
 constexpr std::size_t kMostLadders = 60;  // plots of a page that stays below 400 kB
 
-void add_ladders(HtmlPage& page, const Json& result, const Json& entries) {
+void add_ladders(HtmlPage& page, const Scene& scene, const Json& result, const Json& entries) {
   page.heading("Differences over their step");
   page.note("Errors fall as h^2 until rounding, or the integrator's error on free steps, takes over as 1/h.");
   page.begin_choices({"objective", "parameter"});
@@ -88,10 +96,12 @@ void add_ladders(HtmlPage& page, const Json& result, const Json& entries) {
   for (const auto& [objective, parameters] : entries.items()) {
     std::size_t p = 0;
     for (const auto& [parameter, entry] : parameters.items()) {
-      const Json derivative = result.at("objectives").at(objective).at("gradient").value(parameter, Json());
-      if (plots++ < kMostLadders && derivative.is_number()) {
+      const Json& values = result.at("objectives").at(objective);
+      const Json derivative = values.at("gradient").value(parameter, Json());
+      const auto found = std::ranges::find(scene.parameters, parameter, &Parameter::name);
+      if (plots++ < kMostLadders && derivative.is_number() && found != scene.parameters.end()) {
         page.begin_choice({objective, parameter}, ladder_id(o, p));
-        page.plot(ladder_plot(objective, parameter, entry, derivative.get<double>()));
+        page.plot(ladder_plot(objective, unit_of(values), *found, entry, derivative.get<double>()));
         page.end_choice();
       }
       ++p;
@@ -102,10 +112,13 @@ void add_ladders(HtmlPage& page, const Json& result, const Json& entries) {
   if (plots > kMostLadders) page.note(fmt::format("The first {} of {} plots are drawn.", kMostLadders, plots));
 }
 
-void add_taylor(HtmlPage& page, const Json& taylor) {
+void add_taylor(HtmlPage& page, const Json& objectives, const Json& taylor) {
+  std::set<std::string> units;
+  for (const auto& [objective, of_one] : taylor.items()) units.insert(unit_of(objectives.at(objective)));
   LinePlot plot{.title = "Taylor remainder along a random direction d of all parameters",
                 .x_label = "h [-]",
-                .y_label = "|psi(rho + h d) - psi - h psi_rho d| [unit of psi]",
+                .y_label = fmt::format("|psi(rho + h d) - psi - h psi_rho d| [{}]",
+                                       units.size() == 1 ? *units.begin() : "SI unit"),
                 .logarithmic_y = true,
                 .logarithmic_x = true};
   for (const auto& [objective, of_one] : taylor.items()) {
@@ -160,7 +173,8 @@ std::string gradient_report(const Scene& scene, const Json& result) {
         counted(static_cast<long>(scene.parameters.size()), "parameter"), result.at("methods").begin().key(), [&] {
           std::string values;
           for (const auto& [name, objective] : result.at("objectives").items())
-            values += (values.empty() ? "" : ", ") + name + " = " + cell(objective.at("value"), 5);
+            values +=
+                (values.empty() ? "" : ", ") + name + " = " + cell(objective.at("value"), 5) + after_number(objective);
           return values;
         }()));
   }
@@ -192,8 +206,8 @@ std::string check_report(const Scene& scene, const Json& result) {
     add_digits(page, entries, "tlm_adjoint", "Tangent-linear model and adjoint:");
     add_digits(page, entries, "frozen_difference", "Tangent-linear model and differences on frozen steps:");
     add_digits(page, entries, "free_difference", "Tangent-linear model and differences with step-size control:");
-    add_ladders(page, result, entries);
-    add_taylor(page, result.at("verdict").value("taylor", Json::object()));
+    add_ladders(page, scene, result, entries);
+    add_taylor(page, result.at("objectives"), result.at("verdict").value("taylor", Json::object()));
     page.heading("Verdicts");
     std::vector<TableRow> rows;
     for (const auto& [objective, parameters] : entries.items()) {

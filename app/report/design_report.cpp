@@ -16,17 +16,18 @@
 namespace mbsopt {
 namespace {
 
-// "track fell from 12.3 to 0.45 (-96 %) in 12 iterations; no limit is missed; k is at a bound."
+// "track fell from 12.3 to 0.45 m^2 s (-96 %) in 12 iterations; no limit is missed; k is at a bound."
 void add_design_verdict(HtmlPage& page, const Json& result) {
   const Json& optimizer = result.at("optimizer");
   if (result.at("objectives").empty()) return;
   const double before = optimizer.at("objective_initial").get<double>(),
                after = optimizer.at("objective_final").get<double>();
-  std::string words = fmt::format("{} {} from {:.5g} to {:.5g}", result.at("objectives").begin().key(),
+  const Json& minimised = *result.at("objectives").begin();
+  std::string words = fmt::format("{} {} from {:.5g} to {:.5g}{}", result.at("objectives").begin().key(),
                                   after < before   ? "fell"
                                   : after > before ? "rose"
                                                    : "stayed",
-                                  before, after);
+                                  before, after, after_number(minimised));
   if (before != 0) words += fmt::format(" ({:+.3g} %)", 100 * (after - before) / std::abs(before));
   words += " in " + counted(optimizer.at("iterations").get<long>(), "iteration");
   if (result.at("objectives").size() > 1)
@@ -56,7 +57,7 @@ void add_parameters(HtmlPage& page, const Json& result) {
                          .high = to,
                          .ring = from,
                          .dot = to,
-                         .words = cell(p.at("initial"), 4) + " \u2192 " + cell(p.at("value"), 4)});
+                         .words = cell(p.at("initial"), 4) + " \u2192 " + cell(p.at("value"), 4) + after_number(p)});
   }
   page.table({"parameter", "initial", "optimum", "unit", "lower", "upper", "at bound"}, rows);
   page.drawing(to_svg(plot));
@@ -81,7 +82,8 @@ void add_outcome(HtmlPage& page, const Json& result) {
   std::vector<TableRow> rows;
   const auto add_row = [&](const std::string& name, const Json& objective) {
     const Json extreme = objective.value("true_value", Json());
-    rows.push_back({name, number_cell(objective.value("initial", Json()), 7), number_cell(objective.at("value"), 7)});
+    rows.push_back({name, unit_of(objective), number_cell(objective.value("initial", Json()), 7),
+                    number_cell(objective.at("value"), 7)});
     if (true_values) rows.back().push_back(number_cell(extreme, 7));
     for (const char* key : {"lower", "upper"}) rows.back().push_back(number_cell(objective.value(key, Json()), 7));
     rows.back().push_back(margin_of(objective, extreme.is_number() ? extreme : objective.at("value")));
@@ -92,8 +94,8 @@ void add_outcome(HtmlPage& page, const Json& result) {
   for (const auto& [load_case, of_case] : cases.items())
     for (const auto& [name, objective] : of_case.at("objectives").items())
       add_row(fmt::format("{} ({})", name, load_case), objective);
-  std::vector<std::string> header{"objective", "before", "after", "at least", "at most", "margin", "price"};
-  if (true_values) header.insert(header.begin() + 3, "true extreme after");
+  std::vector<std::string> header{"objective", "unit", "before", "after", "at least", "at most", "margin", "price"};
+  if (true_values) header.insert(header.begin() + 4, "true extreme after");
   page.table(header, rows);
   if (!result.contains("conflicts")) return;
   page.paragraph("These limits and bounds are in conflict:");
@@ -156,7 +158,9 @@ std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const 
   page.heading("Result");
   add_outcome(page, result);
   add_parameters(page, result);
-  add_convergence(page, history, result.at("parameters"));
+  const Json& objectives = result.at("objectives");
+  add_convergence(page, history, result.at("parameters"),
+                  objectives.empty() ? "SI unit" : unit_of(*objectives.begin()));
   add_multistart(page, result);
   page.heading("Motion before and after");
   add_drawings(page, scene, rho, before, after, targets);

@@ -13,7 +13,11 @@
 namespace mbsopt {
 namespace {
 
-constexpr std::size_t kWords = 24;  // characters from which a cell is a sentence, which wraps
+// Characters from which a cell is a sentence, which wraps. An interval of two numbers, the longest of all other cells,
+// has 30: [-1.234567e-05, -1.234567e-05].
+constexpr std::size_t kWords = 32;
+
+constexpr std::size_t kFewColumns = 8;  // that fit a printed page of 18 cm without breaks within words
 
 // As the value of an attribute.
 std::string list_of(const std::vector<std::string>& words) {
@@ -22,13 +26,13 @@ std::string list_of(const std::vector<std::string>& words) {
   return html_escaped(fmt::format("[{}]", fmt::join(quoted, ",")));
 }
 
-std::string cell_of(const TableCell& cell) {
+std::string cell_of(const TableCell& cell, bool words) {
   std::string attributes;
   if (!cell.full.empty() && cell.full != cell.text) attributes += fmt::format(" title=\"{}\"", html_escaped(cell.full));
   if (cell.shade) {
     attributes += fmt::format(" class=\"shade\" style=\"--tone:var({});--depth:{:.2f}\"",
                               *cell.shade < 0 ? "--c1" : "--c0", std::min(1.0, std::abs(*cell.shade)));
-  } else if (cell.text.size() >= kWords) {
+  } else if (words) {
     attributes += " class=\"words\"";
   }
   std::string text = html_escaped(cell.text);
@@ -63,19 +67,26 @@ void HtmlPage::code(std::string_view text) { body_ += fmt::format("<code>{}</cod
 
 void HtmlPage::table(const std::vector<std::string>& header, const std::vector<TableRow>& rows, bool dense) {
   if (rows.empty()) return;
-  body_ += fmt::format("<div class=\"table\" tabindex=\"0\"><table{}>\n", dense ? " class=\"dense\"" : "");
-  if (std::any_of(header.begin(), header.end(), [](const std::string& name) { return !name.empty(); })) {
+  std::vector<bool> words(header.size());  // a column with a sentence is aligned as text, in all its rows
+  for (const TableRow& row : rows)
+    for (std::size_t k = 0; k < std::min(row.size(), words.size()); ++k)
+      words[k] = words[k] || row[k].text.size() >= kWords;
+  const bool named = std::ranges::any_of(header, [](const std::string& name) { return !name.empty(); });
+  const char* const kind = dense                         ? " class=\"dense\""
+                           : !named                      ? " class=\"pairs\""
+                           : header.size() > kFewColumns ? " class=\"wide\""
+                                                         : "";
+  body_ += fmt::format("<div class=\"table\" tabindex=\"0\"><table{}>\n", kind);
+  if (named) {
     body_ += "<thead><tr>";
-    for (std::size_t k = 0; k < header.size(); ++k) {
-      const bool words = k < rows.front().size() && rows.front()[k].text.size() >= kWords;
-      body_ += fmt::format("<th{}>{}</th>", words ? " class=\"words\"" : "", html_escaped(header[k]));
-    }
+    for (std::size_t k = 0; k < header.size(); ++k)
+      body_ += fmt::format("<th{}>{}</th>", words[k] ? " class=\"words\"" : "", html_escaped(header[k]));
     body_ += "</tr></thead>\n";
   }
   body_ += "<tbody>";
   for (const TableRow& row : rows) {
     body_ += "<tr>";
-    for (const TableCell& cell : row) body_ += cell_of(cell);
+    for (std::size_t k = 0; k < row.size(); ++k) body_ += cell_of(row[k], k < words.size() && words[k]);
     body_ += "</tr>\n";
   }
   body_ += "</tbody></table></div>\n";

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <utility>
 
@@ -41,7 +42,7 @@ void add_fit_verdict(HtmlPage& page, const Json& result) {
     const Json error = p.value("std_error", Json());
     words += fmt::format("{} {} = {}", k++ == 0 ? ":" : ",", name, rounded_cell(p.at("value"), error).text);
     if (error.is_number() && std::isfinite(error.get<double>())) words += " \u00b1 " + cell(error, 2);
-    if (!p.value("unit", "").empty()) words += " " + p.value("unit", "");
+    words += after_number(p);
   }
   page.verdict(words + (parameters.size() > kMost ? ", ..." : "."));
 }
@@ -63,7 +64,7 @@ void add_fitted_parameters(HtmlPage& page, const Json& result) {
   page.table({"parameter", "initial", "value", "standard error", "95 % interval", "unit", "at bound"}, rows);
   RowPlot plot{.title = "95 % intervals (ring: initial value, red: bounds, thin: prior; where they are near)",
                .x_label = "deviation from the estimate [%]"};
-  constexpr double kFar = 100;  // [%]: an interval that is wider says that the data do not determine the parameter
+  constexpr double kFar = 100;  // [%]: a wider interval, as of a value near 0, leaves the frame
   double widest = 0;
   for (const auto& [name, p] : result.at("parameters").items()) {
     const double value = p.at("value").get<double>(),
@@ -86,10 +87,11 @@ void add_fitted_parameters(HtmlPage& page, const Json& result) {
     }
     const double start = percent(p.at("initial").get<double>());
     if (std::abs(start) < kFar) row.ring = start;
-    widest = std::max(widest, std::min(half, kFar));
+    if (half <= kFar) widest = std::max(widest, half);
     plot.rows.push_back(std::move(row));
   }
-  if (widest > 0) plot.range = std::pair(-1.6 * widest, 1.6 * widest);
+  if (widest == 0) widest = kFar;
+  plot.range = std::pair(-1.6 * widest, 1.6 * widest);
   for (PlotRow& row : plot.rows)
     if (row.ring && std::abs(*row.ring) > 1.6 * widest) row.ring.reset();
   page.drawing(to_svg(plot));
@@ -112,6 +114,14 @@ void add_fit_outcome(HtmlPage& page, const Json& result) {
                         {"condition number", cell(identifiability.at("condition_number"), 3)}});
   if (statistics.contains("no_standard_errors"))
     page.paragraph("There are no standard errors and intervals: " + cell(statistics.at("no_standard_errors")) + ".");
+  if (std::string words = identifiability.value("in_words", ""); !words.empty()) {
+    words.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(words.front())));
+    page.paragraph(words + ".");
+    page.note(
+        "Singular values of the sensitivities, with the effect of each parameter scaled to 1: the nearer to 0, the "
+        "less "
+        "a combination of parameters shows in the data.");
+  }
   for (const Json& words : identifiability.at("unidentifiable"))
     page.paragraph("Not determined by the data: " + cell(words));
 }
@@ -121,25 +131,29 @@ void add_correlation(HtmlPage& page, const Json& result) {
   if (!result.contains("correlation")) return;
   page.heading("Correlation of the estimates");
   constexpr std::size_t kMostNumbers = 12;  // columns of numbers that fit a page; with more, cells are colours alone
+  constexpr std::size_t kMost = 60;         // parameters of a page that stays below 400 kB; shared ones come first
   const Json& correlation = result.at("correlation");
-  const bool dense = correlation.at("names").size() > kMostNumbers;
+  const std::size_t all = correlation.at("names").size(), shown = std::min(all, kMost);
+  const bool dense = all > kMostNumbers;
   std::vector<std::string> header{""};
   std::vector<TableRow> rows;
-  for (std::size_t i = 0; i < correlation.at("names").size(); ++i) {
+  for (std::size_t i = 0; i < shown; ++i) {
     header.push_back(cell(correlation.at("names")[i]));
     rows.push_back({header.back()});
-    for (const Json& entry : correlation.at("matrix")[i]) {
+    for (std::size_t k = 0; k <= i; ++k) {  // the matrix is symmetric
+      const Json& entry = correlation.at("matrix")[i][k];
       if (!entry.is_number()) {
         rows.back().push_back("-");
         continue;
       }
-      rows.back().push_back(
-          {dense ? std::string() : fmt::format("{:.2f}", entry.get<double>()), fmt::format("{}", entry.get<double>())});
-      rows.back().back().shade = entry.get<double>();
+      const double r = entry.get<double>();
+      rows.back().push_back({dense ? std::string() : fmt::format("{:.2f}", r), fmt::format("{:.4f}", r)});
+      rows.back().back().shade = r;
     }
   }
   page.table(header, rows, dense);
   if (dense) page.note("Blue: positive, orange: negative, stronger: nearer to 1. The pointer shows the numbers.");
+  if (shown < all) page.note(fmt::format("The first {} of {} parameters are drawn.", shown, all));
 }
 
 void add_experiments(HtmlPage& page, const Json& result) {
@@ -224,10 +238,12 @@ LinePlot histogram(const FitPlot& fit) {
   PlotSeries found{"share of the residuals", {}, {}, Mark::bars, {}, data_colour(fit)},
       normal{"normal distribution", {}, {}, Mark::line};
   std::vector<double> share(kBins, 0.0);
+  const auto samples =
+      static_cast<double>(std::ranges::count_if(fit.residual, [](double z) { return std::isfinite(z); }));
   for (const double z : fit.residual) {
     if (!std::isfinite(z)) continue;
     const double bin = std::clamp(std::floor((z + kEnd) / kWidth), 0.0, kBins - 1.0);
-    share[static_cast<std::size_t>(bin)] += 1 / static_cast<double>(fit.residual.size());
+    share[static_cast<std::size_t>(bin)] += 1 / samples;
   }
   for (int k = 0; k < kBins; ++k) {
     const double z = -kEnd + (k + 0.5) * kWidth;
@@ -241,21 +257,40 @@ LinePlot histogram(const FitPlot& fit) {
           .series = {found, normal}};
 }
 
-// r_k = sum_i z_i z_{i+k} / sum_i z_i^2 about the mean; of white noise 95 % lie within +-1.96/sqrt(n).
+// Residuals without gaps: of one record, or of one of its windows.
+std::vector<std::vector<double>> parts_of(const std::vector<double>& residual) {
+  std::vector<std::vector<double>> parts(1);
+  for (const double z : residual) {
+    if (std::isfinite(z))
+      parts.back().push_back(z);
+    else if (!parts.back().empty())
+      parts.emplace_back();
+  }
+  return parts;
+}
+
+// r_k = sum_i z_i z_{i+k} / sum_i z_i^2 about the mean, without pairs across a gap; of white noise 95 % lie within
+// +-1.96/sqrt(n).
 LinePlot autocorrelation(const FitPlot& fit) {
   constexpr std::size_t kMostLags = 40;
-  const std::vector<double>& z = fit.residual;
-  const std::size_t lags = std::min(kMostLags, z.size() / 4);
+  const std::vector<std::vector<double>> parts = parts_of(fit.residual);
+  std::size_t samples = 0, longest = 0;
   double mean = 0, power = 0;
-  for (const double value : z) mean += value / static_cast<double>(z.size());
-  for (const double value : z) power += (value - mean) * (value - mean);
+  for (const std::vector<double>& z : parts) {
+    samples += z.size(), longest = std::max(longest, z.size());
+    for (const double value : z) mean += value;
+  }
+  mean /= static_cast<double>(samples);
+  for (const std::vector<double>& z : parts)
+    for (const double value : z) power += (value - mean) * (value - mean);
   PlotSeries r{"autocorrelation", {}, {}, Mark::bars, {}, data_colour(fit)};
-  for (std::size_t lag = 1; lag <= lags; ++lag) {
+  for (std::size_t lag = 1; lag <= std::min(kMostLags, longest / 4); ++lag) {
     double sum = 0;
-    for (std::size_t i = 0; i + lag < z.size(); ++i) sum += (z[i] - mean) * (z[i + lag] - mean);
+    for (const std::vector<double>& z : parts)
+      for (std::size_t i = 0; i + lag < z.size(); ++i) sum += (z[i] - mean) * (z[i + lag] - mean);
     r.x.push_back(static_cast<double>(lag)), r.y.push_back(power > 0 ? sum / power : 0);
   }
-  const double limit = 1.96 / std::sqrt(static_cast<double>(z.size()));
+  const double limit = 1.96 / std::sqrt(static_cast<double>(samples));
   return {.title = fmt::format("{}: autocorrelation of the residuals of {}", fit.experiment, fit.channel),
           .x_label = "lag [samples]",
           .y_label = "autocorrelation [-]",
@@ -272,7 +307,7 @@ void add_fit(HtmlPage& page, const FitPlot& fit) {
                 .y_label = fmt::format("{} [{}]", fit.channel, fit.unit)};
   plot.series.push_back({"measured", fit.times, fit.measured, Mark::points, {}, data});
   plot.series.push_back({"model", fit.times, fit.model, Mark::line, {}, model});
-  if (!fit.prediction.empty() && fit.prediction.size() == fit.times.size())
+  if (std::ranges::any_of(fit.prediction, [](double width) { return std::isfinite(width); }))
     for (const double side : {1.0, -1.0}) {
       PlotSeries band{side > 0 ? "95 % of measurements" : "", fit.times, fit.model, Mark::line, {}, kBandColour};
       for (std::size_t i = 0; i < band.y.size(); ++i) band.y[i] += side * fit.prediction[i];

@@ -4,7 +4,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <cstdlib>
 #include <iterator>
 #include <limits>
 #include <random>
@@ -152,11 +154,45 @@ const char* style_of(Mark mark) {
   return "line";
 }
 
-std::string ring(double px, double py) {
-  return fmt::format("M{:.1f} {:.1f}a4 4 0 1 0 8 0a4 4 0 1 0 -8 0", px - 4, py);
-}
+constexpr const char* kRing = "a4 4 0 1 0 8 0a4 4 0 1 0 -8 0";  // from its left end
+constexpr const char* kCross = "l10 10m-10 0l10 -10";           // from its upper left end
 
-std::string cross_at(double px, double py) { return fmt::format("M{:.1f} {:.1f}l10 10m-10 0l10 -10", px - 5, py - 5); }
+// The d of an SVG path. It goes from place to place by differences in tenths of a px, which are half as long as the
+// places. They end at rounded places, so that rounding errors do not add up.
+class PathText {
+ public:
+  void move(double px, double py) { go('m', px, py); }
+  void line(double px, double py) { go('l', px, py); }
+  // Draws at the place and ends there.
+  void mark(double px, double py, const char* drawn, double dx = 0, double dy = 0) {
+    move(px, py);
+    text_ += drawn, command_ = 0;
+    x_ += std::lround(10 * dx), y_ += std::lround(10 * dy);
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  void go(char command, double px, double py) {
+    const long x = std::lround(10 * px), y = std::lround(10 * py);
+    if (command != command_ || command == 'm') text_ += command;  // two places after one m are a line
+    command_ = command;
+    add(x - x_), add(y - y_);
+    x_ = x, y_ = y;
+  }
+
+  // 12, -.3; a space where no sign parts a number from the one before.
+  void add(long tenths) {
+    if (tenths >= 0 && !text_.empty() && std::isdigit(static_cast<unsigned char>(text_.back()))) text_ += ' ';
+    const long size = std::abs(tenths);
+    if (tenths < 0) text_ += '-';
+    if (size >= 10 || size == 0) text_ += std::to_string(size / 10);
+    if (size % 10 != 0) text_ += fmt::format(".{}", size % 10);
+  }
+
+  std::string text_;
+  char command_ = 0;
+  long x_ = 0, y_ = 0;  // where it ends [0.1 px]
+};
 
 std::size_t colour_of(const PlotSeries& series, std::size_t index) {
   return series.colour.value_or(series.part_of.value_or(index)) % kColours;
@@ -164,7 +200,7 @@ std::size_t colour_of(const PlotSeries& series, std::size_t index) {
 
 void draw_series(const LinePlot& plot, const PlotFrame& frame, std::size_t index, std::string& svg) {
   const PlotSeries& series = plot.series[index];
-  std::string path;
+  PathText path;
   bool pen_down = false;
   for (const std::size_t i : visible_samples(plot, series, frame)) {
     const double x = x_of(plot, series.x[i]), y = y_of(plot, series.y[i]);
@@ -174,27 +210,27 @@ void draw_series(const LinePlot& plot, const PlotFrame& frame, std::size_t index
     }
     const double px = frame.px(x), py = frame.py(y);
     if (series.mark == Mark::points) {
-      fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}h0", px, py);
+      path.mark(px, py, "h0");
     } else if (series.mark == Mark::rings) {
-      path += ring(px, py);
+      path.mark(px - 4, py, kRing);
     } else if (series.mark == Mark::crosses) {
-      path += cross_at(px, py);
+      path.mark(px - 5, py - 5, kCross, 10);
     } else if (series.mark == Mark::bars) {
-      fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}V{:.1f}", px, frame.py(0), py);
+      path.move(px, frame.py(0)), path.line(px, py);
     } else {
-      fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}", pen_down ? 'L' : 'M', px, py);
+      pen_down ? path.line(px, py) : path.move(px, py);
     }
     pen_down = true;
   }
   svg += fmt::format("<path data-series=\"{}\" class=\"{} c{}\" d=\"{}\"/>\n", index, style_of(series.mark),
-                     colour_of(series, index), path);
+                     colour_of(series, index), path.text());
 }
 
 // The area between a limit and what of a line lies beyond it.
 std::string area_beyond(const LinePlot& plot, const PlotFrame& frame, const PlotSeries& series,
                         const PlotLimit& limit) {
   const double y_limit = y_of(plot, limit.value);
-  std::string path;
+  PathText path;
   bool any = false;
   double last = 0;
   for (const std::size_t i : visible_samples(plot, series, frame)) {
@@ -202,11 +238,12 @@ std::string area_beyond(const LinePlot& plot, const PlotFrame& frame, const Plot
     if (!std::isfinite(x) || !std::isfinite(y)) continue;
     const bool beyond = limit.upper ? y > y_limit : y < y_limit;
     any = any || beyond;
-    if (path.empty()) path = fmt::format("M{:.1f} {:.1f}", frame.px(x), frame.py(y_limit));
-    fmt::format_to(std::back_inserter(path), "L{:.1f} {:.1f}", frame.px(x), frame.py(beyond ? y : y_limit));
+    if (path.text().empty()) path.move(frame.px(x), frame.py(y_limit));
+    path.line(frame.px(x), frame.py(beyond ? y : y_limit));
     last = frame.px(x);
   }
-  return any ? path + fmt::format("L{:.1f} {:.1f}Z", last, frame.py(y_limit)) : std::string();
+  path.line(last, frame.py(y_limit));
+  return any ? path.text() + "Z" : std::string();
 }
 
 void draw_limits(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
@@ -287,9 +324,9 @@ Ticks x_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
 // Drawn like the series itself.
 std::string legend_key(const PlotSeries& series, std::size_t index) {
   const std::string path = series.mark == Mark::points    ? "M5 5h0M15 5h0M25 5h0"
-                           : series.mark == Mark::rings   ? ring(15, 5)
+                           : series.mark == Mark::rings   ? std::string("M11 5") + kRing
                            : series.mark == Mark::bars    ? "M15 0V10"
-                           : series.mark == Mark::crosses ? cross_at(15, 5)
+                           : series.mark == Mark::crosses ? std::string("M10 0") + kCross
                                                           : "M0 5H30";
   return fmt::format("<svg class=\"key\" viewBox=\"0 0 30 10\"><path class=\"{} c{}\" d=\"{}\"/></svg>",
                      style_of(series.mark), colour_of(series, index), path);
@@ -297,20 +334,21 @@ std::string legend_key(const PlotSeries& series, std::size_t index) {
 
 void draw_axes(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
   const double bottom = kTop + kInnerHeight, right = kLeft + kInnerWidth;
-  svg += "<g class=\"ticks\">";
+  std::string grid, x_labels, y_labels;
   for (const auto& [tick, label] : x_ticks_of(plot, frame)) {
-    svg += fmt::format(
-        "<path class=\"grid\" d=\"M{0:.1f} {1:.1f}V{2:.1f}\"/><text x=\"{0:.1f}\" y=\"{3:.1f}\" "
-        "text-anchor=\"middle\">{4}</text>\n",
-        frame.px(tick), kTop, bottom, bottom + 16, label);
+    const double px = frame.px(tick);
+    grid += fmt::format("M{:.1f} {}V{}", px, kTop, bottom);
+    x_labels += fmt::format("<text x=\"{:.1f}\" y=\"{}\">{}</text>", px, bottom + 16, label);
   }
   for (const auto& [tick, label] : y_ticks_of(plot, frame)) {
-    svg += fmt::format(
-        "<path class=\"grid\" d=\"M{1:.1f} {0:.1f}H{2:.1f}\"/><text x=\"{3:.1f}\" y=\"{4:.1f}\" "
-        "text-anchor=\"end\">{5}</text>\n",
-        frame.py(tick), kLeft, right, kLeft - 6, frame.py(tick) + 4, label);
+    const double py = frame.py(tick);
+    grid += fmt::format("M{} {:.1f}H{}", kLeft, py, right);
+    y_labels += fmt::format("<text x=\"{}\" y=\"{:.1f}\">{}</text>", kLeft - 6, py + 4, label);
   }
-  svg += "</g>\n";
+  svg += fmt::format(
+      "<g class=\"ticks\"><path class=\"grid\" d=\"{}\"/>\n<g text-anchor=\"middle\">{}</g>\n"
+      "<g text-anchor=\"end\">{}</g></g>\n",
+      grid, x_labels, y_labels);
   svg += fmt::format("<rect class=\"frame\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>\n", kLeft, kTop, kInnerWidth,
                      kInnerHeight);
   svg += fmt::format("<text class=\"x-label\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n",

@@ -11,6 +11,7 @@
 #include "app/run/energy_balance.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
+#include "core/expression/dimension.hpp"
 
 namespace mbsopt {
 namespace {
@@ -58,6 +59,23 @@ TableCell rounded_cell(const Json& value, const Json& error) {
   // Two digits of the error remain.
   const double digits = std::floor(std::log10(v)) - std::floor(std::log10(e)) + 2;
   return number_cell(value, static_cast<int>(std::clamp(digits, 2.0, static_cast<double>(kMostDigits))));
+}
+
+std::string unit_of(const Json& objective) { return objective.value("unit", "SI unit"); }
+
+std::string after_number(const Json& quantity) {
+  const std::string unit = quantity.value("unit", "");
+  return unit.empty() || unit == "-" ? "" : " " + unit;
+}
+
+std::string unit_per(const std::string& unit, const std::string& divisor) {
+  const auto dimension_of = [](const std::string& text) {
+    return text == "-" ? std::optional(Unit{}) : parse_unit(text);
+  };
+  const std::optional<Unit> a = dimension_of(unit), b = dimension_of(divisor);
+  if (!a || !b) return "SI unit";
+  const Dimension found = a->dimension / b->dimension;
+  return found.is_none() ? "-" : to_string(found);
 }
 
 std::string report_title(const Json& result) {
@@ -121,17 +139,17 @@ void add_objectives(HtmlPage& page, const Json& result) {
   if (!result.contains("objectives") || result.at("objectives").empty()) return;
   page.heading("Objectives");
   std::vector<TableRow> rows;
-  std::vector<std::string> header{"objective", "value"};
+  std::vector<std::string> header{"objective", "value", "unit"};
   const bool any_smooth = has_true_values(result);
   if (any_smooth) header.push_back("true extreme");
   for (const auto& [name, objective] : result.at("objectives").items()) {
-    rows.push_back({name, number_cell(objective.at("value"))});
+    rows.push_back({name, number_cell(objective.at("value")), unit_of(objective)});
     if (any_smooth) rows.back().push_back(number_cell(objective.value("true_value", Json())));
   }
   page.table(header, rows);
 }
 
-void add_convergence(HtmlPage& page, const Trajectory& history, const Json& parameters) {
+void add_convergence(HtmlPage& page, const Trajectory& history, const Json& parameters, const std::string& unit) {
   if (history.rows.size() < 2) return;
   page.heading("Convergence");
   const auto column = [&](std::size_t index) {
@@ -147,7 +165,7 @@ void add_convergence(HtmlPage& page, const Trajectory& history, const Json& para
     if (std::all_of(values.begin(), values.end(), [](double v) { return v == 0; })) continue;
     LinePlot plot{.title = name,
                   .x_label = "iteration",
-                  .y_label = fmt::format("{} [{}]", name, name == std::string("objective") ? "its unit" : "-"),
+                  .y_label = fmt::format("{} [{}]", name, name == std::string("objective") ? unit : "-"),
                   .logarithmic_y = positive,
                   .whole_x = true};
     plot.series.push_back({name, column(0), values, Mark::line});
@@ -208,6 +226,12 @@ LinePlot parallel_coordinates(const Json& multistart, const Json& parameters) {
   return plot;
 }
 
+// The starts of an identification compare sums of squares in sigma.
+std::string minimised_unit(const Json& result) {
+  const Json objectives = result.value("objectives", Json::object());
+  return objectives.empty() ? "-" : unit_of(*objectives.begin());
+}
+
 void add_multistart(HtmlPage& page, const Json& result) {
   if (!result.contains("multistart") || !result.at("multistart").contains("waterfall")) return;
   const Json& multistart = result.at("multistart");
@@ -215,7 +239,10 @@ void add_multistart(HtmlPage& page, const Json& result) {
   page.paragraph(fmt::format("{}, seed {}; {} at the best optimum.",
                              counted(multistart.at("finished").get<long>(), "start"), multistart.at("seed").get<long>(),
                              multistart.at("at_the_best_optimum").get<long>()));
-  LinePlot plot{.title = "Waterfall", .x_label = "rank", .y_label = "objective [its unit]", .whole_x = true};
+  LinePlot plot{.title = "Waterfall",
+                .x_label = "rank",
+                .y_label = fmt::format("objective [{}]", minimised_unit(result)),
+                .whole_x = true};
   PlotSeries& series = plot.series.emplace_back(PlotSeries{"objective", {}, {}, Mark::points});
   std::vector<TableRow> rows;
   for (const Json& record : multistart.at("waterfall")) {

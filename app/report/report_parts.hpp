@@ -12,15 +12,20 @@
 
 namespace mbsopt {
 
-std::string report_title(const Json& result);         // "five_bar: design"
+// "m^2 s"; "SI unit" where the unit of an objective, an entry of result["objectives"], is not known.
+std::string unit_of(const Json& objective);
+std::string after_number(const Json& quantity);  // " m^2 s": its "unit", where it has one and is no number
+std::string unit_per(const std::string& unit, const std::string& divisor);  // "N/m", "m" to "N/m^2"
+std::string report_title(const Json& result);                               // "five_bar: design"
 void add_status(HtmlPage& page, const Json& result);  // a banner where it did not end well; warnings
 void add_model(HtmlPage& page, const Json& result);   // bodies, equations, degrees of freedom
 void add_simulation(HtmlPage& page, const Scene& scene, const Json& result);  // steps, violations, energy
 void add_objectives(HtmlPage& page, const Json& result);                      // name and value
 // Whether any objective is a smooth maximum or minimum, with the true one beside it.
 bool has_true_values(const Json& result);
-// Objective, infeasibility and parameters over iterations; parameters: as in result.json, by the names of columns.
-void add_convergence(HtmlPage& page, const Trajectory& history, const Json& parameters);
+// Objective, infeasibility and parameters over iterations; parameters: as in result.json, by the names of columns;
+// unit: of the objective.
+void add_convergence(HtmlPage& page, const Trajectory& history, const Json& parameters, const std::string& unit = "-");
 void add_multistart(HtmlPage& page, const Json& result);  // the waterfall, where there is one
 // A mechanism that moves, over its drawings at start and end.
 void add_motion(HtmlPage& page, std::array<int, 2> plane, const std::vector<MovingState>& states,

@@ -57,18 +57,18 @@ std::string address_of(const std::string& folder) {
   return address;
 }
 
-// The numbers by which two runs are compared have names: "objective path", "parameter k1", ...
+// The numbers by which two runs are compared have names: "objective path [m^2]", "parameter k1 [N/m]", ...
 Json numbers_of(const Json& result) {
   Json numbers = Json::object();
   const Json objectives = result.value("objectives", Json::object()),  // items() refers to them
       parameters = result.value("parameters", Json::object());
-  for (const auto& [name, objective] : objectives.items())
-    if (objective.is_object()) numbers["objective " + name] = objective.value("value", Json());
-  for (const auto& [name, p] : parameters.items()) {
-    if (!p.is_object()) continue;
-    const std::string unit = p.value("unit", "");
-    numbers[fmt::format("parameter {}{}", name, unit.empty() ? "" : " [" + unit + "]")] = p.value("value", Json());
-  }
+  for (const auto& [kind, quantities] : {std::pair{"objective", &objectives}, std::pair{"parameter", &parameters}})
+    for (const auto& [name, quantity] : quantities->items()) {
+      if (!quantity.is_object()) continue;
+      const std::string unit = quantity.value("unit", "");
+      numbers[fmt::format("{} {}{}", kind, name, unit.empty() ? "" : " [" + unit + "]")] =
+          quantity.value("value", Json());
+    }
   for (const auto& [part, keys] : {std::pair{"simulation", std::vector{"steps", "rejected", "rhs_evaluations"}},
                                    std::pair{"optimizer", std::vector{"iterations", "evaluations"}}}) {
     for (const char* key : keys)

@@ -45,13 +45,14 @@ std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const 
                           const DesignMotion& before, const DesignMotion& after, const SensorLimits& limits = {},
                           const std::vector<RunningTerm>& terms = {}, const std::vector<PointTarget>& targets = {});
 
-// The measurements of one channel of one experiment, and the fitted model at the same times. Values are in SI units.
+// The measurements of one channel of one experiment, and the fitted model at the same times. Values are in SI units;
+// NaN stands between the windows of an experiment.
 struct FitPlot {
   std::string experiment, channel, unit;  // channel: its column without the unit
   std::vector<double> times = {}, measured = {}, model = {},
                       residual = {};                     // residual: weighted, (measured - model)/sigma
   bool validates = false;                                // its experiment is scored, not fitted
-  std::vector<double> prediction = {};                   // half of the 95 % interval of a measurement; empty: not known
+  std::vector<double> prediction = {};                   // half of the 95 % interval of a measurement; nan: not known
   std::vector<double> initial_times = {}, initial = {};  // the model before the fit; empty: not known
 };
 // motion: of the first experiment that is fitted.

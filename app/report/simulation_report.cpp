@@ -24,7 +24,7 @@ void add_motion_verdict(HtmlPage& page, const Json& result, const Trajectory& tr
   const Json objectives = result.value("objectives", Json::object());
   if (objectives.size() <= kMost)
     for (const auto& [name, objective] : objectives.items())
-      words += fmt::format("; {} = {}", name, cell(objective.at("value"), 5));
+      words += fmt::format("; {} = {}{}", name, cell(objective.at("value"), 5), after_number(objective));
   page.verdict(words + ".");
 }
 

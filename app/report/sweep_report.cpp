@@ -19,7 +19,7 @@ namespace {
 using Point = std::vector<double>;  // a row of the table
 
 struct SweptObjective {
-  std::string name;
+  std::string name, unit;
   std::size_t value, judged;                     // its columns; judged: the true extreme if it is one, else the value
   std::optional<double> lower = {}, upper = {};  // limits of the design
 
@@ -40,7 +40,7 @@ struct Sweep {
   }
 };
 
-Sweep sweep_of(const Problem& problem, const SweepPoints& points, const Trajectory& table) {
+Sweep sweep_of(const Problem& problem, const SweepPoints& points, const Json& ranges, const Trajectory& table) {
   Sweep sweep;
   for (const int p : points.parameters) sweep.varied.push_back(&problem.scene.parameters[static_cast<std::size_t>(p)]);
   const auto first = table.columns.begin() + 1 + static_cast<std::ptrdiff_t>(sweep.varied.size());
@@ -48,7 +48,8 @@ Sweep sweep_of(const Problem& problem, const SweepPoints& points, const Trajecto
     return static_cast<std::size_t>(std::find(first, table.columns.end(), name) - table.columns.begin());
   };
   for (const ObjectiveSpec& spec : problem.objectives) {
-    SweptObjective objective{spec.name, column(spec.name), column(spec.name + " true")};
+    SweptObjective objective{spec.name, unit_of(ranges.value(spec.name, Json::object())), column(spec.name),
+                             column(spec.name + " true")};
     if (objective.judged == table.columns.size()) objective.judged = objective.value;
     if (problem.design) {
       if (spec.name == problem.design->minimize) sweep.best_by = sweep.objectives.size();
@@ -79,7 +80,7 @@ std::string place_of(const Sweep& sweep, const Point& point) {
   return fmt::format("{} ({}{})", number_of(point), words, sweep.varied.size() > kMost ? ", ..." : "");
 }
 
-// "15 of 15 points have values; track from 0.0123 at point 3 (k = 10 N/m) to 2.31 at point 6."
+// "15 of 15 points have values; track from 0.0123 m^2 at point 3 (k = 10 N/m) to 2.31 m^2 at point 6."
 void add_sweep_verdict(HtmlPage& page, const Sweep& sweep, const Json& counts) {
   std::string words =
       fmt::format("{} of {} have values", sweep.best.size(), counted(counts.at("points").get<std::size_t>(), "point"));
@@ -90,8 +91,9 @@ void add_sweep_verdict(HtmlPage& page, const Sweep& sweep, const Json& counts) {
   for (std::size_t o = 0; !sweep.best.empty() && o < std::min(kMost, sweep.objectives.size()); ++o) {
     const std::size_t column = sweep.objectives[o].judged;
     const auto [low, high] = std::ranges::minmax_element(sweep.best, {}, [&](const Point* p) { return (*p)[column]; });
-    words += fmt::format("; {} from {:.5g} at {} to {:.5g} at {}", sweep.objectives[o].name, (**low)[column],
-                         place_of(sweep, **low), (**high)[column], number_of(**high));
+    const std::string unit = after_number({{"unit", sweep.objectives[o].unit}});
+    words += fmt::format("; {} from {:.5g}{} at {} to {:.5g}{} at {}", sweep.objectives[o].name, (**low)[column], unit,
+                         place_of(sweep, **low), (**high)[column], unit, number_of(**high));
   }
   page.verdict(words + ".");
 }
@@ -107,7 +109,7 @@ void add_best_points(HtmlPage& page, const Sweep& sweep) {
   std::vector<std::string> header{"point"};
   for (const Parameter* p : sweep.varied) header.push_back(unit_label(*p));
   for (const SweptObjective& o : sweep.objectives) {
-    header.push_back(o.name);
+    header.push_back(fmt::format("{} [{}]", o.name, o.unit));
     if (o.judged != o.value) header.push_back(o.name + " true");
   }
   if (sweep.has_limits) header.push_back("misses the limit of");
@@ -143,7 +145,7 @@ LinePlot plot_over(const Sweep& sweep, std::size_t varied, const SweptObjective&
   }
   LinePlot plot{.title = fmt::format("{} over {}", objective.name, p.name),
                 .x_label = unit_label(p),
-                .y_label = objective.name + " [its unit]",
+                .y_label = fmt::format("{} [{}]", objective.name, objective.unit),
                 .logarithmic_y = low > 0 && std::log10(high / low) > kDecades,
                 .logarithmic_x = p.scale != ParameterScale::linear};
   const Point& best = *sweep.best.front();
@@ -176,7 +178,7 @@ void add_plots(HtmlPage& page, const Sweep& sweep, const Trajectory& table) {
 std::string sweep_report(const Problem& problem, const SweepPoints& points, const Json& result,
                          const Trajectory& table) {
   HtmlPage page(report_title(result));
-  const Sweep sweep = sweep_of(problem, points, table);
+  const Sweep sweep = sweep_of(problem, points, result.at("sweep").value("objectives", Json::object()), table);
   add_sweep_verdict(page, sweep, result.at("sweep"));
   add_status(page, result);
   add_best_points(page, sweep);

@@ -41,15 +41,22 @@ Group group_of(const TradeoffSetting& setting) {
 
 constexpr std::size_t kInk = 7;  // the colour of the style that is grey
 
+std::string unit_of_error(const Quantity& q, const ObjectiveUnits& units) {
+  if (q.relative) return "-";
+  const auto found = q.kind == QuantityKind::objective ? units.find(q.objective_name) : units.end();
+  return found == units.end() || found->second.empty() ? "SI unit" : found->second;
+}
+
 // Lines through bounds; points where an error is below its bound, and of settings that a tighter one dominates.
-LinePlot work_precision(const Tradeoff& tradeoff, std::size_t quantity, Group group, const std::string& title) {
+LinePlot work_precision(const Tradeoff& tradeoff, const ObjectiveUnits& units, std::size_t quantity, Group group,
+                        const std::string& title) {
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
   const Quantity& q = quantities[quantity];
   const auto column = static_cast<Eigen::Index>(quantity);
   LinePlot plot{.title = title,
                 .x_label = "time [s]",
                 .y_label = fmt::format("{} error of {} [{}]", q.relative ? "relative" : "absolute", q.name,
-                                       q.relative ? "-" : "its unit"),
+                                       unit_of_error(q, units)),
                 .logarithmic_y = true,
                 .logarithmic_x = true};
   std::vector<PlotSeries> points;
@@ -115,7 +122,7 @@ std::string sentence_of(const Json& result, const Tradeoff& tradeoff, std::size_
   return words + ".";
 }
 
-void add_plots(HtmlPage& page, const Json& result, const Tradeoff& tradeoff) {
+void add_plots(HtmlPage& page, const Json& result, const Tradeoff& tradeoff, const ObjectiveUnits& units) {
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
   struct Titled {
     Group group;
@@ -133,7 +140,7 @@ void add_plots(HtmlPage& page, const Json& result, const Tradeoff& tradeoff) {
   std::vector<Chosen> choices;
   for (std::size_t q = 0; q < quantities.size(); ++q) {
     for (const Titled& p : kPlots) {
-      LinePlot plot = work_precision(tradeoff, q, p.group, quantities[q].name + ": " + p.title);
+      LinePlot plot = work_precision(tradeoff, units, q, p.group, quantities[q].name + ": " + p.title);
       if (!plot.series.empty()) choices.push_back({q, p.title, std::move(plot)});
     }
   }
@@ -205,7 +212,7 @@ LinePlot alpha_plot(const std::string& title, const std::string& label) {
 
 }  // namespace
 
-std::string tradeoff_report(const Json& result, const Tradeoff& tradeoff) {
+std::string tradeoff_report(const Json& result, const Tradeoff& tradeoff, const ObjectiveUnits& units) {
   HtmlPage page(report_title(result));
   const Json recommendations = result.value("recommendations", Json::array());
   if (!recommendations.empty())
@@ -214,7 +221,7 @@ std::string tradeoff_report(const Json& result, const Tradeoff& tradeoff) {
   add_status(page, result);
   add_machine(page, result);
   add_recommendations(page, result);
-  add_plots(page, result, tradeoff);
+  add_plots(page, result, tradeoff, units);
   add_reference(page, tradeoff.reference);
   add_rows(page, tradeoff);
   add_model(page, result);
@@ -247,7 +254,8 @@ std::string penalty_report(const Json& result, const PenaltyStudy& study) {
   const std::vector<Quantity>& quantities = study.reference.errors->quantities();
   for (std::size_t q = 0; q < quantities.size(); ++q) {
     const auto column = static_cast<Eigen::Index>(q);
-    LinePlot plot = alpha_plot("Error of " + quantities[q].name, "error of " + quantities[q].name);
+    LinePlot plot = alpha_plot("Error of " + quantities[q].name, fmt::format("error of {} [{}]", quantities[q].name,
+                                                                             quantities[q].relative ? "-" : "SI unit"));
     PlotSeries quasi{"quasi-definite", {}, {}, Mark::line}, cholesky{"cholesky", {}, {}, Mark::line},
         rounded{"rounding by Cholesky on equal steps", {}, {}, Mark::dashed};
     for (const PenaltyStudyRow& row : study.rows) {

@@ -1,6 +1,7 @@
 #include "app/results/identification_results.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -84,6 +85,32 @@ void print_profiles(std::ostream& out, const IdentificationResult& fit) {
     if (!p.lower) out << fmt::format("{}: no lower end: {}\n", p.name, p.below);
     if (!p.upper) out << fmt::format("{}: no upper end: {}\n", p.name, p.above);
   }
+}
+
+// "the data determine 4 combinations of 4 parameters: singular values 1.8, 0.807, 0.335, 0.0239; the effects of c and T
+// cancel but for 0.024"
+std::string determined_in_words(const IdentificationResult& fit) {
+  constexpr Eigen::Index kMostValues = 6;  // singular values in a sentence
+  constexpr double kCancelled = 0.1;       // what remains of effects of size 1 that are worth a word
+  constexpr double kPart = 0.2;            // of a direction of length 1, from which a parameter counts in it
+  const FitStatistics& s = fit.statistics;
+  const Eigen::Index all = s.singular_values.size();
+  std::string values;
+  for (Eigen::Index k = 0; k < all; ++k) {
+    if (all > kMostValues && k == kMostValues / 2) values += ", ...", k = all - kMostValues / 2;
+    values += (values.empty() ? "" : ", ") + significant(s.singular_values(k), 3);
+  }
+  const std::string words =
+      fmt::format("the data determine {} of {}: singular values {}", counted(s.rank, "combination"),
+                  counted(fit.parameters.size(), "parameter"), values);
+  std::vector<std::string> parts;
+  for (Eigen::Index k = 0; k < s.weakest.size(); ++k)
+    if (std::abs(s.weakest(k)) > kPart) parts.push_back(fit.parameters[static_cast<std::size_t>(k)].name);
+  if (parts.size() < 2 || s.singular_values(s.rank - 1) > kCancelled) return words;
+  const std::string last = parts.back();
+  parts.pop_back();
+  return words + fmt::format("; the effects of {} and {} cancel but for {:.2g}", fmt::join(parts, ", "), last,
+                             s.singular_values(s.rank - 1));
 }
 
 Json to_json(const FittedParameter& p) {
@@ -170,8 +197,9 @@ void print_fit(std::ostream& out, const IdentificationResult& fit, const std::st
   print_correlation(out, fit);
   print_profiles(out, fit);
   print_influences(out, fit);
-  for (const std::string& words : fit.statistics.unidentifiable) out << "not determined by the data: " << words << '\n';
   const FitStatistics& s = fit.statistics;
+  if (fit.parameters.size() > 1) out << '\n' << determined_in_words(fit) << '\n';
+  for (const std::string& words : s.unidentifiable) out << "not determined by the data: " << words << '\n';
   if (!s.none.empty()) out << fmt::format("no standard errors and intervals: {}\n", s.none);
   out << '\n';
   if (s.none.empty()) out << fmt::format("standard errors: {}\n", s.covariance_in_words());
@@ -249,6 +277,14 @@ void add_to_result(Json& result, const IdentificationResult& fit) {
   for (const ParameterProfile& p : fit.profiles) result["profiles"][p.name] = to_json(p);
   result["identifiability"] = {{"condition_number", fit.statistics.condition_number},
                                {"unidentifiable", fit.statistics.unidentifiable}};
+  if (const FitStatistics& s = fit.statistics; s.singular_values.size() > 0) {
+    Json& determined = result["identifiability"];
+    determined["singular_values"] = std::vector<double>(s.singular_values.begin(), s.singular_values.end());
+    determined["rank"] = s.rank;
+    if (fit.parameters.size() > 1) determined["in_words"] = determined_in_words(fit);
+    for (Eigen::Index k = 0; k < s.weakest.size(); ++k)
+      determined["weakest"][fit.parameters[static_cast<std::size_t>(k)].name] = s.weakest(k);
+  }
   if (!fit.statistics.none.empty()) result["statistics"]["no_standard_errors"] = fit.statistics.none;
 }
 

@@ -9,6 +9,7 @@
 #include "app/starts/multistart.hpp"
 #include "app/starts/point_records.hpp"
 #include "app/terminal/interrupt.hpp"
+#include "core/expression/counted.hpp"
 #include "optim/objective/case_evaluator.hpp"
 #include "optim/objective/case_objective.hpp"
 #include "optim/problem/start_points.hpp"
@@ -18,9 +19,10 @@ namespace mbsopt {
 namespace {
 
 std::string progress_line(const DesignRow& row) {
-  return fmt::format("iteration {:3d}   objective {:.6e}   infeasibility {:.1e}{}", row.iteration, row.objective,
+  return fmt::format("iteration {:3d}   objective {:.6e}   infeasibility {:.1e}{}{}", row.iteration, row.objective,
                      row.violation,
-                     std::isfinite(row.optimality) ? fmt::format("   optimality {:.1e}", row.optimality) : "");
+                     std::isfinite(row.optimality) ? fmt::format("   optimality {:.1e}", row.optimality) : "",
+                     row.simulations > 0 ? "   " + counted(row.simulations, "simulation") : "");
 }
 
 std::vector<Parameter> designed(const Problem& problem) {

@@ -155,9 +155,8 @@ MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSp
     std::vector<int> jobs;
     for (int start = first; start < last; ++start)
       if (!finished.contains(start)) jobs.push_back(start);
-    compute_starts(run, jobs, work, done, [&] {
-      run.progress.stands(fmt::format("{} of {} starts finished", outcome.ranked.size(), spec.starts));
-    });
+    compute_starts(run, jobs, work, done,
+                   [&] { run.progress.fraction("starts", static_cast<double>(outcome.ranked.size()) / spec.starts); });
     outcome.interrupted = outcome.interrupted || outcome.ranked.size() < static_cast<std::size_t>(last);
     sort();
     if (!spec.until_all_found) continue;

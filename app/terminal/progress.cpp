@@ -56,18 +56,27 @@ Progress::~Progress() {
   }
 }
 
+// At the speed since the first fraction of the same thing; a hundredth of it tells no speed yet.
+std::string Progress::left_of(std::string_view what, double done, double now) {
+  constexpr double kTells = 0.01;
+  if (what != doing_ || done < done_) doing_ = what, began_ = now, done_ = done;
+  if (now - began_ < kAtFirst || done - done_ < kTells) return "";
+  return fmt::format(", {:.0f} s left", (now - began_) * (1 - done) / (done - done_));
+}
+
 void Progress::fraction(std::string_view what, double done) {
   if (quiet_) return;
   const double percent = 100 * std::clamp(done, 0.0, 1.0);
   const int whole = static_cast<int>(std::floor(percent));
   const bool stands = terminal_ && whole == shown_percent_;
   const double now = seconds_();
+  const std::string left = left_of(what, std::clamp(done, 0.0, 1.0), now);
   if (now - said_ < (stands ? kAtFirst : patience_)) return;
-  if (!terminal_) return break_silence(fmt::format("{}: {:.3g} %", what, percent), now);
+  if (!terminal_) return break_silence(fmt::format("{}: {:.3g} %", what, percent), now, left);
   shown_percent_ = whole, said_ = now;
   const int filled = whole * kBarWidth / 100;
   draw(fmt::format("{} [{:#>{}}{:.>{}}] {:3d} %", what, "", filled, "", kBarWidth - filled, whole),
-       stands ? in_seconds(now - start_) : "");
+       (stands ? in_seconds(now - start_) : "") + left);
 }
 
 bool Progress::silent_for_long() const { return !quiet_ && seconds_() - said_ >= (terminal_ ? kAtFirst : patience_); }
@@ -85,8 +94,8 @@ void Progress::time(std::string_view what, double t) {
   stands(fmt::format("{}: t = {:.3g} s", what, t));
 }
 
-void Progress::break_silence(std::string_view words, double now) {
-  err_ << fmt::format("{} after {:.0f} s\n", words, now - start_) << std::flush;
+void Progress::break_silence(std::string_view words, double now, const std::string& left) {
+  err_ << fmt::format("{} after {:.0f} s{}\n", words, now - start_, left) << std::flush;
   said_ = now, patience_ = std::min(2 * patience_, kLongest);
 }
 

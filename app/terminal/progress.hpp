@@ -2,7 +2,8 @@
 // nothing for a while; nothing when quiet.
 //
 //   Progress progress(err, terminal, quiet);
-//   progress.fraction("simulating", 0.4);     // a bar; without a terminal "simulating: 40 % after 5 s", now and then
+//   progress.fraction("simulating", 0.4);     // a bar; without a terminal "simulating: 40 % after 5 s, 8 s left", now
+//                                             // and then
 //   progress.iteration("3   psi 0.0123");     // "3   psi 0.0123, 5 s"; on a terminal it replaces the previous one
 //   progress.finish();
 //
@@ -36,8 +37,9 @@ class Progress {
 
  private:
   bool silent_for_long() const;
-  void break_silence(std::string_view words, double now);
-  void draw(std::string_view line, const std::string& end);  // end: is never cut
+  void break_silence(std::string_view words, double now, const std::string& left = "");
+  std::string left_of(std::string_view what, double done, double now);  // ", 8 s left", or nothing
+  void draw(std::string_view line, const std::string& end);             // end: is never cut
 
   std::ostream& err_;
   bool terminal_, quiet_;
@@ -47,6 +49,8 @@ class Progress {
   double patience_;      // [s] of silence
   bool line_open_ = false;
   int shown_percent_ = -1;
+  std::string doing_;            // what the last fraction was of
+  double began_ = 0, done_ = 0;  // when it was first told [s], and how much was done then
 };
 
 }  // namespace mbsopt

@@ -207,7 +207,7 @@ std::string to_string(const Dimension& dimension) {
     std::size_t index;
     const char* name;
   };
-  constexpr Base kOrder[] = {{1, "kg"}, {0, "m"}, {2, "s"}, {3, "rad"}};
+  constexpr Base kOrder[] = {{1, "kg"}, {0, "m"}, {3, "rad"}, {2, "s"}};
   bool mechanical = dimension.power[0] != 0 || dimension.power[1] != 0;
   std::string over, under;
   int divisors = 0;

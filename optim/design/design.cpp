@@ -613,7 +613,8 @@ DesignResult designed(const Problem& given, const DesignOptions& options) {
 
   const auto progress = [&](const NlpProgress& p) {
     if (abandoned) return false;  // the iterate before the one that was not reached
-    result.history.push_back({p.iteration, p.f, p.violation, p.optimality, scaling.to_rho(p.x)});
+    result.history.push_back({p.iteration, p.f, p.violation, p.optimality, scaling.to_rho(p.x),
+                              result.simulations + evaluator.simulations() + program.hessian_gradients()});
     return !options.progress || options.progress(result.history.back());
   };
   const LimitedSolution rounds = solved(

@@ -72,6 +72,7 @@ struct DesignRow {
   double violation = 0;        // largest of the constraints, each relative to its bounds
   double optimality = 0;       // largest entry of the scaled Lagrangian gradient; 0 at the optimum; NaN: not known
   Eigen::VectorXd parameters;  // the variables, SI
+  long simulations = 0;        // so far; those of least_squares are counted at its end
 };
 
 struct DesignResult {

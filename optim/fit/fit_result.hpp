@@ -74,6 +74,7 @@ struct FitRow {
   double gradient_norm = 0;    // largest entry, of the scaled variables
   double step_norm = 0;        // of the scaled variables
   Eigen::VectorXd parameters;  // in the order of IdentificationResult::parameters
+  long simulations = 0;        // so far
 };
 
 struct ParameterProfile {

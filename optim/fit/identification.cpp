@@ -164,8 +164,8 @@ class Identification {
     const Eigen::VectorXd sigma = stack.sigma();
     const int before = result_.iterations;
     solver.progress = [&](const LeastSquaresProgress& p) {
-      result_.history.push_back(
-          {before + p.iteration, p.cost, p.gradient_norm, p.step_norm, stack.scaling().to_rho(p.x)});
+      result_.history.push_back({before + p.iteration, p.cost, p.gradient_norm, p.step_norm,
+                                 stack.scaling().to_rho(p.x), result_.simulations + stack.simulations()});
       return !options_.progress || options_.progress(result_.history.back());
     };
     LeastSquaresResult solution = solve_with_equalities(stack, x, solver);

@@ -131,6 +131,7 @@ FitStatistics fit_statistics(const FitData& data) {
   }
   if (!unseen.empty()) s.condition_number = kInfinity;
   const Index U = static_cast<Index>(used.size());
+  s.singular_values.setZero(static_cast<Index>(unseen.size()));
   if (U > 0) {
     MatrixXd scaled(N + R, U);
     for (Index c = 0; c < U; ++c)
@@ -149,6 +150,12 @@ FitStatistics fit_statistics(const FitData& data) {
     const Index rank = (sigma.array() > std::max(kRankTolerance, data.accuracy) * sigma(0)).count();
     if (unseen.empty()) s.condition_number = sigma(F - 1) > 0 ? sigma(0) / sigma(F - 1) : kInfinity;
     const MatrixXd directions = Z * svd.matrixV();
+    s.singular_values.setZero(F + static_cast<Index>(unseen.size()));
+    s.singular_values.head(F) = sigma, s.rank = static_cast<long>(rank);
+    if (rank > 1) {
+      s.weakest.setZero(P);
+      for (Index a = 0; a < U; ++a) s.weakest(used[static_cast<std::size_t>(a)]) = directions(a, rank - 1);
+    }
 
     const MatrixXd V = directions.leftCols(rank) * sigma.head(rank).cwiseInverse().asDiagonal();
     const MatrixXd white = variance * (V * V.transpose());

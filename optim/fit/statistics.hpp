@@ -72,6 +72,9 @@ struct FitStatistics {
   long degrees_of_freedom = 0;              // N + R - P
   double condition_number = kUnknown;       // infinite where a column of J is zero
   std::vector<std::string> unidentifiable;  // in words
+  Eigen::VectorXd singular_values;          // of J, its columns of unit length; descending, 0 for a zero column
+  long rank = 0;                            // how many of them are above the tolerance: combinations determined
+  Eigen::VectorXd weakest;                  // the right singular vector of the last of these; empty below rank 2
 
   std::string covariance_in_words() const;  // what the standard errors take the residuals for
 

@@ -1,13 +1,17 @@
 // The arm with logged torques, in windows: a record of the project, and one of real hardware.
 #include <fmt/format.h>
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
+#include <string>
 
 #include "app/json/read_problem.hpp"
+#include "app/terminal/exit_code.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/problem/logged_columns.hpp"
 #include "source_folder.hpp"
+#include "tests/app/run_command.hpp"
 
 using namespace mbsopt;
 
@@ -62,6 +66,24 @@ TEST_CASE("the arm in windows: the parameters with which its record was made", "
     INFO(fit.parameters[k].name);
     CHECK(std::abs(fit.parameters[k].value - truth[k]) < 4 * fit.parameters[k].std_error);
     CHECK(fit.parameters[k].std_error < 0.01 * truth[k]);
+  }
+}
+
+TEST_CASE("windows share a plot per channel, whose curves end with each window", "[report][windows]") {
+  const TemporaryFolder folder;
+  REQUIRE(run_command({"identify", kArm, "--out", folder.file("out")}).exit_code == kDone);
+  const std::string page = content_of(folder.path / "out/report.html");
+  CHECK(page.size() < 400'000);
+  for (const std::string channel : {"pos_meas1", "pos_meas2", "vel_meas1", "vel_meas2"}) {
+    INFO(channel);
+    const std::string title = fmt::format("<figcaption class=\"title\">arm: {}<", channel),
+                      line = "class=\"line c1\" d=\"";
+    const std::size_t at = page.find(title), begin = page.find(line, at) + line.size();
+    REQUIRE(at != std::string::npos);
+    CHECK(page.find(title, at + 1) == std::string::npos);
+    CHECK(page.find("arm.1: " + channel) == std::string::npos);
+    const std::string path = page.substr(begin, page.find('"', begin) - begin);
+    CHECK(std::ranges::count(path, 'm') == 8);  // a move to the start of each window
   }
 }
 

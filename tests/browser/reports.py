@@ -21,7 +21,8 @@ PROBLEMS = pathlib.Path(__file__).resolve().parents[2] / "problems"
 RUNS = [("simulate", "quarter_car/ride.json", True), ("kinematics", "four_bar/kinematics.json", True),
         ("linearise", "quarter_car/ride.json", False), ("gradient", "five_bar/sensitivities.json", False),
         ("check", "quarter_car/ride.json", False), ("design", "five_bar/design.json", True),
-        ("identify", "pendulum/identify.json", True), ("tradeoff --budget 2", "five_bar/design.json", False),
+        ("identify", "pendulum/identify.json", True), ("identify", "double_pendulum/identify_windows.json", True),
+        ("simulate", "andrews/simulate.json", True), ("tradeoff --budget 2", "five_bar/design.json", False),
         ("sweep --vary k1=10:30:6 --vary c1=0:2:5", "five_bar/design.json", False)]
 LARGE = ("simulate", "quarter_car/ride.json", "--set", "simulation.output_step=0.00003")  # 100001 rows
 WIDTHS = (420, 1300)
@@ -84,6 +85,7 @@ const ink = canvas => {
   found.compared = document.querySelectorAll("[data-comparison] tbody tr").length;
   // A page that is wider than its window scrolls sideways.
   found.overflow = document.documentElement.scrollWidth - document.documentElement.clientWidth;
+  found.height = document.documentElement.scrollHeight;
   if (innerWidth < 700) {
     for (const e of document.querySelectorAll("p,td,th,a,h2,button,svg text")) {
       const box = e.ownerSVGElement ? Math.hypot(e.getScreenCTM().a, e.getScreenCTM().b) : 1;
@@ -225,27 +227,29 @@ def main():
             command, *options = command.split()
             if arguments.only and command != arguments.only:
                 continue
-            folder = base / command
+            folder = base / f"{command}_{pathlib.Path(problem).stem}"
             run = subprocess.run([arguments.program, command, str(PROBLEMS / problem), *options, "--out", str(folder)],
                                  capture_output=True, text=True, timeout=600)
             report = folder / "report.html"
             if not report.is_file():
-                print(f"{command}: no report; {run.stderr.strip()}")
+                print(f"{folder.name}: no report; {run.stderr.strip()}")
                 failed = True
                 continue
             wrong = []
             for width in WIDTHS:
-                wrong += problems_of(*probed(browser, report, width, folder), moves, width)
+                found, console = probed(browser, report, width, folder)
+                wrong += problems_of(found, console, moves, width)
                 if not arguments.keep:
                     continue
+                height = found["height"] + 20 if found else 2600
                 for scheme, value in (("light", 1), ("dark", 0)):
-                    chromium(browser, framed(report, width, 2600, folder), f"--window-size={max(width, 500)},2600",
+                    chromium(browser, framed(report, width, height, folder), f"--window-size={max(width, 500)},{height}",
                              f"--blink-settings=preferredColorScheme={value}",
                              f"--screenshot={folder / f'{scheme}_{width}.png'}")
             size = report.stat().st_size / 1024
             if size > 400:
                 wrong.append(f"the report has {size:.0f} KB, more than 400")
-            print(f"{command}: {size:.0f} KB, " + ("ok" if not wrong else "; ".join(wrong)))
+            print(f"{folder.name}: {size:.0f} KB, " + ("ok" if not wrong else "; ".join(wrong)))
             failed = failed or bool(wrong)
         if not arguments.only:
             failed = not index_opens(browser, base) or failed

@@ -55,7 +55,7 @@ class Plot {
     if (this.over_time) cursor.listeners.push(t => this.show(t));
     // In the next frame: a layout changes the height that is observed.
     new ResizeObserver(() => requestAnimationFrame(() => this.layout())).observe(figure);
-    addEventListener("beforeprint", () => this.layout(560));  // 15 cm
+    addEventListener("beforeprint", () => this.layout(560, 200));  // 15 cm wide; four on a page
     addEventListener("afterprint", () => this.layout());
   }
 
@@ -64,10 +64,9 @@ class Plot {
   }
 
   // One unit of the drawing is one pixel, so that all text has its size at each width.
-  layout(width = this.figure.clientWidth) {
+  layout(width = this.figure.clientWidth, height = Math.round(Math.min(Math.max(0.42 * width, 250), 360))) {
     if (!width || width == this.width) return;
     this.width = width;
-    const height = Math.round(Math.min(Math.max(0.42 * width, 250), 360));
     const [left, top] = [66, 26], [w, h] = [width - left - 22, height - top - 44];
     this.box = [left, top, w, h];
     const set = (e, values) => { for (const [key, value] of Object.entries(values)) e.setAttribute(key, value); };

@@ -234,7 +234,7 @@ class Viewer extends Symbols {
         this.draw_target(target.places, nearest(target.t, this.t), target.measured);
     if (s.reactions && !this.hidden.has("reactions")) this.draw_reactions(s, spot);
     if (this.names && !s.ghost) {
-      c.fillStyle = this.colour("ink");
+      c.fillStyle = this.colour("ink"), c.strokeStyle = this.colour("panel"), c.lineWidth = 4;  // a halo over bars
       const taken = [];
       for (const {body, points} of bodies) {
         const middle = k => points.reduce((sum, p) => sum + p[k], 0) / (points.length || 1);
@@ -243,7 +243,7 @@ class Viewer extends Symbols {
         const wide = c.measureText(body.name).width;  // a name that would lie on another one moves up
         while (taken.some(n => Math.abs(n.y - y) < 13 && x < n.x + n.wide && n.x < x + wide)) y -= 13;
         taken.push({x, y, wide});
-        c.fillText(body.name, x, y);
+        c.strokeText(body.name, x, y), c.fillText(body.name, x, y);
       }
     }
     c.globalAlpha = 1;

@@ -169,4 +169,6 @@ TEST_CASE("bash completes commands and their options", "[command]") {
   };
   CHECK(completed("des", 1) == "design\n");
   CHECK(completed("sweep --sa", 2) == "--samples\n");
+  CHECK(completed("new f", 2) == "four-bar\n");
+  CHECK(completed("gradient five_bar.json --method ad", 4) == "adjoint\n");
 }

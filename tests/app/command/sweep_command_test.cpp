@@ -102,7 +102,7 @@ TEST_CASE("the report of a sweep names the extremes, plots each objective and li
   CHECK_THAT(line, Contains("30 of 30 points have values") &&
                        Contains(fmt::format("{} keep the limits",
                                             std::ranges::count_if(reach, [](double r) { return r <= 0.45; }))));
-  CHECK_THAT(line, Contains(fmt::format("track from {:.5g} at point {} (free = {:.5g})", track[least], least + 1,
+  CHECK_THAT(line, Contains(fmt::format("track from {:.5g} m^2 s at point {} (free = {:.5g})", track[least], least + 1,
                                         table.column("free")[least])));
   // The rows of the table, in their order.
   std::vector<std::string> rows;

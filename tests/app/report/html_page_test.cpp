@@ -47,6 +47,23 @@ TEST_CASE("a cell shows rounded numbers and holds all their digits", "[report]")
   CHECK_THAT(page.text(), Contains("<td title=\"1.2345678901234567\">1.23</td>") && Contains("<td>2</td>"));
 }
 
+TEST_CASE("a column with a sentence is text in all its rows, a column of intervals is not", "[report]") {
+  const std::string sentence = "the residuals are correlated in time", interval = "[-1.234567e-05, -1.234567e-05]";
+  HtmlPage page("p");
+  page.table({"name", "interval", "in words"}, {{"a", interval.c_str(), "white"}, {"b", "-", sentence.c_str()}});
+  CHECK_THAT(page.text(), Contains("<th>interval</th><th class=\"words\">in words</th>") &&
+                              Contains("<td>" + interval + "</td><td class=\"words\">white</td>") &&
+                              Contains("<td>-</td><td class=\"words\">" + sentence + "</td>"));
+}
+
+TEST_CASE("headers of many columns may break, so that print does not cut them", "[report]") {
+  HtmlPage few("p"), many("p");
+  few.table(std::vector<std::string>(8, "name"), std::vector<TableRow>(1, TableRow(8, "1")));
+  many.table(std::vector<std::string>(9, "name"), std::vector<TableRow>(1, TableRow(9, "1")));
+  CHECK_THAT(few.text(), Contains("<table>") && !Contains("<table class="));
+  CHECK_THAT(many.text(), Contains("<table class=\"wide\">"));
+}
+
 TEST_CASE("parts of a page that selectors choose hold their keys and their place for links", "[report]") {
   HtmlPage page("p");
   page.begin_choices({"objective", "parameter"});

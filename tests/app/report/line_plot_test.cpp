@@ -2,11 +2,48 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <regex>
+#include <string>
+#include <vector>
 
 using namespace mbsopt;
+
+namespace {
+
+struct DrawnPoint {
+  double x, y;
+  bool begins;  // a move leads there, not a line
+};
+
+// Where the path of a class goes: absolute and relative moves, lines and the zero strokes of points.
+std::vector<DrawnPoint> drawn_points(const std::string& svg, const std::string& style) {
+  const std::string before = "class=\"" + style + "\" d=\"";
+  const std::size_t at = svg.find(before), begin = at + before.size();
+  REQUIRE(at != std::string::npos);
+  const std::string path = svg.substr(begin, svg.find('"', begin) - begin);
+  const std::regex token("[A-Za-z]|-?(?:[0-9]+(?:\\.[0-9]+)?|\\.[0-9]+)");
+  std::vector<std::string> tokens;
+  for (std::sregex_iterator it(path.begin(), path.end(), token), end; it != end; ++it) tokens.push_back(it->str());
+  std::vector<DrawnPoint> points;
+  double x = 0, y = 0;
+  char command = 0;
+  for (std::size_t i = 0; i < tokens.size();) {
+    if (std::isalpha(static_cast<unsigned char>(tokens[i][0]))) command = tokens[i++][0];
+    if (command == 'h') {
+      CHECK(tokens.at(i++) == "0");
+      continue;
+    }
+    REQUIRE((command == 'm' || command == 'l'));
+    x += std::stod(tokens.at(i)), y += std::stod(tokens.at(i + 1)), i += 2;
+    points.push_back({x, y, command == 'm'});
+  }
+  return points;
+}
+
+}  // namespace
 
 TEST_CASE("ticks are round numbers within the range", "[report]") {
   CHECK(round_ticks(0, 5, 5) == std::vector<double>{0, 1, 2, 3, 4, 5});
@@ -76,10 +113,7 @@ TEST_CASE("values that are not finite interrupt the line and never reach the dra
   const std::string svg = to_svg(plot);
   CHECK(svg.find("nan") == std::string::npos);
   CHECK(svg.find("a &lt; b") != std::string::npos);
-  std::smatch line;
-  REQUIRE(std::regex_search(svg, line, std::regex("class=\"line c0\" d=\"([^\"]*)\"")));
-  const std::string path = line[1];
-  CHECK(std::count(path.begin(), path.end(), 'M') == 2);
+  CHECK(std::ranges::count(drawn_points(svg, "line c0"), true, &DrawnPoint::begins) == 2);
 }
 
 TEST_CASE("thinning a long record keeps its highest and lowest value", "[report]") {
@@ -91,17 +125,33 @@ TEST_CASE("thinning a long record keeps its highest and lowest value", "[report]
   const std::string svg = to_svg(plot);
   CHECK(svg.size() < 100'000);
   // The range is [-1, 10] with 5 % of air: the spike is drawn at 26 + 0.55/12.1 * 250 px.
-  CHECK(svg.find(" 37.4") != std::string::npos);
+  CHECK(std::ranges::min(drawn_points(svg, "line c0"), {}, &DrawnPoint::y).y == Approx(37.4));
+}
+
+TEST_CASE("a line of many samples is drawn where they are", "[report]") {
+  PlotSeries series{"wave", {}, {}, Mark::line};
+  for (int i = 0; i <= 1000; ++i) series.x.push_back(i), series.y.push_back(std::cos(i * 0.05));
+  LinePlot plot{.title = "", .x_label = "", .y_label = ""};
+  plot.series.push_back(series);
+  const std::vector<DrawnPoint> points = drawn_points(to_svg(plot), "line c0");
+  REQUIRE(points.size() == 1001);
+  double largest = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double x = 66 + 672 * series.x[i] / 1000;         // the frame: 672 by 250 px from (66, 26)
+    const double y = 26 + 250 * (1.1 - series.y[i]) / 2.2;  // 5 % of air
+    largest = std::max({largest, std::abs(points[i].x - x), std::abs(points[i].y - y)});
+  }
+  CHECK(largest < 0.06);  // rounded to tenths of a px
 }
 
 TEST_CASE("the frame cuts no point", "[report]") {
   LinePlot plot{.title = "", .x_label = "", .y_label = ""};
   plot.series.push_back({"measured", {0, 1}, {0, 1}, Mark::points});
   const std::string svg = to_svg(plot);
-  std::smatch found;
-  REQUIRE(std::regex_search(svg, found, std::regex("d=\"M([0-9.]+) [0-9.]+h0M([0-9.]+) [0-9.]+h0\"")));
-  CHECK(std::stod(found[1]) > 66 + 4);        // the frame begins at 66 px, a point has a radius of 1.5 px
-  CHECK(std::stod(found[2]) < 760 - 16 - 4);  // and ends there
+  const std::vector<DrawnPoint> points = drawn_points(svg, "points c0");
+  REQUIRE(points.size() == 2);
+  CHECK(points[0].x > 66 + 4);        // the frame begins at 66 px, a point has a radius of 1.5 px
+  CHECK(points[1].x < 760 - 22 - 4);  // and ends there
 }
 
 TEST_CASE("a constant, an empty and a logarithmic series are drawn", "[report]") {
@@ -120,10 +170,11 @@ TEST_CASE("on a logarithmic x axis decades are equally wide and values <= 0 are 
   const std::string svg = to_svg(plot);
   CHECK(svg.find("inf") == std::string::npos);
   CHECK(svg.find(">0.01<") != std::string::npos);
-  std::smatch line;
-  REQUIRE(std::regex_search(svg, line, std::regex("d=\"M([0-9.]+) [0-9.]+L([0-9.]+) [0-9.]+M([0-9.]+) ")));
-  const double first = std::stod(line[1]), second = std::stod(line[2]), third = std::stod(line[3]);
-  CHECK(second - first == Approx(third - second).epsilon(1e-3));
+  const std::vector<DrawnPoint> points = drawn_points(svg, "line c0");
+  REQUIRE(points.size() == 3);
+  CHECK_FALSE(points[1].begins);
+  CHECK(points[2].begins);
+  CHECK(points[1].x - points[0].x == Approx(points[2].x - points[1].x).epsilon(1e-3));
 }
 
 TEST_CASE("a cloud of many points is thinned at random, and the plot says so", "[report]") {
@@ -135,15 +186,10 @@ TEST_CASE("a cloud of many points is thinned at random, and the plot says so", "
   const std::string svg = to_svg(plot);
   CHECK(svg == to_svg(plot));
   CHECK(svg.find("residual: 5000 of 60000 drawn, at random") != std::string::npos);
-  const std::string before = "class=\"points c0\" d=\"";
-  REQUIRE(svg.find(before) != std::string::npos);
-  const std::size_t begin = svg.find(before) + before.size();
-  const std::string drawn = svg.substr(begin, svg.find('"', begin) - begin);
   std::vector<int> tenths(10);
   double low = 1e9, high = -1e9;
   std::vector<double> heights;
-  for (std::size_t at = drawn.find('M'); at != std::string::npos; at = drawn.find('M', at + 1))
-    heights.push_back(std::stod(drawn.substr(drawn.find(' ', at))));
+  for (const DrawnPoint& point : drawn_points(svg, "points c0")) heights.push_back(point.y);
   for (const double y : heights) low = std::min(low, y), high = std::max(high, y);
   for (const double y : heights)
     ++tenths[std::min<std::size_t>(9, static_cast<std::size_t>(10 * (y - low) / (high - low)))];

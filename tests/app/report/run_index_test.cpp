@@ -24,7 +24,8 @@ bool contains(const std::string& text, const std::string& part) { return text.fi
 TEST_CASE("the index lists all runs of its folder and holds their numbers", "[report]") {
   const TemporaryFolder folder;
   const fs::path a = stored_run(folder.path, "a #1", R"({"program": "mbsopt", "command": "design", "status": "ok",
-      "objectives": {"path </script>": {"value": 0.25}}, "parameters": {"k": {"value": 3, "unit": "N/m"}}})");
+      "objectives": {"path </script>": {"value": 0.25, "unit": "m^2"}},
+      "parameters": {"k": {"value": 3, "unit": "N/m"}}})");
   std::ofstream(a / "report.html") << "a report";
   stored_run(folder.path, "b", R"({"program": "mbsopt", "command": "simulate", "status": "failed"})");
   stored_run(folder.path, "foreign_run", R"({"program": "another"})");
@@ -32,7 +33,7 @@ TEST_CASE("the index lists all runs of its folder and holds their numbers", "[re
   const std::string page = run_index(folder.path);
   CHECK(contains(page, R"(<a href="a%20%231/report.html">a #1</a>)"));
   CHECK(contains(page, "<td>b</td><td>simulate</td><td>failed</td>"));  // no report, hence no link
-  CHECK(contains(page, R"("objective path <\/script>":0.25)"));
+  CHECK(contains(page, R"("objective path <\/script> [m^2]":0.25)"));
   CHECK(contains(page, R"("parameter k [N/m]":3)"));
   CHECK_FALSE(contains(page, "foreign_run"));
   CHECK_FALSE(contains(page, "broken_run"));

@@ -38,12 +38,28 @@ TEST_CASE("on a terminal, a bar that stands for long says since when", "[progres
   CHECK(bar() == "]   0 %, 8 s");
 }
 
+TEST_CASE("a bar tells the time that is left, of what it is about", "[progress]") {
+  std::ostringstream err;
+  double now = 0;
+  Progress progress(err, true, false, [&] { return now; });
+  const auto bar = [&] { return err.str().substr(err.str().rfind(']')); };
+  progress.fraction("starts", 0.5);  // half of them were done before
+  now = 3, progress.fraction("starts", 0.6);
+  CHECK(bar() == "]  60 %");
+  now = 5, progress.fraction("starts", 0.75);
+  CHECK(bar() == "]  75 %, 5 s left");
+  now = 6, progress.fraction("sweep", 0.1);
+  CHECK(bar() == "]  10 %");
+}
+
 TEST_CASE("without a terminal, a long silence is broken, and ever more rarely", "[progress]") {
   std::ostringstream err;
   double now = 100;
   Progress progress(err, false, false, [&] { return now; });
   for (; now <= 130; now += 0.5) progress.fraction("simulating", 0.01 * (now - 100));
-  CHECK(err.str() == "simulating: 4 % after 4 s\nsimulating: 12 % after 12 s\nsimulating: 28 % after 28 s\n");
+  CHECK(err.str() ==
+        "simulating: 4 % after 4 s, 96 s left\nsimulating: 12 % after 12 s, 88 s left\n"
+        "simulating: 28 % after 28 s, 72 s left\n");
 }
 
 TEST_CASE("a run whose end is not known tells its time", "[progress]") {

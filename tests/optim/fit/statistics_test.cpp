@@ -73,6 +73,29 @@ TEST_CASE("the covariance of several parameters is s^2 (J'J)^-1, whatever their 
   CHECK(s.condition_number < 3);
 }
 
+TEST_CASE("singular values of two columns are those of the angle between them", "[statistics]") {
+  // Columns of unit length at the angle a: sigma^2 = 1 +- cos a; the weaker direction is (1, -1)/sqrt(2).
+  const double a = 0.2, length[] = {3, 500}, rho[] = {4, 0.01};
+  MatrixXd J(3, 2);
+  J << length[0], length[1] * std::cos(a), 0, length[1] * std::sin(a), 0, 0;
+  const FitStatistics s =
+      fit_statistics(J, random_matrix(3, 1, 9).col(0), (VectorXd(2) << rho[0], rho[1]).finished(), {"k", "c"});
+  REQUIRE(s.singular_values.size() == 2);
+  CHECK(s.singular_values(0) == Approx(std::sqrt(1 + std::cos(a))).epsilon(1e-12));
+  CHECK(s.singular_values(1) == Approx(std::sqrt(1 - std::cos(a))).epsilon(1e-12));
+  CHECK(s.condition_number == Approx(s.singular_values(0) / s.singular_values(1)).epsilon(1e-12));
+  CHECK(s.rank == 2);
+  CHECK(s.weakest(0) * s.weakest(1) == Approx(-0.5).epsilon(1e-10));
+  CHECK(s.weakest.norm() == Approx(1).epsilon(1e-12));
+
+  J.col(1).setZero();
+  const FitStatistics blind =
+      fit_statistics(J, random_matrix(3, 1, 9).col(0), (VectorXd(2) << rho[0], rho[1]).finished(), {"k", "c"});
+  CHECK(blind.rank == 1);
+  CHECK(blind.singular_values == (VectorXd(2) << 1, 0).finished());
+  CHECK(blind.weakest.size() == 0);
+}
+
 TEST_CASE("combinations that data do not determine are named", "[statistics]") {
   const MatrixXd X = random_matrix(30, 3, 9);
   const VectorXd z = random_matrix(30, 1, 10).col(0);

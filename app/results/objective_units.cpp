@@ -1,0 +1,124 @@
+#include "app/results/objective_units.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include "app/results/sensor_unit.hpp"
+#include "core/expression/dimension_inference.hpp"
+#include "core/scene/scene_facts.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Known = std::optional<Dimension>;  // nullopt: not known
+
+class Dimensions {
+ public:
+  explicit Dimensions(const Scene& scene) : scene_(scene), facts_(scene) {}
+
+  // Numbers are pure; where they cannot be, as in sin(5*t), they may stand for anything. Throws DimensionError where
+  // parts of the expression do not fit each other even so.
+  Known of(const Expression& expression) const {
+    const auto of_names = [this](const std::string& name) { return of_name(name); };
+    try {
+      return infer_dimension(expression, of_names, PlainNumbers::are_pure);
+    } catch (const DimensionError&) {
+      return infer_dimension(expression, of_names, PlainNumbers::fit_everything);
+    }
+  }
+
+  Known of_name(const std::string& name) const {
+    if (name == "t") return dimension::kTime;
+    const Sensor* const sensor = facts_.sensor(name);
+    if (!sensor) return facts_.dimension_of_name(name);
+    const std::string unit = unit_in(scene_, *sensor);
+    if (unit == "-") return dimension::kNone;
+    const std::optional<Unit> known = parse_unit(unit);
+    return known ? Known(known->dimension) : std::nullopt;
+  }
+
+ private:
+  const Scene& scene_;
+  SceneFacts facts_;
+};
+
+// The terms of a sum have one dimension: that of those which are known.
+class SumOfTerms {
+ public:
+  void add(const Known& term) {
+    if (!term)
+      unknown_ = true;
+    else if (!sum_ || sum_->is_none())
+      sum_ = term;
+    else if (!term->is_none() && !compatible(*sum_, *term))
+      clash_ = true;
+  }
+  // Beside a term of unknown dimension a number may stand for anything.
+  Known dimension() const { return clash_ || (unknown_ && sum_ && sum_->is_none()) ? std::nullopt : sum_; }
+
+ private:
+  Known sum_;
+  bool unknown_ = false, clash_ = false;
+};
+
+Known product(const Known& a, const Known& b) { return a && b ? Known(*a * *b) : std::nullopt; }
+
+Known dimension_of(const ObjectiveSpec& spec, const Dimensions& dimensions) {
+  SumOfTerms sum;
+  for (const std::optional<Expression>& mean : spec.means)
+    if (mean) return dimensions.of(*mean);
+  if (spec.running) sum.add(product(dimensions.of(*spec.running), dimension::kTime));
+  for (const std::optional<Expression>* term : {&spec.terminal, &spec.parameters_only})
+    if (*term) sum.add(dimensions.of(**term));
+  for (const ObjectiveSample& sample : spec.samples) sum.add(dimensions.of(sample.value));
+  for (const TrackTerm& term : spec.track) {
+    const Known sensor = dimensions.of_name(term.sensor);
+    const Known weight = dimensions.of(term.weight);
+    sum.add(product(weight, product(sensor, sensor)));
+  }
+  return sum.dimension();
+}
+
+std::string unit_of(const ObjectiveSpec& spec, const Dimensions& dimensions) {
+  if (spec.is_written_in_cpp()) return "";
+  if (spec.eigenvalue) return spec.eigenvalue->value == "frequency" ? "Hz" : "-";
+  try {
+    const Known found = dimension_of(spec, dimensions);
+    return !found ? "" : found->is_none() ? "-" : to_string(*found);
+  } catch (const DimensionError&) {  // an objective may add what it likes
+    return "";
+  }
+}
+
+}  // namespace
+
+ObjectiveUnits objective_units(const Problem& problem) {
+  const Dimensions dimensions(problem.scene);
+  ObjectiveUnits units;
+  for (const ObjectiveSpec& spec : problem.objectives) units[spec.name] = unit_of(spec, dimensions);
+  return units;
+}
+
+std::string shown_unit(const ObjectiveUnits& units, const std::string& objective) {
+  const auto found = units.find(objective);
+  return found == units.end() || found->second.empty() ? "-" : found->second;
+}
+
+std::string after_value(const ObjectiveUnits& units, const std::string& objective) {
+  const std::string unit = shown_unit(units, objective);
+  return unit == "-" ? "" : " " + unit;
+}
+
+void add_units(Json& result, const ObjectiveUnits& units) {
+  const auto add = [&](Json& part) {
+    if (!part.contains("objectives")) return;
+    for (auto& [name, objective] : part["objectives"].items())
+      if (const auto unit = units.find(name); unit != units.end() && !unit->second.empty())
+        objective["unit"] = unit->second;
+  };
+  add(result);
+  if (result.contains("cases"))
+    for (Json& of_case : result["cases"]) add(of_case);
+}
+
+}  // namespace mbsopt

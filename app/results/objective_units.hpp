@@ -1,0 +1,27 @@
+// SI units of the values of objectives, from those of their sensors, parameters and the time.
+//
+//   objective_units(problem).at("path");   // "m^2" of samples of (x - 0.1)^2, "-" of a number
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "app/files/result_json.hpp"
+#include "optim/problem/problem.hpp"
+
+namespace mbsopt {
+
+// By the objective's name; empty where the unit does not follow from its parts. Numbers without a unit count as pure.
+using ObjectiveUnits = std::map<std::string, std::string>;
+ObjectiveUnits objective_units(const Problem& problem);
+
+// Of one of them, for a table; "-" where it is not known.
+std::string shown_unit(const ObjectiveUnits& units, const std::string& objective);
+
+// " m^2 s" to follow a value; empty for a number and where it is not known.
+std::string after_value(const ObjectiveUnits& units, const std::string& objective);
+
+// Adds "unit" to each objective of a result and of its load cases whose unit is known.
+void add_units(Json& result, const ObjectiveUnits& units);
+
+}  // namespace mbsopt
