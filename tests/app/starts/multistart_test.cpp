@@ -580,7 +580,7 @@ TEST_CASE("resume: until all_found ends where it would have, whatever starts the
     "design": {"minimize": "o", "variables": ["g"],
                "multistart": {"starts": 100, "seed": 1, "until": "all_found"}}})");
   const fs::path out = folder.path / "out";
-  REQUIRE(design(file, out.string()).exit_code == kDone);
+  REQUIRE(design(file, out.string(), {"--keep-journal"}).exit_code == kDone);
   const nlohmann::json whole = outcome_of(out);
   REQUIRE(whole.at("multistart").at("finished") == 40);  // three optima: the rule does not hold after 20, but after 30
   const std::string journal = content_of(out / kJournalFile);
