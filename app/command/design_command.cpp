@@ -154,7 +154,7 @@ SensorLimits sensor_limits(const Problem& problem) {
 std::vector<RunningTerm> running_terms(const Problem& problem, const ObjectiveUnits& units) {
   std::vector<RunningTerm> terms;
   for (const ObjectiveSpec& spec : problem.objectives) {
-    const std::string unit = units.at(spec.name).empty() ? "SI unit" : units.at(spec.name);
+    const std::string unit = shown_unit(units, spec.name);
     RunningTerm term{spec.name, "Integrand of " + spec.name, fmt::format("integrand [{}]", unit_per(unit, "s"))};
     bool is_sensor = false;
     for (std::size_t k = 0; k < std::size(kMeanKinds); ++k) {

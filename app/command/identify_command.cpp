@@ -51,7 +51,7 @@ std::string unit_of_channel(const Scene& scene, const ChannelSpec& spec) {
   const auto sensor = std::ranges::find(scene.sensors, spec.sensor, &Sensor::name);
   const bool same_unit = spec.gain.is_number() && spec.gain.number() == 1;
   const std::string unit = sensor == scene.sensors.end() || !same_unit ? "" : unit_in(scene, *sensor);
-  return unit.empty() ? "SI unit" : unit;
+  return unit.empty() ? kUnknownUnit : unit;
 }
 
 // Ends a part of the plot: neither a curve nor a correlation goes on from one window to the next.

@@ -11,6 +11,7 @@
 #include "app/report/report_parts.hpp"
 #include "app/report/row_plot.hpp"
 #include "app/report/run_report.hpp"
+#include "app/results/sensor_unit.hpp"
 #include "core/expression/counted.hpp"
 
 namespace mbsopt {
@@ -66,7 +67,7 @@ std::vector<double> numbers_of(const Json& array) {
 // |central difference - tangent-linear model| over the step h, per kind of steps.
 LinePlot ladder_plot(const std::string& objective, const std::string& unit, const Parameter& parameter,
                      const Json& entry, double derivative) {
-  const std::string step = parameter.unit.empty() ? "SI unit" : parameter.unit;
+  const std::string step = parameter.unit.empty() ? kUnknownUnit : parameter.unit;
   LinePlot plot{.title = fmt::format("d {}/d {}: differences over their step", objective, parameter.name),
                 .x_label = fmt::format("step h of {} [{}]", parameter.name, step),
                 .y_label = fmt::format("|difference - derivative| [{}]", unit_per(unit, step)),
@@ -118,7 +119,7 @@ void add_taylor(HtmlPage& page, const Json& objectives, const Json& taylor) {
   LinePlot plot{.title = "Taylor remainder along a random direction d of all parameters",
                 .x_label = "h [-]",
                 .y_label = fmt::format("|psi(rho + h d) - psi - h psi_rho d| [{}]",
-                                       units.size() == 1 ? *units.begin() : "SI unit"),
+                                       units.size() == 1 ? *units.begin() : kUnknownUnit),
                 .logarithmic_y = true,
                 .logarithmic_x = true};
   for (const auto& [objective, of_one] : taylor.items()) {

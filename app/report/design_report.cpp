@@ -11,6 +11,7 @@
 #include "app/report/report_parts.hpp"
 #include "app/report/row_plot.hpp"
 #include "app/report/run_report.hpp"
+#include "app/results/sensor_unit.hpp"
 #include "core/expression/counted.hpp"
 
 namespace mbsopt {
@@ -160,7 +161,7 @@ std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const 
   add_parameters(page, result);
   const Json& objectives = result.at("objectives");
   add_convergence(page, history, result.at("parameters"),
-                  objectives.empty() ? "SI unit" : unit_of(*objectives.begin()));
+                  objectives.empty() ? kUnknownUnit : unit_of(*objectives.begin()));
   add_multistart(page, result);
   page.heading("Motion before and after");
   add_drawings(page, scene, rho, before, after, targets);

@@ -119,8 +119,7 @@ void add_fit_outcome(HtmlPage& page, const Json& result) {
     page.paragraph(words + ".");
     page.note(
         "Singular values of the sensitivities, with the effect of each parameter scaled to 1: the nearer to 0, the "
-        "less "
-        "a combination of parameters shows in the data.");
+        "less a combination of parameters shows in the data.");
   }
   for (const Json& words : identifiability.at("unidentifiable"))
     page.paragraph("Not determined by the data: " + cell(words));

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "app/report/line_plot.hpp"
+#include "app/results/sensor_unit.hpp"
 #include "app/run/energy_balance.hpp"
 #include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
@@ -61,7 +62,7 @@ TableCell rounded_cell(const Json& value, const Json& error) {
   return number_cell(value, static_cast<int>(std::clamp(digits, 2.0, static_cast<double>(kMostDigits))));
 }
 
-std::string unit_of(const Json& objective) { return objective.value("unit", "SI unit"); }
+std::string unit_of(const Json& objective) { return objective.value("unit", kUnknownUnit); }
 
 std::string after_number(const Json& quantity) {
   const std::string unit = quantity.value("unit", "");
@@ -73,7 +74,7 @@ std::string unit_per(const std::string& unit, const std::string& divisor) {
     return text == "-" ? std::optional(Unit{}) : parse_unit(text);
   };
   const std::optional<Unit> a = dimension_of(unit), b = dimension_of(divisor);
-  if (!a || !b) return "SI unit";
+  if (!a || !b) return kUnknownUnit;
   const Dimension found = a->dimension / b->dimension;
   return found.is_none() ? "-" : to_string(found);
 }

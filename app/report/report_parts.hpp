@@ -12,7 +12,7 @@
 
 namespace mbsopt {
 
-// "m^2 s"; "SI unit" where the unit of an objective, an entry of result["objectives"], is not known.
+// "m^2 s"; kUnknownUnit where the unit of an objective, an entry of result["objectives"], is not known.
 std::string unit_of(const Json& objective);
 std::string after_number(const Json& quantity);  // " m^2 s": its "unit", where it has one and is no number
 std::string unit_per(const std::string& unit, const std::string& divisor);  // "N/m", "m" to "N/m^2"

@@ -9,6 +9,7 @@
 
 #include "app/report/line_plot.hpp"
 #include "app/report/report_parts.hpp"
+#include "app/results/sensor_unit.hpp"
 #include "app/results/tradeoff_results.hpp"
 #include "app/run/machine.hpp"
 #include "core/tableau/tableaus.hpp"
@@ -43,8 +44,7 @@ constexpr std::size_t kInk = 7;  // the colour of the style that is grey
 
 std::string unit_of_error(const Quantity& q, const ObjectiveUnits& units) {
   if (q.relative) return "-";
-  const auto found = q.kind == QuantityKind::objective ? units.find(q.objective_name) : units.end();
-  return found == units.end() || found->second.empty() ? "SI unit" : found->second;
+  return q.kind == QuantityKind::objective ? shown_unit(units, q.objective_name) : kUnknownUnit;
 }
 
 // Lines through bounds; points where an error is below its bound, and of settings that a tighter one dominates.
@@ -254,8 +254,9 @@ std::string penalty_report(const Json& result, const PenaltyStudy& study) {
   const std::vector<Quantity>& quantities = study.reference.errors->quantities();
   for (std::size_t q = 0; q < quantities.size(); ++q) {
     const auto column = static_cast<Eigen::Index>(q);
-    LinePlot plot = alpha_plot("Error of " + quantities[q].name, fmt::format("error of {} [{}]", quantities[q].name,
-                                                                             quantities[q].relative ? "-" : "SI unit"));
+    LinePlot plot =
+        alpha_plot("Error of " + quantities[q].name,
+                   fmt::format("error of {} [{}]", quantities[q].name, quantities[q].relative ? "-" : kUnknownUnit));
     PlotSeries quasi{"quasi-definite", {}, {}, Mark::line}, cholesky{"cholesky", {}, {}, Mark::line},
         rounded{"rounding by Cholesky on equal steps", {}, {}, Mark::dashed};
     for (const PenaltyStudyRow& row : study.rows) {

@@ -101,12 +101,12 @@ ObjectiveUnits objective_units(const Problem& problem) {
 
 std::string shown_unit(const ObjectiveUnits& units, const std::string& objective) {
   const auto found = units.find(objective);
-  return found == units.end() || found->second.empty() ? "-" : found->second;
+  return found == units.end() || found->second.empty() ? kUnknownUnit : found->second;
 }
 
 std::string after_value(const ObjectiveUnits& units, const std::string& objective) {
   const std::string unit = shown_unit(units, objective);
-  return unit == "-" ? "" : " " + unit;
+  return unit == "-" || unit == kUnknownUnit ? "" : " " + unit;
 }
 
 void add_units(Json& result, const ObjectiveUnits& units) {

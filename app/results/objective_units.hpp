@@ -15,7 +15,7 @@ namespace mbsopt {
 using ObjectiveUnits = std::map<std::string, std::string>;
 ObjectiveUnits objective_units(const Problem& problem);
 
-// Of one of them, for a table; "-" where it is not known.
+// Returns the unit for a table or an axis; kUnknownUnit where it is not known.
 std::string shown_unit(const ObjectiveUnits& units, const std::string& objective);
 
 // " m^2 s" to follow a value; empty for a number and where it is not known.

@@ -7,6 +7,8 @@
 
 namespace mbsopt {
 
+inline constexpr const char* kUnknownUnit = "SI unit";  // is shown where a unit is not known
+
 std::string unit_in(const Scene& scene, const Sensor& sensor);
 
 // Names the unit of the force or torque along a drive's coordinate.

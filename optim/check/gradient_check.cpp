@@ -229,15 +229,18 @@ class Check {
     (frozen ? result_.frozen : result_.free)(i, k) = d.derivative(i);
     (frozen ? frozen_error_ : free_error_)(i, k) = d.error(i);
     (frozen ? frozen_step_ : free_step_)(i, k) = d.step(i);
-    if (!frozen && result_.discrete) on_base_steps_(i, k) = d.largest(i) < 0.75 * ladder.other_steps;
+    if (!frozen && result_.discrete) on_base_steps_(i, k) = on_base_steps(ladder, i);
   }
 
-  // Of a difference: by its ladder, by the rounding of psi, and on steps of its own by the integration.
+  // Whether all runs that the difference is made of took the steps of the base run.
+  static bool on_base_steps(const Ladder& ladder, Index i) { return ladder.d.largest(i) < 0.75 * ladder.other_steps; }
+
+  // The error of a difference: of its ladder, of psi's rounding, and on steps of its own of the integration.
   double own_error(const Ladder& ladder, Index i, Index k, bool frozen) const {
     const LadderDerivative& d = ladder.d;
     if (!(d.step(i) > 0)) return kInfinity;
-    const bool on_base_steps = frozen || d.largest(i) < 0.75 * ladder.other_steps;
-    return d.error(i) + psi_rounding_(i) / d.step(i) + (on_base_steps ? 0 : integration_error_of(i, k, d.step(i)));
+    const double integration = frozen || on_base_steps(ladder, i) ? 0 : integration_error_of(i, k, d.step(i));
+    return d.error(i) + psi_rounding_(i) / d.step(i) + integration;
   }
 
   // Steps that are coarse for psi may show a plateau that is no derivative (a coordinate of kilometres, of which
@@ -327,7 +330,7 @@ class Check {
     if (!on_base_steps_(i, k) && std::isfinite(free_error_(i, k)))
       free_error_(i, k) += integration_error_of(i, k, free_step_(i, k));
   }
-  // Of a free difference by steps of size `step`.
+  // The error that the integration adds to a free difference over `step`.
   double integration_error_of(Index i, Index k, double step) const {
     return integration_.psi_rho(i, k) + std::max(integration_.psi(i), jump_(i, k)) / step;
   }
@@ -428,14 +431,12 @@ class Check {
   // psi(+-h) = psi + s h +- b h + O(h^2) beside a kink: the slopes s - b and s + b differ at its two sides.
   // b(h) = (psi(h) + psi(-h) - 2 psi)/(2h) falls as h where psi is smooth, and not at all at a kink.
   void say_kinks() {
-    for (const CheckedEntry& e : result_.entries) {
+    for (std::size_t n = 0; n < result_.entries.size(); ++n) {
+      const CheckedEntry& e = result_.entries[n];
+      const Index i = static_cast<Index>(n) / rho_.size(), k = static_cast<Index>(n) % rho_.size();
       const auto failed = [](const std::optional<Verdict>& v) { return v && !passes(*v); };
       const bool frozen = failed(e.frozen_verdict);
       if (!frozen && !failed(e.free_verdict)) continue;
-      const auto at = [](const auto& names, const std::string& name) {
-        return static_cast<Index>(std::ranges::find(names, name) - names.begin());
-      };
-      const Index i = at(result_.objectives, e.objective), k = at(result_.parameters, e.parameter);
       double b = kNaN, wider = kNaN;  // at h and 2h, the smallest steps at which psi's rounding does not count
       for (auto rung = rungs_.rbegin(); rung != rungs_.rend(); ++rung) {
         const auto& [plus, minus] = rung->second[frozen ? 0 : 1];

@@ -181,9 +181,8 @@ NlpResult solve_tracked_squares(DesignProgram& program, const CaseEvaluator& eva
   };
   LeastSquaresResult found = solve_least_squares(problem, x_start, options);
   if (problem.abandoned()) --found.evaluations, --found.failed_evaluations;
-  constexpr double kPromise = 1e-4;  // that of levenberg_marquardt.cpp: the noise of a simulation promises much less
   if (found.status == SolverStatus::converged && problem.without_value() &&
-      promise(problem, found.point, found.x) > kPromise) {
+      promise(problem, found.point, found.x) > kSimulationNoise) {
     found.status = SolverStatus::no_progress;
     found.message =
         "no further progress: the steps lead to where a tracked weight is negative, or a sensor has no value" +

@@ -525,9 +525,8 @@ class Identification {
     if (squares - squares_at_start > expected)
       result_.warnings.push_back(fmt::format(
           "experiment '{}': the fit has lowered its own residuals, but raised those that validate from {:.3g} to "
-          "{:.3g} "
-          "sigma: the values that it found do not hold for other motions. The model leaves something out, or has "
-          "parameters that these data do not determine",
+          "{:.3g} sigma: the values that it found do not hold for other motions. The model leaves something out, or "
+          "has parameters that these data do not determine",
           spec_.experiments[e].name, std::sqrt(squares_at_start / n), std::sqrt(squares / n)));
   }
 

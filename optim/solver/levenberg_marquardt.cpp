@@ -28,12 +28,6 @@ constexpr double kGradient = 1e-14;      // cosine between the residuals and any
 // Of its length at the last point, the least that D keeps of a column. Near a point where the column vanishes, steps by
 // its length alone would grow without limit.
 constexpr double kShrinking = 0.5;
-// Part of the cost of the start that the derivatives may still promise at a minimum. The noise of a simulation at
-// rtol 1e-5 promises below 1e-8; in front of a wall of failed points, or with wrong derivatives, it is most of the
-// cost.
-constexpr double kPromise = 1e-4;
-// Part of the cost up to which a jump counts as an error of the simulation, as with kPromise.
-constexpr double kSimulationNoise = 1e-4;
 // Change of a step, relative, below which it is weighed well enough; a rest of a hundredth costs no evaluation.
 constexpr double kWeighed = 1e-2;
 constexpr int kWeighings = 100;  // of one step; each lowers its cost, so that fewer do no harm
@@ -197,7 +191,8 @@ class Search {
       if (settled) return converged(model, lambda);
       if (!trial.ok && ++invalid == kInvalidSteps)
         return end(SolverStatus::failed, "failed: too many evaluations in a row" + result_.failures());
-      // What a smooth model misses falls with the square of the step, at a kink in proportion to it.
+      // The cost that a model misses falls with the square of the step where it is smooth, and with its length at a
+      // kink.
       const double length = model.D.cwiseProduct(d).norm(), miss = std::abs(promised - gained);
       if (missed > 0 && miss < kSimulationNoise * model.size && miss > std::sqrt(length / missed) * missed_by)
         return end(SolverStatus::converged,
@@ -289,7 +284,7 @@ class Search {
   // Steps that were shortened to nothing are no convergence.
   void converged(const LinearModel& model, double lambda) {
     const double left = promise(model);
-    if (lambda > 1 && left > kPromise * first_size_)
+    if (lambda > 1 && left > kSimulationNoise * first_size_)
       return end(SolverStatus::no_progress,
                  fmt::format("no further progress: the derivatives promise to lower the cost by {:.2g}, but no step "
                              "lowers it{}. Tighten rtol of the integrator; check the derivatives of C++ code",

@@ -34,6 +34,10 @@
 
 namespace mbsopt {
 
+// Part of the cost that errors of the simulation may amount to. At rtol 1e-5 the derivatives promise below 1e-8 of the
+// cost of the start at a minimum; in front of a wall of failed points, or with wrong derivatives, they promise most.
+inline constexpr double kSimulationNoise = 1e-4;
+
 struct LeastSquaresOptions {
   double tolerance = 1e-10;                                   // relative change of the cost, and of x, > 0
   int max_iterations = 100;                                   // >= 0

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "app/json/read_problem.hpp"
+#include "app/results/sensor_unit.hpp"
 #include "source_folder.hpp"
 
 using namespace mbsopt;
@@ -52,7 +53,8 @@ TEST_CASE("where parts have no unit or do not fit each other, that of the object
   CHECK(units.at("weighed").empty());
   CHECK(units.at("mixed").empty());
   CHECK(units.at("root").empty());
-  CHECK(shown_unit(units, "mixed") == "-");
+  CHECK(shown_unit(units, "mixed") == kUnknownUnit);
+  CHECK(shown_unit(units, "mixed") != shown_unit(units_with(R"({"ratio": {"terminal": "x/goal"}})"), "ratio"));
   CHECK(after_value(units, "mixed").empty());
 }
 

@@ -34,6 +34,20 @@ struct WrongEnd : TerminalCost {
   double wrong_;
 };
 
+// Checks the five-bar with an objective of the parameters alone, one of which is p.
+GradientCheck check_of_parameters(const std::string& objective) {
+  Problem problem = five_bar::problem(1e-6);
+  problem.scene.simulation.end_time = 0.2;
+  testing::add_parameters(problem.scene, {{"p", 0.1 + 0.2}});  // 0.3 and its last place
+  ObjectiveSpec sum;
+  sum.name = "sum", sum.parameters_only = Expression::parse(objective);
+  problem.objectives = {sum};
+  for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
+  GradientCheckOptions options;
+  options.timing = {1, 1, 0};
+  return check_gradients(problem, options);
+}
+
 }  // namespace
 
 TEST_CASE("five-bar: every gradient method agrees with every other", "[check]") {
@@ -191,16 +205,7 @@ TEST_CASE("differences that cannot be evaluated have failed, they are not zero",
 }
 
 TEST_CASE("the Taylor remainder of a linear objective has no slope, and that is right", "[check]") {
-  Problem problem = five_bar::problem(1e-6);
-  problem.scene.simulation.end_time = 0.2;
-  ObjectiveSpec sum;
-  sum.name = "sum";
-  sum.parameters_only = Expression::parse("L01 + 2*k1 + m1 + m2 - c1");
-  problem.objectives = {sum};
-  for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
-  GradientCheckOptions options;
-  options.timing = {1, 1, 0};
-  const GradientCheck check = check_gradients(problem, options);
+  const GradientCheck check = check_of_parameters("L01 + 2*k1 + m1 + m2 - c1");
   REQUIRE(check.taylor.size() == 1);
   CHECK_FALSE(check.taylor[0].slope);
   CHECK(check.taylor[0].passed);
@@ -208,17 +213,7 @@ TEST_CASE("the Taylor remainder of a linear objective has no slope, and that is 
 }
 
 TEST_CASE("a kink is named with the slopes at its two sides", "[check]") {
-  Problem problem = five_bar::problem(1e-6);
-  problem.scene.simulation.end_time = 0.2;
-  testing::add_parameters(problem.scene, {{"p", 0.1 + 0.2}});  // 0.3 and its last place
-  ObjectiveSpec sum;
-  sum.name = "sum";
-  sum.parameters_only = Expression::parse("5*p + 2*sqrt((p - 0.3)^2)");
-  problem.objectives = {sum};
-  for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
-  GradientCheckOptions options;
-  options.timing = {1, 1, 0};
-  const GradientCheck check = check_gradients(problem, options);
+  const GradientCheck check = check_of_parameters("5*p + 2*sqrt((p - 0.3)^2)");
   REQUIRE(check.ran);
   CHECK_FALSE(check.passed());
   REQUIRE(check.warnings.size() == 1);
