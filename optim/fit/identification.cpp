@@ -164,15 +164,16 @@ class Identification {
     const Eigen::VectorXd sigma = stack.sigma();
     const int before = result_.iterations;
     solver.progress = [&](const LeastSquaresProgress& p) {
+      if (p.iteration == 0 && !result_.history.empty()) return true;  // where the iterations so far ended
+      if (apart_.empty() || cost_changes(stack)) {
+        apart_.push_back(p.z);
+        apart_.back().head(stack.samples()).array() *= sigma.array();
+      }
       result_.history.push_back({before + p.iteration, p.cost, p.gradient_norm, p.step_norm,
                                  stack.scaling().to_rho(p.x), result_.simulations + stack.simulations()});
       return !options_.progress || options_.progress(result_.history.back());
     };
     LeastSquaresResult solution = solve_with_equalities(stack, x, solver);
-    if (apart_at_start_.size() == 0 && solution.z_initial.size() > 0) {
-      apart_at_start_ = solution.z_initial;
-      apart_at_start_.head(stack.samples()).array() *= sigma.array();
-    }
     result_.iterations += solution.iterations;
     result_.evaluations += solution.evaluations, result_.failed_evaluations += solution.failed_evaluations;
     return solution;
@@ -220,11 +221,21 @@ class Identification {
     return solution;
   }
 
-  // The residuals of the start, by the sigmas of the end.
-  Eigen::VectorXd z_of_start(const ExperimentStack& stack) const {
-    Eigen::VectorXd z = apart_at_start_;
-    z.head(stack.samples()).array() /= stack.sigma().array();
-    return z;
+  // Sigmas, the loss or the multipliers of equations change on the way.
+  bool cost_changes(const ExperimentStack& stack) const {
+    return estimates_sigma(spec_) || spec_.loss.type == LossType::tukey || stack.equalities > 0;
+  }
+
+  static Eigen::VectorXd by_sigmas_of(const ExperimentStack& stack, Eigen::VectorXd apart) {
+    apart.head(stack.samples()).array() /= stack.sigma().array();
+    return apart;
+  }
+
+  void measure_costs_by_the_end(const ExperimentStack& stack, double cost_final) {
+    result_.cost_final = cost_final;
+    for (std::size_t k = 0; k < apart_.size(); ++k)
+      result_.history[k].cost = stack.cost(by_sigmas_of(stack, apart_[k]));
+    if (!apart_.empty()) result_.cost_initial = result_.history.front().cost;
   }
 
   // A loss without pull far out has a minimum wherever all samples are far out.
@@ -262,7 +273,7 @@ class Identification {
           "identification.loss: {} of {} lie beyond its scale, {:g} sigma: these are no outliers. Sigma is too small, "
           "the model is wrong, or the fit ended in another minimum",
           beyond, counted(stack.samples(), "sample"), stack.loss.s()));
-    for (std::string& doubt : angle_doubts(scene_, spec_, stack, z_of_start(stack), z))
+    for (std::string& doubt : angle_doubts(scene_, spec_, stack, by_sigmas_of(stack, apart_.front()), z))
       result_.warnings.push_back(std::move(doubt));
   }
 
@@ -290,8 +301,7 @@ class Identification {
     const LeastSquaresResult solution = solved(stack, scaling.to_x(start_of(unknowns)));
     result_.status = abandoned_ ? SolverStatus::stopped : solution.status;
     result_.message = abandoned_ ? "stopped on request" : solution.message;
-    result_.cost_final = solution.cost_final;
-    if (apart_at_start_.size() > 0) result_.cost_initial = stack.cost(z_of_start(stack));
+    measure_costs_by_the_end(stack, solution.cost_final);
     result_.samples = static_cast<std::size_t>(stack.samples());
     result_.experiments.resize(spec_.experiments.size());
     const Eigen::VectorXd values = scaling.to_rho(solution.x);
@@ -557,8 +567,10 @@ class Identification {
   std::function<bool(double t)> go_on_;
   std::mutex told_;
   bool abandoned_ = false, sigmas_are_estimated_ = false;
-  Eigen::VectorXd apart_at_start_;  // measured - model, then the residuals of the priors
-  Eigen::VectorXd shared_;          // all parameters, the shared ones as fitted
+  // measured - model, then the residuals of the priors: of each row of the history, or of the first if the cost is one
+  // function on the whole way
+  std::vector<Eigen::VectorXd> apart_;
+  Eigen::VectorXd shared_;  // all parameters, the shared ones as fitted
 };
 
 }  // namespace

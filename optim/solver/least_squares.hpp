@@ -85,6 +85,7 @@ struct LeastSquaresProgress {
   double gradient_norm = 0;  // largest entry
   double step_norm = 0;
   Eigen::VectorXd x;
+  Eigen::VectorXd z;  // at x
 };
 
 struct LeastSquaresResult : SolverOutcome {

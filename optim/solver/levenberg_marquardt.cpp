@@ -294,7 +294,7 @@ class Search {
   }
 
   bool told(double gradient, double step) {
-    if (!options_.progress || options_.progress({result_.iterations, cost_, gradient, step, x_})) return true;
+    if (!options_.progress || options_.progress({result_.iterations, cost_, gradient, step, x_, point_.z})) return true;
     end(SolverStatus::stopped, "stopped on request");
     return false;
   }

@@ -393,6 +393,15 @@ TEST_CASE("the cost before and after is by the same sigmas and the same loss", "
   for (const double z : run.residuals(start).z) cost += 0.5 * by.at(z * z).rho;
   CHECK(result.cost_initial == Approx(cost).epsilon(1e-9));
   CHECK(result.cost_final < result.cost_initial);
+  // Each iteration as well, each once.
+  REQUIRE(result.history.size() > 2);
+  CHECK(result.history.front().cost == result.cost_initial);
+  CHECK(result.history.back().cost == Approx(result.cost_final).epsilon(1e-9));
+  for (std::size_t k = 0; k < result.history.size(); ++k) {
+    INFO("row " << k);
+    CHECK(result.history[k].iteration == static_cast<int>(k));
+    CHECK(result.history[k].cost >= result.cost_final * (1 - 1e-6));
+  }
 }
 
 TEST_CASE("a fit of wild data under a loss without pull far out is no fit", "[identification][loss]") {
