@@ -26,7 +26,8 @@ std::string list_of(const std::vector<std::string>& words) {
   return html_escaped(fmt::format("[{}]", fmt::join(quoted, ",")));
 }
 
-std::string cell_of(const TableCell& cell, bool words) {
+// breaks: its text may take several lines.
+std::string cell_of(const TableCell& cell, bool words, bool breaks) {
   std::string attributes;
   if (!cell.full.empty() && cell.full != cell.text) attributes += fmt::format(" title=\"{}\"", html_escaped(cell.full));
   if (cell.shade) {
@@ -35,7 +36,7 @@ std::string cell_of(const TableCell& cell, bool words) {
   } else if (words) {
     attributes += " class=\"words\"";
   }
-  std::string text = html_escaped(cell.text);
+  std::string text = breaks ? html_words(cell.text) : html_escaped(cell.text);
   if (!cell.link.empty()) text = fmt::format("<a href=\"{}\">{}</a>", html_escaped(cell.link), text);
   return fmt::format("<td{}>{}</td>", attributes, text);
 }
@@ -43,11 +44,11 @@ std::string cell_of(const TableCell& cell, bool words) {
 }  // namespace
 
 void HtmlPage::verdict(std::string_view text) {
-  body_ += fmt::format("<p class=\"verdict\">{}</p>\n", html_escaped(text));
+  body_ += fmt::format("<p class=\"verdict\">{}</p>\n", html_words(text));
 }
 
 void HtmlPage::warning(std::string_view text) {
-  body_ += fmt::format("<p class=\"warning\">Warning: {}</p>\n", html_escaped(text));
+  body_ += fmt::format("<p class=\"warning\">Warning: {}</p>\n", html_words(text));
 }
 
 void HtmlPage::heading(std::string_view text) {
@@ -55,15 +56,15 @@ void HtmlPage::heading(std::string_view text) {
   body_ += fmt::format("<h2 id=\"part{}\">{}</h2>\n", headings_.size(), html_escaped(text));
 }
 
-void HtmlPage::paragraph(std::string_view text) { body_ += fmt::format("<p>{}</p>\n", html_escaped(text)); }
+void HtmlPage::paragraph(std::string_view text) { body_ += fmt::format("<p>{}</p>\n", html_words(text)); }
 
-void HtmlPage::note(std::string_view text) { body_ += fmt::format("<p class=\"note\">{}</p>\n", html_escaped(text)); }
+void HtmlPage::note(std::string_view text) { body_ += fmt::format("<p class=\"note\">{}</p>\n", html_words(text)); }
 
 void HtmlPage::banner(std::string_view text) {
-  body_ += fmt::format("<p class=\"banner\" role=\"alert\">{}</p>\n", html_escaped(text));
+  body_ += fmt::format("<p class=\"banner\" role=\"alert\">{}</p>\n", html_words(text));
 }
 
-void HtmlPage::code(std::string_view text) { body_ += fmt::format("<code>{}</code>\n", html_escaped(text)); }
+void HtmlPage::code(std::string_view text) { body_ += fmt::format("<code>{}</code>\n", html_words(text)); }
 
 void HtmlPage::table(const std::vector<std::string>& header, const std::vector<TableRow>& rows, bool dense) {
   if (rows.empty()) return;
@@ -86,7 +87,10 @@ void HtmlPage::table(const std::vector<std::string>& header, const std::vector<T
   body_ += "<tbody>";
   for (const TableRow& row : rows) {
     body_ += "<tr>";
-    for (std::size_t k = 0; k < row.size(); ++k) body_ += cell_of(row[k], k < words.size() && words[k]);
+    for (std::size_t k = 0; k < row.size(); ++k) {
+      const bool sentence = k < words.size() && words[k];
+      body_ += cell_of(row[k], sentence, sentence || k == 0 || !named);
+    }
     body_ += "</tr>\n";
   }
   body_ += "</tbody></table></div>\n";

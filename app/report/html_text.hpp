@@ -7,6 +7,7 @@
 namespace mbsopt {
 
 std::string html_escaped(std::string_view text);
+std::string html_words(std::string_view text);   // escaped; no line ends within "1e-9" or "--out"
 std::string json_quoted(std::string_view text);  // in quotes, without "</", which would end the script
 
 }  // namespace mbsopt

@@ -308,8 +308,9 @@ void add_fit(HtmlPage& page, const FitPlot& fit) {
   plot.series.push_back({"model", fit.times, fit.model, Mark::line, {}, model});
   if (std::ranges::any_of(fit.prediction, [](double width) { return std::isfinite(width); }))
     for (const double side : {1.0, -1.0}) {
-      PlotSeries band{side > 0 ? "95 % of measurements" : "", fit.times, fit.model, Mark::line, {}, kBandColour};
+      PlotSeries band{"95 % of measurements", fit.times, fit.model, Mark::line, {}, kBandColour};
       for (std::size_t i = 0; i < band.y.size(); ++i) band.y[i] += side * fit.prediction[i];
+      if (side < 0) band.part_of = plot.series.size() - 1;
       plot.series.push_back(std::move(band));
     }
   if (is_comparable(fit.initial, fit.measured))

@@ -47,6 +47,14 @@ TEST_CASE("a cell shows rounded numbers and holds all their digits", "[report]")
   CHECK_THAT(page.text(), Contains("<td title=\"1.2345678901234567\">1.23</td>") && Contains("<td>2</td>"));
 }
 
+TEST_CASE("no line ends within a number or an option", "[report]") {
+  HtmlPage page("p");
+  page.paragraph("at rtol 1e-02 - or");
+  page.code("mbsopt simulate a-b.json --out \"a b\"");
+  CHECK_THAT(page.text(), Contains("<p>at rtol <span class=\"whole\">1e-02</span> - or</p>") &&
+                              Contains("a-b.json <span class=\"whole\">--out</span> &quot;a b&quot;"));
+}
+
 TEST_CASE("a column with a sentence is text in all its rows, a column of intervals is not", "[report]") {
   const std::string sentence = "the residuals are correlated in time", interval = "[-1.234567e-05, -1.234567e-05]";
   HtmlPage page("p");
