@@ -131,7 +131,8 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
       const Mechanism mechanism(scene_, rho, active, options_.user_forces, programs_);
       ObjectiveRun objective_run(simulated(), mechanism, settings, options_.progress);
       result = objective_run.run([&](std::span<const Cost> costs) {
-        const RunOptions run_options{.frozen = frozen, .progress = options_.progress, .exact_stages = true};
+        const RunOptions run_options{
+            .frozen = frozen, .progress = options_.progress, .exact_stages = options_.exact_stages};
         ++e.simulations;
         return sweep == Sweep::forward    ? simulate_tlm(mechanism, settings, costs, {}, run_options)
                : sweep == Sweep::backward ? simulate_adjoint(mechanism, settings, costs, run_options)

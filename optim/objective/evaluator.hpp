@@ -62,6 +62,7 @@ struct EvaluatorOptions {
   DifferenceSettings differences;
   std::vector<std::shared_ptr<const UserForce>> user_forces;
   std::function<bool(double t)> progress;  // after accepted steps; false abandons the evaluation
+  bool exact_stages = true;                // of values(), as in RunOptions: those of gradients() always are
 };
 
 class Evaluator {
