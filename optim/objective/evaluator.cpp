@@ -273,7 +273,7 @@ void Evaluator::add_differences(Evaluation& e) const {
   e.wall_seconds += stopwatch.seconds();
 }
 
-const Evaluation& Evaluator::values(const Eigen::VectorXd& rho) {
+Evaluation Evaluator::values(const Eigen::VectorXd& rho) {
   if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho) return last_;
   last_ = run(rho, Sweep::none, nullptr);
   simulations_ += last_.simulations;
@@ -312,7 +312,7 @@ GradientMethod Evaluator::available(GradientMethod method, std::string& choice) 
   return method;
 }
 
-const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
+Evaluation Evaluator::gradients(const Eigen::VectorXd& rho) {
   if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho &&
       (last_.has_gradients() || !last_.ok))
     return last_;

@@ -189,8 +189,9 @@ Cost Objective::cost(const Mechanism& mechanism, const ObjectivePart& part, doub
     if (!value) value = samples_[i].value.bind(mechanism);
     cost.samples.push_back({instants[i].time, value});
   }
-  if (user_running_) cost.running = point_cost(user_running_, mechanism.rho());
-  if (user_terminal_) cost.terminal = point_cost(user_terminal_, mechanism.rho());
+  const std::string user = "objective '" + name_ + "': its ";
+  if (user_running_) cost.running = point_cost(user_running_, mechanism, user + "running cost");
+  if (user_terminal_) cost.terminal = point_cost(user_terminal_, mechanism, user + "terminal cost");
   return cost;
 }
 
