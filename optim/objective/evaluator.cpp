@@ -64,8 +64,11 @@ void Evaluator::find_unused() {
   judged.scene = scene_;
   for (const Objective& o : objectives_)
     if (!o.is_written_in_cpp()) judged.objectives.push_back(o.spec());
+  bool opaque = judged.objectives.size() < objectives_.size() || !options_.user_forces.empty();
+  for (Force& force : judged.scene.forces) {
+    if (auto* const user = std::get_if<UserForceSpec>(&force.kind)) opaque = true, user->parameters.clear();
+  }
   std::vector<SceneIssue> unused = find_unused_parameters(judged);
-  const bool opaque = judged.objectives.size() < objectives_.size() || !options_.user_forces.empty();
   if (opaque) {  // may look at every body
     judged.objectives.clear();
     const std::vector<SceneIssue> by_model = find_unused_parameters(judged);

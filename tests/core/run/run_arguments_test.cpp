@@ -4,7 +4,7 @@
 
 #include <stdexcept>
 
-#include "core/force/user_force.hpp"
+#include "core/force/differentiated_force.hpp"
 #include "core/simulate/simulation.hpp"
 #include "tests/core/integrate/state_costs.hpp"
 #include "tests/core/mechanism/small_scenes.hpp"
@@ -29,6 +29,20 @@ struct ThrowingCost final : RunningCost {
   double g(double, VecIn, VecIn) const override { throw std::domain_error("no table"); }
   void add_g_y(double, VecIn, VecIn, double, VecOut) const override {}
   void add_g_rho(double, VecIn, VecIn, double, VecOut) const override {}
+};
+struct ThrowingForce final : UserForce {
+  std::vector<std::string> bodies() const override { return {"bar"}; }
+  void Q(double, VecIn, VecIn, VecIn, VecOut) const override { throw 3; }
+  void K(double, VecIn, VecIn, VecIn, MatOut) const override {}
+  void C(double, VecIn, VecIn, VecIn, MatOut) const override {}
+  void Q_rho(double, VecIn, VecIn, VecIn, MatOut) const override {}
+};
+struct Resized final : DifferentiatedForce<Resized> {
+  std::vector<std::string> bodies() const override { return {"bar"}; }
+  template <class T>
+  void load(double, const VectorX<T>&, const VectorX<T>&, const VectorX<T>&, VectorX<T>& Q) const {
+    Q.conservativeResize(Q.size() - 1);
+  }
 };
 
 }  // namespace
@@ -106,10 +120,15 @@ TEST_CASE("forces and costs that are not there are refused", "[simulate]") {
                     Contains("samples[0] has no cost"));
 }
 
-TEST_CASE("what a cost of a user throws names it", "[simulate]") {
+TEST_CASE("what forces and costs of a user throw names them", "[simulate]") {
   const Scene s = pendulum();
   const Mechanism m(s, nominal(s));
   Cost cost;
   cost.running = point_cost(std::make_shared<ThrowingCost>(), m, "objective 'lift'");
   CHECK_THROWS_WITH(simulate(m, s.simulation, std::vector{cost}), "objective 'lift' threw: no table");
+  const auto with = [&](std::shared_ptr<const UserForce> force) { return Mechanism(s, nominal(s), {}, {force}); };
+  CHECK_THROWS_WITH(simulate(with(std::make_shared<ThrowingForce>()), s.simulation),
+                    "user force 0 threw what is no std::exception");
+  CHECK_THROWS_WITH(simulate(with(std::make_shared<Resized>()), s.simulation),
+                    "user force 0 threw: load() has changed the size of its result");
 }
