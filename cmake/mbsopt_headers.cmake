@@ -13,9 +13,10 @@ set(public
   optim/design/design.hpp optim/fit/identification.hpp optim/check/gradient_check.hpp
   optim/tradeoff/tradeoff.hpp optim/tradeoff/accuracy.hpp
   optim/solver/nonlinear_program.hpp optim/solver/ipopt_solver.hpp optim/solver/nlopt_solver.hpp
-  app/json/read_problem.hpp)
+  optim/problem/named_terms.hpp app/json/read_problem.hpp app/program.hpp)
 # Public, but not in mbsopt.hpp, which would take longer to compile.
-set(apart core/body/euler_parameters.hpp core/force/differentiated_force.hpp core/run/differentiated_cost.hpp)
+set(apart core/body/euler_parameters.hpp core/force/differentiated_force.hpp core/run/differentiated_cost.hpp
+          optim/problem/plugin.hpp)
 
 set(pattern "#include \"((core|optim|app)/[^\"]+)\"")
 set(found ${public} ${apart})

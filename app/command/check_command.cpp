@@ -161,6 +161,7 @@ void add_to_result(Json& result, const GradientCheck& check, const std::vector<s
 
   Json& verdict = result["verdict"];
   verdict["passed"] = check.passed();
+  if (!check.wrong_terms.empty()) verdict["wrong_terms"] = check.wrong_terms;
   for (const CheckedEntry& e : check.entries) {
     verdict["entries"][e.objective][e.parameter] = {
         {"tlm_adjoint", e.tlm_adjoint},
@@ -238,6 +239,8 @@ int check_command(const CommandContext& context) {
   print_identities(context.out, check);
   print_continuous(context.out, check);
   print_costs(context.out, check);
+  if (!check.wrong_terms.empty()) context.out << "\nterms in C++, against differences of their own values:\n";
+  for (const std::string& wrong : check.wrong_terms) context.out << "  " << wrong << '\n';
   context.out << fmt::format("\n{}\n", check.passed() ? "all gradients agree" : "THE GRADIENTS DISAGREE");
   const bool cases_agree = check_cases(run);
   if (!check.passed() || !cases_agree) run.disagrees();

@@ -106,6 +106,8 @@ void add_options(CLI::App& sub, const std::string& name, CommandOptions& options
   sub.add_option("--threads", options.threads, "at most so many threads or processes (results do not depend on it)")
       ->check(CLI::Range(1, 1024));
   sub.add_flag("--quiet", options.quiet, "no progress on standard error");
+  sub.add_flag("--allow-plugins", options.allow_plugins,
+               "load the shared libraries that the problem names, which run code of their own");
   sub.add_flag("--json", options.json, "print result.json on standard output, and nothing else there");
   if (name == "resume") {
     sub.add_option("folder", options.problem_file, "output folder of the run, with its journal.jsonl")->required();
@@ -323,7 +325,7 @@ CommandOptions options_of(const std::vector<std::string>& arguments) {
 }
 
 int run_command_line(const std::vector<std::string>& given, std::ostream& out, std::ostream& err, bool err_is_terminal,
-                     Ranks* ranks) {
+                     Ranks* ranks, const NamedTerms& terms) {
   const InterruptGuard guard;
   const std::vector<std::string> arguments = without_help_command(given);
   if (!arguments.empty() && !is_known(arguments[0])) {
@@ -355,6 +357,7 @@ int run_command_line(const std::vector<std::string>& given, std::ostream& out, s
                                .err = err,
                                .err_is_terminal = err_is_terminal,
                                .json = options.json ? &out : nullptr,
+                               .terms = terms,
                                .ranks = ranks};
   const auto command =
       std::find_if(kCommands.begin(), kCommands.end(), [&](const Command& c) { return context.command == c.name; });

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "optim/problem/named_terms.hpp"
+
 namespace mbsopt {
 
 struct CommandOptions;
@@ -16,6 +18,6 @@ CommandOptions options_of(const std::vector<std::string>& arguments);
 // Runs one command in this process and returns its exit code. arguments: without the program's name; ranks: those that
 // may help (not owned).
 int run_command_line(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err,
-                     bool err_is_terminal = false, Ranks* ranks = nullptr);
+                     bool err_is_terminal = false, Ranks* ranks = nullptr, const NamedTerms& terms = {});
 
 }  // namespace mbsopt

@@ -355,7 +355,7 @@ int identify_command(const CommandContext& context) {
     throw std::invalid_argument("identification: missing; it says which measurements to explain and what may change");
   }
   std::optional<OtherModel> other;
-  if (!context.options.compare.empty()) other.emplace(context.options.compare);
+  if (!context.options.compare.empty()) other.emplace(context.options.compare, read_options(context));
   const std::vector<CsvTable> whole = data_of(run.problem);
   // With its drives and overrides, which the scene itself may not even assemble without.
   const Scene first = simulated_scene(run.problem, whole);

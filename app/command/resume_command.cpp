@@ -49,6 +49,7 @@ int resume_command(const CommandContext& context) {
   options.problem_file = from_here("input");
   if (!options.sweep.points.empty()) options.sweep.points = from_here("points");
   if (!options.compare.empty()) options.compare = from_here("compare");
+  options.allow_plugins = context.options.allow_plugins;  // a folder of somebody else's must not decide it
   options.out = folder.string();
   options.resume = true;
   const CommandContext again{.command = command,
@@ -58,6 +59,7 @@ int resume_command(const CommandContext& context) {
                              .err = context.err,
                              .err_is_terminal = context.err_is_terminal,
                              .json = context.json,
+                             .terms = context.terms,
                              .ranks = context.ranks};
   if (command == "design") return design_command(again);
   if (command == "identify") return identify_command(again);

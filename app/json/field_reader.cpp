@@ -392,6 +392,10 @@ void FieldReader::read_named(const Node& node, const std::string& path, Definiti
   if (!read_expression(node, path, value.value)) value.value = std::numeric_limits<double>::quiet_NaN();
 }
 
+void FieldReader::read_named(const Node& node, const std::string& path, TermParameter& value) {
+  if (!read_expression(node, path, value.value)) value.value = std::numeric_limits<double>::quiet_NaN();
+}
+
 void FieldReader::version(std::string_view key, int only, const Says& says) {
   const Node* const node = get(key, says);
   if (node && (node->kind != Node::Kind::number || node->number != only))

@@ -152,6 +152,7 @@ class FieldReader {
   }
   void read_named(const Node& node, const std::string& path, Parameter& value);
   void read_named(const Node& node, const std::string& path, Definition& value);
+  void read_named(const Node& node, const std::string& path, TermParameter& value);
   void take_unit(const Node& node, const std::string& path, Parameter& parameter);
 
   bool read_expression(const Node& node, const std::string& path, Expression& value);

@@ -14,6 +14,7 @@
 
 #include "app/json/findings.hpp"
 #include "app/json/node.hpp"
+#include "app/json/read_options.hpp"
 #include "optim/problem/problem.hpp"
 
 namespace mbsopt {
@@ -35,6 +36,7 @@ ProblemSource problem_source_of(const std::string& text, const std::filesystem::
                                 const std::vector<std::string>& set_overrides);
 
 // As the functions of read_problem.hpp.
-Problem read_problem(ProblemSource& source, std::vector<std::string>* warnings = nullptr);
+Problem read_problem(ProblemSource& source, std::vector<std::string>* warnings = nullptr,
+                     const ReadOptions& options = {});
 
 }  // namespace mbsopt

@@ -9,6 +9,7 @@
 #include "app/json/findings.hpp"
 #include "app/json/problem_source.hpp"
 #include "app/json/source_text.hpp"
+#include "app/json/term_resolver.hpp"
 #include "core/scene/default_integrator.hpp"
 #include "optim/objective/problem_issues.hpp"
 #include "optim/problem/bounded_means.hpp"
@@ -171,13 +172,14 @@ void add_issues(Problem& problem, const Node& root, Findings& findings, std::vec
 
 }  // namespace
 
-Problem read_problem(ProblemSource& source, std::vector<std::string>* warnings) {
+Problem read_problem(ProblemSource& source, std::vector<std::string>* warnings, const ReadOptions& options) {
   Findings& findings = source.findings;
   const Node& root = source.root;
   const std::filesystem::path folder = source.file.parent_path();
   Problem problem;
   FieldReader::read(root, "", findings, problem);
   complete_integrator(problem.scene.simulation, root);
+  resolve_terms(problem, options, folder, root, findings);
   resolve_data_files(problem, folder, root, findings);
   read_samples(problem, folder, root, findings);
   add_issues(problem, root, findings, warnings);
@@ -187,14 +189,15 @@ Problem read_problem(ProblemSource& source, std::vector<std::string>* warnings) 
 }
 
 Problem read_problem_text(const std::string& text, const std::filesystem::path& name,
-                          const std::vector<std::string>& set_overrides, std::vector<std::string>* warnings) {
+                          const std::vector<std::string>& set_overrides, std::vector<std::string>* warnings,
+                          const ReadOptions& options) {
   ProblemSource source = problem_source_of(text, name, set_overrides);
-  return read_problem(source, warnings);
+  return read_problem(source, warnings, options);
 }
 
 Problem read_problem(const std::filesystem::path& file, const std::vector<std::string>& set_overrides,
-                     std::vector<std::string>* warnings) {
-  return read_problem_text(read_text_file(file), file, set_overrides, warnings);
+                     std::vector<std::string>* warnings, const ReadOptions& options) {
+  return read_problem_text(read_text_file(file), file, set_overrides, warnings, options);
 }
 
 }  // namespace mbsopt

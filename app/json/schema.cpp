@@ -27,6 +27,8 @@ Json default_of(const VectorField& field) {
 
 template <class T>
 Json object_schema();
+template <class T>
+Json object_schema_of(T value);
 
 // Collects the properties of one object.
 class SchemaWriter {
@@ -119,7 +121,11 @@ class SchemaWriter {
   }
 
   void time_law(std::string_view key, Expression&, std::optional<SampledLaw>&, const Says& says) {
-    put(key, says, {{"anyOf", {ref("expression"), object_schema<SampledLaw>()}}});
+    SampledLaw called;
+    called.function = "f";
+    Json samples = object_schema<SampledLaw>(), function = object_schema_of(called);
+    samples["properties"].erase("user"), function["properties"]["user"].erase("default");
+    put(key, says, {{"anyOf", {ref("expression"), samples, function}}});
   }
   void texts(std::string_view key, std::vector<std::string>&, const Says& says) {
     const Json text = {{"type", "string"}};
@@ -204,7 +210,7 @@ class SchemaWriter {
 
   template <class T>
   static Json named_schema() {
-    if constexpr (std::is_same_v<T, Definition>)
+    if constexpr (std::is_same_v<T, Definition> || std::is_same_v<T, TermParameter>)
       return ref("expression");
     else if constexpr (std::is_same_v<T, Parameter>)
       return {{"anyOf", {ref("number"), object_schema<T>()}}};

@@ -76,6 +76,11 @@ std::string optimized_problem_text(const std::string& problem_file, const std::v
   const auto moved_law = [&](const std::string& place, const std::optional<SampledLaw>& law) {
     if (law) moved(place + ".law.csv", law->file);
   };
+  if (!problem.plugins.empty()) {
+    nlohmann::json plugins = nlohmann::json::array();
+    for (const std::string& file : problem.plugins) plugins.push_back(relative_to_folder(file));
+    text = with_value(text, "plugins", plugins.dump());
+  }
   const std::vector<Drive>& drives = problem.scene.drives;
   const auto laws_moved = [&](const std::vector<DriveLaw>& laws, const std::string& owner) {
     for (std::size_t k = 0; k < laws.size(); ++k) moved_law(child_path(owner + ".drives", k), laws[k].samples);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "app/run/sweep_points.hpp"
+#include "optim/problem/named_terms.hpp"
 
 namespace mbsopt {
 
@@ -40,6 +41,7 @@ struct CommandOptions {
   bool sensitivities = false;         // --sensitivities of simulate: sensitivities.csv
   int threads = 0;                    // --threads, also worker processes; 0: as many as the machine has
   bool quiet = false;                 // --quiet
+  bool allow_plugins = false;         // --allow-plugins
   bool json = false;                  // --json: only result.json on standard output
   bool keep_journal = false;          // --keep-journal of design, identify and sweep
   bool resume = false;                // go on with the journal in `out`
@@ -53,6 +55,7 @@ struct CommandContext {
   std::ostream& err;             // progress and errors
   bool err_is_terminal = false;  // a bar may be drawn
   std::ostream* json = nullptr;  // with --json: where result.json is printed
+  NamedTerms terms = {};         // in C++, which the problem may call by name: those of the program
   Ranks* ranks = nullptr;        // other processes that compute for this one, under mpirun
   mutable std::shared_ptr<const ProblemSource> source = nullptr;  // once Run has read the problem
 };

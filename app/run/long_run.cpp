@@ -68,7 +68,7 @@ void LongRun::refuse_what_has_changed() const {
                                   (run_.folder.path() / kJournalFile).string(),
                                   std::string(key) == "version"        ? "version of mbsopt"
                                   : std::string(key) == "input_sha256" ? "content of the problem file"
-                                                                       : "content of a data file",
+                                                                       : "content of a data file, plug-in or program",
                                   run_.context.command));
   }
 }

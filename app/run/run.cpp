@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <utility>
 
 #include "app/json/problem_source.hpp"
@@ -40,13 +41,16 @@ StatusRow row_of(RunStatus status) {
 Problem problem_of(const CommandContext& context, std::vector<std::string>& warnings) {
   const std::shared_ptr<ProblemSource> source = read_problem_source(context.options.problem_file, context.options.sets);
   context.source = source;
-  return read_problem(*source, &warnings);
+  return read_problem(*source, &warnings, read_options(context));
 }
 
 }  // namespace
 
-std::vector<std::string> data_files(const Problem& problem) {
-  std::vector<std::string> files;
+ReadOptions read_options(const CommandContext& context) { return {context.terms, context.options.allow_plugins}; }
+
+std::vector<std::string> data_files(const Problem& problem, const NamedTerms& terms) {
+  std::vector<std::string> files = problem.plugins;
+  if (!terms.empty()) files.push_back(std::filesystem::canonical("/proc/self/exe").string());
   const auto add = [&](const std::optional<SampledLaw>& law) {
     if (law) files.push_back(law->file);
   };
@@ -76,7 +80,7 @@ Run::Run(const CommandContext& given)
   result["version"] = program_version();
   result["command"] = context.command;
   result["problem"] = problem.scene.name;
-  std::vector<std::string> files = data_files(problem);
+  std::vector<std::string> files = data_files(problem, context.terms);
   if (!context.options.sweep.points.empty()) files.push_back(context.options.sweep.points);
   result["provenance"] = provenance(context.arguments, folder.owner(), context.options.problem_file, files);
   result["warnings"] = Json::array();

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "app/files/result_json.hpp"
+#include "app/json/read_problem.hpp"
 #include "app/run/command.hpp"
 #include "app/run/output_folder.hpp"
 #include "app/terminal/progress.hpp"
@@ -72,8 +73,10 @@ class Run {
   bool running_ = false;
 };
 
-// The data files that a problem names.
-std::vector<std::string> data_files(const Problem& problem);
+ReadOptions read_options(const CommandContext& context);
+
+// The files that a problem names: data, plug-ins; and the program itself where it brings terms of its own.
+std::vector<std::string> data_files(const Problem& problem, const NamedTerms& terms);
 
 // The model at its assembled start into the result and onto standard output, and warnings of what is odd about it.
 // False where the assembly failed, which then is how the run ended. integrated: whether its motion is, by a model.

@@ -9,8 +9,8 @@
 
 namespace mbsopt {
 
-OtherModel::OtherModel(const std::string& file)
-    : source_(read_problem_source(file, {})), problem_(read_problem(*source_)) {
+OtherModel::OtherModel(const std::string& file, const ReadOptions& options)
+    : source_(read_problem_source(file, {})), problem_(read_problem(*source_, nullptr, options)) {
   if (!problem_.identification) throw std::invalid_argument(fmt::format("--compare: {} has no identification", file));
 }
 

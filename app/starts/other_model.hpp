@@ -18,7 +18,7 @@ namespace mbsopt {
 class OtherModel {
  public:
   // Throws InputError and std::invalid_argument, with the place in its own file.
-  explicit OtherModel(const std::string& file);
+  OtherModel(const std::string& file, const ReadOptions& options);
 
   const Problem& problem() const { return problem_; }
   // Takes the integrator of `first`, so that errors of the integration are the same in both fits. Throws InputError

@@ -29,12 +29,13 @@ void set_integrator(Problem& problem, const Json& integrator) {
   settings.integrator.atol = integrator.at("atol").get<double>();
 }
 
-std::function<Json(int)> work_of(const Json& work) {
+std::function<Json(int)> work_of(const Json& work, const NamedTerms& terms) {
   const std::string file = work.at("problem_file"), command = work.at("command");
-  Problem problem = read_problem(file, work.at("sets").get<std::vector<std::string>>());
+  Problem problem = read_problem(file, work.at("sets").get<std::vector<std::string>>(), nullptr,
+                                 {terms, work.at("allow_plugins").get<bool>()});
   set_integrator(problem, work.at("integrator"));
   const Json& task = work.at("task");
-  std::vector<std::string> files = data_files(problem);
+  std::vector<std::string> files = data_files(problem, terms);
   if (const std::string points = task.value("points", ""); !points.empty()) files.push_back(points);
   const Json here = provenance({}, "", file, files);
   for (const char* key : {"input_sha256", "data_sha256"})
@@ -49,7 +50,7 @@ std::function<Json(int)> work_of(const Json& work) {
 
 class Server {
  public:
-  explicit Server(Ranks& ranks) : ranks_(ranks) {}
+  Server(Ranks& ranks, const NamedTerms& terms) : ranks_(ranks), terms_(terms) {}
 
   void run() {
     while (!dismissed_) {
@@ -74,7 +75,7 @@ class Server {
       if (message.contains("work")) {
         const Json& work = message["work"];
         pool_.emplace(work.at("workers").get<int>(),
-                      [record = work_of(work)](int start) { return record(start).dump(); });
+                      [record = work_of(work, terms_)](int start) { return record(start).dump(); });
       }
       if (message.contains("start") && pool_) waiting_.push_back(message["start"].get<int>());
     } catch (const std::exception& error) {
@@ -107,6 +108,7 @@ class Server {
   }
 
   Ranks& ranks_;
+  const NamedTerms& terms_;
   std::optional<ProcessPool> pool_;
   std::deque<int> waiting_;  // starts for which the system has given no process yet
   bool dismissed_ = false, told_of_interrupt_ = false;
@@ -114,9 +116,9 @@ class Server {
 
 }  // namespace
 
-int serve(Ranks& ranks) {
+int serve(Ranks& ranks, const NamedTerms& terms) {
   const InterruptGuard guard;
-  Server(ranks).run();
+  Server(ranks, terms).run();
   return kDone;
 }
 

@@ -2,11 +2,12 @@
 #pragma once
 
 #include "app/starts/ranks.hpp"
+#include "optim/problem/named_terms.hpp"
 
 namespace mbsopt {
 
-// Until rank 0 dismisses all. Returns the exit code.
-int serve(Ranks& ranks);
+// Until rank 0 dismisses all. terms: those of the program. Returns the exit code.
+int serve(Ranks& ranks, const NamedTerms& terms = {});
 void dismiss(Ranks& ranks);
 
 }  // namespace mbsopt

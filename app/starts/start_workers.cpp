@@ -30,6 +30,7 @@ Json work_message(const Run& run, const Json& task, int workers) {
            {{"command", context.command},
             {"problem_file", context.options.problem_file},
             {"sets", context.options.sets},
+            {"allow_plugins", context.options.allow_plugins},
             {"input_sha256", run.result["provenance"]["input_sha256"]},
             {"data_sha256", run.result["provenance"].value("data_sha256", Json())},
             {"workers", workers},

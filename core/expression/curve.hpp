@@ -31,6 +31,7 @@ class Curve {
   double at(double x, int order = 0) const;  // value, or derivative of that order
   int degree() const;                        // derivatives of a higher order are 0; of a routine: none is
 
+  bool is_routine() const { return static_cast<bool>(routine_); }
   Interpolation interpolation() const { return how_; }
   const std::vector<double>& x() const { return spline_ ? spline_->times() : x_; }
   const std::vector<double>& y() const { return spline_ ? spline_->values() : y_; }

@@ -79,6 +79,18 @@ Expression Expression::of_curve(std::shared_ptr<const Curve> f, const Expression
   return ExpressionMaker::of(std::move(tree));
 }
 
+std::vector<CurveCall> curve_calls(const Expression& expression) {
+  std::vector<CurveCall> calls;
+  for (const SyntaxNode& node : expression.tree().nodes) {
+    if (!node.curve) continue;
+    SyntaxTree argument;
+    argument.nodes.assign(expression.tree().nodes.begin(), expression.tree().nodes.begin() + node.a + 1);
+    argument.text = expression.text();
+    calls.push_back({node.curve, ExpressionMaker::of(std::move(argument))});
+  }
+  return calls;
+}
+
 Expression::Expression(double value) : tree_(std::make_shared<const SyntaxTree>(tree_of(value))) {}
 
 Expression Expression::parse(std::string_view text) {

@@ -46,6 +46,13 @@ class Expression {
   std::shared_ptr<const SyntaxTree> tree_;
 };
 
+// The functions of one number that an expression calls, and what it gives them.
+struct CurveCall {
+  std::shared_ptr<const Curve> curve;
+  Expression argument;
+};
+std::vector<CurveCall> curve_calls(const Expression& expression);
+
 Expression operator+(const Expression& a, const Expression& b);
 Expression operator-(const Expression& a, const Expression& b);
 Expression operator*(const Expression& a, const Expression& b);

@@ -14,6 +14,8 @@
 // of its bodies (K, C) or 7 parameters (Q_rho), each with 8 numbers in place of one.
 #pragma once
 
+#include <stdexcept>
+
 #include "core/force/user_force.hpp"
 #include "core/linear/dual_numbers.hpp"
 
@@ -27,6 +29,7 @@ struct DifferentiatedForce : UserForce {
   void Q(double t, VecIn q, VecIn v, VecIn rho, VecOut Q) const final {
     VectorX<double> out = Q;
     own().load(t, VectorX<double>(q), VectorX<double>(v), VectorX<double>(rho), out);
+    if (out.size() != Q.size()) throw std::length_error("load() has changed the size of its result");
     Q = out;
   }
   void K(double t, VecIn q, VecIn v, VecIn rho, MatOut K) const final {
@@ -81,6 +84,7 @@ struct DifferentiatedInertia : UserForce, InertialLoad {
   void L(VecIn q, VecIn v, VecIn z, VecIn rho, VecOut L) const final {
     VectorX<double> out = L;
     own().load(VectorX<double>(q), VectorX<double>(v), VectorX<double>(z), VectorX<double>(rho), out);
+    if (out.size() != L.size()) throw std::length_error("load() has changed the size of its result");
     L = out;
   }
   void M(VecIn q, VecIn rho, MatOut M) const final {

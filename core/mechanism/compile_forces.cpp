@@ -1,7 +1,9 @@
 // Forces of the scene, and those written in C++.
 #include <algorithm>
+#include <optional>
 #include <set>
 
+#include "core/force/bound_force.hpp"
 #include "core/mechanism/compilation.hpp"
 #include "core/mechanism/kinks_in_time.hpp"
 #include "core/mechanism/mechanism.hpp"
@@ -156,17 +158,31 @@ void add(Compilation& model, const FrictionSpec& f, int force, const std::string
   }
 }
 
-void add_user_force(Compilation& model, std::shared_ptr<const UserForce> force) {
-  if (!force) throw SceneError("user force: there is none (null)");
+// where: its place in the scene, or "user force"; name: of its own, for messages.
+void add_user_force(Compilation& model, std::shared_ptr<const UserForce> force, std::vector<std::string> bodies,
+                    std::optional<TermValues> values, const std::string& where, std::string name) {
   UserForceData out;
-  for (const std::string& name : force->bodies()) {
-    const int body = model.body_index(name, "user force");
-    if (body == 0) throw SceneError("user force: acts on the ground, which never moves");
-    out.bodies.push_back(body);
-  }
-  if (force->inertia() && out.bodies.size() != 1) throw SceneError("user force: mass terms act on one body");
-  out.force = std::move(force);
+  for (const std::string& body : bodies) out.bodies.push_back(moving_body(model, body, where));
+  if (out.bodies.empty()) throw SceneError(where + ": acts on no body");
+  if (force->inertia() && out.bodies.size() != 1) throw SceneError(where + ": mass terms act on one body");
+  out.force =
+      std::make_shared<const BoundForce>(std::move(force), std::move(bodies), std::move(values), std::move(name));
   model.data.user_forces.push_back(std::move(out));
+}
+
+void add(Compilation& model, const UserForceSpec& f, int, const std::string& where) {
+  if (!f.term)
+    throw SceneError(where + ".force: '" + f.force + "' is a force written in C++, which nothing has provided");
+  const auto count = static_cast<Eigen::Index>(f.parameters.size());
+  TermValues values{Eigen::VectorXd(count), Eigen::MatrixXd::Zero(count, model.data.rho.size())};
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const TermParameter& parameter = f.parameters[static_cast<std::size_t>(i)];
+    const Dual x = model.fields.value(parameter.value, child_path(where + ".parameters", parameter.name));
+    values.p(i) = x.value();
+    for (std::size_t k = 0; k < model.data.active.size(); ++k)
+      values.p_rho(i, model.data.active[k]) = x.derivatives()(static_cast<Eigen::Index>(k));
+  }
+  add_user_force(model, f.term, bodies_of(f), std::move(values), where, where + " (" + f.force + ")");
 }
 
 }  // namespace
@@ -179,7 +195,12 @@ void compile_forces(Compilation& model) {
 }
 
 void compile_user_forces(Compilation& model, std::vector<std::shared_ptr<const UserForce>> forces) {
-  for (auto& force : forces) add_user_force(model, std::move(force));
+  for (std::size_t i = 0; i < forces.size(); ++i) {
+    if (!forces[i]) throw SceneError("user force: there is none (null)");
+    std::vector<std::string> bodies = forces[i]->bodies();
+    std::string name = "user force " + std::to_string(i);
+    add_user_force(model, std::move(forces[i]), std::move(bodies), {}, "user force", std::move(name));
+  }
 }
 
 }  // namespace mbsopt

@@ -12,8 +12,8 @@
 #include "core/constraint/time_law.hpp"
 #include "core/expression/curve.hpp"
 #include "core/force/applied.hpp"
+#include "core/force/bound_force.hpp"
 #include "core/force/forces.hpp"
-#include "core/force/user_force.hpp"
 #include "core/mechanism/sensor_function.hpp"
 #include "core/sensor/joint_measure.hpp"
 
@@ -59,7 +59,7 @@ struct KinkedSignal {  // a derivative jumps at its samples, later by the delay
 };
 
 struct UserForceData {
-  std::shared_ptr<const UserForce> force;
+  std::shared_ptr<const BoundForce> force;
   std::vector<int> bodies;  // 1-based
 };
 

@@ -16,6 +16,7 @@
 
 namespace mbsopt {
 
+class Mechanism;         // core/mechanism/mechanism.hpp
 struct SwitchedProgram;  // core/expression/program_switches.hpp
 
 // y = (q, v): q has 7 numbers per body (r_g, p), v = qdot the same; y.head(7n) = q, y.tail(7n) = v.
@@ -62,9 +63,11 @@ struct Cost {
 // Which of the costs have no finite value, in words.
 std::string not_finite_costs(std::span<const Cost> costs, const Eigen::VectorXd& psi);
 
-// Adapters from what a user writes; rho is the parameter vector of the mechanism that is simulated. Throw
-// std::invalid_argument where there is no cost (null).
-std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const RunningCost> running, const Eigen::VectorXd& rho);
-std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const TerminalCost> terminal, const Eigen::VectorXd& rho);
+// Adapters from what a user writes, at the parameters of the mechanism that is simulated. name: for messages, such as
+// that of what the cost throws. Throw std::invalid_argument where there is no cost (null).
+std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const RunningCost> running, const Mechanism& mechanism,
+                                            std::string name = "a running cost");
+std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const TerminalCost> terminal, const Mechanism& mechanism,
+                                            std::string name = "a terminal cost");
 
 }  // namespace mbsopt

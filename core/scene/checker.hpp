@@ -109,7 +109,7 @@ class Checker {
   void named(std::string_view key, const std::vector<T>& values, const Says&) {
     for (const T& value : values) {
       Checker inside(facts_, issues_, child_path(path(key), value.name));
-      if constexpr (std::is_same_v<T, Definition>)
+      if constexpr (std::is_same_v<T, Definition> || std::is_same_v<T, TermParameter>)
         inside.check_expression(inside.path(), value.value, Names::none, {});
       else
         inside.check(value);

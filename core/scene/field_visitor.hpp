@@ -111,7 +111,9 @@ class FieldVisitor {
   }
   template <class T>
   void named(std::string_view key, const std::vector<T>& values, const Says&) {
-    if constexpr (!std::is_same_v<T, Definition>)
+    if constexpr (std::is_same_v<T, TermParameter>)
+      for (const T& value : values) tell(child_path(at(key), value.name), value.value, Names::none);
+    else if constexpr (!std::is_same_v<T, Definition>)
       for (const T& value : values) visit(child_path(at(key), value.name), value);
   }
   void version(std::string_view, int, const Says&) {}

@@ -18,6 +18,8 @@
 
 namespace mbsopt {
 
+struct UserForce;  // core/force/user_force.hpp
+
 using Field = Expression;  // a number, or an expression over parameters and definitions
 using VectorField = std::array<Field, 3>;
 using PointField =
@@ -41,6 +43,12 @@ struct Parameter {
 };
 
 struct Definition {
+  std::string name;
+  Field value;
+};
+
+// A parameter of a term written in C++: an expression of those of the scene.
+struct TermParameter {
   std::string name;
   Field value;
 };
@@ -117,8 +125,12 @@ struct SampleColumn {
   static constexpr double kFirstRow = std::numeric_limits<double>::lowest();  // a time_zero: that of the first row
 };
 
-// A law of a drive through samples, always a spline.
-struct SampledLaw : SampleColumn {};
+// A law of a drive through samples, always a spline; or f(argument), f a function written in C++. The reader of the
+// file makes an expression of the latter.
+struct SampledLaw : SampleColumn {
+  std::string function = {};                // its name; empty: samples
+  std::optional<Expression> argument = {};  // of t and parameters; when absent t
+};
 
 // A function of time that laws, costs and channels use by name: gain f(t - delay) + offset, f through the samples.
 struct Signal : SampleColumn {
@@ -187,9 +199,17 @@ struct FrictionSpec {
   std::string motion;                       // rotation or translation; empty: whichever the joint has, rotation first
   Field coulomb, smooth_velocity, viscous;  // [N m], [rad/s], [N m s/rad], or [N], [m/s], [N s/m]
 };
+// A force written in C++, by its name. Its rho is its own parameters, in the order of this list.
+struct UserForceSpec {
+  static constexpr std::string_view kType = "user";
+  std::string force;
+  std::vector<std::string> bodies;             // on which it acts; when empty those that it names itself
+  std::vector<TermParameter> parameters;       // the reader of the file puts them into the order of the term
+  std::shared_ptr<const UserForce> term = {};  // that the name stands for
+};
 struct Force {
   std::string name;
-  std::variant<Tsda, Rsda, TorsionBar, PointForce, Torque, BushingSpec, FrictionSpec> kind;
+  std::variant<Tsda, Rsda, TorsionBar, PointForce, Torque, BushingSpec, FrictionSpec, UserForceSpec> kind;
 };
 
 struct PointOnBody {

@@ -83,6 +83,7 @@ inline constexpr TypeRow kForceTypes[] = {
      "body1 body2! point1 point2 stiffness damping torsional_stiffness torsional_damping"},
     {"friction", "smoothed Coulomb and viscous friction about or along the axis of a joint",
      "joint! motion coulomb smooth_velocity! viscous"},
+    {"user", "force written in C++, of a plug-in or of the program, by its name", "force! bodies parameters"},
 };
 
 inline constexpr TypeRow kSensorQuantities[] = {

@@ -216,7 +216,12 @@ void describe_samples(auto& v, auto& c, std::string_view file) {
            dimension::kTime});
 }
 
-void describe(auto& v, Like<SampledLaw> auto& l) { describe_samples(v, l, "csv"); }
+void describe(auto& v, Like<SampledLaw> auto& l) {
+  v.text("user", l.function,
+         {"name of a function of a plug-in or of the program", l.function.empty() ? Need::optional : Need::required});
+  if (l.function.empty()) return describe_samples(v, l, "csv");
+  v.law("argument", l.argument, Names::time_law, {"of the function: of t and parameters; t when absent"});
+}
 
 void describe(auto& v, Like<Signal> auto& s) {
   describe_samples(v, s, "file");
@@ -243,7 +248,8 @@ void describe(auto& v, Like<Drive> auto& d) {
   v.point("point1", d.point1, d.body1, {"first point [m]", need_of(*row, "point1"), kLength});
   v.point("point2", d.point2, d.body2, {"second point [m]", need_of(*row, "point2"), kLength});
   v.time_law("law", d.law, d.samples,
-             {"expression of t and parameters, or {\"csv\": file, \"time\": column, \"column\": column}",
+             {"expression of t and parameters, or {\"csv\": file, \"time\": column, \"column\": column}, or {\"user\": "
+              "function, \"argument\": expression}",
               Need::required, dimension_of_drive(d.type, d.coordinate)});
 }
 
@@ -320,6 +326,13 @@ void describe(auto& v, Like<FrictionSpec> auto& f, const TypeRow& row) {
   v.number("smooth_velocity", f.smooth_velocity,
            {"rate at which the Coulomb part is 0.71 of its level [rad/s], [m/s]", need_of(row, "smooth_velocity")});
   v.number("viscous", f.viscous, {"torque [N m s/rad] or force [N s/m] per rate", need_of(row, "viscous")});
+}
+
+void describe(auto& v, Like<UserForceSpec> auto& f, const TypeRow& row) {
+  v.text("force", f.force, {"name of a force of a plug-in or of the program", need_of(row, "force")});
+  v.references("bodies", f.bodies, To::body,
+               {"on which it acts, in its order; when absent those that it names itself", need_of(row, "bodies")});
+  v.named("parameters", f.parameters, {"its own, each an expression of parameters", need_of(row, "parameters")});
 }
 
 void describe(auto& v, Like<Force> auto& f) {

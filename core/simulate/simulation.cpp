@@ -117,6 +117,11 @@ SimulationResult integrate_adjoint(const Mechanism& mechanism, const SimulationS
   return run.finish();
 }
 
+void require_observer(const auto& sampling) {
+  if (!sampling.times.empty() && !sampling.observe)
+    throw std::invalid_argument("sampling: times without anything that observes (observe is empty)");
+}
+
 // By whichever of the three computes such a run.
 template <class Cvodes, class Driven, class Integrated>
 SimulationResult run_by(const Mechanism& mechanism, const SimulationSettings& settings, Cvodes&& by_cvodes,
@@ -134,6 +139,7 @@ SimulationResult simulate(const Mechanism& mechanism, const SimulationSettings& 
                           const Sampling& sampling, const RunOptions& options) {
   require_settled(settings);
   check_run_arguments(mechanism, settings, costs, sampling.times, options);
+  require_observer(sampling);
   return run_by(
       mechanism, settings, [&] { return cvodes_simulate(mechanism, settings, costs, sampling, options); },
       [&](auto& start) { return driven_simulate(mechanism, settings, costs, sampling, options, start); },
@@ -144,8 +150,7 @@ SimulationResult simulate_tlm(const Mechanism& mechanism, const SimulationSettin
                               std::span<const Cost> costs, const TangentSampling& sampling, const RunOptions& options) {
   require_settled(settings);
   check_run_arguments(mechanism, settings, costs, sampling.times, options);
-  if (!sampling.times.empty() && !sampling.observe)
-    throw std::invalid_argument("sampling: times without anything that observes (observe is empty)");
+  require_observer(sampling);
   return run_by(
       mechanism, settings, [&] { return cvodes_forward(mechanism, settings, costs, sampling, options); },
       [&](auto& start) { return driven_tlm(mechanism, settings, costs, sampling, options, start); },

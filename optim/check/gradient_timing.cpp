@@ -26,8 +26,8 @@ GradientTiming time_gradients(const Scene& scene, const std::vector<Objective>& 
   const Eigen::VectorXd rho = parameter_values(scene);
   // A fresh evaluator has no point that it could return again.
   const auto timed = [&](GradientMethod method) {
-    Evaluator evaluator(scene, objectives, {}, {method, {}, options.user_forces, options.progress});
     const bool derivatives = method != GradientMethod::automatic;
+    Evaluator evaluator(scene, objectives, {}, {method, {}, options.user_forces, options.progress, derivatives});
     const Evaluation& e = derivatives ? evaluator.gradients(rho) : evaluator.values(rho);
     timing.simulations += e.simulations;
     timing.ok = e.ok;

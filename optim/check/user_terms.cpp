@@ -6,11 +6,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/force/user_force.hpp"
+#include "core/expression/curve.hpp"
+#include "core/expression/expression.hpp"
+#include "core/force/bound_force.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/simulate/simulation.hpp"
 #include "optim/differences/difference_ladder.hpp"
 #include "optim/differences/verdict.hpp"
+#include "optim/objective/expression_cost.hpp"
 #include "optim/objective/sampled_motion.hpp"
 #include "optim/problem/parameter_values.hpp"
 
@@ -93,7 +96,8 @@ class UserTerms {
     for (Index i = 0; i < motion.states.cols(); ++i) {
       const double t = motion.times[static_cast<std::size_t>(i)];
       const VectorXd angles = motion.angles.col(i);
-      for (std::size_t f = 0; f < user_forces_.size(); ++f) check_force(f, t, motion.states.col(i));
+      for (std::size_t f = 0; f < mechanism_.data().user_forces.size(); ++f) check_force(f, t, motion.states.col(i));
+      for (const Drive& drive : scene_.drives) check_law(drive, t);
       for (const Objective& o : objectives_)
         if (o.is_written_in_cpp()) check_objective(o, t, motion.states.col(i), angles, i + 1 == motion.states.cols());
     }
@@ -102,7 +106,8 @@ class UserTerms {
 
  private:
   Mechanism mechanism_at(const VectorXd& rho) const {
-    return Mechanism(scene_, rho, std::vector<bool>(scene_.parameters.size(), false), user_forces_);
+    // Every parameter is active: those of a named force have derivatives in them.
+    return Mechanism(scene_, rho, {}, user_forces_);
   }
 
   // The worst entry of a derivative along one direction, if it is wrong; said once for each `what`.
@@ -136,8 +141,8 @@ class UserTerms {
   }
 
   void check_force(std::size_t index, double t, const VectorXd& y) {
-    const UserForce& force = *user_forces_[index];
     const UserForceData& data = mechanism_.data().user_forces[index];
+    const BoundForce& force = *data.force;
     const std::vector<std::string> bodies = force.bodies();
     const Index size = 7 * static_cast<Index>(bodies.size()), n = y.size() / 2;
     VectorXd q(size), v(size);
@@ -145,10 +150,10 @@ class UserTerms {
       const Index at = 7 * static_cast<Index>(b), from = 7 * (data.bodies[b] - 1);
       q.segment<7>(at) = y.segment<7>(from), v.segment<7>(at) = y.segment<7>(n + from);
     }
-    const std::string name = fmt::format("user force {} (on '{}')", index, fmt::join(bodies, "', '"));
-    const auto Q = [&](const VectorXd& q_at, const VectorXd& v_at, const VectorXd& rho) {
+    const std::string name = fmt::format("{} (on '{}')", force.name(), fmt::join(bodies, "', '"));
+    const auto Q = [&](const BoundForce& of, const VectorXd& q_at, const VectorXd& v_at, const VectorXd& rho) {
       VectorXd value = VectorXd::Zero(size);
-      force.Q(t, q_at, v_at, rho, value);
+      of.Q(t, q_at, v_at, rho, value);
       return value;
     };
     MatrixXd K = MatrixXd::Zero(size, size), C = K, Q_rho = MatrixXd::Zero(size, rho_.size());
@@ -159,24 +164,29 @@ class UserTerms {
         if (d.of_rates == rates)
           compare(
               name + (rates ? ": its C = -dQ/dv" : ": its K = -dQ/dq"), d.name, t, step_of(d),
-              [&](double h) { return Q(q + h * d.q, v + h * d.v, rho_); }, -(K * d.q + C * d.v));
+              [&](double h) { return Q(force, q + h * d.q, v + h * d.v, rho_); }, -(K * d.q + C * d.v));
     for (std::size_t k = 0; k < scene_.parameters.size(); ++k) {
       const VectorXd e = VectorXd::Unit(rho_.size(), static_cast<Index>(k));
       compare(
           name + ": its Q_rho", "'" + scene_.parameters[k].name + "'", t, step_of_parameter(k),
-          [&](double h) { return Q(q, v, rho_ + h * e); }, Q_rho.col(static_cast<Index>(k)));
+          [&](double h) {
+            const Mechanism there = mechanism_at(rho_ + h * e);
+            return Q(*there.data().user_forces[index].force, q, v, rho_ + h * e);
+          },
+          Q_rho.col(static_cast<Index>(k)));
     }
-    if (const InertialLoad* inertia = force.inertia()) check_inertia(*inertia, name, t, q, v, bodies);
+    if (const InertialLoad* inertia = force.inertia()) check_inertia(index, *inertia, name, t, q, v, bodies);
   }
 
   // At accelerations of the size that moves the body by its length within a second.
-  void check_inertia(const InertialLoad& load, const std::string& name, double t, const VectorXd& q, const VectorXd& v,
-                     const std::vector<std::string>& bodies) {
+  void check_inertia(std::size_t index, const InertialLoad& load, const std::string& name, double t, const VectorXd& q,
+                     const VectorXd& v, const std::vector<std::string>& bodies) {
     VectorXd z(6);
     z << length_ * Vector3d(1, -0.7, 0.4), Vector3d(0.6, -1, 0.8);
-    const auto L = [&](const VectorXd& q_at, const VectorXd& v_at, const VectorXd& z_at, const VectorXd& rho) {
+    const auto L = [&](const InertialLoad& of, const VectorXd& q_at, const VectorXd& v_at, const VectorXd& z_at,
+                       const VectorXd& rho) {
       VectorXd value = VectorXd::Zero(6);
-      load.L(q_at, v_at, z_at, rho, value);
+      of.L(q_at, v_at, z_at, rho, value);
       return value;
     };
     MatrixXd M = MatrixXd::Zero(6, 6), L_q = MatrixXd::Zero(6, 7), L_v = L_q, L_rho = MatrixXd::Zero(6, rho_.size());
@@ -185,7 +195,7 @@ class UserTerms {
       const VectorXd e = VectorXd::Unit(6, k);
       compare(
           name + ": its M = -dL/dz", fmt::format("acceleration {}", k), t, kLargest * (k < 3 ? length_ : 1),
-          [&](double h) { return L(q, v, z + h * e, rho_); }, -M.col(k));
+          [&](double h) { return L(load, q, v, z + h * e, rho_); }, -M.col(k));
     }
     const std::vector<Direction> all = directions(q, v, bodies);
     for (const bool rates : {true, false})
@@ -193,12 +203,34 @@ class UserTerms {
         if (d.of_rates == rates)
           compare(
               name + (rates ? ": its L_v" : ": its L_q"), d.name, t, step_of(d),
-              [&](double h) { return L(q + h * d.q, v + h * d.v, z, rho_); }, L_q * d.q + L_v * d.v);
+              [&](double h) { return L(load, q + h * d.q, v + h * d.v, z, rho_); }, L_q * d.q + L_v * d.v);
     for (std::size_t k = 0; k < scene_.parameters.size(); ++k) {
       const VectorXd e = VectorXd::Unit(rho_.size(), static_cast<Index>(k));
       compare(
           name + ": its L_rho", "'" + scene_.parameters[k].name + "'", t, step_of_parameter(k),
-          [&](double h) { return L(q, v, z, rho_ + h * e); }, L_rho.col(static_cast<Index>(k)));
+          [&](double h) {
+            const Mechanism there = mechanism_at(rho_ + h * e);
+            return L(*there.data().user_forces[index].force, q, v, z, rho_ + h * e);
+          },
+          L_rho.col(static_cast<Index>(k)));
+    }
+  }
+
+  // The derivatives of functions written in C++ that the law calls, up to the third, which gradients read.
+  void check_law(const Drive& drive, double t) {
+    for (const CurveCall& call : curve_calls(drive.law)) {
+      if (!call.curve->is_routine()) continue;
+      const Program argument(call.argument, time_symbols(scene_));
+      std::vector<double> inputs(rho_.begin(), rho_.end());
+      inputs.push_back(t);
+      Program::Scratch scratch = argument.scratch();
+      const double x = argument.value(inputs, scratch);
+      for (int order = 1; order <= 3; ++order)
+        compare(
+            fmt::format("drive '{}': derivative {} of its law's function", drive.name, order), "its argument", t,
+            kLargest * std::max(1.0, std::abs(x)),
+            [&](double h) { return VectorXd::Constant(1, call.curve->at(x + h, order - 1)); },
+            VectorXd::Constant(1, call.curve->at(x, order)));
     }
   }
 
@@ -261,8 +293,12 @@ class UserTerms {
 std::vector<std::string> wrong_user_terms(const Scene& scene, const std::vector<Objective>& objectives,
                                           const std::vector<std::shared_ptr<const UserForce>>& user_forces,
                                           const std::function<bool(double t)>& progress) {
-  if (user_forces.empty() &&
-      std::none_of(objectives.begin(), objectives.end(), [](const Objective& o) { return o.is_written_in_cpp(); }))
+  const auto calls_routine = [](const Drive& drive) {
+    return std::ranges::any_of(curve_calls(drive.law), [](const CurveCall& call) { return call.curve->is_routine(); });
+  };
+  const auto is_named = [](const Force& force) { return std::holds_alternative<UserForceSpec>(force.kind); };
+  if (user_forces.empty() && std::ranges::none_of(objectives, &Objective::is_written_in_cpp) &&
+      std::ranges::none_of(scene.forces, is_named) && std::ranges::none_of(scene.drives, calls_routine))
     return {};
   return UserTerms(scene, objectives, user_forces).find(progress);
 }

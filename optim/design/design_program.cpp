@@ -146,7 +146,7 @@ void DesignProgram::evaluate_values(const VectorXd& x, NlpPoint& point) {
   keep(e);
 }
 
-const CaseEvaluation& DesignProgram::evaluation(const VectorXd& rho) {
+CaseEvaluation DesignProgram::evaluation(const VectorXd& rho) {
   return best_.ok && best_.has_gradients() && best_.rho == rho ? best_ : evaluator_.gradients(rho);
 }
 

@@ -39,7 +39,7 @@ class DesignProgram : public NonlinearProgram {
   bool gradient_beside(const Eigen::VectorXd& x, const Eigen::VectorXd& d, Eigen::VectorXd& f_x) override;
 
   // The evaluation with gradients at rho: the one that was kept, or a new one.
-  const CaseEvaluation& evaluation(const Eigen::VectorXd& rho);
+  CaseEvaluation evaluation(const Eigen::VectorXd& rho);
 
   // Where the objective of a constraint stands in an evaluation, and the values that are minimised, one of each case.
   Eigen::Index psi_of(Eigen::Index constraint) const;

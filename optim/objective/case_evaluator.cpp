@@ -61,7 +61,7 @@ void CaseEvaluator::for_each_case(const std::function<void(std::size_t c)>& work
 }
 
 template <class Evaluate>
-const CaseEvaluation& CaseEvaluator::evaluated(const Eigen::VectorXd& rho, const Evaluate& evaluate) {
+CaseEvaluation CaseEvaluator::evaluated(const Eigen::VectorXd& rho, const Evaluate& evaluate) {
   std::vector<Evaluation> found(cases());
   for_each_case([&](std::size_t c) { found[c] = evaluate(evaluators_[c]); });
   const Eigen::Index n = static_cast<Eigen::Index>(objectives());
@@ -91,11 +91,11 @@ const CaseEvaluation& CaseEvaluator::evaluated(const Eigen::VectorXd& rho, const
   return last_;
 }
 
-const CaseEvaluation& CaseEvaluator::values(const Eigen::VectorXd& rho) {
+CaseEvaluation CaseEvaluator::values(const Eigen::VectorXd& rho) {
   return evaluated(rho, [&](Evaluator& evaluator) { return evaluator.values(rho); });
 }
 
-const CaseEvaluation& CaseEvaluator::gradients(const Eigen::VectorXd& rho) {
+CaseEvaluation CaseEvaluator::gradients(const Eigen::VectorXd& rho) {
   return evaluated(rho, [&](Evaluator& evaluator) { return evaluator.gradients(rho); });
 }
 

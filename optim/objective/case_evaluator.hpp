@@ -2,7 +2,7 @@
 // of their own; results do not depend on how many.
 //
 //   CaseEvaluator evaluator(problem, {"track", "peak"}, {"k1"}, {}, 2);
-//   const CaseEvaluation& e = evaluator.gradients(evaluator.start());
+//   const CaseEvaluation e = evaluator.gradients(evaluator.start());
 //   e.psi(2 * c), e.psi(2 * c + 1);   // track and peak in case c
 #pragma once
 
@@ -31,9 +31,8 @@ class CaseEvaluator {
   CaseEvaluator(const Problem& problem, const std::vector<std::string>& objectives,
                 const std::vector<std::string>& variables, const EvaluatorOptions& options = {}, int threads = 1);
 
-  // The reference holds until the next call.
-  const CaseEvaluation& values(const Eigen::VectorXd& rho);
-  const CaseEvaluation& gradients(const Eigen::VectorXd& rho);
+  CaseEvaluation values(const Eigen::VectorXd& rho);
+  CaseEvaluation gradients(const Eigen::VectorXd& rho);
   // As Evaluator's, case by case.
   std::vector<std::optional<double>> true_values(const Eigen::VectorXd& rho) const;
 
@@ -54,7 +53,7 @@ class CaseEvaluator {
 
  private:
   template <class Evaluate>
-  const CaseEvaluation& evaluated(const Eigen::VectorXd& rho, const Evaluate& evaluate);
+  CaseEvaluation evaluated(const Eigen::VectorXd& rho, const Evaluate& evaluate);
 
   bool has_cases() const { return !problem_.cases.empty(); }
   // "case 'cold': words", with the problem's names of parameters.

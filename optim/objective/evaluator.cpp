@@ -64,8 +64,11 @@ void Evaluator::find_unused() {
   judged.scene = scene_;
   for (const Objective& o : objectives_)
     if (!o.is_written_in_cpp()) judged.objectives.push_back(o.spec());
+  bool opaque = judged.objectives.size() < objectives_.size() || !options_.user_forces.empty();
+  for (Force& force : judged.scene.forces) {
+    if (auto* const user = std::get_if<UserForceSpec>(&force.kind)) opaque = true, user->parameters.clear();
+  }
   std::vector<SceneIssue> unused = find_unused_parameters(judged);
-  const bool opaque = judged.objectives.size() < objectives_.size() || !options_.user_forces.empty();
   if (opaque) {  // may look at every body
     judged.objectives.clear();
     const std::vector<SceneIssue> by_model = find_unused_parameters(judged);
@@ -131,7 +134,8 @@ Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSeq
       const Mechanism mechanism(scene_, rho, active, options_.user_forces, programs_);
       ObjectiveRun objective_run(simulated(), mechanism, settings, options_.progress);
       result = objective_run.run([&](std::span<const Cost> costs) {
-        const RunOptions run_options{.frozen = frozen, .progress = options_.progress, .exact_stages = true};
+        const RunOptions run_options{
+            .frozen = frozen, .progress = options_.progress, .exact_stages = options_.exact_stages};
         ++e.simulations;
         return sweep == Sweep::forward    ? simulate_tlm(mechanism, settings, costs, {}, run_options)
                : sweep == Sweep::backward ? simulate_adjoint(mechanism, settings, costs, run_options)
@@ -272,7 +276,7 @@ void Evaluator::add_differences(Evaluation& e) const {
   e.wall_seconds += stopwatch.seconds();
 }
 
-const Evaluation& Evaluator::values(const Eigen::VectorXd& rho) {
+Evaluation Evaluator::values(const Eigen::VectorXd& rho) {
   if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho) return last_;
   last_ = run(rho, Sweep::none, nullptr);
   simulations_ += last_.simulations;
@@ -311,7 +315,7 @@ GradientMethod Evaluator::available(GradientMethod method, std::string& choice) 
   return method;
 }
 
-const Evaluation& Evaluator::gradients(const Eigen::VectorXd& rho) {
+Evaluation Evaluator::gradients(const Eigen::VectorXd& rho) {
   if (last_.psi.size() > 0 && last_.rho.size() == rho.size() && last_.rho == rho &&
       (last_.has_gradients() || !last_.ok))
     return last_;

@@ -2,7 +2,7 @@
 // kept: a solver that asks for f and then for its gradient pays once.
 //
 //   Evaluator evaluator(problem.scene, objectives_of(problem), {"k1", "L01"});
-//   const Evaluation& e = evaluator.gradients(evaluator.start());
+//   const Evaluation e = evaluator.gradients(evaluator.start());
 //   if (!e.ok) std::cerr << e.message;
 //   e.psi(0), e.psi_rho(0, 1);   // the first objective, and its derivative in L01
 #pragma once
@@ -62,6 +62,7 @@ struct EvaluatorOptions {
   DifferenceSettings differences;
   std::vector<std::shared_ptr<const UserForce>> user_forces;
   std::function<bool(double t)> progress;  // after accepted steps; false abandons the evaluation
+  bool exact_stages = true;                // of values(), as in RunOptions: those of gradients() always are
 };
 
 class Evaluator {
@@ -73,9 +74,8 @@ class Evaluator {
   Evaluator(Scene scene, std::vector<Objective> objectives, const std::vector<std::string>& variables = {},
             EvaluatorOptions options = {});
 
-  // The reference holds until the next call.
-  const Evaluation& values(const Eigen::VectorXd& rho);
-  const Evaluation& gradients(const Eigen::VectorXd& rho);
+  Evaluation values(const Eigen::VectorXd& rho);
+  Evaluation gradients(const Eigen::VectorXd& rho);
 
   // Of each objective that is a smooth maximum or minimum: the largest, smallest value that it stands for, on a run of
   // its own. The others have none; none has one where the run fails.

@@ -9,7 +9,9 @@
 #include <stdexcept>
 
 #include "core/expression/did_you_mean.hpp"
+#include "core/scene/scene_path.hpp"
 #include "core/scene/signals.hpp"
+#include "optim/objective/bound_costs.hpp"
 
 namespace mbsopt {
 namespace {
@@ -189,8 +191,9 @@ Cost Objective::cost(const Mechanism& mechanism, const ObjectivePart& part, doub
     if (!value) value = samples_[i].value.bind(mechanism);
     cost.samples.push_back({instants[i].time, value});
   }
-  if (user_running_) cost.running = point_cost(user_running_, mechanism.rho());
-  if (user_terminal_) cost.terminal = point_cost(user_terminal_, mechanism.rho());
+  const std::string user = "objective '" + name_ + "': its ";
+  if (user_running_) cost.running = point_cost(user_running_, mechanism, user + "running cost");
+  if (user_terminal_) cost.terminal = point_cost(user_terminal_, mechanism, user + "terminal cost");
   return cost;
 }
 
@@ -259,7 +262,10 @@ std::vector<Objective> objectives_of(const Problem& problem, const std::vector<s
       throw std::invalid_argument(
           fmt::format("there is no objective '{}'{}; known: {}", name, did_you_mean(name, known), joined(known)));
     const ObjectiveSpec& spec = problem.objectives[static_cast<std::size_t>(found - known.begin())];
-    if (spec.is_written_in_cpp())
+    if (spec.user) {
+      const BoundCosts costs = bound_costs(problem.scene, *spec.user, child_path("objectives", name) + ".user");
+      result.emplace_back(spec.name, costs.running, costs.terminal);
+    } else if (spec.is_written_in_cpp())
       result.emplace_back(spec.name, spec.running_in_cpp, spec.terminal_in_cpp);
     else
       result.emplace_back(problem.scene, spec);

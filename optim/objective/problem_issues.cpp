@@ -89,7 +89,7 @@ void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
     ++alone;
     extreme = extreme || kMeanKinds[k].extreme != Extreme::none;
   }
-  kinds.emplace_back("eigenvalue");
+  kinds.emplace_back("eigenvalue"), kinds.emplace_back("user");
   if (objective.eigenvalue) ++alone;
   if (objective.is_written_in_cpp()) ++alone;
   if (!sums && alone == 0)

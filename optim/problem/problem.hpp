@@ -37,6 +37,16 @@ struct TrackTerm : SampleColumn {
   Timing timing = Timing::prescribed;  // else the curve is over rows, from 0 (free_instants.hpp)
 };
 
+// Costs written in C++, by their name. Their rho is their own parameters, in the order of this list, and their y that
+// of the bodies: (q, v), 7 numbers each per body.
+struct UserCostSpec {
+  std::string cost;
+  std::vector<std::string> bodies;        // when empty all, in the order of the scene
+  std::vector<TermParameter> parameters;  // the reader of the file puts them into the order of the term
+  std::shared_ptr<const RunningCost> running = {};
+  std::shared_ptr<const TerminalCost> terminal = {};
+};
+
 // psi = integral of running + terminal at the end time + sum of samples and track + parameters_only; or, alone, one of
 // the means of objective_kinds.hpp, or an eigenvalue.
 struct ObjectiveSpec {
@@ -51,7 +61,8 @@ struct ObjectiveSpec {
   // Written in C++, in place of all of the above: no file has them, but design, check and the others take them.
   std::shared_ptr<const RunningCost> running_in_cpp = {};
   std::shared_ptr<const TerminalCost> terminal_in_cpp = {};
-  bool is_written_in_cpp() const { return running_in_cpp || terminal_in_cpp; }
+  std::optional<UserCostSpec> user = {};  // the same by its name, in a file
+  bool is_written_in_cpp() const { return running_in_cpp || terminal_in_cpp || user; }
 
   // kind: "rms_of"
   std::optional<Expression>& mean(std::string_view kind) {
@@ -191,6 +202,7 @@ struct Problem {
   std::vector<CaseSpec> cases;  // load_cases.hpp
   std::optional<DesignSpec> design;
   std::optional<IdentificationSpec> identification;
+  std::vector<std::string> plugins = {};       // shared libraries of named_terms.hpp, resolved as data files are
   std::vector<std::string> columns_read = {};  // what the reader converted to SI, in words
 };
 

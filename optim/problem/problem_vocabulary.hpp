@@ -53,6 +53,12 @@ void describe(auto& v, Like<EigenvalueSpec> auto& e) {
   v.word("value", e.value, Words{"frequency damping"}, {"natural frequency [Hz], or damping ratio"});
 }
 
+void describe(auto& v, Like<UserCostSpec> auto& c) {
+  v.text("cost", c.cost, {"its name", Need::required});
+  v.references("bodies", c.bodies, To::body, {"whose states it reads, in its order; all when absent"});
+  v.named("parameters", c.parameters, {"its own, each an expression of parameters"});
+}
+
 void describe_means(auto& v, auto& means) {
   for (std::size_t k = 0; k < std::size(kMeanKinds); ++k)
     v.law(kMeanKinds[k].name, means[k], Names::objective, {kMeanKinds[k].description});
@@ -66,6 +72,7 @@ void describe(auto& v, Like<ObjectiveSpec> auto& o) {
   v.law("parameters_only", o.parameters_only, Names::none, {"added; of parameters only"});
   describe_means(v, o.means);
   v.object("eigenvalue", o.eigenvalue, {"alone: of a mode of the motion beside the initial equilibrium"});
+  v.object("user", o.user, {"alone: a cost written in C++, of a plug-in or of the program"});
   v.plain("sharpness", o.sharpness, kPositive,
           {"of maximum_of, minimum_of, peak_to_peak_of: k in log(mean exp(k x))/k [1/unit of the expression]; 100 when "
            "absent"});
@@ -219,6 +226,9 @@ void describe(auto& v, Like<Problem> auto& p) {
   std::string schema;
   v.text("$schema", schema, {"for editors: where problem.schema.json is"});
   v.version("format", 1, {"version of the problem format"});
+  v.texts("plugins", p.plugins,
+          {"shared libraries with forces, costs and laws in C++, relative to the problem file; loaded with "
+           "--allow-plugins only"});
   describe(v, p.scene);
   v.named("objectives", p.objectives, {"scalars of a motion, to minimise, to bound or to differentiate"});
   v.list("cases", p.cases, {"loads that one design must bear"});

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <set>
 
+#include "core/force/bound_force.hpp"
 #include "core/scene/field_visitor.hpp"
 #include "core/scene/scene_facts.hpp"
 #include "core/scene/scene_path.hpp"
@@ -145,6 +146,8 @@ class FieldSearch {
       return bodies_of_joint(kind.joint);
     } else if constexpr (ForceBetweenBodies<Kind>) {
       return {kind.body1, kind.body2};
+    } else if constexpr (std::is_same_v<Kind, UserForceSpec>) {
+      return mbsopt::bodies_of(kind);
     } else {  // on one body, of which its sensors may make it depend on others
       std::vector<std::string> all{kind.body};
       for (const Expression& component : kind.components)
@@ -204,7 +207,8 @@ class FieldSearch {
     for (const ObjectiveSpec& objective : objectives) {
       collect(objective);
       for (const TrackTerm& term : objective.track) use_sensor(term.sensor);
-      if (objective.eigenvalue) bodies_.look_at_all();
+      if (objective.eigenvalue || (objective.user && objective.user->bodies.empty())) bodies_.look_at_all();
+      if (objective.user) bodies_.look_at(objective.user->bodies);
     }
   }
   void collect(const std::vector<ExperimentSpec>& experiments) {

@@ -268,8 +268,8 @@ TEST_CASE("MBSVT: integration_sensitivity with callbacks, two objectives, two pa
   const VectorXd rho = Eigen::Vector2d(40, 0.2);
   const Mechanism mechanism(scene, rho, {}, {std::make_shared<OwnSpring>()});
   std::vector<Cost> costs(2);  // NADJ = 2
-  costs[0].running = point_cost(std::make_shared<SquareOfX>(), rho);
-  costs[1].terminal = point_cost(std::make_shared<ScaledEnd>(), rho);
+  costs[0].running = point_cost(std::make_shared<SquareOfX>(), mechanism);
+  costs[1].terminal = point_cost(std::make_shared<ScaledEnd>(), mechanism);
   const SimulationResult run = GENERATE(true, false) ? simulate_adjoint(mechanism, scene.simulation, costs)
                                                      : simulate_tlm(mechanism, scene.simulation, costs);
   REQUIRE(run.ok());
@@ -294,8 +294,9 @@ TEST_CASE("MBSVT: ADDforce_TSDA instead of a spring of one's own gives the same 
   scene.forces.push_back({"spring", spring});
   const VectorXd rho = Eigen::Vector2d(40, 0.2);
   std::vector<Cost> costs(1);
-  costs[0].terminal = point_cost(std::make_shared<ScaledEnd>(), rho);
-  const SimulationResult with_tsda = simulate_adjoint(Mechanism(scene, rho), scene.simulation, costs);
+  const Mechanism mechanism(scene, rho);
+  costs[0].terminal = point_cost(std::make_shared<ScaledEnd>(), mechanism);
+  const SimulationResult with_tsda = simulate_adjoint(mechanism, scene.simulation, costs);
   const Scene bare = oscillator();
   const SimulationResult own =
       simulate_adjoint(Mechanism(bare, rho, {}, {std::make_shared<OwnSpring>()}), bare.simulation, costs);

@@ -261,7 +261,7 @@ TEST_CASE("a running cost with a kink is integrated to the tolerance", "[driven]
   const Scene scene = slider_crank();
   const Mechanism m(scene, nominal(scene));
   std::vector<Cost> costs(1);
-  costs[0].running = point_cost(std::make_shared<Kink>(), m.rho());
+  costs[0].running = point_cost(std::make_shared<Kink>(), m);
   const SimulationResult run = simulate(m, scene.simulation, costs);
   REQUIRE(run.ok());
   CHECK(run.psi(0) == Approx((0.7123 * 0.7123 + 1.2877 * 1.2877) / 2).epsilon(1e-10));

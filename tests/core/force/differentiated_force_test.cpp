@@ -95,7 +95,7 @@ TEST_CASE("a run's gradients with a force by automatic differentiation are those
   const Mechanism by_hand(scene, rho, {}, {std::make_shared<CubicDrag>("coupler", rho.size() - 1)});
   const Mechanism automatic(scene, rho, {}, {std::make_shared<Drag>(rho.size() - 1)});
   std::vector<Cost> costs(1);
-  costs[0].terminal = point_cost(std::make_shared<EndPlace>(), rho);
+  costs[0].terminal = point_cost(std::make_shared<EndPlace>(), by_hand);
   const SimulationResult reference = simulate_adjoint(by_hand, scene.simulation, costs);
   const SimulationResult adjoint = simulate_adjoint(automatic, scene.simulation, costs);
   const SimulationResult tlm = simulate_tlm(automatic, scene.simulation, costs);

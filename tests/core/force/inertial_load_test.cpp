@@ -97,8 +97,8 @@ TEST_CASE("mass that a user adds to a body moves as the body's own, with all der
   const Mechanism with(scene, nominal(scene), {}, {std::make_shared<Ballast>(parameters - 2, parameters - 1, g)}),
       alone(own, nominal(own));
   std::vector<Cost> costs(1), costs_alone(1);
-  costs[0].terminal = point_cost(std::make_shared<EndNorm>(), with.rho());
-  costs_alone[0].terminal = point_cost(std::make_shared<EndNorm>(), alone.rho());
+  costs[0].terminal = point_cost(std::make_shared<EndNorm>(), with);
+  costs_alone[0].terminal = point_cost(std::make_shared<EndNorm>(), alone);
   const SimulationResult expected = simulate_adjoint(alone, own.simulation, costs_alone),
                          adjoint = simulate_adjoint(with, scene.simulation, costs),
                          tlm = simulate_tlm(with, scene.simulation, costs);

@@ -2,7 +2,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "core/force/user_force.hpp"
+#include <stdexcept>
+
+#include "core/force/differentiated_force.hpp"
 #include "core/simulate/simulation.hpp"
 #include "tests/core/integrate/state_costs.hpp"
 #include "tests/core/mechanism/small_scenes.hpp"
@@ -23,6 +25,26 @@ struct Speed final : RunningCost {
   }
 };
 
+struct ThrowingCost final : RunningCost {
+  double g(double, VecIn, VecIn) const override { throw std::domain_error("no table"); }
+  void add_g_y(double, VecIn, VecIn, double, VecOut) const override {}
+  void add_g_rho(double, VecIn, VecIn, double, VecOut) const override {}
+};
+struct ThrowingForce final : UserForce {
+  std::vector<std::string> bodies() const override { return {"bar"}; }
+  void Q(double, VecIn, VecIn, VecIn, VecOut) const override { throw 3; }
+  void K(double, VecIn, VecIn, VecIn, MatOut) const override {}
+  void C(double, VecIn, VecIn, VecIn, MatOut) const override {}
+  void Q_rho(double, VecIn, VecIn, VecIn, MatOut) const override {}
+};
+struct Resized final : DifferentiatedForce<Resized> {
+  std::vector<std::string> bodies() const override { return {"bar"}; }
+  template <class T>
+  void load(double, const VectorX<T>&, const VectorX<T>&, const VectorX<T>&, VectorX<T>& Q) const {
+    Q.conservativeResize(Q.size() - 1);
+  }
+};
+
 }  // namespace
 
 TEST_CASE("samples outside the simulated time are refused with their place", "[simulate]") {
@@ -33,9 +55,10 @@ TEST_CASE("samples outside the simulated time are refused with their place", "[s
   CHECK_THROWS_WITH(simulate(m, s.simulation, {}, beyond),
                     Contains("times[1] is 1.5 s, outside") && Contains("0 to 1 s"));
   CHECK_THROWS_WITH(simulate(m, s.simulation, {}, before), Contains("times[0] is -0.1 s, outside"));
+  CHECK_THROWS_WITH(simulate(m, s.simulation, {}, Sampling{{0.5}, {}}), Contains("observe is empty"));
   CHECK_THROWS_WITH(simulate_tlm(m, s.simulation, {}, TangentSampling{{0.5}, {}}), Contains("observe is empty"));
   Cost late;
-  late.name = "late", late.samples = {{2, point_cost(std::make_shared<Speed>(), m.rho())}};
+  late.name = "late", late.samples = {{2, point_cost(std::make_shared<Speed>(), m)}};
   CHECK_THROWS_WITH(simulate(m, s.simulation, std::vector{late}), Contains("objective 'late': samples[0] is at 2 s"));
 }
 
@@ -74,20 +97,38 @@ TEST_CASE("a cost that is bound to other parameters than the mechanism is refuse
   other(2) += 0.1;
   const Mechanism m(s, nominal(s));
   Cost cost;
-  cost.name = "speed", cost.running = point_cost(std::make_shared<Speed>(), other);
+  cost.name = "speed", cost.running = point_cost(std::make_shared<Speed>(), Mechanism(s, other));
   CHECK_THROWS_WITH(simulate_adjoint(m, s.simulation, std::vector{cost}),
                     Contains("objective 'speed': its running cost is bound to other parameters") && Contains("rho[2]"));
-  cost.running = point_cost(std::make_shared<Speed>(), other.head(2));
-  CHECK_THROWS_WITH(simulate(m, s.simulation, std::vector{cost}), Contains("bound to 2 parameters"));
+  Scene alone;
+  Body stone;
+  stone.name = "stone", stone.mass = 1.0, stone.inertia = {1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
+  alone.bodies = {stone};
+  cost.running = point_cost(std::make_shared<Speed>(), Mechanism(alone, Eigen::VectorXd()));
+  CHECK_THROWS_WITH(simulate(m, s.simulation, std::vector{cost}), Contains("bound to 0 parameters"));
 }
 
 TEST_CASE("forces and costs that are not there are refused", "[simulate]") {
   const Scene s = pendulum();
+  const Mechanism m(s, nominal(s));
   CHECK_THROWS_WITH(Mechanism(s, nominal(s), {}, {nullptr}), Contains("user force: there is none"));
-  CHECK_THROWS_WITH(point_cost(std::shared_ptr<const RunningCost>(), nominal(s)), Contains("no running cost"));
-  CHECK_THROWS_WITH(point_cost(std::shared_ptr<const TerminalCost>(), nominal(s)), Contains("no terminal cost"));
+  CHECK_THROWS_WITH(point_cost(std::shared_ptr<const RunningCost>(), m), Contains("no running cost"));
+  CHECK_THROWS_WITH(point_cost(std::shared_ptr<const TerminalCost>(), m), Contains("no terminal cost"));
   Cost cost;
   cost.samples = {{0.5, nullptr}};
   CHECK_THROWS_WITH(simulate(Mechanism(s, nominal(s)), s.simulation, std::vector{cost}),
                     Contains("samples[0] has no cost"));
+}
+
+TEST_CASE("what forces and costs of a user throw names them", "[simulate]") {
+  const Scene s = pendulum();
+  const Mechanism m(s, nominal(s));
+  Cost cost;
+  cost.running = point_cost(std::make_shared<ThrowingCost>(), m, "objective 'lift'");
+  CHECK_THROWS_WITH(simulate(m, s.simulation, std::vector{cost}), "objective 'lift' threw: no table");
+  const auto with = [&](std::shared_ptr<const UserForce> force) { return Mechanism(s, nominal(s), {}, {force}); };
+  CHECK_THROWS_WITH(simulate(with(std::make_shared<ThrowingForce>()), s.simulation),
+                    "user force 0 threw what is no std::exception");
+  CHECK_THROWS_WITH(simulate(with(std::make_shared<Resized>()), s.simulation),
+                    "user force 0 threw: load() has changed the size of its result");
 }

@@ -55,8 +55,8 @@ struct Case {
                        {0.1234, std::make_shared<SensorProduct>(m, angle, angle)},
                        {0.1235, std::make_shared<SensorProduct>(m, v, z)},
                        {0.25, std::make_shared<SensorProduct>(m, z, v)}};
-    list[2].running = point_cost(std::make_shared<UserRunningCost>(), m.rho());
-    list[2].terminal = point_cost(std::make_shared<UserTerminalCost>(), m.rho());
+    list[2].running = point_cost(std::make_shared<UserRunningCost>(), m);
+    list[2].terminal = point_cost(std::make_shared<UserTerminalCost>(), m);
     return list;
   }
 };

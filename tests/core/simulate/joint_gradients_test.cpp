@@ -126,10 +126,10 @@ struct AllOfY final : RunningCost, TerminalCost {
   }
 };
 
-std::vector<Cost> costs(const VectorXd& rho) {
+std::vector<Cost> costs(const Mechanism& mechanism) {
   std::vector<Cost> list(2);
-  list[0].running = point_cost(std::shared_ptr<const RunningCost>(std::make_shared<AllOfY>()), rho);
-  list[1].terminal = point_cost(std::shared_ptr<const TerminalCost>(std::make_shared<AllOfY>()), rho);
+  list[0].running = point_cost(std::shared_ptr<const RunningCost>(std::make_shared<AllOfY>()), mechanism);
+  list[1].terminal = point_cost(std::shared_ptr<const TerminalCost>(std::make_shared<AllOfY>()), mechanism);
   return list;
 }
 
@@ -137,8 +137,8 @@ std::vector<Cost> costs(const VectorXd& rho) {
 void check_gradient(const Scene& scene, const std::string& idle = "") {
   const VectorXd rho = nominal(scene);
   const Mechanism mechanism(scene, rho);
-  const SimulationResult tlm = simulate_tlm(mechanism, scene.simulation, costs(rho));
-  const SimulationResult adjoint = simulate_adjoint(mechanism, scene.simulation, costs(rho));
+  const SimulationResult tlm = simulate_tlm(mechanism, scene.simulation, costs(mechanism));
+  const SimulationResult adjoint = simulate_adjoint(mechanism, scene.simulation, costs(mechanism));
   INFO(tlm.message << adjoint.message);
   REQUIRE((tlm.ok() && adjoint.ok()));
   CHECK(tlm.statistics.max_position_violation < 1e-12);
@@ -146,7 +146,8 @@ void check_gradient(const Scene& scene, const std::string& idle = "") {
   auto psi = [&](Eigen::Index k, double h) {
     VectorXd at = rho;
     at(k) += h;
-    const SimulationResult run = simulate(Mechanism(scene, at), scene.simulation, costs(at), {}, frozen);
+    const Mechanism there(scene, at);
+    const SimulationResult run = simulate(there, scene.simulation, costs(there), {}, frozen);
     REQUIRE(run.ok());
     return run.psi;
   };

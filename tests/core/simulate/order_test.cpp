@@ -41,8 +41,8 @@ Derivatives solve(Scene scene, const std::string& method, int steps) {
   scene.simulation.integrator.step = scene.simulation.end_time / steps;
   const Mechanism m(scene, nominal(scene));
   std::vector<Cost> costs(1);
-  costs[0].running = point_cost(std::make_shared<NormAndCosine>(), m.rho());
-  costs[0].terminal = point_cost(std::make_shared<EndNorm>(), m.rho());
+  costs[0].running = point_cost(std::make_shared<NormAndCosine>(), m);
+  costs[0].terminal = point_cost(std::make_shared<EndNorm>(), m);
   Derivatives d;
   TangentSampling end;
   end.times = {scene.simulation.end_time};

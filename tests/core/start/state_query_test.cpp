@@ -185,7 +185,7 @@ TEST_CASE("d psi/dy at the start is what differences of runs from given states s
   x.scene.simulation.end_time = 0.3;
   const Mechanism free = x.at(x.rho);
   std::vector<Cost> costs(1);
-  costs[0].terminal = point_cost(std::make_shared<EndHeight>(), x.rho);
+  costs[0].terminal = point_cost(std::make_shared<EndHeight>(), free);
   const SimulationResult run = simulate_adjoint(free, x.scene.simulation, costs);
   REQUIRE(run.ok());
   REQUIRE((run.psi_y_initial.rows() == 1 && run.psi_y_initial.cols() == 28));

@@ -1,0 +1,133 @@
+#include "app/json/term_resolver.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app/json/plugin_loader.hpp"
+#include "core/expression/counted.hpp"
+#include "core/expression/did_you_mean.hpp"
+#include "core/force/named_throw.hpp"
+#include "core/scene/scene_path.hpp"
+
+namespace mbsopt {
+namespace {
+
+class TermResolver {
+ public:
+  TermResolver(NamedTerms terms, const Node& root, Findings& findings)
+      : terms_(std::move(terms)), root_(root), findings_(findings) {}
+
+  void load(std::vector<std::string>& plugins, bool allowed, const std::filesystem::path& folder) {
+    if (!plugins.empty() && !allowed)
+      add("plugins",
+          "names code that would run inside this program: --allow-plugins lets it, for files that you trust");
+    for (std::size_t i = 0; i < plugins.size(); ++i) {
+      plugins[i] = (folder / plugins[i]).lexically_normal().string();
+      if (!allowed) continue;
+      try {
+        load_plugin(plugins[i], terms_);
+      } catch (const std::runtime_error& error) {
+        add(child_path("plugins", i), error.what());
+      }
+    }
+  }
+
+  void resolve(Force& force, const std::string& place) {
+    auto* const user = std::get_if<UserForceSpec>(&force.kind);
+    if (!user) return;
+    const NamedForce* const term = find(terms_.forces(), "force", user->force, place + ".force");
+    if (!term) return;
+    user->term = term->force;
+    order(user->parameters, term->parameters, place);
+    const std::size_t acts_on =
+        named_throw("force '" + user->force + "'", [&] { return term->force->bodies(); }).size();
+    if (!user->bodies.empty() && user->bodies.size() != acts_on)
+      add(place + ".bodies", "has " + counted(user->bodies.size(), "name") + ", but '" + user->force + "' acts on " +
+                                 counted(acts_on, "body", "bodies"));
+  }
+
+  void resolve(UserCostSpec& cost, const std::string& place) {
+    const NamedCost* const term = find(terms_.costs(), "cost", cost.cost, place + ".cost");
+    if (!term) return;
+    cost.running = term->running, cost.terminal = term->terminal;
+    order(cost.parameters, term->parameters, place);
+  }
+
+  void resolve(Expression& law, std::optional<SampledLaw>& samples, const std::string& place) {
+    if (!samples || samples->function.empty()) return;
+    static const Expression t = Expression::parse("t");
+    if (const NamedLaw* const term = find(terms_.laws(), "law", samples->function, place + ".user"))
+      law = Expression::of_curve(
+          std::make_shared<const Curve>([f = term->f, name = "law '" + term->name + "'"](double x, int order) {
+            return named_throw(name, [&] { return f(x, order); });
+          }),
+          samples->argument.value_or(t), term->name);
+    samples.reset();
+  }
+
+ private:
+  void add(const std::string& path, const std::string& message) { findings_.add(nearest(root_, path), path, message); }
+
+  // What is unknown because a plug-in is not loaded is told there.
+  template <class Term>
+  const Term* find(const std::vector<Term>& all, const std::string& what, const std::string& name,
+                   const std::string& path) {
+    const auto found = std::ranges::find(all, name, &Term::name);
+    if (found != all.end()) return &*found;
+    if (findings_.concerns("plugins") || findings_.concerns(path)) return nullptr;
+    std::vector<std::string> known;
+    for (const Term& term : all) known.push_back(term.name);
+    add(path, "there is no " + what + " '" + name + "' written in C++" + did_you_mean(name, known) +
+                  (known.empty() ? "; neither the program nor its plug-ins have one" : "; known: " + joined(known)));
+    return nullptr;
+  }
+
+  // The parameters in the order of the term, which must be all of them.
+  void order(std::vector<TermParameter>& given, const std::vector<std::string>& wanted, const std::string& place) {
+    std::vector<TermParameter> ordered;
+    for (const std::string& name : wanted) {
+      const auto found = std::ranges::find(given, name, &TermParameter::name);
+      if (found != given.end())
+        ordered.push_back(*found);
+      else
+        add(place + ".parameters", "'" + name + "' is missing; expected: " + joined(wanted));
+    }
+    for (const TermParameter& parameter : given)
+      if (std::ranges::find(wanted, parameter.name) == wanted.end())
+        add(child_path(place + ".parameters", parameter.name),
+            "is no parameter of the term" + did_you_mean(parameter.name, wanted) +
+                (wanted.empty() ? "; it has none" : "; known: " + joined(wanted)));
+    given = std::move(ordered);
+  }
+
+  NamedTerms terms_;
+  const Node& root_;
+  Findings& findings_;
+};
+
+}  // namespace
+
+void resolve_terms(Problem& problem, const ReadOptions& options, const std::filesystem::path& folder, const Node& root,
+                   Findings& findings) {
+  TermResolver resolver(options.terms, root, findings);
+  resolver.load(problem.plugins, options.allow_plugins, folder);
+  const auto laws = [&](std::vector<DriveLaw>& all, const std::string& owner) {
+    for (std::size_t i = 0; i < all.size(); ++i)
+      resolver.resolve(all[i].law, all[i].samples, child_path(owner + ".drives", i) + ".law");
+  };
+  Scene& scene = problem.scene;
+  for (std::size_t i = 0; i < scene.forces.size(); ++i) resolver.resolve(scene.forces[i], child_path("forces", i));
+  for (std::size_t i = 0; i < scene.drives.size(); ++i)
+    resolver.resolve(scene.drives[i].law, scene.drives[i].samples, child_path("drives", i) + ".law");
+  for (ObjectiveSpec& objective : problem.objectives)
+    if (objective.user) resolver.resolve(*objective.user, child_path("objectives", objective.name) + ".user");
+  for (std::size_t c = 0; c < problem.cases.size(); ++c) laws(problem.cases[c].drives, child_path("cases", c));
+  if (!problem.identification) return;
+  for (std::size_t e = 0; e < problem.identification->experiments.size(); ++e)
+    laws(problem.identification->experiments[e].drives, child_path("identification.experiments", e));
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,135 @@
+#include "optim/objective/bound_costs.hpp"
+
+#include <algorithm>
+#include <span>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "core/expression/program.hpp"
+#include "core/scene/scene_path.hpp"
+#include "optim/objective/expression_cost.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// What both costs of a term read: the rows of y, and the term's parameters as programs of those of the scene.
+class TermInputs {
+ public:
+  TermInputs(const Scene& scene, const UserCostSpec& spec, const std::string& place) {
+    const Symbols symbols = parameter_symbols(scene);
+    for (const TermParameter& parameter : spec.parameters) {
+      try {
+        parameters_.emplace_back(parameter.value, symbols);
+      } catch (const UnknownName& error) {
+        throw std::invalid_argument(child_path(place + ".parameters", parameter.name) + ": " + error.what());
+      }
+    }
+    for (const std::string& name : spec.bodies) {
+      const auto body = std::ranges::find(scene.bodies, name, &Body::name);
+      if (body == scene.bodies.end()) throw std::invalid_argument(place + ".bodies: there is no body '" + name + "'");
+      rows_.push_back(7 * (body - scene.bodies.begin()));
+    }
+    if (!spec.bodies.empty()) return;
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i) rows_.push_back(7 * static_cast<Index>(i));
+  }
+
+  VectorXd state(VecIn y) const {
+    const Index own = 7 * static_cast<Index>(rows_.size()), all = y.size() / 2;
+    VectorXd part(2 * own);
+    for (std::size_t k = 0; k < rows_.size(); ++k) {
+      part.segment<7>(7 * static_cast<Index>(k)) = y.segment<7>(rows_[k]);
+      part.segment<7>(own + 7 * static_cast<Index>(k)) = y.segment<7>(all + rows_[k]);
+    }
+    return part;
+  }
+  void add_state(const VectorXd& part, VecOut out) const {
+    const Index own = part.size() / 2, all = out.size() / 2;
+    for (std::size_t k = 0; k < rows_.size(); ++k) {
+      out.segment<7>(rows_[k]) += part.segment<7>(7 * static_cast<Index>(k));
+      out.segment<7>(all + rows_[k]) += part.segment<7>(own + 7 * static_cast<Index>(k));
+    }
+  }
+
+  VectorXd parameters(VecIn rho) const {
+    VectorXd p(count());
+    for (std::size_t i = 0; i < parameters_.size(); ++i) {
+      Program::Scratch scratch = parameters_[i].scratch();
+      p(static_cast<Index>(i)) = parameters_[i].value(view(rho), scratch);
+    }
+    return p;
+  }
+  void add_rho(VecIn rho, const VectorXd& p_bar, VecOut out) const {
+    const std::span<double> gradient(out.data(), static_cast<std::size_t>(out.size()));
+    for (std::size_t i = 0; i < parameters_.size(); ++i) {
+      Program::Scratch scratch = parameters_[i].scratch();
+      parameters_[i].add_gradient(view(rho), p_bar(static_cast<Index>(i)), gradient, scratch);
+    }
+  }
+  Index count() const { return static_cast<Index>(parameters_.size()); }
+
+ private:
+  static std::span<const double> view(const VecIn& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
+
+  std::vector<Program> parameters_;
+  std::vector<Index> rows_;  // of the bodies' q in that of the scene
+};
+
+class BoundRunning final : public RunningCost {
+ public:
+  BoundRunning(TermInputs inputs, std::shared_ptr<const RunningCost> cost)
+      : inputs_(std::move(inputs)), cost_(std::move(cost)) {}
+  double g(double t, VecIn y, VecIn rho) const override {
+    return cost_->g(t, inputs_.state(y), inputs_.parameters(rho));
+  }
+  void add_g_y(double t, VecIn y, VecIn rho, double scale, VecOut out) const override {
+    const VectorXd part = inputs_.state(y);
+    VectorXd bar = VectorXd::Zero(part.size());
+    cost_->add_g_y(t, part, inputs_.parameters(rho), scale, bar);
+    inputs_.add_state(bar, out);
+  }
+  void add_g_rho(double t, VecIn y, VecIn rho, double scale, VecOut out) const override {
+    VectorXd bar = VectorXd::Zero(inputs_.count());
+    cost_->add_g_rho(t, inputs_.state(y), inputs_.parameters(rho), scale, bar);
+    inputs_.add_rho(rho, bar, out);
+  }
+
+ private:
+  TermInputs inputs_;
+  std::shared_ptr<const RunningCost> cost_;
+};
+
+class BoundTerminal final : public TerminalCost {
+ public:
+  BoundTerminal(TermInputs inputs, std::shared_ptr<const TerminalCost> cost)
+      : inputs_(std::move(inputs)), cost_(std::move(cost)) {}
+  double value(VecIn y, VecIn rho) const override { return cost_->value(inputs_.state(y), inputs_.parameters(rho)); }
+  void adjoint_init(VecIn y, VecIn rho, VecOut lambda, VecOut mu) const override {
+    const VectorXd part = inputs_.state(y);
+    VectorXd of_state = VectorXd::Zero(part.size()), of_p = VectorXd::Zero(inputs_.count());
+    cost_->adjoint_init(part, inputs_.parameters(rho), of_state, of_p);
+    lambda.setZero(), mu.setZero();
+    inputs_.add_state(of_state, lambda), inputs_.add_rho(rho, of_p, mu);
+  }
+
+ private:
+  TermInputs inputs_;
+  std::shared_ptr<const TerminalCost> cost_;
+};
+
+}  // namespace
+
+BoundCosts bound_costs(const Scene& scene, const UserCostSpec& spec, const std::string& place) {
+  if (!spec.running && !spec.terminal)
+    throw std::invalid_argument(place + ".cost: '" + spec.cost +
+                                "' is a cost written in C++, which nothing has provided");
+  const TermInputs inputs(scene, spec, place);
+  return {spec.running ? std::make_shared<BoundRunning>(inputs, spec.running) : nullptr,
+          spec.terminal ? std::make_shared<BoundTerminal>(inputs, spec.terminal) : nullptr};
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,25 @@
+// Costs written in C++ as a problem names them: the state of some bodies in, parameters of their own, and the chain
+// rule back to the state y and the parameters rho of the scene.
+//
+//   g(t, y_b, p),  y_b: rows of y of the bodies,  p = p(rho)        g_rho = g_p dp/drho
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "core/run/cost.hpp"
+#include "core/scene/scene.hpp"
+#include "optim/problem/problem.hpp"
+
+namespace mbsopt {
+
+struct BoundCosts {
+  std::shared_ptr<const RunningCost> running;    // null where there is none
+  std::shared_ptr<const TerminalCost> terminal;  // likewise
+};
+
+// place: of the spec in the problem, for messages. Throws std::invalid_argument for unknown names and for costs that
+// nothing has provided.
+BoundCosts bound_costs(const Scene& scene, const UserCostSpec& spec, const std::string& place);
+
+}  // namespace mbsopt
