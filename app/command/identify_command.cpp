@@ -317,24 +317,33 @@ std::vector<PointTarget> measured_points(const Problem& fitted, const Scene& sce
   return point_targets(scene, values, true);
 }
 
-// Before and after the fit, for the report; without the fitted one where its simulation stops.
-std::string report_of(Run& run, const Problem& cut, const Problem& needed, const std::vector<CsvTable>& data,
-                      const SimulatedExperiment& before, const IdentificationResult& fit, const Trajectory& history) {
-  std::vector<MovingState> states;
-  std::optional<SimulatedExperiment> after;
+// What the report shows beside the fit: the experiments at the start, and the motion of the first one as fitted.
+struct ReportMotions {
   IdentificationResult start;
-  if (!interrupted() && before.simulation.ok()) {
-    start = at_start(run, needed, data);
-    const Problem fitted = fitted_problem(needed, fit);
-    after = simulated_experiment(run, simulated_scene(fitted, data));
-    run.progress.finish();
-    if (after->simulation.ok()) {
-      states.push_back({"initial", before.scene, before.trajectory, true});
-      states.push_back({"fitted", after->scene, after->trajectory, false, measured_points(fitted, after->scene, fit),
-                        after->forces});
-    }
+  std::optional<SimulatedExperiment> after;
+  std::vector<PointTarget> measured;
+};
+
+ReportMotions report_motions(Run& run, const Problem& needed, const std::vector<CsvTable>& data,
+                             const IdentificationResult& fit) {
+  ReportMotions motions{at_start(run, needed, data), {}, {}};
+  const Problem fitted = fitted_problem(needed, fit);
+  motions.after = simulated_experiment(run, simulated_scene(fitted, data));
+  run.progress.finish();
+  motions.measured = measured_points(fitted, motions.after->scene, fit);
+  return motions;
+}
+
+// Without motions where a simulation stopped.
+std::string report_of(const Run& run, const Problem& cut, const SimulatedExperiment& before,
+                      const ReportMotions& motions, const IdentificationResult& fit, const Trajectory& history) {
+  std::vector<MovingState> states;
+  const std::optional<SimulatedExperiment>& after = motions.after;
+  if (after && after->simulation.ok()) {
+    states.push_back({"initial", before.scene, before.trajectory, true});
+    states.push_back({"fitted", after->scene, after->trajectory, false, motions.measured, after->forces});
   }
-  return identification_report(run.problem.scene, run.result, history, fit_plots(cut, fit, start), states);
+  return identification_report(run.problem.scene, run.result, history, fit_plots(cut, fit, motions.start), states);
 }
 
 std::vector<NewValue> new_values(const IdentificationResult& fit) {
@@ -400,13 +409,15 @@ int identify_command(const CommandContext& context) {
   run.write("residuals.csv", residuals_csv(fit));
   if (!fit.profiles.empty()) run.write("profile.csv", profile_csv(fit));
   if (fit.ok()) examine(run, cut, fit, other);
+  ReportMotions motions;
+  if (!interrupted() && before.simulation.ok()) motions = report_motions(run, needed, data, fit);
   if (fit.status == SolverStatus::stopped || interrupted()) {
     long_run.stopped("optimized.json holds the best fit so far");
   } else if (!fit.ok()) {
     run.failed(fit.message);
     if (other) run.warn("--compare: is skipped, since the fit did not converge");
   }
-  run.write("report.html", report_of(run, cut.problem, needed, data, before, fit, history));
+  run.write("report.html", report_of(run, cut.problem, before, motions, fit, history));
   return long_run.finish();
 }
 

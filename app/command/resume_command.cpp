@@ -20,26 +20,33 @@ int nothing_left(const CommandContext& context, const std::string& command, cons
   return kDone;
 }
 
-// The command whose journal was removed at its good end; empty where there was none.
-std::string ended_well(const std::filesystem::path& folder) {
-  if (std::filesystem::exists(folder / kJournalFile) || !std::filesystem::exists(folder / "result.json")) return {};
+struct LastRun {
+  std::string command, status;
+};
+
+// What result.json says of a command that can be resumed; empty where there was none.
+LastRun last_run(const std::filesystem::path& folder) {
+  if (!std::filesystem::exists(folder / "result.json")) return {};
   const Json result = Json::parse(read_text_file(folder / "result.json"), nullptr, false);
   const auto text = [&](const char* key) {
     return result.is_object() && result.contains(key) && result[key].is_string() ? result[key].get<std::string>() : "";
   };
   const std::string command = text("command");
   const bool resumes = command == "design" || command == "identify" || command == "sweep";
-  return text("program") == "mbsopt" && text("status") == "ok" && resumes ? command : "";
+  return text("program") == "mbsopt" && resumes ? LastRun{command, text("status")} : LastRun{};
 }
 
 }  // namespace
 
 int resume_command(const CommandContext& context) {
   const std::filesystem::path folder = context.options.problem_file;
-  if (const std::string ended = ended_well(folder); !ended.empty()) return nothing_left(context, ended, "ok");
+  const LastRun last = last_run(folder);
+  if (last.status == "ok" && !std::filesystem::exists(folder / kJournalFile))  // it was removed at the good end
+    return nothing_left(context, last.command, last.status);
   const JournalContent journal = read_journal(folder);
   const std::string command = journal.header.value("command", "");
-  if (!journal.ended.empty() && journal.ended != "interrupted") return nothing_left(context, command, journal.ended);
+  if (!journal.ended.empty() && journal.ended != "interrupted" && journal.ended == last.status)
+    return nothing_left(context, command, journal.ended);
   const auto arguments = journal.header.at("arguments").get<std::vector<std::string>>();
   CommandOptions options = options_of(arguments);  // as it was begun, but for where we are now
   options.threads = context.options.threads, options.quiet = context.options.quiet;

@@ -13,6 +13,7 @@ namespace {
 
 // Of steps between two checkpoints: all of them in memory at once, once forward and once more on the way back.
 constexpr std::size_t kBytesOfSteps = std::size_t{32} << 20;
+constexpr std::size_t kBytesOfVector = 1024;  // beside its numbers: SUNDIALS' table of operations is 0.6 KB
 constexpr long kFewestSteps = 100, kMostSteps = 20'000;
 
 long steps_between_checkpoints(Eigen::Index states) {
@@ -47,6 +48,8 @@ Adjoint::Adjoint(ForwardRun& run, const SimulationSettings& settings, std::span<
   theta_bar_.setZero(d.slots());
   rho_bar_.setZero(d.rho.size());
   run.require(CVodeAdjInit(run.memory(), kept_steps_, CV_POLYNOMIAL));
+  room_ = std::make_unique_for_overwrite<std::byte[]>(
+      static_cast<std::size_t>(kept_steps_) * (sizeof(double) * static_cast<std::size_t>(states_) + kBytesOfVector));
 }
 
 std::size_t Adjoint::bytes() const {
@@ -56,6 +59,7 @@ std::size_t Adjoint::bytes() const {
 }
 
 int Adjoint::advance(double end, N_Vector y, double* t) {
+  room_.reset();
   return CVodeF(run_.memory(), end, y, t, CV_ONE_STEP, &checkpoints_);
 }
 

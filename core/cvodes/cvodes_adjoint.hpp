@@ -7,6 +7,8 @@
 // from checkpoints where these are too many to keep.
 #pragma once
 
+#include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "core/cvodes/cvodes_run.hpp"
@@ -50,6 +52,8 @@ class Adjoint {
   std::span<const Cost> costs_;
   Eigen::Index states_, objectives_, active_;
   long kept_steps_;
+  // For the steps that the first CVodeF allocates: SUNDIALS 6.4.1 crashes where there is none, std::bad_alloc does not.
+  std::unique_ptr<std::byte[]> room_;
   int checkpoints_ = 0, which_ = -1;
   double tie_;  // times closer than this are one
   std::vector<Jump> jumps_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -23,7 +24,10 @@ void on_threads(std::size_t jobs, int threads, const std::function<void(std::siz
   {
     std::vector<std::jthread> others;
     const std::size_t wanted = std::min(jobs, static_cast<std::size_t>(std::max(1, threads)));
-    for (std::size_t i = 1; i < wanted; ++i) others.emplace_back(run);
+    try {
+      while (others.size() + 1 < wanted) others.emplace_back(run);
+    } catch (const std::system_error&) {  // the system has no further thread: those that run do all jobs
+    }
     run();
   }
   for (const std::exception_ptr& exception : thrown)

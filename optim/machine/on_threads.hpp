@@ -8,7 +8,8 @@
 
 namespace mbsopt {
 
-// Returns when all jobs have ended. Rethrows what the first of them has thrown, in the order of the jobs.
+// Runs fewer at a time where the system has no further thread. Returns when all jobs have ended. Rethrows what the
+// first of them has thrown, in the order of the jobs.
 void on_threads(std::size_t jobs, int threads, const std::function<void(std::size_t job)>& work);
 
 }  // namespace mbsopt

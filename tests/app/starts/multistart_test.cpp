@@ -236,6 +236,13 @@ TEST_CASE("resume refuses what it cannot go on with", "[resume]") {
     CHECK(outcome.exit_code == kDone);
     CHECK_THAT(outcome.out, Contains("its 'design' came to its end (ok)"));
   }
+  // A journal that ends, beside results of a run that does not, goes on.
+  auto running = json_of(out / "result.json");
+  running["status"] = "running";
+  write_text(out / "result.json", running.dump());
+  fs::remove(out / "optimized.json");
+  CHECK(run_command({"resume", out.string()}).exit_code == kDone);
+  CHECK(fs::exists(out / "optimized.json"));
 
   std::vector<std::string> lines = lines_of(out / kJournalFile);
   write_text(out / kJournalFile, lines[0] + "\n" + lines[1] + "\n");
