@@ -534,7 +534,8 @@ class Campaign:
             return "it hangs"
         if ended.code < 0 and signal.Signals(-ended.code).name not in sent:
             return f"ended by {signal.Signals(-ended.code).name}: {ended.err[-300:]}"
-        if ended.code < 0 and listens:  # all within a second, which is one
+        # All came within a second, which is one; but the program no longer listens when all is written.
+        if ended.code < 0 and listens and status(folder / "out") == "running":
             return f"ended at once by {signal.Signals(-ended.code).name}"
         if ended.code > 0 and ended.code not in (1, 130):
             return f"exit code {ended.code}: {ended.err[-300:]}"
