@@ -47,10 +47,7 @@ void parts(benchmark::State& state, const Linkage& linkage) {
   SaddleSolver solver(data, alpha);
   std::vector<Vec<6>> b(n, Vec<6>::Zero()), x(n);
   for (std::size_t i = 0; i < n; ++i) b[i].head<3>() = data.bodies[i + 1].mass * data.gravity;
-  const auto assemble = [&] {
-    rows.set_mass(S);
-    rows.add_weighted_square(alpha, S);
-  };
+  const auto assemble = [&] { rows.assemble(frames, alpha, S); };
   for (auto _ : state) {
     const double per_body = 1e9 / linkage.size();
     const auto part = [&](const char* name, auto&& f) {

@@ -84,7 +84,7 @@ void ConstraintRows::evaluate(std::size_t group, const Frames& frames, Eigen::Ve
           }
           Mat<m, 6> A, B;
           p.jacobian(f1, f2, A, B);
-          // In the halves in which they are written: a load across them would wait for both.
+          // Copies the halves in which they are written: a load across them would wait for both.
           const auto copy = [&](const Mat<m, 6>& from, Rows& J) {
             J.middleRows<m>(c->block).template leftCols<3>() = c->factor * from.template leftCols<3>();
             J.middleRows<m>(c->block).template rightCols<3>() = c->factor * from.template rightCols<3>();
@@ -103,7 +103,7 @@ void ConstraintRows::evaluate(const std::vector<Frame>& frames) {
   }
 }
 
-// A few groups at a time: their J is read again while it is near, but not so soon that it is still being stored.
+// Takes a few groups at a time: their J is read again while it is near, but after it has been stored.
 void ConstraintRows::assemble(const std::vector<Frame>& frames, const Eigen::VectorXd& alpha, BlockCholesky<6>& S,
                               Eigen::VectorXd* phi_ddot) {
   constexpr std::size_t kAtATime = 4;
@@ -137,11 +137,6 @@ void ConstraintRows::set_mass(BlockCholesky<6>& S) const {
       for (int j = 0; j < 3; ++j) D[21 + 6 * k + j] = b.J[3 * k + j];
     }
   }
-}
-
-void ConstraintRows::add_weighted_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S) {
-  for (std::size_t k = 0; k < groups_.size(); ++k) add_square(k, alpha, block_kernels(), S);
-  if (!shared_.empty()) add_shared_square(alpha, S);
 }
 
 void ConstraintRows::add_square(std::size_t group, const Eigen::VectorXd& alpha, const BlockKernels& kernels,

@@ -14,7 +14,6 @@
 
 #include <memory>
 
-#include "core/dynamics/residual_watch.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
 
 namespace mbsopt {
@@ -41,8 +40,9 @@ class Dynamics {
   long factor_blocks() const;
   long factorisations() const;
   long linearised_states() const { return linearised_states_; }
-  // Largest relative residual of the constraints' accelerations over all evaluations (augmented Lagrangian).
-  double worst_residual() const { return watch_.worst(); }
+  // Returns the largest residual of J z + gamma over all evaluations, relative to z or to the accelerations that are
+  // usual at the state (augmented Lagrangian; else 0).
+  double worst_residual() const { return worst_residual_; }
 
  private:
   const Mechanism mechanism_;  // keeps the data alive
@@ -50,7 +50,7 @@ class Dynamics {
   // One of the two.
   std::unique_ptr<SpatialDynamics> spatial_;
   std::unique_ptr<PlanarDynamics> planar_;
-  ResidualWatch watch_;
+  double worst_residual_ = 0;
   long linearised_states_ = 0;
 };
 

@@ -115,9 +115,9 @@ void MotionTerms::acceleration_errors(Eigen::VectorXd& out) {
   add_stabilisation(out);
 }
 
-double MotionTerms::usual_acceleration() const {
+double MotionTerms::usual_acceleration(double enough) const {
   double largest = 1e-9;
-  for (std::size_t i = 0; i < f.size(); ++i) {
+  for (std::size_t i = 0; i < f.size() && !(largest >= enough); ++i) {
     const BodyData& b = data_.bodies[i + 1];
     const double omega = bodies[i + 1].omega().norm();
     largest = std::max(largest, omega * (omega + frames[i + 1].rdot.norm()));

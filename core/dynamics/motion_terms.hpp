@@ -70,8 +70,8 @@ class MotionTerms {
 
   // Statics: laws of time keep their values from now on.
   void hold_laws() { laws_.hold(); }
-  // The largest acceleration that the loads give to a body alone, or its turning takes.
-  double usual_acceleration() const;
+  // The largest acceleration that the loads give to a body alone, or its turning takes; any that reaches `enough`.
+  double usual_acceleration(double enough) const;
 
  private:
   void set_time(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);

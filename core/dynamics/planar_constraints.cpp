@@ -8,6 +8,7 @@ namespace mbsopt {
 namespace {
 
 using Kind = PlanarConstraint::Kind;
+using Order = PlanarConstraints::Order;
 
 // The primitive's vectors, constant or with directions of their own.
 template <class S>
@@ -15,87 +16,61 @@ struct Vectors {
   Complex<S> s1, s2, s3;
 };
 
-// Along the motion: a body-fixed vector x = A s, or the separation of two points.
-template <class T>
+// A number or a vector along the motion, with its time derivatives.
+template <class X>
 struct Jet {
-  Complex<T> x, xd, xdd;
+  X x{}, xd{}, xdd{};
+
+  const X& of(Order order) const { return order == Order::phi ? x : order == Order::phi_dot ? xd : xdd; }
 };
+template <class T>
+Jet<T> dot(const Jet<Complex<T>>& a, const Jet<Complex<T>>& b) {
+  return {dot(a.x, b.x), dot(a.xd, b.x) + dot(a.x, b.xd), dot(a.xdd, b.x) + 2 * dot(a.xd, b.xd) + dot(a.x, b.xdd)};
+}
+template <class T>
+Jet<T> length(const Jet<Complex<T>>& d) {
+  using std::sqrt;
+  const T l = sqrt(squared_norm(d.x)), ldot = dot(d.x, d.xd) / l;
+  return {l, ldot, T(dot(d.x, d.xdd) + squared_norm(d.xd) - ldot * ldot) / l};
+}
+
+// A body-fixed vector x = A s, and the separation of two points.
 template <class T, class S>
-Jet<T> vector_of(const PlanarFrame<T>& f, const Complex<S>& s) {
+Jet<Complex<T>> vector_of(const PlanarFrame<T>& f, const Complex<S>& s) {
   return {f.A * s, f.Adot * s, f.Addot * s};
 }
 template <class T, class S>
-Jet<T> separation(const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, const Vectors<S>& s) {
+Jet<Complex<T>> separation(const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, const Vectors<S>& s) {
   return {f2.r - f1.r + f2.A * s.s2 - f1.A * s.s1, f2.rdot - f1.rdot + f2.Adot * s.s2 - f1.Adot * s.s1,
           f2.Addot * s.s2 - f1.Addot * s.s1 + (f2.rddot - f1.rddot)};
 }
 
+// arg(A2 s2) - arg(A1 s1). Only the part of the order is computed: atan2 is slow.
+template <class T, class S>
+Jet<T> angle_between(Order order, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, const Vectors<S>& s) {
+  using std::atan2;
+  if (order == Order::phi) {
+    const Complex<T> x1 = f1.A * s.s1, x2 = f2.A * s.s2;
+    return {T(atan2(cross(x1, x2), dot(x1, x2))), T(0), T(0)};
+  }
+  const Complex<T> over1 = inverse(f1.A), rate1 = f1.Adot * over1, over2 = inverse(f2.A), rate2 = f2.Adot * over2;
+  return {T(0), T(rate2.im - rate1.im),
+          T((f2.Addot * over2 - rate2 * rate2).im - (f1.Addot * over1 - rate1 * rate1).im)};
+}
+
 // The equation of each kind of single row.
 template <class T, class S>
-T phi_of(const PlanarConstraint& c, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, const Vectors<S>& s) {
-  using std::atan2, std::sqrt;
+T phi_of(Order order, const PlanarConstraint& c, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2,
+         const Vectors<S>& s) {
   switch (c.kind) {
     case Kind::dot1:
-      return dot(f1.A * s.s1, f2.A * s.s2);
+      return dot(vector_of(f1, s.s1), vector_of(f2, s.s2)).of(order);
     case Kind::dot2:
-      return dot(f1.A * s.s3, separation(f1, f2, s).x);
+      return dot(vector_of(f1, s.s3), separation(f1, f2, s)).of(order);
     case Kind::distance:
-      return sqrt(squared_norm(separation(f1, f2, s).x));
-    case Kind::angle: {
-      const Complex<T> x1 = f1.A * s.s1, x2 = f2.A * s.s2;
-      return c.sign * T(atan2(cross(x1, x2), dot(x1, x2)));
-    }
-    case Kind::point:
-      break;
-  }
-  return T(0);
-}
-
-template <class T, class S>
-T phi_dot_of(const PlanarConstraint& c, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, const Vectors<S>& s) {
-  using std::sqrt;
-  switch (c.kind) {
-    case Kind::dot1:
-      return dot(f1.Adot * s.s1, f2.A * s.s2) + dot(f1.A * s.s1, f2.Adot * s.s2);
-    case Kind::dot2: {
-      const Jet<T> d = separation(f1, f2, s);
-      return dot(f1.Adot * s.s3, d.x) + dot(f1.A * s.s3, d.xd);
-    }
-    case Kind::distance: {
-      const Jet<T> d = separation(f1, f2, s);
-      return dot(d.x, d.xd) / T(sqrt(squared_norm(d.x)));
-    }
+      return length(separation(f1, f2, s)).of(order);
     case Kind::angle:
-      return c.sign * T((f2.Adot * inverse(f2.A)).im - (f1.Adot * inverse(f1.A)).im);
-    case Kind::point:
-      break;
-  }
-  return T(0);
-}
-
-template <class T, class S>
-T phi_ddot_of(const PlanarConstraint& c, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, const Vectors<S>& s) {
-  using std::sqrt;
-  const auto product = [](const Jet<T>& x, const Jet<T>& y) {
-    return T(dot(x.xdd, y.x) + 2 * dot(x.xd, y.xd) + dot(x.x, y.xdd));
-  };
-  switch (c.kind) {
-    case Kind::dot1:
-      return product(vector_of(f1, s.s1), vector_of(f2, s.s2));
-    case Kind::dot2:
-      return product(vector_of(f1, s.s3), separation(f1, f2, s));
-    case Kind::distance: {
-      const Jet<T> d = separation(f1, f2, s);
-      const T l = sqrt(squared_norm(d.x)), ldot = dot(d.x, d.xd) / l;
-      return T(dot(d.x, d.xdd) + squared_norm(d.xd) - ldot * ldot) / l;
-    }
-    case Kind::angle: {
-      const auto second = [](const PlanarFrame<T>& f) {
-        const Complex<T> over = inverse(f.A), rate = f.Adot * over;
-        return T((f.Addot * over - rate * rate).im);
-      };
-      return c.sign * T(second(f2) - second(f1));
-    }
+      return c.sign * angle_between(order, f1, f2, s).of(order);
     case Kind::point:
       break;
   }
@@ -146,7 +121,7 @@ double on_branch(const PlanarConstraint& c, const RowLaws& laws, const Eigen::Ve
 
 Vectors<double> vectors(const PlanarConstraint& c) { return {c.s1, c.s2, c.s3}; }
 
-// A vector with its directions, of the slot's three numbers those in the plane.
+// A vector with the directions of its slot, of which only those in the plane count.
 PlaneDual moving(const PlanarBody& body, const Plane& s, const Lanes<3>* ds) {
   if (!ds) return {s.re, s.im};
   return {{s.re, LaneDual::Lane(body.b1.transpose() * *ds)}, {s.im, LaneDual::Lane(body.b2.transpose() * *ds)}};
@@ -156,14 +131,14 @@ struct Multipliers1 {
   double lambda = 0, mu0 = 0, mu1 = 0, mu2 = 0;
 };
 
-// Cotangent of x in  lambda (x'y)_eta + mu0 x'y + mu1 (x'y)dot + mu2 (x'y)ddot.
-PlanarJetBar product_bar(const Jet<double>& y, const Plane& y_eta, const Multipliers1& z) {
+// The cotangent of x in  lambda (x'y)_eta + mu0 x'y + mu1 (x'y)dot + mu2 (x'y)ddot.
+PlanarJetBar product_bar(const Jet<Plane>& y, const Plane& y_eta, const Multipliers1& z) {
   return {z.lambda * y_eta + z.mu0 * y.x + z.mu1 * y.xd + z.mu2 * y.xdd, z.mu1 * y.x + (2 * z.mu2) * y.xd, z.mu2 * y.x,
           z.lambda * y.x};
 }
 
-// Of |d|; with u = d/|d| and across(x) = (x - u u'x)/l as in distance.cpp.
-PlanarJetBar distance_bar(const Jet<double>& d, const Plane& d_eta, const Multipliers1& z) {
+// The cotangent of d in the same of |d|, with u = d/|d| and across(x) = (x - u u'x)/l as in distance.cpp.
+PlanarJetBar distance_bar(const Jet<Plane>& d, const Plane& d_eta, const Multipliers1& z) {
   const double l = std::sqrt(squared_norm(d.x));
   const Plane u = (1 / l) * d.x;
   const auto across = [&](const Plane& x) { return (1 / l) * (x - dot(u, x) * u); };
@@ -173,8 +148,8 @@ PlanarJetBar distance_bar(const Jet<double>& d, const Plane& d_eta, const Multip
           z.mu1 * u + (2 * z.mu2) * across(d.xd), z.mu2 * u, z.lambda * u};
 }
 
-// Of Im w,  w = mu0 log A + mu1 Adot/A + mu2 (Addot/A - (Adot/A)^2) + lambda A_eta/A:  the cotangent of z in Im w is
-// i conj(dw/dz).
+// Adds the cotangents in Im w,  w = mu0 log A + mu1 Adot/A + mu2 (Addot/A - (Adot/A)^2) + lambda A_eta/A:  the
+// cotangent of z in Im w is i conj(dw/dz).
 void add_angle_bar(const PlanarFrame<double>& f, const Multipliers1& z, PlanarFrameBar& bar) {
   const Plane over = inverse(f.A), rate = f.Adot * over, second = f.Addot * over;
   const Plane change{0, f.theta_eta};  // A_eta/A
@@ -194,46 +169,35 @@ PlanarColumn jacobian_of_row(const PlanarConstraint& c, const PlanarFrame<double
   return {J.force1, J.force2, J.moment1, J.moment2};
 }
 
+// Phi or a time derivative of it, without laws. branch(c, value) puts an angle on its branch.
+template <PlanarConstraints::Order order, class Branch>
+void PlanarConstraints::evaluate(const Frames& frames, Branch&& branch, Eigen::VectorXd& out) const {
+  out.setZero();
+  for (const PlanarConstraint& c : model_->constraints) {
+    const PlanarFrame<double>&f1 = frames[at(c.body1)], &f2 = frames[at(c.body2)];
+    if (c.kind == Kind::point) {
+      const Plane d = separation(f1, f2, vectors(c)).of(order);
+      out(c.row) = d.re, out(c.row2) = d.im;
+    } else {
+      out(c.row) += c.factor * branch(c, phi_of(order, c, f1, f2, vectors(c)));
+    }
+  }
+}
+
 void PlanarConstraints::phi(const Frames& frames, const RowLaws& laws, const Eigen::VectorXd& angles,
                             Eigen::VectorXd& out) const {
-  out.setZero();
-  for (const PlanarConstraint& c : model_->constraints) {
-    const PlanarFrame<double>&f1 = frames[at(c.body1)], &f2 = frames[at(c.body2)];
-    if (c.kind == Kind::point) {
-      const Plane d = f2.r - f1.r + f2.A * c.s2 - f1.A * c.s1;
-      out(c.row) = d.re, out(c.row2) = d.im;
-    } else {
-      out(c.row) += c.factor * on_branch(c, laws, angles, phi_of(c, f1, f2, vectors(c)));
-    }
-  }
+  evaluate<Order::phi>(
+      frames, [&](const PlanarConstraint& c, double x) { return on_branch(c, laws, angles, x); }, out);
   laws.subtract_f(out);
 }
-
 void PlanarConstraints::phi_dot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const {
-  out.setZero();
-  for (const PlanarConstraint& c : model_->constraints) {
-    const PlanarFrame<double>&f1 = frames[at(c.body1)], &f2 = frames[at(c.body2)];
-    if (c.kind == Kind::point) {
-      const Plane d = f2.rdot - f1.rdot + f2.Adot * c.s2 - f1.Adot * c.s1;
-      out(c.row) = d.re, out(c.row2) = d.im;
-    } else {
-      out(c.row) += c.factor * phi_dot_of(c, f1, f2, vectors(c));
-    }
-  }
+  evaluate<Order::phi_dot>(
+      frames, [](const PlanarConstraint&, double x) { return x; }, out);
   laws.subtract_f_t(out);
 }
-
 void PlanarConstraints::phi_ddot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const {
-  out.setZero();
-  for (const PlanarConstraint& c : model_->constraints) {
-    const PlanarFrame<double>&f1 = frames[at(c.body1)], &f2 = frames[at(c.body2)];
-    if (c.kind == Kind::point) {
-      const Plane d = f2.Addot * c.s2 - f1.Addot * c.s1 + (f2.rddot - f1.rddot);
-      out(c.row) = d.re, out(c.row2) = d.im;
-    } else {
-      out(c.row) += c.factor * phi_ddot_of(c, f1, f2, vectors(c));
-    }
-  }
+  evaluate<Order::phi_ddot>(
+      frames, [](const PlanarConstraint&, double x) { return x; }, out);
   laws.subtract_f_tt(out);
 }
 
@@ -266,7 +230,7 @@ void PlanarConstraints::add_pull_back(const Frames& frames, RowLaws& laws, const
           add_vector_bar(f2, c.s2, product_bar(vector_of(f1, c.s1), changed(f1, c.s1), z), 1, bars[j], s2_bar);
           break;
         case Kind::dot2: {
-          const Jet<double> d = separation(f1, f2, vectors(c));
+          const Jet<Plane> d = separation(f1, f2, vectors(c));
           add_vector_bar(f1, c.s3, product_bar(d, d_eta, z), 1, bars[i], s3_bar);
           const PlanarJetBar bar = product_bar(vector_of(f1, c.s3), changed(f1, c.s3), z);
           add_point_bar(f2, c.s2, bar, 1, bars[j], s2_bar);
@@ -290,11 +254,12 @@ void PlanarConstraints::add_pull_back(const Frames& frames, RowLaws& laws, const
       }
       if (c.slot_factor >= 0) {
         const RowColumn<double> J = column_of(c, f1, f2, vectors(c));
+        const auto phi = [&](Order order) { return phi_of(order, c, f1, f2, vectors(c)); };
         const double change =
             dot(J.force1, f1.r_eta) + dot(J.force2, f2.r_eta) + J.moment1 * f1.theta_eta + J.moment2 * f2.theta_eta;
-        theta_bar(c.slot_factor) +=
-            unscaled.lambda * change + unscaled.mu0 * on_branch(c, laws, angles, phi_of(c, f1, f2, vectors(c))) +
-            unscaled.mu1 * phi_dot_of(c, f1, f2, vectors(c)) + unscaled.mu2 * phi_ddot_of(c, f1, f2, vectors(c));
+        theta_bar(c.slot_factor) += unscaled.lambda * change +
+                                    unscaled.mu0 * on_branch(c, laws, angles, phi(Order::phi)) +
+                                    unscaled.mu1 * phi(Order::phi_dot) + unscaled.mu2 * phi(Order::phi_ddot);
       }
     }
     const auto keep = [&](int slot, std::size_t body, const Plane& s_bar) {
@@ -321,8 +286,7 @@ void PlanarConstraints::tangents(Order order, const DualFrames& frames, RowLaws&
     };
     const auto add = [&](const auto& s) {
       if (c.kind == Kind::point) {
-        const PlaneDual d = order == Order::phi ? f2.r - f1.r + f2.A * s.s2 - f1.A * s.s1
-                                                : f2.rdot - f1.rdot + f2.Adot * s.s2 - f1.Adot * s.s1;
+        const PlaneDual d = separation(f1, f2, s).of(order);
         rows.row(c.row) += d.re.d.matrix();
         rows.row(c.row2) += d.im.d.matrix();
         const Plane l{lambda(c.row), lambda(c.row2)};
@@ -333,9 +297,7 @@ void PlanarConstraints::tangents(Order order, const DualFrames& frames, RowLaws&
       LaneDual factor = c.factor;
       Lanes<1> storage;
       if (const Lanes<1>* change = block.field<1>(c.slot_factor, storage)) factor.d = change->array();
-      LaneDual phi = order == Order::phi       ? phi_of(c, f1, f2, s)
-                     : order == Order::phi_dot ? phi_dot_of(c, f1, f2, s)
-                                               : phi_ddot_of(c, f1, f2, s);
+      LaneDual phi = phi_of(order, c, f1, f2, s);
       if (order == Order::phi) phi.v = on_branch(c, laws, angles, phi.v);
       rows.row(c.row) += (factor * phi).d.matrix();
       const LaneDual l = lambda(c.row) * factor;

@@ -31,6 +31,7 @@ class PlanarConstraints {
  public:
   explicit PlanarConstraints(const MechanismData& data) : model_(data.planar.get()) {}
 
+  enum class Order { phi, phi_dot, phi_ddot };
   using Frames = std::vector<PlanarFrame<double>>;
   using DualFrames = std::vector<PlanarFrame<LaneDual>>;
 
@@ -39,20 +40,19 @@ class PlanarConstraints {
   void phi_dot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const;
   void phi_ddot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const;
 
-  // As that of ConstraintTerms.
+  // As ConstraintTerms::add_pull_back.
   void add_pull_back(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
                      const ConstraintWeights& weights, double scale, std::vector<PlanarFrameBar>& bars,
                      Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) const;
 
-  // Tangents in the frames' directions and those of the vectors: of Phi, of Phidot, or of Phiddot (the others
-  // hold nothing of use), and of J'lambda, added to loads (the ground's first). Of Phiddot without the points, whose
+  // Sets the tangent of Phi, Phidot or Phiddot in the frames' directions and those of the vectors; the other two hold
+  // nothing of use. Adds that of J'lambda to loads (the ground's first). Points add nothing to Phiddot' here: their
   // tangents are below.
-  enum class Order { phi, phi_dot, phi_ddot };
   void tangents(Order order, const DualFrames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
                 const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,
                 std::vector<Lanes<3>>& loads) const;
 
-  // Points, which most joints of a plane are. In the frames, lambda and the vectors held fixed:
+  // Most joints of a plane are points. In the frames, with lambda and the vectors held fixed:
   //   d(J'lambda)_theta of a body = cross(A', W),  W: sum of +-conj(s) lambda over its points      [the ground's first]
   void set_point_moments(const Eigen::VectorXd& lambda, std::vector<Plane>& W) const;
   // c -= Phiddot' in the directions Addot' (the ground's first; rows re, im) and those of the vectors, and
@@ -60,10 +60,13 @@ class PlanarConstraints {
   void subtract_point_tangents(const Frames& frames, const std::vector<Lanes<2>>& Addot_dirs,
                                const ParameterBlock& block, const Eigen::VectorXd& lambda, LaneRows& c,
                                std::vector<Lanes<3>>& b) const;
-  // Bodies (the ground first) of constraints that are no points.
+  // Marks the bodies (the ground first) of constraints that are no points.
   void mark_others(std::vector<bool>& bodies) const;
 
  private:
+  template <Order order, class Branch>
+  void evaluate(const Frames& frames, Branch&& branch, Eigen::VectorXd& out) const;
+
   const PlanarModel* model_;
 };
 

@@ -152,9 +152,9 @@ bool PlanarDynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::V
   return finite;
 }
 
-double PlanarDynamics::usual_acceleration() const {
+double PlanarDynamics::usual_acceleration(double enough) const {
   double largest = 1e-9;
-  for (std::size_t k = 1; k < bodies_.size(); ++k) {
+  for (std::size_t k = 1; k < bodies_.size() && !(largest >= enough); ++k) {
     const PlanarBody& b = model_.bodies[k];
     const Vec<3>& load = loads_[k - 1];
     const double omega = 2 * std::sqrt(squared_norm(bodies_[k].Pdot));

@@ -33,7 +33,7 @@ class PlanarDynamics {
                    Eigen::VectorXd& rho_bar);
 
   const Eigen::VectorXd& lambda() const { return lambda_of_phi_; }
-  double usual_acceleration() const;  // what accelerations are of: loads on each body alone, and turning
+  double usual_acceleration(double enough) const;
   const PlanarSaddleSolver& solver() const { return solver_; }
 
  private:

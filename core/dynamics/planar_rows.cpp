@@ -67,34 +67,6 @@ void PlanarRows::evaluate(const Frames& frames) {
   }
 }
 
-void PlanarRows::load(const SaddleIterate& it, bool first, std::vector<Vec<3>>& correction) const {
-  for (std::size_t k = 0; k < correction.size(); ++k) {
-    const RowsInPlane::Body& m = bodies_[k];
-    const double *b = it.b + 3 * k, *x = it.x + 3 * k;
-    correction[k] =
-        first ? Vec<3>(b[0], b[1], b[2]) : Vec<3>(b[0] - m.mass * x[0], b[1] - m.mass * x[1], b[2] - m.inertia * x[2]);
-  }
-  if (first) {
-    subtract_transposed([&](int row) { return -it.alpha[row] * it.residual[row]; }, correction);
-  } else {
-    subtract_transposed([&](int row) { return it.nu[row] - it.alpha[row] * it.residual[row]; }, correction);
-  }
-}
-
-void PlanarRows::correct(const SaddleIterate& it, bool first, const std::vector<Vec<3>>& correction) const {
-  for (std::size_t k = 0; k < correction.size(); ++k) {
-    for (int i = 0; i < 3; ++i) {
-      double& x = it.x[3 * k + at(i)];
-      x = first ? correction[k](i) : x + correction[k](i);
-    }
-  }
-  subtract_times(correction, it.residual);
-  for (std::size_t r = 0; r < it.rows; ++r) {
-    const double step = it.alpha[r] * it.residual[r];
-    it.nu[r] = first ? -step : it.nu[r] - step;
-  }
-}
-
 void PlanarRows::assemble(const Frames& frames, const Eigen::VectorXd& alpha, BlockCholesky<3>& S,
                           [[maybe_unused]] Eigen::VectorXd* phi_ddot) {
   assert(!phi_ddot);

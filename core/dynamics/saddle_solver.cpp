@@ -13,25 +13,18 @@ constexpr double kStagnation = 0.97;
 // the freedom that opens, so that refinement goes on to rounding, whatever tolerance is enough elsewhere.
 constexpr double kSlow = 1e-6, kRounding = 1e-14;
 
-// Row by row: z *= 1 - c alpha.
+// z_r *= 1 - c alpha_r of each row r.
 template <class Y>
 void reduce(double c, const Eigen::VectorXd& alpha, Y& z) {
   for (Eigen::Index r = 0; r < alpha.size(); ++r) entries(z)[r] *= 1 - c * alpha(r);
 }
 
-// The last pass, which added correction to x and -alpha residual to nu.
+// Takes back the last pass, which added correction to x and -alpha residual to nu.
 template <class X, class Y>
 void take_back(const Eigen::VectorXd& alpha, std::vector<X>& x, Y& nu, const Y& residual,
                const std::vector<X>& correction) {
   for (std::size_t i = 0; i < x.size(); ++i) x[i] -= correction[i];
   for (Eigen::Index r = 0; r < alpha.size(); ++r) entries(nu)[r] += alpha(r) * entries(residual)[r];
-}
-
-template <class X>
-double largest(const std::vector<X>& x) {
-  double size = 0;
-  for (const X& xi : x) size = std::max(size, xi.cwiseAbs().maxCoeff());
-  return size;
 }
 
 // A residual above it, relative as in Settings, is more than rounding.
@@ -82,13 +75,7 @@ void BlockSaddleSolver<Rows>::refine(const SaddleIterate& at, bool from_zero, do
     const bool first = from_zero && k == 0, last = k >= settings.most, decides = last || k + 1 >= settings.least;
     rows_.load(at, first, correction);  // b - M x - J'nu + J' alpha residual
     S_.solve(std::span<X>(correction));
-    SaddleSizes sizes{0, 0};
-    if constexpr (X::ColsAtCompileTime == 1) {
-      rows_.correct(at, first, correction);
-      if (decides) sizes = {largest(x), residual.cwiseAbs().maxCoeff()};
-    } else {
-      sizes = rows_.correct(at, first, correction);
-    }
+    SaddleSizes sizes = rows_.correct(at, first, correction);
     if (c_ > 0) reduce(c_, alpha_, residual);
     if (!decides) continue;
     if (c_ > 0) sizes.residual = residual.cwiseAbs().maxCoeff();

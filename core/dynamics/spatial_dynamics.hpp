@@ -52,7 +52,7 @@ class SpatialDynamics {
   MotionTerms& terms() { return terms_; }
   SaddleSolver& solver() { return solver_; }
   double compliance() const { return settings_.compliance; }
-  double usual_acceleration() const { return terms_.usual_acceleration(); }
+  double usual_acceleration(double enough) const { return terms_.usual_acceleration(enough); }
 
  private:
   const Mechanism mechanism_;  // keeps the data alive

@@ -54,22 +54,6 @@ template <int N>
 void subtract_product(const Mat<N, N>& A, const Mat<N, N>& B, Mat<N, N>& C) {
   C.noalias() -= A.lazyProduct(B.transpose());
 }
-// x = W x and x = W'x, W unit lower; y -= L x and y -= L'x.
-// Of three numbers, written out: pairs would wait for the single numbers just stored.
-void multiply(const Mat<3, 3>& W, Vec<3>& x) {
-  x = Vec<3>(x(0), x(1) + W(1, 0) * x(0), x(2) + W(2, 0) * x(0) + W(2, 1) * x(1));
-}
-void multiply_transposed(const Mat<3, 3>& W, Vec<3>& x) {
-  x = Vec<3>(x(0) + W(1, 0) * x(1) + W(2, 0) * x(2), x(1) + W(2, 1) * x(2), x(2));
-}
-void subtract_times(const Mat<3, 3>& L, const Vec<3>& x, Vec<3>& y) {
-  const double a = x(0), b = x(1), c = x(2);
-  for (int i = 0; i < 3; ++i) y(i) -= L(i, 0) * a + L(i, 1) * b + L(i, 2) * c;
-}
-void subtract_transposed_times(const Mat<3, 3>& L, const Vec<3>& x, Vec<3>& y) {
-  const double a = x(0), b = x(1), c = x(2);
-  for (int j = 0; j < 3; ++j) y(j) -= L(0, j) * a + L(1, j) * b + L(2, j) * c;
-}
 
 // Blocks of six are left to block_kernels.hpp.
 bool factor_diagonal(Mat<6, 6>& A, Vec<6>& inverse) {
@@ -146,30 +130,14 @@ FactorView BlockCholesky<N>::view() const {
 template <int N>
 void BlockCholesky<N>::solve(std::span<Vec<N>> x) {
   if (x.empty()) return;
-  if constexpr (N == 6) {
-    block_kernels().solve(view(), x[0].data());
-  } else {
-    const std::vector<int>& order = elimination_.order;
-    for (std::size_t k = 0; k < order.size(); ++k) {
-      Vec<N>& y = x[at(order[k])];
-      multiply(diagonal_[k], y);
-      for (int b = first_block_[k]; b < first_block_[k + 1]; ++b) subtract_times(lower_[at(b)], y, x[at(body_[at(b)])]);
-    }
-    for (std::size_t k = order.size(); k-- > 0;) {
-      Vec<N>& y = x[at(order[k])];
-      y.array() *= inverse_[k].array();
-      for (int b = first_block_[k]; b < first_block_[k + 1]; ++b)
-        subtract_transposed_times(lower_[at(b)], x[at(body_[at(b)])], y);
-      multiply_transposed(diagonal_[k], y);
-    }
-  }
+  (N == 6 ? block_kernels().in_space.solve : portable_block_kernels().in_plane.solve)(view(), x[0].data());
 }
 
 template <int N>
 void BlockCholesky<N>::solve(std::span<Lanes<N>> x) {
   if (x.empty()) return;
   const BlockKernels& kernels = block_kernels();
-  (N == 6 ? kernels.solve_lanes_in_space : kernels.solve_lanes_in_plane)(view(), x[0].data());
+  (N == 6 ? kernels.lanes_in_space.solve : kernels.lanes_in_plane.solve)(view(), x[0].data());
 }
 
 template class BlockCholesky<6>;

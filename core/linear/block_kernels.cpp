@@ -1,5 +1,7 @@
 #include "core/linear/block_kernels.hpp"
 
+#include <algorithm>
+
 #include "core/linear/block_loops.hpp"
 #include "core/linear/pairs.hpp"
 
@@ -25,6 +27,18 @@ struct SixInPairs : Column<3> {
   SixInPairs& operator-=(const SixInPairs& y) {
     for (int i = 0; i < 3; ++i) x[i] -= y.x[i];
     return *this;
+  }
+  // Grows to the absolute values of y where these are larger.
+  void grow_to(const SixInPairs& y) {
+    for (int i = 0; i < 3; ++i) {
+      const Pair size = y.x[i] < 0 ? -y.x[i] : y.x[i];
+      x[i] = x[i] > size ? x[i] : size;
+    }
+  }
+  double largest() const {
+    double size = 0;
+    for (const Pair& pair : x) size = std::max({size, pair[0], pair[1]});
+    return size;
   }
   // The products with one, two, six columns of six.
   double times(const double* y) const {

@@ -1,4 +1,4 @@
-// Compiled with -mavx2 -mfma where the compiler has them (CMakeLists.txt), else empty but for the answer no.
+// Compiled with -mavx2 -mfma where the compiler has them (CMakeLists.txt). Elsewhere avx2_block_kernels() is null.
 #include "core/linear/block_kernels.hpp"
 #include "core/linear/block_loops.hpp"
 
@@ -22,7 +22,7 @@ struct __attribute__((may_alias)) Row {
   friend Row operator*(double s, const Row& a) { return {s * a.x}; }
 
   static Row zero() { return {Four{}}; }
-  // To the absolute values of y, where they are larger.
+  // Grows to the absolute values of y where these are larger.
   void grow_to(const Row& y) {
     const Four size = y.x < 0 ? -y.x : y.x;
     x = x > size ? x : size;
@@ -47,6 +47,17 @@ class Six {
   friend Six operator*(const Six& x, const Six& y) { return Six(x.a_ * y.a_, x.b_ * y.b_); }
   Six& operator+=(const Six& y) { return a_ += y.a_, b_ += y.b_, *this; }
   Six& operator-=(const Six& y) { return a_ -= y.a_, b_ -= y.b_, *this; }
+  // Grows to the absolute values of y where these are larger.
+  void grow_to(const Six& y) {
+    const Four a = y.a_ < 0 ? -y.a_ : y.a_;
+    const Two b = y.b_ < 0 ? -y.b_ : y.b_;
+    a_ = a_ > a ? a_ : a, b_ = b_ > b ? b_ : b;
+  }
+  double largest() const {
+    double size = b_[0] > b_[1] ? b_[0] : b_[1];
+    for (int i = 0; i < 4; ++i) size = size > a_[i] ? size : a_[i];
+    return size;
+  }
   // The products with one, two, six columns of six.
   double times(const double* y) const {
     const Four p = a_ * four(y);

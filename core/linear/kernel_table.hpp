@@ -1,9 +1,9 @@
-// The innermost loops of the block solvers, over blocks of six and over lanes (core/linear/fixed_size.hpp: four tangent
-// directions at a time), compiled twice: for any processor, and for x86-64 ones with AVX2 and FMA, whose registers hold
-// four numbers. The processor chooses, so the last bits of results depend on its kind.
+// The innermost loops of the block solvers, for a single vector and for lanes (core/linear/fixed_size.hpp: four tangent
+// directions at a time). They are compiled twice: for any processor, and for x86-64 processors with AVX2 and FMA, whose
+// registers hold four numbers. The processor chooses, so the last bits of results depend on its kind.
 //
-// Plain arrays and no inline functions: what Eigen or the standard library define inline, compiled for AVX2 and not
-// inlined, would be the same symbol as elsewhere, and a linker may keep either.
+// The loops take plain arrays and call no inline function of Eigen or the standard library. Compiled for AVX2 such a
+// function would be the same symbol as elsewhere, and a linker may keep either.
 #pragma once
 
 #include <cstddef>
@@ -23,11 +23,12 @@ struct FactorView {
 
 // Phi_eta of all constraints in space (ConstraintRows).
 struct RowsInSpace {
+  static constexpr int kUnknowns = 6;  // per body
   struct Group {
     int body1, body2, row, block, rows;  // body 0: the ground
   };
   struct Columns {
-    int first = 0, last = 3;  // of a row's three numbers for displacements those that may not be zero
+    int first = 0, last = 3;  // the columns of displacements in which a row may differ from zero
   };
   struct Body {
     double mass, J[9];
@@ -40,8 +41,9 @@ struct RowsInSpace {
   std::size_t body_count;
 };
 
-// And in the plane (PlanarRows).
+// Phi_eta of all constraints in the plane (PlanarRows).
 struct RowsInPlane {
+  static constexpr int kUnknowns = 3;
   // A coincidence: [-I, -i x1] of body 1 and [I, i x2] of body 2, the ground's part left out.
   struct Point {
     int body1, body2, row, row2;
@@ -83,36 +85,36 @@ struct MotionPlace {
   int row, body;
 };
 
+// x: kUnknowns numbers, or rows of lanes, per moving body; y, lambda: one per row of Phi.
+template <class Rows>
+struct RowKernels {
+  void (*solve)(const FactorView& factor, double* x);                                 // x = inv(S) x
+  void (*subtract_times)(const Rows& J, const double* x, double* y);                  // y -= J x
+  void (*subtract_transposed_times)(const Rows& J, const double* lambda, double* x);  // x -= J'lambda
+  // correction = b - M x - J'(nu - alpha residual); first: x = 0, nu = 0
+  void (*load)(const Rows& J, const SaddleIterate& at, bool first, double* correction);
+  // x += correction, residual -= J correction, nu -= alpha residual; first: x = correction, nu = -alpha residual
+  SaddleSizes (*correct)(const Rows& J, const SaddleIterate& at, bool first, const double* correction);
+};
+
 struct BlockKernels {
-  // Over blocks of six, single vectors.
+  // Over blocks of six.
 
   // Lower triangle of A = L D L' -> inv(L) below the diagonal, zeros elsewhere; false where D is not positive
   bool (*factor_diagonal)(double* A, double* inverse_D);
   void (*divide)(const double* W, const double* inverse_D, double* A, double* LD);  // LD = A W', A = LD inv(D)
   void (*subtract_product)(const double* A, const double* B, double* C);            // C -= A B'
-  void (*solve)(const FactorView& factor, double* x);                               // x = inv(S) x
   // aa += sum_r alpha_r a_r'a_r, bb and ab likewise, of rows a_r, b_r of six numbers; null: left out
   void (*add_weighted_squares)(int rows, const double* alpha, const RowsInSpace::Columns* columns, const double* a,
                                const double* b, double* aa, double* bb, double* ab);
-  // correction = b - M x - J'(nu - alpha residual); first: x = 0, nu = 0
-  void (*load)(const RowsInSpace& J, const SaddleIterate& at, bool first, double* correction);
-  // x += correction, residual -= J correction, nu -= alpha residual; first: x = correction, nu = -alpha residual
-  void (*correct)(const RowsInSpace& J, const SaddleIterate& at, bool first, const double* correction);
+  // in_*: of a single vector; lanes_in_*: of lanes.
+  RowKernels<RowsInSpace> in_space;
+  RowKernels<RowsInPlane> in_plane;
+  RowKernels<RowsInSpace> lanes_in_space;
+  RowKernels<RowsInPlane> lanes_in_plane;
 
-  // Over lanes. x: N rows of lanes per moving body, N = 6 in space, 3 in the plane; y, lambda: one per row of Phi.
+  // Over lanes.
 
-  void (*solve_lanes_in_space)(const FactorView& factor, double* x);
-  void (*solve_lanes_in_plane)(const FactorView& factor, double* x);
-  void (*subtract_times_in_space)(const RowsInSpace& J, const double* x, double* y);  // y -= J x
-  void (*subtract_times_in_plane)(const RowsInPlane& J, const double* x, double* y);
-  void (*subtract_transposed_times_in_space)(const RowsInSpace& J, const double* lambda, double* x);  // x -= J'lambda
-  void (*subtract_transposed_times_in_plane)(const RowsInPlane& J, const double* lambda, double* x);
-  void (*load_lanes_in_space)(const RowsInSpace& J, const SaddleIterate& at, bool first, double* correction);
-  void (*load_lanes_in_plane)(const RowsInPlane& J, const SaddleIterate& at, bool first, double* correction);
-  SaddleSizes (*correct_lanes_in_space)(const RowsInSpace& J, const SaddleIterate& at, bool first,
-                                        const double* correction);
-  SaddleSizes (*correct_lanes_in_plane)(const RowsInPlane& J, const SaddleIterate& at, bool first,
-                                        const double* correction);
   // to += the blocks' product with y (7 n rows of q, 7 n of v); first_place: per row, and after the last
   void (*add_motion_of_bodies)(const MotionBlockView<6>* blocks, const MotionPlace* places, const int* first_place,
                                std::size_t rows, std::size_t n, const double* y, double* to);

@@ -1,5 +1,5 @@
-// The loops of block_kernels.hpp over blocks of six, single vectors of simulations in space: Six is a column of a block
-// in registers. For block_loops.hpp.
+// The loops of kernel_table.hpp over blocks of six and over single vectors in space, for a type of register: Six, a
+// column of a block. For block_loops.hpp.
 #pragma once
 
 #include "core/linear/kernel_table.hpp"
@@ -11,6 +11,18 @@ namespace {  // of each file its own: compiled for different processors
 template <class Six>
 class LoopsOfSix {
  public:
+  static constexpr RowKernels<RowsInSpace> row_kernels() {
+    return {.solve = &solve,
+            .subtract_times = &subtract_times,
+            .subtract_transposed_times =
+                [](const RowsInSpace& J, const double* lambda, double* x) {
+                  subtract_transposed(
+                      J, [lambda](int row) { return lambda[row]; }, x);
+                },
+            .load = &load,
+            .correct = &correct};
+  }
+
   // Lower triangle of A -> below the diagonal of W = inv(L), zeros elsewhere, and the inverse of D, with A = L D L';
   // false where D is not positive.
   // Two pivots at a time, a and c - b^2/a = (a c - b^2)/a: both quotients are on their way at once.
@@ -74,7 +86,7 @@ class LoopsOfSix {
     }
   }
 
-  static void solve_vector(const FactorView& f, double* x) {
+  static void solve(const FactorView& f, double* x) {
     for (int k = 0; k < f.bodies; ++k) {
       prefetch<36>(f.W, 36 * (k + kAhead)), prefetch<36>(f.L, 36 * (f.first_block[k] + kAhead));
       double* y = x + 6 * f.order[k];
@@ -128,13 +140,31 @@ class LoopsOfSix {
     if (ab) add_square(count, alpha, nonzero, a, b, ab);
   }
 
-  // Of groups ahead, as if they were as large as a hinge's.
+  // Prefetches the rows of later groups, as if each had the five of a hinge.
   [[gnu::always_inline]] static void prefetch_rows(const RowsInSpace& J, const RowsInSpace::Group& g) {
     constexpr int kRows = 5;
     prefetch<6 * kRows>(J.J1, 6 * (g.block + kRows * kAhead)),
         prefetch<6 * kRows>(J.J2, 6 * (g.block + kRows * kAhead));
   }
-  static void load_vector(const RowsInSpace& J, const SaddleIterate& at, bool first, double* correction) {
+
+  // x -= J'lambda. lambda(row) returns the row's multiplier.
+  template <class Lambda>
+  static void subtract_transposed(const RowsInSpace& J, const Lambda& lambda, double* x) {
+    const auto subtract = [&](int body, const double* rows_of_body, const RowsInSpace::Group& g) {
+      if (body == 0) return;
+      double* const to = x + 6 * (body - 1);
+      Six sum(to);
+      for (int r = 0; r < g.rows; ++r) sum.subtract(lambda(g.row + r), rows_of_body + 6 * (g.block + r));
+      sum.store(to);
+    };
+    for (std::size_t k = 0; k < J.group_count; ++k) {
+      const RowsInSpace::Group& g = J.groups[k];
+      prefetch_rows(J, g);
+      subtract(g.body1, J.J1, g), subtract(g.body2, J.J2, g);
+    }
+  }
+
+  static void load(const RowsInSpace& J, const SaddleIterate& at, bool first, double* correction) {
     for (std::size_t k = 0; k < J.body_count; ++k) {
       const RowsInSpace::Body& m = J.bodies[k];
       const double* const b = at.b + 6 * k;
@@ -147,25 +177,16 @@ class LoopsOfSix {
       for (int i = 0; i < 3; ++i) y[i] = b[i] - m.mass * x[i];
       for (int i = 0; i < 3; ++i) y[3 + i] = b[3 + i] - m.J[i] * x[3] - m.J[i + 3] * x[4] - m.J[i + 6] * x[5];
     }
-    const auto subtract = [&](int body, const double* rows_of_body, const RowsInSpace::Group& g) {
-      if (body == 0) return;
-      double* const to = correction + 6 * (body - 1);
-      Six sum(to);
-      for (int r = 0; r < g.rows; ++r) {
-        const int row = g.row + r;
-        const double step = at.alpha[row] * at.residual[row];
-        sum.subtract(first ? -step : at.nu[row] - step, rows_of_body + 6 * (g.block + r));
-      }
-      sum.store(to);
-    };
-    for (std::size_t k = 0; k < J.group_count; ++k) {
-      const RowsInSpace::Group& g = J.groups[k];
-      prefetch_rows(J, g);
-      subtract(g.body1, J.J1, g), subtract(g.body2, J.J2, g);
+    if (first) {
+      subtract_transposed(
+          J, [&](int row) { return -at.alpha[row] * at.residual[row]; }, correction);
+    } else {
+      subtract_transposed(
+          J, [&](int row) { return at.nu[row] - at.alpha[row] * at.residual[row]; }, correction);
     }
   }
 
-  static void subtract_times_vector(const RowsInSpace& J, const double* x, double* y) {
+  static void subtract_times(const RowsInSpace& J, const double* x, double* y) {
     for (std::size_t k = 0; k < J.group_count; ++k) {
       const RowsInSpace::Group& g = J.groups[k];
       prefetch_rows(J, g);
@@ -188,14 +209,27 @@ class LoopsOfSix {
       to[r] -= sum;
     }
   }
-  static void correct_vector(const RowsInSpace& J, const SaddleIterate& at, bool first, const double* correction) {
+
+  static SaddleSizes correct(const RowsInSpace& J, const SaddleIterate& at, bool first, const double* correction) {
     const std::size_t unknowns = 6 * J.body_count;
     for (std::size_t i = 0; i < unknowns; ++i) at.x[i] = first ? correction[i] : at.x[i] + correction[i];
-    subtract_times_vector(J, correction, at.residual);
+    subtract_times(J, correction, at.residual);
     for (std::size_t r = 0; r < at.rows; ++r) {
       const double step = at.alpha[r] * at.residual[r];
       at.nu[r] = first ? -step : at.nu[r] - step;
     }
+    return {largest(at.x, unknowns), largest(at.residual, at.rows)};
+  }
+  static double largest(const double* x, std::size_t count) {
+    Six sizes = Six::zero();
+    std::size_t i = 0;
+    for (; i + 6 <= count; i += 6) sizes.grow_to(Six(x + i));
+    double size = sizes.largest();
+    for (; i < count; ++i) {
+      const double of_x = x[i] < 0 ? -x[i] : x[i];
+      size = size > of_x ? size : of_x;
+    }
+    return size;
   }
 };
 

@@ -25,7 +25,7 @@ struct __attribute__((may_alias)) LaneRow {
   friend LaneRow operator*(double s, const LaneRow& x) { return {s * x.low, s * x.high}; }
 
   static LaneRow zero() { return {AlignedPair{}, AlignedPair{}}; }
-  // To the absolute values of y, where they are larger.
+  // Grows to the absolute values of y where these are larger.
   void grow_to(const LaneRow& y) {
     const AlignedPair a = y.low < 0 ? -y.low : y.low, b = y.high < 0 ? -y.high : y.high;
     low = low > a ? low : a, high = high > b ? high : b;

@@ -38,7 +38,6 @@ struct PlanarConstraint {
   int body1 = 0, body2 = 0;
   int row = 0, row2 = 0;  // number of its row (PlanarModel::rows); row2: of a point's second coordinate
   Plane s1, s2, s3;       // parts in the plane of the primitive's vectors
-  double offset = 0;      // distance: of the two points along n [m]
   double sign = 1;        // angle: about +n or -n
   int slot1 = -1, slot2 = -1, slot3 = -1;  // of the primitive's vectors, three rows each
   double factor = 1;

@@ -63,16 +63,8 @@ NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J, const Ve
   Z_ = orthonormal_null_space(scaled, J_transposed_, sizes);
 }
 
-// With lengths L, entries of r stand as L g_r beside g_p, of which rounding is eps g_p: refinement by g - J'nu, where
-// rows of r see only their own terms, restores the digits of nu that this takes.
 MatrixXd NearestPointLinearisation::multipliers(const Eigen::Ref<const MatrixXd>& g) const {
-  constexpr int kRefinements = 2;  // each gains the digits that one solution has
-  MatrixXd nu = scale_.asDiagonal() * J_transposed_.solve(sizes_.asDiagonal() * g);
-  for (int k = 0; k < kRefinements; ++k) {
-    const MatrixXd left = g - J_.transpose() * nu;
-    nu += scale_.asDiagonal() * J_transposed_.solve(sizes_.asDiagonal() * left);
-  }
-  return nu;
+  return scale_.asDiagonal() * J_transposed_.solve(sizes_.asDiagonal() * g);
 }
 // Rounding leaves eps L of x in r and eps in p. The rows of the smaller size, r of tiny mechanisms, say what they can
 // of nu; the others say the rest, which is larger: its rounding goes out by another look at the first.
@@ -404,20 +396,10 @@ class Search {
     };
     const double now = merit(result_.x, result_.F);
     for (double part = 1; part > 1e-7; part *= 0.5) {
-      VectorXd trial = result_.x + part * step;
-      VectorXd F_trial = equations_.values(trial);
-      const double enough = now + 1e-4 * part * slope;
-      if (merit(trial, F_trial) <= enough) {
-        move(trial);
-        return true;
-      }
-      if (part == 1) {  // second-order correction: full steps along curved equations
-        trial -= result_.linearisation.pseudo_inverse_times(F_trial);
-        if (merit(trial, equations_.values(trial)) <= enough) {
-          move(trial);
-          return true;
-        }
-      }
+      const VectorXd trial = result_.x + part * step;
+      if (merit(trial, equations_.values(trial)) > now + 1e-4 * part * slope) continue;
+      move(trial);
+      return true;
     }
     return false;
   }

@@ -12,7 +12,7 @@
 // unknowns in units of their sizes, and Z keeps pure translations (or pure turns) apart, so that a mechanism of
 // micrometres or of kilometres loses no digits between metres and Euler parameters.
 // Nocedal and Wright, "Numerical Optimization" (2006), sections 16.2 (null-space method), 18.4 and 18.5 (SQP, merit
-// functions, second-order correction).
+// functions).
 //
 // Far from the solution Gauss-Newton steps (H = I) of limited length follow the guess onto the equations, without a
 // merit function: they keep to the guess's branch and pass redundant equations, whose rank changes on the way, where a

@@ -13,9 +13,10 @@
 
 #include "core/cvodes/cvodes.hpp"
 #include "core/run/kinks.hpp"
+#include "optim/check/rounding_scatter.hpp"
+#include "optim/check/taylor_remainders.hpp"
 #include "optim/check/user_terms.hpp"
 #include "optim/differences/difference_ladder.hpp"
-#include "optim/machine/median.hpp"
 #include "optim/machine/stopwatch.hpp"
 #include "optim/objective/integration_error.hpp"
 
@@ -33,7 +34,7 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kPsiRounding = 100 * kEpsilon;
 constexpr int kJumpRungs = 3;  // the smallest: further off, frozen steps have errors of their own
 
-// Methods, whatever the reason where they do not.
+// Returns whether the methods agree. Wrong terms of a user do not count here.
 bool agree(const GradientCheck& check) {
   auto fine = [](const CheckedEntry& e) {
     return passes(e.exact) && (!e.frozen_verdict || passes(*e.frozen_verdict)) &&
@@ -173,9 +174,9 @@ class Check {
   void difference() {
     const Index m = result_.psi.size(), P = rho_.size();
     for (MatrixXd* x :
-         {&result_.frozen, &result_.free, &frozen_error_, &free_error_, &frozen_step_, &free_step_, &rounding_})
+         {&result_.frozen, &result_.free, &frozen_error_, &free_error_, &frozen_step_, &free_step_, &rounding_.psi_rho})
       x->setZero(m, P);
-    psi_rounding_.setZero(m);
+    rounding_.psi.setZero(m);
     jump_.setZero(m, P);
     on_base_steps_.setConstant(m, P, false);
     for (Index k = 0; k < P; ++k) {
@@ -240,7 +241,7 @@ class Check {
     const LadderDerivative& d = ladder.d;
     if (!(d.step(i) > 0)) return kInfinity;
     const double integration = frozen || on_base_steps(ladder, i) ? 0 : integration_error_of(i, k, d.step(i));
-    return d.error(i) + psi_rounding_(i) / d.step(i) + integration;
+    return d.error(i) + rounding_.psi(i) / d.step(i) + integration;
   }
 
   // Steps that are coarse for psi may show a plateau that is no derivative (a coordinate of kilometres, of which
@@ -335,72 +336,23 @@ class Check {
     return integration_.psi_rho(i, k) + std::max(integration_.psi(i), jump_(i, k)) / step;
   }
 
-  // Rounding scatters psi and its derivatives over points that are some units in the last place apart: a few, or some
-  // 10^4, which coordinates at 1 km take for one. Each side of rho is looked at alone, since a kink at rho parts the
-  // sides and is no rounding. Parameters that move nothing show none of it, so that the scene's own numbers are changed
-  // as well. This runs only if something disagrees.
+  // Runs only if something disagrees.
   void measure_rounding() {
-    psi_rounding_ = kPsiRounding * result_.psi.cwiseAbs();
-    for (const double unit : {kEpsilon, -kEpsilon, 1e4 * kEpsilon, -1e4 * kEpsilon}) {
-      note_scatter([&](double units, GradientMethod method) {
-        return tlm_.gradients_on(steps_, rho_ + units * unit * size_, method);
-      });
-    }
-    note_scatter([&](double units, GradientMethod method) {
-      generator_.seed(options_.seed);  // the same scene for both methods
-      return evaluator(with_numbers_changed(units * kEpsilon), method).gradients_on(steps_, rho_, method);
-    });
-    // A parameter that changes psi by less than its rounding, when it changes by its own size, has no other part in it.
-    rounding_ = rounding_.cwiseMax(psi_rounding_ * size_.cwiseInverse().transpose());
+    const RoundingRuns runs{
+        [&](const VectorXd& rho, GradientMethod method) { return tlm_.gradients_on(steps_, rho, method); },
+        [&](const Scene& scene, GradientMethod method) {
+          return evaluator(scene, method).gradients_on(steps_, rho_, method);
+        }};
+    rounding_ = rounding_scatter({scene_, rho_, size_, result_.psi, kPsiRounding, options_.seed}, runs);
+    result_.simulations += rounding_.simulations;
     rounding_known_ = true;
-  }
-
-  // Of what is evaluated some units in the last place away: f(units, method).
-  template <class F>
-  void note_scatter(F&& f) {
-    for (const GradientMethod method : {GradientMethod::tlm, GradientMethod::adjoint}) {
-      std::optional<Evaluation> first;
-      for (const double units : {8.0, 12.0, 16.0}) {
-        const Evaluation e = f(units, method);
-        result_.simulations += e.simulations;
-        if (!e.ok) continue;
-        if (!first) {
-          first = e;
-          continue;
-        }
-        rounding_ = rounding_.cwiseMax((e.psi_rho - first->psi_rho).cwiseAbs());
-        const VectorXd slope = first->psi_rho * (e.rho - first->rho);
-        psi_rounding_ = psi_rounding_.cwiseMax((e.psi - first->psi - slope).cwiseAbs());
-      }
-    }
-  }
-
-  // Masses, places, rates and points, each by a relative change of its own of at most `largest`, so that none cancel.
-  Scene with_numbers_changed(double largest) {
-    Scene scene = scene_;
-    std::uniform_real_distribution<double> change(-largest, largest);
-    const auto changed = [&](const Field& x) {
-      return Expression::parse(fmt::format("({})*{:.17g}", x.text(), 1 + change(generator_)));
-    };
-    const auto nudge = [&](VectorField& v) {
-      for (Field& x : v) x = changed(x);
-    };
-    for (Body& body : scene.bodies) {
-      body.mass = changed(body.mass);
-      nudge(body.position), nudge(body.velocity), nudge(body.angular_velocity);
-      for (auto& [name, point] : body.points) nudge(point);
-    }
-    for (Joint& joint : scene.joints)
-      for (PointField* point : {&joint.point1, &joint.point2})
-        if (auto* given = std::get_if<VectorField>(point)) nudge(*given);
-    return scene;
   }
 
   // Entries that CVODES disagrees with, within the rounding of the discrete ones, which parts TLM and adjoint, too.
   void excuse_rounding(ContinuousCheck& check) {
     if (check.passed() || !result_.discrete) return;
     if (!rounding_known_) measure_rounding();
-    const MatrixXd rounding = rounding_.cwiseMax((result_.tlm - result_.adjoint).cwiseAbs());
+    const MatrixXd rounding = rounding_.psi_rho.cwiseMax((result_.tlm - result_.adjoint).cwiseAbs());
     for (std::size_t n = 0; n < check.entries.size(); ++n) {
       ContinuousEntry& e = check.entries[n];
       const Index at = static_cast<Index>(n), P = rho_.size();
@@ -416,10 +368,10 @@ class Check {
     const FormulationSettings& f = scene_.simulation.formulation;
     if (f.type != FormulationType::penalty || f.linear_solver != LinearSolver::cholesky) return;
     double worst = 0;
-    for (Index i = 0; i < rounding_.rows(); ++i)
-      for (Index k = 0; k < rounding_.cols(); ++k)
+    for (Index i = 0; i < rounding_.psi_rho.rows(); ++i)
+      for (Index k = 0; k < rounding_.psi_rho.cols(); ++k)
         if (const double entry = std::abs(result_.tlm(i, k)); entry > 0)
-          worst = std::max(worst, rounding_(i, k) / std::max(entry, floor_of(i, k)));
+          worst = std::max(worst, rounding_.psi_rho(i, k) / std::max(entry, floor_of(i, k)));
     if (!(worst > options_.thresholds.tlm_adjoint)) return;
     result_.warnings.push_back(
         fmt::format("simulation.formulation: penalty with alpha {:.3g} by cholesky rounds derivatives by up to {:.1g} "
@@ -442,7 +394,7 @@ class Check {
         const auto& [plus, minus] = rung->second[frozen ? 0 : 1];
         if (rung->first.first != k || plus.size() == 0 || minus.size() == 0) continue;
         const double bend = plus(i) + minus(i) - 2 * result_.psi(i);
-        if (!(std::abs(bend) > kEstimateTrust * psi_rounding_(i))) break;
+        if (!(std::abs(bend) > kEstimateTrust * rounding_.psi(i))) break;
         wider = b, b = bend / (2 * rung->first.second);
       }
       constexpr double kFalls = 0.75;  // between 1/2 of a smooth psi and 1 of a kink
@@ -476,16 +428,16 @@ class Check {
         const double floor = floor_of(i, k);
         // Differences carry the rounding of psi, divided by their step, too.
         const auto rounding = [&](const MatrixXd& step) {
-          return rounding_(i, k) + (step(i, k) > 0 ? psi_rounding_(i) / step(i, k) : 0);
+          return rounding_.psi_rho(i, k) + (step(i, k) > 0 ? rounding_.psi(i) / step(i, k) : 0);
         };
         auto relative = [](double difference, double to) { return difference == 0 ? 0 : std::abs(difference) / to; };
         e.tlm_adjoint = relative(e.tlm - e.adjoint, std::max(entry, floor));
         e.frozen_difference = relative(e.frozen - e.tlm, entry);
         e.free_difference = relative(e.free - e.tlm, entry);
         if (result_.discrete) {
-          e.exact = entry == 0
-                        ? Verdict::zero
-                        : verdict_of(e.adjoint, rounding_(i, k), e.tlm, std::max(entry, floor), limits.tlm_adjoint);
+          e.exact = entry == 0 ? Verdict::zero
+                               : verdict_of(e.adjoint, rounding_.psi_rho(i, k), e.tlm, std::max(entry, floor),
+                                            limits.tlm_adjoint);
           e.frozen_error += rounding(frozen_step_);
           if (on_frozen_steps_(k)) e.frozen_verdict = verdict_of(e.frozen, e.frozen_error, e.tlm, entry, limits.frozen);
         } else {
@@ -530,61 +482,26 @@ class Check {
       check.adjoint = (result_.adjoint.transpose() * w).dot(d);
       const double terms = w.cwiseAbs().dot(result_.tlm.cwiseAbs() * d.cwiseAbs());
       check.relative_defect = terms > 0 ? std::abs(check.tlm - check.adjoint) / terms : 0;
-      const double rounding = w.cwiseAbs().dot(rounding_ * d.cwiseAbs());
+      const double rounding = w.cwiseAbs().dot(rounding_.psi_rho * d.cwiseAbs());
       check.passed = check.relative_defect <= options_.thresholds.identity ||
                      std::abs(check.tlm - check.adjoint) <= kEstimateTrust * rounding;
       result_.identities.push_back(check);
     }
   }
 
-  // R(h) = |psi(rho + h d) - psi - h psi_rho d|: where it stands clear of rounding, it falls by 4 when h is halved.
   void check_taylor() {
-    constexpr int kRungs = 14;
-    constexpr double kLargest = 1e-2, kClear = 100;              // clear of rounding: that many times above it
-    const double allowed = options_.thresholds.frozen / kClear;  // of a derivative, as in differences
-    result_.taylor.clear();
+    const double allowed = options_.thresholds.frozen / kTaylorClear;  // of a derivative, as in differences
     const VectorXd d = random_direction(rho_.size())
                            .cwiseProduct(taylor_size_)
                            .cwiseProduct(on_frozen_steps_.cast<double>().matrix()) /
                        std::sqrt(static_cast<double>(rho_.size()));
-    const VectorXd slope = result_.tlm * d;
-    std::vector<VectorXd> remainders, noise;
-    std::vector<double> steps;
-    double h = kLargest;
-    for (int j = 0; j < kRungs; ++j, h /= 2) {
-      const std::optional<VectorXd> psi = psi_at(rho_ + h * d, true);
-      if (!psi) continue;
-      steps.push_back(h);
-      remainders.push_back((*psi - result_.psi - h * slope).cwiseAbs());
-      noise.push_back((kPsiRounding * psi->cwiseAbs().cwiseMax(result_.psi.cwiseAbs())).cwiseMax(psi_rounding_) +
-                      h * (rounding_ + allowed * result_.tlm.cwiseAbs()) * d.cwiseAbs());
-    }
-    for (Index i = 0; i < result_.psi.size(); ++i) {
-      TaylorCheck check;
-      check.objective = result_.objectives[static_cast<std::size_t>(i)];
-      std::vector<double> slopes;
-      const auto slope_at = [&](std::size_t j) {
-        return std::log(remainders[j - 1](i) / remainders[j](i)) / std::log(steps[j - 1] / steps[j]);
-      };
-      // A remainder that falls as h or faster leaves 1/4096 of itself at the smallest two h; more is rounding, unless
-      // it falls as h^2 to the last.
-      double left = 0;
-      const std::size_t n = steps.size();
-      if (n < 3 || !(std::min(slope_at(n - 1), slope_at(n - 2)) >= options_.thresholds.taylor_slope))
-        for (std::size_t j = std::max<std::size_t>(n, 2) - 2; j < n; ++j) left = std::max(left, remainders[j](i));
-      for (std::size_t j = 0; j < steps.size(); ++j) {
-        check.rows.push_back({steps[j], remainders[j](i)});
-        if (j == 0 || remainders[j](i) <= kClear * std::max(noise[j](i), left)) continue;
-        slopes.push_back(slope_at(j));
-      }
-      // Large h has terms of higher order: the later slopes tell.
-      if (slopes.size() > 4) slopes.erase(slopes.begin(), slopes.end() - 4);
-      // Errors of derivatives fall as h, kinks not at all; what grows as h falls is rounding.
-      if (!slopes.empty()) check.slope = median(std::move(slopes));
-      if (check.slope && *check.slope < 0) check.slope.reset();
-      check.passed = !steps.empty() && (!check.slope || *check.slope >= options_.thresholds.taylor_slope);
-      result_.taylor.push_back(std::move(check));
-    }
+    const auto psi_there = [&](double h) { return psi_at(rho_ + h * d, true); };
+    const auto rounding = [&](double h, const VectorXd& psi) -> VectorXd {
+      return (kPsiRounding * psi.cwiseAbs().cwiseMax(result_.psi.cwiseAbs())).cwiseMax(rounding_.psi) +
+             h * (rounding_.psi_rho + allowed * result_.tlm.cwiseAbs()) * d.cwiseAbs();
+    };
+    result_.taylor = check_taylor_remainders(result_.objectives, result_.psi, {psi_there, rounding, result_.tlm * d},
+                                             options_.thresholds.taylor_slope);
   }
 
   const Scene& scene_;
@@ -596,8 +513,7 @@ class Check {
   StepSequence steps_;
   MatrixXd frozen_error_, free_error_, frozen_step_, free_step_;
   IntegrationError integration_;
-  MatrixXd rounding_;      // of the derivatives, where it was measured; else 0
-  VectorXd psi_rounding_;  // of psi, the same
+  RoundingScatter rounding_;  // where it was measured; else 0
   bool rounding_known_ = false;
   Eigen::Array<bool, Eigen::Dynamic, 1> on_frozen_steps_;             // parameters whose differences they serve
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> on_base_steps_;  // a free difference

@@ -29,6 +29,7 @@
 
 #include "optim/check/continuous_check.hpp"
 #include "optim/check/gradient_timing.hpp"
+#include "optim/check/taylor_remainders.hpp"
 #include "optim/differences/verdict.hpp"
 #include "optim/objective/evaluator.hpp"
 #include "optim/problem/problem.hpp"
@@ -67,16 +68,6 @@ struct CheckedEntry {
   std::optional<Verdict> frozen_verdict;  // where steps can be frozen
   std::optional<Verdict> free_verdict;    // where free differences were asked for
   std::vector<LadderRung> rungs;          // h falling
-};
-
-struct TaylorRow {
-  double h = 0, remainder = 0;
-};
-struct TaylorCheck {
-  std::string objective;
-  std::vector<TaylorRow> rows;  // h falling; empty where no step could be evaluated
-  std::optional<double> slope;  // of the part above rounding; none where all of it is rounding: linear along d
-  bool passed = false;
 };
 
 struct IdentityCheck {

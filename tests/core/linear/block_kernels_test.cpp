@@ -10,23 +10,24 @@ using namespace mbsopt;
 
 namespace {
 
-constexpr int kLanes = 4;
-using Rows = Eigen::Matrix<double, Eigen::Dynamic, kLanes, Eigen::RowMajor>;
+constexpr int kDirections = 4;  // in lanes
+template <int Columns>          // one vector, or lanes
+using Numbers = Eigen::Matrix<double, Eigen::Dynamic, Columns, Columns == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
+using Rows = Numbers<kDirections>;
 
 // Numbers in [-1, 1].
-Rows random_rows(Eigen::Index rows, int seed) {
+template <int Columns = kDirections>
+Numbers<Columns> random_rows(Eigen::Index rows, int seed) {
   std::mt19937 generator(static_cast<unsigned>(seed));
   std::uniform_real_distribution<double> number(-1, 1);
-  return Rows::NullaryExpr(rows, kLanes, [&] { return number(generator); });
+  return Numbers<Columns>::NullaryExpr(rows, Columns, [&] { return number(generator); });
 }
 std::vector<double> random_numbers(std::size_t count, int seed) {
-  const Rows x = random_rows(static_cast<Eigen::Index>(count), seed);
-  std::vector<double> numbers;
-  for (Eigen::Index i = 0; i < x.rows(); ++i) numbers.push_back(x(i, 0));
-  return numbers;
+  const Numbers<1> x = random_rows<1>(static_cast<Eigen::Index>(count), seed);
+  return {x.begin(), x.end()};
 }
 
-void require_equal(const Rows& x, const Eigen::MatrixXd& expected) {
+void require_equal(const Eigen::MatrixXd& x, const Eigen::MatrixXd& expected) {
   REQUIRE((x - expected).cwiseAbs().maxCoeff() < 1e-13 * (1 + expected.cwiseAbs().maxCoeff()));
 }
 
@@ -74,10 +75,10 @@ struct Factor {
   }
 };
 
-template <int N>
+template <int N, int Columns>
 void test_solve(void (*solve)(const FactorView&, double*)) {
   const Factor<N> factor;
-  Rows x = random_rows(3 * N, 4);
+  Numbers<Columns> x = random_rows<Columns>(3 * N, 4);
   const Eigen::MatrixXd expected = factor.inverse() * x;
   solve(factor.view(), x.data());
   require_equal(x, expected);
@@ -151,38 +152,36 @@ struct InPlane {
   }
 };
 
-template <class Model, class View>
-void test_products(void (*subtract_times)(const View&, const double*, double*),
-                   void (*subtract_transposed_times)(const View&, const double*, double*)) {
+template <class Model, int Columns, class View>
+void test_products(const RowKernels<View>& kernels) {
   const Model model;
-  const Rows x = random_rows(Model::unknowns, 7), lambda = random_rows(Model::rows, 8);
-  Rows y = lambda, of_x = x;
-  subtract_times(model.view(), x.data(), y.data());
+  const Numbers<Columns> x = random_rows<Columns>(Model::unknowns, 7), lambda = random_rows<Columns>(Model::rows, 8);
+  Numbers<Columns> y = lambda, of_x = x;
+  kernels.subtract_times(model.view(), x.data(), y.data());
   require_equal(y, lambda - model.J() * x);
-  subtract_transposed_times(model.view(), lambda.data(), of_x.data());
+  kernels.subtract_transposed_times(model.view(), lambda.data(), of_x.data());
   require_equal(of_x, x - model.J().transpose() * lambda);
 }
 
-template <class Model, class View>
-void test_pass(void (*load)(const View&, const SaddleIterate&, bool, double*),
-               SaddleSizes (*correct)(const View&, const SaddleIterate&, bool, const double*)) {
+template <class Model, int Columns, class View>
+void test_pass(const RowKernels<View>& kernels) {
   const Model model;
   for (const bool first : {true, false}) {
     const Eigen::VectorXd alpha = Eigen::VectorXd::LinSpaced(Model::rows, 1, 2);
-    const Rows b = random_rows(Model::unknowns, 9), dx = random_rows(Model::unknowns, 10);
-    Rows x = random_rows(Model::unknowns, 11), nu = random_rows(Model::rows, 12),
-         residual = random_rows(Model::rows, 13);
-    const Eigen::MatrixXd x0 = first ? Eigen::MatrixXd::Zero(x.rows(), kLanes) : Eigen::MatrixXd(x);
-    const Eigen::MatrixXd nu0 = first ? Eigen::MatrixXd::Zero(nu.rows(), kLanes) : Eigen::MatrixXd(nu);
+    const Numbers<Columns> b = random_rows<Columns>(Model::unknowns, 9), dx = random_rows<Columns>(Model::unknowns, 10);
+    Numbers<Columns> x = random_rows<Columns>(Model::unknowns, 11), nu = random_rows<Columns>(Model::rows, 12),
+                     residual = random_rows<Columns>(Model::rows, 13);
+    const Eigen::MatrixXd x0 = first ? Eigen::MatrixXd::Zero(x.rows(), Columns) : Eigen::MatrixXd(x);
+    const Eigen::MatrixXd nu0 = first ? Eigen::MatrixXd::Zero(nu.rows(), Columns) : Eigen::MatrixXd(nu);
     const Eigen::MatrixXd residual0 = residual;
     const SaddleIterate at{alpha.data(), b.data(),        x.data(),
                            nu.data(),    residual.data(), static_cast<std::size_t>(Model::rows)};
 
-    Rows correction = random_rows(Model::unknowns, 14);
-    load(model.view(), at, first, correction.data());
+    Numbers<Columns> correction = random_rows<Columns>(Model::unknowns, 14);
+    kernels.load(model.view(), at, first, correction.data());
     require_equal(correction, b - model.M() * x0 - model.J().transpose() * (nu0 - alpha.asDiagonal() * residual0));
 
-    const SaddleSizes sizes = correct(model.view(), at, first, dx.data());
+    const SaddleSizes sizes = kernels.correct(model.view(), at, first, dx.data());
     const Eigen::MatrixXd left = residual0 - model.J() * dx;
     require_equal(x, x0 + dx);
     require_equal(residual, left);
@@ -227,13 +226,10 @@ void test_motion(void (*add)(const MotionBlockView<N>*, const MotionPlace*, cons
 
 TEST_CASE("loops of the block solvers solve with a factor, vectors and lanes, for whatever processor") {
   for (const BlockKernels* kernels : all_kernels()) {
-    const Factor<6> factor;
-    const Rows x = random_rows(18, 40);
-    Eigen::VectorXd single = x.col(0);
-    kernels->solve(factor.view(), single.data());
-    REQUIRE((single - factor.inverse() * x.col(0)).norm() < 1e-12 * (1 + single.norm()));
-    test_solve<6>(kernels->solve_lanes_in_space);
-    test_solve<3>(kernels->solve_lanes_in_plane);
+    test_solve<6, 1>(kernels->in_space.solve);
+    test_solve<3, 1>(kernels->in_plane.solve);
+    test_solve<6, kDirections>(kernels->lanes_in_space.solve);
+    test_solve<3, kDirections>(kernels->lanes_in_plane.solve);
   }
 }
 
@@ -284,42 +280,22 @@ TEST_CASE("loops of the block solvers add squares of rows and leave out their em
   }
 }
 
-TEST_CASE("loops of the block solvers take a pass of the saddle-point solver on a vector, for whatever processor") {
-  const InSpace model;
-  const Eigen::VectorXd alpha = Eigen::VectorXd::LinSpaced(5, 1, 2);
-  const Eigen::VectorXd b = random_rows(12, 9).col(0), dx = random_rows(12, 10).col(0);
-  for (const BlockKernels* kernels : all_kernels()) {
-    for (const bool first : {true, false}) {
-      Eigen::VectorXd x = random_rows(12, 11).col(0), nu = random_rows(5, 12).col(0),
-                      residual = random_rows(5, 13).col(0);
-      const Eigen::VectorXd x0 = first ? Eigen::VectorXd::Zero(12) : x, nu0 = first ? Eigen::VectorXd::Zero(5) : nu,
-                            residual0 = residual;
-      const SaddleIterate at{alpha.data(), b.data(), x.data(), nu.data(), residual.data(), 5};
-      Eigen::VectorXd correction(12);
-      kernels->load(model.view(), at, first, correction.data());
-      const Eigen::VectorXd step = nu0 - alpha.asDiagonal() * residual0;
-      REQUIRE((correction - (b - model.M() * x0 - model.J().transpose() * step)).norm() < 1e-13);
-      kernels->correct(model.view(), at, first, dx.data());
-      const Eigen::VectorXd left = residual0 - model.J() * dx;
-      REQUIRE((x - x0 - dx).norm() < 1e-14);
-      REQUIRE((residual - left).norm() < 1e-14);
-      REQUIRE((nu - nu0 + alpha.asDiagonal() * left).norm() < 1e-14);
-    }
-  }
-}
-
 TEST_CASE(
     "loops of the block solvers multiply by the constraints' Jacobian and its transpose, for whatever processor") {
   for (const BlockKernels* kernels : all_kernels()) {
-    test_products<InSpace, RowsInSpace>(kernels->subtract_times_in_space, kernels->subtract_transposed_times_in_space);
-    test_products<InPlane, RowsInPlane>(kernels->subtract_times_in_plane, kernels->subtract_transposed_times_in_plane);
+    test_products<InSpace, 1>(kernels->in_space);
+    test_products<InPlane, 1>(kernels->in_plane);
+    test_products<InSpace, kDirections>(kernels->lanes_in_space);
+    test_products<InPlane, kDirections>(kernels->lanes_in_plane);
   }
 }
 
 TEST_CASE("loops of the block solvers take a pass of the saddle-point solver, for whatever processor") {
   for (const BlockKernels* kernels : all_kernels()) {
-    test_pass<InSpace, RowsInSpace>(kernels->load_lanes_in_space, kernels->correct_lanes_in_space);
-    test_pass<InPlane, RowsInPlane>(kernels->load_lanes_in_plane, kernels->correct_lanes_in_plane);
+    test_pass<InSpace, 1>(kernels->in_space);
+    test_pass<InPlane, 1>(kernels->in_plane);
+    test_pass<InSpace, kDirections>(kernels->lanes_in_space);
+    test_pass<InPlane, kDirections>(kernels->lanes_in_plane);
   }
 }
 

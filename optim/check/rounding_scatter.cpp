@@ -1,0 +1,73 @@
+#include "optim/check/rounding_scatter.hpp"
+
+#include <fmt/format.h>
+
+#include <limits>
+#include <optional>
+#include <random>
+
+namespace mbsopt {
+namespace {
+
+using Eigen::VectorXd;
+
+// Masses, places, rates and points, each by a relative change of its own of at most `largest`, so that none cancel.
+Scene with_numbers_changed(Scene scene, double largest, unsigned seed) {
+  std::mt19937 generator{seed};
+  std::uniform_real_distribution<double> change(-largest, largest);
+  const auto changed = [&](const Field& x) {
+    return Expression::parse(fmt::format("({})*{:.17g}", x.text(), 1 + change(generator)));
+  };
+  const auto nudge = [&](VectorField& v) {
+    for (Field& x : v) x = changed(x);
+  };
+  for (Body& body : scene.bodies) {
+    body.mass = changed(body.mass);
+    nudge(body.position), nudge(body.velocity), nudge(body.angular_velocity);
+    for (auto& [name, point] : body.points) nudge(point);
+  }
+  for (Joint& joint : scene.joints)
+    for (PointField* point : {&joint.point1, &joint.point2})
+      if (auto* given = std::get_if<VectorField>(point)) nudge(*given);
+  return scene;
+}
+
+// Notes how f(units, method) differs between points some units in the last place away.
+template <class F>
+void note(F&& f, RoundingScatter& scatter) {
+  for (const GradientMethod method : {GradientMethod::tlm, GradientMethod::adjoint}) {
+    std::optional<Evaluation> first;
+    for (const double units : {8.0, 12.0, 16.0}) {
+      const Evaluation e = f(units, method);
+      scatter.simulations += e.simulations;
+      if (!e.ok) continue;
+      if (!first) {
+        first = e;
+        continue;
+      }
+      scatter.psi_rho = scatter.psi_rho.cwiseMax((e.psi_rho - first->psi_rho).cwiseAbs());
+      const VectorXd slope = first->psi_rho * (e.rho - first->rho);
+      scatter.psi = scatter.psi.cwiseMax((e.psi - first->psi - slope).cwiseAbs());
+    }
+  }
+}
+
+}  // namespace
+
+RoundingScatter rounding_scatter(const RoundingBase& base, const RoundingRuns& runs) {
+  constexpr double kUnit = std::numeric_limits<double>::epsilon();
+  RoundingScatter scatter{base.rounding * base.psi.cwiseAbs(), Eigen::MatrixXd::Zero(base.psi.size(), base.rho.size())};
+  for (const double unit : {kUnit, -kUnit, 1e4 * kUnit, -1e4 * kUnit})
+    note([&](double units, GradientMethod method) { return runs.at(base.rho + units * unit * base.size, method); },
+         scatter);
+  note(
+      [&](double units, GradientMethod method) {
+        return runs.of(with_numbers_changed(base.scene, units * kUnit, base.seed), method);
+      },
+      scatter);
+  // A parameter that changes psi by less than its rounding, when it changes by its own size, has no other part in it.
+  scatter.psi_rho = scatter.psi_rho.cwiseMax(scatter.psi * base.size.cwiseInverse().transpose());
+  return scatter;
+}
+
+}  // namespace mbsopt

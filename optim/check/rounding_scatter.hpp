@@ -1,0 +1,38 @@
+// How far rounding scatters psi and psi_rho over points that are some units in the last place apart: a few, or some
+// 10^4, which coordinates at 1 km take for one. Each side of rho is looked at alone, since a kink at rho parts the
+// sides and is no rounding. Parameters that move nothing show none of it, so that the scene's own numbers are changed
+// as well.
+//
+//   const RoundingScatter scatter = rounding_scatter(base, {at, of});     // some 60 runs
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+
+#include "core/scene/scene.hpp"
+#include "optim/objective/evaluator.hpp"
+
+namespace mbsopt {
+
+struct RoundingScatter {
+  Eigen::VectorXd psi;
+  Eigen::MatrixXd psi_rho;  // objective x parameter
+  long simulations = 0;
+};
+
+// Where it is measured. size: of each parameter, as differences take it.
+struct RoundingBase {
+  const Scene& scene;
+  Eigen::VectorXd rho, size, psi;
+  double rounding;  // of psi, relative, at least
+  unsigned seed;    // of the changes to the scene
+};
+// Gradients on the steps of the base run.
+struct RoundingRuns {
+  std::function<Evaluation(const Eigen::VectorXd& rho, GradientMethod method)> at;
+  std::function<Evaluation(const Scene& scene, GradientMethod method)> of;
+};
+
+RoundingScatter rounding_scatter(const RoundingBase& base, const RoundingRuns& runs);
+
+}  // namespace mbsopt
