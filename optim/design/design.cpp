@@ -12,6 +12,7 @@
 #include "core/expression/counted.hpp"
 #include "core/expression/did_you_mean.hpp"
 #include "core/simulate/simulation_warnings.hpp"
+#include "core/start/assembly.hpp"
 #include "core/start/assembly_modes.hpp"
 #include "optim/design/closing.hpp"
 #include "optim/design/design_program.hpp"
@@ -519,6 +520,53 @@ Problem closed(const Problem& given, const DesignOptions& options, int& steps) {
   return problem;
 }
 
+// Far from the start its poses may lead to another mode, which is a jump that stops a search. Where one ends without
+// being stationary, it goes on with the poses that it has reached as its guess, as long as this makes the design
+// better. Returns whether the problem has other poses now.
+bool keep_mode(Problem& problem, const DesignOptions& options, DesignResult& result) {
+  constexpr int kMostMoves = 5;
+  constexpr double kFactor = 100;  // above the tolerance, as in docs/design-optimisation.md
+  constexpr double kHeld = 1e-6;   // violation of limits: what ranks as feasible
+  bool moved = false;
+  DesignOptions unrecorded = options;  // points are known by their scaled variables, whose units the start decides
+  unrecorded.records = nullptr, unrecorded.compare_differences = false;
+  for (int k = 0; k < kMostMoves; ++k) {
+    const bool ended = result.status == SolverStatus::converged || result.status == SolverStatus::no_progress;
+    if (!ended || result.optimality <= kFactor * problem.design->optimizer.tolerance) break;
+    Problem next = problem;
+    for (std::size_t p = 0; p < next.scene.parameters.size(); ++p)
+      next.scene.parameters[p].value = result.rho(static_cast<Eigen::Index>(p));
+    const Mechanism mechanism(next.scene, result.rho, std::vector<bool>(next.scene.parameters.size(), false));
+    const Assembly reached(mechanism, next.scene.simulation.start_time);
+    if (!reached.result().ok) break;
+    set_guess(next.scene, mechanism, {reached.result().y.head(reached.result().y.size() / 2), 0});
+    DesignResult more = designed(next, unrecorded);
+    const bool is_better = more.final_evaluation.ok && more.violation <= std::max(result.violation, kHeld) &&
+                           more.objective_final < result.objective_final;
+    more.objective_initial = result.objective_initial;
+    more.iterations += result.iterations, more.evaluations += result.evaluations;
+    more.failed_evaluations += result.failed_evaluations;
+    more.simulations += result.simulations, more.wall_seconds += result.wall_seconds;
+    for (std::size_t v = 0; v < more.variables.size(); ++v) more.variables[v].initial = result.variables[v].initial;
+    for (std::size_t c = 0; c < more.constraints.size(); ++c)
+      more.constraints[c].initial = result.constraints[c].initial;
+    for (std::size_t c = 0; c < more.cases.size(); ++c) more.cases[c].initial = result.cases[c].initial;
+    if (!is_better) {
+      result.iterations = more.iterations, result.evaluations = more.evaluations;
+      result.failed_evaluations = more.failed_evaluations;
+      result.simulations = more.simulations, result.wall_seconds = more.wall_seconds;
+      break;
+    }
+    std::vector<DesignRow> history = std::move(result.history);
+    const int before = history.empty() ? 0 : history.back().iteration;
+    for (DesignRow& row : more.history)
+      if (row.iteration > 0) row.iteration += before, history.push_back(row);
+    more.history = std::move(history);
+    result = std::move(more), problem = std::move(next), moved = true;
+  }
+  return moved;
+}
+
 // As designed, with the poses of the mode.
 DesignResult designed_in_mode(const Problem& given, const DesignOptions& options) {
   const int mode = *options.mode;
@@ -547,8 +595,9 @@ DesignResult designed_in_mode(const Problem& given, const DesignOptions& options
   DesignOptions without_mode = options;
   without_mode.mode.reset();
   DesignResult result = designed(problem, without_mode);
+  const bool moved = keep_mode(problem, without_mode, result);
   result.mode = DesignMode{mode, static_cast<int>(modes.size()), {}};
-  if (mode > 0) result.mode->bodies = problem.scene.bodies;
+  if (mode > 0 || moved) result.mode->bodies = problem.scene.bodies;
   return result;
 }
 
