@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -342,17 +343,38 @@ TEST_CASE("eighteen points: least squares ends where the literature does", "[syn
   CHECK(d.result["optimizer"]["objective_final"].get<double>() < 0.0099120);
 }
 
-TEST_CASE("least squares is refused where there are no squares, or limits", "[synthesis]") {
+TEST_CASE("least squares is refused where there are no squares, or limits of more than samples", "[synthesis]") {
   const TemporaryFolder folder;
   const Designed limits =
       designed_points(folder, and_also(kLeastSquares, {"--set",
                                                        "design.subject_to=[{\"objective\": \"transmission\", "
                                                        "\"lower\": 0.5}]"}));
   CHECK(limits.outcome.exit_code == kBadInput);
-  CHECK_THAT(limits.outcome.err, Contains("design.optimizer.type") && Contains("bounds of variables alone"));
+  CHECK_THAT(limits.outcome.err, Contains("design.subject_to[0]") && Contains("`samples` alone"));
   const Designed squares = designed_points(folder, and_also(kLeastSquares, {"--set", "design.minimize=transmission"}));
   CHECK(squares.outcome.exit_code == kBadInput);
   CHECK_THAT(squares.outcome.err, Contains("is not a sum of squares"));
+}
+
+TEST_CASE("eighteen points: least squares holds limits of samples, and says their prices", "[synthesis]") {
+  Problem problem = eighteen_points();
+  for (int k = 0; k < 18; ++k) {
+    ObjectiveSpec& sine = problem.objectives.emplace_back();
+    sine.name = "sin_mu_" + std::to_string(k);
+    sine.samples = {{static_cast<double>(k), Expression::parse("sin(mu)")}};
+    problem.design->subject_to.push_back({sine.name, 0.6, {}});
+  }
+  const DesignResult result = run_design(problem, without_comparison());
+  INFO(result.message);
+  CHECK(result.status == SolverStatus::converged);
+  CHECK(result.optimality < 1e-4);
+  CHECK(result.violation < 1e-6);
+  CHECK(result.objective_final > 0.0099120);
+  double least = 1, dearest = 0;
+  for (const DesignConstraint& c : result.constraints)
+    least = std::min(least, c.value), dearest = std::max(dearest, c.price);
+  CHECK(least == Approx(0.6).epsilon(1e-5));
+  CHECK(dearest > 1e-4);
 }
 
 TEST_CASE("eighteen points: all branches start in both assembly modes, and the result is that of its mode",
