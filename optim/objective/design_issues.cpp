@@ -5,6 +5,7 @@
 #include "core/cvodes/cvodes.hpp"
 #include "core/scene/scene_path.hpp"
 #include "optim/objective/objective.hpp"
+#include "optim/problem/bounded_means.hpp"
 #include "optim/solver/nlopt_methods.hpp"
 
 namespace mbsopt {
@@ -95,13 +96,14 @@ std::optional<DesignIssue> limit_of_squares_issue(const Problem& problem) {
   const std::vector<ObjectiveBound>& bounds = problem.design->subject_to;
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     const auto objective = std::ranges::find(problem.objectives, bounds[i].objective, &ObjectiveSpec::name);
-    if (objective == problem.objectives.end()) continue;
-    const bool has_samples_alone = !objective->samples.empty() && !objective->running && !objective->terminal &&
-                                   !objective->parameters_only && objective->track.empty();
+    if (bounds[i].sampled || (objective == problem.objectives.end() && !bounded_mean(bounds[i]))) continue;
+    const bool has_samples_alone = objective != problem.objectives.end() && !objective->samples.empty() &&
+                                   !objective->running && !objective->terminal && !objective->parameters_only &&
+                                   objective->track.empty();
     if (!has_samples_alone)
       return DesignIssue{child_path("design.subject_to", i),
-                         "bounds '" + bounds[i].objective +
-                             "', which is not made of `samples` alone; the optimizer 'least_squares' takes no other "
+                         "bounds " + (bounds[i].objective.empty() ? "a mean" : "'" + bounds[i].objective + "'") +
+                             ", which is not made of `samples` alone; the optimizer 'least_squares' takes no other "
                              "limits, ipopt with \"hessian\": \"gauss_newton\" does"};
   }
   return std::nullopt;

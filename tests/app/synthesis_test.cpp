@@ -259,7 +259,8 @@ TEST_CASE("six points on a line are met exactly, ten on an ellipse within 10 mm 
 }
 
 TEST_CASE("least squares that is interrupted keeps its best design, and goes on from its records", "[synthesis]") {
-  const Problem problem = eighteen_points();
+  Problem problem = eighteen_points();
+  problem.scene.simulation.solve = Solve::dynamics;
   long calls = 0, allowed = std::numeric_limits<long>::max();
   DesignOptions options = without_comparison();
   options.simulation_progress = [&](double) { return ++calls <= allowed; };
@@ -358,14 +359,12 @@ TEST_CASE("least squares is refused where there are no squares, or limits of mor
 
 TEST_CASE("eighteen points: least squares holds limits of samples, and says their prices", "[synthesis]") {
   Problem problem = eighteen_points();
-  for (int k = 0; k < 18; ++k) {
-    ObjectiveSpec& sine = problem.objectives.emplace_back();
-    sine.name = "sin_mu_" + std::to_string(k);
-    sine.samples = {{static_cast<double>(k), Expression::parse("sin(mu)")}};
-    problem.design->subject_to.push_back({sine.name, 0.6, {}});
-  }
+  ObjectiveBound& sines = problem.design->subject_to.emplace_back();
+  sines.sampled = Expression::parse("sin(mu)"), sines.every = 0.5, sines.lower = 0.6;
   const DesignResult result = run_design(problem, without_comparison());
   INFO(result.message);
+  REQUIRE(result.constraints.size() == 35);
+  CHECK(result.constraints[1].objective == "sin(mu) at 0.5 s");
   CHECK(result.status == SolverStatus::converged);
   CHECK(result.optimality < 1e-4);
   CHECK(result.violation < 1e-6);
@@ -375,6 +374,46 @@ TEST_CASE("eighteen points: least squares holds limits of samples, and says thei
     least = std::min(least, c.value), dearest = std::max(dearest, c.price);
   CHECK(least == Approx(0.6).epsilon(1e-5));
   CHECK(dearest > 1e-4);
+}
+
+TEST_CASE("eighteen points: nine of ten searches from anywhere end in an optimum", "[synthesis]") {
+  long optima = 0, all = 0;
+  double least = 1;
+  for (int start = 0; start < 10; ++start)
+    for (const int mode : {0, 1}) {
+      const DesignResult result = designed_from("eighteen_points_starts", start, mode);
+      INFO(start << ' ' << mode << ' ' << result.message);
+      CHECK((result.status != SolverStatus::converged || result.optimality < 1e-3));
+      ++all, optima += result.status == SolverStatus::converged;
+      if (result.ok()) least = std::min(least, result.objective_final);
+    }
+  CHECK(10 * optima >= 9 * all);
+  CHECK(least < 0.0099120);
+}
+
+TEST_CASE("gradients of limits at instants agree", "[synthesis]") {
+  const TemporaryFolder folder;
+  const CommandOutcome checked = run_command(
+      {"check", MBSOPT_SOURCE_DIR + std::string("/problems/synthesis/eighteen_points_starts.json"), "--out",
+       folder.file("out"), "--set", "design.subject_to=[{\"sampled\": \"sin(mu)\", \"every\": 6, \"lower\": 0.1}]"});
+  INFO(checked.out << checked.err);
+  CHECK(checked.exit_code == kDone);
+  CHECK_THAT(checked.out, Contains("sin(mu) at 6 s"));
+}
+
+TEST_CASE("limits on lengths make a crank turn fully", "[synthesis]") {
+  Problem problem = eighteen_points();
+  problem.scene.definitions.push_back({"ground", Expression::parse("sqrt((Bx - Ax)^2 + (By - Ay)^2)")});
+  for (const char* margin : {"coupler + rocker - ground - crank", "ground + coupler - rocker - crank",
+                             "ground + rocker - coupler - crank"}) {
+    ObjectiveBound& limit = problem.design->subject_to.emplace_back();
+    limit.sampled = Expression::parse(margin), limit.every = 100, limit.lower = 0.05;
+  }
+  const DesignResult result = run_design(problem, without_comparison());
+  INFO(result.message);
+  CHECK(result.status == SolverStatus::converged);
+  REQUIRE(result.constraints.size() == 3);
+  for (const DesignConstraint& c : result.constraints) CHECK(c.value > 0.05 - 1e-6);
 }
 
 TEST_CASE("eighteen points: all branches start in both assembly modes, and the result is that of its mode",
