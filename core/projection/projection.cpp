@@ -52,7 +52,12 @@ class ProjectorOf final : public Projector {
                   Eigen::VectorXd& rho_bar) override;
   bool linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, const Eigen::VectorXd& y,
                  const ProjectionSolution& s) override;
-  void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override;
+  void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override {
+    set_tangent(block, y_hat_dir, constrained(), y_dir);
+  }
+  void position_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override {
+    set_tangent(block, y_hat_dir, false, y_dir);
+  }
   void add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,
                    Eigen::VectorXd& rho_bar) override;
   void response(Eigen::VectorXd& out) override;
@@ -83,6 +88,7 @@ class ProjectorOf final : public Projector {
   void set_position_rows(const ParameterBlock& block);
   // b_lanes_ = -(M' x + (J'lambda)')
   void set_loads(const ParameterBlock& block, const std::vector<X>& x);
+  void set_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, bool velocities, LaneRows& y_dir);
   void refine_tangent(ProjectionLevel level, const LargestEntries<Direction>& size);
   void refine_adjoint(ProjectionLevel level);
   void add_pull_back(Frames& frames, const ConstraintWeights& weights, Y& theta_bar, Y& rho_bar) {
@@ -498,7 +504,8 @@ void ProjectorOf<Body>::refine_adjoint(ProjectionLevel level) {
 }
 
 template <class Body>
-void ProjectorOf<Body>::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) {
+void ProjectorOf<Body>::set_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, bool velocities,
+                                    LaneRows& y_dir) {
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     bodies_[i].tilde_tangent(y_hat_dir, frames_tilde_[i + 1], q_dirs_[i], frame_dirs_[i + 1]);
   }
@@ -516,7 +523,7 @@ void ProjectorOf<Body>::tangent(const ParameterBlock& block, const LaneRows& y_h
   for_bodies([&](const Body& b, std::size_t i, const auto& f) {
     b.velocity_tangent(y_hat_dir, u_[i], f, q_dirs_[i], v_dirs_[i], frame_dirs_[i + 1]);
   });
-  if (constrained()) {
+  if (velocities) {
     set_tangents(ProjectionLevel::velocity, frames_, block, kappa_);
     set_loads(block, u_);
     g_lanes_ = -dirs_.phi_dot;

@@ -91,9 +91,10 @@ void velocity_guess_derivatives(const MechanismData& d, const VectorXd& q, std::
 }  // namespace
 
 struct Assembly::Solution {
-  Solution(const Mechanism& m, double t)
+  Solution(const Mechanism& m, double t, Modes sought)
       : mechanism(m),
         start(t),
+        modes(sought),
         data(m.data()),
         position(data, AssemblyLevel::position, t),
         velocity(data, AssemblyLevel::velocity, t) {
@@ -109,6 +110,10 @@ struct Assembly::Solution {
     result.y.head(N) = guess;
     position.start_branches(result.y);
     if (solve_in_plane()) return;
+    if (modes == Modes::of_guess) {
+      result.message = "the mechanism does not close in the assembly mode of its guess";
+      return;
+    }
     q.emplace(nearest_point(positions, guess, Decomposition::on_demand, data.assembly_iterations));
     result.y.head(N) = q->x;
     result.iterations = q->iterations;
@@ -158,7 +163,7 @@ struct Assembly::Solution {
     velocity.set_angles(position.followed_angles());
     result.y = y, result.residual = left, result.iterations = static_cast<int>(projector->factorisations());
     q = at, v = moving;
-    return result.ok = true;
+    return result.ok = result.in_mode = true;
   }
 
   // From the nearest position that closes the joints to the equilibrium nearest to that.
@@ -283,6 +288,7 @@ struct Assembly::Solution {
 
   const Mechanism mechanism;
   double start;
+  Modes modes;
   const MechanismData& data;
   Equilibrium equilibrium;  // where the scene starts from one
   AssemblyEquations position, velocity;
@@ -290,8 +296,8 @@ struct Assembly::Solution {
   AssemblyResult result;
 };
 
-Assembly::Assembly(const Mechanism& mechanism, double start_time)
-    : solution_(std::make_unique<Solution>(mechanism, start_time)) {}
+Assembly::Assembly(const Mechanism& mechanism, double start_time, Modes modes)
+    : solution_(std::make_unique<Solution>(mechanism, start_time, modes)) {}
 Assembly::Assembly(Assembly&&) noexcept = default;
 Assembly::~Assembly() = default;
 

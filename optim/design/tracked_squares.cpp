@@ -9,7 +9,6 @@
 #include "core/mechanism/scene_programs.hpp"
 #include "core/run/run_arguments.hpp"
 #include "core/simulate/simulation.hpp"
-#include "core/start/assembly.hpp"
 #include "optim/solver/limit_multipliers.hpp"
 
 namespace mbsopt {
@@ -77,24 +76,28 @@ void TrackedSquares::evaluate(const VectorXd& x, LeastSquaresPoint& point) {
     known.ok = point.ok, known.message = point.message;
     known.f = point.z.head(residuals_).squaredNorm(), known.f_x.setZero(variables());
     known.c = point.z, known.c_x = point.z_x;
-    if (records_) records_->record(x, Wanted::derivatives, known);
+    if (records_ && !is_solved_) records_->record(x, Wanted::derivatives, known);
   }
   without_value_ = without_value_ || point.message == kNoValue;
 }
 
-// Residuals read no rates of the state, so that a solved run goes without the equations of motion.
+// Residuals read no rates of the state, so that a solved run goes without the equations of motion. Once a run has begun
+// in the mode of its guess, a jump to another mode is a failure.
 SimulationResult TrackedSquares::with_tangents(const Mechanism& mechanism, const SimulationSettings& settings,
                                                const TangentSampling& sampling, const RunOptions& options) {
   if (is_solved_) {
     check_run_arguments(mechanism, settings, {}, sampling.times, options);
-    const Assembly start(mechanism, settings.start_time);
+    const Assembly start(mechanism, settings.start_time, modes_);
     if (!start.result().ok) {
       SimulationResult failed;
       failed.status = SimulationStatus::assembly_failed, failed.message = start.result().message;
       return failed;
     }
-    if (is_solved(mechanism, settings, start))
-      return driven_tlm(mechanism, settings, {}, sampling, options, start, Rates::unknown);
+    if (is_solved(mechanism, settings, start)) {
+      if (start.result().in_mode) modes_ = Modes::of_guess;
+      return driven_tlm(mechanism, settings, {}, sampling, options, start,
+                        reads_velocities_ ? Rates::unknown : Rates::without_tangents);
+    }
     is_solved_ = false;
   }
   return simulate_tlm(mechanism, settings, {}, sampling, options);
@@ -144,10 +147,12 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
     }
     const Index half = mechanism.states() / 2;
     VectorXd y_bar(mechanism.states()), rho_bar(rho.size()), z_t(static_cast<Index>(rows.size()));
+    bool reads_velocities = false;
     sampling.observe = [&](std::size_t k, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
       y_bar.setZero(), rho_bar.setZero();
       const auto& [time, value, row, factor] = taken[k];
       point.z(row) += factor * costs[k]->add_gradient(at, 1, y_bar, rho_bar);
+      reads_velocities = reads_velocities || y_bar.tail(half).any();
       if (row < residuals_) z_t(row - first) = factor * y_bar.head(half).dot(at.y.tail(half));
       for (Index j = 0; j < x.size(); ++j) {
         const int parameter = evaluator.variables()[static_cast<std::size_t>(j)];
@@ -159,6 +164,11 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
     if (!run.ok()) {
       point.ok = false, point.message = run.message;
       return;
+    }
+    if (reads_velocities && !reads_velocities_) {  // with their derivatives
+      reads_velocities_ = true;
+      point.z.setZero(), point.z_x.setZero();
+      return simulate(x, point);
     }
     project_free_instants(objective, instants, first, z_t, point.z_x);
     first += static_cast<Index>(rows.size());

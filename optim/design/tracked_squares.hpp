@@ -8,6 +8,7 @@
 
 #include <functional>
 
+#include "core/start/assembly.hpp"
 #include "optim/design/design_program.hpp"
 #include "optim/solver/least_squares.hpp"
 
@@ -15,7 +16,8 @@ namespace mbsopt {
 
 class TrackedSquares : public LeastSquaresProblem {
  public:
-  // records: may be null. A point is recorded as one of constraints c = z, c_x = z_x. Rows: residuals, then limits.
+  // records: may be null. A point is recorded as one of constraints c = z, c_x = z_x, but not where the run is solved:
+  // that costs less than its record. Rows: residuals, then limits.
   TrackedSquares(const DesignProgram& program, const CaseEvaluator& evaluator, PointRecords* records = nullptr);
 
   void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) override;
@@ -35,7 +37,9 @@ class TrackedSquares : public LeastSquaresProblem {
   const Eigen::Index residuals_;
   long simulations_ = 0;
   bool abandoned_ = false, without_value_ = false;
-  bool is_solved_ = true;  // until a run is integrated
+  bool is_solved_ = true;          // until a run is integrated
+  bool reads_velocities_ = false;  // a sensor, as far as its derivatives were seen
+  Modes modes_ = Modes::all;       // until a start is assembled in the mode of its guess
 };
 
 // simulations: is added to.

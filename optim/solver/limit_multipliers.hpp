@@ -3,8 +3,8 @@
 //
 //   minimise 1/2 |z|^2 + 1/2 w^2 |s - P(s)|^2,   s = c + l/w^2,      then      l <- w^2 (s - P(s))
 //
-// P takes s into the limits, so that l_i is zero where a limit does not hold x back. w = 0.3 |z| at the start of a
-// round: a limit that is missed by its own size then costs 9 % of the squares, wherever the search stands. Rounds end
+// P takes s into the limits, so that l_i is zero where a limit does not hold x back. w = 0.15 |z| at the start of a
+// round: a limit that is missed by its own size then costs 2 % of the squares, wherever the search stands. Rounds end
 // when c = P(s): the limits hold, and multipliers act only at them. R. T. Rockafellar, "A dual approach to solving
 // nonlinear programming problems by unconstrained optimization", Mathematical Programming 5 (1973) 354; Nocedal and
 // Wright, "Numerical Optimization" (2006), section 17.4.
