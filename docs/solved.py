@@ -4,7 +4,7 @@
     docs/solved.py PROGRAM
 
 `mbsopt gradient` runs with "solve": "auto" and "dynamics". The differences of values and gradients are relative to the
-largest entry of an objective. Times are the shortest of three runs.
+largest entry of an objective. Times are the shortest of RUNS runs.
 """
 import json
 import pathlib
@@ -13,6 +13,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
+RUNS = 7
 
 
 def gradient(program, file, folder, *sets):
@@ -45,9 +46,9 @@ def row(program, file, folder):
     first = gradient(program, file, folder) if '"drives"' in file.read_text() else None
     if first is None or first["simulation"].get("solve") != "kinematics":
         return None
-    runs = [first] + [gradient(program, file, folder) for _ in range(2)]
+    runs = [first] + [gradient(program, file, folder) for _ in range(RUNS - 1)]
     name = file.relative_to(ROOT / "problems").with_suffix("")
-    others = [gradient(program, file, folder, "simulation.solve=dynamics") for _ in range(3)]
+    others = [gradient(program, file, folder, "simulation.solve=dynamics") for _ in range(RUNS)]
     if others[0] is None:
         return f"| `{name}` | {1e3 * min(map(seconds, runs)):.2g} | fails | | |"
     times = min(map(seconds, runs)), min(map(seconds, others))

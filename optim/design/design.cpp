@@ -35,6 +35,9 @@
 namespace mbsopt {
 namespace {
 
+constexpr double kStationary = 100;  // times the tolerance: docs/design-optimisation.md, `converged`
+// The same for least squares. Where the cost settles to 1e-10 of itself, optimality is known to the root of that.
+constexpr double kSettled = 1000;
 constexpr double kTouches = 1e-5;  // relative to the bound's size: the barrier keeps solutions this near to a bound
 
 bool touches(double value, const std::optional<double>& bound, double size) {
@@ -236,6 +239,20 @@ void describe_solution(DesignProgram& program, const VariableScaling& scaling, c
     c.price = c.lower && c.upper && *c.lower == *c.upper ? fall : std::abs(fall);
   }
   if (result.status == SolverStatus::infeasible) describe_conflict(program, scaling, x, end, result);
+}
+
+// Least squares converges by its steps. Where a solved run leaves no noise, that is an optimum only with the optimality
+// conditions.
+void judge_stationarity(const DesignSpec& spec, DesignResult& result) {
+  const bool judged = spec.optimizer.type == OptimizerSpec::kLeastSquares && result.final_evaluation.ok &&
+                      result.final_evaluation.of_cases.front().statistics.solved;
+  if (!judged || result.status != SolverStatus::converged) return;
+  if (result.optimality <= kSettled * spec.optimizer.tolerance) return;
+  result.status = SolverStatus::no_progress;
+  result.message = fmt::format(
+      "no further progress: cost and parameters settle where the optimality is {:.1g}, a kink "
+      "or a dead point",
+      result.optimality);
 }
 
 // Says where a limit on an extreme does not hold for the true one, in spite of bounds that were moved.
@@ -462,6 +479,11 @@ std::string DesignConstraint::in_words() const {
   return load_case.empty() ? objective : fmt::format("{} ({})", objective, load_case);
 }
 
+bool DesignResult::is_at_boundary() const {
+  return std::ranges::any_of(variables, [](const DesignVariable& v) { return v.at_lower || v.at_upper; }) ||
+         std::ranges::any_of(constraints, [](const DesignConstraint& c) { return c.at_lower || c.at_upper; });
+}
+
 std::optional<double> design_sharpness(const Problem& problem, const DesignOptions& options) {
   return Prepared(problem, options, options.simulation_progress).spec.sharpness;
 }
@@ -525,14 +547,13 @@ Problem closed(const Problem& given, const DesignOptions& options, int& steps) {
 // better. Returns whether the problem has other poses now.
 bool keep_mode(Problem& problem, const DesignOptions& options, DesignResult& result) {
   constexpr int kMostMoves = 5;
-  constexpr double kFactor = 100;  // above the tolerance, as in docs/design-optimisation.md
-  constexpr double kHeld = 1e-6;   // violation of limits: what ranks as feasible
+  constexpr double kHeld = 1e-6;  // violation of limits: what ranks as feasible
   bool moved = false;
   DesignOptions unrecorded = options;  // points are known by their scaled variables, whose units the start decides
   unrecorded.records = nullptr, unrecorded.compare_differences = false;
   for (int k = 0; k < kMostMoves; ++k) {
     const bool ended = result.status == SolverStatus::converged || result.status == SolverStatus::no_progress;
-    if (!ended || result.optimality <= kFactor * problem.design->optimizer.tolerance) break;
+    if (!ended || result.optimality <= kStationary * problem.design->optimizer.tolerance) break;
     Problem next = problem;
     for (std::size_t p = 0; p < next.scene.parameters.size(); ++p)
       next.scene.parameters[p].value = result.rho(static_cast<Eigen::Index>(p));
@@ -679,6 +700,7 @@ DesignResult designed(const Problem& given, const DesignOptions& options) {
     describe_end(evaluator, program, solution.point, result);
     if (!abandoned && !rounds.true_values.empty()) {
       describe_solution(program, scaling, rounds, result);
+      judge_stationarity(spec, result);
       judge_true_extremes(program, evaluator, result);
     }
   }
