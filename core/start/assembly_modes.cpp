@@ -140,9 +140,10 @@ OrientationField turned(const OrientationField& given, const Vector4d& turn) {
 std::vector<AssemblyMode> assembly_modes(const Mechanism& mechanism, double t, const std::function<bool()>& go_on) {
   const MechanismData& d = mechanism.data();
   const Assembly given(mechanism, t);
-  if (!given.result().ok || given.degrees_of_freedom() > 0) return {};
+  if (given.result().ok ? given.degrees_of_freedom() > 0 : d.drive_names.empty()) return {};
   const VectorXd guess = position_guess(d);
-  std::vector<AssemblyMode> modes{{given.result().y.head(guess.size()), 0}};
+  std::vector<AssemblyMode> modes;
+  if (given.result().ok) modes.push_back({given.result().y.head(guess.size()), 0});
   RandomTurns turns(d);
   const std::unique_ptr<Projector> projector = make_projector(mechanism, Projection::position_velocity,
                                                               d.planar ? Model::planar : Model::spatial, Free::nothing);
@@ -161,14 +162,14 @@ std::vector<AssemblyMode> assembly_modes(const Mechanism& mechanism, double t, c
     if (found.status != NearestPointStatus::found) continue;
     if (!found.determined) linearise(positions, found);
     if (!found.determined && found.linearisation.rank() < found.x.size()) continue;
-    if (is_inside_out(d, modes[0].q, found.x)) {
+    if (!modes.empty() && is_inside_out(d, modes[0].q, found.x)) {
       --fruitless;
       continue;
     }
     const double size = 1 + size_of(found.x);
     if (std::ranges::any_of(modes, [&](const AssemblyMode& m) { return distance(m.q, found.x) <= kSame * size; }))
       continue;
-    modes.push_back({found.x, distance(modes[0].q, found.x)});
+    modes.push_back({found.x, modes.empty() ? 0 : distance(modes[0].q, found.x)});
     fruitless = 0;
   }
   std::ranges::sort(modes, {}, &AssemblyMode::distance);

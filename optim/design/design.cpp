@@ -561,7 +561,12 @@ bool keep_mode(Problem& problem, const DesignOptions& options, DesignResult& res
     const Assembly reached(mechanism, next.scene.simulation.start_time);
     if (!reached.result().ok) break;
     set_guess(next.scene, mechanism, {reached.result().y.head(reached.result().y.size() / 2), 0});
-    DesignResult more = designed(next, unrecorded);
+    DesignResult more;
+    try {
+      more = designed(next, unrecorded);
+    } catch (const std::exception&) {  // a singular position, where parameters stand against each other
+      break;
+    }
     const bool is_better = more.final_evaluation.ok && more.violation <= std::max(result.violation, kHeld) &&
                            more.objective_final < result.objective_final;
     more.objective_initial = result.objective_initial;
@@ -610,15 +615,15 @@ DesignResult designed_in_mode(const Problem& given, const DesignOptions& options
   }
   Problem problem = given;
   const std::vector<bool> none(given.scene.parameters.size(), false);
-  if (mode > 0)
-    set_guess(problem.scene, Mechanism(given.scene, parameter_values(given.scene), none),
-              modes[static_cast<std::size_t>(mode)]);
+  const Mechanism mechanism(given.scene, parameter_values(given.scene), none);
+  const bool posed = mode > 0 || !Assembly(mechanism, given.scene.simulation.start_time).result().ok;
+  if (posed) set_guess(problem.scene, mechanism, modes[static_cast<std::size_t>(mode)]);
   DesignOptions without_mode = options;
   without_mode.mode.reset();
   DesignResult result = designed(problem, without_mode);
   const bool moved = keep_mode(problem, without_mode, result);
   result.mode = DesignMode{mode, static_cast<int>(modes.size()), {}};
-  if (mode > 0 || moved) result.mode->bodies = problem.scene.bodies;
+  if (posed || moved) result.mode->bodies = problem.scene.bodies;
   return result;
 }
 
