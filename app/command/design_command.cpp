@@ -124,6 +124,8 @@ void add_to_result(Json& result, const DesignResult& design) {
                          {"infeasibility", design.violation},
                          {"true_infeasibility", design.true_violation}};
   if (design.seed) result["optimizer"]["seed"] = *design.seed;
+  if (design.status == SolverStatus::converged)
+    result["optimizer"]["optimum"] = design.is_at_boundary() ? "boundary" : "interior";
   if (design.mode) result["optimizer"]["assembly_mode"] = mode_json(*design.mode);
   if (design.closing_steps > 0) result["optimizer"]["closing_steps"] = design.closing_steps;
   if (design.limit_rounds > 0) result["optimizer"]["limit_rounds"] = design.limit_rounds;

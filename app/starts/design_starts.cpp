@@ -107,6 +107,7 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, std::optiona
               {"evaluations", design.evaluations},
               {"simulations", design.simulations},
               {"wall_seconds", design.wall_seconds}};
+  if (design.status == SolverStatus::converged) record["optimum"] = design.is_at_boundary() ? "boundary" : "interior";
   if (design.mode) record["assembly_mode"] = mode_json(*design.mode);
   if (design.closing_steps > 0) record["closing_steps"] = design.closing_steps;
   for (const DesignVariable& v : design.variables)

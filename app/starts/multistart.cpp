@@ -189,6 +189,14 @@ MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSp
   print_waterfall(run.context.out, outcome.ranked);
   run.context.out << fmt::format("{}, seed {}: {} at the best optimum\n",
                                  counted(static_cast<long>(outcome.ranked.size()), "start"), *spec.seed, same);
+  const auto ended = [&](const char* optimum) {
+    return std::ranges::count_if(outcome.ranked, [&](const Json& r) { return r.value("optimum", "") == optimum; });
+  };
+  if (const long inside = ended("interior"), beside = ended("boundary"); inside + beside > 0) {
+    result["optima_inside"] = inside, result["optima_at_boundary"] = beside;
+    run.context.out << fmt::format("{} end in an optimum: {} inside, {} at a bound or a limit\n", inside + beside,
+                                   inside, beside);
+  }
   const std::vector<DistinctOptimum> optima = distinct_optima(outcome.ranked, run.problem.scene);
   describe(optima, searched(optima), ends, result);
   print(optima, searched(optima), ends, run.context.out);

@@ -87,12 +87,15 @@ class DrivenDerivatives {
 
   bool linearise(const StatePoint& at) { return projector_->linearise(at.t, at.angles, at.y, at.y, unmoved_); }
   // y0_rho: dy0/drho
-  const Eigen::MatrixXd& y_rho(const Eigen::MatrixXd& y0_rho) {
+  const Eigen::MatrixXd& y_rho(const Eigen::MatrixXd& y0_rho, bool velocities) {
     for (const ParameterBlock& b : blocks_) {
       for (int k = 0; k < kLanes; ++k) {
         if (b.parameter[k] >= 0) y0_dir_.col(k) = y0_rho.col(b.parameter[k]);
       }
-      projector_->tangent(b, y0_dir_, direction_);
+      if (velocities)
+        projector_->tangent(b, y0_dir_, direction_);
+      else
+        projector_->position_tangent(b, y0_dir_, direction_);
       for (int k = 0; k < kLanes; ++k) {
         if (b.parameter[k] >= 0) y_rho_.col(b.parameter[k]) = direction_.col(k);
       }
@@ -172,7 +175,7 @@ SimulationResult driven_tlm(const Mechanism& mechanism, const SimulationSettings
   run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
     if (!derivatives.linearise(at)) return false;
     ++result.statistics.linearised_states;
-    const Eigen::MatrixXd& y_rho = derivatives.y_rho(y0_rho);
+    const Eigen::MatrixXd& y_rho = derivatives.y_rho(y0_rho, rates != Rates::without_tangents);
     const bool observed = std::ranges::any_of(terms, [](const DrivenTerm& term) { return !term.cost; });
     if (observed && dynamics && !dynamics->evaluate(at.t, at.y, at.angles, ydot)) return false;
     for (const DrivenTerm& term : terms) {

@@ -57,7 +57,7 @@ VectorXd definite_solve(const MatrixXd& A, const VectorXd& b, double threshold) 
 struct SquareFactor::Factors {
   Eigen::PartialPivLU<MatrixXd> lu;
   VectorXd x;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows;
+  Eigen::Matrix<double, Eigen::Dynamic, kLanes, Eigen::RowMajor> rows;
 };
 
 SquareFactor::SquareFactor() : factors_(std::make_unique<Factors>()) {}
@@ -74,10 +74,18 @@ void SquareFactor::solve(Eigen::Ref<VectorXd> b) const {
   factors_->x = factors_->lu.solve(b);
   b = factors_->x;
 }
-void SquareFactor::solve_lanes(
-    Eigen::Ref<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> b) const {
-  factors_->rows = factors_->lu.solve(b);
-  b = factors_->rows;
+void SquareFactor::solve_lanes(Eigen::Ref<Eigen::Matrix<double, Eigen::Dynamic, kLanes, Eigen::RowMajor>> b) const {
+  auto& x = factors_->rows;
+  const MatrixXd& LU = factors_->lu.matrixLU();
+  x.noalias() = factors_->lu.permutationP() * b;
+  const Index n = LU.rows();  // a row of b is a few numbers: Eigen's blocked solution is made for many
+  for (Index j = 0; j < n; ++j)
+    for (Index i = j + 1; i < n; ++i) x.row(i) -= LU(i, j) * x.row(j);
+  for (Index j = n - 1; j >= 0; --j) {
+    x.row(j) /= LU(j, j);
+    for (Index i = 0; i < j; ++i) x.row(i) -= LU(i, j) * x.row(j);
+  }
+  b = x;
 }
 void SquareFactor::solve_transposed(Eigen::Ref<VectorXd> b) const {
   factors_->x = factors_->lu.transpose().solve(b);

@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <memory>
 
+#include "core/linear/fixed_size.hpp"
+
 namespace mbsopt {
 
 // Eigenvalues of a symmetric matrix, ascending, and the orthonormal eigenvectors as columns.
@@ -56,7 +58,7 @@ class SquareFactor {
   bool compute(const Eigen::MatrixXd& A);  // false where A is singular to rounding
   // b becomes x of A x = b, or of A'x = b. _lanes: of several b, its columns.
   void solve(Eigen::Ref<Eigen::VectorXd> b) const;
-  void solve_lanes(Eigen::Ref<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> b) const;
+  void solve_lanes(Eigen::Ref<Eigen::Matrix<double, Eigen::Dynamic, kLanes, Eigen::RowMajor>> b) const;
   void solve_transposed(Eigen::Ref<Eigen::VectorXd> b) const;
 
  private:

@@ -47,11 +47,17 @@ class ProjectorOf final : public Projector {
   bool project(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y,
                ProjectionSolution& s) override;
   bool settle(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y) override;
+  bool assemble(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y) override;
   double approach(double t, const Eigen::VectorXd& angles, Eigen::VectorXd& y, Eigen::VectorXd& theta_bar,
                   Eigen::VectorXd& rho_bar) override;
   bool linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, const Eigen::VectorXd& y,
                  const ProjectionSolution& s) override;
-  void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override;
+  void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override {
+    set_tangent(block, y_hat_dir, constrained(), y_dir);
+  }
+  void position_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override {
+    set_tangent(block, y_hat_dir, false, y_dir);
+  }
   void add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,
                    Eigen::VectorXd& rho_bar) override;
   void response(Eigen::VectorXd& out) override;
@@ -82,6 +88,7 @@ class ProjectorOf final : public Projector {
   void set_position_rows(const ParameterBlock& block);
   // b_lanes_ = -(M' x + (J'lambda)')
   void set_loads(const ParameterBlock& block, const std::vector<X>& x);
+  void set_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, bool velocities, LaneRows& y_dir);
   void refine_tangent(ProjectionLevel level, const LargestEntries<Direction>& size);
   void refine_adjoint(ProjectionLevel level);
   void add_pull_back(Frames& frames, const ConstraintWeights& weights, Y& theta_bar, Y& rho_bar) {
@@ -234,6 +241,51 @@ bool ProjectorOf<Body>::settle(double t, const Y& angles, const Y& y_hat, Y& y) 
   y = y_hat;
   for_bodies([&](Body& b, std::size_t, auto& f) { b.write(f, y); });
   return y.allFinite();
+}
+
+// Small steps follow the flow qdot = -J^-1 Phi, along which Phi falls as exp(-s) and det J cannot change its sign.
+template <class Body>
+bool ProjectorOf<Body>::assemble(double t, const Y& angles, const Y& y_hat, Y& y) {
+  constexpr int kMost = 100;
+  constexpr double kLongest = 0.5;    // of a turn in one step [rad]
+  constexpr double kShortest = 1e-3;  // part of a step: det J vanishes on the way, or |Phi| has a least value
+  if (!square_) return false;
+  double sign = 0;
+  // |Phi| beside the state that was read, with J_ there; infinite where det J has another sign than at the guess.
+  const auto violation_at = [&](const Y& moved) {
+    for_bodies(
+        [&](Body& b, std::size_t i, auto& f) { b.displace(moved.segment<N>(N * static_cast<Eigen::Index>(i)), f); });
+    constraints_.phi(frames_, laws_, angles, phi_);
+    set_rows_of(J_);
+    const double determinant = J_.determinant();
+    if (sign == 0) sign = determinant;
+    return determinant * sign > 0 ? phi_.norm() : INFINITY;
+  };
+  Y reached = y_hat;
+  read_hat(t, reached);
+  double violation = violation_at(Y::Zero(N * data_.n));
+  const double size = std::max(1.0, y_hat.head(7 * data_.n).cwiseAbs().maxCoeff());
+  for (int k = 0; k < kMost && violation > kUnmetPosition * size; ++k) {
+    ++square_factorisations_;
+    if (!std::isfinite(violation) || !J_factor_.compute(J_)) return false;
+    Y step = -phi_;
+    J_factor_.solve(step);
+    double turn = 0;
+    constexpr Eigen::Index kTurns = N == 3 ? 1 : 3;  // the last unknowns of a body
+    for (Eigen::Index i = N - kTurns; i < step.size(); i += N)
+      turn = std::max(turn, step.segment<kTurns>(i).cwiseAbs().maxCoeff());
+    if (turn > kLongest) step *= kLongest / turn;
+    double part = 1, now = violation_at(step);
+    while (!(now < violation)) {
+      if ((part /= 2) < kShortest) return false;
+      now = violation_at(part * step);
+    }
+    violation = now;
+    for_bodies([&](Body& b, std::size_t, auto& f) { b.start_velocity(f), b.write(f, reached); });
+    read_hat(t, reached);
+  }
+  reached.tail(7 * data_.n) = y_hat.tail(7 * data_.n);
+  return settle(t, angles, reached, y);
 }
 
 // Levenberg-Marquardt with a damping of the size of |Phi|: quadratic where the constraints can hold (Yamashita and
@@ -452,7 +504,8 @@ void ProjectorOf<Body>::refine_adjoint(ProjectionLevel level) {
 }
 
 template <class Body>
-void ProjectorOf<Body>::tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) {
+void ProjectorOf<Body>::set_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, bool velocities,
+                                    LaneRows& y_dir) {
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     bodies_[i].tilde_tangent(y_hat_dir, frames_tilde_[i + 1], q_dirs_[i], frame_dirs_[i + 1]);
   }
@@ -470,7 +523,7 @@ void ProjectorOf<Body>::tangent(const ParameterBlock& block, const LaneRows& y_h
   for_bodies([&](const Body& b, std::size_t i, const auto& f) {
     b.velocity_tangent(y_hat_dir, u_[i], f, q_dirs_[i], v_dirs_[i], frame_dirs_[i + 1]);
   });
-  if (constrained()) {
+  if (velocities) {
     set_tangents(ProjectionLevel::velocity, frames_, block, kappa_);
     set_loads(block, u_);
     g_lanes_ = -dirs_.phi_dot;

@@ -35,6 +35,10 @@ class Projector {
   // method.
   virtual bool settle(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y) = 0;
 
+  // As settle, from far: damped Newton steps that keep the sign of det J, and with it the assembly mode of a mechanism
+  // whose modes differ in that sign. False where J is not square, too.
+  virtual bool assemble(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, Eigen::VectorXd& y) = 0;
+
   // Moves the positions of y to where |Phi|^2/2 is least, near y, and returns |Phi| there; theta_bar and rho_bar += the
   // gradient of |Phi|^2/2 in the fields and in the parameters of laws, q being stationary.
   virtual double approach(double t, const Eigen::VectorXd& angles, Eigen::VectorXd& y, Eigen::VectorXd& theta_bar,
@@ -44,6 +48,8 @@ class Projector {
   virtual bool linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat,
                          const Eigen::VectorXd& y, const ProjectionSolution& solution) = 0;
   virtual void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) = 0;
+  // The same of positions alone: as if no velocity depended on anything but positions.
+  virtual void position_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) = 0;
   // y_hat_bar += (dy/dy_hat)' y_bar, and the same for the differentiated fields and the parameters in laws
   virtual void add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,
                            Eigen::VectorXd& rho_bar) = 0;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <initializer_list>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -11,6 +12,8 @@
 #include "core/constraint/unit_norm.hpp"
 #include "core/linear/row_dependence.hpp"
 #include "core/linear/sparse_projection.hpp"
+#include "core/mechanism/planar_model.hpp"
+#include "core/projection/projection.hpp"
 #include "core/start/assembly_equations.hpp"
 #include "core/start/assembly_problems.hpp"
 #include "core/start/assembly_report.hpp"
@@ -88,9 +91,10 @@ void velocity_guess_derivatives(const MechanismData& d, const VectorXd& q, std::
 }  // namespace
 
 struct Assembly::Solution {
-  Solution(const Mechanism& m, double t)
+  Solution(const Mechanism& m, double t, Modes sought)
       : mechanism(m),
         start(t),
+        modes(sought),
         data(m.data()),
         position(data, AssemblyLevel::position, t),
         velocity(data, AssemblyLevel::velocity, t) {
@@ -105,6 +109,11 @@ struct Assembly::Solution {
     const VectorXd guess = position_guess(data);
     result.y.head(N) = guess;
     position.start_branches(result.y);
+    if (solve_in_plane()) return;
+    if (modes == Modes::of_guess) {
+      result.message = "the mechanism does not close in the assembly mode of its guess";
+      return;
+    }
     q.emplace(nearest_point(positions, guess, Decomposition::on_demand, data.assembly_iterations));
     result.y.head(N) = q->x;
     result.iterations = q->iterations;
@@ -126,6 +135,35 @@ struct Assembly::Solution {
       return;
     }
     result.ok = true;
+  }
+
+  // Damped Newton steps on three unknowns per body, where a planar mechanism has nothing free: to the assembly mode of
+  // the guess, in the sense of the sign of det Phi_q. False where they do not converge, or leave an equation: the guess
+  // may lie out of the plane.
+  bool solve_in_plane() {
+    constexpr double kSatisfied = 1e-11;  // of the equations, per unit of y, as in nearest_point.cpp
+    const bool determined = data.planar && data.planar->rows.size() == 3 * static_cast<std::size_t>(data.n);
+    if (!determined || data.equilibrium || !position.targets().empty() || !velocity.targets().empty()) return false;
+    const Index N = 7 * data.n;
+    VectorXd y_guess = result.y, y = result.y;
+    y_guess.tail(N) = velocity_guess(data, result.y.head(N));
+    const std::unique_ptr<Projector> projector =
+        make_projector(mechanism, Projection::position_velocity, Model::planar, Free::nothing);
+    if (!projector->assemble(start, position.angles(), y_guess, y)) return false;
+    const auto found = [&](const AssemblyEquations& equations, const VectorXd& x) {
+      NearestPoint point;
+      point.status = NearestPointStatus::found, point.determined = true, point.linearised = false;
+      point.x = x, point.F = equations.values(y), point.nu = VectorXd::Zero(point.F.size());
+      return point;
+    };
+    const NearestPoint at = found(position, y.head(N)), moving = found(velocity, y.tail(N));
+    const double left = std::max(at.F.lpNorm<Eigen::Infinity>(), moving.F.lpNorm<Eigen::Infinity>());
+    if (!(left <= kSatisfied * (1 + y.lpNorm<Eigen::Infinity>()))) return false;
+    position.continue_branches(y);
+    velocity.set_angles(position.followed_angles());
+    result.y = y, result.residual = left, result.iterations = static_cast<int>(projector->factorisations());
+    q = at, v = moving;
+    return result.ok = result.in_mode = true;
   }
 
   // From the nearest position that closes the joints to the equilibrium nearest to that.
@@ -250,6 +288,7 @@ struct Assembly::Solution {
 
   const Mechanism mechanism;
   double start;
+  Modes modes;
   const MechanismData& data;
   Equilibrium equilibrium;  // where the scene starts from one
   AssemblyEquations position, velocity;
@@ -257,8 +296,8 @@ struct Assembly::Solution {
   AssemblyResult result;
 };
 
-Assembly::Assembly(const Mechanism& mechanism, double start_time)
-    : solution_(std::make_unique<Solution>(mechanism, start_time)) {}
+Assembly::Assembly(const Mechanism& mechanism, double start_time, Modes modes)
+    : solution_(std::make_unique<Solution>(mechanism, start_time, modes)) {}
 Assembly::Assembly(Assembly&&) noexcept = default;
 Assembly::~Assembly() = default;
 

@@ -17,6 +17,7 @@ namespace mbsopt {
 
 struct AssemblyResult {
   bool ok = false;
+  bool in_mode = false;    // in the assembly mode of the guess, in the sense of the sign of det Phi_q, as far as known
   std::string message;     // names violated constraints and amounts where it failed
   Eigen::VectorXd y;       // (q, v)
   Eigen::VectorXd angles;  // branch of each tracked joint angle
@@ -24,9 +25,13 @@ struct AssemblyResult {
   double residual = 0;
 };
 
+// of_guess: fails where planar Newton steps do not reach the mode of the guess (AssemblyResult::in_mode). The search in
+// all modes costs several evaluations of a linkage that does not close.
+enum class Modes { all, of_guess };
+
 class Assembly {
  public:
-  Assembly(const Mechanism& mechanism, double start_time);
+  Assembly(const Mechanism& mechanism, double start_time, Modes modes = Modes::all);
   Assembly(Assembly&&) noexcept;
   ~Assembly();
   const AssemblyResult& result() const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <random>
 #include <string>
@@ -11,6 +12,8 @@
 #include "core/constraint/constraint.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/mechanism/planar_model.hpp"
+#include "core/projection/projection.hpp"
+#include "core/start/assembly.hpp"
 #include "core/start/assembly_problems.hpp"
 
 namespace mbsopt {
@@ -23,7 +26,10 @@ namespace {
 constexpr int kFruitless = 40;  // guesses in a row that find nothing new: a mode that one in ten finds is missed 1:70;
                                 // those that end inside out say nothing
 constexpr int kMost = 400;      // guesses
+constexpr double kOpen = 1e-6;  // |Phi| of a nearest approach, relative to the size: it is not closed there
 constexpr double kSame = 1e-6;  // distance of equal modes, relative to the size of the mechanism
+
+double size_of(const VectorXd& x) { return x.lpNorm<Eigen::Infinity>(); }
 
 // a times b
 Vector4d product(const Vector4d& a, const Vector4d& b) {
@@ -133,33 +139,37 @@ OrientationField turned(const OrientationField& given, const Vector4d& turn) {
 
 std::vector<AssemblyMode> assembly_modes(const Mechanism& mechanism, double t, const std::function<bool()>& go_on) {
   const MechanismData& d = mechanism.data();
+  const Assembly given(mechanism, t);
+  if (given.result().ok ? given.degrees_of_freedom() > 0 : d.drive_names.empty()) return {};
   const VectorXd guess = position_guess(d);
   std::vector<AssemblyMode> modes;
+  if (given.result().ok) modes.push_back({given.result().y.head(guess.size()), 0});
   RandomTurns turns(d);
-  for (int k = 0, fruitless = 0; k < kMost && fruitless < kFruitless; ++k) {
-    if (k > 0 && go_on && !go_on()) break;
+  const std::unique_ptr<Projector> projector = make_projector(mechanism, Projection::position_velocity,
+                                                              d.planar ? Model::planar : Model::spatial, Free::nothing);
+  VectorXd theta_bar = VectorXd::Zero(d.slots()), rho_bar = VectorXd::Zero(d.rho.size());
+  for (int k = 1, fruitless = 0; k < kMost && fruitless < kFruitless; ++k) {
+    if (go_on && !go_on()) break;
     AssemblyEquations equations(d, AssemblyLevel::position, t);
     PositionProblem positions(equations);
-    const VectorXd from = k == 0 ? guess : turns.of(guess);
-    VectorXd y = VectorXd::Zero(2 * from.size());
-    y.head(from.size()) = from;
+    VectorXd y = VectorXd::Zero(2 * guess.size());
+    y.head(guess.size()) = turns.of(guess);
     equations.start_branches(y);
-    NearestPoint found = nearest_point(positions, from, Decomposition::now, d.assembly_iterations);
-    const bool settled = found.status == NearestPointStatus::found && found.linearisation.rank() == found.x.size();
-    if (!settled) {
-      if (k == 0) return {};
-      ++fruitless;
+    ++fruitless;
+    if (projector->approach(t, equations.angles(), y, theta_bar, rho_bar) > kOpen * (1 + size_of(y))) continue;
+    NearestPoint found =
+        nearest_point(positions, y.head(guess.size()), Decomposition::on_demand, d.assembly_iterations);
+    if (found.status != NearestPointStatus::found) continue;
+    if (!found.determined) linearise(positions, found);
+    if (!found.determined && found.linearisation.rank() < found.x.size()) continue;
+    if (!modes.empty() && is_inside_out(d, modes[0].q, found.x)) {
+      --fruitless;
       continue;
     }
-    if (k > 0 && is_inside_out(d, modes[0].q, found.x)) continue;
-    const double size = 1 + found.x.lpNorm<Eigen::Infinity>();
-    const bool known =
-        std::ranges::any_of(modes, [&](const AssemblyMode& mode) { return distance(mode.q, found.x) <= kSame * size; });
-    if (known) {
-      ++fruitless;
+    const double size = 1 + size_of(found.x);
+    if (std::ranges::any_of(modes, [&](const AssemblyMode& m) { return distance(m.q, found.x) <= kSame * size; }))
       continue;
-    }
-    modes.push_back({found.x, k == 0 ? 0 : distance(modes[0].q, found.x)});
+    modes.push_back({found.x, modes.empty() ? 0 : distance(modes[0].q, found.x)});
     fruitless = 0;
   }
   std::ranges::sort(modes, {}, &AssemblyMode::distance);

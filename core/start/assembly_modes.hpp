@@ -20,7 +20,8 @@ struct AssemblyMode {
   double distance = 0;  // from the first: norm of the differences of r [m] and of rotation matrices
 };
 
-// The nearest first. Empty where something is free, or where the scene's poses do not close. go_on: asked before every
+// The nearest first; where the scene's poses do not lead to a mode, from the one found first. Empty where something is
+// free, or none is found. go_on: asked before every
 // guess after the first; false ends the search with what it has found.
 std::vector<AssemblyMode> assembly_modes(const Mechanism& mechanism, double t, const std::function<bool()>& go_on = {});
 

@@ -24,6 +24,7 @@ class NearestApproach {
   // At an instant after the one before. e_rho: of all parameters.
   double defect(double t, Eigen::VectorXd& e_rho);
   const Eigen::VectorXd& y() const { return y_; }  // positions there
+  const Eigen::VectorXd& angles() const { return angles_; }
 
  private:
   const Mechanism mechanism_;

@@ -12,6 +12,7 @@
 #include "core/expression/counted.hpp"
 #include "core/expression/did_you_mean.hpp"
 #include "core/simulate/simulation_warnings.hpp"
+#include "core/start/assembly.hpp"
 #include "core/start/assembly_modes.hpp"
 #include "optim/design/closing.hpp"
 #include "optim/design/design_program.hpp"
@@ -34,6 +35,9 @@
 namespace mbsopt {
 namespace {
 
+constexpr double kStationary = 100;  // times the tolerance: docs/design-optimisation.md, `converged`
+// The same for least squares. Where the cost settles to 1e-10 of itself, optimality is known to the root of that.
+constexpr double kSettled = 1000;
 constexpr double kTouches = 1e-5;  // relative to the bound's size: the barrier keeps solutions this near to a bound
 
 bool touches(double value, const std::optional<double>& bound, double size) {
@@ -235,6 +239,20 @@ void describe_solution(DesignProgram& program, const VariableScaling& scaling, c
     c.price = c.lower && c.upper && *c.lower == *c.upper ? fall : std::abs(fall);
   }
   if (result.status == SolverStatus::infeasible) describe_conflict(program, scaling, x, end, result);
+}
+
+// Least squares converges by its steps. Where a solved run leaves no noise, that is an optimum only with the optimality
+// conditions.
+void judge_stationarity(const DesignSpec& spec, DesignResult& result) {
+  const bool judged = spec.optimizer.type == OptimizerSpec::kLeastSquares && result.final_evaluation.ok &&
+                      result.final_evaluation.of_cases.front().statistics.solved;
+  if (!judged || result.status != SolverStatus::converged) return;
+  if (result.optimality <= kSettled * spec.optimizer.tolerance) return;
+  result.status = SolverStatus::no_progress;
+  result.message = fmt::format(
+      "no further progress: cost and parameters settle where the optimality is {:.1g}, a kink "
+      "or a dead point",
+      result.optimality);
 }
 
 // Says where a limit on an extreme does not hold for the true one, in spite of bounds that were moved.
@@ -461,6 +479,11 @@ std::string DesignConstraint::in_words() const {
   return load_case.empty() ? objective : fmt::format("{} ({})", objective, load_case);
 }
 
+bool DesignResult::is_at_boundary() const {
+  return std::ranges::any_of(variables, [](const DesignVariable& v) { return v.at_lower || v.at_upper; }) ||
+         std::ranges::any_of(constraints, [](const DesignConstraint& c) { return c.at_lower || c.at_upper; });
+}
+
 std::optional<double> design_sharpness(const Problem& problem, const DesignOptions& options) {
   return Prepared(problem, options, options.simulation_progress).spec.sharpness;
 }
@@ -519,6 +542,57 @@ Problem closed(const Problem& given, const DesignOptions& options, int& steps) {
   return problem;
 }
 
+// Far from the start its poses may lead to another mode, which is a jump that stops a search. Where one ends without
+// being stationary, it goes on with the poses that it has reached as its guess, as long as this makes the design
+// better. Returns whether the problem has other poses now.
+bool keep_mode(Problem& problem, const DesignOptions& options, DesignResult& result) {
+  constexpr int kMostMoves = 5;
+  constexpr double kHeld = 1e-6;  // violation of limits: what ranks as feasible
+  bool moved = false;
+  DesignOptions unrecorded = options;  // points are known by their scaled variables, whose units the start decides
+  unrecorded.records = nullptr, unrecorded.compare_differences = false;
+  for (int k = 0; k < kMostMoves; ++k) {
+    const bool ended = result.status == SolverStatus::converged || result.status == SolverStatus::no_progress;
+    if (!ended || result.optimality <= kStationary * problem.design->optimizer.tolerance) break;
+    Problem next = problem;
+    for (std::size_t p = 0; p < next.scene.parameters.size(); ++p)
+      next.scene.parameters[p].value = result.rho(static_cast<Eigen::Index>(p));
+    const Mechanism mechanism(next.scene, result.rho, std::vector<bool>(next.scene.parameters.size(), false));
+    const Assembly reached(mechanism, next.scene.simulation.start_time);
+    if (!reached.result().ok) break;
+    set_guess(next.scene, mechanism, {reached.result().y.head(reached.result().y.size() / 2), 0});
+    DesignResult more;
+    try {
+      more = designed(next, unrecorded);
+    } catch (const std::exception&) {  // a singular position, where parameters stand against each other
+      break;
+    }
+    const bool is_better = more.final_evaluation.ok && more.violation <= std::max(result.violation, kHeld) &&
+                           more.objective_final < result.objective_final;
+    more.objective_initial = result.objective_initial;
+    more.iterations += result.iterations, more.evaluations += result.evaluations;
+    more.failed_evaluations += result.failed_evaluations;
+    more.simulations += result.simulations, more.wall_seconds += result.wall_seconds;
+    for (std::size_t v = 0; v < more.variables.size(); ++v) more.variables[v].initial = result.variables[v].initial;
+    for (std::size_t c = 0; c < more.constraints.size(); ++c)
+      more.constraints[c].initial = result.constraints[c].initial;
+    for (std::size_t c = 0; c < more.cases.size(); ++c) more.cases[c].initial = result.cases[c].initial;
+    if (!is_better) {
+      result.iterations = more.iterations, result.evaluations = more.evaluations;
+      result.failed_evaluations = more.failed_evaluations;
+      result.simulations = more.simulations, result.wall_seconds = more.wall_seconds;
+      break;
+    }
+    std::vector<DesignRow> history = std::move(result.history);
+    const int before = history.empty() ? 0 : history.back().iteration;
+    for (DesignRow& row : more.history)
+      if (row.iteration > 0) row.iteration += before, history.push_back(row);
+    more.history = std::move(history);
+    result = std::move(more), problem = std::move(next), moved = true;
+  }
+  return moved;
+}
+
 // As designed, with the poses of the mode.
 DesignResult designed_in_mode(const Problem& given, const DesignOptions& options) {
   const int mode = *options.mode;
@@ -541,14 +615,15 @@ DesignResult designed_in_mode(const Problem& given, const DesignOptions& options
   }
   Problem problem = given;
   const std::vector<bool> none(given.scene.parameters.size(), false);
-  if (mode > 0)
-    set_guess(problem.scene, Mechanism(given.scene, parameter_values(given.scene), none),
-              modes[static_cast<std::size_t>(mode)]);
+  const Mechanism mechanism(given.scene, parameter_values(given.scene), none);
+  const bool posed = mode > 0 || !Assembly(mechanism, given.scene.simulation.start_time).result().ok;
+  if (posed) set_guess(problem.scene, mechanism, modes[static_cast<std::size_t>(mode)]);
   DesignOptions without_mode = options;
   without_mode.mode.reset();
   DesignResult result = designed(problem, without_mode);
+  const bool moved = keep_mode(problem, without_mode, result);
   result.mode = DesignMode{mode, static_cast<int>(modes.size()), {}};
-  if (mode > 0) result.mode->bodies = problem.scene.bodies;
+  if (posed || moved) result.mode->bodies = problem.scene.bodies;
   return result;
 }
 
@@ -630,6 +705,7 @@ DesignResult designed(const Problem& given, const DesignOptions& options) {
     describe_end(evaluator, program, solution.point, result);
     if (!abandoned && !rounds.true_values.empty()) {
       describe_solution(program, scaling, rounds, result);
+      judge_stationarity(spec, result);
       judge_true_extremes(program, evaluator, result);
     }
   }

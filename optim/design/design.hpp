@@ -105,6 +105,7 @@ struct DesignResult {
   std::vector<std::string> warnings;  // sentences
   std::optional<DesignMode> mode;     // where one was asked for
   int closing_steps = 0;              // that led a start which does not close to one that does (closing.hpp)
+  bool is_at_boundary() const;        // a bound of a variable, or a limit, holds the solution back or just holds
   bool ok() const {
     return status == SolverStatus::converged || status == SolverStatus::converged_beyond_limit ||
            status == SolverStatus::no_progress || status == SolverStatus::searched;

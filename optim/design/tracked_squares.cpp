@@ -4,14 +4,12 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 
 #include "core/driven/driven_simulation.hpp"
 #include "core/mechanism/scene_programs.hpp"
 #include "core/run/run_arguments.hpp"
 #include "core/simulate/simulation.hpp"
-#include "core/start/assembly.hpp"
-#include "optim/solver/levenberg_marquardt.hpp"
+#include "optim/solver/limit_multipliers.hpp"
 
 namespace mbsopt {
 
@@ -57,10 +55,11 @@ void project_free_instants(const Objective& objective, const std::vector<Objecti
 }  // namespace
 
 TrackedSquares::TrackedSquares(const DesignProgram& program, const CaseEvaluator& evaluator, PointRecords* records)
-    : LeastSquaresProblem(program.variables(), residuals(evaluator)),
+    : LeastSquaresProblem(program.variables(), mbsopt::residuals(evaluator) + program.constraints()),
       program_(program),
       evaluator_(evaluator),
-      records_(size * (1 + variables()) <= kMostNumbers ? records : nullptr) {
+      records_(size * (1 + variables()) <= kMostNumbers ? records : nullptr),
+      residuals_(size - program.constraints()) {
   x_lower = program.x_lower, x_upper = program.x_upper;
 }
 
@@ -75,26 +74,30 @@ void TrackedSquares::evaluate(const VectorXd& x, LeastSquaresPoint& point) {
     if (abandoned_) return;
     if (point.ok && !(point.z.allFinite() && point.z_x.allFinite())) point.ok = false, point.message = kNoValue;
     known.ok = point.ok, known.message = point.message;
-    known.f = point.z.squaredNorm(), known.f_x.setZero(variables());
+    known.f = point.z.head(residuals_).squaredNorm(), known.f_x.setZero(variables());
     known.c = point.z, known.c_x = point.z_x;
-    if (records_) records_->record(x, Wanted::derivatives, known);
+    if (records_ && !is_solved_) records_->record(x, Wanted::derivatives, known);
   }
   without_value_ = without_value_ || point.message == kNoValue;
 }
 
-// Residuals read no rates of the state, so that a solved run goes without the equations of motion.
+// Residuals read no rates of the state, so that a solved run goes without the equations of motion. Once a run has begun
+// in the mode of its guess, a jump to another mode is a failure.
 SimulationResult TrackedSquares::with_tangents(const Mechanism& mechanism, const SimulationSettings& settings,
                                                const TangentSampling& sampling, const RunOptions& options) {
   if (is_solved_) {
     check_run_arguments(mechanism, settings, {}, sampling.times, options);
-    const Assembly start(mechanism, settings.start_time);
+    const Assembly start(mechanism, settings.start_time, modes_);
     if (!start.result().ok) {
       SimulationResult failed;
       failed.status = SimulationStatus::assembly_failed, failed.message = start.result().message;
       return failed;
     }
-    if (is_solved(mechanism, settings, start))
-      return driven_tlm(mechanism, settings, {}, sampling, options, start, Rates::unknown);
+    if (is_solved(mechanism, settings, start)) {
+      if (start.result().in_mode) modes_ = Modes::of_guess;
+      return driven_tlm(mechanism, settings, {}, sampling, options, start,
+                        reads_velocities_ ? Rates::unknown : Rates::without_tangents);
+    }
     is_solved_ = false;
   }
   return simulate_tlm(mechanism, settings, {}, sampling, options);
@@ -117,28 +120,43 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
     for (const int k : evaluator.variables()) active[static_cast<std::size_t>(k)] = true;
     const Mechanism mechanism(evaluator.scene(), rho, active, evaluator.options().user_forces, evaluator.programs());
     const std::vector<Objective::Instant> instants = objective.instants_of(rows, mechanism, go_on);
-    std::vector<std::size_t> order(rows.size());  // of the rows in time
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return instants[i].time; });
+    const double weight = std::sqrt(weights(static_cast<Index>(c)));
+    struct Taken {
+      double time;
+      const CostExpression* value;
+      Index row;
+      double factor;  // of the value in the row
+    };
+    std::vector<Taken> taken;
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      taken.push_back({instants[i].time, &rows[i].value, first + static_cast<Index>(i), weight});
+    const Index limits = program_.constraints() / static_cast<Index>(evaluator_.cases());
+    for (Index i = 0; i < limits; ++i) {
+      const Index constraint = static_cast<Index>(c) * limits + i;
+      for (const Objective::Sample& sample : evaluator.objectives()[static_cast<std::size_t>(1 + i)].samples())
+        taken.push_back({sample.time, &sample.value, residuals_ + constraint, 1 / program_.size(constraint)});
+    }
+    std::ranges::stable_sort(taken, {}, &Taken::time);
     std::map<const void*, std::shared_ptr<const PointCost>> bound;  // rows of a file share an expression
     TangentSampling sampling;
     std::vector<const PointCost*> costs;
-    for (const std::size_t i : order) {
-      std::shared_ptr<const PointCost>& cost = bound[rows[i].value.id()];
-      if (!cost) cost = rows[i].value.bind(mechanism);
-      costs.push_back(cost.get()), sampling.times.push_back(instants[i].time);
+    for (const Taken& t : taken) {
+      std::shared_ptr<const PointCost>& cost = bound[t.value->id()];
+      if (!cost) cost = t.value->bind(mechanism);
+      costs.push_back(cost.get()), sampling.times.push_back(t.time);
     }
-    const double weight = std::sqrt(weights(static_cast<Index>(c)));
     const Index half = mechanism.states() / 2;
     VectorXd y_bar(mechanism.states()), rho_bar(rho.size()), z_t(static_cast<Index>(rows.size()));
+    bool reads_velocities = false;
     sampling.observe = [&](std::size_t k, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
       y_bar.setZero(), rho_bar.setZero();
-      const Index row = first + static_cast<Index>(order[k]);
-      point.z(row) = weight * costs[k]->add_gradient(at, 1, y_bar, rho_bar);
-      z_t(row - first) = weight * y_bar.head(half).dot(at.y.tail(half));
+      const auto& [time, value, row, factor] = taken[k];
+      point.z(row) += factor * costs[k]->add_gradient(at, 1, y_bar, rho_bar);
+      reads_velocities = reads_velocities || y_bar.tail(half).any();
+      if (row < residuals_) z_t(row - first) = factor * y_bar.head(half).dot(at.y.tail(half));
       for (Index j = 0; j < x.size(); ++j) {
         const int parameter = evaluator.variables()[static_cast<std::size_t>(j)];
-        point.z_x(row, j) = weight * rho_x(j) * (y_bar.dot(y_rho.col(parameter)) + rho_bar(parameter));
+        point.z_x(row, j) += factor * rho_x(j) * (y_bar.dot(y_rho.col(parameter)) + rho_bar(parameter));
       }
     };
     ++simulations_;
@@ -147,25 +165,15 @@ void TrackedSquares::simulate(const VectorXd& x, LeastSquaresPoint& point) {
       point.ok = false, point.message = run.message;
       return;
     }
+    if (reads_velocities && !reads_velocities_) {  // with their derivatives
+      reads_velocities_ = true;
+      point.z.setZero(), point.z_x.setZero();
+      return simulate(x, point);
+    }
     project_free_instants(objective, instants, first, z_t, point.z_x);
     first += static_cast<Index>(rows.size());
   }
 }
-
-namespace {
-
-// Part of the sum of squares that the best step along one free variable would gain by the derivatives.
-double promise(const TrackedSquares& problem, const LeastSquaresPoint& point, const VectorXd& x) {
-  double most = 0;
-  for (Index k = 0; k < x.size(); ++k) {
-    const double slope = point.z_x.col(k).dot(point.z), length = point.z_x.col(k).norm() * point.z.norm();
-    const bool presses = (x(k) <= problem.x_lower(k) && slope > 0) || (x(k) >= problem.x_upper(k) && slope < 0);
-    if (!presses && length > 0) most = std::max(most, std::pow(slope / length, 2));
-  }
-  return most;
-}
-
-}  // namespace
 
 NlpResult solve_tracked_squares(DesignProgram& program, const CaseEvaluator& evaluator, const VectorXd& x_start,
                                 const OptimizerSpec& spec, const std::function<bool(const NlpProgress&)>& progress,
@@ -179,10 +187,9 @@ NlpResult solve_tracked_squares(DesignProgram& program, const CaseEvaluator& eva
     constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
     return !problem.abandoned() && (!progress || progress({p.iteration, 2 * p.cost, 0, kUnknown, p.x}));
   };
-  LeastSquaresResult found = solve_least_squares(problem, x_start, options);
+  LeastSquaresResult found = solve_within_limits(problem, program.c_lower, program.c_upper, x_start, options);
   if (problem.abandoned()) --found.evaluations, --found.failed_evaluations;
-  if (found.status == SolverStatus::converged && problem.without_value() &&
-      promise(problem, found.point, found.x) > kSimulationNoise) {
+  if (found.status == SolverStatus::converged && problem.without_value() && found.promised > kSimulationNoise) {
     found.status = SolverStatus::no_progress;
     found.message =
         "no further progress: the steps lead to where a tracked weight is negative, or a sensor has no value" +
@@ -190,16 +197,20 @@ NlpResult solve_tracked_squares(DesignProgram& program, const CaseEvaluator& eva
   }
   NlpResult result;
   static_cast<SolverOutcome&>(result) = found;
-  result.algorithm = "Levenberg-Marquardt within bounds";
+  result.algorithm = program.constraints() > 0 ? "Levenberg-Marquardt within bounds, multipliers of limits"
+                                               : "Levenberg-Marquardt within bounds";
   simulations += problem.simulations();
   NlpPoint& point = result.point;
-  point.c.setZero(0), point.c_x.setZero(0, program.variables());
+  point.c.setZero(program.constraints()), point.c_x.setZero(program.constraints(), program.variables());
   point.ok = found.point.z.size() == problem.size;  // not where the start could not be evaluated
   if (!point.ok) {
     point.message = found.message;
     return result;
   }
-  point.f = found.point.z.squaredNorm(), point.f_x = 2 * found.point.z_x.transpose() * found.point.z;
+  const Index squares = problem.residuals();
+  point.f = found.point.z.head(squares).squaredNorm();
+  point.f_x = 2 * found.point.z_x.topRows(squares).transpose() * found.point.z.head(squares);
+  point.c = found.point.z.tail(program.constraints()), point.c_x = found.point.z_x.bottomRows(program.constraints());
   return result;
 }
 

@@ -2,11 +2,13 @@
 //
 //   z = sqrt(w_c w) (sensor(t_k) - column_k),     z_x by one tangent-linear run       w_c: weight of the load case
 //
-// so that Levenberg-Marquardt (levenberg_marquardt.hpp) takes the place of a general optimiser.
+// so that Levenberg-Marquardt (levenberg_marquardt.hpp) takes the place of a general optimiser. Limits of `samples` of
+// the same run are further rows, in units of their size; limit_multipliers.hpp holds them.
 #pragma once
 
 #include <functional>
 
+#include "core/start/assembly.hpp"
 #include "optim/design/design_program.hpp"
 #include "optim/solver/least_squares.hpp"
 
@@ -14,10 +16,12 @@ namespace mbsopt {
 
 class TrackedSquares : public LeastSquaresProblem {
  public:
-  // records: may be null. A point is recorded as one of constraints c = z, c_x = z_x.
+  // records: may be null. A point is recorded as one of constraints c = z, c_x = z_x, but not where the run is solved:
+  // that costs less than its record. Rows: residuals, then limits.
   TrackedSquares(const DesignProgram& program, const CaseEvaluator& evaluator, PointRecords* records = nullptr);
 
   void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) override;
+  Eigen::Index residuals() const { return residuals_; }
   long simulations() const { return simulations_; }
   bool abandoned() const { return abandoned_; }          // the last evaluation, by the user
   bool without_value() const { return without_value_; }  // whether a residual was not a number somewhere
@@ -30,9 +34,12 @@ class TrackedSquares : public LeastSquaresProblem {
   const DesignProgram& program_;
   const CaseEvaluator& evaluator_;
   PointRecords* const records_;
+  const Eigen::Index residuals_;
   long simulations_ = 0;
   bool abandoned_ = false, without_value_ = false;
-  bool is_solved_ = true;  // until a run is integrated
+  bool is_solved_ = true;          // until a run is integrated
+  bool reads_velocities_ = false;  // a sensor, as far as its derivatives were seen
+  Modes modes_ = Modes::all;       // until a start is assembled in the mode of its guess
 };
 
 // simulations: is added to.

@@ -5,6 +5,7 @@
 #include "core/cvodes/cvodes.hpp"
 #include "core/scene/scene_path.hpp"
 #include "optim/objective/objective.hpp"
+#include "optim/problem/bounded_means.hpp"
 #include "optim/solver/nlopt_methods.hpp"
 
 namespace mbsopt {
@@ -26,10 +27,6 @@ std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& s
   std::vector<DesignIssue> issues;
   const NloptMethod* const method = find_nlopt_method(optimizer.type);
   if (optimizer.type == OptimizerSpec::kLeastSquares) {
-    if (!spec.subject_to.empty())
-      issues.push_back({path + ".type",
-                        "is 'least_squares', which holds bounds of variables alone; design.subject_to "
-                        "needs another one: ipopt with \"hessian\": \"gauss_newton\""});
     if (spec.over == "max")
       issues.push_back({path + ".type", "is 'least_squares', which minimises sums over the cases, not their maximum"});
     for (const auto& [key, given] : {std::pair("hessian", optimizer.hessian != "lbfgs"),
@@ -92,7 +89,31 @@ std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& s
   return issues;
 }
 
+namespace {
+
+// Least squares computes limits with the residuals, at instants of the same run.
+std::optional<DesignIssue> limit_of_squares_issue(const Problem& problem) {
+  const std::vector<ObjectiveBound>& bounds = problem.design->subject_to;
+  for (std::size_t i = 0; i < bounds.size(); ++i) {
+    const auto objective = std::ranges::find(problem.objectives, bounds[i].objective, &ObjectiveSpec::name);
+    if (bounds[i].sampled || (objective == problem.objectives.end() && !bounded_mean(bounds[i]))) continue;
+    const bool has_samples_alone = objective != problem.objectives.end() && !objective->samples.empty() &&
+                                   !objective->running && !objective->terminal && !objective->parameters_only &&
+                                   objective->track.empty();
+    if (!has_samples_alone)
+      return DesignIssue{child_path("design.subject_to", i),
+                         "bounds " + (bounds[i].objective.empty() ? "a mean" : "'" + bounds[i].objective + "'") +
+                             ", which is not made of `samples` alone; the optimizer 'least_squares' takes no other "
+                             "limits, ipopt with \"hessian\": \"gauss_newton\" does"};
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
 std::optional<DesignIssue> curvature_issue(const Problem& problem) {
+  if (problem.design && problem.design->optimizer.type == OptimizerSpec::kLeastSquares)
+    if (const std::optional<DesignIssue> issue = limit_of_squares_issue(problem)) return issue;
   if (problem.design && problem.design->optimizer.type == OptimizerSpec::kLeastSquares &&
       !objectives_of(problem, {problem.design->minimize}).front().is_sum_of_squares())
     return DesignIssue{"design.optimizer.type", "is 'least_squares', but '" + problem.design->minimize +

@@ -131,6 +131,15 @@ void check_meaning(Checker& checker, const ObjectiveBound& bound) {
     given += bound.means[k].has_value();
     extreme = extreme || (bound.means[k] && kMeanKinds[k].extreme != Extreme::none);
   }
+  kinds.emplace_back("sampled");
+  given += bound.sampled.has_value();
+  if (bound.sampled.has_value() != bound.every.has_value())
+    checker.issue(checker.path(), "has only one of \"sampled\" and \"every\"; they say what is limited, and when");
+  constexpr double kMostLimits = 10'000;
+  const SimulationSettings& simulation = checker.facts().scene().simulation;
+  if (bound.every && simulation.end_time - simulation.start_time > kMostLimits * *bound.every)
+    checker.issue(checker.path("every"), "is " + text_of(*bound.every) + " s, which makes more than " +
+                                             text_of(kMostLimits) + " limits of the simulated time");
   if (given != 1)
     checker.issue(checker.path(), std::string(given == 0 ? "does not say what it bounds" : "bounds several things") +
                                       "; one is needed: objective, or in its place " + joined(kinds));
@@ -151,8 +160,9 @@ void check_meaning(Checker& checker, const DesignSpec& design) {
   for (std::size_t i = 0; i < design.subject_to.size(); ++i) {
     const ObjectiveBound& bound = design.subject_to[i];
     const std::optional<std::size_t> kind = bounded_mean(bound);
-    if (!kind) continue;
-    const auto [it, is_new] = first.emplace(name_of_mean(*kind, *bound.means[*kind]), i);
+    if (!kind && !bound.sampled) continue;
+    const std::string name = kind ? name_of_mean(*kind, *bound.means[*kind]) : "sampled " + bound.sampled->text();
+    const auto [it, is_new] = first.emplace(name, i);
     if (!is_new)
       checker.issue(child_path(checker.path("subject_to"), i), "bounds " + it->first + " once more; " +
                                                                    child_path(checker.path("subject_to"), it->second) +

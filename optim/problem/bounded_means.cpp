@@ -13,12 +13,45 @@ std::optional<std::size_t> bounded_mean(const ObjectiveBound& bound) {
   return std::nullopt;
 }
 
+std::vector<double> instants(const ObjectiveBound& bound, const SimulationSettings& simulation) {
+  constexpr double kRounding = 1e-9;  // of the number of intervals
+  const double intervals = (simulation.end_time - simulation.start_time) / *bound.every;
+  std::vector<double> times;
+  for (double k = 0; k <= intervals * (1 + kRounding); ++k)
+    times.push_back(std::min(simulation.start_time + k * *bound.every, simulation.end_time));
+  return times;
+}
+
 std::string name_of_mean(std::size_t kind, const Expression& of) {
   return fmt::format("{} {}", kMeanKinds[kind].name, of.text());
 }
 
+namespace {
+
+// A limit and an objective per instant.
+void name_sampled(Problem& problem) {
+  std::vector<ObjectiveBound> bounds;
+  for (ObjectiveBound& bound : problem.design->subject_to) {
+    if (!bound.sampled) {
+      bounds.push_back(std::move(bound));
+      continue;
+    }
+    for (const double t : instants(bound, problem.scene.simulation)) {
+      ObjectiveSpec objective;
+      objective.name = fmt::format("{} at {:g} s", bound.sampled->text(), t);
+      objective.samples = {{t, *bound.sampled}};
+      bounds.push_back({objective.name, bound.lower, bound.upper});
+      problem.objectives.push_back(std::move(objective));
+    }
+  }
+  problem.design->subject_to = std::move(bounds);
+}
+
+}  // namespace
+
 void name_bounded_means(Problem& problem) {
   if (!problem.design) return;
+  name_sampled(problem);
   for (ObjectiveBound& bound : problem.design->subject_to) {
     const std::optional<std::size_t> kind = bounded_mean(bound);
     if (!kind) continue;

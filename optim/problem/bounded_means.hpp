@@ -1,13 +1,15 @@
-// A limit on a mean of an expression that no objective of the file has:
+// Limits on a mean of an expression, or on its values at instants, that no objective of the file has:
 //
-//   "subject_to": [{"maximum_of": "F", "upper": 33}]
+//   "subject_to": [{"maximum_of": "F", "upper": 33}, {"sampled": "sin(mu)", "every": 0.5, "lower": 0.1}]
 //
-// The bound gets an objective of its own, "maximum_of F", so that all that is done with objectives is done with it.
+// A mean gets an objective of its own, "maximum_of F", each instant a limit and an objective, "sin(mu) at 0.5 s", so
+// that all that is done with objectives is done with them.
 #pragma once
 
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "optim/problem/problem.hpp"
 
@@ -15,6 +17,9 @@ namespace mbsopt {
 
 // Which of kMeanKinds a bound gives in place of an objective; the first where it gives several.
 std::optional<std::size_t> bounded_mean(const ObjectiveBound& bound);
+
+// Instants of a sampled limit: start_time + k every, up to end_time.
+std::vector<double> instants(const ObjectiveBound& bound, const SimulationSettings& simulation);
 
 std::string name_of_mean(std::size_t kind, const Expression& of);  // "maximum_of F"
 

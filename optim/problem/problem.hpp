@@ -77,6 +77,8 @@ struct ObjectiveBound {
   std::array<std::optional<Expression>, std::size(kMeanKinds)> means = {};
   std::optional<double> sharpness = {};  // when absent kSharpness over the size of the bounds
   static constexpr double kSharpness = 100;
+  std::optional<Expression> sampled = {};  // a limit at start_time + k every
+  std::optional<double> every = {};        // [s]
 };
 
 struct OptimizerSpec {

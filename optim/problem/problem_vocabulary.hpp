@@ -79,8 +79,10 @@ void describe(auto& v, Like<ObjectiveSpec> auto& o) {
 }
 
 void describe(auto& v, Like<ObjectiveBound> auto& b) {
-  v.reference("objective", b.objective, To::objective, {"an objective; or, in its place, one of the next four"});
+  v.reference("objective", b.objective, To::objective, {"an objective; or, in its place, one of the next five"});
   describe_means(v, b.means);
+  v.law("sampled", b.sampled, Names::objective, {"its value at each of the instants start_time + k every"});
+  v.plain("every", b.every, kPositive, {"of sampled [s]"});
   v.plain("sharpness", b.sharpness, kPositive,
           {"of an extreme in place of an objective; when absent 100 over the larger absolute value of the bounds"});
   v.plain("lower", b.lower, kAny, {"it must not be less"});

@@ -92,6 +92,7 @@ struct LeastSquaresResult : SolverOutcome {
   LeastSquaresPoint point;    // at x
   Eigen::VectorXd z_initial;  // at the start; empty where that could not be evaluated
   double cost_initial = 0, cost_final = 0;
+  double promised = 0;  // part of the cost that a step along one variable would gain by the derivatives
 };
 
 }  // namespace mbsopt

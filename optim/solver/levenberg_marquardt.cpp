@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -11,6 +12,7 @@
 
 #include "core/expression/counted.hpp"
 #include "optim/solver/bounded_linear_least_squares.hpp"
+#include "optim/solver/residual_curvature.hpp"
 
 namespace mbsopt {
 namespace {
@@ -49,14 +51,20 @@ Triangle triangle(std::vector<Index> variables, MatrixXd J) {
 struct LinearModel {
   RowBlocks R;
   VectorXd q, gradient;
-  VectorXd D;   // lengths of the columns, or more
-  double size;  // half the weighted sum of squares
+  VectorXd D;      // lengths of the columns, or more
+  VectorXd units;  // steps are measured by: D, or one length for all
+  double size;     // half the weighted sum of squares
 
   LinearModel(const LeastSquaresProblem& problem, const LeastSquaresPoint& point)
       : LinearModel(point, problem.weights(point.z).cwiseSqrt(), problem.parts) {}
   // w: square roots of the weights.
   LinearModel(const LeastSquaresPoint& point, const VectorXd& w, const std::vector<Dependence>& parts)
       : LinearModel(triangles(point, w, parts), point.z_x.cols(), 0.5 * w.cwiseProduct(point.z).squaredNorm()) {}
+  MatrixXd squares() const {  // J'J
+    MatrixXd H(D.size(), D.size());
+    for (Index k = 0; k < D.size(); ++k) H.col(k) = R.transposed_times(R * VectorXd(VectorXd::Unit(D.size(), k)));
+    return H;
+  }
   double promised(const VectorXd& d) const { return 0.5 * (q.squaredNorm() - (q + R * d).squaredNorm()); }
 
  private:
@@ -67,7 +75,7 @@ struct LinearModel {
     q.resize(rows);
     rows = 0;
     for (const Triangle& t : triangles) q.segment(rows, t.q.size()) = t.q, rows += t.q.size();
-    D = R.column_norms();
+    units = D = R.column_norms();
     gradient = R.transposed_times(q);
   }
 
@@ -100,7 +108,8 @@ struct LinearModel {
 
 class Search {
  public:
-  Search(LeastSquaresProblem& problem, const LeastSquaresOptions& options) : problem_(problem), options_(options) {}
+  Search(LeastSquaresProblem& problem, const LeastSquaresOptions& options)
+      : problem_(problem), options_(options), curvature_(problem.variables()) {}
 
   LeastSquaresResult run(const VectorXd& x_start) {
     x_ = result_.x = x_start.cwiseMax(problem_.x_lower).cwiseMin(problem_.x_upper);
@@ -154,6 +163,7 @@ class Search {
     if (!told(0, 0)) return;
     LinearModel model(problem_, point_);
     first_size_ = model.size;
+    if (options_.large_residuals) equalise(model.units);
     VectorXd d = step(model, lambda);
     double missed = 0, missed_by = 0;  // length of the step refused last at this point, and what its model missed
     while (true) {
@@ -173,15 +183,19 @@ class Search {
       LeastSquaresPoint trial = evaluated(x);
       const double cost = trial.ok ? problem_.cost(trial.z) : kInfinity;
       const double gained = cost_ - cost;
+      if (options_.large_residuals && std::isfinite(cost))
+        curved_ = std::abs(model.promised(d) - bent_by(d) - gained) < std::abs(model.promised(d) - gained);
       const bool settled = std::abs(gained) <= options_.tolerance * model.size;
       if (std::isfinite(cost) && (gained > kAccepted * promised || (settled && gained >= 0))) {
         invalid = 0, missed = 0;
+        if (options_.large_residuals) learn(x - x_, trial);
         x_ = x, cost_ = cost, point_ = std::move(trial);
         const double ratio = gained / promised;
         lambda = std::max(lambda * std::max(1. / 3, 1 - std::pow(2 * ratio - 1, 3)), kLeastDamping);
         const VectorXd D = model.D;
         model = LinearModel(problem_, point_);
-        model.D = model.D.cwiseMax(kShrinking * D);
+        model.D = model.units = model.D.cwiseMax(kShrinking * D);
+        if (options_.large_residuals) equalise(model.units);
         if (!told(free_gradient(model), d.norm())) return;
         if (settled) return converged(model, lambda);
         d = step(model, lambda);
@@ -193,7 +207,7 @@ class Search {
         return end(SolverStatus::failed, "failed: too many evaluations in a row" + result_.failures());
       // The cost that a model misses falls with the square of the step where it is smooth, and with its length at a
       // kink.
-      const double length = model.D.cwiseProduct(d).norm(), miss = std::abs(promised - gained);
+      const double length = model.units.cwiseProduct(d).norm(), miss = std::abs(promised - gained);
       if (missed > 0 && miss < kSimulationNoise * model.size && miss > std::sqrt(length / missed) * missed_by)
         return end(SolverStatus::converged,
                    fmt::format("converged: errors of the simulation change the cost by {:.1g}, more than the {:.1g} "
@@ -203,21 +217,23 @@ class Search {
       // The parabola through both costs with the slope at the start.
       const double slope = model.gradient.dot(d);
       const double part = std::isfinite(cost) ? std::clamp(-slope / (2 * (cost - cost_ - slope)), 0.1, 0.5) : 0.25;
-      const double longest = part * model.D.cwiseProduct(d).norm();
+      const double longest = part * model.units.cwiseProduct(d).norm();
       do {
         lambda *= 2;
         d = step(model, lambda);
-      } while (model.D.cwiseProduct(d).norm() > longest);
+      } while (model.units.cwiseProduct(d).norm() > longest);
     }
   }
 
   // The weights follow the residuals z + J d that the step leads to (levenberg_marquardt.hpp).
-  VectorXd step(const LinearModel& model, double lambda) const {
-    VectorXd d = weighed_step(model, model.D, lambda);
+  VectorXd step(const LinearModel& model, double& lambda) const {
+    if (curved_) return curved_step(model, lambda);
+    VectorXd d = weighed_step(model, model.units, lambda);
     for (int i = 0; i < kWeighings && has_weights(); ++i) {
       const VectorXd w = problem_.weights(point_.z + point_.z_x * d).cwiseSqrt();
-      const VectorXd before = std::exchange(d, weighed_step(LinearModel(point_, w, problem_.parts), model.D, lambda));
-      if (model.D.cwiseProduct(d - before).norm() <= kWeighed * model.D.cwiseProduct(d).norm()) break;
+      const VectorXd before =
+          std::exchange(d, weighed_step(LinearModel(point_, w, problem_.parts), model.units, lambda));
+      if (model.units.cwiseProduct(d - before).norm() <= kWeighed * model.units.cwiseProduct(d).norm()) break;
     }
     return d;
   }
@@ -225,7 +241,46 @@ class Search {
   bool has_weights() const { return !problem_.groups.empty() || problem_.loss.type != LossType::squared; }
 
   double promised_by(const LinearModel& model, const VectorXd& d) const {
-    return has_weights() ? cost_ - problem_.cost(point_.z + point_.z_x * d) : model.promised(d);
+    return has_weights() ? cost_ - problem_.cost(point_.z + point_.z_x * d)
+                         : model.promised(d) - (curved_ ? bent_by(d) : 0);
+  }
+
+  // d'S d/2
+  double bent_by(const VectorXd& d) const { return 0.5 * d.dot(curvature_.matrix() * d); }
+
+  // The step with J'J + S. lambda: rises where the matrix of the step is not positive definite.
+  VectorXd curved_step(const LinearModel& model, double& lambda) const {
+    constexpr double kFirstRise = 1e-8, kRise = 4;  // rises that rounding of J'J does not undo
+    const VectorXd D = model.units.unaryExpr([](double length) { return length > 0 ? length : 1; });
+    const VectorXd lower = D.cwiseProduct(problem_.x_lower - x_), upper = D.cwiseProduct(problem_.x_upper - x_);
+    const VectorXd inverse = D.cwiseInverse();
+    MatrixXd H = inverse.asDiagonal() * (model.squares() + curvature_.matrix()) * inverse.asDiagonal();
+    H.diagonal().array() += lambda;
+    Eigen::LLT<MatrixXd> L(H);
+    while (L.info() != Eigen::Success) {
+      const double larger = std::max(kRise * lambda, kFirstRise);
+      H.diagonal().array() += larger - lambda;
+      lambda = larger;
+      L.compute(H);
+    }
+    const VectorXd b = -L.matrixL().solve(inverse.cwiseProduct(model.gradient));
+    return bounded_linear_least_squares(RowBlocks(MatrixXd(L.matrixU())), b, lower, upper).cwiseQuotient(D);
+  }
+
+  // One length for all variables in units of their ranges, the least of their columns.
+  void equalise(VectorXd& units) const {
+    const VectorXd sizes = (problem_.x_upper - problem_.x_lower).unaryExpr([](double range) {
+      return std::isfinite(range) && range > 0 ? range : 1.0;
+    });
+    double least = kInfinity;
+    for (const double length : VectorXd(units.cwiseProduct(sizes)))
+      if (length > 0) least = std::min(least, length);
+    if (std::isfinite(least)) units = least * sizes.cwiseInverse();
+  }
+
+  void learn(const VectorXd& s, const LeastSquaresPoint& next) {
+    const VectorXd gradient = next.z_x.transpose() * next.z, crossed = point_.z_x.transpose() * next.z;
+    curvature_.add(s, gradient - point_.z_x.transpose() * point_.z, gradient - crossed);
   }
 
   VectorXd weighed_step(const LinearModel& model, const VectorXd& lengths, double lambda) const {
@@ -248,8 +303,8 @@ class Search {
 
   // By what it changes of the residuals, so that units of the variables do not matter.
   bool is_short(const LinearModel& model, const VectorXd& d) const {
-    const double size = model.D.cwiseProduct(x_).norm() + options_.tolerance * std::sqrt(2 * model.size);
-    return model.D.cwiseProduct(d).norm() <= options_.tolerance * size;
+    const double size = model.units.cwiseProduct(x_).norm() + options_.tolerance * std::sqrt(2 * model.size);
+    return model.units.cwiseProduct(d).norm() <= options_.tolerance * size;
   }
 
   bool presses(Index k, double gradient) const {
@@ -284,6 +339,7 @@ class Search {
   // Steps that were shortened to nothing are no convergence.
   void converged(const LinearModel& model, double lambda) {
     const double left = promise(model);
+    result_.promised = model.size > 0 ? left / model.size : 0;
     if (lambda > 1 && left > kSimulationNoise * first_size_)
       return end(SolverStatus::no_progress,
                  fmt::format("no further progress: the derivatives promise to lower the cost by {:.2g}, but no step "
@@ -306,6 +362,8 @@ class Search {
   VectorXd x_;
   LeastSquaresPoint point_;
   double cost_ = 0, first_size_ = 0;
+  ResidualCurvature curvature_;
+  bool curved_ = false;  // whether it takes part in the next step
 };
 
 }  // namespace

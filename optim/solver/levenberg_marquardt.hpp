@@ -12,6 +12,12 @@
 // Where the problem says which residuals depend on which variables, factors are those of its parts (row_blocks.hpp), so
 // that a step costs no more than linearly in their number.
 //
+// Where residuals stay large (`large_residuals`), J'J is only a part of the second derivatives. The rest, S, is learnt
+// from gradients (residual_curvature.hpp). After each trial the model that foretold the cost better, with S or without,
+// makes the next step; lambda rises until its matrix is positive definite. D is then the same for all variables in
+// units of their ranges: where a residual changes fast in one direction, the lengths of all columns grow with it, and
+// steps across that direction would be damped, too.
+//
 // A loss, and sigmas that the problem eliminates, make a cost of the residuals that is no square. The step minimises
 // this cost of the linear residuals, by weights (LeastSquaresProblem::weights) of the residuals that it leads to:
 //   minimise cost(z + J d) + lambda |D d|^2/2:   d <- the step above with the weights at z + J d,   until d is settled
@@ -43,6 +49,7 @@ struct LeastSquaresOptions {
   int max_iterations = 100;                                   // >= 0
   std::function<bool(const LeastSquaresProgress&)> progress;  // after every iteration; false stops
   std::optional<long> max_evaluations = {};                   // > 0, that of the start counted
+  bool large_residuals = false;                               // without parts, losses and groups
 };
 
 // x_start is taken into the bounds. Never throws for what an evaluation does: exceptions of evaluate() are failed

@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,8 @@
 #include "app/report/point_targets.hpp"
 #include "app/starts/point_records.hpp"
 #include "app/terminal/exit_code.hpp"
+#include "core/mechanism/mechanism_data.hpp"
+#include "core/start/assembly_equations.hpp"
 #include "core/start/nearest_approach.hpp"
 #include "optim/design/design.hpp"
 #include "optim/objective/design_issues.hpp"
@@ -256,7 +259,8 @@ TEST_CASE("six points on a line are met exactly, ten on an ellipse within 10 mm 
 }
 
 TEST_CASE("least squares that is interrupted keeps its best design, and goes on from its records", "[synthesis]") {
-  const Problem problem = eighteen_points();
+  Problem problem = eighteen_points();
+  problem.scene.simulation.solve = Solve::dynamics;
   long calls = 0, allowed = std::numeric_limits<long>::max();
   DesignOptions options = without_comparison();
   options.simulation_progress = [&](double) { return ++calls <= allowed; };
@@ -340,17 +344,76 @@ TEST_CASE("eighteen points: least squares ends where the literature does", "[syn
   CHECK(d.result["optimizer"]["objective_final"].get<double>() < 0.0099120);
 }
 
-TEST_CASE("least squares is refused where there are no squares, or limits", "[synthesis]") {
+TEST_CASE("least squares is refused where there are no squares, or limits of more than samples", "[synthesis]") {
   const TemporaryFolder folder;
   const Designed limits =
       designed_points(folder, and_also(kLeastSquares, {"--set",
                                                        "design.subject_to=[{\"objective\": \"transmission\", "
                                                        "\"lower\": 0.5}]"}));
   CHECK(limits.outcome.exit_code == kBadInput);
-  CHECK_THAT(limits.outcome.err, Contains("design.optimizer.type") && Contains("bounds of variables alone"));
+  CHECK_THAT(limits.outcome.err, Contains("design.subject_to[0]") && Contains("`samples` alone"));
   const Designed squares = designed_points(folder, and_also(kLeastSquares, {"--set", "design.minimize=transmission"}));
   CHECK(squares.outcome.exit_code == kBadInput);
   CHECK_THAT(squares.outcome.err, Contains("is not a sum of squares"));
+}
+
+TEST_CASE("eighteen points: least squares holds limits of samples, and says their prices", "[synthesis]") {
+  Problem problem = eighteen_points();
+  ObjectiveBound& sines = problem.design->subject_to.emplace_back();
+  sines.sampled = Expression::parse("sin(mu)"), sines.every = 0.5, sines.lower = 0.6;
+  const DesignResult result = run_design(problem, without_comparison());
+  INFO(result.message);
+  REQUIRE(result.constraints.size() == 35);
+  CHECK(result.constraints[1].objective == "sin(mu) at 0.5 s");
+  CHECK(result.status == SolverStatus::converged);
+  CHECK(result.optimality < 1e-4);
+  CHECK(result.violation < 1e-6);
+  CHECK(result.objective_final > 0.0099120);
+  double least = 1, dearest = 0;
+  for (const DesignConstraint& c : result.constraints)
+    least = std::min(least, c.value), dearest = std::max(dearest, c.price);
+  CHECK(least == Approx(0.6).epsilon(1e-5));
+  CHECK(dearest > 1e-4);
+}
+
+TEST_CASE("eighteen points: nine of ten searches from anywhere end in an optimum", "[synthesis]") {
+  long optima = 0, all = 0;
+  double least = 1;
+  for (int start = 0; start < 10; ++start)
+    for (const int mode : {0, 1}) {
+      const DesignResult result = designed_from("eighteen_points_starts", start, mode);
+      INFO(start << ' ' << mode << ' ' << result.message);
+      CHECK((result.status != SolverStatus::converged || result.optimality < 1e-3));
+      ++all, optima += result.status == SolverStatus::converged;
+      if (result.ok()) least = std::min(least, result.objective_final);
+    }
+  CHECK(10 * optima >= 9 * all);
+  CHECK(least < 0.0099120);
+}
+
+TEST_CASE("gradients of limits at instants agree", "[synthesis]") {
+  const TemporaryFolder folder;
+  const CommandOutcome checked = run_command(
+      {"check", MBSOPT_SOURCE_DIR + std::string("/problems/synthesis/eighteen_points_starts.json"), "--out",
+       folder.file("out"), "--set", "design.subject_to=[{\"sampled\": \"sin(mu)\", \"every\": 6, \"lower\": 0.1}]"});
+  INFO(checked.out << checked.err);
+  CHECK(checked.exit_code == kDone);
+  CHECK_THAT(checked.out, Contains("sin(mu) at 6 s"));
+}
+
+TEST_CASE("limits on lengths make a crank turn fully", "[synthesis]") {
+  Problem problem = eighteen_points();
+  problem.scene.definitions.push_back({"ground", Expression::parse("sqrt((Bx - Ax)^2 + (By - Ay)^2)")});
+  for (const char* margin : {"coupler + rocker - ground - crank", "ground + coupler - rocker - crank",
+                             "ground + rocker - coupler - crank"}) {
+    ObjectiveBound& limit = problem.design->subject_to.emplace_back();
+    limit.sampled = Expression::parse(margin), limit.every = 100, limit.lower = 0.05;
+  }
+  const DesignResult result = run_design(problem, without_comparison());
+  INFO(result.message);
+  CHECK(result.status == SolverStatus::converged);
+  REQUIRE(result.constraints.size() == 3);
+  for (const DesignConstraint& c : result.constraints) CHECK(c.value > 0.05 - 1e-6);
 }
 
 TEST_CASE("eighteen points: all branches start in both assembly modes, and the result is that of its mode",
@@ -374,7 +437,9 @@ TEST_CASE("eighteen points: all branches start in both assembly modes, and the r
   REQUIRE(again.exit_code == kDone);
   CHECK(json_of(folder.path / "g/result.json")["objectives"]["path"]["value"].get<double>() ==
         Approx(d.result["optimizer"]["objective_final"].get<double>()).epsilon(1e-9));
-}  // The file's four-bar with a coupler that is too short to reach all points.
+}
+
+// The file's four-bar with a coupler that is too short to reach all points.
 Problem open_four_bar() {
   Problem problem = eighteen_points();
   for (Parameter& p : problem.scene.parameters)
@@ -385,28 +450,50 @@ Problem open_four_bar() {
   return problem;
 }
 
+// The spatial function generator with a rod that is too short to let its crank turn.
+Problem open_rssr() {
+  Problem problem = read_problem(MBSOPT_SOURCE_DIR + std::string("/problems/synthesis/rssr.json"));
+  for (Definition& d : problem.scene.definitions)
+    if (d.name == "rod") d.value = Expression::parse("0.7*rocker");
+  return problem;
+}
+
 TEST_CASE("nearest approach: gradients of defects equal differences where the linkage is open", "[synthesis]") {
-  const Problem problem = open_four_bar();
-  const auto defects = [&](const Eigen::VectorXd& rho, Eigen::MatrixXd& e_rho) {
-    NearestApproach approach(Mechanism(problem.scene, rho), 0);
-    Eigen::VectorXd e(18), gradient(rho.size());
-    e_rho.resize(18, rho.size());
-    for (int k = 0; k < 18; ++k) {
-      e(k) = approach.defect(k, gradient);
-      e_rho.row(k) = gradient.transpose();
+  const auto [problem, step] = GENERATE(std::pair(open_four_bar(), 1), std::pair(open_rssr(), 2));
+  constexpr int kInstants = 18;
+  const Eigen::VectorXd rho = parameter_values(problem.scene);
+  // tangent: de = Phi'Phi_rho/(|Phi| sqrt(m)) of all equations of the assembly, column by column, at the same
+  // positions.
+  const auto defects = [&](const Eigen::VectorXd& at, Eigen::MatrixXd* e_rho, Eigen::MatrixXd* tangent) {
+    const Mechanism mechanism(problem.scene, at, std::vector<bool>(static_cast<std::size_t>(at.size()), true));
+    NearestApproach approach(mechanism, 0);
+    Eigen::VectorXd e(kInstants), gradient(at.size());
+    for (int k = 0; k < kInstants; ++k) {
+      e(k) = approach.defect(step * k, gradient);
+      if (!e_rho) continue;
+      e_rho->row(k) = gradient.transpose();
+      AssemblyEquations equations(mechanism.data(), AssemblyLevel::position, step * k);
+      equations.set_angles(approach.angles());
+      const Eigen::Index m = mechanism.data().m;
+      const Eigen::VectorXd Phi = equations.values(approach.y()).head(m);
+      const Eigen::MatrixXd Phi_rho = equations.gradients(approach.y()).rho.topRows(m);
+      tangent->row(k) = e(k) == 0 ? Eigen::RowVectorXd(Eigen::RowVectorXd::Zero(at.size()))
+                                  : Phi.normalized().transpose() * Phi_rho / std::sqrt(static_cast<double>(m));
     }
     return e;
   };
-  const Eigen::VectorXd rho = parameter_values(problem.scene);
-  Eigen::MatrixXd e_rho, unused;
-  const Eigen::VectorXd e = defects(rho, e_rho);
+  Eigen::MatrixXd e_rho(kInstants, rho.size()), tangent(kInstants, rho.size());
+  const Eigen::VectorXd e = defects(rho, &e_rho, &tangent);
   CHECK(e.maxCoeff() > 0.01);
   CHECK(e.minCoeff() == 0);
+  CHECK((e_rho - tangent).lpNorm<Eigen::Infinity>() < 1e-10);
+  constexpr double kStationary = 1e-4;  // an approach ends where |Phi| falls by 1e-12, which leaves a root in J'Phi
   const double h = 1e-6;
   for (Eigen::Index k = 0; k < rho.size(); ++k) {
     const Eigen::VectorXd d = h * Eigen::VectorXd::Unit(rho.size(), k);
-    const Eigen::VectorXd difference = (defects(rho + d, unused) - defects(rho - d, unused)) / (2 * h);
-    CHECK((difference - e_rho.col(k)).lpNorm<Eigen::Infinity>() < 1e-5);
+    const Eigen::VectorXd difference =
+        (defects(rho + d, nullptr, nullptr) - defects(rho - d, nullptr, nullptr)) / (2 * h);
+    CHECK((difference - e_rho.col(k)).lpNorm<Eigen::Infinity>() < kStationary);
   }
 }
 

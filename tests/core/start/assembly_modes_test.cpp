@@ -4,6 +4,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <string>
 
 #include "core/body/euler_parameters.hpp"
 #include "core/start/assembly.hpp"
@@ -113,6 +114,22 @@ TEST_CASE("a four-bar has two assembly modes, mirror images about the line from 
   const auto angle = [](const VectorXd& q) { return 2 * std::atan2(q(13), q(10)); };  // of the coupler
   const double sum = angle(modes[0].q) + angle(modes[1].q) - 2 * line;
   CHECK(std::abs(std::remainder(sum, 2 * 3.141592653589793)) < 1e-9);
+}
+
+// det Phi_q of a four-bar has the sign of sin(coupler - rocker).
+TEST_CASE("a four-bar assembles on the side of its guess, also from far", "[modes]") {
+  Scene scene = linkage();
+  const VectorXd rho = nominal(scene);
+  for (const AssemblyMode& mode : assembly_modes(Mechanism(scene, rho), 0)) {
+    const double coupler = 2 * std::atan2(mode.q(13), mode.q(10)), rocker = 2 * std::atan2(mode.q(20), mode.q(17));
+    const double offset = GENERATE(-0.8, -0.4, 0.4, 0.8), other = GENERATE(-0.8, -0.3, 0.3, 0.8);
+    if (std::sin(coupler + offset - rocker - other) * std::sin(coupler - rocker) < 0.1) continue;
+    scene.bodies[1].orientation = turned(std::to_string(coupler + offset));
+    scene.bodies[2].orientation = turned(std::to_string(rocker + other));
+    const Assembly found(Mechanism(scene, rho), 0);
+    REQUIRE(found.result().ok);
+    CHECK((found.result().y.head(mode.q.size()) - mode.q).norm() < 1e-9);
+  }
 }
 
 TEST_CASE("two loops have four assembly modes", "[modes]") {

@@ -1,0 +1,142 @@
+#include "optim/solver/limit_multipliers.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "core/expression/counted.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+// Of |z|. Of 0.05 to 1 this one ends most runs of eighteen_points_starts.json, in the fewest
+// evaluations: lighter limits let the search pass into dead points, heavier ones make valleys of them that steps follow
+// slowly.
+constexpr double kLimitWeight = 0.15;
+// Where a round that settled leaves more than a quarter of |c - P(s)|, the weight rises: Nocedal and Wright, framework
+// 17.3.
+constexpr double kSettledRound = 1e-7, kFallenEnough = 0.25, kHeavierLimit = 3, kHeaviestLimit = 1e3;
+constexpr double kLoosest = 1e-2, kTightening = 0.03;  // of rounds that only show the next one where to start
+constexpr double kLimitsHeld = 1e-6;                   // |c - P(s)| at the end: what ranks as feasible
+constexpr double kFinerLimits = 1e-4;                  // of the last: the cost is stationary in x, the limits are not
+constexpr int kLimitRounds = 30;                       // seven or eight are usual
+
+class LimitRound : public LeastSquaresProblem {
+ public:
+  LimitRound(LeastSquaresProblem& given, const VectorXd& c_lower, const VectorXd& c_upper)
+      : LeastSquaresProblem(given.variables(), given.size),
+        given_(given),
+        c_lower_(c_lower),
+        c_upper_(c_upper),
+        l_(VectorXd::Zero(c_lower.size())) {
+    x_lower = given.x_lower, x_upper = given.x_upper;
+  }
+
+  void evaluate(const VectorXd& x, LeastSquaresPoint& point) override {
+    if (known_.z.size() > 0 && x == x_) {  // where the last round ended
+      point = known_;
+    } else {
+      ++evaluations;
+      given_.evaluate(x, point);
+      if (!point.ok) return;
+    }
+    last = {x, 0.5 * point.z.head(size - l_.size()).squaredNorm()};
+    if (w_ == 0) w_ = weight(point);
+    const VectorXd s = point.z.tail(l_.size()) + l_ / (w_ * w_), beyond = s - taken_in(s);
+    point.z.tail(l_.size()) = w_ * beyond;
+    for (Index i = 0; i < l_.size(); ++i) point.z_x.row(point.z.size() - l_.size() + i) *= beyond(i) != 0 ? w_ : 0;
+  }
+
+  // Turns the solution of a round into that of the problem given, at the cost of no evaluation where it is known.
+  bool end(LeastSquaresResult& solution, double tolerance) {
+    LeastSquaresPoint at;
+    at.z.setZero(size), at.z_x.setZero(size, variables());
+    given_.evaluate(solution.x, at);
+    ++evaluations;
+    if (!at.ok) return false;
+    const VectorXd c = at.z.tail(l_.size()), s = c + l_ / (w_ * w_);
+    const double before = std::exchange(left_, (c - taken_in(s)).lpNorm<Eigen::Infinity>());
+    if (tolerance < kSettledRound && left_ > kFallenEnough * before)
+      part_ = std::min(kHeavierLimit * part_, kHeaviestLimit);
+    missed_ = (c - taken_in(c)).lpNorm<Eigen::Infinity>();
+    l_ = w_ * w_ * (s - taken_in(s));
+    x_ = solution.x, known_ = at, w_ = weight(at);
+    solution.point = at, solution.cost_final = 0.5 * at.z.head(size - l_.size()).squaredNorm();
+    return true;
+  }
+
+  double left() const { return left_; }      // |c - P(s)|
+  double missed() const { return missed_; }  // |c - P(c)|
+  long evaluations = 0;
+  struct {
+    VectorXd x;
+    double cost = 0;  // without limits
+  } last;             // that was evaluated
+
+ private:
+  VectorXd taken_in(const VectorXd& c) const { return c.cwiseMax(c_lower_).cwiseMin(c_upper_); }
+  double weight(const LeastSquaresPoint& point) const {
+    constexpr double kExact = 1e-12;  // squares that vanish leave the limits a weight
+    return part_ * std::max(point.z.head(size - l_.size()).norm(), kExact);
+  }
+
+  LeastSquaresProblem& given_;
+  const VectorXd &c_lower_, &c_upper_;
+  VectorXd l_, x_;
+  double part_ = kLimitWeight, w_ = 0, left_ = std::numeric_limits<double>::infinity(), missed_ = 0;
+  LeastSquaresPoint known_;
+};
+
+}  // namespace
+
+LeastSquaresResult solve_within_limits(LeastSquaresProblem& problem, const VectorXd& c_lower, const VectorXd& c_upper,
+                                       const VectorXd& x_start, const LeastSquaresOptions& options) {
+  if (c_lower.size() == 0) return solve_least_squares(problem, x_start, options);
+  LimitRound round(problem, c_lower, c_upper);
+  LeastSquaresResult all;
+  all.x = x_start;
+  double tolerance = kLoosest, shown = 0;
+  for (int k = 0; k < kLimitRounds; ++k, tolerance *= kTightening) {
+    LeastSquaresOptions of_round = options;
+    of_round.large_residuals = true;
+    of_round.tolerance = std::max(kFinerLimits * options.tolerance, tolerance);
+    of_round.max_iterations = options.max_iterations - all.iterations;
+    if (options.max_evaluations) of_round.max_evaluations = std::max(1L, *options.max_evaluations - round.evaluations);
+    if (options.progress)
+      of_round.progress = [&](LeastSquaresProgress p) {
+        if (k > 0 && p.iteration == 0) return true;
+        if (p.x == round.last.x) shown = round.last.cost;
+        p.iteration += all.iterations, p.cost = shown;
+        return options.progress(p);
+      };
+    LeastSquaresResult found = solve_least_squares(round, all.x, of_round);
+    found.iterations += all.iterations;
+    found.failed_evaluations += all.failed_evaluations;
+    if (!all.first_error.empty()) found.first_error = all.first_error;
+    const VectorXd z_initial = k == 0 ? found.z_initial : all.z_initial;
+    all = std::move(found);
+    all.z_initial = z_initial, all.evaluations = round.evaluations;
+    if (all.point.z.size() == 0 || !round.end(all, of_round.tolerance)) return all;
+    all.evaluations = round.evaluations;
+    if (all.status == SolverStatus::iteration_limit) {  // of all rounds, not of this one
+      all.message =
+          fmt::format("stopped at the limit of {}{}", counted(options.max_iterations, "iteration"), all.failures());
+      return all;
+    }
+    if (all.status == SolverStatus::stopped) return all;
+    if (round.left() <= kLimitsHeld && of_round.tolerance <= options.tolerance) return all;
+  }
+  all.status = round.missed() > kLimitsHeld ? SolverStatus::infeasible : SolverStatus::no_progress;
+  all.message =
+      round.missed() > kLimitsHeld
+          ? fmt::format("no point near satisfies all limits: one is missed by {:.1g} of its size", round.missed())
+          : "no further progress: the prices of the limits do not settle";
+  return all;
+}
+
+}  // namespace mbsopt
