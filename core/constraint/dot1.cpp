@@ -3,6 +3,19 @@
 #include "core/constraint/body_vector.hpp"
 
 namespace mbsopt {
+namespace {
+
+// (x'y)ddot in p and pdot of the body of x = A s, as VectorBlocks:  y'N(p, s) = (K(y s') p)', K as in
+// euler_parameters.hpp
+void product_rows(const VectorJet& y, const BodyState& b, const Vector3d& s, const Vector3d& x, Mat<1, 4>& by_p,
+                  Mat<1, 4>& by_pdot) {
+  const Vector3d turned = b.omegadot.cross(s) - 2 * b.pdot.squaredNorm() * s;
+  const Mat<4, 4> K_x = K(y.x * s.transpose()), K_xd = 2 * K(y.xd * s.transpose());
+  by_p = (K(y.x * turned.transpose() + y.xdd * s.transpose()) * b.p + K_xd * b.pdot).transpose();
+  by_pdot = (2 * (K_x * b.pdot) + K_xd * b.p - (4 * y.x.dot(x)) * b.pdot).transpose();
+}
+
+}  // namespace
 
 void Dot1::phi(const Frame& f1, const Frame& f2, Vec<1>& out) const { out(0) = (f1.A * s1).dot(f2.A * s2); }
 
@@ -44,17 +57,14 @@ void Dot1::tangent(const Frame& f1, const Frame& f2, const FrameTangent& t1, con
 
 void Dot1::turning_blocks(const BodyState& b1, const Frame& f1, const BodyState& b2, const Frame& f2,
                           const Vec<1>& lambda, TurningBlocks<1>& out) const {
-  const VectorBlocks dx(b1, f1, s1), dy(b2, f2, s2);
   const VectorJet x(f1, s1), y(f2, s2);
-  out.p1 = y.x.transpose() * dx.xdd_p + 2 * y.xd.transpose() * dx.xd_p + y.xdd.transpose() * dx.x_p;
-  out.p2 = x.x.transpose() * dy.xdd_p + 2 * x.xd.transpose() * dy.xd_p + x.xdd.transpose() * dy.x_p;
-  out.pdot1 = y.x.transpose() * dx.xdd_pdot + 2 * y.xd.transpose() * dx.x_p;
-  out.pdot2 = x.x.transpose() * dy.xdd_pdot + 2 * x.xd.transpose() * dy.x_p;
+  product_rows(y, b1, s1, x.x, out.p1, out.pdot1);
+  product_rows(x, b2, s2, y.x, out.p2, out.pdot2);
   const Matrix3d S1 = lambda(0) * skew(s1), S2 = lambda(0) * skew(s2);
   out.moment1_p1 = S1 * N_transposed(b1.p, y.x);
-  out.moment1_p2 = S1 * (f1.A.transpose() * dy.x_p);
+  out.moment1_p2 = S1 * (f1.A.transpose() * N(b2.p, s2));
   out.moment2_p2 = S2 * N_transposed(b2.p, x.x);
-  out.moment2_p1 = S2 * (f2.A.transpose() * dx.x_p);
+  out.moment2_p1 = S2 * (f2.A.transpose() * N(b1.p, s1));
 }
 
 }  // namespace mbsopt

@@ -114,8 +114,8 @@ struct RunOptions {
   std::function<bool(double t)> progress;  // called after accepted steps; false stops the run (status: stopped)
   // The state after each accepted step, the start not counted; for states at times of one's own choice: Sampling.
   std::function<void(const StatePoint& at)> after_step = {};
-  // Stages of implicit methods to rounding, not to a fraction of the tolerance; always so in runs with derivatives, and
-  // with fixed or given steps. For values that are to be compared with those.
+  // Stages of implicit methods to 1e-12 of the state, not to a fraction of the tolerance, for values that are to be
+  // compared with those of runs with derivatives. These always do so; fixed and given steps go on to rounding.
   bool exact_stages = false;
 };
 

@@ -12,8 +12,9 @@ constexpr long kMostNewtonIterations = 10;  // at a tolerance
 constexpr long kMostExactIterations = 60;   // to rounding, with a new Jacobian wherever convergence is slow
 constexpr double kSlow = 0.1;               // contraction per iteration from which a new Jacobian pays
 constexpr double kRounding = 1e-11;         // relative; iterations that stop falling below it are at rounding
-constexpr int kMostOwnJacobians = 4;        // of each stage, in one step
-constexpr int kOwnSteps = 20;  // steps for which they are used once the Jacobian of the start did not serve
+constexpr double kPolished = 1e-12;   // relative, of what the next iteration would change where stages are polished
+constexpr int kMostOwnJacobians = 4;  // of each stage, in one step
+constexpr int kOwnSteps = 20;         // steps for which they are used once the Jacobian of the start did not serve
 
 }  // namespace
 
@@ -240,8 +241,10 @@ bool ImplicitStages::iterate(Step& step, const StageGroup& g, Matrix& m, Goal go
     const double now = add_change(step, g, m, exact);
     if (!std::isfinite(now)) return false;
     bool converges = true;
+    if (since > 0) rate_ = before > 0 ? now / before : 0;
+    if (goal == Goal::polish && (since > 0 || !own) && rate_ <= 0.5 && rate_ / (1 - rate_) * now <= kPolished)
+      return true;
     if (since > 0) {
-      rate_ = before > 0 ? now / before : 0;
       if (exact) {
         converges = rate_ <= 0.5;
         if (!converges && now < kRounding) return true;

@@ -6,8 +6,9 @@
 //   V_i = v0 + h sum_j A_ij a_j,   Q_i = q0 + h sum_j A_ij V_j,   r(t_i, Q_i, V_i, a_i, lambda_i) = 0
 //
 // Convergence test: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.8. An adaptive
-// run stops at a fraction of its tolerance; where derivatives are taken, or steps are fixed or given, the stages of
-// accepted steps are solved to rounding, so that differences of runs over the same steps mean something.
+// run stops at a fraction of its tolerance; where derivatives are taken, the stages of accepted steps are polished to
+// 1e-12 of the state. Where steps are fixed or given, stages are solved to rounding, so that differences of runs over
+// the same steps mean something.
 #pragma once
 
 #include <optional>
@@ -36,7 +37,7 @@ class ImplicitStages {
   enum class Goal {
     tolerance,  // a fraction of it, from a guess
     rounding,   // from a guess
-    polish      // to rounding, from stages that are solved to a tolerance
+    polish      // to 1e-12 of the state, from stages that are solved to a tolerance
   };
   bool solve(Step& step, const StageGroup& group, Goal goal);
   // error = (I - h error_filter f_y)^-1 error

@@ -81,7 +81,7 @@ StageMatrix::StageMatrix(const MechanismData& data, const MotionJacobian& jacobi
       }
       most = std::max(most, at(joint.rows) * joint.bodies.size());
     }
-    G_.resize(most);
+    G_.resize(most), JW_.resize(most);
     by_body_.setZero(data.n * blocks_->stride());
   }
   values_.resize(at(stages));
@@ -103,6 +103,7 @@ void StageMatrix::set_scales(const MechanismData& data) {
   const double J = inertia > 0 ? power_of_two(inertia) : 1, L = mass > 0 ? power_of_two(std::sqrt(J / mass)) : 1;
   column_scale_ << L, L, L, 1, 1, 1, 1;
   row_scale_ << L, L, L, 1, 1, 1, J;
+  scale_ = row_scale_ * column_scale_.transpose();
   multiplier_scale_ = (data.row_alpha * J).cwiseSqrt().unaryExpr(power_of_two);
 }
 
@@ -138,33 +139,52 @@ bool StageMatrix::factor_blocks() {
       const double p = P_(i, j), pp = P2_(i, j);
       if (p != 0 || pp != 0) {
         for (std::size_t k = 0; k < pairs_.size(); ++k) {
-          const MotionJacobian::Block K = p * x.v[k] + pp * x.q[k];
-          S.add(pairs_[k], 7 * i, 7 * j, scaled(K));
+          S.add(pairs_[k], 7 * i, 7 * j, scale_.cwiseProduct(p * x.v[k] + pp * x.q[k]));
         }
       }
       if (i == j) {
-        for (std::size_t b = 0; b < diagonal_.size(); ++b) S.add(diagonal_[b], 7 * i, 7 * i, scaled(x.mass[b]));
-      }
-      for (const Joint& joint : joints_) {
-        const std::size_t bodies = joint.bodies.size(), rows = at(joint.rows);
-        for (std::size_t k = 0; k < rows * bodies; ++k) {
-          G_[k] = p * x.row_v[joint.place + k] + pp * x.row_q[joint.place + k];
-          if (i == j) G_[k] += x.J_T[joint.place + k];
-        }
-        for (std::size_t a = 0; a < bodies; ++a) {
-          for (std::size_t b = 0; b < bodies; ++b) {
-            MotionJacobian::Block JWG = MotionJacobian::Block::Zero();
-            for (std::size_t r = 0; r < rows; ++r) {
-              const Vec<6> JW = W_(joint.row + static_cast<int>(r)) * x.J[joint.place + r * bodies + a].transpose();
-              for (int c = 0; c < 7; ++c) JWG.col(c).head<6>() += G_[r * bodies + b](c) * JW;
-            }
-            S.add(joint.blocks[a * bodies + b], 7 * i, 7 * j, scaled(JWG));
-          }
+        for (std::size_t b = 0; b < diagonal_.size(); ++b) {
+          S.add(diagonal_[b], 7 * i, 7 * i, scale_.cwiseProduct(x.mass[b]));
         }
       }
     }
+    for (const Joint& joint : joints_) add_joint(joint, i, x);
   }
   return S.factor();
+}
+
+// J'W G of a joint's rows in the equations of stage i, scaled.
+void StageMatrix::add_joint(const Joint& joint, int i, const MotionJacobian::Values& x) {
+  const std::size_t bodies = joint.bodies.size(), rows = at(joint.rows), places = rows * bodies;
+  const MotionJacobian::Row* const row_v = x.row_v.data() + joint.place;
+  const MotionJacobian::Row* const row_q = x.row_q.data() + joint.place;
+  const MotionJacobian::Row* const J_T = x.J_T.data() + joint.place;
+  Vec<6>* const JW = JW_.data();
+  MotionJacobian::Row* const G = G_.data();
+  for (std::size_t k = 0; k < places; ++k) {
+    const double W = W_(joint.row + static_cast<int>(k / bodies));
+    JW[k] = W * row_scale_.head<6>().cwiseProduct(x.J[joint.place + k].transpose());
+  }
+  for (int j = 0; j < stages_; ++j) {
+    const double p = P_(i, j), pp = P2_(i, j);
+    if (i != j && p == 0 && pp == 0) continue;
+    for (std::size_t k = 0; k < places; ++k) {
+      G[k] = p * row_v[k] + pp * row_q[k];
+      if (i == j) G[k] += J_T[k];
+      G[k].array() *= column_scale_.transpose().array();
+    }
+    for (std::size_t a = 0; a < bodies; ++a) {
+      for (std::size_t b = 0; b < bodies; ++b) {
+        Mat<6, 7> JWG;
+        for (int c = 0; c < 7; ++c) {
+          Vec<6> column = G[b](c) * JW[a];
+          for (std::size_t k = bodies; k < places; k += bodies) column += G[k + b](c) * JW[k + a];
+          JWG.col(c) = column;
+        }
+        blocks_->add(joint.blocks[a * bodies + b], 7 * i, 7 * j, JWG);
+      }
+    }
+  }
 }
 
 bool StageMatrix::factor_sparse() {
@@ -178,7 +198,7 @@ bool StageMatrix::factor_sparse() {
     for (int j = 0; j < stages_; ++j) {
       const double p = P_(i, j), pp = P2_(i, j);
       for (std::size_t b = 0; b < of.q.size(); ++b) {
-        const MotionJacobian::Block K = scaled(p * of.v[b] + pp * of.q[b]);
+        const MotionJacobian::Block K = scale_.cwiseProduct(p * of.v[b] + pp * of.q[b]);
         for (const double e : K.reshaped()) add(e);
       }
       for (std::size_t r = 0; r < of.row_q.size(); ++r) {
@@ -189,7 +209,7 @@ bool StageMatrix::factor_sparse() {
       }
     }
     for (const MotionJacobian::Block& mass : of.mass) {
-      const MotionJacobian::Block M = scaled(mass);
+      const MotionJacobian::Block M = scale_.cwiseProduct(mass);
       for (const double e : M.reshaped()) add(e);
     }
     for (std::size_t r = 0; r < of.J.size(); ++r) {

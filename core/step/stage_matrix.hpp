@@ -53,13 +53,11 @@ class StageMatrix {
   };
 
   void set_scales(const MechanismData& data);
-  MotionJacobian::Block scaled(const MotionJacobian::Block& K) const {
-    return row_scale_.asDiagonal() * K * column_scale_.asDiagonal();
-  }
   template <bool Columns>
   void scale(Eigen::Ref<Eigen::MatrixXd> b) const;
 
   bool factor_blocks();
+  void add_joint(const Joint& joint, int i, const MotionJacobian::Values& x);
   bool factor_sparse();
   bool turn_to_sparse();
   bool is_right();
@@ -91,6 +89,7 @@ class StageMatrix {
   Eigen::Index accelerations_, per_stage_;
   Eigen::VectorXd epsilon_;          // per row of Phi
   Vec<7> row_scale_, column_scale_;  // of a body's equations and accelerations, as they are factored
+  MotionJacobian::Block scale_;      // both, of an entry
   Eigen::VectorXd multiplier_scale_;
   std::vector<Joint> joints_;
   std::vector<BlockLu::Handle> pairs_, diagonal_;  // per pair of the Jacobian; per body
@@ -102,7 +101,8 @@ class StageMatrix {
   Eigen::MatrixXd P_, P2_;
   std::vector<const MotionJacobian::Values*> values_;  // per stage
   Eigen::VectorXd W_;                                  // per row of Phi
-  std::vector<Mat<1, 7>> G_;                           // of the rows and bodies of a joint
+  std::vector<MotionJacobian::Row> G_;                 // of the rows and bodies of a joint, scaled
+  std::vector<Vec<6>> JW_;                             // the same: columns of J'W
   Eigen::MatrixXd right_, step_;
   Eigen::VectorXd by_body_, v_, q_, probe_, answer_;
   long factorisations_ = 0, pivoted_ = 0;

@@ -1,6 +1,6 @@
 // The cost of gradients, in simulations. One simulation is a run with the same objectives, at the same parameters and
 // tolerances, as `simulate` takes it: compiling the mechanism, assembly and time integration, implicit stages to the
-// tolerance of the run. (Runs with derivatives solve them to rounding, which is part of their cost.) Simulation, TLM
+// tolerance of the run. (Runs with derivatives solve them to 1e-12, which is part of their cost.) Simulation, TLM
 // and adjoint run in turn; a ratio is the median over the rounds of that round's ratio, so that it holds on a busy
 // machine.
 //

@@ -18,3 +18,8 @@ execute_process(COMMAND ${CMAKE_COMMAND} -S ${SOURCE}/../../examples -B ${work}/
                         -DCMAKE_PREFIX_PATH=${work}/prefix -DCMAKE_BUILD_TYPE=Release COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND ${CMAKE_COMMAND} --build ${work}/examples COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND ${CMAKE_CTEST_COMMAND} --test-dir ${work}/examples --output-on-failure COMMAND_ERROR_IS_FATAL ANY)
+find_program(PYTHON python3)
+if(PYTHON)
+  execute_process(COMMAND ${PYTHON} ${SOURCE}/resume.py ${work}/examples/own_program
+                          ${SOURCE}/../../examples/own_program.json ${work}/resume COMMAND_ERROR_IS_FATAL ANY)
+endif()
