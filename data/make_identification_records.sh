@@ -82,6 +82,8 @@ motion arm double_pendulum/identify_windows parameters.h1.value=0.25 parameters.
   parameters.viscous2.value=0.01
 record arm 17 0.005 pos_meas1 pos_meas2 vel_meas1 vel_meas2
 sed -i '1s/^t,/time,/' data/identification/arm.csv
+data/smooth_motion.py data/identification/arm.csv 0.04 time pos_meas1:vel_meas1 pos_meas2:vel_meas2 \
+  >data/identification/arm_smooth.csv
 
 printf 't,angle1,angle2\n0,0,0\n1,0,0\n5,0,0\n' >data/identification/tumbling.csv
 motion tumbling double_pendulum/identify_tumbling simulation.end_time=5 parameters.J1.value=0.06 \

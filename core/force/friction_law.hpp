@@ -7,9 +7,10 @@ namespace mbsopt {
 
 // A law of JointEffort, of the rate alone.
 struct FrictionLaw {
-  static constexpr int kFields = 3;
+  static constexpr int kFields = 5;
   double coulomb = 0, smooth = 1, viscous = 0;  // [N m], [rad/s], [N m s/rad], or [N], [m/s], [N s/m]
-  int slot = -1;                                // first of their three rows among the differentiated fields
+  double breakaway = 0, stribeck = 1;           // [N m], [rad/s], or [N], [m/s]
+  int slot = -1;                                // first of their five rows among the differentiated fields
 
   double value(double, const Eigen::VectorXd&, double, double rate, Law::Scratch&) const;
   Law::Value derivatives(double, const Eigen::VectorXd&, double, double rate, Law::Scratch&) const;
@@ -17,19 +18,23 @@ struct FrictionLaw {
                           Eigen::VectorXd&) const;
   double potential(double) const { return 0; }
   double potential_slope(double) const { return 0; }
-  Vec<3> potential_gradient(double) const { return Vec<3>::Zero(); }
+  Vec<kFields> potential_gradient(double) const { return Vec<kFields>::Zero(); }
   double stiffness() const { return 0; }
   bool conserves_energy() const { return false; }
 
   bool moves(const ParameterBlock& block) const { return block.moves(slot, kFields); }
   template <class RhoDirection>
-  Lanes<1> field_tangent(const Law::Point& at, const Lanes<3>* fields, RhoDirection&&, const Law::Scratch&) const {
+  Lanes<1> field_tangent(const Law::Point& at, const Lanes<kFields>* fields, RhoDirection&&,
+                         const Law::Scratch&) const {
     return fields ? Lanes<1>(field_gradient(at.xdot).transpose() * *fields) : Lanes<1>(Lanes<1>::Zero());
   }
 
  private:
-  double width(double rate) const;
-  Vec<3> field_gradient(double rate) const;  // df/d(coulomb, smooth, viscous)
+  struct Parts {
+    double w, fall, level;  // fall = exp(-(rate/stribeck)^2)
+  };
+  Parts parts(double rate) const;
+  Vec<kFields> field_gradient(double rate) const;  // df/d(coulomb, smooth, viscous, breakaway, stribeck)
 };
 
 }  // namespace mbsopt

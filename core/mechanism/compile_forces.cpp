@@ -142,12 +142,17 @@ void add(Compilation& model, const BushingSpec& f, int force, const std::string&
 void add(Compilation& model, const FrictionSpec& f, int force, const std::string& where) {
   const Joint& joint = model.scene.joints[model.joint_index(f.joint, where + ".joint")];
   FrictionLaw law;
-  const DualVector3 x{model.fields.value(f.coulomb, where + ".coulomb"),
-                      model.fields.value(f.smooth_velocity, where + ".smooth_velocity"),
-                      model.fields.value(f.viscous, where + ".viscous")};
-  const Vec<3> v = numbers(model.keep(law.slot, x));
-  law.coulomb = v(0), law.smooth = v(1), law.viscous = v(2);
+  // Without breakaway the level is coulomb at any Stribeck velocity.
+  const DualVector<FrictionLaw::kFields> x{
+      model.fields.value(f.coulomb, where + ".coulomb"),
+      model.fields.value(f.smooth_velocity, where + ".smooth_velocity"),
+      model.fields.value(f.viscous, where + ".viscous"),
+      model.fields.value(f.breakaway.value_or(f.coulomb), where + ".breakaway"),
+      model.fields.value(f.stribeck_velocity.value_or(1.0), where + ".stribeck_velocity")};
+  const Vec<FrictionLaw::kFields> v = numbers(model.keep(law.slot, x));
+  law.coulomb = v(0), law.smooth = v(1), law.viscous = v(2), law.breakaway = v(3), law.stribeck = v(4);
   if (!(law.smooth > 0)) throw SceneError(where + ".smooth_velocity: must be greater than 0");
+  if (!(law.stribeck > 0)) throw SceneError(where + ".stribeck_velocity: must be greater than 0");
   if (is_sliding(f.motion, joint.type)) {
     model.data.forces.of<SlidingFriction>().push_back(
         {force, model.joint_displacement(f.joint, where + ".joint"), -1, law});

@@ -90,15 +90,23 @@ void check_friction(Checker& checker, const FrictionSpec& friction) {
   const Joint* const joint = checker.facts().joint(friction.joint);
   const bool slides = joint && is_sliding(friction.motion, joint->type);
   check_joint_has(checker, "joint", friction.joint, slides ? "displacement" : "angle");
-  const auto check = [&](std::string_view key, const Field& field, const Dimension& turning, const Dimension& sliding) {
+  const auto check = [&](std::string_view key, const auto& field, const Dimension& turning, const Dimension& sliding) {
     if (joint) checker.number(key, field, {"", Need::optional, slides ? sliding : turning});
   };
   check("coulomb", friction.coulomb, kTorque, kForce);
   check("smooth_velocity", friction.smooth_velocity, kRate, kVelocity);
   check("viscous", friction.viscous, kTorsionalDamping, kDamping);
-  const std::optional<double> smooth = checker.facts().value(friction.smooth_velocity);
-  if (smooth && *smooth <= 0)
-    checker.issue(checker.path("smooth_velocity"), "is " + text_of(*smooth) + ", it must be greater than 0");
+  check("breakaway", friction.breakaway, kTorque, kForce);
+  check("stribeck_velocity", friction.stribeck_velocity, kRate, kVelocity);
+  if (friction.breakaway.has_value() != friction.stribeck_velocity.has_value())
+    checker.issue(checker.path(friction.breakaway ? "stribeck_velocity" : "breakaway"),
+                  "is missing; give breakaway and stribeck_velocity, or neither");
+  const auto check_above_zero = [&](std::string_view key, const Field& field) {
+    const std::optional<double> rate = checker.facts().value(field);
+    if (rate && *rate <= 0) checker.issue(checker.path(key), "is " + text_of(*rate) + ", it must be greater than 0");
+  };
+  check_above_zero("smooth_velocity", friction.smooth_velocity);
+  if (friction.stribeck_velocity) check_above_zero("stribeck_velocity", *friction.stribeck_velocity);
 }
 
 void check_moving(Checker& checker, const std::string& body) {

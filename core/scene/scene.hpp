@@ -198,6 +198,8 @@ struct FrictionSpec {
   std::string joint;
   std::string motion;                       // rotation or translation; empty: whichever the joint has, rotation first
   Field coulomb, smooth_velocity, viscous;  // [N m], [rad/s], [N m s/rad], or [N], [m/s], [N s/m]
+  std::optional<Field> breakaway = {};      // [N m], [N]; empty: coulomb
+  std::optional<Field> stribeck_velocity = {};  // [rad/s], [m/s]; with breakaway
 };
 // A force written in C++, by its name. Its rho is its own parameters, in the order of this list.
 struct UserForceSpec {

@@ -81,8 +81,8 @@ inline constexpr TypeRow kForceTypes[] = {
      "body! components! frame"},
     {"bushing", "springs and dampers along and about the three axes of body1, undeformed as the file places the bodies",
      "body1 body2! point1 point2 stiffness damping torsional_stiffness torsional_damping"},
-    {"friction", "smoothed Coulomb and viscous friction about or along the axis of a joint",
-     "joint! motion coulomb smooth_velocity! viscous"},
+    {"friction", "smoothed Coulomb, Stribeck and viscous friction about or along the axis of a joint",
+     "joint! motion coulomb smooth_velocity! viscous breakaway stribeck_velocity"},
     {"user", "force written in C++, of a plug-in or of the program, by its name", "force! bodies parameters"},
 };
 

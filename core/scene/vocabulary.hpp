@@ -326,6 +326,11 @@ void describe(auto& v, Like<FrictionSpec> auto& f, const TypeRow& row) {
   v.number("smooth_velocity", f.smooth_velocity,
            {"rate at which the Coulomb part is 0.71 of its level [rad/s], [m/s]", need_of(row, "smooth_velocity")});
   v.number("viscous", f.viscous, {"torque [N m s/rad] or force [N s/m] per rate", need_of(row, "viscous")});
+  v.number("breakaway", f.breakaway,
+           {"torque [N m] or force [N] of dry friction at low rates; when absent, that at high rates",
+            need_of(row, "breakaway")});
+  v.number("stribeck_velocity", f.stribeck_velocity,
+           {"rate at which 1/e of breakaway - coulomb is left [rad/s], [m/s]", need_of(row, "stribeck_velocity")});
 }
 
 void describe(auto& v, Like<UserForceSpec> auto& f, const TypeRow& row) {

@@ -157,6 +157,28 @@ TEST_CASE("friction comes from a run-down with gross errors, in a CSV file with 
   CHECK(squared.at("experiments").at("run_down").at("channels").at("omega").at("sigma").get<double>() > 0.3);
 }
 
+TEST_CASE("inverse dynamics: torques of the smoothed motion give the arm's numbers, and start the forward fit",
+          "[gallery][identification]") {
+  const TemporaryFolder folder;
+  // Whatever the start, since the residuals are linear.
+  const auto result = identified(folder, "double_pendulum/inverse_dynamics",
+                                 {"--set", "parameters.h1.value=0.6", "--set", "parameters.J1.value=0.4", "--set",
+                                  "parameters.h2.value=0.05", "--set", "parameters.coulomb1.value=0.6"});
+  CHECK(result.at("optimizer").at("evaluations") <= 5);
+  const std::map<std::string, double> truth{{"h1", 0.25}, {"J1", 0.06},      {"h2", 0.16},
+                                            {"J2", 0.05}, {"coulomb1", 0.1}, {"coulomb2", 0.08}};
+  std::vector<std::string> starts;
+  for (const auto& [name, value] : truth) {
+    INFO(name);
+    const double found = result.at("parameters").at(name).at("value");
+    CHECK(found == Approx(value).epsilon(name.starts_with("coulomb") ? 0.1 : 0.01));
+    starts.insert(starts.end(), {"--set", "parameters." + name + ".value=" + std::to_string(found)});
+  }
+  const TemporaryFolder other;
+  const auto forward = identified(other, "double_pendulum/identify_windows", starts);
+  CHECK(forward.at("optimizer").at("evaluations") <= 6);
+}
+
 TEST_CASE("before the fit: what the columns hold, and what they would determine", "[identification][command]") {
   const TemporaryFolder folder;
   const auto result = identified(folder, "spring_damper/identify", {"--preflight"});

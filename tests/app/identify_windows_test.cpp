@@ -125,3 +125,31 @@ TEST_CASE("the measured arm in windows: the residuals of its record, and parts t
       CHECK(b.value < a.ci95[1]);
     }
 }
+
+TEST_CASE("the measured arm with Stribeck's friction in the elbow: friction of disjoint parts agrees",
+          "[identification][measured]") {
+  if (!std::filesystem::exists(kMeasured)) {
+    WARN("the record is not here, nothing was tested: " << kMeasured);
+    return;
+  }
+  std::vector<IdentificationResult> parts;
+  for (const double start : {0.5, 2.5, 4.5, 6.5}) {
+    std::vector<std::string> sets = measured_between(start, start + 2);
+    sets.insert(sets.end(), {R"(parameters.rise2={"value": 0.05, "lower": 0, "upper": 2, "unit": "N m"})",
+                             "forces[3].breakaway=coulomb2 + rise2", "forces[3].stribeck_velocity=2",
+                             R"(identification.variables=["h1", "J1", "h2", "J2", "coulomb1", "coulomb2", "viscous1",)"
+                             R"( "viscous2", "rise2"])"});
+    parts.push_back(fitted(sets));
+    REQUIRE(parts.back().ok());
+  }
+  for (const std::size_t k : {2, 4, 5}) {  // m2 r2, Coulomb friction of both joints
+    for (const IdentificationResult& one : parts) {
+      for (const IdentificationResult& other : parts) {
+        const FittedParameter &a = one.parameters[k], &b = other.parameters[k];
+        INFO(a.name << ": " << a.value << " +- " << a.std_error << ", " << b.value << " +- " << b.std_error);
+        CHECK(std::abs(a.value - b.value) <= 3 * std::hypot(a.std_error, b.std_error));
+        CHECK(a.ci95[0] < b.ci95[1]);
+      }
+    }
+  }
+}

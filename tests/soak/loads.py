@@ -248,9 +248,12 @@ class Loads:
         turns = joint.angle is not None
         inertia = self.least(joint.bodies, "inertia" if turns else "mass")
         rate = (1 if turns else f.length) / f.time
-        return {"type": "friction", "joint": joint.name, "motion": "rotation" if turns else "translation",
-                "coulomb": 0.3 * inertia * rate / f.time, "smooth_velocity": rate * rng.uniform(0.2, 1),
-                "viscous": rng.choice([0, 0.1]) * inertia / f.time}
+        friction = {"type": "friction", "joint": joint.name, "motion": "rotation" if turns else "translation",
+                    "coulomb": 0.3 * inertia * rate / f.time, "smooth_velocity": rate * rng.uniform(0.2, 1),
+                    "viscous": rng.choice([0, 0.1]) * inertia / f.time}
+        if rng.random() < 0.5:
+            friction |= {"breakaway": 1.5 * friction["coulomb"], "stribeck_velocity": rate * rng.uniform(0.2, 1)}
+        return friction
 
     def hold_everything(self):
         """An equilibrium exists for sure where every body is held; only then is one worth asking for."""

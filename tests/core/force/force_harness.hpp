@@ -42,17 +42,19 @@ struct ProgramLaw {
   }
 };
 
-// Smoothed Coulomb friction and a viscous part: three fields.
+// Smoothed Coulomb and Stribeck friction and a viscous part: five fields.
 struct DryFriction {
-  static constexpr int kFields = 3, kParameters = 0;
+  static constexpr int kFields = 5, kParameters = 0;
   using ForceLaw = FrictionLaw;
   template <class T>
   static T value(const std::vector<T>& at, std::size_t k, const T&, const T& rate) {
-    using std::sqrt;
-    return at[k] * rate / sqrt(rate * rate + at[k + 1] * at[k + 1]) + at[k + 2] * rate;
+    using std::exp, std::sqrt;
+    const T part = rate / at[k + 4], level = at[k] + (at[k + 3] - at[k]) * exp(-part * part);
+    return level * rate / sqrt(rate * rate + at[k + 1] * at[k + 1]) + at[k + 2] * rate;
   }
   static void fill(FrictionLaw& law, const Eigen::VectorXd& at, int first, int slot) {
     law.coulomb = at(first), law.smooth = at(first + 1), law.viscous = at(first + 2);
+    law.breakaway = at(first + 3), law.stribeck = at(first + 4);
     law.slot = slot;
   }
 };

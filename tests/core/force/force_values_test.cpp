@@ -36,7 +36,7 @@ TEST_CASE("a bushing measures the rotation vector at any angle below half a turn
 
 TEST_CASE("friction resists the motion at its level, smoothly through rest", "[force]") {
   FrictionLaw law;
-  law.coulomb = 2, law.smooth = 0.01, law.viscous = 0.5;
+  law.coulomb = 2, law.smooth = 0.01, law.viscous = 0.5, law.breakaway = 2;
   Law::Scratch scratch;
   auto torque = [&](double rate) { return law.value(0, VectorXd(), 0, rate, scratch); };
   CHECK(torque(0) == 0);
@@ -44,6 +44,10 @@ TEST_CASE("friction resists the motion at its level, smoothly through rest", "[f
   CHECK(torque(5) == Approx(2 + 2.5).epsilon(1e-5));
   CHECK(torque(-5) == -torque(5));
   CHECK(law.derivatives(0, VectorXd(), 0, 0, scratch).f_xdot == Approx(2 / 0.01 + 0.5));
+  law.breakaway = 3, law.stribeck = 0.4;
+  CHECK(torque(0.4) == Approx(2 + std::exp(-1.0) + 0.2).epsilon(1e-3));
+  CHECK(torque(5) == Approx(2 + 2.5).epsilon(1e-5));
+  CHECK(torque(-0.4) == -torque(0.4));
 }
 
 TEST_CASE("a force at a point gives its moment about the centre of mass", "[force]") {

@@ -75,7 +75,8 @@ struct RsdaCase : Bodies {
 
 // Friction along an axis of body 1; geometry: the two points and the axis.
 struct SlidingCase : Bodies {
-  static constexpr int kGeometry = 9, kLaw = 28 + kGeometry, kFields = 3, kParameters = 0, kInputs = kLaw + kFields;
+  static constexpr int kGeometry = 9, kLaw = 28 + kGeometry, kFields = DryFriction::kFields, kParameters = 0;
+  static constexpr int kInputs = kLaw + kFields;
   SlidingFriction force;
 
   explicit SlidingCase(unsigned seed) : Bodies(seed, kInputs) { place(); }
@@ -110,7 +111,8 @@ struct SlidingCase : Bodies {
     LawScratch<DryFriction> s(force.law, x, kLaw);
     const Law::Value f = force.at(s.inputs, f1, f2);
     const Lanes<3> s1 = directions.middleRows<3>(28), s2 = directions.middleRows<3>(31),
-                   s3 = directions.middleRows<3>(34), law = directions.middleRows<3>(kLaw);
+                   s3 = directions.middleRows<3>(34);
+    const Lanes<kFields> law = directions.middleRows<kFields>(kLaw);
     const Lanes<1> df = force.law.field_tangent(
         force.measured(s.angles, f1, f2), &law, [](int) { return Lanes<1>(Lanes<1>::Zero()); }, s.scratch);
     LoadTangents out;

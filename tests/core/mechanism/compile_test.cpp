@@ -72,7 +72,9 @@ Numbers numbers_of(const MechanismData& d) {
     x.add(f.slot_R0, R0), x.add(f.slot_law, law);
   }
   for (const TurningFriction& f : d.forces.of<TurningFriction>()) {
-    x.add(f.law.slot, Vector3d(f.law.coulomb, f.law.smooth, f.law.viscous));
+    VectorXd law(FrictionLaw::kFields);
+    law << f.law.coulomb, f.law.smooth, f.law.viscous, f.law.breakaway, f.law.stribeck;
+    x.add(f.law.slot, law);
   }
   for (const SensorPtr& s : d.sensors) {
     const auto* p = dynamic_cast<const PointSensor*>(s.get());
@@ -104,6 +106,7 @@ Scene every_field() {
   s.forces.push_back({"mount", mount});
   FrictionSpec brake;
   brake.joint = "A", brake.coulomb = f("n*L2"), brake.smooth_velocity = f("u^2"), brake.viscous = f("spin");
+  brake.breakaway = f("L2"), brake.stribeck_velocity = f("1 + n^2");
   s.forces.push_back({"brake", brake});
   PointForce push;
   push.body = "crank", push.point = vec("c1", "off", "u"), push.components = {f("1"), f("theta"), f("t")};

@@ -108,6 +108,7 @@ inline Scene every_force_four_bar() {
   s.forces.push_back({"mount", mount});
   FrictionSpec brake;
   brake.joint = "A", brake.coulomb = f("mu"), brake.smooth_velocity = f("slip"), brake.viscous = f("cb/3");
+  brake.breakaway = f("1.3*mu"), brake.stribeck_velocity = f("2*slip");
   s.forces.push_back({"brake", brake});
   PointForce follower;
   follower.body = "coupler", follower.point = vec("c2", "0.1", "off"), follower.in_body_frame = true;
