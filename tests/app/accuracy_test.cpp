@@ -193,7 +193,8 @@ TEST_CASE("what was chosen is said, stored and in the report", "[accuracy]") {
   CHECK(accuracy.at("estimated_error").get<double>() <= 1e-5);
   CHECK(accuracy.at("errors").contains("track"));
   CHECK(result.at("warnings").empty());
-  CHECK_THAT(content_of(folder.path / "out/report.html"), Contains("engineering (1e-05) is asked for"));
+  CHECK_THAT(content_of(folder.path / "out/report.html"),
+             Contains("engineering <span class=\"whole\">(1e-05)</span> is asked for"));
 }
 
 TEST_CASE("an accuracy that cannot be had is a warning with the error that can", "[accuracy]") {

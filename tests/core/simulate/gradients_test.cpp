@@ -150,17 +150,21 @@ TEST_CASE("the gradient equals differences on frozen steps to 1e-7 for every par
   CHECK((psi(rho) - adjoint.psi).cwiseAbs().maxCoeff() < same * adjoint.psi.cwiseAbs().maxCoeff());
   const double size = adjoint.psi_rho.cwiseAbs().maxCoeff();
   for (Eigen::Index k = 0; k < rho.size(); ++k) {
-    const double h = 2e-4 * std::max(1.0, std::abs(rho(k)));
     auto difference = [&](double step) {
       VectorXd up = rho, down = rho;
       up(k) += step, down(k) -= step;
       return VectorXd((psi(up) - psi(down)) / (2 * step));
     };
-    const VectorXd extrapolated = (4 * difference(h / 2) - difference(h)) / 3;
+    auto error = [&](double step) {
+      const double h = step * std::max(1.0, std::abs(rho(k)));
+      const VectorXd extrapolated = (4 * difference(h / 2) - difference(h)) / 3;
+      return VectorXd((extrapolated - adjoint.psi_rho.col(k)).cwiseAbs());
+    };
+    // Rounding is less with the large step. The small one may keep clear of the kink where the large one straddles it.
+    const VectorXd least = error(2e-4).cwiseMin(error(2e-5));
     INFO(method << ": " << c.scene.parameters[static_cast<std::size_t>(k)].name);
     for (Eigen::Index o = 0; o < 3; ++o) {
-      CHECK(std::abs(extrapolated(o) - adjoint.psi_rho(o, k)) <=
-            1e-7 * std::max(std::abs(adjoint.psi_rho(o, k)), 1e-3 * size));
+      CHECK(least(o) <= 1e-7 * std::max(std::abs(adjoint.psi_rho(o, k)), 1e-3 * size));
     }
   }
 }
