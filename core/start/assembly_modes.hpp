@@ -21,8 +21,8 @@ struct AssemblyMode {
 };
 
 // The nearest first; where the scene's poses do not lead to a mode, from the one found first. Empty where something is
-// free, or none is found. go_on: asked before every
-// guess after the first; false ends the search with what it has found.
+// free, or none is found. go_on: asked before every guess after the first; false ends the search with what it has
+// found.
 std::vector<AssemblyMode> assembly_modes(const Mechanism& mechanism, double t, const std::function<bool()>& go_on = {});
 
 // Moves the poses of the scene's bodies to a mode of a mechanism made from it: positions are moved, orientations turned

@@ -70,8 +70,8 @@ struct ResidualRow {
 // One iteration of the solver.
 struct FitRow {
   int iteration = 0;
-  double cost =
-      0;  // what is minimised: in the result by the loss and the sigmas of the end, in progress by those so far
+  // What is minimised: in the result by the loss and the sigmas of the end, in progress by those so far.
+  double cost = 0;
   double gradient_norm = 0;    // largest entry, of the scaled variables
   double step_norm = 0;        // of the scaled variables
   Eigen::VectorXd parameters;  // in the order of IdentificationResult::parameters

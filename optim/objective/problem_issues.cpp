@@ -137,7 +137,7 @@ void check_meaning(Checker& checker, const ObjectiveBound& bound) {
     checker.issue(checker.path(), "has only one of \"sampled\" and \"every\"; they say what is limited, and when");
   constexpr double kMostLimits = 10'000;
   const SimulationSettings& simulation = checker.facts().scene().simulation;
-  if (bound.every && simulation.end_time - simulation.start_time > kMostLimits * *bound.every)
+  if (bound.every && *bound.every > 0 && simulation.end_time - simulation.start_time > kMostLimits * *bound.every)
     checker.issue(checker.path("every"), "is " + text_of(*bound.every) + " s, which makes more than " +
                                              text_of(kMostLimits) + " limits of the simulated time");
   if (given != 1)

@@ -38,7 +38,8 @@ void name_sampled(Problem& problem) {
     }
     for (const double t : instants(bound, problem.scene.simulation)) {
       ObjectiveSpec objective;
-      objective.name = fmt::format("{} at {:g} s", bound.sampled->text(), t);
+      // 14 digits tell all instants apart and leave out the rounding of k every.
+      objective.name = fmt::format("{} at {:.14g} s", bound.sampled->text(), t);
       objective.samples = {{t, *bound.sampled}};
       bounds.push_back({objective.name, bound.lower, bound.upper});
       problem.objectives.push_back(std::move(objective));

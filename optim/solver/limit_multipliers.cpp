@@ -14,17 +14,18 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-// Of |z|. Of 0.05 to 1 this one ends most runs of eighteen_points_starts.json, in the fewest
+// Part of |z|. This value, among those from 0.05 to 1, ends most runs of eighteen_points_starts.json, in the fewest
 // evaluations: lighter limits let the search pass into dead points, heavier ones make valleys of them that steps follow
 // slowly.
 constexpr double kLimitWeight = 0.15;
-// Where a round that settled leaves more than a quarter of |c - P(s)|, the weight rises: Nocedal and Wright, framework
-// 17.3.
+// The weight rises if a round that settled leaves more than a quarter of |c - P(s)|: Nocedal and Wright,
+// framework 17.3.
 constexpr double kSettledRound = 1e-7, kFallenEnough = 0.25, kHeavierLimit = 3, kHeaviestLimit = 1e3;
-constexpr double kLoosest = 1e-2, kTightening = 0.03;  // of rounds that only show the next one where to start
-constexpr double kLimitsHeld = 1e-6;                   // |c - P(s)| at the end: what ranks as feasible
-constexpr double kFinerLimits = 1e-4;                  // of the last: the cost is stationary in x, the limits are not
-constexpr int kLimitRounds = 30;                       // seven or eight are usual
+constexpr double kLoosest = 1e-2,
+                 kTightening = 0.03;   // tolerances of rounds that only show the next one where to start
+constexpr double kLimitsHeld = 1e-6;   // |c - P(s)| at the end: what ranks as feasible
+constexpr double kFinerLimits = 1e-4;  // of the last tolerance: the cost is stationary in x, the limits are not
+constexpr int kLimitRounds = 30;       // seven or eight are usual
 
 class LimitRound : public LeastSquaresProblem {
  public:
