@@ -395,12 +395,16 @@ void check_meaning(Checker& checker, const Problem& problem) {
   check_unique_names(checker, problem.cases, "a case", [&](std::size_t c) { return place(c) + ".name"; });
   for (std::size_t c = 0; c < problem.cases.size(); ++c) {
     if (!problem.cases[c].end_time) continue;
+    const double end = *problem.cases[c].end_time, end_of_file = problem.scene.simulation.end_time;
+    if (problem.design && end < end_of_file &&
+        std::ranges::any_of(problem.design->subject_to, [](const ObjectiveBound& b) { return b.sampled.has_value(); }))
+      checker.issue(place(c) + ".end_time", "is " + text_of(end) + " s, but a limit is sampled until " +
+                                                text_of(end_of_file) + " s, simulation.end_time");
     for (const ObjectiveSpec& objective : problem.objectives)
       for (const ObjectiveSample& sample : objective.samples)
-        if (sample.time > *problem.cases[c].end_time)
-          checker.issue(place(c) + ".end_time", "is " + text_of(*problem.cases[c].end_time) +
-                                                    " s, but the objective '" + objective.name + "' has a sample at " +
-                                                    text_of(sample.time) + " s");
+        if (sample.time > end)
+          checker.issue(place(c) + ".end_time", "is " + text_of(end) + " s, but the objective '" + objective.name +
+                                                    "' has a sample at " + text_of(sample.time) + " s");
   }
   if (problem.cases.size() < 2 && problem.design && problem.design->over == "max")
     checker.issue("design.minimize.over", "is \"max\", of which there is none without several \"cases\"");
