@@ -112,6 +112,11 @@ std::optional<DesignIssue> limit_of_squares_issue(const Problem& problem) {
 }  // namespace
 
 std::optional<DesignIssue> curvature_issue(const Problem& problem) {
+  const auto is_unread = [](const TrackTerm& term) { return !term.curve; };  // a finding of the reader says why
+  if (problem.design && std::ranges::any_of(problem.objectives, [&](const ObjectiveSpec& objective) {
+        return std::ranges::any_of(objective.track, is_unread);
+      }))
+    return std::nullopt;
   if (problem.design && problem.design->optimizer.type == OptimizerSpec::kLeastSquares)
     if (const std::optional<DesignIssue> issue = limit_of_squares_issue(problem)) return issue;
   if (problem.design && problem.design->optimizer.type == OptimizerSpec::kLeastSquares &&

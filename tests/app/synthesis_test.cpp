@@ -517,3 +517,12 @@ TEST_CASE("design: values of the file that do not close are led to some that do,
   CHECK(d.result.at("optimizer").at("objective_final") < d.result.at("optimizer").at("objective_initial"));
   CHECK(d.result.at("parameters").at("crank").at("initial") != 2);
 }
+
+TEST_CASE("least squares on a column that is not there: the column is named", "[synthesis]") {
+  const TemporaryFolder folder;
+  const CommandOutcome outcome =
+      run_command({"validate", MBSOPT_SOURCE_DIR + std::string("/problems/synthesis/eighteen_points_starts.json"),
+                   "--out", folder.file("out"), "--set", "objectives.path.track[0].column=zz"});
+  CHECK(outcome.exit_code == kBadInput);
+  CHECK_THAT(outcome.err, Contains("track[0]") && Contains("has no column 'zz'"));
+}
