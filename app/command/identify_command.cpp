@@ -317,7 +317,7 @@ std::vector<PointTarget> measured_points(const Problem& fitted, const Scene& sce
   return point_targets(scene, values, true);
 }
 
-// What the report shows beside the fit: the experiments at the start, and the motion of the first one as fitted.
+// The report shows these beside the fit: the experiments at the start, and the first one's motion as fitted.
 struct ReportMotions {
   IdentificationResult start;
   std::optional<SimulatedExperiment> after;

@@ -24,7 +24,7 @@ struct LastRun {
   std::string command, status;
 };
 
-// What result.json says of a command that can be resumed; empty where there was none.
+// Reads command and status of a run that can be resumed from result.json; both are empty if there was none.
 LastRun last_run(const std::filesystem::path& folder) {
   if (!std::filesystem::exists(folder / "result.json")) return {};
   const Json result = Json::parse(read_text_file(folder / "result.json"), nullptr, false);

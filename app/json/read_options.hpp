@@ -1,4 +1,4 @@
-// What a problem file may call beside itself.
+// A problem file may call C++ terms beside itself; these options say which.
 #pragma once
 
 #include "optim/problem/named_terms.hpp"

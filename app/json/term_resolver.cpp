@@ -71,7 +71,7 @@ class TermResolver {
  private:
   void add(const std::string& path, const std::string& message) { findings_.add(nearest(root_, path), path, message); }
 
-  // What is unknown because a plug-in is not loaded is told there.
+  // The finding about a plug-in that is not loaded stands for its unknown names.
   template <class Term>
   const Term* find(const std::vector<Term>& all, const std::string& what, const std::string& name,
                    const std::string& path) {

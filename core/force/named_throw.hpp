@@ -1,4 +1,4 @@
-// What code of a user throws, with the name of its term before it.
+// Puts the name of a term before the message that its code, a user's, throws.
 //
 //   named_throw("forces[1] (drag)", [&] { force.Q(t, q, v, rho, Q); });   // "forces[1] (drag) threw: no table"
 #pragma once

@@ -20,7 +20,7 @@ struct RoundingScatter {
   long simulations = 0;
 };
 
-// Where it is measured. size: of each parameter, as differences take it.
+// The point at which scatter is measured. size: of each parameter, as differences take it.
 struct RoundingBase {
   const Scene& scene;
   Eigen::VectorXd rho, size, psi;

@@ -70,7 +70,7 @@ struct ResidualRow {
 // One iteration of the solver.
 struct FitRow {
   int iteration = 0;
-  // What is minimised: in the result by the loss and the sigmas of the end, in progress by those so far.
+  // The fit minimises it. The result measures it by the loss and the sigmas of the end, progress by those so far.
   double cost = 0;
   double gradient_norm = 0;    // largest entry, of the scaled variables
   double step_norm = 0;        // of the scaled variables

@@ -17,7 +17,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// What both costs of a term read: the rows of y, and the term's parameters as programs of those of the scene.
+// Both costs of a term read these: rows of y, and the term's parameters, computed from those of the scene.
 class TermInputs {
  public:
   TermInputs(const Scene& scene, const UserCostSpec& spec, const std::string& place) {
