@@ -13,7 +13,7 @@ from pathlib import Path
 HANG = 8.0  # [s] of processor time without an end
 STUCK = 60.0  # [s] without an end, whatever the processor did
 NUMBERLESS = re.compile(r"(?<![A-Za-z_])[-+]?(nan|inf)(?![A-Za-z_])", re.IGNORECASE)
-PROGRESS = re.compile(r"^.*: \S+ % after \d+ s$", re.MULTILINE)
+PROGRESS = re.compile(r"^.*: \S+ % after \d+ s(?:, \d+ s left)?$", re.MULTILINE)
 CLUMSY = re.compile(r"\S  \S|''|std::|terminate called|0x[0-9a-f]{6,}|\be\+308")
 
 
