@@ -83,9 +83,12 @@ void add_second_derivatives(Run& run, Evaluator& evaluator) {
 }
 
 void warn_of_unresolved(Run& run, const Evaluator& evaluator, const Evaluation& evaluation) {
-  const IntegrationError error = integration_error(
-      evaluator.scene(), evaluator.objectives(), evaluation.psi, evaluation.psi_rho,
-      {.progress = run.watched("estimating the error"), .method = evaluator.options().method, .fixed_steps = true});
+  const IntegrationError error =
+      integration_error(evaluator.scene(), evaluator.objectives(), evaluation.psi, evaluation.psi_rho,
+                        {.progress = run.watched("estimating the error"),
+                         .method = evaluator.options().method,
+                         .fixed_steps = true,
+                         .steps = evaluation.statistics.steps});
   run.progress.finish();
   for (const std::string& doubt :
        unresolved_gradients(evaluator.scene(), evaluator.objectives(), evaluation.psi, evaluation.psi_rho, error))

@@ -83,7 +83,7 @@ class ContinuousComparison {
 
   std::optional<MatrixXd> gradients(const std::string& type, double rtol, GradientMethod by, std::string* message) {
     constexpr long kManyTimes = 200, kAtLeast = 50'000;
-    Scene scene = with_errors_times(rtol / scene_.simulation.integrator.rtol, scene_);
+    Scene scene = scene_;
     // Without projection: CVODES has none, and one of penalty has a motion of its own.
     FormulationSettings& formulation = scene.simulation.formulation;
     if (formulation.type == FormulationType::penalty) formulation.projection = Projection::none;
@@ -91,6 +91,9 @@ class ContinuousComparison {
     if (s.type != type) s.options = {};  // the other method's
     s.type = type;
     s.step.reset();
+    // Steps of CVODES say nothing about those of another method.
+    const long steps = is_cvodes(scene_.simulation.integrator.type) ? 0 : options_.typical_steps;
+    scene = with_errors_times(rtol / s.rtol, std::move(scene), steps);
     s.max_steps = std::min(s.max_steps, std::max(kAtLeast, kManyTimes * options_.typical_steps));
     Evaluator evaluator(std::move(scene), objectives_, {}, {by, {}, options_.user_forces, options_.progress});
     const Evaluation& e = evaluator.gradients(evaluator.start());

@@ -312,7 +312,10 @@ class Check {
     if (!options_.free_steps && result_.discrete) return;
     const auto error_of = [&](GradientMethod method, const MatrixXd& psi_rho) {
       IntegrationError e = integration_error(scene_, objectives_, result_.psi, psi_rho,
-                                             {options_.user_forces, options_.simulation_progress, method});
+                                             {.user_forces = options_.user_forces,
+                                              .progress = options_.simulation_progress,
+                                              .method = method,
+                                              .steps = result_.statistics.steps});
       result_.simulations += e.simulations;
       return e;
     };

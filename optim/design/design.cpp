@@ -422,7 +422,7 @@ DifferenceComparison comparison_at(const Evaluation& start, const Evaluator& eva
     return e.psi;
   };
   comparison.tighter = [&start, &evaluator, &scene, names](Eigen::VectorXd& f, Eigen::MatrixXd& f_rho) {
-    std::optional<Scene> tight = with_other_tolerances(scene);
+    std::optional<Scene> tight = with_other_tolerances(scene, start.statistics.steps);
     if (!tight) return false;
     Evaluator at_tight(*std::move(tight), evaluator.objectives(), names, evaluator.options());
     const Evaluation& e = at_tight.gradients(start.rho);

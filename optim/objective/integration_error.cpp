@@ -27,21 +27,26 @@ Eigen::MatrixXd contributions(const Scene& scene, const Eigen::MatrixXd& psi_rho
 
 }  // namespace
 
-Scene with_errors_times(double factor, Scene scene) {
+Scene with_errors_times(double factor, Scene scene, long steps) {
   IntegratorSettings& s = scene.simulation.integrator;
   s.rtol *= factor, s.atol *= factor;
   if (const Method* method = runge_kutta_method(s.type)) {
     const double ratio = std::pow(factor, 1.0 / method->order);
     if (s.max_step) *s.max_step *= ratio;
+    if (steps > 0 && factor < 1) {
+      const double span = scene.simulation.end_time - scene.simulation.start_time;
+      s.max_step = std::min(s.max_step.value_or(span), ratio * span / static_cast<double>(steps));
+    }
     if (s.step) *s.step *= ratio;
   }
   return scene;
 }
 
-std::optional<Scene> with_other_tolerances(Scene scene) {
+std::optional<Scene> with_other_tolerances(Scene scene, long steps) {
   const IntegratorSettings& given = scene.simulation.integrator;
   if (given.step) return std::nullopt;
-  return with_errors_times(other_errors(given), std::move(scene));
+  const double factor = other_errors(given);
+  return with_errors_times(factor, std::move(scene), steps);
 }
 
 IntegrationError integration_error(const Scene& scene, const std::vector<Objective>& objectives,
@@ -52,7 +57,7 @@ IntegrationError integration_error(const Scene& scene, const std::vector<Objecti
   const IntegratorSettings& given = scene.simulation.integrator;
   if (given.step && !options.fixed_steps) return error;
   if (!given.step) error.psi_rho = given.rtol * psi_rho.cwiseAbs();
-  Evaluator evaluator(with_errors_times(given.step ? 0.1 : other_errors(given), scene), objectives, {},
+  Evaluator evaluator(with_errors_times(given.step ? 0.1 : other_errors(given), scene, options.steps), objectives, {},
                       {options.method, {}, options.user_forces, options.progress});
   const Evaluation& e = evaluator.gradients(evaluator.start());
   error.simulations = e.simulations;

@@ -29,14 +29,17 @@ struct IntegrationErrorOptions {
   std::function<bool(double t)> progress = {};  // within a simulation; false abandons it
   GradientMethod method = GradientMethod::automatic;
   bool fixed_steps = false;  // estimate their error, too
+  long steps = 0;            // of the run that gave psi and psi_rho
 };
 
 // The scene with factor times the integration errors: tolerances times factor, and max_step and step times
-// factor^(1/order), since the error is O(h^order) where they choose the steps.
-Scene with_errors_times(double factor, Scene scene);
+// factor^(1/order), since the error is O(h^order) where they choose the steps. steps: how many a run of the scene
+// takes. Where the motion is met exactly by any steps, tolerances choose none, and integrals keep their errors; for
+// factor < 1 no step is then longer than the mean of that run times factor^(1/order).
+Scene with_errors_times(double factor, Scene scene, long steps = 0);
 
 // The scene with tolerances ten times tighter, or looser; none where its steps are fixed.
-std::optional<Scene> with_other_tolerances(Scene scene);
+std::optional<Scene> with_other_tolerances(Scene scene, long steps = 0);
 
 // psi, psi_rho: at the parameters and tolerances of the scene.
 IntegrationError integration_error(const Scene& scene, const std::vector<Objective>& objectives,

@@ -45,7 +45,43 @@ std::vector<std::string> doubts(const Problem& problem, const Evaluation& e) {
                               integration_error(problem.scene, objectives, e.psi, e.psi_rho, {.fixed_steps = true}));
 }
 
+// A body falls along a parabola, which dopri5 meets exactly: tolerances choose no steps, and an integral over them has
+// the error of the longest ones.
+Problem falling(const std::string& running) {
+  Problem problem;
+  Body body;
+  body.name = "b", body.mass = 1.0, body.inertia = {1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
+  problem.scene.bodies.push_back(body);
+  problem.scene.simulation.end_time = 1;
+  problem.scene.simulation.integrator.type = "dopri5";
+  problem.scene.simulation.integrator.rtol = problem.scene.simulation.integrator.atol = 1e-8;
+  Parameter p;
+  p.name = "p", p.value = 1;
+  problem.scene.parameters.push_back(p);
+  ObjectiveSpec objective;
+  objective.name = "J", objective.running = Expression::parse(running);
+  problem.objectives.push_back(objective);
+  return problem;
+}
+
 }  // namespace
+
+// The integral of exp(-((t - 0.5)/w)^2) from 0 to 1 is w sqrt(pi) erf(1/(2w)).
+TEST_CASE("integrals of a motion that any steps meet have an error that shows", "[integration_error]") {
+  const Problem problem = falling("p*exp(-((t - 0.5)/0.3)^2)");
+  const std::vector<Objective> objectives = objectives_of(problem);
+  const Evaluation e = gradients_of(problem);
+  INFO(e.message);
+  REQUIRE(e.ok);
+  const double exact = 0.3 * std::sqrt(std::acos(-1.0)) * std::erf(0.5 / 0.3), off = std::abs(e.psi_rho(0, 0) - exact);
+  INFO(e.statistics.steps << " steps, off by " << off);
+  CHECK(off > 1e-4 * exact);
+  CHECK(may_be_unresolved(problem.scene, objectives, e));
+  const IntegrationError error =
+      integration_error(problem.scene, objectives, e.psi, e.psi_rho, {.steps = e.statistics.steps});
+  CHECK(error.psi_rho(0, 0) > 0.3 * off);
+  CHECK(unresolved_gradients(problem.scene, objectives, e.psi, e.psi_rho, error).size() == 1);
+}
 
 // The integral of L01 exp(-((t - 0.5)/w)^2) over the real axis is L01 w sqrt(pi).
 TEST_CASE("a gradient that the steps do not resolve is doubted, one that they resolve is not", "[integration_error]") {
