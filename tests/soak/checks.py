@@ -260,9 +260,11 @@ def values_at(lab, settings, direction, h):
 
 
 def scattered(lab, settings, direction):
-    """How much rounding changes the objectives from run to run: their spread over parameters that differ by 1e-11."""
-    values = [v for v in (values_at(lab, settings, direction, k * 1e-11) for k in (0, 1, -1, 2)) if v]
-    return {name: 3 * (max(v[name] for v in values) - min(v[name] for v in values)) if values else 0.0
+    """How much rounding changes the objectives from run to run: the largest third difference over parameters that
+    differ by 1e-8. Smaller changes are below the rounding of coordinates far from the origin."""
+    values = [v for v in (values_at(lab, settings, direction, k * 1e-8) for k in range(-2, 4)) if v]
+    return {name: max((abs(a[name] - 3 * b[name] + 3 * c[name] - d[name])
+                       for a, b, c, d in zip(values, values[1:], values[2:], values[3:])), default=0.0)
             for name in lab.problem["objectives"]}
 
 
