@@ -9,6 +9,8 @@
 //                            in the frames (eta held fixed) and in s1, s2, s3: all that the adjoint sweep needs
 //   tangent                  the same information forward: Phi', Phidot', Phiddot' and (J' lambda)' in kLanes
 //                            directions
+// A mechanism that moves in a plane takes core/dynamics/planar_constraints.hpp instead: the same equations in complex
+// numbers.
 #pragma once
 
 #include <concepts>
@@ -20,7 +22,7 @@ namespace mbsopt {
 // How the rows of J1 and J2 see displacements of their bodies: not at all, row r only along axis r, or anyhow.
 enum class Displacements { none, own_axis, any };
 
-// What the numbers of a row are: [m], a product of two directions [-], [rad], [-].
+// The quantity that a row measures: [m], the product of two directions [-], [rad], [-].
 enum class RowQuantity { length, cosine, angle, euler_parameter };
 
 template <int Rows>
