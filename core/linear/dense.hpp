@@ -48,6 +48,13 @@ struct LeftSingular {
 };
 LeftSingular left_singular(const Eigen::MatrixXd& A);
 
+// The least of the min(rows, columns) singular values of A, which is not empty, and its vectors: A v = value u.
+struct LeastSingular {
+  double value;
+  Eigen::VectorXd u, v;
+};
+LeastSingular least_singular(const Eigen::MatrixXd& A);
+
 // Factors of a small square matrix, by elimination with row pivoting.
 class SquareFactor {
  public:
