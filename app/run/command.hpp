@@ -74,5 +74,6 @@ int resume_command(const CommandContext& context);  // options.problem_file: the
 int new_command(const CommandContext& context);
 int import_command(const CommandContext& context);  // options.problem_file: the model
 int schema_command(const CommandContext& context);
+int completion_command(const CommandContext& context);
 
 }  // namespace mbsopt

@@ -98,6 +98,74 @@ Json without_points(const Json& record) {
   return short_record;
 }
 
+// Returns whether the search ended since it had found all optima (spec.until_all_found).
+bool compute_batches(Run& run, LongRun& long_run, const MultistartSpec& spec, const StartWork& work,
+                     MultistartOutcome& outcome) {
+  std::set<int> finished;
+  for (const Json& record : long_run.earlier().starts) {
+    if (finished.insert(number_of(record)).second) outcome.ranked.push_back(record);
+  }
+  const auto done = [&](const JobReply& reply) {
+    const Json record = record_of(reply);
+    const std::string status = record["status"];
+    const bool cut_off = status == "stopped" || (!reply.ok && interrupted());
+    // A worker that crashed may do better next time: not in the journal either.
+    if (!cut_off && reply.ok) long_run.add("start", record);
+    outcome.interrupted = outcome.interrupted || cut_off;
+    outcome.ranked.push_back(record);
+    run.progress.iteration(fmt::format("start {:3d}   {}   objective {}   {} of {} finished", reply.job, status,
+                                       text_of(record, "objective"), outcome.ranked.size(), spec.starts));
+  };
+  const auto show = [&] { run.progress.fraction("starts", static_cast<double>(outcome.ranked.size()) / spec.starts); };
+  const int batch = spec.until_all_found ? kBatch : spec.starts;
+  bool ends = false;
+  for (int first = 0; first < spec.starts && !ends && !outcome.interrupted; first += batch) {
+    const int last = std::min(first + batch, spec.starts);
+    std::vector<int> jobs;
+    for (int start = first; start < last; ++start)
+      if (!finished.contains(start)) jobs.push_back(start);
+    compute_starts(run, jobs, work, done, show);
+    outcome.interrupted = outcome.interrupted || outcome.ranked.size() < static_cast<std::size_t>(last);
+    std::ranges::sort(outcome.ranked, {}, rank);
+    if (!spec.until_all_found) continue;
+    std::vector<Json> looked_at;  // a resumed run may know starts of a later batch
+    std::ranges::copy_if(outcome.ranked, std::back_inserter(looked_at),
+                         [&](const Json& record) { return number_of(record) < last; });
+    ends = all_found(looked_at, run.problem.scene);
+  }
+  return ends;
+}
+
+void tell_starts(Run& run, const MultistartSpec& spec, const MultistartOutcome& outcome) {
+  const Json* const best = outcome.best();
+  const long same = best ? std::ranges::count_if(outcome.ranked,
+                                                 [&](const Json& r) {
+                                                   return has_objective(r) && same_optimum(*best, r, run.problem.scene);
+                                                 })
+                         : 0;
+  Json& result = run.result["multistart"];
+  result = {{"starts", spec.starts},
+            {"seed", *spec.seed},
+            {"sampling", spec.sampling == StartSampling::sobol ? "sobol" : "latin_hypercube"},
+            {"finished", outcome.ranked.size()},
+            {"simulations", outcome.simulations},
+            {"wall_seconds", outcome.wall_seconds},
+            {"best", best ? Json(number_of(*best)) : Json()},
+            {"at_the_best_optimum", same}};
+  for (const Json& record : outcome.ranked) result["waterfall"].push_back(without_points(record));
+  print_waterfall(run.context.out, outcome.ranked);
+  run.context.out << fmt::format("{}, seed {}: {} at the best optimum\n",
+                                 counted(static_cast<long>(outcome.ranked.size()), "start"), *spec.seed, same);
+  const auto ended = [&](const char* optimum) {
+    return std::ranges::count_if(outcome.ranked, [&](const Json& r) { return r.value("optimum", "") == optimum; });
+  };
+  if (const long inside = ended("interior"), beside = ended("boundary"); inside + beside > 0) {
+    result["optima_inside"] = inside, result["optima_at_boundary"] = beside;
+    run.context.out << fmt::format("{} end in an optimum: {} inside, {} at a bound or a limit\n", inside + beside,
+                                   inside, beside);
+  }
+}
+
 }  // namespace
 
 const Json* MultistartOutcome::best() const {
@@ -129,77 +197,16 @@ Problem with_values(Problem problem, const Json& values) {
 
 MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSpec& spec, const StartWork& work) {
   MultistartOutcome outcome;
-  std::set<int> finished;
-  for (const Json& record : long_run.earlier().starts) {
-    if (finished.insert(number_of(record)).second) outcome.ranked.push_back(record);
-  }
-  const auto done = [&](const JobReply& reply) {
-    const Json record = record_of(reply);
-    const std::string status = record["status"];
-    const bool cut_off = status == "stopped" || (!reply.ok && interrupted());
-    // A worker that crashed may do better next time: not in the journal either.
-    if (!cut_off && reply.ok) long_run.add("start", record);
-    outcome.interrupted = outcome.interrupted || cut_off;
-    outcome.ranked.push_back(record);
-    run.progress.iteration(fmt::format("start {:3d}   {}   objective {}   {} of {} finished", reply.job, status,
-                                       text_of(record, "objective"), outcome.ranked.size(), spec.starts));
-  };
-  const auto sort = [&] {
-    std::sort(outcome.ranked.begin(), outcome.ranked.end(),
-              [](const Json& a, const Json& b) { return rank(a) < rank(b); });
-  };
-  const int batch = spec.until_all_found ? kBatch : spec.starts;
-  bool ends = false;
-  for (int first = 0; first < spec.starts && !ends && !outcome.interrupted; first += batch) {
-    const int last = std::min(first + batch, spec.starts);
-    std::vector<int> jobs;
-    for (int start = first; start < last; ++start)
-      if (!finished.contains(start)) jobs.push_back(start);
-    compute_starts(run, jobs, work, done,
-                   [&] { run.progress.fraction("starts", static_cast<double>(outcome.ranked.size()) / spec.starts); });
-    outcome.interrupted = outcome.interrupted || outcome.ranked.size() < static_cast<std::size_t>(last);
-    sort();
-    if (!spec.until_all_found) continue;
-    std::vector<Json> looked_at;  // a resumed run may know starts of a later batch
-    std::ranges::copy_if(outcome.ranked, std::back_inserter(looked_at),
-                         [&](const Json& record) { return number_of(record) < last; });
-    ends = all_found(looked_at, run.problem.scene);
-  }
+  const bool all_found = compute_batches(run, long_run, spec, work, outcome);
   run.progress.finish();
-
   for (const Json& record : outcome.ranked) {
     outcome.simulations += record.value("simulations", 0L);
     outcome.wall_seconds += record.value("wall_seconds", 0.0);
   }
-  Json& result = run.result["multistart"];
-  result = {{"starts", spec.starts},
-            {"seed", *spec.seed},
-            {"sampling", spec.sampling == StartSampling::sobol ? "sobol" : "latin_hypercube"},
-            {"finished", outcome.ranked.size()},
-            {"simulations", outcome.simulations},
-            {"wall_seconds", outcome.wall_seconds}};
-  const Json* const best = outcome.best();
-  const long same =
-      best ? std::count_if(outcome.ranked.begin(), outcome.ranked.end(),
-                           [&](const Json& r) { return has_objective(r) && same_optimum(*best, r, run.problem.scene); })
-           : 0;
-  result["best"] = best ? Json(number_of(*best)) : Json();
-  result["at_the_best_optimum"] = same;
-  for (const Json& record : outcome.ranked) result["waterfall"].push_back(without_points(record));
-  print_waterfall(run.context.out, outcome.ranked);
-  run.context.out << fmt::format("{}, seed {}: {} at the best optimum\n",
-                                 counted(static_cast<long>(outcome.ranked.size()), "start"), *spec.seed, same);
-  const auto ended = [&](const char* optimum) {
-    return std::ranges::count_if(outcome.ranked, [&](const Json& r) { return r.value("optimum", "") == optimum; });
-  };
-  if (const long inside = ended("interior"), beside = ended("boundary"); inside + beside > 0) {
-    result["optima_inside"] = inside, result["optima_at_boundary"] = beside;
-    run.context.out << fmt::format("{} end in an optimum: {} inside, {} at a bound or a limit\n", inside + beside,
-                                   inside, beside);
-  }
+  tell_starts(run, spec, outcome);
   const std::vector<DistinctOptimum> optima = distinct_optima(outcome.ranked, run.problem.scene);
-  describe(optima, searched(optima), ends, result);
-  print(optima, searched(optima), ends, run.context.out);
+  describe(optima, searched(optima), all_found, run.result["multistart"]);
+  print(optima, searched(optima), all_found, run.context.out);
   return outcome;
 }
 

@@ -14,6 +14,7 @@ namespace mbsopt {
 struct Angle {
   static constexpr int kRows = 1;
   static constexpr Displacements kDisplacements = Displacements::none;
+  static constexpr RowQuantity quantity() { return RowQuantity::angle; }
   Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero(), s3 = Vector3d::Zero();  // n1, n2, a x n1 [-]
 
   // The value of angle nearest to reference among those a full turn apart.

@@ -11,6 +11,7 @@ namespace mbsopt {
 struct Coincidence {
   static constexpr int kRows = 3;
   static constexpr Displacements kDisplacements = Displacements::own_axis;
+  static constexpr RowQuantity quantity() { return RowQuantity::length; }
   Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero();  // P seen from each centre of mass, in that body's axes [m]
 
   void phi(const Frame& f1, const Frame& f2, Vec<3>& out) const;

@@ -35,6 +35,20 @@ struct Constraint {
   int rows() const {
     return std::visit([](const auto& p) { return std::decay_t<decltype(p)>::kRows; }, primitive);
   }
+  RowQuantity quantity() const {
+    return std::visit([](const auto& p) { return p.quantity(); }, primitive);
+  }
+  // Calls f(body, s) for the points between which a length is measured; the ground has some, too.
+  template <class F>
+  void for_each_point(F&& f) const {
+    std::visit(
+        [&](const auto& p) {
+          if constexpr (requires { p.s1; }) {
+            if (p.quantity() == RowQuantity::length) f(body1, p.s1), f(body2, p.s2);
+          }
+        },
+        primitive);
+  }
 };
 
 }  // namespace mbsopt

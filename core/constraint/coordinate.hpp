@@ -11,6 +11,7 @@ struct Coordinate {
   static constexpr int kRows = 1;
   static constexpr Displacements kDisplacements = Displacements::any;
   int index = 0;  // 0..2: x y z, 3..6: e0..e3
+  RowQuantity quantity() const { return index < 3 ? RowQuantity::length : RowQuantity::euler_parameter; }
 
   void phi(const Frame&, const Frame& f, Vec<1>& out) const;
   void phi_dot(const Frame&, const Frame& f, Vec<1>& out) const;

@@ -13,6 +13,7 @@ namespace mbsopt {
 struct Distance {
   static constexpr int kRows = 1;
   static constexpr Displacements kDisplacements = Displacements::any;
+  static constexpr RowQuantity quantity() { return RowQuantity::length; }
   Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero();  // the points from each centre of mass, body axes [m]
 
   void phi(const Frame& f1, const Frame& f2, Vec<1>& out) const;

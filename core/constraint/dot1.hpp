@@ -13,6 +13,7 @@ namespace mbsopt {
 struct Dot1 {
   static constexpr int kRows = 1;
   static constexpr Displacements kDisplacements = Displacements::none;
+  static constexpr RowQuantity quantity() { return RowQuantity::cosine; }
   Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero();  // the two vectors, each in its body's axes [-]
 
   void phi(const Frame& f1, const Frame& f2, Vec<1>& out) const;

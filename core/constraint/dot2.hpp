@@ -13,6 +13,7 @@ namespace mbsopt {
 struct Dot2 {
   static constexpr int kRows = 1;
   static constexpr Displacements kDisplacements = Displacements::any;
+  static constexpr RowQuantity quantity() { return RowQuantity::length; }
   Vector3d s1 = Vector3d::Zero(), s2 = Vector3d::Zero();  // the points from each centre of mass, body axes [m]
   Vector3d s3 = Vector3d::Zero();                         // the direction, axes of body 1 [-]
 

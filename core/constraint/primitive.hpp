@@ -9,6 +9,8 @@
 //                            in the frames (eta held fixed) and in s1, s2, s3: all that the adjoint sweep needs
 //   tangent                  the same information forward: Phi', Phidot', Phiddot' and (J' lambda)' in kLanes
 //                            directions
+// A mechanism that moves in a plane takes core/dynamics/planar_constraints.hpp instead: the same equations in complex
+// numbers.
 #pragma once
 
 #include <concepts>
@@ -19,6 +21,9 @@ namespace mbsopt {
 
 // How the rows of J1 and J2 see displacements of their bodies: not at all, row r only along axis r, or anyhow.
 enum class Displacements { none, own_axis, any };
+
+// The quantity that a row measures: [m], the product of two directions [-], [rad], [-].
+enum class RowQuantity { length, cosine, angle, euler_parameter };
 
 template <int Rows>
 struct Multipliers {
@@ -38,8 +43,8 @@ struct GeometryTangent {
   const Lanes<3>* s3 = nullptr;
 };
 
-// Of a primitive whose Phiddot and J'lambda see nothing of the bodies' r and rdot: their derivatives in each body's p
-// and pdot (4 columns) with omegadot held fixed. Forces in J'lambda do not change, moments are in body axes.
+// Derivatives of Phiddot and J'lambda in each body's p and pdot (4 columns), omegadot held fixed, of a primitive that
+// does not depend on r and rdot. Its forces J'lambda are constant; moments are in body axes.
 template <int Rows>
 struct TurningBlocks {
   Mat<Rows, 4> p1, pdot1, p2, pdot2;                         // of Phiddot
@@ -57,6 +62,7 @@ concept IsPrimitive = requires(const P& primitive, const Frame& f, Vec<P::kRows>
                                const Multipliers<P::kRows>& z, FrameBar& bar, GeometryBar& s_bar, const FrameTangent& t,
                                const GeometryTangent& s, PrimitiveTangent<P::kRows>& out) {
   { P::kDisplacements } -> std::convertible_to<Displacements>;
+  { primitive.quantity() } -> std::same_as<RowQuantity>;
   primitive.phi(f, f, phi);
   primitive.phi_dot(f, f, phi);
   primitive.phi_ddot(f, f, phi);

@@ -24,7 +24,8 @@ class Mechanism;
 
 bool is_cvodes(std::string_view integrator);
 
-// The same span and tolerances, by cvodes_adams where it is another integrator's; without a fixed step.
+// Returns settings with the same span and tolerances, without a fixed step. The method becomes cvodes_adams if it is
+// none of CVODES.
 SimulationSettings with_cvodes(SimulationSettings settings);
 
 // Each throws std::invalid_argument for frozen steps, which a multistep method cannot take, and for a fixed step.

@@ -21,11 +21,11 @@ class Adjoint {
   Adjoint(const Adjoint&) = delete;
   Adjoint& operator=(const Adjoint&) = delete;
 
-  // Of the forward run: keeps what the way back needs.
-  int advance(double end, N_Vector y, double* t);  // one step
+  // Takes a step of the forward run and keeps what the backward run needs.
+  int advance(double end, N_Vector y, double* t);
   void take_sample(const SampleEvent& event, const StatePoint& at);
   void take_step(const StatePoint& at);
-  // From the end to the start; run.result() says how it ended.
+  // Integrates from the end to the start; run.result() says how it ended.
   void go_back(const RunOptions& options);
   const Eigen::MatrixXd& lambda() const { return lambda_; }  // at the start, 14n x objectives
   const Eigen::MatrixXd& mu() const { return mu_; }          // parameters x objectives

@@ -26,10 +26,10 @@ class Flow {
   // Solves the equations of motion at (t, y), unless that is where they were solved last. False where that failed.
   bool evaluate(double t, const Numbers& y);
   const Eigen::VectorXd& ydot() const { return ydot_; }
-  // The same, ready for dynamics().tangent and .add_adjoint.
+  // Also prepares dynamics().acceleration_tangent() and add_adjoint() there.
   bool linearise(double t, const Numbers& y);
 
-  // As costs and sensors want it; holds until the next call.
+  // The state for costs and sensors. It is valid until the next call.
   StatePoint point(double t, const Numbers& y);
   MotionSource* motion() { return motion_ ? &*motion_ : nullptr; }
 

@@ -13,7 +13,7 @@ namespace mbsopt::cvodes {
 
 class Sensitivities {
  public:
-  // Hangs itself into the run; active parameters there must be.
+  // Registers the sensitivities with CVODES. Requires at least one active parameter.
   Sensitivities(ForwardRun& run, const SimulationSettings& settings, std::span<const Cost> costs,
                 const TangentSampling& sampling);
   Sensitivities(const Sensitivities&) = delete;

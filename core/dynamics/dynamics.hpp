@@ -26,7 +26,7 @@ class Dynamics {
   Dynamics(const Mechanism& mechanism, const FormulationSettings& settings, Model model = Model::spatial);
   ~Dynamics();
 
-  // As those of SpatialDynamics.
+  // These are documented in spatial_dynamics.hpp.
   bool evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, Eigen::Ref<Eigen::VectorXd> ydot);
   const Eigen::VectorXd& lambda() const;
   bool linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,

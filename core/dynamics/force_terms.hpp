@@ -59,7 +59,7 @@ class ForceTerms {
 
   const MechanismData& data_;
   Law::Scratch law_;
-  // Of applied forces: inputs of their programs, the gradient of each component; a sensor's gradient.
+  // Scratch for applied forces: inputs of their programs, gradients of components and of a sensor.
   Program::Scratch program_;
   std::vector<double> inputs_;
   std::array<std::vector<double>, 3> gradients_;

@@ -52,7 +52,7 @@ class MotionTerms {
 
   // The derivatives of b and c in the state, z and lambda fixed, as blocks.
   const MotionBlocks& blocks();
-  // The same in directions of the state (14n x lanes), the fields and the parameters.
+  // Sets the tangents of b and c in directions of the state (14n x lanes), the fields and the parameters.
   void set_tangents(const ParameterBlock& block, const LaneRows& y_dir);
   // Adds the gradient of  pddot_bar'pddot + eta'b + mu'c  with z and lambda fixed; pddot_bar with the ground.
   void add_pull_back(const std::vector<Vec<6>>& eta, const Eigen::VectorXd& mu, const std::vector<Vector4d>& pddot_bar,

@@ -24,7 +24,7 @@ class PlanarDynamics {
  public:
   PlanarDynamics(const MechanismData& data, const FormulationSettings& settings);
 
-  // As those of SpatialDynamics.
+  // These are documented in spatial_dynamics.hpp.
   bool evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, Eigen::Ref<Eigen::VectorXd> ydot);
   bool linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                  const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);

@@ -71,7 +71,7 @@ struct InPlane {
   using Constraints = PlanarConstraints;
   using Rows = PlanarRows;
 
-  // Those that say something in the plane.
+  // The rows that constrain motion in the plane.
   static RowLaws laws(const MechanismData& data) { return RowLaws(data, data.planar->rows); }
   static Eigen::Index rows(const MechanismData& data) { return static_cast<Eigen::Index>(data.planar->rows.size()); }
   static void gather(const MechanismData& data, const Eigen::VectorXd& of_phi, Eigen::VectorXd& x) {

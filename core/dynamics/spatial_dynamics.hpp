@@ -36,7 +36,7 @@ class SpatialDynamics {
   // Prepares derivatives at a state whose solution (a = qddot, lambda) is known.
   bool linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                  const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
-  // The same right after evaluate() at this state, whose factor is still there.
+  // As linearise(), right after evaluate() at this state: it uses the factor of evaluate().
   void linearise_here() { terms_.set_accelerations(); }
 
   // y_dir: tangent of y (14n x lanes); ydot_dir: of (v, a). z_tangent(): of z.

@@ -1,8 +1,8 @@
 // The physical dimension of an expression, from the units written in it and the dimensions of its names.
 //
 // A plain number fits everything: "L + 3" is a length, and "m*0.5^2/12" may be an inertia, since 0.5 may be a length.
-// So does a name whose dimension is not known. What is computed from them by products is unknown, and unknown fits
-// everything; results such as sin(a) or L1/L2 have no dimension and may stand where a plain number may.
+// A name of unknown dimension fits everything, too. Products with either have an unknown dimension, which fits
+// everything. Results such as sin(a) or L1/L2 have no dimension and are allowed wherever a plain number is.
 #pragma once
 
 #include <functional>

@@ -113,6 +113,12 @@ LeftSingular left_singular(const MatrixXd& A) {
   return {svd.singularValues(), svd.matrixU()};
 }
 
+LeastSingular least_singular(const MatrixXd& A) {
+  const Eigen::JacobiSVD<MatrixXd> svd(A, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const Index last = svd.singularValues().size() - 1;
+  return {svd.singularValues()(last), svd.matrixU().col(last), svd.matrixV().col(last)};
+}
+
 struct OrthogonalDecomposition::Factors {
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> cod;  // Eigen reads beyond matrices without entries
   Index rows = 0, cols = 0;

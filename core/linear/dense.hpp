@@ -30,7 +30,7 @@ Eigen::VectorXcd left_eigenvector(const Eigen::MatrixXd& A, std::complex<double>
 
 // Solves A x = b of a symmetric positive definite A by Cholesky.
 Eigen::VectorXd cholesky_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
-// The same; empty if a pivot is below this part of the largest, or not positive.
+// As above; returns an empty vector if a pivot is not positive, or below this part of the largest.
 Eigen::VectorXd definite_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b, double threshold);
 
 // An orthonormal basis of { x : A x = 0 } as columns, by QR of A' with column pivoting. threshold: the pivots below
@@ -47,6 +47,13 @@ struct LeftSingular {
   Eigen::MatrixXd U;
 };
 LeftSingular left_singular(const Eigen::MatrixXd& A);
+
+// The least of the min(rows, columns) singular values of A, which is not empty, and its vectors: A v = value u.
+struct LeastSingular {
+  double value;
+  Eigen::VectorXd u, v;
+};
+LeastSingular least_singular(const Eigen::MatrixXd& A);
 
 // Factors of a small square matrix, by elimination with row pivoting.
 class SquareFactor {

@@ -14,7 +14,7 @@ namespace mbsopt {
 inline constexpr int kDualDirections = 7;
 using Dual = Eigen::AutoDiffScalar<Eigen::Matrix<double, kDualDirections, 1>>;
 
-// The same numbers, which nothing is differentiated in.
+// Returns constants: the same numbers with derivatives of zero.
 inline Eigen::VectorX<Dual> constants(const Eigen::Ref<const Eigen::VectorXd>& x) { return x.cast<Dual>(); }
 
 // J += scale df/dx; J is f's size x x's. f(x, out): out arrives zeroed.

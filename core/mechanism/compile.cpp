@@ -34,16 +34,10 @@ void scale_alpha(MechanismData& data) {
   std::vector<double> mass(bodies), inertia(bodies), reach2(bodies, 0.0);
   double largest_mass = 0, largest_inertia = 0;
   for (const Constraint& c : data.constraints) {
-    std::visit(
-        [&]<class P>(const P& p) {
-          if constexpr (std::is_same_v<P, Coincidence> || std::is_same_v<P, Dot2> || std::is_same_v<P, Distance>) {
-            double& r1 = reach2[static_cast<std::size_t>(c.body1)];
-            double& r2 = reach2[static_cast<std::size_t>(c.body2)];
-            r1 = std::max(r1, p.s1.squaredNorm());
-            r2 = std::max(r2, p.s2.squaredNorm());
-          }
-        },
-        c.primitive);
+    c.for_each_point([&](int body, const Vector3d& s) {
+      double& r2 = reach2[static_cast<std::size_t>(body)];
+      r2 = std::max(r2, s.squaredNorm());
+    });
   }
   for (std::size_t i = 1; i < bodies; ++i) {
     const BodyData& b = data.bodies[i];
@@ -73,12 +67,11 @@ void scale_alpha(MechanismData& data) {
   };
   data.row_alpha.setZero(data.m);
   for (const Constraint& c : data.constraints) {
-    const auto* coordinate = std::get_if<Coordinate>(&c.primitive);
-    const bool turns = std::holds_alternative<Dot1>(c.primitive) || std::holds_alternative<Angle>(c.primitive) ||
-                       (coordinate && coordinate->index >= 3);
-    const double seen =
-        turns ? inverse(inertia, largest_inertia, lightest_inertia, c) : inverse(mass, largest_mass, lightest_mass, c);
-    data.row_alpha.segment(c.row, c.rows()).array() += c.factor * c.factor * seen * (turns && coordinate ? 0.25 : 1.0);
+    const RowQuantity quantity = c.quantity();
+    const double seen = quantity == RowQuantity::length ? inverse(mass, largest_mass, lightest_mass, c)
+                                                        : inverse(inertia, largest_inertia, lightest_inertia, c);
+    data.row_alpha.segment(c.row, c.rows()).array() +=
+        c.factor * c.factor * seen * (quantity == RowQuantity::euler_parameter ? 0.25 : 1.0);
   }
   // A factor of zero leaves a row without inertia: any alpha does.
   data.row_alpha = (data.row_alpha.array() > 0).select(data.row_alpha.array().inverse(), 1.0);

@@ -1,4 +1,4 @@
-// Whose coordinates each body's equations of motion read: the pattern of their derivatives.
+// The bodies whose coordinates occur in each body's equations of motion: the pattern of their derivatives.
 #pragma once
 
 #include <vector>

@@ -52,7 +52,7 @@ Eigen::Matrix<double, 13, 1> body_row(const Mechanism& mechanism, int body, cons
 struct ModelSummary {
   int bodies = 0, equations = 0, rank = 0, degrees_of_freedom = 0;  // equations: joints' and unit-norm rows
   std::vector<std::string> redundant;  // joints that hold redundant equations, "name (2 of 5)"
-  // Of the equations of motion (model_choice.hpp): 3 in the plane, 6 in space, and why not 3.
+  // Unknowns of the equations of motion (model_choice.hpp): 3 in the plane, 6 in space; and the reason why not 3.
   int unknowns_per_body = 6;
   std::string not_planar;
 };

@@ -21,7 +21,7 @@ class ScenePrograms {
 
   const Symbols& symbols() const { return symbols_; }  // parameters (inputs, in order), definitions, signals
 
-  // Of a numeric field, and f, f_t, f_tt of a law of time, whose last input is t. Both throw UnknownName.
+  // The program of a numeric field; f, f_t, f_tt of a law of time, whose last input is t. Both throw UnknownName.
   std::shared_ptr<const Program> field(const Expression& field);
   std::shared_ptr<const std::array<Program, 3>> law(const Expression& law);
   std::shared_ptr<const std::array<Program, 3>> law(const SampledLaw& samples);

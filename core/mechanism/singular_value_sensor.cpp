@@ -8,9 +8,9 @@
 // Redundant equations beside a free motion give 0 everywhere; in a driven mechanism they do no harm. A sigma that
 // occurs twice has no derivative; the gradient is then that of one of the two. Source of dsigma: G. H. Golub,
 // C. F. Van Loan, "Matrix Computations", section 8.6.
-#include <Eigen/SVD>
 #include <cmath>
 
+#include "core/linear/dense.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 #include "core/mechanism/virtual_work.hpp"
 #include "core/sensor/body_at.hpp"
@@ -59,10 +59,8 @@ Scaled scaled(const MechanismData& d, const Eigen::VectorXd& y) {
   for (Eigen::Index i = 0; i < out.J.rows(); ++i)
     if (out.norms(i) > 0) out.J.row(i) /= out.norms(i);
   if (out.J.size() == 0) return out;
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(out.J, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const Eigen::Index last = svd.singularValues().size() - 1;
-  out.smallest = svd.singularValues()(last);
-  out.left = svd.matrixU().col(last), out.right = svd.matrixV().col(last);
+  LeastSingular least = least_singular(out.J);
+  out.smallest = least.value, out.left = std::move(least.u), out.right = std::move(least.v);
   return out;
 }
 

@@ -4,7 +4,7 @@
 //   theta = theta~ + 2 atan(delta_theta/2)                  pi = p~ + 1/2 G(p~)' delta_theta, normalised, turns so
 //   w = w_n + u_theta,   w_n = 2 Im(conj(P) Pdot^),   Pdot = i w/2 P
 //
-// The part of y that leaves the plane is carried along. projection.cpp calls these functions inline.
+// The part of y that leaves the plane is carried along. All functions are inline.
 #pragma once
 
 #include <cmath>

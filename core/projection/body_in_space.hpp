@@ -3,7 +3,7 @@
 //   p~ = p^/|p^|,   pi = p~ + 1/2 G(p~)' delta_theta,   p = pi/|pi|
 //   pdot = pdot_n + 1/2 G(p)' u_theta,   pdot_n = pdot^ - p (p'pdot^)/(p'p)
 //
-// Where velocities alone are projected, p = p~ = p^. For projection.cpp: inline.
+// Where velocities alone are projected, p = p~ = p^. All functions are inline: they run once per body and iteration.
 #pragma once
 
 #include <cmath>

@@ -32,12 +32,12 @@ class SampleSchedule {
       std::stable_sort(events_.begin(), events_.end(), before);
   }
 
-  // Of the next event; infinite if there is none.
+  // The time of the next event; infinite if there is none.
   double next_time() const { return next_ < events_.size() ? events_[next_].time : INFINITY; }
 
   bool due(double t1) const { return next_ < events_.size() && (events_[next_].time <= t1 || t1 >= end_); }
 
-  // Events up to t1 that were not taken before; all that are left in the step that reaches the end.
+  // Returns the events up to t1 that were not taken before, and all that remain in the step that reaches the end.
   std::span<const SampleEvent> take(double t1) {
     const std::size_t first = next_;
     while (due(t1)) ++next_;

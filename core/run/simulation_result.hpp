@@ -46,7 +46,7 @@ struct SimulationStatistics {
   struct Rejections {
     long error_test = 0, not_converged = 0, off_constraints = 0, not_finite = 0, placed_again = 0;
   } rejections;
-  // Of the factor of the explicit equations of motion: its blocks (6 x 6, or 3 x 3 in the plane), diagonal ones
+  // The factor of the explicit equations of motion: its blocks (6 x 6, or 3 x 3 in the plane), diagonal ones
   // included; and at how many states derivatives of these equations were evaluated.
   long factor_blocks = 0, linearised_states = 0;
   double wall_seconds = 0;

@@ -120,7 +120,7 @@ class Checker {
   void misplaced(std::string_view, std::string_view) {}
   void rest_unknown() {}
 
-  // Of a field at any path.
+  // Checks a field at any path.
   void check_expression(const std::string& path, const Expression& value, Names names,
                         const std::optional<Dimension>& expected);
   void check_size(const std::string& where, const Expression& value);

@@ -59,7 +59,7 @@ class SceneFacts {
   Reads reads_of(const Sensor& sensor) const;
   std::optional<Dimension> dimension_of(const Sensor& sensor,
                                         PlainNumbers plain = PlainNumbers::fit_everything) const;  // nullopt: not known
-  // Of a name in a sensor's expression.
+  // The dimension of a name in a sensor's expression.
   std::optional<Dimension> dimension_in_sensor(const std::string& name,
                                                PlainNumbers plain = PlainNumbers::fit_everything) const;
 

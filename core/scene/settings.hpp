@@ -12,8 +12,8 @@
 namespace mbsopt {
 
 enum class FormulationType { penalty, augmented_lagrangian };
-// Of the penalty equations: S = M + J' alpha J at once, which loses digits as alpha grows, or the quasi-definite system
-// [M J'; J -1/alpha], which does not.
+// How the penalty equations are solved: by S = M + J' alpha J, which loses digits as alpha grows, or by the
+// quasi-definite system [M J'; J -1/alpha], which does not.
 enum class LinearSolver { cholesky, quasidefinite };
 enum class Projection { none, velocity, position_velocity };
 // Six unknowns per body, or three where joints hold all bodies in a plane (planar_model.hpp); automatic: planar where
@@ -39,8 +39,8 @@ struct FormulationSettings {
   }
 };
 
-// What an expert may change of step-size control and of Newton's method. An absent value is the method's own; one that
-// the method has no use for is refused (docs/integrators.md).
+// Settings of step-size control and of Newton's method for experts. An absent value is the method's own. A value that
+// the method does not use is an error (docs/integrators.md).
 struct IntegratorOptions {
   std::optional<double> min_step;          // [s], > 0; a rejected step that would fall below it ends the run
   std::optional<double> newton_tolerance;  // part of the tolerance, in (0, 1); else sqrt(rtol), at most 0.01

@@ -155,7 +155,7 @@ std::string not_among(std::string_view what, std::string_view found, const std::
 // Whether friction in a joint resists sliding: as `motion` says, else where the joint has no angle.
 bool is_sliding(std::string_view motion, std::string_view joint_type);
 
-// Of a quantity other than expression, whose are found in the scene (scene_facts.hpp). nullopt: not known (N or N m).
+// Of a quantity other than expression; scene_facts.hpp finds those of expressions. nullopt: not known (N or N m).
 std::optional<Dimension> dimension_of_quantity(const Sensor& sensor);
 Reads reads_of_quantity(const Sensor& sensor);
 

@@ -1,5 +1,5 @@
-// What a joint leaves to its bodies, as one number x: the angle about its axis or the displacement along it; what
-// sensors, drives and forces in joints share. The mathematics is that of the primitive.
+// The coordinate x of a joint: the angle about its axis or the displacement along it. Sensors, drives and forces in
+// joints use it. Its equations are those of the primitive.
 #pragma once
 
 #include <type_traits>

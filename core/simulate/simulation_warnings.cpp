@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <optional>
+#include <utility>
+
 #include "core/cvodes/cvodes.hpp"
 
 namespace mbsopt {
@@ -9,7 +12,7 @@ namespace {
 
 constexpr double kApart = 1e-3;  // [m, -]
 // [m, -]: projections leave 1e-11 and less, rounding of coordinates up to 1e4 m. Where rows contradict each other, they
-// give up below 1e-8 (projection.cpp) at the first step.
+// give up below 1e-8 (projection_solution.hpp) at the first step.
 constexpr double kContradicting = 1e-10;
 constexpr double kUnmet = 1e-5;            // of the accelerations of the constraints
 constexpr double kGivingWay = 1e-8;        // of the accelerations; gradients had errors of 500 times as much
@@ -19,6 +22,109 @@ constexpr double kUnresolved = 3e-2;       // of the integral of a running cost'
 constexpr double kWithinSteps = 100;       // tolerances: two of the digits that were asked for
 constexpr double kLargePenalty = 3e10;     // above it rounding by Cholesky passes 1e-5 of the accelerations
 constexpr double kDigitsPerAlpha = 1e-16;  // docs/formulations.md, measured
+
+using Warning = std::optional<std::string>;
+
+bool is_penalty(const SimulationSettings& settings) { return settings.formulation.type == FormulationType::penalty; }
+bool by_cvodes(const SimulationSettings& settings) { return is_cvodes(settings.integrator.type); }
+
+Warning rounding_of_penalty(const SimulationSettings& settings) {
+  const FormulationSettings& f = settings.formulation;
+  if (!is_penalty(settings) || f.linear_solver != LinearSolver::cholesky || !(f.alpha > kLargePenalty)) return {};
+  return fmt::format(
+      "simulation.formulation: penalty with alpha {:.3g} by cholesky leaves the accelerations with relative errors of "
+      "about {:.0e}, from rounding; \"linear_solver\": \"quasidefinite\" has none of them",
+      f.alpha, 10 * kDigitsPerAlpha * f.alpha);
+}
+
+Warning joints_apart(const SimulationSettings& settings, const SimulationStatistics& statistics) {
+  if (!(statistics.max_position_violation > kApart)) return {};
+  const std::string advice =
+      is_penalty(settings)
+          ? fmt::format(
+                "simulation.formulation.alpha is {:.3g}: raise it, it has to be large against the forces in "
+                "the joints over the violation that is allowed; or leave the formulation out, the default has "
+                "no such error",
+                settings.formulation.alpha)
+      : by_cvodes(settings) ? "Tighten rtol and atol, or take a Runge-Kutta method, which projects onto the constraints"
+                            : "Tighten rtol and atol, or let simulation.formulation.projection be position_velocity";
+  return fmt::format("the joints came apart: their equations are violated by up to {:.2g} [m, -]. {}",
+                     statistics.max_position_violation, advice);
+}
+
+Warning energy_lost(const SimulationSettings& settings, const SimulationStatistics& statistics) {
+  if (!(statistics.relative_energy_drift > kEnergyLost && statistics.max_position_violation <= kApart)) return {};
+  return fmt::format(
+      "the energy changed by up to {:.2g} J, {:.2g} % of all there is, although nothing does work: this is not the "
+      "motion of the scene. {}{}",
+      statistics.energy_drift, 100 * statistics.relative_energy_drift,
+      settings.integrator.step ? "Take a smaller simulation.integrator.step"
+                               : "Tighten simulation.integrator.rtol and atol",
+      by_cvodes(settings) ? "; near singular positions a Runge-Kutta method, which projects onto the constraints, is "
+                            "right where CVODES is not"
+                          : "");
+}
+
+Warning accelerations_unmet(const SimulationSettings& settings, const SimulationStatistics& statistics) {
+  const double residual = statistics.max_acceleration_residual;
+  if (is_penalty(settings)) {
+    if (!(residual > kTakenOut)) return {};
+    return fmt::format(
+        "the projections took out {:.2g} of the change of velocity: the penalty does not hold the joints by itself, "
+        "and the motion is wrong by as much or more. simulation.formulation.alpha is {:.3g}: raise it with "
+        "\"linear_solver\": \"quasidefinite\", or leave the formulation out, the default has no such error{}",
+        residual, settings.formulation.alpha,
+        settings.integrator.step ? "; or take a smaller simulation.integrator.step" : "");
+  }
+  if (!(residual > kUnmet)) return {};
+  return fmt::format(
+      "the accelerations of the constraints were met to {:.1e} only: steps came close to a singular position, after "
+      "which the branch may be wrong (compare with another Runge-Kutta method, or other tolerances), or masses differ "
+      "too much for simulation.formulation (a larger alpha or more iterations), or joints lock only by a small angle "
+      "between their axes and give way: raise simulation.formulation.alpha, or make the axes exactly parallel",
+      residual);
+}
+
+Warning joints_give_way(const SimulationSettings& settings, const SimulationStatistics& statistics) {
+  if (!(statistics.weak_joints_error > kGivingWay)) return {};
+  return fmt::format(
+      "joints lock only by a small angle between their axes and give way: the accelerations have a relative error of "
+      "{:.1e}, and gradients may have a thousand times as much. Make the axes exactly parallel, or raise "
+      "simulation.formulation.alpha ({:.3g} now; 1e12 holds angles of 1e-6)",
+      statistics.weak_joints_error, settings.formulation.alpha);
+}
+
+Warning contradicting_joints(const SimulationSettings& settings, const SimulationStatistics& statistics) {
+  const bool projects = settings.formulation.projection == Projection::position_velocity && !by_cvodes(settings);
+  if (!projects || !(statistics.max_position_violation > kContradicting)) return {};
+  return fmt::format(
+      "the equations of the joints contradict each other by {:.1e} [m, -], which no projection takes out: some of them "
+      "nearly depend on each other, as where axes in a closed loop are parallel but for a few digits. Which motions "
+      "they leave is uncertain, and so are the motion and its gradients, even in their first digits. Write these axes "
+      "with all digits, or replace a joint of the loop by one with fewer equations (`validate` names joints with "
+      "redundant equations)",
+      statistics.max_position_violation);
+}
+
+Warning unresolved(const SimulationSettings& settings, const QuadratureError& worst, const char* what,
+                   const char* consequence) {
+  if (!(worst.error > kUnresolved)) return {};
+  return fmt::format(
+      "the steps do not resolve {} of objective '{}': {} has an estimated error of {:.2g} %, most of it near t = "
+      "{:.6g} s. {}, or take cvodes_bdf or cvodes_adams, which control this error",
+      what, worst.of, consequence, 100 * worst.error, worst.time,
+      settings.integrator.step ? "Take a smaller simulation.integrator.step"
+                               : "Set simulation.integrator.max_step, tighten rtol");
+}
+
+Warning near_singular(const SimulationSettings& settings, const SimulationStatistics& statistics) {
+  if (!(statistics.projected_error > kWithinSteps)) return {};
+  return fmt::format(
+      "near t = {:.6g} s the mechanism comes close to a singular position: states between the ends of steps there, as "
+      "in rows of the trajectory and in sampled values, may be off by {:.1g} of their size. A smaller "
+      "simulation.integrator.max_step helps",
+      statistics.projected_error_time, statistics.projected_error * settings.integrator.rtol);
+}
 
 }  // namespace
 
@@ -41,89 +147,20 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
                                              bool finished) {
   const SimulationSettings& settings = scene.simulation;
   std::vector<std::string> warnings;
-  const FormulationSettings& f = settings.formulation;
-  const bool penalty = f.type == FormulationType::penalty;
-  if (penalty && f.linear_solver == LinearSolver::cholesky && f.alpha > kLargePenalty) {
-    warnings.push_back(
-        fmt::format("simulation.formulation: penalty with alpha {:.3g} by cholesky leaves the accelerations with "
-                    "relative errors of about {:.0e}, from rounding; \"linear_solver\": \"quasidefinite\" has none "
-                    "of them",
-                    f.alpha, 10 * kDigitsPerAlpha * f.alpha));
-  }
-  if (statistics.max_position_violation > kApart) {
-    warnings.push_back(fmt::format(
-        "the joints came apart: their equations are violated by up to {:.2g} [m, -]. {}",
-        statistics.max_position_violation,
-        penalty ? fmt::format("simulation.formulation.alpha is {:.3g}: raise it, it has to be large against the forces "
-                              "in the joints over the violation that is allowed; or leave the formulation out, the "
-                              "default has no such error",
-                              f.alpha)
-                : std::string("Tighten rtol and atol, or ") +
-                      (is_cvodes(settings.integrator.type)
-                           ? "take a Runge-Kutta method, which projects onto the constraints"
-                           : "let simulation.formulation.projection be position_velocity")));
-  }
-  if (!finished) return warnings;
-  const bool projects = f.projection == Projection::position_velocity && !is_cvodes(settings.integrator.type);
-  if (statistics.relative_energy_drift > kEnergyLost && statistics.max_position_violation <= kApart) {
-    warnings.push_back(fmt::format(
-        "the energy changed by up to {:.2g} J, {:.2g} % of all there is, although nothing does work: this is not the "
-        "motion of the scene. {}{}",
-        statistics.energy_drift, 100 * statistics.relative_energy_drift,
-        settings.integrator.step ? "Take a smaller simulation.integrator.step"
-                                 : "Tighten simulation.integrator.rtol and atol",
-        is_cvodes(settings.integrator.type) ? "; near singular positions a Runge-Kutta method, which projects onto the "
-                                              "constraints, is right where CVODES is not"
-                                            : ""));
-  } else if (penalty && statistics.max_acceleration_residual > kTakenOut) {
-    warnings.push_back(
-        fmt::format("the projections took out {:.2g} of the change of velocity: the penalty does not hold the joints "
-                    "by itself, and the motion is wrong by as much or more. simulation.formulation.alpha is {:.3g}: "
-                    "raise it with \"linear_solver\": \"quasidefinite\", or leave the formulation out, the default "
-                    "has no such error{}",
-                    statistics.max_acceleration_residual, f.alpha,
-                    settings.integrator.step ? "; or take a smaller simulation.integrator.step" : ""));
-  } else if (!penalty && statistics.max_acceleration_residual > kUnmet) {
-    warnings.push_back(fmt::format(
-        "the accelerations of the constraints were met to {:.1e} only: steps came close to a singular position, after "
-        "which the branch may be wrong (compare with another Runge-Kutta method, or other tolerances), or masses "
-        "differ too much for simulation.formulation (a larger alpha or more iterations), or joints lock only by a "
-        "small angle between their axes and give way: raise simulation.formulation.alpha, or make the axes exactly "
-        "parallel",
-        statistics.max_acceleration_residual));
-  } else if (statistics.weak_joints_error > kGivingWay) {
-    warnings.push_back(fmt::format(
-        "joints lock only by a small angle between their axes and give way: the accelerations have a relative error "
-        "of {:.1e}, and gradients may have a thousand times as much. Make the axes exactly parallel, or raise "
-        "simulation.formulation.alpha ({:.3g} now; 1e12 holds angles of 1e-6)",
-        statistics.weak_joints_error, f.alpha));
-  } else if (projects && statistics.max_position_violation > kContradicting) {
-    warnings.push_back(fmt::format(
-        "the equations of the joints contradict each other by {:.1e} [m, -], which no projection takes out: some of "
-        "them nearly depend on each other, as where axes in a closed loop are parallel but for a few digits. Which "
-        "motions they leave is uncertain, and so are the motion and its gradients, even in their first digits. Write "
-        "these axes with all digits, or replace a joint of the loop by one with fewer equations (`validate` names "
-        "joints with redundant equations)",
-        statistics.max_position_violation));
-  }
-  const auto add_unresolved = [&](const QuadratureError& worst, const char* what, const char* consequence) {
-    if (!(worst.error > kUnresolved)) return;
-    warnings.push_back(fmt::format(
-        "the steps do not resolve {} of objective '{}': {} has an estimated error of {:.2g} %, most of it near t = "
-        "{:.6g} s. {}, or take cvodes_bdf or cvodes_adams, which control this error",
-        what, worst.of, consequence, 100 * worst.error, worst.time,
-        settings.integrator.step ? "Take a smaller simulation.integrator.step"
-                                 : "Set simulation.integrator.max_step, tighten rtol"));
+  const auto add = [&](std::optional<std::string> warning) {
+    if (warning) warnings.push_back(std::move(*warning));
+    return warning.has_value();
   };
-  add_unresolved(statistics.quadrature, "the running cost", "its integral");
-  add_unresolved(statistics.extreme_quadrature, "the peaks", "the integral of their exponential");
-  add_unresolved(statistics.gradient_quadrature, "the derivative of the integrand", "the gradient");
-  if (statistics.projected_error > kWithinSteps)
-    warnings.push_back(fmt::format(
-        "near t = {:.6g} s the mechanism comes close to a singular position: states between the ends of steps there, "
-        "as in rows of the trajectory and in sampled values, may be off by {:.1g} of their size. A smaller "
-        "simulation.integrator.max_step helps",
-        statistics.projected_error_time, statistics.projected_error * settings.integrator.rtol));
+  add(rounding_of_penalty(settings));
+  add(joints_apart(settings, statistics));
+  if (!finished) return warnings;
+  // Each of these explains those after it.
+  for (const auto& warning : {energy_lost, accelerations_unmet, joints_give_way, contradicting_joints})
+    if (add(warning(settings, statistics))) break;
+  add(unresolved(settings, statistics.quadrature, "the running cost", "its integral"));
+  add(unresolved(settings, statistics.extreme_quadrature, "the peaks", "the integral of their exponential"));
+  add(unresolved(settings, statistics.gradient_quadrature, "the derivative of the integrand", "the gradient"));
+  add(near_singular(settings, statistics));
   for (const Jump& jump : statistics.jumps) warnings.push_back(in_words(scene, jump));
   return warnings;
 }

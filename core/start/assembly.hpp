@@ -37,7 +37,7 @@ class Assembly {
   const AssemblyResult& result() const;
   ModelSummary summary() const;
   int degrees_of_freedom() const;  // those of the summary
-  // Of an assembly that failed, these are not a number.
+  // Both are NaN if the assembly failed.
   Eigen::MatrixXd tangent() const;                                                 // dy/drho, 14n x P
   void add_adjoint(const Eigen::MatrixXd& y_bar, Eigen::MatrixXd& rho_bar) const;  // rho_bar += (dy/drho)' y_bar
   // Parameters that cannot change by themselves: where equations are redundant, they would contradict each other (one

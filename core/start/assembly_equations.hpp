@@ -51,7 +51,7 @@ class AssemblyEquations {
   };
   Gradients gradients(const Eigen::VectorXd& y) const;
   Eigen::MatrixXd gradients_in_y(const Eigen::VectorXd& y) const;
-  // The same with the state's gradient by its entries; those of the same place add up.
+  // As above, with the gradient in the state as entries; entries at the same place are added.
   struct SparseGradients {
     std::vector<SparseEntry> y;
     Eigen::MatrixXd rho;

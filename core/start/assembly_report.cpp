@@ -29,10 +29,9 @@ void add_joint(const MechanismData& d, AssemblyLevel level, int joint, const Eig
     if (c.joint != joint) continue;
     any = &c;
     const double amount = F.segment(c.row, c.rows()).norm();
-    double& kind = std::holds_alternative<Dot1>(c.primitive)    ? skew
-                   : std::holds_alternative<Angle>(c.primitive) ? turned
-                                                                : apart;
-    kind = std::holds_alternative<Angle>(c.primitive) ? amount : std::hypot(kind, amount);
+    const RowQuantity quantity = c.quantity();
+    double& kind = quantity == RowQuantity::cosine ? skew : quantity == RowQuantity::angle ? turned : apart;
+    kind = quantity == RowQuantity::angle ? amount : std::hypot(kind, amount);
   }
   if (!any || std::max({apart, skew, turned}) <= tolerance) return;
   const bool rates = level == AssemblyLevel::velocity;
@@ -73,8 +72,8 @@ void add_drive(const MechanismData& d, AssemblyLevel level, const Constraint& c,
                double tolerance, std::vector<Finding>& findings) {
   const double amount = std::abs(F(c.row));
   if (amount <= tolerance) return;
-  const bool lengths = std::holds_alternative<Dot2>(c.primitive) || std::holds_alternative<Distance>(c.primitive);
-  const std::string unit = std::holds_alternative<Angle>(c.primitive) ? " rad" : lengths ? " m" : "";
+  const RowQuantity quantity = c.quantity();
+  const std::string unit = quantity == RowQuantity::angle ? " rad" : quantity == RowQuantity::length ? " m" : "";
   findings.push_back(
       {amount, fmt::format("drive '{}': missed by {:.3g}{}{}", d.drive_names[static_cast<std::size_t>(c.drive)], amount,
                            unit, level == AssemblyLevel::velocity ? " per second" : "")});

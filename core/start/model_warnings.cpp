@@ -195,14 +195,9 @@ void add_rounding(const MechanismData& d, const VectorXd& q, std::vector<std::st
   constexpr double kNoticeable = 1e-8;  // of the arms: below the tolerances of integrators
   double arm = 0, far = 0;
   for (const Constraint& c : d.constraints) {
-    std::visit(
-        [&]<class P>(const P& p) {
-          if constexpr (std::is_same_v<P, Coincidence> || std::is_same_v<P, Dot2> || std::is_same_v<P, Distance>) {
-            if (c.body1 > 0) arm = std::max(arm, p.s1.norm());
-            if (c.body2 > 0) arm = std::max(arm, p.s2.norm());
-          }
-        },
-        c.primitive);
+    c.for_each_point([&](int body, const Vector3d& s) {
+      if (body > 0) arm = std::max(arm, s.norm());
+    });
   }
   for (int i = 0; i < d.n; ++i) far = std::max(far, q.segment<3>(7 * i).stableNorm());
   const double rounding = std::numeric_limits<double>::epsilon() * far;

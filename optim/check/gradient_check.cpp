@@ -3,10 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
-#include <map>
 #include <optional>
 #include <random>
 #include <set>
@@ -16,9 +13,7 @@
 #include "optim/check/rounding_scatter.hpp"
 #include "optim/check/taylor_remainders.hpp"
 #include "optim/check/user_terms.hpp"
-#include "optim/differences/difference_ladder.hpp"
 #include "optim/machine/stopwatch.hpp"
-#include "optim/objective/integration_error.hpp"
 
 namespace mbsopt {
 namespace {
@@ -26,13 +21,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-// psi carries the rounding of all steps: some units in the last place of the largest numbers it is made of.
-constexpr double kPsiRounding = 100 * kEpsilon;
-constexpr int kJumpRungs = 3;  // the smallest: further off, frozen steps have errors of their own
 
 // Returns whether the methods agree. Wrong terms of a user do not count here.
 bool agree(const GradientCheck& check) {
@@ -61,14 +49,17 @@ class Check {
     size_.resize(rho_.size());
     for (Index k = 0; k < rho_.size(); ++k)
       size_(k) = typical_size(scene.parameters[static_cast<std::size_t>(k)], rho_(k));
-    taylor_size_ = size_;
   }
 
   GradientCheck run() {
     if (!base_runs()) return std::move(result_);
     result_.ran = true;
     result_.discrete = !is_cvodes(scene_.simulation.integrator.type);
-    set_what_moves_kinks();
+    differences_.emplace(
+        GradientDifferences::Base{result_.psi, rho_, size_, steps_, result_.discrete, parameters_on_frozen_steps()},
+        GradientDifferences::Settings{options_.relative_step, options_.rungs, options_.free_steps},
+        [this](const VectorXd& rho, bool frozen) { return run_at(rho, frozen); });
+    rounding_.psi.setZero(result_.psi.size()), rounding_.psi_rho.setZero(result_.psi.size(), rho_.size());
     measure_times();
     difference();
     estimate_integration_error();
@@ -119,7 +110,7 @@ class Check {
   }
 
   // Steps that end at kinks lose them as a parameter moves these: differences need steps of their own then.
-  void set_what_moves_kinks() {
+  Eigen::Array<bool, Eigen::Dynamic, 1> parameters_on_frozen_steps() {
     const Mechanism mechanism(scene_, rho_, {}, options_.user_forces);
     std::vector<Cost> costs;
     for (const Objective& objective : objectives_)
@@ -127,15 +118,17 @@ class Check {
     std::set<int> moving;
     for (const KinkedSignal& kinks : kinks_of(mechanism, costs))
       moving.insert(kinks.moved_by.begin(), kinks.moved_by.end());
-    on_frozen_steps_.setConstant(rho_.size(), result_.discrete);
+    Eigen::Array<bool, Eigen::Dynamic, 1> frozen =
+        Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(rho_.size(), result_.discrete);
     std::string names;
     for (const int k : moving) {
-      on_frozen_steps_(k) = false;
+      frozen(k) = false;
       names += (names.empty() ? "'" : ", '") + result_.parameters[static_cast<std::size_t>(k)] + "'";
     }
     if (!names.empty() && result_.discrete)
       result_.warnings.push_back(fmt::format(
           "{} moves kinks of laws, at which steps end: compared with differences on free steps only", names));
+    return frozen;
   }
 
   void measure_times() {
@@ -172,25 +165,15 @@ class Check {
   }
 
   void difference() {
-    const Index m = result_.psi.size(), P = rho_.size();
-    for (MatrixXd* x :
-         {&result_.frozen, &result_.free, &frozen_error_, &free_error_, &frozen_step_, &free_step_, &rounding_.psi_rho})
-      x->setZero(m, P);
-    rounding_.psi.setZero(m);
-    jump_.setZero(m, P);
-    on_base_steps_.setConstant(m, P, false);
+    const Index P = rho_.size();
     for (Index k = 0; k < P; ++k) {
-      if (result_.discrete && !on_frozen_steps_(k)) result_.frozen.col(k).setConstant(kNaN);
       for (const bool frozen : {true, false}) {
-        if (frozen ? !on_frozen_steps_(k) : !options_.free_steps) continue;
+        if (!differences_->takes(k, frozen)) continue;
         const Stopwatch stopwatch;
-        const Ladder ladder = ladder_of(k, frozen, options_.relative_step * size_(k));
-        const LadderDerivative& d = ladder.d;
-        if (d.derivative.hasNaN() && !ladder.failure.empty())
+        if (const std::string failure = differences_->take(k, frozen); !failure.empty())
           result_.warnings.push_back(fmt::format("differences in '{}' could not be evaluated{}: {}",
                                                  result_.parameters[static_cast<std::size_t>(k)],
-                                                 frozen ? " on the steps of the base run" : "", ladder.failure));
-        for (Index i = 0; i < m; ++i) take(ladder, i, k, frozen);
+                                                 frozen ? " on the steps of the base run" : "", failure));
         (frozen ? result_.frozen_cost : result_.free_cost).wall_seconds += stopwatch.seconds();
       }
       if (options_.progress) options_.progress(static_cast<int>(k) + 1, static_cast<int>(P));
@@ -198,116 +181,23 @@ class Check {
     set_ratio(result_.frozen_cost), set_ratio(result_.free_cost);
   }
 
-  struct Ladder {
-    LadderDerivative d;
-    std::string failure;             // of a run
-    double other_steps = kInfinity;  // the smallest |h| at which a run took others than the base run
-  };
-
-  // Differences in parameter k, by steps of `largest` and below.
-  Ladder ladder_of(Index k, bool frozen, double largest) {
-    Ladder ladder;
-    const double near = largest * std::pow(0.5, options_.rungs - kJumpRungs);
-    const auto f = [&](double h) -> std::optional<VectorXd> {
-      VectorXd rho = rho_;
-      rho(k) += h;
-      Evaluation e = run_at(rho, frozen);
-      if (!e.ok) ladder.failure = e.message;
-      if (!e.ok) return std::nullopt;
-      if (e.steps.sizes != steps_.sizes) ladder.other_steps = std::min(ladder.other_steps, std::abs(h));
-      if (std::abs(h) < 1.5 * near) note_jump(k, h, frozen, e.psi);
-      note_rung(k, h, frozen, e.psi);
-      return std::move(e.psi);
-    };
-    ladder.d = difference_ladder(f, result_.psi.size(), {largest, options_.rungs, kPsiRounding});
-    for (Index i = 0; i < result_.psi.size(); ++i)
-      if (!ladder.d.has_estimate(i)) ladder.d.derivative(i) = kNaN, ladder.d.error(i) = kInfinity;
-    return ladder;
-  }
-
-  void take(const Ladder& ladder, Index i, Index k, bool frozen) {
-    const LadderDerivative& d = ladder.d;
-    (frozen ? result_.frozen : result_.free)(i, k) = d.derivative(i);
-    (frozen ? frozen_error_ : free_error_)(i, k) = d.error(i);
-    (frozen ? frozen_step_ : free_step_)(i, k) = d.step(i);
-    if (!frozen && result_.discrete) on_base_steps_(i, k) = on_base_steps(ladder, i);
-  }
-
-  // Whether all runs that the difference is made of took the steps of the base run.
-  static bool on_base_steps(const Ladder& ladder, Index i) { return ladder.d.largest(i) < 0.75 * ladder.other_steps; }
-
-  // The error of a difference: of its ladder, of psi's rounding, and on steps of its own of the integration.
-  double own_error(const Ladder& ladder, Index i, Index k, bool frozen) const {
-    const LadderDerivative& d = ladder.d;
-    if (!(d.step(i) > 0)) return kInfinity;
-    const double integration = frozen || on_base_steps(ladder, i) ? 0 : integration_error_of(i, k, d.step(i));
-    return d.error(i) + rounding_.psi(i) / d.step(i) + integration;
-  }
-
-  // Steps that are coarse for psi may show a plateau that is no derivative (a coordinate of kilometres, of which
-  // metres matter). Where a difference disagrees, a ladder that begins below the first holds, if it contradicts it by
-  // more than its own error: smaller steps magnify rounding and jumps, which must not excuse a wrong gradient.
+  // Where a difference disagrees.
   bool difference_finer() {
-    const Index m = result_.psi.size(), P = rho_.size();
-    const double finer = std::pow(0.5, options_.rungs);
     bool found = false;
-    for (Index k = 0; k < P; ++k) {
+    for (Index k = 0; k < rho_.size(); ++k) {
       for (const bool frozen : {true, false}) {
-        const auto disagrees = [&](Index i) {
-          const CheckedEntry& e = result_.entries[static_cast<std::size_t>(i * P + k)];
+        std::vector<Index> disagreeing;
+        for (Index i = 0; i < result_.psi.size(); ++i) {
+          const CheckedEntry& e = result_.entries[static_cast<std::size_t>(i * rho_.size() + k)];
           const std::optional<Verdict>& verdict = frozen ? e.frozen_verdict : e.free_verdict;
-          return verdict && !passes(*verdict);
-        };
-        std::optional<Ladder> ladder;
-        for (Index i = 0; i < m; ++i) {
-          if (!disagrees(i)) continue;
-          if (!ladder) ladder = ladder_of(k, frozen, options_.relative_step * size_(k) * finer);
-          const double coarse = (frozen ? result_.frozen : result_.free)(i, k);
-          if (!(std::abs(ladder->d.derivative(i) - coarse) > kEstimateTrust * own_error(*ladder, i, k, frozen)))
-            continue;
-          take(*ladder, i, k, frozen);
-          if (!frozen) add_integration_error(i, k);
-          taylor_size_(k) = std::min(taylor_size_(k), ladder->d.largest(i) / options_.relative_step);
-          found = true;
+          if (verdict && !passes(*verdict)) disagreeing.push_back(i);
         }
+        if (differences_->take_finer(k, frozen, disagreeing, rounding_.psi)) found = true;
       }
     }
     return found;
   }
 
-  // The difference of the values at h and -h, once both are known.
-  void note_rung(Index k, double h, bool frozen, const VectorXd& psi) {
-    auto& values = rungs_[{k, std::abs(h)}][frozen ? 0 : 1];
-    values[h > 0 ? 0 : 1] = psi;
-  }
-
-  std::vector<LadderRung> rungs_of(Index i, Index k) const {
-    std::vector<LadderRung> rungs;
-    for (const auto& [at, values] : rungs_) {
-      if (at.first != k) continue;
-      const auto slope = [&, h = at.second](const std::array<VectorXd, 2>& psi) {
-        return psi[0].size() == 0 || psi[1].size() == 0 ? kNaN : (psi[0](i) - psi[1](i)) / (2 * h);
-      };
-      rungs.push_back({at.second, slope(values[0]), slope(values[1])});
-    }
-    std::reverse(rungs.begin(), rungs.end());
-    return rungs;
-  }
-
-  // Both ladders take the same steps h, halved exactly.
-  void note_jump(Index k, double h, bool frozen, const VectorXd& psi) {
-    if (frozen) return;
-    const auto rung = rungs_.find({k, std::abs(h)});
-    if (rung == rungs_.end()) return;
-    const VectorXd& values = rung->second[0][h > 0 ? 0 : 1];
-    if (values.size() > 0 && psi.allFinite() && values.allFinite())
-      jump_.col(k) = jump_.col(k).cwiseMax((psi - values).cwiseAbs());
-  }
-
-  // Free differences differ from the derivatives of the numbers on frozen steps by the derivative of the integration
-  // error, and carry its jumps from step sequence to step sequence, divided by the step. How large these are the
-  // smallest steps show, too, where both differences were taken. Where all runs that an entry is made of took the steps
-  // of the base run, as rounded ones often do (step_control.hpp), it is as good as one on frozen steps.
   void estimate_integration_error() {
     if (!options_.free_steps && result_.discrete) return;
     const auto error_of = [&](GradientMethod method, const MatrixXd& psi_rho) {
@@ -325,18 +215,7 @@ class Check {
     if (!result_.discrete) {  // forward and backward have errors of their own
       e.psi_rho += error_of(GradientMethod::adjoint, result_.adjoint).psi_rho;
     }
-    integration_ = std::move(e);
-    if (!options_.free_steps) return;
-    for (Index k = 0; k < rho_.size(); ++k)
-      for (Index i = 0; i < result_.psi.size(); ++i) add_integration_error(i, k);
-  }
-  void add_integration_error(Index i, Index k) {
-    if (!on_base_steps_(i, k) && std::isfinite(free_error_(i, k)))
-      free_error_(i, k) += integration_error_of(i, k, free_step_(i, k));
-  }
-  // The error that the integration adds to a free difference over `step`.
-  double integration_error_of(Index i, Index k, double step) const {
-    return integration_.psi_rho(i, k) + std::max(integration_.psi(i), jump_(i, k)) / step;
+    differences_->add(std::move(e));
   }
 
   // Runs only if something disagrees.
@@ -383,8 +262,6 @@ class Check {
                     f.alpha, worst));
   }
 
-  // psi(+-h) = psi + s h +- b h + O(h^2) beside a kink: the slopes s - b and s + b differ at its two sides.
-  // b(h) = (psi(h) + psi(-h) - 2 psi)/(2h) falls as h where psi is smooth, and not at all at a kink.
   void say_kinks() {
     for (std::size_t n = 0; n < result_.entries.size(); ++n) {
       const CheckedEntry& e = result_.entries[n];
@@ -392,17 +269,8 @@ class Check {
       const auto failed = [](const std::optional<Verdict>& v) { return v && !passes(*v); };
       const bool frozen = failed(e.frozen_verdict);
       if (!frozen && !failed(e.free_verdict)) continue;
-      double b = kNaN, wider = kNaN;  // at h and 2h, the smallest steps at which psi's rounding does not count
-      for (auto rung = rungs_.rbegin(); rung != rungs_.rend(); ++rung) {
-        const auto& [plus, minus] = rung->second[frozen ? 0 : 1];
-        if (rung->first.first != k || plus.size() == 0 || minus.size() == 0) continue;
-        const double bend = plus(i) + minus(i) - 2 * result_.psi(i);
-        if (!(std::abs(bend) > kEstimateTrust * rounding_.psi(i))) break;
-        wider = b, b = bend / (2 * rung->first.second);
-      }
-      constexpr double kFalls = 0.75;  // between 1/2 of a smooth psi and 1 of a kink
-      const double s = frozen ? e.frozen : e.free;
-      if (!(b / wider > kFalls) || std::abs(e.tlm - s) > std::abs(b) / kFalls) continue;
+      const double s = frozen ? e.frozen : e.free, b = differences_->kink(i, k, frozen, rounding_.psi(i));
+      if (!(std::abs(e.tlm - s) <= std::abs(b) / kKinkFalls)) continue;
       result_.warnings.push_back(fmt::format(
           "{} is not smooth in {}: its slope is {:.6g} below the value and {:.6g} above it, as at a norm or "
           "an absolute value that is zero. There is no derivative",
@@ -419,14 +287,16 @@ class Check {
   void compare() {
     result_.entries.clear();
     const CheckThresholds& limits = options_.thresholds;
+    const GradientDifferences::Table &on_frozen = differences_->of(true), &on_free = differences_->of(false);
+    result_.frozen = on_frozen.derivative, result_.free = on_free.derivative;
     for (Index i = 0; i < result_.psi.size(); ++i) {
       for (Index k = 0; k < rho_.size(); ++k) {
         CheckedEntry e;
         e.objective = result_.objectives[static_cast<std::size_t>(i)];
         e.parameter = result_.parameters[static_cast<std::size_t>(k)];
         e.tlm = result_.tlm(i, k), e.adjoint = result_.adjoint(i, k);
-        e.frozen = result_.frozen(i, k), e.frozen_error = frozen_error_(i, k);
-        e.free = result_.free(i, k), e.free_error = free_error_(i, k);
+        e.frozen = result_.frozen(i, k), e.frozen_error = on_frozen.error(i, k);
+        e.free = result_.free(i, k), e.free_error = on_free.error(i, k);
         const double entry = std::max(std::abs(e.tlm), std::abs(e.adjoint));
         const double floor = floor_of(i, k);
         // Differences carry the rounding of psi, divided by their step, too.
@@ -441,14 +311,16 @@ class Check {
           e.exact = entry == 0 ? Verdict::zero
                                : verdict_of(e.adjoint, rounding_.psi_rho(i, k), e.tlm, std::max(entry, floor),
                                             limits.tlm_adjoint);
-          e.frozen_error += rounding(frozen_step_);
-          if (on_frozen_steps_(k)) e.frozen_verdict = verdict_of(e.frozen, e.frozen_error, e.tlm, entry, limits.frozen);
+          e.frozen_error += rounding(on_frozen.step);
+          if (differences_->on_frozen_steps(k))
+            e.frozen_verdict = verdict_of(e.frozen, e.frozen_error, e.tlm, entry, limits.frozen);
         } else {
-          e.exact = verdict_of(e.adjoint, integration_.psi_rho(i, k), e.tlm, std::max(entry, floor), limits.continuous);
+          e.exact = verdict_of(e.adjoint, differences_->integration().psi_rho(i, k), e.tlm, std::max(entry, floor),
+                               limits.continuous);
         }
-        e.free_error += rounding(free_step_);
+        e.free_error += rounding(on_free.step);
         if (options_.free_steps) e.free_verdict = verdict_of(e.free, e.free_error, e.tlm, entry, limits.free);
-        e.rungs = rungs_of(i, k);
+        e.rungs = differences_->rungs(i, k);
         result_.entries.push_back(std::move(e));
       }
     }
@@ -494,10 +366,10 @@ class Check {
 
   void check_taylor() {
     const double allowed = options_.thresholds.frozen / kTaylorClear;  // of a derivative, as in differences
-    const VectorXd d = random_direction(rho_.size())
-                           .cwiseProduct(taylor_size_)
-                           .cwiseProduct(on_frozen_steps_.cast<double>().matrix()) /
-                       std::sqrt(static_cast<double>(rho_.size()));
+    VectorXd d = random_direction(rho_.size()).cwiseProduct(differences_->size_of_steps()) /
+                 std::sqrt(static_cast<double>(rho_.size()));
+    for (Index k = 0; k < d.size(); ++k)
+      if (!differences_->on_frozen_steps(k)) d(k) = 0;
     const auto psi_there = [&](double h) { return psi_at(rho_ + h * d, true); };
     const auto rounding = [&](double h, const VectorXd& psi) -> VectorXd {
       return (kPsiRounding * psi.cwiseAbs().cwiseMax(result_.psi.cwiseAbs())).cwiseMax(rounding_.psi) +
@@ -512,17 +384,10 @@ class Check {
   const GradientCheckOptions& options_;
   Evaluator adjoint_, tlm_;
   VectorXd rho_, size_;
-  VectorXd taylor_size_;  // smaller where finer differences hold: the steps that they come from are its largest
   StepSequence steps_;
-  MatrixXd frozen_error_, free_error_, frozen_step_, free_step_;
-  IntegrationError integration_;
+  std::optional<GradientDifferences> differences_;
   RoundingScatter rounding_;  // where it was measured; else 0
   bool rounding_known_ = false;
-  Eigen::Array<bool, Eigen::Dynamic, 1> on_frozen_steps_;             // parameters whose differences they serve
-  Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> on_base_steps_;  // a free difference
-  // psi at h and -h on frozen and free steps, by the parameter and |h|.
-  std::map<std::pair<Index, double>, std::array<std::array<VectorXd, 2>, 2>> rungs_;
-  MatrixXd jump_;  // of psi, between the steps of the base run and those chosen anew
   std::mt19937 generator_{options_.seed};
   GradientCheck result_;
 };

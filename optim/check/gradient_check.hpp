@@ -20,7 +20,6 @@
 
 #include <Eigen/Core>
 #include <functional>
-#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -28,6 +27,7 @@
 #include <vector>
 
 #include "optim/check/continuous_check.hpp"
+#include "optim/check/gradient_differences.hpp"
 #include "optim/check/gradient_timing.hpp"
 #include "optim/check/taylor_remainders.hpp"
 #include "optim/differences/verdict.hpp"
@@ -48,12 +48,6 @@ struct CheckThresholds {
   double rounding_floor = 1e-3;
   // Of CVODES: relative to the entry or to rounding_floor's part, or within the integration errors.
   double continuous = 1e-6;
-};
-
-// Central differences (psi(h) - psi(-h))/(2 h) before extrapolation; NaN where they were not evaluated.
-struct LadderRung {
-  double h = 0;
-  double frozen = std::numeric_limits<double>::quiet_NaN(), free = std::numeric_limits<double>::quiet_NaN();
 };
 
 struct CheckedEntry {

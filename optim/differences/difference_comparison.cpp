@@ -16,12 +16,118 @@ constexpr double kApart = 1e-2;    // of a derivative: an optimiser does not min
 constexpr double kMatters = 1e-3;  // of the group's largest derivative
 constexpr double kTrust = 10;      // times an estimated error
 
+using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using ComparedGroup = DifferenceComparison::Group;
+
+VectorXd rows(const VectorXd& x, const ComparedGroup& group) { return x.segment(group.first, group.rows); }
 
 struct Difference {
   VectorXd slope, bend;  // bend: |f(h) - 2 f(0) + f(-h)|/(2 h)
   double h = 0;
 };
+
+class Comparison {
+ public:
+  explicit Comparison(const DifferenceComparison& of) : of_(of) {}
+
+  // nullopt: f cannot be evaluated beside the start.
+  std::optional<Difference> difference(std::size_t variable) const;
+  // The groups whose derivatives disagree with it, with a shorter one, and by more than the integrator's error.
+  std::vector<const ComparedGroup*> disagreeing(std::size_t variable, const Difference& d);
+
+ private:
+  struct Errors {
+    VectorXd f;
+    MatrixXd f_rho;
+  };
+  std::optional<Difference> difference(std::size_t variable, double wanted) const;
+  double largest_derivative(const ComparedGroup& group) const;
+  bool disagrees(const ComparedGroup& group, std::size_t variable, const Difference& d, const Errors* integrator) const;
+  const Errors& integrator_errors();
+
+  const DifferenceComparison& of_;
+  std::optional<Errors> errors_;
+};
+
+std::optional<Difference> Comparison::difference(std::size_t variable) const {
+  const double wanted = kStep * of_.variables[variable].size;
+  const std::optional<Difference> d = difference(variable, wanted);
+  return d ? d : difference(variable, wanted / kShorter);
+}
+
+std::optional<Difference> Comparison::difference(std::size_t variable, double wanted) const {
+  const ComparedVariable& v = of_.variables[variable];
+  const double nearer = std::min(v.below, v.above), farther = std::max(v.below, v.above);
+  Difference d;
+  if (nearer >= wanted / kShorter) {
+    d.h = std::min(wanted, nearer);
+    const std::optional<VectorXd> plus = of_.at(variable, d.h), minus = of_.at(variable, -d.h);
+    if (!plus || !minus) return std::nullopt;
+    d.slope = (*plus - *minus) / (2 * d.h);
+    d.bend = (*plus - 2 * of_.f + *minus).cwiseAbs() / (2 * d.h);
+    return d;
+  }
+  // On a bound: away from it, (4 f(h/2) - f(h) - 3 f(0))/h.
+  d.h = std::min(wanted, farther);
+  const double h = v.above >= v.below ? d.h : -d.h;
+  const std::optional<VectorXd> half = of_.at(variable, h / 2), whole = of_.at(variable, h);
+  if (!half || !whole) return std::nullopt;
+  d.slope = (4 * *half - *whole - 3 * of_.f) / h;
+  d.bend = (*whole - 2 * *half + of_.f).cwiseAbs() / (0.5 * d.h);
+  return d;
+}
+
+double Comparison::largest_derivative(const ComparedGroup& group) const {
+  double largest = 0;
+  for (std::size_t k = 0; k < of_.variables.size(); ++k)
+    largest = std::max(largest, of_.variables[k].size * rows(of_.f_rho.col(static_cast<Index>(k)), group).norm());
+  return largest;
+}
+
+bool Comparison::disagrees(const ComparedGroup& group, std::size_t variable, const Difference& d,
+                           const Errors* integrator) const {
+  const auto size = [&](const auto& x) { return rows(x, group).norm(); };
+  const Index k = static_cast<Index>(variable);
+  double allowed = std::max({kApart * size(of_.f_rho.col(k)), kApart * size(d.slope), size(d.bend),
+                             kMatters * largest_derivative(group) / of_.variables[variable].size});
+  if (integrator) allowed += kTrust * (size(integrator->f) / d.h + size(integrator->f_rho.col(k)));
+  return size(VectorXd(d.slope - of_.f_rho.col(k))) > allowed;
+}
+
+const Comparison::Errors& Comparison::integrator_errors() {
+  if (errors_) return *errors_;
+  errors_ = {VectorXd::Zero(of_.f.size()), MatrixXd::Zero(of_.f_rho.rows(), of_.f_rho.cols())};
+  VectorXd f;
+  MatrixXd f_rho;
+  if (of_.tighter && of_.tighter(f, f_rho) && f.size() == of_.f.size())
+    errors_ = {(f - of_.f).cwiseAbs(), (f_rho - of_.f_rho).cwiseAbs()};
+  return *errors_;
+}
+
+std::vector<const ComparedGroup*> Comparison::disagreeing(std::size_t variable, const Difference& d) {
+  std::vector<const ComparedGroup*> found;
+  std::optional<Difference> shorter;
+  for (const ComparedGroup& group : of_.groups) {
+    if (!disagrees(group, variable, d, nullptr)) continue;
+    if (!shorter) shorter = difference(variable, kStep / kShorter * of_.variables[variable].size);
+    if (!shorter || !disagrees(group, variable, *shorter, nullptr)) continue;
+    if (disagrees(group, variable, d, &integrator_errors())) found.push_back(&group);
+  }
+  return found;
+}
+
+std::string in_words(const ComparedGroup& group, const std::string& variable, const VectorXd& exact,
+                     const VectorXd& slope, double h) {
+  const bool one = group.rows == 1;
+  return fmt::format(
+      "the derivative of {} in '{}' is {}{:.6g} at the start, but a difference over {:.2g} says {:.6g}{}: something is "
+      "not smooth here (a jump whose instant moves, a limit, an impact), or the steps do not resolve it. An optimiser "
+      "follows the derivative; 'mbsopt check' tells more",
+      group.name, variable, one ? "" : "of size ", one ? exact(0) : exact.norm(), h, one ? slope(0) : slope.norm(),
+      one ? "" : fmt::format(" (apart by {:.6g})", (slope - exact).norm()));
+}
 
 }  // namespace
 
@@ -34,84 +140,23 @@ ComparedVariable compared_variable(const std::string& name, const Parameter& at)
 
 std::vector<std::string> DifferenceComparison::warnings() const {
   std::vector<std::string> said;
-  VectorXd f_error, tight_f;
-  Eigen::MatrixXd f_rho_error, tight_f_rho;
-  bool asked = false;
-
-  const auto difference = [&](std::size_t k, double wanted) -> std::optional<Difference> {
-    const Variable& v = variables[k];
-    const double nearer = std::min(v.below, v.above), farther = std::max(v.below, v.above);
-    Difference d;
-    if (nearer >= wanted / kShorter) {
-      d.h = std::min(wanted, nearer);
-      const std::optional<VectorXd> plus = at(k, d.h), minus = at(k, -d.h);
-      if (!plus || !minus) return std::nullopt;
-      d.slope = (*plus - *minus) / (2 * d.h);
-      d.bend = (*plus - 2 * f + *minus).cwiseAbs() / (2 * d.h);
-      return d;
-    }
-    // On a bound: away from it, (4 f(h/2) - f(h) - 3 f(0))/h.
-    d.h = std::min(wanted, farther);
-    const double h = v.above >= v.below ? d.h : -d.h;
-    const std::optional<VectorXd> half = at(k, h / 2), whole = at(k, h);
-    if (!half || !whole) return std::nullopt;
-    d.slope = (4 * *half - *whole - 3 * f) / h;
-    d.bend = (*whole - 2 * *half + f).cwiseAbs() / (0.5 * d.h);
-    return d;
-  };
-  const auto size_of_group = [&](const Group& g) {
-    double largest = 0;
-    for (std::size_t k = 0; k < variables.size(); ++k)
-      largest = std::max(largest,
-                         variables[k].size * f_rho.col(static_cast<Eigen::Index>(k)).segment(g.first, g.rows).norm());
-    return largest;
-  };
-  // By how much more than allowed; `errors` counts those of the integrator.
-  const auto disagrees = [&](const Group& g, std::size_t k, const Difference& d, bool errors) {
-    const auto of = [&](const auto& x) { return x.segment(g.first, g.rows).norm(); };
-    const VectorXd exact = f_rho.col(static_cast<Eigen::Index>(k));
-    double allowed = std::max(
-        {kApart * of(exact), kApart * of(d.slope), of(d.bend), kMatters * size_of_group(g) / variables[k].size});
-    if (errors) allowed += kTrust * (of(f_error) / d.h + of(VectorXd(f_rho_error.col(static_cast<Eigen::Index>(k)))));
-    return of(VectorXd(d.slope - exact)) > allowed;
-  };
-
+  Comparison comparison(*this);
   for (std::size_t k = 0; k < variables.size(); ++k) {
     if (go_on && !go_on()) return {};
     const Variable& v = variables[k];
     if (!(std::max(v.below, v.above) > 0)) continue;  // its bounds leave it where it is
-    std::optional<Difference> d = difference(k, kStep * v.size);
-    if (!d) d = difference(k, kStep / kShorter * v.size);
+    const std::optional<Difference> d = comparison.difference(k);
     if (go_on && !go_on()) return {};
     if (!d) {
       said.push_back(
-          fmt::format("the derivatives in '{}' were not compared with a difference: next to the start it "
-                      "cannot be evaluated",
+          fmt::format("the derivatives in '{}' were not compared with a difference: next to the start it cannot be "
+                      "evaluated",
                       v.name));
       continue;
     }
-    std::optional<Difference> shorter;
-    for (const Group& g : groups) {
-      if (!disagrees(g, k, *d, false)) continue;
-      if (!shorter) shorter = difference(k, kStep / kShorter * v.size);
-      if (!shorter || !disagrees(g, k, *shorter, false)) continue;
-      if (!asked) {
-        asked = true;
-        f_error = VectorXd::Zero(f.size()), f_rho_error = Eigen::MatrixXd::Zero(f_rho.rows(), f_rho.cols());
-        if (tighter && tighter(tight_f, tight_f_rho) && tight_f.size() == f.size())
-          f_error = (tight_f - f).cwiseAbs(), f_rho_error = (tight_f_rho - f_rho).cwiseAbs();
-      }
-      if (!disagrees(g, k, *d, true)) continue;
-      const bool one = g.rows == 1;
-      const VectorXd exact = f_rho.col(static_cast<Eigen::Index>(k)).segment(g.first, g.rows);
-      const VectorXd slope = d->slope.segment(g.first, g.rows);
-      said.push_back(fmt::format(
-          "the derivative of {} in '{}' is {}{:.6g} at the start, but a difference over {:.2g} says {:.6g}{}: "
-          "something is not smooth here (a jump whose instant moves, a limit, an impact), or the steps do not resolve "
-          "it. An optimiser follows the derivative; 'mbsopt check' tells more",
-          g.name, v.name, one ? "" : "of size ", one ? exact(0) : exact.norm(), d->h, one ? slope(0) : slope.norm(),
-          one ? "" : fmt::format(" (apart by {:.6g})", (slope - exact).norm())));
-    }
+    for (const ComparedGroup* group : comparison.disagreeing(k, *d))
+      said.push_back(
+          in_words(*group, v.name, rows(f_rho.col(static_cast<Index>(k)), *group), rows(d->slope, *group), d->h));
   }
   return said;
 }

@@ -111,78 +111,85 @@ Eigen::VectorXd Evaluator::start() const { return parameter_values(scene_); }
 
 Evaluation Evaluator::run(const Eigen::VectorXd& rho, Sweep sweep, const StepSequence* frozen, bool by_cvodes) const {
   const Stopwatch stopwatch;
-  const SimulationSettings settings = by_cvodes ? with_cvodes(scene_.simulation) : scene_.simulation;
   Evaluation e;
   e.rho = rho;
   e.psi.setZero(static_cast<Eigen::Index>(objectives_.size()));
   if (sweep != Sweep::none) e.psi_rho.setZero(e.psi.size(), static_cast<Eigen::Index>(variables_.size()));
-  for (Eigen::Index k = 0; k < rho.size(); ++k) {
-    if (std::isfinite(rho(k))) continue;  // of an optimiser whose own numbers overflowed
-    e.message = fmt::format("parameters.{}: is no finite number", scene_.parameters[static_cast<std::size_t>(k)].name);
-    return e;
-  }
-  e.ok = true;
-  if (!simulated_.empty()) {
-    if (options_.progress && !options_.progress(settings.start_time)) {  // the assembly alone may take a second
-      e.ok = false, e.message = "stopped before its simulation";
-      return e;
-    }
-    // Derivatives are carried only where a sweep needs them.
-    const std::vector<bool> active = sweep == Sweep::none ? std::vector<bool>(active_.size(), false) : active_;
-    SimulationResult result;
-    try {
-      const Mechanism mechanism(scene_, rho, active, options_.user_forces, programs_);
-      ObjectiveRun objective_run(simulated(), mechanism, settings, options_.progress);
-      result = objective_run.run([&](std::span<const Cost> costs) {
-        const RunOptions run_options{
-            .frozen = frozen, .progress = options_.progress, .exact_stages = options_.exact_stages};
-        ++e.simulations;
-        return sweep == Sweep::forward    ? simulate_tlm(mechanism, settings, costs, {}, run_options)
-               : sweep == Sweep::backward ? simulate_adjoint(mechanism, settings, costs, run_options)
-                                          : simulate(mechanism, settings, costs, {}, run_options);
-      });
-    } catch (const SceneError& error) {  // a field that this rho drives out of its range
-      e.ok = false, e.message = error.what();
-      return e;
-    } catch (const NoMotion& error) {
-      e.ok = false, e.message = error.what();
-      return e;
-    }
-    e.statistics = result.statistics;
-    if (!frozen) e.warnings = simulation_warnings(scene_, result.statistics, result.ok());
-    e.steps = std::move(result.steps);
-    if (!result.ok()) {
-      e.ok = false, e.message = result.message;
-      return e;
-    }
-    for (std::size_t j = 0; j < simulated_.size(); ++j) {
-      const Eigen::Index i = static_cast<Eigen::Index>(simulated_[j]), row = static_cast<Eigen::Index>(j);
-      e.psi(i) = result.psi(row);
-      if (sweep == Sweep::none) continue;
-      const Objective& objective = objectives_[simulated_[j]];
-      if (objective.mean() && !objective.is_extreme() && e.psi(i) == 0 && !frozen)
-        e.warnings.push_back(
-            fmt::format("objective '{}' is a root mean square of 0, where it is not smooth: its gradient is given as 0",
-                        objective.name()));
-      for (Eigen::Index k = 0; k < e.psi_rho.cols(); ++k)
-        e.psi_rho(i, k) = result.psi_rho(row, variables_[static_cast<std::size_t>(k)]);
-    }
-  }
-  try {
-    add_parameters_only(e, sweep != Sweep::none);
-  } catch (const std::runtime_error& error) {  // of an eigenvalue
-    e.ok = false, e.message = error.what();
-    return e;
-  }
-  for (Eigen::Index i = 0; i < e.psi.size(); ++i) {
-    if (std::isfinite(e.psi(i)) && (sweep == Sweep::none || e.psi_rho.row(i).allFinite())) continue;
-    e.ok = false;
-    e.message = fmt::format("the objective '{}' or its gradient is not finite here",
-                            objectives_[static_cast<std::size_t>(i)].name());
-    break;
-  }
+  e.ok = has_finite_parameters(e) && add_simulated(e, sweep, frozen, by_cvodes) &&
+         add_parameters_only(e, sweep != Sweep::none) && has_finite_objectives(e);
   e.wall_seconds = stopwatch.seconds();
   return e;
+}
+
+// An optimiser's own numbers may overflow.
+bool Evaluator::has_finite_parameters(Evaluation& e) const {
+  for (Eigen::Index k = 0; k < e.rho.size(); ++k) {
+    if (std::isfinite(e.rho(k))) continue;
+    e.message = fmt::format("parameters.{}: is no finite number", scene_.parameters[static_cast<std::size_t>(k)].name);
+    return false;
+  }
+  return true;
+}
+
+bool Evaluator::has_finite_objectives(Evaluation& e) const {
+  for (Eigen::Index i = 0; i < e.psi.size(); ++i) {
+    if (std::isfinite(e.psi(i)) && (!e.has_gradients() || e.psi_rho.row(i).allFinite())) continue;
+    e.message = fmt::format("the objective '{}' or its gradient is not finite here",
+                            objectives_[static_cast<std::size_t>(i)].name());
+    return false;
+  }
+  return true;
+}
+
+bool Evaluator::add_simulated(Evaluation& e, Sweep sweep, const StepSequence* frozen, bool by_cvodes) const {
+  if (simulated_.empty()) return true;
+  const SimulationSettings settings = by_cvodes ? with_cvodes(scene_.simulation) : scene_.simulation;
+  if (options_.progress && !options_.progress(settings.start_time)) {  // the assembly alone may take a second
+    e.message = "stopped before its simulation";
+    return false;
+  }
+  // Derivatives are carried only where a sweep needs them.
+  const std::vector<bool> active = sweep == Sweep::none ? std::vector<bool>(active_.size(), false) : active_;
+  SimulationResult result;
+  try {
+    const Mechanism mechanism(scene_, e.rho, active, options_.user_forces, programs_);
+    ObjectiveRun objective_run(simulated(), mechanism, settings, options_.progress);
+    result = objective_run.run([&](std::span<const Cost> costs) {
+      const RunOptions run_options{
+          .frozen = frozen, .progress = options_.progress, .exact_stages = options_.exact_stages};
+      ++e.simulations;
+      return sweep == Sweep::forward    ? simulate_tlm(mechanism, settings, costs, {}, run_options)
+             : sweep == Sweep::backward ? simulate_adjoint(mechanism, settings, costs, run_options)
+                                        : simulate(mechanism, settings, costs, {}, run_options);
+    });
+  } catch (const SceneError& error) {  // a field that this rho drives out of its range
+    e.message = error.what();
+    return false;
+  } catch (const NoMotion& error) {
+    e.message = error.what();
+    return false;
+  }
+  e.statistics = result.statistics;
+  if (!frozen) e.warnings = simulation_warnings(scene_, result.statistics, result.ok());
+  e.steps = std::move(result.steps);
+  e.message = result.message;
+  if (result.ok()) take(result, !frozen, e);
+  return result.ok();
+}
+
+void Evaluator::take(const SimulationResult& result, bool warn, Evaluation& e) const {
+  for (std::size_t j = 0; j < simulated_.size(); ++j) {
+    const Eigen::Index i = static_cast<Eigen::Index>(simulated_[j]), row = static_cast<Eigen::Index>(j);
+    e.psi(i) = result.psi(row);
+    if (!e.has_gradients()) continue;
+    const Objective& objective = objectives_[simulated_[j]];
+    if (objective.mean() && !objective.is_extreme() && e.psi(i) == 0 && warn)
+      e.warnings.push_back(
+          fmt::format("objective '{}' is a root mean square of 0, where it is not smooth: its gradient is given as 0",
+                      objective.name()));
+    for (Eigen::Index k = 0; k < e.psi_rho.cols(); ++k)
+      e.psi_rho(i, k) = result.psi_rho(row, variables_[static_cast<std::size_t>(k)]);
+  }
 }
 
 std::vector<const Objective*> Evaluator::simulated() const {
@@ -204,22 +211,28 @@ std::vector<std::optional<double>> Evaluator::true_values(const Eigen::VectorXd&
   return values;
 }
 
-void Evaluator::add_parameters_only(Evaluation& e, bool gradients) const {
+bool Evaluator::add_parameters_only(Evaluation& e, bool gradients) const {
   Eigen::VectorXd gradient(e.rho.size());
-  for (Eigen::Index i = 0; i < e.psi.size(); ++i) {
-    const Objective& objective = objectives_[static_cast<std::size_t>(i)];
-    if (!gradients) {
-      e.psi(i) += objective.parameters_only(e.rho, options_.user_forces);
-      continue;
+  try {
+    for (Eigen::Index i = 0; i < e.psi.size(); ++i) {
+      const Objective& objective = objectives_[static_cast<std::size_t>(i)];
+      if (!gradients) {
+        e.psi(i) += objective.parameters_only(e.rho, options_.user_forces);
+        continue;
+      }
+      gradient.setZero();
+      std::vector<std::string> doubts;
+      e.psi(i) += objective.add_parameters_only_gradient(e.rho, gradient, options_.user_forces, &doubts);
+      for (const std::string& doubt : doubts)
+        e.warnings.push_back(fmt::format("objective '{}': {}", objective.name(), doubt));
+      for (Eigen::Index k = 0; k < e.psi_rho.cols(); ++k)
+        e.psi_rho(i, k) += gradient(variables_[static_cast<std::size_t>(k)]);
     }
-    gradient.setZero();
-    std::vector<std::string> doubts;
-    e.psi(i) += objective.add_parameters_only_gradient(e.rho, gradient, options_.user_forces, &doubts);
-    for (const std::string& doubt : doubts)
-      e.warnings.push_back(fmt::format("objective '{}': {}", objective.name(), doubt));
-    for (Eigen::Index k = 0; k < e.psi_rho.cols(); ++k)
-      e.psi_rho(i, k) += gradient(variables_[static_cast<std::size_t>(k)]);
+  } catch (const std::runtime_error& error) {  // of an eigenvalue
+    e.message = error.what();
+    return false;
   }
+  return true;
 }
 
 namespace {

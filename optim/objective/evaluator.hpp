@@ -98,7 +98,12 @@ class Evaluator {
   enum class Sweep { none, forward, backward };
   Evaluation run(const Eigen::VectorXd& rho, Sweep sweep, const StepSequence* frozen, bool by_cvodes = false) const;
   GradientMethod available(GradientMethod method, std::string& choice) const;
-  void add_parameters_only(Evaluation& e, bool gradients) const;
+  // Parts of run(). False: the point cannot be evaluated, e.message says why.
+  bool has_finite_parameters(Evaluation& e) const;
+  bool add_simulated(Evaluation& e, Sweep sweep, const StepSequence* frozen, bool by_cvodes) const;
+  bool add_parameters_only(Evaluation& e, bool gradients) const;
+  bool has_finite_objectives(Evaluation& e) const;
+  void take(const SimulationResult& result, bool warn, Evaluation& e) const;
   void add_differences(Evaluation& e) const;
   void find_unused();
   void judge_zero_columns(Evaluation& e) const;

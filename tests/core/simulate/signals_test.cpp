@@ -6,7 +6,7 @@
 #include "core/scene/issues.hpp"
 #include "core/simulate/simulation.hpp"
 #include "tests/core/integrate/state_costs.hpp"
-#include "tests/core/mechanism/moving_scenes.hpp"
+#include "tests/core/mechanism/one_coordinate.hpp"
 
 using namespace mbsopt;
 using namespace mbsopt::testing;
@@ -24,19 +24,8 @@ Signal signal(Interpolation how, std::vector<double> t, std::vector<double> y) {
 
 // A mass of 1 kg on a slide along x, pushed by the signal u [N].
 Scene pushed(const Signal& u) {
-  Scene s;
-  s.gravity = {0.0, 0.0, 0.0};
-  s.bodies = {body("cart", vec("0", "0", "0"), vec("0", "0", "0"), turned("0"))};
-  Joint slide;
-  slide.name = "slide", slide.type = "translational", slide.body1 = "ground", slide.body2 = "cart";
-  slide.axis1 = vec("1", "0", "0"), slide.axis2 = vec("1", "0", "0");
-  s.joints = {slide};
-  PointForce push;
-  push.body = "cart", push.components = {f("u"), f("0"), f("0")};
-  s.forces.push_back({"push", push});
+  Scene s = pushed_cart("u", 2, 1e-8);
   s.signals = {u};
-  s.simulation.end_time = 2;
-  s.simulation.integrator.rtol = 1e-8, s.simulation.integrator.atol = 1e-10;
   return s;
 }
 

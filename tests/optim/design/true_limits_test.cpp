@@ -5,7 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "optim/design/design.hpp"
-#include "tests/core/mechanism/moving_scenes.hpp"
+#include "tests/core/mechanism/one_coordinate.hpp"
 
 using namespace mbsopt;
 using namespace mbsopt::testing;
@@ -16,18 +16,9 @@ namespace {
 // A mass on a spring moves as x = a cos(2 t) over 5 s, its extremes are a and -a. Minimised is (a - 1)^2.
 Problem swing(std::vector<ObjectiveBound> limits) {
   Problem problem;
+  problem.scene = swinging_mass({{"a", 0.2}}, "-4*x", 5);
   Scene& s = problem.scene;
-  add_parameters(s, {{"a", 0.2}});
   s.parameters[0].lower = 0.1, s.parameters[0].upper = 2;
-  s.gravity = {0.0, 0.0, 0.0};
-  s.bodies.push_back(plain_body("mass", 1, {0.1, 0.1, 0.1, 0.0, 0.0, 0.0}, vec("a", "0", "0")));
-  PointForce pull;
-  pull.body = "mass", pull.components = {f("-4*x"), f("0"), f("0")};
-  s.forces.push_back({"pull", pull});
-  s.sensors.push_back(point_sensor("x", "position", "mass", vec("0", "0", "0"), "x"));
-  s.simulation.end_time = 5;
-  IntegratorSettings& integrator = s.simulation.integrator;
-  integrator.type = "dopri853", integrator.rtol = 1e-10, integrator.atol = 1e-12;
   s.simulation.integrator.max_step = 0.05;
   ObjectiveSpec near_one;
   near_one.name = "near_one", near_one.parameters_only = f("(a - 1)^2");

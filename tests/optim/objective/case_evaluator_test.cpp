@@ -9,7 +9,7 @@
 #include "optim/design/design.hpp"
 #include "optim/objective/case_objective.hpp"
 #include "optim/problem/load_cases.hpp"
-#include "tests/core/mechanism/moving_scenes.hpp"
+#include "tests/core/mechanism/one_coordinate.hpp"
 
 using namespace mbsopt;
 using namespace mbsopt::testing;
@@ -19,18 +19,8 @@ namespace {
 // A mass at x = a cos(w t), w = sqrt(k), over 1 s; in cases with other k, a and end time.
 Problem loaded_swing() {
   Problem problem;
-  Scene& s = problem.scene;
-  add_parameters(s, {{"k", 4.0}, {"a", 0.3}, {"b", 0.1}});
-  s.definitions.push_back({"twice", f("2*k")});
-  s.gravity = {0.0, 0.0, 0.0};
-  s.bodies.push_back(plain_body("mass", 1, {0.1, 0.1, 0.1, 0.0, 0.0, 0.0}, vec("a", "0", "0")));
-  PointForce pull;
-  pull.body = "mass", pull.components = {f("-twice/2*x"), f("0"), f("0")};
-  s.forces.push_back({"pull", pull});
-  s.sensors.push_back(point_sensor("x", "position", "mass", vec("0", "0", "0"), "x"));
-  s.simulation.end_time = 1;
-  IntegratorSettings& integrator = s.simulation.integrator;
-  integrator.type = "dopri853", integrator.rtol = 1e-11, integrator.atol = 1e-13;
+  problem.scene = swinging_mass({{"k", 4.0}, {"a", 0.3}, {"b", 0.1}}, "-twice/2*x", 1, 1e-11);
+  problem.scene.definitions.push_back({"twice", f("2*k")});
   ObjectiveSpec end;
   end.name = "end", end.terminal = f("x"), end.parameters_only = f("0*b");
   problem.objectives = {end};

@@ -7,7 +7,7 @@
 #include "optim/check/gradient_check.hpp"
 #include "optim/objective/evaluator.hpp"
 #include "optim/objective/objective_run.hpp"
-#include "tests/core/mechanism/moving_scenes.hpp"
+#include "tests/core/mechanism/one_coordinate.hpp"
 
 using namespace mbsopt;
 using namespace mbsopt::testing;
@@ -17,17 +17,7 @@ namespace {
 
 // A mass on a spring of stiffness k, moving as x = a cos(w t), w = sqrt(k) = 2 with the nominal parameters; over 5 s.
 Scene oscillator() {
-  Scene s;
-  add_parameters(s, {{"k", 4.0}, {"a", 0.3}});
-  s.gravity = {0.0, 0.0, 0.0};
-  s.bodies.push_back(plain_body("mass", 1, {0.1, 0.1, 0.1, 0.0, 0.0, 0.0}, vec("a", "0", "0")));
-  PointForce pull;
-  pull.body = "mass", pull.components = {f("-k*x"), f("0"), f("0")};
-  s.forces.push_back({"pull", pull});
-  s.sensors.push_back(point_sensor("x", "position", "mass", vec("0", "0", "0"), "x"));
-  s.simulation.end_time = 5;
-  IntegratorSettings& integrator = s.simulation.integrator;
-  integrator.type = "dopri853", integrator.rtol = 1e-10, integrator.atol = 1e-12;
+  Scene s = swinging_mass({{"k", 4.0}, {"a", 0.3}}, "-k*x", 5);
   s.simulation.integrator.max_step = 0.02;
   return s;
 }

@@ -5,7 +5,7 @@
 #include "optim/objective/evaluator.hpp"
 #include "optim/objective/gauss_newton.hpp"
 #include "optim/objective/problem_issues.hpp"
-#include "tests/core/mechanism/small_scenes.hpp"
+#include "tests/core/mechanism/one_coordinate.hpp"
 
 using namespace mbsopt;
 using namespace mbsopt::testing;
@@ -17,22 +17,12 @@ namespace {
 // A mass on a slide along x under a constant force: x = p t^2/2.
 Problem slide() {
   Problem problem;
+  problem.scene = pushed_cart("p", 1, 1e-10);
   Scene& s = problem.scene;
-  s.gravity = {0.0, 0.0, 0.0};
   add_parameters(s, {{"p", 3.0}, {"w", 2.0}});
-  s.bodies = {body("cart", vec("0", "0", "0"), vec("0", "0", "0"), turned("0"))};
-  Joint joint;
-  joint.name = "slide", joint.type = "translational", joint.body1 = "ground", joint.body2 = "cart";
-  joint.axis1 = vec("1", "0", "0"), joint.axis2 = vec("1", "0", "0");
-  s.joints = {joint};
-  PointForce push;
-  push.body = "cart", push.components = {f("p"), f("0"), f("0")};
-  s.forces.push_back({"push", push});
   Sensor x;
   x.name = "x", x.quantity = "displacement", x.joint = "slide";
   s.sensors = {x};
-  s.simulation.end_time = 1;
-  s.simulation.integrator.rtol = 1e-10, s.simulation.integrator.atol = 1e-12;
   TrackTerm term;
   term.sensor = "x", term.weight = f("w^2");
   term.curve = std::make_shared<const Curve>(Interpolation::linear, std::vector{0.2, 0.5, 1.0, 1.5},

@@ -1,0 +1,153 @@
+#include "optim/check/gradient_differences.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "optim/differences/verdict.hpp"
+
+namespace mbsopt {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr int kJumpRungs = 3;  // the smallest: further off, frozen steps have errors of their own
+
+// Whether all runs that the difference is made of took the steps of the base run.
+bool on_base_steps(const VectorXd& largest, Index i, double other_steps) { return largest(i) < 0.75 * other_steps; }
+
+}  // namespace
+
+GradientDifferences::GradientDifferences(Base base, const Settings& settings, Run run)
+    : base_(std::move(base)), settings_(settings), run_(std::move(run)), size_of_steps_(base_.size) {
+  const Index m = base_.psi.size(), P = base_.rho.size();
+  for (Table* table : {&frozen_, &free_}) {
+    for (MatrixXd* x : {&table->derivative, &table->error, &table->step}) x->setZero(m, P);
+  }
+  for (Index k = 0; k < P; ++k) {
+    if (base_.discrete && !base_.on_frozen_steps(k)) frozen_.derivative.col(k).setConstant(kNaN);
+  }
+  jump_.setZero(m, P);
+  on_base_steps_.setConstant(m, P, false);
+}
+
+std::string GradientDifferences::take(Index k, bool frozen) {
+  const Ladder found = ladder(k, frozen, settings_.relative_step * base_.size(k));
+  for (Index i = 0; i < base_.psi.size(); ++i) keep(found, i, k, frozen);
+  return found.d.derivative.hasNaN() ? found.failure : "";
+}
+
+// Steps that are coarse for psi may show a plateau that is no derivative (a coordinate of kilometres, of which metres
+// matter). A ladder that begins below the first holds if it contradicts it by more than its own error: smaller steps
+// magnify rounding and jumps, which must not excuse a wrong gradient.
+bool GradientDifferences::take_finer(Index k, bool frozen, const std::vector<Index>& objectives,
+                                     const VectorXd& psi_rounding) {
+  if (objectives.empty()) return false;
+  const Ladder finer = ladder(k, frozen, settings_.relative_step * base_.size(k) * std::pow(0.5, settings_.rungs));
+  bool found = false;
+  for (const Index i : objectives) {
+    const double change = std::abs(finer.d.derivative(i) - of(frozen).derivative(i, k));
+    if (!(change > kEstimateTrust * own_error(finer, i, k, frozen, psi_rounding(i)))) continue;
+    keep(finer, i, k, frozen);
+    if (!frozen) add_integration_error(i, k);
+    size_of_steps_(k) = std::min(size_of_steps_(k), finer.d.largest(i) / settings_.relative_step);
+    found = true;
+  }
+  return found;
+}
+
+// By steps of `largest` and below.
+GradientDifferences::Ladder GradientDifferences::ladder(Index k, bool frozen, double largest) {
+  Ladder ladder;
+  const auto f = [&](double h) -> std::optional<VectorXd> {
+    VectorXd rho = base_.rho;
+    rho(k) += h;
+    Evaluation e = run_(rho, frozen);
+    if (!e.ok) ladder.failure = e.message;
+    if (!e.ok) return std::nullopt;
+    if (e.steps.sizes != base_.steps.sizes) ladder.other_steps = std::min(ladder.other_steps, std::abs(h));
+    note(k, h, frozen, e.psi);
+    const double near = largest * std::pow(0.5, settings_.rungs - kJumpRungs);
+    if (!frozen && std::abs(h) < 1.5 * near) {
+      const VectorXd& on_base_steps = rungs_.at({k, std::abs(h)})[0][h > 0 ? 0 : 1];
+      if (on_base_steps.size() > 0 && e.psi.allFinite() && on_base_steps.allFinite())
+        jump_.col(k) = jump_.col(k).cwiseMax((e.psi - on_base_steps).cwiseAbs());
+    }
+    return std::move(e.psi);
+  };
+  ladder.d = difference_ladder(f, base_.psi.size(), {largest, settings_.rungs, kPsiRounding});
+  for (Index i = 0; i < base_.psi.size(); ++i)
+    if (!ladder.d.has_estimate(i)) ladder.d.derivative(i) = kNaN, ladder.d.error(i) = kInfinity;
+  return ladder;
+}
+
+// Both ladders take the same steps h, halved exactly.
+void GradientDifferences::note(Index k, double h, bool frozen, const VectorXd& psi) {
+  rungs_[{k, std::abs(h)}][frozen ? 0 : 1][h > 0 ? 0 : 1] = psi;
+}
+
+void GradientDifferences::keep(const Ladder& ladder, Index i, Index k, bool frozen) {
+  Table& table = frozen ? frozen_ : free_;
+  table.derivative(i, k) = ladder.d.derivative(i);
+  table.error(i, k) = ladder.d.error(i);
+  table.step(i, k) = ladder.d.step(i);
+  if (!frozen && base_.discrete) on_base_steps_(i, k) = on_base_steps(ladder.d.largest, i, ladder.other_steps);
+}
+
+// Of the ladder, of psi's rounding, and on free steps of the integration.
+double GradientDifferences::own_error(const Ladder& ladder, Index i, Index k, bool frozen, double psi_rounding) const {
+  const double step = ladder.d.step(i);
+  if (!(step > 0)) return kInfinity;
+  const bool same_steps = frozen || on_base_steps(ladder.d.largest, i, ladder.other_steps);
+  return ladder.d.error(i) + psi_rounding / step + (same_steps ? 0 : integration_error_of(i, k, step));
+}
+
+// Free differences differ from the derivatives of the numbers on frozen steps by the derivative of the integration
+// error, and carry its jumps from step sequence to step sequence, divided by the step. The smallest steps show the size
+// of the jumps, too, where both differences were taken. Where all runs of an entry took the steps of the base run, as
+// rounded ones often do (step_control.hpp), it is as good as one on frozen steps.
+void GradientDifferences::add(IntegrationError integration) {
+  integration_ = std::move(integration);
+  if (!settings_.free_steps) return;
+  for (Index k = 0; k < base_.rho.size(); ++k)
+    for (Index i = 0; i < base_.psi.size(); ++i) add_integration_error(i, k);
+}
+void GradientDifferences::add_integration_error(Index i, Index k) {
+  if (!on_base_steps_(i, k) && std::isfinite(free_.error(i, k)))
+    free_.error(i, k) += integration_error_of(i, k, free_.step(i, k));
+}
+double GradientDifferences::integration_error_of(Index i, Index k, double step) const {
+  return integration_.psi_rho(i, k) + std::max(integration_.psi(i), jump_(i, k)) / step;
+}
+
+std::vector<LadderRung> GradientDifferences::rungs(Index i, Index k) const {
+  std::vector<LadderRung> rungs;
+  for (const auto& [at, values] : rungs_) {
+    if (at.first != k) continue;
+    const auto slope = [&, h = at.second](const std::array<VectorXd, 2>& psi) {
+      return psi[0].size() == 0 || psi[1].size() == 0 ? kNaN : (psi[0](i) - psi[1](i)) / (2 * h);
+    };
+    rungs.push_back({at.second, slope(values[0]), slope(values[1])});
+  }
+  std::reverse(rungs.begin(), rungs.end());
+  return rungs;
+}
+
+// b(h) = (psi(h) + psi(-h) - 2 psi)/(2h), at the smallest steps h and 2h at which psi's rounding does not count.
+double GradientDifferences::kink(Index i, Index k, bool frozen, double psi_rounding) const {
+  double b = kNaN, wider = kNaN;
+  for (auto rung = rungs_.rbegin(); rung != rungs_.rend(); ++rung) {
+    const auto& [plus, minus] = rung->second[frozen ? 0 : 1];
+    if (rung->first.first != k || plus.size() == 0 || minus.size() == 0) continue;
+    const double bend = plus(i) + minus(i) - 2 * base_.psi(i);
+    if (!(std::abs(bend) > kEstimateTrust * psi_rounding)) break;
+    wider = b, b = bend / (2 * rung->first.second);
+  }
+  return b / wider > kKinkFalls ? b : kNaN;
+}
+
+}  // namespace mbsopt

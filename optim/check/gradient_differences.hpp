@@ -1,0 +1,105 @@
+// Differences of all objectives in all parameters for the gradient check: on the accepted steps of the base run
+// (frozen) and with step-size control at work (free), each by a ladder of steps whose values are kept.
+//
+//   GradientDifferences differences(base, settings, run);
+//   const std::string failure = differences.take(k, true);       // in parameter k, on frozen steps
+//   differences.of(true).derivative(i, k), differences.of(true).error(i, k);
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <functional>
+#include <limits>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "optim/differences/difference_ladder.hpp"
+#include "optim/objective/evaluator.hpp"
+#include "optim/objective/integration_error.hpp"
+
+namespace mbsopt {
+
+// psi carries the rounding of all steps: some units in the last place of the largest numbers it is made of.
+inline constexpr double kPsiRounding = 100 * std::numeric_limits<double>::epsilon();
+// psi(h) + psi(-h) - 2 psi(0), divided by h, falls to 1/2 from 2h to h where psi is smooth, and stays at a kink.
+inline constexpr double kKinkFalls = 0.75;
+
+// Central differences (psi(h) - psi(-h))/(2 h) before extrapolation; NaN where they were not evaluated.
+struct LadderRung {
+  double h = 0;
+  double frozen = std::numeric_limits<double>::quiet_NaN(), free = std::numeric_limits<double>::quiet_NaN();
+};
+
+class GradientDifferences {
+ public:
+  // The run whose gradient is checked.
+  struct Base {
+    Eigen::VectorXd psi, rho, size;  // size: of each parameter
+    StepSequence steps;
+    bool discrete = true;  // other runs may take its steps
+    // The parameters in which differences on these steps serve.
+    Eigen::Array<bool, Eigen::Dynamic, 1> on_frozen_steps;
+  };
+  struct Settings {
+    double relative_step;  // the largest of a ladder, of the parameter's size
+    int rungs;
+    bool free_steps;
+  };
+  using Run = std::function<Evaluation(const Eigen::VectorXd& rho, bool frozen)>;
+
+  // Objective x parameter. Where a difference was not taken: 0, or NaN on frozen steps that do not serve.
+  struct Table {
+    Eigen::MatrixXd derivative, error, step;
+  };
+
+  GradientDifferences(Base base, const Settings& settings, Run run);
+
+  bool takes(Eigen::Index k, bool frozen) const { return frozen ? base_.on_frozen_steps(k) : settings_.free_steps; }
+  // Sets column k. Returns the message of a run that failed, if a derivative could not be found.
+  std::string take(Eigen::Index k, bool frozen);
+  // Takes the entries of these objectives in k by smaller steps, where those contradict the entries by more than their
+  // own error. Returns whether one did. psi_rounding: of each objective.
+  bool take_finer(Eigen::Index k, bool frozen, const std::vector<Eigen::Index>& objectives,
+                  const Eigen::VectorXd& psi_rounding);
+  // Adds the integrator's errors to those of free differences, from now on.
+  void add(IntegrationError integration);
+
+  const Table& of(bool frozen) const { return frozen ? frozen_ : free_; }
+  const IntegrationError& integration() const { return integration_; }
+  bool on_frozen_steps(Eigen::Index k) const { return base_.on_frozen_steps(k); }
+  // Of each parameter: smaller than its size where finer differences hold, whose steps are then relative_step times it.
+  const Eigen::VectorXd& size_of_steps() const { return size_of_steps_; }
+
+  std::vector<LadderRung> rungs(Eigen::Index i, Eigen::Index k) const;
+  // b in  psi(+-h) = psi + s h +- b h + O(h^2)  beside a kink, whose slopes at its two sides are s - b and s + b. NaN
+  // where psi_i is smooth in k.
+  double kink(Eigen::Index i, Eigen::Index k, bool frozen, double psi_rounding) const;
+
+ private:
+  struct Ladder {
+    LadderDerivative d;
+    std::string failure;                                           // of a run
+    double other_steps = std::numeric_limits<double>::infinity();  // smallest |h| at which a run left the base's steps
+  };
+  Ladder ladder(Eigen::Index k, bool frozen, double largest);
+  void keep(const Ladder& ladder, Eigen::Index i, Eigen::Index k, bool frozen);
+  double own_error(const Ladder& ladder, Eigen::Index i, Eigen::Index k, bool frozen, double psi_rounding) const;
+  void add_integration_error(Eigen::Index i, Eigen::Index k);
+  double integration_error_of(Eigen::Index i, Eigen::Index k, double step) const;
+  void note(Eigen::Index k, double h, bool frozen, const Eigen::VectorXd& psi);
+
+  Base base_;
+  Settings settings_;
+  Run run_;
+  Table frozen_, free_;
+  IntegrationError integration_;
+  Eigen::VectorXd size_of_steps_;
+  Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> on_base_steps_;  // a free difference
+  // psi at h and -h on frozen and free steps, by the parameter and |h|.
+  std::map<std::pair<Eigen::Index, double>, std::array<std::array<Eigen::VectorXd, 2>, 2>> rungs_;
+  Eigen::MatrixXd jump_;  // of psi, between the steps of the base run and those chosen anew
+};
+
+}  // namespace mbsopt
