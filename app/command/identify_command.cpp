@@ -230,9 +230,6 @@ int preflight(Run& run, const Problem& needed, const std::vector<CsvTable>& data
   print_preflight(run.context.out, start, channels);
   add_preflight(run.result, start, channels);
   for (const std::string& warning : start.warnings) run.warn(warning);
-  for (const ChannelData& c : channels)
-    if (c.least == c.most && c.samples > 1)
-      run.warn(fmt::format("experiment '{}': the column '{}' never changes", c.experiment, c.column));
   return run.finish();
 }
 
