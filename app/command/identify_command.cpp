@@ -386,8 +386,8 @@ int identify_command(const CommandContext& context) {
   for (std::size_t i = 0; !cut_again && i < cut.warnings.size(); ++i) run.warn(cut.warnings[i]);
   add_windows(run, cut.problem);
   const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
-  for (const std::string& warning : doubts_about_fit(needed, data, {{}, [](double) { return !interrupted(); }}))
-    run.warn(warning);
+  const FitComparisonOptions compared{{}, [](double) { return !interrupted(); }, case_threads(run)};
+  for (const std::string& warning : doubts_about_fit(needed, data, compared)) run.warn(warning);
   if (other) check(run, *other);
   if (context.options.preflight) return preflight(run, needed, data);
   LongRun long_run(run);

@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <mutex>
 
+#include "optim/machine/on_threads.hpp"
 #include "optim/problem/parameter_values.hpp"
 
 namespace mbsopt {
@@ -33,10 +36,16 @@ ComparedVariable compared_variable(const std::string& name, const Parameter& at)
 }
 
 std::vector<std::string> DifferenceComparison::warnings() const {
-  std::vector<std::string> said;
-  VectorXd f_error, tight_f;
-  Eigen::MatrixXd f_rho_error, tight_f_rho;
-  bool asked = false;
+  VectorXd f_error;
+  Eigen::MatrixXd f_rho_error;
+  std::once_flag asked;
+  const auto ask_for_errors = [&] {
+    VectorXd tight_f;
+    Eigen::MatrixXd tight_f_rho;
+    f_error = VectorXd::Zero(f.size()), f_rho_error = Eigen::MatrixXd::Zero(f_rho.rows(), f_rho.cols());
+    if (tighter && tighter(tight_f, tight_f_rho) && tight_f.size() == f.size())
+      f_error = (tight_f - f).cwiseAbs(), f_rho_error = (tight_f_rho - f_rho).cwiseAbs();
+  };
 
   const auto difference = [&](std::size_t k, double wanted) -> std::optional<Difference> {
     const Variable& v = variables[k];
@@ -76,31 +85,25 @@ std::vector<std::string> DifferenceComparison::warnings() const {
     return of(VectorXd(d.slope - exact)) > allowed;
   };
 
-  for (std::size_t k = 0; k < variables.size(); ++k) {
+  const auto compare = [&](std::size_t k) -> std::vector<std::string> {
+    std::vector<std::string> said;
     if (go_on && !go_on()) return {};
     const Variable& v = variables[k];
-    if (!(std::max(v.below, v.above) > 0)) continue;  // its bounds leave it where it is
+    if (!(std::max(v.below, v.above) > 0)) return {};  // its bounds leave it where it is
     std::optional<Difference> d = difference(k, kStep * v.size);
     if (!d) d = difference(k, kStep / kShorter * v.size);
     if (go_on && !go_on()) return {};
-    if (!d) {
-      said.push_back(
-          fmt::format("the derivatives in '{}' were not compared with a difference: next to the start it "
-                      "cannot be evaluated",
-                      v.name));
-      continue;
-    }
+    if (!d)
+      return {
+          fmt::format("the derivatives in '{}' were not compared with a difference: next to the start it cannot be "
+                      "evaluated",
+                      v.name)};
     std::optional<Difference> shorter;
     for (const Group& g : groups) {
       if (!disagrees(g, k, *d, false)) continue;
       if (!shorter) shorter = difference(k, kStep / kShorter * v.size);
       if (!shorter || !disagrees(g, k, *shorter, false)) continue;
-      if (!asked) {
-        asked = true;
-        f_error = VectorXd::Zero(f.size()), f_rho_error = Eigen::MatrixXd::Zero(f_rho.rows(), f_rho.cols());
-        if (tighter && tighter(tight_f, tight_f_rho) && tight_f.size() == f.size())
-          f_error = (tight_f - f).cwiseAbs(), f_rho_error = (tight_f_rho - f_rho).cwiseAbs();
-      }
+      std::call_once(asked, ask_for_errors);
       if (!disagrees(g, k, *d, true)) continue;
       const bool one = g.rows == 1;
       const VectorXd exact = f_rho.col(static_cast<Eigen::Index>(k)).segment(g.first, g.rows);
@@ -112,7 +115,13 @@ std::vector<std::string> DifferenceComparison::warnings() const {
           g.name, v.name, one ? "" : "of size ", one ? exact(0) : exact.norm(), d->h, one ? slope(0) : slope.norm(),
           one ? "" : fmt::format(" (apart by {:.6g})", (slope - exact).norm())));
     }
-  }
+    return said;
+  };
+  std::vector<std::vector<std::string>> of_variables(variables.size());
+  on_threads(variables.size(), threads, [&](std::size_t k) { of_variables[k] = compare(k); });
+  if (go_on && !go_on()) return {};
+  std::vector<std::string> said;
+  for (std::vector<std::string>& sentences : of_variables) std::ranges::move(sentences, std::back_inserter(said));
   return said;
 }
 
