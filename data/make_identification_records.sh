@@ -17,19 +17,22 @@ motion() {
 }
 
 # record NAME SEED SIGMA COLUMN...: these columns with noise. Sum of twelve uniform numbers minus six: close to normal
-# with unit variance. Generator: x <- 16807 x mod (2^31 - 1). Environment: LATE [s], WRONG (every so many rows a gross
-# error, of 20 to 60 sigma), DIALECT=semicolon (with decimal commas).
+# with unit variance. Generator: x <- 16807 x mod (2^31 - 1). Environment: LATE [s] and FAST: a stamp t is that of the
+# instant t - LATE - FAST t; OFFSET + DRIFT t is in the columns; WRONG (every so many rows a gross error, of 20 to 60
+# sigma); DIALECT=semicolon (with decimal commas).
 record() {
   local name="$1" seed="$2" sigma="$3"
   shift 3
-  awk -F, -v seed="$seed" -v sigma="$sigma" -v wanted="$*" -v late="${LATE:-0}" -v wrong="${WRONG:-0}" '
+  awk -F, -v seed="$seed" -v sigma="$sigma" -v wanted="$*" -v late="${LATE:-0}" -v fast="${FAST:-0}" \
+    -v offset="${OFFSET:-0}" -v drift="${DRIFT:-0}" -v wrong="${WRONG:-0}" '
     function uniform() { x = (16807 * x) % 2147483647; return x / 2147483647 }
     function normal(  k, sum) { sum = -6; for (k = 0; k < 12; ++k) sum += uniform(); return sum }
     BEGIN { x = seed; n = split(wanted, name, " "); printf "t"; for (k = 1; k <= n; ++k) printf ",%s", name[k]; print "" }
     NR == 1 { for (i = 1; i <= NF; ++i) column[$i] = i; next }
-    { printf "%.4f", $column["t"] + late
+    { t = ($column["t"] + late) / (1 - fast)
+      printf "%.4f", t
       for (k = 1; k <= n; ++k) {
-        error = sigma * normal()
+        error = sigma * normal() + offset + drift * t
         if (wrong && NR % wrong == 5) error += sigma * (20 + 40 * uniform())
         printf ",%.6f", $column[name[k]] + error
       }
@@ -71,6 +74,15 @@ LATE=0.012 record ride_fast 15 0.0005 z
 motion run_down friction/identify parameters.coulomb.value=1.2 parameters.viscous.value=0.05 parameters.slip.value=0.4 \
   parameters.omega0.value=20
 WRONG=20 DIALECT=semicolon record run_down 16 0.05 omega
+
+printf 't,theta\n1,0\n' >data/identification/swing_angle.csv
+printf 't,omega\n1,0\n' >data/identification/swing_rate.csv
+for name in swing_angle swing_rate; do
+  motion $name pendulum/gyroscope parameters.J.value=0.00334 parameters.k.value=1.8e-4 parameters.theta0.value=1.52 \
+    parameters.omega0.value=1.85
+done
+record swing_angle 19 0.005 theta
+LATE=0.03 FAST=0.002 OFFSET=0.05 DRIFT=0.01 record swing_rate 20 0.02 omega
 
 # The arm's torques, and its motion by them from rest. Its columns are those of an arm with measured torques.
 awk 'BEGIN { print "time,tau_meas1,tau_meas2"; for (i = 0; i <= 400; ++i) { t = i / 100

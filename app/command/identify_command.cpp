@@ -230,9 +230,6 @@ int preflight(Run& run, const Problem& needed, const std::vector<CsvTable>& data
   print_preflight(run.context.out, start, channels);
   add_preflight(run.result, start, channels);
   for (const std::string& warning : start.warnings) run.warn(warning);
-  for (const ChannelData& c : channels)
-    if (c.least == c.most && c.samples > 1)
-      run.warn(fmt::format("experiment '{}': the column '{}' never changes", c.experiment, c.column));
   return run.finish();
 }
 
@@ -389,8 +386,8 @@ int identify_command(const CommandContext& context) {
   for (std::size_t i = 0; !cut_again && i < cut.warnings.size(); ++i) run.warn(cut.warnings[i]);
   add_windows(run, cut.problem);
   const SimulatedExperiment before = simulate_first_experiment(run, needed, data);
-  for (const std::string& warning : doubts_about_fit(needed, data, {{}, [](double) { return !interrupted(); }}))
-    run.warn(warning);
+  const FitComparisonOptions compared{{}, [](double) { return !interrupted(); }, case_threads(run)};
+  for (const std::string& warning : doubts_about_fit(needed, data, compared)) run.warn(warning);
   if (other) check(run, *other);
   if (context.options.preflight) return preflight(run, needed, data);
   LongRun long_run(run);

@@ -30,7 +30,14 @@ class ForceTerms {
   // Their derivatives in the state as blocks, units: unit tangents of all bodies, the ground first; and in the
   // directions of fields and parameters, bodies at rest.
   void mark_units(std::vector<bool>& bodies) const;  // that add_blocks() reads
-  void add_blocks(const At& at, const std::vector<UnitTangents>& units, MotionBlocks& out);
+  void add_blocks(const At& at, const std::vector<UnitTangents>& units, MotionBlocks& out, bool but_torques = false);
+  // The law of a torque or of a force along a joint, with derivatives.
+  template <class Effort>
+  Law::Value law_of(const Effort& f, const At& at) {
+    const std::array<int, 2> bodies = f.bodies();
+    return f.at(inputs(at), at.frames[static_cast<std::size_t>(bodies[0])],
+                at.frames[static_cast<std::size_t>(bodies[1])]);
+  }
   void add_field_tangent(const At& at, const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs);
   // Gradient of the virtual work sum load'eta, eta in the frames and held fixed.
   void add_pull_back(const At& at, std::vector<FrameBar>& bars, Eigen::Ref<Eigen::VectorXd> y_bar,

@@ -12,6 +12,23 @@ bool any_force_but_springs(const MechanismData& d) {
   return d.forces.size() > d.forces.of<TsdaForce>().size() || !d.applied.empty() || !d.user_forces.empty();
 }
 
+// Whether the vectors between which they measure their angles lie in the plane.
+bool torques_are_about_normal(const MechanismData& d) {
+  constexpr double kParallel = 1e-12;  // sine of the angle up to which a direction counts as another
+  bool all = true;
+  const auto look = [&](const auto& torque) {
+    const JointAngle& joint = torque.joint;
+    const auto lies = [&](int body, const Vector3d& s) {
+      return std::abs(d.planar->bodies[at(body)].n.dot(s)) <= kParallel * s.norm();
+    };
+    all = all && lies(joint.body1, joint.measure.s1) && lies(joint.body1, joint.measure.s3) &&
+          lies(joint.body2, joint.measure.s2);
+  };
+  std::ranges::for_each(d.forces.of<RsdaForce>(), look);
+  std::ranges::for_each(d.forces.of<TurningFriction>(), look);
+  return all;
+}
+
 std::vector<std::size_t> bodies_with_inertial_slots(const MechanismData& data) {
   std::vector<std::size_t> bodies;
   for (std::size_t k = 1; k < data.bodies.size(); ++k) {
@@ -33,6 +50,7 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
       bodies_with_slots_(bodies_with_inertial_slots(data)),
       solver_(data, rows_of<InPlane>(data, settings_.alpha), settings_.compliance),
       springs_(data),
+      torques_in_plane_(torques_are_about_normal(data)),
       has_springs_(!data.forces.of<TsdaForce>().empty()),
       has_other_forces_(any_force_but_springs(data)),
       forces_(data),

@@ -4,7 +4,7 @@
 //   pddot:  Pddot = (i omegadot/2 - |Pdot|^2) P
 //
 // and with the gyroscopic term gone. Springs act in the plane where their points lie in one; other forces are evaluated
-// in space and reduced to the plane.
+// in space and reduced to the plane, but for derivatives of torques about hinges in the state.
 // Allocates nothing after construction, but in the first tangent.
 #pragma once
 
@@ -51,6 +51,7 @@ class PlanarDynamics {
   }
   void prepare_tangents();  // what all directions share, after linearise()
   void prepare_force_tangents();
+  void add_torque_blocks();
   void add_force_tangent(const ParameterBlock& block, const LaneRows& y_dir);
   void add_other_tangents(const ParameterBlock& block, const LaneRows& y_dir);
   void add_force_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
@@ -76,6 +77,7 @@ class PlanarDynamics {
 
   PlanarSprings springs_;
   bool springs_in_plane_ = false;  // at this state
+  const bool torques_in_plane_;    // those about hinges
   // Forces, and the bodies that they read and load, in space.
   bool has_springs_, has_other_forces_;
   bool in_space_ = false;  // whether the bodies are placed there at this state
@@ -97,8 +99,9 @@ class PlanarDynamics {
     MotionBlocks blocks;
     std::vector<UnitTangents> units;
     struct Block {
-      Mat<3, 4> q, v;  // by (r, P) and (rdot, Pdot)
-      Vec<3> height;   // by r along n, which parameters may change
+      Mat<3, 4> q = Mat<3, 4>::Zero(), v = Mat<3, 4>::Zero();  // by (r, P) and (rdot, Pdot)
+      Vec<3> height = Vec<3>::Zero();                          // by r along n, which parameters may change
+      bool filled = false;
     };
     std::vector<Block> in_plane;
   };

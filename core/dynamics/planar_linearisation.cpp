@@ -50,10 +50,11 @@ void PlanarDynamics::prepare_force_tangents() {
   ForceLinearisation& x = *force_linearisation_;
   x.blocks.set_zero();
   for (const std::size_t k : loaded_) set_unit_tangents(states_in_space_[k], x.units[k]);
-  forces_.add_blocks(here(), x.units, x.blocks);
+  forces_.add_blocks(here(), x.units, x.blocks, torques_in_plane_);
   user_.add_blocks(here(), states_in_space_, no_mass_terms_, x.blocks);
   for (std::size_t k = 0; k < x.in_plane.size(); ++k) {
     const MotionBlocks::Block<6>& block = x.blocks.b[k];
+    x.in_plane[k] = {};
     if (block.parts == 0) continue;
     const MotionBlocks::Place& place = x.blocks.pairs()[k];
     const PlanarBody &loaded = model_.bodies[at(place.row + 1)], &read = model_.bodies[at(place.body + 1)];
@@ -68,8 +69,36 @@ void PlanarDynamics::prepare_force_tangents() {
       return to;
     };
     const Mat<3, 7> q = in_plane(block.q);
-    x.in_plane[k] = {reduce(q), reduce(in_plane(block.v)), q.col(model_.n)};
+    x.in_plane[k] = {reduce(q), reduce(in_plane(block.v)), q.col(model_.n), true};
   }
+  if (torques_in_plane_) add_torque_blocks();
+}
+
+// A torque about a hinge loads the bodies at its ends by -+f(x, xdot), where x = +-(theta_2 - theta_1):
+//   moment_i' = -s_i sum_j s_j (f_x theta_j' + f_xdot omega_j'),   s = -1 for body 1, 1 for body 2
+//   theta' = Im(2 P'/P),   omega' = Im(2 Pdot'/P - 2 Pdot P'/P^2)
+// These are the numbers of space, off the constraints, too.
+void PlanarDynamics::add_torque_blocks() {
+  ForceLinearisation& x = *force_linearisation_;
+  const auto add = [&](const auto& torque) {
+    const Law::Value f = forces_.law_of(torque, here());
+    for (const int read : torque.bodies()) {
+      if (read == 0) continue;
+      const Body& b = bodies_[at(read)];
+      const Plane over = inverse(b.P), theta = 2 * over, omega = -(theta * (b.Pdot * over));
+      for (const int loaded : torque.bodies()) {
+        if (loaded == 0) continue;
+        const double sign = loaded == read ? -1 : 1;
+        const Plane by_P = sign * (f.f_x * theta + f.f_xdot * omega), by_Pdot = (sign * f.f_xdot) * theta;
+        ForceLinearisation::Block& block = x.in_plane[at(x.blocks.pair(loaded - 1, read - 1))];
+        block.q.row(2).tail<2>() += Eigen::RowVector2d(by_P.im, by_P.re);
+        block.v.row(2).tail<2>() += Eigen::RowVector2d(by_Pdot.im, by_Pdot.re);
+        block.filled = true;
+      }
+    }
+  };
+  for (const RsdaForce& torque : data_.forces.of<RsdaForce>()) add(torque);
+  for (const TurningFriction& torque : data_.forces.of<TurningFriction>()) add(torque);
 }
 
 // The forces' share of b: in the state by their blocks, and in the fields.
@@ -77,7 +106,7 @@ void PlanarDynamics::add_force_tangent(const ParameterBlock& block, const LaneRo
   const ForceLinearisation& x = *force_linearisation_;
   const LaneRow* y = entries(y_dir);
   for (std::size_t k = 0; k < x.in_plane.size(); ++k) {
-    if (x.blocks.b[k].parts == 0) continue;
+    if (!x.in_plane[k].filled) continue;
     const MotionBlocks::Place& place = x.blocks.pairs()[k];
     const LaneRow* r = y + 7 * place.body;
     const LaneRow* rdot = r + 7 * data_.n;

@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <mutex>
 
+#include "optim/machine/on_threads.hpp"
 #include "optim/problem/parameter_values.hpp"
 
 namespace mbsopt {
@@ -32,23 +35,26 @@ class Comparison {
  public:
   explicit Comparison(const DifferenceComparison& of) : of_(of) {}
 
-  // nullopt: f cannot be evaluated beside the start.
-  std::optional<Difference> difference(std::size_t variable) const;
-  // The groups whose derivatives disagree with it, with a shorter one, and by more than the integrator's error.
-  std::vector<const ComparedGroup*> disagreeing(std::size_t variable, const Difference& d);
+  // What there is to say of a variable; threads may ask, for variables each.
+  std::vector<std::string> sentences(std::size_t variable);
 
  private:
   struct Errors {
     VectorXd f;
     MatrixXd f_rho;
   };
+  // nullopt: f cannot be evaluated beside the start.
+  std::optional<Difference> difference(std::size_t variable) const;
   std::optional<Difference> difference(std::size_t variable, double wanted) const;
+  // The groups whose derivatives disagree with it, with a shorter one, and by more than the integrator's error.
+  std::vector<const ComparedGroup*> disagreeing(std::size_t variable, const Difference& d);
   double largest_derivative(const ComparedGroup& group) const;
   bool disagrees(const ComparedGroup& group, std::size_t variable, const Difference& d, const Errors* integrator) const;
   const Errors& integrator_errors();
 
   const DifferenceComparison& of_;
-  std::optional<Errors> errors_;
+  std::once_flag asked_;
+  Errors errors_;
 };
 
 std::optional<Difference> Comparison::difference(std::size_t variable) const {
@@ -97,13 +103,14 @@ bool Comparison::disagrees(const ComparedGroup& group, std::size_t variable, con
 }
 
 const Comparison::Errors& Comparison::integrator_errors() {
-  if (errors_) return *errors_;
-  errors_ = {VectorXd::Zero(of_.f.size()), MatrixXd::Zero(of_.f_rho.rows(), of_.f_rho.cols())};
-  VectorXd f;
-  MatrixXd f_rho;
-  if (of_.tighter && of_.tighter(f, f_rho) && f.size() == of_.f.size())
-    errors_ = {(f - of_.f).cwiseAbs(), (f_rho - of_.f_rho).cwiseAbs()};
-  return *errors_;
+  std::call_once(asked_, [&] {
+    errors_ = {VectorXd::Zero(of_.f.size()), MatrixXd::Zero(of_.f_rho.rows(), of_.f_rho.cols())};
+    VectorXd f;
+    MatrixXd f_rho;
+    if (of_.tighter && of_.tighter(f, f_rho) && f.size() == of_.f.size())
+      errors_ = {(f - of_.f).cwiseAbs(), (f_rho - of_.f_rho).cwiseAbs()};
+  });
+  return errors_;
 }
 
 std::vector<const ComparedGroup*> Comparison::disagreeing(std::size_t variable, const Difference& d) {
@@ -129,6 +136,23 @@ std::string in_words(const ComparedGroup& group, const std::string& variable, co
       one ? "" : fmt::format(" (apart by {:.6g})", (slope - exact).norm()));
 }
 
+std::vector<std::string> Comparison::sentences(std::size_t variable) {
+  const auto abandoned = [this] { return of_.go_on && !of_.go_on(); };
+  const ComparedVariable& v = of_.variables[variable];
+  if (abandoned() || !(std::max(v.below, v.above) > 0)) return {};  // its bounds leave it where it is
+  const std::optional<Difference> d = difference(variable);
+  if (abandoned()) return {};
+  if (!d)
+    return {fmt::format(
+        "the derivatives in '{}' were not compared with a difference: next to the start it cannot be evaluated",
+        v.name)};
+  std::vector<std::string> said;
+  for (const ComparedGroup* group : disagreeing(variable, *d))
+    said.push_back(in_words(*group, v.name, rows(of_.f_rho.col(static_cast<Index>(variable)), *group),
+                            rows(d->slope, *group), d->h));
+  return said;
+}
+
 }  // namespace
 
 ComparedVariable compared_variable(const std::string& name, const Parameter& at) {
@@ -139,25 +163,12 @@ ComparedVariable compared_variable(const std::string& name, const Parameter& at)
 }
 
 std::vector<std::string> DifferenceComparison::warnings() const {
-  std::vector<std::string> said;
   Comparison comparison(*this);
-  for (std::size_t k = 0; k < variables.size(); ++k) {
-    if (go_on && !go_on()) return {};
-    const Variable& v = variables[k];
-    if (!(std::max(v.below, v.above) > 0)) continue;  // its bounds leave it where it is
-    const std::optional<Difference> d = comparison.difference(k);
-    if (go_on && !go_on()) return {};
-    if (!d) {
-      said.push_back(
-          fmt::format("the derivatives in '{}' were not compared with a difference: next to the start it cannot be "
-                      "evaluated",
-                      v.name));
-      continue;
-    }
-    for (const ComparedGroup* group : comparison.disagreeing(k, *d))
-      said.push_back(
-          in_words(*group, v.name, rows(f_rho.col(static_cast<Index>(k)), *group), rows(d->slope, *group), d->h));
-  }
+  std::vector<std::vector<std::string>> of_variables(variables.size());
+  on_threads(variables.size(), threads, [&](std::size_t k) { of_variables[k] = comparison.sentences(k); });
+  if (go_on && !go_on()) return {};
+  std::vector<std::string> said;
+  for (std::vector<std::string>& sentences : of_variables) std::ranges::move(sentences, std::back_inserter(said));
   return said;
 }
 

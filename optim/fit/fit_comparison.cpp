@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 
 #include "core/simulate/simulation_warnings.hpp"
 #include "optim/differences/difference_comparison.hpp"
 #include "optim/fit/unknown_parameters.hpp"
+#include "optim/machine/on_threads.hpp"
 #include "optim/objective/integration_error.hpp"
 
 namespace mbsopt {
@@ -16,9 +18,11 @@ using Eigen::Index;
 
 struct Fitted {
   std::vector<Experiment> experiments;
+  int threads;
 
   Fitted(const Scene& scene, const Problem& problem, const std::vector<CsvTable>& data,
-         const std::vector<UnknownParameter>& unknowns, const FitComparisonOptions& options) {
+         const std::vector<UnknownParameter>& unknowns, const FitComparisonOptions& options)
+      : threads(options.threads) {
     const IdentificationSpec& spec = *problem.identification;
     for (std::size_t e = 0; e < spec.experiments.size(); ++e)
       if (!spec.experiments[e].validate)
@@ -47,12 +51,12 @@ struct Fitted {
   // All residuals, one experiment below the other, and their derivatives.
   bool residuals(const Eigen::VectorXd& u, const Experiment::Limits& limits, Eigen::VectorXd& z, Eigen::MatrixXd& z_u,
                  std::vector<Jump>* jumps = nullptr) const {
-    std::vector<Experiment::Residuals> of;
+    std::vector<Experiment::Residuals> of(experiments.size());
+    on_threads(of.size(), threads, [&](std::size_t e) { of[e] = experiments[e].residuals(u, limits); });
     Index rows = 0;
-    for (const Experiment& experiment : experiments) {
-      of.push_back(experiment.residuals(u, limits));
-      if (!of.back().ok) return false;
-      rows += of.back().z.size();
+    for (const Experiment::Residuals& r : of) {
+      if (!r.ok) return false;
+      rows += r.z.size();
     }
     z.resize(rows);
     z_u.resize(rows, u.size());
@@ -75,10 +79,13 @@ std::vector<std::string> doubts_about_fit(const Problem& problem, const std::vec
   const std::vector<UnknownParameter> unknowns = unknowns_of_fit(problem.scene, spec);
   const std::vector<std::string> names = names_of(unknowns, spec);
   const Fitted fitted(problem.scene, problem, data, unknowns, options);
-  bool abandoned = false;
+  std::atomic<bool> abandoned = false;
   Experiment::Limits limits;
   if (options.progress)
-    limits.progress = [&](double t) { return abandoned = abandoned || !options.progress(t), !abandoned; };
+    limits.progress = [&](double t) {
+      if (!options.progress(t)) abandoned = true;
+      return !abandoned;
+    };
   const Eigen::VectorXd u = start_of(unknowns);
 
   DifferenceComparison comparison;
@@ -92,6 +99,7 @@ std::vector<std::string> doubts_about_fit(const Problem& problem, const std::vec
     comparison.variables.push_back(compared_variable(names[k], unknowns[k].description));
   comparison.groups = {{"the residuals", 0, comparison.f.size()}};
   comparison.go_on = [&] { return !abandoned; };
+  comparison.threads = options.threads;
   comparison.at = [&](std::size_t k, double h) -> std::optional<Eigen::VectorXd> {
     Eigen::VectorXd z = comparison.f;
     if (!fitted.moved(u, static_cast<Index>(k), h, limits, z)) return std::nullopt;

@@ -16,7 +16,8 @@ struct UserForce;
 
 struct FitComparisonOptions {
   std::vector<std::shared_ptr<const UserForce>> user_forces = {};
-  std::function<bool(double t)> progress = {};  // within a simulation; false abandons the comparison
+  std::function<bool(double t)> progress = {};  // within a simulation, in any thread; false abandons the comparison
+  int threads = 1;
 };
 
 // Sentences; of the experiments that are fitted. data: one table per experiment. Empty where the start cannot be

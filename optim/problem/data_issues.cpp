@@ -19,6 +19,7 @@ namespace {
 // Of the start's own place in time: a record as far from the start as this, in its own lengths, was hardly meant to be
 // reached by a simulation from there (clocks count from 1970 or from midnight).
 constexpr double kFar = 100;
+constexpr double kLong = 1e6;       // s: no motion of a mechanism is recorded for eleven days, but clocks count in us
 constexpr double kResolved = 1e-8;  // as simulation.end_time: a step of a millionth of the span still has two digits
 
 class DataCheck {
@@ -36,7 +37,7 @@ class DataCheck {
     if (issues_.empty()) attempt(place_ + ".data", [&] { ascending_times(data_, experiment_.time); });
     if (issues_.empty()) check_samples();
     if (issues_.empty())
-      for (std::size_t c = 0; c < experiment_.channels.size(); ++c) check_turns(c);
+      for (std::size_t c = 0; c < experiment_.channels.size(); ++c) check_values(c);
     return std::move(issues_);
   }
 
@@ -58,14 +59,18 @@ class DataCheck {
              fmt::format("'{}' is compared by channels[{}] already; its samples would count twice", column, k)});
   }
 
+  // As the file or the problem gives it; empty: neither does.
+  std::string unit_text(const ChannelSpec& channel) const {
+    const std::string& header = data_.header[data_.find_column(channel.column)];
+    return channel.unit.empty() ? std::string(parts_of_header(header).unit.value_or("")) : channel.unit;
+  }
+
   void check_unit(std::size_t c) {
     const ChannelSpec& channel = experiment_.channels[c];
     const auto sensor = std::ranges::find(scene_.sensors, channel.sensor, &Sensor::name);
     const TypeRow* const row = sensor == scene_.sensors.end() ? nullptr : find_row(kSensorQuantities, sensor->quantity);
     if (!row || !channel.gain.is_number() || !data_.has_column(channel.column)) return;
-    const std::string& header = data_.header[data_.find_column(channel.column)];
-    const std::string text =
-        channel.unit.empty() ? std::string(parts_of_header(header).unit.value_or("")) : channel.unit;
+    const std::string text = unit_text(channel);
     const std::optional<Unit> unit = parse_column_unit(text);
     if (text.empty() || !unit || unit->dimension.is_none() || compatible(unit->dimension, row->dimension)) return;
     issues_.push_back({channel_path(c, "column"),
@@ -124,6 +129,12 @@ class DataCheck {
                "lasts {:.6g} s: all the time before would be simulated. Take the first time off "
                "the column '{}' (\"time_zero\": \"first\" does), or say by \"start_time\" where the experiment begins",
                place, first - start_, start_, span, experiment_.time)});
+    else if (span > kLong && experiment_.time_unit.empty() && !time_has_unit())
+      issues_.push_back({place_ + ".time",
+                         fmt::format("{}: the record lasts {:.6g} s, {:.3g} days: is '{}' in s? Its unit in the header "
+                                     "or in \"time_unit\" (\"s\", \"ms\") tells",
+                                     place, span, span / 86400, experiment_.time),
+                         true});
     else if (last - start_ < kResolved * std::max(std::abs(start_), std::abs(last)))
       issues_.push_back(
           {place_ + ".data",
@@ -132,18 +143,54 @@ class DataCheck {
                        place, last, last - start_, experiment_.time)});
   }
 
+  bool time_has_unit() const {
+    return parts_of_header(data_.header[data_.find_column(experiment_.time)]).unit.has_value();
+  }
+
   std::string window() const {
     return fmt::format("after the start at {} s{}", start_,
                        std::isfinite(end_) ? fmt::format(" and until {} s", end_) : "");
   }
 
+  void check_values(std::size_t c) {
+    const std::vector<std::size_t> rows = samples(experiment_.channels[c]);
+    const std::vector<double>& measured = data_.column(experiment_.channels[c].column);
+    const auto [least, most] = std::ranges::minmax_element(rows, {}, [&](std::size_t row) { return measured[row]; });
+    if (rows.size() > 2 && measured[*least] == measured[*most])
+      issues_.push_back({channel_path(c, "column"),
+                         fmt::format("'{}' of {} never changes: {} samples of {:g}", experiment_.channels[c].column,
+                                     data_.name, rows.size(), measured[*least]),
+                         true});
+    if (!check_turns(c, rows)) check_size(c, std::abs(measured[*least]) > std::abs(measured[*most]) ? *least : *most);
+  }
+
+  // The angle's sensor in rad that the column shows, by a gain that is known.
+  const Sensor* angle_sensor(const ChannelSpec& channel) const {
+    const auto sensor = std::ranges::find(scene_.sensors, channel.sensor, &Sensor::name);
+    const bool angle = sensor != scene_.sensors.end() && unit_of(scene_, *sensor) == "rad" && channel.gain.is_number();
+    return angle ? &*sensor : nullptr;
+  }
+
+  // An angle of many turns whose unit nobody gives may be in degrees.
+  void check_size(std::size_t c, std::size_t row) {
+    constexpr double kMany = 100;  // rad: less than a third of a turn in degrees, 16 turns in radians
+    const ChannelSpec& channel = experiment_.channels[c];
+    if (!angle_sensor(channel) || channel.gain.number() != 1 || !unit_text(channel).empty()) return;
+    const double angle = data_.column(channel.column)[row];
+    if (!(std::abs(angle) > kMany)) return;
+    issues_.push_back({channel_path(c, "column"),
+                       fmt::format("{}: '{}' is {:.6g} rad, {:.3g} turns: is the column in degrees? Its unit in the "
+                                   "header or in \"unit\" (\"deg\" or \"rad\") tells",
+                                   data_.place(row), channel.column, angle, std::abs(angle) / (2 * std::numbers::pi)),
+                       true});
+  }
+
   // An unwrapped angle is right where its samples are dense: steps of less than half a turn.
-  void check_unwrapped(std::size_t c) {
+  bool check_unwrapped(std::size_t c, const std::vector<std::size_t>& rows) {
     constexpr double kDoubtful = 0.4;  // of a turn
     const ChannelSpec& channel = experiment_.channels[c];
     const double turn = 2 * std::numbers::pi * (channel.gain.is_number() ? std::abs(channel.gain.number()) : 1);
     const std::vector<double>& measured = data_.column(channel.column);
-    const std::vector<std::size_t> rows = samples(channel);
     for (std::size_t i = 1; i < rows.size(); ++i) {
       const double step = std::abs(measured[rows[i]] - measured[rows[i - 1]]) / turn;
       if (!(step > kDoubtful)) continue;
@@ -153,21 +200,19 @@ class DataCheck {
                        "told from its jumps, so the unwrapped angle may be wrong from here on",
                        data_.place(rows[i]), channel.column, step),
            true});
-      return;
+      return true;
     }
+    return false;
   }
 
-  // A jump is about a turn, and no usual step of the record.
-  void check_turns(std::size_t c) {
-    if (experiment_.channels[c].unwrap) return check_unwrapped(c);
+  // A jump is about a turn, and no usual step of the record. Returns whether one was found.
+  bool check_turns(std::size_t c, const std::vector<std::size_t>& rows) {
+    if (experiment_.channels[c].unwrap) return check_unwrapped(c, rows);
     constexpr double kAbout = 0.1, kUnusual = 5;  // of a turn; of the median step
     const ChannelSpec& channel = experiment_.channels[c];
-    const auto sensor = std::find_if(scene_.sensors.begin(), scene_.sensors.end(),
-                                     [&](const Sensor& s) { return s.name == channel.sensor; });
-    if (sensor == scene_.sensors.end() || unit_of(scene_, *sensor) != "rad" || !channel.gain.is_number()) return;
+    const Sensor* const sensor = angle_sensor(channel);
+    if (!sensor || rows.size() < 3) return false;
     const std::vector<double>& measured = data_.column(channel.column);
-    const std::vector<std::size_t> rows = samples(channel);
-    if (rows.size() < 3) return;
     std::vector<double> steps;
     for (std::size_t i = 1; i < rows.size(); ++i) steps.push_back(std::abs(measured[rows[i]] - measured[rows[i - 1]]));
     const double usual = kUnusual * median(steps);
@@ -184,8 +229,9 @@ class DataCheck {
                        data_.place(rows[i]), channel.column, measured[rows[i - 1]], measured[rows[i]],
                        degrees ? " in degrees, where rad are expected" : "", sensor->name),
            true});
-      return;
+      return true;
     }
+    return false;
   }
 
   const ExperimentSpec& experiment_;

@@ -63,10 +63,12 @@ CsvTable merged(const std::vector<CsvTable>& tables, const std::vector<std::stri
     all.files.push_back(table.name);
     for (std::size_t c = 0; c < columns.size(); ++c) {
       const std::size_t from = table.find_column(columns[c]);
-      if (from < table.header.size())
+      if (from < table.header.size()) {
         std::ranges::copy(table.columns[from], std::back_inserter(all.columns[c]));
-      else
+        all.header[c] = table.header[from];  // with its unit
+      } else {
         all.columns[c].insert(all.columns[c].end(), table.rows(), kMissing);
+      }
     }
     std::ranges::copy(table.lines, std::back_inserter(all.lines));
     all.file_of_row.insert(all.file_of_row.end(), table.rows(), all.files.size() - 1);

@@ -126,6 +126,29 @@ TEST_CASE("a damper's law, and how late its sensor is, come from two rides on ro
         100 * result.at("optimizer").at("objective_final").get<double>());
 }
 
+TEST_CASE("a gyroscope's drift and the clock of its logger come with the pendulum's numbers",
+          "[gallery][identification]") {
+  const TemporaryFolder folder;
+  const auto result = identified(folder, "pendulum/gyroscope");
+  check_against(result, {{"J", 0.00334},
+                         {"k", 1.8e-4},
+                         {"late", 0.03},
+                         {"fast", 0.002},
+                         {"offset", 0.05},
+                         {"drift", 0.01},
+                         {"swing.theta0", 1.52},
+                         {"swing.omega0", 1.85}});
+  // A clock that is as fast as the encoder's does not explain the rate.
+  const TemporaryFolder other;
+  const auto one_clock =
+      identified(other, "pendulum/gyroscope", {"--set", "parameters.fast.lower=0", "--set", "parameters.fast.upper=0"});
+  const auto rms = [](const nlohmann::json& r) {
+    return r.at("experiments").at("swing").at("channels").at("omega").at("rms").get<double>();
+  };
+  CHECK(rms(result) < 0.022);
+  CHECK(rms(one_clock) > 2 * rms(result));
+}
+
 TEST_CASE("friction comes from a run-down with gross errors, in a CSV file with decimal commas",
           "[gallery][identification]") {
   const TemporaryFolder folder;

@@ -132,14 +132,24 @@ TEST_CASE("the measured arm with Stribeck's friction in the elbow: friction of d
     WARN("the record is not here, nothing was tested: " << kMeasured);
     return;
   }
+  const auto with_stribeck = [](double start, double end, const std::string& velocity, const std::string& variable) {
+    std::vector<std::string> sets = measured_between(start, end);
+    sets.insert(sets.end(), {R"(parameters.rise2={"value": 0.05, "lower": 0, "upper": 2, "unit": "N m"})",
+                             "forces[3].breakaway=coulomb2 + rise2", "forces[3].stribeck_velocity=" + velocity,
+                             R"(identification.variables=["h1", "J1", "h2", "J2", "coulomb1", "coulomb2", "viscous1",)"
+                             R"( "viscous2", "rise2")" +
+                                 variable + "]"});
+    return sets;
+  };
+  // The velocity comes from a part of the record that is not compared.
+  std::vector<std::string> apart = with_stribeck(8.5, 9.99, "vs2", R"(, "vs2")");
+  apart.push_back(R"(parameters.vs2={"value": 1, "lower": 0.2, "upper": 10, "scale": "log", "unit": "rad/s"})");
+  const IdentificationResult of_velocity = fitted(apart);
+  REQUIRE(of_velocity.ok());
+  REQUIRE(of_velocity.parameters[9].name == "vs2");
   std::vector<IdentificationResult> parts;
   for (const double start : {0.5, 2.5, 4.5, 6.5}) {
-    std::vector<std::string> sets = measured_between(start, start + 2);
-    sets.insert(sets.end(), {R"(parameters.rise2={"value": 0.05, "lower": 0, "upper": 2, "unit": "N m"})",
-                             "forces[3].breakaway=coulomb2 + rise2", "forces[3].stribeck_velocity=2",
-                             R"(identification.variables=["h1", "J1", "h2", "J2", "coulomb1", "coulomb2", "viscous1",)"
-                             R"( "viscous2", "rise2"])"});
-    parts.push_back(fitted(sets));
+    parts.push_back(fitted(with_stribeck(start, start + 2, fmt::format("{}", of_velocity.parameters[9].value), "")));
     REQUIRE(parts.back().ok());
   }
   for (const std::size_t k : {2, 4, 5}) {  // m2 r2, Coulomb friction of both joints

@@ -1,7 +1,14 @@
-#include <catch2/catch.hpp>
-#include <sstream>
+#include <signal.h>
 
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <cmath>
+#include <sstream>
+#include <thread>
+
+#include "app/files/journal.hpp"
 #include "app/terminal/exit_code.hpp"
+#include "tests/app/killed_run.hpp"
 #include "tests/app/run_command.hpp"
 
 using namespace mbsopt;
@@ -151,6 +158,78 @@ TEST_CASE("identify: what only the data can tell is placed in the problem file",
   CHECK_THAT(refused("identification.experiments[0].channels[0].gain=0"), Contains("gain: is 0"));
   CHECK_THAT(refused("identification.loss={\"type\": \"huber\", \"scale\": 1e-300}"),
              Contains("loss.scale: is 1e-300 sigma"));
+}
+
+TEST_CASE("identify: an angle that wraps, is in degrees or never moves costs no result", "[command]") {
+  const TemporaryFolder folder;
+  std::istringstream rows(measured_swing(folder));
+  // Shifted by a turn in the middle of the record; in degrees; constant.
+  std::string row, wrapped = "t,theta\n", degrees = wrapped, still = wrapped;
+  std::getline(rows, row);
+  for (int i = 0; std::getline(rows, row); ++i) {
+    const std::string t = row.substr(0, row.find(',') + 1);
+    const double theta = std::stod(row.substr(row.find(',') + 1));
+    wrapped += t + std::to_string(theta + (i < 25 ? 0 : 2 * M_PI)) + "\n";
+    degrees += t + std::to_string(300 + theta * 180 / M_PI) + "\n";
+    still += t + "0.1\n";
+  }
+  const std::string file = folder.write("fit.json", identification_problem());
+  const auto identify = [&](const std::string& csv, const std::string& out, const std::string& set) {
+    folder.write("swing.csv", csv);
+    std::vector<std::string> arguments{"identify", file, "--out", folder.file(out)};
+    if (!set.empty()) arguments.insert(arguments.end(), {"--set", set});
+    return run_command(arguments);
+  };
+  const struct {
+    std::string csv, warning;
+  } cases[] = {{wrapped, "by about a turn"}, {degrees, "is the column in degrees?"}, {still, "never changes"}};
+  for (const auto& [csv, warning] : cases) {
+    INFO(warning);
+    const CommandOutcome outcome = identify(csv, "out", "");
+    CHECK(outcome.exit_code == kDone);
+    CHECK_THAT(outcome.err, Contains(warning));
+    const auto result = json_of(folder.path / "out/result.json");
+    CHECK(result.at("parameters").at("k").at("value").is_number());
+    CHECK_THAT(result.at("warnings").dump(), Contains(warning));
+    const CommandOutcome before = run_command({"validate", file, "--out", folder.file("validated")});
+    CHECK(before.exit_code == kDone);
+    CHECK_THAT(before.err, Contains(warning));
+  }
+  const CommandOutcome unwrapped =
+      identify(wrapped, "unwrapped", "identification.experiments[0].channels[0].unwrap=true");
+  REQUIRE(unwrapped.exit_code == kDone);
+  CHECK(json_of(folder.path / "unwrapped/result.json").at("parameters").at("k").at("value").get<double>() ==
+        Approx(20).epsilon(1e-4));
+}
+
+TEST_CASE("identify: what GNU timeout ends keeps the best values so far", "[command][resume]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", measured_swing(folder));
+  const std::string file = folder.write("fit.json", identification_problem());
+  const std::filesystem::path out = folder.path / "out";
+  std::thread timeout([&] {
+    for (int i = 0; i < 3000 && !(std::filesystem::exists(out / kJournalFile) && journal_lines(out, "iterate") >= 2);
+         ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    ::kill(::getpid(), SIGTERM);
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    ::kill(::getpid(), SIGTERM);  // to its process group, too
+  });
+  // Simulations that take a while, so that the signal comes within the fit.
+  const CommandOutcome outcome =
+      run_command({"identify", file, "--out", out.string(), "--set", "simulation.integrator.max_step=2e-4"});
+  timeout.join();
+  INFO(outcome.err);
+  REQUIRE(outcome.exit_code == kInterrupted);
+  const auto result = json_of(out / "result.json");
+  CHECK(result.at("status") == "interrupted");
+  const double k = result.at("parameters").at("k").at("value");
+  CHECK(std::abs(k - 20) < 5);  // the start is 15
+  CHECK(result.at("optimizer").at("objective_final") < result.at("optimizer").at("objective_initial"));
+  CHECK_THAT(content_of(out / "optimized.json"), Contains("\"k\""));
+  CHECK_THAT(content_of(out / "residuals.csv"), Contains("swing,theta,"));
+  REQUIRE(run_command({"resume", out.string()}).exit_code == kDone);
+  CHECK(json_of(out / "result.json").at("parameters").at("k").at("value").get<double>() == Approx(20).epsilon(1e-6));
 }
 
 TEST_CASE("identify --compare: the other file is checked before the fit, and found again by resume", "[command]") {

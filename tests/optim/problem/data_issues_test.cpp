@@ -69,7 +69,7 @@ TEST_CASE("a column is compared once, and not with the times", "[data]") {
 }
 
 TEST_CASE("seconds since 1970 are not simulated", "[data]") {
-  const std::string csv = "t,x,y\n1700000000,1,1\n1700000001,1,1\n1700000030,1,2\n";
+  const std::string csv = "t,x,y\n1700000000,1,1\n1700000001,2,1\n1700000030,1,2\n";
   const auto issues = issues_of(experiment(), csv);
   REQUIRE(issues.size() == 1);
   CHECK(issues[0].path == "experiments[0].data");
@@ -89,7 +89,8 @@ TEST_CASE("an angle that jumps by a turn is warned of, at the row", "[data]") {
   const auto turned = [](double turn) {
     std::string csv = "t,x,y\n";
     for (int i = 0; i < 40; ++i)
-      csv += std::to_string(i) + ",0," + std::to_string(0.04 * turn * i - (i < 20 ? 0 : turn)) + "\n";
+      csv += std::to_string(i) + "," + std::to_string(i % 2) + "," +
+             std::to_string(0.04 * turn * i - (i < 20 ? 0 : turn)) + "\n";
     return csv;
   };
   for (const double turn : {2 * 3.14159265358979, 360.0}) {
@@ -100,4 +101,40 @@ TEST_CASE("an angle that jumps by a turn is warned of, at the row", "[data]") {
     CHECK_THAT(issues[0].message, Catch::Contains("run.csv:22: 'y' jumps"));
     CHECK((issues[0].message.find("degrees") != std::string::npos) == (turn > 300));
   }
+}
+
+TEST_CASE("a signal that never moves is warned of", "[data]") {
+  const auto issues = issues_of(experiment(), "t,x,y\n0,1,0.5\n1,2,nan\n2,1,0.5\n3,2,0.5\n");
+  REQUIRE(issues.size() == 1);
+  CHECK(issues[0].is_warning);
+  CHECK(issues[0].path == "experiments[0].channels[1].column");
+  CHECK_THAT(issues[0].message, Catch::Contains("'y' of run.csv never changes: 3 samples of 0.5"));
+  ExperimentSpec moving = experiment();
+  moving.end_time = 2;
+  CHECK(issues_of(moving, "t,x,y\n0,1,0.5\n1,2,0.6\n2,1,0.5\n3,1,0.5\n").empty());
+}
+
+TEST_CASE("an angle beyond 100 rad is warned of where nobody gives its unit", "[data]") {
+  const auto record = [](const char* header) { return std::string(header) + "\n0,1,1\n1,2,-40\n2,1,-80\n3,2,-120\n"; };
+  const auto issues = issues_of(experiment(), record("t,x,y"));
+  REQUIRE(issues.size() == 1);
+  CHECK(issues[0].is_warning);
+  CHECK(issues[0].path == "experiments[0].channels[1].column");
+  CHECK_THAT(issues[0].message, Catch::Contains("run.csv:5: 'y' is -120 rad, 19.1 turns: is the column in degrees?"));
+  CHECK(issues_of(experiment(), record("t,x,y [rad]")).empty());
+  ExperimentSpec in_degrees = experiment();
+  in_degrees.channels[1].gain = 180 / 3.14159265358979;
+  CHECK(issues_of(in_degrees, record("t,x,y")).empty());
+}
+
+TEST_CASE("a record of days is warned of where nobody gives the unit of its times", "[data]") {
+  const auto record = [](const char* header) {  // 3 s in microseconds
+    return std::string(header) + "\n0,1,1\n1000000,2,2\n2000000,1,1\n3000000,2,3\n";
+  };
+  const auto issues = issues_of(experiment(), record("t,x,y"));
+  REQUIRE(issues.size() == 1);
+  CHECK(issues[0].is_warning);
+  CHECK(issues[0].path == "experiments[0].time");
+  CHECK_THAT(issues[0].message, Catch::Contains("the record lasts 3e+06 s, 34.7 days: is 't' in s?"));
+  CHECK(issues_of(experiment(), record("t [s],x,y")).empty());
 }
