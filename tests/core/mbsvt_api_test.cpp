@@ -109,6 +109,19 @@ struct ScaledEnd final : TerminalCost {
   void adjoint_init(VecIn y, VecIn rho, VecOut lambda, VecOut mu) const override { lambda(0) = rho(1), mu(1) = y(0); }
 };
 
+// A cost of accelerations and reactions: the square of a sensor.
+struct SquareOfSensor final : PointCost {
+  const Mechanism& mechanism;
+  int sensor;
+  SquareOfSensor(const Mechanism& m, const std::string& name) : mechanism(m), sensor(m.sensor(name)) {}
+  double value(const StatePoint& at) const override { return std::pow(mechanism.sensor_value(sensor, at), 2); }
+  double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const override {
+    const double x = mechanism.sensor_value(sensor, at);
+    mechanism.add_sensor_gradient(sensor, at, 2 * scale * x, y_bar, rho_bar);
+    return x * x;
+  }
+};
+
 // 1.5 kg that slides along x, released at rest from x = 1 + a; rho = (k, a).
 Scene oscillator() {
   Scene scene;
@@ -183,6 +196,34 @@ TEST_CASE("MBSVT: ADDConstr_Drive_rgx, ADDConstr_Drive_dist: drives of a coordin
   CHECK(run.ok());
 }
 
+TEST_CASE("MBSVT: ADDConstr_Drive_rgx .. rgz, eu0 .. eu3: a free body's coordinate follows its law", "[mbsvt]") {
+  const std::string coordinate = GENERATE("x", "y", "z", "e0", "e1", "e2", "e3");
+  Scene scene;
+  Body body;
+  body.name = "body", body.mass = 1.0, body.inertia = {0.2, 0.3, 0.4, 0.0, 0.0, 0.0};
+  body.position = vec("0.5", "0.5", "0.5");
+  body.orientation = AxisAngleField{vec("1", "1", "1"), f("2*pi/3")};  // e0 = e1 = e2 = e3 = 0.5
+  scene.bodies = {body};
+  Drive drive;
+  drive.name = "drive", drive.type = "coordinate", drive.body = "body", drive.coordinate = coordinate;
+  drive.law = f("0.5 + 0.1*sin(2*t)");
+  scene.drives = {drive};
+  Sensor sensor;
+  sensor.name = "driven", sensor.quantity = coordinate.size() == 1 ? "position" : "orientation";
+  sensor.body = "body", sensor.component = coordinate;
+  scene.sensors = {sensor};
+  const Mechanism mechanism(scene, VectorXd());
+  int seen = 0;
+  const Sampling sampling{{0, 0.5, 1}, [&](std::size_t, const StatePoint& at) {
+                            CHECK(std::abs(mechanism.sensor_value(0, at) - 0.5 - 0.1 * std::sin(2 * at.t)) < 1e-6);
+                            ++seen;
+                          }};
+  const SimulationResult run = simulate(mechanism, scene.simulation, {}, sampling);
+  INFO(coordinate << run.message);
+  CHECK(run.ok());
+  CHECK(seen == 3);
+}
+
 // STATE::pos, vel, ace of a drive: a routine of the user, here the cycloidal rise of a cam and its fall,
 // 1 + 0.1 sin^3(angle/2) = 1 + 0.025 (3 sin(angle/2) - sin(3 angle/2)), and its derivatives.
 double cam(double angle, int order) {
@@ -243,9 +284,10 @@ TEST_CASE("MBSVT: acceleration_dynamics at a state", "[mbsvt]") {
 
 TEST_CASE("MBSVT: initialize_CONSTANTS, integration_dynamics with a callback after each step", "[mbsvt]") {
   Scene scene = slider_crank();
-  scene.simulation.formulation = FormulationSettings::penalty();  // penalty 1e9, psi 1, omega 10: no projection
-  scene.simulation.formulation.alpha = 1e8, scene.simulation.formulation.xi = 1,
-  scene.simulation.formulation.omega = 10;
+  FormulationSettings& penalty = scene.simulation.formulation;
+  penalty = FormulationSettings::penalty();  // without projection
+  CHECK((penalty.alpha == 1e9 && penalty.xi == 1 && penalty.omega == 10));
+  penalty.alpha = 1e8;
   scene.simulation.integrator.type = "rk4";
   scene.simulation.integrator.step = 1e-4;
   scene.simulation.end_time = 0.1;
@@ -284,6 +326,36 @@ TEST_CASE("MBSVT: integration_sensitivity with callbacks, two objectives, two pa
   CHECK(run.psi(1) == Approx(a * (1 + a * c)).epsilon(1e-10));
   CHECK(run.psi_rho(1, 0) == Approx(-a * a * s * T * w_k).epsilon(1e-9));
   CHECK(run.psi_rho(1, 1) == Approx(1 + 2 * a * c).epsilon(1e-9));
+}
+
+TEST_CASE("MBSVT: gfun of accelerations and reactions, by their sensors", "[mbsvt]") {
+  Scene scene = oscillator();
+  scene.gravity = {0.0, -9.81, 0.0};
+  std::swap(scene.joints[0].body1, scene.joints[0].body2);  // the ground is second: its moment about O is -m g x
+  Sensor a, moment;
+  a.name = "a", a.quantity = "acceleration", a.body = "mass", a.component = "x";
+  moment.name = "moment", moment.quantity = "reaction", moment.joint = "slide";
+  moment.kind = "torque", moment.component = "z";
+  scene.sensors = {a, moment};
+  const Mechanism mechanism(scene, Eigen::Vector2d(40, 0.2), {}, {std::make_shared<OwnSpring>()});
+  std::vector<Cost> costs(3);
+  costs[0].running = std::make_shared<SquareOfSensor>(mechanism, "a");
+  costs[1].running = std::make_shared<SquareOfSensor>(mechanism, "moment");
+  costs[2].running = point_cost(std::make_shared<SquareOfX>(), mechanism);
+  const SimulationResult run = GENERATE(true, false) ? simulate_adjoint(mechanism, scene.simulation, costs)
+                                                     : simulate_tlm(mechanism, scene.simulation, costs);
+  INFO(run.message);
+  REQUIRE(run.ok());
+  // xddot = -w^2 a cos(w t), w = sqrt(k/m)
+  const double a0 = 0.2, m = 1.5, T = 1.2, w = std::sqrt(40 / m), w_k = 1 / (2 * w * m);
+  const double s2 = std::sin(2 * w * T), c2 = std::cos(2 * w * T), w2 = w * w;
+  CHECK(run.psi(0) == Approx(a0 * a0 * w2 * (w2 * T / 2 + w * s2 / 4)).epsilon(1e-10));
+  CHECK(run.psi_rho(0, 0) ==
+        Approx(a0 * a0 * (2 * w2 * w * T + 3 * w2 * s2 / 4 + w2 * w * T * c2 / 2) * w_k).epsilon(1e-9));
+  CHECK(run.psi_rho(0, 1) == Approx(2 * run.psi(0) / a0).epsilon(1e-9));
+  const double weight = m * 9.81;
+  CHECK(run.psi(1) == Approx(weight * weight * run.psi(2)).epsilon(1e-12));
+  for (const int k : {0, 1}) CHECK(run.psi_rho(1, k) == Approx(weight * weight * run.psi_rho(2, k)).epsilon(1e-11));
 }
 
 TEST_CASE("MBSVT: ADDforce_TSDA instead of a spring of one's own gives the same motion and gradient", "[mbsvt]") {

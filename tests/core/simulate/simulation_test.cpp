@@ -126,6 +126,18 @@ TEST_CASE("a fixed step divides the span evenly", "[simulation]") {
   CHECK(run.last_good_time == 0.3);
 }
 
+TEST_CASE("the first step is initial_step, and none is longer than max_step", "[simulation]") {
+  const Scene scene = point_pendulum();
+  SimulationSettings settings = scene.simulation;
+  settings.integrator.initial_step = 1e-3, settings.integrator.max_step = 4e-3;
+  settings.integrator.rtol = settings.integrator.atol = 1e-3;  // alone it would allow longer ones
+  const SimulationResult run = simulate(Mechanism(scene, VectorXd()), settings);
+  REQUIRE(run.ok());
+  const std::vector<double>& h = run.steps.sizes;
+  CHECK(h.front() == 1e-3);
+  CHECK(*std::max_element(h.begin(), h.end()) == 4e-3);
+}
+
 TEST_CASE("a body that nothing gives inertia is named", "[simulation]") {
   Scene scene;
   scene.bodies.push_back(plain_body("ghost", 0, {}, {0.0, 0.0, 0.0}));
