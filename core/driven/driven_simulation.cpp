@@ -88,6 +88,7 @@ class DrivenDerivatives {
   bool linearise(const StatePoint& at) { return projector_->linearise(at.t, at.angles, at.y, at.y, unmoved_); }
   // y0_rho: dy0/drho
   const Eigen::MatrixXd& y_rho(const Eigen::MatrixXd& y0_rho, bool velocities) {
+    const Eigen::Index rows = velocities ? y_rho_.rows() : y_rho_.rows() / 2;
     for (const ParameterBlock& b : blocks_) {
       for (int k = 0; k < kLanes; ++k) {
         if (b.parameter[k] >= 0) y0_dir_.col(k) = y0_rho.col(b.parameter[k]);
@@ -97,7 +98,7 @@ class DrivenDerivatives {
       else
         projector_->position_tangent(b, y0_dir_, direction_);
       for (int k = 0; k < kLanes; ++k) {
-        if (b.parameter[k] >= 0) y_rho_.col(b.parameter[k]) = direction_.col(k);
+        if (b.parameter[k] >= 0) y_rho_.col(b.parameter[k]).head(rows) = direction_.col(k).head(rows);
       }
     }
     return y_rho_;

@@ -53,7 +53,7 @@ class ProjectorOf final : public Projector {
   bool linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, const Eigen::VectorXd& y,
                  const ProjectionSolution& s) override;
   void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override {
-    set_tangent(block, y_hat_dir, constrained(), y_dir);
+    set_tangent(block, y_hat_dir, true, y_dir);
   }
   void position_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override {
     set_tangent(block, y_hat_dir, false, y_dir);
@@ -73,7 +73,6 @@ class ProjectorOf final : public Projector {
   bool constrained() const { return rows_.count() > 0; }
   void read_hat(double t, const Y& y_hat);
   bool factor(double t, const Y& y_hat);                // of S(q~)
-  void set_rows_of(Eigen::MatrixXd& J);                 // J at the frames, dense
   bool factor_square();                                 // J at the frames
   void solve_square(const Y& rows, std::vector<X>& x);  // J x = rows
   // Calls f(body, its number without the ground, its frame).
@@ -84,8 +83,7 @@ class ProjectorOf final : public Projector {
   X test_load_of(int body) const;
   // Directions of Phi or Phidot (dirs_) and of J'lambda (load_dirs_), along frame_dirs_ and those of the fields.
   void set_tangents(ProjectionLevel level, const Frames& frames, const ParameterBlock& block, const Y& lambda);
-  // g_lanes_ = -Phi' at q, along the displacements x_lanes_ (frame_dirs_) and those of the fields.
-  void set_position_rows(const ParameterBlock& block);
+  void set_field_tangents(const ParameterBlock& block);  // Phi' at q along the fields into dirs_, bodies at rest
   // b_lanes_ = -(M' x + (J'lambda)')
   void set_loads(const ParameterBlock& block, const std::vector<X>& x);
   void set_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, bool velocities, LaneRows& y_dir);
@@ -163,23 +161,9 @@ bool ProjectorOf<Body>::factor(double t, const Y& y_hat) {
 }
 
 template <class Body>
-void ProjectorOf<Body>::set_rows_of(Eigen::MatrixXd& J) {
-  rows_.evaluate(frames_);
-  const Eigen::Index unknowns = N * static_cast<Eigen::Index>(x_.size());
-  J.setZero(rows_.count(), unknowns);
-  for (X& x : x_) x.setZero();
-  for (Eigen::Index k = 0; k < unknowns; ++k) {
-    double& unit = x_[at(static_cast<int>(k / N))](k % N);
-    unit = -1;
-    g_.setZero();
-    rows_.subtract_times(x_, g_);
-    J.col(k) = g_;
-    unit = 0;
-  }
-}
-template <class Body>
 bool ProjectorOf<Body>::factor_square() {
-  set_rows_of(J_);
+  rows_.evaluate(frames_);
+  J_ = rows_.dense();
   ++square_factorisations_;
   return J_factor_.compute(J_);
 }
@@ -256,7 +240,8 @@ bool ProjectorOf<Body>::assemble(double t, const Y& angles, const Y& y_hat, Y& y
     for_bodies(
         [&](Body& b, std::size_t i, auto& f) { b.displace(moved.segment<N>(N * static_cast<Eigen::Index>(i)), f); });
     constraints_.phi(frames_, laws_, angles, phi_);
-    set_rows_of(J_);
+    rows_.evaluate(frames_);
+    J_ = rows_.dense();
     const double determinant = J_.determinant();
     if (sign == 0) sign = determinant;
     return determinant * sign > 0 ? phi_.norm() : INFINITY;
@@ -304,7 +289,8 @@ double ProjectorOf<Body>::approach(double t, const Y& angles, Y& y, Y& theta_bar
   double violation = read(), damping = 1;
   Y trial = y;
   for (int k = 0; k < kMost && violation > kProjectionRounding; ++k) {
-    set_rows_of(J_);
+    rows_.evaluate(frames_);
+    J_ = rows_.dense();
     const Y gradient = J_.transpose() * phi_;
     Eigen::MatrixXd A = J_.transpose() * J_;
     A.diagonal().array() += damping * violation;
@@ -452,18 +438,14 @@ void ProjectorOf<BodyInPlane>::set_tangents(ProjectionLevel level, const Frames&
                         block, lambda, dirs_, load_dirs_);
 }
 
-// J times the displacement, since p' turns a unit p.
 template <>
-void ProjectorOf<BodyInSpace>::set_position_rows(const ParameterBlock& block) {
+void ProjectorOf<BodyInSpace>::set_field_tangents(const ParameterBlock& block) {
   mu_.setZero();
   constraints_.field_tangents(frames_, laws_, angles_, block, mu_, dirs_, load_dirs_);
-  g_lanes_ = -dirs_.phi;
-  rows_.subtract_times(x_lanes_, g_lanes_);
 }
 template <>
-void ProjectorOf<BodyInPlane>::set_position_rows(const ParameterBlock& block) {
-  set_tangents(ProjectionLevel::position, frames_, block, nu_);
-  g_lanes_ = -dirs_.phi;
+void ProjectorOf<BodyInPlane>::set_field_tangents(const ParameterBlock& block) {
+  constraints_.field_tangents(frames_, laws_, angles_, block, dirs_.phi);
 }
 
 template <class Body>
@@ -510,20 +492,25 @@ void ProjectorOf<Body>::set_tangent(const ParameterBlock& block, const LaneRows&
     bodies_[i].tilde_tangent(y_hat_dir, frames_tilde_[i + 1], q_dirs_[i], frame_dirs_[i + 1]);
   }
   if (positions()) {
-    set_tangents(ProjectionLevel::position, frames_tilde_, block, nu_);
-    set_loads(block, delta_);
-    for_bodies([&](const Body& b, std::size_t i, const auto& f) {
-      b.position_tangent(delta_[i], f, q_dirs_[i], x_lanes_[i], frame_dirs_[i + 1]);
-    });
-    set_position_rows(block);
+    if (!square_) {  // else nu and delta are 0
+      set_tangents(ProjectionLevel::position, frames_tilde_, block, nu_);
+      set_loads(block, delta_);
+    }
+    for_bodies(
+        [&](const Body& b, std::size_t i, const auto&) { b.position_tangent(delta_[i], q_dirs_[i], x_lanes_[i]); });
+    set_field_tangents(block);
+    g_lanes_ = -dirs_.phi;
+    rows_.subtract_times(x_lanes_, g_lanes_);  // J x, since p' turns a unit p
     refine_tangent(ProjectionLevel::position, largest(x_lanes_));
     for_bodies([&](const Body& b, std::size_t i, const auto&) { b.add_displacement(x_lanes_[i], q_dirs_[i]); });
   }
 
-  for_bodies([&](const Body& b, std::size_t i, const auto& f) {
-    b.velocity_tangent(y_hat_dir, u_[i], f, q_dirs_[i], v_dirs_[i], frame_dirs_[i + 1]);
-  });
   if (velocities) {
+    for_bodies([&](const Body& b, std::size_t i, const auto& f) {
+      b.velocity_tangent(y_hat_dir, u_[i], f, q_dirs_[i], v_dirs_[i], frame_dirs_[i + 1]);
+    });
+  }
+  if (velocities && constrained()) {
     set_tangents(ProjectionLevel::velocity, frames_, block, kappa_);
     set_loads(block, u_);
     g_lanes_ = -dirs_.phi_dot;
@@ -531,8 +518,10 @@ void ProjectorOf<Body>::set_tangent(const ParameterBlock& block, const LaneRows&
     for_bodies([&](const Body& b, std::size_t i, const auto&) { b.add_velocity_tangent(x_lanes_[i], v_dirs_[i]); });
   }
   y_dir = y_hat_dir;
-  for_bodies(
-      [&](const Body& b, std::size_t i, const auto&) { b.write_tangent(q_dirs_[i], v_dirs_[i], y_hat_dir, y_dir); });
+  for_bodies([&](const Body& b, std::size_t i, const auto&) {
+    b.write_position_tangent(q_dirs_[i], y_hat_dir, y_dir);
+    if (velocities) b.write_velocity_tangent(q_dirs_[i], v_dirs_[i], y_hat_dir, y_dir);
+  });
 }
 
 template <class Body>
