@@ -149,12 +149,12 @@ LeastSquaresResult solve_within_limits(LeastSquaresProblem& problem, const Vecto
       return all;
     }
     if (all.status == SolverStatus::stopped) return all;
-    if (round.left() <= kLimitsHeld && of_round.tolerance <= options.tolerance) return all;
     if (is_blocked && round.left() <= kLimitsHeld) {
       all.status = SolverStatus::no_progress;
       all.message = "no further progress: steps lead to where evaluations fail" + all.failures();
       return all;
     }
+    if (round.left() <= kLimitsHeld && of_round.tolerance <= options.tolerance) return all;
   }
   all.status = round.missed() > kLimitsHeld ? SolverStatus::infeasible : SolverStatus::no_progress;
   all.message =
