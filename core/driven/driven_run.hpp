@@ -46,6 +46,7 @@ class DrivenRun {
   SimulationResult& result() { return result_; }
   SimulationResult finish();
   Model model() const { return model_; }
+  Projector& projector() { return path_.projector(); }
 
  private:
   enum class Panel { accepted, refused, stuck };

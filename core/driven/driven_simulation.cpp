@@ -74,10 +74,10 @@ bool moves_out_of_plane(const MechanismData& d) {
 // of the coordinates out of it, which stay as they were assembled: y = P(y0(rho), rho), P the projection.
 class DrivenDerivatives {
  public:
-  DrivenDerivatives(const Mechanism& mechanism, Model model)
+  DrivenDerivatives(const Mechanism& mechanism, Projector& projector)
       : data_(mechanism.data()),
-        projector_(make_projector(mechanism, Projection::position_velocity, model, Free::nothing)),
-        unmoved_(projector_->solution()),
+        projector_(projector),
+        unmoved_(projector.solution()),
         blocks_(parameter_blocks(data_)),
         y_bar_(Eigen::VectorXd::Zero(mechanism.states())),
         rho_bar_(Eigen::VectorXd::Zero(data_.rho.size())),
@@ -85,19 +85,20 @@ class DrivenDerivatives {
     y0_dir_.setZero(mechanism.states(), kLanes), direction_ = y0_dir_;
   }
 
-  bool linearise(const StatePoint& at) { return projector_->linearise(at.t, at.angles, at.y, at.y, unmoved_); }
+  bool linearise(const StatePoint& at) { return projector_.linearise(at.t, at.angles, at.y, at.y, unmoved_); }
   // y0_rho: dy0/drho
   const Eigen::MatrixXd& y_rho(const Eigen::MatrixXd& y0_rho, bool velocities) {
+    const Eigen::Index rows = velocities ? y_rho_.rows() : y_rho_.rows() / 2;
     for (const ParameterBlock& b : blocks_) {
       for (int k = 0; k < kLanes; ++k) {
         if (b.parameter[k] >= 0) y0_dir_.col(k) = y0_rho.col(b.parameter[k]);
       }
       if (velocities)
-        projector_->tangent(b, y0_dir_, direction_);
+        projector_.tangent(b, y0_dir_, direction_);
       else
-        projector_->position_tangent(b, y0_dir_, direction_);
+        projector_.position_tangent(b, y0_dir_, direction_);
       for (int k = 0; k < kLanes; ++k) {
-        if (b.parameter[k] >= 0) y_rho_.col(b.parameter[k]) = direction_.col(k);
+        if (b.parameter[k] >= 0) y_rho_.col(b.parameter[k]).head(rows) = direction_.col(k).head(rows);
       }
     }
     return y_rho_;
@@ -113,13 +114,12 @@ class DrivenDerivatives {
                     Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) {
     y_bar_.setZero();
     for (const DrivenTerm& term : terms) term.cost->add_gradient(at, term.weight, y_bar_, rho_bar);
-    projector_->add_adjoint(y_bar_, y0_bar, theta_bar, rho_bar);
+    projector_.add_adjoint(y_bar_, y0_bar, theta_bar, rho_bar);
   }
-  long factorisations() const { return projector_->factorisations(); }
 
  private:
   const MechanismData& data_;
-  std::unique_ptr<Projector> projector_;
+  Projector& projector_;  // of the run, which counts its factorisations
   const ProjectionSolution unmoved_;
   std::vector<ParameterBlock> blocks_;
   Eigen::VectorXd y_bar_, rho_bar_;
@@ -166,7 +166,7 @@ SimulationResult driven_tlm(const Mechanism& mechanism, const SimulationSettings
   DrivenRun run(mechanism, settings, costs, sampling.times, options, start, true);
   SimulationResult& result = run.result();
   result.psi_rho.setZero(static_cast<Eigen::Index>(costs.size()), mechanism.parameters());
-  DrivenDerivatives derivatives(mechanism, run.model());
+  DrivenDerivatives derivatives(mechanism, run.projector());
   Eigen::MatrixXd y0_rho = Eigen::MatrixXd::Zero(mechanism.states(), mechanism.parameters());
   if (run.model() == Model::planar && moves_out_of_plane(mechanism.data())) y0_rho = start.tangent();
   std::optional<SpatialDynamics> dynamics;  // of the rates that observers get
@@ -189,7 +189,6 @@ SimulationResult driven_tlm(const Mechanism& mechanism, const SimulationSettings
     }
     return y_rho.allFinite();
   });
-  result.statistics.factorisations += derivatives.factorisations();
   return run.finish();
 }
 
@@ -198,7 +197,7 @@ SimulationResult driven_adjoint(const Mechanism& mechanism, const SimulationSett
   DrivenRun run(mechanism, settings, costs, {}, options, start, true);
   SimulationResult& result = run.result();
   const MechanismData& d = mechanism.data();
-  DrivenDerivatives derivatives(mechanism, run.model());
+  DrivenDerivatives derivatives(mechanism, run.projector());
   std::vector<Eigen::VectorXd> y0_bar(costs.size(), Eigen::VectorXd::Zero(mechanism.states()));
   std::vector<Eigen::VectorXd> theta_bar(costs.size(), Eigen::VectorXd::Zero(d.slots()));
   std::vector<Eigen::VectorXd> rho_bar(costs.size(), Eigen::VectorXd::Zero(d.rho.size()));
@@ -225,7 +224,6 @@ SimulationResult driven_adjoint(const Mechanism& mechanism, const SimulationSett
     }
     result.psi_rho.row(static_cast<Eigen::Index>(o)) = rho_bar[o].transpose();
   }
-  result.statistics.factorisations += derivatives.factorisations();
   return run.finish();
 }
 

@@ -135,7 +135,7 @@ void ConstraintTerms::tangents(const Frames& frames, const std::vector<FrameTang
     add_tangent(c, frames, laws, angles, directions[static_cast<std::size_t>(c.body1)],
                 directions[static_cast<std::size_t>(c.body2)], block, lambda, out, loads);
   }
-  laws.subtract_tangents(block, out.phi, out.phi_dot, out.phi_ddot);
+  laws.subtract_tangents(block, {&out.phi, &out.phi_dot, &out.phi_ddot});
 }
 
 void ConstraintTerms::field_tangents(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
@@ -150,7 +150,7 @@ void ConstraintTerms::field_tangents(const Frames& frames, RowLaws& laws, const 
     }
     add_tangent(c, frames, laws, angles, kStill, kStill, block, lambda, out, loads);
   }
-  laws.subtract_tangents(block, out.phi, out.phi_dot, out.phi_ddot);
+  laws.subtract_tangents(block, {&out.phi, &out.phi_dot, &out.phi_ddot});
 }
 
 }  // namespace mbsopt

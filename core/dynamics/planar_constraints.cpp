@@ -127,6 +127,17 @@ PlaneDual moving(const PlanarBody& body, const Plane& s, const Lanes<3>* ds) {
   return {{s.re, LaneDual::Lane(body.b1.transpose() * *ds)}, {s.im, LaneDual::Lane(body.b2.transpose() * *ds)}};
 }
 
+// Two rows += sign Z s', s' the direction of a slot's vector.
+template <class Row>
+void add_vector_tangent(const ParameterBlock& block, int slot, const PlanarBody& body, double sign, const Plane& Z,
+                        Row&& row, Row&& row2) {
+  if (!block.moves(slot, 3)) return;
+  const Lanes<3> ds = block.theta.middleRows<3>(slot);
+  const Lanes<1> re = body.b1.transpose() * ds, im = body.b2.transpose() * ds;
+  row += sign * (Z.re * re - Z.im * im);
+  row2 += sign * (Z.re * im + Z.im * re);
+}
+
 struct Multipliers1 {
   double lambda = 0, mu0 = 0, mu1 = 0, mu2 = 0;
 };
@@ -315,7 +326,39 @@ void PlanarConstraints::tangents(Order order, const DualFrames& frames, RowLaws&
       add(vectors(c));
     }
   }
-  laws.subtract_tangents(block, out.phi, out.phi_dot, out.phi_ddot);
+  laws.subtract_tangents(block, {&out.phi, &out.phi_dot, &out.phi_ddot});
+}
+
+void PlanarConstraints::field_tangents(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
+                                       const ParameterBlock& block, LaneRows& phi) const {
+  phi.setZero();
+  const auto at_rest = [](const PlanarFrame<double>& f) {
+    PlanarFrame<LaneDual> out;
+    out.r = {f.r.re, f.r.im}, out.A = {f.A.re, f.A.im};
+    return out;
+  };
+  for (const PlanarConstraint& c : model_->constraints) {
+    const std::size_t i = at(c.body1), j = at(c.body2);
+    const PlanarBody &b1 = model_->bodies[i], &b2 = model_->bodies[j];
+    if (c.kind == Kind::point) {
+      add_vector_tangent(block, c.slot2, b2, 1, frames[j].A, phi.row(c.row), phi.row(c.row2));
+      add_vector_tangent(block, c.slot1, b1, -1, frames[i].A, phi.row(c.row), phi.row(c.row2));
+      continue;
+    }
+    Lanes<3> d1, d2, d3;
+    Lanes<1> d_factor;
+    const Lanes<3>*s1 = block.field<3>(c.slot1, d1), *s2 = block.field<3>(c.slot2, d2),
+          *s3 = block.field<3>(c.slot3, d3);
+    LaneDual factor = c.factor;
+    const Lanes<1>* const change = block.field<1>(c.slot_factor, d_factor);
+    if (change) factor.d = change->array();
+    if (!s1 && !s2 && !s3 && !change) continue;
+    const Vectors<LaneDual> s{moving(b1, c.s1, s1), moving(b2, c.s2, s2), moving(b1, c.s3, s3)};
+    LaneDual value = phi_of(Order::phi, c, at_rest(frames[i]), at_rest(frames[j]), s);
+    value.v = on_branch(c, laws, angles, value.v);
+    phi.row(c.row) += (factor * value).d.matrix();
+  }
+  laws.subtract_tangents(block, {&phi});
 }
 
 void PlanarConstraints::set_point_moments(const Eigen::VectorXd& lambda, std::vector<Plane>& W) const {
@@ -347,11 +390,10 @@ void PlanarConstraints::subtract_point_tangents(const Frames& frames, const std:
       if (!block.moves(slot, 3)) return;
       const PlanarBody& own = model_->bodies[at(body)];
       const PlanarFrame<double>& f = frames[at(body)];
+      add_vector_tangent(block, slot, own, -sign, f.Addot, c.row(p.row), c.row(p.row2));
+      if (body == 0) return;
       const Lanes<3> ds = block.theta.middleRows<3>(slot);
       const Lanes<1> re = own.b1.transpose() * ds, im = own.b2.transpose() * ds;
-      c.row(p.row) -= sign * (f.Addot.re * re - f.Addot.im * im);
-      c.row(p.row2) -= sign * (f.Addot.re * im + f.Addot.im * re);
-      if (body == 0) return;
       const Plane w = conj(f.A) * Plane{lambda(p.row), lambda(p.row2)};  // cross(A s', l) = cross(s', conj(A) l)
       b[at(body - 1)].row(2) -= sign * (w.im * re - w.re * im);
     };

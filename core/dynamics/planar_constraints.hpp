@@ -52,6 +52,10 @@ class PlanarConstraints {
                 const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,
                 std::vector<Lanes<3>>& loads) const;
 
+  // The tangent of Phi in the directions of the fields alone, bodies at rest: only constraints and laws that have some.
+  void field_tangents(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles, const ParameterBlock& block,
+                      LaneRows& phi) const;
+
   // Most joints of a plane are points. In the frames, with lambda and the vectors held fixed:
   //   d(J'lambda)_theta of a body = cross(A', W),  W: sum of +-conj(s) lambda over its points      [the ground's first]
   void set_point_moments(const Eigen::VectorXd& lambda, std::vector<Plane>& W) const;

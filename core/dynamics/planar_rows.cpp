@@ -67,6 +67,20 @@ void PlanarRows::evaluate(const Frames& frames) {
   }
 }
 
+Eigen::MatrixXd PlanarRows::dense() const {
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(count(), 3 * static_cast<Eigen::Index>(bodies_.size()));
+  const auto add_point = [&](const Point& p, int body, double sign, const double* x) {  // sign (I, i x)
+    if (body == 0) return;
+    const Eigen::Index first = 3 * (body - 1);
+    J(p.row, first) += sign, J(p.row2, first + 1) += sign;
+    J(p.row, first + 2) -= sign * x[1], J(p.row2, first + 2) += sign * x[0];
+  };
+  for (const Point& p : points_) add_point(p, p.body1, -1, p.x1), add_point(p, p.body2, 1, p.x2);
+  for (const Entry& e : entries_)
+    for (int k = 0; k < 3; ++k) J(e.row, 3 * (e.body - 1) + k) += e.J[k];
+  return J;
+}
+
 void PlanarRows::assemble(const Frames& frames, const Eigen::VectorXd& alpha, BlockCholesky<3>& S,
                           [[maybe_unused]] Eigen::VectorXd* phi_ddot) {
   assert(!phi_ddot);

@@ -35,6 +35,7 @@ class PlanarRows : public RowProducts<PlanarRows, RowsInPlane> {
     to[0] = b.mass * from[0], to[1] = b.mass * from[1], to[2] = b.inertia * from[2];
     return out;
   }
+  Eigen::MatrixXd dense() const;  // J, 3 columns per moving body
   BlockCholesky<3> matrix() const { return BlockCholesky<3>(static_cast<int>(model_->bodies.size()) - 1, edges_); }
 
   RowsInPlane view() const {

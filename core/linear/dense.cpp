@@ -5,6 +5,8 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -54,10 +56,26 @@ VectorXd definite_solve(const MatrixXd& A, const VectorXd& b, double threshold) 
   return factor.solve(b);
 }
 
+// P A = L U, row by row; entries of L that are zero cost nothing.
 struct SquareFactor::Factors {
-  Eigen::PartialPivLU<MatrixXd> lu;
-  VectorXd x;
-  Eigen::Matrix<double, Eigen::Dynamic, kLanes, Eigen::RowMajor> rows;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> LU;  // L below the diagonal
+  Eigen::Matrix<Index, Eigen::Dynamic, 1> order;                              // row of A that became row k
+  VectorXd inverse_pivots, x;
+  LaneRows lanes;
+
+  // y: P b, which becomes the solution; single numbers or lanes.
+  template <class Y>
+  void solve(Y& y) const {
+    const Index n = LU.rows();
+    for (Index i = 1; i < n; ++i)
+      for (Index j = 0; j < i; ++j)
+        if (LU(i, j) != 0) y.row(i) -= LU(i, j) * y.row(j);
+    for (Index i = n - 1; i >= 0; --i) {
+      for (Index j = i + 1; j < n; ++j)
+        if (LU(i, j) != 0) y.row(i) -= LU(i, j) * y.row(j);
+      y.row(i) *= inverse_pivots(i);
+    }
+  }
 };
 
 SquareFactor::SquareFactor() : factors_(std::make_unique<Factors>()) {}
@@ -66,30 +84,53 @@ SquareFactor::~SquareFactor() = default;
 
 bool SquareFactor::compute(const MatrixXd& A) {
   constexpr double kSingular = 1e-14;
-  factors_->lu.compute(A);
-  const auto pivots = factors_->lu.matrixLU().diagonal().cwiseAbs();
-  return A.size() > 0 && pivots.minCoeff() > kSingular * pivots.maxCoeff();
+  const Index n = A.rows();
+  auto& [LU, order, inverse_pivots, x, lanes] = *factors_;
+  LU = A, order.setLinSpaced(n, 0, n - 1), inverse_pivots.resize(n);
+  double largest = 0, least = std::numeric_limits<double>::infinity();
+  for (Index k = 0; k < n; ++k) {
+    Index pivot = k;
+    for (Index i = k + 1; i < n; ++i)
+      if (std::abs(LU(i, k)) > std::abs(LU(pivot, k))) pivot = i;
+    if (pivot != k) LU.row(k).swap(LU.row(pivot)), std::swap(order(k), order(pivot));
+    const double size = std::abs(LU(k, k));
+    largest = std::max(largest, size), least = std::min(least, size);
+    if (!(size > 0)) return false;
+    inverse_pivots(k) = 1 / LU(k, k);
+    const double* const from = &LU(k, 0);
+    for (Index i = k + 1; i < n; ++i) {
+      double* const to = &LU(i, 0);
+      if (to[k] == 0) continue;
+      const double factor = to[k] *= inverse_pivots(k);
+      for (Index j = k + 1; j < n; ++j) to[j] -= factor * from[j];
+    }
+  }
+  return n > 0 && least > kSingular * largest;
 }
 void SquareFactor::solve(Eigen::Ref<VectorXd> b) const {
-  factors_->x = factors_->lu.solve(b);
-  b = factors_->x;
-}
-void SquareFactor::solve_lanes(Eigen::Ref<Eigen::Matrix<double, Eigen::Dynamic, kLanes, Eigen::RowMajor>> b) const {
-  auto& x = factors_->rows;
-  const MatrixXd& LU = factors_->lu.matrixLU();
-  x.noalias() = factors_->lu.permutationP() * b;
-  const Index n = LU.rows();  // a row of b is a few numbers: Eigen's blocked solution is made for many
-  for (Index j = 0; j < n; ++j)
-    for (Index i = j + 1; i < n; ++i) x.row(i) -= LU(i, j) * x.row(j);
-  for (Index j = n - 1; j >= 0; --j) {
-    x.row(j) /= LU(j, j);
-    for (Index i = 0; i < j; ++i) x.row(i) -= LU(i, j) * x.row(j);
-  }
+  VectorXd& x = factors_->x;
+  x = b(factors_->order);
+  factors_->solve(x);
   b = x;
 }
-void SquareFactor::solve_transposed(Eigen::Ref<VectorXd> b) const {
-  factors_->x = factors_->lu.transpose().solve(b);
-  b = factors_->x;
+void SquareFactor::solve_lanes(Eigen::Ref<LaneRows> b) const {
+  LaneRows& x = factors_->lanes;
+  x.resize(b.rows(), kLanes);
+  for (Index i = 0; i < b.rows(); ++i) x.row(i) = b.row(factors_->order(i));
+  factors_->solve(x);
+  b = x;
+}
+void SquareFactor::solve_transposed(Eigen::Ref<VectorXd> b) const {  // U'L'(P x) = b
+  const auto& LU = factors_->LU;
+  VectorXd& x = factors_->x;
+  x = b;
+  for (Index i = 0; i < x.size(); ++i) {
+    x(i) *= factors_->inverse_pivots(i);
+    for (Index j = i + 1; j < x.size(); ++j) x(j) -= LU(i, j) * x(i);
+  }
+  for (Index i = x.size() - 1; i > 0; --i)
+    for (Index j = 0; j < i; ++j) x(j) -= LU(i, j) * x(i);
+  b(factors_->order) = x;
 }
 
 MatrixXd null_space(const MatrixXd& A, double threshold) {

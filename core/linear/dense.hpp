@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <memory>
 
-#include "core/linear/fixed_size.hpp"
+#include "core/linear/parameter_block.hpp"
 
 namespace mbsopt {
 
@@ -65,7 +65,7 @@ class SquareFactor {
   bool compute(const Eigen::MatrixXd& A);  // false where A is singular to rounding
   // b becomes x of A x = b, or of A'x = b. _lanes: of several b, its columns.
   void solve(Eigen::Ref<Eigen::VectorXd> b) const;
-  void solve_lanes(Eigen::Ref<Eigen::Matrix<double, Eigen::Dynamic, kLanes, Eigen::RowMajor>> b) const;
+  void solve_lanes(Eigen::Ref<LaneRows> b) const;
   void solve_transposed(Eigen::Ref<Eigen::VectorXd> b) const;
 
  private:

@@ -29,7 +29,10 @@ class FieldValues {
   template <std::size_t N>
   DualVector<N> values(const std::array<Field, N>& fields, const std::string& where) const {
     DualVector<N> result;
-    for (std::size_t i = 0; i < N; ++i) result[i] = value(fields[i], where + "[" + std::to_string(i) + "]");
+    for (std::size_t i = 0; i < N; ++i) {
+      const Field& field = fields[i];
+      result[i] = field.is_number() ? constant(field.number()) : value(field, where + "[" + std::to_string(i) + "]");
+    }
     return result;
   }
   Dual constant(double x) const { return Dual(x, Eigen::VectorXd::Zero(active_)); }

@@ -78,21 +78,21 @@ void RowLaws::add_gradient(Of what, int row, double weight, Eigen::Ref<Eigen::Ve
   for (const int k : data_->active) rho_bar(k) += gradient[static_cast<std::size_t>(k)];
 }
 
-void RowLaws::subtract_tangents(const ParameterBlock& block, LaneRows& phi, LaneRows& phi_dot, LaneRows& phi_ddot) {
-  LaneRows* const out[] = {&phi, &phi_dot, &phi_ddot};
+void RowLaws::subtract_tangents(const ParameterBlock& block, std::initializer_list<LaneRows*> out) {
+  LaneRows* const* const rows = out.begin();  // of Phi, Phidot, Phiddot
   const int P = static_cast<int>(data_->rho.size());
   for (std::size_t k = 0; k < jets_.size(); ++k) {
     const TimeLaw& law = data_->laws[k].law;
     const int row = row_of_law_[k];
     Lanes<1> storage;
-    if (const Lanes<1>* constant = block.field<1>(law.slot, storage)) phi.row(row) -= *constant;
+    if (const Lanes<1>* constant = block.field<1>(law.slot, storage)) rows[0]->row(row) -= *constant;
     if (!law.programs) continue;
-    for (std::size_t order = 0; order < (held_ ? 1u : 3u); ++order) {
+    for (std::size_t order = 0; order < (held_ ? 1u : out.size()); ++order) {
       std::fill(gradient_.begin(), gradient_.end(), 0.0);
       const Program& program = (*law.programs)[order];
       program.add_gradient(inputs_, 1, gradient_, scratch_);
       for (const int input : program.used_inputs()) {
-        if (input < P) out[order]->row(row) -= gradient_[static_cast<std::size_t>(input)] * block.direction(input);
+        if (input < P) rows[order]->row(row) -= gradient_[static_cast<std::size_t>(input)] * block.direction(input);
       }
     }
   }

@@ -2,6 +2,7 @@
 // derivatives of these terms. A mechanism without drives and rods has none and pays nothing.
 #pragma once
 
+#include <initializer_list>
 #include <vector>
 
 #include "core/mechanism/mechanism_data.hpp"
@@ -29,8 +30,8 @@ class RowLaws {
   // Adds weight times the gradient of f, or of f_t, of one row (that of none is zero) in the active parameters.
   enum class Of { f, f_t };
   void add_gradient(Of what, int row, double weight, Eigen::Ref<Eigen::VectorXd> rho_bar) const;
-  // Subtracts the tangents of f, f_t, f_tt.
-  void subtract_tangents(const ParameterBlock& block, LaneRows& phi, LaneRows& phi_dot, LaneRows& phi_ddot);
+  // Subtracts the tangents of f, f_t, f_tt, as many as are given.
+  void subtract_tangents(const ParameterBlock& block, std::initializer_list<LaneRows*> out);
 
  private:
   bool has_law(int row) const { return !jets_.empty() && law_of_row_[static_cast<std::size_t>(row)] >= 0; }

@@ -88,10 +88,7 @@ class BodyInPlane {
     q_dir.row(2) = ((2 / squared_norm(P_hat_)) * (P_hat_.re * P.im.d - P_hat_.im * P.re.d)).matrix();
     set_position(tilde, q_dir, tilde_dir);
   }
-  void position_tangent(const Vec<3>&, const Frame& f, const Direction& q_dir, Lanes<3>& x, FrameTangent& f_dir) const {
-    x = q_dir;
-    set_position(f, q_dir, f_dir);
-  }
+  void position_tangent(const Vec<3>&, const Direction& q_dir, Lanes<3>& x) const { x = q_dir; }
   void add_displacement(Lanes<3>& delta_dir, Direction& q_dir) const {
     turn_by_E(delta_dir, false);
     q_dir += delta_dir;
@@ -107,18 +104,14 @@ class BodyInPlane {
     f_dir.Adot = times_i(LaneDual{w_, v_dir.row(2).array()} * f_dir.A);
   }
   void add_velocity_tangent(const Lanes<3>& u_dir, Direction& v_dir) const { v_dir += u_dir; }
-  // P' = i theta'/2 P,  Pdot = i w/2 P
-  void write_tangent(const Direction& q_dir, const Direction& v_dir, const LaneRows& y_hat_dir, LaneRows& y_dir) const {
-    const Plane iP = times_i(P_);
-    const PlaneDual P{{P_.re, Lane(0.5 * iP.re * q_dir.row(2).array())},
-                      {P_.im, Lane(0.5 * iP.im * q_dir.row(2).array())}};
-    const PlaneDual Pdot = times_i(LaneDual{0.5 * w_, Lane(0.5 * v_dir.row(2).array())} * P);
-    const auto replace = [&](Eigen::Index first, const Direction& dir, const PlaneDual& turn) {
-      in_y_.set_vector_direction(dir, first, y_dir);
-      in_y_.add_turn_direction(k_, turn - in_y_.turn(k_, {}, y_hat_dir, first + 3), first + 3, y_dir);
-    };
-    replace(q_, q_dir, P);
-    replace(v_, v_dir, Pdot);
+  void write_position_tangent(const Direction& q_dir, const LaneRows& y_hat_dir, LaneRows& y_dir) const {
+    replace(q_, q_dir, turned(q_dir), y_hat_dir, y_dir);
+  }
+  // Pdot = i w/2 P
+  void write_velocity_tangent(const Direction& q_dir, const Direction& v_dir, const LaneRows& y_hat_dir,
+                              LaneRows& y_dir) const {
+    const PlaneDual Pdot = times_i(LaneDual{0.5 * w_, Lane(0.5 * v_dir.row(2).array())} * turned(q_dir));
+    replace(v_, v_dir, Pdot, y_hat_dir, y_dir);
   }
 
   void start_adjoint(const Eigen::VectorXd& y_bar, Gradient& q_bar, Gradient& v_bar) const {
@@ -162,6 +155,17 @@ class BodyInPlane {
     const Plane iA = times_i(f.A);
     f_dir.r = {{f.r.re, q_dir.row(0).array()}, {f.r.im, q_dir.row(1).array()}};
     f_dir.A = {{f.A.re, Lane(iA.re * q_dir.row(2).array())}, {f.A.im, Lane(iA.im * q_dir.row(2).array())}};
+  }
+
+  // P' = i theta'/2 P
+  PlaneDual turned(const Direction& q_dir) const {
+    const Plane iP = times_i(P_);
+    return {{P_.re, Lane(0.5 * iP.re * q_dir.row(2).array())}, {P_.im, Lane(0.5 * iP.im * q_dir.row(2).array())}};
+  }
+  void replace(Eigen::Index first, const Direction& dir, const PlaneDual& turn, const LaneRows& y_hat_dir,
+               LaneRows& y_dir) const {
+    in_y_.set_vector_direction(dir, first, y_dir);
+    in_y_.add_turn_direction(k_, turn - in_y_.turn(k_, {}, y_hat_dir, first + 3), first + 3, y_dir);
   }
 
   PlanarBodies in_y_;

@@ -85,7 +85,7 @@ class BodyInSpace {
     set_tangent(tilde_, q_dir, Lanes<7>::Zero(), tilde_dir);
   }
   // q' with delta fixed, and as a virtual displacement;
-  void position_tangent(const Vec<6>& delta, const Frame&, Direction& q_dir, Lanes<6>& x, FrameTangent&) const {
+  void position_tangent(const Vec<6>& delta, Direction& q_dir, Lanes<6>& x) const {
     const Lanes<4> p_tilde_dir = q_dir.bottomRows<4>();
     const Lanes<4> pi_dir = p_tilde_dir + 0.5 * G_transposed_direction(p_tilde_dir, delta.tail<3>());
     const Lanes<4> p_dir = normalised(state_.p, norm_pi_, pi_dir);
@@ -121,8 +121,10 @@ class BodyInSpace {
     v_dir.topRows<3>() += u_dir.topRows<3>();
     v_dir.bottomRows<4>() += 0.5 * G_transposed_times_lanes(state_.p, u_dir.bottomRows<3>());
   }
-  void write_tangent(const Direction& q_dir, const Direction& v_dir, const LaneRows&, LaneRows& y_dir) const {
+  void write_position_tangent(const Direction& q_dir, const LaneRows&, LaneRows& y_dir) const {
     y_dir.middleRows<7>(q_) = q_dir;
+  }
+  void write_velocity_tangent(const Direction&, const Direction& v_dir, const LaneRows&, LaneRows& y_dir) const {
     y_dir.middleRows<7>(v_) = v_dir;
   }
 

@@ -48,7 +48,7 @@ class Projector {
   virtual bool linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat,
                          const Eigen::VectorXd& y, const ProjectionSolution& solution) = 0;
   virtual void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) = 0;
-  // The same of positions alone: as if no velocity depended on anything but positions.
+  // The same of positions alone; rows of velocities are of no use.
   virtual void position_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) = 0;
   // y_hat_bar += (dy/dy_hat)' y_bar, and the same for the differentiated fields and the parameters in laws
   virtual void add_adjoint(const Eigen::VectorXd& y_bar, Eigen::VectorXd& y_hat_bar, Eigen::VectorXd& theta_bar,

@@ -40,18 +40,14 @@ inline void ProjectorOf<BodyInPlane>::set_tangents(ProjectionLevel level, const 
                         block, lambda, dirs_, load_dirs_);
 }
 
-// J times the displacement, since p' turns a unit p.
 template <>
-inline void ProjectorOf<BodyInSpace>::set_position_rows(const ParameterBlock& block) {
+inline void ProjectorOf<BodyInSpace>::set_field_tangents(const ParameterBlock& block) {
   mu_.setZero();
   constraints_.field_tangents(frames_, laws_, angles_, block, mu_, dirs_, load_dirs_);
-  g_lanes_ = -dirs_.phi;
-  rows_.subtract_times(x_lanes_, g_lanes_);
 }
 template <>
-inline void ProjectorOf<BodyInPlane>::set_position_rows(const ParameterBlock& block) {
-  set_tangents(ProjectionLevel::position, frames_, block, nu_);
-  g_lanes_ = -dirs_.phi;
+inline void ProjectorOf<BodyInPlane>::set_field_tangents(const ParameterBlock& block) {
+  constraints_.field_tangents(frames_, laws_, angles_, block, dirs_.phi);
 }
 
 template <class Body>
@@ -98,20 +94,25 @@ void ProjectorOf<Body>::set_tangent(const ParameterBlock& block, const LaneRows&
     bodies_[i].tilde_tangent(y_hat_dir, frames_tilde_[i + 1], q_dirs_[i], frame_dirs_[i + 1]);
   }
   if (positions()) {
-    set_tangents(ProjectionLevel::position, frames_tilde_, block, nu_);
-    set_loads(block, delta_);
-    for_bodies([&](const Body& b, std::size_t i, const auto& f) {
-      b.position_tangent(delta_[i], f, q_dirs_[i], x_lanes_[i], frame_dirs_[i + 1]);
-    });
-    set_position_rows(block);
+    if (!square_) {  // else nu and delta are 0
+      set_tangents(ProjectionLevel::position, frames_tilde_, block, nu_);
+      set_loads(block, delta_);
+    }
+    for_bodies(
+        [&](const Body& b, std::size_t i, const auto&) { b.position_tangent(delta_[i], q_dirs_[i], x_lanes_[i]); });
+    set_field_tangents(block);
+    g_lanes_ = -dirs_.phi;
+    rows_.subtract_times(x_lanes_, g_lanes_);  // J x, since p' turns a unit p
     refine_tangent(ProjectionLevel::position, largest(x_lanes_));
     for_bodies([&](const Body& b, std::size_t i, const auto&) { b.add_displacement(x_lanes_[i], q_dirs_[i]); });
   }
 
-  for_bodies([&](const Body& b, std::size_t i, const auto& f) {
-    b.velocity_tangent(y_hat_dir, u_[i], f, q_dirs_[i], v_dirs_[i], frame_dirs_[i + 1]);
-  });
   if (velocities) {
+    for_bodies([&](const Body& b, std::size_t i, const auto& f) {
+      b.velocity_tangent(y_hat_dir, u_[i], f, q_dirs_[i], v_dirs_[i], frame_dirs_[i + 1]);
+    });
+  }
+  if (velocities && constrained()) {
     set_tangents(ProjectionLevel::velocity, frames_, block, kappa_);
     set_loads(block, u_);
     g_lanes_ = -dirs_.phi_dot;
@@ -119,8 +120,10 @@ void ProjectorOf<Body>::set_tangent(const ParameterBlock& block, const LaneRows&
     for_bodies([&](const Body& b, std::size_t i, const auto&) { b.add_velocity_tangent(x_lanes_[i], v_dirs_[i]); });
   }
   y_dir = y_hat_dir;
-  for_bodies(
-      [&](const Body& b, std::size_t i, const auto&) { b.write_tangent(q_dirs_[i], v_dirs_[i], y_hat_dir, y_dir); });
+  for_bodies([&](const Body& b, std::size_t i, const auto&) {
+    b.write_position_tangent(q_dirs_[i], y_hat_dir, y_dir);
+    if (velocities) b.write_velocity_tangent(q_dirs_[i], v_dirs_[i], y_hat_dir, y_dir);
+  });
 }
 
 template <class Body>

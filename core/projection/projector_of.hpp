@@ -32,7 +32,7 @@ class ProjectorOf final : public Projector {
   bool linearise(double t, const Eigen::VectorXd& angles, const Eigen::VectorXd& y_hat, const Eigen::VectorXd& y,
                  const ProjectionSolution& s) override;
   void tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override {
-    set_tangent(block, y_hat_dir, constrained(), y_dir);
+    set_tangent(block, y_hat_dir, true, y_dir);
   }
   void position_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, LaneRows& y_dir) override {
     set_tangent(block, y_hat_dir, false, y_dir);
@@ -52,7 +52,6 @@ class ProjectorOf final : public Projector {
   bool constrained() const { return rows_.count() > 0; }
   void read_hat(double t, const Y& y_hat);
   bool factor(double t, const Y& y_hat);                // of S(q~)
-  void set_rows_of(Eigen::MatrixXd& J);                 // J at the frames, dense
   bool factor_square();                                 // J at the frames
   void solve_square(const Y& rows, std::vector<X>& x);  // J x = rows
   // Calls f(body, its number without the ground, its frame).
@@ -63,8 +62,7 @@ class ProjectorOf final : public Projector {
   X test_load_of(int body) const;
   // Directions of Phi or Phidot (dirs_) and of J'lambda (load_dirs_), along frame_dirs_ and those of the fields.
   void set_tangents(ProjectionLevel level, const Frames& frames, const ParameterBlock& block, const Y& lambda);
-  // g_lanes_ = -Phi' at q, along the displacements x_lanes_ (frame_dirs_) and those of the fields.
-  void set_position_rows(const ParameterBlock& block);
+  void set_field_tangents(const ParameterBlock& block);  // Phi' at q along the fields into dirs_, bodies at rest
   // b_lanes_ = -(M' x + (J'lambda)')
   void set_loads(const ParameterBlock& block, const std::vector<X>& x);
   void set_tangent(const ParameterBlock& block, const LaneRows& y_hat_dir, bool velocities, LaneRows& y_dir);

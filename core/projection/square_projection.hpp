@@ -10,23 +10,9 @@
 namespace mbsopt {
 
 template <class Body>
-void ProjectorOf<Body>::set_rows_of(Eigen::MatrixXd& J) {
-  rows_.evaluate(frames_);
-  const Eigen::Index unknowns = N * static_cast<Eigen::Index>(x_.size());
-  J.setZero(rows_.count(), unknowns);
-  for (X& x : x_) x.setZero();
-  for (Eigen::Index k = 0; k < unknowns; ++k) {
-    double& unit = x_[at(static_cast<int>(k / N))](k % N);
-    unit = -1;
-    g_.setZero();
-    rows_.subtract_times(x_, g_);
-    J.col(k) = g_;
-    unit = 0;
-  }
-}
-template <class Body>
 bool ProjectorOf<Body>::factor_square() {
-  set_rows_of(J_);
+  rows_.evaluate(frames_);
+  J_ = rows_.dense();
   ++square_factorisations_;
   return J_factor_.compute(J_);
 }
@@ -103,7 +89,8 @@ bool ProjectorOf<Body>::assemble(double t, const Y& angles, const Y& y_hat, Y& y
     for_bodies(
         [&](Body& b, std::size_t i, auto& f) { b.displace(moved.segment<N>(N * static_cast<Eigen::Index>(i)), f); });
     constraints_.phi(frames_, laws_, angles, phi_);
-    set_rows_of(J_);
+    rows_.evaluate(frames_);
+    J_ = rows_.dense();
     const double determinant = J_.determinant();
     if (sign == 0) sign = determinant;
     return determinant * sign > 0 ? phi_.norm() : INFINITY;
@@ -151,7 +138,8 @@ double ProjectorOf<Body>::approach(double t, const Y& angles, Y& y, Y& theta_bar
   double violation = read(), damping = 1;
   Y trial = y;
   for (int k = 0; k < kMost && violation > kProjectionRounding; ++k) {
-    set_rows_of(J_);
+    rows_.evaluate(frames_);
+    J_ = rows_.dense();
     const Y gradient = J_.transpose() * phi_;
     Eigen::MatrixXd A = J_.transpose() * J_;
     A.diagonal().array() += damping * violation;

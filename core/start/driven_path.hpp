@@ -47,6 +47,8 @@ class DrivenPath {
 
   double position_violation() { return projector_->position_violation(state_.t, state_.angles, state_.y); }
   double velocity_violation() { return projector_->velocity_violation(state_.t, state_.y); }
+  // For derivatives at a state: the path needs nothing of it between its steps.
+  Projector& projector() { return *projector_; }
   long steps() const { return steps_; }
   long factorisations() const { return projector_->factorisations(); }
 

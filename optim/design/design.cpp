@@ -552,8 +552,10 @@ bool keep_mode(Problem& problem, const DesignOptions& options, DesignResult& res
   DesignOptions unrecorded = options;  // points are known by their scaled variables, whose units the start decides
   unrecorded.records = nullptr, unrecorded.compare_differences = false;
   for (int k = 0; k < kMostMoves; ++k) {
-    const bool ended = result.status == SolverStatus::converged || result.status == SolverStatus::no_progress;
-    if (!ended || result.optimality <= kStationary * problem.design->optimizer.tolerance) break;
+    const bool is_stationary = result.status == SolverStatus::converged &&
+                               result.optimality <= kStationary * problem.design->optimizer.tolerance;
+    if (is_stationary || (result.status != SolverStatus::converged && result.status != SolverStatus::no_progress))
+      break;
     Problem next = problem;
     for (std::size_t p = 0; p < next.scene.parameters.size(); ++p)
       next.scene.parameters[p].value = result.rho(static_cast<Eigen::Index>(p));

@@ -71,6 +71,7 @@ void TrackedSquares::evaluate(const VectorXd& x, LeastSquaresPoint& point) {
   } else {
     known = {};
     simulate(x, point);
+    is_integrated = !is_solved_;
     if (abandoned_) return;
     if (point.ok && !(point.z.allFinite() && point.z_x.allFinite())) point.ok = false, point.message = kNoValue;
     known.ok = point.ok, known.message = point.message;

@@ -73,6 +73,7 @@ struct LeastSquaresProblem {
   Eigen::Index size;                 // N
   Eigen::Index equalities = 0;       // of them, the last: zero at the solution
   Eigen::VectorXd closed;            // per equality: |c| that its own errors leave; empty: none
+  bool is_integrated = true;         // z has the errors of an integrator; known after an evaluation
   Eigen::Index plain = 0;            // of them, the last before the equalities: not seen by the loss
   Loss loss;
   std::vector<ScaleGroup> groups;  // disjoint

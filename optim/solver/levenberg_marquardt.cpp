@@ -12,7 +12,6 @@
 
 #include "core/expression/counted.hpp"
 #include "optim/solver/bounded_linear_least_squares.hpp"
-#include "optim/solver/residual_curvature.hpp"
 
 namespace mbsopt {
 namespace {
@@ -109,7 +108,10 @@ struct LinearModel {
 class Search {
  public:
   Search(LeastSquaresProblem& problem, const LeastSquaresOptions& options)
-      : problem_(problem), options_(options), curvature_(problem.variables()) {}
+      : problem_(problem),
+        options_(options),
+        own_(problem.variables()),
+        learnt_(options.learnt ? *options.learnt : own_) {}
 
   LeastSquaresResult run(const VectorXd& x_start) {
     x_ = result_.x = x_start.cwiseMax(problem_.x_lower).cwiseMin(problem_.x_upper);
@@ -183,8 +185,12 @@ class Search {
       LeastSquaresPoint trial = evaluated(x);
       const double cost = trial.ok ? problem_.cost(trial.z) : kInfinity;
       const double gained = cost_ - cost;
-      if (options_.large_residuals && std::isfinite(cost))
-        curved_ = std::abs(model.promised(d) - bent_by(d) - gained) < std::abs(model.promised(d) - gained);
+      if (options_.large_residuals && std::isfinite(cost)) {
+        const double without = std::abs(model.promised(d) - gained),
+                     with_S = std::abs(model.promised(d) - raised_by(d) - gained);
+        const double with_b = bend_.size() > 0 ? std::abs(promised - gained) : kInfinity;
+        learnt_.takes_part = with_S < std::min(without, with_b);
+      }
       const bool settled = std::abs(gained) <= options_.tolerance * model.size;
       if (std::isfinite(cost) && (gained > kAccepted * promised || (settled && gained >= 0))) {
         invalid = 0, missed = 0;
@@ -226,9 +232,11 @@ class Search {
   }
 
   // The weights follow the residuals z + J d that the step leads to (levenberg_marquardt.hpp).
-  VectorXd step(const LinearModel& model, double& lambda) const {
-    if (curved_) return curved_step(model, lambda);
+  VectorXd step(const LinearModel& model, double& lambda) {
+    bend_.resize(0);
+    if (learnt_.takes_part) return curved_step(model, lambda);
     VectorXd d = weighed_step(model, model.units, lambda);
+    if (last_step_.size() > 0) return bent_step(model, d, lambda);
     for (int i = 0; i < kWeighings && has_weights(); ++i) {
       const VectorXd w = problem_.weights(point_.z + point_.z_x * d).cwiseSqrt();
       const VectorXd before =
@@ -241,12 +249,23 @@ class Search {
   bool has_weights() const { return !problem_.groups.empty() || problem_.loss.type != LossType::squared; }
 
   double promised_by(const LinearModel& model, const VectorXd& d) const {
-    return has_weights() ? cost_ - problem_.cost(point_.z + point_.z_x * d)
-                         : model.promised(d) - (curved_ ? bent_by(d) : 0);
+    if (has_weights()) return cost_ - problem_.cost(point_.z + point_.z_x * d);
+    if (bend_.size() > 0) return cost_ - 0.5 * (point_.z + bend_ + point_.z_x * d).squaredNorm();
+    return model.promised(d) - (learnt_.takes_part ? raised_by(d) : 0);
   }
 
   // d'S d/2
-  double bent_by(const VectorXd& d) const { return 0.5 * d.dot(curvature_.matrix() * d); }
+  double raised_by(const VectorXd& d) const { return 0.5 * d.dot(learnt_.S.matrix() * d); }
+
+  // The step that reckons with the bend of the residuals, seen in the last step, along d.
+  VectorXd bent_step(const LinearModel& model, const VectorXd& d, double lambda) {
+    const VectorXd last = model.units.cwiseProduct(last_step_);
+    const double tau = last.dot(model.units.cwiseProduct(d)) / last.squaredNorm();
+    bend_ = 0.5 * tau * tau * change_;
+    LeastSquaresPoint bent = point_;
+    bent.z += bend_;
+    return weighed_step(LinearModel(problem_, bent), model.units, lambda);
+  }
 
   // The step with J'J + S. lambda: rises where the matrix of the step is not positive definite.
   VectorXd curved_step(const LinearModel& model, double& lambda) const {
@@ -254,7 +273,7 @@ class Search {
     const VectorXd D = model.units.unaryExpr([](double length) { return length > 0 ? length : 1; });
     const VectorXd lower = D.cwiseProduct(problem_.x_lower - x_), upper = D.cwiseProduct(problem_.x_upper - x_);
     const VectorXd inverse = D.cwiseInverse();
-    MatrixXd H = inverse.asDiagonal() * (model.squares() + curvature_.matrix()) * inverse.asDiagonal();
+    MatrixXd H = inverse.asDiagonal() * (model.squares() + learnt_.S.matrix()) * inverse.asDiagonal();
     H.diagonal().array() += lambda;
     Eigen::LLT<MatrixXd> L(H);
     while (L.info() != Eigen::Success) {
@@ -280,7 +299,8 @@ class Search {
 
   void learn(const VectorXd& s, const LeastSquaresPoint& next) {
     const VectorXd gradient = next.z_x.transpose() * next.z, crossed = point_.z_x.transpose() * next.z;
-    curvature_.add(s, gradient - point_.z_x.transpose() * point_.z, gradient - crossed);
+    learnt_.S.add(s, gradient - point_.z_x.transpose() * point_.z, gradient - crossed);
+    last_step_ = s, change_ = next.z_x * s - point_.z_x * s;
   }
 
   VectorXd weighed_step(const LinearModel& model, const VectorXd& lengths, double lambda) const {
@@ -341,10 +361,13 @@ class Search {
     const double left = promise(model);
     result_.promised = model.size > 0 ? left / model.size : 0;
     if (lambda > 1 && left > kSimulationNoise * first_size_)
-      return end(SolverStatus::no_progress,
-                 fmt::format("no further progress: the derivatives promise to lower the cost by {:.2g}, but no step "
-                             "lowers it{}. Tighten rtol of the integrator; check the derivatives of C++ code",
-                             left, result_.failures()));
+      return end(
+          SolverStatus::no_progress,
+          fmt::format(
+              "no further progress: the derivatives promise to lower the cost by {:.2g}, but no step "
+              "lowers it{}{}",
+              left, result_.failures(),
+              problem_.is_integrated ? ". Tighten rtol of the integrator; check the derivatives of C++ code" : ""));
     end(SolverStatus::converged,
         fmt::format("converged: cost and parameters change by less than {:g} of themselves", options_.tolerance));
   }
@@ -362,8 +385,10 @@ class Search {
   VectorXd x_;
   LeastSquaresPoint point_;
   double cost_ = 0, first_size_ = 0;
-  ResidualCurvature curvature_;
-  bool curved_ = false;  // whether it takes part in the next step
+  LearntCurvature own_;
+  LearntCurvature& learnt_;
+  VectorXd last_step_, change_;  // s and (J+ - J) s; empty where residuals are not large
+  VectorXd bend_;                // b of the next step; empty: it has none
 };
 
 }  // namespace

@@ -13,10 +13,15 @@
 // that a step costs no more than linearly in their number.
 //
 // Where residuals stay large (`large_residuals`), J'J is only a part of the second derivatives. The rest, S, is learnt
-// from gradients (residual_curvature.hpp). After each trial the model that foretold the cost better, with S or without,
-// makes the next step; lambda rises until its matrix is positive definite. D is then the same for all variables in
-// units of their ranges: where a residual changes fast in one direction, the lengths of all columns grow with it, and
-// steps across that direction would be damped, too.
+// from gradients (residual_curvature.hpp). Along a curved valley the last step s, from J to J+, tells how residuals
+// bend along the next one, d:
+//   z(x + d) ~ z + b + J d,   b = tau^2/2 (J+ - J) s,   tau = s'D^2 d/s'D^2 s,   d: the step without b
+// The step minimises |z + b + J d|^2 + lambda |D d|^2, a geodesic acceleration that takes no evaluation (Transtrum and
+// Sethna, "Improvements to the Levenberg-Marquardt algorithm for nonlinear least-squares minimization",
+// arXiv:1201.5885). After each trial the model that foretold the cost best, with S or with b, makes the next step.
+// lambda rises until the matrix with S is positive definite. D is then the same for all variables in units of their
+// ranges: where a residual changes fast in one direction, the lengths of all columns grow with it, and steps across
+// that direction would be damped, too.
 //
 // A loss, and sigmas that the problem eliminates, make a cost of the residuals that is no square. The step minimises
 // this cost of the linear residuals, by weights (LeastSquaresProblem::weights) of the residuals that it leads to:
@@ -37,6 +42,7 @@
 #include <optional>
 
 #include "optim/solver/least_squares.hpp"
+#include "optim/solver/residual_curvature.hpp"
 
 namespace mbsopt {
 
@@ -44,12 +50,20 @@ namespace mbsopt {
 // cost of the start at a minimum; in front of a wall of failed points, or with wrong derivatives, they promise most.
 inline constexpr double kSimulationNoise = 1e-4;
 
+// What a search has learnt of large residuals. The next search, of nearly the same residuals, begins with it.
+struct LearntCurvature {
+  explicit LearntCurvature(Eigen::Index variables) : S(variables) {}
+  ResidualCurvature S;
+  bool takes_part = false;  // in the next step
+};
+
 struct LeastSquaresOptions {
   double tolerance = 1e-10;                                   // relative change of the cost, and of x, > 0
   int max_iterations = 100;                                   // >= 0
   std::function<bool(const LeastSquaresProgress&)> progress;  // after every iteration; false stops
   std::optional<long> max_evaluations = {};                   // > 0, that of the start counted
   bool large_residuals = false;                               // without parts, losses and groups
+  LearntCurvature* learnt = nullptr;                          // of large residuals; null: nothing is known before
 };
 
 // x_start is taken into the bounds. Never throws for what an evaluation does: exceptions of evaluate() are failed

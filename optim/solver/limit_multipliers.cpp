@@ -26,6 +26,10 @@ constexpr double kLoosest = 1e-2,
 constexpr double kLimitsHeld = 1e-6;   // |c - P(s)| at the end: what ranks as feasible
 constexpr double kFinerLimits = 1e-4;  // of the last tolerance: the cost is stationary in x, the limits are not
 constexpr int kLimitRounds = 30;       // seven or eight are usual
+// A round from the fourth on that met failed points, and whose derivatives promise so many times its tolerance, ended
+// in front of them. Where no limit holds it back, the rounds after it would come no farther.
+constexpr int kFirstJudged = 3;
+constexpr double kPromisesMore = 10;
 
 class LimitRound : public LeastSquaresProblem {
  public:
@@ -44,22 +48,28 @@ class LimitRound : public LeastSquaresProblem {
     } else {
       ++evaluations;
       given_.evaluate(x, point);
+      is_integrated = given_.is_integrated;
       if (!point.ok) return;
     }
     last = {x, 0.5 * point.z.head(size - l_.size()).squaredNorm()};
     if (w_ == 0) w_ = weight(point);
+    LeastSquaresPoint given = point;
     const VectorXd s = point.z.tail(l_.size()) + l_ / (w_ * w_), beyond = s - taken_in(s);
     point.z.tail(l_.size()) = w_ * beyond;
     for (Index i = 0; i < l_.size(); ++i) point.z_x.row(point.z.size() - l_.size() + i) *= beyond(i) != 0 ? w_ : 0;
+    if (const double cost = point.z.squaredNorm(); cost <= best_.cost) best_ = {x, std::move(given), cost};
   }
 
   // Turns the solution of a round into that of the problem given, at the cost of no evaluation where it is known.
   bool end(LeastSquaresResult& solution, double tolerance) {
-    LeastSquaresPoint at;
-    at.z.setZero(size), at.z_x.setZero(size, variables());
-    given_.evaluate(solution.x, at);
-    ++evaluations;
-    if (!at.ok) return false;
+    Evaluated at_best = std::exchange(best_, {});
+    LeastSquaresPoint& at = at_best.point;
+    if (at_best.x.size() == 0 || at_best.x != solution.x) {
+      at.z.setZero(size), at.z_x.setZero(size, variables());
+      given_.evaluate(solution.x, at);
+      ++evaluations;
+      if (!at.ok) return false;
+    }
     const VectorXd c = at.z.tail(l_.size()), s = c + l_ / (w_ * w_);
     const double before = std::exchange(left_, (c - taken_in(s)).lpNorm<Eigen::Infinity>());
     if (tolerance < kSettledRound && left_ > kFallenEnough * before)
@@ -88,6 +98,12 @@ class LimitRound : public LeastSquaresProblem {
 
   LeastSquaresProblem& given_;
   const VectorXd &c_lower_, &c_upper_;
+  struct Evaluated {
+    VectorXd x;
+    LeastSquaresPoint point;  // of the problem given
+    double cost = std::numeric_limits<double>::infinity();
+  };
+  Evaluated best_;  // of this round, where most searches end
   VectorXd l_, x_;
   double part_ = kLimitWeight, w_ = 0, left_ = std::numeric_limits<double>::infinity(), missed_ = 0;
   LeastSquaresPoint known_;
@@ -101,10 +117,11 @@ LeastSquaresResult solve_within_limits(LeastSquaresProblem& problem, const Vecto
   LimitRound round(problem, c_lower, c_upper);
   LeastSquaresResult all;
   all.x = x_start;
+  LearntCurvature learnt(problem.variables());
   double tolerance = kLoosest, shown = 0;
   for (int k = 0; k < kLimitRounds; ++k, tolerance *= kTightening) {
     LeastSquaresOptions of_round = options;
-    of_round.large_residuals = true;
+    of_round.large_residuals = true, of_round.learnt = &learnt;
     of_round.tolerance = std::max(kFinerLimits * options.tolerance, tolerance);
     of_round.max_iterations = options.max_iterations - all.iterations;
     if (options.max_evaluations) of_round.max_evaluations = std::max(1L, *options.max_evaluations - round.evaluations);
@@ -116,6 +133,8 @@ LeastSquaresResult solve_within_limits(LeastSquaresProblem& problem, const Vecto
         return options.progress(p);
       };
     LeastSquaresResult found = solve_least_squares(round, all.x, of_round);
+    const bool is_blocked =
+        k >= kFirstJudged && found.failed_evaluations > 0 && found.promised > kPromisesMore * of_round.tolerance;
     found.iterations += all.iterations;
     found.failed_evaluations += all.failed_evaluations;
     if (!all.first_error.empty()) found.first_error = all.first_error;
@@ -130,6 +149,11 @@ LeastSquaresResult solve_within_limits(LeastSquaresProblem& problem, const Vecto
       return all;
     }
     if (all.status == SolverStatus::stopped) return all;
+    if (is_blocked && round.left() <= kLimitsHeld) {
+      all.status = SolverStatus::no_progress;
+      all.message = "no further progress: steps lead to where evaluations fail" + all.failures();
+      return all;
+    }
     if (round.left() <= kLimitsHeld && of_round.tolerance <= options.tolerance) return all;
   }
   all.status = round.missed() > kLimitsHeld ? SolverStatus::infeasible : SolverStatus::no_progress;

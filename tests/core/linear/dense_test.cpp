@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 #include <utility>
 
-#include "core/linear/fixed_size.hpp"
+#include "core/linear/parameter_block.hpp"
 
 using namespace mbsopt;
 using Eigen::MatrixXd;
@@ -85,4 +85,24 @@ TEST_CASE("cholesky solves a symmetric positive definite system", "[linear]") {
   const MatrixXd A = rank_two() * rank_two().transpose() + MatrixXd::Identity(3, 3);
   const VectorXd x = VectorXd::LinSpaced(3, 1, 2);
   CHECK(largest(cholesky_solve(A, A * x) - x) < 1e-13);
+}
+
+TEST_CASE("factors of a square matrix with zeros solve with it and with its transpose, and refuse a singular one",
+          "[linear]") {
+  MatrixXd A(4, 4);
+  A << 0, 2, 0, 1, 1, 0, 0, 0, 0, 3, -1, 0, 4, 0, 0, 5;
+  SquareFactor factor;
+  REQUIRE(factor.compute(A));
+  const VectorXd b = VectorXd::LinSpaced(4, 1, 7);
+  VectorXd x = b, y = b;
+  factor.solve(x);
+  CHECK(largest(A * x - b) < 1e-14);
+  factor.solve_transposed(y);
+  CHECK(largest(A.transpose() * y - b) < 1e-14);
+  LaneRows lanes = LaneRows::Random(4, kLanes);
+  const LaneRows right = lanes;
+  factor.solve_lanes(lanes);
+  CHECK(largest(A * lanes - right) < 1e-14);
+  A.row(3) = A.row(0) + A.row(2);
+  CHECK_FALSE(factor.compute(A));
 }

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <stdexcept>
+#include <string>
 
 #include "tests/optim/small_programs.hpp"
 
@@ -93,4 +95,41 @@ TEST_CASE("large residuals: the learnt second-order term takes fewer evaluations
   INFO(learnt.calls << " of " << plain.calls);
   CHECK(learnt.calls < plain.calls);
   CHECK(by_squares.cost_final >= by_both.cost_final * (1 - 1e-10));
+}
+
+TEST_CASE("large residuals: what one search has learnt shortens the next", "[limits]") {
+  Squares problem = brown_and_dennis();
+  LearntCurvature learnt(4);
+  LeastSquaresOptions options;
+  options.large_residuals = true, options.tolerance = 1e-6, options.max_iterations = 1000;
+  options.learnt = &learnt;
+  const VectorXd reached = solve_least_squares(problem, vector({25, 5, -5, -1}), options).x;
+  options.tolerance = 1e-14;
+  const LeastSquaresResult next = solve_least_squares(problem, reached, options);
+  CHECK(2 * next.cost_final == Approx(85822.2016).epsilon(1e-8));
+  options.learnt = nullptr;
+  const LeastSquaresResult anew = solve_least_squares(problem, reached, options);
+  INFO(next.evaluations << " of " << anew.evaluations);
+  CHECK(next.evaluations < anew.evaluations);
+}
+
+TEST_CASE("least squares within limits: rounds end in front of points that fail", "[limits]") {
+  struct Walled : LeastSquaresProblem {
+    Walled() : LeastSquaresProblem(2, 3) { is_integrated = false; }
+    void evaluate(const VectorXd& x, LeastSquaresPoint& p) override {
+      if (x(0) < 1) throw std::runtime_error("does not close");
+      p.z << x(0), x(1) - x(0) * x(0), x(0) + x(1);
+      p.z_x << 1, 0, -2 * x(0), 1, 1, 1;
+    }
+  } problem;
+  LeastSquaresOptions options;
+  options.max_iterations = 1000;
+  const LeastSquaresResult found =
+      solve_within_limits(problem, vector({-kUnlimited}), vector({1e3}), vector({3, 3}), options);
+  INFO(found.message);
+  CHECK(found.status == SolverStatus::no_progress);
+  CHECK(found.x(0) == Approx(1).epsilon(1e-2));
+  CHECK(found.message.find("does not close") != std::string::npos);
+  CHECK(found.message.find("integrator") == std::string::npos);
+  CHECK(found.evaluations < 100);
 }
