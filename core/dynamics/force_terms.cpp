@@ -106,7 +106,7 @@ void ForceTerms::add_blocks(const At& at, const std::vector<UnitTangents>& units
   });
   const int t = static_cast<int>(data_.rho.size());
   for (const AppliedForce& f : data_.applied) {
-    if (!depends_on_state(f)) continue;
+    if (!depends_on_state(f) || (but_torques && is_free_torque(f))) continue;
     const Vector3d c = components_with_gradients(f, at);
     const Frame& frame = at.frames[index(f.body)];
     const int row = f.body - 1;

@@ -30,7 +30,16 @@ class ForceTerms {
   // Their derivatives in the state as blocks, units: unit tangents of all bodies, the ground first; and in the
   // directions of fields and parameters, bodies at rest.
   void mark_units(std::vector<bool>& bodies) const;  // that add_blocks() reads
+  // but_torques: without those about hinges, and without free ones. Those are applied torques with components in
+  // global axes, which no sensor moves.
   void add_blocks(const At& at, const std::vector<UnitTangents>& units, MotionBlocks& out, bool but_torques = false);
+  static bool is_free_torque(const AppliedForce& f) { return f.is_torque && !f.in_body_axes && f.sensors.empty(); }
+  // visitor(body, components)
+  template <class Visitor>
+  void for_each_free_torque(const At& at, Visitor&& visitor) {
+    for (const AppliedForce& f : data_.applied)
+      if (is_free_torque(f)) visitor(f.body, components(f, at));
+  }
   // The law of a torque or of a force along a joint, with derivatives.
   template <class Effort>
   Law::Value law_of(const Effort& f, const At& at) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/dynamics/space.hpp"
+#include "core/mechanism/derivative_blocks.hpp"
 
 namespace mbsopt {
 namespace {
@@ -29,6 +30,14 @@ bool torques_are_about_normal(const MechanismData& d) {
   return all;
 }
 
+// Whether no force depends on the state but torques about hinges and free ones.
+bool nothing_but_torques(const MechanismData& d) {
+  return d.forces.size() == d.forces.of<RsdaForce>().size() + d.forces.of<TurningFriction>().size() &&
+         d.user_forces.empty() && std::ranges::all_of(d.applied, [](const AppliedForce& f) {
+           return !depends_on_state(f) || ForceTerms::is_free_torque(f);
+         });
+}
+
 std::vector<std::size_t> bodies_with_inertial_slots(const MechanismData& data) {
   std::vector<std::size_t> bodies;
   for (std::size_t k = 1; k < data.bodies.size(); ++k) {
@@ -51,6 +60,7 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
       solver_(data, rows_of<InPlane>(data, settings_.alpha), settings_.compliance),
       springs_(data),
       torques_in_plane_(torques_are_about_normal(data)),
+      only_torques_(torques_in_plane_ && nothing_but_torques(data)),
       has_springs_(!data.forces.of<TsdaForce>().empty()),
       has_other_forces_(any_force_but_springs(data)),
       forces_(data),

@@ -4,7 +4,7 @@
 //   pddot:  Pddot = (i omegadot/2 - |Pdot|^2) P
 //
 // and with the gyroscopic term gone. Springs act in the plane where their points lie in one; other forces are evaluated
-// in space and reduced to the plane, but for derivatives of torques about hinges in the state.
+// in space and reduced to the plane, but for derivatives of torques in the state.
 // Allocates nothing after construction, but in the first tangent.
 #pragma once
 
@@ -77,7 +77,8 @@ class PlanarDynamics {
 
   PlanarSprings springs_;
   bool springs_in_plane_ = false;  // at this state
-  const bool torques_in_plane_;    // those about hinges
+  const bool torques_in_plane_;    // those about hinges, and free ones
+  const bool only_torques_;        // in the plane; no other force depends on the state
   // Forces, and the bodies that they read and load, in space.
   bool has_springs_, has_other_forces_;
   bool in_space_ = false;  // whether the bodies are placed there at this state

@@ -48,13 +48,15 @@ void PlanarDynamics::prepare_force_tangents() {
   }
   if (!in_space_) place_in_space();
   ForceLinearisation& x = *force_linearisation_;
+  for (ForceLinearisation::Block& block : x.in_plane) block = {};
+  if (torques_in_plane_) add_torque_blocks();
+  if (only_torques_) return;
   x.blocks.set_zero();
   for (const std::size_t k : loaded_) set_unit_tangents(states_in_space_[k], x.units[k]);
   forces_.add_blocks(here(), x.units, x.blocks, torques_in_plane_);
   user_.add_blocks(here(), states_in_space_, no_mass_terms_, x.blocks);
   for (std::size_t k = 0; k < x.in_plane.size(); ++k) {
     const MotionBlocks::Block<6>& block = x.blocks.b[k];
-    x.in_plane[k] = {};
     if (block.parts == 0) continue;
     const MotionBlocks::Place& place = x.blocks.pairs()[k];
     const PlanarBody &loaded = model_.bodies[at(place.row + 1)], &read = model_.bodies[at(place.body + 1)];
@@ -69,15 +71,15 @@ void PlanarDynamics::prepare_force_tangents() {
       return to;
     };
     const Mat<3, 7> q = in_plane(block.q);
-    x.in_plane[k] = {reduce(q), reduce(in_plane(block.v)), q.col(model_.n), true};
+    ForceLinearisation::Block& to = x.in_plane[k];
+    to.q += reduce(q), to.v += reduce(in_plane(block.v)), to.height += q.col(model_.n), to.filled = true;
   }
-  if (torques_in_plane_) add_torque_blocks();
 }
 
 // A torque about a hinge loads the bodies at its ends by -+f(x, xdot), where x = +-(theta_2 - theta_1):
 //   moment_i' = -s_i sum_j s_j (f_x theta_j' + f_xdot omega_j'),   s = -1 for body 1, 1 for body 2
 //   theta' = Im(2 P'/P),   omega' = Im(2 Pdot'/P - 2 Pdot P'/P^2)
-// These are the numbers of space, off the constraints, too.
+// A free torque c has the moment |P|^2 c_n. These are the numbers of space, off the constraints, too.
 void PlanarDynamics::add_torque_blocks() {
   ForceLinearisation& x = *force_linearisation_;
   const auto add = [&](const auto& torque) {
@@ -99,6 +101,12 @@ void PlanarDynamics::add_torque_blocks() {
   };
   for (const RsdaForce& torque : data_.forces.of<RsdaForce>()) add(torque);
   for (const TurningFriction& torque : data_.forces.of<TurningFriction>()) add(torque);
+  forces_.for_each_free_torque(here(), [&](int body, const Vector3d& c) {
+    const Plane& P = bodies_[at(body)].P;
+    ForceLinearisation::Block& block = x.in_plane[at(x.blocks.pair(body - 1, body - 1))];
+    block.q.row(2).tail<2>() += 2 * c(model_.n) * Eigen::RowVector2d(P.re, P.im);
+    block.filled = true;
+  });
 }
 
 // The forces' share of b: in the state by their blocks, and in the fields.

@@ -73,7 +73,11 @@ void JointEffort<P, L>::add_field_tangent(const ForceInputs& in, const Parameter
   const Lanes<1> df = law.field_tangent(
       measured(in.angles, f1, f2), block.field<L::kFields>(law.slot, fields), [&](int k) { return block.direction(k); },
       in.scratch);
-  tangent(f, f1, f2, kStill, kStill, {df, s}, load1, load2);
+  if (s.s1 || s.s2 || s.s3) return tangent(f, f1, f2, kStill, kStill, {df, s}, load1, load2);
+  Mat<1, 6> J1, J2;  // the measure stays as it is
+  joint.measure.jacobian(f1, f2, J1, J2);
+  load1 -= J1.transpose() * df;
+  load2 -= J2.transpose() * df;
 }
 
 template <class P, class L>

@@ -116,6 +116,9 @@ inline Scene planar_machine(int normal = 2, bool out_of_plane = true) {
                                     push.components[at((normal + 2) % 3)] = f("-k*0.01*reach");
   push.components[at(normal)] = f(out_of_plane ? "1" : "0");
   s.forces.push_back({"push", push});
+  Torque twist;
+  twist.body = "bar", twist.components[at(normal)] = f("mu*cos(spin*t)");
+  s.forces.push_back({"twist", twist});
   s.sensors.push_back(point_sensor("reach", "position", "coupler", v("L2", "0"), "x"));
   s.sensors.push_back(angle_sensor("turn", "D"));
   s.simulation.end_time = 0.4;
