@@ -92,6 +92,8 @@ class Identification {
     data.change = u_x.cwiseAbs();
     data.covariance = covariance_for(stack);
     for (const UnknownParameter& u : unknowns) data.of_one_record.push_back(!u.shared);
+    for (Eigen::Index k = 0; k < solution.x.size(); ++k)
+      data.at_bound.push_back(solution.x(k) <= stack.x_lower(k) || solution.x(k) >= stack.x_upper(k));
     data.records = stack.records_in_time(), data.motions = stack.motions_in_time();
     data.record = stack.measured().cwiseQuotient(stack.sigma()).norm();
     const IntegratorSettings& integrator = scene_.simulation.integrator;

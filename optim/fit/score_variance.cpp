@@ -1,5 +1,7 @@
 #include "optim/fit/score_variance.hpp"
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -10,6 +12,9 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+// So few records or samples that the fit leaves nothing of the variance would have no standard error at all.
+constexpr double kLeastLeft = 0.05;
 
 // add(S, weight) for the sum S of the scores in each window [tau, tau + H]; the weights are the shares d tau/H of the
 // starts tau with these samples.
@@ -65,9 +70,27 @@ double ScoreVariance::kept(const VectorXd& a_J, const MatrixXd& q, bool of_one_r
   const bool within = !is_between(of_one_record);
   for_sums(a_J.asDiagonal() * q, within ? motions_ : records_, within,
            [&](const VectorXd& S, double weight) { explained += weight * S.squaredNorm(); });
-  // So few records or samples that nothing is left would have no standard error at all.
-  constexpr double kLeast = 0.05;
-  return all > 0 ? std::max(1 - explained / all, kLeast) : 1;
+  return all > 0 ? std::max(1 - explained / all, kLeastLeft) : 1;
+}
+
+VectorXd ScoreVariance::left_out(VectorXd z, const MatrixXd& J, const MatrixXd& inverse) const {
+  for (const SampledRecord& record : records_) {
+    const Index n = record.t.size();
+    std::vector<Index> acting;
+    for (Index k = 0; k < J.cols(); ++k)
+      if (!J.col(k).segment(record.first, n).isZero(0)) acting.push_back(k);
+    const Eigen::HouseholderQR<MatrixXd> qr(J(Eigen::seqN(record.first, n), acting));
+    const Index rows = std::min(n, static_cast<Index>(acting.size()));
+    const MatrixXd R = qr.matrixQR().topRows(rows).triangularView<Eigen::Upper>();
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> S(R * inverse(acting, acting) * R.transpose());
+    const VectorXd left = (1 - S.eigenvalues().array()).max(kLeastLeft);
+    auto z_w = z.segment(record.first, n);
+    const VectorXd along = S.eigenvectors().transpose() * (qr.householderQ().adjoint() * z_w).head(rows);
+    VectorXd more = VectorXd::Zero(n);
+    more.head(rows) = S.eigenvectors() * along.cwiseProduct(S.eigenvalues()).cwiseQuotient(left);
+    z_w += qr.householderQ() * more;
+  }
+  return z;
 }
 
 long ScoreVariance::freedom() const {

@@ -23,6 +23,15 @@
 //   kept = 1 - sum_p a' B(J q_p) a/sum_i (a' J_i)^2,       B(J q_p): of the scores J_i q_ip
 // by which B is divided, whatever the noise (Bell and McCaffrey, Survey Methodology 28 (2002) 169).
 //
+// A motion in several windows tells more. A wrong law has other best parameters in each window, and the fit hides this
+// best where a window decides. So z of each window w is what a fit to all others would leave, to first order, and
+// nothing is divided (CR3 of Bell and McCaffrey; Cameron and Miller, section VI.B, whose factor (W - 1)/W for W windows
+// is left out, since sums over the lag take its place):
+//   (I - H_w)^-1 z_w,   H_w = J_w (J'J)^-1 J_w' = Q_w S Q_w',   J_w = Q_w R_w,   S = R_w (J'J)^-1 R_w'
+//                     = z_w + Q_w S (I - S)^-1 Q_w' z_w
+// A window's own start, which no other shows, has the eigenvalue 1 of S. There Q_w' z_w = 0, so that the start is the
+// best one for the parameters of the others.
+//
 //   const ScoreVariance variance(CovarianceType::newey_west, {{0, t}});
 //   variance.within(scores);
 #pragma once
@@ -52,6 +61,10 @@ class ScoreVariance {
   Eigen::MatrixXd within(const Eigen::MatrixXd& scores) const;   // B of Newey and West
   Eigen::MatrixXd between(const Eigen::MatrixXd& scores) const;  // B between records
   bool is_between(bool of_one_record) const { return type_ == CovarianceType::windows && !of_one_record; }
+  // Whether a motion is in several windows, so that left_out() serves parameters that act in more than one.
+  bool has_windows() const { return records_.size() > motions_.size(); }
+  // Each record's z as a fit to the other records would leave it. inverse: (J'J)^-1, 0 of parameters held by a bound.
+  Eigen::VectorXd left_out(Eigen::VectorXd z, const Eigen::MatrixXd& J, const Eigen::MatrixXd& inverse) const;
   // The part of the variance that the fit leaves. a_J: a' J_i; q: columns.
   double kept(const Eigen::VectorXd& a_J, const Eigen::MatrixXd& q, bool of_one_record) const;
   long freedom() const;  // of the estimate of each variance

@@ -74,10 +74,18 @@ MatrixXd null_space_of(const MatrixXd& C) {
   return Q.rightCols(C.cols() - C.rows());
 }
 
-MatrixXd scores_of(const FitData& data) {
-  MatrixXd scores = influences(data).asDiagonal() * data.J;
-  scores.rowwise() -= scores.colwise().mean().eval();  // zero but for the pull of priors
+MatrixXd scores_of(const VectorXd& z, const MatrixXd& J) {
+  MatrixXd scores = z.asDiagonal() * J;
+  scores.rowwise() -= scores.colwise().mean().eval();  // zero but for the pull of priors and of bounds
   return scores;
+}
+
+// V V' where `held` rows of V stay zero.
+MatrixXd inverse_without(const MatrixXd& V, const std::vector<Index>& held) {
+  if (held.empty()) return V * V.transpose();
+  if (static_cast<Index>(held.size()) >= V.cols()) return MatrixXd::Zero(V.rows(), V.rows());
+  const MatrixXd free = V * null_space_of(V(held, Eigen::all));
+  return free * free.transpose();
 }
 
 }  // namespace
@@ -162,18 +170,27 @@ FitStatistics fit_statistics(const FitData& data) {
     MatrixXd covariance = white;
     if (sandwich) {
       const MatrixXd q = scaled * V, inverse = V * V.transpose(), a_J = scaled.topRows(N) * inverse;
-      const MatrixXd scores = scores_of(data)(Eigen::all, used) * length(used).cwiseInverse().asDiagonal();
+      const VectorXd z = influences(data);
+      const MatrixXd scores = scores_of(z, scaled.topRows(N));
       const MatrixXd within = inverse * scores_vary.within(scores) * inverse;
-      const MatrixXd between = data.covariance == CovarianceType::windows
-                                   ? MatrixXd(inverse * scores_vary.between(scores) * inverse)
-                                   : within;
+      VectorXd left_out;
+      if (scores_vary.has_windows()) {
+        std::vector<Index> held;
+        for (Index a = 0; a < U && !data.at_bound.empty(); ++a)
+          if (data.at_bound[static_cast<std::size_t>(used[static_cast<std::size_t>(a)])]) held.push_back(a);
+        left_out = scores_vary.left_out(z, scaled.topRows(N), inverse_without(V, held));
+      }
       VectorXd larger = VectorXd::Ones(U);  // standard errors than those of `within`
       for (Index a = 0; a < U; ++a) {
         const Index k = used[static_cast<std::size_t>(a)];
         const bool alone = !data.of_one_record.empty() && data.of_one_record[static_cast<std::size_t>(k)];
-        const double variance_k = scores_vary.is_between(alone) ? between(a, a) : within(a, a);
-        if (within(a, a) > 0)
-          larger(a) = std::sqrt(variance_k / (within(a, a) * scores_vary.kept(a_J.col(a), q.topRows(N), alone)));
+        const bool by_windows = !alone && scores_vary.has_windows();
+        VectorXd of_k = scores * inverse.col(a);
+        if (by_windows) of_k += a_J.col(a).cwiseProduct(left_out - z);
+        const double kept = by_windows ? 1 : scores_vary.kept(a_J.col(a), q.topRows(N), alone);
+        const double variance_k =
+            (scores_vary.is_between(alone) ? scores_vary.between(of_k) : scores_vary.within(of_k))(0, 0) / kept;
+        if (within(a, a) > 0) larger(a) = std::sqrt(variance_k / within(a, a));
       }
       covariance = larger.asDiagonal() * within * larger.asDiagonal();
       if (R > 0) {  // v^2 J_prior'J_prior, which the scaled rows have v times

@@ -55,6 +55,7 @@ struct FitData {
   std::vector<SampledRecord> records;                 // the rows of J, where it is not white
   std::vector<SampledRecord> motions;                 // the same in longer parts that are one in time, or empty
   std::vector<bool> of_one_record;                    // parameters that act in one record only
+  std::vector<bool> at_bound;                         // parameters that a bound holds; empty: none
 };
 
 struct FitStatistics {

@@ -1,5 +1,6 @@
 #include "optim/fit/score_variance.hpp"
 
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -55,6 +56,36 @@ TEST_CASE("between records the sum of each counts", "[covariance]") {
   CHECK((variance.between(s) - sums.transpose() * sums).norm() < 1e-12);
   CHECK((variance.within(s) - s.transpose() * s).norm() < 1e-12);  // a tenth of a record holds one sample
   CHECK(variance.freedom() == 2);
+}
+
+TEST_CASE("residuals of a window are what a fit to the other windows leaves", "[covariance]") {
+  // Windows of 15, 9 and 30 samples; two parameters act in all of them, one more in each.
+  const std::vector<Index> lengths{15, 9, 30};
+  const Index N = 54, P = 5;
+  MatrixXd J = normal_matrix(N, P, 5);
+  const VectorXd y = normal_matrix(N, 1, 6), t = VectorXd::LinSpaced(N, 0, 1);
+  std::vector<SampledRecord> windows;
+  for (Index first = 0, w = 0; w < 3; first += lengths[static_cast<std::size_t>(w++)]) {
+    const Index n = lengths[static_cast<std::size_t>(w)];
+    windows.push_back({first, t.segment(first, n)});
+    const VectorXd own = J.col(2 + w).segment(first, n);
+    J.col(2 + w).setZero(), J.col(2 + w).segment(first, n) = own;
+  }
+  const ScoreVariance variance(CovarianceType::newey_west, windows, {{0, t}});
+  REQUIRE(variance.has_windows());
+  CHECK_FALSE(ScoreVariance(CovarianceType::newey_west, windows).has_windows());
+  const VectorXd fit = y - J * J.householderQr().solve(y);
+  const VectorXd z = variance.left_out(fit, J, (J.transpose() * J).inverse());
+  for (std::size_t w = 0; w < 3; ++w) {  // the shared two are those of the others, its own one the best for these
+    const Index first = windows[w].first, n = lengths[w];
+    MatrixXd others = J;
+    VectorXd seen = y;
+    others.middleRows(first, n).setZero(), seen.segment(first, n).setZero();
+    const VectorXd shared = others.completeOrthogonalDecomposition().solve(seen).head(2);
+    const VectorXd own = J.col(2 + static_cast<Index>(w)).segment(first, n).normalized();
+    const VectorXd left = y.segment(first, n) - J.block(first, 0, n, 2) * shared;
+    CHECK((z.segment(first, n) - (left - own * own.dot(left))).norm() < 1e-10);
+  }
 }
 
 TEST_CASE("what the fit leaves of the variance is that of white noise", "[covariance]") {

@@ -57,6 +57,35 @@ TEST_CASE("a straight line's statistics are those of the textbook", "[statistics
   CHECK(known.ci95(1, 1) - b == Approx(1.959963984540054 * known.std_error(1)).epsilon(1e-10));
 }
 
+TEST_CASE("a bound that holds the start of a window does not widen the intervals of others",
+          "[statistics][covariance]") {
+  // Four windows of 50 samples; two parameters act in all of them, one more in each.
+  const Eigen::Index n = 50, N = 4 * n;
+  FitData data;
+  data.J = random_matrix(N, 6, 11), data.covariance = CovarianceType::newey_west;
+  const VectorXd y = random_matrix(N, 1, 12), t = VectorXd::LinSpaced(N, 0, 1);
+  for (Eigen::Index w = 0; w < 4; ++w) {
+    const VectorXd own = data.J.col(2 + w).segment(n * w, n);
+    data.J.col(2 + w).setZero(), data.J.col(2 + w).segment(n * w, n) = own;
+    data.records.push_back({n * w, t.segment(n * w, n)});
+  }
+  data.motions = {{0, t}};
+  data.names = {"a", "b", "s1", "s2", "s3", "s4"}, data.of_one_record = {false, false, true, true, true, true};
+  data.rho = data.J.householderQr().solve(y), data.z = y - data.J * data.rho;
+  const FitStatistics free = mbsopt::fit_statistics(data);
+  // The bound keeps s1 at a distance of two of its standard errors, the others are fitted again.
+  const double held = data.rho(2) + 2 * free.std_error(2);
+  const MatrixXd others = data.J(Eigen::all, std::vector<int>{0, 1, 3, 4, 5});
+  const VectorXd shifted = y - held * data.J.col(2);
+  data.z = shifted - others * others.householderQr().solve(shifted), data.rho(2) = held;
+  data.at_bound = {false, false, true, false, false, false};
+  const FitStatistics bounded = mbsopt::fit_statistics(data);
+  for (Eigen::Index k = 0; k < 2; ++k) CHECK(bounded.std_error(k) == Approx(free.std_error(k)).epsilon(0.15));
+  // At least as many held as the data determine: nothing is left out, and nothing breaks.
+  data.at_bound.assign(6, true);
+  CHECK(mbsopt::fit_statistics(data).std_error.allFinite());
+}
+
 TEST_CASE("the covariance of several parameters is s^2 (J'J)^-1, whatever their units", "[statistics]") {
   MatrixXd J = random_matrix(40, 4, 5);
   J.col(2) *= 1e7, J.col(3) *= 1e-6;
