@@ -27,7 +27,7 @@ struct LastRun {
 // Reads command and status of a run that can be resumed from result.json; both are empty if there was none.
 LastRun last_run(const std::filesystem::path& folder) {
   if (!std::filesystem::exists(folder / "result.json")) return {};
-  const Json result = Json::parse(read_text_file(folder / "result.json"), nullptr, false);
+  const Json result = read_json_or_discarded(read_text_file(folder / "result.json"));
   const auto text = [&](const char* key) {
     return result.is_object() && result.contains(key) && result[key].is_string() ? result[key].get<std::string>() : "";
   };

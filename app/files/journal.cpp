@@ -31,7 +31,7 @@ struct Line {
 };
 
 Line sealed(const Json& record, const std::string& run, const std::string& seal_before) {
-  std::string text = record.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string text = json_text(record);
   text.pop_back();  // the closing bracket
   text += fmt::format(",\"run\":\"{}\"", run);
   text += fmt::format(",\"bytes\":{}", text.size());
@@ -51,7 +51,7 @@ std::string seal_of(std::string_view line, const std::string& seal_before) {
 }
 
 Json object_of(std::string_view line) {
-  const Json json = Json::parse(line.begin(), line.end(), nullptr, false);
+  const Json json = read_json_or_discarded(line);
   return json.is_object() ? json : Json::object();
 }
 

@@ -78,7 +78,7 @@ std::string result_json_text(const Json& parts) {
     if (const auto part = parts.find(key); part != parts.end()) ordered[key] = *part;
   }
   for (const auto& [key, part] : parts.items()) ordered[key] = part;  // assigns what is there already to itself
-  return ordered.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_text(ordered, 2) + "\n";
 }
 
 }  // namespace mbsopt

@@ -1,16 +1,14 @@
 // result.json: what a run found, for scripts. Keys as in docs/cli.md, always in the same order.
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
+#include "app/files/json_text.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/simulate/simulation.hpp"
 
 namespace mbsopt {
-
-using Json = nlohmann::ordered_json;
 
 Json to_json(const ModelSummary& summary);
 Json to_json(const SimulationStatistics& statistics);

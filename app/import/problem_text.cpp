@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "app/files/json_text.hpp"
 #include "app/import/model_reader.hpp"
 #include "core/expression/expression.hpp"
 #include "core/scene/type_table.hpp"
@@ -16,7 +17,6 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-using Json = nlohmann::ordered_json;
 
 // Rotations leave some 1e-17 in entries that are 0; relative to `scale` this is rounding.
 double rounded(double value, double scale) {
@@ -200,10 +200,10 @@ class ProblemWriter {
 
 std::string one_line(const Json& json) {
   if (json.is_number_float()) return fmt::format("{}", json.get<double>());  // 0 in place of nlohmann's 0.0
-  if (!json.is_structured()) return json.dump();
+  if (!json.is_structured()) return json_text(json);
   std::string text;
   for (const auto& [key, value] : json.items())
-    text += (text.empty() ? "" : ", ") + (json.is_object() ? Json(key).dump() + ": " : "") + one_line(value);
+    text += (text.empty() ? "" : ", ") + (json.is_object() ? json_text(key) + ": " : "") + one_line(value);
   return json.is_object() ? "{" + text + "}" : "[" + text + "]";
 }
 
@@ -217,7 +217,7 @@ nlohmann::ordered_json problem_of(const ImportedModel& model, double smooth_velo
 std::string text_of(const nlohmann::ordered_json& problem) {
   std::string text;
   for (const auto& [key, value] : problem.items()) {
-    text += fmt::format("{}  {}: ", text.empty() ? "" : ",\n", Json(key).dump());
+    text += fmt::format("{}  {}: ", text.empty() ? "" : ",\n", json_text(key));
     if (!value.is_structured() || value.empty() || !value.front().is_structured()) {
       text += one_line(value);
       continue;
@@ -225,7 +225,7 @@ std::string text_of(const nlohmann::ordered_json& problem) {
     std::string entries;
     for (const auto& [name, entry] : value.items())
       entries += fmt::format("{}    {}{}", entries.empty() ? "" : ",\n",
-                             value.is_object() ? Json(name).dump() + ": " : "", one_line(entry));
+                             value.is_object() ? json_text(name) + ": " : "", one_line(entry));
     text += value.is_object() ? "{\n" + entries + "\n  }" : "[\n" + entries + "\n  ]";
   }
   return "{\n" + text + "\n}\n";

@@ -1,7 +1,8 @@
 #include "app/report/html_text.hpp"
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
+
+#include "app/files/json_text.hpp"
 
 namespace mbsopt {
 namespace {
@@ -49,7 +50,7 @@ std::string html_words(std::string_view text) {
 }
 
 std::string json_quoted(std::string_view text) {
-  std::string quoted = nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  std::string quoted = json_text(text);
   for (std::size_t at = 0; (at = quoted.find("</", at)) != std::string::npos; at += 3) quoted.insert(at + 1, 1, '\\');
   return quoted;
 }

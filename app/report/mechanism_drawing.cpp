@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <optional>
 
 #include "app/report/html_text.hpp"
@@ -108,7 +107,7 @@ std::optional<View> view_of(std::array<int, 2> plane, const std::vector<DrawnSke
 std::string path_through(const std::vector<Point2>& pixels, bool closed) {
   std::string d;
   for (std::size_t i = 0; i < pixels.size(); ++i)
-    fmt::format_to(std::back_inserter(d), "{}{:.1f} {:.1f}", i == 0 ? 'M' : 'L', pixels[i].x(), pixels[i].y());
+    d += fmt::format("{}{:.1f} {:.1f}", i == 0 ? 'M' : 'L', pixels[i].x(), pixels[i].y());
   return closed ? d + "Z" : d;
 }
 

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
-#include <iterator>
 
 namespace mbsopt {
 
@@ -13,7 +12,7 @@ std::size_t PageArrays::add(const std::vector<double>& values, int digits) {
   for (const double value : values) {
     if (text.size() > 1) text += ',';
     if (std::isfinite(value)) {
-      fmt::format_to(std::back_inserter(text), "{:.{}g}", value, digits);
+      text += fmt::format("{:.{}g}", value, digits);
     } else {
       text += "null";
     }

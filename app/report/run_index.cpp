@@ -34,7 +34,7 @@ std::vector<StoredRun> runs_in(const fs::path& folder) {
     if (!fs::exists(entry.path() / "result.json", ignored)) continue;
     Json result;
     try {
-      result = Json::parse(content_of_regular_file(entry.path() / "result.json", kLargest), nullptr, false);
+      result = read_json_or_discarded(content_of_regular_file(entry.path() / "result.json", kLargest));
     } catch (const FileError&) {
       continue;
     }
@@ -94,7 +94,7 @@ std::string run_index(const fs::path& folder) {
     compared.push_back({{"name", run.folder}, {"numbers", numbers_of(run.result)}});
   }
   page.table({"folder", "command", "status", "warnings"}, rows);
-  if (runs.size() > 1) page.comparison(compared.dump(-1, ' ', false, Json::error_handler_t::replace));
+  if (runs.size() > 1) page.comparison(json_text(compared));
   return page.text();
 }
 

@@ -302,9 +302,9 @@ std::string residuals_csv(const IdentificationResult& fit) {
   std::string text = "experiment,channel,t,measured,model,residual,prediction\n";
   for (const ResidualRow& row : fit.residuals) {
     const ExperimentFit& experiment = fit.experiments[row.experiment];
-    fmt::format_to(std::back_inserter(text), "{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n",
-                   csv_cell(experiment.name), csv_cell(experiment.channels[row.channel].column), row.t, row.measured,
-                   row.model, row.scaled, row.prediction);
+    text += fmt::format("{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", csv_cell(experiment.name),
+                        csv_cell(experiment.channels[row.channel].column), row.t, row.measured, row.model, row.scaled,
+                        row.prediction);
   }
   return text;
 }
@@ -315,9 +315,8 @@ std::string profile_csv(const IdentificationResult& fit) {
   text += '\n';
   for (const ParameterProfile& profile : fit.profiles) {
     for (const ParameterProfile::Point& p : profile.points) {
-      fmt::format_to(std::back_inserter(text), "{},{:.17g},{:.17g},{:.17g}", csv_cell(profile.name), p.value, p.cost,
-                     p.tau);
-      for (const double x : p.parameters) fmt::format_to(std::back_inserter(text), ",{:.17g}", x);
+      text += fmt::format("{},{:.17g},{:.17g},{:.17g}", csv_cell(profile.name), p.value, p.cost, p.tau);
+      for (const double x : p.parameters) text += fmt::format(",{:.17g}", x);
       text += '\n';
     }
   }

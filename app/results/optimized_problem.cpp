@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <map>
-#include <nlohmann/json.hpp>
 
+#include "app/files/json_text.hpp"
 #include "app/json/edit_text.hpp"
 #include "app/json/source_text.hpp"
 #include "app/run/run.hpp"
@@ -13,16 +13,14 @@
 namespace mbsopt {
 namespace {
 
-nlohmann::json json_of(const Field& field) {
-  return field.is_number() ? nlohmann::json(field.number()) : nlohmann::json(field.text());
-}
+Json json_of(const Field& field) { return field.is_number() ? Json(field.number()) : Json(field.text()); }
 template <std::size_t N>
-nlohmann::json json_of(const std::array<Field, N>& fields) {
-  nlohmann::json json = nlohmann::json::array();
+Json json_of(const std::array<Field, N>& fields) {
+  Json json = Json::array();
   for (const Field& field : fields) json.push_back(json_of(field));
   return json;
 }
-nlohmann::json json_of(const OrientationField& field) {
+Json json_of(const OrientationField& field) {
   if (const auto* const e = std::get_if<EulerParametersField>(&field)) return json_of(e->e);
   if (const auto* const a = std::get_if<AxisAngleField>(&field))
     return {{"axis", json_of(a->axis)}, {"angle", json_of(a->angle)}};
@@ -50,8 +48,8 @@ std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& 
   std::string text = optimized_problem_text(options.problem_file, options.sets, run.problem, values, run.folder.path());
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const std::string body = child_path("bodies", i);
-    text = with_value(text, body + ".position", json_of(poses[i].position).dump());
-    text = with_value(text, body + ".orientation", json_of(poses[i].orientation).dump());
+    text = with_value(text, body + ".position", json_text(json_of(poses[i].position)));
+    text = with_value(text, body + ".orientation", json_text(json_of(poses[i].orientation)));
   }
   return text;
 }
@@ -71,15 +69,15 @@ std::string optimized_problem_text(const std::string& problem_file, const std::v
     return std::filesystem::relative(file, std::filesystem::canonical(folder)).generic_string();
   };
   const auto moved = [&](const std::string& path, const std::string& file) {
-    text = with_value(text, path, nlohmann::json(relative_to_folder(file)).dump());
+    text = with_value(text, path, json_text(relative_to_folder(file)));
   };
   const auto moved_law = [&](const std::string& place, const std::optional<SampledLaw>& law) {
     if (law) moved(place + ".law.csv", law->file);
   };
   if (!problem.plugins.empty()) {
-    nlohmann::json plugins = nlohmann::json::array();
+    Json plugins = Json::array();
     for (const std::string& file : problem.plugins) plugins.push_back(relative_to_folder(file));
-    text = with_value(text, "plugins", plugins.dump());
+    text = with_value(text, "plugins", json_text(plugins));
   }
   const std::vector<Drive>& drives = problem.scene.drives;
   const auto laws_moved = [&](const std::vector<DriveLaw>& laws, const std::string& owner) {
@@ -103,9 +101,9 @@ std::string optimized_problem_text(const std::string& problem_file, const std::v
   for (std::size_t i = 0; i < problem.identification->experiments.size(); ++i) {
     const ExperimentSpec& experiment = problem.identification->experiments[i];
     const std::string place = experiment_path(i);
-    nlohmann::json data = nlohmann::json::array();
+    Json data = Json::array();
     for (const std::string& file : experiment.data) data.push_back(relative_to_folder(file));
-    text = with_value(text, place + ".data", (data.size() == 1 ? data[0] : data).dump());
+    text = with_value(text, place + ".data", json_text(data.size() == 1 ? data[0] : data));
     laws_moved(experiment.drives, place);
     signals_moved(experiment.signals, place);
   }

@@ -10,7 +10,7 @@ namespace {
 std::string text_of(const Json& object) {
   std::string text;
   for (const auto& [key, value] : object.items())
-    text += (text.empty() ? "" : ", ") + Json(key).dump() + ": " + value.dump();
+    text += (text.empty() ? "" : ", ") + json_text(key) + ": " + json_text(value);
   return "{" + text + "}";
 }
 

@@ -6,10 +6,10 @@
 
 #include <algorithm>
 #include <array>
-#include <nlohmann/json.hpp>
 
 #include "app/files/atomic_file.hpp"
 #include "app/files/journal.hpp"
+#include "app/files/json_text.hpp"
 #include "optim/problem/regular_file.hpp"
 
 namespace mbsopt {
@@ -35,15 +35,15 @@ struct StoredRun {
   std::string owner, command;
 };
 
-std::string text_at(const nlohmann::json& object, const char* key) {
+std::string text_at(const Json& object, const char* key) {
   const auto found = object.is_object() ? object.find(key) : object.end();
   return found != object.end() && found->is_string() ? found->get<std::string>() : std::string{};
 }
 
 StoredRun stored_run(const fs::path& file) {
-  nlohmann::json result;
+  Json result;
   try {
-    result = nlohmann::json::parse(content_of_regular_file(file), nullptr, false);
+    result = read_json_or_discarded(content_of_regular_file(file));
   } catch (const FileError&) {
     return {};
   }

@@ -33,7 +33,7 @@ std::tuple<int, double, double, int> rank(const Json& record) {
 }
 
 Json record_of(const JobReply& reply) {
-  if (reply.ok) return Json::parse(reply.text);
+  if (reply.ok) return read_json(reply.text);
   return {{"start", reply.job}, {"status", "failed"}, {"message", reply.text}, {"objective", nullptr}};
 }
 

@@ -54,7 +54,7 @@ class Server {
 
   void run() {
     while (!dismissed_) {
-      while (const std::optional<Ranks::Message> message = ranks_.receive()) take(Json::parse(message->text));
+      while (const std::optional<Ranks::Message> message = ranks_.receive()) take(read_json(message->text));
       start_what_waits();
       send_what_has_ended();
       if (interrupted() && !told_of_interrupt_) {
@@ -66,7 +66,7 @@ class Server {
   }
 
  private:
-  void tell(const Json& message) { ranks_.send(0, message.dump(-1, ' ', false, Json::error_handler_t::replace)); }
+  void tell(const Json& message) { ranks_.send(0, json_text(message)); }
 
   void take(const Json& message) {
     if (message.contains("dismissed")) dismissed_ = true;
@@ -75,7 +75,7 @@ class Server {
       if (message.contains("work")) {
         const Json& work = message["work"];
         pool_.emplace(work.at("workers").get<int>(),
-                      [record = work_of(work, terms_)](int start) { return record(start).dump(); });
+                      [record = work_of(work, terms_)](int start) { return json_text(record(start)); });
       }
       if (message.contains("start") && pool_) waiting_.push_back(message["start"].get<int>());
     } catch (const std::exception& error) {
@@ -123,7 +123,7 @@ int serve(Ranks& ranks, const NamedTerms& terms) {
 }
 
 void dismiss(Ranks& ranks) {
-  for (int rank = 1; rank < ranks.size(); ++rank) ranks.send(rank, Json{{"dismissed", true}}.dump());
+  for (int rank = 1; rank < ranks.size(); ++rank) ranks.send(rank, json_text(Json{{"dismissed", true}}));
 }
 
 }  // namespace mbsopt

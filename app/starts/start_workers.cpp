@@ -44,7 +44,7 @@ class OtherRanks {
   OtherRanks(Ranks& ranks, int workers) : ranks_(ranks), workers_(workers), busy_(ranks_size(), 0) {}
 
   void tell(const Json& message) {
-    for (int rank = 1; rank < ranks_.size(); ++rank) ranks_.send(rank, message.dump());
+    for (int rank = 1; rank < ranks_.size(); ++rank) ranks_.send(rank, json_text(message));
   }
   bool idle() const {
     return std::all_of(busy_.begin(), busy_.end(), [](int jobs) { return jobs == 0; });
@@ -53,14 +53,14 @@ class OtherRanks {
   bool start(int job) {
     const auto least = std::min_element(busy_.begin() + 1, busy_.end());
     if (*least >= workers_) return false;
-    ranks_.send(static_cast<int>(least - busy_.begin()), Json{{"start", job}}.dump());
+    ranks_.send(static_cast<int>(least - busy_.begin()), json_text(Json{{"start", job}}));
     ++*least;
     return true;
   }
   std::vector<JobReply> ended() {
     std::vector<JobReply> replies;
     while (const std::optional<Ranks::Message> message = ranks_.receive()) {
-      const Json json = Json::parse(message->text);
+      const Json json = read_json(message->text);
       if (json.contains("failed"))
         throw std::runtime_error(fmt::format("rank {}: {}", message->from, json["failed"].get<std::string>()));
       if (json.contains("interrupted")) interrupt();  // who ends one rank, ends the run
@@ -83,7 +83,7 @@ void compute_on_ranks(Run& run, Ranks& ranks, int workers, const std::vector<int
                       const std::function<void(const JobReply&)>& done, const std::function<void()>& waiting) {
   OtherRanks others(ranks, workers);
   others.tell(work_message(run, work.task, workers));
-  ProcessPool here(workers, [&](int start) { return work.record(start).dump(); });
+  ProcessPool here(workers, [&](int start) { return json_text(work.record(start)); });
   auto next = starts.begin();
   std::optional<Clock::time_point> stopped;
   while (!here.idle() || !others.idle() || (next != starts.end() && !stopped)) {
@@ -113,7 +113,7 @@ void compute_starts(Run& run, const std::vector<int>& starts, const StartWork& w
                     const std::function<void(const JobReply&)>& done, const std::function<void()>& waiting) {
   if (run.context.ranks) return compute_on_ranks(run, *run.context.ranks, workers_of(run), starts, work, done, waiting);
   run_in_processes(
-      starts, workers_of(run), [&](int start) { return work.record(start).dump(); }, done,
+      starts, workers_of(run), [&](int start) { return json_text(work.record(start)); }, done,
       [&] {
         waiting();
         return !interrupted();

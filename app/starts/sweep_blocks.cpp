@@ -120,7 +120,7 @@ std::vector<SweepRow> swept(Run& run, LongRun& long_run, const SweepPoints& poin
             rows[i + k].done = true, rows[i + k].message = reply.text;
           return;
         }
-        const Json record = Json::parse(reply.text);
+        const Json record = read_json(reply.text);
         take(record);
         if (record["status"] == "ok") long_run.add("start", record);
         ++done;

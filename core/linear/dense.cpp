@@ -46,6 +46,11 @@ Eigen::VectorXcd left_eigenvector(const MatrixXd& A, std::complex<double> lambda
   return w;
 }
 
+MatrixXd cholesky_factor(const MatrixXd& A) {
+  const Eigen::LLT<MatrixXd> factor(A);
+  return factor.info() == Eigen::Success ? MatrixXd(factor.matrixL()) : MatrixXd();
+}
+
 VectorXd cholesky_solve(const MatrixXd& A, const VectorXd& b) { return A.llt().solve(b); }
 
 VectorXd definite_solve(const MatrixXd& A, const VectorXd& b, double threshold) {
@@ -146,6 +151,15 @@ MatrixXd orthonormal_columns(const MatrixXd& A) {
   const Eigen::ColPivHouseholderQR<MatrixXd> qr(A);
   const MatrixXd AP = A * qr.colsPermutation(), R = qr.matrixR().topRows(A.cols());
   return R.triangularView<Eigen::Upper>().solve<Eigen::OnTheRight>(AP);
+}
+
+MatrixXd triangular_factor(MatrixXd A) {
+  const Index rows = std::min(A.rows(), A.cols());
+  return Eigen::HouseholderQR<MatrixXd>(std::move(A)).matrixQR().topRows(rows).triangularView<Eigen::Upper>();
+}
+
+MatrixXd orthogonal_factor(const MatrixXd& A) {
+  return Eigen::HouseholderQR<MatrixXd>(A).householderQ() * MatrixXd::Identity(A.rows(), A.cols());
 }
 
 LeftSingular left_singular(const MatrixXd& A) {

@@ -28,6 +28,9 @@ GeneralEigen general_eigen(const Eigen::MatrixXd& A);
 // w with w'A = lambda w' for a simple eigenvalue lambda, by inverse iteration; of unit length.
 Eigen::VectorXcd left_eigenvector(const Eigen::MatrixXd& A, std::complex<double> lambda);
 
+// L of A = L L', lower triangular; empty where A, which is symmetric, is not positive definite.
+Eigen::MatrixXd cholesky_factor(const Eigen::MatrixXd& A);
+
 // Solves A x = b of a symmetric positive definite A by Cholesky.
 Eigen::VectorXd cholesky_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
 // As above; returns an empty vector if a pivot is not positive, or below this part of the largest.
@@ -40,6 +43,10 @@ Eigen::MatrixXd null_space(const Eigen::MatrixXd& A, double threshold);
 // A basis of the range of A, whose columns are independent: A times the inverse of its triangular factor, so that small
 // rows keep their digits.
 Eigen::MatrixXd orthonormal_columns(const Eigen::MatrixXd& A);
+
+// A = Q R by Householder's reflections.
+Eigen::MatrixXd triangular_factor(Eigen::MatrixXd A);         // R, of min(rows, columns) rows
+Eigen::MatrixXd orthogonal_factor(const Eigen::MatrixXd& A);  // Q, of the shape of A, rows >= columns
 
 // A = U diag(values) V', all columns of U, values descending. For small matrices.
 struct LeftSingular {

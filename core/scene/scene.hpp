@@ -245,7 +245,15 @@ struct Condition {
   std::optional<Field> acceleration = {};  // of kinematics only (kinematic_scene.hpp)
 };
 
+// Its constructors are compiled once, in scene.cpp: inline they are a quarter of each source that copies a scene.
 struct Scene {
+  Scene();
+  Scene(const Scene&);
+  Scene(Scene&&) noexcept;
+  Scene& operator=(const Scene&);
+  Scene& operator=(Scene&&) noexcept;
+  ~Scene();
+
   std::string name = "unnamed";
   VectorField gravity{0.0, 0.0, -9.81};
   std::vector<Parameter> parameters;

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -11,6 +9,7 @@
 #include <set>
 
 #include "core/expression/did_you_mean.hpp"
+#include "core/linear/dense.hpp"
 #include "optim/fit/sums_of_products.hpp"
 
 namespace mbsopt {
@@ -26,8 +25,7 @@ bool is_near(double a, double b) { return std::abs(a - b) <= kPart * std::max({1
 
 // Orthogonal projector onto the directions.
 MatrixXd projector(const MatrixXd& null_space) {
-  const MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(null_space).householderQ() *
-                     MatrixXd::Identity(null_space.rows(), null_space.cols());
+  const MatrixXd Q = orthogonal_factor(null_space);
   return Q * Q.transpose();
 }
 
@@ -63,9 +61,9 @@ class Group {
       units_.push_back(units.empty() ? "" : units[static_cast<std::size_t>(k)]);
     }
     // A projector's singular values are 1 and 0.
-    const Eigen::JacobiSVD<MatrixXd> svd(inside, Eigen::ComputeFullU);
-    const Index free = (svd.singularValues().array() > 0.5).count();
-    Q_ = svd.matrixU().rightCols(c - free);
+    const LeftSingular svd = left_singular(inside);
+    const Index free = (svd.values.array() > 0.5).count();
+    Q_ = svd.U.rightCols(c - free);
     rows_ = reduced_rows(Q_.transpose(), pivots_);
   }
 

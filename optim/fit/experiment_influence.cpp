@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/linear/dense.hpp"
 #include "optim/fit/determined_combinations.hpp"
 #include "optim/solver/bounded_linear_least_squares.hpp"
 
@@ -31,8 +32,7 @@ Rows together(const Rows& a, const Rows& b) {
   all.topLeftCorner(a.T.rows(), n) = a.T, all.topRightCorner(a.T.rows(), 1) = a.p;
   all.bottomLeftCorner(b.T.rows(), n) = b.T, all.bottomRightCorner(b.T.rows(), 1) = b.p;
   if (rows <= n) return {all.leftCols(n), all.rightCols(1)};
-  const Eigen::HouseholderQR<MatrixXd> qr(std::move(all));
-  const MatrixXd R = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
+  const MatrixXd R = triangular_factor(std::move(all)).topRows(n);
   return {R.leftCols(n), R.rightCols(1)};
 }
 
@@ -92,8 +92,7 @@ std::vector<VectorXd> changes_without(const ExperimentStack& stack, const LeastS
     MatrixXd J(rows, columns + 1);
     J.leftCols(columns) = w(rows_here).asDiagonal() * z_x(rows_here, order);
     J.rightCols(1) = w(rows_here).cwiseProduct(z(rows_here));
-    const Eigen::HouseholderQR<MatrixXd> qr(std::move(J));
-    const MatrixXd R = qr.matrixQR().topRows(std::min(rows, columns)).triangularView<Eigen::Upper>();
+    const MatrixXd R = triangular_factor(std::move(J)).topRows(std::min(rows, columns));
     const Index left = std::max<Index>(R.rows() - own, 0);
     Rows& rest = parts.emplace_back(Rows{MatrixXd::Zero(left, n), R.bottomRows(left).rightCols(1)});
     rest.T(Eigen::all, here) = R.bottomRows(left).middleCols(own, columns - own);

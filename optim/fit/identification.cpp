@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <memory>
 #include <mutex>
@@ -12,7 +11,9 @@
 
 #include "core/expression/counted.hpp"
 #include "core/expression/did_you_mean.hpp"
+#include "core/linear/dense.hpp"
 #include "optim/fit/angle_doubts.hpp"
+#include "optim/fit/distributions.hpp"
 #include "optim/fit/experiment_influence.hpp"
 #include "optim/fit/experiment_stack.hpp"
 #include "optim/fit/profile_likelihood.hpp"
@@ -508,7 +509,7 @@ class Identification {
     Eigen::MatrixXd J = z_in_parameters(whole, point, rho);
     if (F > 0) {
       const Eigen::MatrixXd J_f = J.leftCols(F), J_s = J.rightCols(J.cols() - F);
-      J.rightCols(J.cols() - F) -= J_f * J_f.completeOrthogonalDecomposition().solve(J_s);
+      J.rightCols(J.cols() - F) -= J_f * OrthogonalDecomposition(J_f).solve(J_s);
     }
     Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(J.cols(), J.cols());
     if (F > 0) covariance.topLeftCorner(F, F) = own.covariance;
@@ -531,7 +532,7 @@ class Identification {
     result_.experiments[e].rms_scaled_at_start = std::sqrt(squares_at_start / n);
     const long P = std::ranges::count_if(result_.parameters, [](const auto& p) { return p.experiment.empty(); });
     if (!s.none.empty() || P == 0 || !(result_.cost_final < result_.cost_initial)) return;
-    const double chi2 = boost::math::quantile(boost::math::chi_squared(static_cast<double>(P)), kWorse);
+    const double chi2 = chi_squared_quantile(static_cast<double>(P), kWorse);
     const double expected = chi2 * s.likelihood_scale * std::max(1.0, s.inflation.maxCoeff()) *
                             std::max(1.0, n / static_cast<double>(result_.samples));
     if (squares - squares_at_start > expected)

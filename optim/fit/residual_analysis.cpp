@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
+
+#include "optim/fit/distributions.hpp"
 
 namespace mbsopt {
 namespace {
@@ -27,7 +27,7 @@ void count_runs(const Eigen::VectorXd& z, ResidualAnalysis& a) {
   const double mean = 2 * above * below / n + 1, variance = (mean - 1) * (mean - 2) / (n - 1);
   if (variance > 0) {
     a.runs_z = (static_cast<double>(a.runs) - mean) / std::sqrt(variance);
-    a.runs_p = 2 * boost::math::cdf(boost::math::complement(boost::math::normal(), std::abs(a.runs_z)));
+    a.runs_p = 2 * normal_tail(std::abs(a.runs_z));
   } else {
     a.runs_p = 0;  // all of one sign
   }
@@ -51,7 +51,7 @@ ResidualAnalysis analyse_residuals(const Eigen::VectorXd& z) {
     if (k == 1) a.autocorrelation = r;
     a.ljung_box += static_cast<double>(n * (n + 2)) * r * r / static_cast<double>(n - k);
   }
-  a.ljung_box_p = boost::math::cdf(boost::math::complement(boost::math::chi_squared(a.lags), a.ljung_box));
+  a.ljung_box_p = chi_squared_tail(a.lags, a.ljung_box);
   return a;
 }
 

@@ -1,6 +1,6 @@
 #include "optim/fit/state_chart.hpp"
 
-#include <Eigen/QR>
+#include "core/linear/dense.hpp"
 
 namespace mbsopt {
 
@@ -9,7 +9,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 StateChart::StateChart(const VectorXd& y, const MatrixXd& y_u)
-    : y0_(y), W_(y_u.completeOrthogonalDecomposition().pseudoInverse()) {}
+    : y0_(y), W_(OrthogonalDecomposition(y_u).solve(MatrixXd::Identity(y.size(), y.size()))) {}
 
 void StateChart::read(const VectorXd& y, const MatrixXd& y_rho, VectorXd& s, MatrixXd& s_rho) const {
   const Index bodies = y.size() / 14;

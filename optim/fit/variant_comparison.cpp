@@ -1,7 +1,8 @@
 #include "optim/fit/variant_comparison.hpp"
 
-#include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
+
+#include "optim/fit/distributions.hpp"
 
 namespace mbsopt {
 namespace {
@@ -59,7 +60,7 @@ VariantComparison compare_variants(const IdentificationResult& first, const Iden
         "fit ended in another minimum";
     return test;
   }
-  test.p = boost::math::cdf(boost::math::complement(boost::math::fisher_f(more, freedom), test.F));
+  test.p = f_tail(more, freedom, test.F);
   return test;
 }
 

@@ -187,7 +187,14 @@ struct ExperimentSpec {
 // be anything within an experiment, but is independent between experiments. automatic: by tests of the residuals.
 enum class CovarianceType { automatic, white, newey_west, windows };
 
-struct IdentificationSpec {
+struct IdentificationSpec {  // constructors: problem.cpp, as those of Scene
+  IdentificationSpec();
+  IdentificationSpec(const IdentificationSpec&);
+  IdentificationSpec(IdentificationSpec&&) noexcept;
+  IdentificationSpec& operator=(const IdentificationSpec&);
+  IdentificationSpec& operator=(IdentificationSpec&&) noexcept;
+  ~IdentificationSpec();
+
   std::vector<ExperimentSpec> experiments;
   std::vector<std::string> variables;
   bool sigma_is_known = false;
@@ -198,7 +205,14 @@ struct IdentificationSpec {
   int max_iterations = 100;
 };
 
-struct Problem {
+struct Problem {  // constructors: likewise
+  Problem();
+  Problem(const Problem&);
+  Problem(Problem&&) noexcept;
+  Problem& operator=(const Problem&);
+  Problem& operator=(Problem&&) noexcept;
+  ~Problem();
+
   Scene scene;
   std::vector<ObjectiveSpec> objectives;
   std::vector<CaseSpec> cases;  // load_cases.hpp

@@ -1,6 +1,5 @@
 #include "optim/solver/ipopt_solver.hpp"
 
-#include <Eigen/Cholesky>
 #include <coin/IpIpoptApplication.hpp>
 #include <coin/IpTNLP.hpp>
 
@@ -15,6 +14,7 @@
 #include <vector>
 
 #include "core/expression/counted.hpp"
+#include "core/linear/dense.hpp"
 #include "optim/solver/evaluated_points.hpp"
 #include "optim/solver/optimality.hpp"
 #include "optim/solver/search_watch.hpp"
@@ -232,7 +232,7 @@ class Adapter : public Ipopt::TNLP {
     const Eigen::MatrixXd& of_f = hessians_.of[0];
     if (problem_.constraints() > 0) return of_f;
     if (options_.gauss_newton && secants_.contradicts(of_f)) return secants_.matrix_from(of_f);
-    if (Eigen::LLT<Eigen::MatrixXd>(of_f).info() == Eigen::Success) return hessians_.third_order.value_or(of_f);
+    if (cholesky_factor(of_f).size() > 0) return hessians_.third_order.value_or(of_f);
     return secants_.matrix();
   }
 

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <exception>
@@ -11,6 +9,7 @@
 #include <utility>
 
 #include "core/expression/counted.hpp"
+#include "core/linear/dense.hpp"
 #include "optim/solver/bounded_linear_least_squares.hpp"
 
 namespace mbsopt {
@@ -42,9 +41,8 @@ struct Triangle {
 // J: columns of these variables, then z.
 Triangle triangle(std::vector<Index> variables, MatrixXd J) {
   const Index n = J.cols() - 1, rows = std::min(J.rows(), n);
-  const Eigen::HouseholderQR<MatrixXd> qr(std::move(J));
-  return {{std::move(variables), qr.matrixQR().topLeftCorner(rows, n).triangularView<Eigen::Upper>()},
-          qr.matrixQR().rightCols(1).topRows(rows)};
+  const MatrixXd R = triangular_factor(std::move(J));
+  return {{std::move(variables), R.topLeftCorner(rows, n)}, R.rightCols(1).topRows(rows)};
 }
 
 struct LinearModel {
@@ -275,15 +273,15 @@ class Search {
     const VectorXd inverse = D.cwiseInverse();
     MatrixXd H = inverse.asDiagonal() * (model.squares() + learnt_.S.matrix()) * inverse.asDiagonal();
     H.diagonal().array() += lambda;
-    Eigen::LLT<MatrixXd> L(H);
-    while (L.info() != Eigen::Success) {
+    MatrixXd L = cholesky_factor(H);
+    while (L.size() == 0) {
       const double larger = std::max(kRise * lambda, kFirstRise);
       H.diagonal().array() += larger - lambda;
       lambda = larger;
-      L.compute(H);
+      L = cholesky_factor(H);
     }
-    const VectorXd b = -L.matrixL().solve(inverse.cwiseProduct(model.gradient));
-    return bounded_linear_least_squares(RowBlocks(MatrixXd(L.matrixU())), b, lower, upper).cwiseQuotient(D);
+    const VectorXd b = -L.triangularView<Eigen::Lower>().solve(inverse.cwiseProduct(model.gradient));
+    return bounded_linear_least_squares(RowBlocks(MatrixXd(L.transpose())), b, lower, upper).cwiseQuotient(D);
   }
 
   // One length for all variables in units of their ranges, the least of their columns.

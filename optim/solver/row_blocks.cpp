@@ -1,12 +1,13 @@
 #include "optim/solver/row_blocks.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
 #include <set>
 #include <utility>
+
+#include "core/linear/dense.hpp"
 
 namespace mbsopt {
 
@@ -95,8 +96,7 @@ Eliminated eliminate(std::vector<Index> own, const std::vector<Remainder>& parts
     A_b.rightCols(1).middleRows(rows, part.A_b.rows()) = part.A_b.rightCols(1);
     rows += part.A_b.rows();
   }
-  const Eigen::HouseholderQR<MatrixXd> qr(std::move(A_b));
-  const MatrixXd R = qr.matrixQR().topRows(std::min(rows, n)).triangularView<Eigen::Upper>();
+  const MatrixXd R = triangular_factor(std::move(A_b)).topRows(std::min(rows, n));
   left = {{others.begin(), others.end()}, R.bottomRows(R.rows() - m).rightCols(n - m + 1)};
   return {std::move(own), left.columns, R.topRows(m)};
 }

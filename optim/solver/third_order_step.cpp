@@ -1,9 +1,10 @@
 #include "optim/solver/third_order_step.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "core/linear/dense.hpp"
 
 namespace mbsopt {
 namespace {
@@ -36,10 +37,10 @@ std::optional<VectorXd> newton_step(const NonlinearProgram& problem, const Vecto
     if (room > kTouches * std::max(1.0, std::abs(x(k)))) free.push_back(k);
   }
   if (free.empty()) return std::nullopt;
-  const Eigen::LLT<MatrixXd> factor(H(free, free));
-  if (factor.info() != Eigen::Success) return std::nullopt;
+  const VectorXd H_f_x = definite_solve(H(free, free), f_x(free), 0);
+  if (H_f_x.size() == 0) return std::nullopt;
   VectorXd d = VectorXd::Zero(x.size());
-  d(free) = -factor.solve(VectorXd(f_x(free)));
+  d(free) = -H_f_x;
   const VectorXd there = x + d;
   const bool within =
       (there.array() >= problem.x_lower.array()).all() && (there.array() <= problem.x_upper.array()).all();
@@ -56,7 +57,7 @@ std::optional<MatrixXd> third_order_hessian(const MatrixXd& H, const VectorXd& d
   const std::optional<double> beta = along(tau);
   if (!beta) return std::nullopt;
   const double half = *beta * *beta / 2;
-  const VectorXd across = half * (Eigen::LLT<MatrixXd>(H_free).solve(t_free) - tau * d_free);
+  const VectorXd across = half * (cholesky_solve(H_free, t_free) - tau * d_free);
   if (!(across.dot(H_free * across) <= *beta * *beta * dHd)) return std::nullopt;
   VectorXd s = VectorXd::Zero(d.size());
   s(free) = *beta * d_free - across;

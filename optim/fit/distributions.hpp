@@ -1,0 +1,13 @@
+// Quantiles and tails of distributions, from Boost, whose functions take seconds to compile.
+#pragma once
+
+namespace mbsopt {
+
+double chi_squared_quantile(double degrees_of_freedom, double probability);
+
+// The probability of a value above x.
+double chi_squared_tail(double degrees_of_freedom, double x);
+double normal_tail(double x);
+double f_tail(double degrees1, double degrees2, double x);  // of the F distribution
+
+}  // namespace mbsopt
