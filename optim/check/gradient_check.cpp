@@ -181,7 +181,7 @@ class Check {
     set_ratio(result_.frozen_cost), set_ratio(result_.free_cost);
   }
 
-  // Where a difference disagrees.
+  // Repeats differences that disagree, by smaller steps. Returns whether one of them changed.
   bool difference_finer() {
     bool found = false;
     for (Index k = 0; k < rho_.size(); ++k) {

@@ -413,6 +413,7 @@ DifferenceComparison comparison_at(const Evaluation& start, const Evaluator& eva
   comparison.f = start.psi, comparison.f_rho = start.psi_rho;
   std::vector<std::string> names;
   for (const ComparedVariable& v : comparison.variables) names.push_back(v.name);
+  // One evaluator for all differences, which keeps its last point: threads stays 1.
   const auto there = std::make_shared<Evaluator>(scene, evaluator.objectives(), names, evaluator.options());
   comparison.at = [&start, &evaluator, there](std::size_t k, double h) -> std::optional<Eigen::VectorXd> {
     Eigen::VectorXd rho = start.rho;

@@ -35,7 +35,7 @@ class Comparison {
  public:
   explicit Comparison(const DifferenceComparison& of) : of_(of) {}
 
-  // What there is to say of a variable; threads may ask, for variables each.
+  // Returns the warnings about one variable. Threads may call it at a time, each for another variable.
   std::vector<std::string> sentences(std::size_t variable);
 
  private:

@@ -42,7 +42,8 @@ struct DifferenceComparison {
   // f and its derivatives with ten times tighter tolerances (what differs is the integrator's error); false: not known.
   std::function<bool(Eigen::VectorXd& f, Eigen::MatrixXd& f_rho)> tighter;
   std::function<bool()> go_on = {};  // false: abandon the comparison
-  int threads = 1;                   // that call `at`, `tighter` and `go_on`, for variables each
+  // So many threads call `at`, `tighter` and `go_on` at a time. Above 1 these functions have to be thread-safe.
+  int threads = 1;
 
   // Returns a sentence for each variable that disagrees or could not be compared.
   std::vector<std::string> warnings() const;

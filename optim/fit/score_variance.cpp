@@ -79,6 +79,7 @@ VectorXd ScoreVariance::left_out(VectorXd z, const MatrixXd& J, const MatrixXd& 
     std::vector<Index> acting;
     for (Index k = 0; k < J.cols(); ++k)
       if (!J.col(k).segment(record.first, n).isZero(0)) acting.push_back(k);
+    if (acting.empty()) continue;  // nothing is fitted to it
     const Eigen::HouseholderQR<MatrixXd> qr(J(Eigen::seqN(record.first, n), acting));
     const Index rows = std::min(n, static_cast<Index>(acting.size()));
     const MatrixXd R = qr.matrixQR().topRows(rows).triangularView<Eigen::Upper>();

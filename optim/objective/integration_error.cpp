@@ -33,7 +33,7 @@ Scene with_errors_times(double factor, Scene scene, long steps) {
   if (const Method* method = runge_kutta_method(s.type)) {
     const double ratio = std::pow(factor, 1.0 / method->order);
     if (s.max_step) *s.max_step *= ratio;
-    if (steps > 0 && factor < 1) {
+    if (steps > 0 && factor < 1 && !s.step) {
       const double span = scene.simulation.end_time - scene.simulation.start_time;
       s.max_step = std::min(s.max_step.value_or(span), ratio * span / static_cast<double>(steps));
     }

@@ -36,7 +36,7 @@ class DataCheck {
     for (std::size_t c = 0; c < experiment_.channels.size(); ++c) check_column(c);
     if (issues_.empty()) attempt(place_ + ".data", [&] { ascending_times(data_, experiment_.time); });
     if (issues_.empty()) check_samples();
-    if (issues_.empty())
+    if (std::ranges::all_of(issues_, &SceneIssue::is_warning))
       for (std::size_t c = 0; c < experiment_.channels.size(); ++c) check_values(c);
     return std::move(issues_);
   }
@@ -129,18 +129,18 @@ class DataCheck {
                "lasts {:.6g} s: all the time before would be simulated. Take the first time off "
                "the column '{}' (\"time_zero\": \"first\" does), or say by \"start_time\" where the experiment begins",
                place, first - start_, start_, span, experiment_.time)});
-    else if (span > kLong && experiment_.time_unit.empty() && !time_has_unit())
-      issues_.push_back({place_ + ".time",
-                         fmt::format("{}: the record lasts {:.6g} s, {:.3g} days: is '{}' in s? Its unit in the header "
-                                     "or in \"time_unit\" (\"s\", \"ms\") tells",
-                                     place, span, span / 86400, experiment_.time),
-                         true});
     else if (last - start_ < kResolved * std::max(std::abs(start_), std::abs(last)))
       issues_.push_back(
           {place_ + ".data",
            fmt::format("{}: times about {:.6g} s do not resolve the steps of a record "
                        "of {:.6g} s: take the first time off the column '{}' (\"time_zero\": \"first\" does)",
                        place, last, last - start_, experiment_.time)});
+    else if (span > kLong && experiment_.time_unit.empty() && !time_has_unit())
+      issues_.push_back({place_ + ".time",
+                         fmt::format("{}: the record lasts {:.6g} s, {:.3g} days: is '{}' in s? Its unit in the header "
+                                     "or in \"time_unit\" (\"s\", \"ms\") tells",
+                                     place, span, span / 86400, experiment_.time),
+                         true});
   }
 
   bool time_has_unit() const {

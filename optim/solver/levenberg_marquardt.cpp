@@ -190,7 +190,7 @@ class Search {
         learnt_.takes_part = with_S < std::min(without, with_b);
       }
       const bool settled = std::abs(gained) <= options_.tolerance * model.size;
-      if (std::isfinite(cost) && (gained > kAccepted * promised || (settled && gained >= 0))) {
+      if (std::isfinite(cost) && (gained > kAccepted * std::max(promised, 0.0) || (settled && gained >= 0))) {
         invalid = 0, missed = 0;
         if (options_.large_residuals) learn(x - x_, trial);
         x_ = x, cost_ = cost, point_ = std::move(trial);

@@ -103,7 +103,7 @@ class LimitRound : public LeastSquaresProblem {
     LeastSquaresPoint point;  // of the problem given
     double cost = std::numeric_limits<double>::infinity();
   };
-  Evaluated best_;  // of this round, where most searches end
+  Evaluated best_;  // the best point of this round, at which most searches end
   VectorXd l_, x_;
   double part_ = kLimitWeight, w_ = 0, left_ = std::numeric_limits<double>::infinity(), missed_ = 0;
   LeastSquaresPoint known_;

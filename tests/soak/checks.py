@@ -262,9 +262,9 @@ def values_at(lab, settings, direction, h):
 def scattered(lab, settings, direction):
     """How much rounding changes the objectives from run to run: the largest third difference over parameters that
     differ by 1e-8. Smaller changes are below the rounding of coordinates far from the origin."""
-    values = [v for v in (values_at(lab, settings, direction, k * 1e-8) for k in range(-2, 4)) if v]
-    return {name: max((abs(a[name] - 3 * b[name] + 3 * c[name] - d[name])
-                       for a, b, c, d in zip(values, values[1:], values[2:], values[3:])), default=0.0)
+    values = [values_at(lab, settings, direction, k * 1e-8) for k in range(-2, 4)]
+    runs = [four for four in zip(values, values[1:], values[2:], values[3:]) if all(four)]
+    return {name: max((abs(a[name] - 3 * b[name] + 3 * c[name] - d[name]) for a, b, c, d in runs), default=0.0)
             for name in lab.problem["objectives"]}
 
 

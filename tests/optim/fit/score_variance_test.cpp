@@ -88,6 +88,17 @@ TEST_CASE("residuals of a window are what a fit to the other windows leaves", "[
   }
 }
 
+TEST_CASE("a record that no parameter moves keeps its residuals", "[covariance]") {
+  const VectorXd t = VectorXd::LinSpaced(6, 0, 1), z = normal_matrix(18, 1, 7);
+  MatrixXd J = normal_matrix(18, 1, 8);
+  J.middleRows(6, 6).setZero();
+  const ScoreVariance variance(CovarianceType::newey_west, {{0, t}, {6, t}, {12, t}},
+                               {{0, VectorXd::LinSpaced(18, 0, 3)}});
+  const VectorXd left = variance.left_out(z, J, (J.transpose() * J).inverse());
+  CHECK(left.segment(6, 6) == z.segment(6, 6));
+  CHECK(left.head(6).norm() > z.head(6).norm());
+}
+
 TEST_CASE("what the fit leaves of the variance is that of white noise", "[covariance]") {
   // Residuals M e of white e: the mean of a'B a over many e, against that of the whole noise.
   const Index n = 80;
