@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <numeric>
 #include <stdexcept>
 #include <thread>
@@ -86,11 +87,16 @@ void compute_on_ranks(Run& run, Ranks& ranks, int workers, const std::vector<int
   ProcessPool here(workers, [&](int start) { return json_text(work.record(start)); });
   auto next = starts.begin();
   std::optional<Clock::time_point> stopped;
-  while (!here.idle() || !others.idle() || (next != starts.end() && !stopped)) {
+  const auto fill = [&] {
     while (!stopped && next != starts.end() && others.start(*next)) ++next;
     while (!stopped && next != starts.end() && here.has_room() && here.start(*next)) ++next;
-    for (const JobReply& reply : here.ended(kPollMilliseconds)) done(reply);
-    for (const JobReply& reply : others.ended()) done(reply);
+  };
+  fill();
+  while (!here.idle() || !others.idle() || (next != starts.end() && !stopped)) {
+    std::vector<JobReply> replies = here.ended(kPollMilliseconds);
+    std::ranges::move(others.ended(), std::back_inserter(replies));
+    fill();  // before done(), which may wait for a disk
+    for (const JobReply& reply : replies) done(reply);
     waiting();
     if (!stopped && interrupted()) {
       stopped = Clock::now();

@@ -146,9 +146,14 @@ void run_in_processes(const std::vector<int>& jobs, int workers, const std::func
   ProcessPool pool(workers, work);
   auto next = jobs.begin();
   bool stopping = false;
-  while (!pool.idle() || (next != jobs.end() && !stopping)) {
+  const auto fill = [&] {
     while (!stopping && next != jobs.end() && pool.has_room() && pool.start(*next)) ++next;
-    for (const JobReply& reply : pool.ended(kPollMilliseconds)) done(reply);
+  };
+  fill();
+  while (!pool.idle() || (next != jobs.end() && !stopping)) {
+    const std::vector<JobReply> replies = pool.ended(kPollMilliseconds);
+    fill();  // before done(), which may wait for a disk
+    for (const JobReply& reply : replies) done(reply);
     if (!stopping && go_on && !go_on()) {
       stopping = true;
       pool.stop();
