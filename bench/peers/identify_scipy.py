@@ -107,8 +107,8 @@ class HandWritten:
     def __init__(self, folder, measured, torque):
         (folder / "model.c").write_text(MODEL)
         library = str(folder / "model.so")
-        subprocess.run(["cc", "-O3", "-march=native", "-shared", "-fPIC", str(folder / "model.c"), "-o", library, "-lm"],
-                       check=True)
+        source = str(folder / "model.c")
+        subprocess.run(["cc", "-O3", "-march=native", "-shared", "-fPIC", source, "-o", library, "-lm"], check=True)
         self.call = ctypes.CDLL(library).motion
         self.measured, self.torque = measured, torque
         rows = (ROWS - 1) // WINDOWS

@@ -29,8 +29,8 @@ bool may_be_solved(const Mechanism& mechanism, const SimulationSettings& setting
 SimulationResult driven_simulate(const Mechanism& mechanism, const SimulationSettings& settings,
                                  std::span<const Cost> costs, const Sampling& sampling, const RunOptions& options,
                                  const Assembly& start);
-// unknown: observers get no ydot, so that no equations of motion are solved for it. Nor, without_tangents, derivatives
-// of velocities: those rows of y_rho are meaningless.
+// unknown: observers get no ydot, so that no equations of motion are solved for it. without_tangents: nor are
+// derivatives of velocities computed; those rows of y_rho are meaningless.
 enum class Rates { known, unknown, without_tangents };
 SimulationResult driven_tlm(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
                             const TangentSampling& sampling, const RunOptions& options, const Assembly& start,

@@ -187,7 +187,7 @@ struct ExperimentSpec {
 // be anything within an experiment, but is independent between experiments. automatic: by tests of the residuals.
 enum class CovarianceType { automatic, white, newey_west, windows };
 
-struct IdentificationSpec {  // constructors: problem.cpp, as those of Scene
+struct IdentificationSpec {  // problem.cpp defines the constructors, so that they are compiled once
   IdentificationSpec();
   IdentificationSpec(const IdentificationSpec&);
   IdentificationSpec(IdentificationSpec&&) noexcept;
@@ -205,7 +205,7 @@ struct IdentificationSpec {  // constructors: problem.cpp, as those of Scene
   int max_iterations = 100;
 };
 
-struct Problem {  // constructors: likewise
+struct Problem {  // the same
   Problem();
   Problem(const Problem&);
   Problem(Problem&&) noexcept;
