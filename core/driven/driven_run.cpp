@@ -53,7 +53,7 @@ DrivenRun::DrivenRun(const Mechanism& mechanism, const SimulationSettings& setti
   }
   if (!running_.empty()) nodes_.resize(kNodes);
   g_.resize(running_.size() * kNodes);
-  integrals_.resize(running_.size());
+  integrals_.resize(running_.size()), errors_.resize(running_.size());
   path_.start(settings.start_time, start.result().y, start.result().angles);
 }
 
@@ -163,6 +163,17 @@ void DrivenRun::go_through_panels(const Take& take) {
     if (!go_to(resume)) return stop(SimulationStatus::step_too_small, why_it_ends());
   }
   if (jumps) jumps->add_to(result_.statistics);
+  add_quadrature_errors();
+}
+
+// The shortest panels were accepted as they are: an integrable singularity, perhaps.
+void DrivenRun::add_quadrature_errors() {
+  for (std::size_t r = 0; r < running_.size(); ++r) {
+    const Cost& cost = costs_[static_cast<std::size_t>(running_[r].objective)];
+    const double of_size = absolute_(running_[r].objective);
+    QuadratureError& worst = cost.is_extreme ? result_.statistics.extreme_quadrature : result_.statistics.quadrature;
+    if (errors_[r].of_run > worst.error * of_size) worst = {errors_[r].of_run / of_size, cost.name, errors_[r].worst_t};
+  }
 }
 
 double DrivenRun::largest_panel() const {
@@ -183,7 +194,9 @@ DrivenRun::Panel DrivenRun::try_panel(double t1) {
   for (std::size_t r = 0; r < running_.size(); ++r) {
     const PanelIntegral I = integrals_[r] = integrate_panel(std::span(g_).subspan(r * kNodes, kNodes), h);
     if (options_.frozen || h <= shortest_) continue;
-    const double of_panel = s.rtol * I.absolute + s.atol * h;
+    // Exponentials of smooth extremes are of any size: atol says nothing of them.
+    const bool is_extreme = costs_[static_cast<std::size_t>(running_[r].objective)].is_extreme;
+    const double of_panel = s.rtol * I.absolute + (is_extreme ? 0 : s.atol * h);
     const double of_run = kPartOfRun * s.rtol * (absolute_(running_[r].objective) + I.absolute);
     if (I.error > std::max(of_panel, of_run)) return Panel::refused;  // what is no number is found at the end
   }
@@ -206,12 +219,8 @@ bool DrivenRun::take_panel(double t1, const Take& take) {
     const PanelIntegral& I = integrals_[r];
     const Eigen::Index o = running_[r].objective;
     result_.psi(o) += I.value;
-    absolute_(o) += I.absolute;
-    // The shortest panel was accepted as it is: an integrable singularity, perhaps.
-    QuadratureError& worst = costs_[static_cast<std::size_t>(o)].is_extreme ? result_.statistics.extreme_quadrature
-                                                                            : result_.statistics.quadrature;
-    const double relative = I.absolute > 0 ? I.error / absolute_(o) : 0;
-    if (relative > worst.error) worst = {relative, costs_[static_cast<std::size_t>(o)].name, from_.t};
+    absolute_(o) += I.absolute, errors_[r].of_run += I.error;
+    if (I.error > errors_[r].worst) errors_[r].worst = I.error, errors_[r].worst_t = from_.t;
   }
   if (!take_events_until(INFINITY, events, take)) return false;
   path_.start(end);

@@ -50,10 +50,14 @@ class DrivenRun {
 
  private:
   enum class Panel { accepted, refused, stuck };
+  struct PanelErrors {  // of an integral: the sum, the largest of a panel, and when that begins
+    double of_run = 0, worst = 0, worst_t = 0;
+  };
   void go_through_panels(const Take& take);
   Panel try_panel(double t1);
   double largest_panel() const;
   bool take_panel(double t1, const Take& take);
+  void add_quadrature_errors();
   bool take_events_until(double t, std::span<const SampleEvent>& events, const Take& take);
   bool take_terminal_costs(const Take& take);
   void end_panel(double t0, double t1);
@@ -81,6 +85,7 @@ class DrivenRun {
   std::vector<double> g_;           // running cost x node
   Eigen::VectorXd absolute_;        // integral of |g| so far, per cost
   std::vector<PanelIntegral> integrals_;
+  std::vector<PanelErrors> errors_;
   SimulationResult result_;
 };
 

@@ -106,15 +106,18 @@ Warning contradicting_joints(const SimulationSettings& settings, const Simulatio
       statistics.max_position_violation);
 }
 
-Warning unresolved(const SimulationSettings& settings, const QuadratureError& worst, const char* what,
+Warning unresolved(const SimulationSettings& settings, bool solved, const QuadratureError& worst, const char* what,
                    const char* consequence) {
   if (!(worst.error > kUnresolved)) return {};
+  constexpr const char* kCvodes = ", or take cvodes_bdf or cvodes_adams, which control this error";
   return fmt::format(
       "the steps do not resolve {} of objective '{}': {} has an estimated error of {:.2g} %, most of it near t = "
-      "{:.6g} s. {}, or take cvodes_bdf or cvodes_adams, which control this error",
+      "{:.6g} s. {}{}",
       what, worst.of, consequence, 100 * worst.error, worst.time,
-      settings.integrator.step ? "Take a smaller simulation.integrator.step"
-                               : "Set simulation.integrator.max_step, tighten rtol");
+      solved                     ? "Tighten simulation.integrator.rtol and atol"
+      : settings.integrator.step ? "Take a smaller simulation.integrator.step"
+                                 : "Set simulation.integrator.max_step, tighten rtol",
+      solved ? "" : kCvodes);
 }
 
 Warning near_singular(const SimulationSettings& settings, const SimulationStatistics& statistics) {
@@ -157,9 +160,11 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
   // Each of these explains those after it.
   for (const auto& warning : {energy_lost, accelerations_unmet, joints_give_way, contradicting_joints})
     if (add(warning(settings, statistics))) break;
-  add(unresolved(settings, statistics.quadrature, "the running cost", "its integral"));
-  add(unresolved(settings, statistics.extreme_quadrature, "the peaks", "the integral of their exponential"));
-  add(unresolved(settings, statistics.gradient_quadrature, "the derivative of the integrand", "the gradient"));
+  add(unresolved(settings, statistics.solved, statistics.quadrature, "the running cost", "its integral"));
+  add(unresolved(settings, statistics.solved, statistics.extreme_quadrature, "the peaks",
+                 "the integral of their exponential"));
+  add(unresolved(settings, statistics.solved, statistics.gradient_quadrature, "the derivative of the integrand",
+                 "the gradient"));
   add(near_singular(settings, statistics));
   for (const Jump& jump : statistics.jumps) warnings.push_back(in_words(scene, jump));
   return warnings;

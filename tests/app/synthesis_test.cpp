@@ -129,6 +129,20 @@ TEST_CASE("nine points, free timing: the known linkage is recovered, and its cog
   check_values(other, {{"Ax", third.real()}, {"Ay", third.imag()}, {"Bx", 3}, {"By", 0.5}});
 }
 
+// exp(-100 sin(mu)) is of the size of 1e-33, far below any atol.
+TEST_CASE("a solved run integrates the exponential of a smooth minimum to rtol", "[synthesis]") {
+  const TemporaryFolder folder;
+  const CommandOutcome run =
+      run_command({"simulate", MBSOPT_SOURCE_DIR + std::string("/problems/synthesis/eighteen_points.json"), "--out",
+                   folder.file("run")});
+  INFO(run.err);
+  REQUIRE(run.exit_code == kDone);
+  CHECK_THAT(run.err, !Contains("do not resolve"));
+  const nlohmann::json simulation = json_of(folder.path / "run/result.json")["simulation"];
+  CHECK(simulation["solve"] == "kinematics");
+  CHECK(simulation["extreme_quadrature_error"].get<double>() < 1e-5);
+}
+
 TEST_CASE("the instants of free timing are stored; a motion that ends is shown up to there", "[synthesis]") {
   const TemporaryFolder folder;
   Arguments arguments{"simulate", MBSOPT_SOURCE_DIR + std::string("/problems/synthesis/nine_points.json"), "--out",
