@@ -53,7 +53,8 @@ endfunction()
 # which halves the time of a build. Each source still includes what it uses. Where nothing is precompiled, Eigen's
 # kernels are compiled in each source.
 function(mbsopt_precompile target)
-  target_precompile_headers(${target} PRIVATE ${PROJECT_SOURCE_DIR}/core/linear/eigen_kernels.hpp <algorithm> <array> <cmath> <functional> <limits> <map>
+  target_precompile_headers(${target} PRIVATE ${PROJECT_SOURCE_DIR}/core/linear/eigen_kernels.hpp
+                            <algorithm> <array> <cmath> <functional> <limits> <map>
                             <memory> <optional> <span> <stdexcept> <string> <string_view> <utility> <vector> ${ARGN})
   if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
     target_compile_options(${target} PRIVATE -fpch-preprocess)  # ccache's manual, "Precompiled headers"

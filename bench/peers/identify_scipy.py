@@ -173,7 +173,8 @@ def main():
           "| --- | --- | --- | --- | --- |")
     for row, values in rows.items():
         cells = [statistics.median(column) for column in zip(*values)]
-        print(f"| {row} | {cells[0]:.0f} | " + " | ".join("" if math.isnan(c) else f"{c:.2f}" for c in cells[1:]) + " |")
+        seconds = ["" if math.isnan(c) else f"{c:.2f}" for c in cells[1:]]
+        print(f"| {row} | {cells[0]:.0f} | " + " | ".join(seconds) + " |")
     print(f"\nThe costs are {found.cost:.1f} and {fit['objective_final']:.1f}. The shared parameters differ by at most "
           f"{apart:.2g} standard errors.")
 

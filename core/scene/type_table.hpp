@@ -67,7 +67,7 @@ std::string not_among(std::string_view what, std::string_view found, const std::
 // Whether friction in a joint resists sliding: as `motion` says, else where the joint has no angle.
 bool is_sliding(std::string_view motion, std::string_view joint_type);
 
-// Of a quantity other than expression; scene_facts.hpp finds those of expressions. nullopt: not known (N or N m).
+// The dimension of a quantity other than expression (scene_facts.hpp finds theirs); nullopt: N or N m, not known here.
 std::optional<Dimension> dimension_of_quantity(const Sensor& sensor);
 Reads reads_of_quantity(const Sensor& sensor);
 

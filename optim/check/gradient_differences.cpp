@@ -98,7 +98,7 @@ void GradientDifferences::keep(const Ladder& ladder, Index i, Index k, bool froz
   if (!frozen && base_.discrete) on_base_steps_(i, k) = on_base_steps(ladder.d.largest, i, ladder.other_steps);
 }
 
-// Of the ladder, of psi's rounding, and on free steps of the integration.
+// Sums the errors of the ladder, of psi's rounding and, on free steps, of the integration.
 double GradientDifferences::own_error(const Ladder& ladder, Index i, Index k, bool frozen, double psi_rounding) const {
   const double step = ladder.d.step(i);
   if (!(step > 0)) return kInfinity;

@@ -69,7 +69,7 @@ class GradientDifferences {
   const Table& of(bool frozen) const { return frozen ? frozen_ : free_; }
   const IntegrationError& integration() const { return integration_; }
   bool on_frozen_steps(Eigen::Index k) const { return base_.on_frozen_steps(k); }
-  // Of each parameter: smaller than its size where finer differences hold, whose steps are then relative_step times it.
+  // The differences of each parameter step by relative_step times this: its size, or less where finer ones hold.
   const Eigen::VectorXd& size_of_steps() const { return size_of_steps_; }
 
   std::vector<LadderRung> rungs(Eigen::Index i, Eigen::Index k) const;

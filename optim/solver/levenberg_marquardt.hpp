@@ -50,7 +50,7 @@ namespace mbsopt {
 // cost of the start at a minimum; in front of a wall of failed points, or with wrong derivatives, they promise most.
 inline constexpr double kSimulationNoise = 1e-4;
 
-// What a search has learnt of large residuals. The next search, of nearly the same residuals, begins with it.
+// A search fills this with what it has learnt of large residuals; the next one, of nearly the same, begins with it.
 struct LearntCurvature {
   explicit LearntCurvature(Eigen::Index variables) : S(variables) {}
   ResidualCurvature S;
