@@ -196,22 +196,3 @@ TEST_CASE("known parameters are found again from simulated records", "[recovery]
     CHECK(p.share >= 0.85);                                                 // 60 intervals of 95 %: 2.8 %
   }
 }
-
-TEST_CASE("a bootstrap of residuals has the scatter of the standard errors, in any number of threads", "[recovery]") {
-  const repetitions::Study study = repetitions::studies()[1];
-  const std::vector<CsvTable> data = repetitions::repeated(study, 3);
-  const IdentificationResult fit = run_identification(study.problem, data);
-  const Recovery one = recover(study.problem, data, fit, {.seeds = 40, .bootstrap = true}),
-                 two = recover(study.problem, data, fit, {.seeds = 40, .bootstrap = true, .threads = 2});
-  REQUIRE(one.fits == 40);
-  REQUIRE(two.parameters.size() == fit.parameters.size());
-  for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
-    const RecoveredParameter &p = one.parameters[k], &same = two.parameters[k];
-    INFO(p.name << ": scatter " << p.scatter);
-    CHECK(p.scatter == Approx(fit.parameters[k].std_error).epsilon(0.5));  // ten blocks per record
-    CHECK(p.ci95[0] < p.mean);
-    CHECK(p.mean < p.ci95[1]);
-    CHECK(p.scatter == same.scatter);
-    CHECK(p.ci95[0] == same.ci95[0]);
-  }
-}

@@ -65,20 +65,6 @@ TEST_CASE("windows find the parameters from wrong ones", "[identification][windo
   for (const ExperimentFit& e : result.experiments) CHECK(e.rms == Approx(kWindowNoise).epsilon(0.2));
 }
 
-TEST_CASE("windows give the same bits in any number of threads", "[identification][windows]") {
-  const Problem p = windowed();
-  const std::vector<CsvTable> data{motion(p, kWindowNoise)};
-  IdentificationOptions two;
-  two.threads = 2;
-  const IdentificationResult a = run_identification(p, data), b = run_identification(p, data, two);
-  REQUIRE(a.ok());
-  CHECK(a.evaluations == b.evaluations);
-  for (std::size_t k = 0; k < a.parameters.size(); ++k) {
-    CHECK(a.parameters[k].value == b.parameters[k].value);
-    CHECK(a.parameters[k].std_error == b.parameters[k].std_error);
-  }
-}
-
 TEST_CASE("windows: what is free must act on the start", "[identification][windows]") {
   const CsvTable data = motion(windowed(), 0);
   Problem p = windowed();

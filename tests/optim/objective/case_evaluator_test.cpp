@@ -56,14 +56,6 @@ TEST_CASE("values and gradients in cases are those of the closed form, by the ch
   CHECK((e.psi_rho - expected).cwiseAbs().maxCoeff() < accuracy);
 }
 
-TEST_CASE("results of cases do not depend on the number of threads", "[cases]") {
-  CaseEvaluator one(loaded_swing(), {"end"}, {"k", "a", "b"}, {}, 1),
-      three(loaded_swing(), {"end"}, {"k", "a", "b"}, {}, 3);
-  const CaseEvaluation &a = one.gradients(one.start()), &b = three.gradients(three.start());
-  CHECK(a.psi == b.psi);
-  CHECK(a.psi_rho == b.psi_rho);
-}
-
 TEST_CASE("the gradients of a case agree: tlm, adjoint, differences", "[cases]") {
   Problem problem = problem_of(loaded_swing(), loaded_swing().cases[GENERATE(0u, 1u, 2u)]);
   for (Parameter& p : problem.scene.parameters) p.allow_unused = true;
