@@ -18,7 +18,7 @@ void list(const std::vector<std::vector<int>>& bodies, std::vector<MotionBlocks:
   begin.push_back(static_cast<int>(places.size()));
 }
 
-// Blocks as block_kernels.hpp sees them.
+// The blocks in the form of block_kernels.hpp.
 template <int Rows>
 const MotionBlockView<Rows>* view(const std::vector<MotionBlocks::Block<Rows>>& blocks) {
   using Ours = MotionBlocks::Block<Rows>;

@@ -11,8 +11,8 @@ namespace mbsopt {
 namespace {
 
 constexpr double kApart = 1e-3;  // [m, -]
-// [m, -]: projections leave 1e-11 and less, rounding of coordinates up to 1e4 m. Where rows contradict each other, they
-// give up below 1e-8 (projection_solution.hpp) at the first step.
+// [m, -]: projections leave 1e-11 and less, the rounding of coordinates up to 1e4 m. Where rows contradict each other,
+// they give up below 1e-8 (projection_solution.hpp) at the first step.
 constexpr double kContradicting = 1e-10;
 constexpr double kUnmet = 1e-5;            // of the accelerations of the constraints
 constexpr double kGivingWay = 1e-8;        // of the accelerations; gradients had errors of 500 times as much
@@ -157,7 +157,7 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
   add(rounding_of_penalty(settings));
   add(joints_apart(settings, statistics));
   if (!finished) return warnings;
-  // Each of these explains those after it.
+  // Each of these explains the ones after it, so only the first is reported.
   for (const auto& warning : {energy_lost, accelerations_unmet, joints_give_way, contradicting_joints})
     if (add(warning(settings, statistics))) break;
   add(unresolved(settings, statistics.solved, statistics.quadrature, "the running cost", "its integral"));
