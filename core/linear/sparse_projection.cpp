@@ -76,7 +76,7 @@ MatrixXd SparseProjection::left(const Eigen::Ref<const MatrixXd>& b, const Eigen
   return factor_->scale.asDiagonal() * b - factor_->J * x;
 }
 
-// The system is symmetric: of (x_bar, 0) it gives g_bar = (I - J+ J) x_bar and b_bar = (J+)' x_bar.
+// The system is symmetric: with (x_bar, 0) it gives g_bar = (I - J+ J) x_bar and b_bar = (J+)' x_bar.
 void SparseProjection::solve_transposed(const Eigen::Ref<const MatrixXd>& x_bar, MatrixXd& b_bar,
                                         MatrixXd& g_bar) const {
   MatrixXd nu;
