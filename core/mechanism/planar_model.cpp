@@ -197,7 +197,7 @@ class Search {
   }
 
   // Follows joints from the ground; a joint that holds() keeps one of its bodies in the plane if the other one is.
-  // Returns the name of a body that no joint holds, or an empty string.
+  // Returns a message on a body that no joint holds, or an empty string.
   std::string body_not_held() const {
     std::vector<std::vector<int>> neighbours(data_.bodies.size());
     int seen = -1;  // the joint whose first dot-1, one with axis 2, has been looked at

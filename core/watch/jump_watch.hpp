@@ -1,10 +1,10 @@
-// Laws, components of forces and running costs that jump at an instant which parameters move. Frozen steps do not know
-// how the instant moves, so that derivatives leave out the jump times its rate: they are wrong, often 0.
+// Laws, components of forces and running costs that jump at an instant which parameters move. Frozen steps do not
+// follow the instant, so derivatives omit the jump times its rate: they are wrong, often 0.
 //
-// A value can jump only where one of its switches goes through zero (program_switches.hpp). Between two states, apart
-// by a millionth of the run at least, the first zero is found by bisection along the Hermite cubic. A jump keeps its
-// size at a hundredth of the distance from the zero; a continuous value does not. A later jump of the same function is
-// reported if it depends on more: on another parameter, or also on the motion.
+// A value can jump only where one of its switches goes through zero (program_switches.hpp). Between two states,
+// bisection along the Hermite cubic finds the first zero. The states are at least a millionth of the run apart. A jump
+// keeps its size at a hundredth of the distance from the zero; a continuous value does not. A later jump of the same
+// function is reported if it depends on more: on another parameter, or also on the motion.
 //
 //   JumpWatch watch(mechanism, settings, costs, motion);   // in runs with derivatives
 //   watch.begin({t0, y0, angles0}); watch.look_at({t1, y1, angles1}); ... watch.add_to(result.statistics);
@@ -50,7 +50,7 @@ class JumpWatch {
     bool motion = false;                 // some of them name the motion
     bool is_new(const Switch& s) const;  // names more
   };
-  // switches: of the program.
+  // switches are those of the program.
   void add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of,
            Forces::Place place = {});
   void set_inputs(const Function& f, const StatePoint& at);

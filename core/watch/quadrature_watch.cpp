@@ -79,7 +79,7 @@ std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::sp
       costs_[cost].name.empty() ? "" : " of objective '" + costs_[cost].name + "'", t, t);
 }
 
-// The time of a pole within the step; kNone: there is none.
+// The time of a pole within the step, or kNone.
 double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
   const double h = step.h;
   const Eigen::Index n = step.y0.size() / 2;
@@ -115,18 +115,18 @@ double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
 }
 
 void QuadratureWatch::add_to(SimulationStatistics& statistics) const {
-  // rounding: what errors are no larger than where they say nothing.
+  // Errors up to `rounding` have no meaning.
   const auto judge = [](const Integral& i, double of_size, double rounding, const Cost& cost, QuadratureError& worst) {
     if (i.error > worst.error * of_size && i.error > rounding) worst = {i.error / of_size, cost.name, i.worst_t};
   };
   for (std::size_t o = 0; o < costs_.size(); ++o) {
     const Cost& cost = costs_[o];
     const Integral& value = integrals_[kIntegrals * o];
-    // Exponentials are of any size.
+    // Exponentials have any size, so their rounding is relative.
     const double rounding = cost.is_extreme ? kMetExactly * value.of_size : kMetExactly;
     judge(value, value.of_size, rounding, cost,
           cost.is_extreme ? statistics.extreme_quadrature : statistics.quadrature);
-    // Both parts relative to their sum: one that is next to nothing beside the other does not matter.
+    // Both parts count relative to their sum: a part that is negligible beside the other does not matter.
     Integral motion = integrals_[kIntegrals * o + 1];
     const Integral& parameters = integrals_[kIntegrals * o + 2];
     motion.error *= end_ - start_, motion.of_size *= end_ - start_;
