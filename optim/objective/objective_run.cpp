@@ -11,8 +11,8 @@
 namespace mbsopt {
 namespace {
 
-// Largest of values given one after another, and where parabolas through each three whose middle is the highest have
-// their tops beyond it. Such a top is a place to look at, no value: between few points it may be anything.
+// The largest of successive values, and the tops of parabolas through each three whose middle is highest, if they
+// exceed it. A top is only a place to evaluate: between few points the value may be anything.
 class Peak {
  public:
   void add(double t, double x) {
@@ -43,13 +43,13 @@ class Peak {
   std::vector<Top> tops_;
 };
 
-// A side of an objective, as in ObjectivePart.
+// A side of an objective, with the meaning of ObjectivePart.
 struct ExtremeOf {
   const Objective* objective;
   int side;
 };
 
-// The extreme of each objective's expression on its side; none for side 0, and where the run fails.
+// The extreme of each objective's expression on its side. There is none for side 0, or if the run fails.
 std::vector<std::optional<double>> extremes_of(const std::vector<ExtremeOf>& all, const Mechanism& mechanism,
                                                const SimulationSettings& settings, const StepSequence& steps,
                                                const std::function<bool(double t)>& progress) {

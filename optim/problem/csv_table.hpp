@@ -20,7 +20,7 @@
 
 namespace mbsopt {
 
-// "run1.csv:17:5: ...": what is wrong, with line and column where there is one.
+// "run1.csv:17:5: ...": the fault, with line and column if there are any.
 class CsvError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -36,7 +36,7 @@ struct CsvTable {
 
   std::size_t rows() const { return lines.size(); }
   std::string place(std::size_t row) const;  // "run1.csv:17"
-  // A column by its header, or by its header without the unit in brackets where only one has that name.
+  // Finds a column by its header, or by its header without the unit in brackets if only one has that name.
   bool has_column(std::string_view column_name) const { return find_column(column_name) < header.size(); }
   std::size_t find_column(std::string_view column_name) const;  // header.size() where there is none
   const std::vector<double>& column(
@@ -53,7 +53,7 @@ struct ColumnHeader {
 };
 ColumnHeader parts_of_header(std::string_view header);
 
-// A column of times: every cell present and finite, each later than the one before. Throws CsvError naming the row.
+// Returns a column of times: every cell is finite and later than the one before. Throws CsvError with the row.
 const std::vector<double>& ascending_times(const CsvTable& table, std::string_view column_name);
 
 }  // namespace mbsopt
