@@ -1,4 +1,4 @@
-// URDF or MJCF to a problem file.
+// Turns URDF or MJCF into a problem file.
 //
 //   const ImportedProblem imported = import_model("arm.urdf");     // throws InputError: what is wrong, with its line
 //   imported.text                                                  // of arm.json
@@ -21,7 +21,7 @@ struct ImportedProblem {
 
 ImportedProblem import_model(const std::filesystem::path& model);
 
-// The same from a text, without warnings: no mechanism is assembled. `model` stands for the file in findings.
+// Reads the same from a text, without warnings: it assembles no mechanism. `model` names the file in findings.
 ImportedProblem read_model_text(const std::string& text, const std::filesystem::path& model);
 
 }  // namespace mbsopt

@@ -375,7 +375,7 @@ void FieldReader::read_named(const Node& node, const std::string& path, Paramete
     if (const Node* number = node.find(key)) take_unit(*number, child_path(path, key), value);
 }
 
-// A value written with a unit says what "unit" would say, and must not contradict it.
+// A value with a unit has the meaning of "unit", and must not contradict it.
 void FieldReader::take_unit(const Node& node, const std::string& path, Parameter& parameter) {
   if (node.kind != Node::Kind::string) return;
   const auto found = infer_dimension(Expression::parse(node.string), [](const std::string&) { return std::nullopt; });

@@ -29,7 +29,7 @@ std::string to_string(const Finding& finding) {
     if (!finding.path.empty()) text += ": " + finding.path;
   }
   text += ": " + finding.message;
-  // One line each, whatever names and texts it quotes.
+  // Keeps each finding on one line, for any names and texts in it.
   std::replace_if(
       text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
   return text;

@@ -1,5 +1,5 @@
 // Rows of bars along one axis, as an HTML figure: intervals of estimates, variables between their bounds, sizes of
-// effects. It holds a wide and a narrow drawing, of which the page's style shows one.
+// effects. It holds a wide and a narrow drawing; the page's style shows one of them.
 //
 //   RowPlot plot{.title = "Effect of 1 %", .x_label = "p dpsi/dp / psi [-]"};
 //   plot.rows.push_back({.name = "k", .low = 0, .high = 0.3, .words = "0.3"});
@@ -30,7 +30,7 @@ struct RowPlot {
   bool track = false;                                   // a grey bar over the whole range, beneath
 };
 
-// Empty without rows.
+// Returns an empty string without rows.
 std::string to_svg(const RowPlot& plot);
 
 }  // namespace mbsopt

@@ -18,7 +18,7 @@ struct SimulatedMotion {
   Trajectory running = {};  // t, then per objective what it integrates or takes the mean or extreme of; NaN: nothing
 };
 
-// Draws the progress of `run`, and stops where the user interrupts.
+// Draws the progress of `run`, and stops if the user interrupts.
 SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho);
 
 }  // namespace mbsopt

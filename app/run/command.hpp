@@ -1,6 +1,6 @@
-// The input of every command, and the commands. Each returns an exit code (exit_code.hpp); bad input leaves as an
-// exception (InputError, SceneError, OutputError), which command_line.cpp turns into words and exit code 2; so does
-// what cannot be written (WriteError), with exit code 1.
+// The input of every command, and the commands. Each returns an exit code (exit_code.hpp). Bad input is an exception
+// (InputError, SceneError, OutputError), which command_line.cpp turns into words and exit code 2. A failed output
+// (WriteError) gives exit code 1.
 #pragma once
 
 #include <memory>

@@ -14,8 +14,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Of residuals and their derivatives: longer records are not kept, since simulating again costs less than a journal of
-// many megabytes.
+// The limit of residuals and their derivatives. Longer records are not kept: a new simulation costs less than a journal
+// of many megabytes.
 constexpr Index kMostNumbers = 50'000;
 constexpr Index kMostColumns = 1'000'000;  // of a damaged line, before memory is asked for
 
