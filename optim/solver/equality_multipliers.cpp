@@ -43,7 +43,7 @@ class Round : public LeastSquaresProblem {
     point.z_x.bottomRows(W_.size()).array().colwise() *= Omega.array();
   }
 
-  // Turns the solution of a round into that of the problem given.
+  // Turns the solution of a round into that of the given problem.
   void end(LeastSquaresResult& solution) {
     const VectorXd Omega = omega_ * W_;
     auto c = solution.point.z.tail(W_.size());
@@ -55,13 +55,13 @@ class Round : public LeastSquaresProblem {
     solution.cost_final = given_.cost(solution.point.z);
   }
 
-  // |W c| over the norm of the residuals.
+  // W c| divided by the norm of the residuals.
   double left() const {
     const VectorXd z = given_.weights(at_x_.z).cwiseSqrt().cwiseProduct(at_x_.z).head(size - W_.size());
     return W_.cwiseProduct(at_x_.z.tail(W_.size())).norm() / std::max(z.norm(), kNoResidual);
   }
 
-  // Every equation holds within its own errors.
+  // Whether every equation holds within its own errors.
   bool closed() const {
     const Eigen::ArrayXd c = at_x_.z.tail(W_.size()).array().abs();
     return given_.closed.size() == c.size() && (c <= given_.closed.array()).all();

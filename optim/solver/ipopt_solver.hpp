@@ -1,6 +1,6 @@
-// Ipopt: a primal-dual interior point method with a filter line search, here with a limited-memory BFGS Hessian or with
-// the program's own, exact or approximate. Waechter and Biegler, Mathematical Programming 106 (2006) 25-57. For smooth
-// problems with bounds and constraints. With MUMPS it is not thread-safe: one run at a time per process.
+// Ipopt: a primal-dual interior point method with a filter line search, for smooth problems with bounds and
+// constraints. The Hessian is limited-memory BFGS or the program's own, exact or approximate. Waechter and Biegler,
+// Mathematical Programming 106 (2006) 25-57. With MUMPS it is not thread-safe: one run at a time per process.
 //
 //   IpoptOptions options;
 //   options.tolerance = 1e-8;
@@ -28,7 +28,7 @@ struct IpoptOptions {
   bool warm_start = false;  // the start is near the solution: hardly any barrier, bounds that it touches stay touched
 };
 
-// Never throws for what an evaluation does: exceptions of evaluate() are failed evaluations, too.
+// Never throws because of an evaluation: exceptions of evaluate() are failed evaluations, too.
 NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const IpoptOptions& options = {});
 
 }  // namespace mbsopt

@@ -1,4 +1,4 @@
-// A setting that a trade-off measures, and the figures measured.
+// A setting that a trade-off measures, and its figures.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,7 +21,7 @@ struct TradeoffSetting {
 };
 // "dopri5 at rtol 1e-06", "adjoint, rk4 with steps of 0.005 s"
 std::string in_words(const TradeoffSetting& setting);
-// Of no curve: the scene's own settings and the defaults.
+// Whether it belongs to no curve: the scene's own settings and the defaults.
 bool stands_alone(const TradeoffSetting& setting);
 
 enum class RowStatus {
