@@ -1,8 +1,8 @@
 // A self-contained HTML page: a verdict, warnings, then headings, sentences, tables and plots. It is light or dark, has
 // its contents at the side, and is fit for print. It loads nothing from the network and has no time stamp.
 //
-// The page shows everything without scripts. Its script (script/*.js) adds functions: for plots the values under the
-// pointer, zoom and legends that hide; for a mechanism its motion; for tables a copy as CSV. The script reads the data
+// The page shows everything without scripts. Its script (script/*.js) adds functions. Plots get the values under the
+// pointer, zoom and legends that hide. A mechanism gets its motion, and tables a copy as CSV. The script reads the data
 // of plots and motions from one block of JSON, which holds equal arrays once.
 #pragma once
 
@@ -48,8 +48,8 @@ class HtmlPage {
     table(header, cells);
   }
   void plot(const LinePlot& plot);
-  // Parts of which the script shows one at a time. names are those of the selectors. keys give the choice of each, and
-  // id serves links to it.
+  // Parts of which the script shows one at a time. `names` are those of the selectors. `keys` give the choice of each,
+  // and id serves links to it.
   //   page.begin_choices({"quantity"}), page.begin_choice({"x"}), page.plot(x), page.end_choice(), page.end_choices();
   void begin_choices(const std::vector<std::string>& names);
   void begin_choice(const std::vector<std::string>& keys, std::string_view id = "");

@@ -1,5 +1,5 @@
-// The report of an identification before the fit: the content of the columns, their distance from the start, and what
-// the data would determine there with the given sigma.
+// The report of an identification before the fit: the content of the columns and their distance from the start. With
+// the given sigma it shows what the data would determine there.
 //
 //   const std::vector<ChannelData> channels = channel_data(start);    // start: of IdentificationOptions::preflight
 //   print_preflight(std::cout, start, channels);

@@ -12,8 +12,8 @@ namespace mbsopt {
 // The unique names of the vectors: letters, digits and _, at most 63, beginning with a letter.
 std::vector<std::string> mat_names(const std::vector<std::string>& columns);
 
-// A MAT-file of level 5, uncompressed (The MathWorks, "MAT-File Format"). libmatio writes the same, but it needs HDF5
-// and 30 more shared libraries, which double the time that the program takes to start.
+// A MAT-file of level 5, uncompressed (The MathWorks, "MAT-File Format"). The library libmatio writes the same, but it
+// needs HDF5 and 30 more shared libraries, which double the time that the program takes to start.
 std::string to_mat(const Trajectory& trajectory);
 
 }  // namespace mbsopt

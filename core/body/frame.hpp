@@ -81,8 +81,8 @@ Vec<7> pull_back_position(const BodyState& body, const FrameBar& bar);
 void add_pull_back_velocity(const BodyState& body, const FrameBar& bar, double scale, Eigen::Ref<Vec<7>> q_bar,
                             Eigen::Ref<Vec<7>> v_bar);
 
-// The full pull-back of the adjoint sweep. w_p is the cotangent of pddot itself, eta_theta the virtual rotation. z is
-// held fixed: the adjoint system solves for its cotangent.
+// The full pull-back of the adjoint sweep. `w_p` is the cotangent of pddot itself, eta_theta the virtual rotation. The
+// accelerations z are held fixed: the adjoint system solves for its cotangent.
 void add_pull_back(const BodyState& body, FrameBar bar, const Vector4d& w_p, const Vector3d& eta_theta,
                    Eigen::Ref<Vec<7>> q_bar, Eigen::Ref<Vec<7>> v_bar);
 

@@ -11,8 +11,8 @@
 namespace mbsopt {
 
 // across1 and binormal1 are unit vectors of body 1 that complete axis1 to a right-handed triad (axis1, across1,
-// binormal1). keep1 is normal1, keep2 is axis2 x normal2: they are at right angles while the normals are parallel. x1
-// y1 y2 z2 are the global axes as the bodies see them at the orientations in the file.
+// binormal1). The vector keep1 is normal1, keep2 is axis2 x normal2: they are at right angles while the normals are
+// parallel. Vectors x1 y1 y2 z2 are the global axes as the bodies see them at the orientations in the file.
 enum class JointVector {
   none,
   point1,

@@ -57,8 +57,8 @@ class Adjoint {
   int checkpoints_ = 0, which_ = -1;
   double tie_;  // times closer than this are one
   std::vector<Jump> jumps_;
-  // Per objective: source_ is the largest entry of any gradient in y that enters. running_source_ is the integral over
-  // the steps so far of that of the running cost, and last_size_ its entry at the last step.
+  // Per objective: source_ is the largest entry of any gradient in y that enters. `running_source_` is the integral
+  // over the steps so far of that of the running cost, and last_size_ its entry at the last step.
   Eigen::VectorXd source_, running_source_, last_size_;
   double last_time_;
   Eigen::MatrixXd lambda_, mu_;

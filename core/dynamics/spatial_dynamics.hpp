@@ -44,8 +44,8 @@ class SpatialDynamics {
   void tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir);
   void acceleration_tangent(const ParameterBlock& block, const LaneRows& y_dir, Eigen::Ref<LaneRows> a_dir);
   const std::vector<Lanes<6>>& z_tangent() const { return z_dir_; }
-  // Adds to the cotangents of y, of the differentiated fields, and of the parameters in laws. w is the cotangent of (v,
-  // a), motion one of z and lambda themselves.
+  // Adds to the cotangents of y, of the differentiated fields, and of the parameters in laws. `w` is the cotangent of
+  // (v, a), motion one of z and lambda themselves.
   void add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
                    Eigen::VectorXd& rho_bar, const Motion* motion = nullptr);
 

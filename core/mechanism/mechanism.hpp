@@ -20,8 +20,8 @@ struct StatePoint;
 
 class Mechanism {
  public:
-  // rho has one value per scene.parameters, in their order. active[k] requests derivatives in rho_k (empty: all).
-  // programs are the scene's expressions, from other mechanisms of the same scene. If null, they are compiled.
+  // rho has one value per scene.parameters, in their order. `active[k]` requests derivatives in rho_k (empty: all).
+  // `programs` are the scene's expressions, from other mechanisms of the same scene. If null, they are compiled.
   Mechanism(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active = {},
             std::vector<std::shared_ptr<const UserForce>> user_forces = {},
             std::shared_ptr<ScenePrograms> programs = nullptr);
@@ -45,8 +45,8 @@ class Mechanism {
   std::shared_ptr<const MechanismData> data_;
 };
 
-// The motion of one body at a state, for output: origin of the body frame, Euler parameters, the origin's velocity,
-// angular velocity (global components): x y z e0..e3 vx vy vz wx wy wz.
+// The motion of one body at a state, for output: origin of the body frame, Euler parameters, velocity of the origin,
+// and angular velocity in global components: x y z e0..e3 vx vy vz wx wy wz.
 Eigen::Matrix<double, 13, 1> body_row(const Mechanism& mechanism, int body, const StatePoint& at);
 
 // Counts of equations at the assembled initial state.

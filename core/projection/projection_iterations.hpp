@@ -51,7 +51,7 @@ enum class ProjectionLevel { position, velocity };
 // Solves, with J~ = J(q~) of the solver and J = J(q) of `rows`, its columns of turns times E at the position level,
 //   [ M  J~' ] or, transposed,  [ M  E'J' ]        (velocity level: [ M J'; J 0 ], symmetric)
 //   [ JE  0  ]                  [ J~  0   ]
-// by x += K (rhs - B x) with K the approximate inverse from the factor of S(q~). x is added to directions, so its
+// by x += K (rhs - B x) with K the approximate inverse from the factor of S(q~). `x` is added to directions, so its
 // rounding is relative to these. turn(x, transposed) computes x = E x or E'x. Each pass gains a factor of about the
 // correction's size, or of 1/alpha times the ratio of the coupled masses.
 template <class Rows, class X, class Y, class Turn>

@@ -63,7 +63,7 @@ struct Cost {
 // Names the costs that have no finite value.
 std::string not_finite_costs(std::span<const Cost> costs, const Eigen::VectorXd& psi);
 
-// Adapters for the costs of a user, at the parameters of the simulated mechanism. name appears in messages, such as
+// Adapters for the costs of a user, at the parameters of the simulated mechanism. `name` appears in messages, such as
 // those for exceptions of the cost. Throws std::invalid_argument if the cost is null.
 std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const RunningCost> running, const Mechanism& mechanism,
                                             std::string name = "a running cost");

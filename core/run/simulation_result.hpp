@@ -41,7 +41,7 @@ struct SimulationStatistics {
   // rhs_evaluations counts those of the equations of motion, with each stage of a Newton iteration. jacobians counts
   // those of the same equations.
   long steps = 0, rejected = 0, rhs_evaluations = 0, factorisations = 0, jacobians = 0;
-  // newton_iterations counts those of Newton's method. linear_solves counts the linear systems of these, of the error
+  // newton_iterations counts those of Newton's method. `linear_solves` counts the linear systems of these, of the error
   // filter, and of explicit equations of motion, without refinements.
   long newton_iterations = 0, linear_solves = 0;
   // The rejected steps by reason; their sum is `rejected`. placed_again: see singular_passage.hpp.
@@ -49,7 +49,7 @@ struct SimulationStatistics {
     long error_test = 0, not_converged = 0, off_constraints = 0, not_finite = 0, placed_again = 0;
   } rejections;
   // factor_blocks counts the blocks of the explicit equations' factor (6 x 6, or 3 x 3 in the plane), diagonal ones
-  // included. linearised_states counts the states at which derivatives of these equations were evaluated.
+  // included. `linearised_states` counts the states at which derivatives of these equations were evaluated.
   long factor_blocks = 0, linearised_states = 0;
   double wall_seconds = 0;
   double max_position_violation = 0;                              // of |Phi| over accepted steps [m, -]

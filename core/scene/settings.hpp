@@ -16,12 +16,12 @@ enum class FormulationType { penalty, augmented_lagrangian };
 // system [M J'; J -1/alpha], which does not.
 enum class LinearSolver { cholesky, quasidefinite };
 enum class Projection { none, velocity, position_velocity };
-// Six unknowns per body, or three if joints hold all bodies in a plane (planar_model.hpp). automatic is planar if
+// Six unknowns per body, or three if joints hold all bodies in a plane (planar_model.hpp). `automatic` is planar if
 // possible.
 enum class ModelChoice { automatic, planar, spatial };
 enum class Model { spatial, planar };
-// The motion of a mechanism whose drives leave no freedom. kinematics solves its positions at each instant, and
-// dynamics integrates its equations of motion. automatic solves if possible (core/driven).
+// The motion of a mechanism whose drives leave no freedom. `kinematics` solves its positions at each instant, and
+// dynamics integrates its equations of motion. `automatic` solves if possible (core/driven).
 enum class Solve { automatic, kinematics, dynamics };
 
 struct FormulationSettings {

@@ -344,8 +344,8 @@ void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
 
 namespace {
 
-// Marks columns of right-hand sides b for which J x = b has no solution. left is the part of b that a solution leaves,
-// rows scaled to unit length. b is the sum of pieces, which may cancel.
+// Marks columns of right-hand sides b for which J x = b has no solution. `left` is the part of b that a solution
+// leaves, rows scaled to unit length. b is the sum of pieces, which may cancel.
 void note_unmet(const MatrixXd& left, const VectorXd& row_scale, std::initializer_list<MatrixXd> pieces,
                 std::vector<bool>& unmet) {
   constexpr double kOpen = 1e-7;       // of b: assembly leaves a loop open by far less

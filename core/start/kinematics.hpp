@@ -36,9 +36,9 @@ struct KinematicsResult {
   std::vector<SingularPosition> singular;  // among the times wanted
 };
 
-// start is the mechanism assembled at the first of the times, which ascend. settings gives the formulation and the
-// largest number of steps (integrator.max_steps). observe gets the motion (accelerations, multipliers) in the point.
-// go_on is called before each step with its time. Either ends the run by returning false.
+// start is the mechanism assembled at the first of the times, which ascend. `settings` gives the formulation and the
+// largest number of steps (integrator.max_steps). `observe` gets the motion (accelerations, multipliers) in the point.
+// `go_on` is called before each step with its time. Either ends the run by returning false.
 KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& start, const SimulationSettings& settings,
                                   const std::vector<double>& times,
                                   const std::function<bool(std::size_t, const StatePoint&)>& observe,

@@ -1,5 +1,5 @@
 // Implicit methods. Stage 0 of each is the explicit one at the start of the step, f(y0): the estimate and dense output
-// use it. tableaus.py beside this file computes the numbers and the weights of dense output.
+// use it. The script tableaus.py beside this file computes the numbers and the weights of dense output.
 //   Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996): [HW].
 //
 // error_filter is A_ii if all implicit stages share it, or else the real eigenvalue of A if there is one.

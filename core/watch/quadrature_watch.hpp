@@ -9,8 +9,8 @@
 // 2.
 //
 // Derivatives of psi are integrals of g_y y' + g_rho. They may be unresolved where g is not (sqrt(|x|) through zero).
-// Only one of the two sweeps knows the directions y'. ydot and rho replace them: the errors of g_y ydot and g_rho rho
-// are estimated like that of g (gradient_quadrature.hpp).
+// Only one of the two sweeps knows the directions y'. Instead, ydot and rho replace them: the errors of g_y ydot and
+// g_rho rho are estimated like that of g (gradient_quadrature.hpp).
 //
 // If the error is large, the watch searches for a pole. It halves the interval around the largest |g| along the step's
 // Hermite cubic. If |g| times the interval's length does not fall, |g| grows at least like 1/|t - t*|, which has no

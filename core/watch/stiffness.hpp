@@ -9,8 +9,8 @@
 // Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.2, "automatic stiffness detection";
 // as in their DOPRI5 and DOP853.
 //
-// Pairs: dopri5 and verner6 have two stages at the end of the step. dopri853 has one there; it is compared with the
-// first stage of the next step. rk2 and bs3 have no useful pair, and implicit methods have no such limit.
+// Pairs: dopri5 and verner6 have two stages at the end of the step. For dopri853 it is one stage there, compared with
+// the first stage of the next step. Methods rk2 and bs3 have no useful pair, and implicit methods have no such limit.
 #pragma once
 
 #include <Eigen/Core>

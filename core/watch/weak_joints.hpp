@@ -14,7 +14,7 @@
 namespace mbsopt {
 
 // The change of the accelerations, relative to the largest, if alpha is 1e4 times as large; 0 for penalties, whose
-// alpha is intended. worst_residual is that of the run (Dynamics). If it is only rounding, the function computes
+// alpha is intended. `worst_residual` is that of the run (Dynamics). If it is only rounding, the function computes
 // nothing.
 double error_of_weak_joints(const Mechanism& mechanism, const FormulationSettings& settings, double worst_residual,
                             double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);

@@ -1,5 +1,5 @@
-// Differences of all objectives in all parameters for the gradient check: on the accepted steps of the base run
-// (frozen) and with step-size control (free). Each uses a ladder of steps whose values are kept.
+// Differences of all objectives in all parameters for the gradient check. The frozen ones use the accepted steps of the
+// base run, the free ones step-size control. Each uses a ladder of steps whose values are kept.
 //
 //   GradientDifferences differences(base, settings, run);
 //   const std::string failure = differences.take(k, true);       // in parameter k, on frozen steps

@@ -1,6 +1,6 @@
 // The cost of gradients, in simulations. One simulation is a run of `simulate` with the same objectives, parameters and
 // tolerances. It compiles the mechanism, assembles it and integrates in time, with implicit stages to the tolerance of
-// the run. (Runs with derivatives solve the stages to 1e-12, which is part of their cost.) Simulation, TLM and adjoint
+// the run. Runs with derivatives solve the stages to 1e-12, which is part of their cost. Simulation, TLM and adjoint
 // run in turn. A ratio is the median of the ratios of all rounds, so that it holds on a busy machine.
 //
 //   const GradientTiming timing = time_gradients(problem.scene, objectives_of(problem));

@@ -33,7 +33,7 @@ struct IntegrationErrorOptions {
 };
 
 // The scene with factor times the integration errors. It multiplies tolerances by factor, and max_step and step by
-// factor^(1/order), since the error is O(h^order) if they choose the steps. steps is the number of steps of a run. If
+// factor^(1/order), since the error is O(h^order) if they choose the steps. `steps` is the number of steps of a run. If
 // any steps give the exact motion, tolerances choose none, and integrals keep their errors. For factor < 1 no step is
 // then longer than the mean of that run times factor^(1/order).
 Scene with_errors_times(double factor, Scene scene, long steps = 0);

@@ -33,8 +33,8 @@ LoggedColumn column_in_si(const CsvTable& table, std::string_view column, const 
 LoggedColumn times_in_seconds(const CsvTable& table, std::string_view column, const std::string& given,
                               std::optional<double> time_zero);
 
-// Reads the curve through the rows of a table that have a number, and sets the SI unit. missing allows rows without
-// one. by_row takes the number of the row, from 0, in place of the time.
+// Reads the curve through the rows of a table that have a number, and sets the SI unit. `missing` allows rows without
+// one. `by_row` takes the number of the row, from 0, in place of the time.
 void read_curve(SampleColumn& samples, Interpolation how, bool missing, bool by_row, const CsvTable& table,
                 std::vector<std::string>& read);
 

@@ -184,7 +184,7 @@ struct ExperimentSpec {
 };
 
 // The assumption of standard errors on the residuals: independent noise, noise that is correlated in time, or any noise
-// within an experiment that is independent between experiments. automatic decides by tests of the residuals.
+// within an experiment that is independent between experiments. `automatic` decides by tests of the residuals.
 enum class CovarianceType { automatic, white, newey_west, windows };
 
 struct IdentificationSpec {  // problem.cpp defines the constructors, so that they are compiled once

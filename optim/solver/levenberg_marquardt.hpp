@@ -5,9 +5,9 @@
 //
 // An active set solves this problem exactly in each step (bounded_linear_least_squares.hpp). So bounds that are active
 // at the solution cost no further evaluations, and near it the convergence is that without bounds: Kanzow, Yamashita
-// and Fukushima, Journal of Computational and Applied Mathematics 172 (2004) 375. lambda falls after a step that met
-// the model's promise, by the rule of Nielsen, report IMM-REP-1999-05, Technical University of Denmark. After another
-// step it rises until the step is shortened to the minimum of a parabola along it.
+// and Fukushima, Journal of Computational and Applied Mathematics 172 (2004) 375. The damping lambda falls after a step
+// that met the model's promise, by the rule of Nielsen, report IMM-REP-1999-05, Technical University of Denmark. After
+// another step it rises until the step is shortened to the minimum of a parabola along it.
 //
 // If the problem declares which residuals depend on which variables, factors are those of its parts (row_blocks.hpp).
 // The cost of a step is then at most linear in their number.
@@ -19,9 +19,9 @@
 // The step minimises |z + b + J d|^2 + lambda |D d|^2, a geodesic acceleration that takes no evaluation (Transtrum and
 // Sethna, "Improvements to the Levenberg-Marquardt algorithm for nonlinear least-squares minimization",
 // arXiv:1201.5885). After each trial, the model that predicted the cost best, with S or with b, makes the next step.
-// lambda rises until the matrix with S is positive definite. D is then the same for all variables in units of their
-// ranges. Otherwise a residual that changes fast in one direction would lengthen all columns and damp steps across that
-// direction, too.
+// Then lambda rises until the matrix with S is positive definite. D is then the same for all variables in units of
+// their ranges. Otherwise a residual that changes fast in one direction would lengthen all columns and damp steps
+// across that direction, too.
 //
 // With a loss, or with eliminated sigmas, the cost of the residuals is not a square. The step minimises this cost of
 // the linear residuals, by weights (LeastSquaresProblem::weights) of the residuals after the step:

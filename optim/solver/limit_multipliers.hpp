@@ -3,7 +3,7 @@
 //
 //   minimise 1/2 |z|^2 + 1/2 w^2 |s - P(s)|^2,   s = c + l/w^2,      then      l <- w^2 (s - P(s))
 //
-// P moves s into the limits, so l_i is zero if limit i is inactive. w = 0.15 |z| at the start of a round: a limit that
+// P moves s into the limits, so l_i is zero if limit i is inactive. At the start of a round w = 0.15 |z|: a limit that
 // is violated by its own size then costs 2 % of the squares at any point. Rounds end when c = P(s): the limits hold,
 // and multipliers act only at them. R. T. Rockafellar, "A dual approach to solving nonlinear programming problems by
 // unconstrained optimization", Mathematical Programming 5 (1973) 354; Nocedal and Wright, "Numerical Optimization"

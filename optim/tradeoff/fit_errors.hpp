@@ -1,6 +1,7 @@
-// The integrator's errors in an identification: in 1/2 sum z^2 over the samples of its fitted experiments, and in its
-// gradient in the unknowns, at the starting values. The reference is dopri853 and gauss6 at tight tolerances, with
-// steps shortened until both agree. Priors and losses do not depend on integration and are left out.
+// The integrator's errors in an identification. They are those in 1/2 sum z^2 over the samples of its fitted
+// experiments, and in its gradient in the unknowns, at the starting values. The reference is dopri853 and gauss6 at
+// tight tolerances, with steps shortened until both agree. Priors and losses do not depend on integration and are left
+// out.
 //
 //   const FitErrors errors = measure_fit_errors(problem, data, {{"own", problem.scene.simulation}});
 //   errors.settings.at(0).cost;   // |cost - cost*| / |cost*|

@@ -51,8 +51,8 @@ struct TradeoffOptions {
 Tradeoff measure_tradeoff(const Scene& scene, const std::vector<Objective>& objectives,
                           const TradeoffOptions& options = {});
 
-// The row of the simulation with the settings of a gradient's row, or of a looser one of the same kind that is already
-// as exact as the reference. For a simulation's row it is that row. There is none if it was not measured.
+// The row of the simulation with the settings of a gradient's row. A looser row of the same kind may replace it if it
+// is already as exact as the reference. For a simulation's row it is that row. There is none if it was not measured.
 std::optional<std::size_t> simulation_of(const Tradeoff& tradeoff, std::size_t row);
 
 // The fastest row whose bounds in these quantities are within the accuracy. A bound excludes errors that pass through

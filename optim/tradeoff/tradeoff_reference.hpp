@@ -3,8 +3,8 @@
 //
 // The methods are dopri853 (explicit) and gauss6 (implicit). verner6 and radau5 replace one that fails (stiff motion,
 // singular positions). If equations were not satisfied near singular positions, gauss6 and radau5 also take steps of
-// one size: step-size control takes ever shorter steps around these positions, and some stage comes too close. The
-// equations are the constrained ones (augmented Lagrangian, projected) for any scene.
+// one size. Step-size control would take ever shorter steps there, and some stage would come too close. The equations
+// are the constrained ones (augmented Lagrangian, projected) for any scene.
 //
 //   const TradeoffReference reference = converged_reference(runs);
 //   if (reference.ok()) reference.errors->of(answer);
