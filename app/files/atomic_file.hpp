@@ -16,7 +16,7 @@ class OutputError : public std::runtime_error {
 // The system did not accept the output.
 class WriteError : public OutputError {
  public:
-  WriteError(const std::filesystem::path& path, const char* what);  // with the reason that errno gives
+  WriteError(const std::filesystem::path& path, const char* what);  // adds the reason from errno
 };
 
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);  // throws WriteError

@@ -13,9 +13,9 @@ namespace mbsopt {
 struct ImportedProblem {
   std::string name;                   // of the model; that of a file
   std::string text;                   // of the problem file; the lists stand in its comments, too
-  std::vector<std::string> changed;   // what it says otherwise, sentences
+  std::vector<std::string> changed;   // changed content, in sentences
   std::vector<std::string> warnings;  // why simulate fails: bodies without mass that no joint holds
-  std::vector<std::string> dropped;   // what it does not hold: "line 12: joint range"
+  std::vector<std::string> dropped;   // omitted parts: "line 12: joint range"
   std::size_t bodies = 0, joints = 0;
 };
 

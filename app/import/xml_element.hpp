@@ -24,7 +24,7 @@ class XmlElement {
   std::vector<const XmlElement*> children(std::string_view child_name) const;
   std::vector<const XmlElement*> children() const;  // all of them, in the order of the file; marks none as read
   void mark_read() const { read_ = true; }
-  void mark_unread() const { read_ = false; }  // asked for, and then not used
+  void mark_unread() const { read_ = false; }  // read, and then not used
 
   struct Unread {
     int line;

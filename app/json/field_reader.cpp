@@ -116,7 +116,7 @@ const TypeRow* FieldReader::type(std::string_view key, std::string_view, std::sp
   const Node* const node = get(key, {says.description, Need::optional, {}});
   if (!node) {
     missing_.push_back({std::string(key), "is missing; available: " + joined(names_of(rows))});
-    findings_.add_elsewhere(path_);  // what else the object needs depends on it
+    findings_.add_elsewhere(path_);  // other requirements of the object depend on it
     return nullptr;
   }
   std::string given;

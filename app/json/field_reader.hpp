@@ -140,7 +140,7 @@ class FieldReader {
   };
   const Missing* missing_like(const std::string& unknown) const;
   void skip(std::string_view key, const Says& says) { get(key, says); }
-  void refuse(std::string_view key, const std::string& message);  // where it is given
+  void refuse(std::string_view key, const std::string& message);  // reports a given key
 
   // Returns the value of a key, which is known from now on. If it is absent, it returns nullptr and reports a required
   // one.

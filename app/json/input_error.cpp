@@ -7,7 +7,7 @@ namespace mbsopt {
 namespace {
 
 std::string lines(const std::vector<Finding>& findings) {
-  constexpr std::size_t kShown = 100;  // more than anyone mends before the next try
+  constexpr std::size_t kShown = 100;  // more than a user corrects before the next run
   std::string all;
   for (std::size_t i = 0; i < std::min(kShown, findings.size()); ++i) {
     if (!all.empty()) all += '\n';

@@ -98,7 +98,7 @@ class NodeBuilder : public nlohmann::json_sax<nlohmann::json> {
     Node node;
     std::string path;
     std::unordered_set<std::string> keys;
-    std::vector<std::size_t> repeated;  // which of the node's keys were there before
+    std::vector<std::size_t> repeated;  // repeated keys of the node
   };
 
   bool number(double value) { return scalar(Node::Kind::number).number = value, true; }

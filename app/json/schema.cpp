@@ -35,7 +35,7 @@ class SchemaWriter {
  public:
   Json properties = Json::object();
   Json required = Json::array();
-  Json dependent = Json::object();  // what the presence of a key asks of others
+  Json dependent = Json::object();  // requirements that a key makes on others
   std::span<const TypeRow> rows;    // of an object with a type
   std::string type_key;
 

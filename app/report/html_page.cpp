@@ -17,7 +17,7 @@ namespace {
 // [-1.234567e-05, -1.234567e-05].
 constexpr std::size_t kWords = 32;
 
-constexpr std::size_t kFewColumns = 8;  // that fit a printed page of 18 cm without breaks within words
+constexpr std::size_t kFewColumns = 8;  // they fit a printed page of 18 cm without breaks within words
 
 // Writes words as the value of an attribute.
 std::string list_of(const std::vector<std::string>& words) {

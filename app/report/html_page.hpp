@@ -37,7 +37,7 @@ class HtmlPage {
   void heading(std::string_view text);
   void paragraph(std::string_view text);
   void note(std::string_view text);    // in small print
-  void banner(std::string_view text);  // what a reader must see first
+  void banner(std::string_view text);  // text that a reader must see first
   void code(std::string_view text);
   // The first column holds names; the others are numbers or short words. A dense table has narrow columns, for colours.
   void table(const std::vector<std::string>& header, const std::vector<TableRow>& rows, bool dense = false);

@@ -192,7 +192,7 @@ class PathText {
 
   std::string text_;
   char command_ = 0;
-  long x_ = 0, y_ = 0;  // where it ends [0.1 px]
+  long x_ = 0, y_ = 0;  // its end [0.1 px]
 };
 
 std::size_t colour_of(const PlotSeries& series, std::size_t index) {

@@ -24,7 +24,7 @@ struct PlotSeries {
   std::string name;
   std::vector<double> x, y;  // values that are not finite are left out
   Mark mark = Mark::line;
-  std::optional<std::size_t> part_of = {};  // that series: in its colour, and not in the legend
+  std::optional<std::size_t> part_of = {};  // takes that series' colour, and no place in the legend
   std::optional<std::size_t> colour = {};   // else the number of the series
 };
 

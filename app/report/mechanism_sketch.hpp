@@ -27,7 +27,7 @@ struct SketchedJoint {
 
 struct SketchedSpring {
   BodyPoint from, to;
-  bool spring, damper;  // which of the two acts
+  bool spring, damper;  // whether each of them acts
 };
 
 // The point of a position sensor, whose path is drawn.

@@ -14,7 +14,7 @@ namespace mbsopt {
 namespace {
 
 constexpr std::size_t kMostNumbers = 20'000;  // of all poses: some 200 kB of the page
-constexpr std::size_t kFewestRows = 60;       // with fewer a motion is no longer smooth
+constexpr std::size_t kFewestRows = 60;       // fewer rows do not show a smooth motion
 constexpr std::size_t kPose = 7;              // x y z e0 e1 e2 e3
 
 std::string vector_of(const Eigen::Vector3d& v) { return fmt::format("[{:.6g},{:.6g},{:.6g}]", v.x(), v.y(), v.z()); }

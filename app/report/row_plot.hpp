@@ -16,9 +16,9 @@ namespace mbsopt {
 struct PlotRow {
   std::string name;
   double low = 0, high = 0;                             // the bar
-  std::optional<double> ring = {};                      // where something started
-  std::optional<double> dot = {};                       // where it ended
-  std::vector<double> bounds = {};                      // what is out of sight is left out
+  std::optional<double> ring = {};                      // a starting value
+  std::optional<double> dot = {};                       // a final value
+  std::vector<double> bounds = {};                      // bounds outside the plot are not drawn
   std::optional<std::pair<double, double>> prior = {};  // an interval, drawn thin above the bar
   std::string words = {};                               // at the right, with the numbers
 };

@@ -11,7 +11,7 @@ struct SimulatedMotion {
   Trajectory trajectory;                           // up to the last good time where the simulation failed
   Eigen::VectorXd psi;                             // per objective of the problem, where the simulation is ok
   std::vector<std::optional<double>> true_values;  // of smooth maxima and minima among them
-  ModelSummary model;                              // where the assembly is ok
+  ModelSummary model;                              // set if the assembly is ok
   std::vector<std::string> warnings;               // of the start
   Trajectory forces = {};                          // of joints (joint_forces.hpp)
   std::vector<std::vector<double>> instants = {};  // per objective, of its tracked points without prescribed timing [s]

@@ -44,7 +44,7 @@ struct CommandOptions {
   bool allow_plugins = false;         // --allow-plugins
   bool json = false;                  // --json: only result.json on standard output
   bool keep_journal = false;          // --keep-journal of design, identify and sweep
-  bool resume = false;                // go on with the journal in `out`
+  bool resume = false;                // continue with the journal in `out`
 };
 
 struct CommandContext {
@@ -54,7 +54,7 @@ struct CommandContext {
   std::ostream& out;             // results as text; with --json they are left out
   std::ostream& err;             // progress and errors
   bool err_is_terminal = false;  // a bar may be drawn
-  std::ostream* json = nullptr;  // with --json: where result.json is printed
+  std::ostream* json = nullptr;  // the stream for result.json with --json
   NamedTerms terms = {};         // in C++, which the problem may call by name: those of the program
   Ranks* ranks = nullptr;        // other processes that compute for this one, under mpirun
   mutable std::shared_ptr<const ProblemSource> source = nullptr;  // once Run has read the problem

@@ -20,7 +20,7 @@ namespace mbsopt {
 class LongRun {
  public:
   explicit LongRun(Run& run);
-  ~LongRun();  // says how to go on where an exception ends the run
+  ~LongRun();  // says how to continue if an exception ends the run
   LongRun(const LongRun&) = delete;
   LongRun& operator=(const LongRun&) = delete;
 

@@ -23,7 +23,7 @@ class OutputFolder {
                const std::string& command);
 
   const std::filesystem::path& path() const { return path_; }
-  const std::string& owner() const { return owner_; }  // what result.json stores as provenance.input
+  const std::string& owner() const { return owner_; }  // provenance.input in result.json
   // Locks the folder and removes unfinished files of a killed run. Throws OutputError if another command writes into
   // it, or has done so since.
   std::unique_ptr<FolderLock> claim() const;

@@ -19,7 +19,7 @@ struct SweepOptions {
 };
 
 struct SweepPoints {
-  std::vector<int> parameters;          // that are varied: their indices
+  std::vector<int> parameters;          // indices of the varied ones
   std::vector<Eigen::VectorXd> values;  // one vector of those per point
 };
 

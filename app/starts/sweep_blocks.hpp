@@ -21,7 +21,7 @@ struct SweepRow {
   std::string message;  // why there are no values
   Eigen::VectorXd psi;
   std::vector<std::optional<double>> true_values;
-  Eigen::MatrixXd psi_rho;  // empty unless gradients are asked for
+  Eigen::MatrixXd psi_rho;  // empty unless gradients are requested
 };
 
 // Returns a row per point, in their order. The journal gives those of earlier runs.

@@ -18,6 +18,6 @@ class InterruptGuard {
 };
 
 bool interrupted();
-void interrupt();  // as if a signal had come
+void interrupt();  // has the effect of a signal
 
 }  // namespace mbsopt

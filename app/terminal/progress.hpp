@@ -49,7 +49,7 @@ class Progress {
   double patience_;      // [s] of silence
   bool line_open_ = false;
   int shown_percent_ = -1;
-  std::string doing_;            // what the last fraction was of
+  std::string doing_;            // the task of the last fraction
   double began_ = 0, done_ = 0;  // when it was first told [s], and how much was done then
 };
 

@@ -43,7 +43,7 @@ class Flow {
  private:
   const Mechanism mechanism_;
   Dynamics dynamics_;
-  std::optional<MotionSolver> motion_;  // where some sensor needs it
+  std::optional<MotionSolver> motion_;  // set if a sensor needs it
   std::vector<double> times_;           // of accepted steps, where angles are followed
   std::vector<Eigen::VectorXd> angles_;
   double t_;

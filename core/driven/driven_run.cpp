@@ -198,7 +198,7 @@ DrivenRun::Panel DrivenRun::try_panel(double t1) {
     const bool is_extreme = costs_[static_cast<std::size_t>(running_[r].objective)].is_extreme;
     const double of_panel = s.rtol * I.absolute + (is_extreme ? 0 : s.atol * h);
     const double of_run = kPartOfRun * s.rtol * (absolute_(running_[r].objective) + I.absolute);
-    if (I.error > std::max(of_panel, of_run)) return Panel::refused;  // what is no number is found at the end
+    if (I.error > std::max(of_panel, of_run)) return Panel::refused;  // the end of the run reports NaN
   }
   return Panel::accepted;
 }

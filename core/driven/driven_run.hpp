@@ -63,7 +63,7 @@ class DrivenRun {
   void end_panel(double t0, double t1);
   void stop(SimulationStatus status, const std::string& message);
   bool go_to(double t);
-  std::string why_it_ends();  // where the path cannot go on
+  std::string why_it_ends();  // the reason why the path cannot continue
   StatePoint point() { return point_of(path_.state()); }
   StatePoint point_of(const DrivenState& s) { return {s.t, s.y, s.angles, motion_ ? &*motion_ : nullptr}; }
 
@@ -73,7 +73,7 @@ class DrivenRun {
   const RunOptions& options_;
   const Model model_;
   DrivenPath path_;
-  std::optional<MotionSolver> motion_;  // where some sensor needs it
+  std::optional<MotionSolver> motion_;  // set if a sensor needs it
   SampleSchedule schedule_;
   LawJumps law_jumps_;
   const bool differentiated_;
@@ -81,7 +81,7 @@ class DrivenRun {
   std::vector<DrivenTerm> running_;  // of one node
   std::vector<DrivenTerm> at_instant_;
   std::vector<DrivenState> nodes_;  // of the panel; none without running costs
-  DrivenState from_;                // where the panel begins
+  DrivenState from_;                // the start of the panel
   std::vector<double> g_;           // running cost x node
   Eigen::VectorXd absolute_;        // integral of |g| so far, per cost
   std::vector<PanelIntegral> integrals_;

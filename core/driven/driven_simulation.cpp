@@ -206,7 +206,7 @@ SimulationResult driven_adjoint(const Mechanism& mechanism, const SimulationSett
   run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
     if (!derivatives.linearise(at)) return false;
     ++result.statistics.linearised_states;
-    while (!terms.empty()) {  // those of one objective stand together
+    while (!terms.empty()) {  // terms of one objective are adjacent
       const auto other = std::ranges::find_if(
           terms, [&](const DrivenTerm& term) { return term.objective != terms.front().objective; });
       const std::size_t o = static_cast<std::size_t>(terms.front().objective),

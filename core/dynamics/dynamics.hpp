@@ -36,7 +36,7 @@ class Dynamics {
                    Eigen::VectorXd& rho_bar);
 
   bool is_planar() const { return planar_ != nullptr; }
-  SpatialDynamics& in_space() { return *spatial_; }  // where it is not planar
+  SpatialDynamics& in_space() { return *spatial_; }  // only if it is not planar
   long factor_blocks() const;
   long factorisations() const;
   long linearised_states() const { return linearised_states_; }

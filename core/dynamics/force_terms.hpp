@@ -30,7 +30,7 @@ class ForceTerms {
   void add_loads(const At& at, std::vector<Vec<6>>& loads, bool but_springs = false);  // PlanarSprings has those
   // The derivatives of the loads in the state as blocks, and in the directions of fields and parameters with bodies at
   // rest. `units` holds the unit tangents of all bodies after the ground's.
-  void mark_units(std::vector<bool>& bodies) const;  // that add_blocks() reads
+  void mark_units(std::vector<bool>& bodies) const;  // marks those that add_blocks() reads
   // but_torques leaves out torques about hinges and free torques. A free torque is an applied torque with components in
   // global axes that reads no sensor.
   void add_blocks(const At& at, const std::vector<UnitTangents>& units, MotionBlocks& out, bool but_torques = false);

@@ -17,7 +17,7 @@ namespace mbsopt {
 
 class InertiaUpdate {
  public:
-  using Inertias = std::vector<UserLoads::Inertia>;  // at the state in hand, the same ones in all calls
+  using Inertias = std::vector<UserLoads::Inertia>;  // at the present state, the same ones in all calls
   InertiaUpdate(const MechanismData& data, const Inertias& added);
 
   // Call this after each factorisation.

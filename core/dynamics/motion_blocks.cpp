@@ -48,7 +48,7 @@ int MotionBlocks::find(const std::vector<Place>& places, const std::vector<int>&
       high = middle;
     }
   }
-  assert(low < begin[at(row) + 1] && places[at(low)].body == body);  // what is not coupled (coupling.hpp) has no block
+  assert(low < begin[at(row) + 1] && places[at(low)].body == body);  // uncoupled bodies (coupling.hpp) have no block
   return low;
 }
 

@@ -97,7 +97,7 @@ class MotionTerms {
     MotionBlocks blocks;
     ConstraintBlocks constraints;
     std::vector<UnitTangents> units;
-    std::vector<std::size_t> bodies_of_units;  // where something reads them
+    std::vector<std::size_t> bodies_of_units;  // bodies whose units are read
     bool current = false;
   };
   std::optional<Linearisation> linear_;

@@ -49,7 +49,7 @@ class PlanarDynamics {
   Vec<3> z_against_gravity(std::size_t body) const {
     return z_[body - 1] - Vec<3>(model_.gravity.re, model_.gravity.im, 0);
   }
-  void prepare_tangents();  // what all directions share, after linearise()
+  void prepare_tangents();  // the common part of all directions, after linearise()
   void prepare_force_tangents();
   void add_torque_blocks();
   void add_force_tangent(const ParameterBlock& block, const LaneRows& y_dir);
@@ -73,11 +73,11 @@ class PlanarDynamics {
   PlanarConstraints::Frames frames_;
   std::vector<Vec<3>> loads_, z_, eta_;
   Eigen::VectorXd gamma_, phi_, phi_dot_, lambda_, mu_, g_;  // of the rows in the plane
-  Eigen::VectorXd lambda_of_phi_;                            // of all; those that hold by themselves have none
+  Eigen::VectorXd lambda_of_phi_;  // of all rows; 0 for rows that every planar motion satisfies
 
   PlanarSprings springs_;
   bool springs_in_plane_ = false;  // at this state
-  const bool torques_in_plane_;    // those about hinges, and free ones
+  const bool torques_in_plane_;    // torques about hinges, and free ones
   const bool only_torques_;        // in the plane; no other force depends on the state
   // The forces, and the bodies in space that they read and load.
   bool has_springs_, has_other_forces_;

@@ -11,7 +11,7 @@ namespace mbsopt {
 
 class PlanarSprings {
  public:
-  explicit PlanarSprings(const MechanismData& data);  // with a planar model
+  explicit PlanarSprings(const MechanismData& data);  // data must have a planar model
 
   // Whether both points of each spring lie at the same height along n. Bodies keep their heights, but states may
   // differ.

@@ -20,7 +20,7 @@ namespace mbsopt {
 
 class StageEquations {
  public:
-  explicit StageEquations(SpatialDynamics& dynamics);  // which lends its terms and the rows of its solver
+  explicit StageEquations(SpatialDynamics& dynamics);  // uses its terms and the rows of its solver
 
   static Eigen::Index count(const MechanismData& data) { return 7 * data.n + data.m; }
 

@@ -41,7 +41,7 @@ enum class Operation : unsigned char {
   smooth_abs,  // sqrt(a^2 + b^2)
   sign,        // -1, 0 or 1: the derivative of abs; only derivative programs use it
   not_above,   // 1 where a <= b, else 0: the choice of min and max; only derivative programs use it
-  curve,       // a function through samples (curve.hpp) of a; whoever holds the curve evaluates it
+  curve,       // a function through samples (curve.hpp) of a; the owner of the curve evaluates it
 };
 
 // 0 for number and name, else 1 or 2.

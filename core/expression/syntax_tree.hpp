@@ -22,7 +22,7 @@ struct SyntaxNode {
   std::optional<Dimension> unit;            // of a number that has one; none: it may stand for anything
   std::string name;                         // of a name
   std::shared_ptr<const Curve> curve = {};  // of a curve
-  std::size_t offset = 0;                   // where it stands in the text [bytes]
+  std::size_t offset = 0;                   // its place in the text [bytes]
 };
 
 struct SyntaxTree {

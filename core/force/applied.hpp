@@ -20,7 +20,7 @@ struct AppliedForce {
   Vector3d s = Vector3d::Zero();  // the point, from the centre of mass, body axes [m]
   int slot = -1;
   std::array<Program, 3> components;  // inputs: all parameters, t, all sensors of the scene
-  std::vector<int> parameters;        // that the components use
+  std::vector<int> parameters;        // used by the components
   std::vector<int> sensors;           // the same
 
   void add_load(const Vector3d& c, const Frame& f, Vec<6>& load) const;

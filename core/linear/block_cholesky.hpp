@@ -62,7 +62,7 @@ class BlockCholesky {
   std::vector<Elimination::Place> handles_;
   std::vector<Block> diagonal_, lower_;  // S before factor(), inv(L_kk) below the diagonal and L_ik after
   std::vector<Vec<N>> inverse_;          // of D
-  std::vector<Block> scaled_;            // L_ik D_k of the column in hand
+  std::vector<Block> scaled_;            // L_ik D_k of the present column
 };
 extern template class BlockCholesky<6>;
 extern template class BlockCholesky<3>;

@@ -23,7 +23,7 @@ class BlockLu {
   // The place of a block: of one body, or of two bodies that an edge joins.
   struct Handle {
     std::size_t offset = 0;
-    bool transposed = false;  // as it is stored
+    bool transposed = false;  // whether it is stored transposed
   };
   Handle handle(int row_body, int column_body) const;
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kAlpha = 1e8;
 constexpr int kMostPasses = 60;
-constexpr double kRounding = 1e-16;  // of x, what a pass still changes
+constexpr double kRounding = 1e-16;  // of x: the last change by a pass
 constexpr double kStagnation = 0.5;  // a pass that changes more than that part of the one before is the last
 constexpr int kLeastPasses = 3;
 

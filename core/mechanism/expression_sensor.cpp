@@ -38,7 +38,7 @@ struct ExpressionSensor final : SensorFunction {
   };
   Program program;
   std::size_t inputs = 0, time = 0;
-  std::vector<std::size_t> parameters;  // that the expression itself uses
+  std::vector<std::size_t> parameters;  // used by the expression itself
   std::vector<Below> below;
   bool is_rate = false;
 

@@ -91,7 +91,7 @@ struct MechanismData {
   std::vector<KinkedSignal> kinks;                                // of signals and laws
   int largest_law = 0;                                            // inputs of the largest law, for scratch
 
-  std::shared_ptr<const PlanarModel> planar;  // where joints hold all bodies in a plane
+  std::shared_ptr<const PlanarModel> planar;  // set if joints hold all bodies in a plane
   std::string not_planar;                     // else why not
 
   bool needs_motion = false;    // some sensor does

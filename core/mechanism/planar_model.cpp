@@ -190,7 +190,7 @@ class Search {
     }
     return false;
   }
-  bool rises(const Vector3d& n, int slot) const {  // with a parameter
+  bool rises(const Vector3d& n, int slot) const {  // whether a parameter changes the height
     if (slot < 0) return false;
     const auto change = data_.theta_rho.middleRows<3>(slot);
     return (n.transpose() * change).cwiseAbs().maxCoeff() > kParallel * change.cwiseAbs().maxCoeff();
@@ -200,7 +200,7 @@ class Search {
   // Returns a message on a body that no joint holds, or an empty string.
   std::string body_not_held() const {
     std::vector<std::vector<int>> neighbours(data_.bodies.size());
-    int seen = -1;  // the joint whose first dot-1, one with axis 2, has been looked at
+    int seen = -1;  // the joint whose first dot-1, which has axis 2, was tested
     for (const Constraint& c : data_.constraints) {
       if (c.joint < 0 || c.joint == seen || !std::holds_alternative<Dot1>(c.primitive)) continue;
       seen = c.joint;

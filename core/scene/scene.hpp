@@ -120,7 +120,7 @@ struct Joint {
 struct SampleColumn {
   std::string file, column, time = "t";
   std::string unit = {}, time_unit = {};  // instead of the units that the headers name; empty: these, else SI
-  std::optional<double> time_zero = {};   // what the file shows at t = 0 [s]
+  std::optional<double> time_zero = {};   // the file's time at t = 0 [s]
   std::shared_ptr<const Curve> curve = {};
   static constexpr double kFirstRow = std::numeric_limits<double>::lowest();  // a time_zero: that of the first row
 };
@@ -164,7 +164,7 @@ struct Rsda {
   Field stiffness, damping, free_angle;
   std::optional<Expression> law;  // of angle, rate, t and parameters
 };
-struct TorsionBar {  // as an rsda, between two bodies that need no joint
+struct TorsionBar {  // an rsda between two bodies without a joint
   static constexpr std::string_view kType = "torsion_bar";
   std::string body1 = "ground", body2;
   std::optional<PointField> axis;  // in body1
@@ -205,9 +205,9 @@ struct FrictionSpec {
 struct UserForceSpec {
   static constexpr std::string_view kType = "user";
   std::string force;
-  std::vector<std::string> bodies;             // on which it acts; when empty those that it names itself
+  std::vector<std::string> bodies;             // loaded bodies; if empty, it names them itself
   std::vector<TermParameter> parameters;       // the reader of the file puts them into the order of the term
-  std::shared_ptr<const UserForce> term = {};  // that the name stands for
+  std::shared_ptr<const UserForce> term = {};  // the term of that name
 };
 struct Force {
   std::string name;

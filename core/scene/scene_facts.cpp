@@ -250,7 +250,7 @@ std::optional<Dimension> SceneFacts::dimension_of_name(const std::string& name) 
     found = infer_dimension(*definition, [this](const std::string& inner) { return dimension_of_name(inner); });
   } catch (const DimensionError&) {  // reported at the definition
   }
-  if (found && found->is_none()) found.reset();  // as a plain number: it may stand for anything
+  if (found && found->is_none()) found.reset();  // a plain number may have any dimension
   return dimensions_[name] = found;
 }
 

@@ -89,7 +89,7 @@ struct SimulationSettings {
   // must still be chosen for it (optim/tradeoff/accuracy.hpp), and nothing can be simulated.
   std::optional<double> accuracy;
   std::vector<double> events;        // times at which a step ends and the next begins [s]
-  double adjoint_memory_mib = 1024;  // what an adjoint run keeps of the forward motion, at most [MiB]
+  double adjoint_memory_mib = 1024;  // limit of the forward motion that an adjoint run keeps [MiB]
 };
 
 }  // namespace mbsopt

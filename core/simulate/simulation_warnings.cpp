@@ -19,7 +19,7 @@ constexpr double kGivingWay = 1e-8;        // of the accelerations; gradients ha
 constexpr double kTakenOut = 1e-4;         // by projections: those of the integration errors are of the order of rtol
 constexpr double kEnergyLost = 1e-2;       // of the largest energy
 constexpr double kUnresolved = 3e-2;       // of the integral of a running cost's size; estimates are pessimistic
-constexpr double kWithinSteps = 100;       // tolerances: two of the digits that were asked for
+constexpr double kWithinSteps = 100;       // tolerances: two of the requested digits
 constexpr double kLargePenalty = 3e10;     // above it rounding by Cholesky passes 1e-5 of the accelerations
 constexpr double kDigitsPerAlpha = 1e-16;  // docs/formulations.md, measured
 

@@ -291,7 +291,7 @@ struct Assembly::Solution {
   double start;
   Modes modes;
   const MechanismData& data;
-  Equilibrium equilibrium;  // where the scene starts from one
+  Equilibrium equilibrium;  // set if the scene starts from one
   AssemblyEquations position, velocity;
   std::optional<NearestPoint> q, v;
   AssemblyResult result;

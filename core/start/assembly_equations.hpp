@@ -24,7 +24,7 @@ struct AssemblyTarget {
   SensorPtr rate;  // its time derivative; at velocity level the sensor itself
   double value = 0;
   int slot = -1;
-  double branch = 0;  // of an angle: the value last accepted, from which it is continued
+  double branch = 0;  // of an angle: the last accepted value, from which it continues
 };
 
 class AssemblyEquations {

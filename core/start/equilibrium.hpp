@@ -21,7 +21,7 @@ namespace mbsopt {
 
 struct Equilibrium {
   bool ok = false;
-  std::string message;    // what is left where it failed
+  std::string message;    // the remaining acceleration, if it failed
   Eigen::VectorXd q;      // 7n
   Eigen::MatrixXd q_rho;  // 7n x P, all parameters
   int iterations = 0;

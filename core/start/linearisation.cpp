@@ -72,7 +72,7 @@ void add_eigenvalues(Linearisation& x) {
   const GeneralEigen eigen = general_eigen(A);
   std::vector<Index> order(static_cast<std::size_t>(2 * f));
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(),  // which keeps pairs together
+  std::stable_sort(order.begin(), order.end(),  // keeps pairs together
                    [&](Index i, Index j) { return std::abs(eigen.values(i)) < std::abs(eigen.values(j)); });
   x.eigenvalues.resize(2 * f), x.errors.resize(2 * f), x.modes.resize(x.basis.rows(), 2 * f);
   for (Index k = 0; k < 2 * f; ++k) {

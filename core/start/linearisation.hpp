@@ -31,7 +31,7 @@ struct Linearisation {
   Eigen::VectorXd errors;        // of the eigenvalues, by rounding: an estimate [1/s]
   double length = 0;             // the size of the mechanism [m]
   double distance = 0;           // of the equilibrium that A predicts, relative to the length
-  double free_acceleration = 0;  // what no displacement balances, relative to the length [1/s^2]
+  double free_acceleration = 0;  // the part that no displacement balances, relative to the length [1/s^2]
   double gravity = 0;            // the same of gravity
   double largest_rate = 0;       // of turning, and speeds of centres of mass over the length [1/s]
 };

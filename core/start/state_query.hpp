@@ -44,14 +44,14 @@ class StateQuery {
   // Unknown names throw std::invalid_argument.
   BodyMotion body(const std::string& name) const;
   PointMotion point(const std::string& body, const Eigen::Vector3d& in_body_frame) const;
-  Eigen::Index index(const std::string& body) const;  // where its numbers begin in q
+  Eigen::Index index(const std::string& body) const;  // the index of its first number in q
   struct Rows {
     Eigen::Index first = 0, count = 0;
   };
   Rows rows(const std::string& joint_or_drive) const;  // in Phi
 
   const Eigen::VectorXd& qddot() const { return a_; }
-  const Eigen::VectorXd& lambda() const { return lambda_; }  // those of the unit norms, too
+  const Eigen::VectorXd& lambda() const { return lambda_; }  // with those of the unit norms
   Eigen::VectorXd Phi() const;
   Eigen::VectorXd Phidot() const;
   Eigen::VectorXd Phiddot_v() const;

@@ -33,20 +33,20 @@ class JumpWatch {
   void add_to(SimulationStatistics& statistics) const;
 
  private:
-  enum class Of { sensors, law, time };  // what the inputs are, beside parameters and t
+  enum class Of { sensors, law, time };  // the inputs beside parameters and t
   struct Switch {
     Program program;
     std::vector<int> parameters;  // active ones that it uses
     bool motion = false;          // it uses the state
-    double last = 0, now = 0;     // its sign, where it was not 0 last; at the instant in hand
+    double last = 0, now = 0;     // its last sign other than 0; its present sign
   };
   struct Function {
-    Jump jump;  // as far as it is known
+    Jump jump;  // the known part
     const Program* program;
     Of of;
     Forces::Place place;  // of a force with a law
     std::vector<Switch> switches;
-    std::vector<int> parameters;         // that its reported jumps name
+    std::vector<int> parameters;         // named by its reported jumps
     bool motion = false;                 // some of them name the motion
     bool is_new(const Switch& s) const;  // names more
   };
@@ -54,7 +54,7 @@ class JumpWatch {
   void add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of,
            Forces::Place place = {});
   void set_inputs(const Function& f, const StatePoint& at);
-  void place_at(double theta);  // between the last state and the one in hand: t_, y_
+  void place_at(double theta);  // sets t_, y_ between the last state and the present one
   void set_inputs_at(double theta, const Function& f);
   bool search(Function& f, Switch& s, double from, double to);  // whether a jump was reported
   double value(const Function& f, const Program& p, double theta);

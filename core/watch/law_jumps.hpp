@@ -28,7 +28,7 @@ class LawJumps {
   Jump find(const TimeLaw& law, Of what, double t0, double t1);
 
   const MechanismData& data_;
-  std::vector<const RowLaw*> laws_;  // those of an expression: constants and splines are smooth
+  std::vector<const RowLaw*> laws_;  // expressions only: constants and splines are smooth
   std::vector<double> inputs_;       // all parameters, then t
   Program::Scratch scratch_;
 };

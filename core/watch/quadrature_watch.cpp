@@ -9,13 +9,13 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kPoor = 1e-4;        // of the integral of |g| so far: an estimate above it asks for a look at the step
+constexpr double kPoor = 1e-4;        // of the integral of |g| so far: a larger estimate starts a search in the step
 constexpr double kNarrowest = 1e-12;  // of a step
 constexpr double kFalls = 0.03;       // |g| times width does by more over half of all halvings, up to |t|^-0.7
 constexpr double kBounded = 1e-7;     // of a step: a |g| that has not grown threefold there does not
 constexpr int kPoints = 9, kMostSearches = 200;
 constexpr double kOffset = 0.471;      // not half: poles are at round times
-constexpr double kMetExactly = 1e-12;  // of what is met exactly but for that, estimates say nothing
+constexpr double kMetExactly = 1e-12;  // estimates below it are rounding
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
@@ -63,7 +63,7 @@ std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::sp
     integral.last_g = g_[0];
     power = 1;
   }
-  if (!(size > 0 && std::isfinite(size))) return {};  // what is not finite is said at the end
+  if (!(size > 0 && std::isfinite(size))) return {};  // the end of the run reports it
   integral.of_size += size;
   const double share = std::min(1.0, std::abs(difference) / size);
   const double error = size * std::pow(share, static_cast<double>(method_.order) / power);

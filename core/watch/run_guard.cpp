@@ -13,10 +13,10 @@ namespace mbsopt {
 namespace {
 
 constexpr double kUnmetAcceleration = 1e-3;                 // relative, of accelerations
-constexpr double kGrown = 0.5;                              // of the energy there is
-constexpr double kNoticeableChange = 1e-3;                  // of the natural energy: below it a change is none
+constexpr double kGrown = 0.5;                              // of the total energy
+constexpr double kNoticeableChange = 1e-3;                  // of the natural energy: smaller changes are ignored
 constexpr double kFastest = 299792458, kFastestTurn = 1e6;  // light [m/s]; ten times the fastest turbine [rad/s]
-constexpr double kGrowth = 1e3;                             // of what is faster from the start
+constexpr double kGrowth = 1e3;                             // of the largest speed at the start
 constexpr double kHalfTurn = 3.13;  // [rad]: nearer, the axis of the rotation may reverse within two hundredths
 
 // The natural size of the energy of a motion. It is a scale for runs that begin at rest at zero potential.

@@ -387,7 +387,7 @@ class Check {
   VectorXd rho_, size_;
   StepSequence steps_;
   std::optional<GradientDifferences> differences_;
-  RoundingScatter rounding_;  // where it was measured; else 0
+  RoundingScatter rounding_;  // 0 if it was not measured
   bool rounding_known_ = false;
   std::mt19937 generator_{options_.seed};
   GradientCheck result_;

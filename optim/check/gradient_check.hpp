@@ -59,8 +59,8 @@ struct CheckedEntry {
   double frozen_difference = 0;           // |frozen - tlm| relative to the entry
   double free_difference = 0;             // |free - tlm| relative to the entry
   Verdict exact = Verdict::disagrees;     // TLM against adjoint
-  std::optional<Verdict> frozen_verdict;  // where steps can be frozen
-  std::optional<Verdict> free_verdict;    // where free differences were asked for
+  std::optional<Verdict> frozen_verdict;  // set if steps can be frozen
+  std::optional<Verdict> free_verdict;    // set if free differences were requested
   std::vector<LadderRung> rungs;          // h falling
 };
 
@@ -81,7 +81,7 @@ struct GradientCheck {
   std::vector<TaylorCheck> taylor;
   std::vector<IdentityCheck> identities;
   bool discrete = true;                       // false: tlm and adjoint are sensitivities by CVODES
-  std::optional<ContinuousCheck> continuous;  // where it was asked for
+  std::optional<ContinuousCheck> continuous;  // set if requested
   MethodCost simulation, tlm_cost, adjoint_cost, frozen_cost, free_cost;  // differences: of all of them
   int timing_rounds = 0;
   SimulationStatistics statistics;       // of the base run

@@ -99,7 +99,7 @@ class GradientDifferences {
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> on_base_steps_;  // a free difference
   // psi at h and -h on frozen and free steps, by parameter and |h|.
   std::map<std::pair<Eigen::Index, double>, std::array<std::array<Eigen::VectorXd, 2>, 2>> rungs_;
-  Eigen::MatrixXd jump_;  // of psi, between the steps of the base run and those chosen anew
+  Eigen::MatrixXd jump_;  // of psi, between the steps of the base run and free steps
 };
 
 }  // namespace mbsopt

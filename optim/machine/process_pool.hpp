@@ -20,7 +20,7 @@ namespace mbsopt {
 struct JobReply {
   int job = 0;
   bool ok = false;
-  std::string text;  // what the job returned; else in words why it did not
+  std::string text;  // the job's result, or the reason of its failure
 };
 
 // The running processes.

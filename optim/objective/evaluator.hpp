@@ -48,13 +48,13 @@ struct Evaluation {
   std::string message;                                // why not, in words
   Eigen::VectorXd rho;                                // all parameters
   Eigen::VectorXd psi;                                // per objective
-  Eigen::MatrixXd psi_rho;                            // objective x variable; 0 x 0 where only values were asked for
+  Eigen::MatrixXd psi_rho;                            // objective x variable; 0 x 0 if only values were requested
   GradientMethod method = GradientMethod::automatic;  // the one used; automatic where no simulation was needed
   std::string choice;                                 // why, in words, where there is something to say
-  std::vector<std::string> warnings;                  // what makes these numbers doubtful, sentences
+  std::vector<std::string> warnings;                  // sentences on doubts about these numbers
   SimulationStatistics statistics;
   StepSequence steps;
-  long simulations = 0;  // that this evaluation took
+  long simulations = 0;  // number for this evaluation
   double wall_seconds = 0;
   bool has_gradients() const { return psi_rho.size() > 0; }
 };

@@ -86,7 +86,7 @@ struct FreeInstants::Block {
   double square = std::numeric_limits<double>::infinity();  // D/2 at tau
   double curvature = 1;                                     // of D/2
   double earlier = 0, earlier_rate = 0;                     // tau before this one, and the rate of D/2 there
-  std::size_t node = 0;                                     // where the scan saw it
+  std::size_t node = 0;                                     // its node in the scan
 };
 
 // Finds minima on the polynomials between the instants of a scan, its nodes.

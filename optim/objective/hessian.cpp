@@ -104,7 +104,7 @@ class GradientAlong {
   // Keeps within the bounds. It steps to both sides, as far as wanted or as the bounds allow, or else to the side with
   // more room. Close bounds on both sides do not tell the parameter's size and are ignored.
   Reach reach_along(const VectorXd& d, double h) const {
-    constexpr double kInside = 1 - 1e-9;  // so that rounding does not carry across
+    constexpr double kInside = 1 - 1e-9;  // rounding must not cross the bound
     double plus = kInfinity, minus = kInfinity;
     for (Index k = 0; k < d.size(); ++k) {
       if (d(k) == 0) continue;

@@ -147,7 +147,7 @@ SimulationResult ObjectiveRun::integrated(const std::vector<Integral>& integrals
 }
 
 bool ObjectiveRun::in_range(const std::vector<Integral>& integrals, const Eigen::VectorXd& values) const {
-  constexpr double kSmall = 1e-250, kLarge = 1e250;  // what exp and its sums can hold, with room for factors
+  constexpr double kSmall = 1e-250, kLarge = 1e250;  // the range of exp and its sums, with room for factors
   for (std::size_t k = 0; k < integrals.size(); ++k) {
     const double I = std::abs(values(static_cast<Eigen::Index>(k)));
     if (integrals[k].part.side != 0 && !(I > kSmall && I < kLarge)) return false;

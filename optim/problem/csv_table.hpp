@@ -30,7 +30,7 @@ struct CsvTable {
   std::string name;                           // of the file or files, for errors
   std::vector<std::string> header;            // each once
   std::vector<std::vector<double>> columns;   // NaN where a cell is missing
-  std::vector<std::size_t> lines;             // where in the file each row is, counted from 1
+  std::vector<std::size_t> lines;             // the line of each row, counted from 1
   std::vector<std::string> files = {};        // of a table made of several files: their names,
   std::vector<std::size_t> file_of_row = {};  // and the one that each row is of
 

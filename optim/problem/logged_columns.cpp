@@ -173,7 +173,7 @@ CsvTable read_record(const ExperimentSpec& experiment, std::vector<std::string>*
   const bool one = experiment.data.size() == 1;
   for (const std::string& file : experiment.data) {
     CsvTable& table = tables.emplace_back(read_csv(file));
-    if (one && !table.has_column(experiment.time)) return std::move(table);  // whoever uses the column reports it
+    if (one && !table.has_column(experiment.time)) return std::move(table);  // the user of the column reports it
     std::set<std::size_t> converted{place_of(table, experiment.time)};
     const std::vector<double>& clock = table.column(experiment.time);
     const double first = clock.empty() ? 0 : clock.front();

@@ -25,7 +25,7 @@ std::optional<Unit> parse_column_unit(std::string_view text);
 struct LoggedColumn {
   std::vector<double> values;
   std::string unit;  // SI unit of the values; empty: none is known
-  std::string read;  // what was converted, in words; empty: nothing
+  std::string read;  // the conversion in words, or empty
 };
 
 // given is a unit that replaces the header's, or empty. Throw CsvError.

@@ -9,7 +9,7 @@
 
 namespace mbsopt {
 
-Eigen::VectorXd parameter_values(const Scene& scene);  // as the scene gives them
+Eigen::VectorXd parameter_values(const Scene& scene);  // the scene's values
 
 // Indices by name, or all if names is empty. Throws std::invalid_argument with the unknown name and the existing ones.
 std::vector<int> parameter_indices(const Scene& scene, const std::vector<std::string>& names);

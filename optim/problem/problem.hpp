@@ -178,8 +178,8 @@ struct ExperimentSpec {
   std::vector<SignalSamples> signals;                     // of this experiment, instead of the scene's
   std::vector<DriveLaw> drives;                           // of this experiment, instead of the scene's laws
   std::vector<std::string> free;                          // parameters with a value of their own here
-  std::optional<WindowsSpec> windows = {};                // in which it is simulated
-  std::optional<WindowOrigin> origin = {};                // where it is one of them
+  std::optional<WindowsSpec> windows = {};                // its windows
+  std::optional<WindowOrigin> origin = {};                // set if it is a window
   bool validate = false;                                  // role: scored (only "free" refitted), not fitted
 };
 
@@ -219,7 +219,7 @@ struct Problem {  // the same
   std::optional<DesignSpec> design;
   std::optional<IdentificationSpec> identification;
   std::vector<std::string> plugins = {};       // shared libraries of named_terms.hpp, resolved as data files are
-  std::vector<std::string> columns_read = {};  // what the reader converted to SI, in words
+  std::vector<std::string> columns_read = {};  // conversions to SI, in words
 };
 
 }  // namespace mbsopt

@@ -30,7 +30,7 @@ class Round : public LeastSquaresProblem {
   }
 
   void evaluate(const VectorXd& x, LeastSquaresPoint& point) override {
-    if (x_.size() > 0 && x == x_) {  // where the last round ended
+    if (x_.size() > 0 && x == x_) {  // the end of the last round
       point = at_x_;
     } else {
       ++evaluations;

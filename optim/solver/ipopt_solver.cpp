@@ -54,7 +54,7 @@ class Adapter : public Ipopt::TNLP {
 
   bool start_is_valid() { return evaluate(x_start_); }
   bool out_of_evaluations() const { return out_of_evaluations_; }
-  SearchEnd end() const { return end_; }  // that was chosen here, of the last round
+  SearchEnd end() const { return end_; }  // the end of the last round, if chosen here
   bool lost() const { return end_ == SearchEnd::wandering || end_ == SearchEnd::creeping; }
   bool second_order() const { return second_order_; }
   int left_newton_at() const { return left_newton_at_; }  // iteration; 0: never
@@ -150,7 +150,7 @@ class Adapter : public Ipopt::TNLP {
   bool intermediate_callback(Ipopt::AlgorithmMode, Index iteration, Number, Number, Number, Number, Number, Number,
                              Number, Number, Index, const Ipopt::IpoptData*,
                              Ipopt::IpoptCalculatedQuantities*) override {
-    if (round_ > 0 && iteration == 0) return true;  // the point it goes on from
+    if (round_ > 0 && iteration == 0) return true;  // the start of this round
     result_.iterations = iterations_before_ + iteration;
     out_of_evaluations_ = options_.max_evaluations && result_.evaluations >= *options_.max_evaluations;
     if (iterate_.size() == 0) return !out_of_evaluations_;

@@ -22,8 +22,8 @@ struct IpoptOptions {
   int history = 20;                    // pairs kept by the limited-memory Hessian
   std::function<bool(const NlpProgress&)> progress;  // after every iteration; false stops
   bool second_order = false;                         // Hessians of the program, which must have hessians()
-  bool gauss_newton = false;                         // they leave something out, which the gradients' changes tell of
-  std::optional<long> max_evaluations = {};          // looked at after every iteration
+  bool gauss_newton = false;                         // incomplete Hessians; changes of gradients correct them
+  std::optional<long> max_evaluations = {};          // tested after every iteration
   PointRecords* records = nullptr;
   bool warm_start = false;  // the start is near the solution: hardly any barrier, bounds that it touches stay touched
 };

@@ -42,7 +42,7 @@ class LimitRound : public LeastSquaresProblem {
   }
 
   void evaluate(const VectorXd& x, LeastSquaresPoint& point) override {
-    if (known_.z.size() > 0 && x == x_) {  // where the last round ended
+    if (known_.z.size() > 0 && x == x_) {  // the end of the last round
       point = known_;
     } else {
       ++evaluations;
@@ -86,7 +86,7 @@ class LimitRound : public LeastSquaresProblem {
   struct {
     VectorXd x;
     double cost = 0;  // without limits
-  } last;             // that was evaluated
+  } last;             // the last evaluation
 
  private:
   VectorXd taken_in(const VectorXd& c) const { return c.cwiseMax(c_lower_).cwiseMin(c_upper_); }

@@ -29,7 +29,7 @@ constexpr double kFirstStep = 0.1;   // of x, without derivatives
 constexpr double kAcceptable = 100;  // times the tolerance: as Ipopt's second way to converge
 constexpr int kFreshStarts = 2;      // of local methods with gradients, from their best point
 constexpr long kCreeping = 50;       // evaluations in which methods of separable models have to gain
-constexpr double kLeastGain = 0.01;  // so much of f; along a narrow valley they do not, and slsqp goes on
+constexpr double kLeastGain = 0.01;  // part of f; in a narrow valley the gain is less, and slsqp continues
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr long kRequestsPerPoint = 20;  // of points in memory; then a method goes round in circles
 

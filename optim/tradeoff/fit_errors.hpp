@@ -32,7 +32,7 @@ struct FitErrors {
   };
   std::string message;  // why there is nothing
   double cost = 0;      // the right one
-  Apart certificate;    // what the two methods are apart
+  Apart certificate;    // difference of the two methods
   std::vector<Setting> settings;
   bool ok() const { return message.empty(); }
 };

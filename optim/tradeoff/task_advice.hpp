@@ -20,7 +20,7 @@ namespace mbsopt {
 
 struct TaskAdvice {
   Recommendation recommendation;
-  std::optional<FitErrors::Apart> fit;  // of the recommended row, where the file has an identification
+  std::optional<FitErrors::Apart> fit;  // of the recommended row, if the file has an identification
 };
 
 class TaskAdviser {

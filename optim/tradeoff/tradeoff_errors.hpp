@@ -31,8 +31,8 @@ struct Quantity {
   std::string objective_name;  // of objective, gradient
   Eigen::Index objective = 0;  // of objective, gradient
   bool relative = true;
-  double scale = 1;        // what the error is divided by
-  double certificate = 0;  // what two methods are apart in it, in the same measure
+  double scale = 1;        // divisor of the error
+  double certificate = 0;  // difference of two methods in the same measure
 };
 
 class TradeoffErrors {

@@ -87,7 +87,7 @@ class Search {
     std::optional<Candidate> best;
     for (const double rtol : {1e-7, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13}) {
       constexpr double kGrowth = 1.5;     // of the cost, a decade
-      constexpr double kSettled = 1e-11;  // what is left is a tenth of it
+      constexpr double kSettled = 1e-11;  // the remaining error is a tenth of it
       if (best && (kGrowth * best->method.wall_seconds > options_.seconds_per_run || best->change < kSettled)) break;
       Candidate next;
       next.settings = with_tolerance(runs_.scene().simulation, integrator, rtol);

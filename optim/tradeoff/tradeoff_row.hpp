@@ -15,7 +15,7 @@ namespace mbsopt {
 inline constexpr const char *kOwnSettings = "as in the file", *kDefaults = "defaults";
 
 struct TradeoffSetting {
-  std::string curve;  // what it has in common with its neighbours: "dopri5", "penalty 1e+07, cholesky: dopri5"
+  std::string curve;  // the common settings: "dopri5", "penalty 1e+07, cholesky: dopri5"
   SimulationSettings simulation;
   std::optional<GradientMethod> gradient;  // absent: a simulation
 };
@@ -37,7 +37,7 @@ struct TradeoffRow {
   RowStatus status = RowStatus::ok;
   std::string message;  // why it is not ok
   double wall_seconds = 0;
-  int repetitions = 0;  // that this is the median of
+  int repetitions = 0;  // number of runs in this median
   SimulationStatistics statistics;
   Eigen::VectorXd errors;      // per quantity of the reference; NaN: not of this row
   Eigen::VectorXd deviations;  // likewise, with a sign
