@@ -18,7 +18,7 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kWrongDigits = 1e-6;  // of an eigenvalue, from which its error is said
+constexpr double kWrongDigits = 1e-6;  // of an eigenvalue: larger errors are reported
 
 // The indices of names in a list, or all indices if there are no names.
 template <class Named>

@@ -167,7 +167,7 @@ void draw_scale(const View& view, std::string& svg) {
 
 std::array<int, 2> plane_of_motion(const Scene& scene, const Trajectory& trajectory) {
   constexpr std::size_t kInstants = 50;
-  constexpr double kStandstill = 1e-6;  // of the spread: motion below is none
+  constexpr double kStandstill = 1e-6;  // of the spread: smaller motion is rounding
   const Sketch sketch = sketch_of(scene);
   Eigen::AlignedBox3d all;
   Point3 motion = Point3::Zero();  // largest way of a point along each axis

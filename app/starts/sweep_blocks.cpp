@@ -114,7 +114,7 @@ std::vector<SweepRow> swept(Run& run, LongRun& long_run, const SweepPoints& poin
   compute_starts(
       run, jobs, sweep_work(run.problem, task_of(run.context.options.sweep, seed)),
       [&](const JobReply& reply) {
-        if (!reply.ok) {  // of a worker that crashed: it may do better next time
+        if (!reply.ok) {  // a worker crashed; it may succeed next time
           for (std::size_t i = size * static_cast<std::size_t>(reply.job), k = 0;
                !interrupted() && k < size && i + k < rows.size(); ++k)
             rows[i + k].done = true, rows[i + k].message = reply.text;

@@ -44,7 +44,7 @@ class Flow {
   const Mechanism mechanism_;
   Dynamics dynamics_;
   std::optional<MotionSolver> motion_;  // set if a sensor needs it
-  std::vector<double> times_;           // of accepted steps, where angles are followed
+  std::vector<double> times_;           // of accepted steps, if angles are followed
   std::vector<Eigen::VectorXd> angles_;
   double t_;
   Eigen::VectorXd y_, ydot_, y_point_;

@@ -19,7 +19,7 @@ struct SyntaxNode {
   Operation operation = Operation::number;
   int a = -1, b = -1;                       // operands: earlier nodes
   double value = 0;                         // of a number, in SI
-  std::optional<Dimension> unit;            // of a number that has one; none: it may stand for anything
+  std::optional<Dimension> unit;            // of a number with a unit; without, it may have any dimension
   std::string name;                         // of a name
   std::shared_ptr<const Curve> curve = {};  // of a curve
   std::size_t offset = 0;                   // its place in the text [bytes]

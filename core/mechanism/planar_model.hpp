@@ -48,7 +48,7 @@ struct PlanarModel {
   int t1 = 0, t2 = 1, n = 2;       // coordinate axes
   std::vector<PlanarBody> bodies;  // the ground first
   std::vector<PlanarConstraint> constraints;
-  std::vector<int> rows;  // of Phi: those that say something in the plane, counted 0, 1, ... by the constraints above
+  std::vector<int> rows;  // rows of Phi that constrain motion in the plane; the constraints above number them 0, 1, ...
   Plane gravity;
 
   // Writes x to the rows of Phi that the model uses. The other rows keep their values.

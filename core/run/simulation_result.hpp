@@ -55,7 +55,7 @@ struct SimulationStatistics {
   double max_position_violation = 0;                              // of |Phi| over accepted steps [m, -]
   double max_velocity_violation = 0;                              // of |Phi_q v + Phi_t|
   double energy_initial = 0, energy_final = 0, energy_drift = 0;  // drift: largest |E - E(0)| over accepted steps [J]
-  double relative_energy_drift = 0;      // of the largest energy so far, where nothing does work; else 0
+  double relative_energy_drift = 0;      // of the largest energy so far, if nothing does work; else 0
   double max_acceleration_residual = 0;  // relative, of the constraints' accelerations; penalty: of projections
   double weak_joints_error = 0;          // relative, of the accelerations at the end (weak_joints.hpp)
   std::size_t adjoint_memory_bytes = 0;  // the most that the backward sweep kept of the forward run

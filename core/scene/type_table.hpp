@@ -32,10 +32,10 @@ struct TypeRow {
   std::string_view name;
   std::string_view description;
   std::string_view fields;           // "point1 axis1!": what it has besides its name, type and bodies; "!": required
-  std::string_view components = "";  // of a sensor: what "component" may be
-  Dimension dimension = {};          // of a sensor: what it measures (dimension_of_quantity says exceptions)
-  Reads reads = Reads::positions;    // of a sensor (reads_of_quantity says exceptions)
-  std::string_view unit = "";        // of a sensor whose dimension does not say it
+  std::string_view components = "";  // of a sensor: the values of "component"
+  Dimension dimension = {};          // of a sensor's values (dimension_of_quantity has exceptions)
+  Reads reads = Reads::positions;    // of a sensor (reads_of_quantity has exceptions)
+  std::string_view unit = "";        // of a sensor whose dimension does not determine it
 };
 
 extern const std::span<const TypeRow> kJointTypes, kDriveTypes, kForceTypes, kSensorQuantities;

@@ -24,7 +24,7 @@ constexpr int kMostEquilibriumIterations = 500;
 constexpr double kLargestStep = 0.2;         // of a coordinate at once [lengths of the mechanism, rad]
 constexpr double kRestRankThreshold = 1e-8;  // rows of J scaled to unit length
 constexpr double kTolerance = 1e-11;         // of the last Newton step [lengths of the mechanism, rad]
-constexpr double kPredicted = 0.5;           // of the forces: a downhill step whose end differs more is too long
+constexpr double kPredicted = 0.5;           // of the forces: a downhill step with a larger difference is too long
 constexpr double kWellPredicted = 0.1;       // and one that differs less may be followed by a longer one
 
 class Statics {

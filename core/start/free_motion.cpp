@@ -39,7 +39,7 @@ using Eigen::VectorXd;
 constexpr int kMostBodies = 40;          // dense decompositions of 6n columns stay within milliseconds
 constexpr double kFreeThreshold = 1e-8;  // as for redundant rows
 constexpr double kStep = 1e-3;  // to the position near by [rad]: far above kZero, and within reach of Newton's steps
-constexpr double kZero = 1e-6;  // of a motion's size: above what rounding leaves of a null vector
+constexpr double kZero = 1e-6;  // of a motion's size: above the rounding of a null vector
 constexpr std::size_t kMostNames = 8;  // in one sentence
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }

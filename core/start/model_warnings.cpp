@@ -163,7 +163,7 @@ bool is_balanced(const MechanismData& d) {
 }
 
 void add_gravity(const MechanismData& d, std::vector<std::string>& warnings) {
-  constexpr double kAlong = 1e-9;  // of gravity: what rounding leaves of a component that is meant to be 0
+  constexpr double kAlong = 1e-9;  // of gravity: rounding of a component that should be 0
   if (!d.planar) return;
   const Vector3d& g = d.gravity;
   if (std::hypot(g(d.planar->t1), g(d.planar->t2)) > kAlong * g.norm() || g.norm() == 0 || is_balanced(d)) return;

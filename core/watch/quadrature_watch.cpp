@@ -12,7 +12,7 @@ namespace {
 constexpr double kPoor = 1e-4;        // of the integral of |g| so far: a larger estimate starts a search in the step
 constexpr double kNarrowest = 1e-12;  // of a step
 constexpr double kFalls = 0.03;       // |g| times width does by more over half of all halvings, up to |t|^-0.7
-constexpr double kBounded = 1e-7;     // of a step: a |g| that has not grown threefold there does not
+constexpr double kBounded = 1e-7;     // of a step: a |g| that has not grown threefold there is bounded
 constexpr int kPoints = 9, kMostSearches = 200;
 constexpr double kOffset = 0.471;      // not half: poles are at round times
 constexpr double kMetExactly = 1e-12;  // estimates below it are rounding

@@ -59,7 +59,7 @@ class QuadratureWatch {
   std::vector<Node> nodes_;
   std::vector<int> node_of_;  // of each node of the method; -1: has no weight
   std::vector<Integral> integrals_;
-  double start_ = 0, end_ = 0;  // of all steps [s], which come forward or backward
+  double start_ = 0, end_ = 0;  // of all steps [s], which go forward or backward
   std::vector<double> g_;       // at the nodes
   Eigen::VectorXd y_;
 };

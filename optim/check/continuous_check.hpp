@@ -44,7 +44,7 @@ struct ContinuousCheckOptions {
   double rtol = 1e-9;  // or the scene's, where that is tighter
   double threshold = 1e-6;
   double floor = 1e-3;     // entries below this part of the largest are compared to that part
-  long typical_steps = 0;  // of the scene's own run, 0: unknown; CVODES gives up at many times these
+  long typical_steps = 0;  // of the scene's own run, 0: unknown; CVODES ends at many times these
   std::vector<std::shared_ptr<const UserForce>> user_forces = {};
   std::function<bool(double t)> progress = {};
 };

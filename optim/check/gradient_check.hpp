@@ -85,7 +85,7 @@ struct GradientCheck {
   MethodCost simulation, tlm_cost, adjoint_cost, frozen_cost, free_cost;  // differences: of all of them
   int timing_rounds = 0;
   SimulationStatistics statistics;       // of the base run
-  std::vector<std::string> warnings;     // of the base run, and what explains disagreement; sentences
+  std::vector<std::string> warnings;     // of the base run, and explanations of disagreement, in sentences
   std::vector<std::string> wrong_terms;  // of forces and costs written in C++ (user_terms.hpp), sentences
   long simulations = 0;
   bool passed() const;

@@ -26,7 +26,7 @@ using Eigen::VectorXd;
 
 constexpr int kStates = 4;         // of the motion, and its start
 constexpr int kRungs = 12;         // from a hundredth of the size down to 5e-6 of it
-constexpr double kLargest = 1e-2;  // of the size of what moves
+constexpr double kLargest = 1e-2;  // of the size of the moving coordinates
 constexpr double kWrong = 1e-6;    // of the derivative: ladders reach 1e-9 and better
 
 // A direction in (q, v) of k bodies, with its name.

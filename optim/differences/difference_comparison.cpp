@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kStep = 1e-3;     // of the variable's size
 constexpr double kShorter = 16;    // times
-constexpr double kApart = 1e-2;    // of a derivative: an optimiser does not mind less
+constexpr double kApart = 1e-2;    // of a derivative: less is harmless for an optimiser
 constexpr double kMatters = 1e-3;  // of the group's largest derivative
 constexpr double kTrust = 10;      // times an estimated error
 

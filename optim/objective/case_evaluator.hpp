@@ -62,7 +62,7 @@ class CaseEvaluator {
 
   const Problem problem_;
   std::vector<Evaluator> evaluators_;
-  std::shared_ptr<std::mutex> progress_;  // of all threads, which tell one listener
+  std::shared_ptr<std::mutex> progress_;  // shared by all threads, which report to one listener
   const int threads_;
   CaseEvaluation last_;
 };

@@ -20,7 +20,7 @@ class CaseObjective {
   double value(const Eigen::VectorXd& psi) const;
   Eigen::VectorXd gradient(const Eigen::VectorXd& psi) const;  // f_psi
   Eigen::MatrixXd hessian(const Eigen::VectorXd& psi) const;   // f_psipsi
-  double true_value(const Eigen::VectorXd& psi) const;         // of the maximum that is meant; else f
+  double true_value(const Eigen::VectorXd& psi) const;         // the true maximum; else f
   bool is_maximum() const { return k_ > 0; }
 
  private:

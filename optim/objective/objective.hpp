@@ -62,7 +62,7 @@ class Objective {
   struct Sample {
     double time;
     CostExpression value;
-    std::optional<std::size_t> point = {};  // of free_instants(); it says the time then
+    std::optional<std::size_t> point = {};  // its point in free_instants(), which gives the time
   };
   const std::optional<CostExpression>& running() const { return running_; }
   const std::optional<CostExpression>& terminal() const { return terminal_; }

@@ -124,7 +124,7 @@ struct CaseSpec {
   std::vector<Definition> overrides = {};  // parameters, as expressions of the parameters of the problem
   std::vector<DriveLaw> drives = {};       // instead of the scene's laws
   std::vector<SignalSamples> signals = {};
-  std::vector<Condition> conditions = {};  // of the start; one on a sensor of the scene's conditions replaces that one
+  std::vector<Condition> conditions = {};  // of the start; each replaces the scene's condition on its sensor
   std::optional<double> end_time = {};
 };
 
@@ -170,7 +170,7 @@ struct ExperimentSpec {
   std::string name;
   std::vector<std::string> data;               // CSV files, resolved against the problem file's folder
   std::string time = "t";                      // their time column
-  std::string time_unit = {};                  // of it, as of a SampleColumn
+  std::string time_unit = {};                  // unit of the times, as in SampleColumn
   std::optional<double> time_zero = {};        // as of a SampleColumn; first: of the first file
   std::optional<double> start_time, end_time;  // instead of the simulation's; rows outside are left out
   std::vector<ChannelSpec> channels;

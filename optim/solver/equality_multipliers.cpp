@@ -15,7 +15,7 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 constexpr double kFaster = 10, kHeaviest = 1e4;  // omega; the square of the largest is far from 1/rounding
-constexpr double kFirstTolerance = 1e-2;         // of a round that only shows the next one where to start
+constexpr double kFirstTolerance = 1e-2;         // tolerance of a round that only gives a start to the next one
 constexpr double kSatisfied = 1e-6;              // |W c| over the norm of the residuals: a millionth of their noise
 constexpr int kLooseRounds = 2;
 constexpr int kRounds = 10;  // each lowers c by omega^2, so that three or four are usual

@@ -71,10 +71,10 @@ struct LeastSquaresProblem {
 
   Eigen::VectorXd x_lower, x_upper;  // +-infinity where there is none
   Eigen::Index size;                 // N
-  Eigen::Index equalities = 0;       // of them, the last: zero at the solution
+  Eigen::Index equalities = 0;       // the number of last rows that are zero at the solution
   Eigen::VectorXd closed;            // per equality: |c| that its own errors leave; empty: none
   bool is_integrated = true;         // z has the errors of an integrator; known after an evaluation
-  Eigen::Index plain = 0;            // of them, the last before the equalities: not seen by the loss
+  Eigen::Index plain = 0;            // the number of rows before the equalities that ignore the loss
   Loss loss;
   std::vector<ScaleGroup> groups;  // disjoint
   std::vector<Dependence> parts;   // all rows, each once; empty: any row may depend on any variable

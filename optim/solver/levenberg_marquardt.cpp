@@ -30,7 +30,7 @@ constexpr double kGradient = 1e-14;      // cosine between the residuals and any
 constexpr double kShrinking = 0.5;
 // The weights are good enough if the step changes by less than this part; a remaining hundredth costs no evaluation.
 constexpr double kWeighed = 1e-2;
-constexpr int kWeighings = 100;  // of one step; each lowers its cost, so that fewer do no harm
+constexpr int kWeighings = 100;  // of one step; each lowers its cost, so fewer are harmless
 
 // The weighted residuals of one part and their derivatives, as triangles: |z + J d|^2 = |q + R d|^2 + constant.
 struct Triangle {

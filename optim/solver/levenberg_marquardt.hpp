@@ -64,7 +64,7 @@ struct LeastSquaresOptions {
   std::function<bool(const LeastSquaresProgress&)> progress;  // after every iteration; false stops
   std::optional<long> max_evaluations = {};                   // > 0, that of the start counted
   bool large_residuals = false;                               // without parts, losses and groups
-  LearntCurvature* learnt = nullptr;                          // of large residuals; null: nothing is known before
+  LearntCurvature* learnt = nullptr;                          // knowledge of large residuals; null without any
 };
 
 // Moves x_start into the bounds. Never throws because of an evaluation: exceptions of evaluate() are failed

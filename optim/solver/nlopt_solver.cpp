@@ -24,14 +24,14 @@ using Eigen::VectorXd;
 using VectorIn = Eigen::Map<const VectorXd>;
 using VectorView = Eigen::Map<VectorXd>;
 
-constexpr int kFailuresInARow = 40;  // of local methods: they are lost
+constexpr int kFailuresInARow = 40;  // of local methods, which then end
 constexpr double kFirstStep = 0.1;   // of x, without derivatives
-constexpr double kAcceptable = 100;  // times the tolerance: as Ipopt's second way to converge
-constexpr int kFreshStarts = 2;      // of local methods with gradients, from their best point
+constexpr double kAcceptable = 100;  // times the tolerance: the factor of Ipopt's acceptable level
+constexpr int kFreshStarts = 2;      // restarts of local methods with gradients, from their best point
 constexpr long kCreeping = 50;       // evaluations in which methods of separable models have to gain
 constexpr double kLeastGain = 0.01;  // part of f; in a narrow valley the gain is less, and slsqp continues
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-constexpr long kRequestsPerPoint = 20;  // of points in memory; then a method goes round in circles
+constexpr long kRequestsPerPoint = 20;  // requests of stored points; beyond it a method repeats itself
 
 using Optimizer = std::unique_ptr<nlopt_opt_s, decltype(&nlopt_destroy)>;
 
@@ -358,7 +358,7 @@ class Adapter {
       return put(
           SolverStatus::infeasible,
           "infeasible: no point near the last one satisfies the constraints; relax them or start elsewhere" + failures);
-    if (code == NLOPT_MAXEVAL_REACHED) {  // of requests for points that are known
+    if (code == NLOPT_MAXEVAL_REACHED) {  // requests of known points reached the limit
       if (method_.global) return say_searched();
       return put(SolverStatus::no_progress, "no further progress: the method goes round in circles" + failures);
     }

@@ -341,7 +341,7 @@ SimulationSettings with_tolerance(SimulationSettings settings, const std::string
   s.atol = std::stod(fmt::format("{:.6e}", atol));  // 1e-07, not 1.0000000000000001e-07
   s.type = integrator, s.rtol = rtol;
   s.step.reset();
-  s.options = {};  // of the file's own setting only
+  s.options = {};  // these belong to the file's own setting only
   return settings;
 }
 

@@ -26,7 +26,7 @@ bool stands_alone(const TradeoffSetting& setting);
 
 enum class RowStatus {
   ok,
-  failed,     // of its own: a step too large, a method that cannot do it
+  failed,     // its own failure: a step too large, a method without the ability
   abandoned,  // took longer than its share, or the user ended it
   skipped,    // would have taken longer
 };
