@@ -28,7 +28,7 @@ class OutputFolder {
   // it, or has done so since.
   std::unique_ptr<FolderLock> claim() const;
   void write(const std::string& file, std::string_view content) const;
-  // Changes "running" in result.json to "failed" without a further byte, for a full disk.
+  // Changes "running" in result.json to "failed" without a further byte, when nothing can be written any more.
   void mark_failed() const noexcept;
 
  private:

@@ -82,8 +82,8 @@ class Evaluator {
   // Other objectives have none. None has one if the run fails.
   std::vector<std::optional<double>> true_values(const Eigen::VectorXd& rho) const;
 
-  // Evaluates on given steps, apart from the stored point: values, and discrete gradients by tlm or adjoint. CVODES
-  // cannot take given steps and throws std::invalid_argument.
+  // Evaluates on given steps and leaves the stored point unchanged: values, and discrete gradients by tlm or adjoint.
+  // CVODES cannot take given steps and throws std::invalid_argument.
   Evaluation values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const;
   Evaluation gradients_on(const StepSequence& steps, const Eigen::VectorXd& rho, GradientMethod method) const;
 
