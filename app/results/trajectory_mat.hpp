@@ -1,5 +1,5 @@
-// trajectory.mat: each column of trajectory.csv as a real vector under its name, for `load` in MATLAB. "_" replaces a
-// character that MATLAB's names do not allow: rod.x is rod_x.
+// trajectory.mat: each column of trajectory.csv as a real vector under its name, for `load` in MATLAB. The sign "_"
+// replaces a character that MATLAB's names do not allow: rod.x is rod_x.
 #pragma once
 
 #include <string>

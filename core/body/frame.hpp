@@ -1,6 +1,7 @@
-// A frame is a body as constraints, forces and sensors see it: its centre of mass r and the matrix A of its axes, with
-// their first and second time derivatives. Every primitive is a polynomial in these. So its derivatives in (q, v) take
-// two steps: first to the frame, then from the frame to (r, p) and (rdot, pdot) by the pull-backs below, once per body.
+// A frame is a body as constraints, forces and sensors see it. It has the centre of mass r, the matrix A of the axes,
+// and their first and second time derivatives. Every primitive is a polynomial in these. So its derivatives in (q, v)
+// take two steps. The first leads to the frame. The second leads from the frame to (r, p) and (rdot, pdot) by the
+// pull-backs below, once per body.
 //
 //   A = A(p)     Adot = B(p, pdot)     Addot = B(p, pddot) + 2 A(pdot)
 //   pddot = 1/2 G(p)' omegadot - (pdot'pdot) p       (the unit-norm equation differentiated twice, solved by hand)

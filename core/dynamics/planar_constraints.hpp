@@ -60,7 +60,7 @@ class PlanarConstraints {
   // Most joints of a plane are points. In the frames, with lambda and the vectors held fixed:
   //   d(J'lambda)_theta of a body = cross(A', W),  W: sum of +-conj(s) lambda over its points      [the ground's first]
   void set_point_moments(const Eigen::VectorXd& lambda, std::vector<Plane>& W) const;
-  // c -= Phiddot' in the directions Addot' (rows re, im, the ground's first) and in those of the vectors. b -=
+  // c -= Phiddot' in the directions Addot' (rows re, im, the ground's first) and in those of the vectors. Also b -=
   // (J'lambda)' in the directions of the vectors; b has no entry of the ground.
   void subtract_point_tangents(const Frames& frames, const std::vector<Lanes<2>>& Addot_dirs,
                                const ParameterBlock& block, const Eigen::VectorXd& lambda, LaneRows& c,

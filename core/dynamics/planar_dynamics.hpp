@@ -1,5 +1,5 @@
-// The equations of motion of a planar model (planar_model.hpp), their tangent and adjoint: the same equations and
-// derivatives as in dynamics.hpp, in z = (rddot along t1 and t2, omegadot about n) per body,
+// The equations of motion of a planar model (planar_model.hpp), their tangent and adjoint. They are the equations and
+// derivatives of dynamics.hpp, in z = (rddot along t1 and t2, omegadot about n) per body,
 //
 //   pddot:  Pddot = (i omegadot/2 - |Pdot|^2) P
 //

@@ -7,10 +7,9 @@
 // to the next body.
 //
 // This finds the same rows as Gram-Schmidt on whole rows. A pivot row is independent of all rows before it, since part
-// of it is. Another row, after reduction by the pivot rows before it, is independent of the reduced rows before it if
-// and only if the row itself is independent (contraction of a matroid: Oxley, "Matroid Theory" (2011), section 3.1). A
-// row that depends on earlier ones at its own front alone is dropped there. So no front passes on more rows than
-// columns.
+// of it is. Another row is reduced by the pivot rows before it. It is independent of the reduced rows before it if and
+// only if the row itself is independent (contraction of a matroid: Oxley, "Matroid Theory" (2011), section 3.1). A row
+// that depends on earlier ones at its own front alone is dropped there. So no front passes on more rows than columns.
 #pragma once
 
 #include <span>

@@ -1,6 +1,6 @@
-// The scene compiled at one value of its parameters: bodies have numbers, joints are primitives, every numeric field is
-// a number with its derivative in rho. It is const after construction. A Dynamics (core/dynamics) owns the arrays of a
-// right-hand side.
+// The scene compiled at one value of its parameters. Bodies have numbers, joints are primitives, and every numeric
+// field is a number with its derivative in rho. It is const after construction. A Dynamics (core/dynamics) owns the
+// arrays of a right-hand side.
 #pragma once
 
 #include <Eigen/Core>
@@ -46,7 +46,7 @@ class Mechanism {
 };
 
 // The motion of one body at a state, for output: origin of the body frame, Euler parameters, velocity of the origin,
-// and angular velocity in global components: x y z e0..e3 vx vy vz wx wy wz.
+// and angular velocity in global components. The columns are x y z e0..e3 vx vy vz wx wy wz.
 Eigen::Matrix<double, 13, 1> body_row(const Mechanism& mechanism, int body, const StatePoint& at);
 
 // Counts of equations at the assembled initial state.

@@ -249,7 +249,7 @@ std::string continue_to_rest(Statics& statics, VectorXd& q, int& iterations) {
   return statics.what_is_left();
 }
 
-// Does the same if the acceleration rises and falls on the way. Each step is one of the overdamped motion: it goes
+// Does the same if the acceleration rises and falls on the way. Each step is one of the overdamped motion. It goes
 // downhill, and is so short that the linear equations predict the forces at its end.
 std::string go_downhill(Statics& statics, VectorXd& q, int& iterations) {
   if (!statics.evaluate(q)) return kNoAccelerations;

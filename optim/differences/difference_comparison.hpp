@@ -1,6 +1,6 @@
-// Before an optimisation: is the gradient the slope of the minimised function? The test compares one central difference
-// per variable, with step-size control, with the exact derivatives. These omit instants at which something jumps, and
-// peaks between two steps.
+// Before an optimisation: is the gradient the slope of the minimised function? The test takes one central difference
+// per variable, with step-size control, and compares it with the exact derivatives. These omit instants at which
+// something jumps, and peaks between two steps.
 //
 //   s = (f(h) - f(-h))/(2 h),  h = 1e-3 of the variable's size        f: groups of rows, an objective or all residuals
 //   |s - f_rho| <= max(1e-2 of either, |f(h) - 2 f(0) + f(-h)|/(2 h), 1e-3 of the group's largest derivative)

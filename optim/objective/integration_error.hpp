@@ -1,5 +1,5 @@
-// The integrator's error in psi and its derivatives. It is their change by ten times tighter tolerances (looser ones if
-// tighter ones are out of reach); for derivatives at least rtol times them. It estimates the size and is no bound.
+// The integrator's error in psi and its derivatives. It is their change by ten times tighter tolerances, or looser ones
+// if those are out of reach. For derivatives it is at least rtol times them. It estimates the size and is no bound.
 // Fixed steps do not jump from run to run: the error is then zero, unless requested.
 #pragma once
 

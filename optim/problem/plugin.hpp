@@ -16,8 +16,8 @@
 
 namespace mbsopt {
 
-// The layout of passed objects depends on these: the classes of this version, the compiler's ABI, and the alignment of
-// Eigen's vectors, which -march changes.
+// The layout of passed objects depends on the classes of this version, the compiler's ABI, and the alignment of Eigen's
+// vectors. -march changes the last one.
 inline constexpr const char* kPluginInterface =
     "mbsopt 0.1, ABI " MBSOPT_TEXT(__GXX_ABI_VERSION) ", Eigen " MBSOPT_TEXT(EIGEN_WORLD_VERSION) "." MBSOPT_TEXT(
         EIGEN_MAJOR_VERSION) "." MBSOPT_TEXT(EIGEN_MINOR_VERSION) " aligned to " MBSOPT_TEXT(EIGEN_MAX_ALIGN_BYTES);

@@ -183,8 +183,8 @@ struct ExperimentSpec {
   bool validate = false;                                  // role: scored (only "free" refitted), not fitted
 };
 
-// The assumption of standard errors on the residuals: independent noise, noise that is correlated in time, or any noise
-// within an experiment that is independent between experiments. `automatic` decides by tests of the residuals.
+// The assumption of standard errors on the residuals: independent noise, noise that is correlated in time, or noise
+// that is independent between experiments only. `automatic` decides by tests of the residuals.
 enum class CovarianceType { automatic, white, newey_west, windows };
 
 struct IdentificationSpec {  // problem.cpp defines the constructors, so that they are compiled once

@@ -285,9 +285,9 @@ class Adapter {
     if (solution_x_.size() > 0 && as_good_as_best(solution_.f)) result_.x = solution_x_, result_.point = solution_;
   }
 
-  // If a point fails, its function value is high, so that the method returns. With gradients it rises along the step as
-  // much as the last good gradient promised to fall: a line search then takes a quarter of its step. Without gradients
-  // it exceeds all values so far. Constraints keep their values.
+  // If a point fails, its function value is high, so that the method returns. With gradients it rises along the step by
+  // the decrease that the last good gradient promised. A line search then takes a quarter of its step. Without
+  // gradients it exceeds all values so far. Constraints keep their values.
   void set_stand_in() {
     stand_in_ = last_good_;
     const double least = 1e-3 * std::max(std::abs(last_good_.f), 1 / problem_.f_scale);

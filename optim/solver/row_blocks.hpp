@@ -5,7 +5,7 @@
 //                      [ 0  T | p ]          T d_B ~ p: a new block, which replaces these rows
 //
 // Columns of the fewest blocks come first. The cost is linear in the number of blocks if each has columns of its own,
-// or shares them with its neighbours, beside columns that all share. One block with all columns is the usual QR
+// or shares them with its neighbours. Further columns may be common to all. One block with all columns is the usual QR
 // factorisation. Bjorck, "Numerical Methods for Least Squares Problems" (1996), section 6.3; Duff and Reid, ACM
 // Transactions on Mathematical Software 9 (1983) 302.
 //

@@ -6,8 +6,8 @@
 //   for (const TradeoffRow& row : tradeoff.rows) std::cout << in_words(row.setting) << ' ' << row.wall_seconds << '\n';
 //
 // Settings that differ in tolerance or step only are a curve. Curves go from loose to tight, the cheapest next point
-// first. A curve ends if its next point would cost more than its share of the budget, or if the reference is no more
-// exact than it. Afterwards all points are timed again, in turn, so that a busy minute does not affect one of them
+// first. A curve ends if its next point would cost more than its share of the budget. It also ends if the reference is
+// no more exact. Afterwards all points are timed again, in turn, so that a busy minute does not affect one of them
 // alone. Times are medians.
 #pragma once
 
