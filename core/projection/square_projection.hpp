@@ -84,7 +84,7 @@ bool ProjectorOf<Body>::assemble(double t, const Y& angles, const Y& y_hat, Y& y
   constexpr double kShortest = 1e-3;  // part of a step: det J vanishes on the way, or |Phi| has a least value
   if (!square_) return false;
   double sign = 0;
-  // Phi| at the state moved, and J_ there. It is infinite if det J differs in sign from that at the guess.
+  // |Phi| at the state moved, and J_ there. It is infinite if det J differs in sign from that at the guess.
   const auto violation_at = [&](const Y& moved) {
     for_bodies(
         [&](Body& b, std::size_t i, auto& f) { b.displace(moved.segment<N>(N * static_cast<Eigen::Index>(i)), f); });

@@ -17,7 +17,7 @@ Eigen::VectorXd position_guess(const MechanismData& data);
 // both.
 Eigen::VectorXd sizes_of_poses(const Eigen::MatrixXd& J);
 
-// J| x, where the largest entry of r and of p (or of their rates) replaces each entry of theirs.
+// |J| x, where the largest entry of r and of p (or of their rates) replaces each entry of theirs.
 Eigen::VectorXd magnitudes_of_terms(Eigen::Index rows, const std::vector<SparseEntry>& J, Eigen::Index first,
                                     const Eigen::VectorXd& x);
 

@@ -55,7 +55,7 @@ class Round : public LeastSquaresProblem {
     solution.cost_final = given_.cost(solution.point.z);
   }
 
-  // W c| divided by the norm of the residuals.
+  // |W c| divided by the norm of the residuals.
   double left() const {
     const VectorXd z = given_.weights(at_x_.z).cwiseSqrt().cwiseProduct(at_x_.z).head(size - W_.size());
     return W_.cwiseProduct(at_x_.z.tail(W_.size())).norm() / std::max(z.norm(), kNoResidual);
