@@ -4,9 +4,9 @@
 //   |lambda| ~ |f(t, Y_b) - f(t, Y_a)| / |Y_b - Y_a|      Y_a, Y_b: two stages at the same time
 //
 // This is an eigenvalue of f_y, the fastest one if the motion is stiff: the two stages differ by its mode (power
-// iteration). Stability limits a step if h |lambda| is near the end of the real part of the stability region. There
-// |R(-x)| <= 1, R of the method's own table. Far beyond it no step would have been accepted, so the quotient has
-// another cause. Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.2, "automatic
+// iteration). Stability limits a step if h |lambda| is near the end of the stability region on the real axis. The
+// region is |R(-x)| <= 1, R of the method's own table. Far beyond it no step would have been accepted, so the quotient
+// has another cause. Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.2, "automatic
 // stiffness detection"; as in their DOPRI5 and DOP853.
 //
 // Pairs: dopri5 and verner6 have two stages at the end of the step. For dopri853 it is one stage there, compared with
