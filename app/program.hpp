@@ -1,5 +1,5 @@
-// mbsopt's command line in a program of your own: every command, with all that it does, for problem files that call the
-// program's forces, costs and laws by name.
+// mbsopt's command line in a program of your own: every command, for problem files that call the program's forces,
+// costs and laws by name.
 //
 //   int main(int argc, char** argv) {
 //     mbsopt::NamedTerms terms;
@@ -15,9 +15,9 @@
 
 namespace mbsopt {
 
-// arguments: the command, then its file and options. Results go into the folder of the run and onto standard output;
-// what is wrong is said on standard error. Returns the exit code: 0 done, 1 a numerical failure, 2 bad input, 3 a check
-// that did not hold, 130 interrupted.
+// arguments hold the command, then its file and options. Results go into the folder of the run and to standard output,
+// messages on faults to standard error. Returns the exit code: 0 done, 1 a numerical failure, 2 bad input, 3 a failed
+// check, 130 interrupted.
 int run_program(const std::vector<std::string>& arguments, const NamedTerms& terms = {});
 
 }  // namespace mbsopt

@@ -281,8 +281,8 @@ one to two right-hand sides per step, and the sums of the stages.
 * **Growth to 10 000 bodies is memory.** A body has some 3.4 kB of frames, J, S and constraints, which a right-hand
   side reads several times. Those of 100 bodies stay in the second-level cache. Those of 10 000 come from the third or,
   if others use it, from memory. So the loops over bodies and over groups of rows prefetch the data of the fourth one
-  ahead (`core/linear/prefetch.hpp`), since the processor's own prefetching ends with each page of 4 kB. Prefetching
-  makes no difference up to 1000 bodies, nor in tangents, which compute more with the data they load.
+  ahead (`core/linear/prefetch.hpp`). The processor's own prefetching ends with each page of 4 kB. Prefetching makes no
+  difference up to 1000 bodies, nor in tangents, which compute more with the data they load.
 
   | ratio, in space, in turn, in quiet minutes (second-level cache of 1 MB) | without prefetching | with it |
   | --- | --- | --- |
@@ -314,8 +314,8 @@ one to two right-hand sides per step, and the sums of the stages.
   sources costs 11 to 12 % more, so only `optim/` and `app/` are compiled with it.
 * **Set-up**: a table holds the names of bodies and joints. Rank and redundant equations come from an elimination of one
   body after another (`core/linear/row_dependence.hpp`). It decides about the rank inside small fronts, and finds the
-  same rows as Gram-Schmidt on whole rows. Initial assembly is dense where the guess is not exact: its time grows with
-  the cube of the number of bodies then, so give large mechanisms a guess that satisfies the joints to rounding.
+  same rows as Gram-Schmidt on whole rows. Initial assembly is dense if the guess is not exact. Its time then grows with
+  the cube of the number of bodies. So give large mechanisms a guess that satisfies the joints to rounding.
 """
 
 PEERS = {"simbody": "Simbody", "mujoco": "MuJoCo", "dart": "DART"}

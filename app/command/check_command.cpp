@@ -19,7 +19,7 @@
 namespace mbsopt {
 namespace {
 
-// "agrees 3.1e-14": the verdict, and the relative difference it is about.
+// "agrees 3.1e-14": the verdict, and its relative difference.
 std::string compared(Verdict verdict, double difference) {
   const std::string words(to_string(verdict));
   return std::isfinite(difference) && verdict != Verdict::zero ? fmt::format("{} {:.1e}", words, difference) : words;

@@ -49,7 +49,7 @@ std::string about_the_problem(const CommandContext& context, const std::string& 
   return placed.value_or(file + ": " + words);
 }
 
-// The command's exit code; what was wrong with the input goes to `err` in words.
+// Returns the command's exit code. Faults of the input go to `err` in words.
 int run_in_words(const Command& command, const CommandContext& context) {
   try {
     return command.run(context);
@@ -78,7 +78,7 @@ int run_in_words(const Command& command, const CommandContext& context) {
   return kBadInput;
 }
 
-// index.html of the folder `out` that holds the run's folder; folders elsewhere are the user's own.
+// Updates index.html of the folder `out` that holds the run's folder. Folders elsewhere are the user's own.
 void update_index(const CommandContext& context) {
   if (context.source == nullptr && context.command != "resume") return;  // no problem was run
   std::filesystem::path run = context.command == "resume" ? context.options.problem_file : context.options.out;

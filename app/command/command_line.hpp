@@ -12,11 +12,11 @@ namespace mbsopt {
 struct CommandOptions;
 struct Ranks;
 
-// Options from the words typed after the program's name; throws std::invalid_argument where they make no sense.
+// Reads options from the words after the program's name. Throws std::invalid_argument if they make no sense.
 CommandOptions options_of(const std::vector<std::string>& arguments);
 
-// Runs one command in this process and returns its exit code. arguments: without the program's name; ranks: those that
-// may help (not owned).
+// Runs one command in this process and returns its exit code. arguments exclude the program's name. ranks are those
+// that may help (not owned).
 int run_command_line(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err,
                      bool err_is_terminal = false, Ranks* ranks = nullptr, const NamedTerms& terms = {});
 

@@ -1,4 +1,4 @@
-// The options of each command, for CLI11, which writes what it reads into CommandOptions.
+// The options of each command for CLI11, which writes them into CommandOptions.
 #pragma once
 
 #include "app/run/command.hpp"

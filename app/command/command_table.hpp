@@ -15,7 +15,7 @@ struct Command {
   std::string_view does;
   int (*run)(const CommandContext&);
   AddOptions* add_options;
-  std::string_view example;  // what follows "mbsopt NAME"
+  std::string_view example;  // the part after "mbsopt NAME"
 };
 std::span<const Command> commands();
 std::vector<std::string> command_names();

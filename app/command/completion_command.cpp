@@ -23,8 +23,8 @@ std::string choices_of(const CLI::Option& option) {
 
 }  // namespace
 
-// Commands first; then a command's options where a word begins with "-", the words that an option or the command takes,
-// else files.
+// Completes commands first. Then it completes a command's options after "-", the words that an option or the command
+// takes, or else files.
 int completion_command(const CommandContext& context) {
   CLI::App app;
   CommandOptions options;

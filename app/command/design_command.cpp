@@ -152,7 +152,7 @@ SensorLimits sensor_limits(const Problem& problem) {
   return limits;
 }
 
-// The running terms of all objectives but those that a plot of a sensor shows already.
+// The running terms of all objectives, except those that the plot of a sensor already shows.
 std::vector<RunningTerm> running_terms(const Problem& problem, const ObjectiveUnits& units) {
   std::vector<RunningTerm> terms;
   for (const ObjectiveSpec& spec : problem.objectives) {
@@ -177,7 +177,7 @@ std::vector<RunningTerm> running_terms(const Problem& problem, const ObjectiveUn
   return terms;
 }
 
-// Without a column of what the method does not know.
+// Omits columns that the method does not have.
 Trajectory history_of(const DesignResult& design) {
   const bool optimality = std::all_of(design.history.begin(), design.history.end(),
                                       [](const DesignRow& row) { return std::isfinite(row.optimality); });
@@ -199,7 +199,7 @@ std::vector<NewValue> new_values(const DesignResult& design) {
   return values;
 }
 
-// Where the linkage does not close at the values of the file, the design starts from some at which it does.
+// If the linkage does not close at the values of the file, the design starts from values at which it does.
 void lead_to_closing(Run& run, SimulatedMotion& before) {
   DesignOptions options;
   options.simulation_progress = run.watched("closing the linkage");

@@ -60,7 +60,7 @@ void add_objectives(Run& run, const Evaluation& evaluation, const std::vector<st
   run.context.out << '\n' << table.text();
 }
 
-// The gradients are done and stay whatever comes of this.
+// The gradients are complete and stay, even if this fails.
 void add_second_derivatives(Run& run, Evaluator& evaluator) {
   std::vector<std::string> objectives, parameters;
   for (const ObjectiveSpec& objective : run.problem.objectives) objectives.push_back(objective.name);

@@ -54,14 +54,14 @@ std::string unit_of_channel(const Scene& scene, const ChannelSpec& spec) {
   return unit.empty() ? kUnknownUnit : unit;
 }
 
-// Ends a part of the plot: neither a curve nor a correlation goes on from one window to the next.
+// Ends a part of the plot: neither a curve nor a correlation continues from one window to the next.
 void add_gap(std::vector<double>& times, double next, std::initializer_list<std::vector<double>*> values) {
   if (times.empty()) return;
   times.push_back((times.back() + next) / 2);
   for (std::vector<double>* v : values) v->push_back(std::numeric_limits<double>::quiet_NaN());
 }
 
-// One plot per channel of each record. start: at the initial values; what it does not hold is left out.
+// One plot per channel of each record. start holds the initial values; channels that it lacks are left out.
 std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResult& fit,
                                const IdentificationResult& start) {
   std::vector<FitPlot> plots;
@@ -117,7 +117,7 @@ IdentificationOptions simulating(Run& run) {
   return options;
 }
 
-// given: what the problem file says, cut into windows.
+// given is the problem of the file, cut into windows.
 IdentificationResult fitted(Run& run, LongRun& long_run, const Problem& problem, const std::vector<CsvTable>& data,
                             const Problem& given) {
   JsonResidualRecords records(long_run.earlier().residuals,
@@ -164,7 +164,7 @@ Recovery recovered(Run& run, const CutProblem& cut, const IdentificationResult& 
   return recovery;
 }
 
-// Variants are named by their problems, or by their files where both have one name.
+// Variants carry the names of their problems, or of their files if both problems have one name.
 void compare(Run& run, const IdentificationResult& fit, const OtherModel& other) {
   const CommandOptions& options = run.context.options;
   const IdentificationResult second = other.fit(simulating(run));
@@ -178,7 +178,7 @@ void compare(Run& run, const IdentificationResult& fit, const OtherModel& other)
   add_comparison(run.result, variants[0], variants[1]);
 }
 
-// Recovers, draws again and compares a fit that has converged, as the command line asks.
+// Recovers, draws again and compares a converged fit, as the command line requests.
 void examine(Run& run, const CutProblem& cut, const IdentificationResult& fit, const std::optional<OtherModel>& other) {
   const CommandOptions& options = run.context.options;
   if (options.recover > 0 && !interrupted()) {
@@ -199,7 +199,7 @@ void examine(Run& run, const CutProblem& cut, const IdentificationResult& fit, c
   }
 }
 
-// By the settled integrator of this problem.
+// Uses the chosen integrator of this problem.
 void check(Run& run, OtherModel& other) {
   const CommandOptions& options = run.context.options;
   other.check(run.problem.scene, simulating(run));
@@ -233,7 +233,7 @@ int preflight(Run& run, const Problem& needed, const std::vector<CsvTable>& data
   return run.finish();
 }
 
-// Of the first experiment that is fitted: it stands for all of them where an integrator is chosen or judged.
+// The scene of the first fitted experiment, which represents all of them when an integrator is chosen or judged.
 Scene simulated_scene(const Problem& problem, const std::vector<CsvTable>& data) {
   const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
   std::size_t e = 0;
@@ -267,7 +267,7 @@ SimulatedExperiment simulated_experiment(Run& run, Scene scene) {
   return motion;
 }
 
-// With the fitted values in place of those it starts from.
+// The problem with the fitted values in place of the starting ones.
 Problem fitted_problem(Problem problem, const IdentificationResult& fit) {
   for (const FittedParameter& p : fit.parameters) {
     for (Parameter& shared : problem.scene.parameters)
@@ -278,7 +278,7 @@ Problem fitted_problem(Problem problem, const IdentificationResult& fit) {
   return problem;
 }
 
-// Residuals are derived along with the motion, by runs that say nothing of their steps: hence one that does.
+// Residuals are derived along with the motion, by runs that do not report their steps. So this runs one that does.
 SimulatedExperiment simulate_first_experiment(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
   SimulatedExperiment experiment = simulated_experiment(run, simulated_scene(needed, data));
   const SimulationResult& first = experiment.simulation;
@@ -289,8 +289,8 @@ SimulatedExperiment simulate_first_experiment(Run& run, const Problem& needed, c
   return experiment;
 }
 
-// Positions that were measured in the first experiment that is fitted. Each sensor is what the channel's gain and bias
-// make of its measurement; channels whose gain or bias needs more than parameters are left out.
+// Positions that were measured in the first fitted experiment. The channel's gain and bias turn its measurement into
+// that of the sensor. Channels are left out if gain or bias depend on more than parameters.
 std::vector<PointTarget> measured_points(const Problem& fitted, const Scene& scene, const IdentificationResult& fit) {
   const std::vector<ExperimentSpec>& experiments = fitted.identification->experiments;
   const auto first = std::ranges::find(experiments, false, &ExperimentSpec::validate);
@@ -331,7 +331,7 @@ ReportMotions report_motions(Run& run, const Problem& needed, const std::vector<
   return motions;
 }
 
-// Without motions where a simulation stopped.
+// The report omits motions if a simulation stopped.
 std::string report_of(const Run& run, const Problem& cut, const SimulatedExperiment& before,
                       const ReportMotions& motions, const IdentificationResult& fit, const Trajectory& history) {
   std::vector<MovingState> states;
@@ -363,7 +363,7 @@ int identify_command(const CommandContext& context) {
   std::optional<OtherModel> other;
   if (!context.options.compare.empty()) other.emplace(context.options.compare, read_options(context));
   const std::vector<CsvTable> whole = data_of(run.problem);
-  // With its drives and overrides, which the scene itself may not even assemble without.
+  // The scene includes its drives and overrides; without them it may not assemble.
   const Scene first = simulated_scene(run.problem, whole);
   const Mechanism mechanism(first, parameter_values(first));
   run.start();

@@ -1,4 +1,4 @@
-// Writes a model of another program as a problem file. A file that exists is never overwritten.
+// Writes a model of another program as a problem file. It never overwrites an existing file.
 #include <fmt/format.h>
 
 #include <filesystem>

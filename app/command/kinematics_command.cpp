@@ -30,7 +30,7 @@ Scene prescribed(const Scene& scene) {
   throw std::invalid_argument(all);
 }
 
-// Effort of each drive over time: along its coordinate, positive where it pushes the coordinate up.
+// The effort of each drive over time along its coordinate; it is positive if it increases the coordinate.
 struct DriveEfforts {
   std::vector<int> rows;
   Trajectory table;
@@ -43,7 +43,7 @@ struct DriveEfforts {
       table.columns.push_back(d.drive_names[static_cast<std::size_t>(c.drive)]);
     }
   }
-  // Returns whether they are finite; only then they are kept.
+  // Keeps the efforts if they are finite, and returns whether they are.
   bool record(const StatePoint& at) {
     std::vector<double> row{at.t};
     const Motion& motion = at.motion->motion(at);

@@ -18,9 +18,9 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kWrongDigits = 1e-6;  // of an eigenvalue, from which its error is said
+constexpr double kWrongDigits = 1e-6;  // of an eigenvalue: larger errors are reported
 
-// The places of names in a list, all of them for none.
+// The indices of names in a list, or all indices if there are no names.
 template <class Named>
 std::vector<int> places(const char* option, const std::vector<std::string>& names, const std::vector<Named>& list) {
   std::vector<std::string> known;
@@ -40,7 +40,7 @@ struct State {
   Eigen::VectorXd y, angles;
 };
 
-// The state of the simulation at the time; nothing where it fails, which then is how the run ended.
+// The state of the simulation at the time. If the simulation fails, so does the run, and there is no state.
 std::optional<State> state_at(Run& run, const Mechanism& mechanism, double time) {
   SimulationSettings settings = run.problem.scene.simulation;
   if (!(time > settings.start_time))
@@ -169,7 +169,7 @@ std::vector<double> row_of(const Mechanism& mechanism, double t, const Eigen::Ve
   return row;
 }
 
-// The state displaced along a mode, a sixth of the mechanism's size where that moves most.
+// The state displaced along a mode. The largest displacement is a sixth of the mechanism's size.
 std::vector<double> displaced_row(const Mechanism& mechanism, const State& state, const Linearisation& x,
                                   Eigen::Index mode) {
   const StateLayout layout{mechanism.bodies()};

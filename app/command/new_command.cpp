@@ -1,4 +1,4 @@
-// Writes a starter file and its data. A file that exists is never overwritten: nothing is written then.
+// Writes a starter file and its data. If one of the files exists, it writes nothing.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -48,7 +48,7 @@ int resume_command(const CommandContext& context) {
   if (!journal.ended.empty() && journal.ended != "interrupted" && journal.ended == last.status)
     return nothing_left(context, command, journal.ended);
   const auto arguments = journal.header.at("arguments").get<std::vector<std::string>>();
-  CommandOptions options = options_of(arguments);  // as it was begun, but for where we are now
+  CommandOptions options = options_of(arguments);  // those of the run, except for the current folder
   options.threads = context.options.threads, options.quiet = context.options.quiet;
   const auto from_here = [&](const char* key) {
     return (folder / journal.header.at(key).get<std::string>()).lexically_normal().string();

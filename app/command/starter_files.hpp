@@ -1,4 +1,4 @@
-// Problem files to start from, one per kind of task, with comments that say what to change: what `mbsopt new` writes.
+// Problem files to start from, one per kind of task, with comments on what to change. `mbsopt new` writes them.
 #pragma once
 
 #include <span>

@@ -30,7 +30,7 @@ void apply_accuracy(Run& run, const Tradeoff& tradeoff, TaskAdviser& adviser, do
     run.write("recommended.json", recommended_problem_text(run, tradeoff.rows[*row].setting.simulation));
 }
 
-// The sum of squares of `identify` is no objective of the file, and as exact as the integrator leaves it.
+// The sum of squares of `identify` is not an objective of the file; the integrator limits its accuracy.
 void add_fit(Run& run, const FitErrorMeasure& fit) {
   const SimulationSettings& own = run.problem.scene.simulation;
   SimulationSettings defaults = own;

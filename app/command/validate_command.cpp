@@ -1,4 +1,4 @@
-// Reading a problem is its whole check; what is left to say is what the mechanism is, and what is odd about it.
+// The reader of a problem checks all of it. This command then describes the mechanism and its oddities.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::string_view kPart = ".part";
 
-// Closes on every way out; the file is removed unless it was renamed.
+// Closes the file on every path, and removes it unless it was renamed.
 struct TemporaryFile {
   std::filesystem::path path;
   int descriptor = -1;
@@ -28,7 +28,7 @@ struct TemporaryFile {
   }
 };
 
-// The new name, too, is to outlive a loss of power. Some file systems flush no folders.
+// The new name must also survive a loss of power. Some file systems flush no folders.
 void flush_folder_of(const std::filesystem::path& path) {
   const std::filesystem::path folder = path.parent_path();
   const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -43,7 +43,7 @@ WriteError::WriteError(const std::filesystem::path& path, const char* what)
     : OutputError(fmt::format("{}: {}: {}", path.string(), what, std::strerror(errno))) {}
 
 void write_file_atomically(const std::filesystem::path& path, std::string_view content) {
-  // The process number keeps two runs that write the same file apart. O_EXCL follows no link.
+  // The process number separates two runs that write the same file. O_EXCL follows no link.
   TemporaryFile file{path.parent_path() / fmt::format(".{}.{}{}", path.filename().string(), ::getpid(), kPart)};
   file.descriptor = ::open(file.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
   if (file.descriptor < 0) throw WriteError(path, "cannot be created");

@@ -1,4 +1,4 @@
-// Files that are whole or absent: written beside their final name, flushed to the disk, then renamed into place.
+// Files that are whole or absent: they are written beside their final name, flushed to the disk, and then renamed.
 #pragma once
 
 #include <filesystem>
@@ -13,21 +13,21 @@ class OutputError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// The system did not take what was to be written.
+// The system did not accept the output.
 class WriteError : public OutputError {
  public:
-  WriteError(const std::filesystem::path& path, const char* what);  // with the reason that errno gives
+  WriteError(const std::filesystem::path& path, const char* what);  // adds the reason from errno
 };
 
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);  // throws WriteError
 
-// With the folders around it. Throws OutputError where that is not possible, or where a file has the name.
+// Creates the folder and its parents. Throws OutputError if that is not possible, or if a file has the name.
 void create_folder(const std::filesystem::path& path);
 
-// For commands that write what a user will edit: throws OutputError where there is anything at `path`.
+// Serves commands that write files for a user to edit. Throws OutputError if anything exists at `path`.
 void refuse_to_overwrite(const std::filesystem::path& path, std::string_view command);
 
-// Whether a file's name is that of the part of such a file that was never renamed, since its writer was killed.
+// Whether `part` is the name of a temporary part of the file that was never renamed, because its writer was killed.
 bool is_part_of(std::string_view part, std::string_view file);
 
 }  // namespace mbsopt

@@ -29,7 +29,7 @@ std::string base64_of(std::span<const double> values) {
 
 std::vector<double> doubles_of(std::string_view base64) {
   const auto refuse = [] { throw std::invalid_argument("no numbers in base64"); };
-  // Blanks around a block would be left out by OpenSSL.
+  // OpenSSL would ignore blanks around a block.
   if (base64.size() % 4 != 0 || base64.find_first_of(" \t\r\n-") != std::string_view::npos) refuse();
   const std::size_t padding = base64.ends_with("==") ? 2 : base64.ends_with('=') ? 1 : 0;
   const std::size_t size = base64.size() / 4 * 3 - padding;

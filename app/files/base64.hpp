@@ -1,5 +1,5 @@
-// Doubles as text that holds them exactly, a bit for a bit: base64 (RFC 4648, section 4) of their bytes, the lowest
-// first. Eleven characters each, where decimals take about twenty.
+// Doubles as text without loss of a bit: base64 (RFC 4648, section 4) of their bytes, the lowest first. Each takes
+// eleven characters; decimals take about twenty.
 //
 //   std::vector<double> same = doubles_of(base64_of({1.5, -2}));
 #pragma once
@@ -12,7 +12,7 @@
 namespace mbsopt {
 
 std::string base64_of(std::span<const double> values);
-// Throws std::invalid_argument where the text is no such one.
+// Throws std::invalid_argument if the text is not of this form.
 std::vector<double> doubles_of(std::string_view base64);
 
 }  // namespace mbsopt

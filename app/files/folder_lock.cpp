@@ -16,7 +16,7 @@ namespace mbsopt {
 FolderLock::FolderLock(const std::filesystem::path& folder)
     : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
   if (descriptor_ < 0) throw WriteError(folder, "cannot be opened");
-  // Workers die with their run; one that had just been forked holds its lock until then.
+  // Workers die with their run, but a newly forked worker holds its lock until then.
   constexpr int kTries = 100;
   for (int i = 0; i < kTries; ++i) {
     held_ = ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0;

@@ -1,6 +1,6 @@
-// An output folder belongs to the one command that writes into it: a lock (flock) on the folder itself, which the
-// system takes back when the process ends, however it ends. It leaves no file. Some network file systems have no such
-// lock; there two commands meet in the journal's checksums at the latest.
+// An output folder belongs to the one command that writes into it. A lock (flock) on the folder itself marks it; the
+// system releases the lock whenever the process ends. It leaves no file. Some network file systems have no such lock;
+// there the journal's checksums reveal two commands at the latest.
 #pragma once
 
 #include <filesystem>

@@ -20,8 +20,8 @@ namespace {
 constexpr int kJournalVersion = 3;
 constexpr std::string_view kSealBegin = ",\"sha256\":\"", kSealEnd = "\"}";
 constexpr std::size_t kSealSize = 64;  // of SHA-256 in hex
-// Between flushes of evaluations. A flush takes up to 10 ms (measured: 8 ms on ext4 of a virtual disk), so that flushes
-// take at most a tenth of the time.
+// The interval between flushes of evaluations. A flush takes up to 10 ms (measured: 8 ms on ext4 of a virtual disk), so
+// flushes take at most a tenth of the time.
 constexpr std::chrono::milliseconds kFlushInterval{100};
 
 bool is_evaluation(std::string_view kind) { return kind == "point" || kind == "hessians" || kind == "residuals"; }
@@ -40,7 +40,7 @@ Line sealed(const Json& record, const std::string& run, const std::string& seal_
   return {std::move(text), seal};
 }
 
-// The checksum that a line ends with; empty where it does not fit the line.
+// The checksum at the end of a line; empty if it does not fit the line.
 std::string seal_of(std::string_view line, const std::string& seal_before) {
   const std::size_t tail = kSealBegin.size() + kSealSize + kSealEnd.size();
   if (line.size() <= tail) return {};
@@ -60,7 +60,7 @@ std::string drawn_run_id() {
   return fmt::format("{:08x}{:08x}", system(), system());
 }
 
-// A file of this name that no run of ours has written is left as it is, and a link is not followed.
+// Refuses a file of this name that no run of this program has written, and does not follow a link.
 void refuse_foreign(const std::filesystem::path& file) {
   const std::filesystem::file_type type = std::filesystem::symlink_status(file).type();
   if (type == std::filesystem::file_type::not_found) return;

@@ -1,5 +1,5 @@
-// journal.jsonl of an output folder: what a long run has done so far, a line of JSON each, appended at once. The kernel
-// keeps an appended line when the run is killed. Lines are flushed to the disk, for a machine that stops: evaluations
+// journal.jsonl of an output folder: the progress of a long run, a line of JSON each, appended at once. The kernel
+// keeps an appended line when the run is killed. A flush to the disk protects lines when the machine stops: evaluations
 // at most every 100 ms, other lines at once.
 //
 //   {"journal": 3, "command": "design", "input": "../five_bar.json", ...}    the first line: what is run, and on what
@@ -7,17 +7,16 @@
 //   {"hessians": {...}}                                                      second derivatives
 //   {"residuals": {...}}                                                     an experiment   (residual_records.hpp)
 //   {"iterate": {"iteration": 3, "objective": ..., "parameters": {...}}}     accepted by the optimiser
-//   {"start": {"start": 7, "status": "converged", ...}}                      a finished start of a multistart, or block
-//   of a sweep
-//   {"ended": "ok"}                                                          the status of result.json, which is there
+//   {"start": {"start": 7, "status": "converged", ...}}                      a start, or a block of a sweep
+//   {"ended": "ok"}                                                          the status of result.json, which exists
 //
 // Each line ends with
 //   "run": "52bd...", "bytes": 310, "sha256": "9f86..."
 // the run's id, the number of bytes before "sha256", and the checksum of these after the checksum of the line before.
-// So a line that is damaged, missing, moved or of another run is found. A last line that was cut off is none.
+// So the reader finds a line that is damaged, missing, moved or of another run. It ignores a truncated last line.
 //
-// A run goes on by doing everything again, from the first line; whatever the journal knows is not computed again. So it
-// ends as it would have, bit by bit.
+// A resumed run repeats everything from the first line, but takes from the journal what it contains. So it ends with
+// the same result, bit by bit.
 #pragma once
 
 #include <chrono>
@@ -33,7 +32,7 @@ namespace mbsopt {
 
 inline constexpr const char* kJournalFile = "journal.jsonl";
 
-// Lines after the first.
+// The lines after the first one, which is the header.
 struct JournalContent {
   Json header;
   std::vector<Json> points, hessians, residuals, starts;
@@ -43,17 +42,17 @@ struct JournalContent {
   std::size_t bytes = 0;  // of whole lines
 };
 
-// Throws OutputError where there is none, or where it is none of this version, or damaged.
+// Throws OutputError if there is no journal, or if it has another version or is damaged.
 JournalContent read_journal(const std::filesystem::path& folder);
 
-// Reads a record's content. What throws there, a library's words or a wrong size, is refused as an OutputError.
+// Reads a record's content. It turns exceptions, from a library or a wrong size, into an OutputError.
 void read_record(const std::function<void()>& read);
 
 class Journal {
  public:
-  // A new one, in place of one of an earlier run. Throws OutputError where a file that is no journal has its name.
+  // Replaces the journal of an earlier run. Throws OutputError if a file that is no journal has its name.
   Journal(const std::filesystem::path& folder, const Json& header);
-  // Goes on with the one that has been read, its cut-off last line removed.
+  // Continues the given journal, and removes its truncated last line.
   Journal(const std::filesystem::path& folder, const JournalContent& earlier);
   ~Journal();  // flushes
   Journal(const Journal&) = delete;

@@ -1,4 +1,4 @@
-// JSON as text. nlohmann's parser and writer are compiled here once: each source that uses them takes seconds longer.
+// JSON as text. This file alone compiles nlohmann's parser and writer, which cost each source several seconds.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -12,7 +12,8 @@ using Json = nlohmann::ordered_json;
 Json read_json(std::string_view text);               // throws Json::parse_error
 Json read_json_or_discarded(std::string_view text);  // is_discarded() where the text is not JSON
 
-// indent: spaces per level; -1: all on one line. U+FFFD replaces what is not UTF-8, so check names of files before.
+// indent is the number of spaces per level; -1 writes one line. U+FFFD replaces invalid UTF-8, so check file names
+// before.
 std::string json_text(const Json& json, int indent = -1);
 
 }  // namespace mbsopt

@@ -1,4 +1,4 @@
-// result.json: what a run found, for scripts. Keys as in docs/cli.md, always in the same order.
+// result.json: the results of a run, for scripts. docs/cli.md lists the keys; they are always in the same order.
 #pragma once
 
 #include <optional>
@@ -15,12 +15,12 @@ Json to_json(const SimulationStatistics& statistics);
 
 Json or_null(const std::optional<double>& value);
 
-// "lower", "upper" or "": the bound that a value touches.
+// "lower", "upper" or "": the bound at which a value is.
 const char* bound_hit(bool lower, bool upper);
-// The same as JSON: null where it touches none.
+// The same as JSON; null if the value is at no bound.
 Json bound_json(bool lower, bool upper);
 
-// The parts a run has gathered, as text in the order of the contract.
+// The parts of a run's result, as text in the order of docs/cli.md.
 std::string result_json_text(const Json& parts);
 
 }  // namespace mbsopt

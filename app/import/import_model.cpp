@@ -32,8 +32,8 @@ constexpr std::array kActs{
     "compiler boundinertia", "compiler balanceinertia", "geom shellinertia", "geom fluidshape"};
 // clang-format on
 
-// No problem file can say numbers that overflowed, or ties between joints without an angle or a displacement: they are
-// findings.
+// A problem file cannot express numbers that overflowed, or ties between joints without an angle or a displacement. So
+// these are findings.
 void refuse(const ImportedModel& model, ModelErrors& errors) {
   for (const ImportedBody& b : model.bodies) {
     const bool finite =
@@ -55,7 +55,7 @@ void refuse(const ImportedModel& model, ModelErrors& errors) {
   errors.throw_if_any();
 }
 
-// The problem; its findings about a body or a joint at their element of the model.
+// Returns the problem. Findings about a body or a joint name their element of the model.
 Problem checked(const std::string& text, const ImportedModel& model, const std::string& file) {
   try {
     return read_problem_text(text, file);

@@ -1,4 +1,4 @@
-// URDF or MJCF to a problem file.
+// Turns URDF or MJCF into a problem file.
 //
 //   const ImportedProblem imported = import_model("arm.urdf");     // throws InputError: what is wrong, with its line
 //   imported.text                                                  // of arm.json
@@ -11,17 +11,17 @@
 namespace mbsopt {
 
 struct ImportedProblem {
-  std::string name;                   // of the model; that of a file
-  std::string text;                   // of the problem file; the lists stand in its comments, too
-  std::vector<std::string> changed;   // what it says otherwise, sentences
+  std::string name;                   // the model's name, used for the file
+  std::string text;                   // the problem file; its comments contain the lists, too
+  std::vector<std::string> changed;   // changed content, in sentences
   std::vector<std::string> warnings;  // why simulate fails: bodies without mass that no joint holds
-  std::vector<std::string> dropped;   // what it does not hold: "line 12: joint range"
+  std::vector<std::string> dropped;   // omitted parts: "line 12: joint range"
   std::size_t bodies = 0, joints = 0;
 };
 
 ImportedProblem import_model(const std::filesystem::path& model);
 
-// The same from a text, without warnings: no mechanism is assembled. `model` stands for the file in findings.
+// Reads the same from a text, without warnings: it assembles no mechanism. `model` names the file in findings.
 ImportedProblem read_model_text(const std::string& text, const std::filesystem::path& model);
 
 }  // namespace mbsopt

@@ -1,5 +1,5 @@
-// A mechanism as a model file describes it, before it is written as a problem file: bodies with their frames at the
-// place where the model file draws them. What belongs to a body is in its frame. Body 0 is the ground.
+// A mechanism in the form of a model file, before it becomes a problem file. Bodies have their frames where the model
+// file draws them. All data of a body are in its frame. Body 0 is the ground.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -18,7 +18,7 @@ struct ImportedShape {
   double radius = 0;         // [m]
 };
 
-// Drawn as a bar along its longest side, as wide as the longer of the other two.
+// A bar along the longest side of the box, as wide as the longer of its other two sides.
 ImportedShape box_shape(const Eigen::Vector3d& half_sides, const Eigen::Isometry3d& at);
 
 struct ImportedBody {
@@ -44,7 +44,7 @@ struct ImportedJoint {
   const XmlElement* source = nullptr;
 };
 
-// value(joint2) = factor value(joint1), both from the start: angles or displacements.
+// value(joint2) = factor value(joint1): angles or displacements, both from the start.
 struct ImportedTie {
   std::string name;
   int joint1 = 0, joint2 = 0;

@@ -1,4 +1,4 @@
-// Default classes of MJCF: an attribute that an element leaves out is that of its class, else of the classes around it.
+// Default classes of MJCF: an element that omits an attribute takes that of its class, or of the classes around it.
 #pragma once
 
 #include <map>
@@ -14,11 +14,12 @@ class MjcfDefaults {
  public:
   MjcfDefaults(const XmlElement& mujoco, ModelErrors& errors);
 
-  // The element, and the elements of its kind in its class and in the classes around this one, from near to far.
-  // An element's own class goes before `childclass`, that of the bodies around it; empty: the outermost class.
+  // The element, and the elements of its kind in its class and in the classes around this one, from near to far. An
+  // element's own class precedes `childclass`, that of the bodies around it. An empty name means the outermost class.
   std::vector<const XmlElement*> sources(const XmlElement& element, const std::string& childclass);
 
-  // The attribute of the first source that has it. All are read: a class that a nearer one overrides is not dropped.
+  // Returns the attribute of the first source that has it. It reads all sources, so an overridden class is not
+  // reported.
   std::optional<std::string> text(const XmlElement& element, const std::string& childclass, std::string_view attribute);
 
  private:

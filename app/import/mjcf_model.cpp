@@ -22,14 +22,14 @@ using Eigen::Vector3d;
 
 constexpr double kDensity = 1000;  // of geoms without mass and density, by MuJoCo's XML reference [kg/m^3]
 
-// The smallest rotation that brings z there; opposite to z half a turn about x, as MuJoCo's.
+// The smallest rotation that moves z there. If it is opposite to z, this is half a turn about x, as in MuJoCo.
 Matrix3d with_z_along(const Vector3d& direction) {
   const Vector3d across = Vector3d::UnitZ().cross(direction);
   const Vector3d axis = across.norm() > 0 ? across.normalized() : Vector3d::UnitX();
   return Eigen::AngleAxisd(std::atan2(across.norm(), direction.z()), axis).toRotationMatrix();
 }
 
-// Elements whose bodies or joints are not read: a model without them would move in another way, unnoticed.
+// The reader does not read bodies or joints in these elements; without them the model would move differently.
 constexpr std::array kRefused{"include", "composite", "flexcomp", "replicate", "attach"};
 
 class MjcfReader {
@@ -98,7 +98,7 @@ class MjcfReader {
 
   bool enabled(const std::string& flag) const { return flags_.at(flag) == "enable"; }
 
-  // One of the words that MuJoCo takes; a finding, and the first one, for any other.
+  // Returns one of MuJoCo's words. Any other word is a finding, and gives the first one.
   std::string keyword(const XmlElement& element, const std::string& attribute, const std::vector<std::string>& words,
                       const std::string& otherwise) {
     const std::string word = element.text(attribute).value_or(otherwise);
@@ -107,7 +107,7 @@ class MjcfReader {
     return words.front();
   }
 
-  // Bodies, geoms and sites of the world, of a body or of a <frame>, which only moves and turns what it holds.
+  // Reads bodies, geoms and sites of the world, of a body or of a <frame>, which only moves and turns its contents.
   void read_contents(const XmlElement& element, const Around& around) {
     for (const XmlElement* geom : element.children("geom")) read_geom(*geom, around);
     for (const XmlElement* site : element.children("site")) {
@@ -134,7 +134,7 @@ class MjcfReader {
     const bool free = joints.size() == 1 && is_free(joints[0]);
     if (free) read_free_joint(joints[0]);
     if (!joints.empty()) {
-      // A joint each between two bodies; those before the last one have no mass.
+      // Each joint lies between two bodies; those before the last one have no mass.
       const std::size_t count = joints.size();
       for (std::size_t k = 0; k < count; ++k) {
         const int parent = inside.body;
@@ -196,7 +196,7 @@ class MjcfReader {
     if (joint.element->name == "joint") leave_out(joint, {"damping", "stiffness", "frictionloss"});
   }
 
-  // damping, stiffness or frictionloss; 0 if a flag switches it off.
+  // Returns damping, stiffness or frictionloss, or 0 if a flag switches it off.
   double coefficient(const PlacedJoint& joint, const std::string& attribute) {
     const double value = number(*joint.element, joint.around, attribute, 0);
     const bool acts =
@@ -328,7 +328,7 @@ class MjcfReader {
     }
   }
 
-  // A body of the model by an attribute of an equality; nothing, and a finding, where there is none.
+  // Finds a body of the model by an attribute of an equality. If there is none, it reports a finding.
   std::optional<Around> placed(const XmlElement& element, const char* attribute, bool world_otherwise) {
     const std::optional<std::string> name = element.text(attribute);
     if ((!name && world_otherwise) || name == "world") return Around{0, Isometry3d::Identity(), "", false};
@@ -350,7 +350,7 @@ class MjcfReader {
     return active;
   }
 
-  // MuJoCo's equalities are springs of its solver; here they hold exactly. point: in the frame of the body `a`.
+  // MuJoCo's equalities are springs of its solver; here they hold exactly. point is in the frame of the body `a`.
   void read_connection(const XmlElement& element, const std::string& type, const Vector3d& point) {
     std::optional<Around> a = placed(element, "body1", false), b = placed(element, "body2", true);
     if (!a || !b || !is_active(element)) return;
@@ -374,7 +374,7 @@ class MjcfReader {
     read_connection(element, "spherical", numbers(element, "anchor", *anchor, 3, errors_));
   }
 
-  // q1 = q1_0 + c0 + c1 (q2 - q2_0) + c2 (q2 - q2_0)^2 + ...; ties are linear and start where the file draws the
+  // q1 = q1_0 + c0 + c1 (q2 - q2_0) + c2 (q2 - q2_0)^2 + ...   Ties here are linear and start where the file draws the
   // joints.
   void read_joint_tie(const XmlElement& element) {
     const std::string coefficients = element.text("polycoef").value_or("0 1 0 0 0");
@@ -420,7 +420,7 @@ class MjcfReader {
     return frame;
   }
 
-  // That of the element; else of its class, and of the classes around this one.
+  // The orientation of the element, or of its class and the classes around it.
   Matrix3d orientation(const XmlElement& element, const Around& around) {
     std::optional<Matrix3d> found;
     for (const XmlElement* source : defaults_.sources(element, around.childclass)) {

@@ -6,7 +6,7 @@
 
 namespace mbsopt {
 
-// mujoco: the root element <mujoco>. Throws InputError with every finding.
+// mujoco is the root element <mujoco>. Throws InputError with every finding.
 ImportedModel mjcf_model(const XmlElement& mujoco, const std::string& file);
 
 }  // namespace mbsopt

@@ -1,4 +1,4 @@
-// The readers of URDF and MJCF share numbers in attributes, names, and findings with their place in the file.
+// The readers of URDF and MJCF share this: numbers in attributes, names, and findings with their place in the file.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,22 +27,22 @@ class ModelErrors {
   std::vector<Finding> findings_;
 };
 
-// Numbers with blanks between them, all finite. What is none is a finding, and the result is empty.
+// Reads finite numbers separated by blanks. Anything else is a finding and gives an empty result.
 std::vector<double> numbers(const XmlElement& element, std::string_view attribute, const std::string& text,
                             ModelErrors& errors);
-// As many as `count`, else a finding and zeros.
+// Reads exactly `count` numbers; otherwise it reports a finding and returns zeros.
 Eigen::VectorXd numbers(const XmlElement& element, std::string_view attribute, const std::string& text,
                         Eigen::Index count, ModelErrors& errors);
 
-// add_mass (imported_model.hpp) of what the element describes. A mass or inertia that no body has is a finding.
+// Calls add_mass (imported_model.hpp) for the element. An impossible mass or inertia is a finding.
 void add_part(ImportedBody& body, const XmlElement& element, double mass, const Eigen::Vector3d& com,
               const Eigen::Matrix3d& inertia, ModelErrors& errors);
 
 // A rotation about a coordinate axis, 0 to 2.
 Eigen::Matrix3d rotation(int axis, double angle);
 
-// Names that a problem file takes, each once: characters that it refuses become "_", a number follows where one is
-// taken. renamed: takes a sentence for each name that is not as wanted.
+// Makes unique names for a problem file. Refused characters become "_", and a number follows a taken name. renamed
+// receives a sentence for each changed name.
 class Names {
  public:
   explicit Names(std::vector<std::string> taken, std::vector<std::string>* renamed = nullptr)

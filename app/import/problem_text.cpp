@@ -18,7 +18,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Rotations leave some 1e-17 in entries that are 0; relative to `scale` this is rounding.
+// Rotations leave some 1e-17 in entries that should be 0; relative to `scale` this is rounding.
 double rounded(double value, double scale) {
   constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
   return std::abs(value) < kRounding * scale ? 0 : value;
@@ -92,7 +92,7 @@ class ProblemWriter {
       json["axis1"] = direction(j.between.linear() * j.axis);
       json["axis2"] = direction(j.axis);
     }
-    // The angle is 0 where the model draws the joint. Without normals it is where the two frames are parallel.
+    // The angle is 0 where the model draws the joint. Without normals it would be 0 where the two frames are parallel.
     if (turns && j.between.linear() != Matrix3d::Identity()) {
       json["normal1"] = direction(j.between.linear() * j.axis.unitOrthogonal());
       json["normal2"] = direction(j.axis.unitOrthogonal());
@@ -112,8 +112,8 @@ class ProblemWriter {
                          {"smooth_velocity", smooth_velocity_}});
   }
 
-  // A torque -c (omega_2 - omega_1) on body 2, its opposite on body 1. A bushing resists the rate of the rotation
-  // vector instead, which is another one for large rotations.
+  // Adds a torque -c (omega_2 - omega_1) on body 2 and its opposite on body 1. A bushing would resist the rate of the
+  // rotation vector, which differs for large rotations.
   void add_ball_damping(const ImportedJoint& j, const ImportedBody& b1, const ImportedBody& b2) {
     Json on_body2 = Json::array(), on_body1 = Json::array();
     for (const char* axis : {"x", "y", "z"}) {
@@ -143,7 +143,7 @@ class ProblemWriter {
     forces_.push_back(rsda);
   }
 
-  // k (x - x0) along the axis, which pulls the two bodies of a translational joint back.
+  // Adds k (x - x0) along the axis, which pulls the two bodies of a translational joint back.
   void add_spring(const ImportedJoint& j, const ImportedBody& b1, const ImportedBody& b2, const Json& json) {
     const std::string x = sensor_of_.at(j.name);
     const std::string extension = j.free_value == 0 ? x : fmt::format("({} - {})", x, Expression(j.free_value).text());

@@ -15,7 +15,7 @@ using Eigen::Isometry3d;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Each type of URDF becomes one of the problem format. "" leaves the child free; "fixed" makes one body of the two.
+// Each type of URDF becomes one of the problem format. "" leaves the child free; "fixed" unites both bodies.
 const std::map<std::string, std::string> kUrdfTypes{
     {"revolute", "revolute"}, {"continuous", "revolute"}, {"prismatic", "translational"},
     {"planar", "planar"},     {"fixed", "fixed"},         {"floating", ""}};
@@ -33,7 +33,7 @@ class UrdfReader {
     errors_.throw_if_any();
     const XmlElement* const root = root_link();
     errors_.throw_if_any();
-    // URDF does not say what carries its root; it is fixed, as in MuJoCo.
+    // URDF does not define the support of its root. It is fixed here, as in MuJoCo.
     fill(*root);
     model_.changed.push_back(fmt::format("the root link '{}' is fixed to the ground", *root->text("name")));
     for (const auto& [name, link] : links_) {
@@ -108,7 +108,7 @@ class UrdfReader {
     return text.empty() ? 0 : numbers(element, attribute, text, 1, errors_)(0);
   }
 
-  // rpy: about the fixed axes x, y, z, in this order.
+  // rpy turns about the fixed axes x, y, z, in this order.
   Isometry3d origin(const XmlElement& element) {
     Isometry3d frame = Isometry3d::Identity();
     const XmlElement* const o = element.child("origin");
@@ -119,7 +119,7 @@ class UrdfReader {
     return frame;
   }
 
-  // Adds each link to its body, from the root on. A tree of any depth: no recursion over links.
+  // Adds each link to its body, from the root on. The tree may have any depth, so this is no recursion over links.
   void fill(const XmlElement& root) {
     struct Waiting {
       const XmlElement* link;
@@ -144,7 +144,7 @@ class UrdfReader {
     }
   }
 
-  // between: the frame of the child link, in that of the parent's body.
+  // between is the frame of the child link in that of the parent's body.
   int body_of(const XmlElement& element, const XmlElement& child, int parent, const Isometry3d& between) {
     const std::string type = kUrdfTypes.at(*element.text("type"));
     if (type == "fixed") {

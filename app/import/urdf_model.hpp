@@ -5,7 +5,7 @@
 
 namespace mbsopt {
 
-// robot: the root element <robot>. Throws InputError with every finding.
+// robot is the root element <robot>. Throws InputError with every finding.
 ImportedModel urdf_model(const XmlElement& robot, const std::string& file);
 
 }  // namespace mbsopt

@@ -1,4 +1,4 @@
-// An XML file as a tree that remembers what was read of it: what nobody asked for is what an import drops.
+// An XML file as a tree that records which parts were read. An import drops the parts that nothing reads.
 //
 //   const XmlElement robot = parse_xml(read_text_file("arm.urdf"), "arm.urdf");
 //   for (const XmlElement* link : robot.children("link")) link->text("name");
@@ -24,13 +24,13 @@ class XmlElement {
   std::vector<const XmlElement*> children(std::string_view child_name) const;
   std::vector<const XmlElement*> children() const;  // all of them, in the order of the file; marks none as read
   void mark_read() const { read_ = true; }
-  void mark_unread() const { read_ = false; }  // asked for, and then not used
+  void mark_unread() const { read_ = false; }  // read, and then not used
 
   struct Unread {
     int line;
     std::string what;  // "joint range", "actuator"
   };
-  // Each kind once, with the line of its first place; below an unread element nothing is listed.
+  // Lists each kind once, with the line of its first place. It lists nothing below an unread element.
   std::vector<Unread> unread() const;
 
  private:
@@ -45,7 +45,7 @@ class XmlElement {
   mutable bool read_ = false;
 };
 
-// Throws InputError with line and column where the text is no XML; `file` stands for it in findings.
+// Throws InputError with line and column if the text is not XML; `file` names it in findings.
 XmlElement parse_xml(const std::string& text, const std::string& file);
 
 }  // namespace mbsopt

@@ -1,4 +1,4 @@
-// Changes values in the text of a problem file and leaves everything else as it was written, comments and formatting.
+// Changes values in the text of a problem file. Everything else stays, with comments and formatting.
 #pragma once
 
 #include <map>
@@ -7,17 +7,17 @@
 
 namespace mbsopt {
 
-// The text with the value at a path (as --set takes it) replaced by `json`; objects on the way that are missing are
-// added. Throws InputError where the text is not JSON or the path leads nowhere.
+// Returns the text with the value at a path (in the form of --set) replaced by `json`. It adds missing objects on the
+// way. Throws InputError if the text is not JSON or the path leads nowhere.
 std::string with_value(const std::string& text, std::string_view path, const std::string& json);
 
-// Without the member at a path of keys; as it is where there is none.
+// Removes the member at a path of keys; the text stays if there is none.
 std::string without_member(const std::string& text, std::string_view path);
 
-// With one --set, "path=value", applied: the value is JSON where it is JSON, else a string.
+// Applies one --set, "path=value". The value is JSON if it can be read as JSON, else a string.
 std::string with_override(const std::string& text, const std::string& override_text);
 
-// With the value of each named parameter replaced by a number in SI of 17 significant digits.
+// Replaces the value of each named parameter by a number in SI with 17 significant digits.
 std::string with_parameter_values(const std::string& text, const std::map<std::string, double>& values);
 
 }  // namespace mbsopt

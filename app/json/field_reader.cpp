@@ -116,7 +116,7 @@ const TypeRow* FieldReader::type(std::string_view key, std::string_view, std::sp
   const Node* const node = get(key, {says.description, Need::optional, {}});
   if (!node) {
     missing_.push_back({std::string(key), "is missing; available: " + joined(names_of(rows))});
-    findings_.add_elsewhere(path_);  // what else the object needs depends on it
+    findings_.add_elsewhere(path_);  // other requirements of the object depend on it
     return nullptr;
   }
   std::string given;
@@ -375,7 +375,7 @@ void FieldReader::read_named(const Node& node, const std::string& path, Paramete
     if (const Node* number = node.find(key)) take_unit(*number, child_path(path, key), value);
 }
 
-// A value written with a unit says what "unit" would say, and must not contradict it.
+// A value with a unit has the meaning of "unit", and must not contradict it.
 void FieldReader::take_unit(const Node& node, const std::string& path, Parameter& parameter) {
   if (node.kind != Node::Kind::string) return;
   const auto found = infer_dimension(Expression::parse(node.string), [](const std::string&) { return std::nullopt; });

@@ -1,5 +1,5 @@
-// The visitor that fills a problem from nodes (core/scene/vocabulary.hpp says what there is to fill). It checks shapes
-// and syntax; meanings are checked on the finished problem.
+// The visitor that fills a problem from nodes (core/scene/vocabulary.hpp lists the fields). It checks shapes and
+// syntax; other checks on the finished problem find wrong meanings.
 #pragma once
 
 #include <algorithm>
@@ -128,8 +128,8 @@ class FieldReader {
   void later(std::string_view key, std::string_view what);
   void misplaced(std::string_view key, std::string_view where);
   void rest_unknown() { rest_unknown_ = true; }
-  // At the end of an object: keys that it does not have, and required ones that are missing. A key that is both unknown
-  // and like a missing one is one finding.
+  // Reports, at the end of an object, unknown keys and missing required ones. An unknown key that resembles a missing
+  // one is one finding.
   void report_keys();
 
  private:
@@ -140,9 +140,10 @@ class FieldReader {
   };
   const Missing* missing_like(const std::string& unknown) const;
   void skip(std::string_view key, const Says& says) { get(key, says); }
-  void refuse(std::string_view key, const std::string& message);  // where it is given
+  void refuse(std::string_view key, const std::string& message);  // reports a given key
 
-  // The value of a key, which from now on is known; nullptr (and a finding where it is required) when it is absent.
+  // Returns the value of a key, which is known from now on. If it is absent, it returns nullptr and reports a required
+  // one.
   const Node* get(std::string_view key, const Says& says);
   const Node* get_kind(std::string_view key, const Says& says, Node::Kind kind);
 

@@ -7,7 +7,7 @@
 namespace mbsopt {
 namespace {
 
-// The path itself and all that it lies in, from within, until `is_it` says so; whether it did.
+// Tries the path and all paths around it, from within, until `is_it` returns true. Returns whether it did.
 template <class Is>
 bool for_each_outer(std::string_view path, Is&& is_it) {
   for (;;) {

@@ -1,4 +1,4 @@
-// Collects what is wrong with a problem while it is read: in the file, or in what --set changed of it.
+// Collects the faults of a problem during reading: in the file, or in the changes of --set.
 #pragma once
 
 #include <string>
@@ -18,20 +18,20 @@ class Findings {
 
   const SourceText& text() const { return text_; }
 
-  // About a value, or about byte `at` of the string it holds.
+  // Adds a finding about a value, or about byte `at` of its string.
   void add(const Node& node, const std::string& path, const std::string& message);
   void add_inside(const Node& node, std::size_t at, const std::string& path, const std::string& message);
-  // About an offset of the file.
+  // Adds a finding about an offset of the file.
   void add_at(std::size_t offset, const std::string& path, const std::string& message);
   void add_override(const std::string& path, const std::string& message);
 
-  // The path counts as having a finding, which is told at another place.
+  // Marks a path whose finding is reported at another place.
   void add_elsewhere(const std::string& path) { mark(path); }
 
-  // Whether a path, one it lies in, or one that lies in it has a finding already.
+  // Whether a path, one around it, or one inside it has a finding already.
   bool concerns(std::string_view path) const;
   bool any() const { return !found_.empty(); }
-  // A finding about a value, not collected: for what is no error.
+  // Makes a finding about a value without collecting it, for warnings.
   Finding finding(const Node& node, const std::string& path, const std::string& message) const;
   void throw_if_any() const;  // InputError, in the order of the file, each once
 

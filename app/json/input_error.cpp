@@ -7,7 +7,7 @@ namespace mbsopt {
 namespace {
 
 std::string lines(const std::vector<Finding>& findings) {
-  constexpr std::size_t kShown = 100;  // more than anyone mends before the next try
+  constexpr std::size_t kShown = 100;  // more than a user corrects before the next run
   std::string all;
   for (std::size_t i = 0; i < std::min(kShown, findings.size()); ++i) {
     if (!all.empty()) all += '\n';
@@ -29,7 +29,7 @@ std::string to_string(const Finding& finding) {
     if (!finding.path.empty()) text += ": " + finding.path;
   }
   text += ": " + finding.message;
-  // One line each, whatever names and texts it quotes.
+  // Keeps each finding on one line, for any names and texts in it.
   std::replace_if(
       text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
   return text;

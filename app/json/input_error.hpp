@@ -1,4 +1,4 @@
-// The errors of a problem file: every finding, with the place it is about.
+// The errors of a problem file: every finding, with its place.
 #pragma once
 
 #include <stdexcept>
@@ -18,7 +18,7 @@ struct Finding {
 // "suspension.json:41:18: bodies[2].inertia: ..."  or  "--set bodies[2].inertia: ..."
 std::string to_string(const Finding& finding);
 
-// what(): one line per finding, the first hundred of them, and how many more there are.
+// what() has one line per finding for the first hundred, and the number of the others.
 class InputError : public std::runtime_error {
  public:
   explicit InputError(std::vector<Finding> all);

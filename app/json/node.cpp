@@ -36,7 +36,7 @@ std::string what_is(const Node& node) {
 
 namespace {
 
-// The key in ["..."] at `at`, which moves behind it.
+// Reads the key in ["..."] at `at`, and moves `at` behind it.
 std::string quoted_key(std::string_view path, std::size_t& at) {
   std::string key;
   for (at += 2; at < path.size() && path[at] != '"'; ++at) {

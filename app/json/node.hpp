@@ -1,4 +1,4 @@
-// A JSON value that remembers where it stands in its text.
+// A JSON value with its place in the text.
 #pragma once
 
 #include <cstddef>
@@ -34,7 +34,7 @@ struct PathStep {
   bool is_index = false;
   std::size_t index = 0;
 };
-// Throws std::invalid_argument where the text is not a path.
+// Throws std::invalid_argument if the text is not a path.
 std::vector<PathStep> parse_path(std::string_view path);
 
 // The value at a path, or the nearest one around it that exists.

@@ -9,7 +9,7 @@ namespace mbsopt {
 
 namespace {
 
-// The member of an object, made where it is missing.
+// Returns the member of an object, and creates it if it is missing.
 Node& member(Node& object, const std::string& key, int number) {
   for (std::size_t i = 0; i < object.keys.size(); ++i)
     if (object.keys[i] == key) return object.items[i];
@@ -21,7 +21,7 @@ Node& member(Node& object, const std::string& key, int number) {
   return made;
 }
 
-// "k1": 100 is short for "k1": {"value": 100}, so that parameters.k1.value can be set in both.
+// "k1": 100 is short for "k1": {"value": 100}; parameters.k1.value sets both.
 void spell_out_parameter(Node& parameter) {
   Node object;
   object.kind = Node::Kind::object;

@@ -8,7 +8,7 @@
 
 namespace mbsopt {
 
-// override_text: "parameters.k1.value=120"; number: which --set it is, from 1.
+// override_text is "parameters.k1.value=120". number counts the --set options from 1.
 void apply_override(Node& root, const std::string& override_text, int number, Findings& findings);
 
 }  // namespace mbsopt

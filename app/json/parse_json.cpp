@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t kDeepestNesting = 100;
 
-// The tokens of a JSON text in their order: brackets, strings, numbers and literals; commas and colons left out.
+// The tokens of a JSON text in their order: brackets, strings, numbers and literals, without commas and colons.
 class TokenScan {
  public:
   explicit TokenScan(std::string_view text, std::size_t begin = 0) : text_(text), at_(begin) {
@@ -98,7 +98,7 @@ class NodeBuilder : public nlohmann::json_sax<nlohmann::json> {
     Node node;
     std::string path;
     std::unordered_set<std::string> keys;
-    std::vector<std::size_t> repeated;  // which of the node's keys were there before
+    std::vector<std::size_t> repeated;  // repeated keys of the node
   };
 
   bool number(double value) { return scalar(Node::Kind::number).number = value, true; }
@@ -137,7 +137,7 @@ class NodeBuilder : public nlohmann::json_sax<nlohmann::json> {
     return true;
   }
 
-  // Keys of an object, by ascending numbers.
+  // Removes keys of an object by ascending numbers.
   static void leave_out(const std::vector<std::size_t>& numbers, Node& node) {
     std::size_t kept = 0;
     auto next = numbers.begin();
@@ -168,7 +168,7 @@ class NodeBuilder : public nlohmann::json_sax<nlohmann::json> {
                                                  : child_path(level.path, level.node.items.size());
   }
 
-  // nlohmann reports how many bytes it has read, up to the last one of the token it stumbled over.
+  // nlohmann reports how many bytes it has read, up to the last one of the faulty token.
   std::size_t place(std::size_t position, const std::string& what) const {
     if (position == 0 || what.find("unexpected end of input") != std::string::npos) return text_.size();
     const std::size_t last_byte = std::min(position, text_.size()) - 1;
@@ -192,7 +192,7 @@ class NodeBuilder : public nlohmann::json_sax<nlohmann::json> {
     return "is not JSON: " + what + comma_hint(begin, what);
   }
 
-  // nlohmann says what it expected; what a writer forgot is most often a comma, and what is left over is one, too.
+  // nlohmann reports the token that it expected. Mostly a comma is missing, or one is superfluous.
   std::string comma_hint(std::size_t begin, const std::string& what) const {
     const bool in_object = what.find("expected '}'") != std::string::npos;
     const bool in_list = what.find("expected ']'") != std::string::npos;

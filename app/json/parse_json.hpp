@@ -1,5 +1,5 @@
-// JSON text (comments allowed) to nodes with positions. nlohmann's parser decides what is JSON; a scan of the tokens
-// beside it says where each one begins, which that parser forgets.
+// Turns JSON text (comments allowed) into nodes with positions. nlohmann's parser decides what is JSON. It does not
+// keep positions, so a scan of the tokens finds where each one begins.
 #pragma once
 
 #include "app/json/findings.hpp"
@@ -7,11 +7,11 @@
 
 namespace mbsopt {
 
-// Reads the text of `findings`. Syntax errors, duplicate keys and the like are added there; throws InputError where
-// nothing can be read.
+// Reads the text of `findings`, and adds syntax errors, duplicate keys and the like to it. Throws InputError if nothing
+// can be read.
 Node parse_json(Findings& findings);
 
-// A value from a command line: JSON where it is JSON, else a string. No positions.
+// A value from a command line without positions: JSON if it can be read as JSON, else a string.
 Node parse_override_value(const std::string& text, int source);
 
 }  // namespace mbsopt

@@ -29,7 +29,7 @@ Function* symbol(void* library, const char* name) {
 }  // namespace
 
 void load_plugin(const std::filesystem::path& file, NamedTerms& terms) {
-  // An absolute path: the loader looks for plain names in the system's folders.
+  // The path is absolute, because the loader searches the system's folders for plain names.
   const std::filesystem::path path = std::filesystem::absolute(file);
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none))

@@ -7,9 +7,9 @@
 
 namespace mbsopt {
 
-// Adds the terms of a shared library, which stays loaded until the process ends: objects of its classes may. Throws
-// std::runtime_error in words: no such file, no library, no plug-in, compiled otherwise, terms refused, or what its
-// registration threw.
+// Adds the terms of a shared library. The library stays loaded until the process ends, because objects of its classes
+// may live so long. Throws std::runtime_error in words: no such file, no library, no plug-in, another version, refused
+// terms, or an exception of its registration.
 void load_plugin(const std::filesystem::path& file, NamedTerms& terms);
 
 }  // namespace mbsopt

@@ -12,7 +12,7 @@
 namespace mbsopt {
 namespace {
 
-// "drives[0].law" of "drives[0].law: its samples"; empty where there is none.
+// "drives[0].law" of "drives[0].law: its samples"; empty if there is no path.
 std::string path_before(const std::string& words) {
   const std::size_t end = words.find(": ");
   if (end == std::string::npos) return {};

@@ -1,4 +1,4 @@
-// A problem file as it was read, with --set applied. It tells where in the file a path stands, also when the file has
+// The content of a problem file with --set applied. It finds the place of a path in the file, also if the file has
 // changed since.
 //
 //   const auto source = read_problem_source("crane.json", {});
@@ -24,18 +24,18 @@ struct ProblemSource {
   Findings findings;  // of the text, of --set, and of read_problem()
   Node root;
 
-  // Nothing if the words do not begin with a path of the problem.
+  // Returns nothing if the words do not begin with a path of the problem.
   std::optional<std::string> placed(const std::string& words) const;
   std::optional<Finding> finding(const std::string& words) const;
 };
 
-// Throws InputError if the file cannot be read, or if its text is no JSON.
+// Throws InputError if the file cannot be read, or if its text is not JSON.
 std::shared_ptr<ProblemSource> read_problem_source(const std::filesystem::path& file,
                                                    const std::vector<std::string>& set_overrides);
 ProblemSource problem_source_of(const std::string& text, const std::filesystem::path& name,
                                 const std::vector<std::string>& set_overrides);
 
-// As the functions of read_problem.hpp.
+// Does the same as the functions of read_problem.hpp.
 Problem read_problem(ProblemSource& source, std::vector<std::string>* warnings = nullptr,
                      const ReadOptions& options = {});
 

@@ -1,4 +1,4 @@
-// A problem file may call C++ terms beside itself; these options say which.
+// These options give the C++ terms that a problem file may call.
 #pragma once
 
 #include "optim/problem/named_terms.hpp"

@@ -22,7 +22,7 @@ namespace mbsopt {
 
 namespace {
 
-// simulation.accuracy chooses all of it, later.
+// With simulation.accuracy all settings are chosen later.
 void complete_integrator(SimulationSettings& settings, const Node& root) {
   if (settings.accuracy) return;
   const Node* const simulation = root.find("simulation");
@@ -52,13 +52,13 @@ void resolve_data_files(Problem& problem, const std::filesystem::path& folder, c
   }
 }
 
-// Reads each file once, whoever asks for a column of it.
+// Reads each file once for all of its columns.
 class SampleReader {
  public:
   SampleReader(std::filesystem::path folder, const Node& root, Findings& findings, std::vector<std::string>& read)
       : folder_(std::move(folder)), root_(root), findings_(findings), read_(read) {}
 
-  // key: of the file; missing: whether cells may be empty; by_row: over the number of the row, not over time.
+  // key is that of the file. missing allows empty cells. by_row takes the number of the row in place of the time.
   void read(SampleColumn& samples, Interpolation how, const std::string& path, const char* key, bool missing = false,
             bool by_row = false) {
     if (findings_.concerns(path)) return;
@@ -80,7 +80,7 @@ class SampleReader {
   std::map<std::string, CsvTable> tables_;
 };
 
-// All samples are read here, so that nothing below knows of files.
+// Reads all samples, so that nothing below depends on files.
 void read_samples(Problem& problem, const std::filesystem::path& folder, const Node& root, Findings& findings) {
   SampleReader reader(folder, root, findings, problem.columns_read);
   Scene& scene = problem.scene;
@@ -119,7 +119,7 @@ void read_samples(Problem& problem, const std::filesystem::path& folder, const N
   }
 }
 
-// Data that an experiment cannot use are found now, before anything runs, whatever the command.
+// Reports data that an experiment cannot use, for every command, before anything runs.
 void check_data(Problem& problem, const Node& root, Findings& findings, std::vector<std::string>* warnings) {
   if (!problem.identification) return;
   const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
@@ -149,8 +149,8 @@ void add_issue(const SceneIssue& issue, const Node& root, Findings& findings) {
     findings.add(node, issue.path, issue.message);
 }
 
-// Errors of meaning, at the place in the file that says it. An error that follows from one in the reading
-// is left out. Names the means that are bounded, once they are known to be right.
+// Reports errors of meaning at their place in the file. It omits an error that follows from one in the reading. It
+// names the bounded means once they are known to be right.
 void add_issues(Problem& problem, const Node& root, Findings& findings, std::vector<std::string>* warnings) {
   std::vector<SceneIssue> errors;
   for (SceneIssue& issue : find_issues(problem)) {

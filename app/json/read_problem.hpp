@@ -1,4 +1,4 @@
-// A problem from its file. Reading is the whole check: what is returned is complete and consistent.
+// Reads a problem from its file. Reading checks everything: the returned problem is complete and consistent.
 //
 //   Problem problem = read_problem("five_bar/design.json", {"parameters.k1.value=120"});
 //
@@ -17,12 +17,12 @@
 
 namespace mbsopt {
 
-// Throws InputError with everything that is wrong. set_overrides: "path=value" each. What deserves a word but is no
-// error is appended to `warnings`.
+// Throws InputError with all faults. Each of set_overrides is "path=value". `warnings` receives remarks that are no
+// errors.
 Problem read_problem(const std::filesystem::path& file, const std::vector<std::string>& set_overrides = {},
                      std::vector<std::string>* warnings = nullptr, const ReadOptions& options = {});
 
-// The same from a text; `name` stands for the file in findings, and its folder is where data files are looked for.
+// Reads the same from a text. `name` names the file in findings, and its folder is searched for data files.
 Problem read_problem_text(const std::string& text, const std::filesystem::path& name,
                           const std::vector<std::string>& set_overrides = {},
                           std::vector<std::string>* warnings = nullptr, const ReadOptions& options = {});

@@ -35,7 +35,7 @@ class SchemaWriter {
  public:
   Json properties = Json::object();
   Json required = Json::array();
-  Json dependent = Json::object();  // what the presence of a key asks of others
+  Json dependent = Json::object();  // requirements that a key makes on others
   std::span<const TypeRow> rows;    // of an object with a type
   std::string type_key;
 
@@ -259,7 +259,7 @@ Json object_schema() {
   return {{"oneOf", std::move(variants)}};
 }
 
-// Its default is a choice as a whole (core/scene/default_integrator.hpp).
+// The default integrator is one choice as a whole (core/scene/default_integrator.hpp).
 template <>
 Json object_schema<IntegratorSettings>() {
   const IntegratorSettings of_other_types;
@@ -275,7 +275,7 @@ Json object_schema<IntegratorSettings>() {
   return schema;
 }
 
-// Its defaults depend on its type; without one it is the first.
+// The defaults of a formulation depend on its type; the first type is the default.
 template <>
 Json object_schema<FormulationSettings>() {
   Json variants = Json::array();

@@ -1,5 +1,5 @@
-// The JSON Schema (draft 2020-12) of problem files, for editors and other tools: written from the same descriptions
-// that the reader uses (core/scene/vocabulary.hpp). It knows shapes and names; the reader checks meanings, too.
+// The JSON Schema (draft 2020-12) of problem files, for editors and other tools. It comes from the same descriptions as
+// the reader (core/scene/vocabulary.hpp). It covers shapes and names; the reader checks meanings, too.
 // problems/problem.schema.json is this text.
 #pragma once
 

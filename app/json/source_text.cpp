@@ -17,7 +17,7 @@ constexpr std::size_t kStride = 1024;  // a line may be the whole file: columns 
 
 bool is_continuation(char c) { return (static_cast<unsigned char>(c) & 0xC0) == 0x80; }
 
-// Bytes of the UTF-8 sequence at `at`, 0 where it is none (overlong forms, surrogates and beyond U+10FFFF are none).
+// The bytes of the UTF-8 sequence at `at`, or 0 if it is invalid (overlong forms, surrogates and beyond U+10FFFF are).
 std::size_t sequence_length(std::string_view text, std::size_t at) {
   const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
   const unsigned b0 = byte(at), b1 = byte(at + 1);

@@ -1,4 +1,4 @@
-// A text and its lines: where an offset is for whoever looks at it in an editor.
+// A text and its lines: finds the place of an offset in an editor.
 #pragma once
 
 #include <filesystem>
@@ -18,7 +18,7 @@ class SourceText {
   const std::string& content() const { return content_; }
   Position position(std::size_t offset) const;
 
-  // Offset of the first byte that is not UTF-8; npos where all is.
+  // The offset of the first byte that is not UTF-8, or npos.
   std::size_t first_invalid_byte() const;
 
   // Offset in the text of byte `at` of the value of the string literal that begins at `literal`.
@@ -32,7 +32,7 @@ class SourceText {
   std::vector<std::size_t> continuations_;  // up to every kStride bytes
 };
 
-// The whole file; throws InputError where it cannot be read, naming it as given.
+// Returns the whole file. Throws InputError with the given name if it cannot be read.
 std::string read_text_file(const std::filesystem::path& file);
 
 }  // namespace mbsopt

@@ -71,7 +71,7 @@ class TermResolver {
  private:
   void add(const std::string& path, const std::string& message) { findings_.add(nearest(root_, path), path, message); }
 
-  // The finding about a plug-in that is not loaded stands for its unknown names.
+  // The finding about a plug-in that is not loaded replaces those about its unknown names.
   template <class Term>
   const Term* find(const std::vector<Term>& all, const std::string& what, const std::string& name,
                    const std::string& path) {
@@ -85,7 +85,7 @@ class TermResolver {
     return nullptr;
   }
 
-  // The parameters in the order of the term, which must be all of them.
+  // Puts the parameters in the order of the term; all of them must be given.
   void order(std::vector<TermParameter>& given, const std::vector<std::string>& wanted, const std::string& place) {
     std::vector<TermParameter> ordered;
     for (const std::string& name : wanted) {

@@ -1,4 +1,4 @@
-// Gives the forces, costs and laws that a problem calls by name the terms in C++ that they stand for.
+// Assigns the C++ terms to the forces, costs and laws that a problem calls by name.
 #pragma once
 
 #include "app/json/findings.hpp"
@@ -8,8 +8,8 @@
 
 namespace mbsopt {
 
-// Loads the problem's plug-ins where this is allowed. Names that are unknown, parameters that are missing or too many,
-// and numbers of bodies that differ are findings.
+// Loads the problem's plug-ins if this is allowed. Findings are unknown names, missing or superfluous parameters, and
+// wrong numbers of bodies.
 void resolve_terms(Problem& problem, const ReadOptions& options, const std::filesystem::path& folder, const Node& root,
                    Findings& findings);
 

@@ -17,7 +17,7 @@
 namespace mbsopt {
 namespace {
 
-// p dpsi/dp, the change of psi per relative change of p; largest first. Where p is zero it would hide the derivative.
+// p dpsi/dp, the change of psi per relative change of p, largest first. A p of zero would hide the derivative.
 void add_tornado(HtmlPage& page, const Scene& scene, const std::string& name, const Json& objective) {
   constexpr std::size_t kMost = 15;  // rows of one plot
   RowPlot plot{.title = name + ": what a change of each parameter does",
@@ -51,7 +51,7 @@ void add_gradients(HtmlPage& page, const Scene& scene, const Json& result) {
   for (const auto& [name, objective] : result.at("objectives").items()) add_tornado(page, scene, name, objective);
 }
 
-// Digits to which two numbers agree, from their relative difference.
+// The number of equal digits of two numbers, from their relative difference.
 std::optional<double> agreeing_digits(const Json& difference) {
   constexpr double kDouble = 16;  // digits of a double
   if (!difference.is_number() || std::isnan(difference.get<double>())) return std::nullopt;
@@ -82,7 +82,7 @@ LinePlot ladder_plot(const std::string& objective, const std::string& unit, cons
   return plot;
 }
 
-// Where the difference of a pair is found in the page.
+// The place of a pair's difference in the page.
 std::string ladder_id(std::size_t objective, std::size_t parameter) {
   return fmt::format("ladder-{}-{}", objective, parameter);
 }

@@ -64,7 +64,7 @@ void add_parameters(HtmlPage& page, const Json& result) {
   page.drawing(to_svg(plot));
 }
 
-// How far a value is from the nearer of its limits; negative where it is beyond.
+// The distance of a value from the nearer of its limits; negative beyond it.
 TableCell margin_of(const Json& objective, const Json& value) {
   const Json lower = objective.value("lower", Json()), upper = objective.value("upper", Json());
   double margin = std::numeric_limits<double>::infinity();

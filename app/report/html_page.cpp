@@ -13,20 +13,20 @@
 namespace mbsopt {
 namespace {
 
-// Characters from which a cell is a sentence, which wraps. An interval of two numbers, the longest of all other cells,
-// has 30: [-1.234567e-05, -1.234567e-05].
+// A cell of so many characters is a sentence, which wraps. The longest other cell, an interval of two numbers, has 30:
+// [-1.234567e-05, -1.234567e-05].
 constexpr std::size_t kWords = 32;
 
-constexpr std::size_t kFewColumns = 8;  // that fit a printed page of 18 cm without breaks within words
+constexpr std::size_t kFewColumns = 8;  // they fit a printed page of 18 cm without breaks within words
 
-// As the value of an attribute.
+// Writes words as the value of an attribute.
 std::string list_of(const std::vector<std::string>& words) {
   std::vector<std::string> quoted;
   for (const std::string& word : words) quoted.push_back(json_quoted(word));
   return html_escaped(fmt::format("[{}]", fmt::join(quoted, ",")));
 }
 
-// breaks: its text may take several lines.
+// breaks allows several lines of text.
 std::string cell_of(const TableCell& cell, bool words, bool breaks) {
   std::string attributes;
   if (!cell.full.empty() && cell.full != cell.text) attributes += fmt::format(" title=\"{}\"", html_escaped(cell.full));

@@ -1,9 +1,9 @@
-// A self-contained HTML page: a verdict, warnings, then headings, sentences, tables and plots; light and dark, with its
-// contents at the side, and fit for print. Nothing comes from the network, there is no time stamp.
+// A self-contained HTML page: a verdict, warnings, then headings, sentences, tables and plots. It is light or dark, has
+// its contents at the side, and is fit for print. It loads nothing from the network and has no time stamp.
 //
-// The page shows all of it without scripts. Its script (script/*.js) adds to plots the values under the pointer, zoom
-// and legends that hide; to a mechanism its motion; to tables a copy as CSV. The script reads the data of plots and
-// motions from one block of JSON, in which equal arrays stand once.
+// The page shows everything without scripts. Its script (script/*.js) adds functions. Plots get the values under the
+// pointer, zoom and legends that hide. A mechanism gets its motion, and tables a copy as CSV. The script reads the data
+// of plots and motions from one block of JSON, which holds equal arrays once.
 #pragma once
 
 #include <optional>
@@ -37,7 +37,7 @@ class HtmlPage {
   void heading(std::string_view text);
   void paragraph(std::string_view text);
   void note(std::string_view text);    // in small print
-  void banner(std::string_view text);  // what a reader must see first
+  void banner(std::string_view text);  // text that a reader must see first
   void code(std::string_view text);
   // The first column holds names; the others are numbers or short words. A dense table has narrow columns, for colours.
   void table(const std::vector<std::string>& header, const std::vector<TableRow>& rows, bool dense = false);
@@ -48,18 +48,17 @@ class HtmlPage {
     table(header, cells);
   }
   void plot(const LinePlot& plot);
-  // Parts of which the script shows one at a time. names: of the selectors; keys: what each selects, id: of links to
-  // it.
+  // Parts of which the script shows one at a time. `names` are those of the selectors. `keys` give the choice of each,
+  // and id serves links to it.
   //   page.begin_choices({"quantity"}), page.begin_choice({"x"}), page.plot(x), page.end_choice(), page.end_choices();
   void begin_choices(const std::vector<std::string>& names);
   void begin_choice(const std::vector<std::string>& keys, std::string_view id = "");
   void end_choice() { body_ += "</div>\n"; }
   void end_choices() { body_ += "</div>\n"; }
   void drawing(std::string_view svg) { body_ += svg; }
-  // A mechanism that moves, as JSON for script/viewer.js, above the drawings that stand for it where there is no
-  // script.
+  // A moving mechanism, as JSON for script/viewer.js, above the drawings that replace it without a script.
   void motion(std::string_view json, std::string_view stills);
-  // Two of several runs beside each other; runs: [{"name": "a", "numbers": {"objective path": 1.2}}, ...]
+  // Compares two of several runs; runs is [{"name": "a", "numbers": {"objective path": 1.2}}, ...]
   void comparison(std::string_view runs);
   PageArrays& arrays() { return arrays_; }
   std::string text() const;

@@ -1,4 +1,4 @@
-// Text as HTML shows it, and as a string of the JSON within a page.
+// Text in HTML, and text in a string of the JSON within a page.
 #pragma once
 
 #include <string>

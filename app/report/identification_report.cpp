@@ -55,7 +55,7 @@ void add_rows(std::vector<TableRow>& rows, const Json& parameters) {
   }
 }
 
-// Those fitted, then what was refitted to score the experiments that validate.
+// Adds the fitted parameters, then those refitted to score the validation experiments.
 void add_fitted_parameters(HtmlPage& page, const Json& result) {
   std::vector<TableRow> rows;
   add_rows(rows, result.at("parameters"));
@@ -97,7 +97,7 @@ void add_fitted_parameters(HtmlPage& page, const Json& result) {
   page.drawing(to_svg(plot));
 }
 
-// How the fit ended, and how much there was to fit.
+// Adds the end of the fit, and the amount of data.
 void add_fit_outcome(HtmlPage& page, const Json& result) {
   const Json& optimizer = result.at("optimizer");
   page.paragraph(fmt::format("{}: {}; {}, {}.", cell(optimizer.at("type")), cell(optimizer.at("message")),
@@ -198,7 +198,7 @@ void add_profiles(HtmlPage& page, const Json& result) {
                   .y_label = "tau [-]"};
     plot.series.push_back({"tau", profile.at("value").get<std::vector<double>>(),
                            profile.at("tau").get<std::vector<double>>(), Mark::line});
-    // Where tau reaches an end of the interval.
+    // Marks the place where tau reaches an end of the interval.
     for (std::size_t end = 0; end < 2; ++end) {
       const Json& values = profile.at("value");
       const auto at = std::find(values.begin(), values.end(), profile.at("ci95")[end]);
@@ -214,7 +214,7 @@ constexpr std::size_t kFewest = 20;  // samples, below which a histogram says no
 
 constexpr std::size_t kInitialColour = 5, kBandColour = 4;
 
-// What validates has other colours than what is fitted.
+// Validation experiments have other colours than fitted ones.
 std::size_t data_colour(const FitPlot& fit) { return fit.validates ? 3 : 0; }
 
 // An initial model that is far from the data would flatten all other curves.
@@ -229,7 +229,7 @@ bool is_comparable(const std::vector<double>& initial, const std::vector<double>
   return !initial.empty() && size(initial) < kFar * size(measured);
 }
 
-// Shares of the residuals in bins of half a sigma within four; those beyond count in the outermost bins. The curve is
+// The shares of the residuals in bins of half a sigma within four; the outermost bins count those beyond. The curve is
 // the normal distribution.
 LinePlot histogram(const FitPlot& fit) {
   constexpr double kWidth = 0.5, kEnd = 4;
@@ -268,7 +268,7 @@ std::vector<std::vector<double>> parts_of(const std::vector<double>& residual) {
   return parts;
 }
 
-// r_k = sum_i z_i z_{i+k} / sum_i z_i^2 about the mean, without pairs across a gap; of white noise 95 % lie within
+// r_k = sum_i z_i z_{i+k} / sum_i z_i^2 about the mean, without pairs across a gap. White noise has 95 % within
 // +-1.96/sqrt(n).
 LinePlot autocorrelation(const FitPlot& fit) {
   constexpr std::size_t kMostLags = 40;

@@ -27,7 +27,7 @@ struct AxisRange {
   double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
   void include(double value) { low = std::min(low, value), high = std::max(high, value); }
   double span() const { return high - low; }
-  // Never empty and never of zero length; a little air at both ends.
+  // Ensures a range of nonzero length, with a little space at both ends.
   void finish(double air) {
     if (low > high) low = 0, high = 1;
     const double smallest = 1e-12 * std::max(std::abs(low), std::abs(high));
@@ -41,7 +41,7 @@ struct AxisRange {
   }
 };
 
-// Data to pixels.
+// Maps data to pixels.
 struct PlotFrame {
   AxisRange x, y;
   double px(double value) const { return kLeft + (value - x.low) / x.span() * kInnerWidth; }
@@ -55,7 +55,7 @@ bool is_cloud(const PlotSeries& series) {
   return series.mark == Mark::points || series.mark == Mark::rings || series.mark == Mark::crosses;
 }
 
-// Part of the width beside the outermost marks, so that the frame cuts none of them: 4 px of 200.
+// The part of the width beside the outermost marks, so that the frame cuts none of them: 4 px of 200.
 constexpr double kAirOfMarks = 0.02;
 
 PlotFrame frame_of(const LinePlot& plot) {
@@ -69,7 +69,8 @@ PlotFrame frame_of(const LinePlot& plot) {
       if (series.mark == Mark::bars) frame.y.include(0);
     }
   }
-  // A limit that is far from all values would flatten them: only one within their range, or as far again, is shown.
+  // A limit that is far from all values would flatten them. So only limits within their range, or as far again, are
+  // shown.
   const AxisRange data = frame.y;
   for (const PlotLimit& limit : plot.limits) {
     const double y = y_of(plot, limit.value);
@@ -92,7 +93,7 @@ PlotFrame frame_of(const LinePlot& plot) {
   return frame;
 }
 
-// Any sample is as likely as any other, so that the cloud looks as dense here and as thin there as it is.
+// All samples have the same probability, so that the density of the cloud is right everywhere.
 std::vector<std::size_t> random_samples(const std::vector<std::size_t>& all, const std::vector<double>& y) {
   if (all.size() <= kMostPoints) return all;
   std::vector<std::size_t> kept;
@@ -113,7 +114,7 @@ bool is_thinned(const PlotSeries& series) {
          std::is_sorted(series.x.begin(), series.x.end());
 }
 
-// Many samples to a pixel column become at most its first, lowest, highest and last: the drawing is the same.
+// Reduces the samples of a pixel column to the first, lowest, highest and last: the drawing is the same.
 std::vector<std::size_t> visible_samples(const LinePlot& plot, const PlotSeries& series, const PlotFrame& frame) {
   std::vector<std::size_t> all(series.x.size());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
@@ -157,13 +158,13 @@ const char* style_of(Mark mark) {
 constexpr const char* kRing = "a4 4 0 1 0 8 0a4 4 0 1 0 -8 0";  // from its left end
 constexpr const char* kCross = "l10 10m-10 0l10 -10";           // from its upper left end
 
-// The d of an SVG path. It goes from place to place by differences in tenths of a px, which are half as long as the
-// places. They end at rounded places, so that rounding errors do not add up.
+// The d of an SVG path. It contains differences in tenths of a px, which are half as long as positions. They lead to
+// rounded positions, so that rounding errors do not add up.
 class PathText {
  public:
   void move(double px, double py) { go('m', px, py); }
   void line(double px, double py) { go('l', px, py); }
-  // Draws at the place and ends there.
+  // Draws at the position and ends there.
   void mark(double px, double py, const char* drawn, double dx = 0, double dy = 0) {
     move(px, py);
     text_ += drawn, command_ = 0;
@@ -180,7 +181,7 @@ class PathText {
     x_ = x, y_ = y;
   }
 
-  // 12, -.3; a space where no sign parts a number from the one before.
+  // Writes 12, -.3, with a space if no sign separates a number from the one before.
   void add(long tenths) {
     if (tenths >= 0 && !text_.empty() && std::isdigit(static_cast<unsigned char>(text_.back()))) text_ += ' ';
     const long size = std::abs(tenths);
@@ -191,7 +192,7 @@ class PathText {
 
   std::string text_;
   char command_ = 0;
-  long x_ = 0, y_ = 0;  // where it ends [0.1 px]
+  long x_ = 0, y_ = 0;  // its end [0.1 px]
 };
 
 std::size_t colour_of(const PlotSeries& series, std::size_t index) {
@@ -226,7 +227,7 @@ void draw_series(const LinePlot& plot, const PlotFrame& frame, std::size_t index
                      colour_of(series, index), path.text());
 }
 
-// The area between a limit and what of a line lies beyond it.
+// The area between a limit and the part of a line beyond it.
 std::string area_beyond(const LinePlot& plot, const PlotFrame& frame, const PlotSeries& series,
                         const PlotLimit& limit) {
   const double y_limit = y_of(plot, limit.value);
@@ -276,7 +277,7 @@ void draw_instants(const LinePlot& plot, const PlotFrame& frame, std::string& sv
   }
 }
 
-// Whether all of an axis can be written as 0.02, 5, 1000.
+// Whether 0.02, 5, 1000 is a fit form for all ticks of an axis.
 bool near_one(const std::vector<double>& ticks) {
   return std::all_of(ticks.begin(), ticks.end(), [](double tick) { return tick > 0.9e-3 && tick < 1.1e4; });
 }
@@ -288,7 +289,7 @@ std::string power_of_ten(double value) {
   return std::abs(digits - 1) < 1e-6 ? power : fmt::format("{:.4g}\u00b7{}", digits, power);
 }
 
-// Places on an axis (logarithms where it is logarithmic) and their labels.
+// Positions on an axis (logarithms if it is logarithmic) and their labels.
 using Ticks = std::vector<std::pair<double, std::string>>;
 
 Ticks ticks_of(const std::vector<double>& values) {
@@ -321,7 +322,7 @@ Ticks x_ticks_of(const LinePlot& plot, const PlotFrame& frame) {
   return ticks_of(values);
 }
 
-// Drawn like the series itself.
+// Draws the key in the style of the series.
 std::string legend_key(const PlotSeries& series, std::size_t index) {
   const std::string path = series.mark == Mark::points    ? "M5 5h0M15 5h0M25 5h0"
                            : series.mark == Mark::rings   ? std::string("M11 5") + kRing
@@ -356,7 +357,7 @@ void draw_axes(const LinePlot& plot, const PlotFrame& frame, std::string& svg) {
   svg += fmt::format("<text class=\"y-label\" x=\"4\" y=\"16\">{}</text>\n", html_escaped(plot.y_label));
 }
 
-// What is drawn of long series, in words.
+// Says which part of long series the plot draws.
 std::string thinning_note(const LinePlot& plot) {
   std::string note;
   if (std::ranges::any_of(plot.series, is_thinned)) note += "Drawn: first, lowest, highest, last of each pixel. ";
@@ -382,7 +383,7 @@ std::vector<double> logarithmic_ticks(double low, double high, int count) {
   if (last - first >= 2) {
     const double stride = std::max(1.0, std::ceil((last - first) / count));
     std::vector<double> ticks;
-    // Multiples of the stride, so that 1 is among them wherever it is in the range.
+    // Takes multiples of the stride, so that 1 is among them if it is in the range.
     for (double k = std::ceil(first / stride) * stride; k <= last; k += stride) ticks.push_back(std::pow(10, k));
     return ticks;
   }

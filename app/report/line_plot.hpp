@@ -2,8 +2,8 @@
 // Colours come from the page's style. The page's script fits the drawing to the width of the window.
 //
 // A line of many samples keeps the first, lowest, highest and last of every pixel column, which draws the same. Points
-// are a cloud, whose density such a choice would change: beyond kMostPoints a random part of them is drawn (always the
-// same), with the lowest and the highest, and the plot says so.
+// are a cloud, and such a choice would change its density. Beyond kMostPoints the plot draws a random part of them
+// (always the same), with the lowest and the highest, and says so.
 //
 //   LinePlot plot{.title = "Angle", .x_label = "t [s]", .y_label = "angle [rad]"};
 //   plot.series.push_back({"model", t, angle});
@@ -24,7 +24,7 @@ struct PlotSeries {
   std::string name;
   std::vector<double> x, y;  // values that are not finite are left out
   Mark mark = Mark::line;
-  std::optional<std::size_t> part_of = {};  // that series: in its colour, and not in the legend
+  std::optional<std::size_t> part_of = {};  // takes that series' colour, and no place in the legend
   std::optional<std::size_t> colour = {};   // else the number of the series
 };
 
@@ -58,14 +58,14 @@ inline constexpr std::size_t kMostPoints = 5000;  // of a series: some 100 kB of
 std::string to_svg(const LinePlot& plot);
 
 class PageArrays;
-// The data of the plot as JSON, for the script of the page: the samples that to_svg draws, with six digits.
+// The data of the plot as JSON, for the page's script: the samples in to_svg, with six digits.
 std::string plot_data(const LinePlot& plot, PageArrays& arrays);
 
 // About `count` round numbers (1, 2 or 5 times a power of ten) that cover [low, high].
 std::vector<double> round_ticks(double low, double high, int count);
 
-// The same on a logarithmic axis, low > 0: powers of ten, every so many where there are too many of them; 1, 2, 5 times
-// powers of ten where there are few, round numbers where there are none.
+// The same on a logarithmic axis, low > 0: powers of ten, with a stride if there are too many. If there are few, it
+// takes 1, 2, 5 times powers of ten; if there are none, round numbers.
 std::vector<double> logarithmic_ticks(double low, double high, int count);
 
 }  // namespace mbsopt

@@ -44,7 +44,7 @@ std::vector<Point2> convex_hull(std::vector<Point2> points) {
   return hull;
 }
 
-// A hull thinner than a pixel is a line: between its two points that are farthest apart.
+// A hull thinner than a pixel becomes a line between its two farthest points.
 std::vector<Point2> outline(std::vector<Point2> points) {
   const std::vector<Point2> hull = convex_hull(std::move(points));
   if (hull.size() < 3) return hull;
@@ -57,7 +57,7 @@ std::vector<Point2> outline(std::vector<Point2> points) {
   return thin ? std::vector<Point2>{a, b} : hull;
 }
 
-// Metres to pixels, the same scale in both directions.
+// Maps metres to pixels with the same scale in both directions.
 struct View {
   std::array<int, 2> plane;
   double x0 = 0, y0 = 0, scale = 1, height = 0;  // x0, y0: at the left and lower margin [m]; scale [px/m]
@@ -68,7 +68,7 @@ struct View {
   }
 };
 
-// A joint is drawn where it holds on the ground, else on its second body.
+// The drawing shows a joint at its point on the ground, or else on its second body.
 const BodyPoint& drawn_point(const SketchedJoint& joint) {
   return joint.on_body1.body == kGround ? joint.on_body1 : joint.on_body2;
 }
@@ -154,7 +154,7 @@ void draw_state(const DrawnSketch& drawn, const View& view, bool last, std::stri
   svg += "</g>\n";
 }
 
-// A length of about an eighth of the width, round.
+// Draws a round length of about an eighth of the width.
 void draw_scale(const View& view, std::string& svg) {
   const double wanted = kWidth / 8 / view.scale, length = round_ticks(0, 4 * wanted, 4).at(1);
   svg += fmt::format(
@@ -167,7 +167,7 @@ void draw_scale(const View& view, std::string& svg) {
 
 std::array<int, 2> plane_of_motion(const Scene& scene, const Trajectory& trajectory) {
   constexpr std::size_t kInstants = 50;
-  constexpr double kStandstill = 1e-6;  // of the spread: motion below is none
+  constexpr double kStandstill = 1e-6;  // of the spread: smaller motion is rounding
   const Sketch sketch = sketch_of(scene);
   Eigen::AlignedBox3d all;
   Point3 motion = Point3::Zero();  // largest way of a point along each axis

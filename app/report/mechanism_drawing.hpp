@@ -1,5 +1,6 @@
-// A sketch of a mechanism: bodies as the hulls of their points, joints as circles, springs as zigzags, projected on the
-// coordinate plane in which it moves most. One state or several on top of each other, all but the last one dashed.
+// A sketch of a mechanism: bodies as the hulls of their points, joints as circles, springs as zigzags. It is projected
+// on the coordinate plane in which the mechanism moves most. Several states lie on top of each other, all but the last
+// one dashed.
 //
 //   const std::array<int, 2> plane = plane_of_motion(scene, trajectory);
 //   page.drawing(mechanism_drawing("start and end", plane, {{"start", scene, first_row}, {"end", scene, last_row}}));
@@ -19,7 +20,7 @@ struct DrawnState {
   const std::vector<double>& row;  // of a trajectory
 };
 
-// The two axes (0, 1, 2) along which the bodies' points move most; where they move along fewer, are spread most.
+// The two axes (0, 1, 2) along which the bodies' points move most. If they move along fewer, their spread decides.
 std::array<int, 2> plane_of_motion(const Scene& scene, const Trajectory& trajectory);
 
 // SVG text; empty if there is no state, or if a distance in it overflows.

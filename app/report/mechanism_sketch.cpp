@@ -73,7 +73,7 @@ class SketchMaker {
     result_.traces.push_back({name ? sensor.body + "." + *name : sensor.name, p});
   }
 
-  // Its named points, but for those that are directions of joints; a body without any gets its centre of mass.
+  // Adds the body's named points except directions of joints. A body without points gets its centre of mass.
   void add_own_points(std::size_t index) {
     const Body& body = scene_.bodies[index];
     for (const auto& [name, coordinates] : body.points)

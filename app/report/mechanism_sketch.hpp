@@ -27,10 +27,10 @@ struct SketchedJoint {
 
 struct SketchedSpring {
   BodyPoint from, to;
-  bool spring, damper;  // which of the two acts
+  bool spring, damper;  // whether each of them acts
 };
 
-// The point of a position sensor, whose path is worth a look.
+// The point of a position sensor, whose path is drawn.
 struct TracedPoint {
   std::string name;
   BodyPoint point;
@@ -51,7 +51,7 @@ struct Sketch {
   std::vector<SketchedShape> shapes;
 };
 
-// At the values that the scene's parameters have.
+// Takes the values of the scene's parameters.
 Sketch sketch_of(const Scene& scene);
 
 // A point of a body of the scene, or of the ground.

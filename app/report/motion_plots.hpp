@@ -1,4 +1,4 @@
-// A trajectory as plots over time: sensors grouped by unit; where a scene has none, the bodies' positions.
+// A trajectory as plots over time: sensors grouped by unit. A scene without sensors shows the bodies' positions.
 #pragma once
 
 #include <string>

@@ -14,7 +14,7 @@ namespace mbsopt {
 namespace {
 
 constexpr std::size_t kMostNumbers = 20'000;  // of all poses: some 200 kB of the page
-constexpr std::size_t kFewestRows = 60;       // with fewer a motion is no longer smooth
+constexpr std::size_t kFewestRows = 60;       // fewer rows do not show a smooth motion
 constexpr std::size_t kPose = 7;              // x y z e0 e1 e2 e3
 
 std::string vector_of(const Eigen::Vector3d& v) { return fmt::format("[{:.6g},{:.6g},{:.6g}]", v.x(), v.y(), v.z()); }
@@ -26,7 +26,7 @@ std::string ends_of(const BodyPoint& p1, const BodyPoint& p2) {
                      vector_of(p2.s));
 }
 
-// Every so many rows, and the last.
+// Keeps one of several rows, and the last.
 std::vector<std::size_t> kept_rows(std::size_t rows, std::size_t most) {
   std::vector<std::size_t> kept;
   const std::size_t stride = (rows + most - 1) / most;
@@ -35,14 +35,14 @@ std::vector<std::size_t> kept_rows(std::size_t rows, std::size_t most) {
   return kept;
 }
 
-// A coordinate that rests is a number, another one the number of its array in brackets.
+// A constant coordinate is a number; another one is the number of its array in brackets.
 std::string coordinate(PageArrays& arrays, const std::vector<double>& values) {
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
   if (*high - *low < 1e-12) return fmt::format("{:.6g}", values.front());
   return fmt::format("[{}]", arrays.add(values));
 }
 
-// The columns of time and poses are finite; a sensor may have no value.
+// Whether the columns of time and poses are finite. A sensor may have no value.
 bool poses_are_finite(const MovingState& state) {
   const auto columns = static_cast<std::ptrdiff_t>(1 + 13 * state.scene.bodies.size());
   return std::ranges::all_of(state.trajectory.rows, [&](const std::vector<double>& row) {
@@ -63,8 +63,8 @@ std::string targets_json(PageArrays& arrays, const std::vector<PointTarget>& tar
   return fmt::format("[{}]", fmt::join(all, ","));
 }
 
-// The size that 98 % of the forces do not exceed: the others, as at singular positions, would hide them. 0: there are
-// none.
+// The size that 98 % of the forces do not exceed; the others, as at singular positions, would hide them. It is 0
+// without forces.
 double large_force(const Trajectory& forces) {
   constexpr double kShare = 0.98;
   std::vector<double> sizes;
@@ -77,7 +77,7 @@ double large_force(const Trajectory& forces) {
   return sizes[static_cast<std::size_t>(place)];
 }
 
-// null without forces.
+// Writes null without forces.
 std::string reactions_json(PageArrays& arrays, const MovingState& state) {
   const Trajectory& forces = state.forces;
   const double large = large_force(forces);
@@ -142,7 +142,7 @@ std::string state_json(PageArrays& arrays, const MovingState& state, std::size_t
       reactions_json(arrays, state));
 }
 
-// Whether no point leaves its plane of that normal.
+// Whether all points stay in planes of that normal.
 bool moves_in(std::array<int, 2> plane, const Scene& scene, const Trajectory& trajectory) {
   constexpr double kStandstill = 1e-6;  // [m] per metre of the largest distance
   const auto normal = static_cast<std::size_t>(3 - plane[0] - plane[1]);

@@ -25,8 +25,8 @@ struct MovingState {
   Trajectory forces = {};  // of joints (joint_forces.hpp)
 };
 
-// plane: in which the mechanism is shown first if it moves in no other direction. Empty if a state has less than two
-// rows or a number in it is not finite.
+// The view first shows plane if the mechanism moves in no other direction. Returns an empty string if a state has less
+// than two rows or a number in it is not finite.
 std::string motion_scene(PageArrays& arrays, std::array<int, 2> plane, const std::vector<MovingState>& states);
 
 }  // namespace mbsopt

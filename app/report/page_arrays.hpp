@@ -14,7 +14,7 @@ namespace mbsopt {
 
 class PageArrays {
  public:
-  // The number of the array; its values get so many digits, and those that are not finite become null.
+  // Returns the number of the array. Its values have so many digits, and infinite ones become null.
   std::size_t add(const std::vector<double>& values, int digits = 6);
   std::string text() const;  // JSON: [[...], ...]
 

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kMostCurves = 16;  // in one plot: each colour twice
 
-// Rows "name, value" for the entries of an object that the list names.
+// Writes rows "name, value" for the listed entries of an object.
 struct Entry {
   const char* key;
   std::string label;
@@ -57,7 +57,7 @@ TableCell rounded_cell(const Json& value, const Json& error) {
   if (!value.is_number() || !error.is_number() || !(error.get<double>() > 0)) return number_cell(value);
   const double v = std::abs(value.get<double>()), e = error.get<double>();
   if (!std::isfinite(e) || !(v > 0)) return number_cell(value);
-  // Two digits of the error remain.
+  // This leaves two digits of the error.
   const double digits = std::floor(std::log10(v)) - std::floor(std::log10(e)) + 2;
   return number_cell(value, static_cast<int>(std::clamp(digits, 2.0, static_cast<double>(kMostDigits))));
 }
@@ -172,7 +172,7 @@ void add_convergence(HtmlPage& page, const Trajectory& history, const Json& para
     plot.series.push_back({name, column(0), values, Mark::line});
     page.plot(plot);
   }
-  // Between bounds where there are two, else relative to the start.
+  // Shows values between two bounds, else relative to the start.
   LinePlot bounded{.title = "Parameters between their bounds",
                    .x_label = "iteration",
                    .y_label = "(value - lower)/(upper - lower) [-]",

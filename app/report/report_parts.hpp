@@ -12,7 +12,7 @@
 
 namespace mbsopt {
 
-// "m^2 s"; kUnknownUnit where the unit of an objective, an entry of result["objectives"], is not known.
+// "m^2 s"; kUnknownUnit if the unit of an objective, an entry of result["objectives"], is unknown.
 std::string unit_of(const Json& objective);
 std::string after_number(const Json& quantity);  // " m^2 s": its "unit", where it has one and is no number
 std::string unit_per(const std::string& unit, const std::string& divisor);  // "N/m", "m" to "N/m^2"
@@ -23,19 +23,19 @@ void add_simulation(HtmlPage& page, const Scene& scene, const Json& result);  //
 void add_objectives(HtmlPage& page, const Json& result);                      // name and value
 // Whether any objective is a smooth maximum or minimum, with the true one beside it.
 bool has_true_values(const Json& result);
-// Objective, infeasibility and parameters over iterations; parameters: as in result.json, by the names of columns;
-// unit: of the objective.
+// Adds objective, infeasibility and parameters over iterations. parameters has the form of result.json, by the names of
+// columns. unit is that of the objective.
 void add_convergence(HtmlPage& page, const Trajectory& history, const Json& parameters, const std::string& unit = "-");
 void add_multistart(HtmlPage& page, const Json& result);  // the waterfall, where there is one
-// A mechanism that moves, over its drawings at start and end.
+// A moving mechanism above its drawings at start and end.
 void add_motion(HtmlPage& page, std::array<int, 2> plane, const std::vector<MovingState>& states,
                 const std::string& stills);
 void add_provenance(HtmlPage& page, const Json& result);
-// A rounded number that shows all its digits under the pointer; a word where it is none.
+// A rounded number that shows all its digits under the pointer, or a word.
 TableCell number_cell(const Json& value, int digits = 6);
-// A value with the digits that its standard error leaves: 20.13 for 20.1273 +- 0.05.
+// A value with the digits that its standard error justifies: 20.13 for 20.1273 +- 0.05.
 TableCell rounded_cell(const Json& value, const Json& error);
-// A number, a word, an interval, "-" where there is none.
+// A number, a word, an interval, or "-" for none.
 std::string cell(const Json& value, int digits = 7);
 
 }  // namespace mbsopt

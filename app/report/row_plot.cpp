@@ -11,7 +11,7 @@
 namespace mbsopt {
 namespace {
 
-// Where things stand [px]. On a narrow page names and numbers share a line above their bar.
+// Positions in the drawing [px]. On a narrow page names and numbers share a line above their bar.
 struct RowLayout {
   const char* name;                      // class of the drawing
   double width, names, words, row, bar;  // words: width right of the bars; bar: its place in the row

@@ -1,5 +1,5 @@
 // Rows of bars along one axis, as an HTML figure: intervals of estimates, variables between their bounds, sizes of
-// effects. It holds a wide and a narrow drawing, of which the page's style shows one.
+// effects. It holds a wide and a narrow drawing; the page's style shows one of them.
 //
 //   RowPlot plot{.title = "Effect of 1 %", .x_label = "p dpsi/dp / psi [-]"};
 //   plot.rows.push_back({.name = "k", .low = 0, .high = 0.3, .words = "0.3"});
@@ -16,9 +16,9 @@ namespace mbsopt {
 struct PlotRow {
   std::string name;
   double low = 0, high = 0;                             // the bar
-  std::optional<double> ring = {};                      // where something started
-  std::optional<double> dot = {};                       // where it ended
-  std::vector<double> bounds = {};                      // what is out of sight is left out
+  std::optional<double> ring = {};                      // a starting value
+  std::optional<double> dot = {};                       // a final value
+  std::vector<double> bounds = {};                      // bounds outside the plot are not drawn
   std::optional<std::pair<double, double>> prior = {};  // an interval, drawn thin above the bar
   std::string words = {};                               // at the right, with the numbers
 };
@@ -30,7 +30,7 @@ struct RowPlot {
   bool track = false;                                   // a grey bar over the whole range, beneath
 };
 
-// Empty without rows.
+// Returns an empty string without rows.
 std::string to_svg(const RowPlot& plot);
 
 }  // namespace mbsopt

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kTitle = "Runs";
-// A sweep or a study may keep far more than a comparison needs; reading it would delay every command by a second.
+// A sweep or a study may keep far more than a comparison needs. Its reading would delay every command by a second.
 constexpr std::size_t kLargest = 20'000'000;  // [bytes] of result.json
 
 struct StoredRun {

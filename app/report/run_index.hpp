@@ -1,4 +1,4 @@
-// index.html of a folder that holds folders of runs: all of them with links to their reports, two of them compared.
+// index.html of a folder of runs: links to all their reports, and a comparison of two of them.
 #pragma once
 
 #include <filesystem>
@@ -6,10 +6,10 @@
 
 namespace mbsopt {
 
-// The page; empty where no folder holds a run. Only result.json of each run is read.
+// Returns the page; empty if no folder holds a run. It reads only result.json of each run.
 std::string run_index(const std::filesystem::path& runs);
 
-// Writes it as runs/index.html, whole. A page of this name that no run_index wrote is left alone.
+// Writes it as runs/index.html, whole. It does not replace a page that run_index has not written.
 void write_run_index(const std::filesystem::path& runs);  // throws WriteError
 
 }  // namespace mbsopt

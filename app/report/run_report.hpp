@@ -1,5 +1,5 @@
-// report.html, whole, per command: what was run, its numbers, its plots. No time of day and no seconds of computing, so
-// that the same inputs give the same bytes. The numbers are taken from the parts of result.json.
+// report.html per command: its input, its numbers, its plots. It has no time of day and no seconds of computing, so the
+// same inputs give the same bytes. The numbers come from the parts of result.json.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@
 
 namespace mbsopt {
 
-// What a report shows of a motion beside its trajectory; each may be empty.
+// The parts of a motion in a report beside its trajectory; each may be empty.
 struct MotionParts {
   std::vector<PointTarget> targets = {};
   Trajectory forces = {};                  // of joints (joint_forces.hpp)
@@ -22,31 +22,31 @@ struct MotionParts {
 std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory,
                               const MotionParts& parts = {});
 
-// state: t and the bodies' part of a row of trajectory.csv; shapes: the same, displaced along each mode.
+// state holds t and the bodies' part of a row of trajectory.csv. shapes holds the same, displaced along each mode.
 std::string linearisation_report(const Scene& scene, const Json& result, const std::vector<double>& state,
                                  const std::vector<std::vector<double>>& shapes);
 
 std::string gradient_report(const Scene& scene, const Json& result);
 std::string check_report(const Scene& scene, const Json& result);
 
-// A motion of a design. running: t, then per objective what it integrates or takes the mean or extreme of.
+// A motion of a design. running holds t, then per objective its integrand, or the expression of its mean or extreme.
 struct DesignMotion {
   const Trajectory& trajectory;
   const Trajectory& forces;
   const Trajectory& running;
 };
-// What the plot of an objective's running term is called, and its limits.
+// The title of the plot of an objective's running term, and its limits.
 struct RunningTerm {
   std::string objective, title, y_label;
   std::vector<PlotLimit> limits = {};
 };
-// rho: the designed parameters; history: columns and rows of history.csv (iteration, objective, infeasibility, ...).
+// rho holds the designed parameters. history holds columns and rows of history.csv (iteration, objective, ...).
 std::string design_report(const Scene& scene, const Eigen::VectorXd& rho, const Json& result, const Trajectory& history,
                           const DesignMotion& before, const DesignMotion& after, const SensorLimits& limits = {},
                           const std::vector<RunningTerm>& terms = {}, const std::vector<PointTarget>& targets = {});
 
-// The measurements of one channel of one experiment, and the fitted model at the same times. Values are in SI units;
-// NaN stands between the windows of an experiment.
+// The measurements of one channel of one experiment, and the fitted model at the same times. Values are in SI units.
+// NaN separates the windows of an experiment.
 struct FitPlot {
   std::string experiment, channel, unit;  // channel: its column without the unit
   std::vector<double> times = {}, measured = {}, model = {},
@@ -55,7 +55,7 @@ struct FitPlot {
   std::vector<double> prediction = {};                   // half of the 95 % interval of a measurement; nan: not known
   std::vector<double> initial_times = {}, initial = {};  // the model before the fit; empty: not known
 };
-// motion: of the first experiment that is fitted.
+// motion is that of the first fitted experiment.
 std::string identification_report(const Scene& scene, const Json& result, const Trajectory& history,
                                   const std::vector<FitPlot>& fits, const std::vector<MovingState>& motion = {});
 

@@ -28,7 +28,7 @@ void add_motion_verdict(HtmlPage& page, const Json& result, const Trajectory& tr
   page.verdict(words + ".");
 }
 
-// Least and largest value of each sensor, and when.
+// The least and largest value of each sensor, with their times.
 void add_extremes(HtmlPage& page, const Scene& scene, const Trajectory& trajectory) {
   if (scene.sensors.empty() || trajectory.rows.empty()) return;
   std::vector<TableRow> rows;

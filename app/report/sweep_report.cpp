@@ -129,7 +129,7 @@ void add_best_points(HtmlPage& page, const Sweep& sweep) {
   page.table(header, rows);
 }
 
-// One parameter alone gives a line through its points in order; of several the points lie above each other.
+// One parameter alone gives a line through its points in order. Several parameters give points above each other.
 LinePlot plot_over(const Sweep& sweep, std::size_t varied, const SweptObjective& objective, const Trajectory& table) {
   constexpr double kDecades = 2;  // from which a linear axis hides how small values differ
   const Parameter& p = *sweep.varied[varied];

@@ -1,5 +1,5 @@
-// report.html of `sweep`: where each objective is least and largest, the best points, each objective over each varied
-// parameter.
+// report.html of `sweep`: the points with the least and largest value of each objective, the best points, and each
+// objective over each varied parameter.
 #pragma once
 
 #include <string>
@@ -11,7 +11,8 @@
 
 namespace mbsopt {
 
-// table: as in sweep.csv: the number of the point, its varied parameters, its objectives; NaN where there is no value.
+// table has the columns of sweep.csv: the number of the point, its varied parameters, its objectives. A missing value
+// is NaN.
 std::string sweep_report(const Problem& problem, const SweepPoints& points, const Json& result,
                          const Trajectory& table);
 

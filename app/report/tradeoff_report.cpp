@@ -30,7 +30,7 @@ void add_reference(HtmlPage& page, const TradeoffReference& reference) {
   page.table({"quantity", "errors are", "two methods apart"}, rows);
 }
 
-// Which plot a curve belongs to.
+// The plot that a curve belongs to.
 enum class Group { explicit_methods, implicit_methods, formulations, gradients };
 
 Group group_of(const TradeoffSetting& setting) {
@@ -47,7 +47,8 @@ std::string unit_of_error(const Quantity& q, const ObjectiveUnits& units) {
   return q.kind == QuantityKind::objective ? shown_unit(units, q.objective_name) : kUnknownUnit;
 }
 
-// Lines through bounds; points where an error is below its bound, and of settings that a tighter one dominates.
+// Draws lines through bounds. It draws points for errors below their bound, and for settings that a tighter one
+// dominates.
 LinePlot work_precision(const Tradeoff& tradeoff, const ObjectiveUnits& units, std::size_t quantity, Group group,
                         const std::string& title) {
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();

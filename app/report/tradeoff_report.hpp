@@ -1,5 +1,5 @@
-// report.html of `tradeoff`: work-precision plots, what is recommended, how far the reference can be trusted. Unlike
-// other reports it shows seconds: they are what was measured.
+// report.html of `tradeoff`: work-precision plots, recommendations, the accuracy of the reference. Unlike other reports
+// it shows seconds, because it measures them.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// simulation.accuracy of a problem: integrator and tolerances chosen (optim/tradeoff/accuracy.hpp), once, at the
-// parameters of the file; what was chosen, why, and the error to be expected go to standard output and into the result.
+// simulation.accuracy of a problem: chooses integrator and tolerances once (optim/tradeoff/accuracy.hpp), at the
+// parameters of the file. The choice, its reason and the expected error go to standard output and into the result.
 #pragma once
 
 #include "app/run/run.hpp"
@@ -7,14 +7,14 @@
 
 namespace mbsopt {
 
-// From here on the run's problem has settings as any other. Nothing where the file asks for no accuracy; the program's
-// defaults, with a warning, where none could be chosen. Call it between start() and what simulates. False where the
-// user interrupted it, which then is how the run ended.
+// Replaces the accuracy of the run's problem by settings. It does nothing if the file requests no accuracy. It takes
+// the program's defaults, with a warning, if it finds none. Call it between start() and the first simulation. Returns
+// false if the user interrupted it, which then is the outcome of the run.
 bool settle_accuracy(Run& run);
-// The same for another scene than that of the file, and the objectives that count.
+// Does the same for another scene than that of the file, and its objectives.
 bool settle_accuracy(Run& run, const Scene& simulated, const std::vector<Objective>& objectives);
 
-// Warns where an explicit method's steps are limited by stability.
+// Warns if stability limits the steps of an explicit method.
 void warn_of_stiffness(Run& run, const SimulationStatistics& statistics, bool differentiated);
 
 }  // namespace mbsopt

@@ -1,4 +1,4 @@
-// The objectives of a problem's load cases: into result.json, "cases", and as a table onto standard output.
+// The objectives of a problem's load cases: into result.json, "cases", and as a table on standard output.
 #pragma once
 
 #include "app/run/run.hpp"
@@ -6,13 +6,13 @@
 
 namespace mbsopt {
 
-// At the values of the file; without cases nothing. Where a case fails, that is how the run ended.
+// Takes the values of the file; does nothing without cases. If a case fails, so does the run.
 void add_cases(Run& run, bool gradients, GradientMethod method = GradientMethod::automatic);
 
-// `check` of each case. False where gradients disagree.
+// Runs `check` for each case. Returns false if gradients disagree.
 bool check_cases(Run& run);
 
-// Threads that a command may use for load cases.
+// The number of threads for load cases.
 int case_threads(const Run& run);
 
 }  // namespace mbsopt

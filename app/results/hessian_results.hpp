@@ -1,4 +1,4 @@
-// Second derivatives as `gradient --hessian` shows them: into result.json, and as tables for people.
+// Second derivatives of `gradient --hessian`: into result.json, and as tables for people.
 #pragma once
 
 #include <ostream>
@@ -10,15 +10,15 @@
 
 namespace mbsopt {
 
-// objectives.<name>.hessian {p: {q: value}} and .hessian_error, methods.hessian, hessian_method.
+// Writes objectives.<name>.hessian {p: {q: value}} and .hessian_error, methods.hessian, hessian_method.
 void add_hessians(Json& result, const Hessians& hessians, const std::vector<std::string>& objectives,
                   const std::vector<std::string>& parameters);
 
-// Per objective its lower triangle, six columns at a time, and how well it is known.
+// Prints, per objective, its lower triangle, six columns at a time, and its accuracy.
 void print_hessians(std::ostream& out, const Hessians& hessians, const std::vector<std::string>& objectives,
                     const std::vector<std::string>& parameters);
 
-// Sentences about Hessians that differences could not find well; empty where all is well.
+// Returns sentences about Hessians that differences did not determine well, or nothing.
 std::vector<std::string> hessian_warnings(const Hessians& hessians, const std::vector<std::string>& objectives);
 
 }  // namespace mbsopt

@@ -15,7 +15,7 @@ namespace mbsopt {
 namespace {
 
 constexpr Eigen::Index kWholeMatrix = 10;  // parameters, up to which the correlation is printed whole
-constexpr std::size_t kInfluences = 3;     // that are printed
+constexpr std::size_t kInfluences = 3;     // number of printed ones
 constexpr double kStrong = 0.9;            // correlation worth a line of its own
 
 std::string interval_of(const FittedParameter& p) {
@@ -91,7 +91,7 @@ void print_profiles(std::ostream& out, const IdentificationResult& fit) {
 // cancel but for 0.024"
 std::string determined_in_words(const IdentificationResult& fit) {
   constexpr Eigen::Index kMostValues = 6;  // singular values in a sentence
-  constexpr double kCancelled = 0.1;       // what remains of effects of size 1 that are worth a word
+  constexpr double kCancelled = 0.1;       // effects of size 1 that cancel below this are reported
   constexpr double kPart = 0.2;            // of a direction of length 1, from which a parameter counts in it
   const FitStatistics& s = fit.statistics;
   const Eigen::Index all = s.singular_values.size();

@@ -11,7 +11,7 @@
 
 namespace mbsopt {
 
-// effort: what it took, effort() of multistart.hpp.
+// effort is the text of effort() in multistart.hpp.
 void print_fit(std::ostream& out, const IdentificationResult& fit, const std::string& effort);
 void print_recovery(std::ostream& out, const Recovery& recovery);
 void add_to_result(Json& result, const Recovery& recovery);

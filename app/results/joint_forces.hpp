@@ -1,5 +1,5 @@
-// The force that each joint puts on its second body, at some instants of a run, for the arrows of a report. Columns:
-// t, then per joint its force in global axes [N].
+// The force of each joint on its second body, at some instants of a run, for the arrows of a report. Columns: t, then
+// per joint its force in global axes [N].
 //
 //   JointForces forces(scene, rho, sampling.times.size());
 //   sampling.observe = [&](std::size_t i, const StatePoint& at) { forces.observe(i, at); };
@@ -17,7 +17,7 @@ class MotionSolver;
 
 class JointForces {
  public:
-  // instants: of the whole run; every so many of them is kept, with the last.
+  // instants counts those of the whole run; the table keeps one of several, and the last.
   JointForces(const Scene& scene, const Eigen::VectorXd& rho, std::size_t instants);
   ~JointForces();
 

@@ -1,4 +1,4 @@
-// Bodies that the answer does not depend on, and that are not simulated: what a command says of them.
+// Messages on bodies that do not affect the answer and are not simulated.
 #pragma once
 
 #include <string>
@@ -11,8 +11,8 @@ namespace mbsopt {
 // judged_by: "objective", "measurement"
 void say_left_out(Run& run, const std::vector<std::string>& bodies, const char* judged_by);
 
-// Of runs with derivatives: blocks evaluated (core/mechanism/derivative_blocks.hpp), and numbers of the model that
-// parameters change. Belongs to result.simulation, which is there.
+// Adds counts of runs with derivatives to result.simulation, which must exist: blocks evaluated
+// (core/mechanism/derivative_blocks.hpp), and numbers of the model that parameters change.
 void add_derivative_counts(Run& run, const Scene& simulated, const SimulationStatistics& statistics);
 
 }  // namespace mbsopt

@@ -16,8 +16,8 @@ class Dimensions {
  public:
   explicit Dimensions(const Scene& scene) : scene_(scene), facts_(scene) {}
 
-  // Numbers are pure; where they cannot be, as in sin(5*t), they may stand for anything. Throws DimensionError where
-  // parts of the expression do not fit each other even so.
+  // Numbers are pure. If they cannot be, as in sin(5*t), they may have any dimension. Throws DimensionError if parts of
+  // the expression still do not fit each other.
   Known of(const Expression& expression) const {
     const auto of_names = [this](const std::string& name) { return of_name(name); };
     try {
@@ -42,7 +42,7 @@ class Dimensions {
   SceneFacts facts_;
 };
 
-// The terms of a sum have one dimension: that of those which are known.
+// The terms of a sum have one dimension: that of the known ones.
 class SumOfTerms {
  public:
   void add(const Known& term) {
@@ -53,7 +53,7 @@ class SumOfTerms {
     else if (!term->is_none() && !compatible(*sum_, *term))
       clash_ = true;
   }
-  // Beside a term of unknown dimension a number may stand for anything.
+  // Beside a term of unknown dimension a number may have any dimension.
   Known dimension() const { return clash_ || (unknown_ && sum_ && sum_->is_none()) ? std::nullopt : sum_; }
 
  private:

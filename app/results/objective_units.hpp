@@ -11,14 +11,14 @@
 
 namespace mbsopt {
 
-// By the objective's name; empty where the unit does not follow from its parts. Numbers without a unit count as pure.
+// The unit by the objective's name; empty if its parts do not determine it. Numbers without a unit count as pure.
 using ObjectiveUnits = std::map<std::string, std::string>;
 ObjectiveUnits objective_units(const Problem& problem);
 
-// Returns the unit for a table or an axis; kUnknownUnit where it is not known.
+// Returns the unit for a table or an axis, or kUnknownUnit.
 std::string shown_unit(const ObjectiveUnits& units, const std::string& objective);
 
-// " m^2 s" to follow a value; empty for a number and where it is not known.
+// " m^2 s" to follow a value; empty for a number or an unknown unit.
 std::string after_value(const ObjectiveUnits& units, const std::string& objective);
 
 // Adds "unit" to each objective of a result and of its load cases whose unit is known.

@@ -1,4 +1,4 @@
-// Values of objectives as results show them: a smooth maximum or minimum with the true one beside it.
+// Values of objectives in results: a smooth maximum or minimum with the true one beside it.
 #pragma once
 
 #include <optional>

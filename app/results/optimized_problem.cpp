@@ -29,7 +29,7 @@ Json json_of(const OrientationField& field) {
 
 std::string experiment_path(std::size_t index) { return child_path("identification.experiments", index); }
 
-// The values that parameters take in one experiment: its overrides.
+// Writes the values of parameters in one experiment as its overrides.
 std::string with_experiment_values(std::string text, const Problem& problem, const std::vector<NewValue>& values) {
   for (std::size_t i = 0; i < problem.identification->experiments.size(); ++i) {
     for (const NewValue& v : values) {
@@ -64,7 +64,7 @@ std::string optimized_problem_text(const std::string& problem_file, const std::v
     if (v.experiment.empty()) of_parameters[v.parameter] = v.value;
   }
   text = with_parameter_values(text, of_parameters);
-  // Files are named relative to the folder that the text will be in.
+  // File names are relative to the folder of the text.
   const auto relative_to_folder = [&](const std::string& file) {
     return std::filesystem::relative(file, std::filesystem::canonical(folder)).generic_string();
   };

@@ -1,5 +1,5 @@
-// optimized.json: the problem of a run, --set included, with new parameter values; a problem file itself, which may lie
-// in another folder (the paths of data files are rewritten). Comments and formatting stay as they were written.
+// optimized.json: the problem of a run with --set and new parameter values. It is a problem file itself, which may lie
+// in another folder: the paths of data files are rewritten. Comments and formatting stay.
 #pragma once
 
 #include <filesystem>
@@ -18,11 +18,11 @@ struct NewValue {
 
 class Run;
 
-// poses: of the scene's bodies, where they are to be written, too.
+// poses are those of the scene's bodies, if they must be written, too.
 std::string optimized_problem_text(const Run& run, const std::vector<NewValue>& values,
                                    const std::vector<Body>& poses = {});
 
-// problem: as read from that file with those --set; folder: where the text will lie.
+// problem is that of the file with its --set options. folder is that of the text.
 std::string optimized_problem_text(const std::string& problem_file, const std::vector<std::string>& sets,
                                    const Problem& problem, const std::vector<NewValue>& values,
                                    const std::filesystem::path& folder);

@@ -1,5 +1,5 @@
-// An identification says this before the fit: what the columns hold, how far the start is from them, and what the data
-// would determine there if sigma is as given.
+// The report of an identification before the fit: the content of the columns and their distance from the start. With
+// the given sigma it shows what the data would determine there.
 //
 //   const std::vector<ChannelData> channels = channel_data(start);    // start: of IdentificationOptions::preflight
 //   print_preflight(std::cout, start, channels);

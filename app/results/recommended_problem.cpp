@@ -26,7 +26,7 @@ Json options_json(const IntegratorOptions& o) {
   return json;
 }
 
-// The form of a problem file, scaled as the tolerance itself has been.
+// The tolerance in the form of a problem file; kinds have the same scale.
 Json tolerance_json(double smallest, const std::optional<KindTolerances>& kinds) {
   if (!kinds) return smallest;
   Json json = Json::object();

@@ -1,5 +1,5 @@
-// recommended.json: the problem of a run, --set included, with other integrator and formulation settings; a problem
-// file itself. Comments and formatting stay as they were written, but inside simulation.integrator and .formulation.
+// recommended.json: the problem of a run with --set and other integrator and formulation settings. It is a problem file
+// itself. Comments and formatting stay, except inside simulation.integrator and .formulation.
 #pragma once
 
 #include <string>

@@ -7,7 +7,7 @@
 
 namespace mbsopt {
 
-// Power is effort times rate: N where the coordinate is a length, N m where it is an angle or a number.
+// Power is effort times rate: the unit is N if the coordinate is a length, N m if it is an angle or a number.
 std::string unit_of_effort(const Drive& drive) {
   return dimension_of_drive(drive.type, drive.coordinate) == dimension::kLength ? "N" : "N m";
 }

@@ -1,4 +1,4 @@
-// The unit of a sensor in its scene, which says whether a force or a drive acts along a line or about an axis.
+// The unit of a sensor in its scene: there a force or a drive acts along a line or about an axis.
 #pragma once
 
 #include <string>

@@ -12,7 +12,7 @@
 namespace mbsopt {
 namespace {
 
-// Per objective g of a sum, x of a mean or extreme; null where there is none.
+// Per objective, g of a sum or x of a mean or extreme; null if there is none.
 std::vector<std::shared_ptr<const PointCost>> running_terms(const std::vector<Objective>& objectives,
                                                             const Mechanism& mechanism) {
   std::vector<std::shared_ptr<const PointCost>> terms;

@@ -11,14 +11,14 @@ struct SimulatedMotion {
   Trajectory trajectory;                           // up to the last good time where the simulation failed
   Eigen::VectorXd psi;                             // per objective of the problem, where the simulation is ok
   std::vector<std::optional<double>> true_values;  // of smooth maxima and minima among them
-  ModelSummary model;                              // where the assembly is ok
+  ModelSummary model;                              // set if the assembly is ok
   std::vector<std::string> warnings;               // of the start
   Trajectory forces = {};                          // of joints (joint_forces.hpp)
   std::vector<std::vector<double>> instants = {};  // per objective, of its tracked points without prescribed timing [s]
   Trajectory running = {};  // t, then per objective what it integrates or takes the mean or extreme of; NaN: nothing
 };
 
-// Draws the progress of `run`, and stops where the user interrupts.
+// Draws the progress of `run`, and stops if the user interrupts.
 SimulatedMotion simulated_motion(Run& run, const Eigen::VectorXd& rho);
 
 }  // namespace mbsopt

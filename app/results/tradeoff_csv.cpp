@@ -13,7 +13,7 @@ namespace {
 
 std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.6g}", value) : std::string(); }
 
-// Columns of names and values side by side, so that no row gets out of step.
+// Sets names and values of columns together, so that they correspond.
 class Row {
  public:
   void text(std::string_view column, std::string_view value) { add(column, csv_cell(value)); }

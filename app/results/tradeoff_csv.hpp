@@ -1,4 +1,4 @@
-// tradeoff.csv: a row per setting that was measured, or that was to be; columns in docs/tradeoffs.md.
+// tradeoff.csv: a row per setting, measured or skipped; docs/tradeoffs.md lists the columns.
 #pragma once
 
 #include <string>

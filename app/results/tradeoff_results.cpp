@@ -23,7 +23,7 @@ Json row_json(const Tradeoff& tradeoff, std::size_t index) {
   return json;
 }
 
-// With the bounds, by which it was chosen; of a gradient with what its simulation adds.
+// Includes the bounds of the choice, and for a gradient those of its simulation.
 Json recommended_json(const Tradeoff& tradeoff, std::size_t index) {
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
   Json json = row_json(tradeoff, index);
@@ -61,7 +61,7 @@ std::string errors_text(const Tradeoff& tradeoff, const TaskAdvice& advice) {
   return text;
 }
 
-// The words of a recommendation say what it is for and which setting it is.
+// The words of a recommendation: its purpose and its setting.
 struct RecommendationWords {
   double accuracy;
   std::string aim, setting;  // "track"; "dopri5 at rtol 1e-05, 12 ms (error 3.1e-05)", or why there is none

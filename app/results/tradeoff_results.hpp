@@ -11,19 +11,19 @@
 namespace mbsopt {
 
 std::string duration_text(double seconds);  // "12.3 ms", "1.5 s"
-// Per quantity, by name; those that are not known are left out.
+// Errors per quantity, by name; unknown ones are left out.
 Json errors_json(const std::vector<Quantity>& quantities, const Eigen::VectorXd& errors);
 
-// The methods, what they are apart, the right values; a warning where these are not certain.
+// Adds the methods, their difference and the right values, with a warning if these are uncertain.
 void add_reference(Run& run, const TradeoffReference& reference);
-// The scene's own settings and the defaults.
+// Adds the scene's own settings and the defaults.
 void add_given_settings(Run& run, const Tradeoff& tradeoff);
 void add_fit_errors(Run& run, const FitErrors& errors);
 void add_recommendations(Run& run, const Tradeoff& tradeoff);
-// For what the file is made for, a design or an identification.
+// Adds recommendations for the task of the file, a design or an identification.
 void add_task_recommendations(Run& run, const Tradeoff& tradeoff, TaskAdviser& adviser);
 void add_outcomes(Run& run, const Tradeoff& tradeoff);  // how many were measured; what was not, and why
-// The choice of --apply; the run has failed where there is nothing to choose.
+// Adds the choice of --apply. The run fails if there is nothing to choose.
 void add_applied(Run& run, const Tradeoff& tradeoff, const TaskAdvice& advice);
 
 void add_penalty_study(Run& run, const PenaltyStudy& study);

@@ -14,7 +14,7 @@ constexpr int kDefaultIntervals = 200;
 
 }  // namespace
 
-// start, start + output_step, ..., end: the end is always a row, and never twice.
+// start, start + output_step, ..., end: the end is always a row, exactly once.
 std::vector<double> output_times(const SimulationSettings& settings) {
   const double span = settings.end_time - settings.start_time;
   const double step = settings.output_step.value_or(span / kDefaultIntervals);

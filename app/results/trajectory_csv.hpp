@@ -30,7 +30,7 @@ Sampling record_trajectory(const Mechanism& mechanism, const Scene& scene, Traje
 std::string to_csv(const std::vector<std::string>& columns, const std::vector<std::vector<double>>& rows);
 inline std::string to_csv(const Trajectory& trajectory) { return to_csv(trajectory.columns, trajectory.rows); }
 
-// The same text; nothing once `go_on`, which sees the first number of each row, says no.
+// The same text; nothing if `go_on`, which gets the first number of each row, returns false.
 std::optional<std::string> to_csv(const Trajectory& trajectory, const std::function<bool(double)>& go_on);
 
 }  // namespace mbsopt

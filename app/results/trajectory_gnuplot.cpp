@@ -9,7 +9,7 @@
 namespace mbsopt {
 namespace {
 
-// Inside single quotes gnuplot reads '' as one, and nothing else in a special way.
+// Inside single quotes gnuplot reads '' as one quote, and all other characters literally.
 std::string quoted(const std::string& text) {
   std::string result = "'";
   for (const char c : text) result += c == '\'' ? std::string("''") : std::string(1, c);

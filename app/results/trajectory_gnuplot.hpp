@@ -1,4 +1,4 @@
-// trajectory.gp: a script of gnuplot that plots each sensor of trajectory.csv, and the position of each body.
+// trajectory.gp: a gnuplot script that plots each sensor of trajectory.csv, and the position of each body.
 #pragma once
 
 #include <string>

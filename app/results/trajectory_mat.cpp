@@ -18,7 +18,7 @@ void append(std::string& bytes, Number value) {
   bytes.append(raw, sizeof value);
 }
 
-// Type, number of bytes, the bytes, zeros up to a multiple of eight.
+// Appends the type, the number of bytes, the bytes, and zeros up to a multiple of eight.
 void append_element(std::string& bytes, std::uint32_t type, const std::string& content) {
   append(bytes, type);
   append(bytes, static_cast<std::uint32_t>(content.size()));

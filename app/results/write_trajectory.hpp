@@ -5,8 +5,8 @@
 
 namespace mbsopt {
 
-// Writes trajectory.csv, with --mat and --gnuplot also trajectory.mat and trajectory.gp. Warns of each column with
-// empty cells. Ctrl-C meanwhile stops the run without the files.
+// Writes trajectory.csv; with --mat and --gnuplot also trajectory.mat and trajectory.gp. Warns of each column with
+// empty cells. Ctrl-C stops the run without the files.
 void write_trajectory(Run& run, const Trajectory& trajectory);
 
 }  // namespace mbsopt

@@ -1,6 +1,6 @@
-// The input of every command, and the commands. Each returns an exit code (exit_code.hpp); bad input leaves as an
-// exception (InputError, SceneError, OutputError), which command_line.cpp turns into words and exit code 2; so does
-// what cannot be written (WriteError), with exit code 1.
+// The input of every command, and the commands. Each returns an exit code (exit_code.hpp). Bad input is an exception
+// (InputError, SceneError, OutputError), which command_line.cpp turns into words and exit code 2. A failed output
+// (WriteError) gives exit code 1.
 #pragma once
 
 #include <memory>
@@ -44,7 +44,7 @@ struct CommandOptions {
   bool allow_plugins = false;         // --allow-plugins
   bool json = false;                  // --json: only result.json on standard output
   bool keep_journal = false;          // --keep-journal of design, identify and sweep
-  bool resume = false;                // go on with the journal in `out`
+  bool resume = false;                // continue with the journal in `out`
 };
 
 struct CommandContext {
@@ -54,7 +54,7 @@ struct CommandContext {
   std::ostream& out;             // results as text; with --json they are left out
   std::ostream& err;             // progress and errors
   bool err_is_terminal = false;  // a bar may be drawn
-  std::ostream* json = nullptr;  // with --json: where result.json is printed
+  std::ostream* json = nullptr;  // the stream for result.json with --json
   NamedTerms terms = {};         // in C++, which the problem may call by name: those of the program
   Ranks* ranks = nullptr;        // other processes that compute for this one, under mpirun
   mutable std::shared_ptr<const ProblemSource> source = nullptr;  // once Run has read the problem

@@ -12,7 +12,7 @@ bool conserves_energy(const Scene& scene) {
   const auto zero = [&](const Field& field) { return facts.value(field) == 0.0; };
   if (!scene.drives.empty()) return false;  // drives do work
   return std::all_of(scene.forces.begin(), scene.forces.end(), [&](const Force& force) {
-    // A constant tension has no part in the potential energy either.
+    // A constant tension has no part in the potential energy, either.
     if (const auto* tsda = std::get_if<Tsda>(&force.kind))
       return !tsda->law && zero(tsda->damping) && zero(tsda->actuator);
     if (const auto* rsda = std::get_if<Rsda>(&force.kind)) return !rsda->law && zero(rsda->damping);

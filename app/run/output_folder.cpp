@@ -16,12 +16,12 @@ namespace mbsopt {
 namespace fs = std::filesystem;
 namespace {
 
-// journal.jsonl is not among them: the journal itself replaces no file of others (journal.hpp).
+// journal.jsonl is not among them: the journal itself replaces no foreign file (journal.hpp).
 constexpr std::array kOutputs{"result.json",    "trajectory.csv",   "drives.csv",    "report.html",
                               "optimized.json", "history.csv",      "residuals.csv", "profile.csv",
                               "tradeoff.csv",   "recommended.json", "sweep.csv"};
 
-// A folder's name from a problem's: no separators, no leading dot, no control characters.
+// Makes a folder's name from a problem's: no separators, no leading dot, no control characters.
 std::string folder_name(std::string name) {
   for (char& c : name) {
     if (c == '/' || c == '\\' || static_cast<unsigned char>(c) < 0x20) c = '_';
@@ -30,7 +30,7 @@ std::string folder_name(std::string name) {
   return name;
 }
 
-// The problem and the command that a result.json belongs to; empty where it is not one of ours.
+// The problem and the command of a result.json; empty if this program has not written it.
 struct StoredRun {
   std::string owner, command;
 };
@@ -51,7 +51,7 @@ StoredRun stored_run(const fs::path& file) {
   return {text_at(result.at("provenance"), "input"), text_at(result, "command")};
 }
 
-// Only who holds the folder's lock may do this: the parts of a run under way are not its own.
+// Call this only with the folder's lock: the parts may belong to a running command.
 void remove_parts(const fs::path& folder) {
   std::error_code ignored;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {

@@ -1,6 +1,6 @@
-// The folder a run writes into: --out DIR, or out/<problem's name>/. Its result.json says whose it is (the path of the
-// problem file seen from the folder); a folder that holds anything of another problem is left untouched. So is the
-// outcome of a design or an identification, which may have taken hours, by any other command.
+// The output folder of a run: --out DIR, or out/<problem's name>/. Its result.json names the owner, the path of the
+// problem file relative to the folder. A run does not touch a folder that holds anything of another problem. No other
+// command replaces the outcome of a design or an identification, which may have taken hours.
 //
 //   OutputFolder folder("", problem.name, "problems/five_bar/design.json", "design");   // throws OutputError
 //   const auto lock = folder.claim();                                                    // from here on it is ours
@@ -18,17 +18,17 @@ namespace mbsopt {
 
 class OutputFolder {
  public:
-  // Creates the folder where needed.
+  // Creates the folder if necessary.
   OutputFolder(const std::string& requested, const std::string& problem_name, const std::string& problem_file,
                const std::string& command);
 
   const std::filesystem::path& path() const { return path_; }
-  const std::string& owner() const { return owner_; }  // what result.json stores as provenance.input
-  // Locks the folder and removes what a killed run left of unfinished files. Throws OutputError where another command
-  // writes into it, or has done so since.
+  const std::string& owner() const { return owner_; }  // provenance.input in result.json
+  // Locks the folder and removes unfinished files of a killed run. Throws OutputError if another command writes into
+  // it, or has done so since.
   std::unique_ptr<FolderLock> claim() const;
   void write(const std::string& file, std::string_view content) const;
-  // For when nothing can be written any more: "running" in result.json becomes "failed" without a further byte.
+  // Changes "running" in result.json to "failed" without a further byte, when nothing can be written any more.
   void mark_failed() const noexcept;
 
  private:

@@ -17,7 +17,7 @@
 namespace mbsopt {
 namespace {
 
-// Quoted where a shell would need it, so that the line can be pasted.
+// Quotes a word if a shell needs it, so that the line can be pasted.
 std::string shell_word(const std::string& word) {
   constexpr const char* plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./:,@%";
   if (!word.empty() && word.find_first_not_of(plain) == std::string::npos) return word;
@@ -44,14 +44,14 @@ nlohmann::ordered_json library_versions() {
           {"compiler", __VERSION__}};
 }
 
-// A run whose input has no checksum could not be gone on with.
+// A run whose input has no checksum cannot be resumed.
 std::string checksum_of(const std::string& file) {
   std::string checksum = sha256_of_file(file);
   if (checksum.empty()) throw CsvError(file + ": cannot be read");
   return checksum;
 }
 
-// Two files may have one base name. The result does not depend on the current folder.
+// A path relative to the folder: two files may have one base name. The result does not depend on the current folder.
 std::string seen_from(const std::filesystem::path& folder, const std::filesystem::path& file) {
   return std::filesystem::absolute(file).lexically_normal().lexically_relative(folder).generic_string();
 }

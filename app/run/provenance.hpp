@@ -1,4 +1,4 @@
-// Where a result comes from: enough to repeat it, and nothing that changes from run to run.
+// The provenance of a result: enough to repeat it, and nothing that changes from run to run.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -10,9 +10,9 @@ namespace mbsopt {
 std::string program_version();
 std::string sha256_of_file(const std::string& path);  // lower-case hex; empty where it cannot be read
 
-// {"command_line", "input", "input_sha256", "data_sha256": {file: hash}, "libraries": {name: version}}
-// Data files are named as seen from the problem file's folder, wherever the command runs. Throws std::runtime_error
-// where a file cannot be read.
+// {"command_line", "input", "input_sha256", "data_sha256": {file: hash}, "libraries": {name: version}} Names of data
+// files are relative to the problem file's folder, wherever the command runs. Throws std::runtime_error if a file
+// cannot be read.
 nlohmann::ordered_json provenance(const std::vector<std::string>& arguments, const std::string& input_as_stored,
                                   const std::string& problem_file, const std::vector<std::string>& data_files);
 

@@ -1,12 +1,12 @@
-// One run of a command on one problem: what all commands share. Reads the problem, claims the output folder, gathers
-// result.json, and ends with an exit code.
+// One run of a command on one problem: the common part of all commands. It reads the problem, claims the output folder,
+// gathers result.json, and ends with an exit code.
 //
 //   Run run(context);                               // throws on bad input
 //   run.start();                                    // from here on there is a result.json
 //   run.result["simulation"] = to_json(statistics);
-//   if (!simulation.ok()) run.failed(simulation.message, simulation.last_good_time);   // how it ended: in the report,
-//   too run.write("report.html", report(run.result)); return run.finish();                            // says how it
-//   ended, and where the results are
+//   if (!simulation.ok()) run.failed(simulation.message, simulation.last_good_time);   // the report shows it, too
+//   run.write("report.html", report(run.result));
+//   return run.finish();                            // prints how it ended, and where the results are
 #pragma once
 
 #include <Eigen/Core>
@@ -48,17 +48,17 @@ class Run {
 
   void start();  // claims the folder: locks it, and writes result.json with "status": "running"
   void write(const std::string& file, std::string_view content);  // into the folder; named in the closing line
-  // For simulations to call after each step: shows how far they are; false once the run is interrupted.
+  // Simulations call this after each step. It shows their progress, and returns false once the run is interrupted.
   std::function<bool(double t)> watched(std::string doing);
   void warn(const std::string& words);  // "simulation.accuracy: ...": with the path's place in the file before them
-  // In place of what the file says (accuracy_results.hpp).
+  // Replaces the settings of the file (accuracy_results.hpp).
   void simulate_with(const SimulationSettings& settings) { problem_.scene.simulation = settings; }
 
   void start_from(const std::vector<Parameter>& parameters) { problem_.scene.parameters = parameters; }
   void take_poses(const std::vector<Body>& bodies) { problem_.scene.bodies = bodies; }
 
-  // How it ended, unless all went well.
-  // exit 1; last_good_time: of the motion, where it is the simulation that failed
+  // These set the end of the run, unless it succeeded. failed gives exit code 1. last_good_time is that of the motion
+  // if the simulation failed.
   void failed(const std::string& message, std::optional<double> last_good_time = {});
   void disagrees();                       // exit 3
   void stopped(const std::string& kept);  // exit 130; kept: a sentence, what the folder holds
@@ -75,11 +75,11 @@ class Run {
 
 ReadOptions read_options(const CommandContext& context);
 
-// The files that a problem names: data, plug-ins; and the program itself where it brings terms of its own.
+// The files that a problem names (data, plug-ins), and the program itself if it provides terms.
 std::vector<std::string> data_files(const Problem& problem, const NamedTerms& terms);
 
-// The model at its assembled start into the result and onto standard output, and warnings of what is odd about it.
-// False where the assembly failed, which then is how the run ended. integrated: whether its motion is, by a model.
+// Adds the model at its assembled start to the result and to standard output, with warnings of oddities. Returns false
+// if the assembly failed, which then is the outcome of the run. integrated: a model of motion is integrated.
 bool assembled(Run& run, const Mechanism& mechanism, const Assembly& assembly, bool integrated = true);
 
 // Prints the counts of bodies, equations, degrees of freedom; redundant equations by joint.

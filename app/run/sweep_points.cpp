@@ -14,7 +14,7 @@
 namespace mbsopt {
 namespace {
 
-constexpr std::size_t kMostPoints = 10'000'000;  // of a grid: more is a slip, and fills the memory
+constexpr std::size_t kMostPoints = 10'000'000;  // of a grid: more is an input error, and fills the memory
 
 int parameter_index(const Scene& scene, const std::string& name) {
   const auto found = std::ranges::find(scene.parameters, name, &Parameter::name);

@@ -19,11 +19,11 @@ struct SweepOptions {
 };
 
 struct SweepPoints {
-  std::vector<int> parameters;          // that are varied: their indices
+  std::vector<int> parameters;          // indices of the varied ones
   std::vector<Eigen::VectorXd> values;  // one vector of those per point
 };
 
-// Grids and samples of a parameter whose scale is logarithmic are even in its logarithm. seed: of the samples.
+// Grids and samples of a parameter with a logarithmic scale are even in its logarithm. seed is that of the samples.
 // Throws std::invalid_argument or CsvError in words.
 SweepPoints sweep_points(const Scene& scene, const SweepOptions& options, long seed);
 

@@ -36,7 +36,7 @@ std::vector<Parameter> designed(const Problem& problem) {
 
 std::vector<double> numbers(const Eigen::VectorXd& values) { return {values.begin(), values.end()}; }
 
-// All runs draw what is random from seeds that are known before they begin.
+// All runs draw random numbers from seeds that are known before they begin.
 Problem with_seeds(Problem problem, LongRun& long_run) {
   OptimizerSpec& optimizer = problem.design->optimizer;
   const NloptMethod* const method = find_nlopt_method(optimizer.type);
@@ -71,7 +71,7 @@ Problem at_start(Problem problem, int start, const Eigen::VectorXd& values) {
   return problem;
 }
 
-// The problem of each start: with all branches, run k of them begins at start k / modes in mode k % modes.
+// The problem of each start. With all branches, run k begins at start k / modes in mode k % modes.
 std::function<Problem(int)> starts_of(const Problem& problem, int modes) {
   const MultistartSpec& spec = *problem.design->multistart;
   return [problem, modes, values = start_values(designed(problem), spec, *spec.seed)](int run) {
@@ -83,7 +83,7 @@ std::optional<int> mode_of(int run, const std::optional<int>& modes) {
   return modes ? std::optional(run % *modes) : std::nullopt;
 }
 
-// In a worker process: the run from one start, with the points it computed, from which the best run is told again.
+// Runs in a worker process from one start. The record holds its points, from which the best run is repeated.
 Json record_of_start(const Problem& problem, const NlpScale& scale, std::optional<int> mode, int start) {
   Json points = Json::array(), hessians = Json::array();
   JsonPointRecords records({}, {}, [&](const char* kind, const Json& content) {
@@ -119,7 +119,7 @@ Json record_of_start(const Problem& problem, const NlpScale& scale, std::optiona
   return record;
 }
 
-// The run of a record, from the points that it knows.
+// Repeats the run of a record from its points.
 DesignResult told_again(const Problem& problem, const NlpScale& scale, std::optional<int> mode, const Json& record) {
   JsonPointRecords records(record.at("points").get<std::vector<Json>>(), record.at("hessians").get<std::vector<Json>>(),
                            [](const char*, const Json&) {});
@@ -148,7 +148,7 @@ void describe_given_cases(const Problem& problem, DesignResult& design) {
   design.objective_initial = CaseObjective(problem.cases, *problem.design).value(minimised);
 }
 
-// The best run, but before it the problem as it was given.
+// Describes the best run, but with the given problem before it.
 void describe_given(const Problem& problem, const Eigen::VectorXd& before, DesignResult& design) {
   const std::vector<Parameter> parameters = designed(problem);
   for (std::size_t k = 0; k < design.variables.size(); ++k) design.variables[k].initial = parameters[k].value;
@@ -162,14 +162,14 @@ void describe_given(const Problem& problem, const Eigen::VectorXd& before, Desig
   for (DesignConstraint& c : design.constraints) c.initial = value_before(c.objective);
 }
 
-// Of a design that ended before its first evaluation.
+// Describes a design that ended before its first evaluation.
 void describe_unmoved(const Problem& problem, const Eigen::VectorXd& before, DesignResult& design) {
   describe_given(problem, before, design);
   design.objective_final = design.objective_initial;
   for (DesignConstraint& c : design.constraints) c.value = c.initial;
 }
 
-// problem: with its seeds.
+// The problem must have its seeds.
 Json task_of(const Problem& problem, const NlpScale& scale, const std::optional<int>& modes) {
   Json task{{"seed", *problem.design->multistart->seed}, {"scale", {{"f", scale.f}, {"c", numbers(scale.c)}}}};
   if (problem.design->optimizer.seed) task["optimizer_seed"] = *problem.design->optimizer.seed;

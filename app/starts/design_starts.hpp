@@ -1,4 +1,4 @@
-// How the design command minimises: one run, or the best of a multistart; journalled, and gone on with.
+// The minimisation of the design command: one run, or the best of a multistart. It writes a journal and can be resumed.
 #pragma once
 
 #include "app/run/long_run.hpp"
@@ -7,7 +7,7 @@
 
 namespace mbsopt {
 
-// mode, of.
+// The JSON members "mode" and "of".
 Json mode_json(const DesignMode& mode);
 
 struct DesignOutcome {
@@ -15,10 +15,10 @@ struct DesignOutcome {
   bool interrupted = false;  // before all starts had finished
 };
 
-// before: the objectives at the given values, in the problem's order.
+// before holds the objectives at the given values, in the problem's order.
 DesignOutcome minimised(Run& run, LongRun& long_run, const Eigen::VectorXd& before);
 
-// The starts of its multistart, from the task that this process or another one has made.
+// The starts of its multistart, from the task of this process or another one.
 StartWork design_start_work(Problem problem, const Json& task);
 
 }  // namespace mbsopt

@@ -1,13 +1,13 @@
-// The optima that the starts of a multistart ended at, each once; and how many others there may be.
+// The distinct optima at which the starts of a multistart ended, and the expected number of others.
 //
-// If every start ends at the optimum of the region that it lies in, and nothing is known of the sizes of these regions,
-// then of n searches that ended at w optima one expects as many optima in all, and searches in regions that are known:
+// Assume that every start ends at the optimum of its region, and that the sizes of these regions are unknown. If n
+// searches ended at w optima, then the expected number of all optima, and the expected share of known regions, are
 //
 //   w (n - 1)/(n - w - 2), n > w + 2         (n - w - 1)(n + w)/(n (n - 1))
 //
 // C. G. E. Boender, A. H. G. Rinnooy Kan, "Bayesian stopping rules for multistart global optimization methods",
-// Mathematical Programming 37 (1987) 59-80. The search ends where the first is below w + 1/2, in each assembly mode:
-// each has optima of its own, and one where few searches converge says little of them.
+// Mathematical Programming 37 (1987) 59-80. The search ends when the first is below w + 1/2 in each assembly mode. Each
+// mode has its own optima, and a mode in which few searches converge tells little of them.
 #pragma once
 
 #include <optional>
@@ -20,7 +20,8 @@ namespace mbsopt {
 
 inline constexpr double kFeasible = 1e-6;  // violation relative to the bounds: what ranks as feasible
 
-// The same within 1e-3 of the range of each parameter that has bounds; of its logarithm where the scale is one.
+// Whether two optima agree within 1e-3 of the range of each bounded parameter, or of its logarithm if that is the
+// scale.
 bool same_optimum(const Json& a, const Json& b, const Scene& scene);
 
 struct DistinctOptimum {
@@ -39,7 +40,7 @@ struct SearchedOptima {
 };
 SearchedOptima searched(const std::vector<DistinctOptimum>& optima);
 
-// Whether the rule holds in each assembly mode that was searched.
+// Whether the rule holds in each searched assembly mode.
 bool all_found(const std::vector<Json>& ranked, const Scene& scene);
 
 }  // namespace mbsopt

@@ -22,8 +22,8 @@ std::vector<Parameter> shared_parameters(const Problem& problem) {
   return parameters;
 }
 
-// By which starts are ranked. With sigmas of its own each start ends at a cost of half its degrees of freedom, however
-// bad its fit: only with their logarithms is it the likelihood, sigma_estimation.hpp.
+// The objective that ranks starts. With estimated sigmas, each start ends at a cost of half its degrees of freedom,
+// even for a bad fit. Only with their logarithms is it the likelihood (sigma_estimation.hpp).
 double objective_of(const IdentificationSpec& spec, const IdentificationResult& fit) {
   double objective = fit.cost_final;
   if (!estimates_sigma(spec)) return objective;

@@ -1,5 +1,4 @@
-// A multistart of an identification: the problem with the values of the best start's fit, from which the fit proper
-// begins.
+// A multistart of an identification: the problem with the values of the best start's fit. The final fit begins there.
 #pragma once
 
 #include <vector>
@@ -17,20 +16,20 @@ struct BestStart {
   double wall_seconds = 0;  // added up over them
 };
 
-// The given problem where no multistart is asked for. Shared variables are spread over their bounds; parameters that
+// Returns the given problem if there is no multistart. Shared variables are spread over their bounds. Parameters that
 // are free in an experiment begin at their given values.
 BestStart from_best_start(Run& run, LongRun& long_run, const std::vector<CsvTable>& data);
 
-// The starts, from the task that this process or another one has made.
+// The starts, from the task of this process or another one.
 StartWork identify_start_work(const Problem& problem, const Json& task);
 
 // The records of the experiments, in their order.
 std::vector<CsvTable> data_of(const Problem& problem);
 
-// Ends a run that was interrupted before the fit proper began; best: from_best_start(). Returns the exit code.
+// Ends a run that was interrupted before the final fit began. best is that of from_best_start(). Returns the exit code.
 int stopped_within_starts(Run& run, LongRun& long_run, const Problem& best);
 
-// "initial" of each parameter: as it was given, not where the best start had brought it.
+// Sets "initial" of each parameter to its given value, not to that of the best start.
 void describe_given(const Problem& given, IdentificationResult& fit);
 
 }  // namespace mbsopt

@@ -29,10 +29,10 @@ namespace {
 constexpr const char* kLibrary = "libmpi.so.40";  // of Open MPI 3, 4 and 5
 constexpr int kTag = 1;
 
-// Open MPI, loaded by ranks only: a plain run neither waits for it nor mixes it with the MPI that MUMPS brings along.
-// That one (in libdmumps_seq, a stand-in for one process) exports MPI_Init, MPI_Comm_rank, MPI_Finalize and MPI_Wtime,
-// which MUMPS must go on to find: were Open MPI linked, it would come first. So
-//   RTLD_DEEPBIND   Open MPI finds its own symbols first, not the stand-in's;
+// Open MPI, which only ranks load. A plain run does not wait for it, and does not mix it with the MPI of MUMPS. That
+// one (in libdmumps_seq, a substitute for one process) exports MPI_Init, MPI_Comm_rank, MPI_Finalize and MPI_Wtime,
+// which MUMPS must find. If Open MPI were linked, it would come first. So
+//   RTLD_DEEPBIND   Open MPI finds its own symbols first, not the substitute's;
 //   RTLD_GLOBAL     its plugins find it, after all that the program was linked with.
 class OpenMpi {
  public:

@@ -9,8 +9,8 @@
 
 namespace mbsopt {
 
-// Joins the run that mpirun has started this process for; null where it has not, or started this one only. MPI is not
-// touched then. Throws std::runtime_error where this build has no MPI, or finds no library.
+// Joins the run for which mpirun started this process. Returns null, without MPI, if it did not, or if it started one
+// process only. Throws std::runtime_error if this build has no MPI, or finds no library.
 std::unique_ptr<Ranks> mpi_ranks();
 
 }  // namespace mbsopt

@@ -17,14 +17,14 @@ namespace mbsopt {
 namespace {
 
 constexpr std::size_t kPrinted = 20;
-// So many starts end between two looks at whether all optima are found. The number does not depend on the machine.
+// After so many starts it decides whether all optima are found. The number does not depend on the machine.
 constexpr int kBatch = 20;
 
 bool has_objective(const Json& record) { return record.contains("objective") && record["objective"].is_number(); }
 
 int number_of(const Json& record) { return record.at("start").get<int>(); }
 
-// Smaller is better.
+// A smaller rank is better.
 std::tuple<int, double, double, int> rank(const Json& record) {
   if (!has_objective(record)) return {2, 0, 0, number_of(record)};
   const double violation = record.value("infeasibility", 0.0), objective = record["objective"].get<double>();
@@ -98,7 +98,7 @@ Json without_points(const Json& record) {
   return short_record;
 }
 
-// Returns whether the search ended since it had found all optima (spec.until_all_found).
+// Returns whether the search ended because it had found all optima (spec.until_all_found).
 bool compute_batches(Run& run, LongRun& long_run, const MultistartSpec& spec, const StartWork& work,
                      MultistartOutcome& outcome) {
   std::set<int> finished;
@@ -109,7 +109,7 @@ bool compute_batches(Run& run, LongRun& long_run, const MultistartSpec& spec, co
     const Json record = record_of(reply);
     const std::string status = record["status"];
     const bool cut_off = status == "stopped" || (!reply.ok && interrupted());
-    // A worker that crashed may do better next time: not in the journal either.
+    // A worker that crashed may succeed next time, so it is not in the journal.
     if (!cut_off && reply.ok) long_run.add("start", record);
     outcome.interrupted = outcome.interrupted || cut_off;
     outcome.ranked.push_back(record);

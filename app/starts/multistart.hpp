@@ -1,11 +1,11 @@
-// A multistart: one record per start, computed in worker processes (start_workers.hpp), ranked. What a start is, the
-// caller says; a record holds at least
+// A multistart: one record per start, computed in worker processes (start_workers.hpp) and ranked. The caller defines a
+// start. A record holds at least
 //
 //   {"start": 7, "status": "converged", "message": "...", "objective": 0.12, "infeasibility": 0, "iterations": 9,
 //    "evaluations": 12, "simulations": 14, "wall_seconds": 0.8, "from": {"k1": 100}, "parameters": {"k1": 87}}
 //
-// and may hold more, which is kept in the journal but not in result.json. Results do not depend on the number of
-// workers: the records are ranked by what they hold, ties by the number of the start.
+// The journal, but not result.json, keeps further entries. Results do not depend on the number of workers. The content
+// of the records ranks them, and the number of the start decides ties.
 #pragma once
 
 #include <optional>
@@ -27,16 +27,16 @@ struct MultistartOutcome {
   const Json* best() const;  // nullptr: no start has an objective
 };
 
-// spec.seed must be there. Puts "multistart" into the result and prints the waterfall.
+// spec.seed must be set. Adds "multistart" to the result and prints the waterfall.
 MultistartOutcome run_multistart(Run& run, LongRun& long_run, const MultistartSpec& spec, const StartWork& work);
 
-// "412 simulations, 6.9 s in all 20 starts": what the program says of an optimisation's effort.
+// "412 simulations, 6.9 s in all 20 starts": the words for an optimisation's effort.
 std::string effort(const Run& run, long simulations, double wall_seconds);
 
 // Parameter values by name.
 Json named_values(const std::vector<std::string>& names, const std::vector<double>& values);
 
-// The problem with other values of some parameters, and without the multistart.
+// The problem with other values of some parameters, without the multistart.
 Problem with_values(Problem problem, const Json& values);
 
 }  // namespace mbsopt

@@ -1,4 +1,4 @@
-// The other model of identify --compare: it is checked before the fit, and fitted after it.
+// The other model of identify --compare. It is checked before the fit, and fitted after it.
 //
 //   OtherModel other(file);                    // read
 //   other.check(run.problem.scene, options);   // cut into windows, simulated once
@@ -24,7 +24,7 @@ class OtherModel {
   // Takes the integrator of `first`, so that errors of the integration are the same in both fits. Throws InputError
   // with the place in its own file, and CsvError.
   void check(const Scene& first, const IdentificationOptions& options);
-  // After check().
+  // Call this after check().
   IdentificationResult fit(const IdentificationOptions& options) const;
 
  private:

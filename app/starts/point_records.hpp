@@ -1,4 +1,4 @@
-// The points of a design as JSON: what an earlier run computed is looked up, what this one computes is told.
+// The points of a design as JSON: finds those of an earlier run, and reports those of this one.
 #pragma once
 
 #include <functional>
@@ -28,7 +28,7 @@ class JsonPointRecords : public PointRecords {
     NlpPoint point;
     bool recalled = false;
   };
-  // Points with values alone and those with derivatives are different points.
+  // Points with values alone differ from those with derivatives.
   std::map<std::pair<Key, Wanted>, Known> points_;
   std::map<Key, NlpHessians> hessians_;
   std::size_t points_left_ = 0;

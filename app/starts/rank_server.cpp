@@ -83,7 +83,7 @@ class Server {
     }
   }
 
-  // Drops the starts that wait, and stops those that run.
+  // Drops the waiting starts, and stops the running ones.
   void stop() {
     waiting_.clear();
     if (pool_) pool_->stop();

@@ -6,7 +6,7 @@
 
 namespace mbsopt {
 
-// Until rank 0 dismisses all. terms: those of the program. Returns the exit code.
+// Serves until rank 0 dismisses all. terms are those of the program. Returns the exit code.
 int serve(Ranks& ranks, const NamedTerms& terms = {});
 void dismiss(Ranks& ranks);
 

@@ -1,7 +1,7 @@
-// The processes of a run that spans several, maybe on several machines: rank 0 runs the command, reads and writes all
-// files and prints; the others compute what it tells them (start_workers.hpp).
+// The processes of a run that spans several, perhaps on several machines. Rank 0 runs the command, reads and writes all
+// files and prints. The others compute on its orders (start_workers.hpp).
 //
-// Messages, all of JSON:
+// Messages are JSON:
 //   to a rank   {"work": {...}} {"start": 7} {"stop": true} {"dismissed": true}
 //   to rank 0   {"reply": 7, "ok": true, "text": "..."} {"interrupted": true} {"failed": "why"}
 #pragma once
@@ -11,7 +11,7 @@
 
 namespace mbsopt {
 
-// Between looks at what has come from other ranks. MPI itself would wait at full speed.
+// The interval between checks for messages. MPI itself would wait at full speed.
 inline constexpr int kPollMilliseconds = 5;
 
 struct Ranks {
@@ -23,7 +23,7 @@ struct Ranks {
     int from = 0;
     std::string text;
   };
-  // Long texts to a rank that sends a long one itself would have both wait for ever: only one side may send them.
+  // If both sides sent long texts to each other, both would wait for ever. So only one side may send them.
   virtual void send(int to, const std::string& text) = 0;
   virtual std::optional<Message> receive() = 0;  // does not wait: none where nothing has come
 };

@@ -14,10 +14,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Of residuals and their derivatives: longer records are not kept, since simulating again costs less than a journal of
-// many megabytes.
+// The limit of residuals and their derivatives. Longer records are not kept: a new simulation costs less than a journal
+// of many megabytes.
 constexpr Index kMostNumbers = 50'000;
-constexpr Index kMostColumns = 1'000'000;  // of a damaged line, before memory is asked for
+constexpr Index kMostColumns = 1'000'000;  // of a damaged line, before memory is requested
 
 Experiment::Residuals residuals_of(const Json& json) {
   const auto numbers = [](const Json& text) { return doubles_of(text.get_ref<const std::string&>()); };

@@ -1,5 +1,4 @@
-// The residuals of an identification as JSON: what an earlier run computed is looked up, what this one computes is
-// told.
+// The residuals of an identification as JSON: finds those of an earlier run, and reports those of this one.
 #pragma once
 
 #include <functional>

@@ -16,10 +16,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// mpirun kills a second after it has asked to end: until then what there is must have been written.
+// mpirun kills a second after its request to end. All results must be written before.
 constexpr std::chrono::milliseconds kPatience{300};
 
-// As rank 0 may have chosen it (accuracy_results.hpp).
+// Rank 0 may have chosen the integrator (accuracy_results.hpp).
 Json integrator_of(const Problem& problem) {
   const IntegratorSettings& s = problem.scene.simulation.integrator;
   return {{"type", s.type}, {"rtol", s.rtol}, {"atol", s.atol}};
@@ -39,7 +39,7 @@ Json work_message(const Run& run, const Json& task, int workers) {
             {"task", task}}}};
 }
 
-// Rank 0's view of the others.
+// The other ranks as rank 0 sees them.
 class OtherRanks {
  public:
   OtherRanks(Ranks& ranks, int workers) : ranks_(ranks), workers_(workers), busy_(ranks_size(), 0) {}
@@ -50,7 +50,7 @@ class OtherRanks {
   bool idle() const {
     return std::all_of(busy_.begin(), busy_.end(), [](int jobs) { return jobs == 0; });
   }
-  // The rank with the fewest starts under way, where one has room.
+  // Gives the job to the rank with the fewest running starts, if one has room.
   bool start(int job) {
     const auto least = std::min_element(busy_.begin() + 1, busy_.end());
     if (*least >= workers_) return false;
@@ -106,7 +106,7 @@ void compute_on_ranks(Run& run, Ranks& ranks, int workers, const std::vector<int
   }
 }
 
-// Under mpirun the number of ranks says how many starts are under way.
+// Under mpirun the number of ranks determines how many starts run at a time.
 int workers_of(const Run& run) {
   const int asked = run.context.options.threads;
   if (asked > 0) return asked;

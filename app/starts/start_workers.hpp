@@ -1,9 +1,8 @@
-// Who computes the starts of a multistart: worker processes of this machine (process_pool.hpp); under mpirun also those
-// of the other ranks, which begin a start as soon as they have ended one.
+// The workers of a multistart: worker processes of this machine (process_pool.hpp), and under mpirun also those of the
+// other ranks. These begin a start as soon as they have ended one.
 //
-// A rank is told once what the starts are of, reads the problem itself, and then gets their numbers. What computes a
-// start is the same function everywhere, in a process of its own everywhere: results do not depend on who computed
-// them.
+// A rank gets the task once, reads the problem itself, and then gets the numbers of starts. The same function computes
+// a start everywhere, always in a process of its own. So results do not depend on the worker.
 #pragma once
 
 #include <functional>
@@ -22,8 +21,8 @@ struct StartWork {
   std::function<Json(int start)> record;
 };
 
-// Like run_in_processes(); what replies is the text of the record. waiting: called about every 50 ms, to show progress.
-// Throws std::runtime_error where a rank cannot work.
+// Works like run_in_processes(); the reply is the text of the record. It calls waiting about every 50 ms, to show
+// progress. Throws std::runtime_error if a rank cannot work.
 void compute_starts(Run& run, const std::vector<int>& starts, const StartWork& work,
                     const std::function<void(const JobReply&)>& done, const std::function<void()>& waiting);
 

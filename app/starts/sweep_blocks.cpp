@@ -14,7 +14,7 @@
 namespace mbsopt {
 namespace {
 
-// A block costs a process (1 ms) and a line of the journal. A sweep that is killed loses one block per worker.
+// A block costs a process (1 ms) and a line of the journal. A killed sweep loses one block per worker.
 constexpr std::size_t kMostBlocks = 1000;
 
 std::size_t block_size(std::size_t points) { return (points + kMostBlocks - 1) / kMostBlocks; }
@@ -69,7 +69,7 @@ SweepRow row_of(const Json& json) {
   return row;
 }
 
-// In a worker process. An interrupt ends the block: it is "stopped", with the rows until then.
+// Runs in a worker process. An interrupt ends the block: it is "stopped", with the rows until then.
 Json record_of_block(const Problem& problem, const SweepPoints& points, bool gradients, int block) {
   std::vector<std::string> varied;
   for (const int p : points.parameters) varied.push_back(problem.scene.parameters[static_cast<std::size_t>(p)].name);
@@ -114,7 +114,7 @@ std::vector<SweepRow> swept(Run& run, LongRun& long_run, const SweepPoints& poin
   compute_starts(
       run, jobs, sweep_work(run.problem, task_of(run.context.options.sweep, seed)),
       [&](const JobReply& reply) {
-        if (!reply.ok) {  // of a worker that crashed: it may do better next time
+        if (!reply.ok) {  // a worker crashed; it may succeed next time
           for (std::size_t i = size * static_cast<std::size_t>(reply.job), k = 0;
                !interrupted() && k < size && i + k < rows.size(); ++k)
             rows[i + k].done = true, rows[i + k].message = reply.text;

@@ -1,5 +1,5 @@
-// The points of a sweep, computed block by block: a block is to a sweep what a start is to a multistart. It runs in a
-// worker process or on another rank (start_workers.hpp), and its record is a line of the journal:
+// The points of a sweep, computed block by block. A block corresponds to a start of a multistart. It runs in a worker
+// process or on another rank (start_workers.hpp), and its record is a line of the journal:
 //
 //   {"start": 3, "status": "ok", "rows": [{"psi": [0.2, 1.1], "true": [null, 1.2], "psi_rho": [[...], [...]]},
 //                                         {"failed": "why"}]}
@@ -21,13 +21,13 @@ struct SweepRow {
   std::string message;  // why there are no values
   Eigen::VectorXd psi;
   std::vector<std::optional<double>> true_values;
-  Eigen::MatrixXd psi_rho;  // empty unless gradients are asked for
+  Eigen::MatrixXd psi_rho;  // empty unless gradients are requested
 };
 
-// A row per point, in their order; those of earlier runs from the journal.
+// Returns a row per point, in their order. The journal gives those of earlier runs.
 std::vector<SweepRow> swept(Run& run, LongRun& long_run, const SweepPoints& points, long seed);
 
-// The blocks, from the task that this process or another one has made.
+// The blocks, from the task of this process or another one.
 StartWork sweep_work(const Problem& problem, const Json& task);
 
 }  // namespace mbsopt

@@ -42,7 +42,7 @@ extern "C" void on_signal(int signal) {
 
 extern "C" void on_broken_pipe(int) {
   flag = true;
-  ::signal(SIGPIPE, SIG_IGN);  // what remains to be said meets it again
+  ::signal(SIGPIPE, SIG_IGN);  // later output fails in the same way
 }
 
 void install(int signal, void (*handler)(int), struct sigaction& before) {

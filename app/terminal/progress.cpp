@@ -14,13 +14,13 @@ namespace {
 
 constexpr int kBarWidth = 40;
 constexpr std::string_view kClearLine = "\r\x1b[K";
-// [s] of silence. Whoever waits wonders after some seconds, and wants no log of a thousand lines after a night.
+// [s] of silence. A user wonders after some seconds, and wants no log of a thousand lines after a night.
 constexpr double kAtFirst = 4, kLongest = 64;
 constexpr double kIterationStays = 0.5;  // [s] on a terminal, before a bar takes its place
 
 std::string in_seconds(double seconds) { return fmt::format(", {:.0f} s", seconds); }
 
-// Bytes count as columns, so a line with other than ASCII letters is cut early; never within a letter of UTF-8.
+// Bytes count as columns, so a line with other than ASCII letters is cut early, but never within a letter of UTF-8.
 std::string_view cut(std::string_view line, std::size_t most) {
   if (line.size() <= most) return line;
   while (most > 0 && (static_cast<unsigned char>(line[most]) & 0xC0U) == 0x80U) --most;
@@ -56,7 +56,7 @@ Progress::~Progress() {
   }
 }
 
-// At the speed since the first fraction of the same thing; a hundredth of it tells no speed yet.
+// The time left at the speed since the first fraction of the same task. The first hundredth gives no speed yet.
 std::string Progress::left_of(std::string_view what, double done, double now) {
   constexpr double kTells = 0.01;
   if (what != doing_ || done < done_) doing_ = what, began_ = now, done_ = done;
@@ -100,7 +100,7 @@ void Progress::break_silence(std::string_view words, double now, const std::stri
 }
 
 void Progress::draw(std::string_view line, const std::string& end) {
-  // The last column stays free: a terminal may wrap as soon as it is filled.
+  // The last column stays free, because a terminal may wrap as soon as it is filled.
   const int columns = columns_(), room = columns - 1 - static_cast<int>(end.size());
   err_ << kClearLine << (columns > 0 ? cut(line, static_cast<std::size_t>(std::max(room, 0))) : line) << end
        << std::flush;

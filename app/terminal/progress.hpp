@@ -1,5 +1,5 @@
-// Progress on standard error: a bar on a terminal; otherwise a line per iteration, and one wherever a command has said
-// nothing for a while; nothing when quiet.
+// Progress on standard error: a bar on a terminal. Otherwise it is a line per iteration, and one after a long silence
+// of a command. It is nothing when quiet.
 //
 //   Progress progress(err, terminal, quiet);
 //   progress.fraction("simulating", 0.4);     // a bar; without a terminal "simulating: 40 % after 5 s, 8 s left", now
@@ -7,7 +7,7 @@
 //   progress.iteration("3   psi 0.0123");     // "3   psi 0.0123, 5 s"; on a terminal it replaces the previous one
 //   progress.finish();
 //
-// A line on a terminal is cut to its width: a longer one would wrap, and could not be drawn again in its place.
+// A line on a terminal is cut to its width: a longer one would wrap, and could not be replaced.
 #pragma once
 
 #include <functional>
@@ -19,7 +19,7 @@ namespace mbsopt {
 
 class Progress {
  public:
-  // seconds: since any fixed moment. columns: the width of the terminal, 0 if it is not known.
+  // seconds counts from any fixed moment. columns is the width of the terminal, or 0 if unknown.
   Progress(std::ostream& err, bool terminal, bool quiet, std::function<double()> seconds = steady_seconds,
            std::function<int()> columns = terminal_columns);
   ~Progress();
@@ -49,7 +49,7 @@ class Progress {
   double patience_;      // [s] of silence
   bool line_open_ = false;
   int shown_percent_ = -1;
-  std::string doing_;            // what the last fraction was of
+  std::string doing_;            // the task of the last fraction
   double began_ = 0, done_ = 0;  // when it was first told [s], and how much was done then
 };
 

@@ -2,8 +2,8 @@
 
 namespace mbsopt {
 
-// Opens /dev/null in place of standard streams that are closed. Else the first file that is opened, such as a journal,
-// would be taken for one of them, and messages would be written into it.
+// Opens /dev/null in place of closed standard streams. Otherwise the first opened file, such as a journal, would be
+// taken for one of them and receive messages.
 void open_missing_standard_streams();
 
 }  // namespace mbsopt

@@ -15,7 +15,7 @@ bool looks_like_a_number(const std::string& cell) {
          cell.starts_with("[-");
 }
 
-// Width on a terminal of UTF-8 text: its code points.
+// The width of UTF-8 text on a terminal: its code points.
 std::size_t width(const std::string& cell) {
   return static_cast<std::size_t>(std::count_if(cell.begin(), cell.end(), [](char c) { return (c & 0xC0) != 0x80; }));
 }

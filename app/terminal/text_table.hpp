@@ -1,4 +1,4 @@
-// A table for people: columns as wide as their widest cell, numbers right, words left.
+// A table for people: columns have the width of their widest cell; numbers stand right, words left.
 //
 //   TextTable table({"parameter", "optimum", "unit"});
 //   table.add({"L01", "2.146954", "m"});

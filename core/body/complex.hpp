@@ -1,7 +1,7 @@
-// Complex numbers, the vectors and turns of the plane: x = A s turns and scales s, A = P^2 for P = e0 + i e_n.
+// Complex numbers are the vectors and turns of the plane: x = A s turns and scales s, A = P^2 for P = e0 + i e_n.
 //
-// T is double, or LaneDual: a number with its derivatives in kLanes directions, by which every formula written for T
-// is its own tangent. Products of the two keep to plain numbers where one factor is constant.
+// T is double or LaneDual. A LaneDual is a number with its derivatives in kLanes directions, so every formula written
+// for T is its own tangent. Products with a constant factor keep to plain numbers.
 #pragma once
 
 #include <cmath>

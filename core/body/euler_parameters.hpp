@@ -15,7 +15,7 @@
 
 namespace mbsopt {
 
-// Entry by entry, from numbers in registers: expressions of e would be read back from memory as they are stored.
+// The entries are computed from numbers in registers: expressions of e would be stored and read back from memory.
 inline Matrix3d A(const Vector4d& p) {
   const double e0 = p(0), e1 = p(1), e2 = p(2), e3 = p(3);
   const double d = e0 * e0 - (e1 * e1 + e2 * e2 + e3 * e3);

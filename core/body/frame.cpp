@@ -83,7 +83,7 @@ void FrameTangent::set_zero() {
 
 Vector3d BodyState::omega() const { return omega_B(p, pdot); }
 
-// G(p)' omegadot/2 - (pdot'pdot) p, entry by entry: a product kept in memory would be waited for.
+// G(p)' omegadot/2 - (pdot'pdot) p, entry by entry: the processor would wait for a product that is kept in memory.
 Vector4d BodyState::pddot() const {
   const double x = 0.5 * omegadot(0), y = 0.5 * omegadot(1), z = 0.5 * omegadot(2), s = pdot.squaredNorm();
   const double e0 = p(0), e1 = p(1), e2 = p(2), e3 = p(3);

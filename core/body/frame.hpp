@@ -1,12 +1,14 @@
-// The view of a body for constraints, forces, sensors: its centre of mass r and the matrix A of its axes, with their
-// first and second time derivatives. Every primitive is a polynomial in these, so its derivatives in (q, v) are taken
-// in two steps: to the frame here, from the frame to (r, p) and (rdot, pdot) by the pull-backs below, once per body.
+// A frame is a body as constraints, forces and sensors see it. It has the centre of mass r, the matrix A of the axes,
+// and their first and second time derivatives. Every primitive is a polynomial in these. So its derivatives in (q, v)
+// take two steps. The first leads to the frame. The second leads from the frame to (r, p) and (rdot, pdot) by the
+// pull-backs below, once per body.
 //
 //   A = A(p)     Adot = B(p, pdot)     Addot = B(p, pddot) + 2 A(pdot)
 //   pddot = 1/2 G(p)' omegadot - (pdot'pdot) p       (the unit-norm equation differentiated twice, solved by hand)
 //
-// A virtual displacement (eta_r, eta_theta), eta_theta in body axes, moves a body-fixed vector s by A skew(eta_theta)
-// s and the Euler parameters, which a frame carries along for drives of single coordinates, by 1/2 G(p)' eta_theta.
+// A virtual displacement is (eta_r, eta_theta), eta_theta in body axes. It moves a body-fixed vector s by A
+// skew(eta_theta) s and the Euler parameters by 1/2 G(p)' eta_theta. A frame carries p for drives of single
+// coordinates.
 #pragma once
 
 #include "core/linear/fixed_size.hpp"
@@ -16,7 +18,7 @@ namespace mbsopt {
 struct Frame {
   Vector3d r = Vector3d::Zero(), rdot = Vector3d::Zero(), rddot = Vector3d::Zero();
   Matrix3d A = Matrix3d::Identity(), Adot = Matrix3d::Zero(), Addot = Matrix3d::Zero();
-  // Virtual displacement of the adjoint sweep, as the primitives see it: A skew(eta_theta).
+  // The virtual displacement of the adjoint sweep; A_eta = A skew(eta_theta).
   Vector3d r_eta = Vector3d::Zero(), theta_eta = Vector3d::Zero();
   Matrix3d A_eta = Matrix3d::Zero();
   Vector4d p{1, 0, 0, 0}, pdot = Vector4d::Zero(), pddot = Vector4d::Zero(), p_eta = Vector4d::Zero();
@@ -35,7 +37,7 @@ struct FrameBar {
   void set_zero();
 };
 
-// Tangent of a Frame in kLanes directions: matrices entry by entry (row 3 i + j: entry (i, j)).
+// The tangent of a Frame in kLanes directions. Matrices are stored entry by entry: row 3 i + j holds entry (i, j).
 struct FrameTangent {
   Lanes<3> r, rdot;
   Lanes<9> A, Adot, Addot;
@@ -70,7 +72,7 @@ Vec<7> acceleration(const BodyState& body, const Frame& frame);
 // T(p)' w: a cotangent of (rddot, pddot) seen by z = (rddot, omegadot).
 Vec<6> to_virtual(const BodyState& body, const Vec<7>& w);
 
-// The cotangents of the virtual displacements' images A_eta and p_eta moved to A and p, eta_theta held fixed.
+// Moves the cotangents of A_eta and p_eta, the images of the virtual displacement, to A and p; eta_theta is held fixed.
 void fold_virtual(const Vector3d& eta_theta, FrameBar& bar);
 
 // Pull-back of a gradient in (r, A, p) to q. [7]
@@ -80,8 +82,8 @@ Vec<7> pull_back_position(const BodyState& body, const FrameBar& bar);
 void add_pull_back_velocity(const BodyState& body, const FrameBar& bar, double scale, Eigen::Ref<Vec<7>> q_bar,
                             Eigen::Ref<Vec<7>> v_bar);
 
-// Full pull-back of the adjoint sweep: bar, and w_p, the cotangent of pddot itself; eta_theta: the virtual rotation.
-// z is held fixed: its own cotangent is what the adjoint system solves for.
+// The full pull-back of the adjoint sweep. `w_p` is the cotangent of pddot itself, eta_theta the virtual rotation. The
+// accelerations z are held fixed: the adjoint system solves for its cotangent.
 void add_pull_back(const BodyState& body, FrameBar bar, const Vector4d& w_p, const Vector3d& eta_theta,
                    Eigen::Ref<Vec<7>> q_bar, Eigen::Ref<Vec<7>> v_bar);
 
@@ -89,7 +91,7 @@ void add_pull_back(const BodyState& body, FrameBar bar, const Vector4d& w_p, con
 void set_tangent(const BodyState& body, const Lanes<7>& q_dir, const Lanes<7>& v_dir, FrameTangent& out);
 Lanes<4> pddot_tangent(const BodyState& body, const Lanes<4>& p_dir, const Lanes<4>& pdot_dir);
 
-// Tangents of the frame in each coordinate of r, p, rdot, pdot in turn (three lanes of those of r and rdot).
+// Tangents of the frame in each coordinate of r, p, rdot, pdot in turn; r and rdot use three lanes.
 struct UnitTangents {
   FrameTangent r, p, rdot, pdot;
 };

@@ -1,5 +1,5 @@
-// Vector algebra of tangent directions, kLanes at a time. For the files that evaluate tangents: inline, so kept out of
-// the headers that declare them.
+// Vector algebra of tangent directions, kLanes at a time. Only the files that evaluate tangents include this header,
+// because its functions are inline.
 #pragma once
 
 #include "core/linear/fixed_size.hpp"

@@ -1,5 +1,5 @@
-// The view that constraints and forces have of a body that moves in a plane, with tangents and cotangents: the planar
-// counterpart of frame.hpp. A = P^2 is a rotation times |P|^2, as A(p) is in space: both models compute the same
+// A planar frame is a body as constraints and forces of the plane see it, with tangents and cotangents: the planar
+// counterpart of frame.hpp. A = P^2 is a rotation times |P|^2, as A(p) is in space. So both models compute the same
 // numbers.
 #pragma once
 

@@ -47,7 +47,7 @@ void Angle::pull_back(const Frame& f1, const Frame& f2, const Multipliers<1>& z,
   C.mu2(0) = -mu2 * j.S / D, S.mu2(0) = mu2 * j.C / D;
   C.mu1(0) = -mu1 * j.S / D - 2 * mu2 * (j.C * j.N - j.S * j.E) / D2;
   S.mu1(0) = mu1 * j.C / D - 2 * mu2 * (j.S * j.N + j.C * j.E) / D2;
-  // Through C and S of (C S_x - S C_x)/D for x = eta, dot, ddot, of atan2, and of the last term of Phiddot.
+  // Derivatives of (C S_x - S C_x)/D for x = eta, dot, ddot, of atan2, and of the last term of Phiddot, in C and in S.
   auto by_C = [&](double C_x, double S_x) { return S_x / D - 2 * j.C * (j.C * S_x - j.S * C_x) / D2; };
   auto by_S = [&](double C_x, double S_x) { return -C_x / D - 2 * j.S * (j.C * S_x - j.S * C_x) / D2; };
   const double EN = 8 * j.E * j.N / (D2 * D);

@@ -1,5 +1,5 @@
-// Body-fixed vectors and the separation of two body points along the motion: what the primitives are written in. For
-// the primitives' own .cpp files: inline, so kept out of the headers that declare them.
+// Primitives are written in body-fixed vectors and in the separation of two body points, along the motion. Only the
+// primitives' own .cpp files include this header, because its functions are inline.
 #pragma once
 
 #include <utility>
@@ -40,7 +40,7 @@ struct VectorBlocks {
         xdd_pdot(2 * xd_p - 4 * (f.A * s) * b.pdot.transpose()) {}
 };
 
-// d = P2 - P1 of two body points; its second derivative without the part of rddot', which tangents hold fixed.
+// d = P2 - P1 of two body points. Its second derivative lacks the part of rddot', which tangents hold fixed.
 inline VectorJet separation(const Frame& f1, const Frame& f2, const Vector3d& s1, const Vector3d& s2) {
   return {f2.point(s2) - f1.point(s1), f2.point_dot(s2) - f1.point_dot(s1), f2.point_ddot(s2) - f1.point_ddot(s1),
           f2.point_eta(s2) - f1.point_eta(s1)};
@@ -56,7 +56,8 @@ inline VectorTangent separation_tangent(const Frame& f1, const Frame& f2, const 
   return d;
 }
 
-// Cotangents of x, xd, xdd, x_eta of a body-fixed vector, or times sign those of a body point, to its frame and to s.
+// Adds the cotangents of x, xd, xdd, x_eta of a body-fixed vector to its frame and to s. With sign they are those of a
+// body point.
 inline void add_vector_bar(const Frame& f, const Vector3d& s, const VectorJet& bar, double sign, FrameBar& frame_bar,
                            Vector3d& s_bar) {
   const Vector3d st = sign * s;

@@ -1,5 +1,5 @@
-// A primitive placed in a mechanism: which bodies it ties, to which rows of Phi it contributes, where its geometry's
-// derivatives are.
+// A constraint is a primitive in a mechanism: it names the bodies, the rows of Phi, and the derivatives of its
+// geometry.
 //
 //   Phi(row) = sum of factor * primitive over the constraints of that row  -  the row's law f(t)     (time_law.hpp)
 //
@@ -28,7 +28,7 @@ struct Constraint {
   int slot1 = -1, slot2 = -1, slot3 = -1;  // first row of s1, s2, s3 among the differentiated fields; -1: constant
   double factor = 1;
   int slot_factor = -1;
-  // Of an Angle: the followed joint angle whose branch it takes, or kNearestLaw.
+  // The followed joint angle whose branch an Angle takes, or kNearestLaw.
   static constexpr int kNearestLaw = -1;
   int angle = kNearestLaw;
 

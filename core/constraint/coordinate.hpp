@@ -1,6 +1,6 @@
 // One of the seven coordinates of body 2: x, y, z of the centre of mass [m] or an Euler parameter e0..e3 [-].
 //   Phi = r_k  or  p_k        Phi_eta = [ e_k'  0 ]  or  [ 0  (1/2 G(p)' )_k ]
-// Its time derivatives are those of the frame, pddot with the unit-norm equation's own part (frame.hpp).
+// Its time derivatives are those of the frame. pddot includes the part of the unit-norm equation (frame.hpp).
 #pragma once
 
 #include "core/constraint/primitive.hpp"

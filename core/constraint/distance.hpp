@@ -2,8 +2,8 @@
 //   Phi      = l = |d|,   d = P2 - P1,  u = d/l
 //   Phidot   = u'ddot,    Phiddot = u'dddot + (|ddot|^2 - ldot^2)/l
 //   Phi_eta  = [ -u'  -(s1 x A1'u)'    u'  (s2 x A2'u)' ]
-// l itself and not d'd, so that its multiplier is the force in the rod [N] and a violation is a length. It has no
-// direction at l = 0: there u = 0.
+// Phi is l and not d'd, so its multiplier is the force in the rod [N] and a violation is a length. At l = 0 there is no
+// direction, and u = 0.
 #pragma once
 
 #include "core/constraint/primitive.hpp"

@@ -1,6 +1,6 @@
 // The table of joints: each is a list of primitives between vectors that its fields give. A new joint is a new row.
-// A tie of angles or displacements of joints to each other (gear, rack_pinion, the thread of a screw) or to a law
-// (drives) adds primitives to one row and is put together where scenes are compiled.
+// Gears, racks, screws and drives tie angles or displacements of joints to each other or to a law. They add primitives
+// to one row; the compiler of scenes (compile_joints.cpp, compile_drives.cpp) builds them.
 #pragma once
 
 #include <span>
@@ -10,9 +10,9 @@
 
 namespace mbsopt {
 
-// across1, binormal1: unit vectors of body 1 that complete axis1 to a right-handed triad (axis1, across1, binormal1).
-// keep1, keep2: normal1, and axis2 x normal2: at right angles while the normals are parallel.
-// x1 y1 y2 z2: the global axes as the bodies see them at the orientations in the file.
+// across1 and binormal1 are unit vectors of body 1 that complete axis1 to a right-handed triad (axis1, across1,
+// binormal1). The vector keep1 is normal1, keep2 is axis2 x normal2: they are at right angles while the normals are
+// parallel. Vectors x1 y1 y2 z2 are the global axes as the bodies see them at the orientations in the file.
 enum class JointVector {
   none,
   point1,

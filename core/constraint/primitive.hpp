@@ -1,7 +1,7 @@
-// The concept of a constraint primitive. A primitive is a few scalar functions of two bodies' frames and of up to
-// three body-fixed vectors s1, s2, s3 of its own; the ground is a frame that never moves. Set to zero, or to a law of
-// time, it is a constraint; a single one is also what sensors and forces measure. Bodies move by virtual displacements
-// (eta_r, eta_theta in body axes), so the unit-norm equations never appear here.
+// The concept of a constraint primitive. A primitive is a few scalar functions of two bodies' frames and of up to three
+// body-fixed vectors s1, s2, s3. The ground is a frame that never moves. A primitive that is set to zero, or to a law
+// of time, is a constraint. Sensors and forces measure single primitives. Bodies move by virtual displacements (eta_r,
+// eta_theta in body axes), so the unit-norm equations never appear here.
 //
 //   phi, phi_dot, phi_ddot   Phi and its total time derivatives, for the frames' velocities and accelerations
 //   jacobian                 J1, J2 (rows x 6): Phi_eta of each body
@@ -9,8 +9,8 @@
 //                            in the frames (eta held fixed) and in s1, s2, s3: all that the adjoint sweep needs
 //   tangent                  the same information forward: Phi', Phidot', Phiddot' and (J' lambda)' in kLanes
 //                            directions
-// A mechanism that moves in a plane takes core/dynamics/planar_constraints.hpp instead: the same equations in complex
-// numbers.
+//
+// A mechanism in a plane uses core/dynamics/planar_constraints.hpp instead: the same equations in complex numbers.
 #pragma once
 
 #include <concepts>
@@ -19,7 +19,7 @@
 
 namespace mbsopt {
 
-// How the rows of J1 and J2 see displacements of their bodies: not at all, row r only along axis r, or anyhow.
+// The displacements of a body that the rows of J1 or J2 depend on: none, row r on axis r only, or any.
 enum class Displacements { none, own_axis, any };
 
 // The quantity that a row measures: [m], the product of two directions [-], [rad], [-].
@@ -43,8 +43,8 @@ struct GeometryTangent {
   const Lanes<3>* s3 = nullptr;
 };
 
-// Derivatives of Phiddot and J'lambda in each body's p and pdot (4 columns), omegadot held fixed, of a primitive that
-// does not depend on r and rdot. Its forces J'lambda are constant; moments are in body axes.
+// Derivatives of Phiddot and J'lambda in each body's p and pdot (4 columns), omegadot held fixed. The primitive must
+// not depend on r and rdot. Its forces J'lambda are constant; moments are in body axes.
 template <int Rows>
 struct TurningBlocks {
   Mat<Rows, 4> p1, pdot1, p2, pdot2;                         // of Phiddot
@@ -82,7 +82,7 @@ Vec<P::kRows> virtual_change(const P& p, const Frame& f1, const Frame& f2) {
   return J1 * eta1 + J2 * eta2;
 }
 
-// Has turning_blocks(): a short cut to what its tangents in all directions say.
+// A primitive with turning_blocks(), a short cut to its tangents in all directions.
 template <class P>
 concept HasTurningBlocks = requires(const P p, const Frame f, const BodyState b, const Vec<P::kRows> lambda,
                                     TurningBlocks<P::kRows> out) {

@@ -1,5 +1,5 @@
-// The value of a row's sum of primitives over time: f(t, rho), with f_t and f_tt and the derivatives of all
-// three in the parameters. A constant (the length of a rod), or an expression in t and parameters.
+// The law f(t, rho) of a row's sum of primitives, with f_t and f_tt and the derivatives of all three in the parameters.
+// It is a constant (the length of a rod) or an expression in t and parameters.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,6 +1,6 @@
 // Unit norm of a body's Euler parameters, one equation per body.   [-]
 //   Phi = p'p - 1      Phi_p = 2 p'      Phidot = 2 p'pdot      Phiddot = 2 p'pddot + 2 pdot'pdot
-// The dynamics solves it by hand (frame.hpp: pddot has the component -(pdot'pdot) p along p); assembly and projection
+// The dynamics solves it by hand: pddot has the component -(pdot'pdot) p along p (frame.hpp). Assembly and projection
 // impose it on positions and velocities.
 #pragma once
 

@@ -1,11 +1,11 @@
-// Integration by CVODES (SUNDIALS): multistep methods of variable order and step, `cvodes_adams` (orders 1 to 12,
-// fixed-point iteration) and `cvodes_bdf` (orders 1 to 5, Newton's method, for stiff scenes). Its derivatives are those
-// of the solution of the differential equation, found by integrating further differential equations (the
-// sensitivities forward, the adjoint backward), each to its own error: a second opinion that shares neither steps nor
-// projection with the discrete derivatives of simulation.hpp.
+// Integration by CVODES (SUNDIALS): multistep methods of variable order and step. `cvodes_adams` has orders 1 to 12 and
+// fixed-point iteration. `cvodes_bdf` has orders 1 to 5 and Newton's method, for stiff scenes. CVODES integrates
+// further differential equations for the derivatives of the solution, each to its own error: forward sensitivities, or
+// the adjoint backward. They share neither steps nor projection with the discrete derivatives of simulation.hpp: a
+// second opinion.
 //
-//   simulate(mechanism, settings, costs)       takes these where settings.integrator.type is cvodes_*
-//   cvodes_forward(mechanism, with_cvodes(settings), costs)       asks for them whatever the type
+//   simulate(mechanism, settings, costs)       uses CVODES where settings.integrator.type is cvodes_*
+//   cvodes_forward(mechanism, with_cvodes(settings), costs)       uses CVODES for every type
 //
 // CVODES does not project: constraints drift by the tolerance. docs/cvodes.md.
 //   Hindmarsh et al., "SUNDIALS: suite of nonlinear and differential/algebraic equation solvers", ACM TOMS 31 (2005);
@@ -24,8 +24,8 @@ class Mechanism;
 
 bool is_cvodes(std::string_view integrator);
 
-// Returns settings with the same span and tolerances, without a fixed step. The method becomes cvodes_adams if it is
-// none of CVODES.
+// Returns settings with the same span and tolerances, without a fixed step. A method that CVODES does not have becomes
+// cvodes_adams.
 SimulationSettings with_cvodes(SimulationSettings settings);
 
 // Each throws std::invalid_argument for frozen steps, which a multistep method cannot take, and for a fixed step.

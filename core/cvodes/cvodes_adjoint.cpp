@@ -11,7 +11,7 @@
 namespace mbsopt::cvodes {
 namespace {
 
-// Of steps between two checkpoints: all of them in memory at once, once forward and once more on the way back.
+// Memory for the steps between two checkpoints. CVODES holds all of them at once: forward, and again on the way back.
 constexpr std::size_t kBytesOfSteps = std::size_t{32} << 20;
 constexpr std::size_t kBytesOfVector = 1024;  // beside its numbers: SUNDIALS' table of operations is 0.6 KB
 constexpr long kFewestSteps = 100, kMostSteps = 20'000;
@@ -72,8 +72,8 @@ void Adjoint::take_sample(const SampleEvent& event, const StatePoint& at) {
   jumps_.push_back(std::move(jump));
 }
 
-// The integral of a running cost's gradient is what lambda might become. Not its largest value times the span: that
-// may be the first steps' of a motion that dies out at once.
+// lambda can become as large as the integral of a running cost's gradient. The largest value times the span would be
+// too much: it may belong to the first steps of a motion that dies out at once.
 void Adjoint::take_step(const StatePoint& at) {
   for (const Eigen::Index o : run_.running()) {
     y_bar_.setZero(), rho_bar_.setZero();
@@ -158,7 +158,7 @@ void Adjoint::create_backward() {
   run_.require(CVodeCreateB(memory, stiff ? CV_BDF : CV_ADAMS, &which_));
   run_.require(CVodeInitB(memory, which_, lambda_rate, settings_.end_time, lambda_vector_));
   run_.require(CVodeSetUserDataB(memory, which_, this));
-  // atol is meant for a state of size one; lambda is psi's size over the state's.
+  // atol is meant for a state of size one. lambda has the size of psi divided by that of the state.
   Vector atol(states_ * objectives_, run_.context()), atol_mu(active_ * objectives_, run_.context());
   const MechanismData& d = run_.flow().data();
   for (Eigen::Index o = 0; o < objectives_; ++o) {
@@ -192,7 +192,7 @@ void Adjoint::failed(int flag) {
 }
 
 bool Adjoint::go_back_to(double t, double from, const RunOptions& options) {
-  // Stops on the way only to ask whether to go on; they are interpolated and cost nothing.
+  // The sweep stops at these times only to ask whether to continue. They are interpolated and cost nothing.
   constexpr int kPauses = 50;
   const double pause = (settings_.end_time - settings_.start_time) / kPauses;
   for (double next = from; next > t;) {

@@ -1,10 +1,10 @@
-// Adjoint sensitivities by CVODES. lambda (one column per objective, all in one backward problem, which share each
-// solution of the equations of motion) and mu solve
+// Adjoint sensitivities by CVODES. lambda has one column per objective. One backward problem holds all columns, which
+// share each solution of the equations of motion. lambda and mu solve
 //   lambda' = -f_y'lambda - g_y,      mu' = -(f_rho'lambda + g_rho),
-// backward from lambda(T) = d terminal/dy, mu(T) = d terminal/drho; at the time of a sampled cost lambda jumps by its
-// gradient. A multistep method cannot step over a jump: it starts again there, at order one. mu is a quadrature with
-// an error control of its own. The forward solution comes from the method's polynomial between stored steps, and
-// from checkpoints where these are too many to keep.
+// backward from lambda(T) = d terminal/dy, mu(T) = d terminal/drho. At the time of a sampled cost lambda jumps by its
+// gradient. A multistep method cannot step over a jump: it starts again there, at order one. mu is a quadrature with an
+// error control of its own. The forward solution is the method's polynomial between stored steps. CVODES uses
+// checkpoints if there are too many steps to store.
 #pragma once
 
 #include <cstddef>
@@ -52,17 +52,17 @@ class Adjoint {
   std::span<const Cost> costs_;
   Eigen::Index states_, objectives_, active_;
   long kept_steps_;
-  // For the steps that the first CVodeF allocates: SUNDIALS 6.4.1 crashes where there is none, std::bad_alloc does not.
+  // Room for the steps that the first CVodeF allocates. SUNDIALS 6.4.1 crashes without memory; std::bad_alloc does not.
   std::unique_ptr<std::byte[]> room_;
   int checkpoints_ = 0, which_ = -1;
   double tie_;  // times closer than this are one
   std::vector<Jump> jumps_;
-  // Per objective: largest entry of any gradient in y that enters; the integral over the steps so far of that of the
-  // running cost, and its entry at the last one.
+  // Per objective: source_ is the largest entry of any gradient in y that enters. `running_source_` is the integral
+  // over the steps so far of that of the running cost, and last_size_ its entry at the last step.
   Eigen::VectorXd source_, running_source_, last_size_;
   double last_time_;
   Eigen::MatrixXd lambda_, mu_;
-  // The last evaluation.
+  // The time and the results of the last evaluation.
   double t_;
   Eigen::VectorXd lambda_at_, lambda_rate_, mu_rate_;
   Eigen::VectorXd w_, y_bar_, theta_bar_, rho_bar_;

@@ -1,6 +1,6 @@
-// The equations of motion as a multistep method sees them: ydot = f(t, y), and nothing that hangs on steps. The branch
-// of each followed joint angle is a function of time: that of the last accepted step before it. So the same (t, y)
-// gives the same f when a backward integration comes by again.
+// The equations of motion for a multistep method: ydot = f(t, y), independent of steps. The branch of each followed
+// joint angle is a function of time: that of the last accepted step before it. So a backward integration finds the same
+// f at the same (t, y).
 #pragma once
 
 #include <optional>
@@ -23,7 +23,7 @@ class Flow {
   const Eigen::VectorXd& angles_at(double t) const;
   std::size_t history_bytes() const;
 
-  // Solves the equations of motion at (t, y), unless that is where they were solved last. False where that failed.
+  // Solves the equations of motion at (t, y), unless it solved them there last. Returns false if that failed.
   bool evaluate(double t, const Numbers& y);
   const Eigen::VectorXd& ydot() const { return ydot_; }
   // Also prepares dynamics().acceleration_tangent() and add_adjoint() there.
@@ -43,8 +43,8 @@ class Flow {
  private:
   const Mechanism mechanism_;
   Dynamics dynamics_;
-  std::optional<MotionSolver> motion_;  // where some sensor needs it
-  std::vector<double> times_;           // of accepted steps, where angles are followed
+  std::optional<MotionSolver> motion_;  // set if a sensor needs it
+  std::vector<double> times_;           // of accepted steps, if angles are followed
   std::vector<Eigen::VectorXd> angles_;
   double t_;
   Eigen::VectorXd y_, ydot_, y_point_;

@@ -93,7 +93,7 @@ void Sensitivities::add_cost(const PointCost& cost, const StatePoint& at, Eigen:
   psi_rho_.row(objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
 }
 
-// The state and its rate, which delays of measurements need.
+// Passes the state and its rate, which delays of measurements need.
 void observe(ForwardRun& run, const TangentSampling& sampling, const SampleEvent& event, StatePoint at, Vector& rate,
              const Eigen::MatrixXd& y_rho) {
   run.require(CVodeGetDky(run.memory(), event.time, 1, rate));

@@ -1,7 +1,7 @@
 // Forward sensitivities by CVODES: s_k = dy/drho_k solves
 //   s_k' = f_y s_k + f_rho_k,     s_k(t0) = dy0/drho_k, through the assembly
-// beside the state (staggered corrector), all parameters at once, with an error control of their own: rtol, and atol
-// over the parameter's size. Running costs integrate g_y s_k + g_rho_k, their error controlled likewise.
+// beside the state (staggered corrector), for all parameters at once. The sensitivities have an error control of their
+// own: rtol, and atol over the parameter's size. Running costs integrate g_y s_k + g_rho_k under the same control.
 #pragma once
 
 #include <vector>

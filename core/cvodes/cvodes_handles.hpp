@@ -1,4 +1,4 @@
-// Owners of SUNDIALS' objects. For the cvodes_*.cpp files only: no header that others include includes this one.
+// Owners of SUNDIALS' objects. Only the cvodes_*.cpp files include this header, directly or through their own headers.
 // Every object belongs to a context, which must outlive it.
 #pragma once
 
@@ -28,11 +28,11 @@ class Context {
   SUNContext context_ = nullptr;
 };
 
-// The numbers of a vector of SUNDIALS.
+// The numbers of a SUNDIALS vector.
 inline Eigen::Map<Eigen::VectorXd> values(N_Vector v) { return {N_VGetArrayPointer(v), N_VGetLength(v)}; }
 
-// CVODES 6.4.1 reads numbers of its copies before it has set them: those of quadratures of sensitivities, when it
-// considers a higher order.
+// CVODES 6.4.1 reads numbers of its copies before it has set them. It reads those of quadratures of sensitivities when
+// it considers a higher order.
 inline N_Vector clone_of_zeros(N_Vector v) {
   const N_Vector clone = N_VClone_Serial(v);
   if (clone) values(clone).setZero();
@@ -56,7 +56,7 @@ class Vector {
   N_Vector vector_;
 };
 
-// count vectors of the same size, as functions of sensitivities want them.
+// An array of vectors of the same size, as SUNDIALS' functions of sensitivities require.
 class VectorArray {
  public:
   VectorArray(int count, Eigen::Index size, const Context& context)

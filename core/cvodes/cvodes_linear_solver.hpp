@@ -1,6 +1,6 @@
-// NewtonMatrix as SUNDIALS wants a direct linear solver: CVODES decides when f_y is evaluated anew and when its factor
-// may be kept. Forward it solves (I - gamma f_y) x = b; for the adjoint, whose right-hand side is -f_y'lambda per
-// objective, (I + gamma f_y')x = b for each objective's part of the vector.
+// NewtonMatrix as a direct linear solver of SUNDIALS: CVODES decides when f_y is evaluated anew and when its factor is
+// kept. The forward run solves (I - gamma f_y) x = b. The right-hand side of the adjoint is -f_y'lambda per objective,
+// so it solves (I + gamma f_y')x = b for each objective's part of the vector.
 #pragma once
 
 #include <sundials/sundials_linearsolver.h>

@@ -15,7 +15,7 @@ class NewtonMatrix {
 
   bool linearise(double t, const Flow::Numbers& y);  // f_y at this state
   bool factor(double gamma);                         // false where it is not finite or singular
-  // x: right-hand side in, solution out; once refined: CVODES takes the solution for that of the equation.
+  // x is the right-hand side on entry and the solution on return. It is refined once, because CVODES takes it as exact.
   void solve(Eigen::Ref<Eigen::VectorXd> x) { system_.solve(x, 1); }
   void solve_transposed(Eigen::Ref<Eigen::VectorXd> x) { system_.solve_transposed(x, 1); }
   long factorisations() const { return system_.factorisations(); }

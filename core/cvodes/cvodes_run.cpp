@@ -21,7 +21,7 @@
 namespace mbsopt::cvodes {
 namespace {
 
-// Squares of numbers up to here, divided by tolerances, are still numbers.
+// Numbers up to this one have a finite square, also after division by tolerances.
 constexpr double kLargestRate = 1e120;
 constexpr long kMostIterations = std::numeric_limits<int>::max();
 
@@ -110,8 +110,8 @@ void ForwardRun::set_up() {
   require(CVodeSetQuadErrCon(memory(), SUNTRUE));
 }
 
-// An integral's absolute tolerance is atol, or rtol of what its rate at the start would make of the whole span: an
-// exponential of a smooth maximum may be of any size.
+// An integral's absolute tolerance is the larger of atol and rtol times its rate at the start times the whole span. The
+// exponential of a smooth maximum may have any size.
 Eigen::VectorXd ForwardRun::quadrature_atol() const {
   Eigen::VectorXd atol(static_cast<Eigen::Index>(running_.size()));
   const Eigen::VectorXd& y = assembly_.result().y;
@@ -161,7 +161,8 @@ int ForwardRun::g(realtype t, N_Vector y, N_Vector gdot, void* self) {
 }
 
 void ForwardRun::stop_for(int flag, double t, const char* of_what) {
-  // What was tried last; CVODES itself tells only what it proposed before its own reductions.
+  // h is the step that CVODES tried last. CVODES itself reports only the step that it proposed before its own
+  // reductions.
   const double h = std::abs(flow_.last_time() - t);
   switch (flag) {
     case CV_RHSFUNC_FAIL:
@@ -194,7 +195,7 @@ void ForwardRun::stop_for(int flag, double t, const char* of_what) {
     case CV_CONV_FAILURE:
     case CV_TOO_CLOSE:
     case CV_LSETUP_FAIL:
-      // CVODES gives up where h is the least step but for rounding, by its own measure of 1e-6.
+      // CVODES gives up if h is the smallest step, within its own tolerance of 1e-6.
       if (const auto min_step = settings_.integrator.options.min_step; min_step && h <= *min_step * (1 + 1e-6)) {
         stop(SimulationStatus::step_too_small,
              below_min_step(flag == CV_ERR_FAILURE ? StepOutcome::rejected : StepOutcome::unsolved, t, *min_step));
@@ -211,7 +212,7 @@ void ForwardRun::stop_for(int flag, double t, const char* of_what) {
   }
 }
 
-// Where it was the integrals that asked for smaller steps: which running costs there are.
+// Names the running costs if their integrals demanded smaller steps.
 std::string ForwardRun::about_quadratures() const {
   long fails = 0;
   if (!running_.empty()) CVodeGetQuadNumErrTestFails(memory(), &fails);
@@ -224,7 +225,7 @@ std::string ForwardRun::about_quadratures() const {
   return "a pole or jump of the running cost" + names + ", ";
 }
 
-// A branch is chosen by nearness: a joint that turns by half a turn in one step is lost.
+// The branch is the nearest one, so a joint must not turn by half a turn in one step.
 bool ForwardRun::step_is_followed(double h, const Eigen::VectorXd& y) {
   for (const JointAngle& a : mechanism_.data().angles) {
     const double rate = std::abs(a.rate(body_at(y, a.body1).frame, body_at(y, a.body2).frame));
@@ -258,7 +259,7 @@ void ForwardRun::take_samples(SampleSchedule& schedule, double t, const Hooks& h
   }
 }
 
-// Those of the state and of its derivatives.
+// Counts the steps of the state and those of its derivatives.
 void ForwardRun::count_steps() {
   long state = 0, derivatives = 0, not_converged = 0, iterations = 0, their_iterations = 0;
   CVodeGetNumErrTestFails(memory(), &state);

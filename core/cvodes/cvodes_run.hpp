@@ -1,6 +1,6 @@
-// Forward integration by CVODES, one internal step at a time, with the running costs as quadratures whose error is
-// controlled. Samples are read off the method's own interpolating polynomial and never force a step; the end time
-// does. What derivatives need hangs in through Hooks.
+// Forward integration by CVODES, one internal step at a time. The running costs are quadratures with error control.
+// Samples come from the method's own interpolating polynomial and never force a step; the end time does. Derivatives
+// attach to the run through Hooks.
 #pragma once
 
 #include <chrono>
@@ -23,7 +23,7 @@
 namespace mbsopt::cvodes {
 
 bool is_stiff_method(const SimulationSettings& settings);  // cvodes_bdf
-// Throws std::invalid_argument: a type that is not CVODES', a fixed step, frozen steps.
+// Throws std::invalid_argument for a type that CVODES does not have, a fixed step, or frozen steps.
 void refuse_what_cannot_be(const SimulationSettings& settings, const RunOptions& options);
 // The return values of right-hand sides that CVODES calls.
 inline constexpr int kOk = 0, kTryASmallerStep = 1;
@@ -58,8 +58,8 @@ class ForwardRun {
   void go(std::span<const double> observed, const RunOptions& options, const Hooks& hooks);
   void set_sensitivities(Sensitivities* sensitivities) { sensitivities_ = sensitivities; }
   Sensitivities* sensitivities() const { return sensitivities_; }
-  // The value of a running cost within the range that a quadrature can carry; a cost that leaves it makes psi not
-  // finite, as an infinite sum would.
+  // Limits the value of a running cost to the range of a quadrature. A cost outside this range makes psi not finite, as
+  // an infinite sum would.
   double bounded(double g, std::size_t quadrature);
 
   void require(int flag) const;  // throws std::runtime_error where CVODES refused what is always right

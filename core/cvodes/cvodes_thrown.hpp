@@ -1,5 +1,5 @@
-// An exception of a user's cost or force must not unwind through CVODES, which is C: a callback keeps it and fails for
-// good, and whoever called CVODES throws it on.
+// An exception of a user's cost or force must not unwind through CVODES, which is C. A callback keeps the exception and
+// reports a failure; the caller of CVODES then throws it.
 #pragma once
 
 #include <exception>

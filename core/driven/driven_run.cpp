@@ -15,16 +15,16 @@
 namespace mbsopt {
 namespace {
 
-// A run has at least so many panels: a peak of a sixtieth of the run meets a node, and is resolved from there on.
+// The least number of panels of a run. A peak of a sixtieth of the run then meets a node, and the panels resolve it.
 constexpr double kFewestPanels = 4;
-// A panel turns bodies by at most so many steps of the path: its 15 nodes then need no steps between them.
+// A panel turns bodies by at most so many steps of the path. Its 15 nodes then need no steps between them.
 constexpr double kStepsPerPanel = 8;
-// A stretch of a panel that takes so many steps of the path is too long: the motion becomes faster in it without end.
+// A stretch of a panel that takes so many steps of the path is too long: the speed in it grows without bound.
 constexpr long kMostStepsOfStretch = 32 * static_cast<long>(kStepsPerPanel);
-// Two ends of a path are the same if less than this part of the rest of the run lies between them; `shortest_` leaves
-// far less.
+// Two ends of a path are the same if they differ by less than this part of the rest of the run. `shortest_` is far
+// less.
 constexpr double kSameEnd = 1e-6;
-// Part of rtol times the integral so far that one panel may be off by, however short: a kink or a jump.
+// A panel of any length may be off by this part of rtol times the integral so far: it may hold a kink or a jump.
 constexpr double kPartOfRun = 0.1;
 
 }  // namespace
@@ -65,7 +65,7 @@ bool DrivenRun::go_to(double t) { return path_.go_to(t, shortest_, kMostStepsOfS
 
 std::string DrivenRun::why_it_ends() {
   const DrivenState& s = path_.state();
-  // A jump is seen over an interval that is long against the rounding of times.
+  // The interval over which a jump is measured; it is long against the rounding of times.
   const double beside = 1e-3 * (settings_.end_time - settings_.start_time);
   const std::string jump =
       law_jumps_.between(std::max(s.t - beside, settings_.start_time), std::min(s.t + beside, settings_.end_time));
@@ -166,7 +166,7 @@ void DrivenRun::go_through_panels(const Take& take) {
   add_quadrature_errors();
 }
 
-// The shortest panels were accepted as they are: an integrable singularity, perhaps.
+// The shortest panels were accepted without a test: they may hold an integrable singularity.
 void DrivenRun::add_quadrature_errors() {
   for (std::size_t r = 0; r < running_.size(); ++r) {
     const Cost& cost = costs_[static_cast<std::size_t>(running_[r].objective)];
@@ -181,7 +181,7 @@ double DrivenRun::largest_panel() const {
                   (running_.empty() ? 1 : kStepsPerPanel) * path_.step_limit());
 }
 
-// The states and running costs at the nodes, and whether the integrals are exact enough.
+// Computes the states and running costs at the nodes, and decides whether the integrals are exact enough.
 DrivenRun::Panel DrivenRun::try_panel(double t1) {
   const double t = from_.t, h = t1 - t;
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
@@ -194,11 +194,11 @@ DrivenRun::Panel DrivenRun::try_panel(double t1) {
   for (std::size_t r = 0; r < running_.size(); ++r) {
     const PanelIntegral I = integrals_[r] = integrate_panel(std::span(g_).subspan(r * kNodes, kNodes), h);
     if (options_.frozen || h <= shortest_) continue;
-    // Exponentials of smooth extremes are of any size: atol says nothing of them.
+    // Exponentials of smooth extremes have any size, so atol does not apply to them.
     const bool is_extreme = costs_[static_cast<std::size_t>(running_[r].objective)].is_extreme;
     const double of_panel = s.rtol * I.absolute + (is_extreme ? 0 : s.atol * h);
     const double of_run = kPartOfRun * s.rtol * (absolute_(running_[r].objective) + I.absolute);
-    if (I.error > std::max(of_panel, of_run)) return Panel::refused;  // what is no number is found at the end
+    if (I.error > std::max(of_panel, of_run)) return Panel::refused;  // the end of the run reports NaN
   }
   return Panel::accepted;
 }

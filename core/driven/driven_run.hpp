@@ -1,5 +1,5 @@
-// A run of a mechanism whose drives leave nothing free. Its positions and velocities are solved at the instants that
-// costs and observers ask for (core/start/driven_path.hpp); nothing is integrated but the running costs.
+// A run of a mechanism whose drives leave no freedom. It solves positions and velocities at the instants that costs and
+// observers request (core/start/driven_path.hpp). It integrates only the running costs.
 //
 //   integral of g dt    sum over panels of Gauss-Kronrod's 15 nodes (kronrod.hpp), panels halved until
 //                       error <= rtol integral of |g| + atol h       over the panel, or a part of it over the run
@@ -25,7 +25,7 @@
 
 namespace mbsopt {
 
-// A run takes this at one instant: a cost times its weight, or an observation, whose cost is null.
+// A term of a run at one instant: a cost times its weight, or an observation, whose cost is null.
 struct DrivenTerm {
   const PointCost* cost = nullptr;
   Eigen::Index objective = 0;
@@ -35,13 +35,13 @@ struct DrivenTerm {
 
 class DrivenRun {
  public:
-  // At the instants in ascending order; false: the derivatives failed there.
+  // The run calls this at the instants in ascending order. It returns false if the derivatives failed there.
   using Take = std::function<bool(const StatePoint&, std::span<const DrivenTerm>)>;
 
   DrivenRun(const Mechanism& mechanism, const SimulationSettings& settings, std::span<const Cost> costs,
             std::span<const double> observed, const RunOptions& options, const Assembly& start, bool differentiated);
 
-  // psi into the result. take: besides.
+  // Computes psi of the result, and calls take at every instant.
   void go(const Take& take);
   SimulationResult& result() { return result_; }
   SimulationResult finish();
@@ -63,7 +63,7 @@ class DrivenRun {
   void end_panel(double t0, double t1);
   void stop(SimulationStatus status, const std::string& message);
   bool go_to(double t);
-  std::string why_it_ends();  // where the path cannot go on
+  std::string why_it_ends();  // the reason why the path cannot continue
   StatePoint point() { return point_of(path_.state()); }
   StatePoint point_of(const DrivenState& s) { return {s.t, s.y, s.angles, motion_ ? &*motion_ : nullptr}; }
 
@@ -73,7 +73,7 @@ class DrivenRun {
   const RunOptions& options_;
   const Model model_;
   DrivenPath path_;
-  std::optional<MotionSolver> motion_;  // where some sensor needs it
+  std::optional<MotionSolver> motion_;  // set if a sensor needs it
   SampleSchedule schedule_;
   LawJumps law_jumps_;
   const bool differentiated_;
@@ -81,7 +81,7 @@ class DrivenRun {
   std::vector<DrivenTerm> running_;  // of one node
   std::vector<DrivenTerm> at_instant_;
   std::vector<DrivenState> nodes_;  // of the panel; none without running costs
-  DrivenState from_;                // where the panel begins
+  DrivenState from_;                // the start of the panel
   std::vector<double> g_;           // running cost x node
   Eigen::VectorXd absolute_;        // integral of |g| so far, per cost
   std::vector<PanelIntegral> integrals_;

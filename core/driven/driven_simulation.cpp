@@ -19,7 +19,7 @@
 namespace mbsopt {
 namespace {
 
-// Why a run is integrated although drives may leave nothing free; empty: no setting asks for it.
+// The reason why a run is integrated although drives may leave no freedom; empty if no setting demands it.
 std::string why_integrated(const MechanismData& d, const SimulationSettings& s) {
   if (d.equilibrium) return "it starts from static equilibrium";
   if (is_cvodes(s.integrator.type)) return "CVODES integrates";
@@ -30,7 +30,8 @@ std::string why_integrated(const MechanismData& d, const SimulationSettings& s) 
   return "";
 }
 
-// Whether a gradient in y has a part out of the plane. That in the plane is rounding where the drives settle the state.
+// Whether a gradient in y has a part out of the plane. The part in the plane is rounding: the drives determine the
+// state.
 bool leaves_plane(const MechanismData& d, Eigen::VectorXd y_bar) {
   const PlanarBodies plane(*d.planar);
   for (int i = 1; i <= d.n; ++i) {
@@ -70,8 +71,9 @@ bool moves_out_of_plane(const MechanismData& d) {
   });
 }
 
-// Derivatives of the state in rho at one instant. The constraints say all of it in space. In a plane they say nothing
-// of the coordinates out of it, which stay as they were assembled: y = P(y0(rho), rho), P the projection.
+// Derivatives of the state in rho at one instant. In space the constraints determine all of the state. In a plane they
+// do not determine the coordinates out of it, which keep their assembled values. So y = P(y0(rho), rho), P the
+// projection.
 class DrivenDerivatives {
  public:
   DrivenDerivatives(const Mechanism& mechanism, Projector& projector)
@@ -109,7 +111,7 @@ class DrivenDerivatives {
     term.cost->add_gradient(at, term.weight, y_bar_, rho_bar_);
     psi_rho.row(term.objective) += rho_bar_.transpose() + y_bar_.transpose() * y_rho_;
   }
-  // The same of all terms of one objective, into the assembled state, fields and parameters.
+  // Adds the same for all terms of one objective, to the gradients in the assembled state, fields and parameters.
   void add_backward(std::span<const DrivenTerm> terms, const StatePoint& at, Eigen::VectorXd& y0_bar,
                     Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) {
     y_bar_.setZero();
@@ -204,7 +206,7 @@ SimulationResult driven_adjoint(const Mechanism& mechanism, const SimulationSett
   run.go([&](const StatePoint& at, std::span<const DrivenTerm> terms) {
     if (!derivatives.linearise(at)) return false;
     ++result.statistics.linearised_states;
-    while (!terms.empty()) {  // those of one objective stand together
+    while (!terms.empty()) {  // terms of one objective are adjacent
       const auto other = std::ranges::find_if(
           terms, [&](const DrivenTerm& term) { return term.objective != terms.front().objective; });
       const std::size_t o = static_cast<std::size_t>(terms.front().objective),

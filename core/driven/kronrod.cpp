@@ -11,7 +11,7 @@ const KronrodRule& kronrod_rule() {
   static const KronrodRule rule = [] {
     using Kronrod = boost::math::quadrature::gauss_kronrod<double, kNodes>;
     using Gauss = boost::math::quadrature::gauss<double, kNodes / 2>;
-    // Both list the nodes of [0, 1) of the interval [-1, 1]; every second one belongs to both.
+    // Both tables list the nodes in [0, 1) of the interval [-1, 1]. Every second node belongs to both.
     constexpr std::size_t middle = kNodes / 2;
     KronrodRule r{};
     for (std::size_t k = 0; k <= middle; ++k) {

@@ -3,7 +3,6 @@
 namespace mbsopt {
 namespace {
 
-// Moments only.
 void add_moment(int pair, double factor, const Mat<3, 4>& moment_p, MotionBlocks& out) {
   if (pair < 0) return;
   MotionBlocks::Block<6>& block = out.b[at(pair)];

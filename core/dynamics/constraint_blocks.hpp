@@ -12,14 +12,15 @@ class ConstraintBlocks {
  public:
   ConstraintBlocks(const MechanismData& data, const MotionBlocks& blocks, double two_xi_omega, double omega2);
 
-  // Marks the bodies whose unit tangents add() reads; some primitives know short cuts.
+  // Marks the bodies whose unit tangents add() reads. Some primitives have short cuts and read none.
   void mark_units(std::vector<bool>& bodies) const;
-  // bodies, frames, units: the ground first.
+  // bodies, frames and units begin with the ground.
   void add(const std::vector<BodyState>& bodies, const std::vector<Frame>& frames,
            const std::vector<UnitTangents>& units, const Eigen::VectorXd& lambda, MotionBlocks& out) const;
 
  private:
-  // Indices of a constraint's blocks: of body i's equations by body j, of each row by each body; -1: the ground.
+  // Indices of a constraint's blocks: those of body i's equations by body j, and those of each row by each body. -1
+  // stands for the ground.
   struct Places {
     int pair[2][2] = {{-1, -1}, {-1, -1}};
     std::array<int, 3> row[2] = {{-1, -1, -1}, {-1, -1, -1}};

@@ -5,8 +5,8 @@
 namespace mbsopt {
 namespace {
 
-// S += x' alpha x, of x the entries first to last and 3 to 6: the lower triangle only, which is all that a
-// factorisation reads.
+// S += x' alpha x for the entries first to last and 3 to 6 of x. It writes the lower triangle only: a factorisation
+// reads no more.
 void add_lower_square(double alpha, const double* x, int first, int last, Mat<6, 6>& S) {
   const double a3 = alpha * x[3], a4 = alpha * x[4], a5 = alpha * x[5];
   for (int j = first; j < last; ++j) {
@@ -84,7 +84,7 @@ void ConstraintRows::evaluate(std::size_t group, const Frames& frames, Eigen::Ve
           }
           Mat<m, 6> A, B;
           p.jacobian(f1, f2, A, B);
-          // Copies the halves in which they are written: a load across them would wait for both.
+          // Copies J by the halves in which it was written: a load across both halves would wait for both stores.
           const auto copy = [&](const Mat<m, 6>& from, Rows& J) {
             J.middleRows<m>(c->block).template leftCols<3>() = c->factor * from.template leftCols<3>();
             J.middleRows<m>(c->block).template rightCols<3>() = c->factor * from.template rightCols<3>();
@@ -103,7 +103,7 @@ void ConstraintRows::evaluate(const std::vector<Frame>& frames) {
   }
 }
 
-// Takes a few groups at a time: their J is read again while it is near, but after it has been stored.
+// Processes a few groups at a time. Their J is then still in the cache when it is read again, but already stored.
 void ConstraintRows::assemble(const std::vector<Frame>& frames, const Eigen::VectorXd& alpha, BlockCholesky<6>& S,
                               Eigen::VectorXd* phi_ddot) {
   constexpr std::size_t kAtATime = 4;

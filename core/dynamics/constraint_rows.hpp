@@ -1,4 +1,4 @@
-// Phi_eta of all constraints as blocks of two 6-rows each, and the products the formulations need of it. A row of Phi
+// Phi_eta of all constraints as blocks of two 6-rows each, with the products that the formulations need. A row of Phi
 // that several constraints share (a gear) has several blocks.
 #pragma once
 
@@ -25,7 +25,7 @@ class ConstraintRows : public RowProducts<ConstraintRows, RowsInSpace> {
   Eigen::Index count() const { return data_->m; }
   void evaluate(const std::vector<Frame>& frames);  // J at the frames' positions
 
-  // Sets J and S = M + J' diag(alpha) J at the frames' positions, and phi_ddot, unless null, to the frames' Phiddot
+  // Sets J and S = M + J' diag(alpha) J at the frames' positions. Sets phi_ddot, unless null, to the frames' Phiddot
   // without laws.
   void assemble(const std::vector<Frame>& frames, const Eigen::VectorXd& alpha, BlockCholesky<6>& S,
                 Eigen::VectorXd* phi_ddot = nullptr);
@@ -58,7 +58,7 @@ class ConstraintRows : public RowProducts<ConstraintRows, RowsInSpace> {
   // S += J' diag(alpha) J of a group
   void add_square(std::size_t group, const Eigen::VectorXd& alpha, const BlockKernels& kernels, BlockCholesky<6>& S);
   void add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S);
-  // Prefetch what evaluate and add_square need of a later group (inlined: prefetch.hpp).
+  // Prefetches the data that evaluate and add_square need for a later group (inlined: prefetch.hpp).
   [[gnu::always_inline]] void prefetch_geometry(std::size_t group, const Frames& frames) const {
     constexpr int kMotion = 36;  // numbers of a frame: its position, axes and their rates
     const RowsInSpace::Group& g = groups_[group];

@@ -28,7 +28,7 @@ Vec<M> rows(const Eigen::VectorXd* z, int row, double scale) {
   return scale * z->segment<M>(row);
 }
 
-// The angle's branch: that of the followed joint angle, or the one nearest to the row's law.
+// Puts an angle on the branch of the followed joint angle, or on the branch nearest to the row's law.
 template <class P>
 void put_on_branch(const Constraint& c, const RowLaws& laws, const Eigen::VectorXd& angles, Vec<P::kRows>& value) {
   if constexpr (std::is_same_v<P, Angle>) {

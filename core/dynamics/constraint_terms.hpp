@@ -1,5 +1,5 @@
-// Values and derivatives of all constraints of a mechanism at given frames (frames[0]: the ground), at one time (laws,
-// set_time called) and on the branches of followed joint angles.
+// Values and derivatives of all constraints of a mechanism at given frames (frames[0] is the ground) and one time. Call
+// set_time of the laws first. Angles are on the branches of followed joint angles.
 #pragma once
 
 #include <vector>
@@ -10,7 +10,7 @@
 
 namespace mbsopt {
 
-// Weights of the scalar  lambda'J eta + mu0'Phi + mu1'Phidot + mu2'Phiddot  (null: zero); eta is in the frames.
+// Weights of the scalar  lambda'J eta + mu0'Phi + mu1'Phidot + mu2'Phiddot; null weights are zero. The frames hold eta.
 struct ConstraintWeights {
   const Eigen::VectorXd* lambda = nullptr;
   const Eigen::VectorXd* mu0 = nullptr;
@@ -33,18 +33,19 @@ class ConstraintTerms {
   void phi_dot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const;
   void phi_ddot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const;
 
-  // Adds the gradient of the weighted scalar, times scale, in the frames to bars, in the geometry to theta_bar, through
+  // Adds scale times the gradient of the weighted scalar: in the frames to bars, in the geometry to theta_bar, through
   // laws to rho_bar.
   void add_pull_back(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
                      const ConstraintWeights& weights, double scale, std::vector<FrameBar>& bars,
                      Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) const;
 
-  // Tangents in the bodies' directions and those of the fields; that of J'lambda is added to loads, one per body, the
-  // ground's first.
+  // Computes the tangents in the directions of the bodies and of the fields. Adds that of J'lambda to loads, one per
+  // body after the ground's.
   void tangents(const Frames& frames, const std::vector<FrameTangent>& directions, RowLaws& laws,
                 const Eigen::VectorXd& angles, const ParameterBlock& block, const Eigen::VectorXd& lambda,
                 ConstraintTangents& out, std::vector<Lanes<6>>& loads) const;
-  // In the directions of the fields alone, bodies at rest: only constraints and laws that have some.
+  // Computes the tangents in the directions of the fields alone, with bodies at rest. Skips constraints and laws
+  // without such directions.
   void field_tangents(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles, const ParameterBlock& block,
                       const Eigen::VectorXd& lambda, ConstraintTangents& out, std::vector<Lanes<6>>& loads) const;
 

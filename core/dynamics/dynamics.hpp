@@ -4,12 +4,12 @@
 //   gamma(q, v) = Phiddot at z = 0  + 2 xi omega Phidot + omega^2 Phi
 //   augmented Lagrangian:  J z + gamma = 0        penalty:  lambda = alpha (J z + gamma)
 //
-// Derivatives are those of the limit of the augmented-Lagrangian iteration, i.e. of the constrained equations.
+// The derivatives are those of the constrained equations, which are the limit of the augmented-Lagrangian iteration.
 //
 //   Dynamics dynamics(mechanism, settings);
 //   dynamics.evaluate(t, y, angles, ydot);
 //
-// One Dynamics per thread: it owns every array that a right-hand side touches.
+// Each thread needs its own Dynamics: it owns every array that a right-hand side uses.
 #pragma once
 
 #include <memory>
@@ -22,7 +22,7 @@ class PlanarDynamics;
 
 class Dynamics {
  public:
-  // planar: only where the mechanism has a planar model.
+  // The mechanism must have a planar model for `planar`.
   Dynamics(const Mechanism& mechanism, const FormulationSettings& settings, Model model = Model::spatial);
   ~Dynamics();
 
@@ -36,18 +36,18 @@ class Dynamics {
                    Eigen::VectorXd& rho_bar);
 
   bool is_planar() const { return planar_ != nullptr; }
-  SpatialDynamics& in_space() { return *spatial_; }  // where it is not planar
+  SpatialDynamics& in_space() { return *spatial_; }  // only if it is not planar
   long factor_blocks() const;
   long factorisations() const;
   long linearised_states() const { return linearised_states_; }
-  // Returns the largest residual of J z + gamma over all evaluations, relative to z or to the accelerations that are
-  // usual at the state (augmented Lagrangian; else 0).
+  // Returns the largest residual of J z + gamma over all evaluations: relative to z, or to usual accelerations at the
+  // state. It is 0 for penalty.
   double worst_residual() const { return worst_residual_; }
 
  private:
   const Mechanism mechanism_;  // keeps the data alive
   const bool constrained_;     // augmented Lagrangian
-  // One of the two.
+  // One of the two is null.
   std::unique_ptr<SpatialDynamics> spatial_;
   std::unique_ptr<PlanarDynamics> planar_;
   double worst_residual_ = 0;

@@ -1,11 +1,11 @@
-// The scene's forces inside the equations of motion (gravity and users' own apart): their loads on each body, force in
-// global axes and moment in body axes, with tangent and pull-back.
+// The scene's forces inside the equations of motion, without gravity and users' own. They give the loads on each body
+// (force in global axes, moment in body axes) with tangent and pull-back.
 //
 // A force written with sensors, F(t, rho, s(t, y, rho)), is differentiated through them:
 //   blocks     F_y = F_s s_y        fields     F' = (F_rho + F_s s_rho) rho'
 //   pull-back  y_bar += s_y' F_s' F_bar,    rho_bar += (F_rho + F_s s_rho)' F_bar
 //
-// Owns the numbers of one evaluation: one per thread, nothing is allocated after construction.
+// Each thread needs its own ForceTerms: it owns the numbers of one evaluation. It allocates nothing after construction.
 #pragma once
 
 #include <type_traits>
@@ -19,7 +19,8 @@ class ForceTerms {
  public:
   explicit ForceTerms(const MechanismData& data);
 
-  // Where they are evaluated; angles: the branch of each joint angle; frames: of all bodies, the ground first.
+  // The state of an evaluation. angles holds the branch of each joint angle, frames those of all bodies after the
+  // ground's.
   struct At {
     double t;
     const Eigen::VectorXd& y;
@@ -27,11 +28,11 @@ class ForceTerms {
     const std::vector<Frame>& frames;
   };
   void add_loads(const At& at, std::vector<Vec<6>>& loads, bool but_springs = false);  // PlanarSprings has those
-  // Their derivatives in the state as blocks, units: unit tangents of all bodies, the ground first; and in the
-  // directions of fields and parameters, bodies at rest.
-  void mark_units(std::vector<bool>& bodies) const;  // that add_blocks() reads
-  // but_torques: without those about hinges, and without free ones. Those are applied torques with components in
-  // global axes, which no sensor moves.
+  // The derivatives of the loads in the state as blocks, and in the directions of fields and parameters with bodies at
+  // rest. `units` holds the unit tangents of all bodies after the ground's.
+  void mark_units(std::vector<bool>& bodies) const;  // marks those that add_blocks() reads
+  // but_torques leaves out torques about hinges and free torques. A free torque is an applied torque with components in
+  // global axes that reads no sensor.
   void add_blocks(const At& at, const std::vector<UnitTangents>& units, MotionBlocks& out, bool but_torques = false);
   static bool is_free_torque(const AppliedForce& f) { return f.is_torque && !f.in_body_axes && f.sensors.empty(); }
   // visitor(body, components)
@@ -48,7 +49,7 @@ class ForceTerms {
                 at.frames[static_cast<std::size_t>(bodies[1])]);
   }
   void add_field_tangent(const At& at, const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs);
-  // Gradient of the virtual work sum load'eta, eta in the frames and held fixed.
+  // Adds the gradient of the virtual work sum load'eta. The frames hold eta, which stays fixed.
   void add_pull_back(const At& at, std::vector<FrameBar>& bars, Eigen::Ref<Eigen::VectorXd> y_bar,
                      Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar, bool but_springs = false);
   Law::Scratch& law_scratch() { return law_; }
@@ -64,7 +65,8 @@ class ForceTerms {
     });
   }
   ForceInputs inputs(const At& at) { return {at.t, data_.rho, at.angles, law_}; }
-  // tangent(t1, t2, load_dir1, load_dir2) of a force between two bodies, in each of their coordinates, to its blocks.
+  // Calls tangent(t1, t2, load_dir1, load_dir2) of a force between two bodies in each of their coordinates, and adds
+  // the result to its blocks.
   template <class Tangent>
   static void add_pair(std::size_t body1, std::size_t body2, const std::vector<UnitTangents>& units, MotionBlocks& out,
                        Tangent&& tangent);

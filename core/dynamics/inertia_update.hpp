@@ -1,10 +1,11 @@
-// The saddle system with mass terms of users, by the factor without them. With E the rows of their bodies, 6 each,
+// Solves the saddle system with mass terms of users by the factor without them. With E the rows of their bodies, 6
+// each,
 //
 //   [M + E Mu E'  J'] (z, lambda) = (b, g)       (z, lambda) = (z0, lambda0) - (Z, Lambda) Mu w,   (I + A Mu) w = E'z0
 //   [J            -c]
 //
 // (z0, lambda0): the solution without Mu. (Z, Lambda): those of the columns of E. A = E'Z. (Sherman, Morrison,
-// Woodbury.) Nothing is done, and nothing allocated, where users add no mass.
+// Woodbury.) It does and allocates nothing if users add no mass.
 #pragma once
 
 #include <vector>
@@ -16,10 +17,10 @@ namespace mbsopt {
 
 class InertiaUpdate {
  public:
-  using Inertias = std::vector<UserLoads::Inertia>;  // at the state in hand, the same ones in all calls
+  using Inertias = std::vector<UserLoads::Inertia>;  // at the present state, the same ones in all calls
   InertiaUpdate(const MechanismData& data, const Inertias& added);
 
-  // After each factor.
+  // Call this after each factorisation.
   void set(const Inertias& added, SaddleSolver& solver, const SaddleSolver::Settings& settings);
   void correct(const Inertias& added, std::vector<Vec<6>>& z, Eigen::VectorXd& lambda);
   void correct(const Inertias& added, std::vector<Lanes<6>>& z, LaneRows& lambda);

@@ -18,7 +18,7 @@ void list(const std::vector<std::vector<int>>& bodies, std::vector<MotionBlocks:
   begin.push_back(static_cast<int>(places.size()));
 }
 
-// Blocks as block_kernels.hpp sees them.
+// The blocks in the form of block_kernels.hpp.
 template <int Rows>
 const MotionBlockView<Rows>* view(const std::vector<MotionBlocks::Block<Rows>>& blocks) {
   using Ours = MotionBlocks::Block<Rows>;
@@ -48,7 +48,7 @@ int MotionBlocks::find(const std::vector<Place>& places, const std::vector<int>&
       high = middle;
     }
   }
-  assert(low < begin[at(row) + 1] && places[at(low)].body == body);  // what is not coupled (coupling.hpp) has no block
+  assert(low < begin[at(row) + 1] && places[at(low)].body == body);  // uncoupled bodies (coupling.hpp) have no block
   return low;
 }
 

@@ -1,12 +1,12 @@
-// The right-hand sides of the equations of motion, differentiated in the state with z = (rddot, omegadot) and lambda
-// held fixed, as blocks on the graph of bodies:
+// Derivatives of the right-hand sides of the equations of motion in the state, as blocks on the graph of bodies. z =
+// (rddot, omegadot) and lambda are held fixed:
 //
 //   b = f - M z - J'lambda      one 6 x 14 block per body and body that its equations read
 //   c = -(Phiddot + 2 xi omega Phidot + omega^2 Phi)      one 1 x 14 block per row of Phi and body that it ties
 //
-// Columns are a body's q = (r, p) and v = (rdot, pdot). Most blocks are empty but for some of r, p, rdot, pdot;
-// products skip the rest. Evaluated once per state, they serve every tangent direction there and the matrices of
-// implicit methods.
+// Columns are a body's q = (r, p) and v = (rdot, pdot). Most blocks depend on some of r, p, rdot, pdot only, and
+// products skip the rest. The blocks are evaluated once per state. They serve every tangent direction there and the
+// matrices of implicit methods.
 #pragma once
 
 #include <vector>
@@ -24,9 +24,9 @@ class MotionBlocks {
   template <int Rows>
   struct Block {
     Mat<Rows, 7> q = Mat<Rows, 7>::Zero(), v = Mat<Rows, 7>::Zero();
-    int parts = 0;  // that are not empty; what was filled once counts as filled
+    int parts = 0;  // nonempty parts; a part filled once counts as filled
 
-    // Adds columns of a part; those of r and rdot may come with a fourth one, which must be zero.
+    // Adds the columns of a part. r and rdot may come with a fourth column, which must be zero.
     template <class Columns>
     void add(Part part, const Columns& x) {
       Mat<Rows, 7>& half = part == r || part == p ? q : v;
@@ -37,7 +37,7 @@ class MotionBlocks {
 
   explicit MotionBlocks(const MechanismData& data);
 
-  // By equations' body or row, then by body.
+  // Both are sorted by the body of the equations (or the row), then by body.
   const std::vector<Place>& pairs() const { return pairs_; }
   const std::vector<Place>& rows() const { return rows_; }
   int pair(int row, int body) const { return find(pairs_, pair_begin_, row, body); }  // its index

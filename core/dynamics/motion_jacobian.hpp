@@ -1,10 +1,9 @@
-// The derivatives of the equations of motion (StageEquations) in (q, v, a, lambda) as blocks on the graph of
-// bodies.
+// The derivatives of the equations of motion (StageEquations) in (q, v, a, lambda) as blocks on the graph of bodies.
 //
 //   -r_q, -r_v:  one 7x7 block per coupled pair of bodies, one 1x7 block per row of Phi and body that it ties
 //   -r_a:        one 7x7 block per body (M T), one 1x7 block per row and body (J T);   -r_lambda: J', -1/alpha
 //
-// r_q, r_v are those of MotionBlocks, taken with z fixed, and what a fixed a adds: omegadot' of stage_equations.hpp.
+// MotionBlocks gives r_q and r_v with z fixed. A fixed a adds the terms of omegadot' in stage_equations.hpp.
 #pragma once
 
 #include <vector>
@@ -36,7 +35,7 @@ class MotionJacobian {
   int constraints() const { return m_; }
   Values values() const;  // of the right sizes
 
-  // At the place of the equations.
+  // Evaluates them at the current state of the equations.
   void evaluate(StageEquations& equations, Values& out);
 
  private:

@@ -25,7 +25,7 @@ const Motion& MotionSolver::motion(const StatePoint& at) {
   if (dynamics_.evaluate(at.t, at.y, at.angles, ydot_)) {
     motion_.z = dynamics_.z();
     motion_.lambda = dynamics_.lambda();
-  } else {  // as any other number that cannot be computed
+  } else {  // marks numbers that cannot be computed
     for (Vec<6>& z : motion_.z) z.setConstant(std::numeric_limits<double>::quiet_NaN());
     motion_.lambda.setConstant(std::numeric_limits<double>::quiet_NaN());
   }

@@ -4,8 +4,7 @@
 //   c = -(J z + gamma)          gamma = Phiddot at z = 0  + 2 xi omega Phidot + omega^2 Phi
 //
 // z = (rddot, omegadot) per body, omegadot in body axes. SpatialDynamics solves b = 0, c = 0 for z and lambda;
-// StageEquations takes them as residuals.
-// Allocates nothing after construction, but in the first call of blocks().
+// StageEquations takes them as residuals. Only the first call of blocks() allocates after construction.
 #pragma once
 
 #include <optional>
@@ -24,7 +23,7 @@ class MotionTerms {
  public:
   MotionTerms(const MechanismData& data, const FormulationSettings& settings);
 
-  // The motion: bodies and frames with the ground first, z and f without it. The solver writes z and lambda.
+  // The motion: bodies and frames begin with the ground, z and f do not. The solver writes z and lambda.
   std::vector<BodyState> bodies;
   std::vector<Frame> frames;
   std::vector<Vec<6>> f, z;
@@ -40,9 +39,9 @@ class MotionTerms {
   // Sets a motion whose qddot = a and multipliers are known.
   void set_motion(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                   const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& multipliers);
-  // Moves z into the frames.
+  // Writes z into the frames.
   void set_accelerations();
-  // f at the motion.
+  // Computes f at the motion.
   void set_loads();
 
   // Adds the laws and the stabilisation to phi_ddot, the Phiddot of the frames without laws.
@@ -50,15 +49,15 @@ class MotionTerms {
   // J z + gamma
   void acceleration_errors(Eigen::VectorXd& out);
 
-  // The derivatives of b and c in the state, z and lambda fixed, as blocks.
+  // Returns the derivatives of b and c in the state as blocks, with z and lambda fixed.
   const MotionBlocks& blocks();
   // Sets the tangents of b and c in directions of the state (14n x lanes), the fields and the parameters.
   void set_tangents(const ParameterBlock& block, const LaneRows& y_dir);
-  // Adds the gradient of  pddot_bar'pddot + eta'b + mu'c  with z and lambda fixed; pddot_bar with the ground.
+  // Adds the gradient of  pddot_bar'pddot + eta'b + mu'c  with z and lambda fixed. pddot_bar begins with the ground.
   void add_pull_back(const std::vector<Vec<6>>& eta, const Eigen::VectorXd& mu, const std::vector<Vector4d>& pddot_bar,
                      Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar);
 
-  // Mass terms of users at the state, which M of the bodies does not hold: x -> out += sign M_user x.
+  // Mass terms of users at the state are not part of the bodies' M. add_user_mass: out += sign M_user x.
   const std::vector<UserLoads::Inertia>& user_inertias() const { return user_.inertias(); }
   template <class X>
   void add_user_mass(double sign, const std::vector<X>& x, std::vector<X>& out) const {
@@ -68,9 +67,10 @@ class MotionTerms {
     }
   }
 
-  // Statics: laws of time keep their values from now on.
+  // For statics: laws of time keep their values from now on.
   void hold_laws() { laws_.hold(); }
-  // The largest acceleration that the loads give to a body alone, or its turning takes; any that reaches `enough`.
+  // Returns the largest acceleration of a single body by its loads or its own rotation. It stops at the first body that
+  // reaches `enough`.
   double usual_acceleration(double enough) const;
 
  private:
@@ -93,12 +93,11 @@ class MotionTerms {
   Eigen::VectorXd y_, angles_;      // y_: where forces read it
   std::vector<Vec<6>> body_loads_;  // of forces, with the ground
   Eigen::VectorXd phi_, phi_dot_;   // or their weights
-  // Derivatives.
   struct Linearisation {
     MotionBlocks blocks;
     ConstraintBlocks constraints;
     std::vector<UnitTangents> units;
-    std::vector<std::size_t> bodies_of_units;  // where something reads them
+    std::vector<std::size_t> bodies_of_units;  // bodies whose units are read
     bool current = false;
   };
   std::optional<Linearisation> linear_;

@@ -1,5 +1,5 @@
-// The numbers of a planar body in the state y, whose layout is that of space (7 + 7 numbers per body): read, written,
-// and with their tangents and cotangents. What leaves the plane stays as it is in y, at rest.
+// Reads and writes the numbers of a planar body in the state y, with their tangents and cotangents. y has the layout of
+// space (7 + 7 numbers per body). Components out of the plane keep their values in y and are at rest.
 #pragma once
 
 #include "core/mechanism/parameter_lanes.hpp"
@@ -11,7 +11,7 @@ class PlanarBodies {
  public:
   explicit PlanarBodies(const PlanarModel& model) : model_(&model) {}
 
-  // first: row of a body's r or p in y (or of their rates).
+  // first is the row of a body's r or p in y, or of their rates.
   template <class Y>
   Plane vector(const Y& y, Eigen::Index first) const {
     return {y(first + model_->t1), y(first + model_->t2)};
@@ -47,7 +47,7 @@ class PlanarBodies {
     y_dir.middleRows<4>(first) += b.p_a * P.re.d.matrix() + b.p_b * P.im.d.matrix();
   }
 
-  // A load (force in global axes, moment in body axes) as the plane sees it, and back.
+  // Reduces a load (force in global axes, moment in body axes) to the plane, and returns it to space.
   Vec<3> reduced(std::size_t body, const Vec<6>& load) const {
     return {load(model_->t1), load(model_->t2), model_->bodies[body].n.dot(load.tail<3>())};
   }
@@ -62,7 +62,7 @@ class PlanarBodies {
     return out;
   }
 
-  // Rows of the inertia's derivative (xx yy zz xy xz yz) that n'J n sees.
+  // The weights of the inertia's six numbers (xx yy zz xy xz yz) in n'J n.
   Vec<6> inertia_weights(std::size_t body) const {
     const Vector3d& n = model_->bodies[body].n;
     Vec<6> w;

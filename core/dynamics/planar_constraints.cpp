@@ -10,7 +10,7 @@ namespace {
 using Kind = PlanarConstraint::Kind;
 using Order = PlanarConstraints::Order;
 
-// The primitive's vectors, constant or with directions of their own.
+// The primitive's vectors, which are constant or have their own directions.
 template <class S>
 struct Vectors {
   Complex<S> s1, s2, s3;
@@ -45,7 +45,7 @@ Jet<Complex<T>> separation(const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, c
           f2.Addot * s.s2 - f1.Addot * s.s1 + (f2.rddot - f1.rddot)};
 }
 
-// arg(A2 s2) - arg(A1 s1). Only the part of the order is computed: atan2 is slow.
+// arg(A2 s2) - arg(A1 s1). It computes only the given order, because atan2 is slow.
 template <class T, class S>
 Jet<T> angle_between(Order order, const PlanarFrame<T>& f1, const PlanarFrame<T>& f2, const Vectors<S>& s) {
   using std::atan2;
@@ -121,7 +121,7 @@ double on_branch(const PlanarConstraint& c, const RowLaws& laws, const Eigen::Ve
 
 Vectors<double> vectors(const PlanarConstraint& c) { return {c.s1, c.s2, c.s3}; }
 
-// A vector with the directions of its slot, of which only those in the plane count.
+// A vector with the directions of its slot; only directions in the plane count.
 PlaneDual moving(const PlanarBody& body, const Plane& s, const Lanes<3>* ds) {
   if (!ds) return {s.re, s.im};
   return {{s.re, LaneDual::Lane(body.b1.transpose() * *ds)}, {s.im, LaneDual::Lane(body.b2.transpose() * *ds)}};

@@ -7,7 +7,7 @@
 //   distance   Phi = |d|
 //   angle      Phi = +-(arg(A2 s2) - arg(A1 s1))
 //
-// As in space (primitive.hpp), each is a function of the bodies' frames, whose derivatives are taken per body.
+// Each is a function of the bodies' frames, as in space (primitive.hpp). Derivatives are taken per body.
 #pragma once
 
 #include <vector>
@@ -35,36 +35,37 @@ class PlanarConstraints {
   using Frames = std::vector<PlanarFrame<double>>;
   using DualFrames = std::vector<PlanarFrame<LaneDual>>;
 
-  // Rows that hold by themselves in the plane stay zero.
+  // Rows that every planar motion satisfies stay zero.
   void phi(const Frames& frames, const RowLaws& laws, const Eigen::VectorXd& angles, Eigen::VectorXd& out) const;
   void phi_dot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const;
   void phi_ddot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const;
 
-  // As ConstraintTerms::add_pull_back.
+  // The planar form of ConstraintTerms::add_pull_back.
   void add_pull_back(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
                      const ConstraintWeights& weights, double scale, std::vector<PlanarFrameBar>& bars,
                      Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) const;
 
-  // Sets the tangent of Phi, Phidot or Phiddot in the frames' directions and those of the vectors; the other two hold
-  // nothing of use. Adds that of J'lambda to loads (the ground's first). Points add nothing to Phiddot' here: their
-  // tangents are below.
+  // Sets the tangent of Phi, Phidot or Phiddot in the directions of the frames and of the vectors. The other two
+  // members of out are undefined. Adds the tangent of J'lambda to loads, which begin with the ground's. Points add
+  // nothing to Phiddot' here; their tangents are below.
   void tangents(Order order, const DualFrames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
                 const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,
                 std::vector<Lanes<3>>& loads) const;
 
-  // The tangent of Phi in the directions of the fields alone, bodies at rest: only constraints and laws that have some.
+  // The tangent of Phi in the directions of the fields alone, with bodies at rest. It skips constraints and laws
+  // without such directions.
   void field_tangents(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles, const ParameterBlock& block,
                       LaneRows& phi) const;
 
   // Most joints of a plane are points. In the frames, with lambda and the vectors held fixed:
   //   d(J'lambda)_theta of a body = cross(A', W),  W: sum of +-conj(s) lambda over its points      [the ground's first]
   void set_point_moments(const Eigen::VectorXd& lambda, std::vector<Plane>& W) const;
-  // c -= Phiddot' in the directions Addot' (the ground's first; rows re, im) and those of the vectors, and
-  // b -= (J'lambda)' in those of the vectors (b without the ground).
+  // c -= Phiddot' in the directions Addot' (rows re, im, the ground's first) and in those of the vectors. Also b -=
+  // (J'lambda)' in the directions of the vectors; b has no entry of the ground.
   void subtract_point_tangents(const Frames& frames, const std::vector<Lanes<2>>& Addot_dirs,
                                const ParameterBlock& block, const Eigen::VectorXd& lambda, LaneRows& c,
                                std::vector<Lanes<3>>& b) const;
-  // Marks the bodies (the ground first) of constraints that are no points.
+  // Marks the bodies (the ground first) of all constraints except points.
   void mark_others(std::vector<bool>& bodies) const;
 
  private:

@@ -13,7 +13,7 @@ bool any_force_but_springs(const MechanismData& d) {
   return d.forces.size() > d.forces.of<TsdaForce>().size() || !d.applied.empty() || !d.user_forces.empty();
 }
 
-// Whether the vectors between which they measure their angles lie in the plane.
+// Whether the vectors that define the angles of torques lie in the plane.
 bool torques_are_about_normal(const MechanismData& d) {
   constexpr double kParallel = 1e-12;  // sine of the angle up to which a direction counts as another
   bool all = true;
@@ -30,7 +30,7 @@ bool torques_are_about_normal(const MechanismData& d) {
   return all;
 }
 
-// Whether no force depends on the state but torques about hinges and free ones.
+// Whether torques about hinges and free torques are the only forces that depend on the state.
 bool nothing_but_torques(const MechanismData& d) {
   return d.forces.size() == d.forces.of<RsdaForce>().size() + d.forces.of<TurningFriction>().size() &&
          d.user_forces.empty() && std::ranges::all_of(d.applied, [](const AppliedForce& f) {

@@ -1,11 +1,11 @@
-// The equations of motion of a planar model (planar_model.hpp), their tangent and adjoint: the same equations and
-// derivatives as in dynamics.hpp, in z = (rddot along t1 and t2, omegadot about n) per body,
+// The equations of motion of a planar model (planar_model.hpp), their tangent and adjoint. They are the equations and
+// derivatives of dynamics.hpp, in z = (rddot along t1 and t2, omegadot about n) per body,
 //
 //   pddot:  Pddot = (i omegadot/2 - |Pdot|^2) P
 //
-// and with the gyroscopic term gone. Springs act in the plane where their points lie in one; other forces are evaluated
-// in space and reduced to the plane, but for derivatives of torques in the state.
-// Allocates nothing after construction, but in the first tangent.
+// without the gyroscopic term. Springs act in the plane if their points lie in one plane. Other forces, and derivatives
+// of torques in the fields, are evaluated in space and reduced to the plane. Derivatives of torques in the state are
+// taken in the plane. Only the first tangent allocates after construction.
 #pragma once
 
 #include <optional>
@@ -45,11 +45,11 @@ class PlanarDynamics {
   void place_in_space();
   void set_loads();
   void set_acceleration(std::size_t body, const Vec<3>& z);
-  // z as it appears with the inertia: M (z - gravity).
+  // The vector that M multiplies: z - gravity.
   Vec<3> z_against_gravity(std::size_t body) const {
     return z_[body - 1] - Vec<3>(model_.gravity.re, model_.gravity.im, 0);
   }
-  void prepare_tangents();  // what all directions share, after linearise()
+  void prepare_tangents();  // the common part of all directions, after linearise()
   void prepare_force_tangents();
   void add_torque_blocks();
   void add_force_tangent(const ParameterBlock& block, const LaneRows& y_dir);
@@ -73,13 +73,13 @@ class PlanarDynamics {
   PlanarConstraints::Frames frames_;
   std::vector<Vec<3>> loads_, z_, eta_;
   Eigen::VectorXd gamma_, phi_, phi_dot_, lambda_, mu_, g_;  // of the rows in the plane
-  Eigen::VectorXd lambda_of_phi_;                            // of all; those that hold by themselves have none
+  Eigen::VectorXd lambda_of_phi_;  // of all rows; 0 for rows that every planar motion satisfies
 
   PlanarSprings springs_;
   bool springs_in_plane_ = false;  // at this state
-  const bool torques_in_plane_;    // those about hinges, and free ones
+  const bool torques_in_plane_;    // torques about hinges, and free ones
   const bool only_torques_;        // in the plane; no other force depends on the state
-  // Forces, and the bodies that they read and load, in space.
+  // The forces, and the bodies in space that they read and load.
   bool has_springs_, has_other_forces_;
   bool in_space_ = false;  // whether the bodies are placed there at this state
   ForceTerms forces_;
@@ -91,7 +91,6 @@ class PlanarDynamics {
   std::vector<Frame> frames_in_space_;
   std::vector<Vec<6>> body_loads_;
 
-  // Derivatives.
   struct TurnTangent {
     Mat<2, 4> Addot, Pddot;  // in the directions (Re P, Im P, Re Pdot, Im Pdot)
     Plane moment;            // b_theta' = moment x P', of J'lambda

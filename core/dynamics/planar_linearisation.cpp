@@ -16,7 +16,7 @@ MotionBlocks force_blocks(MechanismData data) {
 
 }  // namespace
 
-// With P' and Pdot' for directions, products of complex numbers and real dot products:
+// The directions are P' and Pdot'. Products are those of complex numbers and real dot products:
 //   Addot' = 4 Pdot Pdot' + (i omegadot - 2 |Pdot|^2) 2 P P' - 4 (Pdot'Pdot') A
 //   Pddot' = (i omegadot/2 - |Pdot|^2) P' - 2 (Pdot'Pdot') P        and with omegadot':  + i omegadot'/2 P
 void PlanarDynamics::prepare_tangents() {
@@ -39,7 +39,7 @@ void PlanarDynamics::prepare_tangents() {
   if (!loaded_.empty()) prepare_force_tangents();
 }
 
-// The blocks of forces, as the plane sees them.
+// The blocks of forces, reduced to the plane.
 void PlanarDynamics::prepare_force_tangents() {
   if (!force_linearisation_) {
     force_linearisation_.emplace(
@@ -79,7 +79,7 @@ void PlanarDynamics::prepare_force_tangents() {
 // A torque about a hinge loads the bodies at its ends by -+f(x, xdot), where x = +-(theta_2 - theta_1):
 //   moment_i' = -s_i sum_j s_j (f_x theta_j' + f_xdot omega_j'),   s = -1 for body 1, 1 for body 2
 //   theta' = Im(2 P'/P),   omega' = Im(2 Pdot'/P - 2 Pdot P'/P^2)
-// A free torque c has the moment |P|^2 c_n. These are the numbers of space, off the constraints, too.
+// A free torque c has the moment |P|^2 c_n. These numbers equal those of space, also off the constraints.
 void PlanarDynamics::add_torque_blocks() {
   ForceLinearisation& x = *force_linearisation_;
   const auto add = [&](const auto& torque) {
@@ -109,7 +109,7 @@ void PlanarDynamics::add_torque_blocks() {
   });
 }
 
-// The forces' share of b: in the state by their blocks, and in the fields.
+// Adds the tangent of the forces to b: in the state by their blocks, and in the fields.
 void PlanarDynamics::add_force_tangent(const ParameterBlock& block, const LaneRows& y_dir) {
   const ForceLinearisation& x = *force_linearisation_;
   const LaneRow* y = entries(y_dir);
@@ -135,7 +135,7 @@ void PlanarDynamics::add_force_tangent(const ParameterBlock& block, const LaneRo
   for (const std::size_t k : loaded_) rhs_lanes_[k - 1] += bodies_in_y_.reduced(k, body_load_dirs_[k]);
 }
 
-// Of constraints that are no points, and of laws: duals.
+// Adds the tangents of laws and of all constraints except points, by dual numbers.
 void PlanarDynamics::add_other_tangents(const ParameterBlock& block, const LaneRows& y_dir) {
   using Order = PlanarConstraints::Order;
   const Eigen::Index half = 7 * data_.n;

@@ -8,7 +8,7 @@ namespace mbsopt {
 PlanarRows::PlanarRows(const MechanismData& data) : model_(data.planar.get()) {
   for (std::size_t i = 1; i < model_->bodies.size(); ++i)
     bodies_.push_back({model_->bodies[i].mass, model_->bodies[i].inertia});
-  std::map<int, std::vector<int>> bodies_of_row;  // that move
+  std::map<int, std::vector<int>> bodies_of_row;  // moving bodies only
   for (const PlanarConstraint& c : model_->constraints) {
     if (c.kind == PlanarConstraint::Kind::point) continue;
     std::vector<int>& bodies = bodies_of_row[c.row];

@@ -44,7 +44,7 @@ class PlanarRows : public RowProducts<PlanarRows, RowsInPlane> {
 
  private:
   using Point = RowsInPlane::Point;
-  using Entry = RowsInPlane::Entry;  // those of a row follow each other
+  using Entry = RowsInPlane::Entry;  // entries of a row are adjacent
   struct PointPlace {
     int constraint;
     std::size_t handle;  // of the block of its two bodies

@@ -52,7 +52,7 @@ void PlanarSprings::add_loads(double t, const std::vector<PlanarFrame<double>>& 
   }
 }
 
-// As TsdaForce::pull_back.
+// The planar form of TsdaForce::pull_back.
 void PlanarSprings::add_pull_back(double t, const std::vector<PlanarFrame<double>>& frames, Law::Scratch& scratch,
                                   std::vector<PlanarFrameBar>& bars, Eigen::VectorXd& theta_bar,
                                   Eigen::VectorXd& rho_bar) const {

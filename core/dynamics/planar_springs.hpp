@@ -1,5 +1,5 @@
-// The springs (tsda.hpp) of a planar model whose points lie in one plane: loads and their pull-back from planar frames,
-// the same numbers as from frames in space at a fraction of the work.
+// The springs (tsda.hpp) of a planar model whose points lie in one plane: loads and their pull-back from planar frames.
+// The numbers equal those from frames in space, for a fraction of the work.
 #pragma once
 
 #include <vector>
@@ -11,12 +11,13 @@ namespace mbsopt {
 
 class PlanarSprings {
  public:
-  explicit PlanarSprings(const MechanismData& data);  // with a planar model
+  explicit PlanarSprings(const MechanismData& data);  // data must have a planar model
 
-  // Whether each spring's points lie at the same height along n. Bodies keep theirs, but states may differ.
+  // Whether both points of each spring lie at the same height along n. Bodies keep their heights, but states may
+  // differ.
   bool lie_in_plane(const Eigen::VectorXd& y) const;
 
-  // loads: body k at k - 1.
+  // loads[k - 1] belongs to body k.
   void add_loads(double t, const std::vector<PlanarFrame<double>>& frames, Law::Scratch& scratch,
                  std::vector<Vec<3>>& loads) const;
   // Gradient of the virtual work sum load'eta in the frames (eta held fixed), the fields and the parameters of laws.

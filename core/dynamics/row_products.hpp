@@ -1,4 +1,5 @@
-// The products with J that the block solvers need, by the loops of kernel_table.hpp, for a single vector and for lanes.
+// The products with J that the block solvers need, for a single vector and for lanes. The loops are those of
+// kernel_table.hpp.
 //
 //   class ConstraintRows : public RowProducts<ConstraintRows, RowsInSpace> { RowsInSpace view() const; ... };
 #pragma once
@@ -10,8 +11,8 @@
 
 namespace mbsopt {
 
-// View: what the loops see of the rows. X: numbers or lanes of a body, body i at x[i - 1]. Y: Eigen::VectorXd or
-// LaneRows.
+// View is the form of the rows in the loops. X holds numbers or lanes of a body, body i at x[i - 1]. Y is
+// Eigen::VectorXd or LaneRows.
 template <class Rows, class View>
 class RowProducts {
  public:
@@ -27,7 +28,7 @@ class RowProducts {
   void subtract_transposed_times(const Y& lambda, std::vector<X>& x) const {
     if (!x.empty()) kernels<X>().subtract_transposed_times(view(), lambda.data(), x[0].data());
   }
-  // Steps of BlockSaddleSolver.
+  // The steps of BlockSaddleSolver.
   template <class X>
   void load(const SaddleIterate& at, bool first, std::vector<X>& correction) const {
     kernels<X>().load(view(), at, first, correction[0].data());

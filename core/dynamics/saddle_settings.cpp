@@ -8,10 +8,10 @@
 namespace mbsopt {
 namespace {
 
-// alpha of S for the quasi-definite solution, which is the same whatever it is: large against any inertia, so that few
-// refinements do (a row between light bodies may have to move heavy ones behind them), and not so large that S loses
-// the smallest. Either that of the penalty itself, or far from it: in between refinements would crawl where rows are
-// redundant.
+// alpha of S for the quasi-definite solution, which does not depend on it. It is large against any inertia, so that few
+// refinements suffice: a row between light bodies may have to move heavy ones behind them. It is small enough for S to
+// keep the smallest inertia. It equals the penalty or is far below it: between the two, refinements would converge
+// slowly at redundant rows.
 double moderate_alpha(const MechanismData& data, double penalty) {
   if (data.m == 0) return penalty;
   double least = data.row_alpha.minCoeff(), most = data.row_alpha.maxCoeff();
@@ -24,9 +24,9 @@ double moderate_alpha(const MechanismData& data, double penalty) {
   return penalty <= moderate ? penalty : std::min(moderate, penalty / 100);
 }
 
-// Along a chain of L joints the least eigenvalue of J inv(M) J' falls as 1/L^2, and with it what a pass gains. From ten
-// times alpha on rounding takes a third pass, which chains of hundreds of joints in space need anyway; chains in the
-// plane do not (docs/formulations.md).
+// Along a chain of L joints the least eigenvalue of J inv(M) J' falls as 1/L^2, and the gain of a pass falls with it.
+// Above ten times alpha, convergence to rounding takes a third pass. Chains of hundreds of joints need it anyway in
+// space, but not in the plane (docs/formulations.md).
 double alpha_along_chains(const MechanismData& data) {
   constexpr double kLong = 316;
   const double L = joints_to_farthest_body(data);
@@ -38,10 +38,10 @@ constexpr double kDerivativeTolerance = 1e-12;
 
 SaddleSettings constrained(const MechanismData& data, const FormulationSettings& settings) {
   const double alpha = settings.alpha * alpha_along_chains(data), digits = std::max(1.0, std::log10(alpha));
-  // As many passes as bring what S loses of M to alpha to rounding.
+  // S loses digits of M to alpha; so many passes reduce this error to rounding.
   const int rounding = std::clamp(static_cast<int>(std::ceil(14 / std::max(1.0, 16 - digits))) - 1, 1, 14);
-  // Derivatives are those of the limit: as many as bring alpha^-(passes) to rounding, and until J x' is right: an error
-  // of J x' moves along M^-1 J', which the projection's derivative takes out.
+  // Derivatives are those of the limit: so many passes reduce alpha^-(passes) to rounding. More follow until J x' is
+  // exact: an error of J x' moves along M^-1 J', which the projection's derivative removes.
   const int exact = std::max(rounding, std::clamp(static_cast<int>(std::ceil(15 / digits)) - 1, 1, 8));
   return {alpha * data.row_alpha,
           0,

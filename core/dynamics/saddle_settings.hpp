@@ -1,4 +1,5 @@
-// How the equations of a formulation are solved with the factor S (saddle_solver.hpp): its alpha and its refinements.
+// The settings with which a formulation solves its equations by the factor S (saddle_solver.hpp): alpha and
+// refinements.
 #pragma once
 
 #include <Eigen/Core>

@@ -6,11 +6,11 @@
 namespace mbsopt {
 namespace {
 
-// A pass that gains less ends the refinement: rounding is reached, the position is singular, or redundant rows
-// disagree.
+// A pass that reduces the residual by less than this factor ends the refinement. The residual is rounding, the position
+// is singular, or redundant rows disagree.
 constexpr double kStagnation = 0.97;
-// A pass that gains less than this is near a singular position: what is left of the residual there moves x far along
-// the freedom that opens, so that refinement goes on to rounding, whatever tolerance is enough elsewhere.
+// A pass that gains less than kSlow is near a singular position. The remaining residual there moves x far along the
+// freedom that opens. So refinement continues to kRounding, whatever tolerance suffices elsewhere.
 constexpr double kSlow = 1e-6, kRounding = 1e-14;
 
 // z_r *= 1 - c alpha_r of each row r.
@@ -27,7 +27,7 @@ void take_back(const Eigen::VectorXd& alpha, std::vector<X>& x, Y& nu, const Y& 
   for (Eigen::Index r = 0; r < alpha.size(); ++r) entries(nu)[r] += alpha(r) * entries(residual)[r];
 }
 
-// A residual above it, relative as in Settings, is more than rounding.
+// A residual above this, relative as in Settings, is more than rounding.
 constexpr double kDisagreement = 1e-14;
 
 }  // namespace

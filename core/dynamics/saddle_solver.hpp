@@ -1,4 +1,4 @@
-// The linear system every formulation, tangent, adjoint and projection solves,
+// The linear system that every formulation, tangent, adjoint and projection solves,
 //
 //   [ M  J' ] [ x  ]   [ b ]
 //   [ J  -c ] [ nu ] = [ g ]      c = 0: constrained (augmented Lagrangian);  c > 0: penalty, its alpha 1/c
@@ -7,18 +7,18 @@
 //
 //   S dx = (b - M x - J'nu) + J' alpha s,    dnu = alpha (J dx - s),      s = g - J x + c nu
 //
-// The first pass solves the system with 1/alpha in place of c: penalty, when c is just that. Further ones are the
-// augmented-Lagrangian iteration (c = 0) or its quasi-definite counterpart, written as corrections of both x and nu by
-// their residuals: iterative refinement, which also removes the rounding errors of S (its condition number grows with
-// alpha). Each gains a factor of about (1 - c alpha)/(1 + alpha j), j the eigenvalues of J inv(M) J', so alpha need not
-// be that of the penalty. Updating nu by alpha times the whole J x - g instead would leave it with an error of alpha
-// times the rounding unit. The map (b, g) -> (x, nu) after a fixed number of passes is symmetric, so tangent and
-// adjoint solves are exact transposes whatever their convergence.
+// The first pass solves the system with 1/alpha in place of c: exactly the penalty system if c = 1/alpha. Further
+// passes are the augmented-Lagrangian iteration (c = 0) or its quasi-definite counterpart. They correct both x and nu
+// by their residuals. This is iterative refinement, which also removes the rounding errors of S (its condition number
+// grows with alpha). Each pass reduces the error to about (1 - c alpha)/(1 + alpha j) of itself, j the eigenvalues of J
+// inv(M) J'. So alpha may differ from that of the penalty. An update of nu by alpha times the whole J x - g would leave
+// an error of alpha times the rounding unit. After a fixed number of passes the map (b, g) -> (x, nu) is symmetric. So
+// tangent and adjoint solves are exact transposes, converged or not.
 //
-// Redundant rows that disagree leave a residual s with J's = 0 that no x removes. Where c > 0, and alpha is the same in
-// all rows, nu lacks -s/c: it is added, and further passes remove what part of it was not redundant. Where c = 0, each
-// pass moves x by as much along directions that J hardly holds: one that gains nothing is taken back, so that tangent
-// and adjoint solves have equally many.
+// Redundant rows that disagree leave a residual s with J's = 0 that no x removes. If c > 0 and alpha is the same in all
+// rows, nu lacks -s/c. The solver adds it, and further passes remove its part that was not redundant. If c = 0, each
+// pass moves x by a similar amount along directions that J hardly constrains. The solver then undoes a pass that gains
+// nothing, so that tangent and adjoint solves have equally many.
 #pragma once
 
 #include <vector>
@@ -29,14 +29,14 @@
 
 namespace mbsopt {
 
-// Refinements after the first pass: at least `least`, at most `most`; between the two until |s| is at most tolerance
+// The number of refinements after the first pass is between `least` and `most`. They end when |s| is at most tolerance
 // times the larger of |g| and |x|, or stops falling.
 struct Refinements {
   int least = 0, most = 0;
   double tolerance = 0;
 };
 
-// Rows: J and M in space (ConstraintRows) or in the plane (PlanarRows).
+// Rows gives J and M: in space (ConstraintRows) or in the plane (PlanarRows).
 template <class Rows>
 class BlockSaddleSolver {
  public:
@@ -46,13 +46,13 @@ class BlockSaddleSolver {
   using Vector = std::vector<Vec<kUnknowns>>;
   using LaneVector = std::vector<Lanes<kUnknowns>>;
 
-  // alpha: that of S, per row.
+  // alpha is that of S, per row.
   BlockSaddleSolver(const MechanismData& data, const Eigen::VectorXd& alpha, double c = 0);
 
-  // S from J at the frames given; false where it is not positive definite. phi_ddot: the frames' Phiddot, laws left
-  // out.
+  // Factors S with J at the given frames. Returns false if S is not positive definite. phi_ddot receives the frames'
+  // Phiddot without laws.
   bool factor(const Frames& frames, Eigen::VectorXd* phi_ddot = nullptr);
-  // J alone.
+  // Evaluates J alone.
   void place(const Frames& frames) { rows_.evaluate(frames); }
   const Rows& rows() const { return rows_; }
   const Eigen::VectorXd& alpha() const { return alpha_; }
@@ -60,7 +60,7 @@ class BlockSaddleSolver {
   void solve(const Vector& b, const Eigen::VectorXd& g, const Settings& settings, Vector& x, Eigen::VectorXd& nu);
   void solve(const LaneVector& b, const LaneRows& g, const Settings& settings, LaneVector& x, LaneRows& nu);
 
-  // |s| after the last solve, relative as above, and itself.
+  // The residual |s| after the last solve: relative as above, and absolute.
   double residual_ratio() const { return residual_ratio_; }
   double residual_size() const { return residual_size_; }
   long factorisations() const { return factorisations_; }

@@ -1,5 +1,5 @@
-// The two spaces of mechanics, for code that is written once for both: a Space says how many unknowns a body has, how a
-// constraint sees its motion, and how its inertia depends on the parameters.
+// The two spaces of mechanics, for code that is written once for both. A Space gives the unknowns of a body, its motion
+// in a constraint, and the dependence of its inertia on the parameters.
 //
 //   InSpace   x = (r, turn about the body's three axes)         frame.hpp
 //   InPlane   x = (r along t1 and t2, turn about n)             planar_frame.hpp
@@ -36,7 +36,7 @@ struct InSpace {
   using Constraints = ConstraintTerms;
   using Rows = ConstraintRows;
 
-  // The rows of Phi that are solved for: all.
+  // The solver uses all rows of Phi.
   static RowLaws laws(const MechanismData& data) { return RowLaws(data); }
   static Eigen::Index rows(const MechanismData& data) { return data.m; }
   static void gather(const MechanismData&, const Eigen::VectorXd& of_phi, Eigen::VectorXd& x) { x = of_phi; }
@@ -44,7 +44,7 @@ struct InSpace {
 
   static FrameTangent still() { return FrameTangent::zero(); }
 
-  // b -= M' x of a body, M' in the directions of the parameters; and theta_bar -= gradient of eta'M x.
+  // b -= M' x of a body, M' in the directions of the parameters. The pull-back is theta_bar -= gradient of eta'M x.
   static void subtract_mass_tangent(const MechanismData& data, std::size_t body, const ParameterBlock& block,
                                     const Vec<6>& x, Lanes<6>& b) {
     Lanes<1> m_dir;
@@ -71,7 +71,7 @@ struct InPlane {
   using Constraints = PlanarConstraints;
   using Rows = PlanarRows;
 
-  // The rows that constrain motion in the plane.
+  // The solver uses the rows that constrain motion in the plane.
   static RowLaws laws(const MechanismData& data) { return RowLaws(data, data.planar->rows); }
   static Eigen::Index rows(const MechanismData& data) { return static_cast<Eigen::Index>(data.planar->rows.size()); }
   static void gather(const MechanismData& data, const Eigen::VectorXd& of_phi, Eigen::VectorXd& x) {
@@ -103,7 +103,7 @@ struct InPlane {
   }
 };
 
-// The numbers of the rows that are solved for.
+// Selects the entries of the rows that the solver uses.
 template <class Space>
 Eigen::VectorXd rows_of(const MechanismData& data, const Eigen::VectorXd& of_phi) {
   Eigen::VectorXd x(Space::rows(data));

@@ -1,14 +1,15 @@
 // The equations of motion in space, solved for the accelerations, with their tangent and adjoint (dynamics.hpp).
 //
-// Unknowns per body: z = (rddot, omegadot), omegadot in body axes; a = qddot = (rddot, pddot) follows from it
+// Unknowns per body: z = (rddot, omegadot), omegadot in body axes. a = qddot = (rddot, pddot) follows from z
 // (frame.hpp).
 //
 //   tangent:  [M J'; J -c] (z', lambda') = (b', c')                     b, c: motion_terms.hpp
 //   adjoint:  [M J'; J -c] (eta, mu) = (T'w, 0),  then  y_bar += d/dy [ w'a + eta'b + mu'c ]
-// The adjoint is matrix-free; tangents multiply with blocks that are evaluated once per state (motion_blocks.hpp).
 //
-// Owns every array that a right-hand side touches: one per thread. It allocates nothing after construction, but in the
-// first tangent.
+// The adjoint is matrix-free. Tangents multiply with blocks that are evaluated once per state (motion_blocks.hpp).
+//
+// Each thread needs its own SpatialDynamics: it owns every array that a right-hand side uses. Only the first tangent
+// allocates after construction.
 #pragma once
 
 #include <vector>
@@ -25,8 +26,8 @@ class SpatialDynamics {
  public:
   SpatialDynamics(const Mechanism& mechanism, const FormulationSettings& settings);
 
-  // ydot = (v, a) at (t, y); angles: the branch of each joint angle. False where S is not positive definite or a number
-  // is not finite. The solution stays available as z() and lambda(), f as loads(), and gamma().
+  // Computes ydot = (v, a) at (t, y). angles holds the branch of each joint angle. Returns false if S is not positive
+  // definite or a number is not finite. z(), lambda(), loads() (f) and gamma() then hold the solution.
   bool evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles, Eigen::Ref<Eigen::VectorXd> ydot);
   const std::vector<Vec<6>>& z() const { return terms_.z; }
   const Eigen::VectorXd& lambda() const { return terms_.lambda; }
@@ -36,15 +37,15 @@ class SpatialDynamics {
   // Prepares derivatives at a state whose solution (a = qddot, lambda) is known.
   bool linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                  const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
-  // As linearise(), right after evaluate() at this state: it uses the factor of evaluate().
+  // Does the same right after evaluate() at this state, with its factor.
   void linearise_here() { terms_.set_accelerations(); }
 
-  // y_dir: tangent of y (14n x lanes); ydot_dir: of (v, a). z_tangent(): of z.
+  // y_dir is the tangent of y (14n x lanes), ydot_dir that of (v, a). z_tangent() returns that of z.
   void tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir);
   void acceleration_tangent(const ParameterBlock& block, const LaneRows& y_dir, Eigen::Ref<LaneRows> a_dir);
   const std::vector<Lanes<6>>& z_tangent() const { return z_dir_; }
-  // w: cotangent of (v, a); adds to the cotangents of y, of the differentiated fields, and of the parameters in laws.
-  // motion: a cotangent of z and lambda themselves beside it.
+  // Adds to the cotangents of y, of the differentiated fields, and of the parameters in laws. `w` is the cotangent of
+  // (v, a), motion one of z and lambda themselves.
   void add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
                    Eigen::VectorXd& rho_bar, const Motion* motion = nullptr);
 

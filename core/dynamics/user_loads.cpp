@@ -8,7 +8,7 @@
 namespace mbsopt {
 namespace {
 
-// The coordinates of the bodies of a force, one after another.
+// The position and number of the coordinates of a force's bodies, one after another.
 Eigen::Index block_of(std::size_t k) { return 7 * static_cast<Eigen::Index>(k); }
 Eigen::Index size_of(const UserForceData& f) { return block_of(f.bodies.size()); }
 

@@ -1,9 +1,9 @@
-// The forces of users inside the equations of motion: from the 7 coordinates of a body, Q, to its 6 loads T'Q, with
-// derivatives. Virtual work e'Q with e = T(p) eta = (eta_r, 1/2 G(p)' eta_theta).
+// The forces of users inside the equations of motion. They turn the 7 coordinates of a body's force Q into its 6 loads
+// T'Q, with derivatives. The virtual work is e'Q with e = T(p) eta = (eta_r, 1/2 G(p)' eta_theta).
 //
 // Mass terms of users are loads on the accelerations z themselves: -M z - h.
 //
-// Owns the numbers of one evaluation: one per thread, nothing is allocated after construction.
+// Each thread needs its own UserLoads: it owns the numbers of one evaluation. It allocates nothing after construction.
 #pragma once
 
 #include <vector>
@@ -17,14 +17,14 @@ class UserLoads {
   explicit UserLoads(const MechanismData& data);
 
   using Bodies = std::vector<BodyState>;  // the ground first
-  // Mass terms at accelerations z, per body without the ground; null: at z = 0. The other functions take them at z.
+  // Accelerations z per body without the ground, for mass terms. Null means z = 0. The other functions take them at z.
   using Accelerations = std::vector<Vec<6>>;
   void add_loads(const ForceTerms::At& at, const Bodies& bodies, const Accelerations* z, std::vector<Vec<6>>& loads);
   // Derivatives of the loads in the state as blocks, and in the directions of the parameters.
   void add_blocks(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z, MotionBlocks& out);
   void add_field_tangent(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z,
                          const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs);
-  // Gradient of the virtual work sum load'eta; eta: per body, without the ground.
+  // Adds the gradient of the virtual work sum load'eta; eta is per body, without the ground.
   void add_pull_back(const ForceTerms::At& at, const Bodies& bodies, const Accelerations& z,
                      const std::vector<Vec<6>>& eta, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& rho_bar);
 

@@ -1,4 +1,4 @@
-// Counts in sentences: "1 step", "3 steps", "2 bodies".
+// Writes counts for sentences: "1 step", "3 steps", "2 bodies".
 #pragma once
 
 #include <concepts>
@@ -7,7 +7,7 @@
 
 namespace mbsopt {
 
-// many: where it is not just `one` with an s.
+// many is the plural if it is not `one` with an s.
 std::string counted(std::integral auto count, std::string_view one, std::string_view many = "") {
   std::string text = std::to_string(count) + ' ';
   if (count == 1) return text += one;

@@ -31,7 +31,7 @@ Eigen::VectorXd slopes_through(const std::vector<double>& times, const std::vect
     m << d(0) - curvature * h(0), d(0) + curvature * h(0), d(0) + curvature * (h(0) + 2 * h(1));
     return m / mean;
   }
-  std::vector<double> above(n);  // what is right of the diagonal, divided by the pivot
+  std::vector<double> above(n);  // entries right of the diagonal, divided by the pivot
   const auto eliminate = [&](std::size_t i, double below, double diagonal, double right, double b) {
     const double pivot = i == 0 ? diagonal : diagonal - below * above[i - 1];
     above[i] = right / pivot;

@@ -13,10 +13,10 @@ class CubicSpline {
     double f, f_t, f_tt, f_ttt;
   };
 
-  // At least two samples, times strictly increasing (std::invalid_argument otherwise).
+  // Needs at least two samples and strictly increasing times. Otherwise it throws std::invalid_argument.
   CubicSpline(std::vector<double> times, std::vector<double> values);
 
-  // Outside the samples the end polynomials go on.
+  // Outside the samples the end polynomials continue.
   Jet operator()(double t) const;
   const std::vector<double>& times() const { return times_; }
   const std::vector<double>& values() const { return values_; }

@@ -2,8 +2,8 @@
 //   hold      y_i from x_i to x_{i+1}               jumps at samples
 //   linear    straight lines between samples        kinks at samples
 //   spline    C2 cubic, not-a-knot at both ends     (cubic_spline.hpp)
-// or a routine, smooth, with its derivatives. It counts as a spline without samples.
-// The first and the last piece go on outside the samples. At a sample the piece to its right counts.
+// A smooth routine with its derivatives is a curve, too. It counts as a spline without samples. The first and the last
+// piece continue outside the samples. At a sample, the curve takes the piece to its right.
 //
 //   const Curve torque(Interpolation::linear, {0, 0.1, 0.2}, {1, 3, 2});
 //   torque.at(0.05);      // 2
@@ -22,10 +22,10 @@ enum class Interpolation { hold, linear, spline };
 
 class Curve {
  public:
-  // At least two samples, x strictly increasing (std::invalid_argument otherwise).
+  // Needs at least two samples and strictly increasing x. Otherwise it throws std::invalid_argument.
   Curve(Interpolation how, std::vector<double> x, std::vector<double> y);
-  // f(x, order): the value (order 0) and derivatives at x, from several threads. The law of a drive takes orders 0 to
-  // 2, one more where varied parameters enter its argument, and two more for Hessians.
+  // f(x, order) returns the value (order 0) or a derivative at x. Several threads may call it. The law of a drive needs
+  // orders 0 to 2, one more if its argument depends on varied parameters, and two more for Hessians.
   explicit Curve(std::function<double(double x, int order)> f);
 
   double at(double x, int order = 0) const;  // value, or derivative of that order

@@ -46,7 +46,7 @@ std::string did_you_mean(std::string_view word, const std::vector<std::string>& 
       nearest = &candidate;
     }
   }
-  // A wrong letter in a name of one letter is another name.
+  // A one-letter name with a wrong letter is another name.
   if (nearest == nullptr || best > allowed || best >= std::max(word.size(), nearest->size())) return "";
   return " (did you mean '" + *nearest + "'?)";
 }

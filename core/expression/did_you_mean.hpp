@@ -1,4 +1,4 @@
-// The name a user may have meant, for error messages.
+// Finds the name that a user may have meant, for error messages.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace mbsopt {
 
-// " (did you mean 'stiffness'?)", or "" when no candidate is near. Nearness: Damerau-Levenshtein distance (insertions,
-// deletions, substitutions, swaps of neighbours), letters' case not counted, at most a third of the word's length.
+// Returns " (did you mean 'stiffness'?)", or "" if no candidate is near. The Damerau-Levenshtein distance (insertions,
+// deletions, substitutions, swaps of neighbours), without case, must be at most a third of the word's length.
 std::string did_you_mean(std::string_view word, const std::vector<std::string>& candidates);
 
 // "a, b, c"

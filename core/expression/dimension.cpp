@@ -193,7 +193,7 @@ std::string known_units() {
 }
 
 std::string to_string(const Dimension& dimension) {
-  // As engineers write them, instead of kg m/s^2 and so on.
+  // Units in the form that engineers write, instead of kg m/s^2 and so on.
   constexpr std::pair<const char*, Dimension> kNamed[] = {{"N", dimension::kForce},
                                                           {"N m", dimension::kTorque},
                                                           {"N/m", dimension::kStiffness},

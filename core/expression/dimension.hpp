@@ -1,4 +1,4 @@
-// Physical dimension of a number with a unit, as powers of the SI base units that mechanics needs.
+// The physical dimension of a number with a unit, as powers of the SI base units of mechanics.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@
 namespace mbsopt {
 
 struct Dimension {
-  // m, kg, s, rad.  Angles are kept apart so that "[deg]" does not fit a length. They are not told from pure numbers
-  // where they meet other units: N m/rad is N m, and rad/s is 1/s.
+  // m, kg, s, rad. Angles have a power of their own, so that "[deg]" does not fit a length. With other units they count
+  // as pure numbers: N m/rad is N m, and rad/s is 1/s.
   std::array<int, 4> power{0, 0, 0, 0};
   bool operator==(const Dimension&) const = default;
   bool is_none() const { return *this == Dimension{}; }
@@ -20,7 +20,7 @@ Dimension operator*(const Dimension& a, const Dimension& b);
 Dimension operator/(const Dimension& a, const Dimension& b);
 Dimension pow(const Dimension& a, int exponent);
 
-// Whether a quantity of one dimension can stand where the other is asked for: equal but for the angle.
+// Whether a quantity of one dimension may replace one of the other: the powers are equal except for the angle.
 bool compatible(const Dimension& a, const Dimension& b);
 
 struct Unit {
@@ -28,9 +28,8 @@ struct Unit {
   Dimension dimension;
 };
 
-// "N/mm", "kg m^2", "deg", "1/s", "N*s/m", "1/(m s)": factors, side by side or with "*", and quotients from left to
-// right. A product after "/" has to be in brackets ("N/m s" could be read in two ways). nullopt when it is not a unit
-// known here.
+// Reads "N/mm", "kg m^2", "deg", "1/s", "N*s/m", "1/(m s)": factors, side by side or with "*", and quotients from left
+// to right. A product after "/" needs brackets, because "N/m s" is ambiguous. Returns nullopt for an unknown unit.
 std::optional<Unit> parse_unit(std::string_view text);
 std::string known_units();                          // "m, mm, ..."
 std::string to_string(const Dimension& dimension);  // "N/m", "kg m"

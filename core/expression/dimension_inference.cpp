@@ -21,7 +21,7 @@ struct Inferred {
 
 bool is_pure(const Known& d) { return d && compatible(*d, Dimension{}); }
 
-// Of operands that must agree: sums, minima, ...
+// The dimension of operands that must agree, as in sums and minima.
 Known agreed(const Known& a, const Known& b, const SyntaxNode& node) {
   if (!a || a->is_none()) return b && !(b->is_none()) ? b : a;
   if (!b || b->is_none()) return a;

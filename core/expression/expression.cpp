@@ -26,7 +26,7 @@ SyntaxTree tree_of(double value) {
   return tree;
 }
 
-// Appends the nodes of an expression, and returns where it ends.
+// Appends the nodes of an expression, and returns the index of its last node.
 int append(SyntaxTree& tree, const Expression& expression) {
   const int shift = static_cast<int>(tree.nodes.size());
   for (SyntaxNode node : expression.tree().nodes) {
@@ -39,7 +39,7 @@ int append(SyntaxTree& tree, const Expression& expression) {
 
 }  // namespace
 
-// Builds expressions of expressions.
+// Builds an expression from others.
 struct ExpressionMaker {
   static Expression of(SyntaxTree tree) {
     complete(tree);

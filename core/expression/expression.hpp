@@ -17,7 +17,7 @@ namespace mbsopt {
 class Curve;        // curve.hpp
 struct SyntaxTree;  // syntax_tree.hpp
 
-// A text that is not an expression: what is wrong and where (offset in bytes from the start of the text).
+// Reports a text that is not an expression: the fault and its place (offset in bytes from the start of the text).
 class ExpressionError : public std::runtime_error {
  public:
   ExpressionError(const std::string& what, std::size_t at) : std::runtime_error(what), offset(at) {}
@@ -28,7 +28,7 @@ class Expression {
  public:
   Expression() : Expression(0.0) {}
   Expression(double value);  // NOLINT: a number is an expression
-  // Grammar: problem-format, "Numbers, expressions, names". Throws ExpressionError.
+  // docs/expressions.md describes the grammar. Throws ExpressionError.
   static Expression parse(std::string_view text);
 
   // f(argument), f a function through samples; the text calls it `name`.
@@ -46,7 +46,7 @@ class Expression {
   std::shared_ptr<const SyntaxTree> tree_;
 };
 
-// The functions of one number that an expression calls, and what it gives them.
+// The functions of one number that an expression calls, and their arguments.
 struct CurveCall {
   std::shared_ptr<const Curve> curve;
   Expression argument;

@@ -1,7 +1,7 @@
-// The operations an expression is made of: value, first and second partial derivatives. The one place where the
-// calculus of expressions is written; the parser, the folding of constants and every sweep of a Program use this table.
+// The operations of an expression: value, first and second partial derivatives. The calculus of expressions is written
+// only here. The parser, the folding of constants and every sweep of a Program use this table.
 //
-// Derivatives are exact wherever they exist. Where they do not exist:
+// Derivatives are exact wherever they exist. Elsewhere:
 //   abs at 0                    0 (the middle of its subdifferential)
 //   min, max of equal operands  those of the first operand
 //   sqrt at 0                   infinite
@@ -41,7 +41,7 @@ enum class Operation : unsigned char {
   smooth_abs,  // sqrt(a^2 + b^2)
   sign,        // -1, 0 or 1: the derivative of abs; only derivative programs use it
   not_above,   // 1 where a <= b, else 0: the choice of min and max; only derivative programs use it
-  curve,       // a function through samples (curve.hpp) of a; whoever holds the curve evaluates it
+  curve,       // a function through samples (curve.hpp) of a; the owner of the curve evaluates it
 };
 
 // 0 for number and name, else 1 or 2.
@@ -59,7 +59,7 @@ struct SecondPartials {
 inline FirstPartials first_partials(Operation operation, double a, double b, double value);
 inline SecondPartials second_partials(Operation operation, double a, double b, double value);
 
-// Functions as users call them.
+// Functions in the form that users call.
 //   smooth_abs(x, eps)    = sqrt(x^2 + eps^2)                          eps: 1e-6 unless given
 //   smooth_max(a, b, eps) = (a + b + smooth_abs(a - b, eps)) / 2
 //   spline(x, [x0, ...], [y0, ...]), table(x, [x0, ...], [y0, ...])    y may hold expressions
@@ -96,7 +96,7 @@ inline constexpr FunctionEntry kFunctions[] = {
     {"table", Operation::curve, 3, 3},
 };
 
-// Inline: a Program spends its time here.
+// This is inline because a Program spends its time here.
 
 inline double apply(Operation operation, double a, double b) {
   switch (operation) {

@@ -23,7 +23,7 @@ namespace mbsopt {
 namespace {
 
 constexpr int kDeepestNesting = 200;
-// Each ordinate that is no number has a curve of its own through as many samples.
+// Each ordinate that is not a number has its own curve through as many samples.
 constexpr std::size_t kMostOrdinates = 500;
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -201,7 +201,7 @@ class Parser {
     return lower(*function, arguments, offset);
   }
 
-  // Through samples whose ordinates y_j may be expressions. The curve is linear in them:
+  // Reads a curve through samples whose ordinates y_j may be expressions. The curve is linear in them:
   //   f(x) = sum_j y_j f_j(x),   f_j the curve through 1 at x_j and 0 at all other abscissae
   int curve(const std::string& name, std::size_t offset) {
     const Nested level(*this);
@@ -278,7 +278,7 @@ class Parser {
     return entries;
   }
 
-  // Functions of more or fewer arguments than their operation has.
+  // Writes functions that have more or fewer arguments than an operation in terms of operations.
   int lower(const FunctionEntry& function, const std::vector<int>& arguments, std::size_t offset) {
     if (function.name == "smooth_max") {
       const int a = arguments[0], b = arguments[1];

@@ -91,7 +91,8 @@ double Program::value(std::span<const double> x, Scratch& scratch) const {
 }
 
 namespace {
-// A zero seed stays zero whatever it is multiplied by: what does not reach the result does not disturb its derivative.
+// A zero seed stays zero for every factor, also an infinite one: values that do not reach the result do not disturb its
+// derivative.
 double seeded(double seed, double factor) { return seed == 0 ? 0 : seed * factor; }
 }  // namespace
 

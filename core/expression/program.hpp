@@ -1,4 +1,4 @@
-// An Expression compiled against a table of symbols: a straight list of operations with value, exact gradient
+// An Expression compiled against a table of symbols: a straight list of operations. It has a value, an exact gradient
 // (reverse sweep) and exact directional derivatives of both (forward over reverse, for second order).
 //
 //   Symbols symbols;
@@ -24,13 +24,13 @@
 
 namespace mbsopt {
 
-// Names an expression may use: inputs (numbered in the order added) and definitions (sub-expressions of them). A name
-// is one or the other, and is added once (std::invalid_argument otherwise).
+// The names in an expression: inputs (numbered in the order added) and definitions (sub-expressions of them). A name is
+// one of both and is added once; otherwise Symbols throws std::invalid_argument.
 class Symbols {
  public:
   int add_input(const std::string& name);  // index of the input
   void add_definition(const std::string& name, const Expression& expression);
-  // A definition that counts among the inputs, so that the next ones keep their numbers; no program reads it.
+  // Adds a definition that counts among the inputs, so that the next inputs keep their numbers. No program reads it.
   void add_defined_input(const std::string& name, const Expression& expression);
   int inputs() const { return static_cast<int>(input_names_.size()); }
   const std::vector<std::string>& input_names() const { return input_names_; }
@@ -53,7 +53,8 @@ class UnknownName : public std::runtime_error {
 
 class Program {
  public:
-  // Sized once, reused by every evaluation; one per thread. A scratch serves any program not larger than its maker.
+  // A scratch is sized once and serves every evaluation of one thread. It fits any program that is not larger than its
+  // maker.
   struct Scratch {
     std::vector<double> value, adjoint, tangent, adjoint_tangent;
   };
@@ -67,12 +68,12 @@ class Program {
   double value(std::span<const double> x, Scratch& scratch) const;
   // Returns the value; gradient += scale * d value / d x   (gradient: size of x)
   double add_gradient(std::span<const double> x, double scale, std::span<double> gradient, Scratch& scratch) const;
-  // Forward over reverse: gradient += scale * g, gradient_tangent += scale * (d g / d x) x_tangent, and the value's own
-  // tangent is returned.
+  // Forward over reverse: gradient += scale * g, gradient_tangent += scale * (d g / d x) x_tangent. Returns the tangent
+  // of the value.
   double add_gradient_tangent(std::span<const double> x, std::span<const double> x_tangent, double scale,
                               std::span<double> gradient, std::span<double> gradient_tangent, Scratch& scratch) const;
 
-  // The program that computes d value / d x[input], itself differentiable; operation.hpp says what holds at kinks.
+  // Returns the program of d value / d x[input], which can be differentiated again. operation.hpp defines it at kinks.
   Program derivative(int input) const;
 
   bool is_constant() const { return used_inputs_.empty(); }

@@ -1,5 +1,4 @@
-// Compiles expressions and derivatives of programs into instructions; what program.cpp and program_derivative.cpp
-// share.
+// Compiles expressions and derivatives of programs into instructions, for program.cpp and program_derivative.cpp.
 #pragma once
 
 #include <algorithm>
@@ -17,8 +16,8 @@ namespace mbsopt {
 
 struct SampledFunction;  // sampled_functions.hpp
 
-// Turns a tree and the definitions it uses into instructions: equal sub-expressions become one (value numbering),
-// constants are folded, and factors that cannot matter (x^0, 0 x) drop out, so that used_inputs() is structural.
+// Turns a tree and its definitions into instructions. Equal sub-expressions become one (value numbering), and constants
+// are folded. Factors without effect (x^0, 0 x) disappear, so that used_inputs() is structural.
 class ProgramBuilder {
  public:
   ProgramBuilder(const Symbols& symbols, Program& program) : symbols_(symbols), program_(program) {}
@@ -33,7 +32,8 @@ class ProgramBuilder {
 
   static std::vector<Program> switches_of(const Program& program);                   // program_switches.hpp
   static std::vector<SampledFunction> sampled_functions_of(const Program& program);  // sampled_functions.hpp
-  // Of two instructions of another program: the first (how: name), its cosine (cos) or their difference (subtract).
+  // Builds the first of two instructions of another program (how: name), its cosine (cos) or their difference
+  // (subtract).
   void build_switch(const Program& of, Operation how, int a, int b);
 
  private:
@@ -124,7 +124,7 @@ class ProgramBuilder {
     return add({Operation::curve, a, -1, static_cast<double>(place)});
   }
 
-  // An instruction of another program, its operands a and b as they are here.
+  // Copies an instruction of another program; a and b are its operands in this program.
   int copied(const Program& of, const Instruction& in, int a, int b) {
     if (in.operation == Operation::number) return number(in.constant);
     if (in.operation == Operation::name) return add({Operation::name, in.a, -1, 0});

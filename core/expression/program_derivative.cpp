@@ -1,11 +1,11 @@
-// Derivative programs. Laws of motion need f, f_t and f_tt with the parameters' derivatives of all three: two of these
-// and the reverse sweep of each give them exactly.
+// Derivative programs. Laws of motion need f, f_t and f_tt with the parameters' derivatives of all three. Two
+// derivative programs and the reverse sweep of each give them exactly.
 #include "core/expression/program_builder.hpp"
 
 namespace mbsopt {
 
-// df/da (first) or df/db of one instruction as instructions; operands and value are instructions of this builder.
-// Where no derivative exists, those of operation.hpp hold: abs' = sign, min and max take the operand in use.
+// Builds df/da (first) or df/db of one instruction. operands and value are instructions of this builder. Where no
+// derivative exists, the rules of operation.hpp hold: abs' = sign, min and max take the operand in use.
 int ProgramBuilder::partial(const Program& of, const Instruction& in, int a, int b, int value, bool first) {
   using Op = Operation;
   auto square = [&](int x) { return operation(Op::multiply, x, x); };

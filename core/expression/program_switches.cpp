@@ -8,7 +8,7 @@
 
 namespace mbsopt {
 
-// how: cos of a, a - b (subtract), or a itself (name).
+// how selects cos of a, a - b (subtract), or a itself (name).
 void ProgramBuilder::build_switch(const Program& of, Operation how, int a, int b) {
   const std::size_t size = static_cast<std::size_t>(std::max(a, b)) + 1;
   std::vector<char> needed(size, 0);
@@ -61,7 +61,7 @@ std::vector<Program> ProgramBuilder::switches_of(const Program& program) {
       case Operation::not_above:
         jump(Operation::subtract, in.a, in.b);
         break;
-      // A denominator may touch zero where these choose: x/abs(x), x/sqrt(x^2).
+      // A denominator may touch zero at these choices: x/abs(x), x/sqrt(x^2).
       case Operation::abs:
       case Operation::smooth_abs:
         choice(Operation::name, in.a);

@@ -1,7 +1,7 @@
-// Where the value of a program may jump: functions of its inputs, at whose zeros it may. Denominators, bases of powers,
-// both arguments of atan2, the cosine of what tan is taken of, and what kinks, squares and the choices of derivatives
-// depend on, since denominators may touch zero there. It need not jump (sin(x)/x); functions without inputs are left
-// out, and all of them where nothing can jump.
+// The switches of a program: functions of its inputs at whose zeros its value may jump. They are denominators, bases of
+// powers, both arguments of atan2, and the cosine of the argument of tan. The arguments of kinks, squares and choices
+// of derivatives are switches, too, since denominators may touch zero there. The value need not jump (sin(x)/x).
+// Functions without inputs are left out. The list is empty if nothing can jump.
 //
 //   for (const Program& s : switches_of(law)) s.value(inputs, scratch);   // abs(t - tp)/(t - tp): t - tp
 #pragma once

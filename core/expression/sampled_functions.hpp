@@ -1,5 +1,5 @@
-// The functions through samples in a program (table(), spline(), signals and their derivatives), each with the program
-// of its argument, of the same inputs.
+// The functions through samples in a program (table(), spline(), signals and their derivatives). Each comes with the
+// program of its argument, which has the same inputs.
 //
 //   for (const SampledFunction& f : sampled_functions_of(law)) f.curve->at(f.argument.value(inputs, scratch), f.order);
 #pragma once

@@ -1,5 +1,5 @@
-// A parsed expression: its operations in the order they are evaluated. Operands come before the operation
-// that uses them and may be used more than once, so that whoever reads a tree does it in one loop, however deep it is.
+// A parsed expression: its operations in the order of evaluation. Operands come before the operation that uses them,
+// and several operations may share them. So one loop reads a tree of any depth.
 #pragma once
 
 #include <cstddef>
@@ -19,10 +19,10 @@ struct SyntaxNode {
   Operation operation = Operation::number;
   int a = -1, b = -1;                       // operands: earlier nodes
   double value = 0;                         // of a number, in SI
-  std::optional<Dimension> unit;            // of a number that has one; none: it may stand for anything
+  std::optional<Dimension> unit;            // of a number with a unit; without, it may have any dimension
   std::string name;                         // of a name
   std::shared_ptr<const Curve> curve = {};  // of a curve
-  std::size_t offset = 0;                   // where it stands in the text [bytes]
+  std::size_t offset = 0;                   // its place in the text [bytes]
 };
 
 struct SyntaxTree {
@@ -32,13 +32,13 @@ struct SyntaxTree {
   std::optional<double> number;    // the value, where there are no names
 };
 
-// The value of a node whose operands have the values a and b; not of a name.
+// The value of a node whose operands have the values a and b. The node must not be a name.
 inline double value_of(const SyntaxNode& node, double a, double b) {
   if (node.operation == Operation::number) return node.value;
   return node.curve ? node.curve->at(a) : apply(node.operation, a, b);
 }
 
-// The names in its nodes, and the value where there are none.
+// Collects the names in the tree's nodes, and computes its value if there are none.
 void complete(SyntaxTree& tree);
 
 SyntaxTree parse_expression(std::string_view text);  // throws ExpressionError

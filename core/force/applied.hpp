@@ -1,5 +1,5 @@
-// A force at a point of a body, or a torque on a body; its three components c are a user's expressions of t, parameters
-// and sensors of the state, evaluated by the caller.
+// A force at a point of a body, or a torque on a body. The caller evaluates its three components c: a user's
+// expressions of t, parameters and sensors of the state.
 //   force    F = c, or A c in the body's axes       virtual work  F'(r_eta + A_eta s)             [N]
 //   torque   T = c, or A c in the body's axes       virtual work  (A'T)'theta_eta, or c'theta_eta   [N m]
 // Loads: the force in global axes, the moment about the centre of mass in body axes.
@@ -20,15 +20,15 @@ struct AppliedForce {
   Vector3d s = Vector3d::Zero();  // the point, from the centre of mass, body axes [m]
   int slot = -1;
   std::array<Program, 3> components;  // inputs: all parameters, t, all sensors of the scene
-  std::vector<int> parameters;        // that the components use
+  std::vector<int> parameters;        // used by the components
   std::vector<int> sensors;           // the same
 
   void add_load(const Vector3d& c, const Frame& f, Vec<6>& load) const;
 
-  // Gradient of the virtual work load'eta in the frame (eta held fixed) and the point; returns that in c.
+  // Adds the gradient of the virtual work load'eta in the frame (eta held fixed) and the point. Returns that in c.
   Vector3d pull_back(const Vector3d& c, const Frame& f, FrameBar& bar, Eigen::VectorXd& theta_bar) const;
 
-  // Tangent of the load; dc, ds: directions of c and s (null: constant).
+  // The tangent of the load. dc and ds are directions of c and s; a null ds is constant.
   void tangent(const Vector3d& c, const Lanes<3>& dc, const Frame& f, const FrameTangent& t, const Lanes<3>* ds,
                Lanes<6>& load) const;
 };

@@ -1,5 +1,5 @@
-// A force written in C++ as a mechanism calls it: what it throws names it, and one that a problem names has parameters
-// of its own, each a function of the scene's:
+// A force written in C++ as a mechanism calls it. Its exceptions carry its name. A force that a problem names has its
+// own parameters, each a function of the scene's:
 //
 //   p = p(rho),  constant in a mechanism          Q_rho = Q_p dp/drho,  L_rho = L_p dp/drho
 #pragma once
@@ -25,7 +25,7 @@ class BoundForce final : public UserForce, public InertialLoad {
   using VecOut = UserForce::VecOut;
   using MatOut = UserForce::MatOut;
 
-  // values: none where its rho is that of the scene. name: for messages.
+  // values is absent if the force takes the rho of the scene. name appears in messages.
   BoundForce(std::shared_ptr<const UserForce> force, std::vector<std::string> bodies, std::optional<TermValues> values,
              std::string name)
       : force_(std::move(force)), bodies_(std::move(bodies)), values_(std::move(values)), name_(std::move(name)) {}
@@ -55,7 +55,7 @@ class BoundForce final : public UserForce, public InertialLoad {
   std::string name_;
 };
 
-// On which a force acts that a problem names.
+// The bodies on which a force of a problem acts.
 std::vector<std::string> bodies_of(const UserForceSpec& force);
 
 }  // namespace mbsopt

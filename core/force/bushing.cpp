@@ -6,8 +6,8 @@
 
 namespace mbsopt {
 
-// The terms of the virtual work: D = P2 - P1, M = A1'A2, and the coordinates; each at rest, its rate, its virtual
-// change.
+// The terms of the virtual work: D = P2 - P1, M = A1'A2, and the coordinates. Each has its value, its rate and its
+// virtual change.
 struct Bushing::Coordinates {
   Vector3d D, Ddot, D_eta, d, ddot, d_eta;
   Matrix3d M, Mdot, M_eta;
@@ -24,7 +24,7 @@ namespace {
 
 // g(c) = arccos(c)/sqrt(1 - c^2) with two derivatives; from (1 - c^2) g' = c g - 1. Near c = 1, in x = 1 - c:
 //   g = sum_k b_k x^k,  b_0 = 1,  b_k = b_(k-1) k/(2k + 1)          radius of convergence 2
-// For c > 1, off the rotations, where no state stays, g goes on as arcosh(c)/sqrt(c^2 - 1).
+// c > 1 lies off the rotations, and no state stays there. g continues as arcosh(c)/sqrt(c^2 - 1).
 struct RotationFactor {
   double g, g1, g2;
 };

@@ -1,17 +1,18 @@
-// Bushing: springs and dampers along and about the three axes of body 1, between point 1 of body 1 and point 2 of
-// body 2.
+// Bushing: springs and dampers along and about the three axes of body 1, between point 1 of body 1 and point 2 of body
+// 2.
 //   d     = A1'(P2 - P1)                     ddot its rate as body 1 sees it, = A1dot'(P2 - P1) + A1'(P2dot - P1dot)
 //   R     = A1'A2 R0'                        R0 = A1'A2 as the file places the bodies, so that R = I there
 //   theta = g(c) a                           rotation vector of R: a = vee(R - R')/2 = sin(phi) n,  c = (tr R - 1)/2
 //           g(c) = arccos(c)/sqrt(1 - c^2) = phi/sin(phi), analytic for c > -1, with g = 1 at rest
 //   V     = (d'K d + theta'Kt theta)/2       D = (ddot'C ddot + thetadot'Ct thetadot)/2      all four diagonal
 //   virtual work  -f'd_eta - tau'theta_eta,  f = K d + C ddot [N],  tau = Kt theta + Ct thetadot [N m]
-// d_eta, theta_eta are the coordinates' virtual changes: the loads are the exact gradient of V (a bushing without
-// damping conserves energy), D takes power 2 D, and the wrench on the two bodies balances at any deflection; the torque
-// on body 2 is -J'tau with the Jacobian J of the rotation vector, not -tau, unless theta is small.
 //
-// Singular at a relative rotation of half a turn, where theta jumps from pi n to -pi n; keep below it. Rotations about
-// several axes at once are measured by the one rotation vector, which at some tens of degrees is not a sequence of
+// d_eta and theta_eta are the coordinates' virtual changes. So the loads are the exact gradient of V: a bushing without
+// damping conserves energy. The dampers take power 2 D. The wrench on the two bodies balances at any deflection. The
+// torque on body 2 is -J'tau with the Jacobian J of the rotation vector; it equals -tau only if theta is small.
+//
+// The bushing is singular at a relative rotation of half a turn, where theta jumps from pi n to -pi n: keep below it.
+// One rotation vector measures rotations about several axes at once. At some tens of degrees it is not a sequence of
 // angles: Bauchau, "Flexible Multibody Dynamics" (2011), section 13.3.
 #pragma once
 
@@ -35,13 +36,13 @@ struct Bushing {
   std::array<int, 2> bodies() const { return {body1, body2}; }
   void add_load(const ForceInputs&, const Frame& f1, const Frame& f2, Vec<6>& load1, Vec<6>& load2) const;
 
-  // Gradient of the virtual work (load1'eta1 + load2'eta2) in the frames (eta held fixed) and in the fields.
+  // Adds the gradient of the virtual work (load1'eta1 + load2'eta2) in the frames (eta held fixed) and in the fields.
   void pull_back(const ForceInputs&, const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
                  Eigen::VectorXd& theta_bar, Eigen::VectorXd&) const;
 
   struct At {};
   At at(const ForceInputs&, const Frame&, const Frame&) const { return {}; }
-  // Directions of the fields; null: constant.
+  // Directions of the fields; a null one is constant.
   struct FieldLanes {
     const Lanes<3>*s1 = nullptr, *s2 = nullptr;
     const Lanes<9>* R0 = nullptr;

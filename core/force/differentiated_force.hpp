@@ -8,10 +8,10 @@
 //     }
 //   };
 //
-// load() has the arguments of UserForce::Q; T is double or a dual number, and Q arrives zeroed. Functions of numbers
-// are called without std:: (sqrt(x), sin(x)). Branches on values are allowed, where the function stays smooth. sqrt and
-// norm have no derivative at 0: add a small number inside. Cost: a derivative takes about one load() per 7 coordinates
-// of its bodies (K, C) or 7 parameters (Q_rho), each with 8 numbers in place of one.
+// load() has the arguments of UserForce::Q. T is double or a dual number, and Q arrives zeroed. Call functions of
+// numbers without std:: (sqrt(x), sin(x)). Branches on values are allowed where the function stays smooth. sqrt and
+// norm have no derivative at 0: add a small number inside. A derivative costs about one load() per 7 coordinates of its
+// bodies (K, C) or 7 parameters (Q_rho), each with 8 numbers in place of one.
 #pragma once
 
 #include <stdexcept>
@@ -55,7 +55,7 @@ struct DifferentiatedForce : UserForce {
   const Force& own() const { return static_cast<const Force&>(*this); }
 };
 
-// Mass that a user adds to one body, written once: M, L_q, L_v and L_rho follow from its L.
+// The mass that a user adds to one body, written once: M, L_q, L_v and L_rho follow from its L.
 //
 //   struct AddedMass final : DifferentiatedInertia<AddedMass> {  // of a sphere: rho_0 on the centre of mass
 //     std::vector<std::string> bodies() const override { return {"ball"}; }

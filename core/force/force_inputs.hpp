@@ -1,4 +1,4 @@
-// The parts of a state that a force reads beside the frames of its bodies, and the gradient in its fields.
+// The parts of a state that a force reads beside the frames of its bodies, and the gradient in the force's fields.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace mbsopt {
 
-// The value on whose turn a joint's angle is; 0 where none is followed.
+// The value that selects the turn of a joint's angle; 0 if no angle is followed.
 inline double branch(const Eigen::VectorXd& angles, int angle) {
   return angle >= 0 && angle < angles.size() ? angles(angle) : 0.0;
 }

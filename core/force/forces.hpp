@@ -1,12 +1,12 @@
-// The kinds of forces between two bodies, of which one may be the ground; nothing else lists them. Each kind has
+// The kinds of forces between two bodies, one of which may be the ground; nothing else lists them. Each kind has
 //   bodies()                       the two
 //   add_load, pull_back            its loads, and the gradient of their virtual work
 //   at, tangent                    what the tangent needs of a state, and the tangent of the loads in the two frames
 //   add_field_tangent              the same in the directions of fields and parameters
-//   potential, pull_back_potential 0 where it has none
-//   conserves_energy               whether it does no work but that of its potential
+//   potential, pull_back_potential 0 if it has none
+//   conserves_energy               whether all of its work is that of its potential
 //   natural_energy                 a scale of its potential [J]
-// and one with a Law also measured, pull_back_measured: the law's number, which the sensor of a force needs.
+// A kind with a Law also has measured and pull_back_measured: the law's value, which the sensor of a force needs.
 #pragma once
 
 #include <concepts>
@@ -43,7 +43,7 @@ class ForceLists {
   }
   bool empty() const { return size() == 0; }
 
-  // visitor(force), kind by kind; with two arguments visitor(force, place).
+  // Calls visitor(force), kind by kind, or visitor(force, place) if it takes two arguments.
   template <class Visitor>
   void for_each(Visitor&& visitor) const {
     std::size_t kind = 0;
@@ -65,7 +65,7 @@ class ForceLists {
     for_each([&](const auto& force) { all = all && holds(force); });
     return all;
   }
-  // visitor(force) where its kind has a law.
+  // Calls visitor(force) if its kind has a law.
   template <class Visitor>
   void visit_law(Place place, Visitor&& visitor) const {
     std::size_t kind = 0;

@@ -2,10 +2,10 @@
 //   f = level rate/w + viscous rate,     w = sqrt(rate^2 + smooth^2)     resists the motion   [N m], [N]
 //   level = coulomb + (breakaway - coulomb) exp(-(rate/stribeck)^2)      falls with the rate: Stribeck's curve
 // Armstrong-Helouvry, Dupont and Canudas de Wit, "A survey of models, analysis tools and compensation methods for the
-// control of machines with friction", Automatica 30 (1994) 1083, equation 5 with exponent 2.
-// Coulomb's jump at rest is smoothed over the rate `smooth`: at |rate| = smooth the dry part is 1/sqrt(2) of its level,
-// at 10 smooth 0.5 % below it. So the joint creeps where it would stick: at rate  smooth tau/sqrt(coulomb^2 - tau^2)
-// under a torque tau < coulomb = breakaway. Stiffness of the equations at rest: f_rate = breakaway/smooth + viscous.
+// control of machines with friction", Automatica 30 (1994) 1083, equation 5 with exponent 2. The rate `smooth` smooths
+// Coulomb's jump at rest: at |rate| = smooth the dry part is 1/sqrt(2) of its level, at 10 smooth 0.5 % below it. So a
+// joint that should stick turns slowly: at the rate  smooth tau/sqrt(coulomb^2 - tau^2) under a torque tau < coulomb =
+// breakaway. Stiffness of the equations at rest: f_rate = breakaway/smooth + viscous.
 #pragma once
 
 #include "core/force/friction_law.hpp"

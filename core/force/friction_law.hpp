@@ -5,7 +5,7 @@
 
 namespace mbsopt {
 
-// A law of JointEffort, of the rate alone.
+// A law for JointEffort that depends on the rate alone.
 struct FrictionLaw {
   static constexpr int kFields = 5;
   double coulomb = 0, smooth = 1, viscous = 0;  // [N m], [rad/s], [N m s/rad], or [N], [m/s], [N s/m]

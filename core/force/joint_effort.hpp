@@ -4,7 +4,7 @@
 //   tangent    -(J'f)' at f held fixed - J'f',                    f' = f_x x' + f_xdot xdot' + through the law
 //   pull-back  of lambda'x_eta + mu0 x + mu1 xdot (primitive.hpp)
 //              with lambda = -f, mu0 = -x_eta f_x, mu1 = -x_eta f_xdot
-// With Angle and the law  k (angle - free_angle) + c rate  or an expression it is the torsional spring-damper, rsda.
+// The torsional spring-damper, rsda, has Angle and the law  k (angle - free_angle) + c rate  or an expression.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ struct JointEffort {
 
   void add_load(const ForceInputs& in, const Frame& f1, const Frame& f2, Vec<6>& load1, Vec<6>& load2) const;
 
-  // Gradient of the virtual work (load1'eta1 + load2'eta2) in the frames (eta held fixed) and in the fields.
+  // Adds the gradient of the virtual work (load1'eta1 + load2'eta2) in the frames (eta held fixed) and in the fields.
   void pull_back(const ForceInputs& in, const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
                  Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const;
 

@@ -1,5 +1,5 @@
-// A force's law: a scalar function of two state variables (a length and its rate, an angle and its rate), of time and
-// of parameters, with its derivatives. Either the linear law  k (x - x0) + c xdot + f0  or a user's expression.
+// A force's law: a scalar function of a length and its rate (or an angle and its rate), of time and of parameters, with
+// its derivatives. It is the linear law  k (x - x0) + c xdot + f0  or a user's expression.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,7 +17,7 @@ struct Law {
   int slot = -1;                        // first of the four rows k, c, x0, f0 among the differentiated fields
   std::optional<Program> program;       // inputs: all parameters, then x, xdot, t
 
-  // Reusable numbers of one evaluation; gradient: all parameters, then x, xdot, t.
+  // Reusable numbers of one evaluation. gradient holds the entries of all parameters, then x, xdot, t.
   struct Scratch {
     std::vector<double> inputs, gradient;
     Program::Scratch program;
@@ -32,7 +32,7 @@ struct Law {
 
   double value(double t, const Eigen::VectorXd& rho, double x, double xdot, Scratch& s) const;
 
-  // With derivatives; those in the parameters of a program stay in s.gradient.
+  // Returns f with derivatives. Those of a program in the parameters stay in s.gradient.
   Value derivatives(double t, const Eigen::VectorXd& rho, double x, double xdot, Scratch& s) const;
 
   // k (x - x0)^2/2, its derivatives in x and in (k, c, x0, f0); an expression has none.
@@ -52,8 +52,8 @@ struct Law {
   // Whether f changes in the block at fixed x, xdot.
   bool moves(const ParameterBlock& block) const { return program || block.moves(slot, kFields); }
 
-  // Derivative of f through the law's own fields (directions of k, c, x0, f0; null: constant) and, for a program,
-  // through the parameters, whose directions are the rows of rho_dir(parameter).
+  // The tangent of f through the law's own fields (directions of k, c, x0, f0; null if constant). A program adds the
+  // tangent through the parameters, whose directions are the rows of rho_dir(parameter).
   template <class RhoDirection>
   Lanes<1> field_tangent(const Point& at, const Lanes<4>* fields, RhoDirection&& rho_dir, const Scratch& s) const {
     Lanes<1> df = Lanes<1>::Zero();

@@ -1,4 +1,4 @@
-// Puts the name of a term before the message that its code, a user's, throws.
+// Calls a user's code, and puts the name of its term before the message of an exception.
 //
 //   named_throw("forces[1] (drag)", [&] { force.Q(t, q, v, rho, Q); });   // "forces[1] (drag) threw: no table"
 #pragma once

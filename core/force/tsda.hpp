@@ -1,8 +1,8 @@
 // Translational spring-damper-actuator between point 1 of body 1 and point 2 of body 2.
 //   d = P2 - P1,  l = |d|,  u = d/l,  ldot = u'ddot         tension f = k (l - l0) + c ldot + actuator, or a law [N]
 //   virtual work  -f u'(P2_eta - P1_eta): force -f u at P2, +f u at P1
-// A spring of zero length has no direction: u = 0 there, so it has no force. That is the limit where l0 = 0; then,
-// without actuator and damper, the force is k d and its derivative k I is used. Haug, "Computer Aided Kinematics and
+// A spring of zero length has no direction: there u = 0, and it has no force. That is the limit if l0 = 0. Without free
+// length, actuator and damper the force is k d, and its derivative k I is used. Haug, "Computer Aided Kinematics and
 // Dynamics of Mechanical Systems" (1989), section 11.3.
 #pragma once
 
@@ -37,7 +37,7 @@ struct TsdaForce {
   // Adds the loads (force in global axes, moment in body axes) on each body.
   void add_load(const ForceInputs& in, const Frame& f1, const Frame& f2, Vec<6>& load1, Vec<6>& load2) const;
 
-  // Gradient of the virtual work (load1'eta1 + load2'eta2) in the frames (eta held fixed) and in the fields.
+  // Adds the gradient of the virtual work (load1'eta1 + load2'eta2) in the frames (eta held fixed) and in the fields.
   void pull_back(const ForceInputs& in, const Frame& f1, const Frame& f2, FrameBar& bar1, FrameBar& bar2,
                  Eigen::VectorXd& theta_bar, Eigen::VectorXd& rho_bar) const;
 
@@ -45,7 +45,7 @@ struct TsdaForce {
     Span x;
     Law::Value f;
   };
-  // Directions of the law (Law::field_tangent) and of the points; null: constant.
+  // Directions of the law (Law::field_tangent) and of the points; a null one is constant.
   struct FieldLanes {
     Lanes<1> f = Lanes<1>::Zero();
     const Lanes<3>*s1 = nullptr, *s2 = nullptr;

@@ -1,5 +1,5 @@
-// A force written in C++ by the user: its generalised force Q on the coordinates of some bodies and all its
-// derivatives. No derivative is ever defaulted or differenced.
+// A force written in C++ by the user: its generalised force Q on the coordinates of some bodies, and all its
+// derivatives. The user writes every derivative: none has a default or comes from differences.
 //
 //   struct Drag : UserForce {
 //     std::vector<std::string> bodies() const override { return {"crank"}; }
@@ -14,15 +14,15 @@
 
 namespace mbsopt {
 
-// Mass that a user adds to one body: the load L = -(M(q, rho) z + h(q, v, rho)), 6 numbers, on the body's accelerations
-// z = (rddot, omegadot in body axes).   [N, N m]
+// The mass that a user adds to one body. It gives 6 numbers, the load L = -(M(q, rho) z + h(q, v, rho)) on the body's
+// accelerations z = (rddot, omegadot in body axes).   [N, N m]
 struct InertialLoad {
   using VecIn = Eigen::Ref<const Eigen::VectorXd>;
   using VecOut = Eigen::Ref<Eigen::VectorXd>;
   using MatOut = Eigen::Ref<Eigen::MatrixXd>;
 
   virtual ~InertialLoad() = default;
-  // q, v: 7 numbers each. All outputs arrive zeroed.
+  // q and v have 7 numbers each. All outputs arrive zeroed.
   virtual void L(VecIn q, VecIn v, VecIn z, VecIn rho, VecOut L) const = 0;
   virtual void M(VecIn q, VecIn rho, MatOut M) const = 0;                            // -dL/dz, symmetric, not negative
   virtual void L_q(VecIn q, VecIn v, VecIn z, VecIn rho, MatOut L_q) const = 0;      // dL/dq, z fixed, 6 x 7
@@ -35,7 +35,7 @@ struct UserForce {
   using VecOut = Eigen::Ref<Eigen::VectorXd>;
   using MatOut = Eigen::Ref<Eigen::MatrixXd>;
 
-  // Mass terms beside Q, of a force on one body; null: none.
+  // The mass terms beside Q of a force on one body, or null.
   virtual const InertialLoad* inertia() const { return nullptr; }
 
   virtual ~UserForce() = default;

@@ -8,8 +8,8 @@
 namespace mbsopt {
 namespace {
 
-// Lower triangle of A -> below the diagonal of W = inv(L), unit lower, else zeros, and the inverse of D, with
-// A = L D L'; false where D is not positive.
+// Factors A = L D L' from the lower triangle of A. It writes W = inv(L), unit lower, below the diagonal and zeros
+// elsewhere, and the inverse of D. Returns false if D is not positive.
 template <int N>
 bool factor_diagonal(Mat<N, N>& A, Vec<N>& inverse) {
   for (int j = 0; j < N; ++j) {
@@ -55,7 +55,7 @@ void subtract_product(const Mat<N, N>& A, const Mat<N, N>& B, Mat<N, N>& C) {
   C.noalias() -= A.lazyProduct(B.transpose());
 }
 
-// Blocks of six are left to block_kernels.hpp.
+// block_kernels.hpp treats blocks of six.
 bool factor_diagonal(Mat<6, 6>& A, Vec<6>& inverse) {
   return block_kernels().factor_diagonal(A.data(), inverse.data());
 }
@@ -126,7 +126,7 @@ FactorView BlockCholesky<N>::view() const {
           inverse_[0].data()};
 }
 
-// In the order of elimination, in place.
+// Solves in place, in the order of elimination.
 template <int N>
 void BlockCholesky<N>::solve(std::span<Vec<N>> x) {
   if (x.empty()) return;

@@ -1,6 +1,6 @@
 // Sparse Cholesky factorisation S = L D L' (D diagonal) of a symmetric positive definite matrix of N x N blocks on the
-// graph of bodies, N = 6 in space, 3 in the plane. Symbolic work once (elimination order by AMD, fill known), then
-// factor and solve without allocation.
+// graph of bodies, N = 6 in space, 3 in the plane. The constructor does the symbolic work (elimination order by AMD,
+// fill). factor and solve allocate nothing.
 //
 //   BlockCholesky<6> S(bodies, edges);       // edges: pairs of bodies that share a block
 //   S.set_zero();  S.diagonal(0) += ...;  S.add_off_diagonal(handle, X);
@@ -40,7 +40,7 @@ class BlockCholesky {
     }
   }
 
-  // The block of edge `handle` as it is stored: (first, second), or (second, first) where it is transposed.
+  // The stored block of edge `handle`: (first, second), or (second, first) if it is transposed.
   Block& off_diagonal(std::size_t handle) { return lower_[handles_[handle].block]; }
   bool transposed(std::size_t handle) const { return handles_[handle].transposed; }
 
@@ -62,7 +62,7 @@ class BlockCholesky {
   std::vector<Elimination::Place> handles_;
   std::vector<Block> diagonal_, lower_;  // S before factor(), inv(L_kk) below the diagonal and L_ik after
   std::vector<Vec<N>> inverse_;          // of D
-  std::vector<Block> scaled_;            // L_ik D_k of the column in hand
+  std::vector<Block> scaled_;            // L_ik D_k of the present column
 };
 extern template class BlockCholesky<6>;
 extern template class BlockCholesky<3>;

@@ -28,7 +28,7 @@ struct SixInPairs : Column<3> {
     for (int i = 0; i < 3; ++i) x[i] -= y.x[i];
     return *this;
   }
-  // Grows to the absolute values of y where these are larger.
+  // Sets each entry to the larger of itself and |y|.
   void grow_to(const SixInPairs& y) {
     for (int i = 0; i < 3; ++i) {
       const Pair size = y.x[i] < 0 ? -y.x[i] : y.x[i];

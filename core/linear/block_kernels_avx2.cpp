@@ -1,4 +1,4 @@
-// Compiled with -mavx2 -mfma where the compiler has them (CMakeLists.txt). Elsewhere avx2_block_kernels() is null.
+// CMakeLists.txt compiles this file with -mavx2 -mfma if the compiler has them. Otherwise avx2_block_kernels() is null.
 #include "core/linear/block_kernels.hpp"
 #include "core/linear/block_loops.hpp"
 
@@ -7,7 +7,7 @@ namespace mbsopt {
 #if defined(__AVX2__) && defined(__FMA__)
 namespace {
 
-// The attributes of the alias, not of the type: Clang would drop a smaller alignment there.
+// The attributes belong to the alias, not to the type: Clang would drop a smaller alignment there.
 using Four __attribute__((aligned(8), may_alias)) = double __attribute__((vector_size(32)));
 static_assert(alignof(Four) == 8);
 
@@ -22,7 +22,7 @@ struct __attribute__((may_alias)) Row {
   friend Row operator*(double s, const Row& a) { return {s * a.x}; }
 
   static Row zero() { return {Four{}}; }
-  // Grows to the absolute values of y where these are larger.
+  // Sets each entry to the larger of itself and |y|.
   void grow_to(const Row& y) {
     const Four size = y.x < 0 ? -y.x : y.x;
     x = x > size ? x : size;
@@ -47,7 +47,7 @@ class Six {
   friend Six operator*(const Six& x, const Six& y) { return Six(x.a_ * y.a_, x.b_ * y.b_); }
   Six& operator+=(const Six& y) { return a_ += y.a_, b_ += y.b_, *this; }
   Six& operator-=(const Six& y) { return a_ -= y.a_, b_ -= y.b_, *this; }
-  // Grows to the absolute values of y where these are larger.
+  // Sets each entry to the larger of itself and |y|.
   void grow_to(const Six& y) {
     const Four a = y.a_ < 0 ? -y.a_ : y.a_;
     const Two b = y.b_ < 0 ? -y.b_ : y.b_;

@@ -1,6 +1,6 @@
-// The table of kernel_table.hpp from the loops over rows (row_loops.hpp), over blocks of six (loops_of_six.hpp) and
-// over blocks of motion, for two types of registers: Row, kLanes numbers, and Six, a column of a block. For the two
-// files that compile them.
+// The table of kernel_table.hpp, from the loops over rows (row_loops.hpp), over blocks of six (loops_of_six.hpp) and
+// over blocks of motion. It takes two types of registers: Row, kLanes numbers, and Six, a column of a block. Only the
+// two files that compile the table include this header.
 #pragma once
 
 #include "core/linear/kernel_table.hpp"
@@ -31,7 +31,7 @@ class BlockLoops {
   static Row* rows(double* x) { return reinterpret_cast<Row*>(x); }
   static const Row* rows(const double* x) { return reinterpret_cast<const Row*>(x); }
 
-  // sum += B x of the columns first to last of B
+  // sum += B x for the columns first to last of B
   static void add_columns(const double* B, int first, int last, const Row* x, Row* sum) {
     for (int j = first; j < last; ++j) {
       const Row xj = x[j];
@@ -66,7 +66,7 @@ class BlockLoops {
     }
     return true;
   }
-  // Rows of the same bodies, those of a joint, read the directions once.
+  // Rows of one joint tie the same bodies, so they read the directions once.
   template <int Rows>
   static void add_rows_of_joint(const MotionBlockView<1>* blocks, const MotionPlace* places, int count, const Row* q,
                                 const Row* v, Row* to) {
@@ -109,7 +109,7 @@ class BlockLoops {
     }
   }
 
-  // Four rows of both sums at a time stay in registers.
+  // Four rows of both sums stay in registers at a time.
   static void sum_stages(std::size_t count, int terms, const double* const* k, const double* c, const double* d,
                          const double* q0, const double* v0, double* q, double* v) {
     constexpr int kRows = 4;

@@ -10,7 +10,7 @@
 namespace mbsopt {
 namespace {
 
-// Columns are padded to an even length, with zeros.
+// Zeros pad columns to an even length.
 template <int N>
 constexpr int kPairs = (N + 1) / 2;
 template <int N>
@@ -100,7 +100,7 @@ void subtract_transposed_times(const double* A, const double* x, double* y) {
   for (int k = 0; k < N; ++k) y[k] -= dot<N>(A + k * kStride<N>, x);
 }
 
-// The kernels that depend on the size of a block, for the size at hand.
+// Selects the kernels for the size of a block.
 template <class Do>
 auto with_size(Eigen::Index rows, const Do& act) {
   switch (rows) {

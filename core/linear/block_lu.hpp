@@ -1,6 +1,6 @@
-// Sparse LU factorisation of a general matrix of square blocks on the graph of bodies: rows are exchanged within the
-// diagonal blocks only, so it serves matrices near a positive definite one, and those that use it check what comes out.
-// Symbolic work once (elimination.hpp), then factor, solve and solve transposed without allocation.
+// Sparse LU factorisation of a general matrix of square blocks on the graph of bodies. It exchanges rows within the
+// diagonal blocks only, so it serves matrices near a positive definite one. Its users check the solution. The
+// constructor does the symbolic work (elimination.hpp). factor, solve and solve_transposed allocate nothing.
 //
 //   L_ik = A_ik inv(U_kk),   U_ki = inv(L_kk) A_ki,   A_ij -= L_ik U_kj
 #pragma once
@@ -16,14 +16,14 @@ namespace mbsopt {
 
 class BlockLu {
  public:
-  // rows: of a block, 7, 14, 21 or 28.
+  // rows is the number of rows of a block: 7, 14, 21 or 28.
   BlockLu(int rows, int bodies, std::span<const std::pair<int, int>> edges);
   static bool takes(int rows) { return rows == 7 || rows == 14 || rows == 21 || rows == 28; }
 
-  // A block's place, between bodies that are the same or joined by an edge.
+  // The place of a block: of one body, or of two bodies that an edge joins.
   struct Handle {
     std::size_t offset = 0;
-    bool transposed = false;  // as it is stored
+    bool transposed = false;  // whether it is stored transposed
   };
   Handle handle(int row_body, int column_body) const;
 
@@ -43,8 +43,8 @@ class BlockLu {
 
   bool factor();  // false where a pivot is zero or not a number
 
-  // In place. Column c of x: body after body (0-based), stride() numbers each, of which the first rows() count and the
-  // others are zero.
+  // Solves in place. Column c of x holds body after body (0-based), stride() numbers each. The first rows() of them
+  // count; the others are zero.
   void solve(Eigen::Ref<Eigen::MatrixXd> x) const;
   void solve_transposed(Eigen::Ref<Eigen::MatrixXd> x) const;
   Eigen::Index rows() const { return rows_; }

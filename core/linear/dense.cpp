@@ -68,7 +68,7 @@ struct SquareFactor::Factors {
   VectorXd inverse_pivots, x;
   LaneRows lanes;
 
-  // y: P b, which becomes the solution; single numbers or lanes.
+  // y is P b and becomes the solution, for single numbers or lanes.
   template <class Y>
   void solve(Y& y) const {
     const Index n = LU.rows();

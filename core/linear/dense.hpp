@@ -1,4 +1,4 @@
-// Dense decompositions of matrices of any size, compiled once: each of Eigen's costs its source ten seconds.
+// Dense decompositions of matrices of any size. One file compiles them, because each of Eigen's costs ten seconds.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,8 +16,8 @@ struct SymmetricEigen {
 SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& A);
 Eigen::Vector3d symmetric_eigenvalues(const Eigen::Matrix3d& A);
 
-// Eigenvalues and eigenvectors of a real square matrix, the latter of unit length as columns, and the condition of each
-// eigenvalue: 1/|w'v| for left and right eigenvectors w, v of unit length (Golub and Van Loan, section 7.2).
+// Eigenvalues of a real square matrix, eigenvectors of unit length as columns, and the condition of each eigenvalue. It
+// is 1/|w'v| for left and right eigenvectors w, v of unit length (Golub and Van Loan, section 7.2).
 struct GeneralEigen {
   Eigen::VectorXcd values;
   Eigen::MatrixXcd vectors;
@@ -25,37 +25,37 @@ struct GeneralEigen {
 };
 GeneralEigen general_eigen(const Eigen::MatrixXd& A);
 
-// w with w'A = lambda w' for a simple eigenvalue lambda, by inverse iteration; of unit length.
+// Returns w of unit length with w'A = lambda w', for a simple eigenvalue lambda, by inverse iteration.
 Eigen::VectorXcd left_eigenvector(const Eigen::MatrixXd& A, std::complex<double> lambda);
 
-// L of A = L L', lower triangular; empty where A, which is symmetric, is not positive definite.
+// Returns the lower triangular L of A = L L' for a symmetric A; it is empty if A is not positive definite.
 Eigen::MatrixXd cholesky_factor(const Eigen::MatrixXd& A);
 
 // Solves A x = b of a symmetric positive definite A by Cholesky.
 Eigen::VectorXd cholesky_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
-// As above; returns an empty vector if a pivot is not positive, or below this part of the largest.
+// Does the same; returns an empty vector if a pivot is not positive, or below this part of the largest.
 Eigen::VectorXd definite_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b, double threshold);
 
-// An orthonormal basis of { x : A x = 0 } as columns, by QR of A' with column pivoting. threshold: the pivots below
-// this part of the largest count as zero.
+// Returns an orthonormal basis of { x : A x = 0 } as columns, by QR of A' with column pivoting. Pivots below
+// `threshold` times the largest count as zero.
 Eigen::MatrixXd null_space(const Eigen::MatrixXd& A, double threshold);
 
-// A basis of the range of A, whose columns are independent: A times the inverse of its triangular factor, so that small
-// rows keep their digits.
+// Returns a basis of the range of A, whose columns are independent. It is A times the inverse of its triangular factor,
+// so that small rows keep their digits.
 Eigen::MatrixXd orthonormal_columns(const Eigen::MatrixXd& A);
 
 // A = Q R by Householder's reflections.
 Eigen::MatrixXd triangular_factor(Eigen::MatrixXd A);         // R, of min(rows, columns) rows
 Eigen::MatrixXd orthogonal_factor(const Eigen::MatrixXd& A);  // Q, of the shape of A, rows >= columns
 
-// A = U diag(values) V', all columns of U, values descending. For small matrices.
+// A = U diag(values) V' with all columns of U and descending values, for small matrices.
 struct LeftSingular {
   Eigen::VectorXd values;
   Eigen::MatrixXd U;
 };
 LeftSingular left_singular(const Eigen::MatrixXd& A);
 
-// The least of the min(rows, columns) singular values of A, which is not empty, and its vectors: A v = value u.
+// The smallest of the min(rows, columns) singular values of a nonempty A, and its vectors: A v = value u.
 struct LeastSingular {
   double value;
   Eigen::VectorXd u, v;
@@ -70,7 +70,7 @@ class SquareFactor {
   ~SquareFactor();
 
   bool compute(const Eigen::MatrixXd& A);  // false where A is singular to rounding
-  // b becomes x of A x = b, or of A'x = b. _lanes: of several b, its columns.
+  // b becomes the solution of A x = b, or of A'x = b. The _lanes forms take several b as columns.
   void solve(Eigen::Ref<Eigen::VectorXd> b) const;
   void solve_lanes(Eigen::Ref<LaneRows> b) const;
   void solve_transposed(Eigen::Ref<Eigen::VectorXd> b) const;
@@ -81,11 +81,11 @@ class SquareFactor {
 };
 
 // The complete orthogonal decomposition A P = Q [T 0; 0 0] Z (Golub and Van Loan, "Matrix Computations", section 5.4).
-// Its solutions are the least-squares solutions of least norm, whatever the rank.
+// Its solutions are the least-squares solutions of least norm, for any rank.
 class OrthogonalDecomposition {
  public:
   OrthogonalDecomposition();
-  // threshold: the pivots below this part of the largest count as zero; negative: rounding alone decides.
+  // Pivots below `threshold` times the largest count as zero. If it is negative, rounding alone decides.
   explicit OrthogonalDecomposition(const Eigen::MatrixXd& A, double threshold = -1);
   OrthogonalDecomposition(const OrthogonalDecomposition&);
   OrthogonalDecomposition(OrthogonalDecomposition&&) noexcept;

@@ -1,8 +1,8 @@
-// Forward differentiation of functions that are templates in their scalar type: dual numbers carry the derivatives in
+// Forward differentiation of functions that are templates in their scalar type. Dual numbers carry the derivatives in
 // seven directions at a time, as many as a body has coordinates (Eigen's AutoDiffScalar).
 //
-//   add_jacobian([&](const Eigen::VectorX<Dual>& x, Eigen::VectorX<Dual>& f) { f(0) = sin(x(0)) * x(1); }, x, 1, J); //
-//   J += df/dx
+//   // J += df/dx
+//   add_jacobian([&](const Eigen::VectorX<Dual>& x, Eigen::VectorX<Dual>& f) { f(0) = sin(x(0)) * x(1); }, x, 1, J);
 #pragma once
 
 #include <Eigen/Core>
@@ -17,7 +17,7 @@ using Dual = Eigen::AutoDiffScalar<Eigen::Matrix<double, kDualDirections, 1>>;
 // Returns constants: the same numbers with derivatives of zero.
 inline Eigen::VectorX<Dual> constants(const Eigen::Ref<const Eigen::VectorXd>& x) { return x.cast<Dual>(); }
 
-// J += scale df/dx; J is f's size x x's. f(x, out): out arrives zeroed.
+// J += scale df/dx; J has the rows of f and the columns of x. f(x, out) gets a zeroed out.
 template <class Function>
 void add_jacobian(Function&& f, const Eigen::Ref<const Eigen::VectorXd>& x, double scale,
                   Eigen::Ref<Eigen::MatrixXd> J) {

@@ -33,7 +33,7 @@ Elimination::Elimination(int bodies, std::span<const std::pair<int, int>> edges)
     : position(at(bodies)), order(minimum_degree(bodies, edges)), columns(at(bodies)), updates(at(bodies)) {
   for (int k = 0; k < bodies; ++k) position[at(order[at(k)])] = k;
 
-  // The rows of column k are its own edges and what eliminating its children leaves.
+  // The rows of column k are its own edges and the fill of its children.
   std::vector<std::set<int>> rows(at(bodies));
   for (const auto& [a, b] : edges) {
     const int i = position[at(a)], j = position[at(b)];

@@ -1,5 +1,5 @@
-// Symbolic elimination of a matrix of blocks on the graph of bodies: order (approximate minimum degree), fill, and
-// which blocks each column updates. Both block factorisations follow it.
+// Symbolic elimination of a matrix of blocks on the graph of bodies: order (approximate minimum degree), fill, and the
+// blocks that each column updates. Both block factorisations follow it.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +14,8 @@ struct Elimination {
     int row = 0, body = 0;
     std::size_t block = 0;
   };
-  // Eliminating column k changes `target` by the product of its entries i and j (numbers in the column), i at or below
-  // j; diagonal: i = j, and target is an elimination position.
+  // The elimination of column k changes `target` by the product of its entries i and j (their numbers in the column), i
+  // at or below j. For a diagonal block i = j, and target is an elimination position.
   struct Update {
     std::size_t target = 0, i = 0, j = 0;
     bool diagonal = false;
@@ -26,7 +26,7 @@ struct Elimination {
   };
 
   Elimination() = default;
-  // Bodies 0..bodies-1; edges: pairs of bodies that share a block, in any order, repeated or not.
+  // Bodies are 0..bodies-1. edges lists pairs of bodies that share a block, in any order, repeated or not.
   Elimination(int bodies, std::span<const std::pair<int, int>> edges);
 
   int bodies() const { return static_cast<int>(order.size()); }

@@ -1,4 +1,4 @@
-// Fixed-size vectors and matrices of the hot loops, and lanes: blocks of tangent directions treated together.
+// Fixed-size vectors and matrices of the hot loops, and lanes: tangent directions that a loop processes together.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,8 +1,8 @@
 // The innermost loops of the block solvers, for a single vector and for lanes (core/linear/fixed_size.hpp: four tangent
 // directions at a time). They are compiled twice: for any processor, and for x86-64 processors with AVX2 and FMA, whose
-// registers hold four numbers. The processor chooses, so the last bits of results depend on its kind.
+// registers hold four numbers. The program selects by the processor, so the last bits of results depend on its kind.
 //
-// The loops take plain arrays and call no inline function of Eigen or the standard library. Compiled for AVX2 such a
+// The loops take plain arrays and call no inline function of Eigen or the standard library. Compiled for AVX2, such a
 // function would be the same symbol as elsewhere, and a linker may keep either.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 namespace mbsopt {
 
-// BlockCholesky's factor. Blocks hold N x N numbers, by columns.
+// BlockCholesky's factor. Blocks hold N x N numbers by columns.
 struct FactorView {
   int bodies;
   const int* order;         // bodies by elimination position
@@ -44,7 +44,7 @@ struct RowsInSpace {
 // Phi_eta of all constraints in the plane (PlanarRows).
 struct RowsInPlane {
   static constexpr int kUnknowns = 3;
-  // A coincidence: [-I, -i x1] of body 1 and [I, i x2] of body 2, the ground's part left out.
+  // A coincidence: [-I, -i x1] of body 1 and [I, i x2] of body 2. The ground's part is left out.
   struct Point {
     int body1, body2, row, row2;
     double x1[2], x2[2];
@@ -65,7 +65,7 @@ struct RowsInPlane {
   std::size_t body_count;
 };
 
-// An iterate of BlockSaddleSolver, with its right-hand side b and the residual of J x = g. None may overlap.
+// An iterate of BlockSaddleSolver, with its right-hand side b and the residual of J x = g. The arrays must not overlap.
 struct SaddleIterate {
   const double *alpha, *b;
   double *x, *nu, *residual;
@@ -75,7 +75,7 @@ struct SaddleSizes {
   double x, residual;  // largest entries; one that is not a number may be missed
 };
 
-// A block of MotionBlocks: the same layout.
+// A block of MotionBlocks in the same layout.
 template <int Rows>
 struct [[gnu::may_alias]] alignas(Rows % 2 == 0 ? 16 : 8) MotionBlockView {
   double q[7 * Rows], v[7 * Rows];
@@ -85,7 +85,7 @@ struct MotionPlace {
   int row, body;
 };
 
-// x: kUnknowns numbers, or rows of lanes, per moving body; y, lambda: one per row of Phi.
+// x holds kUnknowns numbers, or rows of lanes, per moving body. y and lambda hold one per row of Phi.
 template <class Rows>
 struct RowKernels {
   void (*solve)(const FactorView& factor, double* x);                                 // x = inv(S) x
@@ -98,29 +98,31 @@ struct RowKernels {
 };
 
 struct BlockKernels {
-  // Over blocks of six.
+  // The loops over blocks of six.
 
-  // Lower triangle of A = L D L' -> inv(L) below the diagonal, zeros elsewhere; false where D is not positive
+  // Factors A = L D L' from the lower triangle of A. It writes inv(L) below the diagonal and zeros elsewhere. Returns
+  // false if D is not positive.
   bool (*factor_diagonal)(double* A, double* inverse_D);
   void (*divide)(const double* W, const double* inverse_D, double* A, double* LD);  // LD = A W', A = LD inv(D)
   void (*subtract_product)(const double* A, const double* B, double* C);            // C -= A B'
-  // aa += sum_r alpha_r a_r'a_r, bb and ab likewise, of rows a_r, b_r of six numbers; null: left out
+  // aa += sum_r alpha_r a_r'a_r for rows a_r, b_r of six numbers; bb and ab likewise. Null outputs are skipped.
   void (*add_weighted_squares)(int rows, const double* alpha, const RowsInSpace::Columns* columns, const double* a,
                                const double* b, double* aa, double* bb, double* ab);
-  // in_*: of a single vector; lanes_in_*: of lanes.
+  // in_* take a single vector, lanes_in_* take lanes.
   RowKernels<RowsInSpace> in_space;
   RowKernels<RowsInPlane> in_plane;
   RowKernels<RowsInSpace> lanes_in_space;
   RowKernels<RowsInPlane> lanes_in_plane;
 
-  // Over lanes.
+  // The loops over lanes.
 
-  // to += the blocks' product with y (7 n rows of q, 7 n of v); first_place: per row, and after the last
+  // to += the blocks' product with y (7 n rows of q, 7 n of v). first_place has an entry per row and one after the
+  // last.
   void (*add_motion_of_bodies)(const MotionBlockView<6>* blocks, const MotionPlace* places, const int* first_place,
                                std::size_t rows, std::size_t n, const double* y, double* to);
   void (*add_motion_of_rows)(const MotionBlockView<1>* blocks, const MotionPlace* places, const int* first_place,
                              std::size_t rows, std::size_t n, const double* y, double* to);
-  // q = q0 + sum_j c_j k_j and v = v0 + sum_j d_j k_j of `rows` rows; q may be q0, v v0
+  // q = q0 + sum_j c_j k_j and v = v0 + sum_j d_j k_j of `rows` rows. q may be q0, and v may be v0.
   void (*sum_stages)(std::size_t rows, int terms, const double* const* k, const double* c, const double* d,
                      const double* q0, const double* v0, double* q, double* v);
 };

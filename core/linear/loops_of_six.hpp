@@ -1,5 +1,5 @@
 // The loops of kernel_table.hpp over blocks of six and over single vectors in space, for a type of register: Six, a
-// column of a block. For block_loops.hpp.
+// column of a block. block_loops.hpp includes them.
 #pragma once
 
 #include "core/linear/kernel_table.hpp"
@@ -23,9 +23,9 @@ class LoopsOfSix {
             .correct = &correct};
   }
 
-  // Lower triangle of A -> below the diagonal of W = inv(L), zeros elsewhere, and the inverse of D, with A = L D L';
-  // false where D is not positive.
-  // Two pivots at a time, a and c - b^2/a = (a c - b^2)/a: both quotients are on their way at once.
+  // Factors A = L D L' from the lower triangle of A. It writes W = inv(L) below the diagonal, zeros elsewhere, and the
+  // inverse of D. Returns false if D is not positive. Two pivots at a time, a and c - b^2/a = (a c - b^2)/a, need two
+  // quotients that the processor computes at once.
   static bool factor_diagonal(double* A, double* inverse) {
     double l[36];  // L below the diagonal, by columns
 #pragma GCC unroll 3
@@ -49,7 +49,7 @@ class LoopsOfSix {
       second.scale(e);
       second.store(l + 6 * j + 6);
     }
-    // W L = I:  W(:, j) = e_j - sum_{k > j} L(k, j) W(:, k), from the last column; the units come last.
+    // W L = I:  W(:, j) = e_j - sum_{k > j} L(k, j) W(:, k), from the last column. The unit diagonal is set last.
 #pragma GCC unroll 6
     for (int j = 5; j >= 0; --j) {
       Six w = Six::zero();
@@ -140,7 +140,7 @@ class LoopsOfSix {
     if (ab) add_square(count, alpha, nonzero, a, b, ab);
   }
 
-  // Prefetches the rows of later groups, as if each had the five of a hinge.
+  // Prefetches the rows of later groups: five rows each, as a hinge has.
   [[gnu::always_inline]] static void prefetch_rows(const RowsInSpace& J, const RowsInSpace::Group& g) {
     constexpr int kRows = 5;
     prefetch<6 * kRows>(J.J1, 6 * (g.block + kRows * kAhead)),

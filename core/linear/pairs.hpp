@@ -1,17 +1,16 @@
-// Pairs of doubles, columns of them held in registers, and rows of lanes: vector types of GCC and Clang, which need no
-// particular processor. For the innermost loops of the block solvers, where Eigen's fixed-size expressions go through
-// memory.
+// Pairs of doubles, columns of them held in registers, and rows of lanes: vector types of GCC and Clang, for any
+// processor. The innermost loops of the block solvers use them. Eigen's fixed-size expressions would go through memory.
 #pragma once
 
 #include "core/linear/fixed_size.hpp"
 
 namespace mbsopt {
 
-// The attributes of the alias, not of the type: Clang would drop a smaller alignment there.
+// The attributes belong to the alias, not to the type: Clang would drop a smaller alignment there.
 using Pair __attribute__((aligned(8), may_alias)) = double __attribute__((vector_size(16)));
 static_assert(alignof(Pair) == 8);
 
-// One row of lanes (fixed_size.hpp) in registers. A single vector of four would live in memory where the processor's
+// One row of lanes (fixed_size.hpp) in registers. A single vector of four would stay in memory if the processor's
 // registers hold two.
 struct __attribute__((may_alias)) LaneRow {
   using AlignedPair = double __attribute__((vector_size(16), may_alias));
@@ -25,7 +24,7 @@ struct __attribute__((may_alias)) LaneRow {
   friend LaneRow operator*(double s, const LaneRow& x) { return {s * x.low, s * x.high}; }
 
   static LaneRow zero() { return {AlignedPair{}, AlignedPair{}}; }
-  // Grows to the absolute values of y where these are larger.
+  // Sets each entry to the larger of itself and |y|.
   void grow_to(const LaneRow& y) {
     const AlignedPair a = y.low < 0 ? -y.low : y.low, b = y.high < 0 ? -y.high : y.high;
     low = low > a ? low : a, high = high > b ? high : b;
@@ -37,7 +36,7 @@ struct __attribute__((may_alias)) LaneRow {
 };
 static_assert(sizeof(LaneRow) == kLanes * sizeof(double));
 
-// The numbers of a vector, or the rows of an array of lanes: formulas written for entries hold for both.
+// The numbers of a vector, or the rows of an array of lanes, so that formulas for entries serve both.
 template <int N>
 double* entries(Vec<N>& x) {
   return x.data();
@@ -58,7 +57,7 @@ const LaneRow* entries(const Lanes<N>& x) {
 // (a0 + a1, b0 + b1)
 inline Pair sums(Pair a, Pair b) { return __builtin_shufflevector(a, b, 0, 2) + __builtin_shufflevector(a, b, 1, 3); }
 
-// 2 Pairs numbers.
+// A column of 2 Pairs numbers.
 template <int Pairs>
 struct Column {
   Pair x[Pairs];
@@ -82,7 +81,7 @@ struct Column {
 #pragma GCC unroll 16
     for (int i = 0; i < Pairs; ++i) x[i] *= ss;
   }
-  // x'y, its two halves not yet added.
+  // x'y as two halves that are not yet added.
   Pair times(const double* y) const {
     Pair sum = x[0] * reinterpret_cast<const Pair*>(y)[0];
 #pragma GCC unroll 16

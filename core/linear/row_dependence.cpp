@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 using OfBody = Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, 7>;  // no body has more columns
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// A row's part in the columns of one body, by its elimination position.
+// The part of a row in the columns of one body, which its elimination position names.
 struct Part {
   int position = 0;
   OfBody x;
@@ -54,7 +54,7 @@ std::vector<std::pair<int, int>> pairs_of_bodies(const std::vector<Row>& rows) {
   return pairs;
 }
 
-// Rows of a front, in their order, on the columns of its bodies.
+// Rows of a front in their order, restricted to the columns of its bodies.
 class Front {
  public:
   Front(std::size_t rows, Index columns, double threshold)
@@ -62,7 +62,8 @@ class Front {
 
   RowMajor& rows() { return X_; }
 
-  // Rows whose part in the columns [first, first + count) is independent of those before; the others lose it.
+  // Finds rows whose part in the columns [first, first + count) is independent of earlier ones, and clears it in the
+  // others.
   std::vector<bool> pivots(Index first, Index count) {
     std::vector<bool> is_pivot(static_cast<std::size_t>(X_.rows()), false);
     found_.resize(0);
@@ -83,7 +84,7 @@ class Front {
     return is_pivot;
   }
 
-  // Returns a column for each direction that the pivots' parts do not span: the one with most of it.
+  // Returns a column for each direction that the pivots' parts do not span: the column with the largest component.
   std::vector<int> unreached(Index first, Index count) const {
     MatrixXd left = MatrixXd::Identity(count, count);
     for (const Index k : found_) {

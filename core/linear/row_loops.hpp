@@ -6,7 +6,7 @@
 namespace mbsopt {
 namespace {  // of each file its own: compiled for different processors
 
-// A single vector's number in the place of a row of lanes. It aliases doubles, as its only member is one.
+// One number of a single vector in place of a row of lanes. It may alias doubles, because its only member is one.
 struct One {
   double x;
 
@@ -46,7 +46,7 @@ class RowLoops {
   static Row* rows(double* x) { return reinterpret_cast<Row*>(x); }
   static const Row* rows(const double* x) { return reinterpret_cast<const Row*>(x); }
 
-  // x = W x and x = W'x, W unit lower; y -= L x and y -= L'x. By columns.
+  // x = W x and x = W'x for unit lower W; y -= L x and y -= L'x. All go by columns.
   template <int N>
   static void multiply(const double* W, Row* x) {
 #pragma GCC unroll 6
@@ -155,7 +155,7 @@ class RowLoops {
     }
   }
 
-  // Points and entries are copies: lanes may alias, so that each store to x or y would have them read again.
+  // Points and entries are copies: lanes may alias them, so each store to x or y would force another read.
   static void subtract_times(const RowsInPlane& J, const Row* x, Row* y) {
     const auto [points, point_count, entries, entry_count, bodies, body_count] = J;
     for (std::size_t k = 0; k < point_count; ++k) {

@@ -9,7 +9,7 @@
 namespace mbsopt {
 namespace {
 
-// Pivots kept from an earlier matrix are trusted while the reciprocal growth of the factors stays above this.
+// Pivots of an earlier matrix are kept while the reciprocal growth of the factors stays above this.
 constexpr double kLeastGrowth = 1e-6;
 
 }  // namespace

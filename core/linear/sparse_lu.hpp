@@ -1,6 +1,6 @@
-// Sparse LU of a square matrix whose pattern stays: ordered once, then factored again and again for new values with the
-// pivots kept, and solved for A x = b and A'x = b. KLU of SuiteSparse (Davis and Natarajan, "Algorithm 907: KLU", ACM
-// TOMS 37 (2010)) behind it.
+// Sparse LU of a square matrix with a constant pattern. It is ordered once and factored for each set of new values with
+// the same pivots. It solves A x = b and A'x = b by KLU of SuiteSparse (Davis and Natarajan, "Algorithm 907: KLU", ACM
+// TOMS 37 (2010)).
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +14,7 @@ class SparseLu {
   struct Entry {
     int row, column;
   };
-  // Entries may repeat: values of one place are added. slot(k): where entry k's value goes.
+  // Entries may repeat: values of one place are added. slot(k) is the place of entry k's value.
   SparseLu(int size, const std::vector<Entry>& entries);
   ~SparseLu();
   SparseLu(SparseLu&&) noexcept;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kAlpha = 1e8;
 constexpr int kMostPasses = 60;
-constexpr double kRounding = 1e-16;  // of x, what a pass still changes
+constexpr double kRounding = 1e-16;  // of x: the last change by a pass
 constexpr double kStagnation = 0.5;  // a pass that changes more than that part of the one before is the last
 constexpr int kLeastPasses = 3;
 
@@ -76,7 +76,7 @@ MatrixXd SparseProjection::left(const Eigen::Ref<const MatrixXd>& b, const Eigen
   return factor_->scale.asDiagonal() * b - factor_->J * x;
 }
 
-// The system is symmetric: of (x_bar, 0) it gives g_bar = (I - J+ J) x_bar and b_bar = (J+)' x_bar.
+// The system is symmetric: with (x_bar, 0) it gives g_bar = (I - J+ J) x_bar and b_bar = (J+)' x_bar.
 void SparseProjection::solve_transposed(const Eigen::Ref<const MatrixXd>& x_bar, MatrixXd& b_bar,
                                         MatrixXd& g_bar) const {
   MatrixXd nu;

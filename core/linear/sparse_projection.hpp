@@ -1,10 +1,10 @@
-// How the point nearest to a guess moves (nearest_point.hpp) where the guess itself satisfies the equations, so that
-// nu = 0 and H = I, for large sparse J:
+// The tangent of the point nearest to a guess (nearest_point.hpp) for large sparse J, if the guess itself satisfies the
+// equations, so that nu = 0 and H = I:
 //
 //   x' = J+ b + (I - J+ J) g          that is   x' + J'nu' = g,  J x' = b
 //
-// by the augmented-Lagrangian iteration of saddle_solver.hpp on one sparse factor of S = I + alpha J'J, rows of J
-// scaled to unit length: redundant rows do no harm, and those that disagree are met in the least-squares sense.
+// It uses the augmented-Lagrangian iteration of saddle_solver.hpp on one sparse factor of S = I + alpha J'J, with rows
+// of J scaled to unit length. Redundant rows do no harm. Rows that disagree are satisfied in the least-squares sense.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,12 +26,12 @@ class SparseProjection {
   SparseProjection(SparseProjection&&) noexcept;
 
   Eigen::MatrixXd solve(const Eigen::Ref<const Eigen::MatrixXd>& b, const Eigen::Ref<const Eigen::MatrixXd>& g) const;
-  // The adjoint: b_bar and g_bar from x_bar, so that x_bar'x' = b_bar'b + g_bar'g.
+  // The adjoint: finds b_bar and g_bar with x_bar'x' = b_bar'b + g_bar'g.
   void solve_transposed(const Eigen::Ref<const Eigen::MatrixXd>& x_bar, Eigen::MatrixXd& b_bar,
                         Eigen::MatrixXd& g_bar) const;
 
   const Eigen::VectorXd& row_scale() const;
-  // Returns the residual b - J x', rows of J scaled to unit length.
+  // Returns the residual b - J x', with rows of J scaled to unit length.
   Eigen::MatrixXd left(const Eigen::Ref<const Eigen::MatrixXd>& b, const Eigen::Ref<const Eigen::MatrixXd>& x) const;
 
  private:

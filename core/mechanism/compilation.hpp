@@ -1,5 +1,5 @@
-// The state that the parts of a compilation share: the scene, its fields at one rho, and the numbers found so far. Each
-// part is a file of its own (compile_bodies.cpp, ...) and is run once, in the order of the declarations below.
+// The state that the parts of a compilation share: the scene, its fields at one rho, and the numbers computed so far.
+// Each part is a file of its own (compile_bodies.cpp, ...). The parts run once, in the order of the declarations below.
 #pragma once
 
 #include <map>
@@ -34,7 +34,7 @@ struct Compilation {
     return x;
   }
 
-  // Indices by name; `where` is the place in the scene that uses the name. Throw SceneError.
+  // Return an index by name. `where` is the place in the scene that uses the name. Throw SceneError.
   int body_index(const std::string& name, const std::string& where) const;
   std::size_t joint_index(const std::string& name, const std::string& where) const;
 
@@ -46,21 +46,21 @@ struct Compilation {
   DualVector3 unit_axis(const DualVector3& axis, const std::string& where) const;
 
   enum class Zero { normals, start };
-  // Index of a joint's angle among data.angles; made when it is first asked for.
+  // The index of a joint's angle among data.angles; the first request creates it.
   int angle_of(const std::string& joint, const std::string& where, Zero zero = Zero::normals);
-  // A new one: that of body 2 from body 1 about an axis of body 1, 0 as their axes lie along each other. Seen along the
-  // axis it is the angle of that direction of body 2 which is perpendicular to it there.
+  // Creates the angle of body 2 from body 1 about an axis of body 1. It is 0 while corresponding axes of both bodies
+  // are parallel. It measures, about the axis, a direction of body 2 that is perpendicular to the axis at 0.
   int angle_about(int body1, int body2, const std::optional<PointField>& axis, const std::string& where);
 
-  // A vector of body 1 as body 2 sees it at the orientations in the file, made perpendicular to axis2 (not finite where
-  // it is along axis2).
+  // A vector of body 1 as body 2 sees it at the orientations in the file, made perpendicular to axis2. It is not finite
+  // if the vector lies along axis2.
   DualVector3 normal_in_file(int body1, const DualVector3& normal1, int body2, const DualVector3& axis2) const;
 
-  // A further constraint: on rows of its own, or as a further term of the row last made.
+  // Add a constraint on rows of its own, or as a further term of the last row.
   Constraint& add_constraint(Constraint constraint);
   Constraint& add_term(Constraint constraint);
-  // The angle or displacement of a joint as a constraint not placed yet. Throws SceneError where it has none.
-  // Zero::start: an angle without normals is zero at the orientations in the file, else both normals are the same
+  // The angle or displacement of a joint as a constraint without rows. Throws SceneError if the joint has none. With
+  // Zero::start an angle without normals is zero at the orientations in the file. Otherwise both normals are one
   // vector.
   Constraint joint_angle_term(const std::string& joint, Zero zero, const std::string& where);
   JointDisplacement joint_displacement(const std::string& joint, const std::string& where);

@@ -25,10 +25,11 @@ void group_rows(MechanismData& data) {
   }
 }
 
-// The inertia a row sees, independent of the configuration: reduced mass of the two bodies for a point or distance,
-// reduced inertia about the body's farthest joint point for a direction or angle, four times that for an Euler
-// parameter (p' = 1/2 G'omega); of several terms, the inverses add up with their factors squared. A body without mass
-// passes the forces of a row on to those that it carries: the row sees the other body, or else the lightest of all.
+// The inertia that a row sees, independent of the configuration. For a point or distance it is the reduced mass of the
+// two bodies. For a direction or angle it is the reduced inertia about the body's farthest joint point. For an Euler
+// parameter it is four times that (p' = 1/2 G'omega). The inverses of several terms add up with their factors squared.
+// A body without mass transmits the forces of a row to the bodies that it carries. The row then sees the other body, or
+// else the lightest of all.
 void scale_alpha(MechanismData& data) {
   const std::size_t bodies = data.bodies.size();
   std::vector<double> mass(bodies), inertia(bodies), reach2(bodies, 0.0);
@@ -73,7 +74,7 @@ void scale_alpha(MechanismData& data) {
     data.row_alpha.segment(c.row, c.rows()).array() +=
         c.factor * c.factor * seen * (quantity == RowQuantity::euler_parameter ? 0.25 : 1.0);
   }
-  // A factor of zero leaves a row without inertia: any alpha does.
+  // A factor of zero leaves a row without inertia; any alpha is then right.
   data.row_alpha = (data.row_alpha.array() > 0).select(data.row_alpha.array().inverse(), 1.0);
 }
 

@@ -1,4 +1,5 @@
-// Scene -> MechanismData. Throws SceneError with the place in the scene. programs: of this scene; null: new ones.
+// Compiles a Scene to MechanismData. Throws SceneError with the place in the scene. Pass the programs of this scene, or
+// null for new ones.
 #pragma once
 
 #include <memory>

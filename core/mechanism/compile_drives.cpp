@@ -1,4 +1,4 @@
-// Drives: a coordinate, distance, angle or displacement that follows a law of time, one row of Phi each.
+// Drives: a coordinate, distance, angle or displacement follows a law of time. Each drive is one row of Phi.
 #include "core/mechanism/compilation.hpp"
 #include "core/mechanism/kinks_in_time.hpp"
 #include "core/mechanism/mechanism.hpp"
@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::string_view kCoordinates[] = {"x", "y", "z", "e0", "e1", "e2", "e3"};
 
-// A global coordinate of any body point: a dot-2 with the ground (kinematic_scene.hpp makes such drives).
+// A global coordinate of any body point: a dot-2 with the ground. kinematic_scene.hpp makes such drives.
 Constraint point_coordinate(Compilation& model, const Drive& drive, const std::string& where) {
   Constraint c;
   c.body2 = model.body_index(drive.body, where + ".body");

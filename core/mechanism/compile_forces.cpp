@@ -61,7 +61,7 @@ void add(Compilation& model, const Torsional& f, int force, const std::string& w
   model.data.forces.of<RsdaForce>().push_back(std::move(out));
 }
 
-// The components' inputs: all parameters, t, all sensors; what is used of them is listed.
+// The components' inputs are all parameters, t and all sensors. The sensors in use are listed.
 void set_components(Compilation& model, const LawVector& components, AppliedForce& out, const std::string& where) {
   Symbols symbols = model.fields.symbols();
   add_time_and_sensors(symbols, model.scene);
@@ -163,7 +163,7 @@ void add(Compilation& model, const FrictionSpec& f, int force, const std::string
   }
 }
 
-// where: its place in the scene, or "user force"; name: of its own, for messages.
+// where is the force's place in the scene, or "user force". name is its own name, for messages.
 void add_user_force(Compilation& model, std::shared_ptr<const UserForce> force, std::vector<std::string> bodies,
                     std::optional<TermValues> values, const std::string& where, std::string name) {
   UserForceData out;

@@ -1,4 +1,4 @@
-// Joints: each becomes the primitives of its recipe; gears, racks and screws tie angles and displacements of joints.
+// Joints: each becomes the primitives of its recipe. Gears, racks and screws tie angles and displacements of joints.
 #include <numbers>
 
 #include "core/constraint/joints.hpp"
@@ -9,7 +9,7 @@
 namespace mbsopt {
 namespace {
 
-// The vectors of a joint, each made when an equation asks for it.
+// The vectors of a joint; each is computed when an equation needs it.
 class JointVectors {
  public:
   JointVectors(Compilation& model, const Joint& joint, int body1, int body2, std::string where)
@@ -59,7 +59,7 @@ class JointVectors {
     if (!numbers(n).allFinite()) throw SceneError(where_ + key + ": is parallel to the axis");
     return n;
   }
-  // normal2, or where it is left out the first normal as body 2 sees it in the file.
+  // Returns normal2. If the file omits it, this is the first normal as body 2 sees it in the file.
   DualVector3 second_normal() {
     if (joint_.normal2) return normal(body2_, joint_.normal2, JointVector::axis2, ".normal2");
     const DualVector3 n =

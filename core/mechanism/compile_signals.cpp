@@ -1,4 +1,4 @@
-// Signals: what a run has to know of them beside the expressions that use them.
+// Signals: the data that a run needs beside the expressions that use them.
 #include "core/mechanism/compilation.hpp"
 #include "core/scene/scene_error.hpp"
 #include "core/scene/signals.hpp"

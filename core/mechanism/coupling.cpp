@@ -8,7 +8,7 @@ namespace {
 
 using Bodies = std::vector<int>;
 
-// The bodies that a sensor of the state reads; those of accelerations and reactions are not inputs of forces.
+// The bodies that a sensor of the state reads. Forces cannot read accelerations and reactions, so these are left out.
 Bodies read_by(const MechanismData& data, const SensorPtr& sensor) {
   Bodies read = sensor->bodies(data);
   if (!read.empty()) return read;

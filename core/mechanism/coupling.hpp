@@ -8,10 +8,10 @@
 namespace mbsopt {
 
 struct Coupling {
-  // [i - 1]: the moving bodies (1-based, ascending) whose q and v occur in the six equations of body i, itself
-  // included.
+  // bodies[i - 1] lists the moving bodies (1-based, ascending) whose q and v occur in the six equations of body i, with
+  // i itself.
   std::vector<std::vector<int>> bodies;
-  // Per row of Phi: the moving bodies that it ties.
+  // The moving bodies that each row of Phi ties.
   std::vector<std::vector<int>> rows;
 };
 

@@ -1,6 +1,6 @@
 // The energy of a mechanism and its gradient.   [J]
 //   kinetic    sum of (m rdot'rdot + omega'J omega)/2
-//   potential  sum of -m gravity'r, and that of the forces that have one
+//   potential  sum of -m gravity'r, and of the potentials of forces
 #include <algorithm>
 
 #include "core/body/euler_parameters.hpp"

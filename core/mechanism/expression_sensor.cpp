@@ -1,8 +1,8 @@
 // An expression e of parameters, t and other sensors s as a sensor.
 //   e_y = sum_k e_sk s_k,y               e_rho = e_rho + sum_k e_sk s_k,rho
-//   edot = sum_k e_sk sdot_k  where the s_k are of positions and e is not of t: the tangent of e along sdot, whose
+//   edot = sum_k e_sk sdot_k  if the s_k are of positions and e does not contain t: the tangent of e along sdot, whose
 //   derivatives are those of e_s sdot in s and rho, and e_s in sdot
-// Expressions of expressions are compiled into one, so that all s_k are sensors of other quantities.
+// An expression of expressions is compiled into one, so that all s_k are sensors of other quantities.
 #include <algorithm>
 
 #include "core/mechanism/mechanism.hpp"
@@ -12,8 +12,8 @@
 namespace mbsopt {
 namespace {
 
-// Numbers of one evaluation, one set per thread: they carry nothing from one call to the next, and grow at the first
-// only.
+// The numbers of one evaluation, one set per thread. They carry nothing from one call to the next, and grow at the
+// first call only.
 struct Scratch {
   Program::Scratch program;
   std::vector<double> x, xdot, x_bar, xdot_bar;  // inputs, their rates, and gradients in both
@@ -38,7 +38,7 @@ struct ExpressionSensor final : SensorFunction {
   };
   Program program;
   std::size_t inputs = 0, time = 0;
-  std::vector<std::size_t> parameters;  // that the expression itself uses
+  std::vector<std::size_t> parameters;  // used by the expression itself
   std::vector<Below> below;
   bool is_rate = false;
 
@@ -83,7 +83,7 @@ struct ExpressionSensor final : SensorFunction {
  private:
   std::span<double> span(std::vector<double>& x) const { return {x.data(), inputs}; }
 
-  // The inputs and their rates, and no gradients yet.
+  // Computes the inputs and their rates, but no gradients.
   Scratch& evaluated(const MechanismData& d, const StatePoint& at) const {
     Scratch& s = scratch_of_this_thread().grown(program, inputs);
     for (std::vector<double>* numbers : {&s.xdot, &s.x_bar, &s.xdot_bar}) std::fill_n(numbers->begin(), inputs, 0.0);
@@ -125,7 +125,7 @@ std::unique_ptr<SensorFunction> make_expression(Compilation& model, const Sensor
       out->reads = Reads::time_and_state;
   }
   for (const ExpressionSensor::Below& b : out->below) out->reads = std::max(out->reads, b.sensor->reads);
-  // A condition's equation must be linear in the velocities, which an expression of them need not be.
+  // A condition's equation must be linear in the velocities; an expression of them may not be.
   if (out->reads == Reads::velocities) out->reads = Reads::state;
   return out;
 }

@@ -1,6 +1,6 @@
-// Numeric fields of a scene evaluated at one rho, each with its exact derivative in the active parameters; what is
-// derived from them (unit axes, perpendicular vectors, rotations) is differentiated by forward automatic
-// differentiation.
+// The numeric fields of a scene at one rho, each with its exact derivative in the active parameters. Forward automatic
+// differentiation gives the derivatives of quantities that follow from them (unit axes, perpendicular vectors,
+// rotations).
 #pragma once
 
 #include <Eigen/Core>
@@ -24,7 +24,8 @@ class FieldValues {
  public:
   FieldValues(std::shared_ptr<ScenePrograms> programs, const Eigen::VectorXd& rho, const std::vector<int>& active);
 
-  // where: place in the scene, for errors ("bodies[2].mass"). Throws SceneError on unknown names and values not finite.
+  // where is the place in the scene, for errors ("bodies[2].mass"). Throws SceneError on unknown names and infinite
+  // values.
   Dual value(const Field& field, const std::string& where) const;
   template <std::size_t N>
   DualVector<N> values(const std::array<Field, N>& fields, const std::string& where) const {
@@ -40,7 +41,7 @@ class FieldValues {
   ScenePrograms& programs() const { return *programs_; }
   const Symbols& symbols() const { return programs_->symbols(); }
 
-  // Slot of some numbers: their derivatives become consecutive rows; -1 when all of them are zero.
+  // Returns the slot of some numbers: their derivatives become consecutive rows. It is -1 if all derivatives are zero.
   template <std::size_t N>
   int slot(const DualVector<N>& x) {
     bool depends = false;

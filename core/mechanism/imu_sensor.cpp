@@ -1,4 +1,4 @@
-// An inertial measurement unit at a body point P, in axes M fixed in the body; m is one of them, in the body's axes.
+// An inertial measurement unit at a body point P, in axes M fixed in the body. m is one of them, in the body's axes.
 //   a  specific force     m'A'(Pddot - g)    [m/s^2]    at rest it reads +g upwards
 //   w  angular velocity   m'omega_B          [rad/s]
 #include "core/body/euler_parameters.hpp"

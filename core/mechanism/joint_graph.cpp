@@ -37,7 +37,7 @@ int joints_to_farthest_body(const MechanismData& data) {
 }
 
 bool closes_loops(const MechanismData& data) {
-  std::vector<int> group(data.bodies.size());  // of bodies that hang together, by one of them
+  std::vector<int> group(data.bodies.size());  // connected bodies, named by one of them
   std::iota(group.begin(), group.end(), 0);
   const auto leader = [&](int body) {
     const auto next = [&](int i) -> int& { return group[static_cast<std::size_t>(i)]; };

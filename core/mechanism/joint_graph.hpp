@@ -1,15 +1,15 @@
-// How joints hang together.
+// The graph of bodies and joints.
 #pragma once
 
 namespace mbsopt {
 
 struct MechanismData;
 
-// Joints on the way to the body farthest from the ground, each by its shortest way; 0 without joints. Of bodies that no
-// joint leads to: from the first of those that hang together.
+// The number of joints on the path to the body farthest from the ground, each by its shortest path; 0 without joints.
+// If no joint leads from the ground to a group of bodies, paths start at its first body.
 int joints_to_farthest_body(const MechanismData& data);
 
-// Whether there is a loop of joints, or a drive. Without them the constraints' Jacobian never loses rank.
+// Whether there is a loop of joints, or a drive. Otherwise the constraints' Jacobian never loses rank.
 bool closes_loops(const MechanismData& data);
 
 }  // namespace mbsopt

@@ -5,7 +5,7 @@
 namespace mbsopt {
 namespace {
 
-// reference: the value on whose turn an angle is.
+// The angle is on the turn nearest to reference.
 template <class P>
 double measure_value(const JointMeasure<P>& joint, bool rate, double reference, const Eigen::VectorXd& y) {
   const BodyAt b1 = body_at(y, joint.body1), b2 = body_at(y, joint.body2);

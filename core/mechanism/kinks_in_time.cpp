@@ -9,7 +9,7 @@
 namespace mbsopt {
 namespace {
 
-// f(a t + b) as a function of t; null where rounding joins samples.
+// f(a t + b) as a function of t; null if rounding makes samples coincide.
 std::shared_ptr<const Curve> stretched(const Curve& f, double a, double b) {
   std::vector<double> t, y = f.y();
   for (const double x : f.x()) t.push_back((x - b) / a);

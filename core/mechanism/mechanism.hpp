@@ -1,6 +1,6 @@
-// The scene compiled at one value of its parameters: bodies numbered, joints turned into primitives, every numeric
-// field a number with its derivative in rho. It is const after construction; a Dynamics (core/dynamics)
-// owns the arrays of a right-hand side.
+// The scene compiled at one value of its parameters. Bodies have numbers, joints are primitives, and every numeric
+// field is a number with its derivative in rho. It is const after construction. A Dynamics (core/dynamics) owns the
+// arrays of a right-hand side.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,8 +20,8 @@ struct StatePoint;
 
 class Mechanism {
  public:
-  // rho: one value per scene.parameters, in their order. active[k]: whether derivatives in rho_k are wanted (empty:
-  // all). programs: the scene's expressions, from other mechanisms of the same scene; null: they are compiled.
+  // rho has one value per scene.parameters, in their order. `active[k]` requests derivatives in rho_k (empty: all).
+  // `programs` are the scene's expressions, from other mechanisms of the same scene. If null, they are compiled.
   Mechanism(const Scene& scene, const Eigen::VectorXd& rho, const std::vector<bool>& active = {},
             std::vector<std::shared_ptr<const UserForce>> user_forces = {},
             std::shared_ptr<ScenePrograms> programs = nullptr);
@@ -33,7 +33,8 @@ class Mechanism {
   int sensors() const;                        // in the order of scene.sensors
   int sensor(const std::string& name) const;  // index, -1 when there is none
 
-  // Value of a sensor at a state, and with its gradient: y_bar += scale d/dy, rho_bar += scale d/drho.
+  // Return the value of a sensor at a state. The second adds its gradient: y_bar += scale d/dy, rho_bar += scale
+  // d/drho.
   double sensor_value(int sensor, const StatePoint& at) const;
   double add_sensor_gradient(int sensor, const StatePoint& at, double scale, Eigen::Ref<Eigen::VectorXd> y_bar,
                              Eigen::Ref<Eigen::VectorXd> rho_bar) const;
@@ -44,15 +45,16 @@ class Mechanism {
   std::shared_ptr<const MechanismData> data_;
 };
 
-// Body-frame quantities of one body at a state, for output: origin, Euler parameters, origin's velocity, angular
-// velocity (global components): x y z e0..e3 vx vy vz wx wy wz.
+// The motion of one body at a state, for output: origin of the body frame, Euler parameters, velocity of the origin,
+// and angular velocity in global components. The columns are x y z e0..e3 vx vy vz wx wy wz.
 Eigen::Matrix<double, 13, 1> body_row(const Mechanism& mechanism, int body, const StatePoint& at);
 
 // Counts of equations at the assembled initial state.
 struct ModelSummary {
   int bodies = 0, equations = 0, rank = 0, degrees_of_freedom = 0;  // equations: joints' and unit-norm rows
   std::vector<std::string> redundant;  // joints that hold redundant equations, "name (2 of 5)"
-  // Unknowns of the equations of motion (model_choice.hpp): 3 in the plane, 6 in space; and the reason why not 3.
+  // The unknowns of the equations of motion per body (model_choice.hpp): 3 in the plane, 6 in space. not_planar gives
+  // the reason for 6.
   int unknowns_per_body = 6;
   std::string not_planar;
 };

@@ -1,5 +1,5 @@
 // The numbers of a compiled mechanism. Every field that depends on an active parameter owns rows ("slots") of
-// theta_rho, its derivative; a field without a slot (-1) is constant and costs nothing.
+// theta_rho, its derivative. A field without a slot (-1) is constant and costs nothing.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,7 +24,7 @@ struct BodyData {
   Matrix3d J = Matrix3d::Zero();                   // about the centre of mass, body axes [kg m^2]
   Vector3d com = Vector3d::Zero();                 // in the body frame [m]
   int slot_mass = -1, slot_J = -1, slot_com = -1;  // slot_J: xx yy zz xy xz yz
-  // Guess of the initial state.
+  // The guess of the initial state.
   Vec<7> q = Vec<7>::Zero();                                                  // (r_g, p)
   Vector3d velocity = Vector3d::Zero(), angular_velocity = Vector3d::Zero();  // of the body-frame origin; global
   int slot_q = -1, slot_velocity = -1, slot_angular_velocity = -1;
@@ -91,7 +91,7 @@ struct MechanismData {
   std::vector<KinkedSignal> kinks;                                // of signals and laws
   int largest_law = 0;                                            // inputs of the largest law, for scratch
 
-  std::shared_ptr<const PlanarModel> planar;  // where joints hold all bodies in a plane
+  std::shared_ptr<const PlanarModel> planar;  // set if joints hold all bodies in a plane
   std::string not_planar;                     // else why not
 
   bool needs_motion = false;    // some sensor does
@@ -117,9 +117,9 @@ void add_slot(const MechanismData& data, int slot, const Vec<N>& bar, double sca
 struct Energy {
   double kinetic = 0, potential = 0;
 };
-// Potential: gravity's, zero at the origin, and that of springs with constant coefficients.   [J]
+// The potential is that of gravity, zero at the origin, and of springs with constant coefficients.   [J]
 Energy energy(const MechanismData& data, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
-// Whether nothing does work but gravity and springs, whose potential is known.
+// Whether only gravity and springs of known potential do work.
 bool conserves_energy(const MechanismData& data);
 
 }  // namespace mbsopt

@@ -1,5 +1,5 @@
 // The active parameters as blocks of kLanes tangent directions: lane k of block c is the unit vector of active
-// parameter kLanes c + k; theta holds what each differentiated field does in these directions.
+// parameter kLanes c + k. `theta` holds the derivatives of each differentiated field in these directions.
 #pragma once
 
 #include <vector>

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kParallel = 1e-12;  // sine of the angle up to which a direction counts as another
 
-// How a body-fixed vector lies to the plane, at every value of the parameters.
+// The position of a body-fixed vector relative to the plane, at every value of the parameters.
 enum class Lies { in_plane, along_normal, across };
 
 class Search {
@@ -24,7 +24,7 @@ class Search {
     model_.n = normal, model_.t1 = (normal + 1) % 3, model_.t2 = (normal + 2) % 3;
   }
 
-  // Why there is no model; empty when there is.
+  // Returns the reason why there is no model, or an empty string.
   std::string run() {
     if (data_.n == 0) return "there is no moving body";
     for (const UserForceData& f : data_.user_forces)
@@ -43,7 +43,7 @@ class Search {
   }
   PlanarModel take() { return std::move(model_); }
 
-  // Rows that keep an axis along the normal: where there is no model, the normal with most is the one meant.
+  // Counts rows that keep an axis along the normal. If no normal has a model, the one with most such rows is meant.
   int axes_along_normal() const {
     int count = 0;
     for (const Constraint& c : data_.constraints) {
@@ -100,7 +100,7 @@ class Search {
     return "joint '" + data_.joint_names[at(c.joint)] + "'";
   }
 
-  // A row that motion in the plane satisfies by itself.
+  // Drops a row that every planar motion satisfies.
   std::string drop(const Constraint& c) const {
     return terms_[at(c.row)] > 1 ? name(c) + " moves bodies out of the plane" : "";
   }
@@ -176,8 +176,8 @@ class Search {
     }
   }
 
-  // Whether bodies may lie at heights other than the ground's, where the length of a rod is not that in the plane: a
-  // point, or a row along the normal, that joins two heights.
+  // Whether bodies may lie at other heights than the ground, where a rod's length is not its length in the plane. Then
+  // a point, or a row along the normal, joins two heights.
   bool has_levels() const {
     for (const Constraint& c : data_.constraints) {
       const auto* point = std::get_if<Coincidence>(&c.primitive);
@@ -190,16 +190,17 @@ class Search {
     }
     return false;
   }
-  bool rises(const Vector3d& n, int slot) const {  // with a parameter
+  bool rises(const Vector3d& n, int slot) const {  // whether a parameter changes the height
     if (slot < 0) return false;
     const auto change = data_.theta_rho.middleRows<3>(slot);
     return (n.transpose() * change).cwiseAbs().maxCoeff() > kParallel * change.cwiseAbs().maxCoeff();
   }
 
-  // Joints that hold one body of theirs in the plane when the other one is, followed from the ground.
+  // Follows joints from the ground; a joint that holds() keeps one of its bodies in the plane if the other one is.
+  // Returns a message on a body that no joint holds, or an empty string.
   std::string body_not_held() const {
     std::vector<std::vector<int>> neighbours(data_.bodies.size());
-    int seen = -1;  // the joint whose first dot-1, one with axis 2, has been looked at
+    int seen = -1;  // the joint whose first dot-1, which has axis 2, was tested
     for (const Constraint& c : data_.constraints) {
       if (c.joint < 0 || c.joint == seen || !std::holds_alternative<Dot1>(c.primitive)) continue;
       seen = c.joint;
@@ -227,7 +228,8 @@ class Search {
     return "";
   }
 
-  // Whether a joint holds bodies in the plane, from its first dot-1, which has axis 2 where the joint has axes.
+  // Whether a joint holds bodies in the plane. The answer comes from its first dot-1, which contains axis 2 if the
+  // joint has axes.
   bool holds(const Constraint& c) const {
     const std::string& type = scene_.joints[at(c.joint)].type;
     const Lies axis = lies(c.body2, std::get<Dot1>(c.primitive).s2, c.slot2);

@@ -1,10 +1,10 @@
 // A mechanism that its joints hold in a plane: three unknowns per body instead of six.
 //
-// The plane's normal n is a coordinate axis, (t1, t2, n) a cyclic permutation of (x, y, z). Every body is held in the
-// plane by joints (revolute and planar ones about n, translational ones along the plane, fixed ones) that lead to the
-// ground, and every row of Phi either says something about motion in the plane or holds by itself. Then the feasible
-// accelerations are those with rddot'n = 0 and omegadot along n, whatever the forces: what leaves the plane is reacted.
-// No parameter turns a joint's axis out of the plane, so derivatives stay in it, too.
+// The plane's normal n is a coordinate axis, (t1, t2, n) a cyclic permutation of (x, y, z). Joints that lead to the
+// ground hold every body in the plane: revolute and planar ones about n, translational ones along the plane, fixed
+// ones. Every row of Phi either constrains motion in the plane or is satisfied by every planar motion. Then the
+// feasible accelerations are those with rddot'n = 0 and omegadot along n, for any forces: reactions balance components
+// out of the plane. No parameter turns a joint's axis out of the plane, so derivatives stay in it, too.
 //
 // Vectors of the plane are complex numbers, t1 + i t2. A body's Euler parameters move in the span of p_a and p_b,
 //   p = Re(P) p_a + Im(P) p_b,   P = e0 + i e_n seen from the pose p_a,   A(p) s = P^2 s   for s in the plane,
@@ -31,7 +31,7 @@ struct PlanarBody {
   Vector3d in_body(const Plane& s) const { return s.re * b1 + s.im * b2; }
 };
 
-// A primitive (constraint.hpp) seen in the plane.
+// A primitive (constraint.hpp) in the plane.
 struct PlanarConstraint {
   enum class Kind { point, dot1, dot2, distance, angle };
   Kind kind = Kind::point;
@@ -48,10 +48,10 @@ struct PlanarModel {
   int t1 = 0, t2 = 1, n = 2;       // coordinate axes
   std::vector<PlanarBody> bodies;  // the ground first
   std::vector<PlanarConstraint> constraints;
-  std::vector<int> rows;  // of Phi: those that say something in the plane, counted 0, 1, ... by the constraints above
+  std::vector<int> rows;  // rows of Phi that constrain motion in the plane; the constraints above number them 0, 1, ...
   Plane gravity;
 
-  // Vectors over rows of Phi, of which the others stay as they are.
+  // Writes x to the rows of Phi that the model uses. The other rows keep their values.
   void spread(const Eigen::VectorXd& x, Eigen::VectorXd& phi_rows) const {
     for (std::size_t k = 0; k < rows.size(); ++k) phi_rows(rows[k]) = x(static_cast<Eigen::Index>(k));
   }
@@ -68,8 +68,8 @@ struct PlanarModel {
   }
 };
 
-// The planar model of compiled data whose theta_rho is set; or why there is none, in words that end a sentence
-// "is not planar: ...".
+// The planar model of compiled data whose theta_rho is set. If there is none, it holds the reason in words that end the
+// sentence "is not planar: ...".
 struct PlanarSearch {
   std::shared_ptr<const PlanarModel> model;
   std::string reason;

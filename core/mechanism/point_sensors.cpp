@@ -40,12 +40,12 @@ BodyPoint sensor_point(Compilation& model, const std::string& body, const PointF
 
 namespace {
 
-// A position in the ground's axes, which most objectives look at, needs neither velocities nor frames.
+// A position in the ground's axes needs neither velocities nor frames. Most objectives read such positions.
 bool is_place(const PointSensor& sensor) {
   return sensor.quantity == PointSensor::Quantity::position && sensor.axes_body < 1;
 }
 
-// A body's r, e0 and e in y, in which q comes first, read where they are.
+// Maps a body's r, e0 and e in y, where q comes first, without a copy.
 struct Placed {
   Eigen::Map<const Vector3d> r;
   double e0;
@@ -131,7 +131,7 @@ struct AccelerationSensor final : SensorFunction, SeenPoints {
   }
 };
 
-// A point, perhaps relative to another, and a component in some axes.
+// Sets a point, perhaps relative to another one, and a component in some axes.
 void set_points(Compilation& model, const Sensor& s, SeenPoints& of, const std::string& where) {
   of.a = sensor_point(model, s.body, s.point, where);
   if (s.relative_to) {

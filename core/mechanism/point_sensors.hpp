@@ -21,10 +21,11 @@ struct BodyPoint {
 
 BodyPoint sensor_point(Compilation& model, const std::string& body, const PointField& field, const std::string& where);
 
-// A body with the acceleration that the equations of motion give.
+// A body with the acceleration from the equations of motion.
 BodyAt moving(const StatePoint& at, int body);
 
-// X' times the acceleration of the point: adds scale times its gradient; that in the motion goes to at.motion->bar().
+// Adds scale times the gradient of X' times the acceleration of the point. The part in the motion goes to
+// at.motion->bar().
 void add_acceleration(const MechanismData& data, const StatePoint& at, const BodyPoint& point, const Vector3d& X,
                       double scale, VecOut y_bar, VecOut rho_bar);
 
@@ -54,7 +55,7 @@ struct PointSensor final : SensorFunction, SeenPoints {
   };
   Seen seen(const Eigen::VectorXd& y) const;
   double pick(const Vector3d& x) const { return component == kNorm ? x.norm() : x(component); }
-  // The gradient of pick; zero at a zero vector, where a norm has none.
+  // The gradient of pick. It is zero at a zero vector, where a norm has none.
   Vector3d along(const Vector3d& x) const;
 };
 

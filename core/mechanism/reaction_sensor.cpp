@@ -42,7 +42,7 @@ Vector3d measured(const ReactionSensor& s, const Loads& loads, const Matrix3d& A
   return A2 * loads.T - (A2 * s.s2).cross(loads.F);
 }
 
-// -(lambda' J2 eta) with eta of body 2 in its frame and none of body 1: its gradient.
+// Adds the gradient of -(lambda' J2 eta), with eta of body 2 in its frame and none of body 1.
 void add_pull_back_of_loads(const MechanismData& d, const ReactionSensor& s, const Eigen::VectorXd& y,
                             const Eigen::VectorXd& lambda, const Vec<6>& eta, double scale,
                             Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& lambda_bar,
@@ -97,7 +97,7 @@ double ReactionSensor::add_gradient(const MechanismData& d, const Eigen::VectorX
   }
   add_pull_back_of_loads(d, *this, y, lambda, eta, scale, y_bar, lambda_bar, rho_bar);
   if (!torque) return result;
-  // Through eta itself, with F and T fixed.
+  // The gradient through eta itself, with F and T fixed.
   const Vector3d arm_bar = c.cross(loads.F);
   FrameBar bar;
   bar.set_zero();

@@ -2,10 +2,10 @@
 //
 //   loads of the constraints on body 2:  [F; T] = -J2'lambda    F global, T about the centre of mass in body axes
 //   force    F            torque  about P2 = r2 + A2 s2, global:  A2 T - (A2 s2) x F
-//   drive    -lambda of its row: the force or torque along the driven coordinate, positive where it pushes it up
+//   drive    -lambda of its row: the force or torque along the driven coordinate, positive if it increases it
 //
-// lambda is the solution of the equations of motion (dynamics.hpp); where constraints are redundant it is the one that
-// the augmented Lagrangian tends to.
+// lambda is the solution of the equations of motion (dynamics.hpp). If constraints are redundant, it is the limit of
+// the augmented Lagrangian.
 #pragma once
 
 #include "core/mechanism/mechanism_data.hpp"

@@ -1,5 +1,5 @@
-// The laws of time on the rows of Phi, evaluated at one time: Phi - f, Phidot - f_t, Phiddot - f_tt, and the
-// derivatives of these terms. A mechanism without drives and rods has none and pays nothing.
+// The laws of time on the rows of Phi at one time: Phi - f, Phidot - f_t, Phiddot - f_tt, and the derivatives of these
+// terms. A mechanism without drives and rods has none and costs nothing.
 #pragma once
 
 #include <initializer_list>
@@ -13,7 +13,7 @@ namespace mbsopt {
 class RowLaws {
  public:
   explicit RowLaws(const MechanismData& data);
-  // Rows here are those listed, each by its place in the list.
+  // The rows are those listed; each is named by its place in the list.
   RowLaws(const MechanismData& data, const std::vector<int>& rows);
 
   void set_time(double t);
@@ -24,13 +24,13 @@ class RowLaws {
   void subtract_f_t(Eigen::VectorXd& phi_dot) const;
   void subtract_f_tt(Eigen::VectorXd& phi_ddot) const;
 
-  // Adds scale times the gradient of -(mu0'f + mu1'f_t + mu2'f_tt); null: zero.
+  // Adds scale times the gradient of -(mu0'f + mu1'f_t + mu2'f_tt). A null weight is zero.
   void add_pull_back(const Eigen::VectorXd* mu0, const Eigen::VectorXd* mu1, const Eigen::VectorXd* mu2, double scale,
                      Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar);
-  // Adds weight times the gradient of f, or of f_t, of one row (that of none is zero) in the active parameters.
+  // Adds weight times the gradient of f, or of f_t, of one row in the active parameters. A row without a law has none.
   enum class Of { f, f_t };
   void add_gradient(Of what, int row, double weight, Eigen::Ref<Eigen::VectorXd> rho_bar) const;
-  // Subtracts the tangents of f, f_t, f_tt, as many as are given.
+  // Subtracts the tangents of f, f_t and f_tt, up to the number of outputs.
   void subtract_tangents(const ParameterBlock& block, std::initializer_list<LaneRows*> out);
 
  private:

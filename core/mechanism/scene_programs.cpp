@@ -7,7 +7,7 @@
 namespace mbsopt {
 namespace {
 
-// make() returns an expression that keeps `key` in use, and what is made of it.
+// make() returns an expression that keeps `key` alive, and the object made from it.
 template <class Table, class Make>
 auto found_or_made(Table& table, std::mutex& mutex, const void* key, Make&& make) {
   const std::lock_guard lock(mutex);

@@ -1,5 +1,5 @@
-// The expressions of a scene as programs, each compiled once. Mechanisms of the scene, each at other values of its
-// parameters, share them; several threads may ask for them.
+// The expressions of a scene as programs, each compiled once. Mechanisms of the scene at other parameter values share
+// them. Several threads may use them.
 //
 //   const auto programs = std::make_shared<ScenePrograms>(scene);
 //   const Mechanism first(scene, rho, active, {}, programs), second(scene, other_rho, active, {}, programs);
@@ -21,7 +21,7 @@ class ScenePrograms {
 
   const Symbols& symbols() const { return symbols_; }  // parameters (inputs, in order), definitions, signals
 
-  // The program of a numeric field; f, f_t, f_tt of a law of time, whose last input is t. Both throw UnknownName.
+  // The program of a numeric field, and f, f_t, f_tt of a law of time, whose last input is t. Both throw UnknownName.
   std::shared_ptr<const Program> field(const Expression& field);
   std::shared_ptr<const std::array<Program, 3>> law(const Expression& law);
   std::shared_ptr<const std::array<Program, 3>> law(const SampledLaw& samples);

@@ -21,11 +21,11 @@ struct SensorFunction {
   // y_bar, rho_bar += scale d/dy, d/drho (of all parameters); returns the value.
   virtual double add_gradient(const MechanismData& data, const StatePoint& at, double scale, VecOut y_bar,
                               VecOut rho_bar) const = 0;
-  // The bodies that it reads; all of them where it names none.
+  // The bodies that the sensor reads. An empty list means all bodies.
   virtual std::vector<int> bodies(const MechanismData&) const { return {}; }
-  // Its time derivative; null where a condition may not prescribe one.
+  // Its time derivative; null if a condition may not prescribe one.
   virtual SensorPtr rate(const MechanismData&) const { return nullptr; }
-  // The norm of a velocity is not linear in v: it returns the three sensors of its components, others return none.
+  // The norm of a velocity is not linear in v: it returns the three sensors of its components. Others return none.
   virtual std::vector<SensorPtr> components() const { return {}; }
   // The followed angle (MechanismData::angles) of an angle or its rate; else -1.
   virtual int angle() const { return -1; }
@@ -33,7 +33,7 @@ struct SensorFunction {
   Reads reads = Reads::positions;  // of its row in kSensorQuantities
 };
 
-// Like a sensor but for one change.
+// A copy of a sensor with one change.
 template <class Kind, class Change>
 SensorPtr changed(const Kind& sensor, const Change& change) {
   auto copy = std::make_shared<Kind>(sensor);
@@ -41,7 +41,7 @@ SensorPtr changed(const Kind& sensor, const Change& change) {
   return copy;
 }
 
-// At (y, branch of the angles), for sensors that need no motion.
+// Evaluates at (y, branch of the angles), for sensors that need no motion.
 inline double evaluate(const MechanismData& data, const SensorPtr& sensor, double t, const Eigen::VectorXd& y,
                        const Eigen::VectorXd& angles) {
   return sensor->value(data, {t, y, angles});

@@ -1,5 +1,5 @@
-// Which function makes each quantity of kSensorQuantities from the scene. A new sensor is a file with its maker, a row
-// here and a row there. A maker throws SceneError.
+// The function that makes each quantity of kSensorQuantities from the scene. A new sensor is a file with its maker, a
+// row here and a row there. A maker throws SceneError.
 #pragma once
 
 #include <memory>
@@ -51,7 +51,7 @@ inline constexpr SensorMakerRow kSensorMakers[] = {
     {"expression", make_expression},
 };
 
-// Index of the component, 3 for a norm.
+// The index of the component; 3 stands for a norm.
 int component_of(const Sensor& sensor, const std::string& where);
 
 }  // namespace mbsopt

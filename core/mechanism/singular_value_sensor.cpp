@@ -1,4 +1,4 @@
-// The smallest singular value of the scaled Jacobian of joints and drives: 0 where they lose hold of a motion.   [-]
+// The smallest singular value of the scaled Jacobian of joints and drives: it is 0 where they release a motion.   [-]
 //   J    rows of Phi, columns (delta r [m], L delta theta) of each body: turns are measured at the length L
 //   j_i  row i of J,  J^ its rows of length 1: j^_i = j_i/|j_i|
 //   J^ = sum_k sigma_k u_k v_k',  sigma the least of the min(rows, columns) values
@@ -6,8 +6,8 @@
 //   L^2 = sum |s|^2/N over the points of joints seen from the centres of mass
 //   dsigma/dL = -1/L sum_i (w_i'j_i)_theta
 // Redundant equations beside a free motion give 0 everywhere; in a driven mechanism they do no harm. A sigma that
-// occurs twice has no derivative; the gradient is then that of one of the two. Source of dsigma: G. H. Golub,
-// C. F. Van Loan, "Matrix Computations", section 8.6.
+// occurs twice has no derivative; the gradient is then that of one of the two. Source of dsigma: G. H. Golub, C. F. Van
+// Loan, "Matrix Computations", section 8.6.
 #include <cmath>
 
 #include "core/linear/dense.hpp"
@@ -91,7 +91,7 @@ struct SingularValueFunction final : SensorFunction {
   }
 
  private:
-  // w'j of row i of a constraint, w a virtual displacement of all bodies.
+  // Adds the gradient of w'j of row i of a constraint; w is a virtual displacement of all bodies.
   static void add_row(const MechanismData& d, const Constraint& c, int i, const Eigen::VectorXd& w,
                       const Eigen::VectorXd& y, double scale, VecOut y_bar, VecOut rho_bar) {
     const auto part = [&](int body) {

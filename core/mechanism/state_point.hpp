@@ -1,4 +1,4 @@
-// The state at one instant, as costs, sensors and observers see it.
+// The state at one instant, for costs, sensors and observers.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,13 +19,13 @@ struct Motion {
 
 struct StatePoint;
 
-// Where sensors of accelerations and reactions get them from (core/dynamics/motion_solver.hpp).
+// Sensors of accelerations and reactions get the motion from this source (core/dynamics/motion_solver.hpp).
 struct MotionSource {
   virtual ~MotionSource() = default;
   virtual const Motion& motion(const StatePoint& at) = 0;
   // A gradient in the motion: zero, until a sensor adds to it.
   virtual Motion& bar() = 0;
-  // Turns it into one in the state and the parameters, which it adds, and sets it to zero again.
+  // Turns this gradient into one in the state and the parameters, adds it to them, and sets it to zero.
   virtual void fold_bar(const StatePoint& at, Eigen::Ref<Eigen::VectorXd> y_bar,
                         Eigen::Ref<Eigen::VectorXd> rho_bar) = 0;
 };

@@ -1,5 +1,5 @@
-// The tension of a spring (tsda) and the resisting torque of a torsional one (rsda, torsion_bar) as a sensor: the law's
-// value
+// The tension of a spring (tsda) or the resisting torque of a torsional one (rsda, torsion_bar) as a sensor. It is the
+// value of the law
 //   f(x, xdot, t, rho),   x = l or the joint's angle
 //   f_y = f_x x_y + f_xdot xdot_y          f_rho = the law's own + through the geometry
 #include "core/mechanism/sensor_kinds.hpp"
@@ -8,8 +8,8 @@
 namespace mbsopt {
 namespace {
 
-// Numbers of one evaluation of a law that is an expression, one set per thread: they carry nothing from one call to the
-// next, and grow at the first only.
+// The numbers for one evaluation of a law that is an expression, one set per thread. They carry nothing from one call
+// to the next, and grow at the first call only.
 Law::Scratch& scratch_of_this_thread(const MechanismData& data, const Program& program) {
   static thread_local Law::Scratch scratch;
   const std::size_t inputs = static_cast<std::size_t>(data.rho.size()) + 3;
@@ -18,12 +18,12 @@ Law::Scratch& scratch_of_this_thread(const MechanismData& data, const Program& p
   return scratch;
 }
 
-// A law made of coefficients needs none.
+// A law of coefficients needs no scratch.
 Law::Scratch& scratch_for(const MechanismData& data, const Law& law, Law::Scratch& none) {
   return law.program ? scratch_of_this_thread(data, *law.program) : none;
 }
 
-// Through the law's own coefficients, or through the parameters of its expression.
+// Adds the gradient through the law's own coefficients, or through the parameters of its expression.
 void add_law_gradient(const MechanismData& data, const Law& law, double x, double xdot, double scale,
                       const Law::Scratch& scratch, Eigen::Ref<Eigen::VectorXd> rho_bar) {
   if (!law.program) return add_slot<4>(data, law.slot, law.field_gradient(x, xdot), scale, rho_bar);

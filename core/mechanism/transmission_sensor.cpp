@@ -2,8 +2,8 @@
 //   x_k = A_k s_k, the vector in link k from this joint to the link's only other pin
 //   mu  = atan2(|x1 x x2|, x1'x2), from 0 to pi
 //   dmu = -(u2 - cos(mu) u1)'dx1 / (|x1| sin(mu)) and the same with 1 and 2 exchanged,   u_k = x_k/|x_k|
-// Where the links are in line (mu = 0 or pi) it has no derivative, and its gradient is set to zero.
-// Source: J. M. McCarthy, G. S. Soh, "Geometric Design of Linkages", section 2.3.
+// If the links are in line (mu = 0 or pi), it has no derivative, and its gradient is set to zero. Source: J. M.
+// McCarthy, G. S. Soh, "Geometric Design of Linkages", section 2.3.
 #include <cmath>
 
 #include "core/mechanism/sensor_kinds.hpp"
@@ -33,7 +33,7 @@ struct TransmissionFunction final : SensorFunction {
     const BodyAt b1 = body_at(at.y, link1.body), b2 = body_at(at.y, link2.body);
     const Vector3d x1 = b1.frame.A * link1.s, x2 = b2.frame.A * link2.s;
     const double across = x1.cross(x2).norm(), along = x1.dot(x2);
-    // across = |x1| |x2| sin(mu), so that no division by a length of zero occurs.
+    // across = |x1| |x2| sin(mu): the formula never divides by a length of zero.
     if (across > 0) {
       add(d, link1, b1, (along / x1.squaredNorm() * x1 - x2) / across, scale, y_bar, rho_bar);
       add(d, link2, b2, (along / x2.squaredNorm() * x2 - x1) / across, scale, y_bar, rho_bar);
@@ -53,7 +53,7 @@ struct TransmissionFunction final : SensorFunction {
   }
 };
 
-// The link `name` from its point in joint `here` to its only other pin.
+// The vector in the link `name` from its point in joint `here` to its only other pin.
 Link link_from(Compilation& model, const std::string& name, const PointField& point, std::size_t here,
                const std::string& where) {
   Link link;

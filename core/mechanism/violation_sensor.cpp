@@ -1,4 +1,4 @@
-// The largest |entry| of the constraint equations and the unit norms: which equation is violated most at a state.
+// The largest |entry| of the constraint equations and the unit norms, and the equation that it belongs to.
 #include <cmath>
 
 #include "core/constraint/unit_norm.hpp"

@@ -1,5 +1,5 @@
-// The virtual work l'(J1 eta1 + J2 eta2) of the forces l = factor times `weights` on the rows of one constraint, and
-// its gradient at fixed weights and virtual displacements eta = (delta r, delta theta).
+// The virtual work l'(J1 eta1 + J2 eta2) of the forces l = factor times `weights` on the rows of one constraint. Its
+// gradient holds for fixed weights and virtual displacements eta = (delta r, delta theta).
 #pragma once
 
 #include <variant>

@@ -1,10 +1,10 @@
-// A body in the plane as the projection moves it (projection.hpp), with the derivatives of each step: a position is
-// (r, theta), P = e^(i theta/2).
+// A body in the plane for the projection (projection.hpp), with the derivatives of each step. A position is (r, theta),
+// P = e^(i theta/2).
 //
 //   theta = theta~ + 2 atan(delta_theta/2)                  pi = p~ + 1/2 G(p~)' delta_theta, normalised, turns so
 //   w = w_n + u_theta,   w_n = 2 Im(conj(P) Pdot^),   Pdot = i w/2 P
 //
-// The part of y that leaves the plane is carried along. All functions are inline.
+// The components of y out of the plane keep their values. All functions are inline.
 #pragma once
 
 #include <cmath>

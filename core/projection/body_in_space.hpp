@@ -1,9 +1,9 @@
-// A body in space as the projection moves it (projection.hpp), with the derivatives of each step:
+// A body in space for the projection (projection.hpp), with the derivatives of each step:
 //
 //   p~ = p^/|p^|,   pi = p~ + 1/2 G(p~)' delta_theta,   p = pi/|pi|
 //   pdot = pdot_n + 1/2 G(p)' u_theta,   pdot_n = pdot^ - p (p'pdot^)/(p'p)
 //
-// Where velocities alone are projected, p = p~ = p^. All functions are inline: they run once per body and iteration.
+// If only velocities are projected, p = p~ = p^. All functions are inline: they run once per body and iteration.
 #pragma once
 
 #include <cmath>
@@ -39,7 +39,7 @@ class BodyInSpace {
     q << r_hat_ + delta.head<3>(), pi / norm_pi_;
     set_position(q, state_, f);
   }
-  // The velocities for u = 0, and what changes u by du.
+  // Sets the velocities for u = 0, and changes u by du.
   void start_velocity(Frame& f) {
     const Vector4d pdot_hat = v_hat_.tail<4>(), &p = state_.p;
     Vec<7> v;
@@ -61,7 +61,7 @@ class BodyInSpace {
   double norm_violation() const { return std::abs(UnitNorm::phi(state_.p)); }
   double norm_rate_violation() const { return std::abs(UnitNorm::phi_dot(state_.p, state_.pdot)); }
 
-  // The velocities of a projection made before, after displace().
+  // Restores the velocities of an earlier projection, after displace().
   void restore_velocity(const Eigen::VectorXd& y, const Vec<6>&, Frame& f) {
     read_velocity(y, f);
     // E = G(p) (I - p p') G(p~)'/|pi| and G(p) p = 0
@@ -69,14 +69,14 @@ class BodyInSpace {
       E_.col(k) = G_times(state_.p, G_transposed_times(tilde_.p, Vector3d::Unit(k))) / norm_pi_;
     }
   }
-  // From delta' to the virtual displacement at q; X: one, or lanes of them.
+  // Turns delta' into the virtual displacement at q. X is one vector or lanes of them.
   template <class X>
   void turn_by_E(X& x, bool transposed) const {
     const auto turn = x.template bottomRows<3>().eval();
     x.template bottomRows<3>().noalias() = transposed ? (E_.transpose() * turn).eval() : (E_ * turn).eval();
   }
 
-  // Tangents: q~' and its frame's;
+  // Sets the tangents of q~ and of its frame.
   void tilde_tangent(const LaneRows& y_hat_dir, const Frame&, Direction& q_dir, FrameTangent& tilde_dir) const {
     q_dir = y_hat_dir.middleRows<7>(q_);
     if (!positions_) return;
@@ -84,7 +84,7 @@ class BodyInSpace {
     q_dir.bottomRows<4>() = normalised(tilde_.p, norm_hat_, p_hat_dir);
     set_tangent(tilde_, q_dir, Lanes<7>::Zero(), tilde_dir);
   }
-  // q' with delta fixed, and as a virtual displacement;
+  // Sets q' with delta fixed, also as a virtual displacement.
   void position_tangent(const Vec<6>& delta, Direction& q_dir, Lanes<6>& x) const {
     const Lanes<4> p_tilde_dir = q_dir.bottomRows<4>();
     const Lanes<4> pi_dir = p_tilde_dir + 0.5 * G_transposed_direction(p_tilde_dir, delta.tail<3>());
@@ -93,13 +93,13 @@ class BodyInSpace {
     x.topRows<3>() = q_dir.topRows<3>();
     x.bottomRows<3>().noalias() = (2 * G(state_.p)) * p_dir;
   }
-  // what delta' adds to q';
+  // Adds the part of delta' to q'.
   void add_displacement(const Lanes<6>& delta_dir, Direction& q_dir) const {
     q_dir.topRows<3>() += delta_dir.topRows<3>();
     const Lanes<4> pi_dir = 0.5 * G_transposed_times_lanes(tilde_.p, delta_dir.bottomRows<3>());
     q_dir.bottomRows<4>() += normalised(state_.p, norm_pi_, pi_dir);
   }
-  // v' with u fixed, and the frame's;
+  // Sets v' with u fixed, and the tangent of the frame.
   void velocity_tangent(const LaneRows& y_hat_dir, const Vec<6>& u, const Frame&, const Direction& q_dir,
                         Direction& v_dir, FrameTangent& f_dir) const {
     const Vector4d& p = state_.p;
@@ -116,7 +116,7 @@ class BodyInSpace {
     v_dir.bottomRows<4>() += 0.5 * G_transposed_direction(p_dir, u.tail<3>());
     set_tangent(state_, q_dir, v_dir, f_dir);
   }
-  // what u' adds to v'.
+  // Adds the part of u' to v'.
   void add_velocity_tangent(const Lanes<6>& u_dir, Direction& v_dir) const {
     v_dir.topRows<3>() += u_dir.topRows<3>();
     v_dir.bottomRows<4>() += 0.5 * G_transposed_times_lanes(state_.p, u_dir.bottomRows<3>());
@@ -128,7 +128,7 @@ class BodyInSpace {
     y_dir.middleRows<7>(v_) = v_dir;
   }
 
-  // Adjoints, in the reverse order: gradients in q and v, and the cotangents of u and delta that they mean.
+  // The adjoint goes in reverse order: from gradients in q and v to the cotangents of u and delta.
   void start_adjoint(const Eigen::VectorXd& y_bar, Gradient& q_bar, Gradient& v_bar) const {
     q_bar = y_bar.segment<7>(q_), v_bar = y_bar.segment<7>(v_);
   }
@@ -149,7 +149,7 @@ class BodyInSpace {
   void pull_back_position(const Frame&, const FrameBar& bar, Gradient& q_bar) const {
     q_bar += mbsopt::pull_back_position(state_, bar);
   }
-  // Through v_n and T(p) u.
+  // Pulls the gradient back through v_n and T(p) u.
   void pull_back_start(const Vec<6>& u, Gradient& q_bar, Gradient& v_bar) const {
     const Vector4d &p = state_.p, pdot_hat = v_hat_.tail<4>(), pdot_bar = v_bar.tail<4>();
     const double pp = p.squaredNorm(), along = p.dot(pdot_hat) / pp, across = p.dot(pdot_bar);
@@ -157,7 +157,7 @@ class BodyInSpace {
     q_bar.tail<4>() -= along * pdot_bar + (across / pp) * (pdot_hat - 2 * along * p);
     v_bar.tail<4>() = pdot_bar - p * (across / pp);
   }
-  // Into y_hat_bar; tilde, bar: of q~, whose bar is zero where nothing is constrained.
+  // Adds to y_hat_bar. tilde and bar belong to q~; bar is zero if nothing is constrained.
   void finish_adjoint(const Vec<6>& delta, const Frame& tilde, FrameBar& bar, const Eigen::VectorXd&,
                       const Gradient& q_bar, const Gradient& v_bar, Eigen::VectorXd& y_hat_bar) const {
     y_hat_bar.segment<7>(v_) += v_bar;

@@ -1,4 +1,4 @@
-// The projection itself, and what it knows of the constraints: violations, and the response of their forces.
+// The projection itself, the violations of the constraints, and the response of their forces.
 #pragma once
 
 #include <algorithm>
@@ -10,10 +10,10 @@
 
 namespace mbsopt {
 
-// More unknowns than these are solved faster by blocks.
+// Blocks are faster for more unknowns than these.
 inline constexpr Eigen::Index kDenseUnknowns = 48;
 
-// Accelerations of body i (1-based), of size 1, that no symmetry of a mechanism leaves a direction out of.
+// Accelerations of body i (1-based) of size 1. No symmetry of a mechanism makes a direction vanish in them.
 template <int N>
 Vec<N> test_load(int i) {
   Vec<N> x;
@@ -93,7 +93,7 @@ bool ProjectorOf<Body>::project(double t, const Y& angles, const Y& y_hat, Y& y,
   return y.allFinite();
 }
 
-// In the plane where there is one, so that both models take the same steps.
+// Uses the load of the plane for planar mechanisms, so that both models take the same steps.
 template <>
 inline Vec<6> ProjectorOf<BodyInSpace>::test_load_of(int body) const {
   return data_.planar ? PlanarBodies(*data_.planar).in_space(at(body), test_load<3>(body)) : test_load<6>(body);

@@ -1,4 +1,4 @@
-// The derivatives of a projection: TLM and adjoint. projection.hpp has the equations.
+// The derivatives of a projection: TLM and adjoint. projection.hpp states the equations.
 #pragma once
 
 #include "core/projection/body_in_plane.hpp"

@@ -1,5 +1,5 @@
-// Projections in space and in the plane share two things: the iteration onto the constraints, and the refinement of
-// the linear systems of its derivatives. Rows: J and M of ConstraintRows or PlanarRows.
+// Projections in space and in the plane share the iteration onto the constraints and the refinement of the linear
+// systems of its derivatives. Rows gives J and M: ConstraintRows or PlanarRows.
 #pragma once
 
 #include <cmath>
@@ -10,16 +10,17 @@
 
 namespace mbsopt {
 
-// Scratch of corrections to unknowns x per body and multipliers nu: right-hand sides, and the corrections themselves.
+// Scratch for corrections to unknowns x per body and multipliers nu: right-hand sides, and the corrections themselves.
 template <class X, class Y>
 struct Corrections {
   std::vector<X> r, dx, Ex;
   Y rg, dnu;
 };
 
-// From x = 0 and nu = 0 to M x + J~'nu = 0 and phi = 0 to rounding, J~: `rows`, by
+// Iterates from x = 0 and nu = 0 until M x + J~'nu = 0 and phi = 0 hold to rounding, J~ that of `rows`, by
 //   [ M J'; J 0 ] (dx, dnu) = -(M x + J~'nu, phi)        J: of the solver's factor
-// evaluate(phi): at x; move(dx): the bodies, to x + dx. False if phi is no number or stays above unmet.
+// evaluate(phi) computes phi at x, and move(dx) moves the bodies to x + dx. Returns false if phi is not finite or stays
+// above unmet.
 template <class Rows, class X, class Evaluate, class Move>
 bool onto_constraints(BlockSaddleSolver<Rows>& solver, const Rows& rows, double size, double unmet, std::vector<X>& x,
                       Eigen::VectorXd& nu, Corrections<X, Eigen::VectorXd>& c, Evaluate&& evaluate, Move&& move) {
@@ -50,9 +51,9 @@ enum class ProjectionLevel { position, velocity };
 // Solves, with J~ = J(q~) of the solver and J = J(q) of `rows`, its columns of turns times E at the position level,
 //   [ M  J~' ] or, transposed,  [ M  E'J' ]        (velocity level: [ M J'; J 0 ], symmetric)
 //   [ JE  0  ]                  [ J~  0   ]
-// by x += K (rhs - B x) with K the approximate inverse that the factor of S(q~) gives. directions: what x adds to,
-// against which its rounding counts. turn(x, transposed): x = E x or E'x. Each pass gains a factor of about the
-// correction's size, or of 1/alpha times the ratio of masses that meet.
+// by x += K (rhs - B x) with K the approximate inverse from the factor of S(q~). `x` is added to directions, so its
+// rounding is relative to these. turn(x, transposed) computes x = E x or E'x. Each pass gains a factor of about the
+// correction's size, or of 1/alpha times the ratio of the coupled masses.
 template <class Rows, class X, class Y, class Turn>
 void refine(BlockSaddleSolver<Rows>& solver, const Rows& rows, ProjectionLevel level, bool transposed,
             const LargestEntries<X>& directions, const std::vector<X>& b, const Y& g, std::vector<X>& x, Y& nu,

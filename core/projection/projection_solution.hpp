@@ -1,4 +1,4 @@
-// The result of a projection (projection.hpp), from which its derivatives follow; constants of both projections.
+// The result of a projection (projection.hpp), which determines its derivatives, and constants of both projections.
 #pragma once
 
 #include <vector>
@@ -9,13 +9,13 @@ namespace mbsopt {
 
 inline constexpr double kProjectionAlpha = 1e8;  // times row_alpha
 inline constexpr int kMostProjectionIterations = 60;
-// Both are relative to the largest coordinate and velocity, or to 1 where these are smaller.
+// Positions are relative to the largest coordinate, velocities to the largest velocity, or to 1 if these are smaller.
 inline constexpr double kProjectionRounding = 1e-15, kUnmetPosition = 1e-8, kUnmetVelocity = 1e-6;
-// A derivative is refined so often at most; a relative change of several units of rounding ends it earlier.
+// The largest number of refinements of a derivative. A relative change of a few units of rounding ends it earlier.
 inline constexpr int kMostRefinements = 12;
 inline constexpr double kNegligibleRefinement = 2e-15;
 
-// Largest entry of each direction.
+// The largest entry of each direction.
 template <class X>
 using LargestEntries = Eigen::Array<double, 1, X::ColsAtCompileTime>;
 template <class X>
@@ -26,7 +26,7 @@ LargestEntries<X> largest(const std::vector<X>& x) {
   return most;
 }
 
-// In the plane each body's entries are (along t1, along t2, about n, 0, 0, 0).
+// In the plane, each body's entries are (along t1, along t2, about n, 0, 0, 0).
 struct ProjectionSolution {
   std::vector<Vec<6>> delta, u;
   Eigen::VectorXd nu, kappa;

@@ -1,4 +1,4 @@
-// The projection in one of the two spaces (Body: BodyInSpace, BodyInPlane), of which projection.hpp is the interface.
+// The projection in one of the two spaces (Body is BodyInSpace or BodyInPlane). projection.hpp is its interface.
 #pragma once
 
 #include <vector>
@@ -9,9 +9,9 @@
 
 namespace mbsopt {
 
-// Bodies are counted without the ground, frames with it.
+// The numbering of bodies excludes the ground, that of frames includes it.
 //   mass_orthogonal_projection.hpp   project, response, violations
-//   square_projection.hpp            settle, assemble, approach: by a dense J where drives leave nothing free
+//   square_projection.hpp            settle, assemble, approach: by a dense J if drives leave no freedom
 //   projection_derivatives.hpp       linearise, tangent, add_adjoint
 template <class Body>
 class ProjectorOf final : public Projector {
@@ -60,7 +60,8 @@ class ProjectorOf final : public Projector {
     for (std::size_t i = 0; i < bodies_.size(); ++i) f(bodies_[i], i, frames_[i + 1]);
   }
   X test_load_of(int body) const;
-  // Directions of Phi or Phidot (dirs_) and of J'lambda (load_dirs_), along frame_dirs_ and those of the fields.
+  // Sets the directions of Phi or Phidot (dirs_) and of J'lambda (load_dirs_), along frame_dirs_ and those of the
+  // fields.
   void set_tangents(ProjectionLevel level, const Frames& frames, const ParameterBlock& block, const Y& lambda);
   void set_field_tangents(const ParameterBlock& block);  // Phi' at q along the fields into dirs_, bodies at rest
   // b_lanes_ = -(M' x + (J'lambda)')
@@ -94,7 +95,7 @@ class ProjectorOf final : public Projector {
   Corrections<X, Y> corrections_;
   std::vector<typename Space::FrameBar> bars_;
   std::vector<Gradient> q_bars_, v_bars_;
-  // Lanes.
+  // Lanes of tangent directions.
   std::vector<typename Space::FrameTangent> frame_dirs_;
   std::vector<Direction> q_dirs_, v_dirs_;
   std::vector<Lanes<N>> load_dirs_, b_lanes_, x_lanes_;

@@ -1,5 +1,5 @@
-// Where drives leave nothing free, J is square: Newton's method by its dense factor finds the state, without the
-// accelerations of project(). The nearest state where constraints cannot hold: by their squares.
+// If drives leave no freedom, J is square. Newton's method by its dense factor then finds the state, without the
+// accelerations of project(). If the constraints cannot hold, the sum of their squares gives the nearest state.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ void ProjectorOf<Body>::solve_square(const Y& rows, std::vector<X>& x) {
   J_factor_.solve(all);
 }
 
-// Newton's method; a turn of each body by dx adds to delta to first order.
+// Uses Newton's method; a turn of each body by dx adds to delta to first order.
 template <class Body>
 bool ProjectorOf<Body>::settle(double t, const Y& angles, const Y& y_hat, Y& y) {
   if (!square_) return project(t, angles, y_hat, y, settled_);
@@ -32,7 +32,7 @@ bool ProjectorOf<Body>::settle(double t, const Y& angles, const Y& y_hat, Y& y) 
   const double q_size = std::max(1.0, y_hat.head(half).cwiseAbs().maxCoeff()),
                v_size = std::max(1.0, y_hat.tail(half).cwiseAbs().maxCoeff());
   std::vector<X>& dx = corrections_.dx;
-  // Calls step() until |phi| is rounding; false where it does not fall before.
+  // Calls step() until |phi| is rounding. Returns false if |phi| stops falling before.
   const auto iterate = [&](double size, double unmet, auto&& evaluate, auto&& step) {
     double before = INFINITY;
     for (int k = 0; k < kMostProjectionIterations; ++k) {
@@ -84,7 +84,7 @@ bool ProjectorOf<Body>::assemble(double t, const Y& angles, const Y& y_hat, Y& y
   constexpr double kShortest = 1e-3;  // part of a step: det J vanishes on the way, or |Phi| has a least value
   if (!square_) return false;
   double sign = 0;
-  // |Phi| beside the state that was read, with J_ there; infinite where det J has another sign than at the guess.
+  // |Phi| at the state moved, and J_ there. It is infinite if det J differs in sign from that at the guess.
   const auto violation_at = [&](const Y& moved) {
     for_bodies(
         [&](Body& b, std::size_t i, auto& f) { b.displace(moved.segment<N>(N * static_cast<Eigen::Index>(i)), f); });
@@ -122,8 +122,9 @@ bool ProjectorOf<Body>::assemble(double t, const Y& angles, const Y& y_hat, Y& y
   return settle(t, angles, reached, y);
 }
 
-// Levenberg-Marquardt with a damping of the size of |Phi|: quadratic where the constraints can hold (Yamashita and
-// Fukushima, Computing Supplementum 15 (2001) 239); and of the size of the curvature |Phi| Phi_qq where they cannot.
+// Levenberg-Marquardt with a damping of the size of |Phi|: it converges quadratically if the constraints can hold
+// (Yamashita and Fukushima, Computing Supplementum 15 (2001) 239). If they cannot, the damping has the size of the
+// curvature |Phi| Phi_qq.
 template <class Body>
 double ProjectorOf<Body>::approach(double t, const Y& angles, Y& y, Y& theta_bar, Y& rho_bar) {
   constexpr int kMost = 100;

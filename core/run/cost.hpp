@@ -30,19 +30,19 @@ struct RunningCost {
 struct TerminalCost {
   virtual ~TerminalCost() = default;
   virtual double value(VecIn y_end, VecIn rho) const = 0;
-  // Where the backward sweep starts (AdjInit): lambda = d value/dy, mu = d value/drho at the end time.
+  // The backward sweep starts with these (AdjInit): lambda = d value/dy, mu = d value/drho at the end time.
   virtual void adjoint_init(VecIn y_end, VecIn rho, VecOut lambda, VecOut mu) const = 0;
 };
 
-// A scalar of one instant: value, and its gradient in y and rho in one call. Must be safe to call from several threads.
+// A scalar of one instant. One call gives its value and its gradient in y and rho. Several threads may call it at once.
 struct PointCost {
   virtual ~PointCost() = default;
   virtual double value(const StatePoint& at) const = 0;
   // y_bar += scale d/dy, rho_bar += scale d/drho; returns the value.
   virtual double add_gradient(const StatePoint& at, double scale, VecOut y_bar, VecOut rho_bar) const = 0;
-  // The parameters that it is bound to; null where it is bound to none.
+  // The parameters that the cost is bound to, or null.
   virtual const Eigen::VectorXd* rho() const { return nullptr; }
-  // The expression that its value jumps with, of all parameters, t and all sensors; null where there is none.
+  // The expression that shows where the value jumps, in all parameters, t and all sensors; null if there is none.
   virtual const SwitchedProgram* program() const { return nullptr; }
 };
 
@@ -51,7 +51,7 @@ struct SampledCost {
   std::shared_ptr<const PointCost> cost;
 };
 
-// One objective. An absent part is absent. (What depends on parameters alone is added by the caller.)
+// One objective. A null part is absent. The caller adds the terms that depend on parameters alone.
 struct Cost {
   std::shared_ptr<const PointCost> running;
   std::shared_ptr<const PointCost> terminal;
@@ -60,11 +60,11 @@ struct Cost {
   bool is_extreme = false;  // running is the exponential of a smooth maximum, which may leave the range of numbers
 };
 
-// Which of the costs have no finite value, in words.
+// Names the costs that have no finite value.
 std::string not_finite_costs(std::span<const Cost> costs, const Eigen::VectorXd& psi);
 
-// Adapters from what a user writes, at the parameters of the mechanism that is simulated. name: for messages, such as
-// that of what the cost throws. Throw std::invalid_argument where there is no cost (null).
+// Adapters for the costs of a user, at the parameters of the simulated mechanism. `name` appears in messages, such as
+// those for exceptions of the cost. Throws std::invalid_argument if the cost is null.
 std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const RunningCost> running, const Mechanism& mechanism,
                                             std::string name = "a running cost");
 std::shared_ptr<const PointCost> point_cost(std::shared_ptr<const TerminalCost> terminal, const Mechanism& mechanism,

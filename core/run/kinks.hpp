@@ -1,4 +1,4 @@
-// Where the laws of a mechanism and the running costs of a run jump or have kinks in time.
+// The instants at which the laws of a mechanism and the running costs of a run jump or have kinks.
 #pragma once
 
 #include <span>

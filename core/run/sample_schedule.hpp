@@ -1,4 +1,4 @@
-// Sample times of costs and observers in the order of time, and which of them lie in a step.
+// Sample times of costs and observers in ascending order; finds those that lie in a step.
 #pragma once
 
 #include <algorithm>
@@ -37,7 +37,7 @@ class SampleSchedule {
 
   bool due(double t1) const { return next_ < events_.size() && (events_[next_].time <= t1 || t1 >= end_); }
 
-  // Returns the events up to t1 that were not taken before, and all that remain in the step that reaches the end.
+  // Returns the events up to t1 that it has not returned before. The step that reaches the end takes all that remain.
   std::span<const SampleEvent> take(double t1) {
     const std::size_t first = next_;
     while (due(t1)) ++next_;

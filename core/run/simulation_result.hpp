@@ -1,4 +1,4 @@
-// The options of a run beside its costs, and its result: objectives, gradients, statistics, doubts in numbers.
+// The options of a run beside its costs, and its result: objectives, gradients, statistics, figures behind warnings.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,7 +16,8 @@ struct StepSequence {
   bool to_the_end = true;  // the last step is the run's last, not one before it
 };
 
-// Estimated error of an integral relative to that of the integrand's size; the objective, and when most of it arose.
+// The estimated error of an integral relative to the integral of |integrand|, with the objective and the time of most
+// of it.
 struct QuadratureError {
   double error = 0;
   std::string of;
@@ -37,37 +38,38 @@ struct Jump {
 struct SimulationStatistics {
   bool solved =
       false;  // drives leave nothing free: positions were solved, steps are panels of quadrature (core/driven)
-  // rhs_evaluations: of the equations of motion, each stage of a Newton iteration included; jacobians: of these.
+  // rhs_evaluations counts those of the equations of motion, with each stage of a Newton iteration. jacobians counts
+  // those of the same equations.
   long steps = 0, rejected = 0, rhs_evaluations = 0, factorisations = 0, jacobians = 0;
-  // Iterations of Newton's method; solutions of linear systems by these, by the filter of the error, and by explicit
-  // equations of motion (their refinements not counted).
+  // newton_iterations counts those of Newton's method. `linear_solves` counts the linear systems of these, of the error
+  // filter, and of explicit equations of motion, without refinements.
   long newton_iterations = 0, linear_solves = 0;
-  // The rejected steps by reason: their sum is `rejected`. placed_again: at a singular position (singular_passage.hpp).
+  // The rejected steps by reason; their sum is `rejected`. placed_again: see singular_passage.hpp.
   struct Rejections {
     long error_test = 0, not_converged = 0, off_constraints = 0, not_finite = 0, placed_again = 0;
   } rejections;
-  // The factor of the explicit equations of motion: its blocks (6 x 6, or 3 x 3 in the plane), diagonal ones
-  // included; and at how many states derivatives of these equations were evaluated.
+  // factor_blocks counts the blocks of the explicit equations' factor (6 x 6, or 3 x 3 in the plane), diagonal ones
+  // included. `linearised_states` counts the states at which derivatives of these equations were evaluated.
   long factor_blocks = 0, linearised_states = 0;
   double wall_seconds = 0;
   double max_position_violation = 0;                              // of |Phi| over accepted steps [m, -]
   double max_velocity_violation = 0;                              // of |Phi_q v + Phi_t|
   double energy_initial = 0, energy_final = 0, energy_drift = 0;  // drift: largest |E - E(0)| over accepted steps [J]
-  double relative_energy_drift = 0;      // of the largest energy so far, where nothing does work; else 0
+  double relative_energy_drift = 0;      // of the largest energy so far, if nothing does work; else 0
   double max_acceleration_residual = 0;  // relative, of the constraints' accelerations; penalty: of projections
   double weak_joints_error = 0;          // relative, of the accelerations at the end (weak_joints.hpp)
   std::size_t adjoint_memory_bytes = 0;  // the most that the backward sweep kept of the forward run
   long recomputed_steps = 0;             // for want of memory, of the backward sweep
-  // Of explicit methods that can tell (stiffness.hpp): steps that were looked at, those at the edge of stability among
+  // For explicit methods with a stiffness test (stiffness.hpp): the steps tested, those at the edge of stability among
   // them, and the fastest rate |lambda| there [1/s].
   long watched_steps = 0, stability_limited_steps = 0;
   double stiffest_rate = 0;
-  // The worst resolved running cost, exponential of a smooth extreme, and derivative of either (quadrature_watch.hpp; 0
-  // by CVODES, which controls this error).
+  // The worst resolved running cost, exponential of a smooth extreme, and derivative of either (quadrature_watch.hpp).
+  // They are 0 with CVODES, which controls this error.
   QuadratureError quadrature, extreme_quadrature, gradient_quadrature;
   std::vector<Jump> jumps;  // in runs with derivatives
-  // The largest error of a step near a singular position that its projection took out, in tolerances, and when [s]:
-  // states within such steps are not projected.
+  // The largest error of a step near a singular position that its projection removed, in tolerances, and its time [s].
+  // States within such steps are not projected.
   double projected_error = 0, projected_error_time = 0;
 };
 
@@ -89,8 +91,8 @@ struct SimulationResult {
   double last_good_time = 0;  // [s]
   Eigen::VectorXd psi;        // per cost
   Eigen::MatrixXd psi_rho;    // cost x parameter; TLM and adjoint only
-  // cost x 14n, adjoint only: d psi/dy at the start, in any direction of y (MBSVT's Lambda at the start). Empty where
-  // drives leave nothing free.
+  // Adjoint only: d psi/dy at the start in any direction of y, cost x 14n (MBSVT's Lambda at the start). It is empty if
+  // drives leave no freedom.
   Eigen::MatrixXd psi_y_initial;
   Eigen::VectorXd y_initial, y_end;
   SimulationStatistics statistics;
@@ -98,12 +100,12 @@ struct SimulationResult {
   bool ok() const { return status == SimulationStatus::ok; }
 };
 
-// States wanted at given times (ascending, within the simulated span), through dense output; never forces a step.
+// Observes states at given times (ascending, within the simulated span) through dense output. It never forces a step.
 struct Sampling {
   std::vector<double> times;
   std::function<void(std::size_t index, const StatePoint& at)> observe;
 };
-// The same with derivatives: y_rho is dy/drho at that time, 14n x P; at.ydot is there.
+// The same with derivatives: y_rho is dy/drho at that time, 14n x P. at.ydot is set.
 struct TangentSampling {
   std::vector<double> times;
   std::function<void(std::size_t index, const StatePoint& at, const Eigen::MatrixXd& y_rho)> observe;
@@ -112,10 +114,10 @@ struct TangentSampling {
 struct RunOptions {
   const StepSequence* frozen = nullptr;    // take exactly these steps
   std::function<bool(double t)> progress;  // called after accepted steps; false stops the run (status: stopped)
-  // The state after each accepted step, the start not counted; for states at times of one's own choice: Sampling.
+  // Receives the state after each accepted step, but not the start. Use Sampling for states at given times.
   std::function<void(const StatePoint& at)> after_step = {};
-  // Stages of implicit methods to 1e-12 of the state, not to a fraction of the tolerance, for values that are to be
-  // compared with those of runs with derivatives. These always do so; fixed and given steps go on to rounding.
+  // Solves the stages of implicit methods to 1e-12 of the state, not to a fraction of the tolerance. The values then
+  // compare with those of runs with derivatives, which always do so. Fixed and given steps solve them to rounding.
   bool exact_stages = false;
 };
 

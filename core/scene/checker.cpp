@@ -13,7 +13,7 @@ namespace mbsopt {
 namespace {
 
 constexpr std::size_t kListed = 20;
-// A hint compares a name with all others. Errors beyond that many go without: no more of them are shown.
+// A hint compares a name with all others. Only so many errors get hints, because no more are shown.
 constexpr std::size_t kWithHints = 100;
 
 // "; bodies: ground, crank"
@@ -50,8 +50,8 @@ Kind kind_of(To what) {
 
 constexpr std::size_t kLongestName = 255;  // bytes, as of a file: a problem's name becomes one
 
-// The first control character (C0, DEL, C1) or one that changes the order in which text is shown (Unicode UAX #9) or
-// its lines: U+061C, U+200E, U+200F, U+2028 to U+202E, U+2066 to U+2069. npos where there is none; the text is UTF-8.
+// Finds the first control character (C0, DEL, C1) or one that changes the order of text (Unicode UAX #9) or its lines:
+// U+061C, U+200E, U+200F, U+2028 to U+202E, U+2066 to U+2069. Returns npos if there is none. The text is UTF-8.
 std::size_t unreadable_character(std::string_view text) {
   const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -283,7 +283,7 @@ void Checker::law(std::string_view key, const std::optional<Expression>& value, 
 }
 
 void Checker::expression(std::string_view key, const Expression& value, Names names, const Says& says) {
-  // Names::none here means parameters_only, in which weights without units are as usual as in other objectives.
+  // Names::none here means parameters_only, where weights without units are usual, as in other objectives.
   if (names == Names::none && !says.dimension) {
     if (!names_are_known(path(key), value, names)) return;
     return check_size(path(key), value);

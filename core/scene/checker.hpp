@@ -1,5 +1,5 @@
-// The visitor (core/scene/vocabulary.hpp) that checks every field of a scene or problem: names that are referred to,
-// expressions, dimensions, ranges. What only a whole object can get wrong is checked by check_meaning().
+// The visitor (core/scene/vocabulary.hpp) that checks every field of a scene or problem: referenced names, expressions,
+// dimensions, ranges. check_meaning() checks what only a whole object can show.
 #pragma once
 
 #include <string>
@@ -27,7 +27,7 @@ class Checker {
   void issue(const std::string& path, const std::string& message) { issues_.push_back({path, message}); }
   void warning(const std::string& path, const std::string& message) { issues_.push_back({path, message, true}); }
 
-  // Checks an object's fields, then what they mean together.
+  // Checks an object's fields, then their meaning together.
   template <class T>
   void check(const T& value) {
     describe(*this, value);
@@ -162,10 +162,10 @@ void check_meaning(Checker& checker, const IntegratorSettings& settings);
 void check_meaning(Checker& checker, const SimulationSettings& settings);
 void check_meaning(Checker& checker, const Scene& scene);
 
-// The units that samples are given in.
+// Checks the units of samples.
 void check_units(Checker& checker, const SampleColumn& samples);
 
-// Names that occur more than once in a list, at paths of(index).
+// Reports names that occur more than once in a list, at paths of(index).
 template <class T, class PathOf>
 void check_unique_names(Checker& checker, const std::vector<T>& all, std::string_view what, PathOf&& path_of) {
   std::map<std::string, std::size_t> first;

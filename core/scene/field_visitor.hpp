@@ -1,5 +1,5 @@
-// The visitor (core/scene/vocabulary.hpp) that finds the expressions and the points of an object, each with its place,
-// for whoever asks on what it depends.
+// The visitor (core/scene/vocabulary.hpp) that finds the expressions and the points of an object with their places. It
+// serves functions that ask what the object depends on.
 #pragma once
 
 #include <string>
@@ -12,12 +12,12 @@ namespace mbsopt {
 
 struct FieldPlace {
   const std::string& path;  // "bodies[2].mass", below the path that the visit began at
-  // A body's named points matter where they are used, its drawing to nothing that is computed.
+  // A body's named points count where they are used. Nothing that is computed depends on its drawing.
   bool in_named_point = false, in_drawing = false;
 };
 
-// on_expression(const FieldPlace&, const Expression&, Names);  on_point(const std::string& body, const std::string&
-// name) for points that are referred to by name. Definitions are left out: they count where they are used.
+// on_expression(const FieldPlace&, const Expression&, Names) and on_point(const std::string& body, const std::string&
+// name) for points that are used by name. Definitions are left out: they count where they are used.
 template <class OnExpression, class OnPoint>
 class FieldVisitor {
  public:

@@ -7,8 +7,8 @@
 
 namespace mbsopt {
 
-// xx yy zz xy xz yz.  Empty where it can; else what is wrong, in words. Tolerance: 1e-6 of the trace, so that tensors
-// written with seven digits pass.
+// The tensor is xx yy zz xy xz yz. Returns the fault in words, or an empty string. The tolerance is 1e-6 of the trace,
+// so that tensors written with seven digits pass.
 std::string inertia_problem(const std::array<double, 6>& tensor);
 
 }  // namespace mbsopt

@@ -21,7 +21,7 @@ double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] 
 bool is_finite(const Vector& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
 Vector unit(const Vector& v) { return {v[0] / norm(v), v[1] / norm(v), v[2] / norm(v)}; }
 
-// A direction that can be used; an issue where it is a zero vector.
+// Returns a usable direction, and reports a zero vector.
 std::optional<Vector> direction(Checker& checker, std::string_view key, const std::optional<PointField>& field,
                                 const std::string& body) {
   if (!field) return std::nullopt;
@@ -215,7 +215,7 @@ void check_meaning(Checker& checker, const Joint& joint) {
   if (need_of(*row, "normal1") != Need::unknown) check_normals(checker, joint, axis1, axis2);
 }
 
-// Of a law of time alone: that it has a number at the start, and so have its first `derivatives` ones.
+// Checks that a law of time alone, and its first `derivatives` derivatives, are finite at the start.
 void check_start(Checker& checker, const std::string& where, const Expression& law, std::size_t derivatives) {
   static constexpr const char* kOf[] = {"", "the rate of ", "the second derivative of "};
   const double start = checker.facts().scene().simulation.start_time;
@@ -249,7 +249,7 @@ void check_meaning(Checker& checker, const Signal& signal) { check_units(checker
 
 namespace {
 
-// Kinks of a drive's law: no motion follows a rate that jumps.
+// Reports kinks of a drive's law: no motion follows a rate that jumps.
 void check_smooth(Checker& checker, const Expression& law) {
   const std::string needs = "; a drive needs two continuous derivatives: take ";
   for (const Signal& signal : checker.facts().scene().signals)
@@ -282,7 +282,7 @@ void check_meaning(Checker& checker, const Force& force) {
     for (std::size_t i = 0; i < 3; ++i)
       check_start(checker, child_path(checker.path("components"), i), components[i], 0);
   };
-  // A coefficient of 0 beside a law says nothing, any other may be thought to act.
+  // Warns of a coefficient beside a law, which has no effect. A coefficient of 0 needs no warning.
   const auto warn_of_law = [&](bool has_law, std::initializer_list<std::pair<const char*, const Field*>> coefficients) {
     std::vector<std::string> idle;
     for (const auto& [key, field] : coefficients)

@@ -1,4 +1,4 @@
-// The findings on a scene: everything that can be said from its plain data, at the values of its parameters.
+// The findings on a scene: all checks of its plain data, at the values of its parameters.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace mbsopt {
 
-// Empty (or warnings only) where a Mechanism can be built.
+// Returns nothing (or warnings only) if a Mechanism can be built.
 std::vector<SceneIssue> find_issues(const Scene& scene);
 
 std::vector<SceneIssue> without_repetitions(std::vector<SceneIssue> issues);

@@ -1,4 +1,4 @@
-// The scene as a kinematic problem: what initial.conditions prescribe at the start is prescribed at all times.
+// The scene as a kinematic problem: initial.conditions hold at all times, not at the start only.
 #pragma once
 
 #include <string>
@@ -9,9 +9,9 @@
 
 namespace mbsopt {
 
-// Conditions on angles, displacements, distances, Euler parameters and global coordinates of points become drives of
-// the law value + rate (t - start_time) + acceleration (t - start_time)^2 / 2; the degrees of freedom that no drive
-// holds are chosen so. The scene returned has no conditions left. Issues: conditions that cannot become drives.
+// Conditions on angles, displacements, distances, Euler parameters and global coordinates of points become drives.
+// Their law is value + rate (t - start_time) + acceleration (t - start_time)^2 / 2. So a user chooses the driven
+// degrees of freedom. The returned scene has no conditions. issues receives conditions that cannot become drives.
 Scene kinematic_scene(const Scene& scene, std::vector<SceneIssue>& issues);
 
 }  // namespace mbsopt

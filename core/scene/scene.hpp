@@ -1,5 +1,5 @@
-// A scene: what a problem file says about a mechanism, as plain data. Nothing is numbered or checked here; scene_issues
-// (issues.hpp) checks it, Mechanism (core/mechanism) compiles it. SI units, radians, right-handed frames.
+// A scene: the mechanism of a problem file as plain data, without numbering or checks. find_issues (issues.hpp) checks
+// it, and Mechanism (core/mechanism) compiles it. SI units, radians, right-handed frames.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ using PointField =
 
 enum class ParameterScale { linear, log, log10 };
 
-// A normal distribution states what is known about a parameter before identification.
+// A normal distribution states the knowledge of a parameter before identification.
 struct Prior {
   double mean = 0, sigma = 1;
 };
@@ -53,15 +53,15 @@ struct TermParameter {
   Field value;
 };
 
-// Tensor entries about the centre of mass, body axes.  [kg m^2]
+// Entries of the tensor about the centre of mass in body axes.  [kg m^2]
 struct InertiaField {
   Field xx, yy, zz, xy, xz, yz;
 };
 
-// A tensor that a body of that mass can have, whatever the six lengths are: with the second moments of the mass about
-// its centre S = m U U', U upper triangular, the tensor is J = tr(S) I - S.  [m]
-//   U = [ x xy xz ]    x, y, z: what is left of the mass's root-mean-square extent along an axis when the shears
-//       [ 0  y yz ]    xy, xz, yz are taken off; with those zero,  J = m diag(y^2 + z^2, x^2 + z^2, x^2 + y^2)
+// A tensor that is physically consistent for any six lengths. With the second moments of the mass about its centre S =
+// m U U', U upper triangular, the tensor is J = tr(S) I - S.  [m]
+//   U = [ x xy xz ]    x, y, z: the mass's root-mean-square extent along an axis without the part of the shears
+//       [ 0  y yz ]    xy, xz, yz; if these are zero,  J = m diag(y^2 + z^2, x^2 + z^2, x^2 + y^2)
 //       [ 0  0  z ]
 // With the mass and the centre of mass it is the log-Cholesky parametrisation of the pseudo-inertia: Rucker and
 // Wensing, "Smooth Parameterization of Rigid-Body Inertia", IEEE RA-L 7 (2022).
@@ -81,7 +81,7 @@ struct RollPitchYawField {  // fixed axes x, y, z, as in URDF
 };
 using OrientationField = std::variant<EulerParametersField, AxisAngleField, RollPitchYawField>;
 
-// Drawing only.
+// A shape is for drawing only.
 struct Shape {
   std::string type;  // rod, box, sphere, cylinder
   PointField from = "O", to = "O";
@@ -102,7 +102,7 @@ struct Body {
   std::vector<Shape> shapes;
 };
 
-// Types as in the problem format; core/constraint/joints.hpp says which primitives each one is made of.
+// The types are those of the problem format; core/constraint/joints.hpp lists the primitives of each.
 struct Joint {
   std::string name, type;
   std::string body1 = "ground", body2;
@@ -110,7 +110,7 @@ struct Joint {
   std::optional<PointField> axis1, axis2, normal1, normal2;
   Field length;                // of distance [m]
   std::string joint1, joint2;  // of gear and rack_pinion, which tie two joints
-  // Angles from normal1 to normal2, or where these are left out from the start; displacements from the start.
+  // Angles go from normal1 to normal2, or from the start if a file omits these. Displacements go from the start.
   Field ratio = 1.0;  // of gear: angle(joint2) = ratio angle(joint1)
   Field radius;       // of rack_pinion: displacement(joint2) = radius angle(joint1) [m]
   Field pitch;        // of screw: displacement = pitch angle/(2 pi) [m per turn]
@@ -120,13 +120,13 @@ struct Joint {
 struct SampleColumn {
   std::string file, column, time = "t";
   std::string unit = {}, time_unit = {};  // instead of the units that the headers name; empty: these, else SI
-  std::optional<double> time_zero = {};   // what the file shows at t = 0 [s]
+  std::optional<double> time_zero = {};   // the file's time at t = 0 [s]
   std::shared_ptr<const Curve> curve = {};
   static constexpr double kFirstRow = std::numeric_limits<double>::lowest();  // a time_zero: that of the first row
 };
 
-// A law of a drive through samples, always a spline; or f(argument), f a function written in C++. The reader of the
-// file makes an expression of the latter.
+// The law of a drive through samples (always a spline), or f(argument) with a function f written in C++. The reader of
+// the file turns f(argument) into an expression.
 struct SampledLaw : SampleColumn {
   std::string function = {};                // its name; empty: samples
   std::optional<Expression> argument = {};  // of t and parameters; when absent t
@@ -150,7 +150,7 @@ struct Drive {
   std::optional<SampledLaw> samples;      // instead of the law
 };
 
-// Each kind of force has the name that a problem file calls it by.
+// Each kind of force has the name that a problem file uses.
 struct Tsda {
   static constexpr std::string_view kType = "tsda";
   std::string body1 = "ground", body2;
@@ -164,7 +164,7 @@ struct Rsda {
   Field stiffness, damping, free_angle;
   std::optional<Expression> law;  // of angle, rate, t and parameters
 };
-struct TorsionBar {  // as an rsda, between two bodies that need no joint
+struct TorsionBar {  // an rsda between two bodies without a joint
   static constexpr std::string_view kType = "torsion_bar";
   std::string body1 = "ground", body2;
   std::optional<PointField> axis;  // in body1
@@ -201,13 +201,13 @@ struct FrictionSpec {
   std::optional<Field> breakaway = {};      // [N m], [N]; empty: coulomb
   std::optional<Field> stribeck_velocity = {};  // [rad/s], [m/s]; with breakaway
 };
-// A force written in C++, by its name. Its rho is its own parameters, in the order of this list.
+// A force written in C++, by its name. Its rho holds its own parameters, in the order of this list.
 struct UserForceSpec {
   static constexpr std::string_view kType = "user";
   std::string force;
-  std::vector<std::string> bodies;             // on which it acts; when empty those that it names itself
+  std::vector<std::string> bodies;             // loaded bodies; if empty, it names them itself
   std::vector<TermParameter> parameters;       // the reader of the file puts them into the order of the term
-  std::shared_ptr<const UserForce> term = {};  // that the name stands for
+  std::shared_ptr<const UserForce> term = {};  // the term of that name
 };
 struct Force {
   std::string name;
@@ -245,7 +245,7 @@ struct Condition {
   std::optional<Field> acceleration = {};  // of kinematics only (kinematic_scene.hpp)
 };
 
-// Its constructors are compiled once, in scene.cpp: inline they are a quarter of each source that copies a scene.
+// scene.cpp compiles its constructors once: inline they are a quarter of each source that copies a scene.
 struct Scene {
   Scene();
   Scene(const Scene&);

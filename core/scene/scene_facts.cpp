@@ -12,7 +12,7 @@ namespace {
 
 bool is_expression(const Sensor& sensor) { return sensor.quantity == "expression"; }
 
-// The first of several equal names counts; duplicates are an issue of their own.
+// The first of several equal names counts. The checks report duplicates elsewhere.
 void add_once(Symbols& symbols, const std::string& name) {
   if (symbols.input(name) < 0 && !symbols.definition(name)) symbols.add_input(name);
 }
@@ -186,7 +186,7 @@ const Symbols& SceneFacts::symbols(Names names) const {
   return none_;
 }
 
-// Faster than to try: the exception holds all names that are like the wrong one.
+// This is faster than an attempt: the exception collects all names that resemble the wrong one.
 bool SceneFacts::can_be_evaluated(const Expression& expression, const Symbols& symbols) const {
   const std::vector<std::string>& names = expression.names();
   return std::all_of(names.begin(), names.end(),
@@ -250,7 +250,7 @@ std::optional<Dimension> SceneFacts::dimension_of_name(const std::string& name) 
     found = infer_dimension(*definition, [this](const std::string& inner) { return dimension_of_name(inner); });
   } catch (const DimensionError&) {  // reported at the definition
   }
-  if (found && found->is_none()) found.reset();  // as a plain number: it may stand for anything
+  if (found && found->is_none()) found.reset();  // a plain number may have any dimension
   return dimensions_[name] = found;
 }
 

@@ -1,4 +1,4 @@
-// Facts on the whole scene, for checks of single fields: its names, and its parameters' values and units.
+// Facts on the whole scene, for checks of single fields: its names, and the values and units of its parameters.
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@ class SceneFacts {
 
   const Scene& scene() const { return scene_; }
 
-  // nullptr when there is none of that name (or when it is the ground, of bodies).
+  // Return nullptr if nothing has that name. The ground counts as no body.
   const Body* body(const std::string& name) const;
   const Joint* joint(const std::string& name) const;
   const Force* force(const std::string& name) const;
@@ -32,30 +32,31 @@ class SceneFacts {
   bool has(To what, const std::string& name) const;
   void add_objectives(std::vector<std::string> names) { objectives_ = std::move(names); }
 
-  // Parameters and definitions, and what else an expression may use.
+  // Parameters, definitions, and the other names that an expression may use.
   const Symbols& symbols(Names names) const;
 
-  // Definitions and sensors' expressions that cannot be evaluated: circular, nested too deep, or with unknown names.
+  // Whether a definition or a sensor's expression cannot be evaluated: it is circular, nested too deep, or has unknown
+  // names.
   bool is_broken(const std::string& definition) const { return broken_.contains(definition); }
-  // These are the ones among them that are circular or nested too deep: path and what is wrong.
+  // The circular and too deeply nested ones among them: path and fault.
   const std::vector<std::pair<std::string, std::string>>& endless_definitions() const { return endless_; }
 
-  // At the parameters' values, finite; nullopt where it cannot be evaluated. A parameter of NaN has no value that
-  // could be read, which is an issue of its own: what depends on it cannot be evaluated either.
+  // The finite value at the parameters' values; nullopt if it cannot be evaluated. A parameter of NaN has no readable
+  // value, which is an issue of its own. So fields that depend on it cannot be evaluated either.
   std::optional<double> value(const Field& field) const;
   std::optional<double> any_value(const Field& field) const;  // infinite ones, too
   std::optional<std::array<double, 3>> value(const VectorField& field) const;
   std::optional<std::array<double, 3>> value(const PointField& field, const std::string& body) const;
 
-  // A law of time alone, and its first two derivatives in it; nullopt where it depends on more or cannot be evaluated.
+  // A law of time alone and its first two derivatives; nullopt if it depends on more or cannot be evaluated.
   std::optional<std::array<double, 3>> law_at(const Expression& law, double t) const;
 
   std::optional<Dimension> dimension_of_name(const std::string& name) const;  // nullopt: not known
 
-  // The sensors that an expression sensor measures by, none of which is an expression; any other sensor measures by
+  // The sensors, none of them an expression, that an expression sensor measures by. Any other sensor measures by
   // itself.
   std::vector<const Sensor*> measured_by(const Sensor& sensor) const;
-  // An expression reads the largest of those; one of velocities is not linear in them, and reads the state.
+  // An expression reads the largest of these. An expression of velocities is not linear in them, and reads the state.
   Reads reads_of(const Sensor& sensor) const;
   std::optional<Dimension> dimension_of(const Sensor& sensor,
                                         PlainNumbers plain = PlainNumbers::fit_everything) const;  // nullopt: not known
@@ -70,7 +71,7 @@ class SceneFacts {
   };
   void find_broken(const std::string& path, const std::string& name, const Expression& value, const Symbols& symbols,
                    Broken& found);
-  // The program's names of an expression that can be evaluated; else none.
+  // The program's names of an expression that can be evaluated; otherwise none.
   std::vector<std::string> used_names(const Expression& expression, const Symbols& symbols) const;
   bool can_be_evaluated(const Expression& expression, const Symbols& symbols) const;
 
@@ -91,12 +92,12 @@ class SceneFacts {
   mutable std::map<std::pair<std::string, PlainNumbers>, std::optional<Dimension>> dimensions_of_sensors_;
 };
 
-// t and the sensors as inputs, in this order. The name of an expression sensor stands for its expression, so that
+// Adds t and the sensors as inputs, in this order. The name of an expression sensor stands for its expression, so that
 // programs read the sensors that it measures by.
 void add_time_and_sensors(Symbols& symbols, const Scene& scene);
 
-// In which a sensor's values are printed: "rad", "m/s"; "-" for a number; empty where it is not known. Plain numbers of
-// an expression count as pure.
+// The dimension and unit in which a sensor's values are printed: "rad", "m/s"; "-" for a number; empty if unknown.
+// Plain numbers of an expression count as pure.
 std::optional<Dimension> shown_dimension(const Scene& scene, const Sensor& sensor);
 std::string unit_of(const Scene& scene, const Sensor& sensor);
 

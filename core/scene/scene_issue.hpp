@@ -9,7 +9,7 @@ namespace mbsopt {
 
 struct SceneIssue {
   std::string path;     // JSON path: "bodies[2].inertia"
-  std::string message;  // what was found, what is allowed
+  std::string message;  // the finding, and the allowed values
   bool is_warning = false;
   std::optional<std::size_t> offset = {};  // byte in the text of the expression that is wrong
   bool operator==(const SceneIssue&) const = default;

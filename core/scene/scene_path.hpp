@@ -1,6 +1,6 @@
-// JSON paths, which name a place in a scene: keys joined by dots, indices in brackets: bodies[2].points.tip. A key that
-// is not a plain identifier is written in quotes, with a backslash before quotes and backslashes:
-// bodies[2].points["left tip"].
+// JSON paths name a place in a scene: keys joined by dots, indices in brackets, as in bodies[2].points.tip. A key that
+// is not a plain identifier stands in quotes, with a backslash before quotes and backslashes: bodies[2].points["left
+// tip"].
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// How a scene is to be simulated: formulation, projection, integrator, tolerances. Defaults are measured
-// (docs/formulations.md); a problem file needs none of them.
+// The settings of a simulation: formulation, projection, integrator, tolerances. Measurements chose the defaults
+// (docs/formulations.md); a problem file needs none of the settings.
 #pragma once
 
 #include <algorithm>
@@ -12,16 +12,16 @@
 namespace mbsopt {
 
 enum class FormulationType { penalty, augmented_lagrangian };
-// How the penalty equations are solved: by S = M + J' alpha J, which loses digits as alpha grows, or by the
-// quasi-definite system [M J'; J -1/alpha], which does not.
+// The solver of the penalty equations: S = M + J' alpha J, which loses digits as alpha grows, or the quasi-definite
+// system [M J'; J -1/alpha], which does not.
 enum class LinearSolver { cholesky, quasidefinite };
 enum class Projection { none, velocity, position_velocity };
-// Six unknowns per body, or three where joints hold all bodies in a plane (planar_model.hpp); automatic: planar where
-// it can be.
+// Six unknowns per body, or three if joints hold all bodies in a plane (planar_model.hpp). `automatic` is planar if
+// possible.
 enum class ModelChoice { automatic, planar, spatial };
 enum class Model { spatial, planar };
-// How a mechanism moves whose drives leave nothing free: its positions are solved at each instant (kinematics), or its
-// equations of motion are integrated (dynamics); automatic: solved where it can be (core/driven).
+// The motion of a mechanism whose drives leave no freedom. `kinematics` solves its positions at each instant, and
+// dynamics integrates its equations of motion. `automatic` solves if possible (core/driven).
 enum class Solve { automatic, kinematics, dynamics };
 
 struct FormulationSettings {
@@ -52,8 +52,8 @@ struct IntegratorOptions {
   bool operator==(const IntegratorOptions&) const = default;
 };
 
-// A tolerance that differs between the kinds of components of the state, and between bodies. A kind that is absent has
-// the smallest tolerance given. A body that is named has its own tolerance, of all its components.
+// A tolerance that differs between the kinds of components of the state, and between bodies. An absent kind has the
+// smallest of the given tolerances. A named body has its own tolerance for all its components.
 struct KindTolerances {
   std::optional<double> position, angle, velocity, rate;  // of r [m], p (half an angle), rdot [m/s], pdot [1/s]
   std::vector<std::pair<std::string, double>> bodies;
@@ -85,11 +85,11 @@ struct SimulationSettings {
   Solve solve = Solve::automatic;
   FormulationSettings formulation;
   IntegratorSettings integrator;
-  // Wanted relative error of the objectives, or of the motion where there is none. While it is there, the integrator is
-  // still to be chosen for it (optim/tradeoff/accuracy.hpp), and nothing can be simulated.
+  // The wanted relative error of the objectives, or of the motion without objectives. While it is set, the integrator
+  // must still be chosen for it (optim/tradeoff/accuracy.hpp), and nothing can be simulated.
   std::optional<double> accuracy;
   std::vector<double> events;        // times at which a step ends and the next begins [s]
-  double adjoint_memory_mib = 1024;  // what an adjoint run keeps of the forward motion, at most [MiB]
+  double adjoint_memory_mib = 1024;  // limit of the forward motion that an adjoint run keeps [MiB]
 };
 
 }  // namespace mbsopt

@@ -174,7 +174,7 @@ std::string_view type_of(const Force& force) {
 
 namespace {
 
-// Makes the kind that is called so the one in hand; nothing where there is none.
+// Makes kind the alternative of that name. Does nothing if there is none.
 template <class... Kinds>
 void emplace_kind(std::variant<Kinds...>& kind, std::string_view type) {
   ((Kinds::kType == type ? void(kind.template emplace<Kinds>()) : void()), ...);

@@ -1,5 +1,5 @@
-// Which joints, forces and sensors there are, and which fields each one has: one row per type. The reader of problem
-// files, the checks of a scene and the JSON Schema all read these tables; a new type is one more row.
+// The types of joints, forces and sensors, and the fields of each: one row per type. The reader of problem files, the
+// checks of a scene and the JSON Schema all read these tables. A new type is one more row.
 #pragma once
 
 #include <optional>
@@ -19,7 +19,7 @@ struct Sensor;
 // Whether a joint ties two other joints (gear, rack_pinion) and has no bodies of its own.
 bool ties_joints(const Joint& joint);
 
-// A sensor is a function of these, or of the ones before them.
+// The quantities that a sensor is a function of; each one includes those before it.
 enum class Reads {
   positions,       // q: conditions may prescribe its value and its rate
   velocities,      // q and v: conditions may prescribe its value
@@ -32,10 +32,10 @@ struct TypeRow {
   std::string_view name;
   std::string_view description;
   std::string_view fields;           // "point1 axis1!": what it has besides its name, type and bodies; "!": required
-  std::string_view components = "";  // of a sensor: what "component" may be
-  Dimension dimension = {};          // of a sensor: what it measures (dimension_of_quantity says exceptions)
-  Reads reads = Reads::positions;    // of a sensor (reads_of_quantity says exceptions)
-  std::string_view unit = "";        // of a sensor whose dimension does not say it
+  std::string_view components = "";  // of a sensor: the values of "component"
+  Dimension dimension = {};          // of a sensor's values (dimension_of_quantity has exceptions)
+  Reads reads = Reads::positions;    // of a sensor (reads_of_quantity has exceptions)
+  std::string_view unit = "";        // of a sensor whose dimension does not determine it
 };
 
 extern const std::span<const TypeRow> kJointTypes, kDriveTypes, kForceTypes, kSensorQuantities;
@@ -47,7 +47,7 @@ inline constexpr std::string_view kJointsWithDisplacement = "translational cylin
 std::string_view integrator_names();
 inline constexpr std::string_view kMultistepMethods = "cvodes_adams cvodes_bdf";
 
-// Names that mean something in laws and objectives, so that nothing else may be called so.
+// Names with a meaning in laws and objectives; nothing else may use them.
 inline constexpr std::string_view kReservedNames = "t l ldot angle rate pi ground O";
 
 enum class Need { unknown, optional, required };
@@ -60,14 +60,15 @@ std::vector<std::string> names_of(std::span<const TypeRow> rows);
 std::vector<std::string> words(std::string_view list);
 bool has_word(std::string_view list, std::string_view word);
 
-// "'gear' is not available in this version; available: revolute, spherical", or what else is wrong with the choice.
+// "'gear' is not available in this version; available: revolute, spherical", or another message on a wrong choice.
 std::string not_among(std::string_view what, std::string_view found, const std::vector<std::string>& available,
                       std::string_view later = "");
 
-// Whether friction in a joint resists sliding: as `motion` says, else where the joint has no angle.
+// Whether friction in a joint resists sliding: `motion` decides if given, else a joint without an angle slides.
 bool is_sliding(std::string_view motion, std::string_view joint_type);
 
-// The dimension of a quantity other than expression (scene_facts.hpp finds theirs); nullopt: N or N m, not known here.
+// The dimension of a quantity other than expression, which scene_facts.hpp finds. nullopt stands for N or N m, which is
+// not known here.
 std::optional<Dimension> dimension_of_quantity(const Sensor& sensor);
 Reads reads_of_quantity(const Sensor& sensor);
 

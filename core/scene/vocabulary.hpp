@@ -1,5 +1,5 @@
-// Every field of a scene: its name in a problem file, what it is, its dimension, whether it must be there. Written
-// once, as functions that tell it to a visitor; the reader of problem files, the checks, the search for unused
+// Every field of a scene: its name in a problem file, its meaning, its dimension, and whether it is required. Functions
+// tell this to a visitor, so it is written once. The reader of problem files, the checks, the search for unused
 // parameters and the JSON Schema are visitors.
 //
 //   describe(visitor, body);      // visitor.name("name", body.name, ...), visitor.number("mass", body.mass, ...), ...
@@ -11,7 +11,7 @@
 //   references(key, vector<string>&, To, says)
 //   texts(key, vector<string>&, says)           a text, or a list of them
 //   reference_or(key, string&, To, says, f)     the same, or an object: {"objective": name}, and the fields of f
-//   choice(key, T&, Choice<T>[], says)       one of a few words that stand for values; true and false as such
+//   choice(key, T&, Choice<T>[], says)          one of a few words that stand for values; true and false as such
 //   word(key, string&, Words, says)             one of a few words
 //   type(key, word, rows, says)                 the type of an object; returns its row, nullptr when there is none
 //   number(key, Field&, says)                   a number or an expression over parameters and definitions
@@ -19,22 +19,22 @@
 //   point(key, PointField&, body, says)         a point or vector of that body, by name or by its coordinates
 //   inertia, orientation, points                the forms that the problem format gives them
 //   law(key, optional<Expression>&, Names, says)  an expression over further names, too
-//   expression(key, Expression&, Names, says)   the same, always there
+//   expression(key, Expression&, Names, says)   the same, always present
 //   time_law(key, Expression&, optional<SampledLaw>&, says)  an expression of t, or samples from a file
 //   laws(key, LawVector&, Names, says)          three of them
-//   plain(key, double&, Range, says)            a number that no parameter enters; also long, int, bool, optional
-//   level(key, optional<double>&, Choice<double>[], Range, says)  a number, or one of a few words that stand for
-//   numbers instead_of(key, object, Words)              where the key is given, that object must not have these fields
+//   plain(key, double&, Range, says)            a number without parameters; also long, int, bool, optional
+//   level(key, optional<double>&, Choice<double>[], Range, says)  a number, or one of a few words for numbers
+//   instead_of(key, object, Words)              if the key is given, that object must not have these fields
 //   object(key, T&, says)                       describe(visitor, T) inside; also optional<T>
 //   group(key, says, f)                         f(visitor) inside: fields that are nested in the file only
 //   list(key, vector<T>&, says)                 describe(visitor, T) for each
-//   named(key, vector<T>&, says)                the same where the file has an object, its keys the names
+//   named(key, vector<T>&, says)                the same if the file has an object, its keys the names
 //   values_of(key, vector<pair<string, double>>&, To, Range, says)  numbers by the name of a parameter or body
 //   tolerance(key, double&, optional<KindTolerances>&, says)  a number, or one for each kind of component
 //   version(key, number, says)                  that number and no other
 //   later(key, what)                            in the problem format, not in this version
-//   misplaced(key, where)                       a field of other objects of this kind, which `where` says
-//   rest_unknown()                              the type is not known, hence neither are the other fields
+//   misplaced(key, where)                       a field of other objects of this kind, which `where` names
+//   rest_unknown()                              the type is unknown, hence also the other fields
 #pragma once
 
 #include <concepts>

@@ -26,7 +26,7 @@ struct JointMeasure {
     measure.phi_dot(f1, f2, xdot);
     return xdot(0);
   }
-  // An angle on the turn nearest to the reference; a displacement has no turns.
+  // Returns an angle on the turn nearest to the reference. A displacement has no turns.
   double value_near(double reference, const Frame& f1, const Frame& f2) const {
     if constexpr (std::is_same_v<P, Angle>) return Angle::on_branch(value(f1, f2), reference);
     return value(f1, f2);

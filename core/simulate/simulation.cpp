@@ -20,7 +20,7 @@
 namespace mbsopt {
 namespace {
 
-// run(), with the time that it took.
+// Calls run() and records its wall time.
 template <class F>
 SimulationResult timed(F&& run) {
   const auto start = std::chrono::steady_clock::now();
@@ -122,7 +122,7 @@ void require_observer(const auto& sampling) {
     throw std::invalid_argument("sampling: times without anything that observes (observe is empty)");
 }
 
-// By whichever of the three computes such a run.
+// Calls the one of the three functions that computes such a run.
 template <class Cvodes, class Driven, class Integrated>
 SimulationResult run_by(const Mechanism& mechanism, const SimulationSettings& settings, Cvodes&& by_cvodes,
                         Driven&& driven, Integrated&& integrated) {

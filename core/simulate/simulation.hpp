@@ -1,6 +1,6 @@
 // Forward simulation, and its exact discrete derivatives by tangent-linear (TLM) and adjoint sweeps.
 //
-// All three take the same steps and compute the same numbers; the derivatives are those of the numbers computed, with
+// All three take the same steps and compute the same numbers. The derivatives are those of the computed numbers, with
 // the accepted steps held fixed, through projection and initial assembly.
 //
 //   const Mechanism mechanism(scene, rho);

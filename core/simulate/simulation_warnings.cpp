@@ -11,15 +11,15 @@ namespace mbsopt {
 namespace {
 
 constexpr double kApart = 1e-3;  // [m, -]
-// [m, -]: projections leave 1e-11 and less, rounding of coordinates up to 1e4 m. Where rows contradict each other, they
-// give up below 1e-8 (projection_solution.hpp) at the first step.
+// [m, -]: projections leave 1e-11 and less, the rounding of coordinates up to 1e4 m. Where rows contradict each other,
+// they give up below 1e-8 (projection_solution.hpp) at the first step.
 constexpr double kContradicting = 1e-10;
 constexpr double kUnmet = 1e-5;            // of the accelerations of the constraints
 constexpr double kGivingWay = 1e-8;        // of the accelerations; gradients had errors of 500 times as much
 constexpr double kTakenOut = 1e-4;         // by projections: those of the integration errors are of the order of rtol
 constexpr double kEnergyLost = 1e-2;       // of the largest energy
 constexpr double kUnresolved = 3e-2;       // of the integral of a running cost's size; estimates are pessimistic
-constexpr double kWithinSteps = 100;       // tolerances: two of the digits that were asked for
+constexpr double kWithinSteps = 100;       // tolerances: two of the requested digits
 constexpr double kLargePenalty = 3e10;     // above it rounding by Cholesky passes 1e-5 of the accelerations
 constexpr double kDigitsPerAlpha = 1e-16;  // docs/formulations.md, measured
 
@@ -157,7 +157,7 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
   add(rounding_of_penalty(settings));
   add(joints_apart(settings, statistics));
   if (!finished) return warnings;
-  // Each of these explains those after it.
+  // Each of these explains the ones after it, so only the first is reported.
   for (const auto& warning : {energy_lost, accelerations_unmet, joints_give_way, contradicting_joints})
     if (add(warning(settings, statistics))) break;
   add(unresolved(settings, statistics.solved, statistics.quadrature, "the running cost", "its integral"));

@@ -1,5 +1,5 @@
-// Warnings name settings that cost digits, joints that came apart, integrals that the steps do not resolve and jumps
-// that derivatives do not see.
+// Warnings name settings that cost digits, joints that came apart, integrals that the steps do not resolve, and jumps
+// outside the derivatives.
 #pragma once
 
 #include <string>
@@ -10,10 +10,10 @@
 
 namespace mbsopt {
 
-// "the law of force 's1' jumps by 2 at t = 0.5 s, an instant that depends on 'tp': ..."; scene: that was simulated
+// "the law of force 's1' jumps by 2 at t = 0.5 s, an instant that depends on 'tp': ..."; scene is the simulated scene.
 std::string in_words(const Scene& scene, const Jump& jump);
 
-// finished: it went through, so that its numbers will be used.
+// finished: the run reached its end, so the caller uses its numbers.
 std::vector<std::string> simulation_warnings(const Scene& scene, const SimulationStatistics& statistics,
                                              bool finished = true);
 

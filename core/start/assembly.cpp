@@ -67,7 +67,7 @@ MatrixXd position_guess_rho(const MechanismData& d) {
   return out;
 }
 
-// v_q: per body, in its own p.
+// v_q holds a block per body in its own p.
 void velocity_guess_derivatives(const MechanismData& d, const VectorXd& q, std::vector<Mat<7, 4>>& v_q,
                                 MatrixXd& v_rho) {
   v_q.resize(static_cast<std::size_t>(d.n));
@@ -137,9 +137,9 @@ struct Assembly::Solution {
     result.ok = true;
   }
 
-  // Damped Newton steps on three unknowns per body, where a planar mechanism has nothing free: to the assembly mode of
-  // the guess, in the sense of the sign of det Phi_q. False where they do not converge, or leave an equation: the guess
-  // may lie out of the plane.
+  // Takes damped Newton steps on three unknowns per body if a planar mechanism has no freedom. They lead to the
+  // assembly mode of the guess, in the sense of the sign of det Phi_q. Returns false if they do not converge or violate
+  // an equation: the guess may lie out of the plane.
   bool solve_in_plane() {
     constexpr double kSatisfied = 1e-11;  // of the equations, per unit of y, as in nearest_point.cpp
     const bool determined = data.planar && data.planar->rows.size() == 3 * static_cast<std::size_t>(data.n);
@@ -166,7 +166,7 @@ struct Assembly::Solution {
     return result.ok = result.in_mode = true;
   }
 
-  // From the nearest position that closes the joints to the equilibrium nearest to that.
+  // Moves from the nearest position that closes the joints to the equilibrium nearest to it.
   void rest_in_equilibrium() {
     position.start_branches(result.y);
     equilibrium = static_equilibrium(mechanism, start, q->x, position.angles());
@@ -176,8 +176,8 @@ struct Assembly::Solution {
     result.message = equilibrium.message;
   }
 
-  // A large mechanism whose guess satisfies everything is differentiated by sparse factors, in about the time of some
-  // steps; the dense decomposition below takes as long as a run.
+  // Sparse factors differentiate a large mechanism whose guess satisfies everything, in the time of a few steps. The
+  // dense decomposition below takes as long as a run.
   struct Sparse {
     SparseProjection q, v;
     std::vector<SparseEntry> v_b_q;  // -F_q at velocity level
@@ -236,7 +236,7 @@ struct Assembly::Solution {
     rho_bar += s.q_b_rho.transpose() * b_bar + s.q_g_rho.transpose() * g_bar;
   }
 
-  // Before the linearisations of q and v are used.
+  // Call this before the linearisations of q and v are used.
   void linearise_both() {
     PositionProblem positions(position);
     linearise(positions, *q);
@@ -244,9 +244,10 @@ struct Assembly::Solution {
     linearise(velocities, *v);
   }
 
-  // On the turn that an angle's condition names, where there is one (so that a measured angle starts where it was
-  // measured), else within half a turn of zero; the last angle of a gear on the branch that the gear asks for. A
-  // condition on an expression of angles may hold on other turns only, to which they were continued.
+  // A condition's angle is on the turn that the condition names, so that a measured angle starts at its measured value.
+  // Other angles are within half a turn of zero, and the last angle of a gear is on the branch that the gear needs. A
+  // condition on an expression of angles may hold only on other turns; angles then keep those to which they were
+  // continued.
   void set_angles() {
     const VectorXd continued = position.followed_angles();
     position.start_branches(result.y);
@@ -264,7 +265,7 @@ struct Assembly::Solution {
     position.settle_shared_rows(result.y, result.angles);
   }
 
-  // Right-hand sides of both linear systems (nearest_point.hpp); those of v need q' as well:
+  // Right-hand sides of both linear systems (nearest_point.hpp). Those of v need q' as well:
   //   J_q q' = -q_F_rho,           H_q q' + .. = q_g_rho
   //   J_v v' = -F_q q' - F_rho,    H_v v' + .. = g_q q' + g_rho
   struct Derivatives {
@@ -290,7 +291,7 @@ struct Assembly::Solution {
   double start;
   Modes modes;
   const MechanismData& data;
-  Equilibrium equilibrium;  // where the scene starts from one
+  Equilibrium equilibrium;  // set if the scene starts from one
   AssemblyEquations position, velocity;
   std::optional<NearestPoint> q, v;
   AssemblyResult result;
@@ -343,8 +344,8 @@ void Assembly::add_adjoint(const MatrixXd& y_bar, MatrixXd& rho_bar) const {
 
 namespace {
 
-// Columns of right-hand sides b that J x = b cannot meet. left: what a solution leaves of b, rows scaled to unit
-// length. pieces: the columns of which b is the sum, before they cancel.
+// Marks columns of right-hand sides b for which J x = b has no solution. `left` is the part of b that a solution
+// leaves, rows scaled to unit length. b is the sum of pieces, which may cancel.
 void note_unmet(const MatrixXd& left, const VectorXd& row_scale, std::initializer_list<MatrixXd> pieces,
                 std::vector<bool>& unmet) {
   constexpr double kOpen = 1e-7;       // of b: assembly leaves a loop open by far less
@@ -398,7 +399,7 @@ int Assembly::degrees_of_freedom() const {
   return s.q && s.q->determined && joints_alone ? 0 : summary().degrees_of_freedom;
 }
 
-// Rows are taken in file order, unit norms first; one that lies in the span of those before it is redundant.
+// Takes rows in file order, unit norms first. A row in the span of earlier rows is redundant.
 ModelSummary Assembly::summary() const {
   const MechanismData& d = solution_->data;
   const int equations = d.m + d.n;

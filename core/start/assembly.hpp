@@ -3,7 +3,7 @@
 //   positions:   min 1/2 |q - q_guess|^2   subject to  Phi(q, rho) = 0, c(q, rho) = 0      (q: r_g and p, unweighted)
 //   velocities:  min 1/2 |v - v_guess|^2   subject to  Phi_q v = -Phi_t, c_q v = rates
 //
-// or, where the scene starts from static equilibrium, that of equilibrium.hpp, at rest.
+// If the scene starts from static equilibrium, it is the state at rest of equilibrium.hpp.
 //
 // Derivatives come from the optimality conditions of both problems (nearest_point.hpp). docs/assembly.md.
 #pragma once
@@ -25,8 +25,8 @@ struct AssemblyResult {
   double residual = 0;
 };
 
-// of_guess: fails where planar Newton steps do not reach the mode of the guess (AssemblyResult::in_mode). The search in
-// all modes costs several evaluations of a linkage that does not close.
+// of_guess fails if planar Newton steps do not reach the mode of the guess (AssemblyResult::in_mode). If a linkage does
+// not close, the search in all modes costs several of its evaluations.
 enum class Modes { all, of_guess };
 
 class Assembly {
@@ -40,8 +40,8 @@ class Assembly {
   // Both are NaN if the assembly failed.
   Eigen::MatrixXd tangent() const;                                                 // dy/drho, 14n x P
   void add_adjoint(const Eigen::MatrixXd& y_bar, Eigen::MatrixXd& rho_bar) const;  // rho_bar += (dy/drho)' y_bar
-  // Parameters that cannot change by themselves: where equations are redundant, they would contradict each other (one
-  // of two parallel cranks longer than the other). The state has no derivative with respect to them.
+  // Parameters that cannot change by themselves. A change would make redundant equations contradict each other (one of
+  // two parallel cranks longer than the other). The state has no derivative with respect to them.
   std::vector<int> obstructed() const;
 
  private:

@@ -21,7 +21,7 @@ struct RowOrder {
   bool operator()(int row, const Constraint& c) const { return row < c.row; }
 };
 
-// A half turn is +pi: rounding does not decide its sign.
+// A half turn is +pi, so that rounding does not decide its sign.
 constexpr double kHalfTurn = -std::numbers::pi + 1e-6;
 
 // y = (q, e_j)
@@ -238,7 +238,7 @@ AssemblyEquations::SparseGradients AssemblyEquations::sparse_gradients(const Vec
   return out;
 }
 
-// rho: null where it is not wanted.
+// rho is null if it is not wanted.
 template <class AddEntry>
 void AssemblyEquations::collect_gradients(const VectorXd& y, AddEntry&& add, MatrixXd* rho) const {
   const bool positions = level_ == AssemblyLevel::position;

@@ -3,9 +3,9 @@
 //   position:  F(q, rho)    = [ Phi of all joints;     p'p - 1 per body;    sensor - value per condition ]
 //   velocity:  F(q, v, rho) = [ Phi_q v of all joints; 2 p'pdot per body;   sensor's rate - rate per condition ]
 //
-// Every rate is linear in v (the norm of a velocity apart), so second derivatives need no code of their own: with v set
-// to the unit vector e_j, the gradient of the rate  nu'F_q e_j  in q and rho is the j-th column of (F_q'nu)_q and row
-// of (F_q'nu)_rho. These are exact; nothing is differenced.
+// Every rate except the norm of a velocity is linear in v, so second derivatives need no code of their own. With v =
+// e_j, the gradient of the rate  nu'F_q e_j  in q is the j-th column of (F_q'nu)_q. Its gradient in rho is the j-th row
+// of (F_q'nu)_rho. These are exact, without differences.
 #pragma once
 
 #include <vector>
@@ -17,26 +17,25 @@ namespace mbsopt {
 
 enum class AssemblyLevel { position, velocity };
 
-// A sensor and the value that it shall have.
+// A sensor and the value that it must have.
 struct AssemblyTarget {
   int condition = 0;  // index in MechanismData::conditions
   SensorPtr sensor;
   SensorPtr rate;  // its time derivative; at velocity level the sensor itself
   double value = 0;
   int slot = -1;
-  double branch = 0;  // of an angle: the value last accepted, from which it is continued
+  double branch = 0;  // of an angle: the last accepted value, from which it continues
 };
 
 class AssemblyEquations {
  public:
   AssemblyEquations(const MechanismData& data, AssemblyLevel level, double t);
 
-  // Branches of followed joint angles: within half a turn of zero at the guess, except that the last angle in a row of
-  // several (a gear) is on the branch that satisfies the row best; from there on they are continued.
+  // Sets the branches of followed joint angles within half a turn of zero at the guess. The last angle in a row of
+  // several (a gear) is on the branch that satisfies the row best. From there on they are continued.
   void start_branches(const Eigen::VectorXd& y);
   const Eigen::VectorXd& angles() const { return angles_; }
-  // As a condition on an expression of several angles sees them: where an angle has a condition of its own, on its
-  // turn.
+  // The angles for a condition on an expression of several angles. An angle with a condition of its own is on its turn.
   Eigen::VectorXd followed_angles() const;
   void set_angles(const Eigen::VectorXd& angles) { angles_ = angles; }
   void settle_shared_rows(const Eigen::VectorXd& y, Eigen::VectorXd& angles) const;
@@ -44,23 +43,23 @@ class AssemblyEquations {
   Eigen::Index rows() const;  // joints first, then unit norms, then targets
   const std::vector<AssemblyTarget>& targets() const { return targets_; }
 
-  // y = (q, v); at position level v is ignored.
+  // y = (q, v); the position level ignores v.
   Eigen::VectorXd values(const Eigen::VectorXd& y) const;
   struct Gradients {
     Eigen::MatrixXd y, rho;  // rows x 14n, rows x P (all parameters)
   };
   Gradients gradients(const Eigen::VectorXd& y) const;
   Eigen::MatrixXd gradients_in_y(const Eigen::VectorXd& y) const;
-  // As above, with the gradient in the state as entries; entries at the same place are added.
+  // The same, with the gradient in the state as entries. Entries at the same place add up.
   struct SparseGradients {
     std::vector<SparseEntry> y;
     Eigen::MatrixXd rho;
   };
   SparseGradients sparse_gradients(const Eigen::VectorXd& y) const;
-  // (F_x'nu) differentiated, x: q at position, v at velocity level.   7n x 14n, 7n x P
+  // The derivative of F_x'nu, with x = q at position level and x = v at velocity level.   7n x 14n, 7n x P
   Gradients second(const Eigen::VectorXd& y, const Eigen::VectorXd& nu) const;
 
-  // Where not all equations can be satisfied, bodies stay rigid: unit norms count a thousand times a metre or radian.
+  // If not all equations can be satisfied, bodies stay rigid: unit norms weigh a thousand times a metre or radian.
   Eigen::VectorXd weights() const;
 
   void continue_branches(const Eigen::VectorXd& y);

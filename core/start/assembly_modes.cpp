@@ -48,8 +48,8 @@ double distance(const VectorXd& a, const VectorXd& b) {
   return std::sqrt(sum);
 }
 
-// Whether a joint holds only because an axis or a normal points the other way than in the first mode. Two dot products
-// or more of a joint leave no motion between the two.
+// Whether a joint holds only because an axis or a normal is opposite to that in the first mode. Two or more dot
+// products of a joint prevent a motion between the two.
 bool is_inside_out(const MechanismData& d, const VectorXd& first, const VectorXd& q) {
   const auto axes = [](const VectorXd& at, int body) {
     return body == 0 ? Matrix3d(Matrix3d::Identity()) : Matrix3d(A(Vector4d(at.segment<4>(7 * (body - 1) + 3))));
@@ -67,7 +67,7 @@ bool is_inside_out(const MechanismData& d, const VectorXd& first, const VectorXd
   });
 }
 
-// The guess with every body turned; the standard's distributions differ from library to library.
+// The guess with every body turned. The standard's distributions are not used, because they differ between libraries.
 class RandomTurns {
  public:
   explicit RandomTurns(const MechanismData& data) : data_(data) {}

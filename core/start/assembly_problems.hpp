@@ -1,4 +1,4 @@
-// The equations of an assembly in the unknowns that each of its two levels solves for: q, then v at a fixed q.
+// The equations of an assembly in the unknowns of its two levels: q, then v at a fixed q.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,14 +13,15 @@ namespace mbsopt {
 // The poses of all bodies in the scene, from which an assembly starts.
 Eigen::VectorXd position_guess(const MechanismData& data);
 
-// A length for r and 1 for p: the root mean square of entries in p over those in r, in rows of J that have both.
+// A length for r and 1 for p. The length is the root mean square of entries in p over those in r, in rows of J with
+// both.
 Eigen::VectorXd sizes_of_poses(const Eigen::MatrixXd& J);
 
-// |J| x with the largest entry of r and of p (or of their rates) for each of theirs.
+// |J| x, where the largest entry of r and of p (or of their rates) replaces each entry of theirs.
 Eigen::VectorXd magnitudes_of_terms(Eigen::Index rows, const std::vector<SparseEntry>& J, Eigen::Index first,
                                     const Eigen::VectorXd& x);
 
-// Unknown q; v plays no part.
+// The unknown is q; v has no effect.
 class PositionProblem : public NearestPointEquations {
  public:
   explicit PositionProblem(AssemblyEquations& equations) : equations_(equations) {}
@@ -32,7 +33,7 @@ class PositionProblem : public NearestPointEquations {
   Eigen::MatrixXd curvature(const Eigen::VectorXd& q, const Eigen::VectorXd& nu) const override {
     return equations_.second(state(q), nu).y.leftCols(q.size());
   }
-  // No Euler parameter changes by more than 0.3 at once (about 0.6 rad); r enters linearly.
+  // No Euler parameter changes by more than 0.3 in one step (about 0.6 rad); r enters linearly.
   double step_fraction(const Eigen::VectorXd& step) const override {
     double change = 0;
     for (Eigen::Index i = 3; i < step.size(); i += 7)
@@ -60,7 +61,7 @@ class PositionProblem : public NearestPointEquations {
   AssemblyEquations& equations_;
 };
 
-// Unknown v at a fixed q.
+// The unknown is v at a fixed q.
 class VelocityProblem : public NearestPointEquations {
  public:
   VelocityProblem(const AssemblyEquations& equations, const Eigen::VectorXd& q) : equations_(equations), q_(q) {}

@@ -20,7 +20,7 @@ std::string joint_name(const MechanismData& d, const Constraint& c) {
          ")";
 }
 
-// The violation of one joint: points apart, directions out of square.
+// Adds the violation of one joint: the distance of points, the deviation of directions from a right angle.
 void add_joint(const MechanismData& d, AssemblyLevel level, int joint, const Eigen::VectorXd& F, double tolerance,
                std::vector<Finding>& findings) {
   double apart = 0, skew = 0, turned = 0;
@@ -114,7 +114,7 @@ std::string assembly_failure(const MechanismData& d, AssemblyLevel level, const 
   for (const AssemblyTarget& target : equations.targets()) {
     const double off = F(row++);
     if (!(std::abs(off) > tolerance)) continue;
-    // The norm of a velocity has no direction to grow into from rest.
+    // The norm of a velocity has no direction in which it could grow from rest.
     const bool at_rest = !target.sensor->components().empty() && std::abs(target.value + off) < 1e-12;
     const ConditionData& c = d.conditions[static_cast<std::size_t>(target.condition)];
     const std::string& unit = positions || c.velocity_level ? c.unit : c.rate_unit;

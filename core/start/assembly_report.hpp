@@ -1,4 +1,4 @@
-// The message of a failed assembly: which joints and conditions stay violated, by how much, and what to try.
+// The message of a failed assembly: the joints and conditions that stay violated, by how much, and what to try.
 #pragma once
 
 #include <string>

@@ -77,9 +77,9 @@ bool DrivenPath::go_to(double t1, double shortest, long most) {
   return true;
 }
 
-// Each body's correction is small against h v, and so is the difference from the trapezoidal rule. Beside a dead point
-// h^2 a/2 may reach the other branch, so that the correction alone is small there; but on that branch the velocity has
-// the opposite sign, and the trapezoidal rule disagrees.
+// Each body's correction must be small against h v, and so must the difference from the trapezoidal rule. Near a dead
+// point h^2 a/2 may reach the other branch, and the correction alone is small there. On that branch the velocity has
+// the opposite sign, so the trapezoidal rule disagrees.
 bool DrivenPath::keeps_branch(double h) const {
   const Index half = mechanism_.states() / 2;
   const auto keeps = [&](Index at, Index size) {

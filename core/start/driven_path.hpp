@@ -1,11 +1,11 @@
-// The positions of a mechanism whose drives leave nothing free, continued in time on one branch.
+// The positions of a mechanism whose drives leave no freedom, continued in time on one branch.
 //
 //   positions    Phi(q, t) = 0,       from the predictor  q + h v + h^2/2 a,   a: (v1 - v0)/h of the last step
 //   velocities   Phi_q v = -Phi_t,    from  v + h a
 //
-// A step is refused where its correction of the predictor is not small against h v, or where the trapezoidal rule
-// disagrees: so a branch is followed and never changed. Haug, "Computer Aided Kinematics and Dynamics of Mechanical
-// Systems" (1989), chapter 3.
+// A step is refused if its correction of the predictor is not small against h v, or if the trapezoidal rule disagrees.
+// So the path never changes its branch. Haug, "Computer Aided Kinematics and Dynamics of Mechanical Systems" (1989),
+// chapter 3.
 //
 //   DrivenPath path(mechanism, Model::spatial);
 //   path.start(0, assembly.result().y, assembly.result().angles);
@@ -34,20 +34,20 @@ class DrivenPath {
   void start(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
   void start(const DrivenState& state) { state_ = state; }
   const DrivenState& state() const { return state_; }
-  // A more exact solution at the same time.
+  // Replaces the state by a more exact solution at the same time.
   void improve(const Eigen::VectorXd& y);
 
   // The longest step that the velocities allow.
   double step_limit() const;
-  // One step by h, to t1 = t + h. False where it is refused; then the path stays where it is.
+  // Takes one step by h, to t1 = t + h. Returns false if it is refused; the path then keeps its state.
   bool advance(double h, double t1);
-  // As many steps as the branch needs. False where they become shorter than `shortest`, or more than `most`: then it
-  // stays where it came to.
+  // Takes as many steps as the branch needs. Returns false if they become shorter than `shortest`, or more than `most`.
+  // The path then keeps the last accepted state.
   bool go_to(double t1, double shortest, long most);
 
   double position_violation() { return projector_->position_violation(state_.t, state_.angles, state_.y); }
   double velocity_violation() { return projector_->velocity_violation(state_.t, state_.y); }
-  // For derivatives at a state: the path needs nothing of it between its steps.
+  // Serves derivatives at a state. The path keeps nothing in it between its steps.
   Projector& projector() { return *projector_; }
   long steps() const { return steps_; }
   long factorisations() const { return projector_->factorisations(); }

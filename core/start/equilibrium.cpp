@@ -24,7 +24,7 @@ constexpr int kMostEquilibriumIterations = 500;
 constexpr double kLargestStep = 0.2;         // of a coordinate at once [lengths of the mechanism, rad]
 constexpr double kRestRankThreshold = 1e-8;  // rows of J scaled to unit length
 constexpr double kTolerance = 1e-11;         // of the last Newton step [lengths of the mechanism, rad]
-constexpr double kPredicted = 0.5;           // of the forces: a downhill step whose end differs more is too long
+constexpr double kPredicted = 0.5;           // of the forces: a downhill step with a larger difference is too long
 constexpr double kWellPredicted = 0.1;       // and one that differs less may be followed by a longer one
 
 class Statics {
@@ -138,7 +138,7 @@ class Statics {
     return out;
   }
 
-  // Back onto the constraints.
+  // Moves q back onto the constraints.
   bool settle(VectorXd& q) {
     VectorXd y_hat = VectorXd::Zero(14 * n_), y(14 * n_);
     y_hat.head(7 * n_) = q;
@@ -178,7 +178,7 @@ class Statics {
   }
 
  private:
-  // The longest arm of a joint, span of a spring or distance of a body from the first; 1 m without any.
+  // The longest arm of a joint, span of a spring or distance of a body from the first; 1 m if there is none.
   double length_at(const VectorXd& y) const {
     double length = 0;
     for (const Constraint& c : d_.constraints) {
@@ -227,8 +227,8 @@ bool at_rest(double size, double sigma, double acceleration) {
 
 constexpr const char* kNoAccelerations = "the accelerations cannot be computed on the way";
 
-// Pseudo-transient continuation, sigma falling with the acceleration that is left: a few iterations where that falls
-// all the way. Empty where q is the equilibrium, else why not.
+// Pseudo-transient continuation: sigma falls with the remaining acceleration. It takes a few iterations if the
+// acceleration falls steadily. Returns an empty string if q is the equilibrium, else the reason.
 std::string continue_to_rest(Statics& statics, VectorXd& q, int& iterations) {
   double sigma = 0, before = 0;
   for (int k = 0; k < kMostEquilibriumIterations; ++k, ++iterations) {
@@ -249,8 +249,8 @@ std::string continue_to_rest(Statics& statics, VectorXd& q, int& iterations) {
   return statics.what_is_left();
 }
 
-// The same where the acceleration rises and falls on the way. Each step is one of the overdamped motion: downhill, and
-// so short that the forces at its end are those that the linear equations predict.
+// Does the same if the acceleration rises and falls on the way. Each step is one of the overdamped motion. It goes
+// downhill, and is so short that the linear equations predict the forces at its end.
 std::string go_downhill(Statics& statics, VectorXd& q, int& iterations) {
   if (!statics.evaluate(q)) return kNoAccelerations;
   double sigma = statics.size_of(statics.z()) / kLargestStep;

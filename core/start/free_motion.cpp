@@ -1,18 +1,18 @@
 // A motion is a null vector of J, six numbers (rdot, omega in body axes) per body. Rows of J are scaled to unit length.
-// Bodies that rows tie to each other are one group; groups move independently of each other.
+// Rows couple bodies to groups; groups move independently of each other.
 //
 //   alone       null vectors L_b of the columns of body b: it moves while all others stand still
 //   together    the null vectors N of the group without their parts in the L_b:  R = N - L L'N,  L = diag(L_b)
 //
-// A null vector may hold for an instant only, as where a crank and its coupler are in line. So all is found again at a
-// position near by, to which a general motion leads: what moves is told from there, and nothing is told where the
-// number of degrees of freedom differs.
+// A null vector may hold for an instant only, for example while a crank and its coupler are in line. So the analysis is
+// repeated at a near position, to which a general motion leads. The motions reported are those of that position. If its
+// number of degrees of freedom differs, nothing is reported.
 //
 // The L_b are independent of each other, so that R has the rank  columns of N - columns of L.
 //
-// Redundant equations: let J_0 be the rows before those of a joint, J_j the rows of the joint. Its combinations
-// y'J_j that depend on J_0 are y'(J_j N_0) = 0, N_0 the null space of J_0. Each is a wrench (f, m) on a body of the
-// joint: rows before forbid the motion already on which it would do work. Wrenches with f = 0 forbid turns.
+// Redundant equations: let J_0 be the rows before those of a joint, J_j the rows of the joint. Its combinations y'J_j
+// that depend on J_0 are y'(J_j N_0) = 0, N_0 the null space of J_0. Each is a wrench (f, m) on a body of the joint:
+// rows before already forbid the motion on which it would do work. Wrenches with f = 0 forbid turns.
 #include "core/start/free_motion.hpp"
 
 #include <fmt/format.h>
@@ -39,7 +39,7 @@ using Eigen::VectorXd;
 constexpr int kMostBodies = 40;          // dense decompositions of 6n columns stay within milliseconds
 constexpr double kFreeThreshold = 1e-8;  // as for redundant rows
 constexpr double kStep = 1e-3;  // to the position near by [rad]: far above kZero, and within reach of Newton's steps
-constexpr double kZero = 1e-6;  // of a motion's size: above what rounding leaves of a null vector
+constexpr double kZero = 1e-6;  // of a motion's size: above the rounding of a null vector
 constexpr std::size_t kMostNames = 8;  // in one sentence
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
@@ -79,7 +79,7 @@ class MotionNames {
     return sentences;
   }
 
-  // d(q)/d(s) along a general motion of all groups, of at most one radian or of one metre if nothing turns.
+  // d(q)/d(s) along a general motion of all groups: at most one radian, or one metre if nothing turns.
   VectorXd general_motion(const VectorXd& y) const {
     VectorXd qdot = VectorXd::Zero(7 * d_.n);
     double fastest = 0, turning = 0;
@@ -158,7 +158,7 @@ class MotionNames {
     }
   }
 
-  // Where joints touch their bodies.
+  // Collects the points where joints touch their bodies.
   void add_points(const Constraint& c) {
     if (c.joint < 0) return;
     std::visit(
@@ -250,8 +250,8 @@ class MotionNames {
     said_.alone.push_back(fmt::format("{} moves alone with {} degrees of freedom", name(body), L.cols()));
   }
 
-  // v of the centre of mass, w: an axis along w through c = r + w x v/w'w, where the body's velocity is along w:
-  // (w'v/w'w) w, zero if the body turns without sliding.
+  // v belongs to the centre of mass. The axis goes along w through c = r + w x v/w'w, where the body's velocity is
+  // (w'v/w'w) w. It is zero if the body turns without sliding.
   std::string one_motion(int body, const VectorXd& motion) const {
     const Frame& f = frames_[at(body)];
     const Vector3d v = motion.head<3>(), w = f.A * motion.tail<3>();
@@ -274,7 +274,7 @@ class MotionNames {
     return "turns about an axis along " + direction(w);
   }
 
-  // Its largest component is positive, and rounding is no component.
+  // The sign makes the largest component positive. Components of rounding size are zero.
   static std::string direction(const Vector3d& x) {
     Index largest = 0;
     x.cwiseAbs().maxCoeff(&largest);
@@ -293,7 +293,7 @@ class MotionNames {
   Told said_;
 };
 
-// Newton's steps of least length to the joints and unit norms, drives held; whether they arrive.
+// Takes Newton steps of least length onto the joints and unit norms with drives held. Returns whether they converge.
 bool close_again(const MechanismData& data, double time, VectorXd& y) {
   constexpr int kSteps = 6;
   constexpr double kClosed = 1e-12;  // [m], 1: rounding
@@ -322,7 +322,7 @@ std::vector<std::string> free_motions(const Mechanism& mechanism, const Assembly
   if (!close_again(data, start_time, moved)) return {};
   const MotionNames::Told at_start = here.told(), near_by = MotionNames(data, moved).told();
   if (at_start.all != degrees_of_freedom || near_by.all != degrees_of_freedom) return {};
-  // The axes at the start are those that a user knows.
+  // A user knows the axes at the start, so these are named.
   std::vector<std::string> all = at_start.freedoms == near_by.freedoms ? at_start.alone : near_by.alone;
   all.insert(all.end(), near_by.together.begin(), near_by.together.end());
   return all;

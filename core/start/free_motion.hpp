@@ -1,4 +1,4 @@
-// Sentences on the motion that the constraints leave at the assembled start, and on that which they forbid twice.
+// Sentences on the motion that the constraints leave at the assembled start, and on motions that they forbid twice.
 //
 //   'coupler' turns about the axis through joints 'B' and 'C'
 //   'crank', 'coupler', 'rocker' move together
@@ -13,11 +13,11 @@
 
 namespace mbsopt {
 
-// degrees_of_freedom: of the summary. Empty where nothing is free, or where the motion cannot be told for sure.
+// degrees_of_freedom is that of the summary. Returns nothing if there is no freedom, or if the motion is uncertain.
 std::vector<std::string> free_motions(const Mechanism& mechanism, const Assembly& assembly, double start_time,
                                       int degrees_of_freedom);
 
-// "1 degree of freedom: 'coupler' turns about ..."; the number alone where the motion cannot be told.
+// "1 degree of freedom: 'coupler' turns about ..."; the number alone if the motion is uncertain.
 std::string freedoms_in_words(const Mechanism& mechanism, const Assembly& assembly, double start_time);
 
 // The motions that redundant equations forbid a second time, a sentence per joint:

@@ -22,7 +22,7 @@ using Eigen::VectorXd;
 
 constexpr double kDrivenRankThreshold = 1e-7;  // rows of J scaled to unit length
 
-// J at a state, rows scaled to unit length: linear solves that no mass enters.
+// J at a state with rows scaled to unit length, for linear solves without masses.
 class DrivenRows {
  public:
   explicit DrivenRows(const MechanismData& d) : d_(d), rows_(d), laws_(d), states_(static_cast<std::size_t>(d.n) + 1) {
@@ -74,8 +74,8 @@ class DrivenRows {
   OrthogonalDecomposition scaled_;  // of unit_rows_
 };
 
-// Accelerations from the equations of the drives alone, and the multipliers that belong to them: right whatever the
-// masses, where the equations of motion lose digits.
+// Accelerations from the equations of the drives alone, with their multipliers. They are right for any masses; the
+// equations of motion would lose digits for some.
 class DrivenMotion final : public MotionSource {
  public:
   DrivenMotion(const Mechanism& mechanism, const FormulationSettings& formulation)
@@ -119,8 +119,8 @@ class DrivenMotion final : public MotionSource {
   VectorXd y_, ydot_;
 };
 
-// Degrees of freedom that J leaves at a position, and who owns the equations that depend on each other there: those
-// with a share in null vectors of J'.
+// Finds the degrees of freedom that J leaves at a position, and the owners of equations that depend on each other
+// there. These have a share in null vectors of J'.
 SingularPosition rank_at(const MechanismData& d, DrivenRows& rows, double t, const VectorXd& y) {
   rows.set(t, y);
   rows.factor();
@@ -142,7 +142,7 @@ SingularPosition rank_at(const MechanismData& d, DrivenRows& rows, double t, con
   return s;
 }
 
-// The path, with positions and velocities that no mass enters.
+// The path, with positions and velocities that do not depend on masses.
 class Kinematics {
  public:
   Kinematics(const Mechanism& mechanism, const FormulationSettings& formulation)
@@ -162,7 +162,7 @@ class Kinematics {
   SingularPosition rank_here() { return rank_at(d_, rows_, t(), path_.state().y); }
 
  private:
-  // Newton's last steps, and the velocities, without masses.
+  // Computes Newton's last steps and the velocities without masses.
   void polish() {
     y_ = path_.state().y;
     double before = INFINITY;

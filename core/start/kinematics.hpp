@@ -4,9 +4,9 @@
 //   positions      Phi(q, t) = 0 by Newton's method from a predictor of second order, continued in time
 //   velocities     Phi_q v = -Phi_t,    accelerations and multipliers from the equations of motion: linear solves
 //
-// The positions follow one branch (driven_path.hpp). Where J loses rank the position is singular: it is crossed
-// when steps to either side of it are possible, and reported with the rank that is lost and the joints and drives whose
-// equations depend on each other.
+// The positions follow one branch (driven_path.hpp). If J loses rank, the position is singular. The path crosses it if
+// steps to either side of it are possible. The report gives the lost rank, and the joints and drives whose equations
+// depend on each other.
 #pragma once
 
 #include <functional>
@@ -36,15 +36,15 @@ struct KinematicsResult {
   std::vector<SingularPosition> singular;  // among the times wanted
 };
 
-// start: the mechanism assembled at the first of the times, which ascend. settings: the formulation, and the steps that
-// may be tried (integrator.max_steps). observe: with the motion (accelerations, multipliers) in the point. go_on: asked
-// before each step, at its time. Either ends the run by false.
+// start is the mechanism assembled at the first of the times, which ascend. `settings` gives the formulation and the
+// largest number of steps (integrator.max_steps). `observe` gets the motion (accelerations, multipliers) in the point.
+// `go_on` is called before each step with its time. Either ends the run by returning false.
 KinematicsResult solve_kinematics(const Mechanism& mechanism, const Assembly& start, const SimulationSettings& settings,
                                   const std::vector<double>& times,
                                   const std::function<bool(std::size_t, const StatePoint&)>& observe,
                                   const std::function<bool(double)>& go_on = {});
 
-// Why the positions cannot be continued from a state at t, in words.
+// The reason why the positions cannot be continued from a state at t, in words.
 std::string why_stuck(const Mechanism& mechanism, double t, const Eigen::VectorXd& y);
 
 }  // namespace mbsopt

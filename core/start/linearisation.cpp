@@ -23,7 +23,7 @@ using Eigen::VectorXd;
 
 constexpr double kRankThreshold = 1e-8;  // of rows scaled to unit length, as for the rank of an equilibrium
 
-// The size of the mechanism: the largest distance between the first centre of mass and another, or from the origin.
+// The size of the mechanism: the largest distance of a centre of mass from the first one, or from the origin.
 double size_of(const VectorXd& y, int n) {
   const StateLayout layout{n};
   double apart = 0, away = 0;
@@ -34,7 +34,7 @@ double size_of(const VectorXd& y, int n) {
   return apart > 0 ? apart : away > 0 ? away : 1.0;
 }
 
-// The free directions: N and P, and what moves the constraints of the inputs.
+// The free directions N and P, and the derivatives of the constraints in the inputs.
 struct FreeDirections {
   MatrixXd N, P, phi_rho;
 };
@@ -59,7 +59,7 @@ FreeDirections free_directions(const MechanismData& d, const StatePoint& at, dou
   return x;
 }
 
-// Eigenvalues, in units of 1/time in which the largest acceleration of a unit displacement is 1, so that no entry of A
+// Eigenvalues in a unit of 1/time in which the largest acceleration of a unit displacement is 1. Then no entry of A
 // hides another by its unit.
 void add_eigenvalues(Linearisation& x) {
   const Index f = x.A.rows() / 2;
@@ -72,13 +72,13 @@ void add_eigenvalues(Linearisation& x) {
   const GeneralEigen eigen = general_eigen(A);
   std::vector<Index> order(static_cast<std::size_t>(2 * f));
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(),  // which keeps pairs together
+  std::stable_sort(order.begin(), order.end(),  // keeps pairs together
                    [&](Index i, Index j) { return std::abs(eigen.values(i)) < std::abs(eigen.values(j)); });
   x.eigenvalues.resize(2 * f), x.errors.resize(2 * f), x.modes.resize(x.basis.rows(), 2 * f);
   for (Index k = 0; k < 2 * f; ++k) {
     const Index i = order[static_cast<std::size_t>(k)];
     x.eigenvalues(k) = per_time * eigen.values(i);
-    // A double eigenvalue with one eigenvector (a free motion: 0) has an error of sqrt(epsilon), no larger one.
+    // A double eigenvalue with one eigenvector (a free motion: 0) has an error of at most sqrt(epsilon).
     const double rounding = A.norm() * std::numeric_limits<double>::epsilon();
     x.errors(k) = per_time * std::min(std::sqrt(rounding), rounding * eigen.conditions(i));
     Eigen::VectorXcd z = eigen.vectors.col(i);

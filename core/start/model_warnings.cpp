@@ -45,8 +45,8 @@ void add_jacobian(const MechanismData& d, const VectorXd& q, std::vector<SparseE
   }
 }
 
-// Directions that neither a joint nor a mass holds: what no row of J and of the masses, one row per principal axis,
-// reaches. By body: whether it may turn so, else only move.
+// Directions that neither a joint nor a mass holds: no row of J and no row of the masses, one per principal axis,
+// reaches them. For each body: whether it may turn, or only move.
 std::map<int, bool> massless_directions(const MechanismData& d, const VectorXd& q) {
   double mass = 0, inertia = 0;
   for (int i = 1; i <= d.n; ++i) {
@@ -95,7 +95,7 @@ void add_springs(const MechanismData& d, const VectorXd& y, std::vector<std::str
   }
 }
 
-// Derivatives of a reaction's components in lambda, one column each. A norm has those of the plane of a mechanism,
+// Derivatives of a reaction's components in lambda, one column each. A norm has those in the plane of a mechanism,
 // since nothing in the plane loads the others.
 Eigen::MatrixXd by_lambda(const MechanismData& d, ReactionSensor sensor, const VectorXd& y) {
   std::vector<int> components{sensor.component};
@@ -116,8 +116,8 @@ Eigen::MatrixXd by_lambda(const MechanismData& d, ReactionSensor sensor, const V
   return columns;
 }
 
-// The motion determines J'lambda, and so b'lambda if b = J u for some u: if b as one more column does not raise the
-// rank of J.
+// The motion determines J'lambda. It determines b'lambda if b = J u for some u, that is, if b as a further column does
+// not raise the rank of J.
 void add_reactions(const MechanismData& d, const VectorXd& y, std::vector<std::string>& warnings) {
   std::vector<SparseEntry> rows;
   int rank = -1;
@@ -150,7 +150,7 @@ void add_reactions(const MechanismData& d, const VectorXd& y, std::vector<std::s
   }
 }
 
-// Whether the ground holds the centre of mass of every body: then no gravity moves anything.
+// Whether the ground holds the centre of mass of every body, so that gravity moves nothing.
 bool is_balanced(const MechanismData& d) {
   std::vector<bool> held(at(d.n) + 1, false);
   held[0] = true;
@@ -163,7 +163,7 @@ bool is_balanced(const MechanismData& d) {
 }
 
 void add_gravity(const MechanismData& d, std::vector<std::string>& warnings) {
-  constexpr double kAlong = 1e-9;  // of gravity: what rounding leaves of a component that is meant to be 0
+  constexpr double kAlong = 1e-9;  // of gravity: rounding of a component that should be 0
   if (!d.planar) return;
   const Vector3d& g = d.gravity;
   if (std::hypot(g(d.planar->t1), g(d.planar->t2)) > kAlong * g.norm() || g.norm() == 0 || is_balanced(d)) return;
@@ -174,7 +174,7 @@ void add_gravity(const MechanismData& d, std::vector<std::string>& warnings) {
                   g(0), g(1), g(2)));
 }
 
-// An axis in the plane: the angle about it never changes, or jumps by half a turn.
+// Warns of an axis in the plane: the angle about it never changes, or jumps by half a turn.
 void add_axes(const MechanismData& d, std::vector<std::string>& warnings) {
   if (!d.planar) return;
   constexpr double kAlong = 1 - 1e-9;
@@ -190,7 +190,7 @@ void add_axes(const MechanismData& d, std::vector<std::string>& warnings) {
   }
 }
 
-// Coordinates r carry rounding of eps |r|, in which the arms of bodies are only so long.
+// Coordinates r have a rounding of eps |r|, which counts against the arms of bodies.
 void add_rounding(const MechanismData& d, const VectorXd& q, std::vector<std::string>& warnings) {
   constexpr double kNoticeable = 1e-8;  // of the arms: below the tolerances of integrators
   double arm = 0, far = 0;

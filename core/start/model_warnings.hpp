@@ -1,4 +1,4 @@
-// Sentences on oddities of a mechanism at its assembled start: such scenes run, but seldom mean what they say.
+// Sentences on oddities of a mechanism at its assembled start. Such scenes run, but are seldom intended.
 //
 //   massless directions that no joint holds        (M is singular on the null space of J: no acceleration there)
 //   springs of zero length                         (they have no direction)
@@ -14,9 +14,9 @@
 namespace mbsopt {
 
 std::vector<std::string> model_warnings(const Mechanism& mechanism, const Assembly& assembly);
-// The bodies with massless directions, from 1; none if the assembly failed.
+// The bodies with massless directions, counted from 1; none if the assembly failed.
 std::vector<int> massless_bodies(const Mechanism& mechanism, const Assembly& assembly);
-// The first two of them, which a simulation may end with.
+// The first two of these warnings, which can explain the end of a simulation.
 std::vector<std::string> start_warnings(const Mechanism& mechanism, const Assembly& assembly);
 
 }  // namespace mbsopt

@@ -23,7 +23,7 @@ NearestApproach::NearestApproach(const Mechanism& mechanism, double start_time)
 }
 
 double NearestApproach::defect(double t, Eigen::VectorXd& e_rho) {
-  constexpr double kClosed = 1e-9;  // as far as a path may leave the constraints
+  constexpr double kClosed = 1e-9;  // the tolerance of a path's constraints
   const MechanismData& d = mechanism_.data();
   Eigen::VectorXd theta_bar = Eigen::VectorXd::Zero(d.slots());
   e_rho.setZero(d.rho.size());

@@ -1,4 +1,4 @@
-// The nearest approach of a mechanism whose joints and drives may not all hold: the positions at which |Phi| is least,
+// The nearest approach of a mechanism whose joints and drives may not all hold: the positions with the smallest |Phi|,
 // continued from instant to instant.
 //
 //   q(t, rho) = argmin 1/2 |Phi(q, t, rho)|^2          by Levenberg-Marquardt steps from the instant before
@@ -21,7 +21,7 @@ namespace mbsopt {
 class NearestApproach {
  public:
   NearestApproach(const Mechanism& mechanism, double start_time);
-  // At an instant after the one before. e_rho: of all parameters.
+  // t must be later than in the call before. e_rho is the gradient in all parameters.
   double defect(double t, Eigen::VectorXd& e_rho);
   const Eigen::VectorXd& y() const { return y_; }  // positions there
   const Eigen::VectorXd& angles() const { return angles_; }

@@ -15,11 +15,11 @@ namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
-// An orthonormal basis of { x : J x / sizes = 0 }. The columns of W, orthonormal in units of the sizes, span it. Those
-// that turn no body (or, where lengths are large, move none) have a part of rounding in p (in r). In the units of x it
-// is eps/L for lengths L, and multiplies the large g of p beside the small one of r: a part eps/L^2 of r would be
-// wrong. So that part is zero, exactly, unless J needs one: of z without it, J leaves more than rounding, and z - J+ J
-// z has it.
+// An orthonormal basis of { x : J x / sizes = 0 }. The columns of W, orthonormal in units of the sizes, span it.
+// Columns that turn no body (or, if lengths are large, move none) have a part of rounding in p (in r). In the units of
+// x this part is eps/L for lengths L. It multiplies the large g of p beside the small g of r, so a part eps/L^2 of r
+// would be wrong. The part is therefore set to zero exactly, unless J needs it. J needs the part of z if J times the
+// rest exceeds rounding; then z - J+ J z contains it.
 MatrixXd orthonormal_null_space(const MatrixXd& J, const OrthogonalDecomposition& J_transposed, const VectorXd& sizes) {
   const MatrixXd W = J_transposed.left_null_space();
   const double heavy = sizes.size() > 0 ? sizes.maxCoeff() : 0;
@@ -66,8 +66,9 @@ NearestPointLinearisation::NearestPointLinearisation(const MatrixXd& J, const Ve
 MatrixXd NearestPointLinearisation::multipliers(const Eigen::Ref<const MatrixXd>& g) const {
   return scale_.asDiagonal() * J_transposed_.solve(sizes_.asDiagonal() * g);
 }
-// Rounding leaves eps L of x in r and eps in p. The rows of the smaller size, r of tiny mechanisms, say what they can
-// of nu; the others say the rest, which is larger: its rounding goes out by another look at the first.
+// Rounding leaves an error of eps L in r and eps in p. So the rows of the smaller size (r of tiny mechanisms) determine
+// the part of nu that they can. The other rows determine the rest, which is larger. A second pass over the first rows
+// removes its rounding.
 VectorXd NearestPointLinearisation::multipliers_at(const VectorXd& away) const {
   const double smallest = sizes_.minCoeff();
   if (smallest == sizes_.maxCoeff()) return multipliers(away);
@@ -136,7 +137,7 @@ constexpr double kSatisfied = 1e-11;  // of F, per unit of x
 
 double largest(const VectorXd& x) { return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>(); }
 
-// Levenberg-Marquardt on 1/2 |weights F|^2: brings x to where the equations are violated least.
+// Applies Levenberg-Marquardt to 1/2 |weights F|^2: brings x to the least violation of the equations.
 void reduce_violation(NearestPointEquations& equations, int most, VectorXd& x, int& iterations) {
   double mu = 1e-3;
   VectorXd F = equations.values(x);
@@ -172,7 +173,8 @@ class Search {
     result_.x = x_guess;
   }
 
-  // In metres; if that fails, where lengths of micrometres or kilometres may have cost digits, in units of the sizes.
+  // Solves in metres. If that fails because lengths of micrometres or kilometres cost digits, it solves in units of the
+  // sizes.
   NearestPoint run() {
     if (guess_is_it()) return result_;
     if (newton_of_determined()) return result_;
@@ -202,7 +204,7 @@ class Search {
     if (unsettled && largest(result_.F) < 1e-9 * size()) result_.status = NearestPointStatus::singular;
   }
 
-  // The guess satisfies the equations to rounding: nothing is nearer, nu = 0 and H = I.
+  // If the guess satisfies the equations to rounding, nothing is nearer: nu = 0 and H = I.
   bool guess_is_it() {
     const VectorXd x = equations_.retracted(x_guess_), F = equations_.values(x);
     if (!(largest(x - x_guess_) <= 4 * kEpsilon)) return false;  // only unit vectors are retracted
@@ -214,8 +216,8 @@ class Search {
     return true;
   }
 
-  // Where the equations leave nothing free, their Newton step alone; by the normal equations, whose lost digits the
-  // next step restores. Empty where these are not positive definite to kDigits.
+  // The Newton step of equations that leave no freedom. It uses the normal equations; the next step restores their lost
+  // digits. It is empty if these are not positive definite to kDigits.
   VectorXd determined_step(const MatrixXd& J) const {
     constexpr double kDigits = 1e-8;  // of the pivots, squares of those of J
     if (J.rows() < J.cols()) return {};
@@ -224,7 +226,8 @@ class Search {
     return definite_solve(A.transpose() * A, -(A.transpose() * scale.cwiseProduct(result_.F)), kDigits);
   }
 
-  // As newton(), while the equations leave nothing free; false where they do, or where that does not converge.
+  // Does the same as newton() for equations that leave no freedom. Returns false if they leave some, or if it does not
+  // converge.
   bool newton_of_determined() {
     constexpr int kMost = 20;        // quadratic convergence takes far fewer
     constexpr double kClose = 1e-8;  // of each unknown's size: its square, the error left, is rounding
@@ -248,7 +251,7 @@ class Search {
     return false;
   }
 
-  // Gauss-Newton, then Newton; false where neither converges.
+  // Takes Gauss-Newton steps, then Newton steps. Returns false if neither converge.
   bool newton() {
     constexpr double kNear = 0.05;    // Gauss-Newton steps below it, per unit of x, may be Newton's instead
     constexpr double kConvex = 1e-3;  // least eigenvalue of Z'HZ at which they are
@@ -316,7 +319,7 @@ class Search {
     const MatrixXd J = equations_.jacobian(result_.x);
     result_.linearisation = sized_ ? NearestPointLinearisation(J, equations_.sizes(J)) : NearestPointLinearisation(J);
   }
-  // Newton's steps to the rounding of each unknown, not of the largest.
+  // Takes Newton steps to the rounding of each unknown, not of the largest.
   void refine() {
     sized_ = true;
     for (double last = std::numeric_limits<double>::infinity();;) {
@@ -332,14 +335,14 @@ class Search {
   void add_curvature(const VectorXd& nu) {
     result_.nu = nu;
     const Eigen::Index n = result_.x.size();
-    // H acts in the directions that the equations leave free; where there are none, it is not evaluated.
+    // H acts in the directions that the equations leave free. It is not evaluated if there are none.
     const bool determined = result_.linearisation.null_space().cols() == 0;
     MatrixXd H = determined ? MatrixXd(MatrixXd::Zero(n, n)) : equations_.curvature(result_.x, result_.nu);
     H.diagonal().array() += 1;
     result_.linearisation.set_hessian(H);
   }
 
-  // At rounding level, or no longer shrinking just above it.
+  // Whether steps are at rounding level, or no longer shrink just above it.
   bool converged(double length) {
     if (length <= 2 * kEpsilon * size()) return true;
     if (length < 0.5 * shortest_) {
@@ -349,7 +352,7 @@ class Search {
     return shortest_ < 1e-11 * size() && ++waited_ >= 2;
   }
 
-  // Whether the violation still shrinks from time to time.
+  // Whether the violation still falls from time to time.
   bool gets_closer() {
     const double violation = scaled_violation(result_.F);
     if (violation < 0.7 * closest_ || violation < 1e-9) {
@@ -359,7 +362,7 @@ class Search {
     return --patience_ > 0;
   }
 
-  // A strict one: the nearest point moves at most 1e9 times as far as the guess.
+  // Whether the minimum is strict: the nearest point moves at most 1e9 times as far as the guess.
   bool is_minimum() const {
     const VectorXd& lambda = result_.linearisation.reduced_eigenvalues();
     return lambda.size() == 0 || lambda(0) > 1e-9;
@@ -370,7 +373,8 @@ class Search {
     equations_.accept(result_.x);
   }
 
-  // One step along the merit function 1/2 |x - x_guess|^2 + sigma |scale F|; false where it cannot be reduced.
+  // Takes one step along the merit function 1/2 |x - x_guess|^2 + sigma |scale F|. Returns false if it cannot be
+  // reduced.
   bool advance(VectorXd step) {
     step *= equations_.step_fraction(step);
     const VectorXd away = result_.x - x_guess_;
@@ -404,7 +408,7 @@ class Search {
     return false;
   }
 
-  // False where even the violation alone does not go to zero.
+  // Returns false if the violation alone does not go to zero.
   bool restore() {
     VectorXd x = result_.x;
     reduce_violation(equations_, most_, x, result_.iterations);

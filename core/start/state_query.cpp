@@ -24,7 +24,7 @@ FormulationSettings without_stabilisation(FormulationSettings formulation) {
   return formulation;
 }
 
-// The body's number, from 1.
+// The body's number, counted from 1.
 int number_of(const MechanismData& data, const std::string& body) {
   const auto found = std::find(data.body_names.begin() + 1, data.body_names.end(), body);
   if (found == data.body_names.end()) throw std::invalid_argument("there is no body '" + body + "'");
@@ -100,7 +100,7 @@ StateQuery::Rows StateQuery::rows(const std::string& name) const {
   return {first, end - first};
 }
 
-// Without the conditions on sensors, which come last.
+// The conditions on sensors come last and are left out.
 VectorXd StateQuery::Phi() const { return equations_->position.values(y_).head(lambda_.size()); }
 VectorXd StateQuery::Phidot() const { return equations_->velocity.values(y_).head(lambda_.size()); }
 MatrixXd StateQuery::Phi_q() const {

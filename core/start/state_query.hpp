@@ -1,5 +1,5 @@
 // The equations of motion at a state, by the names of bodies, joints and drives. Coordinates are q = (r_g, p), 7
-// numbers per body in the order of the scene; the rows of Phi are those of joints and drives, then p'p - 1 of each
+// numbers per body in the order of the scene. The rows of Phi are those of joints and drives, then p'p - 1 of each
 // body.
 //
 //   M qddot + Phi_q'lambda = Q,   Phi_q qddot + Phiddot_v = 0        Q: forces, gravity, -omega x J omega
@@ -11,7 +11,7 @@
 //   at.point("crank", {0.3, 0, 0}).acceleration;                     // global, of the point at 0.3 m in the body frame
 //   at.Phi_q().middleRows(at.rows("pin").first, at.rows("pin").count);
 //
-// Matrices are dense, and computed when they are asked for; sparseView() of Eigen makes sparse ones.
+// Matrices are dense and computed on demand; Eigen's sparseView() makes sparse ones.
 #pragma once
 
 #include <Eigen/Core>
@@ -38,20 +38,20 @@ struct PointMotion {
 
 class StateQuery {
  public:
-  // Throws std::invalid_argument where the accelerations cannot be computed.
+  // Throws std::invalid_argument if the accelerations cannot be computed.
   StateQuery(const Mechanism& mechanism, const FormulationSettings& formulation, const StatePoint& at);
 
-  // Names that there are not: std::invalid_argument.
+  // Unknown names throw std::invalid_argument.
   BodyMotion body(const std::string& name) const;
   PointMotion point(const std::string& body, const Eigen::Vector3d& in_body_frame) const;
-  Eigen::Index index(const std::string& body) const;  // where its numbers begin in q
+  Eigen::Index index(const std::string& body) const;  // the index of its first number in q
   struct Rows {
     Eigen::Index first = 0, count = 0;
   };
   Rows rows(const std::string& joint_or_drive) const;  // in Phi
 
   const Eigen::VectorXd& qddot() const { return a_; }
-  const Eigen::VectorXd& lambda() const { return lambda_; }  // those of the unit norms, too
+  const Eigen::VectorXd& lambda() const { return lambda_; }  // with those of the unit norms
   Eigen::VectorXd Phi() const;
   Eigen::VectorXd Phidot() const;
   Eigen::VectorXd Phiddot_v() const;
@@ -77,8 +77,8 @@ class StateQuery {
   std::vector<Vec<6>> loads_;  // in (rddot, omegadot)
 };
 
-// The scene with the state y as the guess of its start, without initial.conditions: a state that meets the constraints
-// is where the next run begins. The mechanism is that of y.
+// The scene with the state y as the guess of its start, without initial.conditions. If y satisfies the constraints, the
+// next run begins there. mechanism is that of y.
 Scene starting_at(const Scene& scene, const Mechanism& mechanism, const Eigen::VectorXd& y);
 
 }  // namespace mbsopt

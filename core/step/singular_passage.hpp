@@ -1,18 +1,18 @@
 // Steps past singular positions, where the constraints' Jacobian J loses rank for an instant (a four-bar lies flat).
 //
-// At a distance d from such a position, of t* - t in time, a state meets the constraints, to rounding e, only up to e/d
-// in the directions that are about to be free. What is left there obeys d u' + 2 d' u = 0, u' = 2 u/(t* - t), and the
-// stages of an explicit step past t* magnify it, one after another, by h/(t + c_i h - t*) each: by how much depends on
-// where they lie, not on how short the step is; derivatives lose another 1/h^3 or so. Steps are placed such that t*
-// lies where the tableau magnifies least, at theta = (t* - t)/h, and kept long.
+// At a distance d = t* - t before such a position, rounding e limits how well a state satisfies the constraints: up to
+// e/d in the directions that become free. The remaining error obeys d u' + 2 d' u = 0, u' = 2 u/(t* - t). The stages of
+// an explicit step past t* magnify it, one after another, by h/(t + c_i h - t*) each. The magnification depends on
+// where the stages lie, not on how short the step is. Derivatives lose another factor of about 1/h^3. So the step size
+// is chosen to put t* where the tableau magnifies least, at theta = (t* - t)/h, and steps stay long.
 //
-// t* is found from the response of the constraint forces to a fixed load (Projector::response), which has a pole there:
-// its inverse goes through zero, and its sign changes.
+// The response of the constraint forces to a fixed load (Projector::response) has a pole at t*: its inverse goes
+// through zero and changes sign. This gives t*.
 //
 //   SingularPassage passage(method, constraints);
 //   h = passage.propose(t, wanted, most);  // attempt it; then, with the response at its end:
 //   if (passage.well_placed(t, h, wanted, most, response)) passage.accept();
-//   // otherwise again, with what propose() says now
+//   // otherwise attempt the step that propose() returns now
 #pragma once
 
 #include <Eigen/Core>
@@ -25,26 +25,26 @@ namespace mbsopt {
 
 class SingularPassage {
  public:
-  // rk: explicit; outlives this. constraints: entries of a response.
+  // rk must be explicit and outlive this. constraints is the number of entries of a response.
   SingularPassage(const Method& rk, Eigen::Index constraints) : rk_(rk) {
     for (Place* p : {&before_, &last_, &now_, &tried_}) p->response.setZero(constraints);
   }
 
   void forget();  // what went before
-  // wanted: the size that accuracy asks for; most: what no step exceeds, at least that.
+  // wanted is the size for the accuracy. most is the largest size of any step, at least wanted.
   bool well_placed(double t, double h, double wanted, double most, const Eigen::VectorXd& response);
   void accept();
-  // A step from t of the wanted size at most, or a little more, with regard to the next singular position.
+  // A step from t that regards the next singular position. It is at most the wanted size, or a little more.
   double propose(double t, double wanted, double most) const;
-  // Whether a step from t by h is one that passes a singular position, or a neighbour of one.
+  // Whether a step from t by h passes a singular position, or is next to a step that does.
   bool near(double t, double h) const;
-  // Whether one was passed after t.
+  // Whether a step passed one after t.
   bool passed_since(double t) const { return behind_ >= t; }
 
-  // Where a step's t* is best, 0 to 1.
+  // The best position of t* in a step, 0 to 1.
   double best_theta();
-  // The largest acceleration over its stage's distance from t*, of the stages of a step and of one like it after it,
-  // where u is 1 over the distance at the start, and derivatives of it another 1 over the distance.
+  // The largest acceleration over its stage's distance from t*, over the stages of a step and of one like it after it.
+  // u is 1 over the distance at the start. Its derivatives have a further factor of 1 over the distance.
   double magnified(double theta) const;
 
  private:
@@ -59,7 +59,7 @@ class SingularPassage {
     double reach = kNone;  // from the nearest place that it is made of: the smaller, the better
   };
   Estimate estimate() const;
-  // A theta next to which least is magnified, and what is at most.
+  // A theta with locally least magnification, and an upper bound of that next to it.
   struct Passage {
     double theta, magnified;
   };
@@ -69,8 +69,7 @@ class SingularPassage {
   double uncertain(double theta) const;  // what is magnified at most, next to theta
   Choice choose(double left, double h, double most) const;
   void tabulate();
-  // The error that a step leaves, of a size relative to that of its neighbours: accelerations next to t* are off by
-  // 1/d^3.
+  // The error of a step whose size is relative to that of its neighbours: accelerations next to t* are off by 1/d^3.
   static double rounding_of(double magnified, double size) { return magnified / (size * size * size); }
 
   const Method& rk_;

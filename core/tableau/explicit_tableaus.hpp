@@ -6,12 +6,12 @@
 
 namespace mbsopt {
 
-// Euler's method. No estimate: fixed steps only.
+// Euler's method has no estimate, so it takes fixed steps only.
 inline constexpr Tableau<1> kEuler{.name = "euler", .order = 1, .dense_order = 1, .b = {1}, .dense = {{{1}}}};
 static_assert(rows_sum_to_c(kEuler) && is_explicit(kEuler) && dense_ends_at_step(kEuler));
 
-// Ralston, "Runge-Kutta methods with minimum error bounds", Math. Comp. 16 (1962): of the two-stage methods of order 2
-// the one with the least bound of its local error. The estimate is against Euler's method, which lies within.
+// Ralston, "Runge-Kutta methods with minimum error bounds", Math. Comp. 16 (1962): the two-stage method of order 2 with
+// the least bound of its local error. The estimate is the difference from Euler's method, which it contains.
 inline constexpr Tableau<2> kRk2{.name = "rk2",
                                  .order = 2,
                                  .dense_order = 2,
@@ -24,7 +24,7 @@ inline constexpr Tableau<2> kRk2{.name = "rk2",
 static_assert(rows_sum_to_c(kRk2) && is_explicit(kRk2) && dense_ends_at_step(kRk2));
 
 // Bogacki and Shampine, "A 3(2) pair of Runge-Kutta formulas", Appl. Math. Lett. 2 (1989). The last stage is f(y1),
-// which the estimate needs; dense output is the cubic through y0, y1 and their derivatives.
+// which the estimate needs. Dense output is the cubic through y0, y1 and their derivatives.
 inline constexpr Tableau<4> kBs3{.name = "bs3",
                                  .order = 3,
                                  .dense_order = 3,
@@ -36,8 +36,8 @@ inline constexpr Tableau<4> kBs3{.name = "bs3",
                                  .dense = {{{1, -4. / 3, 5. / 9}, {0, 1, -2. / 3}, {0, 4. / 3, -8. / 9}, {0, -1, 1}}}};
 static_assert(rows_sum_to_c(kBs3) && is_explicit(kBs3) && dense_ends_at_step(kBs3));
 
-// Kutta's classical method: [HNW], section II.1; its continuous extension of order 3: section II.6, exercise 1. No
-// estimate: fixed steps only.
+// Kutta's classical method: [HNW], section II.1. Its continuous extension of order 3: section II.6, exercise 1. It has
+// no estimate, so it takes fixed steps only.
 inline constexpr Tableau<4> kRk4{.name = "rk4",
                                  .order = 4,
                                  .dense_order = 3,
@@ -76,8 +76,8 @@ static_assert(rows_sum_to_c(kDopri5) && is_explicit(kDopri5) && dense_ends_at_st
 
 // Tsitouras, "Runge-Kutta pairs of order 5(4) satisfying only the first column simplifying assumption", Comput. Math.
 // Appl. 62 (2011), with its interpolant of order 4, which needs no further stage. The paper prints 16 digits. Nodes and
-// coefficients here differ by 5e-15 at most from these, weights of dense output by 5e-14: of the methods around the
-// printed one, doubles hold this one so that no order condition of the step is off by more than 3e-16.
+// coefficients here differ from these by at most 5e-15, weights of dense output by 5e-14. This is the method near the
+// printed one that doubles represent best: no order condition of the step is off by more than 3e-16.
 inline constexpr Tableau<7> kTsit5{
     .name = "tsit5",
     .order = 5,

@@ -1,11 +1,12 @@
 // Implicit methods. Stage 0 of each is the explicit one at the start of the step, f(y0): the estimate and dense output
-// use it. Numbers and the weights of dense output are made by tableaus.py, beside this file.
+// use it. The script tableaus.py beside this file computes the numbers and the weights of dense output.
 //   Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996): [HW].
 //
-// error_filter is A_ii where it is the same in all implicit stages and the real eigenvalue of A where there is one.
+// error_filter is A_ii if all implicit stages share it, or else the real eigenvalue of A if there is one.
 //
-// Dense output of the order before last, or better, needs f(y0) (and f(y1), in the Gauss methods): in a stiff direction
-// with rate s it carries h s times what y0 is off the slow motion there. Outputs within a fast transient are rough.
+// Dense output of the order before last, or better, needs f(y0), and the Gauss methods also need f(y1). In a stiff
+// direction with rate s it has an error of h s times the distance of y0 from the slow motion. Outputs within a fast
+// transient are rough.
 #pragma once
 
 #include "core/tableau/method.hpp"
@@ -14,8 +15,7 @@ namespace mbsopt {
 
 // sdirk2: TR-BDF2, a trapezoidal half and a BDF2 half. Bank et al., IEEE Trans. CAD 4 (1985); the estimate of order 3
 // by Hosea and Shampine, "Analysis and implementation of TR-BDF2", Appl. Numer. Math. 20 (1996). L-stable, stiffly
-// accurate. Preferred to Alexander's two-stage method, which has stage order 1 and no estimate, at the same number of
-// implicit stages.
+// accurate. Alexander's two-stage method has as many implicit stages, but stage order 1 and no estimate.
 inline constexpr Tableau<3> kSdirk2{.name = "sdirk2",
                                     .order = 2,
                                     .dense_order = 2,
@@ -33,9 +33,9 @@ inline constexpr Tableau<3> kSdirk2{.name = "sdirk2",
 static_assert(rows_sum_to_c(kSdirk2) && dense_ends_at_step(kSdirk2));
 
 // sdirk3, sdirk4: the implicit halves of Kennedy and Carpenter's pairs ARK3(2)4L[2]SA and ARK4(3)6L[2]SA, "Additive
-// Runge-Kutta schemes for convection-diffusion-reaction equations", Appl. Numer. Math. 44 (2003). L-stable, stiffly
-// accurate, and of stage order 2, which the methods of Norsett and Thomsen or [HW], table IV.6.5, are not (they have
-// 1): in stiff mechanisms it is the stage order that is seen. Both have dense output of full order without more stages.
+// Runge-Kutta schemes for convection-diffusion-reaction equations", Appl. Numer. Math. 44 (2003). They are L-stable and
+// stiffly accurate. Their stage order is 2; the methods of Norsett and Thomsen or [HW], table IV.6.5, have 1. In stiff
+// mechanisms the stage order determines the error. Both have dense output of full order without more stages.
 inline constexpr Tableau<4> kSdirk3{
     .name = "sdirk3",
     .order = 3,
@@ -79,12 +79,12 @@ inline constexpr Tableau<6> kSdirk4{
                {-0.006435494303836924, 0.9004541762447945, -1.8364312223249855, 1.1924125403840278}}}};
 static_assert(rows_sum_to_c(kSdirk4) && dense_ends_at_step(kSdirk4));
 
-// gauss4, gauss6: collocation at the zeros of Legendre's polynomials: [HW], section IV.5. A-stable and symplectic, not
-// L-stable: for long motion without fast damping. The last stage of the step is f(y1). The estimate is the divided
-// difference of f over 0 and the nodes, that is, against a formula of order 2 (3 with three nodes), scaled as the one
-// of radau5: error_filter times f(y0). Over 1 as well it would be an order better and vanish wherever f is linear,
-// since f is a polynomial of the collocation polynomial's degree there. With two nodes A has no real eigenvalue and
-// error_filter is their modulus.
+// gauss4, gauss6: collocation at the zeros of Legendre's polynomials: [HW], section IV.5. They are A-stable and
+// symplectic, not L-stable: for long motion without fast damping. The last stage of the step is f(y1). The estimate is
+// the divided difference of f over 0 and the nodes, so it compares with a formula of order 2 (3 with three nodes). It
+// is scaled as that of radau5: error_filter times f(y0). A difference over 1 as well would be an order better, but
+// would vanish wherever f is linear: f is a polynomial of the collocation polynomial's degree there. With two nodes A
+// has no real eigenvalue, and error_filter is the modulus of its eigenvalues.
 inline constexpr Tableau<4> kGauss4{
     .name = "gauss4",
     .order = 4,
@@ -101,8 +101,8 @@ inline constexpr Tableau<4> kGauss4{
                {0.125, -1.125, 1}}}};
 static_assert(rows_sum_to_c(kGauss4) && dense_ends_at_step(kGauss4));
 
-// Dense output of order 5 by one more stage in the middle, at the state of the interpolant of order 4: Hairer, Norsett,
-// Wanner, "Solving Ordinary Differential Equations I" (1993), section II.6.
+// One more stage in the middle gives dense output of order 5, at the state of the interpolant of order 4: Hairer,
+// Norsett, Wanner, "Solving Ordinary Differential Equations I" (1993), section II.6.
 inline constexpr Tableau<5, 6> kGauss6{
     .name = "gauss6",
     .order = 6,
@@ -149,8 +149,8 @@ inline constexpr Tableau<4> kRadau5{
 static_assert(rows_sum_to_c(kRadau5) && dense_ends_at_step(kRadau5));
 
 // lobatto3c: Lobatto IIIC with three stages: [HW], table IV.5.7. L-stable, stiffly accurate, of stage order 2. Its
-// first stage is at the start of the step and not f(y0), so that f adds no fourth node: the estimate is gamma_0 times
-// the second difference of f over f(y0) and the other two stages.
+// first stage is at the start of the step but is not f(y0), so f adds no fourth node. The estimate is gamma_0 times the
+// second difference of f over f(y0) and the other two stages.
 inline constexpr Tableau<4> kLobatto3c{.name = "lobatto3c",
                                        .order = 4,
                                        .dense_order = 3,
@@ -170,7 +170,7 @@ inline constexpr Tableau<4> kLobatto3c{.name = "lobatto3c",
 static_assert(rows_sum_to_c(kLobatto3c) && dense_ends_at_step(kLobatto3c));
 
 // radau1a: Radau IA with three stages: [HW], section IV.5. L-stable, of stage order 2, not stiffly accurate. The last
-// stage of the step is f(y1); the estimate is gamma_0 times the divided difference of f over 0, the inner nodes and 1.
+// stage of the step is f(y1). The estimate is gamma_0 times the divided difference of f over 0, the inner nodes and 1.
 inline constexpr Tableau<5> kRadau1a{
     .name = "radau1a",
     .order = 5,

@@ -3,22 +3,22 @@
 //   Y_i = y0 + h sum_j A_ij k_j,   k_i = f(t0 + c_i h, Y_i),   y1 = y0 + h sum_i b_i k_i
 //   dense output:  y(t0 + theta h) = y0 + h sum_i b_i(theta) k_i,   b_i(theta) = sum_j dense_ij theta^(j+1)
 //
-// Stages beyond the first S serve dense output only and are computed only where it is asked for. The error of a step is
-// the norm of err = h sum_i error_i k_i; where error_low is there, too, the two are combined as in DOP853; where
-// error_filter = g is there, err is replaced by (I - h g f_y)^-1 err, which keeps it bounded in stiff directions.
+// Stages beyond the first S serve dense output only and are computed on demand. The error of a step is the norm of err
+// = h sum_i error_i k_i. If the table has error_low, the two are combined as in DOP853. If it has error_filter = g, (I
+// - h g f_y)^-1 err replaces err, which bounds it in stiff directions.
 //
 // Stages that need each other are solved together: a group is first..last with A_ij = 0 for i <= last < j. In an
-// explicit method every group is one stage with A_ii = 0, in a diagonally implicit one A_ii may differ from 0.
+// explicit method every group is one stage with A_ii = 0. In a diagonally implicit one A_ii may differ from 0.
 //
 // A Rosenbrock method has a second table, gamma, with equal numbers on its diagonal. Its stages solve linear equations:
 //
 //   k_i = f(t0 + c_i h, Y_i) + h f_y(t0, y0) sum_j gamma_ij k_j + h gamma_i f_t(t0, y0),   gamma_i = sum_j gamma_ij
 //
-// Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.7. Its Y_i are of low order, so that
-// running costs are integrated along the dense output: nodes of a Gauss rule take the place of the stages.
+// Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.7. Its Y_i are of low order. So
+// running costs are integrated along the dense output: nodes of a Gauss rule replace the stages.
 //
 // A new method is a table in a file of its kind (explicit_tableaus.hpp, implicit_tableaus.hpp, or its own) and a name
-// in the list of tableaus.cpp; the tests go over that list.
+// in the list of tableaus.cpp. The tests run over that list.
 #pragma once
 
 #include <array>

@@ -1,13 +1,13 @@
-// Rosenbrock methods. Numbers are made by tableaus.py, beside this file.
+// Rosenbrock methods. tableaus.py beside this file computes the numbers.
 #pragma once
 
 #include "core/tableau/method.hpp"
 
 namespace mbsopt {
 
-// rodas4: RODAS of Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.7 and the code
-// RODAS: order 4(3), L-stable, stiffly accurate with its estimate; dense output of order 3 from the same source. Its
-// published coefficients have 16 digits: those of the dense output meet their conditions to 1.4e-13.
+// rodas4: RODAS of Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.7, and the code
+// RODAS: order 4(3), L-stable, stiffly accurate with its estimate. Dense output of order 3 comes from the same source.
+// The published coefficients have 16 digits: those of the dense output satisfy their conditions to 1.4e-13.
 inline constexpr Tableau<6> kRodas4{
     .name = "rodas4",
     .order = 4,

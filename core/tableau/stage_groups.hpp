@@ -1,4 +1,4 @@
-// The sweeps' questions on a method's groups of coupled stages (tableaus.hpp).
+// Queries of the sweeps on a method's groups of coupled stages (tableaus.hpp).
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@ namespace mbsopt {
 
 inline bool is_implicit(const Method& rk, const StageGroup& g) { return !rk.is_explicit_stage(g.first); }
 
-// Stages of the largest implicit group; 0: the method is explicit.
+// The number of stages of the largest implicit group; 0 if the method is explicit.
 inline int largest_implicit_group(const Method& rk) {
   int largest = 0;
   for (const StageGroup& g : rk.stage_groups()) {
@@ -18,8 +18,8 @@ inline int largest_implicit_group(const Method& rk) {
   return largest;
 }
 
-// Whether a step's result depends on the group: through its weights, dense output, or later stages. (An error estimate
-// does not count: steps are held fixed in derivatives.)
+// Whether a step's result depends on the group through its weights, dense output, or later stages. An error estimate
+// does not count, because derivatives hold steps fixed.
 inline bool is_used(const Method& rk, const StageGroup& g, bool dense) {
   if (dense) return true;
   for (int i = g.first; i <= std::min(g.last, rk.stages - 1); ++i) {

@@ -1,5 +1,5 @@
-// y = y0 + sum_j c_j k_j, of states, in one pass: each number of y is read and written once.
-// For as many k_j as a method has stages, and two.
+// y = y0 + sum_j c_j k_j of states in one pass: each number of y is read and written once. It takes two more k_j than a
+// method has stages.
 #pragma once
 
 #include "core/linear/pairs.hpp"
@@ -11,7 +11,7 @@ class StageSum {
  public:
   // to() reads the first terms_ entries only, so the arrays need no values.
   StageSum() {}  // cppcheck-suppress uninitMemberVar
-  // k: as many numbers as y; not read where c is 0.
+  // k has as many numbers as y. It is not read if c is 0.
   void add(double c, const double* k) {
     if (c == 0) return;
     c_[terms_] = c;

@@ -18,7 +18,7 @@ constexpr bool any_nonzero(std::span<const double> x) {
   return std::any_of(x.begin(), x.end(), [](double v) { return v != 0; });
 }
 
-// The least blocks on the diagonal of A that have nothing to their right.
+// Finds the smallest blocks on the diagonal of A that have only zeros to their right.
 template <int S, int T>
 constexpr void find_groups(const Tableau<S, T>& rk, Method& m) {
   for (int first = 0; first < T; first = m.group[static_cast<std::size_t>(m.groups - 1)].last + 1) {
@@ -80,7 +80,7 @@ constexpr Method method(const Tableau<S, T>& rk) {
   return m;
 }
 
-// The explicit ones first.
+// The explicit methods come first.
 constexpr std::array kMethods{method(kEuler),   method(kRk2),     method(kBs3),       method(kRk4),    method(kDopri5),
                               method(kTsit5),   method(kVerner6), method(kDopri853),  method(kSdirk2), method(kSdirk3),
                               method(kSdirk4),  method(kGauss4),  method(kLobatto3c), method(kRodas4), method(kRadau5),

@@ -12,7 +12,7 @@ namespace mbsopt {
 std::span<const Method> runge_kutta_methods();
 std::span<const Method> explicit_methods();
 std::span<const Method> implicit_methods();
-// By name; null when there is none of that name.
+// Finds a method by name; null if there is none.
 const Method* runge_kutta_method(std::string_view name);
 const Method* explicit_method(std::string_view name);
 

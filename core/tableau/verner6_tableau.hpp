@@ -7,9 +7,9 @@ namespace mbsopt {
 
 // Verner's "most robust" pair of orders 6 and 5: J. H. Verner, "Numerically optimal Runge-Kutta pairs with
 // interpolants", Numer. Algorithms 53 (2010), and his page of coefficients, sfu.ca/~jverner. The ninth stage is f(y1),
-// which the estimate needs; one more, in the middle, gives dense output of order 5 with the weights that tableaus.py
-// finds. Preferred to the "most efficient" pair, whose nodes 0.9725, 0.9995, 1 lie so close that its weights reach 176
-// in the step and 1e5 in dense output: rounding then shows in gradients.
+// which the estimate needs. One more stage, in the middle, gives dense output of order 5; tableaus.py computes its
+// weights. The "most efficient" pair has the close nodes 0.9725, 0.9995, 1. Its weights reach 176 in the step and 1e5
+// in dense output, so that rounding shows in gradients.
 inline constexpr Tableau<9, 10> kVerner6{
     .name = "verner6",
     .order = 6,

@@ -123,7 +123,7 @@ double JumpWatch::value(const Function& f, const Program& p, double theta) {
   return p.value(inputs_, scratch_);
 }
 
-// The sign is s.now at `to`, and another one at `from`.
+// The sign is s.now at `to`, and the other one at `from`.
 bool JumpWatch::search(Function& f, Switch& s, double from, double to) {
   for (int i = 0; i < kBisections; ++i) {
     const double middle = 0.5 * (from + to);

@@ -1,10 +1,10 @@
-// Laws, components of forces and running costs that jump at an instant which parameters move. Frozen steps do not know
-// how the instant moves, so that derivatives leave out the jump times its rate: they are wrong, often 0.
+// Laws, components of forces and running costs that jump at an instant which parameters move. Frozen steps do not
+// follow the instant, so derivatives omit the jump times its rate: they are wrong, often 0.
 //
-// A value can jump only where one of its switches goes through zero (program_switches.hpp). Between two states, apart
-// by a millionth of the run at least, the first zero is found by bisection along the Hermite cubic. A jump keeps its
-// size at a hundredth of the distance from the zero; a continuous value does not. A later jump of the same function is
-// reported if it depends on more: on another parameter, or also on the motion.
+// A value can jump only where one of its switches goes through zero (program_switches.hpp). Between two states,
+// bisection along the Hermite cubic finds the first zero. The states are at least a millionth of the run apart. A jump
+// keeps its size at a hundredth of the distance from the zero; a continuous value does not. A later jump of the same
+// function is reported if it depends on more: on another parameter, or also on the motion.
 //
 //   JumpWatch watch(mechanism, settings, costs, motion);   // in runs with derivatives
 //   watch.begin({t0, y0, angles0}); watch.look_at({t1, y1, angles1}); ... watch.add_to(result.statistics);
@@ -33,28 +33,28 @@ class JumpWatch {
   void add_to(SimulationStatistics& statistics) const;
 
  private:
-  enum class Of { sensors, law, time };  // what the inputs are, beside parameters and t
+  enum class Of { sensors, law, time };  // the inputs beside parameters and t
   struct Switch {
     Program program;
     std::vector<int> parameters;  // active ones that it uses
     bool motion = false;          // it uses the state
-    double last = 0, now = 0;     // its sign, where it was not 0 last; at the instant in hand
+    double last = 0, now = 0;     // its last sign other than 0; its present sign
   };
   struct Function {
-    Jump jump;  // as far as it is known
+    Jump jump;  // the known part
     const Program* program;
     Of of;
     Forces::Place place;  // of a force with a law
     std::vector<Switch> switches;
-    std::vector<int> parameters;         // that its reported jumps name
+    std::vector<int> parameters;         // named by its reported jumps
     bool motion = false;                 // some of them name the motion
     bool is_new(const Switch& s) const;  // names more
   };
-  // switches: of the program.
+  // switches are those of the program.
   void add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of,
            Forces::Place place = {});
   void set_inputs(const Function& f, const StatePoint& at);
-  void place_at(double theta);  // between the last state and the one in hand: t_, y_
+  void place_at(double theta);  // sets t_, y_ between the last state and the present one
   void set_inputs_at(double theta, const Function& f);
   bool search(Function& f, Switch& s, double from, double to);  // whether a jump was reported
   double value(const Function& f, const Program& p, double theta);

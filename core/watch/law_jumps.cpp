@@ -43,7 +43,7 @@ LawJumps::Jump LawJumps::find(const TimeLaw& law, Of what, double t0, double t1)
   const auto difference = [&](const TimeLaw::Jet& from, const TimeLaw::Jet& to, double h) {
     return value(to) - value(from) - h / 2 * (rate(from) + rate(to));
   };
-  // A difference counts against the size of the law and of its change at its rate; else it is only rounding.
+  // A difference is compared with the size of the law and of its change at its rate; a smaller one is rounding.
   double size = std::max({std::abs(value(a)), std::abs(value(b)), (t1 - t0) * (std::abs(rate(a)) + std::abs(rate(b)))});
   if (what == Of::f_t) size = std::max(size, std::max(std::abs(a.f), std::abs(b.f)) / (t1 - t0));
   const double shortest = 1e-14 * std::max(std::abs(t0), std::abs(t1));

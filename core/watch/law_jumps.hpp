@@ -1,8 +1,8 @@
 // Jumps of the laws that drives prescribe, or of their rates: no motion of finite force follows them.
 //
 // Over an interval of length h a smooth f keeps  f1 - f0 - h (f0' + f1')/2  within h^3 f'''/12, and so does f' with its
-// own derivative; a jump keeps its size however short the interval. So an interval is halved, towards the larger
-// difference, until that vanishes or the interval does.
+// own derivative. A jump keeps its size in any short interval. So the search halves an interval, towards the larger
+// difference, until the difference or the interval vanishes.
 #pragma once
 
 #include <string>
@@ -16,7 +16,7 @@ class LawJumps {
  public:
   explicit LawJumps(const MechanismData& data);
 
-  // The law that jumps between t0 and t1, when and by how much, in words; empty: none does.
+  // Names the law that jumps between t0 and t1, the time and the size, in words; empty if none does.
   std::string between(double t0, double t1);
 
  private:
@@ -28,7 +28,7 @@ class LawJumps {
   Jump find(const TimeLaw& law, Of what, double t0, double t1);
 
   const MechanismData& data_;
-  std::vector<const RowLaw*> laws_;  // those of an expression: constants and splines are smooth
+  std::vector<const RowLaw*> laws_;  // expressions only: constants and splines are smooth
   std::vector<double> inputs_;       // all parameters, then t
   Program::Scratch scratch_;
 };

@@ -9,13 +9,13 @@
 namespace mbsopt {
 namespace {
 
-constexpr double kPoor = 1e-4;        // of the integral of |g| so far: an estimate above it asks for a look at the step
+constexpr double kPoor = 1e-4;        // of the integral of |g| so far: a larger estimate starts a search in the step
 constexpr double kNarrowest = 1e-12;  // of a step
 constexpr double kFalls = 0.03;       // |g| times width does by more over half of all halvings, up to |t|^-0.7
-constexpr double kBounded = 1e-7;     // of a step: a |g| that has not grown threefold there does not
+constexpr double kBounded = 1e-7;     // of a step: a |g| that has not grown threefold there is bounded
 constexpr int kPoints = 9, kMostSearches = 200;
 constexpr double kOffset = 0.471;      // not half: poles are at round times
-constexpr double kMetExactly = 1e-12;  // of what is met exactly but for that, estimates say nothing
+constexpr double kMetExactly = 1e-12;  // estimates below it are rounding
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
@@ -63,7 +63,7 @@ std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::sp
     integral.last_g = g_[0];
     power = 1;
   }
-  if (!(size > 0 && std::isfinite(size))) return {};  // what is not finite is said at the end
+  if (!(size > 0 && std::isfinite(size))) return {};  // the end of the run reports it
   integral.of_size += size;
   const double share = std::min(1.0, std::abs(difference) / size);
   const double error = size * std::pow(share, static_cast<double>(method_.order) / power);
@@ -79,7 +79,7 @@ std::string QuadratureWatch::look_at(const Step& step, std::size_t cost, std::sp
       costs_[cost].name.empty() ? "" : " of objective '" + costs_[cost].name + "'", t, t);
 }
 
-// The time of a pole within the step; kNone: there is none.
+// The time of a pole within the step, or kNone.
 double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
   const double h = step.h;
   const Eigen::Index n = step.y0.size() / 2;
@@ -115,18 +115,18 @@ double QuadratureWatch::pole(const Step& step, const PointCost& cost) {
 }
 
 void QuadratureWatch::add_to(SimulationStatistics& statistics) const {
-  // rounding: what errors are no larger than where they say nothing.
+  // Errors up to `rounding` have no meaning.
   const auto judge = [](const Integral& i, double of_size, double rounding, const Cost& cost, QuadratureError& worst) {
     if (i.error > worst.error * of_size && i.error > rounding) worst = {i.error / of_size, cost.name, i.worst_t};
   };
   for (std::size_t o = 0; o < costs_.size(); ++o) {
     const Cost& cost = costs_[o];
     const Integral& value = integrals_[kIntegrals * o];
-    // Exponentials are of any size.
+    // Exponentials have any size, so their rounding is relative.
     const double rounding = cost.is_extreme ? kMetExactly * value.of_size : kMetExactly;
     judge(value, value.of_size, rounding, cost,
           cost.is_extreme ? statistics.extreme_quadrature : statistics.quadrature);
-    // Both parts relative to their sum: one that is next to nothing beside the other does not matter.
+    // Both parts count relative to their sum: a part that is negligible beside the other does not matter.
     Integral motion = integrals_[kIntegrals * o + 1];
     const Integral& parameters = integrals_[kIntegrals * o + 2];
     motion.error *= end_ - start_, motion.of_size *= end_ - start_;

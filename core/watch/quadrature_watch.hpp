@@ -1,19 +1,20 @@
-// Integrals of running costs that the steps do not resolve: they are sums over nodes of steps that only the motion
-// asked for.
+// Integrals of running costs that the steps do not resolve. They are sums over nodes of steps whose size the motion
+// alone determines.
 //
 // In each step g at the method's m nodes c_1..c_m has a highest divided difference, which vanishes for polynomials of
 // degree below m - 1 (a null rule: Laurie, "Practical error estimation in numerical integration", J. Comput. Appl.
-// Math. 12, 1985). It is scaled to be the difference of the b_i to a rule that leaves one node out:
-// min_i |e_i / b_i| = 1. With S = h sum_i |b_i g_i| and its share r = min(1, h |sum_i e_i g_i| / S), the error is
-// estimated as S r^(p/(m - 1)), p the order of the method: what a smooth g leaves. A method of one node is compared
-// with the node before, m = 2.
+// Math. 12, 1985). Its scale makes it the difference of the b_i from a rule without one node: min_i |e_i / b_i| = 1.
+// With S = h sum_i |b_i g_i| and its share r = min(1, h |sum_i e_i g_i| / S), the error is estimated as S r^(p/(m -
+// 1)), p the order of the method: the error for a smooth g. A method of one node is compared with the node before, m =
+// 2.
 //
-// Derivatives of psi are integrals of g_y y' + g_rho, which may be unresolved where g is not (sqrt(|x|) through zero).
-// Only one of the two sweeps knows the directions y'. ydot and rho stand for them: g_y ydot and g_rho rho are estimated
-// like g (gradient_quadrature.hpp).
+// Derivatives of psi are integrals of g_y y' + g_rho. They may be unresolved where g is not (sqrt(|x|) through zero).
+// Only one of the two sweeps knows the directions y'. Instead, ydot and rho replace them: the errors of g_y ydot and
+// g_rho rho are estimated like that of g (gradient_quadrature.hpp).
 //
-// Where that is much, a pole is looked for: the interval is halved around the largest |g| along the step's Hermite
-// cubic. If |g| times the interval's length does not fall, |g| grows at least like 1/|t - t*|, which has no integral.
+// If the error is large, the watch searches for a pole. It halves the interval around the largest |g| along the step's
+// Hermite cubic. If |g| times the interval's length does not fall, |g| grows at least like 1/|t - t*|, which has no
+// integral.
 #pragma once
 
 #include <Eigen/Core>
@@ -34,8 +35,8 @@ class QuadratureWatch {
   enum class Of { value, along_motion, along_parameters };  // g, g_y ydot, g_rho rho
   static constexpr std::size_t kIntegrals = 3;              // of each cost
 
-  // After each step, the integrand at each node (Method::nodes), of each cost that runs. In words, what ends the run;
-  // empty: nothing.
+  // Call this after each step with the integrand of each running cost at each node (Method::nodes). Returns a reason to
+  // end the run, in words, or an empty string.
   std::string look_at(const Step& step, std::size_t cost, std::span<const double> g, Of what = Of::value);
 
   void add_to(SimulationStatistics& statistics) const;
@@ -58,7 +59,7 @@ class QuadratureWatch {
   std::vector<Node> nodes_;
   std::vector<int> node_of_;  // of each node of the method; -1: has no weight
   std::vector<Integral> integrals_;
-  double start_ = 0, end_ = 0;  // of all steps [s], which come forward or backward
+  double start_ = 0, end_ = 0;  // of all steps [s], which go forward or backward
   std::vector<double> g_;       // at the nodes
   Eigen::VectorXd y_;
 };

@@ -13,13 +13,13 @@ namespace mbsopt {
 namespace {
 
 constexpr double kUnmetAcceleration = 1e-3;                 // relative, of accelerations
-constexpr double kGrown = 0.5;                              // of the energy there is
-constexpr double kNoticeableChange = 1e-3;                  // of the natural energy: below it a change is none
+constexpr double kGrown = 0.5;                              // of the total energy
+constexpr double kNoticeableChange = 1e-3;                  // of the natural energy: smaller changes are ignored
 constexpr double kFastest = 299792458, kFastestTurn = 1e6;  // light [m/s]; ten times the fastest turbine [rad/s]
-constexpr double kGrowth = 1e3;                             // of what is faster from the start
+constexpr double kGrowth = 1e3;                             // of the largest speed at the start
 constexpr double kHalfTurn = 3.13;  // [rad]: nearer, the axis of the rotation may reverse within two hundredths
 
-// The energy of a motion by its own size: a scale, for runs that begin at rest where the potential is zero.
+// The natural size of the energy of a motion. It is a scale for runs that begin at rest at zero potential.
 double natural_energy(const MechanismData& d, const Eigen::VectorXd& y) {
   double sum = 0;
   for (int i = 1; i <= d.n; ++i) {
@@ -70,7 +70,7 @@ std::string RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& en
   return about_bushings(t, y);
 }
 
-// Between two steps a rotation vector reverses either through zero or, where that is farther, through half a turn.
+// Between two steps a rotation vector reverses through zero or, if zero is farther, through half a turn.
 std::string RunGuard::about_bushings(double t, const Eigen::VectorXd& y) {
   for (std::size_t k = 0; k < bushing_turns_.size(); ++k) {
     const Bushing& b = data_.forces.of<Bushing>()[k];

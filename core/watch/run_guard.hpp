@@ -1,10 +1,10 @@
-// Signs in an accepted step that make a run's numbers worthless although all of them are finite. Asked after each
-// step; an objection ends the run, in words.
+// Signs in an accepted step that make a run's numbers worthless although all of them are finite. The run asks after
+// each step. An objection ends the run, in words:
 //   - the law of a drive jumps, or its rate does (law_jumps.hpp)
 //   - the energy of a mechanism on which nothing does work has grown by half of all it has
 //   - the accelerations of the constraints were not met
-//   - a body is faster than anything is
-//   - a bushing has come to half a turn, where its torque jumps (bushing.hpp)
+//   - a body is faster than any real one
+//   - a bushing has reached half a turn, where its torque jumps (bushing.hpp)
 #pragma once
 
 #include <string>
@@ -19,14 +19,14 @@ class RunGuard {
  public:
   explicit RunGuard(const MechanismData& data);
 
-  // At the start of a run to t_end in at most so many steps, which has to take one in each half turn of a body at
-  // least. Empty: none.
+  // Call this at the start of a run to t_end in at most max_steps steps. It needs at least one step in each half turn
+  // of a body. Returns an objection or an empty string.
   std::string begin(double t, const Eigen::VectorXd& y, const Energy& energy, double t_end, long max_steps);
-  // After a step: its end, the state and the energy there, and the largest relative residual of the constraints'
-  // accelerations so far. Empty: none.
+  // Call this after a step with its end, the state and the energy there, and the largest relative residual of the
+  // constraints' accelerations so far. Returns an objection or an empty string.
   std::string objection(double t, const Eigen::VectorXd& y, const Energy& energy, double acceleration_residual);
 
-  // Largest change of the energy relative to the largest energy, where nothing does work; else 0.
+  // The largest change of the energy relative to the largest energy, if nothing does work; else 0.
   double relative_energy_drift() const;
 
  private:

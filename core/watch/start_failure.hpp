@@ -1,4 +1,4 @@
-// Why a run cannot begin: no accelerations at its start. In words, with what to change.
+// The reason why a run cannot begin without accelerations at its start, in words, with a remedy.
 #pragma once
 
 #include <string>

@@ -1,16 +1,16 @@
-// Whether the steps of an explicit method are as large as accuracy allows, or only as large as stability does: the
-// scene is stiff for it. Looks at stages that the step has computed anyway.
+// Whether accuracy or stability limits the steps of an explicit method; stability limits them if the scene is stiff.
+// The watch uses stages that the step has computed anyway.
 //
 //   |lambda| ~ |f(t, Y_b) - f(t, Y_a)| / |Y_b - Y_a|      Y_a, Y_b: two stages at the same time
 //
-// An eigenvalue of f_y, the fastest one where the motion is stiff: its mode is what the two differ by (power
-// iteration). A step is limited by stability where h |lambda| is near to the end of the stability region on the real
-// axis, |R(-x)| <= 1, R of the method's own table; far beyond it no step would have been accepted, and the quotient is
-// of something else. Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.2, "automatic
+// This is an eigenvalue of f_y, the fastest one if the motion is stiff: the two stages differ by its mode (power
+// iteration). Stability limits a step if h |lambda| is near the end of the stability region on the real axis. The
+// region is |R(-x)| <= 1, R of the method's own table. Far beyond it no step would have been accepted, so the quotient
+// has another cause. Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.2, "automatic
 // stiffness detection"; as in their DOPRI5 and DOP853.
 //
-// Pairs: dopri5 and verner6 have two stages at the end of the step; dopri853 has one there, which is compared with the
-// first stage of the next step. rk2 and bs3 have none that says anything, and implicit methods have no such limit.
+// Pairs: dopri5 and verner6 have two stages at the end of the step. For dopri853 it is one stage there, compared with
+// the first stage of the next step. Methods rk2 and bs3 have no useful pair, and implicit methods have no such limit.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,12 +21,13 @@
 
 namespace mbsopt {
 
-// The largest x with |R(-x')| <= 1 for all x' in [0, x]; explicit methods only.
+// The largest x with |R(-x')| <= 1 for all x' in [0, x], for explicit methods.
 double real_stability_boundary(const Method& rk);
 
 class StiffnessWatch {
  public:
-  // Of the boundary: what h |lambda| is in limited steps. Step-size control lets it vary about and below the boundary.
+  // Limits of h |lambda| in limited steps, as parts of the boundary. Step-size control varies it about and below the
+  // boundary.
   static constexpr double kNear = 0.6, kBeyond = 1.3;
 
   StiffnessWatch(const Method& rk, Eigen::Index states);
@@ -48,16 +49,16 @@ class StiffnessWatch {
   double stiffest_ = 0;
 };
 
-// Whether most steps were limited by stability, of as many as stiff motion takes.
+// Whether stability limited most steps, and as many as stiff motion takes.
 bool is_stability_limited(const SimulationStatistics& statistics);
-// Whether as many were, a tenth of a long run, as can make the derivatives of these steps wrong: a stretch of them
-// does.
+// Whether stability limited enough steps to make their derivatives wrong: a stretch of them suffices, a tenth of a long
+// run.
 bool may_spoil_derivatives(const SimulationStatistics& statistics);
 
-// "the step is limited by stability in 93 % of the steps ..." with what to do; empty where it is in too few of them.
-// differentiated: whether derivatives of these very steps are taken. They are exact, and may be wrong by orders as
-// derivatives of the motion: a mode that has decayed to rounding grows by |R| > 1 until its error reaches the
-// tolerance, and derivatives, which no step-size control looks at, grow with it from wherever they are.
+// "the step is limited by stability in 93 % of the steps ..." with a remedy; empty if there are too few such steps. Set
+// differentiated if derivatives of these very steps are taken. They are exact, but may be wrong by orders as
+// derivatives of the motion. A mode that has decayed to rounding grows by |R| > 1 until its error reaches the
+// tolerance. Derivatives grow with it from any size, because no step-size control looks at them.
 std::string stiffness_warning(const SimulationStatistics& statistics, const std::string& integrator,
                               bool differentiated);
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kThroughZero = 1e-3;  // of the length at the ends of the step
 
-// Without free length, actuator and damper the force is k d, smooth at zero length, too. A law is asked there.
+// Without free length, actuator and damper the force is k d, smooth at zero length, too. A law is evaluated there.
 double pull_at_zero(const TsdaForce& f, double t, const Eigen::VectorXd& rho) {
   if (!f.law.program) return f.law.f0 - f.law.k * f.law.x0;
   Law::Scratch scratch;
@@ -22,7 +22,7 @@ double pull_at_zero(const TsdaForce& f, double t, const Eigen::VectorXd& rho) {
   return f.law.value(t, rho, 0, 0, scratch);
 }
 
-// Least distance from the origin along the cubic through d0, d1 with the rates given, over h.
+// The least distance from the origin along the cubic through d0, d1 with the given rates, over h.
 double closest(const Vector3d& d0, const Vector3d& rate0, const Vector3d& d1, const Vector3d& rate1, double h) {
   const auto distance = [&](double x) {
     const double x2 = x * x, x3 = x2 * x;

@@ -1,5 +1,5 @@
-// A tsda that goes through zero length with a force: its direction turns round at once. The motion goes on rightly, by
-// small steps; its derivatives do not, since how the moment of the jump moves is not among the steps' derivatives.
+// A tsda that passes zero length with a force reverses its direction at once. The motion stays right with small steps.
+// Its derivatives do not: they omit how the moment of the jump moves.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,7 +9,7 @@
 
 namespace mbsopt {
 
-// Between two states, a step apart: which spring did, in words; empty: none.
+// Names the spring that did so between two states, a step apart, in words; empty if none did.
 std::string through_zero_length(const MechanismData& data, double t0, const Eigen::VectorXd& y0, double t1,
                                 const Eigen::VectorXd& y1);
 

@@ -52,7 +52,7 @@ class ContinuousComparison {
   }
 
  private:
-  // The type that gets through: Adams' method, and BDF where stiffness is in its way.
+  // Returns the derivatives by Adams' method, or by BDF if stiffness stops Adams' method.
   std::optional<MatrixXd> by_cvodes() {
     std::vector<std::string> types{"cvodes_adams", "cvodes_bdf"};
     if (stiff_) types.erase(types.begin());
@@ -84,14 +84,15 @@ class ContinuousComparison {
   std::optional<MatrixXd> gradients(const std::string& type, double rtol, GradientMethod by, std::string* message) {
     constexpr long kManyTimes = 200, kAtLeast = 50'000;
     Scene scene = scene_;
-    // Without projection: CVODES has none, and one of penalty has a motion of its own.
+    // CVODES has no projection, and the projection of a penalty formulation has a motion of its own. So neither side
+    // projects.
     FormulationSettings& formulation = scene.simulation.formulation;
     if (formulation.type == FormulationType::penalty) formulation.projection = Projection::none;
     IntegratorSettings& s = scene.simulation.integrator;
     if (s.type != type) s.options = {};  // the other method's
     s.type = type;
     s.step.reset();
-    // Steps of CVODES say nothing about those of another method.
+    // The number of CVODES' steps tells nothing about those of another method.
     const long steps = is_cvodes(scene_.simulation.integrator.type) ? 0 : options_.typical_steps;
     scene = with_errors_times(rtol / s.rtol, std::move(scene), steps);
     s.max_steps = std::min(s.max_steps, std::max(kAtLeast, kManyTimes * options_.typical_steps));
@@ -105,8 +106,8 @@ class ContinuousComparison {
     return e.psi_rho;
   }
 
-  // Where the two differ, a second pair of runs at ten times tighter tolerances (looser, where those are out of reach)
-  // judges, and what it changes is the integrators' error.
+  // If the two differ, a second pair of runs at ten times tighter tolerances decides (looser ones if those are out of
+  // reach). Its change is the integrators' error.
   void compare(const MatrixXd& continuous, const MatrixXd& discrete) {
     set_entries(continuous, discrete, MatrixXd::Zero(continuous.rows(), continuous.cols()));
     if (result_.passed()) return;
@@ -149,8 +150,8 @@ class ContinuousComparison {
             std::max({std::abs(e.discrete), std::abs(e.continuous), options_.floor * largest / size(k)});
         const double apart = std::abs(e.continuous - e.discrete);
         e.difference = apart == 0 ? 0 : apart / entry;
-        // To the integrators an objective below atol is zero. A parameter that changes it by less than its error, when
-        // it changes by its own size, changes nothing.
+        // For the integrators an objective below atol is zero. A parameter has no effect if a change by its own size
+        // changes the objective by less than its error.
         const double atol = scene_.simulation.integrator.atol * result_.rtol / scene_.simulation.integrator.rtol;
         const double psi = std::abs(psi_(i)), nothing = (psi < atol ? atol : result_.rtol * psi) / size(k);
         e.verdict = verdict_of(e.continuous, error(i, k) + nothing, e.discrete, entry, options_.threshold);

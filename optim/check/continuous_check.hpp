@@ -1,6 +1,6 @@
 // A second opinion on gradients: the sensitivities of the differential equation by CVODES against the discrete
-// derivatives, both at tolerances tight enough for them to be the same number. They share the derivatives of single
-// terms, and assembly; not the steps, the projection, the dense output, the quadrature of running costs.
+// derivatives. Both have tolerances tight enough to be the same number. They share the derivatives of single terms, and
+// assembly. They do not share the steps, the projection, the dense output, and the quadrature of running costs.
 //
 //   const ContinuousCheck check = check_continuous(scene, objectives);
 //   if (check.ran) std::cout << check.method << ": " << check.worst_difference();
@@ -44,13 +44,14 @@ struct ContinuousCheckOptions {
   double rtol = 1e-9;  // or the scene's, where that is tighter
   double threshold = 1e-6;
   double floor = 1e-3;     // entries below this part of the largest are compared to that part
-  long typical_steps = 0;  // of the scene's own run, 0: unknown; CVODES gives up at many times these
+  long typical_steps = 0;  // of the scene's own run, 0: unknown; CVODES ends at many times these
   std::vector<std::shared_ptr<const UserForce>> user_forces = {};
   std::function<bool(double t)> progress = {};
 };
 
-// At the parameters' values in the scene, in all parameters. Where an entry is off by more than the threshold, both
-// sides run once more at ten times tighter tolerances, and these judge; what that changes excuses what is still off.
+// Checks the gradients in all parameters at their values in the scene. If an entry is off by more than the threshold,
+// both sides run once more at ten times tighter tolerances, and these decide. The change between the runs excuses the
+// rest.
 ContinuousCheck check_continuous(const Scene& scene, const std::vector<Objective>& objectives,
                                  const ContinuousCheckOptions& options = {});
 

@@ -109,7 +109,7 @@ class Check {
     return true;
   }
 
-  // Steps that end at kinks lose them as a parameter moves these: differences need steps of their own then.
+  // Steps that end at kinks miss them when a parameter moves the kinks. Differences then need steps of their own.
   Eigen::Array<bool, Eigen::Dynamic, 1> parameters_on_frozen_steps() {
     const Mechanism mechanism(scene_, rho_, {}, options_.user_forces);
     std::vector<Cost> costs;
@@ -181,7 +181,7 @@ class Check {
     set_ratio(result_.frozen_cost), set_ratio(result_.free_cost);
   }
 
-  // Repeats differences that disagree, by smaller steps. Returns whether one of them changed.
+  // Repeats differences that disagree with smaller steps. Returns whether one of them changed.
   bool difference_finer() {
     bool found = false;
     for (Index k = 0; k < rho_.size(); ++k) {
@@ -230,7 +230,8 @@ class Check {
     rounding_known_ = true;
   }
 
-  // Entries that CVODES disagrees with, within the rounding of the discrete ones, which parts TLM and adjoint, too.
+  // Excuses entries in which CVODES differs by no more than the rounding of the discrete ones, which separates TLM and
+  // adjoint, too.
   void excuse_rounding(ContinuousCheck& check) {
     if (check.passed() || !result_.discrete) return;
     if (!rounding_known_) measure_rounding();
@@ -245,7 +246,7 @@ class Check {
     }
   }
 
-  // Where rounding is what methods differ by, and the formulation is why there is so much.
+  // Warns if methods differ by rounding, and the formulation causes it.
   void say_rounding() {
     const FormulationSettings& f = scene_.simulation.formulation;
     if (f.type != FormulationType::penalty || f.linear_solver != LinearSolver::cholesky) return;
@@ -386,7 +387,7 @@ class Check {
   VectorXd rho_, size_;
   StepSequence steps_;
   std::optional<GradientDifferences> differences_;
-  RoundingScatter rounding_;  // where it was measured; else 0
+  RoundingScatter rounding_;  // 0 if it was not measured
   bool rounding_known_ = false;
   std::mt19937 generator_{options_.seed};
   GradientCheck result_;

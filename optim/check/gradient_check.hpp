@@ -1,17 +1,17 @@
-// Are the gradients right? Every method against every other, for every objective and parameter.
+// Are the gradients right? The check compares every method with every other, for every objective and parameter.
 //
 //   exact        tangent-linear model (TLM) and adjoint: the derivatives of the same numbers, agree to rounding
 //   frozen       central differences, Richardson-extrapolated over a ladder of steps, on the accepted time steps of the
 //                base run: the same function the exact methods differentiate
-//   free         the same with step-size control at work: what a user of differences would get; judged within what
-//                the integrator's error lets them say
+//   free         the same with step-size control: the differences that a user would take; judged within the limits of
+//                the integrator's error
 //   identity     for random directions d and weights w: w'(psi_rho d) by TLM = (psi_rho' w)'d by adjoint
 //   Taylor       |psi(rho + h d) - psi(rho) - h psi_rho d| falls as h^2 along a random d, on frozen steps
 //   continuous   sensitivities of the differential equation by CVODES, at tolerances of its own (continuous_check.hpp)
 //
-// A scene whose integrator is CVODES has no discrete derivatives, and its steps cannot be frozen: its forward and
-// adjoint sensitivities stand in the places of TLM and adjoint and agree to `continuous`; frozen, identity and Taylor
-// are left out.
+// A scene whose integrator is CVODES has no discrete derivatives, and its steps cannot be frozen. Its forward and
+// adjoint sensitivities replace TLM and adjoint and must agree to `continuous`. The check omits frozen, identity and
+// Taylor.
 //
 //   const GradientCheck check = check_gradients(problem);
 //   for (const CheckedEntry& e : check.entries) std::cout << e.parameter << ' ' << e.adjoint << ' ' << e.frozen;
@@ -36,17 +36,17 @@
 
 namespace mbsopt {
 
-// How far methods may differ. docs/gradient-check.md says why these figures.
+// The limits of the differences between methods. docs/gradient-check.md gives the reasons for these figures.
 struct CheckThresholds {
   double tlm_adjoint = 1e-10;  // relative to the entry, or to rounding_floor times the gradient's size
   double frozen = 1e-7;        // relative to the entry, or within the differences' own error where that hides the entry
   double free = 1e-7;          // the same, or within own error and integration error (integration_error.hpp)
   double identity = 1e-10;     // relative to the sum of the terms' sizes
   double taylor_slope = 1.9;   // at least, 2 in theory
-  // Entries below this part of the largest (each times its parameter's size) are compared to that part: they are
-  // differences of numbers so much larger, and carry their rounding.
+  // Entries below this part of the largest (each times its parameter's size) are compared to that part. They are
+  // differences of numbers so much larger, with the rounding of these.
   double rounding_floor = 1e-3;
-  // Of CVODES: relative to the entry or to rounding_floor's part, or within the integration errors.
+  // The limit for CVODES: relative to the entry or to rounding_floor's part, or within the integration errors.
   double continuous = 1e-6;
 };
 
@@ -59,8 +59,8 @@ struct CheckedEntry {
   double frozen_difference = 0;           // |frozen - tlm| relative to the entry
   double free_difference = 0;             // |free - tlm| relative to the entry
   Verdict exact = Verdict::disagrees;     // TLM against adjoint
-  std::optional<Verdict> frozen_verdict;  // where steps can be frozen
-  std::optional<Verdict> free_verdict;    // where free differences were asked for
+  std::optional<Verdict> frozen_verdict;  // set if steps can be frozen
+  std::optional<Verdict> free_verdict;    // set if free differences were requested
   std::vector<LadderRung> rungs;          // h falling
 };
 
@@ -81,11 +81,11 @@ struct GradientCheck {
   std::vector<TaylorCheck> taylor;
   std::vector<IdentityCheck> identities;
   bool discrete = true;                       // false: tlm and adjoint are sensitivities by CVODES
-  std::optional<ContinuousCheck> continuous;  // where it was asked for
+  std::optional<ContinuousCheck> continuous;  // set if requested
   MethodCost simulation, tlm_cost, adjoint_cost, frozen_cost, free_cost;  // differences: of all of them
   int timing_rounds = 0;
   SimulationStatistics statistics;       // of the base run
-  std::vector<std::string> warnings;     // of the base run, and what explains disagreement; sentences
+  std::vector<std::string> warnings;     // of the base run, and explanations of disagreement, in sentences
   std::vector<std::string> wrong_terms;  // of forces and costs written in C++ (user_terms.hpp), sentences
   long simulations = 0;
   bool passed() const;

@@ -17,7 +17,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr int kJumpRungs = 3;  // the smallest: further off, frozen steps have errors of their own
 
-// Whether all runs that the difference is made of took the steps of the base run.
+// Whether all runs of the difference took the steps of the base run.
 bool on_base_steps(const VectorXd& largest, Index i, double other_steps) { return largest(i) < 0.75 * other_steps; }
 
 }  // namespace
@@ -41,9 +41,9 @@ std::string GradientDifferences::take(Index k, bool frozen) {
   return found.d.derivative.hasNaN() ? found.failure : "";
 }
 
-// Steps that are coarse for psi may show a plateau that is no derivative (a coordinate of kilometres, of which metres
-// matter). A ladder that begins below the first holds if it contradicts it by more than its own error: smaller steps
-// magnify rounding and jumps, which must not excuse a wrong gradient.
+// Steps that are coarse for psi may show a plateau that is no derivative (for example a coordinate of kilometres where
+// metres matter). A ladder that begins below the first one replaces it if they differ by more than its own error.
+// Smaller steps magnify rounding and jumps, which must not excuse a wrong gradient.
 bool GradientDifferences::take_finer(Index k, bool frozen, const std::vector<Index>& objectives,
                                      const VectorXd& psi_rounding) {
   if (objectives.empty()) return false;
@@ -60,7 +60,7 @@ bool GradientDifferences::take_finer(Index k, bool frozen, const std::vector<Ind
   return found;
 }
 
-// By steps of `largest` and below.
+// Takes steps of `largest` and below.
 GradientDifferences::Ladder GradientDifferences::ladder(Index k, bool frozen, double largest) {
   Ladder ladder;
   const auto f = [&](double h) -> std::optional<VectorXd> {
@@ -106,10 +106,10 @@ double GradientDifferences::own_error(const Ladder& ladder, Index i, Index k, bo
   return ladder.d.error(i) + psi_rounding / step + (same_steps ? 0 : integration_error_of(i, k, step));
 }
 
-// Free differences differ from the derivatives of the numbers on frozen steps by the derivative of the integration
-// error, and carry its jumps from step sequence to step sequence, divided by the step. The smallest steps show the size
-// of the jumps, too, where both differences were taken. Where all runs of an entry took the steps of the base run, as
-// rounded ones often do (step_control.hpp), it is as good as one on frozen steps.
+// Free differences differ from the derivatives on frozen steps by the derivative of the integration error. They also
+// contain its jumps from step sequence to step sequence, divided by the step. The smallest steps show the size of the
+// jumps if both differences exist. If all runs of an entry took the steps of the base run, the entry is as good as one
+// on frozen steps. Rounded steps often coincide so (step_control.hpp).
 void GradientDifferences::add(IntegrationError integration) {
   integration_ = std::move(integration);
   if (!settings_.free_steps) return;

@@ -1,5 +1,5 @@
-// Differences of all objectives in all parameters for the gradient check: on the accepted steps of the base run
-// (frozen) and with step-size control at work (free), each by a ladder of steps whose values are kept.
+// Differences of all objectives in all parameters for the gradient check. The frozen ones use the accepted steps of the
+// base run, the free ones step-size control. Each uses a ladder of steps whose values are kept.
 //
 //   GradientDifferences differences(base, settings, run);
 //   const std::string failure = differences.take(k, true);       // in parameter k, on frozen steps
@@ -21,9 +21,9 @@
 
 namespace mbsopt {
 
-// psi carries the rounding of all steps: some units in the last place of the largest numbers it is made of.
+// psi carries the rounding of all steps: some units in the last place of the largest numbers in it.
 inline constexpr double kPsiRounding = 100 * std::numeric_limits<double>::epsilon();
-// psi(h) + psi(-h) - 2 psi(0), divided by h, falls to 1/2 from 2h to h where psi is smooth, and stays at a kink.
+// psi(h) + psi(-h) - 2 psi(0), divided by h, halves from 2h to h where psi is smooth, and is constant at a kink.
 inline constexpr double kKinkFalls = 0.75;
 
 // Central differences (psi(h) - psi(-h))/(2 h) before extrapolation; NaN where they were not evaluated.
@@ -49,7 +49,7 @@ class GradientDifferences {
   };
   using Run = std::function<Evaluation(const Eigen::VectorXd& rho, bool frozen)>;
 
-  // Objective x parameter. Where a difference was not taken: 0, or NaN on frozen steps that do not serve.
+  // Objective x parameter. An entry without a difference is 0, or NaN on frozen steps that do not serve.
   struct Table {
     Eigen::MatrixXd derivative, error, step;
   };
@@ -57,24 +57,24 @@ class GradientDifferences {
   GradientDifferences(Base base, const Settings& settings, Run run);
 
   bool takes(Eigen::Index k, bool frozen) const { return frozen ? base_.on_frozen_steps(k) : settings_.free_steps; }
-  // Sets column k. Returns the message of a run that failed, if a derivative could not be found.
+  // Sets column k. If it finds no derivative, it returns the message of a failed run.
   std::string take(Eigen::Index k, bool frozen);
-  // Takes the entries of these objectives in k by smaller steps, where those contradict the entries by more than their
-  // own error. Returns whether one did. psi_rounding: of each objective.
+  // Replaces the entries of these objectives in k by those of smaller steps, if they differ by more than their own
+  // error. Returns whether one changed. psi_rounding has an entry per objective.
   bool take_finer(Eigen::Index k, bool frozen, const std::vector<Eigen::Index>& objectives,
                   const Eigen::VectorXd& psi_rounding);
-  // Adds the integrator's errors to those of free differences, from now on.
+  // Adds the integrator's errors to those of free differences from now on.
   void add(IntegrationError integration);
 
   const Table& of(bool frozen) const { return frozen ? frozen_ : free_; }
   const IntegrationError& integration() const { return integration_; }
   bool on_frozen_steps(Eigen::Index k) const { return base_.on_frozen_steps(k); }
-  // The differences of each parameter step by relative_step times this: its size, or less where finer ones hold.
+  // The differences of each parameter step by relative_step times this: its size, or less if finer ones replaced them.
   const Eigen::VectorXd& size_of_steps() const { return size_of_steps_; }
 
   std::vector<LadderRung> rungs(Eigen::Index i, Eigen::Index k) const;
-  // b in  psi(+-h) = psi + s h +- b h + O(h^2)  beside a kink, whose slopes at its two sides are s - b and s + b. NaN
-  // where psi_i is smooth in k.
+  // Returns b in  psi(+-h) = psi + s h +- b h + O(h^2)  at a kink, whose slopes on its two sides are s - b and s + b.
+  // It is NaN if psi_i is smooth in k.
   double kink(Eigen::Index i, Eigen::Index k, bool frozen, double psi_rounding) const;
 
  private:
@@ -97,9 +97,9 @@ class GradientDifferences {
   IntegrationError integration_;
   Eigen::VectorXd size_of_steps_;
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> on_base_steps_;  // a free difference
-  // psi at h and -h on frozen and free steps, by the parameter and |h|.
+  // psi at h and -h on frozen and free steps, by parameter and |h|.
   std::map<std::pair<Eigen::Index, double>, std::array<std::array<Eigen::VectorXd, 2>, 2>> rungs_;
-  Eigen::MatrixXd jump_;  // of psi, between the steps of the base run and those chosen anew
+  Eigen::MatrixXd jump_;  // of psi, between the steps of the base run and free steps
 };
 
 }  // namespace mbsopt

@@ -24,7 +24,7 @@ GradientTiming time_gradients(const Scene& scene, const std::vector<Objective>& 
                               const GradientTimingOptions& options) {
   GradientTiming timing;
   const Eigen::VectorXd rho = parameter_values(scene);
-  // A fresh evaluator has no point that it could return again.
+  // A new evaluator has no stored point to return.
   const auto timed = [&](GradientMethod method) {
     const bool derivatives = method != GradientMethod::automatic;
     Evaluator evaluator(scene, objectives, {}, {method, {}, options.user_forces, options.progress, derivatives});

@@ -1,8 +1,7 @@
-// The cost of gradients, in simulations. One simulation is a run with the same objectives, at the same parameters and
-// tolerances, as `simulate` takes it: compiling the mechanism, assembly and time integration, implicit stages to the
-// tolerance of the run. (Runs with derivatives solve them to 1e-12, which is part of their cost.) Simulation, TLM
-// and adjoint run in turn; a ratio is the median over the rounds of that round's ratio, so that it holds on a busy
-// machine.
+// The cost of gradients, in simulations. One simulation is a run of `simulate` with the same objectives, parameters and
+// tolerances. It compiles the mechanism, assembles it and integrates in time, with implicit stages to the tolerance of
+// the run. Runs with derivatives solve the stages to 1e-12, which is part of their cost. Simulation, TLM and adjoint
+// run in turn. A ratio is the median of the ratios of all rounds, so that it holds on a busy machine.
 //
 //   const GradientTiming timing = time_gradients(problem.scene, objectives_of(problem));
 //   timing.adjoint.ratio;     // 2.6
@@ -42,7 +41,7 @@ struct GradientTiming {
   long steps = 0, rhs_evaluations = 0;  // of one simulation
 };
 
-// At the parameters' values in the scene, with derivatives in all parameters.
+// Measures at the parameters' values in the scene, with derivatives in all parameters.
 GradientTiming time_gradients(const Scene& scene, const std::vector<Objective>& objectives,
                               const GradientTimingOptions& options = {});
 

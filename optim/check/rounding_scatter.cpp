@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-// Masses, places, rates and points, each by a relative change of its own of at most `largest`, so that none cancel.
+// Changes masses, places, rates and points, each by its own relative change of at most `largest`, so that none cancel.
 Scene with_numbers_changed(Scene scene, double largest, unsigned seed) {
   std::mt19937 generator{seed};
   std::uniform_real_distribution<double> change(-largest, largest);
@@ -32,7 +32,7 @@ Scene with_numbers_changed(Scene scene, double largest, unsigned seed) {
   return scene;
 }
 
-// Notes how f(units, method) differs between points some units in the last place away.
+// Records how f(units, method) differs between points some units in the last place apart.
 template <class F>
 void note(F&& f, RoundingScatter& scatter) {
   for (const GradientMethod method : {GradientMethod::tlm, GradientMethod::adjoint}) {
@@ -65,7 +65,7 @@ RoundingScatter rounding_scatter(const RoundingBase& base, const RoundingRuns& r
         return runs.of(with_numbers_changed(base.scene, units * kUnit, base.seed), method);
       },
       scatter);
-  // A parameter that changes psi by less than its rounding, when it changes by its own size, has no other part in it.
+  // A parameter has no further effect if a change by its own size changes psi by less than its rounding.
   scatter.psi_rho = scatter.psi_rho.cwiseMax(scatter.psi * base.size.cwiseInverse().transpose());
   return scatter;
 }

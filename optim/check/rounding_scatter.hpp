@@ -1,7 +1,7 @@
-// How far rounding scatters psi and psi_rho over points that are some units in the last place apart: a few, or some
-// 10^4, which coordinates at 1 km take for one. Each side of rho is looked at alone, since a kink at rho parts the
-// sides and is no rounding. Parameters that move nothing show none of it, so that the scene's own numbers are changed
-// as well.
+// The scatter by rounding of psi and psi_rho over points that are some units in the last place apart. It takes a few
+// units, or some 10^4, which are one unit for coordinates at 1 km. It treats each side of rho alone, since a kink at
+// rho separates the sides and is no rounding. Parameters without effect show no rounding, so the scene's own numbers
+// change as well.
 //
 //   const RoundingScatter scatter = rounding_scatter(base, {at, of});     // some 60 runs
 #pragma once
@@ -20,7 +20,7 @@ struct RoundingScatter {
   long simulations = 0;
 };
 
-// The point at which scatter is measured. size: of each parameter, as differences take it.
+// The point at which scatter is measured. size is that of each parameter in differences.
 struct RoundingBase {
   const Scene& scene;
   Eigen::VectorXd rho, size, psi;

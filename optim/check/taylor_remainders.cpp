@@ -18,8 +18,8 @@ double slope_between(const TaylorRung& a, const TaylorRung& b, Eigen::Index obje
   return std::log(a.remainder(objective) / b.remainder(objective)) / std::log(a.h / b.h);
 }
 
-// A remainder that falls as h or faster leaves 1/4096 of itself at the smallest two h; more is rounding, unless it
-// falls as h^2 to the last.
+// A remainder that falls as h or faster leaves 1/4096 of itself at the smallest two h. A larger one is rounding, unless
+// it falls as h^2 to the last.
 double left_at_the_end(const std::vector<TaylorRung>& rungs, Eigen::Index objective, double least_slope) {
   const std::size_t n = rungs.size();
   const auto falls = [&](std::size_t j) { return slope_between(rungs[j - 1], rungs[j], objective) >= least_slope; };
@@ -30,7 +30,7 @@ double left_at_the_end(const std::vector<TaylorRung>& rungs, Eigen::Index object
   return left;
 }
 
-// Large h has terms of higher order: the later slopes tell. What grows as h falls is rounding.
+// Large h have terms of higher order, so the later slopes count. A part that grows as h falls is rounding.
 std::optional<double> slope_of(const std::vector<TaylorRung>& rungs, Eigen::Index objective, double least_slope) {
   constexpr std::ptrdiff_t kLater = 4;
   const double left = left_at_the_end(rungs, objective, least_slope);

@@ -2,7 +2,7 @@
 //
 //   R(h) = |psi(rho + h d) - psi(rho) - h psi_rho d|
 //
-// Where R stands clear of rounding, it falls by 4 when h is halved. Errors of derivatives fall as h, kinks not at all.
+// If R is well above rounding, it falls by 4 when h is halved. Errors of derivatives fall as h; kinks do not fall.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +13,7 @@
 
 namespace mbsopt {
 
-// A remainder so many times above rounding is clear of it.
+// A remainder is clear of rounding if it exceeds it so many times.
 inline constexpr double kTaylorClear = 100;
 
 struct TaylorRow {
@@ -32,7 +32,7 @@ struct TaylorLine {
   Eigen::VectorXd slope;                                                      // psi_rho d
 };
 
-// One check per objective, whose values at rho are psi. least_slope: of log R over log h.
+// One check per objective, whose values at rho are psi. least_slope is that of log R over log h.
 std::vector<TaylorCheck> check_taylor_remainders(const std::vector<std::string>& objectives, const Eigen::VectorXd& psi,
                                                  const TaylorLine& line, double least_slope);
 

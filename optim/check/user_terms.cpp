@@ -26,10 +26,10 @@ using Eigen::VectorXd;
 
 constexpr int kStates = 4;         // of the motion, and its start
 constexpr int kRungs = 12;         // from a hundredth of the size down to 5e-6 of it
-constexpr double kLargest = 1e-2;  // of the size of what moves
+constexpr double kLargest = 1e-2;  // of the size of the moving coordinates
 constexpr double kWrong = 1e-6;    // of the derivative: ladders reach 1e-9 and better
 
-// A direction in (q, v) of k bodies, and in words.
+// A direction in (q, v) of k bodies, with its name.
 struct Direction {
   VectorXd q, v;
   bool of_rates = false;  // v alone
@@ -44,7 +44,7 @@ Vector4d turned(const Vector4d& p, int axis) {
   return out;
 }
 
-// q, v: 7 numbers each for some bodies, whose names are given.
+// q and v have 7 numbers each for the named bodies.
 std::vector<Direction> directions(const VectorXd& q, const VectorXd& v, const std::vector<std::string>& bodies) {
   constexpr const char* kAxes[] = {"x", "y", "z"};
   std::vector<Direction> all;
@@ -106,11 +106,11 @@ class UserTerms {
 
  private:
   Mechanism mechanism_at(const VectorXd& rho) const {
-    // Every parameter is active: those of a named force have derivatives in them.
+    // Every parameter is active: named forces have derivatives in their parameters.
     return Mechanism(scene_, rho, {}, user_forces_);
   }
 
-  // The worst entry of a derivative along one direction, if it is wrong; said once for each `what`.
+  // Reports the worst wrong entry of a derivative along one direction, once for each `what`.
   void compare(const std::string& what, const std::string& along, double t, double step,
                const std::function<VectorXd(double)>& f, const VectorXd& given) {
     if (std::find(said_.begin(), said_.end(), what) != said_.end()) return;
@@ -178,7 +178,7 @@ class UserTerms {
     if (const InertialLoad* inertia = force.inertia()) check_inertia(index, *inertia, name, t, q, v, bodies);
   }
 
-  // At accelerations of the size that moves the body by its length within a second.
+  // The accelerations have the size that moves the body by its length within a second.
   void check_inertia(std::size_t index, const InertialLoad& load, const std::string& name, double t, const VectorXd& q,
                      const VectorXd& v, const std::vector<std::string>& bodies) {
     VectorXd z(6);
@@ -216,7 +216,7 @@ class UserTerms {
     }
   }
 
-  // The derivatives of functions written in C++ that the law calls, up to the third, which gradients read.
+  // Checks the derivatives, up to the third, of functions written in C++ that the law calls. Gradients read these.
   void check_law(const Drive& drive, double t) {
     for (const CurveCall& call : curve_calls(drive.law)) {
       if (!call.curve->is_routine()) continue;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kStep = 1e-3;     // of the variable's size
 constexpr double kShorter = 16;    // times
-constexpr double kApart = 1e-2;    // of a derivative: an optimiser does not mind less
+constexpr double kApart = 1e-2;    // of a derivative: less is harmless for an optimiser
 constexpr double kMatters = 1e-3;  // of the group's largest derivative
 constexpr double kTrust = 10;      // times an estimated error
 
@@ -35,7 +35,7 @@ class Comparison {
  public:
   explicit Comparison(const DifferenceComparison& of) : of_(of) {}
 
-  // Returns the warnings about one variable. Threads may call it at a time, each for another variable.
+  // Returns the warnings about one variable. Threads may call it at the same time for different variables.
   std::vector<std::string> sentences(std::size_t variable);
 
  private:
@@ -43,10 +43,10 @@ class Comparison {
     VectorXd f;
     MatrixXd f_rho;
   };
-  // nullopt: f cannot be evaluated beside the start.
+  // Returns nullopt if f cannot be evaluated beside the start.
   std::optional<Difference> difference(std::size_t variable) const;
   std::optional<Difference> difference(std::size_t variable, double wanted) const;
-  // The groups whose derivatives disagree with it, with a shorter one, and by more than the integrator's error.
+  // Returns the groups whose derivatives disagree with it, with a shorter one, and by more than the integrator's error.
   std::vector<const ComparedGroup*> disagreeing(std::size_t variable, const Difference& d);
   double largest_derivative(const ComparedGroup& group) const;
   bool disagrees(const ComparedGroup& group, std::size_t variable, const Difference& d, const Errors* integrator) const;
@@ -75,7 +75,7 @@ std::optional<Difference> Comparison::difference(std::size_t variable, double wa
     d.bend = (*plus - 2 * of_.f + *minus).cwiseAbs() / (2 * d.h);
     return d;
   }
-  // On a bound: away from it, (4 f(h/2) - f(h) - 3 f(0))/h.
+  // On a bound, the difference goes away from it: (4 f(h/2) - f(h) - 3 f(0))/h.
   d.h = std::min(wanted, farther);
   const double h = v.above >= v.below ? d.h : -d.h;
   const std::optional<VectorXd> half = of_.at(variable, h / 2), whole = of_.at(variable, h);

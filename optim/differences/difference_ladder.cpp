@@ -7,12 +7,12 @@
 namespace mbsopt {
 namespace {
 
-// One rung: the quotient of differences, and the largest values it is made of.
+// One rung: the difference quotient, and the largest values in it.
 struct Rung {
   Eigen::VectorXd quotient, largest;
 };
 
-// base: b of the extrapolation. evaluations: of f in a rung.
+// base is b of the extrapolation. evaluations counts those of f in a rung.
 template <class RungAt>
 LadderDerivative climb(const RungAt& rung_at, Eigen::Index size, double base, double amplification, int evaluations,
                        const LadderOptions& options) {
@@ -38,7 +38,7 @@ LadderDerivative climb(const RungAt& rung_at, Eigen::Index size, double base, do
     const Eigen::ArrayXd rounding = noise * rung->largest.array() / std::abs(h);
     for (std::size_t k = 0; k < row.size(); ++k) {
       for (Eigen::Index i = 0; i < size; ++i) {
-        // A first difference has nothing to be compared with: its error is unknown, but it is better than nothing.
+        // The first difference has nothing to compare with: its error is unknown, but it is better than nothing.
         const double spread =
             k == 0 ? std::numeric_limits<double>::max()
                    : std::max(std::abs(row[k](i) - row[k - 1](i)), std::abs(row[k](i) - above[k - 1](i)));

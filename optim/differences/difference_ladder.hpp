@@ -5,8 +5,8 @@
 //   one-sided   T_j0 = (f(h_j) - f(0)) / h_j            errors h, h^2, ...       b = 2
 //   T_jk = T_j,k-1 + (T_j,k-1 - T_j-1,k-1) / (b^k - 1)
 //
-// Of each component the entry with the least estimated error is taken, estimated by its distance from the two it is
-// made of and by the rounding of f (Ridders, Advances in Engineering Software 4 (1982) 75-76).
+// Each component takes the entry with the least estimated error. The estimate is the entry's distance from its two
+// sources, and the rounding of f (Ridders, Advances in Engineering Software 4 (1982) 75-76).
 //
 //   const auto f = [&](double h) { return std::optional(value_at(x + h)); };
 //   const LadderDerivative d = difference_ladder(f, f0.size(), {1e-2 * x});
@@ -22,7 +22,7 @@ namespace mbsopt {
 
 struct LadderDerivative {
   Eigen::VectorXd derivative;
-  // Estimated; infinite where no step could be evaluated, the largest double where only one could.
+  // The estimated error: infinite if no step could be evaluated, the largest double if only one could.
   Eigen::VectorXd error;
   Eigen::VectorXd rounding;  // the part of it that comes from the noise of f
   Eigen::VectorXd step;      // of the rung taken,
@@ -35,18 +35,18 @@ struct LadderOptions {
   double step = 1e-2;  // the largest, h0 > 0; one-sided also < 0
   int rungs = 8;       // >= 1
   double noise = 0;    // of f, relative to its largest value: 0 takes the rounding of a double
-  // Asked after each rung: true where the derivative is good enough. Absent: all rungs.
+  // Called after each rung: true ends the ladder with this derivative. If it is absent, all rungs are evaluated.
   std::function<bool(const LadderDerivative& best)> enough = {};
 };
 
-// f at an offset, nullopt where it cannot be evaluated (that rung is skipped).
+// f at an offset, or nullopt if it cannot be evaluated; the ladder skips this rung.
 using LadderFunction = std::function<std::optional<Eigen::VectorXd>(double h)>;
 
-// size: of f.
+// size is that of f.
 LadderDerivative difference_ladder(const LadderFunction& f, Eigen::Index size, const LadderOptions& options = {});
 
-// On the side of the step's sign, where the other is out of reach. f0 = f(0). Less exact: the extrapolation amplifies
-// the noise of f up to 8.3 times, prod (2^k + 1)/(2^k - 1), which is counted in.
+// Takes the side of the step's sign if the other side is out of reach. f0 = f(0). It is less exact: the extrapolation
+// amplifies the noise of f up to 8.3 times, prod (2^k + 1)/(2^k - 1). The error includes this.
 LadderDerivative one_sided_ladder(const LadderFunction& f, const Eigen::VectorXd& f0,
                                   const LadderOptions& options = {});
 

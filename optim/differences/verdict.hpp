@@ -13,13 +13,13 @@ enum class Verdict {
   disagrees,
 };
 std::string_view to_string(Verdict verdict);  // "agrees", "within its error", "zero", "FAILED", "DISAGREES"
-// Estimates of errors are of the right size, no bounds: what is within some times of them counts as explained.
+// Estimates of errors have the right size but are no bounds. A difference within some times of them is explained.
 inline constexpr double kEstimateTrust = 10;
 
 inline bool passes(Verdict verdict) { return verdict != Verdict::failed && verdict != Verdict::disagrees; }
 
-// A derivative that is known to `error` against one that it should equal: within threshold * entry it agrees. Its own
-// error, trusted to some times its estimate, counts only where it hides the entry at this threshold.
+// Compares a derivative that is known to `error` with its expected value: it agrees within threshold * entry. Its own
+// error, trusted to some times its estimate, counts only if it hides the entry at this threshold.
 Verdict verdict_of(double found, double error, double expected, double entry, double threshold);
 
 }  // namespace mbsopt

@@ -1,4 +1,4 @@
-// The median: of an even number, the upper of the two in the middle.
+// The median; of an even number of values it is the upper of the middle two.
 #pragma once
 
 #include <algorithm>
@@ -6,7 +6,7 @@
 
 namespace mbsopt {
 
-// 0 where there is none.
+// Returns 0 if x is empty.
 inline double median(std::vector<double> x) {
   if (x.empty()) return 0;
   const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);

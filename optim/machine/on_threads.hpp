@@ -1,4 +1,4 @@
-// Jobs in threads of this process, so many at a time: for simulations, which share nothing that changes.
+// Jobs in a limited number of threads of this process: for simulations, which share only constant data.
 //
 //   on_threads(cases.size(), 2, [&](std::size_t c) { results[c] = evaluate(cases[c]); });
 #pragma once
@@ -8,8 +8,8 @@
 
 namespace mbsopt {
 
-// Runs fewer at a time where the system has no further thread. Returns when all jobs have ended. Rethrows what the
-// first of them has thrown, in the order of the jobs.
+// Runs fewer at a time if the system has no further thread. Returns when all jobs have ended. Then it rethrows the
+// exception of the first job, in the order of the jobs, that threw one.
 void on_threads(std::size_t jobs, int threads, const std::function<void(std::size_t job)>& work);
 
 }  // namespace mbsopt

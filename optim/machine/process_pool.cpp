@@ -22,10 +22,10 @@ namespace mbsopt {
 namespace {
 
 constexpr int kPollMilliseconds = 50;
-// Container runtimes kill 10 s after they have asked to end: half of that is left to write the results.
+// Container runtimes kill 10 s after their request to end. This leaves half of it to write the results.
 constexpr std::chrono::seconds kGrace{5};
 using Worker = ProcessPool::Worker;
-// The first byte of a reply; one that was cut off has no last byte.
+// The first byte of a reply, and its last one. A truncated reply lacks the last byte.
 constexpr char kReturned = 'R', kThrew = 'E', kEnd = '.';
 
 [[noreturn]] void be_worker(int pipe_end, pid_t parent, const std::function<std::string(int)>& work, int job) {
@@ -47,7 +47,7 @@ constexpr char kReturned = 'R', kThrew = 'E', kEnd = '.';
   ::_exit(0);                         // without the destructors and buffers of the process this is a copy of
 }
 
-// None where the system has no more pipes or processes: errno says which.
+// Returns nothing if the system has no more pipes or processes; errno says which.
 std::optional<Worker> started(int job, const std::function<std::string(int)>& work) {
   std::array<int, 2> ends;
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) return std::nullopt;
@@ -66,7 +66,7 @@ std::optional<Worker> started(int job, const std::function<std::string(int)>& wo
   return Worker{job, process, ends[0], {}};
 }
 
-// True when all has come.
+// Returns true when the reply is complete.
 bool receive(Worker& worker) {
   std::array<char, 1 << 14> buffer;
   const ssize_t count = ::read(worker.descriptor, buffer.data(), buffer.size());

@@ -1,6 +1,6 @@
-// Jobs in processes of their own, so many at a time: for solvers that may not run twice in one process (Ipopt with
-// MUMPS). Each job is a copy (fork) of this process as it is; what it returns is sent back as text. One that crashes
-// takes nothing else along. The order in which jobs end depends on the machine; what they return does not.
+// Jobs in a limited number of processes: for solvers that may not run twice in one process (Ipopt with MUMPS). Each job
+// is a copy (fork) of this process in its current state, and sends its result back as text. A crash affects its job
+// only. The order in which jobs end depends on the machine; their results do not.
 //
 //   run_in_processes(20, 4, [&](int job) { return text_of(solve(starts[job])); },
 //                    [&](const JobReply& reply) { replies[reply.job] = reply; });
@@ -20,13 +20,13 @@ namespace mbsopt {
 struct JobReply {
   int job = 0;
   bool ok = false;
-  std::string text;  // what the job returned; else in words why it did not
+  std::string text;  // the job's result, or the reason of its failure
 };
 
-// The processes that are at work.
+// The running processes.
 class ProcessPool {
  public:
-  // work runs in the other process. One that has been started has seen this one as it was then.
+  // work runs in the other process, which copies the state of this one at its start.
   ProcessPool(int workers, std::function<std::string(int job)> work);
   ~ProcessPool();  // kills those that are still at work
   ProcessPool(const ProcessPool&) = delete;
@@ -34,10 +34,10 @@ class ProcessPool {
 
   bool has_room() const { return workers_.size() < room_; }
   bool idle() const { return workers_.empty(); }
-  // False where the system gives no further process: from then on the pool has room for those that are at work only.
-  // Throws std::runtime_error where it gives none at all.
+  // Returns false if the system gives no further process. From then on the pool has room for the running ones only.
+  // Throws std::runtime_error if the system gives none at all.
   bool start(int job);
-  // The replies of jobs that have ended; waits at most so long for the first, also where none is under way.
+  // Returns the replies of jobs that have ended. Waits at most so long for the first, even if none is running.
   std::vector<JobReply> ended(int milliseconds);
   void stop();  // SIGTERM to all that are at work; they may still reply. Who has not after 5 s is killed by ended()
 
@@ -58,9 +58,9 @@ class ProcessPool {
   std::optional<Clock::time_point> kill_at_;
 };
 
-// All jobs, so many at a time; done runs here, in any order. go_on is asked about every 50 ms: when it says no, the
-// jobs under way get SIGTERM and may still reply, and no other job begins. Where the system gives fewer processes than
-// workers, fewer are used; throws std::runtime_error where it gives none.
+// Runs all jobs in so many processes; done runs here, in any order. It calls go_on about every 50 ms. If go_on returns
+// false, running jobs get SIGTERM and may still reply, and no other job begins. If the system gives fewer processes
+// than workers, it uses these. Throws std::runtime_error if the system gives none.
 void run_in_processes(const std::vector<int>& jobs, int workers, const std::function<std::string(int job)>& work,
                       const std::function<void(const JobReply&)>& done, const std::function<bool()>& go_on = {});
 

@@ -1,4 +1,4 @@
-// Time since it was made: wall time, unless it is given a clock (a count of work, for runs that are to be repeatable).
+// The time since its construction: wall time, or that of a given clock. A count of work makes runs repeatable.
 #pragma once
 
 #include <chrono>

@@ -1,4 +1,4 @@
-// A whole text to a descriptor, also where the system takes it in parts or a signal interrupts it.
+// Writes a whole text to a descriptor, also if the system takes it in parts or a signal interrupts it.
 #pragma once
 
 #include <string_view>

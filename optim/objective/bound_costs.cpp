@@ -17,7 +17,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Both costs of a term read these: rows of y, and the term's parameters, computed from those of the scene.
+// The inputs of both costs of a term: rows of y, and the term's parameters, computed from those of the scene.
 class TermInputs {
  public:
   TermInputs(const Scene& scene, const UserCostSpec& spec, const std::string& place) {

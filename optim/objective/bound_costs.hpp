@@ -1,5 +1,5 @@
-// Costs written in C++ as a problem names them: the state of some bodies in, parameters of their own, and the chain
-// rule back to the state y and the parameters rho of the scene.
+// Costs written in C++ that a problem names. They read the state of some bodies and parameters of their own. The chain
+// rule leads back to the state y and the parameters rho of the scene.
 //
 //   g(t, y_b, p),  y_b: rows of y of the bodies,  p = p(rho)        g_rho = g_p dp/drho
 #pragma once
@@ -18,8 +18,8 @@ struct BoundCosts {
   std::shared_ptr<const TerminalCost> terminal;  // likewise
 };
 
-// place: of the spec in the problem, for messages. Throws std::invalid_argument for unknown names and for costs that
-// nothing has provided.
+// place is that of the spec in the problem, for messages. Throws std::invalid_argument for unknown names and for costs
+// that nothing provides.
 BoundCosts bound_costs(const Scene& scene, const UserCostSpec& spec, const std::string& place);
 
 }  // namespace mbsopt

@@ -26,7 +26,7 @@ CaseEvaluator::CaseEvaluator(const Problem& problem, const std::vector<std::stri
     std::vector<std::string> names = variables;
     if (!problem.cases.empty()) {
       for (std::string& name : names) name = name_in(problem.cases[c], name, problem.scene);
-      // A variable may matter in another case only.
+      // A variable may have an effect in another case only.
       for (Parameter& p : needed.scene.parameters) p.allow_unused = true;
     }
     const std::vector<Objective> all = objectives_of(needed, objectives);

@@ -1,5 +1,5 @@
-// The objectives of a problem in all its load cases, as Evaluator gives them of one. The cases are computed in threads
-// of their own; results do not depend on how many.
+// Evaluator for the objectives of a problem in all its load cases. Threads compute the cases; results do not depend on
+// their number.
 //
 //   CaseEvaluator evaluator(problem, {"track", "peak"}, {"k1"}, {}, 2);
 //   const CaseEvaluation e = evaluator.gradients(evaluator.start());
@@ -19,24 +19,25 @@
 
 namespace mbsopt {
 
-// psi and its derivatives case by case, each with all objectives; ok where all cases are. Statistics are of the first.
+// psi and its derivatives case by case, each with all objectives. ok holds if all cases are ok. Statistics are those of
+// the first.
 struct CaseEvaluation : Evaluation {
   std::vector<Evaluation> of_cases;
 };
 
 class CaseEvaluator {
  public:
-  // A problem without cases is its own only case. Each case is reduced to what its objectives need, unless there are
-  // forces written in C++, which name bodies by their number.
+  // A problem without cases is its own only case. Each case is reduced to the needs of its objectives. Forces written
+  // in C++ prevent this, because they name bodies by number.
   CaseEvaluator(const Problem& problem, const std::vector<std::string>& objectives,
                 const std::vector<std::string>& variables, const EvaluatorOptions& options = {}, int threads = 1);
 
   CaseEvaluation values(const Eigen::VectorXd& rho);
   CaseEvaluation gradients(const Eigen::VectorXd& rho);
-  // As Evaluator's, case by case.
+  // Does the same as Evaluator's, case by case.
   std::vector<std::optional<double>> true_values(const Eigen::VectorXd& rho) const;
 
-  // Calls work(c) in up to threads() threads; the case that took most right-hand sides in the last evaluation is first.
+  // Calls work(c) in up to threads() threads. The case with most right-hand sides in the last evaluation is first.
   void for_each_case(const std::function<void(std::size_t c)>& work) const;
 
   std::size_t cases() const { return evaluators_.size(); }
@@ -61,7 +62,7 @@ class CaseEvaluator {
 
   const Problem problem_;
   std::vector<Evaluator> evaluators_;
-  std::shared_ptr<std::mutex> progress_;  // of all threads, which tell one listener
+  std::shared_ptr<std::mutex> progress_;  // shared by all threads, which report to one listener
   const int threads_;
   CaseEvaluation last_;
 };

@@ -1,4 +1,4 @@
-// What a design minimises over its load cases, of the values psi_c that its objective has in them:
+// The function of a design over its load cases, from the values psi_c of its objective in them:
 //
 //   sum   f = sum of w_c psi_c
 //   max   f = (1/k) log( sum of exp(k w_c psi_c) )      above the largest w_c psi_c by log(cases)/k at most
@@ -14,13 +14,13 @@ namespace mbsopt {
 class CaseObjective {
  public:
   CaseObjective() : CaseObjective({}, {}) {}  // f = psi
-  // The design's sharpness must be there for the maximum of several cases.
+  // The maximum of several cases needs the design's sharpness.
   CaseObjective(const std::vector<CaseSpec>& cases, const DesignSpec& design);
 
   double value(const Eigen::VectorXd& psi) const;
   Eigen::VectorXd gradient(const Eigen::VectorXd& psi) const;  // f_psi
   Eigen::MatrixXd hessian(const Eigen::VectorXd& psi) const;   // f_psipsi
-  double true_value(const Eigen::VectorXd& psi) const;         // of the maximum that is meant; else f
+  double true_value(const Eigen::VectorXd& psi) const;         // the true maximum; else f
   bool is_maximum() const { return k_ > 0; }
 
  private:

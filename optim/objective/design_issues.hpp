@@ -1,4 +1,4 @@
-// Requests of a design that its optimiser cannot meet, at the place where it is asked.
+// Requests of a design that its optimiser cannot satisfy, at their place in the problem.
 #pragma once
 
 #include <optional>
@@ -13,13 +13,13 @@ struct DesignIssue {
   std::string path, message;
 };
 
-// The optimiser's type must be one there is, and variables parameters there are.
+// Reports an unknown type of the optimiser, and variables that are no parameters.
 std::vector<DesignIssue> optimizer_issues(const DesignSpec& spec, const Scene& scene);
 
-// Gauss-Newton asked for an objective that gives it no curvature. The problem must make sense otherwise.
+// Reports Gauss-Newton for an objective without its curvature. The problem must have no other error.
 std::optional<DesignIssue> curvature_issue(const Problem& problem);
 
-// A start between bounds needs both. by: what samples them, with its place.
+// A start between bounds needs both bounds. `by` is the field that samples them, with its place.
 std::vector<DesignIssue> missing_bounds(const std::vector<std::string>& variables, const Scene& scene,
                                         const std::string& by);
 

@@ -148,7 +148,7 @@ bool Evaluator::add_simulated(Evaluation& e, Sweep sweep, const StepSequence* fr
     e.message = "stopped before its simulation";
     return false;
   }
-  // Derivatives are carried only where a sweep needs them.
+  // Derivatives are computed only if a sweep needs them.
   const std::vector<bool> active = sweep == Sweep::none ? std::vector<bool>(active_.size(), false) : active_;
   SimulationResult result;
   try {
@@ -237,7 +237,8 @@ bool Evaluator::add_parameters_only(Evaluation& e, bool gradients) const {
 
 namespace {
 
-// Where the rungs disagree, since a stage met a singular position in one of them, say, from smaller steps on.
+// If the rungs disagree, it takes differences from smaller steps on: a stage of one rung may have met a singular
+// position.
 LadderDerivative certain_differences(const LadderFunction& psi_at, Eigen::Index size, double h, int rungs) {
   constexpr double kUncertain = 1e-4;  // of a derivative
   constexpr int kMoreLadders = 2;
@@ -310,7 +311,7 @@ Evaluation Evaluator::gradients_on(const StepSequence& steps, const Eigen::Vecto
   return e;
 }
 
-// The method that is asked for, or what stands for it; `choice` says what that means, where it is not plain.
+// Returns the requested method, or the one that replaces it; `choice` gives the reason if it is not obvious.
 GradientMethod Evaluator::available(GradientMethod method, std::string& choice) const {
   const IntegratorSettings& given = scene_.simulation.integrator;
   const bool by_cvodes = is_cvodes(given.type);
@@ -333,7 +334,7 @@ Evaluation Evaluator::gradients(const Eigen::VectorXd& rho) {
       (last_.has_gradients() || !last_.ok))
     return last_;
   if (!simulated_.empty() && !has_differentiated_) {
-    // At other values than the scene's own the loop may close as a structure that cannot move.
+    // At other values than the scene's own, the loop may close as a structure that cannot move.
     const Eigen::VectorXd own = start();
     require_unobstructed(scene_, own, active_, options_.user_forces);
     if (rho.size() != own.size() || rho != own) require_unobstructed(scene_, rho, active_, options_.user_forces);

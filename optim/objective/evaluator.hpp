@@ -1,5 +1,5 @@
-// Objectives and their gradients at a point, by the method that is cheapest or the one asked for. The last point is
-// kept: a solver that asks for f and then for its gradient pays once.
+// Objectives and their gradients at a point, by the cheapest or the requested method. It keeps the last point: a solver
+// that asks for f and then for its gradient pays once.
 //
 //   Evaluator evaluator(problem.scene, objectives_of(problem), {"k1", "L01"});
 //   const Evaluation e = evaluator.gradients(evaluator.start());
@@ -21,19 +21,21 @@
 
 namespace mbsopt {
 
-// tlm and adjoint are the derivatives of the numbers computed; CVODES, which has none of these, answers with its own.
-// cvodes_*: the motion and its continuous sensitivities by CVODES, whatever the scene's integrator (cvodes.hpp).
+// tlm and adjoint are the derivatives of the computed numbers; CVODES has none of these and gives its own. With
+// cvodes_*, CVODES computes the motion and its continuous sensitivities for any integrator of the scene (cvodes.hpp).
 enum class GradientMethod { automatic, tlm, adjoint, cvodes_forward, cvodes_adjoint, differences };
 std::string_view to_string(GradientMethod method);  // auto, tlm, adjoint, cvodes_forward, cvodes_adjoint, fd
 
 struct DifferenceSettings {
   double relative_step = 4e-3;  // the largest: of the parameter's value, or of 1 where that is 0
   int rungs = 4;                // steps, each half of the one before
-  // On the steps of the run at the point itself, else with step-size control; CVODES always with step-size control.
+  // Differences use the steps of the run at the point itself, else step-size control. CVODES always uses step-size
+  // control.
   bool frozen_steps = true;
 };
 
-// Estimated cost in simulations, from which `automatic` chooses; measured, see docs/design-optimisation.md.
+// Estimated cost in simulations, from which `automatic` chooses. The figures are measured
+// (docs/design-optimisation.md).
 //   tlm        1.5 + 2.2 per block of four variables, which go through a step together
 //   adjoint    1.7 + 0.9 per objective
 struct GradientCost {
@@ -46,13 +48,13 @@ struct Evaluation {
   std::string message;                                // why not, in words
   Eigen::VectorXd rho;                                // all parameters
   Eigen::VectorXd psi;                                // per objective
-  Eigen::MatrixXd psi_rho;                            // objective x variable; 0 x 0 where only values were asked for
+  Eigen::MatrixXd psi_rho;                            // objective x variable; 0 x 0 if only values were requested
   GradientMethod method = GradientMethod::automatic;  // the one used; automatic where no simulation was needed
   std::string choice;                                 // why, in words, where there is something to say
-  std::vector<std::string> warnings;                  // what makes these numbers doubtful, sentences
+  std::vector<std::string> warnings;                  // sentences on doubts about these numbers
   SimulationStatistics statistics;
   StepSequence steps;
-  long simulations = 0;  // that this evaluation took
+  long simulations = 0;  // number for this evaluation
   double wall_seconds = 0;
   bool has_gradients() const { return psi_rho.size() > 0; }
 };
@@ -67,22 +69,21 @@ struct EvaluatorOptions {
 
 class Evaluator {
  public:
-  // variables: names of parameters with respect to which derivatives are wanted; empty: all. Throws
-  // std::invalid_argument: a variable that nothing uses, unless its allow_unused is set. What costs and forces written
-  // in C++ use shows in gradients(): the first fail if such a variable's derivatives are all exactly 0, later ones
-  // warn.
+  // variables are names of parameters for derivatives; an empty list means all. Throws std::invalid_argument for a
+  // variable that nothing uses, unless its allow_unused is set. gradients() shows the variables that costs and forces
+  // in C++ use. The first call fails if all derivatives of such a variable are exactly 0; later calls warn.
   Evaluator(Scene scene, std::vector<Objective> objectives, const std::vector<std::string>& variables = {},
             EvaluatorOptions options = {});
 
   Evaluation values(const Eigen::VectorXd& rho);
   Evaluation gradients(const Eigen::VectorXd& rho);
 
-  // Of each objective that is a smooth maximum or minimum: the largest, smallest value that it stands for, on a run of
-  // its own. The others have none; none has one where the run fails.
+  // The true largest or smallest value of each objective that is a smooth maximum or minimum, on a run of its own.
+  // Other objectives have none. None has one if the run fails.
   std::vector<std::optional<double>> true_values(const Eigen::VectorXd& rho) const;
 
-  // On given steps, away from the point that is kept: values, and discrete gradients by tlm or adjoint. CVODES, which
-  // cannot take given steps, throws std::invalid_argument.
+  // Evaluates on given steps and leaves the stored point unchanged: values, and discrete gradients by tlm or adjoint.
+  // CVODES cannot take given steps and throws std::invalid_argument.
   Evaluation values_on(const StepSequence& steps, const Eigen::VectorXd& rho) const;
   Evaluation gradients_on(const StepSequence& steps, const Eigen::VectorXd& rho, GradientMethod method) const;
 
@@ -98,7 +99,7 @@ class Evaluator {
   enum class Sweep { none, forward, backward };
   Evaluation run(const Eigen::VectorXd& rho, Sweep sweep, const StepSequence* frozen, bool by_cvodes = false) const;
   GradientMethod available(GradientMethod method, std::string& choice) const;
-  // Parts of run(). False: the point cannot be evaluated, e.message says why.
+  // Parts of run(). They return false if the point cannot be evaluated; e.message then gives the reason.
   bool has_finite_parameters(Evaluation& e) const;
   bool add_simulated(Evaluation& e, Sweep sweep, const StepSequence* frozen, bool by_cvodes) const;
   bool add_parameters_only(Evaluation& e, bool gradients) const;

@@ -22,7 +22,7 @@ struct CostExpression::Compiled : SwitchedProgram {
 
 namespace {
 
-// Numbers of one evaluation, one set per thread: they carry nothing from one call to the next.
+// The numbers of one evaluation, one set per thread. They carry nothing from one call to the next.
 struct Scratch {
   Program::Scratch program;
   std::vector<double> x, gradient;
@@ -73,7 +73,7 @@ class ExpressionCost : public PointCost {
 
  private:
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
-  // A thread's arrays serve any expression; a program gets as many numbers as it has inputs.
+  // A thread's arrays serve any expression. A program gets as many numbers as it has inputs.
   std::span<double> inputs(std::vector<double>& x) const { return {x.data(), index(compiled_->inputs)}; }
 
   void set_inputs(const StatePoint& at, Scratch& s) const {

@@ -3,7 +3,7 @@
 //
 //   g(t, y, rho) = e(rho, t, s(y, rho))       g_y = sum_k e_sk s_k,y        g_rho = e_rho + sum_k e_sk s_k,rho
 //
-// Compiled once per scene, bound to a mechanism (one value of rho) as often as needed:
+// It is compiled once per scene, and bound to a mechanism (one value of rho) as often as needed:
 //
 //   const CostExpression compiled(Expression::parse("(tip_y - y0)^2"), scene);
 //   std::shared_ptr<const PointCost> cost = compiled.bind(mechanism);
@@ -20,12 +20,11 @@
 
 namespace mbsopt {
 
-// Names an objective may use: parameters (inputs 0..P-1), "t" (input P), sensors (from P+1), definitions,
-// signals.
+// The names in an objective: parameters (inputs 0..P-1), "t" (input P), sensors (from P+1), definitions, signals.
 Symbols cost_symbols(const Scene& scene);
-// The same without t, signals and sensors: what depends on parameters alone.
+// The same without t, signals and sensors, for expressions of parameters alone.
 Symbols parameter_symbols(const Scene& scene);
-// Parameters, then t; definitions and signals.
+// Parameters, then t, with definitions and signals.
 Symbols time_symbols(const Scene& scene);
 
 // A scalar e of u = (parameters, sensors) along the tangents U = du/drho of a motion.
@@ -40,10 +39,10 @@ class CostExpression {
   CostExpression(const Expression& expression, const Scene& scene);  // throws UnknownName
   bool is_zero() const { return is_zero_; }                          // the constant 0: costs nothing
   const void* id() const { return compiled_.get(); }                 // the same of copies
-  // Of parameters and sensors, at any fixed time: its second derivatives are 0.
+  // Whether it is linear in parameters and sensors at any fixed time: its second derivatives are 0.
   bool is_linear() const;
   std::shared_ptr<const PointCost> bind(const Mechanism& mechanism) const;
-  // y_rho: dy/drho, all parameters; variables: those of rho that are wanted.
+  // y_rho is dy/drho in all parameters. variables selects those of rho for the result.
   SecondOrder second_order(const Mechanism& mechanism, const StatePoint& at, const Eigen::MatrixXd& y_rho,
                            const std::vector<int>& variables) const;
 

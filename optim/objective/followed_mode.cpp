@@ -165,7 +165,7 @@ double FollowedMode::add_gradient(const VectorXd& rho, const UserForces& forces,
   };
   // d(w'f_y)/d(y, rho) along u: of Re w and Im w.
   const auto along = [&](const VectorXd& u) {
-    constexpr double kStep = 0.05;  // of the mechanism's size, or rad: where the highest rung still converges
+    constexpr double kStep = 0.05;  // of the mechanism's size, or rad: the highest rung still converges
     constexpr int kRungs = 5;
     const double moves = u.cwiseQuotient(units).cwiseAbs().maxCoeff();
     if (moves == 0) return VectorXd(VectorXd::Zero(2 * (states + P)));

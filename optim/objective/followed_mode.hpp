@@ -1,13 +1,13 @@
-// The frequency or the damping ratio of one mode of the motion beside the initial state, a function of the parameters
-// alone, with its gradient.
+// The frequency or the damping ratio of one mode of the motion near the initial state. It is a function of the
+// parameters alone, with its gradient.
 //
 //   f_y v = lambda v,   w'f_y = lambda w',   w'v = 1:      lambda' = w'(f_y)' v
 //
 // f: the equations of motion ydot = f(y, rho), y0(rho) the equilibrium from which the scene starts. (f_y)' v is the
 // derivative of f_y and f_rho along v: differences of the exact adjoint f_y'w, f_rho'w at y0 +- h v, extrapolated.
 //
-// The mode is numbered at the scene's own parameter values, from slow to fast as `linearise` does; at other values it
-// is the mode whose shape is most like it. So its value depends on the parameters only, not on the way to them.
+// The mode has its number at the scene's own parameter values, from slow to fast as in `linearise`. At other values it
+// is the mode with the most similar shape. So its value depends on the parameters only, not on the path to them.
 #pragma once
 
 #include <Eigen/Core>
@@ -28,9 +28,10 @@ class FollowedMode {
   ~FollowedMode();
 
   using UserForces = std::vector<std::shared_ptr<const UserForce>>;
-  // Throw std::runtime_error where there is no such mode: assembly failed, no equilibrium, fewer modes.
+  // Throw std::runtime_error if the mode does not exist: assembly failed, no equilibrium, fewer modes.
   double value(const Eigen::VectorXd& rho, const UserForces& forces) const;
-  // rho_bar += d value/d rho, all parameters. warnings: where the mode is not smooth, since another coincides with it.
+  // rho_bar += d value/d rho for all parameters. It warns if the mode is not smooth, because another one coincides with
+  // it.
   double add_gradient(const Eigen::VectorXd& rho, const UserForces& forces, Eigen::Ref<Eigen::VectorXd> rho_bar,
                       std::vector<std::string>* warnings = nullptr) const;
 

@@ -17,7 +17,7 @@ namespace {
 
 constexpr long kRows = 200;       // of output, when output_step is absent
 constexpr long kMostRows = 2000;  // a curve with more minima than that is no path of a mechanism
-// Last step of the secant method in parts of a bracket. It leaves less than a hundred-thousandth of itself.
+// The last step of the secant method in parts of a bracket. It leaves less than a hundred-thousandth of itself.
 constexpr double kSettled = 1e-7;
 constexpr int kMostSteps = 30;    // halving alone makes a bracket a billionth of itself
 constexpr double kClosed = 1e-9;  // of its extent, between both ends of a closed path
@@ -32,20 +32,19 @@ std::vector<double> scan_times(const SimulationSettings& s) {
   return times;
 }
 
-// A number and its derivative in time.
+// A number and its time derivative.
 struct Moving {
   double value, rate;
 };
 
-// The cubic through values and rates at both ends of an interval of length h, at the part u of it.
+// The cubic through values and rates at both ends of an interval of length h, evaluated at its part u.
 Moving hermite(const Moving& a, const Moving& b, double h, double u) {
   const double d = b.value - a.value, p = h * a.rate, q = h * b.rate;
   const double c2 = 3 * d - 2 * p - q, c3 = p + q - 2 * d;
   return {a.value + u * (p + u * (c2 + u * c3)), (p + u * (2 * c2 + 3 * u * c3)) / h};
 }
 
-// A column of D for each of the points, from `first` on round the circle, so that columns do not fall and the sum is
-// least.
+// A column of D for each point, from `first` on round the circle. Columns do not fall, and their sum is least.
 struct Columns {
   double sum = std::numeric_limits<double>::infinity();
   std::vector<std::size_t> of_points;
@@ -79,18 +78,18 @@ struct FreeInstants::Motion {
   }
 };
 
-// Points of one instant, tau, where D/2, the sum of theirs, has a minimum: its rate is negative at `from` and positive
-// at `to`, or both are one end of the run.
+// Points that share the instant tau, where the sum of their D/2 has a minimum. Its rate is negative at `from` and
+// positive at `to`, or both are one end of the run.
 struct FreeInstants::Block {
   std::vector<std::size_t> points;
   double from = 0, to = 0, tau = 0;
   double square = std::numeric_limits<double>::infinity();  // D/2 at tau
   double curvature = 1;                                     // of D/2
   double earlier = 0, earlier_rate = 0;                     // tau before this one, and the rate of D/2 there
-  std::size_t node = 0;                                     // where the scan saw it
+  std::size_t node = 0;                                     // its node in the scan
 };
 
-// Minima on the polynomials between the instants of a scan, its nodes.
+// Finds minima on the polynomials between the instants of a scan, its nodes.
 struct FreeInstants::Scan {
   const FreeInstants& free;
   const Motion motion;
@@ -119,7 +118,7 @@ struct FreeInstants::Scan {
     const double t = motion.times[i];
     return {points, t, t, t, at(points, motion, i).value};
   }
-  // Between the nodes i and i + 1.
+  // The minimum between the nodes i and i + 1.
   Block between(const Points& points, std::size_t i) const {
     const double t = motion.times[i], h = motion.times[i + 1] - t;
     const auto inside = [&](double u) {
@@ -176,8 +175,8 @@ struct FreeInstants::Scan {
     return (motion.s.col(static_cast<Index>(last())) - motion.s.col(0)).norm() <= kClosed * extent.norm();
   }
 
-  // Finds the best nodes in the order of a file's rows, then goes downhill from these to minima.
-  // Neighbours whose minima stand in the other order have one instant.
+  // Finds the best nodes in the order of a file's rows, then goes downhill from these to minima. Neighbours whose
+  // minima have the opposite order share one instant.
   std::vector<Block> in_order(const Points& rows) const {
     MatrixXd D(static_cast<Index>(rows.size()), motion.s.cols());
     for (std::size_t k = 0; k < rows.size(); ++k)

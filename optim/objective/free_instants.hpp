@@ -1,20 +1,21 @@
-// When the motion meets tracked points that have no times. Each point k, a row of a file, is taken where the motion is
-// nearest to it:
+// The instants at which the motion meets tracked points without times. Each point k, a row of a file, is compared where
+// the motion is nearest to it:
 //
 //   tau_k = argmin over the run of D_k(t, rho),    D_k = sum over coordinates i of w_i (s_i(t, rho) - c_ik)^2
 //   psi = sum of D_k(tau_k, rho),    psi_rho = sum of dD_k/drho at fixed tau_k
 //
 // since dD_k/dt = 0 at tau_k, or tau_k is an end of the run (envelope theorem). Each tau_k depends on its point alone.
 //
-// The search is global: s_i and ds_i/dt at the instants of output, cubic Hermite polynomials between them, and from
-// their best minimum the secant method on the motion itself, within the bracket. A minimum between two instants of
-// output is seen if D falls at the first and rises at the second. The motion is solved, so that no steps of an
-// integrator enter.
+// The search is global. It takes s_i and ds_i/dt at the instants of output, with cubic Hermite polynomials between
+// them. From their best minimum the secant method solves on the motion itself, within the bracket. It finds a minimum
+// between two instants of output if D falls at the first and rises at the second. The motion is solved, so it has no
+// steps of an integrator.
 //
 // Ordered points are met one after another, tau_1 <= tau_2 <= ...; on a closed path the circle of points may begin with
-// any of them. Dynamic programming finds the best instants of output in that order. Where the order holds a point back,
-// it has one instant with its neighbour, a block, and D is their sum: the pool of adjacent violators (R. E. Barlow et
-// al., "Statistical Inference under Order Restrictions" (1972)). The gradient is still that at fixed instants.
+// any of them. Dynamic programming finds the best instants of output in that order. If the order constrains a point, it
+// shares one instant with its neighbour. Such points are a block, and D is their sum: the pool of adjacent violators
+// (R. E. Barlow et al., "Statistical Inference under Order Restrictions" (1972)). The gradient is still that at fixed
+// instants.
 #pragma once
 
 #include <functional>
@@ -30,7 +31,7 @@
 
 namespace mbsopt {
 
-// The motion has no instants: it could not be solved.
+// The motion has no instants, because it could not be solved.
 struct NoMotion : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -41,7 +42,8 @@ class FreeInstants {
 
   // The number of a row's point. Terms of one file share their points.
   std::size_t point(const std::string& file, bool ordered, std::size_t row);
-  // The number of a sensor that measures points. It reads positions only. weight: of parameters only.
+  // The number of a sensor that measures points. The sensor reads positions only, and weight depends on parameters
+  // only.
   std::size_t channel(const CostExpression& sensor, const CostExpression& weight);
   void add(std::size_t point, std::size_t channel, double target);
 
@@ -49,8 +51,8 @@ class FreeInstants {
     double tau = 0;         // [s]
     std::size_t block = 0;  // points of one block have one instant
   };
-  // Returns the instant of each point. progress: as in RunOptions. Throws NoMotion, and std::invalid_argument where
-  // drives leave something free.
+  // Returns the instant of each point. progress has the meaning of RunOptions. Throws NoMotion, and
+  // std::invalid_argument if drives leave some freedom.
   std::vector<Instant> nearest(const Mechanism& mechanism, const std::function<bool(double t)>& progress = {}) const;
   // Whether an instant lies within the run, so that dD/dt = 0 there.
   bool is_inside(double tau) const { return tau > settings_.start_time && tau < settings_.end_time; }

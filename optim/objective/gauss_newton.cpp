@@ -15,11 +15,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Gauss-Legendre on [0, 1].
+// The Gauss-Legendre rule on [0, 1].
 constexpr std::array<double, 3> kNodes{0.5 - 0.3872983346207417, 0.5, 0.5 + 0.3872983346207417},
     kWeights{5.0 / 18, 8.0 / 18, 5.0 / 18};
 
-// I, I_rho and I_rhorho of one part of an objective, gathered instant by instant; then its Hessian.
+// I, I_rho and I_rhorho of one part of an objective, summed instant by instant, and its Hessian.
 class Gathered {
  public:
   Gathered(const Objective& objective, const ObjectivePart& part, Index variables)
@@ -43,7 +43,7 @@ class Gathered {
   }
 
  private:
-  // x0 of an extreme: the extreme so far, of which the Hessian is independent. Else 0.
+  // x0 of an extreme is the extreme so far; the Hessian does not depend on it. Otherwise it is 0.
   double shifted(double x) {
     if (part_.side == 0) return 0;
     if (part_.side * x > part_.side * x0_) {
@@ -61,7 +61,7 @@ class Gathered {
   MatrixXd I_rhorho_;
 };
 
-// The points of interest during the run, in the order of time.
+// The instants to evaluate during the run, in the order of time.
 struct Look {
   double time = 0;
   double weight = 0;                           // of the running expressions; 0: none of them

@@ -22,15 +22,15 @@ using Eigen::VectorXd;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A gradient carries the rounding of a forward and a backward sweep over all steps.
 constexpr double kGradientRounding = 1e-13;
-// A bound nearer than this part of the wanted step is too near to stay within on both sides.
+// A bound nearer than this part of the wanted step is too near for a step on both sides.
 constexpr double kNear = 1.0 / 16;
-// Where rounding hides more than this part of H d, the parameter's value is no measure of its effect: the step grows.
+// If rounding hides more than this part of H d, the parameter's value is no measure of its effect, and the step grows.
 constexpr double kHidden = 1e-8;
 constexpr double kGrowth = 16;
 constexpr int kWiderLadders = 2;
 
-// The gradients of all objectives as functions of rho + h d on frozen steps, and their derivatives in h. Everything is
-// in sizes of parameters, row by row: component i n + j of F is d psi_i/d rho_j times the size of rho_j.
+// The gradients of all objectives as functions of rho + h d on frozen steps, and their derivatives in h. All numbers
+// are in sizes of parameters, row by row: component i n + j of F is d psi_i/d rho_j times the size of rho_j.
 class GradientAlong {
  public:
   GradientAlong(Evaluator& evaluator, const VectorXd& rho, const HessianOptions& options)
@@ -51,7 +51,8 @@ class GradientAlong {
     return evaluator_.scene().parameters[static_cast<std::size_t>(index(k))];
   }
 
-  // F'(0) along d, given in sizes with its largest component 1. Has no estimates where it could not be evaluated.
+  // F'(0) along d, which is given in sizes with its largest component 1. It has no estimates if it could not be
+  // evaluated.
   LadderDerivative derivative(const VectorXd& d) {
     double h = options_.relative_step;
     Reach reach = reach_along(d, h);
@@ -93,16 +94,17 @@ class GradientAlong {
     return F;
   }
 
-  // At the point itself, on the same frozen steps: implicit stages are then solved to rounding, as at all other points.
+  // F at the point itself, on the same frozen steps: implicit stages are then solved to rounding, as at all other
+  // points.
   const VectorXd& F0() {
     if (F0_.size() == 0) F0_ = gradient_at(VectorXd::Zero(variables()), 0).value_or(VectorXd());
     return F0_;
   }
 
-  // Within the bounds: a step on both sides, as wide as wanted or as they leave room; else on the side of more room.
-  // Bounds that are close on both sides say nothing about the parameter's size and are not looked at.
+  // Keeps within the bounds. It steps to both sides, as far as wanted or as the bounds allow, or else to the side with
+  // more room. Close bounds on both sides do not tell the parameter's size and are ignored.
   Reach reach_along(const VectorXd& d, double h) const {
-    constexpr double kInside = 1 - 1e-9;  // so that rounding does not carry across
+    constexpr double kInside = 1 - 1e-9;  // rounding must not cross the bound
     double plus = kInfinity, minus = kInfinity;
     for (Index k = 0; k < d.size(); ++k) {
       if (d(k) == 0) continue;
@@ -128,7 +130,7 @@ class GradientAlong {
       best = difference_ladder(F, objectives() * variables(), options);
       if (best.has_estimate(0)) return best;
     }
-    // One side may lie outside of what an expression is defined for.
+    // One side may lie outside the domain of an expression.
     for (const int side : {1, -1}) {
       if ((reach.side != 0 && side != reach.side) || F0().size() == 0) continue;
       options.step = side * reach.step;
@@ -184,7 +186,7 @@ std::string not_differenced(const std::string& what, const std::string& why) {
                      why.empty() ? "too few steps could be evaluated" : why);
 }
 
-// raw(p, q): derivative in q of the gradient's entry p; both in sizes.
+// raw(p, q) is the derivative in q of the gradient's entry p; both are in sizes.
 ObjectiveHessian symmetrised(const MatrixXd& raw, const MatrixXd& raw_error, const VectorXd& size) {
   ObjectiveHessian H;
   const MatrixXd apart = (raw - raw.transpose()).cwiseAbs();

@@ -1,12 +1,13 @@
 // Second derivatives of objectives by parameters: full Hessians, and their products with a direction.
 //
-// Nothing is differentiated twice by hand: this is NOT forward over adjoint. The exact discrete gradient (adjoint or
-// TLM) is differenced along a direction d, each run taking the accepted steps of the run at rho:
+// Nothing is differentiated twice by hand: this is NOT forward over adjoint. It differences the exact discrete gradient
+// (adjoint or TLM) along a direction d. Each run takes the accepted steps of the run at rho:
 //
 //   F(h) = psi_rho(rho + h d), steps frozen       H d = F'(0), by a ladder of differences (difference_ladder.hpp)
 //
-// On frozen steps F is the gradient of one smooth function psi, so H is symmetric but for the error of the differences,
-// and |H - H'| tells of it. A Hessian takes some 4 to 16 gradients per parameter, of all objectives together.
+// On frozen steps F is the gradient of one smooth function psi. So H is symmetric except for the error of the
+// differences, which |H - H'| measures. A Hessian takes some 4 to 16 gradients per parameter, of all objectives
+// together.
 //
 //   Evaluator evaluator(problem.scene, objectives_of(problem), {"k1", "L01"}, {GradientMethod::adjoint});
 //   const Hessians H = hessians(evaluator, evaluator.start());
@@ -25,8 +26,8 @@
 namespace mbsopt {
 
 struct HessianOptions {
-  // The largest step, of the parameter's size (typical_size); of a direction: where its largest component, in sizes,
-  // changes by so much. Smaller where bounds are nearer, on one side only where the point lies on a bound.
+  // The largest step, relative to the parameter's size (typical_size). In a direction, its largest component in sizes
+  // changes by so much. It is smaller if bounds are nearer, and goes to one side only if the point lies on a bound.
   double relative_step = 1e-2;
   int rungs = 8;          // at most; steps, each half of the one before
   double enough = 1e-10;  // ends a ladder: error in H d, relative to the larger of H d and the gradient (in sizes)
@@ -45,7 +46,8 @@ struct HessianProducts {
 struct ObjectiveHessian {
   Eigen::MatrixXd value;  // variable x variable, the mean of what both orders of differentiation give
   Eigen::MatrixXd error;  // estimated: the largest of the two ladders' errors and of |H_pq - H_qp|
-  // Largest error and largest entry, both times the sizes of their parameters: so entries of all units compare.
+  // The largest error and the largest entry, both times the sizes of their parameters, so that entries of all units
+  // compare.
   double largest_error = 0, largest_entry = 0;
   double asymmetry = 0;     // the part of largest_error that is |H_pq - H_qp|
   double gradient = 0;      // the gradient's largest entry times its parameter's size
@@ -61,17 +63,17 @@ struct Hessians {
   double wall_seconds = 0;
 };
 
-// Throws std::invalid_argument where there are no second derivatives: with an integrator of CVODES, whose steps cannot
-// be frozen, and for gradients that are differences or CVODES' own.
+// Throws std::invalid_argument if there are no second derivatives: CVODES' steps cannot be frozen, and gradients must
+// not be differences or CVODES' own.
 void require_second_order(const Scene& scene, GradientMethod method);
 
-// By the evaluator's method (automatic: the one it chooses for a gradient), with respect to its variables.
+// Uses the evaluator's method (automatic: its choice for a gradient) and its variables.
 Hessians hessians(Evaluator& evaluator, const Eigen::VectorXd& rho, const HessianOptions& options = {});
-// d: per variable.
+// d has an entry per variable.
 HessianProducts hessian_products(Evaluator& evaluator, const Eigen::VectorXd& rho, const Eigen::VectorXd& d,
                                  const HessianOptions& options = {});
 
-// How it is done, for results: "central differences (one-sided on a bound) of the adjoint gradient on frozen ...".
+// The method in words, for results: "central differences (one-sided on a bound) of the adjoint gradient on frozen ...".
 std::string hessian_method(GradientMethod method);
 
 }  // namespace mbsopt

@@ -11,7 +11,7 @@ namespace mbsopt {
 namespace {
 
 constexpr double kTightest = 1e-12;  // rounding starves the step-size control beyond
-constexpr double kResolved = 1e-4;   // of a gradient: no optimiser's step and no fit's interval shows less
+constexpr double kResolved = 1e-4;   // of a gradient: less affects no optimiser's step and no fit's interval
 
 double other_errors(const IntegratorSettings& given) { return given.rtol > 10 * kTightest ? 0.1 : 10; }
 

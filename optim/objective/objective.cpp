@@ -16,7 +16,7 @@
 namespace mbsopt {
 namespace {
 
-// What f throws, with the objective's name.
+// Adds the objective's name to an exception of f.
 double named(const std::string& objective, const auto& f) {
   try {
     return f();
@@ -34,7 +34,7 @@ auto at_place(const std::string& place, const Make& make) {
   }
 }
 
-// M(x - x0), of which the integral makes a mean of x.
+// M(x - x0), whose integral gives a mean of x.
 class Integrand final : public PointCost {
  public:
   Integrand(std::shared_ptr<const PointCost> x, const MeanKind& kind, double k, double x0)

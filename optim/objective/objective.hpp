@@ -1,16 +1,18 @@
-// An objective, ready to be evaluated at any rho:
+// An objective that can be evaluated at any rho:
 //
 //   sum     psi(rho) = integral of running dt + terminal at the end time + sum of samples + parameters_only
 //   mean    psi(rho) = x0 + N(I/T),   I = integral of M(x - x0) dt over the simulated time T (objective_kinds.hpp)
 //           or the difference of two such means, its parts
-// A simulation computes what `cost` describes, I (in a sum psi without parameters_only); `of_integral` makes psi of it:
+//
+// A simulation computes I, which `cost` describes (in a sum, psi without parameters_only). `of_integral` turns I into
+// psi:
 //
 //   const Objective track(scene, spec);
 //   const Mechanism mechanism(scene, rho);
 //   const SimulationResult run = simulate(mechanism, scene.simulation, std::vector{track.cost(mechanism)});
 //   const double psi = track.of_integral(run.psi(0)).value + track.parameters_only(rho);
 //
-// ObjectiveRun (objective_run.hpp) does this for several of them and finds x0.
+// ObjectiveRun (objective_run.hpp) does this for several objectives and finds x0.
 #pragma once
 
 #include <functional>
@@ -28,7 +30,7 @@
 
 namespace mbsopt {
 
-// A mean that psi is made of, and its factor in psi. side 1: of a maximum, -1: of a minimum, 0: of neither.
+// A mean in psi, with its factor. side is 1 for a maximum, -1 for a minimum, 0 for neither.
 struct ObjectivePart {
   int side = 0;
   double factor = 1;
@@ -40,7 +42,7 @@ class Objective {
 
   // Throws std::invalid_argument: "objectives.track.running: unknown name ...".
   Objective(const Scene& scene, const ObjectiveSpec& spec);
-  // Written in C++; either part may be absent (null), not both (std::invalid_argument).
+  // An objective written in C++. One part may be null, but not both (std::invalid_argument).
   Objective(std::string name, std::shared_ptr<const RunningCost> running, std::shared_ptr<const TerminalCost> terminal);
 
   const std::string& name() const { return name_; }
@@ -49,23 +51,23 @@ class Objective {
   Extreme extreme() const { return mean_ ? mean_->extreme : Extreme::none; }
   bool is_extreme() const { return extreme() != Extreme::none; }
   std::vector<ObjectivePart> parts() const;
-  // Returns the cost of a part; what is absent stays absent. Throws as instants_of().
+  // Returns the cost of a part; absent parts stay absent. Throws the exceptions of instants_of().
   Cost cost(const Mechanism& mechanism, const ObjectivePart& part = {}, double x0 = 0,
             const Progress& progress = {}) const;
   Jet of_integral(double I, const ObjectivePart& part = {}, double x0 = 0) const;  // its mean, without the factor
   Jet integrand(double x, const ObjectivePart& part = {}) const;                   // M of objective_kinds.hpp
-  // The expression x of a kind that is no sum; null where it is the constant 0.
+  // The expression x of a kind that is no sum; null if it is the constant 0.
   std::shared_ptr<const PointCost> expression(const Mechanism& mechanism) const;
-  // Its parts, for second derivatives: `running` is the integrand, or the expression x of a kind that is no sum.
+  // The parts, for second derivatives. `running` is the integrand, or the expression x of a kind that is no sum.
   struct Sample {
     double time;
     CostExpression value;
-    std::optional<std::size_t> point = {};  // of free_instants(); it says the time then
+    std::optional<std::size_t> point = {};  // its point in free_instants(), which gives the time
   };
   const std::optional<CostExpression>& running() const { return running_; }
   const std::optional<CostExpression>& terminal() const { return terminal_; }
   const std::vector<Sample>& samples() const { return samples_; }
-  // When these samples are taken, in their order; free ones depend on the motion. Throws as FreeInstants::nearest().
+  // The instants of these samples, in their order; free ones depend on the motion. Throws as FreeInstants::nearest().
   struct Instant {
     double time;
     std::optional<std::size_t> block;  // of free ones, FreeInstants::Instant
@@ -73,17 +75,19 @@ class Objective {
   std::vector<Instant> instants_of(const std::vector<Sample>& samples, const Mechanism& mechanism,
                                    const Progress& progress = {}) const;
   const std::optional<FreeInstants>& free_instants() const { return free_instants_; }
-  // Their sum of squares is psi where is_sum_of_squares(): of `track` alone. In the order of time, but for free ones.
+  // Their sum of squares is psi if is_sum_of_squares(): only `track` contributes. They are in the order of time, except
+  // for free ones.
   const std::vector<Sample>& residuals() const { return residuals_; }
   bool is_sum_of_squares() const;
   double exponent(const ObjectivePart& part) const { return part.side * sharpness_; }  // k of an extreme
   bool is_eigenvalue() const { return mode_ != nullptr; }
   bool is_written_in_cpp() const { return user_running_ || user_terminal_; }
   const ObjectiveSpec& spec() const { return spec_; }  // of one that is not
-  // A sum of parts whose second derivatives in parameters and sensors are 0.
+  // Whether it is a sum of parts whose second derivatives in parameters and sensors are 0.
   bool is_linear() const;
 
-  // What depends on the parameters alone, an eigenvalue included (whose errors are std::runtime_error), and += d/drho.
+  // The part that depends on the parameters alone, and += d/drho. It includes an eigenvalue, whose errors are
+  // std::runtime_error.
   double parameters_only(const Eigen::VectorXd& rho, const FollowedMode::UserForces& forces = {}) const;
   double add_parameters_only_gradient(const Eigen::VectorXd& rho, Eigen::Ref<Eigen::VectorXd> rho_bar,
                                       const FollowedMode::UserForces& forces = {},
@@ -107,7 +111,7 @@ class Objective {
   std::shared_ptr<const TerminalCost> user_terminal_;
 };
 
-// Those of a problem that are named; all of them where names is empty. Throws std::invalid_argument for unknown names.
+// Returns the named objectives of a problem, or all if names is empty. Throws std::invalid_argument for unknown names.
 std::vector<Objective> objectives_of(const Problem& problem, const std::vector<std::string>& names = {});
 
 }  // namespace mbsopt

@@ -11,8 +11,8 @@
 namespace mbsopt {
 namespace {
 
-// Largest of values given one after another, and where parabolas through each three whose middle is the highest have
-// their tops beyond it. Such a top is a place to look at, no value: between few points it may be anything.
+// The largest of successive values, and the tops of parabolas through each three whose middle is highest, if they
+// exceed it. A top is only a place to evaluate: between few points the value may be anything.
 class Peak {
  public:
   void add(double t, double x) {
@@ -43,13 +43,13 @@ class Peak {
   std::vector<Top> tops_;
 };
 
-// A side of an objective, as in ObjectivePart.
+// A side of an objective, with the meaning of ObjectivePart.
 struct ExtremeOf {
   const Objective* objective;
   int side;
 };
 
-// The extreme of each objective's expression on its side; none for side 0, and where the run fails.
+// The extreme of each objective's expression on its side. There is none for side 0, or if the run fails.
 std::vector<std::optional<double>> extremes_of(const std::vector<ExtremeOf>& all, const Mechanism& mechanism,
                                                const SimulationSettings& settings, const StepSequence& steps,
                                                const std::function<bool(double t)>& progress) {
@@ -147,7 +147,7 @@ SimulationResult ObjectiveRun::integrated(const std::vector<Integral>& integrals
 }
 
 bool ObjectiveRun::in_range(const std::vector<Integral>& integrals, const Eigen::VectorXd& values) const {
-  constexpr double kSmall = 1e-250, kLarge = 1e250;  // what exp and its sums can hold, with room for factors
+  constexpr double kSmall = 1e-250, kLarge = 1e250;  // the range of exp and its sums, with room for factors
   for (std::size_t k = 0; k < integrals.size(); ++k) {
     const double I = std::abs(values(static_cast<Eigen::Index>(k)));
     if (integrals[k].part.side != 0 && !(I > kSmall && I < kLarge)) return false;

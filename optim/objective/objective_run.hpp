@@ -1,5 +1,5 @@
-// One run of several objectives: what their costs integrate to, turned into psi and its gradient; and the true extremes
-// that smooth maxima and minima stand for.
+// One run of several objectives. It turns the integrals of their costs into psi and its gradient, and finds the true
+// extremes of smooth maxima and minima.
 //
 //   ObjectiveRun objectives({&track, &peak}, mechanism, settings);
 //   SimulationResult r = objectives.run([&](auto costs) { return simulate_adjoint(mechanism, settings, costs); });
@@ -20,12 +20,12 @@ class ObjectiveRun {
  public:
   using Sweep = std::function<SimulationResult(std::span<const Cost>)>;
 
-  // progress: as in RunOptions, for the search of true extremes.
+  // progress has the meaning of RunOptions, for the search of true extremes.
   ObjectiveRun(std::vector<const Objective*> objectives, const Mechanism& mechanism, const SimulationSettings& settings,
                std::function<bool(double t)> progress = {});
 
-  // Calls the sweep with the objectives' costs, with x0 = 0; and once more with x0 = the extremes of that run where an
-  // exponential of a smooth extreme left the range of numbers.
+  // Calls the sweep with the objectives' costs at x0 = 0. If an exponential of a smooth extreme left the range of
+  // numbers, it calls it once more with x0 = the extremes of that run.
   SimulationResult run(const Sweep& sweep) const;
 
  private:
@@ -46,8 +46,8 @@ class ObjectiveRun {
   std::function<bool(double t)> progress_;
 };
 
-// The value that each objective stands for which is an extreme, on given steps: on the dense output at eight points of
-// each step, and where the parabolas through three of them have tops beyond: a value that is reached. None where
+// The true extreme of each objective that is one, on given steps. It evaluates the dense output at eight points of each
+// step, and at higher tops of parabolas through three of them. So the motion reaches the value. There is none if
 // progress, called after steps as in RunOptions, stops the search.
 std::vector<std::optional<double>> true_extremes(const std::vector<const Objective*>& objectives,
                                                  const Mechanism& mechanism, const SimulationSettings& settings,

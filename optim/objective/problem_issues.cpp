@@ -19,7 +19,7 @@ namespace mbsopt {
 
 namespace {
 
-// The dimension that the unit of a column has, against that of the sensor.
+// Compares the dimension of a column's unit with that of the sensor.
 void check_column_unit(Checker& checker, const std::string& unit_text, const std::string& sensor_name) {
   const Sensor* const sensor = checker.facts().sensor(sensor_name);
   const TypeRow* const row = sensor ? find_row(kSensorQuantities, sensor->quantity) : nullptr;
@@ -75,7 +75,7 @@ void check_meaning(Checker& checker, const SignalSamples& samples) {
                                       (names.empty() ? "; there are no signals" : "; signals: " + joined(names)));
 }
 
-// Found by Checker::check through the arguments' namespace.
+// Checker::check finds this function through the arguments' namespace.
 void check_meaning(Checker& checker, const ObjectiveSpec& objective) {
   checker.must_be_identifier(checker.path(), objective.name);
   const bool sums = objective.running || objective.terminal || objective.parameters_only ||
@@ -225,7 +225,7 @@ void check_meaning(Checker& checker, const ExperimentSpec& experiment) {
 
 namespace {
 
-// Samples that two experiments share.
+// Reports samples that two experiments share.
 void check_shared_samples(Checker& checker, const std::vector<ExperimentSpec>& experiments, const std::string& list) {
   const double start = checker.facts().scene().simulation.start_time;
   const double never = std::numeric_limits<double>::infinity();
@@ -309,7 +309,7 @@ void check_meaning(Checker& checker, const IdentificationSpec& identification) {
   }
 }
 
-// The parameters that a signal's delay depends on.
+// The parameters in a signal's delay.
 std::vector<std::string> delayed_by(const Signal& signal, const Scene& scene) {
   const Program delay(signal.delay, parameter_symbols(scene));
   std::vector<std::string> names;
@@ -317,7 +317,7 @@ std::vector<std::string> delayed_by(const Signal& signal, const Scene& scene) {
   return names;
 }
 
-// The override that moves a signal of the problem; empty where none does.
+// The override that shifts a signal of the problem; empty if there is none.
 std::string override_of_delay(const CaseSpec& load_case, const std::string& signal, const Scene& scene) {
   const auto in_problem = std::ranges::find(scene.signals, signal, &Signal::name);
   for (const std::string& name : delayed_by(*in_problem, scene))
@@ -325,7 +325,7 @@ std::string override_of_delay(const CaseSpec& load_case, const std::string& sign
   return "";
 }
 
-// A signal that covers the run may not cover that of a case, and a case may have samples and delays of its own.
+// A signal that covers the run may not cover that of a case. A case may have its own samples and delays.
 void check_coverage(Checker& checker, const CaseSpec& load_case, const Problem& problem, const std::string& place) {
   const Problem of_case = problem_of(problem, load_case);
   const SceneFacts facts(of_case.scene);
@@ -343,7 +343,7 @@ void check_coverage(Checker& checker, const CaseSpec& load_case, const Problem& 
   }
 }
 
-// Signals that jump at times that move with one of the names, which are varied.
+// Signals that jump at times which depend on one of the names; these are varied.
 struct MovedJumps {
   std::string signal, by;
   std::string words(const std::string& where = "") const {
@@ -374,7 +374,7 @@ void check_moved_jumps(Checker& checker, const Problem& problem, const CaseSpec&
   }
 }
 
-// Signals where cases and experiments move them, and what is varied.
+// Checks signals with the changes by cases and experiments, and with the varied parameters.
 void check_signals(Checker& checker, const Problem& problem) {
   for (std::size_t c = 0; c < problem.cases.size(); ++c) {
     check_coverage(checker, problem.cases[c], problem, child_path("cases", c));

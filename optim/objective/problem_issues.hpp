@@ -1,4 +1,4 @@
-// The findings on a whole problem: its scene, and what is asked of it.
+// The findings on a whole problem: its scene, and the tasks on it.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace mbsopt {
 
-// Without unused parameters, which are looked for where nothing else is wrong: unused_parameters.hpp.
+// Unused parameters are not among them: unused_parameters.hpp finds these if there is no other error.
 std::vector<SceneIssue> find_issues(const Problem& problem);
 
 }  // namespace mbsopt

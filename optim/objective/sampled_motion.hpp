@@ -1,10 +1,10 @@
-// A motion at given times: states and sensors; and how far two motions of one mechanism are apart.
+// A motion at given times (states and sensors), and the distance of two motions of one mechanism.
 //
 //   distance(t)^2 = 1/(total mass) sum over bodies of the integral of |x_1 - x_2|^2 dm
 //                 = 1/(total mass) sum (m |r_1 - r_2|^2 + tr(D P D')),   D = A(p_1) - A(p_2),   P = tr(J)/2 I - J
 //
-// the root mean square, over all material points x, of how far each is from where it is in the other motion [m].
-// Exact for rotations of any size, whatever the frames. Where nothing has mass, each body counts as a point of 1 kg.
+// It is the root mean square, over all material points x, of the distance between both motions [m]. It is exact for
+// rotations of any size and for any frames. If nothing has mass, each body counts as a point of 1 kg.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,7 +22,7 @@ struct SampledMotion {
   Eigen::MatrixXd sensors;  // one row per sensor of the scene
 };
 
-// `count` equal parts of the simulated span, their ends; the start is not among them, it is given.
+// The ends of `count` equal parts of the simulated span. The start is given and not among them.
 std::vector<double> sample_times(const SimulationSettings& settings, int count);
 
 // Fills `motion`, whose times are set; both arguments must outlive it.
@@ -32,9 +32,9 @@ class MotionDistance {
  public:
   explicit MotionDistance(const Mechanism& mechanism);
   double between(const Eigen::Ref<const Eigen::VectorXd>& y1, const Eigen::Ref<const Eigen::VectorXd>& y2) const;
-  // The largest over the times.
+  // The largest distance over the times.
   double between(const SampledMotion& one, const SampledMotion& other) const;
-  // How far a motion gets from where it is at its start, y0.
+  // The largest distance of a motion from its start, y0.
   double extent(const SampledMotion& motion, const Eigen::VectorXd& y0) const;
 
  private:

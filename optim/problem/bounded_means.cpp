@@ -28,7 +28,7 @@ std::string name_of_mean(std::size_t kind, const Expression& of) {
 
 namespace {
 
-// A limit and an objective per instant.
+// Adds a limit and an objective per instant.
 void name_sampled(Problem& problem) {
   std::vector<ObjectiveBound> bounds;
   for (ObjectiveBound& bound : problem.design->subject_to) {
@@ -38,7 +38,7 @@ void name_sampled(Problem& problem) {
     }
     for (const double t : instants(bound, problem.scene.simulation)) {
       ObjectiveSpec objective;
-      // 14 digits tell all instants apart and leave out the rounding of k every.
+      // 14 digits distinguish all instants and hide the rounding of k every.
       objective.name = fmt::format("{} at {:.14g} s", bound.sampled->text(), t);
       objective.samples = {{t, *bound.sampled}};
       bounds.push_back({objective.name, bound.lower, bound.upper});

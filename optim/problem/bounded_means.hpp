@@ -1,9 +1,9 @@
-// Limits on a mean of an expression, or on its values at instants, that no objective of the file has:
+// Limits on a mean of an expression, or on its values at instants, without an objective in the file:
 //
 //   "subject_to": [{"maximum_of": "F", "upper": 33}, {"sampled": "sin(mu)", "every": 0.5, "lower": 0.1}]
 //
-// A mean gets an objective of its own, "maximum_of F", each instant a limit and an objective, "sin(mu) at 0.5 s", so
-// that all that is done with objectives is done with them.
+// A mean gets an objective of its own, "maximum_of F". Each instant gets a limit and an objective, "sin(mu) at 0.5 s".
+// So all functions for objectives serve them, too.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace mbsopt {
 
-// Which of kMeanKinds a bound gives in place of an objective; the first where it gives several.
+// The entry of kMeanKinds that a bound gives in place of an objective; the first one if it gives several.
 std::optional<std::size_t> bounded_mean(const ObjectiveBound& bound);
 
 // Instants of a sampled limit: start_time + k every, up to end_time.
@@ -23,8 +23,8 @@ std::vector<double> instants(const ObjectiveBound& bound, const SimulationSettin
 
 std::string name_of_mean(std::size_t kind, const Expression& of);  // "maximum_of F"
 
-// Adds the objectives, and makes the bounds refer to them. The sharpness of an extreme is by default
-// ObjectiveBound::kSharpness/max(|lower|, |upper|), over 1 where that is 0: the expression has the size of its limit.
+// Adds the objectives, and makes the bounds refer to them. The default sharpness of an extreme is
+// ObjectiveBound::kSharpness/max(|lower|, |upper|), over 1 if that is 0: the expression has the size of its limit.
 void name_bounded_means(Problem& problem);
 
 }  // namespace mbsopt

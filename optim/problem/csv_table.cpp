@@ -48,7 +48,7 @@ class Reader {
   }
 
  private:
-  // The next line that is neither blank nor a comment.
+  // Reads the next line that is neither blank nor a comment.
   bool next_line() {
     while (!rest_.empty()) {
       const std::size_t end = std::min(rest_.find('\n'), rest_.size());
@@ -93,7 +93,7 @@ class Reader {
     }
   }
 
-  // From the opening quote to the delimiter or the end of the line.
+  // Reads from the opening quote to the delimiter or the end of the line.
   std::size_t quoted_cell(std::size_t i, std::string& text) const {
     const std::size_t start = i++;
     for (;; ++i) {
@@ -145,7 +145,7 @@ class Reader {
     return error == std::errc() && end == text.data() + text.size() && !text.empty();
   }
 
-  // "1,5": a number where decimals have a comma.
+  // Whether a text such as "1,5" is a number with a decimal comma.
   static bool is_decimal_comma(std::string text) {
     std::replace(text.begin(), text.end(), ',', '.');
     double number = 0;
@@ -160,7 +160,7 @@ class Reader {
     fail(cell.column, fmt::format("column '{}': '{}' is not a finite number", column, cell.text));
   }
 
-  // The cell's text with a decimal point. The first point or comma of the file says which one all others are.
+  // The cell's text with a decimal point. The first point or comma of the file decides for all others.
   std::string with_point(const Cell& cell, const std::string& column) {
     const std::size_t mark = cell.text.find_first_of(".,");
     if (mark == std::string::npos) return cell.text;

@@ -20,7 +20,7 @@
 
 namespace mbsopt {
 
-// "run1.csv:17:5: ...": what is wrong, with line and column where there is one.
+// "run1.csv:17:5: ...": the fault, with line and column if there are any.
 class CsvError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -30,13 +30,13 @@ struct CsvTable {
   std::string name;                           // of the file or files, for errors
   std::vector<std::string> header;            // each once
   std::vector<std::vector<double>> columns;   // NaN where a cell is missing
-  std::vector<std::size_t> lines;             // where in the file each row is, counted from 1
+  std::vector<std::size_t> lines;             // the line of each row, counted from 1
   std::vector<std::string> files = {};        // of a table made of several files: their names,
   std::vector<std::size_t> file_of_row = {};  // and the one that each row is of
 
   std::size_t rows() const { return lines.size(); }
   std::string place(std::size_t row) const;  // "run1.csv:17"
-  // A column by its header, or by its header without the unit in brackets where only one has that name.
+  // Finds a column by its header, or by its header without the unit in brackets if only one has that name.
   bool has_column(std::string_view column_name) const { return find_column(column_name) < header.size(); }
   std::size_t find_column(std::string_view column_name) const;  // header.size() where there is none
   const std::vector<double>& column(
@@ -53,7 +53,7 @@ struct ColumnHeader {
 };
 ColumnHeader parts_of_header(std::string_view header);
 
-// A column of times: every cell present and finite, each later than the one before. Throws CsvError naming the row.
+// Returns a column of times: every cell is finite and later than the one before. Throws CsvError with the row.
 const std::vector<double>& ascending_times(const CsvTable& table, std::string_view column_name);
 
 }  // namespace mbsopt

@@ -16,8 +16,8 @@
 namespace mbsopt {
 namespace {
 
-// Of the start's own place in time: a record as far from the start as this, in its own lengths, was hardly meant to be
-// reached by a simulation from there (clocks count from 1970 or from midnight).
+// A record farther from the start than this, in its own lengths, was not meant to be reached by a simulation. Its clock
+// may count from 1970 or from midnight.
 constexpr double kFar = 100;
 constexpr double kLong = 1e6;       // s: no motion of a mechanism is recorded for eleven days, but clocks count in us
 constexpr double kResolved = 1e-8;  // as simulation.end_time: a step of a millionth of the span still has two digits
@@ -59,7 +59,7 @@ class DataCheck {
              fmt::format("'{}' is compared by channels[{}] already; its samples would count twice", column, k)});
   }
 
-  // As the file or the problem gives it; empty: neither does.
+  // The unit in the file or the problem; empty if neither gives one.
   std::string unit_text(const ChannelSpec& channel) const {
     const std::string& header = data_.header[data_.find_column(channel.column)];
     return channel.unit.empty() ? std::string(parts_of_header(header).unit.value_or("")) : channel.unit;
@@ -87,7 +87,7 @@ class DataCheck {
     }
   }
 
-  // Rows of the channel's samples within the experiment.
+  // The rows of the channel's samples within the experiment.
   std::vector<std::size_t> samples(const ChannelSpec& channel) const {
     const std::vector<double>& t = data_.column(experiment_.time);
     const std::vector<double>& measured = data_.column(channel.column);
@@ -164,14 +164,14 @@ class DataCheck {
     if (!check_turns(c, rows)) check_size(c, std::abs(measured[*least]) > std::abs(measured[*most]) ? *least : *most);
   }
 
-  // The angle's sensor in rad that the column shows, by a gain that is known.
+  // The sensor of an angle in rad that the column shows, by a known gain.
   const Sensor* angle_sensor(const ChannelSpec& channel) const {
     const auto sensor = std::ranges::find(scene_.sensors, channel.sensor, &Sensor::name);
     const bool angle = sensor != scene_.sensors.end() && unit_of(scene_, *sensor) == "rad" && channel.gain.is_number();
     return angle ? &*sensor : nullptr;
   }
 
-  // An angle of many turns whose unit nobody gives may be in degrees.
+  // An angle of many turns without a given unit may be in degrees.
   void check_size(std::size_t c, std::size_t row) {
     constexpr double kMany = 100;  // rad: less than a third of a turn in degrees, 16 turns in radians
     const ChannelSpec& channel = experiment_.channels[c];
@@ -185,7 +185,7 @@ class DataCheck {
                        true});
   }
 
-  // An unwrapped angle is right where its samples are dense: steps of less than half a turn.
+  // An unwrapped angle is right if its samples are dense: steps of less than half a turn.
   bool check_unwrapped(std::size_t c, const std::vector<std::size_t>& rows) {
     constexpr double kDoubtful = 0.4;  // of a turn
     const ChannelSpec& channel = experiment_.channels[c];
@@ -205,7 +205,7 @@ class DataCheck {
     return false;
   }
 
-  // A jump is about a turn, and no usual step of the record. Returns whether one was found.
+  // A jump is about a turn, and larger than usual steps of the record. Returns whether there is one.
   bool check_turns(std::size_t c, const std::vector<std::size_t>& rows) {
     if (experiment_.channels[c].unwrap) return check_unwrapped(c, rows);
     constexpr double kAbout = 0.1, kUnusual = 5;  // of a turn; of the median step

@@ -1,6 +1,5 @@
-// Whether the data of an experiment can be used: its columns are there, each is compared once, its times ascend, and
-// something was measured in every channel. Placed at the field of the problem that asks for it. Warnings: angles that
-// jump by a turn.
+// Checks the data of an experiment: its columns exist, each is compared once, its times ascend, and every channel has
+// measurements. Findings name the field of the problem that uses the data. It warns of angles that jump by a turn.
 #pragma once
 
 #include <string>
@@ -12,7 +11,7 @@
 
 namespace mbsopt {
 
-// place: "identification.experiments[0]"; scene: for its start time and its sensors.
+// place is "identification.experiments[0]". scene gives its start time and its sensors.
 std::vector<SceneIssue> find_data_issues(const ExperimentSpec& experiment, const std::string& place,
                                          const CsvTable& data, const Scene& scene);
 

@@ -1,8 +1,8 @@
-// Load cases: several problems that one design must bear. A case is a problem of its own, with the same objectives and
-// the same parameters in the same order, so that everything that is computed of a problem is computed of a case.
+// Load cases: several problems that one design must satisfy. A case is a problem of its own, with the same objectives
+// and the same parameters in the same order. So every function of a problem also takes a case.
 //
-// An override makes a parameter p = e(rho) in this case: its scene has a definition p = e, and the parameter itself is
-// called otherwise there. So derivatives in the parameters of the problem are exact by the chain of all definitions.
+// An override makes a parameter p = e(rho) in this case: its scene has a definition p = e, and the parameter itself has
+// another name there. So the chain of all definitions gives exact derivatives in the parameters of the problem.
 //
 //   "cases": [{"name": "cold", "overrides": {"k1": "1.2*k1"}, "end_time": 2}]
 //
@@ -16,16 +16,17 @@
 
 namespace mbsopt {
 
-// Without the cases and the identification. Its design has the same variables, under their names in the case.
+// Returns the case without the cases and the identification. Its design has the same variables, under their names in
+// the case.
 Problem problem_of(const Problem& problem, const CaseSpec& load_case);
 
-// What a parameter of the problem is called in a case.
+// The name of a parameter of the problem in a case.
 std::string name_in(const CaseSpec& load_case, const std::string& parameter, const Scene& scene);
 
-// The words with the problem's names of parameters in place of those that they have in the case.
+// Replaces the case's names of parameters in words by those of the problem.
 std::string in_names_of_problem(std::string words, const CaseSpec& load_case, const Scene& scene);
 
-// The problems of all cases; the problem itself where it has none.
+// The problems of all cases, or the problem itself without cases.
 std::vector<Problem> problems_of_cases(const Problem& problem);
 
 }  // namespace mbsopt

@@ -35,13 +35,13 @@ ColumnUnit unit_of(const CsvTable& table, std::size_t column, const std::string&
   return {text, *unit};
 }
 
-// Without it, the name of a column that is there.
+// The place of the column, or an exception that names the existing ones.
 std::size_t place_of(const CsvTable& table, std::string_view column) {
   table.column(column);
   return table.find_column(column);
 }
 
-// Takes out jumps of more than half a turn from one sample to the next.
+// Removes jumps of more than half a turn from one sample to the next.
 void unwrap(std::vector<double>& values, double turn) {
   double last = kMissing, turns = 0;
   for (double& value : values) {
@@ -77,7 +77,7 @@ CsvTable merged(const std::vector<CsvTable>& tables, const std::vector<std::stri
   std::iota(order.begin(), order.end(), std::size_t{0});
   const std::vector<double>& t = all.columns[0];
   std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) { return t[a] < t[b]; });
-  // Rows of one time become one row; each cell of it may come from one file only.
+  // Rows of one time become one row. Each cell of it may come from one file only.
   CsvTable sorted{all.name, all.header, std::vector<std::vector<double>>(columns.size()), {}, all.files, {}};
   constexpr double kRounding = 1e-9;  // of the record's length, beyond what any logger resolves
   const double rounding = order.empty() ? 0 : kRounding * (t[order.back()] - t[order.front()]);
@@ -128,7 +128,7 @@ LoggedColumn times_in_seconds(const CsvTable& table, std::string_view column, co
     throw CsvError(fmt::format("{}: column '{}': '{}' is no unit of time", table.name, column, text));
   result.unit = "s";
   const bool first = time_zero == SampleColumn::kFirstRow;
-  // Taken off before the conversion: stamps of a clock have few digits left behind the point.
+  // The zero is subtracted before the conversion: stamps of a clock have few digits behind the point.
   const double zero = first ? (result.values.empty() ? 0 : result.values.front()) : time_zero.value_or(0) / unit.to_si;
   if (zero == 0 && unit.to_si == 1) return result;
   for (double& t : result.values) t = (t - zero) * unit.to_si;
@@ -173,7 +173,7 @@ CsvTable read_record(const ExperimentSpec& experiment, std::vector<std::string>*
   const bool one = experiment.data.size() == 1;
   for (const std::string& file : experiment.data) {
     CsvTable& table = tables.emplace_back(read_csv(file));
-    if (one && !table.has_column(experiment.time)) return std::move(table);  // whoever uses the column reports it
+    if (one && !table.has_column(experiment.time)) return std::move(table);  // the user of the column reports it
     std::set<std::size_t> converted{place_of(table, experiment.time)};
     const std::vector<double>& clock = table.column(experiment.time);
     const double first = clock.empty() ? 0 : clock.front();

@@ -1,14 +1,15 @@
-// Forces, costs and laws written in C++ that problem files call by name: those of a plug-in (plugin.hpp), or of a
-// program of a user (program.hpp).
+// Forces, costs and laws written in C++ that problem files call by name. They come from a plug-in (plugin.hpp), or from
+// a user's program (program.hpp).
 //
 //   NamedTerms terms;
 //   terms.add_force("drag", {"c"}, std::make_shared<Drag>());
 //   terms.add_cost("effort", {}, std::make_shared<Effort>());
 //   terms.add_law("cam", [](double x, int order) { ... });
+//
 // In the file: "forces": [{"name": "d", "type": "user", "force": "drag", "bodies": ["rod"], "parameters": {"c":
 // "c0"}}], "objectives": {"e": {"user": {"cost": "effort"}}}, and "law": {"user": "cam"} of a drive.
 //
-// rho of a term is its own parameters, in the order of the names given here. One object may serve several forces and
+// rho of a term holds its own parameters, in the order of the names given here. One object may serve several forces and
 // objectives, from several threads. This header needs no library: a plug-in is compiled with headers alone.
 #pragma once
 
@@ -35,7 +36,7 @@ struct NamedCost {
   std::shared_ptr<const RunningCost> running;    // either may be absent (null)
   std::shared_ptr<const TerminalCost> terminal;  // likewise
 };
-// The value (order 0) and derivatives at x of a smooth function; which orders are asked for: curve.hpp.
+// The value (order 0) and derivatives at x of a smooth function. curve.hpp lists the required orders.
 struct NamedLaw {
   std::string name;
   std::function<double(double x, int order)> f;
@@ -43,7 +44,7 @@ struct NamedLaw {
 
 class NamedTerms {
  public:
-  // Throw std::invalid_argument where there is no term (null), no name, or one that is taken.
+  // Throw std::invalid_argument for a null term, and for an empty or taken name.
   void add_force(std::string name, std::vector<std::string> parameters, std::shared_ptr<const UserForce> force) {
     require(forces_, "force", name, force != nullptr);
     forces_.push_back({std::move(name), std::move(parameters), std::move(force)});

@@ -1,10 +1,11 @@
-// The objectives that are a mean over the simulated time T. A new kind is a row of the table; it is tested by a row of
-// tests/optim/objective/objective_test.cpp.
+// The objectives that are a mean over the simulated time T. A new kind is a row of the table. A row of
+// tests/optim/objective/objective_test.cpp tests it.
 //
 //   psi = N(I/T),   I = integral of M(x) dt,   x an expression, N the inverse of M
 //   maximum_of   M = exp(k x)    N = log(m)/k    k = sharpness        minimum_of   the same with k = -sharpness
 //   rms_of       M = x^2         N = sqrt(m)
 //   peak_to_peak_of   psi = maximum_of - minimum_of, two such means
+//
 // An extreme is the same for every x0 in M(x - x0), x0 + N: x0 keeps exp within the range of numbers.
 #pragma once
 
@@ -33,7 +34,7 @@ inline Jet exponential(double x, double k) {
 }
 inline Jet logarithm(double m, double k) { return {std::log(m) / k, 1 / (k * m), -1 / (k * m * m)}; }
 inline Jet square(double x, double) { return {x * x, 2 * x, 2}; }
-// At 0 it has no derivative, which is given as 0. Methods with negative weights may sum squares to -1e-33.
+// At 0 there is no derivative; it is given as 0. Methods with negative weights may sum squares to -1e-33.
 inline Jet root(double m, double) {
   if (m <= 0) return {0, 0, 0};
   const double x = std::sqrt(m);

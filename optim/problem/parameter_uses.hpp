@@ -1,4 +1,4 @@
-// Which fields of a problem each parameter enters, directly or through definitions.
+// The fields of a problem that each parameter enters, directly or through definitions.
 #pragma once
 
 #include <string>

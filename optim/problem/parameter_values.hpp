@@ -9,12 +9,12 @@
 
 namespace mbsopt {
 
-Eigen::VectorXd parameter_values(const Scene& scene);  // as the scene gives them
+Eigen::VectorXd parameter_values(const Scene& scene);  // the scene's values
 
-// Indices by name; all where names is empty. Throws std::invalid_argument: what is unknown, what there is.
+// Indices by name, or all if names is empty. Throws std::invalid_argument with the unknown name and the existing ones.
 std::vector<int> parameter_indices(const Scene& scene, const std::vector<std::string>& names);
 
-// Size of a parameter for differences and Taylor steps: |value|, or the range of its bounds, or 1.
+// The size of a parameter for differences and Taylor steps: |value|, or the range of its bounds, or 1.
 double typical_size(const Parameter& parameter, double value);
 
 }  // namespace mbsopt

@@ -1,5 +1,5 @@
 // A plug-in: a shared library with forces, costs and laws that problem files call by name (docs/plug-ins.md). It is
-// compiled with this package's headers alone, and tells by which: what is compiled otherwise is refused.
+// compiled with this package's headers alone and records their version. A plug-in of another version is refused.
 //
 //   #include <mbsopt/plugin.hpp>
 //   MBSOPT_PLUGIN(terms) { terms.add_force("drag", {"c"}, std::make_shared<Drag>()); }
@@ -16,8 +16,8 @@
 
 namespace mbsopt {
 
-// On which the layout of what is passed depends: the classes of this version, the compiler's ABI, and the alignment of
-// Eigen's vectors, which -march changes.
+// The layout of passed objects depends on the classes of this version, the compiler's ABI, and the alignment of Eigen's
+// vectors. -march changes the last one.
 inline constexpr const char* kPluginInterface =
     "mbsopt 0.1, ABI " MBSOPT_TEXT(__GXX_ABI_VERSION) ", Eigen " MBSOPT_TEXT(EIGEN_WORLD_VERSION) "." MBSOPT_TEXT(
         EIGEN_MAJOR_VERSION) "." MBSOPT_TEXT(EIGEN_MINOR_VERSION) " aligned to " MBSOPT_TEXT(EIGEN_MAX_ALIGN_BYTES);

@@ -1,5 +1,5 @@
-// A whole problem: scene, objectives, and what is to be done with them, as plain data. The reader in app/ fills it from
-// a file; a C++ user may fill it by hand.
+// A whole problem as plain data: scene, objectives and tasks. The reader in app/ fills it from a file; a C++ user may
+// fill it by hand.
 #pragma once
 
 #include <algorithm>
@@ -21,23 +21,23 @@ struct ObjectiveSample {
   Expression value;  // of t, sensors and parameters
 };
 
-// Of one mode of the motion beside the initial state, which must be an equilibrium (docs/linearisation.md).
+// An eigenvalue of one mode of the motion near the initial state, an equilibrium (docs/linearisation.md).
 struct EigenvalueSpec {
   int mode = 1;                     // from slow to fast, at the values of the file
   std::string value = "frequency";  // [Hz], or "damping": its ratio
 };
 
-// When a tracked row is taken: at its time; where the motion is nearest to it; or that in the order of the rows.
+// The instant of a tracked row: its time, the instant nearest to it, or the nearest in the order of the rows.
 enum class Timing { prescribed, free, ordered };
 
-// A sensor's samples to follow: adds sum over the rows k of a file of weight (sensor(t_k) - column_k)^2.
+// Samples for a sensor to follow: adds the sum over the rows k of a file of weight (sensor(t_k) - column_k)^2.
 struct TrackTerm : SampleColumn {
   std::string sensor;
   Field weight = 1.0;                  // of parameters
   Timing timing = Timing::prescribed;  // else the curve is over rows, from 0 (free_instants.hpp)
 };
 
-// Costs written in C++, by their name. Their rho is their own parameters, in the order of this list, and their y that
+// Costs written in C++, by their name. Their rho holds their own parameters, in the order of this list. Their y is that
 // of the bodies: (q, v), 7 numbers each per body.
 struct UserCostSpec {
   std::string cost;
@@ -47,8 +47,8 @@ struct UserCostSpec {
   std::shared_ptr<const TerminalCost> terminal = {};
 };
 
-// psi = integral of running + terminal at the end time + sum of samples and track + parameters_only; or, alone, one of
-// the means of objective_kinds.hpp, or an eigenvalue.
+// psi = integral of running + terminal at the end time + sum of samples and track + parameters_only. Or it is, alone,
+// one of the means of objective_kinds.hpp, or an eigenvalue.
 struct ObjectiveSpec {
   std::string name;
   std::optional<Expression> running, terminal, parameters_only;
@@ -58,7 +58,7 @@ struct ObjectiveSpec {
   std::optional<EigenvalueSpec> eigenvalue;  // alone
   std::optional<double> sharpness;           // of an extreme [1/unit of the expression]
   static constexpr double kSharpness = 100;
-  // Written in C++, in place of all of the above: no file has them, but design, check and the others take them.
+  // Costs in C++ that replace all of the above. No file has them, but design, check and the others take them.
   std::shared_ptr<const RunningCost> running_in_cpp = {};
   std::shared_ptr<const TerminalCost> terminal_in_cpp = {};
   std::optional<UserCostSpec> user = {};  // the same by its name, in a file
@@ -70,7 +70,7 @@ struct ObjectiveSpec {
   }
 };
 
-// Of a named objective, or of a mean of an expression that has no name (bounded_means.hpp).
+// A limit on a named objective, or on a mean of an expression without a name (bounded_means.hpp).
 struct ObjectiveBound {
   std::string objective;
   std::optional<double> lower = {}, upper = {};
@@ -96,7 +96,7 @@ struct OptimizerSpec {
 
 enum class StartSampling { latin_hypercube, sobol };
 
-// Runs from several starts: first from the given values, then from points between the bounds.
+// Runs from several starts: first the given values, then points between the bounds.
 struct MultistartSpec {
   int starts = 20;
   std::optional<long> seed;  // drawn when absent
@@ -112,19 +112,19 @@ struct DriveLaw {
   std::optional<SampledLaw> samples;
 };
 
-// Samples of a signal in one experiment or load case, instead of its own.
+// Samples of a signal in one experiment or load case, which replace its own.
 struct SignalSamples : SampleColumn {
   std::string name;  // of the signal
 };
 
-// One of several loads that one design must bear: how it differs from the problem.
+// One of several loads of a design: its differences from the problem.
 struct CaseSpec {
   std::string name;
   double weight = 1;                       // factor of the minimised objective
   std::vector<Definition> overrides = {};  // parameters, as expressions of the parameters of the problem
   std::vector<DriveLaw> drives = {};       // instead of the scene's laws
   std::vector<SignalSamples> signals = {};
-  std::vector<Condition> conditions = {};  // of the start; one on a sensor of the scene's conditions replaces that one
+  std::vector<Condition> conditions = {};  // of the start; each replaces the scene's condition on its sensor
   std::optional<double> end_time = {};
 };
 
@@ -139,8 +139,8 @@ struct DesignSpec {
   std::optional<MultistartSpec> multistart;
 };
 
-// Whether a channel's sigma is given, its own estimate in each experiment, or one estimate for all channels of its
-// column.
+// A channel's sigma is given (none), estimated in each experiment (own), or estimated for all channels of its column
+// (shared).
 enum class SigmaEstimate { none, own, shared };
 
 struct ChannelSpec {
@@ -159,7 +159,7 @@ struct WindowsSpec {
   bool continuity = false;                     // each ends where the next one starts
 };
 
-// Which window of which experiment of the problem file an experiment is.
+// The experiment and window of the problem file that an experiment is made from.
 struct WindowOrigin {
   std::string experiment, place;  // its name and its path
   std::size_t number = 1;         // from 1
@@ -170,7 +170,7 @@ struct ExperimentSpec {
   std::string name;
   std::vector<std::string> data;               // CSV files, resolved against the problem file's folder
   std::string time = "t";                      // their time column
-  std::string time_unit = {};                  // of it, as of a SampleColumn
+  std::string time_unit = {};                  // unit of the times, as in SampleColumn
   std::optional<double> time_zero = {};        // as of a SampleColumn; first: of the first file
   std::optional<double> start_time, end_time;  // instead of the simulation's; rows outside are left out
   std::vector<ChannelSpec> channels;
@@ -178,13 +178,13 @@ struct ExperimentSpec {
   std::vector<SignalSamples> signals;                     // of this experiment, instead of the scene's
   std::vector<DriveLaw> drives;                           // of this experiment, instead of the scene's laws
   std::vector<std::string> free;                          // parameters with a value of their own here
-  std::optional<WindowsSpec> windows = {};                // in which it is simulated
-  std::optional<WindowOrigin> origin = {};                // where it is one of them
+  std::optional<WindowsSpec> windows = {};                // its windows
+  std::optional<WindowOrigin> origin = {};                // set if it is a window
   bool validate = false;                                  // role: scored (only "free" refitted), not fitted
 };
 
-// What standard errors take the residuals for: independent noise, noise that is correlated in time, or noise that may
-// be anything within an experiment, but is independent between experiments. automatic: by tests of the residuals.
+// The assumption of standard errors on the residuals: independent noise, noise that is correlated in time, or noise
+// that is independent between experiments only. `automatic` decides by tests of the residuals.
 enum class CovarianceType { automatic, white, newey_west, windows };
 
 struct IdentificationSpec {  // problem.cpp defines the constructors, so that they are compiled once
@@ -219,7 +219,7 @@ struct Problem {  // the same
   std::optional<DesignSpec> design;
   std::optional<IdentificationSpec> identification;
   std::vector<std::string> plugins = {};       // shared libraries of named_terms.hpp, resolved as data files are
-  std::vector<std::string> columns_read = {};  // what the reader converted to SI, in words
+  std::vector<std::string> columns_read = {};  // conversions to SI, in words
 };
 
 }  // namespace mbsopt

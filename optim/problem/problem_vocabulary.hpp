@@ -1,4 +1,4 @@
-// Every field of a problem beyond its scene, told to a visitor; see core/scene/vocabulary.hpp.
+// Describes every field of a problem beyond its scene to a visitor; see core/scene/vocabulary.hpp.
 #pragma once
 
 #include <string>

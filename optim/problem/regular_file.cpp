@@ -27,7 +27,7 @@ struct Descriptor {
 }  // namespace
 
 std::string content_of_regular_file(const std::filesystem::path& file, std::size_t at_most) {
-  // O_NONBLOCK: a FIFO without a writer is opened at once, and then refused.
+  // O_NONBLOCK opens a FIFO without a writer at once; it is then refused.
   const Descriptor in{::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)};
   struct stat what = {};
   if (in.number < 0 || ::fstat(in.number, &what) != 0) fail();

@@ -1,5 +1,6 @@
-// The content of a regular file. Pipes and devices are refused: they may never end, and a second reader of a pipe finds
-// nothing, while problem files, data and journals are read more than once (to simulate, and for their checksums).
+// The content of a regular file. Pipes and devices are refused, because they may never end. A second reader of a pipe
+// also finds nothing, but problem files, data and journals are read more than once (to simulate, and for their
+// checksums).
 #pragma once
 
 #include <cstddef>
@@ -10,13 +11,13 @@
 
 namespace mbsopt {
 
-// Why a file cannot be read, without its name.
+// The reason why a file cannot be read, without its name.
 class FileError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// Throws FileError, also where the file is larger than at_most [bytes].
+// Throws FileError, also if the file is larger than at_most [bytes].
 std::string content_of_regular_file(const std::filesystem::path& file,
                                     std::size_t at_most = std::numeric_limits<std::size_t>::max());
 

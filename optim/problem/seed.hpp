@@ -1,4 +1,4 @@
-// Seeds of what is random. A seed that is not given is drawn once and told, so that any run can be repeated.
+// Seeds of random numbers. If a seed is not given, it is drawn once and reported, so that any run can be repeated.
 #pragma once
 
 namespace mbsopt {

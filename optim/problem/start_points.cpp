@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Index;
 
-// The standard's distributions differ from library to library; its generators do not.
+// The standard's distributions differ between libraries; its generators do not.
 class Random {
  public:
   explicit Random(long seed) : generator_(static_cast<std::uint64_t>(seed)) {}

@@ -1,12 +1,12 @@
-// Where the runs of a multistart begin.
+// The starting points of a multistart.
 //
 //   latin_hypercube   every variable takes one value in each of n equal slices of its range, in random order:
 //                     McKay, Beckman and Conover, Technometrics 21 (1979) 239-245
 //   sobol             the low-discrepancy sequence of Sobol' with Joe and Kuo's direction numbers (SIAM J. Sci. Comput.
 //                     30 (2008) 2635-2654), shifted by a random vector modulo 1 (Cranley and Patterson 1976)
 //
-// The same seed gives the same points on every machine. Ranges are those of the scaled variables: of a stiffness with
-// "scale": "log" the logarithm is spread evenly.
+// The same seed gives the same points on every machine. Ranges are those of the scaled variables: a stiffness with
+// "scale": "log" has evenly spread logarithms.
 //
 //   const auto starts = start_values({k1, L1}, *spec.multistart, seed);   // starts[0]: the given values
 #pragma once
@@ -19,7 +19,7 @@
 
 namespace mbsopt {
 
-// count points of the unit cube, one per column.
+// Returns count points of the unit cube, one per column.
 Eigen::MatrixXd unit_points(StartSampling sampling, Eigen::Index dimension, Eigen::Index count, long seed);
 
 // Values of the parameters at each start; they must have bounds (missing_bounds).

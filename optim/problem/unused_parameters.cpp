@@ -25,8 +25,8 @@ concept ForceBetweenBodies = requires(const Kind& kind) {
   kind.body1;
 };
 
-// Sets of bodies that joints, forces and conditions connect: all connections are made before a body is looked at. The
-// ground is no body here.
+// Sets of bodies that joints, forces and conditions connect. Make all connections before a query. The ground is no body
+// here.
 class ConnectedBodies {
  public:
   explicit ConnectedBodies(const Scene& scene) : parent_(scene.bodies.size()) {
@@ -51,7 +51,7 @@ class ConnectedBodies {
   void look_at_all() {
     for (std::size_t i = 0; i < parent_.size(); ++i) seen_.insert(root_of(i));
   }
-  // Whether any of them moves with a body that is looked at.
+  // Whether any of them is connected with an observed body.
   bool matter(const std::vector<std::string>& bodies) {
     for (const std::string& body : bodies)
       if (const auto it = index_.find(body); it != index_.end() && seen_.contains(root_of(it->second))) return true;
@@ -89,7 +89,7 @@ class FieldSearch {
     return used_;
   }
 
-  // The scene without the bodies that no objective depends on, and without what acts on these alone.
+  // The scene without bodies that no objective depends on, and without elements that act on these alone.
   Scene needed(std::vector<std::string>& left_out) {
     used_parameters();
     Scene needed = scene_;
@@ -111,7 +111,7 @@ class FieldSearch {
   }
 
  private:
-  // Also one that looks at several bodies, some of which are there.
+  // Whether the sensor reads one of the bodies; it may also read others.
   bool reads(const Sensor& sensor, const std::set<std::string>& bodies) const {
     if (measures_everything(sensor)) return false;
     const std::vector<std::string> read = bodies_of(sensor);
@@ -297,7 +297,7 @@ class FieldSearch {
   std::set<std::string> used_, used_sensors_;
 };
 
-// What is used in the problem or in one of its load cases; by the names of the problem.
+// The parameters in use in the problem or in one of its load cases, by the names of the problem.
 std::set<std::string> used_in(const Problem& problem) {
   std::set<std::string> used;
   if (problem.cases.empty() || problem.identification) used = FieldSearch(problem).used_parameters();
@@ -310,7 +310,7 @@ std::set<std::string> used_in(const Problem& problem) {
   return used;
 }
 
-// The problem with nothing but the objectives that its design uses.
+// The problem with only those objectives that its design uses.
 Problem as_designed(const Problem& problem) {
   Problem designed;
   designed.scene = problem.scene, designed.cases = problem.cases;
@@ -343,14 +343,14 @@ void add_idle(const std::vector<std::string>& variables, const Problem& judged_b
   }
 }
 
-// Judged without objectives and identification, everything that uses a parameter counts.
+// Without objectives and identification, every use of a parameter counts.
 std::set<std::string> used_anywhere(const Problem& problem) {
   Problem model_only;
   model_only.scene = problem.scene;
   return FieldSearch(model_only).used_parameters();
 }
 
-// Also coefficients that a law replaces.
+// This counts coefficients that a law replaces, too.
 std::set<std::string> used_beside_laws(Problem problem) {
   for (Force& force : problem.scene.forces)
     std::visit(

@@ -1,13 +1,14 @@
-// Parameters that cannot matter: nothing uses them, or what uses them cannot reach any objective or measurement, so
-// that their gradient entries would be zero by structure. An error rather than a silent zero; "allow_unused" lifts it.
+// Parameters without effect: nothing uses them, or nothing that uses them reaches an objective or measurement. Their
+// gradient entries would be zero by structure. This is an error rather than a silent zero; "allow_unused" permits it.
 //
-// A parameter matters when it occurs
+// A parameter has an effect when it occurs
 //   in an objective, or in sigma, gain or bias of a channel;
 //   in a sensor that one of these uses;
-//   in the model of the bodies that such a sensor looks at, and of all bodies that joints, forces or initial conditions
+//   in the model of the bodies that such a sensor observes, and of all bodies that joints, forces or initial conditions
 //   connect with those (not through the ground): their fields, joints, forces and conditions, and gravity.
-// energy, constraint_violation and smallest_singular_value look at all bodies. A problem without objectives and
-// identification is judged as if a sensor looked at everything.
+//
+// energy, constraint_violation and smallest_singular_value observe all bodies. A problem without objectives and
+// identification counts as if a sensor observed everything.
 #pragma once
 
 #include <vector>
@@ -17,23 +18,23 @@
 
 namespace mbsopt {
 
-// For a problem without other issues.
+// The problem must have no other issues.
 std::vector<SceneIssue> find_unused_parameters(const Problem& problem);
 
-// Sets allow_unused of parameters that matter to measurements or load cases alone: commands that look at the objectives
-// of the problem itself let them be.
+// Sets allow_unused of parameters that only measurements or load cases use. Commands on the problem's own objectives
+// then accept them.
 void allow_what_only_measurements_use(Problem& problem);
 
-// The problem as far as its objectives depend on it: without the bodies that none of them looks at and that nothing
-// connects with one that is looked at (not through the ground), and without what acts on or measures these. Such bodies
-// then cost nothing in values and gradients. Parameters stay as they are. For a problem without other issues.
+// The problem as far as its objectives depend on it. It omits bodies that no objective observes and that nothing
+// connects with an observed one (not through the ground). It also omits elements that act on or measure these. Such
+// bodies then cost nothing in values and gradients. Parameters stay. The problem must have no other issues.
 Problem what_objectives_need(const Problem& problem, std::vector<std::string>* left_out = nullptr);
 
 // Likewise, the problem as far as its measurements depend on it.
 Problem what_measurements_need(const Problem& problem, std::vector<std::string>* left_out = nullptr);
 
-// Variables of a design that matter to none of the objectives it minimises or bounds, and variables and free parameters
-// of an identification that matter to none of its channels, though they may matter to other objectives of the problem.
+// Finds variables of a design without effect on the objectives that it minimises or bounds. Finds variables and free
+// parameters of an identification without effect on its channels. They may affect other objectives of the problem.
 std::vector<SceneIssue> find_idle_variables(const Problem& problem);
 
 }  // namespace mbsopt

@@ -1,7 +1,7 @@
-// Between parameters rho (SI units) and the variables x an optimiser sees, about 1 in size.
+// The map between parameters rho (SI units) and the variables x of an optimiser, about 1 in size.
 //
 //   linear   rho = s x        s = max(|value|, (upper - lower)/100), or 1 where that is 0
-//   log      rho = exp(x)     for what is known only in its order of magnitude; rho > 0
+//   log      rho = exp(x)     for a parameter whose order of magnitude alone is known; rho > 0
 //   log10    rho = 10^x
 //
 //   const VariableScaling scaling({k1, L1});
@@ -18,8 +18,8 @@ namespace mbsopt {
 
 class VariableScaling {
  public:
-  // The chosen parameters, in the order of x. Throws std::invalid_argument where a logarithm does not exist, where the
-  // bounds are the wrong way round and where the value lies outside of them.
+  // Takes the chosen parameters, in the order of x. Throws std::invalid_argument if a logarithm does not exist, if the
+  // bounds are reversed, or if the value lies outside of them.
   explicit VariableScaling(const std::vector<Parameter>& parameters);
 
   Eigen::Index size() const { return static_cast<Eigen::Index>(variables_.size()); }

@@ -21,7 +21,7 @@ class ActiveSet {
   }
 
   VectorXd solve() {
-    // Each turn holds a variable or releases one; rounding alone could let them alternate.
+    // Each turn holds or releases a variable. Only rounding could let them alternate.
     for (Index turn = 0; turn < 10 * d_.size() + 10; ++turn)
       if (reach_solution_of_free() && !release()) break;
     return d_;
@@ -29,12 +29,12 @@ class ActiveSet {
 
  private:
   VectorXd gradient() const { return A_.transposed_times(A_ * d_ - b_); }
-  // At a bound beyond which the sum would fall. Where both bounds meet, none can move.
+  // Whether the variable is at a bound beyond which the sum would fall. A variable with equal bounds cannot move.
   bool pushes_out(Index k, double g) const {
     return (d_(k) <= lower_(k) && g > 0) || (d_(k) >= upper_(k) && g < 0) || lower_(k) >= upper_(k);
   }
 
-  // Moves to the solution of the free variables, or as far as the first bound; returns whether it was reached.
+  // Moves to the solution of the free variables, or as far as the first bound. Returns whether it reached the solution.
   bool reach_solution_of_free() {
     if (free_.empty()) return true;
     const Index n = static_cast<Index>(free_.size());

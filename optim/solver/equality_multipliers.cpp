@@ -15,7 +15,7 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 constexpr double kFaster = 10, kHeaviest = 1e4;  // omega; the square of the largest is far from 1/rounding
-constexpr double kFirstTolerance = 1e-2;         // of a round that only shows the next one where to start
+constexpr double kFirstTolerance = 1e-2;         // tolerance of a round that only gives a start to the next one
 constexpr double kSatisfied = 1e-6;              // |W c| over the norm of the residuals: a millionth of their noise
 constexpr int kLooseRounds = 2;
 constexpr int kRounds = 10;  // each lowers c by omega^2, so that three or four are usual
@@ -30,7 +30,7 @@ class Round : public LeastSquaresProblem {
   }
 
   void evaluate(const VectorXd& x, LeastSquaresPoint& point) override {
-    if (x_.size() > 0 && x == x_) {  // where the last round ended
+    if (x_.size() > 0 && x == x_) {  // the end of the last round
       point = at_x_;
     } else {
       ++evaluations;
@@ -43,7 +43,7 @@ class Round : public LeastSquaresProblem {
     point.z_x.bottomRows(W_.size()).array().colwise() *= Omega.array();
   }
 
-  // Turns the solution of a round into that of the problem given.
+  // Turns the solution of a round into that of the given problem.
   void end(LeastSquaresResult& solution) {
     const VectorXd Omega = omega_ * W_;
     auto c = solution.point.z.tail(W_.size());
@@ -55,13 +55,13 @@ class Round : public LeastSquaresProblem {
     solution.cost_final = given_.cost(solution.point.z);
   }
 
-  // |W c| over the norm of the residuals.
+  // |W c| divided by the norm of the residuals.
   double left() const {
     const VectorXd z = given_.weights(at_x_.z).cwiseSqrt().cwiseProduct(at_x_.z).head(size - W_.size());
     return W_.cwiseProduct(at_x_.z.tail(W_.size())).norm() / std::max(z.norm(), kNoResidual);
   }
 
-  // Every equation holds within its own errors.
+  // Whether every equation holds within its own errors.
   bool closed() const {
     const Eigen::ArrayXd c = at_x_.z.tail(W_.size()).array().abs();
     return given_.closed.size() == c.size() && (c <= given_.closed.array()).all();

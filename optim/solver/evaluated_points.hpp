@@ -1,5 +1,5 @@
-// The points of a nonlinear program that a solver has asked for: each is computed once, failures are told from results,
-// and the best is kept whatever becomes of the solver.
+// The points of a nonlinear program that a solver evaluates. Each is computed once, and failures are separate from
+// results. It keeps the best point for any outcome of the solver.
 //
 //   EvaluatedPoints points(problem, result, 1e-8);
 //   const NlpPoint& p = points.at(x, Wanted::derivatives);   // from memory when x was asked for before
@@ -18,12 +18,12 @@ namespace mbsopt {
 
 class EvaluatedPoints {
  public:
-  // Counts evaluations into `outcome`, with the first error. records: may be null.
+  // Counts evaluations into `outcome`, with the first error. records may be null.
   EvaluatedPoints(NonlinearProgram& problem, SolverOutcome& outcome, double constraint_tolerance,
                   PointRecords* records = nullptr);
 
-  // x is taken into the bounds first, which methods may leave by a rounding error. The reference holds until the next
-  // call.
+  // Moves x into the bounds first, because methods may leave them by a rounding error. The reference is valid until the
+  // next call.
   const NlpPoint& at(const Eigen::VectorXd& x, Wanted wanted);
   const Eigen::VectorXd& x() const { return x_; }  // of the last call, within the bounds
 

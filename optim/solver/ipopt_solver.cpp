@@ -54,12 +54,12 @@ class Adapter : public Ipopt::TNLP {
 
   bool start_is_valid() { return evaluate(x_start_); }
   bool out_of_evaluations() const { return out_of_evaluations_; }
-  SearchEnd end() const { return end_; }  // that was chosen here, of the last round
+  SearchEnd end() const { return end_; }  // the end of the last round, if chosen here
   bool lost() const { return end_ == SearchEnd::wandering || end_ == SearchEnd::creeping; }
   bool second_order() const { return second_order_; }
   int left_newton_at() const { return left_newton_at_; }  // iteration; 0: never
 
-  // Feasible, and the objective falls nowhere within the bounds: the barrier would only lead away from here.
+  // Whether the start is feasible and the objective falls nowhere within the bounds. The barrier would only lead away.
   bool start_is_optimal() {
     const double distance = optimality(problem_, points_.x(), *point_);
     if (!points_.feasible(*point_) || distance > options_.tolerance) return false;
@@ -96,8 +96,8 @@ class Adapter : public Ipopt::TNLP {
     return true;
   }
 
-  // Whichever of the four is asked for first computes all of them, so that a point fails where Ipopt can shorten the
-  // step (f, c) and never where it would give up (the gradients).
+  // The first of the four functions that Ipopt calls computes all of them. So a point fails where Ipopt can shorten the
+  // step (f, c), and never where Ipopt would give up (the gradients).
   bool eval_f(Index n, const Number* x, bool, Number& f) override {
     if (!evaluate(VectorIn(x, n))) return false;
     f = point_->f;
@@ -108,7 +108,7 @@ class Adapter : public Ipopt::TNLP {
     VectorView(c, m) = point_->c;
     return true;
   }
-  // Derivatives are asked for only where Ipopt has gone: at its iterates.
+  // Ipopt asks for derivatives only at its iterates.
   bool eval_grad_f(Index n, const Number* x, bool, Number* f_x) override {
     if (!evaluate(VectorIn(x, n))) return false;
     VectorView(f_x, n) = point_->f_x;
@@ -126,7 +126,8 @@ class Adapter : public Ipopt::TNLP {
     return true;
   }
 
-  // Of the Lagrangian: the lower triangle, row by row. Where it cannot be computed, the one before serves again.
+  // The Hessian of the Lagrangian: the lower triangle, row by row. If it cannot be computed, the previous one serves
+  // again.
   bool eval_h(Index n, const Number* x, bool, Number f_factor, Index m, const Number* multipliers, bool, Index,
               Index* row, Index* column, Number* values) override {
     Index k = 0;
@@ -149,7 +150,7 @@ class Adapter : public Ipopt::TNLP {
   bool intermediate_callback(Ipopt::AlgorithmMode, Index iteration, Number, Number, Number, Number, Number, Number,
                              Number, Number, Index, const Ipopt::IpoptData*,
                              Ipopt::IpoptCalculatedQuantities*) override {
-    if (round_ > 0 && iteration == 0) return true;  // the point it goes on from
+    if (round_ > 0 && iteration == 0) return true;  // the start of this round
     result_.iterations = iterations_before_ + iteration;
     out_of_evaluations_ = options_.max_evaluations && result_.evaluations >= *options_.max_evaluations;
     if (iterate_.size() == 0) return !out_of_evaluations_;
@@ -164,7 +165,7 @@ class Adapter : public Ipopt::TNLP {
     return options_.progress({result_.iterations, iterate_f_, iterate_violation_, distance, iterate_});
   }
 
-  // Of a run that was ended here, the end was chosen here.
+  // If this class ended the run, it has already chosen the end point.
   void finalize_solution(Ipopt::SolverReturn, Index n, const Number* x, const Number*, const Number*, Index,
                          const Number*, const Number*, Number, const Ipopt::IpoptData*,
                          Ipopt::IpoptCalculatedQuantities*) override {
@@ -175,10 +176,10 @@ class Adapter : public Ipopt::TNLP {
     return final_.size() > 0 && evaluate(final_) ? optimality(problem_, final_, *point_) : kUnknown;
   }
 
-  // Of a stalled search, the end point's optimality.
+  // The optimality of the end point of a stalled search.
   double distance() const { return watch_.most_stationary().distance; }
 
-  // Whether a point seen on the way is feasible and better than the one Ipopt ended at by more than the tolerance.
+  // Whether a feasible point on the way is better than Ipopt's end point by more than the tolerance.
   bool passed_a_better_point() {
     if (final_.size() == 0 || !points_.have_best() || !evaluate(final_)) return false;
     const double gain = (point_->f - points_.best().f) * problem_.f_scale;
@@ -192,15 +193,15 @@ class Adapter : public Ipopt::TNLP {
     ++round_;
   }
 
-  // Ipopt gives up where a constraint's noise is larger than what it may be missed by, or no step lowers the objective
-  // by more than noise. The best point may be optimal all the same.
+  // Ipopt gives up if the noise of a constraint exceeds its tolerance, or no step lowers the objective by more than
+  // noise. The best point may still be optimal.
   bool best_is_optimal() const {
     return points_.have_best() && points_.feasible(points_.best()) &&
            optimality(problem_, points_.best_x(), points_.best()) <= kAcceptable * options_.tolerance;
   }
   bool best_is_feasible() const { return points_.have_best() && points_.feasible(points_.best()); }
 
-  // The solution where Ipopt converged, else the best point seen.
+  // Takes the solution if Ipopt converged, else the best point.
   void finish(bool converged) {
     if (converged && final_.size() > 0 && evaluate(final_)) {
       result_.x = points_.x(), result_.point = *point_;
@@ -210,13 +211,14 @@ class Adapter : public Ipopt::TNLP {
   }
 
  private:
-  // Interior points may leave the bounds by a rounding error; EvaluatedPoints takes them back.
+  // Interior points may leave the bounds by a rounding error; EvaluatedPoints moves them back.
   bool evaluate(const Eigen::VectorXd& x) {
     point_ = &points_.at(x, Wanted::derivatives);
     return point_->ok;
   }
 
-  // Ipopt would go on. Lost searches begin anew, a few times; of Newton's creeping ones BFGS takes over.
+  // Ipopt would continue. A search without progress starts again, a few times. If Newton steps progress slowly, BFGS
+  // replaces them.
   void look_at_iterate(double distance) {
     end_ = watch_.look({iterate_, point_->f * problem_.f_scale, distance}, points_.best().f * problem_.f_scale);
     if ((lost() && round_ >= kFreshStarts) || (end_ == SearchEnd::creeping && !second_order_)) end_ = SearchEnd::none;
@@ -224,10 +226,10 @@ class Adapter : public Ipopt::TNLP {
     if (end_ == SearchEnd::stalled) final_ = watch_.most_stationary().x;
   }
 
-  // The Hessian of f; but without constraints, where it is not positive definite, BFGS. Negative curvature holds for a
-  // short way only, and Ipopt would add what makes all steps as short; the gradients of the iterates tell of a longer
-  // one. Gauss-Newton's is mended by it where it does not explain how the gradient has changed, exact ones by the third
-  // derivative along their step.
+  // The Hessian of f. If it is not positive definite and there are no constraints, BFGS replaces it: negative curvature
+  // holds for a short distance only. Ipopt would add a multiple of the identity that shortens all steps; the gradients
+  // of the iterates cover a longer distance. BFGS also corrects Gauss-Newton's Hessian if it contradicts the change of
+  // the gradient. The third derivative along their step corrects exact Hessians.
   Eigen::MatrixXd for_steps() const {
     const Eigen::MatrixXd& of_f = hessians_.of[0];
     if (problem_.constraints() > 0) return of_f;
@@ -307,8 +309,8 @@ Outcome stalled_in_words(double distance, const NlpResult& result, const IpoptOp
                       counted(SearchWatch::kStalled, "iteration"), distance, options.tolerance, result.failures())};
 }
 
-// Ipopt's linear solver, MUMPS, takes some MB at once. Where it does not get them, Ipopt reports an error in its step.
-// Throws std::bad_alloc where the system has not so much to give.
+// Ipopt's linear solver, MUMPS, takes some MB at once. Without this memory Ipopt reports an error in its step. So this
+// throws std::bad_alloc if the system does not have it.
 void require_memory() {
   constexpr std::size_t kOfMumps = 16 << 20;  // [bytes]
   ::operator delete(::operator new(kOfMumps));
@@ -361,7 +363,7 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
   list.SetStringValue("sb", "yes");  // no banner
   list.SetStringValue("hessian_approximation", second_order ? "exact" : "limited-memory");
   list.SetIntegerValue("limited_memory_max_history", options.history);
-  // Newton's steps converge faster than the barrier falls from its usual 0.1; BFGS needs that time to learn.
+  // Newton steps converge faster than the barrier falls from its usual 0.1. BFGS needs that time to learn.
   if (second_order) list.SetNumericValue("mu_init", 1e-3);
   if (second_order && !constrained) {  // all matrices are positive definite: Newton's steps need no barrier
     list.SetNumericValue("mu_init", 0.1 * options.tolerance);
@@ -373,8 +375,8 @@ void set_options(Ipopt::IpoptApplication& application, const IpoptOptions& optio
   list.SetNumericValue("bound_relax_factor", 0);  // a bound is a bound: masses and logarithms stay positive
   list.SetNumericValue("tol", options.tolerance);
   list.SetNumericValue("constr_viol_tol", options.constraint_tolerance);
-  // Simulations have noise. Where optimality hangs just above the tolerance and f, about 1 in size, has stopped to
-  // change by what that tolerance amounts to (f - f* = f_x^2/(2 f_xx)), no more is to be had.
+  // Simulations have noise. If optimality stays just above the tolerance and f (about 1 in size) changes by less than
+  // the tolerance implies (f - f* = f_x^2/(2 f_xx)), no further progress is possible.
   list.SetNumericValue("acceptable_tol", kAcceptable * options.tolerance);
   list.SetNumericValue("acceptable_obj_change_tol", options.tolerance * options.tolerance);
   list.SetNumericValue("acceptable_constr_viol_tol", options.constraint_tolerance);
@@ -408,8 +410,8 @@ NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_s
     result.status = SolverStatus::converged, result.message = "converged: the start is optimal already";
     return result;
   }
-  // From far away a barrier method may leave the valley of a good point for a worse one. Then it starts once more,
-  // there.
+  // From a far start a barrier method may leave the valley of a good point for a worse one. Then it starts once more at
+  // the good point.
   Outcome outcome{SolverStatus::failed, "Ipopt refused its options"};
   for (int round = 0; round <= kFreshStarts; ++round) {
     const Ipopt::SmartPtr<Ipopt::IpoptApplication> application = new Ipopt::IpoptApplication(false);  // no console

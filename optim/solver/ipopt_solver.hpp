@@ -1,6 +1,6 @@
-// Ipopt: a primal-dual interior point method with a filter line search, here with a limited-memory BFGS Hessian or with
-// the program's own, exact or approximate. Waechter and Biegler, Mathematical Programming 106 (2006) 25-57. For smooth
-// problems with bounds and constraints. With MUMPS it is not thread-safe: one run at a time per process.
+// Ipopt: a primal-dual interior point method with a filter line search, for smooth problems with bounds and
+// constraints. The Hessian is limited-memory BFGS or the program's own, exact or approximate. Waechter and Biegler,
+// Mathematical Programming 106 (2006) 25-57. With MUMPS it is not thread-safe: one run at a time per process.
 //
 //   IpoptOptions options;
 //   options.tolerance = 1e-8;
@@ -22,13 +22,13 @@ struct IpoptOptions {
   int history = 20;                    // pairs kept by the limited-memory Hessian
   std::function<bool(const NlpProgress&)> progress;  // after every iteration; false stops
   bool second_order = false;                         // Hessians of the program, which must have hessians()
-  bool gauss_newton = false;                         // they leave something out, which the gradients' changes tell of
-  std::optional<long> max_evaluations = {};          // looked at after every iteration
+  bool gauss_newton = false;                         // incomplete Hessians; changes of gradients correct them
+  std::optional<long> max_evaluations = {};          // tested after every iteration
   PointRecords* records = nullptr;
   bool warm_start = false;  // the start is near the solution: hardly any barrier, bounds that it touches stay touched
 };
 
-// Never throws for what an evaluation does: exceptions of evaluate() are failed evaluations, too.
+// Never throws because of an evaluation: exceptions of evaluate() are failed evaluations, too.
 NlpResult solve_with_ipopt(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const IpoptOptions& options = {});
 
 }  // namespace mbsopt

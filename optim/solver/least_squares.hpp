@@ -1,19 +1,19 @@
-// A nonlinear least-squares problem, as every solver here sees it:
+// A nonlinear least-squares problem, in the form of every solver here:
 //
 //   minimise 1/2 sum rho(z_i(x)^2) + 1/2 sum z_j(x)^2   subject to   x_lower <= x <= x_upper,   z_k(x) = 0
 //
-// rho is the loss (robust_loss.hpp); `plain` residuals, j, are squared whatever it is. The last `equalities` rows, k,
-// are no residuals but equations between the variables (equality_multipliers.hpp).
+// rho is the loss (robust_loss.hpp). `plain` residuals, j, are squared for any loss. The last `equalities` rows, k, are
+// no residuals but equations between the variables (equality_multipliers.hpp).
 //
-// Residuals of a scale group have a common standard deviation s that is not known. The fit eliminates it:
+// Residuals of a scale group have a common unknown standard deviation s. The fit eliminates it:
 //
 //   minimise over s:  1/2 sum z_i^2/s^2 + f log s      =>      s^2 = sum z_i^2/f,      cost f/2 (1 + log(sum z_i^2/f))
 //
 // which is the likelihood of normal noise if f is the number of residuals (Seber and Wild, "Nonlinear Regression"
-// (1989), section 2.2). Groups are for the loss that is the square.
+// (1989), section 2.2). Groups need the squared loss.
 //
-// Residuals and their Jacobian come together, since one simulation gives both; an evaluation that fails says so in
-// words, and the solver shortens its step.
+// Residuals and their Jacobian come together, since one simulation gives both. A failed evaluation reports the reason
+// in words, and the solver shortens its step.
 //
 //   struct Line : LeastSquaresProblem {
 //     Line() : LeastSquaresProblem(2, 3) {}
@@ -59,22 +59,22 @@ struct LeastSquaresProblem {
   LeastSquaresProblem(const LeastSquaresProblem&) = delete;
   LeastSquaresProblem& operator=(const LeastSquaresProblem&) = delete;
 
-  // point arrives sized, with zeros.
+  // point arrives sized and zeroed.
   virtual void evaluate(const Eigen::VectorXd& x, LeastSquaresPoint& point) = 0;
 
   Eigen::Index variables() const { return x_lower.size(); }
   double cost(const Eigen::VectorXd& z) const;
-  // w, so that d cost/d z_i = w_i z_i.
+  // Returns w with d cost/d z_i = w_i z_i.
   Eigen::VectorXd weights(const Eigen::VectorXd& z) const;
-  // d cost/d z_i, residual by residual.
+  // Returns d cost/d z_i, residual by residual.
   Eigen::VectorXd pull(const Eigen::VectorXd& z) const;
 
   Eigen::VectorXd x_lower, x_upper;  // +-infinity where there is none
   Eigen::Index size;                 // N
-  Eigen::Index equalities = 0;       // of them, the last: zero at the solution
+  Eigen::Index equalities = 0;       // the number of last rows that are zero at the solution
   Eigen::VectorXd closed;            // per equality: |c| that its own errors leave; empty: none
   bool is_integrated = true;         // z has the errors of an integrator; known after an evaluation
-  Eigen::Index plain = 0;            // of them, the last before the equalities: not seen by the loss
+  Eigen::Index plain = 0;            // the number of rows before the equalities that ignore the loss
   Loss loss;
   std::vector<ScaleGroup> groups;  // disjoint
   std::vector<Dependence> parts;   // all rows, each once; empty: any row may depend on any variable

@@ -25,12 +25,12 @@ constexpr double kAccepted = 1e-3;       // part of the promised gain
 constexpr int kInvalidSteps = 30;        // in a row; each shortens the step, the last ones to nothing
 constexpr double kNothing = 1e-14;       // norm of the residuals, which are in units of their sigma
 constexpr double kGradient = 1e-14;      // cosine between the residuals and any column: rounding
-// Of its length at the last point, the least that D keeps of a column. Near a point where the column vanishes, steps by
-// its length alone would grow without limit.
+// D keeps at least this part of a column's length at the last point. Near a point where the column vanishes, steps
+// scaled by its length alone would grow without limit.
 constexpr double kShrinking = 0.5;
-// Change of a step, relative, below which it is weighed well enough; a rest of a hundredth costs no evaluation.
+// The weights are good enough if the step changes by less than this part; a remaining hundredth costs no evaluation.
 constexpr double kWeighed = 1e-2;
-constexpr int kWeighings = 100;  // of one step; each lowers its cost, so that fewer do no harm
+constexpr int kWeighings = 100;  // of one step; each lowers its cost, so fewer are harmless
 
 // The weighted residuals of one part and their derivatives, as triangles: |z + J d|^2 = |q + R d|^2 + constant.
 struct Triangle {
@@ -38,7 +38,7 @@ struct Triangle {
   VectorXd q;
 };
 
-// J: columns of these variables, then z.
+// J holds the columns of these variables, then z.
 Triangle triangle(std::vector<Index> variables, MatrixXd J) {
   const Index n = J.cols() - 1, rows = std::min(J.rows(), n);
   const MatrixXd R = triangular_factor(std::move(J));
@@ -54,7 +54,7 @@ struct LinearModel {
 
   LinearModel(const LeastSquaresProblem& problem, const LeastSquaresPoint& point)
       : LinearModel(point, problem.weights(point.z).cwiseSqrt(), problem.parts) {}
-  // w: square roots of the weights.
+  // w holds square roots of the weights.
   LinearModel(const LeastSquaresPoint& point, const VectorXd& w, const std::vector<Dependence>& parts)
       : LinearModel(triangles(point, w, parts), point.z_x.cols(), 0.5 * w.cwiseProduct(point.z).squaredNorm()) {}
   MatrixXd squares() const {  // J'J
@@ -209,8 +209,8 @@ class Search {
       if (settled) return converged(model, lambda);
       if (!trial.ok && ++invalid == kInvalidSteps)
         return end(SolverStatus::failed, "failed: too many evaluations in a row" + result_.failures());
-      // The cost that a model misses falls with the square of the step where it is smooth, and with its length at a
-      // kink.
+      // The error of the model's cost falls with the square of the step where the cost is smooth, and with its length
+      // at a kink.
       const double length = model.units.cwiseProduct(d).norm(), miss = std::abs(promised - gained);
       if (missed > 0 && miss < kSimulationNoise * model.size && miss > std::sqrt(length / missed) * missed_by)
         return end(SolverStatus::converged,
@@ -218,7 +218,7 @@ class Search {
                                "that the derivatives promise",
                                miss, promised));
       missed = std::isfinite(miss) ? length : 0, missed_by = miss;
-      // The parabola through both costs with the slope at the start.
+      // Uses the parabola through both costs with the slope at the start.
       const double slope = model.gradient.dot(d);
       const double part = std::isfinite(cost) ? std::clamp(-slope / (2 * (cost - cost_ - slope)), 0.1, 0.5) : 0.25;
       const double longest = part * model.units.cwiseProduct(d).norm();
@@ -229,7 +229,7 @@ class Search {
     }
   }
 
-  // The weights follow the residuals z + J d that the step leads to (levenberg_marquardt.hpp).
+  // The weights are those of the residuals z + J d after the step (levenberg_marquardt.hpp).
   VectorXd step(const LinearModel& model, double& lambda) {
     bend_.resize(0);
     if (learnt_.takes_part) return curved_step(model, lambda);
@@ -255,7 +255,7 @@ class Search {
   // d'S d/2
   double raised_by(const VectorXd& d) const { return 0.5 * d.dot(learnt_.S.matrix() * d); }
 
-  // The step that reckons with the bend of the residuals, seen in the last step, along d.
+  // The step with the bend of the residuals along d, which the last step showed.
   VectorXd bent_step(const LinearModel& model, const VectorXd& d, double lambda) {
     const VectorXd last = model.units.cwiseProduct(last_step_);
     const double tau = last.dot(model.units.cwiseProduct(d)) / last.squaredNorm();
@@ -265,7 +265,7 @@ class Search {
     return weighed_step(LinearModel(problem_, bent), model.units, lambda);
   }
 
-  // The step with J'J + S. lambda: rises where the matrix of the step is not positive definite.
+  // The step with J'J + S. lambda rises if the matrix of the step is not positive definite.
   VectorXd curved_step(const LinearModel& model, double& lambda) const {
     constexpr double kFirstRise = 1e-8, kRise = 4;  // rises that rounding of J'J does not undo
     const VectorXd D = model.units.unaryExpr([](double length) { return length > 0 ? length : 1; });
@@ -284,7 +284,7 @@ class Search {
     return bounded_linear_least_squares(RowBlocks(MatrixXd(L.transpose())), b, lower, upper).cwiseQuotient(D);
   }
 
-  // One length for all variables in units of their ranges, the least of their columns.
+  // Sets one length for all variables in units of their ranges: the smallest of their columns.
   void equalise(VectorXd& units) const {
     const VectorXd sizes = (problem_.x_upper - problem_.x_lower).unaryExpr([](double range) {
       return std::isfinite(range) && range > 0 ? range : 1.0;
@@ -308,7 +308,7 @@ class Search {
     return bounded_linear_least_squares(A, model.R.beside_damping(-model.q), lower, upper).cwiseQuotient(D);
   }
 
-  // Where a step ends at a bound, x is that bound.
+  // If a step ends at a bound, x equals that bound.
   VectorXd moved(const VectorXd& d) const {
     constexpr double kRounding = 4e-16;
     VectorXd x = x_ + d;
@@ -319,7 +319,7 @@ class Search {
     return x.cwiseMax(problem_.x_lower).cwiseMin(problem_.x_upper);
   }
 
-  // By what it changes of the residuals, so that units of the variables do not matter.
+  // The step is measured by its change of the residuals, so that units of the variables do not matter.
   bool is_short(const LinearModel& model, const VectorXd& d) const {
     const double size = model.units.cwiseProduct(x_).norm() + options_.tolerance * std::sqrt(2 * model.size);
     return model.units.cwiseProduct(d).norm() <= options_.tolerance * size;
@@ -337,7 +337,7 @@ class Search {
     return true;
   }
 
-  // Largest entry of the gradient, without those that only press on a bound.
+  // The largest entry of the gradient, without those that only press on a bound.
   double free_gradient(const LinearModel& model) const {
     double largest = 0;
     for (Index k = 0; k < x_.size(); ++k)
@@ -345,7 +345,7 @@ class Search {
     return largest;
   }
 
-  // How far the best step along one free variable lowers the cost by the derivatives, a lower bound of the rest.
+  // The decrease of the cost by the best step along one free variable, from the derivatives: a lower bound of the rest.
   double promise(const LinearModel& model) const {
     double most = 0;
     for (Index k = 0; k < x_.size(); ++k)
@@ -354,7 +354,7 @@ class Search {
     return most;
   }
 
-  // Steps that were shortened to nothing are no convergence.
+  // Steps that were shortened to nothing are not convergence.
   void converged(const LinearModel& model, double lambda) {
     const double left = promise(model);
     result_.promised = model.size > 0 ? left / model.size : 0;

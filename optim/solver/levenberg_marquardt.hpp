@@ -1,36 +1,36 @@
-// Levenberg-Marquardt within bounds, for nonlinear least squares. Converges fast where the residuals at the solution
+// Levenberg-Marquardt within bounds, for nonlinear least squares. It converges fast if the residuals at the solution
 // are small.
 //
 //   step d:   minimise |z + J d|^2 + lambda |D d|^2   subject to   x_lower <= x + d <= x_upper,   D_k = |column k of J|
 //
-// Each step is the exact solution of this problem by an active set (bounded_linear_least_squares.hpp). So bounds that
-// are active at the solution cost no more evaluations than others, and near it the convergence is that without bounds:
-// Kanzow, Yamashita and Fukushima, Journal of Computational and Applied Mathematics 172 (2004) 375. lambda falls after
-// a step that did what the model promised, by the rule of Nielsen, report IMM-REP-1999-05, Technical University of
-// Denmark. After a step that did not, it rises until the step is as much shorter as a parabola along it says.
+// An active set solves this problem exactly in each step (bounded_linear_least_squares.hpp). So bounds that are active
+// at the solution cost no further evaluations, and near it the convergence is that without bounds: Kanzow, Yamashita
+// and Fukushima, Journal of Computational and Applied Mathematics 172 (2004) 375. The damping lambda falls after a step
+// that met the model's promise, by the rule of Nielsen, report IMM-REP-1999-05, Technical University of Denmark. After
+// another step it rises until the step is shortened to the minimum of a parabola along it.
 //
-// Where the problem says which residuals depend on which variables, factors are those of its parts (row_blocks.hpp), so
-// that a step costs no more than linearly in their number.
+// If the problem declares which residuals depend on which variables, factors are those of its parts (row_blocks.hpp).
+// The cost of a step is then at most linear in their number.
 //
-// Where residuals stay large (`large_residuals`), J'J is only a part of the second derivatives. The rest, S, is learnt
-// from gradients (residual_curvature.hpp). Along a curved valley the last step s, from J to J+, tells how residuals
+// If residuals stay large (`large_residuals`), J'J is only a part of the second derivatives. The rest, S, is learnt
+// from gradients (residual_curvature.hpp). Along a curved valley the last step s, from J to J+, shows how residuals
 // bend along the next one, d:
 //   z(x + d) ~ z + b + J d,   b = tau^2/2 (J+ - J) s,   tau = s'D^2 d/s'D^2 s,   d: the step without b
 // The step minimises |z + b + J d|^2 + lambda |D d|^2, a geodesic acceleration that takes no evaluation (Transtrum and
 // Sethna, "Improvements to the Levenberg-Marquardt algorithm for nonlinear least-squares minimization",
-// arXiv:1201.5885). After each trial the model that foretold the cost best, with S or with b, makes the next step.
-// lambda rises until the matrix with S is positive definite. D is then the same for all variables in units of their
-// ranges: where a residual changes fast in one direction, the lengths of all columns grow with it, and steps across
-// that direction would be damped, too.
+// arXiv:1201.5885). After each trial, the model that predicted the cost best, with S or with b, makes the next step.
+// Then lambda rises until the matrix with S is positive definite. D is then the same for all variables in units of
+// their ranges. Otherwise a residual that changes fast in one direction would lengthen all columns and damp steps
+// across that direction, too.
 //
-// A loss, and sigmas that the problem eliminates, make a cost of the residuals that is no square. The step minimises
-// this cost of the linear residuals, by weights (LeastSquaresProblem::weights) of the residuals that it leads to:
+// With a loss, or with eliminated sigmas, the cost of the residuals is not a square. The step minimises this cost of
+// the linear residuals, by weights (LeastSquaresProblem::weights) of the residuals after the step:
 //   minimise cost(z + J d) + lambda |D d|^2/2:   d <- the step above with the weights at z + J d,   until d is settled
-// The costs are concave in the squares, so that each d lowers them (Hunter and Lange, The American Statistician 58
-// (2004) 30). With the weights at z alone the convergence would be linear where residuals of several scales disagree.
+// The costs are concave in the squares, so each d lowers them (Hunter and Lange, The American Statistician 58 (2004)
+// 30). With the weights at z alone the convergence would be linear if residuals of several scales disagree.
 //
-// Where the sequence of an integrator's steps changes, the cost jumps. The search ends where what a step missed does
-// not fall with its length, and is more than it promised.
+// The cost jumps where the sequence of an integrator's steps changes. The search ends if the error of a step's promise
+// does not fall with the step's length, and exceeds the promise.
 //
 //   LeastSquaresOptions options;
 //   options.max_iterations = 50;
@@ -46,11 +46,12 @@
 
 namespace mbsopt {
 
-// Part of the cost that errors of the simulation may amount to. At rtol 1e-5 the derivatives promise below 1e-8 of the
-// cost of the start at a minimum; in front of a wall of failed points, or with wrong derivatives, they promise most.
+// Errors of the simulation may amount to this part of the cost. At a minimum, with rtol 1e-5, the derivatives promise
+// less than 1e-8 of the cost of the start. In front of failed points, or with wrong derivatives, they promise most of
+// it.
 inline constexpr double kSimulationNoise = 1e-4;
 
-// A search fills this with what it has learnt of large residuals; the next one, of nearly the same, begins with it.
+// The knowledge of a search on large residuals. The next search on a similar problem begins with it.
 struct LearntCurvature {
   explicit LearntCurvature(Eigen::Index variables) : S(variables) {}
   ResidualCurvature S;
@@ -63,10 +64,10 @@ struct LeastSquaresOptions {
   std::function<bool(const LeastSquaresProgress&)> progress;  // after every iteration; false stops
   std::optional<long> max_evaluations = {};                   // > 0, that of the start counted
   bool large_residuals = false;                               // without parts, losses and groups
-  LearntCurvature* learnt = nullptr;                          // of large residuals; null: nothing is known before
+  LearntCurvature* learnt = nullptr;                          // knowledge of large residuals; null without any
 };
 
-// x_start is taken into the bounds. Never throws for what an evaluation does: exceptions of evaluate() are failed
+// Moves x_start into the bounds. Never throws because of an evaluation: exceptions of evaluate() are failed
 // evaluations, too.
 LeastSquaresResult solve_least_squares(LeastSquaresProblem& problem, const Eigen::VectorXd& x_start,
                                        const LeastSquaresOptions& options = {});

@@ -14,20 +14,19 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-// Part of |z|. This value, among those from 0.05 to 1, ends most runs of eighteen_points_starts.json, in the fewest
-// evaluations: lighter limits let the search pass into dead points, heavier ones make valleys of them that steps follow
-// slowly.
+// The weight as part of |z|. Of the values from 0.05 to 1, this one ends most runs of eighteen_points_starts.json, in
+// the fewest evaluations. With lighter limits the search passes into dead points. Heavier limits form valleys that
+// steps follow slowly.
 constexpr double kLimitWeight = 0.15;
-// The weight rises if a round that settled leaves more than a quarter of |c - P(s)|: Nocedal and Wright,
-// framework 17.3.
+// The weight rises if a converged round leaves more than a quarter of |c - P(s)|: Nocedal and Wright, framework 17.3.
 constexpr double kSettledRound = 1e-7, kFallenEnough = 0.25, kHeavierLimit = 3, kHeaviestLimit = 1e3;
 constexpr double kLoosest = 1e-2,
                  kTightening = 0.03;   // tolerances of rounds that only show the next one where to start
 constexpr double kLimitsHeld = 1e-6;   // |c - P(s)| at the end: what ranks as feasible
 constexpr double kFinerLimits = 1e-4;  // of the last tolerance: the cost is stationary in x, the limits are not
 constexpr int kLimitRounds = 30;       // seven or eight are usual
-// A round from the fourth on that met failed points, and whose derivatives promise so many times its tolerance, ended
-// in front of them. Where no limit holds it back, the rounds after it would come no farther.
+// From the fourth round on, a round that met failed points ended in front of them if its derivatives promise so many
+// times its tolerance. If no limit is active, further rounds would not improve it.
 constexpr int kFirstJudged = 3;
 constexpr double kPromisesMore = 10;
 
@@ -43,7 +42,7 @@ class LimitRound : public LeastSquaresProblem {
   }
 
   void evaluate(const VectorXd& x, LeastSquaresPoint& point) override {
-    if (known_.z.size() > 0 && x == x_) {  // where the last round ended
+    if (known_.z.size() > 0 && x == x_) {  // the end of the last round
       point = known_;
     } else {
       ++evaluations;
@@ -60,7 +59,7 @@ class LimitRound : public LeastSquaresProblem {
     if (const double cost = point.z.squaredNorm(); cost <= best_.cost) best_ = {x, std::move(given), cost};
   }
 
-  // Turns the solution of a round into that of the problem given, at the cost of no evaluation where it is known.
+  // Turns the solution of a round into that of the given problem, without an evaluation if it is known.
   bool end(LeastSquaresResult& solution, double tolerance) {
     Evaluated at_best = std::exchange(best_, {});
     LeastSquaresPoint& at = at_best.point;
@@ -87,7 +86,7 @@ class LimitRound : public LeastSquaresProblem {
   struct {
     VectorXd x;
     double cost = 0;  // without limits
-  } last;             // that was evaluated
+  } last;             // the last evaluation
 
  private:
   VectorXd taken_in(const VectorXd& c) const { return c.cwiseMax(c_lower_).cwiseMin(c_upper_); }

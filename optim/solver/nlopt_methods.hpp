@@ -1,4 +1,4 @@
-// The methods of NLopt that a design may name, and what each can do. The table in nlopt_methods.cpp is the only list.
+// The methods of NLopt for a design, and the abilities of each. The table in nlopt_methods.cpp is the only list.
 //
 // The augmented Lagrangian is NLopt's (Birgin and Martinez 2008). Global methods need all bounds.
 #pragma once
@@ -23,18 +23,17 @@ const NloptMethod* find_nlopt_method(std::string_view name);  // nullptr: no suc
 std::string_view nlopt_method_names();                        // "slsqp mma ..."
 std::string_view nlopt_methods_by_kind();                     // "local methods with gradients (slsqp, ...) and ..."
 
-// Whether limited-memory BFGS is part of it.
+// Whether the method uses limited-memory BFGS.
 bool keeps_pairs(const NloptMethod& method);
 
-// Where none is given: 500 for local methods with gradients, 500 (n + 1) for those without, 1000 (n + 1) for global
-// ones.
+// The default is 500 for local methods with gradients, 500 (n + 1) for those without, and 1000 (n + 1) for global ones.
 long default_max_evaluations(const NloptMethod& method, Eigen::Index variables);
 
 struct NloptNeeds {
   std::size_t variables = 0;
   bool constraints = false, equalities = false;
 };
-// Why the method cannot solve such a problem, with what can; empty where it can.
+// The reason why the method cannot solve such a problem, with methods that can; empty if it can.
 std::string nlopt_refusal(const NloptMethod& method, const NloptNeeds& needs);
 
 }  // namespace mbsopt

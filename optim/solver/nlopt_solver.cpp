@@ -24,14 +24,14 @@ using Eigen::VectorXd;
 using VectorIn = Eigen::Map<const VectorXd>;
 using VectorView = Eigen::Map<VectorXd>;
 
-constexpr int kFailuresInARow = 40;  // of local methods: they are lost
+constexpr int kFailuresInARow = 40;  // of local methods, which then end
 constexpr double kFirstStep = 0.1;   // of x, without derivatives
-constexpr double kAcceptable = 100;  // times the tolerance: as Ipopt's second way to converge
-constexpr int kFreshStarts = 2;      // of local methods with gradients, from their best point
+constexpr double kAcceptable = 100;  // times the tolerance: the factor of Ipopt's acceptable level
+constexpr int kFreshStarts = 2;      // restarts of local methods with gradients, from their best point
 constexpr long kCreeping = 50;       // evaluations in which methods of separable models have to gain
-constexpr double kLeastGain = 0.01;  // so much of f; along a narrow valley they do not, and slsqp goes on
+constexpr double kLeastGain = 0.01;  // part of f; in a narrow valley the gain is less, and slsqp continues
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-constexpr long kRequestsPerPoint = 20;  // of points in memory; then a method goes round in circles
+constexpr long kRequestsPerPoint = 20;  // requests of stored points; beyond it a method repeats itself
 
 using Optimizer = std::unique_ptr<nlopt_opt_s, decltype(&nlopt_destroy)>;
 
@@ -124,14 +124,14 @@ class Adapter {
     add(equalities_, nlopt_add_equality_mconstraint, equality_values);
   }
 
-  // From x on, which becomes where it ends.
+  // Starts at x, which becomes the end point.
   nlopt_result optimized(VectorXd& x) {
     nlopt_result code = NLOPT_SUCCESS;
     for (int round = 0; round <= kFreshStarts; ++round) {
       const double f_before = points_.best().f;
       double f = 0;
       code = nlopt_optimize(opt_, x.data(), &f);
-      // A line search that got lost in what it had learnt may get on without it.
+      // A line search that stalls with its learnt curvature may progress without it.
       if (ended() || (creeps_ && !handed_over_) || !stalled() || !(points_.best().f < f_before)) break;
       x = points_.best_x();
     }
@@ -146,7 +146,7 @@ class Adapter {
         fmt::format(", from evaluation {} on {}", result_.evaluations + 1, nlopt_algorithm_name(NLOPT_LD_SLSQP));
   }
 
-  // Separable models know nothing of a valley that lies askew to the variables.
+  // Separable models do not represent a valley that is oblique to the variables.
   void look_for_gain() {
     if (method_.constraints != ConstraintSupport::inequalities || creeps_ || ended()) return;
     if (result_.evaluations < next_look_) return;
@@ -156,12 +156,12 @@ class Adapter {
     if (creeps_ && opt_) nlopt_force_stop(opt_);
   }
 
-  // Bounds, and when steps and changes have become too small to go on.
+  // Sets bounds, and the sizes of steps and changes that end the search.
   void limit(nlopt_opt opt, const VectorXd& x_start) const {
     nlopt_set_lower_bounds(opt, problem_.x_lower.data());
     nlopt_set_upper_bounds(opt, problem_.x_upper.data());
     const VectorXd size = x_start.cwiseAbs().cwiseMax(1);
-    // With gradients, convergence is judged by them; the steps only say when nothing moves any more.
+    // With gradients, these decide on convergence; the steps only show that nothing moves any more.
     const VectorXd x_tolerance = (method_.gradients ? 1e-6 : 1.0) * options_.tolerance * size;
     nlopt_set_xtol_abs(opt, x_tolerance.data());
     nlopt_set_ftol_abs(opt, 1e-2 * options_.tolerance * options_.tolerance);
@@ -182,7 +182,7 @@ class Adapter {
     add_to(opt_, static_cast<unsigned>(sides.size()), values, this, tolerance.data());
   }
 
-  // Nothing may be thrown through NLopt, which is C.
+  // No exception may pass through NLopt, which is C.
   template <class F>
   static void guarded(Adapter& self, F&& evaluate) {
     try {
@@ -225,7 +225,7 @@ class Adapter {
     });
   }
 
-  // The value for NLopt: of the point, or what stands for it where it cannot be evaluated.
+  // The point for NLopt, or its substitute if it cannot be evaluated.
   const NlpPoint& at(const VectorXd& x) {
     if (!x.allFinite()) end(Ended::not_a_number);
     if (ended()) return last_good_;
@@ -267,8 +267,8 @@ class Adapter {
            optimality(problem_, result_.x, result_.point) > kAcceptable * options_.tolerance;
   }
 
-  // A constraint that is missed by its tolerance buys a lower objective: of points whose objectives differ by no more
-  // than the tolerances, the most stationary one is the solution.
+  // A constraint violation within its tolerance allows a lower objective. So among points whose objectives differ by no
+  // more than the tolerances, the most stationary one is the solution.
   bool as_good_as_best(double f) const {
     const double margin = std::max(options_.tolerance, 10 * options_.constraint_tolerance);
     return (f - points_.best().f) * problem_.f_scale <= margin;
@@ -285,9 +285,9 @@ class Adapter {
     if (solution_x_.size() > 0 && as_good_as_best(solution_.f)) result_.x = solution_x_, result_.point = solution_;
   }
 
-  // Where a point fails, the function rises so that the method comes back: with gradients along the step as much as the
-  // last good gradient promised to fall, which makes a line search take a quarter of its step; without, above all that
-  // was seen. Constraints are as they were.
+  // If a point fails, its function value is high, so that the method returns. With gradients it rises along the step by
+  // the decrease that the last good gradient promised. A line search then takes a quarter of its step. Without
+  // gradients it exceeds all values so far. Constraints keep their values.
   void set_stand_in() {
     stand_in_ = last_good_;
     const double least = 1e-3 * std::max(std::abs(last_good_.f), 1 / problem_.f_scale);
@@ -358,7 +358,7 @@ class Adapter {
       return put(
           SolverStatus::infeasible,
           "infeasible: no point near the last one satisfies the constraints; relax them or start elsewhere" + failures);
-    if (code == NLOPT_MAXEVAL_REACHED) {  // of requests for points that are known
+    if (code == NLOPT_MAXEVAL_REACHED) {  // requests of known points reached the limit
       if (method_.global) return say_searched();
       return put(SolverStatus::no_progress, "no further progress: the method goes round in circles" + failures);
     }

@@ -1,6 +1,6 @@
 // NLopt: a dozen local and global methods behind one call. S. G. Johnson, "The NLopt nonlinear-optimization package".
 //
-// Which ones there are, and what they can do: nlopt_methods.hpp.
+// nlopt_methods.hpp lists them and their abilities.
 //
 //   NloptOptions options;
 //   options.method = "slsqp";
@@ -19,7 +19,8 @@ namespace mbsopt {
 
 struct NloptOptions {
   std::string method = "slsqp";
-  // With gradients: of the scaled optimality conditions. Without: the last steps, relative to x where that is above 1.
+  // With gradients, this is for the scaled optimality conditions. Without, it is for the last steps, relative to |x| if
+  // above 1.
   double tolerance = 1e-6;
   double constraint_tolerance = 1e-8;  // largest violation of a constraint that counts as feasible, unscaled
   std::optional<long> max_evaluations;
@@ -30,8 +31,8 @@ struct NloptOptions {
   PointRecords* records = nullptr;
 };
 
-// Throws std::invalid_argument with nlopt_refusal(), or where a global method lacks bounds; never for what an
-// evaluation does.
+// Throws std::invalid_argument with nlopt_refusal(), or if a global method lacks bounds. Never throws because of an
+// evaluation.
 NlpResult solve_with_nlopt(NonlinearProgram& problem, const Eigen::VectorXd& x_start, const NloptOptions& options = {});
 
 }  // namespace mbsopt

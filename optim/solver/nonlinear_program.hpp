@@ -1,9 +1,9 @@
-// A smooth nonlinear program, as every solver here sees it:
+// A smooth nonlinear program, in the form of every solver here:
 //
 //   minimise f(x)   subject to   x_lower <= x <= x_upper,   c_lower <= c(x) <= c_upper
 //
-// Value and derivatives come together, since one simulation gives them all; methods without derivatives ask for values
-// alone. An evaluation that fails says so in words, and the solver shortens its step.
+// Value and derivatives come together, since one simulation gives them all. Methods without derivatives ask for values
+// alone. A failed evaluation reports the reason in words, and the solver shortens its step.
 //
 //   struct Sphere : NonlinearProgram {
 //     Sphere() : NonlinearProgram(2, 0) {}
@@ -51,18 +51,18 @@ struct NonlinearProgram {
   NonlinearProgram(const NonlinearProgram&) = delete;
   NonlinearProgram& operator=(const NonlinearProgram&) = delete;
 
-  // point arrives sized, with zeros. x is within the bounds.
+  // point arrives sized and zeroed. x is within the bounds.
   virtual void evaluate(const Eigen::VectorXd& x, NlpPoint& point) = 0;
-  // f and c alone, where they are cheaper than with derivatives.
+  // Evaluates f and c alone, if they are cheaper than with derivatives.
   virtual void evaluate_values(const Eigen::VectorXd& x, NlpPoint& point) {
     point.f_x.setZero(x.size()), point.c_x.setZero(constraints(), x.size());
     evaluate(x, point);
   }
-  // Second derivatives of f, then of each c: n x n each. False where there are none.
+  // Sets second derivatives of f, then of each c: n x n each. Returns false if there are none.
   virtual bool hessians(const Eigen::VectorXd&, std::vector<Eigen::MatrixXd>&) { return false; }
 
-  // f_x at x + d, within the bounds; of a simulation on the steps of x, so that differences are smooth. False: it
-  // fails.
+  // Sets f_x at x + d, within the bounds. A simulation uses the steps of x, so that differences are smooth. Returns
+  // false if it fails.
   virtual bool gradient_beside(const Eigen::VectorXd& x, const Eigen::VectorXd& d, Eigen::VectorXd& f_x) {
     NlpPoint p;
     p.f_x.setZero(x.size()), p.c.setZero(constraints()), p.c_x.setZero(constraints(), x.size());
@@ -84,14 +84,13 @@ struct NonlinearProgram {
   Eigen::VectorXd c_scale;                             // the same for c; ones
 };
 
-// At one point.
+// The Hessians at one point.
 struct NlpHessians {
   std::vector<Eigen::MatrixXd> of;             // f, and each constraint
   std::optional<Eigen::MatrixXd> third_order;  // takes the place of f's in a step of third order
 };
 
-// Points that were computed in an earlier run, and a place where new ones are written down: a run that was killed goes
-// on from there.
+// The points of an earlier run, and a place to record new ones: a killed run continues from there.
 struct PointRecords {
   virtual ~PointRecords() = default;
   virtual bool recall(const Eigen::VectorXd& x, Wanted wanted, NlpPoint& point) = 0;
@@ -109,7 +108,7 @@ struct NlpProgress {
   const Eigen::VectorXd& x;
 };
 
-// x: the solution, or the best point seen: feasible before lower f.
+// x is the solution, or the best point found: feasible points come before a lower f.
 struct NlpResult : SolverOutcome {
   NlpPoint point;         // at x; not ok where the start could not be evaluated
   std::string algorithm;  // in the words of the library that it comes from

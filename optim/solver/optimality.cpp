@@ -13,8 +13,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Bounds nearer than this, relative to the size of what they bound, may have a multiplier; what a multiplier makes of a
-// bound that is not touched shows in its product with the slack.
+// Bounds nearer than this, relative to the size of the bounded number, may have a multiplier. If such a bound is not
+// active, the product of multiplier and slack shows it.
 constexpr double kNear = 1e-3;
 
 bool near(double value, double bound) {
@@ -85,8 +85,7 @@ VectorXd non_negative_least_squares(const MatrixXd& A, const VectorXd& b) {
 
 namespace {
 
-// Near bounds as columns: sign * gradient of a constraint, or a step out of a bound that x is near, which costs
-// nothing.
+// Near bounds as columns: sign * gradient of a constraint. A step out of a bound near x costs nothing.
 struct NearBounds {
   std::vector<Multiplier> constraints;
   std::vector<std::pair<Index, double>> variables;  // x_k, and the sign of the step that leaves the bounds

@@ -5,8 +5,8 @@
 //   S <- tau S + (r y' + y r')/(y's) - (r's) y y'/(y's)^2,   r = y# - tau S s,   tau = min(1, |s'y#|/|s'S s|)
 //
 // Dennis, Gay and Welsch, "An adaptive nonlinear least-squares algorithm", ACM Transactions on Mathematical Software 7
-// (1981) 348. tau makes S as small as the last step says, so that it vanishes with the residuals. A step along which
-// the gradient does not rise (y's <= 0) is left out.
+// (1981) 348. The factor tau reduces S to the size that the last step shows, so S vanishes with the residuals. A step
+// along which the gradient does not rise (y's <= 0) is left out.
 //
 //   ResidualCurvature S(n);
 //   S.add(s, y, y_sharp);

@@ -1,11 +1,12 @@
-// Loss functions of least squares: what a residual z counts for. The fit minimises 1/2 sum rho(z^2).
+// Loss functions of least squares: the weight of a residual z. The fit minimises 1/2 sum rho(z^2).
 //
 //   squared   z^2
 //   huber     z^2 where |z| <= s, else 2 s |z| - s^2              gross errors pull with a constant force
 //   cauchy    s^2 log(1 + z^2/s^2)                                with one that falls off as 1/|z|
 //   tukey     s^2/3 (1 - (1 - z^2/s^2)^3) where |z| <= s, else s^2/3        not at all beyond s
-// All are z^2 near 0. Without a scale s is the constant that keeps 95 % of the efficiency where the noise is normal
-// after all: 1.345, 2.385, 4.685 (Holland and Welsch, Communications in Statistics A6 (1977) 813).
+//
+// All are z^2 near 0. The default s keeps 95 % of the efficiency if the noise is normal: 1.345, 2.385, 4.685 (Holland
+// and Welsch, Communications in Statistics A6 (1977) 813).
 //
 //   const Loss loss{LossType::huber};
 //   const LossValue v = loss.at(z * z);    // v.rho, v.rho1 = d rho/d(z^2), v.rho2

@@ -62,19 +62,19 @@ VectorXd RowBlocks::column_norms() const {
 
 namespace {
 
-// What is left of the rows of some blocks: [A | b] with these columns.
+// The remaining rows of some blocks: [A | b] with these columns.
 struct Remainder {
   std::vector<Index> columns;
   MatrixXd A_b;
 };
 
-// d_own from R d_own = q - S d_others.
+// Gives d_own from R d_own = q - S d_others.
 struct Eliminated {
   std::vector<Index> own, others;
   MatrixXd factors;  // [R S q]
 };
 
-// Takes the columns `own` out of these rows.
+// Eliminates the columns `own` from these rows.
 Eliminated eliminate(std::vector<Index> own, const std::vector<Remainder>& parts, Remainder& left) {
   std::set<Index> others;
   Index rows = 0;
@@ -127,7 +127,7 @@ VectorXd RowBlocks::solve(const VectorXd& b, const std::vector<Index>& free) con
     remainders.push_back(std::move(rest));
   }
 
-  // Where the rows of each block are now: followed to its end.
+  // The present place of each block's rows.
   std::vector<std::size_t> moved(blocks_.size());
   std::iota(moved.begin(), moved.end(), std::size_t{0});
   const auto where = [&](std::size_t block) {

@@ -1,11 +1,11 @@
-// A matrix in blocks of rows, each with entries in a few columns only. Its least-squares problem is solved by
-// elimination: columns of the same blocks leave the problem through the QR factors of the rows with them,
+// A matrix in blocks of rows, each with entries in a few columns only. Elimination solves its least-squares problem:
+// columns of the same blocks leave the problem through the QR factors of their rows,
 //
 //   [ A  B | b ]  =  Q [ R  S | q ]          R d_A = q - S d_B
-//                      [ 0  T | p ]          T d_B ~ p: a new block, which takes the place of these rows
+//                      [ 0  T | p ]          T d_B ~ p: a new block, which replaces these rows
 //
-// those of the fewest blocks first. The cost is linear in the number of blocks where each has columns of its own, or
-// shares them with its neighbours, beside columns that all share. One block with all columns is the usual QR
+// Columns of the fewest blocks come first. The cost is linear in the number of blocks if each has columns of its own,
+// or shares them with its neighbours. Further columns may be common to all. One block with all columns is the usual QR
 // factorisation. Bjorck, "Numerical Methods for Least Squares Problems" (1996), section 6.3; Duff and Reid, ACM
 // Transactions on Mathematical Software 9 (1983) 302.
 //
@@ -31,17 +31,17 @@ class RowBlocks {
   Eigen::Index columns() const { return columns_; }
   const std::vector<RowBlock>& blocks() const { return blocks_; }
 
-  // Vectors of rows are those of the blocks, one below the other.
+  // Vectors of rows hold those of the blocks, one below the other.
   Eigen::VectorXd operator*(const Eigen::VectorXd& d) const;
   Eigen::VectorXd transposed_times(const Eigen::VectorXd& b) const;
   Eigen::VectorXd column_norms() const;
 
-  // Minimises |A d - b| over the columns that are free; the others of d are zero. The free ones are independent.
+  // Minimises |A d - b| over the free columns, which must be independent. The others of d are zero.
   Eigen::VectorXd solve(const Eigen::VectorXd& b, const std::vector<Eigen::Index>& free) const;
 
-  // |A D^-1 e|^2 + lambda |e|^2, as a matrix: sqrt(lambda) e_k is a row below the first block with column k.
+  // The matrix of |A D^-1 e|^2 + lambda |e|^2: sqrt(lambda) e_k is a row below the first block with column k.
   RowBlocks scaled_and_damped(const Eigen::VectorXd& D, double lambda) const;
-  // b, with zeros for the rows that damp.
+  // b with zeros for the damping rows.
   Eigen::VectorXd beside_damping(const Eigen::VectorXd& b) const;
 
  private:

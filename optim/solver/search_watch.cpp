@@ -11,7 +11,7 @@ namespace {
 using Iterate = SearchWatch::Iterate;
 using Iterates = std::deque<Iterate>;
 
-// Of the last count + 1 iterates.
+// Returns the first of the last count + 1 iterates.
 Iterates::const_iterator last(const Iterates& iterates, std::size_t count) {
   return iterates.size() > count + 1 ? iterates.end() - static_cast<std::ptrdiff_t>(count + 1) : iterates.begin();
 }

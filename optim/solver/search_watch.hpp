@@ -1,11 +1,11 @@
-// Ends of a search that depend neither on its Hessian nor on what is left of a barrier: what the last iterates say.
+// Ends a search by its last iterates, independent of its Hessian and of the remaining barrier.
 //
-//   optimal     stationary to the tolerance, by the yardstick of all methods (optimality.hpp)
-//   stalled     ten iterations have changed f by noise only, which a line search would go on trying to lower
-//   wandering   30 iterations without a better point: lost in what was learnt from a wild motion
+//   optimal     stationary to the tolerance, by the measure of all methods (optimality.hpp)
+//   stalled     ten iterations have changed f by noise only, which a line search would try to lower without end
+//   wandering   30 iterations without a better point: the learnt curvature is useless after a wild motion
 //   creeping    20 iterations have gained less than 1 % of f, none of them anywhere near a stationary point
 //
-// Wandering and creeping are said without constraints only: under constraints f tells less.
+// It reports wandering and creeping without constraints only: under constraints f tells less.
 //
 //   SearchWatch watch(1e-6, constraints == 0);
 //   if (watch.look({x, f, distance}, best_f) == SearchEnd::stalled) x = watch.most_stationary().x;
@@ -31,12 +31,12 @@ class SearchWatch {
 
   SearchWatch(double tolerance, bool unconstrained) : tolerance_(tolerance), unconstrained_(unconstrained) {}
 
-  // A feasible iterate; best_f: of all points seen, scaled.
+  // The iterate must be feasible. best_f is the lowest of all points, scaled.
   SearchEnd look(const Iterate& iterate, double best_f);
-  // A search begins anew, at the best point.
+  // Starts a new search at the best point.
   void start_afresh();
 
-  // Of the last kStalled + 1; there must have been one.
+  // The most stationary of the last kStalled + 1 iterates; there must be one.
   const Iterate& most_stationary() const;
 
  private:

@@ -1,4 +1,4 @@
-// How a solver ended, whichever it is and whatever it solved.
+// The end of any solver on any problem.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,8 +7,8 @@
 
 namespace mbsopt {
 
-// searched: a global method that has no other end than its budget has used it up.
-// converged_beyond_limit: limits hold for smooth extremes, but not for the true ones.
+// searched: a global method has used up its budget, which is its only end. converged_beyond_limit: limits hold for
+// smooth extremes, but not for the true ones.
 enum class SolverStatus {
   converged,
   converged_beyond_limit,

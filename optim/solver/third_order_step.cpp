@@ -20,7 +20,7 @@ std::vector<Index> where(const VectorXd& d) {
   return indices;
 }
 
-// The part of s along d; none where the model is too far from f's.
+// The part of s along d; none if the model is too far from f.
 std::optional<double> along(double tau) {
   if (!(tau > -1)) return std::nullopt;
   return 2 / (1 + std::sqrt(std::max(0.0, 1 + 2 * tau)));

@@ -19,7 +19,7 @@ namespace {
 
 using Eigen::Index;
 
-// Independent closed chains: joints that connect what is connected already. The ground is a body here.
+// Counts independent closed chains: joints between bodies that other joints connect already. The ground is a body here.
 int loops_of(const Scene& scene) {
   std::vector<std::string> names{"ground"};
   for (const Body& body : scene.bodies) names.push_back(body.name);
@@ -71,7 +71,7 @@ class Chooser {
   }
 
  private:
-  // Of the pilot run: where that does not suffice the scene is either stiff, or long and worth as many steps as it may.
+  // Limit of the pilot run. If it does not suffice, the scene is either stiff, or long and may take as many steps.
   static constexpr long kPilotSteps = 2'000;
   static constexpr double kTightest = 1e-11, kLoosest = 1e-3;  // of rtol
   static constexpr double kTighter = 100;  // the verifying run's tolerance; rounding starves step-size control beyond
@@ -107,7 +107,7 @@ class Chooser {
     return runs_.motion(settings, options_.limit);
   }
 
-  // A run much more exact than one at rtol; better than one at the tolerance that there is.
+  // A run much more exact than one at rtol; better than one at the existing tolerance.
   Answer verifying(double rtol, double there_is) {
     Answer verified;
     for (const double tighter : {kTighter, 0.1 * kTighter}) {
@@ -126,7 +126,7 @@ class Chooser {
     return settings;
   }
 
-  // Whether what an explicit method did shows that it is the wrong one. Keeps what it found.
+  // Whether the run shows that an explicit method is wrong. Keeps its results.
   bool is_wrong_method(const Point& point) {
     const SimulationStatistics& s = point.answer.statistics;
     if (implicit_ || s.watched_steps == 0) return false;
@@ -139,8 +139,8 @@ class Chooser {
     return is_stability_limited(s);
   }
 
-  // Whether an implicit method needs less than half of the right-hand sides that an unfinished explicit run would need;
-  // their number, unlike the time, is no matter of chance.
+  // Whether an implicit method needs less than half of the right-hand sides that an unfinished explicit run would need.
+  // Their number does not depend on chance, but the time does.
   bool implicit_is_cheaper(const Point& unfinished) {
     const SimulationSettings settings = settings_at("radau5", unfinished.rtol(), base_.integrator.max_steps);
     const Answer implicit = answer(settings);
@@ -154,8 +154,8 @@ class Chooser {
     return true;
   }
 
-  // A point within what is wanted, or the most exact one that there is; none where nothing ran, or the method is to
-  // change.
+  // A point within the wanted accuracy, or the most exact one found. There is none if nothing ran, or if the method
+  // must change.
   std::optional<Point> settled(long pilot_steps) {
     std::optional<Point> best, last;
     std::optional<Answer> right;  // of the verifying run, and its tolerance

@@ -1,19 +1,17 @@
-// Integrator and tolerances for a wanted accuracy (simulation.accuracy), found by running the scene, and the error that
-// is to be expected of them.
+// Integrator and tolerances for a wanted accuracy (simulation.accuracy), found by runs of the scene, with their
+// expected error.
 //
-//   wanted   relative error of the objectives; of the motion where none is simulated (tradeoff_errors.hpp)
+//   wanted   relative error of the objectives; of the motion if none is simulated (tradeoff_errors.hpp)
 //   method   explicit, unless stability and not accuracy limits its steps (core/watch/stiffness.hpp): then implicit
-//   rtol     from error ~ C rtol^p, fitted to the runs made so far, until the estimate is within what is wanted
-//   error    what the answer differs by from that of a run with a tolerance 100 times smaller, by dopri853 where the
-//   method
-//            is explicit: Hairer, Norsett, Wanner, "Solving Ordinary Differential Equations I" (1993), section II.4,
-//            where y_hat - y1 estimates the error of a step; here of the whole run
+//   rtol     from error ~ C rtol^p, fitted to the runs so far, until the estimate is within the wanted error
+//   error    the difference from a run with a tolerance 100 times smaller, by dopri853 if the method is explicit:
+//            Hairer, Norsett, Wanner, "Solving Ordinary Differential Equations I" (1993), section II.4, where
+//            y_hat - y1 estimates the error of a step; here of the whole run
 //
 //   AccuracyChoice choice = choose_accuracy(problem.scene, objectives_of(problem));
-//   problem.scene.simulation = choice.settings;           // once: what is designed then is a function that does not
-//   jump
+//   problem.scene.simulation = choice.settings;           // once: a design then has a function without jumps
 //
-// Nothing in it depends on time measured: the same scene gives the same choice everywhere.
+// The choice does not depend on measured time: the same scene gives the same choice everywhere.
 #pragma once
 
 #include <functional>
@@ -38,7 +36,7 @@ struct ErrorEstimate {
 };
 
 struct AccuracyChoice {
-  // The distance of two runs by rounding alone: no estimate is smaller.
+  // The distance of two runs by rounding alone. No estimate is smaller.
   static constexpr double kRounding = 1e-12;
 
   bool ok = false;
@@ -59,7 +57,7 @@ struct AccuracyOptions {
   std::function<void(int simulations)> progress = {};
 };
 
-// scene.simulation.accuracy must be there.
+// scene.simulation.accuracy must be set.
 AccuracyChoice choose_accuracy(const Scene& scene, const std::vector<Objective>& objectives,
                                const AccuracyOptions& options = {});
 

@@ -1,7 +1,7 @@
-// How exact the integrator leaves what an identification minimises, 1/2 sum z^2 over the samples of its fitted
-// experiments, and the gradient of it in their unknowns, at the values from which it starts: against dopri853 and
-// gauss6 at tight tolerances, with steps shortened until both agree. Priors and losses are no matter of integration and
-// left out.
+// The integrator's errors in an identification. They are those in 1/2 sum z^2 over the samples of its fitted
+// experiments, and in its gradient in the unknowns, at the starting values. The reference is dopri853 and gauss6 at
+// tight tolerances, with steps shortened until both agree. Priors and losses do not depend on integration and are left
+// out.
 //
 //   const FitErrors errors = measure_fit_errors(problem, data, {{"own", problem.scene.simulation}});
 //   errors.settings.at(0).cost;   // |cost - cost*| / |cost*|
@@ -20,7 +20,7 @@
 namespace mbsopt {
 
 struct FitErrors {
-  // Relative; of the gradient |D (g - g*)|/|D g*|, D the sizes of the unknowns on the diagonal.
+  // Relative differences; that of the gradient is |D (g - g*)|/|D g*|, D the sizes of the unknowns on the diagonal.
   struct Apart {
     double cost = 0, gradient = 0;
     double largest() const { return cost > gradient ? cost : gradient; }
@@ -32,7 +32,7 @@ struct FitErrors {
   };
   std::string message;  // why there is nothing
   double cost = 0;      // the right one
-  Apart certificate;    // what the two methods are apart
+  Apart certificate;    // difference of the two methods
   std::vector<Setting> settings;
   bool ok() const { return message.empty(); }
 };
@@ -42,10 +42,10 @@ struct NamedSettings {
   SimulationSettings simulation;
 };
 
-// The right cost and gradient, found once, and errors of any settings against them.
+// The right cost and gradient, computed once, and errors of any settings against them.
 class FitErrorMeasure {
  public:
-  // data: one table per experiment; it and the problem must outlive this.
+  // data has one table per experiment. It and the problem must outlive this.
   FitErrorMeasure(const Problem& problem, const std::vector<CsvTable>& data, std::function<bool()> interrupted = {});
   ~FitErrorMeasure();
 
@@ -67,7 +67,7 @@ class FitErrorMeasure {
   FitErrors::Apart certificate_;
 };
 
-// data: one table per experiment.
+// data has one table per experiment.
 FitErrors measure_fit_errors(const Problem& problem, const std::vector<CsvTable>& data,
                              const std::vector<NamedSettings>& settings, const std::function<bool()>& interrupted = {});
 

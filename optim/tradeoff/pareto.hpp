@@ -1,4 +1,4 @@
-// The Pareto front of cost and error: what nothing else beats in both.
+// The Pareto front of cost and error: settings that no other beats in both.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace mbsopt {
 
-// Per setting, whether it is on the front; never one whose cost or error is not finite. Of equals the first is.
+// Whether each setting is on the front. A setting with infinite cost or error never is. Of equals the first is.
 inline std::vector<bool> pareto_front(const std::vector<double>& cost, const std::vector<double>& error) {
   const auto known = [&](std::size_t i) { return std::isfinite(cost[i]) && std::isfinite(error[i]); };
   std::vector<std::size_t> order(cost.size());

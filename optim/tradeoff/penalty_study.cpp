@@ -17,7 +17,7 @@ namespace {
 
 using Eigen::Index;
 
-// Accelerations at the states of a motion, one column each; a column of NaN where they cannot be computed.
+// Accelerations at the states of a motion, one column each; a column of NaN if they cannot be computed.
 Eigen::MatrixXd accelerations(const Mechanism& mechanism, const FormulationSettings& formulation,
                               const SampledMotion& motion) {
   SpatialDynamics dynamics(mechanism, formulation);
@@ -94,7 +94,7 @@ class Study {
   void choose_settings() {
     const FormulationSettings& given = runs_.scene().simulation.formulation;
     result_.formulation = given.type == FormulationType::penalty ? given : FormulationSettings::penalty();
-    // The explicit one, unless stiffness kept it out of the reference.
+    // Takes the explicit method, unless stiffness excluded it from the reference.
     const bool is_explicit =
         result_.reference.first.integrator == "dopri853" || result_.reference.second.integrator == "dopri853";
     result_.integrator = is_explicit ? "dopri853" : "radau5";
@@ -110,7 +110,7 @@ class Study {
   SimulationSettings constrained_settings() const {
     return settings(constrained(runs_.scene().simulation.formulation));
   }
-  // Solved to rounding; its alpha is none of the study's, so that no column compares a thing with itself.
+  // Solves to rounding. Its alpha is none of the study's, so that no column compares a setting with itself.
   static FormulationSettings exact_formulation() {
     FormulationSettings f;
     f.alpha = 3e7, f.tolerance = 1e-15;
@@ -122,7 +122,7 @@ class Study {
     return f;
   }
 
-  // A run with its errors and its time; its answer.
+  // Adds the errors and the time of a run, and returns its answer.
   Answer add(const SimulationSettings& settings, PenaltyRun& run) const {
     std::vector<double> seconds;
     Answer timed = runs_.values(settings, limit());

@@ -1,13 +1,14 @@
-// The effect of alpha on the penalty form of the equations of motion of one mechanism: the model's error falls as
-// 1/alpha, the rounding of S = M + J' alpha J, which Cholesky factors, grows with it; the quasi-definite form of the
+// The effect of alpha on the penalty form of the equations of motion of one mechanism. The model's error falls as
+// 1/alpha. The rounding of S = M + J' alpha J, which Cholesky factors, grows with alpha. The quasi-definite form of the
 // same equations has no such rounding. docs/formulations.md.
 //
 // Accelerations: at states of the right motion, the largest relative error (of the largest entry).
 //   model      penalty (quasi-definite) against the constrained equations
 //   rounding   penalty by Cholesky against quasi-definite
 //   augmented  augmented Lagrangian at this relative alpha, three refinements, against the constrained equations
-// Runs: errors per quantity against the reference, of which rounding is what Cholesky adds on the very steps of the
-// quasi-definite run; the drift is the largest violation of the constraints.
+//
+// Runs: errors per quantity against the reference. Rounding is the part that Cholesky adds on the very steps of the
+// quasi-definite run. The drift is the largest violation of the constraints.
 #pragma once
 
 #include <Eigen/Core>
@@ -56,11 +57,11 @@ struct PenaltyStudyOptions {
   Clock clock = {};  // of the budget and of all times
 };
 
-// xi, omega and projection as in the scene where it is a penalty form, else MBSVT's: 1, 10 and none.
+// xi, omega and projection are the scene's if it has a penalty form, else MBSVT's: 1, 10 and none.
 PenaltyStudy study_penalty(const Scene& scene, const std::vector<Objective>& objectives,
                            const PenaltyStudyOptions& options);
 
-// "1e2:1e16": all powers of ten from one to the other; "1e5,3e7": these. Throws std::invalid_argument.
+// "1e2:1e16" means all powers of ten in this range, "1e5,3e7" these two. Throws std::invalid_argument.
 std::vector<double> alphas_of(const std::string& text);
 
 }  // namespace mbsopt

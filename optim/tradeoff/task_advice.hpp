@@ -1,5 +1,5 @@
-// Settings for what a file is made for: a design needs exact objectives and exact gradients of what it minimises and
-// bounds, an identification an exact sum of squares with its gradient; a value that is exact enough says nothing of its
+// Settings for the task of a file. A design needs exact objectives and exact gradients of all that it minimises and
+// bounds. An identification needs an exact sum of squares with its gradient. An exact value does not imply an exact
 // gradient.
 //
 //   FitErrorMeasure fit(problem, data);
@@ -20,12 +20,12 @@ namespace mbsopt {
 
 struct TaskAdvice {
   Recommendation recommendation;
-  std::optional<FitErrors::Apart> fit;  // of the recommended row, where the file has an identification
+  std::optional<FitErrors::Apart> fit;  // of the recommended row, if the file has an identification
 };
 
 class TaskAdviser {
  public:
-  // fit: null where nothing is fitted; seconds: for simulations of the fit, in all. All must outlive it.
+  // fit is null if nothing is fitted. seconds is the total for simulations of the fit. All must outlive this.
   TaskAdviser(const Problem& problem, const Tradeoff& tradeoff, const FitErrorMeasure* fit, double seconds);
 
   TaskAdvice at(double accuracy);

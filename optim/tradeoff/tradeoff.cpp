@@ -18,9 +18,7 @@
 namespace mbsopt {
 namespace {
 
-// Curves of one setting, or of two: the motion's and the gradient's.
-
-// Settings from loose to tight, and how far along they are measured.
+// Settings from loose to tight, and the number of those measured.
 struct Curve {
   std::vector<TradeoffSetting> settings;
   std::size_t next = 0;
@@ -97,7 +95,7 @@ class Sweep {
     return std::move(result_);
   }
 
-  // The settings of the file, and the defaults; with a gradient where there is one.
+  // Measures the settings of the file, and the defaults, with a gradient if there is one.
   void measure_given_settings() {
     SimulationSettings defaults = own();
     defaults.formulation = {}, defaults.integrator = default_integrator(own().start_time, own().end_time);
@@ -121,7 +119,7 @@ class Sweep {
 
   bool has_gradients() const { return !result_.reference.gradients_by.empty(); }
 
-  // The scene's settings; a limit of steps that it does not ask for itself would hide what loose tolerances do.
+  // The scene's settings without the default limit of the step size, which would hide the effect of loose tolerances.
   SimulationSettings swept() const {
     SimulationSettings settings = own();
     IntegratorSettings& s = settings.integrator;
@@ -167,8 +165,8 @@ class Sweep {
     return curves;
   }
 
-  // Whether an implicit method needs far fewer right-hand sides at a usual tolerance; their number, unlike the time, is
-  // no matter of chance.
+  // Whether an implicit method needs far fewer right-hand sides at a usual tolerance. Their number does not depend on
+  // chance, but the time does.
   bool stiff() const {
     const auto evaluations = [&](const char* integrator) {
       for (const TradeoffRow& row : result_.rows) {
@@ -202,7 +200,7 @@ class Sweep {
     return curves;
   }
 
-  // MBSVT's form at several alpha, without loss of digits and with; the augmented Lagrangian without projection.
+  // MBSVT's form at several alpha, without and with loss of digits, and the augmented Lagrangian without projection.
   std::vector<Curve> formulation_curves() const {
     const std::string integrator = stiff() ? "radau5" : "dopri5";
     const std::vector<double> rtols = decades(3, 9, 2);
@@ -228,8 +226,8 @@ class Sweep {
   double budget_left() const { return options_.budget_seconds - budget_->seconds(); }
   double most_per_point() const { return options_.budget_seconds / 30; }
 
-  // The curve whose next point costs least a point further, until each is done or the stage's share is used up: what is
-  // cheap is followed to the end, whatever else there is.
+  // Advances the curve with the cheapest next point by one point, until each is complete or the stage's share is used
+  // up. So cheap curves are always followed to the end.
   void stage(const char* name, std::vector<Curve> curves, double share) {
     const Stopwatch stopwatch(options_.clock);
     const double seconds = share * options_.budget_seconds;
@@ -276,7 +274,7 @@ class Sweep {
                             : runs_.values(setting.simulation, limit);
   }
 
-  // The row's index.
+  // Returns the row's index.
   std::size_t measure(const TradeoffSetting& setting, const RunLimit& limit) {
     TradeoffRow row;
     row.setting = setting;
@@ -296,7 +294,7 @@ class Sweep {
     row.deviations = result_.reference.errors->deviations(answer);
     if (row.status != RowStatus::ok) seconds.clear();
     row.repetitions = static_cast<int>(seconds.size());
-    // A gradient's objectives are those of the simulation, which is its own row.
+    // The objectives of a gradient's row are those of the simulation, which has its own row.
     const std::vector<Quantity>& quantities = result_.reference.errors->quantities();
     row.within_floor = row.status == RowStatus::ok;
     for (std::size_t i = 0; i < quantities.size(); ++i) {

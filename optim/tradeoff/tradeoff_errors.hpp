@@ -1,15 +1,15 @@
-// How wrong an answer is against the right one, quantity by quantity; each error is one number:
+// The errors of an answer against the right one, quantity by quantity. Each error is one number:
 //
-//   motion     largest distance (sampled_motion.hpp) over 100 times, relative to how far the motion gets from its start
+//   motion     largest distance (sampled_motion.hpp) over 100 times, relative to the largest distance from its start
 //   sensors    largest over sensors and times of |s - s*|, relative to that sensor's largest |s*|
 //   objective  |psi - psi*| / |psi*|
 //   gradient   of an objective: |D (g - g*)| / |D g*|, D: sizes of the parameters, on the diagonal
 //
-// Where the right answer is zero, or so small that two methods do not agree on its first three digits (`clearly` says
-// otherwise), the error of the motion, an objective or a gradient is absolute, and a sensor is left out.
+// The right answer may be zero, or so small that two methods do not agree on its first three digits (`clearly` sets
+// another limit). Then the error of the motion, an objective or a gradient is absolute, and a sensor is left out.
 //
-// A deviation is an error with its sign: (psi - psi*) / |psi*|, and of a gradient its part along the right one,
-// (D (g - g*))' D g* / |D g*|^2. Where it changes sign from a setting to the next, an error passes through zero.
+// A deviation is an error with its sign: (psi - psi*) / |psi*|, and for a gradient its part along the right one, (D (g
+// - g*))' D g* / |D g*|^2. If it changes sign from a setting to the next, an error passes through zero.
 #pragma once
 
 #include <Eigen/Core>
@@ -31,27 +31,27 @@ struct Quantity {
   std::string objective_name;  // of objective, gradient
   Eigen::Index objective = 0;  // of objective, gradient
   bool relative = true;
-  double scale = 1;        // what the error is divided by
-  double certificate = 0;  // what two methods are apart in it, in the same measure
+  double scale = 1;        // divisor of the error
+  double certificate = 0;  // difference of two methods in the same measure
 };
 
 class TradeoffErrors {
  public:
-  // Two answers that should be the same, by different methods; the first is the more exact one. Each has the motion and
-  // the gradients, where there are any.
-  // Errors are relative to what is `clearly` times as large as what the two are apart.
+  // Takes two answers that should be the same, by different methods; the first is the more exact one. Each has the
+  // motion and any gradients. Errors are relative to quantities that are `clearly` times as large as the difference of
+  // the two.
   TradeoffErrors(const TradeoffRuns& runs, Answer exact, const Answer& second, double clearly = 1e3);
 
-  // The same measures against another answer, by the same scales.
+  // The same measures against another answer, with the same scales.
   TradeoffErrors(TradeoffErrors measures, Answer exact) : TradeoffErrors(std::move(measures)) {
     exact_ = std::move(exact);
   }
 
   const Answer& exact() const { return exact_; }
   const std::vector<Quantity>& quantities() const { return quantities_; }
-  // One per quantity; NaN where the answer does not hold it.
+  // One error per quantity; NaN if the answer does not contain it.
   Eigen::VectorXd of(const Answer& answer) const;
-  // Likewise; NaN for the motion and the sensors, which have no one sign.
+  // Likewise the deviations; NaN for the motion and the sensors, which have no single sign.
   Eigen::VectorXd deviations(const Answer& answer) const;
 
  private:

@@ -71,7 +71,7 @@ class Search {
     return c.change < kSettled;
   }
 
-  // Two that each have settled, on the same answer.
+  // Whether two candidates have settled on the same answer.
   bool agree(const std::vector<Candidate>& found) const {
     if (std::count_if(found.begin(), found.end(), has_settled) < 2) return false;
     return least_apart(found) < kAgreeing;
@@ -87,7 +87,7 @@ class Search {
     std::optional<Candidate> best;
     for (const double rtol : {1e-7, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13}) {
       constexpr double kGrowth = 1.5;     // of the cost, a decade
-      constexpr double kSettled = 1e-11;  // what is left is a tenth of it
+      constexpr double kSettled = 1e-11;  // the remaining error is a tenth of it
       if (best && (kGrowth * best->method.wall_seconds > options_.seconds_per_run || best->change < kSettled)) break;
       Candidate next;
       next.settings = with_tolerance(runs_.scene().simulation, integrator, rtol);
@@ -108,7 +108,7 @@ class Search {
   // Whether a stage came so close to a singular position that its equations were regularised ones.
   static bool is_unmet(const Candidate& c) { return c.answer.statistics.max_acceleration_residual > 1e-9; }
 
-  // Where these agree nothing else counts.
+  // If these agree, nothing else counts.
   void add_stepped(std::vector<Candidate>& found) {
     long most_evaluations = 0;
     for (const Candidate& c : found) most_evaluations = std::max(most_evaluations, c.answer.statistics.rhs_evaluations);
@@ -124,8 +124,8 @@ class Search {
     if (least_apart(met) < kAgreeing) found = std::move(met);
   }
 
-  // Halves the steps until what is left of the error is small or the answer no longer settles; with no more right-hand
-  // sides than step-size control took.
+  // Halves the steps until the remaining error is small or the answer no longer settles. It uses no more right-hand
+  // sides than step-size control did.
   std::optional<Candidate> stepped(const Stepped& method, long most_evaluations) const {
     constexpr double kResolved = 1e-3;  // above it changes may grow: steps are still too large
     constexpr double kLeft = 6e-11;
@@ -154,7 +154,7 @@ class Search {
     return best;
   }
 
-  // Of the motion and of the objectives, the largest relative difference.
+  // The largest relative difference of the motion and of the objectives.
   double apart(const Answer& a, const Answer& b) const {
     const double extent = distance_.extent(a.motion, a.y_initial);
     double largest = distance_.between(a.motion, b.motion);
@@ -166,8 +166,8 @@ class Search {
     return largest;
   }
 
-  // Of one method with and without step-size control only where no two methods agree; of an answer that has not
-  // settled, which is close by chance, only where there are no two others.
+  // Compare a method with its fixed-step form only if no two methods agree. Compare an answer that has not settled only
+  // if there are no two others: it may be close by chance.
   std::pair<std::size_t, std::size_t> closest(const std::vector<Candidate>& found) const {
     std::pair<std::size_t, std::size_t> pair{0, 1};
     double least = std::numeric_limits<double>::infinity();
@@ -184,7 +184,7 @@ class Search {
     return pair;
   }
 
-  // The exact one is a; of two that are apart the one whose gradients change less by the last tightening.
+  // The exact one is a. If two differ, it is the one whose gradients change less by the last tightening.
   void add_gradients(Candidate& a, Candidate& b, TradeoffReference& reference) const {
     if (!runs_.has_gradients() || !options_.gradients) return;
     const GradientCost cost = gradient_cost(runs_.scene().parameters.size(), runs_.objectives().size());
@@ -217,8 +217,8 @@ class Search {
     return change(b.settings, of_b) < change(a.settings, of_a);
   }
 
-  // Derivatives magnify the rounding of positions next to singular ones, by how close stages come to them, which is
-  // chance: also with steps up to eight times the motion's, where these are of one size.
+  // Derivatives magnify the rounding of positions near singular ones, by how close stages come to them, which is
+  // chance. So if steps are of one size, it also takes steps up to eight times the motion's.
   std::vector<Answer> gradients_of(const Candidate& candidate, GradientMethod method, const RunLimit& limit) const {
     if (!candidate.method.step) return {runs_.gradients(candidate.settings, method, limit)};
     std::vector<Answer> answers;
@@ -230,8 +230,9 @@ class Search {
     return answers;
   }
 
-  // Of two methods the answer that agrees best with any of the other's, and what it is certified by: that, or, since
-  // the best of many is chance, the next best of either method. Not ok where a method has none.
+  // The answer of two methods that agrees best with any of the other's, and its certificate. The certificate is that
+  // other answer, or the next best of either method, since the best of many is chance. It is not ok if a method has
+  // none.
   struct Closest {
     Answer answer, certificate;
     double apart = std::numeric_limits<double>::infinity();  // of the closest two
@@ -259,8 +260,8 @@ class Search {
     return {*answer, next && least >= closest_apart ? *next : *closest, closest_apart};
   }
 
-  // Step-size control looks at the motion. What only derivatives see, a kink of a law in a parameter say, takes shorter
-  // steps: the pair that agrees best.
+  // Step-size control sees only the motion. Effects on derivatives alone, such as a kink of a law in a parameter, need
+  // shorter steps. This takes the pair that agrees best.
   void shorten_steps(std::pair<SimulationSettings, SimulationSettings> settings, GradientMethod method,
                      const RunLimit& limit, Answer& best_a, Answer& best_b) const {
     constexpr double kSame = 1e-8, kShorter = 3;
@@ -282,8 +283,8 @@ class Search {
     }
   }
 
-  // Derivatives of steps that pass singular positions settle later than the motion, or not at all: by steps of one size
-  // where these agree better; whether they do.
+  // Derivatives of steps past singular positions settle later than the motion, or not at all. Takes steps of one size
+  // if they agree better, and returns whether they do.
   bool step_evenly(GradientMethod method, const RunLimit& limit, Answer& best_a, Answer& best_b) const {
     constexpr double kSettled = 5e-10;
     const double apart = gradients_apart(best_a, best_b);
@@ -300,7 +301,7 @@ class Search {
     return true;
   }
 
-  // The largest over the objectives, in units of the parameters' sizes.
+  // The largest difference over the objectives, in units of the parameters' sizes.
   double gradients_apart(const Answer& a, const Answer& b) const {
     const std::vector<Parameter>& parameters = runs_.scene().parameters;
     Eigen::VectorXd size(static_cast<Index>(parameters.size()));
@@ -340,7 +341,7 @@ SimulationSettings with_tolerance(SimulationSettings settings, const std::string
   s.atol = std::stod(fmt::format("{:.6e}", atol));  // 1e-07, not 1.0000000000000001e-07
   s.type = integrator, s.rtol = rtol;
   s.step.reset();
-  s.options = {};  // of the file's own setting only
+  s.options = {};  // these belong to the file's own setting only
   return settings;
 }
 

@@ -1,10 +1,10 @@
-// The right answer of a problem, found by two methods that share no table: each goes on to tighter tolerances until its
-// answer no longer settles (rounding) or costs too much. What the two are apart is the reference's certificate.
+// The right answer of a problem, from two methods that share no table. Each takes tighter tolerances until its answer
+// no longer settles (rounding) or costs too much. The difference of the two is the reference's certificate.
 //
-// Methods: dopri853 (explicit) and gauss6 (implicit); where one of them does not get there (stiff motion, singular
-// positions) verner6 and radau5. Where equations were not met next to singular positions, gauss6 and radau5 with steps
-// of one size, too: step-size control takes ever shorter steps around these positions, and some stage comes too close.
-// Equations: the constrained ones (augmented Lagrangian, projected), whatever the scene asks for.
+// The methods are dopri853 (explicit) and gauss6 (implicit). verner6 and radau5 replace one that fails (stiff motion,
+// singular positions). If equations were not satisfied near singular positions, gauss6 and radau5 also take steps of
+// one size. Step-size control would take ever shorter steps there, and some stage would come too close. The equations
+// are the constrained ones (augmented Lagrangian, projected) for any scene.
 //
 //   const TradeoffReference reference = converged_reference(runs);
 //   if (reference.ok()) reference.errors->of(answer);
@@ -46,11 +46,11 @@ struct ReferenceOptions {
 
 TradeoffReference converged_reference(const TradeoffRuns& runs, const ReferenceOptions& options = {});
 
-// The scene's settings with another integrator at a tolerance; atol follows as in the scene (1e-2 of rtol where that
-// has a fixed step).
+// The scene's settings with another integrator at a tolerance. atol has the ratio of the scene, or 1e-2 of rtol if the
+// scene has a fixed step.
 SimulationSettings with_tolerance(SimulationSettings settings, const std::string& integrator, double rtol);
 
-// The constrained equations: the scene's own formulation where it is an augmented Lagrangian with full projection.
+// The constrained equations: the scene's own formulation if it is an augmented Lagrangian with full projection.
 FormulationSettings constrained(const FormulationSettings& formulation);
 
 }  // namespace mbsopt

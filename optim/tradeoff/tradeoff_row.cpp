@@ -7,7 +7,7 @@ namespace mbsopt {
 std::string in_words(const TradeoffSetting& setting) {
   const IntegratorSettings& s = setting.simulation.integrator;
   std::string name = setting.curve;
-  if (stands_alone(setting)) {  // of whatever method
+  if (stands_alone(setting)) {  // for any method
     name = fmt::format("{} ({})", s.type, name);
     if (setting.gradient) name = fmt::format("{}, {}", to_string(*setting.gradient), name);
   }

@@ -1,4 +1,4 @@
-// A setting that a trade-off measures, and the figures measured.
+// A setting that a trade-off measures, and its figures.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,18 +15,18 @@ namespace mbsopt {
 inline constexpr const char *kOwnSettings = "as in the file", *kDefaults = "defaults";
 
 struct TradeoffSetting {
-  std::string curve;  // what it has in common with its neighbours: "dopri5", "penalty 1e+07, cholesky: dopri5"
+  std::string curve;  // the common settings: "dopri5", "penalty 1e+07, cholesky: dopri5"
   SimulationSettings simulation;
   std::optional<GradientMethod> gradient;  // absent: a simulation
 };
 // "dopri5 at rtol 1e-06", "adjoint, rk4 with steps of 0.005 s"
 std::string in_words(const TradeoffSetting& setting);
-// Of no curve: the scene's own settings and the defaults.
+// Whether it belongs to no curve: the scene's own settings and the defaults.
 bool stands_alone(const TradeoffSetting& setting);
 
 enum class RowStatus {
   ok,
-  failed,     // of its own: a step too large, a method that cannot do it
+  failed,     // its own failure: a step too large, a method without the ability
   abandoned,  // took longer than its share, or the user ended it
   skipped,    // would have taken longer
 };
@@ -37,7 +37,7 @@ struct TradeoffRow {
   RowStatus status = RowStatus::ok;
   std::string message;  // why it is not ok
   double wall_seconds = 0;
-  int repetitions = 0;  // that this is the median of
+  int repetitions = 0;  // number of runs in this median
   SimulationStatistics statistics;
   Eigen::VectorXd errors;      // per quantity of the reference; NaN: not of this row
   Eigen::VectorXd deviations;  // likewise, with a sign

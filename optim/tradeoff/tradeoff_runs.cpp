@@ -34,7 +34,7 @@ class Watch {
   double t_ = 0;
 };
 
-// Methods and tolerances of integration are compared: a driven mechanism is integrated, too.
+// Methods and tolerances of integration are compared, so a driven mechanism is integrated, too.
 SimulationSettings integrated(SimulationSettings settings) {
   settings.solve = Solve::dynamics;
   return settings;

@@ -1,5 +1,5 @@
-// One problem at many settings: simulations and gradients, each answered with what the trade between speed and accuracy
-// compares. What goes wrong is a message, never an exception.
+// One problem at many settings: simulations and gradients. Each answer holds the quantities that the trade between
+// speed and accuracy compares. Failures are messages, never exceptions.
 //
 //   const TradeoffRuns runs(problem.scene, objectives_of(problem));
 //   const Answer answer = runs.motion(settings);                    // motion, sensors, psi
@@ -43,12 +43,12 @@ class TradeoffRuns {
 
   TradeoffRuns(Scene scene, std::vector<Objective> objectives);
 
-  // psi alone, as a simulation computes it: what is timed.
+  // psi alone, as a simulation computes it. This is timed.
   Answer values(const SimulationSettings& settings, const RunLimit& limit = {}) const;
-  // With the motion and the sensors at sample times; frozen: on the steps of another run.
+  // Adds the motion and the sensors at sample times. With frozen, it takes the steps of another run.
   Answer motion(const SimulationSettings& settings, const RunLimit& limit = {},
                 const StepSequence* frozen = nullptr) const;
-  // psi and psi_rho in all parameters. The limit holds for the forward part.
+  // psi and psi_rho in all parameters. The limit applies to the forward part.
   Answer gradients(const SimulationSettings& settings, GradientMethod method, const RunLimit& limit = {}) const;
 
   const Scene& scene() const { return scene_; }
