@@ -5,15 +5,13 @@
 namespace mbsopt {
 
 double FrictionLaw::value(double, const Eigen::VectorXd&, double, double rate, Law::Scratch&) const {
-  const auto [w, fall, level] = parts(rate);
-  return level * rate / w + viscous * rate;
+  const Parts at = parts(rate);
+  return at.level * at.u + viscous * rate;
 }
 
 Law::Value FrictionLaw::derivatives(double, const Eigen::VectorXd&, double, double rate, Law::Scratch&) const {
-  const auto [w, fall, level] = parts(rate);
-  const double level_rate = -2 * (breakaway - coulomb) * fall * rate / (stribeck * stribeck);
-  return {level * rate / w + viscous * rate, 0,
-          level * smooth * smooth / (w * w * w) + level_rate * rate / w + viscous};
+  const auto [w, u, s, fall, level, bulge] = parts(rate);
+  return {level * u + viscous * rate, 0, (level * s * s - bulge) / w + viscous};
 }
 
 void FrictionLaw::add_field_gradient(double, double rate, double f_bar, const Law::Scratch&, Eigen::VectorXd& theta_bar,
@@ -22,16 +20,15 @@ void FrictionLaw::add_field_gradient(double, double rate, double f_bar, const La
 }
 
 FrictionLaw::Parts FrictionLaw::parts(double rate) const {
-  const double fall = std::exp(-(rate / stribeck) * (rate / stribeck));
-  return {std::sqrt(rate * rate + smooth * smooth), fall, coulomb + (breakaway - coulomb) * fall};
+  const double w = std::hypot(rate, smooth), x = rate / stribeck, fall = std::exp(-x * x);
+  const double x_fall = fall > 0 ? x * fall * x : 0;  // x^2 overflows where the exponential vanishes
+  return {w, rate / w, smooth / w, fall, coulomb + (breakaway - coulomb) * fall, 2 * (breakaway - coulomb) * x_fall};
 }
 
 Vec<FrictionLaw::kFields> FrictionLaw::field_gradient(double rate) const {
-  const auto [w, fall, level] = parts(rate);
-  const double level_stribeck = 2 * (breakaway - coulomb) * fall * rate * rate / (stribeck * stribeck * stribeck);
+  const auto [w, u, s, fall, level, bulge] = parts(rate);
   Vec<kFields> gradient;
-  gradient << (1 - fall) * rate / w, -level * rate * smooth / (w * w * w), rate, fall * rate / w,
-      level_stribeck * rate / w;
+  gradient << (1 - fall) * u, -level * u * s / w, rate, fall * u, bulge / stribeck * u;
   return gradient;
 }
 

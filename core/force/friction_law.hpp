@@ -31,7 +31,9 @@ struct FrictionLaw {
 
  private:
   struct Parts {
-    double w, fall, level;  // fall = exp(-(rate/stribeck)^2)
+    double w, u, s;      // sqrt(rate^2 + smooth^2), rate/w, smooth/w
+    double fall, level;  // fall = exp(-x^2), x = rate/stribeck
+    double bulge;        // 2 (breakaway - coulomb) x^2 fall = -rate d(level)/d(rate)
   };
   Parts parts(double rate) const;
   Vec<kFields> field_gradient(double rate) const;  // df/d(coulomb, smooth, viscous, breakaway, stribeck)

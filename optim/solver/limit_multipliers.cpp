@@ -89,6 +89,12 @@ class LimitRound : public LeastSquaresProblem {
   } last;             // the last evaluation
 
  private:
+  struct Evaluated {
+    VectorXd x;
+    LeastSquaresPoint point;  // of the problem given
+    double cost = std::numeric_limits<double>::infinity();
+  };
+
   VectorXd taken_in(const VectorXd& c) const { return c.cwiseMax(c_lower_).cwiseMin(c_upper_); }
   double weight(const LeastSquaresPoint& point) const {
     constexpr double kExact = 1e-12;  // squares that vanish leave the limits a weight
@@ -97,11 +103,6 @@ class LimitRound : public LeastSquaresProblem {
 
   LeastSquaresProblem& given_;
   const VectorXd &c_lower_, &c_upper_;
-  struct Evaluated {
-    VectorXd x;
-    LeastSquaresPoint point;  // of the problem given
-    double cost = std::numeric_limits<double>::infinity();
-  };
   Evaluated best_;  // the best point of this round, at which most searches end
   VectorXd l_, x_;
   double part_ = kLimitWeight, w_ = 0, left_ = std::numeric_limits<double>::infinity(), missed_ = 0;

@@ -50,6 +50,23 @@ TEST_CASE("friction resists the motion at its level, smoothly through rest", "[f
   CHECK(torque(-0.4) == -torque(0.4));
 }
 
+TEST_CASE("friction whose Stribeck velocity is next to nothing is Coulomb's, with finite derivatives", "[force]") {
+  FrictionLaw law;
+  law.coulomb = 2, law.smooth = GENERATE(0.01, 1e-110), law.breakaway = 3, law.stribeck = 1e-110, law.slot = 0;
+  FrictionLaw coulomb = law;
+  coulomb.breakaway = 2, coulomb.stribeck = 1;
+  Law::Scratch scratch;
+  VectorXd of_rho, slopes = VectorXd::Zero(FrictionLaw::kFields), of_coulomb = slopes;
+  const double rate = GENERATE(0.4, -1e200, 1e-300);
+  CHECK(std::isfinite(law.derivatives(0, VectorXd(), 0, rate, scratch).f_xdot));
+  law.add_field_gradient(0, rate, 1, scratch, slopes, of_rho);
+  coulomb.add_field_gradient(0, rate, 1, scratch, of_coulomb, of_rho);
+  CHECK(slopes.allFinite());
+  if (std::abs(rate) < law.stribeck) return;
+  CHECK(law.value(0, VectorXd(), 0, rate, scratch) == coulomb.value(0, VectorXd(), 0, rate, scratch));
+  CHECK((slopes.head(3) - of_coulomb.head(3)).norm() == 0);
+}
+
 TEST_CASE("a force at a point gives its moment about the centre of mass", "[force]") {
   AppliedForce force;
   force.s = Vector3d(0.5, 0, 0);
