@@ -1,5 +1,5 @@
-// The scene's forces inside the equations of motion (gravity and users' own apart): their loads on each body, force in
-// global axes and moment in body axes, with tangent and pull-back.
+// Adds the scene's forces to the equations of motion, without gravity and users' own. A load has its force in global
+// axes and its moment in body axes. It comes with tangent and pull-back.
 //
 // A force written with sensors, F(t, rho, s(t, y, rho)), is differentiated through them:
 //   blocks     F_y = F_s s_y        fields     F' = (F_rho + F_s s_rho) rho'
@@ -8,7 +8,7 @@
 // Owns the numbers of one evaluation: one per thread, nothing is allocated after construction.
 #pragma once
 
-#include <type_traits>
+#include <array>
 #include <vector>
 
 #include "core/dynamics/motion_blocks.hpp"
@@ -19,7 +19,8 @@ class ForceTerms {
  public:
   explicit ForceTerms(const MechanismData& data);
 
-  // Where they are evaluated; angles: the branch of each joint angle; frames: of all bodies, the ground first.
+  // The state at which forces are evaluated. angles: the branch of each joint angle; frames: of all bodies, the ground
+  // first.
   struct At {
     double t;
     const Eigen::VectorXd& y;
@@ -27,11 +28,11 @@ class ForceTerms {
     const std::vector<Frame>& frames;
   };
   void add_loads(const At& at, std::vector<Vec<6>>& loads, bool but_springs = false);  // PlanarSprings has those
-  // Their derivatives in the state as blocks, units: unit tangents of all bodies, the ground first; and in the
-  // directions of fields and parameters, bodies at rest.
+  // These add the derivatives in the state as blocks, and those in the directions of fields and parameters with bodies
+  // at rest. units: unit tangents of all bodies, the ground first.
   void mark_units(std::vector<bool>& bodies) const;  // that add_blocks() reads
-  // but_torques: without those about hinges, and without free ones. Those are applied torques with components in
-  // global axes, which no sensor moves.
+  // but_torques: without those about hinges, and without free ones. A free torque is applied, has components in global
+  // axes, and reads no sensor.
   void add_blocks(const At& at, const std::vector<UnitTangents>& units, MotionBlocks& out, bool but_torques = false);
   static bool is_free_torque(const AppliedForce& f) { return f.is_torque && !f.in_body_axes && f.sensors.empty(); }
   // visitor(body, components)
@@ -56,13 +57,7 @@ class ForceTerms {
  private:
   // visitor(force, body1, body2)
   template <class Visitor>
-  void for_each(bool but_springs, Visitor&& visitor) const {
-    data_.forces.for_each([&]<class Kind>(const Kind& f) {
-      if (std::is_same_v<Kind, TsdaForce> && but_springs) return;
-      const std::array<int, 2> bodies = f.bodies();
-      visitor(f, static_cast<std::size_t>(bodies[0]), static_cast<std::size_t>(bodies[1]));
-    });
-  }
+  void for_each(bool but_springs, Visitor&& visitor) const;
   ForceInputs inputs(const At& at) { return {at.t, data_.rho, at.angles, law_}; }
   // tangent(t1, t2, load_dir1, load_dir2) of a force between two bodies, in each of their coordinates, to its blocks.
   template <class Tangent>

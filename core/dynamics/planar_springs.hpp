@@ -1,5 +1,5 @@
-// The springs (tsda.hpp) of a planar model whose points lie in one plane: loads and their pull-back from planar frames,
-// the same numbers as from frames in space at a fraction of the work.
+// Computes loads and pull-back of springs (tsda.hpp) whose points lie in one plane. Planar frames give the same numbers
+// as frames in space at a fraction of the work.
 #pragma once
 
 #include <vector>
@@ -8,6 +8,8 @@
 #include "core/mechanism/mechanism_data.hpp"
 
 namespace mbsopt {
+
+struct TsdaForce;  // core/force/tsda.hpp
 
 class PlanarSprings {
  public:
