@@ -1,5 +1,5 @@
-// Values and derivatives of all constraints of a mechanism at given frames (frames[0]: the ground), at one time (laws,
-// set_time called) and on the branches of followed joint angles.
+// Computes values and derivatives of all constraints of a mechanism. Frames give the bodies, the ground first; laws
+// give the time (call set_time before); angles give the branches of followed joint angles.
 #pragma once
 
 #include <vector>
@@ -33,18 +33,18 @@ class ConstraintTerms {
   void phi_dot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const;
   void phi_ddot(const Frames& frames, const RowLaws& laws, Eigen::VectorXd& out) const;
 
-  // Adds the gradient of the weighted scalar, times scale, in the frames to bars, in the geometry to theta_bar, through
+  // Adds scale times the gradient of the weighted scalar: in the frames to bars, in the geometry to theta_bar, through
   // laws to rho_bar.
   void add_pull_back(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
                      const ConstraintWeights& weights, double scale, std::vector<FrameBar>& bars,
                      Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) const;
 
-  // Tangents in the bodies' directions and those of the fields; that of J'lambda is added to loads, one per body, the
+  // Sets the tangents in the directions of bodies and fields. Adds that of J'lambda to loads, one per body, the
   // ground's first.
   void tangents(const Frames& frames, const std::vector<FrameTangent>& directions, RowLaws& laws,
                 const Eigen::VectorXd& angles, const ParameterBlock& block, const Eigen::VectorXd& lambda,
                 ConstraintTangents& out, std::vector<Lanes<6>>& loads) const;
-  // In the directions of the fields alone, bodies at rest: only constraints and laws that have some.
+  // Does the same for bodies at rest: it visits only constraints and laws with such fields.
   void field_tangents(const Frames& frames, RowLaws& laws, const Eigen::VectorXd& angles, const ParameterBlock& block,
                       const Eigen::VectorXd& lambda, ConstraintTangents& out, std::vector<Lanes<6>>& loads) const;
 

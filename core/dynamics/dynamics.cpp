@@ -23,7 +23,7 @@ bool Dynamics::evaluate(double t, const Eigen::VectorXd& y, const Eigen::VectorX
     const bool finite = model.evaluate(t, y, angles, ydot);
     const double ratio = constrained_ ? model.solver().residual_ratio() : 0;  // to z
     if (ratio > worst_residual_) {
-      // Where nothing accelerates (a wheel driven at constant speed) what is left of z is rounding.
+      // If nothing accelerates (a wheel driven at constant speed), z is rounding only.
       const double size = model.solver().residual_size();
       const double usual = size / model.usual_acceleration(size / worst_residual_);
       worst_residual_ = std::max(worst_residual_, std::min(ratio, usual));

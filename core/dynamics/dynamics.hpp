@@ -40,8 +40,8 @@ class Dynamics {
   long factor_blocks() const;
   long factorisations() const;
   long linearised_states() const { return linearised_states_; }
-  // Returns the largest residual of J z + gamma over all evaluations, relative to z or to the accelerations that are
-  // usual at the state (augmented Lagrangian; else 0).
+  // Returns the largest residual of J z + gamma over all evaluations (augmented Lagrangian; else 0). It is relative to
+  // z, or to the accelerations that are usual at the state.
   double worst_residual() const { return worst_residual_; }
 
  private:

@@ -1,5 +1,5 @@
-// The right-hand sides of the equations of motion, differentiated in the state with z = (rddot, omegadot) and lambda
-// held fixed, as blocks on the graph of bodies:
+// Holds the derivatives of the equations of motion in the state, as blocks on the graph of bodies. z = (rddot,
+// omegadot) and lambda stay fixed:
 //
 //   b = f - M z - J'lambda      one 6 x 14 block per body and body that its equations read
 //   c = -(Phiddot + 2 xi omega Phidot + omega^2 Phi)      one 1 x 14 block per row of Phi and body that it ties

@@ -1,5 +1,5 @@
-// Accelerations and multipliers at any state, for sensors that need them, and what a gradient in them means for the
-// state and the parameters: the equations of motion solved once more, and their adjoint.
+// Solves the equations of motion once more, for sensors that read accelerations or multipliers. Its adjoint turns a
+// gradient in these into one in the state and the parameters.
 #pragma once
 
 #include "core/dynamics/spatial_dynamics.hpp"

@@ -1,5 +1,5 @@
-// The numbers of a planar body in the state y, whose layout is that of space (7 + 7 numbers per body): read, written,
-// and with their tangents and cotangents. What leaves the plane stays as it is in y, at rest.
+// Reads and writes the numbers of a planar body in the state y, with their tangents and cotangents. The layout of y is
+// that of space: 7 + 7 numbers per body. Coordinates that would leave the plane keep their values in y, at rest.
 #pragma once
 
 #include "core/mechanism/parameter_lanes.hpp"

@@ -45,9 +45,9 @@ class PlanarConstraints {
                      const ConstraintWeights& weights, double scale, std::vector<PlanarFrameBar>& bars,
                      Eigen::Ref<Eigen::VectorXd> theta_bar, Eigen::Ref<Eigen::VectorXd> rho_bar) const;
 
-  // Sets the tangent of Phi, Phidot or Phiddot in the frames' directions and those of the vectors; the other two hold
-  // nothing of use. Adds that of J'lambda to loads (the ground's first). Points add nothing to Phiddot' here: their
-  // tangents are below.
+  // Sets the tangent of Phi, Phidot or Phiddot in the directions of frames and vectors. The other two have no meaning
+  // then. Adds that of J'lambda to loads (the ground's first). Points add nothing to Phiddot' here: their tangents are
+  // below.
   void tangents(Order order, const DualFrames& frames, RowLaws& laws, const Eigen::VectorXd& angles,
                 const ParameterBlock& block, const Eigen::VectorXd& lambda, ConstraintTangents& out,
                 std::vector<Lanes<3>>& loads) const;

@@ -1,11 +1,11 @@
-// The equations of motion of a planar model (planar_model.hpp), their tangent and adjoint: the same equations and
-// derivatives as in dynamics.hpp, in z = (rddot along t1 and t2, omegadot about n) per body,
+// The equations of motion of a planar model (planar_model.hpp) with tangent and adjoint. They are those of dynamics.hpp
+// in z = (rddot along t1 and t2, omegadot about n) per body,
 //
 //   pddot:  Pddot = (i omegadot/2 - |Pdot|^2) P
 //
-// and with the gyroscopic term gone. Springs act in the plane where their points lie in one; other forces are evaluated
-// in space and reduced to the plane, but for derivatives of torques in the state.
-// Allocates nothing after construction, but in the first tangent.
+// and with the gyroscopic term gone. Springs whose points lie in one plane are evaluated there. Other forces are
+// evaluated in space and reduced to the plane; only derivatives of torques in the state are not. Allocates nothing
+// after construction, but in the first tangent.
 #pragma once
 
 #include <optional>

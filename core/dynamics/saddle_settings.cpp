@@ -8,10 +8,10 @@
 namespace mbsopt {
 namespace {
 
-// alpha of S for the quasi-definite solution, which is the same whatever it is: large against any inertia, so that few
-// refinements do (a row between light bodies may have to move heavy ones behind them), and not so large that S loses
-// the smallest. Either that of the penalty itself, or far from it: in between refinements would crawl where rows are
-// redundant.
+// Chooses alpha of S for the quasi-definite solution, which does not depend on it. A large alpha needs few refinements:
+// a row between light bodies may have to move heavy ones behind them. A larger one would lose the smallest inertia in
+// S. It takes that of the penalty itself, or one far from it: in between, refinements of redundant rows would hardly
+// converge.
 double moderate_alpha(const MechanismData& data, double penalty) {
   if (data.m == 0) return penalty;
   double least = data.row_alpha.minCoeff(), most = data.row_alpha.maxCoeff();
@@ -24,9 +24,9 @@ double moderate_alpha(const MechanismData& data, double penalty) {
   return penalty <= moderate ? penalty : std::min(moderate, penalty / 100);
 }
 
-// Along a chain of L joints the least eigenvalue of J inv(M) J' falls as 1/L^2, and with it what a pass gains. From ten
-// times alpha on rounding takes a third pass, which chains of hundreds of joints in space need anyway; chains in the
-// plane do not (docs/formulations.md).
+// Along a chain of L joints the least eigenvalue of J inv(M) J' falls as 1/L^2, and with it what a pass gains. Above
+// ten times alpha, rounding takes a third pass. Chains of hundreds of joints in space need that pass anyway, chains in
+// the plane do not (docs/formulations.md).
 double alpha_along_chains(const MechanismData& data) {
   constexpr double kLong = 316;
   const double L = joints_to_farthest_body(data);
@@ -38,10 +38,10 @@ constexpr double kDerivativeTolerance = 1e-12;
 
 SaddleSettings constrained(const MechanismData& data, const FormulationSettings& settings) {
   const double alpha = settings.alpha * alpha_along_chains(data), digits = std::max(1.0, std::log10(alpha));
-  // As many passes as bring what S loses of M to alpha to rounding.
+  // So many passes bring the part of M that S loses to alpha down to rounding.
   const int rounding = std::clamp(static_cast<int>(std::ceil(14 / std::max(1.0, 16 - digits))) - 1, 1, 14);
-  // Derivatives are those of the limit: as many as bring alpha^-(passes) to rounding, and until J x' is right: an error
-  // of J x' moves along M^-1 J', which the projection's derivative takes out.
+  // Derivatives are those of the limit: passes go on until alpha^-(passes) is rounding and J x' is right. An error of J
+  // x' moves along M^-1 J', which the projection's derivative removes.
   const int exact = std::max(rounding, std::clamp(static_cast<int>(std::ceil(15 / digits)) - 1, 1, 8));
   return {alpha * data.row_alpha,
           0,

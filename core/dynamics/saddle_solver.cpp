@@ -9,8 +9,8 @@ namespace {
 // A pass that gains less ends the refinement: rounding is reached, the position is singular, or redundant rows
 // disagree.
 constexpr double kStagnation = 0.97;
-// A pass that gains less than this is near a singular position: what is left of the residual there moves x far along
-// the freedom that opens, so that refinement goes on to rounding, whatever tolerance is enough elsewhere.
+// A pass that gains less than this is near a singular position. There the remaining residual moves x far along the
+// freedom that opens. So refinement goes on to rounding, past any tolerance.
 constexpr double kSlow = 1e-6, kRounding = 1e-14;
 
 // z_r *= 1 - c alpha_r of each row r.

@@ -7,18 +7,18 @@
 //
 //   S dx = (b - M x - J'nu) + J' alpha s,    dnu = alpha (J dx - s),      s = g - J x + c nu
 //
-// The first pass solves the system with 1/alpha in place of c: penalty, when c is just that. Further ones are the
-// augmented-Lagrangian iteration (c = 0) or its quasi-definite counterpart, written as corrections of both x and nu by
-// their residuals: iterative refinement, which also removes the rounding errors of S (its condition number grows with
-// alpha). Each gains a factor of about (1 - c alpha)/(1 + alpha j), j the eigenvalues of J inv(M) J', so alpha need not
-// be that of the penalty. Updating nu by alpha times the whole J x - g instead would leave it with an error of alpha
-// times the rounding unit. The map (b, g) -> (x, nu) after a fixed number of passes is symmetric, so tangent and
-// adjoint solves are exact transposes whatever their convergence.
+// The first pass solves the system with 1/alpha in place of c: penalty, when c is just that. Further passes are the
+// augmented-Lagrangian iteration (c = 0) or its quasi-definite counterpart. They correct x and nu by their residuals:
+// this iterative refinement also removes the rounding errors of S, whose condition number grows with alpha. Each gains
+// a factor of about (1 - c alpha)/(1 + alpha j), j the eigenvalues of J inv(M) J', so alpha need not be that of the
+// penalty. Updating nu by alpha times the whole J x - g instead would leave it with an error of alpha times the
+// rounding unit. The map (b, g) -> (x, nu) after a fixed number of passes is symmetric, so tangent and adjoint solves
+// are exact transposes whatever their convergence.
 //
-// Redundant rows that disagree leave a residual s with J's = 0 that no x removes. Where c > 0, and alpha is the same in
-// all rows, nu lacks -s/c: it is added, and further passes remove what part of it was not redundant. Where c = 0, each
-// pass moves x by as much along directions that J hardly holds: one that gains nothing is taken back, so that tangent
-// and adjoint solves have equally many.
+// Redundant rows that disagree leave a residual s with J's = 0 that no x removes. If c > 0 and all rows have one alpha,
+// nu lacks -s/c. The solver adds it, and further passes remove its part that was not redundant. If c = 0, each pass
+// moves x equally far along directions that J hardly holds. The solver takes a pass back that gains nothing, so that
+// tangent and adjoint solves have equally many.
 #pragma once
 
 #include <vector>
@@ -29,7 +29,7 @@
 
 namespace mbsopt {
 
-// Refinements after the first pass: at least `least`, at most `most`; between the two until |s| is at most tolerance
+// How many refinements follow the first pass: `least` to `most`. Between the two they end when |s| is at most tolerance
 // times the larger of |g| and |x|, or stops falling.
 struct Refinements {
   int least = 0, most = 0;

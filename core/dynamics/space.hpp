@@ -1,5 +1,5 @@
-// The two spaces of mechanics, for code that is written once for both: a Space says how many unknowns a body has, how a
-// constraint sees its motion, and how its inertia depends on the parameters.
+// The two spaces of mechanics, for code that serves both. A Space says how many unknowns a body has, how a constraint
+// sees its motion, and how its inertia depends on the parameters.
 //
 //   InSpace   x = (r, turn about the body's three axes)         frame.hpp
 //   InPlane   x = (r along t1 and t2, turn about n)             planar_frame.hpp

@@ -36,15 +36,15 @@ class SpatialDynamics {
   // Prepares derivatives at a state whose solution (a = qddot, lambda) is known.
   bool linearise(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles,
                  const Eigen::Ref<const Eigen::VectorXd>& a, const Eigen::Ref<const Eigen::VectorXd>& lambda);
-  // As linearise(), right after evaluate() at this state: it uses the factor of evaluate().
+  // Does the same right after evaluate() at this state: it uses the factor of evaluate().
   void linearise_here() { terms_.set_accelerations(); }
 
   // y_dir: tangent of y (14n x lanes); ydot_dir: of (v, a). z_tangent(): of z.
   void tangent(const ParameterBlock& block, const LaneRows& y_dir, LaneRows& ydot_dir);
   void acceleration_tangent(const ParameterBlock& block, const LaneRows& y_dir, Eigen::Ref<LaneRows> a_dir);
   const std::vector<Lanes<6>>& z_tangent() const { return z_dir_; }
-  // w: cotangent of (v, a); adds to the cotangents of y, of the differentiated fields, and of the parameters in laws.
-  // motion: a cotangent of z and lambda themselves beside it.
+  // Adds to the cotangents of y, of the differentiated fields, and of the parameters in laws. w: cotangent of (v, a).
+  // motion: a further cotangent, of z and lambda.
   void add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
                    Eigen::VectorXd& rho_bar, const Motion* motion = nullptr);
 

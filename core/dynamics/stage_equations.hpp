@@ -1,5 +1,5 @@
-// The equations of motion as an implicit method solves them, together with its stages: 7 n + m rows r = 0 for the
-// unknowns (a = qddot, lambda), body by body and then the constraints:
+// The equations of motion that an implicit method solves with its stages. They have 7 n + m rows r = 0 for the unknowns
+// (a = qddot, lambda), body by body and then the constraints:
 //
 //   f - M z - J'lambda,   p'(pddot(z) - a_p)      z = (rddot, omegadot) of a             [7 per body]
 //   lambda/alpha [penalty] - (J z + gamma)                                               [m]

@@ -1,9 +1,9 @@
 // Declared times at which laws may jump or have kinks: a step ends there, the next begins there.
 //
-// A stage at the end of a step must see the law as it is before the event, the first stage of the next step as it is
-// after it, and at the very time a law may have no value at all (abs(x)/x). So the step ends a few roundings early and
-// the next begins as many late, from the same state: a gap of 32 roundings of the time, 7e-15 of it, in which nothing
-// moves. Discrete derivatives know of it as of any other sequence of steps.
+// A stage at the end of a step must see the law before the event. The first stage of the next step must see it after
+// the event. At that very time a law may have no value at all (abs(x)/x). So the step ends a few roundings early, and
+// the next begins as many late from the same state. Nothing moves in this gap of 32 roundings of the time, 7e-15 of it.
+// Discrete derivatives know of it as of any other sequence of steps.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ class EventTimes {
     std::erase_if(times_, [&](double t) { return t <= start + 2 * gap_ || t >= end - 2 * gap_; });
   }
 
-  // Where the step that begins at t has to end at the latest.
+  // The latest end of a step that begins at t.
   double stop_after(double t) {
     while (next_ < times_.size() && t >= times_[next_] - gap_) ++next_;
     return next_ < times_.size() ? times_[next_] - gap_ : end_;

@@ -1,13 +1,13 @@
 // Steps past singular positions, where the constraints' Jacobian J loses rank for an instant (a four-bar lies flat).
 //
-// At a distance d from such a position, of t* - t in time, a state meets the constraints, to rounding e, only up to e/d
-// in the directions that are about to be free. What is left there obeys d u' + 2 d' u = 0, u' = 2 u/(t* - t), and the
-// stages of an explicit step past t* magnify it, one after another, by h/(t + c_i h - t*) each: by how much depends on
-// where they lie, not on how short the step is; derivatives lose another 1/h^3 or so. Steps are placed such that t*
-// lies where the tableau magnifies least, at theta = (t* - t)/h, and kept long.
+// At a distance d from such a position, t* - t in time, a state has errors e/d in the directions that are about to be
+// free, e: rounding. These errors obey d u' + 2 d' u = 0, u' = 2 u/(t* - t). The stages of an explicit step past t*
+// magnify them one after another, by h/(t + c_i h - t*) each. The product depends on where the stages lie, not on how
+// short the step is. Derivatives lose another 1/h^3 or so. So steps stay long, with sizes that put t* where the tableau
+// magnifies least, at theta = (t* - t)/h.
 //
-// t* is found from the response of the constraint forces to a fixed load (Projector::response), which has a pole there:
-// its inverse goes through zero, and its sign changes.
+// The response of the constraint forces to a fixed load (Projector::response) has a pole at t*. Its inverse goes
+// through zero there, which tells t*.
 //
 //   SingularPassage passage(method, constraints);
 //   h = passage.propose(t, wanted, most);  // attempt it; then, with the response at its end:
@@ -43,8 +43,8 @@ class SingularPassage {
 
   // Where a step's t* is best, 0 to 1.
   double best_theta();
-  // The largest acceleration over its stage's distance from t*, of the stages of a step and of one like it after it,
-  // where u is 1 over the distance at the start, and derivatives of it another 1 over the distance.
+  // The largest acceleration over its stage's distance from t*, in a step and in an equal one after it. At the start u
+  // is 1 over the distance, and its derivatives are another 1 over the distance.
   double magnified(double theta) const;
 
  private:

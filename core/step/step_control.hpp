@@ -12,22 +12,21 @@
 
 namespace mbsopt {
 
-// h rounded down to a power of e^(1/parts): estimates of error that differ by rounding lead to the very same step, and
-// with it to results that differ by rounding only, where steps that differ in their last digits would put a part of the
-// method's error between them. Costs 0.5 % of h on average. Powers of two would put steps on round times, where laws
-// have their corners.
+// Rounds h down to a power of e^(1/parts). Error estimates that differ by rounding then lead to the very same step, and
+// results differ by rounding only. Otherwise a part of the method's error would stand between them. Costs 0.5 % of h on
+// average. Powers of two would put steps on round times, where laws have their corners.
 inline double rounded_step(double h, double parts = 100) {
   constexpr double kOnIt = 1e-9;  // such a power stays as it is
   return std::exp(std::floor(parts * std::log(h) + kOnIt) / parts);
 }
 
-// h -> h * factor with factor = safety err^-a err_old^b err_older^-c, at least factor_min, at most factor_max; k the
-// power of h in the estimate (p for an estimate of order p - 1).
+// h -> h * factor with factor = safety err^-a err_old^b err_older^-c within factor_min and factor_max. k is the power
+// of h in the estimate: p for an estimate of order p - 1.
 //   PI:  a = (1 - 0.15)/k, b = 0.2/k
 //   I:   a = 1/k
 //   PID: a = 0.58/k, b = 0.21/k, c = 0.1/k: Kennedy, Carpenter, Applied Numerical Mathematics 44 (2003)
-// factor_max is taken where the error would stay below a half with it: estimates so small are mostly rounding, by
-// methods of high order.
+// The controller takes factor_max if the error would stay below a half with it. Such small estimates of high-order
+// methods are mostly rounding.
 class StepController {
  public:
   StepController(int error_order, const IntegratorOptions& options)
