@@ -37,10 +37,10 @@ struct DriveEfforts {
 
   DriveEfforts(const MechanismData& d) {
     table.columns = {"t"};
-    for (const Constraint& c : d.constraints) {
-      if (c.drive < 0) continue;
-      rows.push_back(c.row);
-      table.columns.push_back(d.drive_names[static_cast<std::size_t>(c.drive)]);
+    for (const RowLaw& law : d.laws) {
+      if (law.drive < 0) continue;
+      rows.push_back(law.row);
+      table.columns.push_back(d.drive_names[static_cast<std::size_t>(law.drive)]);
     }
   }
   // Keeps the efforts if they are finite, and returns whether they are.

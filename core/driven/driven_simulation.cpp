@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "core/constraint/constraint.hpp"
 #include "core/cvodes/cvodes.hpp"
 #include "core/driven/driven_run.hpp"
 #include "core/dynamics/planar_bodies.hpp"

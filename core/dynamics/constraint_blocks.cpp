@@ -1,5 +1,7 @@
 #include "core/dynamics/constraint_blocks.hpp"
 
+#include "core/constraint/constraint.hpp"
+
 namespace mbsopt {
 namespace {
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/constraint/constraint.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -64,6 +66,15 @@ ConstraintRows::ConstraintRows(const MechanismData& data) : data_(&data) {
         edges_.emplace_back(row.bodies[i] - 1, row.bodies[j] - 1);
       }
     }
+  }
+}
+
+[[gnu::always_inline]] inline void ConstraintRows::prefetch_geometry(std::size_t group, const Frames& frames) const {
+  constexpr int kMotion = 36;  // numbers of a frame: its position, axes and their rates
+  const RowsInSpace::Group& g = groups_[group];
+  prefetch<3>(&data_->constraints[first_constraint_[group]]);
+  for (const int body : {g.body1, g.body2}) {
+    if (body > 0) prefetch<kMotion>(frames[at(body)].r.data());
   }
 }
 

@@ -58,15 +58,8 @@ class ConstraintRows : public RowProducts<ConstraintRows, RowsInSpace> {
   // S += J' diag(alpha) J of a group
   void add_square(std::size_t group, const Eigen::VectorXd& alpha, const BlockKernels& kernels, BlockCholesky<6>& S);
   void add_shared_square(const Eigen::VectorXd& alpha, BlockCholesky<6>& S);
-  // Prefetches the data that evaluate and add_square need for a later group (inlined: prefetch.hpp).
-  [[gnu::always_inline]] void prefetch_geometry(std::size_t group, const Frames& frames) const {
-    constexpr int kMotion = 36;  // numbers of a frame: its position, axes and their rates
-    const RowsInSpace::Group& g = groups_[group];
-    prefetch<3>(&data_->constraints[first_constraint_[group]]);
-    for (const int body : {g.body1, g.body2}) {
-      if (body > 0) prefetch<kMotion>(frames[static_cast<std::size_t>(body)].r.data());
-    }
-  }
+  // Prefetches the data that evaluate and add_square need for a later group.
+  void prefetch_geometry(std::size_t group, const Frames& frames) const;
   [[gnu::always_inline]] void prefetch_square(std::size_t group, BlockCholesky<6>& S) const {
     const RowGroup& g = data_->groups[group];
     if (g.shared) return;

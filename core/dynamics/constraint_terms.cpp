@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/constraint/constraint.hpp"
+
 namespace mbsopt {
 namespace {
 

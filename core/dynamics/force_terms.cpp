@@ -1,7 +1,9 @@
 #include "core/dynamics/force_terms.hpp"
 
 #include <algorithm>
+#include <type_traits>
 
+#include "core/force/forces.hpp"
 #include "core/mechanism/derivative_blocks.hpp"
 
 namespace mbsopt {
@@ -15,7 +17,7 @@ ForceTerms::ForceTerms(const MechanismData& data) : data_(data) {
   const std::size_t P = static_cast<std::size_t>(data.rho.size());
   law_.inputs.resize(P + 3);
   law_.gradient.resize(P + 3);
-  data.forces.for_each([&]<class Kind>(const Kind& f) {
+  data.forces->for_each([&]<class Kind>(const Kind& f) {
     if constexpr (HasLaw<Kind>)
       if (f.law.program) f.law.program->grow(law_.program);
   });
@@ -27,6 +29,15 @@ ForceTerms::ForceTerms(const MechanismData& data) : data_(data) {
   }
   y_bar_.setZero(14 * data.n);
   rho_bar_.setZero(data.rho.size());
+}
+
+template <class Visitor>
+void ForceTerms::for_each(bool but_springs, Visitor&& visitor) const {
+  data_.forces->for_each([&]<class Kind>(const Kind& f) {
+    if (std::is_same_v<Kind, TsdaForce> && but_springs) return;
+    const std::array<int, 2> bodies = f.bodies();
+    visitor(f, index(bodies[0]), index(bodies[1]));
+  });
 }
 
 void ForceTerms::set_inputs(const AppliedForce& f, const At& at) {

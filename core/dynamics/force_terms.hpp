@@ -8,7 +8,7 @@
 // Each thread needs its own ForceTerms: it owns the numbers of one evaluation. It allocates nothing after construction.
 #pragma once
 
-#include <type_traits>
+#include <array>
 #include <vector>
 
 #include "core/dynamics/motion_blocks.hpp"
@@ -57,13 +57,7 @@ class ForceTerms {
  private:
   // visitor(force, body1, body2)
   template <class Visitor>
-  void for_each(bool but_springs, Visitor&& visitor) const {
-    data_.forces.for_each([&]<class Kind>(const Kind& f) {
-      if (std::is_same_v<Kind, TsdaForce> && but_springs) return;
-      const std::array<int, 2> bodies = f.bodies();
-      visitor(f, static_cast<std::size_t>(bodies[0]), static_cast<std::size_t>(bodies[1]));
-    });
-  }
+  void for_each(bool but_springs, Visitor&& visitor) const;
   ForceInputs inputs(const At& at) { return {at.t, data_.rho, at.angles, law_}; }
   // Calls tangent(t1, t2, load_dir1, load_dir2) of a force between two bodies in each of their coordinates, and adds
   // the result to its blocks.

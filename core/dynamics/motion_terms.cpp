@@ -6,6 +6,7 @@
 #include "core/body/lanes.hpp"
 #include "core/body/state_layout.hpp"
 #include "core/dynamics/space.hpp"
+#include "core/force/forces.hpp"
 #include "core/linear/prefetch.hpp"
 
 namespace mbsopt {
@@ -14,7 +15,7 @@ MotionTerms::MotionTerms(const MechanismData& data, const FormulationSettings& s
     : data_(data),
       two_xi_omega_(2 * settings.xi * settings.omega),
       omega2_(settings.omega * settings.omega),
-      has_forces_(!(data.forces.empty() && data.applied.empty() && data.user_forces.empty())),
+      has_forces_(!(data.forces->empty() && data.applied.empty() && data.user_forces.empty())),
       forces_read_y_(!(data.applied.empty() && data.user_forces.empty())),
       laws_(data),
       constraints_(data),

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/constraint/constraint.hpp"
 #include "core/linear/pairs.hpp"
 
 namespace mbsopt {

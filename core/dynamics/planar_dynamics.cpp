@@ -4,13 +4,14 @@
 #include <cmath>
 
 #include "core/dynamics/space.hpp"
+#include "core/force/forces.hpp"
 #include "core/mechanism/derivative_blocks.hpp"
 
 namespace mbsopt {
 namespace {
 
 bool any_force_but_springs(const MechanismData& d) {
-  return d.forces.size() > d.forces.of<TsdaForce>().size() || !d.applied.empty() || !d.user_forces.empty();
+  return d.forces->size() > d.forces->of<TsdaForce>().size() || !d.applied.empty() || !d.user_forces.empty();
 }
 
 // Whether the vectors that define the angles of torques lie in the plane.
@@ -25,14 +26,14 @@ bool torques_are_about_normal(const MechanismData& d) {
     all = all && lies(joint.body1, joint.measure.s1) && lies(joint.body1, joint.measure.s3) &&
           lies(joint.body2, joint.measure.s2);
   };
-  std::ranges::for_each(d.forces.of<RsdaForce>(), look);
-  std::ranges::for_each(d.forces.of<TurningFriction>(), look);
+  std::ranges::for_each(d.forces->of<RsdaForce>(), look);
+  std::ranges::for_each(d.forces->of<TurningFriction>(), look);
   return all;
 }
 
 // Whether torques about hinges and free torques are the only forces that depend on the state.
 bool nothing_but_torques(const MechanismData& d) {
-  return d.forces.size() == d.forces.of<RsdaForce>().size() + d.forces.of<TurningFriction>().size() &&
+  return d.forces->size() == d.forces->of<RsdaForce>().size() + d.forces->of<TurningFriction>().size() &&
          d.user_forces.empty() && std::ranges::all_of(d.applied, [](const AppliedForce& f) {
            return !depends_on_state(f) || ForceTerms::is_free_torque(f);
          });
@@ -61,7 +62,7 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
       springs_(data),
       torques_in_plane_(torques_are_about_normal(data)),
       only_torques_(torques_in_plane_ && nothing_but_torques(data)),
-      has_springs_(!data.forces.of<TsdaForce>().empty()),
+      has_springs_(!data.forces->of<TsdaForce>().empty()),
       has_other_forces_(any_force_but_springs(data)),
       forces_(data),
       user_(data) {

@@ -1,7 +1,9 @@
 // Tangents of the planar equations: right-hand sides and accelerations in directions of the state and the parameters.
 #include "core/body/lanes.hpp"
+#include "core/constraint/constraint.hpp"
 #include "core/dynamics/planar_dynamics.hpp"
 #include "core/dynamics/space.hpp"
+#include "core/force/forces.hpp"
 #include "core/linear/pairs.hpp"
 
 namespace mbsopt {
@@ -99,8 +101,8 @@ void PlanarDynamics::add_torque_blocks() {
       }
     }
   };
-  for (const RsdaForce& torque : data_.forces.of<RsdaForce>()) add(torque);
-  for (const TurningFriction& torque : data_.forces.of<TurningFriction>()) add(torque);
+  for (const RsdaForce& torque : data_.forces->of<RsdaForce>()) add(torque);
+  for (const TurningFriction& torque : data_.forces->of<TurningFriction>()) add(torque);
   forces_.for_each_free_torque(here(), [&](int body, const Vector3d& c) {
     const Plane& P = bodies_[at(body)].P;
     ForceLinearisation::Block& block = x.in_plane[at(x.blocks.pair(body - 1, body - 1))];

@@ -2,12 +2,13 @@
 
 #include <cmath>
 
+#include "core/force/forces.hpp"
 #include "core/mechanism/planar_model.hpp"
 
 namespace mbsopt {
 
 PlanarSprings::PlanarSprings(const MechanismData& data) : data_(data) {
-  for (const TsdaForce& f : data.forces.of<TsdaForce>()) {
+  for (const TsdaForce& f : data.forces->of<TsdaForce>()) {
     const std::size_t i = static_cast<std::size_t>(f.body1), j = static_cast<std::size_t>(f.body2);
     const PlanarBody &b1 = data.planar->bodies[i], &b2 = data.planar->bodies[j];
     springs_.push_back({&f, i, j, b1.in_plane(f.s1), b2.in_plane(f.s2)});

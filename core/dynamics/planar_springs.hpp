@@ -9,6 +9,8 @@
 
 namespace mbsopt {
 
+struct TsdaForce;  // core/force/tsda.hpp
+
 class PlanarSprings {
  public:
   explicit PlanarSprings(const MechanismData& data);  // data must have a planar model

@@ -1,6 +1,7 @@
 // The parts of a state that a force reads beside the frames of its bodies, and the gradient in the force's fields.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "core/force/law.hpp"
@@ -11,6 +12,11 @@ namespace mbsopt {
 inline double branch(const Eigen::VectorXd& angles, int angle) {
   return angle >= 0 && angle < angles.size() ? angles(angle) : 0.0;
 }
+
+// A force: its kind in the list `Forces` (forces.hpp), its index among those of this kind.
+struct ForcePlace {
+  std::size_t kind = 0, index = 0;
+};
 
 struct ForceInputs {
   double t;

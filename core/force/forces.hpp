@@ -26,10 +26,6 @@ concept HasLaw = std::same_as<decltype(Kind::law), Law>;
 template <class... Kinds>
 class ForceLists {
  public:
-  struct Place {
-    std::size_t kind = 0, index = 0;
-  };
-
   template <class Kind>
   std::vector<Kind>& of() {
     return std::get<std::vector<Kind>>(lists_);
@@ -52,7 +48,7 @@ class ForceLists {
         if constexpr (std::invocable<Visitor&, decltype(list[i])>) {
           visitor(list[i]);
         } else {
-          visitor(list[i], Place{kind, i});
+          visitor(list[i], ForcePlace{kind, i});
         }
       }
       ++kind;
@@ -67,7 +63,7 @@ class ForceLists {
   }
   // Calls visitor(force) if its kind has a law.
   template <class Visitor>
-  void visit_law(Place place, Visitor&& visitor) const {
+  void visit_law(ForcePlace place, Visitor&& visitor) const {
     std::size_t kind = 0;
     const auto visit = [&](const auto& list) {
       if constexpr (HasLaw<typename std::decay_t<decltype(list)>::value_type>) {
@@ -82,6 +78,6 @@ class ForceLists {
   std::tuple<std::vector<Kinds>...> lists_;
 };
 
-using Forces = ForceLists<TsdaForce, RsdaForce, TurningFriction, SlidingFriction, Bushing>;
+struct Forces : ForceLists<TsdaForce, RsdaForce, TurningFriction, SlidingFriction, Bushing> {};
 
 }  // namespace mbsopt

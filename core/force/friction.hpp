@@ -8,6 +8,7 @@
 // breakaway. Stiffness of the equations at rest: f_rate = breakaway/smooth + viscous.
 #pragma once
 
+#include "core/constraint/dot2.hpp"
 #include "core/force/friction_law.hpp"
 #include "core/force/joint_effort.hpp"
 

@@ -1,5 +1,6 @@
 #include "core/force/joint_effort.hpp"
 
+#include "core/constraint/dot2.hpp"
 #include "core/force/friction_law.hpp"
 
 namespace mbsopt {

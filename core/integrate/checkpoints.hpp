@@ -1,10 +1,10 @@
 // The states that an adjoint run keeps of the forward motion, within a budget of memory.
 //
 // While all steps fit they are kept, and nothing is computed twice. Beyond that the forward run keeps the state at the
-// start of every k-th step, k doubled whenever these snapshots fill half of the budget. Going back, the steps from one
-// snapshot to the next are computed again and kept; where they do not fit either, more snapshots are placed in between
-// by the binomial rule. The steps are those of the forward run, bit for bit, so that derivatives do not depend on the
-// budget.
+// start of every k-th step. k doubles whenever these snapshots fill half of the budget. The backward sweep computes the
+// steps from one snapshot to the next again and keeps them. If they do not fit either, it takes more snapshots in
+// between by the binomial rule. The steps are those of the forward run, bit for bit, so that derivatives do not depend
+// on the budget.
 //
 //   N blocks of steps are reversed from s snapshots (the one at their start included) with the least number of block
 //   evaluations beside those that keep steps, t(N, s) = r N - beta(s + 1, r - 1), beta(s, r) = (s + r)!/(s! r!), r the
@@ -36,8 +36,8 @@ class Checkpoints {
   // Forward: each accepted step in turn, with the samples in it.
   void keep(const Step& step, std::span<const SampleEvent> events);
 
-  // Computes the steps from a snapshot up to, not including, `last` again, and hands each to a sink; dense(): whether
-  // the step at hand needs dense output. False where that fails.
+  // Computes the steps from a snapshot to `last` (not included) again, and gives each to a sink. dense(): whether the
+  // present step needs dense output. Returns whether it succeeds.
   using Replay = std::function<bool(const Snapshot& from, long last, const std::function<bool()>& dense,
                                     const std::function<void(const Step&)>& sink)>;
   using StepBack = std::function<bool(const StoredStep&)>;

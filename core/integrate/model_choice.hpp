@@ -1,4 +1,4 @@
-// Which model a run of a Runge-Kutta method takes: three unknowns per body or six.
+// Chooses the model of a Runge-Kutta run: three unknowns per body or six.
 #pragma once
 
 #include "core/mechanism/mechanism.hpp"
@@ -7,8 +7,8 @@
 
 namespace mbsopt {
 
-// By itself never planar with the penalty form, whose joints give way to loads across the plane, too.
-// Throws SceneError where the settings ask for the planar model and there is none.
+// The penalty form is planar on request only: its joints give way to loads across the plane, too. Throws SceneError
+// where the settings ask for the planar model and there is none.
 Model model_of(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method);
 
 // Why a run with these settings is not planar; empty where it is. method: null for CVODES.

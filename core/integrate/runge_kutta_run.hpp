@@ -7,17 +7,15 @@
 #include <span>
 #include <vector>
 
-#include "core/dynamics/dynamics.hpp"
+#include "core/integrate/step_attempt.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/run/cost.hpp"
 #include "core/run/simulation_result.hpp"
 #include "core/scene/settings.hpp"
 #include "core/step/component_tolerances.hpp"
-#include "core/step/implicit_stages.hpp"
-#include "core/step/rosenbrock_stages.hpp"
-#include "core/step/singular_passage.hpp"
 #include "core/step/step.hpp"
 #include "core/step/step_failure.hpp"
+#include "core/watch/penalty_watch.hpp"
 #include "core/watch/run_guard.hpp"
 
 namespace mbsopt {
@@ -36,7 +34,7 @@ class RungeKuttaRun {
            const std::function<bool(double t1)>& wants_dense, const Sink& accepted, const RunOptions& options,
            SimulationResult& result);
 
-  const Eigen::VectorXd& angles() const { return angles_; }
+  const Eigen::VectorXd& angles() const { return attempt_.step.angles0; }
 
  private:
   using Outcome = StepOutcome;
@@ -54,45 +52,21 @@ class RungeKuttaRun {
   void choose_next_size(Course& course);
   void advance(Course& course);
   void restart(Course& course);
-  void restart_stages();
   void add_statistics(Course& course);
   std::string tolerances_or(std::string message, const Course& course) const;
 
-  double first_step(const IntegratorSettings& s, double span);
   double propose_step(double t, double h, double end, bool adaptive) const;
-  bool evaluate_stage(int i);
-  bool solve_stages(ImplicitStages::Goal goal);
-  double error_of_step();
-  double error_after_projection();
-  bool better_placed_by(double wanted, double largest);
-  void set_y_hat();
-  Outcome attempt(double h, bool adaptive, bool exact, double& error);
-  Outcome finish_step(bool dense);  // dense stages, projection, branches of the angles
   double fastest_tracked_rate(const Eigen::VectorXd& y) const;
   Energy update_statistics(SimulationResult& result);
-  void add_projection(double h);
 
   const Mechanism mechanism_;
   SimulationSettings settings_;
   const Method& rk_;
   const std::vector<KinkedSignal> kinks_;
   const ComponentTolerances tolerances_;
-  Dynamics dynamics_;
-  std::optional<ImplicitStages> implicit_;
-  std::optional<RosenbrockStages> rosenbrock_;
-  std::unique_ptr<Projector> projector_;
+  StepAttempt attempt_;
   RunGuard guard_;
-  // Where passage_ is there.
-  std::optional<SingularPassage> passage_;
-  Eigen::VectorXd response_;
-  ParameterBlock no_parameters_;
-  LaneRows error_, projected_error_;
-  Step step_;
-  Eigen::VectorXd angles_, work_, ydot_, y_stage_;
-  double projected_out_ = 0;  // of the error of the last attempt, in tolerances
-  bool first_stage_known_ = false;
-  long evaluations_ = 0;
-  double projected_ = 0, moved_ = 0;  // sums over the steps, of velocities by penalties
+  PenaltyWatch penalty_;
 };
 
 }  // namespace mbsopt

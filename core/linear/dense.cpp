@@ -158,14 +158,19 @@ MatrixXd triangular_factor(MatrixXd A) {
   return Eigen::HouseholderQR<MatrixXd>(std::move(A)).matrixQR().topRows(rows).triangularView<Eigen::Upper>();
 }
 
-MatrixXd orthogonal_factor(const MatrixXd& A) {
-  return Eigen::HouseholderQR<MatrixXd>(A).householderQ() * MatrixXd::Identity(A.rows(), A.cols());
+MatrixXd orthogonal_factor(const MatrixXd& A, Index columns) {
+  return Eigen::HouseholderQR<MatrixXd>(A).householderQ() * MatrixXd::Identity(A.rows(), columns);
 }
 
 LeftSingular left_singular(const MatrixXd& A) {
   if (A.size() == 0) return {VectorXd(0), MatrixXd::Identity(A.rows(), A.rows())};
   const Eigen::JacobiSVD<MatrixXd> svd(A, Eigen::ComputeFullU);
   return {svd.singularValues(), svd.matrixU()};
+}
+
+RightSingular right_singular(const MatrixXd& A) {
+  const Eigen::JacobiSVD<MatrixXd> svd(A, Eigen::ComputeFullV);
+  return {svd.singularValues(), svd.matrixV()};
 }
 
 LeastSingular least_singular(const MatrixXd& A) {
@@ -208,6 +213,11 @@ MatrixXd OrthogonalDecomposition::solve(const MatrixXd& b) const {
 MatrixXd OrthogonalDecomposition::solve_transposed(const MatrixXd& b) const {
   if (factors_->is_empty()) return MatrixXd::Zero(factors_->rows, b.cols());
   return factors_->cod.transpose().solve(b);
+}
+MatrixXd OrthogonalDecomposition::null_space() const {
+  const Index cols = factors_->cols;
+  if (factors_->is_empty()) return MatrixXd::Identity(cols, cols);
+  return factors_->cod.colsPermutation() * factors_->cod.matrixZ().transpose().rightCols(cols - rank());
 }
 MatrixXd OrthogonalDecomposition::left_null_space() const {
   const Index rows = factors_->rows;

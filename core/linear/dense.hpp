@@ -45,8 +45,8 @@ Eigen::MatrixXd null_space(const Eigen::MatrixXd& A, double threshold);
 Eigen::MatrixXd orthonormal_columns(const Eigen::MatrixXd& A);
 
 // A = Q R by Householder's reflections.
-Eigen::MatrixXd triangular_factor(Eigen::MatrixXd A);         // R, of min(rows, columns) rows
-Eigen::MatrixXd orthogonal_factor(const Eigen::MatrixXd& A);  // Q, of the shape of A, rows >= columns
+Eigen::MatrixXd triangular_factor(Eigen::MatrixXd A);                               // R, of min(rows, columns) rows
+Eigen::MatrixXd orthogonal_factor(const Eigen::MatrixXd& A, Eigen::Index columns);  // these first ones of Q
 
 // A = U diag(values) V' with all columns of U and descending values, for small matrices.
 struct LeftSingular {
@@ -54,6 +54,13 @@ struct LeftSingular {
   Eigen::MatrixXd U;
 };
 LeftSingular left_singular(const Eigen::MatrixXd& A);
+
+// The same with all columns of V, and min(rows, columns) values.
+struct RightSingular {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd V;
+};
+RightSingular right_singular(const Eigen::MatrixXd& A);
 
 // The smallest of the min(rows, columns) singular values of a nonempty A, and its vectors: A v = value u.
 struct LeastSingular {
@@ -97,7 +104,8 @@ class OrthogonalDecomposition {
   Eigen::Index rank() const;
   Eigen::MatrixXd solve(const Eigen::MatrixXd& b) const;             // A x = b
   Eigen::MatrixXd solve_transposed(const Eigen::MatrixXd& b) const;  // A'x = b
-  Eigen::MatrixXd left_null_space() const;                           // orthonormal columns x with A'x = 0
+  Eigen::MatrixXd null_space() const;                                // orthonormal columns x with A x = 0
+  Eigen::MatrixXd left_null_space() const;                           // the same of A'
 
  private:
   struct Factors;

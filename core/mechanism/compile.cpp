@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/constraint/constraint.hpp"
 #include "core/linear/dense.hpp"
 #include "core/mechanism/compilation.hpp"
 #include "core/mechanism/planar_model.hpp"

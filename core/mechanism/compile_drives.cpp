@@ -1,4 +1,5 @@
 // Drives: a coordinate, distance, angle or displacement follows a law of time. Each drive is one row of Phi.
+#include "core/constraint/constraint.hpp"
 #include "core/mechanism/compilation.hpp"
 #include "core/mechanism/kinks_in_time.hpp"
 #include "core/mechanism/mechanism.hpp"
@@ -80,7 +81,7 @@ void compile_drives(Compilation& model) {
     c.drive = static_cast<int>(i);
     model.data.drive_names.push_back(drive.name);
     const int row = model.add_constraint(std::move(c)).row;
-    model.data.laws.push_back({row, law_of(model, drive, where)});
+    model.data.laws.push_back({row, law_of(model, drive, where), static_cast<int>(i)});
   }
 }
 

@@ -3,7 +3,9 @@
 #include <optional>
 #include <set>
 
+#include "core/constraint/dot2.hpp"
 #include "core/force/bound_force.hpp"
+#include "core/force/forces.hpp"
 #include "core/mechanism/compilation.hpp"
 #include "core/mechanism/kinks_in_time.hpp"
 #include "core/mechanism/mechanism.hpp"
@@ -42,7 +44,7 @@ void add(Compilation& model, const Tsda& f, int force, const std::string& where)
   out.s1 = numbers(model.keep(out.slot1, model.point(out.body1, f.point1, where + ".point1")));
   out.s2 = numbers(model.keep(out.slot2, model.point(out.body2, f.point2, where + ".point2")));
   out.law = law(model, f.law, {"l", "ldot"}, {f.stiffness, f.damping, f.free_length, f.actuator}, where);
-  model.data.forces.of<TsdaForce>().push_back(std::move(out));
+  model.data.forces->of<TsdaForce>().push_back(std::move(out));
 }
 
 template <class Torsional>  // Rsda, TorsionBar
@@ -58,7 +60,7 @@ void add(Compilation& model, const Torsional& f, int force, const std::string& w
   }
   out.joint = model.data.angles[static_cast<std::size_t>(out.angle)];
   out.law = law(model, f.law, {"angle", "rate"}, {f.stiffness, f.damping, f.free_angle, 0.0}, where);
-  model.data.forces.of<RsdaForce>().push_back(std::move(out));
+  model.data.forces->of<RsdaForce>().push_back(std::move(out));
 }
 
 // The components' inputs are all parameters, t and all sensors. The sensors in use are listed.
@@ -136,7 +138,7 @@ void add(Compilation& model, const BushingSpec& f, int force, const std::string&
   }
   const Vec<12> x = numbers(model.keep(out.slot_law, law));
   out.K = x.segment<3>(0), out.C = x.segment<3>(3), out.Kt = x.segment<3>(6), out.Ct = x.segment<3>(9);
-  model.data.forces.of<Bushing>().push_back(std::move(out));
+  model.data.forces->of<Bushing>().push_back(std::move(out));
 }
 
 void add(Compilation& model, const FrictionSpec& f, int force, const std::string& where) {
@@ -154,11 +156,11 @@ void add(Compilation& model, const FrictionSpec& f, int force, const std::string
   if (!(law.smooth > 0)) throw SceneError(where + ".smooth_velocity: must be greater than 0");
   if (!(law.stribeck > 0)) throw SceneError(where + ".stribeck_velocity: must be greater than 0");
   if (is_sliding(f.motion, joint.type)) {
-    model.data.forces.of<SlidingFriction>().push_back(
+    model.data.forces->of<SlidingFriction>().push_back(
         {force, model.joint_displacement(f.joint, where + ".joint"), -1, law});
   } else {
     const int angle = model.angle_of(f.joint, where + ".joint");
-    model.data.forces.of<TurningFriction>().push_back(
+    model.data.forces->of<TurningFriction>().push_back(
         {force, model.data.angles[static_cast<std::size_t>(angle)], angle, law});
   }
 }

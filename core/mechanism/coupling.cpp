@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/constraint/constraint.hpp"
+#include "core/force/forces.hpp"
+
 namespace mbsopt {
 namespace {
 
@@ -44,7 +47,7 @@ Coupling coupling(const MechanismData& data) {
     for (int r = 0; r < k.rows(); ++r) add({k.body1, k.body2}, c.rows[static_cast<std::size_t>(k.row + r)]);
     couple({k.body1, k.body2}, {k.body1, k.body2});  // J'lambda
   }
-  data.forces.for_each([&](const auto& f) {
+  data.forces->for_each([&](const auto& f) {
     const auto [i, j] = f.bodies();
     couple({i, j}, {i, j});
   });

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/force/forces.hpp"
+
 namespace mbsopt {
 
 bool depends_on_state(const AppliedForce& force) {
@@ -10,7 +12,7 @@ bool depends_on_state(const AppliedForce& force) {
 }
 
 long derivative_blocks(const MechanismData& d) {
-  return d.n + static_cast<long>(d.groups.size() + d.forces.size() + d.user_forces.size()) +
+  return d.n + static_cast<long>(d.groups.size() + d.forces->size() + d.user_forces.size()) +
          static_cast<long>(std::count_if(d.applied.begin(), d.applied.end(), depends_on_state));
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/body/euler_parameters.hpp"
+#include "core/force/forces.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -42,7 +43,7 @@ void add_potential_gradient(const MechanismData& d, const Eigen::VectorXd& y, co
     add_slot<3>(d, d.slot_gravity, Vec<3>(-body.mass * r), scale, rho_bar);
   }
   FieldGradient fields{d.theta_rho, d.active, scale, rho_bar};
-  d.forces.for_each([&](const auto& f) {
+  d.forces->for_each([&](const auto& f) {
     const auto [i, j] = f.bodies();
     const BodyAt b1 = body_at(y, i), b2 = body_at(y, j);
     FrameBar bar1, bar2;
@@ -79,7 +80,7 @@ Energy energy(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::Vec
     e.kinetic += 0.5 * (body.mass * b.frame.rdot.squaredNorm() + w.dot(body.J * w));
     e.potential -= body.mass * d.gravity.dot(b.frame.r);
   }
-  d.forces.for_each([&](const auto& f) {
+  d.forces->for_each([&](const auto& f) {
     const auto [i, j] = f.bodies();
     e.potential += f.potential(angles, body_at(y, i).frame, body_at(y, j).frame);
   });
@@ -88,7 +89,7 @@ Energy energy(const MechanismData& d, const Eigen::VectorXd& y, const Eigen::Vec
 
 bool conserves_energy(const MechanismData& d) {
   return d.applied.empty() && d.user_forces.empty() &&
-         d.forces.all_of([](const auto& f) { return f.conserves_energy(); }) &&
+         d.forces->all_of([](const auto& f) { return f.conserves_energy(); }) &&
          std::all_of(d.laws.begin(), d.laws.end(), [](auto& l) { return !l.law.programs; });
 }
 

@@ -5,6 +5,7 @@
 #include <set>
 #include <vector>
 
+#include "core/constraint/constraint.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 
 namespace mbsopt {

@@ -1,4 +1,5 @@
 // The angle about an axis, the displacement along one, and their rates; joint_measure.hpp has the equations.
+#include "core/constraint/dot2.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 #include "core/sensor/body_at.hpp"
 

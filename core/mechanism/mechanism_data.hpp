@@ -5,15 +5,13 @@
 #include <Eigen/Core>
 #include <memory>
 #include <string>
-#include <variant>
 #include <vector>
 
-#include "core/constraint/constraint.hpp"
 #include "core/constraint/time_law.hpp"
 #include "core/expression/curve.hpp"
 #include "core/force/applied.hpp"
 #include "core/force/bound_force.hpp"
-#include "core/force/forces.hpp"
+#include "core/force/force_inputs.hpp"
 #include "core/mechanism/sensor_function.hpp"
 #include "core/sensor/joint_measure.hpp"
 
@@ -39,6 +37,7 @@ struct RowGroup {
 struct RowLaw {
   int row = 0;
   TimeLaw law;
+  int drive = -1;  // index in the scene of the drive that it belongs to
 };
 
 struct ConditionData {
@@ -63,9 +62,19 @@ struct UserForceData {
   std::vector<int> bodies;  // 1-based
 };
 
+struct Constraint;   // core/constraint/constraint.hpp
+struct Forces;       // core/force/forces.hpp
 struct PlanarModel;  // planar_model.hpp
 
+// Headers of the kinds of constraints and forces stay out, so that a change to one recompiles only what computes with
+// it.
 struct MechanismData {
+  MechanismData();
+  MechanismData(const MechanismData& other);
+  MechanismData(MechanismData&& other) noexcept;
+  MechanismData& operator=(const MechanismData& other) = delete;
+  ~MechanismData();
+
   int n = 0;                  // bodies, the ground not counted
   int m = 0;                  // rows of Phi, unit norms not counted
   int blocks = 0;             // Jacobian block rows of all constraints: m, and more where rows are shared
@@ -81,7 +90,7 @@ struct MechanismData {
   Eigen::VectorXd row_alpha;  // per row: alpha of the augmented Lagrangian per unit of its relative alpha
   std::vector<RowGroup> groups;
   std::vector<JointAngle> angles;
-  Forces forces;
+  std::shared_ptr<Forces> forces;  // copies share them
   std::vector<AppliedForce> applied;
   std::vector<UserForceData> user_forces;
   std::vector<SensorPtr> sensors;

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/body/euler_parameters.hpp"
+#include "core/constraint/constraint.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/scene/scene.hpp"
 

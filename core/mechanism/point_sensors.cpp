@@ -210,12 +210,6 @@ PointSensor::Seen PointSensor::seen(const Eigen::VectorXd& y) const {
   return x;
 }
 
-Vector3d PointSensor::along(const Vector3d& x) const {
-  if (component != kNorm) return Vector3d::Unit(component);
-  const double l = x.norm();
-  return l > 0 ? Vector3d(x / l) : Vector3d(Vector3d::Zero());
-}
-
 std::vector<int> PointSensor::bodies(const MechanismData&) const {
   return {a.body, relative ? b.body : 0, std::max(axes_body, 0)};
 }

@@ -54,9 +54,8 @@ struct PointSensor final : SensorFunction, SeenPoints {
     Vector3d X, V;
   };
   Seen seen(const Eigen::VectorXd& y) const;
-  double pick(const Vector3d& x) const { return component == kNorm ? x.norm() : x(component); }
-  // The gradient of pick. It is zero at a zero vector, where a norm has none.
-  Vector3d along(const Vector3d& x) const;
+  double pick(const Vector3d& x) const { return component_value(x, component); }
+  Vector3d along(const Vector3d& x) const { return component_gradient(x, component); }
 };
 
 }  // namespace mbsopt

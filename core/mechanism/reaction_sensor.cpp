@@ -2,6 +2,7 @@
 
 #include <cassert>
 
+#include "core/constraint/constraint.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 #include "core/mechanism/virtual_work.hpp"
 #include "core/sensor/body_at.hpp"
@@ -62,7 +63,7 @@ double ReactionSensor::value(const MechanismData& d, const StatePoint& at) const
   const Eigen::VectorXd& lambda = at.motion->motion(at).lambda;
   if (drive_row >= 0) return -lambda(drive_row);
   const Vector3d x = measured(*this, loads_on_body2(d, *this, at.y, lambda), body_at(at.y, body2).frame.A);
-  return component == kNorm ? x.norm() : x(component);
+  return component_value(x, component);
 }
 
 double ReactionSensor::add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
@@ -84,9 +85,8 @@ double ReactionSensor::add_gradient(const MechanismData& d, const Eigen::VectorX
   const Matrix3d& A2 = b2.frame.A;
   const Loads loads = loads_on_body2(d, *this, y, lambda);
   const Vector3d x = measured(*this, loads, A2);
-  const double result = component == kNorm ? x.norm() : x(component);
-  Vector3d c = Vector3d::Unit(component % 3);
-  if (component == kNorm) c = result > 0 ? Vector3d(x / result) : Vector3d(Vector3d::Zero());
+  const double result = component_value(x, component);
+  const Vector3d c = component_gradient(x, component);
 
   // c'x = F'eta_r + T'eta_theta with eta_r = c, or for a torque eta_theta = A2'c and eta_r = (A2 s2) x c
   Vec<6> eta = Vec<6>::Zero();

@@ -19,14 +19,13 @@ struct AngularVelocitySensor final : SensorFunction {
   }
   double value(const MechanismData&, const StatePoint& at) const override {
     const Vector3d w = omega(at.y);
-    return component == kNorm ? w.norm() : w(component);
+    return component_value(w, component);
   }
   double add_gradient(const MechanismData&, const StatePoint& at, double scale, VecOut y_bar, VecOut) const override {
     const Vector3d w = omega(at.y);
-    const double result = component == kNorm ? w.norm() : w(component);
+    const double result = component_value(w, component);
     if (body == 0) return result;
-    Vector3d d = Vector3d::Unit(component % 3);
-    if (component == kNorm) d = result > 0 ? Vector3d(w / result) : Vector3d(Vector3d::Zero());
+    const Vector3d d = component_gradient(w, component);
     const BodyAt b = body_at(at.y, body);
     const Vector4d &p = b.state.p, &pdot = b.state.pdot;
     const Vector3d e = p.tail<3>(), f = pdot.tail<3>();

@@ -33,6 +33,16 @@ struct SensorFunction {
   Reads reads = Reads::positions;  // of its row in kSensorQuantities
 };
 
+// A component of x, or |x| for kNorm, and its gradient in x. A norm at zero has none: it is set to zero.
+inline double component_value(const Vector3d& x, int component) {
+  return component == SensorFunction::kNorm ? x.norm() : x(component);
+}
+inline Vector3d component_gradient(const Vector3d& x, int component) {
+  if (component != SensorFunction::kNorm) return Vector3d::Unit(component);
+  const double l = x.norm();
+  return l > 0 ? Vector3d(x / l) : Vector3d(Vector3d::Zero());
+}
+
 // A copy of a sensor with one change.
 template <class Kind, class Change>
 SensorPtr changed(const Kind& sensor, const Change& change) {

@@ -10,6 +10,7 @@
 // Loan, "Matrix Computations", section 8.6.
 #include <cmath>
 
+#include "core/constraint/constraint.hpp"
 #include "core/linear/dense.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 #include "core/mechanism/virtual_work.hpp"

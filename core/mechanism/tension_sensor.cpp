@@ -2,6 +2,7 @@
 // value of the law
 //   f(x, xdot, t, rho),   x = l or the joint's angle
 //   f_y = f_x x_y + f_xdot xdot_y          f_rho = the law's own + through the geometry
+#include "core/force/forces.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -31,11 +32,11 @@ void add_law_gradient(const MechanismData& data, const Law& law, double x, doubl
 }
 
 struct TensionFunction final : SensorFunction {
-  Forces::Place place;
+  ForcePlace place;
 
   double value(const MechanismData& d, const StatePoint& at) const override {
     double value = 0;
-    d.forces.visit_law(place, [&](const auto& f) {
+    d.forces->visit_law(place, [&](const auto& f) {
       Law::Scratch none;
       const auto [i, j] = f.bodies();
       const auto [x, xdot] = f.measured(at.angles, body_at(at.y, i).frame, body_at(at.y, j).frame);
@@ -47,7 +48,7 @@ struct TensionFunction final : SensorFunction {
   double add_gradient(const MechanismData& d, const StatePoint& at, double scale, VecOut y_bar,
                       VecOut rho_bar) const override {
     double value = 0;
-    d.forces.visit_law(place, [&](const auto& f) {
+    d.forces->visit_law(place, [&](const auto& f) {
       Law::Scratch none;
       Law::Scratch& scratch = scratch_for(d, f.law, none);
       const auto [i, j] = f.bodies();
@@ -75,7 +76,7 @@ std::unique_ptr<SensorFunction> make_tension(Compilation& model, const Sensor& s
   if (found == forces.end()) throw SceneError(where + ".force: there is no force '" + s.force + "'");
   const int force = static_cast<int>(found - forces.begin());
   std::unique_ptr<TensionFunction> out;
-  model.data.forces.for_each([&]<class Kind>(const Kind& f, Forces::Place place) {
+  model.data.forces->for_each([&]<class Kind>(const Kind& f, ForcePlace place) {
     if (!HasLaw<Kind> || f.force != force) return;
     out = std::make_unique<TensionFunction>();
     out->place = place;

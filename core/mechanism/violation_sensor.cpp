@@ -1,6 +1,7 @@
 // The largest |entry| of the constraint equations and the unit norms, and the equation that it belongs to.
 #include <cmath>
 
+#include "core/constraint/constraint.hpp"
 #include "core/constraint/unit_norm.hpp"
 #include "core/mechanism/row_laws.hpp"
 #include "core/mechanism/sensor_kinds.hpp"

@@ -4,6 +4,7 @@
 
 #include <variant>
 
+#include "core/constraint/constraint.hpp"
 #include "core/mechanism/sensor_kinds.hpp"
 #include "core/sensor/body_at.hpp"
 

@@ -5,9 +5,10 @@
 #include <type_traits>
 
 #include "core/constraint/angle.hpp"
-#include "core/constraint/dot2.hpp"
 
 namespace mbsopt {
+
+struct Dot2;  // core/constraint/dot2.hpp
 
 template <class P>  // Angle or Dot2
 struct JointMeasure {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/body/euler_parameters.hpp"
+#include "core/constraint/constraint.hpp"
 #include "core/constraint/unit_norm.hpp"
 #include "core/linear/row_dependence.hpp"
 #include "core/linear/sparse_projection.hpp"

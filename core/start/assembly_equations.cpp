@@ -5,6 +5,7 @@
 #include <numbers>
 #include <span>
 
+#include "core/constraint/constraint.hpp"
 #include "core/constraint/unit_norm.hpp"
 #include "core/sensor/body_at.hpp"
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/constraint/constraint.hpp"
+
 namespace mbsopt {
 namespace {
 

@@ -7,7 +7,9 @@
 #include <limits>
 
 #include "core/body/euler_parameters.hpp"
+#include "core/constraint/constraint.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
+#include "core/force/forces.hpp"
 #include "core/linear/dense.hpp"
 #include "core/projection/projection.hpp"
 #include "core/sensor/body_at.hpp"
@@ -186,7 +188,7 @@ class Statics {
       if (p && c.body1 > 0) length = std::max(length, p->s1.norm());
       if (p && c.body2 > 0) length = std::max(length, p->s2.norm());
     }
-    for (const TsdaForce& f : d_.forces.of<TsdaForce>()) {
+    for (const TsdaForce& f : d_.forces->of<TsdaForce>()) {
       length = std::max(length, f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l);
     }
     for (Index i = 1; i < n_; ++i) length = std::max(length, (y.segment<3>(7 * i) - y.head<3>()).norm());

@@ -23,6 +23,7 @@
 #include <map>
 #include <numeric>
 
+#include "core/constraint/constraint.hpp"
 #include "core/dynamics/constraint_rows.hpp"
 #include "core/expression/counted.hpp"
 #include "core/linear/dense.hpp"

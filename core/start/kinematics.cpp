@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/body/euler_parameters.hpp"
+#include "core/constraint/constraint.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
 #include "core/linear/dense.hpp"
 #include "core/start/driven_path.hpp"

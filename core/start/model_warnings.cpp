@@ -7,7 +7,9 @@
 #include <limits>
 #include <map>
 
+#include "core/constraint/constraint.hpp"
 #include "core/dynamics/constraint_rows.hpp"
+#include "core/force/forces.hpp"
 #include "core/linear/dense.hpp"
 #include "core/linear/row_dependence.hpp"
 #include "core/mechanism/mechanism_data.hpp"
@@ -85,7 +87,7 @@ void add_massless(const MechanismData& d, const VectorXd& q, std::vector<std::st
 }
 
 void add_springs(const MechanismData& d, const VectorXd& y, std::vector<std::string>& warnings) {
-  for (const TsdaForce& f : d.forces.of<TsdaForce>()) {
+  for (const TsdaForce& f : d.forces->of<TsdaForce>()) {
     const double l = f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame).l;
     if (l > kZeroLength) continue;
     warnings.push_back(fmt::format(

@@ -6,6 +6,7 @@
 #include "core/body/euler_parameters.hpp"
 #include "core/body/lanes.hpp"
 #include "core/body/state_layout.hpp"
+#include "core/constraint/constraint.hpp"
 #include "core/dynamics/acceleration_tangents.hpp"
 #include "core/dynamics/spatial_dynamics.hpp"
 #include "core/mechanism/parameter_lanes.hpp"

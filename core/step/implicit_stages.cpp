@@ -81,7 +81,7 @@ void ImplicitStages::accept(const Step& step) {
   const Eigen::Index n = 7 * data_.n;
   std::swap(past_, present_);
   present_.count = 0;
-  // Where the next Jacobian is taken: the latest stage.
+  // The next Jacobian is that of the latest stage.
   int latest = 0;
   for (int i = 1; i < rk_.stages; ++i) {
     if (rk_.c[i] >= rk_.c[latest]) latest = i;
@@ -186,8 +186,8 @@ bool ImplicitStages::evaluate_residuals(Step& step, const StageGroup& g) {
   return r_.topRows(g.size() * rows).allFinite();
 }
 
-// Adds the change in r_ to x_; returns what it does to the stages, root mean square in units of the tolerance (exact:
-// of the state's size).
+// Adds the change in r_ to x_. Returns the change of the stages: root mean square in units of the tolerance (exact: of
+// the state's size).
 double ImplicitStages::add_change(const Step& step, const StageGroup& g, const Matrix& m, bool exact) {
   const Eigen::Index n = 7 * data_.n, rows = n + data_.m;
   const int s = g.size();

@@ -1,14 +1,14 @@
-// The coupled stages of an implicit Runge-Kutta step, solved in their accelerations a_i and multipliers lambda_i by
-// simplified Newton iterations: one Jacobian, taken where the step starts and kept over steps while it serves, one
-// factor per step size and distinct block of the tableau. Where it does not serve (a stiff direction turns within the
-// step), each stage gets a Jacobian of its own for some steps.
+// Solves the coupled stages of an implicit Runge-Kutta step in their accelerations a_i and multipliers lambda_i, by
+// simplified Newton iterations. One Jacobian, that of a step's start, serves as long as the iterations converge. Each
+// step size and distinct block of the tableau has one factor. If a stiff direction turns within the step, each stage
+// gets its own Jacobian for some steps.
 //
 //   V_i = v0 + h sum_j A_ij a_j,   Q_i = q0 + h sum_j A_ij V_j,   r(t_i, Q_i, V_i, a_i, lambda_i) = 0
 //
 // Convergence test: Hairer and Wanner, "Solving Ordinary Differential Equations II" (1996), section IV.8. An adaptive
-// run stops at a fraction of its tolerance; where derivatives are taken, the stages of accepted steps are polished to
-// 1e-12 of the state. Where steps are fixed or given, stages are solved to rounding, so that differences of runs over
-// the same steps mean something.
+// run stops at a fraction of its tolerance. For derivatives it polishes the stages of accepted steps to 1e-12 of the
+// state. With fixed or given steps it solves the stages to rounding, so that differences of runs over the same steps
+// mean something.
 #pragma once
 
 #include <optional>

@@ -1,13 +1,13 @@
 // Times at which signals jump (hold) or have kinks (linear), or their third derivative jumps (spline), and how steps
 // meet them.
 //
-// A step across a kink loses the order of its method, so the step ends there and the next begins there, a few roundings
-// apart (event_times.hpp). Many kinks are smaller than the tolerance, and a step for each would cost more than it
-// gains. So two sizes are controlled: h of steps without kinks inside, and `across` of steps with kinks inside, whose
-// error behaves as h^2, of splines as h^4. A step crosses kinks where `across` reaches over at least two intervals; it
-// ends at a kink, too, so that as few as possible lie inside. Each step that ends at the next kink lets `across` grow
-// again. Knots of splines alone are met only where `across` is shorter than h, and not by fixed steps: they are much
-// smoother. Beside jumps and kinks they are left out.
+// A step across a kink loses the order of its method. So a step ends at the kink, and the next begins a few roundings
+// later (event_times.hpp). Many kinks are smaller than the tolerance, and a step for each would cost more than it
+// gains. So two sizes are controlled: h of steps without kinks inside, and `across` of steps with kinks inside. The
+// error of the latter behaves as h^2, of splines as h^4. A step crosses kinks if `across` reaches over at least two
+// intervals. It ends at a kink, too, so that as few as possible lie inside. Each step that ends at the next kink lets
+// `across` grow again. Knots of splines alone are met only where `across` is shorter than h, and not by fixed steps:
+// they are much smoother. Beside jumps and kinks they are left out.
 #pragma once
 
 #include <algorithm>
@@ -113,7 +113,7 @@ class KinkControl {
   bool reached(double t1) const { return state_ != State::clear && t1 >= kink_ - 1.5 * kinks_.gap(); }
   double resume_time() const { return kink_ + kinks_.gap(); }
 
-  // Of a step of size h that crosses kinks, whose error is given in tolerances.
+  // Reports a step of size h that crosses kinks; its error is in tolerances.
   void accepted_across(double h, double error) { across_ = h * factor(error, kMost); }
   void rejected_across(double h, double error) { across_ = h * factor(error, kShrunk); }
   void met() { across_ *= kRecovery; }

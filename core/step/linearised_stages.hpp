@@ -1,5 +1,5 @@
-// The coupled stages of an accepted implicit step, linearised where they are, each with its own Jacobian: what the
-// tangent and the adjoint sweep solve with.
+// Linearises the coupled stages of an accepted implicit step, each with its own Jacobian. The tangent and the adjoint
+// sweep solve with them.
 #pragma once
 
 #include <vector>

@@ -14,7 +14,7 @@ class ShiftedSystem {
 
   bool factor(double gamma,
               const MotionJacobian::Values& values);  // values are kept by reference until the next factor
-  // In place, 14 n x at most kLanes.
+  // Solves in place, for 14 n x at most kLanes numbers.
   void solve(Eigen::Ref<Eigen::MatrixXd> x, int refinements = 0);
   void solve_transposed(Eigen::Ref<Eigen::MatrixXd> x, int refinements = 0);
   long factorisations() const { return matrix_.factorisations(); }

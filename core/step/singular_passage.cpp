@@ -53,9 +53,9 @@ void SingularPassage::tabulate() {
   }
 }
 
-// Of steps of one size, not far from h, that reach t*, `left` away: those after which least is left; where it is too
-// near for them a shorter step past it. Continuous in both but where another number of steps is better: rounding does
-// not change much.
+// Chooses equal steps of about h that reach t*, `left` away, with the least error after them. If t* is too near for
+// them, it chooses a shorter step past it. The choice is continuous in both arguments except where the number of steps
+// changes.
 SingularPassage::Choice SingularPassage::choose(double left, double h, double most) const {
   const double longest = std::min(kStretch * h, most);
   Choice best{h, kNone};

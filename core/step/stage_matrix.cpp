@@ -6,7 +6,7 @@
 namespace mbsopt {
 namespace {
 
-// epsilon of a row of Phi in units of the inertia that it sees: what it leaves out and the rounding of W = 1/epsilon
+// epsilon of a row of Phi in units of the inertia that it sees. Its truncation error and the rounding of W = 1/epsilon
 // are about equal.
 constexpr double kRelativeEpsilon = 1e-8;
 
@@ -92,9 +92,9 @@ StageMatrix::StageMatrix(const MechanismData& data, const MotionJacobian& jacobi
   probe_.setZero(size()), answer_.setZero(size());
 }
 
-// Lengths in units of L, forces in units of J/L, multipliers so that the rows of G see J, where the heaviest body has
-// the inertia J = m L^2: pivots are chosen among entries of one size, in micrometres as in kilometres. Powers of two
-// round nothing.
+// Lengths are in units of L and forces in units of J/L, where the heaviest body has the inertia J = m L^2. Multipliers
+// are scaled so that the rows of G see J. Thus pivots are chosen among entries of one size, in micrometres as in
+// kilometres. Powers of two round nothing.
 void StageMatrix::set_scales(const MechanismData& data) {
   double mass = 0, inertia = 0;
   for (const BodyData& body : data.bodies)
@@ -221,8 +221,8 @@ bool StageMatrix::factor_sparse() {
   return sparse_->factor();
 }
 
-// Tried on the forces of alternating accelerations of 1, but with constraints: the residual of the answer must be small
-// against the largest force in it.
+// Tries the factor on the forces of alternating accelerations of 1, with constraints. The residual of the answer must
+// be small against the largest force in it.
 bool StageMatrix::is_right() {
   answer_.setZero(), probe_.setZero();
   double largest = 0;

@@ -9,11 +9,10 @@
 //       [ G  -c ]
 //
 // blocks of 7s rows per body, eliminated without exchanging rows between bodies: S is near the positive definite matrix
-// of the equations of motion (saddle_solver.hpp). epsilon also makes it regular where constraints are redundant. What
-// it leaves out, and the rounding of a large W, is taken back by refinement with the residual of N itself, so that
-// solve and solve_transposed are transposes of each other. Each factor is tried, on one right-hand side or by whether
-// the refinement of the first solution converges; where the answer is wrong, N is factored by a sparse LU with pivoting
-// instead.
+// of the equations of motion (saddle_solver.hpp). epsilon also makes it regular where constraints are redundant.
+// Refinement with the residual of N itself removes the truncation and the rounding of a large W. So solve and
+// solve_transposed are transposes of each other. Each factor is tried on one right-hand side, or by the convergence of
+// the first refinement. If the answer is wrong, a sparse LU with pivoting factors N instead.
 #pragma once
 
 #include <optional>
@@ -38,7 +37,7 @@ class StageMatrix {
   bool factor(double h, const Eigen::MatrixXd& A, std::span<const MotionJacobian::Values* const> values,
               Trial trial = Trial::now);
   static constexpr int kExact = 4;  // refinements at most for derivatives; Newton's method needs none
-  // In place; at most kLanes columns.
+  // Solves in place, at most kLanes columns.
   void solve(Eigen::Ref<Eigen::MatrixXd> b, int refinements) { refine<false>(b, refinements); }
   void solve_transposed(Eigen::Ref<Eigen::MatrixXd> b, int refinements) { refine<true>(b, refinements); }
   long factorisations() const { return factorisations_; }

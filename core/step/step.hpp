@@ -26,7 +26,7 @@ struct Step {
   int stages(const Method& rk) const { return dense ? rk.dense_stages : rk.stages; }
 };
 
-// Of the sizes that the mechanism has; projection: of the right sizes.
+// Makes a step with the sizes of the mechanism. projection: has the right sizes.
 Step make_step(const Mechanism& mechanism, const Method& rk, ProjectionSolution projection);
 
 // The upper half of k_i of a Rosenbrock method, from the lower halves of k_0..k_i.
@@ -60,7 +60,7 @@ inline void set_group_stages(const Method& rk, const StageGroup& g, double h, co
 }
 
 // y(t + theta h) = y0 + h sum_i b_i(theta) k_i + blend(theta) (y1 - y_hat): the last term spreads the projection over
-// the step, so that the output is continuous and ends at the projected state.
+// the step. The output is continuous and ends at the projected state.
 inline double projection_blend(double theta) { return theta * theta * (3 - 2 * theta); }
 
 inline void dense_output(const Method& rk, const Step& step, double theta, Eigen::VectorXd& y) {

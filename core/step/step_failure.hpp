@@ -13,7 +13,7 @@ namespace mbsopt {
 // projection found no state that meets them.
 enum class StepOutcome { accepted, rejected, unsolved, failed, off_constraints };
 
-// Of the step from t by h; adaptive: the last of smaller and smaller ones.
+// Says why the step from t by h failed; adaptive: it was the last of smaller and smaller ones.
 std::string step_failure(StepOutcome outcome, double t, double h, bool adaptive,
                          const FormulationSettings& formulation);
 // A step of simulation.integrator.options.min_step is still too long.

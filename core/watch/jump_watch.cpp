@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/expression/program_switches.hpp"
+#include "core/force/forces.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/sensor/body_at.hpp"
 
@@ -28,19 +29,18 @@ JumpWatch::JumpWatch(const Mechanism& mechanism, const SimulationSettings& setti
   if (d.active.empty()) return;
   const auto of_force = [](int index) { return Jump{Jump::Of::force, index, {}, 0, 0, {}, false}; };
   // A mechanism and its laws are compiled at each rho; so are the switches of the laws.
-  const auto add_law = [&](const Jump& jump, const Program& p, Of of, Forces::Place place = {}) {
+  const auto add_law = [&](const Jump& jump, const Program& p, Of of, ForcePlace place = {}) {
     add(jump, p, switches_of(p), of, place);
   };
-  d.forces.for_each([&]<class Kind>(const Kind& f, Forces::Place place) {
+  d.forces->for_each([&]<class Kind>(const Kind& f, ForcePlace place) {
     if constexpr (HasLaw<Kind>)
       if (f.law.program) add_law(of_force(f.force), *f.law.program, Of::law, place);
   });
   for (const AppliedForce& f : d.applied)
     for (const Program& component : f.components) add_law(of_force(f.force), component, Of::sensors);
-  for (const Constraint& c : d.constraints)
-    for (const RowLaw& law : d.laws)
-      if (c.drive >= 0 && law.row == c.row && law.law.programs)
-        add_law({Jump::Of::drive, c.drive, {}, 0, 0, {}, false}, (*law.law.programs)[2], Of::time);
+  for (const RowLaw& law : d.laws)
+    if (law.drive >= 0 && law.law.programs)
+      add_law({Jump::Of::drive, law.drive, {}, 0, 0, {}, false}, (*law.law.programs)[2], Of::time);
   for (const Cost& cost : costs)
     if (const SwitchedProgram* p = cost.running ? cost.running->program() : nullptr)
       add({Jump::Of::objective, 0, cost.name, 0, 0, {}, false}, p->program, p->switches, Of::sensors);
@@ -52,7 +52,7 @@ bool JumpWatch::Function::is_new(const Switch& s) const {
 }
 
 void JumpWatch::add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of,
-                    Forces::Place place) {
+                    ForcePlace place) {
   const MechanismData& d = mechanism_.data();
   const int P = static_cast<int>(d.rho.size());
   const int time = of == Of::law ? P + 2 : P;
@@ -83,7 +83,7 @@ void JumpWatch::set_inputs(const Function& f, const StatePoint& at) {
   std::copy(d.rho.begin(), d.rho.end(), inputs_.begin());
   inputs_[P] = at.t;
   if (f.of == Of::law) {
-    d.forces.visit_law(f.place, [&](const auto& force) {
+    d.forces->visit_law(f.place, [&](const auto& force) {
       const auto [i, j] = force.bodies();
       const auto [x, xdot] = force.measured(at.angles, body_at(at.y, i).frame, body_at(at.y, j).frame);
       inputs_[P] = x, inputs_[P + 1] = xdot, inputs_[P + 2] = at.t;

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "core/expression/program.hpp"
-#include "core/force/forces.hpp"
+#include "core/force/force_inputs.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/run/cost.hpp"
 #include "core/run/simulation_result.hpp"
@@ -44,15 +44,14 @@ class JumpWatch {
     Jump jump;  // the known part
     const Program* program;
     Of of;
-    Forces::Place place;  // of a force with a law
+    ForcePlace place;  // of a force with a law
     std::vector<Switch> switches;
     std::vector<int> parameters;         // named by its reported jumps
     bool motion = false;                 // some of them name the motion
     bool is_new(const Switch& s) const;  // names more
   };
   // switches are those of the program.
-  void add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of,
-           Forces::Place place = {});
+  void add(const Jump& jump, const Program& program, std::span<const Program> switches, Of of, ForcePlace place = {});
   void set_inputs(const Function& f, const StatePoint& at);
   void place_at(double theta);  // sets t_, y_ between the last state and the present one
   void set_inputs_at(double theta, const Function& f);

@@ -12,11 +12,8 @@ constexpr double kJump = 1e-9;       // relative to the law; below it a differen
 constexpr double kRounding = 1e-12;  // [m, rad, and these per s]: of 1 in exp(t) - 1
 constexpr double kPart = 0.471;      // not half: jumps are at round times, where a law may have no value
 
-std::string drive_of_row(const MechanismData& d, int row) {
-  for (const Constraint& c : d.constraints) {
-    if (c.row == row && c.drive >= 0) return d.drive_names[static_cast<std::size_t>(c.drive)];
-  }
-  return "?";
+std::string drive_of(const MechanismData& d, const RowLaw& law) {
+  return law.drive >= 0 ? d.drive_names[static_cast<std::size_t>(law.drive)] : "?";
 }
 
 }  // namespace
@@ -69,14 +66,14 @@ std::string LawJumps::between(double t0, double t1) {
           "the law of drive '{}' jumps by {:.3g} at t = {:.6g} s, which no motion follows. Let it pass smoothly, over "
           "a "
           "short time, from one value to the other",
-          drive_of_row(data_, law->row), f.size, f.t);
+          drive_of(data_, *law), f.size, f.t);
     }
     const Jump f_t = find(law->law, Of::f_t, t0, t1);
     if (f_t.size != 0) {
       return fmt::format(
           "the law of drive '{}' changes its rate by {:.3g} 1/s at once at t = {:.6g} s: an impact, whose force has no "
           "bounds. Let the rate change over a short time",
-          drive_of_row(data_, law->row), f_t.size, f_t.t);
+          drive_of(data_, *law), f_t.size, f_t.t);
     }
   }
   return {};

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/force/forces.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
@@ -25,7 +26,7 @@ double natural_energy(const MechanismData& d, const Eigen::VectorXd& y) {
   for (int i = 1; i <= d.n; ++i) {
     sum += d.bodies[static_cast<std::size_t>(i)].mass * d.gravity.norm() * y.segment<3>(7 * (i - 1)).norm();
   }
-  d.forces.for_each([&](const auto& f) {
+  d.forces->for_each([&](const auto& f) {
     const auto [i, j] = f.bodies();
     sum += f.natural_energy(body_at(y, i).frame, body_at(y, j).frame);
   });
@@ -45,7 +46,7 @@ RunGuard::RunGuard(const MechanismData& data)
     : data_(data),
       conserves_energy_(conserves_energy(data)),
       law_jumps_(data),
-      bushing_turns_(data.forces.of<Bushing>().size(), Vector3d::Zero()) {}
+      bushing_turns_(data.forces->of<Bushing>().size(), Vector3d::Zero()) {}
 
 std::string RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& energy, double t_end, long max_steps) {
   last_t_ = t;
@@ -73,7 +74,7 @@ std::string RunGuard::begin(double t, const Eigen::VectorXd& y, const Energy& en
 // Between two steps a rotation vector reverses through zero or, if zero is farther, through half a turn.
 std::string RunGuard::about_bushings(double t, const Eigen::VectorXd& y) {
   for (std::size_t k = 0; k < bushing_turns_.size(); ++k) {
-    const Bushing& b = data_.forces.of<Bushing>()[k];
+    const Bushing& b = data_.forces->of<Bushing>()[k];
     if (b.Kt.isZero(0) && b.Ct.isZero(0)) continue;
     const Matrix3d R = body_at(y, b.body1).frame.A.transpose() * body_at(y, b.body2).frame.A * b.R0.transpose();
     const Eigen::AngleAxisd turn(R);

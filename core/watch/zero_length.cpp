@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/force/forces.hpp"
 #include "core/sensor/body_at.hpp"
 
 namespace mbsopt {
@@ -44,7 +45,7 @@ double closest(const Vector3d& d0, const Vector3d& rate0, const Vector3d& d1, co
 
 std::string through_zero_length(const MechanismData& d, double t0, const Eigen::VectorXd& y0, double t1,
                                 const Eigen::VectorXd& y1) {
-  for (const TsdaForce& f : d.forces.of<TsdaForce>()) {
+  for (const TsdaForce& f : d.forces->of<TsdaForce>()) {
     const auto span = [&](const Eigen::VectorXd& y) {
       return f.span(body_at(y, f.body1).frame, body_at(y, f.body2).frame);
     };

@@ -5,9 +5,9 @@
 //   step p:    least |p| in units of the bounds' ranges with  e_k + de_k p = -max e  at all open instants, within
 //   bounds
 //
-// Each step aims as far beyond closing as the worst instant lacks: such reflections end in the interior of a convex
-// set after finitely many steps, where projections end on its border, the dead points. Motzkin and Schoenberg, Canadian
-// Journal of Mathematics 6 (1954) 393.
+// Each step aims as far beyond closing as the worst instant lacks. Such reflections end in the interior of a convex set
+// after finitely many steps; projections end on its border, the dead points. Motzkin and Schoenberg, Canadian Journal
+// of Mathematics 6 (1954) 393.
 //
 //   const ClosedStart start = close_start(evaluator, scaling, x_start);
 //   if (start.closes) use(start.x);

@@ -17,8 +17,8 @@ using Eigen::VectorXd;
 double inverse(double x) { return x > 0 && std::isfinite(x) ? 1 / x : 1; }
 
 // A step of an interior point method needs no more than this of a Hessian; a shorter ladder is a cheaper one. Gradients
-// are exact, so differences may be short, and have to be: the gradient of a wild motion changes its sign within 1e-4 of
-// a length.
+// are exact, so differences may be short. They have to be: the gradient of a wild motion changes its sign within 1e-4
+// of a length.
 HessianOptions for_steps() {
   HessianOptions options;
   options.relative_step = 1e-5, options.rungs = 8, options.enough = 1e-4;

@@ -21,14 +21,14 @@ namespace mbsopt {
 
 class DesignProgram : public NonlinearProgram {
  public:
-  // The evaluator's objectives: the one that is minimised, then those that are bounded. abandoned: whether an
-  // evaluation that failed did so because the user stopped it.
+  // The evaluator's objectives: the one that is minimised, then those that are bounded. abandoned: whether the user
+  // stopped an evaluation that failed.
   DesignProgram(const DesignSpec& spec, CaseEvaluator& evaluator, const VariableScaling& scaling,
                 CaseObjective objective = {}, std::function<bool()> abandoned = {});
 
-  // Evaluates the start and scales by it. Convergence is judged on an objective whose size and gradient are about 1:
-  // the larger of those at the start and a little way from it, so that a start at the optimum, where both may vanish,
-  // is seen for what it is. Constraints likewise. Or by a given scale.
+  // Evaluates the start and scales by it. The scale gives the objective a size and a gradient of about 1: the larger of
+  // those at the start and a little way from it. So a start at the optimum, where both may vanish, is recognised.
+  // Constraints likewise. Or by a given scale.
   CaseEvaluation start_from(const Eigen::VectorXd& x_start, const std::optional<NlpScale>& scale = {});
 
   Eigen::VectorXd rho_at(const Eigen::VectorXd& x) const;  // all parameters
@@ -41,7 +41,8 @@ class DesignProgram : public NonlinearProgram {
   // The evaluation with gradients at rho: the one that was kept, or a new one.
   CaseEvaluation evaluation(const Eigen::VectorXd& rho);
 
-  // Where the objective of a constraint stands in an evaluation, and the values that are minimised, one of each case.
+  // psi_of: index of a constraint's objective in an evaluation. minimised: the values that are minimised, one of each
+  // case.
   Eigen::Index psi_of(Eigen::Index constraint) const;
   Eigen::VectorXd minimised(const Eigen::VectorXd& psi) const;
   const CaseObjective& objective() const { return objective_; }

@@ -18,7 +18,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-// Of a point in the records, as in those of a fit: simulating again costs less than a journal of many megabytes.
+// Records leave out points with more numbers, as those of a fit do: simulating again costs less than a journal of many
+// megabytes.
 constexpr Index kMostNumbers = 50'000;
 constexpr const char* kNoValue =
     "a residual or its derivative is not a number: a tracked weight is negative, or a sensor has no value";

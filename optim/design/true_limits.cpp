@@ -11,8 +11,8 @@ constexpr double kUnused = kTrueLimitTolerance;  // what an inequality may leave
 constexpr double kOnBound = 1e-5;  // the smooth value is on its bound: the barrier keeps solutions this near to it
 // Rounds converge like a secant method, in three to five; where a peak gives way to another one they need some more.
 constexpr int kRounds = 12;
-// Slopes of the true extreme in the smooth one that a secant is trusted with. Beyond them other peaks, or variables
-// that have moved without need, make it what it is.
+// The range in which a secant gives the slope of the true extreme in the smooth one. Beyond it other peaks, or
+// variables that moved without need, determine the slope.
 constexpr double kLeastSlope = 0.2, kLargestSlope = 20;
 // A change of psi below it is lost in what solutions scatter by.
 constexpr double kNoChange = 1e-4;

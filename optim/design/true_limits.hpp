@@ -1,6 +1,6 @@
 // Limits of extremes that hold for the true values. An optimiser sees smooth extremes (objective_kinds.hpp), which
-// differ from the true ones. So the bound b on the smooth value is moved, and the program solved again from the last
-// solution, until the true extreme X there keeps its limit U and uses what it allows:
+// differ from the true ones. So the bound b on the smooth value moves, and the program is solved again from the last
+// solution. This ends when the true extreme X keeps its limit U and uses what it allows:
 //
 //   b <- psi + (U - X)/s      psi: the smooth value at the solution,  s: slope dX/dpsi between the last two; 1 at first
 //
@@ -20,7 +20,7 @@
 
 namespace mbsopt {
 
-// Of an equality, relative to its size; inequalities hold exactly.
+// Tolerance of an equality relative to its size; inequalities hold exactly.
 inline constexpr double kTrueLimitTolerance = 1e-6;
 
 class TrueLimits {

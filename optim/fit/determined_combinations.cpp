@@ -25,7 +25,7 @@ bool is_near(double a, double b) { return std::abs(a - b) <= kPart * std::max({1
 
 // Orthogonal projector onto the directions.
 MatrixXd projector(const MatrixXd& null_space) {
-  const MatrixXd Q = orthogonal_factor(null_space);
+  const MatrixXd Q = orthogonal_factor(null_space, null_space.cols());
   return Q * Q.transpose();
 }
 

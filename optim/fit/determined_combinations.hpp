@@ -1,9 +1,9 @@
 // The combinations that data determine where they do not determine every parameter, in words.
 //
 // Given are directions in which nothing that is measured changes. Parameters that such directions tie together form a
-// group; of a group of c parameters with d directions, c - d combinations are determined, those that stay as they are
-// along every direction. To first order they are known from the directions alone, and are told in the simplest form
-// that fits:
+// group. A group of c parameters with d directions has c - d determined combinations: those that are constant along
+// every direction. To first order they are known from the directions alone, and are told in the simplest form that
+// fits:
 //
 //   sums         "m1, m2: only m1 + m2 is determined"                    of parameters of one unit
 //   products     "m, g, J: only m*g/J is determined"                     whole or half exponents

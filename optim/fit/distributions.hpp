@@ -3,6 +3,8 @@
 
 namespace mbsopt {
 
+double normal_quantile(double probability);
+double student_quantile(double degrees_of_freedom, double probability);
 double chi_squared_quantile(double degrees_of_freedom, double probability);
 
 // The probability of a value above x.

@@ -1,6 +1,5 @@
 #include "optim/fit/experiment_influence.hpp"
 
-#include <Eigen/QR>
 #include <limits>
 #include <utility>
 
@@ -16,7 +15,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-// As for the rank of a fit, statistics.cpp: exact derivatives of a simulation carry errors of about 1e-12.
+// The same as for the rank of a fit, statistics.cpp: exact derivatives of a simulation carry errors of about 1e-12.
 constexpr double kRankTolerance = 1e-8;
 
 // [T | p], of which |T d + p| is to be small.
@@ -41,13 +40,10 @@ VectorXd least(const Rows& rows, const VectorXd& lower, const VectorXd& upper) {
   const Index n = rows.T.cols();
   VectorXd scale = rows.T.colwise().norm().transpose();  // columns of unit length
   for (double& s : scale) s = s > 0 ? 1 / s : 1;
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factors;
-  factors.setThreshold(kRankTolerance);
-  factors.compute(rows.T * scale.asDiagonal());
+  const OrthogonalDecomposition factors(rows.T * scale.asDiagonal(), kRankTolerance);
   VectorXd d = -scale.cwiseProduct(factors.solve(rows.p));
   if (factors.rank() < n) {
-    const MatrixXd null_space = factors.matrixZ().transpose().rightCols(n - factors.rank());
-    const std::vector<bool> free = changed_parameters(factors.colsPermutation() * null_space);
+    const std::vector<bool> free = changed_parameters(factors.null_space());
     for (Index k = 0; k < n; ++k)
       if (free[static_cast<std::size_t>(k)]) d(k) = std::numeric_limits<double>::infinity();
     return d;

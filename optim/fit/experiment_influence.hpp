@@ -17,7 +17,7 @@
 namespace mbsopt {
 
 // Per member of the stack, for each variable x the change without it; 0 for those that are not shared. Infinite where
-// the others and priors do not determine one. Of stacks without equalities.
+// the others and priors do not determine one. Stacks must have no equalities.
 std::vector<Eigen::VectorXd> changes_without(const ExperimentStack& stack, const LeastSquaresResult& solution,
                                              const std::vector<UnknownParameter>& unknowns);
 

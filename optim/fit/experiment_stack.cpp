@@ -13,8 +13,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-// A trial that needs so many times the steps of all before it has gone astray (negative damping, say): it counts as
-// failed before it takes forever.
+// A trial that needs so many times the steps of all before it has gone astray, for example by negative damping. It
+// counts as failed.
 constexpr long kStepGrowth = 30;
 constexpr double kRounding = 1e-12;  // of a motion with fixed steps, relative
 

@@ -1,5 +1,5 @@
-// The least-squares problem of an identification: the residuals of its experiments one below the other, then one
-// residual per prior, in the scaled variables of variable_scaling.hpp. Last come the equations of experiments that
+// The least-squares problem of an identification in the scaled variables of variable_scaling.hpp. The residuals of its
+// experiments stand one below the other; one residual per prior follows. Last come the equations of experiments that
 // continue each other:
 //
 //   z = [ z_1; z_2; ...; (u_k - mean_k)/sigma_k for each unknown with a prior; s(end of e) - s(start of e + 1); ... ]
@@ -20,8 +20,7 @@
 
 namespace mbsopt {
 
-// Residuals that were computed in an earlier run, and a place where new ones are written down: a fit that was killed
-// goes on from there.
+// Keeps the residuals that an earlier run computed, and writes new ones down. A fit that was killed goes on from there.
 struct ResidualRecords {
   struct Asked {
     std::size_t experiment;  // in the identification

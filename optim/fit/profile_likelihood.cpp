@@ -127,7 +127,7 @@ class Side {
       const double part = (options_.quantile - a) / (b - a);
       crossing = inside.x + part * (outside.x - inside.x);
       if (b - a <= kCrossing * options_.quantile) return;
-      // Not closer to an end than a tenth: secants would creep.
+      // A secant stays a tenth away from either end; nearer ones would converge slowly.
       const double x = inside.x + std::clamp(part, 0.1, 0.9) * (outside.x - inside.x);
       const std::optional<ProfilePoint> next = fitted(i < 2 ? *crossing : x, inside);
       if (!next) return;

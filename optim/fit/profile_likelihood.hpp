@@ -4,8 +4,8 @@
 //
 //   tau(x) = sign(x - x^) sqrt(2 (C(x) - C(x^))/v)         95 % interval: |tau| <= quantile
 // Bates and Watts, "Nonlinear Regression Analysis and Its Applications" (1988), section 6.1. For a linear model tau is
-// (x - x^)/std_error. Steps go outward from the estimate, each from the fit of the one before, with the next x from tau
-// so far; ends of the interval are found by secants to 1e-3 of the quantile.
+// (x - x^)/std_error. Steps go outward from the estimate. Each starts from the fit of the one before, and tau so far
+// gives the next x. Secants find the ends of the interval to 1e-3 of the quantile.
 //
 //   ProfileOptions options{.variable = 0, .first_step = std_error, .likelihood_scale = s2, .quantile = 1.96};
 //   const Profile profile = profile_likelihood(problem, x_hat, options);

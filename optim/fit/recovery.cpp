@@ -66,7 +66,7 @@ void simulate_noise(const ChannelRecord& record, std::size_t block, std::mt19937
   }
 }
 
-// Without the experiments that validate.
+// Leaves out the experiments that validate.
 void keep_fitted(Problem& problem, std::vector<CsvTable>& data) {
   std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
   for (std::size_t e = experiments.size(); e-- > 0;)
@@ -92,7 +92,7 @@ void start_at(const IdentificationResult& fit, Problem& problem) {
   }
 }
 
-// By linear interpolation between the order statistics.
+// Interpolates linearly between the order statistics.
 double percentile(std::vector<double>& values, double part) {
   std::ranges::sort(values);
   const double at = part * static_cast<double>(values.size() - 1);

@@ -1,12 +1,12 @@
-// Known-truth recovery: does the fit find parameters again that are known? Records are simulated at the parameters that
-// were found, with noise as it was found, and are fitted from the start that the problem gives. Over many seeds this
-// shows the bias of each parameter, its scatter, and how many of the intervals hold the truth.
+// Known-truth recovery: does the fit find parameters again that are known? Records are simulated at the parameters and
+// with the noise of the fit. They are fitted from the start that the problem gives. Over many seeds this shows the bias
+// of each parameter, its scatter, and how many of the intervals hold the truth.
 //
-// The noise of a channel is made of its residuals, centred and enlarged by N/(N - P) in the variance, where P counts
-// parameters less the equations between them. White residuals are drawn one by one. Others are drawn in blocks of a
-// tenth of the record, the lag of score_variance.hpp, so that they stay correlated. All windows of an experiment are
-// one record: the moving blocks of Kuensch, Annals of Statistics 17 (1989) 1217, on a circle. Hence the
-// scatter is a bootstrap of the standard errors.
+// The noise of a channel consists of its residuals, centred, with a variance larger by N/(N - P). P counts parameters
+// less the equations between them. White residuals are drawn one by one. Others are drawn in blocks of a tenth of the
+// record, the lag of score_variance.hpp, so that they stay correlated. All windows of an experiment are one record: the
+// moving blocks of Kuensch, Annals of Statistics 17 (1989) 1217, on a circle. Hence the scatter is a bootstrap of the
+// standard errors.
 //
 //   const Recovery recovery = recover(problem, data, run_identification(problem, data), {.seeds = 100});
 //   for (const RecoveredParameter& p : recovery.parameters) std::cout << p.name << ' ' << p.mean - p.truth;
@@ -40,7 +40,7 @@ struct RecoveryOptions {
   bool bootstrap = false;  // blocks of residuals always, and fits from the values that were found
   int threads = 1;         // fits at a time; results do not depend on it
   std::vector<std::shared_ptr<const UserForce>> user_forces = {};
-  // From any thread, one at a time: after each fit, false stops; within a simulation, false abandons them all.
+  // Called from any thread, one at a time: after each fit, false stops; within a simulation, false abandons all.
   std::function<bool(int done)> progress = {};
   std::function<bool(double t)> simulation_progress = {};
 };

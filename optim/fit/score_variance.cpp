@@ -1,10 +1,10 @@
 #include "optim/fit/score_variance.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include "core/linear/dense.hpp"
 
 namespace mbsopt {
 namespace {
@@ -13,10 +13,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// So few records or samples that the fit leaves nothing of the variance would have no standard error at all.
+// If the fit leaves nothing of the variance of so few records or samples, there is no standard error at all.
 constexpr double kLeastLeft = 0.05;
 
-// add(S, weight) for the sum S of the scores in each window [tau, tau + H]; the weights are the shares d tau/H of the
+// Calls add(S, weight) for the sum S of the scores in each window [tau, tau + H]. A weight is the share d tau/H of the
 // starts tau with these samples.
 template <class Add>
 void for_windows(const MatrixXd& scores, const SampledRecord& record, double H, Add&& add) {
@@ -80,16 +80,13 @@ VectorXd ScoreVariance::left_out(VectorXd z, const MatrixXd& J, const MatrixXd& 
     for (Index k = 0; k < J.cols(); ++k)
       if (!J.col(k).segment(record.first, n).isZero(0)) acting.push_back(k);
     if (acting.empty()) continue;  // nothing is fitted to it
-    const Eigen::HouseholderQR<MatrixXd> qr(J(Eigen::seqN(record.first, n), acting));
-    const Index rows = std::min(n, static_cast<Index>(acting.size()));
-    const MatrixXd R = qr.matrixQR().topRows(rows).triangularView<Eigen::Upper>();
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> S(R * inverse(acting, acting) * R.transpose());
-    const VectorXd left = (1 - S.eigenvalues().array()).max(kLeastLeft);
+    const MatrixXd J_w = J(Eigen::seqN(record.first, n), acting);
+    const MatrixXd R = triangular_factor(J_w), Q = orthogonal_factor(J_w, R.rows());
+    const SymmetricEigen S = symmetric_eigen(R * inverse(acting, acting) * R.transpose());
+    const VectorXd left = (1 - S.values.array()).max(kLeastLeft);
     auto z_w = z.segment(record.first, n);
-    const VectorXd along = S.eigenvectors().transpose() * (qr.householderQ().adjoint() * z_w).head(rows);
-    VectorXd more = VectorXd::Zero(n);
-    more.head(rows) = S.eigenvectors() * along.cwiseProduct(S.eigenvalues()).cwiseQuotient(left);
-    z_w += qr.householderQ() * more;
+    const VectorXd along = S.vectors.transpose() * (Q.transpose() * z_w);
+    z_w += Q * (S.vectors * along.cwiseProduct(S.values).cwiseQuotient(left));
   }
   return z;
 }

@@ -9,14 +9,14 @@
 // rate. With H a given part b of the record (Kiefer and Vogelsang, Econometric Theory 21 (2005) 1130) the estimate has
 // about 3/(2 b) degrees of freedom, for Student's quantiles (Priestley, "Spectral Analysis and Time Series" (1981),
 // section 6.2.4). k is the share of the windows of length H that hold both samples of those that hold the first one. So
-// B is the mean square of the sums over all such windows, which costs no more than the sum itself.
+// B is the mean square of the sums over all such windows. It costs no more than the sum itself.
 //
 // Between records: each record's sum is one observation, whatever happens within the record (Liang and Zeger,
 // Biometrika 73 (1986) 13; Cameron and Miller, Journal of Human Resources 50 (2015) 317), with E - 1 degrees of
 // freedom:
 //   B = sum_e s_e s_e',   s_e = sum_i s_i
-// A parameter that acts in one record only has s_e = 0 at the fit: this record alone says nothing of it between
-// records, and its variance is that of Newey and West. Correlations are those of Newey and West, too.
+// A parameter that acts in one record only has s_e = 0 at the fit. This record alone tells no variation between
+// records, so the variance is that of Newey and West. Correlations are those of Newey and West, too.
 //
 // The fit takes off the residuals what it can explain, so that B is too small. Of white noise it keeps, in the
 // direction a of the parameters, with the orthonormal basis q of the columns of J,

@@ -9,8 +9,8 @@
 
 namespace mbsopt {
 
-// Fills the fit of one experiment from its residuals z, and appends them to the rows of residuals.csv.
-// estimated: the fit has estimated the sigmas that the problem leaves to it.
+// Fills the fit of one experiment from its residuals z, and appends them to the rows of residuals.csv. estimated:
+// whether the fit has estimated sigmas.
 void score_experiment(const ExperimentSpec& spec, const Experiment& model, const Loss& loss, const Eigen::VectorXd& z,
                       bool estimated, std::size_t experiment, ExperimentFit& fit, std::vector<ResidualRow>& residuals);
 

@@ -1,15 +1,13 @@
 #include "optim/fit/statistics.hpp"
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#include "core/linear/dense.hpp"
 #include "optim/fit/determined_combinations.hpp"
+#include "optim/fit/distributions.hpp"
 
 namespace mbsopt {
 namespace {
@@ -19,16 +17,17 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity(), kNaN = std::numeric_limits<double>::quiet_NaN();
-// Singular values below this part of the largest: exact derivatives of a simulation carry errors of about 1e-12, and a
-// combination 1e8 times less certain than the best one is of no use.
+// Smaller singular values, relative to the largest, count as zero. Exact derivatives of a simulation carry errors of
+// about 1e-12, and a combination 1e8 times less certain than the best one is of no use.
 constexpr double kRankTolerance = 1e-8;
-// Of the record: exact derivatives carry rounding errors of about 1e-12 of what is measured; a margin of 100 above.
+// Smaller effects, relative to the record, count as none. Exact derivatives carry rounding errors of about 1e-12 of the
+// record; the margin is 100.
 constexpr double kNoInfluence = 1e-10;
 
 double quantile_975(long degrees_of_freedom, bool sigma_is_known) {
-  if (sigma_is_known) return boost::math::quantile(boost::math::normal(), 0.975);
+  if (sigma_is_known) return normal_quantile(0.975);
   if (degrees_of_freedom < 1) return kInfinity;
-  return boost::math::quantile(boost::math::students_t(static_cast<double>(degrees_of_freedom)), 0.975);
+  return student_quantile(static_cast<double>(degrees_of_freedom), 0.975);
 }
 
 struct Variances {
@@ -70,8 +69,7 @@ VectorXd influences(const FitData& data) {
 
 // Orthonormal columns Z with C Z = 0; C: of independent rows.
 MatrixXd null_space_of(const MatrixXd& C) {
-  const MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(C.transpose()).householderQ();
-  return Q.rightCols(C.cols() - C.rows());
+  return orthogonal_factor(C.transpose(), C.cols()).rightCols(C.cols() - C.rows());
 }
 
 MatrixXd scores_of(const VectorXd& z, const MatrixXd& J) {
@@ -99,7 +97,7 @@ FitStatistics fit_statistics(const FitData& data) {
       s.degrees_of_freedom > 0 ? data.z.squaredNorm() / static_cast<double>(s.degrees_of_freedom) : kNaN;
   const Variances v = variances(data, s.degrees_of_freedom, s.residual_variance);
   s.variance = v.variance, s.likelihood_scale = v.likelihood_scale;
-  // Without one, what is determined is still found.
+  // Without it, the determined combinations are still found.
   const double variance = std::isfinite(s.variance) ? s.variance : 1;
   const bool normal = data.sigma_is_known && data.loss.type == LossType::squared;
   s.quantile = quantile_975(s.degrees_of_freedom, normal);
@@ -149,15 +147,13 @@ FitStatistics fit_statistics(const FitData& data) {
     const Index F = Z.cols();
     // Singular values of the triangular factor, which is as small as the number of parameters.
     MatrixXd triangle = scaled * Z;
-    if (N + R > F)
-      triangle =
-          Eigen::HouseholderQR<MatrixXd>(triangle).matrixQR().topRows(F).triangularView<Eigen::Upper>().toDenseMatrix();
-    const Eigen::JacobiSVD<MatrixXd> svd(triangle, Eigen::ComputeFullV);
+    if (N + R > F) triangle = triangular_factor(std::move(triangle));
+    const RightSingular svd = right_singular(triangle);
     VectorXd sigma = VectorXd::Zero(F);
-    sigma.head(svd.singularValues().size()) = svd.singularValues();
+    sigma.head(svd.values.size()) = svd.values;
     const Index rank = (sigma.array() > std::max(kRankTolerance, data.accuracy) * sigma(0)).count();
     if (unseen.empty()) s.condition_number = sigma(F - 1) > 0 ? sigma(0) / sigma(F - 1) : kInfinity;
-    const MatrixXd directions = Z * svd.matrixV();
+    const MatrixXd directions = Z * svd.V;
     s.singular_values.setZero(F + static_cast<Index>(unseen.size()));
     s.singular_values.head(F) = sigma, s.rank = static_cast<long>(rank);
     if (rank > 1) {

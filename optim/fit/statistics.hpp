@@ -10,15 +10,15 @@
 //   v = K^2 [sum psi^2/(N + R - P)] / mean(psi_z)^2,   K = 1 + (P/N) var(psi_z)/mean(psi_z)^2
 // Huber, "Robust Statistics" (1981), section 7.6, equation 6.5: errors independent, of one symmetric distribution.
 //
-// Where the residuals are not white the covariance is the sandwich
+// If the residuals are not white, the covariance is the sandwich
 //   covariance  = G^-1 (B/v^2 + J_prior'J_prior) G^-1,   G = J'J/v + J_prior'J_prior,   B = variance of J'z
 // with B from the residuals themselves (score_variance.hpp). With another loss z is psi/mean(psi_z) in B.
 //
-// A column of J counts as zero where a change of the parameter by its own size moves the record by less than 1e-10 of
-// the record's norm. With equations C between the parameters, such a column stays if C has one: what the data say of
-// others may determine it. Combinations that the data do not determine come from the singular values of J with columns
-// scaled to unit length, whose ratio is the condition number (Belsley, Kuh and Welsch, "Regression Diagnostics" (1980),
-// section 3.2).
+// A column of J counts as zero if a change of the parameter by its own size moves the record by less than 1e-10 of its
+// norm. With equations C between the parameters, such a column stays if C has one: data on other parameters may
+// determine it. Combinations that the data do not determine come from the singular values of J with columns scaled to
+// unit length, whose ratio is the condition number (Belsley, Kuh and Welsch, "Regression Diagnostics" (1980), section
+// 3.2).
 //
 //   FitData data;
 //   data.J = J, data.z = z, data.rho = rho, data.names = {"m1", "m2"};

@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr Index kMostParameters = 10;  // 290 terms: their triples are looked at within a second
-// Of a gradient: derivatives are exact to about 1e-10, and chance agrees to 1e-3 among some hundred terms.
+// Tolerance of a gradient: derivatives are exact to about 1e-10, and chance agrees to 1e-3 among some hundred terms.
 constexpr double kNothing = 1e-6;
 
 struct Term {

@@ -3,10 +3,10 @@
 //   I1 + m1*a1^2 + 0.04*m2,   m1*a1 + 0.2*m2,   I2 + m2*a2^2,   m2*a2
 //
 // Given is the space of their gradients at one point. A sum of terms belongs to it if its gradient leaves nothing
-// orthogonal to the space. Terms are p, p^2, p q, p^2 q. Their coefficients are 1 or -1 between terms of one unit; the
-// last one may be a number, where the space leaves out at least two directions, so that a chance match would need two
-// numbers to agree. Sums need the units of all parameters. They are searched in order of their length, until their
-// gradients span the space.
+// orthogonal to the space. Terms are p, p^2, p q, p^2 q. Their coefficients are 1 or -1 between terms of one unit. The
+// last one may be any number if the space leaves out at least two directions: a chance match would need two numbers to
+// agree. Sums need the units of all parameters. They are searched in order of their length, until their gradients span
+// the space.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,5 @@
-// Compares two models fitted to the same data, one of which is the other with some parameters held: the F-test of the
-// extra sum of squares (Seber and Wild, "Nonlinear Regression" (1989), section 5.3).
+// Compares two models fitted to the same data; the smaller one is the larger one with some parameters held. This is the
+// F-test of the extra sum of squares (Seber and Wild, "Nonlinear Regression" (1989), section 5.3).
 //
 //   F = [(S_1 - S_2)/(n_1 - n_2)] / (S_2/n_2)         S: sums of (measured - model)^2/sigma^2, with the sigmas of the
 //                                                     larger model 2;  n: degrees of freedom
@@ -22,8 +22,8 @@ struct VariantComparison {
   long more = 0, freedom = 0;  // n_1 - n_2, n_2
   double F = FitStatistics::kUnknown, p = FitStatistics::kUnknown;
   bool white = true;  // residuals of the larger model
-  // Root mean squares of (measured - model)/sigma, of the first and of the second, both by the sigmas of the larger
-  // model; each by its own if the fits are of different samples.
+  // Root mean squares of (measured - model)/sigma of the first and of the second model. Both take the sigmas of the
+  // larger model, or each its own if the fits are of different samples.
   double rms_scaled[2] = {FitStatistics::kUnknown, FitStatistics::kUnknown};
 };
 

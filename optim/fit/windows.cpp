@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/linear/dense.hpp"
 #include "core/mechanism/mechanism.hpp"
 #include "core/start/assembly.hpp"
 #include "optim/fit/experiment_stack.hpp"
@@ -25,13 +25,13 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using UserForces = std::vector<std::shared_ptr<const UserForce>>;
 
-// A polynomial reaches so far to both sides of its time, in lengths of a window, and takes so many samples at least,
+// A polynomial reaches so far to both sides of its time, in lengths of a window. It takes at least so many samples,
 // twice its coefficients.
 constexpr double kReach = 0.1;
 constexpr int kCoefficients = 4;
 constexpr std::size_t kLeastSamples = 2 * kCoefficients;
-// Between the two times where the model meets a polynomial, in lengths of a window: wrong accelerations spoil the
-// velocity in proportion to it, and the integrator's tolerance in proportion to its inverse.
+// The time between the two points where the model meets a polynomial, in lengths of a window. Wrong accelerations spoil
+// the velocity in proportion to it, the integrator's tolerance in proportion to its inverse.
 constexpr double kApart = 0.01;
 // Directions of the start that differ by less are the same: the assembly's derivatives are exact to about 1e-12.
 constexpr double kSameStart = 1e-8;
@@ -203,9 +203,7 @@ class Cut {
     for (Index k = 0; k < y_u.cols(); ++k)
       if (const double norm = y_u.col(k).norm(); norm > 0) y_u.col(k) /= norm;
     const auto rank_of = [](const MatrixXd& A) {
-      Eigen::ColPivHouseholderQR<MatrixXd> qr;
-      qr.setThreshold(kSameStart);
-      return static_cast<int>(qr.compute(A).rank());
+      return static_cast<int>(OrthogonalDecomposition(A, kSameStart).rank());
     };
     const int all = rank_of(y_u), coordinates = rank_of(y_u.topRows(y_u.rows() / 2));
     if (all == 2 * degrees) return;

@@ -3,8 +3,8 @@
 //   run1, free theta0, omega0     ->     run1.1, run1.2, ..., each with its own theta0, omega0
 //
 // Long motions that amplify small errors are then fitted by many short ones, whose residuals depend on all parameters
-// smoothly. The start values of a window are those whose motion meets local cubic polynomials of its channels at their
-// first samples, in value and slope. The initial assembly makes them consistent with joints.
+// smoothly. A window starts with values whose motion meets local cubic polynomials of its channels, in value and slope,
+// at their first samples. The initial assembly makes them consistent with joints.
 //
 //   const CutProblem cut = cut_into_windows(problem, data);
 //   run_identification(cut.problem, cut.data);        // as run_identification(problem, data)

@@ -152,7 +152,8 @@ TEST_CASE("a planar loop of spatial revolutes: validate names the joint with red
   CHECK(outcome.out.find("redundant: D (3 of 5)") != std::string::npos);
 }
 
-TEST_CASE("slider-crank timing and four-bar path syntheses reach designs that meet their aims", "[gallery]") {
+TEST_CASE("slider-crank timing, four-bar path syntheses and a balanced four-bar reach designs that meet their aims",
+          "[gallery]") {
   const TemporaryFolder folder;
   struct Case {
     std::string name, objective;
@@ -161,8 +162,10 @@ TEST_CASE("slider-crank timing and four-bar path syntheses reach designs that me
   };
   const std::vector<Case> cases{
       {"slider_crank/timing", "timing", 1e-9, {{"r", 0.12}, {"rod_length", 0.4}, {"e", 0.03}, {"phase", 0.3}}},
-      {"four_bar/path_synthesis", "path", 1e-4, {}},          // aims rounded to 0.1 mm: 9 points, 1e3 per m^2
-      {"synthesis/eighteen_points", "path", 0.0099120, {}}};  // the published value, docs/synthesis.md
+      {"four_bar/path_synthesis", "path", 1e-4, {}},         // aims rounded to 0.1 mm: 9 points, 1e3 per m^2
+      {"synthesis/eighteen_points", "path", 0.0099120, {}},  // the published value, docs/synthesis.md
+      // Berkof and Lowen's counterweights: m_coupler/m L/2 of each link beyond its pivot
+      {"four_bar/balanced", "unbalance", 1e-12, {{"crank_com", -0.25}, {"rocker_com", -0.4375}}}};
   for (const Case& c : cases) {
     const std::string out = folder.file(fs::path(c.name).filename().string());
     const CommandOutcome outcome = run_command({"design", file_of(c.name).string(), "--out", out, "--quiet"});

@@ -1,4 +1,6 @@
 #include "core/mechanism/compile.hpp"
+#include "core/constraint/constraint.hpp"
+#include "core/force/forces.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -61,17 +63,17 @@ Numbers numbers_of(const MechanismData& d) {
     v << law.k, law.c, law.x0, law.f0;
     x.add(law.slot, v);
   };
-  for (const TsdaForce& f : d.forces.of<TsdaForce>()) x.add(f.slot1, f.s1), x.add(f.slot2, f.s2), add_law(f.law);
-  for (const RsdaForce& f : d.forces.of<RsdaForce>()) add_law(f.law);
+  for (const TsdaForce& f : d.forces->of<TsdaForce>()) x.add(f.slot1, f.s1), x.add(f.slot2, f.s2), add_law(f.law);
+  for (const RsdaForce& f : d.forces->of<RsdaForce>()) add_law(f.law);
   for (const AppliedForce& f : d.applied) x.add(f.slot, f.s);
-  for (const Bushing& f : d.forces.of<Bushing>()) {
+  for (const Bushing& f : d.forces->of<Bushing>()) {
     x.add(f.slot1, f.s1), x.add(f.slot2, f.s2);
     VectorXd R0(9), law(12);
     R0 << f.R0.row(0).transpose(), f.R0.row(1).transpose(), f.R0.row(2).transpose();
     law << f.K, f.C, f.Kt, f.Ct;
     x.add(f.slot_R0, R0), x.add(f.slot_law, law);
   }
-  for (const TurningFriction& f : d.forces.of<TurningFriction>()) {
+  for (const TurningFriction& f : d.forces->of<TurningFriction>()) {
     VectorXd law(FrictionLaw::kFields);
     law << f.law.coulomb, f.law.smooth, f.law.viscous, f.law.breakaway, f.law.stribeck;
     x.add(f.law.slot, law);
@@ -159,7 +161,7 @@ TEST_CASE("a field that no active parameter moves owns no slot", "[mechanism]") 
   CHECK(d.theta_rho.cols() == 1);
   CHECK(d.bodies[1].slot_mass >= 0);
   CHECK(d.bodies[2].slot_mass == -1);
-  CHECK(d.forces.of<TsdaForce>()[0].law.slot >= 0);
+  CHECK(d.forces->of<TsdaForce>()[0].law.slot >= 0);
   CHECK(d.slots() == 1 + 3 + 4);
 }
 

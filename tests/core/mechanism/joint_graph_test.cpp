@@ -1,4 +1,5 @@
 #include "core/mechanism/joint_graph.hpp"
+#include "core/constraint/constraint.hpp"
 
 #include <catch2/catch.hpp>
 #include <utility>

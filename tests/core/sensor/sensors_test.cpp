@@ -125,6 +125,13 @@ struct TextbookScene {
     }
     return sum;
   }
+  T mass() const { return rho[m1] + T(1); }
+  // m1 r1 + m2 r2, or with the velocities.
+  V3<T> mass_sum(std::size_t order) const {
+    const auto X = body(0).moving().r, Y = body(1).moving().r;
+    return {rho[m1] * X[0].c[order] + Y[0].c[order], rho[m1] * X[1].c[order] + Y[1].c[order],
+            rho[m1] * X[2].c[order] + Y[2].c[order]};
+  }
   T potential() const {
     const V3<T> gravity{T(0.1) * rho[g], T(0), -rho[g]};
     T sum(0);
@@ -330,6 +337,14 @@ const std::vector<Row>& all_sensors() {
           [](const auto& s) { return s.rho[kt] * (s.angle() - s.rho[theta0]) + s.rho[b] * s.rate(); }),
       row("torque of a law", force_of("stop"),
           [](const auto& s) { return s.rho[kt] * s.angle() * s.angle() + s.rho[n] * s.rate() * s.angle(); }),
+      row("centre_of_mass", plain("centre_of_mass", "x"), [](const auto& s) { return s.mass_sum(0)[0] / s.mass(); }),
+      row("centre_of_mass, norm", plain("centre_of_mass", "norm"),
+          [](const auto& s) { return norm(s.mass_sum(0)) / s.mass(); }),
+      row(
+          "rate of centre_of_mass", plain("centre_of_mass", "z"),
+          [](const auto& s) { return s.mass_sum(1)[2] / s.mass(); }, true),
+      row("momentum", plain("momentum", "y"), [](const auto& s) { return s.mass_sum(1)[1]; }),
+      row("momentum, norm", plain("momentum", "norm"), [](const auto& s) { return norm(s.mass_sum(1)); }),
       row("constraint_violation", plain("constraint_violation"), [](const auto& s) { return s.violation(); }),
       row("transmission_angle", plain("transmission_angle"), [](const auto& s) { return s.transmission_angle(); }),
       row("imu, rate", mounted("wy"), MountRate()),

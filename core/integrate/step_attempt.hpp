@@ -1,0 +1,76 @@
+// One attempt at a step of a Runge-Kutta method: stages, error, dense stages, projection. RungeKuttaRun chooses the
+// sizes.
+//
+//   StepAttempt attempt(mechanism, settings, method, tolerances);
+//   attempt.step = start;
+//   if (attempt.solve(h, adaptive, exact, error) == StepOutcome::accepted) attempt.finish(dense);
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "core/dynamics/dynamics.hpp"
+#include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/parameter_lanes.hpp"
+#include "core/projection/projection.hpp"
+#include "core/run/simulation_result.hpp"
+#include "core/scene/settings.hpp"
+#include "core/step/component_tolerances.hpp"
+#include "core/step/implicit_stages.hpp"
+#include "core/step/rosenbrock_stages.hpp"
+#include "core/step/singular_passage.hpp"
+#include "core/step/step.hpp"
+#include "core/step/step_failure.hpp"
+
+namespace mbsopt {
+
+class StepAttempt {
+ public:
+  StepAttempt(const Mechanism& mechanism, const SimulationSettings& settings, const Method& method,
+              const ComponentTolerances& tolerances);
+
+  // Evaluates the accelerations at the step's start, from which implicit stages begin. False where they do not exist.
+  bool begin();
+  // A first size from the start. Hairer, Norsett, Wanner I, section II.4, "Starting step size".
+  double first_step(const IntegratorSettings& s, double span);
+
+  // The stages of a step of size h. error: in tolerances, of an adaptive one. exact: implicit stages to rounding.
+  StepOutcome solve(double h, bool adaptive, bool exact, double& error);
+  StepOutcome finish(bool dense);  // dense stages, projection, branches of the angles
+
+  // Whether a step of another size, of `wanted` as far as the singular position allows, is to be tried in its place.
+  bool better_placed_by(double wanted, double largest);
+  void accept();   // the stages of the next step start from this one
+  void advance();  // the start has moved to the step's end
+  void restart();  // accelerations jump at the start: the last step is no start for the iterations of the next
+  bool has_implicit_stages() const { return implicit_.has_value(); }
+  void add_counts(SimulationStatistics& statistics) const;
+
+  Dynamics dynamics;
+  std::unique_ptr<Projector> projector;
+  Step step;                               // t, y0 and angles0 are given
+  std::optional<SingularPassage> passage;  // of explicit methods through closed loops
+  double projected_out = 0;                // of the error of the last attempt, in tolerances
+
+ private:
+  bool evaluate_stage(int i);
+  bool solve_stages(ImplicitStages::Goal goal);
+  double error_of_step();
+  double error_after_projection();
+  void set_y_hat();
+
+  const MechanismData& data_;
+  const Method& rk_;
+  const ComponentTolerances& tolerances_;
+  std::optional<ImplicitStages> implicit_;
+  std::optional<RosenbrockStages> rosenbrock_;
+  // If there is a passage.
+  Eigen::VectorXd response_;
+  ParameterBlock no_parameters_;
+  LaneRows error_, projected_error_;
+  Eigen::VectorXd work_, ydot_, y_stage_;
+  bool first_stage_known_ = false;
+  long evaluations_ = 0;
+};
+
+}  // namespace mbsopt

@@ -1,0 +1,229 @@
+#include "optim/design/design_description.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/expression/did_you_mean.hpp"
+#include "optim/design/prepared_design.hpp"
+#include "optim/design/true_limits.hpp"
+#include "optim/solver/optimality.hpp"
+
+namespace mbsopt {
+namespace {
+
+// Times the tolerance of least squares. If the cost settles to 1e-10 of itself, optimality is known to the root of
+// that.
+constexpr double kSettled = 1000;
+constexpr double kTouches = 1e-5;  // relative to the bound's size: the barrier keeps solutions this near to a bound
+
+bool touches(double value, const std::optional<double>& bound, double size) {
+  return bound && std::abs(value - *bound) <= kTouches * size;
+}
+
+// Warns of variables whose derivatives are all exactly zero: by symmetry, or because their force does not act yet. The
+// search does not move them.
+std::vector<std::string> idle_variables(const Evaluation& start, const Problem& problem) {
+  std::vector<std::string> warnings;
+  for (std::size_t k = 0; k < problem.design->variables.size(); ++k) {
+    if (start.psi_rho.col(static_cast<Eigen::Index>(k)).any()) continue;
+    warnings.push_back(fmt::format(
+        "design.variables: '{}' has a derivative of exactly 0 at the start in all that the design uses ({}); it stays "
+        "as it is unless others change that",
+        problem.design->variables[k], joined(objective_names(*problem.design))));
+  }
+  return warnings;
+}
+
+double missed(const DesignConstraint& c, double value) {
+  return std::max({0.0, c.lower ? *c.lower - value : 0.0, c.upper ? value - *c.upper : 0.0});
+}
+
+std::string limit_text(const std::string& name, bool is_upper, double bound) {
+  return fmt::format("{} {} {:.6g}", name, is_upper ? "<=" : ">=", bound);
+}
+
+// The limits and bounds that stand against each other where no point near satisfies all limits.
+void describe_conflict(const DesignProgram& program, const VariableScaling& scaling, const Eigen::VectorXd& x,
+                       const NlpPoint& end, DesignResult& result) {
+  constexpr double kNoPrice = 1e-6;  // relative to that of a limit that is violated, 1
+  const Conflict found = conflict(program, x, end, kConstraintTolerance);
+  for (std::size_t i = 0; i < result.constraints.size(); ++i) {
+    const DesignConstraint& c = result.constraints[i];
+    const double z = found.of_constraints(static_cast<Eigen::Index>(i));
+    if (std::abs(z) <= kNoPrice) continue;
+    result.conflicts.push_back({limit_text(c.in_words(), z > 0, z > 0 ? *c.upper : *c.lower),
+                                std::max(c.violation, c.true_violation),
+                                std::abs(z) / program.size(static_cast<Eigen::Index>(i))});
+  }
+  const Eigen::VectorXd rho_x = scaling.rho_x(x);
+  for (std::size_t k = 0; k < result.variables.size(); ++k) {
+    const DesignVariable& v = result.variables[k];
+    const Eigen::Index row = static_cast<Eigen::Index>(k);
+    const double z = found.of_bounds(row);
+    if (std::abs(z) <= kNoPrice) continue;
+    result.conflicts.push_back(
+        {limit_text(v.name, z > 0, z > 0 ? *v.upper : *v.lower), 0, std::abs(z) / std::abs(rho_x(row))});
+  }
+  std::string words;
+  for (const DesignConflict& c : result.conflicts)
+    words +=
+        fmt::format("{}{} ({})", words.empty() ? "" : ", ", c.limit,
+                    c.missed > 0 ? fmt::format("missed by {:.3g}", c.missed) : fmt::format("price {:.3g}", c.price));
+  if (!words.empty()) result.message += "; in conflict: " + words;
+}
+
+// The values that are minimised case by case, and the true one that a smooth objective stands for.
+void describe_objective(const DesignProgram& program, const std::vector<std::optional<double>>& true_values,
+                        DesignResult& result) {
+  if (!result.final_evaluation.ok) return;
+  Eigen::VectorXd values = program.minimised(result.final_evaluation.psi);
+  const Eigen::Index stride = static_cast<Eigen::Index>(true_values.size()) / values.size();
+  bool smooth = program.objective().is_maximum();
+  for (Eigen::Index c = 0; c < values.size(); ++c) {
+    const std::optional<double>& true_value = true_values[static_cast<std::size_t>(c * stride)];
+    if (!result.cases.empty()) {
+      DesignCase& of_case = result.cases[static_cast<std::size_t>(c)];
+      of_case.value = values(c), of_case.true_value = true_value;
+    }
+    smooth = smooth || true_value;
+    values(c) = true_value.value_or(values(c));
+  }
+  if (smooth) result.objective_true = program.objective().true_value(values);
+}
+
+// Least squares converges by its steps. A solved run has no noise, so that its end must also satisfy the optimality
+// conditions.
+void judge_stationarity(const DesignSpec& spec, DesignResult& result) {
+  const bool judged = spec.optimizer.type == OptimizerSpec::kLeastSquares && result.final_evaluation.ok &&
+                      result.final_evaluation.of_cases.front().statistics.solved;
+  if (!judged || result.status != SolverStatus::converged) return;
+  if (result.optimality <= kSettled * spec.optimizer.tolerance) return;
+  result.status = SolverStatus::no_progress;
+  result.message = fmt::format(
+      "no further progress: cost and parameters settle where the optimality is {:.1g}, a kink "
+      "or a dead point",
+      result.optimality);
+}
+
+// Says where a limit on an extreme does not hold for the true one, in spite of bounds that were moved.
+void judge_true_extremes(const DesignProgram& program, const CaseEvaluator& evaluator, DesignResult& result) {
+  bool beyond = false;
+  for (std::size_t i = 0; i < result.constraints.size(); ++i) {
+    const DesignConstraint& c = result.constraints[i];
+    const std::size_t bounds = result.constraints.size() / evaluator.cases();
+    const Extreme extreme = evaluator.of_case(i / bounds).objectives()[i % bounds + 1].extreme();
+    if (extreme == Extreme::none) continue;
+    const char* const what = extreme == Extreme::maximum   ? "maximum"
+                             : extreme == Extreme::minimum ? "minimum"
+                                                           : "peak to peak value";
+    const std::string place = fmt::format("design.subject_to[{}]: the {} of '{}'", i % bounds, what, c.in_words());
+    if (!c.true_value) {
+      beyond = true;
+      result.warnings.push_back(place +
+                                " is held by its smooth value only; the run that was to find the true one failed");
+      continue;
+    }
+    const bool equality = c.lower && c.upper && *c.lower == *c.upper;
+    const double size = program.size(static_cast<Eigen::Index>(i));
+    if (c.true_violation <= (equality ? kTrueLimitTolerance * size : 0)) continue;
+    beyond = true;
+    const bool above = c.upper && *c.true_value > *c.upper;
+    result.warnings.push_back(
+        fmt::format("{} is {:.6g}, {} the limit {:.6g}, though its smooth value is {:.6g}; more sharpness brings the "
+                    "two together",
+                    place, *c.true_value, above ? "above" : "below", above ? *c.upper : *c.lower, c.value));
+  }
+  if (!beyond || result.status != SolverStatus::converged) return;
+  result.status = SolverStatus::converged_beyond_limit;
+  result.message += "; limits hold for smooth extremes only";
+}
+
+}  // namespace
+
+void describe_start(const Problem& problem, const CaseEvaluator& evaluator, const DesignProgram& program,
+                    const CaseEvaluation& start, DesignResult& result) {
+  const DesignSpec& spec = *problem.design;
+  result.objective = spec.minimize;
+  for (const Parameter& p : chosen(problem.scene, evaluator.variables()))
+    result.variables.push_back({p.name, p.unit, p.value, p.value, p.lower, p.upper, false, false});
+  const Eigen::VectorXd minimised =
+      start.ok ? program.minimised(start.psi) : Eigen::VectorXd::Zero(static_cast<Eigen::Index>(evaluator.cases()));
+  if (start.ok) result.objective_initial = result.objective_final = program.objective().value(minimised);
+  for (std::size_t c = 0; c < problem.cases.size(); ++c) {
+    const double value = minimised(static_cast<Eigen::Index>(c));
+    result.cases.push_back({problem.cases[c].name, problem.cases[c].weight, value, value});
+  }
+  for (std::size_t c = 0; c < evaluator.cases(); ++c) {
+    for (const ObjectiveBound& bound : spec.subject_to) {
+      const Eigen::Index row = static_cast<Eigen::Index>(result.constraints.size());
+      const double value = start.ok ? start.psi(program.psi_of(row)) : 0;
+      DesignConstraint& constraint = result.constraints.emplace_back();
+      constraint.objective = bound.objective, constraint.lower = bound.lower, constraint.upper = bound.upper;
+      constraint.initial = constraint.value = value, constraint.load_case = evaluator.case_name(c);
+    }
+  }
+  if (!start.ok) return;
+  for (std::string& warning : idle_variables(start, problem)) result.warnings.push_back(std::move(warning));
+}
+
+void describe_end(const CaseEvaluator& evaluator, const DesignProgram& program, const NlpPoint& end,
+                  DesignResult& result) {
+  for (std::size_t k = 0; k < result.variables.size(); ++k) {
+    DesignVariable& v = result.variables[k];
+    v.value = result.rho(evaluator.variables()[k]);
+    const double size = v.lower && v.upper ? *v.upper - *v.lower : std::max(std::abs(v.initial), std::abs(v.value));
+    v.at_lower = touches(v.value, v.lower, size), v.at_upper = touches(v.value, v.upper, size);
+  }
+  result.objective_final = end.f;
+  result.violation = program.violation(end.c);
+  for (std::size_t i = 0; i < result.constraints.size(); ++i) {
+    DesignConstraint& c = result.constraints[i];
+    const Eigen::Index row = static_cast<Eigen::Index>(i);
+    c.value = end.c(row) * program.size(row);
+    c.violation = missed(c, c.value);
+    c.at_lower = c.lower && touches(end.c(row), program.c_lower(row), 1);
+    c.at_upper = c.upper && touches(end.c(row), program.c_upper(row), 1);
+  }
+}
+
+void describe_solution(DesignProgram& program, const VariableScaling& scaling, const LimitedSolution& rounds,
+                       DesignResult& result) {
+  const Eigen::VectorXd& x = rounds.solution.x;
+  result.final_evaluation = program.evaluation(result.rho);
+  describe_objective(program, rounds.true_values, result);
+  result.true_violation = result.violation;
+  for (std::size_t i = 0; i < result.constraints.size(); ++i) {
+    DesignConstraint& c = result.constraints[i];
+    c.true_value = rounds.true_values[static_cast<std::size_t>(program.psi_of(static_cast<Eigen::Index>(i)))];
+    c.true_violation = missed(c, c.true_value.value_or(c.value));
+    if (c.true_value) c.violation = c.true_violation;
+    result.true_violation =
+        std::max(result.true_violation, c.true_violation / program.size(static_cast<Eigen::Index>(i)));
+  }
+  NlpPoint end;
+  end.f_x.setZero(program.variables()), end.c.setZero(program.constraints());
+  end.c_x.setZero(program.constraints(), program.variables());
+  program.evaluate(x, end);
+  if (!end.ok) return;
+  const Stationarity found = stationarity(program, x, end);
+  result.optimality = found.distance;
+  for (std::size_t i = 0; i < result.constraints.size(); ++i) {
+    DesignConstraint& c = result.constraints[i];
+    const Eigen::Index row = static_cast<Eigen::Index>(i);
+    const double fall =
+        found.multipliers(row) * program.c_scale(row) / (program.f_scale * program.size(row) * rounds.slopes(row));
+    c.price = c.lower && c.upper && *c.lower == *c.upper ? fall : std::abs(fall);
+  }
+  if (result.status == SolverStatus::infeasible) describe_conflict(program, scaling, x, end, result);
+}
+
+void judge_solution(const DesignSpec& spec, const DesignProgram& program, const CaseEvaluator& evaluator,
+                    DesignResult& result) {
+  judge_stationarity(spec, result);
+  judge_true_extremes(program, evaluator, result);
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,144 @@
+#include "optim/design/limit_rounds.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "optim/design/tracked_squares.hpp"
+#include "optim/design/true_limits.hpp"
+#include "optim/problem/seed.hpp"
+#include "optim/solver/ipopt_solver.hpp"
+#include "optim/solver/nlopt_solver.hpp"
+
+namespace mbsopt {
+namespace {
+
+NlpResult solved_with_ipopt(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
+                            const SearchHooks& hooks) {
+  IpoptOptions solver;
+  solver.tolerance = spec.tolerance;
+  solver.constraint_tolerance = kConstraintTolerance;
+  solver.max_iterations = static_cast<int>(spec.max_iterations.value_or(OptimizerSpec::kIpoptIterations));
+  solver.max_evaluations = spec.max_evaluations;
+  if (spec.lbfgs_history) solver.history = static_cast<int>(*spec.lbfgs_history);
+  solver.second_order = spec.hessian != "lbfgs";
+  solver.gauss_newton = spec.hessian == "gauss_newton";
+  solver.progress = hooks.progress;
+  solver.records = hooks.records;
+  solver.warm_start = spec.warm_start;
+  NlpResult solution = solve_with_ipopt(program, x_start, solver);
+  if (solver.second_order)
+    solution.algorithm = fmt::format("Ipopt: interior point, {} Hessian",
+                                     spec.hessian == "exact" ? "exact" : "generalised Gauss-Newton");
+  return solution;
+}
+
+NlpResult solved_with_nlopt(DesignProgram& program, const Eigen::VectorXd& x_start, const OptimizerSpec& spec,
+                            const SearchHooks& hooks, std::optional<long>& seed) {
+  NloptOptions solver;
+  solver.method = spec.type;
+  solver.tolerance = spec.tolerance;
+  solver.constraint_tolerance = kConstraintTolerance;
+  solver.max_evaluations = spec.max_evaluations;
+  solver.max_iterations = spec.max_iterations;
+  if (spec.lbfgs_history) solver.history = static_cast<unsigned>(*spec.lbfgs_history);
+  if (find_nlopt_method(spec.type)->random) {
+    if (!seed) seed = spec.seed.value_or(drawn_seed());
+    solver.seed = static_cast<std::uint32_t>(*seed);
+  }
+  solver.progress = hooks.progress;
+  solver.records = hooks.records;
+  return solve_with_nlopt(program, x_start, solver);
+}
+
+NlpResult solved_once(DesignProgram& program, const CaseEvaluator& evaluator, const Eigen::VectorXd& x_start,
+                      const OptimizerSpec& spec, const SearchHooks& hooks, DesignResult& result) {
+  if (spec.type == OptimizerSpec::kLeastSquares)
+    return solve_tracked_squares(program, evaluator, x_start, spec, hooks.progress, hooks.records, result.simulations);
+  if (spec.type == "ipopt") return solved_with_ipopt(program, x_start, spec, hooks);
+  return solved_with_nlopt(program, x_start, spec, hooks, result.seed);
+}
+
+// Returns what an optimiser may still spend after earlier rounds. A global method searches as long in every round.
+OptimizerSpec remaining(OptimizerSpec spec, const NlpResult& done) {
+  const NloptMethod* const method = find_nlopt_method(spec.type);
+  if (method && method->global) return spec;
+  if (!method) spec.max_iterations = spec.max_iterations.value_or(OptimizerSpec::kIpoptIterations);
+  if (spec.max_iterations) *spec.max_iterations = std::max(0L, *spec.max_iterations - done.iterations);
+  if (spec.max_evaluations) *spec.max_evaluations = std::max(0L, *spec.max_evaluations - done.evaluations);
+  return spec;
+}
+
+bool may_go_on(const OptimizerSpec& spec) {
+  return spec.max_iterations.value_or(1) > 0 && spec.max_evaluations.value_or(1) > 0;
+}
+
+bool is_an_end(SolverStatus status) {
+  return status == SolverStatus::converged || status == SolverStatus::no_progress || status == SolverStatus::searched;
+}
+
+bool is_an_improvement(const DesignProgram& program, const NlpResult& found, const NlpResult& before) {
+  if (found.status == SolverStatus::converged) return true;
+  return found.point.ok && is_better(found.point.f, program.violation(found.point.c), before.point.f,
+                                     program.violation(before.point.c), kConstraintTolerance);
+}
+
+// The hooks of a later round, whose iterations follow those of the rounds before.
+SearchHooks continued(const SearchHooks& hooks, int iterations) {
+  SearchHooks later = hooks;
+  later.progress = [progress = hooks.progress, iterations](NlpProgress p) {
+    if (p.iteration == 0) return true;  // known from before
+    p.iteration += iterations;
+    return progress(p);
+  };
+  return later;
+}
+
+// Takes `found`, unless it is worse, with the counts of both.
+void take(const NlpResult& found, bool is_worse, NlpResult& solution) {
+  const NlpResult before = solution;
+  if (!is_worse) solution = found;
+  solution.iterations = found.iterations + before.iterations;
+  solution.evaluations = found.evaluations + before.evaluations;
+  solution.failed_evaluations = found.failed_evaluations + before.failed_evaluations;
+}
+
+// Solves again within the moved bounds, from the last solution. If the method stalls there, it solves from the first
+// start.
+void solve_again(const DesignSpec& spec, DesignProgram& program, const CaseEvaluator& evaluator,
+                 const Eigen::VectorXd& x_start, const SearchHooks& hooks, NlpResult& solution, DesignResult& result) {
+  for (const bool from_solution : {true, false}) {
+    OptimizerSpec rest = remaining(spec.optimizer, solution);
+    if (!may_go_on(rest)) {
+      solution.status = SolverStatus::iteration_limit;
+      solution.message = "stopped at the limit of iterations or evaluations, before the limits held for true extremes";
+      return;
+    }
+    rest.warm_start = from_solution || rest.warm_start;
+    const NlpResult found = solved_once(program, evaluator, from_solution ? solution.x : x_start, rest,
+                                        continued(hooks, solution.iterations), result);
+    take(found, !from_solution && !is_an_improvement(program, found, solution), solution);
+    if (solution.status != SolverStatus::no_progress && solution.status != SolverStatus::infeasible) return;
+  }
+}
+
+}  // namespace
+
+LimitedSolution solve_in_rounds(const DesignSpec& spec, DesignProgram& program, CaseEvaluator& evaluator,
+                                const Eigen::VectorXd& x_start, const SearchHooks& hooks, DesignResult& result) {
+  TrueLimits limits(spec, evaluator);
+  LimitedSolution rounds;
+  NlpResult& solution = rounds.solution;
+  solution = solved_once(program, evaluator, x_start, spec.optimizer, hooks, result);
+  while (solution.point.ok && !hooks.abandoned()) {
+    rounds.true_values = evaluator.true_values(program.rho_at(solution.x));
+    if (!is_an_end(solution.status) || !limits.move(program, solution.point.c, rounds.true_values)) break;
+    solve_again(spec, program, evaluator, x_start, hooks, solution, result);
+  }
+  result.limit_rounds = limits.rounds();
+  rounds.slopes.resize(program.constraints());
+  for (Eigen::Index i = 0; i < program.constraints(); ++i) rounds.slopes(i) = limits.slope(i);
+  return rounds;
+}
+
+}  // namespace mbsopt

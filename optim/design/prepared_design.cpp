@@ -1,0 +1,94 @@
+#include "optim/design/prepared_design.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "optim/objective/design_issues.hpp"
+#include "optim/problem/bounded_means.hpp"
+#include "optim/solver/nlopt_solver.hpp"
+
+namespace mbsopt {
+namespace {
+
+const DesignSpec& checked(const Problem& problem) {
+  if (!problem.design) throw std::invalid_argument("design: is missing; it says what to minimise and what to vary");
+  const DesignSpec& spec = *problem.design;
+  if (spec.variables.empty()) throw std::invalid_argument("design.variables: is empty; name at least one parameter");
+  const bool is_known = spec.optimizer.type == "ipopt" || spec.optimizer.type == OptimizerSpec::kLeastSquares ||
+                        find_nlopt_method(spec.optimizer.type);
+  if (!is_known)
+    throw std::invalid_argument(fmt::format("design.optimizer.type: is '{}'; available: ipopt {} {}",
+                                            spec.optimizer.type, OptimizerSpec::kLeastSquares, nlopt_method_names()));
+  for (std::size_t i = 0; i < spec.subject_to.size(); ++i) {
+    const ObjectiveBound& bound = spec.subject_to[i];
+    if (!bound.lower && !bound.upper)
+      throw std::invalid_argument(fmt::format("design.subject_to[{}]: gives neither lower nor upper", i));
+    if (bound.lower && bound.upper && *bound.lower > *bound.upper)
+      throw std::invalid_argument(
+          fmt::format("design.subject_to[{}]: lower is {}, above upper {}", i, *bound.lower, *bound.upper));
+  }
+  if (const std::vector<DesignIssue> issues = optimizer_issues(spec, problem.scene); !issues.empty())
+    throw std::invalid_argument(issues[0].path + ": " + issues[0].message);
+  if (const std::optional<DesignIssue> issue = curvature_issue(problem))
+    throw std::invalid_argument(issue->path + ": " + issue->message);
+  return spec;
+}
+
+Eigen::VectorXd start_of(const CaseEvaluator& evaluator, const VariableScaling& scaling) {
+  Eigen::VectorXd designed(scaling.size());
+  for (Eigen::Index k = 0; k < designed.size(); ++k)
+    designed(k) = evaluator.start()(evaluator.variables()[static_cast<std::size_t>(k)]);
+  return scaling.to_x(designed);
+}
+
+Problem with_named_means(Problem problem) {
+  name_bounded_means(problem);
+  return problem;
+}
+
+EvaluatorOptions evaluator_options(const DesignOptions& options, std::function<bool(double t)> progress) {
+  EvaluatorOptions result;
+  result.method = options.method, result.user_forces = options.user_forces, result.progress = std::move(progress);
+  return result;
+}
+
+}  // namespace
+
+std::vector<Parameter> chosen(const Scene& scene, const std::vector<int>& indices) {
+  std::vector<Parameter> parameters;
+  for (const int k : indices) parameters.push_back(scene.parameters[static_cast<std::size_t>(k)]);
+  return parameters;
+}
+
+std::vector<std::string> objective_names(const DesignSpec& spec) {
+  std::vector<std::string> names{spec.minimize};
+  for (const ObjectiveBound& bound : spec.subject_to) names.push_back(bound.objective);
+  return names;
+}
+
+PreparedDesign::PreparedDesign(const Problem& given, const DesignOptions& options,
+                               std::function<bool(double t)> progress)
+    : problem(with_named_means(given)),
+      spec(checked(problem)),
+      evaluator(problem, objective_names(spec), spec.variables, evaluator_options(options, std::move(progress)),
+                options.threads),
+      scaling(chosen(problem.scene, evaluator.variables())),
+      x_start(start_of(evaluator, scaling)) {
+  if (!spec.sharpness) spec.sharpness = sharpness();
+}
+
+// The sharpness of the maximum over cases is relative to the largest value at the start.
+std::optional<double> PreparedDesign::sharpness() {
+  if (spec.over != "max" || problem.cases.size() < 2) return std::nullopt;
+  const CaseEvaluation& start = evaluator.gradients(evaluator.start());
+  double largest = 0;
+  for (std::size_t c = 0; c < problem.cases.size() && start.ok; ++c)
+    largest = std::max(largest, std::abs(problem.cases[c].weight * start.of_cases[c].psi(0)));
+  return DesignSpec::kSharpness / (largest > 0 ? largest : 1);
+}
+
+}  // namespace mbsopt

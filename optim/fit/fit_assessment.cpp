@@ -1,0 +1,152 @@
+#include "optim/fit/fit_assessment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "optim/fit/experiment_influence.hpp"
+#include "optim/fit/scored_experiment.hpp"
+
+namespace mbsopt {
+namespace {
+
+// Numerical effects of causes that are the same by the physics differ by a few tolerances of the integration. A late
+// clock and an early start are an example. Measured: 1/condition of that pair is 0.3 to 8 times rtol at 1e-5 to 1e-8.
+constexpr double kTolerances = 10, kLeastAccuracy = 1e-5;
+// The sums of so many records tell a variance: Student's quantile is then 2.09, against 1.96 for any number.
+constexpr std::size_t kManyRecords = 20;
+constexpr double kTouches = 1e-9;  // of the bound's size: the trust region puts solutions exactly on bounds
+
+// Chooses by the residuals of the experiments of the stack, which are scored already.
+CovarianceType covariance_for(const FitContext& fit, const ExperimentStack& stack) {
+  const std::size_t records = stack.records_in_time().size();
+  const bool many = records >= kManyRecords;
+  if (fit.spec.covariance == CovarianceType::windows && records < 2) return CovarianceType::newey_west;
+  if (fit.spec.covariance != CovarianceType::automatic) return fit.spec.covariance;
+  for (const ExperimentStack::Member& m : stack.members())
+    for (const ChannelFit& channel : fit.result.experiments[m.experiment].channels)
+      if (!channel.analysis.white()) return many ? CovarianceType::windows : CovarianceType::newey_west;
+  return CovarianceType::white;
+}
+
+}  // namespace
+
+void score_all(FitContext& fit, ExperimentStack& stack, const Eigen::VectorXd& z, bool estimated) {
+  Eigen::Index row = 0;
+  for (const ExperimentStack::Member& m : stack.members()) {
+    const Eigen::Index n = static_cast<Eigen::Index>(m.model.samples().size());
+    score_experiment(fit.spec.experiments[m.experiment], m.model, fit.spec.loss, z.segment(row, n), estimated,
+                     m.experiment, fit.result.experiments[m.experiment], fit.result.residuals);
+    row += n;
+  }
+}
+
+FitStatistics statistics_at(const FitContext& fit, const LeastSquaresResult& solution, const ExperimentStack& stack,
+                            const std::vector<UnknownParameter>& unknowns) {
+  const Eigen::VectorXd u_x = stack.scaling().rho_x(solution.x);
+  const Eigen::MatrixXd J = solution.point.z_x * u_x.cwiseInverse().asDiagonal();
+  FitData data;
+  data.J = J.topRows(stack.samples()), data.J_prior = J.middleRows(stack.samples(), stack.plain);
+  data.C = J.bottomRows(stack.equalities);
+  data.z = solution.point.z.head(stack.samples());
+  data.rho = stack.scaling().to_rho(solution.x);
+  data.names = names_of(unknowns, fit.spec);
+  for (const UnknownParameter& u : unknowns) data.units.push_back(u.description.unit);
+  data.loss = fit.spec.loss, data.sigma_is_known = fit.spec.sigma_is_known;
+  data.change = u_x.cwiseAbs();
+  data.covariance = covariance_for(fit, stack);
+  for (const UnknownParameter& u : unknowns) data.of_one_record.push_back(!u.shared);
+  for (Eigen::Index k = 0; k < solution.x.size(); ++k)
+    data.at_bound.push_back(solution.x(k) <= stack.x_lower(k) || solution.x(k) >= stack.x_upper(k));
+  data.records = stack.records_in_time(), data.motions = stack.motions_in_time();
+  data.record = stack.measured().cwiseQuotient(stack.sigma()).norm();
+  const IntegratorSettings& integrator = fit.scene.simulation.integrator;
+  if (!integrator.step) data.accuracy = std::min(kTolerances * integrator.rtol, kLeastAccuracy);
+  if (fit.options.preflight) data.loss = {}, data.sigma_is_known = true, data.covariance = CovarianceType::white;
+  FitStatistics statistics = fit_statistics(data);
+  const bool ended = fit.options.preflight || solution.status == SolverStatus::converged ||
+                     solution.status == SolverStatus::no_progress;
+  if (fit.abandoned || !ended)
+    withhold_errors(statistics, "they hold at a minimum, and the fit ended before it reached one");
+  return statistics;
+}
+
+std::vector<FittedParameter> described(const FitContext& fit, const std::vector<UnknownParameter>& unknowns,
+                                       const Eigen::VectorXd& values, const FitStatistics& statistics) {
+  std::vector<FittedParameter> fitted;
+  for (std::size_t i = 0; i < unknowns.size(); ++i) {
+    const UnknownParameter& u = unknowns[i];
+    const Parameter& p = u.description;
+    const Eigen::Index k = static_cast<Eigen::Index>(i);
+    FittedParameter f;
+    f.name = name_of(u, fit.spec), f.parameter = p.name, f.unit = p.unit;
+    if (!u.shared) f.experiment = fit.spec.experiments[u.experiment].name;
+    f.initial = p.value, f.value = values(k), f.lower = p.lower, f.upper = p.upper, f.prior = p.prior;
+    auto touches = [&](const std::optional<double>& bound) {
+      return bound && std::abs(f.value - *bound) <= kTouches * std::max(std::abs(*bound), std::abs(p.value));
+    };
+    f.at_lower = touches(p.lower), f.at_upper = touches(p.upper);
+    if (statistics.std_error.size() > k) {
+      f.std_error = statistics.std_error(k);
+      f.ci95[0] = statistics.ci95(k, 0), f.ci95[1] = statistics.ci95(k, 1);
+    }
+    fitted.push_back(std::move(f));
+  }
+  return fitted;
+}
+
+Eigen::MatrixXd z_in_parameters(const ExperimentStack& stack, const LeastSquaresPoint& point,
+                                const Eigen::VectorXd& rho) {
+  const Eigen::VectorXd u_x = stack.scaling().rho_x(stack.scaling().to_x(rho));
+  return point.z_x.topRows(stack.samples()) * u_x.cwiseInverse().asDiagonal();
+}
+
+void predict(FitContext& fit, const ExperimentStack& stack, const Eigen::MatrixXd& J, const Eigen::MatrixXd& covariance,
+             std::size_t first) {
+  const FitStatistics& s = fit.result.statistics;
+  if (!s.none.empty() || fit.options.preflight) return;
+  const Eigen::VectorXd variances = (J * covariance).cwiseProduct(J).rowwise().sum(), sigma = stack.sigma();
+  for (Eigen::Index i = 0; i < sigma.size(); ++i) {
+    ResidualRow& row = fit.result.residuals[first + static_cast<std::size_t>(i)];
+    row.prediction = s.quantile * sigma(i) * std::sqrt(s.variance + variances(i));
+    ChannelFit& channel = fit.result.experiments[row.experiment].channels[row.channel];
+    if (std::isnan(channel.within_prediction)) channel.within_prediction = 0;
+    if (std::abs(row.measured - row.model) <= row.prediction)
+      channel.within_prediction += 1 / static_cast<double>(channel.samples);
+  }
+}
+
+void find_influences(FitContext& fit, const ExperimentStack& stack, const LeastSquaresResult& solution,
+                     const std::vector<UnknownParameter>& unknowns) {
+  const FitStatistics& s = fit.result.statistics;
+  const bool determined = s.none.empty() && s.unidentifiable.empty();
+  if (stack.members().size() < 2 || stack.equalities > 0 || !determined || fit.options.preflight) return;
+  const Eigen::VectorXd errors = fit.result.statistics.std_error.cwiseQuotient(stack.scaling().rho_x(solution.x));
+  const std::vector<Eigen::VectorXd> changes = changes_without(stack, solution, unknowns);
+  for (std::size_t m = 0; m < changes.size(); ++m) {
+    std::optional<Influence>& most = fit.result.experiments[stack.members()[m].experiment].influence;
+    for (Eigen::Index k = 0; k < errors.size(); ++k) {
+      const UnknownParameter& unknown = unknowns[static_cast<std::size_t>(k)];
+      const double change = changes[m](k) / errors(k);
+      if (unknown.shared && std::isfinite(errors(k)) && (!most || std::abs(change) > std::abs(most->change)))
+        most = {unknown.description.name, change};
+    }
+  }
+}
+
+// Akaike's and Bayes' criteria (Burnham and Anderson, "Model Selection and Multimodel Inference" (2002), chapter 2):
+//   AIC = 2 k - 2 log L,  BIC = k log N - 2 log L,  -2 log L = sum [z^2/v + log(2 pi v sigma^2)]
+// v is 1 where sigma is known or estimated, else it is the mean square of z and one more parameter.
+void compare_by_likelihood(FitContext& fit, const ExperimentStack& stack, const Eigen::VectorXd& z,
+                           std::size_t sigmas) {
+  const double N = static_cast<double>(stack.samples()), squares = z.head(stack.samples()).squaredNorm();
+  const bool scaled = sigmas == 0 && !fit.spec.sigma_is_known;
+  const double v = scaled ? squares / N : 1;
+  if (fit.spec.loss.type != LossType::squared || !(v > 0)) return;
+  const double k = static_cast<double>(stack.freedom_of_variables()) + (scaled ? 1 : static_cast<double>(sigmas));
+  const double twice = squares / v + N * std::log(2 * std::numbers::pi * v) + 2 * stack.sigma().array().log().sum();
+  fit.result.aic = 2 * k + twice, fit.result.bic = k * std::log(N) + twice;
+}
+
+}  // namespace mbsopt

@@ -1,0 +1,42 @@
+// Assesses a solution: scores, statistics, intervals of prediction, influences of experiments, criteria of likelihood.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "optim/fit/experiment_stack.hpp"
+#include "optim/fit/fit_context.hpp"
+#include "optim/fit/statistics.hpp"
+#include "optim/fit/unknown_parameters.hpp"
+#include "optim/solver/levenberg_marquardt.hpp"
+
+namespace mbsopt {
+
+// Scores the experiments of the stack, and appends their rows of residuals to the result.
+void score_all(FitContext& fit, ExperimentStack& stack, const Eigen::VectorXd& z, bool estimated);
+
+// Statistics of the parameters by the samples and the priors at a solution. The experiments of the stack must be
+// scored.
+FitStatistics statistics_at(const FitContext& fit, const LeastSquaresResult& solution, const ExperimentStack& stack,
+                            const std::vector<UnknownParameter>& unknowns);
+
+std::vector<FittedParameter> described(const FitContext& fit, const std::vector<UnknownParameter>& unknowns,
+                                       const Eigen::VectorXd& values, const FitStatistics& statistics);
+
+// dz/drho of the samples.
+Eigen::MatrixXd z_in_parameters(const ExperimentStack& stack, const LeastSquaresPoint& point,
+                                const Eigen::VectorXd& rho);
+
+// Sets the half-widths of the 95 % intervals for one more measurement: Seber and Wild, "Nonlinear Regression" (1989),
+// section 5.1.1. The rows of residuals of these samples begin at `first`:
+//   t sigma sqrt(v + j covariance j'),   j = dz/drho
+void predict(FitContext& fit, const ExperimentStack& stack, const Eigen::MatrixXd& J, const Eigen::MatrixXd& covariance,
+             std::size_t first);
+
+void find_influences(FitContext& fit, const ExperimentStack& stack, const LeastSquaresResult& solution,
+                     const std::vector<UnknownParameter>& unknowns);
+
+// sigmas: how many were estimated.
+void compare_by_likelihood(FitContext& fit, const ExperimentStack& stack, const Eigen::VectorXd& z, std::size_t sigmas);
+
+}  // namespace mbsopt

@@ -1,0 +1,35 @@
+// The parts of an identification share the problem, its data, and the result as far as it is known.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "optim/fit/experiment_stack.hpp"
+#include "optim/fit/fit_result.hpp"
+#include "optim/fit/identification_options.hpp"
+#include "optim/fit/unknown_parameters.hpp"
+#include "optim/problem/csv_table.hpp"
+#include "optim/problem/problem.hpp"
+#include "optim/solver/levenberg_marquardt.hpp"
+
+namespace mbsopt {
+
+struct FitContext {
+  const Scene& scene;
+  const IdentificationSpec& spec;
+  const std::vector<CsvTable>& data;  // one table per experiment
+  const IdentificationOptions& options;
+  std::function<bool(double t)> go_on = {};  // within a simulation, in any thread
+  IdentificationResult result = {};
+  bool abandoned = false, sigmas_are_estimated = false;
+  Eigen::VectorXd shared = {};  // all parameters, the shared ones as fitted
+};
+
+LeastSquaresOptions solver_options(const FitContext& fit);
+
+ExperimentStack::Member member(const FitContext& fit, std::size_t experiment, const Eigen::VectorXd& rho,
+                               const std::vector<UnknownParameter>& unknowns);
+
+}  // namespace mbsopt

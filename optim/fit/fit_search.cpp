@@ -1,0 +1,111 @@
+#include "optim/fit/fit_search.hpp"
+
+#include <fmt/format.h>
+
+#include "optim/solver/equality_multipliers.hpp"
+
+namespace mbsopt {
+namespace {
+
+// Tukey's loss has no pull far out, so that a start there would find nothing: Huber's estimate comes first.
+template <class Estimate>
+LeastSquaresResult estimates_of(const Loss& loss, const Eigen::VectorXd& start, Estimate&& estimate) {
+  if (loss.type != LossType::tukey) return estimate(loss, start);
+  LeastSquaresResult first = estimate(Loss{LossType::huber}, start);
+  if (first.status == SolverStatus::failed || first.status == SolverStatus::stopped) return first;
+  return estimate(loss, first.x);
+}
+
+}  // namespace
+
+LeastSquaresResult FitSearch::minimised(const Eigen::VectorXd& x) {
+  LeastSquaresOptions solver = solver_options(fit_);
+  const Eigen::VectorXd sigma = stack_.sigma();
+  const int before = fit_.result.iterations;
+  solver.progress = [&](const LeastSquaresProgress& p) {
+    if (p.iteration == 0 && !fit_.result.history.empty()) return true;  // where the iterations so far ended
+    if (apart_.empty() || cost_changes()) {
+      apart_.push_back(p.z);
+      apart_.back().head(stack_.samples()).array() *= sigma.array();
+    }
+    fit_.result.history.push_back({before + p.iteration, p.cost, p.gradient_norm, p.step_norm,
+                                   stack_.scaling().to_rho(p.x), fit_.result.simulations + stack_.simulations()});
+    return !fit_.options.progress || fit_.options.progress(fit_.result.history.back());
+  };
+  LeastSquaresResult solution = solve_with_equalities(stack_, x, solver);
+  fit_.result.iterations += solution.iterations;
+  fit_.result.evaluations += solution.evaluations, fit_.result.failed_evaluations += solution.failed_evaluations;
+  return solution;
+}
+
+// The estimate under a loss, with the sigmas that it estimates.
+LeastSquaresResult FitSearch::estimate(const Loss& loss, const Eigen::VectorXd& x) {
+  stack_.loss = loss;
+  if (!estimates_sigma(fit_.spec)) return minimised(x);
+  SigmaEstimation sigmas(stack_, fit_.spec);
+  return loss.type == LossType::squared ? without_sigmas(sigmas, x) : in_turn_with_sigmas(sigmas, x);
+}
+
+LeastSquaresResult FitSearch::without_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x) {
+  stack_.groups = sigmas.scale_groups();
+  LeastSquaresResult solution = minimised(x);
+  stack_.groups.clear();
+  fit_.sigmas_are_estimated =
+      solution.status == SolverStatus::converged || solution.status == SolverStatus::no_progress;
+  if (fit_.sigmas_are_estimated) take(sigmas, solution);
+  if (solution.point.z.size() > 0) solution.cost_final = stack_.cost(solution.point.z);
+  return solution;
+}
+
+// The sigmas by the residuals of the solution, which are by these sigmas then. Returns the largest change.
+double FitSearch::take(SigmaEstimation& sigmas, LeastSquaresResult& solution) const {
+  const Eigen::VectorXd before = stack_.sigma();
+  const double change = sigmas.take(solution.point.z);
+  const Eigen::ArrayXd factor = before.cwiseQuotient(stack_.sigma()).array();
+  solution.point.z.head(stack_.samples()).array() *= factor;
+  solution.point.z_x.topRows(stack_.samples()).array().colwise() *= factor;
+  solution.cost_final = stack_.cost(solution.point.z);
+  return change;
+}
+
+LeastSquaresResult FitSearch::in_turn_with_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x) {
+  LeastSquaresResult solution = minimised(x);
+  for (int round = 0; solution.status == SolverStatus::converged; ++round) {
+    const double change = take(sigmas, solution);
+    fit_.sigmas_are_estimated = change < kSigmaChange || round == kSigmaRounds;
+    if (round == kSigmaRounds && change >= kSigmaChange)
+      solution.message += fmt::format("; estimated sigmas still change by {:.1g} of themselves", change);
+    if (fit_.sigmas_are_estimated) break;
+    solution = minimised(solution.x);
+  }
+  return solution;
+}
+
+// Sigmas, the loss or the multipliers of equations change on the way.
+bool FitSearch::cost_changes() const {
+  return estimates_sigma(fit_.spec) || fit_.spec.loss.type == LossType::tukey || stack_.equalities > 0;
+}
+
+Eigen::VectorXd FitSearch::by_sigmas(Eigen::VectorXd apart) const {
+  apart.head(stack_.samples()).array() /= stack_.sigma().array();
+  return apart;
+}
+
+void FitSearch::measure_costs_by_the_end(double cost_final) {
+  fit_.result.cost_final = cost_final;
+  for (std::size_t k = 0; k < apart_.size(); ++k) fit_.result.history[k].cost = stack_.cost(by_sigmas(apart_[k]));
+  if (!apart_.empty()) fit_.result.cost_initial = fit_.result.history.front().cost;
+}
+
+LeastSquaresResult FitSearch::solved(const Eigen::VectorXd& start) {
+  return estimates_of(fit_.spec.loss, start, [this](const auto& loss, const auto& x) { return estimate(loss, x); });
+}
+
+LeastSquaresResult refit(const FitContext& fit, ExperimentStack& stack, const Eigen::VectorXd& start) {
+  return estimates_of(fit.spec.loss, start, [&](const Loss& loss, const Eigen::VectorXd& x) {
+    stack.loss = loss;
+    return solve_with_equalities(stack, x, solver_options(fit));
+  });
+}
+
+}  // namespace mbsopt

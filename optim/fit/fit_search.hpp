@@ -1,0 +1,47 @@
+// The search of a fit: least squares by rounds of sigmas and losses, and the history of its costs.
+//
+//   FitSearch search(fit, stack);
+//   const LeastSquaresResult solution = search.solved(start);
+//   search.measure_costs_by_the_end(solution.cost_final);
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "optim/fit/experiment_stack.hpp"
+#include "optim/fit/fit_context.hpp"
+#include "optim/fit/sigma_estimation.hpp"
+#include "optim/solver/levenberg_marquardt.hpp"
+
+namespace mbsopt {
+
+class FitSearch {
+ public:
+  FitSearch(FitContext& fit, ExperimentStack& stack) : fit_(fit), stack_(stack) {}
+
+  LeastSquaresResult solved(const Eigen::VectorXd& start);
+  // Fills the costs of result.history, cost_initial and cost_final by the sigmas, the loss and the multipliers of the
+  // end.
+  void measure_costs_by_the_end(double cost_final);
+  Eigen::VectorXd residuals_at_start() const { return by_sigmas(apart_.front()); }
+
+ private:
+  LeastSquaresResult estimate(const Loss& loss, const Eigen::VectorXd& x);
+  LeastSquaresResult without_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x);
+  LeastSquaresResult in_turn_with_sigmas(SigmaEstimation& sigmas, const Eigen::VectorXd& x);
+  LeastSquaresResult minimised(const Eigen::VectorXd& x);
+  double take(SigmaEstimation& sigmas, LeastSquaresResult& solution) const;
+  bool cost_changes() const;
+  Eigen::VectorXd by_sigmas(Eigen::VectorXd apart) const;
+
+  FitContext& fit_;
+  ExperimentStack& stack_;
+  // measured - model, then the residuals of the priors, for each row of the history. One row suffices if the cost does
+  // not change on the way.
+  std::vector<Eigen::VectorXd> apart_;
+};
+
+// The refit of what validates, whose iterations are not those of the result; sigmas stay as they are.
+LeastSquaresResult refit(const FitContext& fit, ExperimentStack& stack, const Eigen::VectorXd& start);
+
+}  // namespace mbsopt

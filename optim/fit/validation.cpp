@@ -1,0 +1,131 @@
+#include "optim/fit/validation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/linear/dense.hpp"
+#include "optim/fit/distributions.hpp"
+#include "optim/fit/fit_assessment.hpp"
+#include "optim/fit/fit_search.hpp"
+#include "optim/problem/parameter_values.hpp"
+
+namespace mbsopt {
+namespace {
+
+constexpr double kWorse = 0.99;  // probability that a right model worsens what validates by less
+
+std::vector<ExperimentStack::Member> alone(const FitContext& fit, std::size_t e, const Eigen::VectorXd& shared,
+                                           const std::vector<UnknownParameter>& unknowns) {
+  std::vector<ExperimentStack::Member> members;
+  members.push_back(member(fit, e, shared, unknowns));
+  return members;
+}
+
+LeastSquaresPoint simulated(ExperimentStack& stack, const Eigen::VectorXd& x) {
+  LeastSquaresPoint point;
+  point.z.setZero(stack.size), point.z_x.setZero(stack.size, stack.variables());
+  stack.evaluate(x, point);
+  return point;
+}
+
+// Has no residuals if nothing could be simulated.
+LeastSquaresResult refitted(const FitContext& fit, ExperimentStack& stack,
+                            const std::vector<UnknownParameter>& unknowns) {
+  LeastSquaresResult found;
+  if (unknowns.empty()) {
+    found.point = simulated(stack, found.x);
+    found.message = found.point.ok ? "simulated" : "could not be simulated: " + found.point.message;
+    if (!found.point.ok) found.point.z.resize(0);
+  } else {
+    found = refit(fit, stack, stack.scaling().to_x(start_of(unknowns)));
+    found.message = "refitted, " + found.message;
+  }
+  return found;
+}
+
+// The refit of its own parameters f compensates errors of the shared parameters s as far as it can:
+//   j = j_s - J_f (J_f^+ J_s),   variance = j cov(s) j' + j_f cov(f) j_f'
+void predict_validation(FitContext& fit, std::size_t e, const ExperimentStack& stack, const LeastSquaresResult& found,
+                        const FitStatistics& own, std::size_t first) {
+  const std::vector<UnknownParameter> fitted = unknowns_of_fit(fit.scene, fit.spec);
+  std::vector<UnknownParameter> all = free_in(fit.scene, fit.spec, e);
+  const Eigen::Index F = static_cast<Eigen::Index>(all.size()), N = stack.samples();
+  std::vector<Eigen::Index> shared;
+  for (std::size_t i = 0; i < fitted.size(); ++i)
+    if (fitted[i].shared) all.push_back(fitted[i]), shared.push_back(static_cast<Eigen::Index>(i));
+  const VariableScaling scaling = scaling_of(all);
+  ExperimentStack whole(alone(fit, e, fit.shared, all), all, scaling, fit.spec.loss);
+  whole.go_on = fit.go_on;
+  Eigen::VectorXd rho(static_cast<Eigen::Index>(all.size()));
+  if (F > 0) rho.head(F) = stack.scaling().to_rho(found.x);
+  for (std::size_t i = 0; i < shared.size(); ++i)
+    rho(F + static_cast<Eigen::Index>(i)) = fit.shared(all[static_cast<std::size_t>(F) + i].parameter);
+  const LeastSquaresPoint point = simulated(whole, scaling.to_x(rho));
+  fit.result.simulations += whole.simulations();
+  if (!point.ok || !fit.result.statistics.none.empty() || !own.none.empty()) return;
+  Eigen::MatrixXd J = z_in_parameters(whole, point, rho);
+  if (F > 0) {
+    const Eigen::MatrixXd J_f = J.leftCols(F), J_s = J.rightCols(J.cols() - F);
+    J.rightCols(J.cols() - F) -= J_f * OrthogonalDecomposition(J_f).solve(J_s);
+  }
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(J.cols(), J.cols());
+  if (F > 0) covariance.topLeftCorner(F, F) = own.covariance;
+  covariance.bottomRightCorner(J.cols() - F, J.cols() - F) = fit.result.statistics.covariance(shared, shared);
+  predict(fit, stack, J.topRows(N), covariance, first);
+}
+
+// Warns if the fit has learnt something wrong. A right model that starts at the true values raises the squares of what
+// validates by about chi^2 of its P parameters, for as many samples as are fitted. Correlated residuals raise them
+// more.
+void compare_with_start(FitContext& fit, std::size_t e, const std::vector<UnknownParameter>& unknowns,
+                        const VariableScaling& scaling, double squares) {
+  const FitStatistics& s = fit.result.statistics;
+  ExperimentStack before(alone(fit, e, parameter_values(fit.scene), unknowns), unknowns, scaling, fit.spec.loss);
+  before.go_on = fit.go_on;
+  const LeastSquaresResult start = refitted(fit, before, unknowns);
+  fit.result.simulations += before.simulations();
+  if (start.point.z.size() == 0 || fit.abandoned) return;
+  const double n = static_cast<double>(before.samples());
+  const double squares_at_start = start.point.z.head(before.samples()).squaredNorm();
+  fit.result.experiments[e].rms_scaled_at_start = std::sqrt(squares_at_start / n);
+  const long P = std::ranges::count_if(fit.result.parameters, [](const auto& p) { return p.experiment.empty(); });
+  if (!s.none.empty() || P == 0 || !(fit.result.cost_final < fit.result.cost_initial)) return;
+  const double chi2 = chi_squared_quantile(static_cast<double>(P), kWorse);
+  const double expected = chi2 * s.likelihood_scale * std::max(1.0, s.inflation.maxCoeff()) *
+                          std::max(1.0, n / static_cast<double>(fit.result.samples));
+  if (squares - squares_at_start > expected)
+    fit.result.warnings.push_back(fmt::format(
+        "experiment '{}': the fit has lowered its own residuals, but raised those that validate from {:.3g} to "
+        "{:.3g} sigma: the values that it found do not hold for other motions. The model leaves something out, or "
+        "has parameters that these data do not determine",
+        fit.spec.experiments[e].name, std::sqrt(squares_at_start / n), std::sqrt(squares / n)));
+}
+
+}  // namespace
+
+void validate(FitContext& fit, std::size_t e) {
+  const std::vector<UnknownParameter> unknowns = free_in(fit.scene, fit.spec, e);
+  const VariableScaling scaling = scaling_of(unknowns);
+  ExperimentStack stack(alone(fit, e, fit.shared, unknowns), unknowns, scaling, fit.spec.loss);
+  stack.go_on = fit.go_on;
+  const LeastSquaresResult found = refitted(fit, stack, unknowns);
+  ExperimentFit& scored = fit.result.experiments[e];
+  scored.message = found.message;
+  if (found.point.z.size() > 0) {
+    const std::size_t first = fit.result.residuals.size();
+    score_all(fit, stack, found.point.z, false);
+    FitStatistics own;
+    if (!unknowns.empty()) own = statistics_at(fit, found, stack, unknowns);
+    scored.refitted = described(fit, unknowns, scaling.to_rho(found.x), own);
+    predict_validation(fit, e, stack, found, own, first);
+    compare_with_start(fit, e, unknowns, scaling, found.point.z.head(stack.samples()).squaredNorm());
+  } else if (!unknowns.empty()) {
+    scored.refitted = described(fit, unknowns, scaling.to_rho(found.x), FitStatistics());
+  }
+  fit.result.simulations += stack.simulations();
+}
+
+}  // namespace mbsopt
