@@ -32,7 +32,7 @@ AdjointSweep::AdjointSweep(const Mechanism& mechanism, const SimulationSettings&
   }
   if (rk_.gamma) {
     rosenbrock_.emplace(mechanism, rk_, dynamics_);
-    for (Bars& b : bars_) b.start.setZero(states);
+    for (Bars& b : bars_) b.start.setZero(states), b.common.setZero(states);
     x_bar_.setZero(states, static_cast<Eigen::Index>(costs.size()));
   }
   for (Eigen::VectorXd* x : {&y_, &ydot_, &w_, &y_bar_, &g_y_}) x->setZero(states);
@@ -126,14 +126,15 @@ void AdjointSweep::nodes_back() {
 }
 
 // The transpose of TangentSweep::follow_rosenbrock, where kbar_i is known:
-//   rbar = inverse of (I - h g f_y)' times kbar_i,   sbar = rbar - kbar_i,   kbar_j += gamma_ij/g sbar, j < i
-//   Ybar_i = f_y(Y_i)'rbar,   kbar_j += h A_ij Ybar_i,   y0bar += Ybar_i + sum_k weight_k f_y(e_k)'rbar
+//   rbar_i = inverse of (I - h g f_y)' times kbar_i,   sbar = rbar_i - kbar_i,   kbar_j += gamma_ij/g sbar, j < i
+//   Ybar_i = f_y(Y_i)'rbar_i,   kbar_j += h A_ij Ybar_i,   y0bar += Ybar_i + D(0, w_i)'rbar_i
+// and y0bar += D(h, h k_0)' sum_i gamma_i rbar_i
 bool AdjointSweep::rosenbrock_back() {
   RosenbrockStages& rosenbrock = *rosenbrock_;
   const Eigen::Index n = mechanism_.states() / 2;
   const double g = rk_.gamma_of(0, 0);
   if (!rosenbrock.factor(step_)) return false;
-  for (Bars& b : bars_) b.start.setZero();
+  for (Bars& b : bars_) b.common.setZero();
   for (int i = rk_.stages - 1; i >= 0; --i) {
     for (std::size_t o = 0; o < bars_.size(); ++o) x_bar_.col(static_cast<Eigen::Index>(o)) = bars_[o].K.col(i);
     for (Eigen::Index first = 0; first < x_bar_.cols(); first += kLanes) {
@@ -144,9 +145,9 @@ bool AdjointSweep::rosenbrock_back() {
       Bars& b = bars_[o];
       const auto r_bar = x_bar_.col(static_cast<Eigen::Index>(o));
       for (int j = 0; j < i; ++j) b.K.col(j) += (rk_.gamma_of(i, j) / g) * (r_bar - b.K.col(i));
-      b.start.tail(n) += rosenbrock.weight(i, 0) * r_bar.tail(n);
+      b.common.tail(n) += rk_.gamma_sum[i] * r_bar.tail(n);
       if (i == 0) {
-        b.start += r_bar;
+        b.start = r_bar;
         continue;
       }
       w_ = r_bar;
@@ -157,17 +158,24 @@ bool AdjointSweep::rosenbrock_back() {
         if (rk_.a(i, j) != 0) b.K.col(j) += (step_.h * rk_.a(i, j)) * y_bar_;
       }
     }
-    for (int k = 1; k < RosenbrockStages::kPoints; ++k) {
-      if (!rosenbrock.linearise_point(step_, i, k)) return false;
+    for (const int sign : {-1, 1}) {
+      if (i == 0) break;  // w_0 = 0
+      if (!rosenbrock.linearise_own(step_, i, sign)) return false;
       for (std::size_t o = 0; o < bars_.size(); ++o) {
         w_.setZero();
-        w_.tail(n) = rosenbrock.weight(i, k) * x_bar_.col(static_cast<Eigen::Index>(o)).tail(n);
+        w_.tail(n) = rosenbrock.own_weight(sign) * x_bar_.col(static_cast<Eigen::Index>(o)).tail(n);
         dynamics_.add_adjoint(w_, bars_[o].lambda, bars_[o].theta, bars_[o].rho);
       }
     }
   }
-  if (!rosenbrock.linearise_stage(step_, 0)) return false;
-  for (Bars& b : bars_) dynamics_.add_adjoint(b.start, b.lambda, b.theta, b.rho);
+  for (int k = 0; k < RosenbrockStages::kPoints; ++k) {
+    if (!rosenbrock.linearise_common(step_, k)) return false;
+    for (Bars& b : bars_) {
+      w_ = rosenbrock.common_weight(k) * b.common;
+      if (k == 0) w_ += b.start;
+      dynamics_.add_adjoint(w_, b.lambda, b.theta, b.rho);
+    }
+  }
   return true;
 }
 

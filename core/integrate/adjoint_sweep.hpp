@@ -48,7 +48,7 @@ class AdjointSweep {
     Eigen::VectorXd lambda, lambda_hat;  // at y1, from there on at y0; at y^
     Eigen::VectorXd theta, rho;          // of all that was swept
     Eigen::VectorXd samples;             // what samples in the step see of y0
-    Eigen::VectorXd start;               // of f(t0, y0), by a Rosenbrock method
+    Eigen::VectorXd start, common;       // of f(t0, y0); of D(h, h k_0) there: by a Rosenbrock method
     Eigen::MatrixXd K;                   // of the stages' derivatives, without what explicit stages after them see
     Eigen::MatrixXd Y;                   // of the stages; those of implicit groups are used up within their group
   };

@@ -40,7 +40,7 @@ TangentSweep::TangentSweep(const Mechanism& mechanism, const SimulationSettings&
     b.a.assign(static_cast<std::size_t>(rk_.dense_stages), LaneRows::Zero(states / 2, kLanes));
     b.Y_stage.assign(static_cast<std::size_t>(coupled), LaneRows::Zero(states, kLanes));
     b.x.setZero(rk_.gamma ? states : coupled * StageEquations::count(d), kLanes);
-    if (rk_.gamma) b.a_start.setZero(states / 2, kLanes);
+    if (rk_.gamma) b.common.setZero(states / 2, kLanes);
     for (int k = 0; k < kLanes; ++k) {
       if (b.parameters.parameter[k] >= 0) b.y0.col(k) = y_initial_rho.col(b.parameters.parameter[k]);
     }
@@ -183,26 +183,35 @@ bool TangentSweep::follow_rosenbrock(const Step& step) {
   RosenbrockStages& rosenbrock = *rosenbrock_;
   const Eigen::Index n = mechanism_.states() / 2;
   const double h = step.h;
-  if (!rosenbrock.factor(step) || !rosenbrock.linearise_stage(step, 0)) return false;
-  for (Block& b : blocks_) dynamics_.acceleration_tangent(b.parameters, b.y0, b.a_start);
+  if (!rosenbrock.factor(step)) return false;
+  for (int k = RosenbrockStages::kPoints - 1; k >= 0; --k) {
+    if (!rosenbrock.linearise_common(step, k)) return false;
+    for (Block& b : blocks_) {
+      dynamics_.acceleration_tangent(b.parameters, b.y0, a_);
+      if (k == RosenbrockStages::kPoints - 1) b.common.setZero();
+      b.common += rosenbrock.common_weight(k) * a_;
+      if (k == 0) b.x.bottomRows(n) = a_;
+    }
+  }
   for (int i = 0; i < rk_.stages; ++i) {
     const std::size_t stage = static_cast<std::size_t>(i);
     if (i > 0 && !rosenbrock.linearise_stage(step, i)) return false;
     for (Block& b : blocks_) {
       if (i == 0) {
-        b.Y = b.y0, a_ = b.a_start;
+        b.Y = b.y0, a_ = b.x.bottomRows(n);
       } else {
         add_stages(b, h, of_stage_[stage].c, of_stage_[stage], 0, i - 1, b.y0, b.Y);
         dynamics_.acceleration_tangent(b.parameters, b.Y, a_);
       }
       b.x.topRows(n) = h * b.Y.bottomRows(n);
-      b.x.bottomRows(n) = h * (a_ + rosenbrock.weight(i, 0) * b.a_start);
+      b.x.bottomRows(n) = h * (a_ + rk_.gamma_sum[i] * b.common);
     }
-    for (int k = 1; k < RosenbrockStages::kPoints; ++k) {
-      if (!rosenbrock.linearise_point(step, i, k)) return false;
+    for (const int sign : {-1, 1}) {
+      if (i == 0) break;  // w_0 = 0
+      if (!rosenbrock.linearise_own(step, i, sign)) return false;
       for (Block& b : blocks_) {
         dynamics_.acceleration_tangent(b.parameters, b.y0, a_);
-        b.x.bottomRows(n) += h * rosenbrock.weight(i, k) * a_;
+        b.x.bottomRows(n) += h * rosenbrock.own_weight(sign) * a_;
       }
     }
     for (Block& b : blocks_) {

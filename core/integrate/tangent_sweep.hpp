@@ -54,7 +54,7 @@ class TangentSweep {
     std::vector<LaneRows> a;        // of each stage
     std::vector<LaneRows> Y_stage;  // of coupled stages
     Eigen::MatrixXd x;              // their accelerations and multipliers; of a Rosenbrock stage h x_i
-    LaneRows a_start;               // of f(t0, y0), by a Rosenbrock method
+    LaneRows common;                // D(h, h k_0), by a Rosenbrock method
   };
   // Weights of stages in a sum: of v0, of the accelerations in q, and in v.
   struct Weights {

@@ -11,13 +11,15 @@
 #include <vector>
 
 #include "core/linear/elimination.hpp"
+#include "core/linear/lu_kernels.hpp"
 
 namespace mbsopt {
 
 class BlockLu {
  public:
   // rows is the number of rows of a block: 7, 14, 21 or 28.
-  BlockLu(int rows, int bodies, std::span<const std::pair<int, int>> edges);
+  BlockLu(int rows, int bodies, std::span<const std::pair<int, int>> edges,
+          const LuKernelTable& kernels = lu_kernels());
   static bool takes(int rows) { return rows == 7 || rows == 14 || rows == 21 || rows == 28; }
 
   // The place of a block: of one body, or of two bodies that an edge joins.
@@ -51,21 +53,23 @@ class BlockLu {
   Eigen::Index stride() const { return stride_; }
 
  private:
-  template <int N>
-  bool factor_blocks();
-  template <int N>
-  void solve_blocks(double* x) const;
-  template <int N>
-  void solve_blocks_transposed(double* x) const;
+  void solve_column(double* x) const;
+  void solve_column_transposed(double* x) const;
 
   double* block(std::size_t k) { return values_.data() + k * size_; }
   const double* block(std::size_t k) const { return values_.data() + k * size_; }
+  // Of the diagonal block at an elimination position.
+  double* inverse_of(std::size_t k) { return inverse_.data() + k * static_cast<std::size_t>(rows_); }
+  const double* inverse_of(std::size_t k) const { return inverse_.data() + k * static_cast<std::size_t>(rows_); }
+  int* exchanged_of(std::size_t k) { return exchanged_.data() + k * static_cast<std::size_t>(rows_); }
+  const int* exchanged_of(std::size_t k) const { return exchanged_.data() + k * static_cast<std::size_t>(rows_); }
   // Below the diagonal: A_ik, then L_ik. Above it, transposed: A_ki', then U_ki'.
   std::size_t lower(std::size_t entry) const { return elimination_.order.size() + 2 * entry; }
   std::size_t upper(std::size_t entry) const { return lower(entry) + 1; }
 
   Eigen::Index rows_, stride_;
   std::size_t size_;  // numbers per block
+  const LuKernels* kernels_;
   Elimination elimination_;
   std::vector<double> values_;   // blocks, columns of stride_ numbers each
   std::vector<double> inverse_;  // of the pivots

@@ -72,12 +72,24 @@ bool RosenbrockStages::linearise_stage(const Step& step, int i) {
   return linearise_at(step.t + rk_.c[i] * step.h, y_, step.angles0);
 }
 
-bool RosenbrockStages::linearise_point(const Step& step, int i, int k) {
-  const double e = k * spacing(i);
+bool RosenbrockStages::linearise_common(const Step& step, int k) {
+  const double e = k * kSpacing * step.h;
+  y_ = step.y0 + e * step.K.col(0);
+  return linearise_at(step.t + e, y_, step.angles0);
+}
+
+bool RosenbrockStages::linearise_own(const Step& step, int i, int sign) {
+  const double e = sign * kSpacing * step.h;
   StageSum sum;
-  for (int j = 0; j <= i; ++j) sum.add(e * step.h * rk_.gamma_of(i, j), step.K.col(j).data());
+  double of_first = 0;
+  for (int j = 1; j <= i; ++j) {
+    const double weight = e * rk_.gamma_of(i, j);
+    sum.add(weight, step.K.col(j).data());
+    of_first -= weight;
+  }
+  sum.add(of_first, step.K.col(0).data());
   sum.to(step.y0.data(), y_.data(), y_.size());
-  return linearise_at(step.t + e * step.h * rk_.gamma_sum[i], y_, step.angles0);
+  return linearise_at(step.t, y_, step.angles0);
 }
 
 }  // namespace mbsopt

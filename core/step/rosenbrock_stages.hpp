@@ -8,9 +8,13 @@
 //   (I - h g f_y) x_i' = f_y(Y_i) Y_i' + f_rho + s_i' + d/de [ f_y(e) y0' + f_rho(e) ],     e = 0
 //   f_y(e), f_rho(e): at t0 + e h gamma_i, y0 + e u_i
 //
-// Second derivatives appear only along that direction, where they are taken by a formula of order 4 from exact first
-// ones at e = 0, d, .., 4 d. Both sweeps use the same formula, so that they are transposes of each other. Points stay
-// on the step's side of t0, where a law may have a kink. f_t is taken by the same formula.
+// This derivative D(h gamma_i, u_i) is linear in the direction, and all stages have most of theirs in common:
+//
+//   D(h gamma_i, u_i) = gamma_i D(h, h k_0) + D(0, w_i),   w_i = h sum_{0<j<=i} gamma_ij (k_j - k_0)
+//
+// w_i is O(h^2), and w_0 = 0. D(h, h k_0) comes from exact first derivatives at e = 0, d, .., 4 d by a formula of order
+// 4: points stay on the step's side of t0, where a law may have a kink. D(0, w_i) comes from those at e = -d, d. Both
+// sweeps use the same formulas, so that they are transposes of each other. f_t is taken by the formula of order 4.
 #pragma once
 
 #include <array>
@@ -36,12 +40,14 @@ class RosenbrockStages {
   bool factor(const Step& step);
   void solve(Eigen::Ref<Eigen::MatrixXd> x) { matrix_.solve(x, StageMatrix::kExact); }
   void solve_transposed(Eigen::Ref<Eigen::MatrixXd> x) { matrix_.solve_transposed(x, StageMatrix::kExact); }
-  // Linearises the dynamics at Y_i; and at the point e = k d of stage i, k = 0..4.
+  // Linearises the dynamics at Y_i; and at the points of D: e = k d along (h, h k_0), k = 0..4; e = sign d along w_i.
   static constexpr int kPoints = 5;
   bool linearise_stage(const Step& step, int i);
-  bool linearise_point(const Step& step, int i, int k);
-  // d/de of a function of e is the sum of weight(i, k) times its values at the points.
-  double weight(int i, int k) const { return kWeights[static_cast<std::size_t>(k)] / spacing(i); }
+  bool linearise_common(const Step& step, int k);
+  bool linearise_own(const Step& step, int i, int sign);
+  // D is the sum of these times the values at its points.
+  static constexpr double common_weight(int k) { return kWeights[static_cast<std::size_t>(k)] / kSpacing; }
+  static constexpr double own_weight(int sign) { return sign * 0.5 / kSpacing; }
 
   long evaluations() const { return evaluations_; }
   long jacobians() const { return jacobians_; }
@@ -50,12 +56,12 @@ class RosenbrockStages {
   long factorisations() const { return matrix_.factorisations(); }
 
  private:
-  // d = 1/64, a power of two. With u_i about h g f, points are 1/256 of a step apart. The formula leaves out
-  // (1/256)^4/5 = 5e-11 times (h/T)^5, T the time in which the motion changes: 5e-14 for steps whose error is 1e-6.
-  // Rounding leaves 10 * 64 * 1e-16.
-  static constexpr double kSpacing = 1.0 / 64;
+  // d, a power of two: of a step, since k_0 is f. The formula of order 4 leaves out (1/256)^4/5 = 5e-11 times (h/T)^5,
+  // T the time in which the motion changes: 5e-14 for steps whose error is 1e-6. Rounding leaves 10 * 64 * 1e-16, as
+  // gamma_i is a quarter at most. The central formula leaves out d^2/6 |w_i|^3 / T^3 and w_i is about 0.1 h^2/T: 3e-15
+  // for such steps, whose h/T is a tenth.
+  static constexpr double kSpacing = 1.0 / 256;
   static constexpr std::array<double, kPoints> kWeights{-25.0 / 12, 4, -3, 4.0 / 3, -1.0 / 4};
-  double spacing(int i) const { return rk_.gamma_sum[i] < 0 ? -kSpacing : kSpacing; }
   bool linearise_at(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& angles);
 
   const Method& rk_;

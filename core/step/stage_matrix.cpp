@@ -10,9 +10,10 @@ namespace {
 // are about equal.
 constexpr double kRelativeEpsilon = 1e-8;
 
-constexpr double kNegligible = 2e-15;  // relative, of what is left: several units of rounding
-constexpr double kWrong = 1e-4;        // relative residual of forces from which a factor is not used
-constexpr int kSparseRun = 20;         // factorisations by the sparse LU after one that was not
+// Relative, of what is left. Multipliers have ten times the rounding of accelerations, W's.
+constexpr double kNegligible = 2e-14;
+constexpr double kWrong = 1e-4;  // relative residual of forces from which a factor is not used
+constexpr int kSparseRun = 20;   // factorisations by the sparse LU after one that was not
 
 using Entries = std::vector<SparseLu::Entry>;
 
@@ -45,7 +46,8 @@ StageMatrix::StageMatrix(const MechanismData& data, const MotionJacobian& jacobi
       stages_(stages),
       accelerations_(7 * data.n),
       per_stage_(7 * data.n + data.m),
-      epsilon_(kRelativeEpsilon * data.row_alpha.cwiseInverse()) {
+      mobility_(data.row_alpha.cwiseInverse()),
+      epsilon_(kRelativeEpsilon * mobility_) {
   set_scales(data);
   const auto& rows = jacobian.rows();
   for (std::size_t k = 0; k < rows.size();) {
@@ -254,8 +256,8 @@ bool StageMatrix::is_right() {
   return wrong <= kWrong * largest;
 }
 
-// x += N_epsilon^-1 (b - N x)  until the next step, foreseen from the last two, would be below rounding in each column,
-// of accelerations and multipliers.
+// x += N_epsilon^-1 (b - N x)  until the next step, foreseen from the last two, would be negligible in each column.
+// Accelerations and multipliers contract alike; where one of them seems slower, it is at rounding.
 template <bool Transposed>
 void StageMatrix::refine(Eigen::Ref<Eigen::MatrixXd> b, int refinements) {
   if (refinements == 0) {
@@ -273,7 +275,8 @@ void StageMatrix::refine(Eigen::Ref<Eigen::MatrixXd> b, int refinements) {
     solve_factored<Transposed>(step);
     b += step;
     const Sizes now = sizes(step);
-    if ((now * now <= kNegligible * size * before).all()) {
+    const Sizes rates = (before > 0).select(now / before, 1.0);
+    if ((rates.colwise().minCoeff() * now.colwise().maxCoeff() <= kNegligible * size.colwise().maxCoeff()).all()) {
       tried_ = true;
       return;
     }
@@ -293,7 +296,8 @@ StageMatrix::Sizes StageMatrix::sizes(const Eigen::Ref<const Eigen::MatrixXd>& x
     const auto of_stage = x.middleRows(i * per_stage_, per_stage_);
     for (Eigen::Index c = 0; c < x.cols(); ++c) {
       most(0, c) = std::max(most(0, c), of_stage.col(c).head(accelerations_).cwiseAbs().maxCoeff());
-      if (m > 0) most(1, c) = std::max(most(1, c), of_stage.col(c).tail(m).cwiseAbs().maxCoeff());
+      if (m > 0)
+        most(1, c) = std::max(most(1, c), of_stage.col(c).tail(m).cwiseProduct(mobility_).cwiseAbs().maxCoeff());
     }
   }
   return most;

@@ -79,14 +79,15 @@ class StageMatrix {
   void add_J_transposed(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y);
   void add_G_transposed(double sign, const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> y);
 
-  // Largest acceleration (row 0) and multiplier (row 1) of each column.
+  // Largest acceleration (row 0) of each column, and multiplier (row 1), in accelerations of what its row sees.
   using Sizes = Eigen::Array<double, 2, kLanes>;
   Sizes sizes(const Eigen::Ref<const Eigen::MatrixXd>& x) const;
 
   const MotionJacobian* jacobian_;
   int stages_;
   Eigen::Index accelerations_, per_stage_;
-  Eigen::VectorXd epsilon_;          // per row of Phi
+  Eigen::VectorXd mobility_;         // per row of Phi: 1/inertia
+  Eigen::VectorXd epsilon_;          // the same
   Vec<7> row_scale_, column_scale_;  // of a body's equations and accelerations, as they are factored
   MotionJacobian::Block scale_;      // both, of an entry
   Eigen::VectorXd multiplier_scale_;

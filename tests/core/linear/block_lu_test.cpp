@@ -30,8 +30,8 @@ struct GraphCase {
     return edges;
   }
 
-  GraphCase(int size, int count, unsigned seed)
-      : rows(size), bodies(count), edges(graph(count, seed)), lu(size, count, edges) {
+  GraphCase(int size, int count, unsigned seed, const LuKernelTable& kernels)
+      : rows(size), bodies(count), edges(graph(count, seed)), lu(size, count, edges, kernels) {
     fill();
   }
   void fill() {
@@ -57,13 +57,21 @@ struct GraphCase {
   }
 };
 
+// What the processor at hand chooses from.
+std::vector<const LuKernelTable*> all_lu_kernels() {
+  std::vector<const LuKernelTable*> all{&portable_lu_kernels()};
+  if (avx2_lu_kernels()) all.push_back(avx2_lu_kernels());
+  return all;
+}
+
 }  // namespace
 
 TEST_CASE("block LU solves with a matrix and its transpose like a dense LU, again and again for new values",
           "[block_lu]") {
   const int rows = GENERATE(7, 14, 21, 28);
   const unsigned seed = GENERATE(range(0u, 5u));
-  GraphCase c(rows, 1 + 3 * static_cast<int>(seed), seed);
+  const LuKernelTable* const kernels = GENERATE(from_range(all_lu_kernels()));
+  GraphCase c(rows, 1 + 3 * static_cast<int>(seed), seed, *kernels);
   for (int repeat = 0; repeat < 2; ++repeat) {
     REQUIRE(c.lu.factor());
     const MatrixXd b = MatrixXd::Random(rows * c.bodies, 3);
