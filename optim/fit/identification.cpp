@@ -276,7 +276,7 @@ class Identification {
           "identification.loss: {} of {} lie beyond its scale, {:g} sigma: these are no outliers. Sigma is too small, "
           "the model is wrong, or the fit ended in another minimum",
           beyond, counted(stack.samples(), "sample"), stack.loss.s()));
-    for (std::string& doubt : angle_doubts(scene_, spec_, stack, by_sigmas_of(stack, apart_.front()), z))
+    for (std::string& doubt : angle_doubts(scene_, spec_, data_, stack, by_sigmas_of(stack, apart_.front()), z))
       result_.warnings.push_back(std::move(doubt));
   }
 
