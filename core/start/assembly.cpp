@@ -264,20 +264,24 @@ struct Assembly::Solution {
     position.settle_shared_rows(result.y, result.angles);
   }
 
-  // Right-hand sides of both linear systems (nearest_point.hpp); those of v need q' as well:
+  // Right-hand sides of both linear systems (nearest_point.hpp), after linearise_both(); those of v need q' as well.
+  // The second one of each counts only where the equations leave something free.
   //   J_q q' = -q_F_rho,           H_q q' + .. = q_g_rho
   //   J_v v' = -F_q q' - F_rho,    H_v v' + .. = g_q q' + g_rho
   struct Derivatives {
     MatrixXd q_b_rho, q_g_rho, v_b_q, v_b_rho, v_g_q, v_g_rho;
   };
   Derivatives derivatives() const {
-    const Index N = 7 * data.n;
-    Derivatives d;
+    const Index N = 7 * data.n, P = data.rho.size();
+    const auto is_free = [](const NearestPoint& point) { return point.linearisation.null_space().cols() > 0; };
+    Derivatives d{{}, MatrixXd::Zero(N, P), {}, {}, MatrixXd::Zero(N, N), MatrixXd::Zero(N, P)};
     d.q_b_rho = -position.gradients(result.y).rho;
-    d.q_g_rho = position_guess_rho(data) - position.second(result.y, q->nu).rho;
-    const AssemblyEquations::Gradients F = velocity.gradients(result.y), S = velocity.second(result.y, v->nu);
+    if (is_free(*q)) d.q_g_rho = position_guess_rho(data) - position.second(result.y, q->nu).rho;
+    const AssemblyEquations::Gradients F = velocity.gradients(result.y);
     d.v_b_q = -F.y.leftCols(N);
     d.v_b_rho = -F.rho;
+    if (!is_free(*v)) return d;
+    const AssemblyEquations::Gradients S = velocity.second(result.y, v->nu);
     std::vector<Mat<7, 4>> v_guess_q;
     velocity_guess_derivatives(data, q->x, v_guess_q, d.v_g_rho);
     d.v_g_q = -S.y.leftCols(N);

@@ -136,6 +136,14 @@ constexpr double kSatisfied = 1e-11;  // of F, per unit of x
 
 double largest(const VectorXd& x) { return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>(); }
 
+// I + curvature. It acts in the directions that the equations leave free; where there are none, it is not evaluated.
+MatrixXd hessian_at(NearestPointEquations& equations, const NearestPoint& at) {
+  const bool determined = at.linearisation.null_space().cols() == 0;
+  MatrixXd H = determined ? MatrixXd(MatrixXd::Zero(at.x.size(), at.x.size())) : equations.curvature(at.x, at.nu);
+  H.diagonal().array() += 1;
+  return H;
+}
+
 // Levenberg-Marquardt on 1/2 |weights F|^2: brings x to where the equations are violated least.
 void reduce_violation(NearestPointEquations& equations, int most, VectorXd& x, int& iterations) {
   double mu = 1e-3;
@@ -331,12 +339,7 @@ class Search {
   }
   void add_curvature(const VectorXd& nu) {
     result_.nu = nu;
-    const Eigen::Index n = result_.x.size();
-    // H acts in the directions that the equations leave free; where there are none, it is not evaluated.
-    const bool determined = result_.linearisation.null_space().cols() == 0;
-    MatrixXd H = determined ? MatrixXd(MatrixXd::Zero(n, n)) : equations_.curvature(result_.x, result_.nu);
-    H.diagonal().array() += 1;
-    result_.linearisation.set_hessian(H);
+    result_.linearisation.set_hessian(hessian_at(equations_, result_));
   }
 
   // At rounding level, or no longer shrinking just above it.
@@ -437,9 +440,7 @@ void linearise(NearestPointEquations& equations, NearestPoint& found) {
   found.linearised = true;
   const MatrixXd J = equations.jacobian(found.x);
   found.linearisation = NearestPointLinearisation(J, equations.sizes(J));
-  MatrixXd H = equations.curvature(found.x, found.nu);
-  H.diagonal().array() += 1;
-  found.linearisation.set_hessian(H);
+  found.linearisation.set_hessian(hessian_at(equations, found));
 }
 
 }  // namespace mbsopt
