@@ -3,9 +3,9 @@
 //
 //   pddot:  Pddot = (i omegadot/2 - |Pdot|^2) P
 //
-// and with the gyroscopic term gone. Springs act in the plane where their points lie in one; other forces are evaluated
-// in space and reduced to the plane, but for derivatives of torques in the state.
-// Allocates nothing after construction, but in the first tangent.
+// and with the gyroscopic term gone. Springs act in the plane where their points lie in one, and torques where the
+// plane holds all that they read; other forces are evaluated in space and reduced to the plane. Allocates nothing after
+// construction, but in the first tangent.
 #pragma once
 
 #include <optional>
@@ -14,6 +14,7 @@
 #include "core/dynamics/force_terms.hpp"
 #include "core/dynamics/planar_bodies.hpp"
 #include "core/dynamics/planar_springs.hpp"
+#include "core/dynamics/planar_torques.hpp"
 #include "core/dynamics/saddle_settings.hpp"
 #include "core/dynamics/user_loads.hpp"
 #include "core/scene/settings.hpp"
@@ -77,8 +78,8 @@ class PlanarDynamics {
 
   PlanarSprings springs_;
   bool springs_in_plane_ = false;  // at this state
-  const bool torques_in_plane_;    // those about hinges, and free ones
-  const bool only_torques_;        // in the plane; no other force depends on the state
+  PlanarTorques torques_;
+  const bool only_torques_;  // in the plane; no other force depends on the state
   // Forces, and the bodies that they read and load, in space.
   bool has_springs_, has_other_forces_;
   bool in_space_ = false;  // whether the bodies are placed there at this state
