@@ -247,15 +247,16 @@ def measured_tasks(folder, data):
 
 def compare(task, program, folder, rounds):
     task.build(folder)
+    fit_folder = folder / f"fit{len(task.start)}"
     rows = {"scipy, C by hand": [], "mbsopt, one core": [], "mbsopt, two cores": []}
     for _ in range(rounds):
         found, elapsed, used = task.fit()
         rows["scipy, C by hand"].append((found.nfev, elapsed, used, math.nan, math.nan))
         for threads, row in (("1", "mbsopt, one core"), ("2", "mbsopt, two cores")):
-            _, before = run(program, "identify", task.problem, folder / "fit", task.sets, "--threads", threads,
+            _, before = run(program, "identify", task.problem, fit_folder, task.sets, "--threads", threads,
                             "--preflight")
             begin = time.perf_counter()
-            result, command = run(program, "identify", task.problem, folder / "fit", task.sets, "--threads", threads)
+            result, command = run(program, "identify", task.problem, fit_folder, task.sets, "--threads", threads)
             whole, fit = time.perf_counter() - begin, result["optimizer"]
             n = fit["evaluations"]
             rows[row].append((n, fit["wall_seconds"], n / (n - 1) * (command - before), whole, command))
