@@ -7,6 +7,7 @@
 #include "app/report/run_report.hpp"
 #include "app/results/accuracy_results.hpp"
 #include "app/results/case_results.hpp"
+#include "app/results/channel_data.hpp"
 #include "app/results/identification_results.hpp"
 #include "app/results/joint_forces.hpp"
 #include "app/results/left_out_bodies.hpp"
@@ -33,6 +34,7 @@
 #include "optim/fit/fit_comparison.hpp"
 #include "optim/fit/identification.hpp"
 #include "optim/fit/recovery.hpp"
+#include "optim/fit/start_residuals.hpp"
 #include "optim/fit/unknown_parameters.hpp"
 #include "optim/fit/windows.hpp"
 #include "optim/problem/unused_parameters.hpp"
@@ -47,13 +49,6 @@ std::string record_of(const ExperimentFit& experiment) {
   return experiment.window ? experiment.window->experiment : experiment.name;
 }
 
-std::string unit_of_channel(const Scene& scene, const ChannelSpec& spec) {
-  const auto sensor = std::ranges::find(scene.sensors, spec.sensor, &Sensor::name);
-  const bool same_unit = spec.gain.is_number() && spec.gain.number() == 1;
-  const std::string unit = sensor == scene.sensors.end() || !same_unit ? "" : unit_in(scene, *sensor);
-  return unit.empty() ? kUnknownUnit : unit;
-}
-
 // Ends a part of the plot: neither a curve nor a correlation continues from one window to the next.
 void add_gap(std::vector<double>& times, double next, std::initializer_list<std::vector<double>*> values) {
   if (times.empty()) return;
@@ -62,8 +57,8 @@ void add_gap(std::vector<double>& times, double next, std::initializer_list<std:
 }
 
 // One plot per channel of each record. start holds the initial values; channels that it lacks are left out.
-std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResult& fit,
-                               const IdentificationResult& start) {
+std::vector<FitPlot> fit_plots(const Problem& problem, const std::vector<CsvTable>& data,
+                               const IdentificationResult& fit, const IdentificationResult& start) {
   std::vector<FitPlot> plots;
   std::vector<std::size_t> first;  // plot of each experiment's first channel
   for (std::size_t e = 0; e < fit.experiments.size(); ++e) {
@@ -74,10 +69,11 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const IdentificationResul
     }
     first.push_back(plots.size());
     for (std::size_t c = 0; c < experiment.channels.size(); ++c)
-      plots.push_back({.experiment = record_of(experiment),
-                       .channel = without_unit(experiment.channels[c].column),
-                       .unit = unit_of_channel(problem.scene, problem.identification->experiments[e].channels[c]),
-                       .validates = experiment.validate});
+      plots.push_back(
+          {.experiment = record_of(experiment),
+           .channel = without_unit(experiment.channels[c].column),
+           .unit = unit_of_channel(problem.scene, problem.identification->experiments[e].channels[c], data[e]),
+           .validates = experiment.validate});
   }
   std::vector<std::optional<std::size_t>> last(plots.size()), last_at_start(plots.size());  // experiment of a plot
   for (const ResidualRow& row : fit.residuals) {
@@ -211,24 +207,30 @@ void check(Run& run, OtherModel& other) {
   if (options.preflight) run.warn("--compare: is skipped by --preflight, which fits nothing");
 }
 
-// Residuals at the initial values.
+// Residuals at the initial values; for --preflight with what the data determine there.
 IdentificationResult at_start(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
   IdentificationOptions options = simulating(run);
-  options.preflight = true;
-  IdentificationResult start = run_identification(needed, data, options);
+  options.preflight = run.context.options.preflight;
+  IdentificationResult start =
+      options.preflight ? run_identification(needed, data, options) : residuals_at_start(needed, data, options);
   run.progress.finish();
   return start;
 }
 
-int preflight(Run& run, const Problem& needed, const std::vector<CsvTable>& data) {
-  const IdentificationResult start = at_start(run, needed, data);
+void say_channels(Run& run, const Problem& cut, const std::vector<CsvTable>& data, const IdentificationResult& start) {
+  std::vector<ChannelData> channels = channel_data(cut, data);
+  add_residuals(channels, start);
+  run.context.out << '\n' << channel_table(channels);
+  run.result["preflight"]["channels"] = to_json(channels);
+}
+
+int preflight(Run& run, const IdentificationResult& start) {
   if (start.residuals.empty()) {
     run.failed(start.message);
     return run.finish();
   }
-  const std::vector<ChannelData> channels = channel_data(start);
-  print_preflight(run.context.out, start, channels);
-  add_preflight(run.result, start, channels);
+  print_preflight(run.context.out, start);
+  add_preflight(run.result, start);
   for (const std::string& warning : start.warnings) run.warn(warning);
   return run.finish();
 }
@@ -314,33 +316,34 @@ std::vector<PointTarget> measured_points(const Problem& fitted, const Scene& sce
   return point_targets(scene, values, true);
 }
 
-// The report shows these beside the fit: the experiments at the start, and the first one's motion as fitted.
-struct ReportMotions {
-  IdentificationResult start;
+// The report shows the first experiment's motion as fitted.
+struct FittedMotion {
   std::optional<SimulatedExperiment> after;
   std::vector<PointTarget> measured;
 };
 
-ReportMotions report_motions(Run& run, const Problem& needed, const std::vector<CsvTable>& data,
-                             const IdentificationResult& fit) {
-  ReportMotions motions{at_start(run, needed, data), {}, {}};
+FittedMotion fitted_motion(Run& run, const Problem& needed, const std::vector<CsvTable>& data,
+                           const IdentificationResult& fit) {
+  FittedMotion motion;
   const Problem fitted = fitted_problem(needed, fit);
-  motions.after = simulated_experiment(run, simulated_scene(fitted, data));
+  motion.after = simulated_experiment(run, simulated_scene(fitted, data));
   run.progress.finish();
-  motions.measured = measured_points(fitted, motions.after->scene, fit);
-  return motions;
+  motion.measured = measured_points(fitted, motion.after->scene, fit);
+  return motion;
 }
 
-// The report omits motions if a simulation stopped.
-std::string report_of(const Run& run, const Problem& cut, const SimulatedExperiment& before,
-                      const ReportMotions& motions, const IdentificationResult& fit, const Trajectory& history) {
+// The report omits motions if a simulation stopped. start holds all experiments.
+std::string report_of(const Run& run, const CutProblem& cut, const SimulatedExperiment& before,
+                      const IdentificationResult& start, const FittedMotion& motion, const IdentificationResult& fit,
+                      const Trajectory& history) {
   std::vector<MovingState> states;
-  const std::optional<SimulatedExperiment>& after = motions.after;
+  const std::optional<SimulatedExperiment>& after = motion.after;
   if (after && after->simulation.ok()) {
     states.push_back({"initial", before.scene, before.trajectory, true});
-    states.push_back({"fitted", after->scene, after->trajectory, false, motions.measured, after->forces});
+    states.push_back({"fitted", after->scene, after->trajectory, false, motion.measured, after->forces});
   }
-  return identification_report(run.problem.scene, run.result, history, fit_plots(cut, fit, motions.start), states);
+  return identification_report(run.problem.scene, run.result, history, fit_plots(cut.problem, cut.data, fit, start),
+                               states);
 }
 
 std::vector<NewValue> new_values(const IdentificationResult& fit) {
@@ -389,7 +392,9 @@ int identify_command(const CommandContext& context) {
   const FitComparisonOptions compared{{}, [](double) { return !interrupted(); }, case_threads(run)};
   for (const std::string& warning : doubts_about_fit(needed, data, compared)) run.warn(warning);
   if (other) check(run, *other);
-  if (context.options.preflight) return preflight(run, needed, data);
+  const IdentificationResult start = at_start(run, needed, data);
+  say_channels(run, needed, data, start);
+  if (context.options.preflight) return preflight(run, start);
   LongRun long_run(run);
   const BestStart best = from_best_start(run, long_run, whole);
   if (interrupted() && starts) return stopped_within_starts(run, long_run, best.problem);
@@ -406,15 +411,15 @@ int identify_command(const CommandContext& context) {
   run.write("residuals.csv", residuals_csv(fit));
   if (!fit.profiles.empty()) run.write("profile.csv", profile_csv(fit));
   if (fit.ok()) examine(run, cut, fit, other);
-  ReportMotions motions;
-  if (!interrupted() && before.simulation.ok()) motions = report_motions(run, needed, data, fit);
+  FittedMotion motion;
+  if (!interrupted() && before.simulation.ok()) motion = fitted_motion(run, needed, data, fit);
   if (fit.status == SolverStatus::stopped || interrupted()) {
     long_run.stopped("optimized.json holds the best fit so far");
   } else if (!fit.ok()) {
     run.failed(fit.message);
     if (other) run.warn("--compare: is skipped, since the fit did not converge");
   }
-  run.write("report.html", report_of(run, cut.problem, before, motions, fit, history));
+  run.write("report.html", report_of(run, cut, before, start, motion, fit, history));
   return long_run.finish();
 }
 

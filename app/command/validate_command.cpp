@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "app/results/channel_data.hpp"
 #include "app/results/window_results.hpp"
 #include "app/run/command.hpp"
 #include "app/run/run.hpp"
@@ -65,6 +66,9 @@ int validate_command(const CommandContext& context) {
     const CutProblem cut = cut_into_windows(problem, data_of(problem), {}, [](double) { return !interrupted(); });
     for (const std::string& warning : cut.warnings) run.warn(warning);
     add_windows(run, cut.problem);
+    const std::vector<ChannelData> channels = channel_data(cut.problem, cut.data);
+    context.out << '\n' << channel_table(channels);
+    run.result["preflight"]["channels"] = to_json(channels);
     if (interrupted()) run.stopped("the starts of some windows were not guessed");
   }
   return run.finish();

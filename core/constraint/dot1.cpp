@@ -17,18 +17,24 @@ void product_rows(const VectorJet& y, const BodyState& b, const Vector3d& s, con
 
 }  // namespace
 
-void Dot1::phi(const Frame& f1, const Frame& f2, Vec<1>& out) const { out(0) = (f1.A * s1).dot(f2.A * s2); }
+void Dot1::phi(const Frame& f1, const Frame& f2, Vec<1>& out) const {
+  const Vector3d x = f1.A * s1, y = f2.A * s2;
+  out(0) = x.dot(y);
+}
 
 void Dot1::phi_dot(const Frame& f1, const Frame& f2, Vec<1>& out) const {
-  out(0) = (f1.Adot * s1).dot(f2.A * s2) + (f1.A * s1).dot(f2.Adot * s2);
+  const Vector3d x = f1.A * s1, y = f2.A * s2, xd = f1.Adot * s1, yd = f2.Adot * s2;
+  out(0) = xd.dot(y) + x.dot(yd);
 }
 
 void Dot1::phi_ddot(const Frame& f1, const Frame& f2, Vec<1>& out) const {
-  out(0) = (f1.Addot * s1).dot(f2.A * s2) + 2 * (f1.Adot * s1).dot(f2.Adot * s2) + (f1.A * s1).dot(f2.Addot * s2);
+  const VectorJet x(f1, s1), y(f2, s2);
+  out(0) = x.xdd.dot(y.x) + 2 * x.xd.dot(y.xd) + x.x.dot(y.xdd);
 }
 
 double Dot1::change(const Frame& f1, const Frame& f2) const {
-  return (f1.A_eta * s1).dot(f2.A * s2) + (f1.A * s1).dot(f2.A_eta * s2);
+  const Vector3d x = f1.A * s1, y = f2.A * s2, x_eta = f1.A_eta * s1, y_eta = f2.A_eta * s2;
+  return x_eta.dot(y) + x.dot(y_eta);
 }
 
 void Dot1::jacobian(const Frame& f1, const Frame& f2, Mat<1, 6>& J1, Mat<1, 6>& J2) const {

@@ -154,10 +154,7 @@ void ForceTerms::add_field_tangent(const At& at, const ParameterBlock& block, st
     if (f.parameters.empty() && f.sensors.empty() && !block.moves(f.slot, 3)) continue;
     const Vector3d c = components_with_gradients(f, at);
     Lanes<3> dc = Lanes<3>::Zero();
-    auto add_input = [&](int input, const Lanes<1>& direction) {
-      for (int i = 0; i < 3; ++i) dc.row(i) += gradients_[index(i)][index(input)] * direction;
-    };
-    for (const int k : f.parameters) add_input(k, block.direction(k));
+    for (const int k : f.parameters) add_input(k, block.direction(k), dc);
     for (const int s : f.sensors) {
       y_bar_.setZero(), rho_bar_.setZero();
       add_gradient(data_, data_.sensors[index(s)], at.t, at.y, at.angles, 1, y_bar_, rho_bar_);
@@ -165,7 +162,7 @@ void ForceTerms::add_field_tangent(const At& at, const ParameterBlock& block, st
       for (int lane = 0; lane < kLanes; ++lane) {
         if (block.parameter[lane] >= 0) direction(lane) = rho_bar_(block.parameter[lane]);
       }
-      add_input(t + 1 + s, direction);
+      add_input(t + 1 + s, direction, dc);
     }
     Lanes<3> ds;
     f.tangent(c, dc, at.frames[index(f.body)], kStill, block.field<3>(f.slot, ds), load_dirs[index(f.body)]);

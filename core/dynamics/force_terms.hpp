@@ -39,14 +39,18 @@ class ForceTerms {
   template <class Visitor>
   void for_each_free_torque(const At& at, Visitor&& visitor) {
     for (const AppliedForce& f : data_.applied)
-      if (is_free_torque(f)) visitor(f.body, components(f, at));
+      if (is_free_torque(f)) visitor(static_cast<std::size_t>(f.body), components(f, at));
   }
-  // The law of a torque or of a force along a joint, with derivatives.
-  template <class Effort>
-  Law::Value law_of(const Effort& f, const At& at) {
-    const std::array<int, 2> bodies = f.bodies();
-    return f.at(inputs(at), at.frames[static_cast<std::size_t>(bodies[0])],
-                at.frames[static_cast<std::size_t>(bodies[1])]);
+  // visitor(body, directions of its components) of those that the block moves
+  template <class Visitor>
+  void for_each_free_torque_tangent(const At& at, const ParameterBlock& block, Visitor&& visitor) {
+    for (const AppliedForce& f : data_.applied) {
+      if (!is_free_torque(f) || f.parameters.empty()) continue;
+      components_with_gradients(f, at);
+      Lanes<3> dc = Lanes<3>::Zero();
+      for (const int k : f.parameters) add_input(k, block.direction(k), dc);
+      visitor(static_cast<std::size_t>(f.body), dc);
+    }
   }
   void add_field_tangent(const At& at, const ParameterBlock& block, std::vector<Lanes<6>>& load_dirs);
   // Adds the gradient of the virtual work sum load'eta. The frames hold eta, which stays fixed.
@@ -68,6 +72,11 @@ class ForceTerms {
   void set_inputs(const AppliedForce& force, const At& at);
   Vector3d components(const AppliedForce& force, const At& at);
   Vector3d components_with_gradients(const AppliedForce& force, const At& at);
+  // After it: what a direction of an input adds to those of the components.
+  void add_input(int input, const Lanes<1>& direction, Lanes<3>& dc) const {
+    for (int i = 0; i < 3; ++i)
+      dc.row(i) += gradients_[static_cast<std::size_t>(i)][static_cast<std::size_t>(input)] * direction;
+  }
 
   const MechanismData& data_;
   Law::Scratch law_;

@@ -14,23 +14,6 @@ bool any_force_but_springs(const MechanismData& d) {
   return d.forces->size() > d.forces->of<TsdaForce>().size() || !d.applied.empty() || !d.user_forces.empty();
 }
 
-// Whether the vectors that define the angles of torques lie in the plane.
-bool torques_are_about_normal(const MechanismData& d) {
-  constexpr double kParallel = 1e-12;  // sine of the angle up to which a direction counts as another
-  bool all = true;
-  const auto look = [&](const auto& torque) {
-    const JointAngle& joint = torque.joint;
-    const auto lies = [&](int body, const Vector3d& s) {
-      return std::abs(d.planar->bodies[at(body)].n.dot(s)) <= kParallel * s.norm();
-    };
-    all = all && lies(joint.body1, joint.measure.s1) && lies(joint.body1, joint.measure.s3) &&
-          lies(joint.body2, joint.measure.s2);
-  };
-  std::ranges::for_each(d.forces->of<RsdaForce>(), look);
-  std::ranges::for_each(d.forces->of<TurningFriction>(), look);
-  return all;
-}
-
 // Whether torques about hinges and free torques are the only forces that depend on the state.
 bool nothing_but_torques(const MechanismData& d) {
   return d.forces->size() == d.forces->of<RsdaForce>().size() + d.forces->of<TurningFriction>().size() &&
@@ -60,8 +43,8 @@ PlanarDynamics::PlanarDynamics(const MechanismData& data, const FormulationSetti
       bodies_with_slots_(bodies_with_inertial_slots(data)),
       solver_(data, rows_of<InPlane>(data, settings_.alpha), settings_.compliance),
       springs_(data),
-      torques_in_plane_(torques_are_about_normal(data)),
-      only_torques_(torques_in_plane_ && nothing_but_torques(data)),
+      torques_(data),
+      only_torques_(torques_.lie_in_plane() && nothing_but_torques(data)),
       has_springs_(!data.forces->of<TsdaForce>().empty()),
       has_other_forces_(any_force_but_springs(data)),
       forces_(data),
@@ -118,7 +101,7 @@ void PlanarDynamics::set_state(double t, const Eigen::VectorXd& y, const Eigen::
   y_ = y;
   in_space_ = false;
   springs_in_plane_ = has_springs_ && springs_.lie_in_plane(y);
-  if (has_other_forces_ || !springs_in_plane_) place_in_space();
+  if ((has_other_forces_ && !torques_.are_all()) || (has_springs_ && !springs_in_plane_)) place_in_space();
 }
 
 void PlanarDynamics::place_in_space() {
@@ -142,7 +125,7 @@ void PlanarDynamics::set_loads() {
     loads_[k - 1] << b.mass * model_.gravity.re, b.mass * model_.gravity.im, 0;
   }
   if (springs_in_plane_) springs_.add_loads(t_, frames_, forces_.law_scratch(), loads_);
-  if (!in_space_) return;
+  if (!in_space_) return torques_.add_loads(here(), frames_, forces_, loads_);
   body_loads_[0].setZero();
   for (const std::size_t k : loaded_) body_loads_[k].setZero();
   forces_.add_loads(here(), body_loads_, springs_in_plane_);
@@ -265,6 +248,7 @@ void PlanarDynamics::add_adjoint(const Eigen::VectorXd& w, Eigen::Ref<Eigen::Vec
 
 void PlanarDynamics::add_force_adjoint(Eigen::Ref<Eigen::VectorXd> y_bar, Eigen::VectorXd& theta_bar,
                                        Eigen::VectorXd& rho_bar) {
+  if (!in_space_) place_in_space();
   bars_in_space_[0].set_zero();
   for (const std::size_t k : loaded_) {
     bars_in_space_[k].set_zero();

@@ -14,6 +14,7 @@
 #include "core/dynamics/force_terms.hpp"
 #include "core/dynamics/planar_bodies.hpp"
 #include "core/dynamics/planar_springs.hpp"
+#include "core/dynamics/planar_torques.hpp"
 #include "core/dynamics/saddle_settings.hpp"
 #include "core/dynamics/user_loads.hpp"
 #include "core/scene/settings.hpp"
@@ -77,8 +78,8 @@ class PlanarDynamics {
 
   PlanarSprings springs_;
   bool springs_in_plane_ = false;  // at this state
-  const bool torques_in_plane_;    // torques about hinges, and free ones
-  const bool only_torques_;        // in the plane; no other force depends on the state
+  PlanarTorques torques_;
+  const bool only_torques_;  // in the plane; no other force depends on the state
   // The forces, and the bodies in space that they read and load.
   bool has_springs_, has_other_forces_;
   bool in_space_ = false;  // whether the bodies are placed there at this state

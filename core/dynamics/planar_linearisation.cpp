@@ -48,14 +48,14 @@ void PlanarDynamics::prepare_force_tangents() {
         ForceLinearisation{force_blocks(data_), std::vector<UnitTangents>(bodies_.size()), {}});
     force_linearisation_->in_plane.resize(force_linearisation_->blocks.b.size());
   }
-  if (!in_space_) place_in_space();
   ForceLinearisation& x = *force_linearisation_;
   for (ForceLinearisation::Block& block : x.in_plane) block = {};
-  if (torques_in_plane_) add_torque_blocks();
+  if (torques_.lie_in_plane()) add_torque_blocks();
   if (only_torques_) return;
+  if (!in_space_) place_in_space();
   x.blocks.set_zero();
   for (const std::size_t k : loaded_) set_unit_tangents(states_in_space_[k], x.units[k]);
-  forces_.add_blocks(here(), x.units, x.blocks, torques_in_plane_);
+  forces_.add_blocks(here(), x.units, x.blocks, torques_.lie_in_plane());
   user_.add_blocks(here(), states_in_space_, no_mass_terms_, x.blocks);
   for (std::size_t k = 0; k < x.in_plane.size(); ++k) {
     const MotionBlocks::Block<6>& block = x.blocks.b[k];
@@ -84,8 +84,7 @@ void PlanarDynamics::prepare_force_tangents() {
 // A free torque c has the moment |P|^2 c_n. These numbers equal those of space, also off the constraints.
 void PlanarDynamics::add_torque_blocks() {
   ForceLinearisation& x = *force_linearisation_;
-  const auto add = [&](const auto& torque) {
-    const Law::Value f = forces_.law_of(torque, here());
+  const auto add = [&](const auto& torque, const Law::Value& f) {
     for (const int read : torque.bodies()) {
       if (read == 0) continue;
       const Body& b = bodies_[at(read)];
@@ -101,11 +100,11 @@ void PlanarDynamics::add_torque_blocks() {
       }
     }
   };
-  for (const RsdaForce& torque : data_.forces->of<RsdaForce>()) add(torque);
-  for (const TurningFriction& torque : data_.forces->of<TurningFriction>()) add(torque);
-  forces_.for_each_free_torque(here(), [&](int body, const Vector3d& c) {
-    const Plane& P = bodies_[at(body)].P;
-    ForceLinearisation::Block& block = x.in_plane[at(x.blocks.pair(body - 1, body - 1))];
+  torques_.for_each_hinge(here(), frames_, forces_.law_scratch(), add);
+  forces_.for_each_free_torque(here(), [&](std::size_t body, const Vector3d& c) {
+    const Plane& P = bodies_[body].P;
+    const int row = static_cast<int>(body) - 1;
+    ForceLinearisation::Block& block = x.in_plane[at(x.blocks.pair(row, row))];
     block.q.row(2).tail<2>() += 2 * c(model_.n) * Eigen::RowVector2d(P.re, P.im);
     block.filled = true;
   });
@@ -130,6 +129,9 @@ void PlanarDynamics::add_force_tangent(const ParameterBlock& block, const LaneRo
               height(i) * r[model_.n];
     }
   }
+  if (torques_.are_all() && !has_springs_)
+    return torques_.add_field_tangent(here(), frames_, forces_, block, rhs_lanes_);
+  if (!in_space_) place_in_space();
   for (const std::size_t k : loaded_) body_load_dirs_[k].setZero();
   body_load_dirs_[0].setZero();
   forces_.add_field_tangent(here(), block, body_load_dirs_);

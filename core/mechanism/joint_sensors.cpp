@@ -8,9 +8,12 @@ namespace {
 
 // The angle is on the turn nearest to reference.
 template <class P>
-double measure_value(const JointMeasure<P>& joint, bool rate, double reference, const Eigen::VectorXd& y) {
-  const BodyAt b1 = body_at(y, joint.body1), b2 = body_at(y, joint.body2);
+double measure_value(const JointMeasure<P>& joint, bool rate, double reference, const BodyAt& b1, const BodyAt& b2) {
   return rate ? joint.rate(b1.frame, b2.frame) : joint.value_near(reference, b1.frame, b2.frame);
+}
+template <class P>
+double measure_value(const JointMeasure<P>& joint, bool rate, double reference, const Eigen::VectorXd& y) {
+  return measure_value(joint, rate, reference, body_at(y, joint.body1), body_at(y, joint.body2));
 }
 
 template <class P>
@@ -28,7 +31,7 @@ double measure_gradient(const MechanismData& d, const JointMeasure<P>& joint, bo
   add_slot<3>(d, joint.slot1, s.s1, 1, rho_bar);
   add_slot<3>(d, joint.slot2, s.s2, 1, rho_bar);
   add_slot<3>(d, joint.slot3, s.s3, 1, rho_bar);
-  return measure_value(joint, rate, reference, y);
+  return measure_value(joint, rate, reference, b1, b2);
 }
 
 struct AngleFunction final : SensorFunction {

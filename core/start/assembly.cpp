@@ -273,13 +273,16 @@ struct Assembly::Solution {
     MatrixXd q_b_rho, q_g_rho, v_b_q, v_b_rho, v_g_q, v_g_rho;
   };
   Derivatives derivatives() const {
-    const Index N = 7 * data.n;
-    Derivatives d;
+    const Index N = 7 * data.n, P = data.rho.size();
+    const auto is_free = [](const NearestPoint& point) { return point.linearisation.null_space().cols() > 0; };
+    Derivatives d{{}, MatrixXd::Zero(N, P), {}, {}, MatrixXd::Zero(N, N), MatrixXd::Zero(N, P)};
     d.q_b_rho = -position.gradients(result.y).rho;
-    d.q_g_rho = position_guess_rho(data) - position.second(result.y, q->nu).rho;
-    const AssemblyEquations::Gradients F = velocity.gradients(result.y), S = velocity.second(result.y, v->nu);
+    if (is_free(*q)) d.q_g_rho = position_guess_rho(data) - position.second(result.y, q->nu).rho;
+    const AssemblyEquations::Gradients F = velocity.gradients(result.y);
     d.v_b_q = -F.y.leftCols(N);
     d.v_b_rho = -F.rho;
+    if (!is_free(*v)) return d;
+    const AssemblyEquations::Gradients S = velocity.second(result.y, v->nu);
     std::vector<Mat<7, 4>> v_guess_q;
     velocity_guess_derivatives(data, q->x, v_guess_q, d.v_g_rho);
     d.v_g_q = -S.y.leftCols(N);

@@ -137,6 +137,14 @@ constexpr double kSatisfied = 1e-11;  // of F, per unit of x
 
 double largest(const VectorXd& x) { return x.size() == 0 ? 0.0 : x.lpNorm<Eigen::Infinity>(); }
 
+// I + curvature acts in the directions that the equations leave free. It is not evaluated if there are none.
+MatrixXd hessian_at(NearestPointEquations& equations, const NearestPoint& at) {
+  const bool determined = at.linearisation.null_space().cols() == 0;
+  MatrixXd H = determined ? MatrixXd(MatrixXd::Zero(at.x.size(), at.x.size())) : equations.curvature(at.x, at.nu);
+  H.diagonal().array() += 1;
+  return H;
+}
+
 // Applies Levenberg-Marquardt to 1/2 |weights F|^2: brings x to the least violation of the equations.
 void reduce_violation(NearestPointEquations& equations, int most, VectorXd& x, int& iterations) {
   double mu = 1e-3;
@@ -334,12 +342,7 @@ class Search {
   }
   void add_curvature(const VectorXd& nu) {
     result_.nu = nu;
-    const Eigen::Index n = result_.x.size();
-    // H acts in the directions that the equations leave free. It is not evaluated if there are none.
-    const bool determined = result_.linearisation.null_space().cols() == 0;
-    MatrixXd H = determined ? MatrixXd(MatrixXd::Zero(n, n)) : equations_.curvature(result_.x, result_.nu);
-    H.diagonal().array() += 1;
-    result_.linearisation.set_hessian(H);
+    result_.linearisation.set_hessian(hessian_at(equations_, result_));
   }
 
   // Whether steps are at rounding level, or no longer shrink just above it.
@@ -441,9 +444,7 @@ void linearise(NearestPointEquations& equations, NearestPoint& found) {
   found.linearised = true;
   const MatrixXd J = equations.jacobian(found.x);
   found.linearisation = NearestPointLinearisation(J, equations.sizes(J));
-  MatrixXd H = equations.curvature(found.x, found.nu);
-  H.diagonal().array() += 1;
-  found.linearisation.set_hessian(H);
+  found.linearisation.set_hessian(hessian_at(equations, found));
 }
 
 }  // namespace mbsopt

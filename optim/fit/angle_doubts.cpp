@@ -8,6 +8,7 @@
 
 #include "core/scene/scene_facts.hpp"
 #include "optim/fit/unknown_parameters.hpp"
+#include "optim/problem/logged_columns.hpp"
 
 namespace mbsopt {
 namespace {
@@ -48,7 +49,8 @@ std::string unit_of_angles(const Scene& scene, const std::string& sensor) {
 
 }  // namespace
 
-std::vector<std::string> angle_doubts(const Scene& scene, const IdentificationSpec& spec, const ExperimentStack& stack,
+std::vector<std::string> angle_doubts(const Scene& scene, const IdentificationSpec& spec,
+                                      const std::vector<CsvTable>& data, const ExperimentStack& stack,
                                       const Eigen::VectorXd& z_start, const Eigen::VectorXd& z_end) {
   std::vector<std::string> doubts;
   Eigen::Index row = 0;
@@ -65,7 +67,7 @@ std::vector<std::string> angle_doubts(const Scene& scene, const IdentificationSp
       const Series& s = series[c];
       const ChannelSpec& channel = spec.experiments[m.experiment].channels[c];
       const std::string unit = unit_of_angles(scene, channel.sensor);
-      if (unit.empty() || s.measured.size() < 2) continue;
+      if (unit.empty() || s.measured.size() < 2 || !stated_unit(channel, data[m.experiment]).empty()) continue;
       const double span = span_of(s.measured), start = span_of(s.start), end = span_of(s.end);
       const auto as_degrees = [&](double model) { return span > kNear * model && span < kNear * kDegrees * model; };
       const bool plausible = unit == "rad" && span <= std::numbers::pi;

@@ -10,6 +10,7 @@
 
 #include "core/expression/did_you_mean.hpp"
 #include "core/mechanism/mechanism.hpp"
+#include "core/mechanism/scene_programs.hpp"
 #include "core/scene/field_visitor.hpp"
 #include "core/scene/scene_facts.hpp"
 #include "core/scene/signals.hpp"
@@ -76,6 +77,7 @@ Experiment::Experiment(const Scene& scene, const ExperimentSpec& spec, std::stri
   }
   for (const Unknown& unknown : unknowns_) active_[static_cast<std::size_t>(unknown.parameter)] = true;
   replace_laws(spec, place);
+  programs_ = std::make_shared<ScenePrograms>(scene_);
   compile_channels(spec, place);
   take_samples(spec, place, data);
   refuse_short_laws(spec, place);
@@ -241,13 +243,13 @@ std::optional<Experiment::ShortSamples> Experiment::short_samples(const Eigen::V
     if (!law || !law->curve) continue;
     if (auto words = uncovered(covered_by(*law->curve), settings_.start_time, end)) return {{false, i, *words}};
   }
-  const Symbols symbols = parameter_symbols(scene_);
   Program::Scratch scratch;
   for (std::size_t i = 0; i < scene_.signals.size(); ++i) {
     const Signal& signal = scene_.signals[i];
     if (!signal.curve) continue;
-    const double delay =
-        evaluated(compiled(signal.delay, symbols, "signals." + signal.name), rho, settings_.start_time, scratch).value;
+    const double delay = signal.delay.is_number()
+                             ? signal.delay.number()
+                             : evaluated(*programs_->field(signal.delay), rho, settings_.start_time, scratch).value;
     if (auto words = uncovered(covered_by(*signal.curve, delay), settings_.start_time, end)) return {{true, i, *words}};
   }
   return std::nullopt;
@@ -312,8 +314,8 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
     }
 
   const std::size_t readings = sampling.times.size();  // those of the samples; then the ends
-  if (start_chart_) sampling.times.push_back(settings.start_time);
-  if (end_chart_) sampling.times.push_back(settings_.end_time);
+  if (start_chart_ && limits.derivatives) sampling.times.push_back(settings.start_time);
+  if (end_chart_ && limits.derivatives) sampling.times.push_back(settings_.end_time);
 
   if (const auto found = short_samples(rho, settings.end_time)) {
     r.message = fmt::format("the motion until {:.6g} s is beyond the samples of the {} '{}': {}", settings.end_time,
@@ -324,9 +326,15 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
   }
   try {
     const std::vector<bool> none(active_.size(), false);
-    const Mechanism mechanism(scene_, rho, limits.derivatives ? active_ : none, user_forces_);
+    const Mechanism mechanism(scene_, rho, limits.derivatives ? active_ : none, user_forces_, programs_);
     Eigen::VectorXd y_bar(mechanism.states()), rho_bar(rho.size());
     std::size_t seen = 0;
+    const auto set_residual = [&](std::size_t i, const ChannelNow& c, double s) {
+      const Sample& sample = samples_[i];
+      r.z(static_cast<Eigen::Index>(i)) =
+          (sample.measured - c.gain.value * s - c.bias.value) / channels_[sample.channel].sigma;
+      ++seen;
+    };
     const auto take = [&](std::size_t i, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
       const Sample& sample = samples_[i];
       const ChannelNow& c = of_sample(sample);
@@ -334,15 +342,18 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
       const double s = mechanism.add_sensor_gradient(channels_[sample.channel].sensor, at, 1, y_bar, rho_bar);
       const bool held = times_[sample.time] - c.delay.value < settings.start_time;
       const double sdot = delayed_ && !held && !unknowns_.empty() ? y_bar.dot(*at.ydot) : 0.0;
-      const double sigma = channels_[sample.channel].sigma;
-      const Eigen::Index row = static_cast<Eigen::Index>(i);
-      r.z(row) = (sample.measured - c.gain.value * s - c.bias.value) / sigma;
+      set_residual(i, c, s);
       for (const Unknown& unknown : unknowns_) {
         const int k = unknown.parameter;
         const double s_u = y_bar.dot(y_rho.col(k)) - sdot * c.delay.rho_bar(k) + rho_bar(k);
-        r.z_u(row, unknown.at) = -(c.gain.value * s_u + s * c.gain.rho_bar(k) + c.bias.rho_bar(k)) / sigma;
+        r.z_u(static_cast<Eigen::Index>(i), unknown.at) =
+            -(c.gain.value * s_u + s * c.gain.rho_bar(k) + c.bias.rho_bar(k)) / channels_[sample.channel].sigma;
       }
-      ++seen;
+    };
+    // f(sample) of those that are read at a time of the run.
+    const auto for_samples_at = [&](std::size_t k, auto&& f) {
+      if (delayed_) return f(k);
+      for (std::size_t i = first_[k]; i < first_[k + 1]; ++i) f(i);
     };
     const auto take_end = [&](const StateChart& chart, const StatePoint& at, const Eigen::MatrixXd& y_rho,
                               Eigen::VectorXd& s, Eigen::MatrixXd& s_u) {
@@ -354,12 +365,20 @@ Experiment::Residuals Experiment::residuals(const Eigen::VectorXd& u, const Limi
     sampling.observe = [&](std::size_t k, const StatePoint& at, const Eigen::MatrixXd& y_rho) {
       if (k == readings && start_chart_) return take_end(*start_chart_, at, y_rho, r.start, r.start_u);
       if (k >= readings) return take_end(*end_chart_, at, y_rho, r.end, r.end_u);
-      if (delayed_) return take(k, at, y_rho);
-      for (std::size_t i = first_[k]; i < first_[k + 1]; ++i) take(i, at, y_rho);
+      for_samples_at(k, [&](std::size_t i) { take(i, at, y_rho); });
     };
     RunOptions options;
-    options.progress = limits.progress;
-    const SimulationResult result = simulate_tlm(mechanism, settings, {}, sampling, options);
+    options.progress = limits.progress, options.exact_stages = true;
+    Sampling values;
+    if (!limits.derivatives) values.times = std::move(sampling.times);
+    values.observe = [&](std::size_t k, const StatePoint& at) {
+      for_samples_at(k, [&](std::size_t i) {
+        const Sample& sample = samples_[i];
+        set_residual(i, of_sample(sample), mechanism.sensor_value(channels_[sample.channel].sensor, at));
+      });
+    };
+    const SimulationResult result = limits.derivatives ? simulate_tlm(mechanism, settings, {}, sampling, options)
+                                                       : simulate(mechanism, settings, {}, values, options);
     r.steps = result.statistics.steps, r.jumps = result.statistics.jumps;
     r.ok = result.ok() && seen == samples_.size();
     r.message = result.message;

@@ -29,6 +29,7 @@
 
 namespace mbsopt {
 
+class ScenePrograms;
 struct UserForce;
 
 struct ExperimentLimits {
@@ -113,6 +114,7 @@ class Experiment {
   void refuse_short_laws(const ExperimentSpec& spec, const std::string& place) const;
 
   Scene scene_;
+  std::shared_ptr<ScenePrograms> programs_;  // of the scene
   SimulationSettings settings_;
   Eigen::VectorXd rho_;
   std::vector<Unknown> unknowns_;

@@ -148,7 +148,7 @@ class Identification {
           "identification.loss: {} of {} lie beyond its scale, {:g} sigma: these are no outliers. Sigma is too small, "
           "the model is wrong, or the fit ended in another minimum",
           beyond, counted(stack.samples(), "sample"), stack.loss.s()));
-    for (std::string& doubt : angle_doubts(fit_.scene, fit_.spec, stack, at_start, z))
+    for (std::string& doubt : angle_doubts(fit_.scene, fit_.spec, fit_.data, stack, at_start, z))
       fit_.result.warnings.push_back(std::move(doubt));
   }
 

@@ -59,18 +59,12 @@ class DataCheck {
              fmt::format("'{}' is compared by channels[{}] already; its samples would count twice", column, k)});
   }
 
-  // The unit in the file or the problem; empty if neither gives one.
-  std::string unit_text(const ChannelSpec& channel) const {
-    const std::string& header = data_.header[data_.find_column(channel.column)];
-    return channel.unit.empty() ? std::string(parts_of_header(header).unit.value_or("")) : channel.unit;
-  }
-
   void check_unit(std::size_t c) {
     const ChannelSpec& channel = experiment_.channels[c];
     const auto sensor = std::ranges::find(scene_.sensors, channel.sensor, &Sensor::name);
     const TypeRow* const row = sensor == scene_.sensors.end() ? nullptr : find_row(kSensorQuantities, sensor->quantity);
     if (!row || !channel.gain.is_number() || !data_.has_column(channel.column)) return;
-    const std::string text = unit_text(channel);
+    const std::string text = stated_unit(channel, data_);
     const std::optional<Unit> unit = parse_column_unit(text);
     if (text.empty() || !unit || unit->dimension.is_none() || compatible(unit->dimension, row->dimension)) return;
     issues_.push_back({channel_path(c, "column"),
@@ -175,7 +169,7 @@ class DataCheck {
   void check_size(std::size_t c, std::size_t row) {
     constexpr double kMany = 100;  // rad: less than a third of a turn in degrees, 16 turns in radians
     const ChannelSpec& channel = experiment_.channels[c];
-    if (!angle_sensor(channel) || channel.gain.number() != 1 || !unit_text(channel).empty()) return;
+    if (!angle_sensor(channel) || channel.gain.number() != 1 || !stated_unit(channel, data_).empty()) return;
     const double angle = data_.column(channel.column)[row];
     if (!(std::abs(angle) > kMany)) return;
     issues_.push_back({channel_path(c, "column"),

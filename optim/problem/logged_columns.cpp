@@ -21,10 +21,14 @@ struct ColumnUnit {
   Unit unit;
 };
 
+// given: instead of the header's; empty: none.
+std::string stated(const std::string& header, const std::string& given) {
+  return given.empty() ? std::string(parts_of_header(header).unit.value_or("")) : given;
+}
+
 ColumnUnit unit_of(const CsvTable& table, std::size_t column, const std::string& given) {
   const std::string& header = table.header[column];
-  const std::optional<std::string_view> of_header = parts_of_header(header).unit;
-  const std::string text = given.empty() ? std::string(of_header.value_or("")) : given;
+  const std::string text = stated(header, given);
   if (text.empty()) return {};
   const std::optional<Unit> unit = parse_column_unit(text);
   if (!unit)
@@ -107,6 +111,11 @@ std::optional<Unit> parse_column_unit(std::string_view text) {
   if (text == "g") return Unit{kStandardGravity, dimension::kAcceleration};
   if (text == "mg") return Unit{1e-3 * kStandardGravity, dimension::kAcceleration};
   return parse_unit(text);
+}
+
+std::string stated_unit(const ChannelSpec& channel, const CsvTable& table) {
+  const std::size_t column = table.find_column(channel.column);
+  return stated(column < table.header.size() ? table.header[column] : "", channel.unit);
 }
 
 LoggedColumn column_in_si(const CsvTable& table, std::string_view column, const std::string& given) {

@@ -21,6 +21,8 @@
 namespace mbsopt {
 
 std::optional<Unit> parse_column_unit(std::string_view text);
+// The unit of a channel's column as the problem or the file states it; empty: neither does.
+std::string stated_unit(const ChannelSpec& channel, const CsvTable& table);
 
 struct LoggedColumn {
   std::vector<double> values;

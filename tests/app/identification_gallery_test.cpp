@@ -218,6 +218,8 @@ TEST_CASE("before the fit: what the columns hold, and what they would determine"
     CHECK(result.at("preflight").at("parameters").at(name).at("predicted_std_error").get<double>() ==
           Approx(10 * fit.at("parameters").at(name).at("std_error").get<double>()).epsilon(0.6));
   CHECK(!result.contains("parameters"));
+  CHECK(channel.at("unit") == "m");
+  CHECK(fit.at("preflight").at("channels") == result.at("preflight").at("channels"));
   CHECK(fit.at("covariance") == "white");
   CHECK(fit.at("recovery").at("m").at("truth") == fit.at("parameters").at("m").at("value"));
   CHECK(fit.at("recovery").at("m").at("fits") == 3);
@@ -227,6 +229,16 @@ TEST_CASE("before the fit: what the columns hold, and what they would determine"
                                 {"--preflight", "--set", "identification.experiments[1].role=validate"});
   CHECK(alone.at("identifiability").at("unidentifiable") ==
         nlohmann::json::array({"m, k, c: only m/c and k/c are determined"}));
+}
+
+// Its angle wraps at 180 degrees, which is said; that it is in degrees, the header says.
+TEST_CASE("a column that states its unit is not asked whether it is in degrees", "[identification][command]") {
+  const TemporaryFolder folder;
+  const auto result = identified(folder, "pendulum/motor",
+                                 {"--preflight", "--set", "identification.experiments[1].channels[0].unwrap=false"});
+  const std::string warnings = result.at("warnings").dump();
+  CHECK_THAT(warnings, Contains("by about a turn") && !Contains("in degrees?"));
+  CHECK(result.at("preflight").at("channels").at(1).at("unit") == "rad");
 }
 
 TEST_CASE("two models of one record: the F-test says which one it needs", "[identification][command]") {

@@ -83,6 +83,34 @@ TEST_CASE("validate takes a prescribed acceleration, which only kinematics uses"
   CHECK(run_command({"simulate", file, "--out", folder.file("simulated")}).exit_code == kBadInput);
 }
 
+// 401 rows at 100 Hz; one column has no samples between 1.5 and 1.8 s. Windows are parts of one record.
+TEST_CASE("validate says what the columns of a record hold", "[command][identification]") {
+  const TemporaryFolder folder;
+  std::istringstream rows(content_of(std::filesystem::path(MBSOPT_SOURCE_DIR) / "data/identification/arm.csv"));
+  std::string record, row;
+  for (int i = -1; std::getline(rows, row); ++i) {
+    if (i > 150 && i < 180) row = row.substr(0, row.find(',') + 1) + row.substr(row.find(',', row.find(',') + 1));
+    record += row + "\n";
+  }
+  const CommandOutcome outcome = run_command({"validate", file_of("double_pendulum/identify_windows").string(), "--set",
+                                              "identification.experiments[0].data=" + folder.write("arm.csv", record),
+                                              "--out", folder.file("out")});
+  INFO(outcome.out << outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  CHECK_THAT(outcome.out, Contains("largest gap") && Contains("rad/s"));
+  const auto channels = json_of(folder.path / "out/result.json").at("preflight").at("channels");
+  REQUIRE(channels.size() == 4);
+  CHECK(channels[0].at("experiment") == "arm");
+  CHECK(channels[0].at("samples") == 401 - 29);
+  CHECK(channels[0].at("missing") == 29);
+  CHECK(channels[0].at("largest_gap").get<double>() == Approx(0.3));
+  CHECK(channels[1].at("samples") == 401);
+  for (const auto& channel : channels) CHECK(channel.at("interval").get<double>() == Approx(0.01));
+  CHECK(channels[1].at("largest_gap").get<double>() == Approx(0.01));
+  CHECK(channels[1].at("unit") == "rad");
+  CHECK(channels[2].at("unit") == "rad/s");
+}
+
 TEST_CASE("validate that is interrupted within the guesses of starts says so", "[command]") {
   const TemporaryFolder folder;
   struct sigaction of_tests = {};

@@ -350,6 +350,12 @@ TEST_CASE("a record of angles in degrees is doubted", "[identification]") {
   REQUIRE_FALSE(result.warnings.empty());
   CHECK_THAT(result.warnings.back(),
              Contains("identification.experiments[0].channels[0].column: ") && Contains("in degrees?"));
+  Problem stated = p;  // who states a unit is not asked
+  stated.identification->experiments[0].channels[0].unit = "rad";
+  CHECK(run_identification(stated, {data}).warnings.empty());
+  CsvTable named = data;
+  named.header[1] += " [rad]";
+  CHECK(run_identification(p, {named}).warnings.empty());
   p.identification->experiments[0].channels[0].gain = 180 / 3.14159265358979;
   p.identification->experiments[0].channels[0].sigma = 0.5;
   CHECK(run_identification(p, {data}).warnings.empty());

@@ -1,0 +1,142 @@
+#include "app/results/channel_data.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "app/results/sensor_unit.hpp"
+#include "app/terminal/text_table.hpp"
+#include "optim/fit/experiment.hpp"
+#include "optim/fit/unknown_parameters.hpp"
+#include "optim/machine/median.hpp"
+#include "optim/problem/logged_columns.hpp"
+#include "optim/problem/parameter_values.hpp"
+
+namespace mbsopt {
+namespace {
+
+// A channel of all windows of its experiment, in the order of time.
+struct RecordedChannel {
+  ChannelData data;
+  std::vector<double> times, measured;
+};
+
+void measure(RecordedChannel& column) {
+  ChannelData& d = column.data;
+  d.samples = column.times.size();
+  if (d.samples == 0) return;
+  const auto [least, most] = std::ranges::minmax(column.measured);
+  d.least = least, d.most = most;
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < column.times.size(); ++i) intervals.push_back(column.times[i] - column.times[i - 1]);
+  if (intervals.empty()) return;
+  d.gap = std::ranges::max(intervals), d.interval = median(std::move(intervals));
+}
+
+}  // namespace
+
+std::string record_name(const ExperimentSpec& experiment) {
+  return experiment.origin ? experiment.origin->experiment : experiment.name;
+}
+
+std::string unit_of_channel(const Scene& scene, const ChannelSpec& channel, const CsvTable& data) {
+  const std::string stated = stated_unit(channel, data);
+  if (const auto unit = stated.empty() ? std::nullopt : parse_column_unit(stated))
+    return unit->dimension.is_none() ? "1" : to_string(unit->dimension);
+  const auto sensor = std::ranges::find(scene.sensors, channel.sensor, &Sensor::name);
+  const bool same_unit = channel.gain.is_number() && channel.gain.number() == 1;
+  const std::string unit = sensor == scene.sensors.end() || !same_unit ? "" : unit_in(scene, *sensor);
+  return unit.empty() ? kUnknownUnit : unit;
+}
+
+std::vector<ChannelData> channel_data(const Problem& problem, const std::vector<CsvTable>& data) {
+  const IdentificationSpec& spec = *problem.identification;
+  std::vector<RecordedChannel> columns;
+  std::size_t first = 0;  // column of the experiment's first channel
+  for (std::size_t e = 0; e < spec.experiments.size(); ++e) {
+    const ExperimentSpec& experiment = spec.experiments[e];
+    const Experiment model(problem.scene, experiment, place_of(spec, e), data[e], parameter_values(problem.scene), {});
+    if (e == 0 || record_name(experiment) != record_name(spec.experiments[e - 1])) {
+      first = columns.size();
+      for (const ChannelSpec& channel : experiment.channels)
+        columns.push_back({{.experiment = record_name(experiment),
+                            .column = channel.column,
+                            .unit = unit_of_channel(problem.scene, channel, data[e]),
+                            .validates = experiment.validate},
+                           {},
+                           {}});
+    }
+    for (std::size_t c = 0; c < model.channels(); ++c) columns[first + c].data.missing += model.missing(c);
+    for (const Experiment::Sample& sample : model.samples()) {
+      columns[first + sample.channel].times.push_back(model.times()[sample.time]);
+      columns[first + sample.channel].measured.push_back(sample.measured);
+    }
+  }
+  std::vector<ChannelData> channels;
+  for (RecordedChannel& column : columns) {
+    measure(column);
+    channels.push_back(std::move(column.data));
+  }
+  return channels;
+}
+
+void add_residuals(std::vector<ChannelData>& channels, const IdentificationResult& start) {
+  std::vector<std::vector<std::size_t>> place;  // of each channel of each experiment
+  for (const ExperimentFit& experiment : start.experiments) {
+    const std::string& name = experiment.window ? experiment.window->experiment : experiment.name;
+    std::vector<std::size_t>& of = place.emplace_back();
+    for (const ChannelFit& channel : experiment.channels) {
+      const auto found = std::ranges::find_if(
+          channels, [&](const ChannelData& d) { return d.experiment == name && d.column == channel.column; });
+      of.push_back(static_cast<std::size_t>(found - channels.begin()));
+    }
+  }
+  std::vector<double> squares(channels.size()), samples(channels.size());
+  for (const ResidualRow& row : start.residuals) {
+    const std::size_t k = place[row.experiment][row.channel];
+    squares[k] += row.scaled * row.scaled, ++samples[k];
+  }
+  for (std::size_t k = 0; k < channels.size(); ++k)
+    if (samples[k] > 0) channels[k].rms_scaled = std::sqrt(squares[k] / samples[k]);
+}
+
+std::string channel_table(const std::vector<ChannelData>& channels) {
+  const bool simulated = std::ranges::any_of(channels, [](const auto& c) { return !std::isnan(c.rms_scaled); });
+  std::vector<std::string> header{"experiment",  "channel", "samples", "missing", "rate",
+                                  "largest gap", "least",   "most",    "unit"};
+  if (simulated) header.push_back("rms/sigma at the start");
+  TextTable table(std::move(header));
+  for (const ChannelData& c : channels) {
+    std::vector<std::string> row{c.experiment,
+                                 c.column,
+                                 std::to_string(c.samples),
+                                 std::to_string(c.missing),
+                                 c.interval > 0 ? significant(1 / c.interval, 3) + " Hz" : "-",
+                                 significant(c.gap, 3) + " s",
+                                 significant(c.least, 4),
+                                 significant(c.most, 4),
+                                 c.unit};
+    if (simulated) row.push_back(significant(c.rms_scaled, 4));
+    table.add(std::move(row));
+  }
+  return table.text();
+}
+
+Json to_json(const std::vector<ChannelData>& channels) {
+  Json all = Json::array();
+  for (const ChannelData& c : channels)
+    all.push_back({{"experiment", c.experiment},
+                   {"column", c.column},
+                   {"unit", c.unit},
+                   {"role", c.validates ? "validate" : "fit"},
+                   {"samples", c.samples},
+                   {"missing", c.missing},
+                   {"interval", c.interval},
+                   {"largest_gap", c.gap},
+                   {"least", c.least},
+                   {"most", c.most},
+                   {"rms_scaled", c.rms_scaled}});
+  return all;
+}
+
+}  // namespace mbsopt

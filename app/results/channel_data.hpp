@@ -1,0 +1,39 @@
+// What the columns of an identification hold, before anything is fitted. Windows of one experiment are one record.
+//
+//   std::vector<ChannelData> channels = channel_data(problem, data);   // problem: cut into windows, data: of these
+//   add_residuals(channels, start);                                    // start: of IdentificationOptions::preflight
+//   std::cout << channel_table(channels);
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "app/files/result_json.hpp"
+#include "optim/fit/identification.hpp"
+#include "optim/problem/csv_table.hpp"
+
+namespace mbsopt {
+
+struct ChannelData {
+  std::string experiment, column, unit;
+  bool validates = false;
+  std::size_t samples = 0, missing = 0;                          // of rows between the start and the end
+  double interval = 0, gap = 0;                                  // median and largest time between samples [s]
+  double least = 0, most = 0;                                    // measured, in the unit
+  double rms_scaled = std::numeric_limits<double>::quiet_NaN();  // of (measured - model)/sigma at the start, if known
+};
+
+std::vector<ChannelData> channel_data(const Problem& problem, const std::vector<CsvTable>& data);
+void add_residuals(std::vector<ChannelData>& channels, const IdentificationResult& start);
+
+std::string channel_table(const std::vector<ChannelData>& channels);
+Json to_json(const std::vector<ChannelData>& channels);
+
+// The experiment of the file that an experiment, or a window, belongs to.
+std::string record_name(const ExperimentSpec& experiment);
+
+// The SI unit of a column; kUnknownUnit if neither the file nor the sensor tells.
+std::string unit_of_channel(const Scene& scene, const ChannelSpec& channel, const CsvTable& data);
+
+}  // namespace mbsopt
