@@ -8,6 +8,7 @@
 
 #include "core/body/planar_frame.hpp"
 #include "core/dynamics/force_terms.hpp"
+#include "core/force/forces.hpp"
 
 namespace mbsopt {
 
