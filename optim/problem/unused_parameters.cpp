@@ -181,9 +181,11 @@ class FieldSearch {
     }
     return all;
   }
+  // A quantity that names no part of the mechanism is one of the whole.
   static bool measures_everything(const Sensor& sensor) {
-    return sensor.quantity == "energy" || sensor.quantity == "constraint_violation" ||
-           sensor.quantity == "smallest_singular_value";
+    const TypeRow* const row = find_row(kSensorQuantities, sensor.quantity);
+    constexpr const char* kParts[] = {"body", "body2", "joint", "force", "drive", "value"};
+    return row && std::ranges::all_of(kParts, [&](const char* part) { return need_of(*row, part) == Need::unknown; });
   }
 
   void connect_bodies() {

@@ -219,7 +219,14 @@ TEST_CASE("before the fit: what the columns hold, and what they would determine"
           Approx(10 * fit.at("parameters").at(name).at("std_error").get<double>()).epsilon(0.6));
   CHECK(!result.contains("parameters"));
   CHECK(channel.at("unit") == "m");
-  CHECK(fit.at("preflight").at("channels") == result.at("preflight").at("channels"));
+  // The fit simulates its start without derivatives, so that its residuals differ by rounding.
+  nlohmann::json of_fit = fit.at("preflight").at("channels"), of_preflight = result.at("preflight").at("channels");
+  for (std::size_t k = 0; k < of_preflight.size(); ++k)
+    CHECK(of_fit.at(k).at("rms_scaled").get<double>() ==
+          Approx(of_preflight[k].at("rms_scaled").get<double>()).epsilon(1e-12));
+  for (nlohmann::json* table : {&of_fit, &of_preflight})
+    for (nlohmann::json& row : *table) row.erase("rms_scaled");
+  CHECK(of_fit == of_preflight);
   CHECK(fit.at("covariance") == "white");
   CHECK(fit.at("recovery").at("m").at("truth") == fit.at("parameters").at("m").at("value"));
   CHECK(fit.at("recovery").at("m").at("fits") == 3);

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/constraint/constraint.hpp"
 #include "core/mechanism/mechanism_data.hpp"
 #include "core/start/assembly_equations.hpp"
 #include "core/start/nearest_point.hpp"
