@@ -241,15 +241,26 @@ std::optional<std::array<double, 3>> SceneFacts::law_at(const Expression& law, d
   }
 }
 
+namespace {
+
+// nullopt for an expression that is wrong: its own check reports that.
+std::optional<Dimension> dimension_if_any(const Expression& expression, const DimensionOfName& dimension_of_name,
+                                          PlainNumbers plain = PlainNumbers::fit_everything) {
+  try {
+    return infer_dimension(expression, dimension_of_name, plain);
+  } catch (const DimensionError&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
 std::optional<Dimension> SceneFacts::dimension_of_name(const std::string& name) const {
   if (const auto it = dimensions_.find(name); it != dimensions_.end()) return it->second;
   const Expression* const definition = none_.definition(name);
   if (!definition || is_broken(name)) return std::nullopt;
-  std::optional<Dimension> found;
-  try {
-    found = infer_dimension(*definition, [this](const std::string& inner) { return dimension_of_name(inner); });
-  } catch (const DimensionError&) {  // reported at the definition
-  }
+  std::optional<Dimension> found =
+      dimension_if_any(*definition, [this](const std::string& inner) { return dimension_of_name(inner); });
   if (found && found->is_none()) found.reset();  // a plain number may have any dimension
   return dimensions_[name] = found;
 }
@@ -284,12 +295,9 @@ std::optional<Dimension> SceneFacts::dimension_of(const Sensor& measured, PlainN
   if (!is_expression(measured)) return dimension_of_quantity(measured);
   if (!can_be_evaluated(measured.value, objective_)) return std::nullopt;
   const auto [it, is_new] = dimensions_of_sensors_.emplace(std::pair(measured.name, plain), std::nullopt);
-  if (!is_new) return it->second;
-  try {
-    it->second = infer_dimension(
+  if (is_new)
+    it->second = dimension_if_any(
         measured.value, [&](const std::string& name) { return dimension_in_sensor(name, plain); }, plain);
-  } catch (const DimensionError&) {  // reported at the sensor
-  }
   return it->second;
 }
 

@@ -288,6 +288,11 @@ TEST_CASE("dimensions follow through parameters and definitions", "[scene]") {
   CHECK(find_issues(scene).empty());
   scene.bodies[0].points["tip"][1] = Expression::parse("w*L");
   CHECK_THAT(at(scene, "bodies[0].points.tip[1]"), Catch::Contains("has the dimension m^2"));
+  scene.bodies[0].points["tip"][1] = 0.0;
+  scene.definitions.push_back({"sum", Expression::parse("L + w^2")});
+  scene.bodies[0].mass = Expression::parse("sum");  // wrong once, at its definition
+  CHECK_THAT(at(scene, "definitions.sum"), Catch::Contains("combines m with m^2"));
+  CHECK(find_issues(scene).size() == 1);
 }
 
 TEST_CASE("thousands of bodies are checked", "[scene]") {
