@@ -21,7 +21,7 @@ class TermResolver {
       : terms_(std::move(terms)), root_(root), findings_(findings) {}
 
   void load(std::vector<std::string>& plugins, bool allowed, const std::filesystem::path& folder) {
-    if (!plugins.empty() && !allowed)
+    if (!plugins.empty() && !allowed && !findings_.concerns("plugins"))
       add("plugins",
           "names code that would run inside this program: --allow-plugins lets it, for files that you trust");
     for (std::size_t i = 0; i < plugins.size(); ++i) {

@@ -331,13 +331,9 @@ void check_meaning(Checker& checker, const Force& force) {
   } else if (const auto* friction = std::get_if<FrictionSpec>(&force.kind)) {
     check_friction(checker, *friction);
   } else if (const auto* user = std::get_if<UserForceSpec>(&force.kind)) {
-    for (std::size_t i = 0; i < user->bodies.size(); ++i) {
-      const std::string place = child_path(checker.path("bodies"), i);
-      if (user->bodies[i] == "ground") checker.issue(place, "is the ground, which never moves");
-      if (std::find(user->bodies.begin(), user->bodies.begin() + static_cast<std::ptrdiff_t>(i), user->bodies[i]) !=
-          user->bodies.begin() + static_cast<std::ptrdiff_t>(i))
-        checker.issue(place, "is '" + user->bodies[i] + "' once more");
-    }
+    for (std::size_t i = 0; i < user->bodies.size(); ++i)
+      if (user->bodies[i] == "ground")
+        checker.issue(child_path(checker.path("bodies"), i), "is the ground, which never moves");
   }
 }
 

@@ -144,7 +144,7 @@ TEST_CASE("unknown terms, parameters and numbers of bodies are errors with their
   CHECK_THAT(refused(replaced(named(), "\"bodies\": [\"rod\", \"bob\"],\n", "\"bodies\": [\"rod\"],\n")),
              Contains("forces[0].bodies: has 1 name, but 'two_drags' acts on 2 bodies"));
   CHECK_THAT(refused(replaced(named(), "\"bodies\": [\"rod\", \"bob\"],\n", "\"bodies\": [\"rod\", \"rod\"],\n")),
-             Contains("forces[0].bodies[1]: is 'rod' once more"));
+             Contains("forces[0].bodies[1]: 'rod' is listed twice"));
   CHECK_THAT(refused(replaced(kNamed, "\"plugins\": [\"PLUGIN\"],", "")),
              Contains("forces[0].force: there is no force 'two_drags'") && Contains("neither the program"));
 }
