@@ -51,11 +51,14 @@ std::string unit_of_channel(const Scene& scene, const ChannelSpec& channel, cons
 
 std::vector<ChannelData> channel_data(const Problem& problem, const std::vector<CsvTable>& data) {
   const IdentificationSpec& spec = *problem.identification;
+  const std::vector<UnknownParameter> of_fit = unknowns_of_fit(problem.scene, spec);
   std::vector<RecordedChannel> columns;
   std::size_t first = 0;  // column of the experiment's first channel
   for (std::size_t e = 0; e < spec.experiments.size(); ++e) {
     const ExperimentSpec& experiment = spec.experiments[e];
-    const Experiment model(problem.scene, experiment, place_of(spec, e), data[e], parameter_values(problem.scene), {});
+    const auto& unknowns = experiment.validate ? free_in(problem.scene, spec, e) : of_fit;
+    const Experiment model(problem.scene, experiment, place_of(spec, e), data[e], parameter_values(problem.scene),
+                           unknowns_in(problem.scene, spec, e, unknowns));  // whose bounds say how far a delay reaches
     if (e == 0 || record_name(experiment) != record_name(spec.experiments[e - 1])) {
       first = columns.size();
       for (const ChannelSpec& channel : experiment.channels)

@@ -1,7 +1,7 @@
 // What the columns of an identification hold, before anything is fitted. Windows of one experiment are one record.
 //
 //   std::vector<ChannelData> channels = channel_data(problem, data);   // problem: cut into windows, data: of these
-//   add_residuals(channels, start);                                    // start: of IdentificationOptions::preflight
+//   add_residuals(channels, start);                                    // start: residuals_at_start, or a preflight
 //   std::cout << channel_table(channels);
 #pragma once
 
@@ -18,9 +18,9 @@ namespace mbsopt {
 struct ChannelData {
   std::string experiment, column, unit;
   bool validates = false;
-  std::size_t samples = 0, missing = 0;                          // of rows between the start and the end
-  double interval = 0, gap = 0;                                  // median and largest time between samples [s]
-  double least = 0, most = 0;                                    // measured, in the unit
+  std::size_t samples = 0, missing = 0;  // of rows between the start and the end that no delay takes before the start
+  double interval = 0, gap = 0;          // median and largest time between samples [s]
+  double least = 0, most = 0;            // measured, in the unit
   double rms_scaled = std::numeric_limits<double>::quiet_NaN();  // of (measured - model)/sigma at the start, if known
 };
 

@@ -13,6 +13,7 @@ namespace mbsopt {
 IdentificationResult residuals_at_start(const Problem& problem, const std::vector<CsvTable>& data,
                                         const IdentificationOptions& options) {
   const IdentificationSpec& spec = *problem.identification;
+  const std::vector<UnknownParameter> unknowns = unknowns_of_fit(problem.scene, spec);
   std::atomic<bool> abandoned = false;
   Experiment::Limits limits;
   limits.derivatives = false;
@@ -26,9 +27,10 @@ IdentificationResult residuals_at_start(const Problem& problem, const std::vecto
   for (std::size_t e = 0; e < models.size(); ++e)
     if (!spec.experiments[e].validate)
       models[e].emplace(problem.scene, spec.experiments[e], place_of(spec, e), data[e], parameter_values(problem.scene),
-                        std::vector<Experiment::Unknown>{}, options.user_forces);
+                        unknowns_in(problem.scene, spec, e, unknowns), options.user_forces);
+  const Eigen::VectorXd u = start_of(unknowns);
   on_threads(models.size(), options.threads, [&](std::size_t e) {
-    if (models[e]) found[e] = models[e]->residuals(Eigen::VectorXd(), limits);
+    if (models[e]) found[e] = models[e]->residuals(u, limits);
   });
   IdentificationResult start;
   start.experiments.resize(models.size());

@@ -238,6 +238,22 @@ TEST_CASE("before the fit: what the columns hold, and what they would determine"
         nlohmann::json::array({"m, k, c: only m/c and k/c are determined"}));
 }
 
+TEST_CASE("the table of columns leaves out what a fitted delay may take before the start, as the fit does",
+          "[identification][command]") {
+  const TemporaryFolder folder, other;
+  const auto fit = identified(folder, "damper/identify_law"),
+             only = identified(other, "damper/identify_law", {"--preflight"});
+  for (std::size_t e = 0; e < 2; ++e) {
+    const nlohmann::json &row = fit.at("preflight").at("channels").at(e),
+                         &of_preflight = only.at("preflight").at("channels").at(e);
+    const std::string name = row.at("experiment");
+    CHECK(row.at("samples") == 199);  // of 201 rows
+    CHECK(row.at("samples") == fit.at("experiments").at(name).at("channels").at("z").at("samples"));
+    CHECK(row.at("samples") == of_preflight.at("samples"));
+    CHECK(row.at("rms_scaled").get<double>() == Approx(of_preflight.at("rms_scaled").get<double>()).epsilon(1e-9));
+  }
+}
+
 // Its angle wraps at 180 degrees, which is said; that it is in degrees, the header says.
 TEST_CASE("a column that states its unit is not asked whether it is in degrees", "[identification][command]") {
   const TemporaryFolder folder;
