@@ -44,11 +44,6 @@ namespace {
 
 std::string without_unit(const std::string& column) { return column.substr(0, column.find(" [")); }
 
-// The windows of one experiment are one record in the report.
-std::string record_of(const ExperimentFit& experiment) {
-  return experiment.window ? experiment.window->experiment : experiment.name;
-}
-
 // Ends a part of the plot: neither a curve nor a correlation continues from one window to the next.
 void add_gap(std::vector<double>& times, double next, std::initializer_list<std::vector<double>*> values) {
   if (times.empty()) return;
@@ -61,19 +56,19 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const std::vector<CsvTabl
                                const IdentificationResult& fit, const IdentificationResult& start) {
   std::vector<FitPlot> plots;
   std::vector<std::size_t> first;  // plot of each experiment's first channel
-  for (std::size_t e = 0; e < fit.experiments.size(); ++e) {
-    const ExperimentFit& experiment = fit.experiments[e];
-    if (e > 0 && experiment.window && record_of(experiment) == record_of(fit.experiments[e - 1])) {
+  const std::vector<ExperimentSpec>& experiments = problem.identification->experiments;
+  for (std::size_t e = 0; e < experiments.size(); ++e) {
+    const ExperimentSpec& experiment = experiments[e];
+    if (e > 0 && experiment.origin && record_name(experiment) == record_name(experiments[e - 1])) {
       first.push_back(first.back());
       continue;
     }
     first.push_back(plots.size());
-    for (std::size_t c = 0; c < experiment.channels.size(); ++c)
-      plots.push_back(
-          {.experiment = record_of(experiment),
-           .channel = without_unit(experiment.channels[c].column),
-           .unit = unit_of_channel(problem.scene, problem.identification->experiments[e].channels[c], data[e]),
-           .validates = experiment.validate});
+    for (const ChannelSpec& channel : experiment.channels)
+      plots.push_back({.experiment = record_name(experiment),
+                       .channel = without_unit(channel.column),
+                       .unit = unit_of_channel(problem.scene, channel, data[e]),
+                       .validates = experiment.validate});
   }
   std::vector<std::optional<std::size_t>> last(plots.size()), last_at_start(plots.size());  // experiment of a plot
   for (const ResidualRow& row : fit.residuals) {
@@ -95,6 +90,8 @@ std::vector<FitPlot> fit_plots(const Problem& problem, const std::vector<CsvTabl
     last_at_start[k] = row.experiment;
     plot.initial_times.push_back(row.t), plot.initial.push_back(row.model);
   }
+  // A fit that ended within its first evaluation has no residuals.
+  std::erase_if(plots, [](const FitPlot& plot) { return plot.times.empty(); });
   return plots;
 }
 

@@ -44,7 +44,7 @@ std::vector<double> doubles_of(std::string_view base64) {
     if (decoded != static_cast<int>(characters / 4 * 3)) refuse();
   }
   std::vector<double> values(size / sizeof(double));
-  std::memcpy(values.data(), bytes.data(), size);
+  if (size > 0) std::memcpy(values.data(), bytes.data(), size);
   return values;
 }
 

@@ -202,6 +202,26 @@ TEST_CASE("identify: an angle that wraps, is in degrees or never moves costs no 
         Approx(20).epsilon(1e-4));
 }
 
+TEST_CASE("identify: a signal before the first evaluation has ended leaves a report and a journal",
+          "[command][resume]") {
+  const TemporaryFolder folder;
+  folder.write("swing.csv", measured_swing(folder));
+  const std::string file = folder.write("fit.json", identification_problem());
+  const std::filesystem::path out = folder.path / "out";
+  std::thread signal([&] {
+    for (int i = 0; i < 3000 && !std::filesystem::exists(out / kJournalFile); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    ::kill(::getpid(), SIGTERM);
+  });
+  const CommandOutcome outcome =
+      run_command({"identify", file, "--out", out.string(), "--set", "simulation.integrator.max_step=2e-5"});
+  signal.join();
+  INFO(outcome.err);
+  REQUIRE(outcome.exit_code == kInterrupted);
+  CHECK(json_of(out / "result.json").at("status") == "interrupted");
+  CHECK_THAT(content_of(out / "report.html"), Contains("interrupted"));
+}
+
 TEST_CASE("identify: what GNU timeout ends keeps the best values so far", "[command][resume]") {
   const TemporaryFolder folder;
   folder.write("swing.csv", measured_swing(folder));
