@@ -375,9 +375,10 @@ class Campaign:
 
         sizes = [0, 1, 100, 700, 1500, 2500, 3500, 5000, 9000, 20000]
         cases = [("file size", resource.RLIMIT_FSIZE, n) for n in sizes]
-        cases += [("descriptors", resource.RLIMIT_NOFILE, n) for n in (3, 4, 5, 6, 7, 8, 10, 12)]
         megabytes = (20, 40, 60, 80, 100, 120, 140, 160, 180, 200, 240, 280, 320, 400)
-        if self.a.fail_calls:  # sanitizers, with which it is left out, need terabytes of addresses
+        # Sanitizers, with which fail_calls is left out, need terabytes of addresses, and pipes to look at an object.
+        if self.a.fail_calls:
+            cases += [("descriptors", resource.RLIMIT_NOFILE, n) for n in (3, 4, 5, 6, 7, 8, 10, 12)]
             cases += [("memory", resource.RLIMIT_AS, n << 20) for n in megabytes]
         for name, (what, which, amount) in self.some([(n, c) for n in ALL for c in cases], 12):
             # The loader says with 127 that it finds no room for the libraries.

@@ -209,7 +209,7 @@ TEST_CASE("identify: a signal before the first evaluation has ended leaves a rep
   const std::string file = folder.write("fit.json", identification_problem());
   const std::filesystem::path out = folder.path / "out";
   std::thread signal([&] {
-    for (int i = 0; i < 3000 && !std::filesystem::exists(out / kJournalFile); ++i)
+    for (int i = 0; i < 30000 && !std::filesystem::exists(out / kJournalFile); ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     ::kill(::getpid(), SIGTERM);
   });
@@ -228,7 +228,7 @@ TEST_CASE("identify: what GNU timeout ends keeps the best values so far", "[comm
   const std::string file = folder.write("fit.json", identification_problem());
   const std::filesystem::path out = folder.path / "out";
   std::thread timeout([&] {
-    for (int i = 0; i < 3000 && !(std::filesystem::exists(out / kJournalFile) && journal_lines(out, "iterate") >= 2);
+    for (int i = 0; i < 30000 && !(std::filesystem::exists(out / kJournalFile) && journal_lines(out, "iterate") >= 2);
          ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     ::kill(::getpid(), SIGTERM);
