@@ -78,11 +78,8 @@ class Sweep {
     say("reference", 0);
     ReferenceOptions options;
     options.seconds_per_run = std::max(10.0, options_.budget_seconds / 6);
-    options.interrupted = [this] {  // asked after every step
-      say("reference", 0);
-      return interrupted();
-    };
-    options.clock = options_.clock;
+    options.interrupted = options_.interrupted, options.clock = options_.clock;
+    options.progress = [this](const std::string& doing, double done) { say("reference, " + doing, done); };
     result_.reference = converged_reference(runs_, options);
     result_.message = result_.reference.message;
   }
