@@ -58,8 +58,9 @@ TEST_CASE("linearise takes a later state, and refuses what is not there", "[comm
   CHECK(run("--at", "0.5").exit_code == kDone);
   CHECK(json_of(folder.path / "out/result.json").at("linearisation").at("time").get<double>() == Approx(0.5));
   CHECK_THAT(run("--at", "-1").err, Contains("must be after start_time"));
-  CHECK_THAT(run("--inputs", "w").err, Contains("--inputs: there is no 'w'"));
-  CHECK_THAT(run("--outputs", "y").err, Contains("--outputs: there is no 'y'"));
+  CHECK_THAT(run("--inputs", "w").err,
+             Contains("--inputs: there is no parameter 'w'") && Contains("known: k, c, u, at"));
+  CHECK_THAT(run("--outputs", "y").err, Contains("--outputs: there is no sensor 'y'") && Contains("known: x, vx"));
   CHECK(run("--outputs", "y").exit_code == kBadInput);
 }
 

@@ -162,6 +162,7 @@ TEST_CASE("what a sweep cannot vary is said", "[command][sweep]") {
   };
   CHECK_THAT(words({}), Contains("either --vary") && Contains("--points"));
   CHECK_THAT(words({"--vary", "fre=1:2:3"}), Contains("no parameter 'fre'") && Contains("free"));
+  CHECK_THAT(words({"--vary", "zz=1:2:3"}), Contains("no parameter 'zz'; known: k, free"));
   CHECK_THAT(words({"--vary", "free=1:2"}), Contains("no number of points"));
   CHECK_THAT(words({"--vary", "free=2:1:3"}), Contains("not below"));
   CHECK_THAT(words({"--vary", "k=-1:1:3"}), Contains("logarithmic"));
