@@ -227,7 +227,7 @@ int linearise_command(const CommandContext& context) {
     if (x.eigenvalues(k).imag() >= 0) shapes.push_back(displaced_row(mechanism, *state, x, k));
   }
   run.write("report.html",
-            linearisation_report(scene, run.result, row_of(mechanism, state->t, state->y, state->angles), shapes));
+            linearisation_report(scene, run.result, x, row_of(mechanism, state->t, state->y, state->angles), shapes));
   return run.finish();
 }
 
