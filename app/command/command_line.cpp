@@ -101,6 +101,22 @@ int flushed(int exit_code, std::ostream& out, std::ostream& err) {
   return exit_code == kDone ? kNumericalFailure : exit_code;
 }
 
+// "--outt" of `mbsopt simulate --outt x`, or the words that no option takes.
+std::string what_is_not_expected(const CLI::App& app) {
+  const CLI::App& command = *app.get_subcommands().front();
+  std::vector<std::string> known;
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  const std::vector<std::string> words = app.remaining(true);
+  const auto option = std::ranges::find_if(words, [](const std::string& word) { return word.starts_with('-'); });
+  if (option == words.end())
+    return fmt::format("{}: nothing takes '{}'; mbsopt help {} lists what it takes", command.get_name(),
+                       fmt::join(words, " "), command.get_name());
+  const std::string name = option->substr(0, option->find('='));
+  return fmt::format("{}: there is no option '{}'{}; known: {}", command.get_name(), name, did_you_mean(name, known),
+                     joined(known));
+}
+
 void parse(CLI::App& app, const std::vector<std::string>& arguments) {
   app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them last first
 }
@@ -141,6 +157,9 @@ int run_command_line(const std::vector<std::string>& given, std::ostream& out, s
   }
   try {
     parse(app, arguments);
+  } catch (const CLI::ExtrasError&) {
+    err << fmt::format("mbsopt {}\n", what_is_not_expected(app));
+    return kBadInput;
   } catch (const CLI::ParseError& error) {
     return flushed(app.exit(error, out, err) == 0 ? kDone : kBadInput, out, err);
   }

@@ -1,8 +1,13 @@
 #include "app/command/command_options.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
 
 #include "app/command/starter_files.hpp"
+#include "core/expression/did_you_mean.hpp"
 
 namespace mbsopt {
 namespace {
@@ -14,6 +19,15 @@ void add_run_options(CLI::App& sub, CommandOptions& options) {
   sub.add_flag("--allow-plugins", options.allow_plugins,
                "load the shared libraries that the problem names, which run code of their own");
   sub.add_flag("--json", options.json, "print result.json on standard output, and nothing else there");
+}
+
+// One of the words. The description also serves the completion.
+CLI::Validator one_of(const std::vector<std::string>& words) {
+  const auto find = [words](const std::string& word) {
+    if (std::ranges::find(words, word) != words.end()) return std::string();
+    return fmt::format("there is no '{}'{}; known: {}", word, did_you_mean(word, words), joined(words));
+  };
+  return {find, fmt::format("{{{}}}", fmt::join(words, ","))};
 }
 
 void add_keep_journal(CLI::App& sub, CommandOptions& options) {
@@ -58,7 +72,7 @@ void linearise_options(CLI::App& sub, CommandOptions& options) {
 void gradient_options(CLI::App& sub, CommandOptions& options) {
   problem_options(sub, options);
   sub.add_option("--method", options.method, "how gradients are computed")
-      ->check(CLI::IsMember({"auto", "tlm", "adjoint", "cvodes_forward", "cvodes_adjoint", "fd"}))
+      ->check(one_of({"auto", "tlm", "adjoint", "cvodes_forward", "cvodes_adjoint", "fd"}))
       ->capture_default_str();
   sub.add_flag("--hessian", options.hessian,
                "second derivatives, too: extrapolated differences of the adjoint gradient (of the tlm gradient with "
@@ -122,7 +136,7 @@ void resume_options(CLI::App& sub, CommandOptions& options) {
 void new_options(CLI::App& sub, CommandOptions& options) {
   std::vector<std::string> kinds;
   for (const Starter& starter : starters()) kinds.emplace_back(starter.kind);
-  sub.add_option("kind", options.starter, "kind of task")->required()->check(CLI::IsMember(kinds));
+  sub.add_option("kind", options.starter, "kind of task")->required()->check(one_of(kinds));
   sub.add_option("--out", options.out, "folder for the file (default: the current one)");
 }
 

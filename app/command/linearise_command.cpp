@@ -22,14 +22,16 @@ constexpr double kWrongDigits = 1e-6;  // of an eigenvalue: larger errors are re
 
 // The indices of names in a list, or all indices if there are no names.
 template <class Named>
-std::vector<int> places(const char* option, const std::vector<std::string>& names, const std::vector<Named>& list) {
+std::vector<int> places(const char* option, const char* kind, const std::vector<std::string>& names,
+                        const std::vector<Named>& list) {
   std::vector<std::string> known;
   for (const Named& x : list) known.push_back(x.name);
   std::vector<int> out;
   for (const std::string& name : names) {
     const auto found = std::find(known.begin(), known.end(), name);
     if (found == known.end())
-      throw std::invalid_argument(fmt::format("{}: there is no '{}'{}", option, name, did_you_mean(name, known)));
+      throw std::invalid_argument(fmt::format("{}: there is no {} '{}'{}; known: {}", option, kind, name,
+                                              did_you_mean(name, known), joined(known)));
     out.push_back(static_cast<int>(found - known.begin()));
   }
   return out;
@@ -192,8 +194,8 @@ std::vector<double> displaced_row(const Mechanism& mechanism, const State& state
 int linearise_command(const CommandContext& context) {
   Run run(context);
   const Scene& scene = run.problem.scene;
-  const std::vector<int> inputs = places("--inputs", context.options.inputs, scene.parameters);
-  std::vector<int> outputs = places("--outputs", context.options.outputs, scene.sensors);
+  const std::vector<int> inputs = places("--inputs", "parameter", context.options.inputs, scene.parameters);
+  std::vector<int> outputs = places("--outputs", "sensor", context.options.outputs, scene.sensors);
   if (context.options.outputs.empty()) {
     for (std::size_t k = 0; k < scene.sensors.size(); ++k) outputs.push_back(static_cast<int>(k));
   }
@@ -225,7 +227,7 @@ int linearise_command(const CommandContext& context) {
     if (x.eigenvalues(k).imag() >= 0) shapes.push_back(displaced_row(mechanism, *state, x, k));
   }
   run.write("report.html",
-            linearisation_report(scene, run.result, row_of(mechanism, state->t, state->y, state->angles), shapes));
+            linearisation_report(scene, run.result, x, row_of(mechanism, state->t, state->y, state->angles), shapes));
   return run.finish();
 }
 

@@ -54,24 +54,31 @@ void add_ranges(Run& run, const SweepPoints& points, const std::vector<SweepRow>
   TextTable table({"objective", "unit", "least", "at point", "largest", "at point"});
   const ObjectiveUnits units = objective_units(run.problem);
   for (std::size_t o = 0; o < run.problem.objectives.size(); ++o) {
-    const Eigen::Index k = static_cast<Eigen::Index>(o);
+    const ObjectiveSpec& spec = run.problem.objectives[o];
+    const auto judged = [&](const SweepRow& row) -> std::optional<double> {
+      if (row.psi.size() == 0) return {};
+      return spec.is_extreme() ? row.true_values[o] : row.psi(static_cast<Eigen::Index>(o));
+    };
     const SweepRow* least = nullptr;
     const SweepRow* largest = nullptr;
     for (const SweepRow& row : rows) {
-      if (row.psi.size() == 0) continue;
-      if (!least || row.psi(k) < least->psi(k)) least = &row;
-      if (!largest || row.psi(k) > largest->psi(k)) largest = &row;
+      const std::optional<double> value = judged(row);
+      if (!value) continue;
+      if (!least || *value < *judged(*least)) least = &row;
+      if (!largest || *value > *judged(*largest)) largest = &row;
     }
     if (!least) continue;
     const auto number = [&](const SweepRow* row) { return static_cast<long>(row - rows.data()) + 1; };
-    const std::string& name = run.problem.objectives[o].name;
-    run.result["sweep"]["objectives"][name] = {{"least", least->psi(k)},
-                                               {"least_at", number(least)},
-                                               {"largest", largest->psi(k)},
-                                               {"largest_at", number(largest)}};
-    if (!units.at(name).empty()) run.result["sweep"]["objectives"][name]["unit"] = units.at(name);
-    table.add({name, shown_unit(units, name), significant(least->psi(k)), std::to_string(number(least)),
-               significant(largest->psi(k)), std::to_string(number(largest))});
+    Json& range = run.result["sweep"]["objectives"][spec.name];
+    range = {{"of", spec.is_extreme() ? "true_value" : "value"},
+             {"least", *judged(*least)},
+             {"least_at", number(least)},
+             {"largest", *judged(*largest)},
+             {"largest_at", number(largest)}};
+    if (!units.at(spec.name).empty()) range["unit"] = units.at(spec.name);
+    table.add({spec.name + (spec.is_extreme() ? " (true)" : ""), shown_unit(units, spec.name),
+               significant(*judged(*least)), std::to_string(number(least)), significant(*judged(*largest)),
+               std::to_string(number(largest))});
   }
   run.context.out << fmt::format("{} points of {} parameter{}\n\n", rows.size(), points.parameters.size(),
                                  points.parameters.size() == 1 ? "" : "s");

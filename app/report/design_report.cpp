@@ -32,7 +32,8 @@ void add_design_verdict(HtmlPage& page, const Json& result) {
   if (before != 0) words += fmt::format(" ({:+.3g} %)", 100 * (after - before) / std::abs(before));
   words += " in " + counted(optimizer.at("iterations").get<long>(), "iteration");
   if (result.at("objectives").size() > 1)
-    words += fmt::format("; the largest relative violation of a limit is {}", cell(optimizer.at("infeasibility"), 2));
+    words +=
+        fmt::format("; the largest relative violation of a limit is {}", cell(optimizer.at("true_infeasibility"), 2));
   long at_bounds = 0;
   for (const Json& p : result.at("parameters")) at_bounds += p.value("at_bound", Json()).is_string() ? 1 : 0;
   page.verdict(fmt::format("{}; {} of {} at a bound.", words, at_bounds,

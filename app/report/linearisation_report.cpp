@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "app/report/mechanism_drawing.hpp"
 #include "app/report/report_parts.hpp"
 #include "app/report/run_report.hpp"
+#include "app/results/sensor_unit.hpp"
 #include "core/expression/counted.hpp"
 
 namespace mbsopt {
@@ -28,10 +30,71 @@ void add_modes_verdict(HtmlPage& page, const Json& modes) {
                   counted(static_cast<long>(modes.size()), "mode"), slowest, fastest, damping, growth));
 }
 
+// "rad/N", "m/(N/m)"
+std::string per(const std::string& output, const std::string& input) {
+  if (input.empty()) return output;
+  const bool one = input.find_first_of(" /*") == std::string::npos;
+  return output + (one ? "/" + input : "/(" + input + ")");
+}
+
+// The amplitude of each output for an input of amplitude 1, from a tenth of the slowest to ten times the fastest mode.
+void add_responses(HtmlPage& page, const Scene& scene, const Json& result, const Linearisation& x) {
+  constexpr int kFrequencies = 400;
+  constexpr std::size_t kDrawn = 12;
+  const auto inputs = result.at("inputs").get<std::vector<std::string>>(),
+             outputs = result.at("outputs").get<std::vector<std::string>>();
+  if (inputs.empty() || outputs.empty()) return;
+  double slowest = INFINITY, fastest = 0;
+  for (const std::complex<double>& e : x.eigenvalues)
+    if (const double f = frequency(e); f > 0) slowest = std::min(slowest, f), fastest = std::max(fastest, f);
+  page.heading("From inputs to outputs");
+  page.paragraph(
+      "Static: the change of the output by a constant input of 1. Below: the amplitude of the output when the input "
+      "swings with amplitude 1.");
+  const Eigen::MatrixXcd still = transfer(x, 0);
+  std::vector<TableRow> rows;
+  std::vector<LinePlot> plots;
+  for (std::size_t j = 0; j < inputs.size(); ++j) {
+    const auto parameter = std::ranges::find(scene.parameters, inputs[j], &Parameter::name);
+    for (std::size_t i = 0; i < outputs.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(j);
+      const auto sensor = std::ranges::find(scene.sensors, outputs[i], &Sensor::name);
+      const std::string unit = per(unit_in(scene, *sensor), parameter->unit);
+      const double gain = still(row, column).real();
+      rows.push_back({inputs[j], outputs[i], std::isfinite(gain) ? number_cell(gain, 6) : TableCell("-"), unit});
+      if (plots.size() == kDrawn || !(fastest > 0)) continue;
+      LinePlot plot{.title = fmt::format("{} by {}", outputs[i], inputs[j]),
+                    .x_label = "frequency [Hz]",
+                    .y_label = fmt::format("amplitude [{}]", unit),
+                    .logarithmic_y = true,
+                    .logarithmic_x = true};
+      plot.series.push_back({outputs[i], {}, {}});
+      plots.push_back(std::move(plot));
+    }
+  }
+  page.table({"input", "output", "static", "unit"}, rows);
+  for (int k = 0; k <= kFrequencies && !plots.empty(); ++k) {
+    const double f = 0.1 * slowest * std::pow(100 * fastest / slowest, static_cast<double>(k) / kFrequencies);
+    const Eigen::MatrixXcd G = transfer(x, {0, 2 * std::numbers::pi * f});
+    for (std::size_t p = 0; p < plots.size(); ++p) {
+      PlotSeries& series = plots[p].series.front();
+      series.x.push_back(f);
+      series.y.push_back(
+          std::abs(G(static_cast<Eigen::Index>(p % outputs.size()), static_cast<Eigen::Index>(p / outputs.size()))));
+    }
+  }
+  const auto is_zero = [](const LinePlot& plot) {
+    return std::ranges::none_of(plot.series.front().y, [](double y) { return y > 0; });
+  };
+  std::erase_if(plots, is_zero);
+  for (const LinePlot& plot : plots) page.plot(plot);
+  if (rows.size() > kDrawn) page.note(fmt::format("The first {} of {} responses are drawn.", kDrawn, rows.size()));
+}
+
 }  // namespace
 
-std::string linearisation_report(const Scene& scene, const Json& result, const std::vector<double>& state,
-                                 const std::vector<std::vector<double>>& shapes) {
+std::string linearisation_report(const Scene& scene, const Json& result, const Linearisation& x,
+                                 const std::vector<double>& state, const std::vector<std::vector<double>>& shapes) {
   constexpr std::size_t kDrawn = 12;  // modes that a reader still tells apart
   HtmlPage page(report_title(result));
   const Json& modes = result.at("linearisation").at("modes");
@@ -51,6 +114,7 @@ std::string linearisation_report(const Scene& scene, const Json& result, const s
     page.drawing(mechanism_drawing(title, plane, {{"state", scene, state}, {"displaced", scene, shapes[k]}}));
   }
   if (shapes.size() > kDrawn) page.paragraph(fmt::format("The first {} of {} modes are drawn.", kDrawn, shapes.size()));
+  add_responses(page, scene, result.at("linearisation"), x);
   add_model(page, result);
   add_provenance(page, result);
   return page.text();

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 #include "app/report/html_text.hpp"
@@ -111,38 +112,67 @@ std::string path_through(const std::vector<Point2>& pixels, bool closed) {
   return closed ? d + "Z" : d;
 }
 
-std::string zigzag(const Point2& from, const Point2& to) {
-  constexpr int kTurns = 12;
-  constexpr double kWide = 5;  // [px]
+// A coil as in script/symbols.js: seen from the side, and a little from the end.
+std::string coil(const Point2& from, const Point2& to) {
+  constexpr int kTurns = 10, kSamples = 12;  // of a turn
+  constexpr double kRadius = 5;              // [px]
   const Point2 along = to - from;
   const double length = along.norm();
-  const Point2 across = length > 0 ? Point2(Point2(-along.y(), along.x()) / length * kWide) : Point2(0, 0);
-  std::vector<Point2> pixels{from, from + 0.15 * along};
-  for (int i = 1; i < kTurns; ++i)
-    pixels.push_back(from + (0.15 + 0.7 * i / kTurns) * along + (i % 2 == 0 ? -1.0 : 1.0) * across);
-  pixels.push_back(from + 0.85 * along);
+  if (!(length > 0)) return path_through({from, to}, false);
+  const Point2 forward = along / length, across(-forward.y(), forward.x());
+  std::vector<Point2> pixels{from};
+  for (int i = 0; i <= kTurns * kSamples; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kSamples;
+    pixels.push_back(from + (0.15 + 0.7 * i / (kTurns * kSamples)) * along +
+                     kRadius * ((0.5 - 0.5 * std::cos(angle)) * forward + std::sin(angle) * across));
+  }
   pixels.push_back(to);
   return path_through(pixels, false);
 }
 
-void draw_state(const DrawnSketch& drawn, const View& view, bool last, std::string& svg) {
+Point2 middle_of(const std::vector<Point2>& points) {
+  Point2 middle(0, 0);
+  for (const Point2& p : points) middle += p / static_cast<double>(points.size());
+  return middle;
+}
+
+std::vector<Point2> outline_of(const DrawnSketch& drawn, std::size_t body, const View& view) {
+  std::vector<Point2> pixels;
+  for (const Point3& s : drawn.sketch.bodies[body]) pixels.push_back(view(placed(drawn.state.row, {body, s})));
+  return outline(std::move(pixels));
+}
+
+// A name beside a body. Beside a bar its nearest corner is kGap off the bar, on the side away from `other`.
+std::string name_beside(const std::vector<Point2>& hull, const Point2& other, const std::string& name) {
+  constexpr double kGap = 6, kAscent = 10, kDescent = 3;  // [px]
+  const Point2 middle = middle_of(hull);
+  Point2 side(1, -1);
+  if (hull.size() == 2) {
+    const Point2 along = (hull[1] - hull[0]).normalized();
+    side = {-along.y(), along.x()};
+    const double away = side.dot(middle - other);
+    if (std::abs(away) > 1 ? away < 0 : side.x() < 0) side = -side;
+  }
+  const Point2 at = middle + kGap * side;
+  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\"{}>{}</text>\n", at.x(),
+                     at.y() + (side.y() > 0 ? kAscent : -kDescent), side.x() < 0 ? " text-anchor=\"end\"" : "",
+                     html_escaped(name));
+}
+
+// Names stand in the last state, on the side away from the first.
+void draw_state(const DrawnSketch& drawn, const DrawnSketch& first, const View& view, bool last, std::string& svg) {
   const auto& [state, sketch] = drawn;
   svg += last ? "<g>\n" : "<g class=\"earlier\">\n";
   for (const SketchedSpring& spring : sketch.springs) {
     svg += fmt::format("<path class=\"spring\" d=\"{}\"/>\n",
-                       zigzag(view(placed(state.row, spring.from)), view(placed(state.row, spring.to))));
+                       coil(view(placed(state.row, spring.from)), view(placed(state.row, spring.to))));
   }
   for (std::size_t i = 0; i < sketch.bodies.size(); ++i) {
-    std::vector<Point2> pixels;
-    Point2 middle(0, 0);
-    for (const Point3& s : sketch.bodies[i]) pixels.push_back(view(placed(state.row, {i, s})));
-    const std::vector<Point2> hull = outline(std::move(pixels));
-    for (const Point2& p : hull) middle += p / static_cast<double>(hull.size());
+    const std::vector<Point2> hull = outline_of(drawn, i, view);
     svg += fmt::format("<path class=\"body c{0} f{0}\" d=\"{1}\"/>\n", i % kBodyColours,
                        hull.size() == 1 ? path_through(hull, false) + "h0" : path_through(hull, hull.size() > 2));
     if (last && sketch.bodies.size() <= kMostNames)
-      svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", middle.x() + 6, middle.y() - 6,
-                         html_escaped(state.scene.bodies[i].name));
+      svg += name_beside(hull, middle_of(outline_of(first, i, view)), state.scene.bodies[i].name);
   }
   for (const SketchedJoint& joint : sketch.joints) {
     const BodyPoint at = drawn_point(joint);
@@ -204,7 +234,7 @@ std::string mechanism_drawing(const std::string& title, std::array<int, 2> plane
   std::string svg = fmt::format("<svg viewBox=\"0 0 {} {:.0f}\" role=\"img\" aria-label=\"{}\">\n", kWidth, view.height,
                                 html_escaped(full_title));
   svg += fmt::format("<text class=\"title\" x=\"{}\" y=\"18\">{}</text>\n", kMargin / 2, html_escaped(full_title));
-  for (const DrawnSketch& one : drawn) draw_state(one, view, &one == &drawn.back(), svg);
+  for (const DrawnSketch& one : drawn) draw_state(one, drawn.front(), view, &one == &drawn.back(), svg);
   draw_scale(view, svg);
   svg += "</svg>\n";
   if (states.size() < 2) return svg;

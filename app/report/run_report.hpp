@@ -9,6 +9,7 @@
 #include "app/report/motion_plots.hpp"
 #include "app/report/motion_scene.hpp"
 #include "app/results/trajectory_csv.hpp"
+#include "core/start/linearisation.hpp"
 
 namespace mbsopt {
 
@@ -22,9 +23,10 @@ struct MotionParts {
 std::string simulation_report(const Scene& scene, const Json& result, const Trajectory& trajectory,
                               const MotionParts& parts = {});
 
-// state holds t and the bodies' part of a row of trajectory.csv. shapes holds the same, displaced along each mode.
-std::string linearisation_report(const Scene& scene, const Json& result, const std::vector<double>& state,
-                                 const std::vector<std::vector<double>>& shapes);
+// x has the outputs and inputs of the result. state holds t and the bodies' part of a row of trajectory.csv. shapes
+// holds the same, displaced along each mode.
+std::string linearisation_report(const Scene& scene, const Json& result, const Linearisation& x,
+                                 const std::vector<double>& state, const std::vector<std::vector<double>>& shapes);
 
 std::string gradient_report(const Scene& scene, const Json& result);
 std::string check_report(const Scene& scene, const Json& result);

@@ -23,6 +23,7 @@ struct SweptObjective {
   std::size_t value, judged;                     // its columns; judged: the true extreme if it is one, else the value
   std::optional<double> lower = {}, upper = {};  // limits of the design
 
+  std::string title() const { return judged == value ? name : name + " (true)"; }
   bool misses_limit(const Point& point) const {
     return (lower && point[judged] < *lower) || (upper && point[judged] > *upper);
   }
@@ -92,8 +93,8 @@ void add_sweep_verdict(HtmlPage& page, const Sweep& sweep, const Json& counts) {
     const std::size_t column = sweep.objectives[o].judged;
     const auto [low, high] = std::ranges::minmax_element(sweep.best, {}, [&](const Point* p) { return (*p)[column]; });
     const std::string unit = after_number({{"unit", sweep.objectives[o].unit}});
-    words += fmt::format("; {} from {:.5g}{} at {} to {:.5g}{} at {}", sweep.objectives[o].name, (**low)[column], unit,
-                         place_of(sweep, **low), (**high)[column], unit, number_of(**high));
+    words += fmt::format("; {} from {:.5g}{} at {} to {:.5g}{} at {}", sweep.objectives[o].title(), (**low)[column],
+                         unit, place_of(sweep, **low), (**high)[column], unit, number_of(**high));
   }
   page.verdict(words + ".");
 }
@@ -104,7 +105,7 @@ void add_best_points(HtmlPage& page, const Sweep& sweep) {
   const std::size_t shown = std::min(kMost, sweep.best.size());
   page.heading("Best points");
   page.paragraph(fmt::format("The {} with the least {}, of {} with values{}. All points stand in sweep.csv.",
-                             counted(shown, "point"), sweep.objectives[sweep.best_by].name, sweep.best.size(),
+                             counted(shown, "point"), sweep.objectives[sweep.best_by].title(), sweep.best.size(),
                              sweep.has_limits ? "; points that keep the limits of the design come first" : ""));
   std::vector<std::string> header{"point"};
   for (const Parameter* p : sweep.varied) header.push_back(unit_label(*p));
@@ -143,15 +144,15 @@ LinePlot plot_over(const Sweep& sweep, std::size_t varied, const SweptObjective&
     all.x.push_back((*point)[1 + varied]), all.y.push_back(value);
     if (std::isfinite(value)) low = std::min(low, value), high = std::max(high, value);
   }
-  LinePlot plot{.title = fmt::format("{} over {}", objective.name, p.name),
+  LinePlot plot{.title = fmt::format("{} over {}", objective.title(), p.name),
                 .x_label = unit_label(p),
-                .y_label = fmt::format("{} [{}]", objective.name, objective.unit),
+                .y_label = fmt::format("{} [{}]", objective.title(), objective.unit),
                 .logarithmic_y = low > 0 && std::log10(high / low) > kDecades,
                 .logarithmic_x = p.scale != ParameterScale::linear};
   const Point& best = *sweep.best.front();
   PlotSeries ring{"best point", {best[1 + varied]}, {best[objective.judged]}, Mark::rings};
   if (sweep.varied.size() == 1) {
-    plot.series.push_back({objective.name, all.x, all.y, Mark::line});
+    plot.series.push_back({objective.title(), all.x, all.y, Mark::line});
     all.part_of = 0;
   }
   plot.series.push_back(std::move(all));

@@ -18,16 +18,18 @@
 namespace mbsopt {
 namespace {
 
-std::string error_cell(double error) { return std::isfinite(error) ? fmt::format("{:.1e}", error) : "-"; }
-
-void add_reference(HtmlPage& page, const TradeoffReference& reference) {
+void add_reference(HtmlPage& page, const Json& result, const TradeoffReference& reference) {
   page.heading("Reference");
   page.paragraph(fmt::format("{}, certified by {}: what the two are apart is how far errors can be told.",
                              in_words(reference.first), in_words(reference.second)));
   std::vector<std::vector<std::string>> rows;
   for (const Quantity& q : reference.errors->quantities())
-    rows.push_back({q.name, q.relative ? "relative" : "absolute", error_cell(q.certificate)});
+    rows.push_back({q.name, q.relative ? "relative" : "absolute", error_text(q.certificate)});
   page.table({"quantity", "errors are", "two methods apart"}, rows);
+  const Json others = result.at("reference").value("without_integration", Json::array());
+  if (!others.empty())
+    page.paragraph(fmt::format("No integration is behind {}: they are not measured.",
+                               fmt::join(others.get<std::vector<std::string>>(), ", ")));
 }
 
 // The plot that a curve belongs to.
@@ -116,9 +118,9 @@ std::string sentence_of(const Json& result, const Tradeoff& tradeoff, std::size_
   if (const auto own = of_gradient ? tradeoff.own_gradient : tradeoff.own) {
     const TradeoffRow& row = tradeoff.rows[*own];
     if (row.status == RowStatus::ok)
-      words +=
-          fmt::format("; as in the file: error {} in {}", error_cell(row.errors(static_cast<Eigen::Index>(quantity))),
-                      duration_text(row.wall_seconds));
+      words += fmt::format("; as in the file: error {} in {}",
+                           error_text(row.errors(static_cast<Eigen::Index>(quantity)), q.certificate),
+                           duration_text(row.wall_seconds));
   }
   return words + ".";
 }
@@ -166,11 +168,12 @@ void add_recommendations(HtmlPage& page, const Json& result) {
     for (const Json& r : result.value(list, Json::array()))
       rows.push_back({r.at("aim"), fmt::format("{:.0e}", r.at("accuracy").get<double>()), r.at("setting_in_words")});
   page.table({"quantity", "accuracy", "fastest setting"}, rows);
-  if (result.contains("applied"))
+  if (result.contains("applied") && result.at("applied").contains("setting"))
     page.paragraph("Applied in recommended.json, " + result.at("applied").at("in_words").get<std::string>() + ".");
 }
 
 void add_rows(HtmlPage& page, const Tradeoff& tradeoff) {
+  if (tradeoff.rows.empty()) return;
   page.heading("All settings");
   std::vector<std::string> header{"setting", "time [ms]", "repetitions", "steps", "right-hand sides", "factorisations"};
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
@@ -190,7 +193,7 @@ void add_rows(HtmlPage& page, const Tradeoff& tradeoff) {
     for (std::size_t q = 0; q < quantities.size(); ++q) {
       const bool front = q < r.pareto.size() && r.pareto[q];
       const auto column = static_cast<Eigen::Index>(q);
-      row.push_back(error_cell(r.errors(column)) + (front ? " *" : ""));
+      row.push_back(error_text(r.errors(column), quantities[q].certificate) + (front ? " *" : ""));
     }
     rows.push_back(std::move(row));
   }
@@ -216,14 +219,17 @@ LinePlot alpha_plot(const std::string& title, const std::string& label) {
 std::string tradeoff_report(const Json& result, const Tradeoff& tradeoff, const ObjectiveUnits& units) {
   HtmlPage page(report_title(result));
   const Json recommendations = result.value("recommendations", Json::array());
-  if (!recommendations.empty())
-    page.verdict(fmt::format("Of {} settings the fastest {}.", tradeoff.rows.size(),
+  const auto measured = std::ranges::count(tradeoff.rows, RowStatus::ok, &TradeoffRow::status);
+  if (!tradeoff.reference.errors->moves())
+    page.verdict("Nothing moves, so that every setting is as exact as another.");
+  else if (!recommendations.empty())
+    page.verdict(fmt::format("Of {} settings that were measured the fastest {}.", measured,
                              recommendations.front().at("in_words").get<std::string>()));
   add_status(page, result);
   add_machine(page, result);
   add_recommendations(page, result);
   add_plots(page, result, tradeoff, units);
-  add_reference(page, tradeoff.reference);
+  add_reference(page, result, tradeoff.reference);
   add_rows(page, tradeoff);
   add_model(page, result);
   add_provenance(page, result);
@@ -243,8 +249,8 @@ std::string penalty_report(const Json& result, const PenaltyStudy& study) {
     for (PlotSeries* s : {&model, &rounding, &augmented}) s->x.push_back(row.alpha);
     model.y.push_back(row.model_error), rounding.y.push_back(row.rounding_error);
     augmented.y.push_back(row.augmented_error);
-    rows.push_back({fmt::format("{:.0e}", row.alpha), error_cell(row.model_error), error_cell(row.rounding_error),
-                    error_cell(row.augmented_error)});
+    rows.push_back({fmt::format("{:.0e}", row.alpha), error_text(row.model_error), error_text(row.rounding_error),
+                    error_text(row.augmented_error)});
   }
   accelerations.series = {model, rounding, augmented};
   page.plot(accelerations);
@@ -274,11 +280,11 @@ std::string penalty_report(const Json& result, const PenaltyStudy& study) {
                                   std::pair<const char*, const PenaltyRun&>{"cholesky", row.cholesky}}) {
       rows.push_back({fmt::format("{:.0e}", row.alpha), name, std::to_string(r.statistics.rhs_evaluations),
                       r.ok ? fmt::format("{:.3g}", r.wall_seconds) : "-",
-                      r.ok ? error_cell(r.statistics.max_position_violation) : "-", r.ok ? "ok" : r.message});
+                      r.ok ? error_text(r.statistics.max_position_violation) : "-", r.ok ? "ok" : r.message});
     }
   }
   page.table({"alpha", "solver", "right-hand sides", "time [s]", "drift", "outcome"}, rows);
-  add_reference(page, study.reference);
+  add_reference(page, result, study.reference);
   add_model(page, result);
   add_provenance(page, result);
   return page.text();

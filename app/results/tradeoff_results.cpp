@@ -8,11 +8,10 @@
 
 #include "app/terminal/text_table.hpp"
 #include "core/expression/counted.hpp"
+#include "core/simulate/simulation_warnings.hpp"
 
 namespace mbsopt {
 namespace {
-
-std::string error_text(double error) { return std::isfinite(error) ? fmt::format("{:.1e}", error) : "-"; }
 
 Json row_json(const Tradeoff& tradeoff, std::size_t index) {
   const TradeoffRow& row = tradeoff.rows[index];
@@ -49,15 +48,17 @@ std::string errors_text(const Tradeoff& tradeoff, const TaskAdvice& advice) {
   const std::size_t simulation = simulation_of(tradeoff, *r.row).value_or(*r.row);
   const auto error = [&](std::size_t q) {
     const bool of_gradient = quantities[q].kind == QuantityKind::gradient;
-    return tradeoff.rows[of_gradient ? *r.row : simulation].errors(static_cast<Eigen::Index>(q));
+    return error_text(tradeoff.rows[of_gradient ? *r.row : simulation].errors(static_cast<Eigen::Index>(q)),
+                      quantities[q].certificate);
   };
-  if (r.quantities.size() == 1 && !advice.fit) return fmt::format("error {:.1e}", error(r.quantities[0]));
+  if (r.quantities.size() == 1 && !advice.fit) return "error " + error(r.quantities[0]);
   std::string text = "errors: ";
   for (const std::size_t q : r.quantities)
-    text += fmt::format("{}{:.1e} in {}", text.ends_with(": ") ? "" : ", ", error(q), quantities[q].name);
+    text += fmt::format("{}{} in {}", text.ends_with(": ") ? "" : ", ", error(q), quantities[q].name);
   if (advice.fit)
-    text +=
-        fmt::format(", {:.1e} in the sum of squares, {:.1e} in its gradient", advice.fit->cost, advice.fit->gradient);
+    text += fmt::format(", {} in the sum of squares, {} in its gradient",
+                        error_text(advice.fit->cost, advice.fit_certificate.cost),
+                        error_text(advice.fit->gradient, advice.fit_certificate.gradient));
   return text;
 }
 
@@ -92,7 +93,23 @@ Json task_json(const Tradeoff& tradeoff, const TaskAdvice& advice, const Recomme
   return json;
 }
 
+// What may make a reference uncertain.
+std::string doubt(const Quantity& q, const std::vector<ObjectiveSpec>& objectives) {
+  const std::string any = "a chaotic motion, or a law that is not smooth?";
+  const auto spec = std::ranges::find(objectives, q.objective_name, &ObjectiveSpec::name);
+  if (spec == objectives.end() || !spec->is_extreme()) return any;
+  return fmt::format(
+      "too much `sharpness`, {:g} now: give it some tens to hundreds, divided by the range of its values? "
+      "Or {}",
+      spec->sharpness.value_or(ObjectiveSpec::kSharpness), any);
+}
+
 }  // namespace
+
+std::string error_text(double error, double certificate) {
+  if (!std::isfinite(error)) return "-";
+  return error < certificate ? fmt::format("< {:.1e}", certificate) : fmt::format("{:.1e}", error);
+}
 
 std::string duration_text(double seconds) {
   return seconds < 1 ? fmt::format("{:.3g} ms", 1e3 * seconds) : fmt::format("{:.3g} s", seconds);
@@ -140,12 +157,24 @@ void add_reference(Run& run, const TradeoffReference& reference) {
                   << '\n'
                   << table.text();
   for (const Quantity& q : errors.quantities()) {
-    if (q.certificate < 1e-6) continue;
-    run.warn(fmt::format(
-        "the reference of {} is known to {:.1e} only: errors below that cannot be told (a chaotic motion, or a law "
-        "that is not smooth?)",
-        q.name, q.certificate));
+    if (!q.is_doubtful()) continue;
+    run.warn(fmt::format("the reference of {} is known to {:.1e} only: errors below that cannot be told ({})", q.name,
+                         q.certificate, doubt(q, run.problem.objectives)));
   }
+  if (!errors.moves())
+    run.warn(
+        fmt::format("nothing moves: the mechanism stays within {:.1e} m of its start, so that every setting is as "
+                    "exact as another. Start it off its equilibrium to compare settings",
+                    errors.extent()));
+  std::string others;
+  for (const ObjectiveSpec& o : run.problem.objectives) {
+    const auto same = [&](const Quantity& q) { return q.objective_name == o.name; };
+    if (std::ranges::any_of(errors.quantities(), same)) continue;
+    run.result["reference"]["without_integration"].push_back(o.name);
+    others += (others.empty() ? "'" : ", '") + o.name + "'";
+  }
+  if (!others.empty())
+    run.context.out << fmt::format("not measured, since no integration is behind them: {}\n", others);
 }
 
 void add_given_settings(Run& run, const Tradeoff& tradeoff) {
@@ -153,23 +182,29 @@ void add_given_settings(Run& run, const Tradeoff& tradeoff) {
   const std::vector<Quantity>& quantities = tradeoff.reference.errors->quantities();
   for (const Quantity& q : quantities) header.push_back(q.name);
   TextTable table(header);
+  const bool is_default = tradeoff.own == tradeoff.defaults;
   const auto add = [&](const char* name, const std::optional<std::size_t>& simulation,
-                       const std::optional<std::size_t>& gradient) {
+                       const std::optional<std::size_t>& gradient, bool shown) {
     for (const std::optional<std::size_t>& i : {simulation, gradient}) {
-      if (!i) continue;
+      if (!i || !shown) continue;
       const TradeoffRow& row = tradeoff.rows[*i];
       std::vector<std::string> cells{in_words(row.setting),
                                      row.status == RowStatus::ok ? duration_text(row.wall_seconds) : "-"};
-      for (Eigen::Index q = 0; q < row.errors.size(); ++q) cells.push_back(error_text(row.errors(q)));
+      for (std::size_t q = 0; q < quantities.size(); ++q)
+        cells.push_back(error_text(row.errors(static_cast<Eigen::Index>(q)), quantities[q].certificate));
       table.add(cells);
       if (row.status != RowStatus::ok) run.warn(fmt::format("{}: {}", cells[0], row.message));
     }
     if (simulation) run.result["settings"][name] = row_json(tradeoff, *simulation);
     if (gradient) run.result["settings"][name]["gradient"] = row_json(tradeoff, *gradient);
   };
-  add("own", tradeoff.own, tradeoff.own_gradient);
-  add("defaults", tradeoff.defaults, tradeoff.default_gradient);
+  add("own", tradeoff.own, tradeoff.own_gradient, true);
+  add("defaults", tradeoff.defaults, tradeoff.default_gradient, !is_default);
   run.context.out << "\nerrors\n" << table.text();
+  if (is_default && tradeoff.own) run.context.out << "the file's settings are the defaults\n";
+  if (!tradeoff.own || tradeoff.rows[*tradeoff.own].status != RowStatus::ok) return;
+  for (const std::string& warning : simulation_warnings(run.problem.scene, tradeoff.rows[*tradeoff.own].statistics))
+    run.warn("as in the file: " + warning);
 }
 
 void add_fit_errors(Run& run, const FitErrors& errors) {
@@ -191,7 +226,8 @@ void add_fit_errors(Run& run, const FitErrors& errors) {
       continue;
     }
     json["settings"][s.name] = {{"error", s.error.cost}, {"gradient_error", s.error.gradient}};
-    table.add({s.name, error_text(s.error.cost), error_text(s.error.gradient)});
+    table.add({s.name, error_text(s.error.cost, errors.certificate.cost),
+               error_text(s.error.gradient, errors.certificate.gradient)});
   }
   run.context.out << '\n' << table.text();
 }
@@ -231,17 +267,19 @@ void add_outcomes(Run& run, const Tradeoff& tradeoff) {
     if (row.status != RowStatus::ok)
       run.result["skipped"].push_back(
           {{"setting", in_words(row.setting)}, {"status", to_string(row.status)}, {"message", row.message}});
-  run.context.out << fmt::format("\n{} measured, {} failed, {} abandoned, {} skipped ({}); {}\n",
-                                 counted(count(RowStatus::ok), "setting"), count(RowStatus::failed),
-                                 count(RowStatus::abandoned), count(RowStatus::skipped), "tradeoff.csv says why",
+  const auto measured = count(RowStatus::ok);
+  const bool all = measured == static_cast<std::ptrdiff_t>(tradeoff.rows.size());
+  run.context.out << fmt::format("\n{} measured, {} failed, {} abandoned, {} skipped{}; {}\n",
+                                 counted(measured, "setting"), count(RowStatus::failed), count(RowStatus::abandoned),
+                                 count(RowStatus::skipped), all ? "" : " (tradeoff.csv says why)",
                                  duration_text(tradeoff.wall_seconds));
 }
 
 void add_applied(Run& run, const Tradeoff& tradeoff, const TaskAdvice& advice) {
   const RecommendationWords words = words_of(tradeoff, advice, run.problem.identification.has_value());
-  run.context.out << "\napplied " << words.sentence() << '\n';
   run.result["applied"] = task_json(tradeoff, advice, words);
-  if (!advice.recommendation.row) run.failed("no recommended.json: " + words.sentence());
+  if (!advice.recommendation.row) return run.failed("no recommended.json: " + words.sentence());
+  run.context.out << "\napplied " << words.sentence() << '\n';
 }
 
 }  // namespace mbsopt

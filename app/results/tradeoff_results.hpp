@@ -11,6 +11,8 @@
 namespace mbsopt {
 
 std::string duration_text(double seconds);  // "12.3 ms", "1.5 s"
+// "1.2e-04", "-" of an error that is not there; "< 4.3e-06" below what the reference is certain of.
+std::string error_text(double error, double certificate = 0);
 // Errors per quantity, by name; unknown ones are left out.
 Json errors_json(const std::vector<Quantity>& quantities, const Eigen::VectorXd& errors);
 

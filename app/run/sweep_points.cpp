@@ -7,8 +7,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "core/expression/did_you_mean.hpp"
 #include "optim/problem/csv_table.hpp"
+#include "optim/problem/parameter_values.hpp"
 #include "optim/problem/start_points.hpp"
 
 namespace mbsopt {
@@ -16,13 +16,7 @@ namespace {
 
 constexpr std::size_t kMostPoints = 10'000'000;  // of a grid: more is an input error, and fills the memory
 
-int parameter_index(const Scene& scene, const std::string& name) {
-  const auto found = std::ranges::find(scene.parameters, name, &Parameter::name);
-  if (found != scene.parameters.end()) return static_cast<int>(found - scene.parameters.begin());
-  std::vector<std::string> names;
-  for (const Parameter& p : scene.parameters) names.push_back(p.name);
-  throw std::invalid_argument(fmt::format("there is no parameter '{}'{}", name, did_you_mean(name, names)));
-}
+int parameter_index(const Scene& scene, const std::string& name) { return parameter_indices(scene, {name}).front(); }
 
 double number_in(const std::string& text, const std::string& option) {
   double value = 0;

@@ -51,7 +51,7 @@ class Parser {
     skip_space();
     if (at_end()) fail("is empty, an expression is expected", 0);
     sum();
-    if (!at_end()) fail("expected an operator (+ - * / ^) before " + found(), at_);
+    if (!at_end()) fail("expected an operator (+ - * / ^) before " + found() + decimal_comma(), at_);
     return std::move(nodes_);
   }
 
@@ -346,6 +346,11 @@ class Parser {
   }
   void skip_space() {
     while (!at_end() && is_space(text_[at_])) ++at_;
+  }
+
+  std::string decimal_comma() const {
+    const bool inside = at_ > 0 && at_ + 1 < text_.size() && is_digit(text_[at_ - 1]) && is_digit(text_[at_ + 1]);
+    return text_[at_] == ',' && inside ? "; decimals have a point" : "";
   }
 
   std::string found() const {

@@ -106,17 +106,18 @@ Warning contradicting_joints(const SimulationSettings& settings, const Simulatio
       statistics.max_position_violation);
 }
 
+// first: what to try before shorter steps, a sentence.
 Warning unresolved(const SimulationSettings& settings, bool solved, const QuadratureError& worst, const char* what,
-                   const char* consequence) {
+                   const char* consequence, const char* first = "") {
   if (!(worst.error > kUnresolved)) return {};
   constexpr const char* kCvodes = ", or take cvodes_bdf or cvodes_adams, which control this error";
   return fmt::format(
       "the steps do not resolve {} of objective '{}': {} has an estimated error of {:.2g} %, most of it near t = "
-      "{:.6g} s. {}{}",
-      what, worst.of, consequence, 100 * worst.error, worst.time,
-      solved                     ? "Tighten simulation.integrator.rtol and atol"
-      : settings.integrator.step ? "Take a smaller simulation.integrator.step"
-                                 : "Set simulation.integrator.max_step, tighten rtol",
+      "{:.6g} s. {}To resolve {}, {}{}",
+      what, worst.of, consequence, 100 * worst.error, worst.time, first, what,
+      solved                     ? "tighten simulation.integrator.rtol and atol"
+      : settings.integrator.step ? "take a smaller simulation.integrator.step"
+                                 : "set simulation.integrator.max_step, tighten rtol",
       solved ? "" : kCvodes);
 }
 
@@ -162,7 +163,8 @@ std::vector<std::string> simulation_warnings(const Scene& scene, const Simulatio
     if (add(warning(settings, statistics))) break;
   add(unresolved(settings, statistics.solved, statistics.quadrature, "the running cost", "its integral"));
   add(unresolved(settings, statistics.solved, statistics.extreme_quadrature, "the peaks",
-                 "the integral of their exponential"));
+                 "the integral of their exponential",
+                 "Give it less `sharpness`: some tens to hundreds, divided by the range of its values. "));
   add(unresolved(settings, statistics.solved, statistics.gradient_quadrature, "the derivative of the integrand",
                  "the gradient"));
   add(near_singular(settings, statistics));

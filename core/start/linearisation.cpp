@@ -159,6 +159,11 @@ Linearisation linearise(const Mechanism& mechanism, const FormulationSettings& f
   return x;
 }
 
+Eigen::MatrixXcd transfer(const Linearisation& x, std::complex<double> s) {
+  const Eigen::MatrixXcd left = s * Eigen::MatrixXcd::Identity(x.A.rows(), x.A.cols()) - x.A;
+  return x.C * left.partialPivLu().solve(Eigen::MatrixXcd(x.B)) + x.D;
+}
+
 bool is_equilibrium(const Linearisation& x) {
   constexpr double kAtRest = 1e-6;  // an equilibrium is found to 1e-11 of the length
   const double fastest = x.eigenvalues.size() > 0 ? x.eigenvalues.cwiseAbs().maxCoeff() : 0.0;

@@ -41,6 +41,9 @@ struct Linearisation {
 Linearisation linearise(const Mechanism& mechanism, const FormulationSettings& formulation, const StatePoint& at,
                         const std::vector<int>& inputs, const std::vector<int>& outputs);
 
+// C (s - A)^-1 B + D: outputs x inputs. s = 2 pi i f is the response at f [Hz], s = 0 the static one.
+Eigen::MatrixXcd transfer(const Linearisation& x, std::complex<double> s);
+
 // Whether the state rests and stays at rest, except for rounding.
 bool is_equilibrium(const Linearisation& x);
 

@@ -178,7 +178,7 @@ void describe_end(const CaseEvaluator& evaluator, const DesignProgram& program, 
     v.at_lower = touches(v.value, v.lower, size), v.at_upper = touches(v.value, v.upper, size);
   }
   result.objective_final = end.f;
-  result.violation = program.violation(end.c);
+  result.violation = result.true_violation = program.violation(end.c);
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     DesignConstraint& c = result.constraints[i];
     const Eigen::Index row = static_cast<Eigen::Index>(i);
@@ -194,7 +194,6 @@ void describe_solution(DesignProgram& program, const VariableScaling& scaling, c
   const Eigen::VectorXd& x = rounds.solution.x;
   result.final_evaluation = program.evaluation(result.rho);
   describe_objective(program, rounds.true_values, result);
-  result.true_violation = result.violation;
   for (std::size_t i = 0; i < result.constraints.size(); ++i) {
     DesignConstraint& c = result.constraints[i];
     c.true_value = rounds.true_values[static_cast<std::size_t>(program.psi_of(static_cast<Eigen::Index>(i)))];

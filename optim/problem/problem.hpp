@@ -64,6 +64,12 @@ struct ObjectiveSpec {
   std::optional<UserCostSpec> user = {};  // the same by its name, in a file
   bool is_written_in_cpp() const { return running_in_cpp || terminal_in_cpp || user; }
 
+  bool is_extreme() const {  // has a sharpness
+    for (std::size_t k = 0; k < means.size(); ++k)
+      if (means[k] && kMeanKinds[k].extreme != Extreme::none) return true;
+    return false;
+  }
+
   // kind: "rms_of"
   std::optional<Expression>& mean(std::string_view kind) {
     return means[static_cast<std::size_t>(std::ranges::find(kMeanKinds, kind, &MeanKind::name) - kMeanKinds)];

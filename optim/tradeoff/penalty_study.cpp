@@ -86,6 +86,7 @@ class Study {
     ReferenceOptions options;
     options.seconds_per_run = std::max(10.0, options_.budget_seconds / 6);
     options.interrupted = options_.interrupted, options.clock = options_.clock;
+    options.progress = [this](const std::string& doing, double done) { say("reference, " + doing, done); };
     options.gradients = false;
     result_.reference = converged_reference(runs_, options);
     result_.message = result_.reference.message;

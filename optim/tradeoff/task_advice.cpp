@@ -48,7 +48,10 @@ TaskAdvice TaskAdviser::at(double accuracy) {
     advice.recommendation =
         recommend(tradeoff_, quantities_, accuracy, fit_ ? exact : std::function<bool(const TradeoffRow&)>());
     const std::optional<std::size_t> row = advice.recommendation.row;
-    if (fit_ && row) advice.fit = fits_.at(&tradeoff_.rows[*row]).error;
+    if (fit_ && row) {
+      advice.fit = fits_.at(&tradeoff_.rows[*row]).error;
+      advice.fit_certificate = fit_->found().certificate;
+    }
     if (!row && out_of_time_) why_not += fmt::format("; the {:.3g} s for fits are over", seconds_);
   }
   return advice;

@@ -21,6 +21,7 @@ namespace mbsopt {
 struct TaskAdvice {
   Recommendation recommendation;
   std::optional<FitErrors::Apart> fit;  // of the recommended row, if the file has an identification
+  FitErrors::Apart fit_certificate = {};
 };
 
 class TaskAdviser {

@@ -78,11 +78,8 @@ class Sweep {
     say("reference", 0);
     ReferenceOptions options;
     options.seconds_per_run = std::max(10.0, options_.budget_seconds / 6);
-    options.interrupted = [this] {  // asked after every step
-      say("reference", 0);
-      return interrupted();
-    };
-    options.clock = options_.clock;
+    options.interrupted = options_.interrupted, options.clock = options_.clock;
+    options.progress = [this](const std::string& doing, double done) { say("reference, " + doing, done); };
     result_.reference = converged_reference(runs_, options);
     result_.message = result_.reference.message;
   }
@@ -335,7 +332,9 @@ class Sweep {
     for (TradeoffRow& row : result_.rows) row.pareto.clear();
     for (Eigen::Index q = 0; q < count(); ++q) {
       bound.clear();
-      for (const TradeoffRow& row : result_.rows) bound.push_back(row.bounds(q));
+      const double certain = result_.reference.errors->quantities()[static_cast<std::size_t>(q)].certificate;
+      for (const TradeoffRow& row : result_.rows)
+        bound.push_back(std::isfinite(row.bounds(q)) ? std::max(row.bounds(q), certain) : kNaN);
       const std::vector<bool> front = pareto_front(cost, bound);
       for (std::size_t i = 0; i < front.size(); ++i) result_.rows[i].pareto.push_back(front[i]);
     }
@@ -409,12 +408,12 @@ Recommendation recommend(const Tradeoff& tradeoff, std::vector<std::size_t> quan
     return found;
   }
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  const auto bound = [&](std::size_t i) {
+  const auto bound = [&](std::size_t i) {  // no less than the reference is certain of
     const TradeoffRow& row = tradeoff.rows[i];
     const bool both = gradients && values;
     if (both && (!row.setting.gradient || *row.setting.gradient == GradientMethod::differences)) return kInfinity;
     const std::optional<std::size_t> simulation = both ? simulation_of(tradeoff, i) : i;
-    double largest = 0;
+    double largest = certificate;
     for (const std::size_t q : found.quantities) {
       const bool of_gradient = all[q].kind == QuantityKind::gradient;
       if (!of_gradient && !simulation) return kInfinity;

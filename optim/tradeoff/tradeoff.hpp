@@ -56,10 +56,10 @@ Tradeoff measure_tradeoff(const Scene& scene, const std::vector<Objective>& obje
 std::optional<std::size_t> simulation_of(const Tradeoff& tradeoff, std::size_t row);
 
 // The fastest row whose bounds in these quantities are within the accuracy. A bound excludes errors that pass through
-// zero by chance. Of rows that are equally fast to a tenth, it takes the one with the lowest bound. There is none if
-// the reference is not three times as exact as requested. If gradients and other quantities are requested, it takes
-// rows of exact gradients, with the bounds of their simulations. `also` is a further condition, tested for the fastest
-// rows first until it holds.
+// zero by chance. Of rows that are equally fast to a tenth, it takes the one with the lowest bound, where bounds below
+// the certainty of the reference are equal. There is none if the reference is not three times as exact as requested. If
+// gradients and other quantities are requested, it takes rows of exact gradients, with the bounds of their simulations.
+// `also` is a further condition, tested for the fastest rows first until it holds.
 Recommendation recommend(const Tradeoff& tradeoff, std::vector<std::size_t> quantities, double accuracy,
                          const std::function<bool(const TradeoffRow&)>& also = {});
 

@@ -33,6 +33,8 @@ struct Quantity {
   bool relative = true;
   double scale = 1;        // divisor of the error
   double certificate = 0;  // difference of two methods in the same measure
+
+  bool is_doubtful() const { return certificate >= 1e-6; }  // 1e-9 and less are usual
 };
 
 class TradeoffErrors {
@@ -49,6 +51,9 @@ class TradeoffErrors {
 
   const Answer& exact() const { return exact_; }
   const std::vector<Quantity>& quantities() const { return quantities_; }
+  // The largest distance of the motion from its start [m], and whether that is more than rounding.
+  double extent() const { return distance_.extent(exact_.motion, exact_.y_initial); }
+  bool moves() const { return quantities_.front().relative || quantities_.front().is_doubtful(); }
   // One error per quantity; NaN if the answer does not contain it.
   Eigen::VectorXd of(const Answer& answer) const;
   // Likewise the deviations; NaN for the motion and the sensors, which have no single sign.

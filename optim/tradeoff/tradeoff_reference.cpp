@@ -61,7 +61,15 @@ class Search {
 
  private:
   bool interrupted() const { return options_.interrupted && options_.interrupted(); }
-  RunLimit limit() const { return {options_.seconds_per_run, options_.interrupted, options_.clock}; }
+  RunLimit limit(const std::string& doing) const {
+    RunLimit limit{options_.seconds_per_run, options_.interrupted, options_.clock};
+    if (!options_.progress) return limit;
+    const SimulationSettings& s = runs_.scene().simulation;
+    limit.progress = [this, &s, doing](double t) {
+      options_.progress(doing, (t - s.start_time) / (s.end_time - s.start_time));
+    };
+    return limit;
+  }
 
   static constexpr double kAgreeing = 1e-7;
   static constexpr double kSettledWell = 1e-10;  // gradients
@@ -92,12 +100,13 @@ class Search {
       Candidate next;
       next.settings = with_tolerance(runs_.scene().simulation, integrator, rtol);
       next.settings.formulation = constrained(next.settings.formulation);
-      next.answer = runs_.motion(next.settings, limit());
+      next.method = {integrator, rtol, {}};
+      next.answer = runs_.motion(next.settings, limit(in_words(next.method)));
       if (!next.answer.ok) {
         if (!best) problem_ += fmt::format("{}{}: {}", problem_.empty() ? "" : "; ", integrator, next.answer.message);
         break;
       }
-      next.method = {integrator, rtol, {}, next.answer.wall_seconds};
+      next.method.wall_seconds = next.answer.wall_seconds;
       if (best) next.change = apart(next.answer, best->answer);
       if (best && next.change >= best->change) break;
       best = std::move(next);
@@ -140,12 +149,13 @@ class Search {
       next.settings = with_tolerance(own, method.integrator, own.integrator.rtol);
       next.settings.integrator.step = (own.end_time - own.start_time) / count;
       next.settings.formulation = constrained(next.settings.formulation);
-      next.answer = runs_.motion(next.settings, limit());
+      next.method = {method.integrator, 0, next.settings.integrator.step};
+      next.answer = runs_.motion(next.settings, limit(in_words(next.method)));
       if (!next.answer.ok) {
         if (best || next.answer.out_of_time || interrupted()) break;
         continue;
       }
-      next.method = {method.integrator, 0, next.settings.integrator.step, next.answer.wall_seconds};
+      next.method.wall_seconds = next.answer.wall_seconds;
       if (best) next.change = apart(next.answer, best->answer);
       if (best && next.change >= best->change && best->change < kResolved) break;
       best = std::move(next);
@@ -189,7 +199,7 @@ class Search {
     if (!runs_.has_gradients() || !options_.gradients) return;
     const GradientCost cost = gradient_cost(runs_.scene().parameters.size(), runs_.objectives().size());
     const GradientMethod method = cost.tlm <= cost.adjoint ? GradientMethod::tlm : GradientMethod::adjoint;
-    RunLimit longer = limit();
+    RunLimit longer = limit("gradients");
     longer.seconds *= 4;
     auto [of_a, of_b, closest] = closest_gradients(gradients_of(a, method, longer), gradients_of(b, method, longer));
     if (!of_a.ok || !of_b.ok) return;

@@ -42,6 +42,8 @@ struct ReferenceOptions {
   bool gradients = true;
   std::function<bool()> interrupted = {};
   Clock clock = {};  // of seconds_per_run
+  // done: 0..1, of the run that `doing` names
+  std::function<void(const std::string& doing, double done)> progress = {};
 };
 
 TradeoffReference converged_reference(const TradeoffRuns& runs, const ReferenceOptions& options = {});

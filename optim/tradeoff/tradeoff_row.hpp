@@ -42,7 +42,7 @@ struct TradeoffRow {
   Eigen::VectorXd errors;      // per quantity of the reference; NaN: not of this row
   Eigen::VectorXd deviations;  // likewise, with a sign
   Eigen::VectorXd bounds;      // likewise, the largest error from here on along the curve (tradeoff_curves.hpp)
-  std::vector<bool> pareto;    // per quantity: nothing is faster and has a lower bound
+  std::vector<bool> pareto;    // per quantity: nothing is faster and has a lower bound, as far as is certain
   bool within_floor = false;   // no error is larger than what the reference is certain of
 };
 

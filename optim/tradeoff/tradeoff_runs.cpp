@@ -18,6 +18,7 @@ class Watch {
   bool go_on(double t) {
     out_of_time_ = stopwatch_.seconds() > limit_.seconds;
     t_ = t;
+    if (limit_.progress) limit_.progress(t);
     return !out_of_time_ && !(limit_.interrupted && limit_.interrupted());
   }
   double seconds() const { return stopwatch_.seconds(); }

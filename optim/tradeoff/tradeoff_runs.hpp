@@ -34,7 +34,8 @@ struct Answer {
 struct RunLimit {
   double seconds = std::numeric_limits<double>::infinity();  // a run that takes longer is abandoned
   std::function<bool()> interrupted = {};
-  Clock clock = {};  // of the limit and of the times reported
+  Clock clock = {};                             // of the limit and of the times reported
+  std::function<void(double t)> progress = {};  // after steps
 };
 
 class TradeoffRuns {

@@ -177,6 +177,23 @@ void check_tutorial(const std::string& name) {
   CHECK(commands >= 4);
 }
 
+// The number of cells of a table's row, 0 if it does not end on its line.
+std::size_t cells_of(std::string row) {
+  row.erase(row.find_last_not_of(' ') + 1);
+  std::size_t bars = 0;
+  for (std::size_t i = 0; i < row.size(); ++i) bars += row[i] == '|' && (i == 0 || row[i - 1] != '\\');
+  return row.ends_with('|') ? bars - 1 : 0;
+}
+
+void add_fields(const nlohmann::json& schema, std::set<std::string>& fields) {
+  if (!schema.is_structured()) return;
+  for (const auto& [key, value] : schema.items()) {
+    if (key == "properties")
+      for (const auto& [name, field] : value.items()) fields.insert(name);
+    add_fields(value, fields);
+  }
+}
+
 }  // namespace
 
 TEST_CASE("each command of the tutorials prints what its page says", "[docs]") {
@@ -214,6 +231,39 @@ TEST_CASE("every page that the README links to is there", "[docs]") {
     ++links;
   }
   CHECK(links > 0);
+}
+
+TEST_CASE("each table of the docs begins with a head and a rule, and its rows have as many cells", "[docs]") {
+  for (const fs::directory_entry& file : fs::directory_iterator(fs::path(MBSOPT_SOURCE_DIR) / "docs")) {
+    if (file.path().extension() != ".md") continue;
+    std::istringstream page(content_of(file.path()));
+    std::size_t row = 0, cells = 0, number = 0;
+    for (std::string line; std::getline(page, line);) {
+      ++number;
+      const std::size_t indent = line.find_first_not_of(' ');
+      row = indent < 4 && line[indent] == '|' ? row + 1 : 0;  // four spaces begin code
+      if (row == 0) continue;
+      if (row == 1) cells = cells_of(line);
+      INFO(file.path().filename() << ':' << number << ": " << line);
+      CHECK(cells_of(line) == cells);
+      CHECK(cells > 0);
+      CHECK((row != 2 || line.find_first_not_of("|-: ") == std::string::npos));
+    }
+  }
+}
+
+TEST_CASE("docs/fields.md names every field of the schema", "[docs]") {
+  const std::string page = content_of(fs::path(MBSOPT_SOURCE_DIR) / "docs/fields.md");
+  std::set<std::string> fields;
+  add_fields(nlohmann::json::parse(run_command({"schema"}).out), fields);
+  CHECK(fields.size() > 100);
+  for (const std::string& field : fields) {
+    INFO(field);
+    const bool named =
+        page.find('`' + field + '`') != std::string::npos || page.find('`' + field + '.') != std::string::npos ||
+        page.find('.' + field + '`') != std::string::npos || page.find('"' + field + '"') != std::string::npos;
+    CHECK(named);
+  }
 }
 
 TEST_CASE("the gallery page shows each problem file", "[docs]") {

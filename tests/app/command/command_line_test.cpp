@@ -22,6 +22,22 @@ TEST_CASE("help and version are results, an unknown command is bad input", "[com
   CHECK(run_command({"simulate", "x.json", "--threads", "0"}).exit_code == kBadInput);
 }
 
+TEST_CASE("an argument that nothing takes is named, with the option that may be meant", "[command]") {
+  const CommandOutcome option = run_command({"simulate", "x.json", "--outt", "x"});
+  CHECK(option.exit_code == kBadInput);
+  CHECK_THAT(option.err, Contains("simulate: there is no option '--outt' (did you mean '--out'?); known: ") &&
+                             Contains("--threads"));
+  CHECK_THAT(run_command({"simulate", "x.json", "--outt=x"}).err, Contains("no option '--outt' (did you mean"));
+  CHECK_THAT(run_command({"simulate", "x.json", "y.json", "z"}).err, Contains("simulate: nothing takes 'y.json z'"));
+}
+
+TEST_CASE("a decimal comma is answered by the point that decimals have", "[command]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("rod.json", kPendulum);
+  CHECK_THAT(run_command({"validate", file, "--out", folder.file("out"), "--set", "bodies[0].mass=\"1,2\""}).err,
+             Contains("before ','; decimals have a point"));
+}
+
 TEST_CASE("help is a command, too", "[command]") {
   const CommandOutcome all = run_command({"help"}), design = run_command({"help", "design"});
   CHECK(all.exit_code == kDone);

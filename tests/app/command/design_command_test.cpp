@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <signal.h>
 #include <unistd.h>
 
@@ -68,6 +69,21 @@ TEST_CASE("design: limits in conflict stand in the terminal with their prices", 
   CHECK(conflicts[0].at("missed").get<double>() == Approx(10).epsilon(2e-3));
   CHECK(conflicts[0].at("price").get<double>() == Approx(1.0 / 50));
   CHECK(conflicts[1].at("price").get<double>() == Approx(1.0 / 80));
+}
+
+TEST_CASE("design: the report's headline has the violation of true extremes", "[command][report]") {
+  const TemporaryFolder folder;
+  // The swing begins at 0.
+  const CommandOutcome outcome =
+      run_command({"design", folder.write("rod.json", kPendulum), "--out", folder.file("out"), "--quiet", "--set",
+                   R"(design.subject_to=[{"maximum_of": "swing", "upper": -0.5, "sharpness": 5}])", "--set",
+                   "parameters.k.lower=1", "--set", "parameters.k.upper=100"});
+  INFO(outcome.out << outcome.err);
+  const auto optimizer = json_of(folder.path / "out/result.json").at("optimizer");
+  const double smooth = optimizer.at("infeasibility"), exact = optimizer.at("true_infeasibility");
+  REQUIRE(exact > 1.1 * smooth);
+  CHECK_THAT(content_of(folder.path / "out/report.html"),
+             Contains(fmt::format("the largest relative violation of a limit is {:.2g};", exact)));
 }
 
 TEST_CASE("design: optimized.json is a problem whose objective is the optimum's", "[command]") {

@@ -43,6 +43,8 @@ TEST_CASE("linearise writes eigenvalues and a transfer function, and warns besid
   const double A21 = x.at("A").at(1).at(0), B = x.at("B").at(1).at(0), C = x.at("C").at(0).at(0);
   CHECK(C * B / A21 == Approx(-1 / 50.0).epsilon(1e-12));
   CHECK(x.at("D").at(0).at(0).get<double>() == 0);
+  const std::string report = content_of(folder.path / "out/report.html");
+  CHECK_THAT(report, Contains("From inputs to outputs") && Contains(">0.02<") && Contains("x by u"));
 
   const CommandOutcome stretched = run_command(arguments("0.3"));
   REQUIRE(stretched.exit_code == kDone);
@@ -58,8 +60,9 @@ TEST_CASE("linearise takes a later state, and refuses what is not there", "[comm
   CHECK(run("--at", "0.5").exit_code == kDone);
   CHECK(json_of(folder.path / "out/result.json").at("linearisation").at("time").get<double>() == Approx(0.5));
   CHECK_THAT(run("--at", "-1").err, Contains("must be after start_time"));
-  CHECK_THAT(run("--inputs", "w").err, Contains("--inputs: there is no 'w'"));
-  CHECK_THAT(run("--outputs", "y").err, Contains("--outputs: there is no 'y'"));
+  CHECK_THAT(run("--inputs", "w").err,
+             Contains("--inputs: there is no parameter 'w'") && Contains("known: k, c, u, at"));
+  CHECK_THAT(run("--outputs", "y").err, Contains("--outputs: there is no sensor 'y'") && Contains("known: x, vx"));
   CHECK(run("--outputs", "y").exit_code == kBadInput);
 }
 

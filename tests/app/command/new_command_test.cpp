@@ -62,4 +62,5 @@ TEST_CASE("new names the kinds that there are", "[command]") {
   const CommandOutcome outcome = run_command({"new", "gearbox"});
   CHECK(outcome.exit_code == kBadInput);
   CHECK_THAT(outcome.err, Contains("pendulum") && Contains("four-bar") && Contains("suspension"));
+  CHECK_THAT(run_command({"new", "penduum"}).err, Contains("there is no 'penduum' (did you mean 'pendulum'?)"));
 }

@@ -121,6 +121,25 @@ TEST_CASE("the report of a sweep names the extremes, plots each objective and li
   CHECK_THAT(grid, !Contains("\"mark\":\"line\"") && !Contains("limits of the design"));
 }
 
+TEST_CASE("a sweep says where true extremes are least and largest, the same everywhere", "[command][sweep][report]") {
+  const TemporaryFolder folder;
+  const CommandOutcome outcome =
+      run_command({"sweep", folder.write("rod.json", kSwingingRod), "--out", folder.file("out"), "--vary",
+                   "free=0.3:0.7:5", "--set", R"(objectives.peak={"maximum_of": "speed", "sharpness": 5})"});
+  INFO(outcome.out << outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  const std::vector<double> peaks = read_csv(folder.file("out/sweep.csv")).column("peak true");
+  const auto [least, largest] = std::ranges::minmax(peaks);
+  const nlohmann::json ranges = json_of(folder.path / "out/result.json").at("sweep").at("objectives");
+  CHECK(ranges.at("peak").at("of") == "true_value");
+  CHECK(ranges.at("peak").at("least").get<double>() == Approx(least).epsilon(1e-12));
+  CHECK(ranges.at("peak").at("largest").get<double>() == Approx(largest).epsilon(1e-12));
+  CHECK(ranges.at("track").at("of") == "value");
+  CHECK_THAT(outcome.out, Contains("peak (true)"));
+  CHECK_THAT(content_of(folder.path / "out/report.html"),
+             Contains(fmt::format("peak (true) from {:.5g}", least)) && Contains("peak (true) over free"));
+}
+
 TEST_CASE("a sweep shows that it works before its first point is done", "[command][sweep]") {
   const TemporaryFolder folder;
   std::ostringstream out, err;
@@ -143,6 +162,7 @@ TEST_CASE("what a sweep cannot vary is said", "[command][sweep]") {
   };
   CHECK_THAT(words({}), Contains("either --vary") && Contains("--points"));
   CHECK_THAT(words({"--vary", "fre=1:2:3"}), Contains("no parameter 'fre'") && Contains("free"));
+  CHECK_THAT(words({"--vary", "zz=1:2:3"}), Contains("no parameter 'zz'; known: k, free"));
   CHECK_THAT(words({"--vary", "free=1:2"}), Contains("no number of points"));
   CHECK_THAT(words({"--vary", "free=2:1:3"}), Contains("not below"));
   CHECK_THAT(words({"--vary", "k=-1:1:3"}), Contains("logarithmic"));

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <chrono>
+#include <cmath>
 #include <sstream>
 #include <thread>
 
+#include "app/results/tradeoff_results.hpp"
 #include "app/terminal/exit_code.hpp"
 #include "tests/app/run_command.hpp"
 #include "tests/app/signal_handler.hpp"
@@ -83,6 +85,12 @@ TEST_CASE("tradeoff: a table of all settings, plots, and advice in words for eac
                          Contains("Lines lead from loose to tight settings through bounds") &&
                          Contains(result.at("machine").at("cpu").get<std::string>()));
   CHECK(report.find("nan") == std::string::npos);
+  const auto measured =
+      std::ranges::count_if(csv.lines, [](const std::string& line) { return line.find(",ok,") != std::string::npos; });
+  CHECK_THAT(report, Contains("Of " + std::to_string(measured) + " settings that were measured the fastest"));
+  // The file has the default settings: they are listed once.
+  CHECK_THAT(outcome.out, Contains("(as in the file) at") && !Contains("(defaults) at") &&
+                              Contains("the file's settings are the defaults"));
   for (const char* list : {"recommendations", "task_recommendations"})
     for (const auto& r : result.at(list))
       CHECK(
@@ -152,6 +160,66 @@ TEST_CASE("tradeoff --apply of an accuracy that nothing has fails in words and k
   CHECK_THAT(outcome.err, Contains("no recommended.json") && Contains("the reference itself is certain to"));
   CHECK(fs::exists(folder.path / "out/tradeoff.csv"));
   CHECK_FALSE(fs::exists(folder.path / "out/recommended.json"));
+  CHECK_THAT(outcome.out, !Contains("applied"));
+  CHECK_THAT(content_of(folder.path / "out/report.html"), !Contains("Applied in recommended.json"));
+}
+
+TEST_CASE("tradeoff of an equilibrium says that nothing moves, and what it does not measure", "[command]") {
+#ifdef __SANITIZE_ADDRESS__
+  return;  // twenty times slower
+#endif
+  const TemporaryFolder folder;
+  std::string text = kPendulum;
+  const auto begin = text.find("\"objectives\"");
+  text.replace(begin, text.rfind('}') - begin,
+               R"("initial": {"equilibrium": true}, "objectives": {"slowest": {"eigenvalue": {"mode": 1}}})");
+  const CommandOutcome outcome = run_command(
+      {"tradeoff", folder.write("rest.json", text), "--budget", kBudget, "--out", folder.file("out"), "--quiet"});
+  INFO(outcome.out << outcome.err);
+  REQUIRE(outcome.exit_code == kDone);
+  CHECK_THAT(outcome.err, Contains("nothing moves: "));
+  CHECK_THAT(outcome.out, Contains("not measured, since no integration is behind them: 'slowest'"));
+  CHECK(json_of(folder.path / "out/result.json").at("reference").at("without_integration") ==
+        nlohmann::json::array({"slowest"}));
+  CHECK_THAT(content_of(folder.path / "out/report.html"),
+             Contains("Nothing moves") && Contains("No integration is behind slowest"));
+}
+
+TEST_CASE("an error below the certainty of the reference is shown as this certainty", "[command]") {
+  CHECK(error_text(2.7e-10, 5e-6) == "< 5.0e-06");
+  CHECK(error_text(0, 5e-6) == "< 5.0e-06");
+  CHECK(error_text(6e-6, 5e-6) == "6.0e-06");
+  CHECK(error_text(0, 0) == "0.0e+00");
+  CHECK(error_text(std::nan(""), 5e-6) == "-");
+}
+
+TEST_CASE("tradeoff passes on the warnings of the file's settings, and doubts the sharpness of a peak", "[command]") {
+  const TemporaryFolder folder;
+  // The peak is at the start, and its exponential falls to 1/e in 0.1 ms.
+  const std::string file = folder.write("block.json", R"({
+    "format": 1, "name": "block",
+    "bodies": [{"name": "block", "mass": 2, "inertia": [1, 1, 1]}],
+    "joints": [{"name": "rail", "type": "translational", "body2": "block", "axis1": [1, 0, 0], "axis2": [1, 0, 0]}],
+    "forces": [{"name": "pull", "type": "force", "body": "block", "components": ["-50*x - 2*vx", 0, 0]}],
+    "sensors": {"x": {"quantity": "position", "body": "block", "component": "x"},
+                "vx": {"quantity": "velocity", "body": "block", "component": "x"}},
+    "initial": {"conditions": [{"sensor": "x", "value": 0.3, "rate": -1}]},
+    "simulation": {"end_time": 1},
+    "objectives": {"peak": {"maximum_of": "1e3*x", "sharpness": 10}}})");
+  const auto check_advice = [](const std::string& words) {
+    CHECK_THAT(words, Contains("the steps do not resolve the peaks of objective 'peak'") &&
+                          Contains("Give it less `sharpness`: some tens to hundreds, divided by the range"));
+  };
+  check_advice(run_command({"simulate", file, "--out", folder.file("simulated"), "--quiet"}).err);
+  std::ostringstream out, err;
+  const bool terminal = true;
+  REQUIRE(run_command_line({"tradeoff", file, "--budget", "0", "--out", folder.file("out")}, out, err, terminal) ==
+          kDone);
+  check_advice(err.str());
+  CHECK_THAT(err.str(), Contains("as in the file: the steps do not resolve"));
+  CHECK_THAT(err.str(), Contains("the reference of peak is known to ") &&
+                            Contains("(too much `sharpness`, 10 now: give it some tens to hundreds"));
+  CHECK_THAT(err.str(), Contains("reference, gauss6 at rtol 1e-07 [####"));
 }
 
 TEST_CASE("tradeoff --alpha: model error, rounding and drift of the penalty form", "[command]") {

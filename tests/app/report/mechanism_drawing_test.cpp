@@ -84,6 +84,32 @@ TEST_CASE("springs and bodies of three points are drawn, directions are no point
   CHECK(mechanism_drawing("none", {0, 1}, {}).empty());
 }
 
+TEST_CASE("the name of a bar stands beside it, away from its earlier position", "[report]") {
+  const Scene scene = drawn_pendulum();
+  const std::regex label("<text x=\"([0-9.]+)\" y=\"([0-9.]+)\"( text-anchor=\"end\")?>");
+  for (const double angle : {0.8, 2.3, 4.0, 5.5}) {
+    for (const double earlier : {angle, angle + 0.2, angle - 0.2}) {
+      const std::string svg =
+          mechanism_drawing("one", {0, 1}, {{"first", scene, bar_at(earlier)}, {"last", scene, bar_at(angle)}});
+      std::smatch found;
+      REQUIRE(std::regex_search(svg, found, label));
+      const auto off = [&](const std::vector<double>& bar, double x, double y) {
+        const double dx = bar[2] - bar[0], dy = bar[3] - bar[1];
+        return (dx * (y - bar[1]) - dy * (x - bar[0])) / std::hypot(dx, dy);  // signed distance
+      };
+      const double x = std::stod(found[1]), y = std::stod(found[2]), wide = found[3].matched ? -40 : 40;
+      const std::vector<double> last = numbers_of_body(svg, 1);
+      INFO(angle << ' ' << earlier);
+      const double side = off(last, x, y);
+      for (const double corner_x : {x, x + wide})
+        for (const double corner_y : {y, y - 9}) CHECK(side * off(last, corner_x, corner_y) > 0);
+      if (earlier == angle) continue;
+      const std::vector<double> first = numbers_of_body(svg, 0);
+      CHECK(side * off(last, (first[0] + first[2]) / 2, (first[1] + first[3]) / 2) < 0);
+    }
+  }
+}
+
 TEST_CASE("a drawing follows the values of the parameters", "[report]") {
   Scene scene = pendulum();
   scene.bodies[0].points["tip"] = {f("c"), 0.0, 0.0};

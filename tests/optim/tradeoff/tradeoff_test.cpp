@@ -164,6 +164,13 @@ TEST_CASE("an error that is small by chance is not recommended", "[tradeoff]") {
   CHECK(*recommend(tradeoff, {0}, 2e-5).row == 3);
   CHECK(*recommend(tradeoff, {0}, 2e-6).row == 5);
   CHECK(recommend(tradeoff, {0}, 5e-7).why_not.find("the best has 1.0e-06") != std::string::npos);
+  // Errors below what the reference is certain of are equal: the faster setting is taken.
+  const double certain = tradeoff.reference.errors->quantities()[0].certificate;
+  REQUIRE(certain > 0);
+  tradeoff.rows.clear();
+  add("a", 1, 0.5 * certain), add("b", 1.05, 0);
+  bound_errors(tradeoff.rows);
+  CHECK(*recommend(tradeoff, {0}, 1e-3).row == 0);
 }
 
 TEST_CASE("advice for a design covers the gradient, at the same settings as the value", "[tradeoff]") {
