@@ -33,6 +33,7 @@
 #include "optim/fit/experiment.hpp"
 #include "optim/fit/fit_comparison.hpp"
 #include "optim/fit/identification.hpp"
+#include "optim/fit/parameter_profile.hpp"
 #include "optim/fit/recovery.hpp"
 #include "optim/fit/start_residuals.hpp"
 #include "optim/fit/unknown_parameters.hpp"
@@ -384,6 +385,9 @@ int identify_command(const CommandContext& context) {
   std::vector<std::string> left_out;
   const Problem needed = what_measurements_need(cut.problem, &left_out);
   say_left_out(run, left_out, "measurement");
+  if (!context.options.profiles.empty())  // before anything is fitted
+    profiled_unknowns(context.options.profiles,
+                      names_of(unknowns_of_fit(needed.scene, *needed.identification), *needed.identification));
   const std::optional<MultistartSpec>& starts = run.problem.identification->multistart;
   const bool cut_again = starts && !context.options.preflight;  // for the values of the best start, with its warnings
   for (std::size_t i = 0; !cut_again && i < cut.warnings.size(); ++i) run.warn(cut.warnings[i]);
